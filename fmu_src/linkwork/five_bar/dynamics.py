@@ -1,0 +1,360 @@
+"""Dynamics of the five-bar slider in its two freedoms (Youssef, chapters II and III, reduced form).
+
+With q = (th2, u), w2 = th2' and v = u' the equations of motion are
+
+    m11 w2' + m12 v' + b1 = T + Q1        (crank)
+    m12 w2' + m22 v' + b2 = F2 + Q2       (slider)
+
+where m is the inertia matrix, b the velocity terms, and Q gathers gravity, the load at P, spring, damper and friction.
+At prescribed speed w2' is given and the first equation yields the crank torque T instead: the multiplier of the
+thesis's third constraint. The state of a run is the six-tuple (th2, u, w2, v, dissipated work, supplied work).
+
+The functions are straight lines of arithmetic on floats, like those of `kinematics`.
+"""
+
+from __future__ import annotations
+
+from math import tanh
+from typing import NamedTuple
+
+from .kinematics import (
+    Coefficients,
+    Position,
+    centripetal,
+    closure_residual,
+    coefficients,
+    coupler_angle,
+    coupler_point,
+    coupler_point_velocity,
+    position,
+    rocker_angle,
+    transmission_angle,
+)
+from .parameters import Constants
+
+#: Slider speed (m/s) at which the regularised Coulomb friction F tanh(u'/v0) has reached 76 % of its level.
+FRICTION_SPEED = 1e-3
+
+State = tuple[float, float, float, float, float, float]
+
+
+class Inputs(NamedTuple):
+    """What acts on the plant at one instant.
+
+    ``speed_drive`` is 1.0 where the crank acceleration is prescribed and 0.0 where the torque is. Torque in N.m,
+    acceleration in rad/s2, slider force and load in N.
+    """
+
+    speed_drive: float
+    torque: float
+    acceleration: float
+    force: float
+    load_x: float
+    load_y: float
+
+
+class Inertia(NamedTuple):
+    """Inertia matrix of the two freedoms: kg.m2, kg.m, kg."""
+
+    m11: float
+    m12: float
+    m22: float
+
+
+class Motion(NamedTuple):
+    """Rates and accelerations that follow from the state and the inputs."""
+
+    w3: float
+    w4: float
+    crank_acceleration: float
+    slider_acceleration: float
+    e3: float
+    e4: float
+    torque: float
+    power_dissipated: float
+    power_supplied: float
+
+
+class Reactions(NamedTuple):
+    """Pin forces (N): ground on crank (A), crank on coupler (B), rocker on coupler (C), slider on rocker (D), guide."""
+
+    ax: float
+    ay: float
+    bx: float
+    by: float
+    cx: float
+    cy: float
+    dx: float
+    dy: float
+    guide: float
+
+
+class Outputs(NamedTuple):
+    """The real outputs of the FMI contract, in its order; SI units."""
+
+    crank_angle: float
+    crank_speed: float
+    crank_acceleration: float
+    coupler_angle: float
+    rocker_angle: float
+    slider_position: float
+    slider_velocity: float
+    slider_acceleration: float
+    coupler_point_x: float
+    coupler_point_y: float
+    drive_applied_torque: float
+    pin_A_fx: float
+    pin_A_fy: float
+    pin_B_fx: float
+    pin_B_fy: float
+    pin_C_fx: float
+    pin_C_fy: float
+    pin_D_fx: float
+    pin_D_fy: float
+    slider_guide_force: float
+    energy_kinetic: float
+    energy_potential: float
+    energy_dissipated: float
+    energy_supplied: float
+    energy_residual: float
+    closure_residual: float
+    transmission_angle: float
+
+
+def inertia(g: Position, k: Coefficients, p: Constants) -> Inertia:
+    """Inertia matrix; the crank's m lG2^2 is inside I_A, the coupler's and rocker's moments are taken about B and D."""
+    # m3 l2 e2.r3 with r3 = G3 - B, and m4 e_alpha.(J r4) with r4 = G4 - D; J turns by +90 degrees
+    q3 = p.l2 * (p.mx3 * (g.c2 * g.c3 + g.s2 * g.s3) + p.my3 * (g.s2 * g.c3 - g.c2 * g.s3))
+    q4 = p.sa * (p.mx4 * g.c4 - p.my4 * g.s4) - p.ca * (p.mx4 * g.s4 + p.my4 * g.c4)
+    return Inertia(
+        p.i2b + k.k32 * (2.0 * q3 + p.i3b * k.k32) + p.i4d * k.k42 * k.k42,
+        k.k3u * (q3 + p.i3b * k.k32) + k.k42 * (q4 + p.i4d * k.k4u),
+        p.m45 + p.i3b * k.k3u * k.k3u + k.k4u * (2.0 * q4 + p.i4d * k.k4u),
+    )
+
+
+def velocity_terms(
+    g: Position, k: Coefficients, w2: float, w3: float, w4: float, g3: float, g4: float, p: Constants
+) -> tuple[float, float]:
+    """Velocity terms b1 (N.m) and b2 (N) of the equations of motion; g3, g4 are those of `centripetal`."""
+    cc = g.c2 * g.c3 + g.s2 * g.s3
+    sc = g.s2 * g.c3 - g.c2 * g.s3
+    q3 = p.l2 * (p.mx3 * cc + p.my3 * sc)
+    n3 = p.l2 * (p.my3 * cc - p.mx3 * sc)
+    rx = p.mx4 * g.c4 - p.my4 * g.s4
+    ry = p.mx4 * g.s4 + p.my4 * g.c4
+    t3 = p.i3b * g3 + w2 * w2 * n3
+    t4 = p.i4d * g4
+    return (
+        g3 * q3 - w3 * w3 * n3 + k.k32 * t3 + k.k42 * t4,
+        k.k3u * t3 + k.k4u * t4 + g4 * (p.sa * rx - p.ca * ry) - w4 * w4 * (p.ca * rx + p.sa * ry),
+    )
+
+
+def friction(v: float, p: Constants) -> float:
+    """Force of damper and guide friction against the slider's motion (N); odd in v."""
+    return p.mu * v + p.fc * tanh(v / FRICTION_SPEED)
+
+
+def applied_forces(
+    g: Position, k: Coefficients, u: float, v: float, load_x: float, load_y: float, p: Constants
+) -> tuple[float, float]:
+    """Generalised forces Q1 (N.m) and Q2 (N) of gravity, load, spring, damper and friction."""
+    # moments about B of what acts on the coupler, about D of what acts on the rocker
+    t3 = (
+        p.gy * (p.mx3 * g.c3 - p.my3 * g.s3)
+        - p.gx * (p.mx3 * g.s3 + p.my3 * g.c3)
+        + load_y * (p.xp * g.c3 - p.yp * g.s3)
+        - load_x * (p.xp * g.s3 + p.yp * g.c3)
+    )
+    t4 = p.gy * (p.mx4 * g.c4 - p.my4 * g.s4) - p.gx * (p.mx4 * g.s4 + p.my4 * g.c4)
+    t2 = p.gy * (p.mx2 * g.c2 - p.my2 * g.s2) - p.gx * (p.mx2 * g.s2 + p.my2 * g.c2)
+    fx = p.m3 * p.gx + load_x
+    fy = p.m3 * p.gy + load_y
+    return (
+        t2 + p.l2 * (fy * g.c2 - fx * g.s2) + k.k32 * t3 + k.k42 * t4,
+        p.m45 * (p.gx * p.ca + p.gy * p.sa) + k.k3u * t3 + k.k4u * t4 - p.k * (u - p.u0) - friction(v, p),
+    )
+
+
+def motion(g: Position, k: Coefficients, x: State, i: Inputs, p: Constants) -> Motion:
+    """Accelerations, crank torque and powers at state ``x`` under the inputs ``i``, from either drive."""
+    _, u, w2, v, _, _ = x
+    w3 = k.k32 * w2 + k.k3u * v
+    w4 = k.k42 * w2 + k.k4u * v
+    m = inertia(g, k, p)
+    g3, g4 = centripetal(g, w2, w3, w4, p)
+    b1, b2 = velocity_terms(g, k, w2, w3, w4, g3, g4, p)
+    q1, q2 = applied_forces(g, k, u, v, i.load_x, i.load_y, p)
+    r1 = q1 - b1 + i.torque
+    r2 = q2 - b2 + i.force
+    free = 1.0 - i.speed_drive
+    e2 = i.speed_drive * i.acceleration + free * (m.m22 * r1 - m.m12 * r2) / (m.m11 * m.m22 - m.m12 * m.m12)
+    a = (r2 - m.m12 * e2) / m.m22
+    torque = free * i.torque + i.speed_drive * (m.m11 * e2 + m.m12 * a + b1 - q1)
+    px, py = coupler_point_velocity(g, w2, w3, p)
+    return Motion(
+        w3,
+        w4,
+        e2,
+        a,
+        k.k32 * e2 + k.k3u * a + g3,
+        k.k42 * e2 + k.k4u * a + g4,
+        torque,
+        friction(v, p) * v,
+        torque * w2 + i.force * v + i.load_x * px + i.load_y * py,
+    )
+
+
+def derivative(x: State, i: Inputs, p: Constants) -> State:
+    """Time derivative of the state under inputs held fixed."""
+    g = position(x[0], x[1], p)
+    k = coefficients(g, p)
+    m = motion(g, k, x, i, p)
+    return (x[2], x[3], m.crank_acceleration, m.slider_acceleration, m.power_dissipated, m.power_supplied)
+
+
+def reactions(g: Position, x: State, m: Motion, i: Inputs, p: Constants) -> Reactions:
+    """Forces in the pins and the guide, by Newton and Euler from the outermost link inwards.
+
+    The force at C is the pair of loop multipliers of the thesis (2.3).
+    """
+    w2 = x[2]
+    e2 = m.crank_acceleration
+    a = m.slider_acceleration
+    # mass times acceleration less gravity of coupler, rocker and crank, at their centres of mass
+    bx = -p.l2 * (g.s2 * e2 + g.c2 * w2 * w2) - p.gx
+    by = p.l2 * (g.c2 * e2 - g.s2 * w2 * w2) - p.gy
+    rx3 = p.mx3 * g.c3 - p.my3 * g.s3
+    ry3 = p.mx3 * g.s3 + p.my3 * g.c3
+    fx3 = p.m3 * bx - ry3 * m.e3 - rx3 * m.w3 * m.w3
+    fy3 = p.m3 * by + rx3 * m.e3 - ry3 * m.w3 * m.w3
+    dx = a * p.ca - p.gx
+    dy = a * p.sa - p.gy
+    rx4 = p.mx4 * g.c4 - p.my4 * g.s4
+    ry4 = p.mx4 * g.s4 + p.my4 * g.c4
+    fx4 = p.m4 * dx - ry4 * m.e4 - rx4 * m.w4 * m.w4
+    fy4 = p.m4 * dy + rx4 * m.e4 - ry4 * m.w4 * m.w4
+    # moments about B and D: t3 = (C - B) x F_C, t4 = (C - D) x F_C, each divided by its link's length
+    t3 = (
+        p.i3b * m.e3
+        + rx3 * by
+        - ry3 * bx
+        - i.load_y * (p.xp * g.c3 - p.yp * g.s3)
+        + i.load_x * (p.xp * g.s3 + p.yp * g.c3)
+    ) / p.l3
+    t4 = -(p.i4d * m.e4 + rx4 * dy - ry4 * dx) / p.l4
+    cx = (t3 * g.c4 - t4 * g.c3) / g.s43
+    cy = (t3 * g.s4 - t4 * g.s3) / g.s43
+    bpx = fx3 - cx - i.load_x
+    bpy = fy3 - cy - i.load_y
+    rx2 = p.mx2 * g.c2 - p.my2 * g.s2
+    ry2 = p.mx2 * g.s2 + p.my2 * g.c2
+    dpx = fx4 + cx
+    dpy = fy4 + cy
+    return Reactions(
+        bpx - ry2 * e2 - rx2 * w2 * w2 - p.m2 * p.gx,
+        bpy + rx2 * e2 - ry2 * w2 * w2 - p.m2 * p.gy,
+        bpx,
+        bpy,
+        cx,
+        cy,
+        dpx,
+        dpy,
+        p.sa * (p.m5 * p.gx - dpx) - p.ca * (p.m5 * p.gy - dpy),
+    )
+
+
+def kinetic_energy(m: Inertia, w2: float, v: float) -> float:
+    """Kinetic energy of all links (J)."""
+    return 0.5 * (m.m11 * w2 * w2 + 2.0 * m.m12 * w2 * v + m.m22 * v * v)
+
+
+def potential_energy(g: Position, u: float, p: Constants) -> float:
+    """Energy of the spring and of gravity, the latter zero with every centre of mass at A (J)."""
+    x = (
+        p.mx2 * g.c2
+        - p.my2 * g.s2
+        + p.m3 * p.l2 * g.c2
+        + p.mx3 * g.c3
+        - p.my3 * g.s3
+        + p.m45 * (p.l1 + u * p.ca)
+        + p.mx4 * g.c4
+        - p.my4 * g.s4
+    )
+    y = (
+        p.mx2 * g.s2
+        + p.my2 * g.c2
+        + p.m3 * p.l2 * g.s2
+        + p.mx3 * g.s3
+        + p.my3 * g.c3
+        + p.m45 * u * p.sa
+        + p.mx4 * g.s4
+        + p.my4 * g.c4
+    )
+    return 0.5 * p.k * (u - p.u0) ** 2 - p.gx * x - p.gy * y
+
+
+def mechanical_energy(x: State, p: Constants) -> float:
+    """Kinetic plus potential energy (J)."""
+    g = position(x[0], x[1], p)
+    return kinetic_energy(inertia(g, coefficients(g, p), p), x[2], x[3]) + potential_energy(g, x[1], p)
+
+
+def jump_speed(x: State, speed: float, p: Constants) -> State:
+    """State after the commanded crank speed has jumped to ``speed``.
+
+    The jump is an impulse on the crank. The slider's generalised momentum m12 w2 + m22 v has no impulse of its own and is
+    conserved; the work of the crank's impulse is the change of kinetic energy.
+    """
+    g = position(x[0], x[1], p)
+    m = inertia(g, coefficients(g, p), p)
+    v = x[3] + m.m12 / m.m22 * (x[2] - speed)
+    work = kinetic_energy(m, speed, v) - kinetic_energy(m, x[2], x[3])
+    return (x[0], x[1], speed, v, x[4], x[5] + work)
+
+
+def outputs(x: State, i: Inputs, start_energy: float, p: Constants) -> Outputs:
+    """All real outputs of the FMI contract at state ``x`` under the inputs ``i``.
+
+    ``start_energy`` is the mechanical energy at the start of the run, against which the balance is kept.
+    """
+    th2, u, w2, v, dissipated, supplied = x
+    g = position(th2, u, p)
+    k = coefficients(g, p)
+    m = motion(g, k, x, i, p)
+    f = reactions(g, x, m, i, p)
+    th3 = coupler_angle(g)
+    th4 = rocker_angle(g)
+    px, py = coupler_point(g, p)
+    kinetic = kinetic_energy(inertia(g, k, p), w2, v)
+    potential = potential_energy(g, u, p)
+    return Outputs(
+        th2,
+        w2,
+        m.crank_acceleration,
+        th3,
+        th4,
+        u,
+        v,
+        m.slider_acceleration,
+        px,
+        py,
+        m.torque,
+        f.ax,
+        f.ay,
+        f.bx,
+        f.by,
+        f.cx,
+        f.cy,
+        f.dx,
+        f.dy,
+        f.guide,
+        kinetic,
+        potential,
+        dissipated,
+        supplied,
+        kinetic + potential - start_energy + dissipated - supplied,
+        closure_residual(th2, th3, th4, u, p),
+        transmission_angle(g, p),
+    )

@@ -1,0 +1,165 @@
+"""Kinematics of the five-bar slider in closed form (Youssef, chapter II).
+
+The freedoms are the crank angle ``th2`` and the slider position ``u``. Every angle is absolute, counter-clockwise from
+the ground link; ``c4, s4`` belong to the direction from the slider pin D to the coupler-rocker pin C, so that the rocker
+angle here is the thesis's theta4 + alpha.
+
+The functions are straight lines of arithmetic on floats: no branches on the state, no NumPy, no I/O. The same code runs
+as it is inside the FMU, compiled under Numba, and traced with CasADi symbols.
+"""
+
+from __future__ import annotations
+
+from math import atan2, cos, sin, sqrt
+from typing import NamedTuple
+
+from .parameters import Constants
+
+#: Least |sin(rocker angle - coupler angle)| at which a motion is still followed. Below it the coupler and the rocker are
+#: taken as collinear: the limit of assembly, where both velocity coefficients grow without bound.
+LIMIT_SINE = 1e-3
+
+
+class Position(NamedTuple):
+    """Directions of the moving links: cosines and sines, and those of rocker angle minus coupler angle."""
+
+    c2: float
+    s2: float
+    c3: float
+    s3: float
+    c4: float
+    s4: float
+    c43: float
+    s43: float
+
+
+class Coefficients(NamedTuple):
+    """Velocity coefficients: w3 = k32 w2 + k3u u', w4 = k42 w2 + k4u u' (rad/rad and rad/m)."""
+
+    k32: float
+    k3u: float
+    k42: float
+    k4u: float
+
+
+def assembly_square(th2: float, u: float, p: Constants) -> float:
+    """Square of l3 times the distance of C from the line BD, times BD squared over l3 squared (m4).
+
+    It is (l3 l4 sin(th4 - th3))^2, positive where the links can be joined and negative where they cannot.
+    """
+    dx = p.l1 + u * p.ca - p.l2 * cos(th2)
+    dy = u * p.sa - p.l2 * sin(th2)
+    d2 = dx * dx + dy * dy
+    a = 0.5 * (d2 + p.l3 * p.l3 - p.l4 * p.l4)
+    return p.l3 * p.l3 * d2 - a * a
+
+
+def position(th2: float, u: float, p: Constants) -> Position:
+    """Solve loop closure (2.1) as the intersection of two circles about B and D.
+
+    ``p.branch`` is the sign of sin(th4 - th3) and stays with the motion: the "+ root" of the thesis's KINE does not, it
+    changes assembly once B passes D.
+
+    Raises
+    ------
+    ValueError
+        If the links cannot be joined (square root of a negative number); NaN in compiled code.
+    ZeroDivisionError
+        If B meets D, where the coupler's direction is undetermined.
+    """
+    c2 = cos(th2)
+    s2 = sin(th2)
+    dx = p.l1 + u * p.ca - p.l2 * c2
+    dy = u * p.sa - p.l2 * s2
+    d2 = dx * dx + dy * dy
+    a = 0.5 * (d2 + p.l3 * p.l3 - p.l4 * p.l4)
+    h = p.branch * sqrt(p.l3 * p.l3 * d2 - a * a)
+    # C - B = (a d + h d_perp) / d2: C lies to the left of B -> D for branch +1
+    x3 = (a * dx - h * dy) / d2
+    y3 = (a * dy + h * dx) / d2
+    c3 = x3 / p.l3
+    s3 = y3 / p.l3
+    c4 = (x3 - dx) / p.l4
+    s4 = (y3 - dy) / p.l4
+    return Position(c2, s2, c3, s3, c4, s4, c3 * c4 + s3 * s4, h / (p.l3 * p.l4))
+
+
+def coefficients(g: Position, p: Constants) -> Coefficients:
+    """Velocity coefficients: loop closure differentiated once, projected on the rocker and on the coupler."""
+    r3 = 1.0 / (p.l3 * g.s43)
+    r4 = 1.0 / (p.l4 * g.s43)
+    return Coefficients(
+        -p.l2 * (g.s4 * g.c2 - g.c4 * g.s2) * r3,
+        (g.c4 * p.ca + g.s4 * p.sa) * r3,
+        -p.l2 * (g.s3 * g.c2 - g.c3 * g.s2) * r4,
+        (g.c3 * p.ca + g.s3 * p.sa) * r4,
+    )
+
+
+def centripetal(g: Position, w2: float, w3: float, w4: float, p: Constants) -> tuple[float, float]:
+    """Accelerations of coupler and rocker left when w2' = u'' = 0 (rad/s2): loop closure differentiated twice."""
+    a2 = p.l2 * w2 * w2
+    a3 = p.l3 * w3 * w3
+    a4 = p.l4 * w4 * w4
+    return (
+        (a2 * (g.c4 * g.c2 + g.s4 * g.s2) + a3 * g.c43 - a4) / (p.l3 * g.s43),
+        (a2 * (g.c3 * g.c2 + g.s3 * g.s2) + a3 - a4 * g.c43) / (p.l4 * g.s43),
+    )
+
+
+def coupler_angle(g: Position) -> float:
+    """Absolute angle of the coupler B -> C, in (-pi, pi]."""
+    return atan2(g.s3, g.c3)
+
+
+def rocker_angle(g: Position) -> float:
+    """Absolute angle of the rocker D -> C, in (-pi, pi] (the thesis's theta4 + alpha)."""
+    return atan2(g.s4, g.c4)
+
+
+def transmission_angle(g: Position, p: Constants) -> float:
+    """Angle between coupler and rocker at C, in [0, pi]: 0 and pi are the limits of assembly."""
+    return atan2(p.branch * g.s43, g.c43)
+
+
+def coupler_point(g: Position, p: Constants) -> tuple[float, float]:
+    """Position of the coupler point P (m)."""
+    return (
+        p.l2 * g.c2 + p.xp * g.c3 - p.yp * g.s3,
+        p.l2 * g.s2 + p.xp * g.s3 + p.yp * g.c3,
+    )
+
+
+def coupler_point_velocity(g: Position, w2: float, w3: float, p: Constants) -> tuple[float, float]:
+    """Velocity of the coupler point P (m/s)."""
+    return (
+        -p.l2 * g.s2 * w2 - (p.xp * g.s3 + p.yp * g.c3) * w3,
+        p.l2 * g.c2 * w2 + (p.xp * g.c3 - p.yp * g.s3) * w3,
+    )
+
+
+def coupler_point_acceleration(
+    g: Position, w2: float, w3: float, e2: float, e3: float, p: Constants
+) -> tuple[float, float]:
+    """Acceleration of the coupler point P (m/s2) for the angular accelerations e2 of the crank and e3 of the coupler."""
+    rx = p.xp * g.c3 - p.yp * g.s3
+    ry = p.xp * g.s3 + p.yp * g.c3
+    return (
+        -p.l2 * (g.s2 * e2 + g.c2 * w2 * w2) - ry * e3 - rx * w3 * w3,
+        p.l2 * (g.c2 * e2 - g.s2 * w2 * w2) + rx * e3 - ry * w3 * w3,
+    )
+
+
+def assembly_margin(th2: float, u: float, p: Constants) -> tuple[float, float]:
+    """Distances of BD to the limits of assembly (m): l3 + l4 - BD, and BD - |l3 - l4|. Both are positive inside."""
+    dx = p.l1 + u * p.ca - p.l2 * cos(th2)
+    dy = u * p.sa - p.l2 * sin(th2)
+    distance = sqrt(dx * dx + dy * dy)
+    return p.l3 + p.l4 - distance, distance - sqrt((p.l3 - p.l4) ** 2)
+
+
+def closure_residual(th2: float, th3: float, th4: float, u: float, p: Constants) -> float:
+    """Length by which the loop (2.1) fails to close at the given angles (m)."""
+    x = p.l2 * cos(th2) + p.l3 * cos(th3) - p.l4 * cos(th4) - p.l1 - u * p.ca
+    y = p.l2 * sin(th2) + p.l3 * sin(th3) - p.l4 * sin(th4) - u * p.sa
+    return sqrt(x * x + y * y)

@@ -1,0 +1,226 @@
+"""Parameters of the five-bar slider: validated, in SI, named as in the FMI contract.
+
+A field ``coupler_point_distance`` is the FMI parameter ``coupler.point_distance``: the first underscore is the dot.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from math import cos, hypot, isfinite, sin
+from typing import NamedTuple
+
+from ..errors import ParameterError
+
+
+class Constants(NamedTuple):
+    """What the equations use, in thesis symbols, derived once from `FiveBarParameters`.
+
+    ``mx3, my3`` are m3 times the components of the centre of mass along and across the coupler, and so on; ``i2b`` is
+    I_A + m3 l2^2, ``i3b`` the coupler's moment of inertia about B, ``i4d`` the rocker's about D; ``gx, gy`` gravity;
+    ``ca, sa`` the guide's direction.
+    """
+
+    l1: float
+    l2: float
+    l3: float
+    l4: float
+    ca: float
+    sa: float
+    branch: float
+    m2: float
+    m3: float
+    m4: float
+    m5: float
+    m45: float
+    mx2: float
+    my2: float
+    mx3: float
+    my3: float
+    mx4: float
+    my4: float
+    i2b: float
+    i3b: float
+    i4d: float
+    k: float
+    u0: float
+    mu: float
+    fc: float
+    xp: float
+    yp: float
+    gx: float
+    gy: float
+
+
+POSITIVE = "be a finite number greater than zero"
+NOT_NEGATIVE = "be a finite number, zero or greater"
+
+_POSITIVE = ("ground_length", "crank_length", "coupler_length", "rocker_length", "crank_inertia")
+_FREE_SIGN = (
+    "crank_cog_distance",
+    "coupler_cog_distance",
+    "rocker_cog_distance",
+    "crank_cog_angle",
+    "coupler_cog_angle",
+    "rocker_cog_angle",
+    "slider_guide_angle",
+    "slider_spring_free_position",
+    "coupler_point_distance",
+    "coupler_point_angle",
+    "ground_inclination",
+)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FiveBarParameters:
+    """A five-bar slider: a four-bar whose rocker-to-ground pivot slides on a sprung and damped guide.
+
+    Lengths in m, masses in kg, moments of inertia in kg.m2, angles in rad, stiffness in N/m, damping in N.s/m. The
+    moment of inertia of the crank is about its shaft A and includes m lG2^2; those of coupler and rocker are about the
+    own centre of mass. Centres of mass are measured from A, from the crank pin B and from the slider pin D, and turned by
+    the ``*_cog_angle`` from the link's own direction (A to B, B to C, D to C).
+
+    Raises
+    ------
+    ParameterError
+        If a value is not finite or has the wrong sign, if ``assembly_branch`` is neither +1 nor -1, if the crank's
+        inertia about A is less than its mass requires, or if nothing moves with the slider.
+    """
+
+    ground_length: float
+    crank_length: float
+    coupler_length: float
+    rocker_length: float
+    crank_mass: float = 0.0
+    coupler_mass: float
+    rocker_mass: float
+    slider_mass: float
+    crank_inertia: float
+    coupler_inertia: float
+    rocker_inertia: float
+    crank_cog_distance: float = 0.0
+    coupler_cog_distance: float
+    rocker_cog_distance: float
+    crank_cog_angle: float = 0.0
+    coupler_cog_angle: float = 0.0
+    rocker_cog_angle: float = 0.0
+    slider_guide_angle: float = 0.0
+    slider_stiffness: float = 0.0
+    slider_spring_free_position: float = 0.0
+    slider_damping: float = 0.0
+    slider_coulomb_friction: float = 0.0
+    coupler_point_distance: float = 0.0
+    coupler_point_angle: float = 0.0
+    gravity: float = 9.81
+    ground_inclination: float = 0.0
+    assembly_branch: int = 1
+
+    def __post_init__(self) -> None:
+        for field in fields(self):
+            name = fmi_name(field.name)
+            value = getattr(self, field.name)
+            if isinstance(value, bool) or not isinstance(value, (int, float)):
+                raise ParameterError(name, value, "be a number in SI units")
+            if field.name == "assembly_branch":
+                if value not in (1, -1):
+                    raise ParameterError(name, value, "be +1 or -1, the sign of sin(rocker.angle - coupler.angle)")
+            elif field.name in _POSITIVE:
+                if not (isfinite(value) and value > 0.0):
+                    raise ParameterError(name, value, POSITIVE)
+            elif field.name in _FREE_SIGN:
+                if not isfinite(value):
+                    raise ParameterError(name, value, "be a finite number")
+            elif not (isfinite(value) and value >= 0.0):
+                raise ParameterError(name, value, NOT_NEGATIVE)
+        steiner = self.crank_mass * self.crank_cog_distance**2
+        if self.crank_inertia < steiner * (1.0 - 1e-12):
+            raise ParameterError(
+                "crank.inertia",
+                self.crank_inertia,
+                f"be at least crank.mass * crank.cog_distance^2 = {steiner:g} kg.m2: it is taken about the shaft A",
+            )
+        if self.rocker_mass + self.slider_mass <= 0.0:
+            raise ParameterError("slider.mass", self.slider_mass, "be greater than zero where rocker.mass is zero")
+
+    def constants(self) -> Constants:
+        """The constants of the equations."""
+
+        def components(factor: float, distance: float, angle: float) -> tuple[float, float]:
+            return factor * distance * cos(angle), factor * distance * sin(angle)
+
+        mx2, my2 = components(self.crank_mass, self.crank_cog_distance, self.crank_cog_angle)
+        mx3, my3 = components(self.coupler_mass, self.coupler_cog_distance, self.coupler_cog_angle)
+        mx4, my4 = components(self.rocker_mass, self.rocker_cog_distance, self.rocker_cog_angle)
+        xp, yp = components(1.0, self.coupler_point_distance, self.coupler_point_angle)
+        return Constants(
+            l1=float(self.ground_length),
+            l2=float(self.crank_length),
+            l3=float(self.coupler_length),
+            l4=float(self.rocker_length),
+            ca=cos(self.slider_guide_angle),
+            sa=sin(self.slider_guide_angle),
+            branch=float(self.assembly_branch),
+            m2=float(self.crank_mass),
+            m3=float(self.coupler_mass),
+            m4=float(self.rocker_mass),
+            m5=float(self.slider_mass),
+            m45=float(self.rocker_mass + self.slider_mass),
+            mx2=mx2,
+            my2=my2,
+            mx3=mx3,
+            my3=my3,
+            mx4=mx4,
+            my4=my4,
+            i2b=self.crank_inertia + self.coupler_mass * self.crank_length**2,
+            i3b=self.coupler_inertia + self.coupler_mass * self.coupler_cog_distance**2,
+            i4d=self.rocker_inertia + self.rocker_mass * self.rocker_cog_distance**2,
+            k=float(self.slider_stiffness),
+            u0=float(self.slider_spring_free_position),
+            mu=float(self.slider_damping),
+            fc=float(self.slider_coulomb_friction),
+            xp=xp,
+            yp=yp,
+            gx=-self.gravity * sin(self.ground_inclination),
+            gy=-self.gravity * cos(self.ground_inclination),
+        )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class InitialState:
+    """Where a run starts: rad, rad/s, m, m/s.
+
+    With the speed prescribed the commanded speed at the start takes the place of ``crank_speed``.
+
+    Raises
+    ------
+    ParameterError
+        If a value is not a finite number.
+    """
+
+    crank_angle: float = 0.0
+    crank_speed: float = 0.0
+    slider_position: float = 0.0
+    slider_velocity: float = 0.0
+
+    def __post_init__(self) -> None:
+        for field in fields(self):
+            value = getattr(self, field.name)
+            if isinstance(value, bool) or not isinstance(value, (int, float)) or not isfinite(value):
+                raise ParameterError(f"initial.{field.name}", value, "be a finite number")
+
+
+def fmi_name(field_name: str) -> str:
+    """Name in the FMI contract of a field of `FiveBarParameters`: the first underscore becomes the dot."""
+    return field_name.replace("_", ".", 1)
+
+
+def field_name(name: str) -> str:
+    """Field of `FiveBarParameters` that carries the FMI parameter ``name``."""
+    return name.replace(".", "_", 1)
+
+
+def reach(parameters: FiveBarParameters, crank_angle: float, slider_position: float) -> float:
+    """Distance from the crank pin B to the slider pin D (m)."""
+    p = parameters.constants()
+    return hypot(
+        p.l1 + slider_position * p.ca - p.l2 * cos(crank_angle), slider_position * p.sa - p.l2 * sin(crank_angle)
+    )

@@ -1,0 +1,102 @@
+"""Published parameter sets (Youssef, Tables 3.1, 8.1, 8.2 and appendix 1), converted from cgs to SI.
+
+`SETS` maps a name to a `PublishedSet`: the mechanism, the speed it is run at, and where it is printed.
+"""
+
+from __future__ import annotations
+
+from math import pi
+from types import MappingProxyType
+from typing import Mapping, NamedTuple
+
+from .parameters import FiveBarParameters, InitialState
+
+METRE_PER_CM = 1e-2
+KG_PER_GRAM = 1e-3
+KG_M2_PER_G_CM2 = 1e-7
+STIFFNESS_PER_DYN_CM = 1e-3
+DAMPING_PER_DYN_S_CM = 1e-3
+TORQUE_PER_DYN_CM = 1e-7
+FORCE_PER_DYN = 1e-5
+RAD_S_PER_RPM = pi / 30.0
+
+
+class PublishedSet(NamedTuple):
+    """A mechanism as printed, the crank speed it is run at (rad/s), and its source."""
+
+    parameters: FiveBarParameters
+    crank_speed: float
+    source: str
+
+    @property
+    def initial(self) -> InitialState:
+        """The thesis's start: th2 = u = u' = 0 at the running speed."""
+        return InitialState(crank_speed=self.crank_speed)
+
+
+def _from_cgs(
+    lengths_cm: tuple[float, float, float, float],
+    cog_cm: tuple[float, float],
+    masses_g: tuple[float, float, float],
+    inertias_g_cm2: tuple[float, float],
+    stiffness_dyn_cm: float,
+    damping_dyn_s_cm: float,
+    inclination: float = 0.0,
+    gravity: float = 9.81,
+) -> FiveBarParameters:
+    return FiveBarParameters(
+        ground_length=lengths_cm[0] * METRE_PER_CM,
+        crank_length=lengths_cm[1] * METRE_PER_CM,
+        coupler_length=lengths_cm[2] * METRE_PER_CM,
+        rocker_length=lengths_cm[3] * METRE_PER_CM,
+        coupler_mass=masses_g[0] * KG_PER_GRAM,
+        rocker_mass=masses_g[1] * KG_PER_GRAM,
+        slider_mass=masses_g[2] * KG_PER_GRAM,
+        # Table 3.1 gives I_A = 12500 g.cm2; the rigs' is not printed, and at prescribed speed nothing depends on it
+        crank_inertia=12500 * KG_M2_PER_G_CM2,
+        coupler_inertia=inertias_g_cm2[0] * KG_M2_PER_G_CM2,
+        rocker_inertia=inertias_g_cm2[1] * KG_M2_PER_G_CM2,
+        coupler_cog_distance=cog_cm[0] * METRE_PER_CM,
+        rocker_cog_distance=cog_cm[1] * METRE_PER_CM,
+        slider_stiffness=stiffness_dyn_cm * STIFFNESS_PER_DYN_CM,
+        slider_damping=damping_dyn_s_cm * DAMPING_PER_DYN_S_CM,
+        ground_inclination=inclination,
+        gravity=gravity,
+    )
+
+
+def _table_3_1(stiffness_dyn_cm: float, damping_dyn_s_cm: float) -> FiveBarParameters:
+    return _from_cgs((15.35, 5, 15, 15), (9.82, 7.5), (209, 206, 590), (5250, 3863), stiffness_dyn_cm, damping_dyn_s_cm)
+
+
+def _rig_1(stiffness_dyn_cm: float) -> FiveBarParameters:
+    return _from_cgs((15.37, 5, 15, 15), (9.55, 7.5), (222, 206, 600), (7064, 4797), stiffness_dyn_cm, 9e3)
+
+
+def _rig_2(stiffness_dyn_cm: float) -> FiveBarParameters:
+    # horizontal plane: gravity does no work in it
+    return _from_cgs(
+        (25.4, 1.27, 25.4, 25.4),
+        (14.2, 12.7),
+        (324, 264, 856),
+        (23784, 15100),
+        stiffness_dyn_cm,
+        5.5e3,
+        gravity=0.0,
+    )
+
+
+SETS: Mapping[str, PublishedSet] = MappingProxyType(
+    {
+        "table-3.1": PublishedSet(
+            _table_3_1(1e6, 3e4), 420 * RAD_S_PER_RPM, "Youssef, Table 3.1, with fig. 3.4's spring"
+        ),
+        "appendix-1": PublishedSet(_table_3_1(1.5e6, 2.8e4), 450 * RAD_S_PER_RPM, "Youssef, appendix 1"),
+        "rig-1-spring-a": PublishedSet(_rig_1(3e6), 420 * RAD_S_PER_RPM, "Youssef, Table 8.1, spring A"),
+        "rig-1-spring-b": PublishedSet(_rig_1(11e6), 420 * RAD_S_PER_RPM, "Youssef, Table 8.1, spring B"),
+        "rig-2-spring-c": PublishedSet(_rig_2(4e6), 420 * RAD_S_PER_RPM, "Youssef, Table 8.2, spring C"),
+        "rig-2-spring-d": PublishedSet(_rig_2(8e6), 420 * RAD_S_PER_RPM, "Youssef, Table 8.2, spring D"),
+    }
+)
+
+TABLE_3_1 = SETS["table-3.1"].parameters

@@ -1,0 +1,206 @@
+"""Adaptive explicit Runge-Kutta integration on tuples of floats; knows no mechanics.
+
+The method is DOP853 of Hairer, Norsett and Wanner (see `tableau`), with their error estimate and step size control.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from math import isfinite, sqrt
+from typing import NamedTuple
+
+from . import tableau
+from .errors import IntegrationError
+
+Vector = tuple[float, ...]
+
+_A = tuple(tuple(weight for _, weight in row) for row in tableau.A)
+_ERROR_STAGES = tuple(i for i in range(tableau.STAGES) if tableau.E5[i] != 0.0)
+_E3 = tuple(tableau.E3[i] for i in _ERROR_STAGES)
+_E5 = tuple(tableau.E5[i] for i in _ERROR_STAGES)
+
+SAFETY = 0.9
+LEAST_FACTOR = 0.2
+GREATEST_FACTOR = 6.0
+#: Shortest step as a fraction of the whole interval, below which the integration gives up.
+LEAST_STEP = 1e-14
+#: What a right-hand side may raise where it is not defined; the step is then tried again shorter.
+UNDEFINED = (ArithmeticError, ValueError)
+
+
+class Result(NamedTuple):
+    """End of an integration: the state, the step size to go on with, and the work done."""
+
+    x: Vector
+    step: float
+    steps: int
+    evaluations: int
+
+
+def rk_step(f: Callable[[Vector], Vector], x: Vector, k1: Vector, h: float, scale: Vector) -> tuple[Vector, float]:
+    """One step of size ``h`` from ``x`` with ``k1 = f(x)``: the new state and the error relative to ``scale``."""
+    (a1,) = _A[1]
+    k2 = f(tuple([y + h * (a1 * p1) for y, p1 in zip(x, k1)]))
+    a1, a2 = _A[2]
+    k3 = f(tuple([y + h * (a1 * p1 + a2 * p2) for y, p1, p2 in zip(x, k1, k2)]))
+    a1, a2 = _A[3]
+    k4 = f(tuple([y + h * (a1 * p1 + a2 * p3) for y, p1, p3 in zip(x, k1, k3)]))
+    a1, a2, a3 = _A[4]
+    k5 = f(tuple([y + h * (a1 * p1 + a2 * p3 + a3 * p4) for y, p1, p3, p4 in zip(x, k1, k3, k4)]))
+    a1, a2, a3 = _A[5]
+    k6 = f(tuple([y + h * (a1 * p1 + a2 * p4 + a3 * p5) for y, p1, p4, p5 in zip(x, k1, k4, k5)]))
+    a1, a2, a3, a4 = _A[6]
+    k7 = f(tuple([y + h * (a1 * p1 + a2 * p4 + a3 * p5 + a4 * p6) for y, p1, p4, p5, p6 in zip(x, k1, k4, k5, k6)]))
+    a1, a2, a3, a4, a5 = _A[7]
+    k8 = f(
+        tuple(
+            [
+                y + h * (a1 * p1 + a2 * p4 + a3 * p5 + a4 * p6 + a5 * p7)
+                for y, p1, p4, p5, p6, p7 in zip(x, k1, k4, k5, k6, k7)
+            ]
+        )
+    )
+    a1, a2, a3, a4, a5, a6 = _A[8]
+    k9 = f(
+        tuple(
+            [
+                y + h * (a1 * p1 + a2 * p4 + a3 * p5 + a4 * p6 + a5 * p7 + a6 * p8)
+                for y, p1, p4, p5, p6, p7, p8 in zip(x, k1, k4, k5, k6, k7, k8)
+            ]
+        )
+    )
+    a1, a2, a3, a4, a5, a6, a7 = _A[9]
+    k10 = f(
+        tuple(
+            [
+                y + h * (a1 * p1 + a2 * p4 + a3 * p5 + a4 * p6 + a5 * p7 + a6 * p8 + a7 * p9)
+                for y, p1, p4, p5, p6, p7, p8, p9 in zip(x, k1, k4, k5, k6, k7, k8, k9)
+            ]
+        )
+    )
+    a1, a2, a3, a4, a5, a6, a7, a8 = _A[10]
+    k11 = f(
+        tuple(
+            [
+                y + h * (a1 * p1 + a2 * p4 + a3 * p5 + a4 * p6 + a5 * p7 + a6 * p8 + a7 * p9 + a8 * p10)
+                for y, p1, p4, p5, p6, p7, p8, p9, p10 in zip(x, k1, k4, k5, k6, k7, k8, k9, k10)
+            ]
+        )
+    )
+    a1, a2, a3, a4, a5, a6, a7, a8, a9 = _A[11]
+    k12 = f(
+        tuple(
+            [
+                y + h * (a1 * p1 + a2 * p4 + a3 * p5 + a4 * p6 + a5 * p7 + a6 * p8 + a7 * p9 + a8 * p10 + a9 * p11)
+                for y, p1, p4, p5, p6, p7, p8, p9, p10, p11 in zip(x, k1, k4, k5, k6, k7, k8, k9, k10, k11)
+            ]
+        )
+    )
+    a1, a2, a3, a4, a5, a6, a7, a8 = _A[12]
+    x_new = tuple(
+        [
+            y + h * (a1 * p1 + a2 * p6 + a3 * p7 + a4 * p8 + a5 * p9 + a6 * p10 + a7 * p11 + a8 * p12)
+            for y, p1, p6, p7, p8, p9, p10, p11, p12 in zip(x, k1, k6, k7, k8, k9, k10, k11, k12)
+        ]
+    )  # Hairer's estimate: |h| err5^2 / sqrt(err5^2 + 0.01 err3^2), a combination of order 8 in h
+    e1, e2, e3, e4, e5, e6, e7, e8 = _E5
+    d1, d2, d3, d4, d5, d6, d7, d8 = _E3
+    sum5 = 0.0
+    sum3 = 0.0
+    for s, y, z, p1, p6, p7, p8, p9, p10, p11, p12 in zip(scale, x, x_new, k1, k6, k7, k8, k9, k10, k11, k12):
+        weight = 1.0 / (s + abs(z if abs(z) > abs(y) else y))
+        error5 = (e1 * p1 + e2 * p6 + e3 * p7 + e4 * p8 + e5 * p9 + e6 * p10 + e7 * p11 + e8 * p12) * weight
+        error3 = (d1 * p1 + d2 * p6 + d3 * p7 + d4 * p8 + d5 * p9 + d6 * p10 + d7 * p11 + d8 * p12) * weight
+        sum5 += error5 * error5
+        sum3 += error3 * error3
+    denominator = sum5 + 0.01 * sum3
+    if denominator == 0.0:
+        return x_new, 0.0
+    return x_new, abs(h) * sum5 / sqrt(denominator * len(x))
+
+
+def integrate(
+    f: Callable[[Vector], Vector],
+    x: Vector,
+    duration: float,
+    *,
+    tolerance: float,
+    scale: Vector,
+    step: float = 0.0,
+    accept: Callable[[Vector], None] | None = None,
+    max_steps: int = 100_000,
+) -> Result:
+    """Integrate x' = f(x) over ``duration``, ending exactly there.
+
+    Parameters
+    ----------
+    f : callable
+        Right-hand side; may raise ArithmeticError or ValueError where it is not defined.
+    x : tuple of float
+        State at the start, finite.
+    duration : float
+        Length of the interval, greater than zero.
+    tolerance : float
+        Bound of the local error of each component relative to ``scale + |x|``.
+    scale : tuple of float
+        Magnitude of each component below which its error counts as absolute.
+    step : float
+        First step to try, as `Result.step` of the interval before gave it; 0 chooses one.
+    accept : callable, optional
+        Called with each accepted state; may raise to stop the integration.
+    max_steps : int
+        Accepted and refused steps allowed.
+
+    Raises
+    ------
+    IntegrationError
+        If the step size underflows or ``max_steps`` do not suffice.
+    """
+    k1 = f(x)
+    evaluations = 1
+    if not step > 0.0:
+        step = _first_step(x, k1, scale, duration, tolerance)
+    done = 0.0
+    steps = 0
+    proposal = step
+    while True:
+        remaining = duration - done
+        last = proposal >= remaining * (1.0 - 1e-10)
+        h = remaining if last else min(proposal, 0.5 * remaining) if proposal > 0.5 * remaining else proposal
+        steps += 1
+        if steps > max_steps:
+            raise IntegrationError(
+                f"{max_steps} steps did not suffice: stopped {done:g} s into an interval of {duration:g} s"
+            )
+        evaluations += 11
+        try:
+            x_new, error = rk_step(f, x, k1, h, scale)
+            error /= tolerance
+            k_new = f(x_new) if error <= 1.0 else k1
+        except UNDEFINED:
+            error = float("nan")
+        if error <= 1.0:
+            evaluations += 1
+            if accept is not None:
+                accept(x_new)
+            factor = GREATEST_FACTOR if error == 0.0 else min(GREATEST_FACTOR, SAFETY * error ** (-1.0 / tableau.ORDER))
+            # a step cut short by the end of the interval does not shorten the one carried over
+            proposal = max(proposal, factor * h) if h < proposal else max(LEAST_FACTOR, factor) * h
+            x = x_new
+            if last:
+                return Result(x, proposal, steps, evaluations)
+            done += h
+            k1 = k_new
+        else:
+            shrink = max(LEAST_FACTOR, SAFETY * error ** (-1.0 / tableau.ORDER)) if isfinite(error) else 0.25
+            proposal = h * shrink
+            if proposal < LEAST_STEP * duration:
+                raise IntegrationError(
+                    f"the step size fell to {proposal:.3g} s, {done:g} s into an interval of {duration:g} s"
+                )
+
+
+def _first_step(x: Vector, k1: Vector, scale: Vector, duration: float, tolerance: float) -> float:
+    """A cautious first step: one hundredth of the time in which the state would change by its own size."""
+    ratio = max(abs(k) / (s + abs(y)) for k, s, y in zip(k1, scale, x))
+    return duration if ratio == 0.0 else min(duration, tolerance ** (1.0 / tableau.ORDER) / ratio)
