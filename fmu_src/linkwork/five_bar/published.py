@@ -11,13 +11,14 @@ from typing import Mapping, NamedTuple
 
 from .parameters import FiveBarParameters, InitialState
 
-METRE_PER_CM = 1e-2
-KG_PER_GRAM = 1e-3
-KG_M2_PER_G_CM2 = 1e-7
-STIFFNESS_PER_DYN_CM = 1e-3
-DAMPING_PER_DYN_S_CM = 1e-3
-TORQUE_PER_DYN_CM = 1e-7
-FORCE_PER_DYN = 1e-5
+# Divisors, because 206 / 1000 is the float nearest to 0.206 and 206 * 0.001 is not.
+CM_PER_METRE = 1e2
+GRAM_PER_KG = 1e3
+G_CM2_PER_KG_M2 = 1e7
+DYN_CM_PER_NEWTON_METRE = 1e7
+DYN_PER_NEWTON = 1e5
+#: Stiffness in dyn/cm per N/m, and damping in dyn.s/cm per N.s/m.
+DYN_PER_CM_PER_NEWTON_PER_METRE = 1e3
 RAD_S_PER_RPM = pi / 30.0
 
 
@@ -45,21 +46,21 @@ def _from_cgs(
     gravity: float = 9.81,
 ) -> FiveBarParameters:
     return FiveBarParameters(
-        ground_length=lengths_cm[0] * METRE_PER_CM,
-        crank_length=lengths_cm[1] * METRE_PER_CM,
-        coupler_length=lengths_cm[2] * METRE_PER_CM,
-        rocker_length=lengths_cm[3] * METRE_PER_CM,
-        coupler_mass=masses_g[0] * KG_PER_GRAM,
-        rocker_mass=masses_g[1] * KG_PER_GRAM,
-        slider_mass=masses_g[2] * KG_PER_GRAM,
+        ground_length=lengths_cm[0] / CM_PER_METRE,
+        crank_length=lengths_cm[1] / CM_PER_METRE,
+        coupler_length=lengths_cm[2] / CM_PER_METRE,
+        rocker_length=lengths_cm[3] / CM_PER_METRE,
+        coupler_mass=masses_g[0] / GRAM_PER_KG,
+        rocker_mass=masses_g[1] / GRAM_PER_KG,
+        slider_mass=masses_g[2] / GRAM_PER_KG,
         # Table 3.1 gives I_A = 12500 g.cm2; the rigs' is not printed, and at prescribed speed nothing depends on it
-        crank_inertia=12500 * KG_M2_PER_G_CM2,
-        coupler_inertia=inertias_g_cm2[0] * KG_M2_PER_G_CM2,
-        rocker_inertia=inertias_g_cm2[1] * KG_M2_PER_G_CM2,
-        coupler_cog_distance=cog_cm[0] * METRE_PER_CM,
-        rocker_cog_distance=cog_cm[1] * METRE_PER_CM,
-        slider_stiffness=stiffness_dyn_cm * STIFFNESS_PER_DYN_CM,
-        slider_damping=damping_dyn_s_cm * DAMPING_PER_DYN_S_CM,
+        crank_inertia=12500 / G_CM2_PER_KG_M2,
+        coupler_inertia=inertias_g_cm2[0] / G_CM2_PER_KG_M2,
+        rocker_inertia=inertias_g_cm2[1] / G_CM2_PER_KG_M2,
+        coupler_cog_distance=cog_cm[0] / CM_PER_METRE,
+        rocker_cog_distance=cog_cm[1] / CM_PER_METRE,
+        slider_stiffness=stiffness_dyn_cm / DYN_PER_CM_PER_NEWTON_PER_METRE,
+        slider_damping=damping_dyn_s_cm / DYN_PER_CM_PER_NEWTON_PER_METRE,
         ground_inclination=inclination,
         gravity=gravity,
     )

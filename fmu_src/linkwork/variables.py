@@ -1,0 +1,108 @@
+"""What a variable of an FMI interface is, and the units that interfaces use."""
+
+from __future__ import annotations
+
+from math import pi
+from typing import NamedTuple
+
+
+class Unit(NamedTuple):
+    """A unit as a product of powers of kg, m, s and rad, with the display units that belong to it.
+
+    ``displays`` are pairs (name, factor): value in the display unit = factor * value in the unit.
+    """
+
+    kg: int = 0
+    m: int = 0
+    s: int = 0
+    rad: int = 0
+    displays: tuple[tuple[str, float], ...] = ()
+
+
+UNITS = {
+    "1": Unit(),
+    "m": Unit(m=1, displays=(("mm", 1e3),)),
+    "m/s": Unit(m=1, s=-1),
+    "m/s2": Unit(m=1, s=-2),
+    "rad": Unit(rad=1, displays=(("deg", 180.0 / pi),)),
+    "rad/s": Unit(rad=1, s=-1, displays=(("rpm", 30.0 / pi),)),
+    "rad/s2": Unit(rad=1, s=-2),
+    "kg": Unit(kg=1),
+    "kg.m2": Unit(kg=1, m=2),
+    "N": Unit(kg=1, m=1, s=-2),
+    "N.m": Unit(kg=1, m=2, s=-2),
+    "N/m": Unit(kg=1, s=-2),
+    "N.s/m": Unit(kg=1, s=-1),
+    "J": Unit(kg=1, m=2, s=-2),
+}
+
+
+class Variable(NamedTuple):
+    """One scalar variable of an FMI interface.
+
+    Attributes
+    ----------
+    name : str
+        Name in the contract.
+    causality : str
+        ``parameter``, ``input`` or ``output``.
+    unit : str
+        A key of `UNITS`; empty for Integer and String.
+    description : str
+    symbol : str
+        Symbol in the thesis, in LaTeX; empty where it has none.
+    start : float, int or str
+        Start value; an output's real one follows from the others and is computed where it is needed.
+    kind : str
+        ``Real``, ``Integer`` or ``String``.
+    minimum, maximum : float or None
+        Bounds, where they mean something.
+    display : str
+        Unit people think in; empty for the unit itself.
+    depends : str
+        Of an output: ``state`` (on no input), ``speed`` (on the commanded speed), or ``all`` inputs.
+    level : str
+        Of an output at the start: what it depends on, ``position``, ``velocity`` or ``all``.
+    """
+
+    name: str
+    causality: str
+    unit: str
+    description: str
+    symbol: str = ""
+    start: float | int | str = 0.0
+    kind: str = "Real"
+    minimum: float | None = None
+    maximum: float | None = None
+    display: str = ""
+    depends: str = "all"
+    level: str = "all"
+
+
+def status_outputs() -> tuple[Variable, Variable]:
+    """The two outputs every slave of ours has: why its last step was refused, if it was."""
+    return (
+        Variable(
+            "solver.status",
+            "output",
+            "",
+            "0 good; 1 step out of order; 2 input not finite; 3 limit of assembly; 4 tolerance not met; "
+            "5 not initialised; 6 bad parameter; 9 internal error",
+            start=0,
+            kind="Integer",
+            minimum=0,
+            maximum=9,
+            depends="state",
+            level="none",
+        ),
+        Variable(
+            "solver.message",
+            "output",
+            "",
+            "Why the last step was refused, in one sentence; empty while solver.status is 0",
+            start="",
+            kind="String",
+            depends="state",
+            level="none",
+        ),
+    )
