@@ -27,12 +27,13 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import NamedTuple
 
-import linkwork
 from fmpy.validation import validate_fmu
+from pythonfmu.builder import FmuBuilder
+
+import linkwork
 from linkwork.errors import LinkworkError
 from linkwork.five_bar import variables as five_bar_variables
 from linkwork.variables import Variable
-from pythonfmu.builder import FmuBuilder
 
 HERE = Path(__file__).resolve().parent
 SOURCES = HERE / "fmu_src"

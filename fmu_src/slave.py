@@ -12,6 +12,9 @@ from collections.abc import Callable, Sequence
 from typing import Any, ClassVar, Protocol
 from xml.etree.ElementTree import Element, SubElement
 
+from pythonfmu import Fmi2Causality, Fmi2Slave, Fmi2Variability, Integer, Real, String
+from pythonfmu.enums import Fmi2Initial, Fmi2Status
+
 from linkwork import __version__
 from linkwork.errors import (
     AssemblyError,
@@ -23,8 +26,6 @@ from linkwork.errors import (
     StepError,
 )
 from linkwork.variables import UNITS, Variable
-from pythonfmu import Fmi2Causality, Fmi2Slave, Fmi2Variability, Integer, Real, String
-from pythonfmu.enums import Fmi2Initial, Fmi2Status
 
 STATUS_GOOD = 0
 STATUS_NOT_INITIALISED = 5
