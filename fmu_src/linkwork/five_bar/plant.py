@@ -47,11 +47,14 @@ def check_assembly(parameters: FiveBarParameters, crank_angle: float, slider_pos
     )
 
 
-def error_scale(parameters: FiveBarParameters, initial: InitialState) -> tuple[float, ...]:
-    """Magnitudes of the state's components below which the integrator's error counts as absolute."""
+def error_scale(parameters: FiveBarParameters, crank_speed: float) -> tuple[float, ...]:
+    """Magnitudes of the state's components below which the integrator's error counts as absolute.
+
+    ``crank_speed`` is the speed at the start (rad/s).
+    """
     length = parameters.crank_length
     mass = parameters.coupler_mass + parameters.rocker_mass + parameters.slider_mass
-    speed = max(1.0, abs(initial.crank_speed))
+    speed = max(1.0, abs(crank_speed))
     energy = 0.5 * (parameters.crank_inertia + mass * length**2) * speed**2
     return (1.0, length, speed, length * speed, energy, energy)
 
@@ -125,7 +128,7 @@ class Plant:
         )
         self._speed_commanded = False
         self._step_size = 0.0
-        self._scale = error_scale(parameters, initial)
+        self._scale = error_scale(parameters, speed)
         self.start_energy = dynamics.mechanical_energy(self.state, self._p)
         if not isfinite(self.start_energy):
             raise ParameterError("initial.crank_speed", speed, "leave the kinetic energy finite")

@@ -1,0 +1,355 @@
+"""Run a built FMU through FMPy with the inputs of `simulate`, and compare two runs."""
+
+from __future__ import annotations
+
+import shutil
+import sys
+import time as clock
+from collections.abc import Iterator
+from contextlib import contextmanager
+from ctypes import byref
+from dataclasses import asdict, dataclass, replace
+from itertools import pairwise
+from math import pi
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from fmpy import extract, read_model_description
+from fmpy.fmi1 import FMICallException
+from fmpy.fmi2 import FMU2Slave, fmi2CallbackFunctions, fmi2CallbackLoggerTYPE
+from fmpy.logging import addLoggerProxy
+from numpy.typing import NDArray
+from rich.progress import Progress
+
+from linkwork.errors import InputError, LinkworkError
+from linkwork.five_bar.parameters import FiveBarParameters, InitialState, fmi_name
+from linkwork.five_bar.plant import INPUT_NAMES, SPEED_DRIVE, TORQUE_DRIVE
+
+from .inputs import Inputs, encode
+from .simulate import RunInterrupted, channels, sample_times
+from .trajectory import OUTPUT_NAMES, UNITS, Trajectory
+
+#: Outputs that are angles in (-pi, pi]: they differ by what is left after whole turns.
+PRINCIPAL_ANGLES = ("coupler.angle", "rocker.angle")
+
+
+class CosimulationError(LinkworkError):
+    """An FMU could not be loaded or initialised; the sentence is the FMU's own where it gave one."""
+
+
+class FmuRun:
+    """An instance of a FiveBarSlider FMU through FMPy: set inputs, step, read outputs.
+
+    Use as a context manager. `simulate` has no part in it: this is the plain FMI life cycle.
+
+    Raises
+    ------
+    CosimulationError
+        If the file is no such FMU, or its initialisation fails.
+    """
+
+    def __init__(
+        self,
+        fmu: str | Path,
+        parameters: FiveBarParameters,
+        initial: InitialState,
+        *,
+        drive_mode: int,
+        tolerance: float,
+        start_time: float,
+        inputs: dict[str, float],
+    ) -> None:
+        if not Path(fmu).is_file():
+            raise CosimulationError(f"there is no file {fmu}: build it with 'python build_fmu.py'")
+        self.messages: list[str] = []
+        description = read_model_description(str(fmu))
+        self._references = {v.name: v.valueReference for v in description.modelVariables}
+        missing = [name for name in (*INPUT_NAMES, *OUTPUT_NAMES, "solver.status") if name not in self._references]
+        if missing or description.coSimulation is None:
+            raise CosimulationError(f"{fmu} is not a FiveBarSlider for co-simulation: it has no {', '.join(missing)}")
+        self._folder = extract(str(fmu))
+        self._callbacks = fmi2CallbackFunctions()
+        self._callbacks.logger = fmi2CallbackLoggerTYPE(self._log)
+        addLoggerProxy(byref(self._callbacks))
+        try:
+            self._slave = FMU2Slave(
+                guid=description.guid,
+                unzipDirectory=self._folder,
+                modelIdentifier=description.coSimulation.modelIdentifier,
+                instanceName="linkwork",
+            )
+            self._slave.instantiate(callbacks=self._callbacks, loggingOn=True)
+            self._slave.setupExperiment(tolerance=tolerance, startTime=start_time)
+            reals = {fmi_name(name): value for name, value in asdict(parameters).items()}
+            reals |= {f"initial.{name}": value for name, value in asdict(initial).items()}
+            reals |= {"solver.tolerance": tolerance} | inputs
+            integers = {"drive.mode": drive_mode, "assembly.branch": reals.pop("assembly.branch")}
+            self._slave.setReal([self._references[name] for name in reals], [float(v) for v in reals.values()])
+            self._slave.setInteger([self._references[name] for name in integers], list(integers.values()))
+            self._slave.enterInitializationMode()
+            self._slave.exitInitializationMode()
+        except FMICallException as error:
+            self.close()
+            reasons = [m for m in self.messages if not m.startswith("Fatal py exception")]
+            raise CosimulationError("; ".join(reasons) or str(error)) from error
+        self._inputs = [self._references[name] for name in INPUT_NAMES]
+        self._outputs = [self._references[name] for name in OUTPUT_NAMES]
+
+    def _log(self, environment: Any, name: bytes, status: int, category: bytes, message: bytes) -> None:
+        self.messages.append(message.decode("utf-8", errors="replace"))
+
+    def __enter__(self) -> FmuRun:
+        return self
+
+    def __exit__(self, *exception: object) -> None:
+        self.close()
+
+    def set_inputs(self, values: dict[str, float]) -> None:
+        """Set all inputs."""
+        self._slave.setReal(self._inputs, [values[name] for name in INPUT_NAMES])
+
+    def outputs(self) -> list[float]:
+        """All real outputs, in the order of the contract."""
+        return list(self._slave.getReal(self._outputs))
+
+    def step(self, time: float, step: float) -> tuple[int, str]:
+        """Take one communication step; returns solver.status and solver.message, 0 and an empty string where it succeeds."""
+        try:
+            self._slave.doStep(time, step)
+        except FMICallException:
+            status = self._slave.getInteger([self._references["solver.status"]])[0]
+            message = self._slave.getString([self._references["solver.message"]])[0]
+            return int(status), message.decode() if isinstance(message, bytes) else str(message)
+        return 0, ""
+
+    def close(self) -> None:
+        """Free the instance and remove the unpacked FMU."""
+        slave = self.__dict__.pop("_slave", None)
+        if slave is not None:
+            slave.freeInstance()
+        # the wrapper puts the unpacked FMU on the module path of this process and leaves it there
+        resources = str(Path(self._folder) / "resources")
+        sys.path[:] = [entry for entry in sys.path if Path(entry) != Path(resources)]
+        shutil.rmtree(self._folder, ignore_errors=True)
+
+
+def cosimulate(
+    fmu: str | Path,
+    parameters: FiveBarParameters,
+    inputs: Inputs | None = None,
+    *,
+    initial: InitialState | None = None,
+    stop_time: float,
+    step: float = 1e-3,
+    start_time: float = 0.0,
+    tolerance: float = 1e-9,
+    progress: bool = False,
+) -> Trajectory:
+    """Run a FiveBarSlider FMU through FMPy.
+
+    The inputs are sampled at each communication point and held over the step, the crank speed goes along the secant:
+    ``simulate(..., hold=step)`` does the same in process.
+
+    Parameters
+    ----------
+    fmu : path
+    parameters, inputs, initial, stop_time, start_time, tolerance, progress
+        As for `simulate`.
+    step : float
+        Communication step (s); every one is recorded.
+
+    Returns
+    -------
+    Trajectory
+        A refused step ends the run with the FMU's solver.status and solver.message and all data up to it.
+
+    Raises
+    ------
+    CosimulationError
+        If the FMU cannot be loaded or refuses to initialise.
+    InputError
+    """
+    begun = clock.perf_counter()
+    inputs = inputs or Inputs()
+    initial = initial or InitialState()
+    times = sample_times(stop_time, step, start_time)
+    encoded = encode(inputs)
+    law = encoded.law.copy()
+    rows: list[list[float]] = []
+    status, message = 0, ""
+
+    def sampled(t: float, ahead: float, x: NDArray[np.float64]) -> dict[str, float]:
+        if law[2] and x[0] >= law[1]:
+            law[2] = 0.0
+        torque, speed, _, force, load_x, load_y = channels(encoded, t, False, x, law)
+        acceleration = 0.0
+        if inputs.speed_drive:
+            acceleration = (channels(encoded, ahead, True, x, law)[1] - speed) / (ahead - t)
+        return dict(zip(INPUT_NAMES, (torque, speed, acceleration, force, load_x, load_y)))
+
+    x = np.array([initial.crank_angle, initial.slider_position, initial.crank_speed, initial.slider_velocity])
+    first = sampled(times[0], times[1], x)
+    run = FmuRun(
+        fmu,
+        parameters,
+        initial,
+        drive_mode=SPEED_DRIVE if inputs.speed_drive else TORQUE_DRIVE,
+        tolerance=tolerance,
+        start_time=float(times[0]),
+        inputs=first,
+    )
+    with run, _interruptible() as interrupted, Progress(disable=not progress, transient=True) as bar:
+        task = bar.add_task("co-simulate", total=len(times) - 1)
+        rows.append(run.outputs())
+        for t, t_next in pairwise(times):
+            status, message = run.step(float(t), float(t_next - t))
+            if status:
+                break
+            # the outputs belong to the inputs that begin here: read the state, sample, set, read all
+            row = run.outputs()
+            x = np.array([row[0], row[5], row[1], row[6]])
+            later = t_next + step if t_next == times[-1] else times[len(rows) + 1]
+            run.set_inputs(sampled(float(t_next), float(later), x))
+            rows.append(run.outputs())
+            bar.advance(task)
+            if interrupted:
+                break
+    trajectory = Trajectory(
+        time=times[: len(rows)],
+        values=np.array(rows),
+        status=status,
+        message=message,
+        source=Path(fmu).name,
+        statistics={"steps": float(len(rows) - 1), "seconds": clock.perf_counter() - begun},
+    )
+    if interrupted:
+        raise RunInterrupted(trajectory)
+    return trajectory
+
+
+@contextmanager
+def _interruptible() -> Iterator[list[bool]]:
+    """Hear Ctrl-C between two steps: inside a step it would strike the FMU's interpreter, which is this one."""
+    import signal
+    import threading
+
+    heard: list[bool] = []
+    if threading.current_thread() is not threading.main_thread():
+        yield heard
+        return
+    before = signal.signal(signal.SIGINT, lambda *_: heard.append(True))
+    try:
+        yield heard
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class OutputDifference:
+    """Difference of one output between two runs: largest and rms, in its unit, and relative to ``scale``."""
+
+    name: str
+    unit: str
+    largest: float
+    rms: float
+    scale: float
+
+    @property
+    def relative(self) -> float:
+        """Largest difference over scale; zero where both runs are zero throughout."""
+        return 0.0 if self.largest == 0.0 else self.largest / self.scale
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Comparison:
+    """Differences of all outputs between two runs."""
+
+    differences: tuple[OutputDifference, ...]
+    tolerance: float
+
+    @property
+    def worst(self) -> OutputDifference:
+        """The output with the largest relative difference."""
+        return max(self.differences, key=lambda d: d.relative)
+
+    @property
+    def agrees(self) -> bool:
+        """Whether every output is within the tolerance."""
+        return self.worst.relative <= self.tolerance
+
+    def __getitem__(self, name: str) -> OutputDifference:
+        return next(d for d in self.differences if d.name == name)
+
+
+def compare(a: Trajectory, b: Trajectory, *, tolerance: float = 1e-6) -> Comparison:
+    """Compare two runs output by output.
+
+    The scale of an output is its largest magnitude in ``a``; but a quantity that is small beside its like (a force at one
+    pin, the displacement of a stiff slider) is not asked for more digits than a thousandth of the largest like one
+    carries, and residuals are measured against what they are the residual of.
+
+    Two runs that ended early for the same reason are compared on the samples they share: a solver in process keeps the
+    last configuration, an FMU the last communication point.
+
+    Raises
+    ------
+    InputError
+        If the runs have not the same times.
+    """
+    if a.status == b.status != 0:
+        n = int(np.count_nonzero(np.isin(a.time, b.time)))
+        a, b = replace(a, time=a.time[:n], values=a.values[:n]), replace(b, time=b.time[:n], values=b.values[:n])
+    if len(a) != len(b) or not np.allclose(a.time, b.time, rtol=1e-12, atol=1e-15):
+        raise InputError(
+            f"the runs cannot be compared: {len(a)} samples to t = {a.time[-1]:.9g} s, and {len(b)} to t = {b.time[-1]:.9g} s"
+        )
+    largest = {name: float(np.max(np.abs(a[name]), initial=0.0)) for name in OUTPUT_NAMES}
+    differences = []
+    for name in OUTPUT_NAMES:
+        difference = np.abs(a[name] - b[name])
+        if name in PRINCIPAL_ANGLES:
+            difference = np.abs(np.remainder(difference + pi, 2.0 * pi) - pi)
+        differences.append(
+            OutputDifference(
+                name=name,
+                unit=UNITS[name],
+                largest=float(difference.max()),
+                rms=float(np.sqrt(np.mean(difference**2))),
+                scale=max(largest[name], _floor(name, largest), np.finfo(float).tiny),
+            )
+        )
+    return Comparison(differences=tuple(differences), tolerance=tolerance)
+
+
+def _floor(name: str, largest: dict[str, float]) -> float:
+    """Least scale of an output, from the largest magnitudes of the outputs like it."""
+
+    def like(*names: str) -> float:
+        return max(largest[n] for n in names)
+
+    if name.endswith(".angle"):
+        return 1.0
+    lengths = like("coupler.point.x", "coupler.point.y", "slider.position")
+    if name == "closure.residual":
+        return lengths
+    if name in ("slider.position", "coupler.point.x", "coupler.point.y"):
+        return 1e-3 * lengths
+    speed = largest["crank.speed"]
+    if name == "slider.velocity":
+        return 1e-3 * lengths * speed
+    if name == "slider.acceleration":
+        return 1e-3 * lengths * speed**2
+    if name == "crank.acceleration":
+        return 1e-3 * speed**2
+    forces = [n for n in OUTPUT_NAMES if UNITS[n] == "N"]
+    if name in forces:
+        return 1e-3 * like(*forces)
+    energies = [n for n in OUTPUT_NAMES if UNITS[n] == "J" and n != "energy.residual"]
+    if name == "energy.residual":
+        return like(*energies)
+    if name in energies:
+        return 1e-3 * like(*energies)
+    if name == "drive.applied_torque":
+        return 1e-3 * like(*forces) * lengths
+    return 0.0

@@ -1,0 +1,322 @@
+"""What acts on a mechanism during a run: crank torque or speed, slider force, load.
+
+One `Inputs` object serves `simulate` and `cosimulate`. A signal is a function of time; a torque may besides depend on
+the crank (torsion bar, induction motor), and any channel but the speed may be a function of time and state.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.interpolate import CubicSpline, PPoly
+
+from linkwork.errors import InputError
+
+#: Channels of a run, in the order of the compiled code.
+CHANNELS = ("torque", "speed", "force", "load_x", "load_y")
+
+StateFunction = Callable[[float, float, float, float, float], float]
+
+
+@dataclass(frozen=True, slots=True)
+class Piecewise:
+    """A signal that is a polynomial of degree three at most between its breaks.
+
+    Parameters
+    ----------
+    breaks : ndarray, shape (n + 1,)
+        Times (s), increasing. Before the first and after the last the outer polynomials go on.
+    coefficients : ndarray, shape (n, 4)
+        Of the powers 0 to 3 of the time since the break on the left.
+
+    Notes
+    -----
+    A jump belongs to the piece on its right: the value at a break is the limit from the right.
+    """
+
+    breaks: NDArray[np.float64]
+    coefficients: NDArray[np.float64]
+
+    def __post_init__(self) -> None:
+        if self.coefficients.shape != (len(self.breaks) - 1, 4):
+            raise InputError(
+                f"a signal with {len(self.breaks)} breaks needs coefficients of shape ({len(self.breaks) - 1}, 4), "
+                f"not {self.coefficients.shape}"
+            )
+        if not (np.all(np.isfinite(self.breaks)) and np.all(np.isfinite(self.coefficients))):
+            raise InputError("a signal's breaks and coefficients must be finite numbers")
+        if np.any(np.diff(self.breaks) <= 0.0):
+            raise InputError(f"a signal's times must increase: they are {self.breaks}")
+
+
+@dataclass(frozen=True, slots=True)
+class Harmonics:
+    """mean + sum of amplitude cos(frequency t + phase); frequencies in rad/s, phases in rad, shapes (n,)."""
+
+    mean: float = 0.0
+    amplitudes: Sequence[float] = ()
+    frequencies: Sequence[float] = ()
+    phases: Sequence[float] = ()
+
+    def __post_init__(self) -> None:
+        if not len(self.amplitudes) == len(self.frequencies) == len(self.phases):
+            raise InputError("harmonics need as many amplitudes as frequencies and phases")
+        if not np.all(np.isfinite([self.mean, *self.amplitudes, *self.frequencies, *self.phases])):
+            raise InputError("harmonics must be finite numbers")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TorsionBar:
+    """Torque of a wound-up bar: torque (1 - th2 / release_angle) until the crank reaches release_angle, then none.
+
+    The thesis's launch (section 3.2.2): torque T0 in N.m, released at 1 rad. The switch is located exactly.
+    """
+
+    torque: float
+    release_angle: float = 1.0
+
+    def __post_init__(self) -> None:
+        if not np.isfinite(self.torque):
+            raise InputError(f"torque of the torsion bar is {self.torque}: it must be a finite number of N.m")
+        if not (np.isfinite(self.release_angle) and self.release_angle > 0.0):
+            raise InputError(f"release angle of the torsion bar is {self.release_angle}: it must be above 0 rad")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class InductionMotor:
+    """Torque of an induction motor by Kloss's formula, 2 Tb / (s / sb + sb / s) at the slip s = 1 - th2' / synchronous_speed.
+
+    Parameters
+    ----------
+    breakdown_torque : float
+        Greatest torque Tb (N.m).
+    breakdown_slip : float
+        Slip sb at which it is reached.
+    synchronous_speed : float
+        Speed of the field (rad/s).
+    """
+
+    breakdown_torque: float
+    breakdown_slip: float
+    synchronous_speed: float
+
+    def __post_init__(self) -> None:
+        if not np.isfinite(self.breakdown_torque):
+            raise InputError(f"breakdown torque is {self.breakdown_torque}: it must be a finite number of N.m")
+        if not (np.isfinite(self.breakdown_slip) and self.breakdown_slip > 0.0):
+            raise InputError(f"breakdown slip is {self.breakdown_slip}: it must be above 0")
+        if not (np.isfinite(self.synchronous_speed) and self.synchronous_speed != 0.0):
+            raise InputError(f"synchronous speed is {self.synchronous_speed}: it must be finite and not 0 rad/s")
+
+
+@dataclass(frozen=True, slots=True)
+class Function:
+    """Any channel as a Python function ``f(t, th2, u, th2', u')`` of floats.
+
+    It is compiled with Numba where it can be, else the run needs one of SciPy's methods. As a speed it must depend on
+    ``t`` alone and needs its ``rate``, the acceleration. ``breaks`` are times (s) where it is not smooth.
+    """
+
+    function: StateFunction
+    rate: StateFunction | None = None
+    breaks: Sequence[float] = ()
+
+
+Signal = float | Piecewise | Harmonics | Function
+Torque = Signal | TorsionBar | InductionMotor
+
+
+def ramp(start: float, end: float, from_time: float, to_time: float) -> Piecewise:
+    """A signal that goes from ``start`` to ``end`` along a straight line between two times (s)."""
+    return table([from_time - 1.0, from_time, to_time, to_time + 1.0], [start, start, end, end])
+
+
+def steps(times: ArrayLike, values: ArrayLike) -> Piecewise:
+    """A signal with the value ``values[i]`` from ``times[i]`` on; shapes (n,) and (n,)."""
+    t, y = _points(times, values, least=1)
+    breaks = np.append(t, t[-1] + 1.0)
+    coefficients = np.zeros((len(t), 4))
+    coefficients[:, 0] = y
+    return Piecewise(breaks, coefficients)
+
+
+def table(times: ArrayLike, values: ArrayLike, kind: str = "linear") -> Piecewise:
+    """A signal through the points (times, values), shapes (n,): ``linear``, ``cubic`` (spline) or ``hold``.
+
+    Outside the table the first and the last value hold.
+    """
+    if kind == "hold":
+        return steps(times, values)
+    t, y = _points(times, values, least=2)
+    if kind == "linear":
+        slopes = np.diff(y) / np.diff(t)
+        inner = np.column_stack([y[:-1], slopes, np.zeros_like(slopes), np.zeros_like(slopes)])
+    elif kind == "cubic":
+        inner = CubicSpline(t, y).c[::-1].T
+    else:
+        raise InputError(f"kind of table is {kind!r}: it must be 'linear', 'cubic' or 'hold'")
+    flat = np.zeros((1, 4))
+    flat[0, 0] = y[0]
+    end = np.zeros((1, 4))
+    end[0, 0] = y[-1]
+    return Piecewise(np.concatenate([[t[0] - 1.0], t, [t[-1] + 1.0]]), np.vstack([flat, inner, end]))
+
+
+def _points(times: ArrayLike, values: ArrayLike, least: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    t = np.asarray(times, dtype=float)
+    y = np.asarray(values, dtype=float)
+    if t.ndim != 1 or t.shape != y.shape:
+        raise InputError(f"a table needs as many times as values in one dimension each, not {t.shape} and {y.shape}")
+    if len(t) < least:
+        raise InputError(f"a table needs at least {least} points, not {len(t)}")
+    return t, y
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Inputs:
+    """Everything that acts on a mechanism during a run. SI units; a plain number is a constant.
+
+    Parameters
+    ----------
+    speed : signal, optional
+        Crank speed (rad/s). Where it is given the run is in speed drive: the crank torque is a result.
+    torque : signal, TorsionBar, InductionMotor or a tuple of them, optional
+        Crank torque (N.m), their sum where there are several. Excludes ``speed``.
+    force : signal
+        Control force on the slider (N).
+    load_x, load_y : signal
+        Load on the coupler point P (N).
+
+    Raises
+    ------
+    InputError
+        If both speed and torque are given, or a value is not finite or of the wrong kind.
+    """
+
+    speed: Signal | None = None
+    torque: Torque | tuple[Torque, ...] | None = None
+    force: Signal = 0.0
+    load_x: Signal = 0.0
+    load_y: Signal = 0.0
+
+    def __post_init__(self) -> None:
+        if self.speed is not None and self.torque is not None:
+            raise InputError("both speed and torque are given: the crank can be driven by one of them only")
+        for channel in CHANNELS:
+            for part in self.parts(channel):
+                kinds: tuple[type, ...] = (int, float, np.floating, np.integer, Piecewise, Harmonics, Function)
+                if channel == "torque":
+                    kinds = (*kinds, TorsionBar, InductionMotor)
+                if not isinstance(part, kinds):
+                    raise InputError(
+                        f"{channel} is {part!r}: it must be a number, a signal of analysis.inputs, or a Function"
+                    )
+                if isinstance(part, (int, float, np.floating, np.integer)) and not np.isfinite(part):
+                    raise InputError(f"{channel} is {part}: it must be a finite number")
+        if isinstance(self.speed, Function) and self.speed.rate is None:
+            raise InputError("a speed given as a Function needs its rate, the acceleration (rad/s2)")
+        for kind in (TorsionBar, InductionMotor, Function):
+            if sum(isinstance(part, kind) for part in self.parts("torque")) > 1:
+                raise InputError(f"torque has more than one {kind.__name__}: one can be in force at a time")
+
+    def parts(self, channel: str) -> tuple[Any, ...]:
+        """The summands of a channel."""
+        value = getattr(self, channel)
+        if value is None:
+            return ()
+        return value if isinstance(value, tuple) else (value,)
+
+    @property
+    def speed_drive(self) -> bool:
+        """Whether the crank speed is prescribed."""
+        return self.speed is not None
+
+
+@dataclass(frozen=True, slots=True)
+class Encoded:
+    """`Inputs` as the arrays that the compiled code reads.
+
+    Attributes
+    ----------
+    breaks : ndarray, shape (n + 1,)
+        Times at which some channel's polynomial changes.
+    coefficients : ndarray, shape (n, 5, 4)
+        Polynomials of the channels between the breaks.
+    harmonics : ndarray, shape (m, 4)
+        Channel number, amplitude, frequency, phase.
+    law : ndarray, shape (6,)
+        Torsion bar: torque, release angle, 1 while it acts. Motor: breakdown torque and slip, synchronous speed.
+    functions : tuple
+        Python functions of torque, force, load_x, load_y, speed and its rate, or None.
+    """
+
+    breaks: NDArray[np.float64]
+    coefficients: NDArray[np.float64]
+    harmonics: NDArray[np.float64]
+    law: NDArray[np.float64]
+    functions: tuple[StateFunction | None, ...] = field(default=(None,) * 6)
+
+    @property
+    def steady(self) -> bool:
+        """Whether torque, force, load and crank acceleration are constant between the breaks."""
+        others = [CHANNELS.index(name) for name in CHANNELS if name != "speed"]
+        return bool(
+            len(self.harmonics) == 0
+            and self.law[0] == 0.0
+            and self.law[3] == 0.0
+            and not any(self.functions)
+            and np.all(self.coefficients[:, others, 1:] == 0.0)
+            and np.all(self.coefficients[:, CHANNELS.index("speed"), 2:] == 0.0)
+        )
+
+
+def encode(inputs: Inputs) -> Encoded:
+    """Bring all channels onto common breaks."""
+    pieces = [(c, part) for c, name in enumerate(CHANNELS) for part in inputs.parts(name)]
+    times = [part.breaks for _, part in pieces if isinstance(part, Piecewise)]
+    times += [np.asarray(part.breaks, dtype=float) for _, part in pieces if isinstance(part, Function)]
+    merged = np.unique(np.concatenate([np.empty(0), *times]))
+    if len(merged) < 2:
+        start = merged[0] if len(merged) else 0.0
+        merged = np.array([start - 1.0, start, start + 1.0]) if len(merged) else np.array([0.0, 1.0])
+    coefficients = np.zeros((len(merged) - 1, len(CHANNELS), 4))
+    harmonics: list[tuple[float, float, float, float]] = []
+    law = np.zeros(6)
+    law[4] = law[5] = 1.0
+    functions: list[StateFunction | None] = [None] * 6
+    slots = {"torque": 0, "force": 1, "load_x": 2, "load_y": 3, "speed": 4}
+    for c, part in pieces:
+        if isinstance(part, Piecewise):
+            coefficients[:, c, :] += _on_breaks(part, merged)
+        elif isinstance(part, Harmonics):
+            coefficients[:, c, 0] += part.mean
+            harmonics += [(float(c), *row) for row in zip(part.amplitudes, part.frequencies, part.phases)]
+        elif isinstance(part, TorsionBar):
+            law[0:3] = part.torque, part.release_angle, 1.0
+        elif isinstance(part, InductionMotor):
+            law[3:6] = part.breakdown_torque, part.breakdown_slip, part.synchronous_speed
+        elif isinstance(part, Function):
+            functions[slots[CHANNELS[c]]] = part.function
+            if CHANNELS[c] == "speed":
+                functions[5] = part.rate
+        else:
+            coefficients[:, c, 0] += float(part)
+    return Encoded(merged, coefficients, np.array(harmonics, dtype=float).reshape(-1, 4), law, tuple(functions))
+
+
+def _on_breaks(part: Piecewise, breaks: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Coefficients of ``part`` about the left ends of finer breaks; its outer pieces go on beyond its ends."""
+    left = breaks[:-1]
+    index = np.clip(np.searchsorted(part.breaks, left, side="right") - 1, 0, len(part.coefficients) - 1)
+    polynomial = PPoly(part.coefficients.T[::-1], part.breaks)
+    shift = left - part.breaks[index]
+    rows = np.empty((len(left), 4))
+    for k, (i, s) in enumerate(zip(index, shift)):
+        c = polynomial.c[:, i]
+        value = np.poly1d(c)
+        rows[k] = [value(s), value.deriv(1)(s), value.deriv(2)(s) / 2.0, value.deriv(3)(s) / 6.0]
+    return rows

@@ -1,0 +1,62 @@
+"""Runs a function in a fresh process: what one FMU leaves behind in an interpreter must not reach the next test."""
+
+from __future__ import annotations
+
+import inspect
+import json
+import os
+import subprocess
+import sys
+import tempfile
+import textwrap
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+HERE = Path(__file__).resolve().parent
+
+_FRAME = """
+import json, sys
+from pathlib import Path
+sys.path.insert(0, {helpers!r})
+
+{source}
+
+arguments = json.loads(Path(sys.argv[1]).read_text())
+Path(sys.argv[2]).write_text(json.dumps({name}(*arguments)))
+"""
+
+
+def run_in_process(
+    code: Callable[..., Any],
+    *args: Any,
+    python: str | Path = sys.executable,
+    timeout: float = 60.0,
+    options: tuple[str, ...] = ("-W", "error"),
+    env: dict[str, str] | None = None,
+) -> Any:
+    """Run the source of the function ``code`` with ``args`` in a fresh Python, and return what it returned.
+
+    The function imports what it needs inside itself; ``bare_master`` is importable. Arguments and result travel as JSON,
+    which carries floats without loss. A process that dies fails the test with what it printed.
+    """
+    source = _FRAME.format(
+        helpers=str(HERE), source=textwrap.dedent(inspect.getsource(code)), name=code.__name__
+    )
+    with tempfile.TemporaryDirectory(prefix="linkwork-test-") as folder:
+        script, given, result = (Path(folder) / name for name in ("script.py", "arguments.json", "result.json"))
+        script.write_text(source)
+        given.write_text(json.dumps([str(a) if isinstance(a, Path) else a for a in args]))
+        done = subprocess.run(
+            [str(python), "-X", "faulthandler", *options, str(script), str(given), str(result)],
+            capture_output=True,
+            text=True,
+            timeout=timeout,
+            check=False,
+            cwd=folder,
+            env=os.environ | {"PYTHONDONTWRITEBYTECODE": "1"} if env is None else env,
+        )
+        told = f"{code.__name__} ended with {done.returncode}\n{done.stdout}\n{done.stderr}"
+        assert done.returncode == 0, told
+        assert result.is_file(), told
+        return json.loads(result.read_text())
