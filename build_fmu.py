@@ -36,8 +36,12 @@ from linkwork.five_bar import variables as five_bar_variables
 from linkwork.variables import Variable
 
 HERE = Path(__file__).resolve().parent
-SOURCES = HERE / "fmu_src"
+#: The source root: beside this file in a checkout, inside the analysis package where Linkwork is installed as a wheel.
+SOURCES = next(
+    (folder for folder in (HERE / "fmu_src", HERE / "analysis" / "_fmu_src") if folder.is_dir()), HERE / "fmu_src"
+)
 ICON = SOURCES / "icon.png"
+LICENSE = next((path for path in (SOURCES / "LICENSE", HERE / "LICENSE") if path.is_file()), HERE / "LICENSE")
 #: Modification time of every file in the zip, so that the same sources give the same archive.
 EPOCH = (1980, 1, 1, 0, 0, 0)
 
@@ -105,8 +109,9 @@ def build(name: str = "FiveBarSlider", dest: Path | str = "build", sources: Path
         raise BuildError(f"there is no model {name!r}: the models are {', '.join(MODELS)}")
     model = MODELS[name]
     sources = Path(sources)
-    if not (sources / f"{model.slave}.py").is_file():
-        raise BuildError(f"{sources} holds no {model.slave}.py: FMUs are built from a checkout of the project")
+    for needed in (f"{model.slave}.py", "slave.py", "linkwork/__init__.py", f"linkwork/{model.plant}/__init__.py"):
+        if not (sources / needed).is_file():
+            raise BuildError(f"{sources} holds no {needed}: FMUs are built from a checkout of the project")
     dest = Path(dest)
     dest.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(prefix="linkwork-fmu-") as folder:
@@ -117,17 +122,20 @@ def build(name: str = "FiveBarSlider", dest: Path | str = "build", sources: Path
         documentation.mkdir()
         (documentation / "index.html").write_text(_documentation(name, model), encoding="utf-8")
         (documentation / "licenses").mkdir()
-        shutil.copy2(HERE / "LICENSE", documentation / "licenses" / "license.txt")
+        shutil.copy2(LICENSE, documentation / "licenses" / "license.txt")
         with _import_state():
-            raw = FmuBuilder.build_FMU(
-                script,
-                dest=Path(folder) / "raw",
-                project_files=[package, base],
-                documentation_folder=documentation,
-                needsExecutionTool=False,
-                canGetAndSetFMUstate=True,
-                canSerializeFMUstate=True,
-            )
+            try:
+                raw = FmuBuilder.build_FMU(
+                    script,
+                    dest=Path(folder) / "raw",
+                    project_files=[package, base],
+                    documentation_folder=documentation,
+                    needsExecutionTool=False,
+                    canGetAndSetFMUstate=True,
+                    canSerializeFMUstate=True,
+                )
+            except Exception as error:  # the sources run here, and may raise anything
+                raise BuildError(f"{name}.fmu cannot be built from {sources}: {error!r}") from error
         finished = Path(folder) / f"{name}.fmu"
         _repack(Path(raw), finished)
         problems = validate_fmu(str(finished))
@@ -282,7 +290,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument(
         "models", nargs="*", metavar="MODEL", help=f"which to build: {', '.join(MODELS)}; all by default"
     )
-    parser.add_argument("--dest", default=str(HERE / "build"), help="folder for the FMUs (default: %(default)s)")
+    parser.add_argument("--dest", default="build", help="folder for the FMUs (default: %(default)s)")
     options = parser.parse_args(arguments)
     for name in options.models or list(MODELS):
         try:

@@ -1,15 +1,50 @@
-"""Reading and writing files: CSV results, and parameters and cases in TOML or JSON with units."""
+"""Reading and writing files: CSV results, and parameters and cases in TOML or JSON with units.
+
+In a file every quantity is a number in SI or a text with its unit, such as ``"15.35 cm"`` or ``"420 rpm"``; the unit's
+dimension is checked. Names are those of the FMI contract: ``[slider] stiffness`` is ``slider.stiffness``.
+"""
 
 from __future__ import annotations
 
+import difflib
+import json
 import os
-from collections.abc import Mapping
+import tomllib
+from collections.abc import Iterable, Mapping
+from dataclasses import MISSING
+from functools import lru_cache
+from math import isfinite, pi
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+import tomli_w
 from numpy.typing import ArrayLike
 
-from linkwork.errors import InputError
+from linkwork.errors import InputError, MissingParameterError, ParameterError, UnknownNameError
+from linkwork.five_bar.parameters import FiveBarParameters, InitialState, field_name
+from linkwork.five_bar.published import SETS
+from linkwork.five_bar.variables import PARAMETERS
+
+from .case import Case
+from .inputs import Harmonics, InductionMotor, Inputs, Piecewise, Signal, Torque, TorsionBar, ramp, table
+
+#: Units of the contract as pint spells them.
+_PINT = {
+    "1": "dimensionless",
+    "N.m": "N*m",
+    "kg.m2": "kg*m**2",
+    "m/s2": "m/s**2",
+    "rad/s2": "rad/s**2",
+    "N.s/m": "N*s/m",
+}
+
+_MECHANISM = {
+    v.name: v
+    for v in PARAMETERS
+    if not v.name.startswith("initial.") and v.name not in ("drive.mode", "solver.tolerance")
+}
+_INITIAL = {v.name.removeprefix("initial."): v for v in PARAMETERS if v.name.startswith("initial.")}
 
 
 def write_csv(path: str | Path, columns: Mapping[str, ArrayLike]) -> Path:
@@ -24,10 +59,401 @@ def write_csv(path: str | Path, columns: Mapping[str, ArrayLike]) -> Path:
     lengths = {name: len(values) for name, values in arrays.items()}
     if len(set(lengths.values())) > 1:
         raise InputError(f"the columns of a CSV file differ in length: {lengths}")
-    path = Path(path)
-    path.parent.mkdir(parents=True, exist_ok=True)
+    path = _prepare(path)
     part = path.with_name(path.name + ".part")
     header = ",".join(arrays)
     np.savetxt(part, np.column_stack(list(arrays.values())), delimiter=",", header=header, comments="", fmt="%.17g")
     os.replace(part, path)
     return path
+
+
+def save_figure(figure: Any, path: str | Path, *, dpi: int = 150) -> Path:
+    """Write a Matplotlib figure, as the format that the path's ending names."""
+    path = _prepare(path)
+    figure.savefig(path, dpi=dpi)
+    return path
+
+
+def _prepare(path: str | Path) -> Path:
+    path = Path(path)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    return path
+
+
+# Quantities
+
+
+@lru_cache(maxsize=1)
+def _registry() -> Any:
+    import pint
+
+    return pint.UnitRegistry()
+
+
+def quantity(value: Any, unit: str, name: str) -> float:
+    """A number in SI from a number or a text with a unit.
+
+    Parameters
+    ----------
+    value : float or str
+        ``0.1535``, ``"0.1535"`` or ``"15.35 cm"``.
+    unit : str
+        SI unit of the contract, such as ``N.s/m``.
+    name : str
+        What it is, for the error.
+
+    Raises
+    ------
+    ParameterError
+        If it is neither, or the unit has another dimension. Hertz is refused for a speed: a cycle is not a radian.
+    """
+    si = _PINT.get(unit, unit)
+    wanted = f"be a number in {unit}" if unit == "1" else f"be a number in {unit}, or a text with a unit of that kind"
+    if isinstance(value, bool):
+        raise ParameterError(name, value, wanted)
+    if isinstance(value, (int, float)):
+        return float(value)
+    if not isinstance(value, str):
+        raise ParameterError(name, value, wanted)
+    import pint
+
+    if unit == "rad/s" and "hz" in value.lower().replace("hertz", "hz"):
+        raise ParameterError(name, value, "be in rad/s or rpm: in Hz it would be ambiguous by a factor of 2 pi")
+    try:
+        parsed = _registry().Quantity(value)
+        if parsed.unitless and parsed.dimensionless and not any(c.isalpha() for c in value.replace("e", "")):
+            number = float(parsed.magnitude)
+        else:
+            number = float(parsed.to(si).magnitude)
+    except (pint.PintError, ValueError, TypeError, AttributeError, ArithmeticError, SyntaxError) as error:
+        raise ParameterError(name, value, f"{wanted} ({_first_sentence(error)})") from error
+    if not isfinite(number):
+        raise ParameterError(name, value, "be a finite number")
+    return number
+
+
+def _first_sentence(error: Exception) -> str:
+    return (str(error) or type(error).__name__).splitlines()[0]
+
+
+def _unknown(name: str, known: Iterable[str]) -> UnknownNameError:
+    names = tuple(known)
+    near = difflib.get_close_matches(name, names, n=1)
+    return UnknownNameError(name, names, near[0] if near else None)
+
+
+def _flatten(data: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
+    flat: dict[str, Any] = {}
+    for name, value in data.items():
+        if isinstance(value, Mapping):
+            flat |= _flatten(value, f"{prefix}{name}.")
+        else:
+            flat[prefix + name] = value
+    return flat
+
+
+# Parameters
+
+
+def parameters_from(data: Mapping[str, Any], base: FiveBarParameters | None = None) -> FiveBarParameters:
+    """Parameters from nested tables or dotted names; what they leave out is taken from ``base``.
+
+    Raises
+    ------
+    ParameterError
+        If a name is unknown, a value is wrong, or, without a base, one is missing.
+    """
+    values: dict[str, Any] = {}
+    for name, value in _flatten(data).items():
+        if name not in _MECHANISM:
+            raise _unknown(name, _MECHANISM)
+        if _MECHANISM[name].kind == "Integer":
+            if isinstance(value, bool) or not isinstance(value, int):
+                raise ParameterError(name, value, "be +1 or -1")
+            values[field_name(name)] = value
+        else:
+            values[field_name(name)] = quantity(value, _MECHANISM[name].unit, name)
+    if base is not None:
+        values = {field: getattr(base, field) for field in base.__dataclass_fields__} | values
+    missing = [
+        name
+        for name in _MECHANISM
+        if field_name(name) not in values
+        and FiveBarParameters.__dataclass_fields__[field_name(name)].default is _REQUIRED
+    ]
+    if missing:
+        raise MissingParameterError(missing[0], tuple(missing[1:]))
+    return FiveBarParameters(**values)
+
+
+_REQUIRED = MISSING
+
+
+def parameters_to(parameters: FiveBarParameters) -> dict[str, Any]:
+    """Parameters as nested tables of texts with SI units, every digit kept."""
+    data: dict[str, Any] = {}
+    for name, variable in _MECHANISM.items():
+        value = getattr(parameters, field_name(name))
+        text = value if variable.kind == "Integer" else f"{float(value)!r} {_PINT.get(variable.unit, variable.unit)}"
+        group, _, leaf = name.rpartition(".")
+        (data.setdefault(group, {}) if group else data)[leaf] = text
+    return data
+
+
+def save_parameters(path: str | Path, parameters: FiveBarParameters) -> Path:
+    """Write parameters to a TOML or JSON file, as the path's ending says."""
+    return _write_tables(path, parameters_to(parameters))
+
+
+def load_parameters(path: str | Path) -> FiveBarParameters:
+    """Read parameters from a TOML or JSON file.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read.
+    ParameterError
+        As `parameters_from`.
+    """
+    return parameters_from(_read_tables(path))
+
+
+def _write_tables(path: str | Path, data: Mapping[str, Any]) -> Path:
+    path = _prepare(path)
+    ending = path.suffix.lower()
+    if ending == ".toml":
+        # plain values before tables, as TOML asks
+        ordered = {k: v for k, v in data.items() if not isinstance(v, dict)} | {
+            k: v for k, v in data.items() if isinstance(v, dict)
+        }
+        path.write_text(tomli_w.dumps(ordered), encoding="utf-8")
+    elif ending == ".json":
+        path.write_text(json.dumps(data, indent=2) + "\n", encoding="utf-8")
+    else:
+        raise InputError(f"{path.name} ends in {ending!r}: it must end in .toml or .json")
+    return path
+
+
+def _read_tables(path: str | Path) -> dict[str, Any]:
+    path = Path(path)
+    ending = path.suffix.lower()
+    if ending not in (".toml", ".json"):
+        raise InputError(f"{path.name} ends in {ending!r}: it must end in .toml or .json")
+    try:
+        text = path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"{path} cannot be read: {_first_sentence(error)}") from error
+    try:
+        data = tomllib.loads(text) if ending == ".toml" else json.loads(text)
+    except (tomllib.TOMLDecodeError, json.JSONDecodeError) as error:
+        raise InputError(f"{path} is not valid {ending[1:].upper()}: {_first_sentence(error)}") from error
+    if not isinstance(data, dict):
+        raise InputError(f"{path} must hold tables, not {type(data).__name__}")
+    return data
+
+
+# Cases
+
+_CASE_KEYS = ("title", "published", "initial", "drive", "force", "load", "run")
+
+
+def load_case(path: str | Path, overrides: Mapping[str, Any] | None = None) -> Case:
+    """Read a case from a TOML or JSON file; see `docs/case-files.md`.
+
+    Parameters
+    ----------
+    path : path
+    overrides : mapping, optional
+        Values by dotted name that replace the file's, such as ``slider.stiffness``, ``drive.speed`` or ``run.stop_time``.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read or leaves out what a run needs.
+    ParameterError
+        If a name is unknown or a value is wrong.
+    """
+    return case_from(_read_tables(path), folder=Path(path).parent, title=Path(path).stem, overrides=overrides)
+
+
+def case_from(
+    data: Mapping[str, Any], *, folder: Path, title: str = "", overrides: Mapping[str, Any] | None = None
+) -> Case:
+    """A case from the tables of a case file; ``folder`` is where its CSV tables are looked for."""
+    data = _overridden(data, overrides or {})
+    mechanism = {name: value for name, value in data.items() if name not in _CASE_KEYS}
+    base = None
+    speed = None
+    published = data.get("published")
+    if published is not None:
+        if published not in SETS:
+            raise _unknown(str(published), SETS)
+        base = SETS[published].parameters
+        speed = SETS[published].crank_speed
+    flat = _flatten(mechanism)
+    initial_values = _table(data, "initial")
+    run = _table(data, "run")
+    parameters = parameters_from(flat, base)
+    for name in initial_values:
+        if name not in _INITIAL:
+            raise _unknown(f"initial.{name}", [f"initial.{n}" for n in _INITIAL])
+    initial = InitialState(
+        **{name: quantity(value, _INITIAL[name].unit, f"initial.{name}") for name, value in initial_values.items()}
+    )
+    inputs = _inputs(data, folder, speed)
+    stop_time, step, tolerance = _run_table(run, inputs)
+    return Case(
+        title=str(data.get("title", title)),
+        parameters=parameters,
+        initial=initial,
+        inputs=inputs,
+        stop_time=stop_time,
+        step=step,
+        tolerance=tolerance,
+    )
+
+
+def _overridden(data: Mapping[str, Any], overrides: Mapping[str, Any]) -> dict[str, Any]:
+    """The tables with single values replaced, by dotted name; one way of driving the crank replaces the other."""
+    result = {name: dict(value) if isinstance(value, Mapping) else value for name, value in data.items()}
+    for name, value in overrides.items():
+        group, _, leaf = name.rpartition(".")
+        if group == "drive":
+            result["drive"] = {leaf: value}
+        elif group:
+            table = result.setdefault(group, {})
+            if not isinstance(table, dict):
+                raise ParameterError(group, table, "be a table")
+            table[leaf] = value
+        else:
+            result[leaf] = value
+    return result
+
+
+def _table(data: Mapping[str, Any], name: str) -> Mapping[str, Any]:
+    value = data.get(name, {})
+    if not isinstance(value, Mapping):
+        raise ParameterError(name, value, "be a table")
+    return value
+
+
+def _inputs(data: Mapping[str, Any], folder: Path, speed: float | None) -> Inputs:
+    drive = _table(data, "drive")
+    for name in drive:
+        if name not in ("speed", "torque"):
+            raise _unknown(f"drive.{name}", ["drive.speed", "drive.torque"])
+    if not drive and speed is not None:
+        drive = {"speed": speed}
+    load = _table(data, "load")
+    for name in load:
+        if name not in ("fx", "fy"):
+            raise _unknown(f"load.{name}", ["load.fx", "load.fy"])
+    torque = drive.get("torque")
+    laws = torque if isinstance(torque, list) else [] if torque is None else [torque]
+    return Inputs(
+        speed=_signal(drive["speed"], "rad/s", "drive.speed", folder) if "speed" in drive else None,
+        torque=tuple(_torque(law, folder) for law in laws) if laws else None,
+        force=_signal(data.get("force", 0.0), "N", "force", folder),
+        load_x=_signal(load.get("fx", 0.0), "N", "load.fx", folder),
+        load_y=_signal(load.get("fy", 0.0), "N", "load.fy", folder),
+    )
+
+
+def _torque(value: Any, folder: Path) -> Torque:
+    if isinstance(value, Mapping):
+        kind = value.get("kind")
+        if kind == "torsion-bar":
+            entries = _entries(value, "drive.torque", {"torque": "N.m", "release_angle": "rad"}, required=("torque",))
+            return TorsionBar(**entries)
+        if kind == "induction-motor":
+            units = {"breakdown_torque": "N.m", "breakdown_slip": "1", "synchronous_speed": "rad/s"}
+            return InductionMotor(**_entries(value, "drive.torque", units, required=units))
+    return _signal(value, "N.m", "drive.torque", folder, extra=("torsion-bar", "induction-motor"))
+
+
+def _signal(value: Any, unit: str, name: str, folder: Path, extra: tuple[str, ...] = ()) -> Signal:
+    if not isinstance(value, Mapping):
+        return quantity(value, unit, name)
+    kind = value.get("kind")
+    if kind == "ramp":
+        units = {"start": unit, "end": unit, "from_time": "s", "to_time": "s"}
+        e = _entries(value, name, units, required=units)
+        return ramp(e["start"], e["end"], e["from_time"], e["to_time"])
+    if kind == "table":
+        return _tabulated(value, unit, name, folder)
+    if kind == "harmonics":
+        _known(value, name, ("kind", "mean", "amplitudes", "frequencies", "phases"))
+        rows = {key: _list(value, key, name) for key in ("amplitudes", "frequencies")}
+        phases = value.get("phases", [0.0] * len(rows["amplitudes"]))
+        return Harmonics(
+            quantity(value.get("mean", 0.0), unit, f"{name}.mean"),
+            [quantity(a, unit, f"{name}.amplitudes") for a in rows["amplitudes"]],
+            [quantity(f, "rad/s", f"{name}.frequencies") for f in rows["frequencies"]],
+            [quantity(p, "rad", f"{name}.phases") for p in phases],
+        )
+    kinds = ("ramp", "table", "harmonics", *extra)
+    raise ParameterError(f"{name}.kind", kind, f"be one of {', '.join(kinds)}")
+
+
+def _tabulated(value: Mapping[str, Any], unit: str, name: str, folder: Path) -> Piecewise:
+    _known(value, name, ("kind", "times", "values", "file", "interpolation"))
+    interpolation = value.get("interpolation", "linear")
+    if "file" in value:
+        path = folder / str(value["file"])
+        try:
+            rows = np.loadtxt(path, delimiter=",", skiprows=1, ndmin=2)
+        except (OSError, ValueError) as error:
+            raise InputError(f"{name}: {path} cannot be read as CSV: {_first_sentence(error)}") from error
+        if rows.shape[1] < 2:
+            raise InputError(f"{name}: {path} must have two columns, time in s and value in {unit}")
+        return table(rows[:, 0], rows[:, 1], interpolation)
+    times = [quantity(t, "s", f"{name}.times") for t in _list(value, "times", name)]
+    values = [quantity(v, unit, f"{name}.values") for v in _list(value, "values", name)]
+    return table(times, values, interpolation)
+
+
+def _list(value: Mapping[str, Any], key: str, name: str) -> list[Any]:
+    found = value.get(key)
+    if not isinstance(found, list):
+        raise ParameterError(f"{name}.{key}", found, "be a list")
+    return found
+
+
+def _known(value: Mapping[str, Any], name: str, keys: Iterable[str]) -> None:
+    for key in value:
+        if key not in keys:
+            raise _unknown(f"{name}.{key}", [f"{name}.{k}" for k in keys])
+
+
+def _entries(
+    value: Mapping[str, Any], name: str, units: Mapping[str, str], required: Iterable[str]
+) -> dict[str, float]:
+    _known(value, name, ("kind", *units))
+    for key in required:
+        if key not in value:
+            raise MissingParameterError(f"{name}.{key}")
+    return {key: quantity(value[key], unit, f"{name}.{key}") for key, unit in units.items() if key in value}
+
+
+def _run_table(run: Mapping[str, Any], inputs: Inputs) -> tuple[float, float, float]:
+    keys = ("stop_time", "revolutions", "step", "tolerance")
+    for name in run:
+        if name not in keys:
+            raise _unknown(f"run.{name}", [f"run.{key}" for key in keys])
+    tolerance = quantity(run.get("tolerance", 1e-9), "1", "run.tolerance")
+    constant = float(inputs.speed) if isinstance(inputs.speed, (int, float)) and inputs.speed != 0.0 else None
+    turn = None if constant is None else 2.0 * pi / abs(constant)
+    if "stop_time" in run:
+        stop_time = quantity(run["stop_time"], "s", "run.stop_time")
+    elif "revolutions" in run:
+        if turn is None:
+            raise ParameterError(
+                "run.revolutions", run["revolutions"], "come with a constant drive.speed; give run.stop_time"
+            )
+        stop_time = quantity(run["revolutions"], "1", "run.revolutions") * turn
+    elif turn is not None:
+        stop_time = 3.0 * turn
+    else:
+        raise MissingParameterError("run.stop_time")
+    step = quantity(run["step"], "s", "run.step") if "step" in run else 1e-3 if turn is None else turn / 360.0
+    return stop_time, step, tolerance

@@ -6,9 +6,14 @@ and ``save``. pythonfmu by itself writes neither units nor dependencies nor Init
 
 from __future__ import annotations
 
+import atexit
+import ctypes
 import json
+import sys
 import uuid
 from collections.abc import Callable, Sequence
+from functools import wraps
+from pathlib import Path
 from typing import Any, ClassVar, Protocol
 from xml.etree.ElementTree import Element, SubElement
 
@@ -44,6 +49,46 @@ GUID_NAMESPACE = uuid.uuid5(uuid.NAMESPACE_URL, "urn:linkwork:fmi")
 
 _TYPES = {"Real": Real, "Integer": Integer, "String": String}
 
+#: Libraries of FMUs that `_end_library_in_order` has seen to.
+_libraries: set[Path] = set()
+
+
+def _end_library_in_order(resources: str, model: str) -> None:
+    """Have the wrapper's library let go of the interpreter when Python ends, not while the process tears itself down.
+
+    On Linux the library clears its pointer to the interpreter's state in a destructor that runs after the pointer itself
+    was destroyed: a use after free that now and then aborts a process whose run was good. Cleared before, it is harmless.
+    """
+    library = Path(resources).parent / "binaries" / "linux64" / f"{model}.so"
+    if not sys.platform.startswith("linux") or library in _libraries or not library.is_file():
+        return
+    _libraries.add(library)
+    finalize = getattr(ctypes.CDLL(str(library)), "finalizePythonInterpreter", None)
+    if finalize is not None:
+        atexit.register(finalize)
+
+
+def _guarded(call: Callable[..., Any]) -> Callable[..., Any]:
+    """Make a method that the wrapper calls safe to raise from.
+
+    After an exception the wrapper drops its references to class, instance and log, and drops them again when the master
+    frees the instance; one more reference each makes the second drop harmless.
+    """
+
+    @wraps(call)
+    def method(self: LinkworkSlave, *arguments: Any) -> Any:
+        try:
+            return call(self, *arguments)
+        except BaseException as error:
+            if not isinstance(error, LinkworkError):
+                self._say(f"internal error in {call.__name__}: {error!r}", Fmi2Status.fatal)
+            if self._wrapped:
+                for kept in (self, type(self), self.log_queue):
+                    ctypes.pythonapi.Py_IncRef(ctypes.py_object(kept))
+            raise
+
+    return method
+
 
 class Plant(Protocol):
     """What a slave asks of its plant."""
@@ -76,6 +121,8 @@ class LinkworkSlave(Fmi2Slave):
     def __init__(self, **kwargs: Any) -> None:
         super().__init__(**kwargs)
         self._wrapped = "logger" in kwargs
+        if self._wrapped:
+            _end_library_in_order(self.resources, type(self).__name__)
         self._names = [v.name for v in self.variables]
         self._kinds = [v.kind for v in self.variables]
         self._causalities = [v.causality for v in self.variables]
@@ -86,6 +133,8 @@ class LinkworkSlave(Fmi2Slave):
         self._plant: Plant | None = None
         self._running = False
         self._stale = True
+        #: status and sentence of what went wrong first since the last good step, other than steps out of order
+        self._cause: tuple[int, str] | None = None
         self._start_time = 0.0
         self._master_tolerance: float | None = None
         for index, variable in enumerate(self.variables):
@@ -147,7 +196,9 @@ class LinkworkSlave(Fmi2Slave):
         )
         listed = next(c for c in root if c.tag == "ModelVariables")
         root.insert(list(root).index(listed), experiment)
-        self._refresh()
+        error = self._refresh()
+        if error is not None:
+            raise error
         for variable, value, scalar in zip(self.variables, self._values, listed):
             self._complete(variable, value, scalar[0])
         structure = next(c for c in root if c.tag == "ModelStructure")
@@ -210,6 +261,7 @@ class LinkworkSlave(Fmi2Slave):
 
     # Lifecycle
 
+    @_guarded
     def setup_experiment(self, start_time: float, stop_time: float | None, tolerance: float | None) -> None:
         self._start_time = start_time
         self._master_tolerance = tolerance
@@ -219,27 +271,43 @@ class LinkworkSlave(Fmi2Slave):
     def enter_initialization_mode(self) -> None:
         pass
 
+    @_guarded
     def exit_initialization_mode(self) -> None:
-        self._refresh()
+        error = self._refresh()
+        if error is not None:
+            raise self._fail(error) from error
+        self._values[self._status_at] = STATUS_GOOD
+        self._values[self._message_at] = ""
+        self._cause = None
         self._running = True
 
+    @_guarded
     def do_step(self, current_time: float, step_size: float) -> bool:
         try:
             if not self._running or self._plant is None:
+                why = f": {self._cause[1]}" if self._cause else ""
                 return self._refuse(
-                    STATUS_NOT_INITIALISED, f"a step at t = {current_time:.9g} s before the initialisation"
+                    STATUS_NOT_INITIALISED, f"a step at t = {current_time:.9g} s before the initialisation{why}"
                 )
             self._plant.step(current_time, step_size)
             self._values[self._status_at] = STATUS_GOOD
             self._values[self._message_at] = ""
+            self._cause = None
             self._stale = True
             return True
+        except StepError as error:
+            if self._cause is None:
+                return self._refuse(_status(error), str(error))
+            # a master that goes on after a refused step leaves a gap: what is to be known is why the first was refused
+            return self._refuse(self._cause[0], f"{error}; before that, {self._cause[1]}")
         except LinkworkError as error:
-            return self._refuse(_status(error), str(error))
+            self._cause = (_status(error), str(error))
+            return self._refuse(*self._cause)
         except (
             Exception
         ) as error:  # the wrapper frees an instance whose step raises: the master would be left with nothing
-            return self._refuse(STATUS_INTERNAL, f"internal error at t = {current_time:.9g} s: {error!r}")
+            self._cause = (STATUS_INTERNAL, f"internal error at t = {current_time:.9g} s: {error!r}")
+            return self._refuse(*self._cause)
 
     def terminate(self) -> None:
         self._running = False
@@ -255,57 +323,59 @@ class LinkworkSlave(Fmi2Slave):
         self.log(sentence.replace("%", "%%"), status)
 
     def _fail(self, error: LinkworkError) -> LinkworkError:
-        """Log the sentence of an error that must be raised, and keep the instance alive through the wrapper's clean-up.
-
-        After an exception the wrapper drops its references to class, instance and log, and drops them again when the
-        master frees the instance; one more reference each makes the second drop harmless.
-        """
-        self._values[self._status_at] = _status(error)
-        self._values[self._message_at] = str(error)
+        """Log the sentence of an error that must be raised, for the wrapper's own message may leave it out."""
+        self._cause = (_status(error), str(error))
+        self._values[self._status_at], self._values[self._message_at] = self._cause
         self._say(str(error), Fmi2Status.error)
-        if self._wrapped:
-            import ctypes
-
-            for kept in (self, type(self), self.log_queue):
-                ctypes.pythonapi.Py_IncRef(ctypes.py_object(kept))
         return error
 
-    def _refresh(self) -> None:
-        """Bring the outputs up to date with state and inputs, making the plant first if need be."""
+    def _refresh(self) -> LinkworkError | None:
+        """Bring the outputs up to date with state and inputs, making the plant first if need be.
+
+        Returns what stood in the way, if anything did: the outputs then stay as they were.
+        """
         if not self._stale:
-            return
+            return None
         try:
             if self._plant is None:
                 values = dict(zip(self._names, self._values))
                 self._plant = self.build(values, self._start_time, self._master_tolerance)
             outputs = self._plant.outputs()
         except LinkworkError as error:
-            if self._running:
-                # an input that is not finite: the last good outputs stay, the next step will be refused
-                self._values[self._status_at] = _status(error)
-                self._values[self._message_at] = str(error)
-                return
-            raise self._fail(error) from error
+            return error
+        except Exception as error:
+            return LinkworkError(f"internal error in the outputs: {error!r}")
         for index, value in zip(self._outputs, outputs):
             self._values[index] = value
         self._stale = False
+        return None
 
     # Values
 
     def _get(self, references: list[int], kind: str) -> list[Any]:
-        if self._stale and any(self._causalities[r] == "output" for r in references):
-            self._refresh()
-        values, kinds = self._values, self._kinds
         for reference in references:
-            if kinds[reference] != kind:
-                raise TypeError(f"variable {self._names[reference]} is not of type {kind}")
+            self._check_reference(reference, kind)
+        if self._stale and any(self._causalities[r] == "output" for r in references):
+            # a read does not fail, for there are masters that take what it returns all the same: the last good outputs
+            # stay, and the initialisation or the next step will be refused
+            error = self._refresh()
+            if error is not None:
+                self._values[self._status_at] = _status(error)
+                self._values[self._message_at] = str(error)
+        values = self._values
         return [values[reference] for reference in references]
+
+    def _check_reference(self, reference: int, kind: str) -> None:
+        # unsigned in FMI, but the wrapper hands it on as a signed number
+        if not 0 <= reference < len(self._names):
+            raise self._fail(LinkworkError(f"there is no variable with the value reference {reference}"))
+        if self._kinds[reference] != kind:
+            raise self._fail(LinkworkError(f"variable {self._names[reference]} is not of type {kind}"))
 
     def _set(self, references: list[int], values: list[Any], kind: str) -> None:
         for reference, value in zip(references, values):
+            self._check_reference(reference, kind)
             name = self._names[reference]
-            if self._kinds[reference] != kind:
-                raise TypeError(f"variable {name} is not of type {kind}")
             causality = self._causalities[reference]
             if causality == "output" and not self._running:
                 continue  # a guess for the initialisation, which is solved without one
@@ -323,26 +393,41 @@ class LinkworkSlave(Fmi2Slave):
                 else:
                     self._plant = None
 
+    @_guarded
     def get_real(self, vrs: list[int]) -> list[float]:
         return self._get(vrs, "Real")
 
+    @_guarded
     def get_integer(self, vrs: list[int]) -> list[int]:
         return self._get(vrs, "Integer")
 
+    @_guarded
     def get_string(self, vrs: list[int]) -> list[str]:
         return self._get(vrs, "String")
 
+    @_guarded
+    def get_boolean(self, vrs: list[int]) -> list[bool]:
+        return self._get(vrs, "Boolean")
+
+    @_guarded
     def set_real(self, vrs: list[int], values: list[float]) -> None:
         self._set(vrs, values, "Real")
 
+    @_guarded
     def set_integer(self, vrs: list[int], values: list[int]) -> None:
         self._set(vrs, values, "Integer")
 
+    @_guarded
     def set_string(self, vrs: list[int], values: list[str]) -> None:
         self._set(vrs, values, "String")
 
+    @_guarded
+    def set_boolean(self, vrs: list[int], values: list[bool]) -> None:
+        self._set(vrs, values, "Boolean")
+
     # Saved state
 
+    @_guarded
     def _get_fmu_state(self) -> dict[str, Any]:
         return {
             "model": type(self).__name__,
@@ -350,29 +435,35 @@ class LinkworkSlave(Fmi2Slave):
             "values": list(self._values),
             "running": self._running,
             "stale": self._stale,
+            "cause": self._cause,
             "start_time": self._start_time,
             "master_tolerance": self._master_tolerance,
             "plant": None if self._plant is None else self._plant.save(),
         }
 
+    @_guarded
     def _set_fmu_state(self, state: dict[str, Any]) -> None:
-        if state.get("interface") != self.interface_guid():
-            raise self._fail(
-                StateError(
+        try:
+            if "damaged" in state:
+                raise StateError(f"the serialised state is damaged: {state['damaged']}")
+            if state.get("interface") != self.interface_guid():
+                raise StateError(
                     f"the saved state belongs to {state.get('model')!r} with another interface, not to this "
                     f"{type(self).__name__}"
                 )
-            )
-        try:
             plant = None if state["plant"] is None else self.restore(state["plant"])
+            values, cause = list(state["values"]), state["cause"]
+            running, stale = state["running"], state["stale"]
+            start_time, master_tolerance = state["start_time"], state["master_tolerance"]
         except LinkworkError as error:
             raise self._fail(error) from error
+        except (KeyError, TypeError) as error:
+            raise self._fail(StateError(f"the saved state is damaged: {error!r}")) from error
         self._plant = plant
-        self._values = list(state["values"])
-        self._running = state["running"]
-        self._stale = state["stale"]
-        self._start_time = state["start_time"]
-        self._master_tolerance = state["master_tolerance"]
+        self._values = values
+        self._cause = None if cause is None else (cause[0], cause[1])
+        self._running, self._stale = running, stale
+        self._start_time, self._master_tolerance = start_time, master_tolerance
 
     @staticmethod
     def _fmu_state_to_bytes(state: dict[str, Any]) -> bytes:
@@ -381,10 +472,12 @@ class LinkworkSlave(Fmi2Slave):
 
     @staticmethod
     def _fmu_state_from_bytes(state: bytes) -> dict[str, Any]:
-        saved = json.loads(state.decode("utf-8"))
-        if not isinstance(saved, dict):
-            raise StateError("the serialised state is not one of a Linkwork slave")
-        return saved
+        # no exception may leave here, where there is no instance to keep: the damage is told when the state is set
+        try:
+            saved = json.loads(state.decode("utf-8"))
+        except ValueError as error:
+            return {"damaged": repr(error)}
+        return saved if isinstance(saved, dict) else {"damaged": "it is not one of a Linkwork slave"}
 
 
 def _status(error: LinkworkError) -> int:

@@ -27,6 +27,26 @@ class ParameterError(LinkworkError, ValueError):
         super().__init__(f"parameter {name} is {value!r}: it must {requirement}")
 
 
+class UnknownNameError(ParameterError):
+    """A name that nothing has; ``known`` are the names there are, ``near`` the one that was probably meant."""
+
+    def __init__(self, name: str, known: tuple[str, ...], near: str | None) -> None:
+        self.known = known
+        self.near = near
+        super().__init__(name, None, f"be one of {', '.join(known)}")
+        hint = f"did you mean {near}? " if near else ""
+        self.args = (f"there is no {name}: {hint}The names are {', '.join(known)}",)
+
+
+class MissingParameterError(ParameterError):
+    """A parameter that is needed was not given."""
+
+    def __init__(self, name: str, others: tuple[str, ...] = ()) -> None:
+        super().__init__(name, None, "be given")
+        also = f", and so are {', '.join(others)}" if others else ""
+        self.args = (f"parameter {name} is missing{also}",)
+
+
 class AssemblyError(LinkworkError):
     """The links cannot be joined at the given crank angle and slider position."""
 

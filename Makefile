@@ -1,0 +1,38 @@
+# make demo: the main job on a fresh machine; make test: the tests. Each makes .venv itself.
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+READY := $(VENV)/.ready
+
+.PHONY: demo test lint figures bench clean
+
+demo: $(READY)
+	$(BIN)/python build_fmu.py
+	$(BIN)/linkwork check --fmu build/FiveBarSlider.fmu --out out
+
+test: $(READY) lint
+	$(BIN)/python build_fmu.py
+	$(BIN)/python -m pytest
+
+lint: $(READY)
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+	$(BIN)/lint-imports
+
+figures: $(READY)
+	$(BIN)/linkwork figures --out out/figures
+
+bench: $(READY)
+	$(BIN)/pip install --quiet --editable '.[dev,bench]'
+	$(BIN)/python -m benchmarks.solvers
+	$(BIN)/python -m benchmarks.fmu
+
+$(READY): pyproject.toml
+	@$(PYTHON) -c 'import sys; sys.exit(0 if sys.version_info >= (3, 11) else "Linkwork needs Python 3.11 or newer: set PYTHON=python3.x")'
+	$(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install --quiet --editable '.[dev]'
+	@touch $(READY)
+
+clean:
+	rm -rf $(VENV) build out

@@ -1,0 +1,60 @@
+"""A case: a mechanism, where it starts, what acts on it, and how long; what a case file holds."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from math import pi
+
+from linkwork.errors import InputError
+from linkwork.five_bar.parameters import FiveBarParameters, InitialState
+from linkwork.five_bar.published import SETS
+
+from .inputs import Inputs
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Case:
+    """Everything a run needs, in process or through the FMU. SI units.
+
+    Attributes
+    ----------
+    title : str
+    parameters : FiveBarParameters
+    initial : InitialState
+    inputs : Inputs
+    stop_time : float
+        End of the run (s); it starts at 0.
+    step : float
+        Distance of the samples, and communication step of the FMU (s).
+    tolerance : float
+    """
+
+    title: str
+    parameters: FiveBarParameters
+    initial: InitialState = field(default_factory=InitialState)
+    inputs: Inputs = field(default_factory=Inputs)
+    stop_time: float
+    step: float = 1e-3
+    tolerance: float = 1e-9
+
+
+def published_case(name: str, *, revolutions: float = 3.0, steps_per_revolution: int = 360) -> Case:
+    """A published set at its running speed, from th2 = u = u' = 0.
+
+    Raises
+    ------
+    InputError
+        If there is no set of that name.
+    """
+    if name not in SETS:
+        raise InputError(f"there is no published set {name!r}: the sets are {', '.join(SETS)}")
+    entry = SETS[name]
+    turn = 2.0 * pi / entry.crank_speed
+    return Case(
+        title=entry.source,
+        parameters=entry.parameters,
+        initial=entry.initial,
+        inputs=Inputs(speed=entry.crank_speed),
+        stop_time=revolutions * turn,
+        step=turn / steps_per_revolution,
+    )

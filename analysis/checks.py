@@ -1,0 +1,80 @@
+"""The standard cases on which the FMU is held against the in-process solver."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from math import pi
+from pathlib import Path
+from types import MappingProxyType
+
+from linkwork.five_bar.published import TABLE_3_1
+
+from .case import Case, published_case
+from .cosimulate import Comparison, compare, cosimulate
+from .inputs import Harmonics, InductionMotor, Inputs, TorsionBar, ramp, steps, table
+from .simulate import simulate
+from .trajectory import Trajectory
+
+_SPEED = 14.0 * pi  # 420 rpm
+
+
+def _case(title: str, inputs: Inputs, **changes: float) -> Case:
+    return Case(
+        title=title, parameters=replace(TABLE_3_1, **changes), inputs=inputs, stop_time=0.4, step=1e-3, tolerance=1e-9
+    )
+
+
+#: By name: every way of driving and loading the mechanism, each on Table 3.1.
+CASES: Mapping[str, Case] = MappingProxyType(
+    {
+        "table-3.1": published_case("table-3.1"),
+        "constant-speed": _case("constant speed of 300 rpm", Inputs(speed=10.0 * pi)),
+        "speed-ramp": _case("ramp of the speed from 100 to 420 rpm", Inputs(speed=ramp(10.0, _SPEED, 0.05, 0.3))),
+        "speed-jump": _case("jumps of the speed", Inputs(speed=steps([0.0, 0.1, 0.25], [20.0, 40.0, 30.0]))),
+        "torque-switched-off": _case(
+            "torsion bar of 1e8 dyn.cm, released at 1 rad", Inputs(torque=TorsionBar(torque=10.0))
+        ),
+        "induction-motor": _case(
+            "run-up by an induction motor",
+            Inputs(torque=InductionMotor(breakdown_torque=5.0, breakdown_slip=0.2, synchronous_speed=50.0)),
+        ),
+        "control-force": _case(
+            "harmonic control force on the slider", Inputs(speed=_SPEED, force=Harmonics(1.0, [5.0], [30.0], [0.3]))
+        ),
+        "load": _case(
+            "load at the coupler point",
+            Inputs(speed=_SPEED, load_x=3.0, load_y=table([0.0, 0.2, 0.4], [0.0, 5.0, -2.0], "cubic")),
+            coupler_point_distance=0.1,
+            coupler_point_angle=0.4,
+        ),
+        "inclined-guide": _case(
+            "guide and ground inclined", Inputs(speed=_SPEED), slider_guide_angle=0.4, ground_inclination=0.3
+        ),
+        "other-assembly": _case("the other assembly", Inputs(speed=_SPEED), assembly_branch=-1),
+        "coulomb-friction": _case(
+            "Coulomb friction of 5 N in the guide", Inputs(speed=_SPEED), slider_coulomb_friction=5.0
+        ),
+    }
+)
+
+
+def check(
+    fmu: str | Path, case: Case, *, tolerance: float = 1e-6, progress: bool = False
+) -> tuple[Trajectory, Trajectory, Comparison]:
+    """Run a case in process and through an FMU, with the same held inputs, and compare every output.
+
+    Returns
+    -------
+    in_process, through_fmu : Trajectory
+    comparison : Comparison
+
+    Raises
+    ------
+    LinkworkError
+        As `simulate` and `cosimulate`.
+    """
+    common = {"initial": case.initial, "stop_time": case.stop_time, "step": case.step, "tolerance": case.tolerance}
+    in_process = simulate(case.parameters, case.inputs, hold=case.step, progress=progress, **common)  # type: ignore[arg-type]
+    through_fmu = cosimulate(fmu, case.parameters, case.inputs, progress=progress, **common)  # type: ignore[arg-type]
+    return in_process, through_fmu, compare(in_process, through_fmu, tolerance=tolerance)
