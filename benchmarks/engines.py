@@ -7,8 +7,8 @@ the reduced equations of `linkwork` integrated to 1e-13.
 
     python -m benchmarks.engines
 
-prints steps, errors and times of both engines for both cases. Needs MuJoCo from the releases whose ``connect`` constraint
-includes the velocity term J' q' (before, the error falls only with the square of the step), and Exudyn 1.13 or later.
+prints steps, errors and times of both engines for both cases. Needs MuJoCo 3.7 or later, whose ``connect`` constraint includes
+the velocity term J' q' (without it this model is of no use: 3.6 misses u by 70 %), and Exudyn 1.13 or later.
 """
 
 from __future__ import annotations
@@ -16,10 +16,10 @@ from __future__ import annotations
 import contextlib
 import io
 import sys
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
-from functools import cache
-from math import ceil, cos, inf, isfinite, pi, sin
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, replace
+from functools import cache, partial
+from math import ceil, cos, inf, isfinite, log, pi, sin
 from time import perf_counter
 from typing import Any, NamedTuple
 
@@ -178,13 +178,14 @@ def _centre(distance: float, angle: float) -> tuple[float, float]:
 # --- MuJoCo -------------------------------------------------------------------------------------------------------------
 
 #: The prescribed speed is that of a flywheel of this inertia (kg.m2) on the crank's shaft. The mechanism's torque of about
-#: 1 N.m changes it by a relative 1e-12, the factorisation of the tree's inertia matrix is not hurt by it, and it costs
-#: nothing, where a servo is stiff, and a constraint to a clock joint adds a freedom and a row.
+#: 1 N.m changes it by a relative 1e-11, and from 1e9 to 1e14 the error is the same. A velocity servo is no substitute: a
+#: gain of 10 N.m.s leaves an error of 2e-3, one of 100 is unstable under RK4 even at a step of 5e-5 s.
 FLYWHEEL = 1e9
 
-#: Rate (1/s) of the critically damped return of the closing pin to closure. The pin's acceleration is constrained with the
-#: term J' q', so the return has only the truncation error to remove; much faster rates are stiff and spoil the RK4 step.
-CLOSURE_RATE = 30.0
+#: Rates (1/s) of the critically damped return of the closing pin to closure, with the speed prescribed and under torque: of
+#: 20 to 200 those that allow the longest steps. The constraint on the pin's acceleration includes J' q', so the return
+#: removes no more than truncation errors; a fast one is stiff and spoils the RK4 step.
+CLOSURE_RATE_SPEED, CLOSURE_RATE_TORQUE = 30.0, 100.0
 
 _MJCF = """
 <mujoco>
@@ -232,6 +233,7 @@ def _mujoco_model(case: Case, iterations: int) -> tuple[Any, Any]:
 
     q = case.parameters
     p = q.constants()
+    rate = CLOSURE_RATE_TORQUE if case.crank_speed is None else CLOSURE_RATE_SPEED
     x2, y2 = _centre(q.crank_cog_distance, q.crank_cog_angle)
     x3, y3 = _centre(q.coupler_cog_distance, q.coupler_cog_angle)
     x4, y4 = _centre(q.rocker_cog_distance, q.rocker_cog_angle)
@@ -249,15 +251,15 @@ def _mujoco_model(case: Case, iterations: int) -> tuple[Any, Any]:
         # T0 (1 - th2/switch_angle) is a spring on the crank, relaxed at the switch angle
         torsion=case.torque / case.switch_angle,
         switch_angle=case.switch_angle,
-        closure_stiffness=-(CLOSURE_RATE**2),
-        closure_damping=-2.0 * CLOSURE_RATE,
+        closure_stiffness=-(rate**2),
+        closure_damping=-2.0 * rate,
     )
     model = mujoco.MjModel.from_xml_string(text)
     model.opt.iterations = iterations
     # The constraint is softened in proportion to the bodies' inverse weight by (1 - d)/d, where the impedance d ends at
     # 0.9999: an error of 3e-5 in u. A smaller weight stiffens it. What one Newton iteration loses to rounding then, a second
     # one wins back.
-    model.body_invweight0 *= 1e-4 if iterations == 1 else 1e-8
+    model.body_invweight0 *= 1e-4 if iterations == 1 else 1e-6
     data = mujoco.MjData(model)
     s = _start(case, p)
     data.qpos[:] = (0.0, s.th3, 0.0, s.th4)
@@ -293,8 +295,8 @@ def _mujoco_until_switch(model: Any, data: Any, case: Case, n: int) -> tuple[int
 def run_mujoco(case: Case, time_step: float, *, iterations: int = 1) -> EngineRun:
     """Run ``case`` in MuJoCo: RK4 on relative joints, stepped in C from sample to sample.
 
-    ``iterations`` is that of the constraint solver: with one the error ends at about 2e-8 and a step is cheapest, with two
-    it falls with the fourth power of the step to below 1e-11.
+    ``iterations`` is that of the constraint solver: with one the error ends at about 1e-7 and a step is cheapest, with two
+    it falls with the fourth power of the step to below 1e-9. `mujoco.rollout` takes the same time per step.
     """
     import mujoco
 
@@ -345,8 +347,12 @@ class _Bar(NamedTuple):
     y: float
 
 
-def _exudyn_model(case: Case) -> tuple[Any, Any]:
-    """System at the start of the run, and the sensor of the slider position.
+#: Where the coordinates of crank and slider, the first two nodes, stand in the vector of all.
+_EXUDYN_CRANK, _EXUDYN_SLIDER = 0, 1
+
+
+def _exudyn_model(case: Case) -> tuple[Any, Any, Any]:
+    """System at the start of the run, the sensor of the slider position, and the spring of the torque drive or None.
 
     Crank and slider have one coordinate each, a rotation and a translation, coupler and rocker three: eight coordinates and
     six pin conditions. Four planar bodies with a prismatic joint (twelve coordinates, ten conditions) give the same numbers
@@ -357,9 +363,7 @@ def _exudyn_model(case: Case) -> tuple[Any, Any]:
     p = q.constants()
     s = _start(case, p)
     mbs = exu.SystemContainer().AddSystem()
-    ground = mbs.AddMarker(
-        items.MarkerNodeCoordinate(nodeNumber=mbs.AddNode(items.NodePointGround()), coordinate=0)
-    )
+    ground = mbs.AddMarker(items.MarkerNodeCoordinate(nodeNumber=mbs.AddNode(items.NodePointGround()), coordinate=0))
 
     def coordinate(node: Any) -> Any:
         return mbs.AddMarker(items.MarkerNodeCoordinate(nodeNumber=node, coordinate=0))
@@ -368,7 +372,13 @@ def _exudyn_model(case: Case) -> tuple[Any, Any]:
         return mbs.AddMarker(items.MarkerBodyPosition(bodyNumber=body, localPosition=[x, y, 0.0]))
 
     def bar(
-        origin: tuple[float, float], speed: float, angle: float, w: float, m: float, inertia: float, g: tuple[float, float]
+        origin: tuple[float, float],
+        speed: float,
+        angle: float,
+        w: float,
+        m: float,
+        inertia: float,
+        g: tuple[float, float],
     ) -> _Bar:
         """Link whose frame has the given origin, with speed along y, at ``angle``; ``g`` is its centre of mass."""
         rx, ry = cos(angle) * g[0] - sin(angle) * g[1], sin(angle) * g[0] + cos(angle) * g[1]
@@ -433,6 +443,7 @@ def _exudyn_model(case: Case) -> tuple[Any, Any]:
     pin(point(coupler.body, p.l3 - coupler.x, -coupler.y), point(rocker.body, p.l4 - rocker.x, -rocker.y))
     pin(point(rocker.body, -rocker.x, -rocker.y), point(slider, 0.0))
 
+    spring = None
     if case.crank_speed is not None:
         mbs.AddObject(
             items.ObjectConnectorCoordinate(
@@ -440,7 +451,14 @@ def _exudyn_model(case: Case) -> tuple[Any, Any]:
             )
         )
     elif case.torque:
-        _exudyn_torsion_bar(case, exu, items, mbs, [ground, coordinate(crank_node)])
+        # T0 (1 - th2/switch_angle) is a spring on the crank, relaxed at the switch angle and then made inactive
+        spring = mbs.AddObject(
+            items.ObjectConnectorCoordinateSpringDamper(
+                markerNumbers=[ground, coordinate(crank_node)],
+                stiffness=case.torque / case.switch_angle,
+                offset=case.switch_angle,
+            )
+        )
     sensor = mbs.AddSensor(
         items.SensorNode(
             nodeNumber=slider_node,
@@ -450,72 +468,198 @@ def _exudyn_model(case: Case) -> tuple[Any, Any]:
         )
     )
     mbs.Assemble()
-    return mbs, sensor
+    return mbs, sensor, spring
 
 
-def _exudyn_torsion_bar(case: Case, exu: Any, items: Any, mbs: Any, markers: list[Any]) -> None:
-    """The torque max(0, T0 (1 - th2/switch_angle)) as a recorded expression, evaluated in C++ without calling Python."""
-    esym = exu.symbolic
+class _ExudynSolver:
+    """Legs of a run, each a call of the engine's own loop; ``seconds`` is the wall time of those loops."""
 
-    def force(_mbs: Any, _t: Any, _item: Any, th2: Any, _w: Any, stiffness: Any, _d: Any, _offset: Any) -> Any:
-        return -stiffness * esym.max(0.0, case.switch_angle - th2)
+    def __init__(self, mbs: Any, newton_tolerance: float) -> None:
+        self.exu, _ = _import_exudyn()
+        self.mbs = mbs
+        self.seconds = 0.0
+        self.steps = 0
+        self.settings = self.exu.SimulationSettings()
+        self.settings.solution.file.write = False
+        integration = self.settings.timeIntegration
+        integration.solverType = self.exu.DynamicSolverType.TrapezoidalIndex2
+        integration.adaptiveStep = False
+        integration.generalizedAlpha.useNewmark = True
+        integration.generalizedAlpha.useIndex2Constraints = True
+        integration.newton.useModifiedNewton = False
+        integration.newton.relativeTolerance = newton_tolerance
+        integration.newton.absoluteTolerance = 1e-14
 
-    spring = mbs.AddObject(
-        items.ObjectConnectorCoordinateSpringDamper(
-            markerNumbers=markers, stiffness=case.torque / case.switch_angle, springForceUserFunction=force
-        )
-    )
-    recorded = mbs.CreateSymbolicUserFunction(
-        itemNumber=spring, userFunctionName="springForceUserFunction", userFunction=force
-    )
-    mbs.SetObjectParameter(spring, "springForceUserFunction", recorded)
+    def run(self, start: float, end: float, steps: int, sampling: float) -> None:
+        """Integrate from the initial configuration in equal steps; the result is the current configuration."""
+        integration = self.settings.timeIntegration
+        integration.startTime, integration.endTime, integration.numberOfSteps = start, end, steps
+        self.settings.solution.sensors.writePeriod = sampling
+        solver = self.exu.MainSolverImplicitSecondOrder()
+        solver.InitializeSolver(self.mbs, self.settings)
+        begin = perf_counter()
+        finished = solver.SolveSteps(self.mbs, self.settings)
+        self.seconds += perf_counter() - begin
+        self.steps += steps
+        solver.FinalizeSolver(self.mbs, self.settings)
+        if not finished:
+            raise ArithmeticError(f"Exudyn stopped between t = {start:g} s and {end:g} s")
+
+    def state(self) -> tuple[np.ndarray, np.ndarray]:
+        """Coordinates and velocities now."""
+        data, now = self.mbs.systemData, self.exu.ConfigurationType.Current
+        return data.GetODE2Coordinates(now), data.GetODE2Coordinates_t(now)
+
+    def initial_state(self) -> tuple[np.ndarray, np.ndarray]:
+        """Coordinates and velocities from which the next leg starts."""
+        data, initial = self.mbs.systemData, self.exu.ConfigurationType.Initial
+        return data.GetODE2Coordinates(initial), data.GetODE2Coordinates_t(initial)
+
+    def start_from(self, state: tuple[np.ndarray, np.ndarray]) -> None:
+        """Make ``state`` the initial configuration of the next leg."""
+        data, initial = self.mbs.systemData, self.exu.ConfigurationType.Initial
+        data.SetODE2Coordinates(state[0], initial)
+        data.SetODE2Coordinates_t(state[1], initial)
 
 
-def run_exudyn(case: Case, time_step: float, *, newton_tolerance: float = 1e-8) -> EngineRun:
+def _exudyn_until_switch(case: Case, solver: _ExudynSolver, spring: Any, time_step: float) -> list[float]:
+    """Slider positions up to the first sample after the switch of the torque, located by Newton's method on a leg's end."""
+    interval = case.duration / case.samples
+    n = steps_in(interval, time_step)
+    u: list[float] = [0.0]
+    while True:
+        start = (len(u) - 1) * interval
+        begin = solver.initial_state()
+        solver.run(start, start + interval, n, interval)
+        q, qd = solver.state()
+        if q[_EXUDYN_CRANK] >= case.switch_angle:
+            break
+        u.append(q[_EXUDYN_SLIDER])
+        solver.start_from((q, qd))
+    kept = solver.steps - n
+    switch = start + interval
+    for _ in range(10):
+        miss = q[_EXUDYN_CRANK] - case.switch_angle
+        if abs(miss) < 1e-10:
+            break
+        switch -= miss / qd[_EXUDYN_CRANK]
+        solver.start_from(begin)
+        n = steps_in(switch - start, time_step)
+        solver.run(start, switch, n, interval)
+        q, qd = solver.state()
+    solver.mbs.SetObjectParameter(spring, "activeConnector", False)
+    solver.start_from((q, qd))
+    rest = start + interval - switch
+    solver.steps = kept + n
+    solver.run(switch, start + interval, steps_in(rest, time_step), interval)
+    u.append(solver.state()[0][_EXUDYN_SLIDER])
+    solver.start_from(solver.state())
+    return u
+
+
+def run_exudyn(case: Case, time_step: float, *, newton_tolerance: float = 1e-6) -> EngineRun:
     """Run ``case`` in Exudyn: the implicit trapezoidal rule with the constraints at velocity level, full Newton steps.
 
     It is of second order, as is generalised-alpha, whose numerical damping makes it 1.7 times less accurate. The explicit
-    integrators take no pins; with stiff springs for pins they need five times as long.
+    integrators take no pins; with stiff springs for pins they need five times as long. With the default
+    ``newton_tolerance`` a step is one Newton iteration: at equal steps it is three times less accurate than with 1e-8, at
+    equal accuracy as fast or faster.
     """
-    exu, _ = _import_exudyn()
-    mbs, sensor = _exudyn_model(case)
-    steps = case.samples * steps_in(case.duration / case.samples, time_step)
-    settings = exu.SimulationSettings()
-    settings.solution.file.write = False
-    settings.solution.sensors.writePeriod = case.duration / case.samples
-    integration = settings.timeIntegration
-    integration.solverType = exu.DynamicSolverType.TrapezoidalIndex2
-    integration.numberOfSteps = steps
-    integration.endTime = case.duration
-    integration.adaptiveStep = False
-    integration.generalizedAlpha.useNewmark = True
-    integration.generalizedAlpha.useIndex2Constraints = True
-    integration.newton.useModifiedNewton = False
-    integration.newton.relativeTolerance = newton_tolerance
-    integration.newton.absoluteTolerance = 1e-14
-    solver = exu.MainSolverImplicitSecondOrder()
-    solver.InitializeSolver(mbs, settings)
-    begin = perf_counter()
-    finished = solver.SolveSteps(mbs, settings)
-    seconds = perf_counter() - begin
-    solver.FinalizeSolver(mbs, settings)
-    stored = mbs.GetSensorStoredData(sensor)
-    failed = not finished or stored.shape[0] != case.samples + 1
-    error = inf if failed else relative_error(case, stored[:, 1])
-    return EngineRun(seconds=seconds, error=error, label="Exudyn trapezoidal", steps=steps)
+    mbs, sensor, spring = _exudyn_model(case)
+    solver = _ExudynSolver(mbs, newton_tolerance)
+    interval = case.duration / case.samples
+    error = inf
+    with contextlib.suppress(ArithmeticError):
+        u = [0.0] if spring is None else _exudyn_until_switch(case, solver, spring, time_step)
+        done = len(u) - 1
+        steps = (case.samples - done) * steps_in(interval, time_step)
+        solver.run(done * interval, case.duration, steps, interval)
+        u.extend(mbs.GetSensorStoredData(sensor)[done - case.samples :, 1])
+        error = relative_error(case, np.array(u))
+    return EngineRun(seconds=solver.seconds, error=error, label="Exudyn trapezoidal", steps=solver.steps)
 
 
 # --- the choice of the step -----------------------------------------------------------------------------------------------
 
 
-def step_series(case: Case, first: float, ratio: float = 2.0**-0.25) -> Iterator[float]:
-    """Geometric series of time steps (s) from ``first`` down, each rounded to a whole number of steps in a sample interval."""
+def time_steps(case: Case, first: float, last: float, ratio: float = 2.0**-0.25) -> Iterator[float]:
+    """Geometric series of time steps (s) from ``first`` to ``last``, each shortened to divide a sample interval."""
     interval = case.duration / case.samples
-    last = 0
-    step = first
-    while True:
-        n = steps_in(interval, step)
-        if n != last:
-            yield interval / n
-        last = n
-        step *= ratio
+    count = ceil(log(last / first) / log(ratio) * (1.0 - 1e-9))
+    fitted = (steps_in(interval, first * ratio**i) for i in range(count + 1))
+    return (interval / n for n in dict.fromkeys(fitted))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Choice:
+    """A time step (s), the run with it, and whether that run reached the accuracy asked for."""
+
+    time_step: float
+    run: EngineRun
+    reached: bool
+
+
+def largest_step(run: Run, case: Case, series: Iterable[float], accuracy: float = ACCURACY) -> Choice:
+    """First step of a falling ``series`` with which ``run`` reaches ``accuracy``, or its most accurate one if none does.
+
+    A step counts only if the next smaller one, where there is one, reaches the accuracy as well: a lucky cancellation is not
+    an accuracy.
+    """
+    runs: list[Choice] = []
+    for step in series:
+        result = run(case, step)
+        runs.append(Choice(time_step=step, run=result, reached=result.error <= accuracy))
+        if len(runs) > 1 and runs[-1].reached and runs[-2].reached:
+            return runs[-2]
+    if not runs:
+        raise ValueError("the series of time steps is empty")
+    if runs[-1].reached:
+        return runs[-1]
+    return replace(min(runs, key=lambda choice: choice.run.error), reached=False)
+
+
+def fastest(run: Run, case: Case, time_step: float, repeats: int = 7) -> EngineRun:
+    """The shortest of several equal runs: the one that the machine disturbed least."""
+    return min((run(case, time_step) for _ in range(repeats)), key=lambda result: result.seconds)
+
+
+class Engine(NamedTuple):
+    """An engine as benchmarked: its run, its first and last step (s), and a run set for the least error, with its last step."""
+
+    run: Run
+    first_step: float
+    last_step: float
+    finest_run: Run
+    finest_step: float
+
+
+ENGINES: tuple[Engine, ...] = (
+    Engine(run_mujoco, 2e-3, 1e-5, partial(run_mujoco, iterations=2), 4e-5),
+    Engine(run_exudyn, 1e-3, 5e-6, partial(run_exudyn, newton_tolerance=1e-9), 2e-6),
+)
+
+
+def main() -> None:
+    """Print step, error and time of each engine and case: down the steps, at the accuracy asked for, and at the finest."""
+
+    def line(case: Case, remark: str, time_step: float, result: EngineRun) -> None:
+        print(
+            f"{case.name:15} {result.label:18} {remark:10} {time_step:9.3e} s {result.steps:8d}"
+            f"  {result.error:8.2e}  {1e3 * result.seconds:9.2f} ms"
+        )
+
+    print(f"{'case':15} {'engine':18} {'':10} {'step':>11} {'steps':>8}  {'error':>8}  {'time':>12}")
+    for case in CASES:
+        for engine in ENGINES:
+            for step in time_steps(case, engine.first_step, engine.last_step, 0.25):
+                line(case, "", step, fastest(engine.run, case, step, 3))
+            series = time_steps(case, engine.first_step, engine.last_step)
+            choice = largest_step(engine.run, case, series)
+            best = fastest(engine.run, case, choice.time_step)
+            line(case, "<= 1e-6" if choice.reached else "best", choice.time_step, best)
+            step = next(time_steps(case, engine.finest_step, engine.finest_step))
+            line(case, "finest", step, engine.finest_run(case, step))
+
+
+if __name__ == "__main__":
+    main()

@@ -128,7 +128,7 @@ def integrate(
     scale: Vector,
     step: float = 0.0,
     accept: Callable[[Vector], None] | None = None,
-    max_steps: int = 100_000,
+    max_steps: int = 20_000,
 ) -> Result:
     """Integrate x' = f(x) over ``duration``, ending exactly there.
 

@@ -167,9 +167,7 @@ class Instance:
         if references is None:
             references = [self.fmu.variables[name].reference for name in names]
         values = (_C_TYPES[kind] * len(references))()
-        status = self._call(
-            f"Get{kind}", (c_uint * len(references))(*references), c_size_t(len(references)), values
-        )
+        status = self._call(f"Get{kind}", (c_uint * len(references))(*references), c_size_t(len(references)), values)
         return status, [v.decode() if isinstance(v, bytes) else v for v in values]
 
     def get(self, name):
@@ -230,5 +228,3 @@ class Instance:
         value = c_double()
         status = self._call("GetRealStatus", c_int(2), byref(value))
         return status, value.value
-
-

@@ -15,7 +15,7 @@ from typing import Any
 
 HERE = Path(__file__).resolve().parent
 
-_FRAME = """
+_FRAME = """from __future__ import annotations
 import json, sys
 from pathlib import Path
 sys.path.insert(0, {helpers!r})
@@ -33,16 +33,13 @@ def run_in_process(
     python: str | Path = sys.executable,
     timeout: float = 60.0,
     options: tuple[str, ...] = ("-W", "error"),
-    env: dict[str, str] | None = None,
 ) -> Any:
     """Run the source of the function ``code`` with ``args`` in a fresh Python, and return what it returned.
 
     The function imports what it needs inside itself; ``bare_master`` is importable. Arguments and result travel as JSON,
     which carries floats without loss. A process that dies fails the test with what it printed.
     """
-    source = _FRAME.format(
-        helpers=str(HERE), source=textwrap.dedent(inspect.getsource(code)), name=code.__name__
-    )
+    source = _FRAME.format(helpers=str(HERE), source=textwrap.dedent(inspect.getsource(code)), name=code.__name__)
     with tempfile.TemporaryDirectory(prefix="linkwork-test-") as folder:
         script, given, result = (Path(folder) / name for name in ("script.py", "arguments.json", "result.json"))
         script.write_text(source)
@@ -54,7 +51,8 @@ def run_in_process(
             timeout=timeout,
             check=False,
             cwd=folder,
-            env=os.environ | {"PYTHONDONTWRITEBYTECODE": "1"} if env is None else env,
+            # masters unpack FMUs into the folder for temporary files, and not all of them clean up
+            env=os.environ | {"PYTHONDONTWRITEBYTECODE": "1", "TMPDIR": folder},
         )
         told = f"{code.__name__} ended with {done.returncode}\n{done.stdout}\n{done.stderr}"
         assert done.returncode == 0, told

@@ -55,7 +55,7 @@ def error_scale(parameters: FiveBarParameters, crank_speed: float) -> tuple[floa
     length = parameters.crank_length
     mass = parameters.coupler_mass + parameters.rocker_mass + parameters.slider_mass
     speed = max(1.0, abs(crank_speed))
-    energy = 0.5 * (parameters.crank_inertia + mass * length**2) * speed**2
+    energy = 0.5 * (parameters.crank_inertia + mass * length * length) * speed * speed
     return (1.0, length, speed, length * speed, energy, energy)
 
 
@@ -131,7 +131,11 @@ class Plant:
         self._scale = error_scale(parameters, speed)
         self.start_energy = dynamics.mechanical_energy(self.state, self._p)
         if not isfinite(self.start_energy):
-            raise ParameterError("initial.crank_speed", speed, "leave the kinetic energy finite")
+            name = "drive.speed" if drive_mode == SPEED_DRIVE else "initial.crank_speed"
+            raise InputError(
+                f"the energy at the start is not finite: {name} is {speed:g} rad/s, initial.slider_velocity "
+                f"{initial.slider_velocity:g} m/s, initial.slider_position {initial.slider_position:g} m"
+            )
 
     def set_input(self, name: str, value: float) -> None:
         """Set an input by its FMI name; it holds until it is set again. Checked at the next step, not here."""

@@ -1,0 +1,148 @@
+"""Write what the documentation repeats from the code: the nomenclature, and the variable table of the README.
+
+python docs/generate.py           writes docs/nomenclature.md and the table between the README's markers
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+from linkwork.five_bar.kinematics import Coefficients, Position
+from linkwork.five_bar.parameters import Constants, FiveBarParameters, field_name
+from linkwork.five_bar.variables import INPUTS, OUTPUTS, PARAMETERS
+from linkwork.variables import Variable
+
+HERE = Path(__file__).resolve().parent
+README = HERE.parent / "README.md"
+BEGIN, END = "<!-- variables: begin -->", "<!-- variables: end -->"
+
+#: Symbols of the equations that are no FMI variable: identifier, symbol, unit, meaning.
+INTERNAL = (
+    ("th2", r"\theta_2", "rad", "crank angle"),
+    ("th3", r"\theta_3", "rad", "coupler angle B to C"),
+    (
+        "th4",
+        r"\theta_4 + \alpha",
+        "rad",
+        "absolute rocker angle D to C; the thesis counts theta4 from the slider's line",
+    ),
+    ("w2", r"\dot\theta_2", "rad/s", "crank speed; w3, w4 likewise, and e2, e3, e4 the accelerations"),
+    ("v", r"\dot u", "m/s", "slider velocity"),
+    ("c2, s2", r"\cos\theta_2, \sin\theta_2", "1", "likewise c3, s3, c4, s4"),
+    ("c43, s43", r"\cos(\theta_4 + \alpha - \theta_3), \sin(\ldots)", "1", "s43 = 0 is the limit of assembly"),
+    ("k32, k42", r"\partial\dot\theta_3/\partial\dot\theta_2, \ldots", "1", "velocity coefficients of the crank"),
+    ("k3u, k4u", r"\partial\dot\theta_3/\partial\dot u, \ldots", "rad/m", "velocity coefficients of the slider"),
+    ("m11, m12, m22", r"M", "kg.m2, kg.m, kg", "inertia matrix of (theta2, u)"),
+    ("b1, b2", "", "N.m, N", "velocity terms of the equations of motion"),
+    ("Q1, Q2", "", "N.m, N", "generalised forces of gravity, load, spring, damper, friction"),
+    ("cx, cy", r"\lambda_1, \lambda_2", "N", "force of the rocker on the coupler: the loop multipliers (2.3)"),
+    ("i2b", r"I_A + m_3 l_2^2", "kg.m2", "crank with the coupler's mass at B"),
+    ("i3b", r"I_{G3} + m_3 l_{G3}^2", "kg.m2", "coupler about B"),
+    ("i4d", r"I_{G4} + m_4 l_{G4}^2", "kg.m2", "rocker about D"),
+    (
+        "mx3, my3",
+        r"m_3 l_{G3} \cos\nu_3, m_3 l_{G3} \sin\nu_3",
+        "kg.m",
+        "first moments along and across the link; 2 and 4 likewise",
+    ),
+    ("xp, yp", r"r \cos a_2, r \sin a_2", "m", "coupler point P along and across the coupler"),
+    ("ca, sa", r"\cos\alpha, \sin\alpha", "1", "direction of the guide"),
+    ("gx, gy", r"-g \sin\alpha_1, -g \cos\alpha_1", "m/s2", "gravity in the frame of the ground link"),
+)
+
+
+def _symbol(text: str) -> str:
+    return f"${text}$" if text else ""
+
+
+def _range(variable: Variable) -> str:
+    low = "" if variable.minimum is None else f"{variable.minimum:g}"
+    high = "" if variable.maximum is None else f"{variable.maximum:g}"
+    return f"{low} .. {high}" if low or high else ""
+
+
+def _start(variable: Variable) -> str:
+    return f"{variable.start:.9g}" if isinstance(variable.start, float) else str(variable.start)
+
+
+def nomenclature() -> str:
+    """The text of docs/nomenclature.md."""
+    fields = FiveBarParameters.__dataclass_fields__
+    lines = [
+        "# Nomenclature",
+        "",
+        "One table: thesis symbol, identifier in Python, FMI variable, unit, meaning and sign. Written by",
+        "`python docs/generate.py` from the tables in the code; a test holds it to them.",
+        "",
+        "**Frame and signs.** x runs along the ground link from the crank shaft A to the slider's zero, y to its left; angles",
+        "are counter-clockwise from x. `ground.inclination` is the angle of x above the horizontal, so gravity in this frame is",
+        "(-g sin, -g cos) of it. `*.cog_angle` and `coupler.point_angle` turn from the link's own direction: A to B, B to C,",
+        "D to C. A positive torque drives the crank counter-clockwise. `rocker.angle` is absolute, the thesis's theta4 + alpha.",
+        "`assembly.branch` is the sign of sin(rocker.angle - coupler.angle), +1 in the thesis's runs: C lies to the left of the",
+        "line from B to D. `pin.A` is the force of the ground on the crank, `pin.B` of the crank on the coupler, `pin.C` of the",
+        "rocker on the coupler, `pin.D` of the slider on the rocker; `slider.guide_force` is the guide's force on the slider, to",
+        "the left of its direction of travel.",
+        "",
+        "## FMI variables",
+        "",
+        "| symbol | identifier | FMI variable | unit | meaning |",
+        "| --- | --- | --- | --- | --- |",
+    ]
+    for variable in (*PARAMETERS, *INPUTS, *OUTPUTS):
+        name = field_name(variable.name)
+        if variable.causality == "parameter":
+            if name in fields:
+                identifier = f"`FiveBarParameters.{name}`"
+            else:
+                identifier = f"`InitialState.{variable.name.split('.')[1]}`" if name.startswith("initial") else ""
+        elif variable.causality == "output" and variable.kind == "Real":
+            identifier = f"`Outputs.{variable.name.replace('.', '_')}`"
+        else:
+            identifier = ""
+        unit = variable.unit or variable.kind
+        lines.append(
+            f"| {_symbol(variable.symbol)} | {identifier} | `{variable.name}` | {unit} | {variable.description} |"
+        )
+    lines += [
+        "",
+        "## Symbols of the equations",
+        "",
+        "| symbol | identifier | unit | meaning |",
+        "| --- | --- | --- | --- |",
+        *(f"| {_symbol(symbol)} | `{name}` | {unit} | {meaning} |" for name, symbol, unit, meaning in INTERNAL),
+        "",
+    ]
+    return "\n".join(lines)
+
+
+def variable_table() -> str:
+    """The table of the README."""
+    lines = ["| variable | causality | unit | start | range | meaning |", "| --- | --- | --- | --- | --- | --- |"]
+    for v in (*PARAMETERS, *INPUTS, *OUTPUTS):
+        start = "" if v.causality == "output" else _start(v)
+        lines.append(f"| `{v.name}` | {v.causality} | {v.unit or v.kind} | {start} | {_range(v)} | {v.description} |")
+    return "\n".join(lines)
+
+
+def readme(text: str) -> str:
+    """The README with its variable table brought up to date."""
+    before, _, rest = text.partition(BEGIN)
+    _, _, after = rest.partition(END)
+    return f"{before}{BEGIN}\n{variable_table()}\n{END}{after}"
+
+
+def identifiers() -> set[str]:
+    """Every identifier of the equations that the second table must explain."""
+    return {*Constants._fields, *Position._fields, *Coefficients._fields}
+
+
+def main() -> int:
+    """Write both."""
+    (HERE / "nomenclature.md").write_text(nomenclature(), encoding="utf-8")
+    README.write_text(readme(README.read_text(encoding="utf-8")), encoding="utf-8")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,163 @@
+"""The command line: what it writes, what it says, and its exit codes."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+import build_fmu
+from analysis import cli
+from linkwork.five_bar.published import SETS
+
+
+@pytest.fixture(scope="module")
+def fmu(tmp_path_factory):
+    return build_fmu.build("FiveBarSlider", tmp_path_factory.mktemp("fmu"))
+
+
+@pytest.fixture
+def linkwork(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+
+    def call(*arguments):
+        return CliRunner().invoke(cli.main, [str(a) for a in arguments], catch_exceptions=False)
+
+    return call
+
+
+def in_own_process(*arguments, cwd):
+    """An FMU runs in a process of its own."""
+    return subprocess.run(
+        [sys.executable, "-m", "analysis.cli", *map(str, arguments)],
+        cwd=cwd,
+        capture_output=True,
+        text=True,
+        timeout=300,
+        check=False,
+    )
+
+
+@pytest.mark.parametrize("command", [[], ["build"], ["run"], ["check"], ["info"], ["figures"]])
+def test_help_shows_examples(linkwork, command):
+    result = linkwork(*command, "--help")
+    assert result.exit_code == 0
+    assert "Examples:" in result.output
+
+
+def test_run_writes_csv_and_plot(linkwork, tmp_path):
+    result = linkwork("run", "--published", "table-3.1")
+    assert result.exit_code == 0, result.output
+    rows = np.loadtxt(tmp_path / "out" / "table-3.1.csv", delimiter=",", skiprows=1)
+    assert rows.shape == (1081, 28)
+    assert (tmp_path / "out" / "table-3.1.png").read_bytes().startswith(b"\x89PNG")
+    assert "slider.position" in result.output
+
+
+def test_run_a_case_file_with_a_change(linkwork, tmp_path):
+    (tmp_path / "case.toml").write_text('published = "table-3.1"\n[run]\nrevolutions = 1\n')
+    assert linkwork("run", "case.toml", "--no-plot").exit_code == 0
+    first = np.loadtxt(tmp_path / "out" / "case.csv", delimiter=",", skiprows=1)
+    assert linkwork("run", "case.toml", "--no-plot", "--set", "slider.stiffness=2e6 dyn/cm").exit_code == 0
+    second = np.loadtxt(tmp_path / "out" / "case.csv", delimiter=",", skiprows=1)
+    assert first.shape == second.shape == (361, 28)
+    assert not np.allclose(first[:, 6], second[:, 6])
+
+
+def test_a_run_that_ends_early_keeps_its_data_and_exits_with_3(linkwork, tmp_path):
+    result = linkwork(
+        "run", "--published", "table-3.1", "--set", "slider.stiffness=0", "--set", "slider.damping=10", "--stop-time", "3 s",
+        "--no-plot",
+    )  # fmt: skip
+    assert result.exit_code == cli.ENDED_EARLY
+    assert "limit of assembly at t = 0.49997" in " ".join(result.stderr.split())
+    rows = np.loadtxt(tmp_path / "out" / "table-3.1.csv", delimiter=",", skiprows=1)
+    assert rows[-1, 0] == pytest.approx(0.499978413)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "said"),
+    [
+        (["run", "--published", "table-3.2"], 1, "there is no published set"),
+        (["run", "--published", "table-3.1", "--set", "slider.stifness=1"], 1, "did you mean slider.stiffness"),
+        (["run", "--published", "table-3.1", "--set", "crank.length=-1"], 1, "parameter crank.length is -1.0"),
+        (["run", "--published", "table-3.1", "--set", "initial.slider_position=1"], 1, "cannot be joined"),
+        (["run", "--published", "table-3.1", "--method", "Euler"], 1, "method is 'Euler'"),
+        (["run"], 2, "give either a case file or --published"),
+        (["run", "--published", "table-3.1", "--set", "nonsense"], 2, "NAME=VALUE"),
+        (["run", "nowhere.toml"], 2, "does not exist"),
+        (["check", "--fmu", "nowhere.fmu"], 1, "there is no file nowhere.fmu"),
+        (["check", "no-such-case"], 2, "neither a case file nor a standard case"),
+        (["figures", "9.9"], 2, "there is no figure 9.9"),
+        (["build", "SixBar"], 1, "there is no model 'SixBar'"),
+        (["info", "nothing"], 2, "neither a published set"),
+    ],
+)
+def test_what_is_wrong_is_told_in_a_sentence(linkwork, arguments, code, said):
+    result = linkwork(*arguments)
+    assert result.exit_code == code
+    assert said in " ".join((result.output + result.stderr).split())
+    assert "Traceback" not in result.output + result.stderr
+
+
+def test_info_lists_the_published_sets_and_one_of_them(linkwork):
+    result = linkwork("info")
+    assert result.exit_code == 0
+    assert all(name in result.output for name in SETS)
+    result = linkwork("info", "rig-1-spring-a")
+    assert result.exit_code == 0
+    assert "slider.stiffness" in result.output
+    assert "turns fully" in result.output
+
+
+def test_info_on_an_fmu(linkwork, fmu):
+    result = linkwork("info", fmu)
+    assert result.exit_code == 0
+    assert "valid" in result.output
+
+
+def test_check_passes_and_writes_its_files(fmu, tmp_path):
+    done = in_own_process("check", "--fmu", fmu, cwd=tmp_path)
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert "1 of 1 cases pass" in done.stdout
+    assert {p.name for p in (tmp_path / "out").iterdir()} == {
+        "table-3.1.png",
+        "table-3.1-in-process.csv",
+        "table-3.1-fmu.csv",
+    }
+
+
+def test_a_check_that_fails_exits_with_4(fmu, tmp_path):
+    done = in_own_process("check", "coulomb-friction", "--fmu", fmu, "--tolerance", "1e-30", cwd=tmp_path)
+    assert done.returncode == cli.CHECK_FAILED
+    assert "check failed: coulomb-friction" in done.stderr
+
+
+def test_run_through_the_fmu_reports_a_refused_step(fmu, tmp_path):
+    done = in_own_process(
+        "run", "--published", "table-3.1", "--fmu", fmu, "--set", "slider.stiffness=0", "--set", "slider.damping=10",
+        "--stop-time", "1 s", "--no-plot", cwd=tmp_path,
+    )  # fmt: skip
+    assert done.returncode == cli.ENDED_EARLY
+    assert "limit of assembly" in done.stderr
+    assert (tmp_path / "out" / "table-3.1.csv").is_file()
+
+
+def test_build_builds(linkwork, tmp_path):
+    result = linkwork("build", "--dest", tmp_path / "fmus")
+    assert result.exit_code == 0
+    assert (tmp_path / "fmus" / "FiveBarSlider.fmu").is_file()
+    assert "valid" in result.output
+
+
+def test_ctrl_c_is_clean(linkwork, monkeypatch):
+    def interrupted(*arguments, **options):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(build_fmu, "build", interrupted)
+    result = linkwork("build")
+    assert result.exit_code == cli.INTERRUPTED
+    assert "interrupted" in result.stderr

@@ -1,0 +1,245 @@
+"""Parameter and case files: units, errors that name what is wrong, every digit kept."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import fields, replace
+from math import pi
+
+import numpy as np
+import pytest
+
+from analysis import io
+from analysis.inputs import Harmonics, Piecewise, TorsionBar
+from linkwork.errors import InputError, MissingParameterError, ParameterError, UnknownNameError
+from linkwork.five_bar.published import SETS, TABLE_3_1
+
+
+@pytest.mark.parametrize("ending", ["toml", "json"])
+@pytest.mark.parametrize("name", list(SETS))
+def test_a_saved_mechanism_comes_back_digit_for_digit(tmp_path, ending, name):
+    path = io.save_parameters(tmp_path / f"mechanism.{ending}", SETS[name].parameters)
+    assert io.load_parameters(path) == SETS[name].parameters
+
+
+def test_every_digit_of_an_awkward_number_is_kept(tmp_path):
+    awkward = replace(TABLE_3_1, slider_guide_angle=0.1 + 0.2, crank_length=0.05 * (1 + 2**-52))
+    assert io.load_parameters(io.save_parameters(tmp_path / "m.toml", awkward)) == awkward
+
+
+@pytest.mark.parametrize(
+    ("text", "unit", "value"),
+    [
+        ("15.35 cm", "m", 0.1535),
+        ("2 in", "m", 0.0508),
+        ("420 rpm", "rad/s", 14 * pi),
+        ("1e6 dyn/cm", "N/m", 1000.0),
+        ("3e4 dyn*s/cm", "N.s/m", 30.0),
+        ("12500 g*cm^2", "kg.m2", 1.25e-3),
+        ("30 deg", "rad", pi / 6),
+        ("981 cm/s^2", "m/s2", 9.81),
+        ("1e8 dyn*cm", "N.m", 10.0),
+        ("0.25", "m", 0.25),
+        ("1e-3", "m", 1e-3),
+        (0.25, "m", 0.25),
+        (3, "1", 3.0),
+    ],
+)
+def test_quantities_in_their_units(text, unit, value):
+    assert io.quantity(text, unit, "x") == pytest.approx(value, rel=1e-14)
+
+
+@pytest.mark.parametrize(
+    ("text", "unit"),
+    [
+        ("15 kg", "m"),
+        ("abc", "m"),
+        ("", "m"),
+        ([1.0], "m"),
+        (True, "m"),
+        ("1 furlongg", "m"),
+        (None, "m"),
+        ("inf m", "m"),
+    ],
+)
+def test_a_quantity_of_another_kind_is_refused_by_name(text, unit):
+    with pytest.raises(ParameterError, match=r"crank\.length"):
+        io.quantity(text, unit, "crank.length")
+
+
+def test_hertz_is_refused_for_a_speed_because_it_is_ambiguous():
+    with pytest.raises(ParameterError, match="2 pi"):
+        io.quantity("7 Hz", "rad/s", "drive.speed")
+
+
+def test_an_unknown_name_is_told_with_the_nearest():
+    with pytest.raises(UnknownNameError, match=r"slider\.stifness: did you mean slider\.stiffness"):
+        io.parameters_from({"slider": {"stifness": 1.0}}, TABLE_3_1)
+
+
+def test_missing_names_are_listed():
+    with pytest.raises(MissingParameterError, match=r"ground\.length is missing.*rocker\.cog_distance"):
+        io.parameters_from({"slider": {"stiffness": 1.0}})
+
+
+def test_wrong_signs_and_numbers_that_are_not_finite_name_the_parameter(tmp_path):
+    for value, name in ((-0.05, "crank.length"), (float("nan"), "slider.mass")):
+        group, leaf = name.split(".")
+        with pytest.raises(ParameterError, match=name.replace(".", r"\.")):
+            io.parameters_from({group: {leaf: value}}, TABLE_3_1)
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "said"),
+    [
+        ("case.toml", "title = ", "not valid TOML"),
+        ("case.json", "{", "not valid JSON"),
+        ("case.yaml", "", r"must end in \.toml or \.json"),
+        ("case.json", "[1, 2]", "must hold tables"),
+    ],
+)
+def test_files_that_cannot_be_read(tmp_path, name, text, said):
+    path = tmp_path / name
+    path.write_text(text)
+    with pytest.raises(InputError, match=said):
+        io.load_case(path)
+
+
+def test_a_missing_file_is_told(tmp_path):
+    with pytest.raises(InputError, match="cannot be read"):
+        io.load_parameters(tmp_path / "nowhere.toml")
+
+
+def case(tmp_path, text, **overrides):
+    path = tmp_path / "case.toml"
+    path.write_text(text)
+    return io.load_case(path, overrides or None)
+
+
+def test_a_published_case_runs_three_turns_at_its_speed(tmp_path):
+    loaded = case(tmp_path, 'published = "table-3.1"\n[slider]\nstiffness = "2e6 dyn/cm"\n')
+    assert loaded.parameters == replace(TABLE_3_1, slider_stiffness=2000.0)
+    assert loaded.inputs.speed == pytest.approx(14 * pi)
+    assert loaded.stop_time == pytest.approx(3 / 7)
+    assert loaded.step == pytest.approx(1 / 7 / 360)
+
+
+def test_every_kind_of_input(tmp_path):
+    (tmp_path / "fy.csv").write_text("time,fy\n0,1\n0.5,2\n1,3\n")
+    loaded = case(
+        tmp_path,
+        """
+published = "table-3.1"
+[[drive.torque]]
+kind = "torsion-bar"
+torque = "1e8 dyn*cm"
+release_angle = "45 deg"
+[[drive.torque]]
+kind = "induction-motor"
+breakdown_torque = 5
+breakdown_slip = 0.2
+synchronous_speed = "500 rpm"
+[force]
+kind = "harmonics"
+mean = 1
+amplitudes = ["2 N", 3]
+frequencies = ["60 rpm", 4]
+[load.fx]
+kind = "ramp"
+start = 0
+end = "1 kN"
+from_time = "10 ms"
+to_time = "20 ms"
+[load.fy]
+kind = "table"
+file = "fy.csv"
+interpolation = "cubic"
+[run]
+stop_time = "0.5 s"
+step = "1 ms"
+""",
+    )
+    bar, motor = loaded.inputs.torque
+    assert bar == TorsionBar(torque=10.0, release_angle=pi / 4)
+    assert (motor.breakdown_torque, motor.breakdown_slip) == (5.0, 0.2)
+    assert motor.synchronous_speed == pytest.approx(500 * pi / 30)
+    force = loaded.inputs.force
+    assert isinstance(force, Harmonics)
+    assert (force.mean, force.amplitudes, force.phases) == (1.0, [2.0, 3.0], [0.0, 0.0])
+    assert force.frequencies == pytest.approx([2 * pi, 4.0])
+    assert isinstance(loaded.inputs.load_x, Piecewise)
+    assert isinstance(loaded.inputs.load_y, Piecewise)
+    assert (loaded.stop_time, loaded.step) == (0.5, 1e-3)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ('published = "table-3.2"', r"did you mean table-3\.1"),
+        ('published = "table-3.1"\n[run]\nstop = 1', r"run\.stop"),
+        ('published = "table-3.1"\n[drive]\nspeeed = 1', r"did you mean drive\.speed"),
+        ('published = "table-3.1"\n[drive]\ntorque = 1', r"run\.stop_time is missing"),
+        ('published = "table-3.1"\n[drive.torque]\nkind = "torsion-bra"\ntorque = 1', "torsion-bar"),
+        ('published = "table-3.1"\n[drive.torque]\nkind = "torsion-bar"', r"drive\.torque\.torque is missing"),
+        (
+            'published = "table-3.1"\n[drive.torque]\nkind = "torsion-bar"\ntorque = 1\nangle = 2',
+            r"drive\.torque\.angle",
+        ),
+        ('published = "table-3.1"\n[drive]\nspeed = 1\ntorque = 1', "both speed and torque"),
+        ('published = "table-3.1"\n[initial]\nangle = 1', r"initial\.angle"),
+        ('published = "table-3.1"\n[load]\nfz = 1', r"load\.fz"),
+        ('published = "table-3.1"\n[force]\nkind = "table"\ntimes = [0, 1]\nvalues = [1]', "as many times as values"),
+        ('published = "table-3.1"\n[force]\nkind = "table"\ntimes = [1, 0]\nvalues = [1, 2]', "must increase"),
+        ('published = "table-3.1"\n[force]\nkind = "table"\nfile = "no.csv"', "cannot be read as CSV"),
+    ],
+)
+def test_a_wrong_case_is_told_in_a_sentence(tmp_path, text, said):
+    with pytest.raises((ParameterError, InputError), match=said):
+        case(tmp_path, text)
+
+
+def test_overrides_replace_parameters_drive_and_run(tmp_path):
+    loaded = case(
+        tmp_path,
+        'published = "table-3.1"\n[drive]\nspeed = "420 rpm"',
+        **{
+            "slider.stiffness": "5e5 dyn/cm",
+            "drive.torque": "2 N*m",
+            "run.stop_time": "0.1 s",
+            "initial.crank_angle": 0.5,
+        },
+    )
+    assert loaded.parameters.slider_stiffness == 500.0
+    assert loaded.inputs.speed is None
+    assert loaded.inputs.torque == (2.0,)
+    assert loaded.stop_time == 0.1
+    assert loaded.initial.crank_angle == 0.5
+
+
+def test_the_examples_load():
+    from pathlib import Path
+
+    examples = sorted((Path(__file__).parents[2] / "examples").glob("*.toml"))
+    assert len(examples) >= 2
+    for path in examples:
+        assert io.load_case(path).stop_time > 0.0
+
+
+def test_csv_keeps_every_digit_and_its_header(tmp_path):
+    values = np.array([0.1, 1 / 3, 1e-300])
+    path = io.write_csv(tmp_path / "deep" / "x.csv", {"a [m]": values, "b [N]": -values})
+    assert path.read_text().splitlines()[0] == "a [m],b [N]"
+    assert np.array_equal(np.loadtxt(path, delimiter=",", skiprows=1)[:, 0], values)
+    assert not list(tmp_path.rglob("*.part"))
+
+
+def test_csv_columns_of_different_length_are_refused(tmp_path):
+    with pytest.raises(InputError, match="differ in length"):
+        io.write_csv(tmp_path / "x.csv", {"a": [1.0], "b": [1.0, 2.0]})
+
+
+def test_every_parameter_has_its_place_in_a_file():
+    data = io.parameters_to(TABLE_3_1)
+    flat = sum(len(v) if isinstance(v, dict) else 1 for v in data.values())
+    assert flat == len(fields(TABLE_3_1))
+    assert json.loads(json.dumps(data)) == data

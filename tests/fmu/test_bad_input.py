@@ -1,0 +1,396 @@
+"""Bad input gets an answer in one sentence, and nothing is lost: neither the process nor the last good state."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from .conftest import Changes
+from .runner import run_in_process
+
+NAN, INF = float("nan"), float("inf")
+
+#: Values before the initialisation, and what the sentence in the log must say.
+BAD_PARAMETERS = {
+    "negative length": ({"crank.length": -0.05}, "parameter crank.length is -0.05: it must be"),
+    "zero length": ({"coupler.length": 0.0}, "parameter coupler.length is 0.0: it must be"),
+    "mass not a number": ({"slider.mass": NAN}, "parameter slider.mass is nan: it must be"),
+    "infinite inertia": ({"rocker.inertia": INF}, "parameter rocker.inertia is inf: it must be"),
+    "inertia below what the mass needs": (
+        {"crank.mass": 9.0, "crank.cog_distance": 0.1},
+        "parameter crank.inertia is 0.00125: it must be at least",
+    ),
+    "nothing moves": ({"slider.mass": 0.0, "rocker.mass": 0.0}, "parameter slider.mass is 0.0: it must be"),
+    "negative damping": ({"slider.damping": -1.0}, "parameter slider.damping is -1.0: it must be"),
+    "branch": ({"assembly.branch": 0}, "parameter assembly.branch is 0: it must be +1 or -1"),
+    "drive mode": ({"drive.mode": 7}, "parameter drive.mode is 7: it must be 0 (torque) or 1 (speed)"),
+    "tolerance zero": ({"solver.tolerance": 0.0}, "parameter solver.tolerance is 0.0: it must be between"),
+    "tolerance not a number": ({"solver.tolerance": NAN}, "parameter solver.tolerance is nan: it must be between"),
+    "start": ({"initial.crank_angle": INF}, "parameter initial.crank_angle is inf: it must be a finite number"),
+    "input not a number": ({"slider.force": NAN}, "input slider.force is nan at t = 0 s: it must be a finite number"),
+    "not to be assembled": ({"initial.slider_position": 1.0}, "the links cannot be joined at crank angle 0 rad"),
+    "at the limit of assembly": (
+        {"initial.slider_position": 0.19649999},
+        "limit of assembly at crank angle 0 rad",
+    ),
+}
+
+
+def initialise_badly(fmu: str, folder: str, cases: list[dict[str, Any]], times: int) -> list[Any]:
+    """Statuses, log and trouble of failed initialisations; every instance is used on and then freed."""
+    from bare_master import DISCARD, FATAL, Fmu
+
+    fmu = Fmu(fmu, folder)
+    found = []
+    for values in cases:
+        for k in range(times):
+            instance = fmu.instantiate(logging=k % 2 == 0)
+            assert [instance.set(name, value) for name, value in values.items()] == [0] * len(values)
+            assert instance.setup() == instance.enter() == 0
+            if k % 3 == 1:
+                # a read on the way neither fails nor hides the failure
+                assert instance.read(["crank.angle"])[0] == 0
+            status = instance.exit()
+            # what masters do that overlook the status
+            assert status == FATAL
+            trouble = instance.trouble()
+            assert instance.step(0.0, 1e-3) == DISCARD
+            after = instance.trouble()
+            outputs = instance.read(fmu.outputs)[0]
+            if k % 2:
+                instance.exit()
+                instance.terminate()
+            instance.free()
+            if k == 0:
+                found.append([trouble, after, outputs, instance.log])
+    # the process is as good as before
+    instance = fmu.instantiate().start()
+    instance.run([1e-3] * 10)
+    instance.free()
+    return found
+
+
+@pytest.fixture(scope="module")
+def failures(fmu: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
+    """What each bad parameter leads to, after 14 of each in one process that lived on."""
+    cases = [values for values, _ in BAD_PARAMETERS.values()]
+    found = run_in_process(initialise_badly, fmu, tmp_path_factory.mktemp("run"), cases, 14)
+    return dict(zip(BAD_PARAMETERS, found))
+
+
+@pytest.mark.parametrize("case", BAD_PARAMETERS)
+def test_bad_parameter_fails_the_initialisation_with_a_sentence(failures: dict[str, Any], case: str) -> None:
+    trouble, after, outputs, log = failures[case]
+    sentence = BAD_PARAMETERS[case][1]
+    said = [text for status, category, text in log if (status, category) == (3, "logStatusError")]
+    assert len(said) == 1
+    assert said[0].startswith(sentence)
+    assert "\n" not in said[0]
+    code = 2 if "input" in case else 3 if "assembl" in case else 6
+    assert trouble == [code, said[0]]
+    # a step all the same: refused, and the cause is still to be read
+    assert after[0] in (5, code)
+    assert said[0] in after[1]
+    assert outputs == 0
+
+
+#: Time and size of a step at t = 0.01, the value of solver.status, and what the sentence must say.
+BAD_STEPS = {
+    "zero": (0.01, 0.0, 1, "a step of 0 s at t = 0.01 s: it must be greater than zero"),
+    "negative": (0.01, -1e-3, 1, "a step of -0.001 s at t = 0.01 s: it must be greater than zero"),
+    "not a number": (0.01, NAN, 1, "a step of nan s from t = 0.01 s: both must be finite numbers"),
+    "infinite": (0.01, INF, 1, "a step of inf s from t = 0.01 s: both must be finite numbers"),
+    "from nowhen": (NAN, 1e-3, 1, "a step of 0.001 s from t = nan s: both must be finite numbers"),
+    "backwards": (0.009, 1e-3, 1, "a step backwards: it starts at t = 0.009 s, but the state is at t = 0.01 s"),
+    "over a gap": (0.02, 1e-3, 1, "a step over a gap: it starts at t = 0.02 s, but the state is at t = 0.01 s"),
+}
+#: Input and value, the value of solver.status, and what the sentence must say.
+BAD_INPUTS = {
+    "NaN force": ("slider.force", NAN, 2, "input slider.force is nan at t = 0.01 s: it must be a finite number"),
+    "infinite speed": ("drive.speed", INF, 2, "input drive.speed is inf at t = 0.01 s: it must be a finite number"),
+    "infinite load": ("load.fy", -INF, 2, "input load.fy is -inf at t = 0.01 s: it must be a finite number"),
+    "slider pushed out": ("slider.force", 1e5, 3, "in the step from t = 0.01 s: limit of assembly at crank angle"),
+    "slider pulled in": ("slider.force", -1e6, 3, "in the step from t = 0.01 s: limit of assembly at crank angle"),
+    "crank run wild": ("drive.speed", 1e5, 3, "in the step from t = 0.01 s: limit of assembly at crank angle"),
+    "beyond floats": ("slider.force", 1e300, 4, "in the step from t = 0.01 s: the step size fell to"),
+    "beyond floats, speed": ("drive.speed", 1e200, 4, "in the step from t = 0.01 s: the step size fell to"),
+}
+
+
+def step_badly(fmu: str, folder: str, cases: list[Any]) -> list[Any]:
+    """After ten good steps a bad one, and then a good one; beside a run without the bad one."""
+    from bare_master import Fmu
+
+    fmu = Fmu(fmu, folder)
+    good = fmu.instantiate().start()
+    good.run([1e-3] * 10)
+    at_failure = good.outputs()
+    good.run([1e-3], 0.01)
+    found = []
+    for inputs, time, size in cases:
+        instance = fmu.instantiate().start()
+        instance.run([1e-3] * 10)
+        kept = {name: instance.get(name) for name in inputs}
+        for name, value in inputs.items():
+            assert instance.set(name, value) == 0
+        status = instance.step(time, size)
+        trouble = instance.trouble()
+        log = list(instance.log)
+        terminated = instance.terminated()
+        # readable under the input that failed, equal to the last good where the input is put back
+        readable = instance.read(fmu.outputs)[0]
+        for name, value in kept.items():
+            instance.set(name, value)
+        same = instance.outputs() == at_failure
+        state = instance.save()
+        saved = len(instance.serialize(state))
+        again = instance.step(0.01, 1e-3)
+        found.append(
+            {
+                "status": status,
+                "trouble": trouble,
+                "log": log,
+                "terminated": terminated,
+                "readable": readable,
+                "same": same,
+                "saved": saved,
+                "again": again,
+                "after": instance.trouble(),
+                "like the run without it": instance.outputs() == good.outputs(),
+            }
+        )
+        # and once more from the state saved after the refusal
+        assert instance.restore(state) == 0
+        assert instance.step(0.01, 1e-3) == 0
+        assert instance.outputs() == good.outputs()
+        instance.terminate()
+        instance.free()
+    return found
+
+
+@pytest.fixture(scope="module")
+def refusals(fmu: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
+    cases: list[Any] = [[{}, time, size] for time, size, _, _ in BAD_STEPS.values()]
+    cases += [[{name: value}, 0.01, 0.1] for name, value, _, _ in BAD_INPUTS.values()]
+    found = run_in_process(step_badly, fmu, tmp_path_factory.mktemp("run"), cases)
+    return dict(zip([*BAD_STEPS, *BAD_INPUTS], found))
+
+
+@pytest.mark.parametrize("case", [*BAD_STEPS, *BAD_INPUTS])
+def test_bad_step_is_refused_and_the_last_good_state_stays(refusals: dict[str, Any], case: str) -> None:
+    *_, code, sentence = (BAD_STEPS | BAD_INPUTS)[case]
+    found = refusals[case]
+    assert found["status"] == 2, "fmi2Discard"
+    assert found["trouble"][0] == code
+    assert found["trouble"][1].startswith(sentence)
+    assert found["log"] == [[2, "logStatusDiscard", found["trouble"][1]]]
+    assert found["terminated"] == [0, 1]
+    assert found["readable"] == 0
+    assert found["same"]
+    assert found["saved"] > 100
+    assert found["again"] == 0
+    assert found["after"] == [0, ""]
+    assert found["like the run without it"]
+
+
+def nan_input_read(fmu: str, folder: str) -> list[Any]:
+    """Outputs read while an input is not finite."""
+    from bare_master import Fmu
+
+    instance = Fmu(fmu, folder).instantiate().start()
+    before = instance.outputs()
+    instance.set("load.fx", float("nan"))
+    return [before, instance.outputs(), instance.trouble()]
+
+
+def test_outputs_under_an_input_that_is_not_finite_are_the_last_good_ones(fmu: Path, tmp_path: Path) -> None:
+    before, during, trouble = run_in_process(nan_input_read, fmu, tmp_path)
+    assert during == before
+    assert trouble[0] == 2
+    assert "load.fx is nan" in trouble[1]
+
+
+def out_of_order(fmu: str, folder: str) -> list[Any]:
+    """Steps before the initialisation and after the end, values set where they cannot be, states of no run."""
+    from bare_master import Fmu
+
+    fmu = Fmu(fmu, folder)
+    instance = fmu.instantiate()
+    found = [[instance.step(0.0, 1e-3), instance.trouble()]]
+    state = instance.save()
+    instance.start()
+    assert instance.step(0.0, 1e-3) == 0
+    found.append([instance.set("crank.length", 0.06), instance.get("crank.length"), instance.log[-1]])
+    found.append([instance.set("crank.angle", 1.0), instance.get("crank.angle") == 1.0, instance.log[-1]])
+    assert instance.restore(state) == 0
+    found.append([instance.step(0.0, 1e-3), instance.trouble()])
+    instance.start()
+    instance.run([1e-3])
+    assert instance.terminate() == 0
+    last = instance.outputs()
+    found.append([instance.step(1e-3, 1e-3), instance.outputs() == last])
+    instance.free_state(state)
+    instance.free()
+    return found
+
+
+def test_calls_out_of_order(fmu: Path, tmp_path: Path) -> None:
+    before, parameter, output, restored, after = run_in_process(out_of_order, fmu, tmp_path)
+    assert before == [2, [5, "a step at t = 0 s before the initialisation"]]
+    assert parameter[:2] == [0, 0.05]
+    assert parameter[2] == [
+        1,
+        "logStatusWarning",
+        "crank.length is a fixed parameter, set after the initialisation: the value 0.06 was not taken",
+    ]
+    assert output[:2] == [0, False]
+    assert output[2][2] == "crank.angle is an output: the value 1.0 was not taken"
+    assert restored == before
+    assert after == [2, True]
+
+
+def go_on_regardless(fmu: str, folder: str) -> list[Any]:
+    """A master that overlooks a refused step and goes on."""
+    from bare_master import Fmu
+
+    instance = Fmu(fmu, folder).instantiate().start()
+    instance.set("slider.force", 1e5)
+    return [[instance.step(0.1 * k, 0.1), instance.trouble()] for k in range(4)]
+
+
+def test_the_cause_stays_where_a_master_goes_on_after_a_refused_step(fmu: Path, tmp_path: Path) -> None:
+    first, *others = run_in_process(go_on_regardless, fmu, tmp_path)
+    assert first[0] == 2
+    assert first[1][0] == 3
+    assert first[1][1].startswith("in the step from t = 0 s: limit of assembly")
+    for k, (status, trouble) in enumerate(others, 1):
+        assert status == 2
+        gap = f"a step over a gap: it starts at t = {0.1 * k:.9g} s, but the state is at t = 0 s"
+        assert trouble == [3, f"{gap}; before that, {first[1][1]}"]
+
+
+def wrong_calls(fmu: str, folder: str) -> list[Any]:
+    """Variables that are not there or of another type; each instance is used on and freed."""
+    from bare_master import Fmu
+
+    fmu = Fmu(fmu, folder)
+    found = []
+    for call in (
+        lambda i: i.read(["drive.mode"], kind="Real")[0],
+        lambda i: i.read(["solver.message"], kind="Integer")[0],
+        lambda i: i.set("crank.length", 1, kind="Integer"),
+        lambda i: i.set("crank.length", "long", kind="String"),
+        lambda i: i.read(["crank.length"], kind="Boolean")[0],
+        lambda i: i.set("crank.length", 1, kind="Boolean"),
+        lambda i: i.read([], kind="Real", references=[9999])[0],
+        lambda i: i.read([], kind="String", references=[0xFFFFFFFF])[0],
+        lambda i: i.set("crank.length", 1.0, reference=0xFFFFFFFF),
+    ):
+        for _ in range(5):
+            instance = fmu.instantiate().start()
+            status = call(instance)
+            said = [text for _, category, text in instance.log if category == "logStatusError"]
+            instance.run([1e-3])
+            instance.free()
+        found.append([status, said])
+    return found
+
+
+def test_wrong_variables_are_told_and_do_not_take_the_process_along(fmu: Path, tmp_path: Path) -> None:
+    found = run_in_process(wrong_calls, fmu, tmp_path)
+    assert [status for status, _ in found] == [4] * 9
+    sentences = [said[0] for _, said in found]
+    assert sentences[0] == "variable drive.mode is not of type Real"
+    assert sentences[5] == "variable crank.length is not of type Boolean"
+    assert sentences[6] == "there is no variable with the value reference 9999"
+    assert all(len(said) == 1 for _, said in found)
+
+
+def interrupt(fmu: str, folder: str) -> list[Any]:
+    """Interrupts as from the keyboard while steps are taken, then a good run in the same process."""
+    import signal
+    import time
+
+    from bare_master import Fmu
+
+    signal.signal(signal.SIGALRM, signal.default_int_handler)
+    fmu = Fmu(fmu, folder)
+    ends = []
+    for _ in range(4):
+        instance = fmu.instantiate().start()
+        end = "none"
+        until = time.monotonic() + 10.0
+        k = 0
+        try:
+            signal.setitimer(signal.ITIMER_REAL, 0.05)
+            # in a step nearly all the time, so that the interrupt finds one
+            while end == "none" and time.monotonic() < until:
+                status = instance.step(k * 0.1, 0.1)
+                end = status or end
+                k += 1
+        except KeyboardInterrupt:
+            end = "raised"
+        assert len(instance.outputs()) > 20
+        ends.append(end)
+        instance.free()
+    instance = fmu.instantiate().start()
+    instance.run([1e-3] * 10)
+    return ends
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no interval timer")
+def test_interrupt_in_a_step_ends_the_run_and_not_the_process(fmu: Path, tmp_path: Path) -> None:
+    # fatal where it found the slave at work, raised where it found the master
+    assert set(run_in_process(interrupt, fmu, tmp_path)) <= {4, "raised"}
+
+
+def refuse_in_percent(fmu: str, folder: str) -> list[Any]:
+    """A refused step whose sentence carries printf conversions."""
+    from bare_master import Fmu
+
+    instance = Fmu(fmu, folder).instantiate().start()
+    status = instance.step(0.0, 0.0)
+    return [status, instance.log, instance.get("solver.message")]
+
+
+def test_percent_signs_come_through_the_printf_of_the_master(
+    build_variant: Callable[[Changes], Path], tmp_path: Path
+) -> None:
+    sentence = "greater than 0 %, not %s%s%n%d %5.3f %%"
+    variant = build_variant({"linkwork/five_bar/plant.py": ("it must be greater than zero", sentence)})
+    status, log, message = run_in_process(refuse_in_percent, variant, tmp_path / "run")
+    assert status == 2
+    assert message == f"a step of 0 s at t = 0 s: {sentence}"
+    assert log == [[2, "logStatusDiscard", message]]
+
+
+def end_in_order(fmu: str, folder: str) -> int:
+    """How many calls at the end of Python many instances ask for together; the FMU is good after they were made."""
+    import atexit
+    import logging
+
+    from bare_master import Fmu
+
+    logging.getLogger()  # imported by the wrapper's package as well, and itself in need of an end
+    before = atexit._ncallbacks()
+    fmu = Fmu(fmu, folder)
+    for _ in range(5):
+        instance = fmu.instantiate().start()
+        instance.free()
+    asked = atexit._ncallbacks() - before
+    atexit._run_exitfuncs()
+    instance = fmu.instantiate().start()
+    instance.run([1e-3] * 5)
+    instance.free()
+    return asked
+
+
+@pytest.mark.skipif(
+    not sys.platform.startswith("linux"), reason="the wrapper's fault is in its library for Linux alone"
+)
+def test_library_lets_go_of_the_interpreter_before_the_process_ends(fmu: Path, tmp_path: Path) -> None:
+    assert run_in_process(end_in_order, fmu, tmp_path) == 1

@@ -1,0 +1,73 @@
+"""The FMU runs on a Python with nothing installed."""
+
+from __future__ import annotations
+
+import sys
+import venv
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from .runner import run_in_process
+
+VALUES = {"slider.damping": 25.0, "slider.coulomb_friction": 0.4, "drive.mode": 0, "drive.torque": 0.3}
+
+
+def run_bare(fmu: str, folder: str, values: dict[str, float], steps: int) -> list[list[float]]:
+    """Outputs after each millisecond, by ctypes on the FMU's library."""
+    import importlib.util
+    import sys
+
+    from bare_master import Fmu
+
+    # no import of these can have been hidden: nothing has been loaded yet
+    installed = [name for name in ("pip", "numpy", "pythonfmu", "linkwork", "fmpy") if importlib.util.find_spec(name)]
+    assert not installed, f"not a bare Python: {installed}"
+    instance = Fmu(fmu, folder).instantiate().start(values)
+    rows = [list(instance.outputs().values())]
+    for k in range(steps):
+        time, end = k * 1e-3, (k + 1) * 1e-3
+        assert instance.step(time, end - time) == 0
+        rows.append(list(instance.outputs().values()))
+    assert instance.trouble() == [0, ""]
+    assert instance.terminate() == 0
+    instance.free()
+    homes = (sys.prefix, sys.base_prefix, folder)
+    strangers = [
+        m.__file__
+        for m in list(sys.modules.values())
+        if getattr(m, "__file__", None) and not m.__file__.startswith(homes) and "bare_master" not in m.__file__
+    ]
+    assert [path for path in strangers if not path.endswith("script.py")] == []
+    return rows
+
+
+def run_fmpy(fmu: str, values: dict[str, float], steps: int) -> list[list[float]]:
+    """The same by FMPy."""
+    from fmpy import read_model_description, simulate_fmu
+
+    variables = read_model_description(fmu).modelVariables
+    outputs = [v.name for v in variables if v.causality == "output" and v.type == "Real"]
+    result = simulate_fmu(
+        fmu, stop_time=steps * 1e-3, step_size=1e-3, output_interval=1e-3, start_values=values, output=outputs
+    )
+    return [[float(row[name]) for name in outputs] for row in result]
+
+
+@pytest.fixture(scope="module")
+def bare_python(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A virtual environment without even pip."""
+    folder = tmp_path_factory.mktemp("bare") / "venv"
+    venv.EnvBuilder(with_pip=False, symlinks=sys.platform != "win32").create(folder)
+    return folder / ("Scripts/python.exe" if sys.platform == "win32" else "bin/python")
+
+
+@pytest.mark.parametrize("values", [{}, VALUES], ids=["default", "torque drive"])
+def test_same_values_as_through_fmpy_bit_for_bit(
+    fmu: Path, tmp_path: Path, bare_python: Path, values: dict[str, Any]
+) -> None:
+    bare = run_in_process(run_bare, fmu, tmp_path, values, 100, python=bare_python, options=("-I", "-W", "error"))
+    assert len(bare) == 101
+    assert bare[0] != bare[-1]
+    assert bare == run_in_process(run_fmpy, fmu, values, 100)

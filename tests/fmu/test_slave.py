@@ -1,0 +1,127 @@
+"""The slave class by itself, without the wrapper: what it says to the one who holds it."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+from pythonfmu.enums import Fmi2Status
+
+from five_bar_slave import FiveBarSlider
+from linkwork.errors import LinkworkError, ParameterError
+
+
+@pytest.fixture
+def slave() -> FiveBarSlider:
+    """A slave that is initialised."""
+    new = FiveBarSlider(instance_name="slave")
+    new.setup_experiment(0.0, None, None)
+    new.enter_initialization_mode()
+    new.exit_initialization_mode()
+    return new
+
+
+def value(slave: FiveBarSlider, name: str) -> Any:
+    reference = [v.name for v in slave.variables].index(name)
+    kind = slave.variables[reference].kind
+    return getattr(slave, f"get_{kind.lower()}")([reference])[0]
+
+
+@pytest.mark.parametrize(
+    "error", [RuntimeError("something"), ZeroDivisionError(), KeyError("x"), RecursionError(), MemoryError()], ids=repr
+)
+def test_no_exception_escapes_from_a_step(
+    slave: FiveBarSlider, monkeypatch: pytest.MonkeyPatch, error: Exception
+) -> None:
+    def fail(time: float, step: float) -> None:
+        raise error
+
+    assert slave.do_step(0.0, 1e-3)
+    before = value(slave, "slider.position")
+    monkeypatch.setattr(slave._plant, "step", fail)
+    assert slave.do_step(1e-3, 1e-3) is False
+    assert value(slave, "solver.status") == 9
+    assert value(slave, "solver.message") == f"internal error at t = 0.001 s: {error!r}"
+    assert value(slave, "slider.position") == before
+    monkeypatch.undo()
+    assert slave.do_step(1e-3, 1e-3)
+    assert value(slave, "solver.status") == 0
+    assert value(slave, "solver.message") == ""
+
+
+def test_no_exception_escapes_from_a_read(slave: FiveBarSlider, monkeypatch: pytest.MonkeyPatch) -> None:
+    def fail() -> None:
+        raise RuntimeError("something")
+
+    before = value(slave, "slider.position")
+    slave.do_step(0.0, 1e-3)
+    monkeypatch.setattr(slave._plant, "outputs", fail)
+    assert value(slave, "slider.position") == before
+    assert value(slave, "solver.status") == 9
+    assert "something" in value(slave, "solver.message")
+
+
+def test_percent_signs_are_doubled_for_the_wrapper(slave: FiveBarSlider) -> None:
+    slave._say("100 % of %s, %% and %n", Fmi2Status.warning)
+    (message,) = slave.log_queue
+    assert message.msg == "100 %% of %%s, %%%% and %%n"
+    assert message.status == Fmi2Status.warning
+    assert message.msg.replace("%%", "%") == "100 % of %s, %% and %n"
+
+
+def test_refusal_is_logged_once_and_readable_with_its_percent_signs(
+    slave: FiveBarSlider, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(time: float, step: float) -> None:
+        raise RuntimeError("at 50 % of the way")
+
+    monkeypatch.setattr(slave._plant, "step", fail)
+    slave.do_step(0.0, 1e-3)
+    (message,) = slave.log_queue
+    assert message.status == Fmi2Status.discard
+    assert "at 50 %% of the way" in message.msg
+    assert "at 50 % of the way" in value(slave, "solver.message")
+
+
+def test_bad_parameter_is_raised_by_the_initialisation_alone() -> None:
+    slave = FiveBarSlider(instance_name="slave")
+    reference = [v.name for v in slave.variables].index("crank.length")
+    slave.set_real([reference], [-1.0])
+    slave.setup_experiment(0.0, None, None)
+    slave.enter_initialization_mode()
+    assert value(slave, "solver.status") == 6
+    assert slave.log_queue == []
+    with pytest.raises(ParameterError, match=r"crank\.length is -1\.0"):
+        slave.exit_initialization_mode()
+    assert len(slave.log_queue) == 1
+    # put right, it goes on as if nothing had been
+    slave.set_real([reference], [0.05])
+    slave.exit_initialization_mode()
+    assert value(slave, "solver.status") == 0
+    assert slave.do_step(0.0, 1e-3)
+
+
+def test_reading_a_variable_of_another_type_is_an_error_with_a_sentence(slave: FiveBarSlider) -> None:
+    with pytest.raises(LinkworkError, match=r"variable crank\.length is not of type Integer"):
+        slave.get_integer([1])
+    with pytest.raises(LinkworkError, match="no variable with the value reference -1"):
+        slave.get_real([-1])
+
+
+def test_saved_state_does_not_change_with_the_slave(slave: FiveBarSlider) -> None:
+    state = slave._get_fmu_state()
+    data = slave._fmu_state_to_bytes(state)
+    for k in range(5):
+        slave.do_step(k * 1e-3, 1e-3)
+    assert slave._fmu_state_to_bytes(state) == data
+    slave._set_fmu_state(state)
+    slave.do_step(0.0, 1e-3)
+    assert slave._fmu_state_to_bytes(state) == data
+
+
+def test_master_tolerance_outside_the_range_is_brought_into_it() -> None:
+    for given, taken in [(None, 1e-9), (1e-3, 1e-9), (1e-11, 1e-11), (0.0, 1e-13), (-1.0, 1e-13)]:
+        slave = FiveBarSlider(instance_name="slave")
+        slave.setup_experiment(0.0, None, given)
+        slave.exit_initialization_mode()
+        assert slave._get_fmu_state()["plant"]["tolerance"] == taken

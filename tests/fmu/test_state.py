@@ -1,0 +1,236 @@
+"""A saved state is the whole state: restored, in this process or another, the run goes on bit for bit."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from .runner import run_in_process
+
+VALUES = {
+    "drive.mode": 0,
+    "initial.crank_speed": 30.0,
+    "drive.torque": 0.2,
+    "slider.force": 0.5,
+    "slider.coulomb_friction": 0.1,
+    "load.fx": 0.3,
+}
+SPEED_VALUES = {"drive.speed": 30.0, "drive.acceleration": 20.0, "slider.force": 0.5}
+CASES = pytest.mark.parametrize("values", [VALUES, SPEED_VALUES], ids=["torque drive", "speed drive"])
+
+OTHER = {"drive.torque": -3.0, "drive.speed": 55.0, "slider.force": 4.0, "load.fy": 2.0}
+
+
+def save_diverge_restore(fmu: str, folder: str, values: dict[str, float], other: dict[str, float]) -> dict[str, Any]:
+    """Save after 20 steps, go on, come back, go elsewhere, come back, go on again; and on in another instance."""
+    from bare_master import Fmu
+
+    fmu = Fmu(fmu, folder)
+
+    def go_on(instance, sizes=(1e-3, 3e-3, 1e-2, 1e-4) * 5):
+        rows = [instance.outputs()]
+        time = 0.02
+        for size in sizes:
+            assert instance.step(time, size) == 0
+            rows.append(instance.outputs())
+            time += size
+        return rows
+
+    instance = fmu.instantiate("one").start(values)
+    instance.run([1e-3] * 20)
+    instance.set("drive.speed", 31.0)  # set, but not stepped with: part of the state as well
+    state = instance.save()
+    data = instance.serialize(state)
+    first = go_on(instance)
+    assert instance.restore(state) == 0
+    for name, value in other.items():
+        instance.set(name, value)
+    elsewhere = go_on(instance)
+    assert instance.restore(state) == 0
+    again = go_on(instance)
+    # a state outlives changes of the instance, and can be written again
+    assert instance.serialize(state) == data
+    fresh = fmu.instantiate("two")
+    status, read = fresh.deserialize(data)
+    assert status == 0
+    assert fresh.restore(read) == 0
+    in_other_instance = go_on(fresh)
+    for one in (instance, fresh):
+        assert one.free_state(state if one is instance else read) == 0
+        assert one.terminate() == 0
+        one.free()
+    return {
+        "data": data.decode("ascii"),
+        "first": first,
+        "elsewhere": elsewhere,
+        "again": again,
+        "other instance": in_other_instance,
+    }
+
+
+def go_on_elsewhere(fmu: str, folder: str, data: str) -> list[dict[str, float]]:
+    """The same steps from a state that another process wrote."""
+    from bare_master import Fmu
+
+    instance = Fmu(fmu, folder).instantiate("three")
+    status, state = instance.deserialize(data.encode("ascii"))
+    assert status == 0
+    assert instance.restore(state) == 0
+    rows = [instance.outputs()]
+    time = 0.02
+    for size in (1e-3, 3e-3, 1e-2, 1e-4) * 5:
+        assert instance.step(time, size) == 0
+        rows.append(instance.outputs())
+        time += size
+    return rows
+
+
+@CASES
+def test_save_diverge_restore_repeat(fmu: Path, tmp_path: Path, values: dict[str, float]) -> None:
+    runs = run_in_process(save_diverge_restore, fmu, tmp_path / "a", values, OTHER)
+    assert runs["first"][-1] != runs["elsewhere"][-1]
+    assert runs["again"] == runs["first"]
+    assert runs["other instance"] == runs["first"]
+    assert run_in_process(go_on_elsewhere, fmu, tmp_path / "b", runs["data"]) == runs["first"]
+
+
+def two_instances(fmu: str, folder: str, values: dict[str, float]) -> list[Any]:
+    """Two instances stepped in turn, and each by itself."""
+    from bare_master import Fmu
+
+    fmu = Fmu(fmu, folder)
+    both = [values, values | {"slider.stiffness": 1500.0, "solver.tolerance": 1e-7}]
+
+    def play(instances, inputs=(0.0, 2.0)):
+        for k in range(50):
+            for instance, force in zip(instances, inputs):
+                instance.set("slider.force", force * k / 50)
+                assert instance.step(k * 1e-3, 1e-3) == 0
+        return [instance.outputs() for instance in instances]
+
+    together = play([fmu.instantiate().start(v) for v in both])
+    alone = play([fmu.instantiate().start(both[0])], (0.0,)) + play([fmu.instantiate().start(both[1])], (2.0,))
+    # a failure of one is none of the other's
+    good, bad = (fmu.instantiate().start(values) for _ in range(2))
+    bad.set("slider.force", float("nan"))
+    return [together, alone, [bad.step(0.0, 1e-3), bad.get("solver.status")], [good.step(0.0, 1e-3), good.log]]
+
+
+def test_two_instances_do_not_see_each_other(fmu: Path, tmp_path: Path) -> None:
+    together, alone, bad, good = run_in_process(two_instances, fmu, tmp_path, VALUES)
+    assert together == alone
+    assert together[0] != together[1]
+    assert bad == [2, 2]
+    assert good == [0, []]
+
+
+def reset(fmu: str, folder: str, values: dict[str, float]) -> list[Any]:
+    """Outputs of a run, of the same after a reset, and of the defaults after another."""
+    from bare_master import FATAL, Fmu
+
+    fmu = Fmu(fmu, folder)
+    instance = fmu.instantiate()
+    rows = []
+    for chosen in (values, values, {}):
+        instance.start(chosen)
+        start = instance.outputs()
+        instance.run([1e-3] * 20)
+        rows.append([start, instance.outputs()])
+        assert instance.reset() == 0
+    # before the next initialisation it is as new: steps are refused, the parameters are the defaults
+    assert instance.step(0.0, 1e-3) == 2
+    assert instance.get("initial.crank_speed") == fmu.instantiate().get("initial.crank_speed")
+    # in the middle of a run that went wrong, and after an initialisation that failed
+    instance.start(values)
+    instance.set("slider.force", 1e5)
+    assert instance.step(0.0, 0.1) == 2
+    assert instance.reset() == 0
+    instance.set("crank.length", -1.0)
+    assert instance.setup() == instance.enter() == 0
+    assert instance.exit() == FATAL
+    assert instance.reset() == 0
+    instance.start(values)
+    instance.run([1e-3] * 20)
+    rows.append([None, instance.outputs()])
+    assert instance.trouble() == [0, ""]
+    assert instance.terminate() == 0
+    instance.free()
+    return rows
+
+
+def test_reset(fmu: Path, tmp_path: Path) -> None:
+    first, again, default, after_failures = run_in_process(reset, fmu, tmp_path, VALUES)
+    assert first == again
+    assert first != default
+    assert after_failures[1] == first[1]
+
+
+def after_refusal(fmu: str, folder: str, values: dict[str, float]) -> list[Any]:
+    """State saved after a refused step: outputs, trouble, and the run that goes on from it, there and elsewhere."""
+    from bare_master import DISCARD, Fmu
+
+    fmu = Fmu(fmu, folder)
+    runs = []
+    for fail in ("no", "force", "nan"):
+        instance = fmu.instantiate().start(values)
+        instance.run([1e-3] * 10)
+        if fail != "no":
+            instance.set("slider.force", 1e5 if fail == "force" else float("nan"))
+            assert instance.step(0.01, 0.1) == DISCARD
+        state = instance.save()
+        data = instance.serialize(state)
+        other = fmu.instantiate()
+        assert other.restore(other.deserialize(data)[1]) == 0
+        for one in (instance, other):
+            trouble = one.trouble()
+            one.set("slider.force", values["slider.force"])
+            time = one.run([1e-3] * 10, 0.01)
+            runs.append([fail, trouble, one.outputs(), one.trouble(), time])
+        instance.free_state(state)
+    return runs
+
+
+def test_state_saved_after_a_refused_step(fmu: Path, tmp_path: Path) -> None:
+    runs = run_in_process(after_refusal, fmu, tmp_path, VALUES)
+    assert len(runs) == 6
+    for fail, trouble, outputs, after, _ in runs:
+        assert outputs == runs[0][2]
+        assert trouble[0] == {"no": 0, "force": 3, "nan": 2}[fail]
+        assert {"no": "", "force": "limit of assembly", "nan": "slider.force is nan"}[fail] in trouble[1]
+        assert after == [0, ""]
+
+
+def damaged(fmu: str, folder: str, pieces: list[str]) -> list[Any]:
+    """Status and log of restoring what is not a state of this FMU; the instance is freed afterwards."""
+    from bare_master import Fmu
+
+    fmu = Fmu(fmu, folder)
+    found = []
+    for piece in pieces:
+        instance = fmu.instantiate().start()
+        instance.run([1e-3])
+        before = instance.outputs()
+        status, state = instance.deserialize(piece.encode("utf-8"))
+        assert status == 0, "what is wrong is told when the state is set"
+        found.append([instance.restore(state), instance.log, instance.outputs() == before])
+        instance.free()
+    return found
+
+
+def test_damaged_state_is_refused(fmu: Path, tmp_path: Path) -> None:
+    whole = json.loads(run_in_process(save_diverge_restore, fmu, tmp_path / "a", VALUES, OTHER)["data"])
+    pieces = [
+        "not JSON",
+        "[1, 2]",
+        json.dumps(whole | {"interface": "another"}),
+        json.dumps({name: value for name, value in whole.items() if name != "running"}),
+        json.dumps(whole | {"plant": {"time": 0.0}}),
+        json.dumps(whole | {"plant": whole["plant"] | {"parameters": {"crank_length": -1.0}}}),
+    ]
+    for status, log, same in run_in_process(damaged, fmu, tmp_path / "b", pieces):
+        assert status == 4
+        assert any("state" in sentence for _, _, sentence in log)
+        assert same

@@ -1,0 +1,91 @@
+"""Numbers to compare with: what the thesis prints, what it states, and an independent derivation.
+
+Source, unless said otherwise: A. H. Youssef, thesis on linkage mechanisms with two degrees of freedom, Newcastle upon
+Tyne. Everything is in cgs, as printed, with the unit in the name; the factors to SI are at the top.
+Nothing here is the output of this program.
+"""
+
+from __future__ import annotations
+
+from types import MappingProxyType
+from typing import Mapping, NamedTuple
+
+# One of the unit, in SI
+CM = 1e-2
+GRAM = 1e-3
+G_CM2 = 1e-7
+DYN = 1e-5
+DYN_CM = 1e-7
+DYN_PER_CM = 1e-3
+DYN_S_PER_CM = 1e-3
+RPM = 0.10471975511965977
+
+
+class CgsTable(NamedTuple):
+    """A table of data as printed."""
+
+    lengths_cm: tuple[float, float, float, float]
+    coupler_cog_cm: float
+    rocker_cog_cm: float
+    masses_g: tuple[float, float, float]
+    coupler_inertia_g_cm2: float
+    rocker_inertia_g_cm2: float
+    stiffness_dyn_cm: float
+    damping_dyn_s_cm: float
+    speed_rpm: float
+
+
+# Table 3.1, with k and mu of fig. 3.4; appendix 1; Tables 8.1 and 8.2 with their springs A to D
+TABLES: Mapping[str, CgsTable] = MappingProxyType(
+    {
+        "table-3.1": CgsTable((15.35, 5, 15, 15), 9.82, 7.5, (209, 206, 590), 5250, 3863, 1e6, 3e4, 420),
+        "appendix-1": CgsTable((15.35, 5, 15, 15), 9.82, 7.5, (209, 206, 590), 5250, 3863, 1.5e6, 2.8e4, 450),
+        "rig-1-spring-a": CgsTable((15.37, 5, 15, 15), 9.55, 7.5, (222, 206, 600), 7064, 4797, 3e6, 9e3, 420),
+        "rig-1-spring-b": CgsTable((15.37, 5, 15, 15), 9.55, 7.5, (222, 206, 600), 7064, 4797, 11e6, 9e3, 420),
+        "rig-2-spring-c": CgsTable(
+            (25.4, 1.27, 25.4, 25.4), 14.2, 12.7, (324, 264, 856), 23784, 15100, 4e6, 5.5e3, 420
+        ),
+        "rig-2-spring-d": CgsTable(
+            (25.4, 1.27, 25.4, 25.4), 14.2, 12.7, (324, 264, 856), 23784, 15100, 8e6, 5.5e3, 420
+        ),
+    }
+)
+
+# Table 3.1: I_A and g as printed (the notes give g = 981 cm/s2)
+CRANK_INERTIA_G_CM2 = 12500.0
+GRAVITY_CM_S2 = 981.0
+
+# --- An independent derivation, cross-checked against two multibody engines: Table 3.1 at 420 rpm, k = 1e6 dyn/cm,
+# --- mu = 3e4 dyn.s/cm, from u = u' = th2 = 0
+U_CM_AT_CRANK_DEG: Mapping[int, float] = MappingProxyType(
+    {90: 0.5091697521, 360: -1.0018190123, 720: -0.8902721383, 1080: -0.8955749071}
+)
+CRANK_TORQUE_AT_START_DYN_CM = -1.129656931e7
+FORCE_AT_C_AT_360_DEG_DYN = (79534.254, 537313.426)
+STEADY_U_CM = -0.89553115
+STEADY_U_RATE_CM_S = -21.92156554
+
+# The same with T = T0 (1 - th2) up to th2 = 1 rad and none after, from rest, T0 = 1e8 dyn.cm, k = 1e6, mu = 3e4
+TORQUE_T0_DYN_CM = 1e8
+TORQUE_END_TIME_S = 0.02137446194
+TORQUE_AT_0_25_S = MappingProxyType({"th2_rad": 17.8051227, "u_cm": -0.61160400, "th2_rate_rad_s": 72.7805553})
+
+# --- Statements of chapter III, as checked by that derivation
+# fig. 3.2, k = 0: turns after which coupler and rocker come to sin(th4 - th3) = 0.3, by mu in dyn.s/cm. The thesis calls
+# the drift linear; it accelerates, and is near linear only from mu = 5e5 on
+TURNS_TO_SINE_0_3: Mapping[float, float] = MappingProxyType({1e4: 3.0, 5e4: 4.9, 1e5: 8.0, 5e5: 36.0})
+# fig. 3.3: growth of the drift without gravity ("about 25 %")
+DRIFT_GROWTH_WITHOUT_GRAVITY = 1.25
+# fig. 3.4: crank angle of the least steady u, and mean u, by k in dyn/cm ("220" in the scan is 22 deg)
+LEAST_STEADY_U_AT_DEG: Mapping[float, float] = MappingProxyType({5e5: 23.45, 1e6: 17.5, 2e6: 5.2})
+MEAN_STEADY_U_CM: Mapping[float, float] = MappingProxyType({5e5: -0.611, 1e6: -0.280, 2e6: -0.142})
+# fig. 3.5: the steady torque between k = 5e5 and 2e6 differs by this part of its peak, and reverses steeply
+TORQUE_DIFFERENCE_OF_PEAK = 0.096
+TORQUE_REVERSAL_DEG_DYN_CM = ((327.0, 1.46e7), (16.0, -2.00e7))
+# section 3.2.2: the thesis calls T0 hyperbolic in the time to 1 rad; T0 t^2 is nearly constant, exponent of t on T0
+TORQUE_TIME_EXPONENT = -1.95
+
+# --- Errors of the source in chapters II and III
+# appendix 1, KINE: its "+ root" changes assembly once B passes D and divides by zero with B vertically above D: see
+# tests/plant/test_kinematics.py
+# appendix 1, FY45: the weight of the rocker enters the vertical force with the wrong sign: see tests/plant/test_dynamics.py

@@ -1,0 +1,127 @@
+"""Random valid five-bar sliders in random states, with every parameter general.
+
+`draw` describes them once, over two functions that supply numbers: `seeded` makes them reproducible from a seed,
+`cases` makes them a hypothesis strategy that shrinks. A configuration is built backwards, so that none has to be thrown
+away: ground link, guide, crank and freedoms first, then the transmission angle, then the coupler and rocker that have it.
+"""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Callable
+from math import asin, cos, hypot, pi, sin, sqrt
+from typing import NamedTuple
+
+from hypothesis import strategies as st
+
+from linkwork.five_bar import dynamics, kinematics
+from linkwork.five_bar.parameters import FiveBarParameters, InitialState
+
+#: Least |sin(rocker angle - coupler angle)| of the states drawn.
+LEAST_SINE = 0.1
+
+Uniform = Callable[[float, float], float]
+
+
+class Case(NamedTuple):
+    """A mechanism, a state of it, and inputs of both drives."""
+
+    parameters: FiveBarParameters
+    state: dynamics.State
+    torque_inputs: dynamics.Inputs
+    speed_inputs: dynamics.Inputs
+
+    @property
+    def initial(self) -> InitialState:
+        """The state as the start of a run."""
+        th2, u, w2, v, _, _ = self.state
+        return InitialState(crank_angle=th2, crank_speed=w2, slider_position=u, slider_velocity=v)
+
+
+def draw(uniform: Uniform, choose: Callable[[], bool]) -> Case:
+    """A case, from a source of numbers ``uniform(low, high)`` and of choices (either assembly)."""
+    l1 = uniform(0.1, 0.5)
+    l2 = l1 * uniform(0.1, 0.5)
+    alpha = uniform(-pi, pi)
+    th2 = uniform(-2.0 * pi, 2.0 * pi)
+    u = l1 * uniform(-0.3, 0.3)
+    branch = 1 if choose() else -1
+    # BD is at least l1 - l2 - |u|, 0.2 l1; the transmission angle and the ratio l3 : l4 then give both lengths
+    bd = hypot(l1 + u * cos(alpha) - l2 * cos(th2), u * sin(alpha) - l2 * sin(th2))
+    margin = asin(1.01 * LEAST_SINE)
+    angle = uniform(margin, pi - margin)
+    ratio = uniform(0.5, 2.0)
+    l4 = bd / sqrt(1.0 + ratio**2 - 2.0 * ratio * cos(angle))
+    l3 = ratio * l4
+
+    def link(length: float) -> tuple[float, float, float, float]:
+        """Mass, inertia about the centre of mass, distance and angle of the centre of mass."""
+        mass = uniform(0.05, 1.0)
+        return mass, mass * (length * uniform(0.2, 0.5)) ** 2, length * uniform(-0.2, 1.0), uniform(-pi, pi)
+
+    m2, inertia2, cog2, nu2 = link(l2)
+    m3, inertia3, cog3, nu3 = link(l3)
+    m4, inertia4, cog4, nu4 = link(l4)
+    parameters = FiveBarParameters(
+        ground_length=l1,
+        crank_length=l2,
+        coupler_length=l3,
+        rocker_length=l4,
+        crank_mass=m2,
+        coupler_mass=m3,
+        rocker_mass=m4,
+        slider_mass=uniform(0.1, 1.0),
+        crank_inertia=inertia2 + m2 * cog2**2,
+        coupler_inertia=inertia3,
+        rocker_inertia=inertia4,
+        crank_cog_distance=cog2,
+        coupler_cog_distance=cog3,
+        rocker_cog_distance=cog4,
+        crank_cog_angle=nu2,
+        coupler_cog_angle=nu3,
+        rocker_cog_angle=nu4,
+        slider_guide_angle=alpha,
+        slider_stiffness=uniform(0.0, 2000.0),
+        slider_spring_free_position=l1 * uniform(-0.2, 0.2),
+        slider_damping=uniform(0.0, 30.0),
+        slider_coulomb_friction=uniform(0.0, 5.0),
+        coupler_point_distance=l3 * uniform(-0.5, 1.5),
+        coupler_point_angle=uniform(-pi, pi),
+        gravity=uniform(0.0, 20.0),
+        ground_inclination=uniform(-pi, pi),
+        assembly_branch=branch,
+    )
+    state = (th2, u, uniform(-30.0, 30.0), uniform(-1.0, 1.0), 0.0, 0.0)
+    force, load_x, load_y = uniform(-50.0, 50.0), uniform(-50.0, 50.0), uniform(-50.0, 50.0)
+    return Case(
+        parameters,
+        state,
+        dynamics.Inputs(0.0, uniform(-5.0, 5.0), 0.0, force, load_x, load_y),
+        dynamics.Inputs(1.0, 0.0, uniform(-500.0, 500.0), force, load_x, load_y),
+    )
+
+
+def seeded(seed: int) -> Case:
+    """The case of a seed, the same on every machine."""
+    source = random.Random(seed)
+    return draw(source.uniform, lambda: source.random() < 0.5)
+
+
+@st.composite
+def cases(draw_from: st.DrawFn) -> Case:
+    """Hypothesis strategy of `Case`."""
+    return draw(
+        lambda low, high: draw_from(st.floats(low, high, allow_subnormal=False)),
+        lambda: draw_from(st.booleans()),
+    )
+
+
+def mechanisms() -> st.SearchStrategy[FiveBarParameters]:
+    """Hypothesis strategy of valid mechanisms."""
+    return cases().map(lambda case: case.parameters)
+
+
+def sine(case: Case, th2: float, u: float) -> float:
+    """|sin(rocker angle - coupler angle)| of a case's mechanism elsewhere; zero where it cannot be joined."""
+    p = case.parameters.constants()
+    return sqrt(max(0.0, kinematics.assembly_square(th2, u, p))) / (p.l3 * p.l4)
