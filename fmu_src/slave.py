@@ -303,9 +303,8 @@ class LinkworkSlave(Fmi2Slave):
         except LinkworkError as error:
             self._cause = (_status(error), str(error))
             return self._refuse(*self._cause)
-        except (
-            Exception
-        ) as error:  # the wrapper frees an instance whose step raises: the master would be left with nothing
+        except Exception as error:
+            # the wrapper frees an instance whose step raises: the master would be left with nothing
             self._cause = (STATUS_INTERNAL, f"internal error at t = {current_time:.9g} s: {error!r}")
             return self._refuse(*self._cause)
 

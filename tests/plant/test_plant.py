@@ -390,8 +390,10 @@ def test_start_with_inputs_that_are_not_usable() -> None:
 
 
 def test_start_with_a_kinetic_energy_that_overflows() -> None:
-    with pytest.raises(ParameterError, match="kinetic energy"):
+    with pytest.raises(InputError, match=r"energy at the start is not finite.*slider_velocity 1e\+180"):
         Plant(TABLE_3_1, InitialState(slider_velocity=1e180))
+    with pytest.raises(InputError, match=r"drive\.speed is 1e\+300"):
+        Plant(TABLE_3_1, InitialState(), drive_mode=SPEED_DRIVE, inputs={"drive.speed": 1e300})
 
 
 def test_speed_drive_starts_at_the_commanded_speed() -> None:
