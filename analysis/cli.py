@@ -193,18 +193,27 @@ def _summary(title: str, result: Any) -> None:
     "--fmu", default=str(DEFAULT_FMU), show_default=True, type=click.Path(dir_okay=False), help="The FMU to check."
 )
 @click.option("--all", "everything", is_flag=True, help="All standard cases instead of Table 3.1 alone.")
+@click.option(
+    "--method",
+    "methods",
+    multiple=True,
+    default=("compiled",),
+    show_default=True,
+    help="In-process method: compiled, Hamming, or one of SciPy's solve_ivp; can be given often.",
+)
 @click.option("--tolerance", default=1e-6, show_default=True, help="Largest relative difference that passes.")
 @click.option(
     "--out", default="out", show_default=True, type=click.Path(file_okay=False), help="Folder for CSV and plots."
 )
 @_handled
-def check(cases: Sequence[str], fmu: str, everything: bool, tolerance: float, out: str) -> None:
+def check(cases: Sequence[str], fmu: str, everything: bool, methods: Sequence[str], tolerance: float, out: str) -> None:
     """Hold the FMU against the in-process solver, output by output. CASES are names of standard cases or case files.
 
     \b
     Examples:
       linkwork check
       linkwork check --all --tolerance 1e-8
+      linkwork check --method compiled --method Radau
       linkwork check speed-jump examples/torsion-bar.toml
     """
     from . import figures, io
@@ -220,37 +229,40 @@ def check(cases: Sequence[str], fmu: str, everything: bool, tolerance: float, ou
             case = io.load_case(name)
         else:
             raise click.UsageError(f"{name!r} is neither a case file nor a standard case ({', '.join(CASES)})")
-        label = Path(name).stem if Path(name).suffix in (".toml", ".json") else name
-        a, b, comparison = compare_case(fmu, case, tolerance=tolerance, progress=console.is_terminal)
-        _comparison(case.title, comparison)
-        folder = Path(out)
-        a.to_csv(folder / f"{label}-in-process.csv")
-        b.to_csv(folder / f"{label}-fmu.csv")
-        shown = ("slider.position", "slider.velocity", "drive.applied_torque", "pin.C.fx", "pin.C.fy")
-        n = min(len(a), len(b))
-        figure = figures.plot_comparison(
-            a.time[:n],
-            {o: (a[o][:n], b[o][:n], a.units[o]) for o in shown},
-            title=case.title,
-            labels=("in process", "FMU"),
-        )
-        io.save_figure(figure, folder / f"{label}.png")
-        console.print(f"wrote {folder / label}.png, -in-process.csv and -fmu.csv", highlight=False, soft_wrap=True)
-        for which, result in (("in process", a), ("FMU", b)):
-            if result.status:
-                errors.print(
-                    f"{which}: the run ended early: {result.message}", style="yellow", markup=False, soft_wrap=True
-                )
-        if not comparison.agrees or a.status != b.status:
-            failed.append(label)
+        stem = Path(name).stem if Path(name).suffix in (".toml", ".json") else name
+        for method in methods:
+            label = stem if method == "compiled" else f"{stem}-{method}"
+            a, b, comparison = compare_case(fmu, case, method=method, tolerance=tolerance, progress=console.is_terminal)
+            _comparison(f"{case.title}: FMU less in process ({a.source})", comparison)
+            folder = Path(out)
+            a.to_csv(folder / f"{label}-in-process.csv")
+            b.to_csv(folder / f"{label}-fmu.csv")
+            shown = ("slider.position", "slider.velocity", "drive.applied_torque", "pin.C.fx", "pin.C.fy")
+            n = min(len(a), len(b))
+            figure = figures.plot_comparison(
+                a.time[:n],
+                {o: (a[o][:n], b[o][:n], a.units[o]) for o in shown},
+                title=case.title,
+                labels=(f"in process ({a.source})", "FMU"),
+            )
+            io.save_figure(figure, folder / f"{label}.png")
+            console.print(f"wrote {folder / label}.png, -in-process.csv and -fmu.csv", highlight=False, soft_wrap=True)
+            for which, result in (("in process", a), ("FMU", b)):
+                if result.status:
+                    errors.print(
+                        f"{which}: the run ended early: {result.message}", style="yellow", markup=False, soft_wrap=True
+                    )
+            if not comparison.agrees or a.status != b.status:
+                failed.append(label)
     if failed:
         errors.print(f"check failed: {', '.join(failed)}", style="red", highlight=False)
         sys.exit(CHECK_FAILED)
-    console.print(f"{len(names)} of {len(names)} cases pass", style="green", highlight=False)
+    count = len(names) * len(methods)
+    console.print(f"{count} of {count} checks pass", style="green", highlight=False)
 
 
 def _comparison(title: str, comparison: Any) -> None:
-    grid = Table(title=f"{title}: FMU less in-process solver, tolerance {comparison.tolerance:g}")
+    grid = Table(title=f"{title}, tolerance {comparison.tolerance:g}")
     for heading in ("output", "unit", "largest difference", "rms", "relative", "verdict"):
         grid.add_column(heading, justify="left" if heading in ("output", "unit", "verdict") else "right")
     for d in comparison.differences:

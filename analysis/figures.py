@@ -2,15 +2,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from math import ceil
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from math import ceil, cos, hypot, sin
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import matplotlib
 import numpy as np
+from matplotlib.animation import PillowWriter
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.patches import Arc, Circle, FancyBboxPatch, PathPatch, Polygon, Rectangle
+from matplotlib.path import Path as Outline
 from numpy.typing import ArrayLike, NDArray
 
-STYLE = {
+from linkwork.errors import AssemblyError, InputError
+from linkwork.five_bar import kinematics
+from linkwork.five_bar.parameters import FiveBarParameters
+
+if TYPE_CHECKING:
+    from .trajectory import Trajectory
+
+STYLE: dict[Any, Any] = {
     "figure.constrained_layout.use": True,
     "axes.grid": True,
     "grid.alpha": 0.3,
@@ -20,6 +35,19 @@ STYLE = {
     "legend.frameon": False,
     "font.size": 9,
 }
+
+#: Colours that stay apart for colour-blind readers and in grey (Okabe and Ito), in the order of curves.
+COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
+#: Colours of the links in drawings.
+CRANK, COUPLER, ROCKER, SLIDER, GROUND, TRACE = "#D55E00", "#0072B2", "#009E73", "#5B6770", "#333333", "#CC79A7"
+
+CM_PER_METRE = 100.0
+
+
+def _finish(figure: Figure) -> Figure:
+    """Lay the figure out while the style is in force: ticks are made, and take their look, only then."""
+    figure.draw_without_rendering()
+    return figure
 
 
 def plot_outputs(
@@ -47,4 +75,547 @@ def plot_outputs(
             axis.set_xlabel("time [s]")
         if title:
             figure.suptitle(title)
-    return figure
+        return _finish(figure)
+
+
+def plot_comparison(
+    time: ArrayLike,
+    outputs: Mapping[str, tuple[NDArray[np.float64], NDArray[np.float64], str]],
+    *,
+    title: str = "",
+    labels: tuple[str, str] = ("first", "second"),
+) -> Figure:
+    """Plot outputs of two runs over each other, and the second less the first beside them, a row each.
+
+    Parameters
+    ----------
+    time : array_like, shape (n,)
+        s.
+    outputs : mapping
+        Name to (values of the first run, values of the second, unit), shapes (n,).
+    labels : (str, str)
+        Names of the runs.
+    """
+    with matplotlib.rc_context(STYLE):
+        figure = Figure(figsize=(9.6, 0.9 + 1.8 * len(outputs)))
+        rows = figure.subplots(len(outputs), 2, sharex=True, squeeze=False, width_ratios=(3, 2))
+        for (both, difference), (name, (first, second, unit)) in zip(rows, outputs.items()):
+            both.plot(time, first, color=COLOURS[0], label=labels[0])
+            both.plot(time, second, "--", color=COLOURS[1], label=labels[1])
+            both.set_ylabel(f"{name} [{unit}]", fontsize=8)
+            difference.plot(time, second - first, color="0.25", linewidth=1.0)
+            difference.set_ylabel(f"difference [{unit}]", fontsize=8)
+        rows[0, 0].legend(fontsize=8, ncols=2, loc="lower right", bbox_to_anchor=(1.0, 1.0), borderaxespad=0.1)
+        rows[0, 1].set_title(f"{labels[1]} less {labels[0]}", fontsize=8.5)
+        for axis in rows[-1]:
+            axis.set_xlabel("time [s]")
+        if title:
+            figure.suptitle(title, fontsize=10.5, fontweight="bold")
+        figure.align_ylabels()
+        return _finish(figure)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Curve:
+    """One line of a panel: points (n,), what the legend calls it, and how it looks where that is not left to the panel."""
+
+    x: ArrayLike
+    y: ArrayLike
+    label: str = ""
+    colour: str | None = None
+    line: str = "-"
+    marker: str = ""
+    width: float | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Panel:
+    """One pair of axes of a plot.
+
+    Attributes
+    ----------
+    x_label, y_label : str
+        With units.
+    curves : sequence of Curve
+        Drawn in the order of `COLOURS`.
+    verticals : mapping
+        Dotted vertical lines: text at the top to place along x.
+    legend : str, optional
+        Heading of the legend; there is one if any curve has a label.
+    legend_at : str
+        Where it goes, in Matplotlib's words, or "outside", to the right of the axes.
+    x_range, y_range : (float, float), optional
+    logarithmic : str
+        Axes on a logarithmic scale: "", "x", "y" or "xy".
+    equal : bool
+        One length on both axes.
+    filled : sequence of sequence of ndarray, shape (n, 2)
+        Areas to shade, each the closed boundaries it has; holes are kept free.
+    x_ticks : sequence of float, optional
+    """
+
+    x_label: str
+    y_label: str
+    curves: Sequence[Curve] = ()
+    verticals: Mapping[str, float] | None = None
+    title: str = ""
+    legend: str = ""
+    legend_at: str = "best"
+    x_range: tuple[float, float] | None = None
+    y_range: tuple[float, float] | None = None
+    logarithmic: str = ""
+    equal: bool = False
+    filled: Sequence[Sequence[NDArray[np.float64]]] = ()
+    x_ticks: Sequence[float] | None = None
+
+
+def plot_curves(
+    panels: Sequence[Panel], *, title: str, columns: int = 1, size: tuple[float, float] = (6.4, 3.7)
+) -> Figure:
+    """Plot curves for print, one pair of axes per panel.
+
+    Parameters
+    ----------
+    panels : sequence of Panel
+    title : str
+        Above all of it; a figure of the thesis by its number.
+    columns : int
+        Panels side by side.
+    size : (float, float)
+        Width and height of a panel (inches).
+    """
+    rows = ceil(len(panels) / columns)
+    with matplotlib.rc_context(STYLE):
+        figure = Figure(figsize=(size[0] * columns, 0.35 + size[1] * rows))
+        axes = figure.subplots(rows, columns, squeeze=False)
+        for axis, panel in zip(axes.flat, panels):
+            _draw_panel(axis, panel)
+        for axis in list(axes.flat)[len(panels) :]:
+            axis.remove()
+        figure.suptitle(title, fontsize=10.5, fontweight="bold")
+        return _finish(figure)
+
+
+def _draw_panel(axis: Axes, panel: Panel) -> None:
+    for boundaries in panel.filled:
+        axis.add_patch(PathPatch(_outline(boundaries), facecolor="#56B4E9", alpha=0.22, edgecolor="none", zorder=0))
+    for number, curve in enumerate(panel.curves):
+        axis.plot(
+            curve.x,
+            curve.y,
+            linestyle=curve.line or "none",
+            color=curve.colour or COLOURS[number % len(COLOURS)],
+            marker=curve.marker or None,
+            markersize=4.5,
+            label=curve.label or None,
+            linewidth=curve.width,
+            markeredgewidth=1.2,
+            zorder=3 if curve.marker else 2,
+        )
+    axis.set_xlabel(panel.x_label)
+    axis.set_ylabel(panel.y_label)
+    if panel.title:
+        axis.set_title(panel.title, fontsize=9)
+    if "x" in panel.logarithmic:
+        axis.set_xscale("log")
+    if "y" in panel.logarithmic:
+        axis.set_yscale("log")
+    if panel.x_ticks is not None:
+        axis.set_xticks(panel.x_ticks, [f"{tick:g}" for tick in panel.x_ticks])
+        axis.set_xticks([], minor=True)
+    if panel.x_range:
+        axis.set_xlim(*panel.x_range)
+    if panel.y_range:
+        axis.set_ylim(*panel.y_range)
+    if panel.equal:
+        axis.set_aspect("equal")
+    for text, place in (panel.verticals or {}).items():
+        axis.axvline(place, color="0.35", linestyle=":", linewidth=1.0, zorder=1)
+        axis.annotate(
+            text,
+            (place, 1.0),
+            xycoords=("data", "axes fraction"),
+            xytext=(-2, -3),
+            textcoords="offset points",
+            rotation=90,
+            ha="right",
+            va="top",
+            fontsize=7.5,
+            color="0.25",
+        )
+    if any(curve.label for curve in panel.curves):
+        outside: dict[str, Any] = {"loc": "upper left", "bbox_to_anchor": (1.0, 1.0)}
+        where = outside if panel.legend_at == "outside" else {"loc": panel.legend_at}
+        axis.legend(title=panel.legend or None, fontsize=8, title_fontsize=8, alignment="left", **where)
+
+
+def _outline(boundaries: Sequence[NDArray[np.float64]]) -> Outline:
+    """One path of closed boundaries; those that run clockwise are holes in the others."""
+    vertices, codes = [], []
+    for ring in boundaries:
+        vertices += [ring, ring[:1]]
+        codes += [Outline.MOVETO] + [Outline.LINETO] * (len(ring) - 1) + [Outline.CLOSEPOLY]
+    return Outline(np.concatenate(vertices), codes)
+
+
+@dataclass(frozen=True, slots=True)
+class _Pins:
+    """Places of the pins (cm) and the angles of crank and guide (rad) at one configuration."""
+
+    b: NDArray[np.float64]
+    c: NDArray[np.float64]
+    d: NDArray[np.float64]
+    p: NDArray[np.float64]
+    crank_angle: float
+    u: float
+
+
+def _pins(parameters: FiveBarParameters, crank_angle: float, slider_position: float) -> _Pins:
+    """Where the pins are.
+
+    Raises
+    ------
+    AssemblyError
+        If the links cannot be joined there.
+    """
+    k = parameters.constants()
+    try:
+        g = kinematics.position(crank_angle, slider_position, k)
+    except (ValueError, ZeroDivisionError):
+        raise AssemblyError(
+            f"the links cannot be joined at crank angle {crank_angle:.9g} rad and slider position "
+            f"{slider_position:.9g} m: there is nothing to draw"
+        ) from None
+    b = k.l2 * np.array([g.c2, g.s2])
+    return _Pins(
+        b=CM_PER_METRE * b,
+        c=CM_PER_METRE * (b + k.l3 * np.array([g.c3, g.s3])),
+        d=CM_PER_METRE * np.array([k.l1 + slider_position * k.ca, slider_position * k.sa]),
+        p=CM_PER_METRE * np.array(kinematics.coupler_point(g, k)),
+        crank_angle=crank_angle,
+        u=CM_PER_METRE * slider_position,
+    )
+
+
+class _Scene:
+    """A mechanism to be drawn at one configuration or several, in one frame that holds them all. Lengths in cm."""
+
+    def __init__(self, parameters: FiveBarParameters, configurations: Sequence[_Pins]) -> None:
+        self.parameters = parameters
+        k = parameters.constants()
+        #: Length by which pins, supports and letters are drawn.
+        self.unit = CM_PER_METRE * (k.l1 + k.l3 + k.l4) / 45.0
+        self.along = np.array([k.ca, k.sa])
+        self.left = np.array([-k.sa, k.ca])
+        self.zero = np.array([CM_PER_METRE * k.l1, 0.0])
+        self.least = min(0.0, *(q.u for q in configurations))
+        self.most = max(0.0, *(q.u for q in configurations))
+        #: Where spring and damper are held, from the slider's zero, if there are any.
+        self.sprung = k.k > 0.0
+        self.damped = k.mu > 0.0
+        self.wall = self.most + 8.0 * self.unit
+        end = self.wall + 1.0 * self.unit if self.sprung or self.damped else self.most + 3.5 * self.unit
+        corners = [
+            self.at(s, n) for s in (self.least - 3.5 * self.unit, end) for n in (-3.2 * self.unit, 1.7 * self.unit)
+        ]
+        reach = CM_PER_METRE * k.l2
+        crank = [np.array([x, y]) for x in (-reach, reach) for y in (-reach, reach)]
+        points = np.array(crank + corners + [point for q in configurations for point in (q.b, q.c, q.d, q.p)])
+        self.low, self.high = points.min(axis=0) - 1.4 * self.unit, points.max(axis=0) + 1.4 * self.unit
+
+    def at(self, s: float, n: float) -> NDArray[np.float64]:
+        """The point at s along the guide from the slider's zero and n to its left."""
+        return self.zero + s * self.along + n * self.left
+
+    def prepare(self, axis: Axes) -> None:
+        axis.set_aspect("equal")
+        axis.set_xlim(self.low[0], self.high[0])
+        axis.set_ylim(self.low[1], self.high[1])
+        axis.set_axis_off()
+
+    def draw(self, axis: Axes, q: _Pins, *, letters: bool = True, trace: NDArray[np.float64] | None = None) -> None:
+        """Draw everything at one configuration; ``trace`` is the path of P, shape (n, 2), in cm."""
+        self._ground(axis, letters)
+        if trace is not None and len(trace):
+            axis.plot(*trace.T, color=TRACE, linewidth=1.4, zorder=2, solid_capstyle="round")
+        self._slider(axis, q)
+        self._links(axis, q)
+        if letters:
+            self._letters(axis, q)
+
+    def _line(self, axis: Axes, points: Sequence[NDArray[np.float64]], **options: Any) -> None:
+        look: dict[str, Any] = {"color": GROUND, "linewidth": 1.1, "solid_capstyle": "butt"}
+        axis.plot(*np.array(points).T, **look | options)
+
+    def _hatch(self, axis: Axes, start: NDArray[np.float64], end: NDArray[np.float64], count: int) -> None:
+        """Short strokes to the right of the line from start to end: what does not move."""
+        way = (end - start) / hypot(*(end - start))
+        stroke = 0.55 * self.unit * (np.array([way[1], -way[0]]) - way)
+        feet = [start + share * (end - start) for share in (np.arange(count) + 0.9) / count]
+        gap = np.full(2, np.nan)
+        points = [point for foot in feet for point in (foot, foot + stroke, gap)]
+        self._line(axis, points, linewidth=0.7, zorder=1)
+
+    def _ground(self, axis: Axes, letters: bool) -> None:
+        unit = self.unit
+        self._line(axis, [np.zeros(2), self.zero], linewidth=0.7, linestyle=(0, (9, 3, 2, 3)), color="0.55", zorder=0)
+        # the bearing of A
+        foot, half = -1.75 * unit, 1.0 * unit
+        bearing = np.array([[-0.3 * unit, 0.0], [-half, foot], [half, foot], [0.3 * unit, 0.0]])
+        axis.add_patch(Polygon(bearing, facecolor="0.92", edgecolor=GROUND, linewidth=1.1, zorder=5))
+        ends = np.array([-1.5 * unit, foot]), np.array([1.5 * unit, foot])
+        self._line(axis, ends)
+        self._hatch(axis, *ends, count=6)
+        # the guide, below the slider, and the wall at its end
+        end = self.wall if self.sprung or self.damped else self.most + 3.0 * unit
+        rail = self.at(self.least - 3.0 * unit, -unit), self.at(end, -unit)
+        self._line(axis, rail, zorder=1)
+        self._hatch(axis, *rail, count=max(4, round((end - self.least) / unit * 1.6)))
+        if self.sprung or self.damped:
+            wall = self.at(end, -unit), self.at(end, 1.5 * unit)
+            self._line(axis, wall)
+            self._hatch(axis, *wall, count=5)
+
+    def _slider(self, axis: Axes, q: _Pins) -> None:
+        unit = self.unit
+        block = [self.at(q.u + s * 1.5 * unit, n * unit) for s, n in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
+        axis.add_patch(Polygon(block, facecolor="#C9D1D6", edgecolor=SLIDER, linewidth=1.2, zorder=4))
+        start, end = q.u + 1.5 * unit, self.wall
+        side = 0.55 * unit if self.sprung and self.damped else 0.0
+        if self.sprung:
+            share = np.concatenate([[0.0, 0.12], np.linspace(0.12, 0.88, 15)[1:-1], [0.88, 1.0]])
+            swing = np.zeros(len(share))
+            swing[2:-2] = 0.38 * unit * (-1.0) ** np.arange(len(share) - 4)
+            spring = [self.at(start + s * (end - start), side + w) for s, w in zip(share, swing)]
+            self._line(axis, spring, color=SLIDER, linewidth=1.2, zorder=3)
+        if self.damped:
+            middle, width, deep = 0.5 * (start + end), 0.32 * unit, 1.6 * unit
+            cup = ((-0.5, 1), (0.5, 1), (0.5, -1), (-0.5, -1))
+            self._line(axis, [self.at(middle + s * deep, w * width - side) for s, w in cup], color=SLIDER, zorder=3)
+            self._line(axis, [self.at(middle + 0.5 * deep, -side), self.at(end, -side)], color=SLIDER, zorder=3)
+            self._line(axis, [self.at(start, -side), self.at(middle, -side)], color=SLIDER, zorder=3)
+            piston = [self.at(middle, w * width - side) for w in (-0.8, 0.8)]
+            self._line(axis, piston, color=SLIDER, linewidth=2.0, zorder=3)
+
+    def _links(self, axis: Axes, q: _Pins) -> None:
+        a = np.zeros(2)
+        width = {"linewidth": 4.5, "solid_capstyle": "round"}
+        offset = abs(float(np.cross(np.append(q.c - q.b, 0.0), np.append(q.p - q.b, 0.0))[2]))
+        if offset > 0.02 * hypot(*(q.c - q.b)) ** 2:
+            axis.add_patch(Polygon([q.b, q.c, q.p], facecolor=COUPLER, alpha=0.16, edgecolor="none", zorder=5))
+            self._line(axis, [q.b, q.p, q.c], color=COUPLER, linewidth=1.4, zorder=6)
+        elif self.parameters.coupler_point_distance:
+            self._line(axis, [q.b, q.p], color=COUPLER, **width, zorder=6)
+        self._line(axis, [q.d, q.c], color=ROCKER, **width, zorder=6)
+        self._line(axis, [q.b, q.c], color=COUPLER, **width, zorder=7)
+        self._line(axis, [a, q.b], color=CRANK, **width, zorder=8)
+        for pin in (a, q.b, q.c, q.d):
+            axis.add_patch(
+                Circle(tuple(pin), 0.36 * self.unit, facecolor="white", edgecolor="black", linewidth=1.2, zorder=9)
+            )
+        if self.parameters.coupler_point_distance:
+            axis.add_patch(
+                Circle(tuple(q.p), 0.24 * self.unit, facecolor=TRACE, edgecolor="black", linewidth=0.9, zorder=10)
+            )
+
+    def _letters(self, axis: Axes, q: _Pins) -> None:
+        unit = self.unit
+        side = -1.0 if (q.c - q.d) @ self.along > 0.0 else 1.0
+        _write(axis, q.d + 0.95 * side * unit * self.along, "D")
+        # the crank angle
+        turn = np.degrees(q.crank_angle) % 360.0
+        radius = max(0.5 * CM_PER_METRE * self.parameters.crank_length, 1.3 * unit)
+        arc: dict[str, Any] = {"color": GROUND, "linewidth": 0.9, "zorder": 3}
+        axis.add_patch(Arc((0, 0), 2 * radius, 2 * radius, theta1=0.0, theta2=turn, **arc))
+        half = np.radians(0.5 * turn)
+        theta = (radius + 0.95 * unit) * np.array([cos(half), sin(half)])
+        _write(axis, theta, r"$\theta_2$")
+        # each pin's letter goes where it has most room
+        centre = (q.b + q.c + q.d) / 3.0
+        a = np.zeros(2)
+        lines = [
+            (a, q.b),
+            (q.b, q.c),
+            (q.c, q.d),
+            (q.b, q.p),
+            (q.c, q.p),
+            (a, np.array([0.0, -2.0 * unit])),
+            (a, self.zero),
+        ]
+        taken = [theta]
+        directions = np.radians(np.arange(0.0, 360.0, 15.0))
+        pins = {"A": a, "B": q.b, "C": q.c} | ({"P": q.p} if self.parameters.coupler_point_distance else {})
+        for name, pin in pins.items():
+            places = pin + 1.15 * unit * np.column_stack([np.cos(directions), np.sin(directions)])
+            room = [
+                min(
+                    *(_distance(place, *line) for line in lines),
+                    *(0.6 * hypot(*(place - other)) for other in (*taken, *pins.values())),
+                )
+                for place in places
+            ]
+            # and where several have as much, outside the loop
+            outwards = (places - pin) @ (pin - centre) / (unit * max(hypot(*(pin - centre)), 1e-9))
+            best = places[int(np.argmax(np.array(room) + 0.1 * unit * outwards))]
+            _write(axis, best, name)
+            taken.append(best)
+        # the slider position
+        level = -2.35 * unit
+        for s in {0.0, q.u}:
+            self._line(axis, [self.at(s, -1.75 * unit), self.at(s, level - 0.4 * unit)], linewidth=0.7)
+        if abs(q.u) > 1.2 * unit:
+            arrow = {"arrowstyle": "-|>", "color": GROUND, "shrinkA": 0, "shrinkB": 0, "linewidth": 0.8}
+            axis.annotate("", tuple(self.at(q.u, level)), tuple(self.at(0.0, level)), arrowprops=arrow)
+        slope = (np.degrees(self.parameters.slider_guide_angle) + 90.0) % 180.0 - 90.0
+        place = self.at(0.5 * q.u, level - 1.05 * unit)
+        _write(axis, place, f"$u = {q.u:.2f}$ cm", fontsize=9, rotation=slope, rotation_mode="anchor")
+
+
+def _write(axis: Axes, point: NDArray[np.float64], words: str, **options: Any) -> None:
+    look: dict[str, Any] = {"ha": "center", "va": "center", "fontsize": 10.5, "zorder": 11}
+    axis.text(point[0], point[1], words, **look | options)
+
+
+def _distance(point: NDArray[np.float64], start: NDArray[np.float64], end: NDArray[np.float64]) -> float:
+    """Distance of a point from a straight line between two others."""
+    way = end - start
+    share = min(1.0, max(0.0, float((point - start) @ way) / max(float(way @ way), 1e-12)))
+    return hypot(*(point - start - share * way))
+
+
+def draw_linkage(
+    parameters: FiveBarParameters,
+    crank_angle: float,
+    slider_position: float,
+    *,
+    title: str = "",
+    trace: ArrayLike | None = None,
+) -> Figure:
+    """Draw the mechanism at one configuration: links, pins, guide, spring and damper, coupler point, the two freedoms.
+
+    Parameters
+    ----------
+    parameters : FiveBarParameters
+    crank_angle, slider_position : float
+        rad, m.
+    title : str
+    trace : array_like, shape (n, 2), optional
+        A path of P to draw too (m), such as an arc of `analysis.workspace.coupler_curve`.
+
+    Raises
+    ------
+    AssemblyError
+        If the links cannot be joined there.
+    """
+    q = _pins(parameters, crank_angle, slider_position)
+    path = CM_PER_METRE * (np.empty((0, 2)) if trace is None else np.asarray(trace, dtype=float))
+    scene = _Scene(parameters, [q, *(replace(q, p=point) for point in path if np.all(np.isfinite(point)))])
+    width, height = scene.high - scene.low
+    with matplotlib.rc_context(STYLE):
+        figure = Figure(figsize=(6.4, 6.4 * height / width + (0.3 if title else 0.0)))
+        axis = figure.subplots()
+        scene.prepare(axis)
+        scene.draw(axis, q, trace=path)
+        if title:
+            axis.set_title(title, fontsize=10.5, fontweight="bold")
+        return _finish(figure)
+
+
+def animate_linkage(
+    parameters: FiveBarParameters,
+    trajectory: Trajectory,
+    path: str | Path,
+    *,
+    frames: int = 60,
+    frames_per_second: int = 20,
+    title: str = "",
+) -> Path:
+    """Write a GIF of a run: the moving linkage with the trace of P, and beside it the slider over time.
+
+    Parameters
+    ----------
+    parameters : FiveBarParameters
+        The mechanism of the run.
+    trajectory : Trajectory
+        At least two samples; the frames are its samples nearest to evenly spaced times.
+    path : str or Path
+        Of the GIF.
+    frames : int
+        Pictures in it, at most one per sample.
+
+    Raises
+    ------
+    InputError
+        If the run has fewer than two samples or there are fewer than two frames.
+    """
+    if len(trajectory) < 2 or frames < 2:
+        raise InputError(f"an animation of {len(trajectory)} samples in {frames} frames: both must be at least 2")
+    path = Path(path)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    time, u = trajectory.time, CM_PER_METRE * trajectory["slider.position"]
+    trace = CM_PER_METRE * np.column_stack([trajectory["coupler.point.x"], trajectory["coupler.point.y"]])
+    chosen = np.unique(np.searchsorted(time, np.linspace(time[0], time[-1], frames)).clip(0, len(time) - 1))
+    angles, slides = trajectory["crank.angle"], trajectory["slider.position"]
+    configurations = [_pins(parameters, float(angles[i]), float(slides[i])) for i in chosen]
+    scene = _Scene(parameters, configurations)
+    width, height = scene.high - scene.low
+    with matplotlib.rc_context(STYLE):
+        figure = Figure(figsize=(5.0, 5.0 * height / width + 1.9))
+        FigureCanvasAgg(figure)
+        above, below = figure.subplots(2, 1, height_ratios=(5.0 * height / width, 1.7))
+        if title:
+            figure.suptitle(title, fontsize=10.5, fontweight="bold")
+        below.plot(time, u, color="0.8")
+        (done,) = below.plot([], [], color=SLIDER)
+        (dot,) = below.plot([], [], "o", color=SLIDER, markersize=5)
+        below.set_xlabel("time [s]")
+        below.set_ylabel("slider position [cm]")
+        writer = PillowWriter(fps=frames_per_second, metadata={})
+        with writer.saving(figure, str(path), dpi=80):
+            for i, q in zip(chosen, configurations):
+                above.clear()
+                scene.prepare(above)
+                scene.draw(above, q, letters=False, trace=trace[: i + 1])
+                done.set_data(time[: i + 1], u[: i + 1])
+                dot.set_data(time[i : i + 1], u[i : i + 1])
+                if i == chosen[0]:
+                    # laid out once: the panels must not creep from frame to frame
+                    figure.draw_without_rendering()
+                    figure.set_layout_engine("none")
+                writer.grab_frame()
+    return path
+
+
+def icon(path: str | Path) -> Path:
+    """Write the icon of the component: the linkage in a few strokes, PNG, 200 by 200 pixels, the same bytes each time."""
+    path = Path(path)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    a, b, c, d = np.array([[38.0, 56.0], [58.0, 92.0], [118.0, 162.0], [136.0, 56.0]])
+    with matplotlib.rc_context({"lines.solid_capstyle": "round", "lines.solid_joinstyle": "round"}):
+        figure = Figure(figsize=(2.0, 2.0), facecolor="none")
+        FigureCanvasAgg(figure)
+        axis = figure.add_axes((0.0, 0.0, 1.0, 1.0))
+        axis.set(xlim=(0.0, 200.0), ylim=(0.0, 200.0))
+        axis.set_axis_off()
+        card = FancyBboxPatch((8, 8), 184, 184, boxstyle="round,pad=0,rounding_size=26", facecolor="white")
+        card.set(edgecolor="#B8C2C9", linewidth=2.0)
+        axis.add_patch(card)
+        axis.plot([20.0, 180.0], [37.0, 37.0], color=GROUND, linewidth=2.4)
+        for x in range(28, 184, 16):
+            axis.plot([x, x - 9.0], [36.0, 26.0], color=GROUND, linewidth=1.2)
+        axis.add_patch(
+            Polygon([a, (a[0] - 15.0, a[1] - 19.0), (a[0] + 15.0, a[1] - 19.0)], facecolor="#E4E8EB", edgecolor=GROUND)
+        )
+        axis.add_patch(Rectangle(d - (19.0, 19.0), 38.0, 38.0, facecolor="#C9D1D6", edgecolor=SLIDER, linewidth=1.6))
+        spring = (
+            np.array([0.0, 2.5, 5.0, 9.0, 13.0, 17.0, 19.5, 22.0]),
+            np.array([0.0, 0.0, 8.0, -8.0, 8.0, -8.0, 0.0, 0.0]),
+        )
+        axis.plot(d[0] + 19.0 + spring[0], d[1] + spring[1], color=SLIDER, linewidth=1.8)
+        axis.plot([178.0, 178.0], [37.0, 76.0], color=GROUND, linewidth=2.4)
+        for (start, end), colour in (((d, c), ROCKER), ((b, c), COUPLER), ((a, b), CRANK)):
+            axis.plot(*np.array([start, end]).T, color=colour, linewidth=6.5)
+        for pin in (a, b, c, d):
+            axis.add_patch(Circle(pin, 7.0, facecolor="white", edgecolor="black", linewidth=1.8, zorder=5))
+        figure.savefig(path, dpi=100, metadata={"Software": None})
+    return path

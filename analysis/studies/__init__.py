@@ -1,0 +1,73 @@
+"""The figures of Youssef's thesis, a runnable module each: ``python -m analysis.studies.fig_3_2``.
+
+`STUDIES` lists them in order with their titles; `load` imports one, `make` runs it and writes its files.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from importlib import import_module
+from pathlib import Path
+from types import MappingProxyType
+from typing import TYPE_CHECKING
+
+from linkwork.errors import InputError
+
+if TYPE_CHECKING:
+    from .study import Study, StudyResult
+
+#: Title of each study by its number in the thesis, and of the pictures of the linkage.
+STUDIES: Mapping[str, str] = MappingProxyType(
+    {
+        "3.2": "Drift of the slider without a spring; Table 3.1, 420 rpm",
+        "3.3": "Drift with and without gravity; Table 3.1, 420 rpm, k = 0",
+        "3.4": "Steady motion of the slider, three springs; Table 3.1, 420 rpm",
+        "3.5": "Torque that holds the speed, three springs; Table 3.1, 420 rpm",
+        "3.6": "Launch with three torques: slider position; Table 3.1",
+        "3.7": "Launch with three torques: crank speed; Table 3.1",
+        "3.8": "Launch with three springs: slider position; Table 3.1",
+        "3.9": "Launch with three springs: crank speed; Table 3.1",
+        "3.10": "Torque of the launch against its time to 1 rad; Table 3.1",
+        "3.11": "Free motion, k = 5e5 dyn/cm: slider position; Table 3.1",
+        "3.12": "Free motion, k = 5e5 dyn/cm: crank speed; Table 3.1",
+        "3.13": "Free motion, k = 2e6 dyn/cm: slider position; Table 3.1",
+        "3.14": "Free motion, k = 2e6 dyn/cm: crank speed; Table 3.1",
+        "7.2": "Coupler curves and accessible area of P; Table 3.1",
+        "8.7": "Steady motion far below resonance; rig 1, spring A",
+        "8.8": "Steady motion near half the natural frequency; rig 1, spring A",
+        "8.9": "Four peaks a turn become two; rig 1, spring A",
+        "8.10": "Steady motion through resonance; rig 1, spring A",
+        "8.11": "Steady motion near a third of the natural frequency; rig 1, spring B",
+        "8.12": "Steady motion near half the natural frequency; rig 1, spring B",
+        "8.13": "Steady motion towards resonance; rig 1, spring B",
+        "8.14": "Amplitude of the slider over the speed; rig 1, spring A",
+        "8.15": "Amplitude of the slider over the speed; rig 1, spring B",
+        "8.16": "Harmonics of the slider's motion over the speed; rig 1",
+        "8.17": "Amplitude with Coulomb friction in the guide; rig 1, spring A",
+        "linkage": "The five-bar slider of Table 3.1 at 420 rpm",
+    }
+)
+
+
+def module_name(number: str) -> str:
+    """Module of a study."""
+    return f"{__name__}.fig_{number.replace('.', '_')}" if number[0].isdigit() else f"{__name__}.{number}"
+
+
+def load(number: str) -> Study:
+    """The study of a figure.
+
+    Raises
+    ------
+    InputError
+        If there is no study of that number.
+    """
+    if number not in STUDIES:
+        raise InputError(f"there is no study of figure {number!r}: there are {', '.join(STUDIES)}")
+    study: Study = import_module(module_name(number)).STUDY
+    return study
+
+
+def make(number: str, out: str | Path = "out") -> tuple[StudyResult, tuple[Path, ...]]:
+    """Run a study and write its plot and CSV (of the linkage an animation too) into a folder; returns the paths."""
+    return load(number).make(out)

@@ -120,20 +120,23 @@ def test_info_on_an_fmu(linkwork, fmu):
 
 
 def test_check_passes_and_writes_its_files(fmu, tmp_path):
-    done = in_own_process("check", "--fmu", fmu, cwd=tmp_path)
+    done = in_own_process("check", "--fmu", fmu, "--method", "compiled", "--method", "Radau", cwd=tmp_path)
     assert done.returncode == 0, done.stdout + done.stderr
-    assert "1 of 1 cases pass" in done.stdout
+    assert "2 of 2 checks pass" in done.stdout
     assert {p.name for p in (tmp_path / "out").iterdir()} == {
         "table-3.1.png",
         "table-3.1-in-process.csv",
         "table-3.1-fmu.csv",
+        "table-3.1-Radau.png",
+        "table-3.1-Radau-in-process.csv",
+        "table-3.1-Radau-fmu.csv",
     }
 
 
 def test_a_check_that_fails_exits_with_4(fmu, tmp_path):
-    done = in_own_process("check", "coulomb-friction", "--fmu", fmu, "--tolerance", "1e-30", cwd=tmp_path)
+    done = in_own_process("check", "coulomb-friction", "--fmu", fmu, "--method", "RK45", "--tolerance", "1e-30", cwd=tmp_path)
     assert done.returncode == cli.CHECK_FAILED
-    assert "check failed: coulomb-friction" in done.stderr
+    assert "check failed: coulomb-friction-RK45" in done.stderr
 
 
 def test_run_through_the_fmu_reports_a_refused_step(fmu, tmp_path):

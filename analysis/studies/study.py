@@ -1,0 +1,198 @@
+"""What every study is: a claim, what we compute, the picture, the verdict; and how one is run."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from rich.console import Console
+from rich.table import Table
+
+from .. import io
+from ..figures import Curve
+from . import STUDIES
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+#: Where a stated value comes from.
+THESIS = "thesis"
+REFERENCE = "reference"  # an independent derivation, cross-checked against two multibody engines
+BALANCE = "check"  # a property that the computation must have
+
+ASSIGNED = (
+    "The captions of the thesis's figures are lost; which quantity stands under which number is our assignment, chosen so "
+    "that the figures of the series together show all that its text discusses."
+)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Verdict:
+    """A stated result beside ours: it holds if ``computed`` lies from ``lower`` to ``upper``.
+
+    Attributes
+    ----------
+    statement : str
+        What is said, as a sentence without its number.
+    source : str
+        Who says so: `THESIS`, `REFERENCE` or `BALANCE`.
+    stated, computed : float
+        The two values in ``unit``.
+    lower, upper : float
+        Range that the source supports.
+    """
+
+    statement: str
+    source: str
+    stated: float
+    computed: float
+    lower: float
+    upper: float
+    unit: str = ""
+
+    def __str__(self) -> str:
+        word = "holds" if self.holds else "DOES NOT HOLD"
+        return f"{self.statement}: {self.expected} ({self.source}), computed {self.found}: {word}"
+
+    @property
+    def expected(self) -> str:
+        """The stated value with its unit, and whether it is a bound."""
+        bound = "at most " if np.isneginf(self.lower) else "at least " if np.isposinf(self.upper) else ""
+        return f"{bound}{self.stated:.6g} {self.unit}".rstrip()
+
+    @property
+    def found(self) -> str:
+        """The computed value with its unit."""
+        return f"{self.computed:.6g} {self.unit}".rstrip()
+
+    @property
+    def holds(self) -> bool:
+        """Whether the computed value is in the range."""
+        return bool(self.lower <= self.computed <= self.upper)
+
+
+def near(statement: str, source: str, stated: float, computed: float, tolerance: float, unit: str = "") -> Verdict:
+    """A verdict on a value that is stated to within a tolerance."""
+    return Verdict(
+        statement=statement,
+        source=source,
+        stated=stated,
+        computed=float(computed),
+        lower=stated - tolerance,
+        upper=stated + tolerance,
+        unit=unit,
+    )
+
+
+def at_least(statement: str, source: str, stated: float, computed: float, unit: str = "") -> Verdict:
+    """A verdict on a value that is stated to reach another."""
+    return Verdict(
+        statement=statement,
+        source=source,
+        stated=stated,
+        computed=float(computed),
+        lower=stated,
+        upper=np.inf,
+        unit=unit,
+    )
+
+
+def at_most(statement: str, source: str, stated: float, computed: float, unit: str = "") -> Verdict:
+    """A verdict on a value that is stated not to exceed another."""
+    return Verdict(
+        statement=statement,
+        source=source,
+        stated=stated,
+        computed=float(computed),
+        lower=-np.inf,
+        upper=stated,
+        unit=unit,
+    )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StudyResult:
+    """What a study found.
+
+    Attributes
+    ----------
+    number : str
+        Of the thesis's figure, or the name of a picture.
+    claim : str
+        What the thesis claims or shows, as far as its text tells.
+    assignment : str
+        What in the figure is our choice, because the caption is lost; empty where nothing is.
+    columns : mapping
+        Data of the plot by name with unit; all of one length, padded with NaN.
+    verdicts : tuple of Verdict
+    """
+
+    number: str
+    claim: str
+    assignment: str = ""
+    columns: Mapping[str, NDArray[np.float64]]
+    verdicts: tuple[Verdict, ...]
+
+    @property
+    def title(self) -> str:
+        """Title in the list of studies."""
+        return STUDIES[self.number]
+
+    @property
+    def heading(self) -> str:
+        """What stands above the plot: the figure's number and title."""
+        return f"Fig {self.number}  {self.title}" if self.number[0].isdigit() else self.title
+
+    def table(self) -> Table:
+        """The verdicts for a terminal."""
+        table = Table("statement", "source", "stated", "computed", "", title=self.heading, title_justify="left")
+        for v in self.verdicts:
+            table.add_row(v.statement, v.source, v.expected, v.found, "holds" if v.holds else "does not hold")
+        return table
+
+
+@dataclass(frozen=True, slots=True)
+class Study:
+    """A figure of the thesis: how it is computed, how it is drawn, and how it is animated, if it is."""
+
+    number: str
+    compute: Callable[[], StudyResult]
+    draw: Callable[[StudyResult], Figure]
+    animate: Callable[[StudyResult, Path], Path] | None = None
+
+    def make(self, out: str | Path = "out") -> tuple[StudyResult, tuple[Path, ...]]:
+        """Compute it and write ``fig_<number>.png`` and ``.csv`` into a folder; returns the result and the paths."""
+        result = self.compute()
+        name = f"fig_{self.number.replace('.', '_')}" if self.number[0].isdigit() else self.number
+        stem = Path(out) / name
+        paths = [
+            io.save_figure(self.draw(result), stem.with_suffix(".png")),
+            io.write_csv(stem.with_suffix(".csv"), result.columns),
+        ]
+        if self.animate:
+            paths.append(self.animate(result, stem.with_suffix(".gif")))
+        return result, tuple(paths)
+
+    def main(self, out: str | Path = "out") -> StudyResult:
+        """Make it and show the verdicts."""
+        result, paths = self.make(out)
+        console = Console()
+        console.print(result.table())
+        console.print(f"wrote {', '.join(map(str, paths))}", highlight=False, soft_wrap=True)
+        return result
+
+
+def padded(columns: Mapping[str, ArrayLike]) -> dict[str, NDArray[np.float64]]:
+    """Columns brought to the length of the longest with NaN."""
+    arrays = {name: np.asarray(values, dtype=float) for name, values in columns.items()}
+    length = max(len(values) for values in arrays.values())
+    return {name: np.append(v, np.full(length - len(v), np.nan)) for name, v in arrays.items()}
+
+
+def curves_of(result: StudyResult, x: str, names: Mapping[str, str]) -> list[Curve]:
+    """Columns of a result as curves over the column ``x``; ``names`` maps each column to its label."""
+    return [Curve(x=result.columns[x], y=result.columns[name], label=label) for name, label in names.items()]

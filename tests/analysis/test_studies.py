@@ -1,0 +1,251 @@
+"""The figures of the thesis: every stated result of theirs, and what each study writes."""
+
+from __future__ import annotations
+
+import csv
+import subprocess
+import sys
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from analysis import studies
+from analysis.studies import _rig_1, _runs
+from analysis.studies.study import BALANCE, REFERENCE, THESIS, StudyResult, at_least, at_most, near
+from linkwork.errors import InputError
+
+
+@cache
+def result(number: str) -> StudyResult:
+    return studies.load(number).compute()
+
+
+def computed(number: str, statement: str, source: str = REFERENCE) -> float:
+    """The computed value beside a statement."""
+    (verdict,) = (v for v in result(number).verdicts if v.statement == statement and v.source == source)
+    return verdict.computed
+
+
+#: What the thesis states and the right physics does not bear out.
+REFUTED = {
+    ("3.2", "third turn's drift relative to the first's; mu = 1e4 dyn.s/cm"),
+    ("3.2", "third turn's drift relative to the first's; mu = 5e4 dyn.s/cm"),
+    ("3.2", "third turn's drift relative to the first's; mu = 1e5 dyn.s/cm"),
+    ("3.10", "exponent of T0 in the time to 1 rad"),
+    ("8.8", "speed of the local maximum"),
+    ("8.12", "speed of the local maximum"),
+    ("8.14", "natural frequency"),
+    ("8.14", "speed of the local maximum"),
+    ("8.14", "speed of the minimum"),
+    ("8.15", "natural frequency"),
+    ("8.15", "natural frequency relative to spring A's"),
+    ("8.15", "speed of the local maximum"),
+}
+
+
+def test_there_is_a_study_of_every_figure() -> None:
+    asked = [f"3.{n}" for n in range(2, 15)] + ["7.2"] + [f"8.{n}" for n in range(7, 18)] + ["linkage"]
+    assert list(studies.STUDIES) == asked
+    for number in studies.STUDIES:
+        assert studies.load(number).number == number
+
+
+def test_a_figure_there_is_not() -> None:
+    with pytest.raises(InputError, match=r"'3\.1'"):
+        studies.load("3.1")
+
+
+@pytest.mark.parametrize("number", studies.STUDIES)
+def test_verdicts(number: str) -> None:
+    failed = {(number, v.statement) for v in result(number).verdicts if not v.holds}
+    assert failed == {entry for entry in REFUTED if entry[0] == number}
+    assert all(v.source == THESIS for v in result(number).verdicts if not v.holds)
+    assert all(v.source in (THESIS, REFERENCE, BALANCE) for v in result(number).verdicts)
+    assert all(np.isfinite(v.computed) for v in result(number).verdicts)
+
+
+@pytest.mark.parametrize("number", studies.STUDIES)
+def test_plot_and_data(number: str) -> None:
+    study = studies.load(number)
+    found = result(number)
+    figure = study.draw(found)
+    assert found.heading in (figure.get_suptitle(), figure.axes[0].get_title())
+    assert (found.heading == f"Fig {number}  {studies.STUDIES[number]}") == number[0].isdigit()
+    for axis in figure.axes if number[0].isdigit() else ():
+        assert axis.get_xlabel()
+        assert axis.get_ylabel()
+        assert axis.lines
+    assert len({len(column) for column in found.columns.values()}) == 1
+    for name in found.columns:
+        assert name.endswith("]"), f"{name} has no unit"
+        assert "," not in name
+    assert found.claim
+    if number not in ("3.2", "3.3", "3.4", "3.5"):
+        assert found.assignment
+        assert "our" in sys.modules[studies.module_name(number)].__doc__
+
+
+def test_written_files(tmp_path: Path) -> None:
+    found, paths = studies.make("3.5", tmp_path / "out")
+    assert paths == (tmp_path / "out" / "fig_3_5.png", tmp_path / "out" / "fig_3_5.csv")
+    assert (tmp_path / "out" / "fig_3_5.png").stat().st_size > 10_000
+    with (tmp_path / "out" / "fig_3_5.csv").open(newline="") as file:
+        rows = list(csv.reader(file))
+    assert rows[0] == list(found.columns)
+    np.testing.assert_array_equal(np.array(rows[1:], float), np.column_stack(list(found.columns.values())))
+
+
+def test_the_linkage_is_animated(tmp_path: Path) -> None:
+    _, paths = studies.make("linkage", tmp_path)
+    assert [path.name for path in paths] == ["linkage.png", "linkage.csv", "linkage.gif"]
+    with Image.open(paths[2]) as image:
+        assert image.n_frames == 72
+
+
+def test_a_verdict_says_what_it_found() -> None:
+    worse = near("length", THESIS, 2.0, 2.5, 0.1, "m")
+    assert str(worse) == "length: 2 m (thesis), computed 2.5 m: DOES NOT HOLD"
+    assert str(at_least("length", BALANCE, 2.0, 2.5)) == "length: at least 2 (check), computed 2.5: holds"
+    assert not at_most("length", BALANCE, 2.0, 2.5).holds
+
+
+def test_a_study_runs_as_a_module(tmp_path: Path) -> None:
+    done = subprocess.run(
+        [sys.executable, "-m", "analysis.studies.fig_3_4", str(tmp_path)], capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    assert "holds" in done.stdout
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["fig_3_4.csv", "fig_3_4.png"]
+
+
+class TestDrift:
+    """Fig 3.2 and 3.3."""
+
+    def test_it_accelerates(self) -> None:
+        for mu in _runs.DAMPINGS:
+            turns = [abs(_runs.drift(mu).per_turn(n)) for n in (1, 3)]
+            assert turns[1] > turns[0]
+
+    def test_it_is_near_linear_with_the_strong_dampers_only(self) -> None:
+        for mu in _runs.DAMPINGS:
+            assert (abs(_runs.drift(mu).growth - 1.0) < 0.1) == (mu >= 5e5)
+
+    @pytest.mark.parametrize(
+        ("mu", "turns", "tolerance"), [(1e4, 3.0, 0.05), (5e4, 4.9, 0.05), (1e5, 8.0, 0.05), (5e5, 36.0, 0.5)]
+    )
+    def test_coupler_and_rocker_come_collinear(self, mu: float, turns: float, tolerance: float) -> None:
+        assert _runs.drift(mu).collinear_turn == pytest.approx(turns, abs=tolerance)
+
+    def test_the_strongest_damper_keeps_them_apart(self) -> None:
+        assert np.isnan(_runs.drift(1e6).collinear_turn)
+
+    @pytest.mark.parametrize("mu", [5e5, 1e6])
+    def test_without_gravity_it_grows_by_a_quarter(self, mu: float) -> None:
+        for turn in (1, 2, 3):
+            assert _runs.drift(mu, 0.0).per_turn(turn) / _runs.drift(mu).per_turn(turn) == pytest.approx(1.25, abs=0.03)
+
+
+class TestSteadyMotion:
+    """Fig 3.4 and 3.5."""
+
+    @pytest.mark.parametrize(("k", "angle", "mean"), [(5e5, 23.45, -0.611), (1e6, 17.5, -0.280), (2e6, 5.2, -0.142)])
+    def test_least_position_and_mean(self, k: float, angle: float, mean: float) -> None:
+        turn = _runs.steady_turn(_runs.table_3_1(k), 420.0)
+        assert _runs.least(turn.angle_deg, turn.slider_cm)[0] == pytest.approx(angle, abs=0.05)
+        assert turn.slider_cm[:-1].mean() == pytest.approx(mean, abs=5e-4)
+
+    def test_the_torque_hardly_feels_the_spring(self) -> None:
+        assert computed("3.5", "difference between k = 5e5 and 2e6, relative to the peak") == pytest.approx(
+            0.096, abs=5e-4
+        )
+
+    def test_the_torque_reverses(self) -> None:
+        assert computed("3.5", "greatest torque; k = 1e6 dyn/cm") == pytest.approx(1.46e7, abs=0.005e7)
+        assert computed("3.5", "crank angle of the greatest torque") == pytest.approx(327.0, abs=0.5)
+        assert computed("3.5", "least torque; k = 1e6 dyn/cm") == pytest.approx(-2.00e7, abs=0.005e7)
+        assert computed("3.5", "crank angle of the least torque") == pytest.approx(16.0, abs=0.5)
+
+
+class TestLaunch:
+    """Section 3.2.2."""
+
+    def test_exponent(self) -> None:
+        assert computed("3.10", "exponent, mean of the two between the three torques") == pytest.approx(
+            -1.95, abs=0.005
+        )
+
+    def test_torque_times_time_squared_is_nearly_constant_and_torque_times_time_is_not(self) -> None:
+        torque, time = (result("3.10").columns[name] for name in ("T0 [dyn.cm]", "time to 1 rad [s]"))
+        squared, hyperbola = torque * time**2, torque * time
+        assert squared.max() / squared.min() < 1.11
+        assert hyperbola.max() / hyperbola.min() > 4.0
+
+
+class TestRig1:
+    """Fig 8.7 to 8.17."""
+
+    @pytest.mark.parametrize(("spring", "rpm"), [("a", 592.0), ("b", 1133.0)])
+    def test_natural_frequency(self, spring: str, rpm: float) -> None:
+        assert _rig_1.natural_speed(spring) == pytest.approx(rpm, abs=0.5)
+
+    def test_maxima_and_minimum_of_the_amplitude(self) -> None:
+        assert _rig_1.sweep("a").highest_near(250, 350) == pytest.approx(296.0, abs=0.5)
+        assert _rig_1.sweep("a").lowest_near(320, 420) == pytest.approx(367.0, abs=0.5)
+        assert _rig_1.sweep("b").highest_near(500, 650) == pytest.approx(564.0, abs=0.5)
+
+    def test_four_peaks_become_two(self) -> None:
+        assert _rig_1.speed_of_fewer_peaks("a", 400.0, 500.0) == pytest.approx(451.0, abs=1.0)
+        assert _rig_1.steady_turn(_rig_1.rig_1("a"), 440.0).peaks == 4
+        assert _rig_1.steady_turn(_rig_1.rig_1("a"), 460.0).peaks == 2
+        # with spring B too, at the same fraction of its natural frequency
+        assert _rig_1.speed_of_fewer_peaks("b", 800.0, 900.0) == pytest.approx(847.0, abs=1.0)
+
+    @pytest.mark.parametrize(("rpm", "peaks"), [(150.0, 8), (200.0, 6), (250.0, 4)])
+    def test_peaks_at_low_speed(self, rpm: float, peaks: int) -> None:
+        assert _rig_1.steady_turn(_rig_1.rig_1("a"), rpm).peaks == peaks
+
+    def test_two_motions_with_spring_b(self) -> None:
+        rest, falling = _rig_1.sweep("b"), _rig_1.falling_sweep("b")
+        assert rest.speed_rpm[rest.jump] == pytest.approx(1040.0, abs=5.0)
+        assert falling.speed_rpm[0] == pytest.approx(940.0, abs=20.0)
+        both = [
+            (r, f)
+            for s, r in zip(rest.speed_rpm, rest.amplitude_cm)
+            for t, f in zip(falling.speed_rpm, falling.amplitude_cm)
+            if s == t
+        ]
+        assert sum(f > 2.0 * r for r, f in both) >= 8
+        assert all(f == pytest.approx(r, rel=1e-5) for r, f in both if f <= 2.0 * r)
+
+    def test_amplitude_is_half_of_peak_to_peak(self) -> None:
+        turn = _rig_1.steady_turn(_rig_1.rig_1("a"), 600.0)
+        assert turn.amplitude == (turn.slider_cm.max() - turn.slider_cm.min()) / 2.0
+
+    def test_harmonic(self) -> None:
+        angle = np.linspace(0.0, 2.0 * np.pi, 721)
+        turn = _runs.SteadyTurn(
+            np.degrees(angle), 0.3 + 2.0 * np.cos(angle + 0.4) + 0.7 * np.sin(2.0 * angle), angle, 0.0
+        )
+        assert turn.harmonic(1) == pytest.approx(2.0, rel=1e-12)
+        assert turn.harmonic(2) == pytest.approx(0.7, rel=1e-12)
+        assert turn.harmonic(3) == pytest.approx(0.0, abs=1e-12)
+
+
+def test_parabola_through_samples() -> None:
+    x = np.linspace(-1.0, 2.0, 31)
+    place, value = _runs.least(x, 3.0 * (x - 0.123) ** 2 - 4.0)
+    assert place == pytest.approx(0.123, abs=1e-12)
+    assert value == pytest.approx(-4.0, abs=1e-12)
+    place, value = _runs.greatest(x, 5.0 - (x - 0.77) ** 2)
+    assert (place, value) == (pytest.approx(0.77, abs=1e-12), pytest.approx(5.0, abs=1e-12))
+
+
+@pytest.mark.parametrize(
+    ("value", "plain", "printed"), [(1e6, "1e6", "10⁶"), (5e5, "5e5", "5\N{MULTIPLICATION SIGN}10⁵")]
+)
+def test_values_in_words(value: float, plain: str, printed: str) -> None:
+    assert _runs.plain(value) == plain
+    assert _runs.scientific(value) == printed
