@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import ceil, cos, hypot, sin
 from pathlib import Path
+from textwrap import fill
 from typing import TYPE_CHECKING, Any
 
 import matplotlib
@@ -192,7 +193,8 @@ def plot_curves(
             _draw_panel(axis, panel)
         for axis in list(axes.flat)[len(panels) :]:
             axis.remove()
-        figure.suptitle(title, fontsize=10.5, fontweight="bold")
+        # about eleven of these letters to the inch
+        figure.suptitle(fill(title, int(10.9 * size[0] * columns)), fontsize=10.5, fontweight="bold")
         return _finish(figure)
 
 

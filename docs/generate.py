@@ -137,12 +137,51 @@ def identifiers() -> set[str]:
     return {*Constants._fields, *Position._fields, *Coefficients._fields}
 
 
-def main() -> int:
-    """Write both."""
+FIGURES = """# The thesis's figures, and what it states
+
+Each figure of chapters III, VII and VIII is a module of `analysis.studies`, with a plot, a CSV and verdicts; `linkwork figures`
+makes them all. The figures themselves are unreadable in the copy we have: what is held against the computation is what the
+text of the thesis states, and reference numbers from an independent derivation that was cross-checked against two multibody
+engines. Where a caption is lost, which quantity stands under which number is our assignment, and the study says so. This page is
+written by `python docs/generate.py --figures`.
+
+"thesis" in the second column is the thesis's own statement, "reference" the independent number, "check" a property that the
+computation must have.
+"""
+
+
+def figures() -> str:
+    """The text of docs/youssef-figures.md: every study computed, with its verdicts."""
+    from analysis.studies import STUDIES, load
+
+    lines = [FIGURES]
+    for number in STUDIES:
+        result = load(number).compute()
+        lines += [f"## {result.heading}", "", result.claim, ""]
+        if result.assignment:
+            lines += [f"*{result.assignment}*", ""]
+        lines += ["| statement | source | stated | computed | |", "| --- | --- | --- | --- | --- |"]
+        lines += [
+            f"| {v.statement} | {v.source} | {v.expected} | {v.found} | {'holds' if v.holds else '**does not hold**'} |"
+            for v in result.verdicts
+        ]
+        lines.append("")
+    return "\n".join(lines)
+
+
+def main(arguments: list[str]) -> int:
+    """Write what is asked for."""
+    if "--figures" in arguments:
+        from analysis.io import save_figure
+        from analysis.studies import load
+
+        (HERE / "youssef-figures.md").write_text(figures(), encoding="utf-8")
+        study = load("linkage")
+        save_figure(study.draw(study.compute()), HERE / "linkage.png")
     (HERE / "nomenclature.md").write_text(nomenclature(), encoding="utf-8")
     README.write_text(readme(README.read_text(encoding="utf-8")), encoding="utf-8")
     return 0
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(main(sys.argv[1:]))

@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 
 import build_fmu
+from analysis.studies import STUDIES
 
 ROOT = Path(__file__).parents[1]
 
@@ -30,6 +31,12 @@ def test_the_nomenclature_is_up_to_date(generate):
 def test_the_variable_table_of_the_readme_is_up_to_date(generate):
     text = (ROOT / "README.md").read_text()
     assert generate.readme(text) == text, "run: python docs/generate.py"
+
+
+def test_every_study_is_on_the_page_of_the_figures():
+    page = (ROOT / "docs" / "youssef-figures.md").read_text()
+    for number, title in STUDIES.items():
+        assert title in page, f"{number}: run python docs/generate.py --figures"
 
 
 def test_links_in_the_documentation_lead_somewhere():
