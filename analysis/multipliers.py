@@ -334,11 +334,13 @@ def _refined_solve(matrix: Vector, rhs: Vector) -> tuple[Vector, float, int]:
     numpy.linalg.LinAlgError
         If the matrix is singular.
     """
-    scale = np.ones(len(rhs))
-    for _ in range(3):
-        scale /= np.sqrt(np.abs(matrix * np.outer(scale, scale)).max(axis=1))
+    scale: Vector = np.ones(len(rhs))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        for _ in range(3):
+            scale /= np.sqrt(np.abs(matrix * np.outer(scale, scale)).max(axis=1))
     if not np.isfinite(scale).all():
         raise np.linalg.LinAlgError("a row of zeros, or an entry that is not finite")
+    scale = np.asarray(np.ldexp(1.0, np.round(np.log2(scale)).astype(int)))  # powers of two: nothing is rounded
     a = matrix * np.outer(scale, scale)
     b = rhs * scale
     wide_a, wide_b = a.astype(np.longdouble), b.astype(np.longdouble)
@@ -413,7 +415,8 @@ def _newton_euler(state: _State, accelerations: Vector, load: complex, links: _L
     matrix[8 + _G2, 9] = 1.0
     x = np.linalg.solve(matrix, np.concatenate([_real(net).T.ravel(), spin[:3]]))
     pins = x[0:8:2] + 1j * x[1:8:2]
-    return _LinkForces(*(complex(f) for f in pins), *(float(f) for f in x[8:]))
+    a, b, c, d = (complex(force) for force in pins)
+    return _LinkForces(a, b, c, d, float(x[8]), float(x[9]), float(x[10]))
 
 
 def _checked(name: str, value: ArrayLike, size: int) -> Vector:
@@ -553,7 +556,7 @@ def simulate_redundant(
     Raises
     ------
     InputError
-        If ``t_eval`` is not increasing.
+        If ``t_eval`` is not increasing, or the inputs are not finite.
     AssemblyError
         If the links cannot be joined at the start, or become collinear.
     IntegrationError
@@ -566,9 +569,15 @@ def simulate_redundant(
     q = assemble(parameters, initial.crank_angle, initial.slider_position)
     qd = rates(parameters, q, initial.crank_speed if speed is None else speed.initial, initial.slider_velocity)
 
+    latest = float(t[0])
+
     def derivative(t: float, y: Vector) -> Vector:
+        nonlocal latest
+        latest = float(t)
         q, qd = y[:4], y[4:]
-        torque, slider_force, load_x, load_y = inputs(t, q, qd)
+        if not np.isfinite(y).all():
+            return np.full(8, np.nan)  # a trial of the integrator went too far: it takes it shorter
+        torque, slider_force, load_x, load_y = _checked(f"what the inputs return at t = {t:.9g} s", inputs(t, q, qd), 4)
         if speed is not None:
             torque = 0.0
         system = _system(
@@ -598,7 +607,7 @@ def simulate_redundant(
         **options,
     )
     if not result.success:
-        raise IntegrationError(f"the redundant form stopped at t = {result.t[-1]:.9g} s: {result.message}")
+        raise IntegrationError(f"the redundant form stopped at t = {latest:.9g} s: {result.message}")
     q_run, qd_run = result.y[:4].T, result.y[4:].T
     closure = np.array([_closure(a, b, links) for a, b in zip(q_run, qd_run)])
     return RedundantRun(

@@ -358,7 +358,8 @@ class LinkworkSlave(Fmi2Slave):
             # a read does not fail, for there are masters that take what it returns all the same: the last good outputs
             # stay, and the initialisation or the next step will be refused
             error = self._refresh()
-            if error is not None:
+            refused = self._running and self._values[self._status_at] != STATUS_GOOD
+            if error is not None and not refused:
                 self._values[self._status_at] = _status(error)
                 self._values[self._message_at] = str(error)
         values = self._values

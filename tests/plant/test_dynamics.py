@@ -416,7 +416,8 @@ def test_friction_is_odd_and_levels_off() -> None:
     assert D.friction(0.0, p) == 0.0
     assert D.friction(0.5, p) == pytest.approx(20.0 * 0.5 + 3.0, rel=1e-14)
     assert D.friction(-0.5, p) == -D.friction(0.5, p)
-    assert D.friction(D.FRICTION_SPEED, p) == pytest.approx(20.0 * D.FRICTION_SPEED + 3.0 * 0.7615941559557649)
+    # tanh(1) of the level at 1 mm/s
+    assert D.friction(1e-3, p) == pytest.approx(20.0 * 1e-3 + 3.0 * 0.7615941559557649, rel=1e-14)
 
 
 # ------------------------------------------------------------------ motions

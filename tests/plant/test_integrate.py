@@ -57,8 +57,9 @@ def test_error_estimate_is_that_of_the_book() -> None:
     # |h| err5^2 / sqrt((err5^2 + 0.01 err3^2) n), from SciPy's arrays, on a step whose stages are plain powers of time
     from scipy.integrate import DOP853
 
-    h, start = 0.7, (1.0,)
-    _, error = rk_step(lambda x: (-x[0],), start, (-1.0,), h, (1.0,))
+    h = 0.7
+    # two components alike: the mean over them is that of one
+    _, error = rk_step(lambda x: (-x[0], -x[1]), (1.0, 1.0), (-1.0, -1.0), h, (1.0, 1.0))
     stages = [-1.0]
     for row in [*DOP853.A[1:], DOP853.B]:
         stages.append(-(1.0 + h * float(np.dot(row[: len(stages)], stages))))
@@ -78,6 +79,21 @@ def test_global_error_falls_with_the_tolerance() -> None:
     assert all(e < 30.0 * t for e, t in zip(errors, tolerances))
     assert evaluations == sorted(evaluations)
     assert slope(tolerances, np.array(errors)) == pytest.approx(1.0, abs=0.25)
+
+
+def test_few_steps_are_refused() -> None:
+    accepted = 0
+
+    def accept(x: Vector) -> None:
+        nonlocal accepted
+        accepted += 1
+
+    result = integrate(pendulum, PENDULUM_START, 50.0, tolerance=1e-9, scale=UNIT, accept=accept)
+    assert accepted > 50
+    assert result.steps < 1.35 * accepted
+    # and the steps are as long as they may be: SciPy's control of the same method takes about as many
+    other = solve_ivp(lambda _, y: pendulum(y), (0.0, 50.0), PENDULUM_START, method="DOP853", rtol=1e-9, atol=1e-9)
+    assert result.evaluations < 1.1 * other.nfev
 
 
 def test_polynomials_up_to_the_seventh_power_are_exact() -> None:

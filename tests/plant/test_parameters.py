@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import FrozenInstanceError, asdict, fields, replace
+from dataclasses import MISSING, FrozenInstanceError, asdict, fields, replace
 from math import cos, hypot, inf, nan, pi, sin
 from typing import Any
 
@@ -110,6 +110,12 @@ def test_branch_is_one_of_two(value: float) -> None:
     error = refusal(assembly_branch=value)
     assert error.name == "assembly.branch"
     assert "+1 or -1, the sign of sin(rocker.angle - coupler.angle)" in str(error)
+
+
+def test_defaults_are_nothing_but_gravity_and_the_thesiss_assembly() -> None:
+    defaults = {f.name: f.default for f in fields(FiveBarParameters) if f.default is not MISSING}
+    assert {name: value for name, value in defaults.items() if value != 0.0} == {"gravity": 9.81, "assembly_branch": 1}
+    assert len(defaults) == 15
 
 
 def test_crank_inertia_about_the_shaft_includes_its_mass() -> None:

@@ -30,6 +30,7 @@ from linkwork.five_bar.plant import (
     Plant,
     check_assembly,
     check_tolerance,
+    error_scale,
 )
 from linkwork.five_bar.published import SETS, TABLE_3_1
 from tests import published
@@ -178,6 +179,23 @@ def test_jump_of_the_speed_conserves_the_momentum_of_the_slider(seed: int) -> No
     assert plant.state[3] == pytest.approx(after.slider_velocity, rel=1e-5, abs=1e-5)
 
 
+def test_step_size_is_carried_from_step_to_step(monkeypatch: pytest.MonkeyPatch) -> None:
+    plant = speed_plant()
+    go(plant, 10, 1e-4)
+    assert plant.save()["step_size"] > 1e-4
+    calls = 0
+    original = dynamics.derivative
+
+    def counted(*arguments: Any) -> dynamics.State:
+        nonlocal calls
+        calls += 1
+        return original(*arguments)
+
+    monkeypatch.setattr(dynamics, "derivative", counted)
+    plant.step(10 * 1e-4, 1e-4)
+    assert calls == 13  # one step of the integrator, with the evaluations at its start and its end
+
+
 def test_setting_the_same_speed_again_does_nothing() -> None:
     plain, told = speed_plant(), speed_plant()
     for n in range(5):
@@ -278,6 +296,12 @@ def test_rounding_of_the_masters_clock_is_no_gap() -> None:
     assert plant.time == pytest.approx(0.1001, rel=1e-12)
 
 
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_millionth_of_the_step_is_what_counts_as_rounding(sign: float) -> None:
+    running().step(0.01 + sign * 0.9e-9, 1e-3)
+    assert_refused(running(), StepError, "a step (backwards|over a gap)", 0.01 + sign * 1.1e-9, 1e-3)
+
+
 @pytest.mark.parametrize("value", [nan, inf, -inf])
 @pytest.mark.parametrize("name", INPUT_NAMES)
 def test_input_that_is_not_finite(name: str, value: float) -> None:
@@ -331,9 +355,33 @@ def test_one_long_step_into_the_limit_is_refused_as_well() -> None:
     assert_refused(falling(), AssemblyError, r"in the step from t = 0 s: limit of assembly", 0.0, 10 * TURN)
 
 
+def test_errors_count_as_absolute_below_the_scale_of_the_mechanism() -> None:
+    par = TABLE_3_1
+    masses = par.coupler_mass + par.rocker_mass + par.slider_mass
+    energy = 0.5 * (par.crank_inertia + masses * par.crank_length**2) * 40.0**2
+    expected = (1.0, par.crank_length, 40.0, 40.0 * par.crank_length, energy, energy)
+    assert error_scale(par, -40.0) == pytest.approx(expected, rel=1e-14)
+    assert error_scale(par, 0.1) == error_scale(par, 1.0)  # one rad/s at least
+
+
 def test_step_that_cannot_meet_its_tolerance() -> None:
     plant = Plant(TABLE_3_1, InitialState(), inputs={"slider.force": 1e200})
-    assert_refused(plant, LinkworkError, r"in the step from t = 0 s: ", 0.0, 1.0)
+    match = r"in the step from t = 0 s: .*, at crank angle 0 rad and slider position 0 m"
+    assert_refused(plant, IntegrationError, match, 0.0, 1.0)
+
+
+def test_refused_step_leaves_a_newly_commanded_speed_waiting() -> None:
+    plant = falling()
+    go(plant, 10, 1e-3)
+    plant.set_input("drive.speed", 0.9 * W)
+    assert_refused(plant, AssemblyError, "limit of assembly", plant.time, 10 * TURN)
+    other = falling()
+    go(other, 10, 1e-3)
+    other.set_input("drive.speed", 0.9 * W)
+    for p in (plant, other):
+        p.step(p.time, 1e-3)
+    assert plant.state == other.state
+    assert plant.state[2] == pytest.approx(0.9 * W, rel=1e-14)
 
 
 def test_refused_step_can_be_taken_shorter() -> None:
@@ -361,8 +409,9 @@ def test_start_at_the_limit_of_assembly() -> None:
     stretched = 0.30 - 0.1535 + 0.05
     with pytest.raises(AssemblyError, match=r"limit of assembly .* collinear to 0\.0\d\d deg"):
         check_assembly(TABLE_3_1, 0.0, stretched - 1e-9)
-    # sin(th4 - th3) = sin(2 asin(BD/2/l)): about 2 sqrt(2 x / 0.3) for x short of stretched
-    inside = 0.3 / 8 * LIMIT_SINE**2
+    # at the limit the sine is 1e-3: it is about 2 sqrt(2 x / 0.3) for BD short of stretched by x
+    assert LIMIT_SINE == 1e-3
+    inside = 0.3 / 8 * 1e-3**2
     check_assembly(TABLE_3_1, 0.0, stretched - 1.05 * inside)
     with pytest.raises(AssemblyError):
         check_assembly(TABLE_3_1, 0.0, stretched - 0.95 * inside)
@@ -376,7 +425,7 @@ def test_drive_mode_is_one_of_two(mode: Any) -> None:
 
 @pytest.mark.parametrize("tolerance", [0.0, -1e-6, 0.1, 1e-16, nan, inf])
 def test_tolerance_out_of_range(tolerance: float) -> None:
-    with pytest.raises(ParameterError, match=r"solver\.tolerance is .* between 1e-13 and 0\.01"):
+    with pytest.raises(ParameterError, match=r"solver\.tolerance is .* between 1e-13 and 0\.01$"):
         check_tolerance(tolerance)
     with pytest.raises(ParameterError, match=r"solver\.tolerance"):
         Plant(TABLE_3_1, InitialState(), tolerance=tolerance)
@@ -481,3 +530,62 @@ def test_two_plants_do_not_share_anything() -> None:
     assert other.state == running().state
     assert np.all(np.array(one.state) != np.array(other.state), where=[True, True, False, True, True, True])
     assert issubclass(IntegrationError, LinkworkError)
+
+
+@pytest.mark.parametrize(
+    ("key", "value"),
+    [
+        ("state", [0.0] * 5),
+        ("state", ["a"] * 6),
+        ("state", [nan] * 6),
+        ("tolerance", nan),
+        ("drive_mode", 7),
+        ("time", "x"),
+        ("time", inf),
+        ("step_size", "x"),
+        ("start_energy", None),
+        ("scale", [0.0] * 6),
+        ("scale", [1.0] * 5),
+        ("inputs", dict.fromkeys(("drive.torque",), 0.0)),
+        ("parameters", {}),
+        ("speed_commanded", "no"),
+    ],
+)
+def test_a_damaged_saved_state_is_refused(key: str, value: Any) -> None:
+    saved = Plant(TABLE_3_1, InitialState()).save()
+    assert Plant.restore(dict(saved)).save() == saved
+    with pytest.raises(StateError):
+        Plant.restore({**saved, key: value})
+
+
+def test_a_repeated_small_step_is_told_even_by_a_long_one() -> None:
+    plant = Plant(TABLE_3_1, InitialState())
+    plant.step(0.0, 1e-6)
+    with pytest.raises(StepError, match="backwards"):
+        plant.step(0.0, 0.1)
+
+
+def test_steps_late_in_a_long_run_are_taken_for_what_they_are() -> None:
+    plant = Plant(TABLE_3_1, InitialState(), time=1e6)
+    for k in range(5):
+        plant.step(1e6 + k * 1e-6, 1e-6)
+    with pytest.raises(StepError, match="backwards"):
+        plant.step(1e6 + 3e-6, 1e-6)
+
+
+def test_a_speed_too_large_for_finite_outputs_is_told() -> None:
+    plant = speed_plant()
+    plant.set_input("drive.speed", 1e200)
+    with pytest.raises(InputError, match=r"drive\.speed is 1e\+200"):
+        plant.outputs()
+
+
+def test_a_start_time_that_is_not_finite_is_refused() -> None:
+    with pytest.raises(InputError, match="time at the start"):
+        Plant(TABLE_3_1, InitialState(), time=nan)
+
+
+@pytest.mark.parametrize("name", ["crank_length", "coupler_cog_distance", "crank_cog_distance"])
+def test_lengths_whose_moments_of_inertia_overflow_are_refused_by_name(name: str) -> None:
+    with pytest.raises(ParameterError, match=name.replace("_", r"\.", 1) + "|crank.inertia"):
+        replace(TABLE_3_1, **{name: 1e200, "crank_mass": 1.0})

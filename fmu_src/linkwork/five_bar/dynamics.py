@@ -292,7 +292,8 @@ def potential_energy(g: Position, u: float, p: Constants) -> float:
         + p.mx4 * g.s4
         + p.my4 * g.c4
     )
-    return 0.5 * p.k * (u - p.u0) ** 2 - p.gx * x - p.gy * y
+    stretch = u - p.u0
+    return 0.5 * p.k * stretch * stretch - p.gx * x - p.gy * y
 
 
 def mechanical_energy(x: State, p: Constants) -> float:

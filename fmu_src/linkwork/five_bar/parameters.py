@@ -120,6 +120,8 @@ class FiveBarParameters:
             value = getattr(self, field.name)
             if isinstance(value, bool) or not isinstance(value, (int, float)):
                 raise ParameterError(name, value, "be a number in SI units")
+            if isinstance(value, int) and abs(value) > 10**15:
+                raise ParameterError(name, value, "be a float where it is that large")
             if field.name == "assembly_branch":
                 if value not in (1, -1):
                     raise ParameterError(name, value, "be +1 or -1, the sign of sin(rocker.angle - coupler.angle)")
@@ -131,7 +133,7 @@ class FiveBarParameters:
                     raise ParameterError(name, value, "be a finite number")
             elif not (isfinite(value) and value >= 0.0):
                 raise ParameterError(name, value, NOT_NEGATIVE)
-        steiner = self.crank_mass * self.crank_cog_distance**2
+        steiner = self.crank_mass * self.crank_cog_distance * self.crank_cog_distance
         if self.crank_inertia < steiner * (1.0 - 1e-12):
             raise ParameterError(
                 "crank.inertia",
@@ -140,6 +142,11 @@ class FiveBarParameters:
             )
         if self.rocker_mass + self.slider_mass <= 0.0:
             raise ParameterError("slider.mass", self.slider_mass, "be greater than zero where rocker.mass is zero")
+        if not all(isfinite(constant) for constant in self.constants()):
+            largest = max((field.name for field in fields(self)), key=lambda name: abs(getattr(self, name)))
+            raise ParameterError(
+                fmi_name(largest), getattr(self, largest), "be small enough for finite moments of inertia"
+            )
 
     def constants(self) -> Constants:
         """The constants of the equations."""
@@ -170,9 +177,9 @@ class FiveBarParameters:
             my3=my3,
             mx4=mx4,
             my4=my4,
-            i2b=self.crank_inertia + self.coupler_mass * self.crank_length**2,
-            i3b=self.coupler_inertia + self.coupler_mass * self.coupler_cog_distance**2,
-            i4d=self.rocker_inertia + self.rocker_mass * self.rocker_cog_distance**2,
+            i2b=self.crank_inertia + self.coupler_mass * self.crank_length * self.crank_length,
+            i3b=self.coupler_inertia + self.coupler_mass * self.coupler_cog_distance * self.coupler_cog_distance,
+            i4d=self.rocker_inertia + self.rocker_mass * self.rocker_cog_distance * self.rocker_cog_distance,
             k=float(self.slider_stiffness),
             u0=float(self.slider_spring_free_position),
             mu=float(self.slider_damping),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import asdict
-from math import asin, degrees, isfinite
+from math import asin, degrees, isfinite, ulp
 from typing import Any
 
 from ..errors import AssemblyError, InputError, IntegrationError, LinkworkError, ParameterError, StateError, StepError
@@ -107,6 +107,8 @@ class Plant:
         if drive_mode not in (TORQUE_DRIVE, SPEED_DRIVE):
             raise ParameterError("drive.mode", drive_mode, "be 0 (torque) or 1 (speed)")
         check_tolerance(tolerance)
+        if not isfinite(time):
+            raise InputError(f"the time at the start is {time} s: it must be a finite number")
         check_assembly(parameters, initial.crank_angle, initial.slider_position)
         self.parameters = parameters
         self.drive_mode = drive_mode
@@ -168,10 +170,16 @@ class Plant:
         Raises
         ------
         InputError
-            If an input is not finite.
+            If an input is not finite, or so large that an output is not.
         """
         self._check_inputs()
-        return dynamics.outputs(self._current(), self._inputs(), self.start_energy, self._p)
+        result = dynamics.outputs(self._current(), self._inputs(), self.start_energy, self._p)
+        if not all(map(isfinite, result)):
+            largest = max(self.inputs, key=lambda name: abs(self.inputs[name]))
+            raise InputError(
+                f"an output is not finite at t = {self.time:.9g} s: input {largest} is {self.inputs[largest]:g}, too large"
+            )
+        return result
 
     def step(self, time: float, step: float) -> None:
         """Go forward from ``time`` by ``step`` seconds under the inputs in force.
@@ -193,7 +201,8 @@ class Plant:
             raise StepError(f"a step of {step} s from t = {time} s: both must be finite numbers")
         if step <= 0.0:
             raise StepError(f"a step of {step:.9g} s at t = {time:.9g} s: it must be greater than zero")
-        slack = 1e-6 * step + 1e-12 * abs(self.time)
+        # what rounding in the master's own sum of steps can make, and no more: a repeated step of a microsecond is told
+        slack = min(1e-6 * step, 1e-9) + 8.0 * ulp(max(abs(time), abs(self.time)))
         if abs(time - self.time) > slack:
             way = "backwards" if time < self.time else "over a gap"
             raise StepError(f"a step {way}: it starts at t = {time:.9g} s, but the state is at t = {self.time:.9g} s")
@@ -277,7 +286,8 @@ class Plant:
             plant.drive_mode = saved["drive_mode"]
             plant.tolerance = saved["tolerance"]
             plant.time = saved["time"]
-            plant.inputs = {name: saved["inputs"][name] for name in INPUT_NAMES}
+            # an input that is not finite may well be saved: it is told at the next step
+            plant.inputs = {name: float(saved["inputs"][name]) for name in INPUT_NAMES}
             th2, u, w2, v, dissipated, supplied = saved["state"]
             plant.state = (th2, u, w2, v, dissipated, supplied)
             plant._speed_commanded = saved["speed_commanded"]
@@ -285,6 +295,17 @@ class Plant:
             plant._scale = tuple(saved["scale"])
             plant.start_energy = saved["start_energy"]
             plant._p = plant.parameters.constants()
+            check_tolerance(plant.tolerance)
+            numbers = (plant.time, plant._step_size, plant.start_energy, *plant.state, *plant._scale)
+            whole = (
+                plant.drive_mode in (TORQUE_DRIVE, SPEED_DRIVE)
+                and isinstance(plant._speed_commanded, bool)
+                and len(plant._scale) == len(plant.state)
+                and min(plant._scale) > 0.0
+                and all(isfinite(number) for number in numbers)
+            )
         except (KeyError, TypeError, ValueError) as error:
             raise StateError(f"the saved state is not one of a five-bar slider: {error!r}") from error
+        if not whole:
+            raise StateError("the saved state is not one of a five-bar slider: a number in it is missing or not finite")
         return plant
