@@ -5,7 +5,8 @@ an explicit signature, so that compiled code is kept on disk and a second proces
 a called function changes; the folder of the cache therefore carries a hash of the plant's sources and of this file.
 
 The integrator is DOP853 (`linkwork.tableau`) with its interpolant of order 7, the same method as the FMU's, written
-again for arrays; inputs are evaluated inside the loop.
+again for arrays; inputs are evaluated inside the loop. A run goes from one interval of smooth inputs to the next, ends of
+intervals being breaks of the inputs, points at which they are sampled and held, and the release of the torsion bar.
 """
 
 from __future__ import annotations
@@ -13,14 +14,17 @@ from __future__ import annotations
 import hashlib
 import os
 import tempfile
-from math import cos, isnan, sin
+from math import cos, isfinite, isnan, sin
 from pathlib import Path
+from typing import NamedTuple
 
 import numba
 import numpy as np
+from llvmlite import ir
 from numba import boolean, float64, int64, njit, types
-from numba.extending import register_jitable
+from numba.extending import intrinsic, register_jitable
 from numba.np.unsafe.ndarray import to_fixed_tuple
+from numpy.typing import NDArray
 from platformdirs import user_cache_dir
 
 import linkwork
@@ -30,16 +34,34 @@ from linkwork.five_bar.dynamics import Inputs
 from linkwork.five_bar.kinematics import LIMIT_SINE
 from linkwork.five_bar.parameters import Constants
 
-# Status of a run, as the kernels return it
+# Status of a run, as the kernels return it: where the run has one, the solver.status of the FMI contract
 RUNNING = -1
 FINISHED = 0
+BAD_INPUT = 2
 LIMIT = 3
 NO_STEP = 4
 EVENT = 10
 
-# Places in the array that carries a run from one call to the next
-TIME, STEP, SAMPLE, INTERVAL, EVENTS, STEPS, REJECTED, EVALUATIONS, FRESH = range(9)
-CARRY = 9
+# Places in the array that carries a run from one call to the next: time at which the interval began and time since then,
+# next step, next sample, number of the interval, events found, counts, whether the run has started and is inside an
+# interval, the input that was not finite, and from HELD on the six inputs in force
+BEGIN, ELAPSED, STEP, SAMPLE, INTERVAL, EVENTS, STEPS, REJECTED, EVALUATIONS, STARTED, MIDWAY, LOST, HELD = range(13)
+CARRY = HELD + 6
+
+#: Events that one step can bring at most, and the beginning of an interval besides.
+EVENTS_PER_STEP = 4
+#: Fraction of a step within which an event counts as simultaneous with the end of the run or the release.
+SAME = 1e-9
+
+
+class Source(NamedTuple):
+    """Inputs as the compiled code reads them: see `analysis.inputs.Encoded`; ``functions`` are addresses, or 0, shape (6,)."""
+
+    breaks: NDArray[np.float64]
+    coefficients: NDArray[np.float64]
+    harmonics: NDArray[np.float64]
+    law: NDArray[np.float64]
+    functions: NDArray[np.int64]
 
 
 def cache_folder() -> Path:
@@ -50,25 +72,39 @@ def cache_folder() -> Path:
         digest.update(path.relative_to(root).as_posix().encode())
         digest.update(path.read_bytes())
     digest.update(Path(__file__).read_bytes())
-    base = Path(os.environ.get("LINKWORK_CACHE_DIR") or user_cache_dir("linkwork", appauthor=False))
-    folder = base / f"numba-{digest.hexdigest()[:16]}"
+    name = f"numba-{digest.hexdigest()[:16]}"
+    user = os.getuid() if hasattr(os, "getuid") else 0
+    folder = Path(os.environ.get("LINKWORK_CACHE_DIR") or user_cache_dir("linkwork", appauthor=False)) / name
+    if _usable(folder):
+        return folder
+    folder = Path(tempfile.gettempdir()) / f"linkwork-{user}" / name
+    # what others can write to could make us run their code
+    if _usable(folder) and (os.name == "nt" or all(_private(f, user) for f in (folder.parent, folder))):
+        return folder
+    return Path(tempfile.mkdtemp(prefix="linkwork-"))
+
+
+def _usable(folder: Path) -> bool:
     try:
-        folder.mkdir(parents=True, exist_ok=True)
+        for path in (folder.parent, folder):
+            path.mkdir(mode=0o700, parents=True, exist_ok=True)
         with tempfile.TemporaryFile(dir=folder):
-            pass
+            return True
     except OSError:
-        folder = Path(tempfile.gettempdir()) / f"linkwork-numba-{digest.hexdigest()[:16]}"
-        folder.mkdir(parents=True, exist_ok=True)
-    return folder
+        return False
 
 
-_FUNCTION = types.FunctionType(float64(float64, float64, float64, float64, float64))
-_EVENT_FUNCTION = types.FunctionType(float64(int64, float64, float64, float64, float64, float64))
+def _private(folder: Path, user: int) -> bool:
+    status = folder.lstat()
+    return status.st_uid == user and not status.st_mode & 0o022
+
+
 _CONSTANTS = types.NamedUniTuple(float64, len(Constants._fields), Constants)
 _VECTOR = float64[::1]
 _MATRIX = float64[:, ::1]
 _CUBE = float64[:, :, ::1]
-_FUNCTIONS = (_FUNCTION,) * 6
+_ADDRESSES = int64[::1]
+_SOURCE = types.NamedTuple((_VECTOR, _CUBE, _MATRIX, _VECTOR, _ADDRESSES), Source)
 
 for _function in (
     kinematics.position,
@@ -80,7 +116,6 @@ for _function in (
     kinematics.coupler_point,
     kinematics.coupler_point_velocity,
     kinematics.closure_residual,
-    kinematics.assembly_square,
     dynamics.inertia,
     dynamics.velocity_terms,
     dynamics.friction,
@@ -90,16 +125,15 @@ for _function in (
     dynamics.reactions,
     dynamics.kinetic_energy,
     dynamics.potential_energy,
-    dynamics.mechanical_energy,
     dynamics.jump_speed,
     dynamics.outputs,
 ):
     register_jitable(_function)
 
-_A = np.zeros((16, 16))
-for _i, _row in enumerate(tableau.A):
-    for _j, _weight in _row:
-        _A[_i, _j] = _weight
+# the weights of stage s are _WEIGHT[_ROW[s]:_ROW[s + 1]], those of the stages _FROM
+_ROW = np.cumsum([0, *(len(row) for row in tableau.A)])
+_FROM = np.array([stage for row in tableau.A for stage, _ in row])
+_WEIGHT = np.array([weight for row in tableau.A for _, weight in row])
 _C = np.array(tableau.C)
 _E3 = np.array(tableau.E3)
 _E5 = np.array(tableau.E5)
@@ -117,17 +151,23 @@ def _compile(*signature):  # type: ignore[no-untyped-def]
     return njit(*signature, cache=True, error_model="numpy", nogil=True)
 
 
-@_compile(float64(float64, float64, float64, float64, float64))
-def no_function(t, th2, u, w2, v):  # type: ignore[no-untyped-def]
-    return 0.0
+# inner functions make no arrays: to count the references to those they are handed would cost more than all they do
+_inner = njit(error_model="numpy", _nrt=False)
 
 
-@_compile(float64(int64, float64, float64, float64, float64, float64))
-def no_event(i, t, th2, u, w2, v):  # type: ignore[no-untyped-def]
-    return 0.0
+@intrinsic
+def _call(typing_context, address, t, th2, u, w2, v):  # type: ignore[no-untyped-def]
+    """Value of the function f(t, th2, u, w2, v) of floats at an address, which costs a call nothing to be handed."""
+
+    def generate(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
+        double = ir.DoubleType()
+        function = builder.inttoptr(arguments[0], ir.FunctionType(double, [double] * 5).as_pointer())
+        return builder.call(function, arguments[1:])
+
+    return float64(int64, *[float64] * 5), generate
 
 
-@njit(inline="always")
+@_inner
 def _find(t, breaks):  # type: ignore[no-untyped-def]
     """Piece of the polynomials in force from t on; the outer ones go on beyond the ends."""
     n = breaks.shape[0] - 1
@@ -135,17 +175,25 @@ def _find(t, breaks):  # type: ignore[no-untyped-def]
     return min(max(i, 0), n - 1)
 
 
-@njit
-def _channels(t, piece, th2, u, w2, v, breaks, coefficients, harmonics, law, used, f1, f2, f3, f4, f5, f6):  # type: ignore[no-untyped-def]
+@_inner
+def _find_before(t, breaks):  # type: ignore[no-untyped-def]
+    """Piece of the polynomials in force up to t."""
+    piece = _find(t, breaks)
+    return piece - 1 if piece > 0 and t == breaks[piece] else piece
+
+
+@_inner
+def _channels(t, piece, x, source):  # type: ignore[no-untyped-def]
     """Torque, speed, acceleration, slider force and load at time t on a given piece."""
-    s = t - breaks[piece]
-    c = coefficients[piece]
+    s = t - source.breaks[piece]
+    c = source.coefficients[piece]
     torque = c[0, 0] + s * (c[0, 1] + s * (c[0, 2] + s * c[0, 3]))
     speed = c[1, 0] + s * (c[1, 1] + s * (c[1, 2] + s * c[1, 3]))
     acceleration = c[1, 1] + s * (2.0 * c[1, 2] + s * 3.0 * c[1, 3])
     force = c[2, 0] + s * (c[2, 1] + s * (c[2, 2] + s * c[2, 3]))
     load_x = c[3, 0] + s * (c[3, 1] + s * (c[3, 2] + s * c[3, 3]))
     load_y = c[4, 0] + s * (c[4, 1] + s * (c[4, 2] + s * c[4, 3]))
+    harmonics = source.harmonics
     for k in range(harmonics.shape[0]):
         channel = int(harmonics[k, 0])
         phase = harmonics[k, 2] * t + harmonics[k, 3]
@@ -161,45 +209,89 @@ def _channels(t, piece, th2, u, w2, v, breaks, coefficients, harmonics, law, use
             load_x += value
         else:
             load_y += value
+    law = source.law
     if law[2] != 0.0:
-        torque += law[0] * (1.0 - th2 / law[1])
+        torque += law[0] * (1.0 - x[0] / law[1])
     if law[3] != 0.0:
         # Kloss: 2 Tb / (s / sb + sb / s), written so that it holds at synchronous speed
-        slip = 1.0 - w2 / law[5]
+        slip = 1.0 - x[2] / law[5]
         torque += 2.0 * law[3] * slip * law[4] / (slip * slip + law[4] * law[4])
-    if used[0]:
-        torque += f1(t, th2, u, w2, v)
-    if used[1]:
-        force += f2(t, th2, u, w2, v)
-    if used[2]:
-        load_x += f3(t, th2, u, w2, v)
-    if used[3]:
-        load_y += f4(t, th2, u, w2, v)
-    if used[4]:
-        speed += f5(t, th2, u, w2, v)
-        acceleration += f6(t, th2, u, w2, v)
+    f = source.functions
+    if f[0] != 0:
+        torque += _call(f[0], t, x[0], x[1], x[2], x[3])
+    if f[1] != 0:
+        force += _call(f[1], t, x[0], x[1], x[2], x[3])
+    if f[2] != 0:
+        load_x += _call(f[2], t, x[0], x[1], x[2], x[3])
+    if f[3] != 0:
+        load_y += _call(f[3], t, x[0], x[1], x[2], x[3])
+    if f[4] != 0:
+        speed += _call(f[4], t, x[0], x[1], x[2], x[3])
+        acceleration += _call(f[5], t, x[0], x[1], x[2], x[3])
     return torque, speed, acceleration, force, load_x, load_y
 
 
-@_compile(
-    types.UniTuple(float64, 6)(float64, boolean, _VECTOR, _VECTOR, _CUBE, _MATRIX, _VECTOR, boolean[::1], *_FUNCTIONS)
-)
-def channels(t, left, x, breaks, coefficients, harmonics, law, used, f1, f2, f3, f4, f5, f6):  # type: ignore[no-untyped-def]
+@_compile(types.UniTuple(float64, 6)(float64, boolean, _VECTOR, _SOURCE))
+def channels(t, left, x, source):  # type: ignore[no-untyped-def]
     """Torque, speed, acceleration, slider force and load at time t, as the limit from the left or from the right."""
-    piece = _find(t, breaks)
-    if left and t == breaks[piece] and piece > 0:
-        piece -= 1
-    return _channels(
-        t, piece, x[0], x[1], x[2], x[3], breaks, coefficients, harmonics, law, used, f1, f2, f3, f4, f5, f6
-    )
+    return _channels(t, _find_before(t, source.breaks) if left else _find(t, source.breaks), x, source)
 
 
-@njit(inline="always")
+@_inner
+def _inputs(t, piece, x, drive, source):  # type: ignore[no-untyped-def]
+    a = _channels(t, piece, x, source)
+    return Inputs(drive, a[0], a[2], a[3], a[4], a[5])
+
+
+@_inner
 def _tuple(x):  # type: ignore[no-untyped-def]
     return (x[0], x[1], x[2], x[3], x[4], x[5])
 
 
-@njit
+@_inner
+def _copy(source, target):  # type: ignore[no-untyped-def]
+    for i in range(_N):
+        target[i] = source[i]
+
+
+@_inner
+def _stage(s, x, k, h, y):  # type: ignore[no-untyped-def]
+    """State at stage s of a step of size h from x; stage 12 is its end."""
+    y0 = y1 = y2 = y3 = y4 = y5 = 0.0
+    for n in range(_ROW[s], _ROW[s + 1]):
+        w = _WEIGHT[n]
+        j = _FROM[n]
+        y0 += w * k[j, 0]
+        y1 += w * k[j, 1]
+        y2 += w * k[j, 2]
+        y3 += w * k[j, 3]
+        y4 += w * k[j, 4]
+        y5 += w * k[j, 5]
+    y[0] = x[0] + h * y0
+    y[1] = x[1] + h * y1
+    y[2] = x[2] + h * y2
+    y[3] = x[3] + h * y3
+    y[4] = x[4] + h * y4
+    y[5] = x[5] + h * y5
+
+
+@_inner
+def _error(x, y, k, h, scale):  # type: ignore[no-untyped-def]
+    """Hairer's estimate of the error of a step from x to y relative to the scale, of order 8 in h."""
+    sum3 = sum5 = 0.0
+    for i in range(_N):
+        e3 = e5 = 0.0
+        for j in range(_STAGES):
+            e3 += _E3[j] * k[j, i]
+            e5 += _E5[j] * k[j, i]
+        weight = scale[i] + max(abs(x[i]), abs(y[i]))
+        sum3 += (e3 / weight) ** 2
+        sum5 += (e5 / weight) ** 2
+    bottom = sum5 + 0.01 * sum3
+    return 0.0 if bottom == 0.0 else h * sum5 / np.sqrt(bottom * _N)
+
+
+@_inner
 def _interpolant(x, y, k, h, f):  # type: ignore[no-untyped-def]
     """Coefficients of the interpolant between x and y (Hairer's contd8); k holds all sixteen stages."""
     for i in range(_N):
@@ -214,7 +306,7 @@ def _interpolant(x, y, k, h, f):  # type: ignore[no-untyped-def]
             f[3 + r, i] = h * total
 
 
-@njit
+@_inner
 def _interpolate(s, x, f, out):  # type: ignore[no-untyped-def]
     """State at the fraction s of the step."""
     for i in range(_N):
@@ -225,390 +317,337 @@ def _interpolate(s, x, f, out):  # type: ignore[no-untyped-def]
         out[i] = x[i] + y
 
 
-@njit
-def _event_value(e, t, x, held, levels, f_event, start_energy, p):  # type: ignore[no-untyped-def]
-    """Event e at a state: an output less its level, or a function; zero where the event happens."""
-    which = int(levels[e, 0])
-    if which >= 0:
-        return dynamics.outputs(_tuple(x), held, start_energy, p)[which] - levels[e, 1]
-    return f_event(-1 - which, t, x[0], x[1], x[2], x[3])
-
-
-@njit
-def _gap(e, t, x, held, levels, f_event, release, start_energy, p):  # type: ignore[no-untyped-def]
+@_inner
+def _gap(e, t, x, held, watch, addresses, release, start_energy, p):  # type: ignore[no-untyped-def]
+    """What is zero where something happens: the limit of assembly (-1), the release (-2), event e of the user."""
     if e == -1:
         return p.branch * kinematics.position(x[0], x[1], p).s43 - LIMIT_SINE
     if e == -2:
         return release - x[0]
-    return _event_value(e, t, x, held, levels, f_event, start_energy, p)
+    if addresses[e] != 0:
+        return _call(addresses[e], t, x[0], x[1], x[2], x[3])
+    return dynamics.outputs(_tuple(x), held, start_energy, p)[int(watch[e, 0])] - watch[e, 1]
 
 
-@njit
-def _locate(e, low, high, t, h, x, f, dense, held, levels, f_event, release, start_energy, p):  # type: ignore[no-untyped-def]
-    """Fraction of the step at which event e happens, by bisection of the interpolant between two fractions."""
-    _interpolate(low, x, f, dense)
-    sign = _gap(e, t + low * h, dense, held, levels, f_event, release, start_energy, p) > 0.0
-    for _ in range(54):
-        middle = 0.5 * (low + high)
-        _interpolate(middle, x, f, dense)
+@_inner
+def _locate(e, low, high, t, h, x, f, dense, constant, held, piece, source, watch, addresses, start_energy, p):  # type: ignore[no-untyped-def]
+    """Fraction of the step at which e happens, by bisection of the interpolant between two fractions."""
+    positive = False
+    for n in range(55):
+        s = low if n == 0 else 0.5 * (low + high)
+        _interpolate(s, x, f, dense)
+        if not constant:
+            held = _inputs(t + s * h, piece, dense, held.speed_drive, source)
         # a NaN, beyond the limit of assembly, compares as not positive
-        if (_gap(e, t + middle * h, dense, held, levels, f_event, release, start_energy, p) > 0.0) == sign:
-            low = middle
+        sign = _gap(e, t + s * h, dense, held, watch, addresses, source.law[1], start_energy, p) > 0.0
+        if n == 0:
+            positive = sign
+        elif sign == positive:
+            low = s
         else:
-            high = middle
+            high = s
     # the limit is approached, not passed: its own side must still be a configuration
     return low if e == -1 else high
 
 
-@njit
+@_inner
+def _crosses(before, after, direction):  # type: ignore[no-untyped-def]
+    """Whether an event happens between two values; one that starts at zero does not."""
+    return (before < 0.0 <= after and direction >= 0.0) or (before > 0.0 >= after and direction <= 0.0)
+
+
+@_inner
+def _record(found, n, e, t, x):  # type: ignore[no-untyped-def]
+    found[n, 0] = e
+    found[n, 1] = t
+    for i in range(_N):
+        found[n, 2 + i] = x[i]
+
+
+@njit(error_model="numpy")
 def _run(
-    p,
-    x,
-    carry,
-    end,
-    speed_drive,
-    hold,
-    steady,
-    breaks,
-    coefficients,
-    harmonics,
-    law,
-    used,
-    f1,
-    f2,
-    f3,
-    f4,
-    f5,
-    f6,
-    tolerance,
-    scale,
-    samples,
-    states,
-    forces,
-    levels,
-    f_event,
-    found,
-    start_energy,
-    max_steps,
-):  # type: ignore[no-untyped-def]
+    p, x, carry, end, speed_drive, hold, steady, source, tolerance, scale, samples, states, forces, watch, addresses,
+    gaps, found, start_energy, max_steps,
+):  # type: ignore[no-untyped-def]  # fmt: skip
     """Integrate until ``end``, a stopping event, or ``max_steps``; see `run` for the arguments."""
     drive = 1.0 if speed_drive else 0.0
+    breaks = source.breaks
+    law = source.law
+    n_samples = samples.shape[0]
+    n_events = watch.shape[0]
     k = np.zeros((16, _N))
     y = np.empty(_N)
     z = np.empty(_N)
-    f = np.empty((7, _N))
     dense = np.empty(_N)
-    n_events = levels.shape[0]
-    before = np.empty(n_events)
-    after = np.empty(n_events)
-    held = Inputs(drive, 0.0, 0.0, 0.0, 0.0, 0.0)
-    t = carry[TIME]
+    f = np.empty((7, _N))
+    begin = carry[BEGIN]
+    elapsed = carry[ELAPSED]
     h_next = carry[STEP]
     sample = int(carry[SAMPLE])
     interval = int(carry[INTERVAL])
     n_found = int(carry[EVENTS])
-    first_time = carry[FRESH] == 0.0
-    origin = samples[0]
+    started = carry[STARTED] != 0.0
+    midway = carry[MIDWAY] != 0.0
+    held = Inputs(drive, carry[HELD + 1], carry[HELD + 2], carry[HELD + 3], carry[HELD + 4], carry[HELD + 5])
     steps = 0
-    status = RUNNING
-    constant = steady or hold > 0.0
     paused = False
+    status = RUNNING
     while status == RUNNING:
-        # an interval on which the inputs are smooth begins: find its end, and the inputs if they stay as they are
-        piece = _find(t, breaks)
+        # an interval on which the inputs are smooth begins, or is gone on with: find its end
+        piece = _find(begin, breaks)
+        constant = hold > 0.0 or (steady and (law[2] == 0.0 or x[0] >= law[1]))
+        stop = end
         if hold > 0.0:
-            stop = origin + (interval + 1) * hold
-            # the end of the run falls on the grid, but for rounding
-            if stop > end - 1e-9 * hold:
-                stop = end
-            torque, speed, acceleration, force, load_x, load_y = _channels(
-                t, piece, x[0], x[1], x[2], x[3], breaks, coefficients, harmonics, law, used, f1, f2, f3, f4, f5, f6
-            )
-            ahead = stop if t < end else t + hold
-            if speed_drive:
-                piece_ahead = _find(ahead, breaks)
-                if ahead == breaks[piece_ahead] and piece_ahead > 0:
-                    piece_ahead -= 1
+            if interval + 1 < n_samples:
+                stop = samples[interval + 1]
+        elif piece + 1 < breaks.shape[0] - 1 and breaks[piece + 1] < end:
+            stop = breaks[piece + 1]
+        if not midway:
+            if n_found + (1 + EVENTS_PER_STEP) * n_events > found.shape[0]:
+                paused = True
+                break
+            if law[2] != 0.0 and x[0] >= law[1]:
+                law[2] = 0.0
+            now = _channels(begin, piece, x, source)
+            acceleration = now[2]
+            if hold > 0.0 and speed_drive:
                 # the secant: the speed meets the command again at the next point of the grid
-                there = _channels(
-                    ahead, piece_ahead, x[0], x[1], x[2], x[3], breaks, coefficients, harmonics, law, used,
-                    f1, f2, f3, f4, f5, f6,
-                )[1]  # fmt: skip
-                acceleration = (there - speed) / (ahead - t)
-            if law[2] != 0.0 and x[0] >= law[1]:
-                torque -= law[0] * (1.0 - x[0] / law[1])
-                law[2] = 0.0
-        else:
-            stop = end
-            if piece + 1 < breaks.shape[0] - 1 and breaks[piece + 1] < end:
-                stop = breaks[piece + 1]
-            if law[2] != 0.0 and x[0] >= law[1]:
-                law[2] = 0.0
-            torque, speed, acceleration, force, load_x, load_y = _channels(
-                t, piece, x[0], x[1], x[2], x[3], breaks, coefficients, harmonics, law, used, f1, f2, f3, f4, f5, f6
-            )
-        held = Inputs(drive, torque, acceleration, force, load_x, load_y)
-        if speed_drive and x[2] != speed:
-            if first_time:
-                x[2] = speed
-            else:
-                jumped = dynamics.jump_speed(_tuple(x), speed, p)
-                for i in range(_N):
-                    x[i] = jumped[i]
-        first_time = False
-        # samples at the beginning of the interval, with the inputs that begin here
-        while sample < samples.shape[0] and samples[sample] <= t:
-            for i in range(_N):
-                states[sample, i] = x[i]
+                ahead = stop if begin < end else begin + hold
+                there = _channels(ahead, _find_before(ahead, breaks), x, source)
+                acceleration = (there[1] - now[1]) / (ahead - begin)
+            held = Inputs(drive, now[0], acceleration, now[3], now[4], now[5])
+            if not isfinite(acceleration):
+                # by name, the speed at the next point of the grid
+                status = BAD_INPUT
+                carry[LOST] = 1
             for i in range(6):
-                forces[sample, i] = held[i]
-            sample += 1
-        if t >= end:
-            status = FINISHED
-            break
-        d = dynamics.derivative(_tuple(x), held, p)
+                if not isfinite(now[i]):
+                    status = BAD_INPUT
+                    carry[LOST] = i
+            if status != RUNNING:
+                break
+            if speed_drive and x[2] != now[1]:
+                if started:
+                    _copy(dynamics.jump_speed(_tuple(x), now[1], p), x)
+                else:
+                    x[2] = now[1]
+            # samples at the beginning of the interval, with the inputs that begin here
+            while sample < n_samples and samples[sample] <= begin:
+                _copy(x, states[sample])
+                _copy(held, forces[sample])
+                sample += 1
+            # what the inputs' jump made happen; a zero stands for what has just been told, and is to be left before it counts
+            for e in range(n_events):
+                before = gaps[e]
+                if started and before == 0.0:
+                    continue
+                gaps[e] = _gap(e, begin, x, held, watch, addresses, law[1], start_energy, p)
+                if started and _crosses(before, gaps[e], watch[e, 2]):
+                    _record(found, n_found, e, begin, x)
+                    n_found += 1
+                    if watch[e, 3] != 0.0:
+                        status = EVENT
+            started = True
+            if status == RUNNING and begin >= end:
+                status = FINISHED
+            if status != RUNNING:
+                break
+        midway = False
+        _copy(dynamics.derivative(_tuple(x), held, p), k[0])
         carry[EVALUATIONS] += 1
-        for i in range(_N):
-            k[0, i] = d[i]
-        for e in range(n_events):
-            before[e] = _event_value(e, t, x, held, levels, f_event, start_energy, p)
         if not h_next > 0.0:
             ratio = 1e-300
             for i in range(_N):
                 ratio = max(ratio, abs(k[0, i]) / (scale[i] + abs(x[i])))
-            h_next = min(stop - t, tolerance ** (-_EXPONENT) / ratio)
-        begin = t
-        switched = False
-        while not switched:
-            remaining = stop - t
-            last = h_next >= remaining * (1.0 - 1e-10)
-            if last:
-                h = remaining
-            elif h_next > 0.5 * remaining:
-                h = 0.5 * remaining
-            else:
-                h = h_next
-            # between two calls the inputs of a held interval would be sampled anew: it is always finished
-            if steps >= max_steps and (hold == 0.0 or t == begin):
-                paused = True
+            h_next = min(stop - begin, tolerance ** (-_EXPONENT) / ratio)
+        # steps, until the interval is over or cut short
+        while True:
+            if steps >= max_steps or n_found + EVENTS_PER_STEP * n_events > found.shape[0]:
+                paused = midway = True
+                if not constant:
+                    # after a step that was refused they are those of one of its stages
+                    held = _inputs(begin + elapsed, piece, x, drive, source)
                 break
+            t = begin + elapsed
+            remaining = (stop - begin) - elapsed
+            last = h_next >= remaining * (1.0 - 1e-10)
+            h = remaining if last else min(h_next, 0.5 * remaining)
             steps += 1
-            # the twelve stages
-            for s in range(1, _STAGES + 1):
-                for i in range(_N):
-                    total = 0.0
-                    for j in range(s):
-                        total += _A[s, j] * k[j, i]
-                    y[i] = x[i] + h * total
-                if s < _STAGES:
-                    if not constant:
-                        ts = t + _C[s] * h
-                        a = _channels(
-                            ts, piece, y[0], y[1], y[2], y[3], breaks, coefficients, harmonics, law, used,
-                            f1, f2, f3, f4, f5, f6,
-                        )  # fmt: skip
-                        held = Inputs(drive, a[0], a[2], a[3], a[4], a[5])
-                    d = dynamics.derivative(_tuple(y), held, p)
-                    for i in range(_N):
-                        k[s, i] = d[i]
+            for s in range(1, _STAGES):
+                _stage(s, x, k, h, y)
+                if not constant:
+                    held = _inputs(t + _C[s] * h, piece, y, drive, source)
+                _copy(dynamics.derivative(_tuple(y), held, p), k[s])
+            _stage(_STAGES, x, k, h, y)
             carry[EVALUATIONS] += _STAGES - 1
-            sum3 = 0.0
-            sum5 = 0.0
-            for i in range(_N):
-                e3 = 0.0
-                e5 = 0.0
-                for j in range(_STAGES):
-                    e3 += _E3[j] * k[j, i]
-                    e5 += _E5[j] * k[j, i]
-                weight = scale[i] + max(abs(x[i]), abs(y[i]))
-                sum3 += (e3 / weight) ** 2
-                sum5 += (e5 / weight) ** 2
-            bottom = sum5 + 0.01 * sum3
-            error = 0.0 if bottom == 0.0 else h * sum5 / np.sqrt(bottom * _N) / tolerance
+            error = _error(x, y, k, h, scale) / tolerance
             good = error <= 1.0
             if good:
-                t_new = stop if last else t + h
+                t_new = stop if last else begin + (elapsed + h)
                 if not constant:
-                    a = _channels(
-                        t_new, piece, y[0], y[1], y[2], y[3], breaks, coefficients, harmonics, law, used,
-                        f1, f2, f3, f4, f5, f6,
-                    )  # fmt: skip
-                    held = Inputs(drive, a[0], a[2], a[3], a[4], a[5])
-                d = dynamics.derivative(_tuple(y), held, p)
+                    held = _inputs(t_new, piece, y, drive, source)
+                _copy(dynamics.derivative(_tuple(y), held, p), k[12])
                 carry[EVALUATIONS] += 1
                 for i in range(_N):
-                    k[12, i] = d[i]
-                    if isnan(d[i]):
+                    if isnan(k[12, i]):
                         good = False
             if not good:
                 carry[REJECTED] += 1
-                h_next = h * (max(0.2, 0.9 * error**_EXPONENT) if error < 1e30 else 0.25)
-                if h_next < 1e-14 * max(abs(t), end - origin):
-                    g = kinematics.position(x[0], x[1], p)
-                    status = LIMIT if abs(g.s43) < 0.05 else NO_STEP
+                h_next = h * (max(0.2, 0.9 * error**_EXPONENT) if 1.0 < error < 1e30 else 0.25)
+                if not h_next >= 1e-14 * max(abs(t), end - samples[0]):
+                    status = LIMIT if abs(kinematics.position(x[0], x[1], p).s43) < 0.05 else NO_STEP
+                    if not constant:
+                        # where a step is impossible however short, an input may be what stops it
+                        for i in range(_N):
+                            z[i] = x[i] + h * k[0, i]
+                        now = _channels(t + h, piece, z, source)
+                        for i in range(6):
+                            if not isfinite(now[i]):
+                                status = BAD_INPUT
+                                carry[LOST] = i
+                        held = _inputs(t, piece, x, drive, source)
                     break
                 continue
-            # accepted; what happens inside the step needs the interpolant
             factor = 6.0 if error == 0.0 else min(6.0, 0.9 * error**_EXPONENT)
+            # a step cut short by the end of the interval does not shorten the one carried over
             h_next = max(h_next, factor * h) if h < h_next else max(0.2, factor) * h
-            bar = law[2] != 0.0 and hold == 0.0
+            # what happens inside the step needs the interpolant
             limit = p.branch * kinematics.position(y[0], y[1], p).s43 < LIMIT_SINE
-            wanted = sample < samples.shape[0] and (samples[sample] < t_new)
-            inside = wanted or n_events > 0 or limit or (bar and y[0] >= law[1])
-            if inside:
+            release = law[2] != 0.0 and hold == 0.0 and y[0] >= law[1]
+            if limit or release or n_events > 0 or (sample < n_samples and samples[sample] < t_new):
+                inside = held
                 for s in range(13, 16):
-                    for i in range(_N):
-                        total = 0.0
-                        for j in range(s):
-                            total += _A[s, j] * k[j, i]
-                        z[i] = x[i] + h * total
+                    _stage(s, x, k, h, z)
                     if not constant:
-                        a = _channels(
-                            t + _C[s] * h, piece, z[0], z[1], z[2], z[3], breaks, coefficients, harmonics, law, used,
-                            f1, f2, f3, f4, f5, f6,
-                        )  # fmt: skip
-                        held = Inputs(drive, a[0], a[2], a[3], a[4], a[5])
-                    d = dynamics.derivative(_tuple(z), held, p)
-                    for i in range(_N):
-                        k[s, i] = d[i]
+                        inside = _inputs(t + _C[s] * h, piece, z, drive, source)
+                    _copy(dynamics.derivative(_tuple(z), inside, p), k[s])
                 carry[EVALUATIONS] += 3
                 _interpolant(x, y, k, h, f)
             # the earliest of: limit of assembly (-1), release of the torsion bar (-2), a stopping event (its number)
             cut = 2.0
-            what = -9
+            what = 0
             if limit:
-                cut = _locate(-1, 0.0, 1.0, t, h, x, f, dense, held, levels, f_event, law[1], start_energy, p)
                 what = -1
-            if bar and y[0] >= law[1]:
-                s_bar = _locate(-2, 0.0, 1.0, t, h, x, f, dense, held, levels, f_event, law[1], start_energy, p)
-                if s_bar < cut:
-                    cut = s_bar
+                cut = _locate(
+                    -1, 0.0, 1.0, t, h, x, f, dense, constant, held, piece, source, watch, addresses, start_energy, p
+                )
+            if release:
+                s = _locate(
+                    -2, 0.0, 1.0, t, h, x, f, dense, constant, held, piece, source, watch, addresses, start_energy, p
+                )
+                if s < cut:
+                    cut = s
                     what = -2
+            n_before = n_found
             for e in range(n_events):
-                g0 = before[e]
-                s0 = 0.0
-                first = 2.0
-                for quarter in range(1, 5):
-                    s1 = 0.25 * quarter
-                    _interpolate(s1, x, f, dense)
-                    if not constant:
-                        a = _channels(
-                            t + s1 * h, piece, dense[0], dense[1], dense[2], dense[3],
-                            breaks, coefficients, harmonics, law, used, f1, f2, f3, f4, f5, f6,
+                for quarter in range(EVENTS_PER_STEP):
+                    s0 = quarter / EVENTS_PER_STEP
+                    s1 = (quarter + 1) / EVENTS_PER_STEP
+                    if s1 == 1.0:
+                        gap = _gap(e, t_new, y, held, watch, addresses, law[1], start_energy, p)
+                    else:
+                        _interpolate(s1, x, f, dense)
+                        inside = held if constant else _inputs(t + s1 * h, piece, dense, drive, source)
+                        gap = _gap(e, t + s1 * h, dense, inside, watch, addresses, law[1], start_energy, p)
+                    if _crosses(gaps[e], gap, watch[e, 2]):
+                        s = _locate(
+                            e, s0, s1, t, h, x, f, dense, constant, held, piece, source, watch, addresses,
+                            start_energy, p,
                         )  # fmt: skip
-                        held = Inputs(drive, a[0], a[2], a[3], a[4], a[5])
-                    g1 = _event_value(e, t + s1 * h, dense, held, levels, f_event, start_energy, p)
-                    up = g0 < 0.0 and g1 >= 0.0
-                    down = g0 > 0.0 and g1 <= 0.0
-                    if (up and levels[e, 2] >= 0.0) or (down and levels[e, 2] <= 0.0):
-                        # the inputs of the quarter's end serve to locate: outputs that depend on them vary slowly in it
-                        s_e = _locate(e, s0, s1, t, h, x, f, dense, held, levels, f_event, law[1], start_energy, p)
-                        # an event at the cut itself, but for rounding, still happens
-                        if s_e <= cut + 1e-9:
-                            if n_found < found.shape[0]:
-                                _interpolate(s_e, x, f, dense)
-                                found[n_found, 0] = e
-                                found[n_found, 1] = t + s_e * h
-                                for i in range(_N):
-                                    found[n_found, 2 + i] = dense[i]
-                                n_found += 1
-                            if levels[e, 3] != 0.0 and first > 1.0:
-                                first = s_e
-                    g0 = g1
-                    s0 = s1
-                after[e] = g0
-                if first < cut:
-                    cut = first
-                    what = e
+                        _interpolate(s, x, f, dense)
+                        _record(found, n_found, e, s, dense)
+                        n_found += 1
+                        if watch[e, 3] != 0.0 and s < cut:
+                            cut = s
+                            what = e
+                    gaps[e] = gap
+            # fractions of the step become times; events after the cut did not happen
+            kept = n_before
+            for n in range(n_before, n_found):
+                s = found[n, 1]
+                if s <= cut + SAME:
+                    found[kept] = found[n]
+                    found[kept, 1] = begin + (elapsed + s * h)
+                    kept += 1
+            n_found = kept
             if cut <= 1.0:
-                # events after the cut did not happen
-                kept = 0
-                for e in range(n_found):
-                    if found[e, 1] <= t + (cut + 1e-9) * h:
-                        for i in range(2 + _N):
-                            found[kept, i] = found[e, i]
-                        kept += 1
-                n_found = kept
-                t_new = t + cut * h
+                t_new = begin + (elapsed + cut * h)
             # samples inside the step; one at its end waits for the next, or for the next interval's inputs
-            while sample < samples.shape[0] and (samples[sample] < t_new):
-                s_sample = (samples[sample] - t) / h
-                _interpolate(s_sample, x, f, dense)
-                if not constant:
-                    a = _channels(
-                        samples[sample], piece, dense[0], dense[1], dense[2], dense[3],
-                        breaks, coefficients, harmonics, law, used, f1, f2, f3, f4, f5, f6,
-                    )  # fmt: skip
-                    held = Inputs(drive, a[0], a[2], a[3], a[4], a[5])
-                for i in range(_N):
-                    states[sample, i] = dense[i]
-                for i in range(6):
-                    forces[sample, i] = held[i]
+            while sample < n_samples and samples[sample] < t_new:
+                _interpolate(((samples[sample] - begin) - elapsed) / h, x, f, states[sample])
+                inside = held if constant else _inputs(samples[sample], piece, states[sample], drive, source)
+                _copy(inside, forces[sample])
                 sample += 1
             if cut <= 1.0:
                 _interpolate(cut, x, f, dense)
-                for i in range(_N):
-                    x[i] = dense[i]
+                _copy(dense, x)
                 if what == -2:
                     x[0] = law[1]
+                if not constant:
+                    held = _inputs(t_new, piece, x, drive, source)
+                for e in range(n_events):
+                    gaps[e] = _gap(e, t_new, x, held, watch, addresses, law[1], start_energy, p)
+                for n in range(n_before, n_found):
+                    # at the cut itself, but for rounding: it has happened
+                    e = int(found[n, 0])
+                    if found[n, 1] >= begin + (elapsed + (cut - SAME) * h):
+                        gaps[e] = 0.0
+                        if watch[e, 3] != 0.0 and what == -2:
+                            status = EVENT
+                if what == -2:
                     law[2] = 0.0
-                elif what == -1:
-                    status = LIMIT
                 else:
-                    status = EVENT
-                t = t_new
-                switched = True
+                    status = LIMIT if what == -1 else EVENT
+                begin = t_new
+                elapsed = 0.0
                 break
-            for i in range(_N):
-                x[i] = y[i]
-                k[0, i] = k[12, i]
-            for e in range(n_events):
-                before[e] = after[e]
-            t = t_new
+            _copy(y, x)
+            _copy(k[12], k[0])
             if last:
+                begin = stop
+                elapsed = 0.0
                 interval += 1
-                switched = True
+                break
+            elapsed += h
         if paused:
             break
-    carry[TIME] = t
+    carry[BEGIN] = begin
+    carry[ELAPSED] = elapsed
     carry[STEP] = h_next
     carry[SAMPLE] = sample
     carry[INTERVAL] = interval
     carry[EVENTS] = n_found
     carry[STEPS] += steps
-    carry[FRESH] = 1.0
+    carry[STARTED] = started
+    carry[MIDWAY] = midway
+    for i in range(6):
+        carry[HELD + i] = held[i]
     return status
 
 
 _RUN_ARGUMENTS = (
-    boolean,  # speed_drive
-    float64,  # hold
-    boolean,  # steady
-    _VECTOR,  # breaks
-    _CUBE,  # coefficients
-    _MATRIX,  # harmonics
-    _VECTOR,  # law
-    boolean[::1],  # used
-    *_FUNCTIONS,
     float64,  # tolerance
     _VECTOR,  # scale
     _VECTOR,  # samples
     _MATRIX,  # states
     _MATRIX,  # forces
-    _MATRIX,  # levels
-    _EVENT_FUNCTION,
+    _MATRIX,  # watch
+    _ADDRESSES,  # addresses
+    _VECTOR,  # gaps
     _MATRIX,  # found
     float64,  # start_energy
     int64,  # max_steps
 )
 
 
-@_compile(int64(_CONSTANTS, _VECTOR, _VECTOR, float64, *_RUN_ARGUMENTS))
+@_compile(int64(_CONSTANTS, _VECTOR, _VECTOR, float64, boolean, float64, boolean, _SOURCE, *_RUN_ARGUMENTS))
 def run(
-    p, x, carry, end, speed_drive, hold, steady, breaks, coefficients, harmonics, law, used, f1, f2, f3, f4, f5, f6,
-    tolerance, scale, samples, states, forces, levels, f_event, found, start_energy, max_steps,
+    p, x, carry, end, speed_drive, hold, steady, source, tolerance, scale, samples, states, forces, watch, addresses,
+    gaps, found, start_energy, max_steps,
 ):  # type: ignore[no-untyped-def]  # fmt: skip
-    """Integrate one run until ``end``, a stopping event, or ``max_steps`` steps; can be called again to go on.
+    """Integrate one run until ``end``, a stopping event, ``max_steps`` steps or a full table of events.
+
+    Called again with what it left behind it goes on, with the same result as in one call.
 
     Parameters
     ----------
@@ -616,46 +655,47 @@ def run(
     x : ndarray, shape (6,)
         State; overwritten.
     carry : ndarray, shape (CARRY,)
-        Time, next step, next sample, number of the held interval, events found, counts; overwritten. All zero but the time
-        at the start.
+        See `BEGIN` and its kin; overwritten. All zero but the time in BEGIN at the start.
     end : float
         Time at the end (s).
     speed_drive : bool
     hold : float
-        Step (s) at whose multiples from ``samples[0]`` the inputs are sampled and held, as a master does; 0 lets them act
-        continuously.
+        Where it is not 0, the inputs are sampled at ``samples`` and held, as a master does; it is then the step (s) that
+        follows the last one. 0 lets the inputs act continuously.
     steady : bool
-        Whether the inputs are constant between the breaks.
-    breaks, coefficients, harmonics, law : ndarray
-        See `analysis.inputs.Encoded`; ``law`` is overwritten when the torsion bar is released.
-    used : ndarray of bool, shape (6,)
-        Which of the functions f1 to f6 are in use.
+        Whether the inputs, but for the torsion bar, are constant between the breaks.
+    source : Source
+        The inputs; its ``law`` is overwritten when the torsion bar is released.
     tolerance : float
     scale : ndarray, shape (6,)
     samples : ndarray, shape (n,)
         Times to record (s), increasing, the first one the start.
     states, forces : ndarray, shapes (n, 6)
         State and inputs at the samples; written.
-    levels : ndarray, shape (m, 4)
-        Events: output number (or -1 - number of the event function), level, direction, whether it stops the run.
-    f_event : function
+    watch : ndarray, shape (m, 4)
+        Events: output number, level, direction, whether it stops the run.
+    addresses : ndarray of int64, shape (m,)
+        Events: address of the function that takes the place of the output, or 0.
+    gaps : ndarray, shape (m,)
+        Last values of the events; overwritten.
     found : ndarray, shape (k, 8)
-        Events found: number, time, state; written.
+        Events found since the caller last set the count of them to zero: number, time, state; written. A step can bring
+        EVENTS_PER_STEP of each.
     start_energy : float
     max_steps : int
 
     Returns
     -------
     int
-        RUNNING, FINISHED, LIMIT, NO_STEP or EVENT.
+        RUNNING, FINISHED, BAD_INPUT, LIMIT, NO_STEP or EVENT.
     """
     return _run(
-        p, x, carry, end, speed_drive, hold, steady, breaks, coefficients, harmonics, law, used, f1, f2, f3, f4, f5, f6,
-        tolerance, scale, samples, states, forces, levels, f_event, found, start_energy, max_steps,
+        p, x, carry, end, speed_drive, hold, steady, source, tolerance, scale, samples, states, forces, watch, addresses,
+        gaps, found, start_energy, max_steps,
     )  # fmt: skip
 
 
-@njit
+@njit(error_model="numpy")
 def _constants(row):  # type: ignore[no-untyped-def]
     return Constants(*to_fixed_tuple(row, _N_CONSTANTS))
 
@@ -664,40 +704,42 @@ def _constants(row):  # type: ignore[no-untyped-def]
     types.void(
         _MATRIX,  # parameters
         _MATRIX,  # starts
-        _VECTOR,  # scales' tolerance
-        float64,
-        boolean,
-        float64,
-        boolean,
+        _VECTOR,  # energies
+        float64,  # end
+        boolean,  # speed_drive
+        float64,  # hold
+        boolean[::1],  # steady
+        int64[:, ::1],  # sizes
         _MATRIX,  # breaks
-        float64[:, :, :, ::1],
+        float64[:, :, :, ::1],  # coefficients
         _CUBE,  # harmonics
         _MATRIX,  # laws
-        boolean[::1],
-        *_FUNCTIONS,
-        _EVENT_FUNCTION,
-        float64,
+        _ADDRESSES,  # functions
+        float64,  # tolerance
         _MATRIX,  # scales
         _VECTOR,  # samples
         _CUBE,  # states
         _CUBE,  # forces
         _MATRIX,  # carries
         int64[::1],  # status
-        int64,
+        int64,  # max_steps
     )
 )
 def run_many(
-    parameters, starts, energies, end, speed_drive, hold, steady, breaks, coefficients, harmonics, laws, used,
-    f1, f2, f3, f4, f5, f6, f_event, tolerance, scales, samples, states, forces, carries, status, max_steps,
+    parameters, starts, energies, end, speed_drive, hold, steady, sizes, breaks, coefficients, harmonics, laws, functions,
+    tolerance, scales, samples, states, forces, carries, status, max_steps,
 ):  # type: ignore[no-untyped-def]  # fmt: skip
-    """Many runs one after the other: `run` for each row, without events."""
-    levels = np.empty((0, 4))
+    """Many runs one after the other: `run` for each row, without events; ``sizes`` counts its pieces and harmonics."""
+    watch = np.empty((0, 4))
+    addresses = np.empty(0, dtype=np.int64)
+    gaps = np.empty(0)
     found = np.empty((0, 8))
     for i in range(parameters.shape[0]):
+        pieces, waves = sizes[i]
+        source = Source(breaks[i, : pieces + 1], coefficients[i, :pieces], harmonics[i, :waves], laws[i], functions)
         status[i] = _run(
-            _constants(parameters[i]), starts[i], carries[i], end, speed_drive, hold, steady, breaks[i], coefficients[i],
-            harmonics[i], laws[i], used, f1, f2, f3, f4, f5, f6, tolerance, scales[i], samples, states[i], forces[i],
-            levels, f_event, found, energies[i], max_steps,
+            _constants(parameters[i]), starts[i], carries[i], end, speed_drive, hold, steady[i], source, tolerance,
+            scales[i], samples, states[i], forces[i], watch, addresses, gaps, found, energies[i], max_steps,
         )  # fmt: skip
 
 

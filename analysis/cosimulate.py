@@ -5,8 +5,6 @@ from __future__ import annotations
 import shutil
 import sys
 import time as clock
-from collections.abc import Iterator
-from contextlib import contextmanager
 from ctypes import byref
 from dataclasses import asdict, dataclass, replace
 from itertools import pairwise
@@ -25,10 +23,11 @@ from rich.progress import Progress
 from linkwork.errors import InputError, LinkworkError
 from linkwork.five_bar.parameters import FiveBarParameters, InitialState, fmi_name
 from linkwork.five_bar.plant import INPUT_NAMES, SPEED_DRIVE, TORQUE_DRIVE
+from linkwork.five_bar.variables import OUTPUT_NAMES
 
-from .inputs import Inputs, encode
-from .simulate import RunInterrupted, channels, sample_times
-from .trajectory import OUTPUT_NAMES, UNITS, Trajectory
+from .inputs import Inputs, align, encode
+from .simulate import RunInterrupted, channels, interruptible, sample_times
+from .trajectory import UNITS, Trajectory
 
 #: Outputs that are angles in (-pi, pi]: they differ by what is left after whole turns.
 PRINCIPAL_ANGLES = ("coupler.angle", "rocker.angle")
@@ -63,16 +62,22 @@ class FmuRun:
         if not Path(fmu).is_file():
             raise CosimulationError(f"there is no file {fmu}: build it with 'python build_fmu.py'")
         self.messages: list[str] = []
-        description = read_model_description(str(fmu))
+        self._folder: str | None = None
+        try:
+            description = read_model_description(str(fmu))
+        except Exception as error:
+            raise CosimulationError(f"{fmu} is not an FMU: {error}") from error
         self._references = {v.name: v.valueReference for v in description.modelVariables}
         missing = [name for name in (*INPUT_NAMES, *OUTPUT_NAMES, "solver.status") if name not in self._references]
-        if missing or description.coSimulation is None:
+        if description.coSimulation is None:
+            missing.append("co-simulation")
+        if missing:
             raise CosimulationError(f"{fmu} is not a FiveBarSlider for co-simulation: it has no {', '.join(missing)}")
-        self._folder = extract(str(fmu))
         self._callbacks = fmi2CallbackFunctions()
         self._callbacks.logger = fmi2CallbackLoggerTYPE(self._log)
         addLoggerProxy(byref(self._callbacks))
         try:
+            self._folder = extract(str(fmu))
             self._slave = FMU2Slave(
                 guid=description.guid,
                 unzipDirectory=self._folder,
@@ -89,10 +94,10 @@ class FmuRun:
             self._slave.setInteger([self._references[name] for name in integers], list(integers.values()))
             self._slave.enterInitializationMode()
             self._slave.exitInitializationMode()
-        except FMICallException as error:
+        except Exception as error:  # FMPy raises plain ones, too
             self.close()
             reasons = [m for m in self.messages if not m.startswith("Fatal py exception")]
-            raise CosimulationError("; ".join(reasons) or str(error)) from error
+            raise CosimulationError("; ".join(reasons) or f"{fmu}: {error}") from error
         self._inputs = [self._references[name] for name in INPUT_NAMES]
         self._outputs = [self._references[name] for name in OUTPUT_NAMES]
 
@@ -126,8 +131,10 @@ class FmuRun:
     def close(self) -> None:
         """Free the instance and remove the unpacked FMU."""
         slave = self.__dict__.pop("_slave", None)
-        if slave is not None:
+        if slave is not None and slave.component:
             slave.freeInstance()
+        if self._folder is None:
+            return
         # the wrapper puts the unpacked FMU on the module path of this process and leaves it there
         resources = str(Path(self._folder) / "resources")
         sys.path[:] = [entry for entry in sys.path if Path(entry) != Path(resources)]
@@ -169,12 +176,13 @@ def cosimulate(
     CosimulationError
         If the FMU cannot be loaded or refuses to initialise.
     InputError
+        If the times are not usable, or an input is not a finite number; the sentence names the input and the time.
     """
     begun = clock.perf_counter()
     inputs = inputs or Inputs()
     initial = initial or InitialState()
     times = sample_times(stop_time, step, start_time)
-    encoded = encode(inputs)
+    encoded = align(encode(inputs), times)
     law = encoded.law.copy()
     rows: list[list[float]] = []
     status, message = 0, ""
@@ -199,7 +207,7 @@ def cosimulate(
         start_time=float(times[0]),
         inputs=first,
     )
-    with run, _interruptible() as interrupted, Progress(disable=not progress, transient=True) as bar:
+    with run, interruptible() as interrupted, Progress(disable=not progress, transient=True) as bar:
         task = bar.add_task("co-simulate", total=len(times) - 1)
         rows.append(run.outputs())
         for t, t_next in pairwise(times):
@@ -226,23 +234,6 @@ def cosimulate(
     if interrupted:
         raise RunInterrupted(trajectory)
     return trajectory
-
-
-@contextmanager
-def _interruptible() -> Iterator[list[bool]]:
-    """Hear Ctrl-C between two steps: inside a step it would strike the FMU's interpreter, which is this one."""
-    import signal
-    import threading
-
-    heard: list[bool] = []
-    if threading.current_thread() is not threading.main_thread():
-        yield heard
-        return
-    before = signal.signal(signal.SIGINT, lambda *_: heard.append(True))
-    try:
-        yield heard
-    finally:
-        signal.signal(signal.SIGINT, before)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -289,27 +280,29 @@ def compare(a: Trajectory, b: Trajectory, *, tolerance: float = 1e-6) -> Compari
     pin, the displacement of a stiff slider) is not asked for more digits than a thousandth of the largest like one
     carries, and residuals are measured against what they are the residual of.
 
-    Two runs that ended early for the same reason are compared on the samples they share: a solver in process keeps the
-    last configuration, an FMU the last communication point.
+    Two runs that ended early for the same reason at the same sample are compared on the samples they share: a solver in
+    process keeps the last configuration, an FMU the last communication point.
 
     Raises
     ------
     InputError
         If the runs have not the same times.
     """
-    if a.status == b.status != 0:
-        n = int(np.count_nonzero(np.isin(a.time, b.time)))
+    n = int(np.count_nonzero(np.isin(a.time, b.time)))
+    if a.status == b.status != 0 and max(len(a), len(b)) <= n + 1:
         a, b = replace(a, time=a.time[:n], values=a.values[:n]), replace(b, time=b.time[:n], values=b.values[:n])
-    if len(a) != len(b) or not np.allclose(a.time, b.time, rtol=1e-12, atol=1e-15):
-        raise InputError(
-            f"the runs cannot be compared: {len(a)} samples to t = {a.time[-1]:.9g} s, and {len(b)} to t = {b.time[-1]:.9g} s"
-        )
-    largest = {name: float(np.max(np.abs(a[name]), initial=0.0)) for name in OUTPUT_NAMES}
+    if len(a) == 0 or len(a) != len(b) or not np.allclose(a.time, b.time, rtol=1e-12, atol=1e-15):
+        ends = [f"{len(run)} samples" + (f" to t = {run.time[-1]:.9g} s" if len(run) else "") for run in (a, b)]
+        raise InputError(f"the runs cannot be compared: {ends[0]}, and {ends[1]}")
+    largest = {name: float(np.max(np.abs(np.nan_to_num(a[name])), initial=0.0)) for name in OUTPUT_NAMES}
     differences = []
     for name in OUTPUT_NAMES:
-        difference = np.abs(a[name] - b[name])
-        if name in PRINCIPAL_ANGLES:
-            difference = np.abs(np.remainder(difference + pi, 2.0 * pi) - pi)
+        with np.errstate(invalid="ignore"):
+            difference = np.abs(a[name] - b[name])
+            if name in PRINCIPAL_ANGLES:
+                difference = np.abs(np.remainder(difference + pi, 2.0 * pi) - pi)
+        # what is not a number differs from everything
+        difference[np.isnan(difference)] = np.inf
         differences.append(
             OutputDifference(
                 name=name,

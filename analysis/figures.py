@@ -193,8 +193,8 @@ def plot_curves(
             _draw_panel(axis, panel)
         for axis in list(axes.flat)[len(panels) :]:
             axis.remove()
-        # about eleven of these letters to the inch
-        figure.suptitle(fill(title, int(10.9 * size[0] * columns)), fontsize=10.5, fontweight="bold")
+        # eleven and a half of these letters go to the inch
+        figure.suptitle(fill(title, int(11.6 * size[0] * columns)), fontsize=10.5, fontweight="bold")
         return _finish(figure)
 
 

@@ -7,12 +7,12 @@ the crank (torsion bar, induction motor), and any channel but the speed may be a
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.interpolate import CubicSpline, PPoly
+from scipy.interpolate import CubicSpline
 
 from linkwork.errors import InputError
 
@@ -42,6 +42,12 @@ class Piecewise:
     coefficients: NDArray[np.float64]
 
     def __post_init__(self) -> None:
+        for name in ("breaks", "coefficients"):
+            object.__setattr__(self, name, np.array(getattr(self, name), dtype=float))
+        if self.breaks.ndim != 1 or len(self.breaks) < 2:
+            raise InputError(
+                f"a signal needs at least two breaks in one dimension, not an array of {self.breaks.shape}"
+            )
         if self.coefficients.shape != (len(self.breaks) - 1, 4):
             raise InputError(
                 f"a signal with {len(self.breaks)} breaks needs coefficients of shape ({len(self.breaks) - 1}, 4), "
@@ -125,6 +131,13 @@ class Function:
     rate: StateFunction | None = None
     breaks: Sequence[float] = ()
 
+    def __post_init__(self) -> None:
+        for name, value in (("function", self.function), ("rate", self.rate)):
+            if not callable(value) and not (name == "rate" and value is None):
+                raise InputError(f"{name} of an input is {value!r}: it must be a function f(t, th2, u, th2', u')")
+        if not np.all(np.isfinite(self.breaks)):
+            raise InputError(f"the breaks of a function must be finite times, not {self.breaks}")
+
 
 Signal = float | Piecewise | Harmonics | Function
 Torque = Signal | TorsionBar | InductionMotor
@@ -185,11 +198,15 @@ class Inputs:
     speed : signal, optional
         Crank speed (rad/s). Where it is given the run is in speed drive: the crank torque is a result.
     torque : signal, TorsionBar, InductionMotor or a tuple of them, optional
-        Crank torque (N.m), their sum where there are several. Excludes ``speed``.
+        Crank torque (N.m). Excludes ``speed``.
     force : signal
         Control force on the slider (N).
     load_x, load_y : signal
         Load on the coupler point P (N).
+
+    Notes
+    -----
+    A tuple of signals is their sum.
 
     Raises
     ------
@@ -197,11 +214,11 @@ class Inputs:
         If both speed and torque are given, or a value is not finite or of the wrong kind.
     """
 
-    speed: Signal | None = None
+    speed: Signal | tuple[Signal, ...] | None = None
     torque: Torque | tuple[Torque, ...] | None = None
-    force: Signal = 0.0
-    load_x: Signal = 0.0
-    load_y: Signal = 0.0
+    force: Signal | tuple[Signal, ...] = 0.0
+    load_x: Signal | tuple[Signal, ...] = 0.0
+    load_y: Signal | tuple[Signal, ...] = 0.0
 
     def __post_init__(self) -> None:
         if self.speed is not None and self.torque is not None:
@@ -217,11 +234,12 @@ class Inputs:
                     )
                 if isinstance(part, (int, float, np.floating, np.integer)) and not np.isfinite(part):
                     raise InputError(f"{channel} is {part}: it must be a finite number")
-        if isinstance(self.speed, Function) and self.speed.rate is None:
+        if any(isinstance(part, Function) and part.rate is None for part in self.parts("speed")):
             raise InputError("a speed given as a Function needs its rate, the acceleration (rad/s2)")
-        for kind in (TorsionBar, InductionMotor, Function):
-            if sum(isinstance(part, kind) for part in self.parts("torque")) > 1:
-                raise InputError(f"torque has more than one {kind.__name__}: one can be in force at a time")
+        for channel in CHANNELS:
+            for kind in (TorsionBar, InductionMotor, Function):
+                if sum(isinstance(part, kind) for part in self.parts(channel)) > 1:
+                    raise InputError(f"{channel} has more than one {kind.__name__}: one can be in force at a time")
 
     def parts(self, channel: str) -> tuple[Any, ...]:
         """The summands of a channel."""
@@ -262,11 +280,10 @@ class Encoded:
 
     @property
     def steady(self) -> bool:
-        """Whether torque, force, load and crank acceleration are constant between the breaks."""
+        """Whether torque, force, load and crank acceleration, but for the torsion bar, are constant between the breaks."""
         others = [CHANNELS.index(name) for name in CHANNELS if name != "speed"]
         return bool(
             len(self.harmonics) == 0
-            and self.law[0] == 0.0
             and self.law[3] == 0.0
             and not any(self.functions)
             and np.all(self.coefficients[:, others, 1:] == 0.0)
@@ -278,11 +295,11 @@ def encode(inputs: Inputs) -> Encoded:
     """Bring all channels onto common breaks."""
     pieces = [(c, part) for c, name in enumerate(CHANNELS) for part in inputs.parts(name)]
     times = [part.breaks for _, part in pieces if isinstance(part, Piecewise)]
-    times += [np.asarray(part.breaks, dtype=float) for _, part in pieces if isinstance(part, Function)]
-    merged = np.unique(np.concatenate([np.empty(0), *times]))
-    if len(merged) < 2:
-        start = merged[0] if len(merged) else 0.0
-        merged = np.array([start - 1.0, start, start + 1.0]) if len(merged) else np.array([0.0, 1.0])
+    for _, part in pieces:
+        if isinstance(part, Function) and len(part.breaks) > 0:
+            # every one of them is a break inside: the first and the last of the merged ones are none
+            times.append(np.array([min(part.breaks) - 1.0, *part.breaks, max(part.breaks) + 1.0]))
+    merged = np.unique(np.concatenate(times)) if times else np.array([0.0, 1.0])
     coefficients = np.zeros((len(merged) - 1, len(CHANNELS), 4))
     harmonics: list[tuple[float, float, float, float]] = []
     law = np.zeros(6)
@@ -312,11 +329,22 @@ def _on_breaks(part: Piecewise, breaks: NDArray[np.float64]) -> NDArray[np.float
     """Coefficients of ``part`` about the left ends of finer breaks; its outer pieces go on beyond its ends."""
     left = breaks[:-1]
     index = np.clip(np.searchsorted(part.breaks, left, side="right") - 1, 0, len(part.coefficients) - 1)
-    polynomial = PPoly(part.coefficients.T[::-1], part.breaks)
-    shift = left - part.breaks[index]
-    rows = np.empty((len(left), 4))
-    for k, (i, s) in enumerate(zip(index, shift)):
-        c = polynomial.c[:, i]
-        value = np.poly1d(c)
-        rows[k] = [value(s), value.deriv(1)(s), value.deriv(2)(s) / 2.0, value.deriv(3)(s) / 6.0]
-    return rows
+    s = left - part.breaks[index]
+    c0, c1, c2, c3 = part.coefficients[index].T
+    return np.column_stack(
+        [c0 + s * (c1 + s * (c2 + s * c3)), c1 + s * (2.0 * c2 + s * 3.0 * c3), c2 + 3.0 * s * c3, c3]
+    )
+
+
+def align(encoded: Encoded, times: NDArray[np.float64]) -> Encoded:
+    """The same inputs with those breaks that miss a sample by rounding alone moved onto it.
+
+    0.3 is not 3 * 0.1 in floats: a jump at 0.3 s would otherwise be missed by a whole step where inputs are sampled and
+    held, and the sample there would belong to what was before the jump.
+    """
+    after = np.clip(np.searchsorted(times, encoded.breaks), 1, len(times) - 1)
+    low, high = times[after - 1], times[after]
+    nearest = np.where(encoded.breaks - low < high - encoded.breaks, low, high)
+    rounding = 1e-9 * (high - low) + 4.0 * np.spacing(np.abs(encoded.breaks))
+    moved = np.where(np.abs(nearest - encoded.breaks) <= rounding, nearest, encoded.breaks)
+    return replace(encoded, breaks=moved) if np.all(np.diff(moved) > 0.0) else encoded

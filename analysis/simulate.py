@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import signal
+import threading
 import time as clock
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import lru_cache
+from itertools import chain
 from math import isfinite
 from typing import Any
 
@@ -19,14 +23,21 @@ from linkwork.errors import InputError, LinkworkError
 from linkwork.five_bar import dynamics, kinematics
 from linkwork.five_bar.parameters import FiveBarParameters, InitialState
 from linkwork.five_bar.plant import check_assembly, check_tolerance, error_scale
+from linkwork.five_bar.variables import OUTPUT_NAMES
 
-from .inputs import Encoded, Inputs, StateFunction, encode
-from .trajectory import OUTPUT_NAMES, Occurrence, Trajectory
+from .inputs import Encoded, Inputs, StateFunction, align, encode
+from .trajectory import Occurrence, Trajectory
 
 #: Steps of one compiled call, between which progress is shown and an interrupt is heard: about a tenth of a second.
 STEPS_PER_CALL = 50_000
-#: Events that one run can record.
-MOST_EVENTS = 100_000
+#: Events of one kind that one compiled call can report before it hands them over.
+EVENTS_PER_CALL = 1_000
+
+#: Evaluations of inputs that are not finite after which one of SciPy's methods is stopped.
+MOST_LOSSES = 300
+
+#: What `channels` returns, in its order.
+CHANNEL_NAMES = ("torque", "speed", "acceleration", "force", "load_x", "load_y")
 
 SCIPY_METHODS = ("RK23", "RK45", "DOP853", "Radau", "BDF", "LSODA")
 
@@ -49,6 +60,11 @@ class Event:
         +1 for rising, -1 for falling, 0 for both.
     stop : bool
         Whether the run ends there.
+
+    Notes
+    -----
+    A value that jumps across the level because an input jumps counts as crossing it, at the time of the jump; one that
+    starts on the level does not. What happens more than once within a quarter of an integrator's step may be missed.
     """
 
     name: str
@@ -63,6 +79,8 @@ class Event:
             raise InputError(f"event {self.name!r} needs either an output or a function")
         if self.output is not None and self.output not in OUTPUT_NAMES:
             raise InputError(f"event {self.name!r} is on {self.output!r}: the outputs are {', '.join(OUTPUT_NAMES)}")
+        if self.function is not None and not callable(self.function):
+            raise InputError(f"event {self.name!r} has the function {self.function!r}: it must be callable")
         if self.direction not in (-1, 0, 1):
             raise InputError(f"event {self.name!r} has direction {self.direction}: it must be -1, 0 or +1")
         if not isfinite(self.level):
@@ -80,22 +98,22 @@ class RunInterrupted(LinkworkError):
 def sample_times(stop_time: float, step: float, start_time: float = 0.0) -> NDArray[np.float64]:
     """Times start, start + step, ... up to and including the stop time, each computed as start + k step.
 
+    The last step is shorter where the run is not a whole number of steps long.
+
     Raises
     ------
     InputError
-        If the stop time is not a positive whole number of steps after the start.
+        If the step is not positive, or the run does not end after it starts.
     """
     if not (isfinite(step) and step > 0.0):
         raise InputError(f"step is {step} s: it must be a finite number greater than zero")
     if not (isfinite(stop_time) and isfinite(start_time) and stop_time > start_time):
         raise InputError(f"a run from {start_time} s to {stop_time} s: it must end after it starts")
     ratio = (stop_time - start_time) / step
-    count = max(1, round(ratio))
-    if abs(ratio - count) > 1e-6 * max(1.0, ratio):
-        # a last, shorter step
-        count = int(np.floor(ratio + 1e-9))
-        return np.append(start_time + step * np.arange(count + 1), stop_time)
-    times = start_time + step * np.arange(count + 1)
+    whole = round(ratio)
+    # what is left over, but for rounding, makes a last, shorter step
+    count = whole if whole > 0 and abs(ratio - whole) <= 1e-6 else int(ratio) + 1
+    times: NDArray[np.float64] = start_time + step * np.arange(count + 1, dtype=float)
     times[-1] = stop_time
     return times
 
@@ -142,7 +160,7 @@ def simulate(
         Bound of the local error relative to state and size of the mechanism.
     events : sequence of Event
     max_steps : int
-        Steps after which the run ends with solver.status 4.
+        Steps after which a compiled run ends with solver.status 4.
     progress : bool
         Show a progress bar.
     **options
@@ -157,7 +175,8 @@ def simulate(
     Raises
     ------
     ParameterError, InputError, AssemblyError
-        If parameters or inputs are not usable, or the links cannot be joined at the start.
+        If parameters or inputs are not usable, or the links cannot be joined at the start. An input that turns out not to
+        be a finite number in the course of the run is named with the time.
     RunInterrupted
         On Ctrl-C; carries what was computed.
     """
@@ -167,9 +186,10 @@ def simulate(
     times = _check_samples(sample_times(stop_time, step, start_time) if samples is None else np.asarray(samples, float))
     if hold is not None:
         _check_hold(hold, times)
-    encoded = encode(inputs)
-    _check_inputs(encoded, times)
+    if max_steps < 1:
+        raise InputError(f"max_steps is {max_steps}: it must be at least 1")
     check_assembly(parameters, initial.crank_angle, initial.slider_position)
+    encoded = align(encode(inputs), times)
     run = _Run(parameters, inputs, encoded, initial, times, hold or 0.0, tolerance, tuple(events), max_steps)
     if method == "compiled":
         if options:
@@ -203,71 +223,51 @@ def _check_hold(hold: float, times: NDArray[np.float64]) -> None:
         raise InputError(f"inputs held over {hold} s: the recorded times must be the same multiples of it")
 
 
-def _check_inputs(encoded: Encoded, times: NDArray[np.float64]) -> None:
-    """A cubic that overflows, or a function that is not finite at the start, is told before the run."""
-    for function in encoded.functions:
-        if function is not None:
-            value = function(float(times[0]), 0.0, 0.0, 0.0, 0.0)
-            if not isinstance(value, (int, float, np.floating)):
-                raise InputError(f"an input function returned {value!r} at t = {times[0]} s: it must return a float")
-
-
-def torque_law(encoded: Encoded) -> NDArray[np.float64]:
-    """A law array of its own for a run, which overwrites it when the torsion bar is released."""
-    return encoded.law.copy()
-
-
 @lru_cache(maxsize=256)
-def _compile_function(function: StateFunction) -> Any:
+def compile_function(function: StateFunction) -> Any:
+    """A user's function as a C function; its ``address`` is what the compiled code calls. NaN where it raises.
+
+    Raises
+    ------
+    InputError
+        If Numba cannot compile it.
+    """
     import numba
 
-    if isinstance(function, numba.core.registry.CPUDispatcher):
-        function = function.py_func
+    plain = function.py_func if isinstance(function, numba.core.registry.CPUDispatcher) else function
+    signature = numba.float64(*[numba.float64] * 5)
     try:
-        signature = numba.float64(*[numba.float64] * 5)
-        return numba.njit(signature, error_model="numpy")(function)
-    except numba.core.errors.NumbaError as error:
+        own = numba.njit(signature, error_model="numpy")(plain)
+
+        @numba.cfunc(signature, error_model="numpy")
+        def guarded(t, th2, u, w2, v):  # type: ignore[no-untyped-def]
+            try:
+                return own(t, th2, u, w2, v)
+            except Exception:
+                return np.nan
+
+    except Exception as error:
         raise InputError(
-            f"function {getattr(function, '__name__', function)!r} cannot be compiled with Numba ({_first_line(error)}): "
-            "choose one of SciPy's methods, such as method='DOP853'"
+            f"function {getattr(function, '__name__', function)!r} cannot be compiled with Numba: choose one of SciPy's "
+            f"methods, such as method='DOP853', which take any function. Numba says: {_reason(error)}"
         ) from error
+    return guarded
 
 
-def _first_line(error: Exception) -> str:
-    return next((line.strip() for line in str(error).splitlines() if line.strip()), type(error).__name__)
+def compiled_source(encoded: Encoded) -> tuple[Any, list[Any]]:
+    """The inputs as the compiled code reads them, with a law of their own, and what has to stay alive meanwhile."""
+    from . import compiled as k
+
+    kept = [f and compile_function(f) for f in encoded.functions]
+    addresses = np.array([f.address if f else 0 for f in kept], dtype=np.int64)
+    return k.Source(encoded.breaks, encoded.coefficients, encoded.harmonics, encoded.law.copy(), addresses), kept
 
 
-def compiled_functions(encoded: Encoded) -> tuple[tuple[Any, ...], NDArray[np.bool_]]:
-    """The functions of the inputs compiled, with placeholders, and which of the six are in use."""
-    from . import compiled
-
-    used = np.array([f is not None for f in encoded.functions])
-    return tuple(compiled.no_function if f is None else _compile_function(f) for f in encoded.functions), used
-
-
-def _event_function(functions: Sequence[StateFunction]) -> Any:
-    """One compiled function of (number, t, th2, u, w2, v) for all event functions."""
-    import numba
-
-    from . import compiled
-
-    combined = compiled.no_event
-    signature = numba.float64(numba.int64, *[numba.float64] * 5)
-    for number, function in enumerate(functions):
-        combined = _bind(number, _compile_function(function), combined, signature)
-    return combined
-
-
-def _bind(number: int, own: Any, other: Any, signature: Any) -> Any:
-    import numba
-
-    @numba.njit(signature)
-    def chosen(i, t, th2, u, w2, v):  # type: ignore[no-untyped-def]
-        if i == number:
-            return own(t, th2, u, w2, v)
-        return other(i, t, th2, u, w2, v)
-
-    return chosen
+def _reason(error: Exception) -> str:
+    """The line of Numba's report that tells most."""
+    lines = [line.strip() for line in str(error).splitlines() if line.strip()]
+    telling = [line for line in lines if not line.startswith(("Failed in nopython", "During", "File", "- During"))]
+    return (telling or lines or [type(error).__name__])[0]
 
 
 def channels(
@@ -276,17 +276,20 @@ def channels(
     """Torque, speed, acceleration, slider force and load at time t and state x, for one who samples inputs in Python.
 
     ``left`` asks for the limit from the left where an input jumps. The user's functions are called as the Python they are.
+
+    Raises
+    ------
+    InputError
+        If one of them is not a finite number.
     """
     from . import compiled as k
 
     e = encoded
-    unused = np.zeros(6, dtype=bool)
-    none = (k.no_function,) * 6
     torque, speed, acceleration, force, load_x, load_y = k.channels(
-        t, left, x, e.breaks, e.coefficients, e.harmonics, law, unused, *none
+        t, left, np.ascontiguousarray(x), k.Source(e.breaks, e.coefficients, e.harmonics, law, _NO_FUNCTIONS)
     )
-    added = [0.0 if f is None else float(f(t, x[0], x[1], x[2], x[3])) for f in e.functions]
-    return (
+    added = [0.0 if f is None else _number(f(t, x[0], x[1], x[2], x[3]), t) for f in e.functions]
+    values = (
         torque + added[0],
         speed + added[4],
         acceleration + added[5],
@@ -294,6 +297,79 @@ def channels(
         load_x + added[2],
         load_y + added[3],
     )
+    for name, value in zip(CHANNEL_NAMES, values):
+        if not isfinite(value):
+            raise _not_finite(name, t, x)
+    return values
+
+
+class NotFiniteError(InputError):
+    """An input, which it names, is not a finite number at a time and a state."""
+
+    name = ""
+
+
+def _not_finite(name: str, t: float, x: NDArray[np.float64]) -> NotFiniteError:
+    error = NotFiniteError(f"the input {name} is not a finite number at t = {t:.9g} s, {_where(x)}")
+    error.name = name
+    return error
+
+
+_NO_FUNCTIONS = np.zeros(6, dtype=np.int64)
+
+
+def _number(value: object, t: float) -> float:
+    if not isinstance(value, (int, float, np.floating, np.integer)):
+        raise InputError(f"an input function returned {value!r} at t = {t:.9g} s: it must return a float")
+    return float(value)
+
+
+def _where(x: NDArray[np.float64]) -> str:
+    return f"crank angle {x[0]:.9g} rad ({np.degrees(x[0]):.4f} deg) and slider position {x[1]:.9g} m"
+
+
+def _verdict(status: int, t: float, x: NDArray[np.float64], steps: int) -> tuple[int, str]:
+    """solver.status and solver.message of a run that ended with a status of the compiled code."""
+    from . import compiled as k
+
+    if status == k.LIMIT:
+        return 3, f"limit of assembly at t = {t:.9g} s, {_where(x)}"
+    if status == k.NO_STEP:
+        return 4, f"the step size fell below what t = {t:.9g} s can resolve, {_where(x)}"
+    if status == k.RUNNING:
+        return 4, f"{steps} steps did not suffice: stopped at t = {t:.9g} s, {_where(x)}"
+    return 0, ""
+
+
+@contextmanager
+def interruptible() -> Iterator[list[bool]]:
+    """Hear Ctrl-C as an entry in a list, to be looked at between two steps or calls.
+
+    An exception would strike wherever it finds the interpreter: inside an FMU, whose interpreter this is, or inside Numba,
+    which may drop it.
+    """
+    heard: list[bool] = []
+    if threading.current_thread() is not threading.main_thread():
+        yield heard
+        return
+    before = signal.getsignal(signal.SIGINT)
+    signal.signal(signal.SIGINT, lambda *_: heard.append(True))
+    try:
+        yield heard
+    finally:
+        # None stands for a handler that was not set from Python
+        signal.signal(signal.SIGINT, signal.SIG_DFL if before is None else before)
+
+
+@contextmanager
+def _shown(progress: bool, duration: float) -> Iterator[Callable[[float], None]]:
+    """A progress bar over the time of a run, as a function of the time done; nothing at all where it is not wanted."""
+    if not progress:
+        yield lambda done: None
+        return
+    with Progress(transient=True) as bar:
+        task = bar.add_task("simulate", total=duration)
+        yield lambda done: bar.update(task, completed=done)
 
 
 @dataclass(slots=True)
@@ -315,17 +391,11 @@ class _Run:
         p = self.parameters.constants()
         i = self.initial
         x = np.array([i.crank_angle, i.slider_position, i.crank_speed, i.slider_velocity, 0.0, 0.0])
+        speed = channels(self.encoded, float(self.times[0]), False, x, self.encoded.law)[1]
         if self.inputs.speed_drive:
-            x[2] = self.channels(float(self.times[0]), False, x, self.encoded.law)[1]
-        if not np.all(np.isfinite(x)):
-            raise InputError(f"the crank speed at the start is {x[2]}: it must be a finite number")
+            x[2] = speed
         scale = np.array(error_scale(self.parameters, float(x[2])))
         return x, dynamics.mechanical_energy(tuple(x), p), scale
-
-    def channels(
-        self, t: float, left: bool, x: NDArray[np.float64], law: NDArray[np.float64]
-    ) -> tuple[float, float, float, float, float, float]:
-        return channels(self.encoded, t, left, x, law)
 
     def compiled(self, progress: bool) -> Trajectory:
         from . import compiled as k
@@ -333,264 +403,343 @@ class _Run:
         begun = clock.perf_counter()
         p = self.parameters.constants()
         x, energy, scale = self.start()
-        e = self.encoded
-        functions, used = compiled_functions(e)
-        callables = [event.function for event in self.events if event.function is not None]
-        levels = np.zeros((len(self.events), 4))
-        number = 0
-        for row, event in zip(levels, self.events):
-            if event.output is not None:
-                row[:2] = OUTPUT_NAMES.index(event.output), event.level
-            else:
-                row[0] = -1 - number
-                number += 1
-            row[2:] = event.direction, event.stop
-        f_event = _event_function(callables)
-        n = len(self.times)
+        source, kept = compiled_source(self.encoded)
+        watch, addresses, watching = self._watch()
+        kept += watching
+        n, n_events = len(self.times), len(self.events)
         states, forces = np.full((n, 6), np.nan), np.full((n, 6), np.nan)
-        found = np.empty((MOST_EVENTS if self.events else 0, 8))
+        gaps = np.zeros(n_events)
+        found = np.empty((EVENTS_PER_CALL * n_events, 8))
         carry = np.zeros(k.CARRY)
-        carry[k.TIME] = self.times[0]
-        law = torque_law(e)
+        carry[k.BEGIN] = self.times[0]
         status = k.RUNNING
-        interrupted = False
-        with Progress(disable=not progress, transient=True) as bar:
-            task = bar.add_task("simulate", total=self.times[-1] - self.times[0])
+        occurrences: list[list[float]] = []
+        with interruptible() as interrupted, _shown(progress, self.times[-1] - self.times[0]) as show:
             try:
-                while status == k.RUNNING and carry[k.STEPS] < self.max_steps:
+                while status == k.RUNNING and carry[k.STEPS] < self.max_steps and not interrupted:
                     status = k.run(
-                        p, x, carry, self.times[-1], self.inputs.speed_drive, self.hold, e.steady, e.breaks,
-                        e.coefficients, e.harmonics, law, used, *functions, self.tolerance, scale, self.times, states,
-                        forces, levels, f_event, found, energy, min(STEPS_PER_CALL, self.max_steps),
+                        p, x, carry, self.times[-1], self.inputs.speed_drive, self.hold, self.encoded.steady, source,
+                        self.tolerance, scale, self.times, states, forces, watch, addresses, gaps, found, energy,
+                        min(STEPS_PER_CALL, self.max_steps - int(carry[k.STEPS])),
                     )  # fmt: skip
-                    bar.update(task, completed=carry[k.TIME] - self.times[0])
-            except KeyboardInterrupt:
-                interrupted = True
+                    occurrences += found[: int(carry[k.EVENTS])].tolist()
+                    carry[k.EVENTS] = 0
+                    show(carry[k.BEGIN] + carry[k.ELAPSED] - self.times[0])
+            except KeyboardInterrupt:  # of one who raises it himself
+                interrupted.append(True)
+        t = float(carry[k.BEGIN] + carry[k.ELAPSED])
+        if status == k.BAD_INPUT:
+            raise _not_finite(CHANNEL_NAMES[int(carry[k.LOST])], t, x)
         done = int(carry[k.SAMPLE])
-        t_end = float(carry[k.TIME])
-        times = self.times[:done]
-        states, forces = states[:done], forces[:done]
-        if status not in (k.FINISHED, k.RUNNING) and (done == 0 or times[-1] < t_end):
+        times, states, forces = self.times[:done], states[:done], forces[:done]
+        if carry[k.STARTED] and times[-1] < t:
             # the run ended between two samples: its last configuration is recorded too
-            torque, _, acceleration, force, load_x, load_y = self.channels(t_end, True, x, law)
-            last = np.array([float(self.inputs.speed_drive), torque, acceleration, force, load_x, load_y])
-            times, states, forces = np.append(times, t_end), np.vstack([states, x]), np.vstack([forces, last])
+            last = carry[k.HELD : k.HELD + 6]
+            times, states, forces = np.append(times, t), np.vstack([states, x]), np.vstack([forces, last])
         values = np.empty((len(times), len(OUTPUT_NAMES)))
-        k.outputs(p, np.ascontiguousarray(states), np.ascontiguousarray(forces), energy, values)
-        occurrences = tuple(
-            Occurrence(self.events[int(row[0])].name, float(row[1]), (row[2], row[3], row[4], row[5]))
-            for row in sorted(found[: int(carry[k.EVENTS])].tolist(), key=lambda row: row[1])
-        )
-        code, message = self._verdict(status, t_end, x)
+        k.outputs(p, states, forces, energy, values)
+        code, message = _verdict(status, t, x, self.max_steps)
         trajectory = Trajectory(
             time=times,
             values=values,
             status=code,
             message=message,
-            events=occurrences,
+            events=tuple(
+                Occurrence(self.events[int(row[0])].name, row[1], (row[2], row[3], row[4], row[5]))
+                for row in sorted(occurrences, key=lambda row: row[1])
+            ),
             source="compiled DOP853",
             statistics={
-                "steps": carry[k.STEPS] - carry[k.REJECTED],
-                "rejected": carry[k.REJECTED],
-                "evaluations": carry[k.EVALUATIONS],
+                "steps": float(carry[k.STEPS] - carry[k.REJECTED]),
+                "rejected": float(carry[k.REJECTED]),
+                "evaluations": float(carry[k.EVALUATIONS]),
                 "seconds": clock.perf_counter() - begun,
             },
         )
         if interrupted:
             raise RunInterrupted(trajectory)
-        if not np.all(np.isfinite(values)):
-            lost = times[np.argmin(np.isfinite(values).all(axis=1))]
-            raise InputError(f"an input is not finite: outputs are lost from t = {lost:.9g} s on")
         return trajectory
 
-    def _verdict(self, status: int, t: float, x: NDArray[np.float64]) -> tuple[int, str]:
-        from . import compiled as k
-
-        where = f"crank angle {x[0]:.9g} rad ({np.degrees(x[0]):.4f} deg) and slider position {x[1]:.9g} m"
-        if status == k.LIMIT:
-            return 3, f"limit of assembly at t = {t:.9g} s, {where}"
-        if status == k.NO_STEP:
-            return 4, f"the step size fell below what t = {t:.9g} s can resolve, {where}"
-        if status == k.RUNNING:
-            return 4, f"{self.max_steps} steps did not suffice: stopped at t = {t:.9g} s, {where}"
-        return 0, ""
+    def _watch(self) -> tuple[NDArray[np.float64], NDArray[np.int64], list[Any]]:
+        """The events as the compiled code reads them, and what has to stay alive meanwhile."""
+        watch = np.zeros((len(self.events), 4))
+        addresses = np.zeros(len(self.events), dtype=np.int64)
+        kept = []
+        for i, event in enumerate(self.events):
+            watch[i] = 0.0, event.level, event.direction, event.stop
+            if event.function is None:
+                watch[i, 0] = OUTPUT_NAMES.index(str(event.output))
+            else:
+                kept.append(compile_function(event.function))
+                addresses[i] = kept[-1].address
+        return watch, addresses, kept
 
     def scipy(self, method: str | type[OdeSolver], options: dict[str, Any], progress: bool) -> Trajectory:
         """The same run by `solve_ivp`, interval by interval of smooth inputs."""
-        from . import compiled as k
-
         begun = clock.perf_counter()
-        p = self.parameters.constants()
-        x, energy, scale = self.start()
-        e = self.encoded
-        law = torque_law(e)
-        speed_drive = float(self.inputs.speed_drive)
-        end = self.times[-1]
-        t = float(self.times[0])
-        interval = 0
-        first = True
-        rows: list[NDArray[np.float64]] = []
-        row_inputs: list[tuple[float, ...]] = []
-        row_times: list[float] = []
-        occurrences: list[Occurrence] = []
-        evaluations = 0
-        status = k.RUNNING
+        march = _March(self)
         interrupted = False
-
-        with Progress(disable=not progress, transient=True) as bar:
-            task = bar.add_task("simulate", total=end - t)
+        with _shown(progress, self.times[-1] - self.times[0]) as show:
             try:
-                while status == k.RUNNING:
-                    if law[2] and x[0] >= law[1]:
-                        law[2] = 0.0
-                    torque, speed, acceleration, force, load_x, load_y = self.channels(t, False, x, law)
-                    if self.hold:
-                        stop = self.times[0] + (interval + 1) * self.hold
-                        stop = end if stop > end - 1e-9 * self.hold else stop
-                        ahead = stop if t < end else t + self.hold
-                        if speed_drive:
-                            acceleration = (self.channels(ahead, True, x, law)[1] - speed) / (ahead - t)
-                    else:
-                        later = e.breaks[1:-1][e.breaks[1:-1] > t]
-                        stop = float(later[0]) if len(later) and later[0] < end else end
-                    held = dynamics.Inputs(speed_drive, torque, acceleration, force, load_x, load_y)
-                    if speed_drive:
-                        x = np.array(
-                            (x[0], x[1], speed, x[3], x[4], x[5]) if first else dynamics.jump_speed(tuple(x), speed, p)
-                        )
-                    first = False
-                    if len(rows) < len(self.times) and self.times[len(rows)] <= t:
-                        rows.append(x)
-                        row_inputs.append(held)
-                        row_times.append(t)
-                    if t >= end:
-                        status = k.FINISHED
-                        break
-                    constant = bool(self.hold) or e.steady
-
-                    def inputs_at(
-                        s: float,
-                        y: NDArray[np.float64],
-                        constant: bool = constant,
-                        held: Any = held,
-                        stop: float = stop,
-                    ) -> dynamics.Inputs:
-                        if constant:
-                            return held  # type: ignore[no-any-return]
-                        a = self.channels(s, s >= stop, y, law)
-                        return dynamics.Inputs(speed_drive, a[0], a[2], a[3], a[4], a[5])
-
-                    def rhs(s: float, y: NDArray[np.float64], inputs_at: Any = inputs_at) -> NDArray[np.float64]:
-                        try:
-                            return np.array(dynamics.derivative(tuple(y), inputs_at(s, y), p))
-                        except (ArithmeticError, ValueError):
-                            # not a configuration: with such an error the step is tried again shorter
-                            return np.full(6, 1e200)
-
-                    watched = self._scipy_events(p, energy, law, inputs_at)
-                    inner = self.times[(self.times > t) & (self.times < stop)]
-                    with np.errstate(over="ignore", invalid="ignore"):
-                        solution = solve_ivp(
-                            rhs,
-                            (t, stop),
-                            x,
-                            method=method,
-                            t_eval=np.append(inner, stop),
-                            events=[function for _, function in watched],
-                            rtol=max(self.tolerance, 3e-14),
-                            atol=self.tolerance * scale,
-                            **options,
-                        )
-                    evaluations += int(solution.nfev)
-                    if solution.status < 0:
-                        status = k.NO_STEP
-                    here = [
-                        (float(s), name, y)
-                        for (name, _), ts, ys in zip(watched, solution.t_events, solution.y_events)
-                        for s, y in zip(ts, ys)
-                    ]
-                    for s, name, y in sorted(here, key=lambda item: item[0]):
-                        if isinstance(name, Event):
-                            occurrences.append(Occurrence(name.name, s, tuple(y[:4])))
-                    count = min(len(inner), int(np.sum(solution.t < stop)))
-                    for s, y in zip(solution.t[:count], solution.y.T[:count]):
-                        rows.append(y)
-                        row_inputs.append(inputs_at(s, y))
-                        row_times.append(float(s))
-                    if solution.status == 1:
-                        s, name, y = max(here, key=lambda item: item[0])
-                        t, x = s, y.copy()
-                        if name == "release":
-                            x[0] = law[1]
-                            law[2] = 0.0
-                        else:
-                            status = k.LIMIT if name == "limit" else k.EVENT
-                            if not row_times or row_times[-1] < t:
-                                rows.append(x)
-                                row_inputs.append(inputs_at(t, x))
-                                row_times.append(t)
-                    elif solution.status == 0:
-                        t, x = stop, solution.y[:, -1].copy()
-                        interval += 1
-                    bar.update(task, completed=t - self.times[0])
+                march.run(method, options, show if progress else None)
             except KeyboardInterrupt:
                 interrupted = True
-        values = np.array(
-            [dynamics.outputs(tuple(y), dynamics.Inputs(*i), energy, p) for y, i in zip(rows, row_inputs)]
-        ).reshape(-1, len(OUTPUT_NAMES))
-        code, message = self._verdict(status, t, x)
+        p = self.parameters.constants()
+        rows = march.rows
+        if rows and rows[-1][0] < march.t:
+            rows = [*rows, (march.t, march.x, march.held)]
+        values = [dynamics.outputs(tuple(x), held, march.energy, p) for _, x, held in rows]
+        code, message = _verdict(march.status, march.t, march.x, self.max_steps)
         trajectory = Trajectory(
-            time=np.array(row_times),
-            values=values,
+            time=np.array([t for t, _, _ in rows]),
+            values=np.array(values).reshape(-1, len(OUTPUT_NAMES)),
             status=code,
             message=message,
-            events=tuple(occurrences),
+            events=tuple(sorted(march.occurrences, key=lambda o: o.time)),
             source=method if isinstance(method, str) else method.__name__,
-            statistics={"evaluations": evaluations, "seconds": clock.perf_counter() - begun},
+            statistics={"evaluations": float(march.evaluations), "seconds": clock.perf_counter() - begun},
         )
         if interrupted:
             raise RunInterrupted(trajectory)
         return trajectory
 
-    def _scipy_events(
-        self, p: Any, energy: float, law: NDArray[np.float64], inputs_at: Callable[..., dynamics.Inputs]
-    ) -> list[tuple[str | Event, Callable[[float, NDArray[np.float64]], float]]]:
+
+class _March:
+    """A run by `solve_ivp`: the loop of `compiled.run` over the intervals of smooth inputs, in Python.
+
+    It shares the equations and the sampling of the inputs with the compiled code, and neither integrator nor root finder.
+    """
+
+    def __init__(self, run: _Run) -> None:
+        from . import compiled as k
+
+        self.run_ = run
+        self.p = run.parameters.constants()
+        self.x, self.energy, self.scale = run.start()
+        self.law = run.encoded.law.copy()
+        self.speed_drive = run.inputs.speed_drive
+        self.t = float(run.times[0])
+        self.held = dynamics.Inputs(float(self.speed_drive), 0.0, 0.0, 0.0, 0.0, 0.0)
+        self.rows: list[tuple[float, NDArray[np.float64], dynamics.Inputs]] = []
+        self.occurrences: list[Occurrence] = []
+        self.evaluations = 0
+        self.status = k.RUNNING
+        #: the input that was not finite inside a step, which is then tried again shorter, how often, and what went well
+        self._lost = ""
+        self._losses = 0
+        self._good = self.t, self.x
+        #: value of each event at the end of the interval before; zero where it happened just there
+        self._gaps: list[float] | None = None
+
+    def _end_of_interval(self, interval: int) -> float:
+        times, breaks = self.run_.times, self.run_.encoded.breaks[1:-1]
+        if self.run_.hold:
+            return float(times[interval + 1] if interval + 1 < len(times) else times[-1])
+        later = breaks[(breaks > self.t) & (breaks < times[-1])]
+        return float(later[0] if len(later) else times[-1])
+
+    def _sample(self, stop: float) -> float:
+        """Sample the inputs at the beginning of an interval; returns the commanded speed."""
+        e, t, end = self.run_.encoded, self.t, self.run_.times[-1]
+        torque, speed, acceleration, force, load_x, load_y = channels(e, t, False, self.x, self.law)
+        if self.run_.hold and self.speed_drive:
+            ahead = stop if t < end else t + self.run_.hold
+            acceleration = (channels(e, ahead, True, self.x, self.law)[1] - speed) / (ahead - t)
+        self.held = dynamics.Inputs(float(self.speed_drive), torque, acceleration, force, load_x, load_y)
+        return speed
+
+    def run(self, method: str | type[OdeSolver], options: dict[str, Any], show: Callable[[float], None] | None) -> None:
+        """March to the end, a stopping event, or where it goes no further."""
+        from . import compiled as k
+
+        times, end = self.run_.times, self.run_.times[-1]
+        interval = 0
+        while True:
+            stop = self._end_of_interval(interval)
+            if self.law[2] and self.x[0] >= self.law[1]:
+                self.law[2] = 0.0
+            speed = self._sample(stop)
+            if self.speed_drive and self._gaps is not None:
+                self.x = np.array(dynamics.jump_speed(tuple(self.x), speed, self.p))
+            if len(self.rows) < len(times) and times[len(self.rows)] <= self.t:
+                self.rows.append((self.t, self.x, self.held))
+            self._notice_jumps()
+            if self.t >= end:
+                self.status = k.FINISHED
+            if self.status != k.RUNNING:
+                return
+            reached = self._interval(stop, method, options, show)
+            if self.status != k.RUNNING:
+                return
+            interval += reached
+
+    def _notice_jumps(self) -> None:
+        """Events that happen because the inputs jump."""
+        from . import compiled as k
+
+        gaps = [self._gap(event, self.t, self.x, self.held) for event in self.run_.events]
+        if self._gaps is not None:
+            # a zero stands for what has just been told, and is to be left before it counts
+            gaps = [before and gap for before, gap in zip(self._gaps, gaps)]
+        for event, before, after in zip(self.run_.events, self._gaps or gaps, gaps):
+            up = before < 0.0 <= after and event.direction >= 0
+            down = before > 0.0 >= after and event.direction <= 0
+            if up or down:
+                self.occurrences.append(Occurrence(event.name, self.t, tuple(self.x[:4].tolist())))
+                if event.stop:
+                    self.status = k.EVENT
+        self._gaps = gaps
+
+    def _gap(self, event: Event, t: float, x: NDArray[np.float64], held: dynamics.Inputs) -> float:
+        if event.function is not None:
+            return float(event.function(t, x[0], x[1], x[2], x[3]))
+        column = OUTPUT_NAMES.index(str(event.output))
+        return dynamics.outputs(tuple(x), held, self.energy, self.p)[column] - event.level
+
+    def _inputs(self, t: float, x: NDArray[np.float64], stop: float) -> dynamics.Inputs:
+        if self.run_.hold or (self.run_.encoded.steady and not self.law[2]):
+            return self.held
+        a = channels(self.run_.encoded, t, t >= stop, x, self.law)
+        return dynamics.Inputs(float(self.speed_drive), a[0], a[2], a[3], a[4], a[5])
+
+    def _derivative(self, t: float, x: NDArray[np.float64], stop: float) -> NDArray[np.float64]:
+        # where there is no configuration or no input, so large a derivative has the step tried again shorter
+        nothing = np.full(6, 1e200)
+        try:
+            held = self._inputs(t, x, stop)
+        except NotFiniteError as error:
+            self._lost = error.name
+            self._losses += 1
+            if self._losses > MOST_LOSSES:
+                # LSODA would go on for ever
+                raise _not_finite(self._lost, *self._good) from None
+            return nothing
+        try:
+            result = np.array(dynamics.derivative(tuple(x), held, self.p))
+        except (ArithmeticError, ValueError):
+            return nothing
+        # a trial of a step too long may be anywhere
+        if t > self._good[0] and np.abs(x).max() < 1e100:
+            self._good = t, x.copy()
+        return result
+
+    def _interval(
+        self, stop: float, method: str | type[OdeSolver], options: dict[str, Any], show: Callable[[float], None] | None
+    ) -> bool:
+        """Integrate up to ``stop``; whether it was reached."""
+        from . import compiled as k
+
+        t0, x0 = self.t, self.x
+        times = self.run_.times
+        watched = self._watched(stop)
+        self._lost, self._losses, self._good = "", 0, (t0, x0)
+
+        def right_side(t: float, x: NDArray[np.float64]) -> NDArray[np.float64]:
+            if show is not None:
+                show(t - times[0])
+            return self._derivative(t, x, stop)
+
+        inner = times[(times > t0) & (times < stop)]
+        with np.errstate(over="ignore", invalid="ignore"):
+            solution = solve_ivp(
+                right_side,
+                (t0, stop),
+                x0,
+                method=method,
+                t_eval=np.append(inner, stop),
+                events=[function for _, function in watched],
+                rtol=max(self.run_.tolerance, 3e-14),
+                atol=self.run_.tolerance * self.scale,
+                **options,
+            )
+        self.evaluations += int(solution.nfev)
+        # in the order of `watched`: of what happens at one time, the limit and the release come first
+        happened = sorted(
+            (
+                (float(t), what, x)
+                for (what, _), ts, xs in zip(watched, solution.t_events, solution.y_events)
+                for t, x in zip(ts, xs)
+            ),
+            key=lambda item: item[0],
+        )
+        for t, event, x in happened:
+            if isinstance(event, Event):
+                self.occurrences.append(Occurrence(event.name, t, tuple(x[:4].tolist())))
+        # SciPy gives empty lists where an event comes before the first of the times
+        for t, x in zip(solution.t, np.ascontiguousarray(np.asarray(solution.y).T)):
+            if t < stop:
+                self.rows.append((float(t), x, self._inputs(t, x, stop)))
+        what: str | Event = ""
+        if solution.status == 1:
+            t_cut = happened[-1][0]
+            _, what, self.x = next(item for item in happened if item[0] == t_cut and self._ends(item[1]))
+            self.t, self.x = t_cut, self.x.copy()
+            if what == "release":
+                self.x[0] = self.law[1]
+            else:
+                self.status = k.LIMIT if what == "limit" else k.EVENT
+        elif solution.status == 0:
+            self.t, self.x = stop, solution.y[:, -1].copy()
+        else:
+            if self.rows[-1][0] > t0:
+                self.t, self.x = self.rows[-1][:2]
+            if self._lost:
+                raise _not_finite(self._lost, *self._good)
+            self.status = k.LIMIT if abs(kinematics.position(self.x[0], self.x[1], self.p).s43) < 0.05 else k.NO_STEP
+        self.held = self._inputs(self.t, self.x, stop)
+        # what happens together with the release or the end of the interval must neither be lost nor be told twice: what
+        # has not been told by now is left to the beginning of the next one
+        same = k.SAME * (self.t - t0)
+        just_now = [event for t, event, _ in happened if t >= self.t - same]
+        before = self.x - same * self._derivative(self.t, self.x, stop)
+        self._gaps = [
+            0.0 if event in just_now else self._gap(event, self.t - same, before, self.held)
+            for event in self.run_.events
+        ]
+        if what == "release":
+            self.law[2] = 0.0
+        return bool(solution.status == 0)
+
+    @staticmethod
+    def _ends(what: str | Event) -> bool:
+        return isinstance(what, str) or what.stop
+
+    def _watched(self, stop: float) -> list[tuple[str | Event, Callable[[float, NDArray[np.float64]], float]]]:
         """Event functions for `solve_ivp`: the limit of assembly, the torsion bar's release, the user's."""
 
-        def limit(t: float, y: NDArray[np.float64]) -> float:
+        def limit(t: float, x: NDArray[np.float64]) -> float:
             try:
-                return float(p.branch * kinematics.position(y[0], y[1], p).s43 - kinematics.LIMIT_SINE)
+                return float(self.p.branch * kinematics.position(x[0], x[1], self.p).s43 - kinematics.LIMIT_SINE)
             except (ArithmeticError, ValueError):
                 return -1.0
 
-        def release(t: float, y: NDArray[np.float64]) -> float:
-            return float(y[0] - law[1])
+        def release(t: float, x: NDArray[np.float64]) -> float:
+            return float(x[0] - self.law[1])
 
         watched: list[tuple[str | Event, Any]] = [("limit", limit)]
-        if law[2] and not self.hold:
+        if self.law[2] and not self.run_.hold:
             watched.append(("release", release))
         for _, function in watched:
             function.terminal = True
         release.direction = 1  # type: ignore[attr-defined]
 
-        def of(event: Event) -> Callable[[float, NDArray[np.float64]], float]:
-            if event.output is None:
-                user = event.function
-                assert user is not None
+        t0, x0 = self.t, self.x
+        # SciPy reports an event that starts at zero: such a one is given the sign of what follows
+        x1 = x0 + 1e-6 * (stop - t0) * self._derivative(t0, x0, stop)
 
-                def value(t: float, y: NDArray[np.float64]) -> float:
-                    return float(user(t, y[0], y[1], y[2], y[3]))
-            else:
-                column = OUTPUT_NAMES.index(event.output)
-
-                def value(t: float, y: NDArray[np.float64]) -> float:
-                    return dynamics.outputs(tuple(y), inputs_at(t, y), energy, p)[column] - event.level
+        def of(event: Event, start: float) -> Callable[[float, NDArray[np.float64]], float]:
+            def value(t: float, x: NDArray[np.float64]) -> float:
+                if t == t0:
+                    gap = start or self._gap(event, t0 + 1e-6 * (stop - t0), x1, self._inputs(t0, x1, stop))
+                else:
+                    gap = self._gap(event, t, x, self._inputs(t, x, stop))
+                return gap or 1e-300
 
             value.terminal = event.stop  # type: ignore[attr-defined]
             value.direction = event.direction  # type: ignore[attr-defined]
             return value
 
-        return watched + [(event, of(event)) for event in self.events]
+        return watched + [(event, of(event, start)) for event, start in zip(self.run_.events, self._gaps or [])]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -605,15 +754,21 @@ class Ensemble:
     forces : ndarray, shape (m, n, 6)
         Inputs at the samples, as `linkwork.five_bar.dynamics.Inputs`.
     status : ndarray of int, shape (m,)
-        solver.status of each run.
+        solver.status of each run; 2 where an input was not finite.
+    messages : tuple of str
+        Why a run ended early; empty if it did not.
     counts : ndarray of int, shape (m,)
         Samples that each run reached.
+    parameters : tuple of FiveBarParameters
+    energies : ndarray, shape (m,)
+        Mechanical energy of each at the start (J).
     """
 
     time: NDArray[np.float64]
     states: NDArray[np.float64]
     forces: NDArray[np.float64]
     status: NDArray[np.int64]
+    messages: tuple[str, ...]
     counts: NDArray[np.int64]
     parameters: tuple[FiveBarParameters, ...]
     energies: NDArray[np.float64]
@@ -622,21 +777,25 @@ class Ensemble:
         return len(self.parameters)
 
     def __getitem__(self, index: int) -> Trajectory:
-        """One run as a `Trajectory`."""
+        """One run as a `Trajectory`: its samples, without the last configuration of one that ended early."""
         from . import compiled as k
 
         n = int(self.counts[index])
         values = np.empty((n, len(OUTPUT_NAMES)))
-        states = np.ascontiguousarray(self.states[index, :n])
-        forces = np.ascontiguousarray(self.forces[index, :n])
-        k.outputs(self.parameters[index].constants(), states, forces, self.energies[index], values)
-        status = int(self.status[index])
-        message = "" if status == 0 else f"run {index} ended after {n} of {len(self.time)} samples"
-        return Trajectory(time=self.time[:n], values=values, status=status, message=message, source="compiled DOP853")
+        p = self.parameters[index].constants()
+        k.outputs(p, self.states[index, :n], self.forces[index, :n], self.energies[index], values)
+        return Trajectory(
+            time=self.time[:n],
+            values=values,
+            status=int(self.status[index]),
+            message=self.messages[index],
+            source="compiled DOP853",
+        )
 
-    def output(self, name: str) -> NDArray[np.float64]:
+    def output(self, name: str) -> np.ma.MaskedArray[Any, np.dtype[np.float64]]:
         """One output of all runs, shape (m, n), masked after the end of a run that ended early."""
-        result = np.ma.masked_all((len(self), len(self.time)))
+        shape = (len(self), len(self.time))
+        result = np.ma.MaskedArray(np.full(shape, np.nan), mask=np.ones(shape, dtype=bool))
         for i in range(len(self)):
             run = self[i]
             result[i, : len(run)] = run[name]
@@ -653,6 +812,7 @@ def simulate_many(
     start_time: float = 0.0,
     hold: float | None = None,
     tolerance: float = 1e-9,
+    max_steps: int = 100_000_000,
     batch: int = 64,
     n_jobs: int | None = None,
     progress: bool = False,
@@ -666,13 +826,16 @@ def simulate_many(
     Raises
     ------
     InputError, ParameterError, AssemblyError
-        As `simulate`; the sentence names the run.
+        As `simulate`; the sentence names the run. An input that turns out not to be finite in the course of a run ends
+        that run alone.
     """
     m = len(parameters)
-    all_inputs = _each(inputs or Inputs(), m, "inputs")
-    starts = _each(initial or InitialState(), m, "initial states")
     if m == 0:
         raise InputError("an ensemble needs at least one set of parameters")
+    if batch < 1 or max_steps < 1:
+        raise InputError(f"batch is {batch} and max_steps {max_steps}: both must be at least 1")
+    all_inputs = _each(inputs or Inputs(), m, "inputs")
+    starts = _each(initial or InitialState(), m, "initial states")
     check_tolerance(tolerance)
     times = _check_samples(sample_times(stop_time, step, start_time))
     if hold is not None:
@@ -683,34 +846,40 @@ def simulate_many(
     for number, (p, i, s) in enumerate(zip(parameters, all_inputs, starts)):
         try:
             check_assembly(p, s.crank_angle, s.slider_position)
-            runs.append(_Run(p, i, encode(i), s, times, hold or 0.0, tolerance, (), 0))
+            run = _Run(p, i, align(encode(i), times), s, times, hold or 0.0, tolerance, (), max_steps)
+            run.start()
         except LinkworkError as error:
-            raise type(error)(f"run {number}: {error}") from error
-    if len({tuple(map(id, r.encoded.functions)) for r in runs}) > 1:
+            raise _of_run(number, error) from error
+        runs.append(run)
+    if len({tuple(map(id, run.encoded.functions)) for run in runs}) > 1:
         raise InputError("an ensemble's inputs must share their Python functions")
+    # what cannot be compiled is told here, and not by a worker
+    compiled_source(runs[0].encoded)
     batches = [runs[k : k + batch] for k in range(0, m, batch)]
-    tasks = (joblib.delayed(_run_batch)(b) for b in batches)
+    results: Iterable[Any] = joblib.Parallel(n_jobs=n_jobs, return_as="generator")(
+        joblib.delayed(_run_batch)(b) for b in batches
+    )
     if progress:
-        results = list(
-            track(
-                joblib.Parallel(n_jobs=n_jobs, return_as="generator")(tasks),
-                total=len(batches),
-                description="simulate",
-                transient=True,
-            )
-        )
-    else:
-        results = joblib.Parallel(n_jobs=n_jobs)(tasks)
-    states, forces, status, counts, energies = (np.concatenate(column) for column in zip(*results))
+        results = track(results, total=len(batches), description="simulate", transient=True)
+    states, forces, status, counts, energies, messages = (list(column) for column in zip(*results))
     return Ensemble(
         time=times,
-        states=states,
-        forces=forces,
-        status=status,
-        counts=counts,
+        states=np.concatenate(states),
+        forces=np.concatenate(forces),
+        status=np.concatenate(status),
+        messages=tuple(chain.from_iterable(messages)),
+        counts=np.concatenate(counts),
         parameters=tuple(parameters),
-        energies=energies,
+        energies=np.concatenate(energies),
     )
+
+
+def _of_run(number: int, error: LinkworkError) -> LinkworkError:
+    """The error with the number of its run before the sentence."""
+    named = type(error).__new__(type(error))
+    named.__dict__.update(error.__dict__)
+    named.args = (f"run {number}: {error}",)
+    return named
 
 
 def _each(value: Any, count: int, what: str) -> list[Any]:
@@ -721,55 +890,42 @@ def _each(value: Any, count: int, what: str) -> list[Any]:
     return list(value)
 
 
-def _run_batch(runs: Sequence[_Run]) -> tuple[NDArray[Any], ...]:
+def _run_batch(runs: Sequence[_Run]) -> tuple[Any, ...]:
     """One compiled call for a batch of prepared runs."""
     from . import compiled as k
 
     m, n = len(runs), len(runs[0].times)
     encoded = [run.encoded for run in runs]
-    pieces = max(len(e.coefficients) for e in encoded)
-    waves = max(len(e.harmonics) for e in encoded)
-    breaks = np.empty((m, pieces + 1))
-    coefficients = np.zeros((m, pieces, 5, 4))
+    sizes = np.array([(len(e.coefficients), len(e.harmonics)) for e in encoded])
+    pieces, waves = sizes.max(axis=0)
+    breaks, coefficients = np.zeros((m, pieces + 1)), np.zeros((m, pieces, 5, 4))
     harmonics = np.zeros((m, waves, 4))
-    laws = np.array([e.law for e in encoded])
     starts, energies, scales = np.empty((m, 6)), np.empty(m), np.empty((m, 6))
     for i, (run, e) in enumerate(zip(runs, encoded)):
-        have = len(e.coefficients)
-        # the last piece again and again, long after the run: breaks must increase
-        far = max(e.breaks[-1], run.times[-1]) + 1.0 + np.arange(pieces + 1 - have - 1)
-        breaks[i] = np.concatenate([e.breaks, far])
-        coefficients[i, :have] = e.coefficients
-        if have < pieces:
-            coefficients[i, have:] = _on_late_breaks(e, breaks[i, have:-1])
+        breaks[i, : len(e.breaks)] = e.breaks
+        coefficients[i, : len(e.coefficients)] = e.coefficients
         harmonics[i, : len(e.harmonics)] = e.harmonics
         starts[i], energies[i], scales[i] = run.start()
-    functions, used = compiled_functions(encoded[0])
+    # kept alive while their addresses are in use
+    source, _kept = compiled_source(encoded[0])
     states, forces = np.full((m, n, 6), np.nan), np.full((m, n, 6), np.nan)
     carries = np.zeros((m, k.CARRY))
-    carries[:, k.TIME] = runs[0].times[0]
+    carries[:, k.BEGIN] = runs[0].times[0]
     status = np.empty(m, dtype=np.int64)
     k.run_many(
         np.array([run.parameters.constants() for run in runs]), starts, energies, runs[0].times[-1],
-        runs[0].inputs.speed_drive, runs[0].hold, all(e.steady for e in encoded), breaks, coefficients, harmonics, laws,
-        used, *functions, k.no_event, runs[0].tolerance, scales, runs[0].times, states, forces, carries, status, 2**62,
+        runs[0].inputs.speed_drive, runs[0].hold, np.array([e.steady for e in encoded]), sizes, breaks, coefficients,
+        harmonics, np.array([e.law for e in encoded]), source.functions, runs[0].tolerance, scales, runs[0].times, states,
+        forces, carries, status, runs[0].max_steps,
     )  # fmt: skip
-    return states, forces, np.where(status == k.RUNNING, 4, status), carries[:, k.SAMPLE].astype(np.int64), energies
-
-
-def _on_late_breaks(e: Encoded, left: NDArray[np.float64]) -> NDArray[np.float64]:
-    """The last polynomials of ``e`` about later left ends."""
-    c = e.coefficients[-1]
-    return np.array(
-        [
-            np.column_stack(
-                [
-                    c[:, 0] + s * (c[:, 1] + s * (c[:, 2] + s * c[:, 3])),
-                    c[:, 1] + s * (2.0 * c[:, 2] + 3.0 * s * c[:, 3]),
-                    c[:, 2] + 3.0 * s * c[:, 3],
-                    c[:, 3],
-                ]
-            )
-            for s in left - e.breaks[-2]
-        ]
-    )
+    codes, messages = [], []
+    for code, x, carry in zip(status.tolist(), starts, carries):
+        t = float(carry[k.BEGIN] + carry[k.ELAPSED])
+        if code == k.BAD_INPUT:
+            codes.append(code)
+            messages.append(str(_not_finite(CHANNEL_NAMES[int(carry[k.LOST])], t, x)))
+        else:
+            verdict, message = _verdict(code, t, x, runs[0].max_steps)
+            codes.append(verdict)
+            messages.append(message)
+    return states, forces, np.array(codes), carries[:, k.SAMPLE].astype(np.int64), energies, messages

@@ -134,7 +134,9 @@ def test_check_passes_and_writes_its_files(fmu, tmp_path):
 
 
 def test_a_check_that_fails_exits_with_4(fmu, tmp_path):
-    done = in_own_process("check", "coulomb-friction", "--fmu", fmu, "--method", "RK45", "--tolerance", "1e-30", cwd=tmp_path)
+    done = in_own_process(
+        "check", "coulomb-friction", "--fmu", fmu, "--method", "RK45", "--tolerance", "1e-30", cwd=tmp_path
+    )
     assert done.returncode == cli.CHECK_FAILED
     assert "check failed: coulomb-friction-RK45" in done.stderr
 

@@ -1,0 +1,213 @@
+"""Ensembles: many runs in one compiled call are the runs one by one, on one core, on several, and on a cluster."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from collections.abc import Iterator
+from dataclasses import replace
+from math import nan
+from pathlib import Path
+from typing import Any
+
+import joblib
+import numpy as np
+import pytest
+
+from analysis import (
+    Ensemble,
+    Function,
+    Harmonics,
+    InductionMotor,
+    Inputs,
+    TorsionBar,
+    simulate,
+    simulate_many,
+    steps,
+    table,
+)
+from linkwork.errors import AssemblyError, InputError, ParameterError
+from linkwork.five_bar.parameters import FiveBarParameters, InitialState
+from linkwork.five_bar.published import SETS, TABLE_3_1
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
+SPEED = SETS["table-3.1"].crank_speed
+OPTIONS: dict[str, Any] = {"stop_time": 0.1, "step": 5e-3}
+
+#: Torques with breaks and harmonics of differing numbers; some steady, some not.
+TORQUES = [
+    1.0,
+    steps([0.0, 0.03, 0.06], [1.0, -1.0, 2.0]),
+    Harmonics(1.0, [0.5, 0.2, 0.1], [30.0, 70.0, 200.0], [0.0, 1.0, 2.0]),
+    TorsionBar(torque=10.0),
+    (table([0.0, 0.02, 0.05, 0.07, 0.1], [0.0, 1.0, 2.0, 1.0, 0.0], "cubic"), Harmonics(0.0, [1.0], [9.0], [0.0])),
+    InductionMotor(breakdown_torque=5.0, breakdown_slip=0.2, synchronous_speed=50.0),
+    steps([0.0, 0.2], [1.0, 5.0]),
+]
+SPRINGS = [replace(TABLE_3_1, slider_stiffness=500.0 + 200.0 * i) for i in range(len(TORQUES))]
+
+
+def assert_same(many: Ensemble, index: int, **run: Any) -> None:
+    one = simulate(**run)
+    ours = many[index]
+    assert np.array_equal(ours.values, one.values)
+    assert np.array_equal(ours.time, one.time)
+    assert (ours.status, ours.message) == (one.status, one.message)
+
+
+@pytest.mark.parametrize("hold", [None, 5e-3])
+def test_runs_of_an_ensemble_are_the_runs_one_by_one(hold: float | None) -> None:
+    inputs = [Inputs(torque=torque, force=float(i)) for i, torque in enumerate(TORQUES)]
+    starts = [InitialState(crank_speed=float(i), slider_velocity=0.01 * i) for i in range(len(TORQUES))]
+    many = simulate_many(SPRINGS, inputs, initial=starts, hold=hold, batch=3, **OPTIONS)
+    assert len(many) == len(TORQUES)
+    for i, parameters in enumerate(SPRINGS):
+        assert_same(many, i, parameters=parameters, inputs=inputs[i], initial=starts[i], hold=hold, **OPTIONS)
+    assert many.output("crank.angle").shape == (len(TORQUES), 21)
+    assert not np.any(many.output("crank.angle").mask)
+    assert np.array_equal(many.output("slider.position")[4], many[4]["slider.position"])
+
+
+def test_speed_drives_with_jumps_of_differing_numbers() -> None:
+    speeds = [SPEED, steps([0.0, 0.05], [20.0, 40.0]), steps([0.0, 0.01, 0.02, 0.09], [5.0, 6.0, 7.0, 8.0])]
+    inputs = [Inputs(speed=speed) for speed in speeds]
+    many = simulate_many([TABLE_3_1] * 3, inputs, **OPTIONS)
+    for i in range(3):
+        assert_same(many, i, parameters=TABLE_3_1, inputs=inputs[i], **OPTIONS)
+
+
+def test_one_set_of_inputs_serves_all() -> None:
+    many = simulate_many(SPRINGS[:2], Inputs(speed=SPEED), initial=InitialState(crank_angle=0.3), **OPTIONS)
+    for i in range(2):
+        initial = InitialState(crank_angle=0.3)
+        assert_same(many, i, parameters=SPRINGS[i], inputs=Inputs(speed=SPEED), initial=initial, **OPTIONS)
+
+
+def test_functions_are_shared() -> None:
+    brake = Function(lambda t, th2, u, w2, v: -0.02 * w2)
+    inputs = [Inputs(torque=(TorsionBar(torque=torque), brake)) for torque in (5.0, 10.0)]
+    many = simulate_many([TABLE_3_1] * 2, inputs, **OPTIONS)
+    for i in range(2):
+        assert_same(many, i, parameters=TABLE_3_1, inputs=inputs[i], **OPTIONS)
+    other = Inputs(torque=Function(lambda t, th2, u, w2, v: 0.0))
+    with pytest.raises(InputError, match="share their Python functions"):
+        simulate_many([TABLE_3_1] * 2, [inputs[0], other], **OPTIONS)
+
+
+def slipping() -> list[FiveBarParameters]:
+    """The second runs into the limit of assembly after half a second, the others do not."""
+    return [replace(TABLE_3_1, slider_stiffness=k, slider_damping=10.0) for k in (1000.0, 0.0, 2000.0)]
+
+
+def test_runs_that_end_early_are_masked_and_counted() -> None:
+    many = simulate_many(slipping(), Inputs(speed=SPEED), stop_time=1.0, step=0.01)
+    assert many.status.tolist() == [0, 3, 0]
+    assert many.counts.tolist() == [101, 50, 101]
+    one = simulate(slipping()[1], Inputs(speed=SPEED), stop_time=1.0, step=0.01)
+    assert many.messages == ("", one.message, "")
+    assert many[1].message.startswith("limit of assembly at t = 0.499978413 s, crank angle 21.99")
+    assert np.array_equal(many[1].values, one.values[:-1])
+    u = many.output("slider.position")
+    assert u.mask.sum(axis=1).tolist() == [0, 51, 0]
+    assert np.all(u.mask[1, 50:])
+    assert np.all(np.isfinite(u.compressed()))
+    assert np.all(np.isnan(many.states[1, 50:]))
+
+
+def test_steps_that_do_not_suffice() -> None:
+    many = simulate_many(SPRINGS[:2], Inputs(speed=SPEED), max_steps=10, **OPTIONS)
+    assert many.status.tolist() == [4, 4]
+    assert many.messages[0].startswith("10 steps did not suffice: stopped at t = ")
+
+
+def test_input_that_ceases_to_be_a_number_ends_its_run_alone() -> None:
+    # only the first crank gets as far as that
+    force = Function(lambda t, th2, u, w2, v: np.sqrt(1.0 - th2))
+    inputs = [Inputs(torque=torque, force=force) for torque in (10.0, 0.5)]
+    many = simulate_many([replace(TABLE_3_1, gravity=0.0)] * 2, inputs, stop_time=0.05, step=5e-3)
+    assert many.status.tolist() == [2, 0]
+    assert many.messages[0].startswith("the input force is not a finite number at t = 0.0193")
+    assert 0 < many.counts[0] < many.counts[1] == 11
+
+
+def test_two_jobs_give_what_one_does() -> None:
+    brake = Function(lambda t, th2, u, w2, v: -2.0 * v)
+    inputs = [Inputs(torque=torque, force=brake) for torque in TORQUES]
+    one = simulate_many(SPRINGS, inputs, batch=4, **OPTIONS)
+    two = simulate_many(SPRINGS, inputs, batch=4, n_jobs=2, **OPTIONS)
+    for field in ("states", "forces", "status", "counts", "energies"):
+        assert np.array_equal(getattr(one, field), getattr(two, field), equal_nan=True)
+
+
+def test_progress_changes_nothing(capfd: pytest.CaptureFixture[str]) -> None:
+    silent = simulate_many(SPRINGS, Inputs(speed=SPEED), batch=2, **OPTIONS)
+    assert capfd.readouterr() == ("", "")
+    shown = simulate_many(SPRINGS, Inputs(speed=SPEED), batch=2, progress=True, **OPTIONS)
+    assert np.array_equal(silent.states, shown.states)
+
+
+@pytest.mark.parametrize(
+    ("change", "error", "said"),
+    [
+        ({"parameters": []}, InputError, "at least one set of parameters"),
+        ({"inputs": [Inputs()]}, InputError, "1 inputs for 3 sets of parameters"),
+        ({"initial": [InitialState()] * 4}, InputError, "4 initial states for 3"),
+        ({"inputs": [Inputs(), Inputs(speed=1.0), Inputs()]}, InputError, "all give the speed or all the torque"),
+        (
+            {"initial": [InitialState(), InitialState(), InitialState(slider_position=1.0)]},
+            AssemblyError,
+            "^run 2: the links cannot be joined at crank angle 0 rad",
+        ),
+        (
+            {"inputs": [Inputs(), Inputs(force=Function(lambda t, th2, u, w2, v: nan)), Inputs()]},
+            InputError,
+            "^run 1: the input force is not a finite number at t = 0 s",
+        ),
+        ({"tolerance": 1.0}, ParameterError, "solver.tolerance"),
+        ({"hold": 1e-3}, InputError, "held over 0.001 s"),
+        ({"batch": 0}, InputError, "batch is 0"),
+        ({"step": -1.0}, InputError, "step is -1.0 s"),
+    ],
+)
+def test_what_is_not_usable_is_refused_and_names_its_run(change: dict[str, Any], error: type, said: str) -> None:
+    with pytest.raises(error, match=said):
+        simulate_many(**{"parameters": SPRINGS[:3]} | OPTIONS | change)
+
+
+@pytest.fixture(scope="module")
+def cluster() -> Iterator[Any]:
+    distributed = pytest.importorskip("distributed")
+    with (
+        distributed.LocalCluster(n_workers=1, threads_per_worker=2, processes=False, dashboard_address=":0") as local,
+        distributed.Client(local) as client,
+    ):
+        yield client
+
+
+def test_batches_go_over_a_dask_cluster(cluster: Any) -> None:
+    inputs = [Inputs(torque=torque) for torque in TORQUES]
+    here = simulate_many(SPRINGS, inputs, batch=2, **OPTIONS)
+    before = cluster.run_on_scheduler(_transitions)
+    with joblib.parallel_config(backend="dask"):
+        there = simulate_many(SPRINGS, inputs, batch=2, **OPTIONS)
+    assert np.array_equal(here.states, there.states)
+    # each of the four batches was a task of the cluster: it waited, was processed, was in memory, was released
+    assert cluster.run_on_scheduler(_transitions) - before >= 3 * 4
+
+
+def _transitions(dask_scheduler: Any) -> int:
+    return int(dask_scheduler.transition_counter)
+
+
+def test_example_with_dask() -> None:
+    done = subprocess.run(
+        [sys.executable, "-W", "error", str(EXAMPLES / "dask_ensemble.py"), "--mechanisms", "40"],
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=False,
+        env=os.environ | {"PYTHONDONTWRITEBYTECODE": "1"},
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert "40 mechanisms" in done.stdout

@@ -1,0 +1,734 @@
+"""The in-process solver: one motion by every method, the reference numbers, accuracy, sampling, and how a run ends."""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+from collections.abc import Callable
+from dataclasses import replace
+from math import nan, pi, radians
+from typing import Any
+
+import numpy as np
+import pytest
+
+from analysis import (
+    Function,
+    Harmonics,
+    InductionMotor,
+    Inputs,
+    Piecewise,
+    RunInterrupted,
+    TorsionBar,
+    Trajectory,
+    compare,
+    compiled,
+    ramp,
+    sample_times,
+    simulate,
+    steps,
+    table,
+)
+from analysis.inputs import encode
+from analysis.multipliers import SpeedDrive, rates, simulate_redundant, solve_multipliers
+from analysis.simulate import SCIPY_METHODS, Event, channels
+from linkwork.errors import AssemblyError, InputError, ParameterError
+from linkwork.five_bar import dynamics
+from linkwork.five_bar.kinematics import LIMIT_SINE, coefficients, position
+from linkwork.five_bar.parameters import FiveBarParameters, InitialState
+from linkwork.five_bar.published import (
+    CM_PER_METRE,
+    DYN_CM_PER_NEWTON_METRE,
+    DYN_PER_NEWTON,
+    SETS,
+    TABLE_3_1,
+)
+from tests import published
+from tests.fmu.runner import run_in_process
+
+# the module, whose name in the package is that of its function
+solver = sys.modules["analysis.simulate"]
+
+SPEED = SETS["table-3.1"].crank_speed
+MOTOR = InductionMotor(breakdown_torque=5.0, breakdown_slip=0.2, synchronous_speed=50.0)
+WAVES = Harmonics(1.0, [5.0, 2.0], [30.0, 71.0], [0.3, 1.0])
+BAR = TorsionBar(torque=published.TORQUE_T0_DYN_CM / DYN_CM_PER_NEWTON_METRE)
+POINT = {"coupler_point_distance": 0.1, "coupler_point_angle": 0.4}
+
+#: Name: mechanism and inputs, smooth but for the torsion bar's release.
+CASES: dict[str, tuple[FiveBarParameters, Inputs]] = {
+    "speed": (TABLE_3_1, Inputs(speed=SPEED)),
+    "torsion-bar": (TABLE_3_1, Inputs(torque=BAR)),
+    "motor": (TABLE_3_1, Inputs(torque=MOTOR)),
+    "force": (TABLE_3_1, Inputs(speed=SPEED, force=WAVES)),
+    "load": (replace(TABLE_3_1, **POINT), Inputs(torque=(0.5, MOTOR), load_x=3.0, load_y=WAVES)),
+    "inclined": (replace(TABLE_3_1, slider_guide_angle=0.4, ground_inclination=0.3), Inputs(torque=MOTOR)),
+    "other-assembly": (replace(TABLE_3_1, assembly_branch=-1), Inputs(speed=SPEED, force=WAVES)),
+    "friction": (replace(TABLE_3_1, slider_coulomb_friction=5.0), Inputs(speed=SPEED)),
+}
+#: Method: tolerance with which it meets 1e-6 in every output.
+METHODS = {"DOP853": 1e-10, "LSODA": 1e-11, "Radau": 1e-9, "Hamming": 1e-11}
+STOP = 0.12
+
+
+def run(case: str, **options: Any) -> Trajectory:
+    parameters, inputs = CASES[case]
+    return simulate(parameters, inputs, **{"stop_time": STOP, "step": 2e-3} | options)
+
+
+def table_3_1(inputs: Inputs | None = None, **options: Any) -> Trajectory:
+    return simulate(TABLE_3_1, inputs or Inputs(speed=SPEED), **{"stop_time": STOP, "step": 2e-3} | options)
+
+
+# --- One motion, by every method
+
+
+@pytest.mark.parametrize("case", CASES)
+@pytest.mark.parametrize("method", METHODS)
+def test_methods_agree_in_every_output(case: str, method: str) -> None:
+    result = compare(run(case), run(case, method=method, tolerance=METHODS[method]), tolerance=1e-6)
+    assert result.agrees, result.worst
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_held_inputs_by_an_independent_integrator(case: str) -> None:
+    options = {"hold": 4e-3, "step": 4e-3}
+    result = compare(run(case, **options), run(case, **options, method="DOP853", tolerance=1e-10), tolerance=1e-6)
+    assert result.agrees, result.worst
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_the_multiplier_form_gives_the_same_motion_and_forces(case: str) -> None:
+    parameters, inputs = CASES[case]
+    stop = 0.02 if case == "torsion-bar" else 0.04
+    initial = InitialState(crank_speed=SPEED if inputs.speed_drive else 0.0)
+    ours = run(case, stop_time=stop, step=stop / 4, initial=initial, tolerance=1e-11)
+    encoded = encode(inputs)
+
+    def acting(t: float, q: np.ndarray, qd: np.ndarray) -> tuple[float, float, float, float]:
+        x = np.array([q[0], q[3], qd[0], qd[3]])
+        torque, _, _, force, load_x, load_y = channels(encoded, t, False, x, encoded.law)
+        return torque, force, load_x, load_y
+
+    speed = SpeedDrive(SPEED) if inputs.speed_drive else None
+    theirs = simulate_redundant(parameters, initial, acting, ours.time, speed=speed)
+    for column, name, scale in ((0, "crank.angle", 1.0), (3, "slider.position", 0.01)):
+        assert np.abs(theirs.q[:, column] - ours[name]).max() < 1e-8 * scale
+    for column, name, scale in ((0, "crank.speed", SPEED), (3, "slider.velocity", 0.5)):
+        assert np.abs(theirs.qd[:, column] - ours[name]).max() < 1e-8 * scale
+    for i, t in enumerate(ours.time):
+        qd = rates(parameters, theirs.q[i], *theirs.qd[i, [0, 3]])
+        torque, force, load_x, load_y = acting(t, theirs.q[i], qd)
+        solution = solve_multipliers(
+            parameters,
+            theirs.q[i],
+            qd,
+            torque=torque,
+            slider_force=force,
+            load=(load_x, load_y),
+            crank_acceleration=0.0 if speed else None,
+        )
+        largest = max(abs(f) for f in solution.forces.values())
+        for name, f in solution.forces.items():
+            assert ours[name][i] == pytest.approx(f, abs=1e-6 * largest)
+        assert ours["drive.applied_torque"][i] == pytest.approx(solution.torque, abs=1e-7 * largest)
+
+
+# --- The reference numbers
+
+
+@pytest.mark.parametrize("method", ["compiled", *METHODS])
+def test_slider_positions_of_the_reference(method: str) -> None:
+    angles = list(published.U_CM_AT_CRANK_DEG)
+    times = [0.0, *(radians(a) / SPEED for a in angles)]
+    ours = table_3_1(samples=times, stop_time=times[-1], method=method, tolerance=METHODS.get(method, 1e-10))
+    assert np.degrees(ours["crank.angle"][1:]) == pytest.approx(angles, rel=1e-9)
+    # printed to ten decimals; the looser methods are held to eight
+    expected = list(published.U_CM_AT_CRANK_DEG.values())
+    precision = 6e-10 if method in ("compiled", "DOP853", "Radau") else 2e-8
+    assert ours["slider.position"][1:] * CM_PER_METRE == pytest.approx(expected, abs=precision)
+
+
+def test_torque_and_force_of_the_reference() -> None:
+    times = [0.0, 2.0 * pi / SPEED]
+    at_rest = table_3_1(samples=times, tolerance=1e-11)
+    assert at_rest["drive.applied_torque"][0] * DYN_CM_PER_NEWTON_METRE == pytest.approx(
+        published.CRANK_TORQUE_AT_START_DYN_CM, rel=1e-9
+    )
+    x, y = published.FORCE_AT_C_AT_360_DEG_DYN
+    assert at_rest["pin.C.fx"][-1] * DYN_PER_NEWTON == pytest.approx(x, abs=2e-3)
+    assert at_rest["pin.C.fy"][-1] * DYN_PER_NEWTON == pytest.approx(y, abs=2e-3)
+
+
+def test_steady_state_of_the_reference() -> None:
+    turns = 2.0 * pi / SPEED * np.array([0.0, 29.0, 30.0])
+    steady = table_3_1(samples=turns, tolerance=1e-11)
+    assert steady["slider.position"][1:] * CM_PER_METRE == pytest.approx([published.STEADY_U_CM] * 2, abs=1e-8)
+    assert steady["slider.velocity"][1:] * CM_PER_METRE == pytest.approx([published.STEADY_U_RATE_CM_S] * 2, abs=1e-7)
+
+
+@pytest.mark.parametrize("method", ["compiled", *METHODS])
+def test_torsion_bar_of_the_reference(method: str) -> None:
+    one_radian = Event(name="one radian", output="crank.angle", level=1.0)
+    ours = run("torsion-bar", stop_time=0.25, step=0.25, events=[one_radian], method=method, tolerance=1e-11)
+    (event,) = ours.events
+    assert event.time == pytest.approx(published.TORQUE_END_TIME_S, abs=6e-12 if method == "compiled" else 1e-10)
+    expected = published.TORQUE_AT_0_25_S
+    assert ours["crank.angle"][-1] == pytest.approx(expected["th2_rad"], abs=2e-7)
+    assert ours["slider.position"][-1] * CM_PER_METRE == pytest.approx(expected["u_cm"], abs=2e-7)
+    assert ours["crank.speed"][-1] == pytest.approx(expected["th2_rate_rad_s"], abs=2e-6)
+
+
+# --- Accuracy
+
+
+def test_error_falls_with_the_tolerance() -> None:
+    exact = run("load", tolerance=1e-13)
+    errors = []
+    for tolerance in (1e-4, 1e-6, 1e-8, 1e-10):
+        errors.append(compare(exact, run("load", tolerance=tolerance))["slider.position"].relative)
+        assert errors[-1] < 1e3 * tolerance
+    ratios = np.array(errors[:-1]) / np.array(errors[1:])
+    assert np.all(ratios > 10.0), errors
+
+
+def test_order_by_regression() -> None:
+    # over one smooth stretch the error goes with the eighth power of the mean step
+    points = []
+    exact = table_3_1(step=STOP, tolerance=1e-13)
+    for tolerance in np.geomspace(1e-5, 1e-10, 11):
+        ours = table_3_1(step=STOP, tolerance=float(tolerance))
+        points.append((ours.statistics["steps"], np.abs(ours.values[-1, 5] - exact.values[-1, 5])))
+    order = -np.polyfit(*np.log(points).T, 1)[0]
+    assert 6.5 < order < 10.0
+
+
+def test_dense_output_between_steps_is_as_good_as_the_steps() -> None:
+    irregular = np.sort(np.random.default_rng(3).uniform(0.0, STOP, 150))
+    samples = np.array([0.0, *irregular, STOP])
+    # a force of zero with breaks at the samples: the integrator stops at each, nothing is interpolated
+    stops = Inputs(speed=SPEED, force=Piecewise(samples, np.zeros((len(samples) - 1, 4))))
+    stepped = table_3_1(stops, samples=samples, tolerance=1e-13)
+    interpolated = table_3_1(samples=samples, tolerance=1e-9)
+    assert interpolated.statistics["steps"] < 40
+    assert compare(stepped, interpolated, tolerance=3e-7).agrees
+    assert compare(stepped, interpolated)["slider.position"].relative < 5e-8
+    assert compare(stepped, table_3_1(samples=samples, tolerance=1e-13), tolerance=1e-10).agrees
+
+
+@pytest.mark.parametrize("drive", ["speed", "torque"])
+def test_energy_balance_holds_to_the_tolerance(drive: str) -> None:
+    inputs = Inputs(speed=SPEED, force=WAVES) if drive == "speed" else Inputs(torque=MOTOR, force=WAVES, load_y=2.0)
+    ours = simulate(replace(TABLE_3_1, slider_coulomb_friction=3.0, **POINT), inputs, stop_time=1.0, step=0.01)
+    assert np.abs(ours["energy.residual"]).max() < 1e-8 * np.abs(ours["energy.supplied"]).max()
+    assert ours["energy.dissipated"][-1] > 0.1
+
+
+def test_a_million_steps() -> None:
+    turn = 2.0 * pi / SPEED
+    turns = 40_000
+    calls = []
+    ours = table_3_1(samples=turn * np.array([0.0, turns - 1.0, turns]), tolerance=1e-9)
+    calls.append(ours.statistics["steps"])
+    assert calls[0] > 800_000
+    assert ours["crank.angle"][-1] == pytest.approx(2.0 * pi * turns, rel=1e-13)
+    assert ours["slider.position"][1:] * CM_PER_METRE == pytest.approx([published.STEADY_U_CM] * 2, abs=1e-6)
+    assert abs(ours["energy.residual"][-1]) < 1e-7 * ours["energy.dissipated"][-1]
+
+
+# --- Sampling
+
+
+def test_sample_times_are_start_plus_k_step() -> None:
+    times = sample_times(1.3, 0.1, 0.3)
+    assert times.tolist() == [0.3 + 0.1 * k for k in range(10)] + [1.3]
+    assert sample_times(0.25, 0.1).tolist() == [0.0, 0.1, 0.2, 0.25]
+    assert sample_times(0.05, 0.1).tolist() == [0.0, 0.05]
+    assert len(sample_times(3.0 / 7.0 * 7.0, 3.0 / 7.0)) == 8
+    # half a step is left over after a million
+    assert sample_times(1000.0005, 0.001)[-2:].tolist() == [1000.0, 1000.0005]
+
+
+@pytest.mark.parametrize("method", ["compiled", "DOP853"])
+def test_recorded_times_are_the_ones_asked_for(method: str) -> None:
+    samples = np.array([0.0, 1e-9, 0.0123, 0.0123 + 1e-12, 0.04, STOP])
+    ours = table_3_1(samples=samples, method=method)
+    assert np.array_equal(ours.time, samples)
+    assert ours["crank.angle"] == pytest.approx(SPEED * samples, rel=1e-12, abs=1e-14)
+    assert table_3_1(step=0.05, method=method).time.tolist() == [0.0, 0.05, 0.1, STOP]
+
+
+@pytest.mark.parametrize("method", ["compiled", "DOP853"])
+@pytest.mark.parametrize("start", [-3.0, 1e6])
+def test_start_time_shifts_a_run_and_nothing_else(start: float, method: str) -> None:
+    def inputs(t0: float) -> Inputs:
+        return Inputs(
+            torque=(MOTOR, ramp(0.0, 1.0, t0 + 0.02, t0 + 0.07)),
+            force=Harmonics(0.0, [4.0], [50.0], [0.3 - 50.0 * t0]),
+            load_x=steps([t0, t0 + 0.05], [0.0, 2.0]),
+        )
+
+    at_zero = table_3_1(inputs(0.0), method=method)
+    shifted = table_3_1(inputs(start), start_time=start, stop_time=start + STOP, method=method)
+    assert shifted.time[0] == start
+    assert shifted.time[-1] == start + STOP
+    moved = replace(shifted, time=at_zero.time)
+    # the times themselves are known to 1e-10 s at 1e6 s, and the phases with them
+    assert compare(at_zero, moved, tolerance=1e-6).agrees
+
+
+@pytest.mark.parametrize("hold", [None, 0.1])
+@pytest.mark.parametrize("method", ["compiled", "DOP853"])
+def test_samples_at_a_jump_belong_to_what_follows(method: str, hold: float | None) -> None:
+    # 0.3 and 3 * 0.1 are not the same float
+    inputs = Inputs(torque=steps([0.0, 0.3, 0.6], [0.1, 0.7, 0.2]), force=steps([0.0, 0.7], [0.0, 1.0]))
+    ours = table_3_1(inputs, stop_time=0.8, step=0.1, hold=hold, method=method)
+    assert ours["drive.applied_torque"].tolist() == [0.1, 0.1, 0.1, 0.7, 0.7, 0.7, 0.2, 0.2, 0.2]
+
+
+@pytest.mark.parametrize("method", ["compiled", "DOP853"])
+def test_jump_at_the_very_end_is_seen_by_the_last_sample(method: str) -> None:
+    ours = table_3_1(Inputs(torque=steps([0.0, 0.1], [0.1, 0.7])), stop_time=0.1, step=0.05, method=method)
+    assert ours["drive.applied_torque"].tolist() == [0.1, 0.1, 0.7]
+
+
+def test_held_inputs_are_constant_between_the_points_of_the_grid() -> None:
+    # what is held at t_k is worth the same as steps with these values
+    times = sample_times(STOP, 4e-3)
+    force = table([0.0, 0.03, 0.08, STOP], [0.0, 4.0, -3.0, 1.0], "cubic")
+    held = table_3_1(Inputs(torque=0.5, force=force), hold=4e-3, step=4e-3)
+    values = [channels(encode(Inputs(force=force)), t, False, np.zeros(4), np.ones(6))[3] for t in times]
+    stepped = table_3_1(Inputs(torque=0.5, force=steps(times, values)), step=4e-3)
+    assert compare(held, stepped, tolerance=1e-12).agrees
+
+
+def test_held_speed_goes_along_the_secant_and_meets_the_command() -> None:
+    speed = Harmonics(40.0, [10.0], [60.0], [0.0])
+    held = table_3_1(Inputs(speed=speed), hold=4e-3, step=4e-3)
+    commanded = 40.0 + 10.0 * np.cos(60.0 * held.time)
+    assert held["crank.speed"] == pytest.approx(commanded, rel=1e-12)
+    ahead = 40.0 + 10.0 * np.cos(60.0 * (held.time + 4e-3))
+    assert held["crank.acceleration"] == pytest.approx((ahead - commanded) / 4e-3, rel=1e-9, abs=1e-6)
+    secants = table_3_1(Inputs(speed=table(held.time, commanded)), step=4e-3)
+    assert compare(held, secants)["slider.position"].relative < 1e-9
+
+
+@pytest.mark.parametrize("hold", [4e-3, None])
+def test_torque_of_the_bar_ends_for_good(hold: float | None) -> None:
+    # turned back after the release, the crank finds no bar any more
+    inputs = Inputs(torque=(BAR, steps([0.0, 0.03], [0.0, -20.0])))
+    ours = table_3_1(inputs, stop_time=0.08, step=4e-3, hold=hold)
+    after = np.argmax(ours["crank.angle"] >= 1.0)
+    assert np.any(ours["crank.angle"][after:] < 0.5)
+    assert set(ours["drive.applied_torque"][after:]) == {0.0, -20.0}
+    assert np.all(ours["drive.applied_torque"][:after] > 0.0)
+
+
+# --- Speed that ramps and jumps
+
+
+def test_crank_angle_under_a_ramp_is_exact() -> None:
+    ours = table_3_1(Inputs(speed=ramp(10.0, 50.0, 0.02, 0.1)))
+    t = np.clip(ours.time, 0.02, 0.1) - 0.02
+    exact = 10.0 * ours.time + 250.0 * t**2 + 40.0 * np.clip(ours.time - 0.1, 0.0, None)
+    assert ours["crank.angle"] == pytest.approx(exact, rel=1e-12)
+    inside = (ours.time >= 0.0199) & (ours.time < 0.0999)
+    assert ours["crank.acceleration"][inside] == pytest.approx(500.0)
+    assert np.all(ours["crank.acceleration"][~inside] == 0.0)
+
+
+def _momentum(parameters: FiveBarParameters, row: Any) -> float:
+    """Generalised momentum of the slider."""
+    p = parameters.constants()
+    g = position(row["crank.angle"], row["slider.position"], p)
+    m = dynamics.inertia(g, coefficients(g, p), p)
+    return m.m12 * row["crank.speed"] + m.m22 * row["slider.velocity"]
+
+
+@pytest.mark.parametrize("at_sample", [True, False])
+@pytest.mark.parametrize("method", ["compiled", "DOP853"])
+def test_jump_of_the_speed_conserves_the_momentum_of_the_slider(method: str, at_sample: bool) -> None:
+    jump = 0.05
+    inputs = Inputs(speed=steps([0.0, jump], [20.0, 45.0]))
+    tiny = 1e-10
+    samples = [0.0, jump - tiny, *([jump] if at_sample else []), jump + tiny, STOP]
+    ours = table_3_1(inputs, samples=samples, method=method)
+    rows = [dict(zip(ours.names, row)) for row in ours.values]
+    before, after = rows[1], rows[2]
+    assert after["crank.speed"] == 45.0
+    assert before["crank.speed"] == 20.0
+    assert after["slider.position"] == pytest.approx(before["slider.position"], abs=1e-9)
+    assert abs(after["slider.velocity"] - before["slider.velocity"]) > 0.03
+    assert _momentum(TABLE_3_1, after) == pytest.approx(_momentum(TABLE_3_1, before), abs=5e-9)
+    # the impulse on the crank does work, and the balance knows of it
+    assert after["energy.supplied"] - before["energy.supplied"] == pytest.approx(
+        after["energy.kinetic"] - before["energy.kinetic"], rel=1e-6
+    )
+    assert np.abs(ours["energy.residual"]).max() < 1e-8 * ours["energy.kinetic"].max()
+
+
+def test_speed_at_the_start_takes_the_place_of_the_initial_one_without_a_jump() -> None:
+    initial = InitialState(crank_speed=5.0, slider_velocity=0.2)
+    ours = table_3_1(initial=initial)
+    assert ours["crank.speed"][0] == SPEED
+    assert ours["slider.velocity"][0] == 0.2
+    assert ours["energy.supplied"][0] == 0.0
+    assert ours["energy.residual"][0] == 0.0
+
+
+# --- Calls
+
+
+CUT_UP = {
+    "bar-and-events": (Inputs(torque=BAR), None),
+    "smooth": (Inputs(torque=MOTOR, force=WAVES), None),
+    "ramp": (Inputs(speed=ramp(10.0, 50.0, 0.02, 0.1)), None),
+    "jumps": (Inputs(speed=(steps([0.0, 0.031, 0.08], [20.0, 45.0, 30.0]), WAVES)), None),
+    "held-speed": (Inputs(speed=(40.0, WAVES)), 4e-3),
+    "held-torque": (Inputs(torque=(BAR, WAVES)), 4e-3),
+    "function": (Inputs(torque=0.5, force=Function(lambda t, th2, u, w2, v: 3.0 * np.sin(th2) - 2.0 * v)), None),
+}
+
+
+@pytest.mark.parametrize("case", CUT_UP)
+def test_a_run_cut_into_small_calls_is_the_same_run(case: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    inputs, hold = CUT_UP[case]
+    events = [
+        Event(name="position", output="slider.position", level=-0.001),
+        Event(name="force", output="pin.C.fx", level=1.0, direction=1),
+        Event(name="function", function=lambda t, th2, u, w2, v: np.sin(5.0 * th2)),
+        Event(name="one", output="crank.angle", level=1.0),
+    ]
+    options: dict[str, Any] = {"events": events, "hold": hold, "step": hold or 2e-3}
+    whole = table_3_1(inputs, **options)
+    calls = []
+    original = compiled.run
+
+    def counted(*arguments: Any) -> int:
+        calls.append(1)
+        return int(original(*arguments))
+
+    monkeypatch.setattr(compiled, "run", counted)
+    for steps_per_call in (1, 3):
+        monkeypatch.setattr(solver, "STEPS_PER_CALL", steps_per_call)
+        # room for the events of one step only
+        monkeypatch.setattr(solver, "EVENTS_PER_CALL", 1 + compiled.EVENTS_PER_STEP)
+        calls.clear()
+        cut = table_3_1(inputs, **options)
+        assert len(calls) > whole.statistics["steps"] / steps_per_call - 1
+        assert np.array_equal(cut.values, whole.values)
+        assert cut.events == whole.events
+        assert cut.statistics["steps"] == whole.statistics["steps"]
+    assert len(whole.events) > 3
+
+
+# --- How a run ends early
+
+
+SLIPS = replace(TABLE_3_1, slider_stiffness=0.0, slider_damping=10.0)
+
+
+@pytest.mark.parametrize("method", ["compiled", "DOP853", "LSODA", "Radau"])
+def test_limit_of_assembly_ends_a_run_with_all_data_up_to_it(method: str) -> None:
+    ours = simulate(SLIPS, Inputs(speed=SPEED), stop_time=3.0, step=0.01, method=method)
+    assert ours.status == 3
+    t, angle, u = ours.time[-1], ours["crank.angle"][-1], ours["slider.position"][-1]
+    assert ours.message == (
+        f"limit of assembly at t = {t:.9g} s, crank angle {angle:.9g} rad ({np.degrees(angle):.4f} deg) and slider "
+        f"position {u:.9g} m"
+    )
+    assert np.array_equal(ours.time[:-1], 0.01 * np.arange(len(ours) - 1))
+    assert np.all(np.isfinite(ours.values))
+    assert np.sin(ours["transmission.angle"][-1]) == pytest.approx(LIMIT_SINE, rel=1e-8)
+    assert t == pytest.approx(0.499978413, abs=2e-9)
+    same = simulate(SLIPS, Inputs(speed=SPEED), stop_time=3.0, step=0.01, tolerance=1e-12)
+    assert t == pytest.approx(same.time[-1], abs=1e-8)
+
+
+def test_limit_of_assembly_with_held_inputs() -> None:
+    ours = simulate(SLIPS, Inputs(speed=SPEED), stop_time=3.0, step=0.01, hold=0.01)
+    assert ours.status == 3
+    assert ours.time[-1] == pytest.approx(0.499978413, abs=2e-9)
+    assert np.all(np.isfinite(ours.values))
+
+
+def test_fold_where_crank_pin_meets_slider_pin_is_the_limit_of_assembly() -> None:
+    # l3 = l4, and the slider is drawn towards the crank pin: coupler and rocker fold
+    inputs = Inputs(speed=0.001, force=-200.0)
+    ours = simulate(replace(TABLE_3_1, slider_stiffness=0.0), inputs, stop_time=1.0, step=0.01)
+    assert ours.status == 3
+    assert ours.time[-1] < 1.0
+    assert ours["transmission.angle"][-1] == pytest.approx(LIMIT_SINE, rel=1e-6)
+
+
+def test_steps_that_do_not_suffice_end_a_run_with_all_data(monkeypatch: pytest.MonkeyPatch) -> None:
+    for per_call in (solver.STEPS_PER_CALL, 7):
+        monkeypatch.setattr(solver, "STEPS_PER_CALL", per_call)
+        ours = table_3_1(max_steps=20, tolerance=1e-12)
+        assert ours.status == 4
+        assert ours.message.startswith(f"20 steps did not suffice: stopped at t = {ours.time[-1]:.9g} s, crank angle ")
+        assert ours.statistics["steps"] + ours.statistics["rejected"] == 20
+        assert len(ours) > 2
+        assert np.all(np.isfinite(ours.values))
+        whole = table_3_1(tolerance=1e-12)
+        assert np.array_equal(ours.values[:-1], whole.values[: len(ours) - 1])
+        assert SPEED * ours.time[-1] == pytest.approx(ours["crank.angle"][-1])
+
+
+def test_steps_that_do_not_suffice_within_a_held_interval() -> None:
+    ours = table_3_1(Inputs(speed=SPEED), max_steps=5, hold=STOP, step=STOP)
+    assert ours.status == 4
+    assert 0.0 < ours.time[-1] < STOP
+
+
+def test_right_hand_side_that_the_step_size_cannot_resolve() -> None:
+    # a force that jumps back and forth with the slider: no step across it meets the tolerance for long
+    chatter = Function(lambda t, th2, u, w2, v: -1e9 if u > 1e-4 else 1e9)
+    ours = table_3_1(Inputs(speed=SPEED, force=chatter), max_steps=100_000)
+    assert ours.status == 4
+    assert np.all(np.isfinite(ours.values))
+
+
+def _interrupting(after: int) -> Callable[..., int]:
+    original = compiled.run
+    calls = []
+
+    def run(*arguments: Any) -> int:
+        calls.append(1)
+        if len(calls) > after:
+            raise KeyboardInterrupt
+        return int(original(*arguments))
+
+    return run
+
+
+def test_interrupt_keeps_the_data(monkeypatch: pytest.MonkeyPatch) -> None:
+    whole = table_3_1()
+    monkeypatch.setattr(solver, "STEPS_PER_CALL", 10)
+    monkeypatch.setattr(compiled, "run", _interrupting(1))
+    with pytest.raises(RunInterrupted, match=r"interrupted at t = 0\.\d+ s") as caught:
+        table_3_1()
+    kept = caught.value.trajectory
+    assert 2 < len(kept) < len(whole)
+    assert np.array_equal(kept.values[:-1], whole.values[: len(kept) - 1])
+    assert np.array_equal(kept.time[:-1], whole.time[: len(kept) - 1])
+
+
+def test_interrupt_before_the_first_step(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(compiled, "run", _interrupting(0))
+    with pytest.raises(RunInterrupted, match=r"^interrupted$") as caught:
+        table_3_1()
+    assert len(caught.value.trajectory) == 0
+
+
+def test_interrupt_in_the_last_call_is_not_forgotten(monkeypatch: pytest.MonkeyPatch) -> None:
+    # else a loop over many short runs could not be stopped
+    original = compiled.run
+
+    def run(*arguments: Any) -> int:
+        os.kill(os.getpid(), signal.SIGINT)
+        return int(original(*arguments))
+
+    before = signal.getsignal(signal.SIGINT)
+    monkeypatch.setattr(compiled, "run", run)
+    with pytest.raises(RunInterrupted, match=r"interrupted at t = 0\.12 s") as caught:
+        table_3_1()
+    monkeypatch.undo()
+    assert np.array_equal(caught.value.trajectory.values, table_3_1().values)
+    assert signal.getsignal(signal.SIGINT) is before
+
+
+def test_interrupt_of_a_scipy_method_keeps_the_data() -> None:
+    def force(t: float, th2: float, u: float, w2: float, v: float) -> float:
+        if t > 0.08:
+            raise KeyboardInterrupt
+        return 0.0
+
+    # with held inputs every interval that is complete is kept
+    with pytest.raises(RunInterrupted) as caught:
+        table_3_1(Inputs(speed=SPEED, force=Function(force)), method="DOP853", step=4e-3, hold=4e-3)
+    kept = caught.value.trajectory
+    assert kept.time[-1] == pytest.approx(0.08)
+    assert compare(table_3_1(step=4e-3, stop_time=0.08, hold=4e-3), kept, tolerance=1e-6).agrees
+
+
+def _interrupted_by_signal() -> list[Any]:
+    import os
+    import signal
+    import threading
+
+    from analysis import Inputs, RunInterrupted, simulate
+    from linkwork.five_bar.published import TABLE_3_1
+
+    simulate(TABLE_3_1, Inputs(speed=44.0), stop_time=0.1)
+    threading.Timer(0.3, os.kill, (os.getpid(), signal.SIGINT)).start()
+    try:
+        simulate(TABLE_3_1, Inputs(speed=44.0), stop_time=1e5, step=10.0)
+    except RunInterrupted as interrupted:
+        run = interrupted.trajectory
+        return [len(run), float(run.time[-1]), float(run["crank.angle"][-1]), str(interrupted)]
+    return []
+
+
+@pytest.mark.skipif(os.name == "nt", reason="a signal of POSIX")
+def test_ctrl_c_in_a_long_run() -> None:
+    count, end, angle, sentence = run_in_process(_interrupted_by_signal)
+    assert count > 1
+    assert 10.0 < end < 1e5
+    assert angle == pytest.approx(44.0 * end, rel=1e-9)
+    assert sentence == f"interrupted at t = {end:.6g} s"
+
+
+# --- Progress
+
+
+@pytest.mark.parametrize("method", ["compiled", "DOP853"])
+def test_progress_is_shown_only_where_it_is_wanted(method: str, capfd: pytest.CaptureFixture[str]) -> None:
+    silent = table_3_1(method=method)
+    assert capfd.readouterr() == ("", "")
+    shown = table_3_1(method=method, progress=True)
+    assert np.array_equal(shown.values, silent.values)
+
+
+# --- What is refused
+
+
+@pytest.mark.parametrize(
+    ("options", "error", "said"),
+    [
+        ({"method": "Euler"}, InputError, "'Euler': it must be 'compiled', 'Hamming' or one of RK23"),
+        ({"tolerance": 0.0}, ParameterError, "solver.tolerance"),
+        ({"tolerance": nan}, ParameterError, "solver.tolerance"),
+        ({"tolerance": 0.1}, ParameterError, "solver.tolerance"),
+        ({"step": 0.0}, InputError, "step is 0.0 s"),
+        ({"step": nan}, InputError, "step is nan s"),
+        ({"stop_time": 0.0}, InputError, "must end after it starts"),
+        ({"stop_time": nan}, InputError, "must end after it starts"),
+        ({"start_time": 1.0}, InputError, "must end after it starts"),
+        ({"samples": [0.0]}, InputError, "at least two finite numbers"),
+        ({"samples": [0.0, 0.2, 0.1]}, InputError, "increasing"),
+        ({"samples": [0.0, nan]}, InputError, "finite"),
+        ({"samples": [[0.0, 1.0]]}, InputError, "recorded times"),
+        ({"hold": 3e-3}, InputError, "held over 0.003 s"),
+        ({"hold": -2e-3}, InputError, "held over -0.002 s"),
+        ({"hold": nan}, InputError, "held over nan s"),
+        ({"samples": [0.0, 0.1, 0.15], "hold": 0.05}, InputError, "same multiples"),
+        ({"max_steps": 0}, InputError, "max_steps is 0"),
+        ({"max_step": 0.1}, InputError, "takes no options, but was given max_step"),
+        ({"initial": InitialState(slider_position=1.0)}, AssemblyError, "cannot be joined at crank angle 0 rad"),
+        ({"initial": InitialState(crank_angle=pi, slider_position=0.0965)}, AssemblyError, "limit of assembly|joined"),
+    ],
+)
+def test_what_is_not_usable_is_refused_with_a_sentence(options: dict[str, Any], error: type, said: str) -> None:
+    with pytest.raises(error, match=said):
+        table_3_1(**options)
+
+
+def test_every_method_of_scipy_is_offered() -> None:
+    for method in SCIPY_METHODS:
+        ours = table_3_1(stop_time=0.01, step=5e-3, method=method, tolerance=1e-6)
+        assert ours.status == 0
+        assert ours.source == method
+        assert ours["crank.angle"][-1] == pytest.approx(0.01 * SPEED)
+
+
+def test_options_reach_scipy() -> None:
+    few = table_3_1(method="DOP853")
+    many = table_3_1(method="DOP853", max_step=1e-4)
+    assert many.statistics["evaluations"] > 2 * few.statistics["evaluations"]
+
+
+@pytest.mark.parametrize("method", ["compiled", "DOP853", "LSODA"])
+def test_input_that_ceases_to_be_a_number_is_named_with_the_time(method: str) -> None:
+    of_time = Inputs(speed=SPEED, force=Function(lambda t, th2, u, w2, v: np.sqrt(0.05 - t)))
+    with np.errstate(invalid="ignore"):
+        with pytest.raises(InputError, match=r"the input force is not a finite number at t = 0\.0(5|499999|500000)"):
+            table_3_1(of_time, method=method)
+        of_state = Inputs(speed=SPEED, load_x=Function(lambda t, th2, u, w2, v: np.sqrt(1.0 - th2)))
+        with pytest.raises(InputError, match=r"the input load_x is .* at t = 0\.0227364\d* s, crank angle (1|0\.9999)"):
+            table_3_1(of_state, method=method)
+
+
+@pytest.mark.parametrize("hold", [None, 2e-3])
+def test_input_that_is_no_number_at_the_start_or_at_a_point_of_the_grid(hold: float | None) -> None:
+    with pytest.raises(InputError, match="the input torque is not a finite number at t = 0 s"):
+        table_3_1(Inputs(torque=Function(lambda t, th2, u, w2, v: nan)), hold=hold)
+    late = Function(lambda t, th2, u, w2, v: nan if t >= 0.04 else 0.0, breaks=[0.04])
+    for channel in ("torque", "force", "load_x", "load_y"):
+        with pytest.raises(InputError, match=rf"the input {channel} is not a finite number at t = 0\.0(4|3999)"):
+            table_3_1(Inputs(**{channel: late}), hold=hold)
+    rate = Function(lambda t, th2, u, w2, v: 40.0, rate=late.function, breaks=[0.04])
+    with pytest.raises(InputError, match=r"the input acceleration is not a finite number at t = 0\.0(4|3999)"):
+        table_3_1(Inputs(speed=rate), hold=hold)
+
+
+def test_function_that_raises_inside_a_compiled_run_counts_as_no_number() -> None:
+    def force(t: float, th2: float, u: float, w2: float, v: float) -> float:
+        if t > 0.05:
+            raise ValueError("too late")
+        return 0.0
+
+    with pytest.raises(InputError, match=r"the input force is not a finite number at t = 0\.0(5|499999|500000)"):
+        table_3_1(Inputs(speed=SPEED, force=Function(force)))
+    # where it is called as the Python that it is, its own error arrives
+    with pytest.raises(ValueError, match="too late"):
+        table_3_1(Inputs(speed=SPEED, force=Function(force)), method="DOP853")
+
+
+def test_function_that_numba_cannot_compile() -> None:
+    class Controller:
+        gain = 3.0
+
+    controller = Controller()
+
+    def force(t: float, th2: float, u: float, w2: float, v: float) -> float:
+        return -controller.gain * v
+
+    inputs = Inputs(speed=SPEED, force=Function(force))
+    with pytest.raises(
+        InputError, match=r"(?s)function 'force' cannot be compiled with Numba: .*method='DOP853'.*Numba says: \w+"
+    ):
+        table_3_1(inputs)
+    plain = table_3_1(Inputs(speed=SPEED, force=Function(lambda t, th2, u, w2, v: -3.0 * v)))
+    assert compare(plain, table_3_1(inputs, method="DOP853"), tolerance=1e-6).agrees
+    with pytest.raises(InputError, match="cannot be compiled"):
+        table_3_1(events=[Event(name="e", function=force)])
+
+
+def test_functions_by_every_method() -> None:
+    inputs = Inputs(
+        torque=Function(lambda t, th2, u, w2, v: 2.0 - 0.05 * w2),
+        force=Function(lambda t, th2, u, w2, v: -30.0 * u - 2.0 * v),
+        load_x=Function(lambda t, th2, u, w2, v: np.cos(th2)),
+        load_y=Function(lambda t, th2, u, w2, v: t),
+    )
+    ours = table_3_1(inputs)
+    assert compare(ours, table_3_1(inputs, method="DOP853"), tolerance=1e-6).agrees
+    assert ours["drive.applied_torque"] == pytest.approx(2.0 - 0.05 * ours["crank.speed"], rel=1e-12)
+
+
+def test_function_as_a_speed() -> None:
+    speed = Function(lambda t, *x: 40.0 + 5.0 * np.sin(60.0 * t), rate=lambda t, *x: 300.0 * np.cos(60.0 * t))
+    same = Harmonics(40.0, [5.0], [60.0], [-pi / 2.0])
+
+    def own(t: float, th2: float, u: float, w2: float, v: float) -> float:
+        return 40.0 + 5.0 * np.sin(60.0 * t)
+
+    def rate(t: float, th2: float, u: float, w2: float, v: float) -> float:
+        return 300.0 * np.cos(60.0 * t)
+
+    assert speed.rate is not None
+    ours = table_3_1(Inputs(speed=Function(own, rate)))
+    assert compare(ours, table_3_1(Inputs(speed=same)), tolerance=1e-8).agrees
+
+
+def test_kink_of_a_function_is_met_where_it_is_announced() -> None:
+    def kinked(breaks: list[float]) -> Trajectory:
+        force = Function(lambda t, th2, u, w2, v: 50.0 if t >= 0.0511 else 0.0, breaks=breaks)
+        return table_3_1(Inputs(speed=SPEED, force=force))
+
+    exact = table_3_1(Inputs(speed=SPEED, force=steps([0.0, 0.0511], [0.0, 50.0])))
+    announced = kinked([0.0511])
+    assert compare(exact, announced)["slider.position"].relative < 1e-7
+    assert announced.statistics["rejected"] < kinked([]).statistics["rejected"]

@@ -1,0 +1,111 @@
+"""The result of a run: columns by name, files, data frames, plots."""
+
+from __future__ import annotations
+
+import csv
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from analysis import Inputs, Trajectory, simulate
+from linkwork.errors import InputError
+from linkwork.five_bar import dynamics
+from linkwork.five_bar.published import SETS, TABLE_3_1
+from linkwork.five_bar.variables import OUTPUT_NAMES, OUTPUTS
+
+
+@pytest.fixture(scope="module")
+def trajectory() -> Trajectory:
+    return simulate(TABLE_3_1, Inputs(speed=SETS["table-3.1"].crank_speed), stop_time=0.1, step=1e-3)
+
+
+def test_every_output_of_the_contract_is_there_by_name_with_its_unit(trajectory: Trajectory) -> None:
+    assert trajectory.names == OUTPUT_NAMES
+    assert trajectory.values.shape == (101, 27)
+    assert len(trajectory) == 101
+    for i, name in enumerate(OUTPUT_NAMES):
+        assert np.array_equal(trajectory[name], trajectory.values[:, i])
+        assert trajectory.column(name) == i
+    assert dict(trajectory.units) == {v.name: v.unit for v in OUTPUTS if v.kind == "Real"}
+    assert trajectory.units["pin.C.fx"] == "N"
+
+
+def test_columns_are_the_outputs_of_the_equations(trajectory: Trajectory) -> None:
+    p = TABLE_3_1.constants()
+    start = trajectory["energy.kinetic"][0] + trajectory["energy.potential"][0]
+    columns = ("crank.angle", "slider.position", "crank.speed", "slider.velocity")
+    for i in (0, 50, 100):
+        th2, u, w2, v = (float(trajectory[name][i]) for name in columns)
+        state = (th2, u, w2, v, float(trajectory["energy.dissipated"][i]), float(trajectory["energy.supplied"][i]))
+        expected = dynamics.outputs(state, dynamics.Inputs(1.0, 0.0, 0.0, 0.0, 0.0, 0.0), start, p)
+        assert trajectory.values[i] == pytest.approx(expected, rel=1e-12, abs=1e-12)
+
+
+def test_counts_of_the_integrator(trajectory: Trajectory) -> None:
+    counts = trajectory.statistics
+    assert set(counts) == {"steps", "rejected", "evaluations", "seconds"}
+    attempts = counts["steps"] + counts["rejected"]
+    # twelve a step and three for its interpolant; a refused one spends eleven, or twelve
+    assert 11 * attempts < counts["evaluations"] < 15 * attempts + 20
+    assert counts["seconds"] > 0.0
+    assert trajectory.source == "compiled DOP853"
+
+
+def test_output_that_does_not_exist(trajectory: Trajectory) -> None:
+    with pytest.raises(InputError, match=r"there is no output 'slider.postion': the outputs are crank.angle, "):
+        trajectory["slider.postion"]
+    with pytest.raises(InputError, match="no output 'time'"):
+        trajectory.plot(["time"])
+
+
+def test_csv_has_names_and_units_and_every_digit(trajectory: Trajectory, tmp_path: Path) -> None:
+    path = trajectory.to_csv(tmp_path / "new" / "run.csv")
+    assert path == tmp_path / "new" / "run.csv"
+    with path.open(newline="") as file:
+        header, *rows = list(csv.reader(file))
+    assert header[0] == "time [s]"
+    assert header[1:] == [f"{v.name} [{v.unit}]" for v in OUTPUTS if v.kind == "Real"]
+    numbers = np.array(rows, dtype=float)
+    assert np.array_equal(numbers[:, 0], trajectory.time)
+    assert np.array_equal(numbers[:, 1:], trajectory.values)
+    assert [p.name for p in path.parent.iterdir()] == ["run.csv"]
+
+
+def test_data_frame(trajectory: Trajectory) -> None:
+    pytest.importorskip("pandas")
+    frame = trajectory.to_dataframe()
+    assert list(frame.columns) == list(OUTPUT_NAMES)
+    assert frame.index.name == "time"
+    assert np.array_equal(frame.index.to_numpy(), trajectory.time)
+    assert np.array_equal(frame["pin.B.fy"].to_numpy(), trajectory["pin.B.fy"])
+
+
+def test_data_frame_without_pandas(trajectory: Trajectory, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "pandas", None)
+    with pytest.raises(ImportError, match="pandas"):
+        trajectory.to_dataframe()
+
+
+def test_plot_shows_the_outputs_with_their_units(trajectory: Trajectory) -> None:
+    from matplotlib.figure import Figure
+
+    figure = trajectory.plot(["slider.position", "crank.speed", "pin.A.fx"], title="three")
+    assert isinstance(figure, Figure)
+    assert [axis.get_ylabel() for axis in figure.axes] == [
+        "slider.position [m]",
+        "crank.speed [rad/s]",
+        "pin.A.fx [N]",
+    ]
+    (line,) = figure.axes[0].lines
+    assert np.array_equal(line.get_xdata(), trajectory.time)
+    assert np.array_equal(line.get_ydata(), trajectory["slider.position"])
+    assert len(trajectory.plot().axes) == 2
+
+
+def test_run_cannot_be_changed(trajectory: Trajectory) -> None:
+    with pytest.raises(AttributeError):
+        trajectory.status = 3  # type: ignore[misc]
+    with pytest.raises(TypeError):
+        trajectory.units["crank.angle"] = "deg"  # type: ignore[index]
