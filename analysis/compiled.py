@@ -442,7 +442,7 @@ def _run(
                 if started and before == 0.0:
                     continue
                 gaps[e] = _gap(e, begin, x, held, watch, addresses, law[1], start_energy, p)
-                if started and _crosses(before, gaps[e], watch[e, 2]):
+                if _crosses(before, gaps[e], watch[e, 2]):
                     _record(found, n_found, e, begin, x)
                     n_found += 1
                     if watch[e, 3] != 0.0:

@@ -413,15 +413,18 @@ class _Run:
         carry = np.zeros(k.CARRY)
         carry[k.BEGIN] = self.times[0]
         status = k.RUNNING
+        integrating = 0.0
         occurrences: list[list[float]] = []
         with interruptible() as interrupted, _shown(progress, self.times[-1] - self.times[0]) as show:
             try:
                 while status == k.RUNNING and carry[k.STEPS] < self.max_steps and not interrupted:
+                    entered = clock.perf_counter()
                     status = k.run(
                         p, x, carry, self.times[-1], self.inputs.speed_drive, self.hold, self.encoded.steady, source,
                         self.tolerance, scale, self.times, states, forces, watch, addresses, gaps, found, energy,
                         min(STEPS_PER_CALL, self.max_steps - int(carry[k.STEPS])),
                     )  # fmt: skip
+                    integrating += clock.perf_counter() - entered
                     occurrences += found[: int(carry[k.EVENTS])].tolist()
                     carry[k.EVENTS] = 0
                     show(carry[k.BEGIN] + carry[k.ELAPSED] - self.times[0])
@@ -453,6 +456,7 @@ class _Run:
                 "steps": float(carry[k.STEPS] - carry[k.REJECTED]),
                 "rejected": float(carry[k.REJECTED]),
                 "evaluations": float(carry[k.EVALUATIONS]),
+                "seconds_integrating": integrating,
                 "seconds": clock.perf_counter() - begun,
             },
         )

@@ -50,7 +50,8 @@ class Trajectory:
     source : str
         What computed it, such as ``compiled DOP853`` or the name of an FMU.
     statistics : mapping
-        Counts of the integrator, where it gives them: steps, rejected, evaluations, seconds.
+        Counts of the integrator, where it gives them: steps, rejected, evaluations, seconds in all
+        and seconds_integrating in the compiled loop.
 
     Notes
     -----

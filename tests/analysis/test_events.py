@@ -152,6 +152,21 @@ def test_run_stops_at_an_event_and_keeps_what_was_there(method: str, hold: float
 
 
 @pytest.mark.parametrize("method", METHODS)
+def test_last_configuration_is_recorded_under_the_inputs_of_its_time(method: str) -> None:
+    inputs = Inputs(torque=Harmonics(1.0, [0.5], [300.0], [0.0]))
+    ours = run([Event(name="e", output="crank.angle", level=1.0, stop=True)], inputs, method=method)
+    assert ours["crank.angle"][-1] == pytest.approx(1.0, rel=1e-12)
+    assert ours["drive.applied_torque"] == pytest.approx(1.0 + 0.5 * np.cos(300.0 * ours.time), rel=1e-12)
+    slips = replace(TABLE_3_1, slider_stiffness=0.0, slider_damping=10.0)
+    pushed = Inputs(speed=SPEED, force=Harmonics(0.0, [5.0], [300.0], [0.0]))
+    lost = simulate(slips, pushed, stop_time=3.0, step=0.01, method=method)
+    # along the guide act the force, the damper and the pin at D; gravity does not
+    force = 5.0 * np.cos(300.0 * lost.time)
+    resisted = -10.0 * lost["slider.velocity"] - lost["pin.D.fx"]
+    assert force + resisted == pytest.approx(slips.slider_mass * lost["slider.acceleration"], abs=1e-6, rel=1e-9)
+
+
+@pytest.mark.parametrize("method", METHODS)
 def test_first_of_several_stopping_events_counts_and_nothing_happens_after_it(method: str) -> None:
     events = [
         Event(name="late", output="crank.angle", level=5.002, stop=True),
