@@ -45,7 +45,8 @@ def test_columns_are_the_outputs_of_the_equations(trajectory: Trajectory) -> Non
 
 def test_counts_of_the_integrator(trajectory: Trajectory) -> None:
     counts = trajectory.statistics
-    assert set(counts) == {"steps", "rejected", "evaluations", "seconds"}
+    assert set(counts) == {"steps", "rejected", "evaluations", "seconds", "seconds_integrating"}
+    assert 0.0 < counts["seconds_integrating"] < counts["seconds"]
     attempts = counts["steps"] + counts["rejected"]
     # twelve a step and three for its interpolant; a refused one spends eleven, or twelve
     assert 11 * attempts < counts["evaluations"] < 15 * attempts + 20
