@@ -29,7 +29,8 @@ INTERRUPTED = 130
 
 DEFAULT_FMU = Path("build/FiveBarSlider.fmu")
 
-console = Console()
+#: Wide enough for the tables where the output goes to a file or a pipe.
+console = Console() if sys.stdout.isatty() else Console(width=120)
 errors = Console(stderr=True)
 
 
@@ -86,6 +87,12 @@ def build(models: Sequence[str], dest: str) -> None:
             path = build_fmu.build(name, dest)
             build_fmu.try_out(path)
         console.print(f"{path}: valid, {path.stat().st_size / 1024:.0f} KiB", highlight=False, soft_wrap=True)
+
+
+def _prepare_solver() -> None:
+    """Load the compiled equations, and say why it takes so long where they are compiled first."""
+    with console.status("preparing the solver: its equations are compiled once, in about twenty seconds"):
+        from . import compiled  # noqa: F401
 
 
 def _case(file: str | None, published: str | None, settings: Sequence[str]) -> Any:
@@ -147,6 +154,7 @@ def run(
     from .simulate import RunInterrupted, simulate
 
     chosen = _case(case, published, settings)
+    _prepare_solver()
     stop = chosen.stop_time if stop_time is None else io.quantity(stop_time, "s", "--stop-time")
     common = {"initial": chosen.initial, "stop_time": stop, "step": chosen.step, "tolerance": chosen.tolerance}
     interrupted = False
@@ -221,6 +229,7 @@ def check(cases: Sequence[str], fmu: str, everything: bool, methods: Sequence[st
     from .checks import check as compare_case
 
     names = list(CASES) if everything else list(cases) or ["table-3.1"]
+    _prepare_solver()
     failed = []
     for name in names:
         if name in CASES:
