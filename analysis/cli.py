@@ -44,11 +44,21 @@ def _handled(command: Callable[..., Any]) -> Callable[..., Any]:
         except LinkworkError as error:
             errors.print(f"error: {error}", style="red", markup=False, highlight=False, soft_wrap=True)
             sys.exit(WRONG)
+        except OSError as error:
+            errors.print(f"error: {error.filename or 'a file'}: {error.strerror or error}", style="red", markup=False)
+            sys.exit(WRONG)
         except KeyboardInterrupt:
             errors.print("interrupted", style="yellow")
             sys.exit(INTERRUPTED)
 
     return run
+
+
+def _tolerance(context: click.Context, parameter: click.Parameter, value: float | None) -> float | None:
+    # written so that NaN, which compares with nothing, is refused too
+    if value is not None and not 0.0 < value <= 1.0:
+        raise click.BadParameter(f"{value} is not between 0 and 1")
+    return value
 
 
 @click.group(context_settings={"help_option_names": ["-h", "--help"]})
@@ -78,7 +88,7 @@ def build(models: Sequence[str], dest: str) -> None:
     \b
     Examples:
       linkwork build
-      linkwork build FiveBarSlider --dest /tmp/fmus
+      linkwork build FiveBarSlider --dest fmus
     """
     import build_fmu
 
@@ -87,6 +97,16 @@ def build(models: Sequence[str], dest: str) -> None:
             path = build_fmu.build(name, dest)
             build_fmu.try_out(path)
         console.print(f"{path}: valid, {path.stat().st_size / 1024:.0f} KiB", highlight=False, soft_wrap=True)
+
+
+def _number_or_text(text: str) -> int | float | str:
+    """A bare number on the command line is in SI; anything else is a text with its unit."""
+    for kind in (int, float):
+        try:
+            return kind(text)
+        except ValueError:
+            continue
+    return text
 
 
 def _prepare_solver() -> None:
@@ -106,9 +126,7 @@ def _case(file: str | None, published: str | None, settings: Sequence[str]) -> A
         name, equals, value = setting.partition("=")
         if not equals:
             raise click.UsageError(f"--set {setting!r}: it must be NAME=VALUE, such as slider.stiffness='2e6 dyn/cm'")
-        overrides[name.strip()] = (
-            int(value) if name.strip() == "assembly.branch" and value.strip("+-").isdigit() else value
-        )
+        overrides[name.strip()] = _number_or_text(value.strip())
     if file is not None:
         return io.load_case(file, overrides)
     assert published is not None
@@ -124,8 +142,16 @@ def _case(file: str | None, published: str | None, settings: Sequence[str]) -> A
 @click.option(
     "--method", default="compiled", show_default=True, help="compiled, Hamming, or a method of SciPy's solve_ivp."
 )
-@click.option("--set", "settings", multiple=True, metavar="NAME=VALUE", help="Change a parameter; can be given often.")
+@click.option(
+    "--set",
+    "settings",
+    multiple=True,
+    metavar="NAME=VALUE",
+    help="Change a value, such as slider.stiffness='2e6 dyn/cm' or drive.speed='300 rpm'; bare numbers are in SI.",
+)
 @click.option("--stop-time", metavar="TIME", help="End of the run, such as '2 s'.")
+@click.option("--step", metavar="TIME", help="Step of the samples and of the co-simulation, such as '0.1 ms'.")
+@click.option("--tolerance", type=float, callback=_tolerance, help="Tolerance of the solver; 1e-9 by default.")
 @click.option(
     "--out", default="out", show_default=True, type=click.Path(file_okay=False), help="Folder for CSV and plot."
 )
@@ -138,6 +164,8 @@ def run(
     method: str,
     settings: Sequence[str],
     stop_time: str | None,
+    step: str | None,
+    tolerance: float | None,
     out: str,
     plot: bool,
 ) -> None:
@@ -155,8 +183,18 @@ def run(
 
     chosen = _case(case, published, settings)
     _prepare_solver()
-    stop = chosen.stop_time if stop_time is None else io.quantity(stop_time, "s", "--stop-time")
-    common = {"initial": chosen.initial, "stop_time": stop, "step": chosen.step, "tolerance": chosen.tolerance}
+    if fmu is not None and method != "compiled":
+        raise click.UsageError("--method is for a run in process: the FMU brings its own")
+
+    def seconds(text: str | None, default: float, name: str) -> float:
+        return default if text is None else io.quantity(_number_or_text(text), "s", name)
+
+    common = {
+        "initial": chosen.initial,
+        "stop_time": seconds(stop_time, chosen.stop_time, "--stop-time"),
+        "step": seconds(step, chosen.step, "--step"),
+        "tolerance": chosen.tolerance if tolerance is None else tolerance,
+    }
     interrupted = False
     try:
         if fmu is not None:
@@ -165,7 +203,7 @@ def run(
             result = simulate(chosen.parameters, chosen.inputs, method=method, progress=console.is_terminal, **common)
     except RunInterrupted as stopped:
         result, interrupted = stopped.trajectory, True
-    name = Path(case).stem if case else str(published)
+    name = (Path(case).stem if case else str(published)) + ("-fmu" if fmu else "")
     written = [result.to_csv(Path(out) / f"{name}.csv")]
     if plot and len(result) > 1:
         names = ("slider.position", "crank.speed", "drive.applied_torque", "transmission.angle")
@@ -173,6 +211,13 @@ def run(
     _summary(chosen.title, result)
     for path in written:
         console.print(f"wrote {path}", highlight=False, soft_wrap=True)
+    if fmu is not None and not chosen.inputs.held_exactly:
+        errors.print(
+            f"note: inputs that vary over a step are sampled and held over it ({common['step']:.3g} s), as any master does; "
+            "a run in process lets them act continuously. Shorten --step until the result stands.",
+            style="yellow",
+            soft_wrap=True,
+        )
     if interrupted:
         errors.print(f"interrupted at t = {result.time[-1]:.6g} s; what was computed is kept", style="yellow")
         sys.exit(INTERRUPTED)
@@ -209,7 +254,14 @@ def _summary(title: str, result: Any) -> None:
     show_default=True,
     help="In-process method: compiled, Hamming, or one of SciPy's solve_ivp; can be given often.",
 )
-@click.option("--tolerance", default=1e-6, show_default=True, help="Largest relative difference that passes.")
+@click.option(
+    "--tolerance",
+    type=float,
+    callback=_tolerance,
+    default=1e-6,
+    show_default=True,
+    help="Largest relative difference that passes.",
+)
 @click.option(
     "--out", default="out", show_default=True, type=click.Path(file_okay=False), help="Folder for CSV and plots."
 )
@@ -385,7 +437,7 @@ def figures(numbers: Sequence[str], out: str, listing: bool) -> None:
     Examples:
       linkwork figures --list
       linkwork figures 3.2 3.4 7.2
-      linkwork figures --out /tmp/figures
+      linkwork figures --out figures
     """
     from .studies import STUDIES, make
 

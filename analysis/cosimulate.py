@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from rich.progress import Progress
 
 from linkwork.errors import InputError, LinkworkError
+from linkwork.five_bar.dynamics import Outputs
 from linkwork.five_bar.parameters import FiveBarParameters, InitialState, fmi_name
 from linkwork.five_bar.plant import INPUT_NAMES, SPEED_DRIVE, TORQUE_DRIVE
 from linkwork.five_bar.variables import OUTPUT_NAMES
@@ -40,7 +41,7 @@ class CosimulationError(LinkworkError):
 class FmuRun:
     """An instance of a FiveBarSlider FMU through FMPy: set inputs, step, read outputs.
 
-    Use as a context manager. `simulate` has no part in it: this is the plain FMI life cycle.
+    Use as a context manager.
 
     Raises
     ------
@@ -216,7 +217,8 @@ def cosimulate(
                 break
             # the outputs belong to the inputs that begin here: read the state, sample, set, read all
             row = run.outputs()
-            x = np.array([row[0], row[5], row[1], row[6]])
+            now = Outputs(*row)
+            x = np.array([now.crank_angle, now.slider_position, now.crank_speed, now.slider_velocity])
             later = t_next + step if t_next == times[-1] else times[len(rows) + 1]
             run.set_inputs(sampled(float(t_next), float(later), x))
             rows.append(run.outputs())
@@ -270,7 +272,10 @@ class Comparison:
         return self.worst.relative <= self.tolerance
 
     def __getitem__(self, name: str) -> OutputDifference:
-        return next(d for d in self.differences if d.name == name)
+        for difference in self.differences:
+            if difference.name == name:
+                return difference
+        raise InputError(f"there is no output {name!r}: the outputs are {', '.join(OUTPUT_NAMES)}")
 
 
 def compare(a: Trajectory, b: Trajectory, *, tolerance: float = 1e-6) -> Comparison:

@@ -69,6 +69,8 @@ class Harmonics:
     phases: Sequence[float] = ()
 
     def __post_init__(self) -> None:
+        if any(np.ndim(values) != 1 for values in (self.amplitudes, self.frequencies, self.phases)):
+            raise InputError("amplitudes, frequencies and phases of harmonics must be lists of numbers")
         if not len(self.amplitudes) == len(self.frequencies) == len(self.phases):
             raise InputError("harmonics need as many amplitudes as frequencies and phases")
         if not np.all(np.isfinite([self.mean, *self.amplitudes, *self.frequencies, *self.phases])):
@@ -145,6 +147,8 @@ Torque = Signal | TorsionBar | InductionMotor
 
 def ramp(start: float, end: float, from_time: float, to_time: float) -> Piecewise:
     """A signal that goes from ``start`` to ``end`` along a straight line between two times (s)."""
+    if not to_time > from_time:
+        raise InputError(f"a ramp from {from_time} s to {to_time} s: it must end after it begins")
     return table([from_time - 1.0, from_time, to_time, to_time + 1.0], [start, start, end, end])
 
 
@@ -186,6 +190,8 @@ def _points(times: ArrayLike, values: ArrayLike, least: int) -> tuple[NDArray[np
         raise InputError(f"a table needs as many times as values in one dimension each, not {t.shape} and {y.shape}")
     if len(t) < least:
         raise InputError(f"a table needs at least {least} points, not {len(t)}")
+    if np.any(np.diff(t) <= 0.0):
+        raise InputError(f"a table's times must increase: they are {t}")
     return t, y
 
 
@@ -247,6 +253,15 @@ class Inputs:
         if value is None:
             return ()
         return value if isinstance(value, tuple) else (value,)
+
+    @property
+    def held_exactly(self) -> bool:
+        """Whether a master that holds the inputs over its steps loses nothing by it: all but the speed are constant.
+
+        The speed goes along the secant of a step, which is exact where it is constant.
+        """
+        parts = [part for channel in CHANNELS for part in self.parts(channel)]
+        return all(isinstance(part, (int, float, np.floating, np.integer)) for part in parts)
 
     @property
     def speed_drive(self) -> bool:

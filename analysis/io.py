@@ -96,7 +96,7 @@ def quantity(value: Any, unit: str, name: str) -> float:
     Parameters
     ----------
     value : float or str
-        ``0.1535``, ``"0.1535"`` or ``"15.35 cm"``.
+        ``0.1535`` or ``"15.35 cm"``. A text needs its unit: a bare "30" for an angle was hardly meant in radians.
     unit : str
         SI unit of the contract, such as ``N.s/m``.
     name : str
@@ -105,7 +105,8 @@ def quantity(value: Any, unit: str, name: str) -> float:
     Raises
     ------
     ParameterError
-        If it is neither, or the unit has another dimension. Hertz is refused for a speed: a cycle is not a radian.
+        If it is neither, the unit is missing or has another dimension, or the number is not finite. Hertz is refused for
+        a speed: a cycle is not a radian.
     """
     si = _PINT.get(unit, unit)
     wanted = f"be a number in {unit}" if unit == "1" else f"be a number in {unit}, or a text with a unit of that kind"
@@ -120,11 +121,13 @@ def quantity(value: Any, unit: str, name: str) -> float:
     if unit == "rad/s" and "hz" in value.lower().replace("hertz", "hz"):
         raise ParameterError(name, value, "be in rad/s or rpm: in Hz it would be ambiguous by a factor of 2 pi")
     try:
-        parsed = _registry().Quantity(value)
-        if parsed.unitless and parsed.dimensionless and not any(c.isalpha() for c in value.replace("e", "")):
-            number = float(parsed.magnitude)
-        else:
-            number = float(parsed.to(si).magnitude)
+        bare: float | None = float(value)
+    except ValueError:
+        bare = None
+    if bare is not None and unit != "1":
+        raise ParameterError(name, value, f"come with its unit, such as '{value} {si}', or be a number, which is in SI")
+    try:
+        number = bare if bare is not None else float(_registry().Quantity(value).to(si).magnitude)
     except (pint.PintError, ValueError, TypeError, AttributeError, ArithmeticError, SyntaxError) as error:
         raise ParameterError(name, value, f"{wanted} ({_first_sentence(error)})") from error
     if not isfinite(number):
@@ -202,6 +205,8 @@ def parameters_to(parameters: FiveBarParameters) -> dict[str, Any]:
 
 def save_parameters(path: str | Path, parameters: FiveBarParameters) -> Path:
     """Write parameters to a TOML or JSON file, as the path's ending says."""
+    if not isinstance(parameters, FiveBarParameters):
+        raise InputError(f"save_parameters takes a path and FiveBarParameters, not {type(parameters).__name__}")
     return _write_tables(path, parameters_to(parameters))
 
 
@@ -241,8 +246,10 @@ def _read_tables(path: str | Path) -> dict[str, Any]:
         raise InputError(f"{path.name} ends in {ending!r}: it must end in .toml or .json")
     try:
         text = path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"{path} cannot be read: {_first_sentence(error)}") from error
+    except OSError as error:
+        raise InputError(f"{path} cannot be read: {error.strerror or error}") from error
+    except UnicodeDecodeError as error:
+        raise InputError(f"{path} cannot be read: it is not text in UTF-8") from error
     try:
         data = tomllib.loads(text) if ending == ".toml" else json.loads(text)
     except (tomllib.TOMLDecodeError, json.JSONDecodeError) as error:
@@ -443,6 +450,8 @@ def _run_table(run: Mapping[str, Any], inputs: Inputs) -> tuple[float, float, fl
     tolerance = quantity(run.get("tolerance", 1e-9), "1", "run.tolerance")
     constant = float(inputs.speed) if isinstance(inputs.speed, (int, float)) and inputs.speed != 0.0 else None
     turn = None if constant is None else 2.0 * pi / abs(constant)
+    if "stop_time" in run and "revolutions" in run:
+        raise ParameterError("run.revolutions", run["revolutions"], "not come together with run.stop_time")
     if "stop_time" in run:
         stop_time = quantity(run["stop_time"], "s", "run.stop_time")
     elif "revolutions" in run:
@@ -450,7 +459,10 @@ def _run_table(run: Mapping[str, Any], inputs: Inputs) -> tuple[float, float, fl
             raise ParameterError(
                 "run.revolutions", run["revolutions"], "come with a constant drive.speed; give run.stop_time"
             )
-        stop_time = quantity(run["revolutions"], "1", "run.revolutions") * turn
+        revolutions = quantity(run["revolutions"], "1", "run.revolutions")
+        if revolutions <= 0.0:
+            raise ParameterError("run.revolutions", run["revolutions"], "be greater than zero")
+        stop_time = revolutions * turn
     elif turn is not None:
         stop_time = 3.0 * turn
     else:

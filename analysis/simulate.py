@@ -825,7 +825,8 @@ def simulate_many(
 
     ``inputs`` and ``initial`` are one for all or as many as ``parameters``; all inputs must drive the same way and share
     their Python functions, if they have any. The batches go through joblib: ``n_jobs`` cores here, or, inside
-    ``joblib.parallel_config(backend="dask")`` or ``"ray"``, the cores of a cluster.
+    ``joblib.parallel_config(backend="dask")``, the cores of a Dask cluster; or of a Ray cluster, with ``backend="ray"``
+    once ``ray.util.joblib.register_ray()`` has been called.
 
     Raises
     ------

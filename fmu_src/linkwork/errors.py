@@ -34,8 +34,8 @@ class UnknownNameError(ParameterError):
         self.known = known
         self.near = near
         super().__init__(name, None, f"be one of {', '.join(known)}")
-        hint = f"did you mean {near}? " if near else ""
-        self.args = (f"there is no {name}: {hint}The names are {', '.join(known)}",)
+        hint = f"; did you mean {near}?" if near else ""
+        self.args = (f"there is no {name}{hint} (the names are {', '.join(known)})",)
 
 
 class MissingParameterError(ParameterError):

@@ -102,7 +102,8 @@ def rk_step(f: Callable[[Vector], Vector], x: Vector, k1: Vector, h: float, scal
             y + h * (a1 * p1 + a2 * p6 + a3 * p7 + a4 * p8 + a5 * p9 + a6 * p10 + a7 * p11 + a8 * p12)
             for y, p1, p6, p7, p8, p9, p10, p11, p12 in zip(x, k1, k6, k7, k8, k9, k10, k11, k12)
         ]
-    )  # Hairer's estimate: |h| err5^2 / sqrt(err5^2 + 0.01 err3^2), a combination of order 8 in h
+    )
+    # Hairer's estimate: |h| err5^2 / sqrt(err5^2 + 0.01 err3^2), a combination of order 8 in h
     e1, e2, e3, e4, e5, e6, e7, e8 = _E5
     d1, d2, d3, d4, d5, d6, d7, d8 = _E3
     sum5 = 0.0

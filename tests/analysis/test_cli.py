@@ -85,7 +85,15 @@ def test_a_run_that_ends_early_keeps_its_data_and_exits_with_3(linkwork, tmp_pat
         (["run", "--published", "table-3.1", "--set", "slider.stifness=1"], 1, "did you mean slider.stiffness"),
         (["run", "--published", "table-3.1", "--set", "crank.length=-1"], 1, "parameter crank.length is -1.0"),
         (["run", "--published", "table-3.1", "--set", "initial.slider_position=1"], 1, "cannot be joined"),
+        (["run", "--published", "table-3.1", "--set", "slider.stiffness=nan"], 1, "parameter slider.stiffness is nan"),
         (["run", "--published", "table-3.1", "--method", "Euler"], 1, "method is 'Euler'"),
+        (["run", "--published", "table-3.1", "--tolerance", "nan"], 2, "not between 0 and 1"),
+        (
+            ["run", "--published", "table-3.1", "--no-plot", "--out", "/proc/no"],
+            1,
+            "/proc/no: No such file or directory",
+        ),
+        (["check", "--tolerance", "-1"], 2, "not between 0 and 1"),
         (["run"], 2, "give either a case file or --published"),
         (["run", "--published", "table-3.1", "--set", "nonsense"], 2, "NAME=VALUE"),
         (["run", "nowhere.toml"], 2, "does not exist"),
@@ -148,7 +156,18 @@ def test_run_through_the_fmu_reports_a_refused_step(fmu, tmp_path):
     )  # fmt: skip
     assert done.returncode == cli.ENDED_EARLY
     assert "limit of assembly" in done.stderr
-    assert (tmp_path / "out" / "table-3.1.csv").is_file()
+    assert (tmp_path / "out" / "table-3.1-fmu.csv").is_file()
+
+
+def test_a_run_through_the_fmu_says_that_its_inputs_are_held(fmu, tmp_path):
+    (tmp_path / "case.toml").write_text(
+        'published = "table-3.1"\n[drive.torque]\nkind = "torsion-bar"\ntorque = 10\n[run]\nstop_time = "10 ms"\n'
+    )
+    done = in_own_process("run", "case.toml", "--fmu", fmu, "--no-plot", "--step", "0.5 ms", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert "note: inputs that vary over a step are sampled and held over it (0.0005 s)" in done.stderr
+    done = in_own_process("run", "--published", "table-3.1", "--fmu", fmu, "--no-plot", cwd=tmp_path)
+    assert "note" not in done.stderr
 
 
 def test_build_builds(linkwork, tmp_path):

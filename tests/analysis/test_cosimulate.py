@@ -42,7 +42,9 @@ def _check_cases(fmu: str, names: list[str], method: str) -> list[Any]:
     """Cases of `analysis.checks` and of this project's issue, each in process and through the FMU."""
     from dataclasses import replace
 
-    from analysis import Harmonics, Inputs, TorsionBar, compare, cosimulate, ramp, simulate, steps
+    import numpy as np
+
+    from analysis import Function, Harmonics, Inputs, TorsionBar, compare, cosimulate, ramp, simulate, steps
     from analysis.checks import CASES
     from linkwork.five_bar.parameters import InitialState
     from linkwork.five_bar.published import TABLE_3_1
@@ -55,6 +57,13 @@ def _check_cases(fmu: str, names: list[str], method: str) -> list[Any]:
             return {"parameters": point, "inputs": inputs, **common}
         if name == "ramp-and-jump":
             inputs = Inputs(speed=(ramp(10.0, 40.0, 0.03, 0.1), steps([0.0, 0.0505], [0.0, 8.0])))
+            return {"parameters": TABLE_3_1, "inputs": inputs, **common}
+        if name == "functions-of-the-state":
+            inputs = Inputs(
+                torque=Function(lambda t, th2, u, w2, v: 2.0 + 10.0 * t - 0.05 * w2),
+                force=Function(lambda t, th2, u, w2, v: -300.0 * u - 20.0 * v),
+                load_y=Function(lambda t, th2, u, w2, v: np.sin(th2)),
+            )
             return {"parameters": TABLE_3_1, "inputs": inputs, **common}
         if name == "late-start":
             initial = InitialState(crank_angle=2.0, slider_position=0.003, slider_velocity=-0.1)
@@ -96,6 +105,7 @@ CASE_NAMES = [
     "coulomb-friction",
     "bar-and-load",
     "ramp-and-jump",
+    "functions-of-the-state",
     "late-start",
 ]
 

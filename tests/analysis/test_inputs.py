@@ -249,7 +249,7 @@ def test_a_signal_keeps_its_numbers_to_itself() -> None:
         (lambda: steps([], []), "at least 1 point"),
         (lambda: table([0.0, 1.0], [1.0, nan]), "finite"),
         (lambda: table([0.0, 1.0], [1.0, 2.0], "quintic"), "'quintic'"),
-        (lambda: ramp(0.0, 1.0, 2.0, 1.0), "must increase"),
+        (lambda: ramp(0.0, 1.0, 2.0, 1.0), "from 2.0 s to 1.0 s: it must end after it begins"),
         (lambda: Piecewise([0.0], np.zeros((0, 4))), "at least two breaks"),
         (lambda: Piecewise([0.0, 1.0], [[1.0, 2.0]]), r"shape \(1, 4\)"),
         (lambda: Harmonics(0.0, [1.0], [2.0], []), "as many amplitudes"),
@@ -291,3 +291,22 @@ def test_ramp_of_half_a_turn_in_numbers() -> None:
     inputs = Inputs(speed=ramp(0.0, 2.0 * pi, 0.0, 1.0))
     middles = (np.arange(1000) + 0.5) / 1000
     assert sum(value(inputs, t)["speed"] for t in middles) / 1000 == pytest.approx(pi, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("make", "said"),
+    [
+        (lambda: ramp(1.0, 2.0, 0.3, 0.3), "it must end after it begins"),
+        (lambda: ramp(1.0, 2.0, 0.3, nan), "it must end after it begins"),
+        (lambda: Harmonics(1.0, 5.0, 30.0, 0.3), "must be lists of numbers"),  # type: ignore[arg-type]
+    ],
+)
+def test_slips_in_a_signal_are_told_in_its_own_words(make: Any, said: str) -> None:
+    with pytest.raises(InputError, match=said):
+        make()
+
+
+def test_inputs_that_a_master_can_hold_without_loss() -> None:
+    assert Inputs(speed=3.0, force=1.0).held_exactly
+    assert not Inputs(speed=ramp(0.0, 1.0, 0.0, 1.0)).held_exactly
+    assert not Inputs(torque=TorsionBar(torque=1.0)).held_exactly

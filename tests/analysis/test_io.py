@@ -39,8 +39,7 @@ def test_every_digit_of_an_awkward_number_is_kept(tmp_path):
         ("30 deg", "rad", pi / 6),
         ("981 cm/s^2", "m/s2", 9.81),
         ("1e8 dyn*cm", "N.m", 10.0),
-        ("0.25", "m", 0.25),
-        ("1e-3", "m", 1e-3),
+        ("0.01", "1", 0.01),
         (0.25, "m", 0.25),
         (3, "1", 3.0),
     ],
@@ -67,13 +66,19 @@ def test_a_quantity_of_another_kind_is_refused_by_name(text, unit):
         io.quantity(text, unit, "crank.length")
 
 
+def test_a_text_without_its_unit_is_refused():
+    """ "30" for an angle was hardly meant in radians."""
+    with pytest.raises(ParameterError, match=r"ground\.inclination is '30': it must come with its unit"):
+        io.parameters_from({"ground": {"inclination": "30"}}, TABLE_3_1)
+
+
 def test_hertz_is_refused_for_a_speed_because_it_is_ambiguous():
     with pytest.raises(ParameterError, match="2 pi"):
         io.quantity("7 Hz", "rad/s", "drive.speed")
 
 
 def test_an_unknown_name_is_told_with_the_nearest():
-    with pytest.raises(UnknownNameError, match=r"slider\.stifness: did you mean slider\.stiffness"):
+    with pytest.raises(UnknownNameError, match=r"slider\.stifness; did you mean slider\.stiffness"):
         io.parameters_from({"slider": {"stifness": 1.0}}, TABLE_3_1)
 
 
@@ -186,6 +191,11 @@ step = "1 ms"
             r"drive\.torque\.angle",
         ),
         ('published = "table-3.1"\n[drive]\nspeed = 1\ntorque = 1', "both speed and torque"),
+        ('published = "table-3.1"\n[run]\nrevolutions = 0', r"run\.revolutions is 0: it must be greater than zero"),
+        (
+            'published = "table-3.1"\n[run]\nrevolutions = 1\nstop_time = "1 s"',
+            r"not come together with run\.stop_time",
+        ),
         ('published = "table-3.1"\n[initial]\nangle = 1', r"initial\.angle"),
         ('published = "table-3.1"\n[load]\nfz = 1', r"load\.fz"),
         ('published = "table-3.1"\n[force]\nkind = "table"\ntimes = [0, 1]\nvalues = [1]', "as many times as values"),

@@ -345,6 +345,15 @@ def test_samples_at_a_jump_belong_to_what_follows(method: str, hold: float | Non
     assert ours["drive.applied_torque"].tolist() == [0.1, 0.1, 0.1, 0.7, 0.7, 0.7, 0.2, 0.2, 0.2]
 
 
+@pytest.mark.parametrize("hold", [None, 0.1])
+@pytest.mark.parametrize("method", ["compiled", "DOP853"])
+def test_jump_that_misses_a_sample_by_rounding_is_at_the_sample(method: str, hold: float | None) -> None:
+    just_after = float(np.nextafter(0.4, 1.0))
+    inputs = Inputs(torque=steps([0.0, just_after], [0.1, 0.7]))
+    ours = table_3_1(inputs, stop_time=0.6, step=0.1, hold=hold, method=method)
+    assert ours["drive.applied_torque"].tolist() == [0.1, 0.1, 0.1, 0.1, 0.7, 0.7, 0.7]
+
+
 @pytest.mark.parametrize("method", ["compiled", "DOP853"])
 def test_jump_at_the_very_end_is_seen_by_the_last_sample(method: str) -> None:
     ours = table_3_1(Inputs(torque=steps([0.0, 0.1], [0.1, 0.7])), stop_time=0.1, step=0.05, method=method)

@@ -223,3 +223,13 @@ def test_gravity_of_the_published_sets(name: str) -> None:
     assert SETS[name].parameters.gravity == pytest.approx(
         0.0 if horizontal else published.GRAVITY_CM_S2 * CM, rel=1e-14
     )
+
+
+def test_numbers_of_other_kinds_become_plain_ones() -> None:
+    numpy = pytest.importorskip("numpy")
+    changed = replace(TABLE_3_1, slider_mass=numpy.float32(0.5), assembly_branch=numpy.int64(-1), gravity=9)
+    assert (type(changed.slider_mass), type(changed.assembly_branch), type(changed.gravity)) == (float, int, float)
+    assert (changed.slider_mass, changed.assembly_branch, changed.gravity) == (0.5, -1, 9.0)
+    assert type(InitialState(crank_angle=numpy.float64(1.0)).crank_angle) is float
+    with pytest.raises(ParameterError, match=r"slider\.mass"):
+        replace(TABLE_3_1, slider_mass=10**400)

@@ -222,7 +222,7 @@ def reactions(g: Position, x: State, m: Motion, i: Inputs, p: Constants) -> Reac
     w2 = x[2]
     e2 = m.crank_acceleration
     a = m.slider_acceleration
-    # mass times acceleration less gravity of coupler, rocker and crank, at their centres of mass
+    # acceleration less gravity of B and of D, and mass times that of the centres of mass of coupler and rocker
     bx = -p.l2 * (g.s2 * e2 + g.c2 * w2 * w2) - p.gx
     by = p.l2 * (g.c2 * e2 - g.s2 * w2 * w2) - p.gy
     rx3 = p.mx3 * g.c3 - p.my3 * g.s3

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, fields
 from math import cos, hypot, isfinite, sin
+from numbers import Real
 from typing import NamedTuple
 
 from ..errors import ParameterError
@@ -118,10 +119,17 @@ class FiveBarParameters:
         for field in fields(self):
             name = fmi_name(field.name)
             value = getattr(self, field.name)
-            if isinstance(value, bool) or not isinstance(value, (int, float)):
+            if isinstance(value, bool) or not isinstance(value, Real):
                 raise ParameterError(name, value, "be a number in SI units")
-            if isinstance(value, int) and abs(value) > 10**15:
-                raise ParameterError(name, value, "be a float where it is that large")
+            try:
+                number: float = float(value)
+                if field.name == "assembly_branch" and number.is_integer():
+                    number = int(number)
+            except (OverflowError, ValueError):
+                raise ParameterError(name, value, "be a finite number") from None
+            # plain Python numbers, whatever kind was given: the equations and JSON know no other
+            object.__setattr__(self, field.name, number)
+            value = number
             if field.name == "assembly_branch":
                 if value not in (1, -1):
                     raise ParameterError(name, value, "be +1 or -1, the sign of sin(rocker.angle - coupler.angle)")
@@ -211,8 +219,9 @@ class InitialState:
     def __post_init__(self) -> None:
         for field in fields(self):
             value = getattr(self, field.name)
-            if isinstance(value, bool) or not isinstance(value, (int, float)) or not isfinite(value):
+            if isinstance(value, bool) or not isinstance(value, Real) or not isfinite(value):
                 raise ParameterError(f"initial.{field.name}", value, "be a finite number")
+            object.__setattr__(self, field.name, float(value))
 
 
 def fmi_name(field_name: str) -> str:

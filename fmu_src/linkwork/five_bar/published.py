@@ -53,7 +53,8 @@ def _from_cgs(
         coupler_mass=masses_g[0] / GRAM_PER_KG,
         rocker_mass=masses_g[1] / GRAM_PER_KG,
         slider_mass=masses_g[2] / GRAM_PER_KG,
-        # Table 3.1 gives I_A = 12500 g.cm2; the rigs' is not printed, and at prescribed speed nothing depends on it
+        # Table 3.1 gives I_A = 12500 g.cm2; the rigs' is not printed and assumed to be the same. At constant speed nothing
+        # but the kinetic energy depends on it
         crank_inertia=12500 / G_CM2_PER_KG_M2,
         coupler_inertia=inertias_g_cm2[0] / G_CM2_PER_KG_M2,
         rocker_inertia=inertias_g_cm2[1] / G_CM2_PER_KG_M2,
@@ -93,10 +94,18 @@ SETS: Mapping[str, PublishedSet] = MappingProxyType(
             _table_3_1(1e6, 3e4), 420 * RAD_S_PER_RPM, "Youssef, Table 3.1, with fig. 3.4's spring"
         ),
         "appendix-1": PublishedSet(_table_3_1(1.5e6, 2.8e4), 450 * RAD_S_PER_RPM, "Youssef, appendix 1"),
-        "rig-1-spring-a": PublishedSet(_rig_1(3e6), 420 * RAD_S_PER_RPM, "Youssef, Table 8.1, spring A"),
-        "rig-1-spring-b": PublishedSet(_rig_1(11e6), 420 * RAD_S_PER_RPM, "Youssef, Table 8.1, spring B"),
-        "rig-2-spring-c": PublishedSet(_rig_2(4e6), 420 * RAD_S_PER_RPM, "Youssef, Table 8.2, spring C"),
-        "rig-2-spring-d": PublishedSet(_rig_2(8e6), 420 * RAD_S_PER_RPM, "Youssef, Table 8.2, spring D"),
+        "rig-1-spring-a": PublishedSet(
+            _rig_1(3e6), 420 * RAD_S_PER_RPM, "Youssef, Table 8.1, spring A (speed and crank inertia assumed)"
+        ),
+        "rig-1-spring-b": PublishedSet(
+            _rig_1(11e6), 420 * RAD_S_PER_RPM, "Youssef, Table 8.1, spring B (speed and crank inertia assumed)"
+        ),
+        "rig-2-spring-c": PublishedSet(
+            _rig_2(4e6), 420 * RAD_S_PER_RPM, "Youssef, Table 8.2, spring C (speed and crank inertia assumed)"
+        ),
+        "rig-2-spring-d": PublishedSet(
+            _rig_2(8e6), 420 * RAD_S_PER_RPM, "Youssef, Table 8.2, spring D (speed and crank inertia assumed)"
+        ),
     }
 )
 

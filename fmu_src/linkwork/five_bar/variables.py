@@ -22,10 +22,16 @@ def _parameter(
 
 
 PARAMETERS = (
-    _parameter("ground.length", "m", "Ground link, from the crank shaft A to the slider's zero", "l_1", minimum=0.0),
-    _parameter("crank.length", "m", "Crank, A to B", "l_2", minimum=0.0),
-    _parameter("coupler.length", "m", "Coupler, B to C", "l_3", minimum=0.0),
-    _parameter("rocker.length", "m", "Rocker, D to C", "l_4", minimum=0.0),
+    _parameter(
+        "ground.length",
+        "m",
+        "Ground link, from the crank shaft A to the slider's zero; greater than zero",
+        "l_1",
+        minimum=0.0,
+    ),
+    _parameter("crank.length", "m", "Crank, A to B; greater than zero", "l_2", minimum=0.0),
+    _parameter("coupler.length", "m", "Coupler, B to C; greater than zero", "l_3", minimum=0.0),
+    _parameter("rocker.length", "m", "Rocker, D to C; greater than zero", "l_4", minimum=0.0),
     _parameter("crank.mass", "kg", "Mass of the crank", "m_2", minimum=0.0),
     _parameter("coupler.mass", "kg", "Mass of the coupler", "m_3", minimum=0.0),
     _parameter("rocker.mass", "kg", "Mass of the rocker", "m_4", minimum=0.0),
@@ -33,7 +39,7 @@ PARAMETERS = (
     _parameter(
         "crank.inertia",
         "kg.m2",
-        "Moment of inertia of the crank about its shaft A, m lG2^2 included",
+        "Moment of inertia of the crank about its shaft A, m lG2^2 included; greater than zero",
         "I_A",
         minimum=0.0,
     ),
@@ -207,7 +213,13 @@ OUTPUTS = (
     *_pin("D", "the slider on the rocker"),
     _output("slider.guide_force", "N", "Force of the guide on the slider, to the left of its direction of travel"),
     _output("energy.kinetic", "J", "Kinetic energy of all links", "", "speed", "velocity", minimum=0.0),
-    _output("energy.potential", "J", "Potential energy of spring and gravity", "", "state"),
+    _output(
+        "energy.potential",
+        "J",
+        "Potential energy of spring and gravity, the latter zero with every centre of mass at A",
+        "",
+        "state",
+    ),
     _output("energy.dissipated", "J", "Work lost in damper and guide since the start", "", "state"),
     _output("energy.supplied", "J", "Work of crank torque, slider force and load since the start", "", "speed"),
     _output(
