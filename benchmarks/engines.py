@@ -227,7 +227,7 @@ _CRANK, _COUPLER, _SLIDER, _ROCKER = range(4)  # order of the joints in the tree
 _NEGLIGIBLE = 1e-12
 
 
-def _mujoco_model(case: Case, iterations: int) -> tuple[Any, Any]:
+def _mujoco_model(case: Case, iterations: int, *, stiffened: bool = True) -> tuple[Any, Any]:
     """Model and data at the start of the run."""
     import mujoco
 
@@ -259,7 +259,8 @@ def _mujoco_model(case: Case, iterations: int) -> tuple[Any, Any]:
     # The constraint is softened in proportion to the bodies' inverse weight by (1 - d)/d, where the impedance d ends at
     # 0.9999: an error of 3e-5 in u. A smaller weight stiffens it. What one Newton iteration loses to rounding then, a second
     # one wins back.
-    model.body_invweight0 *= 1e-4 if iterations == 1 else 1e-6
+    if stiffened:
+        model.body_invweight0 *= 1e-4 if iterations == 1 else 1e-6
     data = mujoco.MjData(model)
     s = _start(case, p)
     data.qpos[:] = (0.0, s.th3, 0.0, s.th4)
@@ -292,15 +293,17 @@ def _mujoco_until_switch(model: Any, data: Any, case: Case, n: int) -> tuple[int
     return n, None
 
 
-def run_mujoco(case: Case, time_step: float, *, iterations: int = 1) -> EngineRun:
+def run_mujoco(case: Case, time_step: float, *, iterations: int = 1, stiffened: bool = True) -> EngineRun:
     """Run ``case`` in MuJoCo: RK4 on relative joints, stepped in C from sample to sample.
 
     ``iterations`` is that of the constraint solver: with one the error ends at about 1e-7 and a step is cheapest, with two
-    it falls with the fourth power of the step to below 1e-9. `mujoco.rollout` takes the same time per step.
+    it falls with the fourth power of the step to below 1e-9. Not ``stiffened``, the constraint is as soft as MuJoCo's model
+    file leaves it, without a change to the compiled model's inverse weights. `mujoco.rollout` takes the same time per
+    step.
     """
     import mujoco
 
-    model, data = _mujoco_model(case, iterations)
+    model, data = _mujoco_model(case, iterations, stiffened=stiffened)
     interval = case.duration / case.samples
     n_full = steps_in(interval, time_step)
     u = np.zeros(case.samples + 1)
@@ -323,7 +326,8 @@ def run_mujoco(case: Case, time_step: float, *, iterations: int = 1) -> EngineRu
             steps += n
         u[sample] = data.qpos[_SLIDER]
     seconds = perf_counter() - begin
-    return EngineRun(seconds=seconds, error=relative_error(case, u), label="MuJoCo RK4", steps=steps)
+    label = "MuJoCo RK4" if stiffened else "MuJoCo RK4, by its model file alone"
+    return EngineRun(seconds=seconds, error=relative_error(case, u), label=label, steps=steps)
 
 
 # --- Exudyn -------------------------------------------------------------------------------------------------------------

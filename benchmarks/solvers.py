@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from functools import partial
 from time import perf_counter
 
 import numpy as np
@@ -270,11 +271,12 @@ def main() -> None:
         timings, remark = in_process(case)
         timings += [with_scipy(case), with_multipliers(case)]
         missing = []
-        for engine in engines.ENGINES:
+        plain = engines.ENGINES[0]._replace(run=partial(engines.run_mujoco, stiffened=False))
+        for engine in (*engines.ENGINES, plain):
             try:
                 timings.append(with_engine(engine, case))
             except ImportError as error:
-                missing.append(error.name or str(error))
+                missing += [error.name or str(error)] * (error.name not in missing)
         table = Table(title=f"{case.name}: error in u at most {ACCURACY:g}")
         for heading in ("solver", "error", "time [ms]", "times the integration", "times the whole call", "setting"):
             table.add_column(heading, justify="left" if heading in ("solver", "setting") else "right")
