@@ -179,6 +179,8 @@ def cosimulate(
     InputError
         If the times are not usable, or an input is not a finite number; the sentence names the input and the time.
     """
+    from .compiled import held_bar  # compiles on the first use
+
     begun = clock.perf_counter()
     inputs = inputs or Inputs()
     initial = initial or InitialState()
@@ -192,6 +194,7 @@ def cosimulate(
         if law[2] and x[0] >= law[1]:
             law[2] = 0.0
         torque, speed, _, force, load_x, load_y = channels(encoded, t, False, x, law)
+        torque += held_bar(law, x[0], x[2], ahead - t)
         acceleration = 0.0
         if inputs.speed_drive:
             acceleration = (channels(encoded, ahead, True, x, law)[1] - speed) / (ahead - t)

@@ -544,11 +544,15 @@ class _March:
 
     def _sample(self, stop: float) -> float:
         """Sample the inputs at the beginning of an interval; returns the commanded speed."""
+        from .compiled import held_bar
+
         e, t, end = self.run_.encoded, self.t, self.run_.times[-1]
         torque, speed, acceleration, force, load_x, load_y = channels(e, t, False, self.x, self.law)
-        if self.run_.hold and self.speed_drive:
+        if self.run_.hold:
             ahead = stop if t < end else t + self.run_.hold
-            acceleration = (channels(e, ahead, True, self.x, self.law)[1] - speed) / (ahead - t)
+            torque += held_bar(self.law, self.x[0], self.x[2], ahead - t)
+            if self.speed_drive:
+                acceleration = (channels(e, ahead, True, self.x, self.law)[1] - speed) / (ahead - t)
         self.held = dynamics.Inputs(float(self.speed_drive), torque, acceleration, force, load_x, load_y)
         return speed
 

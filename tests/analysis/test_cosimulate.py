@@ -211,7 +211,7 @@ def _runs(fmu: str) -> dict[str, Any]:
     found["torque"] = turns["drive.applied_torque"][0]
     found["C"] = [turns["pin.C.fx"][720], turns["pin.C.fy"][720]]
     found["residual"] = float(np.abs(turns["energy.residual"]).max())
-    # the torsion bar is switched at a communication point: within half a step's torque of the exact motion
+    # the torsion bar's torque is held, that of the middle of each step
     bar = {"parameters": TABLE_3_1, "inputs": Inputs(torque=TorsionBar(torque=10.0)), "stop_time": 0.25}
     for step in (1e-3, 1e-4):
         end = cosimulate(fmu, step=step, tolerance=1e-11, **bar).values[-1]
@@ -271,12 +271,15 @@ def test_reference_numbers_through_the_fmu(runs: dict[str, Any]) -> None:
 
 
 def test_torsion_bar_of_the_reference_through_the_fmu(runs: dict[str, Any]) -> None:
-    # held torques lag by half a step: first order in it, so that ten times shorter steps are ten times closer
+    # held at the middle of the step, the torque's impulse is right to second order: at ten times shorter steps the run is
+    # at least thirty times closer, where a torque held from the beginning would be ten times
     reference = published.TORQUE_AT_0_25_S
     exact = np.array([reference["th2_rad"], reference["u_cm"] / CM_PER_METRE, reference["th2_rate_rad_s"]])
     coarse, fine = (np.abs(np.array(runs[f"bar-{step}"]) - exact) for step in (1e-3, 1e-4))
-    assert fine[0] == pytest.approx(coarse[0] / 10.0, rel=0.5)
-    assert fine[0] < 0.1
+    assert np.all(fine <= coarse / 30.0)
+    assert coarse[0] < 0.01
+    assert coarse[2] < 0.2
+    assert fine[2] < 2e-3
 
 
 def test_refused_step_ends_the_run_with_status_message_and_data(runs: dict[str, Any]) -> None:
