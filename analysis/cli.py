@@ -19,6 +19,8 @@ from rich.table import Table
 
 from linkwork import __version__
 from linkwork.errors import LinkworkError
+from linkwork.five_bar.kinematics import assembly_square
+from linkwork.five_bar.parameters import field_name
 from linkwork.five_bar.published import RAD_S_PER_RPM, SETS
 from linkwork.five_bar.variables import PARAMETERS
 
@@ -380,8 +382,6 @@ def _cache() -> Path:
 
 
 def _parameters(title: str, parameters: Any) -> None:
-    from linkwork.five_bar.parameters import field_name
-
     grid = Table(title=title)
     for heading in ("parameter", "value", "unit", "meaning"):
         grid.add_column(heading, justify="right" if heading == "value" else "left")
@@ -392,15 +392,9 @@ def _parameters(title: str, parameters: Any) -> None:
     console.print(grid)
     p = parameters.constants()
     angles = np.linspace(0.0, 2.0 * np.pi, 721)
-    square = [_assembly_square(a, p) for a in angles]
+    square = [assembly_square(float(a), 0.0, p) for a in angles]
     turns = "turns fully" if min(square) > 0.0 else "does not turn fully"
     console.print(f"with the slider at zero the crank {turns}", highlight=False)
-
-
-def _assembly_square(angle: float, p: Any) -> float:
-    from linkwork.five_bar.kinematics import assembly_square
-
-    return assembly_square(float(angle), 0.0, p)
 
 
 def _fmu(path: Path) -> None:

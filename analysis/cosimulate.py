@@ -18,7 +18,6 @@ from fmpy.fmi1 import FMICallException
 from fmpy.fmi2 import FMU2Slave, fmi2CallbackFunctions, fmi2CallbackLoggerTYPE
 from fmpy.logging import addLoggerProxy
 from numpy.typing import NDArray
-from rich.progress import Progress
 
 from linkwork.errors import InputError, LinkworkError
 from linkwork.five_bar.dynamics import Outputs
@@ -27,7 +26,7 @@ from linkwork.five_bar.plant import INPUT_NAMES, SPEED_DRIVE, TORQUE_DRIVE
 from linkwork.five_bar.variables import OUTPUT_NAMES
 
 from .inputs import Inputs, align, encode
-from .simulate import RunInterrupted, channels, interruptible, sample_times
+from .simulate import RunInterrupted, held_channels, interruptible, sample_times, shown
 from .trajectory import UNITS, Trajectory
 
 #: Outputs that are angles in (-pi, pi]: they differ by what is left after whole turns.
@@ -179,8 +178,6 @@ def cosimulate(
     InputError
         If the times are not usable, or an input is not a finite number; the sentence names the input and the time.
     """
-    from .compiled import held_bar  # compiles on the first use
-
     begun = clock.perf_counter()
     inputs = inputs or Inputs()
     initial = initial or InitialState()
@@ -191,14 +188,8 @@ def cosimulate(
     status, message = 0, ""
 
     def sampled(t: float, ahead: float, x: NDArray[np.float64]) -> dict[str, float]:
-        if law[2] and x[0] >= law[1]:
-            law[2] = 0.0
-        torque, speed, _, force, load_x, load_y = channels(encoded, t, False, x, law)
-        torque += held_bar(law, x[0], x[2], ahead - t)
-        acceleration = 0.0
-        if inputs.speed_drive:
-            acceleration = (channels(encoded, ahead, True, x, law)[1] - speed) / (ahead - t)
-        return dict(zip(INPUT_NAMES, (torque, speed, acceleration, force, load_x, load_y)))
+        # the channels stand in the order of the FMU's inputs
+        return dict(zip(INPUT_NAMES, held_channels(encoded, t, ahead, x, law, inputs.speed_drive)))
 
     x = np.array([initial.crank_angle, initial.slider_position, initial.crank_speed, initial.slider_velocity])
     first = sampled(times[0], times[1], x)
@@ -211,8 +202,7 @@ def cosimulate(
         start_time=float(times[0]),
         inputs=first,
     )
-    with run, interruptible() as interrupted, Progress(disable=not progress, transient=True) as bar:
-        task = bar.add_task("co-simulate", total=len(times) - 1)
+    with run, interruptible() as interrupted, shown(progress, times[-1] - times[0], "co-simulate") as show:
         rows.append(run.outputs())
         for t, t_next in pairwise(times):
             status, message = run.step(float(t), float(t_next - t))
@@ -225,7 +215,7 @@ def cosimulate(
             later = t_next + step if t_next == times[-1] else times[len(rows) + 1]
             run.set_inputs(sampled(float(t_next), float(later), x))
             rows.append(run.outputs())
-            bar.advance(task)
+            show(float(t_next - times[0]))
             if interrupted:
                 break
     trajectory = Trajectory(

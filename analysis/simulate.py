@@ -303,6 +303,30 @@ def channels(
     return values
 
 
+def held_channels(
+    encoded: Encoded,
+    t: float,
+    ahead: float,
+    x: NDArray[np.float64],
+    law: NDArray[np.float64],
+    speed_drive: bool,
+) -> tuple[float, float, float, float, float, float]:
+    """The channels at time t as one who samples them holds them until ``ahead``.
+
+    The crank speed goes along the secant; a torsion bar acts with the torque of the middle of the step, and ``law`` is
+    overwritten once it is released.
+    """
+    from .compiled import held_bar
+
+    if law[2] and x[0] >= law[1]:
+        law[2] = 0.0
+    torque, speed, acceleration, force, load_x, load_y = channels(encoded, t, False, x, law)
+    torque += held_bar(law, x[0], x[2], ahead - t)
+    if speed_drive:
+        acceleration = (channels(encoded, ahead, True, x, law)[1] - speed) / (ahead - t)
+    return torque, speed, acceleration, force, load_x, load_y
+
+
 class NotFiniteError(InputError):
     """An input, which it names, is not a finite number at a time and a state."""
 
@@ -362,13 +386,13 @@ def interruptible() -> Iterator[list[bool]]:
 
 
 @contextmanager
-def _shown(progress: bool, duration: float) -> Iterator[Callable[[float], None]]:
+def shown(progress: bool, duration: float, what: str = "simulate") -> Iterator[Callable[[float], None]]:
     """A progress bar over the time of a run, as a function of the time done; nothing at all where it is not wanted."""
     if not progress:
         yield lambda done: None
         return
     with Progress(transient=True) as bar:
-        task = bar.add_task("simulate", total=duration)
+        task = bar.add_task(what, total=duration)
         yield lambda done: bar.update(task, completed=done)
 
 
@@ -415,7 +439,7 @@ class _Run:
         status = k.RUNNING
         integrating = 0.0
         occurrences: list[list[float]] = []
-        with interruptible() as interrupted, _shown(progress, self.times[-1] - self.times[0]) as show:
+        with interruptible() as interrupted, shown(progress, self.times[-1] - self.times[0]) as show:
             try:
                 while status == k.RUNNING and carry[k.STEPS] < self.max_steps and not interrupted:
                     entered = clock.perf_counter()
@@ -483,7 +507,7 @@ class _Run:
         begun = clock.perf_counter()
         march = _March(self)
         interrupted = False
-        with _shown(progress, self.times[-1] - self.times[0]) as show:
+        with shown(progress, self.times[-1] - self.times[0]) as show:
             try:
                 march.run(method, options, show if progress else None)
             except KeyboardInterrupt:
@@ -544,15 +568,13 @@ class _March:
 
     def _sample(self, stop: float) -> float:
         """Sample the inputs at the beginning of an interval; returns the commanded speed."""
-        from .compiled import held_bar
-
         e, t, end = self.run_.encoded, self.t, self.run_.times[-1]
-        torque, speed, acceleration, force, load_x, load_y = channels(e, t, False, self.x, self.law)
         if self.run_.hold:
             ahead = stop if t < end else t + self.run_.hold
-            torque += held_bar(self.law, self.x[0], self.x[2], ahead - t)
-            if self.speed_drive:
-                acceleration = (channels(e, ahead, True, self.x, self.law)[1] - speed) / (ahead - t)
+            values = held_channels(e, t, ahead, self.x, self.law, self.speed_drive)
+        else:
+            values = channels(e, t, False, self.x, self.law)
+        torque, speed, acceleration, force, load_x, load_y = values
         self.held = dynamics.Inputs(float(self.speed_drive), torque, acceleration, force, load_x, load_y)
         return speed
 
