@@ -2,56 +2,44 @@
 
 from __future__ import annotations
 
+import math
+import sys
 from functools import cache
-from types import FunctionType, ModuleType
 from typing import Any
 
 import numpy as np
 import pytest
 
+from analysis import symbolic
+from linkwork.errors import LinkworkError
 from linkwork.five_bar import dynamics, kinematics
-from linkwork.five_bar.parameters import Constants
 from tests.strategies import seeded
 
 casadi = pytest.importorskip("casadi")
 
-ELEMENTARY = {name: getattr(casadi, name) for name in ("sin", "cos", "sqrt", "atan2", "tanh")}
-
-
-def rebound(module: ModuleType, others: dict[str, Any]) -> dict[str, Any]:
-    """The module's namespace with its own functions bound to that namespace instead of the module's."""
-    space = dict(vars(module)) | {name: f for name, f in (ELEMENTARY | others).items() if name in vars(module)}
-    for name, f in vars(module).items():
-        if isinstance(f, FunctionType) and f.__module__ == module.__name__:
-            space[name] = FunctionType(f.__code__, space, name, f.__defaults__)
-    return space
-
 
 @cache
-def symbolic() -> dict[str, Any]:
-    """`dynamics`, traced: CasADi functions of state, inputs and constants."""
-    plain = rebound(kinematics, {})
-    own = {name: f for name, f in plain.items() if isinstance(f, FunctionType)}
-    space = rebound(dynamics, own)
-    x, u, p = casadi.SX.sym("x", 6), casadi.SX.sym("u", 6), casadi.SX.sym("p", len(Constants._fields))
-    state, inputs, constants = (
-        tuple(casadi.vertsplit(x)),
-        dynamics.Inputs(*casadi.vertsplit(u)),
-        Constants(*casadi.vertsplit(p)),
-    )
-    derivative = casadi.vertcat(*space["derivative"](state, inputs, constants))
-    outputs = casadi.vertcat(*space["outputs"](state, inputs, 0.25, constants))
-    jumped = casadi.vertcat(*space["jump_speed"](state, u[0], constants))
+def traced() -> dict[str, Any]:
+    """CasADi functions of state, inputs and constants."""
+    plant = symbolic.plant()
+    x, u = casadi.SX.sym("x", 6), casadi.SX.sym("u", 6)
+    p, constants = symbolic.constants()
+    state, inputs = tuple(casadi.vertsplit(x)), dynamics.Inputs(*casadi.vertsplit(u))
+    derivative = casadi.vertcat(*plant.derivative(state, inputs, constants))
+    outputs = casadi.vertcat(*plant.outputs(state, inputs, 0.25, constants))
+    jumped = casadi.vertcat(*plant.jump_speed(state, u[0], constants))
+    jacobian = casadi.densify(casadi.jacobian(derivative, x))
     return {
         "derivative": casadi.Function("derivative", [x, u, p], [derivative]),
         "outputs": casadi.Function("outputs", [x, u, p], [outputs]),
         "jump": casadi.Function("jump", [x, u, p], [jumped]),
-        "jacobian": casadi.Function("jacobian", [x, u, p], [casadi.jacobian(derivative, x)]),
+        "jacobian": casadi.Function("jacobian", [x, u, p], [jacobian]),
+        "both": casadi.Function("both", [x, u, p], [derivative, jacobian], {"cse": True}),
     }
 
 
 def numbers(function: str, *arguments: Any) -> np.ndarray:
-    return np.asarray(symbolic()[function](*(casadi.DM(list(a)) for a in arguments))).squeeze()
+    return np.asarray(traced()[function](*(casadi.DM(list(a)) for a in arguments))).squeeze()
 
 
 @pytest.mark.parametrize("seed", range(25))
@@ -84,14 +72,47 @@ def test_jacobian_is_that_of_differences(seed: int) -> None:
     assert np.all(np.abs(exact - differences) <= 1e-4 * size + 1e-9)
 
 
+@pytest.mark.parametrize("seed", range(10))
+def test_straight_line_python_has_the_values_of_the_traced_function(seed: int) -> None:
+    space = {name: getattr(math, name) for name in ("sin", "cos", "sqrt", "tanh", "atan2", "fabs")}
+    exec(symbolic.source(traced()["both"], "both"), space)
+    case = seeded(seed)
+    p = case.parameters.constants()
+    written = space["both"](case.state, case.torque_inputs, p)  # type: ignore[operator]
+    assert len(written) == 42
+    assert written[:6] == pytest.approx(dynamics.derivative(case.state, case.torque_inputs, p), rel=1e-11)
+    # column by column
+    expected = numbers("jacobian", case.state, case.torque_inputs, p)
+    assert pytest.approx(expected, rel=1e-11, abs=1e-12) == np.reshape(written[6:], (6, 6)).T
+
+
+def test_a_sparse_output_is_refused() -> None:
+    x = casadi.SX.sym("x", 2)
+    f = casadi.Function("f", [x], [casadi.jacobian(x, x)])
+    with pytest.raises(LinkworkError, match="structural zeros"):
+        symbolic.source(f, "f")
+
+
+def test_an_operation_without_counterpart_is_refused() -> None:
+    x = casadi.SX.sym("x")
+    with pytest.raises(LinkworkError, match="no counterpart"):
+        symbolic.source(casadi.Function("f", [x], [casadi.erf(x)]), "f")
+
+
+def test_without_casadi_the_error_names_the_extra(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "casadi", None)
+    with pytest.raises(symbolic.MissingLibraryError, match=r"linkwork\[symbolic\]"):
+        symbolic.library()
+
+
 def test_nothing_of_the_plain_modules_is_changed() -> None:
-    symbolic()
+    symbolic.plant()
     assert kinematics.sin.__module__ == dynamics.tanh.__module__ == "math"
     assert dynamics.position is kinematics.position
 
 
 def test_traced_function_becomes_c_code(tmp_path: Any) -> None:
     generator = casadi.CodeGenerator("five_bar.c")
-    generator.add(symbolic()["derivative"])
+    generator.add(traced()["derivative"])
     generator.generate(f"{tmp_path}/")
     assert "derivative" in (tmp_path / "five_bar.c").read_text(encoding="utf-8")

@@ -1,12 +1,11 @@
-"""Plots and animations: the only module that draws."""
+"""Pictures of the linkage: a still, an animation, the icon of the FMU."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from math import ceil, cos, hypot, sin
+from math import cos, hypot, sin
 from pathlib import Path
-from textwrap import fill
 from typing import TYPE_CHECKING, Any
 
 import matplotlib
@@ -15,249 +14,22 @@ from matplotlib.animation import PillowWriter
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
-from matplotlib.patches import Arc, Circle, FancyBboxPatch, PathPatch, Polygon, Rectangle
-from matplotlib.path import Path as Outline
+from matplotlib.patches import Arc, Circle, FancyBboxPatch, Polygon, Rectangle
 from numpy.typing import ArrayLike, NDArray
 
 from linkwork.errors import AssemblyError, InputError
 from linkwork.five_bar import kinematics
 from linkwork.five_bar.parameters import FiveBarParameters
 
+from .style import STYLE, finish
+
 if TYPE_CHECKING:
-    from .trajectory import Trajectory
+    from ..trajectory import Trajectory
 
-STYLE: dict[Any, Any] = {
-    "figure.constrained_layout.use": True,
-    "axes.grid": True,
-    "grid.alpha": 0.3,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "lines.linewidth": 1.3,
-    "legend.frameon": False,
-    "font.size": 9,
-}
-
-#: Colours that stay apart for colour-blind readers and in grey (Okabe and Ito), in the order of curves.
-COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
 #: Colours of the links in drawings.
 CRANK, COUPLER, ROCKER, SLIDER, GROUND, TRACE = "#D55E00", "#0072B2", "#009E73", "#5B6770", "#333333", "#CC79A7"
 
 CM_PER_METRE = 100.0
-
-
-def _finish(figure: Figure) -> Figure:
-    """Lay the figure out while the style is in force: ticks are made, and take their look, only then."""
-    figure.draw_without_rendering()
-    return figure
-
-
-def plot_outputs(
-    time: ArrayLike, outputs: Mapping[str, tuple[NDArray[np.float64], str]], *, columns: int = 1, title: str = ""
-) -> Figure:
-    """Plot outputs over time, one panel each.
-
-    Parameters
-    ----------
-    time : array_like, shape (n,)
-        s.
-    outputs : mapping
-        Name to (values of shape (n,), unit).
-    columns : int
-        Panels side by side.
-    """
-    rows = ceil(len(outputs) / columns)
-    with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(6.4 * columns, 1.0 + 1.9 * rows))
-        axes = figure.subplots(rows, columns, sharex=True, squeeze=False)
-        for axis, (name, (values, unit)) in zip(axes.flat, outputs.items()):
-            axis.plot(time, values)
-            axis.set_ylabel(f"{name} [{unit}]")
-        for axis in axes[-1]:
-            axis.set_xlabel("time [s]")
-        if title:
-            figure.suptitle(title)
-        return _finish(figure)
-
-
-def plot_comparison(
-    time: ArrayLike,
-    outputs: Mapping[str, tuple[NDArray[np.float64], NDArray[np.float64], str]],
-    *,
-    title: str = "",
-    labels: tuple[str, str] = ("first", "second"),
-) -> Figure:
-    """Plot outputs of two runs over each other, and the second less the first beside them, a row each.
-
-    Parameters
-    ----------
-    time : array_like, shape (n,)
-        s.
-    outputs : mapping
-        Name to (values of the first run, values of the second, unit), shapes (n,).
-    labels : (str, str)
-        Names of the runs.
-    """
-    with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(9.6, 0.9 + 1.8 * len(outputs)))
-        rows = figure.subplots(len(outputs), 2, sharex=True, squeeze=False, width_ratios=(3, 2))
-        for (both, difference), (name, (first, second, unit)) in zip(rows, outputs.items()):
-            both.plot(time, first, color=COLOURS[0], label=labels[0])
-            both.plot(time, second, "--", color=COLOURS[1], label=labels[1])
-            both.set_ylabel(f"{name} [{unit}]", fontsize=8)
-            difference.plot(time, second - first, color="0.25", linewidth=1.0)
-            difference.set_ylabel(f"difference [{unit}]", fontsize=8)
-        rows[0, 0].legend(fontsize=8, ncols=2, loc="lower right", bbox_to_anchor=(1.0, 1.0), borderaxespad=0.1)
-        rows[0, 1].set_title(f"{labels[1]} less {labels[0]}", fontsize=8.5)
-        for axis in rows[-1]:
-            axis.set_xlabel("time [s]")
-        if title:
-            figure.suptitle(title, fontsize=10.5, fontweight="bold")
-        figure.align_ylabels()
-        return _finish(figure)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Curve:
-    """One line of a panel: points (n,), what the legend calls it, and how it looks where that is not left to the panel."""
-
-    x: ArrayLike
-    y: ArrayLike
-    label: str = ""
-    colour: str | None = None
-    line: str = "-"
-    marker: str = ""
-    width: float | None = None
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Panel:
-    """One pair of axes of a plot.
-
-    Attributes
-    ----------
-    x_label, y_label : str
-        With units.
-    curves : sequence of Curve
-        Drawn in the order of `COLOURS`.
-    verticals : mapping
-        Dotted vertical lines: text at the top to place along x.
-    legend : str, optional
-        Heading of the legend; there is one if any curve has a label.
-    legend_at : str
-        Where it goes, in Matplotlib's words, or "outside", to the right of the axes.
-    x_range, y_range : (float, float), optional
-    logarithmic : str
-        Axes on a logarithmic scale: "", "x", "y" or "xy".
-    equal : bool
-        One length on both axes.
-    filled : sequence of sequence of ndarray, shape (n, 2)
-        Areas to shade, each the closed boundaries it has; holes are kept free.
-    x_ticks : sequence of float, optional
-    """
-
-    x_label: str
-    y_label: str
-    curves: Sequence[Curve] = ()
-    verticals: Mapping[str, float] | None = None
-    title: str = ""
-    legend: str = ""
-    legend_at: str = "best"
-    x_range: tuple[float, float] | None = None
-    y_range: tuple[float, float] | None = None
-    logarithmic: str = ""
-    equal: bool = False
-    filled: Sequence[Sequence[NDArray[np.float64]]] = ()
-    x_ticks: Sequence[float] | None = None
-
-
-def plot_curves(
-    panels: Sequence[Panel], *, title: str, columns: int = 1, size: tuple[float, float] = (6.4, 3.7)
-) -> Figure:
-    """Plot curves for print, one pair of axes per panel.
-
-    Parameters
-    ----------
-    panels : sequence of Panel
-    title : str
-        Above all of it; a figure of the thesis by its number.
-    columns : int
-        Panels side by side.
-    size : (float, float)
-        Width and height of a panel (inches).
-    """
-    rows = ceil(len(panels) / columns)
-    with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(size[0] * columns, 0.35 + size[1] * rows))
-        axes = figure.subplots(rows, columns, squeeze=False)
-        for axis, panel in zip(axes.flat, panels):
-            _draw_panel(axis, panel)
-        for axis in list(axes.flat)[len(panels) :]:
-            axis.remove()
-        # eleven and a half of these letters go to the inch
-        figure.suptitle(fill(title, int(11.6 * size[0] * columns)), fontsize=10.5, fontweight="bold")
-        return _finish(figure)
-
-
-def _draw_panel(axis: Axes, panel: Panel) -> None:
-    for boundaries in panel.filled:
-        axis.add_patch(PathPatch(_outline(boundaries), facecolor="#56B4E9", alpha=0.22, edgecolor="none", zorder=0))
-    for number, curve in enumerate(panel.curves):
-        axis.plot(
-            curve.x,
-            curve.y,
-            linestyle=curve.line or "none",
-            color=curve.colour or COLOURS[number % len(COLOURS)],
-            marker=curve.marker or None,
-            markersize=4.5,
-            label=curve.label or None,
-            linewidth=curve.width,
-            markeredgewidth=1.2,
-            zorder=3 if curve.marker else 2,
-        )
-    axis.set_xlabel(panel.x_label)
-    axis.set_ylabel(panel.y_label)
-    if panel.title:
-        axis.set_title(panel.title, fontsize=9)
-    if "x" in panel.logarithmic:
-        axis.set_xscale("log")
-    if "y" in panel.logarithmic:
-        axis.set_yscale("log")
-    if panel.x_ticks is not None:
-        axis.set_xticks(panel.x_ticks, [f"{tick:g}" for tick in panel.x_ticks])
-        axis.set_xticks([], minor=True)
-    if panel.x_range:
-        axis.set_xlim(*panel.x_range)
-    if panel.y_range:
-        axis.set_ylim(*panel.y_range)
-    if panel.equal:
-        axis.set_aspect("equal")
-    for text, place in (panel.verticals or {}).items():
-        axis.axvline(place, color="0.35", linestyle=":", linewidth=1.0, zorder=1)
-        axis.annotate(
-            text,
-            (place, 1.0),
-            xycoords=("data", "axes fraction"),
-            xytext=(-2, -3),
-            textcoords="offset points",
-            rotation=90,
-            ha="right",
-            va="top",
-            fontsize=7.5,
-            color="0.25",
-        )
-    if any(curve.label for curve in panel.curves):
-        outside: dict[str, Any] = {"loc": "upper left", "bbox_to_anchor": (1.0, 1.0)}
-        where = outside if panel.legend_at == "outside" else {"loc": panel.legend_at}
-        axis.legend(title=panel.legend or None, fontsize=8, title_fontsize=8, alignment="left", **where)
-
-
-def _outline(boundaries: Sequence[NDArray[np.float64]]) -> Outline:
-    """One path of closed boundaries; those that run clockwise are holes in the others."""
-    vertices, codes = [], []
-    for ring in boundaries:
-        vertices += [ring, ring[:1]]
-        codes += [Outline.MOVETO] + [Outline.LINETO] * (len(ring) - 1) + [Outline.CLOSEPOLY]
-    return Outline(np.concatenate(vertices), codes)
 
 
 @dataclass(frozen=True, slots=True)
@@ -520,7 +292,7 @@ def draw_linkage(
         scene.draw(axis, q, trace=path)
         if title:
             axis.set_title(title, fontsize=10.5, fontweight="bold")
-        return _finish(figure)
+        return finish(figure)
 
 
 def animate_linkage(

@@ -1,0 +1,114 @@
+"""Fourier series of real functions of the crank angle."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from linkwork.errors import InputError
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FourierSeries:
+    """f(x) = sum over k of cos[k] cos(k x) + sin[k] sin(k x), k = 0, 1, ..., with period 2 pi.
+
+    Attributes
+    ----------
+    cos, sin : ndarray, shape (n + 1,)
+        Coefficients; ``cos[0]`` is the mean, ``sin[0]`` is zero.
+
+    Raises
+    ------
+    InputError
+        If the two have not the same length, or a coefficient is not finite.
+    """
+
+    cos: NDArray[np.float64]
+    sin: NDArray[np.float64]
+
+    def __post_init__(self) -> None:
+        cos, sin = (np.array(values, dtype=float, ndmin=1) for values in (self.cos, self.sin))
+        if cos.ndim != 1 or cos.shape != sin.shape or len(cos) == 0:
+            raise InputError(f"cosines of shape {cos.shape} and sines of shape {sin.shape}: both must be (n + 1,)")
+        if not (np.isfinite(cos).all() and np.isfinite(sin).all()):
+            raise InputError("a Fourier coefficient is not finite")
+        sin[0] = 0.0
+        object.__setattr__(self, "cos", cos)
+        object.__setattr__(self, "sin", sin)
+
+    @classmethod
+    def constant(cls, value: float) -> FourierSeries:
+        """A constant."""
+        return cls(np.array([value]), np.zeros(1))
+
+    @classmethod
+    def from_samples(cls, samples: ArrayLike, order: int | None = None) -> FourierSeries:
+        """Series through samples at equal steps over one period, the first at x = 0, up to an order.
+
+        Without one it is the highest that the samples determine, (n - 1) // 2.
+        """
+        values = np.asarray(samples, dtype=float)
+        c = np.fft.rfft(values) / len(values)
+        highest = (len(values) - 1) // 2
+        if order is not None and order > highest:
+            raise InputError(f"order {order} from {len(values)} samples: they determine no more than order {highest}")
+        c = c[: (highest if order is None else order) + 1]
+        cos, sin = 2.0 * c.real, -2.0 * c.imag
+        cos[0] = c[0].real
+        return cls(cos, sin)
+
+    @property
+    def order(self) -> int:
+        """Order of the highest harmonic."""
+        return len(self.cos) - 1
+
+    @property
+    def mean(self) -> float:
+        """Mean over a period."""
+        return float(self.cos[0])
+
+    @property
+    def amplitudes(self) -> NDArray[np.float64]:
+        """Amplitude of each harmonic, the mean's with its sign; shape (n + 1,)."""
+        size = np.hypot(self.cos, self.sin)
+        size[0] = self.cos[0]
+        return size
+
+    @property
+    def exponential(self) -> NDArray[np.complex128]:
+        """Coefficients c[k + n] of exp(i k x), k = -n ... n, shape (2 n + 1,)."""
+        half = 0.5 * (self.cos - 1j * self.sin)
+        half[0] = self.cos[0]
+        return np.concatenate([half[:0:-1].conj(), half])
+
+    def __call__(self, x: ArrayLike) -> NDArray[np.float64]:
+        phase = np.multiply.outer(np.asarray(x, dtype=float), np.arange(len(self.cos)))
+        value: NDArray[np.float64] = np.cos(phase) @ self.cos + np.sin(phase) @ self.sin
+        return value
+
+    def __add__(self, other: FourierSeries | float) -> FourierSeries:
+        if not isinstance(other, FourierSeries):
+            other = FourierSeries.constant(float(other))
+        n = max(len(self.cos), len(other.cos))
+        a, b = self.to_order(n - 1), other.to_order(n - 1)
+        return FourierSeries(a.cos + b.cos, a.sin + b.sin)
+
+    __radd__ = __add__
+
+    def __mul__(self, factor: float) -> FourierSeries:
+        return FourierSeries(factor * self.cos, factor * self.sin)
+
+    __rmul__ = __mul__
+
+    def derivative(self) -> FourierSeries:
+        """df/dx."""
+        k = np.arange(len(self.cos))
+        return FourierSeries(k * self.sin, -k * self.cos)
+
+    def to_order(self, order: int) -> FourierSeries:
+        """The series cut off after an order, or filled up to it with zeros."""
+        n = order + 1
+        pad = max(0, n - len(self.cos))
+        return FourierSeries(*(np.append(values[:n], np.zeros(pad)) for values in (self.cos, self.sin)))
