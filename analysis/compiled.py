@@ -2,7 +2,8 @@
 
 `linkwork` does not know Numba: its functions are registered from outside and compiled as they stand. Everything here has
 an explicit signature, so that compiled code is kept on disk and a second process does not wait. Numba does not notice when
-a called function changes; the folder of the cache therefore carries a hash of the plant's sources and of this file.
+a called function changes; the folder of the cache therefore carries a hash of the plant's sources and of the modules here
+that are compiled.
 
 The integrator is DOP853 (`linkwork.tableau`) with its interpolant of order 7, the same method as the FMU's, written
 again for arrays; inputs are evaluated inside the loop. A run goes from one interval of smooth inputs to the next, ends of
@@ -48,6 +49,8 @@ EVENT = 10
 BEGIN, ELAPSED, STEP, SAMPLE, INTERVAL, EVENTS, STEPS, REJECTED, EVALUATIONS, STARTED, MIDWAY, LOST, HELD = range(13)
 CARRY = HELD + 6
 
+#: Modules of this package whose code ends up in compiled code.
+COMPILED_MODULES = ("compiled.py", "orbit_kernels.py", "symbolic.py")
 #: Events that one step can bring at most, and the beginning of an interval besides.
 EVENTS_PER_STEP = 4
 #: Fraction of a step within which an event counts as simultaneous with the end of the run or the release.
@@ -71,7 +74,8 @@ def cache_folder() -> Path:
     for path in sorted(root.rglob("*.py")):
         digest.update(path.relative_to(root).as_posix().encode())
         digest.update(path.read_bytes())
-    digest.update(Path(__file__).read_bytes())
+    for name in COMPILED_MODULES:
+        digest.update(Path(__file__).with_name(name).read_bytes())
     name = f"numba-{digest.hexdigest()[:16]}"
     user = os.getuid() if hasattr(os, "getuid") else 0
     folder = Path(os.environ.get("LINKWORK_CACHE_DIR") or user_cache_dir("linkwork", appauthor=False)) / name
@@ -99,12 +103,12 @@ def _private(folder: Path, user: int) -> bool:
     return status.st_uid == user and not status.st_mode & 0o022
 
 
-_CONSTANTS = types.NamedUniTuple(float64, len(Constants._fields), Constants)
-_VECTOR = float64[::1]
-_MATRIX = float64[:, ::1]
-_CUBE = float64[:, :, ::1]
+CONSTANTS = types.NamedUniTuple(float64, len(Constants._fields), Constants)
+VECTOR = float64[::1]
+MATRIX = float64[:, ::1]
+CUBE = float64[:, :, ::1]
 _ADDRESSES = int64[::1]
-_SOURCE = types.NamedTuple((_VECTOR, _CUBE, _MATRIX, _VECTOR, _ADDRESSES), Source)
+_SOURCE = types.NamedTuple((VECTOR, CUBE, MATRIX, VECTOR, _ADDRESSES), Source)
 
 for _function in (
     kinematics.position,
@@ -130,29 +134,38 @@ for _function in (
 ):
     register_jitable(_function)
 
-# the weights of stage s are _WEIGHT[_ROW[s]:_ROW[s + 1]], those of the stages _FROM
-_ROW = np.cumsum([0, *(len(row) for row in tableau.A)])
-_FROM = np.array([stage for row in tableau.A for stage, _ in row])
-_WEIGHT = np.array([weight for row in tableau.A for _, weight in row])
-_C = np.array(tableau.C)
-_E3 = np.array(tableau.E3)
-_E5 = np.array(tableau.E5)
+# DOP853: the weights of stage s are WEIGHT[ROW[s]:ROW[s + 1]], those of the stages FROM
+ROW = np.cumsum([0, *(len(row) for row in tableau.A)])
+FROM = np.array([stage for row in tableau.A for stage, _ in row])
+WEIGHT = np.array([weight for row in tableau.A for _, weight in row])
+NODES = np.array(tableau.C)
+E3 = np.array(tableau.E3)
+E5 = np.array(tableau.E5)
 _D = np.array(tableau.D)
-_STAGES = tableau.STAGES
-_EXPONENT = -1.0 / tableau.ORDER
+STAGES = tableau.STAGES
+EXPONENT = -1.0 / tableau.ORDER
 _N = 6
-_N_CONSTANTS = len(Constants._fields)
+N_CONSTANTS = len(Constants._fields)
 
-_saved_folder = numba.config.CACHE_DIR
-numba.config.CACHE_DIR = str(cache_folder())
+_FOLDER = str(cache_folder())
 
 
-def _compile(*signature):  # type: ignore[no-untyped-def]
-    return njit(*signature, cache=True, error_model="numpy", nogil=True)
+def kernel(*signature):  # type: ignore[no-untyped-def]
+    """Decorator: compile a function for its explicit signature and keep the machine code in `cache_folder`."""
+
+    def decorate(function):  # type: ignore[no-untyped-def]
+        before = numba.config.CACHE_DIR
+        numba.config.CACHE_DIR = _FOLDER
+        try:
+            return njit(*signature, cache=True, error_model="numpy", nogil=True)(function)
+        finally:
+            numba.config.CACHE_DIR = before
+
+    return decorate
 
 
 # inner functions make no arrays: to count the references to those they are handed would cost more than all they do
-_inner = njit(error_model="numpy", _nrt=False)
+inner = njit(error_model="numpy", _nrt=False)
 
 
 @intrinsic
@@ -167,7 +180,7 @@ def _call(typing_context, address, t, th2, u, w2, v):  # type: ignore[no-untyped
     return float64(int64, *[float64] * 5), generate
 
 
-@_inner
+@inner
 def _find(t, breaks):  # type: ignore[no-untyped-def]
     """Piece of the polynomials in force from t on; the outer ones go on beyond the ends."""
     n = breaks.shape[0] - 1
@@ -175,14 +188,14 @@ def _find(t, breaks):  # type: ignore[no-untyped-def]
     return min(max(i, 0), n - 1)
 
 
-@_inner
+@inner
 def _find_before(t, breaks):  # type: ignore[no-untyped-def]
     """Piece of the polynomials in force up to t."""
     piece = _find(t, breaks)
     return piece - 1 if piece > 0 and t == breaks[piece] else piece
 
 
-@_inner
+@inner
 def _channels(t, piece, x, source):  # type: ignore[no-untyped-def]
     """Torque, speed, acceleration, slider force and load at time t on a given piece."""
     s = t - source.breaks[piece]
@@ -231,7 +244,7 @@ def _channels(t, piece, x, source):  # type: ignore[no-untyped-def]
     return torque, speed, acceleration, force, load_x, load_y
 
 
-@_compile(float64(_VECTOR, float64, float64, float64))
+@kernel(float64(VECTOR, float64, float64, float64))
 def held_bar(law, th2, w2, step):  # type: ignore[no-untyped-def]
     """What to add to the torsion bar's torque at th2 where it is held over a step, at crank speed w2.
 
@@ -244,36 +257,36 @@ def held_bar(law, th2, w2, step):  # type: ignore[no-untyped-def]
     return law[0] * (max(0.0, 1.0 - middle / law[1]) - (1.0 - th2 / law[1]))
 
 
-@_compile(types.UniTuple(float64, 6)(float64, boolean, _VECTOR, _SOURCE))
+@kernel(types.UniTuple(float64, 6)(float64, boolean, VECTOR, _SOURCE))
 def channels(t, left, x, source):  # type: ignore[no-untyped-def]
     """Torque, speed, acceleration, slider force and load at time t, as the limit from the left or from the right."""
     return _channels(t, _find_before(t, source.breaks) if left else _find(t, source.breaks), x, source)
 
 
-@_inner
+@inner
 def _inputs(t, piece, x, drive, source):  # type: ignore[no-untyped-def]
     a = _channels(t, piece, x, source)
     return Inputs(drive, a[0], a[2], a[3], a[4], a[5])
 
 
-@_inner
+@inner
 def _tuple(x):  # type: ignore[no-untyped-def]
     return (x[0], x[1], x[2], x[3], x[4], x[5])
 
 
-@_inner
+@inner
 def _copy(source, target):  # type: ignore[no-untyped-def]
     for i in range(_N):
         target[i] = source[i]
 
 
-@_inner
+@inner
 def _stage(s, x, k, h, y):  # type: ignore[no-untyped-def]
     """State at stage s of a step of size h from x; stage 12 is its end."""
     y0 = y1 = y2 = y3 = y4 = y5 = 0.0
-    for n in range(_ROW[s], _ROW[s + 1]):
-        w = _WEIGHT[n]
-        j = _FROM[n]
+    for n in range(ROW[s], ROW[s + 1]):
+        w = WEIGHT[n]
+        j = FROM[n]
         y0 += w * k[j, 0]
         y1 += w * k[j, 1]
         y2 += w * k[j, 2]
@@ -288,15 +301,15 @@ def _stage(s, x, k, h, y):  # type: ignore[no-untyped-def]
     y[5] = x[5] + h * y5
 
 
-@_inner
+@inner
 def _error(x, y, k, h, scale):  # type: ignore[no-untyped-def]
     """Hairer's estimate of the error of a step from x to y relative to the scale, of order 8 in h."""
     sum3 = sum5 = 0.0
     for i in range(_N):
         e3 = e5 = 0.0
-        for j in range(_STAGES):
-            e3 += _E3[j] * k[j, i]
-            e5 += _E5[j] * k[j, i]
+        for j in range(STAGES):
+            e3 += E3[j] * k[j, i]
+            e5 += E5[j] * k[j, i]
         weight = scale[i] + max(abs(x[i]), abs(y[i]))
         sum3 += (e3 / weight) ** 2
         sum5 += (e5 / weight) ** 2
@@ -304,7 +317,7 @@ def _error(x, y, k, h, scale):  # type: ignore[no-untyped-def]
     return 0.0 if bottom == 0.0 else h * sum5 / np.sqrt(bottom * _N)
 
 
-@_inner
+@inner
 def _interpolant(x, y, k, h, f):  # type: ignore[no-untyped-def]
     """Coefficients of the interpolant between x and y (Hairer's contd8); k holds all sixteen stages."""
     for i in range(_N):
@@ -319,7 +332,7 @@ def _interpolant(x, y, k, h, f):  # type: ignore[no-untyped-def]
             f[3 + r, i] = h * total
 
 
-@_inner
+@inner
 def _interpolate(s, x, f, out):  # type: ignore[no-untyped-def]
     """State at the fraction s of the step."""
     for i in range(_N):
@@ -330,7 +343,7 @@ def _interpolate(s, x, f, out):  # type: ignore[no-untyped-def]
         out[i] = x[i] + y
 
 
-@_inner
+@inner
 def _gap(e, t, x, held, watch, addresses, release, start_energy, p):  # type: ignore[no-untyped-def]
     """What is zero where something happens: the limit of assembly (-1), the release (-2), event e of the user."""
     if e == -1:
@@ -342,7 +355,7 @@ def _gap(e, t, x, held, watch, addresses, release, start_energy, p):  # type: ig
     return dynamics.outputs(_tuple(x), held, start_energy, p)[int(watch[e, 0])] - watch[e, 1]
 
 
-@_inner
+@inner
 def _locate(e, low, high, t, h, x, f, dense, constant, held, piece, source, watch, addresses, start_energy, p):  # type: ignore[no-untyped-def]
     """Fraction of the step at which e happens, by bisection of the interpolant between two fractions."""
     positive = False
@@ -363,13 +376,13 @@ def _locate(e, low, high, t, h, x, f, dense, constant, held, piece, source, watc
     return low if e == -1 else high
 
 
-@_inner
+@inner
 def _crosses(before, after, direction):  # type: ignore[no-untyped-def]
     """Whether an event happens between two values; one that starts at zero does not."""
     return (before < 0.0 <= after and direction >= 0.0) or (before > 0.0 >= after and direction <= 0.0)
 
 
-@_inner
+@inner
 def _record(found, n, e, t, x):  # type: ignore[no-untyped-def]
     found[n, 0] = e
     found[n, 1] = t
@@ -475,7 +488,7 @@ def _run(
             ratio = 1e-300
             for i in range(_N):
                 ratio = max(ratio, abs(k[0, i]) / (scale[i] + abs(x[i])))
-            h_next = min(stop - begin, tolerance ** (-_EXPONENT) / ratio)
+            h_next = min(stop - begin, tolerance ** (-EXPONENT) / ratio)
         # steps, until the interval is over or cut short
         while True:
             if steps >= max_steps or n_found + EVENTS_PER_STEP * n_events > found.shape[0]:
@@ -489,13 +502,13 @@ def _run(
             last = h_next >= remaining * (1.0 - 1e-10)
             h = remaining if last else min(h_next, 0.5 * remaining)
             steps += 1
-            for s in range(1, _STAGES):
+            for s in range(1, STAGES):
                 _stage(s, x, k, h, y)
                 if not constant:
-                    held = _inputs(t + _C[s] * h, piece, y, drive, source)
+                    held = _inputs(t + NODES[s] * h, piece, y, drive, source)
                 _copy(dynamics.derivative(_tuple(y), held, p), k[s])
-            _stage(_STAGES, x, k, h, y)
-            carry[EVALUATIONS] += _STAGES - 1
+            _stage(STAGES, x, k, h, y)
+            carry[EVALUATIONS] += STAGES - 1
             error = _error(x, y, k, h, scale) / tolerance
             good = error <= 1.0
             if good:
@@ -509,7 +522,7 @@ def _run(
                         good = False
             if not good:
                 carry[REJECTED] += 1
-                h_next = h * (max(0.2, 0.9 * error**_EXPONENT) if 1.0 < error < 1e30 else 0.25)
+                h_next = h * (max(0.2, 0.9 * error**EXPONENT) if 1.0 < error < 1e30 else 0.25)
                 if not h_next >= 1e-14 * max(abs(t), end - samples[0]):
                     status = LIMIT if abs(kinematics.position(x[0], x[1], p).s43) < 0.05 else NO_STEP
                     if not constant:
@@ -524,7 +537,7 @@ def _run(
                         held = _inputs(t, piece, x, drive, source)
                     break
                 continue
-            factor = 6.0 if error == 0.0 else min(6.0, 0.9 * error**_EXPONENT)
+            factor = 6.0 if error == 0.0 else min(6.0, 0.9 * error**EXPONENT)
             # a step cut short by the end of the interval does not shorten the one carried over
             h_next = max(h_next, factor * h) if h < h_next else max(0.2, factor) * h
             # what happens inside the step needs the interpolant
@@ -535,7 +548,7 @@ def _run(
                 for s in range(13, 16):
                     _stage(s, x, k, h, z)
                     if not constant:
-                        inside = _inputs(t + _C[s] * h, piece, z, drive, source)
+                        inside = _inputs(t + NODES[s] * h, piece, z, drive, source)
                     _copy(dynamics.derivative(_tuple(z), inside, p), k[s])
                 carry[EVALUATIONS] += 3
                 _interpolant(x, y, k, h, f)
@@ -643,20 +656,20 @@ def _run(
 
 _RUN_ARGUMENTS = (
     float64,  # tolerance
-    _VECTOR,  # scale
-    _VECTOR,  # samples
-    _MATRIX,  # states
-    _MATRIX,  # forces
-    _MATRIX,  # watch
+    VECTOR,  # scale
+    VECTOR,  # samples
+    MATRIX,  # states
+    MATRIX,  # forces
+    MATRIX,  # watch
     _ADDRESSES,  # addresses
-    _VECTOR,  # gaps
-    _MATRIX,  # found
+    VECTOR,  # gaps
+    MATRIX,  # found
     float64,  # start_energy
     int64,  # max_steps
 )
 
 
-@_compile(int64(_CONSTANTS, _VECTOR, _VECTOR, float64, boolean, float64, boolean, _SOURCE, *_RUN_ARGUMENTS))
+@kernel(int64(CONSTANTS, VECTOR, VECTOR, float64, boolean, float64, boolean, _SOURCE, *_RUN_ARGUMENTS))
 def run(
     p, x, carry, end, speed_drive, hold, steady, source, tolerance, scale, samples, states, forces, watch, addresses,
     gaps, found, start_energy, max_steps,
@@ -712,31 +725,31 @@ def run(
 
 
 @njit(error_model="numpy")
-def _constants(row):  # type: ignore[no-untyped-def]
-    return Constants(*to_fixed_tuple(row, _N_CONSTANTS))
+def constants(row):  # type: ignore[no-untyped-def]
+    return Constants(*to_fixed_tuple(row, N_CONSTANTS))
 
 
-@_compile(
+@kernel(
     types.void(
-        _MATRIX,  # parameters
-        _MATRIX,  # starts
-        _VECTOR,  # energies
+        MATRIX,  # parameters
+        MATRIX,  # starts
+        VECTOR,  # energies
         float64,  # end
         boolean,  # speed_drive
         float64,  # hold
         boolean[::1],  # steady
         int64[:, ::1],  # sizes
-        _MATRIX,  # breaks
+        MATRIX,  # breaks
         float64[:, :, :, ::1],  # coefficients
-        _CUBE,  # harmonics
-        _MATRIX,  # laws
+        CUBE,  # harmonics
+        MATRIX,  # laws
         _ADDRESSES,  # functions
         float64,  # tolerance
-        _MATRIX,  # scales
-        _VECTOR,  # samples
-        _CUBE,  # states
-        _CUBE,  # forces
-        _MATRIX,  # carries
+        MATRIX,  # scales
+        VECTOR,  # samples
+        CUBE,  # states
+        CUBE,  # forces
+        MATRIX,  # carries
         int64[::1],  # status
         int64,  # max_steps
     )
@@ -754,12 +767,12 @@ def run_many(
         pieces, waves = sizes[i]
         source = Source(breaks[i, : pieces + 1], coefficients[i, :pieces], harmonics[i, :waves], laws[i], functions)
         status[i] = _run(
-            _constants(parameters[i]), starts[i], carries[i], end, speed_drive, hold, steady[i], source, tolerance,
+            constants(parameters[i]), starts[i], carries[i], end, speed_drive, hold, steady[i], source, tolerance,
             scales[i], samples, states[i], forces[i], watch, addresses, gaps, found, energies[i], max_steps,
         )  # fmt: skip
 
 
-@_compile(types.void(_CONSTANTS, _MATRIX, _MATRIX, float64, _MATRIX))
+@kernel(types.void(CONSTANTS, MATRIX, MATRIX, float64, MATRIX))
 def outputs(p, states, forces, start_energy, out):  # type: ignore[no-untyped-def]
     """All real outputs of the contract for rows of states and inputs: ``out`` has shape (n, 27)."""
     for i in range(states.shape[0]):
@@ -769,7 +782,7 @@ def outputs(p, states, forces, start_energy, out):  # type: ignore[no-untyped-de
             out[i, j] = row[j]
 
 
-@_compile(types.void(_CONSTANTS, _MATRIX, _MATRIX, _MATRIX))
+@kernel(types.void(CONSTANTS, MATRIX, MATRIX, MATRIX))
 def derivatives(p, states, forces, out):  # type: ignore[no-untyped-def]
     """Right-hand side for rows of states and inputs: the bare cost of an evaluation, for the benchmark."""
     for i in range(states.shape[0]):
@@ -777,6 +790,3 @@ def derivatives(p, states, forces, out):  # type: ignore[no-untyped-def]
         row = dynamics.derivative(_tuple(states[i]), Inputs(u[0], u[1], u[2], u[3], u[4], u[5]), p)
         for j in range(_N):
             out[i, j] = row[j]
-
-
-numba.config.CACHE_DIR = _saved_folder

@@ -1,0 +1,425 @@
+"""Branches of periodic motions: how an orbit changes with a parameter, where it loses its stability, and what branches off.
+
+The parameter is the speed, the torque, a force, any parameter of the FMI contract, or whatever a function of one number
+says. A branch is followed by arclength, past its folds; between its points are located where a Floquet multiplier crosses the
+unit circle: at +1 (fold), at -1 (period doubling), or as a complex pair (torus). From a period doubling one switches to the
+motion of twice the period.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from math import pi
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from linkwork.errors import InputError
+from linkwork.five_bar.parameters import Constants, FiveBarParameters, field_name, fmi_name
+from linkwork.five_bar.variables import INPUTS, PARAMETERS
+
+from . import io, orbit_kernels
+from .continuation import Curve, Evaluation, Follower, Point, Settings
+from .floquet import TOLERANCE, Crossing, Stability
+from .orbits import INTEGRATOR_TOLERANCE, Drive, OrbitError, PeriodicOrbit, Turn, failure, scale_of
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+#: Parameters of the drive that can vary, by FMI name.
+OF_THE_DRIVE: Mapping[str, str] = {
+    "drive.speed": "speed",
+    "drive.torque": "torque",
+    "slider.force": "slider_force",
+    "load.fx": "load_x",
+    "load.fy": "load_y",
+}
+#: Relative step of the difference by which the constants are differentiated with respect to the parameter. The constants
+#: are smooth functions of it, most of them linear, and the derivative steers Newton's method only.
+_DIFFERENCE = 1e-6
+#: Distance from a period doubling at which the doubled branch is begun, relative to the crank's length.
+_SWITCH = 2e-3
+
+_UNITS = {variable.name: variable.unit for variable in (*PARAMETERS, *INPUTS)}
+
+#: A branch is left where the links come this close to collinear (least |sin| of the transmission angle), or where its
+#: largest multiplier passes the greatest that single shooting follows with certainty.
+LEAST_SINE, GREATEST_MULTIPLIER = 0.02, 1e4
+
+#: What varies: an FMI name, or a function of one number.
+Vary = str | Callable[[float], tuple[FiveBarParameters, Drive]]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Family:
+    """Periodic motions of a mechanism as one parameter varies.
+
+    Attributes
+    ----------
+    parameters : FiveBarParameters
+    drive : Drive
+    vary : str or callable
+        ``drive.speed``, ``drive.torque``, ``slider.force``, ``load.fx``, ``load.fy``, a parameter of the FMI contract such as
+        ``slider.damping``, or a function from a number to (FiveBarParameters, Drive).
+    name, unit : str
+        Of the parameter, for tables and plots; they follow from an FMI name.
+
+    Raises
+    ------
+    InputError
+        If there is nothing of that name, or it does not act in this drive.
+    """
+
+    parameters: FiveBarParameters
+    drive: Drive
+    vary: Vary = "drive.speed"
+    name: str = ""
+    unit: str = ""
+
+    def __post_init__(self) -> None:
+        if callable(self.vary):
+            object.__setattr__(self, "name", self.name or "parameter")
+            return
+        known = [fmi_name(field) for field in FiveBarParameters.__dataclass_fields__ if field != "assembly_branch"]
+        if self.vary not in OF_THE_DRIVE and self.vary not in known:
+            raise InputError(
+                f"{self.vary!r} cannot vary: it must be one of {', '.join([*OF_THE_DRIVE, *known])}, or a function"
+            )
+        if (self.vary == "drive.speed") != self.drive.speed_drive and self.vary in ("drive.speed", "drive.torque"):
+            raise InputError(
+                f"{self.vary} cannot vary: the drive is by {'speed' if self.drive.speed_drive else 'torque'}"
+            )
+        object.__setattr__(self, "name", self.name or self.vary)
+        object.__setattr__(self, "unit", self.unit or _UNITS[self.vary])
+
+    def at(self, value: float) -> tuple[FiveBarParameters, Drive]:
+        """Mechanism and drive at a value of the parameter."""
+        if callable(self.vary):
+            return self.vary(value)
+        if self.vary in OF_THE_DRIVE:
+            return self.parameters, replace(self.drive, **{OF_THE_DRIVE[self.vary]: value})  # type: ignore[arg-type]
+        return replace(self.parameters, **{field_name(self.vary): value}), self.drive  # type: ignore[arg-type]
+
+    def _direction(self, value: float, reach: float) -> tuple[NDArray[np.float64], Constants]:
+        """Derivatives of drive vector and constants with respect to the parameter, whose range is ``reach``."""
+        step = _DIFFERENCE * max(abs(value), 1e-3 * reach)
+        (p0, d0), (p1, d1) = self.at(value - step), self.at(value + step)
+        return (
+            (d1.vector() - d0.vector()) / (2.0 * step),
+            Constants(*((b - a) / (2.0 * step) for a, b in zip(p0.constants(), p1.constants()))),
+        )
+
+    def evaluate(self, turns: int, reach: float) -> Callable[[NDArray[np.float64], float], Evaluation]:
+        """y(T) - y(0) with its derivatives, as `continuation` follows it; its data are the `PeriodicOrbit`."""
+
+        def evaluation(y: NDArray[np.float64], value: float) -> Evaluation:
+            parameters, drive = self.at(value)
+            d_drive, d_p = self._direction(value, reach)
+            n = drive.size
+            z = np.zeros(n * (2 + n))
+            z[:n] = y
+            scale = scale_of(parameters, drive, y)
+            status = orbit_kernels.period(
+                drive.speed_drive,
+                parameters.constants(),
+                drive.vector(),
+                d_drive,
+                d_p,
+                2.0 * pi * turns,
+                INTEGRATOR_TOLERANCE,
+                scale,
+                reach,
+                z,
+                np.array([0.1, 0.0]),
+            )
+            if status != orbit_kernels.DONE:
+                raise failure(status, y)
+            residual = z[:n] - y
+            monodromy = z[n : n + n * n].reshape(n, n).T.copy()
+            orbit = PeriodicOrbit(
+                parameters=parameters,
+                drive=drive,
+                turns=turns,
+                start=y.copy(),
+                monodromy=monodromy,
+                residual=float(np.abs(residual / scale).max()),
+                iterations=1,
+            )
+            return Evaluation(residual, monodromy - np.eye(n), z[n + n * n :].copy(), orbit)
+
+        return evaluation
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class SpecialPoint:
+    """Where a multiplier crosses the unit circle on a branch.
+
+    Attributes
+    ----------
+    kind : Crossing
+        FOLD, PERIOD_DOUBLING or TORUS.
+    parameter : float
+    orbit : PeriodicOrbit
+    after : int
+        Number of the branch's point after which it lies.
+    """
+
+    kind: Crossing
+    parameter: float
+    orbit: PeriodicOrbit
+    after: int
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Branch:
+    """Orbits along a curve, in its order.
+
+    Attributes
+    ----------
+    family : Family
+    turns : int
+        Turns of the crank in a period.
+    parameter : ndarray, shape (m,)
+    orbits : tuple of PeriodicOrbit
+    special : tuple of SpecialPoint
+    reached, closed : bool
+        Whether it ended at an end of the range or where it began; where it began.
+    reason : str
+        Why it ended. Where the branch was lost, the last point is the last good one.
+    """
+
+    family: Family
+    turns: int
+    parameter: NDArray[np.float64]
+    orbits: tuple[PeriodicOrbit, ...]
+    special: tuple[SpecialPoint, ...]
+    reached: bool
+    closed: bool
+    reason: str
+
+    def __len__(self) -> int:
+        return len(self.orbits)
+
+    @property
+    def amplitude(self) -> NDArray[np.float64]:
+        """Half the range of the slider position at each point (m), shape (m,)."""
+        return np.array([orbit.amplitude for orbit in self.orbits])
+
+    @property
+    def largest_multiplier(self) -> NDArray[np.float64]:
+        """Largest modulus of the Floquet multipliers at each point, shape (m,)."""
+        return np.array([orbit.largest for orbit in self.orbits])
+
+    def stability(self, tolerance: float = TOLERANCE) -> tuple[Stability, ...]:
+        """Verdict at each point."""
+        return tuple(orbit.verdict(tolerance).stability for orbit in self.orbits)
+
+    def turns_of(self, samples: int = 256) -> list[Turn]:
+        """One period of each orbit."""
+        return [orbit.turn(samples) for orbit in self.orbits]
+
+    def columns(self, orders: Sequence[float] = (1, 2, 3)) -> dict[str, NDArray[np.float64]]:
+        """What varies along the branch, by name with unit: amplitude, mean, harmonics, multiplier, torque, pin forces."""
+        turns = self.turns_of()
+        unit = f" [{self.family.unit}]" if self.family.unit else ""
+        columns = {f"{self.family.name}{unit}": self.parameter}
+        if not self.orbits[0].drive.speed_drive:
+            columns["mean crank speed [rad/s]"] = np.array([2.0 * pi * t.turns / t.period for t in turns])
+        columns |= {
+            "turns in a period [1]": np.full(len(self), float(self.turns)),
+            "amplitude of u [m]": self.amplitude,
+            "mean of u [m]": np.array([turn["slider.position"].mean() for turn in turns]),
+        }
+        for order in orders:
+            columns[f"harmonic {order:g} of u [m]"] = np.array([t.harmonic("slider.position", order) for t in turns])
+        columns |= {
+            "largest multiplier [1]": self.largest_multiplier,
+            "stable (1), marginal (0), unstable (-1)": np.array([_SIGN[s] for s in self.stability()]),
+            "mean crank torque [N.m]": np.array([t["drive.applied_torque"].mean() for t in turns]),
+            "greatest crank torque [N.m]": np.array([np.abs(t["drive.applied_torque"]).max() for t in turns]),
+        }
+        for pin in "ABCD":
+            columns[f"greatest force in pin {pin} [N]"] = np.array(
+                [np.hypot(t[f"pin.{pin}.fx"], t[f"pin.{pin}.fy"]).max() for t in turns]
+            )
+        columns["greatest guide force [N]"] = np.array([np.abs(t["slider.guide_force"]).max() for t in turns])
+        columns["least sine of the transmission angle [1]"] = np.array(
+            [np.abs(np.sin(t["transmission.angle"])).min() for t in turns]
+        )
+        return columns
+
+    def to_csv(self, path: str | Path) -> Path:
+        """Write the branch as a table, a row a point; see `columns`."""
+        return io.write_csv(path, self.columns())
+
+    def plot(self, *, title: str = "") -> Figure:
+        """Amplitude over the parameter, stable parts solid, with its special points."""
+        from . import figures
+
+        return figures.plot_branches([self], title=title)
+
+
+_SIGN = {Stability.STABLE: 1.0, Stability.MARGINAL: 0.0, Stability.UNSTABLE: -1.0}
+
+
+def follow(
+    family: Family,
+    orbit: PeriodicOrbit,
+    value: float,
+    *,
+    low: float,
+    high: float,
+    direction: int = 1,
+    first: float = 5e-3,
+    greatest: float = 2e-2,
+    most_points: int = 5000,
+    watch: Callable[[float], None] | None = None,
+) -> Branch:
+    """Follow the branch through an orbit to an end of the range of the parameter.
+
+    Parameters
+    ----------
+    family : Family
+    orbit : PeriodicOrbit
+        At the value of the parameter.
+    value : float
+        Where to begin, from ``low`` to ``high``.
+    low, high : float
+        Range of the parameter.
+    direction : int
+        +1 to higher values at first, -1 to lower.
+    first, greatest : float
+        Steps in scaled arc length: the range has length 1, and the crank's length counts as 1.
+    most_points : int
+    watch : callable, optional
+        Told the parameter of every point.
+
+    Returns
+    -------
+    Branch
+        As far as it could be followed; ``reason`` says why it ended.
+
+    Raises
+    ------
+    ContinuationError
+        If the orbit is not on the family.
+    """
+    settings = Settings(low=low, high=high, first=first, greatest=greatest, most_points=most_points)
+    follower = _follower(family, orbit, settings)
+    return _branch(family, orbit.turns, follower, follower.start(orbit.start, value, direction), watch)
+
+
+def switch(
+    family: Family,
+    doubling: SpecialPoint,
+    *,
+    low: float,
+    high: float,
+    first: float = 5e-3,
+    greatest: float = 2e-2,
+    most_points: int = 5000,
+    watch: Callable[[float], None] | None = None,
+) -> Branch:
+    """The branch of twice the period that leaves a branch at a period doubling.
+
+    Raises
+    ------
+    InputError
+        If the point is no period doubling.
+    ContinuationError
+        If no point on the new branch is found.
+    """
+    if doubling.kind is not Crossing.PERIOD_DOUBLING:
+        raise InputError(
+            f"the point at {doubling.parameter:.9g} is a {doubling.kind.value}: only a period doubling has a branch"
+        )
+    orbit = doubling.orbit
+    settings = Settings(low=low, high=high, first=first, greatest=greatest, most_points=most_points)
+    doubled = replace(orbit, turns=2 * orbit.turns, monodromy=orbit.monodromy @ orbit.monodromy)
+    follower = _follower(family, doubled, settings)
+    # the eigenvector of the multiplier -1 is the direction in which every second period differs
+    scale = follower.scale[:-1]
+    scaled = (orbit.monodromy + np.eye(len(scale))) * scale / scale[:, None]
+    vector = np.linalg.svd(scaled)[2][-1] * scale
+    base = follower.along(orbit.start, doubling.parameter, np.append(vector, 0.0))
+    for length in (_SWITCH, 4.0 * _SWITCH, 0.25 * _SWITCH, 16.0 * _SWITCH):
+        taken = follower.step(base, length)
+        # back on the undoubled branch the start repeats itself after half the period
+        if (
+            taken is not None
+            and abs(float((taken[0].y / scale - orbit.start / scale) @ (vector / scale))) > 0.5 * length
+        ):
+            return _branch(family, doubled.turns, follower, taken[0], watch)
+    raise _no_switch(doubling)
+
+
+def _no_switch(doubling: SpecialPoint) -> OrbitError:
+    return OrbitError(f"the doubled branch at {doubling.parameter:.9g} is not met", doubling.orbit.start, np.inf, 0)
+
+
+def _follower(family: Family, orbit: PeriodicOrbit, settings: Settings) -> Follower:
+    ends = [family.at(value) for value in (settings.low, settings.high)]
+    scale = np.max([scale_of(parameters, drive, orbit.start) for parameters, drive in ends], axis=0)
+    return Follower(family.evaluate(orbit.turns, settings.high - settings.low), scale, settings)
+
+
+def _leave(point: Point) -> str:
+    """Why a branch is not followed beyond a point; empty where it is."""
+    orbit = point.data
+    if orbit.largest > GREATEST_MULTIPLIER:
+        return f"the largest multiplier passes {GREATEST_MULTIPLIER:g} at {point.parameter:.9g}"
+    sine = float(np.abs(np.sin(orbit.turn(64)["transmission.angle"])).min())
+    if sine < LEAST_SINE:
+        return (
+            f"the links come within {sine:.3g} of collinear (sine of the transmission angle) at {point.parameter:.9g}"
+        )
+    return ""
+
+
+def _branch(
+    family: Family, turns: int, follower: Follower, first: Point, watch: Callable[[float], None] | None
+) -> Branch:
+    curve = follower.follow(first, watch=None if watch is None else lambda point: watch(point.parameter), leave=_leave)
+    special = _special_points(curve, follower)
+    return Branch(
+        family=family,
+        turns=turns,
+        parameter=np.array([point.parameter for point in curve.points]),
+        orbits=tuple(point.data for point in curve.points),
+        special=tuple(special),
+        reached=curve.reached,
+        closed=curve.closed,
+        reason=curve.reason,
+    )
+
+
+def _tests(point: Point) -> dict[Crossing, float]:
+    """Functions along a branch that are zero where a multiplier crosses the unit circle."""
+    monodromy = point.data.monodromy
+    n = len(monodromy)
+    mu = point.data.multipliers
+    pairs = [mu[i] * mu[j] - 1.0 for i in range(n) for j in range(i)]
+    return {
+        # det(M - 1) is zero where a branch is crossed as well; the parameter turns back at a fold only
+        Crossing.FOLD: float(point.tangent[-1]),
+        Crossing.PERIOD_DOUBLING: float(np.linalg.det(monodromy + np.eye(n))),
+        Crossing.TORUS: float(np.prod(pairs).real),
+    }
+
+
+def _special_points(curve: Curve, follower: Follower) -> list[SpecialPoint]:
+    found: list[tuple[int, float, SpecialPoint]] = []
+    values = [_tests(point) for point in curve.points]
+    for i, length in enumerate(curve.steps):
+        for kind in Crossing:
+            if not values[i][kind] * values[i + 1][kind] < 0.0:
+                continue
+            point, s = follower.locate(curve.points[i], length, lambda p, kind=kind: _tests(p)[kind])  # type: ignore[misc]
+            # a real pair with the product 1 is no torus
+            if kind is Crossing.TORUS and abs(point.data.multipliers[0].imag) < 1e-6:
+                continue
+            found.append((i, s, SpecialPoint(kind=kind, parameter=point.parameter, orbit=point.data, after=i)))
+    return [special for _, _, special in sorted(found, key=lambda entry: entry[:2])]

@@ -1,0 +1,99 @@
+"""Branches of periodic motions over a parameter."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import matplotlib
+import numpy as np
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from linkwork.five_bar.published import CM_PER_METRE, RAD_S_PER_RPM
+
+from .style import COLOURS, STYLE, finish
+
+if TYPE_CHECKING:
+    from ..branches import Branch
+
+#: Signs of the points at which a multiplier crosses the unit circle, by the kind's value.
+_MARKERS = {"fold": "s", "period doubling": "D", "torus": "^"}
+
+
+def plot_branches(branches: Sequence[Branch], *, title: str = "", rpm: bool = False) -> Figure:
+    """Amplitude, crank torque and pin force along branches: stable parts solid, unstable ones dashed.
+
+    Parameters
+    ----------
+    branches : sequence of Branch
+        Of one family.
+    title : str
+    rpm : bool
+        Whether a speed in rad/s is shown in rpm.
+    """
+    family = branches[0].family
+    factor = 1.0 / RAD_S_PER_RPM if rpm else 1.0
+    unit = "rpm" if rpm else family.unit
+    with matplotlib.rc_context(STYLE):
+        figure = Figure(figsize=(7.2, 7.6))
+        axes = figure.subplots(3, 1, sharex=True, height_ratios=(2.2, 1.0, 1.0))
+        for number, branch in enumerate(branches):
+            table = branch.columns(orders=())
+            stable = table["stable (1), marginal (0), unstable (-1)"] > 0.0
+            x = factor * branch.parameter
+            rows = (
+                CM_PER_METRE * table["amplitude of u [m]"],
+                table["greatest crank torque [N.m]"],
+                np.max([table[f"greatest force in pin {pin} [N]"] for pin in "ABCD"], axis=0),
+            )
+            for axis, y in zip(axes, rows):
+                for part, line in ((stable, "-"), (~stable, "--")):
+                    # a part reaches to the first point of the next, so that there is no gap between them
+                    wide = part | np.append(part[1:], False) & ~part if line == "--" else part
+                    axis.plot(x, np.where(wide, y, np.nan), line, color=COLOURS[number % len(COLOURS)])
+            for special in branch.special:
+                axes[0].plot(
+                    factor * special.parameter,
+                    CM_PER_METRE * special.orbit.amplitude,
+                    _MARKERS[special.kind.value],
+                    color="black",
+                    markersize=4.5,
+                    markerfacecolor="white",
+                    zorder=4,
+                )
+        axes[0].set_ylabel("amplitude of u [cm]")
+        axes[1].set_ylabel("greatest crank\ntorque [N.m]")
+        axes[2].set_ylabel("greatest\npin force [N]")
+        axes[2].set_xlabel(f"{family.name} [{unit}]" if unit else family.name)
+        for axis in axes[1:]:
+            axis.set_yscale("log")
+        axes[0].legend(handles=_legend(branches), fontsize=8)
+        figure.align_ylabels()
+        if title:
+            figure.suptitle(title, fontsize=10.5, fontweight="bold")
+        return finish(figure)
+
+
+def _legend(branches: Sequence[Branch]) -> list[Line2D]:
+    handles = [
+        Line2D([], [], color=COLOURS[i % len(COLOURS)], label=_name(branch)) for i, branch in enumerate(branches)
+    ]
+    handles += [
+        Line2D([], [], color="0.3", linestyle="-", label="stable"),
+        Line2D([], [], color="0.3", linestyle="--", label="unstable"),
+    ]
+    kinds = {special.kind.value for branch in branches for special in branch.special}
+    return handles + [
+        Line2D(
+            [], [], color="black", linestyle="none", marker=marker, markersize=4.5, markerfacecolor="white", label=kind
+        )
+        for kind, marker in _MARKERS.items()
+        if kind in kinds
+    ]
+
+
+def _name(branch: Branch) -> str:
+    if branch.turns > 1:
+        return f"period of {branch.turns} turns"
+    return f"period of one turn, from the {'low' if branch.parameter[0] < branch.parameter[-1] else 'high'} end"
