@@ -17,14 +17,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from linkwork.errors import InputError
+from linkwork.errors import InputError, ParameterError
 from linkwork.five_bar.parameters import Constants, FiveBarParameters, field_name, fmi_name
+from linkwork.five_bar.published import RAD_S_PER_RPM
 from linkwork.five_bar.variables import INPUTS, PARAMETERS
 
 from . import io, orbit_kernels
-from .continuation import Curve, Evaluation, Follower, Point, Settings
+from .continuation import ContinuationError, Curve, Evaluation, Follower, Point, Settings
 from .floquet import TOLERANCE, Crossing, Stability
-from .orbits import INTEGRATOR_TOLERANCE, Drive, OrbitError, PeriodicOrbit, Turn, failure, scale_of
+from .orbits import INTEGRATOR_TOLERANCE, Drive, PeriodicOrbit, Turn, failure, scale_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -103,13 +104,26 @@ class Family:
             return self.parameters, replace(self.drive, **{OF_THE_DRIVE[self.vary]: value})  # type: ignore[arg-type]
         return replace(self.parameters, **{field_name(self.vary): value}), self.drive  # type: ignore[arg-type]
 
+    def tell(self, value: float) -> str:
+        """A value of the parameter in words, with its unit; speeds in rpm too."""
+        rpm = f" ({value / RAD_S_PER_RPM:.6g} rpm)" if self.unit == "rad/s" else ""
+        return f"{self.name} = {value:.6g} {self.unit}".rstrip() + rpm
+
     def _direction(self, value: float, reach: float) -> tuple[NDArray[np.float64], Constants]:
         """Derivatives of drive vector and constants with respect to the parameter, whose range is ``reach``."""
         step = _DIFFERENCE * max(abs(value), 1e-3 * reach)
-        (p0, d0), (p1, d1) = self.at(value - step), self.at(value + step)
+        below = value - step
+        try:
+            p0, d0 = self.at(below)
+        except (ParameterError, InputError):
+            # the least value that there may be, such as no friction
+            below = value
+            p0, d0 = self.at(below)
+        p1, d1 = self.at(value + step)
+        width = value + step - below
         return (
-            (d1.vector() - d0.vector()) / (2.0 * step),
-            Constants(*((b - a) / (2.0 * step) for a, b in zip(p0.constants(), p1.constants()))),
+            (d1.vector() - d0.vector()) / width,
+            Constants(*((b - a) / width for a, b in zip(p0.constants(), p1.constants()))),
         )
 
     def evaluate(self, turns: int, reach: float) -> Callable[[NDArray[np.float64], float], Evaluation]:
@@ -188,7 +202,7 @@ class Branch:
     reached, closed : bool
         Whether it ended at an end of the range or where it began; where it began.
     reason : str
-        Why it ended. Where the branch was lost, the last point is the last good one.
+        Why it ended. Where the branch was lost, its last point is the last good one.
     """
 
     family: Family
@@ -353,11 +367,7 @@ def switch(
             and abs(float((taken[0].y / scale - orbit.start / scale) @ (vector / scale))) > 0.5 * length
         ):
             return _branch(family, doubled.turns, follower, taken[0], watch)
-    raise _no_switch(doubling)
-
-
-def _no_switch(doubling: SpecialPoint) -> OrbitError:
-    return OrbitError(f"the doubled branch at {doubling.parameter:.9g} is not met", doubling.orbit.start, np.inf, 0)
+    raise ContinuationError(f"the motion of twice the period is not met next to {family.tell(doubling.parameter)}")
 
 
 def _follower(family: Family, orbit: PeriodicOrbit, settings: Settings) -> Follower:
@@ -370,12 +380,10 @@ def _leave(point: Point) -> str:
     """Why a branch is not followed beyond a point; empty where it is."""
     orbit = point.data
     if orbit.largest > GREATEST_MULTIPLIER:
-        return f"the largest multiplier passes {GREATEST_MULTIPLIER:g} at {point.parameter:.9g}"
+        return f"its largest multiplier passes {GREATEST_MULTIPLIER:g}"
     sine = float(np.abs(np.sin(orbit.turn(64)["transmission.angle"])).min())
     if sine < LEAST_SINE:
-        return (
-            f"the links come within {sine:.3g} of collinear (sine of the transmission angle) at {point.parameter:.9g}"
-        )
+        return f"the links come near to collinear (sine of the transmission angle {sine:.3g})"
     return ""
 
 

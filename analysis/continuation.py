@@ -205,7 +205,7 @@ class Follower:
                 why = taken
                 length *= SHRINKAGE
                 if length < settings.least:
-                    return self._curve(points, steps, reason=f"the continuation stalls at {last.parameter:.9g}: {why}")
+                    return self._curve(points, steps, reason=f"the continuation stalls: {why}")
                 continue
             point, count = taken
             if not settings.low <= point.parameter <= settings.high:
@@ -215,7 +215,7 @@ class Follower:
                 steps.append(length)
                 if watch:
                     watch(point)
-                return self._curve(points, steps, reached=True, reason=f"the end of the range, {end:.9g}, is reached")
+                return self._curve(points, steps, reached=True, reason="the end of the range is reached")
             points.append(point)
             steps.append(length)
             if watch:

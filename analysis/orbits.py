@@ -281,14 +281,12 @@ class PeriodicOrbit:
 
         It does not use the variational equations, and so checks them.
         """
-        flow = orbit_kernels.flow(self.drive.speed_drive, False)
+        flow = orbit_kernels.flow(self.drive.speed_drive, False).map(samples)
         turn = self.turn(samples)
         n = self.drive.size
-        p, drive = list(self.parameters.constants()), self.drive.vector()
-        traces = []
-        for th2, u, w2, v, _, _ in turn.states:
-            y = [u, v, w2][:n]
-            traces.append(float(np.trace(np.asarray(flow(th2, y, drive, p)[1]))))
+        y = turn.states[:, [1, 3, 2][:n]].T
+        jacobians = flow(turn.angle[None, :], y, self.drive.vector(), list(self.parameters.constants()))[1]
+        traces = np.trace(np.asarray(jacobians).reshape(n, samples, n), axis1=0, axis2=2)
         return liouville(traces, 2.0 * pi * self.turns)
 
 

@@ -8,8 +8,8 @@ mean effective mass. The approximations by harmonic balance are in `analysis.har
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from math import sqrt
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -17,18 +17,19 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import minimize_scalar
+from scipy.signal import find_peaks
 
 from linkwork.errors import InputError, ParameterError
 from linkwork.five_bar.parameters import FiveBarParameters
-from linkwork.five_bar.published import RAD_S_PER_RPM
 
 from . import io, orbit_kernels
 from .branches import Branch, Family, follow, switch
 from .continuation import ContinuationError
 from .floquet import Crossing, Stability
+from .harmonic_balance import harmonic_balance
 from .orbits import Drive, OrbitError, PeriodicOrbit, orbit_of, scale_of
 from .simulate import shown
-from .slider_equation import mean_effective_mass
+from .slider_equation import Variant, mean_effective_mass, slider_equation
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -37,6 +38,8 @@ if TYPE_CHECKING:
 JUMP_TURNS, SETTLED = 5000, 1e-9
 #: Periods, in turns, that a steady motion is looked for with.
 PERIODS = (1, 2, 3, 4)
+#: How far a maximum of the amplitude stands out, relative to its height, to count as one.
+PROMINENCE = 1e-3
 #: Distance of two orbits' starts, relative to crank length and speed, below which they are the same.
 SAME = 1e-6
 
@@ -126,11 +129,12 @@ class Response:
         columns |= {name: np.concatenate([table[name] for table in tables]) for name in tables[0]}
         return io.write_csv(path, columns)
 
-    def plot(self, *, title: str = "", rpm: bool = False) -> Figure:
-        """Amplitude over the parameter; see `analysis.figures.plot_branches`."""
+    def plot(self, *, title: str = "", rpm: bool = False, beside: Approximations | None = None) -> Figure:
+        """Amplitude, crank torque and pin force over the parameter; see `analysis.figures.plot_branches`."""
         from . import figures
 
-        return figures.plot_branches(self.branches, title=title, rpm=rpm)
+        others = {} if beside is None else {name: (beside.speed, a) for name, a in beside.amplitudes.items()}
+        return figures.plot_branches(self.branches, title=title, rpm=rpm, beside=others)
 
 
 def frequency_response(
@@ -207,7 +211,7 @@ def frequency_response(
                 orbit = orbit_of(at, driven, start=guess)
             except OrbitError as error:
                 failures.append(error)
-                problems.append(f"at {value:.6g}: {error}")
+                problems.append(f"at {family.tell(value)}: {error}")
                 continue
             if any(_passes(branch, value, orbit) for branch in branches):
                 continue
@@ -216,7 +220,7 @@ def frequency_response(
             )
             branches.append(branch)
             if not branch.reached:
-                problems.append(f"the branch from {value:.6g} ends early: {branch.reason}")
+                problems.append(_lost(branch))
     if not branches:
         raise failures[0]
     if doubled:
@@ -240,12 +244,20 @@ def _double(
         try:
             branch = switch(family, special, low=low, high=high, greatest=greatest_step)
         except (OrbitError, ContinuationError) as error:
-            problems.append(f"the branch of twice the period at {special.parameter:.6g} is not followed: {error}")
+            problems.append(
+                f"the branch of twice the period at {family.tell(special.parameter)} is not followed: {error}"
+            )
             continue
         branches.append(branch)
         ends.append((float(branch.parameter[-1]), branch.orbits[-1].start))
         if not branch.reached:
-            problems.append(f"the branch of twice the period from {special.parameter:.6g} ends: {branch.reason}")
+            problems.append(_lost(branch))
+
+
+def _lost(branch: Branch) -> str:
+    first, last = (branch.family.tell(float(branch.parameter[i])) for i in (0, -1))
+    period = "" if branch.turns == 1 else f"with a period of {branch.turns} turns "
+    return f"the branch {period}from {first} is followed to {last} only: {branch.reason}"
 
 
 def _passes(branch: Branch, value: float, orbit: PeriodicOrbit) -> bool:
@@ -264,9 +276,10 @@ def extrema(branch: Branch, sign: int = 1) -> tuple[Extremum, ...]:
     The place is found by Brent's method on the orbits at fixed parameters, to 1e-6 of the parameter.
     """
     amplitude = sign * branch.amplitude
+    peaks, properties = find_peaks(amplitude, prominence=0.0)
     found = []
-    for i in range(1, len(branch) - 1):
-        if not (amplitude[i] > amplitude[i - 1] and amplitude[i] >= amplitude[i + 1]):
+    for i, prominence in zip(peaks.tolist(), properties["prominences"].tolist()):
+        if prominence < PROMINENCE * abs(amplitude[i]):
             continue
         a, c = sorted((float(branch.parameter[i - 1]), float(branch.parameter[i + 1])))
         # at a fold the parameter turns back, and the greatest amplitude of the neighbours stands
@@ -444,6 +457,64 @@ def _settled(
     raise OrbitError(f"no steady motion with a period of 1 to 4 turns after {JUMP_TURNS} turns", start, np.inf, 0)
 
 
-def to_rpm(speed: ArrayLike) -> NDArray[np.float64]:
-    """rad/s as rpm, for tables and plots."""
-    return np.asarray(speed, dtype=float) / RAD_S_PER_RPM
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Approximations:
+    """Amplitudes by the classical approximations over the speed, from the linear equation about u = 0.
+
+    Attributes
+    ----------
+    parameters : FiveBarParameters
+        Without Coulomb friction, which a linear equation cannot hold.
+    speed : ndarray, shape (m,)
+        rad/s.
+    amplitudes : mapping
+        Half the range of u (m) by the name of the approximation, each of shape (m,).
+    """
+
+    parameters: FiveBarParameters
+    speed: NDArray[np.float64]
+    amplitudes: Mapping[str, NDArray[np.float64]]
+
+    def at(self, speed: float) -> dict[str, float]:
+        """The approximations at a speed (rad/s), not interpolated."""
+        return _approximate(self.parameters, speed)
+
+    def columns(self) -> dict[str, NDArray[np.float64]]:
+        """As a table, by name with unit."""
+        return {"drive.speed [rad/s]": self.speed} | {f"{name} [m]": v for name, v in self.amplitudes.items()}
+
+
+def approximations(response: Response, points: int = 400) -> Approximations:
+    """The classical approximations over the range of a response: two harmonics as printed and put right, and ten harmonics.
+
+    Raises
+    ------
+    InputError
+        If it is not the speed that varies.
+    """
+    if response.family.vary != "drive.speed":
+        raise InputError(f"{response.family.name} varies: the approximations are over the speed")
+    parameters = replace(response.family.parameters, slider_coulomb_friction=0.0)
+    speeds = np.linspace(response.low, response.high, points)
+    rows = [_approximate(parameters, speed) for speed in speeds.tolist()]
+    return Approximations(
+        parameters=parameters,
+        speed=speeds,
+        amplitudes={name: np.array([row[name] for row in rows]) for name in rows[0]},
+    )
+
+
+#: Approximations by name: variant of the linear equation and harmonics balanced.
+_APPROXIMATIONS = {
+    "two harmonics, printed (4.21)": (Variant.PRINTED, 2),
+    "two harmonics": (Variant.SECOND_ORDER, 2),
+    "ten harmonics": (Variant.EXACT, 10),
+}
+
+
+def _approximate(parameters: FiveBarParameters, speed: float) -> dict[str, float]:
+    return {
+        name: parameters.rocker_length
+        * harmonic_balance(slider_equation(parameters, speed, variant=variant), order).amplitude
+        for name, (variant, order) in _APPROXIMATIONS.items()
+    }

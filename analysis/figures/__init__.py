@@ -2,19 +2,27 @@
 
 from __future__ import annotations
 
+from .charts import HeatMap, plot_charts
+from .control import plot_bode, plot_poles
 from .curves import Curve, Panel, plot_comparison, plot_curves, plot_outputs
 from .linkage import animate_linkage, draw_linkage, icon
+from .response import plot_branches
 from .style import COLOURS, STYLE
 
 __all__ = [
     "COLOURS",
     "STYLE",
     "Curve",
+    "HeatMap",
     "Panel",
     "animate_linkage",
     "draw_linkage",
     "icon",
+    "plot_bode",
+    "plot_branches",
+    "plot_charts",
     "plot_comparison",
     "plot_curves",
     "plot_outputs",
+    "plot_poles",
 ]

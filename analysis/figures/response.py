@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
 
 import matplotlib
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+from numpy.typing import NDArray
 
 from linkwork.five_bar.published import CM_PER_METRE, RAD_S_PER_RPM
 
@@ -17,11 +18,19 @@ from .style import COLOURS, STYLE, finish
 if TYPE_CHECKING:
     from ..branches import Branch
 
+#: Lines of the approximations beside.
+_LINES: tuple[Any, ...] = ("-.", ":", (0, (5, 1)))
 #: Signs of the points at which a multiplier crosses the unit circle, by the kind's value.
 _MARKERS = {"fold": "s", "period doubling": "D", "torus": "^"}
 
 
-def plot_branches(branches: Sequence[Branch], *, title: str = "", rpm: bool = False) -> Figure:
+def plot_branches(
+    branches: Sequence[Branch],
+    *,
+    title: str = "",
+    rpm: bool = False,
+    beside: Mapping[str, tuple[NDArray[np.float64], NDArray[np.float64]]] | None = None,
+) -> Figure:
     """Amplitude, crank torque and pin force along branches: stable parts solid, unstable ones dashed.
 
     Parameters
@@ -31,6 +40,8 @@ def plot_branches(branches: Sequence[Branch], *, title: str = "", rpm: bool = Fa
     title : str
     rpm : bool
         Whether a speed in rad/s is shown in rpm.
+    beside : mapping, optional
+        Amplitudes by approximations: name to (parameter, amplitude in m), shapes (m,).
     """
     family = branches[0].family
     factor = 1.0 / RAD_S_PER_RPM if rpm else 1.0
@@ -62,26 +73,37 @@ def plot_branches(branches: Sequence[Branch], *, title: str = "", rpm: bool = Fa
                     markerfacecolor="white",
                     zorder=4,
                 )
+        others = dict(beside or {})
+        for (parameter, amplitude), line in zip(others.values(), _LINES):
+            axes[0].plot(
+                factor * parameter, CM_PER_METRE * amplitude, linestyle=line, color="0.45", linewidth=0.9, zorder=1
+            )
+        # what is linear has resonances without bound; the true motion sets the scale
+        top = max(CM_PER_METRE * float(branch.amplitude.max()) for branch in branches)
+        axes[0].set_ylim(0.0, 1.15 * top)
         axes[0].set_ylabel("amplitude of u [cm]")
         axes[1].set_ylabel("greatest crank\ntorque [N.m]")
         axes[2].set_ylabel("greatest\npin force [N]")
         axes[2].set_xlabel(f"{family.name} [{unit}]" if unit else family.name)
         for axis in axes[1:]:
             axis.set_yscale("log")
-        axes[0].legend(handles=_legend(branches), fontsize=8)
+        axes[0].legend(handles=_legend(branches, tuple(others)), fontsize=8)
         figure.align_ylabels()
         if title:
             figure.suptitle(title, fontsize=10.5, fontweight="bold")
         return finish(figure)
 
 
-def _legend(branches: Sequence[Branch]) -> list[Line2D]:
+def _legend(branches: Sequence[Branch], others: Sequence[str]) -> list[Line2D]:
     handles = [
         Line2D([], [], color=COLOURS[i % len(COLOURS)], label=_name(branch)) for i, branch in enumerate(branches)
     ]
     handles += [
         Line2D([], [], color="0.3", linestyle="-", label="stable"),
         Line2D([], [], color="0.3", linestyle="--", label="unstable"),
+    ]
+    handles += [
+        Line2D([], [], color="0.45", linestyle=line, linewidth=0.9, label=name) for name, line in zip(others, _LINES)
     ]
     kinds = {special.kind.value for branch in branches for special in branch.special}
     return handles + [

@@ -1,0 +1,87 @@
+"""What the commands share: how they speak, how they fail, and which case they are about."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Sequence
+from functools import wraps
+from pathlib import Path
+from typing import Any
+
+import click
+from rich.console import Console
+
+from linkwork.errors import LinkworkError
+
+WRONG = 1
+ENDED_EARLY = 3
+CHECK_FAILED = 4
+INTERRUPTED = 130
+
+
+#: Wide enough for the tables where the output goes to a file or a pipe.
+console = Console() if sys.stdout.isatty() else Console(width=120)
+errors = Console(stderr=True)
+
+
+def handled(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Turn the project's errors into a sentence and an exit code."""
+
+    @wraps(command)
+    def run(*arguments: Any, **options: Any) -> Any:
+        try:
+            return command(*arguments, **options)
+        except LinkworkError as error:
+            errors.print(f"error: {error}", style="red", markup=False, highlight=False, soft_wrap=True)
+            sys.exit(WRONG)
+        except OSError as error:
+            errors.print(f"error: {error.filename or 'a file'}: {error.strerror or error}", style="red", markup=False)
+            sys.exit(WRONG)
+        except KeyboardInterrupt:
+            errors.print("interrupted", style="yellow")
+            sys.exit(INTERRUPTED)
+
+    return run
+
+
+def tolerance_option(context: click.Context, parameter: click.Parameter, value: float | None) -> float | None:
+    # written so that NaN, which compares with nothing, is refused too
+    if value is not None and not 0.0 < value <= 1.0:
+        raise click.BadParameter(f"{value} is not between 0 and 1")
+    return value
+
+
+def number_or_text(text: str) -> int | float | str:
+    """A bare number on the command line is in SI; anything else is a text with its unit."""
+    for kind in (int, float):
+        try:
+            return kind(text)
+        except ValueError:
+            continue
+    return text
+
+
+def prepare_solver() -> None:
+    """Load the compiled equations, and say why it takes so long where they are compiled first."""
+    with console.status("preparing the solver: its equations are compiled once, in about twenty seconds"):
+        from .. import compiled  # noqa: F401
+
+
+def chosen_case(file: str | None, published: str | None, settings: Sequence[str]) -> Any:
+    from .. import io
+    from ..case import published_case
+
+    if (file is None) == (published is None):
+        raise click.UsageError("give either a case file or --published NAME")
+    overrides: dict[str, Any] = {}
+    for setting in settings:
+        name, equals, value = setting.partition("=")
+        if not equals:
+            raise click.UsageError(f"--set {setting!r}: it must be NAME=VALUE, such as slider.stiffness='2e6 dyn/cm'")
+        overrides[name.strip()] = number_or_text(value.strip())
+    if file is not None:
+        return io.load_case(file, overrides)
+    assert published is not None
+    if overrides:
+        return io.case_from({"published": published}, folder=Path.cwd(), title=published, overrides=overrides)
+    return published_case(published)

@@ -1,0 +1,198 @@
+"""Branches of periodic motions: special points against what defines them, switching, and how a branch ends."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from analysis.branches import Branch, Family, follow, switch
+from analysis.continuation import ContinuationError
+from analysis.floquet import Crossing, Stability
+from analysis.orbits import Drive, OrbitError, find_orbit
+from linkwork.errors import InputError
+from linkwork.five_bar.parameters import FiveBarParameters
+from linkwork.five_bar.published import RAD_S_PER_RPM, SETS, TABLE_3_1
+
+SPEED = SETS["table-3.1"].crank_speed
+RPM = RAD_S_PER_RPM
+RIG_1_B = SETS["rig-1-spring-b"].parameters
+
+
+@pytest.fixture(scope="module")
+def softened() -> Branch:
+    """Table 3.1 with the spring varied: the branch turns back at a fold."""
+    orbit = find_orbit(TABLE_3_1, speed=SPEED)
+    family = Family(parameters=TABLE_3_1, drive=orbit.drive, vary="slider.stiffness")
+    return follow(family, orbit, 1000.0, low=100.0, high=1200.0, direction=-1)
+
+
+@pytest.fixture(scope="module")
+def upper() -> Branch:
+    """Rig 1 with spring B from above: the large motion, which doubles its period."""
+    orbit = find_orbit(RIG_1_B, speed=1200.0 * RPM)
+    family = Family(parameters=RIG_1_B, drive=orbit.drive)
+    return follow(family, orbit, 1200.0 * RPM, low=850.0 * RPM, high=1300.0 * RPM, direction=-1)
+
+
+def test_every_point_is_a_periodic_orbit(softened: Branch) -> None:
+    for value, orbit in list(zip(softened.parameter, softened.orbits))[::10]:
+        again = find_orbit(replace(TABLE_3_1, slider_stiffness=value), speed=SPEED, start=orbit.start, settle=False)
+        assert again.start == pytest.approx(orbit.start, abs=1e-9)
+        assert again.largest == pytest.approx(orbit.largest, rel=1e-6)
+
+
+def test_fold_has_a_multiplier_of_one_and_no_orbit_beyond(softened: Branch) -> None:
+    assert softened.reached
+    (fold,) = softened.special
+    assert fold.kind is Crossing.FOLD
+    assert fold.orbit.multipliers[0].real == pytest.approx(1.0, abs=1e-6)
+    assert fold.parameter == pytest.approx(softened.parameter.min(), rel=1e-3)
+    with pytest.raises(OrbitError):
+        find_orbit(
+            replace(TABLE_3_1, slider_stiffness=0.999 * fold.parameter),
+            speed=SPEED,
+            start=fold.orbit.start,
+            settle=False,
+        )
+    # stable before it, unstable after it
+    words = softened.stability()
+    assert set(words[: fold.after]) == {Stability.STABLE}
+    assert set(words[fold.after + 2 :]) == {Stability.UNSTABLE}
+
+
+def test_fold_does_not_depend_on_the_steps(softened: Branch) -> None:
+    orbit = find_orbit(TABLE_3_1, speed=SPEED)
+    fine = follow(softened.family, orbit, 1000.0, low=200.0, high=1000.0, direction=-1, first=1e-3, greatest=3e-3)
+    assert fine.special[0].parameter == pytest.approx(softened.special[0].parameter, rel=1e-9)
+
+
+def test_doubling_has_a_multiplier_of_minus_one(upper: Branch) -> None:
+    doublings = [s for s in upper.special if s.kind is Crossing.PERIOD_DOUBLING]
+    assert doublings
+    for doubling in doublings:
+        assert np.abs(doubling.orbit.multipliers + 1.0).min() < 1e-8
+
+
+def test_the_doubled_branch_begins_there_and_is_stable_at_first(upper: Branch) -> None:
+    doubling = next(s for s in upper.special if s.kind is Crossing.PERIOD_DOUBLING)
+    doubled = switch(upper.family, doubling, low=850.0 * RPM, high=1300.0 * RPM)
+    assert doubled.turns == 2
+    assert doubled.parameter[0] == pytest.approx(doubling.parameter, rel=1e-4)
+    assert doubled.stability()[1] is Stability.STABLE
+    halves = [orbit.turn().harmonic("slider.position", 0.5) for orbit in doubled.orbits[:6]]
+    # the half-order harmonic grows with the square root of the distance
+    distance = np.abs(doubled.parameter[1:6] - doubling.parameter)
+    slope = np.polyfit(np.log(distance), np.log(halves[1:]), 1)[0]
+    assert slope == pytest.approx(0.5, abs=0.05)
+
+
+def test_one_switches_at_period_doublings_only(softened: Branch) -> None:
+    with pytest.raises(InputError, match="is a fold: only a period doubling has a branch"):
+        switch(softened.family, softened.special[0], low=100.0, high=1200.0)
+
+
+def test_torus_has_a_complex_pair_on_the_unit_circle() -> None:
+    orbit = find_orbit(TABLE_3_1, torque=0.2, start=(0.0, 0.0, 45.0))
+    family = Family(parameters=TABLE_3_1, drive=orbit.drive, vary="drive.torque")
+    branch = follow(family, orbit, 0.2, low=0.05, high=0.3, direction=-1)
+    (torus,) = [s for s in branch.special if s.kind is Crossing.TORUS]
+    assert abs(torus.orbit.multipliers[0]) == pytest.approx(1.0, abs=1e-9)
+    assert abs(torus.orbit.multipliers[0].imag) > 0.1
+    assert branch.orbits[0].largest > 1.0 > branch.orbits[torus.after + 2].largest
+
+
+def test_the_motor_cannot_pass_the_resonance_where_the_torque_folds() -> None:
+    """Sommerfeld's effect: with the torque raised the speed sticks below the resonance, up to a fold."""
+    parameters = SETS["rig-2-spring-c"].parameters
+    orbit = find_orbit(parameters, torque=0.01, start=(0.0, 0.0, 56.0))
+    family = Family(parameters=parameters, drive=orbit.drive, vary="drive.torque")
+    branch = follow(family, orbit, 0.01, low=0.002, high=0.06)
+    fold = branch.special[0]
+    assert fold.kind is Crossing.FOLD
+    speeds = branch.columns()["mean crank speed [rad/s]"]
+    natural = 585.5 * RPM
+    assert speeds[0] < speeds[fold.after] < natural * 1.01
+    # the torque there is what the speed drive needs at the same mean speed, all but for the fluctuation of the speed
+    held = find_orbit(parameters, speed=float(speeds[fold.after])).turn()["drive.applied_torque"].mean()
+    assert fold.parameter == pytest.approx(held, rel=0.05)
+
+
+def test_a_function_can_vary_what_it_likes() -> None:
+    def both(value: float) -> tuple[FiveBarParameters, Drive]:
+        return replace(TABLE_3_1, slider_stiffness=value, slider_damping=0.03 * value), Drive(speed=SPEED)
+
+    parameters, drive = both(1000.0)
+    family = Family(parameters=parameters, drive=drive, vary=both, name="spring and damper")
+    branch = follow(family, find_orbit(parameters, speed=SPEED), 1000.0, low=900.0, high=1100.0)
+    assert branch.reached
+    assert "spring and damper" in branch.columns()
+    end = find_orbit(both(1100.0)[0], speed=SPEED)
+    assert branch.orbits[-1].start == pytest.approx(end.start, abs=1e-9)
+
+
+@pytest.mark.parametrize("name", ["slider.damping", "slider.coulomb_friction", "slider.guide_angle", "crank.length"])
+def test_any_parameter_can_vary(name: str) -> None:
+    orbit = find_orbit(replace(TABLE_3_1, slider_coulomb_friction=0.2), speed=SPEED)
+    family = Family(parameters=orbit.parameters, drive=orbit.drive, vary=name)
+    value = {"slider.damping": 30.0, "slider.coulomb_friction": 0.2, "slider.guide_angle": 0.0, "crank.length": 0.05}[
+        name
+    ]
+    branch = follow(family, orbit, value, low=value - 0.01, high=value + 0.02)
+    assert branch.reached
+    assert len(branch) < 80
+
+
+def test_a_branch_that_nears_the_limit_of_assembly_says_so() -> None:
+    orbit = find_orbit(RIG_1_B, speed=1200.0 * RPM)
+    family = Family(parameters=RIG_1_B, drive=orbit.drive)
+    branch = follow(family, orbit, 1200.0 * RPM, low=100.0 * RPM, high=1300.0 * RPM, direction=-1)
+    assert not branch.reached
+    assert "collinear" in branch.reason
+    assert branch.parameter[-1] > 600.0 * RPM
+
+
+def test_an_orbit_of_another_family_is_refused() -> None:
+    orbit = find_orbit(TABLE_3_1, speed=SPEED)
+    family = Family(parameters=replace(TABLE_3_1, slider_stiffness=200.0), drive=orbit.drive)
+    with pytest.raises(ContinuationError, match="no solution"):
+        follow(family, orbit, SPEED, low=0.5 * SPEED, high=2.0 * SPEED)
+
+
+@pytest.mark.parametrize(
+    ("vary", "drive", "message"),
+    [
+        ("slider.mess", Drive(speed=1.0), r"'slider\.mess' cannot vary: it must be one of drive\.speed"),
+        ("assembly.branch", Drive(speed=1.0), "cannot vary"),
+        ("drive.torque", Drive(speed=1.0), "the drive is by speed"),
+        ("drive.speed", Drive(torque=1.0), "the drive is by torque"),
+    ],
+)
+def test_what_cannot_vary_is_refused(vary: str, drive: Drive, message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        Family(parameters=TABLE_3_1, drive=drive, vary=vary)
+
+
+def test_columns_are_those_of_the_orbits(softened: Branch, tmp_path: pytest.TempPathFactory) -> None:
+    columns = softened.columns()
+    orbit = softened.orbits[20]
+    turn = orbit.turn()
+    assert columns["slider.stiffness [N/m]"][20] == softened.parameter[20]
+    assert columns["amplitude of u [m]"][20] == orbit.amplitude
+    assert columns["harmonic 2 of u [m]"][20] == turn.harmonic("slider.position", 2)
+    assert columns["greatest force in pin C [N]"][20] == np.hypot(turn["pin.C.fx"], turn["pin.C.fy"]).max()
+    path = softened.to_csv(tmp_path / "branch.csv")  # type: ignore[operator]
+    rows = np.loadtxt(path, delimiter=",", skiprows=1)
+    assert rows.shape == (len(softened), len(columns))
+    assert softened.plot(title="softened").axes[0].get_ylabel() == "amplitude of u [cm]"
+
+
+def test_watch_is_told_every_point() -> None:
+    orbit = find_orbit(TABLE_3_1, speed=SPEED)
+    seen: list[float] = []
+    watch: Callable[[float], None] = seen.append
+    family = Family(parameters=TABLE_3_1, drive=orbit.drive)
+    branch = follow(family, orbit, SPEED, low=0.9 * SPEED, high=1.1 * SPEED, watch=watch)
+    assert seen == pytest.approx(branch.parameter[1:].tolist())

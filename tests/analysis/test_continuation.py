@@ -1,0 +1,116 @@
+"""Arclength continuation on curves that are known in closed form."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from analysis.continuation import ContinuationError, Evaluation, Follower, Point, Settings
+from linkwork.errors import AssemblyError, InputError
+
+
+def curve(g, gy, gl):  # type: ignore[no-untyped-def]
+    """G(y, l) of one unknown as the continuation takes it."""
+
+    def evaluate(y: np.ndarray, parameter: float) -> Evaluation:
+        v = float(y[0])
+        return Evaluation(
+            np.array([g(v, parameter)]), np.array([[gy(v, parameter)]]), np.array([gl(v, parameter)]), None
+        )
+
+    return evaluate
+
+
+CUBIC = curve(lambda y, b: y**3 - y - b, lambda y, b: 3 * y * y - 1, lambda y, b: -1.0)
+CIRCLE = curve(lambda y, b: y * y + b * b - 1.0, lambda y, b: 2 * y, lambda y, b: 2 * b)
+
+
+def follower(evaluate, low, high, scale=1.0, **options):  # type: ignore[no-untyped-def]
+    return Follower(evaluate, [scale], Settings(low=low, high=high, **options))
+
+
+def test_an_s_curve_is_followed_through_both_folds() -> None:
+    f = follower(CUBIC, -1.0, 1.0)
+    result = f.follow(f.start([-1.3], -1.0, 1))
+    y, b = (np.array([value(p) for p in result.points]) for value in (lambda p: p.y[0], lambda p: p.parameter))
+    assert result.reached
+    assert not result.closed
+    assert np.abs(y**3 - y - b).max() < 1e-12
+    assert b[-1] == pytest.approx(1.0, abs=1e-12)
+    assert (np.diff(y) > 0.0).all()
+    assert len(result.steps) == len(result.points) - 1
+
+
+@pytest.mark.parametrize("scale", [0.1, 1.0, 10.0])
+def test_a_fold_is_located_where_the_tangent_turns_back(scale: float) -> None:
+    f = follower(CUBIC, -1.0, 1.0, scale=scale, first=1e-3)
+    points = f.follow(f.start([-1.3], -1.0, 1)).points
+    steps = f.follow(f.start([-1.3], -1.0, 1)).steps
+    folds = []
+    for before, after, length in zip(points, points[1:], steps):
+        if before.tangent[-1] * after.tangent[-1] < 0.0:
+            point, s = f.locate(before, length, lambda p: float(p.tangent[-1]))
+            folds.append((point.parameter, point.y[0]))
+            assert 0.0 <= s <= length
+    exact = 2.0 / np.sqrt(27.0), 1.0 / np.sqrt(3.0)
+    assert folds == [pytest.approx((exact[0], -exact[1]), abs=1e-7), pytest.approx((-exact[0], exact[1]), abs=1e-7)]
+
+
+def test_a_closed_curve_closes() -> None:
+    f = follower(CIRCLE, -2.0, 2.0)
+    result = f.follow(f.start([1.0], 0.0, 1))
+    assert result.closed
+    assert result.reached
+    turned = np.unwrap([np.arctan2(p.y[0], p.parameter) for p in result.points])
+    assert abs(turned[-1] - turned[0]) == pytest.approx(2.0 * np.pi, abs=0.1)
+
+
+def test_direction_is_kept() -> None:
+    f = follower(CUBIC, -10.0, 10.0)
+    assert f.follow(f.start([2.0], 6.0, -1)).points[1].parameter < 6.0
+    assert f.follow(f.start([2.0], 6.0, 1)).points[1].parameter > 6.0
+
+
+def test_where_the_equation_ends_the_curve_stalls_at_the_last_good_point() -> None:
+    def half(y: np.ndarray, parameter: float) -> Evaluation:
+        if parameter > 0.5:
+            raise AssemblyError("the links part")
+        return CUBIC(y, parameter)
+
+    f = follower(half, -1.0, 1.0)
+    # on the upper part of the S, which has no fold before the end of its domain
+    result = f.follow(f.start([1.0], 0.0, 1))
+    assert not result.reached
+    assert "stalls" in result.reason
+    assert "the links part" in result.reason
+    assert 0.499 < result.points[-1].parameter <= 0.5
+
+
+def test_the_most_points_are_told() -> None:
+    f = follower(CUBIC, -1.0, 1.0, most_points=7)
+    result = f.follow(f.start([-1.3], -1.0, 1))
+    assert len(result.points) == 7
+    assert not result.reached
+    assert "7 points" in result.reason
+
+
+def test_a_reason_to_leave_is_told() -> None:
+    f = follower(CUBIC, -1.0, 1.0)
+    seen: list[Point] = []
+    result = f.follow(f.start([-1.3], -1.0, 1), watch=seen.append, leave=lambda p: "far enough" if p.y[0] > 0 else "")
+    assert result.reason == "far enough"
+    assert len(seen) == len(result.points) - 1
+
+
+def test_a_point_that_is_not_on_the_curve_is_refused() -> None:
+    f = follower(CIRCLE, -2.0, 2.0)
+    with pytest.raises(ContinuationError, match=r"no solution at the parameter 1\.5"):
+        f.start([1.0], 1.5, 1)
+
+
+@pytest.mark.parametrize(
+    "bad", [{"low": 1.0, "high": 1.0}, {"low": 0.0, "high": float("inf")}, {"low": 0.0, "high": 1.0, "first": 1.0}]
+)
+def test_bad_settings_are_refused(bad: dict[str, float]) -> None:
+    with pytest.raises(InputError):
+        Settings(**bad)  # type: ignore[arg-type]

@@ -1,0 +1,281 @@
+"""Periodic motions by shooting: against published numbers, SciPy on the plain equations, and balances over a period."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from math import pi
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from analysis import InductionMotor, Inputs, simulate
+from analysis.floquet import Crossing, Stability
+from analysis.orbits import (
+    Drive,
+    OrbitAssemblyError,
+    OrbitError,
+    PeriodicOrbit,
+    find_orbit,
+    largest_multipliers,
+    orbit_of,
+)
+from linkwork.errors import AssemblyError, InputError
+from linkwork.five_bar import dynamics
+from linkwork.five_bar.parameters import FiveBarParameters, InitialState
+from linkwork.five_bar.published import RAD_S_PER_RPM, SETS, TABLE_3_1
+from tests import published
+
+SPEED = SETS["table-3.1"].crank_speed
+RIG_1_B = SETS["rig-1-spring-b"].parameters
+MOTOR = InductionMotor(breakdown_torque=5.0, breakdown_slip=0.2, synchronous_speed=SPEED)
+GENERAL = replace(
+    TABLE_3_1,
+    crank_mass=0.3,
+    crank_cog_distance=0.01,
+    crank_cog_angle=0.4,
+    coupler_cog_angle=0.2,
+    rocker_cog_angle=-0.3,
+    slider_guide_angle=0.15,
+    slider_spring_free_position=0.004,
+    slider_coulomb_friction=0.4,
+    coupler_point_distance=0.06,
+    coupler_point_angle=0.5,
+    ground_inclination=0.3,
+)
+
+
+def plain_period(orbit: PeriodicOrbit, start: np.ndarray) -> np.ndarray:
+    """y after a period by SciPy on the plain right-hand side in time, its end located at the crank angle."""
+    p = orbit.parameters.constants()
+    drive = orbit.drive
+
+    def inputs(w: float) -> dynamics.Inputs:
+        torque = drive.torque
+        if drive.motor:
+            slip = 1.0 - w / drive.motor.synchronous_speed
+            ratio = slip / drive.motor.breakdown_slip
+            torque += 2.0 * drive.motor.breakdown_torque * ratio / (1.0 + ratio * ratio)
+        return dynamics.Inputs(float(drive.speed_drive), torque, 0.0, drive.slider_force, drive.load_x, drive.load_y)
+
+    end = 2.0 * pi * orbit.turns
+
+    def turned(t: float, x: np.ndarray) -> float:
+        return x[0] - end
+
+    turned.terminal = True  # type: ignore[attr-defined]
+    speed = drive.speed if drive.speed is not None else float(start[2])
+    solution = solve_ivp(
+        lambda t, x: dynamics.derivative(tuple(x), inputs(x[2]), p),
+        (0.0, 3.0 * end / speed),
+        [0.0, start[0], speed, start[1], 0.0, 0.0],
+        method="DOP853",
+        rtol=1e-12,
+        atol=1e-14,
+        events=turned,
+    )
+    x = solution.y_events[0][0]
+    return np.array([x[1], x[3], x[2]][: drive.size])
+
+
+def test_steady_motion_of_table_3_1_is_the_published_one() -> None:
+    orbit = find_orbit(TABLE_3_1, speed=SPEED)
+    assert 100.0 * orbit.start[0] == pytest.approx(published.STEADY_U_CM, abs=1e-8)
+    assert 100.0 * orbit.start[1] == pytest.approx(published.STEADY_U_RATE_CM_S, abs=1e-7)
+    assert orbit.residual < 1e-9
+    assert orbit.verdict().stability is Stability.STABLE
+
+
+ORBITS = {
+    "Table 3.1": (TABLE_3_1, Drive(speed=SPEED), None),
+    "general": (GENERAL, Drive(speed=30.0, slider_force=2.0, load_x=1.0, load_y=-3.0), None),
+    "unstable": (replace(TABLE_3_1, slider_stiffness=260.0), Drive(speed=SPEED), (-0.0475, -0.5)),
+    "motor": (TABLE_3_1, Drive(motor=MOTOR), None),
+    "torque": (SETS["rig-2-spring-c"].parameters, Drive(torque=0.01), (0.0, 0.0, 56.0)),
+    "general torque": (GENERAL, Drive(motor=MOTOR, torque=-0.3, slider_force=2.0, load_y=-3.0), None),
+}
+
+
+@pytest.fixture(params=ORBITS, scope="module")
+def orbit(request: pytest.FixtureRequest) -> PeriodicOrbit:
+    parameters, drive, start = ORBITS[request.param]
+    return orbit_of(parameters, drive, start=start)
+
+
+def test_motion_repeats_itself_on_the_plain_equations(orbit: PeriodicOrbit) -> None:
+    scale = np.array([0.05, 2.0, 40.0])[: orbit.drive.size]
+    assert np.abs((plain_period(orbit, orbit.start) - orbit.start) / scale).max() < 1e-8 * max(1.0, orbit.largest)
+
+
+def test_monodromy_matrix_is_that_of_differences(orbit: PeriodicOrbit) -> None:
+    for j, step in enumerate((1e-6, 4e-5, 1e-3)[: orbit.drive.size]):
+        aside = np.zeros(orbit.drive.size)
+        aside[j] = step
+        column = (plain_period(orbit, orbit.start + aside) - plain_period(orbit, orbit.start - aside)) / (2.0 * step)
+        size = np.array([0.05, 2.0, 40.0])[: orbit.drive.size] / np.array([0.05, 2.0, 40.0])[j]
+        assert np.abs((column - orbit.monodromy[:, j]) / size).max() < 2e-6 * max(1.0, orbit.largest)
+
+
+def test_determinant_is_liouvilles(orbit: PeriodicOrbit) -> None:
+    # with friction the trace has sharp peaks where the slider turns round
+    samples, tolerance = (16384, 1e-6) if orbit.parameters.slider_coulomb_friction else (512, 1e-8)
+    exact = np.linalg.det(orbit.monodromy)
+    assert orbit.determinant_by_liouville(samples) == pytest.approx(exact, rel=tolerance, abs=1e-12)
+
+
+def test_work_over_a_period_is_what_is_dissipated(orbit: PeriodicOrbit) -> None:
+    # constant slider force and load do no work over a period
+    turn = orbit.turn(4096)
+    v, w = turn["slider.velocity"], turn["crank.speed"]
+    p = orbit.parameters.constants()
+    lost = np.mean([dynamics.friction(x, p) * x for x in v] / w)
+    assert turn["drive.applied_torque"].mean() == pytest.approx(lost, rel=1e-7)
+
+
+def test_loop_stays_closed(orbit: PeriodicOrbit) -> None:
+    assert np.abs(orbit.turn()["closure.residual"]).max() < 1e-14
+
+
+def test_turn_is_that_of_a_run() -> None:
+    orbit = find_orbit(GENERAL, torque=MOTOR)
+    turn = orbit.turn(1024)
+    run = simulate(
+        GENERAL,
+        Inputs(torque=MOTOR),
+        initial=InitialState(
+            crank_speed=orbit.start[2], slider_position=orbit.start[0], slider_velocity=orbit.start[1]
+        ),
+        stop_time=turn.period,
+        samples=np.append(turn.time, turn.period),
+        tolerance=1e-12,
+    )
+    for name in ("crank.angle", "slider.position", "crank.speed", "drive.applied_torque", "pin.C.fx"):
+        size = np.abs(turn[name]).max()
+        assert np.abs(run[name][:-1] - turn[name]).max() < 1e-7 * size, name
+    assert run["crank.angle"][-1] == pytest.approx(2.0 * pi, abs=1e-8)
+
+
+def test_small_deviations_grow_by_the_multiplier() -> None:
+    parameters, drive, start = ORBITS["unstable"]
+    orbit = orbit_of(parameters, drive, start=start)
+    verdict = orbit.verdict()
+    assert verdict.stability is Stability.UNSTABLE
+    assert verdict.crossing is Crossing.FOLD
+    _, vectors = np.linalg.eig(orbit.monodromy)
+    aside = vectors[:, np.argmax(np.abs(np.linalg.eigvals(orbit.monodromy)))].real
+    aside = 1e-7 * aside / abs(aside[0])
+    run = simulate(
+        parameters,
+        Inputs(speed=SPEED),
+        initial=InitialState(slider_position=orbit.start[0] + aside[0], slider_velocity=orbit.start[1] + aside[1]),
+        stop_time=10 * 2.0 * pi / SPEED,
+        step=2.0 * pi / SPEED,
+        tolerance=1e-12,
+    )
+    deviation = run["slider.position"] - orbit.start[0]
+    assert np.exp(np.polyfit(np.arange(3, 9), np.log(np.abs(deviation[3:9])), 1)[0]) == pytest.approx(
+        orbit.largest, rel=1e-3
+    )
+
+
+def test_two_turns_have_the_square_of_the_monodromy_matrix() -> None:
+    once, twice = (find_orbit(TABLE_3_1, speed=SPEED, turns=n) for n in (1, 2))
+    assert twice.start == pytest.approx(once.start, abs=1e-10)
+    assert twice.monodromy == pytest.approx(once.monodromy @ once.monodromy, abs=1e-9)
+    assert twice.turn().harmonic("slider.position", 0.5) < 1e-12
+    assert twice.turn().harmonic("slider.position", 1) == pytest.approx(once.turn().harmonic("slider.position", 1))
+
+
+def test_amplitude_and_harmonics() -> None:
+    turn = find_orbit(TABLE_3_1, speed=SPEED).turn(4096)
+    u = turn["slider.position"]
+    assert find_orbit(TABLE_3_1, speed=SPEED).amplitude == pytest.approx(0.5 * np.ptp(u), rel=1e-6)
+    x = turn.angle
+    assert turn.harmonic("slider.position", 2) == pytest.approx(
+        2.0 * np.hypot((u * np.cos(2 * x)).mean(), (u * np.sin(2 * x)).mean()), rel=1e-12
+    )
+    with pytest.raises(InputError, match=r"order 0\.5"):
+        turn.harmonic("slider.position", 0.5)
+    with pytest.raises(InputError, match=r"no output 'energy\.supplied'"):
+        turn["energy.supplied"]
+
+
+def test_of_two_motions_the_guess_decides() -> None:
+    speed = 1000.0 * RAD_S_PER_RPM
+    lower = find_orbit(RIG_1_B, speed=speed)
+    upper = find_orbit(RIG_1_B, speed=1050.0 * RAD_S_PER_RPM)
+    for rpm in range(1045, 995, -5):
+        upper = find_orbit(RIG_1_B, speed=rpm * RAD_S_PER_RPM, start=upper.start)
+    assert lower.amplitude < 0.03
+    assert upper.amplitude > 0.1
+    assert lower.verdict().stability is upper.verdict().stability is Stability.STABLE
+
+
+def test_newton_converges_quadratically_from_afar() -> None:
+    assert find_orbit(TABLE_3_1, speed=SPEED, start=(0.03, 1.0), settle=False).iterations < 8
+
+
+def test_where_newton_fails_the_motion_itself_or_a_softened_spring_leads_there() -> None:
+    # from rest Newton's method fails; the neighbour at a stiffer spring leads to it
+    soft = replace(TABLE_3_1, slider_stiffness=235.0)
+    with pytest.raises(OrbitError):
+        find_orbit(soft, speed=SPEED, start=(0.09, 3.0), settle=False)
+    assert find_orbit(soft, speed=SPEED, start=(0.09, 3.0)).verdict().stability is Stability.STABLE
+
+
+def test_below_the_fold_there_is_none_and_the_error_says_where_it_ended() -> None:
+    with pytest.raises(OrbitError, match=r"residual .* after \d+ iterations at u = .* m, u' = .* m/s") as caught:
+        find_orbit(replace(TABLE_3_1, slider_stiffness=200.0), speed=SPEED)
+    assert len(caught.value.start) == 2
+    assert caught.value.iterations > 0
+
+
+def test_limit_of_assembly_is_an_error_of_its_own() -> None:
+    with pytest.raises(OrbitAssemblyError, match="limit of assembly") as caught:
+        find_orbit(replace(TABLE_3_1, slider_stiffness=0.0), speed=SPEED, settle=False, start=(0.1, 0.0))
+    assert isinstance(caught.value, AssemblyError)
+    with pytest.raises(OrbitAssemblyError, match="cannot be joined"):
+        find_orbit(TABLE_3_1, speed=SPEED, start=(1.0, 0.0))
+
+
+def test_a_crank_that_stalls_is_told() -> None:
+    with pytest.raises(OrbitError, match="comes to rest"):
+        find_orbit(TABLE_3_1, torque=-2.0, start=(0.0, 0.0, 5.0), settle=False)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({}, "neither a speed nor a torque"),
+        ({"speed": 1.0, "torque": 1.0}, "both a speed and a torque"),
+        ({"speed": -1.0}, "above zero"),
+        ({"speed": float("nan")}, "above zero"),
+        ({"torque": float("inf")}, "torque is inf"),
+        ({"torque": 1.0}, "crank speed is needed"),
+        ({"torque": [MOTOR, MOTOR]}, "2 motors"),
+        ({"torque": 1.0, "start": (0.0, 0.0, 0.0)}, "crank speed at the start is 0"),
+        ({"speed": 1.0, "start": (0.0,)}, "must be 2 finite numbers"),
+        ({"speed": 1.0, "start": (0.0, float("nan"))}, "must be 2 finite numbers"),
+        ({"speed": 1.0, "turns": 0}, "turns is 0"),
+        ({"speed": 1.0, "load": (float("nan"), 0.0)}, "load_x is nan"),
+    ],
+)
+def test_bad_input(arguments: dict[str, object], message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        find_orbit(TABLE_3_1, **arguments)  # type: ignore[arg-type]
+
+
+def test_row_of_orbits_is_the_orbits_one_by_one() -> None:
+    stiffnesses = np.linspace(2000.0, 180.0, 40)
+    rows: list[FiveBarParameters] = [replace(TABLE_3_1, slider_stiffness=k) for k in stiffnesses]
+    values, starts, status = largest_multipliers(rows, [Drive(speed=SPEED)] * len(rows))
+    good = status == 0
+    # below the fold at 232.2 N/m there is none on this branch
+    assert good[stiffnesses > 240.0].all()
+    for i in np.flatnonzero(good)[::7]:
+        orbit = find_orbit(rows[i], speed=SPEED, start=starts[i])
+        assert values[i] == pytest.approx(orbit.largest, abs=1e-9)
+        assert starts[i] == pytest.approx(orbit.start, abs=1e-10)
+    assert np.isnan(values[~good]).all()
+    with pytest.raises(InputError, match="one kind"):
+        largest_multipliers(rows[:2], [Drive(speed=SPEED), Drive(motor=MOTOR)])

@@ -1,0 +1,162 @@
+"""Response over the speed: against the reference numbers, long runs, and the statements of the thesis."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from math import pi
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from analysis import Inputs, simulate
+from analysis.floquet import Crossing, Stability
+from analysis.orbits import Drive, OrbitError
+from analysis.resonance import approximations, frequency_response, natural_frequency, sweep
+from linkwork.errors import AssemblyError, InputError, ParameterError
+from linkwork.five_bar.published import RAD_S_PER_RPM, SETS, TABLE_3_1
+
+RPM = RAD_S_PER_RPM
+RIG = {spring: SETS[f"rig-{1 if spring in 'ab' else 2}-spring-{spring}"].parameters for spring in "abcd"}
+
+# Reference numbers of the notes (an independent derivation), rpm
+NATURAL = {"a": 592.0, "b": 1133.0, "c": 585.5, "d": 828.0}
+MAXIMUM_A, MINIMUM_A, MAXIMUM_B = 296.0, 367.0, 564.0
+
+
+@pytest.fixture(scope="module")
+def response_b():  # type: ignore[no-untyped-def]
+    return frequency_response(RIG["b"], 100.0 * RPM, 1300.0 * RPM)
+
+
+@pytest.mark.parametrize("spring", "abcd")
+def test_natural_frequency_is_the_reference(spring: str) -> None:
+    last_digit = 0.5 if spring in "ab" else 0.05
+    assert natural_frequency(RIG[spring]) / RPM == pytest.approx(NATURAL[spring], abs=last_digit)
+
+
+def test_natural_frequency_needs_a_spring_and_a_turn() -> None:
+    with pytest.raises(ParameterError, match=r"slider\.stiffness"):
+        natural_frequency(replace(TABLE_3_1, slider_stiffness=0.0))
+    with pytest.raises(AssemblyError):
+        natural_frequency(replace(TABLE_3_1, coupler_length=0.05))
+
+
+def test_rig_1_spring_a_has_its_maximum_and_minimum_where_the_reference_has_them() -> None:
+    response = frequency_response(RIG["a"], 100.0 * RPM, 1300.0 * RPM)
+    assert not response.problems
+    assert len(response.branches) == 1
+    assert min(abs(e.parameter / RPM - MAXIMUM_A) for e in response.maxima()) < 0.5
+    assert min(abs(e.parameter / RPM - MINIMUM_A) for e in response.minima()) < 0.5
+    assert set(response.branches[0].stability()) == {Stability.STABLE}
+
+
+def test_rig_1_spring_b_folds_and_doubles(response_b) -> None:  # type: ignore[no-untyped-def]
+    low, high, doubled = response_b.branches
+    assert min(abs(e.parameter / RPM - MAXIMUM_B) for e in response_b.maxima()) < 0.5
+    assert [s.kind for s in low.special] == [Crossing.FOLD]
+    # runs from rest jump between 1035 and 1040 rpm
+    assert 1035.0 < low.special[0].parameter / RPM < 1040.0
+    assert Crossing.PERIOD_DOUBLING in {s.kind for s in high.special}
+    assert doubled.turns == 2
+    # what ends early is told, with where
+    assert len(response_b.problems) == 3
+    assert all("is followed to drive.speed" in problem and "rpm" in problem for problem in response_b.problems)
+
+
+@pytest.mark.parametrize("rpm", [300.0, 560.0, 900.0])
+def test_amplitude_is_that_of_a_long_run_from_rest(response_b, rpm: float) -> None:  # type: ignore[no-untyped-def]
+    low = response_b.branches[0]
+    stable = low.special[0].after
+    amplitude = np.interp(rpm * RPM, low.parameter[:stable], low.amplitude[:stable])
+    period = 60.0 / rpm
+    run = simulate(RIG["b"], Inputs(speed=rpm * RPM), stop_time=200 * period, step=period / 360)
+    assert amplitude == pytest.approx(0.5 * np.ptp(run["slider.position"][-361:]), rel=2e-3)
+
+
+def test_sweeps_up_and_down_jump_at_different_speeds() -> None:
+    speeds = np.arange(960.0, 1101.0, 10.0) * RPM
+    up, down = sweep(RIG["b"], speeds), sweep(RIG["b"], speeds[::-1])
+    assert [round(jump.speed / RPM) for jump in up.jumps] == [1040]
+    assert up.jumps[0].amplitude_after > 2.5 * up.jumps[0].amplitude_before
+    assert not down.jumps
+    shared = np.abs(up.amplitude - down.amplitude[::-1]) < 1e-9
+    assert shared[speeds > 1036.0 * RPM].all()
+    assert not shared[speeds < 1035.0 * RPM].any()
+
+
+def test_a_falling_sweep_doubles_its_period_and_is_lost_with_a_flag() -> None:
+    result = sweep(RIG["b"], np.arange(940.0, 899.0, -5.0) * RPM, start=upper_start())
+    assert result.turns[0] == 1
+    assert 2 in result.turns
+    lost = [flag for orbit, flag in zip(result.orbits, result.flags) if orbit is None]
+    assert lost
+    assert all("limit of assembly" in flag or "no steady motion" in flag for flag in lost)
+    assert result.amplitude.mask.sum() == len(lost)
+    assert all(not flag for orbit, flag in zip(result.orbits, result.flags) if orbit is not None)
+
+
+def upper_start() -> np.ndarray:
+    """Start of the large motion of rig 1 with spring B at 940 rpm, met from above."""
+    orbit = sweep(RIG["b"], np.arange(1100.0, 939.0, -10.0) * RPM).orbits[-1]
+    assert orbit is not None
+    return orbit.start
+
+
+def test_friction_removes_the_coexistence() -> None:
+    response = frequency_response(replace(RIG["b"], slider_coulomb_friction=20.0), 900.0 * RPM, 1200.0 * RPM)
+    assert not response.problems
+    assert not any(branch.special for branch in response.branches)
+
+
+def test_approximations_beside_the_true_motion() -> None:
+    # rig 2 has a short crank: the linear equation is close to the true motion, that of rig 1 with spring B far from it
+    near = frequency_response(RIG["c"], 300.0 * RPM, 700.0 * RPM)
+    table = approximations(near, points=20)
+    peak = max(near.maxima(), key=lambda e: e.amplitude)
+    assert table.at(peak.parameter)["ten harmonics"] == pytest.approx(peak.amplitude, rel=5e-3)
+    assert set(table.columns()) == {"drive.speed [rad/s]", *(f"{name} [m]" for name in table.amplitudes)}
+    with pytest.raises(InputError, match="over the speed"):
+        approximations(
+            frequency_response(
+                TABLE_3_1, 900.0, 1000.0, vary="slider.stiffness", drive=Drive(speed=SETS["table-3.1"].crank_speed)
+            )
+        )
+
+
+def test_torque_drive_over_its_torque(tmp_path: Path) -> None:
+    response = frequency_response(
+        RIG["c"], 0.005, 0.06, vary="drive.torque", drive=Drive(torque=0.005), start=(0.0, 0.0, 54.0)
+    )
+    assert response.branches[0].special[0].kind is Crossing.FOLD
+    rows = np.loadtxt(response.to_csv(tmp_path / "torque.csv"), delimiter=",", skiprows=1)
+    assert len(rows) == sum(map(len, response.branches))
+
+
+def test_no_orbit_at_either_end_is_an_error() -> None:
+    # the crank cannot make a turn
+    with pytest.raises(OrbitError, match="limit of assembly|cannot be joined"):
+        frequency_response(replace(TABLE_3_1, coupler_length=0.06), 40.0, 41.0)
+
+
+def test_one_end_without_an_orbit_is_a_problem_that_is_told() -> None:
+    drive = Drive(speed=SETS["table-3.1"].crank_speed)
+    response = frequency_response(TABLE_3_1, 200.0, 1200.0, vary="slider.stiffness", drive=drive, doubled=False)
+    assert "slider.stiffness = 200 N/m" in response.problems[0]
+    assert response.branches[0].parameter[0] == 1200.0
+
+
+@pytest.mark.parametrize(
+    ("speeds", "message"),
+    [([], "at least one"), ([1.0, 1.0], "increase, or decrease"), ([-1.0, 1.0], "positive"), ([np.nan], "positive")],
+)
+def test_bad_sweeps_are_refused(speeds: list[float], message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        sweep(TABLE_3_1, speeds)
+
+
+def test_bad_ranges_are_refused() -> None:
+    with pytest.raises(InputError, match="finite and increasing"):
+        frequency_response(TABLE_3_1, 2.0 * pi, pi)
+    with pytest.raises(InputError, match="say what drives the plant"):
+        frequency_response(TABLE_3_1, 1.0, 2.0, vary="slider.damping")
