@@ -89,3 +89,43 @@ TORQUE_TIME_EXPONENT = -1.95
 # appendix 1, KINE: its "+ root" changes assembly once B passes D and divides by zero with B vertically above D: see
 # tests/plant/test_kinematics.py
 # appendix 1, FY45: the weight of the rocker enters the vertical force with the wrong sign: see tests/plant/test_dynamics.py
+
+# --- Chapters IV and V: massless coupler, rocker's centre of mass on the slider pin, l3 = l4 = l1, horizontal; omega_c is
+# --- mu/(m4 + m5). "Right" is the independent derivation; "thesis" what the code of appendices 2 to 4 gives
+SIGMA2 = 0.05
+P45 = 0.2
+STIFFNESS_PER_MASS = 1000.0
+# the linearised slider equation for I4 = 1: mean, cosine and sine of the first harmonic of M, K and F
+SLIDER_EQUATION: Mapping[str, tuple[float, float, float]] = MappingProxyType(
+    {
+        "mass": (1.0669267, -0.0022055, 0.0115374),
+        "stiffness": (-0.0008213, 0.0020824, -0.003833),
+        "force": (-0.0002234, -0.0033715, -0.0057687),
+    }
+)
+
+
+class ThesisAndRight(NamedTuple):
+    """A result of the thesis's code, and the right one."""
+
+    thesis: float
+    right: float
+
+
+# undamped resonance (rad/s) by I4
+RESONANCE: Mapping[float, ThesisAndRight] = MappingProxyType(
+    {
+        0.5: ThesisAndRight(31.0763, 31.0975),
+        1.0: ThesisAndRight(30.5572, 30.5979),
+        1.5: ThesisAndRight(30.0645, 30.1220),
+    }
+)
+# lower and upper end in lambda_k^2 of the first unstable region by I4: thesis's appendix 3, and about the periodic orbit
+FIRST_REGION_THESIS = MappingProxyType({0.5: (0.25786, 0.26031), 1.0: (0.26580, 0.27054), 1.5: (0.27382, 0.28069)})
+FIRST_REGION = MappingProxyType({0.5: (0.258298, 0.259203), 1.0: (0.266540, 0.268367), 1.5: (0.274727, 0.277501)})
+# nonlinear runs at I4 = 1 by lambda_k^2: whether they stay bounded
+BOUNDED_AT = MappingProxyType({0.2655: True, 0.26745: False, 0.2695: True})
+# omega_c (1/s) that removes the region everywhere up to I4 = 1.5: read off by the thesis, by its own equation, true
+REMOVING_DAMPING_READ_OFF, REMOVING_DAMPING_THESIS, REMOVING_DAMPING = 0.45, 0.459, 0.167
+# second harmonic near half the natural frequency: how many times too small the thesis's is, "about"
+SECOND_HARMONIC_TOO_SMALL = 7.0

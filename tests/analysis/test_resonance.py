@@ -135,7 +135,7 @@ def test_torque_drive_over_its_torque(tmp_path: Path) -> None:
 
 def test_no_orbit_at_either_end_is_an_error() -> None:
     # the crank cannot make a turn
-    with pytest.raises(OrbitError, match="limit of assembly|cannot be joined"):
+    with pytest.raises(OrbitError, match=r"limit of assembly|cannot be joined"):
         frequency_response(replace(TABLE_3_1, coupler_length=0.06), 40.0, 41.0)
 
 

@@ -110,3 +110,41 @@ SETS: Mapping[str, PublishedSet] = MappingProxyType(
 )
 
 TABLE_3_1 = SETS["table-3.1"].parameters
+
+
+#: Chapters IV and V: sigma2 = l2/l4, p45 = m4/(m4 + m5), k/(m4 + m5) (1/s2) and so omega_k = 31.623 rad/s.
+SIGMA2, P45, SQUARE_OF_OMEGA_K = 0.05, 0.2, 1000.0
+
+
+def chapter_4(inertia_ratio: float, omega_c: float = 0.0) -> FiveBarParameters:
+    """The mechanism of chapters IV and V, horizontal.
+
+    The coupler has no mass, the rocker's centre of mass is on the slider pin D, l3 = l4 = l1, sigma2 = l2/l4 = 0.05,
+    p45 = m4/(m4 + m5) = 0.2, k/(m4 + m5) = 1000 1/s2. Lengths and masses are free: 0.3 m and m4 + m5 = 1 kg are chosen, and
+    no dimensionless result depends on them; nor does any of the slider's on the crank's inertia at constant speed.
+
+    Parameters
+    ----------
+    inertia_ratio : float
+        I4 = I_D/(m4 l4^2); the thesis has 0.25 to 2.
+    omega_c : float
+        mu/(m4 + m5) (1/s).
+    """
+    length, mass = 0.3, 1.0
+    return FiveBarParameters(
+        ground_length=length,
+        crank_length=SIGMA2 * length,
+        coupler_length=length,
+        rocker_length=length,
+        coupler_mass=0.0,
+        rocker_mass=P45 * mass,
+        slider_mass=(1.0 - P45) * mass,
+        crank_inertia=12500 / G_CM2_PER_KG_M2,
+        coupler_inertia=0.0,
+        rocker_inertia=inertia_ratio * P45 * mass * length**2,
+        coupler_cog_distance=0.0,
+        rocker_cog_distance=0.0,
+        slider_stiffness=SQUARE_OF_OMEGA_K * mass,
+        slider_damping=omega_c * mass,
+        gravity=0.0,
+    )
