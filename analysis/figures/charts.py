@@ -1,0 +1,104 @@
+"""Charts over two parameters: a quantity in colours, boundaries drawn over it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import ceil
+from textwrap import fill
+from typing import Any
+
+import matplotlib
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.colors import TwoSlopeNorm
+from matplotlib.figure import Figure
+from matplotlib.patches import Patch
+from numpy.typing import NDArray
+
+from .curves import Panel, _draw_panel
+from .style import STYLE, finish
+
+#: Colour of points that have no value.
+_NONE = "0.82"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class HeatMap:
+    """A quantity over a grid, in colours that part at a value, under the curves of a panel.
+
+    Attributes
+    ----------
+    panel : Panel
+        Axes and curves.
+    x, y : ndarray, shapes (nx,) and (ny,)
+    values : masked array, shape (ny, nx)
+        Masked where there is none; drawn in grey.
+    label : str
+        What it is, with unit.
+    middle : float
+        Value that is white: below it blue, above it red.
+    missing : str
+        What the legend calls masked points.
+    """
+
+    panel: Panel
+    x: NDArray[np.float64]
+    y: NDArray[np.float64]
+    values: np.ma.MaskedArray[Any, np.dtype[np.float64]]
+    label: str
+    middle: float = 1.0
+    missing: str = "no value"
+
+
+def plot_charts(
+    charts: Sequence[Panel | HeatMap], *, title: str, columns: int = 1, size: tuple[float, float] = (5.4, 3.9)
+) -> Figure:
+    """Plot charts for print, with colours or with curves alone.
+
+    Parameters
+    ----------
+    charts : sequence of Panel or HeatMap
+    title : str
+        Above all of it; a figure of the thesis by its number.
+    columns : int
+        Charts side by side.
+    size : (float, float)
+        Width and height of a chart (inches).
+    """
+    rows = ceil(len(charts) / columns)
+    with matplotlib.rc_context(STYLE):
+        figure = Figure(figsize=(size[0] * columns, 0.35 + size[1] * rows))
+        axes = figure.subplots(rows, columns, squeeze=False)
+        for axis, chart in zip(axes.flat, charts):
+            if isinstance(chart, HeatMap):
+                _draw_map(figure, axis, chart)
+            else:
+                _draw_panel(axis, chart)
+        for axis in list(axes.flat)[len(charts) :]:
+            axis.remove()
+        figure.suptitle(fill(title, int(11.6 * size[0] * columns)), fontsize=10.5, fontweight="bold")
+        return finish(figure)
+
+
+def _draw_map(figure: Figure, axis: Axes, chart: HeatMap) -> None:
+    values = np.ma.masked_invalid(chart.values)
+    # both sides of the middle in colours, however one-sided the values are
+    low, high = (float(v) for v in (values.min(), values.max())) if values.count() else (chart.middle, chart.middle)
+    least = 1e-3 * max(abs(chart.middle), 1e-9)
+    norm = TwoSlopeNorm(chart.middle, min(low, chart.middle - least), max(high, chart.middle + least))
+    axis.set_facecolor(_NONE)
+    mesh = axis.pcolormesh(chart.x, chart.y, values, norm=norm, cmap="RdBu_r", shading="nearest", rasterized=True)
+    axis.grid(False)
+    _draw_panel(axis, chart.panel)
+    figure.colorbar(mesh, ax=axis, label=chart.label)
+    legend = axis.get_legend()
+    if np.ma.getmaskarray(values).any():
+        handles, labels = axis.get_legend_handles_labels()
+        handles.append(Patch(facecolor=_NONE))
+        where: Any = chart.panel.legend_at if chart.panel.legend_at != "outside" else "best"
+        axis.legend(handles, [*labels, chart.missing], fontsize=8, loc=where, frameon=True, framealpha=0.9)
+    elif legend is not None:
+        # over the colours a legend needs a ground
+        legend.set_frame_on(True)
+        legend.get_frame().set_alpha(0.9)

@@ -1,0 +1,133 @@
+"""Time of a chart of the true orbit's largest Floquet multiplier, beside the same with SciPy on the plain right-hand side.
+
+    python -m benchmarks.stability
+
+200 x 200 points of rig 1 with spring A, damping over crank speed, each on its own periodic orbit, on two cores from an empty
+cache of results. With SciPy: the same Newton iterations from the same guesses, the orbit and its two neighbours integrated
+together by solve_ivp's DOP853 at the same tolerance, their differences in the place of the variational equations, on the
+same two cores for a sample of the rows. The sample's cost per point stands for the rest; both are measured in one run.
+"""
+
+from __future__ import annotations
+
+import argparse
+import tempfile
+import time
+from math import pi
+
+import joblib
+import numpy as np
+from numpy.typing import NDArray
+from rich.console import Console
+from rich.table import Table
+from scipy.integrate import solve_ivp
+
+from analysis import stability
+from analysis.orbits import INTEGRATOR_TOLERANCE, ORBIT_TOLERANCE
+from linkwork.five_bar import dynamics
+from linkwork.five_bar.parameters import FiveBarParameters
+from linkwork.five_bar.published import RAD_S_PER_RPM, SETS
+
+POINTS = 200
+CORES = 2
+#: Rows of the sample, and how many points of each.
+ROWS, RUN = 4, 10
+SPEEDS = np.linspace(200.0, 1200.0, POINTS) * RAD_S_PER_RPM
+DAMPINGS = np.linspace(3.0, 40.0, POINTS)
+#: Difference of the neighbours' starts, relative to crank length and speed: what balances truncation and rounding.
+STEP = 1e-6
+
+
+def scipy_orbit(
+    parameters: FiveBarParameters, speed: float, guess: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], float]:
+    """Start of the orbit and its largest multiplier, by shooting with SciPy on the plain equations."""
+    p = parameters.constants()
+    inputs = dynamics.Inputs(1.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    scale = np.array([parameters.crank_length, parameters.crank_length * speed])
+
+    def rate(t: float, z: NDArray[np.float64]) -> list[float]:
+        out = []
+        for i in (0, 2, 4):
+            x = dynamics.derivative((speed * t, z[i], speed, z[i + 1], 0.0, 0.0), inputs, p)
+            out += [x[1], x[3]]
+        return out
+
+    y = guess.copy()
+    for _ in range(20):
+        start = (y + STEP * np.array([[0.0, 0.0], [scale[0], 0.0], [0.0, scale[1]]])).ravel()
+        end = solve_ivp(
+            rate,
+            (0.0, 2.0 * pi / speed),
+            start,
+            method="DOP853",
+            rtol=INTEGRATOR_TOLERANCE,
+            atol=INTEGRATOR_TOLERANCE * np.tile(scale, 3),
+        ).y[:, -1]
+        matrix = np.column_stack([(end[2:4] - end[:2]) / (STEP * scale[0]), (end[4:] - end[:2]) / (STEP * scale[1])])
+        correction = np.linalg.solve(np.eye(2) - matrix, end[:2] - y)
+        y = y + correction
+        # the differences' error leaves Newton's method linear at the end
+        if np.abs(correction / scale).max() < 10.0 * ORBIT_TOLERANCE:
+            break
+    return y, float(np.abs(np.linalg.eigvals(matrix)).max())
+
+
+def scipy_row(operation: stability.Plane, damping: float, speeds: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Largest multipliers of a piece of a row, each begun by the secant through the last two."""
+    starts: list[NDArray[np.float64]] = []
+    values = []
+    for speed in speeds.tolist():
+        guess = 2.0 * starts[-1] - starts[-2] if len(starts) > 1 else starts[-1] if starts else np.zeros(2)
+        start, value = scipy_orbit(*operation(speed, damping), guess)
+        starts.append(start)
+        values.append(value)
+    return np.array(values)
+
+
+def main(points: int = POINTS) -> None:
+    """Measure and print."""
+    rig = SETS["rig-1-spring-a"].parameters
+    operation = stability.plane(rig, SPEEDS[0], "speed", "slider.damping")
+    speeds, dampings = (np.linspace(axis[0], axis[-1], points) for axis in (SPEEDS, DAMPINGS))
+    with tempfile.TemporaryDirectory() as folder:
+        # the workers are started and the machine code is loaded before the clock
+        stability.grid(operation, speeds[:4], dampings[:4], folder=folder, n_jobs=CORES)
+        begin = time.perf_counter()
+        chart = stability.grid(operation, speeds, dampings, folder=folder, n_jobs=CORES)
+        ours = time.perf_counter() - begin
+        begin = time.perf_counter()
+        stability.grid(operation, speeds, dampings, folder=folder, n_jobs=CORES)
+        again = time.perf_counter() - begin
+    rows = np.linspace(0, points - 1, ROWS).astype(int)
+    pieces = [slice(first, first + RUN) for first in np.linspace(0, points - RUN, ROWS).astype(int)]
+    begin = time.perf_counter()
+    sample = joblib.Parallel(n_jobs=CORES)(
+        joblib.delayed(scipy_row)(operation, dampings[row], speeds[piece]) for row, piece in zip(rows, pieces)
+    )
+    theirs = (time.perf_counter() - begin) / (ROWS * RUN) * points**2
+    difference = max(
+        float(np.abs(chart.largest[row, piece] - values).max()) for row, piece, values in zip(rows, pieces, sample)
+    )
+    table = Table(title=f"{points} x {points} largest Floquet multipliers of the true orbit, {CORES} cores")
+    for heading in ("", "s", "ms a point and core", "ratio"):
+        table.add_column(heading, justify="right" if heading else "left")
+    per_point = 1e3 * CORES / points**2
+    table.add_row("stability.grid", f"{ours:.2f}", f"{ours * per_point:.3f}", "1")
+    table.add_row("the same again, from the cache on disk", f"{again:.2f}", "", "")
+    table.add_row(
+        f"SciPy DOP853, plain (from {ROWS * RUN} points)",
+        f"{theirs:.0f}",
+        f"{theirs * per_point:.2f}",
+        f"{theirs / ours:.0f}",
+    )
+    console = Console(width=120)
+    console.print(table)
+    found = int((~np.ma.getmaskarray(chart.largest)).sum())
+    console.print(f"orbits found: {found} of {points**2}; largest difference of the multipliers: {difference:.1e}")
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--points", type=int, default=POINTS, help="points along each axis")
+    main(parser.parse_args().points)

@@ -1,0 +1,342 @@
+"""Linear equations with periodic coefficients: three ways to their stability, and verdicts on it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from math import pi, sqrt
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.integrate import solve_ivp
+from scipy.optimize import brentq
+from scipy.special import mathieu_a, mathieu_b
+
+from analysis.floquet import (
+    Crossing,
+    Stability,
+    VerdictError,
+    crossing,
+    liouville,
+    multipliers,
+    verdict,
+)
+from analysis.fourier import FourierSeries
+from analysis.hill import (
+    PeriodicEquation,
+    SingularEquationError,
+    Truncation,
+    boundary_stiffnesses,
+    crossing_test,
+    determinant,
+    hill_determinant,
+    hill_multipliers,
+    hill_regions,
+    monodromies,
+    monodromy,
+    perturbed_region,
+    perturbed_removing_damping,
+)
+from analysis.slider_equation import SliderEquation, Variant, slider_equation
+from linkwork.errors import InputError
+from linkwork.five_bar.published import chapter_4
+
+
+def series(*pairs: tuple[float, float]) -> FourierSeries:
+    cos, sin = zip(*pairs)
+    return FourierSeries(np.array(cos), np.array(sin))
+
+
+#: Mass, damping and stiffness that all vary, none symmetric, b not a'.
+GENERAL = PeriodicEquation(
+    a=series((1.3, 0.0), (0.2, -0.1), (0.05, 0.07)),
+    b=series((0.15, 0.0), (-0.3, 0.2), (0.0, 0.1), (0.02, 0.0)),
+    c=series((0.9, 0.0), (0.3, 0.25), (-0.1, 0.2)),
+)
+
+
+def integrated(equation: PeriodicEquation) -> np.ndarray:
+    """Monodromy matrix by SciPy's integrator."""
+
+    def rate(x: float, y: np.ndarray) -> np.ndarray:
+        a, b, c = (float(s(x)) for s in (equation.a, equation.b, equation.c))
+        return np.concatenate([y[2:], -(b * y[2:] + c * y[:2]) / a])
+
+    end = solve_ivp(rate, (0.0, 2.0 * pi), np.eye(2).ravel(), method="DOP853", rtol=1e-12, atol=1e-13).y[:, -1]
+    return end.reshape(2, 2)
+
+
+def slider(inertia_ratio: float, sigma2: float | None = None, variant: Variant = Variant.EXACT) -> SliderEquation:
+    """The slider's equation of chapters IV and V, of which M and K do not depend on the speed."""
+    mechanism = chapter_4(inertia_ratio)
+    if sigma2 is not None:
+        mechanism = replace(mechanism, crank_length=sigma2 * mechanism.rocker_length)
+    return slider_equation(mechanism, 60.0, variant=variant)
+
+
+def without_spring(equation: SliderEquation, damping: float = 0.0) -> PeriodicEquation:
+    a, b, _ = equation.coefficients()
+    return PeriodicEquation(a=a, b=b + damping, c=equation.stiffness)
+
+
+# Floquet
+
+
+def test_monodromy_against_scipy() -> None:
+    assert monodromy(GENERAL) == pytest.approx(integrated(GENERAL), abs=1e-10)
+
+
+def test_constant_coefficients() -> None:
+    equation = PeriodicEquation(
+        a=FourierSeries.constant(2.0), b=FourierSeries.constant(0.4), c=FourierSeries.constant(3.0)
+    )
+    exponent = -0.1 + 1j * sqrt(1.5 - 0.01)
+    expected = np.exp(2.0 * pi * np.array([exponent, exponent.conjugate()]))
+    assert sorted(multipliers(monodromy(equation)), key=np.imag) == pytest.approx(
+        sorted(expected, key=np.imag), abs=1e-13
+    )
+
+
+def test_integration_is_of_order_twelve() -> None:
+    steps = np.array([2, 3, 4, 6, 8, 10])
+    errors = [np.abs(monodromy(GENERAL, steps=int(n)) - monodromy(GENERAL, steps=60)).max() for n in steps]
+    order = -np.polyfit(np.log(steps), np.log(errors), 1)[0]
+    assert order == pytest.approx(12.0, abs=1.0)
+
+
+def test_default_steps_leave_rounding() -> None:
+    assert monodromy(GENERAL) == pytest.approx(monodromy(GENERAL, steps=60), abs=1e-13)
+    fast = GENERAL.stiffened(2000.0)
+    assert monodromy(fast) == pytest.approx(monodromy(fast, steps=1000), abs=1e-10)
+
+
+def test_determinant_is_liouvilles() -> None:
+    assert np.linalg.det(monodromy(GENERAL)) == pytest.approx(determinant(GENERAL), abs=1e-14)
+    trace = -GENERAL.b(np.linspace(0.0, 2.0 * pi, 200, endpoint=False))
+    assert liouville(trace) == pytest.approx(np.exp(-2.0 * pi * GENERAL.b.mean))
+
+
+def test_self_adjoint_equation_keeps_the_determinant_in_every_step() -> None:
+    equation = without_spring(slider(1.0)).stiffened(0.26)
+    assert np.linalg.det(monodromy(equation, steps=2)) == pytest.approx(1.0, abs=1e-14)
+
+
+def test_many_at_once_are_each_alone() -> None:
+    equations = [GENERAL.stiffened(x) for x in np.linspace(-0.5, 1.0, 7)] + [PeriodicEquation.mathieu(1.0, 0.3)]
+    together = monodromies(equations, steps=30)
+    for equation, matrix in zip(equations, together):
+        assert matrix == pytest.approx(monodromy(equation, steps=30), abs=1e-14)
+
+
+# Mathieu
+
+
+@pytest.mark.parametrize("q", [0.05, 0.5, 2.0, 8.0])
+@pytest.mark.parametrize("number", [1, 2, 3, 4])
+def test_mathieus_tongues(q: float, number: int) -> None:
+    """By Hill and by integration, against SciPy's characteristic values."""
+    expected = sorted([mathieu_a(number, q), mathieu_b(number, q)])
+    region = hill_regions(PeriodicEquation.mathieu(0.0, q), 4)[number]
+    assert (region.low, region.high) == pytest.approx(expected, abs=1e-10)
+
+    def test(p: float) -> float:
+        return float(crossing_test(monodromy(PeriodicEquation.mathieu(p, q)), (-1) ** number))
+
+    # from outside, where the other boundary is far, to the middle of the region
+    middle, width = 0.5 * sum(expected), expected[1] - expected[0]
+    for boundary, side in zip(expected, (-1.0, 1.0)):
+        if width < 1e-4:
+            # the test is nearly a square there, and known to rounding only
+            assert abs(test(boundary)) < 1e-12
+            continue
+        assert brentq(test, middle, boundary + side * 0.4 * width, xtol=1e-12) == pytest.approx(boundary, abs=1e-8)
+
+
+def test_mathieu_below_all_regions() -> None:
+    """The least boundary of the multiplier +1 has no partner."""
+    values = boundary_stiffnesses(PeriodicEquation.mathieu(0.0, 2.0), 1, count=3)
+    assert values == pytest.approx([mathieu_a(0, 2.0), mathieu_b(2, 2.0), mathieu_a(2, 2.0)], abs=1e-10)
+
+
+# Hill
+
+
+@given(st.integers(0, 10_000))
+@settings(max_examples=40, deadline=None)
+def test_hills_multipliers_are_those_of_the_monodromy(seed: int) -> None:
+    random = np.random.default_rng(seed)
+    a, b, c = random.uniform(-0.25, 0.25, (3, 2, 4))
+    equation = PeriodicEquation(
+        a=FourierSeries(*a) + 1.5, b=FourierSeries(*b), c=FourierSeries(*c) + random.uniform(-1.0, 5.0)
+    )
+    matrix = monodromy(equation)
+    by_hill = hill_multipliers(equation)
+    # sum and product: where two multipliers meet each of them is known to the root of rounding only
+    assert by_hill.sum() == pytest.approx(np.trace(matrix), rel=1e-6, abs=1e-6)
+    assert by_hill.prod() == pytest.approx(np.linalg.det(matrix), rel=1e-6, abs=1e-6)
+
+
+@pytest.mark.parametrize("multiplier", [1, -1])
+def test_hills_determinant_is_that_of_the_monodromy(multiplier: int) -> None:
+    """Both are entire functions of the stiffness with the same zeros: their ratio does not depend on it.
+
+    What the truncation leaves of the product over the harmonics k, of c/k^2 each, falls with the inverse of the order.
+    """
+    equations = [GENERAL.stiffened(x) for x in (-0.8, 0.1, 0.55, 1.9, 3.2)]
+    by_floquet = crossing_test(monodromies(equations), multiplier)
+
+    def spread(order: int) -> float:
+        ratio = np.array([hill_determinant(e, multiplier, order=order) for e in equations]) / by_floquet
+        return float(np.ptp(ratio) / abs(ratio.mean()))
+
+    assert spread(160) < 0.05
+    assert spread(40) / spread(160) == pytest.approx(4.0, abs=0.3)
+
+
+def test_boundaries_with_damping_are_where_the_multiplier_is() -> None:
+    for multiplier in (1, -1):
+        values = boundary_stiffnesses(GENERAL, multiplier, count=5)
+        real = values[np.abs(values.imag) < 1e-9].real
+        assert len(real) > 0
+        assert crossing_test(monodromies([GENERAL.stiffened(x) for x in real]), multiplier) == pytest.approx(
+            np.zeros(len(real)), abs=1e-10
+        )
+
+
+def test_damping_removes_regions_one_by_one() -> None:
+    equation = PeriodicEquation.mathieu(0.0, 1.0)
+    assert list(hill_regions(equation, 4)) == [1, 2, 3, 4]
+    assert list(hill_regions(PeriodicEquation.mathieu(0.0, 1.0, damping=0.5), 4)) == [1]
+    assert hill_regions(PeriodicEquation.mathieu(0.0, 1.0, damping=1.2), 4) == {}
+
+
+# Perturbation
+
+
+@pytest.mark.parametrize(("order", "rate"), [(1, 2.0), (2, 3.0)])
+def test_perturbed_boundaries_approach_the_right_ones(order: int, rate: float) -> None:
+    """The error falls with the power of sigma2 that follows the last one taken in."""
+    lengths = np.array([0.005, 0.01, 0.02])
+    errors = []
+    for sigma2 in lengths:
+        equation = slider(1.0, sigma2)
+        right = hill_regions(without_spring(equation), 1)[1]
+        found = perturbed_region(equation.mass, equation.stiffness, 1, order=order)
+        assert found is not None
+        errors.append((abs(found.low - right.low), abs(found.high - right.high)))
+    rates = np.polyfit(np.log(lengths), np.log(errors), 1)[0]
+    assert rates == pytest.approx([rate, rate], abs=0.2)
+
+
+def test_second_region_needs_the_second_order() -> None:
+    """Its width is of second order, and the first harmonics make part of it."""
+    equation = slider(1.0, 0.02)
+    right = hill_regions(without_spring(equation), 2)[2]
+    first, second = (perturbed_region(equation.mass, equation.stiffness, 2, order=order) for order in (1, 2))
+    assert first is not None
+    assert second is not None
+    assert second.width == pytest.approx(right.width, rel=2e-5)
+    assert abs(first.width / right.width - 1.0) > 5e-3
+
+
+@pytest.mark.parametrize("factor", [0.0, 0.5, 0.9])
+def test_perturbed_boundaries_with_damping(factor: float) -> None:
+    equation = slider(1.0)
+    damping = factor * perturbed_removing_damping(equation.mass, equation.stiffness, 1)
+    right = hill_regions(without_spring(equation, damping), 1)[1]
+    found = perturbed_region(equation.mass, equation.stiffness, 1, damping=damping)
+    assert found is not None
+    assert (found.low, found.high) == pytest.approx((right.low, right.high), abs=2e-7)
+
+
+def test_perturbed_removing_damping() -> None:
+    equation = slider(1.0)
+    damping = perturbed_removing_damping(equation.mass, equation.stiffness, 1)
+    assert perturbed_region(equation.mass, equation.stiffness, 1, damping=1.001 * damping) is None
+    assert 1 in hill_regions(without_spring(equation, 0.999 * damping), 1)
+    assert hill_regions(without_spring(equation, 1.001 * damping), 1) == {}
+
+
+def test_equation_as_printed_has_far_too_wide_a_region() -> None:
+    """Without M' y' the harmonics of M enter the width with the wrong sign: four times too wide."""
+    right, printed = slider(1.0, variant=Variant.SECOND_ORDER), slider(1.0, variant=Variant.PRINTED)
+    exact = hill_regions(without_spring(printed), 1)[1]
+    formula = perturbed_region(right.mass, right.stiffness, 1, truncation=Truncation.PRINTED)
+    assert formula is not None
+    assert (formula.low, formula.high) == pytest.approx((exact.low, exact.high), abs=2e-6)
+    assert exact.width / hill_regions(without_spring(right), 1)[1].width == pytest.approx(3.78, abs=0.01)
+
+
+def test_appendix_3_drops_a_factor() -> None:
+    equation = slider(1.0)
+    first, right, listed = (
+        perturbed_region(equation.mass, equation.stiffness, 1, order=order, truncation=truncation)
+        for order, truncation in ((1, Truncation.RIGHT), (2, Truncation.RIGHT), (2, Truncation.APPENDIX_3))
+    )
+    assert first is not None
+    assert right is not None
+    assert listed is not None
+    middle = [0.5 * (region.low + region.high) for region in (first, right, listed)]
+    assert (middle[2] - middle[0]) / (middle[1] - middle[0]) == pytest.approx(equation.mass.mean, rel=1e-9)
+
+
+# Verdicts
+
+
+def test_verdicts() -> None:
+    stable = verdict([0.5 + 0.2j, 0.5 - 0.2j])
+    assert stable.stability is Stability.STABLE
+    assert stable.margin == pytest.approx(1.0 - sqrt(0.29))
+    assert stable.crossing is Crossing.TORUS
+    unstable = verdict([0.3, -1.2])
+    assert unstable.stability is Stability.UNSTABLE
+    assert unstable.margin == pytest.approx(-0.2)
+    assert unstable.largest_multiplier == -1.2
+    assert unstable.crossing is Crossing.PERIOD_DOUBLING
+    assert verdict([1.0 + 1e-8, 0.1]).stability is Stability.MARGINAL
+    assert verdict([1.0 + 1e-8, 0.1], tolerance=1e-9).stability is Stability.UNSTABLE
+    assert crossing(1.01) is Crossing.FOLD
+    assert str(unstable) == "unstable, margin -0.2 with tolerance 1e-06"
+
+
+def test_verdict_is_no_boolean() -> None:
+    with pytest.raises(VerdictError, match="no yes or no"):
+        bool(verdict([0.5]))
+    with pytest.raises(TypeError):
+        assert not verdict([0.5])
+
+
+def test_undamped_equation_is_marginal_outside_its_regions() -> None:
+    outside, inside = (without_spring(slider(1.0)).stiffened(x) for x in (0.26, 0.2675))
+    assert verdict(multipliers(monodromy(outside))).stability is Stability.MARGINAL
+    assert verdict(multipliers(monodromy(inside))).stability is Stability.UNSTABLE
+
+
+def test_bad_arguments_are_refused() -> None:
+    with pytest.raises(InputError, match="not finite"):
+        multipliers([[np.nan, 0.0], [0.0, 1.0]])
+    with pytest.raises(InputError, match="finite numbers"):
+        verdict([])
+    with pytest.raises(InputError, match="tolerance"):
+        verdict([0.5], tolerance=-1.0)
+    with pytest.raises(InputError, match="finite numbers"):
+        liouville([])
+    with pytest.raises(InputError, match=r"\+1 or -1"):
+        hill_determinant(GENERAL, 2)
+    with pytest.raises(InputError, match="order is 0"):
+        hill_multipliers(GENERAL, order=0)
+    with pytest.raises(InputError, match="at least one equation"):
+        monodromies([])
+    with pytest.raises(InputError, match="steps is 0"):
+        monodromy(GENERAL, steps=0)
+    with pytest.raises(InputError, match="boundaries from"):
+        boundary_stiffnesses(GENERAL, 1, count=10, order=2)
+    with pytest.raises(SingularEquationError, match="passes zero in equation 1"):
+        monodromies([GENERAL, replace(GENERAL, a=series((1.0, 0.0), (1.5, 0.0)))])
+    with pytest.raises(InputError, match="count from 1"):
+        perturbed_region(GENERAL.a, GENERAL.c, 0)
+    with pytest.raises(InputError, match="lambda_c"):
+        perturbed_region(GENERAL.a, GENERAL.c, 1, damping=-1.0)
+    with pytest.raises(InputError, match="mean of M"):
+        perturbed_region(FourierSeries.constant(-1.0), GENERAL.c, 1)

@@ -1,0 +1,479 @@
+"""Linear models: against complex steps of the plain functions, small nonlinear motions, and Floquet theory."""
+
+from __future__ import annotations
+
+import cmath
+from dataclasses import replace
+from functools import cache
+from math import pi
+from types import FunctionType, ModuleType, SimpleNamespace
+from typing import Any
+
+import control
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from scipy.linalg import eigh
+
+from analysis import Harmonics, InductionMotor, Inputs, simulate
+from analysis.linearise import (
+    AT_REST,
+    LEAST_SAMPLES,
+    LINEAR_OUTPUTS,
+    SPEED_INPUTS,
+    TORQUE_INPUTS,
+    WITHOUT,
+    EquilibriumError,
+    LinearModelError,
+    find_equilibria,
+    find_equilibrium,
+    linearise,
+    linearise_along,
+    settled_motion,
+)
+from analysis.orbits import find_orbit
+from linkwork.errors import AssemblyError, InputError, UnknownNameError
+from linkwork.five_bar import dynamics, kinematics
+from linkwork.five_bar.parameters import InitialState
+from linkwork.five_bar.published import SETS, TABLE_3_1
+from linkwork.five_bar.variables import OUTPUT_NAMES
+from tests.strategies import seeded
+
+pytest.importorskip("casadi")
+
+TURNING = dynamics.Inputs(1.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+#: Far below every value, so that a complex step has no error but rounding.
+STEP = 1e-30
+PLAIN_INPUTS = ("torque", "acceleration", "force", "load_x", "load_y")
+
+
+def complex_atan2(y: complex, x: complex) -> complex:
+    real = cmath.phase(complex(x.real, y.real))
+    # the derivative, on the branch that the real parts are on
+    slope = (x.real * y.imag - y.real * x.imag) / (x.real**2 + y.real**2)
+    return complex(real, slope)
+
+
+@cache
+def plain() -> SimpleNamespace:
+    """The plant's functions for complex numbers, bound anew and not by way of `analysis.symbolic`."""
+    elementary = {name: getattr(cmath, name) for name in ("sin", "cos", "sqrt", "tanh")} | {
+        "atan2": lambda y, x: complex_atan2(complex(y), complex(x))
+    }
+
+    def bound(module: ModuleType, others: dict[str, Any]) -> dict[str, Any]:
+        space = dict(vars(module)) | {name: f for name, f in others.items() if name in vars(module)}
+        for name, f in vars(module).items():
+            if isinstance(f, FunctionType) and f.__module__ == module.__name__:
+                space[name] = FunctionType(f.__code__, space, name)
+        return space
+
+    first = bound(kinematics, elementary)
+    own = {name: f for name, f in first.items() if isinstance(f, FunctionType)}
+    return SimpleNamespace(**bound(dynamics, elementary | own))
+
+
+def complex_step(f: Any, x: Any) -> np.ndarray:
+    """Derivatives of f with respect to each component of x, a column each."""
+    columns = []
+    for j in range(len(x)):
+        moved = [complex(value) for value in x]
+        moved[j] += 1j * STEP
+        columns.append(np.imag(np.array(f(moved), dtype=complex)) / STEP)
+    return np.array(columns).T
+
+
+def residual(q: Any, qd: Any, qdd: Any, i: Any, p: Any) -> tuple[complex, complex]:
+    f = plain()
+    g = f.position(q[0], q[1], p)
+    k = f.coefficients(g, p)
+    w3, w4 = k.k32 * qd[0] + k.k3u * qd[1], k.k42 * qd[0] + k.k4u * qd[1]
+    m = f.inertia(g, k, p)
+    b1, b2 = f.velocity_terms(g, k, qd[0], w3, w4, *f.centripetal(g, qd[0], w3, w4, p), p)
+    q1, q2 = f.applied_forces(g, k, q[1], qd[1], i.load_x, i.load_y, p)
+    return (
+        m.m11 * qdd[0] + m.m12 * qdd[1] + b1 - q1 - i.torque,
+        m.m12 * qdd[0] + m.m22 * qdd[1] + b2 - q2 - i.force,
+    )
+
+
+def assert_near(actual: np.ndarray, exact: np.ndarray, tolerance: float = 1e-10) -> None:
+    """To the tolerance, relative to the largest entry of each row."""
+    assert actual.shape == exact.shape
+    size = np.abs(exact).max(axis=1, keepdims=True)
+    assert np.all(np.abs(actual - exact) <= tolerance * size + 1e-300), np.abs(actual - exact).max()
+
+
+@pytest.mark.parametrize("seed", range(25))
+def test_second_order_form_is_that_of_complex_steps(seed: int) -> None:
+    case = seeded(seed)
+    p, x, i = case.parameters.constants(), case.state, case.torque_inputs
+    q, qd = x[:2], x[2:4]
+    qdd = dynamics.derivative(x, i, p)[2:4]
+    model = linearise(case.parameters, x, i)
+    assert max(map(abs, residual(q, qd, qdd, i, p))) < 1e-9
+    assert_near(model.M, complex_step(lambda a: residual(q, qd, a, i, p), qdd))
+    assert_near(model.C, complex_step(lambda r: residual(q, r, qdd, i, p), qd))
+    assert_near(model.K, complex_step(lambda c: residual(c, qd, qdd, i, p), q))
+    names = ("torque", "force", "load_x", "load_y")
+    forces = complex_step(
+        lambda w: residual(q, qd, qdd, i._replace(**dict(zip(names, w))), p), [getattr(i, name) for name in names]
+    )
+    assert_near(model.F, -forces)
+    assert model.M[0, 1] == model.M[1, 0]
+
+
+def by_state(f: Any, x: Any, i: Any, p: Any) -> np.ndarray:
+    return complex_step(lambda y: f((*y, 0.0, 0.0), i, p), x[:4])
+
+
+def by_inputs(f: Any, x: Any, i: Any, p: Any) -> dict[str, np.ndarray]:
+    columns = {}
+    for name in PLAIN_INPUTS:
+        columns[name] = complex_step(lambda w, name=name: f(x, i._replace(**{name: w[0]}), p), [getattr(i, name)])[:, 0]
+    return columns
+
+
+FUNCTIONS = {
+    "derivative": lambda x, i, p: plain().derivative(x, i, p)[:4],
+    "outputs": lambda x, i, p: [
+        value for name, value in zip(OUTPUT_NAMES, plain().outputs(x, i, 0.0, p)) if name not in WITHOUT
+    ],
+}
+
+
+@pytest.mark.parametrize("seed", range(25))
+def test_first_order_form_and_outputs_are_those_of_complex_steps_in_torque_drive(seed: int) -> None:
+    case = seeded(seed)
+    p, x, i = case.parameters.constants(), case.state, case.torque_inputs
+    model = linearise(case.parameters, x, i)
+    for f, state, inputs in (("derivative", model.A, model.B), ("outputs", model.H, model.D)):
+        assert_near(state, by_state(FUNCTIONS[f], x, i, p))
+        columns = by_inputs(FUNCTIONS[f], x, i, p)
+        assert_near(inputs, np.column_stack([columns[n] for n in ("torque", "force", "load_x", "load_y")]))
+    assert model.input_names == TORQUE_INPUTS
+
+
+@pytest.mark.parametrize("seed", range(25))
+def test_first_order_form_and_outputs_are_those_of_complex_steps_in_speed_drive(seed: int) -> None:
+    case = seeded(seed)
+    p, x, i = case.parameters.constants(), case.state, case.speed_inputs
+    model = linearise(case.parameters, x, i)
+    assert (model.M.shape, model.input_names) == ((1, 1), SPEED_INPUTS)
+    for f, state, inputs in (("derivative", model.A, model.B), ("outputs", model.H, model.D)):
+        whole, columns = by_state(FUNCTIONS[f], x, i, p), by_inputs(FUNCTIONS[f], x, i, p)
+        exact = np.column_stack(
+            [columns[n] for n in ("force", "load_x", "load_y", "acceleration")] + [whole[:, 2], whole[:, 0]]
+        )
+        rows = [1, 3] if f == "derivative" else slice(None)
+        assert_near(state, whole[rows][:, [1, 3]])
+        assert_near(inputs, exact[rows])
+
+
+def test_the_outputs_at_the_point_are_the_plants() -> None:
+    case = seeded(3)
+    model = linearise(case.parameters, case.state, case.torque_inputs)
+    exact = dynamics.outputs(case.state, case.torque_inputs, 0.0, case.parameters.constants())
+    named = dict(zip(OUTPUT_NAMES, exact))
+    assert model.outputs == pytest.approx([named[name] for name in LINEAR_OUTPUTS], rel=1e-11)
+    assert model.acceleration == pytest.approx([named["crank.acceleration"], named["slider.acceleration"]], rel=1e-11)
+
+
+# equilibria
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_the_plant_rests_at_every_equilibrium(seed: int) -> None:
+    case = seeded(seed)
+    p = case.parameters
+    loads = {"slider_force": case.torque_inputs.force / 10.0, "load": (1.0, -2.0), "crank_torque": 0.05}
+    found = find_equilibria(p, **loads)
+    assert found
+    assert list(found) == sorted(found, key=lambda one: one.potential)
+    for one in found:
+        rates = dynamics.derivative(one.state, one.inputs, p.constants())
+        model = linearise(p, one.state, one.inputs)
+        assert np.abs(model.M @ rates[2:4]).max() < 1e-8
+        assert_near(model.K, one.stiffness)
+        # constant forces have a potential
+        assert model.K[0, 1] == pytest.approx(model.K[1, 0], rel=1e-7, abs=1e-7)
+        assert one.stable == (np.linalg.eigvalsh(one.stiffness)[0] > 0.0)
+        assert (model.poles.real.max() > 1e-9 * np.abs(model.poles).max()) == (not one.stable)
+
+
+def test_equilibria_of_table_3_1() -> None:
+    found = find_equilibria(TABLE_3_1)
+    assert [one.stable for one in found] == [True, False, False, False, False, False]
+    hanging = find_equilibrium(TABLE_3_1)
+    assert hanging.crank_angle == found[0].crank_angle
+    # a free crank without weight of its own hangs where the coupler's weight pulls it, near straight down
+    assert -0.6 * pi < hanging.crank_angle < -0.5 * pi
+    # and every configuration beside it is higher
+    for d2, du in ((1e-3, 0.0), (-1e-3, 0.0), (0.0, 1e-4), (0.0, -1e-4)):
+        moved = replace(hanging, crank_angle=hanging.crank_angle + d2, slider_position=hanging.slider_position + du)
+        assert moved.potential > hanging.potential
+
+
+def test_equilibrium_with_the_crank_held() -> None:
+    held = find_equilibrium(TABLE_3_1, crank_angle=0.3, slider_force=2.0)
+    p = TABLE_3_1.constants()
+    outputs = dynamics.outputs(held.state, held.inputs, 0.0, p)
+    assert abs(outputs.slider_acceleration) < 1e-10
+    assert held.torque == pytest.approx(outputs.drive_applied_torque, rel=1e-10)
+    assert (held.crank_angle, held.stable) == (0.3, True)
+    # the same torque on a free crank keeps it there
+    free = find_equilibrium(TABLE_3_1, crank_torque=held.torque, slider_force=2.0, guess=(0.31, 0.0))
+    assert (free.crank_angle, free.slider_position) == pytest.approx((0.3, held.slider_position), abs=1e-9)
+
+
+def test_a_neutral_equilibrium_is_found_and_not_called_stable() -> None:
+    horizontal = SETS["rig-2-spring-c"].parameters
+    one = find_equilibrium(horizontal, guess=(0.4, 0.001))
+    assert one.slider_position == pytest.approx(0.0, abs=1e-12)
+    assert not one.stable
+
+
+def test_no_equilibrium_is_told() -> None:
+    loose = replace(TABLE_3_1, gravity=0.0, slider_stiffness=0.0)
+    with pytest.raises(EquilibriumError, match=r"no equilibrium under .* slider force 5 N"):
+        find_equilibrium(loose, slider_force=5.0)
+    with pytest.raises(EquilibriumError, match=r"crank held at 0.3 rad"):
+        find_equilibrium(loose, slider_force=5.0, crank_angle=0.3)
+    with pytest.raises(EquilibriumError, match=r"imbalance of 0.25 N.m is left"):
+        find_equilibrium(loose, slider_force=5.0, crank_angle=0.3, guess=(0.0, 0.0))
+
+
+def test_bad_statics_are_told() -> None:
+    with pytest.raises(InputError, match="crank torque is nan"):
+        find_equilibrium(TABLE_3_1, crank_torque=float("nan"))
+    with pytest.raises(InputError, match="crank is held"):
+        find_equilibrium(TABLE_3_1, crank_torque=1.0, crank_angle=0.0)
+    with pytest.raises(InputError, match="crank angle is inf"):
+        find_equilibrium(TABLE_3_1, crank_angle=float("inf"))
+    with pytest.raises(AssemblyError, match="cannot be joined"):
+        find_equilibrium(TABLE_3_1, guess=(0.0, 1.0))
+
+
+# against nonlinear motions
+
+
+@pytest.mark.parametrize("mode", [0, 1])
+def test_small_oscillations_have_the_frequencies_and_shapes_of_the_model(mode: int) -> None:
+    undamped = replace(TABLE_3_1, slider_damping=0.0)
+    rest = find_equilibrium(undamped)
+    model = linearise(undamped, rest.state, rest.inputs)
+    squares, shapes = eigh(model.K, model.M)
+    scale = np.array([1.0, 1.0 / undamped.crank_length])
+    frequency, shape = np.sqrt(squares[mode]), shapes[:, mode] / np.abs(scale * shapes[:, mode]).max()
+    assert model.natural_frequencies[mode] == pytest.approx(frequency, rel=1e-10)
+    errors = []
+    for size in (1e-3, 1e-4):
+        start = InitialState(
+            crank_angle=rest.crank_angle + size * shape[0], slider_position=rest.slider_position + size * shape[1]
+        )
+        run = simulate(undamped, initial=start, stop_time=10.0 * pi / frequency, step=1e-2, tolerance=1e-13)
+        moved = np.array([run["crank.angle"] - rest.crank_angle, run["slider.position"] - rest.slider_position])
+        exact = np.outer(shape, np.cos(frequency * run.time))
+        errors.append(np.abs(scale[:, None] * (moved / size - exact)).max())
+    # over five periods; a frequency wrong by 1e-4 would show as 3e-3 at any amplitude
+    assert errors[1] < 3e-3
+    assert errors[1] < 0.15 * errors[0]
+
+
+@pytest.mark.parametrize("drive", ["free", "held"])
+@pytest.mark.parametrize("channel", ["slider.force", "load.fx", "drive.torque"])
+def test_step_responses_are_the_plants_to_first_order(drive: str, channel: str) -> None:
+    if drive == "held" and channel == "drive.torque":
+        pytest.skip("a held crank takes no torque")
+    parameters = replace(TABLE_3_1, coupler_point_distance=0.1, coupler_point_angle=0.4)
+    rest = find_equilibrium(parameters, crank_angle=0.5 if drive == "held" else None)
+    names = ("slider.position", "coupler.angle", "pin.C.fx", "slider.guide_force")
+    model = linearise(parameters, rest.state, rest.inputs)
+    system = model.to_state_space(names, (channel,))
+    times = np.linspace(0.0, 0.3, 61)
+    response = control.step_response(system, times, squeeze=False).outputs[:, 0, :]
+    key = {"slider.force": "force", "load.fx": "load_x", "drive.torque": "torque"}[channel]
+    at_rest = np.array([model.outputs[LINEAR_OUTPUTS.index(name)] for name in names])
+    initial = InitialState(crank_angle=rest.crank_angle, slider_position=rest.slider_position)
+    speed = {"speed": 0.0} if drive == "held" else {}
+    errors = []
+    for size in (0.1, 0.01):
+        inputs = Inputs(**{key: size}, **speed)
+        run = simulate(parameters, inputs, initial=initial, stop_time=0.3, step=5e-3, tolerance=1e-13)
+        deviation = np.array([run[name] for name in names]) - at_rest[:, None]
+        errors.append(np.abs(deviation - size * response).max(axis=1) / np.abs(response).max(axis=1))
+    # what a linear model leaves out goes with the square of the amplitude
+    assert np.all(errors[1] < 0.02 * errors[0] + 1e-9)
+    assert np.all(errors[1] < 0.1 * 0.01)
+
+
+def test_crank_motion_acts_on_the_slider_by_its_three_inputs() -> None:
+    """A crank that is swung about where it was held: x'' by acceleration, speed and angle together."""
+    rest = find_equilibrium(TABLE_3_1, crank_angle=0.5)
+    system = linearise(TABLE_3_1, rest.state, rest.inputs).to_state_space(
+        inputs=("drive.acceleration", "drive.speed", "crank.angle")
+    )
+    times = np.linspace(0.0, 0.4, 401)
+    w = 40.0
+    swing = np.array([-w * w * np.sin(w * times), w * np.cos(w * times) - w, np.sin(w * times) - w * times])
+    response = control.forced_response(system, times, swing).outputs
+    initial = InitialState(crank_angle=0.5, slider_position=rest.slider_position)
+    errors = []
+    for size in (1e-3, 1e-4):
+        speed = (Harmonics(mean=-w * size, amplitudes=[w * size], frequencies=[w], phases=[0.0]),)
+        run = simulate(TABLE_3_1, Inputs(speed=speed), initial=initial, stop_time=0.4, step=1e-3, tolerance=1e-13)
+        errors.append(np.abs(run["slider.position"] - rest.slider_position - size * response).max() / size)
+    # python-control takes inputs along straight lines between the samples
+    assert errors[0] < 0.05 * np.abs(response).max()
+    assert errors[1] < 0.15 * errors[0] + 2e-4 * np.abs(response).max()
+
+
+# periodic motions
+
+
+@pytest.fixture(scope="module")
+def turning():
+    table = SETS["table-3.1"]
+    return linearise_along(TABLE_3_1, settled_motion(TABLE_3_1, table.crank_speed), TURNING)
+
+
+def test_monodromy_is_that_of_the_variational_equations(turning) -> None:
+    orbit = find_orbit(TABLE_3_1, speed=SETS["table-3.1"].crank_speed)
+    assert turning.monodromy() == pytest.approx(orbit.monodromy, rel=1e-7)
+    along = linearise_along(TABLE_3_1, orbit)
+    assert along.monodromy() == pytest.approx(orbit.monodromy, rel=1e-7)
+    assert along.period == pytest.approx(turning.period, rel=1e-12)
+    assert along.states[:, :4] == pytest.approx(turning.states[:, :4], abs=1e-7)
+
+
+def test_multipliers_of_a_motor_drive() -> None:
+    """The crank's speed varies: equal angles are no equal times, and the motor's slope is a feedback of the speed."""
+    motor = InductionMotor(breakdown_torque=6.0, breakdown_slip=0.2, synchronous_speed=40.0)
+    orbit = find_orbit(TABLE_3_1, torque=motor)
+    along = linearise_along(TABLE_3_1, orbit, samples=256)
+    assert np.ptp(along.states[:, 2]) > 1.0
+
+    def torque(w2: complex) -> complex:
+        slip = 1.0 - w2 / 40.0
+        return 12.0 / (slip / 0.2 + 0.2 / slip)
+
+    w2 = along.states[:, 2]
+    assert [i.torque for i in along.inputs] == pytest.approx(torque(w2), rel=1e-9)
+    closed = along.A.copy()
+    closed[:, :, 2] += along.B[:, :, 0] * np.imag(torque(w2 + 1e-30j) / 1e-30)[:, None]
+    a = along.interpolated(closed)
+    end = solve_ivp(
+        lambda t, y: (a(t) @ y.reshape(4, 4)).ravel(),
+        (0.0, along.period),
+        np.eye(4).ravel(),
+        method="DOP853",
+        rtol=1e-11,
+        atol=1e-13,
+    ).y[:, -1]
+    values = np.linalg.eigvals(end.reshape(4, 4))
+    values = values[np.argsort(np.abs(values - 1.0))]
+    # along the motion nothing dies out; across it, the multipliers of the section
+    assert values[0] == pytest.approx(1.0, abs=1e-6)
+    expected = sorted(orbit.multipliers, key=lambda z: (abs(z), z.imag))
+    assert np.array(sorted(values[1:], key=lambda z: (abs(z), z.imag))) == pytest.approx(np.array(expected), abs=1e-6)
+
+
+def test_liouville(turning) -> None:
+    trace = np.trace(turning.A, axis1=1, axis2=2).mean() * turning.period
+    assert np.linalg.det(turning.monodromy()) == pytest.approx(np.exp(trace), rel=1e-8)
+
+
+def test_the_samples_are_models_and_their_mean_is_the_mean(turning) -> None:
+    one = turning[5]
+    alone = linearise(TABLE_3_1, turning.states[5], TURNING)
+    for name in ("M", "C", "K", "F", "H", "D", "A", "B", "outputs"):
+        assert getattr(one, name) == pytest.approx(getattr(alone, name), rel=1e-13, abs=1e-13)
+    mean = turning.mean()
+    assert pytest.approx(np.mean([m.K[0, 0] for m in map(turning.__getitem__, range(len(turning)))])) == mean.K[0, 0]
+    assert turning.motion()(turning.times[7]) == pytest.approx(turning.states[7, :4], abs=1e-9)
+
+
+def test_rig_2_resonates_where_the_thesis_measured() -> None:
+    """Youssef, chapter VIII: 585 rpm with spring C, 825 with D."""
+    for name, rpm in (("rig-2-spring-c", 585.0), ("rig-2-spring-d", 825.0)):
+        p = SETS[name].parameters
+        mean = linearise_along(p, settled_motion(p, 40.0), TURNING).mean()
+        assert mean.natural_frequencies[0] * 30.0 / pi == pytest.approx(rpm, rel=0.005)
+
+
+# refusals
+
+
+def test_names_that_there_are_not(turning) -> None:
+    model = turning.mean()
+    with pytest.raises(UnknownNameError, match=r"slider\.positon; did you mean slider\.position"):
+        model.to_state_space(("slider.positon",))
+    with pytest.raises(UnknownNameError, match=r"there is no drive\.torque"):
+        model.to_state_space(inputs=("drive.torque",))
+    with pytest.raises(LinearModelError, match="an integral over the run"):
+        model.to_state_space(("energy.supplied",))
+    with pytest.raises(LinearModelError, match="zero everywhere"):
+        model.to_state_space(("closure.residual",))
+
+
+def test_bad_states_are_told() -> None:
+    with pytest.raises(InputError, match="shape"):
+        linearise(TABLE_3_1, (0.0, 0.0, 0.0))
+    with pytest.raises(InputError, match="not finite"):
+        linearise(TABLE_3_1, (0.0, 0.0, np.nan, 0.0))
+    with pytest.raises(InputError, match=r"inputs .* not finite"):
+        linearise(TABLE_3_1, (0.0, 0.0, 0.0, 0.0), AT_REST._replace(force=np.inf))
+    with pytest.raises(InputError, match=r"speed_drive is 0\.5"):
+        linearise(TABLE_3_1, (0.0, 0.0, 0.0, 0.0), AT_REST._replace(speed_drive=0.5))
+    with pytest.raises(AssemblyError):
+        linearise(TABLE_3_1, (0.0, 1.0, 0.0, 0.0))
+    with pytest.raises(InputError, match="many by linearise_along"):
+        linearise(TABLE_3_1, np.zeros((2, 4)))
+
+
+def test_bad_motions_are_told(turning) -> None:
+    states = turning.states
+    with pytest.raises(InputError, match=f"at least {LEAST_SAMPLES}"):
+        linearise_along(TABLE_3_1, states[:5], TURNING)
+    with pytest.raises(InputError, match="not evenly spaced over one period"):
+        linearise_along(TABLE_3_1, np.vstack([states, states[:1]]), TURNING)
+    with pytest.raises(InputError, match="not evenly spaced over one period"):
+        linearise_along(TABLE_3_1, states, TURNING, period=2.0 * turning.period)
+    with pytest.raises(InputError, match="period must be given"):
+        linearise_along(TABLE_3_1, states)
+    with pytest.raises(InputError, match=r"period is -1\.0 s"):
+        linearise_along(TABLE_3_1, states, TURNING, period=-1.0)
+    with pytest.raises(InputError, match="all of one drive"):
+        linearise_along(TABLE_3_1, states, [TURNING, AT_REST] * (len(states) // 2))
+    with pytest.raises(InputError, match="crank speed is 0"):
+        settled_motion(TABLE_3_1, 0.0)
+    with pytest.raises(LinearModelError, match="has not settled after 3 turns"):
+        settled_motion(SETS["rig-2-spring-c"].parameters, 40.0, turns=3)
+
+
+# for python-control, and drawn
+
+
+def test_state_space_has_the_names_and_poles_of_the_model() -> None:
+    rest = find_equilibrium(TABLE_3_1)
+    model = linearise(TABLE_3_1, rest.state, rest.inputs)
+    system = model.to_state_space(("slider.position", "pin.C.fx"))
+    assert system.input_labels == ["drive_torque", "slider_force", "load_fx", "load_fy"]
+    assert system.output_labels == ["slider_position", "pin_C_fx"]
+    assert system.state_labels == ["crank_angle", "slider_position", "crank_speed", "slider_velocity"]
+    assert np.sort_complex(system.poles()) == pytest.approx(np.sort_complex(model.poles), rel=1e-10)
+
+
+def test_bode_and_pole_plots(turning) -> None:
+    model = turning.mean()
+    above, below = model.plot_bode(frequencies=[1.0, 10.0, 100.0], title="one").axes
+    assert (above.get_ylabel(), below.get_xlabel()) == ("magnitude [m/N]", "frequency [rad/s]")
+    m, c, k = model.M[0, 0], model.C[0, 0], model.K[0, 0]
+    exact = [1.0 / (k - m * w * w + 1j * c * w) for w in (1.0, 10.0, 100.0)]
+    assert above.lines[0].get_ydata() == pytest.approx(np.abs(exact), rel=1e-9)
+    assert below.lines[0].get_ydata() == pytest.approx(np.degrees(np.angle(exact)), rel=1e-9)
+    axis = model.plot_poles(output="slider.acceleration").axes[0]
+    curves = {line.get_label(): line for line in axis.lines}
+    assert np.abs(curves["poles"].get_xdata()) == pytest.approx(np.abs(model.poles.real))
+    # force to acceleration: two zeros at nothing
+    assert curves["zeros"].get_ydata() == pytest.approx([0.0, 0.0], abs=1e-6)
