@@ -27,6 +27,7 @@ bench: $(READY)
 	$(BIN)/pip install --quiet --editable '.[dev,bench]'
 	$(BIN)/python -m benchmarks.solvers
 	$(BIN)/python -m benchmarks.fmu
+	$(BIN)/python -m benchmarks.stability
 
 $(READY): pyproject.toml
 	@$(PYTHON) -c 'import sys; sys.exit(0 if sys.version_info >= (3, 11) else "Linkwork needs Python 3.11 or newer: set PYTHON=python3.x")'

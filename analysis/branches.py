@@ -8,8 +8,8 @@ motion of twice the period.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
 from math import pi
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -213,6 +213,8 @@ class Branch:
     reached: bool
     closed: bool
     reason: str
+    # what `columns` has computed
+    _table: dict[str, NDArray[np.float64]] = field(default_factory=dict, init=False, repr=False)
 
     def __len__(self) -> int:
         return len(self.orbits)
@@ -220,7 +222,7 @@ class Branch:
     @property
     def amplitude(self) -> NDArray[np.float64]:
         """Half the range of the slider position at each point (m), shape (m,)."""
-        return np.array([orbit.amplitude for orbit in self.orbits])
+        return self.columns()["amplitude of u [m]"]
 
     @property
     def largest_multiplier(self) -> NDArray[np.float64]:
@@ -231,39 +233,23 @@ class Branch:
         """Verdict at each point."""
         return tuple(orbit.verdict(tolerance).stability for orbit in self.orbits)
 
-    def turns_of(self, samples: int = 256) -> list[Turn]:
-        """One period of each orbit."""
-        return [orbit.turn(samples) for orbit in self.orbits]
+    def columns(self) -> Mapping[str, NDArray[np.float64]]:
+        """What varies along the branch, by name with unit, each of shape (m,).
 
-    def columns(self, orders: Sequence[float] = (1, 2, 3)) -> dict[str, NDArray[np.float64]]:
-        """What varies along the branch, by name with unit: amplitude, mean, harmonics, multiplier, torque, pin forces."""
-        turns = self.turns_of()
+        The parameter, mean speed (under a torque), turns in a period, amplitude, mean and first harmonics of u, largest
+        multiplier, stability, mean and greatest crank torque, greatest pin and guide forces, least transmission sine.
+        """
+        if not self._table:
+            turns = [orbit.turn() for orbit in self.orbits]
+            self._table.update({name: np.array([value(turn) for turn in turns]) for name, value in _OF_A_TURN.items()})
         unit = f" [{self.family.unit}]" if self.family.unit else ""
-        columns = {f"{self.family.name}{unit}": self.parameter}
-        if not self.orbits[0].drive.speed_drive:
-            columns["mean crank speed [rad/s]"] = np.array([2.0 * pi * t.turns / t.period for t in turns])
-        columns |= {
+        first = {
+            f"{self.family.name}{unit}": self.parameter,
             "turns in a period [1]": np.full(len(self), float(self.turns)),
-            "amplitude of u [m]": self.amplitude,
-            "mean of u [m]": np.array([turn["slider.position"].mean() for turn in turns]),
-        }
-        for order in orders:
-            columns[f"harmonic {order:g} of u [m]"] = np.array([t.harmonic("slider.position", order) for t in turns])
-        columns |= {
             "largest multiplier [1]": self.largest_multiplier,
             "stable (1), marginal (0), unstable (-1)": np.array([_SIGN[s] for s in self.stability()]),
-            "mean crank torque [N.m]": np.array([t["drive.applied_torque"].mean() for t in turns]),
-            "greatest crank torque [N.m]": np.array([np.abs(t["drive.applied_torque"]).max() for t in turns]),
         }
-        for pin in "ABCD":
-            columns[f"greatest force in pin {pin} [N]"] = np.array(
-                [np.hypot(t[f"pin.{pin}.fx"], t[f"pin.{pin}.fy"]).max() for t in turns]
-            )
-        columns["greatest guide force [N]"] = np.array([np.abs(t["slider.guide_force"]).max() for t in turns])
-        columns["least sine of the transmission angle [1]"] = np.array(
-            [np.abs(np.sin(t["transmission.angle"])).min() for t in turns]
-        )
-        return columns
+        return first | self._table
 
     def to_csv(self, path: str | Path) -> Path:
         """Write the branch as a table, a row a point; see `columns`."""
@@ -275,6 +261,28 @@ class Branch:
 
         return figures.plot_branches([self], title=title)
 
+
+def _greatest_of(pin: str) -> Callable[[Turn], float]:
+    return lambda turn: float(np.hypot(turn[f"pin.{pin}.fx"], turn[f"pin.{pin}.fy"]).max())
+
+
+#: Columns of a branch that come from the outputs over a period.
+_OF_A_TURN: Mapping[str, Callable[[Turn], float]] = {
+    "mean crank speed [rad/s]": lambda turn: 2.0 * pi * turn.turns / turn.period,
+    "amplitude of u [m]": lambda turn: turn.amplitude,
+    "mean of u [m]": lambda turn: float(turn["slider.position"].mean()),
+    "harmonic 1 of u [m]": lambda turn: turn.harmonic("slider.position", 1),
+    "harmonic 2 of u [m]": lambda turn: turn.harmonic("slider.position", 2),
+    "harmonic 3 of u [m]": lambda turn: turn.harmonic("slider.position", 3),
+    "mean crank torque [N.m]": lambda turn: float(turn["drive.applied_torque"].mean()),
+    "greatest crank torque [N.m]": lambda turn: float(np.abs(turn["drive.applied_torque"]).max()),
+    "greatest force in pin A [N]": _greatest_of("A"),
+    "greatest force in pin B [N]": _greatest_of("B"),
+    "greatest force in pin C [N]": _greatest_of("C"),
+    "greatest force in pin D [N]": _greatest_of("D"),
+    "greatest guide force [N]": lambda turn: float(np.abs(turn["slider.guide_force"]).max()),
+    "least sine of the transmission angle [1]": lambda turn: float(np.abs(np.sin(turn["transmission.angle"])).min()),
+}
 
 _SIGN = {Stability.STABLE: 1.0, Stability.MARGINAL: 0.0, Stability.UNSTABLE: -1.0}
 

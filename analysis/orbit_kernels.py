@@ -38,6 +38,9 @@ from .compiled import (
     kernel,
 )
 
+# what Numba traces while it compiles would fail with an error of Numba's: say it here
+symbolic.library()
+
 #: What drives the plant over an orbit: the prescribed speed, or the torque and an induction motor's breakdown torque,
 #: breakdown slip and synchronous speed (no motor with breakdown torque 0); slider force and load at P.
 DRIVE = ("level", "breakdown_torque", "breakdown_slip", "synchronous_speed", "force", "load_x", "load_y")

@@ -178,6 +178,14 @@ class Turn:
             raise InputError(f"an orbit has no output {name!r}: it has {', '.join(self.names)}")
         return self.values[:, self.names.index(name)]
 
+    @property
+    def amplitude(self) -> float:
+        """Half the distance between the least and the greatest slider position (m), from the Fourier series of the turn."""
+        u = self["slider.position"]
+        n = 8 * len(u)
+        fine = np.fft.irfft(np.fft.rfft(u), n) * (n / len(u))
+        return 0.5 * float(np.ptp(fine))
+
     def harmonic(self, name: str, order: float) -> float:
         """Amplitude of a harmonic of an output, its order counted in turns of the crank: 1/2 where the period is two turns.
 
@@ -270,11 +278,8 @@ class PeriodicOrbit:
 
     @property
     def amplitude(self) -> float:
-        """Half the distance between the least and the greatest slider position (m), from the Fourier series of the turn."""
-        u = self.turn()["slider.position"]
-        n = 8 * len(u)
-        fine = np.fft.irfft(np.fft.rfft(u), n) * (n / len(u))
-        return 0.5 * float(np.ptp(fine))
+        """Half the distance between the least and the greatest slider position (m)."""
+        return self.turn().amplitude
 
     def determinant_by_liouville(self, samples: int = 512) -> float:
         """Determinant of the monodromy matrix from the trace of the rates' Jacobian along the orbit.

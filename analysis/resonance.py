@@ -484,7 +484,7 @@ class Approximations:
         return {"drive.speed [rad/s]": self.speed} | {f"{name} [m]": v for name, v in self.amplitudes.items()}
 
 
-def approximations(response: Response, points: int = 400) -> Approximations:
+def approximations(response: Response, points: int = 160) -> Approximations:
     """The classical approximations over the range of a response: two harmonics as printed and put right, and ten harmonics.
 
     Raises

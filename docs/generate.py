@@ -49,6 +49,34 @@ INTERNAL = (
     ("xp, yp", r"r \cos a_2, r \sin a_2", "m", "coupler point P along and across the coupler"),
     ("ca, sa", r"\cos\alpha, \sin\alpha", "1", "direction of the guide"),
     ("gx, gy", r"-g \sin\alpha_1, -g \cos\alpha_1", "m/s2", "gravity in the frame of the ground link"),
+    ("zeta", r"\zeta = u / l_4", "1", "slider position relative to the rocker's length; ' = d/d(theta2)"),
+    ("sigma2", r"\sigma_2 = l_2 / l_4", "1", "crank's length relative to the rocker's"),
+    (
+        "p45, I4",
+        r"p_{45} = m_4 / (m_4 + m_5), I_4 = I_D / (m_4 l_4^2)",
+        "1",
+        "mass and inertia ratios of chapters IV and V",
+    ),
+    (
+        "SliderEquation.mass, .stiffness, .force",
+        r"M, K, F",
+        "1",
+        "coefficients of (M zeta')' + lambda_c zeta' + (lambda_k^2 + K) zeta = F, eq (4.21) put right: Fourier series",
+    ),
+    ("spring", r"\lambda_k^2 = k / ((m_4 + m_5) \omega^2)", "1", "spring relative to inertia"),
+    ("damping", r"\lambda_c = \mu / ((m_4 + m_5) \omega)", "1", "damper likewise; omega_c = mu/(m4 + m5) in 1/s"),
+    (
+        "y",
+        r"(u, \dot u) \text{ or } (u, \dot u, \dot\theta_2)",
+        "m, m/s, rad/s",
+        "state on the section theta2 = 0, at prescribed speed or under a torque",
+    ),
+    (
+        "monodromy",
+        r"\Phi = \partial y(T) / \partial y(0)",
+        "mixed",
+        "monodromy matrix of a periodic motion; its eigenvalues are the Floquet multipliers",
+    ),
 )
 
 

@@ -61,10 +61,13 @@ def number_or_text(text: str) -> int | float | str:
     return text
 
 
-def prepare_solver() -> None:
+def prepare_solver(*, orbits: bool = False) -> None:
     """Load the compiled equations, and say why it takes so long where they are compiled first."""
-    with console.status("preparing the solver: its equations are compiled once, in about twenty seconds"):
+    with console.status("preparing the solver: its equations are compiled once, in about half a minute"):
         from .. import compiled  # noqa: F401
+
+        if orbits:
+            from .. import orbit_kernels  # noqa: F401
 
 
 def chosen_case(file: str | None, published: str | None, settings: Sequence[str]) -> Any:

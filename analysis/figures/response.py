@@ -50,7 +50,7 @@ def plot_branches(
         figure = Figure(figsize=(7.2, 7.6))
         axes = figure.subplots(3, 1, sharex=True, height_ratios=(2.2, 1.0, 1.0))
         for number, branch in enumerate(branches):
-            table = branch.columns(orders=())
+            table = branch.columns()
             stable = table["stable (1), marginal (0), unstable (-1)"] > 0.0
             x = factor * branch.parameter
             rows = (

@@ -185,3 +185,57 @@ def test_ctrl_c_is_clean(linkwork, monkeypatch):
     result = linkwork("build")
     assert result.exit_code == cli.INTERRUPTED
     assert "interrupted" in result.stderr
+
+
+def test_resonance_of_a_published_set(linkwork, tmp_path):
+    result = linkwork("resonance", "--published", "rig-2-spring-c", "--from", "300 rpm", "--to", "700 rpm")
+    assert result.exit_code == 0, result.output
+    assert "585.47 rpm" in result.output
+    assert "586.12" in result.output
+    out = tmp_path / "out"
+    header = (out / "rig-2-spring-c-resonance.csv").read_text(encoding="utf-8").splitlines()[0]
+    assert header.startswith("branch,drive.speed [rad/s],turns in a period")
+    assert (out / "rig-2-spring-c-resonance.png").read_bytes().startswith(b"\x89PNG")
+    rows = np.loadtxt(out / "rig-2-spring-c-resonance-approximations.csv", delimiter=",", skiprows=1)
+    assert rows.shape[1] == 4
+
+
+def test_resonance_tells_what_could_not_be_followed(linkwork, tmp_path):
+    result = linkwork(
+        "resonance", "--published", "rig-1-spring-b", "--from", "900 rpm", "--to", "1100 rpm", "--no-plot"
+    )
+    assert result.exit_code == 0, result.output
+    assert "fold at 1035.97" in result.output
+    result = linkwork(
+        "resonance", "--published", "rig-1-spring-b", "--from", "500 rpm", "--to", "1100 rpm", "--no-plot"
+    )
+    assert result.exit_code == cli.ENDED_EARLY
+    assert "is followed to drive.speed" in result.output
+    assert not (tmp_path / "out" / "rig-1-spring-b-resonance.png").exists()
+    assert (tmp_path / "out" / "rig-1-spring-b-resonance.csv").exists()
+
+
+def test_resonance_over_another_parameter(linkwork, tmp_path):
+    result = linkwork(
+        "resonance", "--published", "table-3.1", "--vary", "slider.damping", "--from", "2e4 dyn.s/cm", "--to", "4e4 dyn.s/cm"
+    )  # fmt: skip
+    assert result.exit_code == 0, result.output
+    assert (tmp_path / "out" / "table-3.1-resonance.csv").exists()
+    assert "two harmonics" not in result.output
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "words"),
+    [
+        (["--published", "table-3.1", "--vary", "slider.mess"], 1, "cannot vary"),
+        (["--published", "table-3.1", "--vary", "slider.damping"], 2, "--from and --to are needed"),
+        (["--published", "table-3.1", "--from", "100 rpm", "--to", "50 rpm"], 1, "increasing"),
+        (["--published", "table-3.1", "--from", "100 kg", "--to", "200 rpm"], 1, "--from"),
+        (["--published", "table-3.1", "--set", "slider.stiffness=0"], 2, "no natural frequency"),
+        ([], 2, "either a case file or --published"),
+    ],
+)
+def test_bad_resonance(linkwork, arguments, code, words):
+    result = linkwork("resonance", *arguments)
+    assert result.exit_code == code, result.output
+    assert words in result.output
