@@ -85,6 +85,13 @@ def test_sweeps_up_and_down_jump_at_different_speeds() -> None:
     assert not shared[speeds < 1035.0 * RPM].any()
 
 
+def test_a_coarse_step_over_the_fold_is_a_jump_too() -> None:
+    # Newton's method may land on the other motion by itself
+    result = sweep(RIG["b"], np.array([1030.0, 1060.0, 1080.0]) * RPM)
+    assert len(result.jumps) == 1
+    assert result.jumps[0].speed == pytest.approx(1060.0 * RPM)
+
+
 def test_a_falling_sweep_doubles_its_period_and_is_lost_with_a_flag() -> None:
     result = sweep(RIG["b"], np.arange(940.0, 899.0, -5.0) * RPM, start=upper_start())
     assert result.turns[0] == 1
