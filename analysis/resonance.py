@@ -36,6 +36,8 @@ if TYPE_CHECKING:
 
 #: Turns for which a motion that has lost its stability is followed to the next steady one, and the change a turn that ends it.
 JUMP_TURNS, SETTLED = 5000, 1e-9
+#: Change of the amplitude from one speed to the next, relative, beyond which the step is halved, and how often it may be.
+FAR, HALVINGS = 0.25, 6
 #: Periods, in turns, that a steady motion is looked for with.
 PERIODS = (1, 2, 3, 4)
 #: How far a maximum of the amplitude stands out, relative to its height, to count as one.
@@ -398,7 +400,7 @@ def sweep(
     last: PeriodicOrbit | None = None
     for speed in grid.tolist():
         drive = Drive(speed=speed)
-        orbit = None if last is None else _continued(parameters, drive, last)
+        orbit = None if last is None else _continued(parameters, speed, last)
         flag = ""
         if orbit is None:
             try:
@@ -425,15 +427,26 @@ def sweep(
     return Sweep(speed=grid, orbits=tuple(orbits), flags=tuple(flags), jumps=tuple(jumps))
 
 
-def _continued(parameters: FiveBarParameters, drive: Drive, last: PeriodicOrbit) -> PeriodicOrbit | None:
-    """The stable motion near the last one; None if there is none."""
+def _continued(
+    parameters: FiveBarParameters, speed: float, last: PeriodicOrbit, halvings: int = HALVINGS
+) -> PeriodicOrbit | None:
+    """The stable motion that the last one becomes at another speed; None if it is lost on the way.
+
+    A neighbour that differs much may be another motion that Newton's method fell upon: it is sought again in half steps.
+    """
+    assert last.drive.speed is not None
     try:
-        orbit = orbit_of(parameters, drive, turns=last.turns, start=last.start, settle=False)
+        orbit = orbit_of(parameters, Drive(speed=speed), turns=last.turns, start=last.start, settle=False)
     except OrbitError:
+        orbit = None
+    if orbit is not None:
+        far = abs(orbit.amplitude - last.amplitude) > FAR * max(orbit.amplitude, last.amplitude)
+        if not far and orbit.verdict(0.0).stability is Stability.STABLE:
+            return orbit
+    if halvings == 0:
         return None
-    # a neighbour may also be another motion that Newton's method fell upon
-    far = abs(orbit.amplitude - last.amplitude) > 0.25 * max(orbit.amplitude, last.amplitude)
-    return None if far or orbit.verdict(0.0).stability is not Stability.STABLE else orbit
+    middle = _continued(parameters, 0.5 * (last.drive.speed + speed), last, halvings - 1)
+    return None if middle is None else _continued(parameters, speed, middle, halvings - 1)
 
 
 def _settled(
