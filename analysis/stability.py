@@ -34,7 +34,7 @@ from .floquet import TOLERANCE, Stability, StabilityVerdict, multipliers, verdic
 from .hill import PeriodicEquation, crossing_test, monodromy
 from .inputs import Inputs
 from .orbits import Drive, PeriodicOrbit, find_orbit
-from .simulate import shown, simulate
+from .simulate import interruptible, shown, simulate
 from .slider_equation import Variant, slider_equation
 
 #: Names under which the crank speed (rad/s) is an axis.
@@ -198,13 +198,13 @@ def scan(
         except LinkworkError as error:
             gaps.append((point, str(error)))
     places, results = list(points), list(values)
-    for i in range(1, samples - 1):
-        around = values[i - 1 : i + 2]
-        sign = np.sign(values[i])
-        if np.isfinite(around).all() and (np.sign(around) == sign).all() and np.argmin(sign * around) == 1:
+    for i in range(samples):
+        first, last = max(i - 1, 0), min(i + 1, samples - 1)
+        around, sign = values[first : last + 1], np.sign(values[i])
+        if np.isfinite(around).all() and (np.sign(around) == sign).all() and first + np.argmin(sign * around) == i:
             found = minimize_scalar(
                 lambda x, sign=sign: sign * function(x),
-                bounds=(points[i - 1], points[i + 1]),
+                bounds=(points[first], points[last]),
                 method="bounded",
                 options={"xatol": 1e-9 * (high - low)},
             )
@@ -958,15 +958,19 @@ def grid(
         if _read(path, len(xs)) is None:
             missing.append((path, row))
     done = len(paths) - len(missing)
-    with shown(progress, float(len(paths)), "stability") as show:
+    with interruptible() as interrupted, shown(progress, float(len(paths)), "stability") as show:
         show(float(done))
         tasks = (joblib.delayed(_compute_row)(path, row, guess, tolerance) for path, row in missing)
         try:
             for _ in joblib.Parallel(n_jobs=n_jobs, return_as="generator_unordered")(tasks):
                 done += 1
                 show(float(done))
-        except KeyboardInterrupt:
-            raise GridInterrupted(done, len(paths), where) from None
+                if interrupted:
+                    break
+        except KeyboardInterrupt:  # of a worker, or of one who raises it himself
+            interrupted.append(True)
+        if interrupted and done < len(paths):
+            raise GridInterrupted(done, len(paths), where)
     rows = [_read(path, len(xs)) for path in paths]
     if any(row is None for row in rows):
         raise LinkworkError(f"a row of the grid cannot be read back from {where}")
@@ -1089,8 +1093,10 @@ def confirm(
     LinkworkError
         If the deviation grows or dies too fast to be measured.
     """
-    if turns < 20 or not (isfinite(disturbance) and 0.0 < disturbance < LINEAR):
-        raise InputError(f"{turns} turns from a disturbance of {disturbance}: 20 and more, and between 0 and {LINEAR}")
+    if turns < 20 or not NOISE < disturbance < LINEAR:
+        raise InputError(
+            f"{turns} turns from a disturbance of {disturbance}: 20 and more, and between {NOISE:g} and {LINEAR:g}"
+        )
     orbit = find_orbit(parameters, speed=speed, start=start)
     scale = parameters.crank_length * np.array([1.0, speed])
     direction, measure = _leading(orbit, scale)

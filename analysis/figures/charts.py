@@ -91,7 +91,10 @@ def _draw_map(figure: Figure, axis: Axes, chart: HeatMap) -> None:
     mesh = axis.pcolormesh(chart.x, chart.y, values, norm=norm, cmap="RdBu_r", shading="nearest", rasterized=True)
     axis.grid(False)
     _draw_panel(axis, chart.panel)
-    figure.colorbar(mesh, ax=axis, label=chart.label)
+    # the scale is part of the chart, and no axes of its own
+    scale = axis.inset_axes((1.03, 0.0, 0.05, 1.0))
+    figure.colorbar(mesh, cax=scale, label=chart.label)
+    scale.grid(False)
     legend = axis.get_legend()
     if np.ma.getmaskarray(values).any():
         handles, labels = axis.get_legend_handles_labels()

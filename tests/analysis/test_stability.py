@@ -1,0 +1,470 @@
+"""Stability of the periodic motion: charts, removing damping, grids, long runs."""
+
+from __future__ import annotations
+
+import signal
+from collections.abc import Callable
+from dataclasses import replace
+from math import pi, sqrt
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.special import mathieu_a, mathieu_b
+
+from analysis import stability
+from analysis.figures import Curve, HeatMap, Panel, plot_charts
+from analysis.floquet import Stability
+from analysis.hill import PeriodicEquation, crossing_test, hill_regions, monodromy
+from analysis.orbits import find_orbit
+from analysis.stability import (
+    Box,
+    GridInterrupted,
+    Outcome,
+    Plane,
+    Reason,
+    RemovalError,
+    chart,
+    confirm,
+    grid,
+    linear_test,
+    linear_verdict,
+    lowest,
+    orbit_test,
+    plane,
+    removing_damping,
+    removing_damping_over,
+    scan,
+    trace,
+)
+from linkwork.errors import InputError, LinkworkError, ParameterError, UnknownNameError
+from linkwork.five_bar.published import SQUARE_OF_OMEGA_K, TABLE_3_1, chapter_4
+
+# --- STABILITY: notes on Youssef, chapters IV and V; sigma2 = 0.05, p45 = 0.2, k/(m4 + m5) = 1000 1/s2
+# first unstable region in lambda_k^2 by I4, right to the digits given, and by the thesis's appendix 3
+FIRST_REGION = {0.5: (0.258298, 0.259203), 1.0: (0.266540, 0.268367), 1.5: (0.274727, 0.277501)}
+FIRST_REGION_APPENDIX_3 = {0.5: (0.25786, 0.26031), 1.0: (0.26580, 0.27054), 1.5: (0.27382, 0.28069)}
+# omega_c = mu/(m4 + m5) (1/s) that removes it up to I4 = 1.5: thesis, its own equation, right
+REMOVING_OMEGA_C_THESIS, REMOVING_OMEGA_C_OWN, REMOVING_OMEGA_C = 0.45, 0.459, 0.167
+# long nonlinear runs at I4 = 1, lambda_k^2; the thesis is said to call the first unstable too, but that lies just below its
+# region; the second, inside it, is ours
+LONG_RUNS = ((0.2655, "bounded"), (0.2662, "bounded"), (0.26745, "grows"), (0.2695, "bounded"))
+
+UNIT = Box(x=(0.0, 1.0), y=(0.0, 1.0))
+
+
+def crank_speed(lambda_k2: float) -> float:
+    return sqrt(SQUARE_OF_OMEGA_K / lambda_k2)
+
+
+def first_region_plane(omega_c: float = 0.0) -> Plane:
+    """lambda_k^2 and I4."""
+    return lambda lambda_k2, inertia_ratio: (chapter_4(inertia_ratio, omega_c), crank_speed(lambda_k2))
+
+
+def mathieu(multiplier: int, damping: float = 0.0) -> Callable[[float, float], float]:
+    return lambda p, q: float(crossing_test(monodromy(PeriodicEquation.mathieu(p, q, damping)), multiplier))
+
+
+# Planes
+
+
+def test_plane_varies_two_parameters_by_any_of_their_names() -> None:
+    operation = plane(TABLE_3_1, 44.0, "slider.stiffness", "crank_length")
+    assert operation(2e3, 0.04) == (replace(TABLE_3_1, slider_stiffness=2e3, crank_length=0.04), 44.0)
+    assert plane(TABLE_3_1, 44.0, "speed", "slider.damping")(30.0, 5.0) == (
+        replace(TABLE_3_1, slider_damping=5.0),
+        30.0,
+    )
+    with pytest.raises(UnknownNameError, match=r"slider\.stifness"):
+        plane(TABLE_3_1, 44.0, "slider.stifness", "speed")
+    with pytest.raises(InputError, match="two parameters"):
+        plane(TABLE_3_1, 44.0, "speed", "drive.speed")
+    with pytest.raises(ParameterError, match=r"slider\.damping"):
+        plane(TABLE_3_1, 44.0, "speed", "slider.damping")(30.0, -1.0)
+
+
+# Lines
+
+
+@pytest.mark.parametrize("width", [0.3, 1e-3, 1e-6])
+def test_scan_finds_both_sides_of_a_region_however_narrow(width: float) -> None:
+    centre = 0.4137
+    line = scan(lambda x: (x - centre) ** 2 - (0.5 * width) ** 2, 0.0, 1.0, samples=30)
+    assert line.roots == pytest.approx([centre - 0.5 * width, centre + 0.5 * width], abs=1e-10)
+    assert np.array(line.intervals) == pytest.approx(np.array([(line.roots[0], line.roots[1])]))
+
+
+def test_scan_finds_a_narrow_region_beside_its_ends() -> None:
+    line = scan(lambda x: (x - 0.003) ** 2 - 1e-8, 0.0, 1.0, samples=30)
+    assert line.roots == pytest.approx([0.0029, 0.0031], abs=1e-10)
+
+
+def test_scan_from_inside_a_region_and_narrow_stable_strips() -> None:
+    line = scan(lambda x: 1e-8 - (x - 0.61) ** 2, 0.0, 1.0, samples=20)
+    assert np.array(line.intervals) == pytest.approx(np.array([(0.0, 0.61 - 1e-4), (0.61 + 1e-4, 1.0)]), abs=1e-9)
+
+
+def test_scan_tells_where_there_is_no_value() -> None:
+    def function(x: float) -> float:
+        if 0.45 < x < 0.55:
+            raise LinkworkError("no orbit here")
+        return x - 0.8 if x > 0.5 else -1.0
+
+    line = scan(function, 0.0, 1.0, samples=101)
+    assert line.roots == pytest.approx([0.8])
+    assert np.array(line.intervals) == pytest.approx(np.array([(0.0, 0.45), (0.55, 0.8)]))
+    assert len(line.gaps) == 9
+    assert line.gaps[0] == (pytest.approx(0.46), "no orbit here")
+
+
+def test_lowest() -> None:
+    assert lowest(lambda x: (x - 0.3) ** 2 - 1.0, 0.0, 1.0) == pytest.approx((0.3, -1.0), abs=1e-8)
+    assert lowest(lambda x: x, 0.0, 1.0) == (0.0, 0.0)
+    with pytest.raises(InputError, match="needs a length"):
+        lowest(lambda x: x, 1.0, 0.0)
+    with pytest.raises(InputError, match="needs a length"):
+        scan(lambda x: x, 0.0, 1.0, samples=2)
+
+
+# Traces
+
+
+def test_closed_boundary_has_its_region_on_the_left() -> None:
+    """A rotated ellipse; its area by Green's theorem is positive where the negative side is on the left."""
+
+    def test(x: float, y: float) -> float:
+        a, b = 0.8 * (x - 0.5) + 0.6 * (y - 0.5), -0.6 * (x - 0.5) + 0.8 * (y - 0.5)
+        return (a / 0.4) ** 2 + (b / 0.1) ** 2 - 1.0
+
+    boundary = trace(test, (0.9 * 0.4 + 0.5 - 0.04, 0.74), UNIT, step=0.03)
+    assert boundary.closed
+    assert boundary.points[0] == pytest.approx(boundary.points[-1])
+    assert [test(x, y) for x, y in boundary.points] == pytest.approx(np.zeros(len(boundary.points)), abs=1e-8)
+    assert boundary.residual < 1e-9
+    (x, y), (u, v) = boundary.points[:-1].T, np.diff(boundary.points, axis=0).T
+    assert 0.5 * np.sum(x * v - y * u) == pytest.approx(pi * 0.04, rel=5e-3)
+    assert trace(lambda x, y: -test(x, y), (0.82, 0.74), UNIT).points[:, 0].size > 20
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_both_signs_of_a_test_give_the_same_curve_backwards(sign: float) -> None:
+    boundary = trace(lambda x, y: sign * (y - 0.2 - 0.5 * x * x), (0.5, 0.33), UNIT)
+    assert boundary.points[0 if sign > 0.0 else -1] == pytest.approx([1.0, 0.7])
+    assert boundary.points[-1 if sign > 0.0 else 0] == pytest.approx([0.0, 0.2])
+    assert [end.reason for end in boundary.ends] == [Reason.BOX, Reason.BOX]
+    assert boundary.ends[0].point == pytest.approx(tuple(boundary.points[0]))
+    assert boundary.points[:, 1] == pytest.approx(0.2 + 0.5 * boundary.points[:, 0] ** 2, abs=1e-10)
+    assert boundary.crossings(0, 0.4321, UNIT) == pytest.approx([0.2 + 0.5 * 0.4321**2], abs=1e-8)
+
+
+def test_turning_points_are_passed_with_short_steps() -> None:
+    """The two sides of the wedge are 0.02 apart, less than a step."""
+    boundary = trace(lambda x, y: (y - 0.5) ** 2 - 1e-4 * (x - 0.3), (0.8, 0.507), UNIT, step=0.05)
+    assert boundary.points[:, 0].min() == pytest.approx(0.3, abs=1e-5)
+    assert {tuple(np.round(end.point, 6)) for end in boundary.ends} == {(1.0, 0.508367), (1.0, 0.491633)}
+    (low, high) = sorted(boundary.crossings(0, 0.65, UNIT))
+    assert (low, high) == pytest.approx((0.5 - sqrt(3.5e-5), 0.5 + sqrt(3.5e-5)), abs=1e-8)
+
+
+def test_crossing_boundaries_end_where_they_meet() -> None:
+    boundary = trace(lambda x, y: (x - 0.5) ** 2 - (y - 0.5) ** 2, (0.8, 0.79), UNIT)
+    reasons = {end.reason: end for end in boundary.ends}
+    assert set(reasons) == {Reason.BOX, Reason.TIP}
+    assert reasons[Reason.TIP].point == pytest.approx((0.5, 0.5), abs=1e-3)
+
+
+def test_trace_ends_where_the_test_has_no_value() -> None:
+    def test(x: float, y: float) -> float:
+        if x > 0.7:
+            raise LinkworkError("no orbit beyond")
+        return y - 0.5
+
+    boundary = trace(test, (0.2, 0.5), UNIT)
+    lost = next(end for end in boundary.ends if end.reason is Reason.NO_VALUE)
+    assert lost.message == "no orbit beyond"
+    assert lost.point == pytest.approx((0.7, 0.5), abs=2e-4)
+    nan = trace(lambda x, y: y - 0.5 if x > 0.3 else float("nan"), (0.6, 0.5), UNIT)
+    assert any("the test function is nan" in end.message for end in nan.ends)
+
+
+def test_trace_stays_inside_the_box() -> None:
+    def test(x: float, y: float) -> float:
+        assert 0.0 <= x <= 1.0
+        assert 0.0 <= y <= 1.0
+        return y - 0.9999 + 0.3 * (x - 0.5) ** 2
+
+    boundary = trace(test, (0.5, 0.99), UNIT)
+    assert sorted(end.point[0] for end in boundary.ends) == pytest.approx([0.0, 1.0])
+
+
+def test_bad_traces_are_refused() -> None:
+    with pytest.raises(InputError, match="no boundary within"):
+        trace(lambda x, y: x + 1.0, (0.5, 0.5), UNIT)
+    with pytest.raises(InputError, match="outside the box"):
+        trace(lambda x, y: x, (1.5, 0.5), UNIT)
+    with pytest.raises(InputError, match="must increase"):
+        Box(x=(1.0, 0.0), y=(0.0, 1.0))
+    with pytest.raises(InputError, match="lines"):
+        chart(lambda x, y: x, UNIT, lines=(0, 0))
+    short = trace(lambda x, y: y - 0.5, (0.5, 0.5), UNIT, most=3)
+    assert [end.reason for end in short.ends] == [Reason.LENGTH] * 2
+
+
+def test_chart_finds_every_boundary_once() -> None:
+    def test(x: float, y: float) -> float:
+        return ((x - 0.3) ** 2 + (y - 0.5) ** 2 - 0.01) * ((x - 0.7) ** 2 + (y - 0.4) ** 2 - 0.02) * (y - 0.9)
+
+    found = chart(test, UNIT, lines=(2, 9), samples=60)
+    assert len(found.boundaries) == 3
+    assert sorted(boundary.closed for boundary in found.boundaries) == [False, True, True]
+    assert found.gaps == ()
+    assert chart(test, UNIT, lines=(0, 0), seeds=[(0.4, 0.5)]).boundaries[0].closed
+
+
+# Charts of equations and mechanisms
+
+
+@pytest.mark.parametrize("multiplier", [1, -1])
+def test_mathieus_chart(multiplier: int) -> None:
+    """Every traced point lies on one of the characteristic curves."""
+    box = Box(x=(-2.0, 10.0), y=(0.2, 4.0))
+    found = chart(mathieu(multiplier), box, lines=(0, 2), samples=80, step=0.04)
+    numbers = (0, 2) if multiplier == 1 else (1, 3)
+    seen = set()
+    for boundary in found.boundaries:
+        assert all(end.reason is Reason.BOX for end in boundary.ends)
+        p, q = boundary.points.T
+        curves = {(n, f): f(n, q) for n in numbers for f in (mathieu_a, mathieu_b) if n > 0 or f is mathieu_a}
+        nearest = min(curves, key=lambda name: np.abs(curves[name] - p).max())
+        seen.add(nearest)
+        assert p == pytest.approx(curves[nearest], abs=1e-8)
+    assert len(seen) == len(found.boundaries) == (3 if multiplier == 1 else 4)
+
+
+@pytest.mark.parametrize("inertia_ratio", FIRST_REGION)
+def test_first_region_of_the_true_orbit(inertia_ratio: float) -> None:
+    """The right numbers are about the true orbit; the linear equation about zeta = 0 is off in the fourth digit."""
+    right = FIRST_REGION[inertia_ratio]
+    test = orbit_test(first_region_plane(), -1)
+    found = scan(lambda x: test(x, inertia_ratio), 0.25, 0.29, samples=60)
+    assert found.roots == pytest.approx(right, abs=5e-7)
+    linear = linear_test(first_region_plane(), -1)
+    about_zero = scan(lambda x: linear(x, inertia_ratio), 0.25, 0.29, samples=60).roots
+    assert about_zero == pytest.approx(right, abs=2.5e-4)
+    assert np.abs(about_zero - right).max() > 1e-5
+    # the thesis's is two and a half times as wide
+    wide, narrow = (high - low for low, high in (FIRST_REGION_APPENDIX_3[inertia_ratio], found.roots))
+    assert 2.4 < wide / narrow < 2.8
+
+
+def test_linear_region_is_hills() -> None:
+    equation = stability.linear_equation(chapter_4(1.0), crank_speed(0.26))
+    hill = hill_regions(equation, 1)[1]
+    test = linear_test(first_region_plane(), -1)
+    roots = scan(lambda x: test(x, 1.0), 0.25, 0.29, samples=60).roots
+    assert roots == pytest.approx([0.26 + hill.low, 0.26 + hill.high], abs=1e-11)
+
+
+def test_chart_of_the_true_orbit_round_a_tip() -> None:
+    """With damping the boundary turns back at an I4; there that damping removes the region."""
+    found = chart(orbit_test(first_region_plane(0.1), -1), Box(x=(0.25, 0.29), y=(0.25, 2.0)), lines=(0, 2))
+    (boundary,) = found.boundaries
+    assert [end.reason for end in boundary.ends] == [Reason.BOX] * 2
+    assert boundary.residual < 1e-9
+    tip = boundary.points[np.argmin(boundary.points[:, 1])]
+    removed = removing_damping(
+        lambda x, damping: orbit_test(first_region_plane(damping), -1)(x, float(tip[1])),
+        (0.25, 0.29),
+        (0.0, 0.5),
+        samples=10,
+    )
+    assert removed.damping == pytest.approx(0.1, abs=1e-5)
+    assert removed.x == pytest.approx(tip[0], abs=1e-5)
+
+
+def test_linear_verdicts() -> None:
+    inside, outside = (linear_verdict(chapter_4(1.0), crank_speed(x)) for x in (0.2675, 0.2695))
+    damped = linear_verdict(chapter_4(1.0, 0.2), crank_speed(0.2675))
+    assert [v.stability for v in (inside, outside, damped)] == [
+        Stability.UNSTABLE,
+        Stability.MARGINAL,
+        Stability.STABLE,
+    ]
+    assert damped.margin > 0.0 > inside.margin
+
+
+# Removing damping
+
+
+def test_removing_damping_is_where_hills_boundaries_meet() -> None:
+    found = removing_damping(lambda p, damping: mathieu(-1, damping)(p, 0.8), (0.0, 2.5), (0.0, 2.0))
+    for factor, there in ((1.0 - 1e-6, True), (1.0 + 1e-6, False)):
+        equation = PeriodicEquation.mathieu(0.0, 0.8, damping=factor * found.damping)
+        assert (1 in hill_regions(equation, 1)) is there
+    assert abs(found.residual) < 1e-12
+
+
+def test_removing_damping_of_the_first_region() -> None:
+    """Up to I4 = 1.5: 0.167 1/s, and not the thesis's 0.45."""
+
+    def test(x: float, omega_c: float, inertia_ratio: float) -> float:
+        return orbit_test(first_region_plane(omega_c), -1)(x, inertia_ratio)
+
+    worst = removing_damping_over(test, lambda _: (0.26, 0.285), (0.0, 0.5), (1.1, 1.5), samples=3)
+    assert worst.damping == pytest.approx(REMOVING_OMEGA_C, abs=5e-4)
+    assert worst.other == 1.5
+    assert REMOVING_OMEGA_C_THESIS / worst.damping > 2.5
+    assert pytest.approx(REMOVING_OMEGA_C_OWN, rel=0.03) == REMOVING_OMEGA_C_THESIS
+
+
+def test_damping_out_of_range_is_told() -> None:
+    def test(p: float, damping: float) -> float:
+        return mathieu(-1, damping)(p, 0.8)
+
+    with pytest.raises(RemovalError, match=r"still there at the damping 0\.1"):
+        removing_damping(test, (0.0, 2.5), (0.0, 0.1), samples=10)
+    with pytest.raises(RemovalError, match="no region between 3 and 5"):
+        removing_damping(test, (3.0, 5.0), (0.0, 1.0), samples=10)
+
+
+# Grids
+
+XS, YS = np.linspace(0.25, 0.29, 7), np.linspace(0.5, 1.5, 4)
+
+
+def test_grid_is_each_point_alone(tmp_path: Path) -> None:
+    found = grid(first_region_plane(0.05), XS, YS, folder=tmp_path)
+    assert found.computed == len(YS)
+    assert found.largest.shape == found.status.shape == (len(YS), len(XS))
+    for row, y in enumerate(YS.tolist()):
+        for column, x in enumerate(XS.tolist()):
+            parameters, speed = first_region_plane(0.05)(x, y)
+            orbit = find_orbit(parameters, speed=speed)
+            assert found.largest[row, column] == pytest.approx(orbit.largest, abs=1e-9)
+            assert found.starts[row, column] == pytest.approx(orbit.start, abs=1e-9)
+    states = found.stability()
+    assert {Stability.STABLE, Stability.UNSTABLE} == set(states.ravel())
+
+
+def test_grid_goes_on_from_what_is_there(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    compute = stability._compute_row
+    calls = []
+
+    def interrupted(*arguments: object) -> None:
+        calls.append(arguments)
+        compute(*arguments)  # type: ignore[arg-type]
+        if len(calls) == 2:
+            signal.raise_signal(signal.SIGINT)
+
+    monkeypatch.setattr(stability, "_compute_row", interrupted)
+    with pytest.raises(GridInterrupted, match="2 of 4 rows done") as caught:
+        grid(first_region_plane(), XS, YS, folder=tmp_path)
+    assert (caught.value.done, caught.value.rows) == (2, 4)
+    monkeypatch.setattr(stability, "_compute_row", compute)
+    again = grid(first_region_plane(), XS, YS, folder=tmp_path)
+    assert again.computed == 2
+    assert grid(first_region_plane(), XS, YS, folder=tmp_path).computed == 0
+    # a row is the same whatever chart it belongs to
+    assert grid(first_region_plane(), XS, [*YS[1:], 2.0], folder=tmp_path).computed == 1
+    assert grid(first_region_plane(), XS, YS, folder=tmp_path, tolerance=1e-11).computed == 4
+    assert grid(first_region_plane(1e-3), XS, YS, folder=tmp_path).computed == 4
+    for path in tmp_path.iterdir():
+        path.write_bytes(path.read_bytes()[:100])
+    mended = grid(first_region_plane(), XS, YS, folder=tmp_path)
+    assert mended.computed == 4
+    assert (mended.largest == again.largest).all()
+
+
+def test_grid_in_processes(tmp_path: Path) -> None:
+    apart = grid(first_region_plane(), XS, YS, folder=tmp_path / "apart", n_jobs=2)
+    here = grid(first_region_plane(), XS, YS, folder=tmp_path / "here")
+    assert (apart.largest == here.largest).all()
+
+
+def test_points_without_an_orbit_are_masked_with_a_reason(tmp_path: Path) -> None:
+    """Table 3.1 at 420 rpm: below a stiffness of about 232 N/m the motion that follows from stiffer springs is lost."""
+    operation = plane(TABLE_3_1, 14.0 * pi, "slider.stiffness", "slider.damping")
+    found = grid(operation, [1000.0, 400.0, 200.0], [30.0], folder=tmp_path)
+    assert found.largest.mask.tolist() == [[False, False, True]]
+    assert found.reason(0, 0) == ""
+    assert found.reason(0, 2) in stability.REASONS.values()
+    assert found.stability()[0, 2] is None
+    assert np.isfinite(found.starts[0, :2]).all()
+
+
+def test_bad_grids_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="axis y"):
+        grid(first_region_plane(), XS, [], folder=tmp_path)
+    with pytest.raises(InputError, match="axis x"):
+        grid(first_region_plane(), [np.nan], YS, folder=tmp_path)
+    with pytest.raises(ParameterError, match=r"rocker\.inertia"):
+        grid(first_region_plane(), XS, [-1.0], folder=tmp_path)
+
+
+def test_grid_is_kept_beside_the_compiled_code(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("LINKWORK_CACHE_DIR", str(tmp_path))
+    assert stability.grid_folder() == tmp_path / "grids"
+
+
+# Long runs
+
+
+@pytest.mark.parametrize(("lambda_k2", "expected"), LONG_RUNS)
+def test_long_runs_without_damping(lambda_k2: float, expected: str) -> None:
+    low, high = FIRST_REGION_APPENDIX_3[1.0]
+    assert (low < lambda_k2 < high) or lambda_k2 == 0.2655
+    outcome = Outcome.GROWS if expected == "grows" else Outcome.BOUNDED
+    run = confirm(chapter_4(1.0), crank_speed(lambda_k2), turns=2000)
+    assert run.outcome is outcome
+    assert run.agrees
+    assert run.growth == pytest.approx(1.0 - run.verdict.margin, abs=1e-7)
+    assert run.message == ""
+    if outcome is Outcome.BOUNDED:
+        assert run.verdict.stability is Stability.MARGINAL
+        assert run.deviations.max() < 1.1
+    else:
+        assert run.deviations.max() > 1e4
+
+
+def test_long_run_decays_at_the_multiplier_of_a_complex_pair() -> None:
+    run = confirm(chapter_4(1.0, 0.5), crank_speed(0.3), turns=300)
+    assert abs(run.verdict.largest_multiplier.imag) > 0.1
+    assert run.outcome is Outcome.DECAYS
+    assert run.agrees
+    assert run.growth == pytest.approx(1.0 - run.verdict.margin, abs=1e-5)
+
+
+def test_unstable_orbit_of_table_3_1() -> None:
+    """On the branch that turns back at about 232 N/m a multiplier is above +1."""
+    parameters, speed = replace(TABLE_3_1, slider_stiffness=235.0), 14.0 * pi
+    run = confirm(parameters, speed, turns=40, start=(-0.0368, -0.5125), disturbance=1e-7)
+    assert run.verdict.stability is Stability.UNSTABLE
+    assert run.verdict.largest_multiplier.real > 1.1
+    assert run.outcome is Outcome.GROWS
+    assert run.growth == pytest.approx(1.0 - run.verdict.margin, abs=2e-3)
+
+
+def test_bad_long_runs_are_refused() -> None:
+    with pytest.raises(InputError, match="20 and more"):
+        confirm(chapter_4(1.0), 60.0, turns=5)
+    with pytest.raises(InputError, match="between 1e-08 and 0"):
+        confirm(chapter_4(1.0), 60.0, disturbance=0.5)
+
+
+# Pictures
+
+
+def test_chart_in_colours() -> None:
+    x, y = np.linspace(0.0, 1.0, 4), np.linspace(0.0, 2.0, 3)
+    values = np.ma.MaskedArray(0.9 + 0.1 * np.add.outer(y, x))
+    panel = Panel(x_label="x", y_label="y", curves=[Curve(x=[0.0, 1.0], y=[0.0, 2.0], label="boundary")])
+    values[0, 0] = np.ma.masked
+    chart_ = HeatMap(panel=panel, x=x, y=y, values=values, label="largest multiplier", missing="no orbit")
+    figure = plot_charts([chart_, panel], title="A chart", columns=2)
+    assert figure.axes[0].collections[0].get_array().mask.sum() == 1
+    assert [text.get_text() for text in figure.axes[0].get_legend().get_texts()] == ["boundary", "no orbit"]
+    assert figure.axes[0].child_axes[0].get_ylabel() == "largest multiplier"
+    assert len(figure.axes) == 2
+    nothing = replace(chart_, values=np.ma.masked_all((3, 4)))
+    assert plot_charts([nothing], title="Nothing").axes
