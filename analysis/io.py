@@ -19,7 +19,7 @@ from typing import Any
 
 import numpy as np
 import tomli_w
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from linkwork.errors import InputError, MissingParameterError, ParameterError, UnknownNameError
 from linkwork.five_bar.parameters import FiveBarParameters, InitialState, field_name
@@ -72,6 +72,26 @@ def save_figure(figure: Any, path: str | Path, *, dpi: int = 150) -> Path:
     path = _prepare(path)
     figure.savefig(path, dpi=dpi)
     return path
+
+
+def save_array(path: str | Path, values: ArrayLike) -> Path:
+    """Write an array to a file that is there as a whole or not at all, for caches; see `load_array`."""
+    target = _prepare(path)
+    part = target.with_name(f"{target.name}.{os.getpid()}.part")
+    with part.open("wb") as file:
+        np.save(file, np.asarray(values, dtype=float))
+    os.replace(part, target)
+    return target
+
+
+def load_array(path: str | Path) -> NDArray[np.float64] | None:
+    """An array from a file of `save_array`; None if it is not there or damaged."""
+    try:
+        with Path(path).open("rb") as file:
+            values: NDArray[np.float64] = np.load(file)
+    except (OSError, ValueError, EOFError):
+        return None
+    return values
 
 
 def _prepare(path: str | Path) -> Path:

@@ -22,8 +22,9 @@ from rich.console import Console
 from rich.table import Table
 from scipy.integrate import solve_ivp
 
-from analysis import stability
+from analysis.grids import grid
 from analysis.orbits import INTEGRATOR_TOLERANCE, ORBIT_TOLERANCE
+from analysis.planes import Plane, plane
 from linkwork.five_bar import dynamics
 from linkwork.five_bar.parameters import FiveBarParameters
 from linkwork.five_bar.published import RAD_S_PER_RPM, SETS
@@ -73,7 +74,7 @@ def scipy_orbit(
     return y, float(np.abs(np.linalg.eigvals(matrix)).max())
 
 
-def scipy_row(operation: stability.Plane, damping: float, speeds: NDArray[np.float64]) -> NDArray[np.float64]:
+def scipy_row(operation: Plane, damping: float, speeds: NDArray[np.float64]) -> NDArray[np.float64]:
     """Largest multipliers of a piece of a row, each begun by the secant through the last two."""
     starts: list[NDArray[np.float64]] = []
     values = []
@@ -88,16 +89,16 @@ def scipy_row(operation: stability.Plane, damping: float, speeds: NDArray[np.flo
 def main(points: int = POINTS) -> None:
     """Measure and print."""
     rig = SETS["rig-1-spring-a"].parameters
-    operation = stability.plane(rig, SPEEDS[0], "speed", "slider.damping")
+    operation = plane(rig, SPEEDS[0], "speed", "slider.damping")
     speeds, dampings = (np.linspace(axis[0], axis[-1], points) for axis in (SPEEDS, DAMPINGS))
     with tempfile.TemporaryDirectory() as folder:
         # the workers are started and the machine code is loaded before the clock
-        stability.grid(operation, speeds[:4], dampings[:4], folder=folder, n_jobs=CORES)
+        grid(operation, speeds[:4], dampings[:4], folder=folder, n_jobs=CORES)
         begin = time.perf_counter()
-        chart = stability.grid(operation, speeds, dampings, folder=folder, n_jobs=CORES)
+        chart = grid(operation, speeds, dampings, folder=folder, n_jobs=CORES)
         ours = time.perf_counter() - begin
         begin = time.perf_counter()
-        stability.grid(operation, speeds, dampings, folder=folder, n_jobs=CORES)
+        grid(operation, speeds, dampings, folder=folder, n_jobs=CORES)
         again = time.perf_counter() - begin
     rows = np.linspace(0, points - 1, ROWS).astype(int)
     pieces = [slice(first, first + RUN) for first in np.linspace(0, points - RUN, ROWS).astype(int)]
@@ -113,7 +114,7 @@ def main(points: int = POINTS) -> None:
     for heading in ("", "s", "ms a point and core", "ratio"):
         table.add_column(heading, justify="right" if heading else "left")
     per_point = 1e3 * CORES / points**2
-    table.add_row("stability.grid", f"{ours:.2f}", f"{ours * per_point:.3f}", "1")
+    table.add_row("grids.grid", f"{ours:.2f}", f"{ours * per_point:.3f}", "1")
     table.add_row("the same again, from the cache on disk", f"{again:.2f}", "", "")
     table.add_row(
         f"SciPy DOP853, plain (from {ROWS * RUN} points)",

@@ -16,7 +16,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
-from .curves import Panel, _draw_panel
+from .curves import Panel, draw_panel
 from .style import STYLE, finish
 
 #: Colour of points that have no value.
@@ -74,7 +74,7 @@ def plot_charts(
             if isinstance(chart, HeatMap):
                 _draw_map(figure, axis, chart)
             else:
-                _draw_panel(axis, chart)
+                draw_panel(axis, chart)
         for axis in list(axes.flat)[len(charts) :]:
             axis.remove()
         figure.suptitle(fill(title, int(11.6 * size[0] * columns)), fontsize=10.5, fontweight="bold")
@@ -90,7 +90,7 @@ def _draw_map(figure: Figure, axis: Axes, chart: HeatMap) -> None:
     axis.set_facecolor(_NONE)
     mesh = axis.pcolormesh(chart.x, chart.y, values, norm=norm, cmap="RdBu_r", shading="nearest", rasterized=True)
     axis.grid(False)
-    _draw_panel(axis, chart.panel)
+    draw_panel(axis, chart.panel)
     # the scale is part of the chart, and no axes of its own
     scale = axis.inset_axes((1.03, 0.0, 0.05, 1.0))
     figure.colorbar(mesh, cax=scale, label=chart.label)

@@ -161,7 +161,7 @@ def plot_curves(
         figure = Figure(figsize=(size[0] * columns, 0.35 + size[1] * rows))
         axes = figure.subplots(rows, columns, squeeze=False)
         for axis, panel in zip(axes.flat, panels):
-            _draw_panel(axis, panel)
+            draw_panel(axis, panel)
         for axis in list(axes.flat)[len(panels) :]:
             axis.remove()
         # eleven and a half of these letters go to the inch
@@ -169,7 +169,7 @@ def plot_curves(
         return finish(figure)
 
 
-def _draw_panel(axis: Axes, panel: Panel) -> None:
+def draw_panel(axis: Axes, panel: Panel) -> None:
     for boundaries in panel.filled:
         axis.add_patch(PathPatch(_outline(boundaries), facecolor="#56B4E9", alpha=0.22, edgecolor="none", zorder=0))
     for number, curve in enumerate(panel.curves):

@@ -20,23 +20,12 @@ from numpy.typing import ArrayLike, NDArray
 from linkwork.five_bar.parameters import FiveBarParameters
 from linkwork.five_bar.published import SQUARE_OF_OMEGA_K, chapter_4
 
+from ..boundaries import Box, Chart, Test, chart
 from ..floquet import Stability
 from ..hill import PeriodicEquation, Region, hill_regions
+from ..planes import Operation, Plane
 from ..slider_equation import SliderEquation, Variant, slider_equation
-from ..stability import (
-    Box,
-    Chart,
-    Confirmation,
-    Operation,
-    Plane,
-    RemovingDamping,
-    Test,
-    chart,
-    confirm,
-    linear_test,
-    orbit_test,
-    removing_damping,
-)
+from ..stability import Confirmation, RemovingDamping, confirm, linear_test, orbit_test, removing_damping
 from .study import BALANCE, StudyResult, Verdict, at_most, near, padded
 
 #: First region in lambda_k^2 by I4: the right one, and the thesis's by its appendix 3.

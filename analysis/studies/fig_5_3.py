@@ -22,8 +22,9 @@ import numpy as np
 from linkwork.five_bar.parameters import FiveBarParameters
 from linkwork.five_bar.published import chapter_4
 
+from ..boundaries import Box, Chart, chart
 from ..figures import COLOURS, Curve, Panel, plot_curves
-from ..stability import Box, Chart, Operation, chart
+from ..planes import Operation
 from ._chapter_5 import (
     MOTIONS,
     crank_speed,

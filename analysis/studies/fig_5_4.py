@@ -14,8 +14,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..boundaries import Box, Chart, chart
 from ..figures import COLOURS, Curve, HeatMap, Panel, plot_charts
-from ..stability import Box, Chart, Grid, Operation, chart, grid
+from ..grids import Grid, grid
+from ..planes import Operation
 from ._chapter_5 import (
     MOTIONS,
     crank_speed,

@@ -12,30 +12,24 @@ import numpy as np
 import pytest
 from scipy.special import mathieu_a, mathieu_b
 
-from analysis import stability
+from analysis import grids, orbit_kernels, stability
+from analysis.boundaries import Box, Reason, chart, scan, trace
 from analysis.figures import Curve, HeatMap, Panel, plot_charts
 from analysis.floquet import Stability
+from analysis.grids import GridInterrupted, grid
 from analysis.hill import PeriodicEquation, crossing_test, hill_regions, monodromy
 from analysis.orbits import find_orbit
+from analysis.planes import Plane, plane
 from analysis.stability import (
-    Box,
-    GridInterrupted,
     Outcome,
-    Plane,
-    Reason,
     RemovalError,
-    chart,
     confirm,
-    grid,
     linear_test,
     linear_verdict,
     lowest,
     orbit_test,
-    plane,
     removing_damping,
     removing_damping_over,
-    scan,
-    trace,
 )
 from linkwork.errors import InputError, LinkworkError, ParameterError, UnknownNameError
 from linkwork.five_bar.published import SQUARE_OF_OMEGA_K, TABLE_3_1, chapter_4
@@ -348,7 +342,7 @@ def test_grid_is_each_point_alone(tmp_path: Path) -> None:
 
 
 def test_grid_goes_on_from_what_is_there(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    compute = stability._compute_row
+    compute = grids._compute_row
     calls = []
 
     def interrupted(*arguments: object) -> None:
@@ -357,11 +351,11 @@ def test_grid_goes_on_from_what_is_there(tmp_path: Path, monkeypatch: pytest.Mon
         if len(calls) == 2:
             signal.raise_signal(signal.SIGINT)
 
-    monkeypatch.setattr(stability, "_compute_row", interrupted)
+    monkeypatch.setattr(grids, "_compute_row", interrupted)
     with pytest.raises(GridInterrupted, match="2 of 4 rows done") as caught:
         grid(first_region_plane(), XS, YS, folder=tmp_path)
     assert (caught.value.done, caught.value.rows) == (2, 4)
-    monkeypatch.setattr(stability, "_compute_row", compute)
+    monkeypatch.setattr(grids, "_compute_row", compute)
     again = grid(first_region_plane(), XS, YS, folder=tmp_path)
     assert again.computed == 2
     assert grid(first_region_plane(), XS, YS, folder=tmp_path).computed == 0
@@ -388,7 +382,7 @@ def test_points_without_an_orbit_are_masked_with_a_reason(tmp_path: Path) -> Non
     found = grid(operation, [1000.0, 400.0, 200.0], [30.0], folder=tmp_path)
     assert found.largest.mask.tolist() == [[False, False, True]]
     assert found.reason(0, 0) == ""
-    assert found.reason(0, 2) in stability.REASONS.values()
+    assert found.reason(0, 2) in orbit_kernels.REASONS.values()
     assert found.stability()[0, 2] is None
     assert np.isfinite(found.starts[0, :2]).all()
 
@@ -404,7 +398,7 @@ def test_bad_grids_are_refused(tmp_path: Path) -> None:
 
 def test_grid_is_kept_beside_the_compiled_code(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("LINKWORK_CACHE_DIR", str(tmp_path))
-    assert stability.grid_folder() == tmp_path / "grids"
+    assert grids.grid_folder() == tmp_path / "grids"
 
 
 # Long runs
