@@ -86,12 +86,16 @@ def scan(
         first, last = max(i - 1, 0), min(i + 1, samples - 1)
         around, sign = values[first : last + 1], np.sign(values[i])
         if np.isfinite(around).all() and (np.sign(around) == sign).all() and first + np.argmin(sign * around) == i:
-            found = minimize_scalar(
-                lambda x, sign=sign: sign * function(x),
-                bounds=(points[first], points[last]),
-                method="bounded",
-                options={"xatol": 1e-9 * (high - low)},
-            )
+            try:
+                found = minimize_scalar(
+                    lambda x, sign=sign: sign * function(x),
+                    bounds=(points[first], points[last]),
+                    method="bounded",
+                    options={"xatol": 1e-9 * (high - low)},
+                )
+            except LinkworkError as error:
+                gaps.append((float(points[i]), f"between the samples: {error}"))
+                continue
             if found.fun < 0.0:
                 places.append(float(found.x))
                 results.append(sign * float(found.fun))
@@ -113,7 +117,15 @@ def scan(
         if (left < 0.0) == (right < 0.0):
             continue
         # a function value of zero counts as positive: the same root is not found from both sides
-        root = here if right == 0.0 else float(brentq(function, points[i - 1], here, xtol=tolerance * (high - low)))
+        try:
+            root = here if right == 0.0 else float(brentq(function, points[i - 1], here, xtol=tolerance * (high - low)))
+        except LinkworkError as error:
+            gaps.append((here, f"just before: {error}"))
+            # the boundary is somewhere between the samples, and so is the end of the interval
+            if begun is not None:
+                intervals.append((begun, float(points[i - 1])))
+            begun = here if right < 0.0 else None
+            continue
         roots.append(root)
         if right < 0.0:
             begun = root

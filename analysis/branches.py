@@ -50,6 +50,26 @@ _UNITS = {variable.name: variable.unit for variable in (*PARAMETERS, *INPUTS)}
 #: largest multiplier passes the greatest that single shooting follows with certainty.
 LEAST_SINE, GREATEST_MULTIPLIER = 0.02, 1e4
 
+
+def unit_of(name: str) -> str:
+    """Unit of a parameter or input by its FMI name.
+
+    Raises
+    ------
+    InputError
+        If there is nothing of that name.
+    """
+    if name not in _UNITS:
+        raise InputError(f"there is no {name!r}: the names are {', '.join(_UNITS)}")
+    return _UNITS[name]
+
+
+def told(name: str, value: float, unit: str) -> str:
+    """A value in words, with its unit; speeds in rpm too."""
+    rpm = f" ({value / RAD_S_PER_RPM:.6g} rpm)" if unit == "rad/s" else ""
+    return f"{name} = {value:.6g} {unit}".rstrip() + rpm
+
+
 #: What varies: an FMI name, or a function of one number.
 Vary = str | Callable[[float], tuple[FiveBarParameters, Drive]]
 
@@ -94,7 +114,7 @@ class Family:
                 f"{self.vary} cannot vary: the drive is by {'speed' if self.drive.speed_drive else 'torque'}"
             )
         object.__setattr__(self, "name", self.name or self.vary)
-        object.__setattr__(self, "unit", self.unit or _UNITS[self.vary])
+        object.__setattr__(self, "unit", self.unit or unit_of(self.vary))
 
     def at(self, value: float) -> tuple[FiveBarParameters, Drive]:
         """Mechanism and drive at a value of the parameter."""
@@ -106,8 +126,7 @@ class Family:
 
     def tell(self, value: float) -> str:
         """A value of the parameter in words, with its unit; speeds in rpm too."""
-        rpm = f" ({value / RAD_S_PER_RPM:.6g} rpm)" if self.unit == "rad/s" else ""
-        return f"{self.name} = {value:.6g} {self.unit}".rstrip() + rpm
+        return told(self.name, value, self.unit)
 
     def _direction(self, value: float, reach: float) -> tuple[NDArray[np.float64], Constants]:
         """Derivatives of drive vector and constants with respect to the parameter, whose range is ``reach``."""

@@ -12,6 +12,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
+from functools import cache
 from math import exp, isfinite, pi
 
 import numpy as np
@@ -24,12 +25,16 @@ from linkwork.five_bar.parameters import FiveBarParameters, InitialState
 
 from .boundaries import Test
 from .floquet import TOLERANCE, Stability, StabilityVerdict, multipliers, verdict
+from .grids import Grid
 from .hill import PeriodicEquation, crossing_test, monodromy
 from .inputs import Inputs
-from .orbits import PeriodicOrbit, find_orbit
+from .orbits import OrbitError, PeriodicOrbit, find_orbit
 from .planes import Plane
 from .simulate import simulate
 from .slider_equation import Variant, slider_equation
+
+#: Monodromy matrix at a point of a plane, shape (2, 2).
+Monodromy = Callable[[float, float], NDArray[np.float64]]
 
 
 def linear_equation(parameters: FiveBarParameters, speed: float, variant: Variant = Variant.EXACT) -> PeriodicEquation:
@@ -45,19 +50,21 @@ def linear_verdict(
     return verdict(multipliers(monodromy(linear_equation(parameters, speed, variant))), tolerance)
 
 
-def linear_test(operation: Plane, multiplier: int, *, variant: Variant = Variant.EXACT) -> Test:
-    """det(Phi - multiplier I) of the linear equation about u = 0; ``multiplier`` is +1 or -1."""
+def linear_monodromy(operation: Plane, *, variant: Variant = Variant.EXACT) -> Monodromy:
+    """Monodromy matrix of the linear equation about u = 0 over a plane; points are remembered."""
 
-    def test(x: float, y: float) -> float:
-        return float(crossing_test(monodromy(linear_equation(*operation(x, y), variant)), multiplier))
+    @cache
+    def matrix(x: float, y: float) -> NDArray[np.float64]:
+        return monodromy(linear_equation(*operation(x, y), variant))
 
-    return test
+    return matrix
 
 
-def orbit_test(operation: Plane, multiplier: int, *, start: ArrayLike | None = None) -> Test:
-    """det(Phi - multiplier I) of the mechanism's own periodic orbit of one turn; ``multiplier`` is +1 or -1.
+def orbit_monodromy(operation: Plane, *, start: ArrayLike | None = None) -> Monodromy:
+    """Monodromy matrix of the mechanism's own periodic orbit of one turn over a plane; points are remembered.
 
-    Each orbit is sought from the one found last, so that neighbouring points stay on one branch.
+    Each orbit is sought from the one found last, so that neighbouring points stay on one branch, then from u = 0; the first by
+    all the ways of `find_orbit`.
 
     Parameters
     ----------
@@ -65,15 +72,37 @@ def orbit_test(operation: Plane, multiplier: int, *, start: ArrayLike | None = N
         Guess of the first: see `find_orbit`.
     """
     last = None if start is None else np.array(start, dtype=float)
+    found = False
 
-    def test(x: float, y: float) -> float:
-        nonlocal last
+    @cache
+    def matrix(x: float, y: float) -> NDArray[np.float64]:
+        nonlocal last, found
         parameters, speed = operation(x, y)
-        orbit = find_orbit(parameters, speed=speed, start=last)
-        last = orbit.start
-        return float(crossing_test(orbit.monodromy, multiplier))
+        try:
+            orbit = find_orbit(parameters, speed=speed, start=last, settle=not found)
+        except OrbitError:
+            if not found:
+                raise
+            orbit = find_orbit(parameters, speed=speed, settle=False)
+        last, found = orbit.start, True
+        return orbit.monodromy
 
-    return test
+    return matrix
+
+
+def crossing(matrix: Monodromy, multiplier: int) -> Test:
+    """Test function det(Phi - multiplier I) of a monodromy matrix over a plane; ``multiplier`` is +1 or -1."""
+    return lambda x, y: float(crossing_test(matrix(x, y), multiplier))
+
+
+def linear_test(operation: Plane, multiplier: int, *, variant: Variant = Variant.EXACT) -> Test:
+    """`crossing` of `linear_monodromy`."""
+    return crossing(linear_monodromy(operation, variant=variant), multiplier)
+
+
+def orbit_test(operation: Plane, multiplier: int, *, start: ArrayLike | None = None) -> Test:
+    """`crossing` of `orbit_monodromy`."""
+    return crossing(orbit_monodromy(operation, start=start), multiplier)
 
 
 # Removing damping
@@ -266,6 +295,8 @@ class Confirmation:
 
 #: Start of a long run: distance from the orbit relative to the crank's length, and the range over which growth is measured.
 DISTURBANCE, NOISE, LINEAR = 1e-5, 1e-8, 1e-2
+#: Margin from which on a long run tells growth from decay with certainty.
+MEASURABLE = 1e-2
 #: Growth or decay over a run, of the envelope, from which it counts.
 NOTABLE = 3.0
 
@@ -337,6 +368,28 @@ def confirm(
         deviations=size / size[0],
         message=run.message,
     )
+
+
+def telling_points(found: Grid) -> list[tuple[int, int]]:
+    """Three points of a grid that put it to the test: its most stable, its least stable, and the one nearest to a boundary.
+
+    The last is the point of the least margin, to either side, that a long run can still tell from none.
+
+    Returns
+    -------
+    list of (int, int)
+        Rows and columns, without repetition; none where the grid has no orbit.
+    """
+    margin = 1.0 - found.largest
+    if margin.count() == 0:
+        return []
+    size = np.ma.abs(margin)
+    near = np.ma.masked_where(size < MEASURABLE, size)
+    places = [int(margin.argmax()), int(margin.argmin())]
+    if near.count():
+        places.append(int(near.argmin()))
+    row, column = np.unravel_index(list(dict.fromkeys(places)), margin.shape)
+    return list(zip(row.tolist(), column.tolist()))
 
 
 def _leading(orbit: PeriodicOrbit, scale: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.complex128]]:

@@ -31,5 +31,5 @@ def main() -> None:
     """
 
 
-for _command in (runs.build, runs.run, runs.check, runs.info, runs.figures, vibration.resonance):
+for _command in (runs.build, runs.run, runs.check, runs.info, runs.figures, vibration.resonance, vibration.stability):
     main.add_command(_command)

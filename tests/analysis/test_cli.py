@@ -239,3 +239,36 @@ def test_bad_resonance(linkwork, arguments, code, words):
     result = linkwork("resonance", *arguments)
     assert result.exit_code == code, result.output
     assert words in result.output
+
+
+def test_stability_verdict_and_chart(linkwork, tmp_path, monkeypatch):
+    monkeypatch.setenv("LINKWORK_CACHE_DIR", str(tmp_path / "cache"))
+    result = linkwork("stability", "--published", "table-3.1", "--no-chart")
+    assert result.exit_code == 0, result.output
+    assert "stable, margin 0.94" in result.output
+    assert not (tmp_path / "out").exists()
+    result = linkwork(
+        "stability", "--published", "rig-2-spring-c", "--x-range", "1120 rpm", "1220 rpm",
+        "--y-range", "0", "2e3 dyn.s/cm", "--points", "12", "--cores", "1",
+    )  # fmt: skip
+    assert result.exit_code == 0, result.output
+    assert "no region is left from slider.damping = 0.97580" in result.output
+    assert result.output.count("agrees") == 3
+    for name in (".csv", "-boundaries.csv", ".png"):
+        assert (tmp_path / "out" / f"rig-2-spring-c-stability{name}").exists()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "words"),
+    [
+        (["--x", "slider.mess"], 1, "there is no 'slider.mess'"),
+        (["--y", "slider.coulomb_friction"], 1, "give the range of the axis"),
+        (["--x-range", "2", "1"], 1, "must increase"),
+        (["--speed", "-1"], 1, "above zero"),
+        (["--points", "1"], 2, "points"),
+    ],
+)
+def test_bad_stability(linkwork, arguments, code, words):
+    result = linkwork("stability", "--published", "table-3.1", *arguments)
+    assert result.exit_code == code, result.output
+    assert words in " ".join(result.output.split())

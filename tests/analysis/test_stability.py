@@ -89,6 +89,27 @@ def test_scan_finds_both_sides_of_a_region_however_narrow(width: float) -> None:
     assert np.array(line.intervals) == pytest.approx(np.array([(line.roots[0], line.roots[1])]))
 
 
+def test_a_gap_between_the_samples_is_told() -> None:
+    def function(x: float) -> float:
+        if 0.33 < x < 0.34:
+            raise InputError("no value here")
+        return (x - 0.335) ** 2 - 1e-6 if x < 0.6 else -(x - 0.665)
+
+    # the least value between the samples at 0.3 and 0.4 lies where there is none
+    line = scan(function, 0.0, 1.0, samples=11)
+    assert any("between the samples: no value here" in message for _, message in line.gaps)
+
+    def broken(x: float) -> float:
+        if 0.52 < x < 0.58:
+            raise InputError("no value here")
+        return 0.55 - x
+
+    line = scan(broken, 0.0, 1.0, samples=11)
+    assert any("just before: no value here" in message for _, message in line.gaps)
+    assert line.intervals == (pytest.approx((0.6, 1.0)),)
+    assert len(line.roots) == 0
+
+
 def test_scan_finds_a_narrow_region_beside_its_ends() -> None:
     line = scan(lambda x: (x - 0.003) ** 2 - 1e-8, 0.0, 1.0, samples=30)
     assert line.roots == pytest.approx([0.0029, 0.0031], abs=1e-10)

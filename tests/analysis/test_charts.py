@@ -1,0 +1,131 @@
+"""A stability chart as a whole: what it finds, tells, writes, and does where something is missing."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from analysis import grids
+from analysis.charts import StabilityChart, default_range, stability_chart
+from analysis.floquet import Stability
+from analysis.orbits import find_orbit
+from analysis.resonance import natural_frequency
+from analysis.stability import telling_points
+from linkwork.errors import InputError, LinkworkError
+from linkwork.five_bar.published import RAD_S_PER_RPM, SETS, TABLE_3_1
+
+RPM = RAD_S_PER_RPM
+RIG_2 = SETS["rig-2-spring-c"].parameters
+SPEEDS, DAMPINGS = (1120.0 * RPM, 1220.0 * RPM), (0.0, 2.0)
+
+
+@pytest.fixture(scope="module")
+def found(tmp_path_factory: pytest.TempPathFactory) -> StabilityChart:
+    """The first region of rig 2 with spring C."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(grids, "grid_folder", lambda: tmp_path_factory.mktemp("grids"))
+        return stability_chart(RIG_2, 60.0, ranges=(SPEEDS, DAMPINGS), points=41)
+
+
+def test_region_is_traced_and_is_where_the_multipliers_are_great(found: StabilityChart) -> None:
+    (region,) = [t for t in found.boundaries if t.motion == "true orbit"]
+    assert region.multiplier == -1
+    # twice the natural frequency is inside it
+    points = region.boundary.points
+    assert points[:, 0].min() < 2.0 * natural_frequency(RIG_2) < points[:, 0].max()
+    middle = 2.0 * natural_frequency(RIG_2)
+    orbit = find_orbit(replace(RIG_2, slider_damping=0.1), speed=middle)
+    assert orbit.verdict().stability is Stability.UNSTABLE
+    # the grid agrees point by point
+    for y, row in zip(found.grid.y, found.grid.largest):
+        sides = np.sort(region.boundary.crossings(1, float(y), found.box))
+        inside = np.zeros(len(row), dtype=bool)
+        if len(sides) == 2:
+            inside = (found.grid.x > sides[0]) & (found.grid.x < sides[1])
+        assert ((row > 1.0 + 1e-6) == inside).all()
+
+
+def test_removing_damping_is_the_top_of_the_region(found: StabilityChart) -> None:
+    doubling, fold = found.removals
+    (region,) = [t for t in found.boundaries if t.motion == "true orbit"]
+    top = region.boundary.points[:, 1].max()
+    value = float(doubling.partition("slider.damping = ")[2].split()[0])
+    assert value == pytest.approx(top, abs=1e-3)
+    assert "fold: there is no region" in fold
+    for damping, word in ((0.99 * value, Stability.UNSTABLE), (1.01 * value, Stability.STABLE)):
+        mechanism = replace(RIG_2, slider_damping=damping)
+        worst = max(find_orbit(mechanism, speed=s).largest for s in np.linspace(1165.0, 1173.0, 41) * RPM)
+        assert (worst > 1.0) == (word is Stability.UNSTABLE)
+
+
+def test_long_runs_confirm_three_points(found: StabilityChart) -> None:
+    assert len(found.runs) == 3
+    assert all(run.confirmation.agrees for run in found.runs)
+    assert {run.confirmation.verdict.stability for run in found.runs} == {Stability.STABLE, Stability.UNSTABLE}
+    margins = 1.0 - found.grid.largest
+    rows = telling_points(found.grid)
+    assert float(margins[rows[0]]) == margins.max()
+    assert float(margins[rows[1]]) == margins.min()
+
+
+def test_files_and_plot(found: StabilityChart, tmp_path: Path) -> None:
+    rows = np.loadtxt(found.to_csv(tmp_path / "chart.csv"), delimiter=",", skiprows=1)
+    assert rows.shape == (41 * 41, 4)
+    assert rows[:, 0].min() == pytest.approx(1120.0)
+    traces = np.loadtxt(found.boundaries_to_csv(tmp_path / "boundaries.csv"), delimiter=",", skiprows=1)
+    assert set(traces[:, 0]) == set(range(1, len(found.boundaries) + 1))
+    figure = found.plot(title="chart")
+    assert figure.axes[0].get_xlabel() == "drive.speed [rpm]"
+
+
+def test_points_without_an_orbit_are_told() -> None:
+    chart = stability_chart(
+        TABLE_3_1,
+        SETS["table-3.1"].crank_speed,
+        ("slider.stiffness", "slider.damping"),
+        ((150.0, 400.0), (20.0, 40.0)),
+        points=6,
+    )
+    assert any("no orbit was found at" in problem and "slider.stiffness = " in problem for problem in chart.problems)
+    assert np.ma.getmaskarray(chart.grid.largest).any()
+
+
+def test_a_chart_of_mechanisms_that_cannot_turn_says_so_and_keeps_the_rest() -> None:
+    chart = stability_chart(
+        TABLE_3_1,
+        SETS["table-3.1"].crank_speed,
+        ("coupler.length", "rocker.length"),
+        ((0.04, 0.15), (0.14, 0.16)),
+        points=5,
+    )
+    assert chart.problems
+    assert chart.grid.largest.count() > 0
+
+
+def test_default_ranges() -> None:
+    natural = natural_frequency(RIG_2)
+    assert default_range(RIG_2, 1.0, "drive.speed") == pytest.approx((0.3 * natural, 2.5 * natural))
+    assert default_range(RIG_2, 1.0, "slider.damping") == pytest.approx((0.55, 11.0))
+    with pytest.raises(InputError, match=r"slider\.coulomb_friction is 0"):
+        default_range(RIG_2, 1.0, "slider.coulomb_friction")
+    with pytest.raises(InputError, match=r"there is no 'slider\.mess'"):
+        default_range(RIG_2, 1.0, "slider.mess")
+
+
+@pytest.mark.parametrize(
+    ("names", "ranges"),
+    [
+        (("drive.speed", "drive.speed"), ((1.0, 2.0), (1.0, 2.0))),
+        (("drive.speed", "slider.mess"), ((1.0, 2.0), (1.0, 2.0))),
+        (("drive.speed", "slider.damping"), ((2.0, 1.0), (1.0, 2.0))),
+        (("drive.speed", "slider.damping"), ((1.0, 2.0), (-1.0, 2.0))),
+    ],
+)
+def test_bad_charts_are_refused(
+    names: tuple[str, str], ranges: tuple[tuple[float, float], tuple[float, float]]
+) -> None:
+    with pytest.raises(LinkworkError):
+        stability_chart(RIG_2, 60.0, names, ranges, points=3)
