@@ -197,6 +197,26 @@ def figures() -> str:
     return "\n".join(lines)
 
 
+#: Pictures of docs/rig-2.md by the study that they are.
+RIG_2 = {"rig-2-approximations.png": "8.18", "rig-2-harmonics.png": "8.20", "rig-2-forces.png": "8.21"}
+
+
+def rig_2_pictures() -> None:
+    """Draw the pictures of docs/rig-2.md."""
+    from analysis.io import save_figure
+    from analysis.resonance import approximations, frequency_response
+    from analysis.studies import load
+    from linkwork.five_bar.published import RAD_S_PER_RPM, SETS
+
+    for name, number in RIG_2.items():
+        study = load(number)
+        save_figure(study.draw(study.compute()), HERE / name)
+    rig = SETS["rig-2-spring-c"]
+    response = frequency_response(rig.parameters, 100.0 * RAD_S_PER_RPM, 1300.0 * RAD_S_PER_RPM)
+    figure = response.plot(title=rig.source, rpm=True, beside=approximations(response))
+    save_figure(figure, HERE / "rig-2-response.png")
+
+
 def main(arguments: list[str]) -> int:
     """Write what is asked for."""
     if "--figures" in arguments:
@@ -206,6 +226,7 @@ def main(arguments: list[str]) -> int:
         (HERE / "youssef-figures.md").write_text(figures(), encoding="utf-8")
         study = load("linkage")
         save_figure(study.draw(study.compute()), HERE / "linkage.png")
+        rig_2_pictures()
     (HERE / "nomenclature.md").write_text(nomenclature(), encoding="utf-8")
     README.write_text(readme(README.read_text(encoding="utf-8")), encoding="utf-8")
     return 0

@@ -129,3 +129,16 @@ BOUNDED_AT = MappingProxyType({0.2655: True, 0.26745: False, 0.2695: True})
 REMOVING_DAMPING_READ_OFF, REMOVING_DAMPING_THESIS, REMOVING_DAMPING = 0.45, 0.459, 0.167
 # second harmonic near half the natural frequency: how many times too small the thesis's is, "about"
 SECOND_HARMONIC_TOO_SMALL = 7.0
+
+# --- RIGS: chapter VIII, speeds in rpm by spring, stated or measured by the thesis and right. Its 580 and 1160 rpm are as 1 to
+# --- 2, but the springs A and B as 3 to 11
+NATURAL_RPM = MappingProxyType(
+    {
+        "rig-1-spring-a": ThesisAndRight(580.0, 592.0),
+        "rig-1-spring-b": ThesisAndRight(1160.0, 1133.0),
+        "rig-2-spring-c": ThesisAndRight(585.0, 585.5),
+        "rig-2-spring-d": ThesisAndRight(825.0, 828.0),
+    }
+)
+LOCAL_MAXIMUM_RPM = MappingProxyType({"a": ThesisAndRight(290.0, 296.0), "b": ThesisAndRight(580.0, 564.0)})
+MINIMUM_RPM = MappingProxyType({"a": ThesisAndRight(345.0, 367.0)})

@@ -146,61 +146,35 @@ class SteadyTurn:
         return 2.0 * float(np.abs(np.fft.rfft(self.slider_cm[:-1])[order])) / (len(self.slider_cm) - 1)
 
 
-def last_turn(
-    parameters: FiveBarParameters,
-    speed_rpm: float,
-    start: tuple[float, float],
-    crank_angle: float = 0.0,
-    samples: int = 720,
-) -> SteadyTurn:
-    """Two turns from a steady start (u, u') at a crank angle (m, m/s, rad), of which the second is kept.
-
-    The angles of the result count from that crank angle.
-    """
-    period = 60.0 / speed_rpm
-    run = simulate(
+@cache
+def steady_turn(parameters: FiveBarParameters, speed_rpm: float, start: tuple[float, float] = (0.0, 0.0)) -> SteadyTurn:
+    """The steady motion that a run ends in; from rest at u = 0, or from another (u, u') at crank angle 0 (m, m/s)."""
+    period, samples = 60.0 / speed_rpm, 1440
+    inputs = Inputs(speed=speed_rpm * RAD_S_PER_RPM)
+    turns = ceil(SETTLING_TIME / period)
+    settling = simulate(
         parameters,
-        Inputs(speed=speed_rpm * RAD_S_PER_RPM),
-        initial=InitialState(crank_angle=crank_angle, slider_position=start[0], slider_velocity=start[1]),
-        stop_time=2.0 * period,
-        step=period / samples,
-    )
-    u = CM_PER_METRE * run["slider.position"]
-    return SteadyTurn(
-        np.linspace(0.0, 360.0, samples + 1),
-        u[samples:],
-        run["drive.applied_torque"][samples:],
-        float(np.abs(u[samples:] - u[: samples + 1]).max()),
-    )
-
-
-def settle(
-    parameters: FiveBarParameters,
-    speed_rpm: float,
-    start: tuple[float, float] = (0.0, 0.0),
-    time: float = SETTLING_TIME,
-) -> tuple[float, float] | None:
-    """(u, u') at crank angle 0 (m, m/s) after as many turns as a time (s) takes; None if the links part before."""
-    period = 60.0 / speed_rpm
-    turns = ceil(time / period)
-    run = simulate(
-        parameters,
-        Inputs(speed=speed_rpm * RAD_S_PER_RPM),
+        inputs,
         initial=InitialState(slider_position=start[0], slider_velocity=start[1]),
         stop_time=turns * period,
         step=turns * period,
     )
-    if run.status:
-        return None
-    return float(run["slider.position"][-1]), float(run["slider.velocity"][-1])
-
-
-@cache
-def steady_turn(parameters: FiveBarParameters, speed_rpm: float) -> SteadyTurn:
-    """The steady motion that a run from rest at u = 0 ends in."""
-    start = settle(parameters, speed_rpm)
-    assert start is not None, "the published mechanisms stay assembled at the speeds of the figures"
-    return last_turn(parameters, speed_rpm, start, samples=1440)
+    assert not settling.status, "the published mechanisms stay assembled at the speeds of the figures"
+    u, v = (float(settling[name][-1]) for name in ("slider.position", "slider.velocity"))
+    run = simulate(
+        parameters,
+        inputs,
+        initial=InitialState(slider_position=u, slider_velocity=v),
+        stop_time=2.0 * period,
+        step=period / samples,
+    )
+    u_cm = CM_PER_METRE * run["slider.position"]
+    return SteadyTurn(
+        np.linspace(0.0, 360.0, samples + 1),
+        u_cm[samples:],
+        run["drive.applied_torque"][samples:],
+        float(np.abs(u_cm[samples:] - u_cm[: samples + 1]).max()),
+    )
 
 
 def least(x: NDArray[np.float64], y: NDArray[np.float64]) -> tuple[float, float]:

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import sys
 
-from ._rig_1 import draw_turns, sweep, turns_result
+from ._rig_1 import draw_turns, local_maximum, turns_result
 from .study import REFERENCE, THESIS, Study, StudyResult, near
 
 NUMBER = "8.12"
@@ -23,8 +23,8 @@ def compute() -> StudyResult:
         "The amplitude has a local maximum at 580 rpm.",
         "b",
         (530, 564, 600),
-        near("speed of the local maximum", THESIS, 580.0, sweep("b").highest_near(500, 650), 5.0, "rpm"),
-        near("speed of the local maximum", REFERENCE, 564.0, sweep("b").highest_near(500, 650), 0.5, "rpm"),
+        near("speed of the local maximum", THESIS, 580.0, local_maximum("b"), 5.0, "rpm"),
+        near("speed of the local maximum", REFERENCE, 564.0, local_maximum("b"), 0.5, "rpm"),
     )
 
 

@@ -43,11 +43,22 @@ REFUTED = {
     ("8.15", "natural frequency"),
     ("8.15", "natural frequency relative to spring A's"),
     ("8.15", "speed of the local maximum"),
+    ("8.17", "local maximum; spring A, with the friction that fits best"),
+    ("8.17", "minimum; spring A, with the friction that fits best"),
+    ("8.17", "local maximum; spring B, with the friction that fits best"),
+    ("8.17", "local maximum; spring A, with the friction and damping that fit best"),
+    ("8.17", "minimum; spring A, with the friction and damping that fit best"),
+    ("8.17", "resonance; spring A, with the friction and damping that fit best"),
+    ("8.17", "local maximum; spring B, with the friction and damping that fit best"),
+    ("8.17", "misfit left by the friction that fits best"),
+    ("8.17", "the same with the damping free"),
+    ("8.17", "levels that bring one speed each, greatest less least"),
 }
 
 
 def test_there_is_a_study_of_every_figure() -> None:
-    asked = [f"3.{n}" for n in range(2, 15)] + ["7.2"] + [f"8.{n}" for n in range(7, 18)] + ["linkage"]
+    chapters = {3: range(2, 15), 4: range(3, 8), 5: range(1, 5), 7: (2,), 8: range(7, 22)}
+    asked = [f"{chapter}.{n}" for chapter, numbers in chapters.items() for n in numbers] + ["linkage"]
     assert list(studies.STUDIES) == asked
     for number in studies.STUDIES:
         assert studies.load(number).number == number
@@ -192,11 +203,6 @@ class TestRig1:
     def test_natural_frequency(self, spring: str, rpm: float) -> None:
         assert _rig_1.natural_speed(spring) == pytest.approx(rpm, abs=0.5)
 
-    def test_maxima_and_minimum_of_the_amplitude(self) -> None:
-        assert _rig_1.sweep("a").highest_near(250, 350) == pytest.approx(296.0, abs=0.5)
-        assert _rig_1.sweep("a").lowest_near(320, 420) == pytest.approx(367.0, abs=0.5)
-        assert _rig_1.sweep("b").highest_near(500, 650) == pytest.approx(564.0, abs=0.5)
-
     def test_four_peaks_become_two(self) -> None:
         assert _rig_1.speed_of_fewer_peaks("a", 400.0, 500.0) == pytest.approx(451.0, abs=1.0)
         assert _rig_1.steady_turn(_rig_1.rig_1("a"), 440.0).peaks == 4
@@ -207,19 +213,6 @@ class TestRig1:
     @pytest.mark.parametrize(("rpm", "peaks"), [(150.0, 8), (200.0, 6), (250.0, 4)])
     def test_peaks_at_low_speed(self, rpm: float, peaks: int) -> None:
         assert _rig_1.steady_turn(_rig_1.rig_1("a"), rpm).peaks == peaks
-
-    def test_two_motions_with_spring_b(self) -> None:
-        rest, falling = _rig_1.sweep("b"), _rig_1.falling_sweep("b")
-        assert rest.speed_rpm[rest.jump] == pytest.approx(1040.0, abs=5.0)
-        assert falling.speed_rpm[0] == pytest.approx(940.0, abs=20.0)
-        both = [
-            (r, f)
-            for s, r in zip(rest.speed_rpm, rest.amplitude_cm)
-            for t, f in zip(falling.speed_rpm, falling.amplitude_cm)
-            if s == t
-        ]
-        assert sum(f > 2.0 * r for r, f in both) >= 8
-        assert all(f == pytest.approx(r, rel=1e-5) for r, f in both if f <= 2.0 * r)
 
     def test_amplitude_is_half_of_peak_to_peak(self) -> None:
         turn = _rig_1.steady_turn(_rig_1.rig_1("a"), 600.0)
