@@ -560,7 +560,13 @@ def chart(
     for axis, seed in candidates:
         if axis is not None and any(_on(boundary, axis, seed, box) for boundary in found):
             continue
-        found.append(trace(test, seed, box, step=step, tolerance=tolerance))
+        try:
+            found.append(trace(test, seed, box, step=step, tolerance=tolerance))
+        except LinkworkError as error:
+            if axis is None:
+                raise
+            # the sign changes where the function jumps, too
+            gaps.append(Gap(point=seed, message=f"no boundary leads through: {error}"))
     return Chart(box=box, test=test, boundaries=tuple(found), gaps=tuple(gaps))
 
 

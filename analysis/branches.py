@@ -17,15 +17,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from linkwork.errors import InputError, ParameterError
+from linkwork.errors import InputError
 from linkwork.five_bar.parameters import Constants, FiveBarParameters, field_name, fmi_name
 from linkwork.five_bar.published import RAD_S_PER_RPM
 from linkwork.five_bar.variables import INPUTS, PARAMETERS
 
-from . import io, orbit_kernels
-from .continuation import ContinuationError, Curve, Evaluation, Follower, Point, Settings
+from . import io
+from .continuation import ContinuationError, Curve, Evaluate, Evaluation, Follower, Point, Settings
 from .floquet import TOLERANCE, Crossing, Stability
-from .orbits import INTEGRATOR_TOLERANCE, Drive, PeriodicOrbit, Turn, failure, scale_of
+from .orbits import Drive, Period, PeriodicOrbit, Turn, period_from, scale_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -128,62 +128,47 @@ class Family:
         """A value of the parameter in words, with its unit; speeds in rpm too."""
         return told(self.name, value, self.unit)
 
-    def _direction(self, value: float, reach: float) -> tuple[NDArray[np.float64], Constants]:
-        """Derivatives of drive vector and constants with respect to the parameter, whose range is ``reach``."""
-        step = _DIFFERENCE * max(abs(value), 1e-3 * reach)
-        below = value - step
-        try:
-            p0, d0 = self.at(below)
-        except (ParameterError, InputError):
-            # the least value that there may be, such as no friction
-            below = value
-            p0, d0 = self.at(below)
-        p1, d1 = self.at(value + step)
-        width = value + step - below
+    def _direction(self, value: float, low: float, high: float) -> tuple[NDArray[np.float64], Constants]:
+        """Derivatives of drive vector and constants with respect to the parameter, by differences inside its range."""
+        step = _DIFFERENCE * max(abs(value), 1e-3 * (high - low))
+        a, b = max(value - step, low), min(value + step, high)
+        (p0, d0), (p1, d1) = self.at(a), self.at(b)
         return (
-            (d1.vector() - d0.vector()) / width,
-            Constants(*((b - a) / width for a, b in zip(p0.constants(), p1.constants()))),
+            (d1.vector() - d0.vector()) / (b - a),
+            Constants(*((y - x) / (b - a) for x, y in zip(p0.constants(), p1.constants()))),
         )
 
-    def evaluate(self, turns: int, reach: float) -> Callable[[NDArray[np.float64], float], Evaluation]:
-        """y(T) - y(0) with its derivatives, as `continuation` follows it; its data are the `PeriodicOrbit`."""
+    def evaluate(self, turns: int, low: float, high: float) -> Evaluate:
+        """y(T) - y(0) with its derivatives over a range, as `continuation` follows it; its data are the `PeriodicOrbit`.
+
+        Beyond the range, where there may be no mechanism (friction below zero), it goes on in a straight line, so that a
+        branch can be followed up to the very end.
+        """
 
         def evaluation(y: NDArray[np.float64], value: float) -> Evaluation:
-            parameters, drive = self.at(value)
-            d_drive, d_p = self._direction(value, reach)
-            n = drive.size
-            z = np.zeros(n * (2 + n))
-            z[:n] = y
-            scale = scale_of(parameters, drive, y)
-            status = orbit_kernels.period(
-                drive.speed_drive,
-                parameters.constants(),
-                drive.vector(),
-                d_drive,
-                d_p,
-                2.0 * pi * turns,
-                INTEGRATOR_TOLERANCE,
-                scale,
-                reach,
-                z,
-                np.array([0.1, 0.0]),
-            )
-            if status != orbit_kernels.DONE:
-                raise failure(status, y)
-            residual = z[:n] - y
-            monodromy = z[n : n + n * n].reshape(n, n).T.copy()
-            orbit = PeriodicOrbit(
-                parameters=parameters,
-                drive=drive,
-                turns=turns,
-                start=y.copy(),
-                monodromy=monodromy,
-                residual=float(np.abs(residual / scale).max()),
-                iterations=1,
-            )
-            return Evaluation(residual, monodromy - np.eye(n), z[n + n * n :].copy(), orbit)
+            inside = min(max(value, low), high)
+            parameters, drive = self.at(inside)
+            period = period_from(parameters, drive, y, turns, self._direction(inside, low, high), high - low)
+            residual = period.shift + period.slope * (value - inside)
+            orbit = orbit_from(parameters, drive, y, turns, period)
+            return Evaluation(residual, period.monodromy - np.eye(len(y)), period.slope, orbit)
 
         return evaluation
+
+
+def orbit_from(
+    parameters: FiveBarParameters, drive: Drive, start: NDArray[np.float64], turns: int, period: Period
+) -> PeriodicOrbit:
+    """The orbit that one period from its start is, as far as it closes."""
+    return PeriodicOrbit(
+        parameters=parameters,
+        drive=drive,
+        turns=turns,
+        start=start.copy(),
+        monodromy=period.monodromy,
+        residual=float(np.abs(period.shift / scale_of(parameters, drive, start)).max()),
+        iterations=1,
+    )
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -400,10 +385,10 @@ def switch(
 def _follower(family: Family, orbit: PeriodicOrbit, settings: Settings) -> Follower:
     ends = [family.at(value) for value in (settings.low, settings.high)]
     scale = np.max([scale_of(parameters, drive, orbit.start) for parameters, drive in ends], axis=0)
-    return Follower(family.evaluate(orbit.turns, settings.high - settings.low), scale, settings)
+    return Follower(family.evaluate(orbit.turns, settings.low, settings.high), scale, settings)
 
 
-def _leave(point: Point) -> str:
+def reason_to_leave(point: Point) -> str:
     """Why a branch is not followed beyond a point; empty where it is."""
     orbit = point.data
     if orbit.largest > GREATEST_MULTIPLIER:
@@ -417,7 +402,9 @@ def _leave(point: Point) -> str:
 def _branch(
     family: Family, turns: int, follower: Follower, first: Point, watch: Callable[[float], None] | None
 ) -> Branch:
-    curve = follower.follow(first, watch=None if watch is None else lambda point: watch(point.parameter), leave=_leave)
+    curve = follower.follow(
+        first, watch=None if watch is None else lambda point: watch(point.parameter), leave=reason_to_leave
+    )
     special = _special_points(curve, follower)
     return Branch(
         family=family,
@@ -431,17 +418,22 @@ def _branch(
     )
 
 
+def crossing_value(kind: Crossing, orbit: PeriodicOrbit) -> float:
+    """Smooth function of an orbit that is zero where a multiplier is +1, -1, or a pair has the product 1."""
+    monodromy = orbit.monodromy
+    if kind is Crossing.TORUS:
+        mu = orbit.multipliers
+        return float(np.prod([mu[i] * mu[j] - 1.0 for i in range(len(mu)) for j in range(i)]).real)
+    sign = 1.0 if kind is Crossing.FOLD else -1.0
+    return float(np.linalg.det(monodromy - sign * np.eye(len(monodromy))))
+
+
 def _tests(point: Point) -> dict[Crossing, float]:
-    """Functions along a branch that are zero where a multiplier crosses the unit circle."""
-    monodromy = point.data.monodromy
-    n = len(monodromy)
-    mu = point.data.multipliers
-    pairs = [mu[i] * mu[j] - 1.0 for i in range(n) for j in range(i)]
+    """What changes its sign along a branch where a multiplier crosses the unit circle."""
+    # det(M - 1) is zero where a branch is crossed as well; the parameter turns back at a fold only
     return {
-        # det(M - 1) is zero where a branch is crossed as well; the parameter turns back at a fold only
-        Crossing.FOLD: float(point.tangent[-1]),
-        Crossing.PERIOD_DOUBLING: float(np.linalg.det(monodromy + np.eye(n))),
-        Crossing.TORUS: float(np.prod(pairs).real),
+        kind: float(point.tangent[-1]) if kind is Crossing.FOLD else crossing_value(kind, point.data)
+        for kind in Crossing
     }
 
 

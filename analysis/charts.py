@@ -6,7 +6,9 @@ their FMI names, the crank speed among them.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -18,15 +20,18 @@ from linkwork.five_bar.parameters import FiveBarParameters, field_name
 from linkwork.five_bar.published import RAD_S_PER_RPM
 
 from . import io
-from .boundaries import Boundary, Box, Test, chart
-from .branches import told, unit_of
+from .boundaries import Box, Test, chart
+from .branches import Family, follow, told, unit_of
+from .continuation import ContinuationError
+from .crossings import At, follow_crossing
+from .floquet import Crossing
 from .grids import Grid, grid
-from .planes import plane
+from .orbits import Drive, OrbitError, find_orbit
+from .planes import Plane, plane
 from .resonance import natural_frequency
 from .stability import (
     Confirmation,
     Monodromy,
-    RemovalError,
     confirm,
     crossing,
     linear_monodromy,
@@ -42,6 +47,10 @@ if TYPE_CHECKING:
 _SPEEDS, _OTHERS = (0.3, 2.5), (0.1, 2.0)
 #: Lines of a chart on which boundaries are sought, of either kind, and samples on each.
 LINES, SAMPLES = (2, 5), 120
+#: Points of a branch at most on which folds are sought.
+BRANCH_POINTS = 600
+#: Distance, with the box scaled to 1 by 1, at which a point lies on a boundary.
+SAME = 5e-3
 DAMPING = "slider.damping"
 
 
@@ -75,16 +84,20 @@ class Traced:
 
     Attributes
     ----------
-    boundary : Boundary
+    points : ndarray, shape (n, 2)
+        In SI.
     motion : str
         ``true orbit`` or ``linear equation``.
-    multiplier : int
-        Floquet multiplier on it: -1 or +1.
+    kind : Crossing
+        What the multipliers do there: at -1 a period doubling, at +1 a fold, beyond which the orbit is no more.
+    ends : (str, str)
+        Why it ends, at the first and at the last point.
     """
 
-    boundary: Boundary
+    points: NDArray[np.float64]
     motion: str
-    multiplier: int
+    kind: Crossing
+    ends: tuple[str, str]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -140,8 +153,8 @@ class StabilityChart:
         """Write the boundaries as a table, a row a point, numbered in the first column."""
         rows = [np.empty((0, 5))]
         for number, traced in enumerate(self.boundaries, start=1):
-            points = traced.boundary.points * [axis.factor for axis in self.axes]
-            head = [number, float(traced.motion == "true orbit"), traced.multiplier]
+            points = traced.points * [axis.factor for axis in self.axes]
+            head = [number, float(traced.motion == "true orbit"), 1.0 if traced.kind is Crossing.FOLD else -1.0]
             rows.append(np.column_stack([np.tile(head, (len(points), 1)), points]))
         names = ("boundary", "true orbit (1) or linear equation (0)", "multiplier [1]", *(a.label for a in self.axes))
         return io.write_csv(path, dict(zip(names, np.concatenate(rows).T)))
@@ -152,19 +165,18 @@ class StabilityChart:
 
         x, y = self.axes
         looks = {
-            ("true orbit", -1): ("0.1", "-", "period doubling"),
-            ("true orbit", 1): (COLOURS[3], "-", "fold"),
-            ("linear equation", -1): (COLOURS[2], "--", "linear equation, -1"),
-            ("linear equation", 1): (COLOURS[4], "--", "linear equation, +1"),
+            ("true orbit", Crossing.PERIOD_DOUBLING): ("0.1", "-", "period doubling"),
+            ("true orbit", Crossing.FOLD): (COLOURS[3], "-", "fold"),
+            ("linear equation", Crossing.PERIOD_DOUBLING): (COLOURS[2], "--", "linear equation, multiplier -1"),
+            ("linear equation", Crossing.FOLD): (COLOURS[4], "--", "linear equation, multiplier +1"),
         }
         curves, named = [], set()
         for traced in self.boundaries:
-            colour, line, label = looks[traced.motion, traced.multiplier]
-            points = traced.boundary.points
+            colour, line, label = looks[traced.motion, traced.kind]
             curves.append(
                 Curve(
-                    x=x.factor * points[:, 0],
-                    y=y.factor * points[:, 1],
+                    x=x.factor * traced.points[:, 0],
+                    y=y.factor * traced.points[:, 1],
                     colour=colour,
                     line=line,
                     label="" if label in named else label,
@@ -249,21 +261,30 @@ def stability_chart(
     operation = plane(parameters, speed, *names)
     found = grid(operation, np.linspace(*box.x, points), np.linspace(*box.y, points), n_jobs=n_jobs, progress=progress)
     problems = _missing(found, axes)
-    traced: list[Traced] = []
-    linear = parameters.slider_coulomb_friction == 0.0 and "slider.coulomb_friction" not in names
     matrices = {"true orbit": orbit_monodromy(operation)}
-    if linear:
+    if parameters.slider_coulomb_friction == 0.0 and "slider.coulomb_friction" not in names:
         matrices["linear equation"] = linear_monodromy(operation)
+    traced: list[Traced] = []
     for motion, matrix in matrices.items():
-        for multiplier in (-1, 1):
-            result = chart(crossing(matrix, multiplier), box, lines=LINES, samples=SAMPLES)
-            traced += [Traced(boundary=b, motion=motion, multiplier=multiplier) for b in result.boundaries]
+        # where the true orbit folds it ends, and a test function with it: its folds are found on its branches
+        for kind in (Crossing.PERIOD_DOUBLING, Crossing.FOLD)[: 1 if motion == "true orbit" else 2]:
+            result = chart(crossing(matrix, 1 if kind is Crossing.FOLD else -1), box, lines=LINES, samples=SAMPLES)
+            traced += [
+                Traced(
+                    points=boundary.points,
+                    motion=motion,
+                    kind=kind,
+                    ends=(boundary.ends[0].reason.value, boundary.ends[1].reason.value),
+                )
+                for boundary in result.boundaries
+            ]
             if result.gaps:
                 first = result.gaps[0]
                 problems.append(
-                    f"{motion}, multiplier {multiplier:+d}: no value at {len(result.gaps)} points of the lines searched, the "
-                    f"first at {_place(axes, *first.point)}: {first.message}"
+                    f"{motion}, {kind.value}: no value at {len(result.gaps)} points of the lines searched, the first at "
+                    f"{_place(axes, *first.point)}: {first.message}"
                 )
+    _add_crossings(operation, box, axes, traced, problems)
     runs = []
     for row, column in telling_points(found):
         x, y = float(found.x[column]), float(found.y[row])
@@ -279,10 +300,75 @@ def stability_chart(
         box=box,
         grid=found,
         boundaries=tuple(traced),
-        removals=_removals(matrices["true orbit"], box, names),
+        removals=_removals(matrices["true orbit"], box, names, traced),
         runs=tuple(runs),
         problems=tuple(problems),
     )
+
+
+def _add_crossings(
+    operation: Plane, box: Box, axes: tuple[Axis, Axis], traced: list[Traced], problems: list[str]
+) -> None:
+    """Append the boundaries that the branches along lines y = const lead to: folds, and doublings on their other sheets."""
+
+    def at(x: float, y: float) -> tuple[FiveBarParameters, Drive]:
+        mechanism, speed = operation(x, y)
+        return mechanism, Drive(speed=speed)
+
+    lost: list[str] = []
+    for y in np.linspace(*box.y, LINES[1]).tolist():
+        for start, end, direction in ((*box.x, 1), (*box.x[::-1], -1)):
+            mechanism, drive = at(start, y)
+            family = Family(
+                parameters=mechanism,
+                drive=drive,
+                vary=partial(_along, at, y),
+                name=axes[0].name,
+                unit=unit_of(axes[0].name),
+            )
+            try:
+                orbit = find_orbit(family.parameters, speed=family.drive.speed)
+                branch = follow(
+                    family, orbit, start, low=box.x[0], high=box.x[1], direction=direction, most_points=BRANCH_POINTS
+                )
+            except (OrbitError, ContinuationError) as error:
+                lost.append(f"{_place(axes, start, y)}: {error}")
+                continue
+            for special in branch.special:
+                place = (special.parameter, y)
+                if special.kind is Crossing.TORUS or _is_known(place, special.kind, box, traced):
+                    continue
+                try:
+                    curve = follow_crossing(at, special.orbit, special.kind, place, x=box.x, y=box.y)
+                except ContinuationError as error:
+                    problems.append(f"the {special.kind.value} at {_place(axes, *place)} is not followed: {error}")
+                else:
+                    traced.append(Traced(points=curve.points, motion="true orbit", kind=curve.kind, ends=curve.ends))
+            # the branch that goes through needs not be followed backwards
+            if branch.parameter[-1] == end and not branch.special:
+                break
+    if lost:
+        problems.append(
+            f"no branch to seek folds on from {len(lost)} of {2 * LINES[1]} ends of lines, the first {lost[0]}"
+        )
+
+
+def _along(at: At, y: float, x: float) -> tuple[FiveBarParameters, Drive]:
+    return at(x, y)
+
+
+def _is_known(place: tuple[float, float], kind: Crossing, box: Box, traced: Sequence[Traced]) -> bool:
+    """Whether a boundary of the true orbit that has been traced passes through a point, nearly."""
+    for boundary in traced:
+        if boundary.kind is kind and boundary.motion == "true orbit" and len(boundary.points) > 1:
+            s = (boundary.points - np.array(place)) / box.size
+            # distance of the point, now the origin, from each piece
+            pieces = np.diff(s, axis=0)
+            squares = np.maximum((pieces**2).sum(axis=1), 1e-300)
+            along = np.clip(-(s[:-1] * pieces).sum(axis=1) / squares, 0.0, 1.0)
+            if float(np.hypot(*(s[:-1] + along[:, None] * pieces).T).min()) < SAME:
+                return True
+    return False
 
 
 def default_range(parameters: FiveBarParameters, speed: float, name: str) -> tuple[float, float]:
@@ -327,28 +413,36 @@ def _missing(found: Grid, axes: tuple[Axis, Axis]) -> list[str]:
     ]
 
 
-def _removals(matrix: Monodromy, box: Box, names: tuple[str, str]) -> tuple[str, ...]:
+def _removals(matrix: Monodromy, box: Box, names: tuple[str, str], traced: Sequence[Traced]) -> tuple[str, ...]:
     """The damping that removes the regions, where damping is one of the axes."""
     if DAMPING not in names:
         return ()
-    other = 1 - names.index(DAMPING)
-    x, damping = (box.x, box.y) if other == 0 else (box.y, box.x)
-    told_ones = []
-    for multiplier, kind in ((-1, "period doubling"), (1, "fold")):
-        test = crossing(matrix, multiplier)
-
-        def turned(s: float, d: float, test: Test = test) -> float:
-            return test(s, d) if other == 0 else test(d, s)
-
+    which = names.index(DAMPING)
+    x, damping = (box.x, box.y) if which == 1 else (box.y, box.x)
+    sentences = []
+    for kind in (Crossing.PERIOD_DOUBLING, Crossing.FOLD):
+        boundaries = [b for b in traced if b.kind is kind and b.motion == "true orbit"]
+        if not boundaries:
+            sentences.append(f"{kind.value}: there is none in the box")
+            continue
+        top = max(float(b.points[:, which].max()) for b in boundaries)
+        if top > damping[1] - 1e-6 * (damping[1] - damping[0]):
+            sentences.append(f"{kind.value}: still there at {DAMPING} = {damping[1]:.6g} {unit_of(DAMPING)}")
+            continue
         try:
-            found = removing_damping(turned, x, damping)
-        except RemovalError as error:
-            told_ones.append(f"{kind}: {error}")
-        except LinkworkError as error:
-            told_ones.append(f"{kind}: the removing damping is not found: {error}")
-        else:
-            last = told(names[other], found.x, unit_of(names[other]))
-            told_ones.append(
-                f"{kind}: no region is left from {DAMPING} = {found.damping:.8g} {unit_of(DAMPING)} on; the last goes at {last}"
+            test = crossing(matrix, 1 if kind is Crossing.FOLD else -1)
+            found = removing_damping(partial(_turned, test, which), x, damping)
+        except LinkworkError:
+            # the test function ends at folds: what the traced boundary tells stands
+            sentences.append(
+                f"{kind.value}: goes up to {DAMPING} = {top:.4g} {unit_of(DAMPING)}, by the traced boundary"
             )
-    return tuple(told_ones)
+        else:
+            last = told(names[1 - which], found.x, unit_of(names[1 - which]))
+            value = f"{DAMPING} = {found.damping:.8g} {unit_of(DAMPING)}"
+            sentences.append(f"{kind.value}: no region is left from {value} on; the last goes at {last}")
+    return tuple(sentences)
+
+
+def _turned(test: Test, which: int, other: float, damping: float) -> float:
+    return test(other, damping) if which == 1 else test(damping, other)

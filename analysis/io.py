@@ -61,7 +61,8 @@ def write_csv(path: str | Path, columns: Mapping[str, ArrayLike]) -> Path:
         raise InputError(f"the columns of a CSV file differ in length: {lengths}")
     path = _prepare(path)
     part = path.with_name(path.name + ".part")
-    header = ",".join(arrays)
+    # a name with a comma in it is one column all the same
+    header = ",".join(f'"{name}"' if "," in name else name for name in arrays)
     np.savetxt(part, np.column_stack(list(arrays.values())), delimiter=",", header=header, comments="", fmt="%.17g")
     os.replace(part, path)
     return path

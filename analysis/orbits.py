@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from math import isfinite, pi
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -19,7 +20,7 @@ from linkwork.errors import AssemblyError, InputError, LinkworkError
 from linkwork.five_bar import kinematics
 from linkwork.five_bar.dynamics import Inputs
 from linkwork.five_bar.kinematics import LIMIT_SINE
-from linkwork.five_bar.parameters import FiveBarParameters
+from linkwork.five_bar.parameters import Constants, FiveBarParameters
 from linkwork.five_bar.variables import OUTPUT_NAMES
 
 from . import compiled, orbit_kernels
@@ -489,6 +490,60 @@ def _newton(parameters: FiveBarParameters, drive: Drive, turns: int, guess: NDAr
         residual=float(report[0]),
         iterations=int(report[1]),
     )
+
+
+class Period(NamedTuple):
+    """One period from a start: y(T) - y(0), shape (n,), its derivatives dy(T)/dy(0), (n, n), and dy(T)/dlambda, (n,)."""
+
+    shift: NDArray[np.float64]
+    monodromy: NDArray[np.float64]
+    slope: NDArray[np.float64]
+
+
+def period_from(
+    parameters: FiveBarParameters,
+    drive: Drive,
+    start: NDArray[np.float64],
+    turns: int,
+    direction: tuple[NDArray[np.float64], Constants] | None = None,
+    along: float = 1.0,
+) -> Period:
+    """Follow the plant over one period from a start that need not be on a periodic orbit.
+
+    Parameters
+    ----------
+    start : ndarray, shape (n,)
+        y at crank angle 0.
+    direction : (ndarray of shape (7,), Constants), optional
+        Derivatives of `Drive.vector` and of the constants with respect to a parameter lambda; zero without it.
+    along : float
+        Magnitude of lambda.
+
+    Raises
+    ------
+    OrbitError
+        If the period cannot be followed.
+    """
+    n = drive.size
+    d_drive, d_p = direction or (np.zeros(len(orbit_kernels.DRIVE)), Constants(*[0.0] * len(Constants._fields)))
+    z = np.zeros(n * (2 + n))
+    z[:n] = start
+    status = orbit_kernels.period(
+        drive.speed_drive,
+        parameters.constants(),
+        drive.vector(),
+        d_drive,
+        d_p,
+        2.0 * pi * turns,
+        INTEGRATOR_TOLERANCE,
+        scale_of(parameters, drive, start),
+        along,
+        z,
+        np.array([0.1, 0.0]),
+    )
+    if status != orbit_kernels.DONE:
+        raise failure(status, start)
+    return Period(z[:n] - start, z[n : n + n * n].reshape(n, n).T.copy(), z[n + n * n :].copy())
 
 
 def failure(status: int, start: NDArray[np.float64], residual: float = np.inf, iterations: int = 0) -> OrbitError:

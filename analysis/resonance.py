@@ -148,7 +148,7 @@ def frequency_response(
     vary: str = "drive.speed",
     start: ArrayLike | None = None,
     doubled: bool = True,
-    greatest_step: float = 2e-2,
+    greatest_step: float = 5e-3,
     progress: bool = False,
 ) -> Response:
     """Follow the periodic motions of the full nonlinear plant over a range of speeds, or of another parameter.
@@ -168,7 +168,8 @@ def frequency_response(
     doubled : bool
         Whether the motions of twice the period are followed from each period doubling.
     greatest_step : float
-        Greatest step in scaled arc length: the range has length 1, and the crank's length counts as 1.
+        Greatest step in scaled arc length: the range has length 1, and the crank's length counts as 1. Narrow resonances need
+        small ones.
     progress : bool
         Show a progress bar.
 

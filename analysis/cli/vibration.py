@@ -254,16 +254,15 @@ def _regions(found: Any) -> None:
     count = int(np.ma.sum(found.grid.largest > 1.0))
     console.print(f"{count} of {found.grid.largest.count()} points with an orbit are unstable", highlight=False)
     grid = Table(title="boundaries of instability", title_justify="left")
-    for heading in ("motion", "where a multiplier is", f"{x.name} [{x.unit}]", f"{y.name} [{y.unit}]", "ends because"):
+    for heading in ("motion", "kind", f"{x.name} [{x.unit}]", f"{y.name} [{y.unit}]", "ends because"):
         grid.add_column(escape(heading))
     for traced in found.boundaries:
-        points = traced.boundary.points
+        points = traced.points
         spans = [
             f"{axis.factor * points[:, i].min():.6g} to {axis.factor * points[:, i].max():.6g}"
             for i, axis in enumerate(found.axes)
         ]
-        reasons = dict.fromkeys(end.reason.value for end in traced.boundary.ends)
-        grid.add_row(traced.motion, f"{traced.multiplier:+d}", *spans, "; ".join(reasons))
+        grid.add_row(traced.motion, traced.kind.value, *spans, "; ".join(dict.fromkeys(traced.ends)))
     if found.boundaries:
         console.print(grid)
     for removal in found.removals:

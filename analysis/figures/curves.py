@@ -184,8 +184,6 @@ def draw_panel(axis: Axes, panel: Panel) -> None:
             linewidth=curve.width,
             markeredgewidth=1.2,
             zorder=3 if curve.marker else 2,
-            # points by themselves show on the edge of the axes too
-            clip_on=bool(curve.line),
         )
     axis.set_xlabel(panel.x_label)
     axis.set_ylabel(panel.y_label)
