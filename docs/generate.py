@@ -167,7 +167,7 @@ def identifiers() -> set[str]:
 
 FIGURES = """# The thesis's figures, and what it states
 
-Each figure of chapters III, VII and VIII is a module of `analysis.studies`, with a plot, a CSV and verdicts; `linkwork figures`
+Each figure of chapters III, IV, V, VII and VIII is a module of `analysis.studies`, with a plot, a CSV and verdicts; `linkwork figures`
 makes them all. The figures themselves are unreadable in the copy we have: what is held against the computation is what the
 text of the thesis states, and reference numbers from an independent derivation that was cross-checked against two multibody
 engines. Where a caption is lost, which quantity stands under which number is our assignment, and the study says so. This page is

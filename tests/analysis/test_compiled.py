@@ -92,11 +92,16 @@ def test_cache_folder_changes_with_the_sources(tmp_path: Path, monkeypatch: pyte
     assert len(folders) == 5
     (sources / "new.py").touch()
     assert compiled.cache_folder() not in folders
-    own = tmp_path / "compiled.py"
-    own.write_text("changed", encoding="utf-8")
     before = compiled.cache_folder()
-    monkeypatch.setattr(compiled, "__file__", str(own))
-    assert compiled.cache_folder() != before
+    for name in compiled.COMPILED_MODULES:
+        shutil.copy(Path(compiled.__file__).with_name(name), tmp_path / name)
+    monkeypatch.setattr(compiled, "__file__", str(tmp_path / "compiled.py"))
+    assert compiled.cache_folder() == before
+    for name in compiled.COMPILED_MODULES:
+        with (tmp_path / name).open("a", encoding="utf-8") as file:
+            file.write("\n")
+        assert compiled.cache_folder() != before
+        before = compiled.cache_folder()
 
 
 def test_folder_that_cannot_be_written_to_falls_back_to_a_temporary_one(

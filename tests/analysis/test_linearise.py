@@ -280,11 +280,17 @@ def test_small_oscillations_have_the_frequencies_and_shapes_of_the_model(mode: i
     assert errors[1] < 0.15 * errors[0]
 
 
-@pytest.mark.parametrize("drive", ["free", "held"])
-@pytest.mark.parametrize("channel", ["slider.force", "load.fx", "drive.torque"])
+@pytest.mark.parametrize(
+    ("drive", "channel"),
+    [
+        ("free", "slider.force"),
+        ("free", "load.fx"),
+        ("free", "drive.torque"),
+        ("held", "slider.force"),
+        ("held", "load.fx"),
+    ],
+)
 def test_step_responses_are_the_plants_to_first_order(drive: str, channel: str) -> None:
-    if drive == "held" and channel == "drive.torque":
-        pytest.skip("a held crank takes no torque")
     parameters = replace(TABLE_3_1, coupler_point_distance=0.1, coupler_point_angle=0.4)
     rest = find_equilibrium(parameters, crank_angle=0.5 if drive == "held" else None)
     names = ("slider.position", "coupler.angle", "pin.C.fx", "slider.guide_force")

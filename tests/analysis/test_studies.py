@@ -35,6 +35,15 @@ REFUTED = {
     ("3.2", "third turn's drift relative to the first's; mu = 5e4 dyn.s/cm"),
     ("3.2", "third turn's drift relative to the first's; mu = 1e5 dyn.s/cm"),
     ("3.10", "exponent of T0 in the time to 1 rad"),
+    *(("4.3", f"resonance; I4 = {ratio}") for ratio in ("0.5", "1", "1.5")),
+    *(("4.6", f"shift by the crank; I4 = {ratio}") for ratio in ("0.5", "1", "1.5")),
+    *(
+        ("5.1", f"{side} boundary in lambda_k^2; I4 = {ratio}")
+        for side in ("lower", "upper")
+        for ratio in ("0.5", "1", "1.5")
+    ),
+    ("5.2", "damping that removes the region up to I4 = 1.5"),
+    ("5.2", "the same, by the thesis's own equation"),
     ("8.8", "speed of the local maximum"),
     ("8.12", "speed of the local maximum"),
     ("8.14", "natural frequency"),
