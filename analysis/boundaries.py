@@ -72,9 +72,7 @@ def scan(
     InputError
         If the interval or the number of samples is not usable.
     """
-    if not (isfinite(low) and isfinite(high) and low < high) or samples < 3:
-        raise InputError(f"a line from {low} to {high} with {samples} samples: it needs a length and three samples")
-    points = np.linspace(low, high, samples)
+    points = _samples(low, high, samples)
     values, gaps = np.full(samples, np.nan), []
     for i, point in enumerate(points.tolist()):
         try:
@@ -135,6 +133,32 @@ def scan(
     if begun is not None:
         intervals.append((begun, float(points[-1])))
     return Line(roots=np.array(roots), intervals=tuple(intervals), gaps=tuple(gaps))
+
+
+def lowest(
+    function: Callable[[float], float], low: float, high: float, *, samples: int = 40, tolerance: float = 1e-9
+) -> tuple[float, float]:
+    """Place and value of the least value of a smooth function on an interval.
+
+    The place to within a tolerance relative to the length of the interval; the value is good to its square.
+
+    Raises
+    ------
+    InputError
+        If the interval or the number of samples is not usable.
+    """
+    points = _samples(low, high, samples)
+    values = [function(x) for x in points.tolist()]
+    i = int(np.argmin(values))
+    bounds = points[max(i - 1, 0)], points[min(i + 1, samples - 1)]
+    found = minimize_scalar(function, bounds=bounds, method="bounded", options={"xatol": tolerance * (high - low)})
+    return (float(found.x), float(found.fun)) if found.fun < values[i] else (float(points[i]), float(values[i]))
+
+
+def _samples(low: float, high: float, count: int) -> NDArray[np.float64]:
+    if not (isfinite(low) and isfinite(high) and low < high) or count < 3:
+        raise InputError(f"a line from {low} to {high} with {count} samples: it needs a length and three samples")
+    return np.linspace(low, high, count)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -302,10 +302,10 @@ def _stage(s, x, k, h, y):  # type: ignore[no-untyped-def]
 
 
 @inner
-def _error(x, y, k, h, scale):  # type: ignore[no-untyped-def]
-    """Hairer's estimate of the error of a step from x to y relative to the scale, of order 8 in h."""
+def local_error(size, x, y, k, h, scale):  # type: ignore[no-untyped-def]
+    """Hairer's estimate of the error of a step from x to y relative to the scale, of order 8 in h; components ``size``."""
     sum3 = sum5 = 0.0
-    for i in range(_N):
+    for i in range(size):
         e3 = e5 = 0.0
         for j in range(STAGES):
             e3 += E3[j] * k[j, i]
@@ -314,7 +314,7 @@ def _error(x, y, k, h, scale):  # type: ignore[no-untyped-def]
         sum3 += (e3 / weight) ** 2
         sum5 += (e5 / weight) ** 2
     bottom = sum5 + 0.01 * sum3
-    return 0.0 if bottom == 0.0 else h * sum5 / np.sqrt(bottom * _N)
+    return 0.0 if bottom == 0.0 else h * sum5 / np.sqrt(bottom * size)
 
 
 @inner
@@ -509,7 +509,7 @@ def _run(
                 _copy(dynamics.derivative(_tuple(y), held, p), k[s])
             _stage(STAGES, x, k, h, y)
             carry[EVALUATIONS] += STAGES - 1
-            error = _error(x, y, k, h, scale) / tolerance
+            error = local_error(_N, x, y, k, h, scale) / tolerance
             good = error <= 1.0
             if good:
                 t_new = stop if last else begin + (elapsed + h)

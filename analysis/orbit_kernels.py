@@ -23,8 +23,6 @@ from linkwork.five_bar.kinematics import LIMIT_SINE
 from . import symbolic
 from .compiled import (
     CONSTANTS,
-    E3,
-    E5,
     EXPONENT,
     FROM,
     MATRIX,
@@ -36,6 +34,7 @@ from .compiled import (
     constants,
     inner,
     kernel,
+    local_error,
 )
 
 # what Numba traces while it compiles would fail with an error of Numba's: say it here
@@ -221,22 +220,6 @@ def _stage(s, size, z, k, h, y):  # type: ignore[no-untyped-def]
 
 
 @inner
-def _error(size, z, y, k, h, scale):  # type: ignore[no-untyped-def]
-    """Hairer's estimate of the error of a step from z to y relative to the scale, of order 8 in h."""
-    sum3 = sum5 = 0.0
-    for i in range(size):
-        e3 = e5 = 0.0
-        for j in range(STAGES):
-            e3 += E3[j] * k[j, i]
-            e5 += E5[j] * k[j, i]
-        weight = scale[i] + max(abs(z[i]), abs(y[i]))
-        sum3 += (e3 / weight) ** 2
-        sum5 += (e5 / weight) ** 2
-    bottom = sum5 + 0.01 * sum3
-    return 0.0 if bottom == 0.0 else h * sum5 / np.sqrt(bottom * size)
-
-
-@inner
 def _turn(speed_drive, columns, p, drive, d_drive, d_p, begin, end, tolerance, scale, z, k, y, carry):  # type: ignore[no-untyped-def]
     """Integrate z over a range of crank angles; carry[0] is the step to begin with and to go on with, carry[1] counts."""
     n = 2 if speed_drive else 3
@@ -262,7 +245,7 @@ def _turn(speed_drive, columns, p, drive, d_drive, d_p, begin, end, tolerance, s
             _stage(s, size, z, k, h, y)
             _rate(speed_drive, columns, th2 + NODES[s] * h, y, drive, p, d_drive, d_p, k[s])
         _stage(STAGES, size, z, k, h, y)
-        error = _error(size, z, y, k, h, scale) / tolerance
+        error = local_error(size, z, y, k, h, scale) / tolerance
         carry[1] += 1.0
         if not error <= 1.0:
             # beyond the limit of assembly the error is NaN

@@ -13,17 +13,17 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
 from functools import cache
-from math import exp, isfinite, pi
+from math import exp, pi
 
 import numpy as np
 import scipy.linalg
 from numpy.typing import ArrayLike, NDArray
-from scipy.optimize import brentq, minimize_scalar
+from scipy.optimize import brentq
 
 from linkwork.errors import InputError, LinkworkError
 from linkwork.five_bar.parameters import FiveBarParameters, InitialState
 
-from .boundaries import Test
+from .boundaries import Test, lowest
 from .floquet import TOLERANCE, Stability, StabilityVerdict, multipliers, verdict
 from .grids import Grid
 from .hill import PeriodicEquation, crossing_test, monodromy
@@ -129,28 +129,6 @@ class RemovingDamping:
     damping: float
     x: float
     residual: float
-
-
-def lowest(
-    function: Callable[[float], float], low: float, high: float, *, samples: int = 40, tolerance: float = 1e-9
-) -> tuple[float, float]:
-    """Place and value of the least value of a smooth function on an interval.
-
-    The place to within a tolerance relative to the length of the interval; the value is good to its square.
-
-    Raises
-    ------
-    InputError
-        If the interval or the number of samples is not usable.
-    """
-    if not (isfinite(low) and isfinite(high) and low < high) or samples < 3:
-        raise InputError(f"a line from {low} to {high} with {samples} samples: it needs a length and three samples")
-    points = np.linspace(low, high, samples)
-    values = [function(x) for x in points.tolist()]
-    i = int(np.argmin(values))
-    bounds = points[max(i - 1, 0)], points[min(i + 1, samples - 1)]
-    found = minimize_scalar(function, bounds=bounds, method="bounded", options={"xatol": tolerance * (high - low)})
-    return (float(found.x), float(found.fun)) if found.fun < values[i] else (float(points[i]), float(values[i]))
 
 
 def removing_damping(

@@ -13,7 +13,7 @@ import pytest
 from scipy.special import mathieu_a, mathieu_b
 
 from analysis import grids, orbit_kernels, stability
-from analysis.boundaries import Box, Reason, chart, scan, trace
+from analysis.boundaries import Box, Reason, chart, lowest, scan, trace
 from analysis.figures import Curve, HeatMap, Panel, plot_charts
 from analysis.floquet import Stability
 from analysis.grids import GridInterrupted, grid
@@ -26,7 +26,6 @@ from analysis.stability import (
     confirm,
     linear_test,
     linear_verdict,
-    lowest,
     orbit_test,
     removing_damping,
     removing_damping_over,
