@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from linkwork.errors import InputError
-from linkwork.five_bar.parameters import Constants, FiveBarParameters, field_name, fmi_name
+from linkwork.five_bar.parameters import Constants, FiveBarParameters, field_name
 from linkwork.five_bar.published import RAD_S_PER_RPM
 from linkwork.five_bar.variables import INPUTS, PARAMETERS
 
@@ -44,7 +44,13 @@ _DIFFERENCE = 1e-6
 #: Distance from a period doubling at which the doubled branch is begun, relative to the crank's length.
 _SWITCH = 2e-3
 
-_UNITS = {variable.name: variable.unit for variable in (*PARAMETERS, *INPUTS)}
+#: Unit of each parameter that can vary.
+_UNITS = {
+    variable.name: variable.unit
+    for variable in (*INPUTS, *PARAMETERS)
+    if variable.name in OF_THE_DRIVE
+    or (field_name(variable.name) in FiveBarParameters.__dataclass_fields__ and variable.kind == "Real")
+}
 
 #: A branch is left where the links come this close to collinear (least |sin| of the transmission angle), or where its
 #: largest multiplier passes the greatest that single shooting follows with certainty.
@@ -60,7 +66,7 @@ def unit_of(name: str) -> str:
         If there is nothing of that name.
     """
     if name not in _UNITS:
-        raise InputError(f"there is no {name!r}: the names are {', '.join(_UNITS)}")
+        raise InputError(f"there is no {name}: what can vary is {', '.join(_UNITS)}")
     return _UNITS[name]
 
 
@@ -104,11 +110,8 @@ class Family:
         if callable(self.vary):
             object.__setattr__(self, "name", self.name or "parameter")
             return
-        known = [fmi_name(field) for field in FiveBarParameters.__dataclass_fields__ if field != "assembly_branch"]
-        if self.vary not in OF_THE_DRIVE and self.vary not in known:
-            raise InputError(
-                f"{self.vary!r} cannot vary: it must be one of {', '.join([*OF_THE_DRIVE, *known])}, or a function"
-            )
+        if self.vary not in _UNITS:
+            raise InputError(f"{self.vary!r} cannot vary: it must be one of {', '.join(_UNITS)}, or a function")
         if (self.vary == "drive.speed") != self.drive.speed_drive and self.vary in ("drive.speed", "drive.torque"):
             raise InputError(
                 f"{self.vary} cannot vary: the drive is by {'speed' if self.drive.speed_drive else 'torque'}"
@@ -333,7 +336,7 @@ def follow(
     ContinuationError
         If the orbit is not on the family.
     """
-    settings = Settings(low=low, high=high, first=first, greatest=greatest, most_points=most_points)
+    settings = Settings(low=low, high=high, first=min(first, greatest), greatest=greatest, most_points=most_points)
     follower = _follower(family, orbit, settings)
     return _branch(family, orbit.turns, follower, follower.start(orbit.start, value, direction), watch)
 
@@ -363,7 +366,7 @@ def switch(
             f"the point at {doubling.parameter:.9g} is a {doubling.kind.value}: only a period doubling has a branch"
         )
     orbit = doubling.orbit
-    settings = Settings(low=low, high=high, first=first, greatest=greatest, most_points=most_points)
+    settings = Settings(low=low, high=high, first=min(first, greatest), greatest=greatest, most_points=most_points)
     doubled = replace(orbit, turns=2 * orbit.turns, monodromy=orbit.monodromy @ orbit.monodromy)
     follower = _follower(family, doubled, settings)
     # the eigenvector of the multiplier -1 is the direction in which every second period differs
@@ -442,6 +445,9 @@ def _special_points(curve: Curve, follower: Follower) -> list[SpecialPoint]:
     values = [_tests(point) for point in curve.points]
     for i, length in enumerate(curve.steps):
         for kind in Crossing:
+            # at prescribed speed the product of the two multipliers follows from the damping alone and crosses nothing
+            if kind is Crossing.TORUS and curve.points[i].data.drive.speed_drive:
+                continue
             if not values[i][kind] * values[i + 1][kind] < 0.0:
                 continue
             point, s = follower.locate(curve.points[i], length, lambda p, kind=kind: _tests(p)[kind])  # type: ignore[misc]

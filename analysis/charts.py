@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from linkwork.errors import InputError, LinkworkError
 from linkwork.five_bar.parameters import FiveBarParameters, field_name
@@ -21,23 +21,24 @@ from linkwork.five_bar.published import RAD_S_PER_RPM
 
 from . import io
 from .boundaries import Box, Test, chart
-from .branches import Family, follow, told, unit_of
+from .branches import OF_THE_DRIVE, Family, SpecialPoint, follow, told, unit_of
 from .continuation import ContinuationError
-from .crossings import At, follow_crossing
+from .crossings import COMPLETE, follow_crossing
 from .floquet import Crossing
 from .grids import Grid, grid
-from .orbits import Drive, OrbitError, find_orbit
-from .planes import Plane, plane
+from .orbits import Drive, OrbitError, PeriodicOrbit, orbit_of, scale_of
+from .planes import Plane, plane, require_axis
 from .resonance import natural_frequency
+from .simulate import shown
 from .stability import (
     Confirmation,
     Monodromy,
     confirm,
-    crossing,
     linear_monodromy,
     orbit_monodromy,
     removing_damping,
     telling_points,
+    test_of,
 )
 
 if TYPE_CHECKING:
@@ -49,6 +50,8 @@ _SPEEDS, _OTHERS = (0.3, 2.5), (0.1, 2.0)
 LINES, SAMPLES = (2, 5), 120
 #: Points of a branch at most on which folds are sought.
 BRANCH_POINTS = 600
+#: Distance of two starts, relative to crank length and speed, up to which neighbours on a grid are of one motion.
+SAME_MOTION = 0.4
 #: Distance, with the box scaled to 1 by 1, at which a point lies on a boundary.
 SAME = 5e-3
 DAMPING = "slider.damping"
@@ -126,6 +129,8 @@ class StabilityChart:
         The damping that removes the regions between the ends of the other axis, in words; none unless damping is an axis.
     runs : tuple of Run
         Three points put to the test.
+    elsewhere : int
+        Folds and period doublings met that belong to other motions than the grid's; `follow_crossing` follows them.
     problems : tuple of str
         What could not be computed, a sentence each; empty where everything was.
     """
@@ -136,6 +141,7 @@ class StabilityChart:
     boundaries: tuple[Traced, ...]
     removals: tuple[str, ...]
     runs: tuple[Run, ...]
+    elsewhere: int
     problems: tuple[str, ...]
 
     def to_csv(self, path: str | Path) -> Path:
@@ -217,11 +223,12 @@ class StabilityChart:
 
 def stability_chart(
     parameters: FiveBarParameters,
-    speed: float,
+    drive: Drive,
     names: tuple[str, str] = ("drive.speed", DAMPING),
     ranges: tuple[tuple[float, float], tuple[float, float]] | None = None,
     *,
     points: int = 80,
+    start: ArrayLike | None = None,
     n_jobs: int | None = None,
     progress: bool = False,
 ) -> StabilityChart:
@@ -230,14 +237,16 @@ def stability_chart(
     Parameters
     ----------
     parameters : FiveBarParameters
-    speed : float
-        Crank speed (rad/s) where it is no axis.
+    drive : Drive
+        Speed, or torque, and constant forces, where they are no axes.
     names : (str, str)
         FMI names of the parameters along x and y; ``drive.speed`` is the crank speed.
     ranges : ((float, float), (float, float)), optional
         Their ranges in SI; see `default_range`.
     points : int
         Of the grid, along each axis.
+    start : array_like, shape (2,) or (3,), optional
+        Guess of the orbits; under a torque it is needed: see `find_orbit`.
     n_jobs : int, optional
         Cores, as `joblib.Parallel`.
     progress : bool
@@ -256,19 +265,26 @@ def stability_chart(
         On Ctrl-C; the same call goes on from the rows that are kept.
     """
     axes = (_axis(names[0]), _axis(names[1]))
-    spans = ranges or (default_range(parameters, speed, names[0]), default_range(parameters, speed, names[1]))
+    spans = ranges or (default_range(parameters, drive, names[0]), default_range(parameters, drive, names[1]))
     box = Box(x=spans[0], y=spans[1])
-    operation = plane(parameters, speed, *names)
-    found = grid(operation, np.linspace(*box.x, points), np.linspace(*box.y, points), n_jobs=n_jobs, progress=progress)
+    operation = plane(parameters, drive, *names)
+    found = grid(
+        operation,
+        np.linspace(*box.x, points),
+        np.linspace(*box.y, points),
+        start=start,
+        n_jobs=n_jobs,
+        progress=progress,
+    )
     problems = _missing(found, axes)
-    matrices = {"true orbit": orbit_monodromy(operation)}
-    if parameters.slider_coulomb_friction == 0.0 and "slider.coulomb_friction" not in names:
+    matrices = {"true orbit": orbit_monodromy(operation, start=start)}
+    if drive.speed_drive and parameters.slider_coulomb_friction == 0.0 and "slider.coulomb_friction" not in names:
         matrices["linear equation"] = linear_monodromy(operation)
     traced: list[Traced] = []
     for motion, matrix in matrices.items():
         # where the true orbit folds it ends, and a test function with it: its folds are found on its branches
         for kind in (Crossing.PERIOD_DOUBLING, Crossing.FOLD)[: 1 if motion == "true orbit" else 2]:
-            result = chart(crossing(matrix, 1 if kind is Crossing.FOLD else -1), box, lines=LINES, samples=SAMPLES)
+            result = chart(test_of(matrix, 1 if kind is Crossing.FOLD else -1), box, lines=LINES, samples=SAMPLES)
             traced += [
                 Traced(
                     points=boundary.points,
@@ -284,13 +300,12 @@ def stability_chart(
                     f"{motion}, {kind.value}: no value at {len(result.gaps)} points of the lines searched, the first at "
                     f"{_place(axes, *first.point)}: {first.message}"
                 )
-    _add_crossings(operation, box, axes, traced, problems)
+    elsewhere = _add_crossings(operation, found, box, axes, start, traced, problems, progress)
     runs = []
     for row, column in telling_points(found):
         x, y = float(found.x[column]), float(found.y[row])
-        mechanism, own_speed = operation(x, y)
         try:
-            check = confirm(mechanism, own_speed, start=found.starts[row, column])
+            check = confirm(*operation(x, y), start=found.starts[row, column])
         except LinkworkError as error:
             problems.append(f"no long run at {_place(axes, x, y)}: {error}")
         else:
@@ -302,58 +317,102 @@ def stability_chart(
         boundaries=tuple(traced),
         removals=_removals(matrices["true orbit"], box, names, traced),
         runs=tuple(runs),
+        elsewhere=elsewhere,
         problems=tuple(problems),
     )
 
 
 def _add_crossings(
-    operation: Plane, box: Box, axes: tuple[Axis, Axis], traced: list[Traced], problems: list[str]
-) -> None:
-    """Append the boundaries that the branches along lines y = const lead to: folds, and doublings on their other sheets."""
+    at: Plane,
+    found: Grid,
+    box: Box,
+    axes: tuple[Axis, Axis],
+    guess: ArrayLike | None,
+    traced: list[Traced],
+    problems: list[str],
+    progress: bool,
+) -> int:
+    """Append the boundaries that the branches along lines y = const lead to, folds above all.
 
-    def at(x: float, y: float) -> tuple[FiveBarParameters, Drive]:
-        mechanism, speed = operation(x, y)
-        return mechanism, Drive(speed=speed)
-
+    Those of other motions than the grid's are not traced; returns how many were met.
+    """
     lost: list[str] = []
-    for y in np.linspace(*box.y, LINES[1]).tolist():
-        for start, end, direction in ((*box.x, 1), (*box.x[::-1], -1)):
-            mechanism, drive = at(start, y)
-            family = Family(
-                parameters=mechanism,
-                drive=drive,
-                vary=partial(_along, at, y),
-                name=axes[0].name,
-                unit=unit_of(axes[0].name),
-            )
-            try:
-                orbit = find_orbit(family.parameters, speed=family.drive.speed)
-                branch = follow(
-                    family, orbit, start, low=box.x[0], high=box.x[1], direction=direction, most_points=BRANCH_POINTS
+    elsewhere = 0
+    with shown(progress, float(LINES[1]), "branches") as show:
+        for number, y in enumerate(np.linspace(*box.y, LINES[1]).tolist()):
+            for start, direction in ((box.x[0], 1), (box.x[1], -1)):
+                mechanism, drive = at(start, y)
+                family = Family(
+                    parameters=mechanism,
+                    drive=drive,
+                    vary=partial(_along, at, y),
+                    name=axes[0].name,
+                    unit=unit_of(axes[0].name),
                 )
-            except (OrbitError, ContinuationError) as error:
-                lost.append(f"{_place(axes, start, y)}: {error}")
-                continue
-            for special in branch.special:
-                place = (special.parameter, y)
-                if special.kind is Crossing.TORUS or _is_known(place, special.kind, box, traced):
-                    continue
                 try:
-                    curve = follow_crossing(at, special.orbit, special.kind, place, x=box.x, y=box.y)
-                except ContinuationError as error:
-                    problems.append(f"the {special.kind.value} at {_place(axes, *place)} is not followed: {error}")
-                else:
-                    traced.append(Traced(points=curve.points, motion="true orbit", kind=curve.kind, ends=curve.ends))
-            # the branch that goes through needs not be followed backwards
-            if branch.parameter[-1] == end and not branch.special:
-                break
+                    orbit = orbit_of(mechanism, drive, start=guess)
+                    branch = follow(
+                        family,
+                        orbit,
+                        start,
+                        low=box.x[0],
+                        high=box.x[1],
+                        direction=direction,
+                        most_points=BRANCH_POINTS,
+                    )
+                except (OrbitError, ContinuationError) as error:
+                    lost.append(f"{_place(axes, start, y)}: {error}")
+                    continue
+                for special in branch.special:
+                    place = (special.parameter, y)
+                    if special.kind is Crossing.TORUS or _is_known(place, special.kind, box, traced):
+                        continue
+                    if _is_of(found, special.orbit, place):
+                        _append(at, special, place, box, axes, traced, problems)
+                    else:
+                        elsewhere += 1
+                # the branch that goes through needs not be followed backwards
+                if branch.reached and not branch.special:
+                    break
+            show(number + 1.0)
     if lost:
         problems.append(
             f"no branch to seek folds on from {len(lost)} of {2 * LINES[1]} ends of lines, the first {lost[0]}"
         )
+    return elsewhere
 
 
-def _along(at: At, y: float, x: float) -> tuple[FiveBarParameters, Drive]:
+def _is_of(found: Grid, orbit: PeriodicOrbit, place: tuple[float, float]) -> bool:
+    """Whether an orbit is of the motion whose multipliers a grid has, by the points of the grid around its place."""
+    column, row = (int(np.abs(axis - value).argmin()) for axis, value in zip((found.x, found.y), place))
+    around = found.starts[max(row - 1, 0) : row + 2, max(column - 1, 0) : column + 2].reshape(-1, len(orbit.start))
+    scale = scale_of(orbit.parameters, orbit.drive, orbit.start)
+    distance = np.linalg.norm((around - orbit.start) / scale, axis=1)
+    return bool(np.any(distance < SAME_MOTION))
+
+
+def _append(
+    at: Plane,
+    special: SpecialPoint,
+    place: tuple[float, float],
+    box: Box,
+    axes: tuple[Axis, Axis],
+    traced: list[Traced],
+    problems: list[str],
+) -> None:
+    what = f"the {special.kind.value} at {_place(axes, *place)}"
+    try:
+        curve = follow_crossing(at, special.orbit, special.kind, place, x=box.x, y=box.y)
+    except ContinuationError as error:
+        problems.append(f"{what} is not followed: {error}")
+        return
+    traced.append(Traced(points=curve.points, motion="true orbit", kind=curve.kind, ends=curve.ends))
+    for end, point in zip(curve.ends, (curve.points[0], curve.points[-1])):
+        if end not in COMPLETE:
+            problems.append(f"{what} is followed to {_place(axes, *point.tolist())} only: {end}")
+
+
+def _along(at: Plane, y: float, x: float) -> tuple[FiveBarParameters, Drive]:
     return at(x, y)
 
 
@@ -371,19 +430,20 @@ def _is_known(place: tuple[float, float], kind: Crossing, box: Box, traced: Sequ
     return False
 
 
-def default_range(parameters: FiveBarParameters, speed: float, name: str) -> tuple[float, float]:
+def default_range(parameters: FiveBarParameters, drive: Drive, name: str) -> tuple[float, float]:
     """Range of an axis where none is given: speeds about the natural frequency, others about the value there is.
 
     Raises
     ------
     InputError
-        If there is neither.
+        If there is no value, or no such axis.
     """
-    unit_of(name)
-    if name == "drive.speed":
-        natural = natural_frequency(parameters) if parameters.slider_stiffness > 0.0 else speed
+    require_axis(drive, name)
+    if name == "drive.speed" and parameters.slider_stiffness > 0.0:
+        natural = natural_frequency(parameters)
         return (_SPEEDS[0] * natural, _SPEEDS[1] * natural)
-    value = float(getattr(parameters, field_name(name), 0.0))
+    at_drive = OF_THE_DRIVE.get(name)
+    value = float(getattr(drive, at_drive) if at_drive else getattr(parameters, field_name(name)))
     if value <= 0.0:
         raise InputError(f"{name} is {value:g} here: give the range of the axis")
     return (_OTHERS[0] * value, _OTHERS[1] * value)
@@ -414,33 +474,37 @@ def _missing(found: Grid, axes: tuple[Axis, Axis]) -> list[str]:
 
 
 def _removals(matrix: Monodromy, box: Box, names: tuple[str, str], traced: Sequence[Traced]) -> tuple[str, ...]:
-    """The damping that removes the regions, where damping is one of the axes."""
+    """The damping that removes each region, where damping is one of the axes; a sentence a boundary of the true orbit."""
     if DAMPING not in names:
         return ()
     which = names.index(DAMPING)
-    x, damping = (box.x, box.y) if which == 1 else (box.y, box.x)
+    other, damping = (box.x, box.y) if which == 1 else (box.y, box.x)
+    name, unit = names[1 - which], unit_of(names[1 - which])
     sentences = []
-    for kind in (Crossing.PERIOD_DOUBLING, Crossing.FOLD):
-        boundaries = [b for b in traced if b.kind is kind and b.motion == "true orbit"]
-        if not boundaries:
-            sentences.append(f"{kind.value}: there is none in the box")
+    for boundary in traced:
+        if boundary.motion != "true orbit" or len(boundary.points) < 2:
             continue
-        top = max(float(b.points[:, which].max()) for b in boundaries)
+        across, up = boundary.points[:, 1 - which], boundary.points[:, which]
+        span = f"{told(name, float(across.min()), unit)} to {told(name, float(across.max()), unit)}"
+        region = f"{boundary.kind.value} from {span}"
+        top = float(up.max())
         if top > damping[1] - 1e-6 * (damping[1] - damping[0]):
-            sentences.append(f"{kind.value}: still there at {DAMPING} = {damping[1]:.6g} {unit_of(DAMPING)}")
+            sentences.append(f"{region}: still there at {DAMPING} = {damping[1]:.6g} {unit_of(DAMPING)}")
             continue
+        # this region and no other
+        margin = 0.25 * float(np.ptp(across))
+        x = (max(other[0], float(across.min()) - margin), min(other[1], float(across.max()) + margin))
+        test = test_of(matrix, 1 if boundary.kind is Crossing.FOLD else -1)
         try:
-            test = crossing(matrix, 1 if kind is Crossing.FOLD else -1)
-            found = removing_damping(partial(_turned, test, which), x, damping)
+            found = removing_damping(partial(_turned, test, which), x, (float(up.min()), damping[1]))
         except LinkworkError:
             # the test function ends at folds: what the traced boundary tells stands
-            sentences.append(
-                f"{kind.value}: goes up to {DAMPING} = {top:.4g} {unit_of(DAMPING)}, by the traced boundary"
-            )
+            sentences.append(f"{region}: goes up to {DAMPING} = {top:.4g} {unit_of(DAMPING)}, by its points")
         else:
-            last = told(names[1 - which], found.x, unit_of(names[1 - which]))
-            value = f"{DAMPING} = {found.damping:.8g} {unit_of(DAMPING)}"
-            sentences.append(f"{kind.value}: no region is left from {value} on; the last goes at {last}")
+            sentences.append(
+                f"{region}: gone from {DAMPING} = {found.damping:.8g} {unit_of(DAMPING)} on, last at "
+                f"{told(name, found.x, unit)}"
+            )
     return tuple(sentences)
 
 

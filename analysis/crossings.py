@@ -20,8 +20,11 @@ from .continuation import Evaluate, Evaluation, Follower, Point, Settings
 from .floquet import Crossing
 from .orbits import Drive, PeriodicOrbit, period_from, scale_of
 
-#: Steps of the central differences, relative to the scales: the multipliers are good to about 1e-10.
+#: Steps of the differences, relative to the scales: the multipliers are good to about 1e-10. They steer Newton's method only.
 _DIFFERENCE = 1e-5
+
+#: Ends of a curve that leave nothing to follow.
+COMPLETE = ("it leaves the box", "it is closed")
 
 #: Mechanism and drive at a point of the plane.
 At = Callable[[float, float], tuple[FiveBarParameters, Drive]]
@@ -56,8 +59,8 @@ def follow_crossing(
     x: tuple[float, float],
     y: tuple[float, float],
     first: float = 2e-3,
-    greatest: float = 2e-2,
-    most_points: int = 1000,
+    greatest: float = 4e-2,
+    most_points: int = 300,
 ) -> CrossingCurve:
     """Follow a crossing of the unit circle through a plane, to both sides, to the edges of a box.
 
@@ -139,9 +142,10 @@ def _evaluate(
         here, orbit = values(inside)
         columns = np.empty((n + 1, n + 2))
         for j, step in enumerate(steps):
-            a, b = inside.copy(), inside.copy()
-            a[j], b[j] = max(inside[j] - step, low[j]), min(inside[j] + step, high[j])
-            columns[:, j] = (values(b)[0] - values(a)[0]) / (b[j] - a[j])
+            there = inside.copy()
+            # into the box, where there is a mechanism for certain
+            there[j] += step if inside[j] + step <= high[j] else -step
+            columns[:, j] = (values(there)[0] - here) / (there[j] - inside[j])
         columns[:n, :n] = orbit.monodromy - np.eye(n)
         return Evaluation(here + columns @ (z - inside), columns[:, :-1], columns[:, -1], orbit)
 

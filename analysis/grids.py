@@ -13,17 +13,16 @@ import joblib
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from linkwork.errors import InputError, LinkworkError
+from linkwork.errors import InputError, Interrupted, LinkworkError
 
 from . import floquet, io, orbit_kernels, orbits
 from .compiled import cache_folder
 from .floquet import TOLERANCE, Stability
-from .orbits import Drive
 from .planes import Operation, Plane
 from .simulate import interruptible, shown
 
 
-class GridInterrupted(LinkworkError):
+class GridInterrupted(Interrupted):
     """A grid was interrupted; the rows that were done are kept and the same call goes on from there.
 
     Attributes
@@ -48,8 +47,9 @@ class Grid:
     x, y : ndarray, shapes (nx,) and (ny,)
     largest : masked array, shape (ny, nx)
         Largest modulus of the Floquet multipliers; masked where no orbit was found.
-    starts : ndarray, shape (ny, nx, 2)
-        u (m) and u' (m/s) of the orbits at crank angle 0; NaN where ``largest`` is masked.
+    starts : ndarray, shape (ny, nx, n)
+        u (m) and u' (m/s) of the orbits at crank angle 0, under a torque the crank speed (rad/s) too; NaN where ``largest``
+        is masked.
     status : ndarray of int, shape (ny, nx)
         0, or why there is no orbit: a key of `orbit_kernels.REASONS`.
     computed : int
@@ -112,8 +112,8 @@ def grid(
         See `plane`.
     x, y : array_like, shapes (nx,) and (ny,)
         Values of the axes.
-    start : array_like, shape (2,), optional
-        Guess of the first orbit of each row.
+    start : array_like, shape (2,) or (3,), optional
+        Guess of the first orbit of each row; see `find_orbit`.
     tolerance : float
         Bound of the integrator's local error.
     folder : path, optional
@@ -126,7 +126,7 @@ def grid(
     Raises
     ------
     InputError
-        If an axis is empty or not finite.
+        If an axis is empty or not finite, or there are no cores.
     ParameterError
         If a point is no mechanism.
     GridInterrupted
@@ -136,7 +136,9 @@ def grid(
     for name, axis in (("x", xs), ("y", ys)):
         if axis.ndim != 1 or len(axis) == 0 or not np.isfinite(axis).all():
             raise InputError(f"the axis {name} of a grid must be finite numbers, at least one")
-    guess = np.zeros(2) if start is None else np.array(start, dtype=float)
+    if n_jobs == 0:
+        raise InputError("0 cores: it must be a number of them, or -1 for all")
+    guess = orbits.guess_of(operation(float(xs[0]), float(ys[0]))[1], start)
     where = grid_folder() if folder is None else Path(folder)
     where.mkdir(parents=True, exist_ok=True)
     sources = _sources()
@@ -144,11 +146,11 @@ def grid(
     for value in ys.tolist():
         row = [operation(first, value) for first in xs.tolist()]
         digest = hashlib.sha256(sources)
-        digest.update(np.array([(*p.constants(), speed) for p, speed in row]).tobytes())
+        digest.update(np.array([(*p.constants(), *drive.vector(), drive.speed_drive) for p, drive in row]).tobytes())
         digest.update(np.array([*guess, tolerance]).tobytes())
         path = where / f"{digest.hexdigest()[:32]}.npy"
         paths.append(path)
-        if _read(path, len(xs)) is None:
+        if _read(path, len(xs), len(guess)) is None:
             missing.append((path, row))
     done = len(paths) - len(missing)
     with interruptible() as interrupted, shown(progress, float(len(paths)), "stability") as show:
@@ -164,16 +166,16 @@ def grid(
             interrupted.append(True)
         if interrupted and done < len(paths):
             raise GridInterrupted(done, len(paths), where)
-    rows = [_read(path, len(xs)) for path in paths]
+    rows = [_read(path, len(xs), len(guess)) for path in paths]
     if any(row is None for row in rows):
         raise LinkworkError(f"a row of the grid cannot be read back from {where}")
     data = np.array(rows, dtype=float)
-    status = data[..., 3].astype(np.int64)
+    status = data[..., -1].astype(np.int64)
     return Grid(
         x=xs,
         y=ys,
         largest=np.ma.MaskedArray(data[..., 0], mask=status != orbit_kernels.DONE),
-        starts=data[..., 1:3],
+        starts=data[..., 1:-1],
         status=status,
         computed=len(missing),
     )
@@ -181,12 +183,12 @@ def grid(
 
 def _compute_row(path: Path, row: Sequence[Operation], guess: NDArray[np.float64], tolerance: float) -> None:
     """Compute a row and write its file, which is there as a whole or not at all."""
-    mechanisms, drives = [p for p, _ in row], [Drive(speed=speed) for _, speed in row]
+    mechanisms, drives = [p for p, _ in row], [drive for _, drive in row]
     values, starts, status = orbits.largest_multipliers(mechanisms, drives, guess, tolerance=tolerance)
     io.save_array(path, np.column_stack([values, starts, status]))
 
 
-def _read(path: Path, count: int) -> NDArray[np.float64] | None:
-    """A row from its file, columns multiplier, u, u' and status, shape (count, 4); None if it is not there or not whole."""
+def _read(path: Path, count: int, size: int) -> NDArray[np.float64] | None:
+    """A row from its file, columns multiplier, start (of ``size`` components) and status; None if it is not there."""
     row = io.load_array(path)
-    return row if row is not None and row.shape == (count, 4) else None
+    return row if row is not None and row.shape == (count, size + 2) else None

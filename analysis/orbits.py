@@ -24,6 +24,7 @@ from linkwork.five_bar.parameters import Constants, FiveBarParameters
 from linkwork.five_bar.variables import OUTPUT_NAMES
 
 from . import compiled, orbit_kernels
+from . import inputs as inputs_module
 from .floquet import TOLERANCE, StabilityVerdict, liouville, multipliers, verdict
 from .inputs import InductionMotor
 
@@ -285,7 +286,8 @@ class PeriodicOrbit:
     def determinant_by_liouville(self, samples: int = 512) -> float:
         """Determinant of the monodromy matrix from the trace of the rates' Jacobian along the orbit.
 
-        It does not use the variational equations, and so checks them.
+        It does not use the variational equations, and so checks them. With Coulomb friction the trace peaks sharply where the
+        slider turns round: it then takes some ten thousand samples.
         """
         flow = orbit_kernels.flow(self.drive.speed_drive, False).map(samples)
         turn = self.turn(samples)
@@ -356,6 +358,8 @@ def find_orbit(
     >>> round(100.0 * orbit.start[0], 8), orbit.verdict().stability.value
     (-0.89553115, 'stable')
     """
+    if len(load) != 2:
+        raise InputError(f"load is {load}: it must be two numbers, its components along x and y")
     parts = () if torque is None else tuple(torque) if isinstance(torque, Sequence) else (torque,)
     motors = [part for part in parts if isinstance(part, InductionMotor)]
     if len(motors) > 1:
@@ -380,9 +384,9 @@ def orbit_of(
     settle: bool = True,
 ) -> PeriodicOrbit:
     """The same as `find_orbit`, from a `Drive`."""
-    if turns < 1:
-        raise InputError(f"turns is {turns}: a period has at least one")
-    guess = _guess(drive, start)
+    if turns < 1 or turns != int(turns):
+        raise InputError(f"turns is {turns}: a period has a whole number of them, at least one")
+    guess = guess_of(drive, start)
     _check_assembly(parameters, guess)
     try:
         return _newton(parameters, drive, turns, guess)
@@ -438,7 +442,45 @@ def _soften(parameters: FiveBarParameters, drive: Drive, turns: int) -> Periodic
     return None
 
 
-def _guess(drive: Drive, start: ArrayLike | None) -> NDArray[np.float64]:
+def drive_of(inputs: inputs_module.Inputs) -> Drive:
+    """The drive of an orbit under the inputs of a run, which must not vary in time.
+
+    Raises
+    ------
+    InputError
+        If an input varies, or nothing drives the crank.
+    """
+    constant: dict[str, float] = {}
+    motors: list[InductionMotor] = []
+    for channel in inputs_module.CHANNELS:
+        for part in inputs.parts(channel):
+            if isinstance(part, InductionMotor):
+                motors.append(part)
+            elif isinstance(part, (int, float, np.floating, np.integer)):
+                constant[channel] = constant.get(channel, 0.0) + float(part)
+            else:
+                raise InputError(
+                    f"{channel} is a {type(part).__name__}: what acts on a periodic motion must be constant, or an "
+                    "induction motor"
+                )
+    return Drive(
+        speed=constant.get("speed"),
+        torque=constant.get("torque", 0.0),
+        motor=motors[0] if motors else None,
+        slider_force=constant.get("force", 0.0),
+        load_x=constant.get("load_x", 0.0),
+        load_y=constant.get("load_y", 0.0),
+    )
+
+
+def guess_of(drive: Drive, start: ArrayLike | None) -> NDArray[np.float64]:
+    """Where Newton's method begins: ``start``, checked; without it u = u' = 0, at a speed that a motor may have.
+
+    Raises
+    ------
+    InputError
+        If ``start`` has not the components of the state, or is needed and not there.
+    """
     if start is None:
         if drive.speed_drive:
             return np.zeros(2)
@@ -600,7 +642,7 @@ def largest_multipliers(
     n = drives[0].size
     if any(drive.size != n for drive in drives):
         raise InputError("a row has both drives by speed and by torque: it must have one kind")
-    first = _guess(drives[0], guess)
+    first = guess_of(drives[0], guess)
     monodromies, starts = np.full((len(rows), n * n), np.nan), np.full((len(rows), n), np.nan)
     status = orbit_kernels.solve_row(
         drives[0].speed_drive,

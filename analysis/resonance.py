@@ -27,9 +27,9 @@ from .branches import Branch, Family, follow, switch
 from .continuation import ContinuationError
 from .floquet import Crossing, Stability
 from .harmonic_balance import harmonic_balance
-from .orbits import Drive, OrbitError, PeriodicOrbit, orbit_of, scale_of
+from .orbits import Drive, OrbitError, PeriodicOrbit, guess_of, orbit_of, scale_of
 from .simulate import shown
-from .slider_equation import Variant, mean_effective_mass, slider_equation
+from .slider_equation import Load, Variant, mean_effective_mass, slider_equation
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -122,7 +122,16 @@ class Response:
 
     def _extrema(self, sign: int) -> tuple[Extremum, ...]:
         found = [e for branch in self.branches if branch.turns == 1 for e in extrema(branch, sign)]
-        return tuple(sorted(found, key=lambda e: e.parameter))
+        found.sort(key=lambda e: (e.parameter, e.amplitude))
+        # a curve that is followed from both ends and arrives at neither has its extrema on both branches
+        reach = 1e-5 * (self.high - self.low)
+        return tuple(
+            e
+            for before, e in zip([None, *found], found)
+            if before is None
+            or abs(e.parameter - before.parameter) > reach
+            or abs(e.amplitude - before.amplitude) > 1e-6 * abs(e.amplitude)
+        )
 
     def to_csv(self, path: str | Path) -> Path:
         """Write all branches as one table, numbered in the first column; see `Branch.columns`."""
@@ -148,6 +157,7 @@ def frequency_response(
     vary: str = "drive.speed",
     start: ArrayLike | None = None,
     doubled: bool = True,
+    most_points: int = 5000,
     greatest_step: float = 5e-3,
     progress: bool = False,
 ) -> Response:
@@ -159,7 +169,7 @@ def frequency_response(
     low, high : float
         Range of the parameter: speed in rad/s, torque in N.m, else in the unit of the FMI contract.
     drive : Drive, optional
-        What drives the plant where another parameter than the speed varies.
+        What drives the plant; needed where another parameter than the speed varies.
     vary : str
         ``drive.speed``, ``drive.torque`` (the mean speed is then part of the solution: ``start`` is needed), or whatever
         `Family` can vary.
@@ -167,6 +177,8 @@ def frequency_response(
         Guess of the orbit's start at the low end; see `find_orbit`.
     doubled : bool
         Whether the motions of twice the period are followed from each period doubling.
+    most_points : int
+        Points of a branch at most.
     greatest_step : float
         Greatest step in scaled arc length: the range has length 1, and the crank's length counts as 1. Narrow resonances need
         small ones.
@@ -219,7 +231,15 @@ def frequency_response(
             if any(_passes(branch, value, orbit) for branch in branches):
                 continue
             branch = follow(
-                family, orbit, value, low=low, high=high, direction=direction, greatest=greatest_step, watch=watch
+                family,
+                orbit,
+                value,
+                low=low,
+                high=high,
+                direction=direction,
+                greatest=greatest_step,
+                most_points=most_points,
+                watch=watch,
             )
             branches.append(branch)
             if not branch.reached:
@@ -397,7 +417,7 @@ def sweep(
     orbits: list[PeriodicOrbit | None] = []
     flags: list[str] = []
     jumps: list[Jump] = []
-    state = np.zeros(2) if start is None else np.array(start, dtype=float)
+    state = guess_of(Drive(speed=float(grid[0])), start)
     last: PeriodicOrbit | None = None
     for speed in grid.tolist():
         drive = Drive(speed=speed)
@@ -479,6 +499,8 @@ class Approximations:
     ----------
     parameters : FiveBarParameters
         Without Coulomb friction, which a linear equation cannot hold.
+    load : Load
+        Constant forces.
     speed : ndarray, shape (m,)
         rad/s.
     amplitudes : mapping
@@ -486,12 +508,13 @@ class Approximations:
     """
 
     parameters: FiveBarParameters
+    load: Load
     speed: NDArray[np.float64]
     amplitudes: Mapping[str, NDArray[np.float64]]
 
     def at(self, speed: float) -> dict[str, float]:
         """The approximations at a speed (rad/s), not interpolated."""
-        return _approximate(self.parameters, speed)
+        return _approximate(self.parameters, speed, self.load)
 
     def columns(self) -> dict[str, NDArray[np.float64]]:
         """As a table, by name with unit."""
@@ -509,10 +532,13 @@ def approximations(response: Response, points: int = 160) -> Approximations:
     if response.family.vary != "drive.speed":
         raise InputError(f"{response.family.name} varies: the approximations are over the speed")
     parameters = replace(response.family.parameters, slider_coulomb_friction=0.0)
+    drive = response.family.drive
+    load = Load(x=drive.load_x, y=drive.load_y, slider=drive.slider_force)
     speeds = np.linspace(response.low, response.high, points)
-    rows = [_approximate(parameters, speed) for speed in speeds.tolist()]
+    rows = [_approximate(parameters, speed, load) for speed in speeds.tolist()]
     return Approximations(
         parameters=parameters,
+        load=load,
         speed=speeds,
         amplitudes={name: np.array([row[name] for row in rows]) for name in rows[0]},
     )
@@ -526,9 +552,9 @@ _APPROXIMATIONS = {
 }
 
 
-def _approximate(parameters: FiveBarParameters, speed: float) -> dict[str, float]:
+def _approximate(parameters: FiveBarParameters, speed: float, load: Load) -> dict[str, float]:
     return {
         name: parameters.rocker_length
-        * harmonic_balance(slider_equation(parameters, speed, variant=variant), order).amplitude
+        * harmonic_balance(slider_equation(parameters, speed, variant=variant, load=load), order).amplitude
         for name, (variant, order) in _APPROXIMATIONS.items()
     }

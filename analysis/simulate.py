@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 from rich.progress import Progress, track
 from scipy.integrate import OdeSolver, solve_ivp
 
-from linkwork.errors import InputError, LinkworkError
+from linkwork.errors import InputError, Interrupted, LinkworkError
 from linkwork.five_bar import dynamics, kinematics
 from linkwork.five_bar.parameters import FiveBarParameters, InitialState
 from linkwork.five_bar.plant import check_assembly, check_tolerance, error_scale
@@ -87,7 +87,7 @@ class Event:
             raise InputError(f"event {self.name!r} has level {self.level}: it must be a finite number")
 
 
-class RunInterrupted(LinkworkError):
+class RunInterrupted(Interrupted):
     """A run was interrupted from the keyboard; ``trajectory`` holds what it had computed."""
 
     def __init__(self, trajectory: Trajectory) -> None:

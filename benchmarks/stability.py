@@ -23,7 +23,7 @@ from rich.table import Table
 from scipy.integrate import solve_ivp
 
 from analysis.grids import grid
-from analysis.orbits import INTEGRATOR_TOLERANCE, ORBIT_TOLERANCE
+from analysis.orbits import INTEGRATOR_TOLERANCE, ORBIT_TOLERANCE, Drive
 from analysis.planes import Plane, plane
 from linkwork.five_bar import dynamics
 from linkwork.five_bar.parameters import FiveBarParameters
@@ -40,10 +40,12 @@ STEP = 1e-6
 
 
 def scipy_orbit(
-    parameters: FiveBarParameters, speed: float, guess: NDArray[np.float64]
+    parameters: FiveBarParameters, drive: Drive, guess: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], float]:
     """Start of the orbit and its largest multiplier, by shooting with SciPy on the plain equations."""
     p = parameters.constants()
+    speed = drive.speed
+    assert speed is not None
     inputs = dynamics.Inputs(1.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     scale = np.array([parameters.crank_length, parameters.crank_length * speed])
 
@@ -89,7 +91,7 @@ def scipy_row(operation: Plane, damping: float, speeds: NDArray[np.float64]) -> 
 def main(points: int = POINTS) -> None:
     """Measure and print."""
     rig = SETS["rig-1-spring-a"].parameters
-    operation = plane(rig, SPEEDS[0], "speed", "slider.damping")
+    operation = plane(rig, Drive(speed=float(SPEEDS[0])), "drive.speed", "slider.damping")
     speeds, dampings = (np.linspace(axis[0], axis[-1], points) for axis in (SPEEDS, DAMPINGS))
     with tempfile.TemporaryDirectory() as folder:
         # the workers are started and the machine code is loaded before the clock

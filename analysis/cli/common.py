@@ -11,7 +11,7 @@ from typing import Any
 import click
 from rich.console import Console
 
-from linkwork.errors import LinkworkError
+from linkwork.errors import Interrupted, LinkworkError
 
 WRONG = 1
 ENDED_EARLY = 3
@@ -31,6 +31,9 @@ def handled(command: Callable[..., Any]) -> Callable[..., Any]:
     def run(*arguments: Any, **options: Any) -> Any:
         try:
             return command(*arguments, **options)
+        except Interrupted as error:
+            errors.print(str(error), style="yellow", markup=False, highlight=False, soft_wrap=True)
+            sys.exit(INTERRUPTED)
         except LinkworkError as error:
             errors.print(f"error: {error}", style="red", markup=False, highlight=False, soft_wrap=True)
             sys.exit(WRONG)

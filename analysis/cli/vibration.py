@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +13,7 @@ import numpy as np
 from rich.markup import escape
 from rich.table import Table
 
+from linkwork.errors import InputError
 from linkwork.five_bar.published import CM_PER_METRE, RAD_S_PER_RPM, SETS
 
 from .common import ENDED_EARLY, chosen_case, console, errors, handled, number_or_text, prepare_solver
@@ -20,10 +22,59 @@ from .common import ENDED_EARLY, chosen_case, console, errors, handled, number_o
 _RANGE = (0.15, 1.5)
 
 
+def _cores(context: click.Context, parameter: click.Parameter, value: int) -> int:
+    if value == 0 or value < -1:
+        raise click.BadParameter(f"{value} is neither -1, for all, nor a number of cores")
+    return value
+
+
 def _quantity(text: str, unit: str, name: str) -> float:
     from .. import io
 
     return io.quantity(number_or_text(text), unit, name)
+
+
+def _require_range(low: float, high: float, name: str, first: str, last: str) -> None:
+    """Refuse a range that is none, in the words of the command line."""
+    from ..branches import told, unit_of
+
+    unit = unit_of(name)
+    options = first if first == last else f"{first} and {last}"
+    if not low < high:
+        raise click.UsageError(f"{options}: from {told(name, low, unit)} to {told(name, high, unit)}: it must increase")
+    if name == "drive.speed" and low <= 0.0:
+        raise click.UsageError(f"{options}: it begins at {told(name, low, unit)}: speeds must be above zero")
+
+
+def _drive(chosen: Any, speed: str | None) -> Any:
+    """What drives the case, its constant forces with it; a speed given takes the place of its drive."""
+    from ..orbits import drive_of
+
+    inputs = chosen.inputs
+    if speed is not None:
+        inputs = replace(inputs, speed=_quantity(speed, "rad/s", "--speed"), torque=None)
+        if chosen.inputs.torque is not None:
+            errors.print("note: the speed is prescribed; the case's torque is left out", style="yellow")
+    try:
+        return drive_of(inputs)
+    except InputError as error:
+        hint = "; --speed prescribes the speed instead" if str(error).startswith("torque") else ""
+        raise InputError(f"{chosen.title}: {error}{hint}") from None
+
+
+def _start(chosen: Any, drive: Any, guess_speed: str | None) -> Any:
+    """Guess of the orbit's start: none at prescribed speed, else with a crank speed."""
+    if drive.speed_drive:
+        if guess_speed is not None:
+            raise click.UsageError("--guess-speed is for a case driven by a torque: here the speed is prescribed")
+        return None
+    if guess_speed is not None:
+        return (0.0, 0.0, _quantity(guess_speed, "rad/s", "--guess-speed"))
+    if chosen.initial.crank_speed > 0.0:
+        return (0.0, 0.0, chosen.initial.crank_speed)
+    if drive.motor is None:
+        raise click.UsageError("under a torque a guess of the crank speed is needed: --guess-speed '300 rpm'")
+    return None
 
 
 def _stem(case: str | None, published: str | None) -> str:
@@ -39,7 +90,8 @@ def _stem(case: str | None, published: str | None) -> str:
     "--from", "low", metavar="VALUE", help="Beginning of the range, such as '100 rpm'; bare numbers are in SI."
 )
 @click.option("--to", "high", metavar="VALUE", help="End of the range.")
-@click.option("--speed", metavar="SPEED", help="Crank speed where something else varies; the case's own by default.")
+@click.option("--speed", metavar="SPEED", help="Prescribe this crank speed in the place of the case's drive.")
+@click.option("--guess-speed", metavar="SPEED", help="Guess of the crank speed, for a case driven by a torque.")
 @click.option("--doubled/--no-doubled", default=True, show_default=True, help="Follow motions of twice the period.")
 @click.option("--out", default="out", show_default=True, type=click.Path(file_okay=False), help="Folder.")
 @click.option("--plot/--no-plot", default=True, show_default=True, help="Whether to write a plot.")
@@ -52,6 +104,7 @@ def resonance(
     low: str | None,
     high: str | None,
     speed: str | None,
+    guess_speed: str | None,
     doubled: bool,
     out: str,
     plot: bool,
@@ -68,32 +121,38 @@ def resonance(
       linkwork resonance --published table-3.1 --vary slider.stiffness --from '1e5 dyn/cm' --to '2e6 dyn/cm'
     """
     from .. import io
-    from ..branches import Family
-    from ..orbits import Drive
+    from ..branches import unit_of
     from ..resonance import approximations, frequency_response, natural_frequency
 
     chosen = chosen_case(case, published, settings)
     parameters = chosen.parameters
     over_speed = vary == "drive.speed"
     natural = natural_frequency(parameters) if parameters.slider_stiffness > 0.0 else None
-    running = chosen.initial.crank_speed if speed is None else _quantity(speed, "rad/s", "--speed")
-    unit = Family(parameters=parameters, drive=Drive(speed=max(running, 1.0)), vary=vary).unit
+    unit = unit_of(vary)
     if over_speed and natural is not None:
         ends = [factor * natural for factor in _RANGE]
     elif low is None or high is None:
-        raise click.UsageError(f"--from and --to are needed for {vary}: there is no natural frequency to begin with")
+        why = (
+            "without a spring there is no natural frequency to begin with"
+            if over_speed
+            else "it has no range of its own"
+        )
+        raise click.UsageError(f"--from and --to are needed for {vary}: {why}")
     else:
         ends = [0.0, 0.0]
     if low is not None:
         ends[0] = _quantity(low, unit, "--from")
     if high is not None:
         ends[1] = _quantity(high, unit, "--to")
-    prepare_solver()
+    _require_range(ends[0], ends[1], vary, "--from", "--to")
+    drive = _drive(chosen, f"{ends[0]} rad/s" if over_speed else speed)
+    prepare_solver(orbits=True)
     response = frequency_response(
         parameters,
         *ends,
-        drive=None if over_speed else Drive(speed=running),
+        drive=drive,
         vary=vary,
+        start=_start(chosen, drive, guess_speed),
         doubled=doubled,
         progress=console.is_terminal,
     )
@@ -123,10 +182,11 @@ def resonance(
 
 def _branches(title: str, response: Any, factor: float, unit: str) -> None:
     grid = Table(title=f"{title}: periodic motions, {response.family.name} in {unit}", title_justify="left")
-    for heading in ("branch", "turns", "points", "from", "to", "stable", "what happens on it"):
+    for heading in ("branch", "turns", "points", "from", "to", "motion", "what happens on it"):
         grid.add_column(escape(heading), justify="left" if heading.startswith("what") else "right")
     for number, branch in enumerate(response.branches, start=1):
-        stable = np.mean([s.value == "stable" for s in branch.stability()])
+        words = [s.value for s in branch.stability()]
+        told = ", ".join(f"{words.count(word) / len(words):.0%} {word}" for word in dict.fromkeys(words))
         events = [f"{s.kind.value} at {factor * s.parameter:.6g}" for s in branch.special]
         grid.add_row(
             str(number),
@@ -134,7 +194,7 @@ def _branches(title: str, response: Any, factor: float, unit: str) -> None:
             str(len(branch)),
             f"{factor * branch.parameter[0]:.6g}",
             f"{factor * branch.parameter[-1]:.6g}",
-            f"{stable:.0%}",
+            told,
             "; ".join(events),
         )
     console.print(grid)
@@ -145,6 +205,9 @@ def _extrema(response: Any, factor: float, unit: str, table: Any) -> None:
     names = () if table is None else tuple(table.amplitudes)
     for heading in ("", f"at [{unit}]", "amplitude [cm]", "motion", *(f"{name} [cm]" for name in names)):
         grid.add_column(escape(heading), justify="left" if heading in ("", "motion") else "right")
+    if not response.maxima() and not response.minima():
+        console.print("the amplitude has neither a maximum nor a minimum inside the range", highlight=False)
+        return
     entries = [("maximum", e) for e in response.maxima()] + [("minimum", e) for e in response.minima()]
     for word, extremum in sorted(entries, key=lambda entry: entry[1].parameter):
         others = [] if table is None else [f"{CM_PER_METRE * v:.4f}" for v in table.at(extremum.parameter).values()]
@@ -162,13 +225,14 @@ def _extrema(response: Any, factor: float, unit: str, table: Any) -> None:
 @click.argument("case", required=False, type=click.Path(exists=True, dir_okay=False))
 @click.option("--published", metavar="NAME", help=f"A published set instead: {', '.join(SETS)}.")
 @click.option("--set", "settings", multiple=True, metavar="NAME=VALUE", help="Change a value of the mechanism.")
-@click.option("--speed", metavar="SPEED", help="Crank speed of the verdict; the case's own by default.")
+@click.option("--speed", metavar="SPEED", help="Prescribe this crank speed in the place of the case's drive.")
+@click.option("--guess-speed", metavar="SPEED", help="Guess of the crank speed, for a case driven by a torque.")
 @click.option("--x", "x", default="drive.speed", show_default=True, metavar="NAME", help="Parameter along x.")
 @click.option("--x-range", nargs=2, metavar="FROM TO", help="Its range, such as '100 rpm' '1500 rpm'.")
 @click.option("--y", "y", default="slider.damping", show_default=True, metavar="NAME", help="Parameter along y.")
 @click.option("--y-range", nargs=2, metavar="FROM TO", help="Its range, such as 0 '2e4 dyn.s/cm'.")
 @click.option("--points", default=80, show_default=True, type=click.IntRange(2, 2000), help="Points along each axis.")
-@click.option("--cores", default=-1, show_default=True, help="Cores; -1 for all.")
+@click.option("--cores", default=-1, show_default=True, callback=_cores, help="Cores; -1 for all.")
 @click.option("--out", default="out", show_default=True, type=click.Path(file_okay=False), help="Folder.")
 @click.option("--chart/--no-chart", "charted", default=True, show_default=True, help="Chart, or the verdict alone.")
 @handled
@@ -177,6 +241,7 @@ def stability(
     published: str | None,
     settings: Sequence[str],
     speed: str | None,
+    guess_speed: str | None,
     x: str,
     x_range: tuple[str, str] | None,
     y: str,
@@ -198,39 +263,50 @@ def stability(
       linkwork stability --published rig-2-spring-c --x-range '200 rpm' '1500 rpm' --y-range 0 '6e3 dyn.s/cm'
       linkwork stability --published rig-1-spring-a --y slider.stiffness --y-range '1e6 dyn/cm' '5e6 dyn/cm'
     """
+    from .. import io
     from ..branches import unit_of
-    from ..orbits import find_orbit
+    from ..charts import default_range, stability_chart
+    from ..orbits import orbit_of
 
     chosen = chosen_case(case, published, settings)
     parameters = chosen.parameters
-    running = chosen.initial.crank_speed if speed is None else _quantity(speed, "rad/s", "--speed")
+    drive = _drive(chosen, speed)
+    start = _start(chosen, drive, guess_speed)
+    ranges: list[tuple[float, float]] = []
+    if charted:
+        for name, texts, option in ((x, x_range, "--x-range"), (y, y_range, "--y-range")):
+            if texts is None:
+                ranges.append(default_range(parameters, drive, name))
+            else:
+                low, high = (_quantity(text, unit_of(name), option) for text in texts)
+                _require_range(low, high, name, option, option)
+                ranges.append((low, high))
     prepare_solver(orbits=True)
-    orbit = find_orbit(parameters, speed=running)
-    verdict = orbit.verdict()
+    orbit = orbit_of(parameters, drive, start=start)
+    turn = orbit.turn()
     told = ", ".join(f"{m.real:.6g}{m.imag:+.6g}i" if m.imag else f"{m.real:.6g}" for m in orbit.multipliers)
     console.print(
-        f"{chosen.title} at {running / RAD_S_PER_RPM:.6g} rpm: {verdict}\n"
-        f"Floquet multipliers {told}; amplitude {CM_PER_METRE * orbit.amplitude:.5g} cm",
+        f"{chosen.title} at {60.0 * turn.turns / turn.period:.6g} rpm: {orbit.verdict()}\n"
+        f"Floquet multipliers {told}; amplitude {CM_PER_METRE * turn.amplitude:.5g} cm",
         highlight=False,
         soft_wrap=True,
     )
+    if parameters.slider_coulomb_friction:
+        errors.print(
+            "note: Coulomb friction is smoothed over 1 mm/s: where the slider would stick, the model creeps to one place, and "
+            "its multipliers tell of the creep",
+            style="yellow",
+            highlight=False,
+            soft_wrap=True,
+        )
     if not charted:
         return
-    from .. import io
-    from ..charts import default_range, stability_chart
-
-    ranges = []
-    for name, texts, option in ((x, x_range, "--x-range"), (y, y_range, "--y-range")):
-        if texts is None:
-            ranges.append(default_range(parameters, running, name))
-        else:
-            low, high = (_quantity(text, unit_of(name), option) for text in texts)
-            ranges.append((low, high))
     found = stability_chart(
         parameters,
-        running,
+        drive,
         (x, y),
         (ranges[0], ranges[1]),
+        start=start,
         points=points,
         n_jobs=cores,
         progress=console.is_terminal,
@@ -247,6 +323,8 @@ def stability(
         console.print(f"wrote {path}", highlight=False, soft_wrap=True)
     for problem in found.problems:
         errors.print(f"note: {problem}", style="yellow", markup=False, highlight=False, soft_wrap=True)
+    if found.problems:
+        sys.exit(ENDED_EARLY)
 
 
 def _regions(found: Any) -> None:
@@ -267,6 +345,12 @@ def _regions(found: Any) -> None:
         console.print(grid)
     for removal in found.removals:
         console.print(removal, highlight=False, soft_wrap=True)
+    if found.elsewhere:
+        console.print(
+            f"{found.elsewhere} folds and period doublings on the lines searched belong to other, larger motions: not traced",
+            highlight=False,
+            soft_wrap=True,
+        )
 
 
 def _runs(found: Any) -> None:

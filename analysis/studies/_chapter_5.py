@@ -23,6 +23,7 @@ from linkwork.five_bar.published import SQUARE_OF_OMEGA_K, chapter_4
 from ..boundaries import Box, Chart, Test, chart
 from ..floquet import Stability
 from ..hill import PeriodicEquation, Region, hill_regions
+from ..orbits import Drive
 from ..planes import Operation, Plane
 from ..slider_equation import SliderEquation, Variant, slider_equation
 from ..stability import Confirmation, RemovingDamping, confirm, linear_test, orbit_test, removing_damping
@@ -55,7 +56,7 @@ def with_damping(omega_c: float) -> Plane:
     """The plane of lambda_k^2 and I4 at a damping omega_c (1/s)."""
 
     def operation(lambda_k2: float, inertia_ratio: float) -> Operation:
-        return chapter_4(inertia_ratio, omega_c), crank_speed(lambda_k2)
+        return chapter_4(inertia_ratio, omega_c), Drive(speed=crank_speed(lambda_k2))
 
     return operation
 
@@ -104,7 +105,7 @@ def with_crank(inertia_ratio: float, omega_c: float, sigma2: float) -> FiveBarPa
 @cache
 def long_run(parameters: FiveBarParameters, lambda_k2: float) -> Confirmation:
     """A long run of the nonlinear mechanism from close to its periodic orbit."""
-    return confirm(parameters, crank_speed(lambda_k2), turns=TURNS)
+    return confirm(parameters, Drive(speed=crank_speed(lambda_k2)), turns=TURNS)
 
 
 def run_verdicts(places: Sequence[tuple[str, FiveBarParameters, float]]) -> list[Verdict]:

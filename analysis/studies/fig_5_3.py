@@ -24,6 +24,7 @@ from linkwork.five_bar.published import chapter_4
 
 from ..boundaries import Box, Chart, chart
 from ..figures import COLOURS, Curve, Panel, plot_curves
+from ..orbits import Drive
 from ..planes import Operation
 from ._chapter_5 import (
     MOTIONS,
@@ -70,7 +71,7 @@ def region(motion: str) -> Chart:
     mechanism = held if motion == "held" else closed
 
     def operation(lambda_k2: float, ratio: float) -> Operation:
-        return mechanism(ratio), crank_speed(lambda_k2)
+        return mechanism(ratio), Drive(speed=crank_speed(lambda_k2))
 
     test = MOTIONS["linear" if motion == "held" else motion](operation, -1)
     return chart(test, BOX, lines=(0, 4), samples=100)

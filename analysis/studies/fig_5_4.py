@@ -17,6 +17,7 @@ import numpy as np
 from ..boundaries import Box, Chart, chart
 from ..figures import COLOURS, Curve, HeatMap, Panel, plot_charts
 from ..grids import Grid, grid
+from ..orbits import Drive
 from ..planes import Operation
 from ._chapter_5 import (
     MOTIONS,
@@ -51,7 +52,7 @@ PLACES = [(f"sigma2 = {s:g}, lambda_k^2 = {x:g}", with_crank(INERTIA_RATIO, DAMP
 
 def operation(lambda_k2: float, sigma2: float) -> Operation:
     """A point of the chart."""
-    return with_crank(INERTIA_RATIO, DAMPING, sigma2), crank_speed(lambda_k2)
+    return with_crank(INERTIA_RATIO, DAMPING, sigma2), Drive(speed=crank_speed(lambda_k2))
 
 
 @cache

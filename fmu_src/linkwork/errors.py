@@ -65,3 +65,7 @@ class IntegrationError(LinkworkError):
 
 class StateError(LinkworkError):
     """A saved state does not belong to this model or is damaged."""
+
+
+class Interrupted(LinkworkError):
+    """Work was interrupted from the keyboard; what had been done is kept."""

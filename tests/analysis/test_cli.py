@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import csv
 import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,7 +13,10 @@ from click.testing import CliRunner
 
 import build_fmu
 from analysis import cli
-from linkwork.five_bar.published import SETS
+from analysis.orbits import find_orbit
+from linkwork.five_bar.published import SETS, TABLE_3_1
+
+ROOT = Path(__file__).parents[2]
 
 
 @pytest.fixture(scope="module")
@@ -227,9 +232,10 @@ def test_resonance_over_another_parameter(linkwork, tmp_path):
 @pytest.mark.parametrize(
     ("arguments", "code", "words"),
     [
-        (["--published", "table-3.1", "--vary", "slider.mess"], 1, "cannot vary"),
+        (["--published", "table-3.1", "--vary", "slider.mess"], 1, "there is no slider.mess"),
         (["--published", "table-3.1", "--vary", "slider.damping"], 2, "--from and --to are needed"),
-        (["--published", "table-3.1", "--from", "100 rpm", "--to", "50 rpm"], 1, "increasing"),
+        (["--published", "table-3.1", "--from", "100 rpm", "--to", "50 rpm"], 2, "must increase"),
+        (["--published", "table-3.1", "--from", "0", "--to", "50 rpm"], 2, "speeds must be above zero"),
         (["--published", "table-3.1", "--from", "100 kg", "--to", "200 rpm"], 1, "--from"),
         (["--published", "table-3.1", "--set", "slider.stiffness=0"], 2, "no natural frequency"),
         ([], 2, "either a case file or --published"),
@@ -252,7 +258,7 @@ def test_stability_verdict_and_chart(linkwork, tmp_path, monkeypatch):
         "--y-range", "0", "2e3 dyn.s/cm", "--points", "12", "--cores", "1",
     )  # fmt: skip
     assert result.exit_code == 0, result.output
-    assert "no region is left from slider.damping = 0.97580" in result.output
+    assert "gone from slider.damping = 0.97580" in " ".join(result.output.split())
     assert result.output.count("agrees") == 3
     for name in (".csv", "-boundaries.csv", ".png"):
         assert (tmp_path / "out" / f"rig-2-spring-c-stability{name}").exists()
@@ -261,9 +267,13 @@ def test_stability_verdict_and_chart(linkwork, tmp_path, monkeypatch):
 @pytest.mark.parametrize(
     ("arguments", "code", "words"),
     [
-        (["--x", "slider.mess"], 1, "there is no 'slider.mess'"),
+        (["--x", "slider.mess"], 1, "there is no slider.mess"),
         (["--y", "slider.coulomb_friction"], 1, "give the range of the axis"),
-        (["--x-range", "2", "1"], 1, "must increase"),
+        (["--x-range", "2", "1"], 2, "--x-range: from drive.speed = 2 rad/s"),
+        (["--x-range", "0", "1"], 2, "speeds must be above zero"),
+        (["--cores", "0"], 2, "number of cores"),
+        (["--guess-speed", "3"], 2, "the speed is prescribed"),
+        (["--set", "slider.damping=-1"], 1, "slider.damping"),
         (["--speed", "-1"], 1, "above zero"),
         (["--points", "1"], 2, "points"),
     ],
@@ -272,3 +282,55 @@ def test_bad_stability(linkwork, arguments, code, words):
     result = linkwork("stability", "--published", "table-3.1", *arguments)
     assert result.exit_code == code, result.output
     assert words in " ".join(result.output.split())
+
+
+CASE = """
+published = "table-3.1"
+force = "5 N"
+
+[load]
+fy = "-20 N"
+
+[drive]
+speed = "300 rpm"
+"""
+
+
+def test_constant_inputs_of_a_case_count(linkwork, tmp_path):
+    (tmp_path / "case.toml").write_text(CASE, encoding="utf-8")
+    result = linkwork("stability", "case.toml", "--no-chart")
+    assert result.exit_code == 0, result.output
+    orbit = find_orbit(TABLE_3_1, speed=10.0 * np.pi, slider_force=5.0, load=(0.0, -20.0))
+    assert f"amplitude {100.0 * orbit.amplitude:.5g} cm" in result.output
+    assert "at 300 rpm" in result.output
+    bare = linkwork("stability", "--published", "table-3.1", "--set", "drive.speed=300 rpm", "--no-chart")
+    assert bare.exit_code == 0, bare.output
+    assert "at 300 rpm" in bare.output
+    assert bare.output != result.output
+    along = linkwork("resonance", "case.toml", "--from", "290 rpm", "--to", "310 rpm", "--no-plot")
+    assert along.exit_code == 0, along.output
+    rows = np.loadtxt(tmp_path / "out" / "case-resonance.csv", delimiter=",", skiprows=1)
+    header = (tmp_path / "out" / "case-resonance.csv").read_text(encoding="utf-8").splitlines()[0]
+    names = next(csv.reader([header]))
+    assert len(names) == rows.shape[1]
+    speeds, amplitudes = (rows[:, names.index(n)] for n in ("drive.speed [rad/s]", "amplitude of u [m]"))
+    assert np.interp(10.0 * np.pi, speeds, amplitudes) == pytest.approx(orbit.amplitude, rel=1e-3)
+
+
+def test_what_varies_in_time_is_refused_and_a_motor_is_not(linkwork):
+    case = str(ROOT / "examples" / "run-up.toml")
+    result = linkwork("stability", case, "--no-chart")
+    assert result.exit_code == 1
+    assert "force is a Piecewise" in result.output
+    result = linkwork("stability", case, "--set", "force=0", "--no-chart")
+    assert result.exit_code == 0, result.output
+    assert "at 499.502 rpm: stable" in result.output
+
+
+def test_resonance_over_the_torque(linkwork):
+    result = linkwork(
+        "resonance", "--published", "rig-2-spring-c", "--set", "drive.torque=0.01 N*m",
+        "--set", "run.stop_time=1 s", "--vary", "drive.torque",
+        "--from", "0.005", "--to", "0.06", "--guess-speed", "540 rpm", "--no-plot", "--no-doubled",
+    )  # fmt: skip
+    assert "fold at 0.04949" in result.output, result.output

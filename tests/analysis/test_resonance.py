@@ -146,6 +146,14 @@ def test_no_orbit_at_either_end_is_an_error() -> None:
         frequency_response(replace(TABLE_3_1, coupler_length=0.06), 40.0, 41.0)
 
 
+def test_a_curve_followed_from_both_ends_has_its_maximum_once() -> None:
+    parameters = replace(RIG["c"], slider_damping=0.9)
+    response = frequency_response(parameters, 540.0 * RPM, 620.0 * RPM, most_points=300)
+    assert any("300 points" in problem for problem in response.problems)
+    places = [round(e.parameter, 6) for e in response.maxima()]
+    assert len(places) == len(set(places))
+
+
 def test_one_end_without_an_orbit_is_a_problem_that_is_told() -> None:
     drive = Drive(speed=SETS["table-3.1"].crank_speed)
     response = frequency_response(TABLE_3_1, 200.0, 1200.0, vary="slider.stiffness", drive=drive, doubled=False)

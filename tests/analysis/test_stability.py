@@ -18,7 +18,7 @@ from analysis.figures import Curve, HeatMap, Panel, plot_charts
 from analysis.floquet import Stability
 from analysis.grids import GridInterrupted, grid
 from analysis.hill import PeriodicEquation, crossing_test, hill_regions, monodromy
-from analysis.orbits import find_orbit
+from analysis.orbits import Drive, orbit_of
 from analysis.planes import Plane, plane
 from analysis.stability import (
     Outcome,
@@ -31,7 +31,7 @@ from analysis.stability import (
     removing_damping_over,
 )
 from linkwork.errors import InputError, LinkworkError, ParameterError, UnknownNameError
-from linkwork.five_bar.published import SQUARE_OF_OMEGA_K, TABLE_3_1, chapter_4
+from linkwork.five_bar.published import SETS, SQUARE_OF_OMEGA_K, TABLE_3_1, chapter_4
 
 # --- STABILITY: notes on Youssef, chapters IV and V; sigma2 = 0.05, p45 = 0.2, k/(m4 + m5) = 1000 1/s2
 # first unstable region in lambda_k^2 by I4, right to the digits given, and by the thesis's appendix 3
@@ -52,7 +52,7 @@ def crank_speed(lambda_k2: float) -> float:
 
 def first_region_plane(omega_c: float = 0.0) -> Plane:
     """lambda_k^2 and I4."""
-    return lambda lambda_k2, inertia_ratio: (chapter_4(inertia_ratio, omega_c), crank_speed(lambda_k2))
+    return lambda lambda_k2, inertia_ratio: (chapter_4(inertia_ratio, omega_c), Drive(speed=crank_speed(lambda_k2)))
 
 
 def mathieu(multiplier: int, damping: float = 0.0) -> Callable[[float, float], float]:
@@ -62,19 +62,57 @@ def mathieu(multiplier: int, damping: float = 0.0) -> Callable[[float, float], f
 # Planes
 
 
-def test_plane_varies_two_parameters_by_any_of_their_names() -> None:
-    operation = plane(TABLE_3_1, 44.0, "slider.stiffness", "crank_length")
-    assert operation(2e3, 0.04) == (replace(TABLE_3_1, slider_stiffness=2e3, crank_length=0.04), 44.0)
-    assert plane(TABLE_3_1, 44.0, "speed", "slider.damping")(30.0, 5.0) == (
+def test_plane_varies_two_parameters_of_mechanism_and_drive() -> None:
+    drive = Drive(speed=44.0, load_y=-3.0)
+    operation = plane(TABLE_3_1, drive, "slider.stiffness", "crank.length")
+    assert operation(2e3, 0.04) == (replace(TABLE_3_1, slider_stiffness=2e3, crank_length=0.04), drive)
+    assert plane(TABLE_3_1, drive, "drive.speed", "slider.damping")(30.0, 5.0) == (
         replace(TABLE_3_1, slider_damping=5.0),
-        30.0,
+        replace(drive, speed=30.0),
+    )
+    assert plane(TABLE_3_1, drive, "slider.force", "load.fx")(2.0, 5.0)[1] == replace(
+        drive, slider_force=2.0, load_x=5.0
     )
     with pytest.raises(UnknownNameError, match=r"slider\.stifness"):
-        plane(TABLE_3_1, 44.0, "slider.stifness", "speed")
+        plane(TABLE_3_1, drive, "slider.stifness", "drive.speed")
     with pytest.raises(InputError, match="two parameters"):
-        plane(TABLE_3_1, 44.0, "speed", "drive.speed")
-    with pytest.raises(ParameterError, match=r"slider\.damping"):
-        plane(TABLE_3_1, 44.0, "speed", "slider.damping")(30.0, -1.0)
+        plane(TABLE_3_1, drive, "drive.speed", "drive.speed")
+    with pytest.raises(InputError, match="the drive is by speed"):
+        plane(TABLE_3_1, drive, "drive.torque", "drive.speed")
+    with pytest.raises(ParameterError):
+        plane(TABLE_3_1, drive, "drive.speed", "slider.damping")(30.0, -1.0)
+
+
+def test_torque_drive_has_charts_too() -> None:
+    rig = SETS["rig-2-spring-c"].parameters
+    operation = plane(rig, Drive(torque=0.01), "drive.torque", "slider.damping")
+    found = grid(operation, np.linspace(0.005, 0.03, 4), np.linspace(5.0, 8.0, 3), start=(0.0, 0.0, 56.0))
+    assert found.starts.shape == (3, 4, 3)
+    orbit = orbit_of(*operation(0.03, 8.0), start=found.starts[2, 3])
+    assert found.largest[2, 3] == pytest.approx(orbit.largest, abs=1e-8)
+    run = confirm(*operation(0.03, 8.0), start=found.starts[2, 3], turns=200)
+    assert run.agrees
+    assert run.growth == pytest.approx(orbit.largest, rel=1e-3)
+    with pytest.raises(InputError, match="by torque"):
+        linear_verdict(rig, Drive(torque=0.01))
+
+
+@pytest.mark.parametrize("cores", [0])
+def test_no_cores_are_refused(cores: int) -> None:
+    with pytest.raises(InputError, match="cores"):
+        grid(first_region_plane(), [0.26, 0.27], [1.0], n_jobs=cores)
+
+
+def test_a_small_margin_is_given_more_turns() -> None:
+    rig = replace(SETS["rig-2-spring-c"].parameters, slider_damping=0.9794)
+    drive = Drive(speed=1169.3 * pi / 30.0)
+    orbit = orbit_of(rig, drive)
+    assert 0.0 < orbit.verdict().margin < 5e-4
+    run = confirm(rig, drive)
+    assert len(run.deviations) > 2000
+    assert run.agrees
+    # told too soon the run stays bounded, and its growth is held to the multiplier's
+    assert confirm(rig, drive, turns=500).agrees
 
 
 # Lines
@@ -273,7 +311,7 @@ def test_first_region_of_the_true_orbit(inertia_ratio: float) -> None:
 
 
 def test_linear_region_is_hills() -> None:
-    equation = stability.linear_equation(chapter_4(1.0), crank_speed(0.26))
+    equation = stability.linear_equation(chapter_4(1.0), Drive(speed=crank_speed(0.26)))
     hill = hill_regions(equation, 1)[1]
     test = linear_test(first_region_plane(), -1)
     roots = scan(lambda x: test(x, 1.0), 0.25, 0.29, samples=60).roots
@@ -298,8 +336,8 @@ def test_chart_of_the_true_orbit_round_a_tip() -> None:
 
 
 def test_linear_verdicts() -> None:
-    inside, outside = (linear_verdict(chapter_4(1.0), crank_speed(x)) for x in (0.2675, 0.2695))
-    damped = linear_verdict(chapter_4(1.0, 0.2), crank_speed(0.2675))
+    inside, outside = (linear_verdict(chapter_4(1.0), Drive(speed=crank_speed(x))) for x in (0.2675, 0.2695))
+    damped = linear_verdict(chapter_4(1.0, 0.2), Drive(speed=crank_speed(0.2675)))
     assert [v.stability for v in (inside, outside, damped)] == [
         Stability.UNSTABLE,
         Stability.MARGINAL,
@@ -353,8 +391,7 @@ def test_grid_is_each_point_alone(tmp_path: Path) -> None:
     assert found.largest.shape == found.status.shape == (len(YS), len(XS))
     for row, y in enumerate(YS.tolist()):
         for column, x in enumerate(XS.tolist()):
-            parameters, speed = first_region_plane(0.05)(x, y)
-            orbit = find_orbit(parameters, speed=speed)
+            orbit = orbit_of(*first_region_plane(0.05)(x, y))
             assert found.largest[row, column] == pytest.approx(orbit.largest, abs=1e-9)
             assert found.starts[row, column] == pytest.approx(orbit.start, abs=1e-9)
     states = found.stability()
@@ -398,7 +435,7 @@ def test_grid_in_processes(tmp_path: Path) -> None:
 
 def test_points_without_an_orbit_are_masked_with_a_reason(tmp_path: Path) -> None:
     """Table 3.1 at 420 rpm: below a stiffness of about 232 N/m the motion that follows from stiffer springs is lost."""
-    operation = plane(TABLE_3_1, 14.0 * pi, "slider.stiffness", "slider.damping")
+    operation = plane(TABLE_3_1, Drive(speed=14.0 * pi), "slider.stiffness", "slider.damping")
     found = grid(operation, [1000.0, 400.0, 200.0], [30.0], folder=tmp_path)
     assert found.largest.mask.tolist() == [[False, False, True]]
     assert found.reason(0, 0) == ""
@@ -429,7 +466,7 @@ def test_long_runs_without_damping(lambda_k2: float, expected: str) -> None:
     low, high = FIRST_REGION_APPENDIX_3[1.0]
     assert (low < lambda_k2 < high) or lambda_k2 == 0.2655
     outcome = Outcome.GROWS if expected == "grows" else Outcome.BOUNDED
-    run = confirm(chapter_4(1.0), crank_speed(lambda_k2), turns=2000)
+    run = confirm(chapter_4(1.0), Drive(speed=crank_speed(lambda_k2)), turns=2000)
     assert run.outcome is outcome
     assert run.agrees
     assert run.growth == pytest.approx(1.0 - run.verdict.margin, abs=1e-7)
@@ -442,7 +479,7 @@ def test_long_runs_without_damping(lambda_k2: float, expected: str) -> None:
 
 
 def test_long_run_decays_at_the_multiplier_of_a_complex_pair() -> None:
-    run = confirm(chapter_4(1.0, 0.5), crank_speed(0.3), turns=300)
+    run = confirm(chapter_4(1.0, 0.5), Drive(speed=crank_speed(0.3)), turns=300)
     assert abs(run.verdict.largest_multiplier.imag) > 0.1
     assert run.outcome is Outcome.DECAYS
     assert run.agrees
@@ -451,8 +488,8 @@ def test_long_run_decays_at_the_multiplier_of_a_complex_pair() -> None:
 
 def test_unstable_orbit_of_table_3_1() -> None:
     """On the branch that turns back at about 232 N/m a multiplier is above +1."""
-    parameters, speed = replace(TABLE_3_1, slider_stiffness=235.0), 14.0 * pi
-    run = confirm(parameters, speed, turns=40, start=(-0.0368, -0.5125), disturbance=1e-7)
+    parameters, drive = replace(TABLE_3_1, slider_stiffness=235.0), Drive(speed=14.0 * pi)
+    run = confirm(parameters, drive, turns=40, start=(-0.0368, -0.5125), disturbance=1e-7)
     assert run.verdict.stability is Stability.UNSTABLE
     assert run.verdict.largest_multiplier.real > 1.1
     assert run.outcome is Outcome.GROWS
@@ -461,9 +498,9 @@ def test_unstable_orbit_of_table_3_1() -> None:
 
 def test_bad_long_runs_are_refused() -> None:
     with pytest.raises(InputError, match="20 and more"):
-        confirm(chapter_4(1.0), 60.0, turns=5)
+        confirm(chapter_4(1.0), Drive(speed=60.0), turns=5)
     with pytest.raises(InputError, match="between 1e-08 and 0"):
-        confirm(chapter_4(1.0), 60.0, disturbance=0.5)
+        confirm(chapter_4(1.0), Drive(speed=60.0), disturbance=0.5)
 
 
 # Pictures
