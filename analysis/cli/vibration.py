@@ -208,6 +208,8 @@ def _extrema(response: Any, factor: float, unit: str, table: Any) -> None:
     if not response.maxima() and not response.minima():
         console.print("the amplitude has neither a maximum nor a minimum inside the range", highlight=False)
         return
+    if table is not None and response.family.parameters.slider_coulomb_friction:
+        console.print("the approximations are of the mechanism without its Coulomb friction", highlight=False)
     entries = [("maximum", e) for e in response.maxima()] + [("minimum", e) for e in response.minima()]
     for word, extremum in sorted(entries, key=lambda entry: entry[1].parameter):
         others = [] if table is None else [f"{CM_PER_METRE * v:.4f}" for v in table.at(extremum.parameter).values()]
@@ -267,6 +269,7 @@ def stability(
     from ..branches import unit_of
     from ..charts import default_range, stability_chart
     from ..orbits import orbit_of
+    from ..stability import linear_verdict
 
     chosen = chosen_case(case, published, settings)
     parameters = chosen.parameters
@@ -291,6 +294,12 @@ def stability(
         highlight=False,
         soft_wrap=True,
     )
+    if drive.speed_drive and not parameters.slider_coulomb_friction:
+        console.print(
+            f"by the linear equation about u = 0, as in the thesis: {linear_verdict(parameters, drive)}",
+            highlight=False,
+            soft_wrap=True,
+        )
     if parameters.slider_coulomb_friction:
         errors.print(
             "note: Coulomb friction is smoothed over 1 mm/s: where the slider would stick, the model creeps to one place, and "

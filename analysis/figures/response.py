@@ -98,9 +98,10 @@ def _legend(branches: Sequence[Branch], others: Sequence[str]) -> list[Line2D]:
     handles = [
         Line2D([], [], color=COLOURS[i % len(COLOURS)], label=_name(branch)) for i, branch in enumerate(branches)
     ]
+    words = {word.value for branch in branches for word in branch.stability()}
+    looks: dict[str, Any] = {"stable": "-", "unstable": "--", "marginal": "--"}
     handles += [
-        Line2D([], [], color="0.3", linestyle="-", label="stable"),
-        Line2D([], [], color="0.3", linestyle="--", label="unstable"),
+        Line2D([], [], color="0.3", linestyle=line, label=word) for word, line in looks.items() if word in words
     ]
     handles += [
         Line2D([], [], color="0.45", linestyle=line, linewidth=0.9, label=name) for name, line in zip(others, _LINES)
