@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import inspect
+import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -156,14 +157,20 @@ def grid(
     with interruptible() as interrupted, shown(progress, float(len(paths)), "stability") as show:
         show(float(done))
         tasks = (joblib.delayed(_compute_row)(path, row, guess, tolerance) for path, row in missing)
+        results = joblib.Parallel(n_jobs=n_jobs, return_as="generator_unordered")(tasks)
         try:
-            for _ in joblib.Parallel(n_jobs=n_jobs, return_as="generator_unordered")(tasks):
+            for _ in results:
                 done += 1
                 show(float(done))
                 if interrupted:
                     break
         except KeyboardInterrupt:  # of a worker, or of one who raises it himself
             interrupted.append(True)
+        finally:
+            with warnings.catch_warnings():
+                # that rows were cancelled is what was asked for
+                warnings.filterwarnings("ignore", message=".*still being processed", category=UserWarning)
+                results.close()
         if interrupted and done < len(paths):
             raise GridInterrupted(done, len(paths), where)
     rows = [_read(path, len(xs), len(guess)) for path in paths]
