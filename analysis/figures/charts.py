@@ -4,11 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import ceil
-from textwrap import fill
 from typing import Any
 
-import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import TwoSlopeNorm
@@ -16,8 +13,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
-from .curves import Panel, draw_panel
-from .style import STYLE, finish
+from .curves import Panel, draw_panel, lay_out
 
 #: Colour of points that have no value.
 _NONE = "0.82"
@@ -66,19 +62,14 @@ def plot_charts(
     size : (float, float)
         Width and height of a chart (inches).
     """
-    rows = ceil(len(charts) / columns)
-    with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(size[0] * columns, 0.35 + size[1] * rows))
-        axes = figure.subplots(rows, columns, squeeze=False)
-        for axis, chart in zip(axes.flat, charts):
-            if isinstance(chart, HeatMap):
-                _draw_map(figure, axis, chart)
-            else:
-                draw_panel(axis, chart)
-        for axis in list(axes.flat)[len(charts) :]:
-            axis.remove()
-        figure.suptitle(fill(title, int(11.6 * size[0] * columns)), fontsize=10.5, fontweight="bold")
-        return finish(figure)
+    return lay_out(charts, _draw, title=title, columns=columns, size=size)
+
+
+def _draw(figure: Figure, axis: Axes, chart: Panel | HeatMap) -> None:
+    if isinstance(chart, HeatMap):
+        _draw_map(figure, axis, chart)
+    else:
+        draw_panel(axis, chart)
 
 
 def _draw_map(figure: Figure, axis: Axes, chart: HeatMap) -> None:

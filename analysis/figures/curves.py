@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from math import ceil
 from textwrap import fill
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import matplotlib
 import numpy as np
@@ -20,6 +20,9 @@ from .style import COLOURS, STYLE, finish
 
 if TYPE_CHECKING:
     pass
+
+
+_Part = TypeVar("_Part")
 
 
 def plot_outputs(
@@ -156,13 +159,25 @@ def plot_curves(
     size : (float, float)
         Width and height of a panel (inches).
     """
-    rows = ceil(len(panels) / columns)
+    return lay_out(panels, lambda figure, axis, panel: draw_panel(axis, panel), title=title, columns=columns, size=size)
+
+
+def lay_out(
+    parts: Sequence[_Part],
+    draw: Callable[[Figure, Axes, _Part], None],
+    *,
+    title: str,
+    columns: int,
+    size: tuple[float, float],
+) -> Figure:
+    """A figure with a pair of axes per part, drawn by ``draw``; see `plot_curves`."""
+    rows = ceil(len(parts) / columns)
     with matplotlib.rc_context(STYLE):
         figure = Figure(figsize=(size[0] * columns, 0.35 + size[1] * rows))
         axes = figure.subplots(rows, columns, squeeze=False)
-        for axis, panel in zip(axes.flat, panels):
-            draw_panel(axis, panel)
-        for axis in list(axes.flat)[len(panels) :]:
+        for axis, part in zip(axes.flat, parts):
+            draw(figure, axis, part)
+        for axis in list(axes.flat)[len(parts) :]:
             axis.remove()
         # eleven and a half of these letters go to the inch
         figure.suptitle(fill(title, int(11.6 * size[0] * columns)), fontsize=10.5, fontweight="bold")
