@@ -93,6 +93,15 @@ def test_files_and_plot(found: StabilityChart, tmp_path: Path) -> None:
     assert figure.axes[0].get_xlabel() == "drive.speed [rpm]"
 
 
+def test_crossings_of_other_motions_are_counted_not_traced() -> None:
+    rig = SETS["rig-1-spring-a"].parameters
+    # the period doubling at 379 to 527 rpm belongs to a motion of some 8 cm, beside the small one that the grid has
+    chart = stability_chart(rig, DRIVE, ranges=((350.0 * RPM, 620.0 * RPM), (5.0, 12.0)), points=9)
+    assert chart.elsewhere > 0
+    assert Crossing.PERIOD_DOUBLING not in {traced.kind for traced in chart.boundaries}
+    assert (chart.grid.largest < 1.0).all()
+
+
 def test_points_without_an_orbit_are_told() -> None:
     chart = stability_chart(
         TABLE_3_1,
