@@ -306,6 +306,7 @@ def follow(
     greatest: float = 2e-2,
     most_points: int = 5000,
     watch: Callable[[float], None] | None = None,
+    stop: Callable[[], bool] | None = None,
 ) -> Branch:
     """Follow the branch through an orbit to an end of the range of the parameter.
 
@@ -325,6 +326,8 @@ def follow(
     most_points : int
     watch : callable, optional
         Told the parameter of every point.
+    stop : callable, optional
+        Asked at every point whether to leave it at that.
 
     Returns
     -------
@@ -338,7 +341,7 @@ def follow(
     """
     settings = Settings(low=low, high=high, first=min(first, greatest), greatest=greatest, most_points=most_points)
     follower = _follower(family, orbit, settings)
-    return _branch(family, orbit.turns, follower, follower.start(orbit.start, value, direction), watch)
+    return _branch(family, orbit.turns, follower, follower.start(orbit.start, value, direction), watch, stop)
 
 
 def switch(
@@ -351,6 +354,7 @@ def switch(
     greatest: float = 2e-2,
     most_points: int = 5000,
     watch: Callable[[float], None] | None = None,
+    stop: Callable[[], bool] | None = None,
 ) -> Branch:
     """The branch of twice the period that leaves a branch at a period doubling.
 
@@ -381,7 +385,7 @@ def switch(
             taken is not None
             and abs(float((taken[0].y / scale - orbit.start / scale) @ (vector / scale))) > 0.5 * length
         ):
-            return _branch(family, doubled.turns, follower, taken[0], watch)
+            return _branch(family, doubled.turns, follower, taken[0], watch, stop)
     raise ContinuationError(f"the motion of twice the period is not met next to {family.tell(doubling.parameter)}")
 
 
@@ -403,10 +407,17 @@ def reason_to_leave(point: Point) -> str:
 
 
 def _branch(
-    family: Family, turns: int, follower: Follower, first: Point, watch: Callable[[float], None] | None
+    family: Family,
+    turns: int,
+    follower: Follower,
+    first: Point,
+    watch: Callable[[float], None] | None,
+    stop: Callable[[], bool] | None,
 ) -> Branch:
     curve = follower.follow(
-        first, watch=None if watch is None else lambda point: watch(point.parameter), leave=reason_to_leave
+        first,
+        watch=None if watch is None else lambda point: watch(point.parameter),
+        leave=lambda point: "it was interrupted" if stop is not None and stop() else reason_to_leave(point),
     )
     special = _special_points(curve, follower)
     return Branch(

@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import minimize_scalar
 from scipy.signal import find_peaks
 
-from linkwork.errors import InputError, ParameterError
+from linkwork.errors import InputError, Interrupted, ParameterError
 from linkwork.five_bar.parameters import FiveBarParameters
 
 from . import io, orbit_kernels
@@ -28,7 +28,7 @@ from .continuation import ContinuationError
 from .floquet import Crossing, Stability
 from .harmonic_balance import harmonic_balance
 from .orbits import Drive, OrbitError, PeriodicOrbit, guess_of, orbit_of, scale_of
-from .simulate import shown
+from .simulate import interruptible, shown
 from .slider_equation import Load, Variant, mean_effective_mass, slider_equation
 
 if TYPE_CHECKING:
@@ -148,6 +148,16 @@ class Response:
         return figures.plot_branches(self.branches, title=title, rpm=rpm, beside=others)
 
 
+class ResponseInterrupted(Interrupted):
+    """Ctrl-C: the branches that had been followed are in ``response``."""
+
+    def __init__(self, response: Response) -> None:
+        self.response = response
+        super().__init__(
+            f"interrupted with {len(response.branches)} branches followed, the last in part; they are kept"
+        )
+
+
 def frequency_response(
     parameters: FiveBarParameters,
     low: float,
@@ -196,6 +206,8 @@ def frequency_response(
         If there is no periodic motion to begin with at either end.
     InputError
         If the range is not one.
+    ResponseInterrupted
+        On Ctrl-C, with the branches that there are.
     """
     if drive is None:
         if vary != "drive.speed":
@@ -210,7 +222,7 @@ def frequency_response(
     problems: list[str] = []
     failures: list[OrbitError] = []
     done = 0.0
-    with shown(progress, high - low, "follow") as show:
+    with interruptible() as interrupted, shown(progress, high - low, "follow") as show:
 
         def watch(value: float) -> None:
             nonlocal done
@@ -240,19 +252,31 @@ def frequency_response(
                 greatest=greatest_step,
                 most_points=most_points,
                 watch=watch,
+                stop=lambda: bool(interrupted),
             )
             branches.append(branch)
             if not branch.reached:
                 problems.append(_lost(branch))
+            if interrupted:
+                break
+        if doubled and not interrupted:
+            _double(family, branches, problems, low, high, greatest_step, lambda: bool(interrupted))
     if not branches:
         raise failures[0]
-    if doubled:
-        _double(family, branches, problems, low, high, greatest_step)
-    return Response(branches=tuple(branches), low=low, high=high, problems=tuple(problems))
+    response = Response(branches=tuple(branches), low=low, high=high, problems=tuple(problems))
+    if interrupted:
+        raise ResponseInterrupted(response)
+    return response
 
 
 def _double(
-    family: Family, branches: list[Branch], problems: list[str], low: float, high: float, greatest_step: float
+    family: Family,
+    branches: list[Branch],
+    problems: list[str],
+    low: float,
+    high: float,
+    greatest_step: float,
+    stop: Callable[[], bool],
 ) -> None:
     """Append the branches of twice the period; one that ends at another doubling is not followed back from there."""
     ends: list[tuple[float, NDArray[np.float64]]] = []
@@ -265,7 +289,7 @@ def _double(
         ):
             continue
         try:
-            branch = switch(family, special, low=low, high=high, greatest=greatest_step)
+            branch = switch(family, special, low=low, high=high, greatest=greatest_step, stop=stop)
         except (OrbitError, ContinuationError) as error:
             problems.append(
                 f"the branch of twice the period at {family.tell(special.parameter)} is not followed: {error}"
@@ -275,6 +299,8 @@ def _double(
         ends.append((float(branch.parameter[-1]), branch.orbits[-1].start))
         if not branch.reached:
             problems.append(_lost(branch))
+        if stop():
+            return
 
 
 def _lost(branch: Branch) -> str:

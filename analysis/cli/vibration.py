@@ -16,7 +16,7 @@ from rich.table import Table
 from linkwork.errors import InputError
 from linkwork.five_bar.published import CM_PER_METRE, RAD_S_PER_RPM, SETS
 
-from .common import ENDED_EARLY, chosen_case, console, errors, handled, number_or_text, prepare_solver
+from .common import ENDED_EARLY, INTERRUPTED, chosen_case, console, errors, handled, number_or_text, prepare_solver
 
 #: Range of speeds where none is given, relative to the natural frequency.
 _RANGE = (0.15, 1.5)
@@ -122,7 +122,7 @@ def resonance(
     """
     from .. import io
     from ..branches import unit_of
-    from ..resonance import approximations, frequency_response, natural_frequency
+    from ..resonance import ResponseInterrupted, approximations, frequency_response, natural_frequency
 
     chosen = chosen_case(case, published, settings)
     parameters = chosen.parameters
@@ -147,15 +147,19 @@ def resonance(
     _require_range(ends[0], ends[1], vary, "--from", "--to")
     drive = _drive(chosen, f"{ends[0]} rad/s" if over_speed else speed)
     prepare_solver(orbits=True)
-    response = frequency_response(
-        parameters,
-        *ends,
-        drive=drive,
-        vary=vary,
-        start=_start(chosen, drive, guess_speed),
-        doubled=doubled,
-        progress=console.is_terminal,
-    )
+    interrupted = False
+    try:
+        response = frequency_response(
+            parameters,
+            *ends,
+            drive=drive,
+            vary=vary,
+            start=_start(chosen, drive, guess_speed),
+            doubled=doubled,
+            progress=console.is_terminal,
+        )
+    except ResponseInterrupted as stopped:
+        response, interrupted = stopped.response, True
     factor, shown_unit = (1.0 / RAD_S_PER_RPM, "rpm") if over_speed else (1.0, unit)
     if over_speed and natural is not None:
         console.print(
@@ -176,6 +180,8 @@ def resonance(
         console.print(f"wrote {path}", highlight=False, soft_wrap=True)
     for problem in response.problems:
         errors.print(f"note: {problem}", style="yellow", markup=False, highlight=False, soft_wrap=True)
+    if interrupted:
+        sys.exit(INTERRUPTED)
     if response.problems:
         sys.exit(ENDED_EARLY)
 

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import os
+import signal
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from math import pi
 from pathlib import Path
@@ -9,10 +13,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from analysis import Inputs, simulate
+from analysis import Inputs, resonance, simulate
 from analysis.floquet import Crossing, Stability
 from analysis.orbits import Drive, OrbitError
-from analysis.resonance import approximations, frequency_response, natural_frequency, sweep
+from analysis.resonance import ResponseInterrupted, approximations, frequency_response, natural_frequency, sweep
 from linkwork.errors import AssemblyError, InputError, ParameterError
 from linkwork.five_bar.published import RAD_S_PER_RPM, SETS, TABLE_3_1
 
@@ -152,6 +156,28 @@ def test_a_curve_followed_from_both_ends_has_its_maximum_once() -> None:
     assert any("300 points" in problem for problem in response.problems)
     places = [round(e.parameter, 6) for e in response.maxima()]
     assert len(places) == len(set(places))
+
+
+def test_an_interrupt_keeps_what_was_followed(monkeypatch: pytest.MonkeyPatch) -> None:
+    # Ctrl-C at the fortieth point
+    count = 0
+
+    @contextmanager
+    def counting(*_: object) -> Iterator[Callable[[float], None]]:
+        def show(_: float) -> None:
+            nonlocal count
+            count += 1
+            if count == 40:
+                os.kill(os.getpid(), signal.SIGINT)
+
+        yield show
+
+    monkeypatch.setattr(resonance, "shown", counting)
+    with pytest.raises(ResponseInterrupted, match="1 branches followed") as stopped:
+        frequency_response(RIG["a"], 100.0 * RPM, 1300.0 * RPM)
+    (branch,) = stopped.value.response.branches
+    assert len(branch) == 41
+    assert "it was interrupted" in stopped.value.response.problems[0]
 
 
 def test_one_end_without_an_orbit_is_a_problem_that_is_told() -> None:
