@@ -55,6 +55,8 @@ SAME_MOTION = 0.4
 #: Distance, with the box scaled to 1 by 1, at which a point lies on a boundary.
 SAME = 5e-3
 DAMPING = "slider.damping"
+#: Multiplier on a boundary, as it is written to files.
+_MULTIPLIER = {Crossing.FOLD: 1.0, Crossing.PERIOD_DOUBLING: -1.0, Crossing.TORUS: 0.0}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -92,7 +94,8 @@ class Traced:
     motion : str
         ``true orbit`` or ``linear equation``.
     kind : Crossing
-        What the multipliers do there: at -1 a period doubling, at +1 a fold, beyond which the orbit is no more.
+        What the multipliers do there: at -1 a period doubling, at +1 a fold, beyond which the orbit is no more; under a torque
+        a complex pair may pass the unit circle, at a torus.
     ends : (str, str)
         Why it ends, at the first and at the last point.
     """
@@ -160,9 +163,14 @@ class StabilityChart:
         rows = [np.empty((0, 5))]
         for number, traced in enumerate(self.boundaries, start=1):
             points = traced.points * [axis.factor for axis in self.axes]
-            head = [number, float(traced.motion == "true orbit"), 1.0 if traced.kind is Crossing.FOLD else -1.0]
+            head = [number, float(traced.motion == "true orbit"), _MULTIPLIER[traced.kind]]
             rows.append(np.column_stack([np.tile(head, (len(points), 1)), points]))
-        names = ("boundary", "true orbit (1) or linear equation (0)", "multiplier [1]", *(a.label for a in self.axes))
+        names = (
+            "boundary",
+            "true orbit (1) or linear equation (0)",
+            "multiplier (+1; -1; 0: a complex pair)",
+            *(a.label for a in self.axes),
+        )
         return io.write_csv(path, dict(zip(names, np.concatenate(rows).T)))
 
     def plot(self, *, title: str = "") -> Figure:
@@ -173,6 +181,7 @@ class StabilityChart:
         looks = {
             ("true orbit", Crossing.PERIOD_DOUBLING): ("0.1", "-", "period doubling"),
             ("true orbit", Crossing.FOLD): (COLOURS[3], "-", "fold"),
+            ("true orbit", Crossing.TORUS): (COLOURS[1], "-", "torus"),
             ("linear equation", Crossing.PERIOD_DOUBLING): (COLOURS[2], "--", "linear equation, multiplier -1"),
             ("linear equation", Crossing.FOLD): (COLOURS[4], "--", "linear equation, multiplier +1"),
         }
@@ -365,7 +374,7 @@ def _add_crossings(
                     continue
                 for special in branch.special:
                     place = (special.parameter, y)
-                    if special.kind is Crossing.TORUS or _is_known(place, special.kind, box, traced):
+                    if _is_known(place, special.kind, box, traced):
                         continue
                     if _is_of(found, special.orbit, place):
                         _append(at, special, place, box, axes, traced, problems)
@@ -482,7 +491,7 @@ def _removals(matrix: Monodromy, box: Box, names: tuple[str, str], traced: Seque
     name, unit = names[1 - which], unit_of(names[1 - which])
     sentences = []
     for boundary in traced:
-        if boundary.motion != "true orbit" or len(boundary.points) < 2:
+        if boundary.motion != "true orbit" or boundary.kind is Crossing.TORUS or len(boundary.points) < 2:
             continue
         across, up = boundary.points[:, 1 - which], boundary.points[:, which]
         span = f"{told(name, float(across.min()), unit)} to {told(name, float(across.max()), unit)}"

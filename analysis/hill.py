@@ -220,14 +220,18 @@ def determinant(equation: PeriodicEquation) -> float:
 
 
 def crossing_test(matrices: NDArray[np.float64], multiplier: int) -> NDArray[np.float64]:
-    """det(Phi - multiplier I), shape (...,), of monodromy matrices (..., 2, 2): zero where one multiplier is +1 or -1.
+    """det(I - multiplier Phi), shape (...,), of monodromy matrices (..., n, n): zero where one multiplier is +1 or -1.
 
-    Between two such boundaries of a region of instability it is negative: a real multiplier has passed the unit circle.
+    ``multiplier`` is +1 or -1. Positive where all multipliers are inside the unit circle; negative where one real multiplier
+    has passed it.
     """
     _require_sign(multiplier)
+    if matrices.shape[-1] != 2:
+        value: NDArray[np.float64] = np.asarray(np.linalg.det(np.eye(matrices.shape[-1]) - multiplier * matrices))
+        return value
     trace = matrices[..., 0, 0] + matrices[..., 1, 1]
     det = matrices[..., 0, 0] * matrices[..., 1, 1] - matrices[..., 0, 1] * matrices[..., 1, 0]
-    value: NDArray[np.float64] = 1.0 - multiplier * trace + det
+    value = 1.0 - multiplier * trace + det
     return value
 
 

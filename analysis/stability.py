@@ -100,7 +100,7 @@ def orbit_monodromy(operation: Plane, *, start: ArrayLike | None = None) -> Mono
 
 
 def test_of(matrix: Monodromy, multiplier: int) -> Test:
-    """Test function det(Phi - multiplier I) of a monodromy matrix over a plane; ``multiplier`` is +1 or -1."""
+    """Test function det(I - multiplier Phi) of a monodromy matrix over a plane; ``multiplier`` is +1 or -1."""
     return lambda x, y: float(crossing_test(matrix(x, y), multiplier))
 
 

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from analysis import grids
+from analysis.branches import Family, follow
 from analysis.charts import StabilityChart, default_range, stability_chart
 from analysis.floquet import Crossing, Stability
 from analysis.orbits import Drive, find_orbit
@@ -100,6 +101,35 @@ def test_crossings_of_other_motions_are_counted_not_traced() -> None:
     assert chart.elsewhere > 0
     assert Crossing.PERIOD_DOUBLING not in {traced.kind for traced in chart.boundaries}
     assert (chart.grid.largest < 1.0).all()
+
+
+def test_a_chart_under_a_torque_has_its_doublings_and_tori() -> None:
+    # on the branch of one damper: torus at 0.1055 and 0.2644 N.m, period doubling at 0.3395 N.m
+    drive = Drive(torque=0.2)
+    orbit = find_orbit(TABLE_3_1, torque=0.2, start=(0.0, 0.0, 45.0))
+    family = Family(parameters=TABLE_3_1, drive=drive, vary="drive.torque")
+    branch = follow(family, orbit, 0.2, low=0.15, high=0.45)
+    expected = {special.kind: special.parameter for special in branch.special}
+    chart = stability_chart(
+        TABLE_3_1,
+        drive,
+        ("drive.torque", "slider.damping"),
+        ((0.2, 0.45), (29.0, 31.0)),
+        points=12,
+        start=orbit.start,
+    )
+    for kind in (Crossing.TORUS, Crossing.PERIOD_DOUBLING):
+        (boundary,) = [traced for traced in chart.boundaries if traced.kind is kind]
+        order = np.argsort(boundary.points[:, 1])
+        torque = np.interp(30.0, boundary.points[order, 1], boundary.points[order, 0])
+        assert torque == pytest.approx(expected[kind], rel=1e-3)
+    # unstable beyond the doubling, by the grid too
+    row = int(np.abs(chart.grid.y - 30.0).argmin())
+    unstable = chart.grid.largest[row] > 1.0
+    assert unstable[chart.grid.x > expected[Crossing.PERIOD_DOUBLING] + 0.03].all()
+    assert not unstable[
+        (chart.grid.x > expected[Crossing.TORUS] + 0.02) & (chart.grid.x < expected[Crossing.PERIOD_DOUBLING] - 0.02)
+    ].any()
 
 
 def test_points_without_an_orbit_are_told() -> None:
