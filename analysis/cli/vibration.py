@@ -127,6 +127,10 @@ def resonance(
     chosen = chosen_case(case, published, settings)
     parameters = chosen.parameters
     over_speed = vary == "drive.speed"
+    if over_speed and speed is not None:
+        raise click.UsageError(
+            "--speed prescribes a speed, but it is the speed that varies: give --from and --to, or --vary"
+        )
     natural = natural_frequency(parameters) if parameters.slider_stiffness > 0.0 else None
     unit = unit_of(vary)
     if over_speed and natural is not None:

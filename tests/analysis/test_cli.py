@@ -236,6 +236,7 @@ def test_resonance_over_another_parameter(linkwork, tmp_path):
         (["--published", "table-3.1", "--vary", "slider.damping"], 2, "--from and --to are needed"),
         (["--published", "table-3.1", "--from", "100 rpm", "--to", "50 rpm"], 2, "must increase"),
         (["--published", "table-3.1", "--from", "0", "--to", "50 rpm"], 2, "speeds must be above zero"),
+        (["--published", "table-3.1", "--speed", "300 rpm"], 2, "it is the speed that varies"),
         (["--published", "table-3.1", "--from", "100 kg", "--to", "200 rpm"], 1, "--from"),
         (["--published", "table-3.1", "--set", "slider.stiffness=0"], 2, "no natural frequency"),
         ([], 2, "either a case file or --published"),
