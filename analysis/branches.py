@@ -12,7 +12,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from math import pi
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -45,7 +45,7 @@ _DIFFERENCE = 1e-6
 _SWITCH = 2e-3
 
 #: Unit of each parameter that can vary.
-_UNITS = {
+UNITS_OF_VARIABLES = {
     variable.name: variable.unit
     for variable in (*INPUTS, *PARAMETERS)
     if variable.name in OF_THE_DRIVE
@@ -65,15 +65,39 @@ def unit_of(name: str) -> str:
     InputError
         If there is nothing of that name.
     """
-    if name not in _UNITS:
-        raise InputError(f"there is no {name}: what can vary is {', '.join(_UNITS)}")
-    return _UNITS[name]
+    if name not in UNITS_OF_VARIABLES:
+        raise InputError(f"there is no {name}: what can vary is {', '.join(UNITS_OF_VARIABLES)}")
+    return UNITS_OF_VARIABLES[name]
 
 
 def told(name: str, value: float, unit: str) -> str:
     """A value in words, with its unit; speeds in rpm too."""
     rpm = f" ({value / RAD_S_PER_RPM:.6g} rpm)" if unit == "rad/s" else ""
     return f"{name} = {value:.6g} {unit}".rstrip() + rpm
+
+
+def require_drive(drive: Drive, name: str) -> None:
+    """Refuse a speed that varies under a torque, and a torque at prescribed speed.
+
+    Raises
+    ------
+    InputError
+        If the parameter does not act in this drive.
+    """
+    if name in ("drive.speed", "drive.torque") and (name == "drive.speed") != drive.speed_drive:
+        raise InputError(f"{name} cannot vary: the drive is by {'speed' if drive.speed_drive else 'torque'}")
+
+
+def with_values(
+    parameters: FiveBarParameters, drive: Drive, values: Mapping[str, float]
+) -> tuple[FiveBarParameters, Drive]:
+    """Mechanism and drive with other values of parameters by their FMI names."""
+    of_drive: dict[str, Any] = {OF_THE_DRIVE[name]: value for name, value in values.items() if name in OF_THE_DRIVE}
+    of_mechanism: dict[str, Any] = {field_name(name): v for name, v in values.items() if name not in OF_THE_DRIVE}
+    return (
+        replace(parameters, **of_mechanism) if of_mechanism else parameters,
+        replace(drive, **of_drive) if of_drive else drive,
+    )
 
 
 #: What varies: an FMI name, or a function of one number.
@@ -110,12 +134,11 @@ class Family:
         if callable(self.vary):
             object.__setattr__(self, "name", self.name or "parameter")
             return
-        if self.vary not in _UNITS:
-            raise InputError(f"{self.vary!r} cannot vary: it must be one of {', '.join(_UNITS)}, or a function")
-        if (self.vary == "drive.speed") != self.drive.speed_drive and self.vary in ("drive.speed", "drive.torque"):
+        if self.vary not in UNITS_OF_VARIABLES:
             raise InputError(
-                f"{self.vary} cannot vary: the drive is by {'speed' if self.drive.speed_drive else 'torque'}"
+                f"{self.vary!r} cannot vary: it must be one of {', '.join(UNITS_OF_VARIABLES)}, or a function"
             )
+        require_drive(self.drive, self.vary)
         object.__setattr__(self, "name", self.name or self.vary)
         object.__setattr__(self, "unit", self.unit or unit_of(self.vary))
 
@@ -123,9 +146,7 @@ class Family:
         """Mechanism and drive at a value of the parameter."""
         if callable(self.vary):
             return self.vary(value)
-        if self.vary in OF_THE_DRIVE:
-            return self.parameters, replace(self.drive, **{OF_THE_DRIVE[self.vary]: value})  # type: ignore[arg-type]
-        return replace(self.parameters, **{field_name(self.vary): value}), self.drive  # type: ignore[arg-type]
+        return with_values(self.parameters, self.drive, {self.vary: value})
 
     def tell(self, value: float) -> str:
         """A value of the parameter in words, with its unit; speeds in rpm too."""

@@ -18,7 +18,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from linkwork.errors import AssemblyError, InputError, LinkworkError
 from linkwork.five_bar import kinematics
-from linkwork.five_bar.dynamics import Inputs
 from linkwork.five_bar.kinematics import LIMIT_SINE
 from linkwork.five_bar.parameters import Constants, FiveBarParameters
 from linkwork.five_bar.variables import OUTPUT_NAMES
@@ -276,11 +275,6 @@ class PeriodicOrbit:
             values=values[:, keep],
             turns=self.turns,
         )
-
-    @property
-    def inputs(self) -> Inputs:
-        """What acts on the plant at crank angle 0."""
-        return Inputs(*self.turn(2).inputs[0])
 
     @property
     def amplitude(self) -> float:

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
-from typing import Any
 
 from linkwork.errors import InputError, UnknownNameError
-from linkwork.five_bar.parameters import FiveBarParameters, field_name, fmi_name
+from linkwork.five_bar.parameters import FiveBarParameters
 
-from .branches import OF_THE_DRIVE
+from .branches import UNITS_OF_VARIABLES, require_drive, with_values
 from .orbits import Drive
 
 #: A mechanism and what drives it.
@@ -42,22 +40,13 @@ def plane(parameters: FiveBarParameters, drive: Drive, x: str, y: str) -> Plane:
         require_axis(drive, name)
 
     def operation(first: float, second: float) -> Operation:
-        of_drive: dict[str, Any] = {}
-        of_mechanism: dict[str, Any] = {}
-        for name, value in ((x, first), (y, second)):
-            if name in OF_THE_DRIVE:
-                of_drive[OF_THE_DRIVE[name]] = value
-            else:
-                of_mechanism[field_name(name)] = value
-        return replace(parameters, **of_mechanism), replace(drive, **of_drive)
+        return with_values(parameters, drive, {x: first, y: second})
 
     return operation
 
 
 def require_axis(drive: Drive, name: str) -> None:
     """Raise an error for a parameter that is none, or does not act in this drive; see `plane`."""
-    known = tuple(fmi_name(field) for field in FiveBarParameters.__dataclass_fields__ if field != "assembly_branch")
-    if name not in OF_THE_DRIVE and name not in known:
-        raise UnknownNameError(name, (*OF_THE_DRIVE, *known), None)
-    if name in ("drive.speed", "drive.torque") and (name == "drive.speed") != drive.speed_drive:
-        raise InputError(f"{name} cannot be an axis: the drive is by {'speed' if drive.speed_drive else 'torque'}")
+    if name not in UNITS_OF_VARIABLES:
+        raise UnknownNameError(name, tuple(UNITS_OF_VARIABLES), None)
+    require_drive(drive, name)

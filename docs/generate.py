@@ -8,8 +8,7 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
-from linkwork.five_bar.kinematics import Coefficients, Position
-from linkwork.five_bar.parameters import Constants, FiveBarParameters, field_name
+from linkwork.five_bar.parameters import FiveBarParameters, field_name
 from linkwork.five_bar.variables import INPUTS, OUTPUTS, PARAMETERS
 from linkwork.variables import Variable
 
@@ -158,11 +157,6 @@ def readme(text: str) -> str:
     before, _, rest = text.partition(BEGIN)
     _, _, after = rest.partition(END)
     return f"{before}{BEGIN}\n{variable_table()}\n{END}{after}"
-
-
-def identifiers() -> set[str]:
-    """Every identifier of the equations that the second table must explain."""
-    return {*Constants._fields, *Position._fields, *Coefficients._fields}
 
 
 FIGURES = """# The thesis's figures, and what it states

@@ -211,16 +211,16 @@ def _branches(title: str, response: Any, factor: float, unit: str) -> None:
 
 
 def _extrema(response: Any, factor: float, unit: str, table: Any) -> None:
+    entries = [("maximum", e) for e in response.maxima()] + [("minimum", e) for e in response.minima()]
+    if not entries:
+        console.print("the amplitude has neither a maximum nor a minimum inside the range", highlight=False)
+        return
     grid = Table(title="where the amplitude of the slider is largest and least", title_justify="left")
     names = () if table is None else tuple(table.amplitudes)
     for heading in ("", f"at [{unit}]", "amplitude [cm]", "motion", *(f"{name} [cm]" for name in names)):
         grid.add_column(escape(heading), justify="left" if heading in ("", "motion") else "right")
-    if not response.maxima() and not response.minima():
-        console.print("the amplitude has neither a maximum nor a minimum inside the range", highlight=False)
-        return
     if table is not None and response.family.parameters.slider_coulomb_friction:
         console.print("the approximations are of the mechanism without its Coulomb friction", highlight=False)
-    entries = [("maximum", e) for e in response.maxima()] + [("minimum", e) for e in response.minima()]
     for word, extremum in sorted(entries, key=lambda entry: entry[1].parameter):
         others = [] if table is None else [f"{CM_PER_METRE * v:.4f}" for v in table.at(extremum.parameter).values()]
         grid.add_row(
