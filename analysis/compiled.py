@@ -50,7 +50,7 @@ BEGIN, ELAPSED, STEP, SAMPLE, INTERVAL, EVENTS, STEPS, REJECTED, EVALUATIONS, ST
 CARRY = HELD + 6
 
 #: Modules of this package whose code ends up in compiled code.
-COMPILED_MODULES = ("compiled.py", "orbit_kernels.py", "symbolic.py")
+COMPILED_MODULES = ("compiled.py", "orbit_kernels.py", "symbolic.py", "synthesis/kernels.py")
 #: Events that one step can bring at most, and the beginning of an interval besides.
 EVENTS_PER_STEP = 4
 #: Fraction of a step within which an event counts as simultaneous with the end of the run or the release.
@@ -75,7 +75,7 @@ def cache_folder() -> Path:
         digest.update(path.relative_to(root).as_posix().encode())
         digest.update(path.read_bytes())
     for name in COMPILED_MODULES:
-        digest.update(Path(__file__).with_name(name).read_bytes())
+        digest.update((Path(__file__).parent / name).read_bytes())
     name = f"numba-{digest.hexdigest()[:16]}"
     user = os.getuid() if hasattr(os, "getuid") else 0
     folder = Path(os.environ.get("LINKWORK_CACHE_DIR") or user_cache_dir("linkwork", appauthor=False)) / name
@@ -111,6 +111,7 @@ _ADDRESSES = int64[::1]
 _SOURCE = types.NamedTuple((VECTOR, CUBE, MATRIX, VECTOR, _ADDRESSES), Source)
 
 for _function in (
+    kinematics.joined,
     kinematics.position,
     kinematics.coefficients,
     kinematics.centripetal,

@@ -423,14 +423,35 @@ class SampledController:
         """Forget the integral."""
         self.integral = 0.0
 
+    @property
+    def method(self) -> str:
+        """How it was designed."""
+        return self.design.method
+
     def force(self, measured: Sequence[float], reference: float) -> float:
         """The force (N) for the next period, from (th2, u, th2', u') and the reference (m)."""
-        d = self.design
         step = reference - self._target[1]
-        wanted = d.force + d.force_slope * step - d.integral_gain * self.integral
+        wanted = self.holding_force(reference)
         for gain, value, target, slope in zip(self._gains, measured, self._target, self._slope):
             wanted -= gain * (value - target - slope * step)
-        error = measured[1] - reference
+        return self._limited(wanted, measured[1] - reference)
+
+    def holding_force(self, reference: float) -> float:
+        """The force (N) that holds the slider at a reference (m) on the linear model."""
+        return self.design.force + self.design.force_slope * (reference - self._target[1])
+
+    def follow(self, feedforward: float, position_error: float, velocity_error: float) -> float:
+        """The force (N) for the next period along a moving reference, from the slider's errors (m, m/s) against it.
+
+        ``feedforward`` (N) takes the place of the holding force; no gain acts on the crank.
+        """
+        _, k_u, _, k_v = self._gains
+        return self._limited(feedforward - k_u * position_error - k_v * velocity_error, position_error)
+
+    def _limited(self, wanted: float, error: float) -> float:
+        """The force wanted, integral added, within the limit; the integral goes on by the error (m)."""
+        d = self.design
+        wanted -= d.integral_gain * self.integral
         # a force beyond the limit is not asked for still louder
         if abs(wanted) <= self.limit or wanted * d.integral_gain * error > 0.0:
             self.integral += self.period * error
@@ -544,6 +565,20 @@ class LoopResult:
         )
 
 
+class Controller(Protocol):
+    """What closes a loop every ``period`` s."""
+
+    @property
+    def period(self) -> float: ...
+
+    @property
+    def method(self) -> str: ...
+
+    def reset(self) -> None: ...
+
+    def force(self, measured: Sequence[float], reference: float, /) -> float: ...
+
+
 class _Plant(Protocol):
     """What a loop is closed around."""
 
@@ -554,9 +589,7 @@ class _Plant(Protocol):
     def step(self, time: float, step: float) -> tuple[int, str]: ...
 
 
-def _run_loop(
-    plant: _Plant, controller: SampledController, reference: Reference, load: Load, times: FloatArray
-) -> LoopResult:
+def _run_loop(plant: _Plant, controller: Controller, reference: Reference, load: Load, times: FloatArray) -> LoopResult:
     """Measure, compute, hold, step; the controller starts afresh."""
     controller.reset()
     rows: list[tuple[float, ...]] = []
@@ -630,7 +663,7 @@ class _Fmu:
 
 def control_loop(
     parameters: FiveBarParameters,
-    controller: SampledController,
+    controller: Controller,
     reference: Reference,
     *,
     initial: InitialState,
@@ -646,8 +679,8 @@ def control_loop(
     Parameters
     ----------
     parameters : FiveBarParameters
-    controller : SampledController
-        Starts with its integral at zero.
+    controller : Controller
+        Such as a `SampledController`; starts with its integral at zero.
     reference : float or function of time
         Slider position to hold (m).
     initial : InitialState
@@ -705,7 +738,7 @@ def control_loop(
         values=rows,
         status=result.status,
         message=result.message,
-        source=f"{source}, {controller.design.method} sampled",
+        source=f"{source}, {controller.method} sampled",
     )
     return replace(result, trajectory=trajectory)
 
@@ -763,7 +796,7 @@ class _Linear:
 
 def predict_loop(
     model: LinearModel | PeriodicModel,
-    controller: SampledController,
+    controller: Controller,
     reference: Reference,
     *,
     stop_time: float,

@@ -69,19 +69,26 @@ def position(th2: float, u: float, p: Constants) -> Position:
     """
     c2 = cos(th2)
     s2 = sin(th2)
-    dx = p.l1 + u * p.ca - p.l2 * c2
-    dy = u * p.sa - p.l2 * s2
+    return joined(c2, s2, p.l1 + u * p.ca - p.l2 * c2, u * p.sa - p.l2 * s2, p.l3, p.l4, p.branch)
+
+
+def joined(c2: float, s2: float, dx: float, dy: float, l3: float, l4: float, branch: float) -> Position:
+    """The intersection of the circles of coupler and rocker about B and D, for the vector (dx, dy) from B to D.
+
+    ``c2, s2`` are passed through. What moves D and what measures the crank's direction is left to the caller: the slider
+    in `position`, anything in the synthesis of linkages.
+    """
     d2 = dx * dx + dy * dy
-    a = 0.5 * (d2 + p.l3 * p.l3 - p.l4 * p.l4)
-    h = p.branch * sqrt(p.l3 * p.l3 * d2 - a * a)
+    a = 0.5 * (d2 + l3 * l3 - l4 * l4)
+    h = branch * sqrt(l3 * l3 * d2 - a * a)
     # C - B = (a d + h d_perp) / d2: C lies to the left of B -> D for branch +1
     x3 = (a * dx - h * dy) / d2
     y3 = (a * dy + h * dx) / d2
-    c3 = x3 / p.l3
-    s3 = y3 / p.l3
-    c4 = (x3 - dx) / p.l4
-    s4 = (y3 - dy) / p.l4
-    return Position(c2, s2, c3, s3, c4, s4, c3 * c4 + s3 * s4, h / (p.l3 * p.l4))
+    c3 = x3 / l3
+    s3 = y3 / l3
+    c4 = (x3 - dx) / l4
+    s4 = (y3 - dy) / l4
+    return Position(c2, s2, c3, s3, c4, s4, c3 * c4 + s3 * s4, h / (l3 * l4))
 
 
 def coefficients(g: Position, p: Constants) -> Coefficients:

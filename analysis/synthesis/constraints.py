@@ -1,0 +1,305 @@
+"""What a linkage must satisfy besides tracing its target."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from math import isfinite, pi, radians
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from linkwork.errors import InputError, LinkworkError, ParameterError
+
+from .kernels import PLACES
+from .linkage import LINKS, names_of
+from .tasks import Normal, RockerFunction, Task
+
+FloatArray = NDArray[np.float64]
+GrashofType = Literal["crank-rocker", "drag-link", "double-rocker", "rocker-crank", "triple-rocker"]
+
+#: The unknowns of every linkage, in their order: `kernels.PLACES` and the output angle.
+UNKNOWNS = (*PLACES, "output_angle")
+#: Largest link by default, in sizes of the target; and, of a rocker function, in ground links.
+LARGEST = 5.0
+#: Ground link of a rocker function by default (m): its angles do not depend on the size.
+GROUND = 0.1
+
+
+class InfeasibleError(LinkworkError):
+    """Bounds and constraints leave no linkage."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LeastTransmission:
+    """The angle between coupler and rocker stays at least this far from 0 and pi.
+
+    Attributes
+    ----------
+    angle : float
+        rad.
+    over : "turn" or "task"
+        Over a full turn, which makes the crank able to turn fully, or at the task's stations only.
+    """
+
+    angle: float = radians(40.0)
+    over: Literal["turn", "task"] = "turn"
+
+    def __post_init__(self) -> None:
+        if not 0.0 <= self.angle < 0.5 * pi:
+            raise ParameterError("least transmission angle", self.angle, "be at least 0 and below pi/2 rad")
+        if self.over not in ("turn", "task"):
+            raise ParameterError("over", self.over, "be 'turn' or 'task'")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FullTurn:
+    """The crank can turn fully, however near the links come to being collinear."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Grashof:
+    """The four-bar is of this type; see `Linkage.grashof`."""
+
+    type: GrashofType
+
+    def __post_init__(self) -> None:
+        known = ("crank-rocker", "drag-link", "double-rocker", "rocker-crank", "triple-rocker")
+        if self.type not in known:
+            raise ParameterError("Grashof type", self.type, f"be one of {', '.join(known)}")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LargestLink:
+    """No link, nor the distance of the coupler point, is longer than this (m)."""
+
+    length: float
+
+    def __post_init__(self) -> None:
+        if not (isfinite(self.length) and self.length > 0.0):
+            raise ParameterError("largest link", self.length, "be a finite number greater than zero (m)")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Assembly:
+    """C lies to the left (+1) or to the right (-1) of B -> D."""
+
+    branch: int
+
+    def __post_init__(self) -> None:
+        if self.branch not in (1, -1):
+            raise ParameterError("branch", self.branch, "be +1 or -1")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class PivotRegion:
+    """A pivot lies within a polygon, convex or not.
+
+    Attributes
+    ----------
+    pivot : "A" or "D"
+        The crank shaft, or the end of the ground link.
+    polygon : array_like, shape (n, 2)
+        Corners in order (m).
+    """
+
+    pivot: Literal["A", "D"]
+    polygon: ArrayLike
+
+    def __post_init__(self) -> None:
+        if self.pivot not in ("A", "D"):
+            raise ParameterError("pivot", self.pivot, "be 'A' or 'D'")
+        corners = np.array(self.polygon, dtype=float)
+        if corners.ndim != 2 or corners.shape[1] != 2 or len(corners) < 3 or not np.isfinite(corners).all():
+            raise InputError(f"the region of pivot {self.pivot} must be at least 3 finite corners, shape (n, 2)")
+        from shapely import Polygon
+
+        shape = Polygon(corners)
+        if not shape.is_valid or not shape.area > 0.0:
+            raise InputError(f"the region of pivot {self.pivot} crosses itself or has no area: {corners.tolist()}")
+        object.__setattr__(self, "polygon", corners)
+
+    def pieces(self) -> list[FloatArray]:
+        """The region as triangles, counter-clockwise, each shape (3, 2)."""
+        from shapely import Polygon, constrained_delaunay_triangles
+        from shapely.geometry.polygon import orient
+
+        triangles = constrained_delaunay_triangles(Polygon(self.polygon))
+        return [np.array(orient(t).exterior.coords)[:3] for t in triangles.geoms]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Require:
+    """Any function of the dimensions is below zero, or zero.
+
+    Attributes
+    ----------
+    function : callable
+        Of a namespace with the fields of `Linkage` (SI), in arithmetic and functions of `math`; it is traced, so that its
+        derivatives are exact.
+    equal : bool
+        Whether it is to be zero, instead of at most zero.
+    name : str
+        For messages.
+    scale : float
+        Magnitude of its values.
+    """
+
+    function: Callable[[Any], Any]
+    equal: bool = False
+    name: str = "required function"
+    scale: float = 1.0
+
+
+Constraint = LeastTransmission | FullTurn | Grashof | LargestLink | Assembly | PivotRegion | Require
+#: A least transmission angle of 40 degrees over a full turn.
+USUAL: tuple[Constraint, ...] = (LeastTransmission(),)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Limits:
+    """Bounds and constraints in normal form: lengths in units of the target's size, about its centre.
+
+    Attributes
+    ----------
+    low, high : ndarray, shape (11,)
+        Of `UNKNOWNS`.
+    transmission : float or None
+        Least transmission angle (rad), 0 where the crank is only to turn fully, None where nothing is asked.
+    over_turn : bool
+        Whether it holds over the turn or at the stations.
+    grashof : str or None
+    branches : tuple of int
+        Assemblies to be tried.
+    regions : tuple
+        (pivot, triangles of complex corners), in units.
+    requires : tuple of Require
+    """
+
+    low: FloatArray
+    high: FloatArray
+    transmission: float | None
+    over_turn: bool
+    grashof: str | None
+    branches: tuple[int, ...]
+    regions: tuple[tuple[str, tuple[FloatArray, ...]], ...]
+    requires: tuple[Require, ...]
+
+    @property
+    def bounds_only(self) -> bool:
+        """Whether nothing but bounds is asked, so that a least squares method can do it."""
+        return self.transmission is None and self.grashof is None and not self.regions and not self.requires
+
+    @property
+    def largest(self) -> float:
+        """The longest that any link may be (units)."""
+        return float(self.high[2:6].max())
+
+
+def limits_of(
+    task: Task, normal: Normal, bounds: Mapping[str, tuple[float, float]] | None, constraints: Sequence[Constraint]
+) -> Limits:
+    """Bounds and constraints of a task in normal form.
+
+    Raises
+    ------
+    ParameterError
+        If a bound's name is none of a dimension, or its ends are the wrong way round.
+    InfeasibleError
+        If they contradict one another.
+    """
+    bounds = dict(bounds or {})
+    names_of(bounds)
+    unit, origin = normal.unit, normal.origin
+    kinds = (LeastTransmission, FullTurn, Grashof, LargestLink, Assembly, PivotRegion, Require)
+    for c in constraints:
+        if not isinstance(c, kinds):
+            raise InputError(f"constraint {c!r} is none: use {', '.join(kind.__name__ for kind in kinds)}")
+    caps = [c.length for c in constraints if isinstance(c, LargestLink)]
+    function = isinstance(task, RockerFunction)
+    cap = min(caps, default=LARGEST * (GROUND if function else unit))
+    given: dict[str, tuple[float, float]] = {}
+    for name in UNKNOWNS:
+        if name in ("pivot_x", "pivot_y"):
+            middle = origin.real if name == "pivot_x" else origin.imag
+            usual = (middle - 4.0 * cap, middle + 4.0 * cap) if not function else (0.0, 0.0)
+        elif name in LINKS:
+            usual = (1e-3 * cap, cap)
+        elif name == "point_distance":
+            usual = (0.0, 0.0) if function else (0.0, cap)
+        elif name == "output_angle" and not normal.mounting:
+            usual = (0.0, 0.0)
+        else:
+            usual = (-4.0 * pi, 4.0 * pi)
+        if function and name in ("ground_angle", "point_angle"):
+            usual = (0.0, 0.0)
+        if function and name == "ground_length" and not caps and not set(LINKS) & set(bounds):
+            usual = (GROUND, GROUND)
+        low, high = _ordered(name, bounds[name]) if name in bounds else usual
+        if name in LINKS and high <= 0.0:
+            raise ParameterError(f"bound of {name}", high, "be above zero: a link has a length")
+        if name in LINKS or name == "point_distance":
+            if caps and low > cap:
+                raise InfeasibleError(
+                    f"{name} is to be at least {low:g} m, and no link longer than {cap:g} m: no linkage has both"
+                )
+            low, high = max(low, 1e-6 * cap if name in LINKS else 0.0), min(high, cap) if caps else high
+        given[name] = (low, high)
+    _check_links(given, constraints)
+    lows, highs = (np.array([given[name][end] for name in UNKNOWNS]) for end in (0, 1))
+    shift = np.zeros(len(UNKNOWNS))
+    shift[:2] = origin.real, origin.imag
+    scale = np.ones(len(UNKNOWNS))
+    scale[:7] = unit
+    angles = [c for c in constraints if isinstance(c, LeastTransmission)]
+    turns = [c for c in constraints if isinstance(c, FullTurn)]
+    types = {c.type for c in constraints if isinstance(c, Grashof)}
+    if len(types) > 1:
+        raise InfeasibleError(f"Grashof types {', '.join(sorted(types))} are asked for at once: a four-bar has one")
+    type_ = types.pop() if types else None
+    over_turn = bool(turns) or any(c.over == "turn" for c in angles) or type_ in ("crank-rocker", "drag-link")
+    if type_ in ("double-rocker", "rocker-crank", "triple-rocker") and over_turn:
+        raise InfeasibleError(f"the crank of a {type_} does not turn fully, which another constraint asks for")
+    branches = {c.branch for c in constraints if isinstance(c, Assembly)}
+    if len(branches) > 1:
+        raise InfeasibleError("both assemblies are asked for at once")
+    return Limits(
+        low=(lows - shift) / scale,
+        high=(highs - shift) / scale,
+        transmission=max((c.angle for c in angles), default=0.0 if over_turn else None),
+        over_turn=over_turn,
+        grashof=type_,
+        branches=tuple(branches) or (1, -1),
+        regions=tuple(
+            (c.pivot, tuple((piece - shift[:2]) / unit for piece in c.pieces()))
+            for c in constraints
+            if isinstance(c, PivotRegion)
+        ),
+        requires=tuple(c for c in constraints if isinstance(c, Require)),
+    )
+
+
+def _ordered(name: str, ends: tuple[float, float]) -> tuple[float, float]:
+    try:
+        low, high = (float(end) for end in ends)
+    except (TypeError, ValueError):
+        raise ParameterError(f"bounds of {name}", ends, "be two numbers, the least and the greatest value") from None
+    if np.isnan(low) or np.isnan(high) or not np.isfinite([low, high]).all():
+        raise ParameterError(f"bounds of {name}", ends, "be finite")
+    if low > high:
+        raise InfeasibleError(f"{name} is to be at least {low:g} and at most {high:g}: no value is")
+    return low, high
+
+
+def _check_links(given: Mapping[str, tuple[float, float]], constraints: Sequence[Constraint]) -> None:
+    """Make sure that bounds alone leave a linkage whose crank turns, where that is asked."""
+    if not any(isinstance(c, FullTurn) or (isinstance(c, LeastTransmission) and c.over == "turn") for c in constraints):
+        return
+    l1, l2, l3, l4 = (given[name] for name in LINKS)
+    # l1 + l2 <= l3 + l4 is needed for a full turn
+    if l1[0] + l2[0] > l3[1] + l4[1]:
+        raise InfeasibleError(
+            f"the crank cannot turn fully: ground link and crank are at least {l1[0] + l2[0]:g} m together, coupler and rocker "
+            f"at most {l3[1] + l4[1]:g} m"
+        )

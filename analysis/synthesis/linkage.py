@@ -1,0 +1,429 @@
+"""A linkage in the plane: the four-bar of the thesis's chapter VI, its rocker pivot fixed, sliding, or on a second crank.
+
+The coupler point is, with the thesis's symbols (appendix 5),
+
+    x = X0 + l2 cos(th2 + a1) + r cos(th3 + a1 + a2),   y alike with sines,   th2 = phi + th20,
+
+where phi is the crank's rotation from the start of the motion. Equation (6.17) as printed drops a1 in the second term.
+Angles th2, th3, th4 are those of the plant, from the ground link; a1 turns the whole linkage. Loop closure and derivatives are
+evaluated by `analysis.synthesis.kernels`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields, replace
+from math import cos, hypot, isfinite, pi, sin
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from linkwork.errors import AssemblyError, ParameterError
+from linkwork.five_bar.parameters import FiveBarParameters
+
+from ..fourier import FourierSeries
+from .kernels import PLACES, coupler_path, coupler_path_jacobian, link_directions, link_jacobian
+
+FloatArray = NDArray[np.float64]
+
+#: Of a linkage: what must be greater than zero, what is a length of any sign, what is an angle.
+LINKS = ("ground_length", "crank_length", "coupler_length", "rocker_length")
+LENGTHS = ("pivot_x", "pivot_y", *LINKS, "point_distance")
+ANGLES = ("ground_angle", "crank_phase", "point_angle", "output_angle")
+#: Crank rotations over which a full turn is looked at.
+TURN = 360
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SliderMotion:
+    """The rocker pivot D moves along a guide as a Fourier series of the crank's rotation.
+
+    Attributes
+    ----------
+    series : FourierSeries
+        u(phi) in m: its order is the number of harmonics.
+    guide_angle : float
+        alpha, the guide's direction from the ground link (rad).
+    """
+
+    series: FourierSeries
+    guide_angle: float = 0.0
+
+    def displacement(self, rotation: ArrayLike) -> tuple[FloatArray, FloatArray]:
+        """Displacement of D in the frame of the ground link (m)."""
+        u = self.series(rotation)
+        return u * cos(self.guide_angle), u * sin(self.guide_angle)
+
+    @property
+    def stroke(self) -> float:
+        """Distance between the ends of the slider's travel (m)."""
+        return float(np.ptp(self.series(np.linspace(0.0, 2.0 * pi, 1440, endpoint=False))))
+
+    def scaled(self, factor: float) -> SliderMotion:
+        """The motion of a linkage that is larger by the factor."""
+        return replace(self, series=self.series * factor)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SecondCrank:
+    """The rocker pivot D sits on a second crank, geared to the first or turned independently: a five-bar.
+
+    D = E + l5 exp(i psi) about the end E of the ground link, with psi = ratio phi + phase + series(phi).
+
+    Attributes
+    ----------
+    length : float
+        l5 (m).
+    ratio : float
+        Turns of the second crank for one of the first: a whole number, or the path does not close.
+    phase : float
+        psi at the start (rad).
+    series : FourierSeries
+        What is added to the geared rotation (rad): zero with gears.
+    """
+
+    length: float
+    ratio: float = 1.0
+    phase: float = 0.0
+    series: FourierSeries = field(default_factory=lambda: FourierSeries.constant(0.0))
+
+    def angle(self, rotation: ArrayLike) -> FloatArray:
+        """psi (rad)."""
+        phi = np.asarray(rotation, dtype=float)
+        value: FloatArray = self.ratio * phi + self.phase + self.series(phi)
+        return value
+
+    def displacement(self, rotation: ArrayLike) -> tuple[FloatArray, FloatArray]:
+        """Displacement of D in the frame of the ground link (m)."""
+        psi = self.angle(rotation)
+        return self.length * np.cos(psi), self.length * np.sin(psi)
+
+    def scaled(self, factor: float) -> SecondCrank:
+        """The motion of a linkage that is larger by the factor."""
+        return replace(self, length=self.length * factor)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Linkage:
+    """A four-bar with a coupler point, placed in the plane. Lengths in m, angles in rad.
+
+    Attributes
+    ----------
+    pivot_x, pivot_y : float
+        X0, Y0: the crank shaft A.
+    ground_length, crank_length, coupler_length, rocker_length : float
+        l1 ... l4.
+    point_distance, point_angle : float
+        r and a2: the coupler point from the crank pin B, and its direction from the coupler's.
+    ground_angle : float
+        a1: direction of the ground link, from A to the rocker pivot.
+    crank_phase : float
+        th20: crank angle from the ground link at the start of the motion.
+    output_angle : float
+        Mounting angle of what is read on the rocker, or carried by the coupler, from the link's own direction.
+    branch : int
+        Assembly: +1 with C to the left of B -> D, -1 to the right.
+    pivot : SliderMotion or SecondCrank, optional
+        What moves the rocker pivot; it is fixed without.
+
+    Raises
+    ------
+    ParameterError
+        If a value is not finite, a link not longer than zero, or the branch neither +1 nor -1.
+    """
+
+    pivot_x: float = 0.0
+    pivot_y: float = 0.0
+    ground_length: float
+    crank_length: float
+    coupler_length: float
+    rocker_length: float
+    point_distance: float = 0.0
+    ground_angle: float = 0.0
+    crank_phase: float = 0.0
+    point_angle: float = 0.0
+    output_angle: float = 0.0
+    branch: int = 1
+    pivot: SliderMotion | SecondCrank | None = None
+
+    def __post_init__(self) -> None:
+        for name in (*LENGTHS, *ANGLES):
+            value = float(getattr(self, name))
+            if not isfinite(value):
+                raise ParameterError(name, value, "be a finite number")
+            if name in LINKS and value <= 0.0:
+                raise ParameterError(name, value, "be greater than zero")
+            object.__setattr__(self, name, value)
+        if self.branch not in (1, -1):
+            raise ParameterError("branch", self.branch, "be +1 or -1")
+
+    @classmethod
+    def from_vector(cls, q: ArrayLike, branch: int = 1, **more: Any) -> Linkage:
+        """From the vector of `kernels.PLACES` (and the output angle as an eleventh, if it is there)."""
+        values = np.asarray(q, dtype=float)
+        return cls(**dict(zip((*PLACES, "output_angle"), values.tolist())), branch=branch, **more)
+
+    @property
+    def vector(self) -> FloatArray:
+        """The ten parameters in the order of `kernels.PLACES`."""
+        return np.array([getattr(self, name) for name in PLACES])
+
+    def values(self) -> dict[str, float]:
+        """Dimensions by name, without the pivot's motion (m, rad)."""
+        return {name: getattr(self, name) for name in (*LENGTHS, *ANGLES)} | {"branch": self.branch}
+
+    @property
+    def largest_link(self) -> float:
+        """The longest of the four links (m)."""
+        return max(self.ground_length, self.crank_length, self.coupler_length, self.rocker_length)
+
+    def displacement(self, rotation: ArrayLike) -> tuple[FloatArray, FloatArray]:
+        """Displacement of the rocker pivot from the end of the ground link, in the frame of that link (m)."""
+        if self.pivot is None:
+            zero = np.zeros(np.shape(rotation))
+            return zero, zero
+        return self.pivot.displacement(rotation)
+
+    def _arguments(
+        self, rotation: ArrayLike
+    ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray, float]:
+        phi = np.ascontiguousarray(rotation, dtype=float)
+        dx, dy = (np.ascontiguousarray(d) for d in self.displacement(phi))
+        return np.cos(phi), np.sin(phi), dx, dy, self.vector, float(self.branch)
+
+    def path(self, rotation: ArrayLike) -> FloatArray:
+        """Coupler point at rotations of the crank, shape (n, 2) in m; NaN where the links cannot be joined."""
+        out = np.empty((2, np.size(rotation)))
+        coupler_path(*self._arguments(rotation), out)
+        return out.T
+
+    def path_jacobian(self, rotation: ArrayLike) -> tuple[FloatArray, FloatArray]:
+        """Coupler point (n, 2), and its derivatives with respect to `kernels.COLUMNS`, shape (12, 2, n)."""
+        n = np.size(rotation)
+        out, jacobian = np.empty((2, n)), np.empty((12, 2, n))
+        coupler_path_jacobian(*self._arguments(rotation), out, jacobian)
+        return out.T, jacobian
+
+    def link_jacobian(self, rotation: ArrayLike) -> tuple[FloatArray, FloatArray]:
+        """Angles of coupler and rocker from the ground link (2, n), and their derivatives as in `path_jacobian`, (12, 2, n)."""
+        n = np.size(rotation)
+        out, jacobian = np.empty((2, n)), np.empty((12, 2, n))
+        link_jacobian(*self._arguments(rotation), out, jacobian)
+        return out, jacobian
+
+    def directions(self, rotation: ArrayLike) -> FloatArray:
+        """(c3, s3, c4, s4, c43, s43) of `kinematics.Position`, shape (6, n), in the frame of the ground link."""
+        out = np.empty((6, np.size(rotation)))
+        link_directions(*self._arguments(rotation), out)
+        return out
+
+    def coupler_angle(self, rotation: ArrayLike) -> FloatArray:
+        """Direction of the coupler in the plane, with the output angle (rad), continuous over the rotations."""
+        g = self.directions(rotation)
+        turned: FloatArray = np.unwrap(np.arctan2(g[1], g[0])) + self.ground_angle + self.output_angle
+        return turned
+
+    def rocker_angle(self, rotation: ArrayLike) -> FloatArray:
+        """th4 from the ground link, with the output angle (rad), continuous over the rotations (the thesis's th4)."""
+        g = self.directions(rotation)
+        turned: FloatArray = np.unwrap(np.arctan2(g[3], g[2])) + self.output_angle
+        return turned
+
+    def transmission(self, rotation: ArrayLike) -> FloatArray:
+        """Acute angle between coupler and rocker (rad), 0 at the limit of assembly; NaN where there is no joining."""
+        g = self.directions(rotation)
+        angle: FloatArray = np.arctan2(np.abs(g[5]), np.abs(g[4]))
+        return angle
+
+    def pins(self, rotation: float) -> dict[str, tuple[float, float]]:
+        """A, B, C, D, the end E of the ground link, and P in the plane (m) at one rotation of the crank.
+
+        Raises
+        ------
+        AssemblyError
+            If the links cannot be joined there.
+        """
+        g = self.directions([rotation])[:, 0]
+        if not np.isfinite(g).all():
+            raise AssemblyError(f"the links cannot be joined at a crank rotation of {rotation:.6g} rad")
+        turn = np.exp(1j * self.ground_angle)
+        a = complex(self.pivot_x, self.pivot_y)
+        dx, dy = (float(d[0]) for d in self.displacement([rotation]))
+        b = a + turn * self.crank_length * np.exp(1j * (rotation + self.crank_phase))
+        coupler = turn * complex(g[0], g[1])
+        places = {
+            "A": a,
+            "B": b,
+            "C": b + self.coupler_length * coupler,
+            "D": a + turn * complex(self.ground_length + dx, dy),
+            "E": a + turn * self.ground_length,
+            "P": b + self.point_distance * np.exp(1j * self.point_angle) * coupler,
+        }
+        return {name: (float(z.real), float(z.imag)) for name, z in places.items()}
+
+    def moved(self, x: float, y: float) -> Linkage:
+        """The same linkage elsewhere (m)."""
+        return replace(self, pivot_x=self.pivot_x + x, pivot_y=self.pivot_y + y)
+
+    def scaled(self, factor: float) -> Linkage:
+        """The linkage with every length, and the place of A, multiplied by the factor."""
+        lengths = {name: factor * getattr(self, name) for name in LENGTHS}
+        return replace(self, **lengths, pivot=None if self.pivot is None else self.pivot.scaled(factor))
+
+    @property
+    def grashof(self) -> str:
+        """Type of the four-bar by Grashof's criterion, the rocker pivot at the end of the ground link.
+
+        One of crank-rocker, drag-link (both turn), double-rocker (the coupler turns), rocker-crank (the rocker turns, the crank
+        does not), triple-rocker, change-point.
+        """
+        lengths = {name: getattr(self, name) for name in LINKS}
+        shortest = min(lengths, key=lambda name: lengths[name])
+        excess = 2.0 * (min(lengths.values()) + max(lengths.values())) - sum(lengths.values())
+        if abs(excess) <= 1e-12 * sum(lengths.values()):
+            return "change-point"
+        if excess > 0.0:
+            return "triple-rocker"
+        return {
+            "ground_length": "drag-link",
+            "crank_length": "crank-rocker",
+            "coupler_length": "double-rocker",
+            "rocker_length": "rocker-crank",
+        }[shortest]
+
+    def transmission_range(self) -> tuple[float, float]:
+        """Least and greatest angle between coupler and rocker at C over a turn (rad), in [0, pi].
+
+        With a fixed pivot it is at its extremes with the crank along the ground link; with a moving one it is looked for over
+        `TURN` rotations. Where the crank cannot turn fully the extremes are 0 or pi.
+        """
+        l3, l4 = self.coupler_length, self.rocker_length
+        if self.pivot is None:
+            d = np.array([abs(self.ground_length - self.crank_length), self.ground_length + self.crank_length])
+        else:
+            phi = np.linspace(0.0, 2.0 * pi, TURN, endpoint=False)
+            dx, dy = self.displacement(phi)
+            th2 = phi + self.crank_phase
+            d = np.hypot(
+                self.ground_length + dx - self.crank_length * np.cos(th2), dy - self.crank_length * np.sin(th2)
+            )
+        cosine = np.clip((l3 * l3 + l4 * l4 - d * d) / (2.0 * l3 * l4), -1.0, 1.0)
+        angle = np.arccos(cosine)
+        return float(angle.min()), float(angle.max())
+
+    @property
+    def least_transmission(self) -> float:
+        """Least deviation of the transmission angle from 0 and pi over a turn (rad); 0 where the crank cannot turn fully."""
+        low, high = self.transmission_range()
+        return min(low, pi - high)
+
+    @property
+    def turns_fully(self) -> bool:
+        """Whether the crank can turn fully, the pivot moving as it does."""
+        return self.least_transmission > 0.0
+
+    def to_five_bar(
+        self,
+        *,
+        density: float = 7850.0,
+        section: tuple[float, float] = (0.02, 0.005),
+        slider_mass: float | None = None,
+        slider_stiffness: float = 0.0,
+        slider_damping: float = 0.0,
+        slider_coulomb_friction: float = 0.0,
+        gravity: float = 9.81,
+    ) -> FiveBarParameters:
+        """Parameters of the plant and its FMU, with masses from density and section.
+
+        Crank and rocker are bars of a rectangular section between their pins; the coupler is one from B to C and, where the
+        coupler point is off that line, a second from B to P. The plant's x axis is the ground link: gravity comes at the
+        linkage's own inclination. A fixed rocker pivot becomes a slider held by a spring: give it one, or hold it by force.
+
+        Parameters
+        ----------
+        density : float
+            kg/m3; steel by default.
+        section : (float, float)
+            Width in the plane and thickness of every bar (m).
+        slider_mass : float, optional
+            kg; by default that of a block of four widths by two widths by four thicknesses.
+        slider_stiffness, slider_damping, slider_coulomb_friction, gravity : float
+            As in `FiveBarParameters`.
+
+        Raises
+        ------
+        ParameterError
+            If density or section are not greater than zero, or the pivot is on a second crank.
+        """
+        width, thickness = section
+        for name, value in (("density", density), ("section width", width), ("section thickness", thickness)):
+            if not (isfinite(value) and value > 0.0):
+                raise ParameterError(name, value, "be a finite number greater than zero")
+        if isinstance(self.pivot, SecondCrank):
+            raise ParameterError("pivot", self.pivot, "be fixed or a slider: the plant has no second crank")
+        line = density * width * thickness
+
+        def bar(length: float) -> tuple[float, float]:
+            """Mass, and moment of inertia about the centre."""
+            mass = line * length
+            return mass, mass * (length * length + width * width) / 12.0
+
+        m2, i2 = bar(self.crank_length)
+        m4, i4 = bar(self.rocker_length)
+        m3, i3 = bar(self.coupler_length)
+        x, y = 0.5 * self.coupler_length, 0.0
+        r = self.point_distance
+        if r > 0.0 and abs(sin(self.point_angle)) * r > 1e-9 * self.coupler_length:
+            extra, inertia = bar(r)
+            px, py = 0.5 * r * cos(self.point_angle), 0.5 * r * sin(self.point_angle)
+            total = m3 + extra
+            gx, gy = (m3 * x + extra * px) / total, (m3 * y + extra * py) / total
+            i3 = i3 + m3 * ((x - gx) ** 2 + (y - gy) ** 2) + inertia + extra * ((px - gx) ** 2 + (py - gy) ** 2)
+            m3, x, y = total, gx, gy
+        elif r > 0.0:
+            # along the coupler: one bar over all of it
+            end = r * cos(self.point_angle)
+            low, high = min(0.0, end), max(self.coupler_length, end)
+            m3, i3 = bar(high - low)
+            x = 0.5 * (low + high)
+        return FiveBarParameters(
+            ground_length=self.ground_length,
+            crank_length=self.crank_length,
+            coupler_length=self.coupler_length,
+            rocker_length=self.rocker_length,
+            crank_mass=m2,
+            coupler_mass=m3,
+            rocker_mass=m4,
+            slider_mass=density * 32.0 * width * width * thickness if slider_mass is None else slider_mass,
+            crank_inertia=i2 + m2 * (0.5 * self.crank_length) ** 2,
+            coupler_inertia=i3,
+            rocker_inertia=i4,
+            crank_cog_distance=0.5 * self.crank_length,
+            coupler_cog_distance=hypot(x, y),
+            coupler_cog_angle=float(np.arctan2(y, x)),
+            rocker_cog_distance=0.5 * self.rocker_length,
+            slider_guide_angle=0.0 if self.pivot is None else self.pivot.guide_angle,
+            slider_stiffness=slider_stiffness,
+            slider_damping=slider_damping,
+            slider_coulomb_friction=slider_coulomb_friction,
+            coupler_point_distance=r,
+            coupler_point_angle=self.point_angle,
+            gravity=gravity,
+            ground_inclination=self.ground_angle,
+            assembly_branch=self.branch,
+        )
+
+
+def names_of(values: Mapping[str, Any]) -> None:
+    """Make sure that these are names of a linkage's dimensions.
+
+    Raises
+    ------
+    ParameterError
+        If one is not.
+    """
+    known = {f.name for f in fields(Linkage)} - {"branch", "pivot"}
+    for name in values:
+        if name not in known:
+            raise ParameterError(name, values[name], f"have the name of a dimension: {', '.join(sorted(known))}")

@@ -1,0 +1,305 @@
+"""From starts to optima: SciPy's least squares where bounds are all that is asked, IPOPT where there are inequalities.
+
+Both have exact Jacobians. An untimed path whose quality is an area is first fitted by least squares, the crank rotations of its
+stations among the unknowns, and then by the area itself, whose absolute value is sharpened step by step.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from math import inf, pi
+
+import joblib
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import least_squares
+
+from linkwork.errors import InputError
+
+from ..simulate import interruptible, shown
+from .constraints import Limits
+from .kernels import coupler_path_jacobian, link_jacobian
+from .program import Answer, PivotUnknown, Program, Start
+from .tasks import Normal
+
+FloatArray = NDArray[np.float64]
+
+#: Sharpness of the area's absolute value, as shares of the root mean square distance that least squares left.
+BLURS = (0.3, 0.03)
+#: How many of the fitted paths go on to the area.
+AREAS = 6
+#: Share of the quality below which points count as met exactly (units squared).
+EXACT = 1e-14
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Polished:
+    """What became of starts: answers that keep every constraint, best first, and the others."""
+
+    kept: tuple[Answer, ...]
+    others: tuple[Answer, ...]
+    done: int
+    interrupted: bool
+
+
+def polish(
+    normal: Normal,
+    limits: Limits,
+    starts: Sequence[Start],
+    *,
+    pivot: PivotUnknown | None = None,
+    n_jobs: int = 1,
+    progress: bool = False,
+) -> Polished:
+    """Go from every start to an optimum. On Ctrl-C what was done is returned, marked as interrupted.
+
+    Raises
+    ------
+    InputError
+        If there are no cores.
+    MissingLibraryError
+        If there are inequalities and CasADi is not installed.
+    """
+    if n_jobs == 0:
+        raise InputError("0 cores: it must be a number of them, or -1 for all")
+    cores = joblib.effective_n_jobs(n_jobs)
+    size = 1 if cores == 1 else max(1, -(-len(starts) // (3 * cores)))
+    batches = [starts[k : k + size] for k in range(0, len(starts), size)]
+    answers: dict[int, list[Answer]] = {}
+    with interruptible() as interrupted, shown(progress, float(len(batches)), "polish") as show:
+        if cores == 1:
+            worker = Polisher(normal, limits, pivot)
+            for number, batch in enumerate(batches):
+                answers[number] = [worker.fit(start) for start in batch]
+                show(float(number + 1))
+                if interrupted:
+                    break
+        else:
+            tasks = (joblib.delayed(_batch)(normal, limits, pivot, k, batch) for k, batch in enumerate(batches))
+            results = joblib.Parallel(n_jobs=cores, return_as="generator_unordered")(tasks)
+            try:
+                for number, part in results:
+                    answers[number] = part
+                    show(float(len(answers)))
+                    if interrupted:
+                        break
+            except KeyboardInterrupt:  # of a worker
+                interrupted.append(True)
+            finally:
+                with warnings.catch_warnings():
+                    warnings.filterwarnings("ignore", message=".*still being processed", category=UserWarning)
+                    results.close()
+    found = [answer for number in sorted(answers) for answer in answers[number]]
+    kept = sorted((a for a in found if a.feasible), key=lambda a: a.start.quality)
+    if normal.normals is not None and not interrupted:
+        best = distinct(kept, AREAS)
+        worker = Polisher(normal, limits, pivot)
+        kept = sorted((worker.area(a) for a in best), key=lambda a: a.start.quality)
+    return Polished(
+        kept=tuple(kept),
+        others=tuple(a for a in found if not a.feasible),
+        done=len(found),
+        interrupted=bool(interrupted),
+    )
+
+
+def _batch(
+    normal: Normal, limits: Limits, pivot: PivotUnknown | None, number: int, starts: Sequence[Start]
+) -> tuple[int, list[Answer]]:
+    worker = Polisher(normal, limits, pivot)
+    return number, [worker.fit(start) for start in starts]
+
+
+def distinct(answers: Sequence[Answer], count: int, apart: float = 1e-3) -> list[Answer]:
+    """The first answers that are different linkages: in their links, as shares of the longest, and their point and pivot."""
+    chosen: list[Answer] = []
+    marks: list[FloatArray] = []
+    for answer in answers:
+        q = answer.start.q
+        largest = q[2:7].max()
+        v = answer.start.pivot
+        mark = np.concatenate([q[:7] / largest, np.cos(q[7:]), np.sin(q[7:]), v / largest])
+        # the start of an untimed path's rotation is no dimension
+        if answer.start.rotation is not None:
+            mark[[8, 12]] = 0.0
+        mirror = [3.0 * answer.start.branch]
+        mark = np.concatenate([mark, mirror])
+        if any(np.abs(mark - other).max() < apart for other in marks):
+            continue
+        marks.append(mark)
+        chosen.append(answer)
+        if len(chosen) == count:
+            break
+    return chosen
+
+
+class Polisher:
+    """Fits starts to one task; its programs are built when they are first needed."""
+
+    def __init__(self, normal: Normal, limits: Limits, pivot: PivotUnknown | None) -> None:
+        self.normal, self.limits, self.pivot = normal, limits, pivot
+        self.by_least_squares = limits.bounds_only and pivot is None and normal.straight is None
+        self._programs: dict[str, Program] = {}
+
+    def program(self, objective: str) -> Program:
+        """The program with this objective."""
+        if objective not in self._programs:
+            self._programs[objective] = Program(self.normal, self.limits, self.pivot, objective)  # type: ignore[arg-type]
+        return self._programs[objective]
+
+    def fit(self, start: Start) -> Answer:
+        """The optimum of the squared errors from a start; where points are met exactly, of the transmission angle."""
+        if self.by_least_squares:
+            answer = fit_least_squares(self.normal, self.limits, start)
+        else:
+            answer = self.program("squares").solve(start)
+        if self.normal.exact and answer.feasible and answer.start.quality < EXACT:
+            met = self.program("transmission").solve(answer.start)
+            if met.feasible:
+                return replace(met, start=replace(met.start, quality=quality_of(self.normal, met.start)))
+        return answer
+
+    def area(self, answer: Answer) -> Answer:
+        """From the least squares of an untimed path to its least area."""
+        program = self.program("area")
+        distance = max((answer.start.quality / self.normal.n) ** 0.5, 1e-9)
+        now = answer
+        for blur in BLURS:
+            following = program.solve(now.start, blur=blur * distance, gain=1.0 / distance)
+            if not following.feasible:
+                break
+            now = following
+        if now is answer:
+            area = float((self.normal.weights * self.normal.arc * _distances(self.normal, answer.start)).sum())
+            return replace(answer, start=replace(answer.start, quality=area))
+        return now
+
+
+# Least squares
+
+
+def residuals(
+    normal: Normal, branch: int, q: FloatArray, rotation: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Weighted residuals of a linkage with a fixed pivot at crank rotations, in normal form.
+
+    Returns
+    -------
+    residual : ndarray, shape (m,)
+        x, then y, then angle, as far as the task has them, n of each.
+    jacobian : ndarray, shape (m, 11)
+        With respect to `constraints.UNKNOWNS`.
+    rate : ndarray, shape (m,)
+        With respect to the crank rotation at the residual's own station.
+    """
+    n = normal.n
+    c, s, zero = np.cos(rotation), np.sin(rotation), np.zeros(n)
+    root = np.sqrt(normal.weights)
+    parts, jacobians, rates = [], [], []
+    if normal.points is not None:
+        out, jacobian = np.empty((2, n)), np.empty((12, 2, n))
+        coupler_path_jacobian(c, s, zero, zero, q[:10], float(branch), out, jacobian)
+        for axis, wanted in enumerate((normal.points.real, normal.points.imag)):
+            parts.append(root * (out[axis] - wanted))
+            jacobians.append(root[:, None] * np.column_stack([jacobian[:10, axis].T, np.zeros(n)]))
+            # a rotation of the crank is a change of its phase
+            rates.append(root * jacobian[8, axis])
+    if normal.angle is not None:
+        out, jacobian = np.empty((2, n)), np.empty((12, 2, n))
+        link_jacobian(c, s, zero, zero, q[:10], float(branch), out, jacobian)
+        which = 1 if normal.of_rocker else 0
+        turned = 0.0 if normal.of_rocker else q[7]
+        left = out[which] + turned + q[10] - normal.angle
+        own = np.column_stack([jacobian[:10, which].T, np.ones(n)])
+        own[:, 7] += 0.0 if normal.of_rocker else 1.0
+        factor = normal.leverage * root
+        parts.append(factor * ((left + pi) % (2.0 * pi) - pi))
+        jacobians.append(factor[:, None] * own)
+        rates.append(factor * jacobian[8, which])
+    return np.concatenate(parts), np.concatenate(jacobians), np.concatenate(rates)
+
+
+def quality_of(normal: Normal, start: Start) -> float:
+    """Sum of weighted squared errors of a start with a fixed pivot; infinite where the links cannot be joined."""
+    rotation = normal.rotation if start.rotation is None else start.rotation
+    assert rotation is not None
+    residual = residuals(normal, start.branch, start.q, rotation)[0]
+    value = float(residual @ residual)
+    return value if np.isfinite(value) else inf
+
+
+def _distances(normal: Normal, start: Start) -> FloatArray:
+    rotation = normal.rotation if start.rotation is None else start.rotation
+    assert rotation is not None
+    part = residuals(replace(normal, weights=np.ones(normal.n)), start.branch, start.q, rotation)[0]
+    distances: FloatArray = np.hypot(part[: normal.n], part[normal.n : 2 * normal.n])
+    return distances
+
+
+def fit_least_squares(normal: Normal, limits: Limits, start: Start) -> Answer:
+    """SciPy's trust region reflective method on bounds, with the exact Jacobian of the compiled kernels."""
+    free = np.nonzero(limits.high > limits.low)[0]
+    timed, n = normal.timed, normal.n
+    base = np.clip(start.q, limits.low, limits.high)
+    low, high = limits.low[free], limits.high[free]
+    x0 = base[free]
+    # strictly inside, as the method asks
+    x0 = np.clip(x0, low + 1e-9 * (high - low), high - 1e-9 * (high - low))
+    rotation0 = normal.rotation if timed else start.rotation
+    if rotation0 is None:
+        raise InputError("the start of an untimed task needs the crank rotations of its stations")
+    if not timed:
+        x0 = np.append(x0, rotation0)
+        low, high = np.append(low, np.full(n, -inf)), np.append(high, np.full(n, inf))
+    size = len(free)
+    blocks = (normal.points is not None) * 2 + (normal.angle is not None)
+
+    def unpacked(x: FloatArray) -> tuple[FloatArray, FloatArray]:
+        q = base.copy()
+        q[free] = x[:size]
+        return q, rotation0 if timed else x[size:]
+
+    def value(x: FloatArray) -> FloatArray:
+        residual = residuals(normal, start.branch, *unpacked(x))[0]
+        # beyond the limit of assembly: farther than anything, so that the step is shortened
+        return residual if np.isfinite(residual).all() else np.full(len(residual), 1e3)
+
+    def derivative(x: FloatArray) -> FloatArray:
+        _, jacobian, rate = residuals(normal, start.branch, *unpacked(x))
+        columns = jacobian[:, free]
+        if timed:
+            return columns
+        own = np.zeros((blocks * n, n))
+        for block in range(blocks):
+            own[np.arange(block * n, (block + 1) * n), np.arange(n)] = rate[block * n : (block + 1) * n]
+        return np.hstack([columns, own])
+
+    if not np.isfinite(residuals(normal, start.branch, *unpacked(x0))[0]).all():
+        return Answer(
+            start=replace(start, quality=inf),
+            feasible=False,
+            converged=False,
+            violation=inf,
+            worst="loop closure",
+            status="the links cannot be joined at the start",
+            iterations=0,
+        )
+    result = least_squares(
+        value, x0, jac=derivative, bounds=(low, high), x_scale="jac", xtol=1e-12, ftol=1e-13, gtol=1e-13, max_nfev=400
+    )
+    q, rotation = unpacked(result.x)
+    ordered = timed or bool(np.all(np.sign(np.diff(rotation)) == np.sign(rotation[-1] - rotation[0])))
+    ordered = ordered and abs(rotation[-1] - rotation[0]) <= 2.0 * pi + 1e-9
+    ended = replace(start, q=q, rotation=None if timed else rotation)
+    quality = quality_of(normal, ended)
+    return Answer(
+        start=replace(ended, quality=quality),
+        feasible=bool(np.isfinite(quality)) and ordered,
+        converged=bool(result.success),
+        violation=0.0 if ordered else inf,
+        worst="" if ordered else "order of the stations",
+        status=str(result.message),
+        iterations=int(result.nfev),
+    )

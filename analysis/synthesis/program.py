@@ -1,0 +1,631 @@
+"""The nonlinear program of a synthesis: exact derivatives by CasADi, solved by IPOPT.
+
+Loop closure is that of the plant, traced (`analysis.symbolic`). The program is stated in normal form (`tasks.Normal`,
+`constraints.Limits`); what a start decides - assembly, direction of travel, which triangle of a region, which link is the
+shortest - comes as parameters, so that one program serves all starts.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from math import cos, inf, isfinite, pi
+from types import FunctionType, ModuleType, SimpleNamespace
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from linkwork.errors import InputError, ParameterError
+
+from .. import symbolic
+from ..fourier import FourierSeries
+from .constraints import UNKNOWNS, Limits, Require
+from .linkage import Linkage, SecondCrank, SliderMotion
+from .tasks import Normal
+
+FloatArray = NDArray[np.float64]
+Objective = Literal["squares", "area", "transmission"]
+
+#: Least transmission angle at which a crank still counts as turning fully (rad).
+TURNING = 0.002
+#: Crank rotations at which a moving pivot's assembly, speed and acceleration are held within their limits.
+GRID = 72
+#: How IPOPT follows its barrier: freely from a start that is only near, with care from one that a first solution gave.
+FOLLOWING: dict[str, dict[str, Any]] = {
+    "squares": {"mu_strategy": "adaptive"},
+    "transmission": {"mu_strategy": "adaptive"},
+    "area": {"mu_strategy": "monotone", "mu_init": 1e-5, "bound_push": 1e-8, "bound_frac": 1e-8},
+}
+#: Least rotation of the crank from one untimed station to the next, as a share of an even one.
+ADVANCE = 1e-3
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SliderUnknown:
+    """A slider whose motion is sought: a Fourier series with this many harmonics.
+
+    Attributes
+    ----------
+    harmonics : int
+        0 is a slider set once.
+    guide_angle : (float, float)
+        Bounds (rad); equal ones fix it.
+    stroke : float
+        Greatest distance between the ends of its travel (m).
+    speed, acceleration : float
+        Greatest |du/dphi| (m/rad) and |d2u/dphi2| (m/rad2).
+    smoothness : float
+        Weight of the mean of (d2u/dphi2)^2 (1/rad4) added to the quality: trades error for smoothness.
+    """
+
+    harmonics: int
+    guide_angle: tuple[float, float] = (-pi, pi)
+    stroke: float = inf
+    speed: float = inf
+    acceleration: float = inf
+    smoothness: float = 0.0
+
+    def __post_init__(self) -> None:
+        if self.harmonics < 0:
+            raise ParameterError("harmonics", self.harmonics, "be zero or greater")
+        low, high = self.guide_angle
+        if not (isfinite(low) and isfinite(high) and low <= high):
+            raise ParameterError("bounds of guide_angle", self.guide_angle, "be two finite angles in order (rad)")
+        for name in ("stroke", "speed", "acceleration"):
+            if not getattr(self, name) > 0.0:
+                raise ParameterError(f"greatest {name}", getattr(self, name), "be greater than zero")
+        if not (isfinite(self.smoothness) and self.smoothness >= 0.0):
+            raise ParameterError("smoothness", self.smoothness, "be a finite number, zero or greater")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CrankUnknown:
+    """A second crank whose length, phase and, with ``harmonics``, independent rotation are sought.
+
+    Attributes
+    ----------
+    ratio : int
+        Turns for one of the first crank.
+    length : (float, float)
+        Bounds (m).
+    harmonics : int
+        Of the rotation added to the geared one; 0 of gears.
+    speed : float
+        Greatest deviation of d psi/d phi from the ratio.
+    """
+
+    ratio: int
+    length: tuple[float, float]
+    harmonics: int = 0
+    speed: float = inf
+
+    def __post_init__(self) -> None:
+        low, high = self.length
+        if not (isfinite(low) and isfinite(high) and 0.0 < low <= high):
+            raise ParameterError("bounds of the second crank", self.length, "be two lengths above zero, in order (m)")
+        if self.harmonics < 0 or self.ratio != int(self.ratio):
+            raise ParameterError(
+                "second crank", (self.ratio, self.harmonics), "have whole numbers of turns and harmonics"
+            )
+
+
+PivotUnknown = SliderUnknown | CrankUnknown
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Start:
+    """Where a search starts, or ends, in normal form.
+
+    Attributes
+    ----------
+    q : ndarray, shape (11,)
+        Of `constraints.UNKNOWNS`.
+    branch : int
+    pivot : ndarray
+        Unknowns of the moved pivot: guide angle, mean, cosines and sines in turn; or length, phase, cosines and sines.
+    rotation : ndarray, shape (n,), or None
+        Crank rotations of the stations where they are unknown.
+    quality : float
+        In units squared.
+    """
+
+    q: FloatArray
+    branch: int
+    quality: float = inf
+    pivot: FloatArray = field(default_factory=lambda: np.empty(0))
+    rotation: FloatArray | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Answer:
+    """What IPOPT says: where it ended, whether that satisfies every constraint, which it violates most, and its own word."""
+
+    start: Start
+    feasible: bool
+    converged: bool
+    violation: float
+    worst: str
+    status: str
+    iterations: int
+
+
+class Program:
+    """A synthesis as a nonlinear program.
+
+    Parameters
+    ----------
+    normal : Normal
+    limits : Limits
+    pivot : PivotUnknown, optional
+        Lengths in m, as the task; None of a fixed pivot.
+    objective : "squares", "area" or "transmission"
+        Weighted squared errors; the area between the curves, smoothed by ``blur`` of `solve`; or the least transmission angle,
+        greatest, with the stations met exactly.
+    """
+
+    def __init__(
+        self, normal: Normal, limits: Limits, pivot: PivotUnknown | None = None, objective: Objective = "squares"
+    ) -> None:
+        self.normal, self.limits, self.pivot, self.objective = normal, limits, pivot, objective
+        casadi = symbolic.library()
+        self._casadi = casadi
+        SX = casadi.SX
+        n = normal.n
+        q = SX.sym("q", len(UNKNOWNS))
+        z = [q]
+        low, high = [limits.low], [limits.high]
+        self._constraints: list[tuple[Any, float, float, str]] = []
+        # parameters: branch, direction, blur, factor of the objective, rows of Grashof's type, half-planes of the regions
+        branch, direction, blur, gain = (SX.sym(name) for name in ("branch", "direction", "blur", "gain"))
+        grashof = SX.sym("grashof", 6, 4)
+        planes = [SX.sym(f"plane{k}", 3, 3) for k in range(len(limits.regions))]
+        # unknowns of the pivot
+        size = _size(pivot)
+        v = SX.sym("v", size)
+        v_low, v_high = _pivot_bounds(pivot, normal.unit)
+        z.append(v)
+        low.append(v_low)
+        high.append(v_high)
+        # crank rotations
+        if normal.timed:
+            phi: Any = casadi.DM(normal.rotation)
+        else:
+            phi = SX.sym("phi", n)
+            z.append(phi)
+            low.append(np.full(n, -inf))
+            high.append(np.full(n, inf))
+            self._ordered(phi, direction)
+        p = SimpleNamespace(**{name: q[k] for k, name in enumerate(UNKNOWNS)})
+        g, point = self._closed(p, v, phi, branch)
+        quality = self._quality(p, g, point, phi, blur, z, low, high)
+        cosine: Any = cos(max(limits.transmission or 0.0, TURNING))
+        if objective == "transmission":
+            tilt = SX.sym("tilt")
+            z.append(tilt)
+            low.append(np.zeros(1))
+            high.append(np.array([cosine]))
+            cosine = tilt
+            quality = tilt + 1e-3 * casadi.sumsqr(q[2:6])
+        self._assembled(p, v, phi, cosine)
+        if limits.grashof:
+            self._at_most(casadi.mtimes(grashof, q[2:6]), f"Grashof type {limits.grashof}")
+        for (name, _), plane in zip(limits.regions, planes):
+            x, y = p.pivot_x, p.pivot_y
+            if name == "D":
+                x, y = (
+                    x + p.ground_length * casadi.cos(p.ground_angle),
+                    y + p.ground_length * casadi.sin(p.ground_angle),
+                )
+            self._at_most(casadi.mtimes(plane, casadi.vertcat(x, y, 1.0)), f"region of pivot {name}")
+        for require in limits.requires:
+            value = traced(require, self._physical(p)) / require.scale
+            self._within(value, 0.0 if require.equal else -inf, 0.0, require.name)
+        if isinstance(pivot, SliderUnknown):
+            quality = quality + self._slider(pivot, v, z, low, high)
+        if isinstance(pivot, CrankUnknown) and isfinite(pivot.speed):
+            x = casadi.DM(np.linspace(0.0, 2.0 * pi, GRID, endpoint=False))
+            rate = _series(casadi, v[2:], x, mean=False, order=1)
+            self._within(rate, -pivot.speed, pivot.speed, "speed of the second crank")
+        parameters = casadi.vertcat(
+            branch, direction, blur, gain, casadi.vec(grashof), *(casadi.vec(x) for x in planes)
+        )
+        self.low, self.high = np.concatenate(low), np.concatenate(high)
+        self._g_low = np.concatenate([np.full(e.numel(), a) for e, a, _, _ in self._constraints] or [np.empty(0)])
+        self._g_high = np.concatenate([np.full(e.numel(), b) for e, _, b, _ in self._constraints] or [np.empty(0)])
+        self._labels = [name for e, _, _, name in self._constraints for _ in range(e.numel())]
+        g_all = casadi.vertcat(*(casadi.vec(e) for e, _, _, _ in self._constraints)) if self._constraints else SX(0, 1)
+        self._nlp = {"x": casadi.vertcat(*z), "f": gain * quality, "g": g_all, "p": parameters}
+        self._extra = self._nlp["x"].numel() - len(UNKNOWNS) - size - (0 if normal.timed else n)
+
+    # Objective
+
+    def _closed(self, p: Any, v: Any, phi: Any, branch: Any) -> tuple[Any, Any]:
+        """Directions of the links and the coupler point (x, y) at rotations, by the plant's own loop closure."""
+        casadi = self._casadi
+        c2, s2 = casadi.cos(phi + p.crank_phase), casadi.sin(phi + p.crank_phase)
+        dx, dy = self._displacement(v, phi)
+        g = symbolic.plant().joined(
+            c2,
+            s2,
+            p.ground_length + dx - p.crank_length * c2,
+            dy - p.crank_length * s2,
+            p.coupler_length,
+            p.rocker_length,
+            branch,
+        )
+        ca, sa = casadi.cos(p.ground_angle), casadi.sin(p.ground_angle)
+        px = p.point_distance * casadi.cos(p.ground_angle + p.point_angle)
+        py = p.point_distance * casadi.sin(p.ground_angle + p.point_angle)
+        x = p.pivot_x + p.crank_length * (ca * c2 - sa * s2) + px * g.c3 - py * g.s3
+        y = p.pivot_y + p.crank_length * (sa * c2 + ca * s2) + py * g.c3 + px * g.s3
+        return g, (x, y)
+
+    def _displacement(self, v: Any, phi: Any) -> tuple[Any, Any]:
+        casadi = self._casadi
+        if self.pivot is None:
+            return 0.0, 0.0
+        if isinstance(self.pivot, SliderUnknown):
+            u = _series(casadi, v[1:], phi)
+            return u * casadi.cos(v[0]), u * casadi.sin(v[0])
+        psi = self.pivot.ratio * phi + v[1] + _series(casadi, v[2:], phi, mean=False)
+        return v[0] * casadi.cos(psi), v[0] * casadi.sin(psi)
+
+    def _quality(
+        self, p: Any, g: Any, point: Any, phi: Any, blur: Any, z: list[Any], low: list[Any], high: list[Any]
+    ) -> Any:
+        """The quality function; with it the constraints that belong to it."""
+        casadi, normal = self._casadi, self.normal
+        weights = casadi.DM(normal.weights)
+        quality: Any = 0.0
+        ex: Any = None
+        ey: Any = None
+        if normal.points is not None:
+            ex, ey = point[0] - casadi.DM(normal.points.real), point[1] - casadi.DM(normal.points.imag)
+        turned: Any = None
+        if normal.angle is not None:
+            c, s = (g.c4, g.s4) if normal.of_rocker else (g.c3, g.s3)
+            wanted = casadi.DM(normal.angle) - p.output_angle - (0.0 if normal.of_rocker else p.ground_angle)
+            ct, st = casadi.cos(wanted), casadi.sin(wanted)
+            # the difference of the angles, without a jump at half a turn
+            turned = casadi.atan2(s * ct - c * st, c * ct + s * st)
+        if self.objective == "transmission":
+            for value in (ex, ey, turned):
+                if value is not None:
+                    self._within(value, 0.0, 0.0, "the stations")
+            return quality
+        normals = normal.normals
+        if normals is not None:
+            across = ex * casadi.DM(normals.real) + ey * casadi.DM(normals.imag)
+            along = ex * casadi.DM(normals.imag) - ey * casadi.DM(normals.real)
+        if self.objective == "area":
+            # the strip between the curves, station by station along the target's normals
+            self._within(along, 0.0, 0.0, "stations on their normals")
+            quality = casadi.sum1(weights * casadi.DM(normal.arc) * (casadi.sqrt(across**2 + blur**2) - blur))
+        else:
+            if ex is not None:
+                quality = casadi.sum1(weights * (ex**2 + ey**2))
+            if turned is not None:
+                quality = quality + normal.leverage**2 * casadi.sum1(weights * turned**2)
+        straight = normal.straight
+        if straight is not None:
+            part = slice(straight.start, straight.end + 1)
+            line = normal.points[straight.end] - normal.points[straight.start]  # type: ignore[index]
+            line /= abs(line)
+            off = (ey * line.real - ex * line.imag)[part]
+            spent = phi[straight.end] - phi[straight.start]
+            self._within(spent, -straight.rotation, straight.rotation, "crank rotation of the straight part")
+            if straight.flatness is None:
+                quality = quality + (straight.weight - 1.0) * casadi.sumsqr(off)
+            else:
+                level = casadi.SX.sym("level")
+                z.append(level)
+                low.append(np.array([-inf]))
+                high.append(np.array([inf]))
+                half = 0.5 * straight.flatness
+                self._within(off - level, -half, half, "flatness of the straight part")
+        return quality
+
+    # Constraints
+
+    def _within(self, value: Any, low: float, high: float, name: str) -> None:
+        self._constraints.append((value, low, high, name))
+
+    def _at_most(self, value: Any, name: str) -> None:
+        self._within(value, -inf, 0.0, name)
+
+    def _ordered(self, phi: Any, direction: Any) -> None:
+        """The stations come one after the other, within a turn."""
+        n = self.normal.n
+        least = ADVANCE * 2.0 * pi / n
+        steps = direction * (phi[1:] - phi[:-1])
+        self._within(steps, least, inf, "order of the stations")
+        total = direction * (phi[n - 1] - phi[0])
+        self._within(total, -inf, 2.0 * pi - (least if self.normal.closed else 0.0), "stations within a turn")
+
+    def _assembled(self, p: Any, v: Any, phi: Any, cosine: Any) -> None:
+        """The transmission angle keeps its distance: |cos mu| <= cosine, written without division.
+
+        With a fixed pivot the extremes over a turn are where the crank lies along the ground link.
+        """
+        casadi, limits = self._casadi, self.limits
+        if limits.transmission is None and self.objective != "transmission":
+            return
+        name = "transmission angle"
+        l1, l2, l3, l4 = p.ground_length, p.crank_length, p.coupler_length, p.rocker_length
+        joint, product = l3 * l3 + l4 * l4, 2.0 * l3 * l4 * cosine
+        if self.pivot is None and limits.over_turn:
+            self._at_most(joint - (l1 - l2) ** 2 - product, name)
+            self._at_most((l1 + l2) ** 2 - joint - product, name)
+            return
+        x = casadi.DM(np.linspace(0.0, 2.0 * pi, GRID, endpoint=False)) if limits.over_turn else phi
+        dx, dy = self._displacement(v, x)
+        bx = l1 + dx - l2 * casadi.cos(x + p.crank_phase)
+        by = dy - l2 * casadi.sin(x + p.crank_phase)
+        d2 = bx * bx + by * by
+        self._at_most(joint - d2 - product, name)
+        self._at_most(d2 - joint - product, name)
+
+    def _slider(self, pivot: SliderUnknown, v: Any, z: list[Any], low: list[Any], high: list[Any]) -> Any:
+        casadi, unit = self._casadi, self.normal.unit
+        x = casadi.DM(np.linspace(0.0, 2.0 * pi, GRID, endpoint=False))
+        if isfinite(pivot.stroke):
+            middle = casadi.SX.sym("middle")
+            z.append(middle)
+            low.append(np.array([-inf]))
+            high.append(np.array([inf]))
+            half = 0.5 * pivot.stroke / unit
+            self._within(_series(casadi, v[1:], x) - middle, -half, half, "stroke")
+        for order, bound, name in ((1, pivot.speed, "slider speed"), (2, pivot.acceleration, "slider acceleration")):
+            if isfinite(bound):
+                self._within(_series(casadi, v[1:], x, order=order), -bound / unit, bound / unit, name)
+        if not pivot.smoothness:
+            return 0.0
+        return pivot.smoothness * casadi.sumsqr(_series(casadi, v[1:], x, order=2)) / GRID
+
+    def _physical(self, p: Any) -> SimpleNamespace:
+        """Dimensions in SI for functions of the user's."""
+        unit, origin = self.normal.unit, self.normal.origin
+        values = dict(vars(p))
+        for name in UNKNOWNS[:7]:
+            values[name] = unit * values[name]
+        values["pivot_x"], values["pivot_y"] = values["pivot_x"] + origin.real, values["pivot_y"] + origin.imag
+        return SimpleNamespace(**values)
+
+    # Solution
+
+    @cached_property
+    def _solver(self) -> Any:
+        options = {
+            "ipopt": {
+                "print_level": 0,
+                "sb": "yes",
+                "max_iter": 400,
+                "tol": 1e-9,
+                "constr_viol_tol": 1e-9,
+                "acceptable_tol": 1e-7,
+                "acceptable_iter": 8,
+                "bound_relax_factor": 0.0,
+                **FOLLOWING[self.objective],
+            },
+            "print_time": False,
+            "error_on_fail": False,
+            "show_eval_warnings": False,
+        }
+        return self._casadi.nlpsol("synthesis", "ipopt", self._nlp, options)
+
+    def solve(
+        self,
+        start: Start,
+        *,
+        blur: float = 1e-3,
+        gain: float = 1.0,
+        low: FloatArray | None = None,
+        high: FloatArray | None = None,
+    ) -> Answer:
+        """Solve from a start.
+
+        Parameters
+        ----------
+        start : Start
+        blur : float
+            Distance below which an area's absolute value is smooth (units).
+        gain : float
+            Factor on the objective, one over its magnitude.
+        low, high : ndarray, shape (11,), optional
+            Replace the bounds of the linkage's unknowns.
+        """
+        limits = self.limits
+        lower, upper = self.low.copy(), self.high.copy()
+        if low is not None:
+            lower[: len(UNKNOWNS)] = low
+        if high is not None:
+            upper[: len(UNKNOWNS)] = high
+        size = _size(self.pivot)
+        pivot = np.zeros(size) if len(start.pivot) == 0 else start.pivot
+        if len(pivot) != size:
+            raise InputError(f"a start with {len(pivot)} unknowns of the pivot: there must be {size}")
+        guess = [start.q, pivot]
+        direction = 1.0
+        if not self.normal.timed:
+            if start.rotation is None:
+                raise InputError("the start of an untimed task needs the crank rotations of its stations")
+            guess.append(start.rotation)
+            direction = float(np.sign(start.rotation[-1] - start.rotation[0]) or 1.0)
+        z0 = np.concatenate([*guess, np.zeros(self._extra)])
+        z0 = np.clip(z0, lower, upper)
+        parameters = [
+            float(start.branch),
+            direction,
+            blur,
+            gain,
+            *_grashof_rows(limits.grashof, z0[2:6]).ravel(order="F"),
+        ]
+        for name, pieces in limits.regions:
+            parameters += _half_planes(_nearest_piece(pieces, name, z0)).ravel(order="F").tolist()
+        result = self._solver(x0=z0, lbx=lower, ubx=upper, lbg=self._g_low, ubg=self._g_high, p=parameters)
+        stats = self._solver.stats()
+        z = np.asarray(result["x"]).ravel()
+        g = np.asarray(result["g"]).ravel()
+        over = np.maximum(self._g_low - g, g - self._g_high) if np.isfinite(g).all() else np.full(len(g), inf)
+        violation = float(over.max(initial=0.0))
+        end = len(UNKNOWNS) + size
+        answer = Start(
+            q=z[: len(UNKNOWNS)],
+            branch=start.branch,
+            pivot=z[len(UNKNOWNS) : end],
+            rotation=None if self.normal.timed else z[end : end + self.normal.n],
+            quality=float(result["f"]) / gain,
+        )
+        return Answer(
+            start=answer,
+            feasible=violation <= 1e-7 and bool(np.isfinite(z).all()) and isfinite(answer.quality),
+            converged=bool(stats["success"]),
+            violation=violation,
+            worst=self._labels[int(np.argmax(over))] if len(over) else "",
+            status=str(stats["return_status"]),
+            iterations=int(stats["iter_count"]),
+        )
+
+
+def _size(pivot: PivotUnknown | None) -> int:
+    """Number of the pivot's unknowns."""
+    if pivot is None:
+        return 0
+    return 2 + 2 * pivot.harmonics
+
+
+def _pivot_bounds(pivot: PivotUnknown | None, unit: float) -> tuple[FloatArray, FloatArray]:
+    if pivot is None:
+        return np.empty(0), np.empty(0)
+    low, high = np.full(_size(pivot), -inf), np.full(_size(pivot), inf)
+    if isinstance(pivot, SliderUnknown):
+        low[0], high[0] = pivot.guide_angle
+    else:
+        low[0], high[0] = pivot.length[0] / unit, pivot.length[1] / unit
+    return low, high
+
+
+def _series(casadi: Any, coefficients: Any, x: Any, *, mean: bool = True, order: int = 0) -> Any:
+    """A Fourier series, or a derivative of it, at x: mean (where there is one), then cosine and sine of each harmonic."""
+    value = (coefficients[0] if order == 0 else 0.0) + 0.0 * x if mean else 0.0 * x
+    first = 1 if mean else 0
+    for k in range((coefficients.numel() - first) // 2):
+        harmonic = k + 1
+        a, b = coefficients[first + 2 * k], coefficients[first + 2 * k + 1]
+        for _ in range(order):
+            a, b = harmonic * b, -harmonic * a
+        value = value + a * casadi.cos(harmonic * x) + b * casadi.sin(harmonic * x)
+    return value
+
+
+def traced(require: Require, values: SimpleNamespace) -> Any:
+    """Value of a function of the user's for CasADi symbols, what it takes from `math` or NumPy replaced by CasADi's.
+
+    Raises
+    ------
+    InputError
+        If it branches on its argument, or calls what CasADi cannot.
+    """
+    casadi = symbolic.library()
+    f = require.function
+    if isinstance(f, FunctionType):
+        space = dict(f.__globals__)
+        for name in f.__code__.co_names:
+            known = space.get(name)
+            if isinstance(known, ModuleType) and known.__name__ in ("math", "numpy"):
+                space[name] = casadi
+            elif getattr(known, "__module__", None) in ("math", "numpy") and hasattr(casadi, name):
+                space[name] = getattr(casadi, name)
+        f = FunctionType(f.__code__, space, f.__name__, f.__defaults__, f.__closure__)
+    try:
+        value = casadi.SX(f(values))
+    except Exception as error:
+        raise InputError(
+            f"{require.name} cannot be traced ({type(error).__name__}: {error}): it must be arithmetic and functions of math, "
+            "without branches"
+        ) from error
+    return value
+
+
+def _grashof_rows(type_: str | None, links: FloatArray) -> FloatArray:
+    """Rows r with r . (l1, l2, l3, l4) <= 0 that a four-bar of this type satisfies, shape (6, 4); zero rows ask nothing.
+
+    Of a triple-rocker, whose links are not convex in their lengths, the shortest and the longest stay what they are.
+    """
+    rows = np.zeros((6, 4))
+    if type_ is None:
+        return rows
+    shortest = {"drag-link": 0, "crank-rocker": 1, "double-rocker": 2, "rocker-crank": 3}.get(type_)
+    if shortest is None:
+        order = np.argsort(links)
+        s, a, b, longest = (int(k) for k in order)
+        rows[0, [a, b]], rows[0, [s, longest]] = 1.0, -1.0
+        for k, other in enumerate((a, b)):
+            rows[1 + k, s], rows[1 + k, other] = 1.0, -1.0
+            rows[3 + k, other], rows[3 + k, longest] = 1.0, -1.0
+        return rows
+    others = [k for k in range(4) if k != shortest]
+    for k, other in enumerate(others):
+        rows[k, shortest], rows[k, other] = 1.0, -1.0
+        rows[3 + k] = [-1.0 if j != shortest and j != other else 1.0 for j in range(4)]
+    return rows
+
+
+def _half_planes(triangle: FloatArray) -> FloatArray:
+    """Rows r with r . (x, y, 1) <= 0 inside a counter-clockwise triangle, shape (3, 3)."""
+    rows = np.zeros((3, 3))
+    for k in range(3):
+        (x0, y0), (x1, y1) = triangle[k], triangle[(k + 1) % 3]
+        length = float(np.hypot(x1 - x0, y1 - y0))
+        rows[k] = (y1 - y0) / length, (x0 - x1) / length, (y0 * x1 - x0 * y1) / length
+    return rows
+
+
+def _nearest_piece(pieces: Sequence[FloatArray], pivot: str, q: FloatArray) -> FloatArray:
+    """The triangle that a pivot is in, or least far outside of."""
+    x, y = float(q[0]), float(q[1])
+    if pivot == "D":
+        x, y = x + float(q[2] * np.cos(q[7])), y + float(q[2] * np.sin(q[7]))
+    return min(pieces, key=lambda piece: float((_half_planes(piece) @ [x, y, 1.0]).max()))
+
+
+def linkage_of(start: Start, normal: Normal, pivot: PivotUnknown | None = None) -> Linkage:
+    """The linkage of a start, in SI."""
+    q = start.q.copy()
+    q[:7] *= normal.unit
+    q[0] += normal.origin.real
+    q[1] += normal.origin.imag
+    q[7:] = (q[7:] + pi) % (2.0 * pi) - pi
+    v = start.pivot
+    moved: SliderMotion | SecondCrank | None = None
+    if isinstance(pivot, SliderUnknown) and len(v):
+        cosines, sines = np.append(v[1], v[2::2]), np.append(0.0, v[3::2])
+        moved = SliderMotion(FourierSeries(normal.unit * cosines, normal.unit * sines), float(v[0]))
+    elif isinstance(pivot, CrankUnknown) and len(v):
+        series = FourierSeries(np.append(0.0, v[2::2]), np.append(0.0, v[3::2]))
+        moved = SecondCrank(normal.unit * float(v[0]), pivot.ratio, float(v[1]), series)
+    return Linkage.from_vector(q, start.branch, pivot=moved)
+
+
+def start_of(
+    linkage: Linkage, normal: Normal, pivot: PivotUnknown | None = None, rotation: FloatArray | None = None
+) -> Start:
+    """A linkage as a start; the pivot's motion is cut off after, or filled up to, the harmonics sought."""
+    q = np.append(linkage.vector, linkage.output_angle)
+    q[0] -= normal.origin.real
+    q[1] -= normal.origin.imag
+    q[:7] /= normal.unit
+    v = np.zeros(_size(pivot))
+    if isinstance(pivot, SliderUnknown) and isinstance(linkage.pivot, SliderMotion):
+        series = linkage.pivot.series.to_order(pivot.harmonics)
+        v[0], v[1] = linkage.pivot.guide_angle, series.mean / normal.unit
+        v[2::2], v[3::2] = series.cos[1:] / normal.unit, series.sin[1:] / normal.unit
+    elif isinstance(pivot, CrankUnknown):
+        v[0] = pivot.length[0] / normal.unit
+        if isinstance(linkage.pivot, SecondCrank):
+            series = linkage.pivot.series.to_order(pivot.harmonics)
+            v[0], v[1] = linkage.pivot.length / normal.unit, linkage.pivot.phase
+            v[2::2], v[3::2] = series.cos[1:], series.sin[1:]
+    return Start(q=q, branch=linkage.branch, pivot=v, rotation=rotation)

@@ -1,0 +1,390 @@
+"""The global scan: many thousand four-bars, each placed as well as it can be in closed form.
+
+Variable projection: with the shape of the four-bar (its links as shares of the ground link) and the crank's phase given, the
+coupler point is z0 + c1 exp(i th2) + c2 exp(i th3), linear in three complex unknowns: place, size and direction, and the
+coupler point. What is left is searched by a Sobol sequence, which a seed scrambles.
+
+- Timed tasks: shape and phase are searched.
+- Few untimed stations: their crank rotations as well, in order.
+- Untimed paths: shape and coupler point are searched; each coupler curve is laid over the target by the best similarity, at
+  even arc length, over all starting points (by a fast Fourier transform of their correlation), or all pieces of it for an open
+  path.
+- Rocker functions: shape and phase; the mounting angle is the mean of what is left.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from math import cos, inf, pi
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import qmc
+
+from .constraints import InfeasibleError, Limits
+from .kernels import many_directions, match_windows
+from .program import TURNING, Start
+from .tasks import Normal
+
+FloatArray = NDArray[np.float64]
+ComplexArray = NDArray[np.complex128]
+
+#: Ranges of l2/l1, l3/l1, l4/l1 that are searched, evenly in the logarithm.
+SHAPES = ((0.01, 3.0), (0.05, 6.0), (0.05, 6.0))
+#: Candidates in one piece of work.
+CHUNK = 4096
+#: Steps of a coupler curve and points of it at even arc length.
+CURVE, EVEN = 128, 64
+#: Starts that differ by less than this in the logarithms of their shape and in phase count as one.
+APART = 0.08
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Candidates:
+    """Rows of candidates: quality (m,), vectors of the eleven unknowns (m, 11), rotations (m, n) or None, their branch."""
+
+    quality: FloatArray
+    q: FloatArray
+    rotation: FloatArray | None
+    branch: int
+
+
+def scan(normal: Normal, limits: Limits, *, seed: int, candidates: int, starts: int) -> list[Start]:
+    """The best starts of a scan over both assemblies, none near another, best first.
+
+    Parameters
+    ----------
+    candidates : int
+        Shapes that are tried, those that are not allowed left out.
+    starts : int
+        How many are kept.
+
+    Raises
+    ------
+    InfeasibleError
+        If no shape at all is allowed.
+    """
+    found: list[Candidates] = []
+    for number, branch in enumerate(limits.branches):
+        chunks = _shapes(limits, seed + 7919 * number, max(1, candidates // len(limits.branches)))
+        found += [_placed(normal, limits, shapes, branch, seed) for shapes in chunks]
+    if not found:
+        raise InfeasibleError(
+            "no shape of four-bar within the bounds has the transmission angle, full turn or Grashof type that is asked for"
+        )
+    return _apart(found, normal, starts)
+
+
+def _shapes(limits: Limits, seed: int, count: int) -> Iterator[FloatArray]:
+    """Allowed shapes with the other searched numbers in [0, 1), rows of (l2/l1, l3/l1, l4/l1, six numbers), in chunks."""
+    sequence = qmc.Sobol(9, seed=seed)
+    low, high = np.log(np.array(SHAPES)).T
+    kept, tried = 0, 0
+    while kept < count and tried < 64 * count:
+        unit = sequence.random(CHUNK)
+        tried += CHUNK
+        shapes = np.hstack([np.exp(low + (high - low) * unit[:, :3]), unit[:, 3:]])
+        shapes = shapes[_allowed(shapes, limits)][: count - kept]
+        kept += len(shapes)
+        if len(shapes):
+            yield shapes
+
+
+def _allowed(shapes: FloatArray, limits: Limits) -> NDArray[np.bool_]:
+    """Whether shapes keep the transmission angle and the Grashof type, and can be within the bounds of their links."""
+    links = np.column_stack([np.ones(len(shapes)), shapes[:, :3]])
+    l1, l2, l3, l4 = links.T
+    allowed = np.ones(len(shapes), dtype=bool)
+    if limits.over_turn:
+        cosine = cos(max(limits.transmission or 0.0, TURNING))
+        joint, product = l3 * l3 + l4 * l4, 2.0 * l3 * l4 * cosine
+        allowed &= (joint - (l1 - l2) ** 2 <= product) & ((l1 + l2) ** 2 - joint <= product)
+    if limits.grashof is not None:
+        order = np.sort(links, axis=1)
+        excess = order[:, 0] + order[:, 3] - order[:, 1] - order[:, 2]
+        if limits.grashof == "triple-rocker":
+            allowed &= excess > 0.0
+        else:
+            shortest = ("drag-link", "crank-rocker", "double-rocker", "rocker-crank").index(limits.grashof)
+            allowed &= (excess < 0.0) & (links.argmin(axis=1) == shortest)
+    least, most = _sizes(links, limits)
+    return allowed & (least <= most)
+
+
+def _sizes(links: FloatArray, limits: Limits) -> tuple[FloatArray, FloatArray]:
+    """Least and greatest ground link with which every link keeps its bounds."""
+    return (limits.low[2:6] / links).max(axis=1), (limits.high[2:6] / links).min(axis=1)
+
+
+def _placed(normal: Normal, limits: Limits, shapes: FloatArray, branch: int, seed: int) -> Candidates:
+    if normal.of_rocker:
+        return _functions(normal, limits, shapes, branch)
+    if normal.timed:
+        return _timed(normal, limits, shapes, branch, None)
+    if normal.angle is not None or normal.exact:
+        return _timed(normal, limits, shapes, branch, np.random.default_rng([seed, len(shapes), branch + 1]))
+    return _paths(normal, limits, shapes, branch)
+
+
+def _directions(shapes: FloatArray, rotation: FloatArray, branch: int) -> tuple[ComplexArray, ComplexArray]:
+    coupler = np.empty((len(shapes), len(rotation)), dtype=complex)
+    rocker = np.empty_like(coupler)
+    many_directions(np.cos(rotation), np.sin(rotation), np.ascontiguousarray(shapes), float(branch), coupler, rocker)
+    return coupler, rocker
+
+
+def _functions(normal: Normal, limits: Limits, shapes: FloatArray, branch: int) -> Candidates:
+    """Rocker functions: the phase is searched, the mounting angle follows."""
+    assert normal.rotation is not None
+    assert normal.angle is not None
+    phase = 2.0 * pi * shapes[:, 3]
+    _, rocker = _directions(np.column_stack([shapes[:, :3], phase]), normal.rotation, branch)
+    left: ComplexArray = np.exp(1j * normal.angle) * rocker.conj()
+    offset = np.zeros(len(shapes))
+    if normal.mounting:
+        offset = np.angle((normal.weights * left).sum(axis=1))
+        left *= np.exp(-1j * offset)[:, None]
+    quality = (normal.weights * np.angle(left) ** 2).sum(axis=1)
+    least, most = _sizes(np.column_stack([np.ones(len(shapes)), shapes[:, :3]]), limits)
+    size = np.sqrt(np.maximum(least, 1e-12) * most)
+    q = np.zeros((len(shapes), 11))
+    q[:, 2:6] = size[:, None] * np.column_stack([np.ones(len(shapes)), shapes[:, :3]])
+    q[:, 8], q[:, 10] = phase, offset
+    return Candidates(quality=np.nan_to_num(quality, nan=inf), q=q, rotation=None, branch=branch)
+
+
+def _timed(
+    normal: Normal, limits: Limits, shapes: FloatArray, branch: int, random: np.random.Generator | None
+) -> Candidates:
+    """Timed paths and motions by variable projection; without given rotations, over random ones in order."""
+    phase = 2.0 * pi * shapes[:, 3]
+    links = np.column_stack([np.ones(len(shapes)), shapes[:, :3]])
+    n = normal.n
+    if random is None:
+        assert normal.rotation is not None
+        rotation = np.broadcast_to(normal.rotation, (len(shapes), n))
+        coupler, _ = _directions(np.column_stack([shapes[:, :3], phase]), normal.rotation, branch)
+    else:
+        gaps = random.dirichlet(np.ones(n + 1), len(shapes))[:, :n]
+        rotation = 2.0 * pi * np.cumsum(gaps, axis=1) * random.choice([1.0, -1.0], (len(shapes), 1))
+        coupler = np.empty((len(shapes), n), dtype=complex)
+        for k in range(n):
+            turned = np.column_stack([shapes[:, :3], phase + rotation[:, k]])
+            coupler[:, k] = _directions(turned, np.zeros(1), branch)[0][:, 0]
+    assert normal.points is not None
+    crank = np.exp(1j * (phase[:, None] + rotation))
+    basis = np.stack([np.ones_like(crank), crank, coupler], axis=1)
+    w, p = normal.weights, normal.points
+    z = _projected(basis, p, w)
+    # the size that the links' bounds allow; the rest follows once more
+    least, most = _sizes(links, limits)
+    size = np.abs(z[:, 1]) / shapes[:, 0]
+    bounded = np.clip(size, np.maximum(least, 1e-9), most)
+    outside = bounded != size
+    if outside.any():
+        z[outside, 1] *= (bounded / np.maximum(size, 1e-300))[outside]
+        rest = _projected(basis[outside][:, [0, 2]], p - z[outside, 1, None] * basis[outside, 1], w)
+        z[outside, 0], z[outside, 2] = rest[:, 0], rest[:, 1]
+    far = np.abs(z[:, 2]) > limits.high[6]
+    z[far, 2] *= limits.high[6] / np.abs(z[far, 2])
+    error = np.abs(np.einsum("mk,mkn->mn", z, basis) - p) ** 2
+    turn = np.angle(z[:, 1])
+    offset = np.zeros(len(shapes))
+    if normal.angle is not None:
+        left = np.exp(1j * (normal.angle - turn[:, None])) * coupler.conj()
+        offset = np.angle((w * left).sum(axis=1))
+        error = error + (normal.leverage * np.angle(left * np.exp(-1j * offset)[:, None])) ** 2
+    q = np.column_stack(
+        [
+            z[:, 0].real,
+            z[:, 0].imag,
+            bounded[:, None] * links,
+            np.abs(z[:, 2]),
+            turn,
+            phase,
+            np.angle(z[:, 2]) - turn,
+            offset,
+        ]
+    )
+    quality = np.nan_to_num((w * error).sum(axis=1), nan=inf)
+    return Candidates(quality=quality, q=q, rotation=None if random is None else rotation, branch=branch)
+
+
+def _projected(basis: ComplexArray, p: ComplexArray, w: FloatArray) -> ComplexArray:
+    """Weighted least squares of p = z . basis for every row; basis (m, k, n), p (n,) or (m, n); z (m, k)."""
+    weighted = basis.conj() * w
+    gram = weighted @ basis.transpose(0, 2, 1)
+    # transposed: gram[a, b] = sum of conj(basis_a) w basis_b
+    gram += 1e-12 * w.sum() * np.eye(basis.shape[1])
+    right = (weighted * (p if p.ndim == 1 else p[:, None, :])).sum(axis=2)
+    bad = ~np.isfinite(gram).all(axis=(1, 2))
+    gram[bad], right[bad] = np.eye(basis.shape[1]), np.nan
+    solved: ComplexArray = np.linalg.solve(gram, right[:, :, None])[:, :, 0]
+    return solved
+
+
+def _paths(normal: Normal, limits: Limits, shapes: FloatArray, branch: int) -> Candidates:
+    """Untimed paths: coupler curves laid over the target by a similarity."""
+    links = np.column_stack([np.ones(len(shapes)), shapes[:, :3]])
+    rotation = np.linspace(0.0, 2.0 * pi, CURVE, endpoint=False)
+    coupler, _ = _directions(np.column_stack([shapes[:, :3], np.zeros(len(shapes))]), rotation, branch)
+    # the coupler point anywhere about the coupler, evenly in the logarithm of its distance
+    longest = links.max(axis=1)
+    distance = longest * np.exp(np.log(0.1) + np.log(30.0) * shapes[:, 4])
+    point = distance * np.exp(2j * pi * shapes[:, 5])
+    curves = shapes[:, :1] * np.exp(1j * rotation) + point[:, None] * coupler
+    return (_closed_paths if normal.closed else _open_paths)(normal, limits, links, curves, point, branch)
+
+
+def _closed_paths(
+    normal: Normal, limits: Limits, links: FloatArray, curves: ComplexArray, point: ComplexArray, branch: int
+) -> Candidates:
+    assert normal.points is not None
+    target, _ = _even(normal.points[None, :], EVEN)
+    goal = target[0] - target[0].mean()
+    even, turned = _even(curves, EVEN)
+    mean = even.mean(axis=1)
+    even = even - mean[:, None]
+    energy = (np.abs(even) ** 2).sum(axis=1)
+    best = np.full(len(curves), -inf)
+    shift = np.zeros(len(curves), dtype=int)
+    way = np.ones(len(curves))
+    product = np.zeros(len(curves), dtype=complex)
+    spectrum = np.fft.fft(goal)
+    for direction in (1.0, -1.0):
+        run = even if direction > 0.0 else np.roll(even[:, ::-1], 1, axis=1)
+        # sum over k of goal[k] conj(run[k + s]) for every s
+        correlation = np.fft.ifft(np.fft.fft(run).conj() * spectrum)
+        at = np.abs(correlation).argmax(axis=1)
+        value = correlation[np.arange(len(at)), at]
+        better = np.abs(value) > best
+        best = np.where(better, np.abs(value), best)
+        # goal[k] lies over run[k - at]
+        shift = np.where(better, at, shift)
+        way = np.where(better, direction, way)
+        product = np.where(better, value, product)
+    scale = product / energy
+    bounded, scale = _bounded(scale, links, point, limits)
+    misfit = (np.abs(goal) ** 2).sum() - 2.0 * (scale.conj() * product).real + np.abs(scale) ** 2 * energy
+    place = target[0].mean() - scale * mean
+    # crank rotation of each station: its share of the target's length, from where the target starts on the curve
+    stations = _shares(normal.points, closed=True) * EVEN
+    rotations = np.empty((len(curves), normal.n))
+    chosen = np.argsort(misfit)[: min(len(misfit), 400)]
+    for i in chosen:
+        index = way[i] * (stations - shift[i])
+        table = np.append(turned[i], turned[i, 0] + 2.0 * pi)
+        rotations[i] = 2.0 * pi * np.floor(index / EVEN) + np.interp(index % EVEN, np.arange(EVEN + 1), table)
+        rotations[i] -= 2.0 * pi * np.floor(rotations[i, 0] / (2.0 * pi))
+    quality = np.full(len(curves), inf)
+    quality[chosen] = misfit[chosen] * normal.weights.sum() / EVEN
+    q = _vectors(links, bounded, scale, place, point)
+    return Candidates(quality=np.nan_to_num(quality, nan=inf), q=q, rotation=rotations, branch=branch)
+
+
+def _open_paths(
+    normal: Normal, limits: Limits, links: FloatArray, curves: ComplexArray, point: ComplexArray, branch: int
+) -> Candidates:
+    assert normal.points is not None
+    k = 32
+    shares = _shares(normal.points, closed=False)
+    even = np.interp(np.linspace(0.0, 1.0, k), shares, normal.points.real) + 1j * np.interp(
+        np.linspace(0.0, 1.0, k), shares, normal.points.imag
+    )
+    goal = even - even.mean()
+    starts = np.arange(0, CURVE, 4)
+    spans = np.array([10, 14, 20, 28, 38, 48, 60, 74, 90, 108, 126])
+    best = np.empty((len(curves), 4))
+    match_windows(np.ascontiguousarray(curves), goal, starts, spans, True, best)
+    chosen = np.argsort(best[:, 0])[: min(len(best), 400)]
+    chosen = chosen[np.isfinite(best[chosen, 0])]
+    quality = np.full(len(curves), inf)
+    q = np.zeros((len(curves), 11))
+    rotations = np.zeros((len(curves), normal.n))
+    for i in chosen:
+        start, span, way = int(best[i, 1]), int(best[i, 2]), best[i, 3]
+        part = curves[i, np.arange(start, start + span + 1) % CURVE]
+        length = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(part)))]) / np.abs(np.diff(part)).sum()
+        angles = 2.0 * pi * np.arange(start, start + span + 1) / CURVE
+        at = shares if way > 0.0 else 1.0 - shares
+        rotations[i] = np.interp(at, length, angles)
+        piece = np.interp(at, length, part.real) + 1j * np.interp(at, length, part.imag)
+        basis = np.stack([np.ones_like(piece), piece])[None]
+        place, scale = _projected(basis, normal.points, normal.weights)[0]
+        bounded, scales = _bounded(np.array([scale]), links[i : i + 1], point[i : i + 1], limits)
+        if scales[0] != scale:
+            place = (normal.weights * (normal.points - scales[0] * piece)).sum() / normal.weights.sum()
+        quality[i] = (normal.weights * np.abs(place + scales[0] * piece - normal.points) ** 2).sum()
+        q[i] = _vectors(links[i : i + 1], bounded, scales, np.array([place]), point[i : i + 1])[0]
+    return Candidates(quality=np.nan_to_num(quality, nan=inf), q=q, rotation=rotations, branch=branch)
+
+
+def _bounded(
+    scale: ComplexArray, links: FloatArray, point: ComplexArray, limits: Limits
+) -> tuple[FloatArray, ComplexArray]:
+    """Sizes and scales within the bounds of links and coupler point."""
+    least, most = _sizes(links, limits)
+    most = np.minimum(most, limits.high[6] / np.abs(point))
+    size = np.abs(scale)
+    bounded = np.clip(size, np.maximum(least, 1e-9), np.maximum(most, np.maximum(least, 1e-9)))
+    return bounded, scale * bounded / np.maximum(size, 1e-300)
+
+
+def _vectors(
+    links: FloatArray, size: FloatArray, scale: ComplexArray, place: ComplexArray, point: ComplexArray
+) -> FloatArray:
+    turn = np.angle(scale)
+    zero = np.zeros(len(links))
+    columns = [place.real, place.imag, size[:, None] * links, size * np.abs(point), turn, zero, np.angle(point), zero]
+    return np.column_stack(columns)
+
+
+def _shares(points: ComplexArray, *, closed: bool) -> FloatArray:
+    """Share of a polyline's length up to each of its points."""
+    steps = np.abs(np.diff(np.append(points, points[0]) if closed else points))
+    length = np.concatenate([[0.0], np.cumsum(steps)])
+    shares: FloatArray = length[: len(points)] / length[-1]
+    return shares
+
+
+def _even(curves: ComplexArray, k: int) -> tuple[ComplexArray, FloatArray]:
+    """Closed curves at even arc length, shape (m, k), and the crank rotation at each of these points."""
+    m, n = curves.shape
+    ring = np.hstack([curves, curves[:, :1]])
+    length = np.hstack([np.zeros((m, 1)), np.cumsum(np.abs(np.diff(ring, axis=1)), axis=1)])
+    place = length[:, -1:] * np.arange(k) / k
+    # the segment that each place is on: one sorted search for all rows
+    rows = np.arange(m)[:, None]
+    offset = 2.0 * rows
+    shares = length / length[:, -1:]
+    index = np.searchsorted((shares + offset).ravel(), (place / length[:, -1:] + offset).ravel(), side="right") - 1
+    index = np.clip(index.reshape(m, k) - rows * (n + 1), 0, n - 1)
+    step = np.maximum(length[rows, index + 1] - length[rows, index], 1e-300)
+    share = (place - length[rows, index]) / step
+    points = (1.0 - share) * ring[rows, index] + share * ring[rows, index + 1]
+    return points, 2.0 * pi * (index + share) / n
+
+
+def _apart(found: list[Candidates], normal: Normal, starts: int) -> list[Start]:
+    """The best candidates of all, none within `APART` of a better one."""
+    rows = [
+        (float(c.quality[i]), int(c.branch), c.q[i], None if c.rotation is None else c.rotation[i])
+        for c in found
+        for i in np.argsort(c.quality)[: 20 * starts]
+        if np.isfinite(c.quality[i]) and np.isfinite(c.q[i]).all()
+    ]
+    rows.sort(key=lambda row: row[0])
+    kept: list[Start] = []
+    marks: list[FloatArray] = []
+    for quality, branch, q, rotation in rows:
+        shape = np.log(q[3:6] / q[2])
+        begin = q[8] if rotation is None else rotation[0]
+        mark = np.array([*shape, cos(begin), np.sin(begin), 5.0 * branch])
+        if any(np.abs(mark - other).max() < APART for other in marks):
+            continue
+        marks.append(mark)
+        kept.append(Start(q=q, branch=branch, quality=quality, rotation=rotation))
+        if len(kept) == starts:
+            break
+    return kept

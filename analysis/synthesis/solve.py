@@ -1,0 +1,292 @@
+"""`synthesize`: from a task to ranked linkages, and the trade-off of its error against size or transmission angle."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from math import isfinite
+from time import perf_counter
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from linkwork.errors import InputError, Interrupted
+
+from .black_box import by_differential_evolution, by_simplex
+from .constraints import (
+    USUAL,
+    Constraint,
+    InfeasibleError,
+    LargestLink,
+    LeastTransmission,
+    limits_of,
+)
+from .polish import Polished, distinct, polish
+from .program import Answer, PivotUnknown, Start, linkage_of, start_of
+from .scan import scan
+from .solution import Solution, ranked
+from .tasks import Task, normal_form
+
+Method = Literal["scan", "differential-evolution", "simplex"]
+METHODS: tuple[Method, ...] = ("scan", "differential-evolution", "simplex")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Synthesis:
+    """Ranked solutions of a task.
+
+    Attributes
+    ----------
+    task : Task
+        With the weights it was solved with.
+    solutions : tuple of Solution
+        Sound ones first, then by error; different linkages.
+    method : str
+    seed : int
+    starts : int
+        Searches that were run.
+    seconds : float
+        It took (s).
+    complete : bool
+        False if it was stopped.
+    """
+
+    task: Task
+    solutions: tuple[Solution, ...]
+    method: str
+    seed: int
+    starts: int
+    seconds: float
+    complete: bool = True
+
+    @property
+    def best(self) -> Solution:
+        """The first solution."""
+        return self.solutions[0]
+
+
+class SynthesisInterrupted(Interrupted):
+    """A synthesis was stopped from the keyboard; ``synthesis`` holds the best so far, or is None if there is none."""
+
+    def __init__(self, synthesis: Synthesis | None, done: int, starts: int) -> None:
+        self.synthesis = synthesis
+        super().__init__(f"stopped after {done} of {starts} searches")
+
+
+def synthesize(
+    task: Task,
+    bounds: Mapping[str, tuple[float, float]] | None = None,
+    constraints: Sequence[Constraint] = USUAL,
+    weights: ArrayLike | None = None,
+    seed: int = 0,
+    *,
+    method: Method = "scan",
+    candidates: int = 1 << 16,
+    starts: int = 24,
+    solutions: int = 6,
+    pivot: PivotUnknown | None = None,
+    guesses: Sequence[Solution] = (),
+    n_jobs: int = 1,
+    progress: bool = False,
+) -> Synthesis:
+    """Find linkages that do a task.
+
+    A scan over many thousand four-bars, each placed in closed form, gives the starts; each is polished to an optimum with exact
+    derivatives. What cannot be done exactly is answered with the best there is, its error told.
+
+    Parameters
+    ----------
+    task : TimedPath, UntimedPath, RockerFunction, Motion or PrecisionPoints
+    bounds : mapping, optional
+        (least, greatest) of dimensions by their name in `Linkage` (m, rad); equal ones fix a dimension. Without, links up to five
+        times the target's size; of a rocker function, a ground link of 0.1 m and the others up to five times that.
+    constraints : sequence
+        See `analysis.synthesis.constraints`; by default a transmission angle of at least 40 degrees over a full turn.
+    weights : array_like, optional
+        One per target, in the place of the task's own.
+    seed : int
+        Of the scan: the same seed gives the same solutions, on any number of cores.
+    method : "scan", "differential-evolution" or "simplex"
+        The last two are for comparison: SciPy's differential evolution on the quality function as a black box, and the thesis's
+        downhill simplex from many starts.
+    candidates : int
+        Four-bars in the scan.
+    starts : int
+        Of them, how many are polished.
+    solutions : int
+        At most that many different linkages are returned.
+    pivot : SliderUnknown or CrankUnknown, optional
+        Move the rocker pivot, its motion sought together with the links.
+    guesses : sequence of Solution
+        Searched from as well.
+    n_jobs : int
+        Cores, as `joblib.Parallel`.
+    progress : bool
+        Show a progress bar.
+
+    Raises
+    ------
+    InputError
+        If the task, the weights or a number here is not usable.
+    InfeasibleError
+        If no linkage keeps all bounds and constraints; it names the one that is hurt most.
+    SynthesisInterrupted
+        On Ctrl-C, with the best so far.
+    MissingLibraryError
+        If there are inequalities, and CasADi is not installed.
+    """
+    for name, value in (("candidates", candidates), ("starts", starts), ("solutions", solutions)):
+        if value < 1:
+            raise InputError(f"{value} {name}: there must be at least one")
+    if method not in METHODS:
+        raise InputError(f"method {method!r}: it must be one of {', '.join(METHODS)}")
+    begun = perf_counter()
+    if weights is not None:
+        normal = normal_form(task, weights)
+        task = replace(task, weights=weights)  # type: ignore[call-arg]
+    normal = normal_form(task)
+    limits = limits_of(task, normal, bounds, constraints)
+    if method == "scan":
+        begin = [start_of(g.linkage, normal, pivot, g.evaluation.rotation) for g in guesses]
+        begin += scan(normal, limits, seed=seed, candidates=candidates, starts=starts)
+        done = polish(normal, limits, begin, pivot=pivot, n_jobs=n_jobs, progress=progress)
+        total = len(begin)
+    else:
+        if pivot is not None:
+            raise InputError(f"method {method!r} searches linkages with a fixed pivot: use 'scan'")
+        search = by_differential_evolution if method == "differential-evolution" else by_simplex
+        done = search(normal, limits, seed=seed, starts=starts, n_jobs=n_jobs, progress=progress)
+        total = starts
+    found = _solutions(task, done, pivot, solutions)
+    seconds = perf_counter() - begun
+    result = Synthesis(
+        task=task,
+        solutions=found,
+        method=method,
+        seed=seed,
+        starts=done.done,
+        seconds=seconds,
+        complete=not done.interrupted,
+    )
+    if done.interrupted:
+        raise SynthesisInterrupted(result if found else None, done.done, total)
+    if not found:
+        raise _infeasible(done)
+    return result
+
+
+def _solutions(task: Task, done: Polished, pivot: PivotUnknown | None, count: int) -> tuple[Solution, ...]:
+    normal = normal_form(task)
+    chosen = distinct(done.kept, 4 * count)
+    made = [Solution.of(task, linkage_of(a.start, normal, pivot), a.start.rotation) for a in chosen]
+    return ranked([s for s in made if isfinite(s.error)])[:count]
+
+
+def _infeasible(done: Polished) -> InfeasibleError:
+    if not done.others:
+        return InfeasibleError("no linkage keeps all bounds and constraints")
+    nearest: Answer = min(done.others, key=lambda a: a.violation)
+    return InfeasibleError(
+        f"no linkage keeps all bounds and constraints: of {len(done.others)} searches the nearest violates "
+        f"the {nearest.worst or 'quality'} by {nearest.violation:.3g} (in units of the target's size, or rad; {nearest.status})"
+    )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class TradeOff:
+    """The least error over a limit that is tightened.
+
+    Attributes
+    ----------
+    over : str
+        ``size`` or ``transmission``.
+    limit : ndarray, shape (n,)
+        Largest link (m), or least transmission angle (rad).
+    solutions : tuple of Solution or None
+        The best at each; None where there is no linkage.
+    """
+
+    over: str
+    limit: NDArray[np.float64]
+    solutions: tuple[Solution | None, ...]
+
+    @property
+    def error(self) -> np.ma.MaskedArray:
+        """Quality function at each limit, masked where there is no linkage; shape (n,)."""
+        values = [np.nan if s is None else s.error for s in self.solutions]
+        return np.ma.masked_invalid(np.array(values))
+
+
+def trade_off(
+    task: Task,
+    over: Literal["size", "transmission"],
+    limits: ArrayLike,
+    bounds: Mapping[str, tuple[float, float]] | None = None,
+    constraints: Sequence[Constraint] = USUAL,
+    weights: ArrayLike | None = None,
+    seed: int = 0,
+    *,
+    starts: int = 12,
+    pivot: PivotUnknown | None = None,
+    n_jobs: int = 1,
+    progress: bool = False,
+) -> TradeOff:
+    """Error against size or transmission angle, by the epsilon-constraint method with warm starts.
+
+    From the loosest limit to the tightest each problem starts from its own scan and from the solutions of the one before; a second
+    pass goes back, so that a solution found late serves the looser limits too. The error can only grow as a limit is tightened.
+
+    Parameters
+    ----------
+    task : Task
+    over : "size" or "transmission"
+    limits : array_like, shape (n,)
+        Largest links (m), or least transmission angles (rad).
+    bounds, constraints, weights, seed, starts, pivot, n_jobs, progress
+        As for `synthesize`; the limit takes the place of a constraint of its own kind.
+
+    Raises
+    ------
+    InputError
+        If ``over`` or the limits are not usable.
+    SynthesisInterrupted
+        On Ctrl-C, with the last problem's best so far.
+    """
+    kind = {"size": LargestLink, "transmission": LeastTransmission}.get(over)
+    values = np.array(limits, dtype=float)
+    if kind is None:
+        raise InputError(f"a trade-off over {over!r}: it must be 'size' or 'transmission'")
+    if values.ndim != 1 or len(values) < 2 or not np.isfinite(values).all():
+        raise InputError("the limits of a trade-off must be finite numbers, at least two")
+    rest = tuple(c for c in constraints if not isinstance(c, kind))
+    order = np.argsort(-values if over == "size" else values)
+    found: dict[int, Solution] = {}
+    for number, sequence in enumerate((order, order[::-1])):
+        previous: list[Solution] = []
+        for k in sequence.tolist():
+            limit: Constraint = LargestLink(length=values[k]) if over == "size" else LeastTransmission(angle=values[k])
+            guesses = [*previous, *([found[k]] if k in found else [])]
+            if number and not guesses:
+                continue
+            try:
+                result = synthesize(
+                    task,
+                    bounds,
+                    (*rest, limit),
+                    weights,
+                    seed,
+                    starts=starts if number == 0 else 1,
+                    candidates=1 << 14 if number == 0 else 1 << 8,
+                    solutions=3,
+                    pivot=pivot,
+                    guesses=guesses,
+                    n_jobs=n_jobs,
+                    progress=progress,
+                )
+            except InfeasibleError:
+                continue
+            if k not in found or result.best.error < found[k].error:
+                found[k] = result.best
+            previous = list(result.solutions) if number == 0 else [found[k]]
+    return TradeOff(over=over, limit=values, solutions=tuple(found.get(k) for k in range(len(values))))

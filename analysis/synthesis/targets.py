@@ -1,0 +1,584 @@
+"""What is to be traced: plane curves as points in m, and functions of the crank angle, from arrays, files or formulas.
+
+A curve is a polyline: its points joined by straight segments, the last one to the first if it is closed. Length, centroid,
+size and areas are exact for the polyline.
+"""
+
+from __future__ import annotations
+
+import ast
+import difflib
+from collections.abc import Callable
+from dataclasses import dataclass
+from math import cos, e, pi, sin, tau
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from linkwork.errors import InputError
+
+from ..io import quantity, read_points
+
+FloatArray = NDArray[np.float64]
+
+#: Share of a curve's extent below which two points are the same one, and of its length squared below which it has no area.
+COINCIDENT = 1e-12
+#: Most points that the smoothing takes; a curve of more is first resampled to as many.
+MOST_SMOOTHED = 1000
+#: Weight of the degrees of freedom in the generalised cross-validation: 1 is the plain one, which smooths too little now
+#: and then; 1.4 is advised by Kim and Gu, J. R. Statist. Soc. B 66 (2004), p 337.
+FREEDOM_WEIGHT = 1.4
+
+
+# Curves
+
+
+def plane_points(points: ArrayLike, what: str, least: int) -> FloatArray:
+    """Points as an array of shape (n, 2) of finite numbers, a copy.
+
+    Raises
+    ------
+    InputError
+        If the shape is another, a coordinate is not finite, or there are less than ``least`` points; ``what`` they are is
+        named.
+    """
+    try:
+        array = np.array(points, dtype=float)
+    except (TypeError, ValueError) as error:
+        raise InputError(f"{what} is not an array of numbers: {error}") from error
+    if array.ndim != 2 or array.shape[1] != 2:
+        raise InputError(f"{what} has shape {array.shape}: it must be (n, 2), a point a row")
+    bad = np.flatnonzero(~np.isfinite(array).all(axis=1))
+    if len(bad):
+        raise InputError(
+            f"{what} has {len(bad)} points that are not finite, the first at index {bad[0]}: {array[bad[0]]}"
+        )
+    if len(array) < least:
+        raise InputError(f"{what} has {len(array)} points: it needs at least {least}")
+    return array
+
+
+def ring(points: FloatArray, closed: bool) -> FloatArray:
+    """The polyline's vertices in order, the first one again at the end if it is closed."""
+    return np.vstack([points, points[:1]]) if closed else points
+
+
+def arc_lengths(vertices: FloatArray) -> FloatArray:
+    """Length along a polyline up to each vertex, from 0, shape (n,)."""
+    return np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(vertices, axis=0).T))])
+
+
+def along(vertices: FloatArray, s: ArrayLike) -> FloatArray:
+    """Points of a polyline at arc lengths s, shape (len(s), 2)."""
+    lengths = arc_lengths(vertices)
+    return np.column_stack([np.interp(np.asarray(s, dtype=float), lengths, column) for column in vertices.T])
+
+
+def even_odd_area(*rings: FloatArray) -> float:
+    """Area of the points that closed polylines go round an odd number of times in all (m2).
+
+    Of one polyline it is the enclosed area, by the even-odd rule where it crosses itself: both lobes of a figure-eight
+    count, an inner loop does not. Of two it is the area of the symmetric difference of what they enclose, because a
+    point is in that if it is inside one of them and not the other. The polylines are cut at their crossings, and the faces
+    between the pieces counted or not by a ray from a point in each.
+
+    Parameters
+    ----------
+    *rings : ndarray, shape (n, 2)
+        Closed polylines without the first point again at the end.
+    """
+    import shapely
+
+    # about a point nearby, for a curve far from the origin
+    origin = rings[0].mean(axis=0)
+    vertices = [ring(points - origin, True) for points in rings]
+    pieces = shapely.get_parts(shapely.unary_union([shapely.LineString(v) for v in vertices]))
+    faces = shapely.get_parts(shapely.polygonize(pieces))
+    x, y = shapely.get_coordinates(shapely.point_on_surface(faces)).T[:, :, None]
+    crossings = np.zeros(len(faces), dtype=int)
+    for v in vertices:
+        (xa, ya), (xb, yb) = v[:-1].T, v[1:].T
+        spans = (ya > y) != (yb > y)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            # segments along the ray divide by zero; they span no ray
+            right = xa + (y - ya) * (xb - xa) / (yb - ya) > x
+        crossings += (spans & right).sum(axis=1)
+    return float(shapely.area(faces)[crossings % 2 == 1].sum())
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class TargetPath:
+    """A plane curve to be traced, in the order of the points.
+
+    Attributes
+    ----------
+    points : ndarray, shape (n, 2)
+        m; a closed curve does not repeat its first point at the end.
+    closed : bool
+        Whether the last point is joined to the first.
+
+    Raises
+    ------
+    InputError
+        If there are less than 3 points (2 if open), one is not finite, two in succession or all are the same, the shape is
+        not (n, 2), or a closed curve encloses no area.
+    """
+
+    points: FloatArray
+    closed: bool
+
+    def __post_init__(self) -> None:
+        points = plane_points(self.points, "the target", 3 if self.closed else 2)
+        extent = float(np.ptp(points, axis=0).max())
+        nothing = COINCIDENT * max(extent, float(np.abs(points).max()))
+        if extent <= nothing:
+            raise InputError(f"all {len(points)} points of the target are the same one, {points[0]} m")
+        # the magnitude too: far from the origin the digits of a coordinate are fewer
+        steps = np.hypot(*np.diff(ring(points, self.closed), axis=0).T)
+        same = np.flatnonzero(steps <= nothing)
+        if len(same):
+            first, second = int(same[0]), int(same[0] + 1) % len(points)
+            hint = ": the last point repeats the first, leave it out" if second == 0 else ""
+            raise InputError(
+                f"the target has {len(same)} pairs of successive points that are the same, the first at indices "
+                f"{first} and {second}{hint}"
+            )
+        points.setflags(write=False)
+        object.__setattr__(self, "points", points)
+        if self.closed and self.enclosed_area <= COINCIDENT * self.length**2:
+            raise InputError(
+                "the target is closed and encloses no area: a curve traced there and back is an open one (closed=False)"
+            )
+
+    @classmethod
+    def from_file(
+        cls, path: str | Path, *, unit: str | None = None, name: str | None = None, closed: bool | None = None
+    ) -> TargetPath:
+        """The curve of a CSV or SVG file; see `analysis.io.read_points`. ``closed`` overrules what the file says.
+
+        Raises
+        ------
+        InputError
+            If the file cannot be read, or its points are no target.
+        """
+        points, found = read_points(path, unit=unit, name=name)
+        return cls(points=points, closed=found if closed is None else closed)
+
+    @property
+    def length(self) -> float:
+        """Length of the polyline (m)."""
+        return float(arc_lengths(ring(self.points, self.closed))[-1])
+
+    def _segments(self) -> tuple[FloatArray, FloatArray]:
+        vertices = ring(self.points, self.closed)
+        return 0.5 * (vertices[:-1] + vertices[1:]), np.hypot(*np.diff(vertices, axis=0).T)
+
+    @property
+    def centroid(self) -> FloatArray:
+        """Centroid of the line itself, not of the area inside (m), shape (2,)."""
+        middles, lengths = self._segments()
+        centre: FloatArray = lengths @ middles / lengths.sum()
+        return centre
+
+    @property
+    def size(self) -> float:
+        """Radius of gyration: the root of the mean squared distance of the line from its centroid (m)."""
+        middles, lengths = self._segments()
+        # a segment has l^2/12 about its own middle
+        squares = ((middles - self.centroid) ** 2).sum(axis=1) + lengths**2 / 12.0
+        return float(np.sqrt(lengths @ squares / lengths.sum()))
+
+    @property
+    def signed_area(self) -> float:
+        """Integral of x dy round the closed curve (m2): positive counter-clockwise; the lobes of a figure-eight cancel.
+
+        Raises
+        ------
+        InputError
+            If the curve is open.
+        """
+        self._must_be_closed()
+        x, y = (self.points - self.points[0]).T
+        return 0.5 * float(np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y))
+
+    @property
+    def enclosed_area(self) -> float:
+        """Area inside, by the even-odd rule where the curve crosses itself (m2); see `even_odd_area`.
+
+        Raises
+        ------
+        InputError
+            If the curve is open.
+        """
+        self._must_be_closed()
+        return even_odd_area(self.points)
+
+    def _must_be_closed(self) -> None:
+        if not self.closed:
+            raise InputError("the target is open: it encloses no area")
+
+    @property
+    def weights(self) -> FloatArray:
+        """Arc length that belongs to each point: half of both segments at it (m), shape (n,); their sum is the length."""
+        lengths = self._segments()[1]
+        before = np.roll(lengths, 1) if self.closed else np.append(0.0, lengths)
+        after = lengths if self.closed else np.append(lengths, 0.0)
+        halves: FloatArray = 0.5 * (before + after)
+        return halves
+
+    @property
+    def normals(self) -> FloatArray:
+        """Unit normals at the points, shape (n, 2): outwards of a closed curve, to the right along an open one.
+
+        The tangent is that of the parabola through the point and its two neighbours (second order in the spacing), at an
+        open end that of the segment. Of a closed curve that crosses itself 'outwards' is that of the lobe with more area.
+        """
+        vertices = ring(self.points, self.closed)
+        steps = np.diff(vertices, axis=0)
+        lengths = np.hypot(*steps.T)[:, None]
+        units = steps / lengths
+        if self.closed:
+            before, after, h, k = np.roll(units, 1, axis=0), units, np.roll(lengths, 1, axis=0), lengths
+        else:
+            before, after = np.vstack([units[:1], units]), np.vstack([units, units[-1:]])
+            h, k = np.vstack([lengths[:1], lengths]), np.vstack([lengths, lengths[-1:]])
+        tangents = (k * before + h * after) / (h + k)
+        size = np.hypot(*tangents.T)[:, None]
+        # at the tip of a cusp the curve turns back on itself: the side on which it came
+        tangents = np.where(size > 1e-9, tangents / np.maximum(size, 1e-9), before)
+        side = -1.0 if self.closed and self.signed_area < 0.0 else 1.0
+        normals: FloatArray = side * np.column_stack([tangents[:, 1], -tangents[:, 0]])
+        return normals
+
+    def reversed(self) -> TargetPath:
+        """The same curve the other way round; a closed one starts at the same point."""
+        points = np.roll(self.points[::-1], 1, axis=0) if self.closed else self.points[::-1]
+        return TargetPath(points=points, closed=self.closed)
+
+    def resampled(self, n: int) -> TargetPath:
+        """n points at equal arc length along the polyline, from the first point on; both ends of an open one included.
+
+        Raises
+        ------
+        InputError
+            If n is less than 3 (2 if open), or the points fall on each other.
+        """
+        least = 3 if self.closed else 2
+        if n < least:
+            raise InputError(f"{n} points are asked for: there must be at least {least}")
+        s = np.linspace(0.0, self.length, n, endpoint=not self.closed)
+        return TargetPath(points=along(ring(self.points, self.closed), s), closed=self.closed)
+
+    def transformed(
+        self, *, scale: float = 1.0, angle: float = 0.0, shift: tuple[float, float] = (0.0, 0.0)
+    ) -> TargetPath:
+        """The curve scaled and turned (rad, counter-clockwise) about the origin, then shifted (m).
+
+        Raises
+        ------
+        InputError
+            If the scale is not greater than zero, or a number is not finite.
+        """
+        if not scale > 0.0:
+            raise InputError(f"the scale is {scale!r}: it must be greater than zero")
+        c, s = scale * cos(angle), scale * sin(angle)
+        return TargetPath(points=self.points @ np.array([[c, s], [-s, c]]) + shift, closed=self.closed)
+
+    def smoothed(self, n: int, *, deviation: float | None = None) -> TargetPath:
+        """A cubic smoothing spline of a noisy curve, at n points of equal arc length.
+
+        The spline z(u) over the chord length u of the points z_k = x + i y minimises
+
+            sum |z_k - z(u_k)|^2 + lambda * integral |z''|^2 du,
+
+        periodic for a closed curve, with natural ends for an open one (Green and Silverman, Nonparametric Regression and
+        Generalized Linear Models, 1994, chapter 2). Both coordinates share lambda, so that turning the curve turns the result.
+
+        Parameters
+        ----------
+        n : int
+        deviation : float, optional
+            Root of the mean squared distance of the points from the spline (m), if the noise is known; by default lambda is
+            chosen by generalised cross-validation, which takes what is not correlated from point to point as noise. For
+            a slow tremor of the hand give the deviation.
+
+        Raises
+        ------
+        InputError
+            If the curve has less than 6 points, or the deviation is not greater than zero and less than that of the
+            smoothest curve there is (a point if closed, a straight line if open).
+        """
+        from scipy.interpolate import CubicSpline
+        from scipy.optimize import brentq, minimize_scalar
+
+        if len(self.points) < 6:
+            raise InputError(f"the target has {len(self.points)} points: smoothing needs at least 6")
+        points = self.points if len(self.points) <= MOST_SMOOTHED else self.resampled(MOST_SMOOTHED).points
+        origin, unit = points.mean(axis=0), self.size
+        vertices = ring(points - origin, self.closed) / unit
+        u = arc_lengths(vertices)
+        u *= (len(u) - 1) / u[-1]
+        z = vertices[: len(points)] @ np.array([1.0, 1j])
+        stiffness, modes = np.linalg.eigh(_bending(np.diff(u), self.closed))
+        free = 1 if self.closed else 2  # what bending leaves as it is: a point, or a straight line
+        stiffness[:free] = 0.0
+        c = modes.T @ z
+
+        def misfit(log: float) -> float:
+            """Mean squared distance of the points from the spline."""
+            held = 1.0 / (1.0 + np.exp(log) * stiffness)
+            return float((np.abs((1.0 - held) * c) ** 2).mean())
+
+        def validation(log: float) -> float:
+            freedom = (1.0 / (1.0 + np.exp(log) * stiffness)).mean()
+            left = 1.0 - FREEDOM_WEIGHT * freedom
+            return float(np.log(misfit(log) + 1e-30) - 2.0 * np.log(left)) if left > 0.0 else float("inf")
+
+        low, high = -np.log(stiffness[-1]) - 20.0, -np.log(stiffness[free]) + 20.0
+        if deviation is None:
+            grid = np.linspace(low, high, 200)
+            k = int(np.argmin([validation(g) for g in grid]))
+            log = minimize_scalar(
+                validation, bounds=(grid[max(k - 1, 0)], grid[min(k + 1, len(grid) - 1)]), method="bounded"
+            ).x
+        else:
+            wanted, most = (deviation / unit) ** 2, misfit(high)
+            if not (deviation > 0.0 and wanted < most):
+                raise InputError(
+                    f"a deviation of {deviation!r} m: it must be greater than zero and less than {unit * most**0.5:.3g} m, "
+                    "where nothing is left of the curve"
+                )
+            log = low if misfit(low) >= wanted else brentq(lambda g: misfit(g) - wanted, low, high, xtol=1e-12)
+        fitted = modes @ (c / (1.0 + np.exp(log) * stiffness))
+        knots = ring(np.column_stack([fitted.real, fitted.imag]), self.closed)
+        spline = CubicSpline(u, knots, bc_type="periodic" if self.closed else "natural")
+        fine = spline(np.linspace(0.0, u[-1], max(20 * n, 10 * len(u)), endpoint=not self.closed))
+        return TargetPath(points=origin + unit * fine, closed=self.closed).resampled(n)
+
+
+def _bending(h: FloatArray, closed: bool) -> FloatArray:
+    """The matrix K of z' K z = integral of z''^2 over the cubic spline through z at knots h apart, K = Q R^-1 Q'.
+
+    Green and Silverman, section 2.1.2; periodic, or natural with z'' = 0 at both ends.
+    """
+    n = len(h) if closed else len(h) + 1
+    inner = np.arange(n) if closed else np.arange(1, n - 1)
+    before, after = h[inner - 1], h[inner % len(h)]
+    eye = np.eye(n)
+    # R z'' = Q' z at every knot (of an open curve: at the inner ones, z'' being zero at the ends)
+    r = (
+        eye[inner - 1] * (before / 6.0)[:, None]
+        + eye[inner] * ((before + after) / 3.0)[:, None]
+        + eye[(inner + 1) % n] * (after / 6.0)[:, None]
+    )[:, inner]
+    slopes = (eye[(inner + 1) % n] - eye[inner]) / after[:, None] - (eye[inner] - eye[inner - 1]) / before[:, None]
+    k: FloatArray = slopes.T @ np.linalg.solve(r, slopes)
+    return 0.5 * (k + k.T)
+
+
+# Formulas
+
+_CONSTANTS = {"pi": pi, "e": e, "tau": tau}
+_FUNCTIONS: dict[str, tuple[Callable[..., Any], int]] = {
+    **{name: (getattr(np, name), 1) for name in ("sin", "cos", "tan", "sinh", "cosh", "tanh", "exp", "log", "sqrt")},
+    **{name: (getattr(np, name), 1) for name in ("abs", "sign", "floor", "ceil", "degrees", "radians")},
+    **{name: (getattr(np, f"arc{name[1:]}"), 1) for name in ("asin", "acos", "atan")},
+    "atan2": (np.arctan2, 2),
+    "hypot": (np.hypot, 2),
+    "min": (np.minimum, 2),
+    "max": (np.maximum, 2),
+}
+_OPERATORS: dict[type[ast.AST], Callable[..., Any]] = {
+    ast.Add: np.add,
+    ast.Sub: np.subtract,
+    ast.Mult: np.multiply,
+    ast.Div: np.divide,
+    ast.Mod: np.mod,
+    ast.Pow: np.power,
+    ast.UAdd: np.positive,
+    ast.USub: np.negative,
+}
+#: Longest formula, in characters.
+_LONGEST = 1000
+
+
+def formula(text: str, variable: str = "t") -> Callable[[ArrayLike], FloatArray]:
+    """A function of one variable from a text such as ``"70 + 100*abs(sin(t/2))"``.
+
+    Numbers, ``+ - * / % **``, brackets, ``pi e tau``, ``sin cos tan asin acos atan atan2 sinh cosh tanh exp log sqrt abs sign
+    floor ceil hypot min max degrees radians``, and the variable; angles in radians. Nothing else is run: the text is parsed
+    with `ast`, and each node either stands on this list or is refused.
+
+    Returns
+    -------
+    callable
+        From an array to an array of the same shape; raises InputError where the value is not finite.
+
+    Raises
+    ------
+    InputError
+        If the text is no such formula; the part that is not is named.
+    """
+    if not isinstance(text, str):
+        raise InputError(f"a formula must be a text, not {text!r}")
+    if len(text) > _LONGEST:
+        raise InputError(f"the formula has {len(text)} characters: it must have no more than {_LONGEST}")
+    try:
+        tree = ast.parse(text.strip(), mode="eval").body
+    except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
+        reason = error.msg if isinstance(error, SyntaxError) else str(error)
+        raise InputError(f"the formula {text!r} cannot be read: {reason}") from None
+
+    def refused(node: ast.AST, reason: str) -> InputError:
+        return InputError(f"in the formula {text!r}: {ast.unparse(node)!r} {reason}")
+
+    def unknown(node: ast.AST, name: str, known: list[str]) -> InputError:
+        near = difflib.get_close_matches(name, known, n=1)
+        hint = f"; did you mean {near[0]}?" if near else ""
+        return refused(node, f"is not known{hint} (there are {', '.join(known)})")
+
+    def value(node: ast.AST, t: FloatArray) -> Any:
+        match node:
+            case ast.Constant(value=int() | float() as number) if not isinstance(number, bool):
+                try:
+                    return np.float64(number)
+                except OverflowError:
+                    raise refused(node, "is too large") from None
+            case ast.Name(id=name):
+                if name == variable:
+                    return t
+                if name not in _CONSTANTS:
+                    raise unknown(node, name, [variable, *_CONSTANTS])
+                return _CONSTANTS[name]
+            case ast.BinOp(left=left, op=op, right=right) if type(op) in _OPERATORS:
+                return _OPERATORS[type(op)](value(left, t), value(right, t))
+            case ast.BinOp(op=ast.BitXor()):
+                raise refused(node, "has ^, which is no power here: write **")
+            case ast.UnaryOp(op=op, operand=operand) if type(op) in _OPERATORS:
+                return _OPERATORS[type(op)](value(operand, t))
+            case ast.Call(func=ast.Name(id=name), args=args, keywords=[]):
+                if name not in _FUNCTIONS:
+                    raise unknown(node, name, list(_FUNCTIONS))
+                function, count = _FUNCTIONS[name]
+                if len(args) != count:
+                    raise refused(node, f"has {len(args)} arguments: {name} takes {count}")
+                return function(*(value(arg, t) for arg in args))
+            case _:
+                raise refused(node, "is not allowed: a formula has numbers, operators, functions and constants only")
+
+    def evaluated(t: ArrayLike) -> FloatArray:
+        t = np.asarray(t, dtype=float)
+        with np.errstate(all="ignore"):  # what comes out is checked instead
+            values: FloatArray = np.array(np.broadcast_to(value(tree, t), t.shape), dtype=float)
+        bad = np.flatnonzero(~np.isfinite(values))
+        if len(bad):
+            raise InputError(
+                f"the formula {text!r} has the value {values.flat[bad[0]]} at {variable} = {t.flat[bad[0]]:.6g}: it must be "
+                "finite"
+            )
+        return values
+
+    try:
+        with np.errstate(all="ignore"):
+            value(tree, np.zeros(()))
+    except RecursionError:
+        raise InputError(f"the formula {text[:40]!r}... cannot be read: it is nested too deeply") from None
+    return evaluated
+
+
+def _number(value: float | str) -> float:
+    return float(formula(value, "")(0.0)) if isinstance(value, str) else float(value)
+
+
+def _parameter(start: float | str, end: float | str, n: int, turn: bool) -> FloatArray:
+    """n values at equal steps from start to end, the end itself left out for a whole turn."""
+    a, b = _number(start), _number(end)
+    if not (np.isfinite([a, b]).all() and b > a):
+        raise InputError(f"the parameter goes from {start!r} to {end!r}: the end must be greater, and both finite")
+    return np.linspace(a, b, n, endpoint=not turn)
+
+
+def path_from_formula(
+    x: str,
+    y: str,
+    *,
+    n: int = 72,
+    unit: str = "m",
+    start: float | str = 0.0,
+    end: float | str = 2.0 * pi,
+    variable: str = "t",
+) -> TargetPath:
+    """A curve from two formulas, at n equal steps of their parameter.
+
+    Parameters
+    ----------
+    x, y : str
+        See `formula`; for example ``"20 + 10*cos(t)"`` and ``"15 + 5*sin(t)"``.
+    n : int
+        Number of points.
+    unit : str
+        Unit of what the formulas give, such as ``"cm"``.
+    start, end : float or str
+        Range of the parameter, as numbers or formulas such as ``"3*pi/2"``. If the curve is back at its first point at the end
+        (to within 1e-9 of its extent), it is closed, and that point is not repeated.
+
+    Raises
+    ------
+    InputError
+        If a formula, the range or the curve is not usable.
+    ParameterError
+        If the unit is not one of length.
+    """
+    factor = quantity(f"1 {unit}", "m", "unit")
+    functions = [formula(text, variable) for text in (x, y)]
+
+    def points(turn: bool, number: int) -> FloatArray:
+        t = _parameter(start, end, number, turn)
+        return factor * np.column_stack([f(t) for f in functions])
+
+    drawn = points(False, n + 1)
+    closed = bool(np.hypot(*(drawn[-1] - drawn[0])) <= 1e-9 * np.ptp(drawn, axis=0).max())
+    return TargetPath(points=points(closed, n), closed=closed)
+
+
+def function_from_formula(
+    text: str,
+    *,
+    n: int = 72,
+    unit: str = "rad",
+    start: float | str = 0.0,
+    end: float | str = 2.0 * pi,
+    variable: str = "t",
+) -> tuple[FloatArray, FloatArray]:
+    """Angles at n equal steps of the crank angle from a formula; for example ``"70 + 100*abs(sin(t/2))"`` in ``"deg"``.
+
+    Parameters
+    ----------
+    text : str
+        See `formula`; its variable is the crank angle omega t (rad).
+    n, variable
+        As for `path_from_formula`.
+    unit : str
+        Unit of what the formula gives.
+    start, end : float or str
+        Range of the crank angle; one of whole turns leaves out its end, which is its start again.
+
+    Returns
+    -------
+    crank_angle, angle : ndarray, shape (n,)
+        rad.
+
+    Raises
+    ------
+    InputError
+        If the formula or the range is not usable.
+    ParameterError
+        If the unit is not one of angle.
+    """
+    factor = quantity(f"1 {unit}", "rad", "unit")
+    turns = (_number(end) - _number(start)) / tau
+    whole = bool(np.isfinite(turns) and abs(turns - round(turns)) < 1e-9)
+    crank_angle = _parameter(start, end, n, whole)
+    return crank_angle, factor * formula(text, variable)(crank_angle)

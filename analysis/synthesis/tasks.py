@@ -1,0 +1,452 @@
+"""What a linkage is asked to do: tasks of synthesis, and their normal form.
+
+A task holds target values and weights. `Task.normal` puts it in the form that every method here works on: lengths in units
+of the target's size, about its centre, so that a watch and an excavator are the same problem.
+
+The quality functions are the thesis's (chapter VI): timed, the sum of weighted squared distances at the given crank
+rotations; of a rocker, the sum of weighted squared errors of angle; untimed, the area between the curves or the
+squared distance to the curve.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from itertools import pairwise
+from math import hypot, isfinite, pi
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from linkwork.errors import InputError
+
+from .targets import TargetPath
+
+FloatArray = NDArray[np.float64]
+Measure = Literal["area", "distance"]
+
+
+def _points(values: ArrayLike, what: str, least: int) -> FloatArray:
+    points = np.array(values, dtype=float)
+    if points.ndim != 2 or points.shape[1] != 2:
+        raise InputError(f"{what} have the shape {points.shape}: they must be n points of two coordinates, (n, 2)")
+    _finite(points, what)
+    if len(points) < least:
+        raise InputError(f"{what}: {len(points)} are too few, there must be at least {least}")
+    same = np.nonzero((np.diff(points, axis=0) == 0.0).all(axis=1))[0]
+    if len(same):
+        raise InputError(
+            f"{what}: points {same[0]} and {same[0] + 1} are the same, {points[same[0]].tolist()}; leave one out"
+        )
+    return points
+
+
+def _finite(values: FloatArray, what: str) -> None:
+    bad = np.argwhere(~np.isfinite(values))
+    if len(bad):
+        raise InputError(f"{what}: number {int(bad[0][0])} is {values[tuple(bad[0])]}: it must be finite")
+
+
+def _numbers(values: ArrayLike, what: str, n: int) -> FloatArray:
+    numbers = np.array(values, dtype=float)
+    if numbers.shape != (n,):
+        raise InputError(f"{what} have the shape {numbers.shape}: there must be one for each of the {n} targets")
+    _finite(numbers, what)
+    return numbers
+
+
+def _rotation(values: ArrayLike, n: int) -> FloatArray:
+    rotation = _numbers(values, "crank rotations", n)
+    steps = np.diff(rotation)
+    if not (np.all(steps > 0.0) or np.all(steps < 0.0)):
+        k = int(np.argmin(steps * np.sign(steps.sum() or 1.0)))
+        raise InputError(
+            f"crank rotations {k} and {k + 1} are {rotation[k]:.6g} and {rotation[k + 1]:.6g} rad: they must go one way"
+        )
+    if abs(rotation[-1] - rotation[0]) > 2.0 * pi * (1.0 + 1e-9):
+        raise InputError(
+            f"crank rotations span {abs(rotation[-1] - rotation[0]):.6g} rad: no more than a turn can be asked"
+        )
+    return rotation
+
+
+def _weights(values: ArrayLike | None, n: int) -> FloatArray:
+    if values is None:
+        return np.ones(n)
+    weights = _numbers(values, "weights", n)
+    if (weights < 0.0).any() or not weights.any():
+        k = int(np.argmin(weights))
+        raise InputError(f"weight {k} is {weights[k]:g}: none may be below zero, nor all be zero")
+    return weights
+
+
+def turn(n: int) -> FloatArray:
+    """n equal steps over one turn of the crank (rad), the end left out."""
+    return np.linspace(0.0, 2.0 * pi, n, endpoint=False)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class TimedPath:
+    """The coupler point is to be at given points at given crank rotations.
+
+    Attributes
+    ----------
+    points : ndarray, shape (n, 2)
+        m.
+    rotation : ndarray, shape (n,)
+        Crank rotation from the start (rad), within a turn; equal steps over one turn by default.
+    weights : ndarray, shape (n,)
+        Of the squared distances.
+    """
+
+    points: ArrayLike
+    rotation: ArrayLike | None = None
+    weights: ArrayLike | None = None
+
+    def __post_init__(self) -> None:
+        points = _points(self.points, "target points", 2)
+        object.__setattr__(self, "points", points)
+        rotation = turn(len(points)) if self.rotation is None else _rotation(self.rotation, len(points))
+        object.__setattr__(self, "rotation", rotation)
+        object.__setattr__(self, "weights", _weights(self.weights, len(points)))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Straight:
+    """A part of an untimed path that must be straight, and quick.
+
+    Attributes
+    ----------
+    start, end : int
+        First and last of the path's points on the straight part, in the order of the points.
+    rotation : float
+        Crank rotation within which it must be run through (rad).
+    flatness : float, optional
+        Largest extent across the line over that part (m); only wished for, by ``weight``, without.
+    weight : float
+        Of the deviation across the line there.
+    """
+
+    start: int
+    end: int
+    rotation: float
+    flatness: float | None = None
+    weight: float = 1.0
+
+    def __post_init__(self) -> None:
+        if self.end <= self.start or self.start < 0:
+            raise InputError(f"a straight part from point {self.start} to {self.end}: it must run forward")
+        if not 0.0 < self.rotation <= 2.0 * pi:
+            raise InputError(
+                f"crank rotation of the straight part is {self.rotation}: it must be above 0, at most 2 pi rad"
+            )
+        if self.flatness is not None and not self.flatness > 0.0:
+            raise InputError(f"flatness is {self.flatness}: it must be greater than zero (m)")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class UntimedPath:
+    """The coupler point is to trace a curve, whatever the crank's rotation on the way.
+
+    Attributes
+    ----------
+    path : TargetPath
+        Closed or open.
+    measure : "area" or "distance"
+        What ranks solutions: the area between the curves (m2), or the mean squared distance times the number of points (m2).
+    samples : int
+        Points at equal arc length at which the curve is fitted.
+    straight : Straight, optional
+        A straight part run through within a crank rotation; its points are those of ``path``.
+    weights : ndarray, shape (number of the path's points,), optional
+        Per point of ``path``; in between they are interpolated along it.
+    """
+
+    path: TargetPath
+    measure: Measure = "area"
+    samples: int = 72
+    straight: Straight | None = None
+    weights: ArrayLike | None = None
+
+    def __post_init__(self) -> None:
+        if self.measure not in ("area", "distance"):
+            raise InputError(f"measure is {self.measure!r}: it must be 'area' or 'distance'")
+        if self.samples < 8:
+            raise InputError(f"{self.samples} samples of a path: there must be at least 8")
+        if self.straight is not None and self.straight.end >= len(self.path.points):
+            raise InputError(
+                f"the straight part ends at point {self.straight.end}, the path has {len(self.path.points)}"
+            )
+        object.__setattr__(self, "weights", _weights(self.weights, len(self.path.points)))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class RockerFunction:
+    """The rocker is to be at given angles at given crank rotations.
+
+    Attributes
+    ----------
+    angle : ndarray, shape (n,)
+        th4 from the ground link (rad).
+    rotation, weights : ndarray, shape (n,)
+        As in `TimedPath`; the weights are of the squared errors of angle.
+    mounting : bool
+        Whether the output may be mounted on the rocker at any angle.
+    """
+
+    angle: ArrayLike
+    rotation: ArrayLike | None = None
+    weights: ArrayLike | None = None
+    mounting: bool = False
+
+    def __post_init__(self) -> None:
+        angle = np.array(self.angle, dtype=float)
+        if angle.ndim != 1 or len(angle) < 3:
+            raise InputError(f"target angles have the shape {angle.shape}: they must be a list of at least 3")
+        _finite(angle, "target angles")
+        object.__setattr__(self, "angle", angle)
+        rotation = turn(len(angle)) if self.rotation is None else _rotation(self.rotation, len(angle))
+        object.__setattr__(self, "rotation", rotation)
+        object.__setattr__(self, "weights", _weights(self.weights, len(angle)))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Motion:
+    """The coupler is to carry a body through given poses.
+
+    Attributes
+    ----------
+    points : ndarray, shape (n, 2)
+        Places of the coupler point (m).
+    angle : ndarray, shape (n,)
+        Direction of the body at each (rad); how it is mounted on the coupler is free.
+    rotation : ndarray, shape (n,), optional
+        Crank rotations; without them only the order is asked.
+    length : float, optional
+        Length by which an error of angle counts as one of place (m/rad); half the target's extent by default.
+    weights : ndarray, shape (n,)
+    """
+
+    points: ArrayLike
+    angle: ArrayLike
+    rotation: ArrayLike | None = None
+    length: float | None = None
+    weights: ArrayLike | None = None
+
+    def __post_init__(self) -> None:
+        points = _points(self.points, "target points", 2)
+        n = len(points)
+        object.__setattr__(self, "points", points)
+        object.__setattr__(self, "angle", _numbers(self.angle, "target angles", n))
+        if self.rotation is not None:
+            object.__setattr__(self, "rotation", _rotation(self.rotation, n))
+        if self.length is None:
+            object.__setattr__(self, "length", 0.5 * _extent(points))
+        elif not (isfinite(self.length) and self.length > 0.0):
+            raise InputError(f"length is {self.length}: it must be a finite number greater than zero (m/rad)")
+        object.__setattr__(self, "weights", _weights(self.weights, n))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class PrecisionPoints:
+    """The coupler point is to pass exactly through a few points, in their order, at any crank rotations or at given ones.
+
+    A four-bar can do nine untimed points or five timed ones, and rarely with good manners; what cannot be done exactly comes as
+    close as it can. With an ``angle`` they are poses: five untimed.
+
+    Attributes
+    ----------
+    points : ndarray, shape (n, 2)
+        m.
+    angle, rotation : ndarray, shape (n,), optional
+        Directions of the carried body, crank rotations (rad).
+    length : float, optional
+        As in `Motion`.
+    """
+
+    points: ArrayLike
+    angle: ArrayLike | None = None
+    rotation: ArrayLike | None = None
+    length: float | None = None
+
+    def __post_init__(self) -> None:
+        points = _points(self.points, "precision points", 2)
+        object.__setattr__(self, "points", points)
+        n = len(points)
+        for name in ("angle", "rotation"):
+            if getattr(self, name) is not None:
+                check = _rotation if name == "rotation" else lambda v, m: _numbers(v, "target angles", m)
+                object.__setattr__(self, name, check(getattr(self, name), n))
+        if self.angle is not None and self.length is None:
+            object.__setattr__(self, "length", 0.5 * _extent(points))
+
+
+Task = TimedPath | UntimedPath | RockerFunction | Motion | PrecisionPoints
+
+
+def _extent(points: FloatArray) -> float:
+    return float(hypot(*np.ptp(points, axis=0)))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Normal:
+    """A task in normal form: what is compared at n stations, in units of the target's size about its centre.
+
+    Attributes
+    ----------
+    origin : complex
+        Centre of the target (m).
+    unit : float
+        Its size (m): diagonal of its bounding box; of a rocker function, 1 m.
+    points : ndarray of complex, shape (n,), or None
+        Target of the coupler point.
+    angle : ndarray, shape (n,), or None
+        Target of the coupler's or the rocker's angle (rad).
+    of_rocker : bool
+        Whether the angle is the rocker's, from the ground link, or the coupler's, in the plane.
+    mounting : bool
+        Whether the output angle is free.
+    leverage : float
+        Factor of an error of angle (units per rad); 1 of a rocker function.
+    weights : ndarray, shape (n,)
+        Of the squared errors.
+    rotation : ndarray, shape (n,), or None
+        Crank rotations, None where only their order is given.
+    closed : bool
+        Whether the stations close upon themselves.
+    normals : ndarray of complex, shape (n,), or None
+        Unit normals of the target: where the quality is an area.
+    arc : ndarray, shape (n,)
+        Length of the target that each station stands for.
+    straight : Straight or None
+        Its ends counted in stations, its flatness in units.
+    exact : bool
+        Whether the points are to be met exactly.
+    """
+
+    origin: complex
+    unit: float
+    points: NDArray[np.complex128] | None
+    angle: FloatArray | None
+    of_rocker: bool = False
+    mounting: bool = False
+    leverage: float = 1.0
+    weights: FloatArray
+    rotation: FloatArray | None
+    closed: bool = False
+    normals: NDArray[np.complex128] | None = None
+    arc: FloatArray = field(default_factory=lambda: np.empty(0))
+    straight: Straight | None = None
+    exact: bool = False
+
+    @property
+    def n(self) -> int:
+        """Number of stations."""
+        return len(self.weights)
+
+    @property
+    def timed(self) -> bool:
+        """Whether the crank rotations are given."""
+        return self.rotation is not None
+
+    @property
+    def scale_of_error(self) -> float:
+        """Factor from the normal quality (units squared) to m2; 1 of a rocker function (rad2)."""
+        return self.unit * self.unit
+
+
+def normal_form(task: Task, weights: ArrayLike | None = None) -> Normal:
+    """Normal form of a task, with ``weights`` in the place of its own where given.
+
+    Raises
+    ------
+    InputError
+        If the weights are not one per target, or all points coincide.
+    """
+    if weights is not None:
+        if isinstance(task, PrecisionPoints):
+            raise InputError("precision points are met exactly: they have no weights")
+        task = replace(task, weights=weights)
+    if isinstance(task, RockerFunction):
+        return Normal(
+            origin=0.0,
+            unit=1.0,
+            points=None,
+            angle=np.asarray(task.angle),
+            of_rocker=True,
+            mounting=task.mounting,
+            weights=np.asarray(task.weights),
+            rotation=np.asarray(task.rotation),
+            closed=False,
+        )
+    if isinstance(task, UntimedPath):
+        return _of_path(task)
+    points = np.asarray(task.points)
+    unit = _extent(points)
+    if not unit > 0.0:
+        raise InputError(f"all target points are the same, {points[0].tolist()}: a path has an extent")
+    low, high = points.min(axis=0), points.max(axis=0)
+    origin = complex(*(0.5 * (low + high)))
+    angle = None if isinstance(task, TimedPath) else task.angle
+    return Normal(
+        origin=origin,
+        unit=unit,
+        points=(points @ np.array([1.0, 1j]) - origin) / unit,
+        angle=None if angle is None else np.asarray(angle),
+        mounting=angle is not None,
+        leverage=1.0 if angle is None else float(task.length) / unit,  # type: ignore[union-attr, arg-type]
+        weights=np.ones(len(points)) if isinstance(task, PrecisionPoints) else np.asarray(task.weights),
+        rotation=None if task.rotation is None else np.asarray(task.rotation),
+        exact=isinstance(task, PrecisionPoints),
+    )
+
+
+def _of_path(task: UntimedPath) -> Normal:
+    points = np.asarray(task.path.points) @ np.array([1.0, 1j])
+    closed = task.path.closed
+    weights = np.asarray(task.weights)
+    if closed:
+        points, weights = np.append(points, points[0]), np.append(weights, weights[0])
+    low, high = complex(points.real.min(), points.imag.min()), complex(points.real.max(), points.imag.max())
+    origin, unit = 0.5 * (low + high), abs(high - low)
+    length = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(points)))])
+    ends = [0.0, float(length[-1])]
+    straight = task.straight
+    if straight is not None:
+        ends = sorted({*ends, float(length[straight.start]), float(length[straight.end])})
+    # pieces of the path, each divided evenly, so that the ends of the straight part are stations
+    pieces = [
+        np.linspace(a, b, max(2, round(task.samples * (b - a) / length[-1])), endpoint=False) for a, b in pairwise(ends)
+    ]
+    if not closed:
+        pieces.append(np.array([length[-1]]))
+    s = np.concatenate(pieces)
+
+    def at(place: FloatArray) -> NDArray[np.complex128]:
+        where = place % length[-1] if closed else np.clip(place, 0.0, length[-1])
+        places: NDArray[np.complex128] = np.interp(where, length, points.real) + 1j * np.interp(
+            where, length, points.imag
+        )
+        return places
+
+    step = 0.25 * length[-1] / task.samples
+    tangent = at(s + step) - at(s - step)
+    tangent /= np.abs(tangent)
+    edges = np.diff(np.append(s, length[-1])) if closed else np.diff(s)
+    arc = 0.5 * (edges + np.roll(edges, 1)) if closed else 0.5 * (np.append(edges, 0.0) + np.append(0.0, edges))
+    if straight is not None:
+        first, last = (int(np.argmin(np.abs(s - length[k]))) for k in (straight.start, straight.end))
+        flatness = None if straight.flatness is None else straight.flatness / unit
+        straight = replace(straight, start=first, end=last, flatness=flatness)
+    return Normal(
+        origin=origin,
+        unit=unit,
+        points=(at(s) - origin) / unit,
+        angle=None,
+        weights=np.interp(s, length, weights),
+        rotation=None,
+        closed=closed,
+        normals=1j * tangent if task.measure == "area" else None,
+        arc=arc / unit,
+        straight=straight,
+    )

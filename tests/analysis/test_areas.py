@@ -1,0 +1,303 @@
+"""Areas and distances between curves, and the flatness of straight parts.
+
+Published linkages: A. H. Youssef's thesis, chapter VI, in the convention of its appendix 5. The coupler curves are written
+here from the formula, without the package's kinematics.
+"""
+
+from __future__ import annotations
+
+from math import cos, pi, sin
+
+import numpy as np
+import pytest
+import shapely
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+from scipy.spatial.distance import directed_hausdorff
+
+from analysis.synthesis.areas import (
+    area_between,
+    distance_to,
+    hausdorff,
+    straightest_part,
+    straightness,
+)
+from analysis.synthesis.targets import TargetPath, path_from_formula
+from linkwork.errors import InputError
+
+FloatArray = NDArray[np.float64]
+
+# X0, Y0, l1, l2, l3, l4, r (cm), a1, th20, a2 (deg); X0 of path a printed as 154.85, l4 of path b as 183.443
+PATH_A = (15.485, -62.54, 80.216, 5.03, 139.25, 129.46, 77.75, -93.22, 100.41, 113.83)
+PATH_B = (-49.13, 144.98, 142.576, 8.18, 152.743, 184.443, 147.38, -3.062, -31.19, -136.04)
+# the packaging machine (mm); no th20 is printed
+PACKAGING = (94.53, -48.55, 137.54, 36.05, 134.05, 40.06, 435.15, 116.73, 0.0, 345.01)
+# appendix 5, offset by (51, 350); the third x and the sixth are uncertain in the scan
+TEN_POINTS = np.array(
+    [(164, 8), (164, 0), (160, 0), (50, 0), (10, 0), (0, 31), (0, 61), (45, 61), (92, 61), (128, 34.5)]
+) + np.array([51.0, 350.0])
+
+
+def coupler_curve(linkage: tuple[float, ...], n: int, side: int = 1) -> FloatArray:
+    """P over a turn of the crank at n equal steps, C to the left (+1) or right of B->D, by intersecting two circles."""
+    x0, y0, l1, l2, l3, l4, r, *angles = linkage
+    a1, th20, a2 = np.radians(angles)
+    th2 = th20 + np.linspace(0.0, 2.0 * pi, n, endpoint=False)
+    b = l2 * np.exp(1j * th2)
+    bd = l1 - b
+    along = (l3**2 - l4**2 + np.abs(bd) ** 2) / (2.0 * np.abs(bd))
+    bc = (along + 1j * side * np.sqrt(l3**2 - along**2)) * bd / np.abs(bd)
+    p = x0 + 1j * y0 + (b + r * bc / np.abs(bc) * np.exp(1j * a2)) * np.exp(1j * a1)
+    return np.column_stack([p.real, p.imag])
+
+
+def circle(radius: float, n: int = 720, centre: tuple[float, float] = (0.0, 0.0)) -> FloatArray:
+    t = np.linspace(0.0, 2.0 * pi, n, endpoint=False)
+    return np.column_stack([centre[0] + radius * np.cos(t), centre[1] + radius * np.sin(t)])
+
+
+def arc(radius: float, start: float, end: float, n: int = 2000) -> FloatArray:
+    t = np.linspace(start, end, n)
+    return np.column_stack([radius * np.cos(t), radius * np.sin(t)])
+
+
+def open_target(*points: tuple[float, float]) -> TargetPath:
+    return TargetPath(points=np.array(points), closed=False)
+
+
+def closed_target(points: FloatArray) -> TargetPath:
+    return TargetPath(points=points, closed=True)
+
+
+# Published numbers
+
+
+@pytest.mark.parametrize(
+    ("linkage", "axis", "area"), [(PATH_A, 10, 3.11), (PATH_B, 15, 12.61)], ids=["path a", "path b"]
+)
+def test_area_of_the_printed_linkages(linkage: tuple[float, ...], axis: float, area: float) -> None:
+    """Path generation of chapter VI, 360 points of each curve, cm2: printed 2.3 and 12.6."""
+    target = path_from_formula(f"20 + {axis}*cos(t)", "15 + 5*sin(t)", n=360)
+    assert area_between(coupler_curve(linkage, 360), target) == pytest.approx(area, abs=5e-3)
+    # the other assembly is another curve
+    assert area_between(coupler_curve(linkage, 360, side=-1), target) > 100.0
+
+
+def test_packaging_machine() -> None:
+    """Travel 175.8 and flatness 6.99 within 120 deg, area 1444: 5 deg steps, C to the right of B->D, the ten points closed."""
+    curve = coupler_curve(PACKAGING, 72, side=-1)
+    target = closed_target(TEN_POINTS)
+    assert area_between(curve, target) == pytest.approx(1444.0, abs=0.5)
+    part = straightest_part(curve, 25, direction=0.0, least_travel=140.0)
+    assert part.start == 15  # th2 from 75 to 195 deg
+    assert part.travel == pytest.approx(175.8, abs=0.05)
+    assert part.flatness == pytest.approx(6.99, abs=5e-3)
+    # the sixth point read as (10, 31) does not give the area
+    other = TEN_POINTS.copy()
+    other[5, 0] = 61.0
+    assert area_between(curve, closed_target(other)) > 1700.0
+
+
+# Area
+
+
+def test_area_between_circles() -> None:
+    assert area_between(circle(1.0), closed_target(circle(2.0))) == pytest.approx(3.0 * pi, rel=1e-4)
+    # the lens of two unit circles a distance 1 apart
+    lens = 2.0 * pi / 3.0 - 3.0**0.5 / 2.0
+    moved = closed_target(circle(1.0, centre=(1.0, 0.0)))
+    assert area_between(circle(1.0), moved) == pytest.approx(2.0 * (pi - lens), rel=1e-4)
+    assert area_between(circle(1.0), moved) == pytest.approx(
+        area_between(moved.points, closed_target(circle(1.0))), rel=1e-12
+    )
+    apart = closed_target(circle(1.0, centre=(5.0, 0.0)))
+    assert area_between(circle(1.0), apart) == pytest.approx(2.0 * pi, rel=1e-4)
+
+
+def test_area_between_a_curve_and_itself_is_none() -> None:
+    points = circle(0.3, 72, centre=(20.0, -7.0))
+    assert area_between(points, closed_target(points)) < 1e-15
+    assert area_between(np.roll(points[::-1], 5, axis=0), closed_target(points)) < 1e-15
+    assert area_between(points[:50], open_target(*points[:50].tolist()), closed=False) < 1e-12
+
+
+@settings(max_examples=30, deadline=None)
+@given(st.lists(st.floats(0.2, 1.0), min_size=12, max_size=12), st.lists(st.floats(0.2, 1.0), min_size=7, max_size=7))
+def test_area_between_polygons_is_that_of_shapelys_overlay(first: list[float], second: list[float]) -> None:
+    a, b = (
+        np.array(r)[:, None] * circle(1.0, len(r), centre=(0.0, 0.0)) + shift
+        for r, shift in ((first, 0.0), (second, 0.1))
+    )
+    expected = shapely.symmetric_difference(shapely.Polygon(a), shapely.Polygon(b)).area
+    assert area_between(a, closed_target(b)) == pytest.approx(expected, rel=1e-9, abs=1e-12)
+
+
+def test_area_from_a_figure_eight() -> None:
+    """A circle round a figure-eight of lobe area 4/3: the even-odd rule takes both lobes out."""
+    eight = path_from_formula("sin(t)", "sin(2*t)", n=2000)
+    assert area_between(circle(2.0, 2000), eight) == pytest.approx(4.0 * pi - 8.0 / 3.0, rel=1e-4)
+    assert area_between(eight.points, closed_target(circle(2.0, 2000))) == pytest.approx(4.0 * pi - 8.0 / 3.0, rel=1e-4)
+
+
+@pytest.mark.parametrize("scale", [1e-3, 1e3])
+def test_area_does_not_depend_on_place_and_scale(scale: float) -> None:
+    first, second = circle(1.0), circle(1.0, centre=(0.3, 0.1)) * [1.0, 0.7]
+    area = area_between(first, closed_target(second))
+    moved = area_between(scale * (first + 1e4), closed_target(scale * (second + 1e4)))
+    assert moved == pytest.approx(scale**2 * area, rel=1e-7)
+    swept = area_between(first[:300], open_target(*second[:300].tolist()), closed=False)
+    moved = area_between(
+        scale * (first[:300] + 1e4), open_target(*(scale * (second[:300] + 1e4)).tolist()), closed=False
+    )
+    assert moved == pytest.approx(scale**2 * swept, rel=1e-7)
+
+
+def test_area_between_parallel_open_curves_is_that_of_the_strip() -> None:
+    flat = open_target((0.0, 0.0), (2.0, 0.0))
+    assert area_between([[2.0, 0.1], [0.0, 0.1]], flat, closed=False) == pytest.approx(0.2)
+    inner = TargetPath(points=arc(1.0, 0.3, 2.5), closed=False)
+    sector = 0.5 * 2.2 * (1.1**2 - 1.0)
+    assert area_between(arc(1.1, 0.3, 2.5), inner, closed=False) == pytest.approx(sector, rel=1e-5)
+
+
+def test_area_between_open_curves_is_symmetric_and_sees_missing_and_spare_length() -> None:
+    flat, half = open_target((0.0, 0.0), (1.0, 0.0)), np.array([[0.0, 0.0], [0.5, 0.0]])
+    # half of the integral of s ds from 0 to 1/2 that is missed
+    assert area_between(half, flat, closed=False) == pytest.approx(0.0625, rel=1e-5)
+    assert area_between(flat.points, TargetPath(points=half, closed=False), closed=False) == pytest.approx(
+        0.0625, rel=1e-5
+    )
+    wave = path_from_formula("t", "0.2*sin(t)", n=300, end=5.0)
+    other = path_from_formula("t + 0.1", "0.3*sin(t) + 0.05", n=200, end=4.5)
+    assert area_between(wave.points, other, closed=False) == pytest.approx(
+        area_between(other.points, wave, closed=False), rel=1e-12
+    )
+    assert area_between(wave.points[::-1], other, closed=False) == pytest.approx(
+        area_between(wave.points, other, closed=False), rel=1e-9
+    )
+
+
+def test_a_closed_curve_may_trace_an_open_target_on_part_of_its_way() -> None:
+    target = TargetPath(points=arc(1.1, 0.0, pi), closed=False)
+    assert area_between(circle(1.0), target) == pytest.approx(0.1 * 1.1 * pi, rel=1e-4)
+    # and an open curve of a closed target: both integrals
+    part = arc(1.0, 0.0, pi)
+    both = area_between(part, closed_target(circle(1.0)), closed=False)
+    missed = area_between(circle(1.0), TargetPath(points=part, closed=False))
+    assert missed == pytest.approx(0.0, abs=1e-4)
+    # the lower half is 2 sin(phi / 2) from the nearer end, phi from 0 to pi/2 twice
+    assert both == pytest.approx(0.5 * 2.0 * 4.0 * (1.0 - cos(pi / 4)), rel=1e-4)
+
+
+# Distances
+
+
+def test_distance_is_that_to_the_nearest_segment() -> None:
+    rng = np.random.default_rng(2)
+    curve, points = rng.normal(size=(40, 2)), rng.normal(size=(60, 2))
+    for closed in (True, False):
+        ends = np.roll(curve, -1, axis=0) if closed else curve[1:]
+        starts = curve if closed else curve[:-1]
+        expected = np.full(60, np.inf)
+        for a, b in zip(starts, ends):
+            s = np.clip((points - a) @ (b - a) / ((b - a) @ (b - a)), 0.0, 1.0)
+            expected = np.minimum(expected, np.linalg.norm(points - a - s[:, None] * (b - a), axis=1))
+        assert distance_to(curve, points, closed=closed) == pytest.approx(expected, abs=1e-13)
+    assert distance_to(curve, np.empty((0, 2))).shape == (0,)
+
+
+def test_hausdorff_distance() -> None:
+    square = closed_target(np.array([[1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0], [1.0, -1.0]]))
+    assert hausdorff(circle(1.0), square) == pytest.approx(2**0.5 - 1.0, abs=1e-4)
+    # the other way round the circle is the one that sticks out
+    assert hausdorff(circle(3.0), square) == pytest.approx(2.0, abs=1e-4)
+    wave = path_from_formula("t", "0.2*sin(t)", n=2000, end=5.0)
+    other = path_from_formula("t + 0.4", "0.3*cos(t)", n=2000, end=4.5)
+    sampled = max(directed_hausdorff(wave.points, other.points)[0], directed_hausdorff(other.points, wave.points)[0])
+    assert hausdorff(wave.points, other, closed=False) == pytest.approx(sampled, abs=3e-3)
+    assert hausdorff(other.points, wave, closed=False) == pytest.approx(hausdorff(wave.points, other, closed=False))
+    # of an open target only what the target misses
+    assert hausdorff(circle(1.0), TargetPath(points=arc(1.2, 0.0, 1.0), closed=False)) == pytest.approx(0.2, abs=1e-4)
+
+
+# Straight parts
+
+
+def test_straightness_along_a_direction() -> None:
+    line = np.array([[0.0, 0.0], [1.0, 0.1], [2.0, -0.2], [3.0, 0.0], [2.8, 0.05]])
+    part = straightness(line, direction=0.0)
+    assert (part.travel, part.extent, part.flatness) == pytest.approx((2.8, 3.0, 0.3))
+    turned = straightness(line @ np.array([[cos(2.0), sin(2.0)], [-sin(2.0), cos(2.0)]]) + [50.0, -3.0], direction=2.0)
+    assert (turned.travel, turned.extent, turned.flatness) == pytest.approx((2.8, 3.0, 0.3))
+    assert turned.direction == pytest.approx(2.0)
+    # the line has no sense of its own: the part's is taken
+    assert abs(straightness(line[::-1], direction=0.0).direction) == pytest.approx(pi)
+    assert straightness(line[::-1], direction=0.0).travel == pytest.approx(2.8)
+
+
+@settings(max_examples=40, deadline=None)
+@given(st.integers(0, 10**6), st.floats(0.0, 2.0 * pi))
+def test_free_direction_gives_the_narrowest_strip(seed: int, angle: float) -> None:
+    points = np.random.default_rng(seed).normal(size=(12, 2)) * [3.0, 0.5]
+    points = points @ np.array([[cos(angle), sin(angle)], [-sin(angle), cos(angle)]])
+    part = straightness(points)
+    # width over all directions, by brute force: never less, and as little at best
+    angles = np.linspace(0.0, pi, 3000)
+    widths = np.ptp(points @ np.array([-np.sin(angles), np.cos(angles)]), axis=0)
+    assert part.flatness <= widths.min() + 1e-12
+    assert part.flatness == pytest.approx(widths.min(), abs=0.02)
+    assert straightness(points, direction=part.direction).flatness == pytest.approx(part.flatness)
+
+
+def test_points_on_a_line_are_flat() -> None:
+    t = np.array([0.0, 0.2, 0.5, 1.0])
+    part = straightness(np.column_stack([7.0 - 3.0 * t, 4.0 * t]))
+    assert part.flatness == pytest.approx(0.0, abs=1e-14)
+    assert part.travel == pytest.approx(5.0)
+    assert part.direction == pytest.approx(np.arctan2(4.0, -3.0))
+
+
+def test_straightest_part_of_a_stadium() -> None:
+    # two straights, along y = 0 and y = 2, of 30 and 10 points; the seam lies within the first
+    first = np.column_stack([np.linspace(0.0, 3.0, 30), np.zeros(30)])
+    right = np.array([3.0, 1.0]) + np.roll(circle(1.0, 40), 9, axis=0)[:19]
+    second = np.column_stack([np.linspace(3.0, 0.0, 10), np.full(10, 2.0)])
+    left = np.array([0.0, 1.0]) + circle(1.0, 40)[11:30]
+    curve = np.roll(np.vstack([first, right, second, left]), 12, axis=0)
+    part = straightest_part(np.roll(curve, -27, axis=0), 30)
+    assert part.flatness == pytest.approx(0.0, abs=1e-12)
+    assert part.travel == pytest.approx(3.0)
+    assert np.roll(curve, -27, axis=0)[part.start] == pytest.approx([0.0, 0.0])
+    # over the seam of an open curve no part runs
+    assert straightest_part(np.roll(curve, -27, axis=0), 30, closed=False).flatness > 0.01
+    assert straightest_part(curve, 5, direction=0.0, least_travel=1.0).travel >= 1.0
+
+
+@pytest.mark.parametrize("call", ["area", "hausdorff", "distance", "straightness", "straightest"])
+def test_bad_curves_are_refused(call: str) -> None:
+    bad = np.array([[0.0, 0.0], [1.0, np.inf], [2.0, 1.0]])
+    target = closed_target(circle(1.0))
+    with pytest.raises(InputError, match="index 1"):
+        {
+            "area": lambda: area_between(bad, target),
+            "hausdorff": lambda: hausdorff(bad, target),
+            "distance": lambda: distance_to(target.points, bad),
+            "straightness": lambda: straightness(bad),
+            "straightest": lambda: straightest_part(bad, 2),
+        }[call]()
+
+
+def test_bad_requests_are_refused() -> None:
+    with pytest.raises(InputError, match="2 points: it needs at least 3"):
+        area_between([[0.0, 0.0], [1.0, 1.0]], closed_target(circle(1.0)))
+    with pytest.raises(InputError, match="shape"):
+        distance_to(circle(1.0), [0.0, 1.0])
+    with pytest.raises(InputError, match="the same one"):
+        straightness([[1.0, 2.0]] * 3)
+    with pytest.raises(InputError, match="direction is nan"):
+        straightness([[1.0, 2.0], [2.0, 2.0]], direction=float("nan"))
+    with pytest.raises(InputError, match="part of 721 points of 720"):
+        straightest_part(circle(1.0), 721)
+    with pytest.raises(InputError, match=r"travel of 3.0 m: the longest is 2"):
+        straightest_part(circle(1.0), 361, least_travel=3.0)

@@ -1,0 +1,196 @@
+"""Drawings to scale: DXF and SVG, read back by other libraries."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from io import StringIO
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+import ezdxf
+import numpy as np
+import pytest
+import svgelements
+from ezdxf import bbox
+
+from analysis.drawings import LAYERS, UNITS, Circle, Drawing, Line, Polyline, Text, to_dxf, to_svg
+from analysis.io import read_points, save_drawing
+from linkwork.errors import InputError, LinkworkError, ParameterError, UnknownNameError
+
+RNG = np.random.default_rng(4)
+CURVE = RNG.normal(size=(72, 2)) * 0.1 + [0.3, -0.2]
+TARGET = RNG.normal(size=(9, 2)) * 0.1
+DRAWING = Drawing(
+    title="Four-bar <a & b>, ø 5",
+    lines=(
+        Line(layer="crank", start=(0.0, 0.0), end=(0.05, 0.02)),
+        Line(layer="ground", start=(0.0, 0.0), end=(0.4, 0.0)),
+    ),
+    circles=(
+        Circle(layer="ground", centre=(0.0, 0.0), radius=0.004),
+        Circle(layer="slider", centre=(0.4, 0.01), radius=0.8),
+    ),
+    polylines=(
+        Polyline(layer="coupler-curve", points=CURVE, closed=True),
+        Polyline(layer="target", points=TARGET, closed=False),
+    ),
+    texts=(Text(layer="text", position=(0.1, 0.2), height=0.005, text="l2 = 50 mm & µ < 1"),),
+)
+
+
+def read_dxf(text: str) -> Any:
+    return ezdxf.read(StringIO(text))
+
+
+@pytest.mark.parametrize(
+    ("unit", "metre", "code"), [("mm", 1e-3, 4), ("cm", 1e-2, 5), ("m", 1.0, 6), ("in", 0.0254, 1)]
+)
+def test_dxf_reads_back(unit: str, metre: float, code: int) -> None:
+    document = read_dxf(to_dxf(DRAWING, unit))
+    auditor = document.audit()
+    assert not auditor.errors
+    assert not auditor.fixes
+    assert document.header["$INSUNITS"] == code
+    assert {layer.dxf.name for layer in document.layers} >= set(LAYERS)
+    assert document.layers.get("crank").rgb == (0xC0, 0x39, 0x2B)
+    assert document.layers.get("crank").dxf.lineweight == 50
+    space = document.modelspace()
+    assert len(space) == 7
+    crank, ground = space.query("LINE")
+    assert crank.dxf.layer == "crank"
+    assert np.array(crank.dxf.end)[:2] * metre == pytest.approx([0.05, 0.02], abs=1e-9)
+    assert np.array(ground.dxf.end)[:2] * metre == pytest.approx([0.4, 0.0], abs=1e-9)
+    pin, slider = space.query("CIRCLE")
+    assert (pin.dxf.layer, slider.dxf.layer) == ("ground", "slider")
+    assert slider.dxf.radius * metre == pytest.approx(0.8)
+    assert np.array(slider.dxf.center)[:2] * metre == pytest.approx([0.4, 0.01])
+    curve, target = space.query("LWPOLYLINE")
+    assert (curve.closed, target.closed) == (True, False)
+    assert (curve.dxf.layer, target.dxf.layer) == ("coupler-curve", "target")
+    assert np.array(curve.get_points("xy")) * metre == pytest.approx(CURVE, abs=1e-9)
+    assert np.array(target.get_points("xy")) * metre == pytest.approx(TARGET, abs=1e-9)
+    (text,) = space.query("TEXT")
+    assert text.dxf.text == "l2 = 50 mm & µ < 1"
+    assert text.dxf.height * metre == pytest.approx(0.005)
+    assert np.array(text.dxf.insert)[:2] * metre == pytest.approx([0.1, 0.2])
+    assert dict(document.header.custom_vars.properties)["Title"] == DRAWING.title
+
+
+def test_extents() -> None:
+    (left, bottom), (right, top) = DRAWING.extents
+    assert (left, bottom, right, top) == pytest.approx((-0.4, -0.79, 1.2, 0.81))
+    document = read_dxf(to_dxf(DRAWING))
+    box = bbox.extents(document.modelspace().query("LINE CIRCLE LWPOLYLINE"), fast=False)
+    assert np.array([box.extmin, box.extmax])[:, :2] / 1e3 == pytest.approx(np.array(DRAWING.extents), abs=1e-3)
+    assert np.array(document.header["$EXTMIN"])[:2] / 1e3 == pytest.approx([left, bottom])
+    assert np.array(document.header["$EXTMAX"])[:2] / 1e3 == pytest.approx([right, top])
+
+
+@pytest.mark.parametrize("unit", ["mm", "cm", "in"])
+def test_svg_reads_back(tmp_path: Path, unit: str) -> None:
+    path = save_drawing(tmp_path / "a.svg", DRAWING, unit=unit)
+    for name, points, closed in (("coupler-curve", CURVE, True), ("target", TARGET, False)):
+        again, found = read_points(path, name=name)
+        assert found == closed
+        assert again == pytest.approx(points, abs=1e-9)
+
+
+def test_svg_has_real_size_and_layers() -> None:
+    root = ElementTree.fromstring(to_svg(DRAWING))
+    width, height = (float(root.attrib[key].removesuffix("mm")) for key in ("width", "height"))
+    # 5 % of 1.6 m to each side
+    assert (width, height) == pytest.approx((1760.0, 1760.0))
+    assert [float(v) for v in root.attrib["viewBox"].split()] == pytest.approx([-480.0, -890.0, 1760.0, 1760.0])
+    ns = "{http://www.w3.org/2000/svg}"
+    assert [group.get("id") for group in root.iter(f"{ns}g")] == [
+        "ground",
+        "crank",
+        "slider",
+        "coupler-curve",
+        "target",
+        "text",
+    ]
+    assert root.findtext(f"{ns}title") == DRAWING.title
+    assert root.findtext(f"{ns}g/{ns}text") == "l2 = 50 mm & µ < 1"
+
+
+def test_svg_as_svgelements_sees_it() -> None:
+    drawing = svgelements.SVG.parse(StringIO(to_svg(DRAWING)))
+    user = ~svgelements.Matrix(drawing.viewbox_transform)
+    (curve, _) = (svgelements.Path(e) * user for e in drawing.elements() if isinstance(e, svgelements.Path))
+    points = np.array([[segment.end.x, -segment.end.y] for segment in abs(curve)])
+    # 72 points, and the end of the closing line
+    assert points * 1e-3 == pytest.approx(np.vstack([CURVE, CURVE[:1]]), abs=1e-9)
+    (circle,) = (e for e in drawing.elements() if isinstance(e, svgelements.Circle) and e.implicit_r > 1000.0)
+    # 800 mm at 96 px an inch, by svgelements's own scale
+    assert circle.implicit_r == pytest.approx(800.0 * 96.0 / 25.4, rel=1e-6)
+    assert circle.implicit_center.y == pytest.approx((890.0 - 10.0) * 96.0 / 25.4, rel=1e-6)
+
+
+def test_same_drawing_same_bytes() -> None:
+    code = (
+        "import hashlib; from tests.analysis.test_drawings import DRAWING, to_dxf, to_svg; "
+        "print(hashlib.sha256((to_dxf(DRAWING) + to_svg(DRAWING)).encode()).hexdigest())"
+    )
+    digests = {
+        subprocess.run(
+            [sys.executable, "-c", code],
+            env={"PYTHONHASHSEED": seed, "PATH": ""},
+            cwd=Path(__file__).parents[2],
+            capture_output=True,
+            text=True,
+            check=True,
+        ).stdout
+        for seed in ("1", "2")
+    }
+    assert len(digests) == 1
+    dxf = to_dxf(DRAWING)
+    for name in ("$FINGERPRINTGUID", "$VERSIONGUID"):
+        assert f"{name}\n  2\n{{00000000-0000-0000-0000-000000000000}}\n" in dxf
+    for name in ("$TDCREATE", "$TDUPDATE", "$TDUCREATE", "$TDUUPDATE"):
+        assert f"{name}\n 40\n0.0\n" in dxf
+
+
+def test_file_endings(tmp_path: Path) -> None:
+    path = save_drawing(tmp_path / "new" / "a.DXF", DRAWING, unit="m")
+    assert path.read_bytes() == to_dxf(DRAWING, "m").encode()
+    assert len(ezdxf.readfile(path).modelspace()) == 7
+    with pytest.raises(InputError, match=r"\.dxf or \.svg"):
+        save_drawing(tmp_path / "a.pdf", DRAWING)
+    for ending, unit in ((".svg", "m"), (".dxf", "km")):
+        with pytest.raises(ParameterError, match="unit"):
+            save_drawing(tmp_path / f"b{ending}", DRAWING, unit=unit)
+        assert not (tmp_path / f"b{ending}").exists()
+    assert set(UNITS) == {"mm", "cm", "m", "in"}
+
+
+@pytest.mark.parametrize(
+    ("build", "message"),
+    [
+        (lambda: Line(layer="crank", start=(0.0, float("nan")), end=(1.0, 1.0)), "layer crank: .* finite"),
+        (lambda: Circle(layer="crank", centre=(0.0, 0.0), radius=0.0), "radius is 0.0"),
+        (lambda: Circle(layer="crank", centre=(0.0, 0.0), radius=float("inf")), "finite"),
+        (lambda: Polyline(layer="target", points=np.zeros((1, 2))), r"shape \(1, 2\)"),
+        (lambda: Polyline(layer="target", points=np.zeros((4, 3))), r"shape \(4, 3\)"),
+        (lambda: Polyline(layer="target", points=np.array([[0, 0], [np.inf, 0]])), "point 1 of a polyline"),
+        (lambda: Text(layer="text", position=(0.0, 0.0), height=-1.0, text="a"), "height is -1.0"),
+        (lambda: Text(layer="text", position=(0.0, 0.0), height=1.0, text="a\nb"), "one line"),
+        (lambda: Text(layer="text", position=(0.0, 0.0), height=1.0, text=""), "one line"),
+        (lambda: Drawing(title="a\x00"), "title"),
+        (lambda: Drawing(title="a"), "nothing is drawn"),
+        (
+            lambda: Drawing(title="a", lines=(Line(layer="crank", start=(1.0, 1.0), end=(1.0, 1.0)),)),
+            "at one point",
+        ),
+    ],
+)
+def test_what_cannot_be_drawn_is_refused(build: Any, message: str) -> None:
+    with pytest.raises(LinkworkError, match=message):
+        build()
+
+
+def test_unknown_layers_are_refused() -> None:
+    with pytest.raises(UnknownNameError, match=r"there is no layer 'cranc'.* crank"):
+        Line(layer="cranc", start=(0.0, 0.0), end=(1.0, 1.0))

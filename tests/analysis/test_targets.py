@@ -1,0 +1,525 @@
+"""Targets: curves and functions of the crank angle, from arrays, formulas and files."""
+
+from __future__ import annotations
+
+from math import pi
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.integrate import quad
+from scipy.special import ellipe
+
+from analysis.io import read_points, write_csv
+from analysis.synthesis.areas import distance_to
+from analysis.synthesis.targets import (
+    TargetPath,
+    even_odd_area,
+    formula,
+    function_from_formula,
+    path_from_formula,
+)
+from linkwork.errors import InputError, ParameterError, UnknownNameError
+
+T = np.linspace(0.0, 2.0 * pi, 400, endpoint=False)
+SQUARE = TargetPath(points=np.array([[0.0, 0.0], [2.0, 0.0], [2.0, 2.0], [0.0, 2.0]]), closed=True)
+BENT = TargetPath(points=np.array([[0.0, 0.0], [3.0, 0.0], [3.0, 4.0]]), closed=False)
+
+
+def ellipse(a: float, b: float, n: int = 400) -> TargetPath:
+    t = np.linspace(0.0, 2.0 * pi, n, endpoint=False)
+    return TargetPath(points=np.column_stack([a * np.cos(t), b * np.sin(t)]), closed=True)
+
+
+# Curves
+
+
+def test_measures_of_a_square() -> None:
+    assert SQUARE.length == 8.0
+    assert SQUARE.signed_area == 4.0
+    assert SQUARE.enclosed_area == pytest.approx(4.0)
+    assert SQUARE.centroid == pytest.approx([1.0, 1.0])
+    # radius of gyration of a square's outline of side 2: (integral of (1 + s^2) ds from -1 to 1) / 2
+    assert SQUARE.size == pytest.approx((4.0 / 3.0) ** 0.5)
+    assert SQUARE.weights == pytest.approx([2.0] * 4)
+    assert SQUARE.normals == pytest.approx(np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) / 2**0.5)
+
+
+def test_measures_of_an_open_curve() -> None:
+    assert BENT.length == 7.0
+    assert BENT.centroid == pytest.approx([(3 * 1.5 + 4 * 3) / 7, 4 * 2 / 7])
+    mean_square = (quad(lambda s: s**2, 0, 3)[0] + quad(lambda s: 9 + s**2, 0, 4)[0]) / 7
+    assert BENT.size**2 == pytest.approx(mean_square - BENT.centroid @ BENT.centroid)
+    assert BENT.weights == pytest.approx([1.5, 3.5, 2.0])
+    # to the right of the way along x, and then along y; between them the parabola's tangent (4 e_x + 3 e_y) / 5
+    assert BENT.normals == pytest.approx(np.array([[0.0, -1.0], [0.6, -0.8], [1.0, 0.0]]))
+    for measure in ("signed_area", "enclosed_area"):
+        with pytest.raises(InputError, match="open"):
+            getattr(BENT, measure)
+
+
+def test_length_and_area_converge_to_those_of_the_ellipse() -> None:
+    for n, tolerance in ((100, 1e-3), (1000, 1e-5)):
+        path = ellipse(0.1, 0.05, n)
+        assert path.length == pytest.approx(4.0 * 0.1 * ellipe(0.75), rel=tolerance)
+        assert path.enclosed_area == pytest.approx(pi * 0.005, rel=tolerance)
+        assert path.signed_area == pytest.approx(path.enclosed_area, rel=1e-12)
+
+
+def test_normals_are_those_of_the_ellipse_to_second_order() -> None:
+    errors = []
+    for n in (100, 200):
+        path = ellipse(2.0, 1.0, n).resampled(n)
+        # outward gradient of x^2/4 + y^2
+        gradient = path.points * [0.25, 1.0]
+        gradient /= np.hypot(*gradient.T)[:, None]
+        errors.append(np.abs(path.normals - gradient).max())
+        assert path.reversed().normals == pytest.approx(np.roll(path.normals[::-1], 1, axis=0), abs=1e-12)
+        assert path.weights.sum() == pytest.approx(path.length)
+    assert errors[0] < 6e-3
+    assert errors[1] == pytest.approx(errors[0] / 4, rel=0.4)
+
+
+def test_normals_of_unequal_steps_are_of_second_order_too() -> None:
+    errors = []
+    for factor in (1e-2, 5e-3):
+        t = factor * np.array([-2.0, 0.0, 5.0])
+        path = TargetPath(points=np.column_stack([t, 5.0 * t**2 + t]), closed=False)
+        errors.append(np.abs(path.normals[1] - np.array([1.0, -1.0]) / 2**0.5).max())
+    assert errors[1] == pytest.approx(errors[0] / 4, rel=0.1)
+
+
+def test_a_cusp_has_a_normal() -> None:
+    path = TargetPath(points=np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 0.0], [0.0, 1.0]]), closed=False)
+    assert np.isfinite(path.normals).all()
+    assert path.normals[1] == pytest.approx([0.0, -1.0])
+
+
+def test_normal_displacement_changes_the_area_by_length() -> None:
+    """dA = integral of n . dx ds: what `weights` and `normals` are there for."""
+    path = path_from_formula("3*cos(t) + 0.5*cos(2*t)", "2*sin(t)", n=400).resampled(300)
+    h = 1e-4 * (1.0 + path.points[:, 0])
+    moved = TargetPath(points=path.points + h[:, None] * path.normals, closed=True)
+    assert moved.enclosed_area - path.enclosed_area == pytest.approx(path.weights @ h, rel=1e-3)
+
+
+@pytest.mark.parametrize("path", [SQUARE, BENT, ellipse(0.1, 0.05, 37)])
+def test_resampled_points_are_equally_far_along_the_polyline(path: TargetPath) -> None:
+    again = path.resampled(840)
+    assert again.points[0] == pytest.approx(path.points[0])
+    assert distance_to(path.points, again.points, closed=path.closed) == pytest.approx(np.zeros(840), abs=1e-12)
+    steps = np.hypot(*np.diff(again.points, axis=0).T)
+    step = path.length / (840 if path.closed else 839)
+    # equal along the way; across a corner the chord is shorter
+    assert steps.max() == pytest.approx(step)
+    assert np.median(steps) == pytest.approx(step, rel=1e-3)
+    if not path.closed:
+        assert again.points[-1] == pytest.approx(path.points[-1])
+
+
+def test_reversed_and_transformed() -> None:
+    back = SQUARE.reversed()
+    assert back.points[0] == pytest.approx(SQUARE.points[0])
+    assert back.signed_area == -SQUARE.signed_area
+    assert BENT.reversed().points == pytest.approx(BENT.points[::-1])
+    path = BENT.transformed(scale=2.0, angle=pi / 2, shift=(1.0, -1.0))
+    assert path.points == pytest.approx(np.array([[1.0, -1.0], [1.0, 5.0], [-7.0, 5.0]]))
+    assert path.length == pytest.approx(14.0)
+    with pytest.raises(InputError, match="scale"):
+        BENT.transformed(scale=-1.0)
+
+
+def test_points_are_copied_and_locked() -> None:
+    points = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
+    path = TargetPath(points=points, closed=True)
+    points[0] = 7.0
+    assert path.points[0] == pytest.approx([0.0, 0.0])
+    with pytest.raises(ValueError, match="read-only"):
+        path.points[0] = 1.0
+
+
+def test_even_odd_area_where_the_curve_crosses_itself() -> None:
+    eight = TargetPath(points=np.column_stack([np.sin(T), np.sin(2.0 * T)]), closed=True)
+    # 4 times the integral of |x y'| over a quarter: each lobe of the Lissajous figure has 4/3
+    assert eight.enclosed_area == pytest.approx(8.0 / 3.0, rel=1e-3)
+    assert eight.signed_area == pytest.approx(0.0, abs=1e-12)
+    # limacon r = 1 + 2 cos t: outside pi 2 + 3 sqrt3/2 (inner loop taken out: pi + 3 sqrt 3)
+    r = 1.0 + 2.0 * np.cos(T)
+    limacon = np.column_stack([r * np.cos(T), r * np.sin(T)])
+    assert even_odd_area(limacon) == pytest.approx(pi + 3.0 * 3.0**0.5, rel=1e-3)
+    # a five-pointed star in one line: the pentagon in the middle is gone round twice
+    star = np.column_stack([np.cos(4.0 * pi / 5.0 * np.arange(5)), np.sin(4.0 * pi / 5.0 * np.arange(5))])
+    radius = np.cos(2 * pi / 5) / np.cos(pi / 5)
+    triangles = 5 * radius * np.sin(pi / 5) * (1.0 - radius * np.cos(pi / 5))
+    assert even_odd_area(star) == pytest.approx(triangles, rel=1e-12)
+
+
+@settings(max_examples=30, deadline=None)
+@given(st.lists(st.tuples(st.integers(0, 20), st.integers(0, 20)), min_size=4, max_size=9, unique=True))
+def test_even_odd_area_of_any_polygon_is_that_of_a_count_over_a_grid(corners: list[tuple[int, int]]) -> None:
+    points = np.array(corners) / 20
+    grid = (np.arange(200) + 0.5) / 200
+    x, y = np.meshgrid(grid, grid)
+    inside = np.zeros(x.shape, dtype=bool)
+    for (xa, ya), (xb, yb) in zip(points, np.roll(points, -1, axis=0)):
+        # vertical rays here, horizontal ones in the code
+        if xa != xb:
+            inside ^= ((xa > x) != (xb > x)) & (ya + (x - xa) / (xb - xa) * (yb - ya) > y)
+    assert even_odd_area(points) == pytest.approx(inside.mean(), abs=0.02)
+
+
+@pytest.mark.parametrize("scale", [1e-3, 1.0, 1e3])
+@pytest.mark.parametrize("shift", [0.0, 1e4])
+def test_measures_do_not_depend_on_place_and_scale(scale: float, shift: float) -> None:
+    path = ellipse(2.0, 1.0).transformed(scale=scale, angle=0.3, shift=(shift * scale, -shift * scale))
+    assert path.length / scale == pytest.approx(ellipse(2.0, 1.0).length, rel=1e-8)
+    assert path.size / scale == pytest.approx(ellipse(2.0, 1.0).size, rel=1e-8)
+    assert path.enclosed_area / scale**2 == pytest.approx(ellipse(2.0, 1.0).enclosed_area, rel=1e-8)
+
+
+@pytest.mark.parametrize(
+    ("points", "closed", "message"),
+    [
+        ([[0.0, 0.0], [1.0, 1.0]], True, "2 points: it needs at least 3"),
+        ([[0.0, 0.0]], False, "1 points: it needs at least 2"),
+        ([0.0, 1.0, 2.0], False, r"shape \(3,\)"),
+        ([[0.0, 1.0, 2.0]] * 4, False, r"shape \(4, 3\)"),
+        ([[0.0, 1.0], [2.0]], False, "not an array of numbers"),
+        ([["a", "b"], ["c", "d"]], False, "not an array of numbers"),
+        ([[0.0, 0.0], [1.0, np.nan], [2.0, 0.0]], False, "1 points that are not finite, the first at index 1"),
+        ([[0.0, 0.0], [1.0, 0.0], [1.0, 0.0], [2.0, 3.0]], False, "indices 1 and 2"),
+        ([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 0.0]], True, "indices 3 and 0: the last point repeats"),
+        ([[3.0, 4.0]] * 5, True, "all 5 points of the target are the same"),
+        ([[0.0, 0.0], [1.0, 1.0], [3.0, 3.0]], True, "encloses no area"),
+        ([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [1.0, 0.5], [1.0, 0.0], [0.5, 0.0]], True, "encloses no area"),
+    ],
+)
+def test_bad_points_are_refused(points: list[list[float]], closed: bool, message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        TargetPath(points=points, closed=closed)  # type: ignore[arg-type]
+
+
+def test_a_straight_open_curve_is_a_target() -> None:
+    assert TargetPath(points=np.array([[0.0, 0.0], [1.0, 1.0]]), closed=False).length == pytest.approx(2**0.5)
+    with pytest.raises(InputError, match="2 points are asked for"):
+        SQUARE.resampled(2)
+
+
+# Smoothing
+
+
+def noisy(path: TargetPath, sd: float, seed: int = 3) -> TargetPath:
+    noise = np.random.default_rng(seed).normal(0.0, sd, path.points.shape)
+    return TargetPath(points=path.points + noise, closed=path.closed)
+
+
+OPEN = path_from_formula("t/10", "0.1*sin(t)", n=120, end="2*pi - 0.5")
+
+
+@pytest.mark.parametrize("true", [ellipse(0.3, 0.15, 120), OPEN], ids=["closed", "open"])
+def test_smoothing_takes_most_of_the_noise_away(true: TargetPath) -> None:
+    sd = 2e-3
+    smooth = noisy(true, sd).smoothed(200)
+    assert smooth.closed == true.closed
+    assert len(smooth.points) == 200
+    rms = float(np.sqrt(np.mean(distance_to(true.points, smooth.points, closed=true.closed) ** 2)))
+    assert rms < 0.5 * sd
+    assert smooth.length == pytest.approx(true.length, rel=0.02)
+
+
+def test_smoothing_leaves_a_curve_without_noise() -> None:
+    for true in (ellipse(0.3, 0.15, 60), OPEN):
+        smooth = true.smoothed(300)
+        assert distance_to(true.points, smooth.points, closed=true.closed).max() < 3e-4 * true.length
+
+
+def test_smoothing_turns_with_the_curve_and_scales() -> None:
+    drawn = noisy(ellipse(0.3, 0.15, 80), 2e-3)
+    smooth = drawn.smoothed(50)
+    moved = drawn.transformed(scale=1e3, angle=1.0, shift=(2e3, -5e3)).smoothed(50)
+    assert moved.points == pytest.approx(smooth.transformed(scale=1e3, angle=1.0, shift=(2e3, -5e3)).points, abs=1e-4)
+
+
+def test_smoothing_to_a_known_deviation() -> None:
+    """Of points on a circle at equal steps smoothing keeps a circle, smaller by the deviation."""
+    circle = ellipse(1.0, 1.0, 90)
+    smooth = circle.smoothed(90, deviation=0.05)
+    assert np.hypot(*smooth.points.T) == pytest.approx(np.full(90, 0.95), abs=1e-4)
+    straight = TargetPath(points=np.column_stack([np.arange(9.0), [0, 1, 0, 1, 0, 1, 0, 1, 0]]), closed=False)
+    line = straight.smoothed(30, deviation=0.49)
+    assert np.ptp(line.points[:, 1]) < 0.3
+    for deviation in (2.0, 0.0, float("nan")):
+        with pytest.raises(InputError, match="deviation"):
+            circle.smoothed(90, deviation=deviation)
+
+
+def test_natural_smoothing_is_scipys() -> None:
+    """At equal chord lengths and a given lambda both minimise the same integral."""
+    from scipy.interpolate import make_smoothing_spline
+
+    from analysis.synthesis.targets import _bending
+
+    rng = np.random.default_rng(5)
+    u = np.cumsum(rng.uniform(0.5, 1.5, 25))
+    y = np.sin(u / 3.0) + rng.normal(0.0, 0.1, 25)
+    ours = np.linalg.solve(np.eye(25) + 2.5 * _bending(np.diff(u), False), y)
+    assert ours == pytest.approx(make_smoothing_spline(u, y, lam=2.5)(u), abs=1e-10)
+
+
+def test_periodic_bending_is_the_integral_over_the_spline() -> None:
+    from scipy.interpolate import CubicSpline
+
+    from analysis.synthesis.targets import _bending
+
+    rng = np.random.default_rng(6)
+    u = np.concatenate([[0.0], np.cumsum(rng.uniform(0.5, 1.5, 12))])
+    y = rng.normal(size=12)
+    second = CubicSpline(u, np.append(y, y[0]), bc_type="periodic").derivative(2)
+    # piecewise linear: Simpson's rule is exact for its square
+    a, b, m = second(u[:-1]), second(u[1:]), second(0.5 * (u[1:] + u[:-1]))
+    expected = np.sum(np.diff(u) / 6.0 * (a**2 + 4.0 * m**2 + b**2))
+    assert y @ _bending(np.diff(u), True) @ y == pytest.approx(expected, rel=1e-10)
+
+
+def test_long_drawings_are_smoothed_too() -> None:
+    smooth = noisy(ellipse(0.3, 0.15, 1500), 1e-3).smoothed(100)
+    assert distance_to(ellipse(0.3, 0.15).points, smooth.points).max() < 1e-3
+
+
+def test_too_few_points_to_smooth() -> None:
+    with pytest.raises(InputError, match="at least 6"):
+        SQUARE.smoothed(50)
+
+
+# Formulas
+
+
+def test_ellipse_of_the_thesis_from_a_formula() -> None:
+    path = path_from_formula("20 + 10*cos(t)", "15 + 5*sin(t)", n=72, unit="cm", start=0, end=2 * pi)
+    t = np.radians(5.0 * np.arange(72))
+    assert path.closed
+    assert path.points == pytest.approx(np.column_stack([0.2 + 0.1 * np.cos(t), 0.15 + 0.05 * np.sin(t)]), abs=1e-15)
+
+
+def test_open_path_from_a_formula() -> None:
+    path = path_from_formula("s", "s**2", n=11, start=-1, end="1/2 + 1/2", variable="s")
+    assert not path.closed
+    assert path.points == pytest.approx(np.column_stack([np.linspace(-1, 1, 11), np.linspace(-1, 1, 11) ** 2]))
+
+
+def test_rocker_function_of_the_thesis() -> None:
+    crank_angle, angle = function_from_formula("70 + 100*abs(sin(t/2))", unit="deg")
+    assert crank_angle == pytest.approx(np.radians(5.0 * np.arange(72)))
+    assert np.degrees(angle[[0, 36]]) == pytest.approx([70.0, 170.0])
+    assert np.degrees(angle[12]) == pytest.approx(120.0)
+    crank_angle, _ = function_from_formula("t", n=5, start="pi/2", end="pi")
+    assert crank_angle[[0, -1]] == pytest.approx([pi / 2, pi])
+
+
+@pytest.mark.parametrize(
+    ("text", "value"),
+    [
+        ("2**3**2 - -t", 512.3),
+        ("7 % 4 + 1/4", 3.25),
+        ("atan2(1, -1) + hypot(3, 4)", 0.75 * pi + 5.0),
+        ("min(t, 2) + max(t, 2) + floor(2.7) + ceil(2.1)", 7.3),
+        ("degrees(pi) + radians(180) + sign(-2)", 179.0 + pi),
+        ("exp(log(2)) + sqrt(4) + asin(1) + acos(1) + atan(1) + e - tau", 4.0 + 0.75 * pi + np.e - 2 * pi),
+        (" sinh(t)**2 - cosh(t)**2 + tanh(0) + tan(0) + 1e3", 999.0),
+    ],
+)
+def test_formulas_have_the_value_of_the_mathematics(text: str, value: float) -> None:
+    assert formula(text)(0.3) == pytest.approx(value)
+    assert formula(text)(np.full((2, 3), 0.3)).shape == (2, 3)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("__import__('os').system('true')", "not allowed"),
+        ("().__class__", "not allowed"),
+        ("t.real", "'t.real' is not allowed"),
+        ("[t for t in (1, 2)]", "not allowed"),
+        ("(lambda: 1)()", "not allowed"),
+        ("sin(t, out=t)", "not allowed"),
+        ("sin(*t)", "not allowed"),
+        ("True", "'True' is not allowed"),
+        ("'a'", "not allowed"),
+        ("1j", "'1j' is not allowed"),
+        ("t if t else 1", "not allowed"),
+        ("1 < 2", "not allowed"),
+        ("~t", "not allowed"),
+        ("t^2", r"'t \^ 2' has \^, which is no power here: write \*\*"),
+        ("sinn(t)", r"'sinn\(t\)' is not known; did you mean sin\?"),
+        ("x + 1", "'x' is not known"),
+        ("atan2(t)", "1 arguments: atan2 takes 2"),
+        ("2 +", "cannot be read"),
+        ("", "cannot be read"),
+        ("a\0b", "cannot be read"),
+        ("x = 1", "cannot be read"),
+        ("(" * 300 + "t" + ")" * 300, "cannot be read"),
+        ("-" * 990 + "t", "cannot be read|nested"),
+        ("t+" * 600 + "t", "1201 characters"),
+        ("1" * 400, "too large"),
+        (3.0, "must be a text"),
+    ],
+)
+def test_what_is_no_formula_is_refused(text: str, message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        formula(text)
+
+
+def test_values_must_be_finite() -> None:
+    for text, at in (("1/(t - 1)", "t = 1"), ("sqrt(t)", "t = -1"), ("9**9**9**9", "t = -1")):
+        with pytest.raises(InputError, match=at):
+            formula(text)([-1.0, 0.0, 1.0] if at == "t = -1" else [0.0, 1.0])
+
+
+def test_bad_ranges_and_units_are_refused() -> None:
+    with pytest.raises(InputError, match="the end must be greater"):
+        path_from_formula("t", "t**2", start=1.0, end=0.0)
+    with pytest.raises(InputError, match="the end must be greater"):
+        function_from_formula("t", end=float("inf"))
+    with pytest.raises(InputError, match="'t' is not known"):
+        path_from_formula("t", "t**2", end="t")
+    with pytest.raises(ParameterError, match="unit"):
+        path_from_formula("t", "t", unit="deg")
+    with pytest.raises(ParameterError, match="unit"):
+        function_from_formula("t", unit="cm")
+    with pytest.raises(InputError, match="at least 3"):
+        path_from_formula("cos(t)", "sin(t)", n=2)
+
+
+# Files
+
+
+def save(folder: Path, name: str, text: str) -> Path:
+    path = folder / name
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "0,0\n1,0\n1,2.5\n",
+        "x,y\n0,0\n1,0\n1,2.5",
+        "﻿x; y\n0; 0\n\n1; 0\n1; 2.5\n",
+        "# made by hand\nx\ty\n0\t0\n1\t0\n1\t2.5\n",
+        " 0   0\n 1e0 0\n 1 , 2.5\n",
+    ],
+)
+def test_points_from_csv(tmp_path: Path, text: str) -> None:
+    points, closed = read_points(save(tmp_path, "a.csv", text), unit="mm")
+    assert points == pytest.approx(1e-3 * np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 2.5]]))
+    assert not closed
+
+
+def test_a_csv_that_ends_where_it_began_is_closed(tmp_path: Path) -> None:
+    path = write_csv(tmp_path / "a.csv", {"x": [0.0, 1.0, 1.0, 0.0], "y": [0.0, 0.0, 1.0, 0.0]})
+    target = TargetPath.from_file(path)
+    assert target.closed
+    assert target.enclosed_area == pytest.approx(0.5)
+    assert not TargetPath.from_file(path, closed=False).closed
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("x,y\n0,0\n1\n", "line 3: '1' is not two numbers"),
+        ("0,0\n1,2,3\n", "line 2"),
+        ("0,0\n1,two\n", "line 2: '1,two'"),
+        ("x,y\nlength,width\n1,2\n", "line 2"),
+        ("0,0\n1,inf\n", "line 2: '1,inf' is not finite"),
+        ("0,zero\n1,1\n", "line 1"),
+        ("x,y\n", "no points"),
+        ("", "no points"),
+    ],
+)
+def test_bad_csv_is_refused_with_its_line(tmp_path: Path, text: str, message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        read_points(save(tmp_path, "a.csv", text))
+
+
+SVG = """<svg xmlns="http://www.w3.org/2000/svg" {head}>
+  <circle id="pin" cx="1" cy="2" r="3"/>
+  <g id="drawn" transform="translate(10, 5) scale(2)"><path id="wedge" d="M 0,0 L 10,0 10,-5 Z"/></g>
+  <path id="wave" d="M 0 0 C 10 10 20 -10 30 0"/>
+  <path id="two" d="M 0 0 L 1 1 M 2 2 L 3 3"/>
+  <path id="empty" d=""/>
+</svg>"""
+WEDGE = np.array([[10.0, -5.0], [30.0, -5.0], [30.0, 5.0]])
+
+
+@pytest.mark.parametrize(
+    ("head", "unit", "metres"),
+    [
+        ('width="100mm" height="50mm" viewBox="0 0 100 50"', None, 1e-3),
+        ('width="10cm" height="5cm" viewBox="-20 -30 200 100"', None, 0.5e-3),
+        ('width="10in" viewBox="0 0 100 50"', None, 2.54e-3),
+        ('width="72pt" height="200pt" viewBox="0 0 100,50"', None, 0.254e-3),
+        ('width="100%" height="100%" viewBox="0 0 100 50"', None, 0.0254 / 96),
+        ('width="100mm" height="50mm"', None, 0.0254 / 96),
+        ("", None, 0.0254 / 96),
+        ('width="100mm" height="50mm" viewBox="5 5 50 25"', "cm", 1e-2),
+    ],
+)
+def test_points_from_svg_have_the_documents_scale(tmp_path: Path, head: str, unit: str | None, metres: float) -> None:
+    points, closed = read_points(save(tmp_path, "a.svg", SVG.format(head=head)), unit=unit)
+    assert closed
+    assert points == pytest.approx(metres * WEDGE, rel=1e-12, abs=1e-15)
+    # the shoelace of a triangle on paper: clockwise in SVG's frame becomes what the eye sees
+    assert TargetPath(points=points, closed=True).signed_area == pytest.approx(100.0 * metres**2)
+
+
+def test_named_curves_of_svg(tmp_path: Path) -> None:
+    path = save(tmp_path, "a.svg", SVG.format(head=""))
+    assert read_points(path, unit="m", name="drawn")[0] == pytest.approx(WEDGE)
+    pin, closed = read_points(path, unit="m", name="pin")
+    assert closed
+    assert np.hypot(pin[:, 0] - 1.0, pin[:, 1] + 2.0) == pytest.approx(np.full(len(pin), 3.0))
+    assert TargetPath(points=pin, closed=True).enclosed_area == pytest.approx(9.0 * pi, rel=1e-3)
+    wave, closed = read_points(path, unit="m", name="wave")
+    assert not closed
+    s = np.linspace(0.0, 1.0, 500)
+    exact = np.column_stack([30.0 * s, -30.0 * s * (1 - s) * (1 - 2 * s)])
+    assert distance_to(wave, exact, closed=False).max() < 30.0 * 1e-4
+    assert len(wave) < 200
+    with pytest.raises(UnknownNameError, match="did you mean wave"):
+        read_points(path, name="waves")
+    with pytest.raises(InputError, match="two has 2 curves"):
+        read_points(path, name="two")
+    with pytest.raises(InputError, match="empty has 0 curves"):
+        read_points(path, name="empty")
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("<svg", "not valid SVG"),
+        ("<html/>", "not valid SVG"),
+        ('<svg xmlns="http://www.w3.org/2000/svg"/>', "no path"),
+        (SVG.format(head='width="9mm" height="1mm" viewBox="0 0 1 1" preserveAspectRatio="none"'), "stretched"),
+        (SVG.format(head='width="9mm" height="1mm" viewBox="0 0 0 1"'), "viewBox"),
+        (SVG.format(head='width="9mm" height="1mm" viewBox="0 0 one 1"'), "not valid SVG|viewBox"),
+    ],
+)
+def test_bad_svg_is_refused(tmp_path: Path, text: str, message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        read_points(save(tmp_path, "a.svg", text))
+
+
+def test_files_that_cannot_be_read(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="cannot be read"):
+        read_points(tmp_path / "none.csv")
+    with pytest.raises(InputError, match=r"'\.xls'"):
+        read_points(tmp_path / "a.xls")
+    with pytest.raises(InputError, match="cannot be looked up"):
+        read_points(save(tmp_path, "a.csv", "0,0\n1,1\n"), name="curve")
+    with pytest.raises(ParameterError, match="unit"):
+        read_points(save(tmp_path, "a.csv", "0,0\n1,1\n"), unit="kg")
+    (tmp_path / "b.csv").write_bytes(b"\xff\xfe0")
+    with pytest.raises(InputError, match="UTF-8"):
+        read_points(tmp_path / "b.csv")
