@@ -280,7 +280,7 @@ def _svg_scale(path: Path, root: Any) -> float:
     """Metres per user unit of an SVG document."""
     lengths: list[float | None] = []
     for key in ("width", "height"):
-        found = re.fullmatch(r"\s*([\d.]+(?:[eE][+-]?\d+)?)\s*(px|mm|cm|in|pt|pc|)\s*", root.get(key, ""))
+        found = re.fullmatch(r"\s*((?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(px|mm|cm|in|pt|pc|)\s*", root.get(key, ""))
         lengths.append(float(found[1]) * _CSS[found[2]] if found else None)
     box = root.get("viewBox")
     if box is None or lengths == [None, None]:

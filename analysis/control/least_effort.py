@@ -422,6 +422,8 @@ class _Problem:
         ):
             if choice not in known:
                 raise InputError(f"{name} is {choice!r}: it must be one of {', '.join(known)}")
+        if self.of_point and self.parameters.coupler_point_distance == 0.0:
+            raise InputError("coupler.point_distance is 0: P is the crank pin, which no slider moves")
 
     @cached_property
     def tau(self) -> FloatArray:
@@ -512,11 +514,10 @@ class _Problem:
         error = self.grid(theta, u)
         # P moves by no more than r/(l3 sin(th4 - th3)) of the slider's way, the rocker turns by no more than 1/(l4 sin)
         leverage = p.coupler_point_distance / p.coupler_length if self.of_point else 1.0 / p.rocker_length
-        between = 0.5 * leverage / sin(self.transmission)
+        between = leverage / sin(self.transmission)
         least = error.min(axis=1, keepdims=True)
-        self._check_reach(theta, least.ravel() - between * (u[1] - u[0]))
         near = np.flatnonzero((error <= np.maximum(least, self.bound) + between * (u[1] - u[0])).any(axis=0))
-        u = np.linspace(u[near[0]], u[near[-1]], WAYS)
+        u = np.linspace(u[max(near[0] - 1, 0)], u[min(near[-1] + 1, POSITIONS - 1)], WAYS)
         error = self.grid(theta, u)
         self._check_reach(theta, error.min(axis=1) - between * (u[1] - u[0]))
         slack = float(u[1] - u[0]) * leverage

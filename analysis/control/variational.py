@@ -39,9 +39,8 @@ FloatArray = NDArray[np.float64]
 
 #: What makes a position of the slider a minimum of the error, see `VariationalMotion.kind`.
 KINDS = ("target", "perpendicular", "limit", "stroke")
-#: Rounding errors of sines, and of errors relative to the lengths (or rad) that they come from.
+#: Rounding errors of sines and their products.
 ROUNDING = 1e-12
-TIE = 1e-13
 #: Halvings of a step in search of a path of minima across it, and the gap, of l3 + l4, at which it is found. A minimum that
 #: reaches the perpendicular does so as the square root: 44 halvings bring it to 2.4e-7.
 HALVINGS = 44
@@ -316,16 +315,10 @@ def variational_motion(
     if not joined.all():
         raise AssemblyError(_out_of_reach(problem, phi[~joined], n))
 
-    if continuous:
-        chosen_from = minima.valid
-    else:
-        error = np.where(minima.valid, minima.error, inf)
-        size = pi
-        if aim.ndim == 2:
-            size = linkage.largest_link + linkage.point_distance
-            size += float(np.abs(goal - complex(linkage.pivot_x, linkage.pivot_y)).max())
-        chosen_from = error <= error.min(axis=0) + TIE * size
-    bridged = _bridged(problem, phi, goal, minima, chosen_from, closed)
+    error = np.where(minima.valid, minima.error, inf)
+    # equals, the two sides of the other link, are so to the last bit
+    chosen_from = minima.valid if continuous else error == error.min(axis=0)
+    bridged = _bridged(problem, phi, goal, minima, chosen_from)
     travel = minima.u / (linkage.coupler_length + linkage.rocker_length)
     choice = _path(w * minima.error**2, travel, chosen_from, bridged, closed)
     at = (choice, np.arange(n))
@@ -406,9 +399,10 @@ def _bridged(
     goal: NDArray[np.complex128] | FloatArray,
     minima: _Minima,
     chosen_from: NDArray[np.bool_],
-    closed: bool,
 ) -> NDArray[np.bool_]:
     """Whether minimum i at rotation k and minimum j at the next one belong to one path of minima, shape (n, m, m).
+
+    The last rotation is followed by the first, a turn later.
 
     Between the rotations the target goes straight. The step is halved at the minimum that fills its gap best, the half with
     the wider gap is halved in turn, and so on: the gap of a path vanishes, that of a jump remains.
@@ -418,8 +412,6 @@ def _bridged(
     bridged = np.zeros((n, m, m), dtype=bool)
     branches = problem.labels[1]
     pairs = chosen_from.T[:, :, None] & chosen_from[:, following].T[:, None, :] & (branches[:, None] == branches)
-    if not closed:
-        pairs[-1] = False
     k, i, j = np.nonzero(pairs)
     start, step = phi[k], np.append(np.diff(phi), 2.0 * pi - (phi[-1] - phi[0]))[k]
     aim, change = goal[k], goal[following[k]] - goal[k]
@@ -467,6 +459,7 @@ def _path(
         before[k] = ways.argmin(axis=1)
         total = ways.min(axis=1) + cost[:, k]
     if not closed:
+        # what leads back to the first rotation does not count
         step[-1] = 0.0
     first, row = np.unravel_index(int((total + step[-1].T).argmin()), (m, m))
     choice = np.empty(n, dtype=int)

@@ -41,10 +41,8 @@ def distance_to(curve: ArrayLike, points: ArrayLike, *, closed: bool = True) -> 
     """
     import shapely
 
-    vertices = ring(plane_points(curve, "the curve", 2), closed)
-    origin = vertices.mean(axis=0)
-    line = shapely.LineString(vertices - origin)
-    distances: FloatArray = shapely.distance(line, shapely.points(plane_points(points, "the points", 0) - origin))
+    line = shapely.LineString(ring(plane_points(curve, "the curve", 2), closed))
+    distances: FloatArray = shapely.distance(line, shapely.points(plane_points(points, "the points", 0)))
     return distances
 
 

@@ -7,9 +7,11 @@ stations among the unknowns, and then by the area itself, whose absolute value i
 from __future__ import annotations
 
 import warnings
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from math import inf, pi
+from typing import TypeVar
 
 import joblib
 import numpy as np
@@ -21,10 +23,12 @@ from linkwork.errors import InputError
 from ..simulate import interruptible, shown
 from .constraints import Limits
 from .kernels import coupler_path_jacobian, link_jacobian
-from .program import Answer, PivotUnknown, Program, Start
+from .program import Answer, PivotUnknown, Program, Start, inside
 from .tasks import Normal
 
 FloatArray = NDArray[np.float64]
+Item = TypeVar("Item")
+Made = TypeVar("Made")
 
 #: Sharpness of the area's absolute value, as shares of the root mean square distance that least squares left.
 BLURS = (0.3, 0.03)
@@ -42,6 +46,10 @@ class Polished:
     others: tuple[Answer, ...]
     done: int
     interrupted: bool
+
+    def reaching(self, quality: float, within: float = 0.01) -> int:
+        """How many searches reached a quality, but for this share of it: "40 of 40 starts converge"."""
+        return sum(a.start.quality <= quality * (1.0 + within) for a in self.kept)
 
 
 def polish(
@@ -62,36 +70,18 @@ def polish(
     MissingLibraryError
         If there are inequalities and CasADi is not installed.
     """
-    if n_jobs == 0:
-        raise InputError("0 cores: it must be a number of them, or -1 for all")
-    cores = joblib.effective_n_jobs(n_jobs)
+    cores = effective_cores(n_jobs)
     size = 1 if cores == 1 else max(1, -(-len(starts) // (3 * cores)))
     batches = [starts[k : k + size] for k in range(0, len(starts), size)]
-    answers: dict[int, list[Answer]] = {}
-    with interruptible() as interrupted, shown(progress, float(len(batches)), "polish") as show:
-        if cores == 1:
-            worker = Polisher(normal, limits, pivot)
-            for number, batch in enumerate(batches):
-                answers[number] = [worker.fit(start) for start in batch]
-                show(float(number + 1))
-                if interrupted:
-                    break
-        else:
-            tasks = (joblib.delayed(_batch)(normal, limits, pivot, k, batch) for k, batch in enumerate(batches))
-            results = joblib.Parallel(n_jobs=cores, return_as="generator_unordered")(tasks)
-            try:
-                for number, part in results:
-                    answers[number] = part
-                    show(float(len(answers)))
-                    if interrupted:
-                        break
-            except KeyboardInterrupt:  # of a worker
-                interrupted.append(True)
-            finally:
-                with warnings.catch_warnings():
-                    warnings.filterwarnings("ignore", message=".*still being processed", category=UserWarning)
-                    results.close()
-    found = [answer for number in sorted(answers) for answer in answers[number]]
+    if cores == 1:
+        worker = Polisher(normal, limits, pivot)
+
+        def fitted(batch: Sequence[Start]) -> list[Answer]:
+            return [worker.fit(start) for start in batch]
+    else:
+        fitted = partial(_batch, normal, limits, pivot)
+    parts, interrupted = over_cores(fitted, batches, cores=cores, progress=progress, what="polish")
+    found = [answer for part in parts for answer in part]
     kept = sorted((a for a in found if a.feasible), key=lambda a: a.start.quality)
     if normal.normals is not None and not interrupted:
         best = distinct(kept, AREAS)
@@ -101,15 +91,60 @@ def polish(
         kept=tuple(kept),
         others=tuple(a for a in found if not a.feasible),
         done=len(found),
-        interrupted=bool(interrupted),
+        interrupted=interrupted,
     )
 
 
-def _batch(
-    normal: Normal, limits: Limits, pivot: PivotUnknown | None, number: int, starts: Sequence[Start]
-) -> tuple[int, list[Answer]]:
+def effective_cores(n_jobs: int) -> int:
+    """Number of cores, as `joblib.Parallel` counts them.
+
+    Raises
+    ------
+    InputError
+        If there are none.
+    """
+    if n_jobs == 0:
+        raise InputError("0 cores: it must be a number of them, or -1 for all")
+    return int(joblib.effective_n_jobs(n_jobs))
+
+
+def over_cores(
+    work: Callable[[Item], Made], items: Sequence[Item], *, cores: int, progress: bool, what: str
+) -> tuple[list[Made], bool]:
+    """What becomes of every item, in their order whatever the cores; on Ctrl-C of those that were done, and True."""
+    made: dict[int, Made] = {}
+    with interruptible() as interrupted, shown(progress, float(len(items)), what) as show:
+        if cores == 1:
+            for number, item in enumerate(items):
+                made[number] = work(item)
+                show(float(number + 1))
+                if interrupted:
+                    break
+        else:
+            tasks = (joblib.delayed(_numbered)(work, number, item) for number, item in enumerate(items))
+            results = joblib.Parallel(n_jobs=cores, return_as="generator_unordered")(tasks)
+            try:
+                for number, value in results:
+                    made[number] = value
+                    show(float(len(made)))
+                    if interrupted:
+                        break
+            except KeyboardInterrupt:  # of a worker
+                interrupted.append(True)
+            finally:
+                with warnings.catch_warnings():
+                    warnings.filterwarnings("ignore", message=".*still being processed", category=UserWarning)
+                    results.close()
+    return [made[number] for number in sorted(made)], bool(interrupted)
+
+
+def _numbered(work: Callable[[Item], Made], number: int, item: Item) -> tuple[int, Made]:
+    return number, work(item)
+
+
+def _batch(normal: Normal, limits: Limits, pivot: PivotUnknown | None, starts: Sequence[Start]) -> list[Answer]:
     worker = Polisher(normal, limits, pivot)
-    return number, [worker.fit(start) for start in starts]
+    return [worker.fit(start) for start in starts]
 
 
 def distinct(answers: Sequence[Answer], count: int, apart: float = 1e-3) -> list[Answer]:
@@ -242,7 +277,7 @@ def fit_least_squares(normal: Normal, limits: Limits, start: Start) -> Answer:
     """SciPy's trust region reflective method on bounds, with the exact Jacobian of the compiled kernels."""
     free = np.nonzero(limits.high > limits.low)[0]
     timed, n = normal.timed, normal.n
-    base = np.clip(start.q, limits.low, limits.high)
+    base = inside(start.q, limits.low, limits.high)
     low, high = limits.low[free], limits.high[free]
     x0 = base[free]
     # strictly inside, as the method asks

@@ -8,7 +8,7 @@ shortest - comes as parameters, so that one program serves all starts.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import cos, inf, isfinite, pi
 from types import FunctionType, ModuleType, SimpleNamespace
@@ -38,8 +38,12 @@ FOLLOWING: dict[str, dict[str, Any]] = {
     "transmission": {"mu_strategy": "adaptive"},
     "area": {"mu_strategy": "monotone", "mu_init": 1e-5, "bound_push": 1e-8, "bound_frac": 1e-8},
 }
+#: Amplitudes at which the motion of a pivot is started, as shares of the ground link.
+AMPLITUDE = 0.1
 #: Least rotation of the crank from one untimed station to the next, as a share of an even one.
 ADVANCE = 1e-3
+#: Greatest, in even ones: in a wider gap the coupler point could wander off unseen between two stations.
+GAP = 8.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -220,7 +224,7 @@ class Program:
                 )
             self._at_most(casadi.mtimes(plane, casadi.vertcat(x, y, 1.0)), f"region of pivot {name}")
         for require in limits.requires:
-            value = traced(require, self._physical(p)) / require.scale
+            value = traced(require, physical(p, self.normal.unit, self.normal.origin)) / require.scale
             self._within(value, 0.0 if require.equal else -inf, 0.0, require.name)
         if isinstance(pivot, SliderUnknown):
             quality = quality + self._slider(pivot, v, z, low, high)
@@ -340,9 +344,11 @@ class Program:
         n = self.normal.n
         least = ADVANCE * 2.0 * pi / n
         steps = direction * (phi[1:] - phi[:-1])
-        self._within(steps, least, inf, "order of the stations")
+        most = GAP * 2.0 * pi / n
+        self._within(steps, least, most, "order of the stations")
         total = direction * (phi[n - 1] - phi[0])
-        self._within(total, -inf, 2.0 * pi - (least if self.normal.closed else 0.0), "stations within a turn")
+        closing = (2.0 * pi - most, 2.0 * pi - least) if self.normal.closed else (-inf, 2.0 * pi)
+        self._within(total, *closing, "stations within a turn")
 
     def _assembled(self, p: Any, v: Any, phi: Any, cosine: Any) -> None:
         """The transmission angle keeps its distance: |cos mu| <= cosine, written without division.
@@ -384,16 +390,12 @@ class Program:
             return 0.0
         return pivot.smoothness * casadi.sumsqr(_series(casadi, v[1:], x, order=2)) / GRID
 
-    def _physical(self, p: Any) -> SimpleNamespace:
-        """Dimensions in SI for functions of the user's."""
-        unit, origin = self.normal.unit, self.normal.origin
-        values = dict(vars(p))
-        for name in UNKNOWNS[:7]:
-            values[name] = unit * values[name]
-        values["pivot_x"], values["pivot_y"] = values["pivot_x"] + origin.real, values["pivot_y"] + origin.imag
-        return SimpleNamespace(**values)
-
     # Solution
+
+    @cached_property
+    def _value(self) -> Any:
+        """Objective and constraints as a function, to see whether a start can be evaluated at all."""
+        return self._casadi.Function("value", [self._nlp["x"], self._nlp["p"]], [self._nlp["f"], self._nlp["g"]])
 
     @cached_property
     def _solver(self) -> Any:
@@ -412,6 +414,7 @@ class Program:
             "print_time": False,
             "error_on_fail": False,
             "show_eval_warnings": False,
+            "calc_lam_p": False,
         }
         return self._casadi.nlpsol("synthesis", "ipopt", self._nlp, options)
 
@@ -453,8 +456,8 @@ class Program:
                 raise InputError("the start of an untimed task needs the crank rotations of its stations")
             guess.append(start.rotation)
             direction = float(np.sign(start.rotation[-1] - start.rotation[0]) or 1.0)
-        z0 = np.concatenate([*guess, np.zeros(self._extra)])
-        z0 = np.clip(z0, lower, upper)
+        guess[0] = inside(start.q, lower[: len(UNKNOWNS)], upper[: len(UNKNOWNS)])
+        z0 = np.clip(np.concatenate([*guess, np.zeros(self._extra)]), lower, upper)
         parameters = [
             float(start.branch),
             direction,
@@ -463,7 +466,17 @@ class Program:
             *_grashof_rows(limits.grashof, z0[2:6]).ravel(order="F"),
         ]
         for name, pieces in limits.regions:
-            parameters += _half_planes(_nearest_piece(pieces, name, z0)).ravel(order="F").tolist()
+            parameters += half_planes(_nearest_piece(pieces, name, z0)).ravel(order="F").tolist()
+        if not all(np.isfinite(np.asarray(value)).all() for value in self._value(z0, parameters)):
+            return Answer(
+                start=replace(start, quality=inf),
+                feasible=False,
+                converged=False,
+                violation=inf,
+                worst="loop closure",
+                status="the links cannot be joined at the start",
+                iterations=0,
+            )
         result = self._solver(x0=z0, lbx=lower, ubx=upper, lbg=self._g_low, ubg=self._g_high, p=parameters)
         stats = self._solver.stats()
         z = np.asarray(result["x"]).ravel()
@@ -487,6 +500,28 @@ class Program:
             status=str(stats["return_status"]),
             iterations=int(stats["iter_count"]),
         )
+
+
+def random_pivot(unknown: PivotUnknown, ground: float, unit: float, random: np.random.Generator) -> FloatArray:
+    """Unknowns of a pivot at random: harmonics that fall off with their order, within the bounds of stroke and length.
+
+    Parameters
+    ----------
+    ground : float
+        Ground link (units).
+    unit : float
+        m.
+    """
+    orders = np.repeat(np.arange(1, unknown.harmonics + 1), 2)
+    waves = random.standard_normal(2 * unknown.harmonics) / (1.0 + orders)
+    if isinstance(unknown, CrankUnknown):
+        length = random.uniform(*unknown.length) / unit
+        return np.array([length, random.uniform(-pi, pi), *(0.3 * waves)])
+    low, high = unknown.guide_angle
+    # a guide is the same one from its other end
+    angle = low + min(high - low, pi) * random.random()
+    size = min(AMPLITUDE * ground, 0.25 * unknown.stroke / unit)
+    return np.array([angle, size * random.standard_normal(), *(size * waves)])
 
 
 def _size(pivot: PivotUnknown | None) -> int:
@@ -518,6 +553,15 @@ def _series(casadi: Any, coefficients: Any, x: Any, *, mean: bool = True, order:
             a, b = harmonic * b, -harmonic * a
         value = value + a * casadi.cos(harmonic * x) + b * casadi.sin(harmonic * x)
     return value
+
+
+def physical(p: SimpleNamespace, unit: float, origin: complex) -> SimpleNamespace:
+    """Dimensions in SI, from those in normal form, for functions of the user's."""
+    values = dict(vars(p))
+    for name in UNKNOWNS[:7]:
+        values[name] = unit * values[name]
+    values["pivot_x"], values["pivot_y"] = values["pivot_x"] + origin.real, values["pivot_y"] + origin.imag
+    return SimpleNamespace(**values)
 
 
 def traced(require: Require, values: SimpleNamespace) -> Any:
@@ -573,7 +617,7 @@ def _grashof_rows(type_: str | None, links: FloatArray) -> FloatArray:
     return rows
 
 
-def _half_planes(triangle: FloatArray) -> FloatArray:
+def half_planes(triangle: FloatArray) -> FloatArray:
     """Rows r with r . (x, y, 1) <= 0 inside a counter-clockwise triangle, shape (3, 3)."""
     rows = np.zeros((3, 3))
     for k in range(3):
@@ -588,7 +632,17 @@ def _nearest_piece(pieces: Sequence[FloatArray], pivot: str, q: FloatArray) -> F
     x, y = float(q[0]), float(q[1])
     if pivot == "D":
         x, y = x + float(q[2] * np.cos(q[7])), y + float(q[2] * np.sin(q[7]))
-    return min(pieces, key=lambda piece: float((_half_planes(piece) @ [x, y, 1.0]).max()))
+    return min(pieces, key=lambda piece: float((half_planes(piece) @ [x, y, 1.0]).max()))
+
+
+def inside(q: FloatArray, low: FloatArray, high: FloatArray) -> FloatArray:
+    """Unknowns within their bounds, angles by whole turns where that is enough."""
+    q = q.copy()
+    angles = slice(UNKNOWNS.index("ground_angle"), len(UNKNOWNS))
+    turned = q[angles] + 2.0 * pi * np.ceil((low[angles] - q[angles]) / (2.0 * pi))
+    fits = (turned <= high[angles]) & ((q[angles] < low[angles]) | (q[angles] > high[angles]))
+    q[angles] = np.where(fits, turned, q[angles])
+    return np.clip(q, low, high)
 
 
 def linkage_of(start: Start, normal: Normal, pivot: PivotUnknown | None = None) -> Linkage:

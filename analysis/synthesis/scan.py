@@ -213,7 +213,7 @@ def _timed(
 
 def _projected(basis: ComplexArray, p: ComplexArray, w: FloatArray) -> ComplexArray:
     """Weighted least squares of p = z . basis for every row; basis (m, k, n), p (n,) or (m, n); z (m, k)."""
-    weighted = basis.conj() * w
+    weighted: ComplexArray = basis.conj() * w
     gram = weighted @ basis.transpose(0, 2, 1)
     # transposed: gram[a, b] = sum of conj(basis_a) w basis_b
     gram += 1e-12 * w.sum() * np.eye(basis.shape[1])

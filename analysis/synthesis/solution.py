@@ -195,48 +195,6 @@ def judge(linkage: Linkage, rotation: FloatArray, *, closed: bool) -> Verdicts:
     )
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Sensitivity:
-    """What one dimension does to the error.
-
-    Attributes
-    ----------
-    name : str
-        Field of `Linkage`, or of its pivot's motion.
-    value : float
-        m or rad.
-    slope : float
-        Derivative of the quality function with respect to it: zero at an optimum that no bound holds.
-    shift : float
-        Root mean square displacement of the traced point, or error of angle, per unit of it.
-    """
-
-    name: str
-    value: float
-    slope: float
-    shift: float
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Rounding:
-    """What rounding the dimensions costs.
-
-    Attributes
-    ----------
-    linkage : Linkage
-        Rounded.
-    error : float
-        Its quality function.
-    expected : float
-        Mean quality function of dimensions that are off by random amounts, evenly within half a step: to second order, by
-        the exact derivatives.
-    """
-
-    linkage: Linkage
-    error: float
-    expected: float
-
-
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Solution:
     """A linkage for a task.
@@ -281,68 +239,14 @@ class Solution:
             return self.linkage.path(np.linspace(at[0], at[-1], n))
         return self.linkage.path(np.linspace(0.0, 2.0 * pi, n, endpoint=False))
 
-    def _derivatives(self) -> tuple[list[str], FloatArray, FloatArray, FloatArray]:
-        """Names, derivatives (m, k) of the residuals with respect to them, residuals (m,), and weights (m,).
-
-        The residuals are those of the quality function; of an untimed path, the distances along the target's normals.
-        """
-        task, linkage = self.task, self.linkage
-        normal = normal_form(task)
-        at = normal.rotation if normal.rotation is not None else self.evaluation.rotation
-        if at is None:
-            assert normal.points is not None
-            at = _nearest(linkage, normal.origin + normal.unit * normal.points)
-        columns, basis = _pivot_columns(linkage, at)
-        names = [*PLACES, *columns]
-        parts, blocks, weights = [], [], []
-        if normal.points is not None:
-            points = normal.origin + normal.unit * normal.points
-            place, jacobian = linkage.path_jacobian(at)
-            left = place @ np.array([1.0, 1j]) - points
-            both = jacobian[:, 0] + 1j * jacobian[:, 1]
-            whole = np.vstack([both[: len(PLACES)], *[bx * both[10] + by * both[11] for bx, by in basis]]).T
-            if isinstance(task, UntimedPath):
-                rate = _rate(linkage, at, both)
-                across = 1j * rate / np.abs(rate)
-                parts, blocks = [(left * across.conj()).real], [(whole * across.conj()[:, None]).real]
-                weights = [normal.weights]
-            else:
-                parts, blocks = [left.real, left.imag], [whole.real, whole.imag]
-                weights = [normal.weights, normal.weights]
-        if normal.angle is not None:
-            which = 1 if normal.of_rocker else 0
-            angles, jacobian = linkage.link_jacobian(at)
-            turned = 0.0 if normal.of_rocker else linkage.ground_angle
-            left_angle = angles[which] + linkage.output_angle + turned - normal.angle
-            own = np.vstack(
-                [
-                    jacobian[: len(PLACES), which],
-                    *[bx * jacobian[10, which] + by * jacobian[11, which] for bx, by in basis],
-                ]
-            ).T
-            if not normal.of_rocker:
-                own[:, PLACES.index("ground_angle")] += 1.0
-            leverage = normal.leverage * normal.unit
-            parts.append(leverage * ((left_angle + pi) % (2.0 * pi) - pi))
-            blocks.append(leverage * own)
-            weights.append(normal.weights)
-        return names, np.vstack(blocks), np.concatenate(parts), np.concatenate(weights)
-
     def sensitivities(self) -> tuple[Sensitivity, ...]:
         """What each dimension does to the error, by exact derivatives.
 
         Of an untimed path, the squared distances to the curve at its stations, the crank rotations following.
         """
-        names, jacobian, residual, weights = self._derivatives()
-        slopes = 2.0 * jacobian.T @ (weights * residual)
-        stations = len(normal_form(self.task).weights)
-        shifts = np.sqrt((jacobian**2).sum(axis=0) / stations)
-        values = self.linkage.values() | _pivot_values(self.linkage)
-        return tuple(
-            Sensitivity(name=name, value=float(values[name]), slope=float(slope), shift=float(shift))
-            for name, slope, shift in zip(names, slopes, shifts)
-            if not (isinstance(self.task, RockerFunction) and name not in (*_LINK_NAMES, "crank_phase", *names[10:]))
-        )
+        from .sensitivity import sensitivities
+
+        return sensitivities(self)
 
     def rounded(self, length: float = 1e-4, angle: float = radians(0.1)) -> Rounding:
         """What rounding lengths and angles to whole steps costs.
@@ -352,80 +256,12 @@ class Solution:
         length, angle : float
             Steps (m, rad); 0.1 mm and 0.1 degrees by default.
         """
-        for what, step in (("length", length), ("angle", angle)):
-            if not (np.isfinite(step) and step > 0.0):
-                raise InputError(f"step of {what} is {step}: it must be greater than zero")
-        changed = {
-            name: step * round(getattr(self.linkage, name) / step)
-            for names, step in ((LENGTHS, length), (_ANGLES, angle))
-            for name in names
-        }
-        linkage = replace(self.linkage, **changed)
-        names, jacobian, _, weights = self._derivatives()
-        variance = np.array([(length if name in LENGTHS else angle) ** 2 / 12.0 for name in names[: len(PLACES)]])
-        squares = (weights[:, None] * jacobian[:, : len(PLACES)] ** 2).sum(axis=0)
-        rotation = self.evaluation.rotation
-        error = evaluate(self.task, linkage, rotation).error
-        if isinstance(self.task, UntimedPath) and self.task.measure == "area":
-            # an area: the mean of the distances, as of a normal variable of that spread about what is there
-            normal = normal_form(self.task)
-            spread = np.sqrt(jacobian[:, : len(PLACES)] ** 2 @ variance)
-            left = self._derivatives()[2]
-            expected = float(normal.weights * normal.arc * normal.unit @ _mean_absolute(left, spread))
-        else:
-            expected = self.error + float(squares @ variance)
-        return Rounding(linkage=linkage, error=error, expected=expected)
+        from .sensitivity import rounded
+
+        return rounded(self, length, angle)
 
 
-_LINK_NAMES = ("ground_length", "crank_length", "coupler_length", "rocker_length")
-_ANGLES = ("ground_angle", "crank_phase", "point_angle", "output_angle")
-
-
-def _mean_absolute(mean: FloatArray, spread: FloatArray) -> FloatArray:
-    """Mean of |x| of a normal variable."""
-    from scipy.special import erf
-
-    safe = np.maximum(spread, 1e-300)
-    ratio = mean / safe
-    value: FloatArray = safe * np.sqrt(2.0 / pi) * np.exp(-0.5 * ratio**2) + mean * erf(ratio / np.sqrt(2.0))
-    return value
-
-
-def _pivot_columns(linkage: Linkage, at: FloatArray) -> tuple[list[str], list[tuple[FloatArray, FloatArray]]]:
-    """Dimensions of a moved pivot, and the derivatives of its displacement with respect to each."""
-    pivot = linkage.pivot
-    names: list[str] = []
-    columns: list[tuple[FloatArray, FloatArray]] = []
-    if isinstance(pivot, SliderMotion):
-        c, s = np.cos(pivot.guide_angle), np.sin(pivot.guide_angle)
-        u = pivot.series(at)
-        names.append("guide_angle")
-        columns.append((-s * u, c * u))
-        for k in range(pivot.series.order + 1):
-            for kind, value in (("cos", np.cos(k * at)), ("sin", np.sin(k * at)))[: 1 if k == 0 else 2]:
-                names.append(f"slider {kind} {k}")
-                columns.append((c * value, s * value))
-    elif isinstance(pivot, SecondCrank):
-        psi = pivot.angle(at)
-        names += ["second_crank_length", "second_crank_phase"]
-        columns += [(np.cos(psi), np.sin(psi)), (-pivot.length * np.sin(psi), pivot.length * np.cos(psi))]
-    return names, columns
-
-
-def _pivot_values(linkage: Linkage) -> dict[str, float]:
-    pivot = linkage.pivot
-    if isinstance(pivot, SliderMotion):
-        values = {"guide_angle": pivot.guide_angle}
-        for k in range(pivot.series.order + 1):
-            values[f"slider cos {k}"] = float(pivot.series.cos[k])
-            values[f"slider sin {k}"] = float(pivot.series.sin[k])
-        return values
-    if isinstance(pivot, SecondCrank):
-        return {"second_crank_length": pivot.length, "second_crank_phase": pivot.phase}
-    return {}
-
-
-def _rate(linkage: Linkage, at: FloatArray, both: NDArray[np.complex128]) -> NDArray[np.complex128]:
+def path_rate(linkage: Linkage, at: FloatArray, both: NDArray[np.complex128]) -> NDArray[np.complex128]:
     """dP/dphi: by the crank's phase, and by the pivot's own motion."""
     step = 1e-6
     ahead, behind = linkage.displacement(at + step), linkage.displacement(at - step)
@@ -434,18 +270,19 @@ def _rate(linkage: Linkage, at: FloatArray, both: NDArray[np.complex128]) -> NDA
     return rate
 
 
-def _nearest(linkage: Linkage, points: NDArray[np.complex128]) -> FloatArray:
-    """Crank rotations at which the coupler point is nearest to points."""
+def nearest_rotations(linkage: Linkage, points: NDArray[np.complex128]) -> FloatArray:
+    """Crank rotations at which the coupler point is nearest to points (complex, m), without jumps of a turn."""
     phi = np.linspace(0.0, 2.0 * pi, 4 * CURVE, endpoint=False)
     curve = linkage.path(phi) @ np.array([1.0, 1j])
     at: FloatArray = phi[np.abs(points[:, None] - curve[None, :]).argmin(axis=1)]
     for _ in range(3):
         place, jacobian = linkage.path_jacobian(at)
         both = jacobian[:, 0] + 1j * jacobian[:, 1]
-        rate = _rate(linkage, at, both)
+        rate = path_rate(linkage, at, both)
         step = ((points - place @ np.array([1.0, 1j])) * rate.conj()).real / np.abs(rate) ** 2
         at += np.clip(step, -pi / CURVE, pi / CURVE)
-    return at
+    unwrapped: FloatArray = np.unwrap(at)
+    return unwrapped
 
 
 def ranked(solutions: Sequence[Solution]) -> tuple[Solution, ...]:

@@ -22,13 +22,16 @@ from .constraints import (
     LeastTransmission,
     limits_of,
 )
+from .linkage import Linkage
 from .polish import Polished, distinct, polish
-from .program import Answer, PivotUnknown, Start, linkage_of, start_of
+from .program import Answer, PivotUnknown, Start, linkage_of, random_pivot, start_of
 from .scan import scan
-from .solution import Solution, ranked
-from .tasks import Task, normal_form
+from .solution import Solution, nearest_rotations, ranked
+from .tasks import Normal, Task, UntimedPath, normal_form, reweighted
 
 Method = Literal["scan", "differential-evolution", "simplex"]
+#: Stations of an untimed path where the pivot moves: more than with a fixed one, because harmonics put waves into the curve.
+STATIONS = 144
 METHODS: tuple[Method, ...] = ("scan", "differential-evolution", "simplex")
 
 
@@ -99,8 +102,8 @@ def synthesize(
     ----------
     task : TimedPath, UntimedPath, RockerFunction, Motion or PrecisionPoints
     bounds : mapping, optional
-        (least, greatest) of dimensions by their name in `Linkage` (m, rad); equal ones fix a dimension. Without, links up to five
-        times the target's size; of a rocker function, a ground link of 0.1 m and the others up to five times that.
+        (least, greatest) of dimensions by their name in `Linkage` (m, rad); equal ones fix a dimension. Without, links up
+        to five times the target's size; of a rocker function, a ground link of 0.1 m and the others up to five times that.
     constraints : sequence
         See `analysis.synthesis.constraints`; by default a transmission angle of at least 40 degrees over a full turn.
     weights : array_like, optional
@@ -142,14 +145,15 @@ def synthesize(
     if method not in METHODS:
         raise InputError(f"method {method!r}: it must be one of {', '.join(METHODS)}")
     begun = perf_counter()
-    if weights is not None:
-        normal = normal_form(task, weights)
-        task = replace(task, weights=weights)  # type: ignore[call-arg]
-    normal = normal_form(task)
+    task = reweighted(task, weights)
+    normal = fitted_form(task, pivot)
     limits = limits_of(task, normal, bounds, constraints)
     if method == "scan":
-        begin = [start_of(g.linkage, normal, pivot, g.evaluation.rotation) for g in guesses]
-        begin += scan(normal, limits, seed=seed, candidates=candidates, starts=starts)
+        begin = [start_from(g.linkage, normal, pivot, g.evaluation.rotation) for g in guesses]
+        random = np.random.default_rng(seed)
+        for start in scan(normal, limits, seed=seed, candidates=candidates, starts=starts):
+            motion = start.pivot if pivot is None else random_pivot(pivot, start.q[2], normal.unit, random)
+            begin.append(replace(start, pivot=motion))
         done = polish(normal, limits, begin, pivot=pivot, n_jobs=n_jobs, progress=progress)
         total = len(begin)
     else:
@@ -158,7 +162,7 @@ def synthesize(
         search = by_differential_evolution if method == "differential-evolution" else by_simplex
         done = search(normal, limits, seed=seed, starts=starts, n_jobs=n_jobs, progress=progress)
         total = starts
-    found = _solutions(task, done, pivot, solutions)
+    found = solutions_of(task, normal, done, pivot, solutions)
     seconds = perf_counter() - begun
     result = Synthesis(
         task=task,
@@ -172,18 +176,50 @@ def synthesize(
     if done.interrupted:
         raise SynthesisInterrupted(result if found else None, done.done, total)
     if not found:
-        raise _infeasible(done)
+        raise infeasible(done)
     return result
 
 
-def _solutions(task: Task, done: Polished, pivot: PivotUnknown | None, count: int) -> tuple[Solution, ...]:
-    normal = normal_form(task)
+def fitted_form(task: Task, pivot: PivotUnknown | None) -> Normal:
+    """Normal form of a task for a search; of an untimed path with more stations where the pivot moves."""
+    if pivot is not None and isinstance(task, UntimedPath):
+        task = replace(task, samples=max(task.samples, STATIONS))
+    return normal_form(task)
+
+
+def start_from(
+    linkage: Linkage, normal: Normal, pivot: PivotUnknown | None, rotation: NDArray[np.float64] | None = None
+) -> Start:
+    """A linkage as a start, its untimed stations at the given rotations, or else where it comes nearest to them.
+
+    Raises
+    ------
+    InputError
+        If rotations are needed and cannot be found so, because the path is open.
+    """
+    if normal.timed:
+        return start_of(linkage, normal, pivot)
+    if rotation is None or len(rotation) != normal.n:
+        if normal.points is None or not normal.closed:
+            if rotation is None:
+                raise InputError("a start for an open path needs the crank rotations of its stations")
+            rotation = np.interp(np.linspace(0.0, 1.0, normal.n), np.linspace(0.0, 1.0, len(rotation)), rotation)
+        else:
+            rotation = nearest_rotations(linkage, normal.origin + normal.unit * normal.points)
+    return start_of(linkage, normal, pivot, rotation)
+
+
+def solutions_of(
+    task: Task, normal: Normal, done: Polished, pivot: PivotUnknown | None, count: int
+) -> tuple[Solution, ...]:
+    """Answers as solutions, each evaluated afresh, ranked, and at most so many."""
     chosen = distinct(done.kept, 4 * count)
     made = [Solution.of(task, linkage_of(a.start, normal, pivot), a.start.rotation) for a in chosen]
     return ranked([s for s in made if isfinite(s.error)])[:count]
 
 
-def _infeasible(done: Polished) -> InfeasibleError:
+def infeasible(done: Polished) -> InfeasibleError:
+    """What to say where nothing was found that keeps the constraints."""
     if not done.others:
         return InfeasibleError("no linkage keeps all bounds and constraints")
     nearest: Answer = min(done.others, key=lambda a: a.violation)
@@ -234,8 +270,9 @@ def trade_off(
 ) -> TradeOff:
     """Error against size or transmission angle, by the epsilon-constraint method with warm starts.
 
-    From the loosest limit to the tightest each problem starts from its own scan and from the solutions of the one before; a second
-    pass goes back, so that a solution found late serves the looser limits too. The error can only grow as a limit is tightened.
+    From the loosest limit to the tightest each problem starts from its own scan and from the solutions of the one before; a
+    second pass goes back, so that a solution found late serves the looser limits too: the error can only grow as a limit is
+    tightened.
 
     Parameters
     ----------

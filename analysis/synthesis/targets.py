@@ -91,9 +91,7 @@ def even_odd_area(*rings: FloatArray) -> float:
     """
     import shapely
 
-    # about a point nearby, for a curve far from the origin
-    origin = rings[0].mean(axis=0)
-    vertices = [ring(points - origin, True) for points in rings]
+    vertices = [ring(points, True) for points in rings]
     pieces = shapely.get_parts(shapely.unary_union([shapely.LineString(v) for v in vertices]))
     faces = shapely.get_parts(shapely.polygonize(pieces))
     x, y = shapely.get_coordinates(shapely.point_on_surface(faces)).T[:, :, None]
@@ -319,7 +317,6 @@ class TargetPath:
         origin, unit = points.mean(axis=0), self.size
         vertices = ring(points - origin, self.closed) / unit
         u = arc_lengths(vertices)
-        u *= (len(u) - 1) / u[-1]
         z = vertices[: len(points)] @ np.array([1.0, 1j])
         stiffness, modes = np.linalg.eigh(_bending(np.diff(u), self.closed))
         free = 1 if self.closed else 2  # what bending leaves as it is: a point, or a straight line

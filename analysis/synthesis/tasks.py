@@ -355,6 +355,21 @@ class Normal:
         return self.unit * self.unit
 
 
+def reweighted(task: Task, weights: ArrayLike | None) -> Task:
+    """The task with other weights, where any are given.
+
+    Raises
+    ------
+    InputError
+        If they are not one per target, or the task has none.
+    """
+    if weights is None:
+        return task
+    if isinstance(task, PrecisionPoints):
+        raise InputError("precision points are met exactly: they have no weights")
+    return replace(task, weights=weights)
+
+
 def normal_form(task: Task, weights: ArrayLike | None = None) -> Normal:
     """Normal form of a task, with ``weights`` in the place of its own where given.
 
@@ -363,10 +378,7 @@ def normal_form(task: Task, weights: ArrayLike | None = None) -> Normal:
     InputError
         If the weights are not one per target, or all points coincide.
     """
-    if weights is not None:
-        if isinstance(task, PrecisionPoints):
-            raise InputError("precision points are met exactly: they have no weights")
-        task = replace(task, weights=weights)
+    task = reweighted(task, weights)
     if isinstance(task, RockerFunction):
         return Normal(
             origin=0.0,

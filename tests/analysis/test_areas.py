@@ -274,6 +274,15 @@ def test_straightest_part_of_a_stadium() -> None:
     assert straightest_part(curve, 5, direction=0.0, least_travel=1.0).travel >= 1.0
 
 
+def test_straightest_part_at_the_very_end() -> None:
+    # a zigzag whose last three points, or the last and the first two, lie on a line
+    ends = np.array([[0.0, 0.0], [1.0, 3.0], [2.0, 0.0], [3.0, 2.0], [4.0, 2.0], [5.0, 2.0]])
+    assert straightest_part(ends, 3, closed=False).start == 3
+    seam = np.array([[1.0, 0.0], [2.0, 0.0], [3.0, 3.0], [2.0, 5.0], [1.0, 3.0], [0.0, 0.0]])
+    part = straightest_part(seam, 3)
+    assert (part.start, part.travel, part.flatness) == pytest.approx((5, 2.0, 0.0))
+
+
 @pytest.mark.parametrize("call", ["area", "hausdorff", "distance", "straightness", "straightest"])
 def test_bad_curves_are_refused(call: str) -> None:
     bad = np.array([[0.0, 0.0], [1.0, np.inf], [2.0, 1.0]])

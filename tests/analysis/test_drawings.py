@@ -53,6 +53,11 @@ def test_dxf_reads_back(unit: str, metre: float, code: int) -> None:
     assert not auditor.errors
     assert not auditor.fixes
     assert document.header["$INSUNITS"] == code
+    assert document.header["$MEASUREMENT"] == (0 if unit == "in" else 1)
+    (view,) = document.viewports.get("*Active")
+    # a little more than the drawing's 1.6 m, about its middle
+    assert view.dxf.height * metre == pytest.approx(1.76)
+    assert np.array(view.dxf.center)[:2] * metre == pytest.approx([0.4, 0.01])
     assert {layer.dxf.name for layer in document.layers} >= set(LAYERS)
     assert document.layers.get("crank").rgb == (0xC0, 0x39, 0x2B)
     assert document.layers.get("crank").dxf.lineweight == 50
@@ -113,6 +118,13 @@ def test_svg_has_real_size_and_layers() -> None:
         "text",
     ]
     assert root.findtext(f"{ns}title") == DRAWING.title
+    text = root.find(f"{ns}g/{ns}text")
+    assert text is not None
+    tilted = Drawing(title="", lines=(Line(layer="rocker", start=(0.01, 0.02), end=(0.03, -0.04)),))
+    line = ElementTree.fromstring(to_svg(tilted)).find(f"{ns}g/{ns}line")
+    assert line is not None
+    assert {k: float(v) for k, v in line.attrib.items()} == pytest.approx({"x1": 10, "y1": -20, "x2": 30, "y2": 40})
+    assert (float(text.attrib["x"]), float(text.attrib["y"])) == pytest.approx((100.0, -200.0))
     assert root.findtext(f"{ns}g/{ns}text") == "l2 = 50 mm & µ < 1"
 
 

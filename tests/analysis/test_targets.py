@@ -60,6 +60,11 @@ def test_measures_of_an_open_curve() -> None:
             getattr(BENT, measure)
 
 
+def test_weights_are_half_of_both_neighbouring_segments() -> None:
+    triangle = TargetPath(points=np.array([[0.0, 0.0], [3.0, 0.0], [3.0, 4.0]]), closed=True)
+    assert triangle.weights == pytest.approx([4.0, 3.5, 4.5])
+
+
 def test_length_and_area_converge_to_those_of_the_ellipse() -> None:
     for n, tolerance in ((100, 1e-3), (1000, 1e-5)):
         path = ellipse(0.1, 0.05, n)
@@ -170,6 +175,12 @@ def test_even_odd_area_of_any_polygon_is_that_of_a_count_over_a_grid(corners: li
     assert even_odd_area(points) == pytest.approx(inside.mean(), abs=0.02)
 
 
+def test_there_and_back_is_no_closed_curve_in_any_direction() -> None:
+    there = np.array([0.0, 0.4, 1.0, 0.7, 0.2])
+    with pytest.raises(InputError, match="no area"):
+        TargetPath(points=np.column_stack([1.7 + 0.3 * there, -0.1 + 0.7 * there]), closed=True)
+
+
 @pytest.mark.parametrize("scale", [1e-3, 1.0, 1e3])
 @pytest.mark.parametrize("shift", [0.0, 1e4])
 def test_measures_do_not_depend_on_place_and_scale(scale: float, shift: float) -> None:
@@ -233,6 +244,18 @@ def test_smoothing_leaves_a_curve_without_noise() -> None:
     for true in (ellipse(0.3, 0.15, 60), OPEN):
         smooth = true.smoothed(300)
         assert distance_to(true.points, smooth.points, closed=true.closed).max() < 3e-4 * true.length
+
+
+@pytest.mark.parametrize("path", [ellipse(0.3, 0.15, 9), OPEN.resampled(7)], ids=["closed", "open"])
+def test_without_deviation_smoothing_is_the_interpolating_spline(path: TargetPath) -> None:
+    from scipy.interpolate import CubicSpline
+
+    points = np.vstack([path.points, path.points[:1]]) if path.closed else path.points
+    u = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])
+    spline = CubicSpline(u, points, bc_type="periodic" if path.closed else "natural")
+    exact = spline(np.linspace(0.0, u[-1], 500))
+    smooth = path.smoothed(3000, deviation=1e-9)
+    assert distance_to(smooth.points, exact, closed=path.closed).max() < 1e-6
 
 
 def test_smoothing_turns_with_the_curve_and_scales() -> None:
@@ -404,7 +427,7 @@ def save(folder: Path, name: str, text: str) -> Path:
 @pytest.mark.parametrize(
     "text",
     [
-        "0,0\n1,0\n1,2.5\n",
+        "\ufeff0,0\n1,0\n1,2.5\n",
         "x,y\n0,0\n1,0\n1,2.5",
         "﻿x; y\n0; 0\n\n1; 0\n1; 2.5\n",
         "# made by hand\nx\ty\n0\t0\n1\t0\n1\t2.5\n",
@@ -461,6 +484,7 @@ WEDGE = np.array([[10.0, -5.0], [30.0, -5.0], [30.0, 5.0]])
         ('width="10in" viewBox="0 0 100 50"', None, 2.54e-3),
         ('width="72pt" height="200pt" viewBox="0 0 100,50"', None, 0.254e-3),
         ('width="100%" height="100%" viewBox="0 0 100 50"', None, 0.0254 / 96),
+        ('width=".5in" height="1.2.3in" viewBox="0 0 100 50"', None, 0.0254 / 200),
         ('width="100mm" height="50mm"', None, 0.0254 / 96),
         ("", None, 0.0254 / 96),
         ('width="100mm" height="50mm" viewBox="5 5 50 25"', "cm", 1e-2),

@@ -112,7 +112,7 @@ def brute_force(
         best[i] = min(e[1:-1][at])
         share = 0.5 * (sqrt(5.0) - 1.0)
         # about the grid's point, which is finite: a section of infinities only would not know where to go
-        for _ in range(90):
+        for _ in range(60):
             c, d = b - share * (b - a), a + share * (b - a)
             at_c, at_d = error(k, c), error(k, d)
             best[i] = min(best[i], at_c.min(), at_d.min())
@@ -182,7 +182,7 @@ class TestBruteForce:
     @pytest.mark.parametrize("path", [True, False])
     def test_no_slider_position_does_better(self, path: bool) -> None:
         seen: dict[str, int] = {}
-        for linkage, phi, target, settings in problems(150, path, seed=11):
+        for linkage, phi, target, settings in problems(80, path, seed=11):
             brute = brute_force(linkage, phi, target, *path_settings(settings, linkage.branch))
             motion = optimum(linkage, phi, target, **settings)
             assert (motion is None) == bool(np.isinf(brute).any())
@@ -194,10 +194,10 @@ class TestBruteForce:
             for kind in motion.kind.tolist():
                 seen[kind] = seen.get(kind, 0) + 1
         assert set(seen) == {"target", "perpendicular", "limit", "stroke"}
-        assert min(seen.values()) >= 20
+        assert min(seen.values()) >= 10
 
     def test_both_assemblies(self) -> None:
-        for linkage, phi, target, settings in problems(30, True, seed=5):
+        for linkage, phi, target, settings in problems(20, True, seed=5):
             brute = np.minimum(*(brute_force(linkage, phi, target, *path_settings(settings, b)) for b in (1, -1)))
             motion = optimum(linkage, phi, target, assemblies=(1, -1), **settings)
             assert (motion is None) == bool(np.isinf(brute).any())
@@ -273,7 +273,7 @@ class TestGeometry:
     @pytest.mark.parametrize("path", [True, False])
     def test_the_thesis_candidates_are_all_where_the_assembly_may_change(self, path: bool) -> None:
         compared = 0
-        for linkage, phi, target, settings in problems(150, path, seed=8):
+        for linkage, phi, target, settings in problems(70, path, seed=8):
             free = {"guide_angle": settings["guide_angle"]}
             both = optimum(linkage, phi, target, assemblies=(1, -1), **free)
             if both is None:
@@ -283,7 +283,7 @@ class TestGeometry:
             np.testing.assert_allclose(both.error, np.minimum(own[0].error, own[1].error), atol=1e-15)  # type: ignore[union-attr]
             compared += sum("limit" in motion.kind for motion in own if motion)
         # and where it may not, the limits of assembly are needed
-        assert compared > 20
+        assert compared > 15
 
     def test_lengths_scale_and_the_mirror_image_takes_the_other_assembly(self) -> None:
         linkage = replace(PATH_B, crank_phase=0.4)
@@ -337,6 +337,16 @@ class TestKnownMotions:
         assert motion.stroke == pytest.approx(np.ptp(series(TURN_72)))
         fit = motion.to_series(2)
         np.testing.assert_allclose([fit.cos, fit.sin], [series.cos, series.sin], atol=1e-13)
+
+    def test_a_function_that_passes_half_a_turn(self) -> None:
+        series = FourierSeries(np.array([0.01, 0.02, -0.005]), np.array([0.0, 0.01, 0.008]))
+        slider = SliderMotion(series=series, guide_angle=0.5)
+        moved = replace(WEIGHTED_ROCKER, pivot=slider, output_angle=1.0)
+        target = wrapped(moved.rocker_angle(TURN_24))
+        assert np.ptp(target) > 6.0
+        motion = variational_motion(moved, TURN_24, target, guide_angle=0.5)
+        assert motion.error.max() < 1e-14
+        assert len(motion.jumps) == 0
 
     def test_a_series_from_unequal_steps_follows_the_weights(self) -> None:
         random = np.random.default_rng(2)
@@ -417,21 +427,60 @@ class TestJumps:
             motion = variational_motion(linkage, phi, target, continuous=True, **settings)  # type: ignore[arg-type]
             assert (motion.error >= free.error - 1e-13).all()
             assert len(motion.jumps) <= len(free.jumps)
+            for step in (1e-4, -1e-4):
+                beside = motion.u + step
+                error = plant_error(linkage, phi, beside, target, motion.guide_angle, linkage.branch)
+                sine = directions(linkage, phi, beside, motion.guide_angle, linkage.branch)[5]
+                # worse, or out of the range
+                assert ((error > motion.error - 1e-9) | ~(linkage.branch * sine > np.sin(0.1))).all()
             if len(free.jumps) == 0:
                 assert motion.squared_error == pytest.approx(free.squared_error, abs=1e-12)
             elif len(motion.jumps) == 0:
-                # it pays for it, or one as good was missed where each rotation was taken by itself
+                # it pays for it
                 assert motion.squared_error > free.squared_error
                 mended += 1
         assert mended >= 3
 
+    def test_each_weighting_has_its_own_best_motion(self) -> None:
+        random = np.random.default_rng(16)
+        phi = np.arange(18) * pi / 9.0
+        differ = 0
+        for _ in range(60):
+            linkage, target = random_linkage(random), random_task(random, phi, path=True)
+            weights = random.uniform(0.0, 1.0, (4, 18)) ** 4
+            found = [optimum(linkage, phi, target, continuous=True, weights=w) for w in weights]
+            motions = [motion for motion in found if motion]
+            for w, own in zip(weights, motions):
+                for other in motions:
+                    assert len(own.jumps) == len(other.jumps)
+                    assert own.squared_error <= w @ other.error**2 + 1e-9
+                    differ += own.squared_error < w @ other.error**2 - 1e-6
+        assert differ >= 5
+
+    def test_a_change_of_assembly_is_a_jump(self) -> None:
+        changes = 0
+        for linkage, phi, target, settings in problems(60, True, seed=14):
+            motion = optimum(linkage, phi, target, guide_angle=settings["guide_angle"], assemblies=(1, -1))
+            if motion is not None:
+                changed = np.flatnonzero(motion.branch != np.roll(motion.branch, -1))
+                assert np.isin(changed, motion.jumps).all()
+                changes += len(changed)
+        assert changes > 10
+
     def test_an_open_motion_has_no_last_step(self) -> None:
-        target = PATH_B.path(TURN_72)
-        # the target goes round once, and ends where the linkage cannot come back from in one step
-        phi, aim = TURN_72[:30], target[:30].copy()
-        motion = variational_motion(PATH_B, phi, aim, closed=False)
-        assert len(motion.jumps) == 0
-        np.testing.assert_allclose(motion.u, 0.0, atol=1e-13)
+        # where the one jump of a closed motion leads from the last rotation to the first
+        random = np.random.default_rng(1)
+        phi = np.arange(36) * pi / 18.0
+        found = 0
+        for _ in range(100):
+            linkage, target = random_linkage(random), random_task(random, phi, path=True)
+            closed = optimum(linkage, phi[:12], target[:12], guide_angle=0.3)
+            if closed is not None and closed.jumps.tolist() == [11]:
+                motion = variational_motion(linkage, phi[:12], target[:12], guide_angle=0.3, closed=False)
+                assert len(motion.jumps) == 0
+                np.testing.assert_allclose(motion.error, closed.error, atol=1e-12)
+                found += 1
+        assert found >= 3
 
     @pytest.mark.parametrize("closed", [True, False])
     def test_the_choice_is_the_best_of_all(self, closed: bool) -> None:
@@ -459,13 +508,14 @@ class TestJumps:
 
 
 class TestThesis:
-    def test_the_slider_makes_the_weighted_rocker_function_exact(self) -> None:
+    @pytest.mark.parametrize("continuous", [True, False])
+    def test_the_slider_makes_the_weighted_rocker_function_exact(self, continuous: bool) -> None:
         target, weights = rocker_target(TURN_24), rocker_weights(TURN_24)
         # the printed linkage without a slider: 35.8 at N = 24, re-evaluated
         alone = float(weights @ wrapped(WEIGHTED_ROCKER.rocker_angle(TURN_24) - target) ** 2)
         assert alone == pytest.approx(35.8, abs=0.2)
         motion = variational_motion(
-            WEIGHTED_ROCKER, TURN_24, target, guide_angle=pi / 6.0, weights=weights, continuous=True
+            WEIGHTED_ROCKER, TURN_24, target, guide_angle=pi / 6.0, weights=weights, continuous=continuous
         )
         assert motion.error.max() < 1e-14
         assert len(motion.jumps) == 0

@@ -1,0 +1,211 @@
+"""The direct search for the slider's motion: a Fourier series of the crank's rotation (thesis, chapter VII).
+
+The rocker pivot of a given linkage is moved so that it does its task better: mean, harmonics and the guide's angle are sought
+with exact Jacobians from several starts, within bounds of stroke, speed and acceleration; or the links together with them. The
+optimum at every crank angle by itself is in `analysis.control.variational`; it may jump, a Fourier series cannot.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from math import pi
+from time import perf_counter
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from linkwork.errors import InputError
+
+from ..synthesis.constraints import Assembly, Constraint, FullTurn, InfeasibleError, limits_of
+from ..synthesis.linkage import Linkage, SliderMotion
+from ..synthesis.polish import polish
+from ..synthesis.program import PivotUnknown, SliderUnknown, random_pivot
+from ..synthesis.solution import Solution
+from ..synthesis.solve import Synthesis, SynthesisInterrupted, fitted_form, infeasible, solutions_of, start_from
+from ..synthesis.tasks import Task
+
+FloatArray = NDArray[np.float64]
+
+
+def slider_motion(
+    task: Task,
+    linkage: Linkage,
+    unknown: PivotUnknown,
+    *,
+    bounds: Mapping[str, tuple[float, float]] | None = None,
+    constraints: Sequence[Constraint] = (FullTurn(),),
+    guesses: Sequence[Linkage] = (),
+    starts: int = 24,
+    solutions: int = 6,
+    seed: int = 0,
+    n_jobs: int = 1,
+    progress: bool = False,
+) -> Synthesis:
+    """Move the rocker pivot of a linkage so that it does a task as well as it can.
+
+    Parameters
+    ----------
+    task : Task
+        Of `analysis.synthesis`; weights are the task's own.
+    linkage : Linkage
+        Its dimensions are kept, but for those that ``bounds`` sets free.
+    unknown : SliderUnknown or CrankUnknown
+        Harmonics, and bounds of guide angle, stroke, speed and acceleration.
+    bounds : mapping, optional
+        Dimensions that are optimised together with the motion, (least, greatest) by name (m, rad).
+    constraints : sequence
+        By default the links stay joined over the turn.
+    guesses : sequence of Linkage
+        Searched from as well: their pivots' motion, and with free dimensions those too.
+    starts : int
+        Random starts besides: phases and amplitudes of the harmonics, guide angles all round.
+    solutions, seed, n_jobs, progress
+        As for `synthesize`.
+
+    Returns
+    -------
+    Synthesis
+        Solutions whose linkages have a moved pivot.
+
+    Raises
+    ------
+    InputError, InfeasibleError, SynthesisInterrupted, MissingLibraryError
+        As `synthesize`.
+    """
+    if starts < 1 and not guesses:
+        raise InputError(f"{starts} starts and no guess: there must be at least one of either")
+    begun = perf_counter()
+    normal = fitted_form(task, unknown)
+    kept = {name: (value, value) for name, value in linkage.values().items() if name != "branch"}
+    assembly = () if any(isinstance(c, Assembly) for c in constraints) else (Assembly(branch=linkage.branch),)
+    limits = limits_of(task, normal, kept | dict(bounds or {}), (*constraints, *assembly))
+    begin = [start_from(guess, normal, unknown) for guess in guesses]
+    random = np.random.default_rng(seed)
+    base = start_from(linkage, normal, unknown)
+    begin += [replace(base, pivot=random_pivot(unknown, base.q[2], normal.unit, random)) for _ in range(starts)]
+    done = polish(normal, limits, begin, pivot=unknown, n_jobs=n_jobs, progress=progress)
+    found = solutions_of(task, normal, done, unknown, solutions)
+    result = Synthesis(
+        task=task,
+        solutions=found,
+        method="scan",
+        seed=seed,
+        starts=done.done,
+        seconds=perf_counter() - begun,
+        complete=not done.interrupted,
+    )
+    if done.interrupted:
+        raise SynthesisInterrupted(result if found else None, done.done, len(begin))
+    if not found:
+        raise infeasible(done)
+    return result
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class SmoothnessCurve:
+    """Error of the task against the smoothness of the slider's motion.
+
+    Attributes
+    ----------
+    acceleration : ndarray, shape (n,)
+        Greatest |d2u/dphi2| that was allowed (m/rad2), increasing.
+    solutions : tuple of Solution or None
+        The best at each; None where there is none.
+    """
+
+    acceleration: FloatArray
+    solutions: tuple[Solution | None, ...]
+
+    @property
+    def error(self) -> np.ma.MaskedArray:
+        """Quality function at each, masked where there is no solution; shape (n,)."""
+        return np.ma.masked_invalid(np.array([np.nan if s is None else s.error for s in self.solutions]))
+
+    @property
+    def attained(self) -> np.ma.MaskedArray:
+        """Greatest |d2u/dphi2| of each motion (m/rad2)."""
+        return np.ma.masked_invalid(np.array([np.nan if s is None else greatest(s.linkage, 2) for s in self.solutions]))
+
+
+def greatest(linkage: Linkage, order: int) -> float:
+    """Greatest magnitude over a turn of the slider's position (order 0), or of a derivative of it by the crank's rotation."""
+    if not isinstance(linkage.pivot, SliderMotion):
+        return 0.0
+    series = linkage.pivot.series
+    for _ in range(order):
+        series = series.derivative()
+    return float(np.abs(series(np.linspace(0.0, 2.0 * pi, 720, endpoint=False))).max())
+
+
+def smoothness_curve(
+    task: Task,
+    linkage: Linkage,
+    unknown: SliderUnknown,
+    accelerations: ArrayLike,
+    *,
+    bounds: Mapping[str, tuple[float, float]] | None = None,
+    constraints: Sequence[Constraint] = (FullTurn(),),
+    starts: int = 12,
+    seed: int = 0,
+    n_jobs: int = 1,
+    progress: bool = False,
+) -> SmoothnessCurve:
+    """Smoothness traded against error: the best motion for each bound of its second derivative, warm started.
+
+    From the roughest motion to the smoothest each problem starts from the solutions of the one before, its harmonics shrunk
+    to the new bound, and from its own random starts; then back, so that the error never grows with the freedom.
+
+    Parameters
+    ----------
+    task, linkage, unknown, bounds, constraints, starts, seed, n_jobs, progress
+        As for `slider_motion`.
+    accelerations : array_like, shape (n,)
+        Bounds of |d2u/dphi2| (m/rad2), above zero.
+
+    Raises
+    ------
+    InputError
+        If the bounds are not usable.
+    """
+    values = np.sort(np.array(accelerations, dtype=float, ndmin=1))
+    if values.ndim != 1 or len(values) < 2 or not (np.isfinite(values).all() and values[0] > 0.0):
+        raise InputError("bounds of acceleration must be finite numbers above zero, at least two")
+    found: dict[int, Solution] = {}
+    for own, sequence in ((starts, range(len(values) - 1, -1, -1)), (0, range(len(values)))):
+        previous: list[Linkage] = []
+        for k in sequence:
+            guesses = [*previous, *([found[k].linkage] if k in found else [])]
+            if not own and not guesses:
+                continue
+            try:
+                result = slider_motion(
+                    task,
+                    linkage,
+                    replace(unknown, acceleration=float(values[k])),
+                    bounds=bounds,
+                    constraints=constraints,
+                    guesses=[_shrunk(guess, float(values[k])) for guess in guesses],
+                    starts=own,
+                    solutions=3,
+                    seed=seed,
+                    n_jobs=n_jobs,
+                    progress=progress,
+                )
+            except InfeasibleError:
+                continue
+            if k not in found or result.best.error < found[k].error:
+                found[k] = result.best
+            previous = [s.linkage for s in result.solutions]
+    return SmoothnessCurve(acceleration=values, solutions=tuple(found.get(k) for k in range(len(values))))
+
+
+def _shrunk(linkage: Linkage, acceleration: float) -> Linkage:
+    """The linkage with its slider's harmonics made smaller, down to the bound."""
+    most = greatest(linkage, 2)
+    if not isinstance(linkage.pivot, SliderMotion) or most <= acceleration:
+        return linkage
+    series = linkage.pivot.series
+    factor = acceleration / most
+    mean = series.mean
+    return replace(linkage, pivot=replace(linkage.pivot, series=(series + -mean) * factor + mean))

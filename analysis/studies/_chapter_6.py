@@ -1,0 +1,204 @@
+"""What Fig 6.4 to 6.11 share: the printed linkage of a problem and ours, side by side.
+
+Lengths and errors in the units of print, cm and degrees.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import cache
+from math import degrees, pi
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from linkwork.five_bar.published import CM_PER_METRE
+
+from ..figures import COLOURS, Curve, Panel
+from ..synthesis import Linkage, RockerFunction, Solution, evaluate, synthesize
+from ..synthesis.published import PROBLEMS
+from ..synthesis.tasks import normal_form
+from .study import BALANCE, REFERENCE, THESIS, StudyResult, Verdict, at_least, at_most, near
+
+if TYPE_CHECKING:
+    FloatArray = NDArray[np.float64]
+
+ASSIGNED = (
+    "The captions of the thesis's figures are lost; which of its problems stands under which number is our assignment."
+)
+#: Least transmission angle that is asked of our linkages (deg).
+TRANSMISSION = 40.0
+#: A small search does: nearly every start of these problems ends at the same optimum.
+STARTS, CANDIDATES = 8, 1 << 14
+#: Colours of target, printed and our linkage.
+TARGET, PRINTED, OURS = "0.25", COLOURS[1], COLOURS[0]
+
+
+@cache
+def best(name: str) -> Solution:
+    """Our best linkage for a problem of chapter VI."""
+    p = PROBLEMS[name]
+    return synthesize(p.task, p.bounds, p.constraints, starts=STARTS, candidates=CANDIDATES).best
+
+
+def error_verdicts(name: str, stated: float, tolerance: float, reference: float, digits: float) -> tuple[Verdict, ...]:
+    """The printed linkage's error as the thesis states it and as it is, and ours against the goal.
+
+    Parameters
+    ----------
+    name : str
+        Problem.
+    stated, tolerance : float
+        By the thesis, and half its last digit.
+    reference, digits : float
+        The printed linkage's true error, and half the last digit of it.
+    """
+    p = PROBLEMS[name]
+    printed, found = p.shown(evaluate(p.task, p.linkage).error), p.shown(best(name).error)
+    return (
+        near("error of the printed linkage", THESIS, stated, printed, tolerance, p.unit),
+        near("error of the printed linkage", REFERENCE, reference, printed, digits, p.unit),
+        at_most("error of our linkage", REFERENCE, p.goal, found, p.unit),
+    )
+
+
+def sound_verdicts(name: str) -> tuple[Verdict, ...]:
+    """Our linkage turns fully, with a transmission angle, and is no longer than the longest printed link."""
+    p, ours = PROBLEMS[name], best(name)
+    largest = p.linkage.largest_link if not p.bounds else max(high for _, high in p.bounds.values())
+    return (
+        at_least(
+            "least transmission angle of our linkage",
+            BALANCE,
+            TRANSMISSION - 1e-3,
+            degrees(ours.linkage.least_transmission),
+            "deg",
+        ),
+        at_most(
+            "longest link of our linkage",
+            BALANCE,
+            CM_PER_METRE * largest * (1.0 + 1e-6),
+            CM_PER_METRE * ours.linkage.largest_link,
+            "cm",
+        ),
+        at_least("our linkage has no circuit, branch or order defect", BALANCE, 1.0, float(ours.verdicts.sound)),
+    )
+
+
+def outline(linkage: Linkage) -> dict[str, FloatArray]:
+    """Links at the start of the motion (cm): the line A B P C B, on to C and D, and the ground A D; shape (n, 2)."""
+    at = {name: CM_PER_METRE * np.array(place) for name, place in linkage.pins(0.0).items()}
+    return {
+        "links": np.array([at[name] for name in "ABPCBCD"]),
+        "ground": np.array([at["A"], at["D"]]),
+    }
+
+
+def path_columns(name: str) -> dict[str, FloatArray]:
+    """Target, both coupler curves and both linkages: x and y in cm."""
+    p = PROBLEMS[name]
+    normal = normal_form(p.task)
+    assert normal.points is not None
+    stations = normal.origin + normal.unit * normal.points
+    shapes = {"target": CM_PER_METRE * np.column_stack([stations.real, stations.imag])}
+    turn = np.linspace(0.0, 2.0 * pi, 361)
+    for who, linkage in (("printed", p.linkage), ("ours", best(name).linkage)):
+        shapes[f"{who} curve"] = CM_PER_METRE * linkage.path(turn)
+        shapes |= {f"{who} {part}": line for part, line in outline(linkage).items()}
+    return {f"{shape} {axis} [cm]": xy[:, k] for shape, xy in shapes.items() for k, axis in enumerate("xy")}
+
+
+def curve_of(result: StudyResult, shape: str, **look: str | float | None) -> Curve:
+    """A shape of `path_columns` as a curve."""
+    return Curve(x=result.columns[f"{shape} x [cm]"], y=result.columns[f"{shape} y [cm]"], **look)  # type: ignore[arg-type]
+
+
+def curves_panel(result: StudyResult, *, marks: bool) -> Panel:
+    """Target and coupler curves; the target's points as marks, or as a closed line."""
+    x, y = (result.columns[f"target {axis} [cm]"] for axis in "xy")
+    x, y = (np.append(v[np.isfinite(v)], v[0]) for v in (x, y))
+    target = Curve(
+        x=x, y=y, label="target", colour=TARGET, line="" if marks else "--", marker="." if marks else "", width=1.1
+    )
+    return Panel(
+        x_label="x [cm]",
+        y_label="y [cm]",
+        title="coupler curves",
+        curves=[
+            target,
+            curve_of(result, "printed curve", label="printed linkage", colour=PRINTED),
+            curve_of(result, "ours curve", label="our linkage", colour=OURS),
+        ],
+        equal=True,
+        legend_at="center",
+    )
+
+
+def linkages_panel(result: StudyResult) -> Panel:
+    """Both linkages to scale."""
+    curves = []
+    for who, label, colour in (("printed", "printed", PRINTED), ("ours", "ours", OURS)):
+        curves += [
+            curve_of(result, f"{who} links", label=label, colour=colour, marker=".", width=1.6),
+            curve_of(result, f"{who} ground", colour=colour, line=":", width=1.2),
+            curve_of(result, f"{who} curve", colour=colour, width=0.9),
+        ]
+    return Panel(
+        x_label="x [cm]",
+        y_label="y [cm]",
+        title="linkages at the start, to scale; ground dotted",
+        curves=curves,
+        equal=True,
+        legend_at="best",
+    )
+
+
+def distance_columns(name: str) -> dict[str, FloatArray]:
+    """Distance of the coupler point from its target over the crank's rotation."""
+    p = PROBLEMS[name]
+    found: Mapping[str, FloatArray] = {
+        "printed": evaluate(p.task, p.linkage).errors,
+        "ours": best(name).evaluation.errors,
+    }
+    rotation = normal_form(p.task).rotation
+    assert rotation is not None
+    return {"crank rotation [deg]": np.degrees(rotation)} | {
+        f"{who} distance [cm]": CM_PER_METRE * distance for who, distance in found.items()
+    }
+
+
+def distance_panel(result: StudyResult) -> Panel:
+    """The distances, on a logarithmic scale."""
+    return Panel(
+        x_label="crank rotation [deg]",
+        y_label="distance from the target [cm]",
+        title="error over a turn",
+        curves=[
+            Curve(
+                x=result.columns["crank rotation [deg]"],
+                y=result.columns[f"{who} distance [cm]"],
+                label=label,
+                colour=colour,
+            )
+            for who, label, colour in (("printed", "printed linkage", PRINTED), ("ours", "our linkage", OURS))
+        ],
+        logarithmic="y",
+        x_ticks=range(0, 361, 90),
+    )
+
+
+# Rocker functions
+
+
+def angle_columns(solutions: Mapping[str, tuple[RockerFunction, Linkage]]) -> dict[str, FloatArray]:
+    """Rocker angle and its error over a turn, of linkages by name, and the target (deg)."""
+    phi = np.linspace(0.0, 2.0 * pi, 361)
+    target = 70.0 + 100.0 * np.abs(np.sin(0.5 * phi))
+    columns = {"crank rotation [deg]": np.degrees(phi), "target angle [deg]": target}
+    for who, (_, linkage) in solutions.items():
+        angle = np.degrees(linkage.rocker_angle(phi))
+        # to the turn that the target is in
+        angle -= 360.0 * np.round(np.mean(angle - target) / 360.0)
+        columns[f"{who} angle [deg]"], columns[f"{who} error [deg]"] = angle, angle - target
+    return columns

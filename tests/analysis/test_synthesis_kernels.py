@@ -1,0 +1,197 @@
+"""The compiled path of the coupler point and its derivatives: against the plant traced with CasADi, and finite differences."""
+
+from __future__ import annotations
+
+from functools import cache
+from math import pi
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from analysis import symbolic
+from analysis.synthesis.kernels import (
+    COLUMNS,
+    PLACES,
+    coupler_path,
+    coupler_path_jacobian,
+    link_directions,
+    link_jacobian,
+    many_directions,
+    match_windows,
+)
+from linkwork.five_bar.parameters import Constants
+from tests.linkages import drawn
+
+FloatArray = NDArray[np.float64]
+
+
+def case(seed: int, n: int = 7) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, float]:
+    """Rotations, displacements of D, vector q and branch of a random linkage."""
+    random = np.random.default_rng(seed)
+    linkage = drawn(random, least=0.5)
+    small = 0.02 * linkage.crank_length
+    return (
+        random.uniform(-pi, pi, n),
+        random.uniform(-small, small, n),
+        random.uniform(-small, small, n),
+        linkage.vector,
+        float(linkage.branch),
+    )
+
+
+def evaluated(
+    kernel: Any, rows: int, phi: FloatArray, dx: FloatArray, dy: FloatArray, q: FloatArray, branch: float
+) -> tuple[FloatArray, FloatArray]:
+    out, jacobian = np.empty((rows, len(phi))), np.empty((len(COLUMNS), rows, len(phi)))
+    kernel(np.cos(phi), np.sin(phi), dx, dy, q, branch, out, jacobian)
+    return out, jacobian
+
+
+@cache
+def traced() -> Any:
+    """Coupler point in the plane and link angles, by `position` and `coupler_point` of the plant, with their Jacobian.
+
+    The slider's displacement is (dx, dy) with u = 1 and the guide's direction (dx, dy).
+    """
+    casadi = symbolic.library()
+    plant = symbolic.plant()
+    z = casadi.SX.sym("z", len(COLUMNS))
+    phi, branch = casadi.SX.sym("phi"), casadi.SX.sym("branch")
+    v = dict(zip(COLUMNS, casadi.vertsplit(z)))
+    known = {
+        "l1": v["ground_length"],
+        "l2": v["crank_length"],
+        "l3": v["coupler_length"],
+        "l4": v["rocker_length"],
+        "ca": v["dx"],
+        "sa": v["dy"],
+        "branch": branch,
+        "xp": v["point_distance"] * casadi.cos(v["point_angle"]),
+        "yp": v["point_distance"] * casadi.sin(v["point_angle"]),
+    }
+    p = Constants(**{name: known.get(name, 0.0) for name in Constants._fields})
+    g = plant.position(phi + v["crank_phase"], 1.0, p)
+    x, y = plant.coupler_point(g, p)
+    c, s = casadi.cos(v["ground_angle"]), casadi.sin(v["ground_angle"])
+    values = casadi.vertcat(
+        v["pivot_x"] + c * x - s * y, v["pivot_y"] + s * x + c * y, plant.coupler_angle(g), plant.rocker_angle(g)
+    )
+    return casadi.Function("traced", [z, phi, branch], [values, casadi.jacobian(values, z)])
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_path_angles_and_jacobians_are_those_of_the_plant(seed: int) -> None:
+    pytest.importorskip("casadi")
+    phi, dx, dy, q, branch = case(seed)
+    path, path_jacobian = evaluated(coupler_path_jacobian, 2, phi, dx, dy, q, branch)
+    angles, angle_jacobian = evaluated(link_jacobian, 2, phi, dx, dy, q, branch)
+    for j in range(len(phi)):
+        values, jacobian = (np.asarray(a) for a in traced()(np.append(q, [dx[j], dy[j]]), phi[j], branch))
+        np.testing.assert_allclose(path[:, j], values[:2, 0], rtol=0.0, atol=1e-13)
+        np.testing.assert_allclose(np.exp(1j * angles[:, j]), np.exp(1j * values[2:, 0]), rtol=0.0, atol=1e-13)
+        np.testing.assert_allclose(path_jacobian[:, :, j], jacobian[:2].T, rtol=1e-11, atol=1e-12)
+        np.testing.assert_allclose(angle_jacobian[:, :, j], jacobian[2:].T, rtol=1e-11, atol=1e-12)
+
+
+@pytest.mark.parametrize("kernel", [coupler_path_jacobian, link_jacobian])
+@pytest.mark.parametrize("seed", range(4))
+def test_jacobians_are_limits_of_differences(kernel: Any, seed: int) -> None:
+    phi, dx, dy, q, branch = case(seed + 100)
+    _, jacobian = evaluated(kernel, 2, phi, dx, dy, q, branch)
+    h = 1e-6
+    for k, name in enumerate(COLUMNS):
+        ends = []
+        for step in (h, -h):
+            moved = q.copy()
+            if k < len(PLACES):
+                moved[k] += step
+            shift = [d + (step if name == label else 0.0) for d, label in ((dx, "dx"), (dy, "dy"))]
+            ends.append(evaluated(kernel, 2, phi, *shift, moved, branch)[0])
+        difference = ends[0] - ends[1]
+        if kernel is link_jacobian:
+            difference = np.angle(np.exp(1j * difference))
+        np.testing.assert_allclose(jacobian[k], difference / (2.0 * h), rtol=1e-7, atol=1e-8, err_msg=name)
+
+
+def test_with_and_without_derivatives_the_path_is_the_same() -> None:
+    phi, dx, dy, q, branch = case(5, 72)
+    path = np.empty((2, 72))
+    coupler_path(np.cos(phi), np.sin(phi), dx, dy, q, branch, path)
+    np.testing.assert_allclose(path, evaluated(coupler_path_jacobian, 2, phi, dx, dy, q, branch)[0], atol=1e-14)
+    directions = np.empty((6, 72))
+    link_directions(np.cos(phi), np.sin(phi), dx, dy, q, branch, directions)
+    angles = evaluated(link_jacobian, 2, phi, dx, dy, q, branch)[0]
+    np.testing.assert_allclose(directions[0] + 1j * directions[1], np.exp(1j * angles[0]), atol=1e-14)
+    np.testing.assert_allclose(directions[2] + 1j * directions[3], np.exp(1j * angles[1]), atol=1e-14)
+    np.testing.assert_allclose(directions[4] + 1j * directions[5], np.exp(1j * (angles[1] - angles[0])), atol=1e-14)
+
+
+def test_links_that_cannot_be_joined_leave_a_nan() -> None:
+    q = np.array([0.0, 0.0, 1.0, 0.9, 0.5, 0.6, 0.3, 0.0, 0.0, 0.0])
+    phi = np.array([0.5, pi])
+    zero = np.zeros(2)
+    path, jacobian = evaluated(coupler_path_jacobian, 2, phi, zero, zero, q, 1.0)
+    assert np.isfinite(path[:, 0]).all()
+    assert np.isnan(path[:, 1]).all()
+    assert np.isnan(jacobian[2:, :, 1]).any()
+
+
+def test_many_linkages_at_once_are_one_after_the_other() -> None:
+    random = np.random.default_rng(3)
+    drawings = [drawn(random) for _ in range(5)]
+    phi = np.linspace(0.0, 6.0, 11)
+    for branch in (1.0, -1.0):
+        shapes = np.array(
+            [[x.crank_length, x.coupler_length, x.rocker_length, x.ground_length * x.crank_phase] for x in drawings]
+        ) / np.array([[x.ground_length] for x in drawings])
+        coupler = np.empty((5, 11), dtype=complex)
+        rocker = np.empty((5, 11), dtype=complex)
+        many_directions(np.cos(phi), np.sin(phi), shapes, branch, coupler, rocker)
+        for row, linkage in enumerate(drawings):
+            g = np.empty((6, 11))
+            zero = np.zeros(11)
+            link_directions(np.cos(phi), np.sin(phi), zero, zero, linkage.vector, branch, g)
+            np.testing.assert_allclose(coupler[row], g[0] + 1j * g[1], atol=1e-13)
+            np.testing.assert_allclose(rocker[row], g[2] + 1j * g[3], atol=1e-13)
+
+
+class TestMatchWindows:
+    CURVE = np.exp(1j * np.linspace(0.0, 2.0 * pi, 128, endpoint=False)) * (
+        1.0 + 0.4 * np.cos(np.linspace(0.0, 4.0 * pi, 128, endpoint=False) + 0.3)
+    )
+
+    def piece(self, start: int, span: int, k: int = 32) -> NDArray[np.complex128]:
+        """Points at even arc length on a piece of the curve."""
+        part = self.CURVE[np.arange(start, start + span + 1) % 128]
+        length = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(part)))])
+        at = np.linspace(0.0, length[-1], k)
+        return np.interp(at, length, part.real) + 1j * np.interp(at, length, part.imag)
+
+    def matched(self, target: NDArray[np.complex128], *, closed: bool = True) -> FloatArray:
+        best = np.empty((1, 4))
+        spans = np.array([10, 20, 28, 48, 90])
+        match_windows(self.CURVE[None, :].copy(), target - target.mean(), np.arange(0, 128, 4), spans, closed, best)
+        return best[0]
+
+    @pytest.mark.parametrize(("start", "span"), [(8, 28), (112, 48), (64, 90)])
+    def test_it_finds_the_piece_that_was_cut_out_turned_and_scaled(self, start: int, span: int) -> None:
+        found = self.matched(2.5 * np.exp(0.7j) * self.piece(start, span) + 3.0)
+        assert found[0] == pytest.approx(0.0, abs=1e-12)
+        assert found[1:].tolist() == [start, span, 1.0]
+
+    def test_it_finds_the_direction(self) -> None:
+        found = self.matched(self.piece(20, 48)[::-1])
+        assert found[0] == pytest.approx(0.0, abs=1e-12)
+        assert found[1:].tolist() == [20, 48, -1.0]
+
+    def test_a_mirror_image_is_no_similarity(self) -> None:
+        assert self.matched(self.piece(20, 48).conj())[0] > 1e-3
+
+    def test_an_open_curve_has_no_piece_over_its_end(self) -> None:
+        over = self.piece(112, 48)
+        assert self.matched(over, closed=True)[0] == pytest.approx(0.0, abs=1e-12)
+        found = self.matched(over, closed=False)
+        assert found[0] > 1e-6
+        assert found[1] + found[2] < 128
