@@ -24,7 +24,8 @@ from .constraints import (
 )
 from .linkage import Linkage, SecondCrank, SliderMotion
 from .program import CrankUnknown, SliderUnknown
-from .solution import Evaluation, Rounding, Sensitivity, Solution, Verdicts, evaluate, judge
+from .sensitivity import Rounding, Sensitivity
+from .solution import Evaluation, Solution, Verdicts, evaluate, judge
 from .solve import Synthesis, SynthesisInterrupted, TradeOff, synthesize, trade_off
 from .targets import TargetPath, function_from_formula, path_from_formula
 from .tasks import Motion, PrecisionPoints, RockerFunction, Straight, TimedPath, UntimedPath, turn

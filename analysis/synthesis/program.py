@@ -56,6 +56,9 @@ class SliderUnknown:
         0 is a slider set once.
     guide_angle : (float, float)
         Bounds (rad); equal ones fix it.
+    position : (float, float), optional
+        Least and greatest slider position (m); by default one ground link to either side of its end, beyond which it would be
+        another linkage.
     stroke : float
         Greatest distance between the ends of its travel (m).
     speed, acceleration : float
@@ -66,6 +69,7 @@ class SliderUnknown:
 
     harmonics: int
     guide_angle: tuple[float, float] = (-pi, pi)
+    position: tuple[float, float] | None = None
     stroke: float = inf
     speed: float = inf
     acceleration: float = inf
@@ -77,6 +81,12 @@ class SliderUnknown:
         low, high = self.guide_angle
         if not (isfinite(low) and isfinite(high) and low <= high):
             raise ParameterError("bounds of guide_angle", self.guide_angle, "be two finite angles in order (rad)")
+        if self.position is not None:
+            low, high = self.position
+            if not (isfinite(low) and isfinite(high) and low < high):
+                raise ParameterError(
+                    "bounds of slider position", self.position, "be two finite lengths, increasing (m)"
+                )
         for name in ("stroke", "speed", "acceleration"):
             if not getattr(self, name) > 0.0:
                 raise ParameterError(f"greatest {name}", getattr(self, name), "be greater than zero")
@@ -227,7 +237,7 @@ class Program:
             value = traced(require, physical(p, self.normal.unit, self.normal.origin)) / require.scale
             self._within(value, 0.0 if require.equal else -inf, 0.0, require.name)
         if isinstance(pivot, SliderUnknown):
-            quality = quality + self._slider(pivot, v, z, low, high)
+            quality = quality + self._slider(pivot, p.ground_length, v, z, low, high)
         if isinstance(pivot, CrankUnknown) and isfinite(pivot.speed):
             x = casadi.DM(np.linspace(0.0, 2.0 * pi, GRID, endpoint=False))
             rate = _series(casadi, v[2:], x, mean=False, order=1)
@@ -373,16 +383,23 @@ class Program:
         self._at_most(joint - d2 - product, name)
         self._at_most(d2 - joint - product, name)
 
-    def _slider(self, pivot: SliderUnknown, v: Any, z: list[Any], low: list[Any], high: list[Any]) -> Any:
+    def _slider(self, pivot: SliderUnknown, ground: Any, v: Any, z: list[Any], low: list[Any], high: list[Any]) -> Any:
+        """Bounds of the slider's motion; what its smoothness adds to the quality."""
         casadi, unit = self._casadi, self.normal.unit
         x = casadi.DM(np.linspace(0.0, 2.0 * pi, GRID, endpoint=False))
+        u = _series(casadi, v[1:], x)
+        if pivot.position is None:
+            self._at_most(u - ground, "slider position")
+            self._at_most(-u - ground, "slider position")
+        else:
+            self._within(u, pivot.position[0] / unit, pivot.position[1] / unit, "slider position")
         if isfinite(pivot.stroke):
             middle = casadi.SX.sym("middle")
             z.append(middle)
             low.append(np.array([-inf]))
             high.append(np.array([inf]))
             half = 0.5 * pivot.stroke / unit
-            self._within(_series(casadi, v[1:], x) - middle, -half, half, "stroke")
+            self._within(u - middle, -half, half, "stroke")
         for order, bound, name in ((1, pivot.speed, "slider speed"), (2, pivot.acceleration, "slider acceleration")):
             if isfinite(bound):
                 self._within(_series(casadi, v[1:], x, order=order), -bound / unit, bound / unit, name)

@@ -3,18 +3,27 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from math import degrees, inf, pi, radians
+from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from linkwork.errors import InputError
+from linkwork.errors import AssemblyError, InputError
 
 from .areas import area_between, distance_to
 from .kernels import PLACES
-from .linkage import LENGTHS, Linkage, SecondCrank, SliderMotion
+from .linkage import Linkage, SecondCrank, SliderMotion
 from .tasks import PrecisionPoints, RockerFunction, Task, TimedPath, UntimedPath, normal_form
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from ..drawings import Drawing
+    from ..figures import LinkageScene
+    from .sensitivity import Rounding, Sensitivity
 
 FloatArray = NDArray[np.float64]
 
@@ -260,6 +269,137 @@ class Solution:
 
         return rounded(self, length, angle)
 
+    def columns(self) -> dict[str, FloatArray]:
+        """Target by target: crank rotation, what was asked for, what is done, error, transmission angle; SI, units in the names.
+
+        Of an untimed path the point of it that is nearest to each of the target's points.
+        """
+        task = self.task
+        at = self.evaluation.rotation
+        if isinstance(task, UntimedPath):
+            points = np.asarray(task.path.points)
+            begin, end = (0.0, 2.0 * pi) if task.path.closed or at is None else (float(at.min()), float(at.max()))
+            at = nearest_rotations(self.linkage, points @ np.array([1.0, 1j]), begin, end)
+        assert at is not None
+        columns = {"crank rotation [rad]": at}
+        if isinstance(task, RockerFunction):
+            columns |= {"target angle [rad]": np.asarray(task.angle), "rocker angle [rad]": self.linkage.rocker_angle(at)}
+            columns["error of angle [rad]"] = self.evaluation.errors
+        else:
+            wanted = np.asarray(task.path.points if isinstance(task, UntimedPath) else task.points)
+            made = self.linkage.path(at)
+            for name, both in (("target", wanted), ("path", made)):
+                columns |= {f"{name} {axis} [m]": both[:, k] for k, axis in enumerate("xy")}
+            columns["error [m]"] = self.evaluation.errors
+        if self.evaluation.angle_errors is not None:
+            angle = self.linkage.coupler_angle(at)
+            columns["target angle [rad]"] = angle - self.evaluation.angle_errors
+            columns["coupler angle [rad]"] = angle
+            columns["error of angle [rad]"] = self.evaluation.angle_errors
+        columns["transmission angle [rad]"] = angle_at_c(self.linkage, at)
+        return columns
+
+    def to_csv(self, path: str | Path) -> Path:
+        """Write `columns` to a CSV file."""
+        from ..io import write_csv
+
+        return write_csv(path, self.columns())
+
+    def report(self) -> str:
+        """Verdicts, dimensions with what an error of 0.1 mm or 0.1 degrees in each costs, rounding, errors, in mm and degrees."""
+        from .sensitivity import report
+
+        return report(self)
+
+    def plot(self, *, title: str = "") -> Figure:
+        """The linkage to scale, its path with magnified errors or its function, errors and transmission angle."""
+        from .. import figures
+
+        return figures.plot_solution(self.scene(title))
+
+    def animate(self, path: str | Path, *, title: str = "", frames: int = 72) -> Path:
+        """Write a GIF of a turn of the crank."""
+        from .. import figures
+
+        return figures.animate_solution(self.scene(title), path, frames=frames)
+
+    def drawing(self, rotation: float | None = None, *, title: str = "") -> Drawing:
+        """The linkage, its coupler curve and the target at real size, for `analysis.io.save_drawing`.
+
+        Parameters
+        ----------
+        rotation : float, optional
+            Of the crank (rad); the first at which the links are joined by default.
+        title : str
+        """
+        from .draughting import drawing
+
+        return drawing(self.scene(title), rotation)
+
+    def scene(self, title: str = "") -> LinkageScene:
+        """What a picture of it shows."""
+        from ..figures import LinkageScene
+
+        task, linkage = self.task, self.linkage
+        at = self.rotation
+        closed = isinstance(task, UntimedPath) and task.path.closed
+        # stations as far apart over the end of the turn as elsewhere: the whole turn is the task
+        span = float(np.ptp(at))
+        whole = closed or 2.0 * pi - span <= 1.01 * float(np.abs(np.diff(at)).max())
+        begin = 0.0 if closed else float(at.min())
+        turn = begin + np.linspace(0.0, 2.0 * pi, 2 * CURVE + 1)
+        way = turn if whole else np.linspace(begin, begin + span, 2 * CURVE + 1)
+        pointed = not isinstance(task, RockerFunction)
+        slides = linkage.pivot if isinstance(linkage.pivot, SliderMotion) else None
+        return LinkageScene(
+            pins=lambda phi: _pins(linkage, phi, pointed),
+            rotation=way if whole else at,
+            curves=_pieces(linkage.path(turn)) if pointed else (),
+            traced=linkage.path(way) if pointed else None,
+            target=None if not pointed else np.asarray(task.path.points if isinstance(task, UntimedPath) else task.points),
+            line=task.path.closed if isinstance(task, UntimedPath) else None,
+            timed=not isinstance(task, UntimedPath) and task.rotation is not None,
+            stations=self.columns(),
+            guide=None if slides is None else _guide(linkage, slides, turn),
+            second_crank=isinstance(linkage.pivot, SecondCrank),
+            transmission=np.vstack([turn, angle_at_c(linkage, turn)]),
+            title=title,
+        )
+
+
+def angle_at_c(linkage: Linkage, rotation: FloatArray) -> FloatArray:
+    """Angle between coupler and rocker at C (rad), from 0 to pi, NaN where the links cannot be joined."""
+    g = linkage.directions(rotation)
+    angle: FloatArray = np.arctan2(np.abs(g[5]), g[4])
+    return angle
+
+
+def _pins(linkage: Linkage, rotation: float, pointed: bool) -> dict[str, tuple[float, float]] | None:
+    try:
+        pins = linkage.pins(rotation)
+    except AssemblyError:
+        return None
+    if not pointed:
+        del pins["P"]
+    return pins
+
+
+def _pieces(points: FloatArray) -> tuple[FloatArray, ...]:
+    """A curve cut where it has no points."""
+    there = np.isfinite(points).all(axis=1)
+    edges = np.flatnonzero(np.diff(there.astype(int))) + 1
+    return tuple(p for p in np.split(points, edges) if np.isfinite(p).all() and len(p) > 1)
+
+
+def _guide(linkage: Linkage, motion: SliderMotion, turn: FloatArray) -> FloatArray:
+    """Ends of the slider's travel in the plane (m), shape (2, 2)."""
+    u = motion.series(turn)
+    ground = np.exp(1j * linkage.ground_angle)
+    ends = complex(linkage.pivot_x, linkage.pivot_y) + ground * (
+        linkage.ground_length + np.array([u.min(), u.max()]) * np.exp(1j * motion.guide_angle)
+    )
+    return np.column_stack([ends.real, ends.imag])
+
 
 def path_rate(linkage: Linkage, at: FloatArray, both: NDArray[np.complex128]) -> NDArray[np.complex128]:
     """dP/dphi: by the crank's phase, and by the pivot's own motion."""
@@ -270,17 +410,26 @@ def path_rate(linkage: Linkage, at: FloatArray, both: NDArray[np.complex128]) ->
     return rate
 
 
-def nearest_rotations(linkage: Linkage, points: NDArray[np.complex128]) -> FloatArray:
-    """Crank rotations at which the coupler point is nearest to points (complex, m), without jumps of a turn."""
-    phi = np.linspace(0.0, 2.0 * pi, 4 * CURVE, endpoint=False)
+def nearest_rotations(
+    linkage: Linkage, points: NDArray[np.complex128], begin: float = 0.0, end: float = 2.0 * pi
+) -> FloatArray:
+    """Crank rotations at which the coupler point is nearest to points (complex, m), without jumps of a turn.
+
+    Looked for from ``begin`` to ``end``: the whole turn by default.
+    """
+    whole = end - begin >= 2.0 * pi - 1e-9
+    phi = np.linspace(begin, end, 4 * CURVE, endpoint=not whole)
     curve = linkage.path(phi) @ np.array([1.0, 1j])
-    at: FloatArray = phi[np.abs(points[:, None] - curve[None, :]).argmin(axis=1)]
+    distance = np.abs(points[:, None] - curve[None, :])
+    at: FloatArray = phi[np.where(np.isfinite(distance), distance, inf).argmin(axis=1)]
     for _ in range(3):
         place, jacobian = linkage.path_jacobian(at)
         both = jacobian[:, 0] + 1j * jacobian[:, 1]
         rate = path_rate(linkage, at, both)
         step = ((points - place @ np.array([1.0, 1j])) * rate.conj()).real / np.abs(rate) ** 2
         at += np.clip(step, -pi / CURVE, pi / CURVE)
+    if not whole:
+        return np.clip(at, begin, end)
     unwrapped: FloatArray = np.unwrap(at)
     return unwrapped
 

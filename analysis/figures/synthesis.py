@@ -1,0 +1,490 @@
+"""Pictures of linkages that were found: to scale with their curve and target, their errors, and what was traded for what.
+
+What is drawn comes as data (`LinkageScene`): nothing here knows what a task is. Lengths are shown in mm, angles in degrees.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from math import ceil, hypot, log10
+from pathlib import Path
+from typing import Any
+
+import matplotlib
+import numpy as np
+from matplotlib.animation import PillowWriter
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from matplotlib.patches import Circle, Polygon
+from numpy.typing import NDArray
+
+from linkwork.errors import InputError
+
+from .linkage import COUPLER, CRANK, GROUND, ROCKER, SLIDER, TRACE
+from .style import COLOURS, STYLE, finish
+
+FloatArray = NDArray[np.float64]
+
+#: Colour of what is asked for.
+TARGET = "#E69F00"
+MM_PER_METRE = 1e3
+#: Length of the longest error vector, as a share of the target's extent.
+LONGEST = 0.12
+#: Rotations at which a scene is looked at to frame it.
+FRAMED = 72
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class LinkageScene:
+    """A linkage with what it was found for, in m and rad.
+
+    Attributes
+    ----------
+    pins : callable
+        Places of A, B, C, D, E and, where there is a coupler point, P at a rotation of the crank; None where the links
+        cannot be joined.
+    rotation : ndarray, shape (n,)
+        Crank rotations over which the task is done.
+    curves : tuple of ndarray, shape (n, 2)
+        The coupler curve over all that the crank can turn, in pieces; none without a coupler point.
+    traced : ndarray, shape (n, 2), or None
+        The part of it that does the task.
+    target : ndarray, shape (n, 2), or None
+    line : bool or None
+        Whether the target is a line, closed (True) or open (False), or points (None).
+    timed : bool
+        Whether the crank rotations of the stations were given.
+    stations : mapping
+        Columns by name with unit, such as ``error [m]``; see `Solution.columns`.
+    guide : ndarray, shape (2, 2), or None
+        Ends of the travel of the slider that carries D.
+    second_crank : bool
+        Whether D is on a second crank about E.
+    transmission : ndarray, shape (2, n)
+        Crank rotation over a turn, and the angle between coupler and rocker, NaN where the links cannot be joined.
+    title : str
+    """
+
+    pins: Callable[[float], Mapping[str, tuple[float, float]] | None]
+    rotation: FloatArray
+    curves: tuple[FloatArray, ...]
+    traced: FloatArray | None
+    target: FloatArray | None
+    line: bool | None
+    timed: bool
+    stations: Mapping[str, FloatArray]
+    guide: FloatArray | None
+    second_crank: bool
+    transmission: FloatArray
+    title: str = ""
+
+
+class _Frame:
+    """Limits that hold a linkage in all its positions (mm), and the size in which its pins are drawn."""
+
+    def __init__(self, scene: LinkageScene, rotations: FloatArray) -> None:
+        places = [pins for phi in rotations if (pins := scene.pins(float(phi))) is not None]
+        points = [np.array(list(pins.values())) for pins in places]
+        points += [p for p in (*scene.curves, scene.target, scene.guide) if p is not None]
+        everything = MM_PER_METRE * np.vstack(points)
+        low, high = everything.min(axis=0), everything.max(axis=0)
+        self.extent = float((high - low).max())
+        #: Length by which pins, supports and letters are drawn.
+        self.unit = self.extent / 42.0
+        self.low, self.high = low - 3.0 * self.unit, high + 3.0 * self.unit
+
+    def prepare(self, axis: Axes) -> None:
+        axis.set_xlim(self.low[0], self.high[0])
+        axis.set_ylim(self.low[1], self.high[1])
+        axis.set_aspect("equal", adjustable="datalim")
+        axis.set_xlabel("x [mm]")
+        axis.set_ylabel("y [mm]")
+
+
+def _line(axis: Axes, points: Any, **options: Any) -> None:
+    look: dict[str, Any] = {"color": GROUND, "linewidth": 1.1, "solid_capstyle": "round"}
+    axis.plot(*np.array(points).T, **look | options)
+
+
+def _support(axis: Axes, at: FloatArray, unit: float) -> None:
+    """The bearing of a pin that does not move."""
+    foot, half = at[1] - 1.5 * unit, 0.85 * unit
+    corners = [at, (at[0] - half, foot), (at[0] + half, foot)]
+    axis.add_patch(Polygon(corners, facecolor="0.92", edgecolor=GROUND, linewidth=0.9, zorder=5))
+    _line(axis, [(at[0] - 1.3 * unit, foot), (at[0] + 1.3 * unit, foot)], linewidth=0.9, zorder=5)
+    for x in np.linspace(at[0] - 0.9 * unit, at[0] + 1.3 * unit, 5):
+        _line(axis, [(x, foot), (x - 0.5 * unit, foot - 0.5 * unit)], linewidth=0.6, zorder=5)
+
+
+def _draw_target(axis: Axes, scene: LinkageScene, *, size: float = 3.0) -> None:
+    if scene.target is None:
+        return
+    points = MM_PER_METRE * scene.target
+    look: dict[str, Any] = {"color": TARGET, "zorder": 3, "label": "target"}
+    if scene.line is None:
+        axis.plot(*points.T, "o", markersize=size, fillstyle="none", markeredgewidth=0.9, **look)
+    else:
+        closed = np.vstack([points, points[:1]]) if scene.line else points
+        axis.plot(*closed.T, linewidth=2.6, alpha=0.8, **look)
+
+
+def _draw_curves(axis: Axes, scene: LinkageScene, *, upto: FloatArray | None = None) -> None:
+    for number, piece in enumerate(scene.curves):
+        label = "coupler curve" if number == 0 else None
+        axis.plot(*(MM_PER_METRE * piece).T, color=TRACE, alpha=0.45, linewidth=0.9, zorder=2, label=label)
+    traced = scene.traced if upto is None else upto
+    if traced is not None and len(traced):
+        axis.plot(*(MM_PER_METRE * traced).T, color=TRACE, linewidth=1.6, zorder=4, label="path")
+
+
+def _draw_linkage(
+    axis: Axes, scene: LinkageScene, frame: _Frame, pins: Mapping[str, tuple[float, float]], *, letters: bool = True
+) -> None:
+    """Links, pins and supports at one position."""
+    unit = frame.unit
+    at = {name: MM_PER_METRE * np.array(place) for name, place in pins.items()}
+    a, b, c, d, e = (at[name] for name in "ABCDE")
+    p = at.get("P")
+    link: dict[str, Any] = {"linewidth": 3.6 if letters else 2.4}
+    _line(axis, [a, e], linewidth=0.7, linestyle=(0, (9, 3, 2, 3)), color="0.55", zorder=1)
+    _support(axis, a, unit)
+    if scene.guide is not None:
+        _draw_slider(axis, MM_PER_METRE * scene.guide, d, unit)
+    else:
+        _support(axis, e if scene.second_crank else d, unit)
+    if scene.second_crank:
+        _line(axis, [e, d], color=CRANK, zorder=8, **link)
+    if p is not None:
+        axis.add_patch(Polygon([b, c, p], facecolor=COUPLER, alpha=0.14, edgecolor="none", zorder=5))
+        _line(axis, [b, p, c], color=COUPLER, linewidth=1.2, zorder=6)
+    _line(axis, [d, c], color=ROCKER, zorder=6, **link)
+    _line(axis, [b, c], color=COUPLER, zorder=7, **link)
+    _line(axis, [a, b], color=CRANK, zorder=8, **link)
+    for pin in (a, b, c, d, *([e] if scene.second_crank else [])):
+        axis.add_patch(Circle(pin, 0.36 * unit, facecolor="white", edgecolor="black", linewidth=1.0, zorder=9))
+    if p is not None:
+        axis.add_patch(Circle(p, 0.32 * unit, facecolor=TRACE, edgecolor="black", linewidth=0.9, zorder=10))
+    if letters:
+        _write_letters(axis, scene, at, unit)
+
+
+def _draw_slider(axis: Axes, guide: FloatArray, d: FloatArray, unit: float) -> None:
+    way = guide[1] - guide[0]
+    length = hypot(*way)
+    along = way / length if length > 0.0 else np.array([1.0, 0.0])
+    left = np.array([-along[1], along[0]])
+    for side in (-0.8, 0.8):
+        rail = [guide[0] - 2.2 * unit * along + side * unit * left, guide[1] + 2.2 * unit * along + side * unit * left]
+        _line(axis, rail, linewidth=1.0, zorder=3)
+    block = [d + s * 1.3 * unit * along + n * 0.8 * unit * left for s, n in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
+    axis.add_patch(Polygon(block, facecolor="#C9D1D6", edgecolor=SLIDER, linewidth=1.1, zorder=4))
+
+
+def _write_letters(axis: Axes, scene: LinkageScene, at: Mapping[str, FloatArray], unit: float) -> None:
+    """Each pin's letter where it has most room: from the links, the supports, the curve and the letters before."""
+    names = [n for n in "ABCDEP" if n in at and (n != "E" or scene.second_crank)]
+    lines = [(at["A"], at["B"]), (at["B"], at["C"]), (at["C"], at["D"]), (at["A"], at["E"])]
+    if "P" in at:
+        lines += [(at["B"], at["P"]), (at["C"], at["P"])]
+    fixed = [at["A"], at["E"] if scene.second_crank else at["D"]]
+    lines += [(pin, pin - np.array([0.0, 2.0 * unit])) for pin in fixed]
+    if scene.guide is not None:
+        lines.append((MM_PER_METRE * scene.guide[0], MM_PER_METRE * scene.guide[1]))
+    if scene.second_crank:
+        lines.append((at["E"], at["D"]))
+    marks = [at[n] for n in names]
+    drawn = [p for p in (*scene.curves, scene.traced, scene.target) if p is not None]
+    curve = MM_PER_METRE * np.vstack(drawn) if drawn else np.empty((0, 2))
+    directions = np.radians(np.arange(0.0, 360.0, 15.0))
+    for name in names:
+        places = at[name] + 1.35 * unit * np.column_stack([np.cos(directions), np.sin(directions)])
+        room = np.min([_from_line(places, *line) for line in lines], axis=0)
+        for mark in marks:
+            room = np.minimum(room, 0.6 * np.hypot(*(places - mark).T))
+        if len(curve):
+            near = np.hypot(*(places[:, None] - curve[None, :]).transpose(2, 0, 1)).min(axis=1)
+            room = np.minimum(room, near)
+        place = places[int(np.argmax(room))]
+        axis.text(*place, name, ha="center", va="center", fontsize=10.5, zorder=11)
+        marks.append(place)
+
+
+def _from_line(points: FloatArray, start: FloatArray, end: FloatArray) -> FloatArray:
+    """Distances of points from the straight line between two others."""
+    way = end - start
+    share = np.clip((points - start) @ way / max(float(way @ way), 1e-300), 0.0, 1.0)
+    distances: FloatArray = np.hypot(*(points - start - share[:, None] * way).T)
+    return distances
+
+
+def _start(scene: LinkageScene) -> tuple[float, Mapping[str, tuple[float, float]]]:
+    """The first crank rotation at which there is something to draw, and the pins there."""
+    for phi in (*scene.rotation, *scene.transmission[0]):
+        pins = scene.pins(float(phi))
+        if pins is not None:
+            return float(phi), pins
+    raise InputError("the links cannot be joined at any rotation of the crank: there is nothing to draw")
+
+
+def _around(scene: LinkageScene) -> FloatArray:
+    """Rotations by which the scene is framed."""
+    rotation, angle = scene.transmission
+    chosen: FloatArray = rotation[np.isfinite(angle)]
+    return chosen[:: max(1, len(chosen) // FRAMED)]
+
+
+def magnification(worst: float, extent: float) -> float:
+    """Factor 1, 2 or 5 times a power of ten by which error vectors are drawn so that the longest is `LONGEST` of an extent."""
+    if not (np.isfinite(worst) and worst > 1e-9 * extent):
+        return 1.0
+    most = LONGEST * extent / worst
+    power = 10.0 ** np.floor(log10(most))
+    return max(1.0, float(power * max(m for m in (1.0, 2.0, 5.0) if m * power <= most)))
+
+
+def _enlarged(axis: Axes, scene: LinkageScene) -> None:
+    """Target and path alone, with the error vectors magnified."""
+    assert scene.target is not None
+    columns = scene.stations
+    wanted = MM_PER_METRE * np.column_stack([columns["target x [m]"], columns["target y [m]"]])
+    made = MM_PER_METRE * np.column_stack([columns["path x [m]"], columns["path y [m]"]])
+    extent = float(np.ptp(wanted, axis=0).max())
+    factor = magnification(float(np.hypot(*(made - wanted).T).max()), extent)
+    shown = np.linspace(0, len(wanted) - 1, min(len(wanted), 180)).round().astype(int)
+    ends = wanted + factor * (made - wanted)
+    strokes = np.stack([wanted[shown], ends[shown], np.full((len(shown), 2), np.nan)], axis=1).reshape(-1, 2)
+    times = "" if factor == 1.0 else f" (x {factor:g})"
+    _draw_target(axis, scene, size=4.0)
+    if scene.traced is not None:
+        axis.plot(*(MM_PER_METRE * scene.traced).T, color=TRACE, linewidth=1.3, zorder=4, label="path")
+    axis.plot(*strokes.T, color=CRANK, linewidth=0.8, zorder=5, label=f"error{times}")
+    points = np.vstack([wanted, ends])
+    low, high = points.min(axis=0), points.max(axis=0)
+    rim = 0.06 * float((high - low).max())
+    axis.set_xlim(low[0] - rim, high[0] + rim)
+    axis.set_ylim(low[1] - rim, high[1] + rim)
+    axis.set_aspect("equal", adjustable="datalim")
+    axis.set_xlabel("x [mm]")
+    axis.set_ylabel("y [mm]")
+    axis.legend(fontsize=7.5, loc="upper center", bbox_to_anchor=(0.5, 1.16), ncols=3, columnspacing=1.2)
+
+
+def _stations(scene: LinkageScene) -> tuple[FloatArray, str]:
+    """What stations are plotted over, and what it is called."""
+    rotation = np.degrees(scene.stations["crank rotation [rad]"])
+    if scene.timed:
+        return rotation, "crank rotation [deg]"
+    return np.arange(len(rotation)), "target point"
+
+
+def _rocker(axis: Axes, scene: LinkageScene) -> None:
+    """Angle of the rocker over the crank's rotation, with the target."""
+    x, words = _stations(scene)
+    columns = scene.stations
+    axis.plot(x, np.degrees(columns["rocker angle [rad]"]), color=ROCKER, label="rocker", zorder=4)
+    look: dict[str, Any] = {"markersize": 3.5, "fillstyle": "none", "markeredgewidth": 0.9}
+    axis.plot(x, np.degrees(columns["target angle [rad]"]), "o", color=TARGET, label="target", zorder=3, **look)
+    axis.set_xlabel(words)
+    axis.set_ylabel("rocker angle [deg]")
+    axis.legend(fontsize=7.5, loc="upper center", bbox_to_anchor=(0.5, 1.16), ncols=2)
+
+
+def _errors(axis: Axes, scene: LinkageScene) -> None:
+    """Errors station by station."""
+    x, words = _stations(scene)
+    columns = scene.stations
+    few: dict[str, Any] = {"marker": "o", "markersize": 3.0} if len(x) <= 100 else {}
+    if "error [m]" in columns:
+        axis.plot(x, MM_PER_METRE * columns["error [m]"], color=COLOURS[0], **few)
+        axis.set_ylabel("error [mm]")
+        axis.set_ylim(bottom=0.0)
+    if "error of angle [rad]" in columns:
+        beside = axis.twinx() if "error [m]" in columns else axis
+        turned = np.degrees(columns["error of angle [rad]"])
+        colour = COLOURS[2] if beside is not axis else COLOURS[0]
+        beside.axhline(0.0, color="0.6", linewidth=0.7)
+        beside.plot(x, turned, color=colour, linestyle="-" if beside is axis else "--", **few)
+        beside.set_ylabel("error of angle [deg]", color=colour if beside is not axis else "black")
+        if beside is not axis:
+            beside.spines["right"].set_visible(True)
+            beside.grid(False)
+    axis.set_xlabel(words)
+
+
+def _transmission(axis: Axes, scene: LinkageScene) -> None:
+    """The angle between coupler and rocker over a turn; the part of the task strong."""
+    rotation, angle = scene.transmission
+    turns, angles = np.degrees(rotation), np.degrees(angle)
+    begin, end = np.degrees([scene.rotation.min(), scene.rotation.max()])
+    within = (turns >= begin - 1e-9) & (turns <= end + 1e-9)
+    axis.plot(turns, angles, color=COUPLER, linewidth=1.0, alpha=0.5)
+    axis.plot(turns, np.where(within, angles, np.nan), color=COUPLER, linewidth=1.8)
+    axis.axhline(90.0, color="0.6", linewidth=0.7)
+    axis.set_ylim(0.0, 180.0)
+    axis.set_yticks([0.0, 40.0, 90.0, 140.0, 180.0])
+    axis.set_xticks(np.arange(90.0 * np.floor(turns[0] / 90.0), turns[-1] + 1.0, 90.0))
+    axis.set_xlabel("crank rotation [deg]")
+    axis.set_ylabel("transmission\nangle [deg]")
+
+
+def plot_solution(scene: LinkageScene) -> Figure:
+    """A linkage to scale; its target and path with magnified errors, or its function; errors and transmission angle.
+
+    Raises
+    ------
+    InputError
+        If the links cannot be joined anywhere.
+    """
+    _, pins = _start(scene)
+    frame = _Frame(scene, _around(scene))
+    with matplotlib.rc_context(STYLE):
+        figure = Figure(figsize=(10.4, 7.0))
+        panels = figure.subplot_mosaic(
+            [["linkage", "task"], ["linkage", "errors"], ["linkage", "transmission"]],
+            width_ratios=(1.25, 1.0),
+            height_ratios=(2.1, 1.0, 1.0),
+        )
+        left = panels["linkage"]
+        frame.prepare(left)
+        _draw_target(left, scene, size=2.5)
+        _draw_curves(left, scene)
+        _draw_linkage(left, scene, frame, pins)
+        if scene.target is None:
+            _rocker(panels["task"], scene)
+        else:
+            _enlarged(panels["task"], scene)
+        _errors(panels["errors"], scene)
+        _transmission(panels["transmission"], scene)
+        if scene.title:
+            figure.suptitle(scene.title, fontsize=10.5, fontweight="bold")
+        figure.align_ylabels([panels[name] for name in ("task", "errors", "transmission")])
+        return finish(figure)
+
+
+def plot_alternatives(scenes: Sequence[LinkageScene], *, title: str = "") -> Figure:
+    """Linkages beside one another, each to its own scale, under its own title.
+
+    Raises
+    ------
+    InputError
+        If there are none.
+    """
+    if not scenes:
+        raise InputError("there are no linkages to draw")
+    columns = min(3, len(scenes))
+    rows = ceil(len(scenes) / columns)
+    with matplotlib.rc_context(STYLE):
+        figure = Figure(figsize=(3.5 * columns, 3.5 * rows + (0.3 if title else 0.0)))
+        axes = figure.subplots(rows, columns, squeeze=False).ravel()
+        for axis, scene in zip(axes, scenes):
+            _, pins = _start(scene)
+            frame = _Frame(scene, _around(scene))
+            frame.prepare(axis)
+            _draw_target(axis, scene, size=1.8)
+            _draw_curves(axis, scene)
+            _draw_linkage(axis, scene, frame, pins, letters=False)
+            axis.set_title(scene.title, fontsize=8.5)
+        for axis in axes[len(scenes) :]:
+            axis.set_visible(False)
+        if title:
+            figure.suptitle(title, fontsize=10.5, fontweight="bold")
+        return finish(figure)
+
+
+def plot_trade_off(
+    limit: FloatArray,
+    errors: Mapping[str, FloatArray],
+    *,
+    limit_label: str,
+    title: str = "",
+) -> Figure:
+    """Errors over a limit that is tightened, a panel each; limits without a linkage are marked below.
+
+    Parameters
+    ----------
+    limit : ndarray, shape (n,)
+        In the unit of its label.
+    errors : mapping
+        What the axis is called, with its unit, to values; NaN where there is no linkage.
+    limit_label : str
+    """
+    order = np.argsort(limit)
+    with matplotlib.rc_context(STYLE):
+        figure = Figure(figsize=(6.4, 2.6 * len(errors) + 0.4))
+        axes = figure.subplots(len(errors), 1, sharex=True, squeeze=False).ravel()
+        for axis, (label, values) in zip(axes, errors.items()):
+            there = np.isfinite(values)
+            known = values[there]
+            if len(known) and known.min() > 0.0 and known.max() > 20.0 * known.min():
+                axis.set_yscale("log")
+            axis.plot(limit[order], values[order], "-o", color=COLOURS[0], markersize=4.0)
+            if not there.all():
+                # at the foot of the panel, whatever its scale
+                foot = {"transform": axis.get_xaxis_transform(), "clip_on": False, "zorder": 5}
+                none = limit[~there]
+                axis.plot(none, np.full(len(none), 0.04), "x", color=COLOURS[1], label="no linkage", **foot)
+                axis.legend(fontsize=8)
+            axis.set_ylabel(label)
+        axes[-1].set_xlabel(limit_label)
+        if title:
+            figure.suptitle(title, fontsize=10.5, fontweight="bold")
+        figure.align_ylabels()
+        return finish(figure)
+
+
+def animate_solution(scene: LinkageScene, path: str | Path, *, frames: int = 72, frames_per_second: int = 20) -> Path:
+    """Write a GIF of a turn, or of the part of one that the crank can make: the linkage, and the transmission angle below.
+
+    Of a rocker function its angle with the target is below. Positions in which the links cannot be joined are left out.
+
+    Raises
+    ------
+    InputError
+        If there are fewer than two frames, or the links cannot be joined anywhere.
+    """
+    if frames < 2:
+        raise InputError(f"an animation in {frames} frames: there must be at least 2")
+    path = Path(path)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    first, _ = _start(scene)
+    backwards = len(scene.rotation) > 1 and scene.rotation[-1] < scene.rotation[0]
+    turn = first + (-1.0 if backwards else 1.0) * np.linspace(0.0, 2.0 * np.pi, frames, endpoint=False)
+    shown = [(float(phi), pins) for phi in turn if (pins := scene.pins(float(phi))) is not None]
+    frame = _Frame(scene, np.array([phi for phi, _ in shown]))
+    width, height = frame.high - frame.low
+    tall = float(np.clip(5.0 * height / width, 2.5, 7.0))
+    with matplotlib.rc_context(STYLE):
+        figure = Figure(figsize=(5.4, tall + 2.1))
+        FigureCanvasAgg(figure)
+        above, below = figure.subplots(2, 1, height_ratios=(tall, 1.6))
+        if scene.title:
+            figure.suptitle(scene.title, fontsize=10.5, fontweight="bold")
+        if scene.target is None:
+            _rocker(below, scene)
+            x = np.degrees(scene.stations["crank rotation [rad]"])
+            y = np.degrees(scene.stations["rocker angle [rad]"])
+        else:
+            _transmission(below, scene)
+            x, y = np.degrees(scene.transmission)
+        (now,) = below.plot([], [], "o", color=CRANK, markersize=5, zorder=6)
+        writer = PillowWriter(fps=frames_per_second, metadata={})
+        trace: list[tuple[float, float]] = []
+        with writer.saving(figure, str(path), dpi=80):
+            for number, (phi, pins) in enumerate(shown):
+                above.clear()
+                frame.prepare(above)
+                if "P" in pins:
+                    trace.append(pins["P"])
+                _draw_target(above, scene, size=2.0)
+                _draw_curves(above, scene, upto=np.array(trace).reshape(-1, 2))
+                _draw_linkage(above, scene, frame, pins, letters=False)
+                at = x[0] + (np.degrees(phi) - x[0]) % 360.0
+                now.set_data([at], [np.interp(at, x, y) if at <= x[-1] + 1e-9 else np.nan])
+                if number == 0:
+                    # laid out once: the panels must not creep from frame to frame
+                    figure.draw_without_rendering()
+                    figure.set_layout_engine("none")
+                writer.grab_frame()
+    return path

@@ -1,0 +1,391 @@
+"""A linkage in the plane: against the plant, dense sampling, brute-force circuits, and bars integrated numerically."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from math import cos, pi, sin
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from analysis.fourier import FourierSeries
+from analysis.inputs import Inputs
+from analysis.simulate import simulate
+from analysis.synthesis import Linkage, SecondCrank, SliderMotion, Verdicts, judge, turn
+from linkwork.errors import AssemblyError, ParameterError
+from linkwork.five_bar import kinematics
+from linkwork.five_bar.parameters import FiveBarParameters, InitialState
+from tests.linkages import drawn, linkages
+
+FloatArray = NDArray[np.float64]
+
+
+def moved(linkage: Linkage) -> Linkage:
+    """The linkage with a slider whose motion is small beside the crank."""
+    a = 0.1 * linkage.crank_length
+    series = FourierSeries(np.array([0.05, 0.5, -0.3]) * a, np.array([0.0, 0.4, 0.2]) * a)
+    return replace(linkage, pivot=SliderMotion(series, 0.8))
+
+
+class TestAgainstThePlant:
+    @pytest.mark.parametrize("slides", [False, True])
+    @settings(max_examples=25, deadline=None)
+    @given(linkage=linkages())
+    def test_path_and_angles_are_the_plants_turned_and_shifted(self, slides: bool, linkage: Linkage) -> None:
+        if slides:
+            linkage = moved(linkage)
+        plant = linkage.to_five_bar()
+        p = plant.constants()
+        phi = np.linspace(-3.0, 3.0, 9)
+        path, rocker = linkage.path(phi), linkage.rocker_angle(phi)
+        coupler, transmission = linkage.coupler_angle(phi), linkage.transmission(phi)
+        series = linkage.pivot.series(phi) if isinstance(linkage.pivot, SliderMotion) else np.zeros(9)
+        for k, u in enumerate(series):
+            g = kinematics.position(phi[k] + linkage.crank_phase, u, p)
+            x, y = kinematics.coupler_point(g, p)
+            place = complex(linkage.pivot_x, linkage.pivot_y) + np.exp(1j * plant.ground_inclination) * complex(x, y)
+            assert abs(complex(*path[k]) - place) < 1e-12
+            turned = kinematics.rocker_angle(g) + linkage.output_angle
+            assert abs(np.exp(1j * rocker[k]) - np.exp(1j * turned)) < 1e-12
+            turned = kinematics.coupler_angle(g) + linkage.ground_angle + linkage.output_angle
+            assert abs(np.exp(1j * coupler[k]) - np.exp(1j * turned)) < 1e-12
+            angle = kinematics.transmission_angle(g, p)
+            assert transmission[k] == pytest.approx(min(angle, pi - angle), abs=1e-12)
+
+    @settings(max_examples=25, deadline=None)
+    @given(linkage=linkages(), phi=st.floats(-7.0, 7.0))
+    def test_pins_are_as_far_apart_as_the_links_are_long(self, linkage: Linkage, phi: float) -> None:
+        linkage = replace(moved(linkage), branch=-linkage.branch)
+        z = {name: complex(*place) for name, place in linkage.pins(phi).items()}
+        for ends, length in (
+            ("AB", linkage.crank_length),
+            ("BC", linkage.coupler_length),
+            ("CD", linkage.rocker_length),
+            ("AE", linkage.ground_length),
+            ("BP", linkage.point_distance),
+        ):
+            assert abs(z[ends[0]] - z[ends[1]]) == pytest.approx(length, rel=1e-12)
+        assert complex(*linkage.path([phi])[0]) == pytest.approx(z["P"], abs=1e-12)
+        # branch: C to the left of B -> D
+        side = ((z["D"] - z["B"]).conjugate() * (z["C"] - z["B"])).imag
+        assert np.sign(side) == linkage.branch
+        # the slider travels along its guide
+        assert isinstance(linkage.pivot, SliderMotion)
+        travel = (z["D"] - z["E"]) * np.exp(-1j * (linkage.ground_angle + linkage.pivot.guide_angle))
+        assert travel == pytest.approx(linkage.pivot.series(phi), abs=1e-12)
+
+    def test_angles_are_continuous_over_turns(self) -> None:
+        # a drag link, whose coupler and rocker turn with the crank
+        linkage = Linkage(ground_length=0.5, crank_length=1.0, coupler_length=0.9, rocker_length=0.9)
+        phi = np.linspace(0.0, 4.0 * pi, 200)
+        assert linkage.grashof == "drag-link"
+        for angle in (linkage.rocker_angle(phi), linkage.coupler_angle(phi)):
+            assert np.abs(np.diff(angle)).max() < 0.3
+        assert linkage.rocker_angle(phi)[-1] - linkage.rocker_angle(phi)[0] == pytest.approx(4.0 * pi)
+
+
+class TestSecondCrank:
+    def test_the_rocker_pivot_goes_round_it(self) -> None:
+        pivot = SecondCrank(0.2, ratio=2.0, phase=0.4, series=FourierSeries(np.array([0.0, 0.1]), np.array([0.0, 0.2])))
+        linkage = replace(drawn(np.random.default_rng(1)), crank_length=0.1, pivot=pivot)
+        for phi in (0.0, 1.3, 5.0):
+            z = {name: complex(*place) for name, place in linkage.pins(phi).items()}
+            psi = 2.0 * phi + 0.4 + 0.1 * cos(phi) + 0.2 * sin(phi)
+            assert z["D"] - z["E"] == pytest.approx(0.2 * np.exp(1j * (psi + linkage.ground_angle)), abs=1e-12)
+        assert abs(complex(*linkage.path([0.0])[0]) - complex(*linkage.path([2.0 * pi])[0])) < 1e-12
+
+    def test_the_plant_has_none(self) -> None:
+        linkage = replace(drawn(np.random.default_rng(1)), pivot=SecondCrank(0.2))
+        with pytest.raises(ParameterError, match="the plant has no second crank"):
+            linkage.to_five_bar()
+
+
+class TestPlaceAndSize:
+    @pytest.mark.parametrize("kind", ["fixed", "slider", "crank"])
+    def test_scaling_and_moving_do_so_to_the_path(self, kind: str) -> None:
+        linkage = drawn(np.random.default_rng(4))
+        if kind == "slider":
+            linkage = moved(linkage)
+        if kind == "crank":
+            linkage = replace(linkage, pivot=SecondCrank(0.05 * linkage.crank_length, ratio=-1.0, phase=0.2))
+        phi = turn(12)
+        np.testing.assert_allclose(linkage.scaled(3.0).path(phi), 3.0 * linkage.path(phi), atol=1e-12)
+        np.testing.assert_allclose(linkage.moved(1.0, -2.0).path(phi), linkage.path(phi) + [1.0, -2.0], atol=1e-12)
+
+    def test_vectors_and_back(self) -> None:
+        linkage = drawn(np.random.default_rng(2))
+        again = Linkage.from_vector(np.append(linkage.vector, linkage.output_angle), linkage.branch)
+        assert again.values() == linkage.values()
+        assert Linkage.from_vector(linkage.vector).output_angle == 0.0
+
+
+# lengths l1, l2, l3, l4: the shortest and the longest against the others (Grashof)
+TYPES = {
+    "crank-rocker": (1.0, 0.3, 0.9, 0.8),
+    "drag-link": (0.3, 1.0, 0.9, 0.8),
+    "double-rocker": (1.0, 0.9, 0.3, 0.8),
+    "rocker-crank": (1.0, 0.9, 0.8, 0.3),
+    "triple-rocker": (1.0, 0.5, 0.6, 0.7),
+    "change-point": (1.0, 0.4, 0.8, 0.6),
+}
+
+
+def four_bar(l1: float, l2: float, l3: float, l4: float) -> Linkage:
+    return Linkage(ground_length=l1, crank_length=l2, coupler_length=l3, rocker_length=l4, point_distance=0.4)
+
+
+class TestGrashof:
+    @pytest.mark.parametrize("type_", TYPES)
+    def test_types(self, type_: str) -> None:
+        assert four_bar(*TYPES[type_]).grashof == type_
+
+    @settings(max_examples=150, deadline=None)
+    @given(lengths=st.tuples(*[st.floats(0.1, 1.0)] * 4))
+    def test_the_type_says_which_links_turn(self, lengths: tuple[float, float, float, float]) -> None:
+        """By brute force: a link turns fully against its neighbour if the other two can close every gap."""
+
+        def turns(a: float, b: float, c: float, d: float) -> bool:
+            """Whether a turns fully against b, c and d joining their ends."""
+            gap = np.hypot(b - a * np.cos(ANGLES), a * np.sin(ANGLES))
+            return bool((gap <= c + d).all() and (gap >= abs(c - d)).all())
+
+        l1, l2, l3, l4 = lengths
+        linkage = four_bar(*lengths)
+        excess = 2.0 * (min(lengths) + max(lengths)) - sum(lengths)
+        if abs(excess) < 1e-3 or np.diff(np.sort(lengths)).min() < 1e-3:
+            return
+        crank, rocker = turns(l2, l1, l3, l4), turns(l4, l1, l3, l2)
+        coupler = turns(l3, l2, l4, l1)
+        assert linkage.turns_fully == crank
+        assert (
+            linkage.grashof
+            == {
+                (True, True, False): "drag-link",
+                (True, True, True): "drag-link",
+                (True, False, True): "crank-rocker",
+                (True, False, False): "crank-rocker",
+                (False, True, True): "rocker-crank",
+                (False, True, False): "rocker-crank",
+                (False, False, True): "double-rocker",
+                (False, False, False): "triple-rocker",
+            }[crank, rocker, coupler]
+        )
+
+
+ANGLES = np.linspace(0.0, 2.0 * pi, 721)
+
+
+class TestTransmission:
+    @pytest.mark.parametrize("slides", [False, True])
+    @settings(max_examples=40, deadline=None)
+    @given(linkage=linkages())
+    def test_range_is_what_dense_sampling_finds(self, slides: bool, linkage: Linkage) -> None:
+        if slides:
+            linkage = moved(linkage)
+        g = linkage.directions(np.linspace(0.0, 2.0 * pi, 20000))
+        angle = np.arctan2(np.abs(g[5]), g[4])
+        low, high = linkage.transmission_range()
+        assert low == pytest.approx(angle.min(), abs=2e-4 if slides else 1e-6)
+        assert high == pytest.approx(angle.max(), abs=2e-4 if slides else 1e-6)
+        assert linkage.least_transmission == pytest.approx(min(low, pi - high))
+
+    @settings(max_examples=20, deadline=None)
+    @given(linkage=linkages())
+    def test_drawn_linkages_keep_theirs(self, linkage: Linkage) -> None:
+        assert linkage.least_transmission > 0.299
+
+    def test_without_a_full_turn_it_goes_down_to_nothing(self) -> None:
+        linkage = four_bar(*TYPES["triple-rocker"])
+        assert linkage.least_transmission == 0.0
+        assert not linkage.turns_fully
+
+
+class TestVerdicts:
+    def judged(self, linkage: Linkage, *rotation: float, closed: bool = False) -> Verdicts:
+        return judge(linkage, np.array(rotation), closed=closed)
+
+    def test_sound(self) -> None:
+        linkage = four_bar(*TYPES["crank-rocker"])
+        verdicts = self.judged(linkage, 0.0, 2.0, 4.0)
+        assert verdicts.sound
+        assert verdicts.full_turn
+        assert str(verdicts).startswith("crank-rocker, full turn, transmission angle 48.2 to ")
+
+    def test_a_circuit_that_is_left_between_two_targets(self) -> None:
+        # at a crank angle of 0 and of 2.0 it can be joined, half a turn on it cannot
+        linkage = four_bar(1.0, 0.5, 0.6, 0.7)
+        assert np.isfinite(linkage.path([0.3, 2.0 * pi - 0.3])).all()
+        assert np.isnan(linkage.path([pi])).all()
+        verdicts = self.judged(linkage, 0.3, 2.0 * pi - 0.3)
+        assert not verdicts.circuit
+        assert not verdicts.branch
+        assert not verdicts.sound
+        assert not verdicts.full_turn
+        assert "no full turn, circuit defect, branch defect" in str(verdicts)
+        assert verdicts.least_transmission == 0.0
+
+    def test_a_partial_rotation_of_a_triple_rocker_is_sound(self) -> None:
+        verdicts = self.judged(four_bar(1.0, 0.5, 0.6, 0.7), -0.5, 0.3, 1.0)
+        assert verdicts.sound
+        assert not verdicts.full_turn
+        assert verdicts.grashof == "triple-rocker"
+
+    def test_collinear_on_the_way(self) -> None:
+        # a change point: coupler and rocker collinear at a crank angle of pi, l1 + l2 = l3 + l4
+        linkage = four_bar(1.0, 0.5, 0.75, 0.75)
+        verdicts = self.judged(linkage, 2.5, 4.0)
+        assert verdicts.circuit
+        assert not verdicts.branch
+        assert self.judged(linkage, -2.5, 2.5).sound
+
+    @pytest.mark.parametrize("phase", [0.0, 0.7, -2.2])
+    def test_the_extremes_are_seen_between_the_stations(self, phase: float) -> None:
+        linkage = replace(four_bar(*TYPES["crank-rocker"]), crank_phase=phase)
+        low, high = linkage.transmission_range()
+        verdicts = self.judged(linkage, -0.1 - phase, pi + 0.1 - phase)
+        assert verdicts.least_transmission == pytest.approx(low, abs=1e-12)
+        assert verdicts.greatest_transmission == pytest.approx(high, abs=1e-12)
+        verdicts = self.judged(linkage, 0.5 - phase, 2.0 - phase)
+        angle = np.arccos(linkage.directions(np.array([0.5, 2.0]) - phase)[4])
+        assert verdicts.least_transmission == pytest.approx(angle.min(), abs=1e-12)
+        assert verdicts.greatest_transmission == pytest.approx(angle.max(), abs=1e-12)
+
+    def test_order(self) -> None:
+        linkage = four_bar(*TYPES["crank-rocker"])
+        assert not self.judged(linkage, 0.0, 2.0, 1.0).order
+        assert self.judged(linkage, 2.0, 1.0, 0.5).order
+        assert "order defect" in str(self.judged(linkage, 0.0, 2.0, 1.0))
+
+    def test_of_a_closed_path_the_whole_turn_counts(self) -> None:
+        linkage = four_bar(1.0, 0.5, 0.6, 0.7)
+        assert self.judged(linkage, -0.2, 0.2).sound
+        assert not self.judged(linkage, -0.2, 0.2, closed=True).sound
+
+    def test_a_slider_can_save_the_turn(self) -> None:
+        # l1 + l2 = 1.5 > l3 + l4 = 1.3: with D drawn in by 0.3 half a turn on, it is joined
+        linkage = four_bar(1.0, 0.5, 0.6, 0.7)
+        pivot = SliderMotion(FourierSeries(np.array([-0.15, 0.15]), np.array([0.0, 0.0])))
+        assert not linkage.turns_fully
+        assert replace(linkage, pivot=pivot).turns_fully
+        assert self.judged(replace(linkage, pivot=pivot), 0.0, 6.0).sound
+
+
+class TestFiveBar:
+    WIDTH, THICKNESS, DENSITY = 0.03, 0.004, 2700.0
+
+    def bars(self, linkage: Linkage) -> FiveBarParameters:
+        return linkage.to_five_bar(density=self.DENSITY, section=(self.WIDTH, self.THICKNESS))
+
+    def integrated(self, *bars: tuple[float, float, float]) -> tuple[float, complex, float]:
+        """Mass, centre, and moment of inertia about it, of bars (from, to, direction), by summing over small squares."""
+        n = 200
+        masses, places = [], []
+        for begin, end, direction in bars:
+            x = begin + (np.arange(n) + 0.5) / n * (end - begin)
+            y = ((np.arange(n) + 0.5) / n - 0.5) * self.WIDTH
+            z = (x[:, None] + 1j * y[None, :]) * np.exp(1j * direction)
+            places.append(z.ravel())
+            mass = self.DENSITY * self.WIDTH * self.THICKNESS * (end - begin)
+            masses.append(np.full(z.size, mass / z.size))
+        m, z = np.concatenate(masses), np.concatenate(places)
+        centre = complex((m * z).sum() / m.sum())
+        return float(m.sum()), centre, float((m * np.abs(z - centre) ** 2).sum())
+
+    LINKAGE = Linkage(
+        ground_length=0.4,
+        crank_length=0.1,
+        coupler_length=0.35,
+        rocker_length=0.3,
+        point_distance=0.2,
+        point_angle=1.1,
+        ground_angle=0.6,
+        crank_phase=0.3,
+    )
+
+    def test_crank_and_rocker(self) -> None:
+        p = self.bars(self.LINKAGE)
+        mass, centre, inertia = self.integrated((0.0, 0.1, 0.0))
+        assert p.crank_mass == pytest.approx(mass, rel=1e-12)
+        assert p.crank_cog_distance == pytest.approx(centre.real, rel=1e-12)
+        # about the shaft, as the plant wants it
+        assert p.crank_inertia == pytest.approx(inertia + mass * abs(centre) ** 2, rel=1e-4)
+        mass, centre, inertia = self.integrated((0.0, 0.3, 0.0))
+        assert p.rocker_mass == pytest.approx(mass, rel=1e-12)
+        assert p.rocker_cog_distance == pytest.approx(centre.real, rel=1e-12)
+        assert p.rocker_inertia == pytest.approx(inertia, rel=1e-4)
+
+    @pytest.mark.parametrize(
+        ("distance", "angle", "bars"),
+        [
+            (0.2, 1.1, ((0.0, 0.35, 0.0), (0.0, 0.2, 1.1))),
+            (0.5, -2.5, ((0.0, 0.35, 0.0), (0.0, 0.5, -2.5))),
+            (0.2, 0.0, ((0.0, 0.35, 0.0),)),
+            (0.5, 0.0, ((0.0, 0.5, 0.0),)),
+            (0.2, pi, ((-0.2, 0.35, 0.0),)),
+            (0.0, 1.0, ((0.0, 0.35, 0.0),)),
+        ],
+    )
+    def test_the_coupler_reaches_its_point(
+        self, distance: float, angle: float, bars: tuple[tuple[float, float, float], ...]
+    ) -> None:
+        p = self.bars(replace(self.LINKAGE, point_distance=distance, point_angle=angle))
+        mass, centre, inertia = self.integrated(*bars)
+        own = p.coupler_cog_distance * np.exp(1j * p.coupler_cog_angle)
+        assert p.coupler_mass == pytest.approx(mass, rel=1e-12)
+        assert complex(own) == pytest.approx(centre, abs=1e-12)
+        assert p.coupler_inertia == pytest.approx(inertia, rel=1e-4)
+
+    def test_it_runs_and_keeps_its_energy(self) -> None:
+        linkage = replace(self.LINKAGE, pivot=SliderMotion(FourierSeries.constant(0.0), 0.3))
+        p = linkage.to_five_bar(slider_stiffness=2e4, slider_mass=0.2)
+        assert p.ground_inclination == 0.6
+        assert p.slider_guide_angle == 0.3
+        run = simulate(p, Inputs(), initial=InitialState(crank_angle=0.3, crank_speed=8.0), duration=0.5)
+        assert np.abs(run["energy.residual"]).max() < 1e-6 * run["energy.kinetic"].max()
+
+    def test_gravity_pulls_down_in_the_plane(self) -> None:
+        """Inclination: the plant's potential energy is that of the bars' centres in the plane, to a constant."""
+        from linkwork.five_bar import dynamics
+
+        linkage = replace(self.LINKAGE, point_distance=0.0)
+        p = linkage.to_five_bar(slider_mass=0.0)
+        line = 7850.0 * 0.02 * 0.005
+        values = []
+        for phi in (0.0, 1.0, 2.5):
+            z = {name: complex(*place) for name, place in linkage.pins(phi).items()}
+            height = sum(
+                line * abs(z[a] - z[b]) * 0.5 * (z[a] + z[b]).imag for a, b in (("A", "B"), ("B", "C"), ("C", "D"))
+            )
+            state = (phi + linkage.crank_phase, 0.0, 0.0, 0.0, 0.0, 0.0)
+            values.append(dynamics.mechanical_energy(state, p.constants()) - 9.81 * height)
+        np.testing.assert_allclose(values, values[0], atol=1e-12)
+
+    @pytest.mark.parametrize(
+        ("density", "section"), [(0.0, (0.02, 0.005)), (7850.0, (-0.02, 0.005)), (7850.0, (1.0, np.nan))]
+    )
+    def test_bad_bars(self, density: float, section: tuple[float, float]) -> None:
+        with pytest.raises(ParameterError, match="be a finite number greater than zero"):
+            self.LINKAGE.to_five_bar(density=density, section=section)
+
+
+class TestBadDimensions:
+    @pytest.mark.parametrize(
+        ("change", "message"),
+        [
+            ({"crank_length": 0.0}, "crank_length is 0.0: it must be greater than zero"),
+            ({"rocker_length": -1.0}, "rocker_length is -1.0: it must be greater than zero"),
+            ({"ground_angle": np.nan}, "ground_angle is nan: it must be a finite number"),
+            ({"pivot_x": np.inf}, "pivot_x is inf: it must be a finite number"),
+            ({"branch": 0}, "branch is 0: it must be"),
+        ],
+    )
+    def test_are_named(self, change: dict[str, float], message: str) -> None:
+        with pytest.raises(ParameterError, match=message):
+            replace(TestFiveBar.LINKAGE, **change)
+
+    def test_where_it_cannot_be_joined_it_has_no_pins(self) -> None:
+        with pytest.raises(AssemblyError, match="crank rotation of 3.14159 rad"):
+            four_bar(*TYPES["triple-rocker"]).pins(pi)
