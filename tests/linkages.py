@@ -17,11 +17,11 @@ def drawn(random: np.random.Generator, *, least: float = 0.3) -> Linkage:
     at the crank's two positions along the ground link.
     """
     l1 = random.uniform(0.5, 1.5)
-    l2 = l1 * random.uniform(0.1, 0.6)
     branch = int(random.choice([-1, 1]))
-    near, far = abs(l1 - l2) ** 2, (l1 + l2) ** 2
     # (l3 - l4)^2 + 2 l3 l4 (1 - cos mu) = d^2 at both: two equations for the product and the difference
     while True:
+        l2 = l1 * random.uniform(0.1, 0.6)
+        near, far = (l1 - l2) ** 2, (l1 + l2) ** 2
         low, high = np.sort(random.uniform(least, pi - least, 2))
         if cos(low) - cos(high) < 0.05:
             continue

@@ -142,3 +142,52 @@ NATURAL_RPM = MappingProxyType(
 )
 LOCAL_MAXIMUM_RPM = MappingProxyType({"a": ThesisAndRight(290.0, 296.0), "b": ThesisAndRight(580.0, 564.0)})
 MINIMUM_RPM = MappingProxyType({"a": ThesisAndRight(345.0, 367.0)})
+
+# --- Chapter VI. Linkages as printed: X0, Y0, l1, l2, l3, l4, r (cm), a1, th20, a2 (deg); of rocker functions l1 ... l4, th20.
+# --- The packaging machine's th20 is not printed
+CHAPTER_6: Mapping[str, tuple[float, ...]] = MappingProxyType(
+    {
+        "ellipse-a": (16.48, -47.89, 65.31, 5.04, 112.85, 104.34, 63.26, -92.82, 96.26, 114.02),
+        "ellipse-b": (-60.48, 169.45, 165.65, 7.95, 179.09, 216.94, 174.32, -3.44, -27.05, -136.94),
+        "ellipse-a-bounded": (19.6, 0.03, 16.4, 5.01, 26.5, 22.0, 15.4, 93.8, 93.2, 127.3),
+        "rocker": (0.0, 0.0, 5.083, 2.615, 4.148, 3.75, 0.0, 0.0, 41.88, 0.0),
+        "rocker-weighted": (0.0, 0.0, 15.65, 6.91, 11.77, 11.56, 0.0, 0.0, 42.74, 0.0),
+        "path-a": (154.85, -62.54, 80.216, 5.03, 139.25, 129.46, 77.75, -93.22, 100.41, 113.83),
+        "path-b": (-49.13, 144.98, 142.576, 8.18, 152.743, 183.443, 147.38, -3.062, -31.19, -136.04),
+        "packaging": (94.53, -48.55, 137.54, 36.05, 134.05, 40.06, 435.15, 116.73, 0.0, 345.01),
+    }
+)
+# ERRATA: by problem, the place in the row above and what it must be read as
+CHAPTER_6_READ: Mapping[str, tuple[int, float]] = MappingProxyType(
+    {"ellipse-a-bounded": (7, -93.8), "path-a": (0, 15.485), "path-b": (5, 184.443)}
+)
+
+
+class PrintedAndTrue(NamedTuple):
+    """An error as printed, what the printed linkage really has to the digits given, and what can be reached."""
+
+    printed: float
+    true: float
+    digits: float
+    goal: float
+
+
+# cm2; of the rocker functions deg2, at N = 72 and, weighted and divided by the weight 1000, at N = 24
+CHAPTER_6_ERRORS: Mapping[str, PrintedAndTrue] = MappingProxyType(
+    {
+        "ellipse-a": PrintedAndTrue(0.889, 5.64, 5e-3, 0.46),
+        "ellipse-b": PrintedAndTrue(4.001, 9.15, 5e-3, 0.62),
+        "ellipse-a-bounded": PrintedAndTrue(53.6, 30.4, 0.05, 6.4),
+        "rocker": PrintedAndTrue(700.0, 1059.9, 0.05, 1025.0),
+        "rocker-weighted": PrintedAndTrue(35.0, 35.8, 0.05, 35.6),
+        "path-a": PrintedAndTrue(2.3, 3.11, 5e-3, 0.125),
+        "path-b": PrintedAndTrue(12.6, 12.61, 5e-3, 0.31),
+    }
+)
+# the unweighted rocker function at N = 48: true error and the least found; ellipse (a) over the rounding of its printed digits
+ROCKER_AT_48 = (721.0, 695.8)
+ELLIPSE_A_OVER_ROUNDING = (4.86, 6.54)
+# weighted rocker function, N = 72: sum of squared errors from 60 to 260 deg, of the printed linkage and with a free mounting
+WINDOW_SUM, WINDOW_SUM_MOUNTED = 104.9, 3.1
+# packaging machine: travel, flatness (cm), area (cm2), least transmission angle (deg)
+PACKAGING = (175.8, 6.99, 1444.0, 10.5)

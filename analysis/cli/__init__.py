@@ -10,7 +10,7 @@ import click
 
 from linkwork import __version__
 
-from . import runs, vibration
+from . import design, runs, vibration
 from .common import CHECK_FAILED, ENDED_EARLY, INTERRUPTED, WRONG
 
 __all__ = ["CHECK_FAILED", "ENDED_EARLY", "INTERRUPTED", "WRONG", "main"]
@@ -31,5 +31,14 @@ def main() -> None:
     """
 
 
-for _command in (runs.build, runs.run, runs.check, runs.info, runs.figures, vibration.resonance, vibration.stability):
+for _command in (
+    runs.build,
+    runs.run,
+    runs.check,
+    runs.info,
+    runs.figures,
+    vibration.resonance,
+    vibration.stability,
+    design.synthesize,
+):
     main.add_command(_command)

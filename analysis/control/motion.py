@@ -20,22 +20,22 @@ from linkwork.errors import InputError
 from ..synthesis.constraints import Assembly, Constraint, FullTurn, InfeasibleError, limits_of
 from ..synthesis.linkage import Linkage, SliderMotion
 from ..synthesis.polish import polish
-from ..synthesis.program import PivotUnknown, SliderUnknown, random_pivot
+from ..synthesis.program import PivotUnknown, SliderUnknown, Start, random_pivot
 from ..synthesis.solution import Solution
 from ..synthesis.solve import Synthesis, SynthesisInterrupted, fitted_form, infeasible, solutions_of, start_from
-from ..synthesis.tasks import Task
+from ..synthesis.tasks import Normal, Task
 
 FloatArray = NDArray[np.float64]
 
 
 def slider_motion(
     task: Task,
-    linkage: Linkage,
+    linkage: Linkage | Solution,
     unknown: PivotUnknown,
     *,
     bounds: Mapping[str, tuple[float, float]] | None = None,
     constraints: Sequence[Constraint] = (FullTurn(),),
-    guesses: Sequence[Linkage] = (),
+    guesses: Sequence[Linkage | Solution] = (),
     starts: int = 24,
     solutions: int = 6,
     seed: int = 0,
@@ -48,15 +48,16 @@ def slider_motion(
     ----------
     task : Task
         Of `analysis.synthesis`; weights are the task's own.
-    linkage : Linkage
-        Its dimensions are kept, but for those that ``bounds`` sets free.
+    linkage : Linkage or Solution
+        Its dimensions are kept, but for those that ``bounds`` sets free. For an open path it must be a solution, which brings the
+        crank rotations of the stations.
     unknown : SliderUnknown or CrankUnknown
         Harmonics, and bounds of guide angle, stroke, speed and acceleration.
     bounds : mapping, optional
         Dimensions that are optimised together with the motion, (least, greatest) by name (m, rad).
     constraints : sequence
         By default the links stay joined over the turn.
-    guesses : sequence of Linkage
+    guesses : sequence of Linkage or Solution
         Searched from as well: their pivots' motion, and with free dimensions those too.
     starts : int
         Random starts besides: phases and amplitudes of the harmonics, guide angles all round.
@@ -77,15 +78,21 @@ def slider_motion(
         raise InputError(f"{starts} starts and no guess: there must be at least one of either")
     begun = perf_counter()
     normal = fitted_form(task, unknown)
-    kept = {name: (value, value) for name, value in linkage.values().items() if name != "branch"}
-    assembly = () if any(isinstance(c, Assembly) for c in constraints) else (Assembly(branch=linkage.branch),)
-    limits = limits_of(task, normal, kept | dict(bounds or {}), (*constraints, *assembly))
-    begin = [start_from(guess, normal, unknown) for guess in guesses]
+    given = linkage.linkage if isinstance(linkage, Solution) else linkage
+    kept = {name: value for name, value in given.values().items() if name != "branch" and name not in (bounds or {})}
+    assembly = () if any(isinstance(c, Assembly) for c in constraints) else (Assembly(branch=given.branch),)
+    fixed = {name: (value, value) for name, value in kept.items()}
+    limits = limits_of(task, normal, fixed | dict(bounds or {}), (*constraints, *assembly))
+    begin = [_start(guess, normal, unknown) for guess in guesses]
     random = np.random.default_rng(seed)
-    base = start_from(linkage, normal, unknown)
+    base = _start(linkage, normal, unknown)
     begin += [replace(base, pivot=random_pivot(unknown, base.q[2], normal.unit, random)) for _ in range(starts)]
     done = polish(normal, limits, begin, pivot=unknown, n_jobs=n_jobs, progress=progress)
-    found = solutions_of(task, normal, done, unknown, solutions)
+    # what is kept is kept to the last digit, whatever the normal form made of it
+    found = tuple(
+        Solution.of(task, replace(s.linkage, **kept), s.evaluation.rotation)
+        for s in solutions_of(task, normal, done, unknown, solutions)
+    )
     result = Synthesis(
         task=task,
         solutions=found,
@@ -100,6 +107,12 @@ def slider_motion(
     if not found:
         raise infeasible(done)
     return result
+
+
+def _start(of: Linkage | Solution, normal: Normal, unknown: PivotUnknown) -> Start:
+    if isinstance(of, Solution):
+        return start_from(of.linkage, normal, unknown, of.evaluation.rotation)
+    return start_from(of, normal, unknown)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -140,7 +153,7 @@ def greatest(linkage: Linkage, order: int) -> float:
 
 def smoothness_curve(
     task: Task,
-    linkage: Linkage,
+    linkage: Linkage | Solution,
     unknown: SliderUnknown,
     accelerations: ArrayLike,
     *,
@@ -173,9 +186,9 @@ def smoothness_curve(
         raise InputError("bounds of acceleration must be finite numbers above zero, at least two")
     found: dict[int, Solution] = {}
     for own, sequence in ((starts, range(len(values) - 1, -1, -1)), (0, range(len(values)))):
-        previous: list[Linkage] = []
+        previous: list[Solution] = []
         for k in sequence:
-            guesses = [*previous, *([found[k].linkage] if k in found else [])]
+            guesses = [*previous, *([found[k]] if k in found else [])]
             if not own and not guesses:
                 continue
             try:
@@ -185,7 +198,7 @@ def smoothness_curve(
                     replace(unknown, acceleration=float(values[k])),
                     bounds=bounds,
                     constraints=constraints,
-                    guesses=[_shrunk(guess, float(values[k])) for guess in guesses],
+                    guesses=[replace(guess, linkage=_shrunk(guess.linkage, float(values[k]))) for guess in guesses],
                     starts=own,
                     solutions=3,
                     seed=seed,
@@ -196,7 +209,7 @@ def smoothness_curve(
                 continue
             if k not in found or result.best.error < found[k].error:
                 found[k] = result.best
-            previous = [s.linkage for s in result.solutions]
+            previous = list(result.solutions)
     return SmoothnessCurve(acceleration=values, solutions=tuple(found.get(k) for k in range(len(values))))
 
 

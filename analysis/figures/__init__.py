@@ -8,6 +8,7 @@ from .curves import Curve, Panel, plot_comparison, plot_curves, plot_outputs
 from .linkage import animate_linkage, draw_linkage, icon
 from .response import plot_branches
 from .style import COLOURS, STYLE
+from .synthesis import LinkageScene, animate_solution, plot_alternatives, plot_solution, plot_trade_off
 
 __all__ = [
     "COLOURS",

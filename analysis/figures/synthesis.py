@@ -18,6 +18,7 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Polygon
+from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from linkwork.errors import InputError
@@ -64,6 +65,10 @@ class LinkageScene:
         Whether D is on a second crank about E.
     transmission : ndarray, shape (2, n)
         Crank rotation over a turn, and the angle between coupler and rocker, NaN where the links cannot be joined.
+    motion : (str, ndarray), or None
+        How the rocker pivot moves over the same rotations: ``slider position [m]`` or ``second crank [rad]``.
+    function : ndarray, shape (2, n), or None
+        Crank rotation and angle of the rocker over the task, of a rocker function.
     title : str
     """
 
@@ -78,6 +83,8 @@ class LinkageScene:
     guide: FloatArray | None
     second_crank: bool
     transmission: FloatArray
+    motion: tuple[str, FloatArray] | None
+    function: FloatArray | None
     title: str = ""
 
 
@@ -96,11 +103,16 @@ class _Frame:
         self.low, self.high = low - 3.0 * self.unit, high + 3.0 * self.unit
 
     def prepare(self, axis: Axes) -> None:
-        axis.set_xlim(self.low[0], self.high[0])
-        axis.set_ylim(self.low[1], self.high[1])
-        axis.set_aspect("equal", adjustable="datalim")
-        axis.set_xlabel("x [mm]")
-        axis.set_ylabel("y [mm]")
+        _one_scale(axis, self.low, self.high)
+
+
+def _one_scale(axis: Axes, low: FloatArray, high: FloatArray) -> None:
+    """One scale on both axes, and at least this box in view: what is left of the panel shows more of the plane."""
+    axis.update_datalim(np.array([low, high]))
+    axis.margins(0.0)
+    axis.set_aspect("equal", adjustable="datalim")
+    axis.set_xlabel("x [mm]")
+    axis.set_ylabel("y [mm]")
 
 
 def _line(axis: Axes, points: Any, **options: Any) -> None:
@@ -111,7 +123,7 @@ def _line(axis: Axes, points: Any, **options: Any) -> None:
 def _support(axis: Axes, at: FloatArray, unit: float) -> None:
     """The bearing of a pin that does not move."""
     foot, half = at[1] - 1.5 * unit, 0.85 * unit
-    corners = [at, (at[0] - half, foot), (at[0] + half, foot)]
+    corners = np.array([at, [at[0] - half, foot], [at[0] + half, foot]])
     axis.add_patch(Polygon(corners, facecolor="0.92", edgecolor=GROUND, linewidth=0.9, zorder=5))
     _line(axis, [(at[0] - 1.3 * unit, foot), (at[0] + 1.3 * unit, foot)], linewidth=0.9, zorder=5)
     for x in np.linspace(at[0] - 0.9 * unit, at[0] + 1.3 * unit, 5):
@@ -130,13 +142,17 @@ def _draw_target(axis: Axes, scene: LinkageScene, *, size: float = 3.0) -> None:
         axis.plot(*closed.T, linewidth=2.6, alpha=0.8, **look)
 
 
-def _draw_curves(axis: Axes, scene: LinkageScene, *, upto: FloatArray | None = None) -> None:
-    for number, piece in enumerate(scene.curves):
-        label = "coupler curve" if number == 0 else None
-        axis.plot(*(MM_PER_METRE * piece).T, color=TRACE, alpha=0.45, linewidth=0.9, zorder=2, label=label)
-    traced = scene.traced if upto is None else upto
-    if traced is not None and len(traced):
-        axis.plot(*(MM_PER_METRE * traced).T, color=TRACE, linewidth=1.6, zorder=4, label="path")
+def _draw_curves(axis: Axes, scene: LinkageScene, *, traced: bool = True) -> None:
+    for piece in scene.curves:
+        axis.plot(*(MM_PER_METRE * piece).T, color=TRACE, alpha=0.45, linewidth=0.9, zorder=2)
+    if not scene.curves:
+        # of a function of the rocker's angle, the ways of B and C
+        places = [pins for phi in _around(scene) if (pins := scene.pins(float(phi))) is not None]
+        for name, colour in (("B", CRANK), ("C", ROCKER)):
+            way = MM_PER_METRE * np.array([pins[name] for pins in places])
+            axis.plot(*way.T, color=colour, alpha=0.35, linewidth=0.9, zorder=2)
+    if traced and scene.traced is not None:
+        axis.plot(*(MM_PER_METRE * scene.traced).T, color=TRACE, linewidth=1.6, zorder=4)
 
 
 def _draw_linkage(
@@ -163,9 +179,9 @@ def _draw_linkage(
     _line(axis, [b, c], color=COUPLER, zorder=7, **link)
     _line(axis, [a, b], color=CRANK, zorder=8, **link)
     for pin in (a, b, c, d, *([e] if scene.second_crank else [])):
-        axis.add_patch(Circle(pin, 0.36 * unit, facecolor="white", edgecolor="black", linewidth=1.0, zorder=9))
+        axis.add_patch(Circle(tuple(pin), 0.36 * unit, facecolor="white", edgecolor="black", linewidth=1.0, zorder=9))
     if p is not None:
-        axis.add_patch(Circle(p, 0.32 * unit, facecolor=TRACE, edgecolor="black", linewidth=0.9, zorder=10))
+        axis.add_patch(Circle(tuple(p), 0.32 * unit, facecolor=TRACE, edgecolor="black", linewidth=0.9, zorder=10))
     if letters:
         _write_letters(axis, scene, at, unit)
 
@@ -189,7 +205,9 @@ def _write_letters(axis: Axes, scene: LinkageScene, at: Mapping[str, FloatArray]
     if "P" in at:
         lines += [(at["B"], at["P"]), (at["C"], at["P"])]
     fixed = [at["A"], at["E"] if scene.second_crank else at["D"]]
+    # the bearings: their height, and their foot
     lines += [(pin, pin - np.array([0.0, 2.0 * unit])) for pin in fixed]
+    lines += [(pin - np.array([1.8, 1.7]) * unit, pin + np.array([1.5, -1.7]) * unit) for pin in fixed]
     if scene.guide is not None:
         lines.append((MM_PER_METRE * scene.guide[0], MM_PER_METRE * scene.guide[1]))
     if scene.second_crank:
@@ -199,7 +217,7 @@ def _write_letters(axis: Axes, scene: LinkageScene, at: Mapping[str, FloatArray]
     curve = MM_PER_METRE * np.vstack(drawn) if drawn else np.empty((0, 2))
     directions = np.radians(np.arange(0.0, 360.0, 15.0))
     for name in names:
-        places = at[name] + 1.35 * unit * np.column_stack([np.cos(directions), np.sin(directions)])
+        places = at[name] + 1.5 * unit * np.column_stack([np.cos(directions), np.sin(directions)])
         room = np.min([_from_line(places, *line) for line in lines], axis=0)
         for mark in marks:
             room = np.minimum(room, 0.6 * np.hypot(*(places - mark).T))
@@ -207,7 +225,7 @@ def _write_letters(axis: Axes, scene: LinkageScene, at: Mapping[str, FloatArray]
             near = np.hypot(*(places[:, None] - curve[None, :]).transpose(2, 0, 1)).min(axis=1)
             room = np.minimum(room, near)
         place = places[int(np.argmax(room))]
-        axis.text(*place, name, ha="center", va="center", fontsize=10.5, zorder=11)
+        axis.text(place[0], place[1], name, ha="center", va="center", fontsize=10.5, zorder=11)
         marks.append(place)
 
 
@@ -231,8 +249,9 @@ def _start(scene: LinkageScene) -> tuple[float, Mapping[str, tuple[float, float]
 def _around(scene: LinkageScene) -> FloatArray:
     """Rotations by which the scene is framed."""
     rotation, angle = scene.transmission
-    chosen: FloatArray = rotation[np.isfinite(angle)]
-    return chosen[:: max(1, len(chosen) // FRAMED)]
+    joined = rotation[np.isfinite(angle)]
+    chosen: FloatArray = joined[np.linspace(0, len(joined) - 1, min(len(joined), FRAMED + 1)).round().astype(int)]
+    return chosen
 
 
 def magnification(worst: float, extent: float) -> float:
@@ -263,12 +282,8 @@ def _enlarged(axis: Axes, scene: LinkageScene) -> None:
     points = np.vstack([wanted, ends])
     low, high = points.min(axis=0), points.max(axis=0)
     rim = 0.06 * float((high - low).max())
-    axis.set_xlim(low[0] - rim, high[0] + rim)
-    axis.set_ylim(low[1] - rim, high[1] + rim)
-    axis.set_aspect("equal", adjustable="datalim")
-    axis.set_xlabel("x [mm]")
-    axis.set_ylabel("y [mm]")
-    axis.legend(fontsize=7.5, loc="upper center", bbox_to_anchor=(0.5, 1.16), ncols=3, columnspacing=1.2)
+    _one_scale(axis, low - rim, high + rim)
+    axis.legend(fontsize=7.5, loc="lower center", bbox_to_anchor=(0.5, 0.99), ncols=3, borderpad=0.2)
 
 
 def _stations(scene: LinkageScene) -> tuple[FloatArray, str]:
@@ -276,19 +291,20 @@ def _stations(scene: LinkageScene) -> tuple[FloatArray, str]:
     rotation = np.degrees(scene.stations["crank rotation [rad]"])
     if scene.timed:
         return rotation, "crank rotation [deg]"
-    return np.arange(len(rotation)), "target point"
+    return np.arange(len(rotation), dtype=float), "target point"
 
 
 def _rocker(axis: Axes, scene: LinkageScene) -> None:
     """Angle of the rocker over the crank's rotation, with the target."""
-    x, words = _stations(scene)
+    assert scene.function is not None
     columns = scene.stations
-    axis.plot(x, np.degrees(columns["rocker angle [rad]"]), color=ROCKER, label="rocker", zorder=4)
+    x = np.degrees(columns["crank rotation [rad]"])
+    axis.plot(*np.degrees(scene.function), color=ROCKER, label="rocker", zorder=4)
     look: dict[str, Any] = {"markersize": 3.5, "fillstyle": "none", "markeredgewidth": 0.9}
     axis.plot(x, np.degrees(columns["target angle [rad]"]), "o", color=TARGET, label="target", zorder=3, **look)
-    axis.set_xlabel(words)
+    axis.set_xlabel("crank rotation [deg]")
     axis.set_ylabel("rocker angle [deg]")
-    axis.legend(fontsize=7.5, loc="upper center", bbox_to_anchor=(0.5, 1.16), ncols=2)
+    axis.legend(fontsize=7.5, loc="lower center", bbox_to_anchor=(0.5, 0.99), ncols=2, borderpad=0.2)
 
 
 def _errors(axis: Axes, scene: LinkageScene) -> None:
@@ -299,7 +315,8 @@ def _errors(axis: Axes, scene: LinkageScene) -> None:
     if "error [m]" in columns:
         axis.plot(x, MM_PER_METRE * columns["error [m]"], color=COLOURS[0], **few)
         axis.set_ylabel("error [mm]")
-        axis.set_ylim(bottom=0.0)
+        # points that are met exactly are not to show the last digits of a double
+        axis.set_ylim(0.0, max(axis.get_ylim()[1], 1e-6))
     if "error of angle [rad]" in columns:
         beside = axis.twinx() if "error [m]" in columns else axis
         turned = np.degrees(columns["error of angle [rad]"])
@@ -311,6 +328,8 @@ def _errors(axis: Axes, scene: LinkageScene) -> None:
             beside.spines["right"].set_visible(True)
             beside.grid(False)
     axis.set_xlabel(words)
+    if not scene.timed:
+        axis.xaxis.set_major_locator(MaxNLocator(integer=True))
 
 
 def _transmission(axis: Axes, scene: LinkageScene) -> None:
@@ -324,9 +343,27 @@ def _transmission(axis: Axes, scene: LinkageScene) -> None:
     axis.axhline(90.0, color="0.6", linewidth=0.7)
     axis.set_ylim(0.0, 180.0)
     axis.set_yticks([0.0, 40.0, 90.0, 140.0, 180.0])
-    axis.set_xticks(np.arange(90.0 * np.floor(turns[0] / 90.0), turns[-1] + 1.0, 90.0))
-    axis.set_xlabel("crank rotation [deg]")
+    _quarters(axis, turns)
     axis.set_ylabel("transmission\nangle [deg]")
+
+
+def _motion(axis: Axes, scene: LinkageScene) -> None:
+    """How the rocker pivot moves over a turn."""
+    assert scene.motion is not None
+    name, values = scene.motion
+    if name.endswith("[m]"):
+        name, values = name.replace("[m]", "[mm]"), MM_PER_METRE * values
+    else:
+        name, values = name.replace("[rad]", "[deg]"), np.degrees(values)
+    turns = np.degrees(scene.transmission[0])
+    axis.plot(turns, values, color=SLIDER)
+    _quarters(axis, turns)
+    axis.set_ylabel(name.replace(" ", "\n", 1))
+
+
+def _quarters(axis: Axes, turns: FloatArray) -> None:
+    axis.set_xticks(np.arange(90.0 * np.ceil(turns[0] / 90.0 - 1e-9), turns[-1] + 1.0, 90.0))
+    axis.set_xlabel("crank rotation [deg]")
 
 
 def plot_solution(scene: LinkageScene) -> Figure:
@@ -340,26 +377,29 @@ def plot_solution(scene: LinkageScene) -> Figure:
     _, pins = _start(scene)
     frame = _Frame(scene, _around(scene))
     with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(10.4, 7.0))
+        right = ["task", "errors", "transmission", *(["motion"] if scene.motion is not None else [])]
+        figure = Figure(figsize=(10.4, 3.1 + 1.3 * len(right)))
         panels = figure.subplot_mosaic(
-            [["linkage", "task"], ["linkage", "errors"], ["linkage", "transmission"]],
+            [["linkage", name] for name in right],
             width_ratios=(1.25, 1.0),
-            height_ratios=(2.1, 1.0, 1.0),
+            height_ratios=(2.1, *(1.0 for _ in right[1:])),
         )
         left = panels["linkage"]
         frame.prepare(left)
         _draw_target(left, scene, size=2.5)
         _draw_curves(left, scene)
         _draw_linkage(left, scene, frame, pins)
-        if scene.target is None:
+        if scene.function is not None:
             _rocker(panels["task"], scene)
         else:
             _enlarged(panels["task"], scene)
         _errors(panels["errors"], scene)
         _transmission(panels["transmission"], scene)
+        if scene.motion is not None:
+            _motion(panels["motion"], scene)
         if scene.title:
             figure.suptitle(scene.title, fontsize=10.5, fontweight="bold")
-        figure.align_ylabels([panels[name] for name in ("task", "errors", "transmission")])
+        figure.align_ylabels([panels[name] for name in right])
         return finish(figure)
 
 
@@ -434,7 +474,7 @@ def plot_trade_off(
         return finish(figure)
 
 
-def animate_solution(scene: LinkageScene, path: str | Path, *, frames: int = 72, frames_per_second: int = 20) -> Path:
+def animate_solution(scene: LinkageScene, path: str | Path, *, frames: int = 48, frames_per_second: int = 20) -> Path:
     """Write a GIF of a turn, or of the part of one that the crank can make: the linkage, and the transmission angle below.
 
     Of a rocker function its angle with the target is below. Positions in which the links cannot be joined are left out.
@@ -451,8 +491,7 @@ def animate_solution(scene: LinkageScene, path: str | Path, *, frames: int = 72,
     first, _ = _start(scene)
     backwards = len(scene.rotation) > 1 and scene.rotation[-1] < scene.rotation[0]
     turn = first + (-1.0 if backwards else 1.0) * np.linspace(0.0, 2.0 * np.pi, frames, endpoint=False)
-    shown = [(float(phi), pins) for phi in turn if (pins := scene.pins(float(phi))) is not None]
-    frame = _Frame(scene, np.array([phi for phi, _ in shown]))
+    frame = _Frame(scene, _around(scene))
     width, height = frame.high - frame.low
     tall = float(np.clip(5.0 * height / width, 2.5, 7.0))
     with matplotlib.rc_context(STYLE):
@@ -461,24 +500,31 @@ def animate_solution(scene: LinkageScene, path: str | Path, *, frames: int = 72,
         above, below = figure.subplots(2, 1, height_ratios=(tall, 1.6))
         if scene.title:
             figure.suptitle(scene.title, fontsize=10.5, fontweight="bold")
-        if scene.target is None:
+        if scene.function is not None:
             _rocker(below, scene)
-            x = np.degrees(scene.stations["crank rotation [rad]"])
-            y = np.degrees(scene.stations["rocker angle [rad]"])
         else:
             _transmission(below, scene)
-            x, y = np.degrees(scene.transmission)
+        x, y = np.degrees(scene.transmission if scene.function is None else scene.function)
         (now,) = below.plot([], [], "o", color=CRANK, markersize=5, zorder=6)
         writer = PillowWriter(fps=frames_per_second, metadata={})
-        trace: list[tuple[float, float]] = []
+        trace: list[FloatArray] = []
+        frame.prepare(above)
+        _draw_target(above, scene, size=2.0)
+        _draw_curves(above, scene, traced=False)
+        fixed = set(above.get_children())
         with writer.saving(figure, str(path), dpi=80):
-            for number, (phi, pins) in enumerate(shown):
-                above.clear()
-                frame.prepare(above)
+            for number, phi in enumerate(turn):
+                pins = scene.pins(float(phi))
+                if pins is None:
+                    # the trace has a gap there
+                    trace.append(np.full(2, np.nan))
+                    continue
+                for artist in above.get_children():
+                    if artist not in fixed:
+                        artist.remove()
                 if "P" in pins:
-                    trace.append(pins["P"])
-                _draw_target(above, scene, size=2.0)
-                _draw_curves(above, scene, upto=np.array(trace).reshape(-1, 2))
+                    trace.append(MM_PER_METRE * np.array(pins["P"]))
+                    _line(above, trace, color=TRACE, linewidth=1.6, zorder=4)
                 _draw_linkage(above, scene, frame, pins, letters=False)
                 at = x[0] + (np.degrees(phi) - x[0]) % 360.0
                 now.set_data([at], [np.interp(at, x, y) if at <= x[-1] + 1e-9 else np.nan])

@@ -7,8 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import cache
-from math import degrees, pi
-from typing import TYPE_CHECKING
+from math import degrees, inf, pi
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,13 +15,13 @@ from numpy.typing import NDArray
 from linkwork.five_bar.published import CM_PER_METRE
 
 from ..figures import COLOURS, Curve, Panel
-from ..synthesis import Linkage, RockerFunction, Solution, evaluate, synthesize
+from ..synthesis import LargestLink, Linkage, RockerFunction, Solution, evaluate, synthesize, trade_off, turn
+from ..synthesis.linkage import LINKS
 from ..synthesis.published import PROBLEMS
 from ..synthesis.tasks import normal_form
 from .study import BALANCE, REFERENCE, THESIS, StudyResult, Verdict, at_least, at_most, near
 
-if TYPE_CHECKING:
-    FloatArray = NDArray[np.float64]
+FloatArray = NDArray[np.float64]
 
 ASSIGNED = (
     "The captions of the thesis's figures are lost; which of its problems stands under which number is our assignment."
@@ -30,9 +29,12 @@ ASSIGNED = (
 #: Least transmission angle that is asked of our linkages (deg).
 TRANSMISSION = 40.0
 #: A small search does: nearly every start of these problems ends at the same optimum.
-STARTS, CANDIDATES = 8, 1 << 14
+STARTS, CANDIDATES = 4, 1 << 14
 #: Colours of target, printed and our linkage.
 TARGET, PRINTED, OURS = "0.25", COLOURS[1], COLOURS[0]
+COLOURED = (PRINTED, OURS, COLOURS[2])
+#: Least transmission angles of the trade-off (deg).
+ANGLES = (0.0, 20.0, 30.0, 35.0, 40.0, 45.0, 50.0, 55.0, 60.0)
 
 
 @cache
@@ -64,9 +66,11 @@ def error_verdicts(name: str, stated: float, tolerance: float, reference: float,
 
 
 def sound_verdicts(name: str) -> tuple[Verdict, ...]:
-    """Our linkage turns fully, with a transmission angle, and is no longer than the longest printed link."""
+    """Our linkage has the transmission angle and the lengths that are asked, and no defect."""
     p, ours = PROBLEMS[name], best(name)
-    largest = p.linkage.largest_link if not p.bounds else max(high for _, high in p.bounds.values())
+    caps = [c.length for c in p.constraints if isinstance(c, LargestLink)]
+    largest = min(caps, default=max((p.bounds[link][1] for link in LINKS if link in p.bounds), default=inf))
+    v = ours.verdicts
     return (
         at_least(
             "least transmission angle of our linkage",
@@ -82,7 +86,9 @@ def sound_verdicts(name: str) -> tuple[Verdict, ...]:
             CM_PER_METRE * ours.linkage.largest_link,
             "cm",
         ),
-        at_least("our linkage has no circuit, branch or order defect", BALANCE, 1.0, float(ours.verdicts.sound)),
+        at_most(
+            "circuit, branch and order defects of our linkage", BALANCE, 0, [v.circuit, v.branch, v.order].count(False)
+        ),
     )
 
 
@@ -102,9 +108,9 @@ def path_columns(name: str) -> dict[str, FloatArray]:
     assert normal.points is not None
     stations = normal.origin + normal.unit * normal.points
     shapes = {"target": CM_PER_METRE * np.column_stack([stations.real, stations.imag])}
-    turn = np.linspace(0.0, 2.0 * pi, 361)
+    rotation = np.linspace(0.0, 2.0 * pi, 361)
     for who, linkage in (("printed", p.linkage), ("ours", best(name).linkage)):
-        shapes[f"{who} curve"] = CM_PER_METRE * linkage.path(turn)
+        shapes[f"{who} curve"] = CM_PER_METRE * linkage.path(rotation)
         shapes |= {f"{who} {part}": line for part, line in outline(linkage).items()}
     return {f"{shape} {axis} [cm]": xy[:, k] for shape, xy in shapes.items() for k, axis in enumerate("xy")}
 
@@ -115,11 +121,13 @@ def curve_of(result: StudyResult, shape: str, **look: str | float | None) -> Cur
 
 
 def curves_panel(result: StudyResult, *, marks: bool) -> Panel:
-    """Target and coupler curves; the target's points as marks, or as a closed line."""
+    """Target and coupler curves; the target's points as marks, or as a wide line under the curves."""
     x, y = (result.columns[f"target {axis} [cm]"] for axis in "xy")
     x, y = (np.append(v[np.isfinite(v)], v[0]) for v in (x, y))
-    target = Curve(
-        x=x, y=y, label="target", colour=TARGET, line="" if marks else "--", marker="." if marks else "", width=1.1
+    target = (
+        Curve(x=x, y=y, label="target", colour=TARGET, line="", marker=".")
+        if marks
+        else Curve(x=x, y=y, label="target", colour="0.8", width=5.0)
     )
     return Panel(
         x_label="x [cm]",
@@ -136,54 +144,45 @@ def curves_panel(result: StudyResult, *, marks: bool) -> Panel:
 
 
 def linkages_panel(result: StudyResult) -> Panel:
-    """Both linkages to scale."""
+    """Both linkages to scale, in the colours of `curves_panel`."""
     curves = []
-    for who, label, colour in (("printed", "printed", PRINTED), ("ours", "ours", OURS)):
+    for who, colour in (("printed", PRINTED), ("ours", OURS)):
         curves += [
-            curve_of(result, f"{who} links", label=label, colour=colour, marker=".", width=1.6),
+            curve_of(result, f"{who} links", colour=colour, marker=".", width=1.6),
             curve_of(result, f"{who} ground", colour=colour, line=":", width=1.2),
             curve_of(result, f"{who} curve", colour=colour, width=0.9),
         ]
     return Panel(
-        x_label="x [cm]",
-        y_label="y [cm]",
-        title="linkages at the start, to scale; ground dotted",
-        curves=curves,
-        equal=True,
-        legend_at="best",
+        x_label="x [cm]", y_label="y [cm]", title="linkages to scale, ground dotted", curves=curves, equal=True
     )
 
 
 def distance_columns(name: str) -> dict[str, FloatArray]:
-    """Distance of the coupler point from its target over the crank's rotation."""
+    """Distance of the target's points from the coupler point at their time, or from the curve of an untimed one."""
     p = PROBLEMS[name]
     found: Mapping[str, FloatArray] = {
         "printed": evaluate(p.task, p.linkage).errors,
         "ours": best(name).evaluation.errors,
     }
-    rotation = normal_form(p.task).rotation
-    assert rotation is not None
-    return {"crank rotation [deg]": np.degrees(rotation)} | {
+    return {"place on the target [deg]": np.degrees(turn(len(found["ours"])))} | {
         f"{who} distance [cm]": CM_PER_METRE * distance for who, distance in found.items()
     }
 
 
-def distance_panel(result: StudyResult) -> Panel:
-    """The distances, on a logarithmic scale."""
+def distance_panel(result: StudyResult, *, timed: bool) -> Panel:
+    """The distances, on a logarithmic scale, in the colours of `curves_panel`."""
     return Panel(
-        x_label="crank rotation [deg]",
+        x_label="crank rotation [deg]" if timed else "ωt of the ellipse [deg]",
         y_label="distance from the target [cm]",
-        title="error over a turn",
+        title="error over a turn" if timed else "error round the target",
         curves=[
             Curve(
-                x=result.columns["crank rotation [deg]"],
-                y=result.columns[f"{who} distance [cm]"],
-                label=label,
-                colour=colour,
+                x=result.columns["place on the target [deg]"], y=result.columns[f"{who} distance [cm]"], colour=colour
             )
-            for who, label, colour in (("printed", "printed linkage", PRINTED), ("ours", "our linkage", OURS))
+            for who, colour in (("printed", PRINTED), ("ours", OURS))
         ],
         logarithmic="y",
+        y_range=None if timed else (1e-4, 1.0),
         x_ticks=range(0, 361, 90),
     )
 
@@ -191,14 +190,73 @@ def distance_panel(result: StudyResult) -> Panel:
 # Rocker functions
 
 
-def angle_columns(solutions: Mapping[str, tuple[RockerFunction, Linkage]]) -> dict[str, FloatArray]:
-    """Rocker angle and its error over a turn, of linkages by name, and the target (deg)."""
+def angle_columns(linkages: Mapping[str, Linkage]) -> dict[str, FloatArray]:
+    """Target, and rocker angles of linkages by name with their errors, over a turn (deg)."""
     phi = np.linspace(0.0, 2.0 * pi, 361)
     target = 70.0 + 100.0 * np.abs(np.sin(0.5 * phi))
     columns = {"crank rotation [deg]": np.degrees(phi), "target angle [deg]": target}
-    for who, (_, linkage) in solutions.items():
+    for who, linkage in linkages.items():
         angle = np.degrees(linkage.rocker_angle(phi))
-        # to the turn that the target is in
+        # into the turn that the target is in
         angle -= 360.0 * np.round(np.mean(angle - target) / 360.0)
         columns[f"{who} angle [deg]"], columns[f"{who} error [deg]"] = angle, angle - target
     return columns
+
+
+def trade_off_columns(name: str, tasks: Mapping[str, RockerFunction]) -> dict[str, FloatArray]:
+    """Least error of tasks by name over the least transmission angle, in the unit of print; NaN where no linkage was found."""
+    p = PROBLEMS[name]
+    columns = {"least transmission angle [deg]": np.array(ANGLES)}
+    for who, task in tasks.items():
+        found = trade_off(task, "transmission", np.radians(ANGLES), constraints=p.constraints, starts=3)
+        columns[f"{who} least error [{p.unit}]"] = p.per_si * np.asarray(found.error.filled(np.nan))
+    return columns
+
+
+def rocker_panels(result: StudyResult, name: str, labels: Mapping[str, str], tasks: Mapping[str, str]) -> list[Panel]:
+    """Angles, errors, and the trade-off: ``labels`` of linkages, ``tasks`` those of the trade-off, by name."""
+    unit = PROBLEMS[name].unit
+    rotation = result.columns["crank rotation [deg]"]
+    look = dict(zip(labels, COLOURED))
+
+    def curves(what: str) -> list[Curve]:
+        return [
+            Curve(x=rotation, y=result.columns[f"{who} {what} [deg]"], label=label, colour=look[who])
+            for who, label in labels.items()
+        ]
+
+    target = Curve(x=rotation, y=result.columns["target angle [deg]"], label="target", colour=TARGET, line="--")
+    ticks = range(0, 361, 60)
+    return [
+        Panel(
+            x_label="crank rotation [deg]",
+            y_label="rocker angle [deg]",
+            title="rocker angle",
+            curves=[target, *curves("angle")],
+            x_ticks=ticks,
+            legend_at="lower center",
+        ),
+        Panel(
+            x_label="crank rotation [deg]",
+            y_label="rocker angle less target [deg]",
+            title="error over a turn",
+            curves=curves("error"),
+            x_ticks=ticks,
+        ),
+        Panel(
+            x_label="least transmission angle [deg]",
+            y_label=f"least error [{unit}]",
+            title="error against transmission angle",
+            curves=[
+                Curve(
+                    x=result.columns["least transmission angle [deg]"],
+                    y=result.columns[f"{who} least error [{unit}]"],
+                    label=label,
+                    colour=colour,
+                    marker=".",
+                )
+                for (who, label), colour in zip(tasks.items(), COLOURED[1:])
+            ],
+            logarithmic="y",
+        ),
+    ]

@@ -15,7 +15,7 @@ from __future__ import annotations
 from math import atan2, cos, sin
 
 import numpy as np
-from numba import boolean, complex128, float64, int64, void
+from numba import complex128, float64, int64, void
 
 from linkwork.five_bar.kinematics import joined
 
@@ -176,14 +176,14 @@ def many_directions(c, s, shapes, branch, coupler, rocker):  # type: ignore[no-u
             rocker[i, j] = complex(g.c4, g.s4)
 
 
-@kernel(void(complex128[:, ::1], complex128[::1], int64[::1], int64[::1], boolean, MATRIX))
-def match_windows(curves, target, starts, spans, closed, best):  # type: ignore[no-untyped-def]
+@kernel(void(complex128[:, ::1], complex128[::1], int64[::1], int64[::1], MATRIX))
+def match_windows(curves, target, starts, spans, best):  # type: ignore[no-untyped-def]
     """The piece of each curve that a target looks most alike, up to a similarity: for open targets.
 
     Each curve is given at even steps of the crank over a turn, shape (m, n); a piece begins at one of ``starts`` and goes over
     one of ``spans`` steps. It is compared at even arc length with the target, given at even arc length about its mean, shape
     (k,), run through forwards and backwards. ``best`` takes (misfit as a share of the target's sum of squares, start, span,
-    direction), shape (m, 4). On a curve that is not ``closed`` a piece does not go past its end.
+    direction), shape (m, 4). Pieces with a point that is not finite are passed over.
     """
     m, n = curves.shape
     k = target.shape[0]
@@ -200,8 +200,6 @@ def match_windows(curves, target, starts, spans, closed, best):  # type: ignore[
         best[row, 0] = np.inf
         for start in starts:
             for span in spans:
-                if not closed and start + span >= n:
-                    continue
                 total = length[start + span] - length[start]
                 if not total > 0.0:
                     continue

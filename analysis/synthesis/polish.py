@@ -23,7 +23,7 @@ from linkwork.errors import InputError
 from ..simulate import interruptible, shown
 from .constraints import Limits
 from .kernels import coupler_path_jacobian, link_jacobian
-from .program import Answer, PivotUnknown, Program, Start, inside
+from .program import Answer, PivotUnknown, Program, SliderUnknown, Start, inside
 from .tasks import Normal
 
 FloatArray = NDArray[np.float64]
@@ -32,6 +32,8 @@ Made = TypeVar("Made")
 
 #: Sharpness of the area's absolute value, as shares of the root mean square distance that least squares left.
 BLURS = (0.3, 0.03)
+#: Untimed stations up to which least squares keeps up with IPOPT, whose Jacobian is sparse.
+FEW = 20
 #: How many of the fitted paths go on to the area.
 AREAS = 6
 #: Share of the quality below which points count as met exactly (units squared).
@@ -84,7 +86,7 @@ def polish(
     found = [answer for part in parts for answer in part]
     kept = sorted((a for a in found if a.feasible), key=lambda a: a.start.quality)
     if normal.normals is not None and not interrupted:
-        best = distinct(kept, AREAS)
+        best = distinct(kept, AREAS, pivot)
         worker = Polisher(normal, limits, pivot)
         kept = sorted((worker.area(a) for a in best), key=lambda a: a.start.quality)
     return Polished(
@@ -147,7 +149,9 @@ def _batch(normal: Normal, limits: Limits, pivot: PivotUnknown | None, starts: S
     return [worker.fit(start) for start in starts]
 
 
-def distinct(answers: Sequence[Answer], count: int, apart: float = 1e-3) -> list[Answer]:
+def distinct(
+    answers: Sequence[Answer], count: int, pivot: PivotUnknown | None = None, apart: float = 1e-3
+) -> list[Answer]:
     """The first answers that are different linkages: in their links, as shares of the longest, and their point and pivot."""
     chosen: list[Answer] = []
     marks: list[FloatArray] = []
@@ -155,6 +159,9 @@ def distinct(answers: Sequence[Answer], count: int, apart: float = 1e-3) -> list
         q = answer.start.q
         largest = q[2:7].max()
         v = answer.start.pivot
+        if isinstance(pivot, SliderUnknown):
+            # as vectors: a guide is the same one from its other end
+            v = np.concatenate([np.cos(v[0]) * v[1:], np.sin(v[0]) * v[1:]])
         mark = np.concatenate([q[:7] / largest, np.cos(q[7:]), np.sin(q[7:]), v / largest])
         # the start of an untimed path's rotation is no dimension
         if answer.start.rotation is not None:
@@ -175,7 +182,8 @@ class Polisher:
 
     def __init__(self, normal: Normal, limits: Limits, pivot: PivotUnknown | None) -> None:
         self.normal, self.limits, self.pivot = normal, limits, pivot
-        self.by_least_squares = limits.bounds_only and pivot is None and normal.straight is None
+        few = normal.timed or normal.n <= FEW
+        self.by_least_squares = limits.bounds_only and pivot is None and normal.straight is None and few
         self._programs: dict[str, Program] = {}
 
     def program(self, objective: str) -> Program:

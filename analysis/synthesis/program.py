@@ -7,11 +7,13 @@ shortest - comes as parameters, so that one program serves all starts.
 
 from __future__ import annotations
 
+import builtins
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import cos, inf, isfinite, pi
-from types import FunctionType, ModuleType, SimpleNamespace
+from types import CellType, CodeType, FunctionType, ModuleType, SimpleNamespace
 from typing import Any, Literal
 
 import numpy as np
@@ -40,6 +42,11 @@ FOLLOWING: dict[str, dict[str, Any]] = {
 }
 #: Amplitudes at which the motion of a pivot is started, as shares of the ground link.
 AMPLITUDE = 0.1
+#: What a function of the user's may take from `math` or NumPy.
+TRACED = (
+    "sin", "cos", "tan", "asin", "acos", "atan", "atan2", "arcsin", "arccos", "arctan", "arctan2", "sinh", "cosh", "tanh",
+    "exp", "log", "sqrt", "hypot", "fabs",
+)  # fmt: skip
 #: Least rotation of the crank from one untimed station to the next, as a share of an even one.
 ADVANCE = 1e-3
 #: Greatest, in even ones: in a wider gap the coupler point could wander off unseen between two stations.
@@ -375,13 +382,18 @@ class Program:
             self._at_most(joint - (l1 - l2) ** 2 - product, name)
             self._at_most((l1 + l2) ** 2 - joint - product, name)
             return
-        x = casadi.DM(np.linspace(0.0, 2.0 * pi, GRID, endpoint=False)) if limits.over_turn else phi
+        x = casadi.DM(np.linspace(0.0, 2.0 * pi, GRID, endpoint=False)) if limits.over_turn else self._way(phi)
         dx, dy = self._displacement(v, x)
         bx = l1 + dx - l2 * casadi.cos(x + p.crank_phase)
         by = dy - l2 * casadi.sin(x + p.crank_phase)
         d2 = bx * bx + by * by
         self._at_most(joint - d2 - product, name)
         self._at_most(d2 - joint - product, name)
+
+    def _way(self, phi: Any) -> Any:
+        """The stations' rotations and some in between: where the links must stay joined on the way of the task."""
+        between = [phi[:-1] + share * (phi[1:] - phi[:-1]) for share in (0.25, 0.5, 0.75)]
+        return self._casadi.vertcat(phi, *between)
 
     def _slider(self, pivot: SliderUnknown, ground: Any, v: Any, z: list[Any], low: list[Any], high: list[Any]) -> Any:
         """Bounds of the slider's motion; what its smoothness adds to the quality."""
@@ -420,7 +432,7 @@ class Program:
             "ipopt": {
                 "print_level": 0,
                 "sb": "yes",
-                "max_iter": 400,
+                "max_iter": 250,
                 "tol": 1e-9,
                 "constr_viol_tol": 1e-9,
                 "acceptable_tol": 1e-7,
@@ -590,24 +602,49 @@ def traced(require: Require, values: SimpleNamespace) -> Any:
         If it branches on its argument, or calls what CasADi cannot.
     """
     casadi = symbolic.library()
-    f = require.function
-    if isinstance(f, FunctionType):
-        space = dict(f.__globals__)
-        for name in f.__code__.co_names:
-            known = space.get(name)
-            if isinstance(known, ModuleType) and known.__name__ in ("math", "numpy"):
-                space[name] = casadi
-            elif getattr(known, "__module__", None) in ("math", "numpy") and hasattr(casadi, name):
-                space[name] = getattr(casadi, name)
-        f = FunctionType(f.__code__, space, f.__name__, f.__defaults__, f.__closure__)
     try:
-        value = casadi.SX(f(values))
+        value = casadi.SX(_rebound(require.function, {})(values))
     except Exception as error:
         raise InputError(
             f"{require.name} cannot be traced ({type(error).__name__}: {error}): it must be arithmetic and functions of math, "
             "without branches"
         ) from error
+    if value.numel() != 1 or value.is_constant():
+        # what turns a symbol into a float by itself has lost it: NaN
+        raise InputError(
+            f"{require.name} cannot be traced (its value is {value}): it must be one number, by arithmetic and functions of "
+            "math from the dimensions"
+        )
     return value
+
+
+def _rebound(value: Any, seen: dict[int, Any]) -> Any:
+    """What a function of the user's takes from elsewhere, `math` and NumPy replaced by CasADi, his own functions likewise."""
+    casadi = symbolic.library()
+    if isinstance(value, ModuleType) and value.__name__ in ("math", "numpy"):
+        return SimpleNamespace(**vars(value) | {n: getattr(casadi, n) for n in TRACED if hasattr(value, n)})
+    if any(getattr(module, getattr(value, "__name__", ""), None) is value for module in (math, np)):
+        return getattr(casadi, value.__name__) if value.__name__ in TRACED else value
+    if not isinstance(value, FunctionType):
+        return value
+    if id(value) not in seen:
+        cells = [CellType() for _ in value.__closure__ or ()]
+        space: dict[str, Any] = {}
+        f = FunctionType(value.__code__, space, value.__name__, value.__defaults__, tuple(cells))
+        f.__kwdefaults__ = value.__kwdefaults__
+        seen[id(value)] = f
+        space.update(
+            {name: _rebound(x, seen) for name, x in value.__globals__.items() if name in _names(value.__code__)}
+        )
+        space["__builtins__"] = value.__globals__.get("__builtins__", builtins)
+        for cell, old in zip(cells, value.__closure__ or ()):
+            cell.cell_contents = _rebound(old.cell_contents, seen)
+    return seen[id(value)]
+
+
+def _names(code: CodeType) -> set[str]:
+    """Global names that code, or code within it, may ask for."""
+    return {*code.co_names}.union(*(_names(c) for c in code.co_consts if isinstance(c, CodeType)))
 
 
 def _grashof_rows(type_: str | None, links: FloatArray) -> FloatArray:

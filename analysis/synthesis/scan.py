@@ -36,6 +36,10 @@ SHAPES = ((0.01, 3.0), (0.05, 6.0), (0.05, 6.0))
 CHUNK = 4096
 #: Steps of a coupler curve and points of it at even arc length.
 CURVE, EVEN = 128, 64
+#: Pieces of a coupler curve that an open target is laid over: points at even arc length, first steps, lengths in steps.
+PIECE = 24
+STARTS = np.arange(0, CURVE, 8)
+SPANS = np.array([10, 16, 24, 36, 52, 72, 96, 124])
 #: Starts that differ by less than this in the logarithms of their shape and in phase count as one.
 APART = 0.08
 
@@ -213,14 +217,14 @@ def _timed(
 
 def _projected(basis: ComplexArray, p: ComplexArray, w: FloatArray) -> ComplexArray:
     """Weighted least squares of p = z . basis for every row; basis (m, k, n), p (n,) or (m, n); z (m, k)."""
-    weighted: ComplexArray = basis.conj() * w
+    weighted = basis.conj() * w
     gram = weighted @ basis.transpose(0, 2, 1)
     # transposed: gram[a, b] = sum of conj(basis_a) w basis_b
     gram += 1e-12 * w.sum() * np.eye(basis.shape[1])
     right = (weighted * (p if p.ndim == 1 else p[:, None, :])).sum(axis=2)
     bad = ~np.isfinite(gram).all(axis=(1, 2))
     gram[bad], right[bad] = np.eye(basis.shape[1]), np.nan
-    solved: ComplexArray = np.linalg.solve(gram, right[:, :, None])[:, :, 0]
+    solved: ComplexArray = np.linalg.solve(gram, right[:, :, None])[:, :, 0].astype(complex)
     return solved
 
 
@@ -241,6 +245,9 @@ def _closed_paths(
     normal: Normal, limits: Limits, links: FloatArray, curves: ComplexArray, point: ComplexArray, branch: int
 ) -> Candidates:
     assert normal.points is not None
+    # a crank that does not turn fully closes no curve
+    broken = np.logical_not(np.isfinite(curves).all(axis=1))
+    curves = np.where(broken.reshape(-1, 1), 1.0 + 0.0j + np.arange(CURVE), curves)
     target, _ = _even(normal.points[None, :], EVEN)
     goal = target[0] - target[0].mean()
     even, turned = _even(curves, EVEN)
@@ -267,11 +274,13 @@ def _closed_paths(
     scale = product / energy
     bounded, scale = _bounded(scale, links, point, limits)
     misfit = (np.abs(goal) ** 2).sum() - 2.0 * (scale.conj() * product).real + np.abs(scale) ** 2 * energy
+    misfit[broken] = inf
     place = target[0].mean() - scale * mean
     # crank rotation of each station: its share of the target's length, from where the target starts on the curve
     stations = _shares(normal.points, closed=True) * EVEN
     rotations = np.empty((len(curves), normal.n))
     chosen = np.argsort(misfit)[: min(len(misfit), 400)]
+    chosen = chosen[np.isfinite(misfit[chosen])]
     for i in chosen:
         index = way[i] * (stations - shift[i])
         table = np.append(turned[i], turned[i, 0] + 2.0 * pi)
@@ -287,16 +296,18 @@ def _open_paths(
     normal: Normal, limits: Limits, links: FloatArray, curves: ComplexArray, point: ComplexArray, branch: int
 ) -> Candidates:
     assert normal.points is not None
-    k = 32
+    k = PIECE
     shares = _shares(normal.points, closed=False)
     even = np.interp(np.linspace(0.0, 1.0, k), shares, normal.points.real) + 1j * np.interp(
         np.linspace(0.0, 1.0, k), shares, normal.points.imag
     )
     goal = even - even.mean()
-    starts = np.arange(0, CURVE, 4)
-    spans = np.array([10, 14, 20, 28, 38, 48, 60, 74, 90, 108, 126])
     best = np.empty((len(curves), 4))
-    match_windows(np.ascontiguousarray(curves), goal, starts, spans, True, best)
+    # where the links cannot be joined all round, a curve begins after the gap: pieces end before the next
+    gaps = ~np.isfinite(curves)
+    first = np.where(gaps.any(axis=1), CURVE - np.argmax(gaps[:, ::-1], axis=1), 0)
+    curves = np.take_along_axis(curves, (np.arange(CURVE) + first[:, None]) % CURVE, axis=1)
+    match_windows(np.ascontiguousarray(curves), goal, STARTS, SPANS, best)
     chosen = np.argsort(best[:, 0])[: min(len(best), 400)]
     chosen = chosen[np.isfinite(best[chosen, 0])]
     quality = np.full(len(curves), inf)
@@ -306,7 +317,7 @@ def _open_paths(
         start, span, way = int(best[i, 1]), int(best[i, 2]), best[i, 3]
         part = curves[i, np.arange(start, start + span + 1) % CURVE]
         length = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(part)))]) / np.abs(np.diff(part)).sum()
-        angles = 2.0 * pi * np.arange(start, start + span + 1) / CURVE
+        angles = 2.0 * pi * np.arange(start + first[i], start + first[i] + span + 1) / CURVE
         at = shares if way > 0.0 else 1.0 - shares
         rotations[i] = np.interp(at, length, angles)
         piece = np.interp(at, length, part.real) + 1j * np.interp(at, length, part.imag)

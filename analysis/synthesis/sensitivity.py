@@ -158,6 +158,34 @@ def rounded(solution: Solution, length: float, angle: float) -> Rounding:
     return Rounding(linkage=linkage, error=error, expected=expected)
 
 
+def costs(solution: Solution, length: float, angle: float) -> dict[str, float]:
+    """What it costs if one dimension is off by a step: the greater growth of the quality function of the two directions.
+
+    By evaluating the linkages, so that it holds of steps of any size; infinite where the links cannot be joined.
+
+    Parameters
+    ----------
+    length, angle : float
+        Steps (m, rad).
+
+    Returns
+    -------
+    dict
+        By the name of the dimension, without those of a moved pivot.
+    """
+    grown: dict[str, float] = {}
+    for names, step in ((LENGTHS, length), (ANGLES, angle)):
+        for name in names:
+            value = getattr(solution.linkage, name)
+            # a link cannot be shorter than nothing
+            ends = [value + side * step for side in (-1.0, 1.0) if name not in LINKS or value + side * step > 0.0]
+            grown[name] = max(
+                evaluate(solution.task, replace(solution.linkage, **{name: end}), solution.evaluation.rotation).error
+                for end in ends
+            )
+    return {name: error - solution.error for name, error in grown.items()}
+
+
 def _mean_absolute(mean: FloatArray, spread: FloatArray) -> FloatArray:
     """Mean of |x| of a normal variable."""
     from scipy.special import erf

@@ -270,7 +270,7 @@ class Solution:
         return rounded(self, length, angle)
 
     def columns(self) -> dict[str, FloatArray]:
-        """Target by target: crank rotation, what was asked for, what is done, error, transmission angle; SI, units in the names.
+        """Target by target: crank rotation, target, what is done, error, transmission angle; SI, units in the names.
 
         Of an untimed path the point of it that is nearest to each of the target's points.
         """
@@ -283,10 +283,14 @@ class Solution:
         assert at is not None
         columns = {"crank rotation [rad]": at}
         if isinstance(task, RockerFunction):
-            columns |= {"target angle [rad]": np.asarray(task.angle), "rocker angle [rad]": self.linkage.rocker_angle(at)}
+            columns |= {
+                "target angle [rad]": np.asarray(task.angle),
+                "rocker angle [rad]": self.linkage.rocker_angle(at),
+            }
             columns["error of angle [rad]"] = self.evaluation.errors
         else:
-            wanted = np.asarray(task.path.points if isinstance(task, UntimedPath) else task.points)
+            wanted = target_points(task)
+            assert wanted is not None
             made = self.linkage.path(at)
             for name, both in (("target", wanted), ("path", made)):
                 columns |= {f"{name} {axis} [m]": both[:, k] for k, axis in enumerate("xy")}
@@ -306,8 +310,8 @@ class Solution:
         return write_csv(path, self.columns())
 
     def report(self) -> str:
-        """Verdicts, dimensions with what an error of 0.1 mm or 0.1 degrees in each costs, rounding, errors, in mm and degrees."""
-        from .sensitivity import report
+        """Verdicts, dimensions with what an error in each costs, rounding, errors target by target; in mm and degrees."""
+        from .report import report
 
         return report(self)
 
@@ -317,7 +321,7 @@ class Solution:
 
         return figures.plot_solution(self.scene(title))
 
-    def animate(self, path: str | Path, *, title: str = "", frames: int = 72) -> Path:
+    def animate(self, path: str | Path, *, title: str = "", frames: int = 48) -> Path:
         """Write a GIF of a turn of the crank."""
         from .. import figures
 
@@ -332,7 +336,7 @@ class Solution:
             Of the crank (rad); the first at which the links are joined by default.
         title : str
         """
-        from .draughting import drawing
+        from .drawing import drawing
 
         return drawing(self.scene(title), rotation)
 
@@ -349,22 +353,38 @@ class Solution:
         begin = 0.0 if closed else float(at.min())
         turn = begin + np.linspace(0.0, 2.0 * pi, 2 * CURVE + 1)
         way = turn if whole else np.linspace(begin, begin + span, 2 * CURVE + 1)
-        pointed = not isinstance(task, RockerFunction)
+        target = target_points(task)
+        pointed = target is not None
         slides = linkage.pivot if isinstance(linkage.pivot, SliderMotion) else None
         return LinkageScene(
             pins=lambda phi: _pins(linkage, phi, pointed),
             rotation=way if whole else at,
             curves=_pieces(linkage.path(turn)) if pointed else (),
             traced=linkage.path(way) if pointed else None,
-            target=None if not pointed else np.asarray(task.path.points if isinstance(task, UntimedPath) else task.points),
+            target=target,
             line=task.path.closed if isinstance(task, UntimedPath) else None,
             timed=not isinstance(task, UntimedPath) and task.rotation is not None,
             stations=self.columns(),
             guide=None if slides is None else _guide(linkage, slides, turn),
             second_crank=isinstance(linkage.pivot, SecondCrank),
             transmission=np.vstack([turn, angle_at_c(linkage, turn)]),
+            motion=_motion(linkage, turn),
+            function=None if pointed else np.vstack([way, linkage.rocker_angle(way)]),
             title=title,
         )
+
+
+def target_points(task: Task) -> FloatArray | None:
+    """Points that a task asks for (m), shape (n, 2); None of a rocker function."""
+    if isinstance(task, RockerFunction):
+        return None
+    return np.asarray(task.path.points if isinstance(task, UntimedPath) else task.points)
+
+
+def _motion(linkage: Linkage, turn: FloatArray) -> tuple[str, FloatArray] | None:
+    if isinstance(linkage.pivot, SliderMotion):
+        return "slider position [m]", linkage.pivot.series(turn)
+    return None if linkage.pivot is None else ("second crank [rad]", linkage.pivot.angle(turn))
 
 
 def angle_at_c(linkage: Linkage, rotation: FloatArray) -> FloatArray:

@@ -5,8 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import isfinite
+from pathlib import Path
+from textwrap import fill
 from time import perf_counter
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -22,12 +24,15 @@ from .constraints import (
     LeastTransmission,
     limits_of,
 )
-from .linkage import Linkage
+from .linkage import ANGLES, Linkage
 from .polish import Polished, distinct, polish
 from .program import Answer, PivotUnknown, Start, linkage_of, random_pivot, start_of
 from .scan import scan
 from .solution import Solution, nearest_rotations, ranked
-from .tasks import Normal, Task, UntimedPath, normal_form, reweighted
+from .tasks import Normal, RockerFunction, Task, UntimedPath, normal_form, reweighted
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 Method = Literal["scan", "differential-evolution", "simplex"]
 #: Stations of an untimed path where the pivot moves: more than with a fixed one, because harmonics put waves into the curve.
@@ -67,6 +72,24 @@ class Synthesis:
     def best(self) -> Solution:
         """The first solution."""
         return self.solutions[0]
+
+    def columns(self) -> dict[str, list[float]]:
+        """Rank, errors, verdicts (1 or 0) and dimensions of each solution; SI, units in the names."""
+        return columns_of(self.solutions)
+
+    def to_csv(self, path: str | Path) -> Path:
+        """Write `columns` to a CSV file."""
+        from ..io import write_csv
+
+        return write_csv(path, self.columns())
+
+    def plot(self, *, title: str = "") -> Figure:
+        """The ranked linkages beside one another, each with its curve and the target."""
+        from .. import figures
+        from .report import headline
+
+        scenes = [s.scene(f"{k}: {headline(s)}") for k, s in enumerate(self.solutions, start=1)]
+        return figures.plot_alternatives(scenes, title=title)
 
 
 class SynthesisInterrupted(Interrupted):
@@ -213,7 +236,7 @@ def solutions_of(
     task: Task, normal: Normal, done: Polished, pivot: PivotUnknown | None, count: int
 ) -> tuple[Solution, ...]:
     """Answers as solutions, each evaluated afresh, ranked, and at most so many."""
-    chosen = distinct(done.kept, 4 * count)
+    chosen = distinct(done.kept, 4 * count, pivot)
     made = [Solution.of(task, linkage_of(a.start, normal, pivot), a.start.rotation) for a in chosen]
     return ranked([s for s in made if isfinite(s.error)])[:count]
 
@@ -227,6 +250,29 @@ def infeasible(done: Polished) -> InfeasibleError:
         f"no linkage keeps all bounds and constraints: of {len(done.others)} searches the nearest violates "
         f"the {nearest.worst or 'quality'} by {nearest.violation:.3g} (in units of the target's size, or rad; {nearest.status})"
     )
+
+
+def columns_of(solutions: Sequence[Solution]) -> dict[str, list[float]]:
+    """What `Synthesis.columns` tells, of any solutions."""
+    columns: dict[str, list[float]] = {}
+
+    def put(name: str, value: float) -> None:
+        columns.setdefault(name, []).append(float(value))
+
+    for rank, s in enumerate(solutions, start=1):
+        angular = isinstance(s.task, RockerFunction)
+        unit, length = ("rad2", "rad") if angular else ("m2", "m")
+        put("rank", rank)
+        put(f"quality [{unit}]", s.error)
+        put(f"rms error [{length}]", s.evaluation.rms)
+        put(f"worst error [{length}]", s.evaluation.worst)
+        for name in ("full_turn", "circuit", "branch", "order"):
+            put(f"{name.replace('_', ' ')} (1 kept, 0 not)", getattr(s.verdicts, name))
+        put("least transmission angle [rad]", s.verdicts.least_transmission)
+        put("greatest transmission angle [rad]", s.verdicts.greatest_transmission)
+        for name, value in s.linkage.values().items():
+            put(name if name == "branch" else f"{name} [{'rad' if name in ANGLES else 'm'}]", value)
+    return columns
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -252,6 +298,36 @@ class TradeOff:
         """Quality function at each limit, masked where there is no linkage; shape (n,)."""
         values = [np.nan if s is None else s.error for s in self.solutions]
         return np.ma.masked_invalid(np.array(values))
+
+    def to_csv(self, path: str | Path) -> Path:
+        """Write each limit with its best linkage, in the columns of `Synthesis.columns`; limits without one are left out."""
+        from ..io import write_csv
+
+        there = [(limit, s) for limit, s in zip(self.limit, self.solutions) if s is not None]
+        unit = "largest link [m]" if self.over == "size" else "least transmission angle [rad]"
+        columns = columns_of([s for _, s in there])
+        del columns["rank"]
+        return write_csv(path, {f"limit of {unit}": [limit for limit, _ in there], **columns})
+
+    def plot(self, *, title: str = "") -> Figure:
+        """Quality function and worst error over the limit."""
+        from .. import figures
+        from .report import error_unit, quality_name, quality_unit
+
+        task = next((s.task for s in self.solutions if s is not None), None)
+        if task is None:
+            raise InfeasibleError("there is no linkage at any of the limits: there is nothing to plot")
+        (factor, unit), (scale, length) = quality_unit(task), error_unit(task)
+        worst = np.array([np.nan if s is None else s.evaluation.worst for s in self.solutions])
+        size = self.over == "size"
+        name = fill(quality_name(task), 26)
+        error = factor * self.error.filled(np.nan)
+        return figures.plot_trade_off(
+            1e3 * self.limit if size else np.degrees(self.limit),
+            {f"{name} [{unit}]": error, f"worst error [{length}]": scale * worst},
+            limit_label="limit of the largest link [mm]" if size else "least transmission angle asked for [deg]",
+            title=title,
+        )
 
 
 def trade_off(

@@ -12,7 +12,6 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from analysis.fourier import FourierSeries
-from analysis.inputs import Inputs
 from analysis.simulate import simulate
 from analysis.synthesis import Linkage, SecondCrank, SliderMotion, Verdicts, judge, turn
 from linkwork.errors import AssemblyError, ParameterError
@@ -89,12 +88,14 @@ class TestAgainstThePlant:
 
 class TestSecondCrank:
     def test_the_rocker_pivot_goes_round_it(self) -> None:
-        pivot = SecondCrank(0.2, ratio=2.0, phase=0.4, series=FourierSeries(np.array([0.0, 0.1]), np.array([0.0, 0.2])))
-        linkage = replace(drawn(np.random.default_rng(1)), crank_length=0.1, pivot=pivot)
+        pivot = SecondCrank(
+            0.05, ratio=2.0, phase=0.4, series=FourierSeries(np.array([0.0, 0.1]), np.array([0.0, 0.2]))
+        )
+        linkage = replace(drawn(np.random.default_rng(1)), crank_length=0.05, pivot=pivot)
         for phi in (0.0, 1.3, 5.0):
             z = {name: complex(*place) for name, place in linkage.pins(phi).items()}
             psi = 2.0 * phi + 0.4 + 0.1 * cos(phi) + 0.2 * sin(phi)
-            assert z["D"] - z["E"] == pytest.approx(0.2 * np.exp(1j * (psi + linkage.ground_angle)), abs=1e-12)
+            assert z["D"] - z["E"] == pytest.approx(0.05 * np.exp(1j * (psi + linkage.ground_angle)), abs=1e-12)
         assert abs(complex(*linkage.path([0.0])[0]) - complex(*linkage.path([2.0 * pi])[0])) < 1e-12
 
     def test_the_plant_has_none(self) -> None:
@@ -113,7 +114,9 @@ class TestPlaceAndSize:
             linkage = replace(linkage, pivot=SecondCrank(0.05 * linkage.crank_length, ratio=-1.0, phase=0.2))
         phi = turn(12)
         np.testing.assert_allclose(linkage.scaled(3.0).path(phi), 3.0 * linkage.path(phi), atol=1e-12)
-        np.testing.assert_allclose(linkage.moved(1.0, -2.0).path(phi), linkage.path(phi) + [1.0, -2.0], atol=1e-12)
+        np.testing.assert_allclose(
+            linkage.moved(1.0, -2.0).path(phi), linkage.path(phi) + np.array([1.0, -2.0]), atol=1e-12
+        )
 
     def test_vectors_and_back(self) -> None:
         linkage = drawn(np.random.default_rng(2))
@@ -225,7 +228,7 @@ class TestVerdicts:
         assert not verdicts.sound
         assert not verdicts.full_turn
         assert "no full turn, circuit defect, branch defect" in str(verdicts)
-        assert verdicts.least_transmission == 0.0
+        assert verdicts.greatest_transmission == pi
 
     def test_a_partial_rotation_of_a_triple_rocker_is_sound(self) -> None:
         verdicts = self.judged(four_bar(1.0, 0.5, 0.6, 0.7), -0.5, 0.3, 1.0)
@@ -343,7 +346,7 @@ class TestFiveBar:
         p = linkage.to_five_bar(slider_stiffness=2e4, slider_mass=0.2)
         assert p.ground_inclination == 0.6
         assert p.slider_guide_angle == 0.3
-        run = simulate(p, Inputs(), initial=InitialState(crank_angle=0.3, crank_speed=8.0), duration=0.5)
+        run = simulate(p, initial=InitialState(crank_angle=0.3, crank_speed=8.0), stop_time=0.5)
         assert np.abs(run["energy.residual"]).max() < 1e-6 * run["energy.kinetic"].max()
 
     def test_gravity_pulls_down_in_the_plane(self) -> None:
@@ -387,5 +390,5 @@ class TestBadDimensions:
             replace(TestFiveBar.LINKAGE, **change)
 
     def test_where_it_cannot_be_joined_it_has_no_pins(self) -> None:
-        with pytest.raises(AssemblyError, match="crank rotation of 3.14159 rad"):
+        with pytest.raises(AssemblyError, match=r"crank rotation of 3\.14159 rad"):
             four_bar(*TYPES["triple-rocker"]).pins(pi)

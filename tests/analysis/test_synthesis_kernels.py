@@ -158,9 +158,8 @@ def test_many_linkages_at_once_are_one_after_the_other() -> None:
 
 
 class TestMatchWindows:
-    CURVE = np.exp(1j * np.linspace(0.0, 2.0 * pi, 128, endpoint=False)) * (
-        1.0 + 0.4 * np.cos(np.linspace(0.0, 4.0 * pi, 128, endpoint=False) + 0.3)
-    )
+    T = 2.0 * pi * np.arange(128) / 128
+    CURVE = np.exp(1j * T) * (1.0 + 0.4 * np.cos(2.0 * T + 0.3) + 0.1 * np.cos(3.0 * T))
 
     def piece(self, start: int, span: int, k: int = 32) -> NDArray[np.complex128]:
         """Points at even arc length on a piece of the curve."""

@@ -1,0 +1,161 @@
+"""What is told of a solution, in mm and degrees."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import degrees, isfinite, log10, pi, radians
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from .linkage import ANGLES, LINKS, SecondCrank, SliderMotion
+from .sensitivity import costs
+from .tasks import RockerFunction, Task, UntimedPath
+
+if TYPE_CHECKING:
+    from .solution import Solution, Verdicts
+
+#: Steps to which dimensions are rounded (m, rad): 0.1 mm, or a tenth of a small link, and 0.1 degrees.
+LENGTH_STEP, ANGLE_STEP = 1e-4, radians(0.1)
+#: What can be wrong with a solution, by the names in its verdicts.
+DEFECTS = ("circuit", "branch", "order")
+#: Dimensions of a moved pivot that are angles.
+PIVOT_ANGLES = ("guide_angle", "second_crank_phase")
+
+
+def quality_unit(task: Task) -> tuple[float, str]:
+    """Factor from SI, and unit, in which a task's quality function is told."""
+    return ((180.0 / pi) ** 2, "deg²") if isinstance(task, RockerFunction) else (1e6, "mm²")
+
+
+def error_unit(task: Task) -> tuple[float, str]:
+    """Factor from SI, and unit, in which a task's errors are told."""
+    return (180.0 / pi, "deg") if isinstance(task, RockerFunction) else (1e3, "mm")
+
+
+def quality_name(task: Task) -> str:
+    """What a task's quality function is."""
+    if isinstance(task, UntimedPath) and task.measure == "area":
+        return "area between the curves"
+    weighted = not np.all(np.asarray(getattr(task, "weights", 1.0)) == 1.0)
+    what = "errors of angle" if isinstance(task, RockerFunction) else "errors"
+    return f"sum of {'weighted ' if weighted else ''}squared {what}"
+
+
+def value_told(name: str, value: float) -> str:
+    """A dimension with its unit."""
+    if name in (*ANGLES, *PIVOT_ANGLES):
+        # + 0.0: no minus before a zero
+        return f"{round(degrees(value), 3) + 0.0:.3f} deg"
+    return f"{value * 1e3:.6g} mm"
+
+
+def headline(solution: Solution) -> str:
+    """Error, size and transmission angle, and what is wrong, in two or three lines."""
+    factor, unit = quality_unit(solution.task)
+    scale, length = error_unit(solution.task)
+    v = solution.verdicts
+    low, high = degrees(v.least_transmission), degrees(v.greatest_transmission)
+    defects = ", ".join(f"{name} defect" for name in DEFECTS if not getattr(v, name))
+    return (
+        f"{factor * solution.error:.4g} {unit}, worst {scale * solution.evaluation.worst:.3g} {length}\n"
+        f"largest link {1e3 * solution.linkage.largest_link:.4g} mm, {low:.0f} to {high:.0f} deg"
+        + (f"\n{defects}" if defects else "")
+    )
+
+
+def length_step(solution: Solution) -> float:
+    """Step to which lengths are rounded (m): 0.1 mm; of a linkage with a link below 1 mm a power of ten below a tenth of it."""
+    least = min(getattr(solution.linkage, name) for name in LINKS)
+    return min(LENGTH_STEP, float(10.0 ** np.floor(log10(0.1 * least) + 1e-9)))
+
+
+def table(rows: Sequence[Sequence[str]]) -> str:
+    """Rows in columns, the first to the left, the others to the right."""
+    widths = [max(len(row[k]) for row in rows) for k in range(len(rows[0]))]
+    lines = [
+        "  ".join(cell.ljust(w) if k == 0 else cell.rjust(w) for k, (cell, w) in enumerate(zip(row, widths)))
+        for row in rows
+    ]
+    return "\n".join(line.rstrip() for line in lines)
+
+
+def report(solution: Solution) -> str:
+    """Verdicts, dimensions with what an error in each costs, rounding, errors target by target."""
+    task, linkage, evaluation = solution.task, solution.linkage, solution.evaluation
+    factor, unit = quality_unit(task)
+    scale, length = error_unit(task)
+    parts = [
+        f"{solution.verdicts}\n"
+        f"{quality_name(task)}: {factor * solution.error:.6g} {unit}; "
+        f"rms error {scale * evaluation.rms:.4g} {length}, worst {scale * evaluation.worst:.4g} {length}\n"
+        f"assembly: C lies to the {'left' if linkage.branch > 0 else 'right'} of B -> D; "
+        f"largest link {1e3 * linkage.largest_link:.6g} mm"
+    ]
+    if isinstance(linkage.pivot, SliderMotion):
+        parts[0] += f"\nslider at D: stroke {1e3 * linkage.pivot.stroke:.6g} mm"
+    elif isinstance(linkage.pivot, SecondCrank):
+        parts[0] += f"\nsecond crank at D: {linkage.pivot.ratio:g} turns for one of the first"
+    parts += [table(dimension_rows(solution)), rounding_told(solution)]
+    parts.append(table(_stations(solution)))
+    return "\n\n".join(parts) + "\n"
+
+
+def dimension_rows(solution: Solution) -> list[tuple[str, str, str, str, str]]:
+    """Dimensions with their values, and what it does if one is off by 0.1 mm or 0.1 degrees; a heading first."""
+    factor, unit = quality_unit(solution.task)
+    scale, length = error_unit(solution.task)
+    step = length_step(solution)
+    dear = costs(solution, step, ANGLE_STEP)
+    rows = [("dimension", "value", "off by", "moves the output by (rms)", "error grows by")]
+    # where the crank's rotation is free, so is where it starts
+    left_out = ("crank_phase",) if isinstance(solution.task, UntimedPath) else ()
+    for s in solution.sensitivities():
+        if s.name in left_out:
+            continue
+        if s.name not in dear:
+            rows.append((s.name, value_told(s.name, s.value), "", "", ""))
+            continue
+        off = ANGLE_STEP if s.name in ANGLES else step
+        cost = factor * max(dear[s.name], 0.0)
+        told = f"{cost:.3g} {unit}" if isfinite(cost) else "no assembly"
+        moved = f"{scale * off * s.shift:.3g} {length}"
+        rows.append((s.name, value_told(s.name, s.value), value_told(s.name, off), moved, told))
+    mounted = solution.linkage.output_angle
+    if mounted:
+        cost = f"{factor * dear['output_angle']:.3g} {unit}"
+        rows.append(
+            ("output_angle", value_told("output_angle", mounted), value_told("output_angle", ANGLE_STEP), "", cost)
+        )
+    return rows
+
+
+def rounding_told(solution: Solution) -> str:
+    """What rounding costs."""
+    factor, unit = quality_unit(solution.task)
+    step = length_step(solution)
+    rounding = solution.rounded(step, ANGLE_STEP)
+    return (
+        f"rounded to {1e3 * step:g} mm and {degrees(ANGLE_STEP):g} deg: {factor * rounding.error:.6g} {unit}; "
+        f"mean over dimensions that are off by up to half as much: {factor * rounding.expected:.6g} {unit}"
+    )
+
+
+def degrees_told(verdicts: Verdicts) -> str:
+    """Range of the transmission angle."""
+    return f"{degrees(verdicts.least_transmission):.1f} to {degrees(verdicts.greatest_transmission):.1f}"
+
+
+def limit_told(over: str, limit: float) -> str:
+    """A limit of a trade-off with its unit."""
+    return f"{1e3 * limit:.6g} mm" if over == "size" else f"{degrees(limit):.4g} deg"
+
+
+def _stations(solution: Solution) -> list[list[str]]:
+    """Errors target by target, in mm and degrees."""
+    columns = solution.columns()
+    heads = [name.replace("[m]", "[mm]").replace("[rad]", "[deg]") for name in columns]
+    factors = [1e3 if name.endswith("[m]") else 180.0 / pi for name in columns]
+    values = np.column_stack([factor * column for factor, column in zip(factors, columns.values())])
+    rows = [[str(k), *(f"{v:.4f}" for v in row)] for k, row in enumerate(values)]
+    return [["target", *heads], *rows]

@@ -1,0 +1,474 @@
+"""The nonlinear program: its optima by finite differences, every kind of constraint in its results, least squares beside it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from math import radians
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy.optimize import nnls
+
+from analysis.fourier import FourierSeries
+from analysis.synthesis import (
+    USUAL,
+    Assembly,
+    CrankUnknown,
+    FullTurn,
+    Grashof,
+    InfeasibleError,
+    LargestLink,
+    LeastTransmission,
+    Linkage,
+    Motion,
+    PivotRegion,
+    Require,
+    RockerFunction,
+    SecondCrank,
+    SliderMotion,
+    SliderUnknown,
+    Solution,
+    TargetPath,
+    TimedPath,
+    UntimedPath,
+    evaluate,
+    synthesize,
+    turn,
+)
+from analysis.synthesis.constraints import Constraint, limits_of
+from analysis.synthesis.polish import fit_least_squares, polish, quality_of, residuals
+from analysis.synthesis.program import Program, Start, linkage_of, start_of
+from analysis.synthesis.scan import scan
+from analysis.synthesis.tasks import Normal, Task, normal_form
+from linkwork.errors import InputError, ParameterError
+from tests.linkages import drawn
+
+pytest.importorskip("casadi")
+FloatArray = NDArray[np.float64]
+
+
+def ellipse(n: int = 24) -> FloatArray:
+    phi = turn(n)
+    return np.column_stack([0.20 + 0.10 * np.cos(phi), 0.15 + 0.05 * np.sin(phi)])
+
+
+TASK = TimedPath(points=ellipse())
+#: Four-bars within which the target, 0.22 m across, can be traced.
+SMALL = LargestLink(length=0.5)
+
+
+def best(*constraints: Constraint, task: Task = TASK, **more: Any) -> Solution:
+    return synthesize(task, constraints=constraints, **{"candidates": 1 << 13, "starts": 4} | more).best
+
+
+class TestOptimum:
+    def stationary(self, program: Program, normal: Normal, start: Start, *, rotation: bool) -> float:
+        """What is left of the gradient of the quality by finite differences, outside the cone of the active constraints.
+
+        Karush, Kuhn and Tucker: -grad f = sum of multipliers times the gradients of what is active, the multipliers of
+        inequalities none below zero. Least squares with such multipliers; as a share of the gradient's parts.
+        """
+        z = start.q.copy() if not rotation else np.concatenate([start.q, start.rotation])  # type: ignore[list-item]
+
+        def quality(x: FloatArray) -> float:
+            at = Start(q=x[:11], branch=start.branch, rotation=x[11:] if rotation else None)
+            return quality_of(normal, at)
+
+        limits = program.limits
+
+        def inequalities(x: FloatArray) -> FloatArray:
+            l1, l2, l3, l4 = x[2:6]
+            product = 2.0 * l3 * l4 * math.cos(limits.transmission)  # type: ignore[arg-type]
+            return np.array(
+                [
+                    l3 * l3 + l4 * l4 - (l1 - l2) ** 2 - product,
+                    (l1 + l2) ** 2 - l3 * l3 - l4 * l4 - product,
+                    *(x[:11] - limits.high),
+                    *(limits.low - x[:11]),
+                ]
+            )
+
+        def gradient(f: Any) -> FloatArray:
+            h = 1e-6
+            columns = [(f(z + h * e) - f(z - h * e)) / (2.0 * h) for e in np.eye(len(z))]
+            return np.array(columns)
+
+        slope = gradient(quality)
+        values = inequalities(z)
+        active = values > -1e-5
+        assert (values < 1e-7).all()
+        columns = gradient(inequalities)[:, active]
+        multipliers, left = nnls(columns, -slope) if active.any() else (None, float(np.linalg.norm(slope)))
+        scale = float(np.linalg.norm(columns * multipliers, axis=0).max()) if active.any() else 0.0
+        return float(left) / max(scale, 1e-3)
+
+    def test_of_a_timed_path(self) -> None:
+        normal = normal_form(TASK)
+        limits = limits_of(TASK, normal, None, (SMALL, LeastTransmission(angle=radians(60))))
+        program = Program(normal, limits)
+        for start in scan(normal, limits, seed=0, candidates=4096, starts=4):
+            answer = program.solve(start)
+            assert answer.feasible
+            assert answer.converged
+            assert answer.start.quality == pytest.approx(quality_of(normal, answer.start), rel=1e-9)
+            assert answer.start.quality < start.quality
+            assert self.stationary(program, normal, answer.start, rotation=False) < 1e-4
+
+    def test_of_poses_without_rotations(self) -> None:
+        known = drawn(np.random.default_rng(3), least=0.8)
+        rotation = np.linspace(0.0, 3.0, 8)
+        noise = np.random.default_rng(0).normal(scale=0.02, size=(8, 2))
+        task = Motion(points=known.path(rotation) + noise, angle=known.coupler_angle(rotation))
+        normal = normal_form(task)
+        limits = limits_of(task, normal, None, USUAL)
+        program = Program(normal, limits)
+        answer = program.solve(start_of(known, normal, rotation=rotation))
+        assert answer.feasible
+        assert answer.converged
+        assert np.all(np.diff(answer.start.rotation) > 0.01)
+        assert self.stationary(program, normal, answer.start, rotation=True) < 1e-4
+
+    def test_of_a_rocker_function(self) -> None:
+        angle = 1.2 + 0.5 * np.sin(turn(24)) + 0.1 * np.cos(2.0 * turn(24))
+        task = RockerFunction(angle=angle)
+        normal = normal_form(task)
+        limits = limits_of(task, normal, {"ground_length": (0.1, 0.1)}, USUAL)
+        program = Program(normal, limits)
+        answer = program.solve(scan(normal, limits, seed=0, candidates=4096, starts=1)[0])
+        assert answer.feasible
+        assert self.stationary(program, normal, answer.start, rotation=False) < 1e-4
+
+
+class TestLeastSquares:
+    def test_it_agrees_with_ipopt_where_bounds_are_all_that_is_asked(self) -> None:
+        normal = normal_form(TASK)
+        limits = limits_of(TASK, normal, {"crank_length": (0.02, 0.06), "ground_length": (0.1, 0.4)}, ())
+        assert limits.bounds_only
+        known = Linkage(
+            pivot_x=0.2, pivot_y=-0.1, ground_length=0.3, crank_length=0.05, coupler_length=0.35, rocker_length=0.3,
+            point_distance=0.3, ground_angle=0.2, point_angle=0.9, crank_phase=0.4,
+        )  # fmt: skip
+        program = Program(normal, limits)
+        qualities = []
+        for start in scan(normal, limits, seed=0, candidates=8192, starts=6):
+            squares = fit_least_squares(normal, limits, start)
+            ipopt = program.solve(squares.start)
+            assert squares.feasible
+            assert ipopt.start.quality == pytest.approx(squares.start.quality, rel=1e-5)
+            qualities.append(squares.start.quality)
+        assert min(qualities) < quality_of(normal, start_of(known, normal))
+
+    @pytest.mark.parametrize("kind", ["path", "rocker", "motion"])
+    def test_residuals_have_the_jacobian_that_differences_give(self, kind: str) -> None:
+        random = np.random.default_rng(1)
+        known = drawn(random, least=0.6)
+        rotation = np.linspace(0.0, 4.0, 6)
+        tasks: dict[str, Task] = {
+            "path": TimedPath(points=known.path(rotation), rotation=rotation, weights=[1, 2, 3, 4, 5, 6]),
+            "rocker": RockerFunction(angle=known.rocker_angle(rotation), rotation=rotation, mounting=True),
+            "motion": Motion(
+                points=known.path(rotation),
+                angle=known.coupler_angle(rotation),
+                rotation=rotation,
+                weights=[1, 2, 3, 4, 5, 6],
+            ),
+        }
+        normal = normal_form(tasks[kind])
+        q = start_of(known, normal).q
+        residual, jacobian, rate = residuals(normal, known.branch, q, rotation)
+        assert np.abs(residual).max() < 1e-12
+        q = q + 0.01 * random.normal(size=11)
+        residual, jacobian, rate = residuals(normal, known.branch, q, rotation)
+        h = 1e-6
+        for k, e in enumerate(np.eye(11)):
+            ends = [residuals(normal, known.branch, q + step * e, rotation)[0] for step in (h, -h)]
+            np.testing.assert_allclose(jacobian[:, k], (ends[0] - ends[1]) / (2.0 * h), atol=1e-8)
+        ends = [residuals(normal, known.branch, q, rotation + step)[0] for step in (h, -h)]
+        np.testing.assert_allclose(rate, (ends[0] - ends[1]) / (2.0 * h), atol=1e-8)
+
+    def test_without_inequalities_casadi_is_not_needed(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        from analysis import symbolic
+
+        def missing() -> None:
+            raise symbolic.MissingLibraryError("CasADi is not installed")
+
+        monkeypatch.setattr(symbolic, "library", missing)
+        solution = best()
+        assert solution.error < 2e-5
+        with pytest.raises(symbolic.MissingLibraryError):
+            best(*USUAL)
+
+
+class TestBounds:
+    @pytest.mark.parametrize(
+        ("name", "low", "high"),
+        [
+            ("pivot_x", 0.30, 0.32),
+            ("pivot_y", -0.05, -0.04),
+            ("ground_length", 0.20, 0.21),
+            ("crank_length", 0.055, 0.06),
+            ("coupler_length", 0.2, 0.22),
+            ("rocker_length", 0.3, 0.31),
+            ("point_distance", 0.1, 0.15),
+            ("ground_angle", 1.0, 1.1),
+            ("crank_phase", -0.5, -0.4),
+            ("point_angle", -1.0, -0.9),
+        ],
+    )
+    def test_each_holds(self, name: str, low: float, high: float) -> None:
+        solution = best(*USUAL, bounds={name: (low, high)})
+        assert low - 1e-9 <= getattr(solution.linkage, name) <= high + 1e-9
+
+    def test_equal_ones_fix(self) -> None:
+        for constraints in ((), USUAL):
+            solution = best(*constraints, bounds={"crank_length": (0.05, 0.05), "pivot_x": (0.25, 0.25)})
+            assert solution.linkage.crank_length == pytest.approx(0.05, abs=1e-12)
+            assert solution.linkage.pivot_x == pytest.approx(0.25, abs=1e-12)
+
+    def test_the_size_cap_counts_the_coupler_point_too(self) -> None:
+        solution = best(*USUAL, LargestLink(length=0.2))
+        assert max(solution.linkage.largest_link, solution.linkage.point_distance) <= 0.2 + 1e-9
+        assert solution.error > best(*USUAL, LargestLink(length=0.5)).error
+
+
+L_SHAPE = np.array([[0.0, -0.3], [0.6, -0.3], [0.6, -0.2], [0.1, -0.2], [0.1, 0.3], [0.0, 0.3]])
+
+
+class TestConstraints:
+    @pytest.mark.parametrize("pivot", ["A", "D"])
+    @pytest.mark.parametrize("polygon", [np.array([[0.3, -0.1], [0.5, -0.1], [0.4, 0.05]]), L_SHAPE, L_SHAPE[::-1]])
+    def test_a_pivot_stays_in_its_region(self, pivot: Any, polygon: FloatArray) -> None:
+        from shapely import Point, Polygon
+
+        solution = best(*USUAL, SMALL, PivotRegion(pivot=pivot, polygon=polygon))
+        place = solution.linkage.pins(0.0)[pivot]
+        assert Polygon(polygon).distance(Point(place)) < 1e-7
+
+    def test_both_pivots_in_regions_of_their_own(self) -> None:
+        from shapely import Point, Polygon
+
+        square = np.array([[0.2, -0.35], [0.5, -0.35], [0.5, 0.0], [0.2, 0.0]])
+        solution = best(*USUAL, PivotRegion(pivot="A", polygon=square), PivotRegion(pivot="D", polygon=L_SHAPE), SMALL)
+        pins = solution.linkage.pins(0.0)
+        assert Polygon(square).distance(Point(pins["A"])) < 1e-7
+        assert Polygon(L_SHAPE).distance(Point(pins["D"])) < 1e-7
+
+    @pytest.mark.parametrize("type_", ["crank-rocker", "drag-link", "double-rocker", "rocker-crank", "triple-rocker"])
+    def test_every_grashof_type_can_be_had(self, type_: Any) -> None:
+        # an arc, half a turn of the crank at most: what each type can do
+        t = np.linspace(0.0, 1.2, 9)
+        task = TimedPath(points=np.column_stack([np.cos(t), np.sin(t) + 0.1 * t * t]), rotation=t)
+        solution = best(Grashof(type=type_), task=task)
+        assert solution.verdicts.grashof in (type_, "change-point")
+        lengths = np.sort(
+            [getattr(solution.linkage, f"{name}_length") for name in ("ground", "crank", "coupler", "rocker")]
+        )
+        excess = lengths[0] + lengths[3] - lengths[1] - lengths[2]
+        assert excess >= -1e-6 if type_ == "triple-rocker" else excess <= 1e-6
+        assert solution.evaluation.worst < 0.05
+
+    def test_least_transmission_over_a_turn(self) -> None:
+        for angle in (20.0, 40.0, 65.0):
+            solution = best(SMALL, LeastTransmission(angle=radians(angle)), bounds={"rocker_length": (0.01, 0.12)})
+            assert solution.linkage.least_transmission >= radians(angle) - 1e-7
+            assert solution.verdicts.full_turn
+
+    def test_least_transmission_over_the_task_alone(self) -> None:
+        rotation = np.linspace(0.0, 1.2, 8)
+        task = TimedPath(points=np.column_stack([rotation, 0.2 * rotation**2]), rotation=rotation)
+        solution = best(LeastTransmission(angle=radians(50), over="task"), Grashof(type="triple-rocker"), task=task)
+        assert solution.linkage.transmission(rotation).min() >= radians(50) - 1e-6
+        assert not solution.verdicts.full_turn
+        assert solution.linkage.least_transmission == 0.0
+        assert solution.verdicts.sound
+
+    def test_full_turn(self) -> None:
+        solution = best(FullTurn(), SMALL)
+        assert solution.verdicts.full_turn
+        assert solution.verdicts.sound
+
+    @pytest.mark.parametrize("branch", [1, -1])
+    def test_assembly(self, branch: int) -> None:
+        assert best(*USUAL, Assembly(branch=branch)).linkage.branch == branch
+
+    def test_required_inequality_in_functions_of_math(self) -> None:
+        # the height of D above A
+        height = Require(function=lambda p: 0.1 - p.ground_length * math.sin(p.ground_angle), name="height of D")
+        solution = best(*USUAL, SMALL, height)
+        assert solution.linkage.pins(0.0)["D"][1] - solution.linkage.pivot_y >= 0.1 - 1e-8
+        from math import sin
+
+        again = Require(function=lambda p: 0.1 - p.ground_length * sin(p.ground_angle))
+        assert best(*USUAL, SMALL, again).linkage.values() == solution.linkage.values()
+
+    def test_required_equality_in_functions_of_numpy(self) -> None:
+        # the coupler point on the coupler's own line, in SI and absolute places
+        on_line = Require(function=lambda p: np.sin(p.point_angle), equal=True, name="point on the coupler")
+        at = Require(function=lambda p: p.pivot_x - p.pivot_y - 0.3, equal=True, scale=0.1)
+        solution = best(*USUAL, SMALL, on_line, at)
+        assert abs(math.sin(solution.linkage.point_angle)) < 1e-6
+        assert solution.linkage.pivot_x - solution.linkage.pivot_y == pytest.approx(0.3, abs=1e-7)
+
+    def test_functions_of_the_users_own_are_traced_through(self) -> None:
+        def height(p: Any) -> Any:
+            return sum([p.ground_length * np.sin(x) for x in (p.ground_angle,)])
+
+        bound = Require(function=lambda p: 0.1 - height(p))
+        solution = best(*USUAL, SMALL, bound)
+        assert solution.linkage.pins(0.0)["D"][1] - solution.linkage.pivot_y >= 0.1 - 1e-8
+
+    def test_what_loses_the_symbol_is_refused_by_name(self) -> None:
+        # float() of a symbol is NaN, and so would the constraint be
+        for function in (lambda p: float(p.pivot_x), lambda p: 1.0, lambda p: math.gamma(p.crank_length)):
+            with pytest.raises(InputError, match="my rule cannot be traced"):
+                best(*USUAL, Require(function=function, name="my rule"))
+
+    def test_a_function_that_branches_is_refused_by_name(self) -> None:
+        bad = Require(function=lambda p: p.pivot_x if p.pivot_x > 0 else 0.0, name="my rule")
+        with pytest.raises(InputError, match="my rule cannot be traced"):
+            best(*USUAL, bad)
+
+    def test_what_cannot_be_is_said_by_name(self) -> None:
+        impossible = Require(function=lambda p: 2.0 - math.cos(p.point_angle), name="a cosine of two")
+        with pytest.raises(InfeasibleError, match=r"searches the nearest violates the a cosine of two by 1"):
+            best(*USUAL, impossible)
+
+
+class TestWeights:
+    def test_a_heavy_point_is_met_better(self) -> None:
+        plain = best(*USUAL, LargestLink(length=0.2))
+        weights = np.ones(24)
+        weights[7] = 1000.0
+        heavy = best(*USUAL, LargestLink(length=0.2), weights=weights)
+        assert heavy.evaluation.errors[7] < 0.2 * plain.evaluation.errors[7]
+        assert heavy.error == pytest.approx(float(weights @ heavy.evaluation.errors**2))
+        same = best(*USUAL, LargestLink(length=0.2), task=TimedPath(points=ellipse(), weights=weights))
+        assert same.error == heavy.error
+
+    def test_a_weight_of_zero_leaves_a_point_out(self) -> None:
+        points = ellipse()
+        points[5] += 0.05
+        weights = np.ones(24)
+        weights[5] = 0.0
+        solution = best(*USUAL, SMALL, task=TimedPath(points=points, weights=weights))
+        assert solution.evaluation.errors[5] > 0.05
+        assert np.delete(solution.evaluation.errors, 5).max() < 0.01
+
+
+class TestMovedPivot:
+    @pytest.mark.parametrize(
+        "unknown", [SliderUnknown(harmonics=2), CrankUnknown(ratio=2, length=(0.01, 0.05), harmonics=1)]
+    )
+    def test_starts_and_linkages_are_each_others_inverse(self, unknown: Any) -> None:
+        pivot: SliderMotion | SecondCrank
+        if isinstance(unknown, SliderUnknown):
+            pivot = SliderMotion(FourierSeries(np.array([0.1, 0.2, 0.3]), np.array([0.0, 0.4, 0.5])), 0.7)
+        else:
+            pivot = SecondCrank(0.02, 2, 0.3, FourierSeries(np.array([0.0, 0.2]), np.array([0.0, 0.4])))
+        linkage = Linkage(ground_length=0.4, crank_length=0.1, coupler_length=0.35, rocker_length=0.3, pivot=pivot)
+        normal = normal_form(TASK)
+        again = linkage_of(start_of(linkage, normal, unknown), normal, unknown)
+        np.testing.assert_allclose(again.displacement(turn(9)), linkage.displacement(turn(9)), atol=1e-14)
+        assert again.values() == pytest.approx(linkage.values())
+
+    def test_the_slider_keeps_stroke_speed_and_acceleration(self) -> None:
+        fixed = best(*USUAL, LargestLink(length=0.2))
+        few: dict[str, Any] = {"starts": 1, "candidates": 64, "guesses": [fixed]}
+        free = best(*USUAL, LargestLink(length=0.2), pivot=SliderUnknown(harmonics=2), **few)
+        bounded = best(
+            *USUAL,
+            LargestLink(length=0.2),
+            pivot=SliderUnknown(harmonics=2, stroke=0.01, speed=0.005, acceleration=0.01, guide_angle=(0.2, 0.4)),
+            **few,
+        )
+        assert free.error < bounded.error < fixed.error
+        pivot = bounded.linkage.pivot
+        assert isinstance(pivot, SliderMotion)
+        phi = turn(1440)
+        assert 0.2 - 1e-9 <= pivot.guide_angle <= 0.4 + 1e-9
+        # held at 72 places
+        assert pivot.stroke <= 0.01 * 1.01
+        assert np.abs(pivot.series.derivative()(phi)).max() <= 0.005 * 1.01
+        assert np.abs(pivot.series.derivative().derivative()(phi)).max() <= 0.01 * 1.01
+        assert bounded.linkage.least_transmission >= radians(40) - 1e-3
+
+    def test_program_and_linkage_agree_on_the_error(self) -> None:
+        for unknown in (
+            SliderUnknown(harmonics=1),
+            CrankUnknown(ratio=1, length=(0.001, 0.05), harmonics=1, speed=0.5),
+        ):
+            solution = best(*USUAL, LargestLink(length=0.3), pivot=unknown, starts=1)
+            normal = normal_form(TASK)
+            limits = limits_of(TASK, normal, None, (*USUAL, LargestLink(length=0.3)))
+            again = Program(normal, limits, unknown).solve(start_of(solution.linkage, normal, unknown))
+            assert again.start.quality * normal.unit**2 == pytest.approx(solution.error, rel=1e-3)
+
+
+class TestUntimed:
+    def test_area_and_distance_come_to_nothing_on_a_known_curve(self) -> None:
+        known = drawn(np.random.default_rng(8), least=0.9)
+        path = TargetPath(points=known.path(turn(180)), closed=True)
+        for measure in ("area", "distance"):
+            task = UntimedPath(path=path, measure=measure, samples=48)  # type: ignore[arg-type]
+            solution = best(*USUAL, task=task)
+            normal = normal_form(task)
+            assert solution.error < 5e-3 * normal.unit**2
+            assert solution.evaluation.worst < 5e-3 * normal.unit
+            assert solution.verdicts.sound
+
+    def test_the_area_is_what_evaluation_finds(self) -> None:
+        phi = turn(180)
+        task = UntimedPath(path=TargetPath(points=np.column_stack([np.cos(phi), 0.6 * np.sin(phi)]), closed=True))
+        normal = normal_form(task)
+        limits = limits_of(task, normal, None, (LeastTransmission(), LargestLink(length=1.5)))
+        done = polish(normal, limits, scan(normal, limits, seed=0, candidates=4096, starts=3))
+        answer = done.kept[0]
+        found = evaluate(task, linkage_of(answer.start, normal), answer.start.rotation)
+        assert answer.start.quality * normal.unit**2 == pytest.approx(found.error, rel=0.1)
+
+    def test_program_needs_rotations_to_start_from(self) -> None:
+        task = Motion(points=ellipse(6), angle=turn(6))
+        normal = normal_form(task)
+        limits = limits_of(task, normal, None, USUAL)
+        start = start_of(drawn(np.random.default_rng(0)), normal)
+        with pytest.raises(InputError, match="needs the crank rotations of its stations"):
+            Program(normal, limits).solve(start)
+        with pytest.raises(InputError, match="needs the crank rotations of its stations"):
+            fit_least_squares(normal, limits, start)
+
+
+class TestBadUnknowns:
+    @pytest.mark.parametrize(
+        ("make", "message"),
+        [
+            (lambda: SliderUnknown(harmonics=-1), "harmonics is -1"),
+            (lambda: SliderUnknown(harmonics=1, guide_angle=(1.0, 0.0)), "bounds of guide_angle"),
+            (lambda: SliderUnknown(harmonics=1, stroke=0.0), "greatest stroke is 0.0"),
+            (lambda: SliderUnknown(harmonics=1, smoothness=-1.0), "smoothness is -1.0"),
+            (lambda: CrankUnknown(ratio=1, length=(0.2, 0.1)), "bounds of the second crank"),
+            (lambda: LeastTransmission(angle=2.0), "least transmission angle is 2.0"),
+            (lambda: LeastTransmission(over="way"), "over is 'way'"),
+            (lambda: Grashof(type="rocker"), "Grashof type is 'rocker'"),
+            (lambda: LargestLink(length=0.0), "largest link is 0.0"),
+            (lambda: Assembly(branch=2), "branch is 2"),
+            (lambda: PivotRegion(pivot="B", polygon=L_SHAPE), "pivot is 'B'"),
+        ],
+    )
+    def test_are_named(self, make: Any, message: str) -> None:
+        with pytest.raises(ParameterError, match=message):
+            make()
+
+    @pytest.mark.parametrize(
+        ("polygon", "message"),
+        [
+            ([[0, 0], [1, 1]], "at least 3 finite corners"),
+            ([[0, 0], [1, 1], [1, 0], [0, 1]], "crosses itself or has no area"),
+            ([[0, 0], [1, 1], [2, 2]], "crosses itself or has no area"),
+        ],
+    )
+    def test_regions(self, polygon: Sequence[Sequence[float]], message: str) -> None:
+        with pytest.raises(InputError, match=message):
+            PivotRegion(pivot="A", polygon=polygon)
