@@ -49,8 +49,8 @@ def slider_motion(
     task : Task
         Of `analysis.synthesis`; weights are the task's own.
     linkage : Linkage or Solution
-        Its dimensions are kept, but for those that ``bounds`` sets free. For an open path it must be a solution, which brings the
-        crank rotations of the stations.
+        Its dimensions are kept, but for those that ``bounds`` sets free. For an open path it must be a solution, which brings
+        the crank rotations of the stations.
     unknown : SliderUnknown or CrankUnknown
         Harmonics, and bounds of guide angle, stroke, speed and acceleration.
     bounds : mapping, optional
@@ -159,7 +159,7 @@ def smoothness_curve(
     *,
     bounds: Mapping[str, tuple[float, float]] | None = None,
     constraints: Sequence[Constraint] = (FullTurn(),),
-    starts: int = 12,
+    starts: int = 24,
     seed: int = 0,
     n_jobs: int = 1,
     progress: bool = False,

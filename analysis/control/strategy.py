@@ -132,6 +132,12 @@ def simplest_mechanism(
         raise InputError(f"criterion {criterion!r}: it must be 'error' or 'worst'")
     if harmonics < 1:
         raise InputError(f"{harmonics} harmonics: there must be at least one")
+    for name, value in (("stroke", stroke), ("length of the second crank", second_crank)):
+        if value is not None and not (isfinite(value) and value > 0.0):
+            raise InputError(f"greatest {name} is {value} m: it must be a finite number greater than zero")
+    for ratio in ratios:
+        if ratio != int(ratio):
+            raise InputError(f"ratio {ratio} of the gears: it must be a whole number, or the path does not close")
     search = _Search(task, tolerance, criterion, n_jobs, progress)
     four_bar = search.step(
         "four-bar",

@@ -8,18 +8,22 @@ from __future__ import annotations
 from collections.abc import Mapping
 from functools import cache
 from math import degrees, inf, pi
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from linkwork.five_bar.published import CM_PER_METRE
 
-from ..figures import COLOURS, Curve, Panel
+from ..figures import COLOURS, Curve, Panel, plot_curves
 from ..synthesis import LargestLink, Linkage, RockerFunction, Solution, evaluate, synthesize, trade_off, turn
 from ..synthesis.linkage import LINKS
 from ..synthesis.published import PROBLEMS
 from ..synthesis.tasks import normal_form
-from .study import BALANCE, REFERENCE, THESIS, StudyResult, Verdict, at_least, at_most, near
+from .study import BALANCE, REFERENCE, THESIS, StudyResult, Verdict, at_least, at_most, near, padded
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 FloatArray = NDArray[np.float64]
 
@@ -185,6 +189,50 @@ def distance_panel(result: StudyResult, *, timed: bool) -> Panel:
         y_range=None if timed else (1e-4, 1.0),
         x_ticks=range(0, 361, 90),
     )
+
+
+def ellipse_result(
+    number: str,
+    name: str,
+    claim: str,
+    stated: tuple[float, float],
+    reference: tuple[float, float],
+    more: tuple[Verdict, ...] = (),
+) -> StudyResult:
+    """A problem of an ellipse: curves, linkages and distances of the printed linkage and ours.
+
+    Parameters
+    ----------
+    number, name : str
+        Of the figure and of the problem.
+    claim : str
+    stated, reference : (float, float)
+        Error as printed, and as the printed linkage evaluates, each with its tolerance (cm2).
+    more : tuple of Verdict
+        Between those on the errors and those on our linkage.
+    """
+    return StudyResult(
+        number=number,
+        claim=claim,
+        assignment=ASSIGNED,
+        columns=padded(path_columns(name) | distance_columns(name)),
+        verdicts=(*error_verdicts(name, *stated, *reference), *more, *sound_verdicts(name)),
+    )
+
+
+def draw_timed(result: StudyResult) -> Figure:
+    """The target and both curves, their distances over the crank's rotation, and the linkages."""
+    return _draw(result, timed=True)
+
+
+def draw_untimed(result: StudyResult) -> Figure:
+    """The target and both curves, their distances round the target, and the linkages."""
+    return _draw(result, timed=False)
+
+
+def _draw(result: StudyResult, *, timed: bool) -> Figure:
+    panels = [curves_panel(result, marks=timed), distance_panel(result, timed=timed), linkages_panel(result)]
+    return plot_curves(panels, title=result.heading, columns=3, size=(3.9, 3.6))
 
 
 # Rocker functions

@@ -11,29 +11,15 @@ from __future__ import annotations
 import sys
 from itertools import product
 from math import radians
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from linkwork.five_bar.published import CM_PER_METRE
 
-from ..figures import plot_curves
 from ..synthesis import Linkage, evaluate
 from ..synthesis.published import PROBLEMS
-from ._chapter_6 import (
-    ASSIGNED,
-    curves_panel,
-    distance_columns,
-    distance_panel,
-    error_verdicts,
-    linkages_panel,
-    path_columns,
-    sound_verdicts,
-)
-from .study import REFERENCE, Study, StudyResult, near, padded
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+from ._chapter_6 import draw_timed, ellipse_result
+from .study import REFERENCE, Study, StudyResult, near
 
 NUMBER = "6.4"
 PROBLEM = "ellipse-a"
@@ -54,27 +40,20 @@ def over_rounding() -> tuple[float, float]:
 def compute() -> StudyResult:
     """Curves, linkages and distances of the printed linkage and ours."""
     least, greatest = over_rounding()
-    return StudyResult(
-        number=NUMBER,
-        claim="A four-bar traces ellipse (a) at 72 crank angles with a sum of squared distances of 0.889 cm2.",
-        assignment=ASSIGNED,
-        columns=padded(path_columns(PROBLEM) | distance_columns(PROBLEM)),
-        verdicts=(
-            *error_verdicts(PROBLEM, 0.889, 5e-4, 5.64, 5e-3),
-            *sound_verdicts(PROBLEM),
+    return ellipse_result(
+        NUMBER,
+        PROBLEM,
+        "A four-bar traces ellipse (a) at 72 crank angles with a sum of squared distances of 0.889 cm2.",
+        stated=(0.889, 5e-4),
+        reference=(5.64, 5e-3),
+        more=(
             near("the same, least over the rounding of the printed digits", REFERENCE, 4.86, least, 5e-3, "cm2"),
             near("the same, greatest over the rounding of the printed digits", REFERENCE, 6.54, greatest, 5e-3, "cm2"),
         ),
     )
 
 
-def draw(result: StudyResult) -> Figure:
-    """The target and both curves, their distances, and the linkages."""
-    panels = [curves_panel(result, marks=True), distance_panel(result, timed=True), linkages_panel(result)]
-    return plot_curves(panels, title=result.heading, columns=3, size=(3.9, 3.6))
-
-
-STUDY = Study(NUMBER, compute, draw)
+STUDY = Study(NUMBER, compute, draw_timed)
 main = STUDY.main
 
 if __name__ == "__main__":

@@ -14,7 +14,7 @@ and compared with the error over a dense range of positions, and with `analysis.
 from __future__ import annotations
 
 import sys
-from math import degrees, hypot, pi, radians
+from math import hypot, pi, radians
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -23,7 +23,6 @@ from linkwork.five_bar.published import CM_PER_METRE
 
 from ..control import variational_motion
 from ..figures import COLOURS, Curve, Panel, plot_curves
-from ..synthesis import Linkage
 from ..synthesis.kernels import coupler_path
 from ..synthesis.published import PROBLEMS
 from ._chapter_7 import ASSIGNED, FloatArray
@@ -39,7 +38,8 @@ ROTATION = 60.0
 #: Direction from the crank pin of a target that the coupler cannot point at, from its own at the ellipse's (deg).
 TURNED = 25.0
 ASSEMBLIES = (("C left of BD", 1), ("C right of BD", -1))
-SAMPLES = 200_001
+SAMPLES = 100_001
+KINDS = ("coupler at the target", "cos th4 = 0, sin th4 = +1", "cos th4 = 0, sin th4 = -1")
 
 
 class Stationary(NamedTuple):
@@ -62,7 +62,10 @@ def targets() -> dict[str, complex]:
     points = np.asarray(PROBLEMS["ellipse-a"].task.points)  # type: ignore[union-attr]
     on_ellipse = complex(*points[round(ROTATION / 360.0 * len(points))])
     _, b = pins()
-    return {"a target of the ellipse": on_ellipse, "one out of reach": b + (on_ellipse - b) * np.exp(1j * radians(TURNED))}
+    return {
+        "a target of the ellipse": on_ellipse,
+        "one out of reach": b + (on_ellipse - b) * np.exp(1j * radians(TURNED)),
+    }
 
 
 def stationary(target: complex) -> list[Stationary]:
@@ -75,11 +78,10 @@ def stationary(target: complex) -> list[Stationary]:
     found: list[tuple[str, float, float]] = []
     sine = (k.coupler_length * np.sin(wanted) + pin.imag) / k.rocker_length
     if abs(sine) <= 1.0:
-        found += [("coupler at the target", wanted, angle) for angle in (np.arcsin(sine), pi - np.arcsin(sine))]
-    for way in (1.0, -1.0):
+        found += [(KINDS[0], wanted, angle) for angle in (np.arcsin(sine), pi - np.arcsin(sine))]
+    for name, way in zip(KINDS[1:], (1.0, -1.0)):
         sine = (way * k.rocker_length - pin.imag) / k.coupler_length
         if abs(sine) <= 1.0:
-            name = f"cos th4 = 0, sin th4 = {way:+.0f}"
             found += [(name, angle, way * 0.5 * pi) for angle in (np.arcsin(sine), pi - np.arcsin(sine))]
     result = []
     for what, th3, th4 in found:
@@ -98,18 +100,24 @@ def swept(target: complex, branch: int, u: FloatArray) -> FloatArray:
     return np.asarray(np.hypot(out[0] - target.real, out[1] - target.imag))
 
 
-def reach(linkage: Linkage) -> FloatArray:
-    """Slider positions from end to end of where the links can be joined, crowded towards the ends (m)."""
+def reach() -> FloatArray:
+    """Slider positions at which the links can be joined (m), crowded towards the limits of assembly; NaN between the ranges."""
+    k = LINKAGE
     a, b = pins()
-    pin = (b - a) / np.exp(1j * linkage.ground_angle) - linkage.ground_length
-    half = np.sqrt((linkage.coupler_length + linkage.rocker_length) ** 2 - pin.imag**2)
-    return np.asarray(pin.real - half * (1.0 - 1e-12) * np.cos(np.linspace(0.0, pi, SAMPLES)))
+    pin = (b - a) / np.exp(1j * k.ground_angle) - k.ground_length
+    far, near_by = (
+        np.sqrt(d**2 - pin.imag**2) for d in (k.coupler_length + k.rocker_length, k.coupler_length - k.rocker_length)
+    )
+    share = 0.5 - 0.5 * np.cos(np.linspace(0.0, pi, SAMPLES))
+    return np.concatenate(
+        [pin.real - far + (far - near_by) * share, [np.nan], pin.real + near_by + (far - near_by) * share]
+    )
 
 
 def compute() -> StudyResult:
     """Error over the position, its stationary points, brute force and the engine's answer."""
-    u = reach(LINKAGE)
-    shown = slice(None, None, 200)
+    u = reach()
+    shown = slice(None, None, 100)
     columns: dict[str, FloatArray] = {"u [cm]": CM_PER_METRE * u[shown]}
     verdicts = []
     for name, target in targets().items():
@@ -131,7 +139,9 @@ def compute() -> StudyResult:
         )
         # brute force is above the least by no more than a step's share of it
         verdicts += [
-            near(f"least of the candidates; {name}", BALANCE, CM_PER_METRE * least, CM_PER_METRE * best.error, 1e-6, "cm"),
+            near(
+                f"least of the candidates; {name}", BALANCE, CM_PER_METRE * least, CM_PER_METRE * best.error, 1e-6, "cm"
+            ),
             near(
                 f"error of the variational motion; {name}",
                 BALANCE,
@@ -148,17 +158,16 @@ def compute() -> StudyResult:
                 "m",
             ),
         ]
-        pointing = best.what == "coupler at the target"
+        pointing = best.what == KINDS[0]
         expected = name == "a target of the ellipse"
-        verdicts.append(at_least(f"the least is of the kind expected; {name}", BALANCE, 1.0, float(pointing == expected)))
-    a, b = pins()
+        verdicts.append(
+            at_least(f"the least is of the kind expected; {name}", BALANCE, 1.0, float(pointing == expected))
+        )
     own = next(iter(targets().values()))
     fixed = LINKAGE.path([radians(ROTATION)])[0]
     at_rest = hypot(fixed[0] - own.real, fixed[1] - own.imag)
     moved = min(p.error for p in stationary(own))
-    verdicts.append(
-        at_most("error with the slider moved, of that with it held at zero", BALANCE, 1.0, moved / at_rest)
-    )
+    verdicts.append(at_most("error with the slider moved, of that with it held at zero", BALANCE, 1.0, moved / at_rest))
     return StudyResult(
         number=NUMBER,
         claim=(
@@ -173,25 +182,26 @@ def compute() -> StudyResult:
 
 def draw(result: StudyResult) -> Figure:
     """Error over the slider position for both targets, the stationary points marked."""
-    panels = []
+    panels: list[Panel] = []
     for name, target in targets().items():
+        first = not panels
         curves = [
             Curve(
                 x=result.columns["u [cm]"],
                 y=result.columns[f"error; {name}; {assembly} [cm]"],
-                label=assembly,
+                label=assembly if first else "",
                 colour=colour,
             )
             for (assembly, _), colour in zip(ASSEMBLIES, COLOURS)
         ]
         points = stationary(target)
-        for what, colour, marker in zip(dict.fromkeys(p.what for p in points), COLOURS[2:], "osd"):
+        for what, colour, marker in zip(KINDS, COLOURS[2:], "osd"):
             at = [p for p in points if p.what == what]
             curves.append(
                 Curve(
                     x=[CM_PER_METRE * p.u for p in at],
                     y=[CM_PER_METRE * p.error for p in at],
-                    label=what.replace("-", "\N{MINUS SIGN}"),
+                    label=what.replace("-", "\N{MINUS SIGN}") if first else "",
                     line="",
                     marker=marker,
                     colour=colour,

@@ -320,15 +320,7 @@ def fit_least_squares(normal: Normal, limits: Limits, start: Start) -> Answer:
         return np.hstack([columns, own])
 
     if not np.isfinite(residuals(normal, start.branch, *unpacked(x0))[0]).all():
-        return Answer(
-            start=replace(start, quality=inf),
-            feasible=False,
-            converged=False,
-            violation=inf,
-            worst="loop closure",
-            status="the links cannot be joined at the start",
-            iterations=0,
-        )
+        return Answer.unjoined(start)
     result = least_squares(
         value, x0, jac=derivative, bounds=(low, high), x_scale="jac", xtol=1e-12, ftol=1e-13, gtol=1e-13, max_nfev=400
     )

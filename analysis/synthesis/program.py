@@ -171,6 +171,19 @@ class Answer:
     status: str
     iterations: int
 
+    @classmethod
+    def unjoined(cls, start: Start) -> Answer:
+        """Of a start whose links cannot be joined."""
+        return cls(
+            start=replace(start, quality=inf),
+            feasible=False,
+            converged=False,
+            violation=inf,
+            worst="loop closure",
+            status="the links cannot be joined at the start",
+            iterations=0,
+        )
+
 
 class Program:
     """A synthesis as a nonlinear program.
@@ -497,15 +510,7 @@ class Program:
         for name, pieces in limits.regions:
             parameters += half_planes(_nearest_piece(pieces, name, z0)).ravel(order="F").tolist()
         if not all(np.isfinite(np.asarray(value)).all() for value in self._value(z0, parameters)):
-            return Answer(
-                start=replace(start, quality=inf),
-                feasible=False,
-                converged=False,
-                violation=inf,
-                worst="loop closure",
-                status="the links cannot be joined at the start",
-                iterations=0,
-            )
+            return Answer.unjoined(start)
         result = self._solver(x0=z0, lbx=lower, ubx=upper, lbg=self._g_low, ubg=self._g_high, p=parameters)
         stats = self._solver.stats()
         z = np.asarray(result["x"]).ravel()

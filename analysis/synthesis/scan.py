@@ -83,7 +83,7 @@ def scan(normal: Normal, limits: Limits, *, seed: int, candidates: int, starts: 
 def _shapes(limits: Limits, seed: int, count: int) -> Iterator[FloatArray]:
     """Allowed shapes with the other searched numbers in [0, 1), rows of (l2/l1, l3/l1, l4/l1, six numbers), in chunks."""
     sequence = qmc.Sobol(9, seed=seed)
-    low, high = np.log(np.array(SHAPES)).T
+    low, high = np.log(_ratios(limits)).T
     kept, tried = 0, 0
     while kept < count and tried < 64 * count:
         unit = sequence.random(CHUNK)
@@ -93,6 +93,14 @@ def _shapes(limits: Limits, seed: int, count: int) -> Iterator[FloatArray]:
         kept += len(shapes)
         if len(shapes):
             yield shapes
+
+
+def _ratios(limits: Limits) -> FloatArray:
+    """Least and greatest l2/l1, l3/l1, l4/l1, shape (3, 2): what the bounds of the links leave of `SHAPES`, or without it."""
+    given = np.column_stack([limits.low[3:6] / limits.high[2], limits.high[3:6] / limits.low[2]])
+    usual = np.array(SHAPES)
+    both = np.column_stack([np.maximum(given[:, 0], usual[:, 0]), np.minimum(given[:, 1], usual[:, 1])])
+    return np.where(both[:, :1] <= both[:, 1:], both, given)
 
 
 def _allowed(shapes: FloatArray, limits: Limits) -> NDArray[np.bool_]:
@@ -113,7 +121,8 @@ def _allowed(shapes: FloatArray, limits: Limits) -> NDArray[np.bool_]:
             shortest = ("drag-link", "crank-rocker", "double-rocker", "rocker-crank").index(limits.grashof)
             allowed &= (excess < 0.0) & (links.argmin(axis=1) == shortest)
     least, most = _sizes(links, limits)
-    return allowed & (least <= most)
+    # links that are fixed leave one size but for rounding
+    return allowed & (least <= most * (1.0 + 1e-9))
 
 
 def _sizes(links: FloatArray, limits: Limits) -> tuple[FloatArray, FloatArray]:

@@ -174,7 +174,11 @@ def synthesize(
     if method == "scan":
         begin = [start_from(g.linkage, normal, pivot, g.evaluation.rotation) for g in guesses]
         random = np.random.default_rng(seed)
-        for start in scan(normal, limits, seed=seed, candidates=candidates, starts=starts):
+        try:
+            scanned = scan(normal, limits, seed=seed, candidates=candidates, starts=starts)
+        except KeyboardInterrupt:
+            raise SynthesisInterrupted(None, 0, len(begin) + starts) from None
+        for start in scanned:
             motion = start.pivot if pivot is None else random_pivot(pivot, start.q[2], normal.unit, random)
             begin.append(replace(start, pivot=motion))
         done = polish(normal, limits, begin, pivot=pivot, n_jobs=n_jobs, progress=progress)

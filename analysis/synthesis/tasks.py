@@ -349,11 +349,6 @@ class Normal:
         """Whether the crank rotations are given."""
         return self.rotation is not None
 
-    @property
-    def scale_of_error(self) -> float:
-        """Factor from the normal quality (units squared) to m2; 1 of a rocker function (rad2)."""
-        return self.unit * self.unit
-
 
 def reweighted(task: Task, weights: ArrayLike | None) -> Task:
     """The task with other weights, where any are given.

@@ -1,4 +1,4 @@
-"""The direct search for the slider's motion: against brute force, the compiled kernels, and what the thesis's problems allow."""
+"""The direct search for the slider's motion: against brute force, the compiled kernels, and the thesis's problems."""
 
 from __future__ import annotations
 

@@ -1,0 +1,232 @@
+"""The simplest mechanism that meets a tolerance: where it stops, and what it says."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from math import degrees, inf, pi, radians
+from typing import Any
+
+import numpy as np
+import pytest
+
+from analysis.control import Strategy, simplest_mechanism
+from analysis.fourier import FourierSeries
+from analysis.synthesis import (
+    FullTurn,
+    InfeasibleError,
+    LargestLink,
+    LeastTransmission,
+    Linkage,
+    RockerFunction,
+    SecondCrank,
+    SliderMotion,
+    TimedPath,
+    evaluate,
+    turn,
+)
+from analysis.synthesis.linkage import ANGLES, LENGTHS
+from analysis.synthesis.published import PROBLEMS
+from linkwork.errors import InputError
+
+pytest.importorskip("casadi")
+
+MM2 = 1e-6
+BASE = Linkage(
+    pivot_x=0.02,
+    pivot_y=-0.03,
+    ground_length=0.20,
+    crank_length=0.06,
+    coupler_length=0.18,
+    rocker_length=0.16,
+    point_distance=0.12,
+    ground_angle=0.3,
+    crank_phase=0.7,
+    point_angle=0.8,
+)
+PHI = turn(24)
+
+
+def links_of(linkage: Linkage, share: float = 0.0) -> dict[str, tuple[float, float]]:
+    """Bounds about a linkage's dimensions: this share of the ground link, or that many radians, to either side."""
+    spread = dict.fromkeys(LENGTHS, share * linkage.ground_length) | dict.fromkeys(ANGLES, share)
+    return {n: (getattr(linkage, n) - d, getattr(linkage, n) + d) for n, d in spread.items() if n != "output_angle"}
+
+
+def strategy(traced: Linkage, tolerance: float, **options: Any) -> Strategy:
+    """For the path of a linkage, its links known but for a few hundredths."""
+    task = TimedPath(points=traced.path(PHI))
+    assert np.isfinite(task.points).all()
+    usual = {"bounds": links_of(BASE, 0.02), "constraints": (FullTurn(),), "harmonics": 2, "starts": 4, "stroke": 0.08}
+    return simplest_mechanism(task, tolerance, **usual | options)
+
+
+def test_a_four_bar_is_enough_for_what_one_traces() -> None:
+    found = strategy(BASE, 0.01 * MM2)
+    assert [step.mechanism for step in found.steps] == ["four-bar"]
+    assert found.met
+    assert found.chosen.solution is not None
+    assert found.chosen.solution.linkage.pivot is None
+    assert found.chosen.value == found.chosen.solution.error <= 0.01 * MM2
+    assert found.chosen.reason.endswith("is within 0.01 mm2: taken")
+
+
+def test_a_slider_where_a_four_bar_is_not_enough() -> None:
+    """Two harmonics were used to trace it: four-bar, one harmonic, two, and there it stops."""
+    series = FourierSeries(np.array([0.0, 0.012, 0.008]), np.array([0.0, 0.010, -0.009]))
+    found = strategy(replace(BASE, pivot=SliderMotion(series, 0.4)), 0.01 * MM2, bounds=links_of(BASE))
+    assert [step.mechanism for step in found.steps] == [
+        "four-bar",
+        "four-bar with a moved slider, 1 harmonic",
+        "four-bar with a moved slider, 2 harmonics",
+    ]
+    values = [step.value for step in found.steps]
+    assert values[0] > values[1] > values[2]
+    assert found.met
+    assert found.chosen is found.steps[-1]
+    linkage = found.chosen.solution.linkage
+    assert isinstance(linkage.pivot, SliderMotion)
+    moved = np.array(linkage.displacement(PHI))
+    assert moved == pytest.approx(
+        np.array(replace(linkage, pivot=SliderMotion(series, 0.4)).displacement(PHI)), abs=1e-6
+    )
+    for step in found.steps[:-1]:
+        ratio = step.value / (0.01 * MM2)
+        assert f"is {ratio:.3g} times the tolerance 0.01 mm2: moved on" in step.reason
+
+
+def test_gears_where_a_slider_is_not_enough() -> None:
+    """The path of a five-bar with gears 2:1, the second crank's stroke wider than the slider's."""
+    gear = SecondCrank(length=0.03, ratio=2, phase=-0.8)
+    found = strategy(replace(BASE, pivot=gear), 0.01 * MM2, harmonics=1, ratios=(1, 2), bounds=links_of(BASE, 0.01))
+    assert [step.mechanism for step in found.steps] == [
+        "four-bar",
+        "four-bar with a moved slider, 1 harmonic",
+        "five-bar, second crank geared 1:1",
+        "five-bar, second crank geared 2:1",
+    ]
+    assert found.met
+    linkage = found.chosen.solution.linkage
+    assert isinstance(linkage.pivot, SecondCrank)
+    assert linkage.pivot.ratio == 2
+    assert linkage.pivot.length == pytest.approx(gear.length, rel=1e-3)
+    assert (np.diff([found.steps[0].value, found.steps[1].value, found.steps[3].value]) < 0.0).all()
+
+
+def test_a_second_crank_that_turns_by_itself_is_the_last_resort() -> None:
+    psi = FourierSeries(np.array([0.0, 0.5]), np.array([0.0, -0.4]))
+    arm = SecondCrank(length=0.03, ratio=1, phase=0.9, series=psi)
+    found = strategy(replace(BASE, pivot=arm), 0.01 * MM2, harmonics=1, ratios=(1,), bounds=links_of(BASE))
+    assert [step.mechanism for step in found.steps][-2:] == [
+        "five-bar, second crank geared 1:1",
+        "five-bar, second crank turned independently, 1 harmonic",
+    ]
+    assert found.met
+    pivot = found.chosen.solution.linkage.pivot
+    assert pivot.length == pytest.approx(arm.length, rel=1e-4)
+    assert pivot.series.amplitudes[1] == pytest.approx(psi.amplitudes[1], rel=1e-4)
+
+
+def test_what_none_can_do_is_answered_with_the_nearest() -> None:
+    """A square, whose corners no series of two harmonics makes."""
+    corners = np.array([[0.0, 0.0], [0.1, 0.0], [0.1, 0.1], [0.0, 0.1], [0.0, 0.0]])
+    s = np.linspace(0.0, 4.0, 24, endpoint=False)
+    square = np.column_stack([np.interp(s, range(5), corners[:, k]) for k in (0, 1)])
+    limits = (LeastTransmission(), LargestLink(length=0.4))
+    found = simplest_mechanism(
+        TimedPath(points=square), 1e-3 * MM2, constraints=limits, harmonics=1, ratios=(-1,), starts=3
+    )
+    assert not found.met
+    assert len(found.steps) == 4
+    assert all(step.reason.endswith("moved on") for step in found.steps)
+    assert found.chosen.value == min(step.value for step in found.steps)
+    assert found.chosen.value < found.steps[0].value
+    # constraints hold for every mechanism
+    for step in found.steps:
+        assert step.solution.linkage.largest_link <= 0.4 * (1.0 + 1e-6)
+        assert step.solution.linkage.least_transmission > radians(39.5)
+        assert step.solution.error == pytest.approx(evaluate(TimedPath(points=square), step.solution.linkage).error)
+    assert str(found).splitlines() == [f"{step.mechanism}: {step.reason}" for step in found.steps]
+
+
+def test_the_worst_error_as_the_criterion_and_the_angles_of_a_rocker() -> None:
+    weighted = PROBLEMS["rocker-weighted"]
+    task = replace(weighted.task, weights=None)
+    found = simplest_mechanism(
+        task, radians(8.0), criterion="worst", bounds=links_of(weighted.linkage), constraints=(FullTurn(),), starts=8
+    )
+    assert found.criterion == "worst"
+    assert found.met
+    assert len(found.steps) == 2
+    for step in found.steps:
+        assert step.value == step.solution.evaluation.worst
+        assert f"worst {degrees(step.value):.4g} deg" in step.reason
+    error = simplest_mechanism(
+        task, 1.0, criterion="error", bounds=links_of(weighted.linkage), constraints=(FullTurn(),), starts=2
+    )
+    assert len(error.steps) == 1
+    assert f"is within {degrees(degrees(1.0)):.4g} deg2: taken" in str(error)
+
+
+def test_the_stroke_is_kept() -> None:
+    series = FourierSeries(np.array([0.0, 0.02]), np.array([0.0, 0.0]))
+    traced = replace(BASE, pivot=SliderMotion(series, 0.4))
+    found = strategy(traced, 1e-6 * MM2, bounds=links_of(BASE), stroke=0.02, harmonics=1, ratios=())
+    slider = found.steps[1].solution.linkage.pivot
+    assert slider.stroke == pytest.approx(0.02, rel=0.005)
+    assert not found.met
+    wider = strategy(traced, 1e-6 * MM2, bounds=links_of(BASE), stroke=0.05, harmonics=1, ratios=())
+    assert wider.met
+    assert wider.chosen.solution.linkage.pivot.stroke == pytest.approx(0.04, rel=1e-3)
+
+
+def test_without_a_solution_a_step_has_none() -> None:
+    """A second crank of at least a thousandth of the stroke, 1 m, cannot be joined to these links."""
+    series = FourierSeries(np.array([0.0, 0.02, 0.01, 0.01]), np.zeros(4))
+    traced = replace(BASE, pivot=SliderMotion(series, 0.4))
+    found = strategy(
+        traced, 1e-6 * MM2, bounds=links_of(BASE), harmonics=1, ratios=(1, 2), stroke=1000.0, second_crank=2.0
+    )
+    assert [step.solution is None for step in found.steps] == [False, False, True, True, True]
+    for step in found.steps[2:]:
+        assert step.value == inf
+        assert step.reason == "none keeps the constraints: moved on"
+    assert not found.met
+    assert found.chosen is found.steps[1]
+
+
+def test_constraints_without_even_a_four_bar() -> None:
+    task = RockerFunction(angle=1.2 + 0.4 * np.sin(PHI))
+    bounds = {"crank_length": (0.3, 0.4), "coupler_length": (0.01, 0.1), "rocker_length": (0.01, 0.1)}
+    with pytest.raises(InfeasibleError, match="crank cannot turn fully"):
+        simplest_mechanism(task, 1e-3, bounds=bounds)
+
+
+@pytest.mark.parametrize(
+    ("tolerance", "options", "words"),
+    [
+        (0.0, {}, "tolerance is 0.0"),
+        (-1.0, {}, "tolerance is -1.0"),
+        (float("nan"), {}, "tolerance is nan"),
+        (inf, {}, "tolerance is inf"),
+        (1.0, {"criterion": "best"}, "criterion 'best'"),
+        (1.0, {"harmonics": 0}, "0 harmonics"),
+        (1.0, {"starts": 0}, "starts"),
+        (1.0, {"stroke": -0.1}, "stroke"),
+        (1.0, {"stroke": float("nan")}, "stroke"),
+        (1.0, {"second_crank": 0.0}, "second crank"),
+        (1.0, {"ratios": (1, 0.5)}, "0.5"),
+    ],
+)
+def test_bad_input_is_named_before_anything_is_searched(tolerance: float, options: dict[str, Any], words: str) -> None:
+    task = TimedPath(points=BASE.path(PHI) + 0.01 * np.column_stack([np.cos(5.0 * PHI), np.sin(4.0 * PHI)]))
+    with pytest.raises(InputError, match=words):
+        simplest_mechanism(task, tolerance, **options)
+
+
+def test_two_calls_give_the_same() -> None:
+    series = FourierSeries(np.array([0.0, 0.012]), np.array([0.0, 0.01]))
+    traced = replace(BASE, pivot=SliderMotion(series, 0.4))
+    one, two = (strategy(traced, 1e-6 * MM2, harmonics=1, ratios=(), starts=2, seed=4) for _ in range(2))
+    assert str(one) == str(two)
+    assert [s.value for s in one.steps] == [s.value for s in two.steps]
+    assert abs(one.chosen.solution.linkage.crank_phase) <= pi

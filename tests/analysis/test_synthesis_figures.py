@@ -1,0 +1,339 @@
+"""What a designer sees of a solution: plots, drawing, table, report."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from math import acos, cos, degrees, hypot, radians, sin
+
+import ezdxf
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from PIL import Image
+
+from analysis import figures, io
+from analysis.figures.synthesis import LONGEST, magnification
+from analysis.fourier import FourierSeries
+from analysis.synthesis import (
+    InfeasibleError,
+    Linkage,
+    Motion,
+    RockerFunction,
+    SecondCrank,
+    SliderMotion,
+    Solution,
+    Synthesis,
+    TargetPath,
+    TimedPath,
+    TradeOff,
+    UntimedPath,
+    turn,
+)
+from analysis.synthesis.report import length_step
+from analysis.synthesis.sensitivity import costs
+from linkwork.errors import AssemblyError, InputError
+
+PHI = turn(24)
+ELLIPSE = np.column_stack([0.20 + 0.10 * np.cos(PHI), 0.15 + 0.05 * np.sin(PHI)])
+#: A crank-rocker near the constrained optimum of the thesis's first ellipse.
+LINKAGE = Linkage(
+    pivot_x=0.2,
+    pivot_y=-0.06,
+    ground_length=0.3,
+    crank_length=0.05,
+    coupler_length=0.215,
+    rocker_length=0.215,
+    point_distance=0.21,
+    ground_angle=radians(-45.0),
+    crank_phase=radians(45.0),
+    point_angle=radians(-178.0),
+    branch=-1,
+)
+#: It cannot turn fully: the longest link and the shortest are more than the other two.
+SWINGING = replace(LINKAGE, crank_length=0.25, ground_length=0.35)
+SLIDING = replace(LINKAGE, pivot=SliderMotion(FourierSeries([0.01, 0.02], [0.0, 0.01]), radians(20.0)))
+GEARED = replace(LINKAGE, pivot=SecondCrank(0.02, 2.0, 0.3))
+
+
+def timed(linkage: Linkage = LINKAGE) -> Solution:
+    return Solution.of(TimedPath(points=ELLIPSE), linkage)
+
+
+def untimed(closed: bool = True) -> Solution:
+    points = ELLIPSE if closed else ELLIPSE[:9]
+    task = UntimedPath(path=TargetPath(points=points, closed=closed))
+    return Solution.of(task, LINKAGE, None if closed else np.linspace(0.1, 2.0, 9))
+
+
+def rocker() -> Solution:
+    return Solution.of(RockerFunction(angle=2.0 + 0.4 * np.sin(PHI)), replace(LINKAGE, point_distance=0.0))
+
+
+def axis_of(figure, label):
+    return next(axis for axis in figure.axes if axis.get_ylabel().replace("\n", " ").startswith(label))
+
+
+def drawn(axis, label):
+    return next(line for line in axis.lines if line.get_label().startswith(label)).get_xydata()
+
+
+# Plots
+
+
+def test_the_panels_of_a_path_show_target_path_errors_and_transmission_angle() -> None:
+    solution = timed()
+    figure = solution.plot(title="ellipse")
+    assert figure.get_suptitle() == "ellipse"
+    linkage, task, errors, transmission = figure.axes
+    assert [a.get_xlabel() for a in figure.axes] == ["x [mm]", "x [mm]", "crank rotation [deg]", "crank rotation [deg]"]
+    np.testing.assert_allclose(drawn(task, "target"), 1e3 * ELLIPSE)
+    path = drawn(task, "path")
+    np.testing.assert_allclose(path, 1e3 * LINKAGE.path(np.linspace(0.0, 2.0 * np.pi, len(path))))
+    # vectors from each target to the path, magnified by what the legend says
+    vectors = drawn(task, "error").reshape(-1, 3, 2)
+    label = next(line.get_label() for line in task.lines if line.get_label().startswith("error"))
+    factor = float(label.split("x ")[1].rstrip(")"))
+    np.testing.assert_allclose(vectors[:, 0], 1e3 * ELLIPSE)
+    np.testing.assert_allclose((vectors[:, 1] - vectors[:, 0]) / factor, 1e3 * (LINKAGE.path(PHI) - ELLIPSE), atol=1e-9)
+    np.testing.assert_allclose(errors.lines[0].get_ydata(), 1e3 * np.hypot(*(LINKAGE.path(PHI) - ELLIPSE).T))
+    # the angle at C by the law of cosines
+    x, y = transmission.lines[0].get_xydata().T
+    for phi, angle in zip(np.radians(x[::90]), y[::90]):
+        b = LINKAGE.pins(float(phi))["B"]
+        d = LINKAGE.pins(0.0)["D"]
+        l3, l4 = LINKAGE.coupler_length, LINKAGE.rocker_length
+        expected = acos((l3**2 + l4**2 - hypot(b[0] - d[0], b[1] - d[1]) ** 2) / (2.0 * l3 * l4))
+        assert angle == pytest.approx(degrees(expected))
+    assert {text.get_text() for text in linkage.texts} == set("ABCDP")
+
+
+def test_letters_stand_clear_of_the_links_and_of_each_other() -> None:
+    for solution in (timed(), timed(SLIDING), timed(GEARED), rocker()):
+        axis = solution.plot().axes[0]
+        places = {t.get_text(): np.array(t.get_position()) for t in axis.texts}
+        pins = {name: 1e3 * np.array(place) for name, place in solution.linkage.pins(0.0).items()}
+        everything = np.array(list(pins.values()))
+        unit = float(np.ptp(everything, axis=0).max()) / 42.0
+        for name, place in places.items():
+            assert np.hypot(*(place - pins[name])) < 4.0 * unit
+            for start, end in ("AB", "BC", "CD"):
+                along = np.linspace(pins[start], pins[end], 400)
+                assert np.hypot(*(along - place).T).min() > 0.5 * unit, (name, start + end)
+        names = list(places)
+        for k, first in enumerate(names):
+            for second in names[k + 1 :]:
+                assert np.hypot(*(places[first] - places[second])) > unit
+
+
+def test_a_function_of_the_rocker_is_shown_with_its_target() -> None:
+    solution = rocker()
+    figure = solution.plot()
+    panel = axis_of(figure, "rocker angle")
+    np.testing.assert_allclose(drawn(panel, "target"), np.degrees(np.column_stack([PHI, 2.0 + 0.4 * np.sin(PHI)])))
+    x, y = np.radians(drawn(panel, "rocker")).T
+    np.testing.assert_allclose(y, solution.linkage.rocker_angle(x))
+    np.testing.assert_allclose(axis_of(figure, "error").lines[-1].get_ydata(), np.degrees(solution.evaluation.errors))
+    # there is no coupler point
+    assert "P" not in {text.get_text() for text in figure.axes[0].texts}
+
+
+@pytest.mark.parametrize(("linkage", "label"), [(SLIDING, "slider position [mm]"), (GEARED, "second crank [deg]")])
+def test_a_moved_pivot_is_drawn_and_its_motion_shown(linkage, label) -> None:
+    figure = timed(linkage).plot()
+    panel = axis_of(figure, label.split(" ")[0])
+    assert panel.get_ylabel().replace("\n", " ") == label
+    x, y = panel.lines[0].get_xydata().T
+    pivot = linkage.pivot
+    expected = 1e3 * pivot.series(np.radians(x)) if linkage is SLIDING else np.degrees(pivot.angle(np.radians(x)))
+    np.testing.assert_allclose(y, expected)
+    assert ("E" in {text.get_text() for text in figure.axes[0].texts}) == (linkage is GEARED)
+
+
+def test_the_guide_spans_the_travel_of_the_slider() -> None:
+    scene = timed(SLIDING).scene()
+    places = np.array([SLIDING.pins(float(phi))["D"] for phi in np.linspace(0.0, 2.0 * np.pi, 400)])
+    along = (scene.guide[1] - scene.guide[0]) / hypot(*(scene.guide[1] - scene.guide[0]))
+    travel = (places - scene.guide[0]) @ along
+    assert travel.min() == pytest.approx(0.0, abs=1e-6)
+    assert travel.max() == pytest.approx(SLIDING.pivot.stroke, rel=1e-4)
+    np.testing.assert_allclose(scene.guide[0] + travel[:, None] * along, places, atol=1e-12)
+
+
+def test_a_linkage_that_cannot_turn_fully_is_drawn_where_it_is_joined() -> None:
+    task = Motion(points=ELLIPSE[:4], angle=np.zeros(4), rotation=[-0.3, -0.1, 0.1, 0.3])
+    solution = Solution.of(task, SWINGING)
+    scene = solution.scene()
+    assert not solution.verdicts.full_turn
+    assert scene.curves
+    assert all(np.isfinite(piece).all() for piece in scene.curves)
+    assert np.isnan(scene.transmission[1]).any()
+    figure = solution.plot()
+    assert [a.get_ylabel() for a in figure.axes if "angle [deg]" in a.get_ylabel()][-1] == "error of angle [deg]"
+    # the drawing refuses what is not finite
+    assert solution.drawing().polylines
+    with pytest.raises(AssemblyError, match="cannot be joined at a crank rotation of 3"):
+        solution.drawing(3.0)
+
+
+@given(st.floats(1e-9, 1e9), st.floats(1e-6, 1e6))
+def test_error_vectors_are_magnified_as_far_as_they_stay_short(worst: float, extent: float) -> None:
+    factor = magnification(worst, extent)
+    if worst <= 1e-9 * extent or worst > LONGEST * extent:
+        assert factor == 1.0
+        return
+    assert factor * worst <= LONGEST * extent * (1.0 + 1e-9)
+    digit = round(factor / 10.0 ** np.floor(np.log10(factor) + 1e-9))
+    assert digit in (1, 2, 5)
+    # the next greater one is too long
+    assert factor * {1: 2.0, 2: 2.5, 5: 2.0}[digit] * worst > LONGEST * extent * (1.0 - 1e-9)
+
+
+def test_alternatives_have_a_panel_each_under_their_errors(tmp_path) -> None:
+    solutions = (timed(), timed(replace(LINKAGE, crank_length=0.048)), timed(SLIDING), timed(GEARED))
+    result = Synthesis(task=solutions[0].task, solutions=solutions, method="scan", seed=0, starts=4, seconds=1.0)
+    figure = result.plot(title="all")
+    shown = [axis for axis in figure.axes if axis.get_visible()]
+    assert [axis.get_title().split(":")[0] for axis in shown] == ["1", "2", "3", "4"]
+    assert f"{1e6 * solutions[0].error:.4g} mm²" in shown[0].get_title()
+    with pytest.raises(InputError, match="no linkages"):
+        figures.plot_alternatives([])
+    rows = np.genfromtxt(result.to_csv(tmp_path / "all.csv"), delimiter=",", names=True, deletechars="")
+    np.testing.assert_allclose(rows["quality_[m2]"], [s.error for s in solutions])
+    np.testing.assert_allclose(rows["crank_length_[m]"], [0.05, 0.048, 0.05, 0.05])
+
+
+def test_a_trade_off_marks_limits_without_a_linkage(tmp_path) -> None:
+    solutions = (None, timed(), timed(replace(LINKAGE, crank_length=0.048)))
+    traded = TradeOff(over="size", limit=np.array([0.1, 0.3, 1.0]), solutions=solutions)
+    figure = traded.plot()
+    for axis, values in zip(
+        figure.axes, ([1e6 * s.error for s in solutions[1:]], [1e3 * s.evaluation.worst for s in solutions[1:]])
+    ):
+        curve, none = axis.lines
+        np.testing.assert_allclose(curve.get_xdata(), [100.0, 300.0, 1000.0])
+        np.testing.assert_allclose(curve.get_ydata()[1:], values)
+        np.testing.assert_allclose(none.get_xdata(), [100.0])
+    assert figure.axes[-1].get_xlabel() == "limit of the largest link [mm]"
+    rows = np.genfromtxt(traded.to_csv(tmp_path / "t.csv"), delimiter=",", names=True, deletechars="")
+    np.testing.assert_allclose(rows["limit_of_largest_link_[m]"], [0.3, 1.0])
+    with pytest.raises(InfeasibleError, match="at any of the limits"):
+        TradeOff(over="size", limit=np.array([0.1, 0.2]), solutions=(None, None)).plot()
+
+
+@pytest.mark.parametrize("solution", [timed(SLIDING), rocker()])
+def test_an_animation_is_a_turn_in_so_many_pictures(tmp_path, solution) -> None:
+    path = solution.animate(tmp_path / "turn.gif", title="a turn", frames=4)
+    with Image.open(path) as picture:
+        assert picture.n_frames == 4
+    with pytest.raises(InputError, match="at least 2"):
+        solution.animate(path, frames=1)
+
+
+# Drawing
+
+
+def test_the_drawing_is_at_real_size(tmp_path) -> None:
+    solution = timed()
+    drawing = solution.drawing(1.0, title="ellipse")
+    pins = LINKAGE.pins(1.0)
+    lengths = {line.layer: hypot(line.end[0] - line.start[0], line.end[1] - line.start[1]) for line in drawing.lines}
+    assert lengths == pytest.approx({"ground": 0.3, "crank": 0.05, "rocker": 0.215})
+    triangle = next(p for p in drawing.polylines if p.layer == "coupler")
+    np.testing.assert_allclose(triangle.points, [pins["B"], pins["C"], pins["P"]])
+    assert {t.text: t.layer for t in drawing.texts} == dict.fromkeys("ABCDP", "text")
+    # what is written can be read back: the curve from SVG, links from DXF in mm
+    curve, closed = io.read_points(io.save_drawing(tmp_path / "a.svg", drawing), name="coupler-curve")
+    assert closed
+    np.testing.assert_allclose(
+        curve, LINKAGE.path(np.linspace(0.0, 2.0 * np.pi, len(curve), endpoint=False)), atol=1e-9
+    )
+    document = ezdxf.readfile(io.save_drawing(tmp_path / "a.dxf", drawing))
+    crank = next(e for e in document.modelspace() if e.dxf.layer == "crank" and e.dxftype() == "LINE")
+    assert (crank.dxf.end - crank.dxf.start).magnitude == pytest.approx(50.0)
+    assert sum(e.dxf.layer == "target" for e in document.modelspace()) == len(ELLIPSE)
+
+
+def test_the_drawing_of_moved_pivots_and_of_curves() -> None:
+    layers = {item.layer for item in timed(SLIDING).drawing().polylines}
+    assert {"slider", "coupler-curve"} <= layers
+    assert any(line.layer == "guide" for line in timed(SLIDING).drawing().lines)
+    cranks = [line for line in timed(GEARED).drawing().lines if line.layer == "crank"]
+    assert sorted(hypot(c.end[0] - c.start[0], c.end[1] - c.start[1]) for c in cranks) == pytest.approx([0.02, 0.05])
+    for closed in (True, False):
+        target = next(p for p in untimed(closed).drawing().polylines if p.layer == "target")
+        assert target.closed is closed
+    flat = Solution.of(TimedPath(points=ELLIPSE), replace(LINKAGE, point_angle=0.0))
+    assert not any(p.layer == "coupler" for p in flat.drawing().polylines)
+
+
+# Tables and report
+
+
+def test_the_columns_of_a_timed_path() -> None:
+    solution = timed()
+    c = solution.columns()
+    np.testing.assert_array_equal(c["crank rotation [rad]"], PHI)
+    made = np.column_stack([c["path x [m]"], c["path y [m]"]])
+    np.testing.assert_allclose(c["error [m]"], np.hypot(*(made - ELLIPSE).T))
+
+
+@pytest.mark.parametrize("closed", [True, False])
+def test_the_columns_of_an_untimed_path_are_its_nearest_points(closed) -> None:
+    solution = untimed(closed)
+    c = solution.columns()
+    made = np.column_stack([c["path x [m]"], c["path y [m]"]])
+    wanted = np.column_stack([c["target x [m]"], c["target y [m]"]])
+    # as far as the polygon of 360 chords is from the curve
+    np.testing.assert_allclose(np.hypot(*(made - wanted).T), c["error [m]"], atol=5e-6)
+    at = c["crank rotation [rad]"]
+    np.testing.assert_allclose(LINKAGE.path(at), made)
+    if not closed:
+        assert at.min() >= 0.1
+        assert at.max() <= 2.0
+
+
+def test_what_an_error_in_a_dimension_costs() -> None:
+    solution = timed()
+    d = 1e-4
+    left = LINKAGE.path(PHI) - ELLIPSE
+    dear = costs(solution, d, radians(0.1))
+    # moving the whole linkage by d: the sum of |e + d|^2 - |e|^2, the worse of the two ways
+    for name, column in (("pivot_x", left[:, 0]), ("pivot_y", left[:, 1])):
+        assert dear[name] == pytest.approx(len(PHI) * d * d + 2.0 * d * abs(column.sum()), rel=1e-9)
+    # turning it about A by an angle
+    turned = radians(0.1)
+    grown = []
+    for side in (-turned, turned):
+        arm = LINKAGE.path(PHI) - [LINKAGE.pivot_x, LINKAGE.pivot_y]
+        way = arm @ np.array([[cos(side), sin(side)], [-sin(side), cos(side)]]) - arm
+        grown.append(((left + way) ** 2).sum() - (left**2).sum())
+    assert dear["ground_angle"] == pytest.approx(max(grown), rel=1e-9)
+    # a linkage at its limit of assembly
+    tight = replace(LINKAGE, ground_length=0.215 + 0.215 - 0.05 - 1e-5)
+    assert costs(timed(tight), d, turned)["ground_length"] == np.inf
+
+
+def test_the_report_tells_dimensions_verdicts_and_errors() -> None:
+    solution = timed()
+    text = solution.report()
+    assert str(solution.verdicts) in text
+    assert f"{1e6 * solution.error:.6g} mm²" in text
+    row = next(line for line in text.splitlines() if line.startswith("crank_length")).split()
+    assert row[1:3] == ["50", "mm"]
+    assert "rounded to 0.1 mm and 0.1 deg" in text
+    stations = text.split("\n\n")[-1].splitlines()
+    assert len(stations) == 1 + len(PHI)
+    assert float(stations[3].split()[6]) == pytest.approx(1e3 * solution.evaluation.errors[2], abs=1e-4)
+    # where the rotation is free its start is no dimension
+    assert "crank_phase" not in untimed().report()
+    assert "deg²" in rocker().report()
+    assert "stroke" in timed(SLIDING).report()
+    assert "second crank at D: 2 turns" in timed(GEARED).report()
+
+
+@pytest.mark.parametrize(("factor", "step"), [(1.0, 1e-4), (1e3, 1e-4), (0.02, 1e-4), (0.015, 1e-5), (1e-3, 1e-6)])
+def test_small_linkages_are_rounded_to_finer_steps(factor, step) -> None:
+    solution = Solution.of(TimedPath(points=factor * ELLIPSE), LINKAGE.scaled(factor))
+    assert length_step(solution) == pytest.approx(step)
+    assert solution.report()

@@ -1,0 +1,499 @@
+"""`synthesize` as a whole: determinism, sensitivities and rounding, trade-offs, precision points, bad input."""
+
+from __future__ import annotations
+
+import signal
+import threading
+from dataclasses import replace
+from math import radians
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from analysis.fourier import FourierSeries
+from analysis.synthesis import (
+    USUAL,
+    Assembly,
+    FullTurn,
+    Grashof,
+    InfeasibleError,
+    LargestLink,
+    LeastTransmission,
+    Linkage,
+    Motion,
+    PrecisionPoints,
+    RockerFunction,
+    SliderMotion,
+    Solution,
+    Straight,
+    SynthesisInterrupted,
+    TargetPath,
+    TimedPath,
+    UntimedPath,
+    evaluate,
+    synthesize,
+    trade_off,
+    turn,
+)
+from analysis.synthesis.areas import straightness
+from linkwork.errors import InputError, ParameterError
+from tests.linkages import drawn
+
+pytest.importorskip("casadi")
+FloatArray = NDArray[np.float64]
+
+ELLIPSE = np.column_stack([0.20 + 0.10 * np.cos(turn(24)), 0.15 + 0.05 * np.sin(turn(24))])
+TASK = TimedPath(points=ELLIPSE)
+QUICK: dict[str, Any] = {"candidates": 1 << 12, "starts": 4}
+
+
+class TestResult:
+    def test_solutions_are_ranked_different_and_what_they_say(self) -> None:
+        result = synthesize(TASK, starts=12, candidates=1 << 13, constraints=[*USUAL, LargestLink(length=0.3)])
+        errors = [s.error for s in result.solutions]
+        assert errors == sorted(errors)
+        assert result.best is result.solutions[0]
+        assert result.complete
+        assert result.starts == 12
+        assert len(errors) <= 6
+        for solution in result.solutions:
+            assert solution.verdicts.sound
+            distance = np.hypot(*(solution.linkage.path(turn(24)) - ELLIPSE).T)
+            np.testing.assert_allclose(solution.evaluation.errors, distance, atol=1e-14)
+            assert solution.error == pytest.approx(float(distance @ distance), rel=1e-12)
+            assert solution.evaluation.worst == pytest.approx(distance.max())
+            assert solution.evaluation.rms == pytest.approx(float(np.sqrt(np.mean(distance**2))))
+
+    def test_the_same_seed_gives_the_same_bits_on_any_number_of_cores(self) -> None:
+        tasks = (TASK, UntimedPath(path=TargetPath(points=ELLIPSE, closed=True), samples=24))
+        for task in tasks:
+            one, again, two = (synthesize(task, seed=5, n_jobs=n, **QUICK) for n in (1, 1, 2))
+            for other in (again, two):
+                assert [s.linkage.values() for s in other.solutions] == [s.linkage.values() for s in one.solutions]
+
+    def test_guesses_are_searched_from(self) -> None:
+        task = Motion(points=ELLIPSE[::4], angle=turn(6))
+        good = synthesize(task, starts=12, candidates=1 << 12).best
+        poor = synthesize(task, starts=1, candidates=16, seed=3)
+        helped = synthesize(task, starts=1, candidates=16, seed=3, guesses=[good])
+        assert helped.starts == 2
+        assert helped.best.error <= good.error * (1.0 + 1e-9)
+        assert poor.best.error > 1.5 * good.error
+
+    @pytest.mark.parametrize("n_jobs", [1, 2])
+    def test_interrupted_it_hands_over_the_best_so_far(self, n_jobs: int) -> None:
+        timer = threading.Timer(2.0, signal.raise_signal, [signal.SIGINT])
+        timer.start()
+        with pytest.raises(SynthesisInterrupted, match=r"stopped after \d+ of \d+ searches") as caught:
+            synthesize(TASK, starts=2000, candidates=1 << 11, n_jobs=n_jobs)
+        timer.join()
+        found = caught.value.synthesis
+        assert found is not None
+        assert not found.complete
+        assert 0 < found.starts < 1000
+        assert found.best.error < 1e-3
+
+    def test_interrupted_in_the_scan_there_is_none_yet(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        def interrupted(*_: Any, **__: Any) -> None:
+            raise KeyboardInterrupt
+
+        monkeypatch.setattr("analysis.synthesis.solve.scan", interrupted)
+        with pytest.raises(SynthesisInterrupted, match="stopped after 0 of 7 searches") as caught:
+            synthesize(TASK, starts=7)
+        assert caught.value.synthesis is None
+
+
+def known(seed: int = 3) -> Linkage:
+    return drawn(np.random.default_rng(seed), least=0.7)
+
+
+def off(points: FloatArray, scale: float = 0.02) -> FloatArray:
+    return points + scale * np.random.default_rng(0).normal(size=points.shape)
+
+
+def judged(kind: str) -> Solution:
+    """A solution that is not quite right, of every kind of task."""
+    linkage = known()
+    phi = np.linspace(0.0, 4.0, 9)
+    weights = np.linspace(1.0, 3.0, 9)
+    points = off(linkage.path(phi))
+    if kind == "slider":
+        a = 0.05 * linkage.crank_length
+        pivot = SliderMotion(FourierSeries(np.array([a, 2.0 * a]), np.array([0.0, a])), 0.4)
+        return Solution.of(TimedPath(points=points, rotation=phi, weights=weights), replace(linkage, pivot=pivot))
+    task: Any = {
+        "timed": lambda: TimedPath(points=points, rotation=phi, weights=weights),
+        "rocker": lambda: RockerFunction(angle=linkage.rocker_angle(phi) + 0.02 * phi, rotation=phi, weights=weights),
+        "motion": lambda: Motion(
+            points=points, angle=linkage.coupler_angle(phi) + 0.02 * phi, rotation=phi, weights=weights
+        ),
+        "poses": lambda: Motion(points=points, angle=linkage.coupler_angle(phi) + 0.02 * phi, weights=weights),
+        "precision": lambda: PrecisionPoints(points=points),
+        "closed": lambda: UntimedPath(
+            path=TargetPath(points=1.02 * linkage.path(turn(90)), closed=True), measure="distance"
+        ),
+        "open": lambda: UntimedPath(
+            path=TargetPath(points=off(linkage.path(np.linspace(0.0, 4.0, 40)), 1e-3), closed=False), measure="distance"
+        ),
+        "area": lambda: UntimedPath(path=TargetPath(points=1.02 * linkage.path(turn(90)), closed=True)),
+    }[kind]()
+    rotation = phi if kind in ("poses", "precision") else None
+    if kind == "open":
+        from analysis.synthesis.solution import nearest_rotations
+        from analysis.synthesis.tasks import normal_form
+
+        normal = normal_form(task)
+        rotation = nearest_rotations(linkage, normal.origin + normal.unit * normal.points)  # type: ignore[operator]
+    return Solution.of(task, linkage, rotation)
+
+
+class TestSensitivity:
+    @pytest.mark.parametrize("kind", ["timed", "rocker", "motion", "poses", "precision", "slider", "closed", "open"])
+    def test_slopes_are_limits_of_differences_of_the_error(self, kind: str) -> None:
+        solution = judged(kind)
+        h = 1e-6
+        seen = 0
+        for s in solution.sensitivities():
+            ends = []
+            for step in (h, -h):
+                changed = self.changed(solution.linkage, s.name, step)
+                ends.append(evaluate(solution.task, changed, solution.evaluation.rotation).error)
+            slope = (ends[0] - ends[1]) / (2.0 * h)
+            # of a path, stations to the polygon of the curve
+            tolerance = 2e-2 if kind in ("closed", "open") else 1e-5
+            largest = max(abs(t.slope) for t in solution.sensitivities())
+            assert s.slope == pytest.approx(slope, rel=tolerance, abs=tolerance * largest), s.name
+            seen += 1
+        assert seen == {"rocker": 5, "slider": 14}.get(kind, 10)
+
+    def changed(self, linkage: Linkage, name: str, step: float) -> Linkage:
+        pivot = linkage.pivot
+        if name in linkage.values():
+            return replace(linkage, **{name: getattr(linkage, name) + step})
+        assert isinstance(pivot, SliderMotion)
+        if name == "guide_angle":
+            return replace(linkage, pivot=replace(pivot, guide_angle=pivot.guide_angle + step))
+        _, kind, k = name.split()
+        cosines, sines = np.array(pivot.series.cos), np.array(pivot.series.sin)
+        (cosines if kind == "cos" else sines)[int(k)] += step
+        return replace(linkage, pivot=replace(pivot, series=FourierSeries(cosines, sines)))
+
+    def test_shifts_are_how_far_the_point_moves(self) -> None:
+        solution = judged("timed")
+        for s in solution.sensitivities():
+            moved = self.changed(solution.linkage, s.name, 1e-6).path(solution.rotation)
+            apart = np.hypot(*(moved - solution.linkage.path(solution.rotation)).T) / 1e-6
+            assert s.shift == pytest.approx(float(np.sqrt(np.mean(apart**2))), rel=1e-4, abs=1e-9), s.name
+
+    def test_at_an_optimum_that_no_bound_holds_the_slopes_vanish(self) -> None:
+        solution = synthesize(TASK, constraints=(), bounds={"ground_length": (0.3, 0.3)}, **QUICK).best
+        free = [s for s in solution.sensitivities() if s.name != "ground_length"]
+        held = next(s for s in solution.sensitivities() if s.name == "ground_length")
+        assert max(abs(s.slope) for s in free) < 1e-4 * abs(held.slope)
+
+
+class TestRounding:
+    def test_dimensions_are_whole_steps(self) -> None:
+        rounding = judged("timed").rounded(length=1e-3, angle=radians(0.5))
+        for name, value in rounding.linkage.values().items():
+            step = radians(0.5) if "angle" in name or "phase" in name else 1e-3
+            if name != "branch":
+                assert value / step == pytest.approx(round(value / step), abs=1e-6)
+        assert rounding.error == evaluate(judged("timed").task, rounding.linkage).error
+
+    @pytest.mark.parametrize("kind", ["timed", "motion", "rocker", "closed", "area"])
+    def test_expected_is_the_mean_over_random_errors_of_make(self, kind: str) -> None:
+        solution = judged(kind)
+        length, angle = 0.02, radians(1.0)
+        random = np.random.default_rng(2)
+        errors = []
+        for _ in range(1500):
+            changed = {
+                name: value + (angle if "angle" in name or "phase" in name else length) * random.uniform(-0.5, 0.5)
+                for name, value in solution.linkage.values().items()
+                if name not in ("branch", "output_angle")
+            }
+            linkage = replace(solution.linkage, **changed)
+            errors.append(evaluate(solution.task, linkage, solution.evaluation.rotation).error)
+            if kind in ("closed", "area") and len(errors) == 400:
+                break
+        # the sample's own uncertainty, and what the second derivatives of the residuals add
+        spread = np.std(errors) / np.sqrt(len(errors))
+        expected = solution.rounded(length=length, angle=angle).expected
+        assert expected == pytest.approx(np.mean(errors), abs=4.0 * spread + 0.05 * (np.mean(errors) - solution.error))
+
+    @pytest.mark.parametrize("step", [0.0, -1.0, np.nan])
+    def test_steps_are_above_zero(self, step: float) -> None:
+        with pytest.raises(InputError, match="step of length"):
+            judged("timed").rounded(length=step)
+        with pytest.raises(InputError, match="step of angle"):
+            judged("timed").rounded(angle=step)
+
+
+class TestTradeOff:
+    @pytest.mark.parametrize(
+        ("over", "limits", "looser"),
+        [("size", [0.3, 0.15, 0.6, 0.2], 1.0), ("transmission", [0.3, 0.6, 0.9, 1.2], -1.0)],
+    )
+    def test_the_error_only_grows_as_the_limit_is_tightened(
+        self, over: Any, limits: list[float], looser: float
+    ) -> None:
+        constraints = [LargestLink(length=0.25)] if over == "transmission" else USUAL
+        front = trade_off(TASK, over, limits, constraints=constraints, starts=3)
+        order = np.argsort(looser * np.array(limits))
+        errors = front.error[order]
+        assert np.all(np.diff(errors) <= 1e-9 * errors[0])
+        assert errors[0] > 1.5 * errors[-1]
+        for limit, solution in zip(limits, front.solutions):
+            assert solution is not None
+            if over == "size":
+                assert solution.linkage.largest_link <= limit + 1e-9
+            else:
+                assert solution.linkage.least_transmission >= limit - 1e-6
+
+    def test_where_there_is_none_it_is_masked(self) -> None:
+        bounds = {"ground_length": (0.2, 0.3), "crank_length": (0.05, 0.05)}
+        front = trade_off(TASK, "size", [0.1, 0.4], bounds=bounds, starts=2)
+        assert front.solutions[0] is None
+        assert front.error.mask.tolist() == [True, False]
+
+    @pytest.mark.parametrize(
+        ("over", "limits", "message"),
+        [
+            ("mass", [1.0, 2.0], "a trade-off over 'mass'"),
+            ("size", [1.0], "at least two"),
+            ("size", [1.0, np.nan], "finite numbers"),
+        ],
+    )
+    def test_bad_ones(self, over: Any, limits: list[float], message: str) -> None:
+        with pytest.raises(InputError, match=message):
+            trade_off(TASK, over, limits)
+
+
+class TestPrecisionPoints:
+    def met(self, task: PrecisionPoints, **more: Any) -> Solution:
+        options: dict[str, Any] = {
+            "constraints": [FullTurn(), LargestLink(length=6.0)],
+            "starts": 30,
+            "candidates": 1 << 14,
+        }
+        solution = synthesize(task, **options | more).best
+        assert solution.verdicts.sound
+        return solution
+
+    @pytest.mark.parametrize("n", [3, 5, 7])
+    def test_untimed_points_of_a_known_curve_are_met_exactly(self, n: int) -> None:
+        points = known(5).path(np.linspace(0.0, 3.5, n))
+        solution = self.met(PrecisionPoints(points=points), starts=12)
+        assert solution.evaluation.worst < 1e-7
+        rotation = solution.rotation
+        np.testing.assert_allclose(solution.linkage.path(rotation), points, atol=1e-7)
+        assert np.all(np.diff(rotation) > 0.0) or np.all(np.diff(rotation) < 0.0)
+
+    def test_nine_untimed_points(self) -> None:
+        points = known(5).path(np.linspace(0.0, 5.5, 9))
+        assert self.met(PrecisionPoints(points=points), starts=60).evaluation.worst < 1e-7
+
+    def test_five_timed_points(self) -> None:
+        rotation = np.array([0.0, 1.0, 2.2, 3.0, 4.5])
+        points = known(6).path(rotation)
+        solution = self.met(PrecisionPoints(points=points, rotation=rotation))
+        assert solution.evaluation.worst < 1e-7
+
+    def test_five_poses(self) -> None:
+        phi = np.linspace(0.0, 3.5, 5)
+        linkage = known(7)
+        task = PrecisionPoints(points=linkage.path(phi), angle=linkage.coupler_angle(phi))
+        solution = self.met(task, starts=40)
+        assert solution.evaluation.worst < 1e-6
+        assert solution.evaluation.angle_errors is not None
+        assert np.abs(solution.evaluation.angle_errors).max() < 1e-6
+
+    def test_what_can_be_met_is_met_with_the_best_transmission_angle(self) -> None:
+        points = known(5).path(np.linspace(0.0, 3.0, 4))
+        plain = self.met(PrecisionPoints(points=points), starts=6)
+        assert plain.linkage.least_transmission > radians(60)
+
+    def test_too_many_come_as_close_as_they_can(self) -> None:
+        points = np.random.default_rng(0).normal(size=(12, 2))
+        solution = self.met(PrecisionPoints(points=points), starts=6)
+        assert 0.01 < solution.evaluation.worst < 3.0
+
+    def test_timed_motion_of_a_known_linkage(self) -> None:
+        phi = np.linspace(0.0, 4.0, 5)
+        linkage = known(8)
+        task = Motion(points=linkage.path(phi), angle=linkage.coupler_angle(phi) + 0.3, rotation=phi)
+        assert self.met(task, starts=12).error < 1e-12  # type: ignore[arg-type]
+
+
+class TestStraight:
+    def test_a_straight_part_is_flat_and_quick(self) -> None:
+        points = np.array([[0, 0], [0.5, 0], [1, 0], [1.1, 0.25], [0.9, 0.4], [0.5, 0.45], [0.1, 0.4], [-0.1, 0.25]])
+        straight = Straight(start=0, end=2, rotation=2.2, flatness=0.02)
+        task = UntimedPath(
+            path=TargetPath(points=points, closed=True), measure="distance", samples=36, straight=straight
+        )
+        solution = synthesize(
+            task, starts=6, candidates=1 << 13, constraints=[LeastTransmission(), LargestLink(length=4.0)]
+        ).best
+        rotation = solution.evaluation.rotation
+        assert rotation is not None
+        from analysis.synthesis.tasks import normal_form
+
+        part = normal_form(task).straight
+        assert part is not None
+        first, last = rotation[part.start], rotation[part.end]
+        assert abs(last - first) <= 2.2 + 1e-6
+        curve = solution.linkage.path(np.linspace(first, last, 50))
+        assert straightness(curve, direction=0.0).flatness < 0.025
+
+
+def refused(message: str, error: type[Exception] = InputError) -> Any:
+    return pytest.raises(error, match=message)
+
+
+class TestBadInput:
+    @pytest.mark.parametrize(
+        ("points", "message"),
+        [
+            ([[0, 0]], "target points: 1 are too few, there must be at least 2"),
+            ([[0, 0, 0], [1, 1, 1]], r"target points have the shape \(2, 3\)"),
+            ([[0, 0], [1, np.nan]], "target points: number 1 is nan: it must be finite"),
+            ([[0, 0], [1, 1], [1, 1]], r"points 1 and 2 are the same, \[1.0, 1.0\]; leave one out"),
+        ],
+    )
+    def test_points(self, points: list[list[float]], message: str) -> None:
+        with refused(message):
+            TimedPath(points=points)
+        with refused(message.replace("target", "precision")):
+            PrecisionPoints(points=points)
+
+    @pytest.mark.parametrize(
+        ("make", "message"),
+        [
+            (lambda: TimedPath(points=ELLIPSE, rotation=turn(5)), "there must be one for each of the 24 targets"),
+            (
+                lambda: TimedPath(points=ELLIPSE[:3], rotation=[0, 2, 1]),
+                "crank rotations 1 and 2 are 2 and 1 rad: they must go one way",
+            ),
+            (lambda: TimedPath(points=ELLIPSE[:3], rotation=[0, 1, 7]), "no more than a turn can be asked"),
+            (lambda: TimedPath(points=ELLIPSE[:3], weights=[1, -1, 1]), "weight 1 is -1: none may be below zero"),
+            (
+                lambda: TimedPath(points=ELLIPSE[:3], weights=[0, 0, 0]),
+                "weight 0 is 0: none may be below zero, nor all be zero",
+            ),
+            (lambda: RockerFunction(angle=[1.0, 2.0]), "must be a list of at least 3"),
+            (lambda: RockerFunction(angle=[1.0, 2.0, np.inf]), "target angles: number 2 is inf"),
+            (lambda: Motion(points=ELLIPSE[:3], angle=[1.0, 2.0]), "target angles have the shape"),
+            (lambda: Motion(points=ELLIPSE[:3], angle=[1, 2, 3], length=-1.0), "length is -1.0"),
+            (lambda: UntimedPath(path=TargetPath(points=ELLIPSE, closed=True), samples=4), "4 samples of a path"),
+            (lambda: UntimedPath(path=TargetPath(points=ELLIPSE, closed=True), measure="mean"), "measure is 'mean'"),  # type: ignore[arg-type]
+            (lambda: Straight(start=3, end=3, rotation=1.0), "it must run forward"),
+            (lambda: Straight(start=0, end=3, rotation=0.0), "crank rotation of the straight part is 0.0"),
+            (lambda: Straight(start=0, end=3, rotation=1.0, flatness=0.0), "flatness is 0.0"),
+        ],
+    )
+    def test_tasks(self, make: Any, message: str) -> None:
+        with refused(message):
+            make()
+
+    @pytest.mark.parametrize(
+        ("options", "error", "message"),
+        [
+            ({"starts": 0}, InputError, "0 starts: there must be at least one"),
+            ({"candidates": 0}, InputError, "0 candidates"),
+            ({"n_jobs": 0}, InputError, "0 cores"),
+            (
+                {"method": "annealing"},
+                InputError,
+                "method 'annealing': it must be one of scan, differential-evolution, simplex",
+            ),
+            ({"weights": [1.0, 2.0]}, InputError, r"weights have the shape \(2,\)"),
+            ({"constraints": ["short"]}, InputError, "constraint 'short' is none: use LeastTransmission"),
+            ({"bounds": {"crank": (0, 1)}}, ParameterError, "crank is .* have the name of a dimension"),
+            (
+                {"bounds": {"crank_length": (0.2, 0.1)}},
+                InfeasibleError,
+                "crank_length is to be at least 0.2 and at most 0.1",
+            ),
+            ({"bounds": {"crank_length": (0.2, np.inf)}}, ParameterError, "bounds of crank_length"),
+            ({"bounds": {"crank_length": 1.0}}, ParameterError, "be two numbers, the least and the greatest value"),
+            ({"bounds": {"crank_length": (-2.0, -1.0)}}, ParameterError, "a link has a length"),
+            (
+                {"bounds": {"rocker_length": (2.0, 3.0)}, "constraints": [LargestLink(length=1.0)]},
+                InfeasibleError,
+                "rocker_length is to be at least 2 m, and no link longer than 1 m",
+            ),
+            (
+                {"constraints": [Assembly(branch=1), Assembly(branch=-1)]},
+                InfeasibleError,
+                "both assemblies are asked for at once",
+            ),
+            (
+                {"constraints": [Grashof(type="drag-link"), Grashof(type="crank-rocker")]},
+                InfeasibleError,
+                "Grashof types crank-rocker, drag-link are asked for at once",
+            ),
+            (
+                {"constraints": [*USUAL, Grashof(type="triple-rocker")]},
+                InfeasibleError,
+                "the crank of a triple-rocker does not turn fully",
+            ),
+            (
+                {"bounds": {"ground_length": (1.0, 2.0), "coupler_length": (0.1, 0.3), "rocker_length": (0.1, 0.3)}},
+                InfeasibleError,
+                "the crank cannot turn fully: ground link and crank are at least",
+            ),
+            (
+                {
+                    "bounds": {"pivot_x": (5.0, 5.0), "crank_length": (0.3, 0.5)},
+                    "constraints": [*USUAL, LargestLink(length=0.3)],
+                },
+                None,
+                "",
+            ),
+        ],
+    )
+    def test_calls(self, options: dict[str, Any], error: type[Exception] | None, message: str) -> None:
+        if error is None:
+            # silly, and yet feasible: answered
+            assert synthesize(TASK, **QUICK | options).best.error > 10.0
+            return
+        with refused(message, error):
+            synthesize(TASK, **QUICK | options)
+
+    def test_precision_points_have_no_weights(self) -> None:
+        with refused("they have no weights"):
+            synthesize(PrecisionPoints(points=ELLIPSE[:4]), weights=[1, 1, 1, 1])
+
+    def test_an_open_path_needs_rotations_to_be_compared(self) -> None:
+        task = UntimedPath(path=TargetPath(points=ELLIPSE[:9], closed=False))
+        with refused("an open path has no crank rotations of its own"):
+            evaluate(task, known())
+        with refused("say at which ones the linkage is to be compared"):
+            evaluate(PrecisionPoints(points=ELLIPSE[:4]), known())
+
+    def test_where_it_cannot_be_joined_the_error_is_infinite_not_nan(self) -> None:
+        linkage = Linkage(
+            ground_length=1.0, crank_length=0.5, coupler_length=0.6, rocker_length=0.7, point_distance=0.3
+        )
+        assert evaluate(TASK, linkage).error == np.inf
+        assert evaluate(UntimedPath(path=TargetPath(points=ELLIPSE, closed=True)), linkage).error == np.inf
+        assert evaluate(RockerFunction(angle=turn(8)), linkage).error == np.inf
+        assert not Solution.of(TASK, linkage).verdicts.sound
+
+
+def test_a_crank_that_need_not_turn_fully_does_not() -> None:
+    """An arc that wants a triple-rocker: found without a word on full turns, sound over the task."""
+    linkage = Linkage(
+        ground_length=1.0, crank_length=0.5, coupler_length=0.6, rocker_length=0.7, point_distance=0.8, point_angle=0.6
+    )
+    rotation = np.linspace(-0.9, 0.9, 15)
+    task = TimedPath(points=linkage.path(rotation), rotation=rotation)
+    solution = synthesize(
+        task, constraints=[LeastTransmission(angle=radians(20), over="task")], starts=10, candidates=1 << 14
+    ).best
+    assert solution.evaluation.worst < 1e-3
+    assert solution.verdicts.sound
