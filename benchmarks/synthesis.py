@@ -6,17 +6,17 @@ Three tables, all in one run:
 
 1. a coupler curve of 72 points and its Jacobian in a compiled loop, beside NumPy over arrays and pylinkage's steps;
 2. every problem of chapter VI: time until the goal is reached, and until the error is within 1 % of the best that any search
-   of the run found. `synthesize` counts with its whole call, as it comes and with `FEW` candidates and starts. Each other search
-   is begun afresh, in turn of either assembly, until the time given to it is over (``--budget``, s) or it has come to ours. All
-   have the same unknowns, bounds and constraints, and all are measured alike: where one improves, its clock is stopped, the
-   linkage evaluated by the task's own measure, and left out if it violates a constraint;
+   of the run found. `synthesize` counts with its whole call, as it comes and with `FEW` candidates and starts. Each other
+   search is begun afresh, in turn of either assembly, until the time given to it is over (``--budget``, s) or it has come to
+   ours. All have the same unknowns, bounds and constraints, and all are measured alike: where one improves, its clock is
+   stopped, the linkage evaluated by the task's own measure, and left out if it violates a constraint;
 3. of 40 starts each, with bounds alone, how many reach the optimum, and the time a start takes: exact Jacobians (SciPy's least
    squares, IPOPT) and the simplex.
 
-pylinkage (extra ``bench``) counts link lengths alone as dimensions: `PlacedFourBar` opens the others to its optimisers. They
-see the coupler curve by its own compiled solver; the constraints as charges in proportion, as our simplex does; and infinity, as is
-its custom, where the links cannot be joined. Its population methods are followed by its Nelder-Mead, as its manual advises.
-Its closed-form synthesis of paths takes five points; that of functions knows the phase and no weights, so that it is
+pylinkage (extra ``bench``) counts link lengths alone as dimensions: `PlacedFourBar` opens the others to its optimisers. They see
+the coupler curve by its own compiled solver; the constraints as charges in proportion, as our simplex does; and infinity, as
+is its custom, where the links cannot be joined. Its population methods are followed by its Nelder-Mead, as its manual
+advises. Its closed-form synthesis of paths takes five points; that of functions knows the phase and no weights, so that it is
 tried over `PHASES` phases, on the unweighted function alone. Its swarm takes no seed.
 """
 
@@ -280,7 +280,8 @@ class Trace:
 def by_scipy(trace: Trace, box: BlackBox, random: np.random.Generator) -> None:
     """SciPy's differential evolution over whole generations, as `synthesize` does by the method of that name."""
     differential_evolution(
-        lambda x: box.quality(x.T),
+        # where no member keeps the constraints, SciPy asks for the quality of none
+        lambda x: box.quality(x.T) if x.size else np.empty(0),
         Bounds(box.low, box.high),
         maxiter=GENERATIONS,
         popsize=MEMBERS,

@@ -10,7 +10,7 @@ import click
 
 from linkwork import __version__
 
-from . import design, runs, vibration
+from . import design, runs, slider, vibration
 from .common import CHECK_FAILED, ENDED_EARLY, INTERRUPTED, WRONG
 
 __all__ = ["CHECK_FAILED", "ENDED_EARLY", "INTERRUPTED", "WRONG", "main"]
@@ -40,5 +40,6 @@ for _command in (
     vibration.resonance,
     vibration.stability,
     design.synthesize,
+    slider.slider_motion,
 ):
     main.add_command(_command)

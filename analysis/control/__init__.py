@@ -1,15 +1,16 @@
 """Motion of the slider: what it must do, and what that takes.
 
-The best position at every crank angle (`variational_motion`), the best Fourier series (`slider_motion`, `smoothness_curve`), the
-simplest mechanism that is good enough (`simplest_mechanism`); then the force that produces a motion (`inverse_dynamics`,
-`best_spring`), its control on the full plant (`track`), and the motion of least effort within an error bound (`least_effort`).
+The best position at every crank angle (`variational_motion`), the best Fourier series (`slider_motion`,
+`smoothness_curve`), the simplest mechanism that is good enough (`simplest_mechanism`); then the force that produces a motion
+(`inverse_dynamics`, `best_spring`), its control on the full plant (`track`), and the motion of least effort within an error
+bound (`least_effort`).
 """
 
 from __future__ import annotations
 
 from .inverse import BestSpring, SliderDrive, TurnBalance, best_spring, inverse_dynamics
 from .least_effort import EffortError, LeastEffort, least_effort
-from .motion import SmoothnessCurve, slider_motion, smoothness_curve
+from .motion import SmoothnessCurve, motion_of_plant, slider_motion, smoothness_curve
 from .strategy import Step, Strategy, simplest_mechanism
 from .tracking import TrackingController, TrackingMetrics, TrackingResult, track
 from .variational import VariationalMotion, variational_motion
@@ -30,6 +31,7 @@ __all__ = [
     "best_spring",
     "inverse_dynamics",
     "least_effort",
+    "motion_of_plant",
     "simplest_mechanism",
     "slider_motion",
     "smoothness_curve",

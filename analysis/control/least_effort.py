@@ -74,7 +74,7 @@ class EffortError(LinkworkError):
         self.status = status
 
 
-class InfeasibleError(EffortError):
+class UnattainableError(EffortError):
     """No motion keeps all the bounds."""
 
 
@@ -212,7 +212,7 @@ def least_effort(
     ------
     InputError
         If something given is not usable.
-    InfeasibleError
+    UnattainableError
         If no slider position within the stroke keeps the bound at some crank angle, which is named, or IPOPT finds that no
         motion keeps all bounds.
     EffortError
@@ -504,7 +504,7 @@ class _Problem:
 
         Raises
         ------
-        InfeasibleError
+        UnattainableError
             If at some crank angle no slider position keeps the bound.
         """
         p = self.parameters
@@ -534,14 +534,14 @@ class _Problem:
         worst = int(np.argmax(least))
         where = f"at crank angle {degrees(theta[worst]):.1f} deg"
         if not isfinite(least[worst]):
-            raise InfeasibleError(
+            raise UnattainableError(
                 f"{where} the links cannot be joined with a transmission angle of {degrees(self.transmission):g} deg wherever "
                 "the slider is within its stroke",
                 "",
             )
         if least[worst] > self.bound:
             unit = "m" if self.of_point else "rad"
-            raise InfeasibleError(
+            raise UnattainableError(
                 f"the bound of {self.bound:g} {unit} cannot be kept: {where} the error is at least {least[worst]:.4g} {unit} "
                 "wherever the slider is within its stroke",
                 "",
@@ -667,7 +667,7 @@ class _Problem:
             f"IPOPT ended after {statistics['iter_count']} iterations with {status}, bounds violated by {violation:.2g}"
         )
         if status in ("Infeasible_Problem_Detected", "Restoration_Failed"):
-            raise InfeasibleError(
+            raise UnattainableError(
                 f"no motion of the slider was found that keeps the error within {self.bound:g} and all other bounds: {ending}",
                 status,
             )

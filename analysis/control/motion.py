@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from linkwork.errors import InputError
 
+from ..fourier import FourierSeries
 from ..synthesis.constraints import Assembly, Constraint, FullTurn, InfeasibleError, limits_of
 from ..synthesis.linkage import Linkage, SliderMotion
 from ..synthesis.polish import polish
@@ -149,6 +150,23 @@ def greatest(linkage: Linkage, order: int) -> float:
     for _ in range(order):
         series = series.derivative()
     return float(np.abs(series(np.linspace(0.0, 2.0 * pi, 720, endpoint=False))).max())
+
+
+def motion_of_plant(linkage: Linkage) -> FourierSeries:
+    """The slider's position (m) over the plant's crank angle th2 = phi + th20, for `inverse_dynamics` and `track`.
+
+    Raises
+    ------
+    InputError
+        If the rocker pivot is on a second crank.
+    """
+    if linkage.pivot is None:
+        return FourierSeries.constant(0.0)
+    if not isinstance(linkage.pivot, SliderMotion):
+        raise InputError("the rocker pivot is on a second crank: the plant has none")
+    series = linkage.pivot.series
+    turned = (series.cos - 1j * series.sin) * np.exp(-1j * linkage.crank_phase * np.arange(series.order + 1))
+    return FourierSeries(turned.real, -turned.imag)
 
 
 def smoothness_curve(

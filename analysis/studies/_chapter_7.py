@@ -5,8 +5,9 @@ Lengths and errors in the units of print, cm and degrees.
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from functools import cache
-from math import inf, pi
+from math import pi
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -15,9 +16,9 @@ from linkwork.five_bar.published import CM_PER_METRE
 
 from ..control import slider_motion
 from ..figures import COLOURS, Curve, Panel
-from ..synthesis import Linkage, SliderMotion, SliderUnknown, Solution, evaluate
+from ..synthesis import Linkage, SliderMotion, SliderUnknown, Solution, UntimedPath, evaluate, turn
 from ..synthesis.published import PROBLEMS
-from .study import BALANCE, StudyResult, Verdict, at_least
+from .study import BALANCE, StudyResult, Verdict, at_least, padded
 
 FloatArray = NDArray[np.float64]
 
@@ -28,18 +29,29 @@ ASSIGNED = (
 #: The problems whose printed linkages the thesis improves by a moved slider.
 ROCKER, PATH = "rocker-weighted", "path-b"
 TARGET, FIXED = "0.25", "0.55"
-#: Starts of the searches; with them every search below ends at the same best motion for other seeds too.
-ROCKER_STARTS, PATH_STARTS = 24, 6
+#: Starts of the searches, the seed of those for the path, and the stroke they may use (m).
+ROCKER_STARTS, PATH_STARTS, PATH_SEED, STROKE = 24, 8, 2, 0.25
 #: Crank rotations of the curves (rad).
 TURN = np.linspace(0.0, 2.0 * pi, 721)
 
 
 @cache
-def motion(name: str, harmonics: int, *, starts: int, stroke: float = inf, seed: int = 0) -> Solution:
-    """The best Fourier series of the slider for a problem of chapter VI, the links of its printed linkage kept."""
-    p = PROBLEMS[name]
-    unknown = SliderUnknown(harmonics=harmonics, stroke=stroke)
-    return slider_motion(p.task, p.linkage, unknown, starts=starts, seed=seed).best
+def rocker_motion(harmonics: int) -> Solution:
+    """The best Fourier series of the slider for the weighted rocker function, the printed links kept."""
+    p = PROBLEMS[ROCKER]
+    return slider_motion(p.task, p.linkage, SliderUnknown(harmonics=harmonics), starts=ROCKER_STARTS).best
+
+
+@cache
+def path_motion(harmonics: int) -> Solution:
+    """The best Fourier series of the slider for path (b), the printed links kept.
+
+    The guide within a right angle from the ground link and 25 cm of stroke: without bounds the same motions are found, by more
+    starts.
+    """
+    p = PROBLEMS[PATH]
+    unknown = SliderUnknown(harmonics=harmonics, guide_angle=(0.0, 0.5 * pi), stroke=STROKE)
+    return slider_motion(p.task, p.linkage, unknown, starts=PATH_STARTS, seed=PATH_SEED).best
 
 
 def slider(linkage: Linkage) -> SliderMotion:
@@ -71,22 +83,61 @@ def window() -> FloatArray:
     return np.array([heavy.min(), heavy.max()])
 
 
-def motion_columns(who: str, linkage: Linkage) -> dict[str, FloatArray]:
-    """Position of the slider over `TURN`, about its mean where that is far off (cm)."""
-    return {f"{who} slider [cm]": CM_PER_METRE * slider(linkage).series(TURN)}
+def path_columns(linkages: Mapping[str, Linkage]) -> dict[str, FloatArray]:
+    """Path (b) and what linkages, by name, make of it: coupler curves, distances from the target, positions of the slider."""
+    task = PROBLEMS[PATH].task
+    assert isinstance(task, UntimedPath)
+    points = np.asarray(task.path.points)
+    columns = {
+        "crank rotation [deg]": np.degrees(TURN),
+        "target x [cm]": CM_PER_METRE * np.append(points[:, 0], points[0, 0]),
+        "target y [cm]": CM_PER_METRE * np.append(points[:, 1], points[0, 1]),
+        "place on the ellipse [deg]": np.degrees(turn(len(points))),
+    }
+    for name, linkage in linkages.items():
+        xy = CM_PER_METRE * linkage.path(TURN)
+        columns |= {f"{name} x [cm]": xy[:, 0], f"{name} y [cm]": xy[:, 1]}
+        columns[f"{name} distance [cm]"] = CM_PER_METRE * evaluate(task, linkage).errors
+        if linkage.pivot is not None:
+            columns[f"{name} slider [cm]"] = CM_PER_METRE * slider(linkage).series(TURN)
+    return padded(columns)
 
 
-def path_columns(who: str, linkage: Linkage) -> dict[str, FloatArray]:
-    """Coupler curve over `TURN` (cm)."""
-    xy = CM_PER_METRE * linkage.path(TURN)
-    return {f"{who} x [cm]": xy[:, 0], f"{who} y [cm]": xy[:, 1]}
-
-
-def target_columns(name: str) -> dict[str, FloatArray]:
-    """The points of an untimed target, closed (cm)."""
-    points = CM_PER_METRE * np.asarray(PROBLEMS[name].task.path.points)  # type: ignore[union-attr]
-    points = np.vstack([points, points[:1]])
-    return {"target x [cm]": points[:, 0], "target y [cm]": points[:, 1]}
+def path_panels(result: StudyResult, names: Mapping[str, str]) -> list[Panel]:
+    """What `path_columns` holds of some linkages, in three panels; ``names`` maps each to its label."""
+    c = result.columns
+    colours = dict(zip(names, (FIXED, *COLOURS)))
+    curves, distances, sliders = (
+        [Curve(x=c["target x [cm]"], y=c["target y [cm]"], label="target", colour=TARGET, line="--")],
+        [],
+        [],
+    )
+    for name, label in names.items():
+        look = {"label": label, "colour": colours[name]}
+        curves.append(Curve(x=c[f"{name} x [cm]"], y=c[f"{name} y [cm]"], **look))
+        distances.append(Curve(x=c["place on the ellipse [deg]"], y=c[f"{name} distance [cm]"], **look))
+        if f"{name} slider [cm]" in c:
+            # the mean is a matter of where the guide's zero is
+            u = c[f"{name} slider [cm]"]
+            sliders.append(Curve(x=c["crank rotation [deg]"], y=u - np.nanmean(u[:-1]), **look))
+    ticks = range(0, 361, 60)
+    return [
+        Panel(x_label="x [cm]", y_label="y [cm]", curves=curves, equal=True, legend_at="outside"),
+        Panel(
+            x_label="place on the ellipse, its parameter [deg]",
+            y_label="distance from the curve [cm]",
+            curves=distances,
+            x_ticks=ticks,
+            legend_at="outside",
+        ),
+        Panel(
+            x_label="crank rotation [deg]",
+            y_label="slider from its mean [cm]",
+            curves=sliders,
+            x_ticks=ticks,
+            legend_at="outside",
+        ),
+    ]
 
 
 def sound(statement: str, *solutions: Solution) -> Verdict:
@@ -95,7 +146,13 @@ def sound(statement: str, *solutions: Solution) -> Verdict:
 
 
 def over_turn(
-    result: StudyResult, names: dict[str, str], y_label: str, title: str, colours: tuple[str, ...] = COLOURS
+    result: StudyResult,
+    names: Mapping[str, str],
+    y_label: str,
+    *,
+    title: str = "",
+    colours: Sequence[str] = COLOURS,
+    verticals: Mapping[str, float] | None = None,
 ) -> Panel:
     """Columns over the crank's rotation; ``names`` maps each to its label."""
     return Panel(
@@ -106,18 +163,7 @@ def over_turn(
             Curve(x=result.columns["crank rotation [deg]"], y=result.columns[name], label=label, colour=colour)
             for (name, label), colour in zip(names.items(), colours)
         ],
+        verticals=verticals,
         x_ticks=range(0, 361, 60),
-        legend_at="best",
+        legend_at="outside",
     )
-
-
-def curves_panel(result: StudyResult, names: dict[str, str], title: str) -> Panel:
-    """Target and coupler curves to scale; ``names`` maps the first part of each pair of columns to its label."""
-    looks = {"target": (TARGET, "--"), "fixed": (FIXED, "-")}
-    others = iter(COLOURS)
-    curves = []
-    for name, label in names.items():
-        colour, line = looks[name] if name in looks else (next(others), "-")
-        x, y = (result.columns[f"{name} {axis} [cm]"] for axis in "xy")
-        curves.append(Curve(x=x, y=y, label=label, colour=colour, line=line))
-    return Panel(x_label="x [cm]", y_label="y [cm]", title=title, curves=curves, equal=True, legend_at="center")

@@ -38,7 +38,7 @@ ROTATION = 60.0
 #: Direction from the crank pin of a target that the coupler cannot point at, from its own at the ellipse's (deg).
 TURNED = 25.0
 ASSEMBLIES = (("C left of BD", 1), ("C right of BD", -1))
-SAMPLES = 100_001
+SAMPLES = 100_000
 KINDS = ("coupler at the target", "cos th4 = 0, sin th4 = +1", "cos th4 = 0, sin th4 = -1")
 
 

@@ -4,9 +4,8 @@ Within the accessible area of Fig 7.2 the coupler point can follow any path: at 
 position follow in closed form, the crank pin as the intersection of two circles, the slider as that of a circle with the
 guide. Whether the crank can keep turning is another question. P is never farther from the shaft A than l2 + r nor nearer than
 r - l2, and at a point strictly between the crank has one angle to either side of AP. To pass from the one to the other, as a
-full turn must, P has to be at one of the limits: so the crank turns fully along a closed curve round no part of A's side if
-and only if the curve touches both circles about A, where it is tangent to them. Any other closed curve in the area makes
-the crank rock.
+full turn must, P has to be at one of the limits: so the crank turns fully along a closed curve that does not go round A only
+if the curve touches both circles about A. Any other such curve makes the crank rock.
 
 The data of the thesis's figure are lost. The mechanism of Fig 7.2, Table 3.1 with P, in its upper assembly, and an ellipse with
 semi-axes of 6.1 and 2 cm at 48 degrees, placed so that it touches both circles, are our choice; so is the crank's constant
@@ -87,7 +86,7 @@ class Motion(NamedTuple):
 
 
 def inverse(s: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Crank angle (rad) and slider position (m) at points of the curve, for the upper assembly and the crank turning forward."""
+    """Crank angle (rad) and slider position (m) at points of the curve, upper assembly, the crank turning forward."""
     p = mechanism(1)
     l2, r = p.crank_length, p.coupler_point_distance
     point = ellipse(s, centre())

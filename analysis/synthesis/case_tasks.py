@@ -97,7 +97,8 @@ def given(table: Mapping[str, Any], key: str, name: str) -> Any:
 # The task
 
 _CURVE = ("points", "file", "name", "closed", "unit", "x", "y", "n", "start", "end", "scale", "turn", "shift")
-_KINDS: Mapping[str, tuple[str, ...]] = {
+#: Names in the table ``[task]`` of each kind.
+KINDS: Mapping[str, tuple[str, ...]] = {
     "timed-path": (*_CURVE, "rotation", "weights"),
     "untimed-path": (*_CURVE, "measure", "samples", "smoothing", "straight", "weights"),
     "rocker-function": ("angle", "angle_unit", "file", "n", "start", "end", "rotation", "weights", "mounting"),
@@ -110,8 +111,8 @@ def task_from(table: Mapping[str, Any], folder: Path) -> Task:
     """The task of a table ``[task]``; ``folder`` is where its files are looked for."""
     if "kind" not in table:
         raise MissingParameterError("task.kind")
-    kind = one_of(table["kind"], "task.kind", _KINDS)
-    _known(table, "task", ("kind", *_KINDS[kind]))
+    kind = one_of(table["kind"], "task.kind", KINDS)
+    _known(table, "task", ("kind", *KINDS[kind]))
     if kind == "rocker-function":
         return _rocker_function(table, folder)
     path, turned = _curve(table, folder, points=kind in ("motion", "precision-points"))

@@ -254,7 +254,8 @@ def bounds_from(table: Mapping[str, Any]) -> dict[str, tuple[float, float]]:
     return bounds
 
 
-_CONSTRAINTS = (
+#: Names in the table ``[constraints]``.
+CONSTRAINTS = (
     "least_transmission_angle",
     "over",
     "full_turn",
@@ -269,7 +270,7 @@ _CONSTRAINTS = (
 
 def constraints_from(table: Mapping[str, Any]) -> tuple[Constraint, ...]:
     """Constraints of a table ``[constraints]``; 40 degrees over a full turn where no transmission angle is given."""
-    _known(table, "constraints", _CONSTRAINTS)
+    _known(table, "constraints", CONSTRAINTS)
     found: list[Constraint] = []
     angle = table.get("least_transmission_angle", LeastTransmission().angle)
     # a crank that cannot turn fully is looked at where it works

@@ -271,7 +271,7 @@ def columns_of(solutions: Sequence[Solution]) -> dict[str, list[float]]:
         put(f"rms error [{length}]", s.evaluation.rms)
         put(f"worst error [{length}]", s.evaluation.worst)
         for name in ("full_turn", "circuit", "branch", "order"):
-            put(f"{name.replace('_', ' ')} (1 kept, 0 not)", getattr(s.verdicts, name))
+            put(f"{name.replace('_', ' ')} (1 or 0)", getattr(s.verdicts, name))
         put("least transmission angle [rad]", s.verdicts.least_transmission)
         put("greatest transmission angle [rad]", s.verdicts.greatest_transmission)
         for name, value in s.linkage.values().items():

@@ -21,7 +21,7 @@ from linkwork.five_bar.published import SETS, TABLE_3_1
 
 pytest.importorskip("casadi")
 
-from analysis.control.least_effort import EffortError, InfeasibleError, _shortest_way, least_effort
+from analysis.control.least_effort import EffortError, UnattainableError, _shortest_way, least_effort
 
 SPEED = SETS["rig-2-spring-c"].crank_speed
 RIG = replace(SETS["rig-2-spring-c"].parameters, coupler_point_distance=0.2, coupler_point_angle=0.5)
@@ -277,13 +277,13 @@ def test_the_shortest_way_is_that_of_all_closed_ways() -> None:
 
 def test_what_cannot_be_is_told() -> None:
     with pytest.raises(
-        InfeasibleError, match=r"bound of 0\.001 m cannot be kept: at crank angle \d+\.0 deg the error is at"
+        UnattainableError, match=r"bound of 0\.001 m cannot be kept: at crank angle \d+\.0 deg the error is at"
     ):
         least_effort(RIG, SPEED, TARGET, 1e-3, stroke=(-0.002, 0.006))
-    with pytest.raises(InfeasibleError, match=r"cannot be joined with a transmission angle of 5 deg"):
+    with pytest.raises(UnattainableError, match=r"cannot be joined with a transmission angle of 5 deg"):
         least_effort(RIG, SPEED, TARGET, 1e-3, stroke=(5.0, 6.0))
     with pytest.raises(
-        InfeasibleError, match=r"and all other bounds: IPOPT ended after \d+ iterations with Inf"
+        UnattainableError, match=r"and all other bounds: IPOPT ended after \d+ iterations with Inf"
     ) as caught:
         least_effort(RIG, SPEED, TARGET, 1e-3, force=5.0)
     assert caught.value.status == "Infeasible_Problem_Detected"

@@ -207,9 +207,8 @@ def test_a_trade_off_marks_limits_without_a_linkage(tmp_path) -> None:
     solutions = (None, timed(), timed(replace(LINKAGE, crank_length=0.048)))
     traded = TradeOff(over="size", limit=np.array([0.1, 0.3, 1.0]), solutions=solutions)
     figure = traded.plot()
-    for axis, values in zip(
-        figure.axes, ([1e6 * s.error for s in solutions[1:]], [1e3 * s.evaluation.worst for s in solutions[1:]])
-    ):
+    expected = ([1e6 * s.error for s in solutions[1:]], [1e3 * s.evaluation.worst for s in solutions[1:]])
+    for axis, values in zip(figure.axes, expected):
         curve, none = axis.lines
         np.testing.assert_allclose(curve.get_xdata(), [100.0, 300.0, 1000.0])
         np.testing.assert_allclose(curve.get_ydata()[1:], values)

@@ -38,6 +38,7 @@ from analysis.synthesis import (
     turn,
 )
 from analysis.synthesis.areas import straightness
+from analysis.synthesis.polish import Polished, polish
 from linkwork.errors import InputError, ParameterError
 from tests.linkages import drawn
 
@@ -83,16 +84,21 @@ class TestResult:
         assert poor.best.error > 1.5 * good.error
 
     @pytest.mark.parametrize("n_jobs", [1, 2])
-    def test_interrupted_it_hands_over_the_best_so_far(self, n_jobs: int) -> None:
-        timer = threading.Timer(2.0, signal.raise_signal, [signal.SIGINT])
-        timer.start()
+    def test_interrupted_it_hands_over_the_best_so_far(self, monkeypatch: pytest.MonkeyPatch, n_jobs: int) -> None:
+        timer = threading.Timer(0.5 if n_jobs == 1 else 2.0, signal.raise_signal, [signal.SIGINT])
+
+        def long(normal: Any, limits: Any, starts: Any, **more: Any) -> Polished:
+            timer.start()
+            return polish(normal, limits, list(starts) * 200, **more)
+
+        monkeypatch.setattr("analysis.synthesis.solve.polish", long)
         with pytest.raises(SynthesisInterrupted, match=r"stopped after \d+ of \d+ searches") as caught:
-            synthesize(TASK, starts=2000, candidates=1 << 11, n_jobs=n_jobs)
+            synthesize(TASK, n_jobs=n_jobs, **QUICK)
         timer.join()
         found = caught.value.synthesis
         assert found is not None
         assert not found.complete
-        assert 0 < found.starts < 1000
+        assert 0 < found.starts < 800
         assert found.best.error < 1e-3
 
     def test_interrupted_in_the_scan_there_is_none_yet(self, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -206,7 +212,7 @@ class TestRounding:
     @pytest.mark.parametrize("kind", ["timed", "motion", "rocker", "closed", "area"])
     def test_expected_is_the_mean_over_random_errors_of_make(self, kind: str) -> None:
         solution = judged(kind)
-        length, angle = 0.02, radians(1.0)
+        length, angle = 0.004, radians(0.3)
         random = np.random.default_rng(2)
         errors = []
         for _ in range(1500):
@@ -245,7 +251,7 @@ class TestTradeOff:
         order = np.argsort(looser * np.array(limits))
         errors = front.error[order]
         assert np.all(np.diff(errors) <= 1e-9 * errors[0])
-        assert errors[0] > 1.5 * errors[-1]
+        assert errors[0] > 1.2 * errors[-1]
         for limit, solution in zip(limits, front.solutions):
             assert solution is not None
             if over == "size":

@@ -1,0 +1,469 @@
+"""`linkwork synthesize`, and the case files it reads."""
+
+from __future__ import annotations
+
+import json
+import re
+import tomllib
+from dataclasses import replace
+from math import cos, degrees, pi, radians, sin
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from analysis import cli, io
+from analysis.simulate import simulate
+from analysis.symbolic import library
+from analysis.synthesis import (
+    Assembly,
+    FullTurn,
+    Grashof,
+    LargestLink,
+    LeastTransmission,
+    Motion,
+    PivotRegion,
+    PrecisionPoints,
+    Solution,
+    SynthesisInterrupted,
+    TimedPath,
+    cases,
+    turn,
+)
+from analysis.synthesis.case_tasks import KINDS
+from analysis.synthesis.cases import load_synthesis_case, synthesis_case_from
+from analysis.synthesis.constraints import UNKNOWNS
+from analysis.synthesis.program import traced
+from analysis.synthesis.requirements import requirement
+from linkwork.errors import InputError, LinkworkError, ParameterError
+
+ROOT = Path(__file__).parents[2]
+ELLIPSE = '[task]\nkind = "timed-path"\nx = "20 + 10*cos(t)"\ny = "15 + 5*sin(t)"\nunit = "cm"\nn = 24\n'
+#: Few starts: enough for an ellipse.
+QUICK = "[search]\ncandidates = 4096\nstarts = 3\nsolutions = 2\n"
+CAPPED = ELLIPSE + QUICK + '[constraints]\nlargest_link = "50 cm"\n'
+SQUARE = "[[0, 0], [1, 0], [1, 1], [0, 1]]"
+
+
+@pytest.fixture
+def linkwork(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+
+    def call(*arguments):
+        return CliRunner().invoke(cli.main, [str(a) for a in arguments], catch_exceptions=False)
+
+    return call
+
+
+def case(text: str, folder: Path, **overrides):
+    path = folder / "case.toml"
+    path.write_text(text)
+    return load_synthesis_case(path, overrides)
+
+
+# The command
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("run")
+    (folder / "case.toml").write_text(CAPPED + '[trade_off]\nover = "size"\nlimits = ["40 cm", "50 cm"]\nstarts = 1\n')
+    result = CliRunner().invoke(
+        cli.main, ["synthesize", str(folder / "case.toml"), "--out", str(folder / "out")], catch_exceptions=False
+    )
+    assert result.exit_code == 0, result.output
+    return result, folder
+
+
+def test_help_shows_examples(linkwork) -> None:
+    assert "Examples:" in linkwork("synthesize", "--help").output
+
+
+def test_it_tells_and_writes_what_it_found(run) -> None:
+    result, folder = run
+    written = {path.name for path in (folder / "out").iterdir()}
+    assert written == {
+        "solutions.csv", "best-curve.csv", "best-report.txt", "best.dxf", "best.svg", "five-bar-parameters.toml",
+        "five-bar.toml", "best-linkage.png", "alternatives.png", "trade-off.csv", "trade-off.png",
+    }  # fmt: skip
+    assert all(f"wrote {folder / 'out' / name}" in result.output for name in written)
+    rows = np.genfromtxt(folder / "out" / "solutions.csv", delimiter=",", names=True, deletechars="")
+    first = rows[0] if rows.ndim else rows
+    # as told, in mm2, and what the curve's file adds up to
+    assert f"{1e6 * first['quality_[m2]']:.5g}" in result.output
+    curve = np.genfromtxt(folder / "out" / "best-curve.csv", delimiter=",", names=True, deletechars="")
+    assert (curve["error_[m]"] ** 2).sum() == pytest.approx(first["quality_[m2]"])
+    assert first["ground_length_[m]"] <= 0.5 + 1e-6
+    assert first["least_transmission_angle_[rad]"] >= radians(40.0) - 1e-6
+    trade = np.genfromtxt(folder / "out" / "trade-off.csv", delimiter=",", names=True, deletechars="")
+    assert trade["quality_[m2]"][0] > trade["quality_[m2]"][1]
+    assert "crank-rocker" in result.output
+    assert "no circuit defect" not in result.output
+
+
+def test_the_five_bar_runs_and_its_point_traces_the_path(run, linkwork) -> None:
+    _, folder = run
+    chosen = io.load_case(folder / "out" / "five-bar.toml")
+    assert io.load_parameters(folder / "out" / "five-bar-parameters.toml") == chosen.parameters
+    motion = simulate(
+        chosen.parameters, chosen.inputs, initial=chosen.initial, stop_time=chosen.stop_time, step=chosen.step
+    )
+    curve = np.genfromtxt(folder / "out" / "best-curve.csv", delimiter=",", names=True, deletechars="")
+    # the plant's frame is that of the ground link, from A
+    rows = np.genfromtxt(folder / "out" / "solutions.csv", delimiter=",", names=True, deletechars="")
+    first = rows[0] if rows.ndim else rows
+    a1 = float(first["ground_angle_[rad]"])
+    place = np.column_stack([motion["coupler.point.x"], motion["coupler.point.y"]])
+    plane = place @ np.array([[cos(a1), sin(a1)], [-sin(a1), cos(a1)]]) + [first["pivot_x_[m]"], first["pivot_y_[m]"]]
+    made = np.column_stack([curve["path_x_[m]"], curve["path_y_[m]"]])
+    # samples a 360th of a turn apart; the slider gives by some micrometres
+    assert len(plane) == 721
+    np.testing.assert_allclose(plane[360 : 720 : 360 // len(made)], made, atol=1e-4)
+    assert np.abs(motion["slider.position"]).max() < 1e-4
+    result = linkwork("run", folder / "out" / "five-bar.toml", "--no-plot")
+    assert result.exit_code == 0, result.output
+
+
+def test_options_and_settings_reach_the_search(linkwork, tmp_path) -> None:
+    (tmp_path / "case.toml").write_text(CAPPED)
+    again = [
+        linkwork(
+            "synthesize", "case.toml", "--no-plots", "--out", out, "--seed", 3, "--jobs", 1, "--set", "task.n=36",
+            "--set", "constraints.largest_link=45 cm", "--set", 'bounds.crank_length=["10 mm", "80 mm"]',
+        )
+        for out in ("a", "b")
+    ]  # fmt: skip
+    assert [r.exit_code for r in again] == [0, 0]
+    first, second = (Path(out, "solutions.csv").read_bytes() for out in ("a", "b"))
+    assert first == second
+    assert not list(Path("a").glob("*.png"))
+    assert len(np.genfromtxt("a/best-curve.csv", delimiter=",", skip_header=1)) == 36
+    values = np.genfromtxt("a/solutions.csv", delimiter=",", names=True, deletechars="")
+    assert np.max(values["ground_length_[m]"]) <= 0.45 + 1e-6
+
+
+def test_an_animation_is_made_where_it_is_asked_for(linkwork, tmp_path, monkeypatch) -> None:
+    (tmp_path / "case.toml").write_text(CAPPED)
+    asked = []
+    monkeypatch.setattr(Solution, "animate", lambda self, path, **more: asked.append((path.name, more)) or path)
+    assert linkwork("synthesize", "case.toml", "--no-plots", "--animate").exit_code == 0
+    assert asked == [("best.gif", {"title": "case"})]
+
+
+def test_an_interrupted_search_keeps_its_best(linkwork, tmp_path, monkeypatch) -> None:
+    (tmp_path / "case.toml").write_text(CAPPED)
+    found = cases.synthesize
+
+    def stopped(*arguments, **more):
+        raise SynthesisInterrupted(found(*arguments, **more), 2, 3)
+
+    monkeypatch.setattr(cases, "synthesize", stopped)
+    result = linkwork("synthesize", "case.toml", "--no-plots")
+    assert result.exit_code == cli.INTERRUPTED
+    assert "stopped after 2 of 3 searches; the best so far is kept" in result.stderr
+    assert Path("out/solutions.csv").exists()
+
+    def nothing(*arguments, **more):
+        raise SynthesisInterrupted(None, 0, 3)
+
+    monkeypatch.setattr(cases, "synthesize", nothing)
+    assert linkwork("synthesize", "case.toml", "--out", "none").exit_code == cli.INTERRUPTED
+    assert not Path("none").exists()
+
+
+def test_a_solution_with_a_defect_is_told(linkwork, tmp_path, monkeypatch) -> None:
+    (tmp_path / "case.toml").write_text(CAPPED)
+    found = cases.synthesize
+
+    def spoilt(*arguments, **more):
+        result = found(*arguments, **more)
+        verdicts = replace(result.best.verdicts, branch=False)
+        return replace(result, solutions=(replace(result.best, verdicts=verdicts),))
+
+    monkeypatch.setattr(cases, "synthesize", spoilt)
+    result = linkwork("synthesize", "case.toml", "--no-plots")
+    assert result.exit_code == 0
+    said = " ".join(result.stderr.split())
+    assert "none of them is free of defects" in said
+    assert "branch defect" in said
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("", "parameter task is missing"),
+        ("[tsk]", "there is no tsk; did you mean task?"),
+        ("task = 3", "parameter task is 3: it must be a table"),
+        ("[task]", "parameter task.kind is missing"),
+        ('[task]\nkind = "timed"', "did you mean timed-path?"),
+        ('[task]\nkind = "timed-path"', "there is none of them"),
+        (ELLIPSE + 'file = "a.csv"', "there are task.file and task.x"),
+        (ELLIPSE + "wieghts = [1]", "did you mean task.weights?"),
+        (ELLIPSE.replace("cos(t)", "cso(t)"), "did you mean cos?"),
+        (ELLIPSE.replace('"cm"', '"kg"'), "it must be a unit of length"),
+        (ELLIPSE.replace("24", "2"), "task.n is 2: it must be at least 3"),
+        (ELLIPSE + "weights = [1, 2]", "there must be one for each of the 24 targets"),
+        (ELLIPSE + 'weights = [{ from = "400 deg", to = "500 deg", weight = 2 }]', "hold at least one target"),
+        (ELLIPSE + 'weights = [{ from = "4 deg", to = "50 deg" }]', "task.weights[0].weight is missing"),
+        (ELLIPSE + 'rotation = { from = "0 deg" }', "task.rotation.to is missing"),
+        ('[task]\nkind = "timed-path"\npoints = [[0, 0], [0, 0], [1, 1]]', "points 0 and 1 are the same"),
+        ('[task]\nkind = "timed-path"\npoints = [[0, 0], [nan, 0], [1, 1]]', "number 1 is nan: it must be finite"),
+        ('[task]\nkind = "timed-path"\npoints = []', "0 are too few"),
+        ('[task]\nkind = "timed-path"\npoints = [["1", 0], [1, 1]]', "come with its unit"),
+        ('[task]\nkind = "untimed-path"\nfile = "none.svg"', "none.svg cannot be read"),
+        (f'[task]\nkind = "untimed-path"\npoints = {SQUARE}\nsmoothing = "yes"', "true, false, or a table"),
+        (
+            f'[task]\nkind = "untimed-path"\npoints = {SQUARE}\nsmoothing = true\n'
+            'straight = { start = 0, end = 1, rotation = "90 deg" }',
+            "not come with task.straight",
+        ),
+        ('[task]\nkind = "rocker-function"\nangle = [1, 2]', "must be a list of at least 3"),
+        ('[task]\nkind = "rocker-function"\nangle = "70+"', "cannot be read"),
+        ('[task]\nkind = "rocker-function"\nangle = "1"\nangle_unit = "mm"', "it must be a unit of angle"),
+        (f'[task]\nkind = "motion"\npoints = {SQUARE}', "task.angle is missing"),
+        (f'[task]\nkind = "precision-points"\npoints = {SQUARE}\nweights = [1, 1, 1, 1]', "there is no task.weights"),
+        (ELLIPSE + "[bounds]\ncrank_lenght = [0, 1]", "did you mean bounds.crank_length?"),
+        (ELLIPSE + '[bounds]\ncrank_length = ["3 m", "1 m"]', "crank_length is to be at least 3 and at most 1"),
+        (ELLIPSE + '[bounds]\ncrank_length = ["1 deg", "2 deg"]', "it must be a number in m"),
+        (ELLIPSE + "[bounds]\ncrank_length = [1]", "[least, greatest]"),
+        (ELLIPSE + '[bounds]\nground_length = "3 m"\n[constraints]\nlargest_link = "1 m"', "no linkage has both"),
+        (ELLIPSE + "[constraints]\nleast_transmission_angle = 40", "a number without a unit is in rad"),
+        (ELLIPSE + '[constraints]\ngrashof = "crank-roker"', "did you mean crank-rocker?"),
+        (ELLIPSE + '[constraints]\ngrashof = "double-rocker"\nfull_turn = true', "does not turn fully"),
+        (ELLIPSE + "[constraints]\nassembly = 2", "be +1 or -1"),
+        (ELLIPSE + "[constraints]\npivot_A = [[0, 0], [1, 1]]", "at least 3 finite corners"),
+        (ELLIPSE + '[constraints]\nrequire = ["crank_lenght <= 3 mm"]', "did you mean crank_length?"),
+        (ELLIPSE + '[search]\nmethod = "simplx"', "did you mean simplex?"),
+        (ELLIPSE + "[search]\nstarts = 0", "search.starts is 0: it must be at least 1"),
+        (ELLIPSE + "[search]\njobs = 0", "a number of cores, or -1"),
+        (ELLIPSE + '[make]\nspeed = "1 Hz"', "be in rad/s or rpm"),
+        (ELLIPSE + "[make]\nwidth = 0", "make.width is 0: it must be greater than zero"),
+        (ELLIPSE + '[trade_off]\nover = "mass"\nlimits = [1, 2]', "the names are size, transmission"),
+        (ELLIPSE + '[trade_off]\nover = "size"\nlimits = [1]', "be at least two"),
+        (
+            ELLIPSE + QUICK + "[constraints]\nlargest_link = 0.5\npivot_A = [[9, 9], [10, 9], [9, 10]]",
+            "no linkage keeps all bounds and constraints",
+        ),
+    ],
+)
+def test_what_is_wrong_is_told_in_a_sentence(linkwork, tmp_path, text, said) -> None:
+    (tmp_path / "case.toml").write_text(text)
+    result = linkwork("synthesize", "case.toml")
+    assert result.exit_code == cli.WRONG, result.output
+    assert said in " ".join(result.stderr.split())
+    assert "Traceback" not in result.output + result.stderr
+
+
+def test_a_setting_without_a_value_is_refused(linkwork, tmp_path) -> None:
+    (tmp_path / "case.toml").write_text(ELLIPSE)
+    assert linkwork("synthesize", "case.toml", "--set", "nonsense").exit_code == 2
+    assert linkwork("synthesize", "case.toml", "--set", "task.n.m=3").exit_code == cli.WRONG
+
+
+# Tasks from tables
+
+
+def test_points_file_and_formula_give_the_same_target(tmp_path) -> None:
+    phi = turn(24)
+    points = np.column_stack([20.0 + 10.0 * np.cos(phi), 15.0 + 5.0 * np.sin(phi)])
+    (tmp_path / "ellipse.csv").write_text("x,y\n" + "\n".join(f"{x!r},{y!r}" for x, y in points.tolist()))
+    written = ", ".join(f"[{x!r}, '{10.0 * y!r} mm']" for x, y in points.tolist())
+    kind = '[task]\nkind = "timed-path"\nunit = "cm"\n'
+    for text in (ELLIPSE, kind + 'file = "ellipse.csv"\n', kind + f"points = [{written}]\n"):
+        task = case(text, tmp_path).task
+        assert isinstance(task, TimedPath)
+        np.testing.assert_allclose(task.points, 0.01 * points)
+        np.testing.assert_allclose(task.rotation, phi)
+
+
+def test_a_target_is_scaled_turned_and_shifted(tmp_path) -> None:
+    text = ELLIPSE + 'scale = 2.0\nturn = "90 deg"\nshift = [1, "2 mm"]\n'
+    phi = turn(24)
+    x, y = 0.2 + 0.1 * np.cos(phi), 0.15 + 0.05 * np.sin(phi)
+    np.testing.assert_allclose(case(text, tmp_path).task.points, np.column_stack([-2.0 * y + 0.01, 2.0 * x + 0.002]))
+
+
+def test_windows_weigh_what_is_within_their_ends(tmp_path) -> None:
+    windows = (
+        'weights = [{ from = "60 deg", to = "90 deg", weight = 10 }, { from = "90 deg", to = "105 deg", weight = 3 }]\n'
+    )
+    weights = case(ELLIPSE + windows, tmp_path).task.weights
+    expected = np.ones(24)
+    expected[4:6], expected[6:8] = 10.0, 3.0
+    np.testing.assert_array_equal(weights, expected)
+    # of an untimed path, numbers of points
+    untimed = f'[task]\nkind = "untimed-path"\npoints = {SQUARE}\nweights = [{{ from = 1, to = 2, weight = 5 }}]\n'
+    np.testing.assert_array_equal(case(untimed, tmp_path).task.weights, [1.0, 5.0, 5.0, 1.0])
+
+
+def test_rotations_in_equal_steps_or_as_a_list(tmp_path) -> None:
+    text = ELLIPSE + 'rotation = { from = "10 deg", to = "240 deg" }\n'
+    np.testing.assert_allclose(case(text, tmp_path).task.rotation, np.radians(np.linspace(10.0, 240.0, 24)))
+    points = f'[task]\nkind = "timed-path"\npoints = {SQUARE}\nrotation = [0, "10 deg", "20 deg", "50 deg"]\n'
+    np.testing.assert_allclose(case(points, tmp_path).task.rotation, np.radians([0.0, 10.0, 20.0, 50.0]))
+
+
+def test_a_function_of_the_rocker_as_formula_list_and_file(tmp_path) -> None:
+    phi = np.linspace(0.0, pi, 7)
+    angle = 70.0 + 100.0 * np.abs(np.sin(0.5 * phi))
+    (tmp_path / "rocker.csv").write_text(
+        "\n".join(f"{degrees(p)!r};{a!r}" for p, a in zip(phi.tolist(), angle.tolist()))
+    )
+    kind = '[task]\nkind = "rocker-function"\nangle_unit = "deg"\n'
+    formula = kind + 'angle = "70 + 100*abs(sin(t/2))"\nn = 7\nend = "180 deg"\nmounting = true\n'
+    listed = f'{kind}angle = {angle.tolist()}\nrotation = {{ from = 0, to = "180 deg" }}\n'
+    for text in (formula, formula.replace('"180 deg"', '"pi"'), kind + 'file = "rocker.csv"\n', listed):
+        task = case(text, tmp_path).task
+        np.testing.assert_allclose(task.angle, np.radians(angle))
+        np.testing.assert_allclose(task.rotation, phi)
+        assert task.mounting is ("mounting" in text)
+
+
+def test_motion_and_precision_points(tmp_path) -> None:
+    text = f'[task]\nkind = "motion"\npoints = {SQUARE}\nangle = [0, 10, "0.5 rad", 30]\nangle_unit = "deg"\nlength = "2 m"\n'
+    task = case(text, tmp_path).task
+    assert isinstance(task, Motion)
+    np.testing.assert_allclose(task.angle, [0.0, radians(10.0), 0.5, radians(30.0)])
+    assert (task.length, task.rotation) == (2.0, None)
+    # a body turned with its target
+    turned = case(text + 'turn = "15 deg"\n', tmp_path).task
+    np.testing.assert_allclose(turned.angle, task.angle + radians(15.0))
+    precise = case(f'[task]\nkind = "precision-points"\npoints = {SQUARE}\n', tmp_path).task
+    assert isinstance(precise, PrecisionPoints)
+    assert precise.angle is None
+
+
+def test_an_untimed_path_with_a_straight_part_or_smoothed(tmp_path) -> None:
+    text = (
+        f'[task]\nkind = "untimed-path"\npoints = {SQUARE}\nmeasure = "distance"\nsamples = 40\nclosed = false\n'
+        'straight = { start = 0, end = 1, rotation = "90 deg", flatness = "1 mm" }\n'
+    )
+    task = case(text, tmp_path).task
+    assert (task.measure, task.samples, task.path.closed) == ("distance", 40, False)
+    assert (task.straight.end, task.straight.flatness) == (1, 1e-3)
+    assert task.straight.rotation == pytest.approx(pi / 2.0)
+    (tmp_path / "hand-drawn.svg").write_text((ROOT / "examples" / "hand-drawn.svg").read_text())
+    drawn = '[task]\nkind = "untimed-path"\nfile = "hand-drawn.svg"\nname = "curve"\nsmoothing = '
+    rough, smooth = (
+        case(drawn + how, tmp_path).task.path for how in ("false", '{ points = 90, deviation = "0.5 mm" }')
+    )
+    assert len(smooth.points) == 90
+    assert smooth.closed
+    assert smooth.length < rough.length
+    assert smooth.enclosed_area == pytest.approx(rough.enclosed_area, rel=0.02)
+
+
+def test_bounds_constraints_and_the_rest(tmp_path) -> None:
+    text = (
+        ELLIPSE
+        + '[bounds]\nground_angle = "30 deg"\ncrank_length = [0.01, "80 mm"]\n'
+        + '[constraints]\nleast_transmission_angle = "35 deg"\nover = "task"\nfull_turn = true\ngrashof = "drag-link"\n'
+        + 'largest_link = "1 m"\nassembly = -1\npivot_A = [[0, 0], [1, 0], ["1000 mm", 1]]\n'
+        + 'require = ["crank_length >= 10 mm"]\n[make]\ndensity = "2.7 g/cm^3"\nspeed = "120 rpm"\n'
+        + '[trade_off]\nover = "transmission"\nlimits = ["20 deg", "40 deg"]\n'
+    )
+    found = case(text, tmp_path)
+    assert found.bounds == {
+        "ground_angle": (pytest.approx(radians(30.0)),) * 2,
+        "crank_length": (0.01, pytest.approx(0.08)),
+    }
+    kinds = [type(c) for c in found.constraints]
+    assert kinds[:6] == [LeastTransmission, FullTurn, Grashof, LargestLink, Assembly, PivotRegion]
+    assert (found.constraints[0].angle, found.constraints[0].over) == (pytest.approx(radians(35.0)), "task")
+    np.testing.assert_allclose(found.constraints[5].polygon, [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0]])
+    assert (found.make.density, found.make.speed) == (pytest.approx(2700.0), pytest.approx(4.0 * pi))
+    np.testing.assert_allclose(found.trade_off.limits, np.radians([20.0, 40.0]))
+    # without a table, and with one that says nothing of it, 40 degrees over the turn
+    for more in ("", "[constraints]\nlargest_link = 1\n"):
+        assert case(ELLIPSE + more, tmp_path).constraints[0] == LeastTransmission()
+    assert case(ELLIPSE + "[constraints]\nleast_transmission_angle = false\n", tmp_path).constraints == ()
+    # a crank that swings is not asked to turn
+    swings = case(ELLIPSE + '[constraints]\ngrashof = "double-rocker"\n', tmp_path).constraints
+    assert swings[0] == LeastTransmission(over="task")
+
+
+def test_overrides_reach_any_depth(tmp_path) -> None:
+    found = case(
+        CAPPED, tmp_path, **{"task.rotation.to": "200 deg", "task.rotation.from": 0, "search.seed": 7, "title": "x"}
+    )
+    assert found.task.rotation[-1] == pytest.approx(radians(200.0))
+    assert (found.search.seed, found.title) == (7, "x")
+
+
+def test_json_does_as_well(tmp_path) -> None:
+    data = {"task": {"kind": "timed-path", "x": "cos(t)", "y": "sin(t)"}, "search": {"seed": 4}}
+    (tmp_path / "case.json").write_text(json.dumps(data))
+    assert load_synthesis_case(tmp_path / "case.json").search.seed == 4
+    assert data == json.loads((tmp_path / "case.json").read_text())
+
+
+def test_the_examples_and_the_documentation_are_readable() -> None:
+    examples = [
+        p for p in (ROOT / "examples").glob("*.toml") if "[task]" in p.read_text() and "[slider" not in p.read_text()
+    ]
+    assert len(examples) >= 4
+    for path in examples:
+        load_synthesis_case(path)
+    page = (ROOT / "docs" / "synthesis-cases.md").read_text()
+    (block,) = re.findall(r"```toml\n(.*?)```", page, flags=re.DOTALL)
+    synthesis_case_from(tomllib.loads(block), folder=ROOT)
+    for names in (cases.TABLES, *KINDS.values(), cases.CONSTRAINTS):
+        for name in names:
+            assert re.search(rf"\b{name}\b", page), name
+
+
+# Requirements
+
+
+@pytest.mark.parametrize(
+    ("text", "difference"),
+    [
+        ("crank_length + coupler_length <= 300 mm", lambda p: p.crank_length + p.coupler_length - 0.3),
+        ("crank_length >= 0.2*ground_length", lambda p: 0.2 * p.ground_length - p.crank_length),
+        ("ground_angle == 30 deg", lambda p: p.ground_angle - pi / 6.0),
+        ("-sin(point_angle)**2/2 < pivot_x - 1.5e-1 m", lambda p: -(sin(p.point_angle) ** 2) / 2.0 - p.pivot_x + 0.15),
+        ("atan2(pivot_y, pivot_x)*pi > 2", lambda p: 2.0 - pi * np.arctan2(p.pivot_y, p.pivot_x)),
+    ],
+)
+def test_a_requirement_is_the_difference_of_its_sides(text, difference) -> None:
+    found = requirement(text)
+    assert found.equal is ("==" in text)
+    casadi = library()
+    symbols = {name: casadi.SX.sym(name) for name in UNKNOWNS}
+    function = casadi.Function("f", list(symbols.values()), [traced(found, SimpleNamespace(**symbols))])
+    for values in np.random.default_rng(1).uniform(0.1, 3.0, (20, len(UNKNOWNS))).tolist():
+        p = SimpleNamespace(**dict(zip(UNKNOWNS, values)))
+        assert found.function(p) == pytest.approx(difference(p), abs=1e-12)
+        # and traced with CasADi's symbols
+        assert float(function(*values)) == pytest.approx(difference(p), abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "crank_length", "crank_length <= 1 <= 2", "crank_length <= (1", "crank_length.real <= 1", "__import__(1) <= 1",
+        "sin(1, 2) <= 1", "crank_length <= 3 furlong", "(lambda: 1)() <= 1", "crank_length and 1 <= 2", "'a' <= 1", "p <= 1",
+        "crank_length <= 1e999", "True <= crank_length", "sin() <= 1",
+    ],
+)  # fmt: skip
+def test_what_is_no_requirement_is_refused(text) -> None:
+    with pytest.raises(LinkworkError):
+        requirement(text)
+
+
+def test_a_requirement_is_kept(tmp_path) -> None:
+    free = case(ELLIPSE + QUICK + '[constraints]\nlargest_link = "50 cm"\n', tmp_path).solve().best.linkage
+    held = case(CAPPED + 'require = ["coupler_length <= 0.3*rocker_length"]\n', tmp_path).solve().best.linkage
+    assert free.coupler_length > 0.3 * free.rocker_length
+    assert held.coupler_length <= 0.3 * held.rocker_length * (1.0 + 1e-6)
+
+
+def test_wrong_kinds_of_values_are_refused(tmp_path) -> None:
+    with pytest.raises(ParameterError, match="be a list of texts"):
+        case(ELLIPSE + "[constraints]\nrequire = [3]\n", tmp_path)
+    with pytest.raises(ParameterError, match="be true or false"):
+        case(ELLIPSE + '[constraints]\nfull_turn = "yes"\n', tmp_path)
+    with pytest.raises(InputError, match="is not valid TOML"):
+        case("[task", tmp_path)
