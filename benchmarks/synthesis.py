@@ -13,9 +13,9 @@ Three tables, all in one run:
 3. of 40 starts each, with bounds alone, how many reach the optimum, and the time a start takes: exact Jacobians (SciPy's least
    squares, IPOPT) and the simplex.
 
-pylinkage (extra ``bench``) counts link lengths alone as dimensions: `PlacedFourBar` opens the others to its optimisers. They see
-the coupler curve by its own compiled solver; the constraints as charges in proportion, as our simplex does; and infinity, as
-is its custom, where the links cannot be joined. Its population methods are followed by its Nelder-Mead, as its manual
+pylinkage (extra ``bench``) counts link lengths alone as dimensions: `PlacedFourBar` opens the others to its optimisers. They
+see the coupler curve by its own compiled solver; the constraints as charges in proportion, as our simplex does; and infinity,
+as is its custom, where the links cannot be joined. Its population methods are followed by its Nelder-Mead, as its manual
 advises. Its closed-form synthesis of paths takes five points; that of functions knows the phase and no weights, so that it is
 tried over `PHASES` phases, on the unweighted function alone. Its swarm takes no seed.
 """
@@ -23,11 +23,11 @@ tried over `PHASES` phases, on the unweighted function alone. Its swarm takes no
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from itertools import count
-from math import inf, isfinite, pi, tau
+from math import degrees, inf, isfinite, pi, tau
 from statistics import median
 from time import perf_counter
 from types import FunctionType, SimpleNamespace
@@ -55,7 +55,17 @@ from analysis.synthesis.constraints import Limits, limits_of
 from analysis.synthesis.kernels import coupler_path, coupler_path_jacobian
 from analysis.synthesis.polish import Polisher, fit_least_squares, quality_of
 from analysis.synthesis.program import Start, linkage_of, start_of
-from analysis.synthesis.published import AREA_N, PROBLEMS, WEIGHT, N, PublishedProblem, ellipse
+from analysis.synthesis.published import (
+    AREA_N,
+    PACKAGING_FLATNESS,
+    PACKAGING_ROTATION,
+    PACKAGING_TRAVEL,
+    PROBLEMS,
+    WEIGHT,
+    N,
+    PublishedProblem,
+    ellipse,
+)
 from analysis.synthesis.scan import scan
 from analysis.synthesis.tasks import Normal, RockerFunction, normal_form
 from linkwork.five_bar import kinematics
@@ -179,12 +189,17 @@ class TimeUp(Exception):
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Contest:
-    """A problem in the form that all searches share, one `BlackBox` for each assembly."""
+    """A problem in the form that all searches share.
+
+    It has a `BlackBox` for each assembly, and a plain one that asks nothing of a straight part: a `BlackBox` has its stations
+    at equal shares of the length, and asks there for more than the task does.
+    """
 
     problem: PublishedProblem
     normal: Normal
     limits: Limits
     boxes: tuple[BlackBox, ...]
+    plain: Mapping[int, BlackBox]
 
     @classmethod
     def of(cls, problem: PublishedProblem) -> Contest:
@@ -192,14 +207,26 @@ class Contest:
         normal = normal_form(problem.task)
         limits = limits_of(problem.task, normal, problem.bounds, problem.constraints)
         boxes = tuple(BlackBox(normal, limits, branch) for branch in limits.branches)
-        return cls(problem=problem, normal=normal, limits=limits, boxes=boxes)
+        plain = {branch: BlackBox(replace(normal, straight=None), limits, branch) for branch in limits.branches}
+        return cls(problem=problem, normal=normal, limits=limits, boxes=boxes, plain=plain)
 
     def error(self, box: BlackBox, x: FloatArray) -> float:
         """Error by the task's own measure, in the unit of print; infinite where a constraint is violated."""
-        answer = box.answer(SimpleNamespace(x=x, success=True, message="", nit=0))  # type: ignore[arg-type]
-        if not answer.feasible:
+        plain = self.plain[box.branch]
+        answer = plain.answer(SimpleNamespace(x=x, success=True, message="", nit=0))  # type: ignore[arg-type]
+        linkage = linkage_of(answer.start, self.normal)
+        if not answer.feasible or (self.normal.straight is not None and not packs(linkage)):
             return inf
-        return self.problem.shown(evaluate(self.problem.task, linkage_of(answer.start, self.normal)).error)
+        return self.problem.shown(evaluate(self.problem.task, linkage).error)
+
+
+def packs(linkage: Linkage) -> bool:
+    """Whether somewhere within the crank rotation asked the coupler point has the travel and flatness asked, to a degree."""
+    x, y = linkage.path(turn(360)).T
+    window = (np.arange(360)[:, None] + np.arange(round(degrees(PACKAGING_ROTATION)) + 1)) % 360
+    across, travel = y[window], np.abs(x[window] - x[:, None])
+    flatness = np.maximum.accumulate(across, axis=1) - np.minimum.accumulate(across, axis=1)
+    return bool(((flatness <= PACKAGING_FLATNESS) & (travel >= PACKAGING_TRAVEL)).any())
 
 
 class Trace:
@@ -405,10 +432,11 @@ class PylinkageScore:
             0.5 * (low + high),
             np.nonzero(high > low)[0],
             box.branch,
-            self.normal.n if self.normal.timed else AREA_N,
+            # in longer steps pylinkage goes over to the other assembly: it takes the nearer place of C
+            self.normal.n * -(-N // self.normal.n) if self.normal.timed else AREA_N,
         )
-        # what the straight part asks is taken from pylinkage's curve: the box would trace its own
-        self._plain = BlackBox(replace(self.normal, straight=None), contest.limits, box.branch)
+        # what is asked of the straight part is taken from pylinkage's curve
+        self.plain = contest.plain[box.branch]
 
     def __call__(self, linkage: PlacedFourBar, values: Sequence[float], coords: object = None) -> float:
         """Score to be minimised."""
@@ -419,8 +447,8 @@ class PylinkageScore:
         track = linkage.track()
         if not np.isfinite(track).all():
             return inf
-        quality, excess = self.measured(track)
-        excess += float(np.maximum(self._plain.violations(x[None, :]), 0.0).sum())
+        quality, excess = self.measured(track[:: len(track) // self.normal.n] if self.normal.timed else track)
+        excess += float(np.maximum(self.plain.violations(x[None, :]), 0.0).sum())
         return quality + PENALTY * float(self.normal.weights.sum()) * excess
 
     def measured(self, track: ComplexArray) -> tuple[float, float]:

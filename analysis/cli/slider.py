@@ -76,7 +76,9 @@ def slider_motion(
     if stopped is None and chosen.drive is not None:
         if isinstance(pivot, SecondCrank):
             errors.print(
-                "note: the pivot is on a second crank, which the plant has not: no forces are computed", style="yellow"
+                "note: the pivot is on a second crank, which the plant has not: no forces are computed",
+                style="yellow",
+                soft_wrap=True,
             )
         else:
             written += _dynamics(chosen, solution, folder, plots)
@@ -136,20 +138,20 @@ def _show(title: str, solutions: Sequence[Any]) -> None:
     from ..synthesis.report import degrees_told, error_unit, quality_name, quality_unit
 
     (factor, unit), (scale, length) = quality_unit(solutions[0].task), error_unit(solutions[0].task)
-    grid = Table(title=escape(title), title_justify="left")
-    grid.add_column("pivot")
+    grid = Table(title=escape(f"{title}: {quality_name(solutions[0].task)}"), title_justify="left")
+    grid.add_column("pivot", no_wrap=True)
     headings = (
-        f"{quality_name(solutions[0].task)} [{unit}]",
+        f"error [{unit}]",
         f"rms error [{length}]",
         f"worst [{length}]",
         "stroke [mm]",
-        "greatest du [mm/rad]",
-        "greatest d2u [mm/rad2]",
-        "guide angle [deg]",
-        "transmission angle [deg]",
+        "du/dphi [mm/rad]",
+        "d2u/dphi2 [mm/rad2]",
+        "guide [deg]",
+        "transmission [deg]",
     )
     for heading in headings:
-        grid.add_column(escape(heading), justify="right")
+        grid.add_column(escape(heading), justify="right", min_width=14 if heading.startswith("trans") else None)
     for s in solutions:
         pivot = s.linkage.pivot
         words, motion = "fixed", ["", "", "", ""]
@@ -298,12 +300,13 @@ def _tracking(chosen: Any, drive: Any, folder: Path, plots: bool) -> list[Path]:
         )
     else:
         m = run.metrics()
+        point = []
+        if drive.parameters.coupler_point_distance:
+            both = f"{1e3 * m.rms_point_error:.4g} mm, {1e3 * m.peak_point_error:.4g} mm"
+            point = [("coupler point error, rms and peak", both)]
         rows = [
             ("slider error, rms and peak", f"{1e3 * m.rms_error:.4g} mm, {1e3 * m.peak_error:.4g} mm"),
-            (
-                "coupler point error, rms and peak",
-                f"{1e3 * m.rms_point_error:.4g} mm, {1e3 * m.peak_point_error:.4g} mm",
-            ),
+            *point,
             ("force, rms and peak", f"{m.rms_force:.5g} N, {m.peak_force:.5g} N"),
             ("power, mean and peak", f"{m.mean_power:.5g} W, {m.peak_power:.5g} W"),
         ]

@@ -20,7 +20,7 @@ from ..slider_control import design_pid
 from ..synthesis.case_tasks import flag, given, listed, one_of, section, whole
 from ..synthesis.cases import TABLES, SynthesisCase, overridden, synthesis_case_from
 from ..synthesis.constraints import Assembly, Constraint
-from ..synthesis.linkage import ANGLES, LENGTHS, LINKS, Linkage, SliderMotion
+from ..synthesis.linkage import ANGLES, LENGTHS, LINKS, Linkage
 from ..synthesis.program import SliderUnknown
 from ..synthesis.solution import Solution
 from ..synthesis.solve import Synthesis, synthesize
@@ -157,7 +157,8 @@ class SliderCase:
         # where it is on the way of the task is not given: found with every dimension fixed
         kept = {name: (value, value) for name, value in self.linkage.values().items() if name != "branch"}
         only = (Assembly(branch=self.linkage.branch),)
-        return synthesize(task, kept, only, seed=self.synthesis.search.seed, starts=4, solutions=1).best
+        seed = self.synthesis.search.seed
+        return synthesize(task, kept, only, seed=seed, candidates=1 << 10, starts=4, solutions=1).best
 
     def move(self, four_bar: Solution, harmonics: int, guesses: tuple[Solution, ...], *, progress: bool) -> Synthesis:
         """The best motion with so many harmonics; see `slider_motion`."""
@@ -229,11 +230,12 @@ class SliderCase:
         wanted = self.tracking
         assert wanted is not None
         model = drive.parameters
-        heavier = {
+        other: dict[str, Any] = {
             name: getattr(model, name) * (1.0 + wanted.mass_error)
             for name in ("coupler_mass", "rocker_mass", "slider_mass", "coupler_inertia", "rocker_inertia")
         }
-        friction = {} if wanted.coulomb_friction is None else {"slider_coulomb_friction": wanted.coulomb_friction}
+        if wanted.coulomb_friction is not None:
+            other["slider_coulomb_friction"] = wanted.coulomb_friction
         bandwidth = 10.0 * abs(drive.crank_speed) if wanted.bandwidth is None else wanted.bandwidth
         design = design_pid(linearise_along(model, drive).mean(), bandwidth=bandwidth) if bandwidth > 0.0 else None
         return track(
@@ -244,7 +246,7 @@ class SliderCase:
             design=design,
             feedforward=wanted.feedforward,
             revolutions=wanted.revolutions,
-            plant=replace(model, **heavier, **friction),
+            plant=replace(model, **other),
             load=drive.load,
             known_load=drive.load if wanted.load_known else (0.0, 0.0),
             limit=wanted.limit,

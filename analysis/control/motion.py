@@ -11,6 +11,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import pi
 from time import perf_counter
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -80,7 +81,9 @@ def slider_motion(
     begun = perf_counter()
     normal = fitted_form(task, unknown)
     given = linkage.linkage if isinstance(linkage, Solution) else linkage
-    kept = {name: value for name, value in given.values().items() if name != "branch" and name not in (bounds or {})}
+    kept: dict[str, Any] = {
+        name: value for name, value in given.values().items() if name != "branch" and name not in (bounds or {})
+    }
     assembly = () if any(isinstance(c, Assembly) for c in constraints) else (Assembly(branch=given.branch),)
     fixed = {name: (value, value) for name, value in kept.items()}
     limits = limits_of(task, normal, fixed | dict(bounds or {}), (*constraints, *assembly))

@@ -36,6 +36,8 @@ BLURS = (0.3, 0.03)
 FEW = 20
 #: How many of the fitted paths go on to the area.
 AREAS = 6
+#: How many of the best are followed to the end, by so many iterations more, where they were cut off.
+FINISHED, LONG = 4, 1500
 #: Share of the quality below which points count as met exactly (units squared).
 EXACT = 1e-14
 
@@ -85,10 +87,13 @@ def polish(
     parts, interrupted = over_cores(fitted, batches, cores=cores, progress=progress, what="polish")
     found = [answer for part in parts for answer in part]
     kept = sorted((a for a in found if a.feasible), key=lambda a: a.start.quality)
-    if normal.normals is not None and not interrupted:
-        best = distinct(kept, AREAS, pivot)
+    if not interrupted:
         worker = Polisher(normal, limits, pivot)
-        kept = sorted((worker.area(a) for a in best), key=lambda a: a.start.quality)
+        if normal.normals is not None:
+            kept = [worker.area(a) for a in distinct(kept, AREAS, pivot)]
+        elif pivot is None:
+            kept = [*map(worker.finish, kept[:FINISHED]), *kept[FINISHED:]]
+        kept.sort(key=lambda a: a.start.quality)
     return Polished(
         kept=tuple(kept),
         others=tuple(a for a in found if not a.feasible),
@@ -203,6 +208,13 @@ class Polisher:
             if met.feasible:
                 return replace(met, start=replace(met.start, quality=quality_of(self.normal, met.start)))
         return answer
+
+    def finish(self, answer: Answer) -> Answer:
+        """Go on where a search was cut off on a flat slope: else what is found there would depend on the last digits."""
+        if answer.converged or self.by_least_squares or self.normal.exact:
+            return answer
+        longer = self.program("squares").solve(answer.start, iterations=LONG)
+        return longer if longer.feasible and longer.start.quality < answer.start.quality else answer
 
     def area(self, answer: Answer) -> Answer:
         """From the least squares of an untimed path to its least area."""

@@ -47,6 +47,8 @@ TRACED = (
     "sin", "cos", "tan", "asin", "acos", "atan", "atan2", "arcsin", "arccos", "arctan", "arctan2", "sinh", "cosh", "tanh",
     "exp", "log", "sqrt", "hypot", "fabs",
 )  # fmt: skip
+#: Iterations of IPOPT: most optima are reached in a hundred, or in many.
+ITERATIONS = 250
 #: Least rotation of the crank from one untimed station to the next, as a share of an even one.
 ADVANCE = 1e-3
 #: Greatest, in even ones: in a wider gap the coupler point could wander off unseen between two stations.
@@ -211,6 +213,7 @@ class Program:
         z = [q]
         low, high = [limits.low], [limits.high]
         self._constraints: list[tuple[Any, float, float, str]] = []
+        self._solvers: dict[int, Any] = {}
         # parameters: branch, direction, blur, factor of the objective, rows of Grashof's type, half-planes of the regions
         branch, direction, blur, gain = (SX.sym(name) for name in ("branch", "direction", "blur", "gain"))
         grashof = SX.sym("grashof", 6, 4)
@@ -439,13 +442,15 @@ class Program:
         """Objective and constraints as a function, to see whether a start can be evaluated at all."""
         return self._casadi.Function("value", [self._nlp["x"], self._nlp["p"]], [self._nlp["f"], self._nlp["g"]])
 
-    @cached_property
-    def _solver(self) -> Any:
+    def _solver(self, iterations: int) -> Any:
+        """IPOPT with this many iterations at most."""
+        if iterations in self._solvers:
+            return self._solvers[iterations]
         options = {
             "ipopt": {
                 "print_level": 0,
                 "sb": "yes",
-                "max_iter": 250,
+                "max_iter": iterations,
                 "tol": 1e-9,
                 "constr_viol_tol": 1e-9,
                 "acceptable_tol": 1e-7,
@@ -458,7 +463,8 @@ class Program:
             "show_eval_warnings": False,
             "calc_lam_p": False,
         }
-        return self._casadi.nlpsol("synthesis", "ipopt", self._nlp, options)
+        self._solvers[iterations] = self._casadi.nlpsol("synthesis", "ipopt", self._nlp, options)
+        return self._solvers[iterations]
 
     def solve(
         self,
@@ -466,6 +472,7 @@ class Program:
         *,
         blur: float = 1e-3,
         gain: float = 1.0,
+        iterations: int = ITERATIONS,
         low: FloatArray | None = None,
         high: FloatArray | None = None,
     ) -> Answer:
@@ -478,6 +485,8 @@ class Program:
             Distance below which an area's absolute value is smooth (units).
         gain : float
             Factor on the objective, one over its magnitude.
+        iterations : int
+            At most.
         low, high : ndarray, shape (11,), optional
             Replace the bounds of the linkage's unknowns.
         """
@@ -511,8 +520,9 @@ class Program:
             parameters += half_planes(_nearest_piece(pieces, name, z0)).ravel(order="F").tolist()
         if not all(np.isfinite(np.asarray(value)).all() for value in self._value(z0, parameters)):
             return Answer.unjoined(start)
-        result = self._solver(x0=z0, lbx=lower, ubx=upper, lbg=self._g_low, ubg=self._g_high, p=parameters)
-        stats = self._solver.stats()
+        solver = self._solver(iterations)
+        result = solver(x0=z0, lbx=lower, ubx=upper, lbg=self._g_low, ubg=self._g_high, p=parameters)
+        stats = solver.stats()
         z = np.asarray(result["x"]).ravel()
         g = np.asarray(result["g"]).ravel()
         over = np.maximum(self._g_low - g, g - self._g_high) if np.isfinite(g).all() else np.full(len(g), inf)

@@ -123,9 +123,9 @@ def dimension_rows(solution: Solution) -> list[tuple[str, str, str, str, str]]:
         rows.append((s.name, value_told(s.name, s.value), value_told(s.name, off), moved, told))
     mounted = solution.linkage.output_angle
     if mounted:
-        cost = f"{factor * dear['output_angle']:.3g} {unit}"
+        told = f"{factor * max(dear['output_angle'], 0.0):.3g} {unit}"
         rows.append(
-            ("output_angle", value_told("output_angle", mounted), value_told("output_angle", ANGLE_STEP), "", cost)
+            ("output_angle", value_told("output_angle", mounted), value_told("output_angle", ANGLE_STEP), "", told)
         )
     return rows
 

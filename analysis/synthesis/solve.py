@@ -241,8 +241,22 @@ def solutions_of(
 ) -> tuple[Solution, ...]:
     """Answers as solutions, each evaluated afresh, ranked, and at most so many."""
     chosen = distinct(done.kept, 4 * count, pivot)
-    made = [Solution.of(task, linkage_of(a.start, normal, pivot), a.start.rotation) for a in chosen]
+    made = [Solution.of(task, linkage_of(a.start, normal, pivot), _stations(task, a.start.rotation)) for a in chosen]
     return ranked([s for s in made if isfinite(s.error)])[:count]
+
+
+def _stations(task: Task, rotation: NDArray[np.float64] | None) -> NDArray[np.float64] | None:
+    """Crank rotations of the task's own stations, from those of the ones it was fitted at."""
+    if rotation is None or not isinstance(task, UntimedPath) or len(rotation) == (n := normal_form(task).n):
+        return rotation
+    m = len(rotation)
+    if not task.path.closed:
+        places, at, turned = np.linspace(0.0, 1.0, n), np.linspace(0.0, 1.0, m), rotation
+    else:
+        turned = np.append(rotation, rotation[0] + np.copysign(2.0 * np.pi, rotation[-1] - rotation[0]))
+        places, at = np.arange(n) / n, np.arange(m + 1) / m
+    told: NDArray[np.float64] = np.interp(places, at, turned)
+    return told
 
 
 def infeasible(done: Polished) -> InfeasibleError:

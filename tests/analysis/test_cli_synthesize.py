@@ -23,6 +23,7 @@ from analysis.synthesis import (
     Grashof,
     LargestLink,
     LeastTransmission,
+    Linkage,
     Motion,
     PivotRegion,
     PrecisionPoints,
@@ -140,8 +141,49 @@ def test_options_and_settings_reach_the_search(linkwork, tmp_path) -> None:
     assert first == second
     assert not list(Path("a").glob("*.png"))
     assert len(np.genfromtxt("a/best-curve.csv", delimiter=",", skip_header=1)) == 36
+    for option, value, said in (("--method", "simplx", "did you mean simplex?"), ("--jobs", 0, "search.jobs is 0")):
+        result = linkwork("synthesize", "case.toml", option, value)
+        assert result.exit_code == cli.WRONG
+        assert said in " ".join(result.stderr.split())
     values = np.genfromtxt("a/solutions.csv", delimiter=",", names=True, deletechars="")
     assert np.max(values["ground_length_[m]"]) <= 0.45 + 1e-6
+
+
+def test_what_the_tables_say_is_what_is_searched(tmp_path, monkeypatch) -> None:
+    given = {}
+    monkeypatch.setattr(cases, "synthesize", lambda *arguments, **more: given.update(more))
+    monkeypatch.setattr(cases, "trade_off", lambda *arguments, **more: given.update(limits=arguments[2], **more))
+    search = '[search]\nmethod = "simplex"\nseed = 5\ncandidates = 99\nstarts = 7\nsolutions = 2\njobs = 2\n'
+    found = case(ELLIPSE + search + '[trade_off]\nover = "size"\nlimits = [1, 2]\nstarts = 3\n', tmp_path)
+    found.solve(progress=True)
+    assert given == {
+        "seed": 5, "method": "simplex", "candidates": 99, "starts": 7, "solutions": 2, "n_jobs": 2, "progress": True,
+    }  # fmt: skip
+    given.clear()
+    found.trade()
+    assert given.pop("limits").tolist() == [1.0, 2.0]
+    assert given == {"seed": 5, "starts": 3, "n_jobs": 2, "progress": False}
+
+
+def test_a_crank_that_swings_backwards_is_run_over_its_task_alone(tmp_path) -> None:
+    linkage = Linkage(
+        ground_length=0.35,
+        crank_length=0.25,
+        coupler_length=0.215,
+        rocker_length=0.215,
+        point_distance=0.1,
+        crank_phase=0.2,
+    )
+    at = np.linspace(0.4, -0.6, 11)
+    task = Motion(points=linkage.path(at) + 1e-3, angle=linkage.coupler_angle(at), rotation=at)
+    solution = Solution.of(task, linkage)
+    assert not solution.verdicts.full_turn
+    ran = io.case_from(cases.Make(speed=3.0).run_case(solution, "swing"), folder=tmp_path)
+    motion = simulate(
+        ran.parameters, ran.inputs, initial=ran.initial, stop_time=ran.stop_time, step=ran.stop_time / 10.0
+    )
+    place = np.column_stack([motion["coupler.point.x"], motion["coupler.point.y"]])
+    np.testing.assert_allclose(place, linkage.path(at), atol=1e-4)
 
 
 def test_an_animation_is_made_where_it_is_asked_for(linkwork, tmp_path, monkeypatch) -> None:

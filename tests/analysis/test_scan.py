@@ -134,6 +134,8 @@ class TestVariableProjection:
         assert linkage.largest_link == pytest.approx(0.3)
         assert linkage.point_distance <= 0.3
         assert found.quality[0] > 1e-4
+        error = evaluate(TimedPath(points=KNOWN.path(rotation), rotation=rotation), linkage).error
+        assert error == pytest.approx(found.quality[0] * normal.unit**2, rel=1e-9)
         moved = [linkage.moved(0.01, 0.0), linkage.moved(0.0, 0.01)]
         task = TimedPath(points=KNOWN.path(rotation), rotation=rotation)
         assert all(evaluate(task, other).error > evaluate(task, linkage).error for other in moved)

@@ -76,6 +76,12 @@ def test_series_2_with_two_harmonics() -> None:
     found = slider_motion(PATH_B.task, PATH_B.linkage, SliderUnknown(harmonics=2), starts=10)
     assert PATH_B.shown(found.best.error) <= 4.05
     assert found.best.verdicts.sound
+    # fitted at more stations than the task has, and told at the task's
+    assert len(found.best.rotation) == 360
+    assert len(found.best.evaluation.rotation) == PATH_B.task.samples
+    residual = {s.name: s.shift for s in found.best.sensitivities()}
+    assert residual["pivot_x"] < 1.0
+    assert residual["slider cos 1"] > 0.1
 
 
 @pytest.mark.parametrize("linkage", [PRINTED, PATH_B.linkage], ids=["rocker", "path"])

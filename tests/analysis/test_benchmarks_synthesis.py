@@ -1,0 +1,212 @@
+"""The pieces of `benchmarks.synthesis`: every search sees the same curve, quality function and constraints."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from math import inf, radians
+from time import perf_counter, sleep
+
+import numpy as np
+import pytest
+from scipy.optimize import minimize
+
+from analysis.synthesis import Linkage, evaluate, turn
+from analysis.synthesis.black_box import PENALTY
+from analysis.synthesis.program import start_of
+from analysis.synthesis.published import PROBLEMS
+from benchmarks.synthesis import (
+    SEARCHES,
+    Contest,
+    PlacedFourBar,
+    PylinkageScore,
+    TimeUp,
+    Trace,
+    by_freudenstein,
+    curve_by_numpy,
+    kernel_times,
+    packs,
+    searched,
+)
+
+pytest.importorskip("pylinkage")
+
+PUBLISHED = [pytest.param(problem.linkage, id=name) for name, problem in PROBLEMS.items()]
+
+
+def unknowns(contest: Contest, linkage: Linkage) -> np.ndarray:
+    free = contest.limits.high > contest.limits.low
+    return start_of(linkage, contest.normal).q[free]
+
+
+def good(name: str) -> Linkage:
+    """A linkage that keeps the problem's bounds and constraints, from a few seconds of search."""
+    from analysis.synthesis import synthesize
+
+    problem = PROBLEMS[name]
+    return synthesize(problem.task, problem.bounds, problem.constraints, candidates=1 << 10, starts=2).best.linkage
+
+
+@pytest.mark.parametrize("linkage", PUBLISHED)
+@pytest.mark.parametrize("branch", [1, -1])
+def test_pylinkage_and_numpy_trace_our_curve(linkage: Linkage, branch: int) -> None:
+    moved = Linkage.from_vector(linkage.vector, branch).moved(0.3, -0.2)
+    ours = moved.path(turn(72)) @ [1.0, 1j]
+    size = moved.largest_link
+    np.testing.assert_allclose(PlacedFourBar.of(moved, 72).track()[:, 4], ours, rtol=0.0, atol=1e-9 * size)
+    np.testing.assert_allclose(curve_by_numpy(moved, turn(72)), ours, rtol=0.0, atol=1e-12 * size)
+
+
+@pytest.mark.parametrize("linkage", PUBLISHED)
+def test_pylinkage_turns_our_rocker(linkage: Linkage) -> None:
+    track = PlacedFourBar.of(linkage, 72).track()
+    off = np.angle((track[:, 3] - track[:, 1]) * np.exp(-1j * (linkage.rocker_angle(turn(72)) + linkage.ground_angle)))
+    assert np.abs(off).max() < 1e-9
+
+
+@pytest.mark.parametrize("name", ["ellipse-a", "ellipse-b", "ellipse-a-bounded", "rocker", "rocker-weighted"])
+def test_pylinkage_is_scored_as_our_simplex(name: str) -> None:
+    contest = Contest.of(PROBLEMS[name])
+    random = np.random.default_rng(1)
+    compared = charged = 0
+    for box in contest.boxes:
+        score = PylinkageScore(contest, box)
+        for x in random.uniform(box.low, box.high, (1500, len(box.low))):
+            value = score(score.four_bar, x.tolist())
+            # nearer to the limit of assembly pylinkage may go over to the other one: it takes the nearer place of C
+            linkage = Linkage.from_vector(score.four_bar.q, box.branch)
+            if linkage.least_transmission < radians(25.0):
+                continue
+            ours = float(box.charged(x[None, :])[0])
+            compared += 1
+            charged += ours > float(box.quality(x[None, :])[0])
+            assert value == pytest.approx(ours, rel=1e-9), x
+    assert compared > 10
+    assert charged > 0 or contest.limits.transmission == 0.0
+
+
+@pytest.mark.parametrize("name", ["path-a", "path-b", "packaging"])
+def test_pylinkage_is_scored_as_our_simplex_on_paths(name: str) -> None:
+    contest = Contest.of(PROBLEMS[name])
+    linkage = good(name)
+    box = next(b for b in contest.boxes if b.branch == linkage.branch)
+    score = PylinkageScore(contest, box)
+    random = np.random.default_rng(2)
+    first = unknowns(contest, linkage)
+    # farther off than the difference of 360 points from 128, and violating what is asked of the straight part
+    for x in first * (1.0 + 0.05 * random.standard_normal((20, len(first)))):
+        value = score(score.four_bar, x.tolist())
+        if value < inf:
+            assert value == pytest.approx(float(box.charged(x[None, :])[0]), rel=0.02), x
+
+
+def test_what_pylinkage_cannot_join_is_infinite() -> None:
+    contest = Contest.of(PROBLEMS["ellipse-a"])
+    box = contest.boxes[0]
+    score = PylinkageScore(contest, box)
+    apart = unknowns(contest, PROBLEMS["ellipse-a"].linkage)
+    apart[2], apart[4], apart[5] = box.high[2], 0.1 * box.high[4], 0.1 * box.high[5]
+    assert score(score.four_bar, apart.tolist()) == inf
+    assert score(score.four_bar, (box.high + 1.0).tolist()) == inf
+
+
+@pytest.mark.parametrize("name", ["ellipse-a", "rocker-weighted", "path-b", "packaging"])
+def test_a_linkage_is_measured_by_the_task(name: str) -> None:
+    problem = PROBLEMS[name]
+    contest = Contest.of(problem)
+    linkage = good(name)
+    box = next(b for b in contest.boxes if b.branch == linkage.branch)
+    error = contest.error(box, unknowns(contest, linkage))
+    assert error == pytest.approx(problem.shown(evaluate(problem.task, linkage).error), rel=1e-9)
+
+
+def test_the_printed_packaging_machine_is_not_flat_enough() -> None:
+    # flatness 6.99 cm at a travel of 175.8 cm (notes on chapter VI); asked are 2.5 cm at 144 cm
+    printed = PROBLEMS["packaging"].linkage
+    assert not packs(printed)
+    assert packs(good("packaging"))
+    # the same, a third larger, has the travel but not the flatness; smaller, not the travel
+    assert not packs(good("packaging").scaled(1.33))
+    assert not packs(good("packaging").scaled(0.9))
+
+
+def test_a_linkage_that_violates_a_constraint_does_not_count() -> None:
+    # the printed linkage of ellipse a has a transmission angle below 40 degrees
+    contest = Contest.of(PROBLEMS["ellipse-a"])
+    linkage = PROBLEMS["ellipse-a"].linkage
+    assert linkage.least_transmission < radians(40.0)
+    trace = Trace(contest, 10.0)
+    trace.offer(next(b for b in contest.boxes if b.branch == linkage.branch), unknowns(contest, linkage))
+    assert trace.points == []
+    assert trace.best == inf
+
+
+def test_the_clock_stops_while_measuring(monkeypatch: pytest.MonkeyPatch) -> None:
+    contest = Contest.of(PROBLEMS["rocker"])
+    box = contest.boxes[0]
+    values = iter([5.0, 7.0, 3.0])
+
+    def slow(*_: object) -> float:
+        sleep(0.1)
+        return next(values)
+
+    monkeypatch.setattr(Contest, "error", slow)
+    begun = perf_counter()
+    trace = Trace(contest, 10.0, enough=3.0)
+    trace.offer(box, box.low)
+    trace.offer(box, box.low)
+    with pytest.raises(TimeUp):
+        trace.offer(box, box.low)
+    assert perf_counter() - begun >= 0.3
+    assert [value for _, value in trace.points] == [5.0, 3.0]
+    assert trace.time_to(4.0) < 0.1
+    assert trace.time_to(1.0) == inf
+    with pytest.raises(TimeUp):
+        Trace(contest, 0.0).tick()
+
+
+def test_what_improves_is_offered() -> None:
+    contest = Contest.of(PROBLEMS["rocker"])
+    box = contest.boxes[0]
+    trace = Trace(contest, 10.0)
+    offered: list[float] = []
+    trace.offer = lambda box, x: offered.append(float(x[0]))  # type: ignore[method-assign]
+    score = trace.watched(box, lambda x: float(x[0] ** 2))
+    minimize(score, [3.0], method="Nelder-Mead")
+    assert offered[0] == 3.0
+    assert all(abs(b) < abs(a) for a, b in pairwise(offered))
+    assert abs(offered[-1]) < 1e-3
+
+
+@pytest.mark.parametrize("search", SEARCHES.values(), ids=SEARCHES.keys())
+def test_every_search_finds_a_rocker_function(search: object) -> None:
+    contest = Contest.of(PROBLEMS["rocker"])
+    # a long way from the optimum of 1019, but no linkage at random does it
+    trace = searched(search, contest, 20.0, 3000.0)  # type: ignore[arg-type]
+    assert trace.best <= 3000.0
+    assert all(b < a for (_, a), (_, b) in pairwise(trace.points))
+
+
+def test_function_generation_of_pylinkage_over_phases() -> None:
+    # Freudenstein's equation weighs the errors otherwise: near the optimum, not at it
+    contest = Contest.of(PROBLEMS["rocker"])
+    trace = searched(by_freudenstein, contest, 20.0, -inf)
+    assert 1019.0 < trace.best < 1300.0
+
+
+def test_kernels_are_timed() -> None:
+    times = kernel_times(PROBLEMS["ellipse-a"].linkage)
+    assert len(times) == 6
+    curve, jacobian = list(times.values())[:2]
+    assert 1e-8 < curve < jacobian
+    # the goals are 1 and 5 microseconds; a busy machine takes several times as long
+    assert curve < 1e-5
+    assert jacobian < 5e-5
+
+
+def test_charges_are_those_of_our_simplex() -> None:
+    contest = Contest.of(PROBLEMS["ellipse-a"])
+    box = contest.boxes[0]
+    x = unknowns(contest, PROBLEMS["ellipse-a"].linkage)[None, :]
+    charge = PENALTY * contest.normal.weights.sum() * np.maximum(box.violations(x), 0.0).sum()
+    assert charge > 0.0
+    assert float(box.charged(x)[0] - box.quality(x)[0]) == pytest.approx(charge, rel=1e-9)
