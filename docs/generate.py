@@ -211,6 +211,46 @@ def rig_2_pictures() -> None:
     save_figure(figure, HERE / "rig-2-response.png")
 
 
+def hand_drawn_pictures() -> None:
+    """Draw the pictures of docs/hand-drawn-to-fmu.md."""
+    import numpy as np
+
+    from analysis.cli.slider import drive_figure
+    from analysis.control.cases import load_slider_case
+    from analysis.figures import Curve, Panel, plot_curves
+    from analysis.io import save_figure
+    from analysis.synthesis import TargetPath
+    from analysis.synthesis.cases import load_synthesis_case
+
+    examples = HERE.parent / "examples"
+
+    def closed(points: np.ndarray, **look: object) -> Curve:
+        x, y = 1e3 * np.vstack([points, points[:1]]).T
+        return Curve(x=x, y=y, **look)
+
+    def picture(name: str, title: str, curves: list[Curve]) -> None:
+        panel = Panel(x_label="x [mm]", y_label="y [mm]", curves=curves, equal=True, legend_at="outside")
+        save_figure(plot_curves([panel], title=title, size=(6.4, 3.4)), HERE / name, dpi=110)
+
+    case = load_synthesis_case(examples / "hand-drawn.toml")
+    drawn = TargetPath.from_file(examples / "hand-drawn.svg")
+    points = closed(drawn.points, label="drawn", line="", marker=".", colour="0.55")
+    smooth = closed(case.task.path.points, label="smoothed", width=1.0)
+    picture("hand-drawn-curve.png", "A curve drawn by hand", [points, smooth])
+    save_figure(case.solve().best.plot(title="The linkage that was found"), HERE / "hand-drawn-linkage.png", dpi=90)
+    small = load_slider_case(examples / "hand-drawn-slider.toml")
+    four_bar = small.four_bar()
+    moved = [four_bar]
+    for harmonics in small.harmonics:
+        moved.append(small.move(four_bar, harmonics, tuple(moved[1:]), progress=False).best)
+    curves = [closed(four_bar.task.path.points, label="wanted", width=3.0, colour="0.8")]
+    curves.append(closed(four_bar.curve(), label="four-bar", line="--"))
+    curves.append(closed(moved[-1].curve(), label="slider moved,\n3 harmonics"))
+    picture("hand-drawn-moved.png", "Links of at most 150 mm", curves)
+    figure = drive_figure("The slider's drive at 60 rpm", small.driven(moved[-1]))
+    save_figure(figure, HERE / "hand-drawn-motion.png", dpi=90)
+
+
 def main(arguments: list[str]) -> int:
     """Write what is asked for."""
     if "--figures" in arguments:
@@ -221,6 +261,7 @@ def main(arguments: list[str]) -> int:
         study = load("linkage")
         save_figure(study.draw(study.compute()), HERE / "linkage.png")
         rig_2_pictures()
+        hand_drawn_pictures()
     (HERE / "nomenclature.md").write_text(nomenclature(), encoding="utf-8")
     README.write_text(readme(README.read_text(encoding="utf-8")), encoding="utf-8")
     return 0

@@ -142,16 +142,15 @@ def _show(title: str, solutions: Sequence[Any]) -> None:
     grid.add_column("pivot", no_wrap=True)
     headings = (
         f"error [{unit}]",
-        f"rms error [{length}]",
         f"worst [{length}]",
         "stroke [mm]",
         "du/dphi [mm/rad]",
         "d2u/dphi2 [mm/rad2]",
         "guide [deg]",
-        "transmission [deg]",
+        "angle at C [deg]",
     )
     for heading in headings:
-        grid.add_column(escape(heading), justify="right", min_width=14 if heading.startswith("trans") else None)
+        grid.add_column(escape(heading), justify="right", no_wrap=heading.startswith("angle"))
     for s in solutions:
         pivot = s.linkage.pivot
         words, motion = "fixed", ["", "", "", ""]
@@ -163,12 +162,10 @@ def _show(title: str, solutions: Sequence[Any]) -> None:
                 *(f"{1e3 * greatest(s.linkage, k):.5g}" for k in (1, 2)),
                 f"{degrees(pivot.guide_angle):.2f}",
             ]
-        e = s.evaluation
         grid.add_row(
             words,
             f"{factor * s.error:.5g}",
-            f"{scale * e.rms:.4g}",
-            f"{scale * e.worst:.4g}",
+            f"{scale * s.evaluation.worst:.4g}",
             *motion,
             degrees_told(s.verdicts),
             style=None if s.verdicts.sound else "yellow",
@@ -226,7 +223,7 @@ def _dynamics(chosen: Any, solution: Any, folder: Path, plots: bool) -> list[Pat
     written.append(io.save_parameters(folder / "five-bar-parameters.toml", drive.parameters))
     written.append(io._write_tables(folder / "five-bar.toml", run_case(drive, title, "force.csv")))
     if plots:
-        written.append(io.save_figure(_drive_figure(title, drive), folder / "motion.png"))
+        written.append(io.save_figure(drive_figure(title, drive), folder / "motion.png"))
     if chosen.tracking is not None:
         written += _tracking(chosen, drive, folder, plots)
     if chosen.effort is not None:
@@ -264,7 +261,7 @@ def _pin(drive: Any, pin: str) -> tuple[Any, Any]:
     return drive[f"pin.{pin}.fx"], drive[f"pin.{pin}.fy"]
 
 
-def _drive_figure(title: str, drive: Any) -> Any:
+def drive_figure(title: str, drive: Any) -> Any:
     """Position, force, power and pin forces over the turn."""
     from ..figures import Curve, Panel, plot_curves
 

@@ -113,13 +113,14 @@ def path_panels(result: StudyResult, names: Mapping[str, str]) -> list[Panel]:
         [],
     )
     for name, label in names.items():
-        look = {"label": label, "colour": colours[name]}
-        curves.append(Curve(x=c[f"{name} x [cm]"], y=c[f"{name} y [cm]"], **look))
-        distances.append(Curve(x=c["place on the ellipse [deg]"], y=c[f"{name} distance [cm]"], **look))
+        colour = colours[name]
+        curves.append(Curve(x=c[f"{name} x [cm]"], y=c[f"{name} y [cm]"], label=label, colour=colour))
+        place, distance = c["place on the ellipse [deg]"], c[f"{name} distance [cm]"]
+        distances.append(Curve(x=place, y=distance, label=label, colour=colour))
         if f"{name} slider [cm]" in c:
             # the mean is a matter of where the guide's zero is
             u = c[f"{name} slider [cm]"]
-            sliders.append(Curve(x=c["crank rotation [deg]"], y=u - np.nanmean(u[:-1]), **look))
+            sliders.append(Curve(x=c["crank rotation [deg]"], y=u - np.nanmean(u[:-1]), label=label, colour=colour))
     ticks = range(0, 361, 60)
     return [
         Panel(x_label="x [cm]", y_label="y [cm]", curves=curves, equal=True, legend_at="outside"),

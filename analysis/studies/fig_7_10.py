@@ -1,8 +1,8 @@
 """Fig 7.10: smoothness of the slider's motion traded against the error of the weighted rocker function.
 
-A slider that must be accelerated hard takes force, and wears. The greatest |d2u/dphi2| is bounded more and more tightly, and the
-best motion is sought anew each time, from the one before: a curve from which a designer can choose. It leads from the motions
-of Fig 7.6 to the fixed pivot. A third harmonic pays only where 2 cm/rad2 and more are allowed.
+A slider that must be accelerated hard takes force, and wears. The greatest |d2u/dphi2| is bounded more and more tightly, and
+the best motion is sought anew each time, from the one before: a curve from which a designer can choose. It leads from the
+motions of Fig 7.6 to the fixed pivot. A third harmonic pays only where 2 cm/rad2 and more are allowed.
 
 Whether the thesis shows this is lost: that it stands under this number is our assignment, and the bounds are our choice.
 """

@@ -1,7 +1,7 @@
 """Fig 7.12: from kinematics to dynamics: what it takes to move the slider, and how well it is followed.
 
-The two harmonics of Fig 7.6 on a real mechanism: the printed links of the weighted rocker function as steel bars of 20 by 5 mm, a
-damper and some friction in the guide, 120 rpm. Inverse dynamics gives the force on the slider, its power and the forces in
+The two harmonics of Fig 7.6 on a real mechanism: the printed links of the weighted rocker function as steel bars of 20 by 5 mm,
+a damper and some friction in the guide, 120 rpm. Inverse dynamics gives the force on the slider, its power and the forces in
 the pins; the best spring halves the rms force. A controller then has to follow the motion on a plant that it does not know
 exactly: twice the friction, coupler and slider a tenth heavier, a load on the rocker pin. Feed-forward alone loses the motion
 before the crank has turned once; with feedback it is held to a fraction of a millimetre, and feed-forward halves what is left.
@@ -70,7 +70,7 @@ class Machine(NamedTuple):
 
 @cache
 def machine() -> Machine:
-    """The printed links in steel, and the two harmonics; the series goes with the crank's rotation, the plant with its angle."""
+    """The printed links in steel, and the two harmonics: over the crank's angle, where the series is over its rotation."""
     linkage = rocker_motion(2).linkage
     series = slider(linkage).series
     turned = np.arange(series.order + 1) * linkage.crank_phase
@@ -142,10 +142,16 @@ def rocker_angle(crank_angle: FloatArray) -> FloatArray:
 
 @cache
 def efforts() -> dict[float, LeastEffort]:
-    """The motion of least rms force at each tolerance; without friction, which turns round too quickly for so few intervals."""
-    free = replace(machine().sprung, slider_coulomb_friction=0.0)
+    """The motion of least rms force at each tolerance, each sought from the motion itself.
+
+    Without friction, which turns round too quickly for so few intervals.
+    """
+    m = machine()
+    free = replace(m.sprung, slider_coulomb_friction=0.0)
     return {
-        tolerance: least_effort(free, SPEED, rocker_angle, radians(tolerance), intervals=INTERVALS, halvings=0)
+        tolerance: least_effort(
+            free, SPEED, rocker_angle, radians(tolerance), intervals=INTERVALS, halvings=0, guess=m.motion
+        )
         for tolerance in TOLERANCES
     }
 

@@ -157,7 +157,7 @@ def compute() -> StudyResult:
     needed = next(n for n, miss in misses.items() if miss <= TOLERANCE)
     held = min(
         float(max(np.abs(m.point - z).min() for z in curve.arcs[0].x + 1j * curve.arcs[0].y))
-        for curve in coupler_curves(p, np.linspace(POSITIONS[0], POSITIONS[-1], 41) / CM_PER_METRE, n=360)
+        for curve in coupler_curves(p, (np.linspace(POSITIONS[0], POSITIONS[-1], 41) / CM_PER_METRE).tolist(), n=360)
     )
     area = accessible_area(p, (POSITIONS[0] / CM_PER_METRE, POSITIONS[-1] / CM_PER_METRE), tolerance=1e-3)
     columns = {
@@ -175,7 +175,8 @@ def compute() -> StudyResult:
             columns[f"{kind} {number} x [cm]"] = CM_PER_METRE * ring[:, 0]
             columns[f"{kind} {number} y [cm]"] = CM_PER_METRE * ring[:, 1]
     for u, curve in zip(
-        (POSITIONS[0], 0, POSITIONS[-1]), coupler_curves(p, [POSITIONS[0] / 100.0, 0.0, POSITIONS[-1] / 100.0])
+        (POSITIONS[0], 0, POSITIONS[-1]),
+        coupler_curves(p, [POSITIONS[0] / CM_PER_METRE, 0.0, POSITIONS[-1] / CM_PER_METRE]),
     ):
         columns[f"x at u = {u} cm [cm]"] = CM_PER_METRE * curve.arcs[0].x
         columns[f"y at u = {u} cm [cm]"] = CM_PER_METRE * curve.arcs[0].y

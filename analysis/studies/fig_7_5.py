@@ -148,20 +148,28 @@ def draw(result: StudyResult) -> Figure:
     """Positions and errors, the jump broken off."""
     names = {name: name.replace("-35", "\N{MINUS SIGN}35").replace("; ", ", ") for name in CASES}
     turn = result.columns["crank rotation [deg]"]
-    positions, errors = [], []
+    positions: list[Curve] = []
+    errors: list[Curve] = []
     for (name, label), colour, line in zip(names.items(), (*COLOURS[:3], COLOURS[4]), ("-", "-", "-", "--")):
         jumps = motion(name).jumps + 1
-        cut = {"x": np.insert(turn, jumps, np.nan), "colour": colour, "line": line}
-        positions.append(Curve(y=np.insert(result.columns[f"slider; {name} [cm]"], jumps, np.nan), label=label, **cut))
-        errors.append(Curve(y=np.insert(result.columns[f"error; {name} [deg]"], jumps, np.nan), label=label, **cut))
+        for curves, column in ((positions, f"slider; {name} [cm]"), (errors, f"error; {name} [deg]")):
+            y = np.insert(result.columns[column], jumps, np.nan)
+            curves.append(Curve(x=np.insert(turn, jumps, np.nan), y=y, label=label, colour=colour, line=line))
     low, high = window()
-    where = {f"{low:.0f} deg": low, f"weighted to {high:.0f} deg": high}
-    common = {"x_label": "crank rotation [deg]", "x_ticks": range(0, 361, 60)}
+    where = {f"weight 1000 from {low:.0f} deg": low, f"to {high:.0f} deg": high}
     panels = [
-        Panel(y_label="slider position u [cm]", curves=positions, legend_at="outside", **common),
         Panel(
-            y_label="error of the rocker's angle [deg]", curves=errors, legend_at="outside", verticals=where, **common
-        ),
+            x_label="crank rotation [deg]",
+            y_label=y_label,
+            curves=curves,
+            verticals=verticals,
+            x_ticks=range(0, 361, 60),
+            legend_at="outside",
+        )
+        for y_label, curves, verticals in (
+            ("slider position u [cm]", positions, None),
+            ("error of the rocker's angle [deg]", errors, where),
+        )
     ]
     return plot_curves(panels, title=result.heading, size=(7.6, 3.2))
 

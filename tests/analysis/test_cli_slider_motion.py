@@ -287,7 +287,7 @@ def test_the_options_of_the_command_line_take_the_place_of_the_files(linkwork) -
     assert result.exit_code == 0, result.output
     assert "slider, 2 harmonics" in result.output
     row = next(line for line in result.output.splitlines() if "slider, 2 harmonics" in line)
-    assert float(row.split("│")[5]) < 20.1
+    assert float(row.split("│")[4]) < 20.1
 
 
 def test_ctrl_c_keeps_the_best_so_far(linkwork, tmp_path, monkeypatch) -> None:

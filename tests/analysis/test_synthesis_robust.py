@@ -38,24 +38,23 @@ def traced(points: FloatArray, *, closed: bool = True, **more: Any) -> UntimedPa
     return UntimedPath(path=TargetPath(points=points, closed=closed), **more)
 
 
-# Kunjur and Krishnamurty (1997); again in Cabrera et al., Mech. Mach. Theory 37 (2002), p 1165, and Acharyya and Mandal, Mech.
-# Mach. Theory 44 (2009), p 1784: 18 points of a closed curve, 20 degrees of the crank apart
+# the 18 points of a closed curve, 20 degrees of the crank apart, of Acharyya and Mandal (2009) and Cabrera et al.
 EIGHTEEN = np.array(
     [
         (0.5, 1.1), (0.4, 1.1), (0.3, 1.1), (0.2, 1.0), (0.1, 0.9), (0.05, 0.75), (0.02, 0.6), (0.0, 0.5), (0.0, 0.4),
         (0.03, 0.3), (0.1, 0.25), (0.15, 0.2), (0.2, 0.3), (0.3, 0.4), (0.4, 0.5), (0.5, 0.7), (0.6, 0.9), (0.6, 1.0),
     ]
 )  # fmt: skip
-#: The least sum of squares reported there and since is about 0.01, most are 0.02 to 0.04.
+#: Sums of squares in that literature are given as 0.01 to 0.04; not checked against the papers themselves.
 REPORTED = 0.0105
-# the same papers: six points on a vertical line
+# six points on a vertical line, from the same literature
 VERTICAL = np.array([(20.0, 20.0 + 5.0 * k) for k in range(6)])
 
 
 class TestLiterature:
     def test_eighteen_timed_points(self) -> None:
         task = TimedPath(points=EIGHTEEN, rotation=np.radians(20.0) * np.arange(18))
-        # within the bounds of the papers: links up to 50
+        # links up to 50, the crank turning fully
         loose = best(task, constraints=[FullTurn(), LargestLink(length=50.0)])
         assert loose.error < 0.0092 < REPORTED
         assert loose.verdicts.full_turn
