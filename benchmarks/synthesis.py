@@ -723,7 +723,7 @@ def start_table() -> Table:
 
 def main(budget: float = BUDGET, names: Sequence[str] = tuple(PROBLEMS)) -> None:
     """Measure and print."""
-    console = Console(width=140)
+    console = Console(width=150)
     begun = perf_counter()
     console.print(kernel_table())
     # machine code, CasADi and the workers are loaded before the clock

@@ -230,7 +230,7 @@ def hand_drawn_pictures() -> None:
 
     def picture(name: str, title: str, curves: list[Curve]) -> None:
         panel = Panel(x_label="x [mm]", y_label="y [mm]", curves=curves, equal=True, legend_at="outside")
-        save_figure(plot_curves([panel], title=title, size=(6.4, 3.4)), HERE / name, dpi=110)
+        save_figure(plot_curves([panel], title=title, size=(6.4, 3.0)), HERE / name, dpi=110)
 
     case = load_synthesis_case(examples / "hand-drawn.toml")
     drawn = TargetPath.from_file(examples / "hand-drawn.svg")

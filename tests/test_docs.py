@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import importlib.util
 import re
+import shlex
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -48,10 +50,85 @@ def test_links_in_the_documentation_lead_somewhere():
 def test_the_code_of_the_readme_runs(tmp_path):
     build_fmu.build("FiveBarSlider", tmp_path / "build")
     blocks = re.findall(r"```python\n(.*?)```", (ROOT / "README.md").read_text(), flags=re.DOTALL)
-    assert len(blocks) == 3
+    assert len(blocks) == 4
     for block in blocks:
         assert len(block.strip().splitlines()) <= 12
         done = subprocess.run(
             [sys.executable, "-c", block], cwd=tmp_path, capture_output=True, text=True, timeout=300, check=False
         )
         assert done.returncode == 0, done.stderr
+
+
+#: Of the numbers on a page: what another machine or another release of IPOPT may make of them.
+PAGE_TOLERANCE = 2e-2
+
+
+def words_of(line):
+    """The words of a line, box drawing left out."""
+    return [word for word in re.sub(r"[\u2500-\u257f]", " ", line).split() if word]
+
+
+def says(found, stated):
+    """Whether a line says what is stated: the same words, and numbers that are nearly the same."""
+    if len(found) < len(stated):
+        return False
+    for a, b in zip(found, stated):
+        try:
+            x, y = (float(word.rstrip(",;")) for word in (a, b))
+        except ValueError:
+            if a != b:
+                return False
+        else:
+            # 1e-5: a hundredth of a millimetre in m
+            if abs(x - y) > PAGE_TOLERANCE * abs(y) + (1e-5 if abs(y) < 1e-4 else 0.0):
+                return False
+    return True
+
+
+def test_the_page_from_a_hand_drawn_curve_to_an_fmu_runs_and_says_what_is_so(tmp_path):
+    """Each command and each piece of Python in turn; what the page then shows is among what was printed."""
+    page = (ROOT / "docs" / "hand-drawn-to-fmu.md").read_text(encoding="utf-8")
+    shutil.copytree(ROOT / "examples", tmp_path / "examples")
+    python, printed, checked, commands = "", [], 0, 0
+    for kind, block in re.findall(r"```(python|sh|text)\n(.*?)```", page, flags=re.DOTALL):
+        if kind == "text":
+            # a first line of headings is the page's own
+            lines = block.strip().splitlines()
+            stated = [words_of(line) for line in lines if re.search(r"\d", line) and not line.startswith("pivot  ")]
+            for words in stated:
+                assert any(says(found, words) for found in printed), f"the page states: {' '.join(words)}"
+            checked += len(stated)
+            continue
+        if kind == "python":
+            python += block
+            runs = [[sys.executable, "-c", python]]
+        else:
+            runs = [
+                [sys.executable, "-m", "analysis.cli", *shlex.split(line)[1:]] for line in block.strip().splitlines()
+            ]
+            assert all(line.startswith("linkwork ") for line in block.strip().splitlines())
+        for run in runs:
+            done = subprocess.run(run, cwd=tmp_path, capture_output=True, text=True, timeout=600, check=False)
+            assert done.returncode == 0, done.stderr
+            printed += [words_of(line) for line in done.stdout.splitlines()]
+            commands += 1
+    assert (commands, checked) == (9, 43)
+    # what the prose says
+    rows = {tuple(words[:3]): words for words in printed if words[:1] == ["slider,"]}
+    three = float(rows["slider,", "3", "harmonics"][3])
+    fixed = next(float(words[1]) for words in printed if words[:1] == ["fixed"])
+    assert three < 0.38 * fixed
+    assert float(rows["slider,", "3", "harmonics"][5]) == pytest.approx(30.0, rel=0.004)
+    for name in (
+        "hand-drawn/best.dxf",
+        "hand-drawn/solutions.csv",
+        "rounded.dxf",
+        "parameters.toml",
+        "moved/force.csv",
+    ):
+        assert (tmp_path / name).exists()
+
+
+def test_pictures_of_the_documentation_are_small():
+    for picture in (ROOT / "docs").glob("hand-drawn-*.png"):
+        assert picture.stat().st_size < 150_000, picture.name

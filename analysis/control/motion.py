@@ -95,7 +95,7 @@ def slider_motion(
     # what is kept is kept to the last digit, whatever the normal form made of it
     found = tuple(
         Solution.of(task, replace(s.linkage, **kept), s.evaluation.rotation)
-        for s in solutions_of(task, normal, done, unknown, solutions)
+        for s in solutions_of(task, normal, limits, done, unknown, solutions)
     )
     result = Synthesis(
         task=task,

@@ -219,7 +219,7 @@ class BlackBox:
         """Left sides of the inequalities g(x) <= 0, shape (m, number of them)."""
         q = self._linkages(x)
         # what holds over a turn does not ask for the stations' rotations, which take most of the time
-        needed = not self.limits.over_turn or self.normal.straight is not None
+        needed = self.limits.turn is None or self.normal.straight is not None
         rotation = self._rotations(x, q) if needed else np.zeros((len(q), 1))
         return np.column_stack([value for _, value in self._inequalities(q, rotation)])
 
@@ -355,24 +355,27 @@ class BlackBox:
         limits, normal = self.limits, self.normal
         l1, l2, l3, l4 = (q[:, k] for k in range(2, 6))
         found: list[tuple[str, FloatArray]] = []
-        if limits.over_turn:
-            nearest, farthest = np.abs(l1 - l2), l1 + l2
-        else:
+        # distances from crank pin to rocker pivot: over the turn, and over the way of the task
+        spans: list[tuple[FloatArray, FloatArray, float | None]] = []
+        if limits.turn is not None:
+            spans.append((np.abs(l1 - l2), l1 + l2, limits.turn))
+        if limits.turn is None or limits.way is not None:
             distance = np.hypot(*self._pins(q, rotation))
-            nearest, farthest = distance.min(axis=1), distance.max(axis=1)
-        found += [
-            ("loop closure", farthest - (l3 + l4)),
-            ("loop closure", np.abs(l3 - l4) - nearest),
-        ]
-        if limits.transmission is not None:
-            cosine = cos(max(limits.transmission, TURNING))
-            joint, product = l3 * l3 + l4 * l4, 2.0 * l3 * l4 * cosine
-            # as lengths, so that no constraint outweighs another
-            size = l3 + l4
+            spans.append((distance.min(axis=1), distance.max(axis=1), limits.way))
+        for nearest, farthest, least in spans:
             found += [
-                ("transmission angle", (joint - nearest**2 - product) / size),
-                ("transmission angle", (farthest**2 - joint - product) / size),
+                ("loop closure", farthest - (l3 + l4)),
+                ("loop closure", np.abs(l3 - l4) - nearest),
             ]
+            if least is not None:
+                cosine = cos(max(least, TURNING))
+                joint, product = l3 * l3 + l4 * l4, 2.0 * l3 * l4 * cosine
+                # as lengths, so that no constraint outweighs another
+                size = l3 + l4
+                found += [
+                    ("transmission angle", (joint - nearest**2 - product) / size),
+                    ("transmission angle", (farthest**2 - joint - product) / size),
+                ]
         if limits.grashof is not None:
             links = q[:, 2:6]
             order = np.sort(links, axis=1)

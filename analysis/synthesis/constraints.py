@@ -151,6 +151,12 @@ class Require:
     name: str = "required function"
     scale: float = 1.0
 
+    def __post_init__(self) -> None:
+        if not callable(self.function):
+            raise ParameterError(self.name, self.function, "be a function of the dimensions")
+        if not (isfinite(self.scale) and self.scale > 0.0):
+            raise ParameterError(f"scale of {self.name}", self.scale, "be a finite number greater than zero")
+
 
 Constraint = LeastTransmission | FullTurn | Grashof | LargestLink | Assembly | PivotRegion | Require
 #: A least transmission angle of 40 degrees over a full turn.
@@ -165,10 +171,9 @@ class Limits:
     ----------
     low, high : ndarray, shape (11,)
         Of `UNKNOWNS`.
-    transmission : float or None
-        Least transmission angle (rad), 0 where the crank is only to turn fully, None where nothing is asked.
-    over_turn : bool
-        Whether it holds over the turn or at the stations.
+    turn, way : float or None
+        Least transmission angle (rad) over a turn and over the way of the task: 0 where the crank is only to turn fully, or
+        the links only to stay joined; None where nothing is asked.
     grashof : str or None
     branches : tuple of int
         Assemblies to be tried.
@@ -179,8 +184,8 @@ class Limits:
 
     low: FloatArray
     high: FloatArray
-    transmission: float | None
-    over_turn: bool
+    turn: float | None
+    way: float | None
     grashof: str | None
     branches: tuple[int, ...]
     regions: tuple[tuple[str, tuple[FloatArray, ...]], ...]
@@ -189,12 +194,9 @@ class Limits:
     @property
     def bounds_only(self) -> bool:
         """Whether nothing but bounds is asked, so that a least squares method can do it."""
-        return self.transmission is None and self.grashof is None and not self.regions and not self.requires
-
-    @property
-    def largest(self) -> float:
-        """The longest that any link may be (units)."""
-        return float(self.high[2:6].max())
+        return (
+            self.turn is None and self.way is None and self.grashof is None and not self.regions and not self.requires
+        )
 
 
 def limits_of(
@@ -209,6 +211,10 @@ def limits_of(
     InfeasibleError
         If they contradict one another.
     """
+    if not isinstance(bounds, Mapping | None):
+        raise InputError(f"bounds are {bounds!r}: they must be a mapping from a dimension's name to its two ends")
+    if not isinstance(constraints, Sequence):
+        raise InputError(f"constraints are {constraints!r}: they must be a sequence, even of one")
     bounds = dict(bounds or {})
     names_of(bounds)
     unit, origin = normal.unit, normal.origin
@@ -230,13 +236,16 @@ def limits_of(
             usual = (0.0, 0.0) if function else (0.0, cap)
         elif name == "output_angle" and not normal.mounting:
             usual = (0.0, 0.0)
+        elif any(isinstance(c, Require) for c in constraints):
+            # what is returned is what the function saw
+            usual = (-pi, pi)
         else:
             usual = (-4.0 * pi, 4.0 * pi)
         if function and name in ("ground_angle", "point_angle"):
             usual = (0.0, 0.0)
         if function and name == "ground_length" and not caps and not set(LINKS) & set(bounds):
             usual = (GROUND, GROUND)
-        low, high = _ordered(name, bounds[name]) if name in bounds else usual
+        low, high = _ordered(name, bounds[name], usual) if name in bounds else usual
         if name in LINKS and high <= 0.0:
             raise ParameterError(f"bound of {name}", high, "be above zero: a link has a length")
         if name in LINKS or name == "point_distance":
@@ -245,6 +254,10 @@ def limits_of(
                     f"{name} is to be at least {low:g} m, and no link longer than {cap:g} m: no linkage has both"
                 )
             low, high = max(low, 1e-6 * cap if name in LINKS else 0.0), min(high, cap) if caps else high
+            if low > high:
+                raise InfeasibleError(
+                    f"{name} is to be at most {high:g} m: it is a distance and cannot be below {low:g} m"
+                )
         given[name] = (low, high)
     _check_links(given, constraints)
     lows, highs = (np.array([given[name][end] for name in UNKNOWNS]) for end in (0, 1))
@@ -252,23 +265,27 @@ def limits_of(
     shift[:2] = origin.real, origin.imag
     scale = np.ones(len(UNKNOWNS))
     scale[:7] = unit
-    angles = [c for c in constraints if isinstance(c, LeastTransmission)]
-    turns = [c for c in constraints if isinstance(c, FullTurn)]
+    turn = max((c.angle for c in constraints if isinstance(c, LeastTransmission) and c.over == "turn"), default=None)
+    way = max((c.angle for c in constraints if isinstance(c, LeastTransmission) and c.over == "task"), default=None)
     types = {c.type for c in constraints if isinstance(c, Grashof)}
     if len(types) > 1:
         raise InfeasibleError(f"Grashof types {', '.join(sorted(types))} are asked for at once: a four-bar has one")
     type_ = types.pop() if types else None
-    over_turn = bool(turns) or any(c.over == "turn" for c in angles) or type_ in ("crank-rocker", "drag-link")
-    if type_ in ("double-rocker", "rocker-crank", "triple-rocker") and over_turn:
-        raise InfeasibleError(f"the crank of a {type_} does not turn fully, which another constraint asks for")
+    if turn is None and (any(isinstance(c, FullTurn) for c in constraints) or type_ in ("crank-rocker", "drag-link")):
+        turn = 0.0
+    if type_ in ("double-rocker", "rocker-crank", "triple-rocker"):
+        if turn is not None:
+            raise InfeasibleError(f"the crank of a {type_} does not turn fully, which another constraint asks for")
+        # on its way it must stay joined all the same
+        way = way or 0.0
     branches = {c.branch for c in constraints if isinstance(c, Assembly)}
     if len(branches) > 1:
         raise InfeasibleError("both assemblies are asked for at once")
     return Limits(
         low=(lows - shift) / scale,
         high=(highs - shift) / scale,
-        transmission=max((c.angle for c in angles), default=0.0 if over_turn else None),
-        over_turn=over_turn,
+        turn=turn,
+        way=way,
         grashof=type_,
         branches=tuple(branches) or (1, -1),
         regions=tuple(
@@ -280,13 +297,14 @@ def limits_of(
     )
 
 
-def _ordered(name: str, ends: tuple[float, float]) -> tuple[float, float]:
+def _ordered(name: str, ends: tuple[float | None, float | None], usual: tuple[float, float]) -> tuple[float, float]:
+    """Bounds as given; an end that is None or infinite is the usual one."""
     try:
-        low, high = (float(end) for end in ends)
+        low, high = (e if end is None or np.isinf(end) else float(end) for end, e in zip(ends, usual, strict=True))
     except (TypeError, ValueError):
         raise ParameterError(f"bounds of {name}", ends, "be two numbers, the least and the greatest value") from None
-    if np.isnan(low) or np.isnan(high) or not np.isfinite([low, high]).all():
-        raise ParameterError(f"bounds of {name}", ends, "be finite")
+    if not np.isfinite([low, high]).all():
+        raise ParameterError(f"bounds of {name}", ends, "be numbers, or None for an open end")
     if low > high:
         raise InfeasibleError(f"{name} is to be at least {low:g} and at most {high:g}: no value is")
     return low, high

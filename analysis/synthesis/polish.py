@@ -10,6 +10,7 @@ import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from itertools import product
 from math import inf, pi
 from typing import TypeVar
 
@@ -38,6 +39,8 @@ FEW = 20
 AREAS = 6
 #: How many of the best are followed to the end, by so many iterations more, where they were cut off.
 FINISHED, LONG = 4, 1500
+#: How many triangles of a region that is not convex are tried at a time.
+PIECES = 3
 #: Share of the quality below which points count as met exactly (units squared).
 EXACT = 1e-14
 
@@ -90,7 +93,8 @@ def polish(
     if not interrupted:
         worker = Polisher(normal, limits, pivot)
         if normal.normals is not None:
-            kept = [worker.area(a) for a in distinct(kept, AREAS, pivot)]
+            best = distinct(kept, AREAS, pivot)
+            kept, interrupted = over_cores(worker.area, best, cores=1, progress=progress, what="area")
         elif pivot is None:
             kept = [*map(worker.finish, kept[:FINISHED]), *kept[FINISHED:]]
         kept.sort(key=lambda a: a.start.quality)
@@ -199,15 +203,35 @@ class Polisher:
 
     def fit(self, start: Start) -> Answer:
         """The optimum of the squared errors from a start; where points are met exactly, of the transmission angle."""
-        if self.by_least_squares:
-            answer = fit_least_squares(self.normal, self.limits, start)
-        else:
-            answer = self.program("squares").solve(start)
+        fitted = self.by_least_squares
+        answer = fit_least_squares(self.normal, self.limits, start) if fitted else self._solved(start)
         if self.normal.exact and answer.feasible and answer.start.quality < EXACT:
             met = self.program("transmission").solve(answer.start)
             if met.feasible:
-                return replace(met, start=replace(met.start, quality=quality_of(self.normal, met.start)))
+                return replace(met, start=replace(met.start, quality=self.program("squares").value(met.start)))
         return answer
+
+    def _solved(self, start: Start) -> Answer:
+        """By IPOPT; where a region is not convex, in several of its triangles, and on across the edges that hold it up."""
+        program = self.program("squares")
+        if all(len(triangles) == 1 for _, triangles in self.limits.regions):
+            return program.solve(start)
+        best: Answer | None = None
+        tried: set[tuple[int, ...]] = set()
+        now = start
+        while True:
+            ways = product(*(order[:PIECES] for order in program.nearest_pieces(now.q)))
+            fresh = [way for way in ways if way not in tried]
+            tried |= set(fresh)
+            answers = [program.solve(now, pieces=way) for way in fresh]
+            better = min(answers, key=lambda a: (not a.feasible, a.start.quality), default=None)
+            if better is None or (
+                best and (best.feasible, -best.start.quality) >= (better.feasible, -better.start.quality)
+            ):
+                break
+            best, now = better, better.start
+        assert best is not None
+        return best
 
     def finish(self, answer: Answer) -> Answer:
         """Go on where a search was cut off on a flat slope: else what is found there would depend on the last digits."""
@@ -226,10 +250,7 @@ class Polisher:
             if not following.feasible:
                 break
             now = following
-        if now is answer:
-            area = float((self.normal.weights * self.normal.arc * _distances(self.normal, answer.start)).sum())
-            return replace(answer, start=replace(answer.start, quality=area))
-        return now
+        return replace(now, start=replace(now.start, quality=program.value(now.start)))
 
 
 # Least squares
@@ -283,14 +304,6 @@ def quality_of(normal: Normal, start: Start) -> float:
     residual = residuals(normal, start.branch, start.q, rotation)[0]
     value = float(residual @ residual)
     return value if np.isfinite(value) else inf
-
-
-def _distances(normal: Normal, start: Start) -> FloatArray:
-    rotation = normal.rotation if start.rotation is None else start.rotation
-    assert rotation is not None
-    part = residuals(replace(normal, weights=np.ones(normal.n)), start.branch, start.q, rotation)[0]
-    distances: FloatArray = np.hypot(part[: normal.n], part[normal.n : 2 * normal.n])
-    return distances
 
 
 def fit_least_squares(normal: Normal, limits: Limits, start: Start) -> Answer:

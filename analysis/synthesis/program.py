@@ -32,8 +32,11 @@ Objective = Literal["squares", "area", "transmission"]
 
 #: Least transmission angle at which a crank still counts as turning fully (rad).
 TURNING = 0.002
-#: Crank rotations at which a moving pivot's assembly, speed and acceleration are held within their limits.
-GRID = 72
+#: Crank rotations at which a moving pivot's assembly, speed and acceleration are held within their limits, and what is added
+#: to the least transmission angle for what is between them (rad).
+GRID, BETWEEN = 96, 1e-3
+#: Margin of a Grashof type, as a share of the links' sum: at zero a four-bar is a change-point.
+MARGIN = 1e-4
 #: How IPOPT follows its barrier: freely from a start that is only near, with care from one that a first solution gave.
 FOLLOWING: dict[str, dict[str, Any]] = {
     "squares": {"mu_strategy": "adaptive"},
@@ -236,18 +239,19 @@ class Program:
             self._ordered(phi, direction)
         p = SimpleNamespace(**{name: q[k] for k, name in enumerate(UNKNOWNS)})
         g, point = self._closed(p, v, phi, branch)
-        quality = self._quality(p, g, point, phi, blur, z, low, high)
-        cosine: Any = cos(max(limits.transmission or 0.0, TURNING))
+        quality = self._quality(p, v, g, point, phi, branch, blur, z, low, high)
+        tilt: Any = None
         if objective == "transmission":
+            # the largest |cos mu| of all, which is made small
             tilt = SX.sym("tilt")
             z.append(tilt)
             low.append(np.zeros(1))
-            high.append(np.array([cosine]))
-            cosine = tilt
+            high.append(np.array([cos(TURNING)]))
             quality = tilt + 1e-3 * casadi.sumsqr(q[2:6])
-        self._assembled(p, v, phi, cosine)
+        self._assembled(p, v, phi, tilt)
         if limits.grashof:
-            self._at_most(casadi.mtimes(grashof, q[2:6]), f"Grashof type {limits.grashof}")
+            margin = MARGIN * casadi.sum1(q[2:6]) * casadi.sum2(casadi.fabs(grashof)) / 4.0
+            self._at_most(casadi.mtimes(grashof, q[2:6]) + margin, f"Grashof type {limits.grashof}")
         for (name, _), plane in zip(limits.regions, planes):
             x, y = p.pivot_x, p.pivot_y
             if name == "D":
@@ -310,7 +314,17 @@ class Program:
         return v[0] * casadi.cos(psi), v[0] * casadi.sin(psi)
 
     def _quality(
-        self, p: Any, g: Any, point: Any, phi: Any, blur: Any, z: list[Any], low: list[Any], high: list[Any]
+        self,
+        p: Any,
+        v: Any,
+        g: Any,
+        point: Any,
+        phi: Any,
+        branch: Any,
+        blur: Any,
+        z: list[Any],
+        low: list[Any],
+        high: list[Any],
     ) -> Any:
         """The quality function; with it the constraints that belong to it."""
         casadi, normal = self._casadi, self.normal
@@ -361,7 +375,11 @@ class Program:
                 low.append(np.array([-inf]))
                 high.append(np.array([inf]))
                 half = 0.5 * straight.flatness
-                self._within(off - level, -half, half, "flatness of the straight part")
+                # along the straight line through the part's ends, at the stations and in between
+                x, y = self._closed(p, v, self._way(phi[part]), branch)[1]
+                begin = normal.points[straight.start]  # type: ignore[index]
+                away = (y - begin.imag) * line.real - (x - begin.real) * line.imag
+                self._within(away - level, -half, half, "flatness of the straight part")
         return quality
 
     # Constraints
@@ -383,28 +401,36 @@ class Program:
         closing = (2.0 * pi - most, 2.0 * pi - least) if self.normal.closed else (-inf, 2.0 * pi)
         self._within(total, *closing, "stations within a turn")
 
-    def _assembled(self, p: Any, v: Any, phi: Any, cosine: Any) -> None:
-        """The transmission angle keeps its distance: |cos mu| <= cosine, written without division.
-
-        With a fixed pivot the extremes over a turn are where the crank lies along the ground link.
-        """
+    def _assembled(self, p: Any, v: Any, phi: Any, tilt: Any) -> None:
+        """The transmission angle keeps its distance over the turn, over the way of the task, or both."""
         casadi, limits = self._casadi, self.limits
-        if limits.transmission is None and self.objective != "transmission":
-            return
-        name = "transmission angle"
-        l1, l2, l3, l4 = p.ground_length, p.crank_length, p.coupler_length, p.rocker_length
-        joint, product = l3 * l3 + l4 * l4, 2.0 * l3 * l4 * cosine
-        if self.pivot is None and limits.over_turn:
-            self._at_most(joint - (l1 - l2) ** 2 - product, name)
-            self._at_most((l1 + l2) ** 2 - joint - product, name)
-            return
-        x = casadi.DM(np.linspace(0.0, 2.0 * pi, GRID, endpoint=False)) if limits.over_turn else self._way(phi)
+        l1, l2 = p.ground_length, p.crank_length
+        if limits.turn is not None and self.pivot is None:
+            # with a fixed pivot its extremes are where the crank lies along the ground link
+            self._transmitting(p, (l1 - l2) ** 2, (l1 + l2) ** 2, limits.turn, tilt)
+        elif limits.turn is not None:
+            d2 = self._reach(p, v, casadi.DM(np.linspace(0.0, 2.0 * pi, GRID, endpoint=False)))
+            self._transmitting(p, d2, d2, limits.turn + BETWEEN, tilt)
+        if limits.way is not None or (tilt is not None and limits.turn is None):
+            d2 = self._reach(p, v, self._way(phi))
+            self._transmitting(p, d2, d2, limits.way or 0.0, tilt)
+
+    def _transmitting(self, p: Any, nearest: Any, farthest: Any, least: float, tilt: Any) -> None:
+        """|cos mu| is at most cos(least), and at most the tilt: for squares of the distance BD, written without division."""
+        l3, l4 = p.coupler_length, p.rocker_length
+        joint = l3 * l3 + l4 * l4
+        for cosine in (cos(max(least, TURNING)), *([] if tilt is None else [tilt])):
+            product = 2.0 * l3 * l4 * cosine
+            self._at_most(joint - nearest - product, "transmission angle")
+            self._at_most(farthest - joint - product, "transmission angle")
+
+    def _reach(self, p: Any, v: Any, x: Any) -> Any:
+        """Square of the distance from crank pin to rocker pivot at rotations."""
+        casadi = self._casadi
         dx, dy = self._displacement(v, x)
-        bx = l1 + dx - l2 * casadi.cos(x + p.crank_phase)
-        by = dy - l2 * casadi.sin(x + p.crank_phase)
-        d2 = bx * bx + by * by
-        self._at_most(joint - d2 - product, name)
-        self._at_most(d2 - joint - product, name)
+        bx = p.ground_length + dx - p.crank_length * casadi.cos(x + p.crank_phase)
+        by = dy - p.crank_length * casadi.sin(x + p.crank_phase)
+        return bx * bx + by * by
 
     def _way(self, phi: Any) -> Any:
         """The stations' rotations and some in between: where the links must stay joined on the way of the task."""
@@ -414,8 +440,11 @@ class Program:
     def _slider(self, pivot: SliderUnknown, ground: Any, v: Any, z: list[Any], low: list[Any], high: list[Any]) -> Any:
         """Bounds of the slider's motion; what its smoothness adds to the quality."""
         casadi, unit = self._casadi, self.normal.unit
-        x = casadi.DM(np.linspace(0.0, 2.0 * pi, GRID, endpoint=False))
+        count = max(GRID, 16 * pivot.harmonics)
+        x = casadi.DM(np.linspace(0.0, 2.0 * pi, count, endpoint=False))
         u = _series(casadi, v[1:], x)
+        # a trigonometric polynomial is nowhere larger than at these points but for this factor (Ehlich and Zeller 1964)
+        share = cos(pi * pivot.harmonics / count)
         if pivot.position is None:
             self._at_most(u - ground, "slider position")
             self._at_most(-u - ground, "slider position")
@@ -426,14 +455,15 @@ class Program:
             z.append(middle)
             low.append(np.array([-inf]))
             high.append(np.array([inf]))
-            half = 0.5 * pivot.stroke / unit
+            half = 0.5 * share * pivot.stroke / unit
             self._within(u - middle, -half, half, "stroke")
         for order, bound, name in ((1, pivot.speed, "slider speed"), (2, pivot.acceleration, "slider acceleration")):
             if isfinite(bound):
-                self._within(_series(casadi, v[1:], x, order=order), -bound / unit, bound / unit, name)
+                most = share * bound / unit
+                self._within(_series(casadi, v[1:], x, order=order), -most, most, name)
         if not pivot.smoothness:
             return 0.0
-        return pivot.smoothness * casadi.sumsqr(_series(casadi, v[1:], x, order=2)) / GRID
+        return pivot.smoothness * casadi.sumsqr(_series(casadi, v[1:], x, order=2)) / count
 
     # Solution
 
@@ -466,6 +496,27 @@ class Program:
         self._solvers[iterations] = self._casadi.nlpsol("synthesis", "ipopt", self._nlp, options)
         return self._solvers[iterations]
 
+    def nearest_pieces(self, q: FloatArray) -> list[list[int]]:
+        """For each region its triangles, the one that the pivot is in, or least far outside of, first."""
+        order = []
+        for name, triangles in self.limits.regions:
+            x, y = float(q[0]), float(q[1])
+            if name == "D":
+                x, y = x + float(q[2] * np.cos(q[7])), y + float(q[2] * np.sin(q[7]))
+            outside = [float((half_planes(t) @ [x, y, 1.0]).max()) for t in triangles]
+            order.append([int(k) for k in np.argsort(outside, kind="stable")])
+        return order
+
+    def value(self, start: Start) -> float:
+        """The objective of a start, the area not smoothed; infinite where the links cannot be joined."""
+        parts = [start.q, start.pivot if len(start.pivot) else np.zeros(_size(self.pivot))]
+        if start.rotation is not None:
+            parts.append(start.rotation)
+        parameters = np.zeros(self._nlp["p"].numel())
+        parameters[[0, 1, 3]] = start.branch, 1.0, 1.0
+        f = float(self._value(np.concatenate([*parts, np.zeros(self._extra)]), parameters)[0])
+        return f if isfinite(f) else inf
+
     def solve(
         self,
         start: Start,
@@ -473,6 +524,7 @@ class Program:
         blur: float = 1e-3,
         gain: float = 1.0,
         iterations: int = ITERATIONS,
+        pieces: Sequence[int] | None = None,
         low: FloatArray | None = None,
         high: FloatArray | None = None,
     ) -> Answer:
@@ -487,6 +539,8 @@ class Program:
             Factor on the objective, one over its magnitude.
         iterations : int
             At most.
+        pieces : sequence of int, optional
+            Which triangle of each region; the nearest by default.
         low, high : ndarray, shape (11,), optional
             Replace the bounds of the linkage's unknowns.
         """
@@ -516,8 +570,9 @@ class Program:
             gain,
             *_grashof_rows(limits.grashof, z0[2:6]).ravel(order="F"),
         ]
-        for name, pieces in limits.regions:
-            parameters += half_planes(_nearest_piece(pieces, name, z0)).ravel(order="F").tolist()
+        chosen = [nearest[0] for nearest in self.nearest_pieces(z0)] if pieces is None else pieces
+        for (_, triangles), k in zip(limits.regions, chosen):
+            parameters += half_planes(triangles[k]).ravel(order="F").tolist()
         if not all(np.isfinite(np.asarray(value)).all() for value in self._value(z0, parameters)):
             return Answer.unjoined(start)
         solver = self._solver(iterations)
@@ -696,31 +751,31 @@ def half_planes(triangle: FloatArray) -> FloatArray:
     return rows
 
 
-def _nearest_piece(pieces: Sequence[FloatArray], pivot: str, q: FloatArray) -> FloatArray:
-    """The triangle that a pivot is in, or least far outside of."""
-    x, y = float(q[0]), float(q[1])
-    if pivot == "D":
-        x, y = x + float(q[2] * np.cos(q[7])), y + float(q[2] * np.sin(q[7]))
-    return min(pieces, key=lambda piece: float((half_planes(piece) @ [x, y, 1.0]).max()))
-
-
 def inside(q: FloatArray, low: FloatArray, high: FloatArray) -> FloatArray:
     """Unknowns within their bounds, angles by whole turns where that is enough."""
     q = q.copy()
     angles = slice(UNKNOWNS.index("ground_angle"), len(UNKNOWNS))
-    turned = q[angles] + 2.0 * pi * np.ceil((low[angles] - q[angles]) / (2.0 * pi))
-    fits = (turned <= high[angles]) & ((q[angles] < low[angles]) | (q[angles] > high[angles]))
-    q[angles] = np.where(fits, turned, q[angles])
+    middle = 0.5 * (low[angles] + high[angles])
+    nearest = middle + (q[angles] - middle + pi) % (2.0 * pi) - pi
+    outside = (q[angles] < low[angles]) | (q[angles] > high[angles])
+    q[angles] = np.where(outside, nearest, q[angles])
     return np.clip(q, low, high)
 
 
-def linkage_of(start: Start, normal: Normal, pivot: PivotUnknown | None = None) -> Linkage:
-    """The linkage of a start, in SI."""
+def linkage_of(
+    start: Start, normal: Normal, pivot: PivotUnknown | None = None, limits: Limits | None = None
+) -> Linkage:
+    """The linkage of a start, in SI; its angles within a half turn of zero, or else within their limits."""
     q = start.q.copy()
     q[:7] *= normal.unit
     q[0] += normal.origin.real
     q[1] += normal.origin.imag
-    q[7:] = (q[7:] + pi) % (2.0 * pi) - pi
+    angles = slice(UNKNOWNS.index("ground_angle"), len(UNKNOWNS))
+    wrapped = (q[angles] + pi) % (2.0 * pi) - pi
+    if limits is not None:
+        outside = (wrapped < limits.low[angles]) | (wrapped > limits.high[angles])
+        wrapped = np.where(outside, q[angles], wrapped)
+    q[angles] = wrapped
     v = start.pivot
     moved: SliderMotion | SecondCrank | None = None
     if isinstance(pivot, SliderUnknown) and len(v):

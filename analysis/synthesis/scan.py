@@ -15,8 +15,8 @@ coupler point. What is left is searched by a Sobol sequence, which a seed scramb
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
-from math import cos, inf, pi
+from dataclasses import dataclass, replace
+from math import cos, degrees, inf, pi
 
 import numpy as np
 from numpy.typing import NDArray
@@ -72,11 +72,10 @@ def scan(normal: Normal, limits: Limits, *, seed: int, candidates: int, starts: 
     found: list[Candidates] = []
     for number, branch in enumerate(limits.branches):
         chunks = _shapes(limits, seed + 7919 * number, max(1, candidates // len(limits.branches)))
-        found += [_placed(normal, limits, shapes, branch, seed) for shapes in chunks]
+        for chunk, shapes in enumerate(chunks):
+            found.append(_placed(normal, limits, shapes, branch, np.random.default_rng([seed, chunk, branch + 1])))
     if not found:
-        raise InfeasibleError(
-            "no shape of four-bar within the bounds has the transmission angle, full turn or Grashof type that is asked for"
-        )
+        raise InfeasibleError(f"no shape of four-bar {_why(limits, seed)}")
     return _apart(found, normal, starts)
 
 
@@ -95,6 +94,25 @@ def _shapes(limits: Limits, seed: int, count: int) -> Iterator[FloatArray]:
             yield shapes
 
 
+def _why(limits: Limits, seed: int) -> str:
+    """Which of the limits leaves no shape, by itself or only with the others."""
+    unit = qmc.Sobol(9, seed=seed).random(CHUNK)
+    low, high = np.log(_ratios(limits)).T
+    shapes = np.hstack([np.exp(low + (high - low) * unit[:, :3]), unit[:, 3:]])
+    free = replace(limits, low=np.zeros(len(limits.low)), high=np.full(len(limits.high), 1e9))
+    alone = {
+        "is within the bounds of the links": replace(limits, turn=None, grashof=None),
+        f"has a transmission angle of {degrees(limits.turn or 0.0):g} deg over a full turn": replace(
+            free, grashof=None
+        ),
+        f"is a {limits.grashof}": replace(free, turn=None),
+    }
+    failed = [words for words, one in alone.items() if not _allowed(shapes, one).any()]
+    if failed:
+        return failed[0]
+    return " and ".join(["is within the bounds of the links", *list(alone)[1 : 2 + (limits.grashof is not None)]])
+
+
 def _ratios(limits: Limits) -> FloatArray:
     """Least and greatest l2/l1, l3/l1, l4/l1, shape (3, 2): what the bounds of the links leave of `SHAPES`, or without it."""
     given = np.column_stack([limits.low[3:6] / limits.high[2], limits.high[3:6] / limits.low[2]])
@@ -108,8 +126,8 @@ def _allowed(shapes: FloatArray, limits: Limits) -> NDArray[np.bool_]:
     links = np.column_stack([np.ones(len(shapes)), shapes[:, :3]])
     l1, l2, l3, l4 = links.T
     allowed = np.ones(len(shapes), dtype=bool)
-    if limits.over_turn:
-        cosine = cos(max(limits.transmission or 0.0, TURNING))
+    if limits.turn is not None:
+        cosine = cos(max(limits.turn, TURNING))
         joint, product = l3 * l3 + l4 * l4, 2.0 * l3 * l4 * cosine
         allowed &= (joint - (l1 - l2) ** 2 <= product) & ((l1 + l2) ** 2 - joint <= product)
     if limits.grashof is not None:
@@ -130,13 +148,13 @@ def _sizes(links: FloatArray, limits: Limits) -> tuple[FloatArray, FloatArray]:
     return (limits.low[2:6] / links).max(axis=1), (limits.high[2:6] / links).min(axis=1)
 
 
-def _placed(normal: Normal, limits: Limits, shapes: FloatArray, branch: int, seed: int) -> Candidates:
+def _placed(normal: Normal, limits: Limits, shapes: FloatArray, branch: int, random: np.random.Generator) -> Candidates:
     if normal.of_rocker:
         return _functions(normal, limits, shapes, branch)
     if normal.timed:
         return _timed(normal, limits, shapes, branch, None)
     if normal.angle is not None or normal.exact:
-        return _timed(normal, limits, shapes, branch, np.random.default_rng([seed, len(shapes), branch + 1]))
+        return _timed(normal, limits, shapes, branch, random)
     return _paths(normal, limits, shapes, branch)
 
 

@@ -27,6 +27,8 @@ if TYPE_CHECKING:
 
 FloatArray = NDArray[np.float64]
 
+#: Share of the target's size squared below which an error is rounding.
+EXACT = 1e-14
 #: Points of a coupler curve by which an untimed path is judged: the thesis's 360.
 CURVE = 360
 
@@ -46,22 +48,33 @@ class Evaluation:
         Of a motion (rad).
     rotation : ndarray, shape (n,), or None
         Crank rotations at which the targets are compared; None where the linkage was given without.
+    length : float
+        Of a motion, the length at which an error of angle counts as an error of place (m); see `Motion`.
     """
 
     error: float
     errors: FloatArray
     angle_errors: FloatArray | None
     rotation: FloatArray | None
+    length: float = 0.0
+
+    @property
+    def combined(self) -> FloatArray:
+        """Errors of place and angle together, as they count in the quality function (m or rad), shape (n,)."""
+        if self.angle_errors is None:
+            return np.abs(self.errors)
+        both: FloatArray = np.hypot(self.errors, self.length * self.angle_errors)
+        return both
 
     @property
     def rms(self) -> float:
-        """Root mean square of the errors (m or rad)."""
-        return float(np.sqrt(np.mean(self.errors**2)))
+        """Root mean square of the combined errors (m or rad)."""
+        return float(np.sqrt(np.mean(self.combined**2)))
 
     @property
     def worst(self) -> float:
-        """Largest error (m or rad)."""
-        return float(np.abs(self.errors).max())
+        """Largest of the combined errors (m or rad)."""
+        return float(self.combined.max())
 
 
 def evaluate(task: Task, linkage: Linkage, rotation: FloatArray | None = None) -> Evaluation:
@@ -96,13 +109,15 @@ def evaluate(task: Task, linkage: Linkage, rotation: FloatArray | None = None) -
     distance = np.hypot(*(linkage.path(at) - points).T)
     weights = np.ones(len(points)) if isinstance(task, PrecisionPoints) else np.asarray(task.weights)
     squares = distance**2
-    turned = None
+    turned, length = None, 0.0
     if not isinstance(task, TimedPath) and task.angle is not None:
-        turned = linkage.coupler_angle(at) - np.asarray(task.angle)
+        turned, length = linkage.coupler_angle(at) - np.asarray(task.angle), float(task.length or 0.0)
         turned = (turned + pi) % (2.0 * pi) - pi
-        squares = squares + (float(task.length or 0.0) * turned) ** 2
+        squares = squares + (length * turned) ** 2
     error = float(weights @ squares)
-    return Evaluation(error=error if np.isfinite(error) else inf, errors=distance, angle_errors=turned, rotation=at)
+    return Evaluation(
+        error=error if np.isfinite(error) else inf, errors=distance, angle_errors=turned, rotation=at, length=length
+    )
 
 
 def _of_path(task: UntimedPath, linkage: Linkage, rotation: FloatArray | None) -> Evaluation:
@@ -118,11 +133,26 @@ def _of_path(task: UntimedPath, linkage: Linkage, rotation: FloatArray | None) -
     if not np.isfinite(curve).all():
         return Evaluation(error=inf, errors=np.full(len(points), inf), angle_errors=None, rotation=rotation)
     distance = distance_to(curve, points, closed=path.closed)
-    if task.measure == "area":
-        error = area_between(curve, path, closed=path.closed)
+    weights = np.asarray(task.weights)
+    normal = normal_form(task)
+    assert normal.points is not None
+    if task.measure == "area" and (weights == weights[0]).all():
+        error = float(weights[0]) * area_between(curve, path, closed=path.closed)
+    elif task.measure == "area":
+        # a weighted area: along the target with its weights, and along the curve with those of the nearest stations, by halves
+        stations = normal.origin + normal.unit * normal.points
+        apart = distance_to(curve, np.column_stack([stations.real, stations.imag]), closed=path.closed)
+        traced = curve @ np.array([1.0, 1j])
+        steps = np.abs(np.diff(np.append(traced, traced[0]) if path.closed else traced))
+        along = (
+            0.5 * (steps + np.roll(steps, 1)) if path.closed else 0.5 * (np.append(steps, 0.0) + np.append(0.0, steps))
+        )
+        nearest = np.abs(traced[:, None] - stations[None, :]).argmin(axis=1)
+        back = distance_to(points, curve, closed=path.closed)
+        error = 0.5 * float(
+            normal.weights @ (normal.unit * normal.arc * apart) + normal.weights[nearest] @ (along * back)
+        )
     else:
-        normal = normal_form(task)
-        assert normal.points is not None
         stations = normal.origin + normal.unit * normal.points
         apart = distance_to(curve, np.column_stack([stations.real, stations.imag]), closed=path.closed)
         error = float(normal.weights @ apart**2)
@@ -136,7 +166,7 @@ class Verdicts:
     Attributes
     ----------
     grashof : str
-        Type of the four-bar; see `Linkage.grashof`.
+        Type of the four-bar, see `Linkage.grashof`; where the rocker pivot moves, which has none, what moves it.
     full_turn : bool
         The crank can turn fully.
     circuit : bool
@@ -194,7 +224,7 @@ def judge(linkage: Linkage, rotation: FloatArray, *, closed: bool) -> Verdicts:
     joined = bool((np.abs(cosine) <= 1.0).all())
     angle = np.arccos(np.clip(cosine, -1.0, 1.0))
     return Verdicts(
-        grashof=linkage.grashof,
+        grashof=_kind(linkage),
         full_turn=linkage.turns_fully,
         circuit=joined,
         branch=joined and bool((np.abs(cosine) < 1.0).all()),
@@ -202,6 +232,13 @@ def judge(linkage: Linkage, rotation: FloatArray, *, closed: bool) -> Verdicts:
         least_transmission=float(angle.min()),
         greatest_transmission=float(angle.max()),
     )
+
+
+def _kind(linkage: Linkage) -> str:
+    """Grashof's type, or what moves the pivot: the four lengths then say nothing of who can turn."""
+    if linkage.pivot is None:
+        return linkage.grashof
+    return "five-bar" if isinstance(linkage.pivot, SecondCrank) else "four-bar with a moved pivot"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -227,6 +264,7 @@ class Solution:
         evaluation = evaluate(task, linkage, rotation)
         closed = isinstance(task, UntimedPath) and task.path.closed
         at = np.array([0.0, 2.0 * pi]) if evaluation.rotation is None else evaluation.rotation
+        closed = closed or whole_turn(at)
         return cls(task=task, linkage=linkage, evaluation=evaluation, verdicts=judge(linkage, at, closed=closed))
 
     @property
@@ -257,13 +295,13 @@ class Solution:
 
         return sensitivities(self)
 
-    def rounded(self, length: float = 1e-4, angle: float = radians(0.1)) -> Rounding:
+    def rounded(self, length: float | None = None, angle: float = radians(0.1)) -> Rounding:
         """What rounding lengths and angles to whole steps costs.
 
         Parameters
         ----------
         length, angle : float
-            Steps (m, rad); 0.1 mm and 0.1 degrees by default.
+            Steps (m, rad); by default 0.1 mm, or less with a link below 1 mm (`sensitivity.length_step`), and 0.1 degrees.
         """
         from .sensitivity import rounded
 
@@ -347,9 +385,8 @@ class Solution:
         task, linkage = self.task, self.linkage
         at = self.rotation
         closed = isinstance(task, UntimedPath) and task.path.closed
-        # stations as far apart over the end of the turn as elsewhere: the whole turn is the task
         span = float(np.ptp(at))
-        whole = closed or 2.0 * pi - span <= 1.01 * float(np.abs(np.diff(at)).max())
+        whole = closed or whole_turn(at)
         begin = 0.0 if closed else float(at.min())
         turn = begin + np.linspace(0.0, 2.0 * pi, 2 * CURVE + 1)
         way = turn if whole else np.linspace(begin, begin + span, 2 * CURVE + 1)
@@ -372,6 +409,12 @@ class Solution:
             function=None if pointed else np.vstack([way, linkage.rocker_angle(way)]),
             title=title,
         )
+
+
+def whole_turn(rotation: FloatArray) -> bool:
+    """Whether stations are over a whole turn: as far apart over its end as elsewhere."""
+    gap = 2.0 * pi - float(np.ptp(rotation))
+    return gap <= 1.01 * float(np.abs(np.diff(rotation)).max(initial=0.0))
 
 
 def target_points(task: Task) -> FloatArray | None:
@@ -455,5 +498,10 @@ def nearest_rotations(
 
 
 def ranked(solutions: Sequence[Solution]) -> tuple[Solution, ...]:
-    """Sound ones first, then by error."""
-    return tuple(sorted(solutions, key=lambda s: (not s.verdicts.sound, s.error)))
+    """Sound ones first, then by error; those that are exact but for rounding by their transmission angle."""
+
+    def place(solution: Solution) -> tuple[bool, float, float]:
+        exact = solution.error <= EXACT * normal_form(solution.task).unit ** 2
+        return not solution.verdicts.sound, 0.0 if exact else solution.error, -solution.linkage.least_transmission
+
+    return tuple(sorted(solutions, key=place))

@@ -22,6 +22,7 @@ from .constraints import (
     InfeasibleError,
     LargestLink,
     LeastTransmission,
+    Limits,
     limits_of,
 )
 from .linkage import ANGLES, Linkage
@@ -167,6 +168,8 @@ def synthesize(
             raise InputError(f"{value} {name}: there must be at least one")
     if method not in METHODS:
         raise InputError(f"method {method!r}: it must be one of {', '.join(METHODS)}")
+    if seed < 0 or int(seed) != seed or int(solutions) != solutions:
+        raise InputError(f"seed {seed} and {solutions} solutions: both must be whole numbers, the seed not below zero")
     begun = perf_counter()
     task = reweighted(task, weights)
     normal = fitted_form(task, pivot)
@@ -189,7 +192,7 @@ def synthesize(
         search = by_differential_evolution if method == "differential-evolution" else by_simplex
         done = search(normal, limits, seed=seed, starts=starts, n_jobs=n_jobs, progress=progress)
         total = starts
-    found = solutions_of(task, normal, done, pivot, solutions)
+    found = solutions_of(task, normal, limits, done, pivot, solutions)
     seconds = perf_counter() - begun
     result = Synthesis(
         task=task,
@@ -200,7 +203,7 @@ def synthesize(
         seconds=seconds,
         complete=not done.interrupted,
     )
-    if done.interrupted:
+    if done.interrupted and done.done < total:
         raise SynthesisInterrupted(result if found else None, done.done, total)
     if not found:
         raise infeasible(done)
@@ -237,11 +240,13 @@ def start_from(
 
 
 def solutions_of(
-    task: Task, normal: Normal, done: Polished, pivot: PivotUnknown | None, count: int
+    task: Task, normal: Normal, limits: Limits, done: Polished, pivot: PivotUnknown | None, count: int
 ) -> tuple[Solution, ...]:
     """Answers as solutions, each evaluated afresh, ranked, and at most so many."""
     chosen = distinct(done.kept, 4 * count, pivot)
-    made = [Solution.of(task, linkage_of(a.start, normal, pivot), _stations(task, a.start.rotation)) for a in chosen]
+    made = [
+        Solution.of(task, linkage_of(a.start, normal, pivot, limits), _stations(task, a.start.rotation)) for a in chosen
+    ]
     return ranked([s for s in made if isfinite(s.error)])[:count]
 
 

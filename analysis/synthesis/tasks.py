@@ -142,6 +142,8 @@ class Straight:
             )
         if self.flatness is not None and not self.flatness > 0.0:
             raise InputError(f"flatness is {self.flatness}: it must be greater than zero (m)")
+        if not (isfinite(self.weight) and self.weight >= 1.0):
+            raise InputError(f"weight of the straight part is {self.weight}: it must be a finite number, 1 or greater")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -365,15 +367,16 @@ def reweighted(task: Task, weights: ArrayLike | None) -> Task:
     return replace(task, weights=weights)
 
 
-def normal_form(task: Task, weights: ArrayLike | None = None) -> Normal:
-    """Normal form of a task, with ``weights`` in the place of its own where given.
+def normal_form(task: Task) -> Normal:
+    """Normal form of a task.
 
     Raises
     ------
     InputError
-        If the weights are not one per target, or all points coincide.
+        If it is no task, or all its points coincide.
     """
-    task = reweighted(task, weights)
+    if not isinstance(task, TimedPath | UntimedPath | RockerFunction | Motion | PrecisionPoints):
+        raise InputError(f"{task!r} is no task: use TimedPath, UntimedPath, RockerFunction, Motion or PrecisionPoints")
     if isinstance(task, RockerFunction):
         return Normal(
             origin=0.0,
@@ -438,6 +441,10 @@ def _of_path(task: UntimedPath) -> Normal:
 
     step = 0.25 * length[-1] / task.samples
     tangent = at(s + step) - at(s - step)
+    # where the path runs back on itself: along what follows
+    back = np.abs(tangent) < 1e-9 * step
+    tangent = np.where(back, at(s + step) - at(s), tangent)
+    tangent = np.where(np.abs(tangent) < 1e-9 * step, at(s) - at(s - step), tangent)
     tangent /= np.abs(tangent)
     edges = np.diff(np.append(s, length[-1])) if closed else np.diff(s)
     arc = 0.5 * (edges + np.roll(edges, 1)) if closed else 0.5 * (np.append(edges, 0.0) + np.append(0.0, edges))
@@ -445,12 +452,15 @@ def _of_path(task: UntimedPath) -> Normal:
         first, last = (int(np.argmin(np.abs(s - length[k]))) for k in (straight.start, straight.end))
         flatness = None if straight.flatness is None else straight.flatness / unit
         straight = replace(straight, start=first, end=last, flatness=flatness)
+    station_weights = np.interp(s, length, weights)
+    if not station_weights.any():
+        raise InputError(f"the weights are zero at each of the {len(s)} stations: take more samples or wider weights")
     return Normal(
         origin=origin,
         unit=unit,
         points=(at(s) - origin) / unit,
         angle=None,
-        weights=np.interp(s, length, weights),
+        weights=station_weights,
         rotation=None,
         closed=closed,
         normals=1j * tangent if task.measure == "area" else None,

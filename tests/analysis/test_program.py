@@ -81,7 +81,7 @@ class TestOptimum:
 
         def inequalities(x: FloatArray) -> FloatArray:
             l1, l2, l3, l4 = x[2:6]
-            product = 2.0 * l3 * l4 * math.cos(limits.transmission)  # type: ignore[arg-type]
+            product = 2.0 * l3 * l4 * math.cos(limits.turn)  # type: ignore[arg-type]
             return np.array(
                 [
                     l3 * l3 + l4 * l4 - (l1 - l2) ** 2 - product,
