@@ -10,8 +10,8 @@ from __future__ import annotations
 
 from .inverse import BestSpring, SliderDrive, TurnBalance, best_spring, inverse_dynamics
 from .least_effort import EffortError, LeastEffort, least_effort
-from .motion import SmoothnessCurve, motion_of_plant, slider_motion, smoothness_curve
-from .strategy import Step, Strategy, simplest_mechanism
+from .motion import SmoothnessCurve, SmoothnessInterrupted, motion_of_plant, slider_motion, smoothness_curve
+from .strategy import Step, Strategy, StrategyInterrupted, simplest_mechanism
 from .tracking import TrackingController, TrackingMetrics, TrackingResult, track
 from .variational import VariationalMotion, variational_motion
 
@@ -21,8 +21,10 @@ __all__ = [
     "LeastEffort",
     "SliderDrive",
     "SmoothnessCurve",
+    "SmoothnessInterrupted",
     "Step",
     "Strategy",
+    "StrategyInterrupted",
     "TrackingController",
     "TrackingMetrics",
     "TrackingResult",

@@ -16,14 +16,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from linkwork.errors import InputError
+from linkwork.errors import InputError, Interrupted
 
 from ..fourier import FourierSeries
 from ..synthesis.constraints import Assembly, Constraint, FullTurn, InfeasibleError, limits_of
 from ..synthesis.linkage import Linkage, SliderMotion
 from ..synthesis.polish import polish
 from ..synthesis.program import PivotUnknown, SliderUnknown, Start, random_pivot
-from ..synthesis.solution import Solution
+from ..synthesis.solution import Solution, ranked
 from ..synthesis.solve import Synthesis, SynthesisInterrupted, fitted_form, infeasible, solutions_of, start_from
 from ..synthesis.tasks import Normal, Task
 
@@ -145,6 +145,14 @@ class SmoothnessCurve:
         return np.ma.masked_invalid(np.array([np.nan if s is None else greatest(s.linkage, 2) for s in self.solutions]))
 
 
+class SmoothnessInterrupted(Interrupted):
+    """A smoothness curve was stopped from the keyboard; ``curve`` has the best so far at each bound, None where there is none."""
+
+    def __init__(self, curve: SmoothnessCurve, done: int, problems: int) -> None:
+        self.curve = curve
+        super().__init__(f"stopped after {done} of {problems} problems of the smoothness curve")
+
+
 def greatest(linkage: Linkage, order: int) -> float:
     """Greatest magnitude over a turn of the slider's position (order 0), or of a derivative of it by the crank's rotation."""
     if not isinstance(linkage.pivot, SliderMotion):
@@ -188,7 +196,8 @@ def smoothness_curve(
     """Smoothness traded against error: the best motion for each bound of its second derivative, warm started.
 
     From the roughest motion to the smoothest each problem starts from the solutions of the one before, its harmonics shrunk
-    to the new bound, and from its own random starts; then back, so that the error never grows with the freedom.
+    to the new bound, and from its own random starts; then back, each problem keeping the smoother solution or what is polished
+    from it, so that the error never grows with the freedom.
 
     Parameters
     ----------
@@ -200,18 +209,29 @@ def smoothness_curve(
     Raises
     ------
     InputError
-        If the bounds are not usable.
+        If the bounds are not usable, or the unknown is no slider.
+    SmoothnessInterrupted
+        On Ctrl-C, with the best so far at each bound.
     """
+    if not isinstance(unknown, SliderUnknown):
+        raise InputError(f"the smoothness of {unknown!r}: it must be that of a SliderUnknown")
     values = np.sort(np.array(accelerations, dtype=float, ndmin=1))
     if values.ndim != 1 or len(values) < 2 or not (np.isfinite(values).all() and values[0] > 0.0):
         raise InputError("bounds of acceleration must be finite numbers above zero, at least two")
     found: dict[int, Solution] = {}
+
+    def result_so_far() -> SmoothnessCurve:
+        return SmoothnessCurve(acceleration=values, solutions=tuple(found.get(k) for k in range(len(values))))
+
     for own, sequence in ((starts, range(len(values) - 1, -1, -1)), (0, range(len(values)))):
         previous: list[Solution] = []
-        for k in sequence:
-            guesses = [*previous, *([found[k]] if k in found else [])]
+        for done, k in enumerate(sequence):
+            mine = [found[k]] if k in found else []
+            guesses = [*previous, *mine]
             if not own and not guesses:
                 continue
+            # on the way back what keeps the tighter bound keeps this one, too
+            kept = mine if own else guesses
             try:
                 result = slider_motion(
                     task,
@@ -225,13 +245,20 @@ def smoothness_curve(
                     seed=seed,
                     n_jobs=n_jobs,
                     progress=progress,
-                )
+                ).solutions
             except InfeasibleError:
+                result = ()
+            except (SynthesisInterrupted, KeyboardInterrupt) as error:
+                last = error.synthesis if isinstance(error, SynthesisInterrupted) else None
+                if best := ranked([*kept, *(last.solutions if last else ())])[:1]:
+                    found[k] = best[0]
+                run = done if own else len(values) + done
+                raise SmoothnessInterrupted(result_so_far(), run, 2 * len(values)) from None
+            if not (result or kept):
                 continue
-            if k not in found or result.best.error < found[k].error:
-                found[k] = result.best
-            previous = list(result.solutions)
-    return SmoothnessCurve(acceleration=values, solutions=tuple(found.get(k) for k in range(len(values))))
+            found[k] = ranked([*kept, *result])[0]
+            previous = list(result) if own else [found[k]]
+    return result_so_far()
 
 
 def _shrunk(linkage: Linkage, acceleration: float) -> Linkage:

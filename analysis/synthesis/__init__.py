@@ -26,7 +26,7 @@ from .linkage import Linkage, SecondCrank, SliderMotion
 from .program import CrankUnknown, SliderUnknown
 from .sensitivity import Rounding, Sensitivity
 from .solution import Evaluation, Solution, Verdicts, evaluate, judge
-from .solve import Synthesis, SynthesisInterrupted, TradeOff, synthesize, trade_off
+from .solve import Synthesis, SynthesisInterrupted, TradeOff, TradeOffInterrupted, synthesize, trade_off
 from .targets import TargetPath, function_from_formula, path_from_formula
 from .tasks import Motion, PrecisionPoints, RockerFunction, Straight, TimedPath, UntimedPath, turn
 
@@ -58,6 +58,7 @@ __all__ = [
     "TargetPath",
     "TimedPath",
     "TradeOff",
+    "TradeOffInterrupted",
     "UntimedPath",
     "Verdicts",
     "evaluate",

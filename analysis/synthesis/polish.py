@@ -89,6 +89,8 @@ def polish(
         fitted = partial(_batch, normal, limits, pivot)
     parts, interrupted = over_cores(fitted, batches, cores=cores, progress=progress, what="polish")
     found = [answer for part in parts for answer in part]
+    # heard after the last of them it has nothing to stop
+    interrupted = interrupted and len(found) < len(starts)
     kept = sorted((a for a in found if a.feasible), key=lambda a: a.start.quality)
     if not interrupted:
         worker = Polisher(normal, limits, pivot)

@@ -376,7 +376,7 @@ class Program:
                 high.append(np.array([inf]))
                 half = 0.5 * straight.flatness
                 # along the straight line through the part's ends, at the stations and in between
-                x, y = self._closed(p, v, self._way(phi[part]), branch)[1]
+                x, y = self._closed(p, v, self._way(phi[part])[0], branch)[1]
                 begin = normal.points[straight.start]  # type: ignore[index]
                 away = (y - begin.imag) * line.real - (x - begin.real) * line.imag
                 self._within(away - level, -half, half, "flatness of the straight part")
@@ -412,8 +412,11 @@ class Program:
             d2 = self._reach(p, v, casadi.DM(np.linspace(0.0, 2.0 * pi, GRID, endpoint=False)))
             self._transmitting(p, d2, d2, limits.turn + BETWEEN, tilt)
         if limits.way is not None or (tilt is not None and limits.turn is None):
-            d2 = self._reach(p, v, self._way(phi))
-            self._transmitting(p, d2, d2, limits.way or 0.0, tilt)
+            x, step = self._way(phi)
+            d2 = self._reach(p, v, x)
+            # an extreme between two of these rotations is where the crank lies along the ground link: no more than this off
+            slack = 2.0 * l1 * l2 * (1.0 - casadi.cos(0.5 * step))
+            self._transmitting(p, d2 - slack, d2 + slack, limits.way or 0.0, tilt)
 
     def _transmitting(self, p: Any, nearest: Any, farthest: Any, least: float, tilt: Any) -> None:
         """|cos mu| is at most cos(least), and at most the tilt: for squares of the distance BD, written without division."""
@@ -432,10 +435,12 @@ class Program:
         by = dy - p.crank_length * casadi.sin(x + p.crank_phase)
         return bx * bx + by * by
 
-    def _way(self, phi: Any) -> Any:
-        """The stations' rotations and some in between: where the links must stay joined on the way of the task."""
-        between = [phi[:-1] + share * (phi[1:] - phi[:-1]) for share in (0.25, 0.5, 0.75)]
-        return self._casadi.vertcat(phi, *between)
+    def _way(self, phi: Any) -> tuple[Any, Any]:
+        """The stations' rotations and some in between, and how far from each the next one is."""
+        steps = 0.25 * (phi[1:] - phi[:-1])
+        between = [phi[:-1] + k * steps for k in (1, 2, 3)]
+        casadi = self._casadi
+        return casadi.vertcat(phi, *between), casadi.vertcat(steps, steps[-1], steps, steps, steps)
 
     def _slider(self, pivot: SliderUnknown, ground: Any, v: Any, z: list[Any], low: list[Any], high: list[Any]) -> Any:
         """Bounds of the slider's motion; what its smoothness adds to the quality."""

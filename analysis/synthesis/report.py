@@ -3,24 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import degrees, isfinite, log10, pi, radians
+from math import degrees, isfinite, pi
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .linkage import ANGLES, LINKS, SecondCrank, SliderMotion
-from .sensitivity import costs
+from .linkage import ANGLES, SecondCrank, SliderMotion
+from .sensitivity import ANGLE_STEP, PIVOT_ANGLES, costs, length_step
 from .tasks import RockerFunction, Task, UntimedPath
 
 if TYPE_CHECKING:
     from .solution import Solution, Verdicts
 
-#: Steps to which dimensions are rounded (m, rad): 0.1 mm, or a tenth of a small link, and 0.1 degrees.
-LENGTH_STEP, ANGLE_STEP = 1e-4, radians(0.1)
 #: What can be wrong with a solution, by the names in its verdicts.
 DEFECTS = ("circuit", "branch", "order")
-#: Dimensions of a moved pivot that are angles.
-PIVOT_ANGLES = ("guide_angle", "second_crank_phase")
 
 
 def quality_unit(task: Task) -> tuple[float, str]:
@@ -44,7 +40,7 @@ def quality_name(task: Task) -> str:
 
 def value_told(name: str, value: float) -> str:
     """A dimension with its unit."""
-    if name in (*ANGLES, *PIVOT_ANGLES):
+    if name in (*ANGLES, *PIVOT_ANGLES) or name.startswith("second_crank "):
         # + 0.0: no minus before a zero
         return f"{round(degrees(value), 3) + 0.0:.3f} deg"
     return f"{value * 1e3:.6g} mm"
@@ -62,12 +58,6 @@ def headline(solution: Solution) -> str:
         f"largest link {1e3 * solution.linkage.largest_link:.4g} mm, {low:.0f} to {high:.0f} deg"
         + (f"\n{defects}" if defects else "")
     )
-
-
-def length_step(solution: Solution) -> float:
-    """Step to which lengths are rounded (m): 0.1 mm; of a linkage with a link below 1 mm a power of ten below a tenth of it."""
-    least = min(getattr(solution.linkage, name) for name in LINKS)
-    return min(LENGTH_STEP, float(10.0 ** np.floor(log10(0.1 * least) + 1e-9)))
 
 
 def table(rows: Sequence[Sequence[str]]) -> str:
@@ -105,7 +95,7 @@ def dimension_rows(solution: Solution) -> list[tuple[str, str, str, str, str]]:
     """Dimensions with their values, and what it does if one is off by 0.1 mm or 0.1 degrees; a heading first."""
     factor, unit = quality_unit(solution.task)
     scale, length = error_unit(solution.task)
-    step = length_step(solution)
+    step = length_step(solution.linkage)
     dear = costs(solution, step, ANGLE_STEP)
     rows = [("dimension", "value", "off by", "moves the output by (rms)", "error grows by")]
     # where the crank's rotation is free, so is where it starts
@@ -121,19 +111,13 @@ def dimension_rows(solution: Solution) -> list[tuple[str, str, str, str, str]]:
         told = f"{cost:.3g} {unit}" if isfinite(cost) else "no assembly"
         moved = f"{scale * off * s.shift:.3g} {length}"
         rows.append((s.name, value_told(s.name, s.value), value_told(s.name, off), moved, told))
-    mounted = solution.linkage.output_angle
-    if mounted:
-        told = f"{factor * max(dear['output_angle'], 0.0):.3g} {unit}"
-        rows.append(
-            ("output_angle", value_told("output_angle", mounted), value_told("output_angle", ANGLE_STEP), "", told)
-        )
     return rows
 
 
 def rounding_told(solution: Solution) -> str:
     """What rounding costs."""
     factor, unit = quality_unit(solution.task)
-    step = length_step(solution)
+    step = length_step(solution.linkage)
     rounding = solution.rounded(step, ANGLE_STEP)
     return (
         f"rounded to {1e3 * step:g} mm and {degrees(ANGLE_STEP):g} deg: {factor * rounding.error:.6g} {unit}; "

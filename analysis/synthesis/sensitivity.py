@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from math import pi
+from math import inf, log10, pi, radians
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,10 +14,18 @@ from linkwork.errors import InputError
 
 from .kernels import PLACES
 from .linkage import ANGLES, LENGTHS, LINKS, Linkage, SecondCrank, SliderMotion
-from .solution import Solution, evaluate, nearest_rotations, path_rate
-from .tasks import RockerFunction, UntimedPath, normal_form
+from .solution import CURVE, Solution, evaluate, nearest_rotations, path_rate
+from .tasks import Normal, RockerFunction, UntimedPath, normal_form
 
 FloatArray = NDArray[np.float64]
+
+#: Steps to which dimensions are rounded (m, rad): 0.1 mm, or a tenth of a small link, and 0.1 degrees.
+LENGTH_STEP, ANGLE_STEP = 1e-4, radians(0.1)
+#: Dimensions of a moved pivot, besides the coefficients of its motion: the length, and the angles.
+SECOND = "second_crank_length"
+PIVOT_ANGLES = ("guide_angle", "second_crank_phase")
+#: Step of the differences of exact derivatives, in rad or as a share of the longest link.
+DIFFERENCE = 1e-5
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -29,7 +39,8 @@ class Sensitivity:
     value : float
         m or rad.
     slope : float
-        Derivative of the quality function with respect to it: zero at an optimum that no bound holds.
+        Derivative with respect to it of the sum of weighted squared errors, which is the quality function, or of a path whose
+        quality is an area stands in for it: zero at an optimum of it that no bound holds.
     shift : float
         Root mean square displacement of the traced point, or error of angle, per unit of it.
     """
@@ -47,17 +58,24 @@ class Rounding:
     Attributes
     ----------
     linkage : Linkage
-        Rounded.
+        Rounded; a link to no less than one step, the coefficients of a slider's or a second crank's motion, which is commanded
+        and not made, not at all.
     error : float
         Its quality function.
     expected : float
-        Mean quality function of dimensions that are off by random amounts, evenly within half a step: to second order, by
-        the exact derivatives.
+        Mean quality function of dimensions that are off by random amounts, evenly within half a step, to second order: the
+        exact derivatives and their own, by differences; infinite where there are none.
     """
 
     linkage: Linkage
     error: float
     expected: float
+
+
+def length_step(linkage: Linkage) -> float:
+    """Step to which lengths are rounded (m): 0.1 mm; of a linkage with a link below 1 mm a power of ten below a tenth of it."""
+    least = min(getattr(linkage, name) for name in LINKS)
+    return min(LENGTH_STEP, float(10.0 ** np.floor(log10(0.1 * least) + 1e-9)))
 
 
 def derivatives(solution: Solution) -> tuple[list[str], FloatArray, FloatArray, FloatArray]:
@@ -71,24 +89,31 @@ def derivatives(solution: Solution) -> tuple[list[str], FloatArray, FloatArray, 
     if at is None:
         assert normal.points is not None
         at = nearest_rotations(linkage, normal.origin + normal.unit * normal.points)
-    columns, basis = _pivot_columns(linkage, at)
-    names = [*PLACES, *columns]
-    parts, blocks, weights = [], [], []
+    weights = np.tile(normal.weights, 1 if normal.points is None or isinstance(task, UntimedPath) else 2)
+    if normal.points is not None and normal.angle is not None:
+        weights = np.append(weights, normal.weights)
+    return _names(linkage, normal), *_residuals(linkage, normal, at, isinstance(task, UntimedPath)), weights
+
+
+def _residuals(linkage: Linkage, normal: Normal, at: FloatArray, across: bool) -> tuple[FloatArray, FloatArray]:
+    """Derivatives (m, k) of the residuals, and residuals (m,): of points, ``across`` the curve or x and y; of angles."""
+    columns = [column for _, column in _pivot_columns(linkage, at)]
+    angular = normal.angle is not None
+    parts, blocks = [], []
     if normal.points is not None:
         points = normal.origin + normal.unit * normal.points
         place, jacobian = linkage.path_jacobian(at)
         left = place @ np.array([1.0, 1j]) - points
         both = jacobian[:, 0] + 1j * jacobian[:, 1]
-        whole = np.vstack([both[: len(PLACES)], *[bx * both[10] + by * both[11] for bx, by in basis]]).T
-        if isinstance(task, UntimedPath):
+        still = [np.zeros(len(at), dtype=complex)] if angular else []
+        whole = np.vstack([both[: len(PLACES)], *still, *[bx * both[10] + by * both[11] for bx, by in columns]]).T
+        if across:
             rate = path_rate(linkage, at, both)
-            across = 1j * rate / np.abs(rate)
-            parts, blocks = [(left * across.conj()).real], [(whole * across.conj()[:, None]).real]
-            weights = [normal.weights]
+            normals = 1j * rate / np.abs(rate)
+            parts, blocks = [(left * normals.conj()).real], [(whole * normals.conj()[:, None]).real]
         else:
             parts, blocks = [left.real, left.imag], [whole.real, whole.imag]
-            weights = [normal.weights, normal.weights]
-    if normal.angle is not None:
+    if angular:
         which = 1 if normal.of_rocker else 0
         angles, jacobian = linkage.link_jacobian(at)
         turned = 0.0 if normal.of_rocker else linkage.ground_angle
@@ -96,7 +121,8 @@ def derivatives(solution: Solution) -> tuple[list[str], FloatArray, FloatArray, 
         own = np.vstack(
             [
                 jacobian[: len(PLACES), which],
-                *[bx * jacobian[10, which] + by * jacobian[11, which] for bx, by in basis],
+                np.ones(len(at)),
+                *[bx * jacobian[10, which] + by * jacobian[11, which] for bx, by in columns],
             ]
         ).T
         if not normal.of_rocker:
@@ -104,8 +130,7 @@ def derivatives(solution: Solution) -> tuple[list[str], FloatArray, FloatArray, 
         leverage = normal.leverage * normal.unit
         parts.append(leverage * ((left_angle + pi) % (2.0 * pi) - pi))
         blocks.append(leverage * own)
-        weights.append(normal.weights)
-    return names, np.vstack(blocks), np.concatenate(parts), np.concatenate(weights)
+    return np.vstack(blocks), np.concatenate(parts)
 
 
 def sensitivities(solution: Solution) -> tuple[Sensitivity, ...]:
@@ -118,44 +143,84 @@ def sensitivities(solution: Solution) -> tuple[Sensitivity, ...]:
     stations = len(normal_form(solution.task).weights)
     shifts = np.sqrt((jacobian**2).sum(axis=0) / stations)
     values = solution.linkage.values() | _pivot_values(solution.linkage)
+    # a rocker's angle has nothing to do with where the linkage stands, nor with its coupler point
+    idle = set(PLACES) - {*LINKS, "crank_phase"} if isinstance(solution.task, RockerFunction) else set()
     return tuple(
         Sensitivity(name=name, value=float(values[name]), slope=float(slope), shift=float(shift))
         for name, slope, shift in zip(names, slopes, shifts)
-        if not (isinstance(solution.task, RockerFunction) and name not in (*LINKS, "crank_phase", *names[10:]))
+        if name not in idle
     )
 
 
-def rounded(solution: Solution, length: float, angle: float) -> Rounding:
+def rounded(solution: Solution, length: float | None = None, angle: float = ANGLE_STEP) -> Rounding:
     """What rounding lengths and angles to whole steps costs.
 
     Parameters
     ----------
     length, angle : float
-        Steps (m, rad); 0.1 mm and 0.1 degrees by default.
+        Steps (m, rad); `length_step` and 0.1 degrees by default.
+
+    Raises
+    ------
+    InputError
+        If a step is not above zero.
     """
+    length = length_step(solution.linkage) if length is None else length
     for what, step in (("length", length), ("angle", angle)):
         if not (np.isfinite(step) and step > 0.0):
             raise InputError(f"step of {what} is {step}: it must be greater than zero")
-    changed = {
-        name: step * round(getattr(solution.linkage, name) / step)
-        for names, step in ((LENGTHS, length), (ANGLES, angle))
-        for name in names
-    }
-    linkage = replace(solution.linkage, **changed)
-    names, jacobian, _, weights = derivatives(solution)
-    variance = np.array([(length if name in LENGTHS else angle) ** 2 / 12.0 for name in names[: len(PLACES)]])
-    squares = (weights[:, None] * jacobian[:, : len(PLACES)] ** 2).sum(axis=0)
-    rotation = solution.evaluation.rotation
-    error = evaluate(solution.task, linkage, rotation).error
-    if isinstance(solution.task, UntimedPath) and solution.task.measure == "area":
+    linkage = solution.linkage
+    steps = {name: angle if name in (*ANGLES, *PIVOT_ANGLES) else length for name in _made(linkage)}
+    rounded_to = linkage
+    for name, value in _made(linkage).items():
+        whole = round(value / steps[name])
+        # a link is not rounded away
+        rounded_to = _with(rounded_to, name, steps[name] * (max(whole, 1) if name in (*LINKS, SECOND) else whole))
+    error = evaluate(solution.task, rounded_to, solution.evaluation.rotation).error
+    return Rounding(linkage=rounded_to, error=error, expected=_expected(solution, steps))
+
+
+def _expected(solution: Solution, steps: Mapping[str, float]) -> float:
+    """Mean quality function of dimensions that are off by even random amounts of a variance of a twelfth of a step squared."""
+    task, linkage = solution.task, solution.linkage
+    area = isinstance(task, UntimedPath) and task.measure == "area"
+    if isinstance(task, UntimedPath) and area:
+        # as many stations as it is evaluated at
+        task = replace(task, samples=max(task.samples, CURVE))
+    normal = normal_form(task)
+    given = normal.rotation if normal.rotation is not None else solution.evaluation.rotation
+    names = _names(linkage, normal)
+
+    def residuals(made: Linkage) -> tuple[FloatArray, FloatArray]:
+        at = given
+        if isinstance(task, UntimedPath):
+            # the crank rotations follow
+            assert normal.points is not None
+            ends = () if normal.closed or given is None else (float(given.min()), float(given.max()))
+            at = nearest_rotations(made, normal.origin + normal.unit * normal.points, *ends)
+        assert at is not None
+        return _residuals(made, normal, at, isinstance(task, UntimedPath))
+
+    jacobian, left = residuals(linkage)
+    square, shift = np.zeros(len(left)), np.zeros(len(left))
+    for name, step in steps.items():
+        if name not in names:
+            continue
+        k, variance = names.index(name), step**2 / 12.0
+        small = DIFFERENCE * (1.0 if name in (*ANGLES, *PIVOT_ANGLES) else linkage.largest_link)
+        value = _made(linkage)[name]
+        ahead, behind = (residuals(_with(linkage, name, value + side * small))[0][:, k] for side in (1.0, -1.0))
+        square += variance * jacobian[:, k] ** 2
+        shift += 0.5 * variance * (ahead - behind) / (2.0 * small)
+    if area:
         # an area: the mean of the distances, as of a normal variable of that spread about what is there
-        normal = normal_form(solution.task)
-        spread = np.sqrt(jacobian[:, : len(PLACES)] ** 2 @ variance)
-        left = derivatives(solution)[2]
-        expected = float(normal.weights * normal.arc * normal.unit @ _mean_absolute(left, spread))
+        grown = (
+            normal.weights * normal.arc * normal.unit @ (_mean_absolute(left + shift, np.sqrt(square)) - np.abs(left))
+        )
     else:
-        expected = solution.error + float(squares @ variance)
-    return Rounding(linkage=linkage, error=error, expected=expected)
+        weights = np.tile(normal.weights, len(left) // normal.n)
+        grown = weights @ (square + 2.0 * left * shift)
+    return solution.error + float(grown) if np.isfinite(grown) else inf
 
 
 def costs(solution: Solution, length: float, angle: float) -> dict[str, float]:
@@ -196,35 +261,60 @@ def _mean_absolute(mean: FloatArray, spread: FloatArray) -> FloatArray:
     return value
 
 
-def _pivot_columns(linkage: Linkage, at: FloatArray) -> tuple[list[str], list[tuple[FloatArray, FloatArray]]]:
+def _names(linkage: Linkage, normal: Normal) -> list[str]:
+    """Dimensions that there are derivatives with respect to, in their order."""
+    mounted = [] if normal.angle is None else ["output_angle"]
+    return [*PLACES, *mounted, *[name for name, _ in _pivot_columns(linkage, np.zeros(1))]]
+
+
+def _pivot_columns(linkage: Linkage, at: FloatArray) -> list[tuple[str, tuple[FloatArray, FloatArray]]]:
     """Dimensions of a moved pivot, and the derivatives of its displacement with respect to each."""
     pivot = linkage.pivot
-    names: list[str] = []
-    columns: list[tuple[FloatArray, FloatArray]] = []
+    columns: list[tuple[str, tuple[FloatArray, FloatArray]]] = []
     if isinstance(pivot, SliderMotion):
         c, s = np.cos(pivot.guide_angle), np.sin(pivot.guide_angle)
         u = pivot.series(at)
-        names.append("guide_angle")
-        columns.append((-s * u, c * u))
+        columns.append(("guide_angle", (-s * u, c * u)))
         for k in range(pivot.series.order + 1):
             for kind, value in (("cos", np.cos(k * at)), ("sin", np.sin(k * at)))[: 1 if k == 0 else 2]:
-                names.append(f"slider {kind} {k}")
-                columns.append((c * value, s * value))
+                columns.append((f"slider {kind} {k}", (c * value, s * value)))
     elif isinstance(pivot, SecondCrank):
         psi = pivot.angle(at)
-        names += ["second_crank_length", "second_crank_phase"]
-        columns += [(np.cos(psi), np.sin(psi)), (-pivot.length * np.sin(psi), pivot.length * np.cos(psi))]
-    return names, columns
+        turned = -pivot.length * np.sin(psi), pivot.length * np.cos(psi)
+        columns += [(SECOND, (np.cos(psi), np.sin(psi))), ("second_crank_phase", turned)]
+        # the mean of the series is the phase's
+        for k in range(1, pivot.series.order + 1):
+            for kind, value in (("cos", np.cos(k * at)), ("sin", np.sin(k * at))):
+                columns.append((f"second_crank {kind} {k}", (turned[0] * value, turned[1] * value)))
+    return columns
 
 
 def _pivot_values(linkage: Linkage) -> dict[str, float]:
     pivot = linkage.pivot
     if isinstance(pivot, SliderMotion):
         values = {"guide_angle": pivot.guide_angle}
-        for k in range(pivot.series.order + 1):
-            values[f"slider cos {k}"] = float(pivot.series.cos[k])
-            values[f"slider sin {k}"] = float(pivot.series.sin[k])
-        return values
-    if isinstance(pivot, SecondCrank):
-        return {"second_crank_length": pivot.length, "second_crank_phase": pivot.phase}
-    return {}
+    elif isinstance(pivot, SecondCrank):
+        values = {SECOND: pivot.length, "second_crank_phase": pivot.phase}
+    else:
+        return {}
+    own = "slider" if isinstance(pivot, SliderMotion) else "second_crank"
+    for k in range(pivot.series.order + 1):
+        values[f"{own} cos {k}"] = float(pivot.series.cos[k])
+        values[f"{own} sin {k}"] = float(pivot.series.sin[k])
+    return values
+
+
+def _made(linkage: Linkage) -> dict[str, float]:
+    """Dimensions that are made, and so are off by something: a commanded motion is not among them."""
+    values = linkage.values() | _pivot_values(linkage)
+    return {name: values[name] for name in (*LENGTHS, *ANGLES, SECOND, *PIVOT_ANGLES) if name in values}
+
+
+def _with(linkage: Linkage, name: str, value: float) -> Linkage:
+    """The linkage with another value of one of the dimensions that are made."""
+    if name in (*LENGTHS, *ANGLES):
+        changed: Mapping[str, Any] = {name: value}
+        return replace(linkage, **changed)
+    assert linkage.pivot is not None
+    own: Mapping[str, Any] = {{SECOND: "length", "second_crank_phase": "phase"}.get(name, name): value}
+    return replace(linkage, pivot=replace(linkage.pivot, **own))

@@ -203,7 +203,7 @@ def synthesize(
         seconds=seconds,
         complete=not done.interrupted,
     )
-    if done.interrupted and done.done < total:
+    if done.interrupted:
         raise SynthesisInterrupted(result if found else None, done.done, total)
     if not found:
         raise infeasible(done)
@@ -353,6 +353,14 @@ class TradeOff:
         )
 
 
+class TradeOffInterrupted(Interrupted):
+    """A trade-off was stopped from the keyboard; ``trade_off`` has the best so far at each limit, None where there is none."""
+
+    def __init__(self, trade_off: TradeOff, done: int, problems: int) -> None:
+        self.trade_off = trade_off
+        super().__init__(f"stopped after {done} of {problems} problems of the trade-off")
+
+
 def trade_off(
     task: Task,
     over: Literal["size", "transmission"],
@@ -370,8 +378,8 @@ def trade_off(
     """Error against size or transmission angle, by the epsilon-constraint method with warm starts.
 
     From the loosest limit to the tightest each problem starts from its own scan and from the solutions of the one before; a
-    second pass goes back, so that a solution found late serves the looser limits too: the error can only grow as a limit is
-    tightened.
+    second pass goes back, so that a solution found late serves the looser limits too, itself or polished anew: the error of
+    sound linkages can only grow as a limit is tightened.
 
     Parameters
     ----------
@@ -386,8 +394,8 @@ def trade_off(
     ------
     InputError
         If ``over`` or the limits are not usable.
-    SynthesisInterrupted
-        On Ctrl-C, with the last problem's best so far.
+    TradeOffInterrupted
+        On Ctrl-C, with the best so far at each limit.
     """
     kind = {"size": LargestLink, "transmission": LeastTransmission}.get(over)
     values = np.array(limits, dtype=float)
@@ -398,13 +406,20 @@ def trade_off(
     rest = tuple(c for c in constraints if not isinstance(c, kind))
     order = np.argsort(-values if over == "size" else values)
     found: dict[int, Solution] = {}
+
+    def result_so_far() -> TradeOff:
+        return TradeOff(over=over, limit=values, solutions=tuple(found.get(k) for k in range(len(values))))
+
     for number, sequence in enumerate((order, order[::-1])):
         previous: list[Solution] = []
-        for k in sequence.tolist():
+        for done, k in enumerate(sequence.tolist()):
             limit: Constraint = LargestLink(length=values[k]) if over == "size" else LeastTransmission(angle=values[k])
-            guesses = [*previous, *([found[k]] if k in found else [])]
+            own = [found[k]] if k in found else []
+            guesses = [*previous, *own]
             if number and not guesses:
                 continue
+            # on the way back what keeps the tighter limit keeps this one, too
+            kept = guesses if number else own
             try:
                 result = synthesize(
                     task,
@@ -419,10 +434,16 @@ def trade_off(
                     guesses=guesses,
                     n_jobs=n_jobs,
                     progress=progress,
-                )
+                ).solutions
             except InfeasibleError:
+                result = ()
+            except (SynthesisInterrupted, KeyboardInterrupt) as error:
+                last = error.synthesis if isinstance(error, SynthesisInterrupted) else None
+                if best := ranked([*kept, *(last.solutions if last else ())])[:1]:
+                    found[k] = best[0]
+                raise TradeOffInterrupted(result_so_far(), number * len(values) + done, 2 * len(values)) from None
+            if not (result or kept):
                 continue
-            if k not in found or result.best.error < found[k].error:
-                found[k] = result.best
-            previous = list(result.solutions) if number == 0 else [found[k]]
-    return TradeOff(over=over, limit=values, solutions=tuple(found.get(k) for k in range(len(values))))
+            found[k] = ranked([*kept, *result])[0]
+            previous = [found[k]] if number else list(result)
+    return result_so_far()

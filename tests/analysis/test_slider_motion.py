@@ -81,7 +81,7 @@ def test_series_2_with_two_harmonics() -> None:
     assert len(found.best.evaluation.rotation) == PATH_B.task.samples
     residual = {s.name: s.shift for s in found.best.sensitivities()}
     assert residual["pivot_x"] < 1.0
-    assert residual["slider cos 1"] > 0.1
+    assert residual["slider cos 1"] > 0.0
 
 
 @pytest.mark.parametrize("linkage", [PRINTED, PATH_B.linkage], ids=["rocker", "path"])

@@ -30,8 +30,7 @@ from analysis.synthesis import (
     UntimedPath,
     turn,
 )
-from analysis.synthesis.report import length_step
-from analysis.synthesis.sensitivity import costs
+from analysis.synthesis.sensitivity import costs, length_step
 from linkwork.errors import AssemblyError, InputError
 
 PHI = turn(24)
@@ -336,5 +335,5 @@ def test_the_report_tells_dimensions_verdicts_and_errors() -> None:
 @pytest.mark.parametrize(("factor", "step"), [(1.0, 1e-4), (1e3, 1e-4), (0.02, 1e-4), (0.015, 1e-5), (1e-3, 1e-6)])
 def test_small_linkages_are_rounded_to_finer_steps(factor, step) -> None:
     solution = Solution.of(TimedPath(points=factor * ELLIPSE), LINKAGE.scaled(factor))
-    assert length_step(solution) == pytest.approx(step)
+    assert length_step(solution.linkage) == pytest.approx(step)
     assert solution.report()

@@ -23,8 +23,11 @@ from analysis.synthesis import (
     LeastTransmission,
     Linkage,
     Motion,
+    PivotRegion,
     PrecisionPoints,
+    Require,
     RockerFunction,
+    SecondCrank,
     SliderMotion,
     Solution,
     Straight,
@@ -38,7 +41,10 @@ from analysis.synthesis import (
     turn,
 )
 from analysis.synthesis.areas import straightness
+from analysis.synthesis.constraints import limits_of
+from analysis.synthesis.linkage import ANGLES, LENGTHS
 from analysis.synthesis.polish import Polished, polish
+from analysis.synthesis.tasks import normal_form
 from linkwork.errors import InputError, ParameterError
 from tests.linkages import drawn
 
@@ -129,6 +135,10 @@ def judged(kind: str) -> Solution:
         a = 0.05 * linkage.crank_length
         pivot = SliderMotion(FourierSeries(np.array([a, 2.0 * a]), np.array([0.0, a])), 0.4)
         return Solution.of(TimedPath(points=points, rotation=phi, weights=weights), replace(linkage, pivot=pivot))
+    if kind == "five-bar":
+        series = FourierSeries(np.array([0.0, 0.2, -0.1]), np.array([0.0, 0.3, 0.1]))
+        arm = SecondCrank(0.1 * linkage.crank_length, ratio=2, phase=0.7, series=series)
+        return Solution.of(TimedPath(points=points, rotation=phi, weights=weights), replace(linkage, pivot=arm))
     task: Any = {
         "timed": lambda: TimedPath(points=points, rotation=phi, weights=weights),
         "rocker": lambda: RockerFunction(angle=linkage.rocker_angle(phi) + 0.02 * phi, rotation=phi, weights=weights),
@@ -155,8 +165,12 @@ def judged(kind: str) -> Solution:
     return Solution.of(task, linkage, rotation)
 
 
+#: Kinds whose quality is a sum over stations of given rotations.
+SUMS = ("timed", "rocker", "motion", "poses", "precision", "slider", "five-bar")
+
+
 class TestSensitivity:
-    @pytest.mark.parametrize("kind", ["timed", "rocker", "motion", "poses", "precision", "slider", "closed", "open"])
+    @pytest.mark.parametrize("kind", [*SUMS, "closed", "open"])
     def test_slopes_are_limits_of_differences_of_the_error(self, kind: str) -> None:
         solution = judged(kind)
         h = 1e-6
@@ -172,15 +186,15 @@ class TestSensitivity:
             largest = max(abs(t.slope) for t in solution.sensitivities())
             assert s.slope == pytest.approx(slope, rel=tolerance, abs=tolerance * largest), s.name
             seen += 1
-        assert seen == {"rocker": 5, "slider": 14}.get(kind, 10)
+        assert seen == {"rocker": 6, "motion": 11, "poses": 11, "slider": 14, "five-bar": 16}.get(kind, 10)
 
     def changed(self, linkage: Linkage, name: str, step: float) -> Linkage:
         pivot = linkage.pivot
         if name in linkage.values():
             return replace(linkage, **{name: getattr(linkage, name) + step})
-        assert isinstance(pivot, SliderMotion)
-        if name == "guide_angle":
-            return replace(linkage, pivot=replace(pivot, guide_angle=pivot.guide_angle + step))
+        own = {"guide_angle": "guide_angle", "second_crank_length": "length", "second_crank_phase": "phase"}.get(name)
+        if own is not None:
+            return replace(linkage, pivot=replace(pivot, **{own: getattr(pivot, own) + step}))
         _, kind, k = name.split()
         cosines, sines = np.array(pivot.series.cos), np.array(pivot.series.sin)
         (cosines if kind == "cos" else sines)[int(k)] += step
@@ -209,19 +223,22 @@ class TestRounding:
                 assert value / step == pytest.approx(round(value / step), abs=1e-6)
         assert rounding.error == evaluate(judged("timed").task, rounding.linkage).error
 
-    @pytest.mark.parametrize("kind", ["timed", "motion", "rocker", "closed", "area"])
+    @pytest.mark.parametrize("kind", ["timed", "motion", "rocker", "slider", "five-bar", "closed", "area"])
     def test_expected_is_the_mean_over_random_errors_of_make(self, kind: str) -> None:
         solution = judged(kind)
         length, angle = 0.004, radians(0.3)
         random = np.random.default_rng(2)
         errors = []
+
+        def made(part: Any, names: tuple[str, ...]) -> Any:
+            steps = {n: angle if "angle" in n or "phase" in n else length for n in names}
+            return replace(part, **{n: getattr(part, n) + s * random.uniform(-0.5, 0.5) for n, s in steps.items()})
+
         for _ in range(1500):
-            changed = {
-                name: value + (angle if "angle" in name or "phase" in name else length) * random.uniform(-0.5, 0.5)
-                for name, value in solution.linkage.values().items()
-                if name not in ("branch", "output_angle")
-            }
-            linkage = replace(solution.linkage, **changed)
+            linkage = made(solution.linkage, (*LENGTHS, *ANGLES))
+            if linkage.pivot is not None:
+                own = ("guide_angle",) if kind == "slider" else ("length", "phase")
+                linkage = replace(linkage, pivot=made(linkage.pivot, own))
             errors.append(evaluate(solution.task, linkage, solution.evaluation.rotation).error)
             if kind in ("closed", "area") and len(errors) == 400:
                 break
@@ -229,6 +246,50 @@ class TestRounding:
         spread = np.std(errors) / np.sqrt(len(errors))
         expected = solution.rounded(length=length, angle=angle).expected
         assert expected == pytest.approx(np.mean(errors), abs=4.0 * spread + 0.05 * (np.mean(errors) - solution.error))
+
+    @pytest.mark.parametrize("kind", [*SUMS, "closed", "open", "area"])
+    def test_fine_steps_cost_nothing(self, kind: str) -> None:
+        solution = judged(kind)
+        rounding = solution.rounded(length=1e-9, angle=1e-9)
+        assert rounding.expected == pytest.approx(solution.error, rel=1e-6)
+        assert rounding.error == pytest.approx(solution.error, rel=1e-5)
+
+    def test_expected_knows_how_the_residuals_are_curved(self) -> None:
+        """One dimension off, and a large error: by Simpson's rule, which integrates the cubic of it exactly."""
+        solution = judged("rocker")
+        task = replace(solution.task, angle=solution.linkage.rocker_angle(solution.task.rotation) + 0.5)  # type: ignore[call-arg]
+        solution = Solution.of(task, solution.linkage)
+        angle = radians(2.0)
+
+        def mean(name: str) -> float:
+            ends = [
+                evaluate(task, replace(solution.linkage, **{name: getattr(solution.linkage, name) + d})).error
+                for d in (-angle / 2.0, angle / 2.0)
+            ]
+            return (ends[0] + 4.0 * solution.error + ends[1]) / 6.0
+
+        # of the angles, only these two turn the rocker
+        grown = sum(mean(name) - solution.error for name in ("crank_phase", "output_angle"))
+        assert solution.rounded(length=1e-9, angle=angle).expected - solution.error == pytest.approx(grown, rel=1e-3)
+
+    def test_output_angle_and_moved_pivot_are_rounded_the_commanded_motion_is_not(self) -> None:
+        motion = judged("motion")
+        mounted = replace(motion, linkage=replace(motion.linkage, output_angle=0.1234))
+        assert mounted.rounded(angle=0.05).linkage.output_angle == pytest.approx(0.1)
+        sliding, geared = judged("slider"), judged("five-bar")
+        assert sliding.rounded(angle=0.25).linkage.pivot.guide_angle == pytest.approx(0.5)  # type: ignore[union-attr]
+        assert sliding.rounded(length=0.01).linkage.pivot.series is sliding.linkage.pivot.series  # type: ignore[union-attr]
+        pivot = geared.rounded(length=1.0, angle=0.5).linkage.pivot
+        assert (pivot.length, pivot.phase) == (1.0, 0.5)  # type: ignore[union-attr]
+
+    @pytest.mark.parametrize("factor", [1.0, 1e-3, 1e-5])
+    def test_small_linkages_by_themselves_are_rounded_to_finer_steps(self, factor: float) -> None:
+        """A link is not rounded away, and the error stays in proportion to the linkage."""
+        linkage = known().scaled(factor)
+        solution = Solution.of(TimedPath(points=off(known().path(turn(9))) * factor), linkage)
+        rounding = solution.rounded()
+        assert rounding.error == pytest.approx(solution.error, rel=0.3)
+        assert solution.rounded(length=10.0 * linkage.largest_link).linkage.crank_length == 10.0 * linkage.largest_link
 
     @pytest.mark.parametrize("step", [0.0, -1.0, np.nan])
     def test_steps_are_above_zero(self, step: float) -> None:
@@ -424,7 +485,7 @@ class TestBadInput:
                 InfeasibleError,
                 "crank_length is to be at least 0.2 and at most 0.1",
             ),
-            ({"bounds": {"crank_length": (0.2, np.inf)}}, ParameterError, "bounds of crank_length"),
+            ({"bounds": {"crank_length": (0.2, np.nan)}}, ParameterError, "bounds of crank_length"),
             ({"bounds": {"crank_length": 1.0}}, ParameterError, "be two numbers, the least and the greatest value"),
             ({"bounds": {"crank_length": (-2.0, -1.0)}}, ParameterError, "a link has a length"),
             (
@@ -503,3 +564,102 @@ def test_a_crank_that_need_not_turn_fully_does_not() -> None:
     ).best
     assert solution.evaluation.worst < 1e-3
     assert solution.verdicts.sound
+
+
+class TestLimits:
+    """What is asked over the turn and over the way of the task, and what is returned keeps its bounds."""
+
+    def test_an_open_end_is_the_usual_one(self) -> None:
+        whole = synthesize(TASK, {"crank_length": (None, None)}, **QUICK)
+        assert whole.best.error == synthesize(TASK, **QUICK).best.error
+        assert synthesize(TASK, {"crank_length": (0.04, np.inf)}, **QUICK).best.linkage.crank_length >= 0.04
+
+    def test_over_the_turn_and_over_the_task_are_two_limits(self) -> None:
+        points = np.column_stack([np.linspace(0.0, 0.1, 6), np.zeros(6)])
+        task = TimedPath(points=points, rotation=np.linspace(0.0, 0.8, 6))
+        both = (LeastTransmission(angle=radians(15.0)), LeastTransmission(angle=radians(60.0), over="task"))
+        best = synthesize(task, constraints=both, **QUICK).best
+        assert best.linkage.least_transmission >= radians(15.0) - 1e-6
+        assert (
+            min(best.verdicts.least_transmission, np.pi - best.verdicts.greatest_transmission) >= radians(60.0) - 1e-4
+        )
+        normal = normal_form(task)
+        limits = limits_of(task, normal, None, both)
+        assert (limits.turn, limits.way) == (radians(15.0), radians(60.0))
+        only = limits_of(task, normal, None, (FullTurn(), LeastTransmission(angle=1.0, over="task")))
+        assert (only.turn, only.way) == (0.0, 1.0)
+
+    @pytest.mark.parametrize("low", [3.5, -3.5])
+    def test_angles_are_returned_within_their_bounds(self, low: float) -> None:
+        best = synthesize(TASK, {"ground_angle": (low, low + 0.5)}, **QUICK).best
+        assert low <= best.linkage.ground_angle <= low + 0.5
+
+    def test_a_required_angle_is_the_one_that_is_returned(self) -> None:
+        asked = Require(function=lambda p: p.ground_angle - 2.0, equal=True, name="ground angle")
+        best = synthesize(TASK, constraints=(*USUAL, asked), **QUICK).best
+        assert best.linkage.ground_angle == pytest.approx(2.0, abs=1e-6)
+
+    def test_two_links_may_be_fixed(self) -> None:
+        best = synthesize(TASK, {"ground_length": (0.3, 0.3), "crank_length": (0.06, 0.06)}, **QUICK).best
+        assert (best.linkage.ground_length, best.linkage.crank_length) == pytest.approx((0.3, 0.06), rel=1e-9)
+
+    def test_a_grashof_type_is_no_change_point(self) -> None:
+        points = np.column_stack([np.linspace(0.0, 0.1, 5), 0.02 * np.linspace(-1.0, 1.0, 5) ** 2])
+        task = TimedPath(points=points, rotation=np.linspace(0.0, 1.5, 5))
+        for type_ in ("rocker-crank", "double-rocker"):
+            result = synthesize(task, constraints=(Grashof(type=type_),), **QUICK)  # type: ignore[arg-type]
+            assert {s.linkage.grashof for s in result.solutions} == {type_}
+            assert result.best.verdicts.sound
+
+    def test_a_region_that_is_not_convex_is_searched_through(self) -> None:
+        # a box with a notch cut into it from below: as good as without, but for the notch
+        x, y, half = -0.1, 0.1, 0.08
+        notched = [
+            (x - half, y - half), (x - 0.01, y - half), (x, y - 0.016), (x + 0.01, y - half),
+            (x + half, y - half), (x + half, y + half), (x - half, y + half),
+        ]  # fmt: skip
+        task = TimedPath(points=np.column_stack([0.2 + 0.1 * np.cos(turn(24)), 0.15 + 0.05 * np.sin(turn(24))]))
+        cap = LargestLink(length=1.1285)
+        region = PivotRegion(pivot="A", polygon=notched)
+        best = synthesize(task, constraints=(*USUAL, cap, region), starts=8, candidates=1 << 13).best
+        boxes = [
+            {"pivot_x": (x - half, x - 0.01), "pivot_y": (y - half, y + half)},
+            {"pivot_x": (x + 0.01, x + half), "pivot_y": (y - half, y + half)},
+            {"pivot_x": (x - half, x + half), "pivot_y": (y - 0.016, y + half)},
+        ]
+        inner = min(synthesize(task, box, (*USUAL, cap), starts=8, candidates=1 << 13).best.error for box in boxes)
+        assert best.error <= inner * (1.0 + 1e-6)
+
+    def test_exact_points_are_ranked_by_their_transmission_angle(self) -> None:
+        known = synthesize(TASK, **QUICK).best.linkage
+        at = np.linspace(0.0, 4.0, 4)
+        task = PrecisionPoints(points=known.path(at), rotation=at)
+        found = [s for s in synthesize(task, **QUICK).solutions if s.error < 1e-18]
+        assert len(found) > 1
+        angles = [s.linkage.least_transmission for s in found]
+        assert angles == sorted(angles, reverse=True)
+
+    def test_the_closing_step_of_a_turn_counts(self) -> None:
+        linkage = Linkage(
+            ground_length=1.0, crank_length=0.91687, coupler_length=1.00396, rocker_length=1.25461, crank_phase=0.51262
+        )
+        assert not linkage.turns_fully
+        solution = Solution.of(TimedPath(points=linkage.path(turn(8))), linkage)
+        assert not solution.verdicts.sound
+
+    def test_weights_of_an_area_are_in_its_error(self) -> None:
+        path = TargetPath(points=ELLIPSE, closed=True)
+        linkage = synthesize(UntimedPath(path=path, samples=24), **QUICK).best.linkage
+        shifted = replace(linkage, pivot_x=linkage.pivot_x + 1e-3)
+        plain, twice = (
+            Solution.of(UntimedPath(path=path, weights=np.full(len(ELLIPSE), w)), shifted).error for w in (1.0, 2.0)
+        )
+        assert twice == pytest.approx(2.0 * plain, rel=1e-12)
+        # all but even weights take the other way to nearly the same area
+        weights = np.ones(len(ELLIPSE))
+        weights[0] = 1.0 + 1e-9
+        assert Solution.of(UntimedPath(path=path, weights=weights), shifted).error == pytest.approx(plain, rel=0.03)
+        right = np.where(ELLIPSE[:, 0] > ELLIPSE[:, 0].mean(), 1.0, 0.0)
+        left = 1.0 - right
+        halves = [Solution.of(UntimedPath(path=path, weights=w), shifted).error for w in (left, right)]
+        assert sum(halves) == pytest.approx(plain, rel=0.05)
