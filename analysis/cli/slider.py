@@ -232,7 +232,8 @@ def _dynamics(chosen: Any, solution: Any, folder: Path, plots: bool) -> list[Pat
 
 
 def _rows(title: str, rows: Sequence[tuple[str, str]]) -> None:
-    grid = Table(title=escape(title), title_justify="left", show_header=False)
+    console.print(title, style="italic", highlight=False, markup=False, soft_wrap=True)
+    grid = Table(show_header=False)
     grid.add_column()
     grid.add_column(justify="right")
     for row in rows:

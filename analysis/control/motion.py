@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from math import pi
+from math import inf, pi
 from time import perf_counter
 from typing import Any
 
@@ -195,7 +195,7 @@ def smoothness_curve(
 ) -> SmoothnessCurve:
     """Smoothness traded against error: the best motion for each bound of its second derivative, warm started.
 
-    From the roughest motion to the smoothest each problem starts from the solutions of the one before, its harmonics shrunk
+    From the motion without a bound through the roughest to the smoothest each problem starts from the solutions of the one before, its harmonics shrunk
     to the new bound, and from its own random starts; then back, each problem keeping the smoother solution or what is polished
     from it, so that the error never grows with the freedom.
 
@@ -220,8 +220,40 @@ def smoothness_curve(
         raise InputError("bounds of acceleration must be finite numbers above zero, at least two")
     found: dict[int, Solution] = {}
 
-    def result_so_far() -> SmoothnessCurve:
-        return SmoothnessCurve(acceleration=values, solutions=tuple(found.get(k) for k in range(len(values))))
+    def best(acceleration: float, guesses: Sequence[Solution], own: int) -> list[Solution]:
+        try:
+            result = slider_motion(
+                task,
+                linkage,
+                replace(unknown, acceleration=acceleration),
+                bounds=bounds,
+                constraints=constraints,
+                guesses=[replace(guess, linkage=_shrunk(guess.linkage, acceleration)) for guess in guesses],
+                starts=own,
+                solutions=3,
+                seed=seed,
+                n_jobs=n_jobs,
+                progress=progress,
+            )
+        except InfeasibleError:
+            return []
+        return list(result.solutions)
+
+    down = range(len(values) - 1, -1, -1)
+    for own, sequence in ((starts, down), (0, reversed(down))):
+        # what is best without a bound is the start for a wide one
+        previous = best(inf, [], starts) if own else []
+        for k in sequence:
+            guesses = [*previous, *([found[k]] if k in found else [])]
+            if not own and not guesses:
+                continue
+            solutions = best(float(values[k]), guesses, own)
+            if not solutions:
+                continue
+            if k not in found or solutions[0].error < found[k].error:
+                found[k] = solutions[0]
+            previous = solutions
+    return SmoothnessCurve(acceleration=values, solutions=tuple(found.get(k) for k in range(len(values))))
 
     for own, sequence in ((starts, range(len(values) - 1, -1, -1)), (0, range(len(values)))):
         previous: list[Solution] = []

@@ -19,7 +19,7 @@ from linkwork.five_bar.published import CM_PER_METRE
 
 from ..figures import Curve, Panel, plot_curves
 from ..synthesis import UntimedPath, turn
-from ..synthesis.areas import Straightness, area_between, straightest_part, straightness
+from ..synthesis.areas import area_between, straightest_part
 from ..synthesis.published import (
     CM2_PER_M2,
     PACKAGING_FLATNESS,
@@ -29,7 +29,6 @@ from ..synthesis.published import (
     PROBLEMS,
     N,
 )
-from ..synthesis.tasks import normal_form
 from ._chapter_6 import (
     ASSIGNED,
     OURS,
@@ -53,32 +52,18 @@ PROBLEM = "packaging"
 WINDOW = round(N * PACKAGING_ROTATION / (2.0 * np.pi)) + 1
 
 
-def straight_rotations() -> tuple[float, float]:
-    """Crank rotations at the ends of our straight part (rad)."""
-    ours = best(PROBLEM)
-    straight = normal_form(ours.task).straight
-    assert straight is not None
-    assert ours.evaluation.rotation is not None
-    first, last = ours.evaluation.rotation[[straight.start, straight.end]]
-    return float(first), float(last)
-
-
-def our_part() -> Straightness:
-    """Travel and flatness of our straight part, looked at densely."""
-    return straightness(best(PROBLEM).linkage.path(np.linspace(*straight_rotations(), 721)), direction=0.0)
-
-
 def compute() -> StudyResult:
     """Curves and linkages, with their straight parts."""
     p, ours = PROBLEMS[PROBLEM], best(PROBLEM)
     assert isinstance(p.task, UntimedPath)
     curve = p.linkage.path(turn(N))
     printed = straightest_part(curve, WINDOW, direction=0.0, least_travel=PACKAGING_TRAVEL)
-    part, rotations = our_part(), straight_rotations()
+    part = ours.straight()
+    assert part is not None
     columns = path_columns(PROBLEM)
     parts = {
         "printed straight": p.linkage.path(turn(N)[printed.start] + np.linspace(0.0, PACKAGING_ROTATION, 97)),
-        "ours straight": ours.linkage.path(np.linspace(*rotations, 97)),
+        "ours straight": ours.linkage.path(np.linspace(part.begin, part.end, 97)),
     }
     for name, points in parts.items():
         columns |= {f"{name} {axis} [cm]": CM_PER_METRE * points[:, k] for k, axis in enumerate("xy")}
@@ -114,7 +99,7 @@ def compute() -> StudyResult:
                 "crank rotation of our straight part",
                 REFERENCE,
                 degrees(PACKAGING_ROTATION) + 1e-6,
-                degrees(abs(rotations[1] - rotations[0])),
+                degrees(part.rotation),
                 "deg",
             ),
             at_most("area between our curve and the ten points", REFERENCE, p.goal, p.shown(ours.error), "cm2"),

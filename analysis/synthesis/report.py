@@ -56,6 +56,7 @@ def headline(solution: Solution) -> str:
     return (
         f"{factor * solution.error:.4g} {unit}, worst {scale * solution.evaluation.worst:.3g} {length}\n"
         f"largest link {1e3 * solution.linkage.largest_link:.4g} mm, {low:.0f} to {high:.0f} deg"
+        + (f"\n{straight}" if (straight := solution.straight()) else "")
         + (f"\n{defects}" if defects else "")
     )
 
@@ -86,6 +87,8 @@ def report(solution: Solution) -> str:
         parts[0] += f"\nslider at D: stroke {1e3 * linkage.pivot.stroke:.6g} mm"
     elif isinstance(linkage.pivot, SecondCrank):
         parts[0] += f"\nsecond crank at D: {linkage.pivot.ratio:g} turns for one of the first"
+    if straight := solution.straight():
+        parts[0] += f"\n{straight}"
     parts += [table(dimension_rows(solution)), rounding_told(solution)]
     parts.append(table(_stations(solution)))
     return "\n\n".join(parts) + "\n"

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from linkwork.errors import AssemblyError, InputError
 
-from .areas import area_between, distance_to
+from .areas import area_between, distance_to, straightness
 from .kernels import PLACES
 from .linkage import Linkage, SecondCrank, SliderMotion
 from .tasks import PrecisionPoints, RockerFunction, Task, TimedPath, UntimedPath, normal_form
@@ -241,6 +241,33 @@ def _kind(linkage: Linkage) -> str:
     return "five-bar" if isinstance(linkage.pivot, SecondCrank) else "four-bar with a moved pivot"
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StraightPart:
+    """The straight part of a path as it is traced, looked at densely.
+
+    Attributes
+    ----------
+    travel, flatness : float
+        Along the line from its first point to its last, and extent across it (m).
+    begin, end : float
+        Crank rotations at its ends (rad).
+    """
+
+    travel: float
+    flatness: float
+    begin: float
+    end: float
+
+    @property
+    def rotation(self) -> float:
+        """Crank rotation that it takes (rad)."""
+        return abs(self.end - self.begin)
+
+    def __str__(self) -> str:
+        angle = degrees(self.rotation)
+        return f"straight part {1e3 * self.travel:.4g} mm long, {1e3 * self.flatness:.3g} mm off straight, in {angle:.1f} deg"
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Solution:
     """A linkage for a task.
@@ -278,6 +305,21 @@ class Solution:
         if self.evaluation.rotation is not None and not (isinstance(self.task, UntimedPath) and self.task.path.closed):
             return self.evaluation.rotation
         return np.linspace(0.0, 2.0 * pi, CURVE, endpoint=False)
+
+    def straight(self) -> StraightPart | None:
+        """The straight part that the task asks for, as it is traced; None where none is asked."""
+        asked = normal_form(self.task).straight
+        rotation = self.evaluation.rotation
+        if asked is None or rotation is None or not isinstance(self.task, UntimedPath):
+            return None
+        begin, end = float(rotation[asked.start]), float(rotation[asked.end])
+        own = self.task.straight
+        assert own is not None
+        line = np.subtract(*self.task.path.points[[own.end, own.start]])
+        part = straightness(
+            self.linkage.path(np.linspace(begin, end, 721)), direction=float(np.arctan2(line[1], line[0]))
+        )
+        return StraightPart(travel=part.travel, flatness=part.flatness, begin=begin, end=end)
 
     def curve(self, n: int = CURVE) -> FloatArray:
         """The traced path, shape (n, 2) in m: over a turn, or from the first station to the last."""
