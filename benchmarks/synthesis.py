@@ -213,7 +213,7 @@ class Contest:
     def error(self, box: BlackBox, x: FloatArray) -> float:
         """Error by the task's own measure, in the unit of print; infinite where a constraint is violated."""
         plain = self.plain[box.branch]
-        answer = plain.answer(SimpleNamespace(x=x, success=True, message="", nit=0))  # type: ignore[arg-type]
+        answer = plain.answer(SimpleNamespace(x=x, success=True, message="", nit=0))
         linkage = linkage_of(answer.start, self.normal)
         if not answer.feasible or (self.normal.straight is not None and not packs(linkage)):
             return inf
@@ -397,9 +397,9 @@ class PlacedFourBar:
         values: list[float] = self.q[self.free].tolist()
         return values
 
-    def get_coords(self) -> list[tuple[float, float]]:
+    def get_coords(self) -> list[tuple[float | None, float | None]]:
         """Places of A, D, B, C, P."""
-        coords: list[tuple[float, float]] = self.linkage.get_coords()
+        coords: list[tuple[float | None, float | None]] = self.linkage.get_coords()
         return coords
 
     def set_constraints(self, values: Sequence[float]) -> None:
@@ -483,7 +483,7 @@ class PylinkageScore:
         return float(normal.weights @ np.abs(met - points) ** 2), excess
 
 
-def _by_pylinkage(trace: Trace, box: BlackBox, *stages: tuple[Callable[..., object], dict[str, Any]]) -> None:
+def _by_pylinkage(trace: Trace, box: BlackBox, *stages: tuple[Callable[..., Any], dict[str, Any]]) -> None:
     from pylinkage.optimization import chain_optimizers
 
     score = PylinkageScore(trace.contest, box)
@@ -646,7 +646,7 @@ def _random_starts(boxes: dict[int, BlackBox], normal: Normal, number: int) -> I
         box = list(boxes.values())[k % len(boxes)]
         draws = random.uniform(box.low, box.high, (DRAWS, len(box.low)))
         best = draws[np.argmin(box.charged(draws))]
-        answer = box.answer(SimpleNamespace(x=best, success=True, message="", nit=0))  # type: ignore[arg-type]
+        answer = box.answer(SimpleNamespace(x=best, success=True, message="", nit=0))
         yield start_of(linkage_of(answer.start, normal), normal)
 
 

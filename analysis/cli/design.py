@@ -152,7 +152,7 @@ def synthesize(
       linkwork synthesize examples/ellipse.toml --set constraints.largest_link='300 mm' --set task.n=36
     """
     from .. import io
-    from ..synthesis import SynthesisInterrupted
+    from ..synthesis import SynthesisInterrupted, TradeOffInterrupted
     from ..synthesis.cases import load_synthesis_case
 
     overrides = settings_of(settings)
@@ -186,9 +186,16 @@ def synthesize(
     if stopped is not None:
         errors.print(f"{stopped}; the best so far is kept", style="yellow", highlight=False, soft_wrap=True)
         sys.exit(INTERRUPTED)
-    traded = chosen.trade(progress=console.is_terminal)
+    halted: TradeOffInterrupted | None = None
+    try:
+        traded = chosen.trade(progress=console.is_terminal)
+    except TradeOffInterrupted as error:
+        traded, halted = error.trade_off, error
     if traded is not None:
         _trade_off(traded, chosen.title, folder, plots)
+    if halted is not None:
+        errors.print(f"{halted}; what there is is kept", style="yellow", highlight=False, soft_wrap=True)
+        sys.exit(INTERRUPTED)
 
 
 def _trade_off(traded: Any, title: str, folder: Path, plots: bool) -> None:

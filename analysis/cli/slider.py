@@ -13,6 +13,8 @@ import numpy as np
 from rich.markup import escape
 from rich.table import Table
 
+from linkwork.errors import Interrupted
+
 from .common import INTERRUPTED, console, errors, handled, prepare_solver
 from .design import settings_of, wrote
 
@@ -55,7 +57,6 @@ def slider_motion(
       linkwork slider-motion examples/slider-motion.toml --set slider.stroke='20 mm' --harmonics 3
     """
     from ..control.cases import load_slider_case
-    from ..synthesis import SynthesisInterrupted
     from ..synthesis.linkage import SecondCrank, SliderMotion
 
     overrides = settings_of(settings)
@@ -65,11 +66,7 @@ def slider_motion(
     chosen = load_slider_case(case, overrides)
     prepare_solver()
     folder = Path(out)
-    stopped: SynthesisInterrupted | None = None
-    if chosen.strategy is not None:
-        solution = _strategy(chosen)
-    else:
-        solution, stopped = _moved(chosen)
+    solution, stopped = _moved(chosen) if chosen.strategy is None else _strategy(chosen)
     folder.mkdir(parents=True, exist_ok=True)
     written = _write_solution(solution, folder, chosen.synthesis.title, plots)
     pivot = solution.linkage.pivot
@@ -90,9 +87,17 @@ def slider_motion(
         sys.exit(INTERRUPTED)
 
 
-def _strategy(chosen: Any) -> Any:
-    """The simplest mechanism that will do."""
-    found = chosen.simplest(progress=console.is_terminal)
+def _strategy(chosen: Any) -> tuple[Any, Interrupted | None]:
+    """The simplest mechanism that will do; and what stopped the search, if anything did."""
+    from ..control import StrategyInterrupted
+
+    stopped = None
+    try:
+        found = chosen.simplest(progress=console.is_terminal)
+    except StrategyInterrupted as error:
+        if error.strategy is None:
+            raise
+        found, stopped = error.strategy, error
     grid = Table(title=escape(f"{chosen.synthesis.title}: the simplest mechanism"), title_justify="left")
     grid.add_column("mechanism")
     grid.add_column("what came of it")
@@ -106,10 +111,10 @@ def _strategy(chosen: Any) -> Any:
             highlight=False,
             soft_wrap=True,
         )
-    return found.chosen.solution
+    return found.chosen.solution, stopped
 
 
-def _moved(chosen: Any) -> tuple[Any, Any]:
+def _moved(chosen: Any) -> tuple[Any, Interrupted | None]:
     """The best motion, harmonic by harmonic, beside the fixed pivot; and what stopped it, if anything did."""
     from ..synthesis import SynthesisInterrupted
 

@@ -229,11 +229,12 @@ def inverse_dynamics(
     Raises
     ------
     InputError
-        If the speed is zero or not finite, the load is not finite, or there are too few samples for the series.
+        If the speed is zero or not finite, the load is not two finite numbers, or there are too few samples for the series.
     AssemblyError
         If the links cannot be joined somewhere on the turn, with where.
     """
     check_speed(crank_speed)
+    samples = whole(samples, "samples of a turn")
     least = max(LEAST_SAMPLES, 2 * slider.order + 1)
     if samples < least:
         raise InputError(f"{samples} samples of a turn: a motion of order {slider.order} needs at least {least}")
@@ -277,15 +278,34 @@ def check_speed(crank_speed: float) -> None:
         raise InputError(f"crank speed is {crank_speed} rad/s: it must be finite and not zero")
 
 
+def whole(value: float, what: str) -> int:
+    """Make sure that a number of something is a whole one.
+
+    Raises
+    ------
+    InputError
+        If it is not.
+    """
+    if not float(value).is_integer():
+        raise InputError(f"{value} {what}: it must be a whole number")
+    return int(value)
+
+
 def load_at(load: Load, crank_angle: float) -> tuple[float, float]:
     """The load at P (N, N) at a crank angle (rad).
 
     Raises
     ------
     InputError
-        If it is not finite.
+        If it is not two finite numbers.
     """
-    fx, fy = load(crank_angle) if callable(load) else load
+    given = load(crank_angle) if callable(load) else load
+    try:
+        fx, fy = (float(part) for part in given)
+    except (TypeError, ValueError):
+        raise InputError(
+            f"the load at P is {given!r} at crank angle {crank_angle:.9g} rad: it must be two numbers (N)"
+        ) from None
     if not (isfinite(fx) and isfinite(fy)):
         raise InputError(f"the load at P is ({fx}, {fy}) N at crank angle {crank_angle:.9g} rad: it must be finite")
     return fx, fy
@@ -361,7 +381,7 @@ def best_spring(
         return float(np.sqrt(np.mean((force + k * (u - free)) ** 2))), k, free
 
     candidates = [with_spring(0.0, 0.0)]
-    (k, preload), *_ = np.linalg.lstsq(np.column_stack([u, -np.ones(samples)]), -force, rcond=None)
+    (k, preload), *_ = np.linalg.lstsq(np.column_stack([u, -np.ones_like(u)]), -force, rcond=None)
     if k > 0.0 and low <= preload / k <= high:
         candidates.append(with_spring(float(k), float(preload / k)))
     for edge in (low, high):

@@ -36,7 +36,7 @@ from .. import symbolic
 from ..fourier import FourierSeries
 from ..inputs import Inputs, Piecewise, table
 from ..simulate import simulate
-from .inverse import FloatArray, Load, inverse_dynamics, load_at
+from .inverse import FloatArray, Load, inverse_dynamics, load_at, whole
 
 #: Points over crank angles (rad): (n,) to (n, 2) for P (m), or to (n,) for the rocker's angle (rad).
 Target = Callable[[FloatArray], ArrayLike] | ArrayLike
@@ -222,6 +222,7 @@ def least_effort(
     symbolic.MissingLibraryError
         If CasADi is not installed.
     """
+    intervals, halvings = whole(intervals, "intervals"), whole(halvings, "halvings")
     problem = _Problem(
         parameters=parameters,
         crank_speed=crank_speed,
@@ -234,7 +235,7 @@ def least_effort(
         transmission=transmission,
         spring=spring,
         load=load,
-        degree=degree,
+        degree=whole(degree, "as the degree"),
         points=points,
     )
     if intervals < 4 or halvings < 0:

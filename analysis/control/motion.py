@@ -146,7 +146,7 @@ class SmoothnessCurve:
 
 
 class SmoothnessInterrupted(Interrupted):
-    """A smoothness curve was stopped from the keyboard; ``curve`` has the best so far at each bound, None where there is none."""
+    """A smoothness curve was stopped from the keyboard; ``curve`` has the best so far at each bound."""
 
     def __init__(self, curve: SmoothnessCurve, done: int, problems: int) -> None:
         self.curve = curve
@@ -195,9 +195,9 @@ def smoothness_curve(
 ) -> SmoothnessCurve:
     """Smoothness traded against error: the best motion for each bound of its second derivative, warm started.
 
-    From the motion without a bound through the roughest to the smoothest each problem starts from the solutions of the one before, its harmonics shrunk
-    to the new bound, and from its own random starts; then back, each problem keeping the smoother solution or what is polished
-    from it, so that the error never grows with the freedom.
+    From the motion without a bound through the roughest to the smoothest each problem starts from the solutions of the one
+    before, their harmonics shrunk to the new bound, and from its own random starts; then back, each problem keeping the
+    smoother solution or what is polished from it, so that the error never grows with the freedom.
 
     Parameters
     ----------
@@ -220,7 +220,7 @@ def smoothness_curve(
         raise InputError("bounds of acceleration must be finite numbers above zero, at least two")
     found: dict[int, Solution] = {}
 
-    def best(acceleration: float, guesses: Sequence[Solution], own: int) -> list[Solution]:
+    def best(acceleration: float, guesses: Sequence[Solution], own: int) -> tuple[Solution, ...]:
         try:
             result = slider_motion(
                 task,
@@ -236,61 +236,35 @@ def smoothness_curve(
                 progress=progress,
             )
         except InfeasibleError:
-            return []
-        return list(result.solutions)
+            return ()
+        return result.solutions
 
-    down = range(len(values) - 1, -1, -1)
-    for own, sequence in ((starts, down), (0, reversed(down))):
+    k, kept, done = -1, [], 0
+    try:
         # what is best without a bound is the start for a wide one
-        previous = best(inf, [], starts) if own else []
-        for k in sequence:
-            guesses = [*previous, *([found[k]] if k in found else [])]
-            if not own and not guesses:
-                continue
-            solutions = best(float(values[k]), guesses, own)
-            if not solutions:
-                continue
-            if k not in found or solutions[0].error < found[k].error:
-                found[k] = solutions[0]
-            previous = solutions
-    return SmoothnessCurve(acceleration=values, solutions=tuple(found.get(k) for k in range(len(values))))
-
-    for own, sequence in ((starts, range(len(values) - 1, -1, -1)), (0, range(len(values)))):
-        previous: list[Solution] = []
-        for done, k in enumerate(sequence):
+        previous = best(inf, [], starts)
+        down = range(len(values) - 1, -1, -1)
+        for own, k in [(starts, k) for k in down] + [(0, k) for k in reversed(down)]:
+            if not own and k == 0:
+                previous = ()
             mine = [found[k]] if k in found else []
-            guesses = [*previous, *mine]
-            if not own and not guesses:
-                continue
             # on the way back what keeps the tighter bound keeps this one, too
-            kept = mine if own else guesses
-            try:
-                result = slider_motion(
-                    task,
-                    linkage,
-                    replace(unknown, acceleration=float(values[k])),
-                    bounds=bounds,
-                    constraints=constraints,
-                    guesses=[replace(guess, linkage=_shrunk(guess.linkage, float(values[k]))) for guess in guesses],
-                    starts=own,
-                    solutions=3,
-                    seed=seed,
-                    n_jobs=n_jobs,
-                    progress=progress,
-                ).solutions
-            except InfeasibleError:
-                result = ()
-            except (SynthesisInterrupted, KeyboardInterrupt) as error:
-                last = error.synthesis if isinstance(error, SynthesisInterrupted) else None
-                if best := ranked([*kept, *(last.solutions if last else ())])[:1]:
-                    found[k] = best[0]
-                run = done if own else len(values) + done
-                raise SmoothnessInterrupted(result_so_far(), run, 2 * len(values)) from None
-            if not (result or kept):
-                continue
-            found[k] = ranked([*kept, *result])[0]
-            previous = list(result) if own else [found[k]]
-    return result_so_far()
+            kept = mine if own else [*previous, *mine]
+            if own or kept:
+                solutions = best(float(values[k]), [*previous, *mine], own)
+                if kept or solutions:
+                    found[k] = ranked([*kept, *solutions])[0]
+                    previous = solutions if own else (found[k],)
+            done += 1
+    except (SynthesisInterrupted, KeyboardInterrupt) as error:
+        if isinstance(error, SynthesisInterrupted) and error.synthesis is not None and k >= 0:
+            found[k] = ranked([*kept, *error.synthesis.solutions])[0]
+        raise SmoothnessInterrupted(_curve(values, found), done, 2 * len(values)) from None
+    return _curve(values, found)
+
+
+def _curve(values: FloatArray, found: Mapping[int, Solution]) -> SmoothnessCurve:
+    return SmoothnessCurve(acceleration=values, solutions=tuple(found.get(k) for k in range(len(values))))
 
 
 def _shrunk(linkage: Linkage, acceleration: float) -> Linkage:

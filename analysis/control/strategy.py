@@ -10,7 +10,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from math import degrees, inf, isfinite
-from numbers import Integral
 from typing import Literal
 
 import numpy as np
@@ -146,7 +145,7 @@ def simplest_mechanism(
     if criterion not in ("error", "worst"):
         raise InputError(f"criterion {criterion!r}: it must be 'error' or 'worst'")
     for name, value in (("harmonics", harmonics), ("starts", starts)):
-        if not (isinstance(value, Integral) and value >= 1):
+        if not (float(value).is_integer() and value >= 1):
             raise InputError(f"{value} {name}: it must be a whole number, at least one")
     for name, length in (("stroke", stroke), ("length of the second crank", second_crank)):
         if length is not None and not (isfinite(length) and length > 0.0):
@@ -154,7 +153,8 @@ def simplest_mechanism(
     for ratio in ratios:
         if not (isfinite(ratio) and ratio == int(ratio)):
             raise InputError(f"ratio {ratio} of the gears: it must be a whole number, or the path does not close")
-    search = _Search(task, tolerance, criterion, bounds, constraints, starts, seed, n_jobs, progress)
+    harmonics = int(harmonics)
+    search = _Search(task, tolerance, criterion, bounds, constraints, int(starts), seed, n_jobs, progress)
     four_bar = search.first()
     if search.met():
         return search.result()

@@ -27,7 +27,7 @@ from scipy.optimize import Bounds, NonlinearConstraint, OptimizeResult, differen
 
 from linkwork.five_bar import kinematics
 
-from .constraints import UNKNOWNS, Limits
+from .constraints import UNKNOWNS, Limits, Require
 from .polish import Polished, effective_cores, over_cores, quality_of
 from .program import TURNING, Answer, Start, half_planes, physical
 from .tasks import Normal
@@ -49,6 +49,8 @@ GENERATIONS, MEMBERS = 400, 10
 DRAWS, EDGE = 64, 0.2
 #: Factor of violated constraints in the simplex's quality function, in mean squared sizes of the target.
 PENALTY = 10.0
+#: Violation of a requirement that has no value, in its scale.
+NO_VALUE = 1e3
 #: Evaluations that a simplex may take for each unknown.
 EVALUATIONS = 600
 
@@ -132,15 +134,35 @@ def _searched(work: partial[Answer], normal: Normal, starts: int, n_jobs: int, p
     )
 
 
+def _value(require: Require, p: SimpleNamespace) -> float:
+    """Left side of a requirement; where it has no value, as the root of something negative, it is violated by `NO_VALUE`."""
+    try:
+        with np.errstate(all="ignore"):
+            value = require.function(p)
+    except (ValueError, ZeroDivisionError, OverflowError):
+        return NO_VALUE * require.scale
+    # a power of something negative is complex
+    return NO_VALUE * require.scale if isinstance(value, complex) or not np.isfinite(value) else float(value)
+
+
+def _only(box: BlackBox) -> Answer:
+    """The one linkage there is where bounds fix every dimension."""
+    return box.answer(OptimizeResult(x=box.low, success=True, message="every dimension is fixed", nit=0))
+
+
 def _evolved(normal: Normal, limits: Limits, seed: int, number: int) -> Answer:
     box = BlackBox(normal, limits, limits.branches[number % len(limits.branches)])
+
+    if not len(box.low):
+        return _only(box)
 
     def violations(x: FloatArray) -> FloatArray:
         # of one vector first, of a generation then
         return box.violations(np.atleast_2d(x.T)).T.reshape(-1, *x.shape[1:])
 
     result = differential_evolution(
-        lambda x: box.quality(x.T),
+        # SciPy asks for none where no member of a generation keeps the constraints
+        lambda x: box.quality(x.T) if x.size else np.empty(0),
         Bounds(box.low, box.high),
         maxiter=GENERATIONS,
         popsize=MEMBERS,
@@ -157,6 +179,8 @@ def _evolved(normal: Normal, limits: Limits, seed: int, number: int) -> Answer:
 
 def _descended(normal: Normal, limits: Limits, seed: int, number: int) -> Answer:
     box = BlackBox(normal, limits, limits.branches[number % len(limits.branches)])
+    if not len(box.low):
+        return _only(box)
     draws = np.random.default_rng([seed, number]).uniform(box.low, box.high, (DRAWS, len(box.low)))
     first = draws[np.argmin(box.charged(draws))]
     # away from the nearer bound
@@ -397,7 +421,7 @@ class BlackBox:
             columns = [
                 physical(SimpleNamespace(**dict(zip(UNKNOWNS, row.tolist()))), normal.unit, normal.origin) for row in q
             ]
-            value = np.array([float(require.function(p)) for p in columns]) / require.scale
+            value = np.array([_value(require, p) for p in columns]) / require.scale
             found.append((require.name, np.abs(value) - EQUAL if require.equal else value))
         straight = normal.straight
         if straight is not None:

@@ -45,10 +45,19 @@ class SliderMotion:
         u(phi) in m: its order is the number of harmonics.
     guide_angle : float
         alpha, the guide's direction from the ground link (rad).
+
+    Raises
+    ------
+    ParameterError
+        If the guide's angle is not finite.
     """
 
     series: FourierSeries
     guide_angle: float = 0.0
+
+    def __post_init__(self) -> None:
+        if not isfinite(self.guide_angle):
+            raise ParameterError("guide_angle", self.guide_angle, "be a finite number")
 
     def displacement(self, rotation: ArrayLike) -> tuple[FloatArray, FloatArray]:
         """Displacement of D in the frame of the ground link (m)."""
@@ -81,12 +90,25 @@ class SecondCrank:
         psi at the start (rad).
     series : FourierSeries
         What is added to the geared rotation (rad): zero with gears.
+
+    Raises
+    ------
+    ParameterError
+        If the length is not greater than zero, the ratio not whole, or the phase not finite.
     """
 
     length: float
     ratio: float = 1.0
     phase: float = 0.0
     series: FourierSeries = field(default_factory=lambda: FourierSeries.constant(0.0))
+
+    def __post_init__(self) -> None:
+        if not (isfinite(self.length) and self.length > 0.0):
+            raise ParameterError("second_crank_length", self.length, "be a finite number greater than zero")
+        if not float(self.ratio).is_integer():
+            raise ParameterError("ratio of the second crank", self.ratio, "be a whole number")
+        if not isfinite(self.phase):
+            raise ParameterError("second_crank_phase", self.phase, "be a finite number")
 
     def angle(self, rotation: ArrayLike) -> FloatArray:
         """psi (rad)."""

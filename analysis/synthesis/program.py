@@ -584,7 +584,8 @@ class Program:
         result = solver(x0=z0, lbx=lower, ubx=upper, lbg=self._g_low, ubg=self._g_high, p=parameters)
         stats = solver.stats()
         z = np.asarray(result["x"]).ravel()
-        g = np.asarray(result["g"]).ravel()
+        # evaluated anew: where IPOPT ends at a number that is not one, CasADi returns zeros
+        f, g = (np.asarray(value).ravel() for value in self._value(z, parameters))
         over = np.maximum(self._g_low - g, g - self._g_high) if np.isfinite(g).all() else np.full(len(g), inf)
         violation = float(over.max(initial=0.0))
         end = len(UNKNOWNS) + size
@@ -593,7 +594,7 @@ class Program:
             branch=start.branch,
             pivot=z[len(UNKNOWNS) : end],
             rotation=None if self.normal.timed else z[end : end + self.normal.n],
-            quality=float(result["f"]) / gain,
+            quality=float(f[0]) / gain,
         )
         return Answer(
             start=answer,

@@ -310,6 +310,19 @@ def test_ctrl_c_keeps_the_best_so_far(linkwork, tmp_path, monkeypatch) -> None:
     assert (tmp_path / "out" / "motion.csv").exists()
 
 
+def test_ctrl_c_in_the_strategy_keeps_its_steps(linkwork, tmp_path, monkeypatch) -> None:
+    def stopped(*arguments: Any, **options: Any) -> Any:
+        found = control.simplest_mechanism(*arguments, **options)
+        raise control.StrategyInterrupted(replace(found, steps=found.steps[:1], met=False))
+
+    monkeypatch.setattr("analysis.control.cases.simplest_mechanism", stopped)
+    strategy = {"tolerance": "1e-9 mm", "harmonics": 1, "ratios": [], "starts": 2}
+    result = linkwork(tables(strategy=strategy), "--no-plots")
+    assert result.exit_code == cli.INTERRUPTED
+    assert "stopped after 1 mechanisms; the best so far is kept" in result.output
+    assert (tmp_path / "out" / "report.txt").exists()
+
+
 @pytest.mark.parametrize(
     ("change", "words"),
     [
