@@ -29,8 +29,9 @@ ASSIGNED = (
 #: The problems whose printed linkages the thesis improves by a moved slider.
 ROCKER, PATH = "rocker-weighted", "path-b"
 TARGET, FIXED = "0.25", "0.55"
-#: Starts of the searches, the seed of those for the path, and the stroke they may use (m).
-ROCKER_STARTS, PATH_STARTS, PATH_SEED, STROKE = 24, 8, 2, 0.25
+#: Starts of the searches: of the rocker function's, and by its harmonics of the path's, with the stroke that it may use (m).
+ROCKER_STARTS = 24
+PATH_SEARCHES = {2: (8, 0.25), 3: (8, 0.25), 5: (24, 0.18)}
 #: Crank rotations of the curves (rad).
 TURN = np.linspace(0.0, 2.0 * pi, 721)
 
@@ -46,12 +47,13 @@ def rocker_motion(harmonics: int) -> Solution:
 def path_motion(harmonics: int) -> Solution:
     """The best Fourier series of the slider for path (b), the printed links kept.
 
-    The guide within a right angle from the ground link and 25 cm of stroke: without bounds the same motions are found, by more
-    starts.
+    The guide within a right angle from the ground link, and a bound of the stroke: among so many optima they bring the search
+    to the better ones.
     """
     p = PROBLEMS[PATH]
-    unknown = SliderUnknown(harmonics=harmonics, guide_angle=(0.0, 0.5 * pi), stroke=STROKE)
-    return slider_motion(p.task, p.linkage, unknown, starts=PATH_STARTS, seed=PATH_SEED).best
+    starts, stroke = PATH_SEARCHES[harmonics]
+    unknown = SliderUnknown(harmonics=harmonics, guide_angle=(0.0, 0.5 * pi), stroke=stroke)
+    return slider_motion(p.task, p.linkage, unknown, starts=starts).best
 
 
 def slider(linkage: Linkage) -> SliderMotion:

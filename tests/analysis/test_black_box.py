@@ -322,6 +322,31 @@ class TestSearch:
             synthesize(TASK, method=method, starts=2, constraints=[impossible])
 
     @pytest.mark.parametrize("method", METHODS)
+    @pytest.mark.parametrize(
+        "function",
+        [
+            lambda p: 0.2 - math.sqrt(p.crank_length - 0.05),
+            lambda p: 0.2 - (p.crank_length - 0.05) ** 0.5,
+            lambda p: 0.2 - np.sqrt(p.crank_length - 0.05),
+            lambda p: 1.0 / max(p.crank_length - 0.09, 0.0) - 1e6,
+            lambda p: math.exp(1.0 / (p.crank_length - 0.09)) - 1e6,
+        ],
+    )
+    def test_a_requirement_without_a_value_is_violated(self, method: Any, function: Any) -> None:
+        """Crank lengths from 90 mm on have one: what is below is no error, and no solution."""
+        constraints = [SMALL, Require(function=function, name="own")]
+        found = synthesize(TASK, method=method, starts=2, constraints=constraints)
+        assert found.best.linkage.crank_length > 0.0899
+
+    @pytest.mark.parametrize("method", METHODS)
+    def test_a_linkage_whose_every_dimension_is_fixed_is_evaluated(self, method: Any) -> None:
+        linkage = drawn(np.random.default_rng(3), least=0.7)
+        bounds = {n: (v, v) for n, v in linkage.values().items() if n not in ("branch", "output_angle")}
+        task = TimedPath(points=linkage.path(turn(9)) + 1e-3)
+        found = synthesize(task, bounds, (), method=method, starts=2)
+        assert found.best.error == pytest.approx(9 * 2e-6, rel=1e-9)
+
+    @pytest.mark.parametrize("method", METHODS)
     def test_interrupted_it_hands_over_the_best_so_far(self, method: Any, monkeypatch: pytest.MonkeyPatch) -> None:
         import signal
 

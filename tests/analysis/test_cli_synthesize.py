@@ -30,6 +30,8 @@ from analysis.synthesis import (
     Solution,
     SynthesisInterrupted,
     TimedPath,
+    TradeOff,
+    TradeOffInterrupted,
     cases,
     turn,
 )
@@ -213,6 +215,24 @@ def test_an_interrupted_search_keeps_its_best(linkwork, tmp_path, monkeypatch) -
     monkeypatch.setattr(cases, "synthesize", nothing)
     assert linkwork("synthesize", "case.toml", "--out", "none").exit_code == cli.INTERRUPTED
     assert not Path("none").exists()
+
+
+def test_an_interrupted_trade_off_keeps_what_it_has(linkwork, tmp_path, monkeypatch) -> None:
+    (tmp_path / "case.toml").write_text(
+        CAPPED + '[trade_off]\nover = "size"\nlimits = ["40 cm", "50 cm"]\nstarts = 1\n'
+    )
+
+    def stopped(self, **more):
+        found = self.solve()
+        front = TradeOff(over="size", limit=np.array([0.4, 0.5]), solutions=(None, found.best))
+        raise TradeOffInterrupted(front, 1, 4)
+
+    monkeypatch.setattr(cases.SynthesisCase, "trade", stopped)
+    result = linkwork("synthesize", "case.toml", "--no-plots")
+    assert result.exit_code == cli.INTERRUPTED
+    assert "stopped after 1 of 4 problems of the trade-off; what there is is kept" in result.stderr
+    assert len(Path("out/trade-off.csv").read_text().splitlines()) == 2
+    assert Path("out/solutions.csv").exists()
 
 
 def test_a_solution_with_a_defect_is_told(linkwork, tmp_path, monkeypatch) -> None:

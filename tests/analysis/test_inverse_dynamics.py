@@ -211,6 +211,13 @@ def test_bad_motions_are_told() -> None:
         inverse_dynamics(RIG, MOTION.to_order(40), SPEED, samples=80)
     with pytest.raises(InputError, match=r"load at P is \(nan, 0\.0\) N at crank angle 0 rad"):
         inverse_dynamics(RIG, MOTION, SPEED, load=(float("nan"), 0.0))
+    for load in ((1.0, 2.0, 3.0), lambda angle: None, ("a", 0.0), 5.0):
+        with pytest.raises(InputError, match=r"load at P is .* at crank angle 0 rad: it must be two numbers"):
+            inverse_dynamics(RIG, MOTION, SPEED, load=load)
+    for samples in (72.5, float("nan")):
+        with pytest.raises(InputError, match="samples of a turn: it must be a whole number"):
+            inverse_dynamics(RIG, MOTION, SPEED, samples=samples)
+    assert len(inverse_dynamics(RIG, MOTION, SPEED, samples=72.0).time) == 72
     # at 90 deg u = 0.255 m: the slider pin is 0.509 m from the crank pin, and the two links together are 0.508 m long
     far = FourierSeries(np.array([0.255, -0.255]), np.zeros(2))
     with pytest.raises(AssemblyError, match=r"cannot be followed beyond 90\.00 deg of the turn: the links cannot"):

@@ -392,3 +392,35 @@ class TestBadDimensions:
     def test_where_it_cannot_be_joined_it_has_no_pins(self) -> None:
         with pytest.raises(AssemblyError, match=r"crank rotation of 3\.14159 rad"):
             four_bar(*TYPES["triple-rocker"]).pins(pi)
+
+
+class TestMovedPivots:
+    @pytest.mark.parametrize("angle", [np.nan, np.inf])
+    def test_a_guide_has_a_direction(self, angle: float) -> None:
+        with pytest.raises(ParameterError, match="guide_angle is"):
+            SliderMotion(FourierSeries.constant(0.0), angle)
+
+    @pytest.mark.parametrize(
+        ("values", "message"),
+        [
+            ({"length": -0.1}, "second_crank_length is -0.1"),
+            ({"length": 0.0}, "second_crank_length is 0.0"),
+            ({"length": np.inf}, "second_crank_length is inf"),
+            ({"length": 0.1, "ratio": 1.5}, "ratio of the second crank is 1.5: it must be a whole number"),
+            ({"length": 0.1, "ratio": np.nan}, "ratio of the second crank is nan"),
+            ({"length": 0.1, "phase": np.nan}, "second_crank_phase is nan"),
+        ],
+    )
+    def test_a_second_crank_is_one(self, values: dict[str, float], message: str) -> None:
+        with pytest.raises(ParameterError, match=message):
+            SecondCrank(**values)
+
+    def test_verdicts_name_what_moves_the_pivot(self) -> None:
+        """The lengths alone, a triple-rocker's, say nothing of a linkage whose pivot moves, as this one's crank turns."""
+        linkage = four_bar(1.0, 0.5, 0.73, 0.73)
+        assert linkage.grashof == "triple-rocker"
+        follows = SliderMotion(FourierSeries(np.array([0.0, 0.3]), np.zeros(2)))
+        for pivot, words in ((follows, "four-bar with a moved pivot"), (SecondCrank(0.3), "five-bar")):
+            verdicts = judge(replace(linkage, pivot=pivot), np.array([0.0, 2.0 * pi]), closed=True)
+            assert verdicts.full_turn
+            assert str(verdicts).startswith(f"{words}, full turn")

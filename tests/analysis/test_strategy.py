@@ -9,17 +9,23 @@ from typing import Any
 import numpy as np
 import pytest
 
-from analysis.control import Strategy, simplest_mechanism
+from analysis.control import Step, Strategy, StrategyInterrupted, simplest_mechanism
+from analysis.control import strategy as strategy_module
 from analysis.fourier import FourierSeries
 from analysis.synthesis import (
     FullTurn,
+    Grashof,
     InfeasibleError,
     LargestLink,
     LeastTransmission,
     Linkage,
+    Motion,
+    PrecisionPoints,
     RockerFunction,
     SecondCrank,
     SliderMotion,
+    Solution,
+    SynthesisInterrupted,
     TimedPath,
     evaluate,
     turn,
@@ -215,9 +221,17 @@ def test_constraints_without_even_a_four_bar() -> None:
         (1.0, {"stroke": float("nan")}, "stroke"),
         (1.0, {"second_crank": 0.0}, "second crank"),
         (1.0, {"ratios": (1, 0.5)}, "0.5"),
+        (1.0, {"ratios": (float("nan"),)}, "ratio nan"),
+        (1.0, {"ratios": (inf,)}, "ratio inf"),
+        (1.0, {"harmonics": 1.5}, "1.5 harmonics"),
+        (1.0, {"starts": 2.5}, "2.5 starts"),
+        (1.0, {"starts": float("nan")}, "nan starts"),
     ],
 )
-def test_bad_input_is_named_before_anything_is_searched(tolerance: float, options: dict[str, Any], words: str) -> None:
+def test_bad_input_is_named_before_anything_is_searched(
+    monkeypatch: pytest.MonkeyPatch, tolerance: float, options: dict[str, Any], words: str
+) -> None:
+    monkeypatch.setattr(strategy_module, "synthesize", lambda *_, **__: pytest.fail("searched"))
     task = TimedPath(points=BASE.path(PHI) + 0.01 * np.column_stack([np.cos(5.0 * PHI), np.sin(4.0 * PHI)]))
     with pytest.raises(InputError, match=words):
         simplest_mechanism(task, tolerance, **options)
@@ -230,3 +244,88 @@ def test_two_calls_give_the_same() -> None:
     assert str(one) == str(two)
     assert [s.value for s in one.steps] == [s.value for s in two.steps]
     assert abs(one.chosen.solution.linkage.crank_phase) <= pi
+
+
+def test_a_mechanism_with_a_defect_is_not_taken() -> None:
+    """Seven points that a double-rocker meets within the tolerance, but on two circuits, or out of order."""
+    points = [[0.0, 0.0], [0.05, 0.03], [0.1, 0.04], [0.15, 0.02], [0.16, -0.03], [0.1, -0.08], [0.05, 0.02]]
+    task = PrecisionPoints(points=points)
+    found = simplest_mechanism(
+        task, 2e-3, constraints=(Grashof(type="double-rocker"),), starts=3, harmonics=1, ratios=()
+    )
+    for step in found.steps:
+        if step.solution is not None and not step.solution.verdicts.sound and step.value <= 2e-3:
+            assert " defect: moved on" in step.reason
+    assert not any(step.reason.endswith("taken") for step in found.steps if not step.solution.verdicts.sound)
+    assert not found.met or found.chosen.solution.verdicts.sound
+
+
+def step_of(verdicts: dict[str, bool], error: float) -> Step:
+    solution = Solution.of(TimedPath(points=BASE.path(PHI)), BASE)
+    solution = replace(solution, verdicts=replace(solution.verdicts, **verdicts))
+    return Step(mechanism="one", solution=solution, value=error, reason="")
+
+
+def test_defects_are_named_and_what_is_sound_comes_first(monkeypatch: pytest.MonkeyPatch) -> None:
+    real = strategy_module.synthesize
+
+    def defective(*arguments: Any, **more: Any) -> Any:
+        found = real(*arguments, **more)
+        if more["pivot"] is not None:
+            return found
+        broken = [replace(s, verdicts=replace(s.verdicts, circuit=False, branch=False)) for s in found.solutions]
+        return replace(found, solutions=tuple(broken))
+
+    monkeypatch.setattr(strategy_module, "synthesize", defective)
+    found = strategy(BASE, 0.01 * MM2, harmonics=1, ratios=(), starts=2)
+    assert found.steps[0].reason.endswith("is within 0.01 mm2, with a circuit defect and a branch defect: moved on")
+    assert len(found.steps) == 2
+    steps = (step_of({"circuit": False}, 1.0), step_of({}, 3.0), step_of({}, 2.0))
+    assert Strategy(steps=steps, met=False, tolerance=0.1, criterion="error").chosen is steps[2]
+
+
+def test_the_worst_error_of_a_motion_counts_its_angles() -> None:
+    """Points that a linkage traces, with directions that its coupler has not."""
+    angle = BASE.coupler_angle(PHI) + 0.3 * np.sin(7.0 * PHI)
+    motion = Motion(points=BASE.path(PHI), angle=angle, rotation=PHI, length=0.1)
+    options = {"bounds": links_of(BASE, 1e-3), "constraints": (FullTurn(),), "harmonics": 1, "ratios": (), "starts": 1}
+    found = simplest_mechanism(motion, 0.01, criterion="worst", **options)
+    assert not found.met
+    best = found.steps[0].solution.evaluation
+    assert found.steps[0].value == pytest.approx(np.hypot(best.errors, 0.1 * best.angle_errors).max())
+    assert best.errors.max() < 0.005 < 0.02 < found.steps[0].value
+
+
+@pytest.mark.parametrize("stop", [0, 1, 2])
+@pytest.mark.parametrize("best", [True, False])
+def test_interrupted_it_keeps_its_steps(monkeypatch: pytest.MonkeyPatch, stop: int, best: bool) -> None:
+    series = FourierSeries(np.array([0.0, 0.012, 0.008]), np.array([0.0, 0.010, -0.009]))
+    real, calls = strategy_module.synthesize, []
+
+    def stopped(*arguments: Any, **more: Any) -> Any:
+        calls.append(more)
+        if len(calls) <= stop:
+            return real(*arguments, **more)
+        if not best:
+            raise KeyboardInterrupt
+        raise SynthesisInterrupted(replace(real(*arguments, **more), complete=False), 1, 4)
+
+    monkeypatch.setattr(strategy_module, "synthesize", stopped)
+    with pytest.raises(StrategyInterrupted, match=f"stopped after {stop + best} mechanisms") as caught:
+        strategy(replace(BASE, pivot=SliderMotion(series, 0.4)), 1e-20 * MM2, starts=1, bounds=links_of(BASE))
+    kept = caught.value.strategy
+    if stop + best == 0:
+        assert kept is None
+        return
+    assert len(kept.steps) == stop + best
+    assert all(step.solution is not None for step in kept.steps)
+    assert kept.steps[-1].reason.endswith("stopped" if best else "moved on")
+    assert kept.chosen.value == min(step.value for step in kept.steps)
+
+
+def test_a_short_second_crank_may_be_asked_for() -> None:
+    """Even one below a thousandth of the stroke."""
+    found = strategy(BASE, 1e-30, harmonics=1, ratios=(1,), starts=2, second_crank=1e-5)
+    lengths = [s.solution.linkage.pivot.length for s in found.steps[2:] if s.solution is not None]
+    assert lengths
+    assert max(lengths) <= 1e-5 * (1.0 + 1e-6)

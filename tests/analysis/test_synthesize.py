@@ -34,6 +34,7 @@ from analysis.synthesis import (
     SynthesisInterrupted,
     TargetPath,
     TimedPath,
+    TradeOffInterrupted,
     UntimedPath,
     evaluate,
     synthesize,
@@ -167,6 +168,22 @@ def judged(kind: str) -> Solution:
 
 #: Kinds whose quality is a sum over stations of given rotations.
 SUMS = ("timed", "rocker", "motion", "poses", "precision", "slider", "five-bar")
+
+
+class TestErrors:
+    @pytest.mark.parametrize("kind", ["motion", "poses"])
+    def test_errors_of_angle_count_in_the_worst_and_the_mean(self, kind: str) -> None:
+        solution = judged(kind)
+        task, evaluation = solution.task, solution.evaluation
+        assert isinstance(task, Motion)
+        made = solution.linkage.coupler_angle(evaluation.rotation)
+        turned = task.length * (made - np.asarray(task.angle))
+        apart = solution.linkage.path(evaluation.rotation) - np.asarray(task.points)
+        squares = (apart**2).sum(axis=1) + turned**2
+        assert evaluation.worst == pytest.approx(np.sqrt(squares.max()))
+        assert evaluation.rms == pytest.approx(np.sqrt(squares.mean()))
+        assert evaluation.worst > np.abs(evaluation.errors).max()
+        assert solution.error == pytest.approx(float(np.asarray(task.weights) @ squares))
 
 
 class TestSensitivity:
@@ -319,6 +336,48 @@ class TestTradeOff:
                 assert solution.linkage.largest_link <= limit + 1e-9
             else:
                 assert solution.linkage.least_transmission >= limit - 1e-6
+
+    def test_an_area_only_grows_as_the_size_is_limited(self) -> None:
+        task = UntimedPath(path=TargetPath(points=ELLIPSE, closed=True), samples=24)
+        errors = trade_off(task, "size", [0.2, 0.3, 1.0, 2.0], starts=4).error
+        assert np.all(np.diff(errors) <= 0.0)
+
+    def test_on_the_way_back_the_tighter_solution_is_kept(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        """Where every search but that of the tightest limit comes to something poor, its solution serves them all."""
+        poor = Solution.of(TASK, known())
+        calls = []
+
+        def search(*arguments: Any, **more: Any) -> Any:
+            calls.append(more)
+            found = synthesize(*arguments, **more)
+            return found if len(calls) == 3 else replace(found, solutions=(poor,))
+
+        monkeypatch.setattr("analysis.synthesis.solve.synthesize", search)
+        front = trade_off(TASK, "size", [0.4, 0.6, 0.5], starts=1)
+        assert len(calls) == 6
+        assert front.solutions[0] is front.solutions[1] is front.solutions[2] is not poor
+
+    @pytest.mark.parametrize("stop", [0, 1, 3])
+    @pytest.mark.parametrize("by", ["search", "key"])
+    def test_interrupted_it_keeps_what_it_has(self, monkeypatch: pytest.MonkeyPatch, stop: int, by: str) -> None:
+        calls = []
+
+        def search(*arguments: Any, **more: Any) -> Any:
+            calls.append(more)
+            if len(calls) <= stop:
+                return synthesize(*arguments, **more)
+            if by == "key":
+                raise KeyboardInterrupt
+            raise SynthesisInterrupted(synthesize(*arguments, **more), 1, 2)
+
+        monkeypatch.setattr("analysis.synthesis.solve.synthesize", search)
+        with pytest.raises(TradeOffInterrupted, match=f"stopped after {stop} of 4 problems of the trade-off") as caught:
+            trade_off(TASK, "size", [0.3, 0.6], starts=1)
+        front = caught.value.trade_off
+        there = [s is not None for s in front.solutions]
+        # the looser limit is the first
+        assert there == [stop + (by == "search") >= 2, stop + (by == "search") >= 1]
+        assert front.limit.tolist() == [0.3, 0.6]
 
     def test_where_there_is_none_it_is_masked(self) -> None:
         bounds = {"ground_length": (0.2, 0.3), "crank_length": (0.05, 0.05)}
