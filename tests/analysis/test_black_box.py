@@ -329,7 +329,7 @@ class TestSearch:
             lambda p: 0.2 - (p.crank_length - 0.05) ** 0.5,
             lambda p: 0.2 - np.sqrt(p.crank_length - 0.05),
             lambda p: 1.0 / max(p.crank_length - 0.09, 0.0) - 1e6,
-            lambda p: math.exp(1.0 / (p.crank_length - 0.09)) - 1e6,
+            lambda p: math.exp(1e4 * (0.1 - p.crank_length)) - 2.0,
         ],
     )
     def test_a_requirement_without_a_value_is_violated(self, method: Any, function: Any) -> None:
