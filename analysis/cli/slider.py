@@ -283,7 +283,7 @@ def drive_figure(title: str, drive: Any) -> Any:
     ]
     ticks = [0.0, 90.0, 180.0, 270.0, 360.0]
     panels = [
-        Panel(x_label="crank angle [deg]", y_label=label, curves=curves, x_ticks=ticks, legend_at="upper center")
+        Panel(x_label="crank angle [deg]", y_label=label, curves=curves, x_ticks=ticks, legend_at="outside")
         for label, curves in parts
     ]
     return plot_curves(panels, title=title, columns=2, size=(4.4, 2.4))

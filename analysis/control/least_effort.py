@@ -242,9 +242,6 @@ def least_effort(
         raise InputError(f"{intervals} intervals, {halvings} halvings: at least 4 and 0 are needed")
     guess = problem.within() if guess is None else guess
     start = _Mesh.of_motion(problem, guess, intervals)
-    if cost != "force":
-        # a rounder one first
-        start = problem.solve(start, intervals, 10.0 * ROUNDING).mesh
     solution = problem.solve(start, intervals)
     iterations, effort, moved = solution.iterations, inf, inf
     for _ in range(halvings):
@@ -561,7 +558,7 @@ class _Problem:
         """Crank angles of the start and the collocation points of n intervals (rad), shape (n, d + 1)."""
         return np.asarray(2.0 * pi / n * (np.arange(n)[:, None] + np.append(0.0, self.tau)))
 
-    def transcribe(self, n: int, rounding: float = ROUNDING) -> tuple[dict[str, Any], FloatArray, FloatArray]:
+    def transcribe(self, n: int) -> tuple[dict[str, Any], FloatArray, FloatArray]:
         """The nonlinear programme on n intervals, with the lower and upper bounds of its constraints."""
         casadi, d = symbolic.library(), self.degree
         slope, end, quadrature = casadi.collocation_coeff(self.tau.tolist())
@@ -587,7 +584,7 @@ class _Problem:
             return casadi.mtimes(values, np.tile(np.array(quadrature).ravel(), n)) / n
 
         square = mean(row(f) ** 2)
-        absolute = casadi.sqrt(power**2 + rounding**2) - rounding
+        absolute = casadi.sqrt(power**2 + ROUNDING**2) - ROUNDING
         objective = {
             "force": square,
             "power": mean(absolute) + FORCE_WEIGHT * square,
@@ -638,9 +635,9 @@ class _Problem:
         stiffness, preload = (parts[3] * self.scales[3:]).tolist()
         return _Mesh(tau=self.tau, u=u, v=v, f=f, spring=(max(stiffness, 0.0), preload))
 
-    def solve(self, start: _Mesh, n: int, rounding: float = ROUNDING) -> _Solution:
+    def solve(self, start: _Mesh, n: int) -> _Solution:
         """The solution on n intervals that IPOPT comes to from ``start``."""
-        programme, lower, upper = self.transcribe(n, rounding)
+        programme, lower, upper = self.transcribe(n)
         solver = symbolic.library().nlpsol("least_effort", "ipopt", programme, IPOPT)
         found = solver(x0=self.pack(start, n), lbx=self.box(n, -1), ubx=self.box(n, 1), lbg=lower, ubg=upper)
         self._check(solver.stats(), found, lower, upper)

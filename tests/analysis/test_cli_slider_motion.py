@@ -127,6 +127,7 @@ def test_what_is_written_runs_and_reproduces_the_motion(linkwork, tmp_path) -> N
     assert io.load_parameters(tmp_path / "moved" / "five-bar-parameters.toml") == case.parameters
     run = simulate(case.parameters, case.inputs, initial=case.initial, stop_time=case.stop_time, step=case.step)
     columns = csv(tmp_path / "moved" / "motion.csv")
+    assert columns["slider position [m]"] == pytest.approx(columns["slider.position [m]"], abs=1e-15)
     n = len(columns["slider.position [m]"])
     assert run["slider.position"][:n] == pytest.approx(columns["slider.position [m]"], abs=1e-7)
     assert run["pin.C.fx"][:n] == pytest.approx(columns["pin.C.fx [N]"], abs=1e-3)
@@ -189,6 +190,36 @@ def test_tracking_without_feed_forward_is_worse(tmp_path) -> None:
     assert feedback > 20.0 * both
     assert forward < 1e-5
     assert 2.0 * both < wrong < 2e-4
+
+
+def test_a_load_that_is_not_known_is_felt(tmp_path) -> None:
+    errors = []
+    for known in (True, False):
+        tracking = {"revolutions": 2, "load_known": known}
+        chosen = read(tmp_path, tables(drive={"speed": "120 rpm"}, load={"fx": "5 N", "fy": "-4 N"}, tracking=tracking))
+        solution = chosen.move(chosen.four_bar(), 1, (), progress=False).best
+        errors.append(chosen.tracked(chosen.driven(solution)).metrics().rms_error)
+    assert errors[0] < 1e-6
+    assert errors[1] > 20.0 * errors[0]
+
+
+def test_the_slider_is_made_as_the_case_says(tmp_path) -> None:
+    make = {
+        "slider_damping": "20 N*s/m",
+        "slider_stiffness": "300 N/m",
+        "slider_coulomb_friction": "2 N",
+        "slider_mass": "1 kg",
+    }
+    made = read(tmp_path, tables(make=make)).five_bar(BASE)
+    assert (made.slider_damping, made.slider_stiffness, made.slider_coulomb_friction, made.slider_mass) == (
+        20,
+        300,
+        2,
+        1,
+    )
+    # a pivot that is to move is not held, unlike that of a four-bar
+    free = read(tmp_path, tables(make={})).five_bar(BASE)
+    assert free.slider_stiffness == free.slider_damping == 0.0
 
 
 def test_least_effort_takes_less(linkwork, tmp_path) -> None:
@@ -279,6 +310,16 @@ def test_an_open_path_is_placed_by_itself(tmp_path) -> None:
     ends = np.exp(1j * four_bar.evaluation.rotation[[0, -1]])
     assert ends == pytest.approx(np.exp(1j * t[[0, -1]]), abs=1e-3)
     assert chosen.move(four_bar, 1, (), progress=False).best.error <= four_bar.error + 1e-12
+
+
+def test_a_path_that_is_traced_clockwise_is_driven_so(tmp_path) -> None:
+    t = np.linspace(0.3, 2.4, 40)
+    task = {"kind": "untimed-path", "points": BASE.path(t).tolist(), "closed": False, "measure": "distance"}
+    back = task | {"points": task["points"][::-1]}
+    drive = {"speed": "60 rpm"}
+    for turned, sign in ((task, 1.0), (back, -1.0)):
+        chosen = read(tmp_path, tables(task=turned, drive=drive))
+        assert chosen.driven(chosen.four_bar()).crank_speed == pytest.approx(sign * 2.0 * pi)
 
 
 def test_the_options_of_the_command_line_take_the_place_of_the_files(linkwork) -> None:

@@ -120,13 +120,15 @@ def test_gears_where_a_slider_is_not_enough() -> None:
 
 def test_a_second_crank_that_turns_by_itself_is_the_last_resort() -> None:
     psi = FourierSeries(np.array([0.0, 0.5]), np.array([0.0, -0.4]))
-    arm = SecondCrank(length=0.03, ratio=1, phase=0.9, series=psi)
-    found = strategy(replace(BASE, pivot=arm), 0.01 * MM2, harmonics=1, ratios=(1,), bounds=links_of(BASE))
+    arm = SecondCrank(length=0.03, ratio=2, phase=0.9, series=psi)
+    found = strategy(replace(BASE, pivot=arm), 0.01 * MM2, harmonics=1, ratios=(1, 2), bounds=links_of(BASE))
     assert [step.mechanism for step in found.steps][-2:] == [
-        "five-bar, second crank geared 1:1",
+        "five-bar, second crank geared 2:1",
         "five-bar, second crank turned independently, 1 harmonic",
     ]
     assert found.met
+    # it goes on from the better of the gears
+    assert found.chosen.solution.linkage.pivot.ratio == 2
     pivot = found.chosen.solution.linkage.pivot
     assert pivot.length == pytest.approx(arm.length, rel=1e-4)
     assert pivot.series.amplitudes[1] == pytest.approx(psi.amplitudes[1], rel=1e-4)
