@@ -240,7 +240,7 @@ def _svg_points(path: Path, text: str, scale: float | None, name: str | None) ->
         named = [element for element in drawing.elements() if isinstance(element, kinds) and element.id is not None]
         within = [element for element in named if element.id == name]
         if not within:
-            raise _unknown(name, [str(element.id) for element in named])
+            raise unknown_name(name, [str(element.id) for element in named])
     shapes = [within[0]] if isinstance(within[0], svgelements.Shape) else within[0].select()
     shapes = [shape for shape in shapes if isinstance(shape, svgelements.Shape)]
     shapes.sort(key=lambda shape: not isinstance(shape, svgelements.Path))
@@ -355,7 +355,8 @@ def _first_sentence(error: Exception) -> str:
     return (str(error) or type(error).__name__).splitlines()[0]
 
 
-def _unknown(name: str, known: Iterable[str]) -> UnknownNameError:
+def unknown_name(name: str, known: Iterable[str]) -> UnknownNameError:
+    """The error for a name that is not among those known, with the nearest of them."""
     names = tuple(known)
     near = difflib.get_close_matches(name, names, n=1)
     return UnknownNameError(name, names, near[0] if near else None)
@@ -385,7 +386,7 @@ def parameters_from(data: Mapping[str, Any], base: FiveBarParameters | None = No
     values: dict[str, Any] = {}
     for name, value in _flatten(data).items():
         if name not in _MECHANISM:
-            raise _unknown(name, _MECHANISM)
+            raise unknown_name(name, _MECHANISM)
         if _MECHANISM[name].kind == "Integer":
             if isinstance(value, bool) or not isinstance(value, int):
                 raise ParameterError(name, value, "be +1 or -1")
@@ -423,7 +424,7 @@ def save_parameters(path: str | Path, parameters: FiveBarParameters) -> Path:
     """Write parameters to a TOML or JSON file, as the path's ending says."""
     if not isinstance(parameters, FiveBarParameters):
         raise InputError(f"save_parameters takes a path and FiveBarParameters, not {type(parameters).__name__}")
-    return _write_tables(path, parameters_to(parameters))
+    return write_tables(path, parameters_to(parameters))
 
 
 def load_parameters(path: str | Path) -> FiveBarParameters:
@@ -436,10 +437,17 @@ def load_parameters(path: str | Path) -> FiveBarParameters:
     ParameterError
         As `parameters_from`.
     """
-    return parameters_from(_read_tables(path))
+    return parameters_from(read_tables(path))
 
 
-def _write_tables(path: str | Path, data: Mapping[str, Any]) -> Path:
+def write_tables(path: str | Path, data: Mapping[str, Any]) -> Path:
+    """Write nested tables to a TOML or JSON file, as the path's ending says.
+
+    Raises
+    ------
+    InputError
+        If the ending is another.
+    """
     path = _prepare(path)
     ending = path.suffix.lower()
     if ending == ".toml":
@@ -455,7 +463,14 @@ def _write_tables(path: str | Path, data: Mapping[str, Any]) -> Path:
     return path
 
 
-def _read_tables(path: str | Path) -> dict[str, Any]:
+def read_tables(path: str | Path) -> dict[str, Any]:
+    """Nested tables from a TOML or JSON file.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read, or is not what its ending says.
+    """
     path = Path(path)
     ending = path.suffix.lower()
     if ending not in (".toml", ".json"):
@@ -496,7 +511,7 @@ def load_case(path: str | Path, overrides: Mapping[str, Any] | None = None) -> C
     ParameterError
         If a name is unknown or a value is wrong.
     """
-    return case_from(_read_tables(path), folder=Path(path).parent, title=Path(path).stem, overrides=overrides)
+    return case_from(read_tables(path), folder=Path(path).parent, title=Path(path).stem, overrides=overrides)
 
 
 def case_from(
@@ -510,7 +525,7 @@ def case_from(
     published = data.get("published")
     if published is not None:
         if published not in SETS:
-            raise _unknown(str(published), SETS)
+            raise unknown_name(str(published), SETS)
         base = SETS[published].parameters
         speed = SETS[published].crank_speed
     flat = _flatten(mechanism)
@@ -519,7 +534,7 @@ def case_from(
     parameters = parameters_from(flat, base)
     for name in initial_values:
         if name not in _INITIAL:
-            raise _unknown(f"initial.{name}", [f"initial.{n}" for n in _INITIAL])
+            raise unknown_name(f"initial.{name}", [f"initial.{n}" for n in _INITIAL])
     initial = InitialState(
         **{name: quantity(value, _INITIAL[name].unit, f"initial.{name}") for name, value in initial_values.items()}
     )
@@ -564,13 +579,13 @@ def _inputs(data: Mapping[str, Any], folder: Path, speed: float | None) -> Input
     drive = _table(data, "drive")
     for name in drive:
         if name not in ("speed", "torque"):
-            raise _unknown(f"drive.{name}", ["drive.speed", "drive.torque"])
+            raise unknown_name(f"drive.{name}", ["drive.speed", "drive.torque"])
     if not drive and speed is not None:
         drive = {"speed": speed}
     load = _table(data, "load")
     for name in load:
         if name not in ("fx", "fy"):
-            raise _unknown(f"load.{name}", ["load.fx", "load.fy"])
+            raise unknown_name(f"load.{name}", ["load.fx", "load.fy"])
     torque = drive.get("torque")
     laws = torque if isinstance(torque, list) else [] if torque is None else [torque]
     return Inputs(
@@ -605,7 +620,7 @@ def _signal(value: Any, unit: str, name: str, folder: Path, extra: tuple[str, ..
     if kind == "table":
         return _tabulated(value, unit, name, folder)
     if kind == "harmonics":
-        _known(value, name, ("kind", "mean", "amplitudes", "frequencies", "phases"))
+        check_names(value, name, ("kind", "mean", "amplitudes", "frequencies", "phases"))
         rows = {key: _list(value, key, name) for key in ("amplitudes", "frequencies")}
         phases = value.get("phases", [0.0] * len(rows["amplitudes"]))
         return Harmonics(
@@ -619,7 +634,7 @@ def _signal(value: Any, unit: str, name: str, folder: Path, extra: tuple[str, ..
 
 
 def _tabulated(value: Mapping[str, Any], unit: str, name: str, folder: Path) -> Piecewise:
-    _known(value, name, ("kind", "times", "values", "file", "interpolation"))
+    check_names(value, name, ("kind", "times", "values", "file", "interpolation"))
     interpolation = value.get("interpolation", "linear")
     if "file" in value:
         path = folder / str(value["file"])
@@ -642,16 +657,23 @@ def _list(value: Mapping[str, Any], key: str, name: str) -> list[Any]:
     return found
 
 
-def _known(value: Mapping[str, Any], name: str, keys: Iterable[str]) -> None:
+def check_names(value: Mapping[str, Any], name: str, keys: Iterable[str]) -> None:
+    """Make sure that a table has no other entries than these.
+
+    Raises
+    ------
+    UnknownNameError
+        For the first that is none of them.
+    """
     for key in value:
         if key not in keys:
-            raise _unknown(f"{name}.{key}", [f"{name}.{k}" for k in keys])
+            raise unknown_name(f"{name}.{key}", [f"{name}.{k}" for k in keys])
 
 
 def _entries(
     value: Mapping[str, Any], name: str, units: Mapping[str, str], required: Iterable[str]
 ) -> dict[str, float]:
-    _known(value, name, ("kind", *units))
+    check_names(value, name, ("kind", *units))
     for key in required:
         if key not in value:
             raise MissingParameterError(f"{name}.{key}")
@@ -662,7 +684,7 @@ def _run_table(run: Mapping[str, Any], inputs: Inputs) -> tuple[float, float, fl
     keys = ("stop_time", "revolutions", "step", "tolerance")
     for name in run:
         if name not in keys:
-            raise _unknown(f"run.{name}", [f"run.{key}" for key in keys])
+            raise unknown_name(f"run.{name}", [f"run.{key}" for key in keys])
     tolerance = quantity(run.get("tolerance", 1e-9), "1", "run.tolerance")
     constant = float(inputs.speed) if isinstance(inputs.speed, (int, float)) and inputs.speed != 0.0 else None
     turn = None if constant is None else 2.0 * pi / abs(constant)

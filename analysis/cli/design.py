@@ -103,7 +103,7 @@ def write_solution(solution: Any, folder: Path, title: str, *, make: Any, plots:
     if not isinstance(pivot, SecondCrank):
         written.append(io.save_parameters(folder / "five-bar-parameters.toml", make.five_bar(solution)))
     if pivot is None:
-        written.append(io._write_tables(folder / "five-bar.toml", make.run_case(solution, title)))
+        written.append(io.write_tables(folder / "five-bar.toml", make.run_case(solution, title)))
     if plots:
         written.append(io.save_figure(solution.plot(title=title), folder / "best-linkage.png"))
     if animate:

@@ -226,7 +226,7 @@ def _dynamics(chosen: Any, solution: Any, folder: Path, plots: bool) -> list[Pat
     end = {"time [s]": np.append(drive.time, drive.period), "slider.force [N]": np.append(drive.force, drive.force[0])}
     written.append(io.write_csv(folder / "force.csv", end))
     written.append(io.save_parameters(folder / "five-bar-parameters.toml", drive.parameters))
-    written.append(io._write_tables(folder / "five-bar.toml", run_case(drive, title, "force.csv")))
+    written.append(io.write_tables(folder / "five-bar.toml", run_case(drive, title, "force.csv")))
     if plots:
         written.append(io.save_figure(drive_figure(title, drive), folder / "motion.png"))
     if chosen.tracking is not None:

@@ -14,7 +14,7 @@ import numpy as np
 from linkwork.errors import InputError, LinkworkError, MissingParameterError, ParameterError
 from linkwork.five_bar.parameters import FiveBarParameters, InitialState
 
-from ..io import _known, _read_tables, _unknown, parameters_to, quantity
+from ..io import check_names, parameters_to, quantity, read_tables, unknown_name
 from ..linearise import linearise_along
 from ..slider_control import design_pid
 from ..synthesis.case_tasks import flag, given, listed, one_of, section, whole
@@ -334,7 +334,7 @@ def load_slider_case(path: str | Path, overrides: Mapping[str, Any] | None = Non
         If bounds and constraints contradict one another.
     """
     path = Path(path)
-    return slider_case_from(_read_tables(path), folder=path.parent, title=path.stem, overrides=overrides)
+    return slider_case_from(read_tables(path), folder=path.parent, title=path.stem, overrides=overrides)
 
 
 def slider_case_from(
@@ -344,14 +344,14 @@ def slider_case_from(
     data = overridden(data, overrides or {})
     for name in data:
         if name not in (*TABLES, *OWN) or name == "trade_off":
-            raise _unknown(name, [n for n in (*TABLES, *OWN) if n != "trade_off"])
+            raise unknown_name(name, [n for n in (*TABLES, *OWN) if n != "trade_off"])
     if "slider" not in data and "strategy" not in data:
         raise MissingParameterError("slider")
     rest = {name: value for name, value in data.items() if name not in OWN}
     synthesis = synthesis_case_from(rest, folder=folder, title=title)
     linkage = _linkage(section(data, "linkage"), folder) if "linkage" in data else None
     slider = section(data, "slider")
-    _known(slider, "slider", (*_MOTION, "harmonics", "guide_angle", "position", "links", "starts"))
+    check_names(slider, "slider", (*_MOTION, "harmonics", "guide_angle", "position", "links", "starts"))
     free = one_of(slider.get("links", "kept"), "slider.links", ("kept", "free")) == "free"
     if linkage is not None and not free and synthesis.bounds:
         first = next(iter(synthesis.bounds))
@@ -382,9 +382,9 @@ def slider_case_from(
 def _linkage(table: Mapping[str, Any], folder: Path) -> Linkage:
     """A linkage by its dimensions, or one of those in a file that `linkwork synthesize` wrote."""
     if "file" in table:
-        _known(table, "linkage", ("file", "rank"))
+        check_names(table, "linkage", ("file", "rank"))
         return linkage_from_csv(folder / str(table["file"]), whole(table.get("rank", 1), "linkage.rank", 1))
-    _known(table, "linkage", (*DIMENSIONS, "branch"))
+    check_names(table, "linkage", (*DIMENSIONS, "branch"))
     values: dict[str, Any] = {
         name: quantity(table[name], "rad" if name in ANGLES else "m", f"linkage.{name}")
         for name in DIMENSIONS
@@ -469,7 +469,7 @@ def _positive(value: Any, unit: str, name: str) -> float:
 
 def _strategy(table: Mapping[str, Any], angular: bool) -> StrategyWanted:
     name = "strategy"
-    _known(table, name, StrategyWanted.__dataclass_fields__)
+    check_names(table, name, StrategyWanted.__dataclass_fields__)
     criterion = one_of(table.get("criterion", "worst"), "strategy.criterion", get_args(Criterion))
     unit = ("rad" if angular else "m") + ("**2" if criterion == "error" else "")
     options: dict[str, Any] = {
@@ -484,8 +484,8 @@ def _strategy(table: Mapping[str, Any], angular: bool) -> StrategyWanted:
 
 
 def _drive(table: Mapping[str, Any], load: Mapping[str, Any]) -> DriveWanted:
-    _known(table, "drive", ("speed", "samples", "best_spring"))
-    _known(load, "load", ("fx", "fy"))
+    check_names(table, "drive", ("speed", "samples", "best_spring"))
+    check_names(load, "load", ("fx", "fy"))
     return DriveWanted(
         speed=_positive(given(table, "speed", "drive"), "rad/s", "drive.speed"),
         load=(quantity(load.get("fx", 0.0), "N", "load.fx"), quantity(load.get("fy", 0.0), "N", "load.fy")),
@@ -495,7 +495,7 @@ def _drive(table: Mapping[str, Any], load: Mapping[str, Any]) -> DriveWanted:
 
 
 def _tracking(table: Mapping[str, Any]) -> TrackingWanted:
-    _known(table, "tracking", TrackingWanted.__dataclass_fields__)
+    check_names(table, "tracking", TrackingWanted.__dataclass_fields__)
     options: dict[str, Any] = {
         name: flag(table[name], f"tracking.{name}") for name in ("feedforward", "load_known") if name in table
     }
@@ -517,7 +517,7 @@ def _tracking(table: Mapping[str, Any]) -> TrackingWanted:
 
 
 def _effort(table: Mapping[str, Any], angular: bool) -> EffortWanted:
-    _known(table, "least_effort", EffortWanted.__dataclass_fields__)
+    check_names(table, "least_effort", EffortWanted.__dataclass_fields__)
     options: dict[str, Any] = {
         name: _positive(table[name], unit, f"least_effort.{name}")
         for name, unit in (("force", "N"), ("speed", "m/s"))

@@ -84,7 +84,12 @@ def slider_motion(
     kept: dict[str, Any] = {
         name: value for name, value in given.values().items() if name != "branch" and name not in (bounds or {})
     }
-    assembly = () if any(isinstance(c, Assembly) for c in constraints) else (Assembly(branch=given.branch),)
+    asked = {c.branch for c in constraints if isinstance(c, Assembly)}
+    if asked - {given.branch}:
+        raise InputError(
+            f"assembly {asked.pop():+d} is asked of a linkage that is assembled {given.branch:+d}: turn it over first"
+        )
+    assembly = () if asked else (Assembly(branch=given.branch),)
     fixed = {name: (value, value) for name, value in kept.items()}
     limits = limits_of(task, normal, fixed | dict(bounds or {}), (*constraints, *assembly))
     begin = [_start(guess, normal, unknown) for guess in guesses]

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from linkwork.errors import InputError, MissingParameterError, ParameterError, UnknownNameError
 
-from ..io import _known, quantity, read_points
+from ..io import check_names, quantity, read_points
 from .targets import TargetPath, function_from_formula, path_from_formula
 from .tasks import Motion, PrecisionPoints, RockerFunction, Straight, Task, TimedPath, UntimedPath, turn
 
@@ -112,7 +112,7 @@ def task_from(table: Mapping[str, Any], folder: Path) -> Task:
     if "kind" not in table:
         raise MissingParameterError("task.kind")
     kind = one_of(table["kind"], "task.kind", KINDS)
-    _known(table, "task", ("kind", *KINDS[kind]))
+    check_names(table, "task", ("kind", *KINDS[kind]))
     if kind == "rocker-function":
         return _rocker_function(table, folder)
     path, turned = _curve(table, folder, points=kind in ("motion", "precision-points"))
@@ -215,7 +215,7 @@ def _rotation(table: Mapping[str, Any], n: int) -> FloatArray | None:
     if value is None:
         return None
     if isinstance(value, Mapping):
-        _known(value, "task.rotation", ("from", "to"))
+        check_names(value, "task.rotation", ("from", "to"))
         begin, end = (
             quantity(given(value, key, "task.rotation"), "rad", f"task.rotation.{key}") for key in ("from", "to")
         )
@@ -237,7 +237,7 @@ def _weights(table: Mapping[str, Any], rotation: FloatArray | None, n: int = 0) 
         name = f"task.weights[{k}]"
         if not isinstance(window, Mapping):
             raise ParameterError(name, window, "be a window as the others, with from, to and weight")
-        _known(window, name, ("from", "to", "weight"))
+        check_names(window, name, ("from", "to", "weight"))
         ends = [
             float(whole(given(window, key, name), f"{name}.{key}", 0))
             if rotation is None
@@ -265,7 +265,7 @@ def _untimed(table: Mapping[str, Any], path: TargetPath | FloatArray) -> Untimed
     if straight is not None:
         if not isinstance(straight, Mapping):
             raise ParameterError("task.straight", straight, "be a table")
-        _known(straight, "task.straight", ("start", "end", "rotation", "flatness", "weight"))
+        check_names(straight, "task.straight", ("start", "end", "rotation", "flatness", "weight"))
         name = "task.straight"
         flatness = straight.get("flatness")
         more["straight"] = Straight(
@@ -285,7 +285,7 @@ def _untimed(table: Mapping[str, Any], path: TargetPath | FloatArray) -> Untimed
 def _smoothed(value: Any, path: TargetPath) -> TargetPath:
     options: Mapping[str, Any] = {}
     if isinstance(value, Mapping):
-        _known(value, "task.smoothing", ("points", "deviation"))
+        check_names(value, "task.smoothing", ("points", "deviation"))
         options = value
     elif value is not True:
         raise ParameterError("task.smoothing", value, "be true, false, or a table with points and deviation")

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from linkwork.errors import MissingParameterError, ParameterError
 from linkwork.five_bar.parameters import FiveBarParameters
 
-from ..io import _known, _read_tables, _unknown, parameters_to, quantity
+from ..io import check_names, parameters_to, quantity, read_tables, unknown_name
 from .case_tasks import flag, given, list_of, listed, one_of, pairs, section, task_from, whole
 from .constraints import (
     UNKNOWNS,
@@ -195,7 +195,7 @@ def load_synthesis_case(path: str | Path, overrides: Mapping[str, Any] | None = 
         If bounds and constraints contradict one another.
     """
     path = Path(path)
-    return synthesis_case_from(_read_tables(path), folder=path.parent, title=path.stem, overrides=overrides)
+    return synthesis_case_from(read_tables(path), folder=path.parent, title=path.stem, overrides=overrides)
 
 
 def synthesis_case_from(
@@ -205,7 +205,7 @@ def synthesis_case_from(
     data = overridden(data, overrides or {})
     for name in data:
         if name not in TABLES:
-            raise _unknown(name, TABLES)
+            raise unknown_name(name, TABLES)
     if "task" not in data:
         raise MissingParameterError("task")
     wanted = data.get("trade_off")
@@ -244,7 +244,7 @@ def bounds_from(table: Mapping[str, Any]) -> dict[str, tuple[float, float]]:
     bounds: dict[str, tuple[float, float]] = {}
     for name, value in table.items():
         if name not in UNKNOWNS:
-            raise _unknown(f"bounds.{name}", [f"bounds.{n}" for n in UNKNOWNS])
+            raise unknown_name(f"bounds.{name}", [f"bounds.{n}" for n in UNKNOWNS])
         unit = "rad" if name in ANGLES else "m"
         ends = value if isinstance(value, list) else [value, value]
         if len(ends) != 2:
@@ -270,7 +270,7 @@ CONSTRAINTS = (
 
 def constraints_from(table: Mapping[str, Any]) -> tuple[Constraint, ...]:
     """Constraints of a table ``[constraints]``; 40 degrees over a full turn where no transmission angle is given."""
-    _known(table, "constraints", CONSTRAINTS)
+    check_names(table, "constraints", CONSTRAINTS)
     found: list[Constraint] = []
     angle = table.get("least_transmission_angle", LeastTransmission().angle)
     # a crank that cannot turn fully is looked at where it works
@@ -303,7 +303,7 @@ def constraints_from(table: Mapping[str, Any]) -> tuple[Constraint, ...]:
 
 def search_from(table: Mapping[str, Any]) -> Search:
     """How it is searched, of a table ``[search]``."""
-    _known(table, "search", Search.__dataclass_fields__)
+    check_names(table, "search", Search.__dataclass_fields__)
     values: dict[str, Any] = {
         name: whole(value, f"search.{name}", {"seed": 0, "jobs": -1}.get(name, 1))
         for name, value in table.items()
@@ -331,7 +331,7 @@ _MAKE = {
 
 def make_from(table: Mapping[str, Any]) -> Make:
     """What the linkage is made of, of a table ``[make]``."""
-    _known(table, "make", _MAKE)
+    check_names(table, "make", _MAKE)
     values = {name: quantity(value, _MAKE[name], f"make.{name}") for name, value in table.items()}
     for name, value in values.items():
         above = name in ("density", "width", "thickness", "speed")
@@ -343,7 +343,7 @@ def make_from(table: Mapping[str, Any]) -> Make:
 
 
 def _trade_off(table: Mapping[str, Any]) -> TradeOffWanted:
-    _known(table, "trade_off", ("over", "limits", "starts"))
+    check_names(table, "trade_off", ("over", "limits", "starts"))
     over = one_of(given(table, "over", "trade_off"), "trade_off.over", ("size", "transmission"))
     limits = list_of(given(table, "limits", "trade_off"), "m" if over == "size" else "rad", "trade_off.limits")
     if len(limits) < 2:

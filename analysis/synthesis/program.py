@@ -34,7 +34,7 @@ Objective = Literal["squares", "area", "transmission"]
 TURNING = 0.002
 #: Crank rotations at which a moving pivot's assembly, speed and acceleration are held within their limits, and what is added
 #: to the least transmission angle for what is between them (rad).
-GRID, BETWEEN = 96, 1e-3
+GRID, BETWEEN = 96, 2.5e-3
 #: Margin of a Grashof type, as a share of the links' sum: at zero a four-bar is a change-point.
 MARGIN = 1e-4
 #: How IPOPT follows its barrier: freely from a start that is only near, with care from one that a first solution gave.

@@ -12,7 +12,7 @@ from typing import Any
 
 from linkwork.errors import InputError, ParameterError
 
-from ..io import _unknown, quantity
+from ..io import quantity, unknown_name
 from .constraints import UNKNOWNS, Require
 
 _COMPARED: Mapping[type[ast.cmpop], tuple[int, bool]] = {
@@ -82,7 +82,7 @@ def _check_side(node: ast.AST, text: str, numbers: list[float]) -> None:
             numbers.append(float(number))
         case ast.Name(id=name):
             if name not in (*UNKNOWNS, "pi"):
-                raise _unknown(name, (*UNKNOWNS, "pi", *_REQUIRED))
+                raise unknown_name(name, (*UNKNOWNS, "pi", *_REQUIRED))
         case ast.BinOp(left=left, op=ast.Add() | ast.Sub() | ast.Mult() | ast.Div() | ast.Pow(), right=right):
             _check_side(left, text, numbers)
             _check_side(right, text, numbers)
@@ -90,7 +90,7 @@ def _check_side(node: ast.AST, text: str, numbers: list[float]) -> None:
             _check_side(operand, text, numbers)
         case ast.Call(func=ast.Name(id=name), args=args, keywords=[]) if args:
             if name not in _REQUIRED:
-                raise _unknown(name, _REQUIRED)
+                raise unknown_name(name, _REQUIRED)
             for arg in args:
                 _check_side(arg, text, numbers)
         case _:

@@ -63,8 +63,9 @@ class Rounding:
     error : float
         Its quality function.
     expected : float
-        Mean quality function of dimensions that are off by random amounts, evenly within half a step, to second order: the
-        exact derivatives and their own, by differences; infinite where there are none.
+        Mean quality function of dimensions that are off by random amounts, evenly within half a step: a sum of squares to
+        second order, by exact derivatives of the errors and their differences; an area by the spread of the distances, as of
+        normal variables. Infinite where there are no derivatives.
     """
 
     linkage: Linkage
@@ -207,16 +208,18 @@ def _expected(solution: Solution, steps: Mapping[str, float]) -> float:
         if name not in names:
             continue
         k, variance = names.index(name), step**2 / 12.0
+        square += variance * jacobian[:, k] ** 2
+        if area:
+            continue
         small = DIFFERENCE * (1.0 if name in (*ANGLES, *PIVOT_ANGLES) else linkage.largest_link)
         value = _made(linkage)[name]
+        if name in (*LINKS, SECOND):
+            small = min(small, 0.1 * value)
         ahead, behind = (residuals(_with(linkage, name, value + side * small))[0][:, k] for side in (1.0, -1.0))
-        square += variance * jacobian[:, k] ** 2
         shift += 0.5 * variance * (ahead - behind) / (2.0 * small)
     if area:
         # an area: the mean of the distances, as of a normal variable of that spread about what is there
-        grown = (
-            normal.weights * normal.arc * normal.unit @ (_mean_absolute(left + shift, np.sqrt(square)) - np.abs(left))
-        )
+        grown = normal.weights * normal.arc * normal.unit @ (_mean_absolute(left, np.sqrt(square)) - np.abs(left))
     else:
         weights = np.tile(normal.weights, len(left) // normal.n)
         grown = weights @ (square + 2.0 * left * shift)

@@ -14,6 +14,7 @@ from scipy.optimize import differential_evolution, minimize_scalar
 from analysis.control import SmoothnessInterrupted, motion, slider_motion, smoothness_curve
 from analysis.control.motion import greatest
 from analysis.synthesis import (
+    Assembly,
     CrankUnknown,
     FullTurn,
     InfeasibleError,
@@ -521,3 +522,8 @@ def test_bad_input_is_named() -> None:
             smoothness_curve(WEIGHTED.task, PRINTED, unknown, wrong)
     with pytest.raises(InputError, match="it must be that of a SliderUnknown"):
         smoothness_curve(WEIGHTED.task, PRINTED, CrankUnknown(ratio=1, length=(0.1, 0.2)), [0.01, 0.02])
+
+
+def test_an_assembly_that_contradicts_the_linkage_is_refused() -> None:
+    with pytest.raises(InputError, match="assembly -1 is asked of a linkage that is assembled"):
+        slider_motion(WEIGHTED.task, PRINTED, SliderUnknown(harmonics=1), constraints=(Assembly(branch=-1),))

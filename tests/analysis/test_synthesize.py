@@ -271,6 +271,22 @@ class TestRounding:
         assert rounding.expected == pytest.approx(solution.error, rel=1e-6)
         assert rounding.error == pytest.approx(solution.error, rel=1e-5)
 
+    def test_expected_of_an_area_that_is_as_small_as_it_can_be(self) -> None:
+        """Distances of either sign, few stations, and a target of few points: what is added starts from the area itself."""
+        task = UntimedPath(path=TargetPath(points=ELLIPSE, closed=True), samples=36)
+        solution = synthesize(task, **QUICK).best
+        random = np.random.default_rng(0)
+        errors = []
+        for _ in range(400):
+            off = {n: radians(0.1) if n in ANGLES else 1e-4 for n in (*LENGTHS, *ANGLES)}
+            changed = {n: getattr(solution.linkage, n) + random.uniform(-0.5, 0.5) * step for n, step in off.items()}
+            errors.append(evaluate(task, replace(solution.linkage, **changed)).error)
+        grown = float(np.mean(errors)) - solution.error
+        spread = float(np.std(errors)) / np.sqrt(len(errors))
+        expected = solution.rounded(length=1e-4, angle=radians(0.1)).expected - solution.error
+        assert expected == pytest.approx(grown, abs=3.0 * spread)
+        assert spread < 0.06 * grown
+
     def test_expected_knows_how_the_residuals_are_curved(self) -> None:
         """One dimension off, and a large error: by Simpson's rule, which integrates the cubic of it exactly."""
         solution = judged("rocker")
