@@ -321,7 +321,8 @@ def test_the_links_keep_their_transmission_angle() -> None:
     found = slider_motion(
         WEIGHTED.task, PRINTED, SliderUnknown(harmonics=2), constraints=(LeastTransmission(angle=angle),)
     )
-    assert found.best.linkage.least_transmission == pytest.approx(angle, abs=radians(0.1))
+    # a margin of 0.15 degrees is for what lies between the rotations that are looked at
+    assert angle <= found.best.linkage.least_transmission <= angle + radians(0.16)
     assert moved(2).best.linkage.least_transmission < radians(25.0)
     assert found.best.error > moved(2).best.error
 
