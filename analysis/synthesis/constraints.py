@@ -136,8 +136,8 @@ class Require:
     Attributes
     ----------
     function : callable
-        Of a namespace with the fields of `Linkage` (SI), in arithmetic and functions of `math`; it is traced, so that its
-        derivatives are exact.
+        Of a namespace with the dimensions of `Linkage` by name (SI), in arithmetic and the elementary functions of `math` or
+        NumPy, without branches; it is traced, so that its derivatives are exact.
     equal : bool
         Whether it is to be zero, instead of at most zero.
     name : str

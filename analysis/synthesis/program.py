@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import builtins
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import cos, inf, isfinite, pi
@@ -50,6 +50,15 @@ TRACED = (
     "sin", "cos", "tan", "asin", "acos", "atan", "atan2", "arcsin", "arccos", "arctan", "arctan2", "sinh", "cosh", "tanh",
     "exp", "log", "sqrt", "hypot", "fabs",
 )  # fmt: skip
+#: And what CasADi has under another name, or not at all.
+RENAMED: dict[str, Callable[..., Any]] = {
+    "degrees": lambda x: x * (180.0 / pi),
+    "radians": lambda x: x * (pi / 180.0),
+    "pow": lambda x, y: x**y,
+    "power": lambda x, y: x**y,
+    "maximum": lambda x, y: symbolic.library().fmax(x, y),
+    "minimum": lambda x, y: symbolic.library().fmin(x, y),
+}
 #: Iterations of IPOPT: most optima are reached in a hundred, or in many.
 ITERATIONS = 250
 #: Least rotation of the crank from one untimed station to the next, as a share of an even one.
@@ -698,9 +707,11 @@ def _rebound(value: Any, seen: dict[int, Any]) -> Any:
     """What a function of the user's takes from elsewhere, `math` and NumPy replaced by CasADi, his own functions likewise."""
     casadi = symbolic.library()
     if isinstance(value, ModuleType) and value.__name__ in ("math", "numpy"):
-        return SimpleNamespace(**vars(value) | {n: getattr(casadi, n) for n in TRACED if hasattr(value, n)})
+        known = {n: getattr(casadi, n) for n in TRACED} | RENAMED
+        return SimpleNamespace(**vars(value) | {n: f for n, f in known.items() if hasattr(value, n)})
     if any(getattr(module, getattr(value, "__name__", ""), None) is value for module in (math, np)):
-        return getattr(casadi, value.__name__) if value.__name__ in TRACED else value
+        name = value.__name__
+        return RENAMED.get(name, getattr(casadi, name) if name in TRACED else value)
     if not isinstance(value, FunctionType):
         return value
     if id(value) not in seen:

@@ -304,7 +304,7 @@ def _closed_paths(
     misfit[broken] = inf
     place = target[0].mean() - scale * mean
     # crank rotation of each station: its share of the target's length, from where the target starts on the curve
-    stations = _shares(normal.points, closed=True) * EVEN
+    stations = normal.shares * EVEN
     rotations = np.empty((len(curves), normal.n))
     chosen = np.argsort(misfit)[: min(len(misfit), 400)]
     chosen = chosen[np.isfinite(misfit[chosen])]
@@ -324,7 +324,7 @@ def _open_paths(
 ) -> Candidates:
     assert normal.points is not None
     k = PIECE
-    shares = _shares(normal.points, closed=False)
+    shares = normal.shares
     even = np.interp(np.linspace(0.0, 1.0, k), shares, normal.points.real) + 1j * np.interp(
         np.linspace(0.0, 1.0, k), shares, normal.points.imag
     )
@@ -376,14 +376,6 @@ def _vectors(
     zero = np.zeros(len(links))
     columns = [place.real, place.imag, size[:, None] * links, size * np.abs(point), turn, zero, np.angle(point), zero]
     return np.column_stack(columns)
-
-
-def _shares(points: ComplexArray, *, closed: bool) -> FloatArray:
-    """Share of a polyline's length up to each of its points."""
-    steps = np.abs(np.diff(np.append(points, points[0]) if closed else points))
-    length = np.concatenate([[0.0], np.cumsum(steps)])
-    shares: FloatArray = length[: len(points)] / length[-1]
-    return shares
 
 
 def _even(curves: ComplexArray, k: int) -> tuple[ComplexArray, FloatArray]:

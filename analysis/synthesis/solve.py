@@ -245,22 +245,22 @@ def solutions_of(
     """Answers as solutions, each evaluated afresh, ranked, and at most so many."""
     chosen = distinct(done.kept, 4 * count, pivot)
     made = [
-        Solution.of(task, linkage_of(a.start, normal, pivot, limits), _stations(task, a.start.rotation)) for a in chosen
+        Solution.of(task, linkage_of(a.start, normal, pivot, limits), _stations(task, normal, a.start.rotation))
+        for a in chosen
     ]
     return ranked([s for s in made if isfinite(s.error)])[:count]
 
 
-def _stations(task: Task, rotation: NDArray[np.float64] | None) -> NDArray[np.float64] | None:
+def _stations(task: Task, normal: Normal, rotation: NDArray[np.float64] | None) -> NDArray[np.float64] | None:
     """Crank rotations of the task's own stations, from those of the ones it was fitted at."""
-    if rotation is None or not isinstance(task, UntimedPath) or len(rotation) == (n := normal_form(task).n):
+    own = normal_form(task)
+    if rotation is None or len(rotation) == own.n:
         return rotation
-    m = len(rotation)
-    if not task.path.closed:
-        places, at, turned = np.linspace(0.0, 1.0, n), np.linspace(0.0, 1.0, m), rotation
-    else:
+    at, turned = normal.shares, rotation
+    if own.closed:
+        at = np.append(at, 1.0)
         turned = np.append(rotation, rotation[0] + np.copysign(2.0 * np.pi, rotation[-1] - rotation[0]))
-        places, at = np.arange(n) / n, np.arange(m + 1) / m
-    told: NDArray[np.float64] = np.interp(places, at, turned)
+    told: NDArray[np.float64] = np.interp(own.shares, at, turned)
     return told
 
 
@@ -271,7 +271,8 @@ def infeasible(done: Polished) -> InfeasibleError:
     nearest: Answer = min(done.others, key=lambda a: a.violation)
     return InfeasibleError(
         f"no linkage keeps all bounds and constraints: of {len(done.others)} searches the nearest violates "
-        f"the {nearest.worst or 'quality'} by {nearest.violation:.3g} (in units of the target's size, or rad; {nearest.status})"
+        f"the {nearest.worst or 'quality'} by {nearest.violation:.3g} (in units of the target's size, or rad; "
+        f"{nearest.status.replace('_', ' ').lower()})"
     )
 
 

@@ -351,6 +351,15 @@ class Normal:
         """Whether the crank rotations are given."""
         return self.rotation is not None
 
+    @property
+    def shares(self) -> FloatArray:
+        """Share of the length of the line through the stations' targets up to each of them, shape (n,)."""
+        assert self.points is not None
+        steps = np.abs(np.diff(np.append(self.points, self.points[0]) if self.closed else self.points))
+        length = np.concatenate([[0.0], np.cumsum(steps)])
+        shares: FloatArray = length[: self.n] / length[-1]
+        return shares
+
 
 def reweighted(task: Task, weights: ArrayLike | None) -> Task:
     """The task with other weights, where any are given.

@@ -312,6 +312,15 @@ class TestConstraints:
         assert abs(math.sin(solution.linkage.point_angle)) < 1e-6
         assert solution.linkage.pivot_x - solution.linkage.pivot_y == pytest.approx(0.3, abs=1e-7)
 
+    def test_functions_that_casadi_names_otherwise(self) -> None:
+        in_degrees = Require(function=lambda p: math.degrees(p.ground_angle) - 100.0, equal=True, scale=100.0)
+        longest = Require(
+            function=lambda p: np.maximum(math.pow(p.coupler_length, 2.0), p.rocker_length**2) - 0.0225, scale=0.01
+        )
+        solution = best(*USUAL, SMALL, in_degrees, longest).linkage
+        assert math.degrees(solution.ground_angle) == pytest.approx(100.0, abs=1e-4)
+        assert max(solution.coupler_length, solution.rocker_length) <= 0.15 + 1e-7
+
     def test_functions_of_the_users_own_are_traced_through(self) -> None:
         def height(p: Any) -> Any:
             return sum([p.ground_length * np.sin(x) for x in (p.ground_angle,)])
