@@ -94,7 +94,8 @@ def test_cache_folder_changes_with_the_sources(tmp_path: Path, monkeypatch: pyte
     assert compiled.cache_folder() not in folders
     before = compiled.cache_folder()
     for name in compiled.COMPILED_MODULES:
-        shutil.copy(Path(compiled.__file__).with_name(name), tmp_path / name)
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        shutil.copy(Path(compiled.__file__).parent / name, tmp_path / name)
     monkeypatch.setattr(compiled, "__file__", str(tmp_path / "compiled.py"))
     assert compiled.cache_folder() == before
     for name in compiled.COMPILED_MODULES:
