@@ -230,8 +230,10 @@ def test_the_examples_load():
     from pathlib import Path
 
     examples = sorted((Path(__file__).parents[2] / "examples").glob("*.toml"))
-    assert len(examples) >= 2
-    for path in examples:
+    runs = [path for path in examples if "[task]" not in path.read_text(encoding="utf-8")]
+    # those with a task are cases of the synthesis and of the slider's motion, and have their tests
+    assert len(runs) >= 2
+    for path in runs:
         assert io.load_case(path).stop_time > 0.0
 
 

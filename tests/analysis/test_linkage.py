@@ -23,10 +23,14 @@ FloatArray = NDArray[np.float64]
 
 
 def moved(linkage: Linkage) -> Linkage:
-    """The linkage with a slider whose motion is small beside the crank."""
+    """The linkage with a slider whose motion is small beside the crank, and small enough for the links to stay joined."""
     a = 0.1 * linkage.crank_length
-    series = FourierSeries(np.array([0.05, 0.5, -0.3]) * a, np.array([0.0, 0.4, 0.2]) * a)
-    return replace(linkage, pivot=SliderMotion(series, 0.8))
+    while True:
+        series = FourierSeries(np.array([0.05, 0.5, -0.3]) * a, np.array([0.0, 0.4, 0.2]) * a)
+        made = replace(linkage, pivot=SliderMotion(series, 0.8))
+        if made.least_transmission > 0.1:
+            return made
+        a *= 0.5
 
 
 class TestAgainstThePlant:
