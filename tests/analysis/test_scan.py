@@ -229,7 +229,10 @@ class TestShapes:
             coupler_length=(1.2, 1.3),
             rocker_length=(0.05, 0.1),
         )
-        with pytest.raises(InfeasibleError, match=r"no shape of four-bar is within the bounds of the links and has a crank that turns fully"):
+        with pytest.raises(
+            InfeasibleError,
+            match=r"no shape of four-bar is within the bounds of the links and has a crank that turns fully",
+        ):
             scan(normal, limits, seed=0, candidates=256, starts=4)
 
 
