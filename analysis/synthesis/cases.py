@@ -87,7 +87,7 @@ class Make:
 
     def five_bar(self, solution: Solution) -> FiveBarParameters:
         """Parameters of the plant for a solution, its slider held."""
-        free = solution.linkage.to_five_bar(
+        free = solution.to_five_bar(
             density=self.density,
             section=(self.width, self.thickness),
             slider_mass=self.slider_mass,

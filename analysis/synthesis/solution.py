@@ -6,12 +6,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from math import degrees, inf, pi, radians
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from linkwork.errors import AssemblyError, InputError
+from linkwork.five_bar.parameters import FiveBarParameters
 
 from .areas import area_between, distance_to, straightness
 from .kernels import PLACES
@@ -348,6 +349,10 @@ class Solution:
         from .sensitivity import rounded
 
         return rounded(self, length, angle)
+
+    def to_five_bar(self, **made_of: Any) -> FiveBarParameters:
+        """Parameters of the plant and its FMU, masses from density and section; see `Linkage.to_five_bar`."""
+        return self.linkage.to_five_bar(**made_of)
 
     def columns(self) -> dict[str, FloatArray]:
         """Target by target: crank rotation, target, what is done, error, transmission angle; SI, units in the names.

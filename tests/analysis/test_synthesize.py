@@ -90,6 +90,12 @@ class TestResult:
         assert helped.best.error <= good.error * (1.0 + 1e-9)
         assert poor.best.error > 1.5 * good.error
 
+    def test_its_best_is_a_plant_that_runs(self) -> None:
+        best = synthesize(TASK, **QUICK).best
+        plant = best.to_five_bar(density=2700.0, section=(0.03, 0.01), slider_stiffness=1e6)
+        assert plant == best.linkage.to_five_bar(density=2700.0, section=(0.03, 0.01), slider_stiffness=1e6)
+        assert plant.crank_mass == pytest.approx(2700.0 * 0.03 * 0.01 * best.linkage.crank_length)
+
     @pytest.mark.parametrize("n_jobs", [1, 2])
     def test_interrupted_it_hands_over_the_best_so_far(self, monkeypatch: pytest.MonkeyPatch, n_jobs: int) -> None:
         timer = threading.Timer(0.5 if n_jobs == 1 else 2.0, signal.raise_signal, [signal.SIGINT])
