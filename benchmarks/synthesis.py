@@ -38,17 +38,16 @@ from numba import njit
 from numpy.typing import NDArray
 from rich.console import Console
 from rich.table import Table
-from scipy.optimize import Bounds, NonlinearConstraint, differential_evolution, minimize
+from scipy.optimize import Bounds, minimize
 
 from analysis.synthesis import LargestLink, Linkage, TimedPath, evaluate, synthesize, turn
 from analysis.synthesis.black_box import (
     DRAWS,
     EDGE,
     EVALUATIONS,
-    GENERATIONS,
-    MEMBERS,
     PENALTY,
     BlackBox,
+    evolve,
     initial_simplex,
 )
 from analysis.synthesis.constraints import Limits, limits_of
@@ -306,23 +305,7 @@ class Trace:
 
 def by_scipy(trace: Trace, box: BlackBox, random: np.random.Generator) -> None:
     """SciPy's differential evolution over whole generations, as `synthesize` does by the method of that name."""
-    differential_evolution(
-        # where no member keeps the constraints, SciPy asks for the quality of none
-        lambda x: box.quality(x.T) if x.size else np.empty(0),
-        Bounds(box.low, box.high),
-        maxiter=GENERATIONS,
-        popsize=MEMBERS,
-        tol=1e-8,
-        init="sobol",
-        updating="deferred",
-        vectorized=True,
-        polish=False,
-        constraints=(
-            NonlinearConstraint(lambda x: box.violations(np.atleast_2d(x.T)).T.reshape(-1, *x.shape[1:]), -inf, 0.0),
-        ),
-        callback=lambda intermediate_result: trace.offer(box, intermediate_result.x),
-        rng=random,
-    )
+    evolve(box, random, lambda found: trace.offer(box, found.x))
 
 
 def by_simplex(trace: Trace, box: BlackBox, random: np.random.Generator) -> None:

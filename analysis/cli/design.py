@@ -88,17 +88,23 @@ def show_best(solution: Any) -> None:
     console.print(rounding_told(solution), highlight=False, soft_wrap=True)
 
 
+def write_described(solution: Any, folder: Path, title: str, *, curve: str, report: str, drawing: str) -> list[Path]:
+    """The curve of a solution, its report, and its drawing as DXF and SVG, under these names; what was written."""
+    from .. import io
+
+    told = folder / f"{report}.txt"
+    written = [solution.to_csv(folder / f"{curve}.csv"), told]
+    told.write_text(f"{title}\n\n{solution.report()}", encoding="utf-8")
+    drawn = solution.drawing(title=title)
+    return written + [io.save_drawing(folder / f"{drawing}.{ending}", drawn) for ending in ("dxf", "svg")]
+
+
 def write_solution(solution: Any, folder: Path, title: str, *, make: Any, plots: bool, animate: bool) -> list[Path]:
     """Everything about one solution: drawing, curve, report, parameters and a case that runs; what was written."""
     from .. import io
     from ..synthesis.linkage import SecondCrank
 
-    written = [solution.to_csv(folder / "best-curve.csv")]
-    report = folder / "best-report.txt"
-    report.write_text(f"{title}\n\n{solution.report()}", encoding="utf-8")
-    written.append(report)
-    drawing = solution.drawing(title=title)
-    written += [io.save_drawing(folder / f"best.{ending}", drawing) for ending in ("dxf", "svg")]
+    written = write_described(solution, folder, title, curve="best-curve", report="best-report", drawing="best")
     pivot = solution.linkage.pivot
     if not isinstance(pivot, SecondCrank):
         written.append(io.save_parameters(folder / "five-bar-parameters.toml", make.five_bar(solution)))

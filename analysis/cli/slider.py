@@ -16,7 +16,7 @@ from rich.table import Table
 from linkwork.errors import Interrupted
 
 from .common import INTERRUPTED, console, errors, handled, prepare_solver
-from .design import settings_of, wrote
+from .design import settings_of, write_described, wrote
 
 
 @click.command("slider-motion")
@@ -181,12 +181,7 @@ def _show(title: str, solutions: Sequence[Any]) -> None:
 def _write_solution(solution: Any, folder: Path, title: str, plots: bool) -> list[Path]:
     from .. import io
 
-    written = [solution.to_csv(folder / "curve.csv")]
-    report = folder / "report.txt"
-    report.write_text(f"{title}\n\n{solution.report()}", encoding="utf-8")
-    written.append(report)
-    drawing = solution.drawing(title=title)
-    written += [io.save_drawing(folder / f"linkage.{ending}", drawing) for ending in ("dxf", "svg")]
+    written = write_described(solution, folder, title, curve="curve", report="report", drawing="linkage")
     if plots:
         written.append(io.save_figure(solution.plot(title=title), folder / "linkage.png"))
     return written

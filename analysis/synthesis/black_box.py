@@ -16,6 +16,7 @@ is every other inequality, and counts in proportion.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 from math import cos, pi, sqrt
@@ -155,12 +156,23 @@ def _evolved(normal: Normal, limits: Limits, seed: int, number: int) -> Answer:
 
     if not len(box.low):
         return _only(box)
+    return box.answer(evolve(box, np.random.default_rng([seed, number])))
+
+
+def evolve(
+    box: BlackBox, random: np.random.Generator, callback: Callable[[OptimizeResult], None] | None = None
+) -> OptimizeResult:
+    """SciPy's differential evolution over whole generations; ``callback`` sees each of them, as SciPy's does."""
 
     def violations(x: FloatArray) -> FloatArray:
         # of one vector first, of a generation then
         return box.violations(np.atleast_2d(x.T)).T.reshape(-1, *x.shape[1:])
 
-    result = differential_evolution(
+    def told(intermediate_result: OptimizeResult) -> None:
+        if callback is not None:
+            callback(intermediate_result)
+
+    return differential_evolution(
         # SciPy asks for none where no member of a generation keeps the constraints
         lambda x: box.quality(x.T) if x.size else np.empty(0),
         Bounds(box.low, box.high),
@@ -172,9 +184,9 @@ def _evolved(normal: Normal, limits: Limits, seed: int, number: int) -> Answer:
         vectorized=True,
         polish=False,
         constraints=(NonlinearConstraint(violations, -np.inf, 0.0),),
-        rng=np.random.default_rng([seed, number]),
+        callback=told,
+        rng=random,
     )
-    return box.answer(result)
 
 
 def _descended(normal: Normal, limits: Limits, seed: int, number: int) -> Answer:

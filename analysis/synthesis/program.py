@@ -539,8 +539,6 @@ class Program:
         gain: float = 1.0,
         iterations: int = ITERATIONS,
         pieces: Sequence[int] | None = None,
-        low: FloatArray | None = None,
-        high: FloatArray | None = None,
     ) -> Answer:
         """Solve from a start.
 
@@ -555,15 +553,9 @@ class Program:
             At most.
         pieces : sequence of int, optional
             Which triangle of each region; the nearest by default.
-        low, high : ndarray, shape (11,), optional
-            Replace the bounds of the linkage's unknowns.
         """
         limits = self.limits
-        lower, upper = self.low.copy(), self.high.copy()
-        if low is not None:
-            lower[: len(UNKNOWNS)] = low
-        if high is not None:
-            upper[: len(UNKNOWNS)] = high
+        lower, upper = self.low, self.high
         size = _size(self.pivot)
         pivot = np.zeros(size) if len(start.pivot) == 0 else start.pivot
         if len(pivot) != size:
