@@ -18,7 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from linkwork.errors import InputError
-from linkwork.five_bar.parameters import Constants, FiveBarParameters, field_name
+from linkwork.five_bar.parameters import Constants, FiveBarParameters
+from linkwork.parameters import field_name
 from linkwork.five_bar.published import RAD_S_PER_RPM
 from linkwork.five_bar.variables import INPUTS, PARAMETERS
 

@@ -16,7 +16,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from linkwork.errors import InputError, LinkworkError
-from linkwork.five_bar.parameters import FiveBarParameters, field_name
+from linkwork.five_bar.parameters import FiveBarParameters
+from linkwork.parameters import field_name
 from linkwork.five_bar.published import RAD_S_PER_RPM
 
 from . import io

@@ -29,7 +29,7 @@ from numpy.typing import NDArray
 from platformdirs import user_cache_dir
 
 import linkwork
-from linkwork import tableau
+from linkwork import friction, tableau
 from linkwork.five_bar import dynamics, kinematics
 from linkwork.five_bar.dynamics import Inputs
 from linkwork.five_bar.kinematics import LIMIT_SINE
@@ -111,6 +111,7 @@ _ADDRESSES = int64[::1]
 _SOURCE = types.NamedTuple((VECTOR, CUBE, MATRIX, VECTOR, _ADDRESSES), Source)
 
 for _function in (
+    friction.resistance,
     kinematics.joined,
     kinematics.position,
     kinematics.coefficients,

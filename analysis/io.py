@@ -23,7 +23,8 @@ import tomli_w
 from numpy.typing import ArrayLike, NDArray
 
 from linkwork.errors import InputError, MissingParameterError, ParameterError, UnknownNameError
-from linkwork.five_bar.parameters import FiveBarParameters, InitialState, field_name
+from linkwork.five_bar.parameters import FiveBarParameters, InitialState
+from linkwork.parameters import field_name
 from linkwork.five_bar.published import SETS
 from linkwork.five_bar.variables import PARAMETERS
 

@@ -31,7 +31,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.integrate import solve_ivp
 
 from linkwork.errors import AssemblyError, InputError, IntegrationError
-from linkwork.five_bar.dynamics import FRICTION_SPEED
+from linkwork.friction import FRICTION_SPEED
 from linkwork.five_bar.parameters import FiveBarParameters, InitialState
 
 Vector = NDArray[np.float64]

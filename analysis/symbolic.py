@@ -1,23 +1,22 @@
 """The plant's own functions traced with CasADi: exact derivatives of the one set of equations.
 
-The code objects of `linkwork.five_bar.kinematics` and `linkwork.five_bar.dynamics` are called as they stand, their globals
-bound to CasADi's ``sin``, ``cos``, ``sqrt``, ``atan2`` and ``tanh``; the modules themselves are not touched. What is traced
-can be differentiated to any order, evaluated as a ``casadi.Function``, or written out again as straight-line Python
+The code objects of `linkwork.five_bar.kinematics` and `linkwork.five_bar.dynamics` are called as they stand
+(`analysis.tracing`). What is traced can be differentiated to any order, evaluated as a ``casadi.Function``, or written out again as straight-line Python
 (`source`) for Numba to compile. CasADi is an extra: ``pip install 'linkwork[symbolic]'``.
 """
 
 from __future__ import annotations
 
 from functools import cache
-from types import FunctionType, ModuleType, SimpleNamespace
+from types import SimpleNamespace
 from typing import Any
 
+from linkwork import friction
 from linkwork.errors import LinkworkError
 from linkwork.five_bar import dynamics, kinematics
 from linkwork.five_bar.parameters import Constants
 
-#: What the plant's functions take from `math`.
-ELEMENTARY = ("sin", "cos", "sqrt", "atan2", "tanh")
+from .tracing import ELEMENTARY, rebound
 
 
 class MissingLibraryError(LinkworkError):
@@ -41,23 +40,11 @@ def library() -> Any:
     return casadi
 
 
-def _rebound(module: ModuleType, others: dict[str, Any]) -> dict[str, Any]:
-    """The module's namespace with its own functions bound to that namespace instead of the module's."""
-    space = dict(vars(module)) | {name: f for name, f in others.items() if name in vars(module)}
-    for name, f in vars(module).items():
-        if isinstance(f, FunctionType) and f.__module__ == module.__name__:
-            space[name] = FunctionType(f.__code__, space, name, f.__defaults__)
-    return space
-
-
 @cache
 def plant() -> SimpleNamespace:
     """The functions of `kinematics` and `dynamics` by name, for CasADi symbols in the place of floats."""
     casadi = library()
-    elementary = {name: getattr(casadi, name) for name in ELEMENTARY}
-    space = _rebound(kinematics, elementary)
-    own = {name: f for name, f in space.items() if isinstance(f, FunctionType)}
-    return SimpleNamespace(**space | _rebound(dynamics, elementary | own))
+    return rebound((friction, kinematics, dynamics), {name: getattr(casadi, name) for name in ELEMENTARY})
 
 
 def constants(name: str = "p") -> tuple[Any, Constants]:

@@ -8,7 +8,8 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
-from linkwork.five_bar.parameters import FiveBarParameters, field_name
+from linkwork.five_bar.parameters import FiveBarParameters
+from linkwork.parameters import field_name
 from linkwork.five_bar.variables import INPUTS, OUTPUTS, PARAMETERS
 from linkwork.variables import Variable
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from linkwork.five_bar.parameters import FiveBarParameters, InitialState, field_name
+from linkwork.five_bar.parameters import FiveBarParameters, InitialState
+from linkwork.parameters import field_name
 from linkwork.five_bar.plant import Plant
 from linkwork.five_bar.variables import INPUTS, PARAMETERS, POSITION_PARAMETERS, VARIABLES
 from slave import LinkworkSlave

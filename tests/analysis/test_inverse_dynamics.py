@@ -21,6 +21,7 @@ from linkwork.errors import AssemblyError, InputError
 from linkwork.five_bar import dynamics, kinematics
 from linkwork.five_bar.parameters import InitialState
 from linkwork.five_bar.published import SETS, TABLE_3_1
+from linkwork.friction import FRICTION_SPEED
 
 RIG, SPEED, _ = SETS["rig-2-spring-c"]
 MOTION = FourierSeries(np.array([0.002, 0.004, 0.001]), np.array([0.0, 0.003, -0.002]))
@@ -148,7 +149,7 @@ def test_without_dissipation_a_turn_can_be_run_backwards() -> None:
     there, back = (inverse_dynamics(rough, MOTION, w, load=load) for w in (40.0, -40.0))
     v = there.states[:, 3]
     odd = 0.5 * (there.force - np.roll(back.force[::-1], 1))
-    assert odd == pytest.approx(20.0 * v + 3.0 * np.tanh(v / dynamics.FRICTION_SPEED), abs=1e-10)
+    assert odd == pytest.approx(20.0 * v + 3.0 * np.tanh(v / FRICTION_SPEED), abs=1e-10)
 
 
 def test_the_free_motion_takes_no_force() -> None:

@@ -67,7 +67,7 @@ def test_check_is_independent_of_what_it_checks() -> None:
         ("linkwork.errors", "AssemblyError"),
         ("linkwork.errors", "InputError"),
         ("linkwork.errors", "IntegrationError"),
-        ("linkwork.five_bar.dynamics", "FRICTION_SPEED"),
+        ("linkwork.friction", "FRICTION_SPEED"),
         ("linkwork.five_bar.parameters", "FiveBarParameters"),
         ("linkwork.five_bar.parameters", "InitialState"),
     }

@@ -19,6 +19,7 @@ from linkwork.five_bar import dynamics as D
 from linkwork.five_bar import kinematics as K
 from linkwork.five_bar.parameters import Constants, FiveBarParameters
 from linkwork.five_bar.published import SETS, TABLE_3_1
+from linkwork.friction import FRICTION_SPEED
 from tests import published
 from tests.published import CM, DYN, DYN_CM, DYN_PER_CM, DYN_S_PER_CM
 from tests.strategies import LEAST_SINE, Case, cases, seeded, sine
@@ -170,7 +171,7 @@ def cross(a: complex, b: complex) -> float:
 def slider_resistance(x: D.State, par: FiveBarParameters) -> float:
     """Spring, damper and friction: their force on the slider along the guide."""
     spring = par.slider_stiffness * (x[1] - par.slider_spring_free_position)
-    return -spring - par.slider_damping * x[3] - par.slider_coulomb_friction * tanh(x[3] / D.FRICTION_SPEED)
+    return -spring - par.slider_damping * x[3] - par.slider_coulomb_friction * tanh(x[3] / FRICTION_SPEED)
 
 
 @several
@@ -248,7 +249,7 @@ def test_power_balance(seed: int, drive: str) -> None:
     vx, vy = K.coupler_point_velocity(e.g, x[2], e.motion.w3, p)
     assert dx[5] == pytest.approx(e.motion.torque * x[2] + i.force * x[3] + i.load_x * vx + i.load_y * vy, rel=1e-12)
     assert dx[4] == pytest.approx(
-        x[3] * (par.slider_damping * x[3] + par.slider_coulomb_friction * tanh(x[3] / D.FRICTION_SPEED)), rel=1e-12
+        x[3] * (par.slider_damping * x[3] + par.slider_coulomb_friction * tanh(x[3] / FRICTION_SPEED)), rel=1e-12
     )
     assert dx[4] >= 0.0
 

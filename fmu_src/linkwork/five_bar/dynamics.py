@@ -14,9 +14,9 @@ The functions are straight lines of arithmetic on floats, like those of `kinemat
 
 from __future__ import annotations
 
-from math import tanh
 from typing import NamedTuple
 
+from ..friction import resistance
 from .kinematics import (
     Coefficients,
     Position,
@@ -31,9 +31,6 @@ from .kinematics import (
     transmission_angle,
 )
 from .parameters import Constants
-
-#: Slider speed (m/s) at which the regularised Coulomb friction F tanh(u'/v0) has reached 76 % of its level.
-FRICTION_SPEED = 1e-3
 
 State = tuple[float, float, float, float, float, float]
 
@@ -153,7 +150,7 @@ def velocity_terms(
 
 def friction(v: float, p: Constants) -> float:
     """Force of damper and guide friction against the slider's motion (N); odd in v."""
-    return p.mu * v + p.fc * tanh(v / FRICTION_SPEED)
+    return resistance(v, p.mu, p.fc)
 
 
 def applied_forces(

@@ -1,16 +1,13 @@
-"""Parameters of the five-bar slider: validated, in SI, named as in the FMI contract.
-
-A field ``coupler_point_distance`` is the FMI parameter ``coupler.point_distance``: the first underscore is the dot.
-"""
+"""Parameters of the five-bar slider: validated, in SI, named as in the FMI contract."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
-from math import cos, hypot, isfinite, sin
-from numbers import Real
+from dataclasses import dataclass
+from math import cos, hypot, sin
 from typing import NamedTuple
 
 from ..errors import ParameterError
+from ..parameters import check_constants, check_initial, check_parameters
 
 
 class Constants(NamedTuple):
@@ -51,9 +48,6 @@ class Constants(NamedTuple):
     gx: float
     gy: float
 
-
-POSITIVE = "be a finite number greater than zero"
-NOT_NEGATIVE = "be a finite number, zero or greater"
 
 _POSITIVE = ("ground_length", "crank_length", "coupler_length", "rocker_length", "crank_inertia")
 _FREE_SIGN = (
@@ -116,31 +110,12 @@ class FiveBarParameters:
     assembly_branch: int = 1
 
     def __post_init__(self) -> None:
-        for field in fields(self):
-            name = fmi_name(field.name)
-            value = getattr(self, field.name)
-            if isinstance(value, bool) or not isinstance(value, Real):
-                raise ParameterError(name, value, "be a number in SI units")
-            try:
-                number: float = float(value)
-                if field.name == "assembly_branch" and number.is_integer():
-                    number = int(number)
-            except (OverflowError, ValueError):
-                raise ParameterError(name, value, "be a finite number") from None
-            # plain Python numbers, whatever kind was given: the equations and JSON know no other
-            object.__setattr__(self, field.name, number)
-            value = number
-            if field.name == "assembly_branch":
-                if value not in (1, -1):
-                    raise ParameterError(name, value, "be +1 or -1, the sign of sin(rocker.angle - coupler.angle)")
-            elif field.name in _POSITIVE:
-                if not (isfinite(value) and value > 0.0):
-                    raise ParameterError(name, value, POSITIVE)
-            elif field.name in _FREE_SIGN:
-                if not isfinite(value):
-                    raise ParameterError(name, value, "be a finite number")
-            elif not (isfinite(value) and value >= 0.0):
-                raise ParameterError(name, value, NOT_NEGATIVE)
+        check_parameters(
+            self,
+            positive=_POSITIVE,
+            free_sign=_FREE_SIGN,
+            signs={"assembly_branch": "the sign of sin(rocker.angle - coupler.angle)"},
+        )
         steiner = self.crank_mass * self.crank_cog_distance * self.crank_cog_distance
         if self.crank_inertia < steiner * (1.0 - 1e-12):
             raise ParameterError(
@@ -150,11 +125,7 @@ class FiveBarParameters:
             )
         if self.rocker_mass + self.slider_mass <= 0.0:
             raise ParameterError("slider.mass", self.slider_mass, "be greater than zero where rocker.mass is zero")
-        if not all(isfinite(constant) for constant in self.constants()):
-            largest = max((field.name for field in fields(self)), key=lambda name: abs(getattr(self, name)))
-            raise ParameterError(
-                fmi_name(largest), getattr(self, largest), "be small enough for finite moments of inertia"
-            )
+        check_constants(self)
 
     def constants(self) -> Constants:
         """The constants of the equations."""
@@ -217,21 +188,7 @@ class InitialState:
     slider_velocity: float = 0.0
 
     def __post_init__(self) -> None:
-        for field in fields(self):
-            value = getattr(self, field.name)
-            if isinstance(value, bool) or not isinstance(value, Real) or not isfinite(value):
-                raise ParameterError(f"initial.{field.name}", value, "be a finite number")
-            object.__setattr__(self, field.name, float(value))
-
-
-def fmi_name(field_name: str) -> str:
-    """Name in the FMI contract of a field of `FiveBarParameters`: the first underscore becomes the dot."""
-    return field_name.replace("_", ".", 1)
-
-
-def field_name(name: str) -> str:
-    """Field of `FiveBarParameters` that carries the FMI parameter ``name``."""
-    return name.replace(".", "_", 1)
+        check_initial(self)
 
 
 def reach(parameters: FiveBarParameters, crank_angle: float, slider_position: float) -> float:

@@ -1,0 +1,102 @@
+"""What the parameters of every mechanism share: their checks, and their names in the FMI contract.
+
+A field ``coupler_point_distance`` is the FMI parameter ``coupler.point_distance``: the first underscore is the dot.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+from dataclasses import fields
+from math import isfinite
+from numbers import Real
+from typing import Any
+
+from .errors import ParameterError
+
+POSITIVE = "be a finite number greater than zero"
+NOT_NEGATIVE = "be a finite number, zero or greater"
+
+
+def fmi_name(field_name: str) -> str:
+    """Name in the FMI contract of a field of a mechanism's parameters: the first underscore becomes the dot."""
+    return field_name.replace("_", ".", 1)
+
+
+def field_name(name: str) -> str:
+    """Field of a mechanism's parameters that carries the FMI parameter ``name``."""
+    return name.replace(".", "_", 1)
+
+
+def check_parameters(
+    parameters: Any, *, positive: Collection[str], free_sign: Collection[str], signs: Mapping[str, str]
+) -> None:
+    """Check the fields of a frozen dataclass of parameters, and make plain numbers of them.
+
+    Parameters
+    ----------
+    parameters : dataclass instance
+    positive, free_sign : collections of str
+        Fields that must be greater than zero, and those that may have either sign; the others may be zero or greater.
+    signs : mapping
+        Fields that are +1 or -1, and what the sign means, as the end of the sentence "it must be +1 or -1, ...".
+
+    Raises
+    ------
+    ParameterError
+        For the first field that is not as it must be.
+    """
+    for field in fields(parameters):
+        name = fmi_name(field.name)
+        value = getattr(parameters, field.name)
+        if isinstance(value, bool) or not isinstance(value, Real):
+            raise ParameterError(name, value, "be a number in SI units")
+        try:
+            number: float = float(value)
+            if field.name in signs and number.is_integer():
+                number = int(number)
+        except (OverflowError, ValueError):
+            raise ParameterError(name, value, "be a finite number") from None
+        # plain Python numbers, whatever kind was given: the equations and JSON know no other
+        object.__setattr__(parameters, field.name, number)
+        value = number
+        if field.name in signs:
+            if value not in (1, -1):
+                raise ParameterError(name, value, f"be +1 or -1, {signs[field.name]}")
+        elif field.name in positive:
+            if not (isfinite(value) and value > 0.0):
+                raise ParameterError(name, value, POSITIVE)
+        elif field.name in free_sign:
+            if not isfinite(value):
+                raise ParameterError(name, value, "be a finite number")
+        elif not (isfinite(value) and value >= 0.0):
+            raise ParameterError(name, value, NOT_NEGATIVE)
+
+
+def check_constants(parameters: Any) -> None:
+    """Make sure that the derived constants are finite.
+
+    Raises
+    ------
+    ParameterError
+        Naming the largest of the parameters.
+    """
+    if not all(isfinite(constant) for constant in parameters.constants()):
+        largest = max((field.name for field in fields(parameters)), key=lambda name: abs(getattr(parameters, name)))
+        raise ParameterError(
+            fmi_name(largest), getattr(parameters, largest), "be small enough for finite moments of inertia"
+        )
+
+
+def check_initial(initial: Any) -> None:
+    """Check that the fields of a state at the start are finite, and make floats of them.
+
+    Raises
+    ------
+    ParameterError
+        For the first that is not a finite number.
+    """
+    for field in fields(initial):
+        value = getattr(initial, field.name)
+        if isinstance(value, bool) or not isinstance(value, Real) or not isfinite(value):
+            raise ParameterError(f"initial.{field.name}", value, "be a finite number")
+        object.__setattr__(initial, field.name, float(value))

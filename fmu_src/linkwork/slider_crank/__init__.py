@@ -1,0 +1,1 @@
+"""The generalised, spatial slider-crank of Rahman's thesis: parameters, kinematics, dynamics and the stateful plant."""

@@ -1,0 +1,418 @@
+"""Dynamics of the generalised slider-crank in its two freedoms, by vector mechanics.
+
+With q = (theta1, S1), w = theta1' and v = S1' the equations of motion are
+
+    m11 w' + m12 v' + b1 = T + Q1        (crank)
+    m12 w' + m22 v' + b2 = F + Q2        (axial shift)
+
+where b are the velocity terms and Q gathers gravity, the slider's load, springs, dampers and friction. Where the crank
+speed or the shift is prescribed its acceleration is given, and its equation yields the torque T or the axial force F
+that this takes. The state of a run is the six-tuple (theta1, S1, w, v, dissipated work, supplied work).
+
+A rigid rod without spin is, in its motion and in the forces at its ends, the same as the three masses m22, m23, m33 of
+`parameters.Constants` that act on the accelerations of its ends: each of its points moves as a fixed mean of them, and the
+transverse moment of inertia adds to m33 what its centre of mass does not account for.
+
+The functions are straight lines of arithmetic on floats, like those of `kinematics`.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from ..friction import resistance
+from .kinematics import (
+    Coefficients,
+    Position,
+    assembly_margin,
+    centripetal,
+    closure_residual,
+    coefficients,
+    crank_pin,
+    crank_pin_acceleration,
+    crank_pin_velocity,
+    from_guide_frame,
+    groove,
+    guide,
+    position,
+    rod,
+    rod_angular_velocity,
+    slider_pin,
+    transmission_angle,
+)
+from .parameters import Constants
+from .vectors import Vector, add, cross, dot, scale, subtract
+
+State = tuple[float, float, float, float, float, float]
+
+
+class Inputs(NamedTuple):
+    """What acts on the plant at one instant.
+
+    ``speed_drive`` is 1.0 where the crank acceleration is prescribed and 0.0 where the torque is; ``shift_drive`` is 1.0
+    where the axial acceleration is prescribed and 0.0 where the axial force is; ``groove`` is 1.0 where a groove in the
+    shaft makes the shift of eq 28, and then ``shift_drive`` is 0.0. Torque in N.m, accelerations in rad/s2 and m/s2, forces
+    in N; the load acts on the slider in the direction in which its position increases.
+    """
+
+    speed_drive: float
+    shift_drive: float
+    groove: float
+    torque: float
+    acceleration: float
+    force: float
+    shift_acceleration: float
+    load: float
+
+
+class Inertia(NamedTuple):
+    """Inertia matrix of the two freedoms: kg.m2, kg.m, kg."""
+
+    m11: float
+    m12: float
+    m22: float
+
+
+class Motion(NamedTuple):
+    """Accelerations, drive torque and axial force, and powers, that follow from the state and the inputs.
+
+    ``torque`` is that of the drive on the shaft, ``force`` that of what drives or holds the shift.
+    """
+
+    crank_acceleration: float
+    shift_acceleration: float
+    slider_velocity: float
+    slider_acceleration: float
+    torque: float
+    force: float
+    groove_force: float
+    power_dissipated: float
+    power_supplied: float
+
+
+class Reactions(NamedTuple):
+    """Forces and moments in the joints (N, N.m), by their components in the ground frame.
+
+    ``bearing`` is the force of the bearing on the crank, without axial component, ``axial`` what drives, holds and springs
+    the crank along its axis; ``bearing_moment`` is about the origin O of the ground frame, the torques of drive and groove
+    included; ``crank_pin`` is the force of the crank on the rod, ``slider_pin`` that of the slider on the rod; ``guide`` is
+    the force of the guide on the slider, friction, spring and load apart, and ``guide_moment`` its moment about the
+    slider pin.
+    """
+
+    bearing: Vector
+    axial: float
+    bearing_moment: Vector
+    crank_pin: Vector
+    slider_pin: Vector
+    guide: Vector
+    guide_moment: Vector
+
+
+class Outputs(NamedTuple):
+    """The real outputs of the FMI interface, in its order; SI units, vectors in the ground frame."""
+
+    crank_angle: float
+    crank_speed: float
+    crank_acceleration: float
+    shift_position: float
+    shift_velocity: float
+    shift_acceleration: float
+    slider_position: float
+    slider_velocity: float
+    slider_acceleration: float
+    crank_pin_x: float
+    crank_pin_y: float
+    crank_pin_z: float
+    slider_pin_x: float
+    slider_pin_y: float
+    slider_pin_z: float
+    rod_wx: float
+    rod_wy: float
+    rod_wz: float
+    drive_applied_torque: float
+    axial_applied_force: float
+    bearing_fx: float
+    bearing_fy: float
+    bearing_fz: float
+    bearing_mx: float
+    bearing_my: float
+    bearing_mz: float
+    crank_pin_fx: float
+    crank_pin_fy: float
+    crank_pin_fz: float
+    slider_pin_fx: float
+    slider_pin_fy: float
+    slider_pin_fz: float
+    guide_fx: float
+    guide_fy: float
+    guide_fz: float
+    guide_mx: float
+    guide_my: float
+    guide_mz: float
+    energy_kinetic: float
+    energy_potential: float
+    energy_dissipated: float
+    energy_supplied: float
+    energy_residual: float
+    closure_residual: float
+    transmission_angle: float
+    assembly_margin: float
+
+
+def grooved(x: State, in_groove: float, p: Constants) -> State:
+    """The state with shift and axial velocity as a groove makes them, where there is one."""
+    th, s1, w, v, dissipated, supplied = x
+    law = groove(th, p)
+    free = 1.0 - in_groove
+    return (th, free * s1 + in_groove * law.x, w, free * v + in_groove * law.y * w, dissipated, supplied)
+
+
+def inertia(q: Position, k: Coefficients, p: Constants) -> Inertia:
+    """Inertia matrix; the rod by its masses at the ends, of which m23 couples the pins' velocities."""
+    # direction of the guide times the velocities of the crank pin for w = 1 and for v = 1
+    along = -p.a1 * q.c * p.sa
+    m4 = p.m33 + p.m3
+    return Inertia(
+        p.iz + p.m22 * p.a1 * p.a1 + k.kth * (2.0 * p.m23 * along + m4 * k.kth),
+        p.m23 * (along * k.ks - p.ca * k.kth) + m4 * k.kth * k.ks,
+        p.m1 + p.m22 + k.ks * (m4 * k.ks - 2.0 * p.m23 * p.ca),
+    )
+
+
+def velocity_terms(q: Position, k: Coefficients, w: float, slide: float, p: Constants) -> tuple[float, float]:
+    """Velocity terms b1 (N.m) and b2 (N) of the equations of motion; ``slide`` is that of `centripetal`."""
+    along = -p.a1 * q.c * p.sa
+    pull = p.m23 * p.a1 * q.s * p.sa * w * w + (p.m33 + p.m3) * slide
+    return (p.m23 * slide * along + pull * k.kth, -p.m23 * slide * p.ca + pull * k.ks)
+
+
+def slider_resistance(s4: float, v4: float, load: float, p: Constants) -> float:
+    """Force on the slider along its guide (N): load, spring, damper and friction."""
+    return load - p.k * (s4 - p.s0) - resistance(v4, p.mu, p.fc)
+
+
+def shift_resistance(s1: float, v: float, p: Constants) -> float:
+    """Force on the crank along its axis of the spring and the damper there (N)."""
+    return -p.kx * (s1 - p.x0) - p.mux * v
+
+
+def applied_forces(
+    q: Position, k: Coefficients, s1: float, v: float, v4: float, load: float, p: Constants
+) -> tuple[float, float]:
+    """Generalised forces Q1 (N.m) and Q2 (N) of gravity, load, springs, dampers and friction."""
+    front = p.m2 * p.share
+    rear = p.m2 - front
+    push = slider_resistance(q.s4, v4, load, p) - (front + p.m3) * (p.gy * p.sa + p.gz * p.ca)
+    t1 = p.gy * (p.mx1 * q.c - p.my1 * q.s) - p.gx * (p.mx1 * q.s + p.my1 * q.c)
+    return (
+        t1 + rear * p.a1 * (p.gy * q.c - p.gx * q.s) + k.kth * push,
+        (p.m1 + rear) * p.gz + shift_resistance(s1, v, p) + k.ks * push,
+    )
+
+
+def motion(q: Position, k: Coefficients, x: State, i: Inputs, p: Constants) -> Motion:
+    """Accelerations, torque, axial force and powers at state ``x`` under the inputs ``i``, from any drives."""
+    th, s1, w, v, _, _ = x
+    v4 = k.kth * w + k.ks * v
+    m = inertia(q, k, p)
+    slide = centripetal(q, k, w, v, p)
+    b1, b2 = velocity_terms(q, k, w, slide, p)
+    q1, q2 = applied_forces(q, k, s1, v, v4, i.load, p)
+    r1 = q1 - b1 + i.torque
+    r2 = q2 - b2 + i.force
+    law = groove(th, p)
+    pitch = i.groove * law.y
+    # two linear equations, whose rows the drives choose: the crank's (with the groove's force on it eliminated) or the
+    # prescribed crank acceleration; the shift's, the prescribed axial acceleration, or the groove's
+    turning = 1.0 - i.speed_drive
+    shifting = (1.0 - i.shift_drive) * (1.0 - i.groove)
+    a11 = turning * (m.m11 + pitch * m.m12) + i.speed_drive
+    a12 = turning * (m.m12 + pitch * m.m22)
+    a21 = shifting * m.m12 - pitch
+    a22 = shifting * m.m22 + (1.0 - shifting)
+    c1 = turning * (r1 + pitch * r2) + i.speed_drive * i.acceleration
+    c2 = shifting * r2 + i.shift_drive * i.shift_acceleration + i.groove * law.z * w * w
+    determinant = a11 * a22 - a12 * a21
+    e = (c1 * a22 - a12 * c2) / determinant
+    a = (a11 * c2 - a21 * c1) / determinant
+    # what holds the shift beyond the given force, and what the speed takes beyond the given torque
+    hold = (1.0 - shifting) * (m.m12 * e + m.m22 * a - r2)
+    groove_force = i.groove * hold
+    torque = i.torque + i.speed_drive * (m.m11 * e + m.m12 * a - r1 + pitch * hold)
+    force = i.force + hold
+    return Motion(
+        e,
+        a,
+        v4,
+        k.kth * e + k.ks * a + slide,
+        torque,
+        force,
+        groove_force,
+        resistance(v4, p.mu, p.fc) * v4 + p.mux * v * v,
+        # the groove's force works along the shaft what its torque takes from the turning
+        torque * w + (force - groove_force) * v + i.load * v4,
+    )
+
+
+def derivative(x: State, i: Inputs, p: Constants) -> State:
+    """Time derivative of the state under inputs held fixed."""
+    x = grooved(x, i.groove, p)
+    q = position(x[0], x[1], p)
+    k = coefficients(q, p)
+    m = motion(q, k, x, i, p)
+    return (x[2], x[3], m.crank_acceleration, m.shift_acceleration, m.power_dissipated, m.power_supplied)
+
+
+def reactions(q: Position, x: State, m: Motion, i: Inputs, p: Constants) -> Reactions:
+    """Forces and moments in all joints, by Newton and Euler from the slider inwards."""
+    w = x[2]
+    e = m.crank_acceleration
+    g = Vector(p.gx, p.gy, p.gz)
+    along = guide(p)
+    a2 = crank_pin_acceleration(q, w, e, m.shift_acceleration, p)
+    a3 = scale(m.slider_acceleration, along)
+    # what the rod's pins must supply for its motion, up to a pull along the rod
+    front = p.m2 * p.share
+    q2 = subtract(add(scale(p.m22, a2), scale(p.m23, a3)), scale(p.m2 - front, g))
+    q3 = subtract(add(scale(p.m23, a2), scale(p.m33, a3)), scale(front, g))
+    free = subtract(a3, g)
+    pushed = slider_resistance(q.s4, m.slider_velocity, i.load, p)
+    # the slider's motion along the guide gives that pull: m3 (a3 - g) = push - (q3 + pull r), r the rod's vector
+    r = rod(q, p)
+    pull = (pushed - p.m3 * dot(free, along) - dot(q3, along)) / q.h
+    f3 = add(q3, scale(pull, r))
+    f2 = subtract(q2, scale(pull, r))
+    guiding = subtract(add(scale(p.m3, free), f3), scale(pushed, along))
+    guide_moment = cross(from_guide_frame(Vector(p.mx4, p.my4, p.mz4), p), free)
+    # the crank about the origin of frame 2, which accelerates along the axis alone
+    rx = p.mx1 * q.c - p.my1 * q.s
+    ry = p.mx1 * q.s + p.my1 * q.c
+    px = p.pxz * q.c - p.pyz * q.s
+    py = p.pxz * q.s + p.pyz * q.c
+    heave = Vector(-p.gx, -p.gy, m.shift_acceleration - p.gz)
+    spin = add(Vector(w * w * py - e * px, -w * w * px - e * py, p.iz * e), cross(Vector(rx, ry, p.mz1), heave))
+    moment = add(spin, cross(Vector(p.a1 * q.c, p.a1 * q.s, 0.0), f2))
+    fx = f2.x - ry * e - rx * w * w - p.m1 * p.gx
+    fy = f2.y + rx * e - ry * w * w - p.m1 * p.gy
+    return Reactions(
+        Vector(fx, fy, 0.0),
+        f2.z + p.m1 * (m.shift_acceleration - p.gz),
+        add(moment, Vector(-x[1] * fy, x[1] * fx, 0.0)),
+        f2,
+        f3,
+        guiding,
+        guide_moment,
+    )
+
+
+def kinetic_energy(m: Inertia, w: float, v: float) -> float:
+    """Kinetic energy of all links (J)."""
+    return 0.5 * (m.m11 * w * w + 2.0 * m.m12 * w * v + m.m22 * v * v)
+
+
+def potential_energy(q: Position, s1: float, p: Constants) -> float:
+    """Energy of the springs and of gravity, the latter zero with every centre of mass at O (J)."""
+    front = p.m2 * p.share
+    rear = p.m2 - front
+    slider = from_guide_frame(Vector(p.mx4, p.my4, p.mz4), p)
+    moved = add(
+        add(scale(rear, crank_pin(q, s1, p)), scale(front + p.m3, slider_pin(q, p))),
+        add(Vector(p.mx1 * q.c - p.my1 * q.s, p.mx1 * q.s + p.my1 * q.c, p.mz1 + p.m1 * s1), slider),
+    )
+    stretch = q.s4 - p.s0
+    shift = s1 - p.x0
+    return 0.5 * (p.k * stretch * stretch + p.kx * shift * shift) - dot(Vector(p.gx, p.gy, p.gz), moved)
+
+
+def mechanical_energy(x: State, p: Constants) -> float:
+    """Kinetic plus potential energy (J)."""
+    q = position(x[0], x[1], p)
+    return kinetic_energy(inertia(q, coefficients(q, p), p), x[2], x[3]) + potential_energy(q, x[1], p)
+
+
+def jump(x: State, i: Inputs, speed: float, shift_velocity: float, p: Constants) -> State:
+    """State after the commanded speeds have jumped, of whichever freedoms are driven by them.
+
+    A jump is an impulse on the freedom that is driven. The other's generalised momentum has no impulse of its own and is
+    conserved; a groove takes the shift along. The work of the impulses is the change of kinetic energy.
+    """
+    x = grooved(x, i.groove, p)
+    th, s1, w, v, dissipated, supplied = x
+    q = position(th, s1, p)
+    m = inertia(q, coefficients(q, p), p)
+    w_new = w + i.speed_drive * (speed - w) + (1.0 - i.speed_drive) * i.shift_drive * m.m12 / m.m11 * (v - shift_velocity)
+    follows = v + i.speed_drive * m.m12 / m.m22 * (w - w_new)
+    v_new = (
+        (1.0 - i.groove) * (i.shift_drive * shift_velocity + (1.0 - i.shift_drive) * follows)
+        + i.groove * groove(th, p).y * w_new
+    )
+    work = kinetic_energy(m, w_new, v_new) - kinetic_energy(m, w, v)
+    return (th, s1, w_new, v_new, dissipated, supplied + work)
+
+
+def outputs(x: State, i: Inputs, start_energy: float, p: Constants) -> Outputs:
+    """All real outputs of the FMI interface at state ``x`` under the inputs ``i``.
+
+    ``start_energy`` is the mechanical energy at the start of the run, against which the balance is kept.
+    """
+    x = grooved(x, i.groove, p)
+    th, s1, w, v, dissipated, supplied = x
+    q = position(th, s1, p)
+    k = coefficients(q, p)
+    m = motion(q, k, x, i, p)
+    f = reactions(q, x, m, i, p)
+    p2 = crank_pin(q, s1, p)
+    p3 = slider_pin(q, p)
+    rate = subtract(scale(m.slider_velocity, guide(p)), crank_pin_velocity(q, w, v, p))
+    turn = rod_angular_velocity(rod(q, p), rate, p)
+    kinetic = kinetic_energy(inertia(q, k, p), w, v)
+    potential = potential_energy(q, s1, p)
+    return Outputs(
+        th,
+        w,
+        m.crank_acceleration,
+        s1,
+        v,
+        m.shift_acceleration,
+        q.s4,
+        m.slider_velocity,
+        m.slider_acceleration,
+        p2.x,
+        p2.y,
+        p2.z,
+        p3.x,
+        p3.y,
+        p3.z,
+        turn.x,
+        turn.y,
+        turn.z,
+        m.torque,
+        m.force,
+        f.bearing.x,
+        f.bearing.y,
+        f.axial,
+        f.bearing_moment.x,
+        f.bearing_moment.y,
+        f.bearing_moment.z,
+        f.crank_pin.x,
+        f.crank_pin.y,
+        f.crank_pin.z,
+        f.slider_pin.x,
+        f.slider_pin.y,
+        f.slider_pin.z,
+        f.guide.x,
+        f.guide.y,
+        f.guide.z,
+        f.guide_moment.x,
+        f.guide_moment.y,
+        f.guide_moment.z,
+        kinetic,
+        potential,
+        dissipated,
+        supplied,
+        kinetic + potential - start_energy + dissipated - supplied,
+        closure_residual(th, s1, q.s4, p),
+        transmission_angle(q, p),
+        assembly_margin(q, p),
+    )

@@ -1,0 +1,54 @@
+"""Data of Rahman's section 3.1 in SI, from the printed inches, pounds and seconds.
+
+A round crank and a round rod with their centres of mass at mid-length, and a cubic slider; the printed "specific gravity" of
+0.28 is a weight density in lb/in3. No gravity acts: the thesis uses g only to make masses of weights.
+"""
+
+from __future__ import annotations
+
+from math import pi, radians
+
+from .parameters import InitialState, SliderCrankParameters
+
+INCH = 0.0254
+POUND_FORCE = 4.4482216152605
+#: Unit of mass of the printed data, lb.s2/in.
+POUND_S2_PER_INCH = POUND_FORCE / INCH
+POUND_INCH = POUND_FORCE * INCH
+RAD_S_PER_RPM = pi / 30.0
+
+CRANK_SPEED = 50.0 * RAD_S_PER_RPM
+CRANK_TORQUE = 100.0 * POUND_INCH
+
+#: Lengths in inches, masses in lb.s2/in.
+_CRANK, _ROD = 12.0, 50.0
+_CRANK_RADIUS, _ROD_RADIUS = 1.5, 1.0
+_CRANK_MASS, _ROD_MASS, _SLIDER_MASS = 0.06146594, 0.11382582, 0.01956522
+
+
+def parameters(offset_in: float = 0.0, twist_deg: float = 270.0) -> SliderCrankParameters:
+    """The mechanism of section 3.1 with the offset a4 (inches) and the twist alpha4 (degrees) of one of its cases."""
+    unit = POUND_S2_PER_INCH * INCH * INCH
+    return SliderCrankParameters(
+        crank_length=_CRANK * INCH,
+        rod_length=_ROD * INCH,
+        guide_offset=offset_in * INCH,
+        guide_twist=radians(twist_deg),
+        crank_mass=_CRANK_MASS * POUND_S2_PER_INCH,
+        rod_mass=_ROD_MASS * POUND_S2_PER_INCH,
+        slider_mass=_SLIDER_MASS * POUND_S2_PER_INCH,
+        # the printed radii of gyration are about the link's end: K^2 = r^2/4 + a^2/3
+        crank_inertia=_CRANK_MASS * (_CRANK_RADIUS**2 / 4.0 + _CRANK**2 / 3.0) * unit,
+        crank_cog_x=0.5 * _CRANK * INCH,
+        rod_inertia=_ROD_MASS * (_ROD_RADIUS**2 / 4.0 + _ROD**2 / 12.0) * unit,
+        rod_cog_distance=0.5 * _ROD * INCH,
+    )
+
+
+def initial(shift_in: float = 0.0) -> InitialState:
+    """The start at 50 rpm with the shift S1 (inches) of one of the cases."""
+    return InitialState(crank_speed=CRANK_SPEED, shift_position=shift_in * INCH)
+
+
+#: The case that the FMU starts from: a4 = 10 in, S1 = 3.5 in, alpha4 = 270 deg.
+OFFSET_CASE = (parameters(10.0), initial(3.5))

@@ -1,0 +1,38 @@
+"""Vectors in space as tuples of floats, and the few operations the equations need."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+
+class Vector(NamedTuple):
+    """A vector by its components in a frame, by default that of the ground."""
+
+    x: float
+    y: float
+    z: float
+
+
+def add(a: Vector, b: Vector) -> Vector:
+    """a + b."""
+    return Vector(a.x + b.x, a.y + b.y, a.z + b.z)
+
+
+def subtract(a: Vector, b: Vector) -> Vector:
+    """a - b."""
+    return Vector(a.x - b.x, a.y - b.y, a.z - b.z)
+
+
+def scale(factor: float, a: Vector) -> Vector:
+    """factor a."""
+    return Vector(factor * a.x, factor * a.y, factor * a.z)
+
+
+def dot(a: Vector, b: Vector) -> float:
+    """a . b."""
+    return a.x * b.x + a.y * b.y + a.z * b.z
+
+
+def cross(a: Vector, b: Vector) -> Vector:
+    """a x b."""
+    return Vector(a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x)
