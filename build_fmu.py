@@ -33,6 +33,7 @@ from pythonfmu.builder import FmuBuilder
 import linkwork
 from linkwork.errors import LinkworkError
 from linkwork.five_bar import variables as five_bar_variables
+from linkwork.slider_crank import variables as slider_crank_variables
 from linkwork.variables import Variable
 
 HERE = Path(__file__).resolve().parent
@@ -56,6 +57,16 @@ class Model(NamedTuple):
     notes: tuple[str, ...]
 
 
+#: What holds for all of them.
+_EVERY_MODEL = (
+    "A step that cannot be taken (not positive, out of order, an input that is not finite, the limit of assembly) is "
+    "refused with fmi2Discard. The last good state stays readable and can be saved; solver.status and "
+    "solver.message say why. Steps are integrated by a Runge-Kutta method of order 8 whose local error is held to "
+    "solver.tolerance, or to the master's tolerance where that is tighter.",
+    "The importing process needs a Python 3 whose symbols it exports. A master that is not itself Python must preload "
+    "the Python library (on Linux: LD_PRELOAD=libpython3.x.so).",
+)
+
 MODELS = {
     "FiveBarSlider": Model(
         "five_bar_slave",
@@ -73,14 +84,33 @@ MODELS = {
             "drive.acceleration (t - t_n), and drive.applied_torque is the torque that takes. Where the commanded speed jumps, "
             "the slider's generalised momentum is conserved and the slider velocity jumps with it; a slave that is not given "
             "drive.speed again starts the next step from the same drive.speed.",
-            "A step that cannot be taken (not positive, out of order, an input that is not finite, the limit of assembly) is "
-            "refused with fmi2Discard. The last good state stays readable and can be saved; solver.status and "
-            "solver.message say why. Steps are integrated by a Runge-Kutta method of order 8 whose local error is held to "
-            "solver.tolerance, or to the master's tolerance where that is tighter.",
-            "The importing process needs a Python 3 whose symbols it exports. A master that is not itself Python must preload "
-            "the Python library (on Linux: LD_PRELOAD=libpython3.x.so).",
+            *_EVERY_MODEL,
         ),
-    )
+    ),
+    "SliderCrank": Model(
+        "slider_crank_slave",
+        "slider_crank",
+        "Generalised slider-crank",
+        slider_crank_variables.VARIABLES,
+        (
+            "A spatial slider-crank: the crank turns about its axis and shifts along it, a rod between two ball joints moves "
+            "a slider on a straight guide that is offset from the crank axis and twisted against it. Crank angle and axial "
+            "shift are the two freedoms; the rod's spin about its own line is idle and taken as none.",
+            "z runs along the crank axis, x along the common normal of axis and guide, away from the guide where "
+            "guide.offset is positive; the crank points along x at crank.angle 0 and turns about z. The guide passes through "
+            "(-guide.offset, 0, 0); the slider position increases along (0, -sin, -cos) of guide.twist. bearing: all that "
+            "the ground exerts on the crank, moments about the origin; crank_pin: force of the crank on the rod; slider_pin: "
+            "of the slider on the rod; guide: of the guide on the slider. Vectors are in the ground frame.",
+            "drive.mode 0: drive.torque acts on the crank. drive.mode 1: over a step the crank turns at drive.speed + "
+            "drive.acceleration (t - t_n), and drive.applied_torque is the torque that takes. axial.mode 0: axial.force acts "
+            "along the axis. axial.mode 1: over a step the crank shifts at axial.speed + axial.acceleration (t - t_n), from "
+            "initial.shift_position; axial.applied_force is the force that takes. axial.mode 2: a groove in the shaft makes "
+            "the shift groove.amplitude sin(groove.ratio crank.angle). Where a commanded speed jumps, the generalised momentum "
+            "of the other freedom is conserved, if nothing drives that one; a slave that is not given a speed again starts "
+            "the next step from the same one.",
+            *_EVERY_MODEL,
+        ),
+    ),
 }
 
 

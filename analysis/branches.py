@@ -19,9 +19,9 @@ from numpy.typing import NDArray
 
 from linkwork.errors import InputError
 from linkwork.five_bar.parameters import Constants, FiveBarParameters
-from linkwork.parameters import field_name
 from linkwork.five_bar.published import RAD_S_PER_RPM
 from linkwork.five_bar.variables import INPUTS, PARAMETERS
+from linkwork.parameters import field_name
 
 from . import io
 from .continuation import ContinuationError, Curve, Evaluate, Evaluation, Follower, Point, Settings

@@ -17,8 +17,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from linkwork.errors import InputError, LinkworkError
 from linkwork.five_bar.parameters import FiveBarParameters
-from linkwork.parameters import field_name
 from linkwork.five_bar.published import RAD_S_PER_RPM
+from linkwork.parameters import field_name
 
 from . import io
 from .boundaries import Box, Test, chart

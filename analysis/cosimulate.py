@@ -22,9 +22,9 @@ from numpy.typing import NDArray
 from linkwork.errors import InputError, LinkworkError
 from linkwork.five_bar.dynamics import Outputs
 from linkwork.five_bar.parameters import FiveBarParameters, InitialState
-from linkwork.parameters import fmi_name
 from linkwork.five_bar.plant import INPUT_NAMES, SPEED_DRIVE, TORQUE_DRIVE
 from linkwork.five_bar.variables import OUTPUT_NAMES
+from linkwork.parameters import fmi_name
 
 from .inputs import Inputs, align, encode
 from .simulate import RunInterrupted, held_channels, interruptible, sample_times, shown

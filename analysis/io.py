@@ -24,9 +24,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from linkwork.errors import InputError, MissingParameterError, ParameterError, UnknownNameError
 from linkwork.five_bar.parameters import FiveBarParameters, InitialState
-from linkwork.parameters import field_name
 from linkwork.five_bar.published import SETS
 from linkwork.five_bar.variables import PARAMETERS
+from linkwork.parameters import field_name
 
 from .case import Case
 from .drawings import Drawing, to_dxf, to_svg

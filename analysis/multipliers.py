@@ -31,8 +31,8 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.integrate import solve_ivp
 
 from linkwork.errors import AssemblyError, InputError, IntegrationError
-from linkwork.friction import FRICTION_SPEED
 from linkwork.five_bar.parameters import FiveBarParameters, InitialState
+from linkwork.friction import FRICTION_SPEED
 
 Vector = NDArray[np.float64]
 ComplexVector = NDArray[np.complex128]

@@ -22,8 +22,9 @@ from scipy.integrate import OdeSolver, solve_ivp
 from linkwork.errors import InputError, Interrupted, LinkworkError
 from linkwork.five_bar import dynamics, kinematics
 from linkwork.five_bar.parameters import FiveBarParameters, InitialState
-from linkwork.five_bar.plant import check_assembly, check_tolerance, error_scale
+from linkwork.five_bar.plant import check_assembly, error_scale
 from linkwork.five_bar.variables import OUTPUT_NAMES
+from linkwork.plant import check_tolerance
 
 from .inputs import Encoded, Inputs, StateFunction, align, encode
 from .trajectory import Occurrence, Trajectory

@@ -1,8 +1,8 @@
 """The plant's own functions traced with CasADi: exact derivatives of the one set of equations.
 
 The code objects of `linkwork.five_bar.kinematics` and `linkwork.five_bar.dynamics` are called as they stand
-(`analysis.tracing`). What is traced can be differentiated to any order, evaluated as a ``casadi.Function``, or written out again as straight-line Python
-(`source`) for Numba to compile. CasADi is an extra: ``pip install 'linkwork[symbolic]'``.
+(`analysis.tracing`). What is traced can be differentiated to any order, evaluated as a ``casadi.Function``, or written out
+again as straight-line Python (`source`) for Numba to compile. CasADi is an extra: ``pip install 'linkwork[symbolic]'``.
 """
 
 from __future__ import annotations

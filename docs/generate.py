@@ -9,8 +9,8 @@ import sys
 from pathlib import Path
 
 from linkwork.five_bar.parameters import FiveBarParameters
-from linkwork.parameters import field_name
 from linkwork.five_bar.variables import INPUTS, OUTPUTS, PARAMETERS
+from linkwork.parameters import field_name
 from linkwork.variables import Variable
 
 HERE = Path(__file__).resolve().parent

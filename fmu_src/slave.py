@@ -1,7 +1,7 @@
 """What every slave of Linkwork shares: the XML of its interface, its lifecycle, its saved state, its log.
 
-A concrete slave names its variables and makes its plant; the plant has ``inputs``, ``set_input``, ``outputs``, ``step``
-and ``save``. pythonfmu by itself writes neither units nor dependencies nor InitialUnknowns: `to_xml` completes them.
+A concrete slave names its variables and the plant it holds. pythonfmu by itself writes neither units nor dependencies nor
+InitialUnknowns: `to_xml` completes them.
 """
 
 from __future__ import annotations
@@ -11,10 +11,10 @@ import ctypes
 import json
 import sys
 import uuid
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from functools import wraps
 from pathlib import Path
-from typing import Any, ClassVar, Protocol
+from typing import Any, ClassVar
 from xml.etree.ElementTree import Element, SubElement
 
 from pythonfmu import Fmi2Causality, Fmi2Slave, Fmi2Variability, Integer, Real, String
@@ -30,6 +30,8 @@ from linkwork.errors import (
     StateError,
     StepError,
 )
+from linkwork.parameters import field_name
+from linkwork.plant import MechanismPlant
 from linkwork.variables import UNITS, Variable
 
 STATUS_GOOD = 0
@@ -90,17 +92,6 @@ def _guarded(call: Callable[..., Any]) -> Callable[..., Any]:
     return method
 
 
-class Plant(Protocol):
-    """What a slave asks of its plant."""
-
-    inputs: dict[str, float]
-
-    def set_input(self, name: str, value: float) -> None: ...
-    def outputs(self) -> Sequence[float]: ...
-    def step(self, time: float, step: float) -> None: ...
-    def save(self) -> dict[str, Any]: ...
-
-
 class LinkworkSlave(Fmi2Slave):
     """A co-simulation slave around a plant.
 
@@ -110,6 +101,8 @@ class LinkworkSlave(Fmi2Slave):
 
     variables: ClassVar[tuple[Variable, ...]]
     position_parameters: ClassVar[tuple[str, ...]]
+    plant_class: ClassVar[type[MechanismPlant]]
+    initial_class: ClassVar[type]
     #: (start, stop, step, tolerance) of the default experiment: s, s, s, relative.
     experiment: ClassVar[tuple[float, float, float, float]]
 
@@ -130,7 +123,7 @@ class LinkworkSlave(Fmi2Slave):
         self._status_at = self._names.index("solver.status")
         self._message_at = self._names.index("solver.message")
         self._values: list[Any] = [v.start for v in self.variables]
-        self._plant: Plant | None = None
+        self._plant: MechanismPlant | None = None
         self._running = False
         self._stale = True
         #: status and sentence of what went wrong first since the last good step, other than steps out of order
@@ -140,15 +133,29 @@ class LinkworkSlave(Fmi2Slave):
         for index, variable in enumerate(self.variables):
             self.register_variable(self._declaration(index, variable), nested=False)
 
-    # What a concrete slave adds
-
-    def build(self, values: dict[str, Any], time: float, tolerance: float | None) -> Plant:
-        """The plant for these parameters and inputs, at its start."""
-        raise NotImplementedError
-
-    def restore(self, saved: dict[str, Any]) -> Plant:
-        """The plant that its ``save`` described."""
-        raise NotImplementedError
+    def _build(self) -> MechanismPlant:
+        """The plant for the present parameters and inputs, at its start."""
+        values = dict(zip(self._names, self._values))
+        modes = [mode.name for mode in self.plant_class.MODES]
+        mechanism = {}
+        initial = {}
+        for variable in self.variables:
+            name = variable.name
+            if name.startswith("initial."):
+                initial[name.removeprefix("initial.")] = values[name]
+            elif variable.causality == "parameter" and name not in modes and name != "solver.tolerance":
+                mechanism[field_name(name)] = values[name]
+        own, master = values["solver.tolerance"], self._master_tolerance
+        return self.plant_class(
+            self.plant_class.PARAMETERS(**mechanism),
+            self.initial_class(**initial),
+            tolerance=own if master is None else min(own, max(master, 1e-13)),
+            time=self._start_time,
+            inputs={
+                variable.name: values[variable.name] for variable in self.variables if variable.causality == "input"
+            },
+            **{field_name(name): values[name] for name in modes},
+        )
 
     # Interface
 
@@ -232,7 +239,7 @@ class LinkworkSlave(Fmi2Slave):
     def _structure(self) -> Element:
         index = {name: str(i + 1) for i, name in enumerate(self._names)}
         inputs = [v.name for v in self.variables if v.causality == "input"]
-        on_inputs = {"state": [], "speed": [n for n in inputs if n == "drive.speed"], "all": inputs}
+        on_inputs = {"state": [], "speed": [n for n in inputs if n in self.plant_class.COMMANDS], "all": inputs}
         at_start: dict[str, list[str] | None] = {
             "none": [],
             "position": list(self.position_parameters),
@@ -337,8 +344,7 @@ class LinkworkSlave(Fmi2Slave):
             return None
         try:
             if self._plant is None:
-                values = dict(zip(self._names, self._values))
-                self._plant = self.build(values, self._start_time, self._master_tolerance)
+                self._plant = self._build()
             outputs = self._plant.outputs()
         except LinkworkError as error:
             return error
@@ -451,7 +457,7 @@ class LinkworkSlave(Fmi2Slave):
                     f"the saved state belongs to {state.get('model')!r} with another interface, not to this "
                     f"{type(self).__name__}"
                 )
-            plant = None if state["plant"] is None else self.restore(state["plant"])
+            plant = None if state["plant"] is None else self.plant_class.restore(state["plant"])
             values, cause = list(state["values"]), state["cause"]
             running, stale = state["running"], state["stale"]
             start_time, master_tolerance = state["start_time"], state["master_tolerance"]

@@ -13,9 +13,9 @@ from rich.table import Table
 
 from linkwork import __version__
 from linkwork.five_bar.kinematics import assembly_square
-from linkwork.parameters import field_name
 from linkwork.five_bar.published import RAD_S_PER_RPM, SETS
 from linkwork.five_bar.variables import PARAMETERS
+from linkwork.parameters import field_name
 
 from .common import (
     CHECK_FAILED,

@@ -60,7 +60,7 @@ class Variable(NamedTuple):
     display : str
         Unit people think in; empty for the unit itself.
     depends : str
-        Of an output: ``state`` (on no input), ``speed`` (on the commanded speed), or ``all`` inputs.
+        Of an output: ``state`` (on no input), ``speed`` (on the commanded speeds), or ``all`` inputs.
     level : str
         Of an output at the start: what it depends on, ``position``, ``velocity`` or ``all``.
     """

@@ -11,8 +11,8 @@ from hypothesis import given, settings
 
 from linkwork.errors import LinkworkError, ParameterError
 from linkwork.five_bar.parameters import FiveBarParameters, InitialState, reach
-from linkwork.parameters import field_name, fmi_name
 from linkwork.five_bar.published import SETS, TABLE_3_1
+from linkwork.parameters import field_name, fmi_name
 from tests import published
 from tests.published import CM, DYN_PER_CM, DYN_S_PER_CM, G_CM2, GRAM, RPM
 from tests.strategies import Case, cases

@@ -7,8 +7,8 @@ from __future__ import annotations
 
 from math import pi
 
-from ..variables import Variable, status_outputs
 from ..parameters import field_name
+from ..variables import Variable, status_outputs
 from .published import SETS
 
 _SET = SETS["table-3.1"]

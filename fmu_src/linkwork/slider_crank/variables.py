@@ -1,0 +1,288 @@
+"""The FMI interface of the generalised slider-crank: every variable, in its order.
+
+The start values are the case a4 = 10 in, S1 = 3.5 in, alpha4 = 270 deg of Rahman's section 3.1 at 50 rpm, in SI.
+"""
+
+from __future__ import annotations
+
+from math import pi
+
+from ..parameters import field_name
+from ..variables import Variable, status_outputs
+from .published import CRANK_SPEED, OFFSET_CASE
+
+_MECHANISM, _INITIAL = OFFSET_CASE
+
+
+def _parameter(
+    name: str, unit: str, description: str, symbol: str = "", *, minimum: float | None = None, display: str = ""
+) -> Variable:
+    start = getattr(_MECHANISM, field_name(name))
+    return Variable(name, "parameter", unit, description, symbol, start, "Real", minimum, None, display)
+
+
+PARAMETERS = (
+    _parameter("crank.length", "m", "Crank, from its axis to the crank pin; greater than zero", "a_1", minimum=0.0),
+    _parameter("rod.length", "m", "Rod, crank pin to slider pin; greater than zero", "a_2", minimum=0.0),
+    _parameter("guide.offset", "m", "Offset between crank axis and guide, along their common normal", "a_4"),
+    _parameter(
+        "guide.twist",
+        "rad",
+        "Twist between crank axis and guide; perpendicular at 90 and 270 deg",
+        "\\alpha_4",
+        display="deg",
+    ),
+    _parameter("crank.mass", "kg", "Mass of the crank; greater than zero", "m_1", minimum=0.0),
+    _parameter("rod.mass", "kg", "Mass of the rod", "m_2", minimum=0.0),
+    _parameter("slider.mass", "kg", "Mass of the slider", "m_3", minimum=0.0),
+    _parameter(
+        "crank.inertia", "kg.m2", "Moment of inertia of the crank about its axis; greater than zero", "", minimum=0.0
+    ),
+    _parameter("crank.cog_x", "m", "Centre of mass of the crank, from the axis towards the crank pin"),
+    _parameter("crank.cog_y", "m", "Centre of mass of the crank, across axis and crank"),
+    _parameter("crank.cog_z", "m", "Centre of mass of the crank, along the axis from the plane of the crank pin"),
+    _parameter("crank.product_xz", "kg.m2", "Product of inertia of the crank: integral of x z over its mass"),
+    _parameter("crank.product_yz", "kg.m2", "Product of inertia of the crank: integral of y z over its mass"),
+    _parameter(
+        "rod.inertia", "kg.m2", "Moment of inertia of the rod, transverse, about its centre of mass", "", minimum=0.0
+    ),
+    _parameter("rod.cog_distance", "m", "Centre of mass of the rod, distance from the crank pin"),
+    _parameter(
+        "slider.cog_x", "m", "Centre of mass of the slider from its pin, along the common normal (i of frame 4)"
+    ),
+    _parameter("slider.cog_y", "m", "Centre of mass of the slider from its pin, across guide and common normal (j)"),
+    _parameter(
+        "slider.cog_z", "m", "Centre of mass of the slider from its pin, along the guide against its position (k)"
+    ),
+    _parameter("slider.stiffness", "N/m", "Stiffness of the spring on the slider", minimum=0.0),
+    _parameter("slider.spring_free_position", "m", "Slider position at which its spring is free"),
+    _parameter("slider.damping", "N.s/m", "Viscous damping of the slider", minimum=0.0),
+    _parameter(
+        "slider.coulomb_friction", "N", "Level of Coulomb friction in the guide, smooth about rest", minimum=0.0
+    ),
+    _parameter("shift.stiffness", "N/m", "Stiffness of the spring on the axial shift", minimum=0.0),
+    _parameter("shift.spring_free_position", "m", "Axial shift at which its spring is free"),
+    _parameter("shift.damping", "N.s/m", "Viscous damping of the axial shift", minimum=0.0),
+    _parameter("groove.amplitude", "m", "Amplitude of the shift that a groove makes; axial.mode 2", "S_{S1}"),
+    _parameter("groove.ratio", "1", "Periods of that shift in a turn of the crank; axial.mode 2", "\\alpha"),
+    _parameter("gravity.x", "m/s2", "Acceleration of gravity along x of the ground frame"),
+    _parameter("gravity.y", "m/s2", "Acceleration of gravity along y of the ground frame"),
+    _parameter("gravity.z", "m/s2", "Acceleration of gravity along z of the ground frame, the crank axis"),
+    Variable(
+        "assembly.branch",
+        "parameter",
+        "",
+        "Assembly: on which side of the crank pin's foot on the guide the slider is, +1 or -1",
+        "",
+        _MECHANISM.assembly_branch,
+        "Integer",
+        -1,
+        1,
+    ),
+    Variable(
+        "drive.mode",
+        "parameter",
+        "",
+        "0: drive.torque acts on the crank; 1: the crank turns at drive.speed",
+        "",
+        1,
+        "Integer",
+        0,
+        1,
+    ),
+    Variable(
+        "axial.mode",
+        "parameter",
+        "",
+        "0: axial.force acts on the crank; 1: the crank shifts at axial.speed; 2: a groove shifts it",
+        "",
+        1,
+        "Integer",
+        0,
+        2,
+    ),
+    Variable("initial.crank_angle", "parameter", "rad", "Crank angle at the start", "\\theta_1", 0.0, display="deg"),
+    Variable(
+        "initial.crank_speed",
+        "parameter",
+        "rad/s",
+        "Crank speed at the start; where drive.mode is 1 drive.speed takes its place",
+        "\\dot\\theta_1",
+        _INITIAL.crank_speed,
+        display="rpm",
+    ),
+    Variable(
+        "initial.shift_position",
+        "parameter",
+        "m",
+        "Axial shift at the start; where axial.mode is 2 the groove's takes its place",
+        "S_1",
+        _INITIAL.shift_position,
+    ),
+    Variable(
+        "initial.shift_velocity",
+        "parameter",
+        "m/s",
+        "Axial velocity at the start; where axial.mode is 1 axial.speed takes its place, where it is 2 the groove's",
+        "\\dot S_1",
+    ),
+    Variable(
+        "solver.tolerance",
+        "parameter",
+        "1",
+        "Relative bound of the local error of a step; the master's tolerance is taken where it is tighter",
+        "",
+        1e-9,
+        minimum=1e-13,
+        maximum=1e-2,
+    ),
+)
+
+INPUTS = (
+    Variable("drive.torque", "input", "N.m", "Torque on the crank, about z; used where drive.mode is 0", "T"),
+    Variable(
+        "drive.speed",
+        "input",
+        "rad/s",
+        "Crank speed at the start of a step; used where drive.mode is 1",
+        "\\dot\\theta_1",
+        CRANK_SPEED,
+        display="rpm",
+    ),
+    Variable(
+        "drive.acceleration",
+        "input",
+        "rad/s2",
+        "Rate of change of the crank speed over a step; used where drive.mode is 1",
+        "\\ddot\\theta_1",
+    ),
+    Variable("axial.force", "input", "N", "Force on the crank along its axis; used where axial.mode is 0"),
+    Variable(
+        "axial.speed",
+        "input",
+        "m/s",
+        "Axial velocity of the crank at the start of a step; used where axial.mode is 1",
+        "\\dot S_1",
+    ),
+    Variable(
+        "axial.acceleration",
+        "input",
+        "m/s2",
+        "Rate of change of the axial velocity over a step; used where axial.mode is 1",
+        "\\ddot S_1",
+    ),
+    Variable("slider.load", "input", "N", "Force on the slider along the guide, in the direction of its position"),
+)
+
+
+def _output(
+    name: str,
+    unit: str,
+    description: str,
+    symbol: str = "",
+    depends: str = "all",
+    level: str = "all",
+    *,
+    minimum: float | None = None,
+    maximum: float | None = None,
+    display: str = "",
+) -> Variable:
+    return Variable(name, "output", unit, description, symbol, 0.0, "Real", minimum, maximum, display, depends, level)
+
+
+def _vector(
+    prefix: str, unit: str, description: str, depends: str = "all", level: str = "all", symbols: str = "   "
+) -> tuple[Variable, ...]:
+    """Three outputs, the components of a vector along x, y and z of the ground frame."""
+    return tuple(
+        _output(f"{prefix}{axis}", unit, f"{description}, along {axis}", symbol.strip(), depends, level)
+        for axis, symbol in zip("xyz", symbols)
+    )
+
+
+#: The real outputs stand in the order of `dynamics.Outputs`.
+OUTPUTS = (
+    _output(
+        "crank.angle", "rad", "Crank angle, counted on over full turns", "\\theta_1", "state", "position", display="deg"
+    ),
+    _output("crank.speed", "rad/s", "Crank speed", "\\dot\\theta_1", "speed", "velocity", display="rpm"),
+    _output("crank.acceleration", "rad/s2", "Crank acceleration", "\\ddot\\theta_1"),
+    _output("shift.position", "m", "Axial shift of the crank", "S_1", "state", "position"),
+    _output("shift.velocity", "m/s", "Axial velocity of the crank", "\\dot S_1", "speed", "velocity"),
+    _output("shift.acceleration", "m/s2", "Axial acceleration of the crank", "\\ddot S_1"),
+    _output(
+        "slider.position", "m", "Slider position along the guide, from the common normal", "S_4", "state", "position"
+    ),
+    _output("slider.velocity", "m/s", "Slider velocity", "\\dot S_4", "speed", "velocity"),
+    _output("slider.acceleration", "m/s2", "Slider acceleration", "\\ddot S_4"),
+    *_vector("crank_pin.", "m", "Crank pin", "state", "position"),
+    *_vector("slider_pin.", "m", "Slider pin", "state", "position"),
+    *_vector("rod.w", "rad/s", "Angular velocity of the rod, none about itself", "speed", "velocity"),
+    _output(
+        "drive.applied_torque", "N.m", "Torque of the drive; where drive.mode is 1 the torque that holds the speed", "T"
+    ),
+    _output(
+        "axial.applied_force",
+        "N",
+        "Force of what drives the shift; where axial.mode is 1 or 2 the force that holds it",
+    ),
+    *_vector("bearing.f", "N", "Force on the crank of bearing, axial drive, shift spring and damper together"),
+    *_vector("bearing.m", "N.m", "Moment about O on the crank of bearing, drive and groove together"),
+    *_vector("crank_pin.f", "N", "Force of the crank on the rod"),
+    *_vector("slider_pin.f", "N", "Force of the slider on the rod"),
+    *_vector("guide.f", "N", "Force of the guide on the slider, across the guide"),
+    *_vector("guide.m", "N.m", "Moment of the guide on the slider, about the slider pin"),
+    _output("energy.kinetic", "J", "Kinetic energy of all links", "", "speed", "velocity", minimum=0.0),
+    _output(
+        "energy.potential",
+        "J",
+        "Potential energy of springs and gravity, the latter zero with every centre of mass at O",
+        "",
+        "state",
+    ),
+    _output("energy.dissipated", "J", "Work lost in dampers and guide since the start", "", "state"),
+    _output("energy.supplied", "J", "Work of crank torque, axial force and slider load since the start", "", "speed"),
+    _output(
+        "energy.residual", "J", "Energy balance: gained plus dissipated less supplied; zero but for error", "", "speed"
+    ),
+    _output("closure.residual", "m", "Length by which the loop fails to close", "", "state", "position", minimum=0.0),
+    _output(
+        "transmission.angle",
+        "rad",
+        "Angle between the rod and the plane normal to the guide; 0 at the limit of assembly",
+        "",
+        "state",
+        "position",
+        minimum=0.0,
+        maximum=0.5 * pi,
+        display="deg",
+    ),
+    _output(
+        "assembly.margin",
+        "m",
+        "Rod length less the crank pin's distance from the guide; positive inside the range of assembly",
+        "",
+        "state",
+        "position",
+    ),
+    *status_outputs(),
+)
+
+VARIABLES = PARAMETERS + INPUTS + OUTPUTS
+
+#: Names of the real outputs, in the order of `dynamics.Outputs`.
+OUTPUT_NAMES = tuple(v.name for v in OUTPUTS if v.kind == "Real")
+
+#: Parameters that set the configuration at the start, for the dependencies of the initial outputs.
+POSITION_PARAMETERS = (
+    "crank.length",
+    "rod.length",
+    "guide.offset",
+    "guide.twist",
+    "groove.amplitude",
+    "groove.ratio",
+    "assembly.branch",
+    "axial.mode",
+    "initial.crank_angle",
+    "initial.shift_position",
+)
