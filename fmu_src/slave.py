@@ -111,6 +111,12 @@ class LinkworkSlave(Fmi2Slave):
     copyright = "Copyright (c) 2026 The Linkwork developers"
     version = __version__
 
+    def __init_subclass__(cls) -> None:
+        super().__init_subclass__()
+        # To find the class the wrapper runs its module's source again, at every instantiation, and then gives up a reference
+        # to the module's namespace that it only borrowed: without one more each time the namespace dies with all its names
+        ctypes.pythonapi.Py_IncRef(ctypes.py_object(vars(sys.modules[cls.__module__])))
+
     def __init__(self, **kwargs: Any) -> None:
         super().__init__(**kwargs)
         self._wrapped = "logger" in kwargs

@@ -1,12 +1,40 @@
-"""Where the slider-crank can be assembled, and how far its slider goes."""
+"""Where the slider-crank can be assembled and how far its slider goes: margin, ranges, dead centres, stroke.
+
+With f and g the crank pin's coordinates across the guide, as in `kinematics`, and S1 a function of theta1 (prime: by it)
+
+    D = a2^2 - f^2 - g^2       its square root is h: the rod reaches the guide where D >= 0
+    A = D'/2 = -(f f' + g g')  zero where the margin of assembly is least or greatest
+    S4' = A/h - B,  B = a1 cos(theta1) sin(alpha4) + S1' cos(alpha4)
+
+and the slider's dead centres are the zeros of h S4' = A - B h, which stays finite at the limit of assembly. The zeros are
+found by halving the turn: how much each of the two functions can change over a piece is bounded by the lengths and by the
+bounds of the law's derivatives, and a piece is dropped only where that excludes a zero. What is left is bisected to the
+last digit. So no zero is missed, but for pairs nearer to each other than `FINEST`, at which the slider only hesitates.
+"""
 
 from __future__ import annotations
 
-from math import asin, degrees, sqrt
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from itertools import pairwise
+from math import asin, cos, degrees, inf, isfinite, pi, sin, sqrt
+from typing import NamedTuple
 
-from ..errors import AssemblyError
+from ..errors import AssemblyError, InputError, ParameterError
 from . import kinematics
-from .parameters import SliderCrankParameters
+from .parameters import Constants, SliderCrankParameters
+
+#: Width (rad) of a piece of the turn that is not divided further. Two zeros of one piece go unseen.
+FINEST = 1e-5
+#: Share of its scale below which a function that vanishes wherever it is looked at is taken as zero throughout.
+_ROUNDING = 1e-13
+#: Pieces into which the turn is divided first.
+_PIECES = 32
+#: Angle (rad) at which the search of a turn begins: none at which a mechanism is likely to have something to find.
+_SEAM = -0.7390851332151607
+#: Largest number of turns after which a groove's law is looked for to repeat.
+_MOST_TURNS = 64
 
 
 def check_assembly(parameters: SliderCrankParameters, crank_angle: float, shift: float) -> None:
@@ -31,7 +59,7 @@ def check_assembly(parameters: SliderCrankParameters, crank_angle: float, shift:
     if square >= least * least:
         return
     where = f"crank angle {crank_angle:.9g} rad ({degrees(crank_angle):.4f} deg) and shift {shift:.9g} m"
-    if square > 0.0:
+    if square >= 0.0:
         raise AssemblyError(
             f"limit of assembly at {where}: the rod is within {degrees(asin(sqrt(square) / p.a2)):.3f} deg of "
             f"perpendicular to the guide"
@@ -41,3 +69,374 @@ def check_assembly(parameters: SliderCrankParameters, crank_angle: float, shift:
         f"the rod does not reach the guide at {where}: the crank pin is {distance:.9g} m from the guide, the rod is "
         f"{p.a2:.9g} m long, {distance - p.a2:.9g} m too short"
     )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ShiftLaw:
+    """The axial shift as a function of the crank angle.
+
+    Parameters
+    ----------
+    at : callable
+        Of the crank angle (rad): the shift (m) and its first derivative by the angle (m/rad); further items are ignored,
+        so that it may be of the form of `kinematics.groove`.
+    rate, curvature : float
+        Bounds of the absolute first and second derivatives by the angle (m/rad, m/rad2). They need not be sharp.
+    turns : int
+        Whole turns of the crank after which the law repeats.
+
+    Raises
+    ------
+    InputError
+        If a bound is negative or not finite, if ``turns`` is not a whole number above zero, or if the law does not repeat.
+    """
+
+    at: Callable[[float], Sequence[float]]
+    rate: float
+    curvature: float
+    turns: int = 1
+
+    def __post_init__(self) -> None:
+        for name in ("rate", "curvature"):
+            bound = getattr(self, name)
+            if not (isfinite(bound) and bound >= 0.0):
+                raise InputError(f"the shift law's {name} is {bound!r}: it must be a finite number, zero or greater")
+        if isinstance(self.turns, bool) or not isinstance(self.turns, int) or self.turns < 1:
+            raise InputError(f"the shift law's turns are {self.turns!r}: they must be a whole number above zero")
+        first, last = self.at(0.0)[0], self.at(self.span)[0]
+        if not abs(first - last) <= 1e-9 * (self.rate + abs(first)):
+            raise InputError(
+                f"the shift law is {first:.9g} m at 0 and {last:.9g} m after {self.turns} turns: it must repeat after them"
+            )
+
+    @property
+    def span(self) -> float:
+        """Crank angle after which the law repeats (rad)."""
+        return 2.0 * pi * self.turns
+
+
+def constant_shift(shift: float) -> ShiftLaw:
+    """The law of a crank held at the shift S1 (m).
+
+    Raises
+    ------
+    InputError
+        If ``shift`` is not finite.
+    """
+    if not isfinite(shift):
+        raise InputError(f"the shift is {shift!r} m: it must be a finite number")
+    return ShiftLaw(at=lambda _: (shift, 0.0), rate=0.0, curvature=0.0)
+
+
+def groove_shift(parameters: SliderCrankParameters) -> ShiftLaw:
+    """The law of the parameters' groove, S1 = SS1 sin(alpha theta1) of eq 28.
+
+    Raises
+    ------
+    ParameterError
+        If alpha is not a ratio of whole numbers of which the lower is at most 64: the law repeats after that many turns.
+    """
+    p = parameters.constants()
+    ratio = Fraction(p.ratio).limit_denominator(_MOST_TURNS)
+    if abs(float(ratio) - p.ratio) > 1e-12 * max(1.0, abs(p.ratio)):
+        raise ParameterError("groove.ratio", p.ratio, f"repeat after at most {_MOST_TURNS} turns of the crank")
+    return ShiftLaw(
+        at=lambda th: kinematics.groove(th, p),
+        rate=abs(p.amplitude * p.ratio),
+        curvature=abs(p.amplitude * p.ratio * p.ratio),
+        turns=ratio.denominator,
+    )
+
+
+class Margin(NamedTuple):
+    """Rod length less the crank pin's distance from the guide, at its least over the turn (m), and the angle there (rad)."""
+
+    length: float
+    crank_angle: float
+
+
+class Place(NamedTuple):
+    """Crank angle (rad), shift (m) and slider position (m) of a configuration."""
+
+    crank_angle: float
+    shift: float
+    slider_position: float
+
+
+class DeadCentre(NamedTuple):
+    """A configuration in which the slider turns back: angle (rad), shift and slider position (m).
+
+    ``outer`` is true where the slider is out furthest to the side of its assembly: at a maximum of S4 on branch +1, at a
+    minimum on branch -1.
+    """
+
+    crank_angle: float
+    shift: float
+    slider_position: float
+    outer: bool
+
+
+class Range(NamedTuple):
+    """A range of crank angles in which the rod reaches the guide, and the slider positions in it.
+
+    ``low`` is in [0, span) and ``high`` at most the span above it (rad); the other angles are in [0, span). The span is one
+    turn, or as many as the law of the shift takes to repeat. ``greatest`` and ``least`` are the extreme slider positions;
+    where the crank cannot turn fully they may be at an end of the range.
+    """
+
+    low: float
+    high: float
+    dead_centres: tuple[DeadCentre, ...]
+    greatest: Place
+    least: Place
+
+    @property
+    def stroke(self) -> float:
+        """Greatest less least slider position (m)."""
+        return self.greatest.slider_position - self.least.slider_position
+
+
+class _Zero(NamedTuple):
+    angle: float
+    falling: bool
+
+
+class _Change(NamedTuple):
+    """D, A and B at the middle of a piece, and the most by which each differs from that inside it."""
+
+    square: float
+    pull: float
+    along: float
+    square_spread: float
+    pull_spread: float
+    along_spread: float
+
+
+def _change(middle: float, half: float, law: ShiftLaw, p: Constants, pitch: float) -> _Change:
+    """D, A and B and their spreads over ``middle`` +- ``half``; ``pitch`` is 0 where A and B leave S1' out, else 1."""
+    s1, ds1 = law.at(middle)[:2]
+    if not (isfinite(s1) and abs(ds1) <= law.rate * (1.0 + 1e-9)):
+        raise InputError(
+            f"the shift law is {s1:g} m with the derivative {ds1:g} m/rad at crank angle {middle:.9g} rad: it must be finite "
+            f"and change by no more than its rate, {law.rate:g} m/rad"
+        )
+    c, s = cos(middle), sin(middle)
+    f = p.a1 * c + p.a4
+    g = p.a1 * s * p.ca - s1 * p.sa
+    df = -p.a1 * s
+    dg = p.a1 * c * p.ca - pitch * ds1 * p.sa
+    # bounds: of f' and f''; of the true g'; of the g' and g'' that A has
+    f1 = p.a1
+    g1 = p.a1 * abs(p.ca) + law.rate * abs(p.sa)
+    pulled = p.a1 * abs(p.ca) + pitch * law.rate * abs(p.sa)
+    pulled1 = p.a1 * abs(p.ca) + pitch * law.curvature * abs(p.sa)
+    most_f = abs(f) + half * f1
+    most_g = abs(g) + half * g1
+    return _Change(
+        p.a2 * p.a2 - f * f - g * g,
+        -(f * df + g * dg),
+        p.a1 * c * p.sa + pitch * ds1 * p.ca,
+        2.0 * half * (most_f * f1 + most_g * g1),
+        half * (f1 * f1 + most_f * f1 + g1 * pulled + most_g * pulled1),
+        half * (p.a1 * abs(p.sa) + pitch * law.curvature * abs(p.ca)),
+    )
+
+
+#: A function of the middle and the half width of a piece: its value in the middle, and its spread over the piece.
+_Bounded = Callable[[float, float], tuple[float, float]]
+
+
+def _margin_slope(law: ShiftLaw, p: Constants) -> _Bounded:
+    """A, whose zeros are the extremes of the distance between crank pin and guide."""
+
+    def slope(middle: float, half: float) -> tuple[float, float]:
+        change = _change(middle, half, law, p, 1.0)
+        return change.pull, change.pull_spread
+
+    return slope
+
+
+def _slider_slope(law: ShiftLaw, p: Constants, pitch: float) -> _Bounded:
+    """A - B h, of the sign of S4' on branch +1 and opposite to it on branch -1."""
+
+    def slope(middle: float, half: float) -> tuple[float, float]:
+        change = _change(middle, half, law, p, pitch)
+        h = sqrt(max(0.0, change.square))
+        # |sqrt x - sqrt y| is at most the root of |x - y|, and |x - y| over either root
+        spread = sqrt(change.square_spread)
+        if change.square_spread < spread * h:
+            spread = change.square_spread / h
+        along = abs(change.along)
+        return (
+            change.pull - p.branch * change.along * h,
+            change.pull_spread + along * spread + change.along_spread * (h + spread),
+        )
+
+    return slope
+
+
+def _bisect(positive: Callable[[float], bool], low: float, high: float) -> float:
+    """Where ``positive`` changes between ``low`` and ``high``, at which it differs; to the last digit."""
+    at_low = positive(low)
+    while True:
+        middle = 0.5 * (low + high)
+        if middle in (low, high):
+            return middle
+        if positive(middle) == at_low:
+            low = middle
+        else:
+            high = middle
+
+
+def _zeros(function: _Bounded, low: float, high: float, scale: float) -> list[_Zero]:
+    """All zeros of ``function`` between ``low`` and ``high`` in which it changes its sign, in order; none if it is zero
+    throughout to the rounding of ``scale``."""
+
+    def positive(x: float) -> bool:
+        return function(x, 0.0)[0] > 0.0
+
+    found: list[_Zero] = []
+
+    def search(a: float, b: float) -> None:
+        middle = 0.5 * (a + b)
+        value, spread = function(middle, 0.5 * (b - a))
+        if abs(value) > spread:
+            return
+        if b - a > FINEST:
+            search(a, middle)
+            search(middle, b)
+        elif positive(a) != positive(b):
+            found.append(_Zero(_bisect(positive, a, b), positive(a)))
+
+    ends = [low + (high - low) * n / _PIECES for n in range(_PIECES)] + [high]
+    if any(abs(function(x, 0.0)[0]) > _ROUNDING * scale for x in ends):
+        for a, b in pairwise(ends):
+            search(a, b)
+    return found
+
+
+def _wrapped(angle: float, law: ShiftLaw) -> float:
+    """The angle in [0, span): the remainder of a tiny negative number rounds to the span itself."""
+    wrapped = angle % law.span
+    return wrapped if wrapped < law.span else 0.0
+
+
+def _square(angle: float, law: ShiftLaw, p: Constants) -> float:
+    return kinematics.assembly_square(angle, law.at(angle)[0], p)
+
+
+def _extremes(law: ShiftLaw, p: Constants) -> list[float]:
+    """The angles at which the margin of assembly is least or greatest, in order; any one if it is the same everywhere."""
+    zeros = _zeros(_margin_slope(law, p), _SEAM, _SEAM + law.span, (p.a1 + law.rate) * p.a2)
+    return [zero.angle for zero in zeros] or [0.0]
+
+
+def assembly_margin(parameters: SliderCrankParameters, law: ShiftLaw) -> Margin:
+    """The least margin of assembly over the turn, negative where the crank cannot turn fully, and where it is.
+
+    The crank turns fully where the margin is zero or greater. The plant's steps also keep clear of the limit of assembly
+    by `kinematics.LIMIT_COSINE`, 5e-7 of the rod's length.
+    """
+    p = parameters.constants()
+    worst = min(_extremes(law, p), key=lambda angle: _square(angle, law, p))
+    return Margin(p.a2 - sqrt(p.a2 * p.a2 - _square(worst, law, p)), _wrapped(worst, law))
+
+
+def turns_fully(parameters: SliderCrankParameters, law: ShiftLaw) -> bool:
+    """Whether the rod reaches the guide at every crank angle."""
+    return assembly_margin(parameters, law).length >= 0.0
+
+
+def greatest_shift(parameters: SliderCrankParameters) -> float | None:
+    """The greatest constant shift |S1| (m) at which the crank turns fully; None if there is none.
+
+    It turns fully at a shift of either sign up to this one. With the guide parallel to the crank axis any shift will do, and
+    the value is infinite.
+    """
+    p = parameters.constants()
+    if p.a2 < p.a1 + abs(p.a4):
+        return None
+    # |S1 sin(alpha4) - a1 s cos(alpha4)| <= sqrt(a2^2 - (a1 c + a4)^2) at every angle: the least value of
+    # a1 s |cos(alpha4)| + sqrt(...), which is the slider position of a mechanism with this guide, bounds |S1 sin(alpha4)|
+    bounding = p._replace(ca=0.0, sa=-abs(p.ca), branch=1.0)
+    least = _range(_SEAM, _SEAM + 2.0 * pi, constant_shift(0.0), bounding).least.slider_position
+    if least < 0.0:
+        return None
+    return least / abs(p.sa) if p.sa != 0.0 else inf
+
+
+def _place(angle: float, law: ShiftLaw, p: Constants) -> Place:
+    """Configuration at an angle at which the rod reaches the guide, or misses it by rounding."""
+    shift = law.at(angle)[0]
+    h = p.branch * sqrt(max(0.0, kinematics.assembly_square(angle, shift, p)))
+    return Place(_wrapped(angle, law), shift, h - p.a1 * sin(angle) * p.sa - shift * p.ca)
+
+
+def _dead_centres(low: float, high: float, law: ShiftLaw, p: Constants, pitch: float) -> tuple[DeadCentre, ...]:
+    zeros = _zeros(_slider_slope(law, p, pitch), low, high, (p.a1 + law.rate) * p.a2)
+    return tuple(sorted(DeadCentre(*_place(zero.angle, law, p), outer=zero.falling) for zero in zeros))
+
+
+def _range(low: float, high: float, law: ShiftLaw, p: Constants) -> Range:
+    dead = _dead_centres(low, high, law, p, 1.0)
+    places = [_place(low, law, p), _place(high, law, p), *(Place(*centre[:3]) for centre in dead)]
+    places.sort(key=lambda place: place.slider_position)
+    # a full turn is searched from the seam, and told from zero
+    start, end = (0.0, law.span) if low == _SEAM else (_wrapped(low, law), _wrapped(low, law) + (high - low))
+    return Range(start, end, dead, places[-1], places[0])
+
+
+def _assembled(law: ShiftLaw, p: Constants) -> list[tuple[float, float]]:
+    """Ends of the ranges in which the rod reaches the guide."""
+    extremes = _extremes(law, p)
+    reached = [_square(angle, law, p) >= 0.0 for angle in extremes]
+    if all(reached):
+        return [(_SEAM, _SEAM + law.span)]
+    # between two extremes D is monotonic; the turn closes with the first extreme, a span on
+    closed = [*extremes, extremes[0] + law.span]
+    starts: list[float] = []
+    ends: list[float] = []
+    for (a, b), at_a, at_b in zip(pairwise(closed), reached, [*reached[1:], reached[0]]):
+        if at_a != at_b:
+            crossing = _bisect(lambda x: _square(x, law, p) >= 0.0, a, b)
+            (ends if at_a else starts).append(crossing)
+    # a range that begins before the seam is ended by the first crossing after it, a span on
+    if ends and ends[0] < starts[0]:
+        ends.append(ends.pop(0) + law.span)
+    return sorted(zip(starts, ends), key=lambda pair: _wrapped(pair[0], law))
+
+
+def ranges(parameters: SliderCrankParameters, law: ShiftLaw) -> tuple[Range, ...]:
+    """The ranges of crank angles in which the rod reaches the guide, each with its dead centres and its stroke.
+
+    One from 0 to the span where the crank turns fully; none where it cannot be assembled at all; at most two at a constant
+    shift. Their ends, at which rod and guide are perpendicular, are those of geometry: the plant's steps stop as soon as the
+    rod is within `kinematics.LIMIT_COSINE` of that.
+    """
+    p = parameters.constants()
+    return tuple(_range(low, high, law, p) for low, high in _assembled(law, p))
+
+
+def dead_centres(parameters: SliderCrankParameters, law: ShiftLaw) -> tuple[DeadCentre, ...]:
+    """All configurations in which the slider turns back, in the order of their angles: dS4/dtheta1 = 0 along the law.
+
+    None where the slider stands still at every angle. At a constant shift there are two where the crank turns fully, of at
+    most four on both branches together.
+
+    With the crank torque given and the slider force sought, these are the singular configurations of a crank whose shift a
+    groove in its shaft makes, or at a constant shift. Where the shift is driven from outside it is `singularities`.
+    """
+    return tuple(sorted(centre for part in ranges(parameters, law) for centre in part.dead_centres))
+
+
+def singularities(parameters: SliderCrankParameters, law: ShiftLaw) -> tuple[DeadCentre, ...]:
+    """The configurations along the law in which the crank's torque and the slider's force do not balance: kth = 0.
+
+    kth is the derivative of the slider position by the crank angle at the shift held. Where the shift is driven by a force
+    of its own, it is this that multiplies the slider force in the crank's equation of motion (the thesis's force problem),
+    whatever the shift's rate. The slider itself stops here only where the shift is constant; ``outer`` says that its
+    position would turn back from a maximum (on branch +1) if the shift were held.
+    """
+    p = parameters.constants()
+    found = (_dead_centres(low, high, law, p, 0.0) for low, high in _assembled(law, p))
+    return tuple(sorted(centre for part in found for centre in part))

@@ -1,0 +1,155 @@
+"""Random valid slider-cranks in random states, with every parameter general.
+
+As in `strategies`, one description over two functions that supply numbers: `seeded` makes cases reproducible from a seed,
+`cases` makes them a hypothesis strategy that shrinks. The rod's length is chosen last, so that it reaches the guide at the
+state drawn and, with room, where the groove would have the crank.
+"""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Callable
+from math import cos, hypot, pi, sin, sqrt
+from typing import NamedTuple
+
+from hypothesis import strategies as st
+
+from linkwork.slider_crank import dynamics
+from linkwork.slider_crank.parameters import Constants, InitialState, SliderCrankParameters
+
+#: What drives crank and shift: speed_drive, shift_drive, groove of `dynamics.Inputs`.
+DRIVES = {
+    "torque-force": (0.0, 0.0, 0.0),
+    "torque-shift": (0.0, 1.0, 0.0),
+    "torque-groove": (0.0, 0.0, 1.0),
+    "speed-force": (1.0, 0.0, 0.0),
+    "speed-shift": (1.0, 1.0, 0.0),
+    "speed-groove": (1.0, 0.0, 1.0),
+}
+
+Uniform = Callable[[float, float], float]
+
+
+class Case(NamedTuple):
+    """A mechanism, a state of it, and the inputs: torque, accelerations, axial force, load."""
+
+    parameters: SliderCrankParameters
+    state: dynamics.State
+    torque: float
+    acceleration: float
+    force: float
+    shift_acceleration: float
+    load: float
+
+    @property
+    def p(self) -> Constants:
+        return self.parameters.constants()
+
+    @property
+    def initial(self) -> InitialState:
+        """The state as the start of a run."""
+        th, s1, w, v, _, _ = self.state
+        return InitialState(crank_angle=th, crank_speed=w, shift_position=s1, shift_velocity=v)
+
+    def inputs(self, drive: str) -> dynamics.Inputs:
+        """The inputs under one of `DRIVES`. An input that a drive does not read is there all the same, but for the torque
+        and the axial force, which a drive by speed or shift adds to."""
+        speed_drive, shift_drive, groove = DRIVES[drive]
+        return dynamics.Inputs(
+            speed_drive,
+            shift_drive,
+            groove,
+            self.torque,
+            self.acceleration,
+            self.force,
+            self.shift_acceleration,
+            self.load,
+        )
+
+    def under(self, drive: str) -> dynamics.State:
+        """The state as one of `DRIVES` has it: a groove determines shift and axial velocity."""
+        return dynamics.grooved(self.state, DRIVES[drive][2], self.p)
+
+
+def draw(uniform: Uniform, choose: Callable[[], bool]) -> Case:
+    """A case, from a source of numbers ``uniform(low, high)`` and of choices (signs, either assembly)."""
+
+    def either(low: float, high: float) -> float:
+        return uniform(low, high) * (1.0 if choose() else -1.0)
+
+    a1 = uniform(0.1, 0.5)
+    a4 = a1 * either(0.1, 1.5)
+    twist = uniform(-pi, 2.0 * pi)
+    th = uniform(-2.0 * pi, 2.0 * pi)
+    s1 = a1 * either(0.05, 1.0)
+    amplitude, ratio = a1 * either(0.1, 0.6), either(0.3, 2.5)
+
+    def distance(shift: float) -> float:
+        return hypot(a1 * cos(th) + a4, a1 * sin(th) * cos(twist) - shift * sin(twist))
+
+    a2 = sqrt(max(distance(s1), distance(amplitude * sin(ratio * th))) ** 2 + (a1 * uniform(1.0, 4.0)) ** 2)
+    m1, m2, m3 = uniform(0.1, 2.0), uniform(0.1, 2.0), uniform(0.1, 2.0)
+    crank_cog = a1 * either(0.05, 0.8), a1 * either(0.05, 0.4), a1 * either(0.05, 0.5)
+    radius = a1 * uniform(0.2, 0.5)
+    parameters = SliderCrankParameters(
+        crank_length=a1,
+        rod_length=a2,
+        guide_offset=a4,
+        guide_twist=twist,
+        crank_mass=m1,
+        rod_mass=m2,
+        slider_mass=m3,
+        crank_inertia=m1 * (radius**2 + crank_cog[0] ** 2 + crank_cog[1] ** 2),
+        crank_cog_x=crank_cog[0],
+        crank_cog_y=crank_cog[1],
+        crank_cog_z=crank_cog[2],
+        crank_product_xz=m1 * a1 * a1 * either(0.01, 0.3),
+        crank_product_yz=m1 * a1 * a1 * either(0.01, 0.3),
+        rod_inertia=m2 * (a2 * uniform(0.1, 0.4)) ** 2,
+        rod_cog_distance=a2 * uniform(-0.2, 1.2),
+        slider_cog_x=a1 * either(0.05, 0.5),
+        slider_cog_y=a1 * either(0.05, 0.5),
+        slider_cog_z=a1 * either(0.05, 0.5),
+        slider_stiffness=uniform(10.0, 2000.0),
+        slider_spring_free_position=a1 * either(0.1, 2.0),
+        slider_damping=uniform(0.1, 30.0),
+        slider_coulomb_friction=uniform(0.1, 5.0),
+        shift_stiffness=uniform(10.0, 2000.0),
+        shift_spring_free_position=a1 * either(0.1, 0.5),
+        shift_damping=uniform(0.1, 30.0),
+        groove_amplitude=amplitude,
+        groove_ratio=ratio,
+        gravity_x=either(0.5, 20.0),
+        gravity_y=either(0.5, 20.0),
+        gravity_z=either(0.5, 20.0),
+        assembly_branch=1 if choose() else -1,
+    )
+    return Case(
+        parameters,
+        (th, s1, either(0.5, 30.0), either(0.05, 2.0), 0.0, 0.0),
+        either(0.1, 20.0),
+        either(1.0, 500.0),
+        either(0.1, 50.0),
+        either(0.1, 50.0),
+        either(0.1, 50.0),
+    )
+
+
+def seeded(seed: int) -> Case:
+    """The case of a seed, the same on every machine."""
+    source = random.Random(seed)
+    return draw(source.uniform, lambda: source.random() < 0.5)
+
+
+@st.composite
+def cases(draw_from: st.DrawFn) -> Case:
+    """Hypothesis strategy of `Case`."""
+    return draw(
+        lambda low, high: draw_from(st.floats(low, high, allow_subnormal=False)),
+        lambda: draw_from(st.booleans()),
+    )
+
+
+def mechanisms() -> st.SearchStrategy[SliderCrankParameters]:
+    """Hypothesis strategy of valid mechanisms."""
+    return cases().map(lambda case: case.parameters)
