@@ -6,8 +6,10 @@ a called function changes; the folder of the cache therefore carries a hash of t
 that are compiled.
 
 The integrator is DOP853 (`linkwork.tableau`) with its interpolant of order 7, the same method as the FMU's, written
-again for arrays; inputs are evaluated inside the loop. A run goes from one interval of smooth inputs to the next, ends of
-intervals being breaks of the inputs, points at which they are sampled and held, and the release of the torsion bar.
+again for arrays; inputs are evaluated inside the loop. It is written once for all mechanisms: which equations it integrates
+follows from the type of the constants, and it is compiled for a mechanism the first time that one is run (`solver`). A run
+goes from one interval of smooth inputs to the next, ends of intervals being breaks of the inputs, points at which they are
+sampled and held, and the release of the torsion bar.
 """
 
 from __future__ import annotations
@@ -15,25 +17,33 @@ from __future__ import annotations
 import hashlib
 import os
 import tempfile
+from functools import cache
 from math import cos, isfinite, isnan, sin
 from pathlib import Path
+from types import FunctionType, SimpleNamespace
 from typing import NamedTuple
 
 import numba
 import numpy as np
 from llvmlite import ir
 from numba import boolean, float64, int64, njit, types
-from numba.extending import intrinsic, register_jitable
+from numba.extending import intrinsic, overload, register_jitable
 from numba.np.unsafe.ndarray import to_fixed_tuple
 from numpy.typing import NDArray
 from platformdirs import user_cache_dir
 
 import linkwork
 from linkwork import friction, tableau
-from linkwork.five_bar import dynamics, kinematics
-from linkwork.five_bar.dynamics import Inputs
-from linkwork.five_bar.kinematics import LIMIT_SINE
-from linkwork.five_bar.parameters import Constants
+from linkwork.five_bar import dynamics as five_bar_dynamics
+from linkwork.five_bar import kinematics as five_bar_kinematics
+from linkwork.five_bar.parameters import Constants as FiveBarConstants
+from linkwork.limits import LIMIT_SINE, NEAR_LIMIT
+from linkwork.slider_crank import dynamics as slider_crank_dynamics
+from linkwork.slider_crank import kinematics as slider_crank_kinematics
+from linkwork.slider_crank import vectors as slider_crank_vectors
+from linkwork.slider_crank.parameters import Constants as SliderCrankConstants
+
+from .inputs import FUNCTIONS, LAST, SPEED
 
 # Status of a run, as the kernels return it: where the run has one, the solver.status of the FMI contract
 RUNNING = -1
@@ -45,9 +55,9 @@ EVENT = 10
 
 # Places in the array that carries a run from one call to the next: time at which the interval began and time since then,
 # next step, next sample, number of the interval, events found, counts, whether the run has started and is inside an
-# interval, the input that was not finite, and from HELD on the six inputs in force
+# interval, the input that was not finite, and from HELD on the inputs in force
 BEGIN, ELAPSED, STEP, SAMPLE, INTERVAL, EVENTS, STEPS, REJECTED, EVALUATIONS, STARTED, MIDWAY, LOST, HELD = range(13)
-CARRY = HELD + 6
+CARRY = HELD + 8
 
 #: Modules of this package whose code ends up in compiled code.
 COMPILED_MODULES = ("compiled.py", "orbit_kernels.py", "symbolic.py", "synthesis/kernels.py")
@@ -58,7 +68,7 @@ SAME = 1e-9
 
 
 class Source(NamedTuple):
-    """Inputs as the compiled code reads them: see `analysis.inputs.Encoded`; ``functions`` are addresses, or 0, shape (6,)."""
+    """Inputs as the compiled code reads them: see `analysis.inputs.Encoded`; ``functions`` are addresses, or 0, shape (7,)."""
 
     breaks: NDArray[np.float64]
     coefficients: NDArray[np.float64]
@@ -103,38 +113,113 @@ def _private(folder: Path, user: int) -> bool:
     return status.st_uid == user and not status.st_mode & 0o022
 
 
-CONSTANTS = types.NamedUniTuple(float64, len(Constants._fields), Constants)
+def constants_type(constants):  # type: ignore[no-untyped-def]
+    """Numba's type of a mechanism's constants."""
+    return types.NamedUniTuple(float64, len(constants._fields), constants)
+
+
+#: Of the five-bar's.
+CONSTANTS = constants_type(FiveBarConstants)
 VECTOR = float64[::1]
 MATRIX = float64[:, ::1]
 CUBE = float64[:, :, ::1]
 _ADDRESSES = int64[::1]
 _SOURCE = types.NamedTuple((VECTOR, CUBE, MATRIX, VECTOR, _ADDRESSES), Source)
 
-for _function in (
-    friction.resistance,
-    kinematics.joined,
-    kinematics.position,
-    kinematics.coefficients,
-    kinematics.centripetal,
-    kinematics.coupler_angle,
-    kinematics.rocker_angle,
-    kinematics.transmission_angle,
-    kinematics.coupler_point,
-    kinematics.coupler_point_velocity,
-    kinematics.closure_residual,
-    dynamics.inertia,
-    dynamics.velocity_terms,
-    dynamics.friction,
-    dynamics.applied_forces,
-    dynamics.motion,
-    dynamics.derivative,
-    dynamics.reactions,
-    dynamics.kinetic_energy,
-    dynamics.potential_energy,
-    dynamics.jump_speed,
-    dynamics.outputs,
+for _module in (
+    friction,
+    five_bar_kinematics,
+    five_bar_dynamics,
+    slider_crank_vectors,
+    slider_crank_kinematics,
+    slider_crank_dynamics,
 ):
-    register_jitable(_function)
+    for _function in vars(_module).values():
+        if isinstance(_function, FunctionType) and _function.__module__ == _module.__name__:
+            register_jitable(_function)
+
+#: The equations of each mechanism, by the class of its constants.
+_EQUATIONS = {FiveBarConstants: five_bar_dynamics, SliderCrankConstants: slider_crank_dynamics}
+
+
+def _equations(p):  # type: ignore[no-untyped-def]
+    return _EQUATIONS[p.instance_class]
+
+
+def _derivative(x, i, p):  # type: ignore[no-untyped-def]
+    """Right-hand side of the mechanism that the constants belong to."""
+
+
+@overload(_derivative, strict=False)
+def _(x, i, p):  # type: ignore[no-untyped-def]
+    return _equations(p).derivative
+
+
+def _row(x, i, start_energy, p):  # type: ignore[no-untyped-def]
+    """All outputs of the mechanism that the constants belong to."""
+
+
+@overload(_row, strict=False)
+def _(x, i, start_energy, p):  # type: ignore[no-untyped-def]
+    return _equations(p).outputs
+
+
+def _clearance(x, i, p):  # type: ignore[no-untyped-def]
+    """Sine of the transmission angle, which falls to LIMIT_SINE at the limit of assembly."""
+
+
+@overload(_clearance, strict=False)
+def _(x, i, p):  # type: ignore[no-untyped-def]
+    return _equations(p).clearance
+
+
+def _commanded(x, i, speed, last, p):  # type: ignore[no-untyped-def]
+    """The state after the commanded speeds have jumped."""
+
+
+@overload(_commanded, strict=False)
+def _(x, i, speed, last, p):  # type: ignore[no-untyped-def]
+    return _equations(p).jump
+
+
+def _applied(drive, axial, torque, acceleration, force, load, last, rate, p):  # type: ignore[no-untyped-def]
+    """The channels as the inputs of the mechanism that the constants belong to."""
+
+
+@overload(_applied, strict=False)
+def _(drive, axial, torque, acceleration, force, load, last, rate, p):  # type: ignore[no-untyped-def]
+    return _equations(p).applied
+
+
+def _restored(row, p):  # type: ignore[no-untyped-def]
+    """The inputs of the mechanism that the constants belong to, from a row that begins with them."""
+
+
+@overload(_restored, strict=False)
+def _(row, p):  # type: ignore[no-untyped-def]
+    inputs = _equations(p).Inputs
+    size = len(inputs._fields)
+
+    def restore(row, p):  # type: ignore[no-untyped-def]
+        return inputs(*to_fixed_tuple(row, size))
+
+    return restore
+
+
+def _constants(row, p):  # type: ignore[no-untyped-def]
+    """Constants like ``p`` from a row of them."""
+
+
+@overload(_constants, strict=False)
+def _(row, p):  # type: ignore[no-untyped-def]
+    constants = p.instance_class
+    size = len(constants._fields)
+
+    def read(row, p):  # type: ignore[no-untyped-def]
+        return constants(*to_fixed_tuple(row, size))
+
+    return read
+
 
 # DOP853: the weights of stage s are WEIGHT[ROW[s]:ROW[s + 1]], those of the stages FROM
 ROW = np.cumsum([0, *(len(row) for row in tableau.A)])
@@ -147,7 +232,6 @@ _D = np.array(tableau.D)
 STAGES = tableau.STAGES
 EXPONENT = -1.0 / tableau.ORDER
 _N = 6
-N_CONSTANTS = len(Constants._fields)
 
 _FOLDER = str(cache_folder())
 
@@ -199,15 +283,16 @@ def _find_before(t, breaks):  # type: ignore[no-untyped-def]
 
 @inner
 def _channels(t, piece, x, source):  # type: ignore[no-untyped-def]
-    """Torque, speed, acceleration, slider force and load at time t on a given piece."""
+    """Torque, speed, acceleration, force, load, last channel and its rate at time t on a given piece."""
     s = t - source.breaks[piece]
     c = source.coefficients[piece]
     torque = c[0, 0] + s * (c[0, 1] + s * (c[0, 2] + s * c[0, 3]))
-    speed = c[1, 0] + s * (c[1, 1] + s * (c[1, 2] + s * c[1, 3]))
-    acceleration = c[1, 1] + s * (2.0 * c[1, 2] + s * 3.0 * c[1, 3])
+    speed = c[SPEED, 0] + s * (c[SPEED, 1] + s * (c[SPEED, 2] + s * c[SPEED, 3]))
+    acceleration = c[SPEED, 1] + s * (2.0 * c[SPEED, 2] + s * 3.0 * c[SPEED, 3])
     force = c[2, 0] + s * (c[2, 1] + s * (c[2, 2] + s * c[2, 3]))
-    load_x = c[3, 0] + s * (c[3, 1] + s * (c[3, 2] + s * c[3, 3]))
-    load_y = c[4, 0] + s * (c[4, 1] + s * (c[4, 2] + s * c[4, 3]))
+    load = c[3, 0] + s * (c[3, 1] + s * (c[3, 2] + s * c[3, 3]))
+    last = c[LAST, 0] + s * (c[LAST, 1] + s * (c[LAST, 2] + s * c[LAST, 3]))
+    rate = c[LAST, 1] + s * (2.0 * c[LAST, 2] + s * 3.0 * c[LAST, 3])
     harmonics = source.harmonics
     for k in range(harmonics.shape[0]):
         channel = int(harmonics[k, 0])
@@ -215,15 +300,16 @@ def _channels(t, piece, x, source):  # type: ignore[no-untyped-def]
         value = harmonics[k, 1] * cos(phase)
         if channel == 0:
             torque += value
-        elif channel == 1:
+        elif channel == SPEED:
             speed += value
             acceleration -= harmonics[k, 1] * harmonics[k, 2] * sin(phase)
         elif channel == 2:
             force += value
         elif channel == 3:
-            load_x += value
+            load += value
         else:
-            load_y += value
+            last += value
+            rate -= harmonics[k, 1] * harmonics[k, 2] * sin(phase)
     law = source.law
     if law[2] != 0.0:
         torque += law[0] * (1.0 - x[0] / law[1])
@@ -237,13 +323,15 @@ def _channels(t, piece, x, source):  # type: ignore[no-untyped-def]
     if f[1] != 0:
         force += _call(f[1], t, x[0], x[1], x[2], x[3])
     if f[2] != 0:
-        load_x += _call(f[2], t, x[0], x[1], x[2], x[3])
+        load += _call(f[2], t, x[0], x[1], x[2], x[3])
     if f[3] != 0:
-        load_y += _call(f[3], t, x[0], x[1], x[2], x[3])
+        last += _call(f[3], t, x[0], x[1], x[2], x[3])
     if f[4] != 0:
         speed += _call(f[4], t, x[0], x[1], x[2], x[3])
         acceleration += _call(f[5], t, x[0], x[1], x[2], x[3])
-    return torque, speed, acceleration, force, load_x, load_y
+    if f[6] != 0:
+        rate += _call(f[6], t, x[0], x[1], x[2], x[3])
+    return torque, speed, acceleration, force, load, last, rate
 
 
 @kernel(float64(VECTOR, float64, float64, float64))
@@ -259,16 +347,16 @@ def held_bar(law, th2, w2, step):  # type: ignore[no-untyped-def]
     return law[0] * (max(0.0, 1.0 - middle / law[1]) - (1.0 - th2 / law[1]))
 
 
-@kernel(types.UniTuple(float64, 6)(float64, boolean, VECTOR, _SOURCE))
+@kernel(types.UniTuple(float64, FUNCTIONS)(float64, boolean, VECTOR, _SOURCE))
 def channels(t, left, x, source):  # type: ignore[no-untyped-def]
-    """Torque, speed, acceleration, slider force and load at time t, as the limit from the left or from the right."""
+    """Torque, speed, acceleration, force, load, last channel and its rate at time t, the limit from the left or the right."""
     return _channels(t, _find_before(t, source.breaks) if left else _find(t, source.breaks), x, source)
 
 
 @inner
-def _inputs(t, piece, x, drive, source):  # type: ignore[no-untyped-def]
+def _inputs(t, piece, x, drive, axial, source, p):  # type: ignore[no-untyped-def]
     a = _channels(t, piece, x, source)
-    return Inputs(drive, a[0], a[2], a[3], a[4], a[5])
+    return _applied(drive, axial, a[0], a[2], a[3], a[4], a[5], a[6], p)
 
 
 @inner
@@ -278,7 +366,7 @@ def _tuple(x):  # type: ignore[no-untyped-def]
 
 @inner
 def _copy(source, target):  # type: ignore[no-untyped-def]
-    for i in range(_N):
+    for i in range(len(source)):
         target[i] = source[i]
 
 
@@ -349,23 +437,25 @@ def _interpolate(s, x, f, out):  # type: ignore[no-untyped-def]
 def _gap(e, t, x, held, watch, addresses, release, start_energy, p):  # type: ignore[no-untyped-def]
     """What is zero where something happens: the limit of assembly (-1), the release (-2), event e of the user."""
     if e == -1:
-        return p.branch * kinematics.position(x[0], x[1], p).s43 - LIMIT_SINE
+        return _clearance(_tuple(x), held, p) - LIMIT_SINE
     if e == -2:
         return release - x[0]
     if addresses[e] != 0:
         return _call(addresses[e], t, x[0], x[1], x[2], x[3])
-    return dynamics.outputs(_tuple(x), held, start_energy, p)[int(watch[e, 0])] - watch[e, 1]
+    return _row(_tuple(x), held, start_energy, p)[int(watch[e, 0])] - watch[e, 1]
 
 
 @inner
-def _locate(e, low, high, t, h, x, f, dense, constant, held, piece, source, watch, addresses, start_energy, p):  # type: ignore[no-untyped-def]
+def _locate(
+    e, low, high, t, h, x, f, dense, constant, held, drive, axial, piece, source, watch, addresses, start_energy, p
+):  # type: ignore[no-untyped-def]
     """Fraction of the step at which e happens, by bisection of the interpolant between two fractions."""
     positive = False
     for n in range(55):
         s = low if n == 0 else 0.5 * (low + high)
         _interpolate(s, x, f, dense)
         if not constant:
-            held = _inputs(t + s * h, piece, dense, held.speed_drive, source)
+            held = _inputs(t + s * h, piece, dense, drive, axial, source, p)
         # a NaN, beyond the limit of assembly, compares as not positive
         sign = _gap(e, t + s * h, dense, held, watch, addresses, source.law[1], start_energy, p) > 0.0
         if n == 0:
@@ -394,7 +484,7 @@ def _record(found, n, e, t, x):  # type: ignore[no-untyped-def]
 
 @njit(error_model="numpy")
 def _run(
-    p, x, carry, end, speed_drive, hold, steady, source, tolerance, scale, samples, states, forces, watch, addresses,
+    p, x, carry, end, speed_drive, axial, hold, steady, source, tolerance, scale, samples, states, forces, watch, addresses,
     gaps, found, start_energy, max_steps,
 ):  # type: ignore[no-untyped-def]  # fmt: skip
     """Integrate until ``end``, a stopping event, or ``max_steps``; see `run` for the arguments."""
@@ -416,7 +506,7 @@ def _run(
     n_found = int(carry[EVENTS])
     started = carry[STARTED] != 0.0
     midway = carry[MIDWAY] != 0.0
-    held = Inputs(drive, carry[HELD + 1], carry[HELD + 2], carry[HELD + 3], carry[HELD + 4], carry[HELD + 5])
+    held = _restored(carry[HELD:], p)
     steps = 0
     paused = False
     status = RUNNING
@@ -439,6 +529,7 @@ def _run(
             now = _channels(begin, piece, x, source)
             acceleration = now[2]
             torque = now[0]
+            rate = now[6]
             if hold > 0.0:
                 ahead = stop if begin < end else begin + hold
                 torque += held_bar(law, x[0], x[2], ahead - begin)
@@ -446,22 +537,26 @@ def _run(
                     # the secant: the speed meets the command again at the next point of the grid
                     there = _channels(ahead, _find_before(ahead, breaks), x, source)
                     acceleration = (there[1] - now[1]) / (ahead - begin)
-            held = Inputs(drive, torque, acceleration, now[3], now[4], now[5])
+                if axial == 1.0:
+                    there = _channels(ahead, _find_before(ahead, breaks), x, source)
+                    rate = (there[5] - now[5]) / (ahead - begin)
+            held = _applied(drive, axial, torque, acceleration, now[3], now[4], now[5], rate, p)
             if not isfinite(acceleration):
                 # by name, the speed at the next point of the grid
                 status = BAD_INPUT
                 carry[LOST] = 1
-            for i in range(6):
+            if not isfinite(rate):
+                status = BAD_INPUT
+                carry[LOST] = 5
+            for i in range(len(now)):
                 if not isfinite(now[i]):
                     status = BAD_INPUT
                     carry[LOST] = i
             if status != RUNNING:
                 break
-            if speed_drive and x[2] != now[1]:
-                if started:
-                    _copy(dynamics.jump_speed(_tuple(x), now[1], p), x)
-                else:
-                    x[2] = now[1]
+            # at the start the state has the commanded speeds; after that a jump of them is an impulse
+            if started and ((speed_drive and x[2] != now[1]) or (axial == 1.0 and x[3] != now[5])):
+                _copy(_commanded(_tuple(x), held, now[1], now[5], p), x)
             # samples at the beginning of the interval, with the inputs that begin here
             while sample < n_samples and samples[sample] <= begin:
                 _copy(x, states[sample])
@@ -484,7 +579,7 @@ def _run(
             if status != RUNNING:
                 break
         midway = False
-        _copy(dynamics.derivative(_tuple(x), held, p), k[0])
+        _copy(_derivative(_tuple(x), held, p), k[0])
         carry[EVALUATIONS] += 1
         if not h_next > 0.0:
             ratio = 1e-300
@@ -497,7 +592,7 @@ def _run(
                 paused = midway = True
                 if not constant:
                     # after a step that was refused they are those of one of its stages
-                    held = _inputs(begin + elapsed, piece, x, drive, source)
+                    held = _inputs(begin + elapsed, piece, x, drive, axial, source, p)
                 break
             t = begin + elapsed
             remaining = (stop - begin) - elapsed
@@ -507,8 +602,8 @@ def _run(
             for s in range(1, STAGES):
                 _stage(s, x, k, h, y)
                 if not constant:
-                    held = _inputs(t + NODES[s] * h, piece, y, drive, source)
-                _copy(dynamics.derivative(_tuple(y), held, p), k[s])
+                    held = _inputs(t + NODES[s] * h, piece, y, drive, axial, source, p)
+                _copy(_derivative(_tuple(y), held, p), k[s])
             _stage(STAGES, x, k, h, y)
             carry[EVALUATIONS] += STAGES - 1
             error = local_error(_N, x, y, k, h, scale) / tolerance
@@ -516,8 +611,8 @@ def _run(
             if good:
                 t_new = stop if last else begin + (elapsed + h)
                 if not constant:
-                    held = _inputs(t_new, piece, y, drive, source)
-                _copy(dynamics.derivative(_tuple(y), held, p), k[12])
+                    held = _inputs(t_new, piece, y, drive, axial, source, p)
+                _copy(_derivative(_tuple(y), held, p), k[12])
                 carry[EVALUATIONS] += 1
                 for i in range(_N):
                     if isnan(k[12, i]):
@@ -526,32 +621,32 @@ def _run(
                 carry[REJECTED] += 1
                 h_next = h * (max(0.2, 0.9 * error**EXPONENT) if 1.0 < error < 1e30 else 0.25)
                 if not h_next >= 1e-14 * max(abs(t), end - samples[0]):
-                    status = LIMIT if abs(kinematics.position(x[0], x[1], p).s43) < 0.05 else NO_STEP
+                    status = LIMIT if abs(_clearance(_tuple(x), held, p)) < NEAR_LIMIT else NO_STEP
                     if not constant:
                         # where a step is impossible however short, an input may be what stops it
                         for i in range(_N):
                             z[i] = x[i] + h * k[0, i]
                         now = _channels(t + h, piece, z, source)
-                        for i in range(6):
+                        for i in range(len(now)):
                             if not isfinite(now[i]):
                                 status = BAD_INPUT
                                 carry[LOST] = i
-                        held = _inputs(t, piece, x, drive, source)
+                        held = _inputs(t, piece, x, drive, axial, source, p)
                     break
                 continue
             factor = 6.0 if error == 0.0 else min(6.0, 0.9 * error**EXPONENT)
             # a step cut short by the end of the interval does not shorten the one carried over
             h_next = max(h_next, factor * h) if h < h_next else max(0.2, factor) * h
             # what happens inside the step needs the interpolant
-            limit = p.branch * kinematics.position(y[0], y[1], p).s43 < LIMIT_SINE
+            limit = _clearance(_tuple(y), held, p) < LIMIT_SINE
             release = law[2] != 0.0 and hold == 0.0 and y[0] >= law[1]
             if limit or release or n_events > 0 or (sample < n_samples and samples[sample] < t_new):
                 inside = held
                 for s in range(13, 16):
                     _stage(s, x, k, h, z)
                     if not constant:
-                        inside = _inputs(t + NODES[s] * h, piece, z, drive, source)
-                    _copy(dynamics.derivative(_tuple(z), inside, p), k[s])
+                        inside = _inputs(t + NODES[s] * h, piece, z, drive, axial, source, p)
+                    _copy(_derivative(_tuple(z), inside, p), k[s])
                 carry[EVALUATIONS] += 3
                 _interpolant(x, y, k, h, f)
             # the earliest of: limit of assembly (-1), release of the torsion bar (-2), a stopping event (its number)
@@ -560,12 +655,14 @@ def _run(
             if limit:
                 what = -1
                 cut = _locate(
-                    -1, 0.0, 1.0, t, h, x, f, dense, constant, held, piece, source, watch, addresses, start_energy, p
-                )
+                    -1, 0.0, 1.0, t, h, x, f, dense, constant, held, drive, axial, piece, source, watch, addresses,
+                    start_energy, p,
+                )  # fmt: skip
             if release:
                 s = _locate(
-                    -2, 0.0, 1.0, t, h, x, f, dense, constant, held, piece, source, watch, addresses, start_energy, p
-                )
+                    -2, 0.0, 1.0, t, h, x, f, dense, constant, held, drive, axial, piece, source, watch, addresses,
+                    start_energy, p,
+                )  # fmt: skip
                 if s < cut:
                     cut = s
                     what = -2
@@ -578,12 +675,12 @@ def _run(
                         gap = _gap(e, t_new, y, held, watch, addresses, law[1], start_energy, p)
                     else:
                         _interpolate(s1, x, f, dense)
-                        inside = held if constant else _inputs(t + s1 * h, piece, dense, drive, source)
+                        inside = held if constant else _inputs(t + s1 * h, piece, dense, drive, axial, source, p)
                         gap = _gap(e, t + s1 * h, dense, inside, watch, addresses, law[1], start_energy, p)
                     if _crosses(gaps[e], gap, watch[e, 2]):
                         s = _locate(
-                            e, s0, s1, t, h, x, f, dense, constant, held, piece, source, watch, addresses,
-                            start_energy, p,
+                            e, s0, s1, t, h, x, f, dense, constant, held, drive, axial, piece, source, watch,
+                            addresses, start_energy, p,
                         )  # fmt: skip
                         _interpolate(s, x, f, dense)
                         _record(found, n_found, e, s, dense)
@@ -606,7 +703,7 @@ def _run(
             # samples inside the step; one at its end waits for the next, or for the next interval's inputs
             while sample < n_samples and samples[sample] < t_new:
                 _interpolate(((samples[sample] - begin) - elapsed) / h, x, f, states[sample])
-                inside = held if constant else _inputs(samples[sample], piece, states[sample], drive, source)
+                inside = held if constant else _inputs(samples[sample], piece, states[sample], drive, axial, source, p)
                 _copy(inside, forces[sample])
                 sample += 1
             if cut <= 1.0:
@@ -615,7 +712,7 @@ def _run(
                 if what == -2:
                     x[0] = law[1]
                 if not constant:
-                    held = _inputs(t_new, piece, x, drive, source)
+                    held = _inputs(t_new, piece, x, drive, axial, source, p)
                 for e in range(n_events):
                     gaps[e] = _gap(e, t_new, x, held, watch, addresses, law[1], start_energy, p)
                 for n in range(n_before, n_found):
@@ -651,7 +748,7 @@ def _run(
     carry[STEPS] += steps
     carry[STARTED] = started
     carry[MIDWAY] = midway
-    for i in range(6):
+    for i in range(len(held)):
         carry[HELD + i] = held[i]
     return status
 
@@ -671,9 +768,8 @@ _RUN_ARGUMENTS = (
 )
 
 
-@kernel(int64(CONSTANTS, VECTOR, VECTOR, float64, boolean, float64, boolean, _SOURCE, *_RUN_ARGUMENTS))
 def run(
-    p, x, carry, end, speed_drive, hold, steady, source, tolerance, scale, samples, states, forces, watch, addresses,
+    p, x, carry, end, speed_drive, axial, hold, steady, source, tolerance, scale, samples, states, forces, watch, addresses,
     gaps, found, start_energy, max_steps,
 ):  # type: ignore[no-untyped-def]  # fmt: skip
     """Integrate one run until ``end``, a stopping event, ``max_steps`` steps or a full table of events.
@@ -690,6 +786,8 @@ def run(
     end : float
         Time at the end (s).
     speed_drive : bool
+    axial : float
+        What moves the second coordinate: 0 a force, 1 a commanded speed, 2 a groove.
     hold : float
         Where it is not 0, the inputs are sampled at ``samples`` and held, as a master does; it is then the step (s) that
         follows the last one. 0 lets the inputs act continuously.
@@ -701,7 +799,7 @@ def run(
     scale : ndarray, shape (6,)
     samples : ndarray, shape (n,)
         Times to record (s), increasing, the first one the start.
-    states, forces : ndarray, shapes (n, 6)
+    states, forces : ndarray, shapes (n, 6) and (n, number of inputs)
         State and inputs at the samples; written.
     watch : ndarray, shape (m, 4)
         Events: output number, level, direction, whether it stops the run.
@@ -721,46 +819,19 @@ def run(
         RUNNING, FINISHED, BAD_INPUT, LIMIT, NO_STEP or EVENT.
     """
     return _run(
-        p, x, carry, end, speed_drive, hold, steady, source, tolerance, scale, samples, states, forces, watch, addresses,
+        p, x, carry, end, speed_drive, axial, hold, steady, source, tolerance, scale, samples, states, forces, watch, addresses,
         gaps, found, start_energy, max_steps,
     )  # fmt: skip
 
 
-@njit(error_model="numpy")
-def constants(row):  # type: ignore[no-untyped-def]
-    return Constants(*to_fixed_tuple(row, N_CONSTANTS))
-
-
-@kernel(
-    types.void(
-        MATRIX,  # parameters
-        MATRIX,  # starts
-        VECTOR,  # energies
-        float64,  # end
-        boolean,  # speed_drive
-        float64,  # hold
-        boolean[::1],  # steady
-        int64[:, ::1],  # sizes
-        MATRIX,  # breaks
-        float64[:, :, :, ::1],  # coefficients
-        CUBE,  # harmonics
-        MATRIX,  # laws
-        _ADDRESSES,  # functions
-        float64,  # tolerance
-        MATRIX,  # scales
-        VECTOR,  # samples
-        CUBE,  # states
-        CUBE,  # forces
-        MATRIX,  # carries
-        int64[::1],  # status
-        int64,  # max_steps
-    )
-)
 def run_many(
-    parameters, starts, energies, end, speed_drive, hold, steady, sizes, breaks, coefficients, harmonics, laws, functions,
-    tolerance, scales, samples, states, forces, carries, status, max_steps,
+    p, parameters, starts, energies, end, speed_drive, axial, hold, steady, sizes, breaks, coefficients, harmonics, laws,
+    functions, tolerance, scales, samples, states, forces, carries, status, max_steps,
 ):  # type: ignore[no-untyped-def]  # fmt: skip
-    """Many runs one after the other: `run` for each row, without events; ``sizes`` counts its pieces and harmonics."""
+    """Many runs one after the other: `run` for each row, without events; ``sizes`` counts its pieces and harmonics.
+
+    ``p`` are constants of the mechanism, any: what counts is their kind.
+    """
     watch = np.empty((0, 4))
     addresses = np.empty(0, dtype=np.int64)
     gaps = np.empty(0)
@@ -769,26 +840,67 @@ def run_many(
         pieces, waves = sizes[i]
         source = Source(breaks[i, : pieces + 1], coefficients[i, :pieces], harmonics[i, :waves], laws[i], functions)
         status[i] = _run(
-            constants(parameters[i]), starts[i], carries[i], end, speed_drive, hold, steady[i], source, tolerance,
+            _constants(parameters[i], p), starts[i], carries[i], end, speed_drive, axial, hold, steady[i], source, tolerance,
             scales[i], samples, states[i], forces[i], watch, addresses, gaps, found, energies[i], max_steps,
         )  # fmt: skip
 
 
-@kernel(types.void(CONSTANTS, MATRIX, MATRIX, float64, MATRIX))
 def outputs(p, states, forces, start_energy, out):  # type: ignore[no-untyped-def]
-    """All real outputs of the contract for rows of states and inputs: ``out`` has shape (n, 27)."""
+    """All real outputs of the contract for rows of states and inputs: ``out`` has shape (n, number of outputs)."""
     for i in range(states.shape[0]):
-        u = forces[i]
-        row = dynamics.outputs(_tuple(states[i]), Inputs(u[0], u[1], u[2], u[3], u[4], u[5]), start_energy, p)
+        row = _row(_tuple(states[i]), _restored(forces[i], p), start_energy, p)
         for j in range(len(row)):
             out[i, j] = row[j]
 
 
-@kernel(types.void(CONSTANTS, MATRIX, MATRIX, MATRIX))
 def derivatives(p, states, forces, out):  # type: ignore[no-untyped-def]
     """Right-hand side for rows of states and inputs: the bare cost of an evaluation, for the benchmark."""
     for i in range(states.shape[0]):
-        u = forces[i]
-        row = dynamics.derivative(_tuple(states[i]), Inputs(u[0], u[1], u[2], u[3], u[4], u[5]), p)
+        row = _derivative(_tuple(states[i]), _restored(forces[i], p), p)
         for j in range(_N):
             out[i, j] = row[j]
+
+
+@cache
+def solver(constants):  # type: ignore[no-untyped-def]
+    """`run`, `run_many`, `outputs` and `derivatives`, compiled for the mechanism with that class of constants."""
+    p = constants_type(constants)
+    signatures = {
+        run: int64(p, VECTOR, VECTOR, float64, boolean, float64, float64, boolean, _SOURCE, *_RUN_ARGUMENTS),
+        run_many: types.void(
+            p,
+            MATRIX,  # parameters
+            MATRIX,  # starts
+            VECTOR,  # energies
+            float64,  # end
+            boolean,  # speed_drive
+            float64,  # axial
+            float64,  # hold
+            boolean[::1],  # steady
+            int64[:, ::1],  # sizes
+            MATRIX,  # breaks
+            float64[:, :, :, ::1],  # coefficients
+            CUBE,  # harmonics
+            MATRIX,  # laws
+            _ADDRESSES,  # functions
+            float64,  # tolerance
+            MATRIX,  # scales
+            VECTOR,  # samples
+            CUBE,  # states
+            CUBE,  # forces
+            MATRIX,  # carries
+            int64[::1],  # status
+            int64,  # max_steps
+        ),
+        outputs: types.void(p, MATRIX, MATRIX, float64, MATRIX),
+        derivatives: types.void(p, MATRIX, MATRIX, MATRIX),
+    }
+    return SimpleNamespace(
+        **{function.__name__: kernel(signature)(function) for function, signature in signatures.items()}
+    )
+
+
+@njit(error_model="numpy")
+def constants(row):  # type: ignore[no-untyped-def]
+    """Constants of the five-bar from a row of them."""
+    return FiveBarConstants(*to_fixed_tuple(row, len(FiveBarConstants._fields)))

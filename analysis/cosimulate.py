@@ -20,14 +20,20 @@ from fmpy.logging import addLoggerProxy
 from numpy.typing import NDArray
 
 from linkwork.errors import InputError, LinkworkError
-from linkwork.five_bar.dynamics import Outputs
-from linkwork.five_bar.parameters import FiveBarParameters, InitialState
-from linkwork.five_bar.plant import INPUT_NAMES, SPEED_DRIVE, TORQUE_DRIVE
-from linkwork.five_bar.variables import OUTPUT_NAMES
 from linkwork.parameters import fmi_name
 
-from .inputs import Inputs, align, encode
-from .simulate import RunInterrupted, held_channels, interruptible, sample_times, shown
+from .inputs import Channels, align, encode
+from .mechanism import InitialState, Parameters, mechanism_of
+from .simulate import (
+    NotFiniteError,
+    RunInterrupted,
+    given,
+    held_channels,
+    interruptible,
+    not_finite,
+    sample_times,
+    shown,
+)
 from .trajectory import UNITS, Trajectory
 
 #: Outputs that are angles in (-pi, pi]: they differ by what is left after whole turns.
@@ -39,9 +45,9 @@ class CosimulationError(LinkworkError):
 
 
 class FmuRun:
-    """An instance of a FiveBarSlider FMU through FMPy: set inputs, step, read outputs.
+    """An instance of an FMU of Linkwork through FMPy: set inputs, step, read outputs.
 
-    Use as a context manager.
+    Which mechanism it must be of, the parameters say. Use as a context manager.
 
     Raises
     ------
@@ -52,16 +58,19 @@ class FmuRun:
     def __init__(
         self,
         fmu: str | Path,
-        parameters: FiveBarParameters,
+        parameters: Parameters,
         initial: InitialState,
         *,
-        drive_mode: int,
+        modes: dict[str, int],
         tolerance: float,
         start_time: float,
         inputs: dict[str, float],
     ) -> None:
         if not Path(fmu).is_file():
             raise CosimulationError(f"there is no file {fmu}: build it with 'python build_fmu.py'")
+        mechanism = mechanism_of(parameters)
+        self.input_names = mechanism.plant.INPUT_NAMES
+        self.output_names = mechanism.output_names
         self.messages: list[str] = []
         self._folder: str | None = None
         try:
@@ -69,11 +78,12 @@ class FmuRun:
         except Exception as error:
             raise CosimulationError(f"{fmu} is not an FMU: {error}") from error
         self._references = {v.name: v.valueReference for v in description.modelVariables}
-        missing = [name for name in (*INPUT_NAMES, *OUTPUT_NAMES, "solver.status") if name not in self._references]
+        needed = (*self.input_names, *self.output_names, "solver.status")
+        missing = [name for name in needed if name not in self._references]
         if description.coSimulation is None:
             missing.append("co-simulation")
         if missing:
-            raise CosimulationError(f"{fmu} is not a FiveBarSlider for co-simulation: it has no {', '.join(missing)}")
+            raise CosimulationError(f"{fmu} is not a {mechanism.fmu} for co-simulation: it has no {', '.join(missing)}")
         self._callbacks = fmi2CallbackFunctions()
         self._callbacks.logger = fmi2CallbackLoggerTYPE(self._log)
         addLoggerProxy(byref(self._callbacks))
@@ -90,7 +100,7 @@ class FmuRun:
             reals = {fmi_name(name): value for name, value in asdict(parameters).items()}
             reals |= {f"initial.{name}": value for name, value in asdict(initial).items()}
             reals |= {"solver.tolerance": tolerance} | inputs
-            integers = {"drive.mode": drive_mode, "assembly.branch": reals.pop("assembly.branch")}
+            integers = modes | {"assembly.branch": reals.pop("assembly.branch")}
             self._slave.setReal([self._references[name] for name in reals], [float(v) for v in reals.values()])
             self._slave.setInteger([self._references[name] for name in integers], list(integers.values()))
             self._slave.enterInitializationMode()
@@ -99,8 +109,8 @@ class FmuRun:
             self.close()
             reasons = [m for m in self.messages if not m.startswith("Fatal py exception")]
             raise CosimulationError("; ".join(reasons) or f"{fmu}: {error}") from error
-        self._inputs = [self._references[name] for name in INPUT_NAMES]
-        self._outputs = [self._references[name] for name in OUTPUT_NAMES]
+        self._inputs = [self._references[name] for name in self.input_names]
+        self._outputs = [self._references[name] for name in self.output_names]
 
     def _log(self, environment: Any, name: bytes, status: int, category: bytes, message: bytes) -> None:
         self.messages.append(message.decode("utf-8", errors="replace"))
@@ -113,7 +123,7 @@ class FmuRun:
 
     def set_inputs(self, values: dict[str, float]) -> None:
         """Set all inputs."""
-        self._slave.setReal(self._inputs, [values[name] for name in INPUT_NAMES])
+        self._slave.setReal(self._inputs, [values[name] for name in self.input_names])
 
     def outputs(self) -> list[float]:
         """All real outputs, in the order of the contract."""
@@ -144,8 +154,8 @@ class FmuRun:
 
 def cosimulate(
     fmu: str | Path,
-    parameters: FiveBarParameters,
-    inputs: Inputs | None = None,
+    parameters: Parameters,
+    inputs: Channels | None = None,
     *,
     initial: InitialState | None = None,
     stop_time: float,
@@ -154,9 +164,9 @@ def cosimulate(
     tolerance: float = 1e-9,
     progress: bool = False,
 ) -> Trajectory:
-    """Run a FiveBarSlider FMU through FMPy.
+    """Run an FMU of Linkwork through FMPy.
 
-    The inputs are sampled at each communication point and held over the step, the crank speed goes along the secant:
+    The inputs are sampled at each communication point and held over the step, commanded speeds go along the secant:
     ``simulate(..., hold=step)`` does the same in process.
 
     Parameters
@@ -180,8 +190,8 @@ def cosimulate(
         If the times are not usable, or an input is not a finite number; the sentence names the input and the time.
     """
     begun = clock.perf_counter()
-    inputs = inputs or Inputs()
-    initial = initial or InitialState()
+    mechanism = mechanism_of(parameters)
+    inputs, initial = given(mechanism, inputs, initial)
     times = sample_times(stop_time, step, start_time)
     encoded = align(encode(inputs), times)
     law = encoded.law.copy()
@@ -189,16 +199,25 @@ def cosimulate(
     status, message = 0, ""
 
     def sampled(t: float, ahead: float, x: NDArray[np.float64]) -> dict[str, float]:
-        # the channels stand in the order of the FMU's inputs
-        return dict(zip(INPUT_NAMES, held_channels(encoded, t, ahead, x, law, inputs.speed_drive)))
+        try:
+            values = held_channels(encoded, t, ahead, x, law, inputs)
+        except NotFiniteError as error:
+            raise not_finite(mechanism, inputs, error.number, t, x) from None
+        return {name: values[number] for name, number in mechanism.channel_of_input.items()}
 
-    x = np.array([initial.crank_angle, initial.slider_position, initial.crank_speed, initial.slider_velocity])
+    second = [mechanism.output_names.index(f"{mechanism.second}.{what}") for what in ("position", "velocity")]
+
+    def state(row: list[float]) -> NDArray[np.float64]:
+        # crank angle and speed are the first two outputs of every mechanism
+        return np.array([row[0], row[second[0]], row[1], row[second[1]]])
+
+    x = np.array(mechanism.state(initial))
     first = sampled(times[0], times[1], x)
     run = FmuRun(
         fmu,
         parameters,
         initial,
-        drive_mode=SPEED_DRIVE if inputs.speed_drive else TORQUE_DRIVE,
+        modes=mechanism.modes(inputs.speed_drive, inputs.axial_mode),
         tolerance=tolerance,
         start_time=float(times[0]),
         inputs=first,
@@ -210,9 +229,7 @@ def cosimulate(
             if status:
                 break
             # the outputs belong to the inputs that begin here: read the state, sample, set, read all
-            row = run.outputs()
-            now = Outputs(*row)
-            x = np.array([now.crank_angle, now.slider_position, now.crank_speed, now.slider_velocity])
+            x = state(run.outputs())
             later = t_next + step if t_next == times[-1] else times[len(rows) + 1]
             run.set_inputs(sampled(float(t_next), float(later), x))
             rows.append(run.outputs())
@@ -224,6 +241,7 @@ def cosimulate(
         values=np.array(rows),
         status=status,
         message=message,
+        names=mechanism.output_names,
         source=Path(fmu).name,
         statistics={"steps": float(len(rows) - 1), "seconds": clock.perf_counter() - begun},
     )
@@ -269,7 +287,8 @@ class Comparison:
         for difference in self.differences:
             if difference.name == name:
                 return difference
-        raise InputError(f"there is no output {name!r}: the outputs are {', '.join(OUTPUT_NAMES)}")
+        known = ", ".join(difference.name for difference in self.differences)
+        raise InputError(f"there is no output {name!r}: the outputs are {known}")
 
 
 def compare(a: Trajectory, b: Trajectory, *, tolerance: float = 1e-6) -> Comparison:
@@ -285,17 +304,19 @@ def compare(a: Trajectory, b: Trajectory, *, tolerance: float = 1e-6) -> Compari
     Raises
     ------
     InputError
-        If the runs have not the same times.
+        If the runs have not the same times or outputs.
     """
+    if a.names != b.names:
+        raise InputError("the runs cannot be compared: they have not the same outputs, and are of different mechanisms")
     n = int(np.count_nonzero(np.isin(a.time, b.time)))
     if a.status == b.status != 0 and max(len(a), len(b)) <= n + 1:
         a, b = replace(a, time=a.time[:n], values=a.values[:n]), replace(b, time=b.time[:n], values=b.values[:n])
     if len(a) == 0 or len(a) != len(b) or not np.allclose(a.time, b.time, rtol=1e-12, atol=1e-15):
         ends = [f"{len(run)} samples" + (f" to t = {run.time[-1]:.9g} s" if len(run) else "") for run in (a, b)]
         raise InputError(f"the runs cannot be compared: {ends[0]}, and {ends[1]}")
-    largest = {name: float(np.max(np.abs(np.nan_to_num(a[name])), initial=0.0)) for name in OUTPUT_NAMES}
+    largest = {name: float(np.max(np.abs(np.nan_to_num(a[name])), initial=0.0)) for name in a.names}
     differences = []
-    for name in OUTPUT_NAMES:
+    for name in a.names:
         with np.errstate(invalid="ignore"):
             difference = np.abs(a[name] - b[name])
             if name in PRINCIPAL_ANGLES:
@@ -317,31 +338,27 @@ def compare(a: Trajectory, b: Trajectory, *, tolerance: float = 1e-6) -> Compari
 def _floor(name: str, largest: dict[str, float]) -> float:
     """Least scale of an output, from the largest magnitudes of the outputs like it."""
 
-    def like(*names: str) -> float:
-        return max(largest[n] for n in names)
+    def like(unit: str) -> float:
+        residuals = ("closure.residual", "energy.residual")
+        return max(size for n, size in largest.items() if UNITS[n] == unit and n not in residuals)
 
     if name.endswith(".angle"):
         return 1.0
-    lengths = like("coupler.point.x", "coupler.point.y", "slider.position")
+    lengths, speed = like("m"), largest["crank.speed"]
     if name == "closure.residual":
         return lengths
-    if name in ("slider.position", "coupler.point.x", "coupler.point.y"):
-        return 1e-3 * lengths
-    speed = largest["crank.speed"]
-    if name == "slider.velocity":
-        return 1e-3 * lengths * speed
-    if name == "slider.acceleration":
-        return 1e-3 * lengths * speed**2
-    if name == "crank.acceleration":
-        return 1e-3 * speed**2
-    forces = [n for n in OUTPUT_NAMES if UNITS[n] == "N"]
-    if name in forces:
-        return 1e-3 * like(*forces)
-    energies = [n for n in OUTPUT_NAMES if UNITS[n] == "J" and n != "energy.residual"]
     if name == "energy.residual":
-        return like(*energies)
-    if name in energies:
-        return 1e-3 * like(*energies)
-    if name == "drive.applied_torque":
-        return 1e-3 * like(*forces) * lengths
-    return 0.0
+        return like("J")
+    if name == "crank.speed":
+        return 0.0
+    scales = {
+        "m": lengths,
+        "m/s": lengths * speed,
+        "m/s2": lengths * speed**2,
+        "rad/s": speed,
+        "rad/s2": speed**2,
+        "N": like("N"),
+        "N.m": like("N") * lengths,
+        "J": like("J"),
+    }
+    return 1e-3 * scales[UNITS[name]]

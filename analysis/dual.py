@@ -185,6 +185,11 @@ def stack(parts: Sequence[Any], axis: int = -1) -> Dual:
     return Dual(np.stack(real, axis), np.stack(slopes, axis))
 
 
+def join(*parts: Dual) -> Dual:
+    """Dual vectors or matrices joined along their last axis; none has directions, or all have."""
+    return Dual(np.concatenate([x.real for x in parts], -1), np.concatenate([x.dual for x in parts], -1))
+
+
 def dot(a: Any, b: Any) -> Dual:
     """Product a . b of dual vectors (..., 3): of two unit screws the cosine of their dual angle."""
     product = dual(a) * b

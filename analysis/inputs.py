@@ -1,14 +1,15 @@
-"""What acts on a mechanism during a run: crank torque or speed, slider force, load.
+"""What acts on a mechanism during a run: crank torque or speed, slider or axial force, axial speed, load.
 
-One `Inputs` object serves `simulate` and `cosimulate`. A signal is a function of time; a torque may besides depend on
-the crank (torsion bar, induction motor), and any channel but the speed may be a function of time and state.
+One object, `Inputs` for the five-bar and `SliderCrankInputs` for the slider-crank, serves `simulate` and `cosimulate`. A
+signal is a function of time; a torque may besides depend on the crank (torsion bar, induction motor), and any channel but a
+commanded speed may be a function of time and state.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -16,8 +17,12 @@ from scipy.interpolate import CubicSpline
 
 from linkwork.errors import InputError
 
-#: Channels of a run, in the order of the compiled code.
-CHANNELS = ("torque", "speed", "force", "load_x", "load_y")
+#: Number of the crank speed among the channels, and of that channel whose rate of change counts besides: an axial speed.
+SPEED, LAST = 1, 4
+#: Where a function of each channel stands among the functions of a run, and where the rates of those two.
+SLOT_OF_CHANNEL = (0, 4, 1, 2, 3)
+SLOT_OF_RATE = {SPEED: 5, LAST: 6}
+FUNCTIONS = 7
 
 StateFunction = Callable[[float, float, float, float, float], float]
 
@@ -195,9 +200,75 @@ def _points(times: ArrayLike, values: ArrayLike, least: int) -> tuple[NDArray[np
     return t, y
 
 
+_NUMBER = (int, float, np.floating, np.integer)
+
+
+class Channels:
+    """What every mechanism's inputs share: named channels, each a signal or a sum of signals."""
+
+    __slots__ = ()
+
+    #: Names of the channels, in the order of the compiled code.
+    CHANNELS: ClassVar[tuple[str, ...]]
+    #: Channels that are speeds: a jump of them is an impulse, and their rate counts.
+    COMMANDS: ClassVar[tuple[str, ...]]
+
+    speed: Signal | tuple[Signal, ...] | None
+    torque: Torque | tuple[Torque, ...] | None
+
+    def __post_init__(self) -> None:
+        if self.speed is not None and self.torque is not None:
+            raise InputError("both speed and torque are given: the crank can be driven by one of them only")
+        for channel in self.CHANNELS:
+            for part in self.parts(channel):
+                kinds: tuple[type, ...] = (*_NUMBER, Piecewise, Harmonics, Function)
+                if channel == "torque":
+                    kinds = (*kinds, TorsionBar, InductionMotor)
+                if not isinstance(part, kinds):
+                    raise InputError(
+                        f"{channel} is {part!r}: it must be a number, a signal of analysis.inputs, or a Function"
+                    )
+                if isinstance(part, _NUMBER) and not np.isfinite(part):
+                    raise InputError(f"{channel} is {part}: it must be a finite number")
+        for command in self.COMMANDS:
+            if any(isinstance(part, Function) and part.rate is None for part in self.parts(command)):
+                unit = "rad/s2" if command == "speed" else "m/s2"
+                raise InputError(f"a {command} given as a Function needs its rate, the acceleration ({unit})")
+        for channel in self.CHANNELS:
+            for kind in (TorsionBar, InductionMotor, Function):
+                if sum(isinstance(part, kind) for part in self.parts(channel)) > 1:
+                    raise InputError(f"{channel} has more than one {kind.__name__}: one can be in force at a time")
+
+    def parts(self, channel: str) -> tuple[Any, ...]:
+        """The summands of a channel."""
+        value = getattr(self, channel)
+        if value is None:
+            return ()
+        return value if isinstance(value, tuple) else (value,)
+
+    @property
+    def held_exactly(self) -> bool:
+        """Whether a master that holds the inputs over its steps loses nothing by it: all are constant.
+
+        A commanded speed goes along the secant of a step, which is exact where it is constant.
+        """
+        parts = [part for channel in self.CHANNELS for part in self.parts(channel)]
+        return all(isinstance(part, _NUMBER) for part in parts)
+
+    @property
+    def speed_drive(self) -> bool:
+        """Whether the crank speed is prescribed."""
+        return self.speed is not None
+
+    @property
+    def axial_mode(self) -> int:
+        """What moves the second coordinate: 0 a force, 1 a commanded speed, 2 a groove."""
+        return 0
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Inputs:
-    """Everything that acts on a mechanism during a run. SI units; a plain number is a constant.
+class Inputs(Channels):
+    """Everything that acts on a five-bar slider during a run. SI units; a plain number is a constant.
 
     Parameters
     ----------
@@ -220,53 +291,72 @@ class Inputs:
         If both speed and torque are given, or a value is not finite or of the wrong kind.
     """
 
+    CHANNELS: ClassVar[tuple[str, ...]] = ("torque", "speed", "force", "load_x", "load_y")
+    COMMANDS: ClassVar[tuple[str, ...]] = ("speed",)
+
     speed: Signal | tuple[Signal, ...] | None = None
     torque: Torque | tuple[Torque, ...] | None = None
     force: Signal | tuple[Signal, ...] = 0.0
     load_x: Signal | tuple[Signal, ...] = 0.0
     load_y: Signal | tuple[Signal, ...] = 0.0
 
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SliderCrankInputs(Channels):
+    """Everything that acts on a slider-crank during a run. SI units; a plain number is a constant.
+
+    Parameters
+    ----------
+    speed : signal, optional
+        Crank speed (rad/s). Where it is given the crank torque is a result.
+    torque : signal, TorsionBar, InductionMotor or a tuple of them, optional
+        Crank torque (N.m). Excludes ``speed``.
+    load : signal
+        Force on the slider along the guide (N), in the direction in which its position increases.
+    shift_speed : signal, optional
+        Axial velocity of the crank (m/s); the axial force is then a result.
+    axial_force : signal, optional
+        Force on the crank along its axis (N); the shift is then free.
+    groove : bool
+        Whether a groove in the crank shaft makes the shift, S1 = SS1 sin(alpha theta1) by eq 28, with the parameters'
+        ``groove_amplitude`` and ``groove_ratio``.
+
+    Notes
+    -----
+    Of ``shift_speed``, ``axial_force`` and ``groove`` one may be given; without any the shift is held as it is. A tuple of
+    signals is their sum. A `Function` is one of (t, theta1, S1, theta1', S1').
+
+    Raises
+    ------
+    InputError
+        If more than one drive of a freedom is given, or a value is not finite or of the wrong kind.
+    """
+
+    CHANNELS: ClassVar[tuple[str, ...]] = ("torque", "speed", "axial_force", "load", "shift_speed")
+    COMMANDS: ClassVar[tuple[str, ...]] = ("speed", "shift_speed")
+
+    speed: Signal | tuple[Signal, ...] | None = None
+    torque: Torque | tuple[Torque, ...] | None = None
+    load: Signal | tuple[Signal, ...] = 0.0
+    shift_speed: Signal | tuple[Signal, ...] | None = None
+    axial_force: Signal | tuple[Signal, ...] | None = None
+    groove: bool = False
+
     def __post_init__(self) -> None:
-        if self.speed is not None and self.torque is not None:
-            raise InputError("both speed and torque are given: the crank can be driven by one of them only")
-        for channel in CHANNELS:
-            for part in self.parts(channel):
-                kinds: tuple[type, ...] = (int, float, np.floating, np.integer, Piecewise, Harmonics, Function)
-                if channel == "torque":
-                    kinds = (*kinds, TorsionBar, InductionMotor)
-                if not isinstance(part, kinds):
-                    raise InputError(
-                        f"{channel} is {part!r}: it must be a number, a signal of analysis.inputs, or a Function"
-                    )
-                if isinstance(part, (int, float, np.floating, np.integer)) and not np.isfinite(part):
-                    raise InputError(f"{channel} is {part}: it must be a finite number")
-        if any(isinstance(part, Function) and part.rate is None for part in self.parts("speed")):
-            raise InputError("a speed given as a Function needs its rate, the acceleration (rad/s2)")
-        for channel in CHANNELS:
-            for kind in (TorsionBar, InductionMotor, Function):
-                if sum(isinstance(part, kind) for part in self.parts(channel)) > 1:
-                    raise InputError(f"{channel} has more than one {kind.__name__}: one can be in force at a time")
-
-    def parts(self, channel: str) -> tuple[Any, ...]:
-        """The summands of a channel."""
-        value = getattr(self, channel)
-        if value is None:
-            return ()
-        return value if isinstance(value, tuple) else (value,)
+        given = [name for name in ("shift_speed", "axial_force") if getattr(self, name) is not None]
+        given += ["groove"] * bool(self.groove)
+        if len(given) > 1:
+            raise InputError(f"both {' and '.join(given)} are given: the shift can be made by one of them only")
+        Channels.__post_init__(self)
 
     @property
-    def held_exactly(self) -> bool:
-        """Whether a master that holds the inputs over its steps loses nothing by it: all but the speed are constant.
+    def axial_mode(self) -> int:
+        """What makes the shift: 0 a force, 1 a commanded speed, 2 a groove; `linkwork.slider_crank.plant` names them."""
+        return 2 if self.groove else 0 if self.axial_force is not None else 1
 
-        The speed goes along the secant of a step, which is exact where it is constant.
-        """
-        parts = [part for channel in CHANNELS for part in self.parts(channel)]
-        return all(isinstance(part, (int, float, np.floating, np.integer)) for part in parts)
 
-    @property
-    def speed_drive(self) -> bool:
-        """Whether the crank speed is prescribed."""
-        return self.speed is not None
+#: Kind of inputs of each mechanism, by its name.
+INPUTS_OF: dict[str, type[Inputs | SliderCrankInputs]] = {"five-bar": Inputs, "slider-crank": SliderCrankInputs}
 
 
 @dataclass(frozen=True, slots=True)
@@ -284,43 +374,45 @@ class Encoded:
     law : ndarray, shape (6,)
         Torsion bar: torque, release angle, 1 while it acts. Motor: breakdown torque and slip, synchronous speed.
     functions : tuple
-        Python functions of torque, force, load_x, load_y, speed and its rate, or None.
+        Python functions of the channels 0, 2, 3, 4 and 1, and of the rates of channels 1 and 4, or None.
     """
 
     breaks: NDArray[np.float64]
     coefficients: NDArray[np.float64]
     harmonics: NDArray[np.float64]
     law: NDArray[np.float64]
-    functions: tuple[StateFunction | None, ...] = field(default=(None,) * 6)
+    functions: tuple[StateFunction | None, ...] = field(default=(None,) * FUNCTIONS)
 
     @property
     def steady(self) -> bool:
-        """Whether torque, force, load and crank acceleration, but for the torsion bar, are constant between the breaks."""
-        others = [CHANNELS.index(name) for name in CHANNELS if name != "speed"]
+        """Whether all channels, but for the torsion bar and of the speed its rate, are constant between the breaks.
+
+        An axial speed counts by its value, though only its rate acts: where it is not constant the run takes the general way.
+        """
+        others = [c for c in range(self.coefficients.shape[1]) if c != SPEED]
         return bool(
             len(self.harmonics) == 0
             and self.law[3] == 0.0
             and not any(self.functions)
             and np.all(self.coefficients[:, others, 1:] == 0.0)
-            and np.all(self.coefficients[:, CHANNELS.index("speed"), 2:] == 0.0)
+            and np.all(self.coefficients[:, SPEED, 2:] == 0.0)
         )
 
 
-def encode(inputs: Inputs) -> Encoded:
+def encode(inputs: Channels) -> Encoded:
     """Bring all channels onto common breaks."""
-    pieces = [(c, part) for c, name in enumerate(CHANNELS) for part in inputs.parts(name)]
+    pieces = [(c, part) for c, name in enumerate(inputs.CHANNELS) for part in inputs.parts(name)]
     times = [part.breaks for _, part in pieces if isinstance(part, Piecewise)]
     for _, part in pieces:
         if isinstance(part, Function) and len(part.breaks) > 0:
             # every one of them is a break inside: the first and the last of the merged ones are none
             times.append(np.array([min(part.breaks) - 1.0, *part.breaks, max(part.breaks) + 1.0]))
     merged = np.unique(np.concatenate(times)) if times else np.array([0.0, 1.0])
-    coefficients = np.zeros((len(merged) - 1, len(CHANNELS), 4))
+    coefficients = np.zeros((len(merged) - 1, len(inputs.CHANNELS), 4))
     harmonics: list[tuple[float, float, float, float]] = []
     law = np.zeros(6)
     law[4] = law[5] = 1.0
-    functions: list[StateFunction | None] = [None] * 6
-    slots = {"torque": 0, "force": 1, "load_x": 2, "load_y": 3, "speed": 4}
+    functions: list[StateFunction | None] = [None] * FUNCTIONS
     for c, part in pieces:
         if isinstance(part, Piecewise):
             coefficients[:, c, :] += _on_breaks(part, merged)
@@ -332,9 +424,9 @@ def encode(inputs: Inputs) -> Encoded:
         elif isinstance(part, InductionMotor):
             law[3:6] = part.breakdown_torque, part.breakdown_slip, part.synchronous_speed
         elif isinstance(part, Function):
-            functions[slots[CHANNELS[c]]] = part.function
-            if CHANNELS[c] == "speed":
-                functions[5] = part.rate
+            functions[SLOT_OF_CHANNEL[c]] = part.function
+            if c in SLOT_OF_RATE and part.rate is not None:
+                functions[SLOT_OF_RATE[c]] = part.rate
         else:
             coefficients[:, c, 0] += float(part)
     return Encoded(merged, coefficients, np.array(harmonics, dtype=float).reshape(-1, 4), law, tuple(functions))

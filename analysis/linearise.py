@@ -29,6 +29,7 @@ from linkwork.five_bar import dynamics, kinematics
 from linkwork.five_bar.parameters import FiveBarParameters
 from linkwork.five_bar.plant import check_assembly
 from linkwork.five_bar.variables import INPUTS, OUTPUT_NAMES, OUTPUTS
+from linkwork.limits import LIMIT_SINE
 
 from . import symbolic
 from .inputs import Inputs
@@ -251,7 +252,7 @@ class _Balance:
     def imbalance(self, th2: float, u: float) -> float:
         """Norm of the forces over the freedoms that are free (N.m); infinite where the links cannot be joined."""
         p = self.parameters.constants()
-        if kinematics.assembly_square(th2, u, p) < (kinematics.LIMIT_SINE * p.l3 * p.l4) ** 2:
+        if kinematics.assembly_square(th2, u, p) < (LIMIT_SINE * p.l3 * p.l4) ** 2:
             return float("inf")
         return float(np.linalg.norm(self.scale * np.array(self.forces(th2, u))[self.free]))
 

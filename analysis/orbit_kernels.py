@@ -18,7 +18,7 @@ from numba import boolean, float64, int64, njit
 from numba.extending import overload
 
 from linkwork.five_bar import dynamics, kinematics
-from linkwork.five_bar.kinematics import LIMIT_SINE
+from linkwork.limits import LIMIT_SINE
 
 from . import symbolic
 from .compiled import (

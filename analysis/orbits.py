@@ -18,9 +18,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from linkwork.errors import AssemblyError, InputError, LinkworkError
 from linkwork.five_bar import kinematics
-from linkwork.five_bar.kinematics import LIMIT_SINE
 from linkwork.five_bar.parameters import Constants, FiveBarParameters
 from linkwork.five_bar.variables import OUTPUT_NAMES
+from linkwork.limits import LIMIT_SINE
 
 from . import compiled, orbit_kernels
 from . import inputs as inputs_module
@@ -263,7 +263,7 @@ class PeriodicOrbit:
         if status != orbit_kernels.DONE:
             raise failure(status, self.start)
         values = np.empty((samples, len(OUTPUT_NAMES)))
-        compiled.outputs(p, states, forces, 0.0, values)
+        compiled.solver(type(p)).outputs(p, states, forces, 0.0, values)
         keep = [OUTPUT_NAMES.index(name) for name in NAMES]
         time, period = _times(states[:, 2], self.turns)
         return Turn(
@@ -450,7 +450,7 @@ def drive_of(inputs: inputs_module.Inputs) -> Drive:
     """
     constant: dict[str, float] = {}
     motors: list[InductionMotor] = []
-    for channel in inputs_module.CHANNELS:
+    for channel in inputs.CHANNELS:
         for part in inputs.parts(channel):
             if isinstance(part, InductionMotor):
                 motors.append(part)

@@ -1,4 +1,4 @@
-"""The in-process solver: runs of the five-bar slider, one or many."""
+"""The in-process solver: runs of a mechanism, one or many."""
 
 from __future__ import annotations
 
@@ -20,13 +20,11 @@ from rich.progress import Progress, track
 from scipy.integrate import OdeSolver, solve_ivp
 
 from linkwork.errors import InputError, Interrupted, LinkworkError
-from linkwork.five_bar import dynamics, kinematics
-from linkwork.five_bar.parameters import FiveBarParameters, InitialState
-from linkwork.five_bar.plant import check_assembly, error_scale
-from linkwork.five_bar.variables import OUTPUT_NAMES
+from linkwork.limits import LIMIT_SINE, NEAR_LIMIT
 from linkwork.plant import check_tolerance
 
-from .inputs import Encoded, Inputs, StateFunction, align, encode
+from .inputs import FUNCTIONS, INPUTS_OF, Channels, Encoded, StateFunction, align, encode
+from .mechanism import OUTPUT_UNITS, InitialState, Mechanism, Parameters, mechanism_of
 from .trajectory import Occurrence, Trajectory
 
 #: Steps of one compiled call, between which progress is shown and an interrupt is heard: about a tenth of a second.
@@ -38,7 +36,7 @@ EVENTS_PER_CALL = 1_000
 MOST_LOSSES = 300
 
 #: What `channels` returns, in its order.
-CHANNEL_NAMES = ("torque", "speed", "acceleration", "force", "load_x", "load_y")
+Values = tuple[float, float, float, float, float, float, float]
 
 SCIPY_METHODS = ("RK23", "RK45", "DOP853", "Radau", "BDF", "LSODA")
 
@@ -56,7 +54,8 @@ class Event:
     level : float
         Level of the output, in its SI unit.
     function : callable, optional
-        Instead of an output: ``f(t, th2, u, th2', u')`` of floats, compiled with Numba.
+        Instead of an output: ``f(t, th2, u, th2', u')`` of floats, compiled with Numba; the slider-crank's state is
+        (theta1, S1, theta1', S1').
     direction : int
         +1 for rising, -1 for falling, 0 for both.
     stop : bool
@@ -78,14 +77,29 @@ class Event:
     def __post_init__(self) -> None:
         if (self.output is None) == (self.function is None):
             raise InputError(f"event {self.name!r} needs either an output or a function")
-        if self.output is not None and self.output not in OUTPUT_NAMES:
-            raise InputError(f"event {self.name!r} is on {self.output!r}: the outputs are {', '.join(OUTPUT_NAMES)}")
+        if self.output is not None and self.output not in OUTPUT_UNITS:
+            raise self._no_output(tuple(OUTPUT_UNITS))
         if self.function is not None and not callable(self.function):
             raise InputError(f"event {self.name!r} has the function {self.function!r}: it must be callable")
         if self.direction not in (-1, 0, 1):
             raise InputError(f"event {self.name!r} has direction {self.direction}: it must be -1, 0 or +1")
         if not isfinite(self.level):
             raise InputError(f"event {self.name!r} has level {self.level}: it must be a finite number")
+
+    def column(self, mechanism: Mechanism) -> int:
+        """Number of the output among those of a mechanism.
+
+        Raises
+        ------
+        InputError
+            If the mechanism has no such output.
+        """
+        if self.output not in mechanism.output_names:
+            raise self._no_output(mechanism.output_names)
+        return mechanism.output_names.index(self.output)
+
+    def _no_output(self, names: tuple[str, ...]) -> InputError:
+        return InputError(f"event {self.name!r} is on {self.output!r}: the outputs are {', '.join(names)}")
 
 
 class RunInterrupted(Interrupted):
@@ -120,8 +134,8 @@ def sample_times(stop_time: float, step: float, start_time: float = 0.0) -> NDAr
 
 
 def simulate(
-    parameters: FiveBarParameters,
-    inputs: Inputs | None = None,
+    parameters: Parameters,
+    inputs: Channels | None = None,
     *,
     initial: InitialState | None = None,
     stop_time: float,
@@ -136,15 +150,15 @@ def simulate(
     progress: bool = False,
     **options: Any,
 ) -> Trajectory:
-    """Run a five-bar slider in process.
+    """Run a mechanism in process.
 
     Parameters
     ----------
-    parameters : FiveBarParameters
-    inputs : Inputs
-        What acts on it; by default nothing does (torque drive without torque).
+    parameters : FiveBarParameters or SliderCrankParameters
+    inputs : Inputs or SliderCrankInputs
+        What acts on it; by default nothing does (torque drive without torque, and the slider-crank's shift held).
     initial : InitialState
-        By default at rest with th2 = u = 0; in speed drive the commanded speed takes the place of ``crank_speed``.
+        That of the mechanism; by default at rest with all coordinates zero. Commanded speeds take the place of the rates.
     stop_time, start_time : float
         End and start of the run (s).
     step : float
@@ -181,22 +195,41 @@ def simulate(
     RunInterrupted
         On Ctrl-C; carries what was computed.
     """
-    inputs = inputs or Inputs()
-    initial = initial or InitialState()
+    mechanism = mechanism_of(parameters)
+    inputs, initial = given(mechanism, inputs, initial)
     check_tolerance(tolerance)
     times = _check_samples(sample_times(stop_time, step, start_time) if samples is None else np.asarray(samples, float))
     if hold is not None:
         _check_hold(hold, times)
     if max_steps < 1:
         raise InputError(f"max_steps is {max_steps}: it must be at least 1")
-    check_assembly(parameters, initial.crank_angle, initial.slider_position)
     encoded = align(encode(inputs), times)
-    run = _Run(parameters, inputs, encoded, initial, times, hold or 0.0, tolerance, tuple(events), max_steps)
+    run = _Run(mechanism, parameters, inputs, encoded, initial, times, hold or 0.0, tolerance, tuple(events), max_steps)
     if method == "compiled":
         if options:
             raise InputError(f"the compiled method takes no options, but was given {', '.join(options)}")
         return run.compiled(progress)
     return run.scipy(_solver(method), options, progress)
+
+
+def given(mechanism: Mechanism, inputs: Channels | None, initial: InitialState | None) -> tuple[Channels, Any]:
+    """Inputs and state at the start of a run, by default nothing and at rest; both must be of the mechanism.
+
+    Raises
+    ------
+    InputError
+        If they are another mechanism's.
+    """
+    kind = INPUTS_OF[mechanism.name]
+    inputs = kind() if inputs is None else inputs
+    initial = mechanism.initial() if initial is None else initial
+    for name, value, wanted in (("inputs", inputs, kind), ("initial", initial, mechanism.initial)):
+        if not isinstance(value, wanted):
+            raise InputError(
+                f"{name} is {type(value).__module__}.{type(value).__qualname__}: with parameters of the {mechanism.name} it "
+                f"must be {wanted.__module__}.{wanted.__qualname__}"
+            )
+    return inputs, initial
 
 
 def _solver(method: str | type[OdeSolver]) -> str | type[OdeSolver]:
@@ -271,10 +304,8 @@ def _reason(error: Exception) -> str:
     return (telling or lines or [type(error).__name__])[0]
 
 
-def channels(
-    encoded: Encoded, t: float, left: bool, x: NDArray[np.float64], law: NDArray[np.float64]
-) -> tuple[float, float, float, float, float, float]:
-    """Torque, speed, acceleration, slider force and load at time t and state x, for one who samples inputs in Python.
+def channels(encoded: Encoded, t: float, left: bool, x: NDArray[np.float64], law: NDArray[np.float64]) -> Values:
+    """Torque, speed, acceleration, force, load, last channel and its rate at time t and state x, sampled in Python.
 
     ``left`` asks for the limit from the left where an input jumps. The user's functions are called as the Python they are.
 
@@ -286,7 +317,7 @@ def channels(
     from . import compiled as k
 
     e = encoded
-    torque, speed, acceleration, force, load_x, load_y = k.channels(
+    torque, speed, acceleration, force, load, last, rate = k.channels(
         t, left, np.ascontiguousarray(x), k.Source(e.breaks, e.coefficients, e.harmonics, law, _NO_FUNCTIONS)
     )
     added = [0.0 if f is None else _number(f(t, x[0], x[1], x[2], x[3]), t) for f in e.functions]
@@ -295,12 +326,13 @@ def channels(
         speed + added[4],
         acceleration + added[5],
         force + added[1],
-        load_x + added[2],
-        load_y + added[3],
+        load + added[2],
+        last + added[3],
+        rate + added[6],
     )
-    for name, value in zip(CHANNEL_NAMES, values):
+    for number, value in enumerate(values):
         if not isfinite(value):
-            raise _not_finite(name, t, x)
+            raise NotFiniteError(number)
     return values
 
 
@@ -310,37 +342,44 @@ def held_channels(
     ahead: float,
     x: NDArray[np.float64],
     law: NDArray[np.float64],
-    speed_drive: bool,
-) -> tuple[float, float, float, float, float, float]:
+    inputs: Channels,
+) -> Values:
     """The channels at time t as one who samples them holds them until ``ahead``.
 
-    The crank speed goes along the secant; a torsion bar acts with the torque of the middle of the step, and ``law`` is
+    Commanded speeds go along the secant; a torsion bar acts with the torque of the middle of the step, and ``law`` is
     overwritten once it is released.
     """
     from .compiled import held_bar
 
     if law[2] and x[0] >= law[1]:
         law[2] = 0.0
-    torque, speed, acceleration, force, load_x, load_y = channels(encoded, t, False, x, law)
+    torque, speed, acceleration, force, load, last, rate = channels(encoded, t, False, x, law)
     torque += held_bar(law, x[0], x[2], ahead - t)
-    if speed_drive:
-        acceleration = (channels(encoded, ahead, True, x, law)[1] - speed) / (ahead - t)
-    return torque, speed, acceleration, force, load_x, load_y
+    if inputs.speed_drive or inputs.axial_mode == 1:
+        there = channels(encoded, ahead, True, x, law)
+        acceleration = (there[1] - speed) / (ahead - t)
+        rate = (there[5] - last) / (ahead - t)
+    return torque, speed, acceleration, force, load, last, rate
 
 
 class NotFiniteError(InputError):
-    """An input, which it names, is not a finite number at a time and a state."""
+    """An input, by its number among `Values`, is not a finite number; `not_finite` says it in a sentence."""
 
-    name = ""
-
-
-def _not_finite(name: str, t: float, x: NDArray[np.float64]) -> NotFiniteError:
-    error = NotFiniteError(f"the input {name} is not a finite number at t = {t:.9g} s, {_where(x)}")
-    error.name = name
-    return error
+    def __init__(self, number: int) -> None:
+        self.number = number
+        super().__init__(f"channel {number} of the inputs is not a finite number")
 
 
-_NO_FUNCTIONS = np.zeros(6, dtype=np.int64)
+def not_finite(mechanism: Mechanism, inputs: Channels, number: int, t: float, x: NDArray[np.float64]) -> InputError:
+    """The error for an input, by its number among `Values`, that is not a finite number at a time and a state."""
+    names = list(inputs.CHANNELS)
+    named = [names[0], names[1], "acceleration", *names[2:], f"rate of {names[-1]}"]
+    return InputError(
+        f"the input {named[number]} is not a finite number at t = {t:.9g} s, {mechanism.where(x[0], x[1])}"
+    )
+
+
+_NO_FUNCTIONS = np.zeros(FUNCTIONS, dtype=np.int64)
 
 
 def _number(value: object, t: float) -> float:
@@ -349,20 +388,17 @@ def _number(value: object, t: float) -> float:
     return float(value)
 
 
-def _where(x: NDArray[np.float64]) -> str:
-    return f"crank angle {x[0]:.9g} rad ({np.degrees(x[0]):.4f} deg) and slider position {x[1]:.9g} m"
-
-
-def _verdict(status: int, t: float, x: NDArray[np.float64], steps: int) -> tuple[int, str]:
+def _verdict(status: int, t: float, x: NDArray[np.float64], steps: int, mechanism: Mechanism) -> tuple[int, str]:
     """solver.status and solver.message of a run that ended with a status of the compiled code."""
     from . import compiled as k
 
+    where = mechanism.where(x[0], x[1])
     if status == k.LIMIT:
-        return 3, f"limit of assembly at t = {t:.9g} s, {_where(x)}"
+        return 3, f"limit of assembly at t = {t:.9g} s, {where}"
     if status == k.NO_STEP:
-        return 4, f"the step size fell below what t = {t:.9g} s can resolve, {_where(x)}"
+        return 4, f"the step size fell below what t = {t:.9g} s can resolve, {where}"
     if status == k.RUNNING:
-        return 4, f"{steps} steps did not suffice: stopped at t = {t:.9g} s, {_where(x)}"
+        return 4, f"{steps} steps did not suffice: stopped at t = {t:.9g} s, {where}"
     return 0, ""
 
 
@@ -401,10 +437,11 @@ def shown(progress: bool, duration: float, what: str = "simulate") -> Iterator[C
 class _Run:
     """One run, prepared: what both ways of solving it share."""
 
-    parameters: FiveBarParameters
-    inputs: Inputs
+    mechanism: Mechanism
+    parameters: Parameters
+    inputs: Channels
     encoded: Encoded
-    initial: InitialState
+    initial: Any
     times: NDArray[np.float64]
     hold: float
     tolerance: float
@@ -412,15 +449,53 @@ class _Run:
     max_steps: int
 
     def start(self) -> tuple[NDArray[np.float64], float, NDArray[np.float64]]:
-        """State at the start, mechanical energy there, and the error scale."""
+        """State at the start, mechanical energy there, and the error scale.
+
+        Raises
+        ------
+        AssemblyError
+            If the links cannot be joined there.
+        InputError
+            If a commanded speed is not a finite number.
+        """
         p = self.parameters.constants()
-        i = self.initial
-        x = np.array([i.crank_angle, i.slider_position, i.crank_speed, i.slider_velocity, 0.0, 0.0])
-        speed = channels(self.encoded, float(self.times[0]), False, x, self.encoded.law)[1]
+        x = np.array([*self.mechanism.state(self.initial), 0.0, 0.0])
+        values = self.sampled(float(self.times[0]), x)
         if self.inputs.speed_drive:
-            x[2] = speed
-        scale = np.array(error_scale(self.parameters, float(x[2])))
+            x[2] = values[1]
+        if self.inputs.axial_mode == 1:
+            x[3] = values[5]
+        dynamics = self.mechanism.dynamics
+        x = np.array(dynamics.started(tuple(x.tolist()), self.applied(values), p))
+        self.mechanism.check_assembly(self.parameters, x[0], x[1])
+        scale = np.array(self.mechanism.error_scale(self.parameters, float(x[2])))
         return x, dynamics.mechanical_energy(tuple(x), p), scale
+
+    def sampled(self, t: float, x: NDArray[np.float64]) -> Values:
+        """The channels at the start."""
+        try:
+            return channels(self.encoded, t, False, x, self.encoded.law)
+        except NotFiniteError as error:
+            raise not_finite(self.mechanism, self.inputs, error.number, t, x) from None
+
+    def applied(self, values: Values) -> Any:
+        """The channels as the inputs of the equations."""
+        torque, _, acceleration, force, load, last, rate = values
+        drive, axial = float(self.inputs.speed_drive), float(self.inputs.axial_mode)
+        p = self.parameters.constants()
+        return self.mechanism.dynamics.applied(drive, axial, torque, acceleration, force, load, last, rate, p)
+
+    @property
+    def solver(self) -> Any:
+        """The compiled code for the mechanism."""
+        from . import compiled
+
+        return compiled.solver(type(self.parameters.constants()))
+
+    @property
+    def n_inputs(self) -> int:
+        """Number of inputs of the equations."""
+        return len(self.mechanism.dynamics.Inputs._fields)
 
     def compiled(self, progress: bool) -> Trajectory:
         from . import compiled as k
@@ -431,8 +506,9 @@ class _Run:
         source, kept = compiled_source(self.encoded)
         watch, addresses, watching = self._watch()
         kept += watching
+        run, outputs = self.solver.run, self.solver.outputs
         n, n_events = len(self.times), len(self.events)
-        states, forces = np.full((n, 6), np.nan), np.full((n, 6), np.nan)
+        states, forces = np.full((n, 6), np.nan), np.full((n, self.n_inputs), np.nan)
         gaps = np.zeros(n_events)
         found = np.empty((EVENTS_PER_CALL * n_events, 8))
         carry = np.zeros(k.CARRY)
@@ -444,9 +520,10 @@ class _Run:
             try:
                 while status == k.RUNNING and carry[k.STEPS] < self.max_steps and not interrupted:
                     entered = clock.perf_counter()
-                    status = k.run(
-                        p, x, carry, self.times[-1], self.inputs.speed_drive, self.hold, self.encoded.steady, source,
-                        self.tolerance, scale, self.times, states, forces, watch, addresses, gaps, found, energy,
+                    status = run(
+                        p, x, carry, self.times[-1], self.inputs.speed_drive, float(self.inputs.axial_mode), self.hold,
+                        self.encoded.steady, source, self.tolerance, scale, self.times, states, forces, watch, addresses,
+                        gaps, found, energy,
                         min(STEPS_PER_CALL, self.max_steps - int(carry[k.STEPS])),
                     )  # fmt: skip
                     integrating += clock.perf_counter() - entered
@@ -457,16 +534,17 @@ class _Run:
                 interrupted.append(True)
         t = float(carry[k.BEGIN] + carry[k.ELAPSED])
         if status == k.BAD_INPUT:
-            raise _not_finite(CHANNEL_NAMES[int(carry[k.LOST])], t, x)
+            raise not_finite(self.mechanism, self.inputs, int(carry[k.LOST]), t, x)
         done = int(carry[k.SAMPLE])
         times, states, forces = self.times[:done], states[:done], forces[:done]
         if carry[k.STARTED] and times[-1] < t:
             # the run ended between two samples: its last configuration is recorded too
-            last = carry[k.HELD : k.HELD + 6]
+            last = carry[k.HELD : k.HELD + self.n_inputs]
             times, states, forces = np.append(times, t), np.vstack([states, x]), np.vstack([forces, last])
-        values = np.empty((len(times), len(OUTPUT_NAMES)))
-        k.outputs(p, states, forces, energy, values)
-        code, message = _verdict(status, t, x, self.max_steps)
+        names = self.mechanism.output_names
+        values = np.empty((len(times), len(names)))
+        outputs(p, states, forces, energy, values)
+        code, message = _verdict(status, t, x, self.max_steps, self.mechanism)
         trajectory = Trajectory(
             time=times,
             values=values,
@@ -477,6 +555,7 @@ class _Run:
                 for row in sorted(occurrences, key=lambda row: row[1])
             ),
             source="compiled DOP853",
+            names=names,
             statistics={
                 "steps": float(carry[k.STEPS] - carry[k.REJECTED]),
                 "rejected": float(carry[k.REJECTED]),
@@ -497,7 +576,7 @@ class _Run:
         for i, event in enumerate(self.events):
             watch[i] = 0.0, event.level, event.direction, event.stop
             if event.function is None:
-                watch[i, 0] = OUTPUT_NAMES.index(str(event.output))
+                watch[i, 0] = event.column(self.mechanism)
             else:
                 kept.append(compile_function(event.function))
                 addresses[i] = kept[-1].address
@@ -514,14 +593,16 @@ class _Run:
             except KeyboardInterrupt:
                 interrupted = True
         p = self.parameters.constants()
+        names, dynamics = self.mechanism.output_names, self.mechanism.dynamics
         rows = march.rows
         if rows and rows[-1][0] < march.t:
             rows = [*rows, (march.t, march.x, march.held)]
         values = [dynamics.outputs(tuple(x), held, march.energy, p) for _, x, held in rows]
-        code, message = _verdict(march.status, march.t, march.x, self.max_steps)
+        code, message = _verdict(march.status, march.t, march.x, self.max_steps, self.mechanism)
         trajectory = Trajectory(
             time=np.array([t for t, _, _ in rows]),
-            values=np.array(values).reshape(-1, len(OUTPUT_NAMES)),
+            values=np.array(values).reshape(-1, len(names)),
+            names=names,
             status=code,
             message=message,
             events=tuple(sorted(march.occurrences, key=lambda o: o.time)),
@@ -543,18 +624,18 @@ class _March:
         from . import compiled as k
 
         self.run_ = run
+        self.dynamics = run.mechanism.dynamics
         self.p = run.parameters.constants()
         self.x, self.energy, self.scale = run.start()
         self.law = run.encoded.law.copy()
-        self.speed_drive = run.inputs.speed_drive
         self.t = float(run.times[0])
-        self.held = dynamics.Inputs(float(self.speed_drive), 0.0, 0.0, 0.0, 0.0, 0.0)
-        self.rows: list[tuple[float, NDArray[np.float64], dynamics.Inputs]] = []
+        self.held = run.applied((0.0,) * 7)
+        self.rows: list[tuple[float, NDArray[np.float64], Any]] = []
         self.occurrences: list[Occurrence] = []
         self.evaluations = 0
         self.status = k.RUNNING
         #: the input that was not finite inside a step, which is then tried again shorter, how often, and what went well
-        self._lost = ""
+        self._lost: int | None = None
         self._losses = 0
         self._good = self.t, self.x
         #: value of each event at the end of the interval before; zero where it happened just there
@@ -567,17 +648,22 @@ class _March:
         later = breaks[(breaks > self.t) & (breaks < times[-1])]
         return float(later[0] if len(later) else times[-1])
 
-    def _sample(self, stop: float) -> float:
-        """Sample the inputs at the beginning of an interval; returns the commanded speed."""
+    def _sample(self, stop: float) -> tuple[float, float]:
+        """Sample the inputs at the beginning of an interval; returns the commanded speeds."""
         e, t, end = self.run_.encoded, self.t, self.run_.times[-1]
-        if self.run_.hold:
-            ahead = stop if t < end else t + self.run_.hold
-            values = held_channels(e, t, ahead, self.x, self.law, self.speed_drive)
-        else:
-            values = channels(e, t, False, self.x, self.law)
-        torque, speed, acceleration, force, load_x, load_y = values
-        self.held = dynamics.Inputs(float(self.speed_drive), torque, acceleration, force, load_x, load_y)
-        return speed
+        try:
+            if self.run_.hold:
+                ahead = stop if t < end else t + self.run_.hold
+                values = held_channels(e, t, ahead, self.x, self.law, self.run_.inputs)
+            else:
+                values = channels(e, t, False, self.x, self.law)
+        except NotFiniteError as error:
+            raise self._not_finite(error.number, t, self.x) from None
+        self.held = self.run_.applied(values)
+        return values[1], values[5]
+
+    def _not_finite(self, number: int, t: float, x: NDArray[np.float64]) -> InputError:
+        return not_finite(self.run_.mechanism, self.run_.inputs, number, t, x)
 
     def run(self, method: str | type[OdeSolver], options: dict[str, Any], show: Callable[[float], None] | None) -> None:
         """March to the end, a stopping event, or where it goes no further."""
@@ -589,9 +675,10 @@ class _March:
             stop = self._end_of_interval(interval)
             if self.law[2] and self.x[0] >= self.law[1]:
                 self.law[2] = 0.0
-            speed = self._sample(stop)
-            if self.speed_drive and self._gaps is not None:
-                self.x = np.array(dynamics.jump_speed(tuple(self.x), speed, self.p))
+            speed, last = self._sample(stop)
+            inputs = self.run_.inputs
+            if (inputs.speed_drive or inputs.axial_mode == 1) and self._gaps is not None:
+                self.x = np.array(self.dynamics.jump(tuple(self.x), self.held, speed, last, self.p))
             if len(self.rows) < len(times) and times[len(self.rows)] <= self.t:
                 self.rows.append((self.t, self.x, self.held))
             self._notice_jumps()
@@ -621,17 +708,16 @@ class _March:
                     self.status = k.EVENT
         self._gaps = gaps
 
-    def _gap(self, event: Event, t: float, x: NDArray[np.float64], held: dynamics.Inputs) -> float:
+    def _gap(self, event: Event, t: float, x: NDArray[np.float64], held: Any) -> float:
         if event.function is not None:
             return float(event.function(t, x[0], x[1], x[2], x[3]))
-        column = OUTPUT_NAMES.index(str(event.output))
-        return dynamics.outputs(tuple(x), held, self.energy, self.p)[column] - event.level
+        column = event.column(self.run_.mechanism)
+        return float(self.dynamics.outputs(tuple(x), held, self.energy, self.p)[column] - event.level)
 
-    def _inputs(self, t: float, x: NDArray[np.float64], stop: float) -> dynamics.Inputs:
+    def _inputs(self, t: float, x: NDArray[np.float64], stop: float) -> Any:
         if self.run_.hold or (self.run_.encoded.steady and not self.law[2]):
             return self.held
-        a = channels(self.run_.encoded, t, t >= stop, x, self.law)
-        return dynamics.Inputs(float(self.speed_drive), a[0], a[2], a[3], a[4], a[5])
+        return self.run_.applied(channels(self.run_.encoded, t, t >= stop, x, self.law))
 
     def _derivative(self, t: float, x: NDArray[np.float64], stop: float) -> NDArray[np.float64]:
         # where there is no configuration or no input, so large a derivative has the step tried again shorter
@@ -639,14 +725,14 @@ class _March:
         try:
             held = self._inputs(t, x, stop)
         except NotFiniteError as error:
-            self._lost = error.name
+            self._lost = error.number
             self._losses += 1
             if self._losses > MOST_LOSSES:
                 # LSODA would go on for ever
-                raise _not_finite(self._lost, *self._good) from None
+                raise self._not_finite(error.number, *self._good) from None
             return nothing
         try:
-            result = np.array(dynamics.derivative(tuple(x), held, self.p))
+            result = np.array(self.dynamics.derivative(tuple(x), held, self.p))
         except (ArithmeticError, ValueError):
             return nothing
         # a trial of a step too long may be anywhere
@@ -663,7 +749,7 @@ class _March:
         t0, x0 = self.t, self.x
         times = self.run_.times
         watched = self._watched(stop)
-        self._lost, self._losses, self._good = "", 0, (t0, x0)
+        self._lost, self._losses, self._good = None, 0, (t0, x0)
 
         def right_side(t: float, x: NDArray[np.float64]) -> NDArray[np.float64]:
             if show is not None:
@@ -714,9 +800,10 @@ class _March:
         else:
             if self.rows[-1][0] > t0:
                 self.t, self.x = self.rows[-1][:2]
-            if self._lost:
-                raise _not_finite(self._lost, *self._good)
-            self.status = k.LIMIT if abs(kinematics.position(self.x[0], self.x[1], self.p).s43) < 0.05 else k.NO_STEP
+            if self._lost is not None:
+                raise self._not_finite(self._lost, *self._good)
+            clearance = self.dynamics.clearance(tuple(self.x), self.held, self.p)
+            self.status = k.LIMIT if abs(clearance) < NEAR_LIMIT else k.NO_STEP
         self.held = self._inputs(self.t, self.x, stop)
         # what happens together with the release or the end of the interval must neither be lost nor be told twice: what
         # has not been told by now is left to the beginning of the next one
@@ -740,7 +827,7 @@ class _March:
 
         def limit(t: float, x: NDArray[np.float64]) -> float:
             try:
-                return float(self.p.branch * kinematics.position(x[0], x[1], self.p).s43 - kinematics.LIMIT_SINE)
+                return float(self.dynamics.clearance(tuple(x), self.held, self.p) - LIMIT_SINE)
             except (ArithmeticError, ValueError):
                 return -1.0
 
@@ -781,16 +868,17 @@ class Ensemble:
     ----------
     time : ndarray, shape (n,)
     states : ndarray, shape (m, n, 6)
-        (th2, u, th2', u', dissipated, supplied) of every run; NaN after a run that ended early, as ``counts`` tells.
-    forces : ndarray, shape (m, n, 6)
-        Inputs at the samples, as `linkwork.five_bar.dynamics.Inputs`.
+        State of every run, dissipated and supplied work included; NaN after a run that ended early, as ``counts`` tells.
+    forces : ndarray, shape (m, n, number of inputs)
+        Inputs at the samples, as the ``Inputs`` of the mechanism's ``dynamics``.
     status : ndarray of int, shape (m,)
         solver.status of each run; 2 where an input was not finite.
     messages : tuple of str
         Why a run ended early; empty if it did not.
     counts : ndarray of int, shape (m,)
         Samples that each run reached.
-    parameters : tuple of FiveBarParameters
+    parameters : tuple
+        Those of the mechanism, one for each run.
     energies : ndarray, shape (m,)
         Mechanical energy of each at the start (J).
     """
@@ -801,7 +889,7 @@ class Ensemble:
     status: NDArray[np.int64]
     messages: tuple[str, ...]
     counts: NDArray[np.int64]
-    parameters: tuple[FiveBarParameters, ...]
+    parameters: tuple[Parameters, ...]
     energies: NDArray[np.float64]
 
     def __len__(self) -> int:
@@ -812,15 +900,17 @@ class Ensemble:
         from . import compiled as k
 
         n = int(self.counts[index])
-        values = np.empty((n, len(OUTPUT_NAMES)))
+        names = mechanism_of(self.parameters[index]).output_names
+        values = np.empty((n, len(names)))
         p = self.parameters[index].constants()
-        k.outputs(p, self.states[index, :n], self.forces[index, :n], self.energies[index], values)
+        k.solver(type(p)).outputs(p, self.states[index, :n], self.forces[index, :n], self.energies[index], values)
         return Trajectory(
             time=self.time[:n],
             values=values,
             status=int(self.status[index]),
             message=self.messages[index],
             source="compiled DOP853",
+            names=names,
         )
 
     def output(self, name: str) -> np.ma.MaskedArray[Any, np.dtype[np.float64]]:
@@ -834,8 +924,8 @@ class Ensemble:
 
 
 def simulate_many(
-    parameters: Sequence[FiveBarParameters],
-    inputs: Inputs | Sequence[Inputs] | None = None,
+    parameters: Sequence[Parameters],
+    inputs: Channels | Sequence[Channels] | None = None,
     *,
     initial: InitialState | Sequence[InitialState] | None = None,
     stop_time: float,
@@ -866,19 +956,22 @@ def simulate_many(
         raise InputError("an ensemble needs at least one set of parameters")
     if batch < 1 or max_steps < 1:
         raise InputError(f"batch is {batch} and max_steps {max_steps}: both must be at least 1")
-    all_inputs = _each(inputs or Inputs(), m, "inputs")
-    starts = _each(initial or InitialState(), m, "initial states")
+    mechanism = mechanism_of(parameters[0])
+    if any(mechanism_of(p) is not mechanism for p in parameters):
+        raise InputError("an ensemble's parameters must all be of one mechanism")
+    all_inputs, starts = _each(inputs, m, "inputs"), _each(initial, m, "initial states")
+    pairs = [given(mechanism, i, s) for i, s in zip(all_inputs, starts)]
+    all_inputs, starts = [i for i, _ in pairs], [s for _, s in pairs]
     check_tolerance(tolerance)
     times = _check_samples(sample_times(stop_time, step, start_time))
     if hold is not None:
         _check_hold(hold, times)
-    if len({i.speed_drive for i in all_inputs}) > 1:
-        raise InputError("an ensemble's inputs must all give the speed or all the torque")
+    if len({(i.speed_drive, i.axial_mode) for i in all_inputs}) > 1:
+        raise InputError("an ensemble's inputs must all drive the mechanism in the same way, by speed or by torque")
     runs = []
     for number, (p, i, s) in enumerate(zip(parameters, all_inputs, starts)):
         try:
-            check_assembly(p, s.crank_angle, s.slider_position)
-            run = _Run(p, i, align(encode(i), times), s, times, hold or 0.0, tolerance, (), max_steps)
+            run = _Run(mechanism, p, i, align(encode(i), times), s, times, hold or 0.0, tolerance, (), max_steps)
             run.start()
         except LinkworkError as error:
             raise _of_run(number, error) from error
@@ -915,7 +1008,7 @@ def _of_run(number: int, error: LinkworkError) -> LinkworkError:
 
 
 def _each(value: Any, count: int, what: str) -> list[Any]:
-    if isinstance(value, (Inputs, InitialState)):
+    if value is None or not isinstance(value, Sequence):
         return [value] * count
     if len(value) != count:
         raise InputError(f"{len(value)} {what} for {count} sets of parameters: give one, or as many")
@@ -940,24 +1033,25 @@ def _run_batch(runs: Sequence[_Run]) -> tuple[Any, ...]:
         starts[i], energies[i], scales[i] = run.start()
     # kept alive while their addresses are in use
     source, _kept = compiled_source(encoded[0])
-    states, forces = np.full((m, n, 6), np.nan), np.full((m, n, 6), np.nan)
+    states, forces = np.full((m, n, 6), np.nan), np.full((m, n, runs[0].n_inputs), np.nan)
     carries = np.zeros((m, k.CARRY))
     carries[:, k.BEGIN] = runs[0].times[0]
     status = np.empty(m, dtype=np.int64)
-    k.run_many(
-        np.array([run.parameters.constants() for run in runs]), starts, energies, runs[0].times[-1],
-        runs[0].inputs.speed_drive, runs[0].hold, np.array([e.steady for e in encoded]), sizes, breaks, coefficients,
-        harmonics, np.array([e.law for e in encoded]), source.functions, runs[0].tolerance, scales, runs[0].times, states,
-        forces, carries, status, runs[0].max_steps,
+    first = runs[0]
+    first.solver.run_many(
+        first.parameters.constants(), np.array([run.parameters.constants() for run in runs]), starts, energies,
+        first.times[-1], first.inputs.speed_drive, float(first.inputs.axial_mode), first.hold,
+        np.array([e.steady for e in encoded]), sizes, breaks, coefficients, harmonics, np.array([e.law for e in encoded]),
+        source.functions, first.tolerance, scales, first.times, states, forces, carries, status, first.max_steps,
     )  # fmt: skip
     codes, messages = [], []
-    for code, x, carry in zip(status.tolist(), starts, carries):
+    for run, code, x, carry in zip(runs, status.tolist(), starts, carries):
         t = float(carry[k.BEGIN] + carry[k.ELAPSED])
         if code == k.BAD_INPUT:
             codes.append(code)
-            messages.append(str(_not_finite(CHANNEL_NAMES[int(carry[k.LOST])], t, x)))
+            messages.append(str(not_finite(run.mechanism, run.inputs, int(carry[k.LOST]), t, x)))
         else:
-            verdict, message = _verdict(code, t, x, runs[0].max_steps)
+            verdict, message = _verdict(code, t, x, run.max_steps, run.mechanism)
             codes.append(verdict)
             messages.append(message)
     return states, forces, np.array(codes), carries[:, k.SAMPLE].astype(np.int64), energies, messages

@@ -23,8 +23,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from linkwork.errors import AssemblyError, InputError
-from linkwork.five_bar.kinematics import LIMIT_SINE
 from linkwork.five_bar.parameters import Constants, FiveBarParameters
+from linkwork.limits import LIMIT_SINE
 
 from . import symbolic
 from .fourier import FourierSeries

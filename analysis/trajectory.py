@@ -12,19 +12,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from linkwork.errors import InputError
-from linkwork.five_bar.variables import OUTPUT_NAMES, OUTPUTS
+
+from .mechanism import FIVE_BAR, OUTPUT_UNITS
 
 if TYPE_CHECKING:
     import pandas
     from matplotlib.figure import Figure
 
 #: Unit of each real output, by name.
-UNITS: Mapping[str, str] = MappingProxyType({v.name: v.unit for v in OUTPUTS if v.kind == "Real"})
+UNITS: Mapping[str, str] = MappingProxyType(OUTPUT_UNITS)
 
 
 @dataclass(frozen=True, slots=True)
 class Occurrence:
-    """An event that happened: its name, the time (s), and (th2, u, th2', u') there in SI."""
+    """An event that happened: its name, the time (s), and the state there in SI.
+
+    The state is crank angle, slider position or axial shift, and their rates.
+    """
 
     name: str
     time: float
@@ -39,8 +43,9 @@ class Trajectory:
     ----------
     time : ndarray, shape (n,)
         Times of the samples (s).
-    values : ndarray, shape (n, 27)
-        Outputs in the order of the FMI contract, SI units. At a sample where an input jumps, the values after the jump.
+    values : ndarray, shape (n, m)
+        The outputs ``names``, in the order of the mechanism's FMI interface, SI units. At a sample where an input jumps,
+        the values after the jump.
     status : int
         0 if the run reached its end or a stopping event, else the solver.status of the FMI contract.
     message : str
@@ -66,7 +71,7 @@ class Trajectory:
     source: str = ""
     statistics: Mapping[str, float] = field(default_factory=dict)
 
-    names: tuple[str, ...] = OUTPUT_NAMES
+    names: tuple[str, ...] = FIVE_BAR.output_names
 
     def __getitem__(self, name: str) -> NDArray[np.float64]:
         return self.values[:, self.column(name)]
@@ -77,7 +82,7 @@ class Trajectory:
     @property
     def units(self) -> Mapping[str, str]:
         """Unit of each output."""
-        return UNITS
+        return MappingProxyType({name: UNITS[name] for name in self.names})
 
     def column(self, name: str) -> int:
         """Number of the column of an output.

@@ -36,7 +36,8 @@ from analysis.multipliers import SpeedDrive, rates, simulate_redundant, solve_mu
 from analysis.simulate import SCIPY_METHODS, Event, channels
 from linkwork.errors import AssemblyError, InputError, ParameterError
 from linkwork.five_bar import dynamics
-from linkwork.five_bar.kinematics import LIMIT_SINE, coefficients, position
+from linkwork.five_bar.kinematics import coefficients, position
+from linkwork.limits import LIMIT_SINE
 from linkwork.five_bar.parameters import FiveBarParameters, InitialState
 from linkwork.five_bar.published import (
     CM_PER_METRE,

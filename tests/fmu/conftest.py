@@ -1,4 +1,4 @@
-"""The FMU under test, built once, and variants of it built from changed copies of the sources."""
+"""The FMUs under test, each built once, and variants of them built from changed copies of the sources."""
 
 from __future__ import annotations
 
@@ -12,8 +12,7 @@ import pytest
 
 import build_fmu
 
-#: Paths below the source root, each with a text to replace in the file and what to put there.
-Changes = dict[str, tuple[str, str]]
+from .models import MODELS, Changes, Model
 
 
 def changed_sources(folder: Path, changes: Changes) -> Path:
@@ -29,27 +28,52 @@ def changed_sources(folder: Path, changes: Changes) -> Path:
 
 
 @pytest.fixture(scope="session")
-def fmu(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """FiveBarSlider.fmu, built from the sources as they are."""
-    return build_fmu.build("FiveBarSlider", tmp_path_factory.mktemp("fmu"))
+def fmus(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+    """Every FMU by its name, built from the sources as they are."""
+    folder = tmp_path_factory.mktemp("fmu")
+    return {name: build_fmu.build(name, folder) for name in MODELS}
+
+
+@pytest.fixture(scope="session", params=MODELS.values(), ids=MODELS)
+def model(request: pytest.FixtureRequest) -> Model:
+    """The model under test: each of them in turn."""
+    return request.param
+
+
+@pytest.fixture(scope="session")
+def fmu(fmus: dict[str, Path], model: Model) -> Path:
+    """The FMU of the model under test."""
+    return fmus[model.name]
+
+
+@pytest.fixture(scope="session")
+def five_bar(fmus: dict[str, Path]) -> Path:
+    """FiveBarSlider.fmu, where a test is of its mechanics."""
+    return fmus["FiveBarSlider"]
+
+
+@pytest.fixture(scope="session")
+def slider_crank(fmus: dict[str, Path]) -> Path:
+    """SliderCrank.fmu, where a test is of its mechanics."""
+    return fmus["SliderCrank"]
 
 
 @pytest.fixture(scope="session")
 def description(fmu: Path) -> ElementTree.Element:
-    """Root of its model description."""
+    """Root of the model description of the FMU under test."""
     return model_description(fmu)
 
 
 @pytest.fixture
-def build_variant(tmp_path: Path) -> Callable[[Changes], Path]:
-    """Builds an FMU from changed sources, each in a folder of its own."""
+def build_variant(tmp_path: Path, model: Model) -> Callable[[Changes], Path]:
+    """Builds the FMU under test from changed sources, each time in a folder of its own."""
     count = 0
 
     def build(changes: Changes) -> Path:
         nonlocal count
         count += 1
         folder = tmp_path / f"variant-{count}"
-        return build_fmu.build("FiveBarSlider", folder, changed_sources(folder, changes))
+        return build_fmu.build(model.name, folder, changed_sources(folder, changes))
 
     return build
 

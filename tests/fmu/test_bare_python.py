@@ -9,9 +9,20 @@ from typing import Any
 
 import pytest
 
+from .models import each
 from .runner import run_in_process
 
-VALUES = {"slider.damping": 25.0, "slider.coulomb_friction": 0.4, "drive.mode": 0, "drive.torque": 0.3}
+VALUES = {
+    "FiveBarSlider": {
+        "default": {},
+        "torque drive": {"slider.damping": 25.0, "slider.coulomb_friction": 0.4, "drive.mode": 0, "drive.torque": 0.3},
+    },
+    "SliderCrank": {
+        "default": {},
+        "forces": {"slider.damping": 25.0, "shift.damping": 9.0, "drive.mode": 0, "axial.mode": 0, "axial.force": 7.0},
+        "groove": {"axial.mode": 2, "groove.amplitude": 0.08, "groove.ratio": 2.0, "slider.coulomb_friction": 0.4},
+    },
+}
 
 
 def run_bare(fmu: str, folder: str, values: dict[str, float], steps: int) -> list[list[float]]:
@@ -63,7 +74,7 @@ def bare_python(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder / ("Scripts/python.exe" if sys.platform == "win32" else "bin/python")
 
 
-@pytest.mark.parametrize("values", [{}, VALUES], ids=["default", "torque drive"])
+@each(VALUES, "values")
 def test_same_values_as_through_fmpy_bit_for_bit(
     fmu: Path, tmp_path: Path, bare_python: Path, values: dict[str, Any]
 ) -> None:

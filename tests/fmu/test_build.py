@@ -14,7 +14,8 @@ import pytest
 import build_fmu
 from build_fmu import BuildError
 
-from .conftest import Changes, changed_sources, model_description
+from .conftest import changed_sources, model_description
+from .models import MODELS, Changes, Model, each
 
 Build = Callable[[Changes], Path]
 
@@ -23,7 +24,14 @@ def guid(fmu: Path) -> str:
     return model_description(fmu).get("guid")
 
 
-def test_archive(fmu: Path) -> None:
+#: Some of the variables that the page inside has to list.
+LISTED = {
+    "FiveBarSlider": ("slider.coulomb_friction", "drive.applied_torque", "solver.message"),
+    "SliderCrank": ("groove.amplitude", "axial.applied_force", "solver.message"),
+}
+
+
+def test_archive(fmu: Path, model: Model) -> None:
     with ZipFile(fmu) as archive:
         assert archive.testzip() is None
         assert {entry.compress_type for entry in archive.infolist()} == {ZIP_DEFLATED}
@@ -32,13 +40,14 @@ def test_archive(fmu: Path) -> None:
         page = archive.read("documentation/index.html").decode("utf-8")
         assert archive.read("model.png").startswith(b"\x89PNG\r\n\x1a\n")
         assert "MIT License" in archive.read("documentation/licenses/license.txt").decode("utf-8")
-    for variable in ("slider.coulomb_friction", "drive.applied_torque", "solver.message"):
+    for variable in LISTED[model.name]:
         assert f"<td>{variable}</td>" in page
-    assert {"binaries/linux64/FiveBarSlider.so", "binaries/win64/FiveBarSlider.dll"} <= set(names)
-    assert not [name for name in names if name.endswith(".pyc") or "slider_crank" in name]
+    assert {f"binaries/linux64/{model.name}.so", f"binaries/win64/{model.name}.dll"} <= set(names)
+    others = [other.plant for other in MODELS.values() if other != model]
+    assert not [name for name in names if name.endswith(".pyc") or any(other in name for other in others)]
 
 
-def test_modules_inside_carry_the_hash_of_their_content(fmu: Path, build_variant: Build) -> None:
+def test_modules_inside_carry_the_hash_of_their_content(fmu: Path, model: Model, build_variant: Build) -> None:
     def modules(path: Path) -> set[str]:
         with ZipFile(path) as archive:
             return {Path(name).parts[1] for name in archive.namelist() if name.startswith("resources/")} - {
@@ -49,77 +58,116 @@ def test_modules_inside_carry_the_hash_of_their_content(fmu: Path, build_variant
     ours = modules(fmu)
     tags = {name.removesuffix(".py")[-8:] for name in ours}
     assert len(tags) == 1
-    assert {name.removesuffix(".py")[:-9] for name in ours} == {"linkwork", "slave", "five_bar_slave"}
-    other = modules(
-        build_variant({"linkwork/friction.py": ("FRICTION_SPEED = 1e-3", "FRICTION_SPEED = 2e-3")})
-    )
+    assert {name.removesuffix(".py")[:-9] for name in ours} == {"linkwork", "slave", model.slave}
+    other = modules(build_variant({"linkwork/friction.py": ("FRICTION_SPEED = 1e-3", "FRICTION_SPEED = 2e-3")}))
     assert not ours & other
 
 
-def test_two_builds_are_the_same_archive(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_two_builds_are_the_same_archive(tmp_path: Path, model: Model, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("SOURCE_DATE_EPOCH", "1700000000")
-    first, second = (build_fmu.build("FiveBarSlider", tmp_path / name).read_bytes() for name in ("a", "b"))
+    first, second = (build_fmu.build(model.name, tmp_path / name).read_bytes() for name in ("a", "b"))
     assert first == second
 
 
-@pytest.mark.parametrize(
-    ("changes", "same"),
-    [
-        ({}, True),
-        ({"linkwork/five_bar/dynamics.py": ('"""Inertia matrix; the crank', '"""The inertia matrix; the crank')}, True),
-        ({"linkwork/friction.py": ("FRICTION_SPEED = 1e-3", "FRICTION_SPEED = 2e-3")}, True),
-        ({"linkwork/five_bar/variables.py": ('"Crank, A to B; greater than zero"', '"The crank, from A to B"')}, True),
-        ({"linkwork/five_bar/variables.py": ('"closure.residual", "m"', '"closure.gap", "m"')}, False),
-        ({"linkwork/five_bar/variables.py": ('"closure.residual", "m"', '"closure.residual", "1"')}, False),
-    ],
-    ids=["nothing", "docstring", "constant", "description", "name", "unit"],
-)
+#: Changes of what is said or reckoned, and of the interface, which alone the GUID follows.
+SAME_GUID = {
+    "nothing": {},
+    "constant": {"linkwork/friction.py": ("FRICTION_SPEED = 1e-3", "FRICTION_SPEED = 2e-3")},
+}
+CHANGES = {
+    "FiveBarSlider": {
+        **{name: (changes, True) for name, changes in SAME_GUID.items()},
+        "docstring": (
+            {"linkwork/five_bar/dynamics.py": ('"""Inertia matrix; the crank', '"""The inertia matrix; the crank')},
+            True,
+        ),
+        "description": (
+            {"linkwork/five_bar/variables.py": ('"Crank, A to B; greater than zero"', '"The crank, from A to B"')},
+            True,
+        ),
+        "name": ({"linkwork/five_bar/variables.py": ('"closure.residual", "m"', '"closure.gap", "m"')}, False),
+        "unit": ({"linkwork/five_bar/variables.py": ('"closure.residual", "m"', '"closure.residual", "1"')}, False),
+    },
+    "SliderCrank": {
+        **{name: (changes, True) for name, changes in SAME_GUID.items()},
+        "docstring": (
+            {"linkwork/slider_crank/dynamics.py": ('"""Inertia matrix; the rod', '"""The inertia matrix; the rod')},
+            True,
+        ),
+        "description": (
+            {"linkwork/slider_crank/variables.py": ('"Rod, crank pin to slider pin', '"The rod, from pin to pin')},
+            True,
+        ),
+        "name": ({"linkwork/slider_crank/variables.py": ('"closure.residual", "m"', '"closure.gap", "m"')}, False),
+        "unit": ({"linkwork/slider_crank/variables.py": ('"closure.residual", "m"', '"closure.residual", "1"')}, False),
+        "start": ({"linkwork/slider_crank/published.py": ("initial(3.5)", "initial(3.0)")}, False),
+        # a mode more, or a wider bound, is another interface as well
+        "bound": ({"linkwork/slider_crank/variables.py": ("        2,\n    ),", "        3,\n    ),")}, False),
+    },
+}
+
+
+@each(CHANGES, "changes", "same")
 def test_guid_changes_with_the_interface_and_only_then(
     fmu: Path, build_variant: Build, changes: Changes, same: bool
 ) -> None:
     assert (guid(build_variant(changes)) == guid(fmu)) is same
 
 
+def test_guids_of_the_models_differ(fmus: dict[str, Path]) -> None:
+    assert len({guid(fmu) for fmu in fmus.values()}) == len(fmus)
+
+
 def test_unknown_model(tmp_path: Path) -> None:
-    with pytest.raises(BuildError, match="no model 'SixBar': the models are FiveBarSlider"):
+    with pytest.raises(BuildError, match=r"no model 'SixBar': the models are FiveBarSlider, SliderCrank$"):
         build_fmu.build("SixBar", tmp_path)
 
 
-@pytest.mark.parametrize("missing", ["five_bar_slave.py", "slave.py", "linkwork", "linkwork/five_bar/dynamics.py"])
-def test_incomplete_sources(tmp_path: Path, missing: str) -> None:
+@pytest.mark.parametrize("missing", ["{slave}.py", "slave.py", "linkwork", "linkwork/{plant}/dynamics.py"])
+def test_incomplete_sources(tmp_path: Path, model: Model, missing: str) -> None:
     sources = changed_sources(tmp_path, {})
-    path = sources / missing
+    path = sources / missing.format(slave=model.slave, plant=model.plant)
     if path.is_dir():
         shutil.rmtree(path)
     else:
         path.unlink()
     before = list(sys.path)
-    with pytest.raises(BuildError, match=r"five_bar_slave\.py|slave\.py|linkwork|dynamics"):
-        build_fmu.build("FiveBarSlider", tmp_path / "build", sources)
+    with pytest.raises(BuildError, match=rf"{model.slave}\.py|slave\.py|linkwork|dynamics"):
+        build_fmu.build(model.name, tmp_path / "build", sources)
     assert sys.path == before
-    assert not (tmp_path / "build" / "FiveBarSlider.fmu").exists()
+    assert not (tmp_path / "build" / f"{model.name}.fmu").exists()
 
 
-def test_failed_build_leaves_the_old_fmu(tmp_path: Path, fmu: Path) -> None:
+def test_a_model_needs_no_other(tmp_path: Path, model: Model) -> None:
+    sources = changed_sources(tmp_path, {})
+    for other in MODELS.values():
+        if other != model:
+            shutil.rmtree(sources / "linkwork" / other.plant)
+            (sources / f"{other.slave}.py").unlink()
+    assert build_fmu.build(model.name, tmp_path / "build", sources).is_file()
+
+
+def test_failed_build_leaves_the_old_fmu(tmp_path: Path, fmu: Path, model: Model) -> None:
     dest = tmp_path / "build"
     dest.mkdir()
     shutil.copy2(fmu, dest)
     # outputs and variables out of step: what is built would not be valid
     broken = changed_sources(tmp_path, {"linkwork/variables.py": ('"kg.m2": Unit(kg=1, m=2)', '"kg.m3": Unit(kg=1)')})
     with pytest.raises(BuildError):
-        build_fmu.build("FiveBarSlider", dest, broken)
-    assert [path.name for path in dest.iterdir()] == ["FiveBarSlider.fmu"]
-    assert (dest / "FiveBarSlider.fmu").read_bytes() == fmu.read_bytes()
+        build_fmu.build(model.name, dest, broken)
+    assert [path.name for path in dest.iterdir()] == [fmu.name]
+    assert (dest / fmu.name).read_bytes() == fmu.read_bytes()
 
 
 @pytest.mark.parametrize(
     ("arguments", "code", "told"),
     [
         (["FiveBarSlider"], 0, "FiveBarSlider.fmu: valid"),
+        ([], 0, "SliderCrank.fmu: valid"),
         (["SixBar"], 1, "error: there is no model 'SixBar'"),
         (["--no-such-option"], 2, "usage:"),
     ],
-    ids=["good", "unknown", "usage"],
+    ids=["one", "all", "unknown", "usage"],
 )
 def test_exit_codes(tmp_path: Path, arguments: list[str], code: int, told: str) -> None:
     done = subprocess.run(
@@ -131,4 +179,5 @@ def test_exit_codes(tmp_path: Path, arguments: list[str], code: int, told: str) 
     )
     assert done.returncode == code, done.stderr
     assert told in (done.stdout if code == 0 else done.stderr)
-    assert (tmp_path / "FiveBarSlider.fmu").is_file() is (code == 0)
+    built = {path.stem for path in tmp_path.glob("*.fmu")}
+    assert built == (set() if code else set(arguments or MODELS))

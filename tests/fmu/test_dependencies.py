@@ -8,42 +8,82 @@ from xml.etree.ElementTree import Element
 
 import pytest
 
+from .models import Model, each
 from .runner import run_in_process
 from .test_description import INPUTS, ROWS, unknowns
 
 # nothing zero and nothing aligned, so that no dependency hides
-MECHANISM = {
-    "crank.mass": 0.3,
-    "crank.cog_distance": 0.02,
-    "crank.cog_angle": 0.4,
-    "coupler.cog_angle": 0.3,
-    "rocker.cog_angle": -0.2,
-    "slider.guide_angle": 0.25,
-    "slider.coulomb_friction": 0.5,
-    "slider.spring_free_position": 0.001,
-    "coupler.point_distance": 0.08,
-    "coupler.point_angle": 0.5,
-    "ground.inclination": 0.3,
-    "initial.crank_angle": 0.7,
-    "initial.slider_velocity": 0.1,
-    "initial.slider_position": 0.004,
-    "drive.torque": 0.6,
-    "drive.acceleration": 30.0,
-    "slider.force": 1.5,
-    "load.fx": 2.0,
-    "load.fy": -1.0,
+MECHANISMS = {
+    "FiveBarSlider": {
+        "crank.mass": 0.3,
+        "crank.cog_distance": 0.02,
+        "crank.cog_angle": 0.4,
+        "coupler.cog_angle": 0.3,
+        "rocker.cog_angle": -0.2,
+        "slider.guide_angle": 0.25,
+        "slider.coulomb_friction": 0.5,
+        "slider.spring_free_position": 0.001,
+        "coupler.point_distance": 0.08,
+        "coupler.point_angle": 0.5,
+        "ground.inclination": 0.3,
+        "initial.crank_angle": 0.7,
+        "initial.slider_velocity": 0.1,
+        "initial.slider_position": 0.004,
+        "drive.torque": 0.6,
+        "drive.acceleration": 30.0,
+        "slider.force": 1.5,
+        "load.fx": 2.0,
+        "load.fy": -1.0,
+    },
+    "SliderCrank": {
+        "guide.twist": 4.3,
+        "crank.inertia": 0.9,
+        "crank.cog_y": 0.04,
+        "crank.cog_z": -0.03,
+        "crank.product_xz": 0.02,
+        "crank.product_yz": -0.01,
+        "rod.cog_distance": 0.5,
+        "slider.cog_x": 0.02,
+        "slider.cog_y": -0.03,
+        "slider.cog_z": 0.05,
+        "slider.stiffness": 300.0,
+        "slider.spring_free_position": 1.0,
+        "slider.damping": 15.0,
+        "slider.coulomb_friction": 0.5,
+        "shift.stiffness": 500.0,
+        "shift.spring_free_position": 0.02,
+        "shift.damping": 12.0,
+        "groove.amplitude": 0.06,
+        "groove.ratio": 1.7,
+        "gravity.x": 3.0,
+        "gravity.y": -7.0,
+        "gravity.z": 5.0,
+        "initial.crank_angle": 0.7,
+        "initial.shift_velocity": 0.3,
+        "drive.torque": 6.0,
+        "drive.acceleration": 9.0,
+        "axial.force": 11.0,
+        "axial.speed": -0.2,
+        "axial.acceleration": 2.0,
+        "slider.load": 14.0,
+    },
+}
+#: Every way to drive each.
+MODES = {
+    "FiveBarSlider": [{"drive.mode": drive} for drive in (0, 1)],
+    "SliderCrank": [{"drive.mode": drive, "axial.mode": axial} for drive in (0, 1) for axial in (0, 1, 2)],
 }
 
 
-def perturb_inputs(fmu: str, folder: str, mechanism: dict[str, float]) -> list[list[Any]]:
-    """For both drives, at the start and after a step: which outputs change at once with each input."""
+def perturb_inputs(fmu: str, folder: str, mechanism: dict[str, float], modes: list[dict[str, int]]) -> list[list[Any]]:
+    """For all drives, at the start and after a step: which outputs change at once with each input."""
     from bare_master import Fmu
 
     fmu = Fmu(fmu, folder)
     inputs = [v.name for v in fmu.variables.values() if v.causality == "input"]
     found = []
-    for mode in (0, 1):
-        instance = fmu.instantiate().start(mechanism | {"drive.mode": mode})
+    for mode in modes:
+        instance = fmu.instantiate().start(mechanism | mode)
         time = 0.0
         for steps in (0, 1, 3):
             time = instance.run([1e-3] * steps, time)
@@ -60,20 +100,22 @@ def perturb_inputs(fmu: str, folder: str, mechanism: dict[str, float]) -> list[l
     return found
 
 
-def perturb_start(fmu: str, folder: str, mechanism: dict[str, float]) -> dict[str, list[str]]:
-    """For both drives: which outputs at the start change with each parameter and input."""
+def perturb_start(
+    fmu: str, folder: str, mechanism: dict[str, float], modes: list[dict[str, int]]
+) -> dict[str, list[str]]:
+    """For all drives: which outputs at the start change with each parameter and input."""
     from bare_master import Fmu
 
     fmu = Fmu(fmu, folder)
     found = {}
-    for mode in (0, 1):
-        base = fmu.instantiate().start(mechanism | {"drive.mode": mode})
+    for mode in modes:
+        base = fmu.instantiate().start(mechanism | mode)
         before = base.outputs()
         for name, variable in fmu.variables.items():
             if variable.causality == "output" or variable.kind != "Real":
                 continue
             value = base.get(name)
-            instance = fmu.instantiate().start(mechanism | {"drive.mode": mode, name: value * 1.01 or 0.01})
+            instance = fmu.instantiate().start(mechanism | mode | {name: value * 1.01 or 0.01})
             after = instance.outputs()
             found.setdefault(name, []).extend(n for n in before if before[n] != after[n])
             instance.free()
@@ -81,32 +123,65 @@ def perturb_start(fmu: str, folder: str, mechanism: dict[str, float]) -> dict[st
     return found
 
 
+Changed = list[tuple[dict[str, int], str, list[str]]]
+
+
 @pytest.fixture(scope="module")
-def changed(fmu: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, set[str]]:
-    """Which outputs were seen to change at once with each input."""
-    seen: dict[str, set[str]] = {}
-    for _, _, name, outputs in run_in_process(perturb_inputs, fmu, tmp_path_factory.mktemp("run"), MECHANISM):
-        seen.setdefault(name, set()).update(outputs)
-    return seen
+def changed(fmu: Path, model: Model, tmp_path_factory: pytest.TempPathFactory) -> Changed:
+    """Under each drive, which outputs were seen to change at once with each input, at the start or later."""
+    arguments = (MECHANISMS[model.name], MODES[model.name])
+    found = run_in_process(perturb_inputs, fmu, tmp_path_factory.mktemp("run"), *arguments)
+    return [(mode, name, outputs) for mode, _, name, outputs in found]
 
 
-@pytest.mark.parametrize("name", sorted(INPUTS))
+@each({model: {name: name for name in sorted(inputs)} for model, inputs in INPUTS.items()}, "name")
 def test_outputs_that_change_at_once_are_those_declared(
-    description: Element, changed: dict[str, set[str]], name: str
+    description: Element, changed: Changed, model: Model, name: str
 ) -> None:
     declared = {output for output, on in unknowns(description, "Outputs").items() if name in on}
     # the one dependency declared to be safe that there is not: the acceleration is commanded apart from the speed
-    never = {"crank.acceleration"} if name == "drive.speed" else set()
-    assert changed[name] == declared - never
+    never = {"drive.speed": {"crank.acceleration"}, "axial.speed": {"shift.acceleration"}}.get(name, set())
+    assert {output for _, given, outputs in changed if given == name for output in outputs} == declared - never
+
+
+#: Inputs of one way to drive that are of no effect in the others: what they are read under.
+READ_UNDER = {
+    "drive.torque": ("drive.mode", 0),
+    "drive.speed": ("drive.mode", 1),
+    "drive.acceleration": ("drive.mode", 1),
+    "axial.force": ("axial.mode", 0),
+    "axial.speed": ("axial.mode", 1),
+    "axial.acceleration": ("axial.mode", 1),
+}
+
+
+def test_inputs_of_another_drive_are_of_no_effect(changed: Changed) -> None:
+    for mode, name, outputs in changed:
+        parameter, value = READ_UNDER.get(name, ("drive.mode", mode["drive.mode"]))
+        assert bool(outputs) is (mode[parameter] == value), (mode, name)
+
+
+#: Outputs at the start that change with a parameter of the configuration, of those declared to.
+MOVED = {
+    "FiveBarSlider": {"slider.guide_angle": {"coupler.angle", "rocker.angle", "transmission.angle"}},
+    "SliderCrank": {
+        "guide.twist": {"slider.position", "slider_pin.y", "slider_pin.z", "transmission.angle", "assembly.margin"},
+        "groove.amplitude": {"shift.position", "crank_pin.z", "slider.position"},
+        "groove.ratio": {"shift.position", "crank_pin.z", "slider.position"},
+        "initial.shift_position": {"shift.position", "crank_pin.z", "slider.position"},
+    },
+}
 
 
 def test_outputs_at_the_start_change_only_with_what_they_declare(
-    description: Element, fmu: Path, tmp_path: Path
+    description: Element, fmu: Path, model: Model, tmp_path: Path
 ) -> None:
     declared = unknowns(description, "InitialUnknowns")
-    found = run_in_process(perturb_start, fmu, tmp_path, MECHANISM)
-    assert set(found) == {name for name, causality, kind, *_ in ROWS if causality != "output" and kind == "Real"}
-    assert set(found["slider.guide_angle"]) >= {"coupler.angle", "rocker.angle", "transmission.angle"}
+    found = run_in_process(perturb_start, fmu, tmp_path, MECHANISMS[model.name], MODES[model.name])
+    rows = ROWS[model.name]
+    assert set(found) == {name for name, causality, kind, *_ in rows if causality != "output" and kind == "Real"}
+    for name, outputs in MOVED[model.name].items():
+        assert set(found[name]) >= outputs, name
     undeclared = {
         (output, name)
         for name, outputs in found.items()

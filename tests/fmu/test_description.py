@@ -11,9 +11,13 @@ from fmpy.validation import validate_fmu
 
 import linkwork
 
-# The contract, written out: name, causality, type, unit, start. Starts are Table 3.1 of the thesis at 420 rpm with
-# k = 1e6 dyn/cm and mu = 3e4 dyn.s/cm in SI; a "?" is an output whose start follows from the others.
-CONTRACT = """
+from .models import MODELS, Model, each
+
+# The contracts, written out: name, causality, type, unit, start; a "?" is an output whose start follows from the others.
+CONTRACTS = {}
+
+# Starts are Table 3.1 of Youssef's thesis at 420 rpm with k = 1e6 dyn/cm and mu = 3e4 dyn.s/cm in SI.
+CONTRACTS["FiveBarSlider"] = """
 ground.length               parameter Real    m      0.1535
 crank.length                parameter Real    m      0.05
 coupler.length              parameter Real    m      0.15
@@ -83,7 +87,108 @@ transmission.angle          output    Real    rad    ?
 solver.status               output    Integer -      0
 solver.message              output    String  -      -
 """
-ROWS = [tuple(line.split()) for line in CONTRACT.split("\n") if line]
+
+# Starts are section 3.1 of Rahman's thesis with a4 = 10 in and S1 = 3.5 in at 50 rpm, in SI: with 1 in = 0.0254 m and
+# 1 lb = 4.4482216152605 N the masses are 0.06146594, 0.11382582 and 0.01956522 lb.s2/in, and the radii of gyration squared are
+# 1.5^2/4 + 12^2/3 in2 of the crank about its axis and 1/4 + 50^2/12 in2 of the rod. At theta1 = 0 the guide is square to the
+# offset: S4 = sqrt(50^2 - 22^2 - 3.5^2) in, rod and slider move along it at a1 w without turning, and S4'' = 12 in * 22 w^2
+# over that root.
+CONTRACTS["SliderCrank"] = """
+crank.length                parameter Real    m      0.3048
+rod.length                  parameter Real    m      1.27
+guide.offset                parameter Real    m      0.254
+guide.twist                 parameter Real    rad    4.71238898038469
+crank.mass                  parameter Real    kg     10.7643355476
+rod.mass                    parameter Real    kg     19.9339556259
+slider.mass                 parameter Real    kg     3.4263950595
+crank.inertia               parameter Real    kg.m2  0.337252902933
+crank.cog_x                 parameter Real    m      0.1524
+crank.cog_y                 parameter Real    m      0
+crank.cog_z                 parameter Real    m      0
+crank.product_xz            parameter Real    kg.m2  0
+crank.product_yz            parameter Real    kg.m2  0
+rod.inertia                 parameter Real    kg.m2  2.68250490013
+rod.cog_distance            parameter Real    m      0.635
+slider.cog_x                parameter Real    m      0
+slider.cog_y                parameter Real    m      0
+slider.cog_z                parameter Real    m      0
+slider.stiffness            parameter Real    N/m    0
+slider.spring_free_position parameter Real    m      0
+slider.damping              parameter Real    N.s/m  0
+slider.coulomb_friction     parameter Real    N      0
+shift.stiffness             parameter Real    N/m    0
+shift.spring_free_position  parameter Real    m      0
+shift.damping               parameter Real    N.s/m  0
+groove.amplitude            parameter Real    m      0
+groove.ratio                parameter Real    1      1
+gravity.x                   parameter Real    m/s2   0
+gravity.y                   parameter Real    m/s2   0
+gravity.z                   parameter Real    m/s2   0
+assembly.branch             parameter Integer -      1
+drive.mode                  parameter Integer -      1
+axial.mode                  parameter Integer -      1
+initial.crank_angle         parameter Real    rad    0
+initial.crank_speed         parameter Real    rad/s  5.235987755983
+initial.shift_position      parameter Real    m      0.0889
+initial.shift_velocity      parameter Real    m/s    0
+solver.tolerance            parameter Real    1      1e-9
+drive.torque                input     Real    N.m    0
+drive.speed                 input     Real    rad/s  5.235987755983
+drive.acceleration          input     Real    rad/s2 0
+axial.force                 input     Real    N      0
+axial.speed                 input     Real    m/s    0
+axial.acceleration          input     Real    m/s2   0
+slider.load                 input     Real    N      0
+crank.angle                 output    Real    rad    0
+crank.speed                 output    Real    rad/s  5.235987755983
+crank.acceleration          output    Real    rad/s2 0
+shift.position              output    Real    m      0.0889
+shift.velocity              output    Real    m/s    0
+shift.acceleration          output    Real    m/s2   0
+slider.position             output    Real    m      1.1369869612269
+slider.velocity             output    Real    m/s    1.59592906802
+slider.acceleration         output    Real    m/s2   4.10689046975
+crank_pin.x                 output    Real    m      0.3048
+crank_pin.y                 output    Real    m      0
+crank_pin.z                 output    Real    m      0.0889
+slider_pin.x                output    Real    m      -0.254
+slider_pin.y                output    Real    m      1.1369869612269
+slider_pin.z                output    Real    m      0
+rod.wx                      output    Real    rad/s  0
+rod.wy                      output    Real    rad/s  0
+rod.wz                      output    Real    rad/s  0
+drive.applied_torque        output    Real    N.m    ?
+axial.applied_force         output    Real    N      ?
+bearing.fx                  output    Real    N      ?
+bearing.fy                  output    Real    N      ?
+bearing.fz                  output    Real    N      ?
+bearing.mx                  output    Real    N.m    ?
+bearing.my                  output    Real    N.m    ?
+bearing.mz                  output    Real    N.m    ?
+crank_pin.fx                output    Real    N      ?
+crank_pin.fy                output    Real    N      ?
+crank_pin.fz                output    Real    N      ?
+slider_pin.fx               output    Real    N      ?
+slider_pin.fy               output    Real    N      -14.07182922
+slider_pin.fz               output    Real    N      ?
+guide.fx                    output    Real    N      ?
+guide.fy                    output    Real    N      0
+guide.fz                    output    Real    N      ?
+guide.mx                    output    Real    N.m    0
+guide.my                    output    Real    N.m    0
+guide.mz                    output    Real    N.m    0
+energy.kinetic              output    Real    J      34.37227492
+energy.potential            output    Real    J      0
+energy.dissipated           output    Real    J      0
+energy.supplied             output    Real    J      0
+energy.residual             output    Real    J      0
+closure.residual            output    Real    m      0
+transmission.angle          output    Real    rad    1.10902636638
+assembly.margin             output    Real    m      0.704172596987
+solver.status               output    Integer -      0
+solver.message              output    String  -      -
+"""
+ROWS = {model: [tuple(line.split()) for line in contract.split("\n") if line] for model, contract in CONTRACTS.items()}
 
 #: Exponents of kg, m, s and rad; the other base units of SI do not occur.
 UNITS = {
@@ -103,32 +208,52 @@ UNITS = {
     "J": (1, 2, -2, 0),
 }
 
-BOUNDS = {
-    **{name: (0.0, None) for name, _, _, unit, _ in ROWS if unit in ("kg", "kg.m2", "N/m", "N.s/m")},
-    **{f"{link}.length": (0.0, None) for link in ("ground", "crank", "coupler", "rocker")},
+#: Bounds of what every model has, and of what one has.
+COMMON_BOUNDS = {
+    **{f"{link}.length": (0.0, None) for link in ("ground", "crank", "coupler", "rocker", "rod")},
     "slider.coulomb_friction": (0.0, None),
-    "gravity": (0.0, None),
     "assembly.branch": (-1.0, 1.0),
     "drive.mode": (0.0, 1.0),
     "solver.tolerance": (1e-13, 1e-2),
-    "coupler.angle": (-pi, pi),
-    "rocker.angle": (-pi, pi),
     "energy.kinetic": (0.0, None),
     "closure.residual": (0.0, None),
-    "transmission.angle": (0.0, pi),
     "solver.status": (0.0, 9.0),
 }
+BOUNDS = {
+    "FiveBarSlider": {
+        "gravity": (0.0, None),
+        "coupler.angle": (-pi, pi),
+        "rocker.angle": (-pi, pi),
+        "transmission.angle": (0.0, pi),
+    },
+    "SliderCrank": {"axial.mode": (0.0, 2.0), "transmission.angle": (0.0, pi / 2)},
+}
+#: Of these units no parameter may be negative, products of inertia apart.
+NOT_NEGATIVE = ("kg", "kg.m2", "N/m", "N.s/m")
 
-INPUTS = {name for name, causality, *_ in ROWS if causality == "input"}
+INPUTS = {model: {name for name, causality, *_ in rows if causality == "input"} for model, rows in ROWS.items()}
 #: What each output depends on at one instant, where that is not every input. A commanded speed that jumps takes the
-#: slider's velocity with it, and with it all energies but the potential and the dissipated.
-OF_STATE = [
-    *("crank.angle", "coupler.angle", "rocker.angle", "slider.position", "coupler.point.x", "coupler.point.y"),
-    *("energy.potential", "energy.dissipated", "closure.residual", "transmission.angle"),
-    *("solver.status", "solver.message"),
+#: other freedom's velocity with it, and with it all energies but the potential and the dissipated.
+OF_STATE = {
+    "FiveBarSlider": ["coupler.angle", "rocker.angle", "coupler.point.x", "coupler.point.y"],
+    "SliderCrank": [
+        "shift.position",
+        *(f"{pin}_pin.{axis}" for pin in ("crank", "slider") for axis in "xyz"),
+        "assembly.margin",
+    ],
+}
+OF_STATE_ALWAYS = [
+    *("crank.angle", "slider.position", "energy.potential", "energy.dissipated", "closure.residual"),
+    *("transmission.angle", "solver.status", "solver.message"),
 ]
-OF_SPEED = ["crank.speed", "slider.velocity", "energy.kinetic", "energy.supplied", "energy.residual"]
-DEPENDENCIES = {name: set() for name in OF_STATE} | {name: {"drive.speed"} for name in OF_SPEED}
+OF_SPEED = {"FiveBarSlider": [], "SliderCrank": ["shift.velocity", "rod.wx", "rod.wy", "rod.wz"]}
+OF_SPEED_ALWAYS = ["crank.speed", "slider.velocity", "energy.kinetic", "energy.supplied", "energy.residual"]
+COMMANDS = {"FiveBarSlider": {"drive.speed"}, "SliderCrank": {"drive.speed", "axial.speed"}}
+DEPENDENCIES = {
+    model: {name: set() for name in OF_STATE_ALWAYS + OF_STATE[model]}
+    | dict.fromkeys(OF_SPEED_ALWAYS + OF_SPEED[model], COMMANDS[model])
+    for model in MODELS
+}
 
 
 def scalars(description: Element) -> dict[str, Element]:
@@ -139,12 +264,16 @@ def test_validator_finds_nothing(fmu: Path) -> None:
     assert validate_fmu(str(fmu)) == []
 
 
-def test_variables_are_those_of_the_contract_in_its_order(description: Element) -> None:
-    assert list(scalars(description)) == [row[0] for row in ROWS]
+def test_variables_are_those_of_the_contract_in_its_order(description: Element, model: Model) -> None:
+    assert list(scalars(description)) == [row[0] for row in ROWS[model.name]]
 
 
-@pytest.mark.parametrize(("name", "causality", "kind", "unit", "start"), ROWS, ids=[row[0] for row in ROWS])
-def test_variable(description: Element, name: str, causality: str, kind: str, unit: str, start: str) -> None:
+@each(
+    {model: {row[0]: row for row in rows} for model, rows in ROWS.items()}, "name", "causality", "kind", "unit", "start"
+)
+def test_variable(
+    description: Element, model: Model, name: str, causality: str, kind: str, unit: str, start: str
+) -> None:
     node = scalars(description)[name]
     value = node[0]
     assert node.get("causality") == causality
@@ -159,18 +288,22 @@ def test_variable(description: Element, name: str, causality: str, kind: str, un
     elif start == "?":
         assert float(value.get("start")) != 0.0
     else:
-        assert float(value.get("start")) == pytest.approx(float(start), rel=1e-9, abs=1e-15)
-    low, high = BOUNDS.get(name, (None, None))
+        # forces are sums of greater ones, to whose rounding they are zero
+        zero = 1e-13 if unit == "N" else 1e-15
+        assert float(value.get("start")) == pytest.approx(float(start), rel=1e-9, abs=zero)
+    signed = causality != "parameter" or "product" in name or unit not in NOT_NEGATIVE
+    low, high = (COMMON_BOUNDS | BOUNDS[model.name]).get(name, (None if signed else 0.0, None))
     for bound, expected in (("min", low), ("max", high)):
         given = value.get(bound)
         assert (None if given is None else float(given)) == expected
         if given is not None:
             assert (float(value.get("start")) - float(given)) * (1 if bound == "min" else -1) >= 0.0
-    display = {"rad": "deg", "rad/s": "rpm"}.get(unit)
+    # shafts turn in rpm; the rod's angular velocity is a vector in space
+    display = None if name.startswith("rod.w") else {"rad": "deg", "rad/s": "rpm"}.get(unit)
     assert value.get("displayUnit") == display
 
 
-def test_unit_definitions(description: Element) -> None:
+def test_unit_definitions(description: Element, model: Model) -> None:
     defined = {}
     displays = {}
     for node in description.find("UnitDefinitions"):
@@ -178,7 +311,8 @@ def test_unit_definitions(description: Element) -> None:
         assert set(base) <= {"kg", "m", "s", "rad"}, "factor and offset must stay at their defaults, 1 and 0"
         defined[node.get("name")] = tuple(int(base.get(name, 0)) for name in ("kg", "m", "s", "rad"))
         displays |= {(node.get("name"), d.get("name")): float(d.get("factor")) for d in node.findall("DisplayUnit")}
-    assert defined == UNITS
+    # those that its variables use, and no others
+    assert defined == {unit: UNITS[unit] for unit in {row[3] for row in ROWS[model.name]} - {"-"}}
     assert displays["rad", "deg"] == pytest.approx(57.29577951308232, rel=1e-15)
     assert displays["rad/s", "rpm"] == pytest.approx(9.549296585513721, rel=1e-15)
     assert displays["m", "mm"] == 1000.0
@@ -196,25 +330,32 @@ def unknowns(description: Element, part: str) -> dict[str, set[str] | None]:
     return found
 
 
-def test_output_dependencies(description: Element) -> None:
-    outputs = [row[0] for row in ROWS if row[1] == "output"]
-    assert unknowns(description, "Outputs") == {name: DEPENDENCIES.get(name, INPUTS) for name in outputs}
+def test_output_dependencies(description: Element, model: Model) -> None:
+    outputs = [row[0] for row in ROWS[model.name] if row[1] == "output"]
+    declared = unknowns(description, "Outputs")
+    assert list(declared) == outputs
+    assert declared == {name: DEPENDENCIES[model.name].get(name, INPUTS[model.name]) for name in outputs}
 
 
-def test_initial_unknowns_are_all_outputs(description: Element) -> None:
+def test_initial_unknowns_are_all_outputs(description: Element, model: Model) -> None:
     initial = unknowns(description, "InitialUnknowns")
-    assert list(initial) == [row[0] for row in ROWS if row[1] == "output"]
+    assert list(initial) == [row[0] for row in ROWS[model.name] if row[1] == "output"]
     assert initial["crank.acceleration"] is None
     assert initial["solver.message"] == set()
     assert "initial.crank_angle" in initial["crank.angle"]
     assert "crank.mass" not in initial["crank.angle"]
 
 
-def test_experiment_and_capabilities(description: Element) -> None:
+#: Stop time and step of the default experiment: three turns at 420 rpm, two at 50 rpm.
+EXPERIMENTS = {"FiveBarSlider": (3 / 7, 1e-3), "SliderCrank": (2 * 60 / 50, 5e-3)}
+
+
+def test_experiment_and_capabilities(description: Element, model: Model) -> None:
     experiment = {name: float(value) for name, value in description.find("DefaultExperiment").attrib.items()}
-    assert experiment == {"startTime": 0.0, "stopTime": pytest.approx(3 / 7), "stepSize": 1e-3, "tolerance": 1e-9}
+    stop, step = EXPERIMENTS[model.name]
+    assert experiment == {"startTime": 0.0, "stopTime": pytest.approx(stop), "stepSize": step, "tolerance": 1e-9}
     flags = dict(description.find("CoSimulation").attrib)
-    assert flags.pop("modelIdentifier") == "FiveBarSlider"
+    assert flags.pop("modelIdentifier") == model.name
     assert {name for name, value in flags.items() if value == "true"} == {
         "canHandleVariableCommunicationStepSize",
         "canGetAndSetFMUstate",
@@ -224,9 +365,9 @@ def test_experiment_and_capabilities(description: Element) -> None:
     assert flags["needsExecutionTool"] == "false"
 
 
-def test_who_made_it(description: Element) -> None:
+def test_who_made_it(description: Element, model: Model) -> None:
     assert description.get("fmiVersion") == "2.0"
-    assert description.get("modelName") == "FiveBarSlider"
+    assert description.get("modelName") == model.name
     assert description.get("author") == "The Linkwork developers"
     assert description.get("license") == "MIT"
     assert description.get("version") == linkwork.__version__

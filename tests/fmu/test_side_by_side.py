@@ -10,32 +10,31 @@ import pytest
 
 import build_fmu
 
-from .conftest import Changes
+from .models import MODELS, Changes, Model
 from .runner import run_in_process
-
-#: One constant of the equations of motion: the coupler's coupling into the crank's inertia, 2 q3.
-EQUATION = ("g3 * q3 - w3 * w3 * n3", "g3 * q3 - 1.01 * w3 * w3 * n3")
 
 
 @pytest.fixture
-def variant(build_variant: Callable[[Changes], Path]) -> Path:
+def variant(build_variant: Callable[[Changes], Path], model: Model) -> Path:
     """The same model with another constant in its equations."""
-    return build_variant({"linkwork/five_bar/dynamics.py": EQUATION})
+    return build_variant(model.equation)
 
 
-def run_together(fmus: list[str], folder: str) -> list[Any]:
-    """An instance of each FMU, stepped in turn in one process, in torque drive."""
+def run_together(fmus: list[str], folder: str, values: list[dict[str, float]]) -> list[Any]:
+    """An instance of each FMU with its values, stepped in turn in one process, in torque drive."""
     from pathlib import Path
 
     from bare_master import Fmu
 
     loaded = [Fmu(fmu, Path(folder) / str(k)) for k, fmu in enumerate(fmus)]
-    instances = [fmu.instantiate().start({"drive.mode": 0, "drive.torque": 0.2}) for fmu in loaded]
+    given = [chosen | {"drive.torque": 0.2} for chosen in values]
+    instances = [fmu.instantiate().start(chosen) for fmu, chosen in zip(loaded, given)]
     for k in range(30):
         for instance in instances:
             assert instance.step(k * 1e-3, 1e-3) == 0
     # and new instances of each, made while the others live
-    late = [fmu.instantiate().start({"drive.mode": 0, "drive.torque": 0.2}) for fmu in reversed(loaded)][::-1]
+    backwards = zip(reversed(loaded), reversed(given))
+    late = [fmu.instantiate().start(chosen) for fmu, chosen in backwards][::-1]
     for instance in late:
         instance.run([1e-3] * 30)
     ends = [[instance.outputs() for instance in both] for both in (instances, late)]
@@ -44,19 +43,76 @@ def run_together(fmus: list[str], folder: str) -> list[Any]:
     return ends
 
 
-def test_two_builds_in_one_process(fmu: Path, variant: Path, tmp_path: Path) -> None:
-    (apart,), (late_apart,) = run_in_process(run_together, [str(fmu)], tmp_path / "a")
-    (other,), _ = run_in_process(run_together, [str(variant)], tmp_path / "b")
-    together, late = run_in_process(run_together, [str(fmu), str(variant)], tmp_path / "c")
+def test_two_builds_in_one_process(fmu: Path, model: Model, variant: Path, tmp_path: Path) -> None:
+    def ends(folder: str, *fmus: Path) -> Any:
+        return run_in_process(run_together, list(map(str, fmus)), tmp_path / folder, [model.free] * len(fmus))
+
+    (apart,), (late_apart,) = ends("a", fmu)
+    (other,), _ = ends("b", variant)
+    together, late = ends("c", fmu, variant)
     assert apart["crank.angle"] != other["crank.angle"]
     assert together == [apart, other]
     assert late[0] == late_apart
     assert late[0] != late[1]
     # whichever comes first
-    assert run_in_process(run_together, [str(variant), str(fmu)], tmp_path / "d")[0] == [other, apart]
+    assert ends("d", variant, fmu)[0] == [other, apart]
 
 
-def rebuild(root: str, folder: str, old: str, new: str) -> list[Any]:
+def test_all_models_in_one_process(fmus: dict[str, Path], tmp_path: Path) -> None:
+    names = list(MODELS)
+
+    def ends(folder: str, *names: str) -> Any:
+        values = [MODELS[name].free for name in names]
+        return run_in_process(run_together, [str(fmus[name]) for name in names], tmp_path / folder, values)
+
+    apart = {name: ends(name, name) for name in names}
+    for order in (names, names[::-1], names * 2):
+        together, late = ends("-".join(order), *order)
+        assert together == [apart[name][0][0] for name in order]
+        assert late == [apart[name][1][0] for name in order]
+
+
+def fail_together(fmus: list[str], folder: str, values: list[dict[str, float]], bad: list[list[Any]]) -> list[Any]:
+    """Instances of several FMUs that refuse a step, each in its turn, and are restored, beside the others."""
+    from pathlib import Path
+
+    from bare_master import DISCARD, Fmu
+
+    loaded = [Fmu(fmu, Path(folder) / str(k)) for k, fmu in enumerate(fmus)]
+    instances = [fmu.instantiate().start(chosen) for fmu, chosen in zip(loaded, values)]
+    for k in range(20):
+        for number, instance in enumerate(instances):
+            if bad and k % 5 == 4 and (k // 5) % len(instances) == number:
+                state = instance.save()
+                name, value = bad[number]
+                kept = instance.get(name)
+                instance.set(name, value)
+                assert instance.step(k * 1e-3, 0.1) == DISCARD
+                assert instance.get("solver.status") == 3
+                instance.set(name, kept)
+                assert instance.restore(state) == 0
+                assert instance.free_state(state) == 0
+                # one more of the same, that does not even start
+                lost = loaded[number].instantiate()
+                lost.set("crank.length", -1.0)
+                assert lost.setup() == lost.enter() == 0
+                assert lost.exit() != 0
+                lost.free()
+            assert instance.step(k * 1e-3, 1e-3) == 0
+    return [instance.outputs() for instance in instances]
+
+
+def test_failures_of_one_model_do_not_reach_another(fmus: dict[str, Path], tmp_path: Path) -> None:
+    models = list(MODELS.values())
+    paths = [str(fmus[model.name]) for model in models]
+    values = [model.free | {"drive.torque": 0.2} for model in models]
+    bad = [[model.force, model.too_much] for model in models]
+    together = run_in_process(fail_together, paths, tmp_path / "together", values, bad)
+    for path, chosen, found in zip(paths, values, together):
+        assert run_in_process(fail_together, [path], tmp_path / Path(path).stem, [chosen], []) == [found]
+
+
+def rebuild(root: str, folder: str, name: str, values: dict[str, float], changes: dict[str, list[str]]) -> list[Any]:
     """Build, run, change the equations, build at the same path, run again, change back, build and run again."""
     import shutil
     import sys
@@ -70,29 +126,32 @@ def rebuild(root: str, folder: str, old: str, new: str) -> list[Any]:
     folder = Path(folder)
     sources = folder / "fmu_src"
     shutil.copytree(build_fmu.SOURCES, sources, ignore=shutil.ignore_patterns("__pycache__"))
-    dynamics = sources / "linkwork" / "five_bar" / "dynamics.py"
+    ((path, (old, new)),) = changes.items()
+    dynamics = sources / path
     text = dynamics.read_text(encoding="utf-8")
     ends = []
     modules = []
     for source in (text, text.replace(old, new), text):
         dynamics.write_text(source, encoding="utf-8")
-        fmu = build_fmu.build("FiveBarSlider", folder / "build", sources)
-        modules.append(sorted(name for name in sys.modules if name.startswith(("linkwork_", "five_bar_slave_"))))
+        fmu = build_fmu.build(name, folder / "build", sources)
+        tops = ("linkwork_", build_fmu.MODELS[name].slave + "_")
+        modules.append(sorted(module for module in sys.modules if module.startswith(tops)))
         end = simulate_fmu(
             fmu,
             stop_time=0.03,
             step_size=1e-3,
             output_interval=1e-3,
-            start_values={"drive.mode": 0, "drive.torque": 0.2},
+            start_values=values | {"drive.torque": 0.2},
             output=["crank.angle"],
         )[-1]
         ends.append(float(end["crank.angle"]))
     return [str(fmu), ends, modules]
 
 
-def test_rebuilt_fmu_runs_its_own_new_code(tmp_path: Path) -> None:
+def test_rebuilt_fmu_runs_its_own_new_code(model: Model, tmp_path: Path) -> None:
     root = str(Path(build_fmu.__file__).parent)
-    _, (first, second, third), modules = run_in_process(rebuild, root, tmp_path, *EQUATION)
+    arguments = (model.name, model.free, model.equation)
+    _, (first, second, third), modules = run_in_process(rebuild, root, tmp_path, *arguments)
     assert first != second
     assert third == first
     assert modules[0] == [], "building leaves modules behind"
@@ -125,20 +184,21 @@ def many_cycles(fmu: str, folder: str, number: int) -> dict[str, Any]:
         instance.free()
         if k in (number // 5, number):
             sizes[k] = megabytes()
-    tops = sorted(name for name in sys.modules if name.startswith(("linkwork", "slave", "five_bar_slave")))
+    ours = ("linkwork", "slave", "five_bar_slave", "slider_crank_slave")
+    tops = sorted(name for name in sys.modules if name.startswith(ours))
     return {"sizes": list(sizes.values()), "modules": [name for name in tops if "." not in name]}
 
 
 @pytest.mark.skipif(not Path("/proc/self/statm").exists(), reason="memory is read from /proc")
-def test_five_hundred_instances_one_after_the_other(fmu: Path, tmp_path: Path) -> None:
+def test_five_hundred_instances_one_after_the_other(fmu: Path, model: Model, tmp_path: Path) -> None:
     found = run_in_process(many_cycles, fmu, tmp_path, 500)
     early, late = found["sizes"]
     # an instance takes about 0.2 MB while it lives; the wrapper keeps little of it, a string on sys.path among others
     assert late - early < 8.0
-    assert [name[:-9] for name in found["modules"]] == ["five_bar_slave", "linkwork", "slave"]
+    assert [name[:-9] for name in found["modules"]] == sorted(["linkwork", "slave", model.slave])
 
 
-def body_again(fmu: str, folder: str, times: int) -> list[Any]:
+def body_again(fmu: str, folder: str, slave: str, times: int) -> list[Any]:
     """What the module body of the slave changes when it is executed again, as the wrapper does for each instance."""
     import atexit
     import sys
@@ -149,7 +209,7 @@ def body_again(fmu: str, folder: str, times: int) -> list[Any]:
 
     fmu = Fmu(fmu, folder)
     instance = fmu.instantiate().start()
-    (name,) = [name for name in sys.modules if name.startswith("five_bar_slave_")]
+    (name,) = [name for name in sys.modules if name.startswith(f"{slave}_")]
     path = fmu.folder / "resources" / f"{name}.py"
     code = compile(path.read_text(), name, "exec")
 
@@ -157,7 +217,7 @@ def body_again(fmu: str, folder: str, times: int) -> list[Any]:
         return [
             sorted(sys.modules),
             sorted(vars(sys.modules[name])),
-            id(sys.modules[name].FiveBarSlider),
+            id(getattr(sys.modules[name], fmu.identifier)),
             atexit._ncallbacks(),
             threading.active_count(),
             list(warnings.filters),
@@ -172,7 +232,10 @@ def body_again(fmu: str, folder: str, times: int) -> list[Any]:
     return [same, instance.outputs(), fmu.instantiate().start().run([1e-3] * 5)]
 
 
-def test_module_body_has_no_side_effects(fmu: Path, tmp_path: Path) -> None:
-    same, outputs, _ = run_in_process(body_again, fmu, tmp_path, 3)
+def test_module_body_has_no_side_effects(fmu: Path, model: Model, tmp_path: Path) -> None:
+    same, outputs, _ = run_in_process(body_again, fmu, tmp_path, model.slave, 3)
     assert same
-    assert outputs["crank.speed"] == pytest.approx(43.982297150257104)
+    # 420 and 50 rpm
+    assert outputs["crank.speed"] == pytest.approx(
+        {"five_bar": 43.982297150257104, "slider_crank": 5.235987755983}[model.plant]
+    )

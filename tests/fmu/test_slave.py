@@ -9,19 +9,32 @@ from pythonfmu.enums import Fmi2Status
 
 from five_bar_slave import FiveBarSlider
 from linkwork.errors import LinkworkError, ParameterError
+from slave import LinkworkSlave
+from slider_crank_slave import SliderCrank
+
+from .models import Model
+
+
+SLAVES = {"FiveBarSlider": FiveBarSlider, "SliderCrank": SliderCrank}
 
 
 @pytest.fixture
-def slave() -> FiveBarSlider:
+def kind(model: Model) -> type[LinkworkSlave]:
+    """The class of the slave under test."""
+    return SLAVES[model.name]
+
+
+@pytest.fixture
+def slave(kind: type[LinkworkSlave]) -> LinkworkSlave:
     """A slave that is initialised."""
-    new = FiveBarSlider(instance_name="slave")
+    new = kind(instance_name="slave")
     new.setup_experiment(0.0, None, None)
     new.enter_initialization_mode()
     new.exit_initialization_mode()
     return new
 
 
-def value(slave: FiveBarSlider, name: str) -> Any:
+def value(slave: LinkworkSlave, name: str) -> Any:
     reference = [v.name for v in slave.variables].index(name)
     kind = slave.variables[reference].kind
     return getattr(slave, f"get_{kind.lower()}")([reference])[0]
@@ -31,7 +44,7 @@ def value(slave: FiveBarSlider, name: str) -> Any:
     "error", [RuntimeError("something"), ZeroDivisionError(), KeyError("x"), RecursionError(), MemoryError()], ids=repr
 )
 def test_no_exception_escapes_from_a_step(
-    slave: FiveBarSlider, monkeypatch: pytest.MonkeyPatch, error: Exception
+    slave: LinkworkSlave, monkeypatch: pytest.MonkeyPatch, error: Exception
 ) -> None:
     def fail(time: float, step: float) -> None:
         raise error
@@ -49,7 +62,7 @@ def test_no_exception_escapes_from_a_step(
     assert value(slave, "solver.message") == ""
 
 
-def test_no_exception_escapes_from_a_read(slave: FiveBarSlider, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_no_exception_escapes_from_a_read(slave: LinkworkSlave, monkeypatch: pytest.MonkeyPatch) -> None:
     def fail() -> None:
         raise RuntimeError("something")
 
@@ -61,7 +74,7 @@ def test_no_exception_escapes_from_a_read(slave: FiveBarSlider, monkeypatch: pyt
     assert "something" in value(slave, "solver.message")
 
 
-def test_percent_signs_are_doubled_for_the_wrapper(slave: FiveBarSlider) -> None:
+def test_percent_signs_are_doubled_for_the_wrapper(slave: LinkworkSlave) -> None:
     slave._say("100 % of %s, %% and %n", Fmi2Status.warning)
     (message,) = slave.log_queue
     assert message.msg == "100 %% of %%s, %%%% and %%n"
@@ -70,7 +83,7 @@ def test_percent_signs_are_doubled_for_the_wrapper(slave: FiveBarSlider) -> None
 
 
 def test_refusal_is_logged_once_and_readable_with_its_percent_signs(
-    slave: FiveBarSlider, monkeypatch: pytest.MonkeyPatch
+    slave: LinkworkSlave, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def fail(time: float, step: float) -> None:
         raise RuntimeError("at 50 % of the way")
@@ -83,8 +96,8 @@ def test_refusal_is_logged_once_and_readable_with_its_percent_signs(
     assert "at 50 % of the way" in value(slave, "solver.message")
 
 
-def test_bad_parameter_is_raised_by_the_initialisation_alone() -> None:
-    slave = FiveBarSlider(instance_name="slave")
+def test_bad_parameter_is_raised_by_the_initialisation_alone(kind: type[LinkworkSlave]) -> None:
+    slave = kind(instance_name="slave")
     reference = [v.name for v in slave.variables].index("crank.length")
     slave.set_real([reference], [-1.0])
     slave.setup_experiment(0.0, None, None)
@@ -101,14 +114,15 @@ def test_bad_parameter_is_raised_by_the_initialisation_alone() -> None:
     assert slave.do_step(0.0, 1e-3)
 
 
-def test_reading_a_variable_of_another_type_is_an_error_with_a_sentence(slave: FiveBarSlider) -> None:
+def test_reading_a_variable_of_another_type_is_an_error_with_a_sentence(slave: LinkworkSlave) -> None:
+    reference = [v.name for v in slave.variables].index("crank.length")
     with pytest.raises(LinkworkError, match=r"variable crank\.length is not of type Integer"):
-        slave.get_integer([1])
+        slave.get_integer([reference])
     with pytest.raises(LinkworkError, match="no variable with the value reference -1"):
         slave.get_real([-1])
 
 
-def test_saved_state_does_not_change_with_the_slave(slave: FiveBarSlider) -> None:
+def test_saved_state_does_not_change_with_the_slave(slave: LinkworkSlave) -> None:
     state = slave._get_fmu_state()
     data = slave._fmu_state_to_bytes(state)
     for k in range(5):
@@ -119,9 +133,9 @@ def test_saved_state_does_not_change_with_the_slave(slave: FiveBarSlider) -> Non
     assert slave._fmu_state_to_bytes(state) == data
 
 
-def test_master_tolerance_outside_the_range_is_brought_into_it() -> None:
+def test_master_tolerance_outside_the_range_is_brought_into_it(kind: type[LinkworkSlave]) -> None:
     for given, taken in [(None, 1e-9), (1e-3, 1e-9), (1e-11, 1e-11), (0.0, 1e-13), (-1.0, 1e-13)]:
-        slave = FiveBarSlider(instance_name="slave")
+        slave = kind(instance_name="slave")
         slave.setup_experiment(0.0, None, given)
         slave.exit_initialization_mode()
         assert slave._get_fmu_state()["plant"]["tolerance"] == taken

@@ -6,25 +6,62 @@ import json
 from pathlib import Path
 from typing import Any
 
-import pytest
-
+from .models import Model, each
 from .runner import run_in_process
 
+#: What the runs start with, by drive; the first leaves both freedoms to forces.
 VALUES = {
-    "drive.mode": 0,
-    "initial.crank_speed": 30.0,
-    "drive.torque": 0.2,
-    "slider.force": 0.5,
-    "slider.coulomb_friction": 0.1,
-    "load.fx": 0.3,
+    "FiveBarSlider": {
+        "torque drive": {
+            "drive.mode": 0,
+            "initial.crank_speed": 30.0,
+            "drive.torque": 0.2,
+            "slider.force": 0.5,
+            "slider.coulomb_friction": 0.1,
+            "load.fx": 0.3,
+        },
+        "speed drive": {"drive.speed": 30.0, "drive.acceleration": 20.0, "slider.force": 0.5},
+    },
+    "SliderCrank": {
+        "forces": {
+            "drive.mode": 0,
+            "axial.mode": 0,
+            "initial.crank_speed": 12.0,
+            "initial.shift_velocity": 0.2,
+            "drive.torque": 5.0,
+            "axial.force": -3.0,
+            "slider.coulomb_friction": 0.1,
+            "shift.stiffness": 900.0,
+            "gravity.z": -9.81,
+        },
+        "speeds": {"drive.speed": 9.0, "drive.acceleration": 20.0, "axial.speed": 0.3, "slider.load": 0.5},
+        "speed, force": {"axial.mode": 0, "drive.speed": 9.0, "axial.force": 4.0, "shift.damping": 3.0},
+        "torque, axial speed": {"drive.mode": 0, "drive.torque": 5.0, "axial.speed": 0.2, "axial.acceleration": -3.0},
+        "groove, torque": {"drive.mode": 0, "axial.mode": 2, "drive.torque": 4.0, "groove.amplitude": 0.07},
+        "groove, speed": {"axial.mode": 2, "drive.speed": 8.0, "groove.amplitude": 0.07, "groove.ratio": 3.0},
+    },
 }
-SPEED_VALUES = {"drive.speed": 30.0, "drive.acceleration": 20.0, "slider.force": 0.5}
-CASES = pytest.mark.parametrize("values", [VALUES, SPEED_VALUES], ids=["torque drive", "speed drive"])
+#: One of them for tests of what does not depend on the drive.
+ONE = {model: next(iter(values.values())) for model, values in VALUES.items()}
 
-OTHER = {"drive.torque": -3.0, "drive.speed": 55.0, "slider.force": 4.0, "load.fy": 2.0}
+#: Inputs that are set, but not stepped with, when the state is saved: part of it as well.
+WAITING = {"FiveBarSlider": {"drive.speed": 31.0}, "SliderCrank": {"drive.speed": 31.0, "axial.speed": 0.25}}
+#: Inputs that lead elsewhere, whatever the drive.
+OTHER = {
+    "FiveBarSlider": {"drive.torque": -3.0, "drive.speed": 55.0, "slider.force": 4.0, "load.fy": 2.0},
+    "SliderCrank": {
+        "drive.torque": -3.0,
+        "drive.speed": 5.0,
+        "axial.force": 20.0,
+        "axial.speed": -0.5,
+        "slider.load": 2.0,
+    },
+}
 
 
-def save_diverge_restore(fmu: str, folder: str, values: dict[str, float], other: dict[str, float]) -> dict[str, Any]:
+def save_diverge_restore(
+    fmu: str, folder: str, values: dict[str, float], waiting: dict[str, float], other: dict[str, float]
+) -> dict[str, Any]:
     """Save after 20 steps, go on, come back, go elsewhere, come back, go on again; and on in another instance."""
     from bare_master import Fmu
 
@@ -41,7 +78,8 @@ def save_diverge_restore(fmu: str, folder: str, values: dict[str, float], other:
 
     instance = fmu.instantiate("one").start(values)
     instance.run([1e-3] * 20)
-    instance.set("drive.speed", 31.0)  # set, but not stepped with: part of the state as well
+    for name, value in waiting.items():
+        instance.set(name, value)
     state = instance.save()
     data = instance.serialize(state)
     first = go_on(instance)
@@ -88,16 +126,17 @@ def go_on_elsewhere(fmu: str, folder: str, data: str) -> list[dict[str, float]]:
     return rows
 
 
-@CASES
-def test_save_diverge_restore_repeat(fmu: Path, tmp_path: Path, values: dict[str, float]) -> None:
-    runs = run_in_process(save_diverge_restore, fmu, tmp_path / "a", values, OTHER)
+@each(VALUES, "values")
+def test_save_diverge_restore_repeat(fmu: Path, model: Model, tmp_path: Path, values: dict[str, float]) -> None:
+    inputs = (WAITING[model.name], OTHER[model.name])
+    runs = run_in_process(save_diverge_restore, fmu, tmp_path / "a", values, *inputs)
     assert runs["first"][-1] != runs["elsewhere"][-1]
     assert runs["again"] == runs["first"]
     assert runs["other instance"] == runs["first"]
     assert run_in_process(go_on_elsewhere, fmu, tmp_path / "b", runs["data"]) == runs["first"]
 
 
-def two_instances(fmu: str, folder: str, values: dict[str, float]) -> list[Any]:
+def two_instances(fmu: str, folder: str, values: dict[str, float], force: str) -> list[Any]:
     """Two instances stepped in turn, and each by itself."""
     from bare_master import Fmu
 
@@ -106,8 +145,8 @@ def two_instances(fmu: str, folder: str, values: dict[str, float]) -> list[Any]:
 
     def play(instances, inputs=(0.0, 2.0)):
         for k in range(50):
-            for instance, force in zip(instances, inputs):
-                instance.set("slider.force", force * k / 50)
+            for instance, value in zip(instances, inputs):
+                instance.set(force, value * k / 50)
                 assert instance.step(k * 1e-3, 1e-3) == 0
         return [instance.outputs() for instance in instances]
 
@@ -115,19 +154,19 @@ def two_instances(fmu: str, folder: str, values: dict[str, float]) -> list[Any]:
     alone = play([fmu.instantiate().start(both[0])], (0.0,)) + play([fmu.instantiate().start(both[1])], (2.0,))
     # a failure of one is none of the other's
     good, bad = (fmu.instantiate().start(values) for _ in range(2))
-    bad.set("slider.force", float("nan"))
+    bad.set(force, float("nan"))
     return [together, alone, [bad.step(0.0, 1e-3), bad.get("solver.status")], [good.step(0.0, 1e-3), good.log]]
 
 
-def test_two_instances_do_not_see_each_other(fmu: Path, tmp_path: Path) -> None:
-    together, alone, bad, good = run_in_process(two_instances, fmu, tmp_path, VALUES)
+def test_two_instances_do_not_see_each_other(fmu: Path, model: Model, tmp_path: Path) -> None:
+    together, alone, bad, good = run_in_process(two_instances, fmu, tmp_path, ONE[model.name], model.force)
     assert together == alone
     assert together[0] != together[1]
     assert bad == [2, 2]
     assert good == [0, []]
 
 
-def reset(fmu: str, folder: str, values: dict[str, float]) -> list[Any]:
+def reset(fmu: str, folder: str, values: dict[str, float], force: str, too_much: float) -> list[Any]:
     """Outputs of a run, of the same after a reset, and of the defaults after another."""
     from bare_master import FATAL, Fmu
 
@@ -145,8 +184,9 @@ def reset(fmu: str, folder: str, values: dict[str, float]) -> list[Any]:
     assert instance.get("initial.crank_speed") == fmu.instantiate().get("initial.crank_speed")
     # in the middle of a run that went wrong, and after an initialisation that failed
     instance.start(values)
-    instance.set("slider.force", 1e5)
+    instance.set(force, too_much)
     assert instance.step(0.0, 0.1) == 2
+    assert instance.get("solver.status") == 3
     assert instance.reset() == 0
     instance.set("crank.length", -1.0)
     assert instance.setup() == instance.enter() == 0
@@ -161,14 +201,16 @@ def reset(fmu: str, folder: str, values: dict[str, float]) -> list[Any]:
     return rows
 
 
-def test_reset(fmu: Path, tmp_path: Path) -> None:
-    first, again, default, after_failures = run_in_process(reset, fmu, tmp_path, VALUES)
+def test_reset(fmu: Path, model: Model, tmp_path: Path) -> None:
+    first, again, default, after_failures = run_in_process(
+        reset, fmu, tmp_path, ONE[model.name], model.force, model.too_much
+    )
     assert first == again
     assert first != default
     assert after_failures[1] == first[1]
 
 
-def after_refusal(fmu: str, folder: str, values: dict[str, float]) -> list[Any]:
+def after_refusal(fmu: str, folder: str, values: dict[str, float], force: str, too_much: float) -> list[Any]:
     """State saved after a refused step: outputs, trouble, and the run that goes on from it, there and elsewhere."""
     from bare_master import DISCARD, Fmu
 
@@ -178,7 +220,7 @@ def after_refusal(fmu: str, folder: str, values: dict[str, float]) -> list[Any]:
         instance = fmu.instantiate().start(values)
         instance.run([1e-3] * 10)
         if fail != "no":
-            instance.set("slider.force", 1e5 if fail == "force" else float("nan"))
+            instance.set(force, too_much if fail == "force" else float("nan"))
             assert instance.step(0.01, 0.1) == DISCARD
         state = instance.save()
         data = instance.serialize(state)
@@ -186,20 +228,20 @@ def after_refusal(fmu: str, folder: str, values: dict[str, float]) -> list[Any]:
         assert other.restore(other.deserialize(data)[1]) == 0
         for one in (instance, other):
             trouble = one.trouble()
-            one.set("slider.force", values["slider.force"])
+            one.set(force, values[force])
             time = one.run([1e-3] * 10, 0.01)
             runs.append([fail, trouble, one.outputs(), one.trouble(), time])
         instance.free_state(state)
     return runs
 
 
-def test_state_saved_after_a_refused_step(fmu: Path, tmp_path: Path) -> None:
-    runs = run_in_process(after_refusal, fmu, tmp_path, VALUES)
+def test_state_saved_after_a_refused_step(fmu: Path, model: Model, tmp_path: Path) -> None:
+    runs = run_in_process(after_refusal, fmu, tmp_path, ONE[model.name], model.force, model.too_much)
     assert len(runs) == 6
     for fail, trouble, outputs, after, _ in runs:
         assert outputs == runs[0][2]
         assert trouble[0] == {"no": 0, "force": 3, "nan": 2}[fail]
-        assert {"no": "", "force": "limit of assembly", "nan": "slider.force is nan"}[fail] in trouble[1]
+        assert {"no": "", "force": "limit of assembly", "nan": f"{model.force} is nan"}[fail] in trouble[1]
         assert after == [0, ""]
 
 
@@ -220,8 +262,9 @@ def damaged(fmu: str, folder: str, pieces: list[str]) -> list[Any]:
     return found
 
 
-def test_damaged_state_is_refused(fmu: Path, tmp_path: Path) -> None:
-    whole = json.loads(run_in_process(save_diverge_restore, fmu, tmp_path / "a", VALUES, OTHER)["data"])
+def test_damaged_state_is_refused(fmu: Path, model: Model, tmp_path: Path) -> None:
+    arguments = (ONE[model.name], WAITING[model.name], OTHER[model.name])
+    whole = json.loads(run_in_process(save_diverge_restore, fmu, tmp_path / "a", *arguments)["data"])
     pieces = [
         "not JSON",
         "[1, 2]",
@@ -233,4 +276,25 @@ def test_damaged_state_is_refused(fmu: Path, tmp_path: Path) -> None:
     for status, log, same in run_in_process(damaged, fmu, tmp_path / "b", pieces):
         assert status == 4
         assert any("state" in sentence for _, _, sentence in log)
+        assert same
+
+
+def state_of(fmu: str, folder: str) -> str:
+    """The state of a run, as bytes."""
+    from bare_master import Fmu
+
+    instance = Fmu(fmu, folder).instantiate().start()
+    instance.run([1e-3] * 3)
+    return instance.serialize(instance.save()).decode("ascii")
+
+
+def test_state_of_another_model_is_refused(fmus: dict[str, Path], model: Model, tmp_path: Path) -> None:
+    for name, other in fmus.items():
+        if name == model.name:
+            continue
+        data = run_in_process(state_of, other, tmp_path / "a")
+        ((status, log, same),) = run_in_process(damaged, fmus[model.name], tmp_path / "b", [data])
+        assert status == 4
+        sentence = f"the saved state belongs to '{name}' with another interface, not to this {model.name}"
+        assert [text for _, category, text in log if category == "logStatusError"] == [sentence]
         assert same

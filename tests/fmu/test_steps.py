@@ -7,15 +7,47 @@ from typing import Any
 
 import pytest
 
+from .models import Model
 from .runner import run_in_process
 
 # free to swing, driven and loaded: steps matter to nothing but the error control
 VALUES = {
-    "drive.mode": 0,
-    "initial.crank_speed": 30.0,
-    "drive.torque": 0.2,
-    "slider.force": 0.5,
-    "slider.coulomb_friction": 0.1,
+    "FiveBarSlider": {
+        "drive.mode": 0,
+        "initial.crank_speed": 30.0,
+        "drive.torque": 0.2,
+        "slider.force": 0.5,
+        "slider.coulomb_friction": 0.1,
+    },
+    "SliderCrank": {
+        "drive.mode": 0,
+        "axial.mode": 0,
+        "guide.twist": 4.4,
+        "initial.crank_speed": 12.0,
+        "drive.torque": 5.0,
+        "axial.force": -8.0,
+        "slider.load": 10.0,
+        "slider.coulomb_friction": 0.1,
+        "shift.stiffness": 4000.0,
+        "shift.spring_free_position": 0.05,
+        "shift.damping": 20.0,
+        "gravity.x": -9.81,
+    },
+}
+#: Magnitudes that quantities have in these runs, by how their names begin, where it is not one of their unit.
+SCALES = {
+    "FiveBarSlider": {
+        "energy": 1.0,
+        "pin": 10.0,
+        "slider.acceleration": 50.0,
+        "crank.acceleration": 100.0,
+        "slider": 0.3,
+    },
+    "SliderCrank": {
+        "energy": 100.0,
+        **dict.fromkeys(("bearing", "crank_pin.f", "slider_pin.f", "guide"), 200.0),
+        **dict.fromkeys(("crank.acceleration", "shift.acceleration", "slider.acceleration"), 100.0),
+    },
 }
 
 
@@ -34,34 +66,33 @@ def run_sizes(fmu: str, folder: str, values: dict[str, float], runs: list[list[f
     return ends
 
 
-def differing(a: dict[str, float], b: dict[str, float], bound: float) -> list[Any]:
+def differing(model: Model, a: dict[str, float], b: dict[str, float], bound: float) -> list[Any]:
     """Outputs that differ by more than ``bound`` of the magnitude that quantities of their kind have in these runs."""
-    scale = {"energy": 1.0, "pin": 10.0, "slider.acceleration": 50.0, "crank.acceleration": 100.0, "slider": 0.3}
     found = []
     for name in a:
-        size = next((s for start, s in scale.items() if name.startswith(start)), 1.0)
+        size = next((s for start, s in SCALES[model.name].items() if name.startswith(start)), 1.0)
         if abs(a[name] - b[name]) > bound * max(size, abs(a[name])):
             found.append([name, a[name], b[name]])
     return found
 
 
-def test_all_sizes_agree(fmu: Path, tmp_path: Path) -> None:
+def test_all_sizes_agree(fmu: Path, model: Model, tmp_path: Path) -> None:
     sizes = [(0.1, 3), (0.05, 6), (0.025, 12), (1e-2, 30), (5e-3, 60), (1e-3, 300), (5e-4, 600), (1e-4, 3000)]
     runs = [[1e-13, 0.3, 1]] + [[1e-9, size, number] for size, number in sizes]
-    exact, *ends = run_in_process(run_sizes, fmu, tmp_path, VALUES, runs)
+    exact, *ends = run_in_process(run_sizes, fmu, tmp_path, VALUES[model.name], runs)
     for end in ends:
-        assert differing(exact, end, 1e-6) == []
+        assert differing(model, exact, end, 1e-6) == []
     # halving the step changes the result, but within the tolerance
     assert len({end["slider.position"] for end in ends}) == len(ends)
 
 
-def test_microseconds(fmu: Path, tmp_path: Path) -> None:
-    whole, cut = run_in_process(run_sizes, fmu, tmp_path, VALUES, [[1e-9, 4e-3, 1], [1e-9, 1e-6, 4000]])
-    assert differing(whole, cut, 1e-8) == []
+def test_microseconds(fmu: Path, model: Model, tmp_path: Path) -> None:
+    whole, cut = run_in_process(run_sizes, fmu, tmp_path, VALUES[model.name], [[1e-9, 4e-3, 1], [1e-9, 1e-6, 4000]])
+    assert differing(model, whole, cut, 1e-8) == []
 
 
-def test_master_tolerance_counts_where_it_is_tighter(fmu: Path, tmp_path: Path) -> None:
-    own, tighter, looser, exact = run_in_process(run_tolerances, fmu, tmp_path, VALUES, [None, 1e-12, 1e-3])
+def test_master_tolerance_counts_where_it_is_tighter(fmu: Path, model: Model, tmp_path: Path) -> None:
+    own, tighter, looser, exact = run_in_process(run_tolerances, fmu, tmp_path, VALUES[model.name], [None, 1e-12, 1e-3])
     assert own == looser
 
     def error(end: dict[str, float]) -> float:
@@ -111,12 +142,12 @@ def random_steps(fmu: str, folder: str, values: dict[str, float]) -> list[Any]:
     return [min(sizes), max(sizes), *ends]
 
 
-def test_random_mixture(fmu: Path, tmp_path: Path) -> None:
-    least, greatest, (time, mixed), (_, whole) = run_in_process(random_steps, fmu, tmp_path, VALUES)
+def test_random_mixture(fmu: Path, model: Model, tmp_path: Path) -> None:
+    least, greatest, (time, mixed), (_, whole) = run_in_process(random_steps, fmu, tmp_path, VALUES[model.name])
     assert least < 1e-5
     assert greatest > 1e-2
     assert time == pytest.approx(0.4, abs=1e-12)
-    assert differing(whole, mixed, 1e-8) == []
+    assert differing(model, whole, mixed, 1e-8) == []
 
 
 def count_time(fmu: str, folder: str) -> list[Any]:

@@ -21,7 +21,8 @@ from linkwork.errors import (
     StepError,
 )
 from linkwork.five_bar import dynamics
-from linkwork.five_bar.kinematics import LIMIT_SINE, coefficients, position
+from linkwork.five_bar.kinematics import coefficients, position
+from linkwork.limits import LIMIT_SINE
 from linkwork.five_bar.parameters import InitialState
 from linkwork.five_bar.plant import INPUT_NAMES, SPEED_DRIVE, TORQUE_DRIVE, Plant, check_assembly, error_scale
 from linkwork.five_bar.published import SETS, TABLE_3_1

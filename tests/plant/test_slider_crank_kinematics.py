@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from math import acos, asin, cos, degrees, hypot, pi, radians, sin, sqrt
+from math import acos, asin, cos, hypot, pi, radians, sin, sqrt
 
 import numpy as np
 import pytest
@@ -91,7 +91,7 @@ def test_planar_special_case() -> None:
         lean = asin((crank * cos(th) + offset) / rod)
         assert q.s4 == pytest.approx(crank * sin(th) + rod * cos(lean), abs=1e-15)
         k = K.coefficients(q, p)
-        assert k.kth == pytest.approx(crank * cos(th + 0.0) + crank * sin(th) * np.tan(lean), abs=1e-15)
+        assert k.kth == pytest.approx(crank * cos(th) + crank * sin(th) * np.tan(lean), abs=1e-15)
         assert k.ks == pytest.approx(0.0, abs=1e-15)
         leaning = crank * sin(th) / (rod * cos(lean))  # of lean, against theta1
         assert K.centripetal(q, k, 2.0, 0.0, p) == pytest.approx(
@@ -276,4 +276,3 @@ def test_vectors() -> None:
     assert scale(-2.5, a) == pytest.approx(-2.5 * np.array(a))
     assert dot(a, b) == pytest.approx(float(np.dot(a, b)))
     assert cross(a, b) == pytest.approx(np.cross(a, b))
-    assert degrees(pi) == 180.0

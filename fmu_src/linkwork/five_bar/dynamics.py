@@ -312,6 +312,36 @@ def jump_speed(x: State, speed: float, p: Constants) -> State:
     return (x[0], x[1], speed, v, x[4], x[5] + work)
 
 
+def jump(x: State, i: Inputs, speed: float, last: float, p: Constants) -> State:
+    """State after the commanded speeds have jumped: that of the crank; the slider has none, ``last`` is of no effect."""
+    return jump_speed(x, speed, p)
+
+
+def applied(
+    drive: float,
+    axial: float,
+    torque: float,
+    acceleration: float,
+    force: float,
+    load: float,
+    last: float,
+    rate: float,
+    p: Constants,
+) -> Inputs:
+    """Inputs from the channels of a run: torque, crank acceleration, force, and the load's two components."""
+    return Inputs(drive, (1.0 - drive) * torque, drive * acceleration, force, load, last)
+
+
+def started(x: State, i: Inputs, p: Constants) -> State:
+    """A state at the start of a run as it is: nothing determines one of its parts by another."""
+    return x
+
+
+def clearance(x: State, i: Inputs, p: Constants) -> float:
+    """Sine of the transmission angle; negative beyond the limit of assembly."""
+    return p.branch * position(x[0], x[1], p).s43
+
+
 def outputs(x: State, i: Inputs, start_energy: float, p: Constants) -> Outputs:
     """All real outputs of the FMI contract at state ``x`` under the inputs ``i``.
 

@@ -15,10 +15,6 @@ from typing import NamedTuple
 
 from .parameters import Constants
 
-#: Least |sin(rocker angle - coupler angle)| at which a motion is still followed. Below it the coupler and the rocker are
-#: taken as collinear: the limit of assembly, where both velocity coefficients grow without bound.
-LIMIT_SINE = 1e-3
-
 
 class Position(NamedTuple):
     """Directions of the moving links: cosines and sines, and those of rocker angle minus coupler angle."""

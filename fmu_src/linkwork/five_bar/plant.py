@@ -7,6 +7,7 @@ from typing import ClassVar
 
 from ..errors import AssemblyError
 from ..integrate import Vector
+from ..limits import LIMIT_SINE, NEAR_LIMIT
 from ..plant import MechanismPlant, Mode
 from . import dynamics, kinematics
 from .parameters import Constants, FiveBarParameters, InitialState, reach
@@ -27,7 +28,7 @@ def check_assembly(parameters: FiveBarParameters, crank_angle: float, slider_pos
     """
     p = parameters.constants()
     square = kinematics.assembly_square(crank_angle, slider_position, p)
-    least = kinematics.LIMIT_SINE * p.l3 * p.l4
+    least = LIMIT_SINE * p.l3 * p.l4
     if square >= least * least:
         return
     distance = reach(parameters, crank_angle, slider_position)
@@ -126,9 +127,9 @@ class Plant(MechanismPlant):
 
     def _inputs(self) -> dynamics.Inputs:
         i = self.inputs
-        if self.drive_mode == SPEED_DRIVE:
-            return dynamics.Inputs(1.0, 0.0, i["drive.acceleration"], i["slider.force"], i["load.fx"], i["load.fy"])
-        return dynamics.Inputs(0.0, i["drive.torque"], 0.0, i["slider.force"], i["load.fx"], i["load.fy"])
+        drive = float(self.drive_mode)
+        torque, acceleration, force = i["drive.torque"], i["drive.acceleration"], i["slider.force"]
+        return dynamics.applied(drive, 0.0, torque, acceleration, force, i["load.fx"], i["load.fy"], 0.0, self._p)
 
     def _jumped(self, x: Vector, commands: set[str]) -> Vector:
         if self.drive_mode == SPEED_DRIVE and commands:
@@ -143,7 +144,7 @@ class Plant(MechanismPlant):
 
     def _near_limit(self, x: Vector) -> bool:
         square = kinematics.assembly_square(x[0], x[1], self._p)
-        return bool(abs(square) ** 0.5 < 0.05 * self._p.l3 * self._p.l4)
+        return bool(abs(square) ** 0.5 < NEAR_LIMIT * self._p.l3 * self._p.l4)
 
     def _where(self, x: Vector) -> str:
         return configuration(x[0], x[1])

@@ -341,14 +341,57 @@ def jump(x: State, i: Inputs, speed: float, shift_velocity: float, p: Constants)
     th, s1, w, v, dissipated, supplied = x
     q = position(th, s1, p)
     m = inertia(q, coefficients(q, p), p)
-    w_new = w + i.speed_drive * (speed - w) + (1.0 - i.speed_drive) * i.shift_drive * m.m12 / m.m11 * (v - shift_velocity)
-    follows = v + i.speed_drive * m.m12 / m.m22 * (w - w_new)
-    v_new = (
-        (1.0 - i.groove) * (i.shift_drive * shift_velocity + (1.0 - i.shift_drive) * follows)
-        + i.groove * groove(th, p).y * w_new
+    w_new = (
+        w + i.speed_drive * (speed - w) + (1.0 - i.speed_drive) * i.shift_drive * m.m12 / m.m11 * (v - shift_velocity)
     )
+    follows = v + i.speed_drive * m.m12 / m.m22 * (w - w_new)
+    v_new = (1.0 - i.groove) * (i.shift_drive * shift_velocity + (1.0 - i.shift_drive) * follows) + i.groove * groove(
+        th, p
+    ).y * w_new
     work = kinetic_energy(m, w_new, v_new) - kinetic_energy(m, w, v)
     return (th, s1, w_new, v_new, dissipated, supplied + work)
+
+
+def applied(
+    drive: float,
+    axial: float,
+    torque: float,
+    acceleration: float,
+    force: float,
+    load: float,
+    last: float,
+    rate: float,
+    p: Constants,
+) -> Inputs:
+    """Inputs from the channels of a run: torque, crank acceleration, axial force, slider load, axial speed and its rate.
+
+    ``axial`` is 0 where the axial force is given, 1 where the axial speed is, 2 where a groove makes the shift.
+    """
+    # 1, 0, 0 and 0, 1, 0 and 0, 0, 1 for the three modes
+    pushed = 0.5 * (1.0 - axial) * (2.0 - axial)
+    shift_drive = axial * (2.0 - axial)
+    groove = 0.5 * axial * (axial - 1.0)
+    return Inputs(
+        drive,
+        shift_drive,
+        groove,
+        (1.0 - drive) * torque,
+        drive * acceleration,
+        pushed * force,
+        shift_drive * rate,
+        load,
+    )
+
+
+def started(x: State, i: Inputs, p: Constants) -> State:
+    """A state at the start of a run, with the shift that a groove makes where there is one."""
+    return grooved(x, i.groove, p)
+
+
+def clearance(x: State, i: Inputs, p: Constants) -> float:
+    """Sine of the transmission angle, which is the cosine of the angle between rod and guide."""
+    s = grooved(x, i.groove, p)
+    return p.branch * position(s[0], s[1], p).h / p.a2
 
 
 def outputs(x: State, i: Inputs, start_energy: float, p: Constants) -> Outputs:

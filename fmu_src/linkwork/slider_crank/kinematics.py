@@ -16,10 +16,6 @@ from typing import NamedTuple
 from .parameters import Constants
 from .vectors import Vector, cross, dot, scale, subtract
 
-#: Least cosine of the angle between rod and guide at which a motion is still followed. Below it the rod is taken as
-#: perpendicular to the guide: the limit of assembly, where the velocity coefficients grow without bound.
-LIMIT_COSINE = 1e-3
-
 
 class Position(NamedTuple):
     """A configuration: cosine and sine of the crank angle, the crank pin's coordinates across the guide, slider position.

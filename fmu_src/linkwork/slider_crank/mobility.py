@@ -22,6 +22,7 @@ from math import asin, cos, degrees, inf, isfinite, pi, sin, sqrt
 from typing import NamedTuple
 
 from ..errors import AssemblyError, InputError, ParameterError
+from ..limits import LIMIT_SINE
 from . import kinematics
 from .parameters import Constants, SliderCrankParameters
 
@@ -55,7 +56,7 @@ def check_assembly(parameters: SliderCrankParameters, crank_angle: float, shift:
     """
     p = parameters.constants()
     square = kinematics.assembly_square(crank_angle, shift, p)
-    least = kinematics.LIMIT_COSINE * p.a2
+    least = LIMIT_SINE * p.a2
     if square >= least * least:
         return
     where = f"crank angle {crank_angle:.9g} rad ({degrees(crank_angle):.4f} deg) and shift {shift:.9g} m"
@@ -335,7 +336,7 @@ def assembly_margin(parameters: SliderCrankParameters, law: ShiftLaw) -> Margin:
     """The least margin of assembly over the turn, negative where the crank cannot turn fully, and where it is.
 
     The crank turns fully where the margin is zero or greater. The plant's steps also keep clear of the limit of assembly
-    by `kinematics.LIMIT_COSINE`, 5e-7 of the rod's length.
+    by `linkwork.limits.LIMIT_SINE`, 5e-7 of the rod's length.
     """
     p = parameters.constants()
     worst = min(_extremes(law, p), key=lambda angle: _square(angle, law, p))
@@ -411,7 +412,7 @@ def ranges(parameters: SliderCrankParameters, law: ShiftLaw) -> tuple[Range, ...
 
     One from 0 to the span where the crank turns fully; none where it cannot be assembled at all; at most two at a constant
     shift. Their ends, at which rod and guide are perpendicular, are those of geometry: the plant's steps stop as soon as the
-    rod is within `kinematics.LIMIT_COSINE` of that.
+    rod is within `linkwork.limits.LIMIT_SINE` of that.
     """
     p = parameters.constants()
     return tuple(_range(low, high, law, p) for low, high in _assembled(law, p))

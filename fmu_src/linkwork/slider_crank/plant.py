@@ -6,6 +6,7 @@ from math import degrees
 from typing import ClassVar
 
 from ..integrate import Vector
+from ..limits import NEAR_LIMIT
 from ..plant import MechanismPlant, Mode
 from . import dynamics, kinematics
 from .mobility import check_assembly
@@ -112,18 +113,16 @@ class Plant(MechanismPlant):
 
     def _inputs(self) -> dynamics.Inputs:
         i = self.inputs
-        speed = float(self.modes["drive.mode"] == SPEED_DRIVE)
-        commanded = float(self.modes["axial.mode"] == COMMANDED_SHIFT)
-        groove = float(self.modes["axial.mode"] == GROOVE)
-        return dynamics.Inputs(
-            speed,
-            commanded,
-            groove,
-            0.0 if speed else i["drive.torque"],
-            i["drive.acceleration"] if speed else 0.0,
-            0.0 if commanded or groove else i["axial.force"],
-            i["axial.acceleration"] if commanded else 0.0,
+        return dynamics.applied(
+            float(self.modes["drive.mode"]),
+            float(self.modes["axial.mode"]),
+            i["drive.torque"],
+            i["drive.acceleration"],
+            i["axial.force"],
             i["slider.load"],
+            i["axial.speed"],
+            i["axial.acceleration"],
+            self._p,
         )
 
     def _jumped(self, x: Vector, commands: set[str]) -> Vector:
@@ -143,7 +142,7 @@ class Plant(MechanismPlant):
 
     def _near_limit(self, x: Vector) -> bool:
         square = kinematics.assembly_square(x[0], x[1], self._p)
-        return bool(abs(square) ** 0.5 < 0.05 * self._p.a2)
+        return bool(abs(square) ** 0.5 < NEAR_LIMIT * self._p.a2)
 
     def _where(self, x: Vector) -> str:
         return configuration(x[0], x[1])

@@ -1,0 +1,391 @@
+"""Velocities, accelerations and all joint forces of the generalised slider-crank by dual vectors (Rahman, eqs 29 to 69).
+
+The velocity of a body is a dual vector, omega + eps v, with v that of the point of the body at the origin of the frame in
+which it is given; forces are F + eps M and momenta p + eps H in the same way. All these go from frame to frame by the dual
+matrices of `closure`. Each body's momentum is its inertia binor applied to its velocity (eqs 46 to 48), the rate of it is
+that in the body's frame and the cross product by the velocity (eqs 49 to 58), and it equals the sum of the dual forces on
+the body (eqs 59 to 64). That makes 18 scalar equations. The rod's about its own line is met by itself: forces at the pins
+have no moment about it, and a rod of rotational symmetry without spin needs none. The 17 that are left hold 17 unknowns
+(eqs 69): force (2), moment (2) of the bearing and the axial force on the crank (erratum 7: it is an unknown, because S1 is
+prescribed), three components of the force in each ball joint, force (2) and moment (3) of the guide, and the crank's torque
+or the force on the slider.
+
+Nothing here takes the plant's equations (`linkwork.slider_crank.kinematics`, `dynamics`), only its parameters.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, TypeAlias, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from linkwork.errors import InputError, LinkworkError
+from linkwork.slider_crank.parameters import SliderCrankParameters
+
+from ..dual import Dual, about_i, apply, cross, join, stack
+from .closure import Closure, scale
+
+FloatArray: TypeAlias = NDArray[np.float64]
+
+#: Share of the crank's length below which dS4/dtheta1 is taken as none: there no torque balances a force on the slider.
+DEAD_CENTRE = 1e-9
+
+
+class DeadCentreError(LinkworkError):
+    """At a dead centre, dS4/dtheta1 = 0, the crank's torque does not determine the force on the slider.
+
+    ``points`` are the indices of the points concerned.
+    """
+
+    def __init__(self, message: str, points: tuple[int, ...]) -> None:
+        super().__init__(message)
+        self.points = points
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Binor:
+    """Inertia binor of a body in a frame fixed to it (eqs 46 to 48): what makes its dual momentum of its dual velocity.
+
+    ``mass`` in kg, ``moment`` the mass times the coordinates of the centre of mass (3,) in kg.m, ``inertia`` the matrix
+    (3, 3) about the frame's origin in kg.m2.
+    """
+
+    mass: float
+    moment: FloatArray
+    inertia: FloatArray
+
+    def momentum(self, velocity: Dual) -> Dual:
+        """p + eps H of omega + eps v: p = m v + omega x m c, H = I omega + m c x v. Rates likewise, shape (..., 3)."""
+        omega, v = velocity.real, velocity.dual
+        return Dual(
+            self.mass * v + np.cross(omega, self.moment),
+            omega @ self.inertia.T + np.cross(self.moment, v),
+        )
+
+    def rate(self, velocity: Dual, acceleration: Dual) -> Dual:
+        """Rate of the dual momentum (eqs 49 to 58), for the velocity and the rate of its components in the frame."""
+        return cast(Dual, self.momentum(acceleration) + cross(velocity, self.momentum(velocity)))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Rates:
+    """Dual velocities of the links in frame 1 and their rates, and what the slider does.
+
+    Dual vectors of shape (n, 3): omega + eps v with v that of the body's point at O. ``slider_velocity`` and
+    ``slider_acceleration`` are S4' (m/s) and S4'' (m/s2), ``ratio`` is dS4/dtheta1 (m/rad), each of shape (n,).
+    """
+
+    crank: Dual
+    rod: Dual
+    slider: Dual
+    crank_rate: Dual
+    rod_rate: Dual
+    slider_rate: Dual
+    slider_velocity: FloatArray
+    slider_acceleration: FloatArray
+    ratio: FloatArray
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class JointLoads:
+    """Forces and moments in all joints, by their components in frame 1; arrays of shape (n, 3) and (n,), N and N.m.
+
+    ``bearing`` is the force of the bearing on the crank, without axial component, ``axial`` the force along the axis that
+    the motion takes of whatever drives or holds the shift; ``bearing_moment`` is about O, the drive's ``torque`` included.
+    ``crank_pin`` is the force of the crank on the rod, ``slider_pin`` that of the slider on the rod; ``guide`` that of the
+    guide on the slider and ``guide_moment`` its moment about the slider pin. ``slider_force`` is all that acts on the
+    slider along the guide (load, spring, damper, friction), positive where the slider position increases.
+
+    ``residual`` is what is left of the equation that is not among the 17, the moment about the rod's line (N.m).
+    """
+
+    closure: Closure
+    torque: FloatArray
+    axial: FloatArray
+    slider_force: FloatArray
+    bearing: FloatArray
+    bearing_moment: FloatArray
+    crank_pin: FloatArray
+    slider_pin: FloatArray
+    guide: FloatArray
+    guide_moment: FloatArray
+    residual: FloatArray
+
+    def components(self, name: str, number: int) -> FloatArray:
+        """Components (n, 3) of a force or moment in frame 1 (ground), 2 (crank), 3 (rod) or 4 (guide).
+
+        The moments keep the points about which they are taken.
+
+        Parameters
+        ----------
+        name : str
+            ``bearing``, ``bearing_moment``, ``crank_pin``, ``slider_pin``, ``guide`` or ``guide_moment``.
+        number : int
+            Number of the frame.
+
+        Raises
+        ------
+        InputError
+            If there is no such force, moment or frame, or if frame 3 is not determined: it has j perpendicular to the rod
+            and to the crank axis, which must not be parallel.
+        """
+        if name not in _NAMED:
+            raise InputError(f"there is no force or moment {name!r}: the names are {', '.join(_NAMED)}")
+        if number not in _FRAMES:
+            raise InputError(f"there is no frame {number!r}: the frames are 1 (ground), 2 (crank), 3 (rod), 4 (guide)")
+        vectors: FloatArray = getattr(self, name)
+        return np.einsum("nji,nj->ni", _FRAMES[number](self.closure), vectors)
+
+
+def rates(
+    closure: Closure,
+    *,
+    speed: Any,
+    shift_velocity: Any = 0.0,
+    acceleration: Any = 0.0,
+    shift_acceleration: Any = 0.0,
+) -> Rates:
+    """Dual velocities (eqs 29 to 45) and their rates, for theta1', S1', theta1'', S1'' (rad/s, m/s, rad/s2, m/s2).
+
+    The screws of the joints times their rates add up to nothing round the loop: six equations, all of them used (the
+    thesis drops the last, erratum 3), and omega . u = 0 for the rod's spin. Their derivative, in which each screw moves
+    with the body that carries it, gives the accelerations.
+
+    Raises
+    ------
+    InputError
+        If a rate is not finite or has not one value or one for each point of the closure.
+    """
+    n = closure.crank_angle.size
+    w, v, e, a = (
+        _values(name, x, n)
+        for name, x in (
+            ("speed", speed),
+            ("shift_velocity", shift_velocity),
+            ("acceleration", acceleration),
+            ("shift_acceleration", shift_acceleration),
+        )
+    )
+    k = np.array([0.0, 0.0, 1.0])
+    rod, guide = closure.rod_frame, closure.guide_frame
+    slide = Dual(np.zeros((n, 3)), guide.real[..., 2])
+    # columns: the ball joints' relative rotations about the axes of rod and guide, the slide
+    screws = stack([*(rod[..., i] for i in range(3)), *(guide[..., i] for i in range(3)), slide])
+    length = scale(closure.parameters, closure.shift)
+    matrix = np.zeros((n, 7, 7))
+    matrix[:, :3] = screws.real
+    matrix[:, 3:6] = screws.dual / length
+    # no spin: the crank's rotation and the first ball joint's make none about the rod's line
+    matrix[:, 6, 0] = 1.0
+
+    def solve(known: Dual, turning: Dual) -> FloatArray:
+        """The joints' rates when the loop's known part is ``known`` and the rod's ``turning``."""
+        spin = np.sum(turning.real * rod.real[..., 0], -1)
+        right = np.concatenate([known.real, known.dual / length, spin[:, None]], -1)
+        return cast(FloatArray, -np.linalg.solve(matrix, right[..., None])[..., 0])
+
+    crank = Dual(w[:, None] * k, v[:, None] * k)
+    q = solve(crank, crank)
+    rod_relative, slider_relative = apply(rod, q[:, :3]), apply(guide, q[:, 3:6])
+    rod_velocity = crank + rod_relative
+    # from the loop's other side, from the ground
+    slider = -(q[:, 6:] * slide)
+    # rates of the screws: those of the first ball joint move with the rod, of the second with the slider; the slide's is 0
+    crank_rate = Dual(e[:, None] * k, a[:, None] * k)
+    rod_moving = crank_rate + cross(rod_velocity, rod_relative)
+    qq = solve(rod_moving + cross(slider, slider_relative), rod_moving)
+    unit = Dual(np.broadcast_to(k, (n, 3)))
+    return Rates(
+        crank=crank,
+        rod=rod_velocity,
+        slider=slider,
+        crank_rate=crank_rate,
+        rod_rate=rod_moving + apply(rod, qq[:, :3]),
+        slider_rate=-(qq[:, 6:] * slide),
+        slider_velocity=q[:, 6],
+        slider_acceleration=qq[:, 6],
+        ratio=solve(unit, unit)[:, 6],
+    )
+
+
+def binors(p: SliderCrankParameters) -> tuple[Binor, Binor, Binor]:
+    """Inertia binors of crank (frame 2), rod (its frame, at the crank pin) and slider (frame 4, at the slider pin).
+
+    Of the crank's inertia only what concerns its axis is of effect, of the rod's only that about transverse axes, of the
+    slider's, which does not turn, none.
+    """
+    crank = np.zeros((3, 3))
+    crank[2] = crank[:, 2] = -p.crank_product_xz, -p.crank_product_yz, p.crank_inertia
+    transverse = p.rod_inertia + p.rod_mass * p.rod_cog_distance**2
+    return (
+        Binor(
+            mass=p.crank_mass,
+            moment=p.crank_mass * np.array([p.crank_cog_x, p.crank_cog_y, p.crank_cog_z]),
+            inertia=crank,
+        ),
+        Binor(
+            mass=p.rod_mass,
+            moment=p.rod_mass * np.array([p.rod_cog_distance, 0.0, 0.0]),
+            inertia=np.diag([0.0, transverse, transverse]),
+        ),
+        Binor(
+            mass=p.slider_mass,
+            moment=p.slider_mass * np.array([p.slider_cog_x, p.slider_cog_y, p.slider_cog_z]),
+            inertia=np.zeros((3, 3)),
+        ),
+    )
+
+
+def joint_loads(
+    closure: Closure,
+    *,
+    speed: Any,
+    shift_velocity: Any = 0.0,
+    acceleration: Any = 0.0,
+    shift_acceleration: Any = 0.0,
+    torque: Any = None,
+    slider_force: Any = None,
+) -> JointLoads:
+    """All joint forces and moments for a given motion (eqs 62 to 69) and either the crank's torque or the slider's force.
+
+    Parameters
+    ----------
+    closure : Closure
+        The positions.
+    speed, shift_velocity, acceleration, shift_acceleration : array_like
+        theta1' (rad/s), S1' (m/s), theta1'' (rad/s2), S1'' (m/s2): one value, or one for each point.
+    torque : array_like, optional
+        Torque on the crank about its axis (N.m), if the slider's force is sought.
+    slider_force : array_like, optional
+        Force on the slider along the guide, positive where S4 increases (N), if the torque is sought.
+
+    Raises
+    ------
+    InputError
+        If not one of ``torque`` and ``slider_force`` is given, or if a value is not finite or not one of so many points.
+    DeadCentreError
+        If the torque is given at a dead centre.
+    """
+    if (torque is None) == (slider_force is None):
+        raise InputError("give either the torque, and the slider's force is sought, or the slider's force, not both")
+    p = closure.parameters
+    n = closure.crank_angle.size
+    motion = rates(
+        closure,
+        speed=speed,
+        shift_velocity=shift_velocity,
+        acceleration=acceleration,
+        shift_acceleration=shift_acceleration,
+    )
+    if torque is not None:
+        _check_dead_centres(closure, motion)
+    length = scale(p, closure.shift)
+    axes = np.broadcast_to(np.eye(3), (n, 3, 3))
+    forces, moments = Dual(axes), Dual(np.zeros_like(axes), axes * length)
+    # bodies' frames in frame 1, and momentum rates less gravity in them: D'Alembert (eqs 62 to 64), with the signs of f1
+    # and f3 (erratum 5) and the centres of mass (erratum 6) as Newton's law has them
+    frames = (closure.crank_frame, closure.rod_frame, closure.guide_frame)
+    gravity = Dual(np.zeros(3), np.array([p.gravity_x, p.gravity_y, p.gravity_z]))
+    needed = [
+        binor.rate(apply(body.T, velocity), apply(body.T, rate)) - binor.momentum(apply(_axes(body).T, gravity))
+        for binor, body, velocity, rate in zip(
+            binors(p),
+            frames,
+            (motion.crank, motion.rod, motion.slider),
+            (motion.crank_rate, motion.rod_rate, motion.slider_rate),
+        )
+    ]
+    # screws of the unknowns in frame 1, lines of action or axes of moments: bearing 1Fi, 1Fj, 1Ti, 1Tj, axial 1Fk, torque
+    # 1Tk; crank pin 2F; slider pin 3F; guide 4Fi, 4Fj, 4T; force on the slider
+    ground = join(forces[..., :2], moments[..., :2], forces[..., 2:], moments[..., 2:])
+    pin = cast(Dual, closure.crank_frame @ about_i(Dual(0.0, p.crank_length)))
+    front = cast(Dual, frames[1] @ about_i(Dual(0.0, p.rod_length)))
+    guiding = join(frames[2][..., :2], frames[2] @ moments, -frames[2][..., 2:])
+    nothing = Dual(np.zeros((n, 3, 6)))
+    on_crank = join(ground, -pin, nothing[..., :3], nothing)
+    on_rod = join(nothing, pin, front, nothing)
+    on_slider = join(nothing, nothing[..., :3], -front, guiding)
+    rows, right = [], []
+    for body, screws, rate in zip(frames, (on_crank, on_rod, on_slider), needed):
+        local = cast(Dual, body.T @ screws)
+        rows.append(np.concatenate([local.real, local.dual / length], -2))
+        right.append(np.concatenate([rate.real, rate.dual / length], -1))
+    matrix, load = np.concatenate(rows, -2), np.concatenate(right, -1)
+    # the rod's moment about its line is the equation that is met by itself
+    kept = np.delete(np.arange(18), 9)
+    given, value = (5, torque) if torque is not None else (17, slider_force)
+    known = _values("torque" if torque is not None else "slider_force", value, n) / (length if given == 5 else 1.0)
+    free = np.delete(np.arange(18), given)
+    unknown = np.linalg.solve(
+        matrix[:, kept[:, None], free], (load[:, kept] - known[:, None] * matrix[:, kept, given])[..., None]
+    )[..., 0]
+    f = np.insert(unknown, given, known, axis=-1)
+    residual = (np.einsum("ni,ni->n", matrix[:, 9], f) - load[:, 9]) * length
+    zero = np.zeros((n, 1))
+    return JointLoads(
+        closure=closure,
+        torque=f[:, 5] * length,
+        axial=f[:, 4],
+        slider_force=f[:, 17],
+        bearing=np.concatenate([f[:, :2], zero], -1),
+        bearing_moment=f[:, [2, 3, 5]] * length,
+        crank_pin=np.einsum("nij,nj->ni", pin.real, f[:, 6:9]),
+        slider_pin=np.einsum("nij,nj->ni", front.real, f[:, 9:12]),
+        guide=np.einsum("nij,nj->ni", frames[2].real[..., :2], f[:, 12:14]),
+        guide_moment=np.einsum("nij,nj->ni", frames[2].real, f[:, 14:17]) * length,
+        residual=residual,
+    )
+
+
+def _check_dead_centres(closure: Closure, motion: Rates) -> None:
+    dead = np.flatnonzero(np.abs(motion.ratio) < DEAD_CENTRE * closure.parameters.crank_length)
+    if dead.size:
+        i = int(dead[0])
+        raise DeadCentreError(
+            f"theta1 = {closure.crank_angle[i]:.9g} rad is a dead centre (dS4/dtheta1 = {motion.ratio[i]:.1e} m/rad): the "
+            "torque does not determine the slider's force there; give the slider's force, or leave the point out",
+            tuple(int(point) for point in dead),
+        )
+
+
+def _values(name: str, x: Any, n: int) -> FloatArray:
+    """One finite value for each of n points."""
+    values = np.asarray(x, dtype=float)
+    if values.shape not in ((), (1,), (n,)):
+        raise InputError(
+            f"{name} has the shape {values.shape}: it must be a number or have one for each of the {n} points"
+        )
+    if not np.all(np.isfinite(values)):
+        raise InputError(f"{name} is {x!r}: it must be finite")
+    return np.broadcast_to(values, (n,))
+
+
+def _axes(frame: Dual) -> Dual:
+    """The same axes with the origin in that of frame 1."""
+    return Dual(frame.real)
+
+
+def _rod_axes(closure: Closure) -> FloatArray:
+    """Axes of frame 3 in frame 1 (n, 3, 3): i along the rod, j perpendicular to it and to the crank axis."""
+    i = closure.rod_frame.real[..., 0]
+    across = np.hypot(i[:, 0], i[:, 1])
+    if np.min(across) < 1e-12:
+        worst = int(np.argmin(across))
+        raise InputError(
+            f"the rod is parallel to the crank axis at theta1 = {closure.crank_angle[worst]:.6g} rad: frame 3 needs an angle "
+            "between them; take the components in another frame"
+        )
+    j = np.stack([-i[:, 1], i[:, 0], np.zeros_like(across)], -1) / across[:, None]
+    return np.stack([i, j, np.cross(i, j)], -1)
+
+
+_FRAMES: dict[int, Callable[[Closure], FloatArray]] = {
+    1: lambda closure: np.broadcast_to(np.eye(3), (closure.crank_angle.size, 3, 3)),
+    2: lambda closure: closure.crank_frame.real,
+    3: _rod_axes,
+    4: lambda closure: closure.guide_frame.real,
+}
+_NAMED = ("bearing", "bearing_moment", "crank_pin", "slider_pin", "guide", "guide_moment")

@@ -1,0 +1,9 @@
+"""Where the motion of a linkage is no longer followed."""
+
+from __future__ import annotations
+
+#: Least sine of the transmission angle at which a motion is still followed. Below it the mechanism is taken to be at the limit
+#: of assembly, where the velocity coefficients grow without bound.
+LIMIT_SINE = 1e-3
+#: Sine of the transmission angle below which a failing integration has failed for the nearness of that limit.
+NEAR_LIMIT = 0.05
