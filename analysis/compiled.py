@@ -861,9 +861,13 @@ def derivatives(p, states, forces, out):  # type: ignore[no-untyped-def]
             out[i, j] = row[j]
 
 
+def solver(p: NamedTuple) -> SimpleNamespace:
+    """`run`, `run_many`, `outputs` and `derivatives`, compiled for the mechanism whose constants ``p`` are."""
+    return _solver(type(p))
+
+
 @cache
-def solver(constants):  # type: ignore[no-untyped-def]
-    """`run`, `run_many`, `outputs` and `derivatives`, compiled for the mechanism with that class of constants."""
+def _solver(constants):  # type: ignore[no-untyped-def]
     p = constants_type(constants)
     signatures = {
         run: int64(p, VECTOR, VECTOR, float64, boolean, float64, float64, boolean, _SOURCE, *_RUN_ARGUMENTS),

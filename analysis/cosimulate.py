@@ -25,12 +25,10 @@ from linkwork.parameters import fmi_name
 from .inputs import Channels, align, encode
 from .mechanism import InitialState, Parameters, mechanism_of
 from .simulate import (
-    NotFiniteError,
     RunInterrupted,
     given,
     held_channels,
     interruptible,
-    not_finite,
     sample_times,
     shown,
 )
@@ -199,10 +197,7 @@ def cosimulate(
     status, message = 0, ""
 
     def sampled(t: float, ahead: float, x: NDArray[np.float64]) -> dict[str, float]:
-        try:
-            values = held_channels(encoded, t, ahead, x, law, inputs)
-        except NotFiniteError as error:
-            raise not_finite(mechanism, inputs, error.number, t, x) from None
+        values = held_channels(encoded, t, ahead, x, law, inputs)
         return {name: values[number] for name, number in mechanism.channel_of_input.items()}
 
     second = [mechanism.output_names.index(f"{mechanism.second}.{what}") for what in ("position", "velocity")]

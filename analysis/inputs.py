@@ -208,6 +208,8 @@ class Channels:
 
     __slots__ = ()
 
+    #: Name of the mechanism that they act on.
+    MECHANISM: ClassVar[str]
     #: Names of the channels, in the order of the compiled code.
     CHANNELS: ClassVar[tuple[str, ...]]
     #: Channels that are speeds: a jump of them is an impulse, and their rate counts.
@@ -291,6 +293,7 @@ class Inputs(Channels):
         If both speed and torque are given, or a value is not finite or of the wrong kind.
     """
 
+    MECHANISM: ClassVar[str] = "five-bar"
     CHANNELS: ClassVar[tuple[str, ...]] = ("torque", "speed", "force", "load_x", "load_y")
     COMMANDS: ClassVar[tuple[str, ...]] = ("speed",)
 
@@ -332,6 +335,7 @@ class SliderCrankInputs(Channels):
         If more than one drive of a freedom is given, or a value is not finite or of the wrong kind.
     """
 
+    MECHANISM: ClassVar[str] = "slider-crank"
     CHANNELS: ClassVar[tuple[str, ...]] = ("torque", "speed", "axial_force", "load", "shift_speed")
     COMMANDS: ClassVar[tuple[str, ...]] = ("speed", "shift_speed")
 
@@ -356,7 +360,7 @@ class SliderCrankInputs(Channels):
 
 
 #: Kind of inputs of each mechanism, by its name.
-INPUTS_OF: dict[str, type[Inputs | SliderCrankInputs]] = {"five-bar": Inputs, "slider-crank": SliderCrankInputs}
+INPUTS_OF: dict[str, type[Inputs | SliderCrankInputs]] = {kind.MECHANISM: kind for kind in (Inputs, SliderCrankInputs)}
 
 
 @dataclass(frozen=True, slots=True)
@@ -375,6 +379,8 @@ class Encoded:
         Torsion bar: torque, release angle, 1 while it acts. Motor: breakdown torque and slip, synchronous speed.
     functions : tuple
         Python functions of the channels 0, 2, 3, 4 and 1, and of the rates of channels 1 and 4, or None.
+    kind : type
+        Of the inputs.
     """
 
     breaks: NDArray[np.float64]
@@ -382,6 +388,13 @@ class Encoded:
     harmonics: NDArray[np.float64]
     law: NDArray[np.float64]
     functions: tuple[StateFunction | None, ...] = field(default=(None,) * FUNCTIONS)
+    kind: type[Channels] = Inputs
+
+    @property
+    def value_names(self) -> tuple[str, ...]:
+        """Names of what the channels and the rates are worth at a time, in the order of the compiled code."""
+        torque, speed, *others = self.kind.CHANNELS
+        return (torque, speed, "acceleration", *others, f"rate of {others[-1]}")
 
     @property
     def steady(self) -> bool:
@@ -429,7 +442,9 @@ def encode(inputs: Channels) -> Encoded:
                 functions[SLOT_OF_RATE[c]] = part.rate
         else:
             coefficients[:, c, 0] += float(part)
-    return Encoded(merged, coefficients, np.array(harmonics, dtype=float).reshape(-1, 4), law, tuple(functions))
+    return Encoded(
+        merged, coefficients, np.array(harmonics, dtype=float).reshape(-1, 4), law, tuple(functions), type(inputs)
+    )
 
 
 def _on_breaks(part: Piecewise, breaks: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -263,7 +263,7 @@ class PeriodicOrbit:
         if status != orbit_kernels.DONE:
             raise failure(status, self.start)
         values = np.empty((samples, len(OUTPUT_NAMES)))
-        compiled.solver(type(p)).outputs(p, states, forces, 0.0, values)
+        compiled.solver(p).outputs(p, states, forces, 0.0, values)
         keep = [OUTPUT_NAMES.index(name) for name in NAMES]
         time, period = _times(states[:, 2], self.turns)
         return Turn(

@@ -24,7 +24,7 @@ from linkwork.limits import LIMIT_SINE, NEAR_LIMIT
 from linkwork.plant import check_tolerance
 
 from .inputs import FUNCTIONS, INPUTS_OF, Channels, Encoded, StateFunction, align, encode
-from .mechanism import OUTPUT_UNITS, InitialState, Mechanism, Parameters, mechanism_of
+from .mechanism import MECHANISMS, OUTPUT_UNITS, InitialState, Mechanism, Parameters, mechanism_of
 from .trajectory import Occurrence, Trajectory
 
 #: Steps of one compiled call, between which progress is shown and an interrupt is heard: about a tenth of a second.
@@ -332,7 +332,7 @@ def channels(encoded: Encoded, t: float, left: bool, x: NDArray[np.float64], law
     )
     for number, value in enumerate(values):
         if not isfinite(value):
-            raise NotFiniteError(number)
+            raise NotFiniteError(encoded, number, t, x)
     return values
 
 
@@ -363,20 +363,12 @@ def held_channels(
 
 
 class NotFiniteError(InputError):
-    """An input, by its number among `Values`, is not a finite number; `not_finite` says it in a sentence."""
+    """An input, by its number among `Values`, is not a finite number at a time and a state."""
 
-    def __init__(self, number: int) -> None:
+    def __init__(self, encoded: Encoded, number: int, t: float, x: NDArray[np.float64]) -> None:
         self.number = number
-        super().__init__(f"channel {number} of the inputs is not a finite number")
-
-
-def not_finite(mechanism: Mechanism, inputs: Channels, number: int, t: float, x: NDArray[np.float64]) -> InputError:
-    """The error for an input, by its number among `Values`, that is not a finite number at a time and a state."""
-    names = list(inputs.CHANNELS)
-    named = [names[0], names[1], "acceleration", *names[2:], f"rate of {names[-1]}"]
-    return InputError(
-        f"the input {named[number]} is not a finite number at t = {t:.9g} s, {mechanism.where(x[0], x[1])}"
-    )
+        where = MECHANISMS[encoded.kind.MECHANISM].where(x[0], x[1])
+        super().__init__(f"the input {encoded.value_names[number]} is not a finite number at t = {t:.9g} s, {where}")
 
 
 _NO_FUNCTIONS = np.zeros(FUNCTIONS, dtype=np.int64)
@@ -460,7 +452,7 @@ class _Run:
         """
         p = self.parameters.constants()
         x = np.array([*self.mechanism.state(self.initial), 0.0, 0.0])
-        values = self.sampled(float(self.times[0]), x)
+        values = channels(self.encoded, float(self.times[0]), False, x, self.encoded.law)
         if self.inputs.speed_drive:
             x[2] = values[1]
         if self.inputs.axial_mode == 1:
@@ -470,13 +462,6 @@ class _Run:
         self.mechanism.check_assembly(self.parameters, x[0], x[1])
         scale = np.array(self.mechanism.error_scale(self.parameters, float(x[2])))
         return x, dynamics.mechanical_energy(tuple(x), p), scale
-
-    def sampled(self, t: float, x: NDArray[np.float64]) -> Values:
-        """The channels at the start."""
-        try:
-            return channels(self.encoded, t, False, x, self.encoded.law)
-        except NotFiniteError as error:
-            raise not_finite(self.mechanism, self.inputs, error.number, t, x) from None
 
     def applied(self, values: Values) -> Any:
         """The channels as the inputs of the equations."""
@@ -490,7 +475,7 @@ class _Run:
         """The compiled code for the mechanism."""
         from . import compiled
 
-        return compiled.solver(type(self.parameters.constants()))
+        return compiled.solver(self.parameters.constants())
 
     @property
     def n_inputs(self) -> int:
@@ -534,7 +519,7 @@ class _Run:
                 interrupted.append(True)
         t = float(carry[k.BEGIN] + carry[k.ELAPSED])
         if status == k.BAD_INPUT:
-            raise not_finite(self.mechanism, self.inputs, int(carry[k.LOST]), t, x)
+            raise NotFiniteError(self.encoded, int(carry[k.LOST]), t, x)
         done = int(carry[k.SAMPLE])
         times, states, forces = self.times[:done], states[:done], forces[:done]
         if carry[k.STARTED] and times[-1] < t:
@@ -651,19 +636,13 @@ class _March:
     def _sample(self, stop: float) -> tuple[float, float]:
         """Sample the inputs at the beginning of an interval; returns the commanded speeds."""
         e, t, end = self.run_.encoded, self.t, self.run_.times[-1]
-        try:
-            if self.run_.hold:
-                ahead = stop if t < end else t + self.run_.hold
-                values = held_channels(e, t, ahead, self.x, self.law, self.run_.inputs)
-            else:
-                values = channels(e, t, False, self.x, self.law)
-        except NotFiniteError as error:
-            raise self._not_finite(error.number, t, self.x) from None
+        if self.run_.hold:
+            ahead = stop if t < end else t + self.run_.hold
+            values = held_channels(e, t, ahead, self.x, self.law, self.run_.inputs)
+        else:
+            values = channels(e, t, False, self.x, self.law)
         self.held = self.run_.applied(values)
         return values[1], values[5]
-
-    def _not_finite(self, number: int, t: float, x: NDArray[np.float64]) -> InputError:
-        return not_finite(self.run_.mechanism, self.run_.inputs, number, t, x)
 
     def run(self, method: str | type[OdeSolver], options: dict[str, Any], show: Callable[[float], None] | None) -> None:
         """March to the end, a stopping event, or where it goes no further."""
@@ -729,7 +708,7 @@ class _March:
             self._losses += 1
             if self._losses > MOST_LOSSES:
                 # LSODA would go on for ever
-                raise self._not_finite(error.number, *self._good) from None
+                raise NotFiniteError(self.run_.encoded, error.number, *self._good) from None
             return nothing
         try:
             result = np.array(self.dynamics.derivative(tuple(x), held, self.p))
@@ -801,7 +780,7 @@ class _March:
             if self.rows[-1][0] > t0:
                 self.t, self.x = self.rows[-1][:2]
             if self._lost is not None:
-                raise self._not_finite(self._lost, *self._good)
+                raise NotFiniteError(self.run_.encoded, self._lost, *self._good)
             clearance = self.dynamics.clearance(tuple(self.x), self.held, self.p)
             self.status = k.LIMIT if abs(clearance) < NEAR_LIMIT else k.NO_STEP
         self.held = self._inputs(self.t, self.x, stop)
@@ -903,7 +882,7 @@ class Ensemble:
         names = mechanism_of(self.parameters[index]).output_names
         values = np.empty((n, len(names)))
         p = self.parameters[index].constants()
-        k.solver(type(p)).outputs(p, self.states[index, :n], self.forces[index, :n], self.energies[index], values)
+        k.solver(p).outputs(p, self.states[index, :n], self.forces[index, :n], self.energies[index], values)
         return Trajectory(
             time=self.time[:n],
             values=values,
@@ -967,7 +946,9 @@ def simulate_many(
     if hold is not None:
         _check_hold(hold, times)
     if len({(i.speed_drive, i.axial_mode) for i in all_inputs}) > 1:
-        raise InputError("an ensemble's inputs must all drive the mechanism in the same way, by speed or by torque")
+        raise InputError(
+            "an ensemble's inputs must all give the speed or all the torque, and all make the shift in one way"
+        )
     runs = []
     for number, (p, i, s) in enumerate(zip(parameters, all_inputs, starts)):
         try:
@@ -1049,7 +1030,7 @@ def _run_batch(runs: Sequence[_Run]) -> tuple[Any, ...]:
         t = float(carry[k.BEGIN] + carry[k.ELAPSED])
         if code == k.BAD_INPUT:
             codes.append(code)
-            messages.append(str(not_finite(run.mechanism, run.inputs, int(carry[k.LOST]), t, x)))
+            messages.append(str(NotFiniteError(run.encoded, int(carry[k.LOST]), t, x)))
         else:
             verdict, message = _verdict(code, t, x, run.max_steps, run.mechanism)
             codes.append(verdict)

@@ -115,7 +115,7 @@ def right_hand_side(case: Case) -> float:
     forces[:, 0] = 1.0 if case.crank_speed else 0.0
     out = np.empty((n, 6))
     p = case.parameters.constants()
-    return best_time(lambda: compiled.solver(type(p)).derivatives(p, states, forces, out), 20) / n
+    return best_time(lambda: compiled.solver(p).derivatives(p, states, forces, out), 20) / n
 
 
 # SciPy

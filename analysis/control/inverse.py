@@ -252,7 +252,7 @@ def inverse_dynamics(
         at_p = load_at(load, x[0])
         i[3], i[4], i[5] = slider_force(x[0], x[1], x[2], x[3], a, at_p, p), *at_p
     values = np.empty((samples, len(OUTPUT_NAMES)))
-    compiled.solver(type(p)).outputs(p, states, inputs, 0.0, values)
+    compiled.solver(p).outputs(p, states, inputs, 0.0, values)
     return SliderDrive(
         parameters=parameters,
         slider=slider,

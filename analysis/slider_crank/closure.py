@@ -68,12 +68,16 @@ class Closure:
     @property
     def rod_frame(self) -> Dual:
         """Frame of the rod in frame 1, its origin in the crank pin and i along the rod: (n, 3, 3)."""
-        return _pin_frame(self.parameters, self.crank_angle, self.shift) @ self.crank_ball
+        return self._frames[0]
 
     @property
     def guide_frame(self) -> Dual:
         """Frame 4, its origin in the slider pin, in frame 1: (n, 3, 3)."""
-        return self.rod_frame @ about_i(Dual(0.0, self.parameters.rod_length)) @ self.slider_ball
+        return self._frames[1]
+
+    @property
+    def _frames(self) -> tuple[Dual, Dual]:
+        return _frames(self.parameters, self.crank_angle, self.shift, self.crank_ball, self.slider_ball)
 
     @property
     def crank_pin(self) -> FloatArray:
@@ -93,8 +97,7 @@ def scale(p: SliderCrankParameters, shift: Array) -> float:
 
 def loop(p: SliderCrankParameters, th: Array, s1: Array, crank_ball: Array, slider_ball: Array, s4: Array) -> Dual:
     """The product M1 L2 L3 M4 (n, 3, 3) of eq 5, the identity where the loop is closed."""
-    rod = _pin_frame(p, th, s1) @ crank_ball
-    guide = rod @ about_i(Dual(0.0, p.rod_length)) @ slider_ball
+    guide = _frames(p, th, s1, crank_ball, slider_ball)[1]
     return cast(Dual, guide @ about_k(Dual(0.0, s4)) @ about_i(Dual(p.guide_twist, p.guide_offset)))
 
 
@@ -145,7 +148,7 @@ def close(parameters: SliderCrankParameters, crank_angle: Any, shift: Any, start
         If the iteration ends in a loop that is not closed or in the other assembly.
     """
     p = parameters
-    th, s1 = _given(crank_angle, shift)
+    th, s1 = given(crank_angle, shift)
     if start is None:
         crank_ball, slider_ball, s4 = estimate(p, th, s1)
     else:
@@ -161,10 +164,8 @@ def close(parameters: SliderCrankParameters, crank_angle: Any, shift: Any, start
         rotation, distance = residuals(product)
         # one more step from inside the tolerance, after which only rounding is left
         found = bool(np.all(rotation <= TOLERANCE) and np.all(distance <= TOLERANCE * scale(p, s1)))
-        rod = _pin_frame(p, th, s1) @ crank_ball
-        guide = rod @ about_i(Dual(0.0, p.rod_length)) @ slider_ball
         try:
-            step = _correction(product, rod, guide, scale(p, s1))
+            step = _correction(product, *_frames(p, th, s1, crank_ball, slider_ball), scale(p, s1))
         except np.linalg.LinAlgError:
             break
         crank_ball = crank_ball @ _turn(np.concatenate([np.zeros((th.size, 1)), step[:, :2]], -1))
@@ -202,7 +203,7 @@ def follow(parameters: SliderCrankParameters, crank_angle: Any, shift: Any) -> C
     InputError, AssemblyError, ClosureError
         As `close`; a step that would change the assembly is a ClosureError.
     """
-    th, s1 = _given(crank_angle, shift)
+    th, s1 = given(crank_angle, shift)
     points: list[Closure] = []
     for angle, position in zip(th, s1):
         points.append(close(parameters, angle, position, points[-1] if points else None))
@@ -230,7 +231,7 @@ def residuals(product: Dual) -> tuple[FloatArray, FloatArray]:
     return 2.0 * np.arcsin(np.minimum(chord, 1.0)), np.linalg.norm(origin(product), axis=-1)
 
 
-def _given(crank_angle: Any, shift: Any) -> tuple[FloatArray, FloatArray]:
+def given(crank_angle: Any, shift: Any) -> tuple[FloatArray, FloatArray]:
     """Crank angles and shifts of one shape (n,)."""
     try:
         th, s1 = np.broadcast_arrays(np.asarray(crank_angle, dtype=float), np.asarray(shift, dtype=float))
@@ -249,6 +250,12 @@ def _given(crank_angle: Any, shift: Any) -> tuple[FloatArray, FloatArray]:
 def _pin_frame(p: SliderCrankParameters, th: Array, s1: Array) -> Dual:
     """M1: the crank's frame moved to the crank pin."""
     return cast(Dual, about_k(Dual(th, s1)) @ about_i(Dual(0.0, p.crank_length)))
+
+
+def _frames(p: SliderCrankParameters, th: Array, s1: Array, crank_ball: Array, slider_ball: Array) -> tuple[Dual, Dual]:
+    """Frames in frame 1 of the rod, at the crank pin, and of the guide, at the slider pin."""
+    rod = _pin_frame(p, th, s1) @ crank_ball
+    return cast(Dual, rod), cast(Dual, rod @ about_i(Dual(0.0, p.rod_length)) @ slider_ball)
 
 
 def _correction(product: Dual, rod: Dual, guide: Dual, length: float) -> FloatArray:
@@ -272,7 +279,8 @@ def _turn(vector: Array) -> Array:
     """Rotation matrices (n, 3, 3) of the vectors (n, 3): axis times tangent of half the angle times two (Cayley)."""
     half = 0.5 * vector
     m = skew(half).real
-    return np.eye(3) + 2.0 * (m + m @ m) / (1.0 + np.sum(half * half, -1))[:, None, None]
+    turn: Array = np.eye(3) + 2.0 * (m + m @ m) / (1.0 + np.sum(half * half, -1))[:, None, None]
+    return turn
 
 
 def _check(
@@ -313,7 +321,7 @@ def shortage(p: SliderCrankParameters, crank_angle: Any, shift: Any) -> FloatArr
     guide = about_i(-Dual(p.guide_twist, p.guide_offset))
     pin = origin(_pin_frame(p, np.asarray(crank_angle), np.asarray(shift)))
     across = (pin - origin(guide)) @ guide.real[:, :2]
-    return np.linalg.norm(across, axis=-1) - p.rod_length
+    return cast(FloatArray, np.linalg.norm(across, axis=-1) - p.rod_length)
 
 
 def _too_short(p: SliderCrankParameters, th: Array, s1: Array, lacking: Array) -> AssemblyError:

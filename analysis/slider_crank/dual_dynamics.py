@@ -137,7 +137,7 @@ class JointLoads:
         if number not in _FRAMES:
             raise InputError(f"there is no frame {number!r}: the frames are 1 (ground), 2 (crank), 3 (rod), 4 (guide)")
         vectors: FloatArray = getattr(self, name)
-        return np.einsum("nji,nj->ni", _FRAMES[number](self.closure), vectors)
+        return cast(FloatArray, np.einsum("nji,nj->ni", _FRAMES[number](self.closure), vectors))
 
 
 def rates(
@@ -192,7 +192,7 @@ def rates(
     rod_relative, slider_relative = apply(rod, q[:, :3]), apply(guide, q[:, 3:6])
     rod_velocity = crank + rod_relative
     # from the loop's other side, from the ground
-    slider = -(q[:, 6:] * slide)
+    slider = -(slide * q[:, 6:])
     # rates of the screws: those of the first ball joint move with the rod, of the second with the slider; the slide's is 0
     crank_rate = Dual(e[:, None] * k, a[:, None] * k)
     rod_moving = crank_rate + cross(rod_velocity, rod_relative)
@@ -204,7 +204,7 @@ def rates(
         slider=slider,
         crank_rate=crank_rate,
         rod_rate=rod_moving + apply(rod, qq[:, :3]),
-        slider_rate=-(qq[:, 6:] * slide),
+        slider_rate=-(slide * qq[:, 6:]),
         slider_velocity=q[:, 6],
         slider_acceleration=qq[:, 6],
         ratio=solve(unit, unit)[:, 6],

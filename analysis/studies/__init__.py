@@ -1,5 +1,6 @@
-"""The figures of Youssef's thesis, a runnable module each: ``python -m analysis.studies.fig_3_2``.
+"""The figures of two theses: of Youssef's a runnable module each, of Rahman's one module for all.
 
+``python -m analysis.studies.fig_3_2`` runs Youssef's figure 3.2, ``python -m analysis.studies.rahman R5`` Rahman's figure 5.
 `STUDIES` lists them in order with their titles; `load` imports one, `make` runs it and writes its files.
 """
 
@@ -13,11 +14,13 @@ from typing import TYPE_CHECKING
 
 from linkwork.errors import InputError
 
+from ._rahman import FIGURES as _RAHMAN
+
 if TYPE_CHECKING:
     from .study import Study, StudyResult
 
-#: Title of each study by its number in the thesis, and of the pictures of the linkage.
-STUDIES: Mapping[str, str] = MappingProxyType(
+#: Title of each study of Youssef's thesis by its number there, and of the pictures of the linkage.
+YOUSSEF: Mapping[str, str] = MappingProxyType(
     {
         "3.2": "Drift of the slider without a spring; Table 3.1, 420 rpm",
         "3.3": "Drift with and without gravity; Table 3.1, 420 rpm, k = 0",
@@ -80,9 +83,26 @@ STUDIES: Mapping[str, str] = MappingProxyType(
 )
 
 
+#: Title of each study of Rahman's thesis by the figure's number there with an R before it.
+RAHMAN: Mapping[str, str] = MappingProxyType({number: figure.title for number, figure in _RAHMAN.items()})
+
+#: Title of each study.
+STUDIES: Mapping[str, str] = MappingProxyType({**YOUSSEF, **RAHMAN})
+
+
+def is_figure(number: str) -> bool:
+    """Whether a study is a figure of a thesis; the others are pictures of a linkage."""
+    return number.removeprefix("R")[0].isdigit()
+
+
+def file_stem(number: str) -> str:
+    """Name of a study's files without their endings."""
+    return f"fig_{number.replace('.', '_')}" if is_figure(number) else number
+
+
 def module_name(number: str) -> str:
     """Module of a study."""
-    return f"{__name__}.fig_{number.replace('.', '_')}" if number[0].isdigit() else f"{__name__}.{number}"
+    return f"{__name__}.{'rahman' if number in RAHMAN else file_stem(number)}"
 
 
 def load(number: str) -> Study:
@@ -95,7 +115,8 @@ def load(number: str) -> Study:
     """
     if number not in STUDIES:
         raise InputError(f"there is no study of figure {number!r}: there are {', '.join(STUDIES)}")
-    study: Study = import_module(module_name(number)).STUDY
+    module = import_module(module_name(number))
+    study: Study = module.study(number) if number in RAHMAN else module.STUDY
     return study
 
 

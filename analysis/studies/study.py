@@ -14,7 +14,7 @@ from rich.table import Table
 
 from .. import io
 from ..figures import Curve
-from . import STUDIES
+from . import STUDIES, file_stem, is_figure
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -145,7 +145,7 @@ class StudyResult:
     @property
     def heading(self) -> str:
         """What stands above the plot: the figure's number and title."""
-        return f"Fig {self.number}  {self.title}" if self.number[0].isdigit() else self.title
+        return f"Fig {self.number}  {self.title}" if is_figure(self.number) else self.title
 
     def table(self) -> Table:
         """The verdicts for a terminal."""
@@ -167,8 +167,7 @@ class Study:
     def make(self, out: str | Path = "out") -> tuple[StudyResult, tuple[Path, ...]]:
         """Compute it and write ``fig_<number>.png`` and ``.csv`` into a folder; returns the result and the paths."""
         result = self.compute()
-        name = f"fig_{self.number.replace('.', '_')}" if self.number[0].isdigit() else self.number
-        stem = Path(out) / name
+        stem = Path(out) / file_stem(self.number)
         paths = [
             io.save_figure(self.draw(result), stem.with_suffix(".png")),
             io.write_csv(stem.with_suffix(".csv"), result.columns),

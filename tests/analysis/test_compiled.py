@@ -23,11 +23,12 @@ from tests.strategies import seeded
 def test_compiled_equations_are_the_plain_ones(seed: int) -> None:
     case = seeded(seed)
     p = case.parameters.constants()
+    solver = compiled.solver(p)
     for inputs in (case.torque_inputs, case.speed_inputs):
         states, forces = np.array([case.state]), np.array([inputs])
         rates, values = np.empty((1, 6)), np.empty((1, 27))
-        compiled.derivatives(p, states, forces, rates)
-        compiled.outputs(p, states, forces, 0.3, values)
+        solver.derivatives(p, states, forces, rates)
+        solver.outputs(p, states, forces, 0.3, values)
         assert rates[0] == pytest.approx(dynamics.derivative(case.state, inputs, p), rel=1e-11)
         plain = dynamics.outputs(case.state, inputs, 0.3, p)
         assert values[0] == pytest.approx(plain, rel=1e-11, abs=1e-14)
@@ -38,7 +39,8 @@ def test_configuration_that_does_not_exist_is_nan() -> None:
     states = np.array([case.state])
     states[0, 1] = 100.0
     rates = np.empty((1, 6))
-    compiled.derivatives(case.parameters.constants(), states, np.array([case.torque_inputs]), rates)
+    p = case.parameters.constants()
+    compiled.solver(p).derivatives(p, states, np.array([case.torque_inputs]), rates)
     assert np.isnan(rates[0, 2:4]).all()
 
 
@@ -54,7 +56,8 @@ def _compile_and_run() -> dict[str, Any]:
 
     run = simulate(TABLE_3_1, Inputs(speed=44.0), stop_time=0.1)
     simulate_many([TABLE_3_1], Inputs(speed=44.0), stop_time=0.1)
-    kernels = [compiled.run, compiled.run_many, compiled.outputs, compiled.channels, compiled.derivatives]
+    solver = compiled.solver(TABLE_3_1.constants())
+    kernels = [solver.run, solver.run_many, solver.outputs, compiled.channels, solver.derivatives]
     return {
         "seconds": perf_counter() - begun,
         "hits": sum(sum(kernel.stats.cache_hits.values()) for kernel in kernels),

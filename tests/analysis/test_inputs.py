@@ -10,7 +10,6 @@ import pytest
 from scipy.interpolate import CubicSpline
 
 from analysis.inputs import (
-    CHANNELS,
     Function,
     Harmonics,
     InductionMotor,
@@ -32,7 +31,7 @@ REST = np.zeros(4)
 def value(inputs: Inputs, t: float, *, left: bool = False, x: Any = REST) -> dict[str, float]:
     """All channels at a time, and the acceleration."""
     encoded = encode(inputs)
-    names = ("torque", "speed", "acceleration", "force", "load_x", "load_y")
+    names = ("torque", "speed", "acceleration", "force", "load_x", "load_y", "rate of load_y")
     return dict(zip(names, channels(encoded, t, left, np.asarray(x, float), encoded.law)))
 
 
@@ -54,6 +53,7 @@ def test_constants_of_every_channel_go_where_they_belong() -> None:
         "force": 2.0,
         "load_x": 3.0,
         "load_y": 4.0,
+        "rate of load_y": 0.0,
     }
     assert value(Inputs(speed=np.float64(5.0)), 7.0)["speed"] == 5.0
 
@@ -105,11 +105,12 @@ def test_harmonics_and_their_rate() -> None:
     assert at["acceleration"] == pytest.approx(-6.0 * sin(2.2) + 40.0 * sin(30.0), rel=1e-14)
 
 
-@pytest.mark.parametrize("channel", CHANNELS)
+@pytest.mark.parametrize("channel", Inputs.CHANNELS)
 def test_harmonics_of_every_channel_go_where_they_belong(channel: str) -> None:
     at = value(Inputs(**{channel: Harmonics(1.0, [2.0], [3.0], [0.0])}), 0.25)
     assert at.pop(channel) == pytest.approx(1.0 + 2.0 * cos(0.75), rel=1e-14)
-    assert {name for name, v in at.items() if v} == ({"acceleration"} if channel == "speed" else set())
+    rates = {"speed": {"acceleration"}, "load_y": {"rate of load_y"}}
+    assert {name for name, v in at.items() if v} == rates.get(channel, set())
 
 
 @pytest.mark.parametrize(("th2", "expected"), [(0.0, 10.0), (0.5, 7.5), (1.5, 2.5), (-1.0, 15.0)])
@@ -145,7 +146,9 @@ def test_functions_see_time_and_state() -> None:
         0.5,
         x=[1.0, 2.0, 3.0, 4.0],
     )
-    assert at == {"torque": 10.5, "speed": 0.0, "acceleration": 0.0, "force": 2.0, "load_x": 3.0, "load_y": 4.0}
+    assert at == {"torque": 10.5, "speed": 0.0, "acceleration": 0.0, "force": 2.0, "load_x": 3.0, "load_y": 4.0} | {
+        "rate of load_y": 0.0
+    }
     speed = Function(lambda t, th2, u, w2, v: t * t, rate=lambda t, th2, u, w2, v: 2.0 * t)
     at = value(Inputs(speed=speed), 3.0)
     assert (at["speed"], at["acceleration"]) == (9.0, 6.0)

@@ -50,6 +50,8 @@ from tests import published
 from tests.fmu.runner import run_in_process
 from tests.strategies import seeded
 
+#: The compiled code of the five-bar.
+SOLVER = compiled.solver(TABLE_3_1.constants())
 # the module, whose name in the package is that of its function
 solver = sys.modules["analysis.simulate"]
 
@@ -111,7 +113,7 @@ def test_the_multiplier_form_gives_the_same_motion_and_forces(case: str) -> None
 
     def acting(t: float, q: np.ndarray, qd: np.ndarray) -> tuple[float, float, float, float]:
         x = np.array([q[0], q[3], qd[0], qd[3]])
-        torque, _, _, force, load_x, load_y = channels(encoded, t, False, x, encoded.law)
+        torque, _, _, force, load_x, load_y, _ = channels(encoded, t, False, x, encoded.law)
         return torque, force, load_x, load_y
 
     speed = SpeedDrive(SPEED) if inputs.speed_drive else None
@@ -473,13 +475,13 @@ def test_a_run_cut_into_small_calls_is_the_same_run(case: str, monkeypatch: pyte
     options: dict[str, Any] = {"events": events, "hold": hold, "step": hold or 2e-3}
     whole = table_3_1(inputs, **options)
     calls = []
-    original = compiled.run
+    original = SOLVER.run
 
     def counted(*arguments: Any) -> int:
         calls.append(1)
         return int(original(*arguments))
 
-    monkeypatch.setattr(compiled, "run", counted)
+    monkeypatch.setattr(SOLVER, "run", counted)
     for steps_per_call in (1, 3):
         monkeypatch.setattr(solver, "STEPS_PER_CALL", steps_per_call)
         # room for the events of one step only
@@ -561,7 +563,7 @@ def test_right_hand_side_that_the_step_size_cannot_resolve() -> None:
 
 
 def _interrupting(after: int) -> Callable[..., int]:
-    original = compiled.run
+    original = SOLVER.run
     calls = []
 
     def run(*arguments: Any) -> int:
@@ -576,7 +578,7 @@ def _interrupting(after: int) -> Callable[..., int]:
 def test_interrupt_keeps_the_data(monkeypatch: pytest.MonkeyPatch) -> None:
     whole = table_3_1()
     monkeypatch.setattr(solver, "STEPS_PER_CALL", 10)
-    monkeypatch.setattr(compiled, "run", _interrupting(1))
+    monkeypatch.setattr(SOLVER, "run", _interrupting(1))
     with pytest.raises(RunInterrupted, match=r"interrupted at t = 0\.\d+ s") as caught:
         table_3_1()
     kept = caught.value.trajectory
@@ -586,7 +588,7 @@ def test_interrupt_keeps_the_data(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_interrupt_before_the_first_step(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(compiled, "run", _interrupting(0))
+    monkeypatch.setattr(SOLVER, "run", _interrupting(0))
     with pytest.raises(RunInterrupted, match=r"^interrupted$") as caught:
         table_3_1()
     assert len(caught.value.trajectory) == 0
@@ -594,14 +596,14 @@ def test_interrupt_before_the_first_step(monkeypatch: pytest.MonkeyPatch) -> Non
 
 def test_interrupt_in_the_last_call_is_not_forgotten(monkeypatch: pytest.MonkeyPatch) -> None:
     # else a loop over many short runs could not be stopped
-    original = compiled.run
+    original = SOLVER.run
 
     def run(*arguments: Any) -> int:
         os.kill(os.getpid(), signal.SIGINT)
         return int(original(*arguments))
 
     before = signal.getsignal(signal.SIGINT)
-    monkeypatch.setattr(compiled, "run", run)
+    monkeypatch.setattr(SOLVER, "run", run)
     with pytest.raises(RunInterrupted, match=r"interrupted at t = 0\.12 s") as caught:
         table_3_1()
     monkeypatch.undo()

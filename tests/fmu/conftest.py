@@ -34,10 +34,10 @@ def fmus(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     return {name: build_fmu.build(name, folder) for name in MODELS}
 
 
-@pytest.fixture(scope="session", params=MODELS.values(), ids=MODELS)
+@pytest.fixture(scope="session", params=list(MODELS))
 def model(request: pytest.FixtureRequest) -> Model:
     """The model under test: each of them in turn."""
-    return request.param
+    return MODELS[request.param]
 
 
 @pytest.fixture(scope="session")

@@ -59,12 +59,13 @@ MODELS = {
 def each(cases: Mapping[str, Mapping[str, Any]], *names: str) -> pytest.MarkDecorator:
     """Parametrise a test over the cases of each model, by model and by the name of the case.
 
-    The arguments ``names`` (by default ``case``) take the value of a case, one of them all of it.
+    The arguments ``names`` (by default ``case``) take the value of a case, one of them all of it. The tests of a model stay
+    together, so that what a module makes for a model is made once.
     """
     names = names or ("case",)
     rows, labels = [], []
     for model in MODELS:
         for label, value in cases[model].items():
-            rows.append((MODELS[model], *(value if len(names) > 1 else (value,))))
+            rows.append((model, *(value if len(names) > 1 else (value,))))
             labels.append(f"{model}-{label}")
-    return pytest.mark.parametrize(("model", *names), rows, ids=labels, indirect=["model"])
+    return pytest.mark.parametrize(("model", *names), rows, ids=labels, indirect=["model"], scope="module")

@@ -9,34 +9,75 @@ from typing import Any
 
 import pytest
 
-from .conftest import Changes
+from .models import Changes, Model, each
 from .runner import run_in_process
+from .test_description import INPUTS
 
 NAN, INF = float("nan"), float("inf")
 
-#: Values before the initialisation, and what the sentence in the log must say.
-BAD_PARAMETERS = {
+#: What every model says alike: values before the initialisation, and what the sentence in the log must say.
+BAD_ANYWHERE = {
     "negative length": ({"crank.length": -0.05}, "parameter crank.length is -0.05: it must be"),
-    "zero length": ({"coupler.length": 0.0}, "parameter coupler.length is 0.0: it must be"),
     "mass not a number": ({"slider.mass": NAN}, "parameter slider.mass is nan: it must be"),
-    "infinite inertia": ({"rocker.inertia": INF}, "parameter rocker.inertia is inf: it must be"),
-    "inertia below what the mass needs": (
-        {"crank.mass": 9.0, "crank.cog_distance": 0.1},
-        "parameter crank.inertia is 0.00125: it must be at least",
-    ),
-    "nothing moves": ({"slider.mass": 0.0, "rocker.mass": 0.0}, "parameter slider.mass is 0.0: it must be"),
     "negative damping": ({"slider.damping": -1.0}, "parameter slider.damping is -1.0: it must be"),
     "branch": ({"assembly.branch": 0}, "parameter assembly.branch is 0: it must be +1 or -1"),
     "drive mode": ({"drive.mode": 7}, "parameter drive.mode is 7: it must be 0 (torque) or 1 (speed)"),
     "tolerance zero": ({"solver.tolerance": 0.0}, "parameter solver.tolerance is 0.0: it must be between"),
     "tolerance not a number": ({"solver.tolerance": NAN}, "parameter solver.tolerance is nan: it must be between"),
     "start": ({"initial.crank_angle": INF}, "parameter initial.crank_angle is inf: it must be a finite number"),
-    "input not a number": ({"slider.force": NAN}, "input slider.force is nan at t = 0 s: it must be a finite number"),
-    "not to be assembled": ({"initial.slider_position": 1.0}, "the links cannot be joined at crank angle 0 rad"),
-    "at the limit of assembly": (
-        {"initial.slider_position": 0.19649999},
-        "limit of assembly at crank angle 0 rad",
-    ),
+}
+BAD_PARAMETERS = {
+    "FiveBarSlider": {
+        **BAD_ANYWHERE,
+        "zero length": ({"coupler.length": 0.0}, "parameter coupler.length is 0.0: it must be"),
+        "infinite inertia": ({"rocker.inertia": INF}, "parameter rocker.inertia is inf: it must be"),
+        "inertia below what the mass needs": (
+            {"crank.mass": 9.0, "crank.cog_distance": 0.1},
+            "parameter crank.inertia is 0.00125: it must be at least",
+        ),
+        "nothing moves": ({"slider.mass": 0.0, "rocker.mass": 0.0}, "parameter slider.mass is 0.0: it must be"),
+        "input not a number": (
+            {"slider.force": NAN},
+            "input slider.force is nan at t = 0 s: it must be a finite number",
+        ),
+        "not to be assembled": ({"initial.slider_position": 1.0}, "the links cannot be joined at crank angle 0 rad"),
+        "at the limit of assembly": (
+            {"initial.slider_position": 0.19649999},
+            "limit of assembly at crank angle 0 rad",
+        ),
+    },
+    "SliderCrank": {
+        **BAD_ANYWHERE,
+        "zero length": ({"rod.length": 0.0}, "parameter rod.length is 0.0: it must be"),
+        "infinite inertia": ({"rod.inertia": INF}, "parameter rod.inertia is inf: it must be"),
+        "inertia below what the mass needs": (
+            {"crank.cog_x": 0.3, "crank.cog_y": 0.1},
+            "parameter crank.inertia is 0.33725290293332477: it must be at least crank.mass * (crank.cog_x^2 + "
+            "crank.cog_y^2) = 1.07643 kg.m2",
+        ),
+        "nothing moves": ({"crank.mass": 0.0}, "parameter crank.mass is 0.0: it must be"),
+        "negative damping of the shift": ({"shift.damping": -1.0}, "parameter shift.damping is -1.0: it must be"),
+        "axial mode": ({"axial.mode": 3}, "parameter axial.mode is 3: it must be 0 (force), 1 (speed) or 2 (groove)"),
+        "groove": ({"groove.ratio": NAN}, "parameter groove.ratio is nan: it must be a finite number"),
+        "twist": ({"guide.twist": INF}, "parameter guide.twist is inf: it must be a finite number"),
+        "input not a number": ({"axial.speed": NAN}, "input axial.speed is nan at t = 0 s: it must be a finite number"),
+        "input too large": ({"axial.speed": 1e300}, "the energy at the start is not finite: "),
+        # sqrt(22^2 in2 + 2^2 m2), less 50 in
+        "not to be assembled": (
+            {"initial.shift_position": 2.0},
+            "the rod does not reach the guide at crank angle 0 rad (0.0000 deg) and shift 2 m: the crank pin is "
+            "2.07659756 m from the guide, the rod is 1.27 m long, 0.806597563 m too short",
+        ),
+        "not to be assembled in the groove": (
+            {"axial.mode": 2, "groove.amplitude": 3.0, "groove.ratio": 3.0, "initial.crank_angle": 0.5},
+            "the rod does not reach the guide at crank angle 0.5 rad (28.6479 deg) and shift 2.99248496 m",
+        ),
+        # the rod is square to the guide at sqrt(50^2 - 22^2) in = 1.140457171 m, within a thousandth of it from 0.7 um less
+        "at the limit of assembly": (
+            {"initial.shift_position": 1.1404568},
+            "limit of assembly at crank angle 0 rad (0.0000 deg) and shift 1.1404568 m: the rod is within",
+        ),
+    },
 }
 
 
@@ -75,17 +116,19 @@ def initialise_badly(fmu: str, folder: str, cases: list[dict[str, Any]], times: 
 
 
 @pytest.fixture(scope="module")
-def failures(fmu: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
+def failures(fmu: Path, model: Model, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
     """What each bad parameter leads to, after 14 of each in one process that lived on."""
-    cases = [values for values, _ in BAD_PARAMETERS.values()]
+    cases = [values for values, _ in BAD_PARAMETERS[model.name].values()]
     found = run_in_process(initialise_badly, fmu, tmp_path_factory.mktemp("run"), cases, 14)
-    return dict(zip(BAD_PARAMETERS, found))
+    return dict(zip(BAD_PARAMETERS[model.name], found))
 
 
-@pytest.mark.parametrize("case", BAD_PARAMETERS)
-def test_bad_parameter_fails_the_initialisation_with_a_sentence(failures: dict[str, Any], case: str) -> None:
+@each({model: {case: case for case in cases} for model, cases in BAD_PARAMETERS.items()})
+def test_bad_parameter_fails_the_initialisation_with_a_sentence(
+    failures: dict[str, Any], model: Model, case: str
+) -> None:
     trouble, after, outputs, log = failures[case]
-    sentence = BAD_PARAMETERS[case][1]
+    sentence = BAD_PARAMETERS[model.name][case][1]
     said = [text for status, category, text in log if (status, category) == (3, "logStatusError")]
     assert len(said) == 1
     assert said[0].startswith(sentence)
@@ -110,14 +153,43 @@ BAD_STEPS = {
 }
 #: Input and value, the value of solver.status, and what the sentence must say.
 BAD_INPUTS = {
-    "NaN force": ("slider.force", NAN, 2, "input slider.force is nan at t = 0.01 s: it must be a finite number"),
-    "infinite speed": ("drive.speed", INF, 2, "input drive.speed is inf at t = 0.01 s: it must be a finite number"),
-    "infinite load": ("load.fy", -INF, 2, "input load.fy is -inf at t = 0.01 s: it must be a finite number"),
-    "slider pushed out": ("slider.force", 1e5, 3, "in the step from t = 0.01 s: limit of assembly at crank angle"),
-    "slider pulled in": ("slider.force", -1e6, 3, "in the step from t = 0.01 s: limit of assembly at crank angle"),
-    "crank run wild": ("drive.speed", 1e5, 3, "in the step from t = 0.01 s: limit of assembly at crank angle"),
-    "beyond floats": ("slider.force", 1e300, 4, "in the step from t = 0.01 s: the step size fell to"),
-    "beyond floats, speed": ("drive.speed", 1e200, 4, "in the step from t = 0.01 s: the step size fell to"),
+    "FiveBarSlider": {
+        "NaN force": ("slider.force", NAN, 2, "input slider.force is nan at t = 0.01 s: it must be a finite number"),
+        "infinite speed": ("drive.speed", INF, 2, "input drive.speed is inf at t = 0.01 s: it must be a finite number"),
+        "infinite load": ("load.fy", -INF, 2, "input load.fy is -inf at t = 0.01 s: it must be a finite number"),
+        "slider pushed out": ("slider.force", 1e5, 3, "in the step from t = 0.01 s: limit of assembly at crank angle"),
+        "slider pulled in": ("slider.force", -1e6, 3, "in the step from t = 0.01 s: limit of assembly at crank angle"),
+        "crank run wild": ("drive.speed", 1e5, 3, "in the step from t = 0.01 s: limit of assembly at crank angle"),
+        "beyond floats": ("slider.force", 1e300, 4, "in the step from t = 0.01 s: the step size fell to"),
+        "beyond floats, speed": ("drive.speed", 1e200, 4, "in the step from t = 0.01 s: the step size fell to"),
+    },
+    "SliderCrank": {
+        "NaN load": ("slider.load", NAN, 2, "input slider.load is nan at t = 0.01 s: it must be a finite number"),
+        "infinite speed": ("drive.speed", INF, 2, "input drive.speed is inf at t = 0.01 s: it must be a finite number"),
+        "infinite shift": (
+            "axial.speed",
+            -INF,
+            2,
+            "input axial.speed is -inf at t = 0.01 s: it must be a finite number",
+        ),
+        "force of no use": (
+            "axial.force",
+            NAN,
+            2,
+            "input axial.force is nan at t = 0.01 s: it must be a finite number",
+        ),
+        "crank pushed out": ("axial.speed", 30.0, 3, "in the step from t = 0.01 s: limit of assembly at crank angle"),
+        "crank pulled out": ("axial.speed", -30.0, 3, "in the step from t = 0.01 s: limit of assembly at crank angle"),
+        "crank run off": (
+            "axial.acceleration",
+            1e3,
+            3,
+            "in the step from t = 0.01 s: limit of assembly at crank angle",
+        ),
+        "beyond floats": ("axial.acceleration", 1e300, 4, "in the step from t = 0.01 s: the step size fell to"),
+        "beyond floats, speed": ("drive.speed", 1e200, 4, "in the step from t = 0.01 s: the step size fell to"),
+        "beyond floats, shift": ("axial.speed", 1e200, 4, "in the step from t = 0.01 s: the step size fell to"),
+    },
 }
 
 
@@ -173,16 +245,17 @@ def step_badly(fmu: str, folder: str, cases: list[Any]) -> list[Any]:
 
 
 @pytest.fixture(scope="module")
-def refusals(fmu: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
+def refusals(fmu: Path, model: Model, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
+    inputs = BAD_INPUTS[model.name]
     cases: list[Any] = [[{}, time, size] for time, size, _, _ in BAD_STEPS.values()]
-    cases += [[{name: value}, 0.01, 0.1] for name, value, _, _ in BAD_INPUTS.values()]
+    cases += [[{name: value}, 0.01, 0.1] for name, value, _, _ in inputs.values()]
     found = run_in_process(step_badly, fmu, tmp_path_factory.mktemp("run"), cases)
-    return dict(zip([*BAD_STEPS, *BAD_INPUTS], found))
+    return dict(zip([*BAD_STEPS, *inputs], found))
 
 
-@pytest.mark.parametrize("case", [*BAD_STEPS, *BAD_INPUTS])
-def test_bad_step_is_refused_and_the_last_good_state_stays(refusals: dict[str, Any], case: str) -> None:
-    *_, code, sentence = (BAD_STEPS | BAD_INPUTS)[case]
+@each({model: {case: case for case in [*BAD_STEPS, *inputs]} for model, inputs in BAD_INPUTS.items()})
+def test_bad_step_is_refused_and_the_last_good_state_stays(refusals: dict[str, Any], model: Model, case: str) -> None:
+    *_, code, sentence = (BAD_STEPS | BAD_INPUTS[model.name])[case]
     found = refusals[case]
     assert found["status"] == 2, "fmi2Discard"
     assert found["trouble"][0] == code
@@ -197,21 +270,31 @@ def test_bad_step_is_refused_and_the_last_good_state_stays(refusals: dict[str, A
     assert found["like the run without it"]
 
 
-def nan_input_read(fmu: str, folder: str) -> list[Any]:
-    """Outputs read while an input is not finite."""
+def nan_input_read(fmu: str, folder: str, inputs: list[str]) -> list[Any]:
+    """Outputs read while an input is not finite, and whether they are as before when it is put back."""
     from bare_master import Fmu
 
-    instance = Fmu(fmu, folder).instantiate().start()
-    before = instance.outputs()
-    instance.set("load.fx", float("nan"))
-    return [before, instance.outputs(), instance.trouble()]
+    fmu = Fmu(fmu, folder)
+    found = []
+    for name in inputs:
+        instance = fmu.instantiate().start()
+        before = instance.outputs()
+        kept = instance.get(name)
+        instance.set(name, float("nan"))
+        found.append([before, instance.outputs(), instance.trouble()])
+        instance.set(name, kept)
+        assert instance.outputs() == before
+    return found
 
 
-def test_outputs_under_an_input_that_is_not_finite_are_the_last_good_ones(fmu: Path, tmp_path: Path) -> None:
-    before, during, trouble = run_in_process(nan_input_read, fmu, tmp_path)
-    assert during == before
-    assert trouble[0] == 2
-    assert "load.fx is nan" in trouble[1]
+def test_outputs_under_an_input_that_is_not_finite_are_the_last_good_ones(
+    fmu: Path, model: Model, tmp_path: Path
+) -> None:
+    names = sorted(INPUTS[model.name])
+    for name, (before, during, trouble) in zip(names, run_in_process(nan_input_read, fmu, tmp_path, names)):
+        assert during == before
+        assert trouble[0] == 2
+        assert f"{name} is nan" in trouble[1]
 
 
 def out_of_order(fmu: str, folder: str) -> list[Any]:
@@ -238,10 +321,11 @@ def out_of_order(fmu: str, folder: str) -> list[Any]:
     return found
 
 
-def test_calls_out_of_order(fmu: Path, tmp_path: Path) -> None:
+def test_calls_out_of_order(fmu: Path, model: Model, tmp_path: Path) -> None:
     before, parameter, output, restored, after = run_in_process(out_of_order, fmu, tmp_path)
     assert before == [2, [5, "a step at t = 0 s before the initialisation"]]
-    assert parameter[:2] == [0, 0.05]
+    # the default: 5 cm, 12 in
+    assert parameter[:2] == [0, pytest.approx({"FiveBarSlider": 0.05, "SliderCrank": 0.3048}[model.name], rel=1e-15)]
     assert parameter[2] == [
         1,
         "logStatusWarning",
@@ -253,17 +337,24 @@ def test_calls_out_of_order(fmu: Path, tmp_path: Path) -> None:
     assert after == [2, True]
 
 
-def go_on_regardless(fmu: str, folder: str) -> list[Any]:
+def go_on_regardless(fmu: str, folder: str, name: str, value: float) -> list[Any]:
     """A master that overlooks a refused step and goes on."""
     from bare_master import Fmu
 
     instance = Fmu(fmu, folder).instantiate().start()
-    instance.set("slider.force", 1e5)
+    instance.set(name, value)
     return [[instance.step(0.1 * k, 0.1), instance.trouble()] for k in range(4)]
 
 
-def test_the_cause_stays_where_a_master_goes_on_after_a_refused_step(fmu: Path, tmp_path: Path) -> None:
-    first, *others = run_in_process(go_on_regardless, fmu, tmp_path)
+#: An input with which the first step of a tenth of a second, from the defaults, ends in the limit of assembly.
+TOO_FAR = {"FiveBarSlider": {"force": ("slider.force", 1e5)}, "SliderCrank": {"shift": ("axial.speed", 30.0)}}
+
+
+@each(TOO_FAR, "name", "value")
+def test_the_cause_stays_where_a_master_goes_on_after_a_refused_step(
+    fmu: Path, tmp_path: Path, name: str, value: float
+) -> None:
+    first, *others = run_in_process(go_on_regardless, fmu, tmp_path, name, value)
     assert first[0] == 2
     assert first[1][0] == 3
     assert first[1][1].startswith("in the step from t = 0 s: limit of assembly")
@@ -361,7 +452,7 @@ def test_percent_signs_come_through_the_printf_of_the_master(
     build_variant: Callable[[Changes], Path], tmp_path: Path
 ) -> None:
     sentence = "greater than 0 %, not %s%s%n%d %5.3f %%"
-    variant = build_variant({"linkwork/five_bar/plant.py": ("it must be greater than zero", sentence)})
+    variant = build_variant({"linkwork/plant.py": ("it must be greater than zero", sentence)})
     status, log, message = run_in_process(refuse_in_percent, variant, tmp_path / "run")
     assert status == 2
     assert message == f"a step of 0 s at t = 0 s: {sentence}"

@@ -10,10 +10,11 @@ import os
 import subprocess
 import sys
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import pytest
 
+from .models import Model
 from .runner import run_in_process
 from .test_description import ROWS
 
@@ -23,31 +24,74 @@ NEEDS = {
     "libcosimpy": "the package libcosimpy",
     "ecospy": "the package ecospy and the library libtbb.so.12 (Debian: apt-get install libtbb12)",
 }
-OUTPUTS = [name for name, causality, kind, *_ in ROWS if causality == "output" and kind == "Real"]
-
-#: Parameters and inputs at the start; the slider's force changes after half of the 100 steps of 1 ms.
-REALS = {
-    "slider.damping": 25.0,
-    "slider.coulomb_friction": 0.3,
-    "coupler.point_distance": 0.07,
-    "initial.crank_speed": 30.0,
-    "drive.torque": 0.3,
-    "slider.force": 0.5,
+OUTPUTS = {
+    model: [name for name, causality, kind, *_ in rows if causality == "output" and kind == "Real"]
+    for model, rows in ROWS.items()
 }
-INTEGERS = {"drive.mode": 0}
-LATER = 2.0
-#: A force that pushes the slider to the limit of assembly in the second step after it is set, at 0.051 s.
-TOO_MUCH = 1e5
 
 
-def by_fmpy(fmu: str, reals: dict[str, float], integers: dict[str, int], later: float, outputs: list[str]) -> Any:
+class Case(NamedTuple):
+    """A run of 100 steps of 1 ms: parameters and inputs at the start, and an input that changes after half of it.
+
+    ``shown`` is an output of which that makes a difference, ``too_much`` a value that ends in the limit of assembly in the
+    second step after it is set, at 0.051 s.
+    """
+
+    reals: dict[str, float]
+    integers: dict[str, int]
+    changed: str
+    later: float
+    shown: str
+    too_much: float
+
+
+CASES = {
+    "FiveBarSlider": Case(
+        {
+            "slider.damping": 25.0,
+            "slider.coulomb_friction": 0.3,
+            "coupler.point_distance": 0.07,
+            "initial.crank_speed": 30.0,
+            "drive.torque": 0.3,
+            "slider.force": 0.5,
+        },
+        {"drive.mode": 0},
+        "slider.force",
+        2.0,
+        "slider.position",
+        1e5,
+    ),
+    "SliderCrank": Case(
+        {
+            "guide.twist": 4.4,
+            "slider.damping": 25.0,
+            "slider.coulomb_friction": 0.3,
+            "shift.stiffness": 500.0,
+            "gravity.y": -9.81,
+            "initial.crank_speed": 30.0,
+            "drive.torque": 3.0,
+            "axial.force": 0.5,
+            "slider.load": 4.0,
+        },
+        {"drive.mode": 0, "axial.mode": 0},
+        "axial.force",
+        2.0,
+        "shift.position",
+        2e7,
+    ),
+}
+
+
+def by_fmpy(
+    fmu: str, reals: dict[str, float], integers: dict[str, int], changed: str, later: float, outputs: list[str]
+) -> Any:
     """The case by FMPy's own simulate_fmu."""
     import numpy as np
     from fmpy import read_model_description, simulate_fmu
 
     names = [v.name for v in read_model_description(fmu).modelVariables if v.causality == "input"]
     before = [reals.get(name, 0.0) for name in names]
-    after = [later if name == "slider.force" else reals.get(name, 0.0) for name in names]
+    after = [later if name == changed else reals.get(name, 0.0) for name in names]
     # the jump is where the communication point is: halves of rounded milliseconds would make a step of their own
     half = 50 * 1e-3
     signals = np.array(
@@ -74,7 +118,9 @@ def by_fmpy(fmu: str, reals: dict[str, float], integers: dict[str, int], later: 
     }
 
 
-def by_libcosimpy(fmu: str, reals: dict[str, float], integers: dict[str, int], later: float, outputs: list[str]) -> Any:
+def by_libcosimpy(
+    fmu: str, reals: dict[str, float], integers: dict[str, int], changed: str, later: float, outputs: list[str]
+) -> Any:
     """The case by libcosim's fixed-step algorithm."""
     import zipfile
     from xml.etree import ElementTree
@@ -99,7 +145,7 @@ def by_libcosimpy(fmu: str, reals: dict[str, float], integers: dict[str, int], l
     for name, value in integers.items():
         assert execution.integer_initial_value(slave, reference[name], value)
     assert execution.step(50)
-    override.slave_real_values(slave, [reference["slider.force"]], [later])
+    override.slave_real_values(slave, [reference[changed]], [later])
     good = execution.step(50)
     return {
         "end": dict(zip(outputs, observer.last_real_values(slave, [reference[name] for name in outputs]))),
@@ -109,7 +155,9 @@ def by_libcosimpy(fmu: str, reals: dict[str, float], integers: dict[str, int], l
     }
 
 
-def by_ecospy(fmu: str, reals: dict[str, float], integers: dict[str, int], later: float, outputs: list[str]) -> Any:
+def by_ecospy(
+    fmu: str, reals: dict[str, float], integers: dict[str, int], changed: str, later: float, outputs: list[str]
+) -> Any:
     """The case by ecos."""
     from ecospy import EcosSimulation, EcosSimulationStructure
 
@@ -119,7 +167,7 @@ def by_ecospy(fmu: str, reals: dict[str, float], integers: dict[str, int], later
         with EcosSimulation(structure=structure, step_size=1e-3) as simulation:
             initialised = simulation.init(parameter_set="case")
             simulation.step(50)
-            simulation.set_real("slider::slider.force", later)
+            simulation.set_real(f"slider::{changed}", later)
             time = simulation.step(50)
             found = {
                 "end": {name: simulation.get_real(f"slider::{name}") for name in outputs},
@@ -147,90 +195,111 @@ def need(master: str) -> None:
         pytest.skip(told)
 
 
-def run(master: str, fmu: Path, reals: dict[str, float] = REALS, later: float = LATER) -> dict[str, Any]:
+def run(master: str, fmu: Path, model: Model, **changes: Any) -> dict[str, Any]:
+    """The model's case, with changes, by a master."""
     need(master)
-    return run_in_process(MASTERS[master], fmu, reals, INTEGERS, later, OUTPUTS)
+    case = CASES[model.name]._replace(**changes)
+    return run_in_process(MASTERS[master], fmu, *case[:4], OUTPUTS[model.name])
 
 
-def by_hand(fmu: str, folder: str, reals: dict[str, float], integers: dict[str, int], later: float) -> Any:
-    """The case step by step: 50 of 1 ms, the force changed, 50 more."""
+def by_hand(
+    fmu: str, folder: str, reals: dict[str, float], integers: dict[str, int], changed: str, later: float
+) -> Any:
+    """The case step by step: 50 of 1 ms, the input changed, 50 more."""
     from bare_master import Fmu
 
     instance = Fmu(fmu, folder).instantiate().start(reals | integers)
     for k in range(100):
         if k == 50:
-            instance.set("slider.force", later)
+            instance.set(changed, later)
         if instance.step(k * 1e-3, 1e-3):
             break
     return [instance.outputs(), instance.trouble()]
 
 
 @pytest.fixture(scope="module")
-def expected(fmu: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, float]:
-    end, trouble = run_in_process(by_hand, fmu, tmp_path_factory.mktemp("run"), REALS, INTEGERS, LATER)
+def expected(fmu: Path, model: Model, tmp_path_factory: pytest.TempPathFactory) -> dict[str, float]:
+    end, trouble = run_in_process(by_hand, fmu, tmp_path_factory.mktemp("run"), *CASES[model.name][:4])
     assert trouble == [0, ""]
     return end
 
 
+#: Outputs of which the last digits are those of sums of far greater ones: forces, moments, accelerations, and the balance of
+#: the slider-crank's hundreds of joules.
+SUMS = {
+    "FiveBarSlider": ("pin.", "acceleration", "guide_force"),
+    "SliderCrank": ("acceleration", "guide.", "bearing.", "crank_pin.f", "slider_pin.f", "applied_force", "residual"),
+}
+
+
 @pytest.mark.parametrize("master", MASTERS)
-def test_same_end_values(fmu: Path, expected: dict[str, float], master: str) -> None:
-    found = run(master, fmu)
+def test_same_end_values(fmu: Path, model: Model, expected: dict[str, float], master: str) -> None:
+    found = run(master, fmu, model)
     assert found["status"] == 0
     assert found["time"] == pytest.approx(0.1, abs=1e-12)
+    assert list(found["end"]) == list(expected) == OUTPUTS[model.name]
     for name, value in expected.items():
-        # of a force or an acceleration the last digits are those of sums of far greater ones
-        assert found["end"][name] == pytest.approx(value, rel=1e-12, abs=1e-12 * max(1.0, SCALE.get(name, 1.0))), name
+        scale = 1e2 if any(part in name for part in SUMS[model.name]) else 1.0
+        assert found["end"][name] == pytest.approx(value, rel=1e-12, abs=1e-12 * scale), name
 
 
-SCALE = {name: 1e2 for name in OUTPUTS if name.startswith("pin") or "acceleration" in name or "guide_force" in name}
-
-
-def test_parameters_and_inputs_arrive(fmu: Path, tmp_path: Path, expected: dict[str, float]) -> None:
+def test_parameters_and_inputs_arrive(fmu: Path, model: Model, tmp_path: Path, expected: dict[str, float]) -> None:
     # that the masters agree says something only if what they set makes a difference
-    for name in REALS:
-        changed = REALS | {name: REALS[name] * 1.1}
-        end, _ = run_in_process(by_hand, fmu, tmp_path / name, changed, INTEGERS, LATER)
+    case = CASES[model.name]
+    for name in case.reals:
+        changed = case._replace(reals=case.reals | {name: case.reals[name] * 1.1})
+        end, _ = run_in_process(by_hand, fmu, tmp_path / name, *changed[:4])
         assert end != expected, name
-    end, _ = run_in_process(by_hand, fmu, tmp_path / "later", REALS, INTEGERS, LATER * 1.1)
-    assert end["slider.position"] != expected["slider.position"]
+    end, _ = run_in_process(by_hand, fmu, tmp_path / "later", *case._replace(later=case.later * 1.1)[:4])
+    assert end[case.shown] != expected[case.shown]
 
 
 @pytest.fixture(scope="module")
-def last_good(fmu: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, float]:
-    end, trouble = run_in_process(by_hand, fmu, tmp_path_factory.mktemp("run"), REALS, INTEGERS, TOO_MUCH)
+def last_good(fmu: Path, model: Model, tmp_path_factory: pytest.TempPathFactory) -> dict[str, float]:
+    case = CASES[model.name]
+    given = case._replace(later=case.too_much)[:4]
+    end, trouble = run_in_process(by_hand, fmu, tmp_path_factory.mktemp("run"), *given)
     assert trouble[0] == 3
+    assert trouble[1].startswith(SENTENCE)
     return end
+
+
+def run_too_far(master: str, fmu: Path, model: Model) -> dict[str, Any]:
+    return run(master, fmu, model, later=CASES[model.name].too_much)
 
 
 SENTENCE = "in the step from t = 0.051 s: limit of assembly at crank angle"
 
 
-def test_refused_step_under_fmpy(fmu: Path, last_good: dict[str, float]) -> None:
+def test_refused_step_under_fmpy(fmu: Path, model: Model, last_good: dict[str, float]) -> None:
     # FMPy ends the run without a word: only solver.status in its last row says that it was not the end
-    found = run("fmpy", fmu, later=TOO_MUCH)
+    found = run_too_far("fmpy", fmu, model)
     assert found["time"] == pytest.approx(0.051)
     assert found["status"] == 3
     assert [said for said in found["said"] if said.startswith(SENTENCE)]
-    assert found["end"]["slider.position"] == pytest.approx(last_good["slider.position"], rel=1e-9)
+    shown = CASES[model.name].shown
+    assert found["end"][shown] == pytest.approx(last_good[shown], rel=1e-9)
 
 
-def test_refused_step_under_libcosimpy(fmu: Path, last_good: dict[str, float]) -> None:
+def test_refused_step_under_libcosimpy(fmu: Path, model: Model, last_good: dict[str, float]) -> None:
     # libcosim reports failure and reads nothing more: solver.status is that of the last good step
-    found = run("libcosimpy", fmu, later=TOO_MUCH)
+    found = run_too_far("libcosimpy", fmu, model)
     assert found["good"] is False
     assert found["time"] == pytest.approx(0.051)
     assert found["status"] == 0
-    assert found["end"]["slider.position"] == pytest.approx(last_good["slider.position"], rel=1e-9)
+    shown = CASES[model.name].shown
+    assert found["end"][shown] == pytest.approx(last_good[shown], rel=1e-9)
 
 
-def test_refused_step_under_ecospy(fmu: Path, last_good: dict[str, float]) -> None:
+def test_refused_step_under_ecospy(fmu: Path, model: Model, last_good: dict[str, float]) -> None:
     # ecos overlooks the status and goes on to the end: solver.status and solver.message alone tell, with the first cause
-    found = run("ecospy", fmu, later=TOO_MUCH)
+    found = run_too_far("ecospy", fmu, model)
     assert found["time"] == pytest.approx(0.1)
     assert found["status"] == 3
     assert found["message"].startswith("a step over a gap: it starts at t = 0.099 s")
     assert SENTENCE in found["message"]
-    assert found["end"]["slider.position"] == pytest.approx(last_good["slider.position"], rel=1e-9)
+    shown = CASES[model.name].shown
+    assert found["end"][shown] == pytest.approx(last_good[shown], rel=1e-9)
 
 
 def bad_by_fmpy(fmu: str, reals: dict[str, float]) -> list[Any]:
@@ -261,15 +330,15 @@ def test_bad_parameter_under_fmpy(fmu: Path) -> None:
     assert rows == 11
 
 
-def test_bad_parameter_under_ecospy(fmu: Path) -> None:
+def test_bad_parameter_under_ecospy(fmu: Path, model: Model) -> None:
     # ecos overlooks this as well: every read has to be survived, and the sentence is there to be read
-    found = run("ecospy", fmu, REALS | {"slider.damping": -1.0})
+    found = run("ecospy", fmu, model, reals=CASES[model.name].reals | {"slider.damping": -1.0})
     assert found["status"] == 6
     assert "parameter slider.damping is -1.0" in found["message"]
 
 
-def test_bad_parameter_under_libcosimpy(fmu: Path) -> None:
+def test_bad_parameter_under_libcosimpy(fmu: Path, model: Model) -> None:
     # libcosim itself ends the process on a failed initialisation, but not before the sentence is in its log
     need("libcosimpy")
     with pytest.raises(AssertionError, match=r"parameter slider\.damping is -1\.0: it must be"):
-        run("libcosimpy", fmu, REALS | {"slider.damping": -1.0})
+        run("libcosimpy", fmu, model, reals=CASES[model.name].reals | {"slider.damping": -1.0})

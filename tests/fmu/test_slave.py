@@ -14,7 +14,6 @@ from slider_crank_slave import SliderCrank
 
 from .models import Model
 
-
 SLAVES = {"FiveBarSlider": FiveBarSlider, "SliderCrank": SliderCrank}
 
 

@@ -1,0 +1,670 @@
+"""Pictures of the generalised slider-crank: in space, moving, and its range of assembly.
+
+The mechanism is seen in orthographic projection with the common normal of crank axis and guide upright. Solids are faces
+that are painted from back to front; centre lines, paths and frames are lines under or over them. Letters look for a free
+place of their own, so that they can be read for any dimensions.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from math import ceil, cos, degrees, isfinite, pi, radians, sin
+from pathlib import Path
+from typing import Any, TypeAlias
+
+import matplotlib
+import numpy as np
+from matplotlib.animation import PillowWriter
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.collections import PolyCollection
+from matplotlib.colors import to_rgb
+from matplotlib.figure import Figure
+from matplotlib.patheffects import withStroke
+from numpy.typing import ArrayLike, NDArray
+
+from linkwork.errors import AssemblyError, InputError
+from linkwork.slider_crank import kinematics
+from linkwork.slider_crank.mobility import Range, ShiftLaw, check_assembly, constant_shift, ranges
+from linkwork.slider_crank.parameters import SliderCrankParameters
+from linkwork.slider_crank.vectors import Vector
+
+from .linkage import COUPLER, CRANK, GROUND, SLIDER, TRACE
+from .style import COLOURS, STYLE, finish
+
+FloatArray: TypeAlias = NDArray[np.float64]
+
+#: A metre in the units that pictures come in.
+UNITS = {"mm": 1e3, "cm": 1e2, "m": 1.0, "in": 1.0 / 0.0254}
+#: Elevation and azimuth (deg) in which shift, offset and twist are all seen, the slider to the right of the crank.
+VIEW = (22.0, -112.0)
+#: Towards the light, along right, up and towards of the view.
+_LIGHT = np.array([-0.25, 0.75, 0.61])
+#: Crank angles of a full turn at which paths and curves are computed.
+_POINTS = 361
+#: How far inside its ends a range is drawn (rad): the plant's own limit of assembly lies in between.
+_INSET = 1e-6
+_DEAD, _LIMIT, _SHIFT, _TWIST = COLOURS[2], "#B07700", "#A0527F", "#2478A8"
+
+
+@dataclass(frozen=True, slots=True)
+class _Pose:
+    """Where the joints are at one configuration, in the picture's unit; the angle in rad."""
+
+    angle: float
+    slide: float
+    centre: FloatArray
+    crank_pin: FloatArray
+    slider_pin: FloatArray
+
+
+def _pose(parameters: SliderCrankParameters, angle: float, shift: float, factor: float) -> _Pose:
+    """The joints at a configuration.
+
+    Raises
+    ------
+    AssemblyError
+        If the rod does not reach the guide there.
+    InputError
+        If angle or shift are not finite.
+    """
+    for name, value in (("crank angle", angle), ("shift", shift)):
+        if not isfinite(value):
+            raise InputError(f"the {name} is {value!r}: it must be a finite number")
+    check_assembly(parameters, angle, shift)
+    p = parameters.constants()
+    q = kinematics.position(angle, shift, p)
+    return _Pose(
+        angle,
+        factor * q.s4,
+        factor * np.array([0.0, 0.0, shift]),
+        factor * np.array(kinematics.crank_pin(q, shift, p)),
+        factor * np.array(kinematics.slider_pin(q, p)),
+    )
+
+
+def _limited(part: Range, law: ShiftLaw) -> bool:
+    """Whether the range ends before the crank has made all of the law's turns."""
+    return part.high - part.low < law.span * (1.0 - 1e-12)
+
+
+def _angles(part: Range, law: ShiftLaw) -> FloatArray:
+    """Crank angles over a range, clear of its ends if it has any."""
+    inset = min(_INSET, 0.25 * (part.high - part.low)) if _limited(part, law) else 0.0
+    count = max(9, ceil(_POINTS * (part.high - part.low) / (2.0 * pi)))
+    return np.linspace(part.low + inset, part.high - inset, count)
+
+
+def _factor(unit: str) -> float:
+    if unit not in UNITS:
+        raise InputError(f"the unit of a picture is {unit!r}: it must be one of {', '.join(UNITS)}")
+    return UNITS[unit]
+
+
+class _Part:
+    """A range of assembly: poses along it, those at its dead centres, and those at its ends where it has any."""
+
+    def __init__(self, parameters: SliderCrankParameters, part: Range, law: ShiftLaw, factor: float) -> None:
+        self.angles = _angles(part, law)
+        self.poses = [_pose(parameters, float(a), law.at(float(a))[0], factor) for a in self.angles]
+        self.crank_pins = np.array([pose.crank_pin for pose in self.poses])
+        self.slider_pins = np.array([pose.slider_pin for pose in self.poses])
+        self.dead = [_pose(parameters, d.crank_angle, d.shift, factor) for d in part.dead_centres]
+        self.limits = [self.poses[0], self.poses[-1]] if _limited(part, law) else []
+
+
+# Solids: faces of four corners, shape (n, 4, 3), in the ground frame, anticlockwise from outside
+
+
+def _tube(start: FloatArray, end: FloatArray, radius: float, *, pieces: int = 1, sides: int = 16) -> FloatArray:
+    """A cylinder with closed ends; in pieces along its length, each painted at its own depth."""
+    way = (end - start) / np.linalg.norm(end - start)
+    first = np.cross(way, np.eye(3)[np.argmin(np.abs(way))])
+    first /= np.linalg.norm(first)
+    turn = np.linspace(0.0, 2.0 * pi, sides + 1)[:, None]
+    ring = radius * (np.cos(turn) * first + np.sin(turn) * np.cross(way, first))
+    stations = [start + share * (end - start) for share in np.linspace(0.0, 1.0, pieces + 1)]
+    faces = [
+        np.stack([near + ring[:-1], near + ring[1:], far + ring[1:], far + ring[:-1]], axis=1)
+        for near, far in zip(stations, stations[1:])
+    ]
+    for place, rim in ((start, ring[::-1]), (end, ring)):
+        middle = np.broadcast_to(place, rim[:-1].shape)
+        faces.append(np.stack([middle, place + rim[:-1], place + rim[1:], middle], axis=1))
+    return np.concatenate(faces)
+
+
+def _ball(centre: FloatArray, radius: float, *, sides: int = 20) -> FloatArray:
+    """A sphere."""
+    turn, rise = np.meshgrid(
+        np.linspace(0.0, 2.0 * pi, sides + 1), np.linspace(-0.5 * pi, 0.5 * pi, sides // 2 + 1), indexing="ij"
+    )
+    points = centre + radius * np.stack([np.cos(rise) * np.cos(turn), np.cos(rise) * np.sin(turn), np.sin(rise)], -1)
+    corners = (points[:-1, :-1], points[1:, :-1], points[1:, 1:], points[:-1, 1:])
+    return np.stack(corners, axis=2).reshape(-1, 4, 3)
+
+
+def _box(low: ArrayLike, high: ArrayLike, rows: FloatArray, origin: FloatArray, *, pieces: int = 1) -> FloatArray:
+    """A box between corners given along the rows, right-handed, from an origin; in pieces along the first of them."""
+    low, high = np.asarray(low, dtype=float), np.asarray(high, dtype=float)
+    faces = []
+    cuts = np.linspace(low[0], high[0], pieces + 1)
+    for number, (start, end) in enumerate(zip(cuts, cuts[1:])):
+        ends = np.array([[start, low[1], low[2]], [end, high[1], high[2]]])
+        for axis in range(3):
+            u, v = (axis + 1) % 3, (axis + 2) % 3
+            for side, order in ((0, ((0, 0), (0, 1), (1, 1), (1, 0))), (1, ((0, 0), (1, 0), (1, 1), (0, 1)))):
+                if axis == 0 and number != (pieces - 1) * side:
+                    continue
+                corners = np.empty((4, 3))
+                corners[:, axis] = ends[side, axis]
+                for corner, (i, j) in zip(corners, order):
+                    corner[u], corner[v] = ends[i, u], ends[j, v]
+                faces.append(corners @ rows + origin)
+    return np.array(faces)
+
+
+@dataclass(frozen=True, slots=True)
+class _Label:
+    """A text that is to stand near a point, on one of the sides named first if it can: angles on the page (deg)."""
+
+    point: FloatArray
+    text: str
+    sides: tuple[float, ...] = (90.0, 270.0, 0.0, 180.0)
+    look: dict[str, Any] = field(default_factory=dict)
+
+
+class _Scene:
+    """The mechanism in space with the paths of its pins, to be drawn at one configuration or many. Lengths in ``unit``."""
+
+    def __init__(
+        self,
+        parameters: SliderCrankParameters,
+        law: ShiftLaw,
+        poses: Sequence[_Pose],
+        unit: str,
+        view: tuple[float, float],
+    ) -> None:
+        self.parameters, self.unit = parameters, unit
+        factor = _factor(unit)
+        p = parameters.constants()
+        self.a1, self.a2, self.a4 = factor * p.a1, factor * p.a2, factor * p.a4
+        self.parts = [_Part(parameters, part, law, factor) for part in ranges(parameters, law)]
+        #: Length by which joints, supports and letters are drawn.
+        self.size = (self.a1 + self.a2 + abs(self.a4)) / 26.0
+        #: Rows: i, j, k of frame 4.
+        self.frame4 = np.array([kinematics.from_guide_frame(Vector(*row), p) for row in np.eye(3)])
+        self.foot = np.array([-self.a4, 0.0, 0.0])
+        everywhere = [*poses, *(pose for part in self.parts for pose in part.poses)]
+        self.least = min(pose.slide for pose in everywhere)
+        self.most = max(pose.slide for pose in everywhere)
+        self.low_shift = float(min(0.0, *(pose.centre[2] for pose in everywhere)))
+        self.high_shift = float(max(0.0, *(pose.centre[2] for pose in everywhere)))
+        #: The slider stands on the side of its pin that is away from the crank.
+        self.side = -1.0 if self.a4 >= 0.0 else 1.0
+        rise, turn = radians(view[0]), radians(view[1])
+        towards = np.array([sin(rise), cos(rise) * cos(turn), cos(rise) * sin(turn)])
+        right = np.array([0.0, -sin(turn), cos(turn)])
+        #: Rows: right and up on the page, and towards the eye, in the ground frame.
+        self.view = np.array([right, np.cross(towards, right), towards])
+        self.low, self.high = self._extent()
+        #: Points on the page that letters should keep clear of.
+        self.taken: list[FloatArray] = []
+
+    def at(self, slide: float, x: float = 0.0, y: float = 0.0) -> FloatArray:
+        """The point at a slider position, off the guide by x and y of frame 4."""
+        return np.asarray(self.foot + np.array([x, y, -slide]) @ self.frame4)
+
+    def page(self, points: ArrayLike) -> FloatArray:
+        """Points (..., 3) of the ground frame on the page, (..., 2)."""
+        return np.asarray(np.asarray(points, dtype=float) @ self.view[:2].T)
+
+    def _extent(self) -> tuple[FloatArray, FloatArray]:
+        u = self.size
+        turn = np.linspace(0.0, 2.0 * pi, 61)
+        ring = self.a1 * np.column_stack([np.cos(turn), np.sin(turn), 0.0 * turn])
+        points = [ring + [0.0, 0.0, z] for z in (self.low_shift, self.high_shift)]
+        points += [np.array([[0.0, 0.0, self.low_shift - 3.0 * u], [0.0, 0.0, self.high_shift + 7.0 * u]])]
+        points += [np.array([self.at(slide, x) for slide in self._rail for x in (0.0, self.side * 2.6 * u)])]
+        points += [self.foot + 2.9 * u * np.vstack([self.frame4, np.eye(3)])]
+        shown = self.page(np.concatenate(points))
+        return shown.min(axis=0) - [3.4 * u, 2.2 * u], shown.max(axis=0) + [3.4 * u, 2.2 * u]
+
+    @property
+    def _rail(self) -> tuple[float, float]:
+        return self.least - 2.3 * self.size, self.most + 2.3 * self.size
+
+    def prepare(self, axis: Axes) -> None:
+        axis.set_aspect("equal")
+        axis.set_xlim(self.low[0], self.high[0])
+        axis.set_ylim(self.low[1], self.high[1])
+        axis.set_axis_off()
+
+    def draw(self, axis: Axes, pose: _Pose, *, letters: bool = True) -> None:
+        """Draw everything at one configuration."""
+        self.taken = []
+        self._centre_lines(axis, pose)
+        self._paths(axis, pose, letters)
+        self._solids(axis, pose)
+        self._dimensions(axis, pose, letters)
+        if letters:
+            self._letters(axis, pose)
+
+    def _line(self, axis: Axes, points: ArrayLike, **look: Any) -> None:
+        shown = self.page(points)
+        axis.plot(*shown.T, **({"color": GROUND, "linewidth": 1.0, "zorder": 4, "solid_capstyle": "round"} | look))
+        lengths = np.linalg.norm(np.diff(shown, axis=0), axis=1)
+        for start, end, length in zip(shown, shown[1:], lengths):
+            share = np.linspace(0.0, 1.0, max(2, ceil(2.5 * length / self.size)))[:, None]
+            self.taken.append(start + share * (end - start))
+
+    def _solids(self, axis: Axes, pose: _Pose) -> None:
+        u, s, pin = self.size, self.side, pose.slider_pin
+        k1 = np.array([0.0, 0.0, 1.0])
+        bearing = self.high_shift + 2.2 * u
+        arm = (pose.crank_pin - pose.centre) / self.a1
+        crank = np.array([arm, np.cross(k1, arm), k1])
+        along = (pin - pose.crank_pin) / self.a2
+        # along the guide as the slider position increases, across, and away from the crank
+        guide = np.array([-self.frame4[2], np.cross(s * self.frame4[0], -self.frame4[2]), s * self.frame4[0]])
+        start, end = self._rail
+        # the crank is cut where the ball is, so that the ball lies in a fork
+        solids: list[tuple[FloatArray, str]] = [
+            (_tube(bearing * k1, (bearing + 3.2 * u) * k1, 0.95 * u, pieces=3), "#AEB7BE"),
+            (_tube(pose.centre, np.array([0.0, 0.0, self.high_shift + 6.6 * u]), 0.42 * u, pieces=16), CRANK),
+            (_tube(pose.centre - 0.42 * u * k1, pose.centre + 0.42 * u * k1, 0.85 * u, sides=24), CRANK),
+            (_box([0.6 * u, -0.45 * u, -0.3 * u], [self.a1 - 0.45 * u, 0.45 * u, 0.3 * u], crank, pose.centre, pieces=6),
+             CRANK),
+            (_ball(pose.crank_pin, 0.66 * u), "#F0A57A"),
+            (_tube(pose.crank_pin + 0.5 * u * along, pin - 0.5 * u * along, 0.3 * u, pieces=30), COUPLER),
+            (_ball(pin, 0.66 * u), "#86BFE3"),
+            (_tube(pin + 0.5 * u * guide[2], pin + 0.95 * u * guide[2], 0.34 * u), SLIDER),
+            (_box([-1.6 * u, -1.2 * u, 0.9 * u], [1.6 * u, 1.2 * u, 2.0 * u], guide, pin, pieces=4), "#84929D"),
+            (_box([start, -0.7 * u, 2.0 * u], [end, 0.7 * u, 2.45 * u], guide, self.foot, pieces=24), "#D9DEE2"),
+        ]  # fmt: skip
+        faces = np.concatenate([solid for solid, _ in solids])
+        paint = np.concatenate([np.broadcast_to(to_rgb(colour), (len(solid), 3)) for solid, colour in solids])
+        seen = faces @ self.view.T
+        normal = np.cross(seen[:, 2] - seen[:, 0], seen[:, 3] - seen[:, 1])
+        normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+        front = normal[:, 2] > 0.0
+        bright = 0.6 + 0.4 * np.clip(normal @ (_LIGHT / np.linalg.norm(_LIGHT)), 0.0, 1.0)
+        colours = (bright[:, None] * paint)[front]
+        seen = seen[front]
+        order = np.argsort(seen[:, :, 2].mean(axis=1), kind="stable")
+        axis.add_collection(
+            PolyCollection(
+                list(seen[order, :, :2]), facecolors=colours[order], edgecolors=colours[order], linewidths=0.4, zorder=3
+            ),
+            autolim=False,
+        )
+        self.taken.extend([seen[:, :, :2].mean(axis=1), seen[:, ::2, :2].reshape(-1, 2)])
+
+    def _centre_lines(self, axis: Axes, pose: _Pose) -> None:
+        u = self.size
+        dashes = {"linestyle": (0, (9, 2, 2, 2)), "linewidth": 0.8, "color": "0.4", "zorder": 1}
+        self._line(axis, [[0, 0, self.low_shift - 4.0 * u], [0, 0, self.high_shift + 8.0 * u]], **dashes)
+        ends = min(self.least - 2.3 * u, -1.5 * u), max(self.most + 2.6 * u, 1.5 * u)
+        self._line(axis, [self.at(slide) for slide in ends], **dashes)
+        turn = np.linspace(0.0, 2.0 * pi, 181)
+        ring = self.a1 * np.column_stack([np.cos(turn), np.sin(turn), 0.0 * turn])
+        self._line(axis, ring + pose.centre, color="0.6", linewidth=0.9, linestyle=":", zorder=1)
+
+    def _paths(self, axis: Axes, pose: _Pose, letters: bool) -> None:
+        """Paths of the pins; crank and rod in thin lines at the dead centres and at the limits of assembly."""
+        for part in self.parts:
+            self._line(axis, part.crank_pins, color=TRACE, linewidth=1.6, zorder=2)
+            self._line(axis, part.slider_pins, color=TRACE, linewidth=3.0, zorder=2)
+            for marked, colour, marker in ((part.dead, _DEAD, "D"), (part.limits, _LIMIT, "s")):
+                for place in marked:
+                    if letters:
+                        joints = [place.centre, place.crank_pin, place.slider_pin]
+                        self._line(axis, joints, color=colour, linewidth=0.9, linestyle="--", zorder=2)
+                    pins = self.page([place.crank_pin, place.slider_pin])
+                    edge = {"markeredgecolor": "white", "markeredgewidth": 0.6}
+                    axis.plot(*pins.T, marker, color=colour, markersize=5.0, zorder=6, **edge)
+
+    def _dimensions(self, axis: Axes, pose: _Pose, letters: bool) -> None:
+        u = self.size
+        if self.a4 != 0.0:
+            self._line(axis, [np.zeros(3), self.foot], color="black", linewidth=1.5, zorder=5)
+        if abs(pose.centre[2]) > 1e-9 * self.size:
+            self._line(axis, [np.zeros(3), pose.centre], color=_SHIFT, linewidth=2.6, zorder=6)
+        if not letters:
+            return
+        if self.a4 != 0.0:
+            # the direction of the crank axis once more, at the guide
+            self._line(axis, [self.foot, self.foot + [0.0, 0.0, 2.6 * u]], color="0.4", linewidth=0.8, linestyle="--")
+        t = np.linspace(0.0, self.parameters.guide_twist, 121)
+        self._line(
+            axis, self.foot + 1.5 * u * np.column_stack([0.0 * t, np.sin(t), np.cos(t)]), color=_TWIST, linewidth=1.4
+        )
+        look = {"arrowstyle": "-|>", "color": "black", "linewidth": 1.0, "mutation_scale": 8, "shrinkA": 0, "shrinkB": 0}
+        for origin, rows in ((np.zeros(3), np.eye(3)), (self.foot, self.frame4)):
+            for way in rows:
+                tip = origin + 2.4 * u * way
+                axis.annotate("", self.page(tip), self.page(origin), arrowprops=look, zorder=7)
+                self.taken.append(self.page([origin + share * (tip - origin) for share in np.linspace(0.0, 1.0, 9)]))
+
+    def _letters(self, axis: Axes, pose: _Pose) -> None:
+        u = self.size
+
+        def told(length: float) -> str:
+            return f"{length:.4g} {self.unit}"
+
+        small = {"fontsize": 7.0}
+        labels = []
+        for number, origin, rows in ((1, np.zeros(3), np.eye(3)), (4, self.foot, self.frame4)):
+            for name, way in zip("ijk", rows):
+                across = self.page(way)
+                side = degrees(np.arctan2(across[1], across[0]))
+                sides = tuple(side + turn for turn in (0.0, 30.0, -30.0, 60.0, -60.0))
+                labels.append(_Label(origin + 2.45 * u * way, f"${name}_{number}$", sides))
+        labels += [
+            _Label(0.55 * pose.crank_pin + 0.45 * pose.centre, f"crank $a_1$ = {told(self.a1)}", (180.0, 0.0, 90.0, 270.0),
+                   {"color": "#8C3D00"}),
+            _Label(0.5 * (pose.crank_pin + pose.slider_pin), f"rod $a_2$ = {told(self.a2)}", look={"color": "#00507F"}),
+            _Label(self.at(pose.slide, self.side * 2.2 * u), f"slider $S_4$ = {told(pose.slide)}", (270.0, 300.0, 240.0),
+                   {"color": "#3F4A52"}),
+            _Label(np.array([0.0, 0.0, self.high_shift + 3.8 * u]), "bearing", (90.0, 180.0), {"color": "#3F4A52"}),
+            _Label(np.array([0.0, 0.0, self.low_shift - 4.0 * u]), "crank axis", (270.0, 0.0, 180.0), small),
+            _Label(self.at(max(self.most + 2.6 * u, 1.5 * u)), "guide", (0.0, 45.0, 315.0), small),
+            _Label(self.foot, rf"$\alpha_4$ = {degrees(self.parameters.guide_twist):.4g}°", (270.0, 225.0, 180.0),
+                   {"color": _TWIST}),
+        ]  # fmt: skip
+        if self.a4 != 0.0:
+            labels.append(_Label(0.5 * self.foot, f"$a_4$ = {told(self.a4)}", (180.0, 0.0)))
+        if abs(pose.centre[2]) > 1e-9 * self.size:
+            labels.append(
+                _Label(0.5 * pose.centre, f"$S_1$ = {told(pose.centre[2])}", (270.0, 0.0, 180.0), {"color": _SHIFT})
+            )
+        for part in self.parts:
+            for marked, name, colour in ((part.dead, "dead centre", _DEAD), (part.limits, "limit", _LIMIT)):
+                for place in marked:
+                    text = f"{name} {degrees(place.angle) % 360.0:.2f}°"
+                    labels.append(_Label(place.slider_pin, text, (90.0, 60.0, 120.0, 270.0), small | {"color": colour}))
+                    labels.append(_Label(place.crank_pin, text, (135.0, 180.0, 90.0), small | {"color": colour}))
+        self._place(axis, labels)
+
+    def _place(self, axis: Axes, labels: Sequence[_Label]) -> None:
+        """Put each text where it covers least, sides named first preferred; with a thin line to its point if it is far."""
+        figure = axis.get_figure(root=True)
+        assert figure is not None
+        renderer = FigureCanvasAgg(figure).get_renderer()
+        to_pixels = axis.transData
+        taken = to_pixels.transform(np.concatenate(self.taken))
+        frame = to_pixels.transform([self.low, self.high])
+        boxes: list[FloatArray] = []
+        step = figure.dpi / 72.0
+        for label in labels:
+            look: dict[str, Any] = {"fontsize": 8.5, "ha": "center", "va": "center", "zorder": 12}
+            look["path_effects"] = [withStroke(linewidth=2.4, foreground="white")]
+            text = axis.text(0.0, 0.0, label.text, **(look | label.look))
+            extent = text.get_window_extent(renderer)
+            half = 0.5 * np.array([extent.width, extent.height]) + 1.0 * step
+            point = to_pixels.transform(self.page(label.point))
+            best: tuple[float, FloatArray, float] | None = None
+            for rank, side in enumerate((*label.sides, *range(15, 375, 30))):
+                way = np.array([cos(radians(side)), sin(radians(side))])
+                # from the point to the middle of a text that just does not cover it
+                clear = float(np.min(half / np.maximum(np.abs(way), 1e-9)))
+                for gap in (3.0, 8.0, 15.0, 25.0, 40.0, 60.0):
+                    middle = point + (clear + gap * step) * way
+                    covered = np.all(np.abs(taken - middle) < half, axis=1).sum()
+                    crossed = sum(bool(np.all(np.abs(box[0] - middle) < box[1] + half)) for box in boxes)
+                    outside = np.maximum(frame[0] - middle + half, middle + half - frame[1]).clip(0.0).sum()
+                    cost = 3.0 * covered + 60.0 * crossed + 2.0 * outside + 0.5 * gap + 0.6 * min(rank, 6)
+                    if best is None or cost < best[0]:
+                        best = cost, middle, gap
+            assert best is not None
+            _, middle, gap = best
+            boxes.append(np.array([middle, half]))
+            text.set_position(to_pixels.inverted().transform(middle))
+            if gap > 10.0:
+                edge = middle + np.clip(point - middle, -half, half)
+                ends = to_pixels.inverted().transform([point, edge])
+                axis.plot(*ends.T, color=label.look.get("color", "black"), linewidth=0.5, zorder=11)
+
+
+def plot_mechanism(
+    parameters: SliderCrankParameters,
+    crank_angle: float,
+    shift: float = 0.0,
+    *,
+    law: ShiftLaw | None = None,
+    unit: str = "mm",
+    view: tuple[float, float] = VIEW,
+    title: str = "",
+) -> Figure:
+    """Draw the mechanism in space at one configuration.
+
+    Besides the links, their dimensions and frames 1 and 4 there are the paths of the pins, crank and rod in thin lines at the
+    dead centres, and where the crank cannot turn fully at the limits of assembly. All directions have one scale, the
+    projection is orthographic.
+
+    Parameters
+    ----------
+    parameters : SliderCrankParameters
+    crank_angle : float
+        Crank angle theta1 (rad).
+    shift : float
+        Axial shift S1 (m).
+    law : ShiftLaw, optional
+        The shift over the crank angle, for the paths; by default it is held at ``shift``.
+    unit : str
+        Of the lengths in the letters: one of `UNITS`.
+    view : (float, float)
+        Elevation of the eye above the plane of crank axis and guide's direction, and its azimuth about the common normal from
+        j of frame 1 towards k (deg).
+    title : str
+
+    Raises
+    ------
+    AssemblyError
+        If the rod does not reach the guide at the configuration, with how much it is too short.
+    InputError
+        If angle or shift are not finite, or the unit is not known.
+    """
+    pose = _pose(parameters, crank_angle, shift, _factor(unit))
+    scene = _Scene(parameters, constant_shift(shift) if law is None else law, [pose], unit, view)
+    with matplotlib.rc_context(STYLE | {"figure.constrained_layout.use": False}):
+        figure, axis = _sheet(scene, 9.0, head=0.35 if title else 0.0)
+        scene.draw(axis, pose)
+        if title:
+            figure.suptitle(title, fontsize=10.5, fontweight="bold")
+        return finish(figure)
+
+
+def _sheet(scene: _Scene, wide: float, *, head: float, foot: float = 0.0) -> tuple[Figure, Axes]:
+    """A figure ``wide`` inches wide with the scene's axes between a head and a foot (inches)."""
+    width, height = scene.high - scene.low
+    tall = float(np.clip(wide * height / width, 2.6, 0.9 * wide))
+    figure = Figure(figsize=(wide, head + tall + foot))
+    FigureCanvasAgg(figure)
+    axis = figure.add_axes((0.0, foot / (head + tall + foot), 1.0, tall / (head + tall + foot)))
+    scene.prepare(axis)
+    axis.apply_aspect()
+    return figure, axis
+
+
+def animate_mechanism(
+    parameters: SliderCrankParameters,
+    path: str | Path,
+    *,
+    law: ShiftLaw | None = None,
+    unit: str = "mm",
+    view: tuple[float, float] = VIEW,
+    frames: int = 48,
+    frames_per_second: int = 20,
+    title: str = "",
+) -> Path:
+    """Write a GIF of the mechanism over all turns of its shift's law, and below it the slider position.
+
+    Where the crank cannot turn fully it goes to and fro in the widest range in which it can be assembled.
+
+    Parameters
+    ----------
+    parameters : SliderCrankParameters
+    path : str or Path
+        Of the GIF.
+    law : ShiftLaw, optional
+        The shift over the crank angle; by default none.
+    unit, view, title
+        As of `plot_mechanism`.
+    frames : int
+        Pictures in all.
+
+    Raises
+    ------
+    AssemblyError
+        If it cannot be assembled at any crank angle.
+    InputError
+        If there are fewer than two frames, or the unit is not known.
+    """
+    if frames < 2:
+        raise InputError(f"an animation in {frames} frames: there must be at least 2")
+    law = constant_shift(0.0) if law is None else law
+    factor = _factor(unit)
+    widest = max(_assembled(parameters, law), key=lambda part: part.high - part.low)
+    ends = _angles(widest, law)[[0, -1]]
+    share = np.linspace(0.0, 1.0, frames, endpoint=False)
+    if _limited(widest, law):
+        # to and fro, slow at the ends
+        share = 0.5 - 0.5 * np.cos(2.0 * pi * share)
+    angles = ends[0] + share * (ends[1] - ends[0])
+    poses = [_pose(parameters, float(a), law.at(float(a))[0], factor) for a in angles]
+    scene = _Scene(parameters, law, poses, unit, view)
+    path = Path(path)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with matplotlib.rc_context(STYLE | {"figure.constrained_layout.use": False}):
+        head, foot = (0.35 if title else 0.0), 1.6
+        figure, above = _sheet(scene, 7.0, head=head, foot=foot)
+        total = figure.get_figheight()
+        below = figure.add_axes((0.11, 0.45 / total, 0.86, (foot - 0.55) / total))
+        if title:
+            figure.suptitle(title, fontsize=10.5, fontweight="bold")
+        _slides(below, scene.parts, unit)
+        (dot,) = below.plot([], [], "o", color=CRANK, markersize=5, zorder=7)
+        writer = PillowWriter(fps=frames_per_second, metadata={})
+        with writer.saving(figure, str(path), dpi=80):
+            for pose in poses:
+                above.clear()
+                scene.prepare(above)
+                scene.draw(above, pose, letters=False)
+                dot.set_data([degrees(pose.angle)], [pose.slide])
+                writer.grab_frame()
+    return path
+
+
+def _assembled(parameters: SliderCrankParameters, law: ShiftLaw) -> tuple[Range, ...]:
+    """The ranges of assembly.
+
+    Raises
+    ------
+    AssemblyError
+        If there are none.
+    """
+    found = ranges(parameters, law)
+    if not found:
+        # the sentence of the nearest there is to an assembly
+        angles = np.linspace(0.0, law.span, _POINTS)
+        p = parameters.constants()
+        nearest = float(max(angles, key=lambda a: kinematics.assembly_square(float(a), law.at(float(a))[0], p)))
+        try:
+            check_assembly(parameters, nearest, law.at(nearest)[0])
+        except AssemblyError as error:
+            raise AssemblyError(f"it cannot be assembled at any crank angle; where it comes nearest to it, {error}") from None
+    return found
+
+
+def _slides(axis: Axes, parts: Sequence[_Part], unit: str) -> None:
+    """Slider position over the crank angle, with dead centres and limits."""
+    for part in parts:
+        axis.plot(np.degrees(part.angles), [pose.slide for pose in part.poses], color=COLOURS[0], zorder=3)
+        for marked, colour, marker in ((part.dead, _DEAD, "D"), (part.limits, _LIMIT, "s")):
+            for place in marked:
+                low, turn = degrees(part.angles[0]), degrees(place.angle)
+                # a range may begin before zero and reach beyond a turn
+                shown = turn if turn >= low - 1e-6 else turn + 360.0 * ceil((low - 1e-6 - turn) / 360.0)
+                axis.plot(shown, place.slide, marker, color=colour, markersize=5.0, zorder=6)
+    axis.set_xlabel("crank angle [deg]")
+    axis.set_ylabel(f"slider position [{unit}]")
+
+
+def plot_range(
+    parameters: SliderCrankParameters, *, law: ShiftLaw | None = None, unit: str = "mm", title: str = ""
+) -> Figure:
+    """Draw where the mechanism can be assembled: round the crank's circle, and over the crank angle.
+
+    On the circle, seen against the crank axis, the range of assembly is drawn full and the rest dotted; beside it are the margin of
+    assembly (rod length less the crank pin's distance from the guide) and the slider position, with dead centres and limits.
+
+    Parameters
+    ----------
+    parameters : SliderCrankParameters
+    law : ShiftLaw, optional
+        The shift over the crank angle; by default none.
+    unit : str
+        One of `UNITS`.
+    title : str
+
+    Raises
+    ------
+    InputError
+        If the unit is not known.
+    """
+    law = constant_shift(0.0) if law is None else law
+    factor = _factor(unit)
+    p = parameters.constants()
+    parts = [_Part(parameters, part, law, factor) for part in ranges(parameters, law)]
+    ends = [*(a for part in parts for a in part.angles[[0, -1]]), 0.0, law.span]
+    angles = np.linspace(min(ends), max(ends), 2 * _POINTS)
+    square = np.array([kinematics.assembly_square(float(a), law.at(float(a))[0], p) for a in angles])
+    margin = factor * (p.a2 - np.sqrt(p.a2 * p.a2 - square))
+    with matplotlib.rc_context(STYLE):
+        figure = Figure(figsize=(9.6, 4.4))
+        panels = figure.subplot_mosaic(
+            [["circle", "margin"], ["circle", "slider"]], width_ratios=(1.0, 1.35), height_ratios=(1.0, 1.0)
+        )
+        _circle(panels["circle"], parts, factor * p.a1, unit)
+        upper = panels["margin"]
+        upper.fill_between(np.degrees(angles), margin, 0.0, where=(margin < 0.0).tolist(), color="0.85", linewidth=0.0)
+        upper.plot(np.degrees(angles), margin, color=COLOURS[0])
+        upper.axhline(0.0, color="0.3", linewidth=0.8)
+        upper.set_ylabel(f"assembly margin [{unit}]")
+        upper.sharex(panels["slider"])
+        _slides(panels["slider"], parts, unit)
+        for angle in (degrees(float(part.angles[end])) for part in parts if part.limits for end in (0, -1)):
+            for axis in (upper, panels["slider"]):
+                axis.axvline(angle, color=_LIMIT, linewidth=0.9, linestyle="--", zorder=1)
+        if title:
+            figure.suptitle(title, fontsize=10.5, fontweight="bold")
+        figure.align_ylabels([upper, panels["slider"]])
+        return finish(figure)
+
+
+def _circle(axis: Axes, parts: Sequence[_Part], radius: float, unit: str) -> None:
+    """The crank pin's circle seen against the crank axis, with what of it the crank can reach."""
+    turn = np.linspace(0.0, 2.0 * pi, 181)
+    axis.plot(radius * np.cos(turn), radius * np.sin(turn), ":", color="0.5", linewidth=1.2)
+    for part in parts:
+        axis.plot(*part.crank_pins[:, :2].T, color=TRACE, linewidth=3.5)
+        for marked, name, colour, marker in (
+            (part.dead, "dead centre", _DEAD, "D"),
+            (part.limits, "limit", _LIMIT, "s"),
+        ):
+            for place in marked:
+                x, y = place.crank_pin[:2]
+                axis.plot([0.0, x], [0.0, y], "--", color=colour, linewidth=0.9)
+                axis.plot(x, y, marker, color=colour, markersize=5.5, zorder=5)
+                side = "left" if x > 0.3 * radius else "right" if x < -0.3 * radius else "center"
+                text = f"{name}\n{degrees(place.angle) % 360.0:.2f}°"
+                axis.text(1.09 * x, 1.13 * y, text, color=colour, fontsize=7.5, ha=side, va="center")
+    axis.plot(0.0, 0.0, "o", color=CRANK, markersize=6)
+    axis.set_aspect("equal")
+    axis.set_xlim(-1.75 * radius, 1.75 * radius)
+    axis.set_ylim(-1.4 * radius, 1.4 * radius)
+    axis.set_xlabel(f"$i_1$ [{unit}]")
+    axis.set_ylabel(f"$j_1$ [{unit}]")
+    axis.set_title("crank pin" if parts else "crank pin: the rod reaches the guide nowhere", fontsize=9)

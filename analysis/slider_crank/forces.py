@@ -1,0 +1,766 @@
+"""Both force problems of the generalised slider-crank, over the turn: all joint forces and moments for a given motion.
+
+Crank and shift move as prescribed, so that the axial force on the crank is an unknown (Rahman prescribes it, erratum 7).
+Then either the slider's load L is given and the crank's torque T sought, or the torque is given and the force on the slider
+sought (the thesis's problem). Both hang together by the crank's equation of motion
+
+    T = T0 - kth L,    kth = dS4/dtheta1 at the shift held,
+
+with T0 the torque that no load takes. So the first problem is regular wherever the mechanism is assembled, and the second
+has a pole where kth = 0: at the dead centres, where the slider's force has no lever on the crank. The values there are masked
+with the reason.
+
+The equations are the plant's own (`linkwork.slider_crank.dynamics`), evaluated on arrays.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from functools import cache
+from math import ceil, degrees, isfinite, pi, tau
+from pathlib import Path
+from types import MappingProxyType, SimpleNamespace
+from typing import Any, NamedTuple, Protocol, TypeAlias
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.optimize import brentq
+
+from linkwork import friction
+from linkwork.errors import AssemblyError, InputError, ParameterError
+from linkwork.limits import LIMIT_SINE
+from linkwork.slider_crank import dynamics, kinematics, mobility, vectors
+from linkwork.slider_crank.dynamics import Inputs
+from linkwork.slider_crank.kinematics import Position
+from linkwork.slider_crank.mobility import DeadCentre
+from linkwork.slider_crank.parameters import Constants, SliderCrankParameters
+from linkwork.slider_crank.published import INCH, POUND_FORCE, POUND_INCH
+from linkwork.slider_crank.vectors import Vector
+
+from .. import io
+from ..tracing import rebound
+from .dual_dynamics import DEAD_CENTRE
+
+FloatArray: TypeAlias = NDArray[np.float64]
+MaskedArray: TypeAlias = "np.ma.MaskedArray[Any, np.dtype[np.float64]]"
+
+#: Angles over the turn where none are given: every degree, both ends.
+SAMPLES = 361
+#: Pieces of a turn in which dead centres are looked for under a law that need not repeat; two in one piece go unseen.
+_PIECES = 1440
+#: Sine of the angle between rod and crank axis below which frame 3 has no direction.
+_PARALLEL = 1e-12
+#: What `ForceTurn.sought` may be.
+TORQUE, SLIDER_FORCE = "torque", "slider force"
+
+#: Forces and moments by name, and whether it is a moment.
+JOINTS: Mapping[str, bool] = MappingProxyType(
+    {
+        "bearing": False,
+        "bearing_moment": True,
+        "crank_pin": False,
+        "slider_pin": False,
+        "guide": False,
+        "guide_moment": True,
+    }
+)
+#: Frames by number: of the ground, the crank, the rod and the guide.
+FRAMES: Mapping[int, str] = MappingProxyType({1: "ground", 2: "crank", 3: "rod", 4: "guide"})
+
+#: Units of a file: for each SI unit the unit that is written and what one of it is in SI.
+UNITS: Mapping[str, Mapping[str, tuple[str, float]]] = MappingProxyType(
+    {
+        "SI": {unit: (unit, 1.0) for unit in ("rad", "m", "m/s", "m/s2", "N", "N.m")},
+        "inch": {
+            "rad": ("deg", pi / 180.0),
+            "m": ("in", INCH),
+            "m/s": ("in/s", INCH),
+            "m/s2": ("in/s2", INCH),
+            "N": ("lb", POUND_FORCE),
+            "N.m": ("lb.in", POUND_INCH),
+        },
+    }
+)
+
+
+class ShiftMotion(NamedTuple):
+    """The axial shift (m) and its rates by time (m/s, m/s2)."""
+
+    shift: Any
+    velocity: Any
+    acceleration: Any
+
+
+class ShiftLaw(Protocol):
+    """How the crank shifts along its axis while it turns."""
+
+    def at(self, angle: Any, speed: Any, acceleration: Any) -> ShiftMotion:
+        """Shift and its rates by time at crank angles (rad), speeds (rad/s) and accelerations (rad/s2) of one shape."""
+
+    def repeating(self, parameters: SliderCrankParameters) -> mobility.ShiftLaw | None:
+        """The law as `linkwork.slider_crank.mobility` takes it; None if it is not known to repeat after whole turns."""
+
+
+@dataclass(frozen=True, slots=True)
+class ConstantShift:
+    """The crank held at a shift S1 (m).
+
+    Raises
+    ------
+    InputError
+        If it is not finite.
+    """
+
+    value: float = 0.0
+
+    def __post_init__(self) -> None:
+        if not isfinite(self.value):
+            raise InputError(f"the shift is {self.value!r} m: it must be a finite number")
+
+    def at(self, angle: Any, speed: Any, acceleration: Any) -> ShiftMotion:
+        """See `ShiftLaw`."""
+        zero = 0.0 * angle
+        return ShiftMotion(self.value + zero, zero, zero)
+
+    def repeating(self, parameters: SliderCrankParameters) -> mobility.ShiftLaw:
+        """See `ShiftLaw`."""
+        return mobility.constant_shift(self.value)
+
+
+@dataclass(frozen=True, slots=True)
+class GrooveShift:
+    """S1 = SS1 sin(alpha theta1), eq 28 (eq 28a prints S1 for SS1).
+
+    Parameters
+    ----------
+    amplitude : float
+        SS1 (m).
+    ratio : float
+        alpha, periods of the shift in a turn of the crank.
+    in_shaft : bool
+        Whether the groove is cut in the crank's shaft, so that the torque of the drive works against its flank: the groove of
+        the plant and the FMU. By default, as in the thesis, something apart from the crank's drive moves the crank along.
+
+    Raises
+    ------
+    InputError
+        If a value is not finite.
+    """
+
+    amplitude: float
+    ratio: float = 1.0
+    in_shaft: bool = False
+
+    def __post_init__(self) -> None:
+        for name in ("amplitude", "ratio"):
+            if not isfinite(getattr(self, name)):
+                raise InputError(f"the groove's {name} is {getattr(self, name)!r}: it must be a finite number")
+
+    def at(self, angle: Any, speed: Any, acceleration: Any) -> ShiftMotion:
+        """See `ShiftLaw`."""
+        phase = self.ratio * angle
+        slope = self.amplitude * self.ratio * np.cos(phase)
+        shift = self.amplitude * np.sin(phase)
+        return ShiftMotion(shift, slope * speed, slope * acceleration - self.ratio * self.ratio * shift * speed * speed)
+
+    def repeating(self, parameters: SliderCrankParameters) -> mobility.ShiftLaw | None:
+        """See `ShiftLaw`."""
+        try:
+            return mobility.groove_shift(
+                replace(parameters, groove_amplitude=float(self.amplitude), groove_ratio=float(self.ratio))
+            )
+        except ParameterError:  # alpha is no ratio of small whole numbers
+            return None
+
+
+#: A function on arrays of angles or times.
+ArrayFunction: TypeAlias = Callable[[FloatArray], ArrayLike]
+
+
+@dataclass(frozen=True, slots=True)
+class AngleShift:
+    """A shift that is any function of the crank angle, with its first two derivatives.
+
+    ``value``, ``slope`` and ``curvature`` take an array of angles (rad) and give m, m/rad and m/rad2.
+    """
+
+    value: ArrayFunction
+    slope: ArrayFunction
+    curvature: ArrayFunction
+
+    def at(self, angle: Any, speed: Any, acceleration: Any) -> ShiftMotion:
+        """See `ShiftLaw`."""
+        slope = np.asarray(self.slope(angle))
+        return ShiftMotion(
+            np.asarray(self.value(angle)),
+            slope * speed,
+            slope * acceleration + np.asarray(self.curvature(angle)) * speed * speed,
+        )
+
+    def repeating(self, parameters: SliderCrankParameters) -> None:
+        """See `ShiftLaw`."""
+        return None
+
+
+@dataclass(frozen=True, slots=True)
+class TimeShift:
+    """A shift that is any function of time, with its first two derivatives, for a crank of constant speed.
+
+    ``value``, ``velocity`` and ``acceleration`` take an array of times (s) and give m, m/s and m/s2. The time is 0 where the
+    crank angle is.
+
+    Raises
+    ------
+    InputError
+        When it is evaluated at a speed that is zero or varies: give the law as an `AngleShift`, or with the time worked out.
+    """
+
+    value: ArrayFunction
+    velocity: ArrayFunction
+    acceleration: ArrayFunction
+
+    def at(self, angle: Any, speed: Any, acceleration: Any) -> ShiftMotion:
+        """See `ShiftLaw`."""
+        w = np.unique(speed)
+        if w.size != 1 or w[0] == 0.0 or np.any(acceleration):
+            raise InputError(
+                "a shift by time needs a crank speed that is constant and not 0 rad/s, to tell the time of each angle; "
+                "give the law by the angle"
+            )
+        time = angle / w[0]
+        return ShiftMotion(*(np.asarray(f(time)) for f in (self.value, self.velocity, self.acceleration)))
+
+    def repeating(self, parameters: SliderCrankParameters) -> None:
+        """See `ShiftLaw`."""
+        return None
+
+
+class Solution(NamedTuple):
+    """What `solve` finds: `Position`, `Coefficients`, `Motion` and `Reactions` of the kind of numbers that it was given."""
+
+    position: Any
+    coefficients: Any
+    motion: Any
+    reactions: Any
+    load: Any
+    ratio: Any
+
+
+def in_the_shaft(law: ShiftLaw) -> bool:
+    """Whether a groove in the crank's shaft makes the shift."""
+    return isinstance(law, GrooveShift) and law.in_shaft
+
+
+def with_groove(p: Constants, law: ShiftLaw) -> Constants:
+    """The constants with the groove of the law, where it is one."""
+    return p._replace(amplitude=law.amplitude, ratio=law.ratio) if isinstance(law, GrooveShift) else p
+
+
+@cache
+def on_arrays() -> SimpleNamespace:
+    """The plant's functions by name, for NumPy arrays and for what NumPy's functions work on (`analysis.dual`)."""
+    elementary = {"sin": np.sin, "cos": np.cos, "sqrt": np.sqrt, "atan2": np.arctan2, "tanh": np.tanh}
+    return rebound((friction, vectors, kinematics, dynamics), elementary)
+
+
+def solve(
+    p: Constants,
+    angle: Any,
+    shift: ShiftMotion,
+    speed: Any,
+    acceleration: Any,
+    *,
+    given: Any,
+    torque: bool,
+    groove: bool,
+) -> Solution:
+    """Solve one of the force problems at configurations that can be assembled, on arrays or dual numbers (`analysis.dual`).
+
+    Parameters
+    ----------
+    p : Constants
+    angle, shift, speed, acceleration
+        theta1 (rad), the shift's motion, theta1' (rad/s) and theta1'' (rad/s2).
+    given
+        The load (N), or with ``torque`` the torque (N.m).
+    torque : bool
+        Whether the torque is given and the load sought. It is not finite where the ratio is zero.
+    groove : bool
+        Whether the parameters' groove makes the shift.
+
+    Returns
+    -------
+    Solution
+        ``ratio`` is minus the derivative of the torque by the load (m): kth, or with a groove in the shaft dS4/dtheta1.
+    """
+    f = on_arrays()
+    q = f.position(angle, shift.shift, p)
+    k = f.coefficients(q, p)
+    x = (angle, shift.shift, speed, shift.velocity, 0.0, 0.0)
+    grooved = 1.0 if groove else 0.0
+    inputs = Inputs(1.0, 1.0 - grooved, grooved, 0.0, acceleration, 0.0, shift.acceleration, 0.0)
+    ratio = k.kth + grooved * f.groove(angle, p).y * k.ks
+    load = (f.motion(q, k, x, inputs, p).torque - given) / ratio if torque else given
+    inputs = inputs._replace(load=load)
+    m = f.motion(q, k, x, inputs, p)
+    return Solution(q, k, m, f.reactions(q, x, m, inputs, p), load, ratio)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ForceTurn:
+    """Motion and all joint forces and moments over the turn, in one of the force problems.
+
+    Attributes
+    ----------
+    parameters : SliderCrankParameters
+    law : ShiftLaw
+        Of the axial shift.
+    sought : str
+        "torque" or "slider force".
+    angle, speed, acceleration : ndarray, shape (n,)
+        theta1 (rad), theta1' (rad/s), theta1'' (rad/s2).
+    shift, shift_velocity, shift_acceleration : ndarray, shape (n,)
+        m, m/s, m/s2.
+    slider_position, slider_velocity, slider_acceleration : ndarray, shape (n,)
+        m, m/s, m/s2.
+    torque : masked array, shape (n,)
+        Torque of the drive on the crank (N.m).
+    slider_force : masked array, shape (n,)
+        Load on the slider (N), positive in the direction in which its position increases, -k of frame 4; spring, damper and
+        friction come on top of it. Masked at a dead centre where it is sought.
+    axial_force : masked array, shape (n,)
+        Force on the crank along its axis (N), of all that drives, holds and springs it.
+    applied_axial_force : masked array, shape (n,)
+        Of it that of what drives or holds the shift: without the spring and the damper there (N).
+    ratio : ndarray, shape (n,)
+        Lever of the slider's force on the crank, minus dT/dL (m): kth, or dS4/dtheta1 with a groove in the shaft.
+    reasons : tuple of (int, str)
+        Index of each point at which something is masked, and why.
+    dead_centres : tuple of DeadCentre
+        Configurations between the first and the last angle at which the slider turns back, located to the last digit.
+    singularities : tuple of DeadCentre
+        Those at which the torque does not determine the slider's force: the zeros of ``ratio``. The same as the dead centres
+        but where the shift moves.
+    unreachable : ndarray, shape (m,)
+        Angles that were asked for and left out because the rod does not reach the guide there (rad).
+    """
+
+    parameters: SliderCrankParameters
+    law: ShiftLaw
+    sought: str
+    angle: FloatArray
+    speed: FloatArray
+    acceleration: FloatArray
+    shift: FloatArray
+    shift_velocity: FloatArray
+    shift_acceleration: FloatArray
+    slider_position: FloatArray
+    slider_velocity: FloatArray
+    slider_acceleration: FloatArray
+    torque: MaskedArray
+    slider_force: MaskedArray
+    axial_force: MaskedArray
+    applied_axial_force: MaskedArray
+    ratio: FloatArray
+    reasons: tuple[tuple[int, str], ...]
+    dead_centres: tuple[DeadCentre, ...]
+    singularities: tuple[DeadCentre, ...]
+    unreachable: FloatArray
+    _joints: Mapping[str, MaskedArray]
+    _position: Position
+
+    def __len__(self) -> int:
+        return len(self.angle)
+
+    def vector(self, name: str, frame: int = 1) -> MaskedArray:
+        """Components of a force or moment, masked where it is not determined.
+
+        Parameters
+        ----------
+        name : str
+            ``bearing``: force of the bearing on the crank, without axial component; ``bearing_moment``: about the ground's
+            origin O, the torque of the drive included; ``crank_pin``: force of the crank on the rod; ``slider_pin``: of the
+            slider on the rod; ``guide``: of the guide on the slider; ``guide_moment``: about the slider pin.
+        frame : int
+            1 ground; 2 crank, i towards the crank pin; 3 rod, i along it from crank pin to slider pin, j perpendicular to it
+            and to the crank axis; 4 guide, the slider position increasing along -k. Moments keep their points.
+
+        Returns
+        -------
+        masked array, shape (n, 3)
+            N or N.m.
+
+        Raises
+        ------
+        InputError
+            If there is no such vector or frame.
+        """
+        if name not in JOINTS:
+            raise InputError(f"there is no joint force or moment {name!r}: the names are {', '.join(JOINTS)}")
+        if frame not in FRAMES:
+            raise InputError(
+                f"there is no frame {frame!r}: the frames are "
+                + ", ".join(f"{number} ({whose})" for number, whose in FRAMES.items())
+            )
+        ground = self._joints[name]
+        if frame == 1:
+            return ground.copy()
+        f, p, q = on_arrays(), self.parameters.constants(), self._position
+        components = Vector(*ground.filled(0.0).T)
+        mask = np.ma.getmaskarray(ground)
+        if frame == 2:
+            turned = f.to_crank_frame(components, q)
+        elif frame == 4:
+            turned = f.to_guide_frame(components, p)
+        else:
+            with np.errstate(divide="ignore", invalid="ignore"):
+                turned = f.to_rod_frame(components, q, p)
+            mask = mask | _parallel(q, p)[:, None]
+        return np.ma.MaskedArray(_joined(turned, len(self)), mask=mask, fill_value=np.nan)
+
+    def columns(self, units: str = "SI", frames: tuple[int, ...] = (1, 2, 3, 4)) -> dict[str, FloatArray]:
+        """Everything by name with unit; NaN where a value is masked, which the last two columns tell.
+
+        Parameters
+        ----------
+        units : str
+            "SI", or "inch": degrees, inches, seconds and pounds force, as the thesis prints them.
+        frames : tuple of int
+            Frames of the joint forces and moments.
+
+        Raises
+        ------
+        InputError
+            If there are no such units or frames.
+        """
+        if units not in UNITS:
+            raise InputError(f"there are no units {units!r}: they are {' or '.join(UNITS)}")
+        parts: list[tuple[str, str, Any]] = [
+            ("crank angle", "rad", self.angle),
+            ("shift", "m", self.shift),
+            ("shift velocity", "m/s", self.shift_velocity),
+            ("shift acceleration", "m/s2", self.shift_acceleration),
+            ("slider position", "m", self.slider_position),
+            ("slider velocity", "m/s", self.slider_velocity),
+            ("slider acceleration", "m/s2", self.slider_acceleration),
+            ("crank torque", "N.m", self.torque),
+            ("slider force", "N", self.slider_force),
+            ("axial force", "N", self.axial_force),
+            ("applied axial force", "N", self.applied_axial_force),
+        ]
+        for frame in frames:
+            for name, moment in JOINTS.items():
+                components = self.vector(name, frame)
+                label = name.replace("_", " ")
+                parts += [
+                    (f"{label} {axis} in frame {frame}", "N.m" if moment else "N", components[:, i])
+                    for i, axis in enumerate("ijk")
+                ]
+        columns = {}
+        for name, unit, values in parts:
+            written, one = UNITS[units][unit]
+            columns[f"{name} [{written}]"] = np.ma.filled(values, np.nan) / one
+        dead = np.ma.getmaskarray(self.slider_force)
+        return columns | {
+            "dead centre (1): forces not determined": dead.astype(float),
+            "rod parallel to crank axis (1): frame 3 not determined": _parallel(
+                self._position, self.parameters.constants()
+            ).astype(float),
+        }
+
+    def to_csv(self, path: str | Path, *, units: str = "SI", frames: tuple[int, ...] = (1, 2, 3, 4)) -> Path:
+        """Write `columns` to a CSV file: a row for every angle, "nan" where a value is masked.
+
+        Raises
+        ------
+        InputError
+            As `columns`.
+        """
+        return io.write_csv(path, self.columns(units, frames))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ForceInstant:
+    """The forces of one configuration, as `ForceTurn` has them for many; None where a value is not determined.
+
+    ``vectors`` are the joint forces and moments in the ground frame; ``reason`` says why any value is None.
+    """
+
+    angle: float
+    shift: float
+    slider_position: float
+    slider_velocity: float
+    slider_acceleration: float
+    torque: float
+    slider_force: float | None
+    axial_force: float | None
+    vectors: Mapping[str, Vector | None]
+    reason: str
+
+
+def force_turn(
+    parameters: SliderCrankParameters,
+    *,
+    crank_speed: ArrayLike,
+    crank_acceleration: ArrayLike = 0.0,
+    shift: ShiftLaw = ConstantShift(0.0),
+    angles: ArrayLike | None = None,
+    load: ArrayLike | None = None,
+    torque: ArrayLike | None = None,
+    partial: bool = False,
+) -> ForceTurn:
+    """Forces and moments in all joints over the turn, for a prescribed motion of crank and shift.
+
+    Parameters
+    ----------
+    parameters : SliderCrankParameters
+    crank_speed, crank_acceleration : array_like, scalar or shape (n,)
+        theta1' (rad/s), theta1'' (rad/s2).
+    shift : ShiftLaw
+        `ConstantShift`, `GrooveShift`, `AngleShift`, `TimeShift` or another. The parameters' own groove is not looked at.
+    angles : array_like, shape (n,), optional
+        Crank angles (rad); 361 over the turn by default.
+    load : array_like, scalar or shape (n,), optional
+        Force on the slider (N), positive in the direction in which its position increases; the torque is sought. 0 by
+        default.
+    torque : array_like, scalar or shape (n,), optional
+        Torque of the drive on the crank (N.m); the load on the slider is sought. Excludes ``load``.
+    partial : bool
+        Whether to leave out the angles at which the rod does not reach the guide, which ``unreachable`` then has.
+
+    Raises
+    ------
+    InputError
+        If both ``load`` and ``torque`` are given, or a value is not finite or of the wrong shape.
+    AssemblyError
+        If the rod does not reach the guide at an angle; it tells the ranges in which it does. With ``partial`` only if it
+        does at none.
+    """
+    if load is not None and torque is not None:
+        raise InputError("both load and torque are given: give the one, and the other is sought")
+    th = np.linspace(0.0, tau, SAMPLES) if angles is None else np.array(angles, dtype=float, ndmin=1)
+    if th.ndim != 1 or th.size == 0 or not np.isfinite(th).all():
+        raise InputError("the angles must be a list of finite numbers (rad), at least one")
+    n = th.size
+    w = _each("crank_speed", crank_speed, n)
+    e = _each("crank_acceleration", crank_acceleration, n)
+    given = _each("torque", torque, n) if torque is not None else _each("load", 0.0 if load is None else load, n)
+    moving = ShiftMotion(*(_each(f"the shift law's {name}", x, n) for name, x in shift.at(th, w, e)._asdict().items()))
+    p = with_groove(parameters.constants(), shift)
+    in_shaft = in_the_shaft(shift)
+
+    f = on_arrays()
+    reached = f.assembly_square(th, moving.shift, p) >= (LIMIT_SINE * p.a2) ** 2
+    if not (reached.any() if partial else reached.all()):
+        raise _not_assembled(parameters, shift, th, moving.shift, reached)
+    unreachable = th[~reached]
+    th, w, e, given = (x[reached] for x in (th, w, e, given))
+    moving = ShiftMotion(*(x[reached] for x in moving))
+    n = th.size
+
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        found = solve(p, th, moving, w, e, given=given, torque=torque is not None, groove=in_shaft)
+    dead = np.abs(found.ratio) <= DEAD_CENTRE * p.a1 if torque is not None else np.zeros(n, dtype=bool)
+    m, r = found.motion, found.reactions
+
+    def masked(values: Any, undetermined: bool = True) -> MaskedArray:
+        whole = _joined(values, n) if isinstance(values, Vector) else np.broadcast_to(values, (n,)).astype(float)
+        mask = dead if undetermined else np.zeros(n, dtype=bool)
+        if whole.ndim == 2:
+            mask = np.repeat(mask[:, None], 3, axis=1)
+        return np.ma.MaskedArray(np.where(mask, np.nan, whole), mask=mask, fill_value=np.nan)
+
+    reasons = [
+        (
+            int(i),
+            f"dead centre at crank angle {th[i]:.9g} rad ({degrees(th[i]):.4f} deg): the slider's force has no lever on the "
+            f"crank (kth = {found.ratio[i]:.1e} m), so that the torque does not determine it",
+        )
+        for i in np.flatnonzero(dead)
+    ]
+    reasons += [
+        (
+            int(i),
+            f"the rod is parallel to the crank axis at crank angle {th[i]:.9g} rad ({degrees(th[i]):.4f} deg): frame 3 has no "
+            "direction across it",
+        )
+        for i in np.flatnonzero(_parallel(found.position, p))
+    ]
+    centres, singular = _dead_centres(parameters, shift, th, w, in_shaft)
+    return ForceTurn(
+        parameters=parameters,
+        law=shift,
+        sought=SLIDER_FORCE if torque is not None else TORQUE,
+        angle=th,
+        speed=w,
+        acceleration=e,
+        shift=moving.shift,
+        shift_velocity=moving.velocity,
+        shift_acceleration=moving.acceleration,
+        slider_position=found.position.s4,
+        slider_velocity=m.slider_velocity,
+        slider_acceleration=m.slider_acceleration,
+        torque=masked(given if torque is not None else m.torque, undetermined=False),
+        slider_force=masked(found.load),
+        axial_force=masked(r.axial),
+        applied_axial_force=masked(m.force),
+        ratio=found.ratio,
+        reasons=tuple(reasons),
+        dead_centres=centres,
+        singularities=singular,
+        unreachable=unreachable,
+        # the slider's mass times its acceleration has no part in the load
+        _joints=MappingProxyType({name: masked(getattr(r, name), name != "guide_moment") for name in JOINTS}),
+        _position=found.position,
+    )
+
+
+def forces_at(
+    parameters: SliderCrankParameters,
+    angle: float,
+    *,
+    crank_speed: float,
+    crank_acceleration: float = 0.0,
+    shift: ShiftLaw = ConstantShift(0.0),
+    load: float | None = None,
+    torque: float | None = None,
+) -> ForceInstant:
+    """`force_turn` at one crank angle (rad).
+
+    Raises
+    ------
+    InputError, AssemblyError
+        As `force_turn`.
+    """
+    turn = force_turn(
+        parameters,
+        crank_speed=crank_speed,
+        crank_acceleration=crank_acceleration,
+        shift=shift,
+        angles=[angle],
+        load=load,
+        torque=torque,
+    )
+
+    def determined(values: MaskedArray) -> float | None:
+        return None if np.ma.getmaskarray(values)[0] else float(values[0])
+
+    def components(name: str) -> Vector | None:
+        row = turn.vector(name)[0]
+        return None if np.ma.getmaskarray(row).any() else Vector(*row.tolist())
+
+    return ForceInstant(
+        angle=float(turn.angle[0]),
+        shift=float(turn.shift[0]),
+        slider_position=float(turn.slider_position[0]),
+        slider_velocity=float(turn.slider_velocity[0]),
+        slider_acceleration=float(turn.slider_acceleration[0]),
+        torque=float(turn.torque[0]),
+        slider_force=determined(turn.slider_force),
+        axial_force=determined(turn.axial_force),
+        vectors=MappingProxyType({name: components(name) for name in JOINTS}),
+        reason="; ".join(why for _, why in turn.reasons),
+    )
+
+
+def _each(name: str, value: ArrayLike, n: int) -> FloatArray:
+    """A finite value for each of n angles."""
+    values = np.asarray(value, dtype=float)
+    if values.shape not in ((), (1,), (n,)):
+        raise InputError(f"{name} has the shape {values.shape}: it must be a number or have one for each of {n} angles")
+    if not np.isfinite(values).all():
+        raise InputError(f"{name} is {value!r}: it must be finite")
+    return np.broadcast_to(values, (n,)).copy()
+
+
+def _joined(vector: Vector, n: int) -> FloatArray:
+    """Components as an array (n, 3)."""
+    return np.stack([np.broadcast_to(x, (n,)) for x in vector], axis=-1).astype(float)
+
+
+def _parallel(q: Position, p: Constants) -> NDArray[np.bool_]:
+    """Where the rod is parallel to the crank axis."""
+    r = on_arrays().rod(q, p)
+    return np.asarray(np.hypot(r.x, r.y) <= _PARALLEL * p.a2)
+
+
+def _not_assembled(
+    parameters: SliderCrankParameters, law: ShiftLaw, th: FloatArray, s1: FloatArray, reached: NDArray[np.bool_]
+) -> AssemblyError:
+    """What to raise where the rod does not reach the guide at all angles."""
+    p = parameters.constants()
+    square = on_arrays().assembly_square(th, s1, p)
+    worst = int(np.argmin(square))
+    short = float(np.sqrt(p.a2 * p.a2 - square[worst]) - p.a2)
+    by_how_much = f"{short:.6g} m too short" if short > 0.0 else "perpendicular to the guide within the limit"
+    places = "; ".join(
+        f"{degrees(float(th[first])):.6g} to {degrees(float(th[last])):.6g} deg" for first, last in _runs(~reached)
+    )
+    repeating = law.repeating(parameters)
+    found = mobility.ranges(parameters, repeating) if repeating is not None else ()
+    within = "".join(f"; it can turn from {degrees(r.low):.6g} to {degrees(r.high):.6g} deg" for r in found) or (
+        "; it can be assembled at no angle" if repeating is not None else ""
+    )
+    return AssemblyError(
+        f"the crank cannot turn over all {th.size} angles: the rod does not reach the guide at {places}, and is at worst "
+        f"{by_how_much} at crank angle {th[worst]:.9g} rad ({degrees(float(th[worst])):.4f} deg) and shift "
+        f"{s1[worst]:.9g} m{within}"
+    )
+
+
+def _runs(flags: NDArray[np.bool_]) -> list[tuple[int, int]]:
+    """First and last index of each run of true values."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(int)))
+    return [(int(first), int(end) - 1) for first, end in zip(edges[::2], edges[1::2])]
+
+
+def _dead_centres(
+    parameters: SliderCrankParameters, law: ShiftLaw, th: FloatArray, w: FloatArray, in_shaft: bool
+) -> tuple[tuple[DeadCentre, ...], tuple[DeadCentre, ...]]:
+    """Dead centres and singularities from the least to the greatest of the angles."""
+    low, high = float(th.min()), float(th.max())
+    repeating = law.repeating(parameters)
+    if repeating is not None:
+        span = repeating.span
+
+        def repeated(found: tuple[DeadCentre, ...]) -> tuple[DeadCentre, ...]:
+            turns = range(ceil((low - span) / span), ceil(high / span) + 1)
+            moved = (c._replace(crank_angle=c.crank_angle + span * turn) for turn in turns for c in found)
+            return tuple(c for c in moved if low <= c.crank_angle <= high)
+
+        centres = repeated(mobility.dead_centres(parameters, repeating))
+        return centres, centres if in_shaft else repeated(mobility.singularities(parameters, repeating))
+    # the slope of the shift by the angle does not depend on the speed but under a law by time
+    speed = float(w[0]) if w[0] != 0.0 and np.all(w == w[0]) else 1.0
+    centres = _sign_changes(parameters, law, low, high, speed, 1.0)
+    return centres, centres if in_shaft else _sign_changes(parameters, law, low, high, speed, 0.0)
+
+
+def _sign_changes(
+    parameters: SliderCrankParameters, law: ShiftLaw, low: float, high: float, speed: float, pitch: float
+) -> tuple[DeadCentre, ...]:
+    """Zeros of kth + ``pitch`` S1' ks, at 1440 places in the turn and more closely where the sign changes."""
+    f, p = on_arrays(), parameters.constants()
+
+    def shift(angle: FloatArray) -> ShiftMotion:
+        return law.at(angle, np.full(angle.shape, speed), np.zeros(angle.shape))
+
+    def slope(angle: FloatArray) -> FloatArray:
+        moving = shift(angle)
+        k = f.coefficients(f.position(angle, moving.shift, p), p)
+        return np.asarray(k.kth + pitch * moving.velocity / speed * k.ks)
+
+    at = np.linspace(low, high, ceil((high - low) / tau * _PIECES) + 1)
+    reached = f.assembly_square(at, shift(at).shift, p) > (LIMIT_SINE * p.a2) ** 2
+    values = np.zeros(at.shape)
+    values[reached] = slope(at[reached])
+    positive = values > 0.0
+    found = []
+    for i in np.flatnonzero((positive[1:] != positive[:-1]) & reached[1:] & reached[:-1]):
+        angle = brentq(lambda x: float(slope(np.array([x]))[0]), at[i], at[i + 1], xtol=1e-14)
+        moving = shift(np.array([angle]))
+        q = f.position(np.array([angle]), moving.shift, p)
+        outer = bool(positive[i]) == (p.branch > 0.0)
+        found.append(DeadCentre(float(angle), float(moving.shift[0]), float(q.s4[0]), outer))
+    return tuple(found)
