@@ -2,14 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from math import pi
+from types import MappingProxyType
 
 from linkwork.errors import InputError
-from linkwork.five_bar.parameters import FiveBarParameters, InitialState
-from linkwork.five_bar.published import SETS
+from linkwork.five_bar import published as five_bar_published
+from linkwork.five_bar.parameters import InitialState as FiveBarState
+from linkwork.slider_crank import published as slider_crank_published
 
-from .inputs import Inputs
+from .inputs import INPUTS_OF, Channels, Inputs
+from .mechanism import InitialState, Parameters, mechanism_of
+
+#: The published sets of every mechanism, by name: each has parameters, initial, crank_speed and source.
+PUBLISHED: Mapping[str, five_bar_published.PublishedSet | slider_crank_published.PublishedSet] = MappingProxyType(
+    {**five_bar_published.SETS, **slider_crank_published.SETS}
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -19,9 +28,8 @@ class Case:
     Attributes
     ----------
     title : str
-    parameters : FiveBarParameters
-    initial : InitialState
-    inputs : Inputs
+    parameters, initial, inputs
+        All of one mechanism, `analysis.mechanism`.
     stop_time : float
         End of the run (s); it starts at 0.
     step : float
@@ -30,31 +38,31 @@ class Case:
     """
 
     title: str
-    parameters: FiveBarParameters
-    initial: InitialState = field(default_factory=InitialState)
-    inputs: Inputs = field(default_factory=Inputs)
+    parameters: Parameters
+    initial: InitialState = field(default_factory=FiveBarState)
+    inputs: Channels = field(default_factory=Inputs)
     stop_time: float
     step: float = 1e-3
     tolerance: float = 1e-9
 
 
 def published_case(name: str, *, revolutions: float = 3.0, steps_per_revolution: int = 360) -> Case:
-    """A published set at its running speed, from th2 = u = u' = 0.
+    """A published set at its running speed, from where it is published to start.
 
     Raises
     ------
     InputError
         If there is no set of that name.
     """
-    if name not in SETS:
-        raise InputError(f"there is no published set {name!r}: the sets are {', '.join(SETS)}")
-    entry = SETS[name]
+    if name not in PUBLISHED:
+        raise InputError(f"there is no published set {name!r}: the sets are {', '.join(PUBLISHED)}")
+    entry = PUBLISHED[name]
     turn = 2.0 * pi / entry.crank_speed
     return Case(
         title=entry.source,
         parameters=entry.parameters,
         initial=entry.initial,
-        inputs=Inputs(speed=entry.crank_speed),
+        inputs=INPUTS_OF[mechanism_of(entry.parameters).name](speed=entry.crank_speed),
         stop_time=revolutions * turn,
         step=turn / steps_per_revolution,
     )

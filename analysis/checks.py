@@ -10,10 +10,11 @@ from types import MappingProxyType
 from typing import Any
 
 from linkwork.five_bar.published import TABLE_3_1
+from linkwork.slider_crank.published import OFFSET_CASE
 
 from .case import Case, published_case
 from .cosimulate import Comparison, compare, cosimulate
-from .inputs import Harmonics, InductionMotor, Inputs, TorsionBar, ramp, steps, table
+from .inputs import Harmonics, InductionMotor, Inputs, SliderCrankInputs, TorsionBar, ramp, steps, table
 from .simulate import simulate
 from .trajectory import Trajectory
 
@@ -26,7 +27,34 @@ def _case(title: str, inputs: Inputs, **changes: Any) -> Case:
     )
 
 
-#: By name: every way of driving and loading the mechanism, each on Table 3.1.
+def _slider_crank(title: str, inputs: SliderCrankInputs, **changes: Any) -> Case:
+    parameters, initial = OFFSET_CASE
+    return Case(
+        title=f"slider-crank: {title}",
+        parameters=replace(parameters, **changes),
+        initial=initial,
+        inputs=inputs,
+        stop_time=1.2,
+        step=4e-3,
+        tolerance=1e-9,
+    )
+
+
+_RPM_50 = 50.0 * pi / 30.0
+_GENERAL = {
+    "guide_twist": 4.0,
+    "crank_cog_y": 0.02,
+    "crank_cog_z": -0.05,
+    "crank_product_xz": 0.02,
+    "crank_product_yz": -0.01,
+    "slider_cog_x": 0.02,
+    "slider_cog_z": 0.03,
+    "gravity_y": -9.81,
+    "gravity_z": 1.0,
+}
+
+#: By name: every way of driving and loading a mechanism, the five-bar's on Table 3.1, the slider-crank's on Rahman's case
+#: a4 = 10 in, S1 = 3.5 in.
 CASES: Mapping[str, Case] = MappingProxyType(
     {
         "table-3.1": published_case("table-3.1"),
@@ -55,6 +83,41 @@ CASES: Mapping[str, Case] = MappingProxyType(
         "other-assembly": _case("the other assembly", Inputs(speed=_SPEED), assembly_branch=-1),
         "coulomb-friction": _case(
             "Coulomb friction of 5 N in the guide", Inputs(speed=_SPEED), slider_coulomb_friction=5.0
+        ),
+        "slider-crank-constant-speed": _slider_crank("50 rpm, the shift held", SliderCrankInputs(speed=_RPM_50)),
+        "slider-crank-torque": _slider_crank(
+            "a torque of 10 N.m against a load", SliderCrankInputs(torque=10.0, load=table([0.0, 1.2], [0.0, -20.0]))
+        ),
+        "slider-crank-shifted": _slider_crank(
+            "ramp of the speed, the shift to and fro",
+            SliderCrankInputs(speed=ramp(2.0, 6.0, 0.2, 0.8), shift_speed=Harmonics(0.0, [0.2], [8.0], [0.0])),
+        ),
+        "slider-crank-jumps": _slider_crank(
+            "jumps of both speeds",
+            SliderCrankInputs(speed=steps([0.0, 0.4], [5.0, 3.0]), shift_speed=steps([0.0, 0.6], [0.1, -0.1])),
+        ),
+        "slider-crank-free-shift": _slider_crank(
+            "both freedoms free, spring and damper on the shift",
+            SliderCrankInputs(torque=5.0, axial_force=Harmonics(0.0, [20.0], [6.0], [0.0])),
+            shift_stiffness=500.0,
+            shift_damping=20.0,
+        ),
+        "slider-crank-groove": _slider_crank(
+            "a groove makes the shift",
+            SliderCrankInputs(torque=5.0, groove=True),
+            groove_amplitude=0.1,
+            groove_ratio=2.0,
+        ),
+        "slider-crank-general": _slider_crank(
+            "general twist and masses, springs, dampers, friction, gravity, the other assembly",
+            SliderCrankInputs(speed=_RPM_50, axial_force=3.0),
+            **_GENERAL,
+            shift_stiffness=800.0,
+            slider_stiffness=200.0,
+            slider_spring_free_position=-1.0,
+            slider_damping=15.0,
+            slider_coulomb_friction=2.0,
+            assembly_branch=-1,
         ),
     }
 )

@@ -232,6 +232,7 @@ _D = np.array(tableau.D)
 STAGES = tableau.STAGES
 EXPONENT = -1.0 / tableau.ORDER
 _N = 6
+_N_CONSTANTS = len(FiveBarConstants._fields)
 
 _FOLDER = str(cache_folder())
 
@@ -907,4 +908,4 @@ def _solver(constants):  # type: ignore[no-untyped-def]
 @njit(error_model="numpy")
 def constants(row):  # type: ignore[no-untyped-def]
     """Constants of the five-bar from a row of them."""
-    return FiveBarConstants(*to_fixed_tuple(row, len(FiveBarConstants._fields)))
+    return FiveBarConstants(*to_fixed_tuple(row, _N_CONSTANTS))

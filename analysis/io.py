@@ -12,7 +12,7 @@ import os
 import re
 import tomllib
 from collections.abc import Iterable, Mapping
-from dataclasses import MISSING
+from dataclasses import MISSING, asdict, fields
 from functools import lru_cache
 from math import isfinite, pi
 from pathlib import Path
@@ -23,14 +23,24 @@ import tomli_w
 from numpy.typing import ArrayLike, NDArray
 
 from linkwork.errors import InputError, MissingParameterError, ParameterError, UnknownNameError
-from linkwork.five_bar.parameters import FiveBarParameters, InitialState
-from linkwork.five_bar.published import SETS
-from linkwork.five_bar.variables import PARAMETERS
 from linkwork.parameters import field_name
 
-from .case import Case
+from .case import PUBLISHED, Case
 from .drawings import Drawing, to_dxf, to_svg
-from .inputs import Harmonics, InductionMotor, Inputs, Piecewise, Signal, Torque, TorsionBar, ramp, table
+from .inputs import (
+    Channels,
+    Harmonics,
+    InductionMotor,
+    Inputs,
+    Piecewise,
+    Signal,
+    SliderCrankInputs,
+    Torque,
+    TorsionBar,
+    ramp,
+    table,
+)
+from .mechanism import FIVE_BAR, MECHANISMS, Mechanism, Parameters, mechanism_of
 
 #: Units of the contract as pint spells them.
 _PINT = {
@@ -41,13 +51,6 @@ _PINT = {
     "rad/s2": "rad/s**2",
     "N.s/m": "N*s/m",
 }
-
-_MECHANISM = {
-    v.name: v
-    for v in PARAMETERS
-    if not v.name.startswith("initial.") and v.name not in ("drive.mode", "solver.tolerance")
-}
-_INITIAL = {v.name.removeprefix("initial."): v for v in PARAMETERS if v.name.startswith("initial.")}
 
 
 def write_csv(path: str | Path, columns: Mapping[str, ArrayLike]) -> Path:
@@ -376,44 +379,50 @@ def _flatten(data: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
 # Parameters
 
 
-def parameters_from(data: Mapping[str, Any], base: FiveBarParameters | None = None) -> FiveBarParameters:
+def parameters_from(
+    data: Mapping[str, Any], base: Parameters | None = None, mechanism: Mechanism = FIVE_BAR
+) -> Parameters:
     """Parameters from nested tables or dotted names; what they leave out is taken from ``base``.
+
+    Parameters
+    ----------
+    data : mapping
+    base : FiveBarParameters or SliderCrankParameters, optional
+    mechanism : Mechanism
+        Whose parameters they are; with a base, the base's.
 
     Raises
     ------
     ParameterError
         If a name is unknown, a value is wrong, or, without a base, one is missing.
     """
+    mechanism = mechanism if base is None else mechanism_of(base)
+    known = mechanism.mechanism_variables
     values: dict[str, Any] = {}
     for name, value in _flatten(data).items():
-        if name not in _MECHANISM:
-            raise unknown_name(name, _MECHANISM)
-        if _MECHANISM[name].kind == "Integer":
+        if name not in known:
+            raise unknown_name(name, known)
+        if known[name].kind == "Integer":
             if isinstance(value, bool) or not isinstance(value, int):
                 raise ParameterError(name, value, "be +1 or -1")
             values[field_name(name)] = value
         else:
-            values[field_name(name)] = quantity(value, _MECHANISM[name].unit, name)
+            values[field_name(name)] = quantity(value, known[name].unit, name)
     if base is not None:
         values = {field: getattr(base, field) for field in base.__dataclass_fields__} | values
-    missing = [
-        name
-        for name in _MECHANISM
-        if field_name(name) not in values
-        and FiveBarParameters.__dataclass_fields__[field_name(name)].default is _REQUIRED
-    ]
+    defaults = {field.name: field.default for field in fields(mechanism.parameters)}
+    missing = [name for name in known if field_name(name) not in values and defaults[field_name(name)] is MISSING]
     if missing:
         raise MissingParameterError(missing[0], tuple(missing[1:]))
-    return FiveBarParameters(**values)
+    made: Parameters = mechanism.parameters(**values)
+    return made
 
 
-_REQUIRED = MISSING
-
-
-def parameters_to(parameters: FiveBarParameters) -> dict[str, Any]:
-    """Parameters as nested tables of texts with SI units, every digit kept."""
-    data: dict[str, Any] = {}
-    for name, variable in _MECHANISM.items():
+def parameters_to(parameters: Parameters) -> dict[str, Any]:
+    """Parameters as nested tables of texts with SI units, every digit kept; those of the five-bar need no ``mechanism``."""
+    mechanism = mechanism_of(parameters)
+    data: dict[str, Any] = {} if mechanism is FIVE_BAR else {"mechanism": mechanism.name}
+    for name, variable in mechanism.mechanism_variables.items():
         value = getattr(parameters, field_name(name))
         text = value if variable.kind == "Integer" else f"{float(value)!r} {_PINT.get(variable.unit, variable.unit)}"
         group, _, leaf = name.rpartition(".")
@@ -421,14 +430,24 @@ def parameters_to(parameters: FiveBarParameters) -> dict[str, Any]:
     return data
 
 
-def save_parameters(path: str | Path, parameters: FiveBarParameters) -> Path:
+def _mechanism_named(data: Mapping[str, Any]) -> Mechanism:
+    """The mechanism that a file is about: its ``mechanism``, by default the five-bar."""
+    name = data.get("mechanism", FIVE_BAR.name)
+    if name not in MECHANISMS:
+        raise unknown_name(str(name), MECHANISMS)
+    return MECHANISMS[name]
+
+
+def save_parameters(path: str | Path, parameters: Parameters) -> Path:
     """Write parameters to a TOML or JSON file, as the path's ending says."""
-    if not isinstance(parameters, FiveBarParameters):
-        raise InputError(f"save_parameters takes a path and FiveBarParameters, not {type(parameters).__name__}")
+    kinds = tuple(mechanism.parameters for mechanism in MECHANISMS.values())
+    if not isinstance(parameters, kinds):
+        names = " or ".join(kind.__name__ for kind in kinds)
+        raise InputError(f"save_parameters takes a path and {names}, not {type(parameters).__name__}")
     return write_tables(path, parameters_to(parameters))
 
 
-def load_parameters(path: str | Path) -> FiveBarParameters:
+def load_parameters(path: str | Path) -> Parameters:
     """Read parameters from a TOML or JSON file.
 
     Raises
@@ -438,7 +457,9 @@ def load_parameters(path: str | Path) -> FiveBarParameters:
     ParameterError
         As `parameters_from`.
     """
-    return parameters_from(read_tables(path))
+    data = read_tables(path)
+    mechanism = _mechanism_named(data)
+    return parameters_from({k: v for k, v in data.items() if k != "mechanism"}, mechanism=mechanism)
 
 
 def write_tables(path: str | Path, data: Mapping[str, Any]) -> Path:
@@ -493,7 +514,11 @@ def read_tables(path: str | Path) -> dict[str, Any]:
 
 # Cases
 
-_CASE_KEYS = ("title", "published", "initial", "drive", "force", "load", "run")
+#: Entries of a case file that are not parameters of the mechanism.
+_CASE_KEYS = {
+    "five-bar": ("mechanism", "title", "published", "initial", "drive", "force", "load", "run"),
+    "slider-crank": ("mechanism", "title", "published", "initial", "drive", "axial", "load", "run"),
+}
 
 
 def load_case(path: str | Path, overrides: Mapping[str, Any] | None = None) -> Case:
@@ -520,26 +545,31 @@ def case_from(
 ) -> Case:
     """A case from the tables of a case file; ``folder`` is where its CSV tables are looked for."""
     data = _overridden(data, overrides or {})
-    mechanism = {name: value for name, value in data.items() if name not in _CASE_KEYS}
-    base = None
-    speed = None
+    base, speed, start = None, None, {}
+    mechanism = _mechanism_named(data)
     published = data.get("published")
     if published is not None:
-        if published not in SETS:
-            raise unknown_name(str(published), SETS)
-        base = SETS[published].parameters
-        speed = SETS[published].crank_speed
-    flat = _flatten(mechanism)
+        if published not in PUBLISHED:
+            raise unknown_name(str(published), PUBLISHED)
+        base = PUBLISHED[published].parameters
+        speed = PUBLISHED[published].crank_speed
+        if "mechanism" in data and mechanism is not mechanism_of(base):
+            raise ParameterError("mechanism", data["mechanism"], f"be that of the published set {published}")
+        mechanism = mechanism_of(base)
+        # a five-bar's published start is at rest but for the speed, which the drive gives
+        start = {} if mechanism is FIVE_BAR else asdict(PUBLISHED[published].initial)
+    flat = _flatten({name: value for name, value in data.items() if name not in _CASE_KEYS[mechanism.name]})
     initial_values = _table(data, "initial")
     run = _table(data, "run")
-    parameters = parameters_from(flat, base)
+    parameters = parameters_from(flat, base, mechanism)
+    known = mechanism.initial_variables
     for name in initial_values:
-        if name not in _INITIAL:
-            raise unknown_name(f"initial.{name}", [f"initial.{n}" for n in _INITIAL])
-    initial = InitialState(
-        **{name: quantity(value, _INITIAL[name].unit, f"initial.{name}") for name, value in initial_values.items()}
-    )
-    inputs = _inputs(data, folder, speed)
+        if name not in known:
+            raise unknown_name(f"initial.{name}", [f"initial.{n}" for n in known])
+    given = {name: quantity(value, known[name].unit, f"initial.{name}") for name, value in initial_values.items()}
+    initial = mechanism.initial(**start | given)
+    read = _inputs if mechanism is FIVE_BAR else _slider_crank_inputs
+    inputs = read(data, folder, speed)
     stop_time, step, tolerance = _run_table(run, inputs)
     return Case(
         title=str(data.get("title", title)),
@@ -553,12 +583,12 @@ def case_from(
 
 
 def _overridden(data: Mapping[str, Any], overrides: Mapping[str, Any]) -> dict[str, Any]:
-    """The tables with single values replaced, by dotted name; one way of driving the crank replaces the other."""
+    """The tables with single values replaced, by dotted name; one way of driving a freedom replaces the other."""
     result = {name: dict(value) if isinstance(value, Mapping) else value for name, value in data.items()}
     for name, value in overrides.items():
         group, _, leaf = name.rpartition(".")
-        if group == "drive":
-            result["drive"] = {leaf: value}
+        if group in ("drive", "axial"):
+            result[group] = {leaf: value}
         elif group:
             table = result.setdefault(group, {})
             if not isinstance(table, dict):
@@ -576,25 +606,49 @@ def _table(data: Mapping[str, Any], name: str) -> Mapping[str, Any]:
     return value
 
 
-def _inputs(data: Mapping[str, Any], folder: Path, speed: float | None) -> Inputs:
+def _drive(data: Mapping[str, Any], folder: Path, speed: float | None) -> dict[str, Any]:
+    """What drives the crank: its speed, by default that of a published set, or a torque or the sum of several."""
     drive = _table(data, "drive")
     for name in drive:
         if name not in ("speed", "torque"):
             raise unknown_name(f"drive.{name}", ["drive.speed", "drive.torque"])
     if not drive and speed is not None:
         drive = {"speed": speed}
+    torque = drive.get("torque")
+    laws = torque if isinstance(torque, list) else [] if torque is None else [torque]
+    return {
+        "speed": _signal(drive["speed"], "rad/s", "drive.speed", folder) if "speed" in drive else None,
+        "torque": tuple(_torque(law, folder) for law in laws) if laws else None,
+    }
+
+
+def _inputs(data: Mapping[str, Any], folder: Path, speed: float | None) -> Channels:
     load = _table(data, "load")
     for name in load:
         if name not in ("fx", "fy"):
             raise unknown_name(f"load.{name}", ["load.fx", "load.fy"])
-    torque = drive.get("torque")
-    laws = torque if isinstance(torque, list) else [] if torque is None else [torque]
     return Inputs(
-        speed=_signal(drive["speed"], "rad/s", "drive.speed", folder) if "speed" in drive else None,
-        torque=tuple(_torque(law, folder) for law in laws) if laws else None,
+        **_drive(data, folder, speed),
         force=_signal(data.get("force", 0.0), "N", "force", folder),
         load_x=_signal(load.get("fx", 0.0), "N", "load.fx", folder),
         load_y=_signal(load.get("fy", 0.0), "N", "load.fy", folder),
+    )
+
+
+def _slider_crank_inputs(data: Mapping[str, Any], folder: Path, speed: float | None) -> Channels:
+    axial = _table(data, "axial")
+    for name in axial:
+        if name not in ("speed", "force", "groove"):
+            raise unknown_name(f"axial.{name}", ["axial.speed", "axial.force", "axial.groove"])
+    groove = axial.get("groove", False)
+    if not isinstance(groove, bool):
+        raise ParameterError("axial.groove", groove, "be true or false")
+    return SliderCrankInputs(
+        **_drive(data, folder, speed),
+        load=_signal(data.get("load", 0.0), "N", "load", folder),
+        shift_speed=_signal(axial["speed"], "m/s", "axial.speed", folder) if "speed" in axial else None,
+        axial_force=_signal(axial["force"], "N", "axial.force", folder) if "force" in axial else None,
+        groove=groove,
     )
 
 
@@ -681,7 +735,7 @@ def _entries(
     return {key: quantity(value[key], unit, f"{name}.{key}") for key, unit in units.items() if key in value}
 
 
-def _run_table(run: Mapping[str, Any], inputs: Inputs) -> tuple[float, float, float]:
+def _run_table(run: Mapping[str, Any], inputs: Channels) -> tuple[float, float, float]:
     keys = ("stop_time", "revolutions", "step", "tolerance")
     for name in run:
         if name not in keys:

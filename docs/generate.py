@@ -6,6 +6,7 @@ python docs/generate.py           writes docs/nomenclature.md and the table betw
 from __future__ import annotations
 
 import sys
+from collections.abc import Iterable
 from pathlib import Path
 
 from linkwork.five_bar.parameters import FiveBarParameters
@@ -160,7 +161,7 @@ def readme(text: str) -> str:
     return f"{before}{BEGIN}\n{variable_table()}\n{END}{after}"
 
 
-FIGURES = """# The thesis's figures, and what it states
+YOUSSEF_FIGURES = """# The figures of Youssef's thesis, and what it states
 
 Each figure of chapters III, IV, V, VII and VIII is a module of `analysis.studies`, with a plot, a CSV and verdicts; `linkwork figures`
 makes them all. The figures themselves are unreadable in the copy we have: what is held against the computation is what the
@@ -172,16 +173,47 @@ written by `python docs/generate.py --figures`.
 computation must have.
 """
 
+RAHMAN_FIGURES = """# The figures of Rahman's thesis, and what it states
 
-def figures() -> str:
-    """The text of docs/youssef-figures.md: every study computed, with its verdicts."""
-    from analysis.studies import STUDIES, load
+Figures 5 to 38 are one family of studies, `analysis.studies.rahman`: `linkwork figures R5` makes figure 5 as a plot and a CSV in
+pounds, inches and degrees, with verdicts. The mechanism of section 3.1 turns at 50 rpm under a crank torque of 100 lb.in; each
+figure has three cases beside the ideal slider-crank (a4 = 0, S1 = 0, alpha4 = 270 deg):
 
-    lines = [FIGURES]
-    for number in STUDIES:
+| figures | cases |
+| --- | --- |
+| R5 to R15 | offset a4 = 10, 20, 30 in at S1 = 3.5 in, alpha4 = 270 deg |
+| R16 to R26 | shift S1 = 3, 6, 9 in at a4 = 30 in, alpha4 = 270 deg |
+| R27 to R37 | twist alpha4 = 232, 270, 310 deg at a4 = 20 in, S1 = 0 |
+| R38 | all of them |
+
+**The numbering is ours.** {assigned}
+
+**Signs and frames.** nFni is the force in joint n along i of frame n, nTni the moment. 1F1 and 1T1 are those of the ground on the
+crank, 1T1 about the origin of frame 1 and with the torque as 1T1k; 2F2 is the force of the rod on the crank, in frame 2, whose i
+points to the crank pin; 3F3 that of the slider on the rod, in frame 3, whose i points along the rod and whose j is perpendicular
+to rod and crank axis; 4F4 and 4T4 those of the ground on the slider, in frame 4, whose k is the guide. 4F4k is the slider force
+sought; the slider position counts against k. The signs of 1F1, 1T1 and 2F2 follow from the thesis's statements; about those of 3F3
+and 4F4 it states nothing that we have.
+
+**Dead centres.** With the torque given, the forces have no finite value where dS4/dtheta1 = 0. The plots are cut off there and dotted
+lines mark the places, which the CSV lists; a value that falls on one of them is "nan" in the CSV. "Greatest" in the tables below
+means: at whole degrees more than 10 deg from a dead centre.
+
+What does not hold, with the right values and the errors in the equations, is summed up in [rahman-errata.md](rahman-errata.md). This page
+is written by `python docs/generate.py --figures`; "thesis" in the second column is the thesis's own statement, "reference" a number
+from an independent derivation, "check" a property that the computation must have.
+"""
+
+
+def figures(head: str, numbers: Iterable[str]) -> str:
+    """The text of docs/youssef-figures.md or rahman-figures.md: these studies computed, with their verdicts."""
+    from analysis.studies import load
+
+    lines = [head]
+    for number in numbers:
         result = load(number).compute()
         lines += [f"## {result.heading}", "", result.claim, ""]
-        if result.assignment:
+        if result.assignment and result.assignment not in head:
             lines += [f"*{result.assignment}*", ""]
         lines += ["| statement | source | stated | computed | |", "| --- | --- | --- | --- | --- |"]
         lines += [
@@ -190,6 +222,21 @@ def figures() -> str:
         ]
         lines.append("")
     return "\n".join(lines)
+
+
+def youssef_figures() -> str:
+    """The text of docs/youssef-figures.md."""
+    from analysis.studies import YOUSSEF
+
+    return figures(YOUSSEF_FIGURES, YOUSSEF)
+
+
+def rahman_figures() -> str:
+    """The text of docs/rahman-figures.md."""
+    from analysis.studies import RAHMAN
+    from analysis.studies.rahman import ASSIGNED
+
+    return figures(RAHMAN_FIGURES.format(assigned=ASSIGNED), RAHMAN)
 
 
 #: Pictures of docs/rig-2.md by the study that they are.
@@ -258,7 +305,8 @@ def main(arguments: list[str]) -> int:
         from analysis.io import save_figure
         from analysis.studies import load
 
-        (HERE / "youssef-figures.md").write_text(figures(), encoding="utf-8")
+        (HERE / "youssef-figures.md").write_text(youssef_figures(), encoding="utf-8")
+        (HERE / "rahman-figures.md").write_text(rahman_figures(), encoding="utf-8")
         study = load("linkage")
         save_figure(study.draw(study.compute()), HERE / "linkage.png")
         rig_2_pictures()

@@ -10,7 +10,7 @@ import click
 
 from linkwork import __version__
 
-from . import design, runs, slider, vibration
+from . import design, runs, slider, slider_crank, vibration
 from .common import CHECK_FAILED, ENDED_EARLY, INTERRUPTED, WRONG
 
 __all__ = ["CHECK_FAILED", "ENDED_EARLY", "INTERRUPTED", "WRONG", "main"]
@@ -41,5 +41,6 @@ for _command in (
     vibration.stability,
     design.synthesize,
     slider.slider_motion,
+    slider_crank.slider_crank,
 ):
     main.add_command(_command)

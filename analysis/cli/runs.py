@@ -6,6 +6,7 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
+from zipfile import BadZipFile
 
 import click
 import numpy as np
@@ -13,10 +14,11 @@ from rich.table import Table
 
 from linkwork import __version__
 from linkwork.five_bar.kinematics import assembly_square
-from linkwork.five_bar.published import RAD_S_PER_RPM, SETS
-from linkwork.five_bar.variables import PARAMETERS
+from linkwork.five_bar.published import RAD_S_PER_RPM
 from linkwork.parameters import field_name
 
+from ..case import PUBLISHED
+from ..mechanism import FIVE_BAR, mechanism_of
 from .common import (
     CHECK_FAILED,
     ENDED_EARLY,
@@ -30,7 +32,18 @@ from .common import (
     tolerance_option,
 )
 
-DEFAULT_FMU = Path("build/FiveBarSlider.fmu")
+#: Outputs that the plot of a check shows, of those that the mechanism has.
+COMPARED = (
+    "slider.position",
+    "slider.velocity",
+    "drive.applied_torque",
+    "pin.C.fx",
+    "pin.C.fy",
+    "slider_pin.fx",
+    "slider_pin.fy",
+)
+#: Where FMUs are looked for that are not named.
+DEFAULT_FOLDER = Path("build")
 
 
 @click.command()
@@ -58,7 +71,7 @@ def build(models: Sequence[str], dest: str) -> None:
 
 @click.command()
 @click.argument("case", required=False, type=click.Path(exists=True, dir_okay=False))
-@click.option("--published", metavar="NAME", help=f"Run a published set instead: {', '.join(SETS)}.")
+@click.option("--published", metavar="NAME", help=f"Run a published set instead: {', '.join(PUBLISHED)}.")
 @click.option("--fmu", type=click.Path(exists=True, dir_okay=False), help="Run through this FMU instead of in process.")
 @click.option(
     "--method", default="compiled", show_default=True, help="compiled, Hamming, or a method of SciPy's solve_ivp."
@@ -127,7 +140,10 @@ def run(
     name = (Path(case).stem if case else str(published)) + ("-fmu" if fmu else "")
     written = [result.to_csv(Path(out) / f"{name}.csv")]
     if plot and len(result) > 1:
-        names = ("slider.position", "crank.speed", "drive.applied_torque", "transmission.angle")
+        second = f"{mechanism_of(chosen.parameters).second}.position"
+        names = tuple(
+            dict.fromkeys(("slider.position", second, "crank.speed", "drive.applied_torque", "transmission.angle"))
+        )
         written.append(io.save_figure(result.plot(names, title=chosen.title), Path(out) / f"{name}.png"))
     _summary(chosen.title, result)
     for path in written:
@@ -164,9 +180,13 @@ def _summary(title: str, result: Any) -> None:
 @click.command()
 @click.argument("cases", nargs=-1)
 @click.option(
-    "--fmu", default=str(DEFAULT_FMU), show_default=True, type=click.Path(dir_okay=False), help="The FMU to check."
+    "--fmu",
+    type=click.Path(dir_okay=False),
+    help="The FMU to check; by default that of each case's mechanism in build, such as build/FiveBarSlider.fmu.",
 )
-@click.option("--all", "everything", is_flag=True, help="All standard cases instead of Table 3.1 alone.")
+@click.option(
+    "--all", "everything", is_flag=True, help="All standard cases (of the FMU's mechanism) instead of Table 3.1 alone."
+)
 @click.option(
     "--method",
     "methods",
@@ -187,7 +207,9 @@ def _summary(title: str, result: Any) -> None:
     "--out", default="out", show_default=True, type=click.Path(file_okay=False), help="Folder for CSV and plots."
 )
 @handled
-def check(cases: Sequence[str], fmu: str, everything: bool, methods: Sequence[str], tolerance: float, out: str) -> None:
+def check(
+    cases: Sequence[str], fmu: str | None, everything: bool, methods: Sequence[str], tolerance: float, out: str
+) -> None:
     """Hold the FMU against the in-process solver, output by output. CASES are names of standard cases or case files.
 
     \b
@@ -201,7 +223,10 @@ def check(cases: Sequence[str], fmu: str, everything: bool, methods: Sequence[st
     from ..checks import CASES
     from ..checks import check as compare_case
 
-    names = list(CASES) if everything else list(cases) or ["table-3.1"]
+    # of an FMU that is named, its own mechanism's
+    wanted = None if fmu is None else _model_name(Path(fmu))
+    every = [name for name, case in CASES.items() if wanted in (None, mechanism_of(case.parameters).fmu)]
+    names = every if everything else list(cases) or ["table-3.1"]
     prepare_solver()
     failed = []
     for name in names:
@@ -214,12 +239,15 @@ def check(cases: Sequence[str], fmu: str, everything: bool, methods: Sequence[st
         stem = Path(name).stem if Path(name).suffix in (".toml", ".json") else name
         for method in methods:
             label = stem if method == "compiled" else f"{stem}-{method}"
-            a, b, comparison = compare_case(fmu, case, method=method, tolerance=tolerance, progress=console.is_terminal)
+            under_test = fmu or DEFAULT_FOLDER / f"{mechanism_of(case.parameters).fmu}.fmu"
+            a, b, comparison = compare_case(
+                under_test, case, method=method, tolerance=tolerance, progress=console.is_terminal
+            )
             _comparison(f"{case.title}: FMU less in process ({a.source})", comparison)
             folder = Path(out)
             a.to_csv(folder / f"{label}-in-process.csv")
             b.to_csv(folder / f"{label}-fmu.csv")
-            shown = ("slider.position", "slider.velocity", "drive.applied_torque", "pin.C.fx", "pin.C.fy")
+            shown = [name for name in COMPARED if name in a.names]
             n = min(len(a), len(b))
             figure = figures.plot_comparison(
                 a.time[:n],
@@ -241,6 +269,16 @@ def check(cases: Sequence[str], fmu: str, everything: bool, methods: Sequence[st
         sys.exit(CHECK_FAILED)
     count = len(names) * len(methods)
     console.print(f"{count} of {count} checks pass", style="green", highlight=False)
+
+
+def _model_name(path: Path) -> str | None:
+    """Name of the model in an FMU; None where there is none to read, which the check will tell."""
+    from fmpy import read_model_description
+
+    try:
+        return str(read_model_description(str(path), validate=False).modelName)
+    except (OSError, KeyError, ValueError, BadZipFile):
+        return None
 
 
 def _comparison(title: str, comparison: Any) -> None:
@@ -279,19 +317,19 @@ def info(what: str | None) -> None:
         grid = Table(title="published sets")
         for heading in ("name", "source", "speed [rpm]"):
             grid.add_column(heading)
-        for name, entry in SETS.items():
+        for name, entry in PUBLISHED.items():
             grid.add_row(name, entry.source, f"{entry.crank_speed / RAD_S_PER_RPM:g}")
         console.print(grid)
         console.print(f"linkwork {__version__}; compiled code is kept in {_cache()}", highlight=False, soft_wrap=True)
-    elif what in SETS:
-        _parameters(SETS[what].source, SETS[what].parameters)
+    elif what in PUBLISHED:
+        _parameters(PUBLISHED[what].source, PUBLISHED[what].parameters)
     elif Path(what).suffix == ".fmu":
         _fmu(Path(what))
     elif Path(what).suffix in (".toml", ".json"):
         case = io.load_case(what)
         _parameters(case.title, case.parameters)
     else:
-        raise click.UsageError(f"{what!r} is neither a published set ({', '.join(SETS)}), a file, nor an FMU")
+        raise click.UsageError(f"{what!r} is neither a published set ({', '.join(PUBLISHED)}), a file, nor an FMU")
 
 
 def _cache() -> Path:
@@ -304,11 +342,14 @@ def _parameters(title: str, parameters: Any) -> None:
     grid = Table(title=title)
     for heading in ("parameter", "value", "unit", "meaning"):
         grid.add_column(heading, justify="right" if heading == "value" else "left")
-    for variable in PARAMETERS:
+    mechanism = mechanism_of(parameters)
+    for variable in mechanism.variables.PARAMETERS:
         value = getattr(parameters, field_name(variable.name), None)
         if value is not None:
             grid.add_row(variable.name, f"{value:.9g}", variable.unit, variable.description)
     console.print(grid)
+    if mechanism is not FIVE_BAR:
+        return
     p = parameters.constants()
     angles = np.linspace(0.0, 2.0 * np.pi, 721)
     square = [assembly_square(float(a), 0.0, p) for a in angles]

@@ -43,7 +43,7 @@ VIEW = (22.0, -112.0)
 _LIGHT = np.array([-0.25, 0.75, 0.61])
 #: Crank angles of a full turn at which paths and curves are computed.
 _POINTS = 361
-#: How far inside its ends a range is drawn (rad): the plant's own limit of assembly lies in between.
+#: How far inside its ends a range is drawn (rad): at the ends the square root may be of a negative number by rounding.
 _INSET = 1e-6
 _DEAD, _LIMIT, _SHIFT, _TWIST = COLOURS[2], "#B07700", "#A0527F", "#2478A8"
 
@@ -60,7 +60,20 @@ class _Pose:
 
 
 def _pose(parameters: SliderCrankParameters, angle: float, shift: float, factor: float) -> _Pose:
-    """The joints at a configuration.
+    """The joints at a configuration in which the rod reaches the guide."""
+    p = parameters.constants()
+    q = kinematics.position(angle, shift, p)
+    return _Pose(
+        angle,
+        factor * q.s4,
+        factor * np.array([0.0, 0.0, shift]),
+        factor * np.array(kinematics.crank_pin(q, shift, p)),
+        factor * np.array(kinematics.slider_pin(q, p)),
+    )
+
+
+def _checked_pose(parameters: SliderCrankParameters, angle: float, shift: float, factor: float) -> _Pose:
+    """The joints at a configuration that was asked for.
 
     Raises
     ------
@@ -73,15 +86,7 @@ def _pose(parameters: SliderCrankParameters, angle: float, shift: float, factor:
         if not isfinite(value):
             raise InputError(f"the {name} is {value!r}: it must be a finite number")
     check_assembly(parameters, angle, shift)
-    p = parameters.constants()
-    q = kinematics.position(angle, shift, p)
-    return _Pose(
-        angle,
-        factor * q.s4,
-        factor * np.array([0.0, 0.0, shift]),
-        factor * np.array(kinematics.crank_pin(q, shift, p)),
-        factor * np.array(kinematics.slider_pin(q, p)),
-    )
+    return _pose(parameters, angle, shift, factor)
 
 
 def _limited(part: Range, law: ShiftLaw) -> bool:
@@ -414,7 +419,7 @@ class _Scene:
                     covered = np.all(np.abs(taken - middle) < half, axis=1).sum()
                     crossed = sum(bool(np.all(np.abs(box[0] - middle) < box[1] + half)) for box in boxes)
                     outside = np.maximum(frame[0] - middle + half, middle + half - frame[1]).clip(0.0).sum()
-                    cost = 3.0 * covered + 60.0 * crossed + 2.0 * outside + 0.5 * gap + 0.6 * min(rank, 6)
+                    cost = 7.0 * covered + 60.0 * crossed + 8.0 * outside + 0.5 * gap + 0.6 * min(rank, 6)
                     if best is None or cost < best[0]:
                         best = cost, middle, gap
             assert best is not None
@@ -466,7 +471,7 @@ def plot_mechanism(
     InputError
         If angle or shift are not finite, or the unit is not known.
     """
-    pose = _pose(parameters, crank_angle, shift, _factor(unit))
+    pose = _checked_pose(parameters, crank_angle, shift, _factor(unit))
     scene = _Scene(parameters, constant_shift(shift) if law is None else law, [pose], unit, view)
     with matplotlib.rc_context(STYLE | {"figure.constrained_layout.use": False}):
         figure, axis = _sheet(scene, 9.0, head=0.35 if title else 0.0)

@@ -22,7 +22,7 @@ from typing import Any, TypeAlias, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from linkwork.errors import InputError, LinkworkError
+from linkwork.errors import AssemblyError, InputError, LinkworkError
 from linkwork.slider_crank.parameters import SliderCrankParameters
 
 from ..dual import Dual, about_i, apply, cross, join, stack
@@ -32,6 +32,8 @@ FloatArray: TypeAlias = NDArray[np.float64]
 
 #: Share of the crank's length below which dS4/dtheta1 is taken as none: there no torque balances a force on the slider.
 DEAD_CENTRE = 1e-9
+#: Cosine of the angle between rod and guide below which the loop is at the limit of assembly.
+LIMIT_COSINE = 1e-9
 
 
 class DeadCentreError(LinkworkError):
@@ -158,6 +160,8 @@ def rates(
     ------
     InputError
         If a rate is not finite or has not one value or one for each point of the closure.
+    AssemblyError
+        At the limit of assembly, where the rod is perpendicular to the guide.
     """
     n = closure.crank_angle.size
     w, v, e, a = (
@@ -171,6 +175,13 @@ def rates(
     )
     k = np.array([0.0, 0.0, 1.0])
     rod, guide = closure.rod_frame, closure.guide_frame
+    cosine = np.abs(np.sum(rod.real[..., 0] * guide.real[..., 2], -1))
+    if np.min(cosine) < LIMIT_COSINE:
+        worst = int(np.argmin(cosine))
+        raise AssemblyError(
+            f"the rod is perpendicular to the guide at theta1 = {closure.crank_angle[worst]:.6g} rad, S1 = "
+            f"{closure.shift[worst]:.6g} m: there, at the limit of assembly, the slider has no finite velocity"
+        )
     slide = Dual(np.zeros((n, 3)), guide.real[..., 2])
     # columns: the ball joints' relative rotations about the axes of rod and guide, the slide
     screws = stack([*(rod[..., i] for i in range(3)), *(guide[..., i] for i in range(3)), slide])
@@ -266,6 +277,8 @@ def joint_loads(
     ------
     InputError
         If not one of ``torque`` and ``slider_force`` is given, or if a value is not finite or not one of so many points.
+    AssemblyError
+        At the limit of assembly.
     DeadCentreError
         If the torque is given at a dead centre.
     """

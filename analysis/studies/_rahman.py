@@ -111,7 +111,7 @@ QUANTITIES: tuple[Quantity, ...] = (
     Quantity("Axial force 1F1k on the crank", (_force(1, "k", _ON_CRANK, "axial_force"),)),
     Quantity("Moment 1T1i on the crank", (_moment(1, "i", _ON_CRANK, "bearing_moment"),)),
     Quantity(
-        "Moments 1T1j and 1T1k on the crank",
+        "Moments 1T1j, 1T1k on the crank",
         tuple(_moment(1, axis, _ON_CRANK, "bearing_moment") for axis in "jk"),
     ),
     Quantity("Force 2F2i in the crank pin", (_force(2, "i", _BY_ROD, "crank_pin", -1.0),)),

@@ -112,17 +112,17 @@ def greatest(case: Case, quantity: FloatArray) -> float:
 
 
 def spikes_deg(case: Case, component: Component) -> FloatArray:
-    """Crank angles (deg) of the two poles of a component: where its reciprocal, which is smooth there, changes its sign."""
+    """Crank angles (deg) of the two poles of a component: where its reciprocal, which is smooth there, goes through zero."""
     value = values(case, component)
-    low, high = value[:-1], value[1:]
-    (changes,) = np.nonzero(low * high < 0.0)
-    if not changes.size:
-        return np.array([])
+    (changes,) = np.nonzero(value[:-1] * value[1:] < 0.0)
     # a zero of the component changes its sign too, between small values
-    size = np.minimum(np.abs(low), np.abs(high))[changes]
-    at = np.sort(changes[np.argsort(size)[-2:]])
-    share = (1.0 / value[at]) / (1.0 / value[at] - 1.0 / value[at + 1])
-    return np.asarray(ANGLES_DEG[at] + share * (ANGLES_DEG[at + 1] - ANGLES_DEG[at]))
+    size = np.minimum(np.abs(value[changes]), np.abs(value[changes + 1]))
+    found = []
+    for at in np.sort(changes[np.argsort(size)[-2:]]).tolist():
+        near_it = slice(at - 1, at + 3)
+        reciprocal = value[at] / value[near_it]
+        found.append(np.polyfit(reciprocal, ANGLES_DEG[near_it], 3)[-1])
+    return np.array(found)
 
 
 @cache
@@ -144,3 +144,345 @@ def difference_from_dual(case: Case, component: Component) -> float:
     other = component.sign * si / _UNITS[component.unit]
     scale = TORQUE if component.unit == "lb.in" else TORQUE / CRANK
     return float(np.abs(values(case, component)[clear(case)] - other).max()) / scale
+
+
+def _offsets_gain(component: Component, given: str) -> float:
+    """Least gain of a component's greatest magnitude from each case of family A to the next, the ideal one first."""
+    peaks = [greatest(case, values(case, component, given)) for case in (IDEAL, *FAMILIES["A"].cases)]
+    return min(after - before for before, after in pairwise(peaks))
+
+
+def _force_verdicts(family: str, component: Component) -> list[Verdict]:
+    """What is said of any component: the offset raises it, its spikes are the dead centres, it is computed twice."""
+    cases, symbol = FAMILIES[family].cases, component.symbol
+    verdicts = []
+    if family == "A" and "F" in symbol:
+        what = f"greatest |{symbol}|, least gain from one a4 to the next"
+        # along the guide nothing acts without a load, and 2F2j is settled by the torque
+        if component.source != "slider_force":
+            verdicts.append(
+                at_least(f"{what}; slider load given", THESIS, 0.0, _offsets_gain(component, "load"), component.unit)
+            )
+        if symbol != "2F2j":
+            verdicts.append(
+                at_least(f"{what}; torque given", THESIS, 0.0, _offsets_gain(component, "torque"), component.unit)
+            )
+    spikes = [(case, spikes_deg(case, component)) for case in cases if _has_spikes(case, component)]
+    if spikes:
+        distance = max(float(np.abs(found - dead_centres_deg(case)).max()) for case, found in spikes)
+        verdicts.append(at_most(f"distance of the spikes of {symbol} from dead centres", BALANCE, 0.005, distance, "deg"))
+    difference = max(difference_from_dual(case, component) for case in (IDEAL, *cases))
+    scale = "T" if component.unit == "lb.in" else "T/a1"
+    verdicts.append(
+        at_most(f"difference of {symbol} from that by dual vectors, relative to {scale}", BALANCE, SAME, difference)
+    )
+    return verdicts
+
+
+def _has_spikes(case: Case, component: Component) -> bool:
+    """Whether the slider's force has a part in a component: then that differs between the two force problems."""
+    sought, given = (values(case, component, problem) for problem in ("torque", "load"))
+    # 1T1k and, at constant speed, 2F2j are settled by the torque
+    settled = np.ptp(sought[clear(case)]) < NOTHING
+    return not settled and greatest(case, sought - given) > NOTHING
+
+
+def _none(statement: str, source: str, case: Case, quantity: FloatArray, unit: str) -> Verdict:
+    """A verdict on what is stated to be zero, told by its greatest magnitude clear of the dead centres."""
+    return near(f"{statement}; {case.name}", source, 0.0, greatest(case, quantity), NOTHING, unit)
+
+
+def _stroke(case: Case) -> float:
+    """Stroke (in) of a mechanism of section 3.1 at its shift."""
+    mechanism = parameters(case.offset_in, case.twist_deg)
+    (whole,) = ranges(mechanism, constant_shift(case.shift_in * INCH))
+    return whole.stroke / INCH
+
+
+def _slider(family: str) -> tuple[str, list[Verdict]]:
+    """Stroke and dead centres, and how far the mechanism can be assembled."""
+    cases = FAMILIES[family].cases
+    verdicts = [
+        at_most(f"stroke relative to the ideal one's; {case.name}", THESIS, 1.0, _stroke(case) / _stroke(IDEAL))
+        for case in cases
+        if case.twist_deg == IDEAL.twist_deg
+    ]
+    claim = "The offset a4 reduces the stroke."
+    if family == "A":
+        for a4, stroke in STROKES.items():
+            planar = Case("", a4, 0.0, 270.0)
+            verdicts.append(
+                near(f"stroke; a4 = {a4:g} in with S1 = 0", REFERENCE, stroke, _stroke(planar), 5e-4, "in")
+            )
+        for a4, stated in DEAD_CENTRES.items():
+            found = dead_centres_deg(Case("", a4, 0.0, 270.0))
+            verdicts += [
+                near(f"{which} dead centre; a4 = {a4:g} in with S1 = 0", REFERENCE, angle, at, 0.005, "deg")
+                for which, angle, at in zip(("first", "second"), stated, found)
+            ]
+    elif family == "B":
+        claim += " The mechanism is found up to a shift S1 of 9 in at most."
+        shifts = {a4: (greatest_shift(parameters(a4)) or 0.0) / INCH for a4 in SHIFTS}
+        statement = "greatest S1 at which the crank turns fully"
+        verdicts.append(at_most(f"{statement}, least of all a4", THESIS, SHIFT_REACHED, min(shifts.values()), "in"))
+        verdicts += [
+            near(f"{statement}; a4 = {a4:g} in", REFERENCE, stated, shifts[a4], 5e-4, "in")
+            for a4, stated in SHIFTS.items()
+        ]
+    else:
+        claim += " The mechanism is found at twists alpha4 from 232 to 310 deg."
+        margins = [_margin(float(twist)) for twist in range(360)]
+        stated = TWISTS_REACHED[1] - TWISTS_REACHED[0]
+        found = float(np.sum(np.array(margins) > 0.0))
+        verdicts.append(near("range of alpha4 in which the crank turns fully", THESIS, stated, found, 1.0, "deg"))
+        verdicts.append(
+            at_least("least margin of assembly at any whole degree of alpha4", REFERENCE, 0.0, min(margins), "in")
+        )
+        verdicts += [
+            near(f"stroke; {case.name}", REFERENCE, TWISTED_STROKES[case.twist_deg], _stroke(case), 0.005, "in")
+            for case in cases
+            if case.twist_deg in TWISTED_STROKES
+        ]
+    return claim, verdicts
+
+
+def _margin(twist_deg: float) -> float:
+    """Least margin of assembly over the turn (in) at a4 = 20 in, S1 = 0."""
+    case = FAMILIES["C"].cases[0]
+    law: ShiftLaw = constant_shift(case.shift_in * INCH)
+    return assembly_margin(parameters(case.offset_in, twist_deg), law).length / INCH
+
+
+def _axial(family: str) -> tuple[str, list[Verdict]]:
+    """1F1k is not prescribed."""
+    verdicts = []
+    for case in FAMILIES[family].cases:
+        found = values(case, _COMPONENTS["1F1k"])
+        verdicts.append(_none("greatest |1F1k|", THESIS, case, found, "lb"))
+        balance = f"greatest |1F1k + 2F2k|, the shift at rest; {case.name}"
+        verdicts.append(at_most(balance, BALANCE, SAME, greatest(case, found + values(case, _COMPONENTS["2F2k"])), "lb"))
+    return "The axial force on the crank is m1 S1'', none at a constant shift.", verdicts
+
+
+def _bearing_moment(family: str, axis: str) -> tuple[str, list[Verdict]]:
+    """1T1i or 1T1j by the forces."""
+    angle = np.radians(ANGLES_DEG)
+    verdicts = []
+    for case in FAMILIES[family].cases:
+        fi, fj, fk, moment = (values(case, _COMPONENTS[name]) for name in ("1F1i", "1F1j", "1F1k", f"1T1{axis}"))
+        if axis == "i":
+            printed, formula = -fj * case.shift_in, "-1F1j S1"
+            whole, full = printed + fk * CRANK * np.sin(angle), "-1F1j S1 + 1F1k a1 sin(theta1)"
+        else:
+            printed, formula = fi * case.shift_in, "1F1i S1"
+            whole, full = printed - fk * CRANK * np.cos(angle), "1F1i S1 - 1F1k a1 cos(theta1)"
+        verdicts.append(_none(f"greatest |1T1{axis} - ({formula})|", THESIS, case, moment - printed, "lb.in"))
+        verdicts.append(_none(f"greatest |1T1{axis} - ({full})|", REFERENCE, case, moment - whole, "lb.in"))
+    if axis == "j":
+        about = [values(case, _COMPONENTS["1T1k"]) for case in FAMILIES[family].cases]
+        verdicts += [
+            near(f"{which} 1T1k, the torque that is given", BALANCE, TORQUE, pick([pick(v) for v in about]), NOTHING, "lb.in")
+            for which, pick in (("least", np.nanmin), ("greatest", np.nanmax))
+        ]
+    return f"1T1{axis} = {formula}.", verdicts
+
+
+def _across_crank(family: str) -> tuple[str, list[Verdict]]:
+    """2F2j is settled by the torque."""
+    found = [values(case, _COMPONENTS["2F2j"]) for case in FAMILIES[family].cases]
+    return "At constant speed 2F2j = -T/a1 = -8.33 lb.", [
+        near(f"{which} 2F2j of all cases", THESIS, -8.33, pick([pick(v) for v in found]), 0.005, "lb")
+        for which, pick in (("least", np.nanmin), ("greatest", np.nanmax))
+    ]
+
+
+def _along_crank_axis(family: str) -> tuple[str, list[Verdict]]:
+    """2F2k is not zero."""
+    component = _COMPONENTS["2F2k"]
+    verdicts = []
+    for case in FAMILIES[family].cases:
+        found = values(case, component)
+        verdicts.append(_none("greatest |2F2k|", THESIS, case, found, "lb"))
+        if (family, case.name) in AXIAL:
+            stated, tolerance = AXIAL[family, case.name]
+            statement = f"greatest |2F2k|; {case.name}"
+            verdicts.append(near(statement, REFERENCE, stated, greatest(case, found), tolerance, "lb"))
+    return "2F2k = 0.", verdicts
+
+
+def _slider_pin(family: str) -> tuple[str, list[Verdict]]:
+    """Across the rod the slider's force has no part."""
+    found = max(
+        float(np.nanmax(np.abs(values(case, component) - values(case, component, "load"))))
+        for case in FAMILIES[family].cases
+        for component in (_COMPONENTS["3F3j"], _COMPONENTS["3F3k"])
+    )
+    statement = "greatest difference of 3F3j and 3F3k between torque given and load given"
+    return _RAISES, [at_most(statement, BALANCE, NOTHING, found, "lb")]
+
+
+def _slider_force(family: str) -> tuple[str, list[Verdict]]:
+    """The spikes, and values from an independent derivation."""
+    component = _COMPONENTS["4F4k"]
+    verdicts = []
+    for case in FAMILIES[family].cases:
+        found = spikes_deg(case, component)
+        verdicts += [
+            near(f"{which} spike; {case.name}", THESIS, stated, at, SPIKES_TO, "deg")
+            for which, stated, at in zip(("first", "second"), SPIKES, found)
+        ]
+        if case.shift_in == 0.0 and case.twist_deg == IDEAL.twist_deg:
+            verdicts += [
+                near(f"{which} spike; {case.name}", REFERENCE, stated, at, 0.005, "deg")
+                for which, stated, at in zip(("first", "second"), DEAD_CENTRES[case.offset_in], found)
+            ]
+        if (family, case.name) in SPOTS:
+            at_30 = values(case, component)[ANGLES_DEG == 30.0]
+            statement = f"4F4k at theta1 = 30 deg; {case.name}"
+            verdicts.append(near(statement, REFERENCE, SPOTS[family, case.name], at_30[0], 5e-7, "lb"))
+    return "There are spikes near 100 and 300 deg.", verdicts
+
+
+def _slider_moments(family: str) -> tuple[str, list[Verdict]]:
+    """4T4 is zero."""
+    cases = (IDEAL, *FAMILIES[family].cases)
+    return "The moments on the slider are zero.", [
+        near(
+            f"greatest |{component.symbol}| of all cases",
+            THESIS,
+            0.0,
+            max(float(np.abs(values(case, component)).max()) for case in cases),
+            NOTHING,
+            "lb.in",
+        )
+        for component in SLIDER_MOMENTS.components
+    ]
+
+
+def _joint_force(family: str) -> tuple[str, list[Verdict]]:
+    """Nothing more is said of this one."""
+    return _RAISES, []
+
+
+_COMPONENTS = {component.symbol: component for quantity in QUANTITIES for component in quantity.components}
+
+#: What is said of a figure's quantity, by its first component: the claim, and the verdicts that are this quantity's own.
+_ARGUMENTS: dict[str, Callable[[str], tuple[str, list[Verdict]]]] = {
+    "S4": _slider,
+    "1F1i": _joint_force,
+    "1F1j": _joint_force,
+    "1F1k": _axial,
+    "1T1i": partial(_bearing_moment, axis="i"),
+    "1T1j": partial(_bearing_moment, axis="j"),
+    "2F2i": _joint_force,
+    "2F2j": _across_crank,
+    "2F2k": _along_crank_axis,
+    "3F3i": _slider_pin,
+    "4F4i": _slider_force,
+    "4T4i": _slider_moments,
+}
+
+
+def _curve_name(symbol: str, case: Case, unit: str) -> str:
+    return f"{symbol}; {case.name} [{unit}]"
+
+
+def _dead_centre_name(case: Case) -> str:
+    return f"dead centre; {case.name} [deg]"
+
+
+def compute(number: str) -> StudyResult:
+    """Curves of all cases of a figure, their dead centres, and what is stated of them."""
+    family, quantity = FIGURES[number]
+    cases = (IDEAL, *FAMILIES[family].cases)
+    columns = {ANGLE: ANGLES_DEG}
+    if not quantity.components:
+        columns |= {_curve_name("S4", case, "in"): position(case) for case in cases}
+    for component in quantity.components:
+        columns |= {_curve_name(component.symbol, case, component.unit): values(case, component) for case in cases}
+    columns |= {_dead_centre_name(case): dead_centres_deg(case) for case in cases}
+    first = quantity.components[0].symbol if quantity.components else "S4"
+    claim, verdicts = _ARGUMENTS[first](family)
+    for component in quantity.components:
+        verdicts += _force_verdicts(family, component)
+    return StudyResult(
+        number=number, claim=claim, assignment=ASSIGNED, columns=padded(columns), verdicts=tuple(verdicts)
+    )
+
+
+def printed(text: str) -> str:
+    """A case or a list of dimensions as it stands in a plot."""
+    text = re.sub(r"\b([aS])(\d)", r"$\1_\2$", text.replace("alpha4", r"$\alpha_4$"))
+    return re.sub(r" deg\b", "°", text)
+
+
+def printed_symbol(symbol: str) -> str:
+    """A symbol of the thesis, such as 1F1k, as it stands in a plot."""
+    return re.sub(r"^(\d)([FT])(\d)([ijk])$", r"$^\1\2_{\3\4}$", symbol)
+
+
+def _broken(result: StudyResult, case: Case, name: str) -> tuple[FloatArray, FloatArray]:
+    """A curve that is interrupted at its dead centres."""
+    centres = result.columns[_dead_centre_name(case)]
+    centres = centres[np.isfinite(centres)]
+    where = np.searchsorted(ANGLES_DEG, centres)
+    return np.insert(ANGLES_DEG, where, centres), np.insert(result.columns[name], where, np.nan)
+
+
+def _y_range(curves: Iterable[FloatArray]) -> tuple[float, float]:
+    """Range in which all values lie that are clear of the dead centres, with some room; at least a lb or lb.in each way."""
+    joined = np.concatenate(list(curves))
+    low, high = float(joined.min()), float(joined.max())
+    room = max(0.08 * (high - low), 1.0 if high - low < NOTHING else 0.0)
+    return low - room, high + room
+
+
+def draw(result: StudyResult) -> Figure:
+    """A panel a component; the ideal case dashed over the others, dead centres dotted."""
+    family, quantity = FIGURES[result.number]
+    looks = [
+        (case, printed(case.name), colour, line)
+        for case, colour, line in zip(FAMILIES[family].cases, COLOURS * 2, ["-"] * len(COLOURS) + ["-."] * len(COLOURS))
+    ]
+    looks.append((IDEAL, printed("ideal, a4 = S1 = 0"), "0.15", "--"))
+    shown = [(c.symbol, f"{printed_symbol(c.symbol)}, {c.meaning}", c.unit) for c in quantity.components]
+    panels: list[Panel] = []
+    for symbol, label, unit in shown or [("S4", "slider position $S_4$", "in")]:
+        names = {case: _curve_name(symbol, case, unit) for case, *_ in looks}
+        low, high = _y_range(result.columns[name][clear(case)] for case, name in names.items())
+        curves = []
+        for case, legend, colour, line in looks:
+            x, y = _broken(result, case, names[case])
+            # one legend serves all panels
+            curves.append(Curve(x=x, y=y, label="" if panels else legend, colour=colour, line=line))
+            curves += [
+                Curve(x=[centre, centre], y=[low, high], colour=colour, line=":", width=0.8)
+                for centre in dead_centres_deg(case)
+            ]
+        panels.append(
+            Panel(
+                x_label="crank angle $\\theta_1$ [deg]; dotted: dead centres",
+                y_label=f"{label} [{unit}]",
+                curves=curves,
+                legend=printed(FAMILIES[family].legend),
+                legend_at="outside",
+                x_range=(0.0, 360.0),
+                y_range=(low, high),
+                x_ticks=np.arange(0.0, 361.0, 60.0).tolist(),
+            )
+        )
+    return plot_curves(panels, title=result.heading, size=(6.4, 3.7 if len(panels) == 1 else 2.7))
+
+
+def study(number: str) -> Study:
+    """The study of one of the figures, by its number with an R before it."""
+    return Study(number, partial(compute, number), draw)
+
+
+def main(number: str, out: str = "out") -> StudyResult:
+    """Make a figure and show the verdicts."""
+    return study(number).main(out)
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])

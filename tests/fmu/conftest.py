@@ -34,13 +34,13 @@ def fmus(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     return {name: build_fmu.build(name, folder) for name in MODELS}
 
 
-@pytest.fixture(scope="session", params=list(MODELS))
+@pytest.fixture(params=list(MODELS))
 def model(request: pytest.FixtureRequest) -> Model:
     """The model under test: each of them in turn."""
     return MODELS[request.param]
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture
 def fmu(fmus: dict[str, Path], model: Model) -> Path:
     """The FMU of the model under test."""
     return fmus[model.name]
@@ -58,7 +58,7 @@ def slider_crank(fmus: dict[str, Path]) -> Path:
     return fmus["SliderCrank"]
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture
 def description(fmu: Path) -> ElementTree.Element:
     """Root of the model description of the FMU under test."""
     return model_description(fmu)

@@ -59,8 +59,7 @@ MODELS = {
 def each(cases: Mapping[str, Mapping[str, Any]], *names: str) -> pytest.MarkDecorator:
     """Parametrise a test over the cases of each model, by model and by the name of the case.
 
-    The arguments ``names`` (by default ``case``) take the value of a case, one of them all of it. The tests of a model stay
-    together, so that what a module makes for a model is made once.
+    The arguments ``names`` (by default ``case``) take the value of a case, one of them all of it.
     """
     names = names or ("case",)
     rows, labels = [], []
@@ -68,4 +67,4 @@ def each(cases: Mapping[str, Mapping[str, Any]], *names: str) -> pytest.MarkDeco
         for label, value in cases[model].items():
             rows.append((model, *(value if len(names) > 1 else (value,))))
             labels.append(f"{model}-{label}")
-    return pytest.mark.parametrize(("model", *names), rows, ids=labels, indirect=["model"], scope="module")
+    return pytest.mark.parametrize(("model", *names), rows, ids=labels, indirect=["model"])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -116,18 +117,23 @@ def initialise_badly(fmu: str, folder: str, cases: list[dict[str, Any]], times: 
 
 
 @pytest.fixture(scope="module")
-def failures(fmu: Path, model: Model, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
-    """What each bad parameter leads to, after 14 of each in one process that lived on."""
-    cases = [values for values, _ in BAD_PARAMETERS[model.name].values()]
-    found = run_in_process(initialise_badly, fmu, tmp_path_factory.mktemp("run"), cases, 14)
-    return dict(zip(BAD_PARAMETERS[model.name], found))
+def failures(fmus: dict[str, Path], tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], dict[str, Any]]:
+    """What each bad parameter of a model leads to, after 14 of each in one process that lived on."""
+
+    @cache
+    def of(model: str) -> dict[str, Any]:
+        cases = [values for values, _ in BAD_PARAMETERS[model].values()]
+        found = run_in_process(initialise_badly, fmus[model], tmp_path_factory.mktemp("run"), cases, 14)
+        return dict(zip(BAD_PARAMETERS[model], found))
+
+    return of
 
 
 @each({model: {case: case for case in cases} for model, cases in BAD_PARAMETERS.items()})
 def test_bad_parameter_fails_the_initialisation_with_a_sentence(
-    failures: dict[str, Any], model: Model, case: str
+    failures: Callable[[str], dict[str, Any]], model: Model, case: str
 ) -> None:
-    trouble, after, outputs, log = failures[case]
+    trouble, after, outputs, log = failures(model.name)[case]
     sentence = BAD_PARAMETERS[model.name][case][1]
     said = [text for status, category, text in log if (status, category) == (3, "logStatusError")]
     assert len(said) == 1
@@ -245,18 +251,26 @@ def step_badly(fmu: str, folder: str, cases: list[Any]) -> list[Any]:
 
 
 @pytest.fixture(scope="module")
-def refusals(fmu: Path, model: Model, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
-    inputs = BAD_INPUTS[model.name]
-    cases: list[Any] = [[{}, time, size] for time, size, _, _ in BAD_STEPS.values()]
-    cases += [[{name: value}, 0.01, 0.1] for name, value, _, _ in inputs.values()]
-    found = run_in_process(step_badly, fmu, tmp_path_factory.mktemp("run"), cases)
-    return dict(zip([*BAD_STEPS, *inputs], found))
+def refusals(fmus: dict[str, Path], tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], dict[str, Any]]:
+    """What each bad step and each bad input of a model leads to."""
+
+    @cache
+    def of(model: str) -> dict[str, Any]:
+        inputs = BAD_INPUTS[model]
+        cases: list[Any] = [[{}, time, size] for time, size, _, _ in BAD_STEPS.values()]
+        cases += [[{name: value}, 0.01, 0.1] for name, value, _, _ in inputs.values()]
+        found = run_in_process(step_badly, fmus[model], tmp_path_factory.mktemp("run"), cases)
+        return dict(zip([*BAD_STEPS, *inputs], found))
+
+    return of
 
 
 @each({model: {case: case for case in [*BAD_STEPS, *inputs]} for model, inputs in BAD_INPUTS.items()})
-def test_bad_step_is_refused_and_the_last_good_state_stays(refusals: dict[str, Any], model: Model, case: str) -> None:
+def test_bad_step_is_refused_and_the_last_good_state_stays(
+    refusals: Callable[[str], dict[str, Any]], model: Model, case: str
+) -> None:
     *_, code, sentence = (BAD_STEPS | BAD_INPUTS[model.name])[case]
-    found = refusals[case]
+    found = refusals(model.name)[case]
     assert found["status"] == 2, "fmi2Discard"
     assert found["trouble"][0] == code
     assert found["trouble"][1].startswith(sentence)

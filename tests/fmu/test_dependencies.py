@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 from typing import Any
 from xml.etree.ElementTree import Element
@@ -123,15 +125,19 @@ def perturb_start(
     return found
 
 
-Changed = list[tuple[dict[str, int], str, list[str]]]
+#: Of a model, under each drive, which outputs were seen to change at once with each input, at the start or later.
+Changed = Callable[[str], list[tuple[dict[str, int], str, list[str]]]]
 
 
 @pytest.fixture(scope="module")
-def changed(fmu: Path, model: Model, tmp_path_factory: pytest.TempPathFactory) -> Changed:
-    """Under each drive, which outputs were seen to change at once with each input, at the start or later."""
-    arguments = (MECHANISMS[model.name], MODES[model.name])
-    found = run_in_process(perturb_inputs, fmu, tmp_path_factory.mktemp("run"), *arguments)
-    return [(mode, name, outputs) for mode, _, name, outputs in found]
+def changed(fmus: dict[str, Path], tmp_path_factory: pytest.TempPathFactory) -> Changed:
+    @cache
+    def of(model: str) -> list[tuple[dict[str, int], str, list[str]]]:
+        arguments = (MECHANISMS[model], MODES[model])
+        found = run_in_process(perturb_inputs, fmus[model], tmp_path_factory.mktemp("run"), *arguments)
+        return [(mode, name, outputs) for mode, _, name, outputs in found]
+
+    return of
 
 
 @each({model: {name: name for name in sorted(inputs)} for model, inputs in INPUTS.items()}, "name")
@@ -141,7 +147,9 @@ def test_outputs_that_change_at_once_are_those_declared(
     declared = {output for output, on in unknowns(description, "Outputs").items() if name in on}
     # the one dependency declared to be safe that there is not: the acceleration is commanded apart from the speed
     never = {"drive.speed": {"crank.acceleration"}, "axial.speed": {"shift.acceleration"}}.get(name, set())
-    assert {output for _, given, outputs in changed if given == name for output in outputs} == declared - never
+    assert {
+        output for _, given, outputs in changed(model.name) if given == name for output in outputs
+    } == declared - never
 
 
 #: Inputs of one way to drive that are of no effect in the others: what they are read under.
@@ -155,8 +163,8 @@ READ_UNDER = {
 }
 
 
-def test_inputs_of_another_drive_are_of_no_effect(changed: Changed) -> None:
-    for mode, name, outputs in changed:
+def test_inputs_of_another_drive_are_of_no_effect(changed: Changed, model: Model) -> None:
+    for mode, name, outputs in changed(model.name):
         parameter, value = READ_UNDER.get(name, ("drive.mode", mode["drive.mode"]))
         assert bool(outputs) is (mode[parameter] == value), (mode, name)
 

@@ -11,9 +11,28 @@ from linkwork.five_bar.dynamics import inertia
 from linkwork.five_bar.kinematics import coefficients, position
 from linkwork.five_bar.published import TABLE_3_1
 
+from .models import each
 from .runner import run_in_process
 
 CONSTANTS = TABLE_3_1.constants()
+
+#: A slider-crank with everything that stores, loses and moves energy.
+GENERAL = {
+    "guide.twist": 4.4,
+    "crank.cog_y": 0.03,
+    "rod.cog_distance": 0.5,
+    "initial.crank_speed": 9.0,
+    "slider.stiffness": 150.0,
+    "slider.spring_free_position": 1.0,
+    "slider.damping": 5.0,
+    "slider.coulomb_friction": 2.0,
+    "shift.stiffness": 400.0,
+    "shift.damping": 10.0,
+    "groove.amplitude": 0.08,
+    "groove.ratio": 2.0,
+    "gravity.y": -9.81,
+    "gravity.z": 3.0,
+}
 
 
 def masses(outputs: dict[str, float]) -> tuple[float, float, float]:
@@ -70,8 +89,8 @@ def jump(fmu: str, folder: str, speed: float) -> list[Any]:
 
 
 @pytest.mark.parametrize("speed", [60.0, 5.0, -30.0])
-def test_jump_of_the_speed_conserves_the_momentum_of_the_slider(fmu: Path, tmp_path: Path, speed: float) -> None:
-    before, at, after, later = run_in_process(jump, fmu, tmp_path, speed)
+def test_jump_of_the_speed_conserves_the_momentum_of_the_slider(five_bar: Path, tmp_path: Path, speed: float) -> None:
+    before, at, after, later = run_in_process(jump, five_bar, tmp_path, speed)
     _, m12, m22 = masses(before)
     assert abs(m12) > 1e-3, "no coupling here: nothing would be tested"
     momentum = m12 * before["crank.speed"] + m22 * before["slider.velocity"]
@@ -105,18 +124,40 @@ def balance(fmu: str, folder: str, values: dict[str, float], inputs: dict[str, l
     return rows
 
 
-@pytest.mark.parametrize(
-    ("values", "inputs"),
-    [
-        ({"drive.mode": 0, "initial.crank_speed": 30.0}, {"drive.torque": [-0.5, 1.0]}),
-        (
+#: Values at the start, and inputs that swing between two values.
+BALANCES = {
+    "FiveBarSlider": {
+        "torque": ({"drive.mode": 0, "initial.crank_speed": 30.0}, {"drive.torque": [-0.5, 1.0]}),
+        "everything": (
             {"drive.mode": 0, "initial.crank_speed": 30.0, "slider.coulomb_friction": 1.0, "slider.guide_angle": 0.3},
             {"drive.torque": [0.0, 0.5], "slider.force": [-2.0, 2.0], "load.fx": [-1.0, 1.0], "load.fy": [0.0, 1.0]},
         ),
-        ({}, {"drive.speed": [40.0, 45.0], "drive.acceleration": [-30.0, 30.0]}),
-    ],
-    ids=["torque", "everything", "speed"],
-)
+        "speed": ({}, {"drive.speed": [40.0, 45.0], "drive.acceleration": [-30.0, 30.0]}),
+    },
+    "SliderCrank": {
+        "forces": (
+            {**GENERAL, "drive.mode": 0, "axial.mode": 0},
+            {"drive.torque": [-20.0, 40.0], "axial.force": [-30.0, 30.0], "slider.load": [-10.0, 10.0]},
+        ),
+        "torque, axial speed": (
+            {**GENERAL, "drive.mode": 0},
+            {"drive.torque": [-20.0, 40.0], "axial.speed": [-0.3, 0.2], "axial.acceleration": [-1.0, 1.0]},
+        ),
+        "speed, force": (
+            {**GENERAL, "axial.mode": 0},
+            {"drive.speed": [8.0, 11.0], "drive.acceleration": [-30.0, 30.0], "axial.force": [-30.0, 30.0]},
+        ),
+        "speeds": (GENERAL, {"drive.speed": [8.0, 11.0], "axial.speed": [-0.3, 0.2], "slider.load": [-10.0, 10.0]}),
+        "torque, groove": (
+            {**GENERAL, "drive.mode": 0, "axial.mode": 2},
+            {"drive.torque": [-20.0, 40.0], "slider.load": [-10.0, 10.0]},
+        ),
+        "speed, groove": ({**GENERAL, "axial.mode": 2}, {"drive.speed": [8.0, 11.0], "slider.load": [-10.0, 10.0]}),
+    },
+}
+
+
+@each(BALANCES, "values", "inputs")
 def test_energy_balance(fmu: Path, tmp_path: Path, values: dict[str, float], inputs: dict[str, list[float]]) -> None:
     rows = run_in_process(balance, fmu, tmp_path, values, inputs)
     first = rows[0]
@@ -148,8 +189,8 @@ def feed_through(fmu: str, folder: str, mode: int) -> list[Any]:
     return [base, read]
 
 
-def test_inputs_are_felt_at_once_in_speed_drive(fmu: Path, tmp_path: Path) -> None:
-    base, read = run_in_process(feed_through, fmu, tmp_path, 1)
+def test_inputs_are_felt_at_once_in_speed_drive(five_bar: Path, tmp_path: Path) -> None:
+    base, read = run_in_process(feed_through, five_bar, tmp_path, 1)
     m11, m12, m22 = masses(base)
     assert read["drive.torque"] == base
     pushed = read["slider.force"]
@@ -162,8 +203,8 @@ def test_inputs_are_felt_at_once_in_speed_drive(fmu: Path, tmp_path: Path) -> No
     assert driven["drive.applied_torque"] - base["drive.applied_torque"] == pytest.approx(torque, rel=1e-9)
 
 
-def test_inputs_are_felt_at_once_in_torque_drive(fmu: Path, tmp_path: Path) -> None:
-    base, read = run_in_process(feed_through, fmu, tmp_path, 0)
+def test_inputs_are_felt_at_once_in_torque_drive(five_bar: Path, tmp_path: Path) -> None:
+    base, read = run_in_process(feed_through, five_bar, tmp_path, 0)
     m11, m12, m22 = masses(base)
     determinant = m11 * m22 - m12**2
     assert read["drive.acceleration"] == base

@@ -9,6 +9,8 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -218,9 +220,30 @@ def by_hand(
 
 
 @pytest.fixture(scope="module")
-def expected(fmu: Path, model: Model, tmp_path_factory: pytest.TempPathFactory) -> dict[str, float]:
-    end, trouble = run_in_process(by_hand, fmu, tmp_path_factory.mktemp("run"), *CASES[model.name][:4])
+def ends(fmus: dict[str, Path], tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Any]:
+    """The last good outputs of a model's case run by hand, to its end or to the limit of assembly, and the trouble then."""
+
+    @cache
+    def of(model: str, *, too_far: bool) -> Any:
+        case = CASES[model]
+        case = case._replace(later=case.too_much) if too_far else case
+        return run_in_process(by_hand, fmus[model], tmp_path_factory.mktemp("run"), *case[:4])
+
+    return of
+
+
+@pytest.fixture
+def expected(ends: Callable[..., Any], model: Model) -> dict[str, float]:
+    end, trouble = ends(model.name, too_far=False)
     assert trouble == [0, ""]
+    return end
+
+
+@pytest.fixture
+def last_good(ends: Callable[..., Any], model: Model) -> dict[str, float]:
+    end, trouble = ends(model.name, too_far=True)
+    assert trouble[0] == 3
+    assert trouble[1].startswith(SENTENCE)
     return end
 
 
@@ -252,16 +275,6 @@ def test_parameters_and_inputs_arrive(fmu: Path, model: Model, tmp_path: Path, e
         assert end != expected, name
     end, _ = run_in_process(by_hand, fmu, tmp_path / "later", *case._replace(later=case.later * 1.1)[:4])
     assert end[case.shown] != expected[case.shown]
-
-
-@pytest.fixture(scope="module")
-def last_good(fmu: Path, model: Model, tmp_path_factory: pytest.TempPathFactory) -> dict[str, float]:
-    case = CASES[model.name]
-    given = case._replace(later=case.too_much)[:4]
-    end, trouble = run_in_process(by_hand, fmu, tmp_path_factory.mktemp("run"), *given)
-    assert trouble[0] == 3
-    assert trouble[1].startswith(SENTENCE)
-    return end
 
 
 def run_too_far(master: str, fmu: Path, model: Model) -> dict[str, Any]:

@@ -1,15 +1,18 @@
-"""The FMU with its defaults gives the reference numbers of Table 3.1 at 420 rpm.
+"""The FMUs give the reference numbers: the five-bar of Table 3.1 at 420 rpm, the slider-crank of section 3.1 at 50 rpm.
 
-The numbers were derived independently of this project and cross-checked against two multibody engines; cgs as noted,
-SI here.
+Those of the five-bar were derived independently of this project and cross-checked against two multibody engines; cgs as noted,
+SI here. Those of the slider-crank are in `tests.published_rahman`.
 """
 
 from __future__ import annotations
 
+from math import cos, pi, sin
 from pathlib import Path
 from typing import Any
 
 import pytest
+
+import tests.published_rahman as rahman
 
 from .runner import run_in_process
 
@@ -41,8 +44,8 @@ def revolutions(fmu: str, folder: str, pattern: list[int], tolerance: float, tur
 @pytest.mark.parametrize(
     "pattern", [[90], [1], [30], [7, 11, 2, 25, 45]], ids=["quarter turns", "degrees", "30 degrees", "uneven"]
 )
-def test_three_turns(fmu: Path, tmp_path: Path, pattern: list[int]) -> None:
-    seen = run_in_process(revolutions, fmu, tmp_path, pattern, 1e-9, 3)
+def test_three_turns(five_bar: Path, tmp_path: Path, pattern: list[int]) -> None:
+    seen = run_in_process(revolutions, five_bar, tmp_path, pattern, 1e-9, 3)
     assert seen["0"]["drive.applied_torque"] == pytest.approx(TORQUE_AT_REST_DYN_CM * 1e-7, rel=1e-9)
     for angle, position in POSITION_CM.items():
         assert seen[str(angle)]["slider.position"] == pytest.approx(position * 1e-2, rel=1e-8)
@@ -52,8 +55,8 @@ def test_three_turns(fmu: Path, tmp_path: Path, pattern: list[int]) -> None:
     assert seen["360"]["pin.C.fy"] == pytest.approx(fy, abs=5e-8)
 
 
-def test_three_turns_at_a_tighter_tolerance(fmu: Path, tmp_path: Path) -> None:
-    seen = run_in_process(revolutions, fmu, tmp_path, [90], 1e-13, 3)
+def test_three_turns_at_a_tighter_tolerance(five_bar: Path, tmp_path: Path) -> None:
+    seen = run_in_process(revolutions, five_bar, tmp_path, [90], 1e-13, 3)
     for angle, position in POSITION_CM.items():
         assert seen[str(angle)]["slider.position"] == pytest.approx(position * 1e-2, abs=0.6e-12)
     assert seen["360"]["pin.C.fx"] == pytest.approx(FORCE_AT_C_DYN[0] * 1e-5, abs=0.6e-8)
@@ -62,7 +65,119 @@ def test_three_turns_at_a_tighter_tolerance(fmu: Path, tmp_path: Path) -> None:
         assert quantity["closure.residual"] < 1e-15
 
 
-def test_steady_state(fmu: Path, tmp_path: Path) -> None:
-    last = run_in_process(revolutions, fmu, tmp_path, [90], 1e-9, 40)["14400"]
+def test_steady_state(five_bar: Path, tmp_path: Path) -> None:
+    last = run_in_process(revolutions, five_bar, tmp_path, [90], 1e-9, 40)["14400"]
     assert last["slider.position"] == pytest.approx(STEADY_POSITION_CM * 1e-2, rel=1e-8)
     assert last["slider.velocity"] == pytest.approx(STEADY_VELOCITY_CM_S * 1e-2, rel=1e-8)
+
+
+#: Lengths in inches and angles in degrees as the thesis gives them, in the FMU's units.
+RAHMAN = {"guide.offset": rahman.INCH, "initial.shift_position": rahman.INCH, "guide.twist": pi / 180.0}
+
+
+def mechanism(offset_in: float = 10.0, shift_in: float = 0.0, twist_deg: float = 270.0) -> dict[str, float]:
+    """Values of the FMU for a case of section 3.1."""
+    return {name: factor * value for (name, factor), value in zip(RAHMAN.items(), (offset_in, shift_in, twist_deg))}
+
+
+def at_angles(fmu: str, folder: str, values: dict[str, float], angles: list[float], load: float) -> list[Any]:
+    """Outputs at 50 rpm, 300 degrees in a second, at crank angles in degrees, each beside those under a slider load."""
+    from bare_master import Fmu
+
+    instance = Fmu(fmu, folder).instantiate().start(values)
+    rows = []
+    time = 0.0
+    for angle in angles:
+        end = angle / 300.0
+        if end > time:
+            assert instance.step(time, end - time) == 0
+        time = end
+        free = instance.outputs()
+        instance.set("slider.load", load)
+        rows.append([free, instance.outputs()])
+        instance.set("slider.load", 0.0)
+    return rows
+
+
+@pytest.mark.parametrize("angles", [[30.0], [7.0, 11.0, 30.0], list(range(31))], ids=["one", "three", "degrees"])
+@pytest.mark.parametrize("spot", rahman.SPOTS, ids=["offset and shift", "offset and twist"])
+def test_slider_crank_at_30_degrees(slider_crank: Path, tmp_path: Path, spot: rahman.Spot, angles: list[float]) -> None:
+    load = spot.slider_force_lb * rahman.POUND_FORCE
+    values = mechanism(spot.offset_in, spot.shift_in, spot.twist_deg)
+    free, loaded = run_in_process(at_angles, slider_crank, tmp_path, values, angles, load)[-1]
+    assert free["crank.angle"] == pytest.approx(pi / 6, rel=1e-12)
+    assert free["slider.position"] / rahman.INCH == pytest.approx(spot.position_in, abs=6e-7)
+    assert free["slider.velocity"] / rahman.INCH == pytest.approx(spot.velocity_in_s, abs=6e-7)
+    assert free["slider.acceleration"] / rahman.INCH == pytest.approx(spot.acceleration_in_s2, abs=6e-6)
+    # slider load given, torque sought; and torque given, slider force sought
+    assert free["drive.applied_torque"] / rahman.POUND_INCH == pytest.approx(spot.torque_lb_in, abs=6e-6)
+    torque = loaded["drive.applied_torque"]
+    assert torque / rahman.POUND_INCH == pytest.approx(rahman.TORQUE_LB_IN, abs=2e-5)
+    # section 3.2: 2F2j = -T/a1 at constant speed, and no moments of the guide
+    force = loaded["crank_pin.fy"] * cos(pi / 6) - loaded["crank_pin.fx"] * sin(pi / 6)
+    assert force == pytest.approx(torque / (rahman.CRANK_IN * rahman.INCH), rel=1e-10)
+    assert loaded["guide.mx"] == loaded["guide.my"] == loaded["guide.mz"] == 0.0
+    for row in (free, loaded):
+        assert row["closure.residual"] < 1e-15
+        assert abs(row["energy.residual"]) < 1e-8
+
+
+def torque_given(fmu: str, folder: str, values: dict[str, float], load: float) -> dict[str, float]:
+    """Outputs at the start in torque drive under a slider load."""
+    from bare_master import Fmu
+
+    return Fmu(fmu, folder).instantiate().start(values | {"drive.mode": 0, "slider.load": load}).outputs()
+
+
+@pytest.mark.parametrize("spot", rahman.SPOTS, ids=["offset and shift", "offset and twist"])
+def test_slider_crank_keeps_its_speed_under_that_torque_and_force(
+    slider_crank: Path, tmp_path: Path, spot: rahman.Spot
+) -> None:
+    values = mechanism(spot.offset_in, spot.shift_in, spot.twist_deg)
+    values |= {"initial.crank_angle": pi / 6, "drive.torque": rahman.TORQUE_LB_IN * rahman.POUND_INCH}
+    load = spot.slider_force_lb * rahman.POUND_FORCE
+    assert abs(run_in_process(torque_given, slider_crank, tmp_path / "a", values, 0.0)["crank.acceleration"]) > 4.0
+    held = run_in_process(torque_given, slider_crank, tmp_path / "b", values, load)
+    # the force is printed to 1e-6 lb
+    assert held["crank.acceleration"] == pytest.approx(0.0, abs=1e-6)
+    assert held["slider.acceleration"] / rahman.INCH == pytest.approx(spot.acceleration_in_s2, abs=2e-5)
+
+
+@pytest.mark.parametrize("offset", rahman.DEAD_CENTRES_DEG)
+def test_slider_crank_turns_back_at_its_dead_centres(slider_crank: Path, tmp_path: Path, offset: float) -> None:
+    outer, inner = rahman.DEAD_CENTRES_DEG[offset]
+    angles = [outer - 0.005, outer + 0.005, inner - 0.005, inner + 0.005]
+    rows = run_in_process(at_angles, slider_crank, tmp_path, mechanism(offset), angles, 0.0)
+    signs = [row["slider.velocity"] > 0.0 for row, _ in rows]
+    assert signs == [True, False, False, True]
+    stroke = (rows[0][0]["slider.position"] - rows[2][0]["slider.position"]) / rahman.INCH
+    assert stroke == pytest.approx(rahman.STROKES_IN[offset], abs=6e-4)
+
+
+def can_start(fmu: str, folder: str, cases: list[dict[str, float]]) -> list[int]:
+    """solver.status of initialisations."""
+    from bare_master import Fmu
+
+    fmu = Fmu(fmu, folder)
+    found = []
+    for values in cases:
+        instance = fmu.instantiate()
+        for name, value in values.items():
+            instance.set(name, value)
+        instance.setup()
+        instance.enter()
+        instance.exit()
+        found.append(instance.get("solver.status"))
+        instance.free()
+    return found
+
+
+def test_slider_crank_assembles_up_to_the_greatest_shift(slider_crank: Path, tmp_path: Path) -> None:
+    # crank and offset in line, where the rod has to reach furthest
+    cases = [
+        mechanism(offset, sign * (shift + more))
+        for offset, shift in rahman.GREATEST_SHIFTS_IN.items()
+        for sign in (1.0, -1.0)
+        for more in (-1e-3, 1e-3)
+    ]
+    assert run_in_process(can_start, slider_crank, tmp_path, cases) == [0, 3] * 8

@@ -3,13 +3,14 @@
 With f and g the crank pin's coordinates across the guide, as in `kinematics`, and S1 a function of theta1 (prime: by it)
 
     D = a2^2 - f^2 - g^2       its square root is h: the rod reaches the guide where D >= 0
-    A = D'/2 = -(f f' + g g')  zero where the margin of assembly is least or greatest
+    A = D'/2                   zero where the margin of assembly is least or greatest
     S4' = A/h - B,  B = a1 cos(theta1) sin(alpha4) + S1' cos(alpha4)
 
 and the slider's dead centres are the zeros of h S4' = A - B h, which stays finite at the limit of assembly. The zeros are
 found by halving the turn: how much each of the two functions can change over a piece is bounded by the lengths and by the
 bounds of the law's derivatives, and a piece is dropped only where that excludes a zero. What is left is bisected to the
-last digit. So no zero is missed, but for pairs nearer to each other than `FINEST`, at which the slider only hesitates.
+last digit. So no zero is missed, but for pairs nearer to each other than `FINEST`, between which the slider moves by some
+1e-13 of the crank's length.
 """
 
 from __future__ import annotations
@@ -27,8 +28,8 @@ from . import kinematics
 from .parameters import Constants, SliderCrankParameters
 
 #: Width (rad) of a piece of the turn that is not divided further. Two zeros of one piece go unseen.
-FINEST = 1e-5
-#: Share of its scale below which a function that vanishes wherever it is looked at is taken as zero throughout.
+FINEST = 1e-4
+#: Share of its scale below which a function is taken as zero, of no sign: a slider that rests does not turn back by rounding.
 _ROUNDING = 1e-13
 #: Pieces into which the turn is divided first.
 _PIECES = 32
@@ -207,9 +208,9 @@ class _Change(NamedTuple):
 
     square: float
     pull: float
+    pull_spread: float
     along: float
     square_spread: float
-    pull_spread: float
     along_spread: float
 
 
@@ -222,23 +223,26 @@ def _change(middle: float, half: float, law: ShiftLaw, p: Constants, pitch: floa
             f"and change by no more than its rate, {law.rate:g} m/rad"
         )
     c, s = cos(middle), sin(middle)
-    f = p.a1 * c + p.a4
-    g = p.a1 * s * p.ca - s1 * p.sa
-    df = -p.a1 * s
-    dg = p.a1 * c * p.ca - pitch * ds1 * p.sa
-    # bounds: of f' and f''; of the true g'; of the g' and g'' that A has
-    f1 = p.a1
-    g1 = p.a1 * abs(p.ca) + law.rate * abs(p.sa)
-    pulled = p.a1 * abs(p.ca) + pitch * law.rate * abs(p.sa)
-    pulled1 = p.a1 * abs(p.ca) + pitch * law.curvature * abs(p.sa)
-    most_f = abs(f) + half * f1
-    most_g = abs(g) + half * g1
+    most = abs(s1) + half * law.rate
+
+    def pull(pitch: float) -> tuple[float, float]:
+        # A with the squares of f and g taken together: they cancel where guide and crank axis are nearly parallel
+        by_shift = p.a1 * p.ca * (c * s1 + pitch * s * ds1) - pitch * p.sa * s1 * ds1
+        steepest = p.a1 * abs(p.a4) + abs(p.sa) * (
+            p.a1 * p.a1 * abs(p.sa)
+            + p.a1 * abs(p.ca) * (most + law.rate + pitch * (law.rate + law.curvature))
+            + pitch * abs(p.sa) * (law.rate * law.rate + most * law.curvature)
+        )
+        return p.a1 * p.a4 * s + p.sa * (p.a1 * p.a1 * p.sa * s * c + by_shift), half * steepest
+
+    total, total_spread = pull(1.0)
+    value, spread = (total, total_spread) if pitch == 1.0 else pull(pitch)
     return _Change(
-        p.a2 * p.a2 - f * f - g * g,
-        -(f * df + g * dg),
+        kinematics.assembly_square(middle, s1, p),
+        value,
+        spread,
         p.a1 * c * p.sa + pitch * ds1 * p.ca,
-        2.0 * half * (most_f * f1 + most_g * g1),
-        half * (f1 * f1 + most_f * f1 + g1 * pulled + most_g * pulled1),
+        2.0 * half * (abs(total) + total_spread),
         half * (p.a1 * abs(p.sa) + pitch * law.curvature * abs(p.ca)),
     )
 
@@ -257,11 +261,11 @@ def _margin_slope(law: ShiftLaw, p: Constants) -> _Bounded:
     return slope
 
 
-def _slider_slope(law: ShiftLaw, p: Constants, pitch: float) -> _Bounded:
+def _slider_slope(change_of: Callable[[float, float], _Change], branch: float) -> _Bounded:
     """A - B h, of the sign of S4' on branch +1 and opposite to it on branch -1."""
 
     def slope(middle: float, half: float) -> tuple[float, float]:
-        change = _change(middle, half, law, p, pitch)
+        change = change_of(middle, half)
         h = sqrt(max(0.0, change.square))
         # |sqrt x - sqrt y| is at most the root of |x - y|, and |x - y| over either root
         spread = sqrt(change.square_spread)
@@ -269,7 +273,7 @@ def _slider_slope(law: ShiftLaw, p: Constants, pitch: float) -> _Bounded:
             spread = change.square_spread / h
         along = abs(change.along)
         return (
-            change.pull - p.branch * change.along * h,
+            change.pull - branch * change.along * h,
             change.pull_spread + along * spread + change.along_spread * (h + spread),
         )
 
@@ -290,29 +294,40 @@ def _bisect(positive: Callable[[float], bool], low: float, high: float) -> float
 
 
 def _zeros(function: _Bounded, low: float, high: float, scale: float) -> list[_Zero]:
-    """All zeros of ``function`` between ``low`` and ``high`` in which it changes its sign, in order; none if it is zero
-    throughout to the rounding of ``scale``."""
+    """All zeros of ``function`` between ``low`` and ``high`` in which it changes its sign, in order.
+
+    Where it is zero to the rounding of ``scale`` over a stretch, the stretch is one zero if the signs before and after it
+    differ, and none otherwise.
+    """
 
     def positive(x: float) -> bool:
         return function(x, 0.0)[0] > 0.0
 
-    found: list[_Zero] = []
+    floor = _ROUNDING * scale
+    kept: list[float] = [low]
 
     def search(a: float, b: float) -> None:
         middle = 0.5 * (a + b)
         value, spread = function(middle, 0.5 * (b - a))
         if abs(value) > spread:
             return
-        if b - a > FINEST:
+        if b - a > FINEST and abs(value) + spread > floor:
             search(a, middle)
             search(middle, b)
-        elif positive(a) != positive(b):
-            found.append(_Zero(_bisect(positive, a, b), positive(a)))
+        else:
+            kept.extend((a, b) if a != kept[-1] else (b,))
 
-    ends = [low + (high - low) * n / _PIECES for n in range(_PIECES)] + [high]
-    if any(abs(function(x, 0.0)[0]) > _ROUNDING * scale for x in ends):
-        for a, b in pairwise(ends):
-            search(a, b)
+    for a, b in pairwise([low + (high - low) * n / _PIECES for n in range(_PIECES)] + [high]):
+        search(a, b)
+    # the sign changes in pieces that were kept alone
+    found: list[_Zero] = []
+    last: float | None = None
+    for x in kept:
+        if abs(function(x, 0.0)[0]) <= floor:
+            continue
+        if last is not None and positive(x) != positive(last):
+            found.append(_Zero(_bisect(positive, last, x), positive(last)))
+        last = x
     return found
 
 
@@ -357,10 +372,26 @@ def greatest_shift(parameters: SliderCrankParameters) -> float | None:
     p = parameters.constants()
     if p.a2 < p.a1 + abs(p.a4):
         return None
-    # |S1 sin(alpha4) - a1 s cos(alpha4)| <= sqrt(a2^2 - (a1 c + a4)^2) at every angle: the least value of
-    # a1 s |cos(alpha4)| + sqrt(...), which is the slider position of a mechanism with this guide, bounds |S1 sin(alpha4)|
-    bounding = p._replace(ca=0.0, sa=-abs(p.ca), branch=1.0)
-    least = _range(_SEAM, _SEAM + 2.0 * pi, constant_shift(0.0), bounding).least.slider_position
+    # |S1 sin(alpha4) - a1 s cos(alpha4)| <= r = sqrt(a2^2 - f^2) at every angle: |S1 sin(alpha4)| is at most the least
+    # value of a1 s |cos(alpha4)| + r, which is that of a slider in the plane but for the cosine
+
+    def change_of(middle: float, half: float) -> _Change:
+        c, s = cos(middle), sin(middle)
+        f = p.a1 * c + p.a4
+        most = abs(f) + half * p.a1
+        lean = p.a1 * abs(p.ca)
+        spread = half * most * p.a1
+        return _Change(
+            p.a2 * p.a2 - f * f, f * p.a1 * s, spread + half * p.a1 * p.a1, -lean * c, 2.0 * spread, half * lean
+        )
+
+    def bound(angle: float) -> float:
+        f = p.a1 * cos(angle) + p.a4
+        return p.a1 * sin(angle) * abs(p.ca) + sqrt(max(0.0, p.a2 * p.a2 - f * f))
+
+    least = min(
+        bound(zero.angle) for zero in _zeros(_slider_slope(change_of, 1.0), _SEAM, _SEAM + 2.0 * pi, p.a1 * p.a2)
+    )
     if least < 0.0:
         return None
     return least / abs(p.sa) if p.sa != 0.0 else inf
@@ -374,7 +405,8 @@ def _place(angle: float, law: ShiftLaw, p: Constants) -> Place:
 
 
 def _dead_centres(low: float, high: float, law: ShiftLaw, p: Constants, pitch: float) -> tuple[DeadCentre, ...]:
-    zeros = _zeros(_slider_slope(law, p, pitch), low, high, (p.a1 + law.rate) * p.a2)
+    slope = _slider_slope(lambda middle, half: _change(middle, half, law, p, pitch), p.branch)
+    zeros = _zeros(slope, low, high, (p.a1 + law.rate) * p.a2)
     return tuple(sorted(DeadCentre(*_place(zero.angle, law, p), outer=zero.falling) for zero in zeros))
 
 

@@ -7,6 +7,8 @@ A round crank and a round rod with their centres of mass at mid-length, and a cu
 from __future__ import annotations
 
 from math import pi, radians
+from types import MappingProxyType
+from typing import Mapping, NamedTuple
 
 from .parameters import InitialState, SliderCrankParameters
 
@@ -49,6 +51,28 @@ def initial(shift_in: float = 0.0) -> InitialState:
     """The start at 50 rpm with the shift S1 (inches) of one of the cases."""
     return InitialState(crank_speed=CRANK_SPEED, shift_position=shift_in * INCH)
 
+
+class PublishedSet(NamedTuple):
+    """A case as printed, the state it starts from, the crank speed (rad/s), and its source."""
+
+    parameters: SliderCrankParameters
+    initial: InitialState
+    crank_speed: float
+    source: str
+
+
+def _case(offset_in: float, shift_in: float, twist_deg: float) -> PublishedSet:
+    source = f"Rahman, section 3.1: a4 = {offset_in:g} in, S1 = {shift_in:g} in, alpha4 = {twist_deg:g} deg"
+    return PublishedSet(parameters(offset_in, twist_deg), initial(shift_in), CRANK_SPEED, source)
+
+
+#: The ideal slider-crank and the cases of figures 5 to 38, by name: offset and shift in inches, twist in degrees.
+SETS: Mapping[str, PublishedSet] = MappingProxyType(
+    {"rahman-ideal": _case(0.0, 0.0, 270.0)}
+    | {f"rahman-a4-{a4}-s1-3.5": _case(a4, 3.5, 270.0) for a4 in (10, 20, 30)}
+    | {f"rahman-a4-30-s1-{s1}": _case(30, s1, 270.0) for s1 in (3, 6, 9)}
+    | {f"rahman-a4-20-alpha4-{twist}": _case(20, 0.0, twist) for twist in (232, 270, 310)}
+)
 
 #: The case that the FMU starts from: a4 = 10 in, S1 = 3.5 in, alpha4 = 270 deg.
 OFFSET_CASE = (parameters(10.0), initial(3.5))

@@ -1,0 +1,710 @@
+"""Commands about the generalised slider-crank: what it can do, its forces, its tolerances, the dual-number method, pictures."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from math import degrees, isinf, radians
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+import numpy as np
+from rich.markup import escape
+from rich.table import Table
+
+from linkwork.errors import AssemblyError, InputError
+from linkwork.slider_crank import mobility
+from linkwork.slider_crank.parameters import SliderCrankParameters
+from linkwork.slider_crank.published import SETS, PublishedSet
+
+from .common import CHECK_FAILED, console, errors, handled, number_or_text, tolerance_option
+from .design import wrote
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from ..slider_crank.forces import ForceTurn, ShiftLaw
+
+#: The case that everything starts from where no other is named.
+DEFAULT = "rahman-a4-10-s1-3.5"
+#: Angle (deg) from a singularity beyond which a value is told as an extreme, and shown.
+CLEAR_DEG = 10.0
+
+
+@click.group("slider-crank")
+def slider_crank() -> None:
+    """The generalised slider-crank of Rahman's thesis: offset, shifted along its crank axis, twisted.
+
+    Each command takes a file of parameters (TOML or JSON, with mechanism = "slider-crank") or a published case, and changes of
+    it. Lengths, angles, speeds and so on are texts with a unit, such as '10 in' or '310 deg'; bare numbers are in SI.
+
+    \b
+    Examples:
+      linkwork slider-crank info
+      linkwork slider-crank info --offset '30 in' --shift '9 in'
+      linkwork slider-crank forces --torque '100 lbf*in' --units inch
+      linkwork slider-crank picture --animate
+    """
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Chosen:
+    """The mechanism that a command is about: its name for files, its title, its parameters, how it shifts, its speed."""
+
+    name: str
+    title: str
+    parameters: SliderCrankParameters
+    shift: float
+    groove: str | None
+    speed: float
+
+    @property
+    def law(self) -> mobility.ShiftLaw:
+        """The shift over the crank angle, as mobility and pictures take it."""
+        return mobility.constant_shift(self.shift) if self.groove is None else mobility.groove_shift(self.parameters)
+
+    @property
+    def force_law(self) -> ShiftLaw:
+        """The shift over the crank angle, as the force problems take it."""
+        from ..slider_crank.forces import ConstantShift, GrooveShift
+
+        p = self.parameters
+        if self.groove is None:
+            return ConstantShift(self.shift)
+        return GrooveShift(p.groove_amplitude, p.groove_ratio, in_shaft=self.groove == "shaft")
+
+    def shift_at(self, crank_angle: float) -> float:
+        """Shift at a crank angle (m)."""
+        return self.shift if self.groove is None else float(self.law.at(crank_angle)[0])
+
+
+_MECHANISM_OPTIONS: Sequence[Callable[[Callable[..., Any]], Callable[..., Any]]] = (
+    click.argument("file", required=False, type=click.Path(exists=True, dir_okay=False)),
+    click.option("--published", metavar="NAME", help=f"A published case, by default {DEFAULT}: {', '.join(SETS)}."),
+    click.option("--offset", metavar="LENGTH", help="Offset a4 between crank axis and guide, such as '10 in'."),
+    click.option("--shift", metavar="LENGTH", help="Axial shift S1 of the crank, such as '3.5 in'."),
+    click.option("--twist", metavar="ANGLE", help="Twist alpha4 between crank axis and guide, such as '310 deg'."),
+    click.option("--speed", metavar="SPEED", help="Crank speed, such as '50 rpm'."),
+    click.option(
+        "--groove",
+        type=click.Choice(["shaft", "apart"]),
+        help="S1 = groove.amplitude sin(groove.ratio theta1): made by a groove in the crank's shaft as in the FMU, or by "
+        "something apart from the crank as in the thesis.",
+    ),
+    click.option(
+        "--set",
+        "settings",
+        multiple=True,
+        metavar="NAME=VALUE",
+        help="Change a parameter by its name in the FMU, such as rod.length='45 in' or assembly.branch=-1.",
+    ),
+)
+
+
+def mechanism_options(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Give a command the options of `_chosen`."""
+    for option in reversed(_MECHANISM_OPTIONS):
+        command = option(command)
+    return command
+
+
+out_option = click.option(
+    "--out", default="out", show_default=True, type=click.Path(file_okay=False), help="Folder for the results."
+)
+units_option = click.option(
+    "--units",
+    type=click.Choice(["SI", "inch"]),
+    default="SI",
+    show_default=True,
+    help="Of what is told and written; inch: inches, pounds force and degrees.",
+)
+plot_option = click.option("--plot/--no-plot", default=True, show_default=True, help="Whether to write plots.")
+
+
+def _chosen(
+    *,
+    file: str | None,
+    published: str | None,
+    offset: str | None,
+    shift: str | None,
+    twist: str | None,
+    speed: str | None,
+    groove: str | None,
+    settings: Sequence[str],
+) -> _Chosen:
+    """The mechanism of the options.
+
+    Raises
+    ------
+    LinkworkError
+        If a file, a name or a value is wrong.
+    """
+    from .. import io
+
+    if file is not None and published is not None:
+        raise click.UsageError("give either a file of parameters or --published NAME")
+    base: PublishedSet | None = None
+    if file is not None:
+        loaded = io.load_parameters(file)
+        if not isinstance(loaded, SliderCrankParameters):
+            raise InputError(f'{file} is of a five-bar: for a slider-crank it must begin with mechanism = "slider-crank"')
+        name, title, parameters = Path(file).stem, Path(file).stem, loaded
+        start, pace = 0.0, SETS[DEFAULT].crank_speed
+    else:
+        name = DEFAULT if published is None else published
+        if name not in SETS:
+            raise io.unknown_name(name, SETS)
+        base = SETS[name]
+        title, parameters, start, pace = base.source, base.parameters, base.initial.shift_position, base.crank_speed
+    changes: dict[str, Any] = {}
+    for setting in settings:
+        key, equals, value = setting.partition("=")
+        if not equals:
+            raise click.UsageError(f"--set {setting!r}: it must be NAME=VALUE, such as rod.length='45 in'")
+        changes[key.strip()] = number_or_text(value.strip())
+    for key, text in (("guide.offset", offset), ("guide.twist", twist)):
+        if text is not None:
+            changes[key] = number_or_text(text)
+    if shift is not None:
+        if groove is not None:
+            raise click.UsageError("--shift holds the crank, --groove moves it: give one of them")
+        start = io.quantity(number_or_text(shift), "m", "--shift")
+    if speed is not None:
+        pace = io.quantity(number_or_text(speed), "rad/s", "--speed")
+    if changes:
+        changed = io.parameters_from(changes, parameters)
+        assert isinstance(changed, SliderCrankParameters)
+        parameters = changed
+    if base is not None and (changes or shift is not None or groove is not None):
+        name, title = "slider-crank", _words(parameters, start, groove)
+    return _Chosen(name=name, title=title, parameters=parameters, shift=start, groove=groove, speed=pace)
+
+
+def _words(p: SliderCrankParameters, shift: float, groove: str | None) -> str:
+    """A title of a mechanism that has none."""
+    inch = _Units("inch").length
+    moved = f"S1 = {inch(shift)}" if groove is None else f"SS1 = {inch(p.groove_amplitude)}, alpha = {p.groove_ratio:g}"
+    return f"Slider-crank: a4 = {inch(p.guide_offset)}, {moved}, alpha4 = {degrees(p.guide_twist):.6g} deg"
+
+
+class _Units:
+    """Numbers as texts in the units of the output."""
+
+    def __init__(self, system: str) -> None:
+        from ..slider_crank.forces import UNITS
+
+        self.system, self.table = system, UNITS[system] | {"rad": UNITS["inch"]["rad"]}
+
+    def name(self, si: str) -> str:
+        """What the unit is called."""
+        return self.table[si][0]
+
+    def per(self, si: str) -> float:
+        """How many of it one of SI is."""
+        return 1.0 / self.table[si][1]
+
+    def length(self, value: float) -> str:
+        return f"{value * self.per('m'):.6g} {self.name('m')}"
+
+    @property
+    def picture(self) -> str:
+        """Of the lengths in pictures."""
+        return "in" if self.system == "inch" else "mm"
+
+
+def _angle(value: float) -> str:
+    return f"{degrees(value):.2f} deg"
+
+
+@slider_crank.command()
+@mechanism_options
+@units_option
+@handled
+def info(units: str, **given: Any) -> None:
+    """Tell where the mechanism can be assembled, its dead centres, its stroke, and how far its crank may shift.
+
+    \b
+    Examples:
+      linkwork slider-crank info --units inch
+      linkwork slider-crank info --published rahman-a4-20-alpha4-310
+      linkwork slider-crank info --offset '30 in' --set rod.length='40 in'
+      linkwork slider-crank info --groove shaft --set groove.amplitude='3 in' --set groove.ratio=2
+    """
+    chosen, told = _chosen(**given), _Units(units)
+    p, law = chosen.parameters, chosen.law
+    margin = mobility.assembly_margin(p, law)
+    parts = mobility.ranges(p, law)
+    if not parts:
+        # the sentence that says by how much
+        nearest = max(np.linspace(0.0, law.span, 721), key=lambda angle: _reach(p, law, float(angle)))
+        mobility.check_assembly(p, float(nearest), law.at(float(nearest))[0])
+        raise AssemblyError("the rod reaches the guide at no crank angle")
+    grid = Table(title=escape(chosen.title), title_justify="left", show_header=False)
+    grid.add_column("what", no_wrap=True)
+    grid.add_column("value")
+    shift = told.length(chosen.shift) if chosen.groove is None else "made by the groove"
+    most = mobility.greatest_shift(p)
+    greatest = "none: it cannot" if most is None else "any" if isinf(most) else told.length(most)
+    turns = "turns fully" if margin.length >= 0.0 else "does not turn fully"
+    for row in (
+        ("crank a1, rod a2", f"{told.length(p.crank_length)}, {told.length(p.rod_length)}"),
+        ("offset a4, twist alpha4", f"{told.length(p.guide_offset)}, {degrees(p.guide_twist):.6g} deg"),
+        ("shift S1", shift),
+        ("assembly", f"branch {p.assembly_branch:+d}"),
+        ("the crank", turns),
+        ("least assembly margin", f"{told.length(margin.length)} at {_angle(margin.crank_angle)}"),
+        ("greatest constant shift for a full turn", greatest),
+    ):
+        grid.add_row(*row)
+    console.print(grid)
+    length = told.name("m")
+    for part in parts:
+        full = f"{_angle(part.low)} to {_angle(part.high)}"
+        ends = f"stroke {told.length(part.stroke)}, slider {told.length(part.least.slider_position)}"
+        console.print(
+            f"range {full}: {ends} to {told.length(part.greatest.slider_position)}", highlight=False, soft_wrap=True
+        )
+    centres = Table(title="dead centres", title_justify="left")
+    for heading in ("crank angle [deg]", f"shift [{length}]", f"slider position [{length}]"):
+        centres.add_column(heading, justify="right")
+    centres.add_column("which")
+    for d in mobility.dead_centres(p, law):
+        centres.add_row(
+            f"{degrees(d.crank_angle):.2f}",
+            f"{d.shift * told.per('m'):.6g}",
+            f"{d.slider_position * told.per('m'):.6g}",
+            "outer" if d.outer else "inner",
+        )
+    console.print(centres)
+
+
+def _reach(p: SliderCrankParameters, law: mobility.ShiftLaw, angle: float) -> float:
+    from linkwork.slider_crank.kinematics import assembly_square
+
+    return assembly_square(angle, law.at(angle)[0], p.constants())
+
+
+# Forces
+
+#: What joint forces and moments are told as: title of a panel, name, whether it is a moment.
+_JOINTS = (
+    ("force of the bearing on the crank", "bearing"),
+    ("moment of the bearing about O", "bearing_moment"),
+    ("force of the crank on the rod", "crank_pin"),
+    ("force of the slider on the rod", "slider_pin"),
+    ("force of the guide on the slider", "guide"),
+    ("moment of the guide on the slider", "guide_moment"),
+)
+
+
+def _problem(torque: str | None, load: str | None) -> dict[str, float]:
+    """What is given: ``torque`` (N.m) or ``load`` (N)."""
+    from .. import io
+
+    if torque is not None and load is not None:
+        raise click.UsageError("give --torque, and the slider's force is sought, or --load, and the torque is")
+    if torque is not None:
+        return {"torque": io.quantity(number_or_text(torque), "N.m", "--torque")}
+    return {"load": 0.0 if load is None else io.quantity(number_or_text(load), "N", "--load")}
+
+
+def _turn(chosen: _Chosen, given: Mapping[str, float], points: int) -> ForceTurn:
+    """The force problem over the turn, or over what of it can be assembled."""
+    from ..slider_crank.forces import force_turn
+
+    turn = force_turn(
+        chosen.parameters,
+        crank_speed=chosen.speed,
+        shift=chosen.force_law,
+        angles=np.linspace(0.0, 2.0 * np.pi, points),
+        partial=True,
+        **given,
+    )
+    if len(turn.unreachable):
+        errors.print(
+            f"note: the rod does not reach the guide at {len(turn.unreachable)} of {points} crank angles, which are left out",
+            style="yellow",
+            highlight=False,
+            soft_wrap=True,
+        )
+    return turn
+
+
+@slider_crank.command()
+@mechanism_options
+@click.option("--torque", metavar="TORQUE", help="On the crank; the slider's force is sought. Such as '100 lbf*in'.")
+@click.option("--load", metavar="FORCE", help="On the slider; the crank's torque is sought. 0 by default.")
+@click.option(
+    "--frame",
+    "frames",
+    type=click.IntRange(1, 4),
+    multiple=True,
+    default=(1,),
+    show_default=True,
+    help="Of the components shown: 1 ground, 2 crank, 3 rod, 4 guide; can be given often.",
+)
+@click.option("--points", type=click.IntRange(2), default=721, show_default=True, help="Crank angles over the turn.")
+@units_option
+@out_option
+@plot_option
+@handled
+def forces(
+    torque: str | None,
+    load: str | None,
+    frames: Sequence[int],
+    points: int,
+    units: str,
+    out: str,
+    plot: bool,
+    **given: Any,
+) -> None:
+    """Find all joint forces over a turn: with the torque given the slider's force, with the load given the torque.
+
+    With the torque given there is no finite slider force at the dead centres. They are told with the reason; extremes are of
+    what is more than 10 deg from them.
+
+    \b
+    Examples:
+      linkwork slider-crank forces --torque '100 lbf*in' --units inch
+      linkwork slider-crank forces --load '-20 lbf' --frame 2 --frame 4
+      linkwork slider-crank forces crank.toml --speed '300 rpm' --out results
+    """
+    from .. import io
+
+    chosen, told = _chosen(**given), _Units(units)
+    turn = _turn(chosen, _problem(torque, load), points)
+    clear = _clear(turn)
+    grid = Table(title=escape(f"{chosen.title}: {turn.sought} sought"), title_justify="left")
+    for heading in ("quantity", "unit", "least", "at [deg]", "greatest", "at [deg]"):
+        grid.add_column(heading, justify="left" if heading in ("quantity", "unit") else "right")
+    for name, si, values in _quantities(turn, frames):
+        row = _extremes(turn.angle, values, clear)
+        if row is not None:
+            low, at_low, high, at_high = row
+            scale = told.per(si)
+            grid.add_row(name, told.name(si), *_texts(low * scale, at_low), *_texts(high * scale, at_high))
+    console.print(grid)
+    _singular(turn, told)
+    folder = Path(out)
+    written = [turn.to_csv(folder / f"{chosen.name}-forces.csv", units=units)]
+    if plot:
+        for frame in dict.fromkeys(frames):
+            figure = forces_figure(f"{chosen.title}: joint forces in frame {frame}", turn, frame, units)
+            written.append(io.save_figure(figure, folder / f"{chosen.name}-forces-frame-{frame}.png"))
+    wrote(written)
+
+
+def _texts(value: float, angle: float) -> tuple[str, str]:
+    return f"{value:.6g}", f"{degrees(angle):.1f}"
+
+
+def _quantities(turn: ForceTurn, frames: Sequence[int]) -> list[tuple[str, str, Any]]:
+    """Names, SI units and values of what is told of a turn."""
+    found: list[tuple[str, str, Any]] = [
+        ("slider position", "m", turn.slider_position),
+        ("crank torque", "N.m", turn.torque),
+        ("slider force", "N", turn.slider_force),
+        ("axial force on the crank", "N", turn.axial_force),
+    ]
+    for frame in dict.fromkeys(frames):
+        for words, name in _JOINTS:
+            vector = turn.vector(name, frame)
+            unit = "N.m" if words.startswith("moment") else "N"
+            found += [(f"{words}, {axis}{frame}", unit, vector[:, i]) for i, axis in enumerate("ijk")]
+    return found
+
+
+def _clear(turn: ForceTurn) -> Any:
+    """Which points are clear of the singularities, as far as there are any for what is sought."""
+    from ..slider_crank.forces import SLIDER_FORCE
+
+    clear = np.ones(len(turn), dtype=bool)
+    if turn.sought == SLIDER_FORCE:
+        for place in turn.singularities:
+            away = np.abs((turn.angle - place.crank_angle + np.pi) % (2.0 * np.pi) - np.pi)
+            clear &= away > radians(CLEAR_DEG)
+    return clear
+
+
+def _extremes(angle: Any, values: Any, clear: Any) -> tuple[float, float, float, float] | None:
+    """Least and greatest of what is clear of singularities and not masked, and their angles; None if nothing is."""
+    good = clear & ~np.ma.getmaskarray(values)
+    if not good.any():
+        return None
+    angle, values = angle[good], np.ma.getdata(values)[good]
+    low, high = int(np.argmin(values)), int(np.argmax(values))
+    return float(values[low]), float(angle[low]), float(values[high]), float(angle[high])
+
+
+def _singular(turn: ForceTurn, told: _Units) -> None:
+    """Dead centres, and what could not be determined there."""
+    from ..slider_crank.forces import SLIDER_FORCE
+
+    for d in turn.dead_centres:
+        console.print(
+            f"dead centre at {_angle(d.crank_angle)}, slider at {told.length(d.slider_position)}", highlight=False
+        )
+    if turn.sought == SLIDER_FORCE:
+        for d in turn.singularities:
+            console.print(
+                f"no slider force at {_angle(d.crank_angle)}: it has no lever on the crank there (kth = 0), and grows without "
+                f"bound towards it; within {CLEAR_DEG:g} deg it is not among the extremes",
+                highlight=False,
+                soft_wrap=True,
+            )
+    for _, reason in turn.reasons:
+        console.print(f"masked: {reason}", highlight=False, soft_wrap=True)
+
+
+def forces_figure(title: str, turn: ForceTurn, frame: int, units: str) -> Figure:
+    """Motion, torque, slider force and all joint forces and moments over the crank angle, by components in a frame."""
+    from ..figures import Curve, Panel, plot_curves
+
+    told = _Units(units)
+    clear = _clear(turn)
+    angle = np.degrees(turn.angle)
+    marks = {f"dead centre {degrees(d.crank_angle):.1f}°": degrees(d.crank_angle) for d in turn.dead_centres}
+
+    def panel(what: str, si: str, curves: Mapping[str, Any]) -> Panel:
+        scaled = {label: np.ma.filled(values * told.per(si), np.nan) for label, values in curves.items()}
+        # towards a singularity curves leave the panel
+        shown = np.concatenate([values[clear & np.isfinite(values)] for values in scaled.values()])
+        limits = None
+        if len(shown):
+            low, high = float(shown.min()), float(shown.max())
+            room = 0.08 * (high - low) or 0.08 * abs(high) or 1.0
+            limits = low - room, high + room
+        return Panel(
+            x_label="crank angle [deg]",
+            y_label=f"[{told.name(si)}]",
+            curves=[Curve(x=angle, y=values, label=label) for label, values in scaled.items()],
+            verticals=marks,
+            title=what,
+            y_range=limits,
+            x_ticks=np.arange(0.0, 361.0, 60.0),
+            legend_at="outside",
+        )
+
+    panels = [
+        panel("slider position S4", "m", {"": turn.slider_position}),
+        panel("crank torque", "N.m", {"": turn.torque}),
+        panel("slider force, along -k4", "N", {"": turn.slider_force}),
+        panel("axial force on the crank", "N", {"": turn.axial_force}),
+    ]
+    for words, name in _JOINTS:
+        vector = turn.vector(name, frame)
+        unit = "N.m" if words.startswith("moment") else "N"
+        panels.append(panel(words, unit, {f"{axis}{frame}": vector[:, i] for i, axis in enumerate("ijk")}))
+    return plot_curves(panels, title=title, columns=2, size=(5.2, 2.5))
+
+
+# The dual-number method
+
+
+@slider_crank.command()
+@mechanism_options
+@click.option("--torque", metavar="TORQUE", help="On the crank; the slider's force is sought.")
+@click.option("--load", metavar="FORCE", help="On the slider; the crank's torque is sought. 0 by default.")
+@click.option("--points", type=click.IntRange(2), default=361, show_default=True, help="Crank angles over the turn.")
+@click.option(
+    "--tolerance",
+    type=float,
+    callback=tolerance_option,
+    default=1e-9,
+    show_default=True,
+    help="Largest relative difference that passes.",
+)
+@click.option("--two-rotations", is_flag=True, help="Show instead where the thesis's own closure ends, and how far open.")
+@units_option
+@out_option
+@handled
+def dual(
+    torque: str | None,
+    load: str | None,
+    points: int,
+    tolerance: float,
+    two_rotations: bool,
+    units: str,
+    out: str,
+    **given: Any,
+) -> None:
+    """Hold the thesis's dual-number method against vector mechanics, quantity by quantity.
+
+    The loop is closed by dual matrices with true ball joints, forces by dual momenta. Differences are relative to the largest
+    quantity of the same unit. --two-rotations shows the thesis's own form, which gives each ball joint two rotations and
+    settles on loops that are not closed.
+
+    \b
+    Examples:
+      linkwork slider-crank dual
+      linkwork slider-crank dual --published rahman-a4-20-alpha4-310 --torque '100 lbf*in'
+      linkwork slider-crank dual --two-rotations --units inch
+    """
+    chosen, told = _chosen(**given), _Units(units)
+    folder = Path(out)
+    if two_rotations:
+        _two_rotations(chosen, points, told, folder)
+        return
+    problem = _problem(torque, load)
+    if chosen.groove == "shaft" and "torque" in problem:
+        raise click.UsageError("--torque is for a shift that is driven apart from the crank: give --groove apart")
+    if not _dual_table(chosen, problem, points, tolerance):
+        errors.print("check failed: the two do not agree", style="red")
+        sys.exit(CHECK_FAILED)
+    console.print("the two agree", style="green")
+
+
+def _dual_table(chosen: _Chosen, problem: Mapping[str, float], points: int, tolerance: float) -> bool:
+    """Show the differences; whether all are within the tolerance."""
+    from ..slider_crank.closure import close
+    from ..slider_crank.dual_dynamics import joint_loads, rates
+    from ..slider_crank.forces import on_arrays
+
+    turn = _turn(chosen, problem, points)
+    p = chosen.parameters
+    good = ~np.ma.getmaskarray(turn.slider_force)
+    closure = close(p, turn.angle[good], turn.shift[good])
+    moving: dict[str, Any] = {
+        "speed": turn.speed[good],
+        "acceleration": turn.acceleration[good],
+        "shift_velocity": turn.shift_velocity[good],
+        "shift_acceleration": turn.shift_acceleration[good],
+    }
+    motion = rates(closure, **moving)
+    pushed = on_arrays().slider_resistance(closure.slider_position, motion.slider_velocity, 0.0, p.constants())
+    if "torque" in problem:
+        loads = joint_loads(closure, torque=problem["torque"], **moving)
+    else:
+        loads = joint_loads(closure, slider_force=pushed + problem["load"], **moving)
+    pairs: list[tuple[str, str, Any, Any]] = [
+        ("slider position", "m", closure.slider_position, turn.slider_position),
+        ("slider velocity", "m/s", motion.slider_velocity, turn.slider_velocity),
+        ("slider acceleration", "m/s2", motion.slider_acceleration, turn.slider_acceleration),
+        ("slider force", "N", loads.slider_force - pushed, turn.slider_force),
+        ("axial force on the crank", "N", loads.axial, turn.axial_force),
+    ]
+    pairs += [
+        (words, "N.m" if words.startswith("moment") else "N", loads.components(name, 1), turn.vector(name))
+        for words, name in _JOINTS
+    ]
+    found = [(words, si, np.abs(a - np.ma.getdata(b)[good]).max(), np.abs(b[good]).max()) for words, si, a, b in pairs]
+    largest = {si: max(size for _, unit, _, size in found if unit == si) for _, si, _, _ in found}
+    grid = Table(
+        title=escape(f"{chosen.title}: dual numbers less vector mechanics, {int(good.sum())} crank angles"),
+        title_justify="left",
+    )
+    for heading in ("quantity", "unit", "largest", "largest difference", "relative", "verdict"):
+        grid.add_column(heading, justify="left" if heading in ("quantity", "unit", "verdict") else "right")
+    agree = True
+    for words, si, difference, size in found:
+        relative = float(difference / largest[si]) if largest[si] > 0.0 else float(difference)
+        passed = relative <= tolerance
+        agree &= passed
+        grid.add_row(
+            words, si, f"{size:.6g}", f"{difference:.1e}", f"{relative:.1e}", "pass" if passed else "FAIL",
+            style=None if passed else "red",
+        )  # fmt: skip
+    console.print(grid)
+    console.print(
+        f"the loop closes to {closure.rotation_residual.max():.1e} rad and {closure.length_residual.max():.1e} m in at most "
+        f"{closure.iterations} iterations; moment about the rod's line, which no equation asks for: "
+        f"{np.abs(loads.residual).max():.1e} N.m",
+        highlight=False,
+        soft_wrap=True,
+    )
+    return agree
+
+
+def _two_rotations(chosen: _Chosen, points: int, told: _Units, folder: Path) -> None:
+    """Where the thesis's iteration ends over the turn."""
+    from .. import io
+    from ..slider_crank.closure import shortage
+    from ..slider_crank.two_rotations import settle
+
+    angle = np.linspace(0.0, 2.0 * np.pi, points)
+    shift = np.array([chosen.shift_at(float(a)) for a in angle])
+    reached = shortage(chosen.parameters, angle, shift) < 0.0
+    if not reached.any():
+        worst = int(np.argmin(shortage(chosen.parameters, angle, shift)))
+        mobility.check_assembly(chosen.parameters, float(angle[worst]), float(shift[worst]))
+    end = settle(chosen.parameters, angle[reached], shift[reached])
+    length = told.name("m")
+    columns = {
+        "crank angle [deg]": np.degrees(end.crank_angle),
+        f"slider position [{length}]": end.unknowns[:, 4] * told.per("m"),
+        f"off by [{length}]": end.position_error * told.per("m"),
+        "rotation residual [deg]": np.degrees(end.rotation_residual),
+        f"length residual [{length}]": end.length_residual * told.per("m"),
+        "steps": end.steps.astype(float),
+        "settled": end.settled.astype(float),
+    }
+    grid = Table(title=escape(f"{chosen.title}: closure with two rotations per ball joint"), title_justify="left")
+    for heading in columns:
+        grid.add_column(heading, justify="right")
+    for i in range(0, len(end.steps), max(1, len(end.steps) // 12)):
+        cells = [f"{values[i]:.6g}" for values in columns.values()]
+        grid.add_row(*cells[:-1], "yes" if end.settled[i] else "no", style=None if end.settled[i] else "yellow")
+    console.print(grid)
+    console.print(
+        f"largest rotation residual {np.degrees(end.rotation_residual).max():.2f} deg, length residual "
+        f"{told.length(float(end.length_residual.max()))}; slider position off by up to "
+        f"{told.length(float(end.position_error.max()))}; the steps become small at {int(end.settled.sum())} of "
+        f"{len(end.settled)} crank angles",
+        highlight=False,
+        soft_wrap=True,
+    )
+    wrote([io.write_csv(folder / f"{chosen.name}-two-rotations.csv", columns)])
+
+
+# Pictures
+
+
+@slider_crank.command()
+@mechanism_options
+@click.option("--angle", default="30 deg", show_default=True, metavar="ANGLE", help="Crank angle of the picture.")
+@click.option("--view", nargs=2, metavar="ELEVATION AZIMUTH", help="Of the eye, such as '22 deg' '-112 deg'.")
+@click.option("--range", "with_range", is_flag=True, help="Draw also where it can be assembled.")
+@click.option("--animate", is_flag=True, help="Write also an animation, GIF.")
+@click.option("--frames", type=click.IntRange(2), default=48, show_default=True, help="Pictures in the animation.")
+@units_option
+@out_option
+@handled
+def picture(
+    angle: str,
+    view: tuple[str, str] | None,
+    with_range: bool,
+    animate: bool,
+    frames: int,
+    units: str,
+    out: str,
+    **given: Any,
+) -> None:
+    """Draw the mechanism in space, with frames 1 and 4, paths and dead centres.
+
+    \b
+    Examples:
+      linkwork slider-crank picture --units inch
+      linkwork slider-crank picture --published rahman-a4-20-alpha4-310 --animate
+      linkwork slider-crank picture --set rod.length='30 in' --offset '20 in' --angle '180 deg' --range
+    """
+    from .. import io
+    from ..figures import slider_crank_picture as pictures
+
+    chosen, told = _chosen(**given), _Units(units)
+    p, folder = chosen.parameters, Path(out)
+    turned = io.quantity(number_or_text(angle), "rad", "--angle")
+    common: dict[str, Any] = {"law": chosen.law, "unit": told.picture, "title": chosen.title}
+    seen = common
+    if view is not None:
+        eye = [degrees(io.quantity(number_or_text(text), "rad", "--view")) for text in view]
+        seen = common | {"view": (eye[0], eye[1])}
+    figure = pictures.plot_mechanism(p, turned, chosen.shift_at(turned), **seen)
+    written = [io.save_figure(figure, folder / f"{chosen.name}.png")]
+    if with_range:
+        written.append(io.save_figure(pictures.plot_range(p, **common), folder / f"{chosen.name}-range.png"))
+    if animate:
+        with console.status(f"drawing {frames} pictures"):
+            written.append(pictures.animate_mechanism(p, folder / f"{chosen.name}.gif", frames=frames, **seen))
+    wrote(written)

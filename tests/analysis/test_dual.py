@@ -1,0 +1,319 @@
+"""Dual numbers: derivatives against known ones and differences, the algebra's laws, screws against rigid motions."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from analysis.dual import (
+    Dual,
+    about_i,
+    about_j,
+    about_k,
+    apply,
+    axial,
+    cross,
+    derivative,
+    dot,
+    frame,
+    join,
+    origin,
+    skew,
+    stack,
+    variables,
+)
+from analysis.tracing import ELEMENTARY, rebound
+from linkwork import friction
+from linkwork.slider_crank import dynamics, kinematics, vectors
+from tests.slider_cranks import DRIVES, seeded
+
+several = settings(max_examples=60, derandomize=True, deadline=None)
+sizes = st.floats(-3.0, 3.0, allow_subnormal=False)
+seeds = st.integers(0, 2**32 - 1)
+
+
+@st.composite
+def duals(draw: st.DrawFn) -> Dual:
+    return Dual(draw(sizes), draw(sizes))
+
+
+def same(a: Dual, b: Dual, tolerance: float = 1e-12) -> None:
+    np.testing.assert_allclose(a.real, b.real, rtol=tolerance, atol=tolerance)
+    np.testing.assert_allclose(a.dual, b.dual, rtol=tolerance, atol=tolerance)
+
+
+def drawn(seed: int, *shape: int) -> Dual:
+    random = np.random.default_rng(seed)
+    return Dual(random.normal(size=shape), random.normal(size=shape))
+
+
+def displacement(seed: int) -> Dual:
+    """A general orthogonal dual matrix."""
+    a = drawn(seed, 4)
+    return about_k(a[0]) @ about_i(a[1]) @ about_j(a[2]) @ about_k(a[3])
+
+
+# ------------------------------------------------------------------ numbers
+
+
+@given(duals(), duals(), duals())
+@several
+def test_the_numbers_are_a_commutative_ring(a: Dual, b: Dual, c: Dual) -> None:
+    same(a * b, b * a)
+    same(a * (b + c), a * b + a * c, 1e-11)
+    same((a * b) * c, a * (b * c), 1e-11)
+    same(a - a, Dual(0.0))
+    same(Dual(0.0, 1.0) * Dual(0.0, 1.0), Dual(0.0))
+
+
+@given(duals(), duals().filter(lambda x: abs(x.real) > 0.1))
+@several
+def test_division_undoes_multiplication(a: Dual, b: Dual) -> None:
+    same(a * b / b, a, 1e-10)
+    same(1.0 / b * b, Dual(1.0), 1e-10)
+
+
+FUNCTIONS: dict[str, Callable[[Any], Any]] = {
+    "sin": np.sin,
+    "cos": np.cos,
+    "tan": np.tan,
+    "sqrt": np.sqrt,
+    "exp": np.exp,
+    "log": np.log,
+    "tanh": np.tanh,
+    "arctan": np.arctan,
+    "arcsin": lambda x: np.arcsin(0.4 * x),
+    "arccos": lambda x: np.arccos(0.4 * x),
+    "reciprocal": np.reciprocal,
+    "square": np.square,
+    "power": lambda x: x**3 + x**-1.5 + 2.0**x + x**x,
+    "divide": lambda x: (1.0 + x) / (2.0 + x * x) - 3.0 / x,
+    "atan2": lambda x: np.arctan2(np.sin(x), x * x) + np.arctan2(1.0, x),
+}
+
+
+@pytest.mark.parametrize("name", [name for name in FUNCTIONS if name != "atan2"])
+def test_derivatives_by_the_complex_step(name: str) -> None:
+    x = np.linspace(0.3, 2.2, 7)
+    expected = FUNCTIONS[name](x + 1e-30j).imag / 1e-30
+    np.testing.assert_allclose(derivative(FUNCTIONS[name], x), expected, rtol=1e-13)
+
+
+def test_derivative_of_the_angle_in_all_quadrants() -> None:
+    turn = np.linspace(-3.0, 3.0, 25)
+    np.testing.assert_allclose(
+        derivative(lambda t: np.arctan2(2.0 * np.sin(t), 2.0 * np.cos(t)), turn), 1.0, rtol=1e-14
+    )
+
+
+def test_derivatives_of_magnitude_and_constant_powers_where_logarithms_have_none() -> None:
+    x = np.array([-2.0, -0.5, 3.0])
+    np.testing.assert_array_equal(derivative(np.absolute, x), [-1.0, -1.0, 1.0])
+    np.testing.assert_allclose(derivative(lambda a: a**3, x), 3.0 * x**2)
+    np.testing.assert_array_equal(derivative(lambda a: a**0, np.array([0.0, 1.0])), [0.0, 0.0])
+    np.testing.assert_array_equal(derivative(lambda a: a**1, np.array([0.0, -1.0])), [1.0, 1.0])
+
+
+def test_scalars_arrays_and_dual_numbers_mix() -> None:
+    x = Dual(np.array([1.0, 2.0]), 1.0)
+    for y in (np.array([3.0, 4.0]) * x, x * np.array([3.0, 4.0])):
+        assert isinstance(y, Dual)
+        np.testing.assert_array_equal(y.real, [3.0, 8.0])
+        np.testing.assert_array_equal(y.dual, [3.0, 4.0])
+    assert isinstance(np.float64(2.0) - x, Dual)
+    same(2 - x, Dual([1.0, 0.0], [-1.0, -1.0]))
+    same(-x + 1 - (+x), Dual([-1.0, -3.0], [-2.0, -2.0]))
+    same(Dual(2), Dual(2.0))
+
+
+def test_comparisons_see_the_real_part() -> None:
+    a, b = Dual(1.0, 5.0), Dual(1.0, -5.0)
+    assert a == b
+    assert a <= b
+    assert not a < b
+    assert Dual(0.0, 9.0) < 1.0
+    assert np.array_equal(Dual([1.0, 3.0]) > 2.0, [False, True])
+    assert not np.isfinite(Dual(1.0, np.inf))
+
+
+def test_what_has_no_derivative_is_refused() -> None:
+    with pytest.raises(TypeError):
+        np.floor(Dual(1.0))
+    with pytest.raises(TypeError):
+        np.add.reduce(Dual([1.0, 2.0]))
+    with pytest.raises(TypeError, match="stack"):
+        np.asarray(Dual(1.0))
+    with pytest.raises(TypeError):
+        float(Dual(1.0))  # type: ignore[arg-type]
+
+
+def test_several_directions_at_once() -> None:
+    a, b = np.array([0.3, 0.7, 1.1]), np.array([2.0, 1.5, 0.4])
+    x, y = variables(a, b)
+    f = np.sin(x) * y**2 + x / y
+    assert f.shape == (3,)
+    np.testing.assert_allclose(f.dual, [np.cos(a) * b**2 + 1.0 / b, 2.0 * np.sin(a) * b - a / b**2], rtol=1e-14)
+    np.testing.assert_allclose(f[1].dual, f.dual[:, 1])
+    # they go through vectors and matrices as well
+    turned = apply(about_k(x), stack([y, 0.0 * y, 0.0 * y]))
+    np.testing.assert_allclose(turned.dual[0], np.stack([-b * np.sin(a), b * np.cos(a), 0 * a], -1), rtol=1e-14)
+    np.testing.assert_allclose(turned.dual[1], np.stack([np.cos(a), np.sin(a), 0 * a], -1), rtol=1e-14)
+
+
+# ------------------------------------------------------------------ the plant's own functions
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_the_plant_differentiated_through_tracing(seed: int) -> None:
+    """Slider position, and torque and accelerations of the equations of motion, by the state and all parameters."""
+    case = seeded(seed)
+    traced = rebound(
+        (friction, vectors, kinematics, dynamics),
+        dict(zip(ELEMENTARY, (np.sin, np.cos, np.sqrt, np.arctan2, np.tanh))),
+    )
+    inputs = case.inputs("torque-force" if seed % 2 else "speed-shift")
+    names = [name for name in case.p._fields if name != "branch"]
+
+    def outputs(f: Any, x: Any) -> list[Any]:
+        p = case.p._replace(**dict(zip(names, x[4:])))
+        state = (*x[:4], 0.0, 0.0)
+        q = f.position(state[0], state[1], p)
+        k = f.coefficients(q, p)
+        motion = f.motion(q, k, state, inputs, p)
+        reactions = f.reactions(q, state, motion, inputs, p)
+        return [q.s4, k.kth, k.ks, motion.torque, motion.crank_acceleration, motion.force, *reactions.guide]
+
+    x = [*case.state[:4], *(getattr(case.p, name) for name in names)]
+    exact = outputs(traced, variables(*x))
+    complex_step = np.array(
+        [
+            [np.imag(y) / 1e-30 for y in outputs(traced, [v + 1e-30j * (j == i) for j, v in enumerate(x)])]
+            for i in range(len(x))
+        ]
+    )
+    values = outputs(dynamics_and_kinematics(), x)
+    for y, value, by_step in zip(exact, values, complex_step.T):
+        result = y if isinstance(y, Dual) else Dual(y, np.zeros(len(x)))
+        assert result.real == pytest.approx(value, rel=1e-13, abs=1e-13)
+        np.testing.assert_allclose(
+            np.broadcast_to(result.dual, by_step.shape), by_step, rtol=1e-10, atol=1e-12 * np.abs(by_step).max()
+        )
+
+
+def dynamics_and_kinematics() -> Any:
+    """The plant's functions as they are, on floats."""
+    return rebound((friction, vectors, kinematics, dynamics), {})
+
+
+def test_every_drive_of_the_plant_takes_dual_numbers() -> None:
+    case = seeded(3)
+    traced = rebound(
+        (friction, vectors, kinematics, dynamics),
+        dict(zip(ELEMENTARY, (np.sin, np.cos, np.sqrt, np.arctan2, np.tanh))),
+    )
+    for drive in DRIVES:
+        x = traced.grooved((Dual(case.state[0], 1.0), *case.state[1:]), DRIVES[drive][2], case.p)
+        rate = traced.derivative(x, case.inputs(drive), case.p)
+        h = 1e-6
+
+        def at(angle: float, drive: str = drive) -> np.ndarray:
+            return np.array(dynamics.derivative((angle, *case.state[1:]), case.inputs(drive), case.p))
+
+        slope = (at(case.state[0] + h) - at(case.state[0] - h)) / (2.0 * h)
+        for y, expected in zip(rate, slope):
+            found = float(y.dual) if isinstance(y, Dual) else 0.0
+            assert found == pytest.approx(expected, rel=1e-5, abs=1e-5 * np.abs(slope).max())
+
+
+# ------------------------------------------------------------------ screws
+
+
+@given(seeds)
+@several
+def test_displacements_are_orthogonal_and_inverted_by_transposing(seed: int) -> None:
+    m = displacement(seed)
+    same(m @ m.T, Dual(np.eye(3)))
+    same(m.T @ m, Dual(np.eye(3)))
+
+
+@given(seeds)
+@several
+def test_displacements_compose_as_rigid_motions(seed: int) -> None:
+    """The same by orientations and origins: R = R1 R2, p = p1 + R1 p2."""
+    first, second = displacement(seed), displacement(seed + 1)
+    both = first @ second
+    np.testing.assert_allclose(both.real, first.real @ second.real, atol=1e-13)
+    np.testing.assert_allclose(origin(both), origin(first) + first.real @ origin(second), atol=1e-12)
+    same(frame(both.real, origin(both)), both)
+
+
+@pytest.mark.parametrize(("about", "axis"), [(about_i, 0), (about_j, 1), (about_k, 2)])
+def test_screw_displacement_about_an_axis(about: Callable[[Any], Dual], axis: int) -> None:
+    angle, distance = 0.7, 2.5
+    m = about(Dual(angle, distance))
+    np.testing.assert_allclose(origin(m), distance * np.eye(3)[axis], atol=1e-15)
+    np.testing.assert_allclose(m.real[:, axis], np.eye(3)[axis], atol=1e-15)
+    # right-handed: the next axis turns towards the one after
+    following, last = (axis + 1) % 3, (axis + 2) % 3
+    assert m.real[last, following] == pytest.approx(np.sin(angle))
+    # its derivative by the angle is the cross product by the axis
+    rate = Dual(about(angle + 1e-6).real - about(angle - 1e-6).real) / 2e-6
+    np.testing.assert_allclose(rate.real, skew(np.eye(3)[axis]).real @ m.real, atol=1e-9)
+
+
+@given(seeds)
+@several
+def test_dot_and_cross_do_not_depend_on_the_frame(seed: int) -> None:
+    a, b, m = drawn(seed, 3), drawn(seed + 1, 3), displacement(seed)
+    same(dot(apply(m, a), apply(m, b)), dot(a, b), 1e-10)
+    same(cross(apply(m, a), apply(m, b)), apply(m, cross(a, b)), 1e-10)
+    same(apply(skew(a), b), cross(a, b))
+    same(axial(skew(a)), a)
+    same(cross(a, b), -cross(b, a))
+
+
+def test_dot_of_unit_lines_is_the_cosine_of_their_dual_angle() -> None:
+    """A line along i through the origin, and one turned by 0.6 about k at the height 2 above it."""
+    i = Dual([1.0, 0.0, 0.0])
+    angle = Dual(0.6, 2.0)
+    same(dot(i, apply(about_k(angle), i)), np.cos(angle))
+
+
+@given(seeds)
+@several
+def test_forces_and_velocities_change_their_point_of_reference(seed: int) -> None:
+    """From a frame with origin p: the moment about O is M + p x F, the velocity at O is v + p x omega."""
+    m, a = displacement(seed), drawn(seed + 1, 3)
+    there = apply(m, a)
+    np.testing.assert_allclose(there.real, m.real @ a.real, atol=1e-12)
+    np.testing.assert_allclose(there.dual, m.real @ a.dual + np.cross(origin(m), there.real), atol=1e-11)
+
+
+@given(seeds)
+@several
+def test_a_screw_carried_by_a_body_changes_by_the_cross_product_with_its_velocity(seed: int) -> None:
+    """Rate of m(t) b for a body that moves as exp(t V) m: V x (m b), by a central difference along the motion."""
+    m, b = displacement(seed), drawn(seed + 1, 3)
+    rate, h = drawn(seed + 2), 1e-5
+
+    def moved(t: float) -> Dual:
+        return apply(about_k(Dual(float(rate.real), float(rate.dual)) * t) @ m, b)
+
+    velocity = Dual([0.0, 0.0, float(rate.real)], [0.0, 0.0, float(rate.dual)])
+    same((moved(h) - moved(-h)) / (2.0 * h), cross(velocity, apply(m, b)), 1e-7)
+
+
+def test_stack_and_join() -> None:
+    x, y = Dual([1.0, 2.0], [3.0, 4.0]), 5.0
+    both = stack([x, y])
+    np.testing.assert_array_equal(both.real, [[1.0, 5.0], [2.0, 5.0]])
+    np.testing.assert_array_equal(both.dual, [[3.0, 0.0], [4.0, 0.0]])
+    assert join(both, both).shape == (2, 4)
+    assert stack([both, both], axis=-2).shape == (2, 2, 2)
+    assert both.T.shape == (2, 2)
+    assert "Dual" in repr(x)

@@ -1,0 +1,376 @@
+"""The thesis's method mended, by dual vectors: against the plant's vector mechanics, published numbers and balances."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import product
+from math import cos, inf, nan, pi, radians, sin
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from numpy.typing import NDArray
+
+from analysis.slider_crank.closure import close, follow
+from analysis.slider_crank.dual_dynamics import DeadCentreError, JointLoads, Rates, binors, joint_loads, rates
+from linkwork.errors import AssemblyError, InputError
+from linkwork.slider_crank import dynamics, kinematics
+from linkwork.slider_crank.parameters import SliderCrankParameters
+from linkwork.slider_crank.published import CRANK_SPEED, CRANK_TORQUE, parameters
+from linkwork.slider_crank.vectors import Vector
+from tests.analysis.test_slider_crank_closure import in_unit
+from tests.published_rahman import (
+    DEAD_CENTRES_DEG,
+    INCH,
+    OFFSETS_IN,
+    POUND_FORCE,
+    POUND_INCH,
+    SHIFTS_IN,
+    SPOTS,
+    TORQUE_LB_IN,
+    TWISTS_DEG,
+    Spot,
+)
+from tests.slider_cranks import Case, cases, seeded
+
+several = settings(max_examples=60, derandomize=True, deadline=None)
+every_case = pytest.mark.parametrize(("offset", "twist"), list(product(OFFSETS_IN, TWISTS_DEG)))
+TURN = np.radians(np.arange(0.0, 360.0, 7.5))
+FORCES = ("bearing", "axial", "crank_pin", "slider_pin", "guide", "slider_force")
+MOMENTS = ("bearing_moment", "guide_moment", "torque")
+
+
+def plant(
+    p: SliderCrankParameters, x: dynamics.State, e: float, a: float, load: float
+) -> tuple[dynamics.Motion, dynamics.Reactions, float]:
+    """Motion, reactions and whole force on the slider with both accelerations prescribed, by the plant."""
+    k = p.constants()
+    q = kinematics.position(x[0], x[1], k)
+    i = dynamics.Inputs(1.0, 1.0, 0.0, 0.0, e, 0.0, a, load)
+    m = dynamics.motion(q, kinematics.coefficients(q, k), x, i, k)
+    return m, dynamics.reactions(q, x, m, i, k), dynamics.slider_resistance(q.s4, m.slider_velocity, load, k)
+
+
+def assert_same(
+    found: JointLoads, expected: list[tuple[dynamics.Motion, dynamics.Reactions, float]], share: float
+) -> None:
+    """Forces to ``share`` of the largest force, moments to ``share`` of the largest moment."""
+    values = {name: np.array([getattr(r, name) for _, r, _ in expected]) for name in dynamics.Reactions._fields}
+    values["torque"] = np.array([m.torque for m, _, _ in expected])
+    values["slider_force"] = np.array([force for *_, force in expected])
+    for names in (FORCES, MOMENTS):
+        largest = max(np.abs(values[name]).max() for name in names)
+        for name in names:
+            np.testing.assert_allclose(getattr(found, name), values[name], rtol=0.0, atol=share * largest, err_msg=name)
+
+
+@every_case
+def test_agrees_with_vector_mechanics_in_all_cases_of_the_thesis_with_the_load_given(
+    offset: float, twist: float
+) -> None:
+    for shift, branch in product(SHIFTS_IN, (1, -1)):
+        p = replace(parameters(offset, twist), assembly_branch=branch)
+        found = joint_loads(close(p, TURN, shift * INCH), speed=CRANK_SPEED, slider_force=20.0)
+        expected = [plant(p, (th, shift * INCH, CRANK_SPEED, 0.0, 0.0, 0.0), 0.0, 0.0, 20.0) for th in TURN]
+        assert_same(found, expected, 1e-9)
+        assert np.abs(found.residual).max() < 1e-9 * np.abs(found.bearing_moment).max()
+
+
+@every_case
+def test_agrees_with_vector_mechanics_in_all_cases_of_the_thesis_with_the_torque_given(
+    offset: float, twist: float
+) -> None:
+    """The plant finds the load by two evaluations: the torque is linear in it. Clear of the dead centres by 0.02 a1."""
+    for shift, branch in product(SHIFTS_IN, (1, -1)):
+        p = replace(parameters(offset, twist), assembly_branch=branch)
+        clear = [
+            th
+            for th in TURN
+            if abs(kinematics.coefficients(kinematics.position(th, shift * INCH, p.constants()), p.constants()).kth)
+            > 0.02 * p.crank_length
+        ]
+        found = joint_loads(close(p, clear, shift * INCH), speed=CRANK_SPEED, torque=CRANK_TORQUE)
+        np.testing.assert_array_equal(found.torque, CRANK_TORQUE)
+        expected = []
+        for th in clear:
+            x = (th, shift * INCH, CRANK_SPEED, 0.0, 0.0, 0.0)
+            none, one = (plant(p, x, 0.0, 0.0, load)[0].torque for load in (0.0, 1.0))
+            expected.append(plant(p, x, 0.0, 0.0, (CRANK_TORQUE - none) / (one - none)))
+        assert_same(found, expected, 1e-9)
+
+
+@given(cases())
+@several
+def test_agrees_with_vector_mechanics_for_random_mechanisms_and_motions(case: Case) -> None:
+    """General masses, centres of mass, products of inertia, gravity, springs, friction, and shift in motion."""
+    p = case.parameters
+    th, s1, w, v, _, _ = case.state
+    e, a = case.acceleration, case.shift_acceleration
+    expected = plant(p, case.state, e, a, case.load)
+    motion = {"speed": w, "shift_velocity": v, "acceleration": e, "shift_acceleration": a}
+    found = close(p, th, s1)
+    moved = rates(found, **motion)
+    q = kinematics.position(th, s1, case.p)
+    k = kinematics.coefficients(q, case.p)
+    slide = kinematics.centripetal(q, k, w, v, case.p)
+    assert moved.slider_velocity[0] == pytest.approx(expected[0].slider_velocity, rel=1e-9, abs=1e-9)
+    assert moved.slider_acceleration[0] == pytest.approx(
+        k.kth * e + k.ks * a + slide, rel=1e-9, abs=1e-9 * (abs(k.kth * e) + abs(k.ks * a) + abs(slide))
+    )
+    assert moved.ratio[0] == pytest.approx(k.kth, rel=1e-9, abs=1e-11)
+    load_given = joint_loads(found, **motion, slider_force=expected[2])
+    assert_same(load_given, [expected], 1e-9)
+    # the other problem gives the load back, as exactly as the lever allows
+    lever = abs(k.kth) / p.crank_length
+    if lever > 1e-3:
+        assert_same(joint_loads(found, **motion, torque=expected[0].torque), [expected], 1e-10 / lever + 1e-9)
+
+
+@pytest.mark.parametrize("spot", SPOTS)
+def test_spot_values(spot: Spot) -> None:
+    found = close(parameters(spot.offset_in, spot.twist_deg), radians(30.0), spot.shift_in * INCH)
+    moved = rates(found, speed=CRANK_SPEED)
+    assert moved.slider_velocity[0] / INCH == pytest.approx(spot.velocity_in_s, abs=1e-6)
+    assert moved.slider_acceleration[0] / INCH == pytest.approx(spot.acceleration_in_s2, abs=1e-5)
+    sought = joint_loads(found, speed=CRANK_SPEED, torque=TORQUE_LB_IN * POUND_INCH)
+    assert sought.slider_force[0] / POUND_FORCE == pytest.approx(spot.slider_force_lb, abs=2e-6)
+    free = joint_loads(found, speed=CRANK_SPEED, slider_force=0.0)
+    assert free.torque[0] / POUND_INCH == pytest.approx(spot.torque_lb_in, abs=1e-5)
+
+
+@pytest.mark.parametrize("unit", [INCH, 1e-3])
+def test_the_unit_of_length_does_not_matter(unit: float) -> None:
+    """With lengths in inches or millimetres forces come out in kg.unit/s2."""
+    p = parameters(20.0, 310.0)
+    metres = joint_loads(close(p, TURN, 6.0 * INCH), speed=CRANK_SPEED, slider_force=20.0)
+    other = joint_loads(close(in_unit(p, unit), TURN, 6.0 * INCH / unit), speed=CRANK_SPEED, slider_force=20.0 / unit)
+    for names, power in ((FORCES, 1), (MOMENTS, 2)):
+        largest = max(np.abs(getattr(metres, name)).max() for name in names)
+        for name in names:
+            np.testing.assert_allclose(
+                getattr(other, name) * unit**power, getattr(metres, name), rtol=0.0, atol=1e-12 * largest
+            )
+
+
+def test_points_and_start_of_the_iteration_do_not_matter() -> None:
+    """Continuation gives the rod another spin than closing each point for itself; the forces are the same."""
+    p = seeded(5).parameters
+    th = np.linspace(0.0, 0.5, 6) + seeded(5).state[0]
+    s1 = seeded(5).state[1]
+    motion = {"speed": 3.0, "shift_velocity": 0.4, "acceleration": -7.0, "shift_acceleration": 2.0, "slider_force": 5.0}
+    one, other = joint_loads(close(p, th, s1), **motion), joint_loads(follow(p, th, s1), **motion)
+    assert np.abs(one.closure.crank_ball - other.closure.crank_ball).max() > 1e-3
+    for name in (*FORCES, *MOMENTS):
+        np.testing.assert_allclose(getattr(one, name), getattr(other, name), rtol=1e-9, atol=1e-9)
+
+
+# ------------------------------------------------------------------ rates
+
+
+def moving(case: Case) -> tuple[Rates, Rates, Rates, float]:
+    """Rates of a motion with theta1 and S1 quadratic in time, now and a moment before and after."""
+    th, s1, w, v, _, _ = case.state
+    e, a = 10.0, 2.0
+    h = 1e-5
+    found = []
+    for t in (-h, 0.0, h):
+        at = close(case.parameters, th + w * t + 0.5 * e * t * t, s1 + v * t + 0.5 * a * t * t)
+        found.append(rates(at, speed=w + e * t, shift_velocity=v + a * t, acceleration=e, shift_acceleration=a))
+    return found[0], found[1], found[2], h
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_rates_are_those_of_the_dual_velocities(seed: int) -> None:
+    """The dual velocities in the ground frame, differentiated numerically, and no spin of the rod at any time."""
+    before, now, after, h = moving(seeded(seed))
+    for name in ("crank", "rod", "slider"):
+        for part in ("real", "dual"):
+            slope = (getattr(getattr(after, name), part) - getattr(getattr(before, name), part)) / (2.0 * h)
+            rate = getattr(getattr(now, f"{name}_rate"), part)
+            np.testing.assert_allclose(rate, slope, rtol=0.0, atol=1e-4 * max(1.0, np.abs(slope).max()))
+    rod = close(seeded(seed).parameters, *seeded(seed).state[:2]).rod_frame.real[0, :, 0]
+    assert now.rod.real[0] @ rod == pytest.approx(0.0, abs=1e-12 * np.linalg.norm(now.rod.real))
+    assert now.rod_rate.real[0] @ rod == pytest.approx(0.0, abs=1e-11 * np.linalg.norm(now.rod_rate.real))
+    np.testing.assert_array_equal(now.slider.real, 0.0)
+
+
+def test_the_rod_joins_the_velocities_of_its_pins() -> None:
+    p = parameters(10.0, 232.0)
+    found = close(p, TURN, 3.5 * INCH)
+    moved = rates(found, speed=CRANK_SPEED, shift_velocity=0.3)
+
+    def at(
+        velocity: NDArray[np.float64], omega: NDArray[np.float64], point: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        return velocity + np.cross(omega, point)
+
+    pin = np.stack(
+        [-p.crank_length * np.sin(TURN) * CRANK_SPEED, p.crank_length * np.cos(TURN) * CRANK_SPEED, 0 * TURN + 0.3], -1
+    )
+    np.testing.assert_allclose(at(moved.rod.dual, moved.rod.real, found.crank_pin), pin, atol=1e-12)
+    guide = np.array([0.0, -sin(p.guide_twist), -cos(p.guide_twist)])
+    np.testing.assert_allclose(
+        at(moved.rod.dual, moved.rod.real, found.slider_pin), moved.slider_velocity[:, None] * guide, atol=1e-12
+    )
+
+
+# ------------------------------------------------------------------ balances that no joint enters
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_what_acts_from_outside_changes_the_momentum_and_the_moment_of_momentum(seed: int) -> None:
+    """Momenta of all links in the ground frame, from their velocities, differentiated numerically."""
+    case = seeded(seed)
+    p = case.parameters
+    th, s1, w, v, _, _ = case.state
+    e, a, h = 10.0, 2.0, 1e-5
+    g = np.array([p.gravity_x, p.gravity_y, p.gravity_z])
+    masses = (p.crank_mass, p.rod_mass, p.slider_mass)
+
+    def momentum(t: float) -> tuple[NDArray[np.float64], list[NDArray[np.float64]]]:
+        """p and H about O together (6,), and the centres of mass."""
+        at = close(p, th + w * t + 0.5 * e * t * t, s1 + v * t + 0.5 * a * t * t)
+        moved = rates(at, speed=w + e * t, shift_velocity=v + a * t)
+        crank, guide = at.crank_frame, at.guide_frame
+        between = at.slider_pin[0] - at.crank_pin[0]
+        centres = [
+            np.array([0.0, 0.0, at.shift[0]]) + crank.real[0] @ [p.crank_cog_x, p.crank_cog_y, p.crank_cog_z],
+            at.crank_pin[0] + between * p.rod_cog_distance / p.rod_length,
+            at.slider_pin[0] + guide.real[0] @ [p.slider_cog_x, p.slider_cog_y, p.slider_cog_z],
+        ]
+        total = np.zeros(6)
+        for mass, centre, body in zip(masses, centres, (moved.crank, moved.rod, moved.slider)):
+            linear = mass * (body.dual[0] + np.cross(body.real[0], centre))
+            total += np.concatenate([linear, np.cross(centre, linear)])
+        # spins about the centres of mass: the crank's about its axis, the rod's transverse
+        omega = w + e * t
+        own = p.crank_inertia - p.crank_mass * (p.crank_cog_x**2 + p.crank_cog_y**2)
+        xz = -p.crank_product_xz + p.crank_mass * p.crank_cog_x * p.crank_cog_z
+        yz = -p.crank_product_yz + p.crank_mass * p.crank_cog_y * p.crank_cog_z
+        total[3:] += crank.real[0] @ (omega * np.array([xz, yz, own])) + p.rod_inertia * moved.rod.real[0]
+        return total, centres
+
+    slope = (momentum(h)[0] - momentum(-h)[0]) / (2.0 * h)
+    found = close(p, th, s1)
+    loads = joint_loads(found, speed=w, shift_velocity=v, acceleration=e, shift_acceleration=a, slider_force=case.load)
+    guide = np.array([0.0, -sin(p.guide_twist), -cos(p.guide_twist)])
+    pushed = loads.guide[0] + loads.slider_force[0] * guide
+    force = loads.bearing[0] + [0.0, 0.0, loads.axial[0]] + pushed + sum(masses) * g
+    moment = loads.bearing_moment[0] + np.cross(found.slider_pin[0], pushed) + loads.guide_moment[0]
+    for mass, centre in zip(masses, momentum(0.0)[1]):
+        moment = moment + np.cross(centre, mass * g)
+    np.testing.assert_allclose(force, slope[:3], rtol=0.0, atol=1e-5 * np.abs(slope).max())
+    np.testing.assert_allclose(moment, slope[3:], rtol=0.0, atol=1e-5 * np.abs(slope).max())
+
+
+def test_virtual_work() -> None:
+    """At rest and without gravity the torque balances the slider's force by the ratio of their motions."""
+    found = close(parameters(10.0, 232.0), TURN, 3.5 * INCH)
+    loads = joint_loads(found, speed=0.0, slider_force=7.0)
+    np.testing.assert_allclose(loads.torque, -7.0 * rates(found, speed=1.0).slider_velocity, atol=1e-12)
+
+
+# ------------------------------------------------------------------ frames
+
+
+def test_components_in_the_frames_of_the_links_as_the_plant_has_them() -> None:
+    p = parameters(20.0, 232.0)
+    found = joint_loads(close(p, TURN, 3.0 * INCH), speed=CRANK_SPEED, slider_force=10.0)
+    for index, th in enumerate(TURN):
+        q = kinematics.position(th, 3.0 * INCH, p.constants())
+        for name in ("crank_pin", "slider_pin", "guide", "bearing", "bearing_moment", "guide_moment"):
+            ground = Vector(*getattr(found, name)[index])
+            for number, expected in (
+                (1, ground),
+                (2, kinematics.to_crank_frame(ground, q)),
+                (3, kinematics.to_rod_frame(ground, q, p.constants())),
+                (4, kinematics.to_guide_frame(ground, p.constants())),
+            ):
+                np.testing.assert_allclose(found.components(name, number)[index], expected, rtol=0.0, atol=1e-9)
+
+
+def test_statements_of_the_thesis_on_single_components() -> None:
+    """Section 3.2 by the notes: 4T4 = 0 and 2F2j = -T/a1 = -8.33 lb at constant speed hold, 2F2k = 0 does not."""
+    found = joint_loads(close(parameters(10.0), TURN + 0.01, 3.5 * INCH), speed=CRANK_SPEED, torque=CRANK_TORQUE)
+    np.testing.assert_allclose(found.guide_moment, 0.0, atol=1e-10)
+    # the force of the rod on the crank, in frame 2
+    on_crank = -found.components("crank_pin", 2) / POUND_FORCE
+    np.testing.assert_allclose(on_crank[:, 1], -TORQUE_LB_IN / 12.0, rtol=1e-9)
+    assert np.abs(on_crank[:, 2]).max() > 1.0
+
+
+def test_frame_3_needs_an_angle_between_rod_and_crank_axis() -> None:
+    p = replace(parameters(0.0, 0.0), guide_offset=-12.0 * INCH)
+    found = joint_loads(close(p, 0.0, 0.0), speed=1.0, slider_force=1.0)
+    assert np.all(np.isfinite(found.components("crank_pin", 2)))
+    with pytest.raises(InputError, match="parallel to the crank axis at theta1 = 0 rad"):
+        found.components("crank_pin", 3)
+
+
+def test_unknown_frames_and_names_are_told() -> None:
+    found = joint_loads(close(parameters(), 0.3, 0.0), speed=1.0, slider_force=1.0)
+    with pytest.raises(InputError, match="the frames are 1"):
+        found.components("guide", 5)
+    with pytest.raises(InputError, match="the names are bearing"):
+        found.components("torque", 1)
+
+
+# ------------------------------------------------------------------ errors
+
+
+@pytest.mark.parametrize("offset", [10.0, 20.0, 30.0])
+def test_dead_centres_are_told(offset: float) -> None:
+    p = parameters(offset)
+    near = [radians(angle) for angle in DEAD_CENTRES_DEG[offset]]
+    # crank and rod in line in the plane: the pin's direction from O is that of the slider from O
+    exact = []
+    for guess in near:
+        low, high = guess - 0.01, guess + 0.01
+        for _ in range(80):
+            middle = 0.5 * (low + high)
+            signs = [np.sign(rates(close(p, th, 0.0), speed=1.0).ratio[0]) for th in (low, middle)]
+            low, high = (middle, high) if signs[0] == signs[1] else (low, middle)
+        exact.append(low)
+    assert np.degrees(exact) == pytest.approx(DEAD_CENTRES_DEG[offset], abs=0.005)
+    with pytest.raises(DeadCentreError, match="is a dead centre") as error:
+        joint_loads(close(p, [0.1, *exact], 0.0), speed=CRANK_SPEED, torque=1.0)
+    assert error.value.points == (1, 2)
+    joint_loads(close(p, exact, 0.0), speed=CRANK_SPEED, slider_force=1.0)
+
+
+def test_one_of_torque_and_force_is_needed() -> None:
+    found = close(parameters(), 0.3, 0.0)
+    for both in ({}, {"torque": 1.0, "slider_force": 1.0}):
+        with pytest.raises(InputError, match="give either the torque"):
+            joint_loads(found, speed=1.0, **both)
+
+
+@pytest.mark.parametrize("name", ["speed", "shift_velocity", "acceleration", "shift_acceleration", "slider_force"])
+@pytest.mark.parametrize("bad", [nan, inf, [1.0, 2.0]])
+def test_values_of_no_use_are_told_by_name(name: str, bad: float) -> None:
+    found = close(parameters(), [0.3, 0.4, 0.5], 0.0)
+    with pytest.raises(InputError, match=name):
+        joint_loads(found, **({"speed": 1.0, "slider_force": 0.0} | {name: bad}))
+
+
+def test_no_rates_at_the_limit_of_assembly() -> None:
+    p = replace(parameters(0.0), rod_length=12.0 * INCH, rod_cog_distance=6.0 * INCH)
+    with pytest.raises(AssemblyError, match="perpendicular to the guide at theta1 = 0 rad"):
+        rates(close(p, 0.0, 0.0), speed=1.0)
+
+
+def test_binors_are_of_the_bodies() -> None:
+    """Momentum of the crank of section 3.1 turning about its axis, by hand: m1 a1/2 w, and m1 K^2 w."""
+    crank, rod, slider = binors(parameters())
+    assert (crank.mass, rod.mass, slider.mass) == (
+        parameters().crank_mass,
+        parameters().rod_mass,
+        parameters().slider_mass,
+    )
+    p = parameters()
+    found = rates(close(p, 0.0, 0.0), speed=2.0)
+    momentum = crank.momentum(found.crank)
+    np.testing.assert_allclose(momentum.real[0], [0.0, p.crank_mass * 6.0 * INCH * 2.0, 0.0], atol=1e-15)
+    square = (1.5 * INCH) ** 2 / 4.0 + (12.0 * INCH) ** 2 / 3.0
+    np.testing.assert_allclose(momentum.dual[0], [0.0, 0.0, p.crank_mass * square * 2.0], rtol=1e-7, atol=1e-15)
+    assert TURN[-1] < 2.0 * pi
