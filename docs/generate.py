@@ -8,6 +8,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Iterable
 from pathlib import Path
+from textwrap import fill
 
 from linkwork.five_bar.parameters import FiveBarParameters
 from linkwork.five_bar.variables import INPUTS, OUTPUTS, PARAMETERS
@@ -186,7 +187,8 @@ figure has three cases beside the ideal slider-crank (a4 = 0, S1 = 0, alpha4 = 2
 | R27 to R37 | twist alpha4 = 232, 270, 310 deg at a4 = 20 in, S1 = 0 |
 | R38 | all of them |
 
-**The numbering is ours.** {assigned}
+**The numbering is ours.**
+{assigned}
 
 **Signs and frames.** nFni is the force in joint n along i of frame n, nTni the moment. 1F1 and 1T1 are those of the ground on the
 crank, 1T1 about the origin of frame 1 and with the torque as 1T1k; 2F2 is the force of the rod on the crank, in frame 2, whose i
@@ -195,13 +197,13 @@ to rod and crank axis; 4F4 and 4T4 those of the ground on the slider, in frame 4
 sought; the slider position counts against k. The signs of 1F1, 1T1 and 2F2 follow from the thesis's statements; about those of 3F3
 and 4F4 it states nothing that we have.
 
-**Dead centres.** With the torque given, the forces have no finite value where dS4/dtheta1 = 0. The plots are cut off there and dotted
-lines mark the places, which the CSV lists; a value that falls on one of them is "nan" in the CSV. "Greatest" in the tables below
-means: at whole degrees more than 10 deg from a dead centre.
+**Dead centres.** With the torque given, the forces have no finite value where dS4/dtheta1 = 0. The plots are cut off there and
+dotted lines mark the places, which the CSV lists; a value that falls on one of them is "nan" in the CSV. A "greatest magnitude"
+below is that at whole degrees more than 10 deg from a dead centre.
 
-What does not hold, with the right values and the errors in the equations, is summed up in [rahman-errata.md](rahman-errata.md). This page
-is written by `python docs/generate.py --figures`; "thesis" in the second column is the thesis's own statement, "reference" a number
-from an independent derivation, "check" a property that the computation must have.
+What does not hold, with the right values, and the errors in the equations are summed up in [rahman-errata.md](rahman-errata.md).
+This page is written by `python docs/generate.py --figures`. "thesis" in the second column is the thesis's own statement,
+"reference" a number from an independent derivation, "check" a property that the computation must have.
 """
 
 
@@ -213,7 +215,7 @@ def figures(head: str, numbers: Iterable[str]) -> str:
     for number in numbers:
         result = load(number).compute()
         lines += [f"## {result.heading}", "", result.claim, ""]
-        if result.assignment and result.assignment not in head:
+        if result.assignment and result.assignment not in " ".join(head.split()):
             lines += [f"*{result.assignment}*", ""]
         lines += ["| statement | source | stated | computed | |", "| --- | --- | --- | --- | --- |"]
         lines += [
@@ -236,7 +238,7 @@ def rahman_figures() -> str:
     from analysis.studies import RAHMAN
     from analysis.studies.rahman import ASSIGNED
 
-    return figures(RAHMAN_FIGURES.format(assigned=ASSIGNED), RAHMAN)
+    return figures(RAHMAN_FIGURES.format(assigned=fill(ASSIGNED, 130)), RAHMAN)
 
 
 #: Pictures of docs/rig-2.md by the study that they are.

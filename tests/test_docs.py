@@ -13,7 +13,9 @@ from pathlib import Path
 import pytest
 
 import build_fmu
-from analysis.studies import STUDIES
+from analysis.studies import RAHMAN, YOUSSEF
+
+from .analysis.test_studies import REFUTED
 
 ROOT = Path(__file__).parents[1]
 
@@ -35,10 +37,35 @@ def test_the_variable_table_of_the_readme_is_up_to_date(generate):
     assert generate.readme(text) == text, "run: python docs/generate.py"
 
 
-def test_every_study_is_on_the_page_of_the_figures():
-    page = (ROOT / "docs" / "youssef-figures.md").read_text()
-    for number, title in STUDIES.items():
+@pytest.mark.parametrize(("name", "studies"), [("youssef-figures.md", YOUSSEF), ("rahman-figures.md", RAHMAN)])
+def test_every_study_is_on_the_page_of_its_figures_with_what_does_not_hold(name, studies):
+    page = (ROOT / "docs" / name).read_text()
+    for number, title in studies.items():
         assert title in page, f"{number}: run python docs/generate.py --figures"
+    parts = re.split(r"^## Fig (\S+)  ", page, flags=re.MULTILINE)
+    stated = {
+        (number, line.split(" | ")[0].removeprefix("| "))
+        for number, part in zip(parts[1::2], parts[2::2])
+        for line in part.splitlines()
+        if "**does not hold**" in line
+    }
+    assert stated == {entry for entry in REFUTED if entry[0] in studies}, "run: python docs/generate.py --figures"
+
+
+def test_every_erratum_has_its_test():
+    """Each row of the table ends with the tests that show it, as file::name."""
+    page = (ROOT / "docs" / "rahman-errata.md").read_text()
+    rows = [line for line in page.splitlines() if line.startswith("| ") and "---" not in line]
+    heads, rows = [row for row in rows if row.endswith("| test |")], [row for row in rows if not row.endswith("| test |")]
+    assert len(heads) == 2
+    assert len(rows) == 9 + 9
+    for row in rows:
+        tests = re.findall(r"`(tests/\S+\.py)::(\w+)(?:::(\w+))?`", row.split(" | ")[-1])
+        assert tests, row
+        for file, *names in tests:
+            code = (ROOT / file).read_text()
+            for test in filter(None, names):
+                assert re.search(rf"^\s*(def|class) {test}\b", code, flags=re.MULTILINE), f"{file}: {test}"
 
 
 def test_links_in_the_documentation_lead_somewhere():

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from math import degrees, isinf, radians
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from ..slider_crank.forces import ForceTurn, ShiftLaw
+    from ..slider_crank.tolerances import MonteCarlo
 
 #: The case that everything starts from where no other is named.
 DEFAULT = "rahman-a4-10-s1-3.5"
@@ -149,7 +150,9 @@ def _chosen(
     if file is not None:
         loaded = io.load_parameters(file)
         if not isinstance(loaded, SliderCrankParameters):
-            raise InputError(f'{file} is of a five-bar: for a slider-crank it must begin with mechanism = "slider-crank"')
+            raise InputError(
+                f'{file} is of a five-bar: for a slider-crank it must begin with mechanism = "slider-crank"'
+            )
         name, title, parameters = Path(file).stem, Path(file).stem, loaded
         start, pace = 0.0, SETS[DEFAULT].crank_speed
     else:
@@ -195,15 +198,17 @@ class _Units:
     def __init__(self, system: str) -> None:
         from ..slider_crank.forces import UNITS
 
-        self.system, self.table = system, UNITS[system] | {"rad": UNITS["inch"]["rad"]}
+        self.system = system
+        # angles are told in degrees in either
+        self.table: dict[str, tuple[str, float]] = {**UNITS[system], "rad": UNITS["inch"]["rad"]}
 
     def name(self, si: str) -> str:
         """What the unit is called."""
-        return self.table[si][0]
+        return self.table.get(si, (si, 1.0))[0]
 
     def per(self, si: str) -> float:
         """How many of it one of SI is."""
-        return 1.0 / self.table[si][1]
+        return 1.0 / self.table.get(si, (si, 1.0))[1]
 
     def length(self, value: float) -> str:
         return f"{value * self.per('m'):.6g} {self.name('m')}"
@@ -379,12 +384,18 @@ def forces(
     grid = Table(title=escape(f"{chosen.title}: {turn.sought} sought"), title_justify="left")
     for heading in ("quantity", "unit", "least", "at [deg]", "greatest", "at [deg]"):
         grid.add_column(heading, justify="left" if heading in ("quantity", "unit") else "right")
-    for name, si, values in _quantities(turn, frames):
-        row = _extremes(turn.angle, values, clear)
+    quantities = _quantities(turn, frames)
+    rows = [_extremes(turn.angle, values, clear if si in ("N", "N.m") else np.True_) for _, si, values in quantities]
+    size = {si: 0.0 for _, si, _ in quantities}
+    for (_, si, _), row in zip(quantities, rows):
+        size[si] = max(size[si], *(abs(value) for value in row[::2]) if row else (0.0,))
+    for (name, si, _), row in zip(quantities, rows):
         if row is not None:
             low, at_low, high, at_high = row
-            scale = told.per(si)
-            grid.add_row(name, told.name(si), *_texts(low * scale, at_low), *_texts(high * scale, at_high))
+            # what is rounding beside the greatest of its kind is none
+            ends = (0.0 if abs(value) <= 1e-12 * size[si] else value * told.per(si) for value in (low, high))
+            cells = (_texts(value, angle) for value, angle in zip(ends, (at_low, at_high)))
+            grid.add_row(name, told.name(si), *(cell for pair in cells for cell in pair))
     console.print(grid)
     _singular(turn, told)
     folder = Path(out)
@@ -465,12 +476,16 @@ def forces_figure(title: str, turn: ForceTurn, frame: int, units: str) -> Figure
     told = _Units(units)
     clear = _clear(turn)
     angle = np.degrees(turn.angle)
+    # a curve has a gap at a singularity, from one side of which to the other it changes its sign
+    gaps = [int(np.argmin(np.abs(turn.angle - d.crank_angle))) for d in turn.singularities if not clear.all()]
     marks = {f"dead centre {degrees(d.crank_angle):.1f}°": degrees(d.crank_angle) for d in turn.dead_centres}
 
     def panel(what: str, si: str, curves: Mapping[str, Any]) -> Panel:
-        scaled = {label: np.ma.filled(values * told.per(si), np.nan) for label, values in curves.items()}
+        scaled = {label: np.array(np.ma.filled(values * told.per(si), np.nan)) for label, values in curves.items()}
         # towards a singularity curves leave the panel
         shown = np.concatenate([values[clear & np.isfinite(values)] for values in scaled.values()])
+        for values in scaled.values():
+            values[gaps if si in ("N", "N.m") else []] = np.nan
         limits = None
         if len(shown):
             low, high = float(shown.min()), float(shown.max())
@@ -483,7 +498,7 @@ def forces_figure(title: str, turn: ForceTurn, frame: int, units: str) -> Figure
             verticals=marks,
             title=what,
             y_range=limits,
-            x_ticks=np.arange(0.0, 361.0, 60.0),
+            x_ticks=[60.0 * n for n in range(7)],
             legend_at="outside",
         )
 
@@ -498,6 +513,193 @@ def forces_figure(title: str, turn: ForceTurn, frame: int, units: str) -> Figure
         unit = "N.m" if words.startswith("moment") else "N"
         panels.append(panel(words, unit, {f"{axis}{frame}": vector[:, i] for i, axis in enumerate("ijk")}))
     return plot_curves(panels, title=title, columns=2, size=(5.2, 2.5))
+
+
+# Tolerances
+
+#: Half widths where none are given: of each length, and of the twist.
+_TOLERANCES = {
+    "crank.length": "0.25 mm",
+    "rod.length": "0.25 mm",
+    "guide.offset": "0.25 mm",
+    "shift.position": "0.25 mm",
+    "guide.twist": "0.1 deg",
+}
+
+
+@slider_crank.command()
+@mechanism_options
+@click.option(
+    "--tolerance",
+    "widths",
+    multiple=True,
+    metavar="NAME=HALF_WIDTH",
+    help="What is in error and by how much, such as guide.offset='0.5 mm' or guide.twist='0.2 deg'; can be given often. By "
+    "default the lengths by 0.25 mm and the twist by 0.1 deg.",
+)
+@click.option(
+    "--distribution",
+    type=click.Choice(["normal", "uniform", "triangular"]),
+    default="normal",
+    show_default=True,
+    help="Of the errors; a normal one has three standard deviations in the half width.",
+)
+@click.option(
+    "--quantity",
+    "quantities",
+    multiple=True,
+    default=("slider.position",),
+    show_default=True,
+    metavar="NAME",
+    help="An output of the FMU, such as crank_pin.fz, or slider.load; can be given often.",
+)
+@click.option("--torque", metavar="TORQUE", help="On the crank; the slider's force is sought. Such as '100 lbf*in'.")
+@click.option("--load", metavar="FORCE", help="On the slider; the crank's torque is sought. 0 by default.")
+@click.option("--angle", default="30 deg", show_default=True, metavar="ANGLE", help="Crank angle of the histogram.")
+@click.option("--points", type=click.IntRange(2), default=73, show_default=True, help="Crank angles over the turn.")
+@click.option("--samples", type=click.IntRange(2), default=100_000, show_default=True, help="Of the Monte Carlo.")
+@click.option(
+    "--seed", type=click.IntRange(0), default=0, show_default=True, help="The same seed gives the same samples."
+)
+@units_option
+@out_option
+@plot_option
+@handled
+def tolerances(
+    widths: Sequence[str],
+    distribution: str,
+    quantities: Sequence[str],
+    torque: str | None,
+    load: str | None,
+    angle: str,
+    points: int,
+    samples: int,
+    seed: int,
+    units: str,
+    out: str,
+    plot: bool,
+    **given: Any,
+) -> None:
+    """Tell what manufacturing tolerances do: exact sensitivities, a linear estimate, and a Monte Carlo beside it.
+
+    \b
+    Examples:
+      linkwork slider-crank tolerances
+      linkwork slider-crank tolerances --tolerance guide.offset='0.5 mm' --tolerance guide.twist='0.2 deg'
+      linkwork slider-crank tolerances --quantity slider.position --quantity crank_pin.fz --load '-20 lbf' --seed 7
+    """
+    from .. import io
+    from ..figures.slider_crank import plot_tolerances
+    from ..slider_crank import tolerances as study
+
+    chosen, told = _chosen(**given), _Units(units)
+    at = io.quantity(number_or_text(angle), "rad", "--angle")
+    allowed = [_tolerance(text, distribution) for text in widths or (f"{k}={v}" for k, v in _TOLERANCES.items())]
+    quantities = tuple(dict.fromkeys(quantities))
+    turn = _turn(chosen, _problem(torque, load), points)
+    exact = study.sensitivities(turn, tuple(t.name for t in allowed), quantities)
+    place = int(np.argmin(np.abs(turn.angle - at)))
+    here = f"{degrees(float(turn.angle[place])):.4g} deg"
+    grid = Table(title=escape(f"{chosen.title}: sensitivities"), title_justify="left")
+    for heading in ("quantity", "to", "unit", f"at {here}", "greatest", "at [deg]"):
+        grid.add_column(heading, justify="left" if heading in ("quantity", "to", "unit") else "right")
+    written: dict[str, Any] = {"crank angle [deg]": np.degrees(turn.angle)}
+    for quantity in quantities:
+        for t in allowed:
+            unit = _ratio(told.name(study.QUANTITIES[quantity]), told.name(study.ERRORS[t.name]))
+            scale = told.per(study.QUANTITIES[quantity]) / told.per(study.ERRORS[t.name])
+            values = exact.of(quantity, t.name) * scale
+            written[f"d {quantity} / d {t.name} [{unit}]"] = values.filled(np.nan)
+            considered = _clear(turn) if study.QUANTITIES[quantity] in ("N", "N.m") else True
+            top = int(np.argmax(np.where(considered, np.ma.abs(values).filled(-1.0), -1.0)))
+            texts = ("none" if np.ma.is_masked(values[i]) else f"{values[i]:.6g}" for i in (place, top))
+            grid.add_row(quantity, t.name, unit, *texts, f"{degrees(float(turn.angle[top])):.1f}")
+    console.print(grid)
+    folder = Path(out)
+    files = [io.write_csv(folder / f"{chosen.name}-sensitivities.csv", written)]
+    with console.status(f"{samples} samples at {len(turn)} crank angles"):
+        found = study.monte_carlo(turn, allowed, quantities=quantities, samples=samples, seed=seed)
+    files.append(io.write_csv(folder / f"{chosen.name}-tolerances.csv", _spread_columns(found, quantities, told)))
+    _spread_table(found, quantities, place, f"{chosen.title}: spread at {here}, {samples} samples", told)
+    for message in found.messages:
+        errors.print(f"note: {message}", style="yellow", markup=False, highlight=False, soft_wrap=True)
+    if plot:
+        for quantity in quantities:
+            figure = plot_tolerances(found.scene(quantity, at), title=f"{chosen.title}: {quantity}")
+            files.append(io.save_figure(figure, folder / f"{chosen.name}-tolerances-{quantity}.png"))
+    wrote(files)
+
+
+def _ratio(above: str, below: str) -> str:
+    """A unit over another."""
+    return f"{above}/({below})" if "." in below or "/" in below else f"{above}/{below}"
+
+
+def _tolerance(text: str, distribution: str) -> Any:
+    """A tolerance from NAME=HALF_WIDTH."""
+    from .. import io
+    from ..slider_crank.tolerances import ERRORS, Tolerance
+
+    name, equals, value = (part.strip() for part in text.partition("="))
+    if not equals:
+        raise click.UsageError(f"--tolerance {text!r}: it must be NAME=HALF_WIDTH, such as guide.offset='0.5 mm'")
+    if name not in ERRORS:
+        raise io.unknown_name(name, ERRORS)
+    width = io.quantity(number_or_text(value), ERRORS[name], name)
+    return Tolerance(name, half_width=width, distribution=distribution)
+
+
+def _spread_columns(found: MonteCarlo, quantities: Sequence[str], told: _Units) -> dict[str, Any]:
+    """Everything of a Monte Carlo over the turn."""
+    from ..slider_crank.tolerances import PERCENTILES, QUANTITIES
+
+    columns: dict[str, Any] = {"crank angle [deg]": np.degrees(found.turn.angle)}
+    for quantity in quantities:
+        unit, scale = told.name(QUANTITIES[quantity]), told.per(QUANTITIES[quantity])
+        linear, spread = found.estimates[quantity], found.spreads[quantity]
+        parts = {
+            "nominal": linear.nominal,
+            "linear standard deviation": linear.deviation,
+            "linear worst case": linear.worst,
+            "standard deviation": spread.deviation,
+            "mean": spread.mean,
+        }
+        parts |= {f"{share:.4g} %": row for share, row in zip(PERCENTILES, spread.percentiles)}
+        columns |= {f"{quantity} {what} [{unit}]": (x * scale).filled(np.nan) for what, x in parts.items()}
+    return columns | {"not assembled": found.not_assembled, "at a dead centre": found.undetermined}
+
+
+def _spread_table(found: MonteCarlo, quantities: Sequence[str], place: int, title: str, told: _Units) -> None:
+    """The estimates and the samples at one crank angle."""
+    from ..slider_crank.tolerances import QUANTITIES
+
+    grid = Table(title=escape(title), title_justify="left")
+    for heading in (
+        "quantity",
+        "unit",
+        "nominal",
+        "sd, linear",
+        "sd, 2nd order",
+        "sd, samples",
+        "worst, linear",
+        "mean off",
+    ):
+        grid.add_column(heading, justify="left" if heading in ("quantity", "unit") else "right")
+    for quantity in quantities:
+        scale = told.per(QUANTITIES[quantity])
+        linear, spread = found.estimates[quantity], found.spreads[quantity]
+        cells = (
+            linear.nominal[place],
+            linear.deviation[place],
+            linear.second_deviation[place],
+            spread.deviation[place],
+            linear.worst[place],
+            spread.mean[place] - linear.nominal[place],
+        )
+        digits = (6, 3, 3, 3, 3, 2)
+        texts = ("none" if np.ma.is_masked(x) else f"{x * scale:.{n}g}" for x, n in zip(cells, digits))
+        grid.add_row(quantity, told.name(QUANTITIES[quantity]), *texts)
+    console.print(grid)
 
 
 # The dual-number method
@@ -516,7 +718,9 @@ def forces_figure(title: str, turn: ForceTurn, frame: int, units: str) -> Figure
     show_default=True,
     help="Largest relative difference that passes.",
 )
-@click.option("--two-rotations", is_flag=True, help="Show instead where the thesis's own closure ends, and how far open.")
+@click.option(
+    "--two-rotations", is_flag=True, help="Show instead where the thesis's own closure ends, and how far open."
+)
 @units_option
 @out_option
 @handled

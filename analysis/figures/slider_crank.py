@@ -6,7 +6,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from math import erf, isfinite, sqrt
 from textwrap import fill
-from typing import Any
 
 import matplotlib
 import numpy as np
@@ -26,8 +25,10 @@ _SHOWN = {"m": ("mm", 1e3), "m/s": ("mm/s", 1e3)}
 _LINEAR, _SAMPLES, _SECOND, _WORST = COLOURS[0], COLOURS[1], COLOURS[2], "0.45"
 #: Greatest and middle departures over the turn: where their ratio is above this, the axis is cut at a multiple of the latter.
 _PEAK, _CUT = 12.0, 4.0
+#: Difference of shares to first and second order below which the latter are not drawn.
+_TOLD = 0.02
 #: Letters in a line of the foot.
-_LINE = 125
+_LINE = 140
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -52,11 +53,11 @@ class ToleranceScene:
     nominal : float
         Value there.
     edges, counts : ndarray, shapes (b + 1,) and (b,)
-        Histogram of the samples less the nominal value.
+        Histogram of the samples less the nominal value; it need not hold all of them.
     sample_deviation, second_deviation : float
         Standard deviation of the samples, and estimated to second order.
     shares : mapping
-        Of each tolerance, by its label, in the linear estimate of the variance; all zero where that is zero.
+        Of each tolerance, by its label, in the variance to first and to second order; NaN where that is zero.
     samples, not_assembled : int
         Samples, and the most at any angle that cannot be assembled.
     singular : tuple of float
@@ -78,7 +79,7 @@ class ToleranceScene:
     counts: NDArray[np.int64]
     sample_deviation: float
     second_deviation: float
-    shares: Mapping[str, float]
+    shares: Mapping[str, tuple[float, float]]
     samples: int
     not_assembled: int
     singular: tuple[float, ...] = ()
@@ -107,19 +108,25 @@ def plot_tolerances(scene: ToleranceScene, *, title: str = "") -> Figure:
         raise InputError(f"a band over the turn needs two angles at least, not {len(scene.angle)}")
     unit, factor = _SHOWN.get(scene.unit, (scene.unit, 1.0))
     name = scene.quantity.replace(".", " ").replace("_", " ")
-    lost = f"{scene.not_assembled / scene.samples:.2%}" if scene.not_assembled else "none"
-    foot = [f"{scene.samples:,} samples at each angle; at worst {lost} cannot be assembled.", *scene.notes]
+    lost = (
+        f"at worst {scene.not_assembled / scene.samples:.2%} of them cannot be assembled, and are left out"
+        if scene.not_assembled
+        else "all can be assembled"
+    )
+    foot = [f"{scene.samples:,} samples at each angle; {lost}.", *(f"{note}." for note in scene.notes)]
     lines = "\n".join(fill(note[0].upper() + note[1:], _LINE, subsequent_indent="    ") for note in foot)
     with matplotlib.rc_context(STYLE):
         figure = Figure(figsize=(9.6, 7.0 + 0.16 * lines.count("\n")))
-        above, below = figure.subfigures(2, 1, height_ratios=(1.0, 1.0 + 0.03 * lines.count("\n")))
+        above, below = np.ravel(
+            figure.subfigures(2, 1, squeeze=False, height_ratios=(1.0, 1.0 + 0.03 * lines.count("\n")))
+        )
         band = above.subplots()
         histogram, bars = below.subplots(1, 2, width_ratios=(3, 2))
         _draw_band(band, scene, f"error of {name} [{unit}]", factor)
         _draw_histogram(histogram, scene, f"error of {name} [{unit}]", factor, unit)
         _draw_shares(bars, scene)
         below.supxlabel(lines, fontsize=8, x=0.02, ha="left", color="0.25")
-        figure.suptitle(title or f"Tolerances: {name}", fontsize=10.5, fontweight="bold")
+        figure.suptitle(fill(title or f"Tolerances: {name}", 110), fontsize=10.5, fontweight="bold")
         return finish(figure)
 
 
@@ -159,69 +166,75 @@ def _draw_band(axis: Axes, scene: ToleranceScene, label: str, factor: float) -> 
 
 def _draw_histogram(axis: Axes, scene: ToleranceScene, label: str, factor: float, unit: str) -> None:
     edges = scene.edges * factor
+    width = edges[1] - edges[0]
     share = scene.counts / scene.samples
     axis.stairs(share, edges, fill=True, color=_SAMPLES, alpha=0.35, label="samples")
-    normal = [(scene.deviation[scene.at] * factor, 0.0, _LINEAR, "linear estimate, normal")]
-    told = f"$\\sigma$ of the samples {_figure(scene.sample_deviation * factor)} {unit}\n" * isfinite(
-        scene.sample_deviation
-    )
-    told += f"$\\sigma$ linear {_figure(normal[0][0])} {unit}"
-    if isfinite(scene.second_deviation):
-        told += f"\n$\\sigma$ to second order {_figure(scene.second_deviation * factor)} {unit}"
-    for deviation, mean, colour, what in normal:
-        # narrower than a bin it is a line at the mean
-        if deviation > edges[1] - edges[0]:
-            fine = np.linspace(edges[0], edges[-1], 400)
-            width = edges[1] - edges[0]
-            axis.plot(
-                fine,
-                [_normal_share(x - 0.5 * width, x + 0.5 * width, mean, deviation) for x in fine],
-                color=colour,
-                label=what,
-            )
-            for sign in (-3.0, 3.0):
-                if edges[0] <= mean + sign * deviation <= edges[-1]:
-                    axis.axvline(mean + sign * deviation, color=colour, linewidth=0.9, linestyle="--")
-        else:
-            axis.axvline(mean, color=colour, linewidth=2.0, label=f"{what}: no spread")
+    deviation = float(scene.deviation[scene.at]) * factor
+    # narrower than a bin it is a line
+    if deviation > width:
+        fine = np.linspace(edges[0], edges[-1], 400)
+        curve = [_normal_share(x - 0.5 * width, x + 0.5 * width, deviation) for x in fine]
+        axis.plot(fine, curve, color=_LINEAR, label="linear estimate, normal")
+        for place in (-3.0 * deviation, 3.0 * deviation):
+            if edges[0] <= place <= edges[-1]:
+                axis.axvline(place, ymax=0.55, color=_LINEAR, linewidth=0.9, linestyle="--")
+                axis.text(place, 0.6, r"$3\,\sigma$", transform=axis.get_xaxis_transform(), ha="center", fontsize=8)
+    else:
+        axis.axvline(0.0, ymax=0.72, color=_LINEAR, linewidth=2.0, label="linear estimate: no spread")
+    told = [
+        f"$\\sigma$ {what} {_figure(value * factor)} {unit}"
+        for what, value in (
+            ("of the samples", scene.sample_deviation),
+            ("linear", deviation / factor),
+            ("to second order", scene.second_deviation),
+        )
+        if isfinite(value)
+    ]
     axis.set_xlabel(label)
     axis.set_ylabel("share of the samples")
     axis.yaxis.set_major_formatter(PercentFormatter(1.0))
-    axis.set_ylim(0.0, 1.45 * float(share.max()))
+    axis.set_xlim(edges[0], edges[-1])
+    axis.set_ylim(0.0, 1.5 * float(share.max()))
     axis.set_title(
-        f"at {np.degrees(scene.angle[scene.at]):.4g} deg, nominal {_figure(scene.nominal * factor, 6)} {unit}",
+        f"at {np.degrees(scene.angle[scene.at]):.4g} deg, nominal {_figure(scene.nominal * factor, 6)} {unit}; "
+        f"{scene.counts.sum() / scene.samples:.1%} of the samples",
         fontsize=9,
     )
     axis.legend(fontsize=8, loc="upper left")
-    axis.text(0.985, 0.97, told, transform=axis.transAxes, ha="right", va="top", fontsize=8)
+    axis.text(0.985, 0.97, "\n".join(told), transform=axis.transAxes, ha="right", va="top", fontsize=8)
 
 
 def _draw_shares(axis: Axes, scene: ToleranceScene) -> None:
-    ordered = sorted(scene.shares.items(), key=lambda item: item[1])
-    names, shares = [name for name, _ in ordered], np.array([share for _, share in ordered])
-    axis.set_title("share in the variance, linear", fontsize=9)
-    if not shares.any():
-        axis.text(
-            0.5, 0.5, "the first derivatives vanish:\nno shares to first order", ha="center", va="center", fontsize=9
-        )
+    ordered = sorted(scene.shares.items(), key=lambda item: item[1][1] if isfinite(item[1][1]) else item[1][0])
+    names, shares = [name for name, _ in ordered], np.array([both for _, both in ordered])
+    linear, second = (bool(np.isfinite(column).all()) for column in shares.T)
+    # the second order is drawn where it says something else
+    second = second and not (linear and np.abs(shares[:, 1] - shares[:, 0]).max() < _TOLD)
+    orders = [(0, _LINEAR, "linear")] * linear + [(1, _SECOND, "to second order")] * second
+    axis.set_title("share in the variance" + ", linear" * (not second), fontsize=9)
+    if not orders:
+        axis.text(0.5, 0.5, "no variance to first or second order", ha="center", va="center", fontsize=9)
         axis.set_axis_off()
         return
-    places = np.arange(len(names))
-    axis.barh(places, shares, color=_LINEAR, alpha=0.8, height=0.62)
-    look: dict[str, Any] = {"va": "center", "fontsize": 8}
-    for place, share in zip(places, shares):
-        axis.text(share + 0.015, place, f"{share:.1%}" if share >= 5e-4 else "< 0.1%", **look)
-    axis.set_yticks(places, names)
-    axis.set_xlim(0.0, min(1.0, float(shares.max())) * 1.22)
+    height = 0.66 / len(orders)
+    for number, (column, colour, label) in enumerate(orders):
+        for place, share in enumerate(shares[:, column].tolist()):
+            at = place + height * (0.5 * (len(orders) - 1) - number)
+            axis.barh(at, share, color=colour, alpha=0.8, height=height, label=label if place == 0 else None)
+            axis.text(share + 0.015, at, f"{share:.1%}" if share >= 5e-4 else "< 0.1%", va="center", fontsize=8)
+    if second:
+        axis.legend(fontsize=8, loc="lower right")
+    axis.set_yticks(np.arange(len(names)), names)
+    axis.set_xlim(0.0, 1.22 * float(np.nanmax(shares)))
     axis.xaxis.set_major_formatter(PercentFormatter(1.0, decimals=0))
     axis.grid(visible=False, axis="y")
 
 
-def _normal_share(low: float, high: float, mean: float, deviation: float) -> float:
-    """Share of a normal distribution between two values."""
-    return 0.5 * (erf((high - mean) / (deviation * sqrt(2.0))) - erf((low - mean) / (deviation * sqrt(2.0))))
+def _normal_share(low: float, high: float, deviation: float) -> float:
+    """Share of a normal distribution of the mean zero between two values."""
+    return 0.5 * (erf(high / (deviation * sqrt(2.0))) - erf(low / (deviation * sqrt(2.0))))
 
 
 def _figure(value: float, digits: int = 3) -> str:
-    """A number for print: no more digits than it takes, zeros of rounding as 0."""
+    """A number for print, zeros of rounding as 0."""
     return f"{value:.{digits}g}" if abs(value) > 1e-12 else "0"

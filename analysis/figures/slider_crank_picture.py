@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise
 from math import ceil, cos, degrees, isfinite, pi, radians, sin
 from pathlib import Path
 from typing import Any, TypeAlias
@@ -132,7 +133,7 @@ def _tube(start: FloatArray, end: FloatArray, radius: float, *, pieces: int = 1,
     stations = [start + share * (end - start) for share in np.linspace(0.0, 1.0, pieces + 1)]
     faces = [
         np.stack([near + ring[:-1], near + ring[1:], far + ring[1:], far + ring[:-1]], axis=1)
-        for near, far in zip(stations, stations[1:])
+        for near, far in pairwise(stations)
     ]
     for place, rim in ((start, ring[::-1]), (end, ring)):
         middle = np.broadcast_to(place, rim[:-1].shape)
@@ -155,7 +156,7 @@ def _box(low: ArrayLike, high: ArrayLike, rows: FloatArray, origin: FloatArray, 
     low, high = np.asarray(low, dtype=float), np.asarray(high, dtype=float)
     faces = []
     cuts = np.linspace(low[0], high[0], pieces + 1)
-    for number, (start, end) in enumerate(zip(cuts, cuts[1:])):
+    for number, (start, end) in enumerate(pairwise(cuts)):
         ends = np.array([[start, low[1], low[2]], [end, high[1], high[2]]])
         for axis in range(3):
             u, v = (axis + 1) % 3, (axis + 2) % 3
@@ -225,16 +226,21 @@ class _Scene:
         """Points (..., 3) of the ground frame on the page, (..., 2)."""
         return np.asarray(np.asarray(points, dtype=float) @ self.view[:2].T)
 
+    def _at_page(self, point: FloatArray) -> tuple[float, float]:
+        x, y = self.page(point)
+        return float(x), float(y)
+
     def _extent(self) -> tuple[FloatArray, FloatArray]:
         u = self.size
         turn = np.linspace(0.0, 2.0 * pi, 61)
         ring = self.a1 * np.column_stack([np.cos(turn), np.sin(turn), 0.0 * turn])
-        points = [ring + [0.0, 0.0, z] for z in (self.low_shift, self.high_shift)]
+        points = [ring + np.array([0.0, 0.0, z]) for z in (self.low_shift, self.high_shift)]
         points += [np.array([[0.0, 0.0, self.low_shift - 3.0 * u], [0.0, 0.0, self.high_shift + 7.0 * u]])]
         points += [np.array([self.at(slide, x) for slide in self._rail for x in (0.0, self.side * 2.6 * u)])]
         points += [self.foot + 2.9 * u * np.vstack([self.frame4, np.eye(3)])]
         shown = self.page(np.concatenate(points))
-        return shown.min(axis=0) - [3.4 * u, 2.2 * u], shown.max(axis=0) + [3.4 * u, 2.2 * u]
+        room = np.array([3.4 * u, 2.2 * u])
+        return shown.min(axis=0) - room, shown.max(axis=0) + room
 
     @property
     def _rail(self) -> tuple[float, float]:
@@ -258,7 +264,8 @@ class _Scene:
 
     def _line(self, axis: Axes, points: ArrayLike, **look: Any) -> None:
         shown = self.page(points)
-        axis.plot(*shown.T, **({"color": GROUND, "linewidth": 1.0, "zorder": 4, "solid_capstyle": "round"} | look))
+        default: dict[str, Any] = {"color": GROUND, "linewidth": 1.0, "zorder": 4, "solid_capstyle": "round"}
+        axis.plot(*shown.T, **default | look)
         lengths = np.linalg.norm(np.diff(shown, axis=0), axis=1)
         for start, end, length in zip(shown, shown[1:], lengths):
             share = np.linspace(0.0, 1.0, max(2, ceil(2.5 * length / self.size)))[:, None]
@@ -327,7 +334,7 @@ class _Scene:
                         joints = [place.centre, place.crank_pin, place.slider_pin]
                         self._line(axis, joints, color=colour, linewidth=0.9, linestyle="--", zorder=2)
                     pins = self.page([place.crank_pin, place.slider_pin])
-                    edge = {"markeredgecolor": "white", "markeredgewidth": 0.6}
+                    edge: dict[str, Any] = {"markeredgecolor": "white", "markeredgewidth": 0.6}
                     axis.plot(*pins.T, marker, color=colour, markersize=5.0, zorder=6, **edge)
 
     def _dimensions(self, axis: Axes, pose: _Pose, letters: bool) -> None:
@@ -340,16 +347,25 @@ class _Scene:
             return
         if self.a4 != 0.0:
             # the direction of the crank axis once more, at the guide
-            self._line(axis, [self.foot, self.foot + [0.0, 0.0, 2.6 * u]], color="0.4", linewidth=0.8, linestyle="--")
+            self._line(
+                axis, [self.foot, self.foot + np.array([0.0, 0.0, 2.6 * u])], color="0.4", linewidth=0.8, linestyle="--"
+            )
         t = np.linspace(0.0, self.parameters.guide_twist, 121)
         self._line(
             axis, self.foot + 1.5 * u * np.column_stack([0.0 * t, np.sin(t), np.cos(t)]), color=_TWIST, linewidth=1.4
         )
-        look = {"arrowstyle": "-|>", "color": "black", "linewidth": 1.0, "mutation_scale": 8, "shrinkA": 0, "shrinkB": 0}
+        look = {
+            "arrowstyle": "-|>",
+            "color": "black",
+            "linewidth": 1.0,
+            "mutation_scale": 8,
+            "shrinkA": 0,
+            "shrinkB": 0,
+        }
         for origin, rows in ((np.zeros(3), np.eye(3)), (self.foot, self.frame4)):
             for way in rows:
                 tip = origin + 2.4 * u * way
-                axis.annotate("", self.page(tip), self.page(origin), arrowprops=look, zorder=7)
+                axis.annotate("", self._at_page(tip), self._at_page(origin), arrowprops=look, zorder=7)
                 self.taken.append(self.page([origin + share * (tip - origin) for share in np.linspace(0.0, 1.0, 9)]))
 
     def _letters(self, axis: Axes, pose: _Pose) -> None:
@@ -396,7 +412,7 @@ class _Scene:
         """Put each text where it covers least, sides named first preferred; with a thin line to its point if it is far."""
         figure = axis.get_figure(root=True)
         assert figure is not None
-        renderer = FigureCanvasAgg(figure).get_renderer()
+        renderer = FigureCanvasAgg(figure).get_renderer()  # type: ignore[no-untyped-call]
         to_pixels = axis.transData
         taken = to_pixels.transform(np.concatenate(self.taken))
         frame = to_pixels.transform([self.low, self.high])
@@ -425,7 +441,8 @@ class _Scene:
             assert best is not None
             _, middle, gap = best
             boxes.append(np.array([middle, half]))
-            text.set_position(to_pixels.inverted().transform(middle))
+            x, y = to_pixels.inverted().transform(middle)
+            text.set_position((float(x), float(y)))
             if gap > 10.0:
                 edge = middle + np.clip(point - middle, -half, half)
                 ends = to_pixels.inverted().transform([point, edge])
@@ -579,7 +596,9 @@ def _assembled(parameters: SliderCrankParameters, law: ShiftLaw) -> tuple[Range,
         try:
             check_assembly(parameters, nearest, law.at(nearest)[0])
         except AssemblyError as error:
-            raise AssemblyError(f"it cannot be assembled at any crank angle; where it comes nearest to it, {error}") from None
+            raise AssemblyError(
+                f"it cannot be assembled at any crank angle; where it comes nearest to it, {error}"
+            ) from None
     return found
 
 
@@ -602,8 +621,9 @@ def plot_range(
 ) -> Figure:
     """Draw where the mechanism can be assembled: round the crank's circle, and over the crank angle.
 
-    On the circle, seen against the crank axis, the range of assembly is drawn full and the rest dotted; beside it are the margin of
-    assembly (rod length less the crank pin's distance from the guide) and the slider position, with dead centres and limits.
+    On the circle, seen against the crank axis, the range of assembly is drawn full and the rest dotted; beside it are the
+    margin of assembly (rod length less the crank pin's distance from the guide) and the slider position, with dead centres and
+    limits.
 
     Parameters
     ----------
@@ -664,8 +684,10 @@ def _circle(axis: Axes, parts: Sequence[_Part], radius: float, unit: str) -> Non
                 axis.plot([0.0, x], [0.0, y], "--", color=colour, linewidth=0.9)
                 axis.plot(x, y, marker, color=colour, markersize=5.5, zorder=5)
                 side = "left" if x > 0.3 * radius else "right" if x < -0.3 * radius else "center"
+                out = 10.0 * x / radius, 18.0 * y / radius
                 text = f"{name}\n{degrees(place.angle) % 360.0:.2f}°"
-                axis.text(1.09 * x, 1.13 * y, text, color=colour, fontsize=7.5, ha=side, va="center")
+                look: dict[str, Any] = {"color": colour, "fontsize": 7.5, "ha": side, "va": "center"}
+                axis.annotate(text, (x, y), out, textcoords="offset points", **look)
     axis.plot(0.0, 0.0, "o", color=CRANK, markersize=6)
     axis.set_aspect("equal")
     axis.set_xlim(-1.75 * radius, 1.75 * radius)

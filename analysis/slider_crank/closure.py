@@ -106,18 +106,10 @@ def estimate(p: SliderCrankParameters, th: Array, s1: Array) -> tuple[FloatArray
 
     The planar mechanism lies in the plane through the crank pin that the common normal i and the guide span. With
     alpha4 = 270 deg and S1 = 0 it is the thesis's and exact.
-
-    Raises
-    ------
-    AssemblyError
-        If not even the planar mechanism can be assembled.
     """
     guide = about_i(-Dual(p.guide_twist, p.guide_offset))
     pin = (origin(_pin_frame(p, th, s1)) - origin(guide)) @ guide.real
-    lacking = np.abs(pin[:, 0]) - p.rod_length
-    if np.any(lacking > 0.0):
-        raise _too_short(p, th, s1, shortage(p, th, s1))
-    beyond = p.assembly_branch * np.sqrt(p.rod_length**2 - pin[:, 0] ** 2)
+    beyond = p.assembly_branch * np.sqrt(np.maximum(p.rod_length**2 - pin[:, 0] ** 2, 0.0))
     # the rod's axes in frame 4: i from pin to pin, j along that of frame 4
     i = np.stack([-pin[:, 0], np.zeros_like(beyond), -beyond], -1) / p.rod_length
     j = np.broadcast_to([0.0, 1.0, 0.0], i.shape)
@@ -149,6 +141,13 @@ def close(parameters: SliderCrankParameters, crank_angle: Any, shift: Any, start
     """
     p = parameters
     th, s1 = given(crank_angle, shift)
+    lacking = shortage(p, th, s1)
+    worst = int(np.argmax(lacking))
+    if lacking[worst] > TOLERANCE * scale(p, s1):
+        raise AssemblyError(
+            f"the rod of {p.rod_length:.6g} m does not reach the guide at theta1 = {th[worst]:.6g} rad, S1 = {s1[worst]:.6g} m: "
+            f"the crank pin is {p.rod_length + lacking[worst]:.6g} m from it, {lacking[worst]:.3g} m too far"
+        )
     if start is None:
         crank_ball, slider_ball, s4 = estimate(p, th, s1)
     else:
@@ -294,15 +293,12 @@ def _check(
 ) -> None:
     """Accept loops that are closed and in the assembly that is sought, or say what is wrong."""
     error = np.maximum(rotation, distance / scale(p, s1))
-    lacking = shortage(p, th, s1)
     worst = int(np.argmax(error))
     if not error[worst] <= TOLERANCE:
-        if np.max(lacking) > 0.0:
-            raise _too_short(p, th, s1, lacking)
         raise ClosureError(
             f"loop closure residual {rotation[worst]:.1e} rad and {distance[worst]:.1e} m after {iterations} iterations at "
-            f"theta1 = {th[worst]:.6g} rad, S1 = {s1[worst]:.6g} m, where the rod is {-lacking[worst]:.1e} m longer than "
-            "it must be: start nearer to the loop that is sought"
+            f"theta1 = {th[worst]:.6g} rad, S1 = {s1[worst]:.6g} m, though the rod reaches the guide: start nearer "
+            "to the loop that is sought"
         )
     # the slider pin is beyond the crank pin's foot on the guide, against k4
     side = -p.assembly_branch * slider_ball[:, 0, 2]
@@ -322,11 +318,3 @@ def shortage(p: SliderCrankParameters, crank_angle: Any, shift: Any) -> FloatArr
     pin = origin(_pin_frame(p, np.asarray(crank_angle), np.asarray(shift)))
     across = (pin - origin(guide)) @ guide.real[:, :2]
     return cast(FloatArray, np.linalg.norm(across, axis=-1) - p.rod_length)
-
-
-def _too_short(p: SliderCrankParameters, th: Array, s1: Array, lacking: Array) -> AssemblyError:
-    worst = int(np.argmax(lacking))
-    return AssemblyError(
-        f"the rod of {p.rod_length:.6g} m does not reach the guide at theta1 = {th[worst]:.6g} rad, S1 = {s1[worst]:.6g} m: "
-        f"the crank pin is {p.rod_length + lacking[worst]:.6g} m from it, {lacking[worst]:.3g} m too far"
-    )

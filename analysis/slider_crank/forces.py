@@ -17,7 +17,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import cache, cached_property
 from math import ceil, degrees, isfinite, pi, tau
 from pathlib import Path
 from types import MappingProxyType, SimpleNamespace
@@ -307,7 +307,7 @@ def solve(
     return Solution(q, k, m, f.reactions(q, x, m, inputs, p), load, ratio)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class ForceTurn:
     """Motion and all joint forces and moments over the turn, in one of the force problems.
 
@@ -337,11 +337,6 @@ class ForceTurn:
         Lever of the slider's force on the crank, minus dT/dL (m): kth, or dS4/dtheta1 with a groove in the shaft.
     reasons : tuple of (int, str)
         Index of each point at which something is masked, and why.
-    dead_centres : tuple of DeadCentre
-        Configurations between the first and the last angle at which the slider turns back, located to the last digit.
-    singularities : tuple of DeadCentre
-        Those at which the torque does not determine the slider's force: the zeros of ``ratio``. The same as the dead centres
-        but where the shift moves.
     unreachable : ndarray, shape (m,)
         Angles that were asked for and left out because the rod does not reach the guide there (rad).
     """
@@ -364,14 +359,25 @@ class ForceTurn:
     applied_axial_force: MaskedArray
     ratio: FloatArray
     reasons: tuple[tuple[int, str], ...]
-    dead_centres: tuple[DeadCentre, ...]
-    singularities: tuple[DeadCentre, ...]
     unreachable: FloatArray
     _joints: Mapping[str, MaskedArray]
     _position: Position
 
     def __len__(self) -> int:
         return len(self.angle)
+
+    @cached_property
+    def dead_centres(self) -> tuple[DeadCentre, ...]:
+        """Configurations between the first and the last angle at which the slider turns back, located to the last digit."""
+        return _located(self, along=True)
+
+    @cached_property
+    def singularities(self) -> tuple[DeadCentre, ...]:
+        """Configurations between the first and the last angle at which the torque does not determine the slider's force.
+
+        The zeros of ``ratio``: the same as the dead centres but where the shift moves and no groove in the shaft makes it.
+        """
+        return self.dead_centres if in_the_shaft(self.law) else _located(self, along=False)
 
     def vector(self, name: str, frame: int = 1) -> MaskedArray:
         """Components of a force or moment, masked where it is not determined.
@@ -587,7 +593,6 @@ def force_turn(
         )
         for i in np.flatnonzero(_parallel(found.position, p))
     ]
-    centres, singular = _dead_centres(parameters, shift, th, w, in_shaft)
     return ForceTurn(
         parameters=parameters,
         law=shift,
@@ -607,8 +612,6 @@ def force_turn(
         applied_axial_force=masked(m.force),
         ratio=found.ratio,
         reasons=tuple(reasons),
-        dead_centres=centres,
-        singularities=singular,
         unreachable=unreachable,
         # the slider's mass times its acceleration has no part in the load
         _joints=MappingProxyType({name: masked(getattr(r, name), name != "guide_moment") for name in JOINTS}),
@@ -715,26 +718,20 @@ def _runs(flags: NDArray[np.bool_]) -> list[tuple[int, int]]:
     return [(int(first), int(end) - 1) for first, end in zip(edges[::2], edges[1::2])]
 
 
-def _dead_centres(
-    parameters: SliderCrankParameters, law: ShiftLaw, th: FloatArray, w: FloatArray, in_shaft: bool
-) -> tuple[tuple[DeadCentre, ...], tuple[DeadCentre, ...]]:
-    """Dead centres and singularities from the least to the greatest of the angles."""
-    low, high = float(th.min()), float(th.max())
-    repeating = law.repeating(parameters)
+def _located(turn: ForceTurn, *, along: bool) -> tuple[DeadCentre, ...]:
+    """Zeros of the slider's velocity ``along`` the law of the shift, or with the shift held, over the angles of the turn."""
+    low, high = float(turn.angle.min()), float(turn.angle.max())
+    repeating = turn.law.repeating(turn.parameters)
     if repeating is not None:
+        find = mobility.dead_centres if along else mobility.singularities
         span = repeating.span
-
-        def repeated(found: tuple[DeadCentre, ...]) -> tuple[DeadCentre, ...]:
-            turns = range(ceil((low - span) / span), ceil(high / span) + 1)
-            moved = (c._replace(crank_angle=c.crank_angle + span * turn) for turn in turns for c in found)
-            return tuple(c for c in moved if low <= c.crank_angle <= high)
-
-        centres = repeated(mobility.dead_centres(parameters, repeating))
-        return centres, centres if in_shaft else repeated(mobility.singularities(parameters, repeating))
-    # the slope of the shift by the angle does not depend on the speed but under a law by time
-    speed = float(w[0]) if w[0] != 0.0 and np.all(w == w[0]) else 1.0
-    centres = _sign_changes(parameters, law, low, high, speed, 1.0)
-    return centres, centres if in_shaft else _sign_changes(parameters, law, low, high, speed, 0.0)
+        turns = range(ceil((low - span) / span), ceil(high / span) + 1)
+        found = find(turn.parameters, repeating)
+        moved = (centre._replace(crank_angle=centre.crank_angle + span * n) for n in turns for centre in found)
+        return tuple(centre for centre in moved if low <= centre.crank_angle <= high)
+    # the slope of the shift by the angle does not depend on the speed but under a law by time, which takes no other
+    speed = float(turn.speed[0])
+    return _sign_changes(turn.parameters, turn.law, low, high, speed if speed != 0.0 else 1.0, 1.0 if along else 0.0)
 
 
 def _sign_changes(

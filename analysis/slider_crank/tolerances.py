@@ -260,6 +260,8 @@ class Estimate:
     second_mean, second_deviation : masked array, shape (n,)
         Mean and standard deviation to second order, from exact derivatives and their differences over one standard
         deviation; masked where the mechanism cannot be assembled there.
+    second_shares : masked array, shape (m, n)
+        As ``shares``, to second order; what two errors do together counts half for each.
     """
 
     nominal: MaskedArray
@@ -268,6 +270,7 @@ class Estimate:
     shares: MaskedArray
     second_mean: MaskedArray
     second_deviation: MaskedArray
+    second_shares: MaskedArray
 
 
 def estimate(
@@ -306,23 +309,32 @@ def estimate(
         variance = (steps**2).sum(axis=0)
         h = 0.5 * (curvature[name] + curvature[name].swapaxes(0, 1))
         own = np.einsum("iin->in", h)
-        # E[x^4] - E[x^2]^2 of each error, and the products of two
-        second = 0.25 * ((kurtoses - 1.0)[:, None] * own**2).sum(axis=0)
-        second += 0.5 * ((h**2).sum(axis=(0, 1)) - (own**2).sum(axis=0))
+        # the variance of the square of each error, and of the products of two
+        pairs = (h**2).sum(axis=1) - own**2
+        second = steps.filled(np.nan) ** 2 + 0.25 * (kurtoses - 1.0)[:, None] * own**2 + 0.5 * pairs
+        whole = second.sum(axis=0)
         lost = np.ma.getmaskarray(nominal) | ~reached
         # derivatives that are rounding errors share nothing out
-        level = np.fmax(1e-6 * np.sqrt(np.abs(second)), 1e-15 * np.abs(nominal.filled(0.0)))
-        vanishing = variance.filled(0.0) <= level**2
+        rounding = (1e-15 * nominal.filled(0.0)) ** 2
+        vanishing = variance.filled(0.0) <= np.fmax(1e-12 * whole, rounding)
+        still = lost | ~(whole > rounding)
         result[name] = Estimate(
             nominal=nominal,
             deviation=np.ma.sqrt(variance),
             worst=np.ma.abs(first.derivatives[name] * extents[:, None]).sum(axis=0),
-            shares=np.ma.masked_where(np.broadcast_to(vanishing, (m, n)), steps**2)
-            / np.ma.masked_where(vanishing, variance),
+            shares=_share(steps**2, variance, vanishing),
             second_mean=np.ma.MaskedArray(nominal.filled(np.nan) + 0.5 * own.sum(axis=0), mask=lost, fill_value=np.nan),
-            second_deviation=np.ma.MaskedArray(np.sqrt(variance.filled(np.nan) + second), mask=lost, fill_value=np.nan),
+            second_deviation=np.ma.MaskedArray(np.sqrt(whole), mask=lost, fill_value=np.nan),
+            second_shares=_share(np.ma.MaskedArray(second), np.ma.MaskedArray(whole), still),
         )
     return result
+
+
+def _share(parts: MaskedArray, whole: MaskedArray, none: NDArray[np.bool_]) -> MaskedArray:
+    """Parts (m, n) of a whole (n,), masked where there is none."""
+    shares = np.ma.masked_where(np.broadcast_to(none, parts.shape), parts) / np.ma.masked_where(none, whole)
+    shares.fill_value = np.nan
+    return cast(MaskedArray, shares)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -339,7 +351,7 @@ class Spread:
     least, greatest : masked array, shape (n,)
     edges : ndarray, shape (n, b + 1)
     counts : ndarray, shape (n, b)
-        Histograms from the least to the greatest sample, or over the middle 99.9 % where the mean does not exist.
+        Histograms of the middle 99.9 % of the samples.
     """
 
     mean: MaskedArray
@@ -432,7 +444,7 @@ class MonteCarlo:
         i = int(np.argmin(np.abs(self.turn.angle - angle)))
         if np.ma.getmaskarray(spread.percentiles)[0, i] or np.ma.getmaskarray(linear.nominal)[i]:
             raise InputError(f"{quantity} is not determined at {_at(self.turn, i)}: choose another angle")
-        shares = linear.shares[:, i]
+        shares = np.column_stack([linear.shares[:, i].filled(np.nan), linear.second_shares[:, i].filled(np.nan)])
         return ToleranceScene(
             quantity=quantity,
             unit=QUANTITIES[quantity],
@@ -447,7 +459,7 @@ class MonteCarlo:
             counts=spread.counts[i],
             sample_deviation=float(np.ma.filled(spread.deviation[i], np.nan)),
             second_deviation=float(np.ma.filled(linear.second_deviation[i], np.nan)),
-            shares={_label(t): float(share) for t, share in zip(self.tolerances, np.ma.filled(shares, 0.0))},
+            shares={_label(t): (float(a), float(b)) for t, (a, b) in zip(self.tolerances, shares)},
             samples=self.samples,
             not_assembled=int(self.not_assembled.max()),
             singular=()
@@ -468,9 +480,15 @@ class MonteCarlo:
         i = int(off[np.argmax(np.abs(linear.deviation[off] / spread.deviation[off] - 1.0))])
         second = linear.second_deviation[i]
         told = "" if second is np.ma.masked else f", to second order {second:.3g} {unit}"
+        vanishing = bool(np.ma.getmaskarray(linear.shares)[0, i])
         return [
-            f"the linear estimate of {name} is off at {_at(self.turn, i)}{_others(off)}: standard deviation "
-            f"{linear.deviation[i]:.3g} {unit} against {spread.deviation[i]:.3g} {unit} of the samples{told}; their mean is "
+            f"the linear estimate of {name} is off at {_at(self.turn, i)}{_others(off)}: "
+            + (
+                "its first derivatives vanish, "
+                if vanishing
+                else f"standard deviation {linear.deviation[i]:.3g} {unit}, "
+            )
+            + f"the samples' standard deviation is {spread.deviation[i]:.3g} {unit}{told}; their mean is "
             f"{spread.mean[i] - linear.nominal[i]:.3g} {unit} from the nominal value"
         ]
 
@@ -585,14 +603,12 @@ def _statistics(values: FloatArray, pole: bool) -> tuple[Any, ...]:
     below = np.minimum(places.astype(int), values.size - 2)
     percentiles = values[below] + (places - below) * (values[below + 1] - values[below])
     low, high = values[0], values[-1]
-    ends = (values[int(0.0005 * values.size)], values[int(0.9995 * (values.size - 1))]) if pole else (low, high)
+    first, last = values[int(0.0005 * values.size)], values[int(0.9995 * (values.size - 1))]
     # all samples alike have a bin of no width: a width that floats can tell is made
-    width = max(ends[1] - ends[0], 1e-12 * max(abs(low), abs(high)), 1e-300)
-    edges = ends[0] + np.linspace(0.0, width, _BINS + 1)
-    counts = np.diff(np.searchsorted(values, edges[1:-1]), prepend=0, append=values.size)
+    edges = first + np.linspace(0.0, max(last - first, 1e-12 * max(abs(low), abs(high)), 1e-300), _BINS + 1)
+    inside = np.searchsorted(values, edges[:-1])
+    counts = np.diff(inside, append=np.searchsorted(values, edges[-1], "right"))
     if pole:
-        counts[0] -= np.searchsorted(values, edges[0])
-        counts[-1] -= values.size - np.searchsorted(values, edges[-1], "right")
         return (np.nan, np.nan, percentiles, low, high, edges, counts)
     return (float(values.mean()), float(values.std(ddof=1)), percentiles, low, high, edges, counts)
 

@@ -59,11 +59,10 @@ SHIFTS, SHIFT_REACHED = {0.0: 48.539, 10.0: 44.900, 20.0: 38.419, 30.0: 27.129},
 TWISTS_REACHED = (232.0, 310.0)
 #: Slider force sought at theta1 = 30 deg (lb), by the family and the case.
 SPOTS = {("A", "a4 = 10 in"): 15.328251, ("C", "alpha4 = 310 deg"): 8.206263}
-#: Greatest |2F2k| clear of the dead centres (lb), and half a unit of the last figure given, likewise.
+#: Greatest magnitude of 2F2k clear of the dead centres (lb), and half a unit of the last figure given, likewise.
 AXIAL = {("A", "a4 = 10 in"): (4.1, 0.05), ("C", "alpha4 = 310 deg"): (27.0, 0.5)}
 
 _UNITS = {"lb": POUND_FORCE, "lb.in": POUND_INCH}
-_CLEAR = f"more than {CLEAR_DEG:g} deg from a dead centre"
 _RAISES = "The offset a4 raises the joint forces."
 
 
@@ -157,7 +156,7 @@ def _force_verdicts(family: str, component: Component) -> list[Verdict]:
     cases, symbol = FAMILIES[family].cases, component.symbol
     verdicts = []
     if family == "A" and "F" in symbol:
-        what = f"greatest |{symbol}|, least gain from one a4 to the next"
+        what = f"greatest magnitude of {symbol}, least gain from one a4 to the next"
         # along the guide nothing acts without a load, and 2F2j is settled by the torque
         if component.source != "slider_force":
             verdicts.append(
@@ -258,8 +257,8 @@ def _axial(family: str) -> tuple[str, list[Verdict]]:
     verdicts = []
     for case in FAMILIES[family].cases:
         found = values(case, _COMPONENTS["1F1k"])
-        verdicts.append(_none("greatest |1F1k|", THESIS, case, found, "lb"))
-        balance = f"greatest |1F1k + 2F2k|, the shift at rest; {case.name}"
+        verdicts.append(_none("greatest magnitude of 1F1k", THESIS, case, found, "lb"))
+        balance = f"greatest magnitude of 1F1k + 2F2k, the shift at rest; {case.name}"
         verdicts.append(at_most(balance, BALANCE, SAME, greatest(case, found + values(case, _COMPONENTS["2F2k"])), "lb"))
     return "The axial force on the crank is m1 S1'', none at a constant shift.", verdicts
 
@@ -276,8 +275,8 @@ def _bearing_moment(family: str, axis: str) -> tuple[str, list[Verdict]]:
         else:
             printed, formula = fi * case.shift_in, "1F1i S1"
             whole, full = printed - fk * CRANK * np.cos(angle), "1F1i S1 - 1F1k a1 cos(theta1)"
-        verdicts.append(_none(f"greatest |1T1{axis} - ({formula})|", THESIS, case, moment - printed, "lb.in"))
-        verdicts.append(_none(f"greatest |1T1{axis} - ({full})|", REFERENCE, case, moment - whole, "lb.in"))
+        verdicts.append(_none(f"greatest magnitude of 1T1{axis} - ({formula})", THESIS, case, moment - printed, "lb.in"))
+        verdicts.append(_none(f"greatest magnitude of 1T1{axis} - ({full})", REFERENCE, case, moment - whole, "lb.in"))
     if axis == "j":
         about = [values(case, _COMPONENTS["1T1k"]) for case in FAMILIES[family].cases]
         verdicts += [
@@ -302,10 +301,10 @@ def _along_crank_axis(family: str) -> tuple[str, list[Verdict]]:
     verdicts = []
     for case in FAMILIES[family].cases:
         found = values(case, component)
-        verdicts.append(_none("greatest |2F2k|", THESIS, case, found, "lb"))
+        verdicts.append(_none("greatest magnitude of 2F2k", THESIS, case, found, "lb"))
         if (family, case.name) in AXIAL:
             stated, tolerance = AXIAL[family, case.name]
-            statement = f"greatest |2F2k|; {case.name}"
+            statement = f"greatest magnitude of 2F2k; {case.name}"
             verdicts.append(near(statement, REFERENCE, stated, greatest(case, found), tolerance, "lb"))
     return "2F2k = 0.", verdicts
 
@@ -348,7 +347,7 @@ def _slider_moments(family: str) -> tuple[str, list[Verdict]]:
     cases = (IDEAL, *FAMILIES[family].cases)
     return "The moments on the slider are zero.", [
         near(
-            f"greatest |{component.symbol}| of all cases",
+            f"greatest magnitude of {component.symbol} in all cases",
             THESIS,
             0.0,
             max(float(np.abs(values(case, component)).max()) for case in cases),

@@ -81,7 +81,7 @@ def test_continuation_finds_the_same_round_the_turn_and_back_to_its_start(offset
 def test_continuation_turns_the_rod_without_spin() -> None:
     """Between near points the rod's rotation has no component along the rod: omega . u = 0, to the square of the step."""
     spins = []
-    for steps in (90, 180):
+    for steps in (36, 72):
         found = follow(parameters(20.0, 232.0), np.linspace(0.0, 2.0 * pi, steps + 1), 6.0 * INCH)
         rods = found.rod_frame.real
         turns = rods[1:] @ np.swapaxes(rods[:-1], 1, 2)
@@ -90,7 +90,7 @@ def test_continuation_turns_the_rod_without_spin() -> None:
         )
         along = np.abs(np.sum(vectors * (rods[1:, :, 0] + rods[:-1, :, 0]), -1)) / 2.0
         spins.append(along.max())
-        assert np.linalg.norm(vectors, axis=-1).max() > 1e3 * along.max()
+        assert np.linalg.norm(vectors, axis=-1).max() > 1e2 * along.max()
     assert spins[1] < spins[0] / 3.5
 
 

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from numpy.typing import NDArray
+from scipy.optimize import brentq
 
 from analysis.slider_crank.closure import close, follow
 from analysis.slider_crank.dual_dynamics import DeadCentreError, JointLoads, Rates, binors, joint_loads, rates
@@ -322,15 +323,10 @@ def test_unknown_frames_and_names_are_told() -> None:
 def test_dead_centres_are_told(offset: float) -> None:
     p = parameters(offset)
     near = [radians(angle) for angle in DEAD_CENTRES_DEG[offset]]
-    # crank and rod in line in the plane: the pin's direction from O is that of the slider from O
-    exact = []
-    for guess in near:
-        low, high = guess - 0.01, guess + 0.01
-        for _ in range(80):
-            middle = 0.5 * (low + high)
-            signs = [np.sign(rates(close(p, th, 0.0), speed=1.0).ratio[0]) for th in (low, middle)]
-            low, high = (middle, high) if signs[0] == signs[1] else (low, middle)
-        exact.append(low)
+    exact = [
+        brentq(lambda th: float(rates(close(p, th, 0.0), speed=1.0).ratio[0]), guess - 0.01, guess + 0.01, xtol=1e-15)
+        for guess in near
+    ]
     assert np.degrees(exact) == pytest.approx(DEAD_CENTRES_DEG[offset], abs=0.005)
     with pytest.raises(DeadCentreError, match="is a dead centre") as error:
         joint_loads(close(p, [0.1, *exact], 0.0), speed=CRANK_SPEED, torque=1.0)

@@ -1,4 +1,4 @@
-"""The figures of the thesis: every stated result of theirs, and what each study writes."""
+"""The figures of the theses: every stated result of theirs, and what each study writes."""
 
 from __future__ import annotations
 
@@ -29,7 +29,39 @@ def computed(number: str, statement: str, source: str = REFERENCE) -> float:
     return verdict.computed
 
 
-#: What the thesis states and the right physics does not bear out.
+#: The cases of Rahman's figures R5 to R15, R16 to R26 and R27 to R37; with all of the last but the planar one.
+OFFSETS = tuple(f"a4 = {a4} in" for a4 in (10, 20, 30))
+SHIFTS = tuple(f"S1 = {s1} in" for s1 in (3, 6, 9))
+TWISTS = tuple(f"alpha4 = {twist} deg" for twist in (232, 310))
+SPATIAL = ((0, OFFSETS), (11, SHIFTS), (22, TWISTS))
+
+#: What Rahman states and the right physics does not bear out.
+RAHMAN_REFUTED = {
+    *(("R5", f"stroke relative to the ideal one's; {case}") for case in OFFSETS),
+    *(("R16", f"stroke relative to the ideal one's; {case}") for case in SHIFTS),
+    ("R27", "stroke relative to the ideal one's; alpha4 = 270 deg"),
+    ("R16", "greatest S1 at which the crank turns fully, least of all a4"),
+    ("R27", "range of alpha4 in which the crank turns fully"),
+    *((f"R{8 + n}", f"greatest magnitude of 1F1k; {case}") for n, cases in SPATIAL for case in cases),
+    *((f"R{13 + n}", f"greatest magnitude of 2F2k; {case}") for n, cases in SPATIAL for case in cases),
+    *((f"R{9 + n}", f"greatest magnitude of 1T1i - (-1F1j S1); {case}") for n, cases in SPATIAL for case in cases),
+    *((f"R{10 + n}", f"greatest magnitude of 1T1j - (1F1i S1); {case}") for n, cases in SPATIAL for case in cases),
+    # of the joint forces 4F4i, 3F3j and 3F3k do grow
+    *(
+        (number, f"greatest magnitude of {symbol}, least gain from one a4 to the next; torque given")
+        for number, symbol in (
+            ("R6", "1F1i"),
+            ("R7", "1F1j"),
+            ("R8", "1F1k"),
+            ("R11", "2F2i"),
+            ("R13", "2F2k"),
+            ("R14", "3F3i"),
+            ("R15", "4F4j"),
+            ("R15", "4F4k"),
+        )
+    ),
+}
+#: What the theses state and the right physics does not bear out.
 REFUTED = {
     ("3.2", "third turn's drift relative to the first's; mu = 1e4 dyn.s/cm"),
     ("3.2", "third turn's drift relative to the first's; mu = 5e4 dyn.s/cm"),
@@ -64,20 +96,24 @@ REFUTED = {
     ("8.17", "misfit left by the friction that fits best"),
     ("8.17", "the same with the damping free"),
     ("8.17", "levels that bring one speed each, greatest less least"),
+    *RAHMAN_REFUTED,
 }
 
 
 def test_there_is_a_study_of_every_figure() -> None:
     chapters = {3: range(2, 15), 4: range(3, 8), 5: range(1, 5), 6: range(4, 12), 7: range(2, 13), 8: range(7, 22)}
     asked = [f"{chapter}.{n}" for chapter, numbers in chapters.items() for n in numbers] + ["linkage"]
-    assert list(studies.STUDIES) == asked
+    assert list(studies.YOUSSEF) == asked
+    assert list(studies.RAHMAN) == [f"R{n}" for n in range(5, 39)]
+    assert list(studies.STUDIES) == [*studies.YOUSSEF, *studies.RAHMAN]
     for number in studies.STUDIES:
         assert studies.load(number).number == number
 
 
-def test_a_figure_there_is_not() -> None:
-    with pytest.raises(InputError, match=r"'3\.1'"):
-        studies.load("3.1")
+@pytest.mark.parametrize("number", ["3.1", "R4", "R39", "5", ""])
+def test_a_figure_there_is_not(number: str) -> None:
+    with pytest.raises(InputError, match=f"'{number}'"):
+        studies.load(number)
 
 
 @pytest.mark.parametrize("number", studies.STUDIES)
@@ -96,8 +132,8 @@ def test_plot_and_data(number: str) -> None:
     figure = study.draw(found)
     titles = (figure.get_suptitle(), figure.axes[0].get_title())
     assert found.heading.split() in [title.split() for title in titles], "but for the breaks of its lines"
-    assert (found.heading == f"Fig {number}  {studies.STUDIES[number]}") == number[0].isdigit()
-    for axis in figure.axes if number[0].isdigit() else ():
+    assert (found.heading == f"Fig {number}  {studies.STUDIES[number]}") == (number != "linkage")
+    for axis in figure.axes if number != "linkage" else ():
         assert axis.get_xlabel()
         assert axis.get_ylabel()
         assert axis.lines

