@@ -367,8 +367,15 @@ def _tuple(x):  # type: ignore[no-untyped-def]
 
 @inner
 def _copy(source, target):  # type: ignore[no-untyped-def]
-    for i in range(len(source)):
+    for i in range(_N):
         target[i] = source[i]
+
+
+@inner
+def _keep(held, target):  # type: ignore[no-untyped-def]
+    """Write inputs into a row."""
+    for i in range(len(held)):
+        target[i] = held[i]
 
 
 @inner
@@ -561,7 +568,7 @@ def _run(
             # samples at the beginning of the interval, with the inputs that begin here
             while sample < n_samples and samples[sample] <= begin:
                 _copy(x, states[sample])
-                _copy(held, forces[sample])
+                _keep(held, forces[sample])
                 sample += 1
             # what the inputs' jump made happen; a zero stands for what has just been told, and is to be left before it counts
             for e in range(n_events):
@@ -705,7 +712,7 @@ def _run(
             while sample < n_samples and samples[sample] < t_new:
                 _interpolate(((samples[sample] - begin) - elapsed) / h, x, f, states[sample])
                 inside = held if constant else _inputs(samples[sample], piece, states[sample], drive, axial, source, p)
-                _copy(inside, forces[sample])
+                _keep(inside, forces[sample])
                 sample += 1
             if cut <= 1.0:
                 _interpolate(cut, x, f, dense)

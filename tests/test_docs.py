@@ -56,7 +56,10 @@ def test_every_erratum_has_its_test():
     """Each row of the table ends with the tests that show it, as file::name."""
     page = (ROOT / "docs" / "rahman-errata.md").read_text()
     rows = [line for line in page.splitlines() if line.startswith("| ") and "---" not in line]
-    heads, rows = [row for row in rows if row.endswith("| test |")], [row for row in rows if not row.endswith("| test |")]
+    heads, rows = (
+        [row for row in rows if row.endswith("| test |")],
+        [row for row in rows if not row.endswith("| test |")],
+    )
     assert len(heads) == 2
     assert len(rows) == 9 + 9
     for row in rows:

@@ -125,6 +125,7 @@ plot_option = click.option("--plot/--no-plot", default=True, show_default=True, 
 
 
 def _chosen(
+    told: _Units,
     *,
     file: str | None,
     published: str | None,
@@ -181,15 +182,16 @@ def _chosen(
         assert isinstance(changed, SliderCrankParameters)
         parameters = changed
     if base is not None and (changes or shift is not None or groove is not None):
-        name, title = "slider-crank", _words(parameters, start, groove)
+        name, title = "slider-crank", _words(told, parameters, start, groove)
     return _Chosen(name=name, title=title, parameters=parameters, shift=start, groove=groove, speed=pace)
 
 
-def _words(p: SliderCrankParameters, shift: float, groove: str | None) -> str:
+def _words(told: _Units, p: SliderCrankParameters, shift: float, groove: str | None) -> str:
     """A title of a mechanism that has none."""
-    inch = _Units("inch").length
-    moved = f"S1 = {inch(shift)}" if groove is None else f"SS1 = {inch(p.groove_amplitude)}, alpha = {p.groove_ratio:g}"
-    return f"Slider-crank: a4 = {inch(p.guide_offset)}, {moved}, alpha4 = {degrees(p.guide_twist):.6g} deg"
+    moved = f"S1 = {told.length(shift)}"
+    if groove is not None:
+        moved = f"SS1 = {told.length(p.groove_amplitude)}, alpha = {p.groove_ratio:g}"
+    return f"Slider-crank: a4 = {told.length(p.guide_offset)}, {moved}, alpha4 = {degrees(p.guide_twist):.6g} deg"
 
 
 class _Units:
@@ -237,7 +239,8 @@ def info(units: str, **given: Any) -> None:
       linkwork slider-crank info --offset '30 in' --set rod.length='40 in'
       linkwork slider-crank info --groove shaft --set groove.amplitude='3 in' --set groove.ratio=2
     """
-    chosen, told = _chosen(**given), _Units(units)
+    told = _Units(units)
+    chosen = _chosen(told, **given)
     p, law = chosen.parameters, chosen.law
     margin = mobility.assembly_margin(p, law)
     parts = mobility.ranges(p, law)
@@ -378,7 +381,8 @@ def forces(
     """
     from .. import io
 
-    chosen, told = _chosen(**given), _Units(units)
+    told = _Units(units)
+    chosen = _chosen(told, **given)
     turn = _turn(chosen, _problem(torque, load), points)
     clear = _clear(turn)
     grid = Table(title=escape(f"{chosen.title}: {turn.sought} sought"), title_justify="left")
@@ -460,7 +464,7 @@ def _singular(turn: ForceTurn, told: _Units) -> None:
     if turn.sought == SLIDER_FORCE:
         for d in turn.singularities:
             console.print(
-                f"no slider force at {_angle(d.crank_angle)}: it has no lever on the crank there (kth = 0), and grows without "
+                f"no slider force at {_angle(d.crank_angle)}: it has no lever on the crank there, and grows without "
                 f"bound towards it; within {CLEAR_DEG:g} deg it is not among the extremes",
                 highlight=False,
                 soft_wrap=True,
@@ -592,7 +596,8 @@ def tolerances(
     from ..figures.slider_crank import plot_tolerances
     from ..slider_crank import tolerances as study
 
-    chosen, told = _chosen(**given), _Units(units)
+    told = _Units(units)
+    chosen = _chosen(told, **given)
     at = io.quantity(number_or_text(angle), "rad", "--angle")
     allowed = [_tolerance(text, distribution) for text in widths or (f"{k}={v}" for k, v in _TOLERANCES.items())]
     quantities = tuple(dict.fromkeys(quantities))
@@ -746,7 +751,8 @@ def dual(
       linkwork slider-crank dual --published rahman-a4-20-alpha4-310 --torque '100 lbf*in'
       linkwork slider-crank dual --two-rotations --units inch
     """
-    chosen, told = _chosen(**given), _Units(units)
+    told = _Units(units)
+    chosen = _chosen(told, **given)
     folder = Path(out)
     if two_rotations:
         _two_rotations(chosen, points, told, folder)
@@ -896,7 +902,8 @@ def picture(
     from .. import io
     from ..figures import slider_crank_picture as pictures
 
-    chosen, told = _chosen(**given), _Units(units)
+    told = _Units(units)
+    chosen = _chosen(told, **given)
     p, folder = chosen.parameters, Path(out)
     turned = io.quantity(number_or_text(angle), "rad", "--angle")
     common: dict[str, Any] = {"law": chosen.law, "unit": told.picture, "title": chosen.title}

@@ -145,8 +145,8 @@ def close(parameters: SliderCrankParameters, crank_angle: Any, shift: Any, start
     worst = int(np.argmax(lacking))
     if lacking[worst] > TOLERANCE * scale(p, s1):
         raise AssemblyError(
-            f"the rod of {p.rod_length:.6g} m does not reach the guide at theta1 = {th[worst]:.6g} rad, S1 = {s1[worst]:.6g} m: "
-            f"the crank pin is {p.rod_length + lacking[worst]:.6g} m from it, {lacking[worst]:.3g} m too far"
+            f"the rod of {p.rod_length:.6g} m does not reach the guide at theta1 = {th[worst]:.6g} rad, S1 = {s1[worst]:.6g} "
+            f"m: the crank pin is {p.rod_length + lacking[worst]:.6g} m from it, {lacking[worst]:.3g} m too far"
         )
     if start is None:
         crank_ball, slider_ball, s4 = estimate(p, th, s1)

@@ -128,7 +128,9 @@ QUANTITIES: tuple[Quantity, ...] = (
     ),
 )
 #: What figure 38 shows.
-SLIDER_MOMENTS = Quantity("Moments 4T4 on the slider", tuple(_moment(4, axis, _BY_GUIDE, "guide_moment") for axis in "ijk"))
+SLIDER_MOMENTS = Quantity(
+    "Moments 4T4 on the slider", tuple(_moment(4, axis, _BY_GUIDE, "guide_moment") for axis in "ijk")
+)
 
 #: The figures by their number in the registry of studies: R and the thesis's.
 FIGURES: Mapping[str, Figure] = MappingProxyType(

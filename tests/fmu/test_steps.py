@@ -27,7 +27,7 @@ VALUES = {
         "drive.torque": 5.0,
         "axial.force": -8.0,
         "slider.load": 10.0,
-        "slider.coulomb_friction": 0.1,
+        "slider.damping": 3.0,
         "shift.stiffness": 4000.0,
         "shift.spring_free_position": 0.05,
         "shift.damping": 20.0,

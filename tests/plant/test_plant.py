@@ -22,11 +22,13 @@ from linkwork.errors import (
 )
 from linkwork.five_bar import dynamics
 from linkwork.five_bar.kinematics import coefficients, position
-from linkwork.limits import LIMIT_SINE
 from linkwork.five_bar.parameters import InitialState
 from linkwork.five_bar.plant import INPUT_NAMES, SPEED_DRIVE, TORQUE_DRIVE, Plant, check_assembly, error_scale
 from linkwork.five_bar.published import SETS, TABLE_3_1
-from linkwork.plant import check_tolerance
+from linkwork.limits import LIMIT_SINE
+from linkwork.plant import MechanismPlant, check_tolerance
+from linkwork.slider_crank.plant import Plant as SliderCrankPlant
+from linkwork.slider_crank.published import OFFSET_CASE
 from tests import published
 from tests.published import CM, DYN_CM, DYN_S_PER_CM
 from tests.strategies import seeded
@@ -46,7 +48,7 @@ def speed_plant(**options: Any) -> Plant:
     )
 
 
-def go(plant: Plant, steps: int, step: float) -> None:
+def go(plant: MechanismPlant, steps: int, step: float) -> None:
     start = plant.time
     for n in range(steps):
         plant.step(start + n * step, step)
@@ -244,11 +246,13 @@ def test_energy_balance_over_a_run_with_everything_switched_on() -> None:
 # ------------------------------------------------------------------ what a step refuses
 
 
-def snapshot(plant: Plant) -> str:
+def snapshot(plant: MechanismPlant) -> str:
     return json.dumps(plant.save())
 
 
-def assert_refused(plant: Plant, error: type[LinkworkError], match: str, time: float, step: float) -> LinkworkError:
+def assert_refused(
+    plant: MechanismPlant, error: type[LinkworkError], match: str, time: float, step: float
+) -> LinkworkError:
     """The step fails with the message, leaves everything as it was, and the plant goes on as if it had not been asked."""
     before = snapshot(plant)
     with pytest.raises(error, match=match) as caught:
@@ -263,21 +267,35 @@ def running() -> Plant:
     return plant
 
 
+def running_slider_crank() -> SliderCrankPlant:
+    plant = SliderCrankPlant(*OFFSET_CASE, drive_mode=SPEED_DRIVE, inputs={"drive.speed": 5.0, "axial.speed": 0.2})
+    go(plant, 10, 1e-3)
+    return plant
+
+
+#: A plant of each kind at 0.01 s, for tests of what all of them share.
+RUNNING = {"five-bar slider": running, "slider-crank": running_slider_crank}
+EVERY_KIND = pytest.mark.parametrize("kind", RUNNING)
+
+
+@EVERY_KIND
 @pytest.mark.parametrize("step", [0.0, -1e-3])
-def test_step_that_is_not_positive(step: float) -> None:
-    assert_refused(running(), StepError, r"it must be greater than zero", 0.01, step)
+def test_step_that_is_not_positive(step: float, kind: str) -> None:
+    assert_refused(RUNNING[kind](), StepError, r"it must be greater than zero", 0.01, step)
 
 
+@EVERY_KIND
 @pytest.mark.parametrize(("time", "step"), [(nan, 1e-3), (0.01, nan), (inf, 1e-3), (0.01, inf)])
-def test_step_that_is_not_finite(time: float, step: float) -> None:
-    assert_refused(running(), StepError, "both must be finite numbers", time, step)
+def test_step_that_is_not_finite(time: float, step: float, kind: str) -> None:
+    assert_refused(RUNNING[kind](), StepError, "both must be finite numbers", time, step)
 
 
-def test_gap_and_step_backwards() -> None:
+@EVERY_KIND
+def test_gap_and_step_backwards(kind: str) -> None:
     assert_refused(
-        running(), StepError, r"over a gap: it starts at t = 0\.02 s, but the state is at t = 0\.01 s", 0.02, 1e-3
+        RUNNING[kind](), StepError, r"over a gap: it starts at t = 0\.02 s, but the state is at t = 0\.01 s", 0.02, 1e-3
     )
-    assert_refused(running(), StepError, r"backwards: it starts at t = 0\.009 s, but .* t = 0\.01 s", 0.009, 1e-3)
+    assert_refused(RUNNING[kind](), StepError, r"backwards: it starts at t = 0\.009 s, but .* t = 0\.01 s", 0.009, 1e-3)
 
 
 def test_rounding_of_the_masters_clock_is_no_gap() -> None:
@@ -290,10 +308,11 @@ def test_rounding_of_the_masters_clock_is_no_gap() -> None:
     assert plant.time == pytest.approx(0.1001, rel=1e-12)
 
 
+@EVERY_KIND
 @pytest.mark.parametrize("sign", [1.0, -1.0])
-def test_a_millionth_of_the_step_is_what_counts_as_rounding(sign: float) -> None:
-    running().step(0.01 + sign * 0.9e-9, 1e-3)
-    assert_refused(running(), StepError, "a step (backwards|over a gap)", 0.01 + sign * 1.1e-9, 1e-3)
+def test_a_millionth_of_the_step_is_what_counts_as_rounding(sign: float, kind: str) -> None:
+    RUNNING[kind]().step(0.01 + sign * 0.9e-9, 1e-3)
+    assert_refused(RUNNING[kind](), StepError, "a step (backwards|over a gap)", 0.01 + sign * 1.1e-9, 1e-3)
 
 
 @pytest.mark.parametrize("value", [nan, inf, -inf])
@@ -474,31 +493,35 @@ def test_run_taken_up_from_json_goes_on_bit_by_bit(drive: int) -> None:
     assert other.save() == plant.save()
 
 
-def test_going_back_repeats_the_same_steps() -> None:
-    plant = running()
+@EVERY_KIND
+def test_going_back_repeats_the_same_steps(kind: str) -> None:
+    plant = RUNNING[kind]()
     saved = plant.save()
     go(plant, 20, 1e-3)
-    again = Plant.restore(saved)
+    again = type(plant).restore(saved)
     assert again.time == pytest.approx(0.01)
     go(again, 20, 1e-3)
     assert again.state == plant.state
 
 
-def test_saved_state_is_a_copy() -> None:
-    plant = running()
+@EVERY_KIND
+def test_saved_state_is_a_copy(kind: str) -> None:
+    plant = RUNNING[kind]()
     saved = plant.save()
     text = json.dumps(saved)
-    plant.set_input("load.fx", 1.0)
+    plant.set_input("drive.torque", 1.0)
     go(plant, 3, 1e-3)
     assert json.dumps(saved) == text
 
 
+@EVERY_KIND
 @pytest.mark.parametrize("key", sorted(running().save()))
-def test_saved_state_with_something_missing(key: str) -> None:
-    saved = running().save()
+def test_saved_state_with_something_missing(key: str, kind: str) -> None:
+    plant = RUNNING[kind]()
+    saved = plant.save()
     del saved[key]
-    with pytest.raises(StateError, match="not one of a five-bar slider"):
-        Plant.restore(saved)
+    with pytest.raises(StateError, match=f"not one of a {kind}"):
+        type(plant).restore(saved)
 
 
 @pytest.mark.parametrize(

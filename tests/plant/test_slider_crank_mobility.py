@@ -329,15 +329,19 @@ def test_dead_centres_of_general_mechanisms_are_those_of_the_quartic() -> None:
 
 def assert_stroke_is_that_of_a_scan(par: SliderCrankParameters, law: M.ShiftLaw) -> None:
     for part in M.ranges(par, law):
-        angles = np.linspace(part.low, part.high, 4001)
+        # dense at the ends, where h is the root of the distance from them
+        share = np.linspace(0.0, 1.0, 4001)
+        for _ in range(2):
+            share = 0.5 - 0.5 * np.cos(pi * share)
+        angles = part.low + (part.high - part.low) * share
         shifts = np.array([law.at(angle)[0] for angle in angles.tolist()])
         scan = positions(par, shifts, angles)
         scan = scan[np.isfinite(scan)]
-        # the ends of a range are steep: h is the root of the distance from them
-        tolerance = 1e-5 * par.rod_length + (1e-5 if M.turns_fully(par, law) else 0.05) * par.crank_length
-        # at the scan's own ends the rounding of the angle is a root of it in h
-        assert part.greatest.slider_position >= scan[1:-1].max() - 1e-12
-        assert part.least.slider_position <= scan[1:-1].min() + 1e-12
+        tolerance = 1e-5 * (par.rod_length + par.crank_length)
+        # at the limit of assembly, at an end or in passing, rounding is a root of it in h
+        rounding = 1e-12 if M.assembly_margin(par, law).length > 1e-9 else 1e-7
+        assert part.greatest.slider_position >= scan.max() - rounding
+        assert part.least.slider_position <= scan.min() + rounding
         assert part.greatest.slider_position == pytest.approx(scan.max(), abs=tolerance)
         assert part.least.slider_position == pytest.approx(scan.min(), abs=tolerance)
         assert part.stroke == part.greatest.slider_position - part.least.slider_position >= 0.0
@@ -458,7 +462,7 @@ def assert_law_agrees_with_a_scan(par: SliderCrankParameters, law: M.ShiftLaw) -
 def test_groove_of_general_mechanisms() -> None:
     source = random.Random(8)
     kinds = set()
-    for par, _ in general(60):
+    for par, _ in general(40):
         model = grooved(par, source.uniform(-0.6, 0.6), source.choice((1.0, 2.0, 3.0, -2.0, 0.5, 1.5, 2.0 / 3.0)))
         law = M.groove_shift(model)
         assert_law_agrees_with_a_scan(model, law)

@@ -26,6 +26,8 @@ from linkwork.slider_crank.published import CRANK_SPEED, OFFSET_CASE, parameters
 from tests.published_rahman import CRANK_IN, GREATEST_SHIFTS_IN, INCH, ROD_IN, SPOTS, Spot
 from tests.slider_cranks import DRIVES, Case, seeded
 
+from .test_plant import assert_refused, go, snapshot
+
 EVERY_DRIVE = pytest.mark.parametrize("drive", DRIVES)
 #: A turn at 50 rpm (s).
 TURN = 1.2
@@ -76,12 +78,6 @@ def default(drive: str = "speed-shift", **options: Any) -> Plant:
     return Plant(
         options.pop("parameters", mechanism), options.pop("initial", initial), **modes(drive), inputs=inputs, **options
     )
-
-
-def go(plant: Plant, steps: int, step: float) -> None:
-    start = plant.time
-    for n in range(steps):
-        plant.step(start + n * step, step)
 
 
 # ------------------------------------------------------------------ what a step does
@@ -293,19 +289,6 @@ def test_energy_balance_over_a_run_with_everything_switched_on(drive: str) -> No
 # ------------------------------------------------------------------ what a step refuses
 
 
-def snapshot(plant: Plant) -> str:
-    return json.dumps(plant.save())
-
-
-def assert_refused(plant: Plant, error: type[LinkworkError], match: str, step: float) -> LinkworkError:
-    """The step fails with the message and leaves everything as it was."""
-    before = snapshot(plant)
-    with pytest.raises(error, match=match) as caught:
-        plant.step(plant.time, step)
-    assert snapshot(plant) == before
-    return caught.value
-
-
 @pytest.mark.parametrize("value", [nan, inf, -inf])
 @pytest.mark.parametrize("name", INPUT_NAMES)
 def test_input_that_is_not_finite(name: str, value: float) -> None:
@@ -314,7 +297,7 @@ def test_input_that_is_not_finite(name: str, value: float) -> None:
     plant.set_input(name, value)
     with pytest.raises(InputError, match=rf"input {name} is {value} at t = 0 s: it must be a finite number"):
         plant.outputs()
-    assert_refused(plant, InputError, rf"input {name} is {value} at t = 0 s", 1e-3)
+    assert_refused(plant, InputError, rf"input {name} is {value} at t = 0 s", plant.time, 1e-3)
     plant.set_input(name, kept)
     plant.step(0.0, 1e-3)
     assert isfinite(plant.outputs().slider_position)
@@ -351,7 +334,7 @@ def test_shift_out_of_the_rods_reach_is_refused_and_the_last_good_state_kept(dri
             return hypot(CRANK_IN * cos(CRANK_SPEED * t) + 10.0, 3.5 + sign * 2.0 * t / INCH)
 
         assert reach(time) < ROD_IN < reach(time + 1e-2)
-    assert_refused(plant, AssemblyError, "limit of assembly", 1e-2)
+    assert_refused(plant, AssemblyError, "limit of assembly", plant.time, 1e-2)
     # a shorter step that stays inside is taken, and so is one back
     plant.step(plant.time, 1e-5)
     plant.set_input("axial.speed", -2.0 * sign)
@@ -370,14 +353,16 @@ def test_other_ways_out_of_the_rods_reach(drive: str) -> None:
         initial=InitialState(crank_speed=CRANK_SPEED),
         inputs={"axial.force": 1e4},
     )
-    assert_refused(plant, AssemblyError, r"in the step from t = 0 s: limit of assembly .*crank angle .* shift", 1.0)
+    assert_refused(
+        plant, AssemblyError, r"in the step from t = 0 s: limit of assembly .*crank angle .* shift", plant.time, 1.0
+    )
     plant.step(0.0, 1e-3)
 
 
 def test_step_that_cannot_meet_its_tolerance() -> None:
     plant = default("torque-force", inputs={"slider.load": 1e200})
     match = r"in the step from t = 0 s: .*, at crank angle 0 rad .* and axial shift 0\.0889 m"
-    assert_refused(plant, IntegrationError, match, 1.0)
+    assert_refused(plant, IntegrationError, match, plant.time, 1.0)
 
 
 def test_refused_step_leaves_newly_commanded_speeds_waiting() -> None:
@@ -386,7 +371,7 @@ def test_refused_step_leaves_newly_commanded_speeds_waiting() -> None:
         go(plant, 5, 1e-2)
         plant.set_input("drive.speed", 0.9 * CRANK_SPEED)
         plant.set_input("axial.speed", 1.0)
-    assert_refused(plants[0], AssemblyError, "limit of assembly", 10.0)
+    assert_refused(plants[0], AssemblyError, "limit of assembly", plants[0].time, 10.0)
     for plant in plants:
         plant.step(plant.time, 1e-3)
         assert plant.state[2:4] == pytest.approx((0.9 * CRANK_SPEED, 1.0), rel=1e-14)

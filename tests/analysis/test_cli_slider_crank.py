@@ -1,0 +1,388 @@
+"""`linkwork slider-crank`: what it tells and writes, its exit codes, and what it says of wrong input."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from math import radians
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from analysis import cli, io
+from analysis.cli import slider_crank
+from analysis.slider_crank.forces import force_turn
+from linkwork.five_bar.published import TABLE_3_1
+from linkwork.slider_crank.published import CRANK_SPEED, INCH, parameters
+from tests import published_rahman as rahman
+
+COMMANDS = ("info", "forces", "tolerances", "dual", "picture")
+
+
+@pytest.fixture
+def linkwork(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+
+    def call(*arguments):
+        words = ["slider-crank", *(str(a) for a in arguments)]
+        return CliRunner().invoke(cli.main, words, catch_exceptions=False)
+
+    return call
+
+
+def rows(output):
+    """Cells of the rows of the tables by the first of them."""
+    found = {}
+    for line in output.splitlines():
+        cells = [cell.strip() for cell in line.strip("│").split("│")]
+        if len(cells) > 1:
+            found[cells[0]] = cells[1:]
+    return found
+
+
+def csv(path):
+    head = path.read_text(encoding="utf-8").splitlines()[0].split(",")
+    return dict(zip(head, np.loadtxt(path, delimiter=",", skiprows=1).T))
+
+
+@pytest.mark.parametrize("command", [[], *([name] for name in COMMANDS)])
+def test_help_shows_examples(linkwork, command):
+    result = linkwork(*command, "--help")
+    assert result.exit_code == 0
+    assert "Examples:" in result.output
+    assert set(slider_crank.slider_crank.commands) == set(COMMANDS)
+
+
+class TestInfo:
+    @pytest.mark.parametrize("offset", [10.0, 20.0, 30.0])
+    def test_strokes_dead_centres_and_greatest_shift_are_the_published_ones(self, linkwork, offset):
+        result = linkwork("info", "--offset", f"{offset} in", "--shift", "0 in", "--units", "inch")
+        assert result.exit_code == 0, result.output
+        assert "turns fully" in rows(result.output)["the crank"]
+        shift = rows(result.output)["greatest constant shift for a full turn"][0]
+        assert float(shift.removesuffix(" in")) == pytest.approx(rahman.GREATEST_SHIFTS_IN[offset], abs=6e-4)
+        stroke = re.search(r"range 0\.00 deg to 360\.00 deg: stroke ([\d.]+) in", result.output)
+        assert float(stroke[1]) == pytest.approx(rahman.STROKES_IN[offset], abs=6e-4)
+        outer, inner = rahman.DEAD_CENTRES_DEG[offset]
+        assert rows(result.output)[f"{outer:.2f}"][-1] == "outer"
+        assert rows(result.output)[f"{inner:.2f}"][-1] == "inner"
+
+    @pytest.mark.parametrize("twist", [232, 310])
+    def test_twist_of_a_published_case(self, linkwork, twist):
+        for arguments in (["--published", f"rahman-a4-20-alpha4-{twist}"], ["--offset", "20 in", "--shift", 0, "--twist", f"{twist} deg"]):  # fmt: skip
+            result = linkwork("info", *arguments, "--units", "inch")
+            stroke = re.search(r"stroke ([\d.]+) in", result.output)
+            assert float(stroke[1]) == pytest.approx(rahman.STROKES_BY_TWIST_IN[twist], abs=6e-3)
+
+    def test_units(self, linkwork):
+        inch, si = linkwork("info", "--units", "inch").output, linkwork("info").output
+        assert rows(inch)["shift S1"] == ["3.5 in"]
+        assert rows(si)["shift S1"] == ["0.0889 m"]
+        assert rows(si)["crank a1, rod a2"] == ["0.3048 m, 1.27 m"]
+
+    def test_a_crank_that_cannot_turn_fully(self, linkwork):
+        """At 270 deg and a4 = 30, S1 = 40 the pin is sqrt((12 c + 30)^2 + 40^2) from the guide: 50 at c = 0, 58 at c = 1."""
+        result = linkwork("info", "--offset", "30 in", "--shift", "40 in", "--units", "inch")
+        assert result.exit_code == 0
+        assert rows(result.output)["the crank"] == ["does not turn fully"]
+        assert rows(result.output)["least assembly margin"] == ["-8 in at 0.00 deg"]
+        assert "range 90.00 deg to 270.00 deg" in result.output
+
+    def test_a_groove(self, linkwork):
+        settings = ("--set", "groove.amplitude=3 in", "--set", "groove.ratio=2")
+        result = linkwork("info", "--groove", "shaft", *settings, "--units", "inch")
+        assert rows(result.output)["shift S1"] == ["made by the groove"]
+        assert "SS1 = 3 in, alpha = 2" in result.output
+        assert "does not turn" not in result.output
+
+
+class TestParameterFiles:
+    @pytest.mark.parametrize("ending", ["toml", "json"])
+    def test_a_file_is_read(self, linkwork, tmp_path, ending):
+        io.save_parameters(tmp_path / f"mine.{ending}", replace(parameters(30.0), rod_length=1.5))
+        result = linkwork("info", f"mine.{ending}", "--shift", "1 in")
+        assert result.exit_code == 0, result.output
+        assert rows(result.output)["crank a1, rod a2"] == ["0.3048 m, 1.5 m"]
+        assert rows(result.output)["shift S1"] == ["0.0254 m"]
+        result = linkwork("info", f"mine.{ending}", "--set", "rod.length=2 m")
+        assert rows(result.output)["crank a1, rod a2"] == ["0.3048 m, 2 m"]
+        assert rows(result.output)["shift S1"] == ["0 m"]
+
+    def test_a_file_of_the_other_mechanism(self, linkwork, tmp_path):
+        io.save_parameters(tmp_path / "five.toml", TABLE_3_1.parameters)
+        result = linkwork("info", "five.toml")
+        assert result.exit_code == cli.WRONG
+        assert 'five.toml is of a five-bar: for a slider-crank it must begin with mechanism = "slider-crank"' in " ".join(
+            result.stderr.split()
+        )
+
+
+class TestForces:
+    def test_torque_given_at_the_published_spot(self, linkwork, tmp_path):
+        result = linkwork("forces", "--torque", "100 lbf*in", "--units", "inch", "--points", 361, "--no-plot")
+        assert result.exit_code == 0, result.output
+        columns = csv(tmp_path / "out" / "rahman-a4-10-s1-3.5-forces.csv")
+        spot = rahman.SPOTS[0]
+        assert columns["crank angle [deg]"][30] == pytest.approx(30.0)
+        assert columns["slider position [in]"][30] == pytest.approx(spot.position_in, abs=1e-6)
+        assert columns["slider force [lb]"][30] == pytest.approx(spot.slider_force_lb, abs=1e-6)
+        assert "slider force sought" in result.output
+        for angle in ("99.30", "285.31"):
+            assert f"dead centre at {angle} deg" in result.output
+            assert f"no slider force at {angle} deg" in result.output
+        # clear of the poles by 10 deg
+        least, at_least, greatest, at_greatest = rows(result.output)["slider force"][1:]
+        for value, angle in ((least, at_least), (greatest, at_greatest)):
+            assert columns["slider force [lb]"][round(float(angle))] == pytest.approx(float(value), rel=1e-5)
+            assert min(abs(float(angle) - 99.30), abs(float(angle) - 285.31)) > 10.0
+        position = [float(x) for x in rows(result.output)["slider position"][1::2]]
+        assert position[1] - position[0] == pytest.approx(24.53, abs=2e-3)
+
+    def test_load_given_at_the_published_spot(self, linkwork, tmp_path):
+        result = linkwork(
+            "forces", "--published", "rahman-a4-20-alpha4-310", "--units", "inch", "--points", 361, "--no-plot"
+        )
+        columns = csv(tmp_path / "out" / "rahman-a4-20-alpha4-310-forces.csv")
+        assert columns["crank torque [lb.in]"][30] == pytest.approx(rahman.SPOTS[1].torque_lb_in, abs=1e-5)
+        assert "torque sought" in result.output
+        assert "no slider force" not in result.output
+        everywhere = columns["crank torque [lb.in]"]
+        told = [float(x) for x in rows(result.output)["crank torque"][1::2]]
+        assert told == pytest.approx([everywhere.min(), everywhere.max()], rel=1e-5)
+
+    def test_a_load_and_a_speed(self, linkwork, tmp_path):
+        linkwork("forces", "--load", "-20 lbf", "--speed", "100 rpm", "--points", 13, "--no-plot")
+        columns = csv(tmp_path / "out" / "rahman-a4-10-s1-3.5-forces.csv")
+        assert columns["slider force [N]"] == pytest.approx(-20.0 * rahman.POUND_FORCE)
+        slow = force_turn(parameters(10.0), crank_speed=CRANK_SPEED, shift=slider_crank_shift(3.5), angles=[radians(30.0)])
+        assert columns["slider velocity [m/s]"][1] == pytest.approx(2.0 * slow.slider_velocity[0])
+
+    def test_plots_in_the_frames_asked_for(self, linkwork, tmp_path):
+        result = linkwork("forces", "--frame", 2, "--frame", 4, "--points", 37, "--torque", "1 N*m", "--out", "results")
+        assert result.exit_code == 0
+        assert {p.name for p in (tmp_path / "results").iterdir()} == {
+            "rahman-a4-10-s1-3.5-forces.csv",
+            "rahman-a4-10-s1-3.5-forces-frame-2.png",
+            "rahman-a4-10-s1-3.5-forces-frame-4.png",
+        }
+        assert "force of the crank on the rod, j2" in result.output
+        assert "force of the crank on the rod, j1" not in result.output
+        # statement of section 3.2: no moments on the slider
+        for axis in "ijk":
+            assert rows(result.output)[f"moment of the guide on the slider, {axis}4"][1::2] == ["0", "0"]
+
+    def test_the_plot_has_gaps_at_the_dead_centres_and_is_scaled_clear_of_them(self):
+        turn = force_turn(parameters(10.0), crank_speed=CRANK_SPEED, angles=np.radians(np.arange(361.0)), torque=11.3)
+        figure = slider_crank.forces_figure("forces", turn, 4, "SI")
+        (axis,) = [a for a in figure.axes if a.get_title() == "slider force, along -k4"]
+        values = axis.lines[0].get_ydata()
+        assert [int(i) for i in np.flatnonzero(np.isnan(values))] == [99, 285]
+        low, high = axis.get_ylim()
+        assert high - low < 0.2 * np.ptp(np.delete(values, [99, 285]))
+        clear = np.delete(values, [*range(90, 109), *range(276, 295)])
+        assert low < clear.min() and clear.max() < high
+        titles = [a.get_title() for a in figure.axes]
+        assert len(titles) == 10
+        position = figure.axes[titles.index("slider position S4")].lines[0].get_ydata()
+        assert np.isfinite(position).all()
+
+    def test_a_crank_that_cannot_turn_fully(self, linkwork, tmp_path):
+        result = linkwork("forces", "--set", "rod.length=30 in", "--offset", "20 in", "--points", 73, "--no-plot")
+        assert result.exit_code == 0
+        assert "the rod does not reach the guide at 15 of 73 crank angles" in " ".join(result.stderr.split())
+        columns = csv(tmp_path / "out" / "slider-crank-forces.csv")
+        assert len(columns["crank angle [deg]"]) == 58
+
+
+def slider_crank_shift(inches):
+    from analysis.slider_crank.forces import ConstantShift
+
+    return ConstantShift(inches * INCH)
+
+
+class TestTolerances:
+    def test_sensitivities_are_those_of_the_closed_form(self, linkwork, tmp_path):
+        result = linkwork(
+            "tolerances", "--units", "inch", "--offset", "10 in", "--shift", "0 in", "--points", 13, "--samples", 2000, "--seed", 3
+        )  # fmt: skip
+        assert result.exit_code == 0, result.output
+        columns = csv(tmp_path / "out" / "slider-crank-sensitivities.csv")
+        # S4 = a1 s + sqrt(a2^2 - (a1 c + a4)^2) at 270 deg and S1 = 0
+        th = np.radians(columns["crank angle [deg]"])
+        across = 12.0 * np.cos(th) + 10.0
+        h = np.sqrt(2500.0 - across**2)
+        assert columns["d slider.position / d rod.length [in/in]"] == pytest.approx(50.0 / h)
+        assert columns["d slider.position / d guide.offset [in/in]"] == pytest.approx(-across / h)
+        assert columns["d slider.position / d crank.length [in/in]"] == pytest.approx(np.sin(th) - across * np.cos(th) / h)
+        assert columns["d slider.position / d shift.position [in/in]"] == pytest.approx(0.0, abs=1e-12)
+        spread = csv(tmp_path / "out" / "slider-crank-tolerances.csv")
+        sd = np.sqrt((50.0 / h) ** 2 + (across / h) ** 2 + (np.sin(th) - across * np.cos(th) / h) ** 2) * 0.25 / 25.4 / 3.0
+        assert spread["slider.position linear standard deviation [in]"] == pytest.approx(sd, rel=1e-9)
+        assert spread["slider.position standard deviation [in]"] == pytest.approx(sd, rel=0.1)
+        assert (tmp_path / "out" / "slider-crank-tolerances-slider.position.png").read_bytes().startswith(b"\x89PNG")
+
+    def test_a_seed_gives_the_same_samples(self, linkwork, tmp_path):
+        found = []
+        for seed in (7, 7, 8):
+            result = linkwork("tolerances", "--points", 3, "--samples", 500, "--seed", seed, "--no-plot")
+            assert result.exit_code == 0
+            found.append((tmp_path / "out" / "rahman-a4-10-s1-3.5-tolerances.csv").read_bytes())
+        assert found[0] == found[1] != found[2]
+
+    def test_tolerances_and_quantities_are_chosen(self, linkwork, tmp_path):
+        result = linkwork(
+            "tolerances", "--tolerance", "guide.twist=0.3 deg", "--distribution", "uniform", "--quantity", "crank_pin.fz",
+            "--quantity", "slider.load", "--torque", "100 lbf*in", "--points", 13, "--samples", 1000, "--no-plot",
+        )  # fmt: skip
+        assert result.exit_code == 0, result.output
+        columns = csv(tmp_path / "out" / "rahman-a4-10-s1-3.5-tolerances.csv")
+        slopes = csv(tmp_path / "out" / "rahman-a4-10-s1-3.5-sensitivities.csv")
+        for quantity in ("crank_pin.fz", "slider.load"):
+            slope = slopes[f"d {quantity} / d guide.twist [N/deg]"]
+            deviation = columns[f"{quantity} linear standard deviation [N]"]
+            assert deviation == pytest.approx(np.abs(slope) * 0.3 / np.sqrt(3.0))
+        # the greatest told is clear of the dead centres
+        top = next(line for line in result.output.splitlines() if "slider.load" in line and "N/deg" in line)
+        angle = float(top.strip("│ ").split("│")[-1])
+        assert min(abs(angle - 99.3), abs(angle - 285.3)) > 10.0
+
+    def test_what_a_reader_must_know_is_told(self, linkwork):
+        """At the ideal mechanism the position is of the second order in S1 and the twist."""
+        result = linkwork(
+            "tolerances", "--published", "rahman-ideal", "--tolerance", "shift.position=5 mm", "--points", 3, "--samples",
+            500, "--no-plot",
+        )  # fmt: skip
+        assert result.exit_code == 0
+        assert "the linear estimate of slider.position is off" in " ".join(result.stderr.split())
+
+
+class TestDual:
+    @pytest.mark.parametrize(
+        "arguments",
+        [
+            (),
+            ("--torque", "100 lbf*in", "--published", "rahman-a4-20-alpha4-310"),
+            ("--load", "10 lbf", "--groove", "shaft", "--set", "groove.amplitude=3 in", "--set", "groove.ratio=2"),
+            (
+                *("--torque", "5 N*m", "--groove", "apart", "--set", "groove.amplitude=3 in", "--set", "slider.damping=100"),
+                *("--set", "slider.stiffness=200", "--set", "slider.coulomb_friction=3", "--set", "gravity.x=-9.81"),
+            ),
+            ("--set", "rod.length=30 in", "--offset", "20 in", "--load", "7 N"),
+        ],
+    )
+    def test_both_agree(self, linkwork, arguments):
+        result = linkwork("dual", *arguments, "--points", 37)
+        assert result.exit_code == 0, result.output
+        assert "the two agree" in result.output
+        assert "FAIL" not in result.output
+        closed = re.search(r"the loop closes to (\S+) rad and (\S+) m", result.output)
+        assert max(float(closed[1]), float(closed[2])) < 1e-12
+
+    def test_a_disagreement_is_a_failed_check(self, linkwork, monkeypatch):
+        from analysis.slider_crank import dual_dynamics
+
+        right = dual_dynamics.joint_loads
+
+        def wrong(*arguments, **options):
+            loads = right(*arguments, **options)
+            return replace(loads, slider_pin=1.000001 * loads.slider_pin)
+
+        monkeypatch.setattr(dual_dynamics, "joint_loads", wrong)
+        result = linkwork("dual", "--points", 37)
+        assert result.exit_code == cli.CHECK_FAILED
+        assert rows(result.output)["force of the slider on the rod"][-1] == "FAIL"
+        assert rows(result.output)["force of the crank on the rod"][-1] == "pass"
+        assert "check failed" in result.stderr
+
+    def test_two_rotations_do_not_close(self, linkwork, tmp_path):
+        result = linkwork("dual", "--two-rotations", "--units", "inch", "--points", 181)
+        assert result.exit_code == 0
+        assert "slider position off by up to 1.7" in " ".join(result.output.split())
+        columns = csv(tmp_path / "out" / "rahman-a4-10-s1-3.5-two-rotations.csv")
+        assert columns["rotation residual [deg]"].max() > 20.0
+        linkwork("dual", "--two-rotations", "--published", "rahman-ideal", "--points", 13)
+        columns = csv(tmp_path / "out" / "rahman-ideal-two-rotations.csv")
+        assert columns["rotation residual [deg]"].max() < 1e-9
+        assert columns["off by [m]"].max() < 1e-12
+
+
+class TestPicture:
+    def test_all_of_it(self, linkwork, tmp_path):
+        result = linkwork("picture", "--range", "--animate", "--frames", 2, "--view", "30 deg", "-60 deg")
+        assert result.exit_code == 0, result.output
+        name = "rahman-a4-10-s1-3.5"
+        assert {p.name for p in (tmp_path / "out").iterdir()} == {f"{name}.png", f"{name}-range.png", f"{name}.gif"}
+        for ending in (".png", "-range.png", ".gif"):
+            assert f"wrote out/{name}{ending}" in result.output
+
+    def test_it_is_of_what_was_asked_for(self, linkwork, monkeypatch):
+        from analysis.figures import slider_crank_picture as pictures
+
+        asked = []
+        right = pictures.plot_mechanism
+        monkeypatch.setattr(
+            pictures, "plot_mechanism", lambda *a, **options: asked.append((a, options)) or right(*a, **options)
+        )
+        arguments = ("--angle", "45 deg", "--groove", "apart", "--set", "groove.amplitude=2 in", "--units", "inch")
+        assert linkwork("picture", *arguments, "--view", "30 deg", "1 rad").exit_code == 0
+        ((p, angle, shift), options) = asked[0]
+        assert angle == pytest.approx(radians(45.0))
+        assert shift == pytest.approx(2.0 * INCH * np.sin(radians(45.0)))
+        assert p.guide_offset == pytest.approx(10.0 * INCH)
+        assert options["unit"] == "in"
+        assert options["view"] == pytest.approx((30.0, np.degrees(1.0)))
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "said"),
+    [
+        (["info", "--offset", "70 in"], 1, "the crank pin is 1.47587989 m from the guide, the rod is 1.27 m long, 0.20587989 m too short"),
+        (["dual", "--two-rotations", "--offset", "70 in"], 1, "0.20587989 m too short"),
+        (["forces", "--offset", "70 in"], 1, "at worst 0.814696 m too short"),
+        (["dual", "--offset", "70 in"], 1, "it can be assembled at no angle"),
+        (["tolerances", "--offset", "70 in"], 1, "it can be assembled at no angle"),
+        (["picture", "--offset", "20 in", "--set", "rod.length=30 in", "--angle", 0], 1, "0.055647265 m too short"),
+        (["picture", "--offset", "70 in"], 1, "the rod does not reach the guide at crank angle"),
+        (["info", "--set", "crank.length=0 m"], 1, "parameter crank.length is 0.0: it must be a finite number greater than zero"),
+        (["info", "--set", "rod.length=-1"], 1, "parameter rod.length is -1.0: it must be a finite number greater than zero"),
+        (["info", "--set", "rod.length=nan"], 1, "parameter rod.length is nan"),
+        (["info", "--set", "crank.inertia=0.001"], 1, "parameter crank.inertia is 0.001: it must be at least"),
+        (["info", "--twist", "inf"], 1, "parameter guide.twist is inf"),
+        (["info", "--offset", "ten"], 1, "parameter guide.offset is 'ten': it must be a number in m"),
+        (["info", "--offset", "10 kg"], 1, "parameter guide.offset is '10 kg': it must be a number in m"),
+        (["info", "--shift", "nan"], 1, "the shift is nan m: it must be a finite number"),
+        (["forces", "--speed", "50 Hz"], 1, "parameter --speed is '50 Hz': it must be in rad/s or rpm"),
+        (["forces", "--speed", "nan"], 1, "crank_speed is nan: it must be finite"),
+        (["forces", "--torque", "nan"], 1, "torque is nan: it must be finite"),
+        (["forces", "--torque", "1 N"], 1, "parameter --torque is '1 N': it must be a number in N.m"),
+        (["forces", "--torque", "1", "--load", "1"], 2, "give --torque, and the slider's force is sought, or --load"),
+        (["dual", "--groove", "shaft", "--torque", "1"], 2, "give --groove apart"),
+        (["info", "--groove", "shaft", "--shift", "1"], 2, "give one of them"),
+        (["info", "--groove", "shaft", "--set", "groove.amplitude=1 in", "--set", "groove.ratio=0.1234567"], 1, "groove.ratio"),
+        (["info", "--published", "rahman"], 1, "there is no rahman; did you mean rahman-"),
+        (["info", "--published", "rahman-ideal", "file.toml"], 2, "does not exist"),
+        (["info", "--set", "rod.lenth=1"], 1, "did you mean rod.length"),
+        (["info", "--set", "rod.length"], 2, "it must be NAME=VALUE"),
+        (["info", "--set", "assembly.branch=2"], 1, "assembly.branch is 2"),
+        (["tolerances", "--tolerance", "guide.ofset=1 mm"], 1, "did you mean guide.offset"),
+        (["tolerances", "--tolerance", "guide.offset"], 2, "it must be NAME=HALF_WIDTH"),
+        (["tolerances", "--tolerance", "guide.offset=-1 mm"], 1, "the tolerance of guide.offset is -0.001"),
+        (["tolerances", "--quantity", "nothing"], 1, "known quantity"),
+        (["dual", "--tolerance", "nan"], 2, "not between 0 and 1"),
+        (["picture", "--out", "/proc/no"], 1, "/proc/no: No such file or directory"),
+    ],
+)  # fmt: skip
+def test_what_is_wrong_is_told_in_a_sentence(linkwork, tmp_path, arguments, code, said):
+    result = linkwork(*arguments)
+    assert result.exit_code == code, result.output
+    assert said in " ".join((result.output + result.stderr).split())
+    assert "Traceback" not in result.output + result.stderr
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_file_and_a_published_case_exclude_each_other(linkwork, tmp_path):
+    io.save_parameters(tmp_path / "mine.toml", parameters(30.0))
+    result = linkwork("info", "mine.toml", "--published", "rahman-ideal")
+    assert result.exit_code == 2
+    assert "give either a file of parameters or --published NAME" in result.stderr

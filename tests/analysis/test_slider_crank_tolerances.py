@@ -1,0 +1,438 @@
+"""Sensitivities of the slider-crank, and what random errors of its dimensions do.
+
+The truth is the closed form differentiated by hand, differences of `force_turn` on changed mechanisms, and distributions that
+are known.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from math import cos, erf, pi, radians, sin, sqrt, tau
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from analysis.slider_crank.forces import AngleShift, ConstantShift, ForceTurn, GrooveShift, ShiftLaw, force_turn
+from analysis.slider_crank.tolerances import (
+    ANGLE,
+    DIMENSIONS,
+    ERRORS,
+    PERCENTILES,
+    QUANTITIES,
+    SHIFT,
+    Tolerance,
+    estimate,
+    monte_carlo,
+    sensitivities,
+)
+from linkwork.errors import InputError, ParameterError
+from linkwork.parameters import field_name
+from linkwork.slider_crank.parameters import SliderCrankParameters
+from linkwork.slider_crank.published import CRANK_SPEED, CRANK_TORQUE, parameters
+
+from ..published_rahman import GREATEST_SHIFTS_IN, INCH
+from ..slider_cranks import Case, cases, seeded
+
+POSITION = ("slider.position",)
+IDEAL = parameters(0.0)
+OFFSET = parameters(10.0)
+TOLERANCES = (
+    Tolerance("crank.length", 1e-4),
+    Tolerance("rod.length", 2e-4, distribution="uniform"),
+    Tolerance("guide.offset", 5e-4),
+    Tolerance("guide.twist", radians(0.2), distribution="triangular"),
+    Tolerance(SHIFT, 5e-4),
+    Tolerance(ANGLE, radians(0.05)),
+)
+
+
+def offset_turn(angles: Any, **given: Any) -> ForceTurn:
+    return force_turn(OFFSET, crank_speed=CRANK_SPEED, shift=ConstantShift(3.5 * INCH), angles=angles, **given)
+
+
+def slider_position(p: SliderCrankParameters, th: Any, s1: Any, **changes: Any) -> Any:
+    """The closed form of the notes, for arrays."""
+    a1, a2, a4, alpha = (
+        changes.get(name, getattr(p, name)) for name in ("crank_length", "rod_length", "guide_offset", "guide_twist")
+    )
+    across = (a1 * np.cos(th) + a4) ** 2 + (a1 * np.sin(th) * np.cos(alpha) - s1 * np.sin(alpha)) ** 2
+    return p.assembly_branch * np.sqrt(a2**2 - across) - a1 * np.sin(th) * np.sin(alpha) - s1 * np.cos(alpha)
+
+
+def changed(p: SliderCrankParameters, name: str, step: float) -> SliderCrankParameters:
+    field = field_name(name)
+    values: dict[str, Any] = {field: getattr(p, field) + step}
+    return replace(p, **values)
+
+
+@settings(max_examples=40)
+@given(cases())
+def test_position_by_the_closed_form_differentiated_by_hand(case: Case) -> None:
+    p = case.parameters
+    th, s1 = case.state[:2]
+    a1, a2, a4, alpha = p.crank_length, p.rod_length, p.guide_offset, p.guide_twist
+    f, g = a1 * cos(th) + a4, a1 * sin(th) * cos(alpha) - s1 * sin(alpha)
+    h = p.assembly_branch * sqrt(a2**2 - f * f - g * g)
+    true = {
+        "crank.length": -sin(th) * sin(alpha) - (f * cos(th) + g * sin(th) * cos(alpha)) / h,
+        "rod.length": a2 / h,
+        "guide.offset": -f / h,
+        "guide.twist": -a1 * sin(th) * cos(alpha)
+        + s1 * sin(alpha)
+        + g * (a1 * sin(th) * sin(alpha) + s1 * cos(alpha)) / h,
+        SHIFT: -cos(alpha) + g * sin(alpha) / h,
+        ANGLE: (f * a1 * sin(th) - g * a1 * cos(th) * cos(alpha)) / h - a1 * cos(th) * sin(alpha),
+        "crank.mass": 0.0,
+        "gravity.y": 0.0,
+    }
+    turn = force_turn(p, crank_speed=1.0, shift=ConstantShift(s1), angles=[th])
+    found = sensitivities(turn, tuple(true), POSITION)
+    assert set(DIMENSIONS) < set(true)
+    for name, slope in true.items():
+        assert found.of("slider.position", name)[0] == pytest.approx(slope, rel=1e-11, abs=1e-12)
+    assert found.values["slider.position"][0] == turn.slider_position[0]
+
+
+def quantities_of(turn: ForceTurn) -> dict[str, Any]:
+    """What `QUANTITIES` names, from a force turn."""
+    found = {
+        "slider.position": turn.slider_position,
+        "slider.velocity": turn.slider_velocity,
+        "slider.acceleration": turn.slider_acceleration,
+        "drive.applied_torque": turn.torque,
+        "slider.load": turn.slider_force,
+    }
+    for joint in ("bearing", "crank_pin", "slider_pin", "guide"):
+        for kind, vector in (("f", joint), ("m", f"{joint}_moment")):
+            if kind == "f" or joint in ("bearing", "guide"):
+                found |= {f"{joint}.{kind}{axis}": turn.vector(vector)[:, i] for i, axis in enumerate("xyz")}
+    return found | {"bearing.fz": turn.axial_force}
+
+
+@pytest.mark.parametrize("law", ["constant", "groove", "groove in the shaft"])
+@pytest.mark.parametrize("problem", [{"load": 7.0}, {"torque": 3.0}], ids=["load given", "torque given"])
+def test_everything_by_differences(problem: dict[str, Any], law: str) -> None:
+    """All quantities by all errors, against differences of fourth order on mechanisms that are changed."""
+    case = seeded(11)
+    angles = case.state[0] + np.array([0.0, 0.02])
+    amplitude = case.parameters.groove_amplitude
+    groove = GrooveShift(amplitude, 0.8, in_shaft=law == "groove in the shaft")
+    nominal: ShiftLaw = ConstantShift(case.state[1]) if law == "constant" else groove
+    mechanism = replace(case.parameters, rod_length=1.5 * case.parameters.rod_length)
+
+    def at(name: str = "", step: float = 0.0) -> dict[str, Any]:
+        # an error of the shift is added to the law's; one of the angle leaves it, but that of a groove in the shaft
+        place = angles + (step if name == ANGLE else 0.0)
+        held = 0.0 if law == "groove in the shaft" else place - angles
+        more = step if name == SHIFT else 0.0
+        shifted: ShiftLaw = AngleShift(
+            lambda th: nominal.at(th - held, 1.0, 0.0).shift + more,
+            lambda th: nominal.at(th - held, 1.0, 0.0).velocity,
+            lambda th: nominal.at(th - held, 1.0, 0.0).acceleration,
+        )
+        return quantities_of(
+            force_turn(
+                mechanism if name in ("", ANGLE, SHIFT) else changed(mechanism, name, step),
+                crank_speed=case.state[2],
+                crank_acceleration=case.acceleration,
+                # a groove in the shaft has its flank's force, that no other law has
+                shift=nominal if groove.in_shaft and name != SHIFT else shifted,
+                angles=place,
+                **problem,
+            )
+        )
+
+    names = [name for name in ERRORS if not (law == "groove in the shaft" and name == SHIFT)]
+    turn = force_turn(
+        mechanism,
+        crank_speed=case.state[2],
+        crank_acceleration=case.acceleration,
+        shift=nominal,
+        angles=angles,
+        **problem,
+    )
+    found = sensitivities(turn, names)
+    assert tuple(found.derivatives) == tuple(QUANTITIES)
+    level = float(np.abs(turn.vector("crank_pin")).max())
+    scales = {"m": 1.0, "m/s": 20.0, "m/s2": 400.0, "N": level, "N.m": level}
+    for quantity, value in at().items():
+        assert np.max(np.abs(value - found.values[quantity])) < 1e-12 * scales[QUANTITIES[quantity]]
+    for name in names:
+        h = 2e-4 * max(0.3, abs(getattr(mechanism, field_name(name), 0.0)))
+        places = [at(name, k * h) for k in (-2.0, -1.0, 1.0, 2.0)]
+        for quantity in QUANTITIES:
+            a, b, c, d = (x[quantity] for x in places)
+            slope = (a - 8.0 * b + 8.0 * c - d) / (12.0 * h)
+            allowed = 3e-7 * (np.abs(slope).max() + scales[QUANTITIES[quantity]])
+            assert np.max(np.abs(found.of(quantity, name) - slope)) < allowed, (quantity, name)
+
+
+def test_at_the_ideal_mechanism_shift_and_twist_are_of_the_second_order() -> None:
+    turn = force_turn(IDEAL, crank_speed=CRANK_SPEED)
+    found = sensitivities(turn, quantities=POSITION)
+    assert np.abs(found.of("slider.position", SHIFT)).max() < 1e-14
+    assert np.abs(found.of("slider.position", "guide.twist")).max() < 1e-14
+    by_offset = found.of("slider.position", "guide.offset")
+    assert np.abs(by_offset[[90, 270]]).max() < 1e-15
+    assert np.flatnonzero(np.diff(np.sign(by_offset.round(12))))[[0, -1]].tolist() == [89, 270]
+    assert found.of("slider.position", ANGLE).data == pytest.approx(turn.ratio, abs=1e-15)
+
+
+def test_masked_at_a_dead_centre_but_what_the_load_has_no_part_in() -> None:
+    turn = force_turn(IDEAL, crank_speed=CRANK_SPEED, torque=CRANK_TORQUE, angles=[0.3, 0.5 * pi])
+    found = sensitivities(turn)
+    for name in QUANTITIES:
+        free = name.startswith(("slider.p", "slider.v", "slider.a", "drive.", "guide.m"))
+        for values in (found.values[name], found.derivatives[name][0], found.derivatives[name][-1]):
+            assert np.ma.getmaskarray(values).tolist() == [False, not free]
+    assert (found.derivatives["drive.applied_torque"] == 0.0).all()
+
+
+@pytest.mark.parametrize(
+    ("distribution", "ratio", "kurtosis"),
+    [("normal", 3.0, 3.0), ("uniform", sqrt(3.0), 9.0 / 5.0), ("triangular", sqrt(6.0), 12.0 / 5.0)],
+)
+def test_distributions(distribution: str, ratio: float, kurtosis: float) -> None:
+    by_width = Tolerance("rod.length", 0.6, distribution=distribution)
+    by_deviation = Tolerance("rod.length", standard_deviation=0.6 / ratio, distribution=distribution)
+    for tolerance in (by_width, by_deviation):
+        assert tolerance.extent == pytest.approx(0.6)
+        assert tolerance.deviation == pytest.approx(0.6 / ratio)
+    x = by_width.draw(np.random.default_rng(1), 400_000)
+    assert x.mean() == pytest.approx(0.0, abs=5.0 * 0.6 / sqrt(400_000))
+    assert x.std() == pytest.approx(0.6 / ratio, rel=0.01)
+    assert (x**4).mean() / (x**2).mean() ** 2 == pytest.approx(kurtosis, rel=0.03)
+    if distribution != "normal":
+        assert 0.59 < np.abs(x).max() <= 0.6
+    # the same of the estimate to second order: S4 = sqrt(a2^2 - x^2) at 90 deg, less a constant
+    turn = force_turn(IDEAL, crank_speed=1.0, angles=[0.5 * pi])
+    deviation = 1e-3
+    second = estimate(turn, [Tolerance(SHIFT, standard_deviation=deviation, distribution=distribution)])[
+        "slider.position"
+    ]
+    h = IDEAL.rod_length
+    assert second.deviation[0] < 1e-18
+    assert second.second_mean[0] - second.nominal[0] == pytest.approx(-(deviation**2) / (2.0 * h), rel=1e-6)
+    assert second.second_deviation[0] == pytest.approx(deviation**2 / (2.0 * h) * sqrt(kurtosis - 1.0), rel=1e-6)
+    assert np.ma.getmaskarray(second.shares).all()
+    assert second.second_shares.tolist() == [[1.0]]
+
+
+def test_two_errors_together() -> None:
+    """At theta1 = 90 deg, S1 = 0 and alpha4 = 270 deg: S4 = a1 cos(x) - y sin(x) + sqrt(a2^2 - (a1 sin(x) + y cos(x))^2)
+    for errors x of the twist and y of the shift; its second derivatives by hand."""
+    dx, dy = 2e-3, 3e-3
+    a1, a2 = IDEAL.crank_length, IDEAL.rod_length
+    turn = force_turn(IDEAL, crank_speed=1.0, angles=[0.5 * pi])
+    tolerances = [Tolerance("guide.twist", standard_deviation=dx), Tolerance(SHIFT, standard_deviation=dy)]
+    found = estimate(turn, tolerances)["slider.position"]
+    hxx, hxy, hyy = (-a1 - a1 * a1 / a2) * dx * dx, (-1.0 - a1 / a2) * dx * dy, -dy * dy / a2
+    assert found.second_mean[0] - found.nominal[0] == pytest.approx(0.5 * (hxx + hyy), rel=1e-4)
+    variance = 0.5 * hxx**2 + hxy**2 + 0.5 * hyy**2
+    assert found.second_deviation[0] == pytest.approx(sqrt(variance), rel=1e-4)
+    shares = (0.5 * hxx**2 + 0.5 * hxy**2) / variance, (0.5 * hyy**2 + 0.5 * hxy**2) / variance
+    assert found.second_shares[:, 0].tolist() == pytest.approx(shares, rel=1e-3)
+
+
+def test_linear_estimate_is_the_sum_of_variances() -> None:
+    turn = offset_turn(np.linspace(0.0, tau, 13))
+    quantities = ("slider.position", "crank_pin.fy")
+    found = estimate(turn, TOLERANCES, quantities)
+    slopes = sensitivities(turn, [t.name for t in TOLERANCES], quantities)
+    for name in quantities:
+        parts: Any = [(slopes.of(name, t.name) * t.deviation) ** 2 for t in TOLERANCES]
+        assert found[name].deviation.data ** 2 == pytest.approx(sum(parts).data)
+        assert found[name].shares.sum(axis=0).data == pytest.approx(np.ones(13))
+        assert (found[name].shares[3] * sum(parts)).data == pytest.approx(parts[3].data)
+        worst: Any = sum(np.abs(slopes.of(name, t.name)) * t.extent for t in TOLERANCES)
+        assert found[name].worst.data == pytest.approx(worst.data)
+        assert found[name].second_shares.sum(axis=0).data == pytest.approx(np.ones(13))
+
+
+def test_samples_are_those_of_the_closed_form() -> None:
+    """Mean, deviation, percentiles and histogram against NumPy's of the closed form, with the same draws."""
+    samples, angles = 40_000, np.array([0.2, 2.0, 5.0])
+    result = monte_carlo(offset_turn(angles), TOLERANCES, samples=samples, seed=5)
+    generator = np.random.default_rng(5)
+    x = {t.name: t.draw(generator, samples) for t in TOLERANCES}
+    spread = result.spreads["slider.position"]
+    for i, th in enumerate(angles):
+        values = slider_position(
+            OFFSET,
+            th + x[ANGLE],
+            3.5 * INCH + x[SHIFT],
+            **{
+                field_name(name): getattr(OFFSET, field_name(name)) + x[name]
+                for name in ("crank.length", "rod.length", "guide.offset", "guide.twist")
+            },
+        )
+        assert spread.mean[i] == pytest.approx(values.mean(), abs=1e-13)
+        assert spread.deviation[i] == pytest.approx(values.std(ddof=1), rel=1e-9)
+        assert spread.percentiles[:, i].data == pytest.approx(np.percentile(values, PERCENTILES), abs=1e-13)
+        assert (spread.least[i], spread.greatest[i]) == pytest.approx((values.min(), values.max()), abs=1e-13)
+        # a value on an edge may fall to either side
+        assert np.abs(spread.counts[i] - np.histogram(values, spread.edges[i])[0]).max() <= 2
+        assert spread.counts[i].sum() == pytest.approx(0.999 * samples, abs=3)
+        assert spread.edges[i, [0, -1]] == pytest.approx(np.percentile(values, [0.05, 99.95]), abs=1e-7)
+    assert not result.not_assembled.any()
+    assert result.messages == ()
+    same = monte_carlo(offset_turn(angles), TOLERANCES, samples=samples, seed=5)
+    other = monte_carlo(offset_turn(angles), TOLERANCES, samples=samples, seed=6)
+    assert (same.spreads["slider.position"].mean == spread.mean).all()
+    assert (other.spreads["slider.position"].mean != spread.mean).all()
+
+
+@pytest.mark.parametrize("problem", [{"load": 40.0}, {"torque": CRANK_TORQUE}], ids=["load given", "torque given"])
+def test_samples_of_forces_are_mechanisms_changed(problem: dict[str, Any]) -> None:
+    samples = 7
+    tolerances = (*TOLERANCES[:4], Tolerance(SHIFT, 5e-4), Tolerance("rod.mass", 0.5), Tolerance("crank.inertia", 0.01))
+    turn = offset_turn([0.7], **problem)
+    result = monte_carlo(turn, tolerances, quantities=tuple(QUANTITIES), samples=samples, seed=2)
+    generator = np.random.default_rng(2)
+    x = {t.name: t.draw(generator, samples) for t in tolerances}
+    found = []
+    for k in range(samples):
+        mechanism = OFFSET
+        for name, errors in x.items():
+            if name != SHIFT:
+                mechanism = changed(mechanism, name, float(errors[k]))
+        shift = ConstantShift(3.5 * INCH + float(x[SHIFT][k]))
+        found.append(
+            quantities_of(force_turn(mechanism, crank_speed=CRANK_SPEED, shift=shift, angles=[0.7], **problem))
+        )
+    for name in QUANTITIES:
+        values = np.array([float(f[name][0]) for f in found])
+        spread = result.spreads[name]
+        assert (spread.least[0], spread.greatest[0]) == pytest.approx((values.min(), values.max()), rel=1e-9, abs=1e-12)
+        assert spread.percentiles[2, 0] == pytest.approx(np.median(values), rel=1e-9, abs=1e-12)
+
+
+def test_a_million_samples_agree_with_the_linear_estimate_in_seconds() -> None:
+    turn = offset_turn([0.5], load=30.0)
+    quantities = ("slider.position", "slider.velocity", "crank_pin.fx", "guide.fx", "bearing.my")
+    begin = perf_counter()
+    result = monte_carlo(turn, TOLERANCES, quantities=quantities)
+    assert perf_counter() - begin < 30.0
+    assert result.samples == 1_000_000
+    assert result.messages == ()
+    for name in quantities:
+        spread, linear = result.spreads[name], result.estimates[name]
+        # the standard error of a standard deviation is 0.07 % of it
+        assert spread.deviation[0] == pytest.approx(linear.deviation[0], rel=5e-3)
+        assert abs(spread.mean[0] - linear.second_mean[0]) < 5e-3 * linear.deviation[0]
+        assert not result.linear_is_off(name).any()
+
+
+def test_where_the_first_derivatives_vanish_it_is_told() -> None:
+    turn = force_turn(IDEAL, crank_speed=1.0, angles=[0.0, 0.5 * pi])
+    tolerances = [Tolerance("guide.offset", 5e-3), Tolerance(SHIFT, 5e-3), Tolerance("guide.twist", radians(0.5))]
+    result = monte_carlo(turn, tolerances, samples=200_000)
+    spread, found = result.spreads["slider.position"], result.estimates["slider.position"]
+    assert result.linear_is_off("slider.position").tolist() == [False, True]
+    assert spread.deviation.data == pytest.approx(found.second_deviation.data, rel=0.02)
+    assert spread.mean[1] == pytest.approx(found.second_mean[1], abs=0.02 * found.second_deviation[1])
+    (message,) = result.messages
+    assert (
+        "the linear estimate of slider.position is off at crank angle 90 deg: its first derivatives vanish" in message
+    )
+
+
+@given(st.integers(0, 3))
+def test_samples_that_cannot_be_assembled_are_counted(seed: int) -> None:
+    """Ideal but for the shift, which has a normal error around its limit less one standard deviation: 15.9 % are beyond."""
+    limit, samples, deviation = GREATEST_SHIFTS_IN[0.0] * INCH, 20_000, 1e-3
+    turn = force_turn(IDEAL, crank_speed=1.0, shift=ConstantShift(limit - deviation), angles=[0.0, 0.5 * pi])
+    result = monte_carlo(turn, [Tolerance(SHIFT, standard_deviation=deviation)], samples=samples, seed=seed)
+    # the plant keeps clear of the limit by a sine of 1e-3, which is 0.67 micrometres of shift here; at 90 deg all assemble
+    beyond = 0.5 * (1.0 - erf(1.0 / sqrt(2.0))) * samples
+    assert abs(result.not_assembled[0] - beyond) < 5.0 * sqrt(beyond) + 0.002 * samples
+    assert result.not_assembled[1] == 0
+    assert result.messages[0].startswith(f"{result.not_assembled[0]} of 20000 samples (1")
+    assert "cannot be assembled at crank angle 0 deg, the most of any angle" in result.messages[0]
+    spread = result.spreads["slider.position"]
+    assert spread.least[0] > 0.0
+    assert spread.counts[0].sum() <= samples - result.not_assembled[0]
+
+
+def test_where_hardly_any_sample_can_be_assembled_nothing_is_made_up() -> None:
+    limit = GREATEST_SHIFTS_IN[0.0] * INCH
+    turn = force_turn(IDEAL, crank_speed=1.0, shift=ConstantShift(limit - 1e-5), angles=[0.0])
+    result = monte_carlo(turn, [Tolerance("rod.length", 1.0, distribution="uniform")], samples=2, seed=3)
+    draws = Tolerance("rod.length", 1.0, distribution="uniform").draw(np.random.default_rng(3), 2)
+    assert (draws < 0.0).all() or result.not_assembled[0] == (draws < 0.0).sum()
+    spread = result.spreads["slider.position"]
+    if result.not_assembled[0] > 0:
+        assert spread.mean.mask.all()
+        assert np.ma.getmaskarray(spread.percentiles).all()
+        assert np.ma.getmaskarray(result.estimates["slider.position"].second_deviation).all()
+
+
+def test_across_a_dead_centre_there_is_no_mean() -> None:
+    common: dict[str, Any] = {"crank_speed": CRANK_SPEED, "shift": ConstantShift(3.5 * INCH)}
+    centre = force_turn(OFFSET, **common).dead_centres[0].crank_angle
+    turn = force_turn(OFFSET, torque=CRANK_TORQUE, angles=[centre - 0.5, centre + 1e-5], **common)
+    result = monte_carlo(turn, TOLERANCES, quantities=("slider.load", "guide.mx", "slider.position"), samples=20_000)
+    load = result.spreads["slider.load"]
+    assert np.ma.getmaskarray(load.mean).tolist() == [False, True]
+    assert np.ma.getmaskarray(load.deviation).tolist() == [False, True]
+    assert not np.ma.getmaskarray(load.percentiles).any()
+    assert load.percentiles[0, 1] < -1e3 < 1e3 < load.percentiles[-1, 1]
+    assert load.counts[1].sum() == pytest.approx(0.999 * 20_000, abs=3)
+    for name in ("guide.mx", "slider.position"):
+        assert not np.ma.getmaskarray(result.spreads[name].mean).any()
+    assert sum("samples on both sides of a dead centre" in m and "slider.load" in m for m in result.messages) == 1
+    # where the load is given the same place is like any other
+    free = force_turn(OFFSET, load=3.0, angles=[centre], **common)
+    assert monte_carlo(free, TOLERANCES, quantities=("crank_pin.fx",), samples=2000).messages == ()
+
+
+def test_samples_at_a_dead_centre_itself_are_counted() -> None:
+    """A tolerance that does not move the crank pin off the guide's foot: at 90 deg the ideal mechanism stays dead."""
+    turn = force_turn(IDEAL, crank_speed=CRANK_SPEED, torque=CRANK_TORQUE, angles=[0.5 * pi, 1.0])
+    result = monte_carlo(turn, [Tolerance("rod.length", 1e-4)], quantities=("slider.load",), samples=500)
+    assert result.undetermined.tolist() == [500, 0]
+    assert np.ma.getmaskarray(result.spreads["slider.load"].percentiles)[0].tolist() == [True, False]
+    assert "500 samples are at a dead centre" in result.messages[0]
+    with pytest.raises(InputError, match=r"slider\.load is not determined at crank angle 90 deg"):
+        result.scene("slider.load", 0.5 * pi)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "error", "message"),
+    [
+        (("crank.colour", 1.0), ParameterError, "crank.colour"),
+        (("groove.amplitude", 1.0), ParameterError, "groove.amplitude"),
+        (("rod.length",), InputError, "either a half width or a standard deviation"),
+        (("rod.length", 1.0, 1.0), InputError, "either a half width or a standard deviation"),
+        (("rod.length", 0.0), InputError, "greater than zero"),
+        (("rod.length", np.nan), InputError, "greater than zero"),
+        (("rod.length", 1.0, None, "cauchy"), InputError, "'cauchy': it must be one of normal, uniform, triangular"),
+    ],
+)
+def test_wrong_tolerances_are_told(arguments: tuple[Any, ...], error: type[Exception], message: str) -> None:
+    with pytest.raises(error, match=message):
+        Tolerance(*arguments)
+
+
+def test_wrong_input_is_told() -> None:
+    turn = offset_turn([0.3])
+    with pytest.raises(ParameterError, match=r"crank_pin\.f"):
+        sensitivities(turn, quantities=["crank_pin.f"])
+    with pytest.raises(ParameterError, match=r"rod\.colour"):
+        sensitivities(turn, ["rod.colour"])
+    with pytest.raises(ParameterError, match=r"rod\.mass"):
+        sensitivities(turn).of("slider.position", "rod.mass")
+    with pytest.raises(InputError, match="no tolerance"):
+        monte_carlo(turn, [])
+    with pytest.raises(InputError, match=r"2 tolerances of rod\.length"):
+        estimate(turn, [Tolerance("rod.length", 1.0), Tolerance("rod.length", 2.0)])
+    with pytest.raises(InputError, match="1 samples: there must be at least two"):
+        monte_carlo(turn, TOLERANCES, samples=1)
+    with pytest.raises(ParameterError, match=r"crank\.length is -"):
+        monte_carlo(turn, [Tolerance("crank.length", 1.0)], samples=1000)
+    with pytest.raises(ParameterError, match=r"crank_pin\.fx"):
+        monte_carlo(turn, TOLERANCES, samples=10).scene("crank_pin.fx")
