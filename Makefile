@@ -8,7 +8,7 @@ READY := $(VENV)/.ready
 
 demo: $(READY)
 	$(BIN)/python build_fmu.py
-	$(BIN)/linkwork check --fmu build/FiveBarSlider.fmu --method compiled --method Radau --out out
+	$(BIN)/linkwork check table-3.1 slider-crank-torque --method compiled --method Radau --out out
 
 test: $(READY) lint
 	$(BIN)/python build_fmu.py

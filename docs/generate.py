@@ -10,8 +10,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from textwrap import fill
 
-from linkwork.five_bar.parameters import FiveBarParameters
-from linkwork.five_bar.variables import INPUTS, OUTPUTS, PARAMETERS
+from analysis.mechanism import FIVE_BAR, SLIDER_CRANK, Mechanism
 from linkwork.parameters import field_name
 from linkwork.variables import Variable
 
@@ -81,6 +80,61 @@ INTERNAL = (
     ),
 )
 
+#: The same of the slider-crank.
+SLIDER_CRANK_INTERNAL = (
+    ("th, w", r"\theta_1, \dot\theta_1", "rad, rad/s", "crank angle and speed; e the acceleration"),
+    ("s1, v", r"S_1, \dot S_1", "m, m/s", "axial shift of the crank and its velocity; a the acceleration"),
+    ("s4", r"S_4", "m", "slider position: the slider pin is at (-a4, 0, 0) - S4 k4, k4 = (0, sin alpha4, cos alpha4)"),
+    (
+        "f, g",
+        r"a_1 c + a_4, a_1 s \cos\alpha_4 - S_1 \sin\alpha_4",
+        "m",
+        "coordinates of the crank pin across the guide",
+    ),
+    (
+        "h",
+        r"\pm\sqrt{a_2^2 - f^2 - g^2}",
+        "m",
+        "slider pin from the crank pin's foot on the guide; 0 at the limit of assembly",
+    ),
+    (
+        "kth, ks",
+        r"\partial S_4/\partial\theta_1, \partial S_4/\partial S_1",
+        "m/rad, 1",
+        "velocity coefficients; kth = 0 at the dead centres",
+    ),
+    ("m11, m12, m22", r"M", "kg.m2, kg.m, kg", "inertia matrix of (theta1, S1)"),
+    ("b1, b2", "", "N.m, N", "velocity terms of the equations of motion"),
+    ("Q1, Q2", "", "N.m, N", "generalised forces of gravity, load, springs, dampers, friction"),
+    (
+        "p.m22, p.m23, p.m33",
+        "",
+        "kg",
+        "the rod's masses at its ends: its energy is half of m22 v2.v2 + 2 m23 v2.v3 + m33 v3.v3",
+    ),
+    ("share", r"g_2/a_2", "1", "distance of the rod's centre of mass from the crank pin relative to its length"),
+    ("amplitude, ratio", r"S_{S1}, \alpha", "m, 1", "of the groove's shift S1 = SS1 sin(alpha theta1), eq 28"),
+)
+
+_FIVE_BAR_FRAME = """**Frame and signs.** x runs along the ground link from the crank shaft A to the slider's zero, y to its left; angles
+are counter-clockwise from x. `ground.inclination` is the angle of x above the horizontal, so gravity in this frame is
+(-g sin, -g cos) of it. `*.cog_angle` and `coupler.point_angle` turn from the link's own direction: A to B, B to C,
+D to C. A positive torque drives the crank counter-clockwise. `rocker.angle` is absolute, the thesis's theta4 + alpha.
+`assembly.branch` is the sign of sin(rocker.angle - coupler.angle), +1 in the thesis's runs: C lies to the left of the
+line from B to D. `pin.A` is the force of the ground on the crank, `pin.B` of the crank on the coupler, `pin.C` of the
+rocker on the coupler, `pin.D` of the slider on the rocker; `slider.guide_force` is the guide's force on the slider, to
+the left of its direction of travel."""
+
+_SLIDER_CRANK_FRAME = """**Frames and signs.** Frame 1, the ground's: z along the crank axis, x along the common normal of crank axis and
+guide, the origin O where they meet; the crank points along x at `crank.angle` 0 and turns about z. Frame 2 turns and shifts
+with the crank, x towards the crank pin, its origin on the axis in the plane of the pin. Frame 3 has x along the rod from
+crank pin to slider pin, y perpendicular to rod and crank axis. Frame 4, the guide's: x that of frame 1, z along
+(0, sin, cos) of `guide.twist`. The guide passes through (-`guide.offset`, 0, 0), and the slider position increases along -z of
+frame 4. `assembly.branch` says on which side of the crank pin's foot on the guide the slider is. FMI outputs are in frame 1:
+`bearing` is what the ground exerts on the crank, axial drive and torque included, its moment about O; `crank_pin` the force
+of the crank on the rod, `slider_pin` that of the slider on the rod, `guide` that of the guide on the slider, its moment about
+the slider pin. `slider.load` is positive in the direction in which the slider position increases."""
+
 
 def _symbol(text: str) -> str:
     return f"${text}$" if text else ""
@@ -98,34 +152,33 @@ def _start(variable: Variable) -> str:
 
 def nomenclature() -> str:
     """The text of docs/nomenclature.md."""
-    fields = FiveBarParameters.__dataclass_fields__
-    lines = [
-        "# Nomenclature",
-        "",
-        "One table: thesis symbol, identifier in Python, FMI variable, unit, meaning and sign. Written by",
-        "`python docs/generate.py` from the tables in the code; a test holds it to them.",
-        "",
-        "**Frame and signs.** x runs along the ground link from the crank shaft A to the slider's zero, y to its left; angles",
-        "are counter-clockwise from x. `ground.inclination` is the angle of x above the horizontal, so gravity in this frame is",
-        "(-g sin, -g cos) of it. `*.cog_angle` and `coupler.point_angle` turn from the link's own direction: A to B, B to C,",
-        "D to C. A positive torque drives the crank counter-clockwise. `rocker.angle` is absolute, the thesis's theta4 + alpha.",
-        "`assembly.branch` is the sign of sin(rocker.angle - coupler.angle), +1 in the thesis's runs: C lies to the left of the",
-        "line from B to D. `pin.A` is the force of the ground on the crank, `pin.B` of the crank on the coupler, `pin.C` of the",
-        "rocker on the coupler, `pin.D` of the slider on the rocker; `slider.guide_force` is the guide's force on the slider, to",
-        "the left of its direction of travel.",
-        "",
-        "## FMI variables",
-        "",
-        "| symbol | identifier | FMI variable | unit | meaning |",
-        "| --- | --- | --- | --- | --- |",
-    ]
-    for variable in (*PARAMETERS, *INPUTS, *OUTPUTS):
-        name = field_name(variable.name)
-        if variable.causality == "parameter":
-            if name in fields:
-                identifier = f"`FiveBarParameters.{name}`"
-            else:
-                identifier = f"`InitialState.{variable.name.split('.')[1]}`" if name.startswith("initial") else ""
+    return "\n".join(
+        [
+            "# Nomenclature",
+            "",
+            "For each mechanism one table: thesis symbol, identifier in Python, FMI variable, unit, meaning and sign. Written by",
+            "`python docs/generate.py` from the tables in the code; a test holds it to them.",
+            "",
+            "## The five-bar slider",
+            "",
+            *_of_mechanism(FIVE_BAR, _FIVE_BAR_FRAME, INTERNAL),
+            "## The generalised slider-crank",
+            "",
+            *_of_mechanism(SLIDER_CRANK, _SLIDER_CRANK_FRAME, SLIDER_CRANK_INTERNAL),
+        ]
+    )
+
+
+def _of_mechanism(mechanism: Mechanism, frame: str, internal: tuple[tuple[str, str, str, str], ...]) -> list[str]:
+    """Frame, FMI variables and symbols of one mechanism."""
+    kind, variables = mechanism.parameters.__name__, mechanism.variables
+    lines = [frame, "", "### FMI variables", ""]
+    lines += ["| symbol | identifier | FMI variable | unit | meaning |", "| --- | --- | --- | --- | --- |"]
+    for variable in (*variables.PARAMETERS, *variables.INPUTS, *variables.OUTPUTS):
+        if variable.name in mechanism.mechanism_variables:
+            identifier = f"`{kind}.{field_name(variable.name)}`"
+        elif variable.name.startswith("initial."):
+            identifier = f"`InitialState.{variable.name.split('.')[1]}`"
         elif variable.causality == "output" and variable.kind == "Real":
             identifier = f"`Outputs.{variable.name.replace('.', '_')}`"
         else:
@@ -136,20 +189,20 @@ def nomenclature() -> str:
         )
     lines += [
         "",
-        "## Symbols of the equations",
+        "### Symbols of the equations",
         "",
         "| symbol | identifier | unit | meaning |",
         "| --- | --- | --- | --- |",
-        *(f"| {_symbol(symbol)} | `{name}` | {unit} | {meaning} |" for name, symbol, unit, meaning in INTERNAL),
-        "",
     ]
-    return "\n".join(lines)
+    lines += [f"| {_symbol(symbol)} | `{name}` | {unit} | {meaning} |" for name, symbol, unit, meaning in internal]
+    return [*lines, ""]
 
 
 def variable_table() -> str:
-    """The table of the README."""
+    """The table of the README: the variables of FiveBarSlider."""
     lines = ["| variable | causality | unit | start | range | meaning |", "| --- | --- | --- | --- | --- | --- |"]
-    for v in (*PARAMETERS, *INPUTS, *OUTPUTS):
+    variables = FIVE_BAR.variables
+    for v in (*variables.PARAMETERS, *variables.INPUTS, *variables.OUTPUTS):
         start = "" if v.causality == "output" else _start(v)
         lines.append(f"| `{v.name}` | {v.causality} | {v.unit or v.kind} | {start} | {_range(v)} | {v.description} |")
     return "\n".join(lines)

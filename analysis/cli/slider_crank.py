@@ -14,7 +14,7 @@ import numpy as np
 from rich.markup import escape
 from rich.table import Table
 
-from linkwork.errors import AssemblyError, InputError
+from linkwork.errors import InputError
 from linkwork.slider_crank import mobility
 from linkwork.slider_crank.parameters import SliderCrankParameters
 from linkwork.slider_crank.published import SETS, PublishedSet
@@ -239,16 +239,13 @@ def info(units: str, **given: Any) -> None:
       linkwork slider-crank info --offset '30 in' --set rod.length='40 in'
       linkwork slider-crank info --groove shaft --set groove.amplitude='3 in' --set groove.ratio=2
     """
+    from ..figures.slider_crank_picture import assembled_ranges
+
     told = _Units(units)
     chosen = _chosen(told, **given)
     p, law = chosen.parameters, chosen.law
     margin = mobility.assembly_margin(p, law)
-    parts = mobility.ranges(p, law)
-    if not parts:
-        # the sentence that says by how much
-        nearest = max(np.linspace(0.0, law.span, 721), key=lambda angle: _reach(p, law, float(angle)))
-        mobility.check_assembly(p, float(nearest), law.at(float(nearest))[0])
-        raise AssemblyError("the rod reaches the guide at no crank angle")
+    parts = assembled_ranges(p, law)
     grid = Table(title=escape(chosen.title), title_justify="left", show_header=False)
     grid.add_column("what", no_wrap=True)
     grid.add_column("value")
@@ -286,12 +283,6 @@ def info(units: str, **given: Any) -> None:
             "outer" if d.outer else "inner",
         )
     console.print(centres)
-
-
-def _reach(p: SliderCrankParameters, law: mobility.ShiftLaw, angle: float) -> float:
-    from linkwork.slider_crank.kinematics import assembly_square
-
-    return assembly_square(angle, law.at(angle)[0], p.constants())
 
 
 # Forces

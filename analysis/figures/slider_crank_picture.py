@@ -548,7 +548,7 @@ def animate_mechanism(
         raise InputError(f"an animation in {frames} frames: there must be at least 2")
     law = constant_shift(0.0) if law is None else law
     factor = _factor(unit)
-    widest = max(_assembled(parameters, law), key=lambda part: part.high - part.low)
+    widest = max(assembled_ranges(parameters, law), key=lambda part: part.high - part.low)
     ends = _angles(widest, law)[[0, -1]]
     share = np.linspace(0.0, 1.0, frames, endpoint=False)
     if _limited(widest, law):
@@ -579,13 +579,13 @@ def animate_mechanism(
     return path
 
 
-def _assembled(parameters: SliderCrankParameters, law: ShiftLaw) -> tuple[Range, ...]:
-    """The ranges of assembly.
+def assembled_ranges(parameters: SliderCrankParameters, law: ShiftLaw) -> tuple[Range, ...]:
+    """The ranges of crank angles in which the mechanism can be assembled, at least one.
 
     Raises
     ------
     AssemblyError
-        If there are none.
+        If there is none, with by how much the rod is too short where that is least.
     """
     found = ranges(parameters, law)
     if not found:

@@ -24,7 +24,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from linkwork.slider_crank.mobility import (
-    ShiftLaw,
     assembly_margin,
     constant_shift,
     greatest_shift,

@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from analysis.dual import Dual, about_i, about_j, about_k
+from analysis.dual import Dual, about_i, about_j, about_k, axial
 from analysis.slider_crank import closure as C
 from analysis.slider_crank.closure import ClosureError, close, estimate, follow, loop, residuals, shortage
 from linkwork.errors import AssemblyError, InputError
@@ -132,6 +132,29 @@ def test_newtons_method_converges_quadratically_from_open_loops(monkeypatch: pyt
     large = [error for error in errors if error > 1e-12]
     assert len(large) >= 4
     assert all(after < 3.0 * before**2 for before, after in pairwise(large[1:]))
+
+
+def test_newtons_step_is_from_the_exact_derivative_at_an_open_loop() -> None:
+    """A small share t of the step takes the share t from the vector of the antisymmetric part, by a central difference."""
+    p = parameters(10.0, 232.0)
+    th, s1 = np.array([0.7]), np.array([0.2])
+    crank_ball, slider_ball, s4 = estimate(p, th, s1)
+    crank_ball = crank_ball @ about_k(0.5).real @ about_i(0.4).real
+    frames = C._frames(p, th, s1, crank_ball, slider_ball)
+    start = loop(p, th, s1, crank_ball, slider_ball, s4)
+    step = C._correction(start, *frames, C.scale(p, s1))
+
+    def after(t: float) -> Dual:
+        turned = crank_ball @ C._turn(np.concatenate([np.zeros((1, 1)), t * step[:, :2]], -1))
+        return axial(
+            loop(p, th, s1, turned, slider_ball @ C._turn(t * step[:, 2:5]), s4 + t * C.scale(p, s1) * step[:, 5])
+        )
+
+    h = 1e-5
+    slope = (after(h) - after(-h)) / (2.0 * h)
+    assert np.abs(axial(start).real).max() > 0.1
+    np.testing.assert_allclose(slope.real, -axial(start).real, atol=1e-8)
+    np.testing.assert_allclose(slope.dual, -axial(start).dual, atol=1e-8)
 
 
 @pytest.mark.parametrize("unit", [INCH, 1e-3])

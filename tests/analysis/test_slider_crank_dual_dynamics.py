@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from itertools import product
-from math import inf, nan, radians, sin
+from math import cos, inf, nan, radians, sin
 
 import numpy as np
 import pytest

@@ -23,7 +23,6 @@ ANGLES = np.linspace(0.0, tau, 25)
 
 def made(**changes: Any) -> ToleranceScene:
     """A scene of made-up numbers, each of which can be told from the others."""
-    normal = np.array([0.0013499, 0.0227501, 0.5, 0.9772499, 0.9986501])
     sigma = 1e-4 * (2.0 + np.cos(ANGLES))
     edges = np.linspace(-1e-3, 1e-3, 81)
     share = np.array([0.5 * (1.0 + erf(x / (3e-4 * sqrt(2.0)))) for x in edges])
@@ -45,7 +44,6 @@ def made(**changes: Any) -> ToleranceScene:
         samples=1_000_000,
         not_assembled=0,
     )
-    assert len(normal) == len(scene.departures)
     return replace(scene, **changes)
 
 

@@ -221,8 +221,10 @@ def test_groove_in_the_shaft_is_the_plants() -> None:
     assert relative(back.slider_force, [5.0, 5.0]) < 1e-9
 
 
-def test_laws_are_one_another() -> None:
+@pytest.mark.parametrize("branch", [1, -1])
+def test_laws_are_one_another(branch: int) -> None:
     """The groove's law, the same as a function of the angle, and of time at constant speed; rates by differences."""
+    mechanism = replace(OFFSET, assembly_branch=branch)
     amplitude, ratio, w = 0.06, 3.0, -7.0
     groove = GrooveShift(amplitude, ratio)
     angle = AngleShift(
@@ -237,7 +239,7 @@ def test_laws_are_one_another() -> None:
         lambda t: -amplitude * f * f * np.sin(f * t),
     )
     turns = [
-        force_turn(OFFSET, crank_speed=w, shift=law, torque=CRANK_TORQUE, angles=np.linspace(0.0, tau, 97))
+        force_turn(mechanism, crank_speed=w, shift=law, torque=CRANK_TORQUE, angles=np.linspace(0.0, tau, 97))
         for law in (groove, angle, time)
     ]
     for turn in turns[1:]:

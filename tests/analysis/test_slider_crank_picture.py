@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import pairwise
 from math import cos, degrees, pi, radians
 
 import numpy as np
@@ -71,7 +72,11 @@ class TestSolids:
         rows = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])
         for faces, volume, tolerance in (
             (pictures._box([-1.0, -2.0, 0.0], [3.0, 1.0, 2.0], rows, origin, pieces=3), 24.0, 1e-9),
-            (pictures._tube(origin, origin + [0.0, 3.0, 4.0], 0.5, pieces=4, sides=64), 5.0 * pi * 0.25, 0.01),
+            (
+                pictures._tube(origin, origin + np.array([0.0, 3.0, 4.0]), 0.5, pieces=4, sides=64),
+                5.0 * pi * 0.25,
+                0.01,
+            ),
             (pictures._ball(origin, 2.0, sides=60), 4.0 / 3.0 * pi * 8.0, 0.2),
         ):
             # divergence theorem: a third of the sum of area vector times place
@@ -121,8 +126,8 @@ class TestMechanism:
             (solids,) = axis.collections
             points = np.concatenate([path.vertices for path in solids.get_paths()])
             (left, right), (low, high) = axis.get_xlim(), axis.get_ylim()
-            assert left < points[:, 0].min() and points[:, 0].max() < right
-            assert low < points[:, 1].min() and points[:, 1].max() < high
+            assert (points > [left, low]).all()
+            assert (points < [right, high]).all()
 
     def test_letters_do_not_cover_each_other(self) -> None:
         for p, angle, shift in ((OFFSET, 30.0, 0.0889), (TWISTED, 130.0, 0.0), (parameters(20.0, 232.0), 30.0, 0.0)):
@@ -162,7 +167,11 @@ class TestMechanism:
     @pytest.mark.parametrize(
         ("arguments", "error", "words"),
         [
-            ((SHORT, 0.0, 0.0), AssemblyError, r"1\.0668 m from the guide, the rod is 0\.9 m long, 0\.1668 m too short"),
+            (
+                (SHORT, 0.0, 0.0),
+                AssemblyError,
+                r"1\.0668 m from the guide, the rod is 0\.9 m long, 0\.1668 m too short",
+            ),
             ((OFFSET, 0.0, 1.5), AssemblyError, "m too short"),
             ((OFFSET, np.nan, 0.0), InputError, "the crank angle is nan: it must be a finite number"),
             ((OFFSET, 0.0, np.inf), InputError, "the shift is inf: it must be a finite number"),
@@ -211,11 +220,13 @@ class TestAnimation:
             return found
 
     def test_a_turn(self, tmp_path) -> None:
-        path = animate_mechanism(OFFSET, tmp_path / "a" / "turn.gif", law=constant_shift(0.0889), frames=4, title="turn")
+        path = animate_mechanism(
+            OFFSET, tmp_path / "a" / "turn.gif", law=constant_shift(0.0889), frames=4, title="turn"
+        )
         found = self.frames(path)
         assert len(found) == 4
         assert len({frame.shape for frame in found}) == 1
-        for a, b in zip(found, found[1:]):
+        for a, b in pairwise(found):
             assert np.abs(a - b).max() > 50.0
 
     def test_to_and_fro_where_the_crank_cannot_turn_fully(self, tmp_path) -> None:
