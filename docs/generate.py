@@ -354,6 +354,36 @@ def hand_drawn_pictures() -> None:
     save_figure(figure, HERE / "hand-drawn-motion.png", dpi=90)
 
 
+def slider_crank_pictures() -> None:
+    """Draw the pictures of docs/slider-crank.md."""
+    from dataclasses import replace
+    from math import radians
+
+    import numpy as np
+
+    from analysis.figures.slider_crank import plot_tolerances
+    from analysis.figures.slider_crank_picture import plot_mechanism, plot_range
+    from analysis.io import save_figure
+    from analysis.slider_crank.forces import force_turn
+    from analysis.slider_crank.tolerances import Tolerance, monte_carlo
+    from linkwork.slider_crank.published import CRANK_SPEED, INCH, SETS, parameters
+
+    case = SETS["rahman-a4-10-s1-3.5"]
+    shift = case.initial.shift_position
+    figure = plot_mechanism(case.parameters, radians(30.0), shift, unit="in", title=case.source)
+    save_figure(figure, HERE / "slider-crank.png", dpi=110)
+    short = replace(parameters(20.0), rod_length=30.0 * INCH)
+    figure = plot_range(short, unit="in", title="A rod of 30 in at a4 = 20 in, S1 = 0")
+    save_figure(figure, HERE / "slider-crank-range.png", dpi=90)
+    turn = force_turn(parameters(20.0), crank_speed=CRANK_SPEED, angles=np.linspace(0.0, 2.0 * np.pi, 73))
+    names = ("crank.length", "rod.length", "guide.offset", "shift.position")
+    allowed = [Tolerance(name, half_width=0.25e-3) for name in names]
+    allowed.append(Tolerance("guide.twist", half_width=radians(0.1)))
+    found = monte_carlo(turn, allowed, samples=100_000)
+    title = "Lengths within 0.25 mm and the twist within 0.1 deg, a4 = 20 in, S1 = 0"
+    save_figure(plot_tolerances(found.scene(angle=radians(30.0)), title=title), HERE / "slider-crank-tolerances.png", dpi=90)
+
+
 def main(arguments: list[str]) -> int:
     """Write what is asked for."""
     if "--figures" in arguments:
@@ -366,6 +396,7 @@ def main(arguments: list[str]) -> int:
         save_figure(study.draw(study.compute()), HERE / "linkage.png")
         rig_2_pictures()
         hand_drawn_pictures()
+        slider_crank_pictures()
     (HERE / "nomenclature.md").write_text(nomenclature(), encoding="utf-8")
     README.write_text(readme(README.read_text(encoding="utf-8")), encoding="utf-8")
     return 0

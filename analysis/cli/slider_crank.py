@@ -601,6 +601,7 @@ def tolerances(
         grid.add_column(heading, justify="left" if heading in ("quantity", "to", "unit") else "right")
     written: dict[str, Any] = {"crank angle [deg]": np.degrees(turn.angle)}
     for quantity in quantities:
+        effect = max(float(np.ma.abs(exact.of(quantity, t.name)).max()) * t.extent for t in allowed)
         for t in allowed:
             unit = _ratio(told.name(study.QUANTITIES[quantity]), told.name(study.ERRORS[t.name]))
             scale = told.per(study.QUANTITIES[quantity]) / told.per(study.ERRORS[t.name])
@@ -608,7 +609,12 @@ def tolerances(
             written[f"d {quantity} / d {t.name} [{unit}]"] = values.filled(np.nan)
             considered = _clear(turn) if study.QUANTITIES[quantity] in ("N", "N.m") else True
             top = int(np.argmax(np.where(considered, np.ma.abs(values).filled(-1.0), -1.0)))
-            texts = ("none" if np.ma.is_masked(values[i]) else f"{values[i]:.6g}" for i in (place, top))
+            # what is rounding beside the greatest effect of any tolerance is none
+            tiny = 1e-12 * effect / t.extent * scale
+            texts = (
+                "none" if np.ma.is_masked(values[i]) else f"{values[i] if abs(values[i]) > tiny else 0.0:.6g}"
+                for i in (place, top)
+            )
             grid.add_row(quantity, t.name, unit, *texts, f"{degrees(float(turn.angle[top])):.1f}")
     console.print(grid)
     folder = Path(out)

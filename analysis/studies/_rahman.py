@@ -79,7 +79,7 @@ class Figure(NamedTuple):
 #: The case that stands beside the others in every figure.
 IDEAL = Case("ideal", 0.0, 0.0, 270.0)
 
-_OFFSETS = tuple(Case(f"a4 = {a4} in", float(a4), 3.0, 270.0) for a4 in (10, 20, 30))
+_OFFSETS = tuple(Case(f"a4 = {a4} in", float(a4), 3.5, 270.0) for a4 in (10, 20, 30))
 _SHIFTS = tuple(Case(f"S1 = {s1} in", 30.0, float(s1), 270.0) for s1 in (3, 6, 9))
 _TWISTS = tuple(Case(f"alpha4 = {twist} deg", 20.0, 0.0, float(twist)) for twist in (232, 270, 310))
 
