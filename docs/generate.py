@@ -381,7 +381,9 @@ def slider_crank_pictures() -> None:
     allowed.append(Tolerance("guide.twist", half_width=radians(0.1)))
     found = monte_carlo(turn, allowed, samples=100_000)
     title = "Lengths within 0.25 mm and the twist within 0.1 deg, a4 = 20 in, S1 = 0"
-    save_figure(plot_tolerances(found.scene(angle=radians(30.0)), title=title), HERE / "slider-crank-tolerances.png", dpi=90)
+    save_figure(
+        plot_tolerances(found.scene(angle=radians(30.0)), title=title), HERE / "slider-crank-tolerances.png", dpi=90
+    )
 
 
 def main(arguments: list[str]) -> int:

@@ -115,9 +115,12 @@ def says(found, stated):
     return True
 
 
-def test_the_page_from_a_hand_drawn_curve_to_an_fmu_runs_and_says_what_is_so(tmp_path):
-    """Each command and each piece of Python in turn; what the page then shows is among what was printed."""
-    page = (ROOT / "docs" / "hand-drawn-to-fmu.md").read_text(encoding="utf-8")
+def run_page(name, tmp_path):
+    """Run each command and each piece of Python of a page in turn; what the page then shows must be among what was printed.
+
+    Gives the number of commands, the number of lines checked, and the words of what was printed, line by line.
+    """
+    page = (ROOT / "docs" / name).read_text(encoding="utf-8")
     shutil.copytree(ROOT / "examples", tmp_path / "examples")
     python, printed, checked, commands = "", [], 0, 0
     for kind, block in re.findall(r"```(python|sh|text)\n(.*?)```", page, flags=re.DOTALL):
@@ -142,6 +145,12 @@ def test_the_page_from_a_hand_drawn_curve_to_an_fmu_runs_and_says_what_is_so(tmp
             assert done.returncode == 0, done.stderr
             printed += [words_of(line) for line in done.stdout.splitlines()]
             commands += 1
+    return commands, checked, printed
+
+
+def test_the_page_from_a_hand_drawn_curve_to_an_fmu_runs_and_says_what_is_so(tmp_path):
+    """Each command and each piece of Python in turn; what the page then shows is among what was printed."""
+    commands, checked, printed = run_page("hand-drawn-to-fmu.md", tmp_path)
     assert (commands, checked) == (9, 43)
     # what the prose says
     rows = {tuple(words[:3]): words for words in printed if words[:1] == ["slider,"]}
@@ -159,6 +168,16 @@ def test_the_page_from_a_hand_drawn_curve_to_an_fmu_runs_and_says_what_is_so(tmp
         assert (tmp_path / name).exists()
 
 
+def test_the_page_of_the_slider_crank_runs_and_says_what_is_so(tmp_path):
+    commands, checked, printed = run_page("slider-crank.md", tmp_path)
+    assert (commands, checked) == (15, 18)
+    assert ["the", "two", "agree"] in printed
+    for name in ("out/rahman-a4-10-s1-3.5.gif", "out/slider-crank-range.png", "mechanism.png", "crank.toml"):
+        assert (tmp_path / name).exists()
+
+
 def test_pictures_of_the_documentation_are_small():
-    for picture in (ROOT / "docs").glob("hand-drawn-*.png"):
+    pictures = [picture for name in ("hand-drawn", "slider-crank") for picture in (ROOT / "docs").glob(f"{name}*.png")]
+    assert pictures
+    for picture in pictures:
         assert picture.stat().st_size < 150_000, picture.name

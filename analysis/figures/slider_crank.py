@@ -25,6 +25,8 @@ _SHOWN = {"m": ("mm", 1e3), "m/s": ("mm/s", 1e3)}
 _LINEAR, _SAMPLES, _SECOND, _WORST = COLOURS[0], COLOURS[1], COLOURS[2], "0.45"
 #: Greatest and middle departures over the turn: where their ratio is above this, the axis is cut at a multiple of the latter.
 _PEAK, _CUT = 12.0, 4.0
+#: Steps of the angle, as a multiple of the middle one, over which no curve is drawn.
+_GAP = 2.5
 #: Difference of shares to first and second order below which the latter are not drawn.
 _TOLD = 0.02
 #: Letters in a line of the foot.
@@ -86,7 +88,7 @@ class ToleranceScene:
     notes: tuple[str, ...] = ()
 
 
-def plot_tolerances(scene: ToleranceScene, *, title: str = "") -> Figure:
+def plot_tolerances(scene: ToleranceScene, *, title: str = "", shown: tuple[str, float] | None = None) -> Figure:
     """Plot the band of errors over the turn, the samples at one angle, and which tolerance contributes how much there.
 
     Above, the linear estimate (filled to three standard deviations, dashed the worst case of the signs) and percentiles of the
@@ -98,6 +100,9 @@ def plot_tolerances(scene: ToleranceScene, *, title: str = "") -> Figure:
     scene : ToleranceScene
         Of `analysis.slider_crank.tolerances.MonteCarlo.scene`.
     title : str
+    shown : (str, float), optional
+        Unit of the figure and how many of it one of SI is, such as ("in", 1 / 0.0254); by default mm, mm/s, and SI for all
+        else.
 
     Raises
     ------
@@ -106,7 +111,7 @@ def plot_tolerances(scene: ToleranceScene, *, title: str = "") -> Figure:
     """
     if len(scene.angle) < 2:
         raise InputError(f"a band over the turn needs two angles at least, not {len(scene.angle)}")
-    unit, factor = _SHOWN.get(scene.unit, (scene.unit, 1.0))
+    unit, factor = shown or _SHOWN.get(scene.unit, (scene.unit, 1.0))
     name = scene.quantity.replace(".", " ").replace("_", " ")
     lost = (
         f"at worst {scene.not_assembled / scene.samples:.2%} of them cannot be assembled, and are left out"
@@ -132,23 +137,30 @@ def plot_tolerances(scene: ToleranceScene, *, title: str = "") -> Figure:
 
 def _draw_band(axis: Axes, scene: ToleranceScene, label: str, factor: float) -> None:
     turn = np.degrees(scene.angle)
-    three = 3.0 * scene.deviation * factor
-    axis.fill_between(turn, -three, three, color=_LINEAR, alpha=0.18, linewidth=0.0, label=r"linear, $\pm 3\,\sigma$")
+    # angles that were left out are a gap in every curve
+    gaps = np.flatnonzero(np.diff(turn) > _GAP * np.median(np.diff(turn))) + 1
+    whole = np.insert(turn, gaps, turn[gaps])
+
+    def curve(values: FloatArray) -> FloatArray:
+        return np.insert(values * factor, gaps, np.nan)
+
+    three = curve(3.0 * scene.deviation)
+    axis.fill_between(whole, -three, three, color=_LINEAR, alpha=0.18, linewidth=0.0, label=r"linear, $\pm 3\,\sigma$")
     for sign in (1.0, -1.0):
         axis.plot(
-            turn,
-            sign * scene.worst * factor,
+            whole,
+            curve(sign * scene.worst),
             "--",
             color=_WORST,
             linewidth=1.0,
             label="linear, worst case" * (sign > 0.0),
         )
-    low, lower, _, upper, high = scene.departures * factor
-    axis.plot(turn, high, color=_SAMPLES, label="samples, 0.135 % and 99.865 %")
-    axis.plot(turn, low, color=_SAMPLES)
-    axis.plot(turn, upper, color=_SAMPLES, linewidth=0.8, alpha=0.7, label="samples, 2.3 % and 97.7 %")
-    axis.plot(turn, lower, color=_SAMPLES, linewidth=0.8, alpha=0.7)
-    axis.plot(turn, scene.mean * factor, ":", color="black", linewidth=1.2, label="mean of the samples")
+    low, lower, _, upper, high = (curve(row) for row in scene.departures)
+    axis.plot(whole, high, color=_SAMPLES, label="samples, 0.135 % and 99.865 %")
+    axis.plot(whole, low, color=_SAMPLES)
+    axis.plot(whole, upper, color=_SAMPLES, linewidth=0.8, alpha=0.7, label="samples, 2.3 % and 97.7 %")
+    axis.plot(whole, lower, color=_SAMPLES, linewidth=0.8, alpha=0.7)
+    axis.plot(whole, curve(scene.mean), ":", color="black", linewidth=1.2, label="mean of the samples")
     axis.axvline(turn[scene.at], color="0.35", linewidth=0.9, linestyle="-.")
     for angle in np.degrees(scene.singular):
         axis.axvline(angle, color="0.35", linewidth=0.9, linestyle=":")

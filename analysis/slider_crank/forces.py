@@ -213,7 +213,7 @@ class TimeShift:
     Raises
     ------
     InputError
-        When it is evaluated at a speed that is zero or varies: give the law as an `AngleShift`, or with the time worked out.
+        When it is evaluated at a speed that is zero or varies: give the law as an `AngleShift`.
     """
 
     value: ArrayFunction

@@ -396,6 +396,10 @@ class MonteCarlo:
     def messages(self) -> tuple[str, ...]:
         """In sentences: samples that cannot be assembled, poles, and where the linear estimate is off and why."""
         told = []
+        if self.turn.unreachable.size:
+            told.append(
+                f"{self.turn.unreachable.size} crank angles are left out: the nominal mechanism cannot be assembled there"
+            )
         if self.not_assembled.any():
             i = int(np.argmax(self.not_assembled))
             told.append(
@@ -422,7 +426,7 @@ class MonteCarlo:
         spread, linear = self._spread(quantity), self.estimates[quantity]
         used = np.maximum(self.samples - self.not_assembled - self.undetermined, 2)
         sd = spread.deviation
-        # a heavy tail makes the standard error greater than the normal distribution's: by its percentiles it is not told
+        # the standard error of the mean, and of a standard deviation up to a kurtosis of five, is this share of the latter
         allowed = OFF * sd + 5.0 * sd / np.sqrt(used)
         rounding = 1e-9 * np.ma.abs(linear.nominal)
         off = (np.ma.abs(spread.mean - linear.nominal) > allowed + rounding) | (

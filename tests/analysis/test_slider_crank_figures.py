@@ -188,6 +188,27 @@ def test_where_the_linear_estimate_has_no_spread() -> None:
     assert "its first derivatives vanish" in texts(figure)
 
 
+def test_other_units() -> None:
+    figure = plot_tolerances(made(), shown=("in", 1.0 / 0.0254))
+    band, histogram, _ = panels(figure)
+    assert band.get_ylabel() == histogram.get_xlabel() == "error of slider position [in]"
+    assert line(band, "mean of the samples").get_ydata() == pytest.approx(0.1 * made().deviation / 0.0254)
+    assert "nominal 49.2126 in" in histogram.get_title()
+
+
+def test_angles_that_were_left_out_are_a_gap() -> None:
+    kept = np.delete(np.arange(25), [4, 5, 6, 7])
+    scene = made()
+    cut = {name: getattr(scene, name)[..., kept] for name in ("angle", "deviation", "worst", "departures", "mean")}
+    band, _, _ = panels(plot_tolerances(replace(scene, **cut)))
+    for label in ("linear, worst case", "samples, 0.135 % and 99.865 %", "mean of the samples"):
+        drawn = line(band, label)
+        assert np.flatnonzero(np.isnan(drawn.get_ydata())).tolist() == [4]
+        assert np.delete(np.asarray(drawn.get_xdata()), 4) == pytest.approx(np.degrees(cut["angle"]))
+    (filled,) = band.collections
+    assert len(filled.get_paths()) == 2
+
+
 def test_one_angle_is_no_band() -> None:
     with pytest.raises(InputError, match="two angles at least, not 1"):
         plot_tolerances(made(angle=np.array([0.3])))

@@ -371,6 +371,14 @@ def test_where_hardly_any_sample_can_be_assembled_nothing_is_made_up() -> None:
         assert np.ma.getmaskarray(result.estimates["slider.position"].second_deviation).all()
 
 
+def test_angles_that_the_nominal_mechanism_cannot_reach_are_told() -> None:
+    shift = ConstantShift((GREATEST_SHIFTS_IN[0.0] + 1.0) * INCH)
+    turn = force_turn(IDEAL, crank_speed=1.0, shift=shift, angles=[0.0, 1.0, 2.0], partial=True)
+    assert turn.unreachable.tolist() == [0.0]
+    result = monte_carlo(turn, [Tolerance("rod.length", 1e-5)], samples=10)
+    assert result.messages == ("1 crank angles are left out: the nominal mechanism cannot be assembled there",)
+
+
 def test_across_a_dead_centre_there_is_no_mean() -> None:
     common: dict[str, Any] = {"crank_speed": CRANK_SPEED, "shift": ConstantShift(3.5 * INCH)}
     centre = force_turn(OFFSET, **common).dead_centres[0].crank_angle

@@ -1,0 +1,204 @@
+"""Speed of the slider-crank: runs in time, the FMU, joint forces over a turn by both formulations, Monte Carlo.
+
+    python -m benchmarks.slider_crank
+
+Runs: Rahman's case a4 = 10 in, S1 = 3.5 in from 50 rpm, a constant torque, 2.4 s. Error is the largest difference in slider
+position from a run at 1e-13, relative to the stroke; each solver gets the loosest tolerance whose error is at most 1e-6. Times are the best of several,
+ratios within this one process.
+"""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Callable
+from functools import cache, partial
+from pathlib import Path
+
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+from scipy.integrate import solve_ivp
+
+import build_fmu
+from analysis import compiled, simulate
+from analysis.inputs import SliderCrankInputs
+from analysis.slider_crank.closure import close
+from analysis.slider_crank.dual_dynamics import joint_loads
+from analysis.slider_crank.forces import ConstantShift, force_turn
+from analysis.slider_crank.tolerances import QUANTITIES, Tolerance, monte_carlo
+from benchmarks.engines import ACCURACY
+from benchmarks.fmu import STEP, seconds_per_step
+from benchmarks.solvers import SCIPY_METHODS, TOLERANCES, best_time
+from linkwork.slider_crank import dynamics, published
+from linkwork.slider_crank.kinematics import coefficients, position
+
+PARAMETERS, INITIAL = published.OFFSET_CASE
+TORQUE = 10.0  # N.m
+STOP = 2.4
+TIMES = np.linspace(0.0, STOP, 49)
+ANGLES = np.linspace(0.0, 2.0 * np.pi, 361)
+
+
+def in_process(tolerance: float) -> np.ndarray:
+    """Slider position at `TIMES` by the compiled solver."""
+    return _run(tolerance)["slider.position"]
+
+
+def _run(tolerance: float):  # type: ignore[no-untyped-def]
+    inputs = SliderCrankInputs(torque=TORQUE)
+    return simulate(PARAMETERS, inputs, initial=INITIAL, stop_time=STOP, samples=TIMES, tolerance=tolerance)
+
+
+def by_scipy(method: str, tolerance: float) -> np.ndarray:
+    """The same by one of SciPy's methods on the plain-Python right-hand side."""
+    p = PARAMETERS.constants()
+    inputs = dynamics.applied(0.0, 1.0, TORQUE, 0.0, 0.0, 0.0, 0.0, 0.0, p)
+    start = [INITIAL.crank_angle, INITIAL.shift_position, INITIAL.crank_speed, 0.0, 0.0, 0.0]
+
+    def rate(_: float, x: np.ndarray) -> tuple[float, ...]:
+        return dynamics.derivative(tuple(x.tolist()), inputs, p)
+
+    result = solve_ivp(rate, (0.0, STOP), start, method=method, t_eval=TIMES, rtol=tolerance, atol=tolerance)
+    return np.array([position(x[0], x[1], p).s4 for x in result.y.T.tolist()])
+
+
+@cache
+def reference() -> np.ndarray:
+    """Slider position at `TIMES` at a tolerance of 1e-13."""
+    return in_process(1e-13)
+
+
+def loosest(run: Callable[[float], np.ndarray]) -> tuple[float, float]:
+    """Loosest tolerance whose error and that of the next one are within the accuracy, and its error."""
+    candidate: tuple[float, float] | None = None
+    stroke = float(np.ptp(reference()))
+    for tolerance in TOLERANCES:
+        error = float(np.abs(run(float(tolerance)) - reference()).max()) / stroke
+        if error > ACCURACY:
+            candidate = None
+        elif candidate is None:
+            candidate = (float(tolerance), error)
+        else:
+            return candidate
+    raise RuntimeError("the accuracy is not reached at any tolerance")
+
+
+def runs() -> Table:
+    """The runs in time."""
+    tolerance, error = loosest(in_process)
+    whole = best_time(partial(in_process, tolerance), 30)
+    statistics = [_run(tolerance).statistics for _ in range(30)]
+    inner = min(s["seconds_integrating"] for s in statistics)
+    table = Table(title=f"{STOP} s under {TORQUE:g} N.m, error at most {ACCURACY:g} of the stroke")
+    for heading in ("solver", "error", "time [ms]", "times the integration"):
+        table.add_column(heading)
+
+    def row(name: str, error: float, seconds: float) -> None:
+        table.add_row(name, f"{error:.1e}", f"{1e3 * seconds:.3f}", f"{seconds / inner:.1f}")
+
+    row(f"in process, the integration ({int(statistics[0]['steps'])} steps)", error, inner)
+    row("in process, the whole call of simulate", error, whole)
+    best: tuple[float, float, str] | None = None
+    for method in SCIPY_METHODS:
+        setting, error = loosest(partial(by_scipy, method))
+        seconds = best_time(partial(by_scipy, method, setting), 3)
+        if best is None or seconds < best[0]:
+            best = (seconds, error, method)
+    assert best is not None
+    row(f"SciPy, plain-Python right-hand side, best method ({best[2]})", best[1], best[0])
+    return table
+
+
+def right_hand_side() -> tuple[float, float]:
+    """Time of one right-hand side, compiled and in plain Python (s)."""
+    p = PARAMETERS.constants()
+    n = 20_000
+    x = (1.0, INITIAL.shift_position, INITIAL.crank_speed, 0.0, 0.0, 0.0)
+    inputs = dynamics.applied(0.0, 1.0, TORQUE, 0.0, 0.0, 0.0, 0.0, 0.0, p)
+    states, forces, out = np.tile(x, (n, 1)), np.tile(inputs, (n, 1)), np.empty((n, 6))
+    fast = best_time(lambda: compiled.solver(p).derivatives(p, states, forces, out), 20) / n
+    plain = best_time(lambda: [dynamics.derivative(x, inputs, p) for _ in range(1000)]) / 1000
+    return fast, plain
+
+
+def _scalar_turn() -> None:
+    p = PARAMETERS.constants()
+    inputs = dynamics.applied(1.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, p)
+    for angle in ANGLES.tolist():
+        x = (angle, INITIAL.shift_position, INITIAL.crank_speed, 0.0, 0.0, 0.0)
+        q = position(x[0], x[1], p)
+        dynamics.reactions(q, x, dynamics.motion(q, coefficients(q, p), x, inputs, p), inputs, p)
+
+
+def _dual_turn() -> None:
+    closure = close(PARAMETERS, ANGLES, np.full(len(ANGLES), INITIAL.shift_position))
+    joint_loads(closure, speed=INITIAL.crank_speed, slider_force=0.0)
+
+
+def forces() -> Table:
+    """All joint forces over a turn of 361 points."""
+    shift = ConstantShift(INITIAL.shift_position)
+    arrays = best_time(lambda: force_turn(PARAMETERS, crank_speed=INITIAL.crank_speed, shift=shift, angles=ANGLES))
+    table = Table(title="all joint forces at 361 angles")
+    for heading in ("method", "time [ms]", "ratio"):
+        table.add_column(heading)
+    for name, seconds in (
+        ("vector mechanics on arrays, force_turn", arrays),
+        ("vector mechanics, the plant in plain Python", best_time(_scalar_turn)),
+        ("dual numbers: closure by Newton-Raphson, 17 equations", best_time(_dual_turn)),
+    ):
+        table.add_row(name, f"{1e3 * seconds:.1f}", f"{seconds / arrays:.1f}")
+    return table
+
+
+def tolerances() -> Table:
+    """Monte Carlo with a million samples at one angle."""
+    turn = force_turn(
+        PARAMETERS,
+        crank_speed=INITIAL.crank_speed,
+        shift=ConstantShift(INITIAL.shift_position),
+        angles=np.array([np.pi / 6.0]),
+    )
+    off = [
+        Tolerance(name="guide.offset", half_width=5e-4),
+        Tolerance(name="shift.position", half_width=5e-4),
+        Tolerance(name="guide.twist", half_width=2e-3),
+        Tolerance(name="crank.length", half_width=1e-4),
+        Tolerance(name="rod.length", half_width=2e-4),
+    ]
+    table = Table(title="a million samples of five tolerances at one angle")
+    for heading in ("quantities", "time [s]", "standard deviation of S4 over the linear estimate"):
+        table.add_column(heading)
+    for name, quantities in (
+        ("slider position", ("slider.position",)),
+        ("motion of the slider, torque and every joint force", tuple(QUANTITIES)),
+    ):
+        found = []
+        seconds = best_time(lambda q=quantities, f=found: f.append(monte_carlo(turn, off, quantities=q)), 3)
+        spread, linear = found[0].spreads["slider.position"], found[0].estimates["slider.position"]
+        ratio = float(spread.deviation[0] / linear.deviation[0])
+        table.add_row(name, f"{seconds:.2f}", f"{ratio:.5f}")
+    return table
+
+
+def main() -> None:
+    """Measure and print the tables."""
+    console = Console(width=140)
+    in_process(1e-6)
+    console.print(runs())
+    fast, plain = right_hand_side()
+    console.print(
+        f"a right-hand side takes {1e9 * fast:.0f} ns compiled, {1e6 * plain:.1f} microseconds in plain Python"
+    )
+    with tempfile.TemporaryDirectory() as folder:
+        whole, bare = seconds_per_step(Path(build_fmu.build("SliderCrank", folder)))
+    console.print(
+        f"the FMU takes {1e6 * whole:.0f} microseconds a step of {1e3 * STEP:g} ms, inputs and outputs included, and "
+        f"{1e6 * bare:.0f} for doStep alone: {STEP / whole:.1f} times faster than real time"
+    )
+    console.print(forces())
+    console.print(tolerances())
+
+
+if __name__ == "__main__":
+    main()
