@@ -266,10 +266,10 @@ class _Scene:
         shown = self.page(points)
         default: dict[str, Any] = {"color": GROUND, "linewidth": 1.0, "zorder": 4, "solid_capstyle": "round"}
         axis.plot(*shown.T, **default | look)
-        lengths = np.linalg.norm(np.diff(shown, axis=0), axis=1)
-        for start, end, length in zip(shown, shown[1:], lengths):
-            share = np.linspace(0.0, 1.0, max(2, ceil(2.5 * length / self.size)))[:, None]
-            self.taken.append(start + share * (end - start))
+        if len(shown) > 1:
+            way = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(shown, axis=0), axis=1)))
+            places = np.linspace(0.0, way[-1], max(2, ceil(2.5 * way[-1] / self.size)))
+            self.taken.append(np.column_stack([np.interp(places, way, x) for x in shown.T]))
 
     def _solids(self, axis: Axes, pose: _Pose) -> None:
         u, s, pin = self.size, self.side, pose.slider_pin
@@ -571,11 +571,11 @@ def animate_mechanism(
         writer = PillowWriter(fps=frames_per_second, metadata={})
         with writer.saving(figure, str(path), dpi=80):
             for pose in poses:
-                above.clear()
-                scene.prepare(above)
                 scene.draw(above, pose, letters=False)
                 dot.set_data([degrees(pose.angle)], [pose.slide])
                 writer.grab_frame()
+                for artist in (*above.lines, *above.collections):
+                    artist.remove()
     return path
 
 

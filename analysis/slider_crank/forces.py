@@ -300,7 +300,7 @@ def solve(
     x = (angle, shift.shift, speed, shift.velocity, 0.0, 0.0)
     grooved = 1.0 if groove else 0.0
     inputs = Inputs(1.0, 1.0 - grooved, grooved, 0.0, acceleration, 0.0, shift.acceleration, 0.0)
-    ratio = k.kth + grooved * f.groove(angle, p).y * k.ks
+    ratio = k.kth + grooved * f.groove(angle, p).pitch * k.ks
     load = (f.motion(q, k, x, inputs, p).torque - given) / ratio if torque else given
     inputs = inputs._replace(load=load)
     m = f.motion(q, k, x, inputs, p)

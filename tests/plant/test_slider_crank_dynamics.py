@@ -499,7 +499,7 @@ def test_axial_force_is_that_of_drive_groove_spring_and_damper() -> None:
             assert e.forces.axial == pytest.approx(
                 e.motion.force + shift_push(x[1], x[3], case.parameters), rel=1e-9, abs=1e-9
             )
-            pitch = K.groove(x[0], case.p).y
+            pitch = K.groove(x[0], case.p).pitch
             assert e.forces.bearing_moment.z == pytest.approx(
                 e.motion.torque - pitch * e.motion.groove_force, rel=1e-9, abs=1e-9
             )
@@ -512,7 +512,7 @@ def test_prescribed_motions_are_the_motions_under_the_forces_they_take() -> None
             case = seeded(seed)
             p, x, i = case.p, case.under(drive), case.inputs(drive)
             motion = evaluate(x, i, p).motion
-            pitch = K.groove(x[0], p).y
+            pitch = K.groove(x[0], p).pitch
             torque = motion.torque - pitch * motion.groove_force
             free = REST._replace(torque=torque, force=motion.force, load=i.load)
             again = evaluate(x, free, p).motion
@@ -596,7 +596,7 @@ def test_jump_of_speeds_conserves_the_momentum_that_no_impulse_acts_on(drive: st
         if i.shift_drive:
             assert dv == pytest.approx(-0.7, rel=1e-12)
         elif i.groove:
-            assert y[3] == pytest.approx(K.groove(x[0], p).y * y[2], rel=1e-12)
+            assert y[3] == pytest.approx(K.groove(x[0], p).pitch * y[2], rel=1e-12)
         else:
             assert second == pytest.approx(0.0, abs=1e-9 * (abs(m.m12 * dw) + m.m22 * abs(dv)))
 

@@ -167,9 +167,9 @@ def test_groove_is_equation_28_and_its_derivatives(seed: int) -> None:
     case = seeded(seed)
     th, p, par = case.state[0], case.p, case.parameters
     law = K.groove(th, p)
-    assert law.x == pytest.approx(par.groove_amplitude * sin(par.groove_ratio * th), abs=1e-15)
+    assert law.shift == pytest.approx(par.groove_amplitude * sin(par.groove_ratio * th), abs=1e-15)
     first, second = derivative(lambda h: K.groove(th + h, p)[:2], 1e-2)
-    assert (law.y, law.z) == pytest.approx((first, second), abs=1e-9)
+    assert (law.pitch, law.bend) == pytest.approx((first, second), abs=1e-9)
 
 
 @several

@@ -499,7 +499,7 @@ def test_groove_repeats_after_whole_turns(ratio: float, turns: int) -> None:
     assert law.span == pytest.approx(TURN * turns)
     angles = np.linspace(0.0, law.span, 501).tolist()
     assert max(abs(law.at(angle)[1]) for angle in angles) <= law.rate * (1.0 + 1e-12)
-    assert max(abs(K.groove(angle, model.constants()).z) for angle in angles) <= law.curvature * (1.0 + 1e-12)
+    assert max(abs(K.groove(angle, model.constants()).bend) for angle in angles) <= law.curvature * (1.0 + 1e-12)
     assert M.ranges(model, law)[0].high == law.span
 
 

@@ -165,7 +165,7 @@ def grooved(x: State, in_groove: float, p: Constants) -> State:
     th, s1, w, v, dissipated, supplied = x
     law = groove(th, p)
     free = 1.0 - in_groove
-    return (th, free * s1 + in_groove * law.x, w, free * v + in_groove * law.y * w, dissipated, supplied)
+    return (th, free * s1 + in_groove * law.shift, w, free * v + in_groove * law.pitch * w, dissipated, supplied)
 
 
 def inertia(q: Position, k: Coefficients, p: Constants) -> Inertia:
@@ -222,7 +222,7 @@ def motion(q: Position, k: Coefficients, x: State, i: Inputs, p: Constants) -> M
     r1 = q1 - b1 + i.torque
     r2 = q2 - b2 + i.force
     law = groove(th, p)
-    pitch = i.groove * law.y
+    pitch = i.groove * law.pitch
     # two linear equations, whose rows the drives choose: the crank's (with the groove's force on it eliminated) or the
     # prescribed crank acceleration; the shift's, the prescribed axial acceleration, or the groove's
     turning = 1.0 - i.speed_drive
@@ -232,7 +232,7 @@ def motion(q: Position, k: Coefficients, x: State, i: Inputs, p: Constants) -> M
     a21 = shifting * m.m12 - pitch
     a22 = shifting * m.m22 + (1.0 - shifting)
     c1 = turning * (r1 + pitch * r2) + i.speed_drive * i.acceleration
-    c2 = shifting * r2 + i.shift_drive * i.shift_acceleration + i.groove * law.z * w * w
+    c2 = shifting * r2 + i.shift_drive * i.shift_acceleration + i.groove * law.bend * w * w
     determinant = a11 * a22 - a12 * a21
     e = (c1 * a22 - a12 * c2) / determinant
     a = (a11 * c2 - a21 * c1) / determinant
@@ -345,9 +345,8 @@ def jump(x: State, i: Inputs, speed: float, shift_velocity: float, p: Constants)
         w + i.speed_drive * (speed - w) + (1.0 - i.speed_drive) * i.shift_drive * m.m12 / m.m11 * (v - shift_velocity)
     )
     follows = v + i.speed_drive * m.m12 / m.m22 * (w - w_new)
-    v_new = (1.0 - i.groove) * (i.shift_drive * shift_velocity + (1.0 - i.shift_drive) * follows) + i.groove * groove(
-        th, p
-    ).y * w_new
+    shifted = i.shift_drive * shift_velocity + (1.0 - i.shift_drive) * follows
+    v_new = (1.0 - i.groove) * shifted + i.groove * groove(th, p).pitch * w_new
     work = kinetic_energy(m, w_new, v_new) - kinetic_energy(m, w, v)
     return (th, s1, w_new, v_new, dissipated, supplied + work)
 

@@ -32,6 +32,14 @@ class Position(NamedTuple):
     s4: float
 
 
+class Groove(NamedTuple):
+    """Shift that a groove makes (m), and its first and second derivatives by the crank angle (m/rad, m/rad2)."""
+
+    shift: float
+    pitch: float
+    bend: float
+
+
 class Coefficients(NamedTuple):
     """Velocity coefficients: S4' = kth theta1' + ks S1' (m/rad and m/m)."""
 
@@ -105,21 +113,24 @@ def crank_pin_acceleration(q: Position, w: float, e: float, a: float, p: Constan
 
 def centripetal(q: Position, k: Coefficients, w: float, v: float, p: Constants) -> float:
     """Acceleration of the slider left when theta1'' = S1'' = 0 (m/s2): loop closure differentiated twice."""
-    rate = subtract(scale(k.kth * w + k.ks * v, guide(p)), crank_pin_velocity(q, w, v, p))
-    return (dot(rod(q, p), crank_pin_acceleration(q, w, 0.0, 0.0, p)) - dot(rate, rate)) / q.h
+    # r.r'' + r'.r' = 0 with the rod's vector r and its rate r' = -S4' k4 - v2; component by component, since every step of
+    # a run asks for it many times
+    slide = k.kth * w + k.ks * v
+    rate_x = p.a1 * q.s * w
+    rate_y = -slide * p.sa - p.a1 * q.c * w
+    rate_z = -slide * p.ca - v
+    towards = p.a1 * w * w * (q.f * q.c + (q.g * p.ca + q.h * p.sa) * q.s)
+    return (towards - rate_x * rate_x - rate_y * rate_y - rate_z * rate_z) / q.h
 
 
-def groove(th: float, p: Constants) -> Vector:
+def groove(th: float, p: Constants) -> Groove:
     """Shift that the groove makes and its first two derivatives by the crank angle: S1 = SS1 sin(alpha theta1), eq 28.
 
     Eq 28a prints S1 for SS1.
     """
     phase = p.ratio * th
-    return Vector(
-        p.amplitude * sin(phase),
-        p.amplitude * p.ratio * cos(phase),
-        -p.amplitude * p.ratio * p.ratio * sin(phase),
-    )
+    shift = p.amplitude * sin(phase)
+    return Groove(shift, p.amplitude * p.ratio * cos(phase), -p.ratio * p.ratio * shift)
 
 
 def rod_angular_velocity(r: Vector, rate: Vector, p: Constants) -> Vector:
