@@ -385,12 +385,13 @@ def _fmu(path: Path) -> None:
 @click.option("--list", "listing", is_flag=True, help="Only list the figures.")
 @handled
 def figures(numbers: Sequence[str], out: str, listing: bool) -> None:
-    """Make the thesis's figures, a still and an animation of the linkage: plots and CSV. NUMBERS such as 3.2; all by default.
+    """Make the theses' figures, a still and an animation of the linkage: plots and CSV. NUMBERS such as 3.2 (Youssef) or R5
+    (Rahman's figure 5); all by default.
 
     \b
     Examples:
       linkwork figures --list
-      linkwork figures 3.2 3.4 7.2
+      linkwork figures 3.2 3.4 7.2 R5
       linkwork figures --out figures
     """
     from ..studies import STUDIES, make

@@ -37,7 +37,6 @@ from analysis.simulate import SCIPY_METHODS, Event, channels
 from linkwork.errors import AssemblyError, InputError, ParameterError
 from linkwork.five_bar import dynamics
 from linkwork.five_bar.kinematics import coefficients, position
-from linkwork.limits import LIMIT_SINE
 from linkwork.five_bar.parameters import FiveBarParameters, InitialState
 from linkwork.five_bar.published import (
     CM_PER_METRE,
@@ -46,6 +45,7 @@ from linkwork.five_bar.published import (
     SETS,
     TABLE_3_1,
 )
+from linkwork.limits import LIMIT_SINE
 from tests import published
 from tests.fmu.runner import run_in_process
 from tests.strategies import seeded

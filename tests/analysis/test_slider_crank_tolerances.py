@@ -171,6 +171,24 @@ def test_everything_by_differences(problem: dict[str, Any], law: str) -> None:
             assert np.max(np.abs(found.of(quantity, name) - slope)) < allowed, (quantity, name)
 
 
+def test_motion_alone_is_the_motion_with_the_forces() -> None:
+    """Where no force is asked for the motion is calculated by itself."""
+    case = seeded(4)
+    turn = force_turn(
+        case.parameters,
+        crank_speed=case.state[2],
+        crank_acceleration=case.acceleration,
+        shift=GrooveShift(0.03, 1.3),
+        angles=case.state[0] + np.array([0.0, 0.01]),
+        partial=True,
+    )
+    motion = ("slider.position", "slider.velocity", "slider.acceleration")
+    alone, whole = sensitivities(turn, quantities=motion), sensitivities(turn)
+    for name in motion:
+        assert alone.values[name].data == pytest.approx(whole.values[name].data, rel=1e-12)
+        assert alone.derivatives[name].data == pytest.approx(whole.derivatives[name].data, rel=1e-10)
+
+
 def test_at_the_ideal_mechanism_shift_and_twist_are_of_the_second_order() -> None:
     turn = force_turn(IDEAL, crank_speed=CRANK_SPEED)
     found = sensitivities(turn, quantities=POSITION)
@@ -351,6 +369,7 @@ def test_samples_that_cannot_be_assembled_are_counted(seed: int) -> None:
     beyond = 0.5 * (1.0 - erf(1.0 / sqrt(2.0))) * samples
     assert abs(result.not_assembled[0] - beyond) < 5.0 * sqrt(beyond) + 0.002 * samples
     assert result.not_assembled[1] == 0
+    assert not result.undetermined.any()
     assert result.messages[0].startswith(f"{result.not_assembled[0]} of 20000 samples (1")
     assert "cannot be assembled at crank angle 0 deg, the most of any angle" in result.messages[0]
     spread = result.spreads["slider.position"]

@@ -14,7 +14,7 @@ from math import atan2, cos, sin, sqrt
 from typing import NamedTuple
 
 from .parameters import Constants
-from .vectors import Vector, cross, dot, scale, subtract
+from .vectors import Vector, cross, dot, scale
 
 
 class Position(NamedTuple):
