@@ -728,9 +728,7 @@ def control_loop(
         rows, source = np.array(inner.rows), "plant in process"
     else:
         modes = {"drive.mode": mode}
-        with FmuRun(
-            fmu, parameters, initial, modes=modes, inputs=inputs, start_time=0.0, tolerance=tolerance
-        ) as run:
+        with FmuRun(fmu, parameters, initial, modes=modes, inputs=inputs, start_time=0.0, tolerance=tolerance) as run:
             outer = _Fmu(run, inputs)
             result = _run_loop(outer, controller, reference, load, times)
             rows, source = np.array(outer.rows), str(fmu)

@@ -3,8 +3,8 @@
     python -m benchmarks.slider_crank
 
 Runs: Rahman's case a4 = 10 in, S1 = 3.5 in from 50 rpm, a constant torque, 2.4 s. Error is the largest difference in slider
-position from a run at 1e-13, relative to the stroke; each solver gets the loosest tolerance whose error is at most 1e-6. Times are the best of several,
-ratios within this one process.
+position from a run at 1e-13, relative to the stroke; each solver gets the loosest tolerance whose error is at most 1e-6. Times
+are the best of several, ratios within this one process.
 """
 
 from __future__ import annotations
