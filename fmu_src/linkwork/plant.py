@@ -30,6 +30,17 @@ def check_tolerance(tolerance: float) -> None:
         raise ParameterError("solver.tolerance", tolerance, f"be between {low:g} and {high:g}")
 
 
+def error_scale(length: float, mass: float, inertia: float, crank_speed: float) -> tuple[float, ...]:
+    """Magnitudes of a state's components below which the integrator's error counts as absolute.
+
+    Of a mechanism with a crank of that length (m) and moment of inertia (kg.m2), other links of that mass (kg), and a crank
+    speed at the start (rad/s).
+    """
+    speed = max(1.0, abs(crank_speed))
+    energy = 0.5 * (inertia + mass * length * length) * speed * speed
+    return (1.0, length, speed, length * speed, energy, energy)
+
+
 class Mode(NamedTuple):
     """A way of driving a freedom: the parameter that chooses it and the words for its values, 0 and on."""
 

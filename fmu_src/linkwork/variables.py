@@ -79,6 +79,36 @@ class Variable(NamedTuple):
     level: str = "all"
 
 
+def output(
+    name: str,
+    unit: str,
+    description: str,
+    symbol: str = "",
+    depends: str = "all",
+    level: str = "all",
+    *,
+    minimum: float | None = None,
+    maximum: float | None = None,
+    display: str = "",
+) -> Variable:
+    """A real output."""
+    return Variable(name, "output", unit, description, symbol, 0.0, "Real", minimum, maximum, display, depends, level)
+
+
+def tolerance_parameter() -> Variable:
+    """The parameter every slave of ours has: how exact a step is."""
+    return Variable(
+        "solver.tolerance",
+        "parameter",
+        "1",
+        "Relative bound of the local error of a step; the master's tolerance is taken where it is tighter",
+        "",
+        1e-9,
+        minimum=1e-13,
+        maximum=1e-2,
+    )
+
+
 def status_outputs() -> tuple[Variable, Variable]:
     """The two outputs every slave of ours has: why its last step was refused, if it was."""
     return (

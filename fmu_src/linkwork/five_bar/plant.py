@@ -5,6 +5,7 @@ from __future__ import annotations
 from math import asin, degrees
 from typing import ClassVar
 
+from .. import plant
 from ..errors import AssemblyError
 from ..integrate import Vector
 from ..limits import LIMIT_SINE, NEAR_LIMIT
@@ -55,11 +56,8 @@ def error_scale(parameters: FiveBarParameters, crank_speed: float) -> tuple[floa
 
     ``crank_speed`` is the speed at the start (rad/s).
     """
-    length = parameters.crank_length
     mass = parameters.coupler_mass + parameters.rocker_mass + parameters.slider_mass
-    speed = max(1.0, abs(crank_speed))
-    energy = 0.5 * (parameters.crank_inertia + mass * length * length) * speed * speed
-    return (1.0, length, speed, length * speed, energy, energy)
+    return plant.error_scale(parameters.crank_length, mass, parameters.crank_inertia, crank_speed)
 
 
 class Plant(MechanismPlant):

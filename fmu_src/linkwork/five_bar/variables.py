@@ -8,7 +8,7 @@ from __future__ import annotations
 from math import pi
 
 from ..parameters import field_name
-from ..variables import Variable, status_outputs
+from ..variables import Variable, output, status_outputs, tolerance_parameter
 from .published import SETS
 
 _SET = SETS["table-3.1"]
@@ -110,16 +110,7 @@ PARAMETERS = (
     ),
     Variable("initial.slider_position", "parameter", "m", "Slider position at the start", "u"),
     Variable("initial.slider_velocity", "parameter", "m/s", "Slider velocity at the start", "\\dot u"),
-    Variable(
-        "solver.tolerance",
-        "parameter",
-        "1",
-        "Relative bound of the local error of a step; the master's tolerance is taken where it is tighter",
-        "",
-        1e-9,
-        minimum=1e-13,
-        maximum=1e-2,
-    ),
+    tolerance_parameter(),
 )
 
 INPUTS = (
@@ -148,36 +139,21 @@ INPUTS = (
 )
 
 
-def _output(
-    name: str,
-    unit: str,
-    description: str,
-    symbol: str = "",
-    depends: str = "all",
-    level: str = "all",
-    *,
-    minimum: float | None = None,
-    maximum: float | None = None,
-    display: str = "",
-) -> Variable:
-    return Variable(name, "output", unit, description, symbol, 0.0, "Real", minimum, maximum, display, depends, level)
-
-
 def _pin(pin: str, description: str) -> tuple[Variable, Variable]:
     return (
-        _output(f"pin.{pin}.fx", "N", f"Force of {description}, along the ground link"),
-        _output(f"pin.{pin}.fy", "N", f"Force of {description}, to the left of the ground link"),
+        output(f"pin.{pin}.fx", "N", f"Force of {description}, along the ground link"),
+        output(f"pin.{pin}.fy", "N", f"Force of {description}, to the left of the ground link"),
     )
 
 
 #: The real outputs stand in the order of `dynamics.Outputs`.
 OUTPUTS = (
-    _output(
+    output(
         "crank.angle", "rad", "Crank angle, counted on over full turns", "\\theta_2", "state", "position", display="deg"
     ),
-    _output("crank.speed", "rad/s", "Crank speed", "\\dot\\theta_2", "speed", "velocity", display="rpm"),
-    _output("crank.acceleration", "rad/s2", "Crank acceleration", "\\ddot\\theta_2"),
-    _output(
+    output("crank.speed", "rad/s", "Crank speed", "\\dot\\theta_2", "speed", "velocity", display="rpm"),
+    output("crank.acceleration", "rad/s2", "Crank acceleration", "\\ddot\\theta_2"),
+    output(
         "coupler.angle",
         "rad",
         "Coupler angle B to C",
@@ -188,7 +164,7 @@ OUTPUTS = (
         maximum=pi,
         display="deg",
     ),
-    _output(
+    output(
         "rocker.angle",
         "rad",
         "Absolute rocker angle D to C",
@@ -199,34 +175,32 @@ OUTPUTS = (
         maximum=pi,
         display="deg",
     ),
-    _output("slider.position", "m", "Slider position along the guide", "u", "state", "position"),
-    _output("slider.velocity", "m/s", "Slider velocity", "\\dot u", "speed", "velocity"),
-    _output("slider.acceleration", "m/s2", "Slider acceleration", "\\ddot u"),
-    _output("coupler.point.x", "m", "Coupler point P, along the ground link from A", "x", "state", "position"),
-    _output("coupler.point.y", "m", "Coupler point P, to the left of the ground link", "y", "state", "position"),
-    _output(
-        "drive.applied_torque", "N.m", "Torque on the crank; in speed drive the torque that holds the speed", "T_1"
-    ),
+    output("slider.position", "m", "Slider position along the guide", "u", "state", "position"),
+    output("slider.velocity", "m/s", "Slider velocity", "\\dot u", "speed", "velocity"),
+    output("slider.acceleration", "m/s2", "Slider acceleration", "\\ddot u"),
+    output("coupler.point.x", "m", "Coupler point P, along the ground link from A", "x", "state", "position"),
+    output("coupler.point.y", "m", "Coupler point P, to the left of the ground link", "y", "state", "position"),
+    output("drive.applied_torque", "N.m", "Torque on the crank; in speed drive the torque that holds the speed", "T_1"),
     *_pin("A", "the ground on the crank"),
     *_pin("B", "the crank on the coupler"),
     *_pin("C", "the rocker on the coupler"),
     *_pin("D", "the slider on the rocker"),
-    _output("slider.guide_force", "N", "Force of the guide on the slider, to the left of its direction of travel"),
-    _output("energy.kinetic", "J", "Kinetic energy of all links", "", "speed", "velocity", minimum=0.0),
-    _output(
+    output("slider.guide_force", "N", "Force of the guide on the slider, to the left of its direction of travel"),
+    output("energy.kinetic", "J", "Kinetic energy of all links", "", "speed", "velocity", minimum=0.0),
+    output(
         "energy.potential",
         "J",
         "Potential energy of spring and gravity, the latter zero with every centre of mass at A",
         "",
         "state",
     ),
-    _output("energy.dissipated", "J", "Work lost in damper and guide since the start", "", "state"),
-    _output("energy.supplied", "J", "Work of crank torque, slider force and load since the start", "", "speed"),
-    _output(
+    output("energy.dissipated", "J", "Work lost in damper and guide since the start", "", "state"),
+    output("energy.supplied", "J", "Work of crank torque, slider force and load since the start", "", "speed"),
+    output(
         "energy.residual", "J", "Energy balance: gained plus dissipated less supplied; zero but for error", "", "speed"
     ),
-    _output("closure.residual", "m", "Length by which the loop fails to close", "", "state", "position", minimum=0.0),
-    _output(
+    output("closure.residual", "m", "Length by which the loop fails to close", "", "state", "position", minimum=0.0),
+    output(
         "transmission.angle",
         "rad",
         "Angle between coupler and rocker at C",

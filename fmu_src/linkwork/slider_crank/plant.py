@@ -5,6 +5,7 @@ from __future__ import annotations
 from math import degrees
 from typing import ClassVar
 
+from .. import plant
 from ..integrate import Vector
 from ..limits import NEAR_LIMIT
 from ..plant import MechanismPlant, Mode
@@ -41,11 +42,8 @@ def error_scale(parameters: SliderCrankParameters, crank_speed: float) -> tuple[
 
     ``crank_speed`` is the speed at the start (rad/s).
     """
-    length = parameters.crank_length
     mass = parameters.crank_mass + parameters.rod_mass + parameters.slider_mass
-    speed = max(1.0, abs(crank_speed))
-    energy = 0.5 * (parameters.crank_inertia + mass * length * length) * speed * speed
-    return (1.0, length, speed, length * speed, energy, energy)
+    return plant.error_scale(parameters.crank_length, mass, parameters.crank_inertia, crank_speed)
 
 
 class Plant(MechanismPlant):

@@ -8,7 +8,7 @@ from __future__ import annotations
 from math import pi
 
 from ..parameters import field_name
-from ..variables import Variable, status_outputs
+from ..variables import Variable, output, status_outputs, tolerance_parameter
 from .published import CRANK_SPEED, OFFSET_CASE
 
 _MECHANISM, _INITIAL = OFFSET_CASE
@@ -126,16 +126,7 @@ PARAMETERS = (
         "Axial velocity at the start; where axial.mode is 1 axial.speed takes its place, where it is 2 the groove's",
         "\\dot S_1",
     ),
-    Variable(
-        "solver.tolerance",
-        "parameter",
-        "1",
-        "Relative bound of the local error of a step; the master's tolerance is taken where it is tighter",
-        "",
-        1e-9,
-        minimum=1e-13,
-        maximum=1e-2,
-    ),
+    tolerance_parameter(),
 )
 
 INPUTS = (
@@ -175,53 +166,38 @@ INPUTS = (
 )
 
 
-def _output(
-    name: str,
-    unit: str,
-    description: str,
-    symbol: str = "",
-    depends: str = "all",
-    level: str = "all",
-    *,
-    minimum: float | None = None,
-    maximum: float | None = None,
-    display: str = "",
-) -> Variable:
-    return Variable(name, "output", unit, description, symbol, 0.0, "Real", minimum, maximum, display, depends, level)
-
-
 def _vector(
     prefix: str, unit: str, description: str, depends: str = "all", level: str = "all", symbols: str = "   "
 ) -> tuple[Variable, ...]:
     """Three outputs, the components of a vector along x, y and z of the ground frame."""
     return tuple(
-        _output(f"{prefix}{axis}", unit, f"{description}, along {axis}", symbol.strip(), depends, level)
+        output(f"{prefix}{axis}", unit, f"{description}, along {axis}", symbol.strip(), depends, level)
         for axis, symbol in zip("xyz", symbols)
     )
 
 
 #: The real outputs stand in the order of `dynamics.Outputs`.
 OUTPUTS = (
-    _output(
+    output(
         "crank.angle", "rad", "Crank angle, counted on over full turns", "\\theta_1", "state", "position", display="deg"
     ),
-    _output("crank.speed", "rad/s", "Crank speed", "\\dot\\theta_1", "speed", "velocity", display="rpm"),
-    _output("crank.acceleration", "rad/s2", "Crank acceleration", "\\ddot\\theta_1"),
-    _output("shift.position", "m", "Axial shift of the crank", "S_1", "state", "position"),
-    _output("shift.velocity", "m/s", "Axial velocity of the crank", "\\dot S_1", "speed", "velocity"),
-    _output("shift.acceleration", "m/s2", "Axial acceleration of the crank", "\\ddot S_1"),
-    _output(
+    output("crank.speed", "rad/s", "Crank speed", "\\dot\\theta_1", "speed", "velocity", display="rpm"),
+    output("crank.acceleration", "rad/s2", "Crank acceleration", "\\ddot\\theta_1"),
+    output("shift.position", "m", "Axial shift of the crank", "S_1", "state", "position"),
+    output("shift.velocity", "m/s", "Axial velocity of the crank", "\\dot S_1", "speed", "velocity"),
+    output("shift.acceleration", "m/s2", "Axial acceleration of the crank", "\\ddot S_1"),
+    output(
         "slider.position", "m", "Slider position along the guide, from the common normal", "S_4", "state", "position"
     ),
-    _output("slider.velocity", "m/s", "Slider velocity", "\\dot S_4", "speed", "velocity"),
-    _output("slider.acceleration", "m/s2", "Slider acceleration", "\\ddot S_4"),
+    output("slider.velocity", "m/s", "Slider velocity", "\\dot S_4", "speed", "velocity"),
+    output("slider.acceleration", "m/s2", "Slider acceleration", "\\ddot S_4"),
     *_vector("crank_pin.", "m", "Crank pin", "state", "position"),
     *_vector("slider_pin.", "m", "Slider pin", "state", "position"),
     *_vector("rod.w", "rad/s", "Angular velocity of the rod, none about itself", "speed", "velocity"),
-    _output(
+    output(
         "drive.applied_torque", "N.m", "Torque of the drive; where drive.mode is 1 the torque that holds the speed", "T"
     ),
-    _output(
+    output(
         "axial.applied_force",
         "N",
         "Force of what drives the shift; where axial.mode is 1 or 2 the force that holds it",
@@ -232,21 +208,21 @@ OUTPUTS = (
     *_vector("slider_pin.f", "N", "Force of the slider on the rod"),
     *_vector("guide.f", "N", "Force of the guide on the slider, across the guide"),
     *_vector("guide.m", "N.m", "Moment of the guide on the slider, about the slider pin"),
-    _output("energy.kinetic", "J", "Kinetic energy of all links", "", "speed", "velocity", minimum=0.0),
-    _output(
+    output("energy.kinetic", "J", "Kinetic energy of all links", "", "speed", "velocity", minimum=0.0),
+    output(
         "energy.potential",
         "J",
         "Potential energy of springs and gravity, the latter zero with every centre of mass at O",
         "",
         "state",
     ),
-    _output("energy.dissipated", "J", "Work lost in dampers and guide since the start", "", "state"),
-    _output("energy.supplied", "J", "Work of crank torque, axial force and slider load since the start", "", "speed"),
-    _output(
+    output("energy.dissipated", "J", "Work lost in dampers and guide since the start", "", "state"),
+    output("energy.supplied", "J", "Work of crank torque, axial force and slider load since the start", "", "speed"),
+    output(
         "energy.residual", "J", "Energy balance: gained plus dissipated less supplied; zero but for error", "", "speed"
     ),
-    _output("closure.residual", "m", "Length by which the loop fails to close", "", "state", "position", minimum=0.0),
-    _output(
+    output("closure.residual", "m", "Length by which the loop fails to close", "", "state", "position", minimum=0.0),
+    output(
         "transmission.angle",
         "rad",
         "Angle between the rod and the plane normal to the guide; 0 at the limit of assembly",
@@ -257,7 +233,7 @@ OUTPUTS = (
         maximum=0.5 * pi,
         display="deg",
     ),
-    _output(
+    output(
         "assembly.margin",
         "m",
         "Rod length less the crank pin's distance from the guide; positive inside the range of assembly",
