@@ -64,6 +64,17 @@ def number_or_text(text: str) -> int | float | str:
     return text
 
 
+def changes(settings: Sequence[str], read: Callable[[str], Any], example: str) -> dict[str, Any]:
+    """Values by dotted name from what was given as ``--set NAME=VALUE``."""
+    values: dict[str, Any] = {}
+    for setting in settings:
+        name, equals, text = setting.partition("=")
+        if not equals or not name.strip():
+            raise click.UsageError(f"--set {setting!r}: it must be NAME=VALUE, such as {example}")
+        values[name.strip()] = read(text.strip())
+    return values
+
+
 def prepare_solver(*, orbits: bool = False) -> None:
     """Load the compiled equations, and say why it takes so long where they are compiled first."""
     with console.status("preparing the solver: its equations are compiled once, in about half a minute"):
@@ -79,12 +90,7 @@ def chosen_case(file: str | None, published: str | None, settings: Sequence[str]
 
     if (file is None) == (published is None):
         raise click.UsageError("give either a case file or --published NAME")
-    overrides: dict[str, Any] = {}
-    for setting in settings:
-        name, equals, value = setting.partition("=")
-        if not equals:
-            raise click.UsageError(f"--set {setting!r}: it must be NAME=VALUE, such as slider.stiffness='2e6 dyn/cm'")
-        overrides[name.strip()] = number_or_text(value.strip())
+    overrides = changes(settings, number_or_text, "slider.stiffness='2e6 dyn/cm'")
     if file is not None:
         return io.load_case(file, overrides)
     assert published is not None

@@ -12,24 +12,19 @@ import click
 from rich.markup import escape
 from rich.table import Table
 
-from .common import INTERRUPTED, console, errors, handled
+from .common import INTERRUPTED, changes, console, errors, handled
 
 
 def settings_of(settings: Sequence[str]) -> dict[str, Any]:
     """Overrides of a case file from NAME=VALUE: a value of TOML, else a text with its unit."""
-    overrides: dict[str, Any] = {}
-    for setting in settings:
-        name, equals, text = setting.partition("=")
-        if not equals or not name.strip():
-            raise click.UsageError(
-                f"--set {setting!r}: it must be NAME=VALUE, such as constraints.largest_link='300 mm'"
-            )
+
+    def value(text: str) -> Any:
         try:
-            value: Any = tomllib.loads(f"value = {text.strip()}")["value"]
+            return tomllib.loads(f"value = {text}")["value"]
         except tomllib.TOMLDecodeError:
-            value = text.strip()
-        overrides[name.strip()] = value
-    return overrides
+            return text
+
+    return changes(settings, value, "constraints.largest_link='300 mm'")
 
 
 def wrote(paths: Sequence[Path]) -> None:

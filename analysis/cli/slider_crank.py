@@ -19,7 +19,7 @@ from linkwork.slider_crank import mobility
 from linkwork.slider_crank.parameters import SliderCrankParameters
 from linkwork.slider_crank.published import SETS, PublishedSet
 
-from .common import CHECK_FAILED, console, errors, handled, number_or_text, tolerance_option
+from .common import CHECK_FAILED, changes, console, errors, handled, number_or_text, tolerance_option
 from .design import wrote
 
 if TYPE_CHECKING:
@@ -162,26 +162,21 @@ def _chosen(
             raise io.unknown_name(name, SETS)
         base = SETS[name]
         title, parameters, start, pace = base.source, base.parameters, base.initial.shift_position, base.crank_speed
-    changes: dict[str, Any] = {}
-    for setting in settings:
-        key, equals, value = setting.partition("=")
-        if not equals:
-            raise click.UsageError(f"--set {setting!r}: it must be NAME=VALUE, such as rod.length='45 in'")
-        changes[key.strip()] = number_or_text(value.strip())
+    values = changes(settings, number_or_text, "rod.length='45 in'")
     for key, text in (("guide.offset", offset), ("guide.twist", twist)):
         if text is not None:
-            changes[key] = number_or_text(text)
+            values[key] = number_or_text(text)
     if shift is not None:
         if groove is not None:
             raise click.UsageError("--shift holds the crank, --groove moves it: give one of them")
         start = io.quantity(number_or_text(shift), "m", "--shift")
     if speed is not None:
         pace = io.quantity(number_or_text(speed), "rad/s", "--speed")
-    if changes:
-        changed = io.parameters_from(changes, parameters)
+    if values:
+        changed = io.parameters_from(values, parameters)
         assert isinstance(changed, SliderCrankParameters)
         parameters = changed
-    if base is not None and (changes or shift is not None or groove is not None):
+    if base is not None and (values or shift is not None or groove is not None):
         name, title = "slider-crank", _words(told, parameters, start, groove)
     return _Chosen(name=name, title=title, parameters=parameters, shift=start, groove=groove, speed=pace)
 

@@ -169,6 +169,7 @@ def assert_ranges_are_those_of_a_scan(par: SliderCrankParameters, shift: float) 
     law = M.constant_shift(shift)
     found = M.ranges(par, law)
     assert len(found) <= 2
+    assert [part.low for part in found] == sorted(part.low for part in found)
     size = par.rod_length**2 + squares(par, shift, np.linspace(0.0, TURN, 50)).min() ** 2
     covered = []
     for part in found:
@@ -268,6 +269,22 @@ def test_crank_turns_fully_up_to_the_greatest_shift(drawn: tuple[SliderCrankPara
         if greatest > tiny:
             assert M.turns_fully(par, M.constant_shift(sign * (greatest - tiny)))
         assert not M.turns_fully(par, M.constant_shift(sign * (greatest + tiny)))
+
+
+def test_greatest_shift_of_general_mechanisms_is_that_of_a_scan() -> None:
+    angles = np.linspace(0.0, TURN, 20001)
+    found = 0
+    for par, _ in general(60):
+        room = par.rod_length**2 - (par.crank_length * np.cos(angles) + par.guide_offset) ** 2
+        bounds = np.sqrt(np.maximum(room, 0.0)) + par.crank_length * np.sin(angles) * abs(cos(par.guide_twist))
+        greatest = M.greatest_shift(par)
+        if greatest is None:
+            assert room.min() < 0.0 or bounds.min() < 1e-6
+            continue
+        found += 1
+        assert greatest * abs(sin(par.guide_twist)) == pytest.approx(bounds.min(), abs=1e-6)
+        assert greatest * abs(sin(par.guide_twist)) <= bounds.min() + 1e-13
+    assert found > 10
 
 
 def test_any_shift_will_do_along_a_parallel_guide() -> None:
@@ -437,7 +454,7 @@ def assert_law_agrees_with_a_scan(par: SliderCrankParameters, law: M.ShiftLaw) -
         k = K.coefficients(K.position(angle, s1, p), p)
         return k.kth + k.ks * ds1, k.kth
 
-    angles = np.linspace(0.05, 0.05 + law.span, 1500 * law.turns).tolist()
+    angles = np.linspace(0.05, 0.05 + law.span, 700 * law.turns).tolist()
     on_grid = [rates(angle) for angle in angles]
     for which, found in enumerate((M.dead_centres(par, law), M.singularities(par, law))):
         crossings = [
@@ -462,7 +479,7 @@ def assert_law_agrees_with_a_scan(par: SliderCrankParameters, law: M.ShiftLaw) -
 def test_groove_of_general_mechanisms() -> None:
     source = random.Random(8)
     kinds = set()
-    for par, _ in general(40):
+    for par, _ in general(60):
         model = grooved(par, source.uniform(-0.6, 0.6), source.choice((1.0, 2.0, 3.0, -2.0, 0.5, 1.5, 2.0 / 3.0)))
         law = M.groove_shift(model)
         assert_law_agrees_with_a_scan(model, law)
@@ -482,6 +499,8 @@ def test_ends_of_ranges_along_a_groove() -> None:
     law = M.groove_shift(model)
     found = M.ranges(model, law)
     assert len(found) > 2
+    assert [part.low for part in found] == sorted(part.low for part in found)
+    assert found[-1].high > TURN  # the last goes on past the turn
     for part in found:
         for end in (part.low, part.high):
             shift = model.groove_amplitude * sin(3.0 * end)
