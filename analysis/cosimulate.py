@@ -79,9 +79,13 @@ class FmuRun:
         needed = (*self.input_names, *self.output_names, "solver.status")
         missing = [name for name in needed if name not in self._references]
         if description.coSimulation is None:
-            missing.append("co-simulation")
+            missing.insert(0, "co-simulation")
         if missing:
-            raise CosimulationError(f"{fmu} is not a {mechanism.fmu} for co-simulation: it has no {', '.join(missing)}")
+            named = ", ".join(missing[:3]) + (f" and {len(missing) - 3} others" if len(missing) > 3 else "")
+            raise CosimulationError(
+                f"{fmu} is not a {mechanism.fmu} for co-simulation, which these parameters need, but "
+                f"{description.modelName}: it has no {named}"
+            )
         self._callbacks = fmi2CallbackFunctions()
         self._callbacks.logger = fmi2CallbackLoggerTYPE(self._log)
         addLoggerProxy(byref(self._callbacks))

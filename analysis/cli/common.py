@@ -11,7 +11,7 @@ from typing import Any
 import click
 from rich.console import Console
 
-from linkwork.errors import Interrupted, LinkworkError
+from linkwork.errors import InputError, Interrupted, LinkworkError
 
 WRONG = 1
 ENDED_EARLY = 3
@@ -82,6 +82,25 @@ def prepare_solver(*, orbits: bool = False) -> None:
 
         if orbits:
             from .. import orbit_kernels  # noqa: F401
+
+
+def five_bar_case(file: str | None, published: str | None, settings: Sequence[str]) -> Any:
+    """The case that a command for five-bars is about.
+
+    Raises
+    ------
+    InputError
+        If it is another mechanism's.
+    """
+    from ..mechanism import FIVE_BAR, mechanism_of
+
+    case = chosen_case(file, published, settings)
+    mechanism = mechanism_of(case.parameters)
+    if mechanism is not FIVE_BAR:
+        raise InputError(
+            f"{file or published} is a case of the {mechanism.name}: this command is for cases of the {FIVE_BAR.name}"
+        )
+    return case
 
 
 def chosen_case(file: str | None, published: str | None, settings: Sequence[str]) -> Any:

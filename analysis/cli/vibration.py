@@ -16,7 +16,7 @@ from rich.table import Table
 from linkwork.errors import InputError
 from linkwork.five_bar.published import CM_PER_METRE, RAD_S_PER_RPM, SETS
 
-from .common import ENDED_EARLY, INTERRUPTED, chosen_case, console, errors, handled, number_or_text, prepare_solver
+from .common import ENDED_EARLY, INTERRUPTED, console, errors, five_bar_case, handled, number_or_text, prepare_solver
 
 #: Range of speeds where none is given, relative to the natural frequency.
 _RANGE = (0.15, 1.5)
@@ -124,7 +124,7 @@ def resonance(
     from ..branches import unit_of
     from ..resonance import ResponseInterrupted, approximations, frequency_response, natural_frequency
 
-    chosen = chosen_case(case, published, settings)
+    chosen = five_bar_case(case, published, settings)
     parameters = chosen.parameters
     over_speed = vary == "drive.speed"
     if over_speed and speed is not None:
@@ -281,7 +281,7 @@ def stability(
     from ..orbits import orbit_of
     from ..stability import linear_verdict
 
-    chosen = chosen_case(case, published, settings)
+    chosen = five_bar_case(case, published, settings)
     parameters = chosen.parameters
     drive = _drive(chosen, speed)
     start = _start(chosen, drive, guess_speed)

@@ -335,3 +335,10 @@ def test_resonance_over_the_torque(linkwork):
         "--from", "0.005", "--to", "0.06", "--guess-speed", "540 rpm", "--no-plot", "--no-doubled",
     )  # fmt: skip
     assert "fold at 0.04949" in result.output, result.output
+
+
+@pytest.mark.parametrize("command", ["resonance", "stability"])
+def test_commands_for_five_bars_refuse_a_slider_crank(command: str) -> None:
+    result = CliRunner().invoke(cli.main, [command, "--published", "rahman-ideal"])
+    assert result.exit_code == 1
+    assert "rahman-ideal is a case of the slider-crank: this command is for cases of the five-bar" in result.stderr

@@ -356,7 +356,7 @@ def test_foreign_fmu(tmp_path: Path, interface: str) -> None:
     path = tmp_path / "foreign.fmu"
     with zipfile.ZipFile(path, "w") as archive:
         archive.writestr("modelDescription.xml", FOREIGN.format(interface=f'<{interface} modelIdentifier="Foreign"/>'))
-    with pytest.raises(CosimulationError, match=r"is not a FiveBarSlider for co-simulation: it has no .*drive\.speed"):
+    with pytest.raises(CosimulationError, match=r"is not a FiveBarSlider .*, but Foreign: it has no .*drive\.speed"):
         _cosimulate(path)
 
 
