@@ -29,6 +29,7 @@ bench: $(READY)
 	$(BIN)/python -m benchmarks.fmu
 	$(BIN)/python -m benchmarks.stability
 	$(BIN)/python -m benchmarks.synthesis
+	$(BIN)/python -m benchmarks.slider_crank
 
 $(READY): pyproject.toml
 	@$(PYTHON) -c 'import sys; sys.exit(0 if sys.version_info >= (3, 11) else "Linkwork needs Python 3.11 or newer: set PYTHON=python3.x")'

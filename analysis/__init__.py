@@ -11,7 +11,18 @@
 from __future__ import annotations
 
 from .cosimulate import Comparison, CosimulationError, FmuRun, OutputDifference, compare, cosimulate
-from .inputs import Function, Harmonics, InductionMotor, Inputs, Piecewise, TorsionBar, ramp, steps, table
+from .inputs import (
+    Function,
+    Harmonics,
+    InductionMotor,
+    Inputs,
+    Piecewise,
+    SliderCrankInputs,
+    TorsionBar,
+    ramp,
+    steps,
+    table,
+)
 from .simulate import Ensemble, Event, RunInterrupted, sample_times, simulate, simulate_many
 from .trajectory import Occurrence, Trajectory
 
@@ -29,6 +40,7 @@ __all__ = [
     "OutputDifference",
     "Piecewise",
     "RunInterrupted",
+    "SliderCrankInputs",
     "TorsionBar",
     "Trajectory",
     "compare",

@@ -12,7 +12,7 @@ from linkwork.five_bar import published as five_bar_published
 from linkwork.five_bar.parameters import InitialState as FiveBarState
 from linkwork.slider_crank import published as slider_crank_published
 
-from .inputs import INPUTS_OF, Channels, Inputs
+from .inputs import INPUTS_OF, Channels, Inputs, given
 from .mechanism import InitialState, Parameters, mechanism_of
 
 #: The published sets of every mechanism, by name: each has parameters, initial, crank_speed and source.
@@ -29,7 +29,7 @@ class Case:
     ----------
     title : str
     parameters, initial, inputs
-        All of one mechanism, `analysis.mechanism`.
+        All of one mechanism, `analysis.mechanism`; initial and inputs are by default those of a five-bar at rest.
     stop_time : float
         End of the run (s); it starts at 0.
     step : float
@@ -44,6 +44,10 @@ class Case:
     stop_time: float
     step: float = 1e-3
     tolerance: float = 1e-9
+
+    def __post_init__(self) -> None:
+        # inputs and start of another mechanism are told here, not when it is run
+        given(mechanism_of(self.parameters), self.inputs, self.initial)
 
 
 def published_case(name: str, *, revolutions: float = 3.0, steps_per_revolution: int = 360) -> Case:

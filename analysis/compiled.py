@@ -17,10 +17,10 @@ from __future__ import annotations
 import hashlib
 import os
 import tempfile
-from functools import cache
+from functools import cache, cached_property
 from math import cos, isfinite, isnan, sin
 from pathlib import Path
-from types import FunctionType, SimpleNamespace
+from types import FunctionType
 from typing import NamedTuple
 
 import numba
@@ -59,8 +59,15 @@ EVENT = 10
 BEGIN, ELAPSED, STEP, SAMPLE, INTERVAL, EVENTS, STEPS, REJECTED, EVALUATIONS, STARTED, MIDWAY, LOST, HELD = range(13)
 CARRY = HELD + 8
 
-#: Modules of this package whose code ends up in compiled code.
-COMPILED_MODULES = ("compiled.py", "orbit_kernels.py", "symbolic.py", "synthesis/kernels.py")
+#: Modules of this package whose code or constants end up in compiled code.
+COMPILED_MODULES = (
+    "compiled.py",
+    "inputs.py",
+    "orbit_kernels.py",
+    "symbolic.py",
+    "synthesis/kernels.py",
+    "tracing.py",
+)
 #: Events that one step can bring at most, and the beginning of an interval besides.
 EVENTS_PER_STEP = 4
 #: Fraction of a step within which an event counts as simultaneous with the end of the run or the release.
@@ -869,47 +876,62 @@ def derivatives(p, states, forces, out):  # type: ignore[no-untyped-def]
             out[i, j] = row[j]
 
 
-def solver(p: NamedTuple) -> SimpleNamespace:
-    """`run`, `run_many`, `outputs` and `derivatives`, compiled for the mechanism whose constants ``p`` are."""
+class Solver:
+    """`run`, `run_many`, `outputs` and `derivatives` for one mechanism, each compiled the first time that it is asked for."""
+
+    def __init__(self, constants):  # type: ignore[no-untyped-def]
+        self._p = constants_type(constants)
+
+    @cached_property
+    def run(self):  # type: ignore[no-untyped-def]
+        arguments = (VECTOR, VECTOR, float64, boolean, float64, float64, boolean, _SOURCE, *_RUN_ARGUMENTS)
+        return kernel(int64(self._p, *arguments))(run)
+
+    @cached_property
+    def run_many(self):  # type: ignore[no-untyped-def]
+        return kernel(types.void(self._p, *_RUN_MANY_ARGUMENTS))(run_many)
+
+    @cached_property
+    def outputs(self):  # type: ignore[no-untyped-def]
+        return kernel(types.void(self._p, MATRIX, MATRIX, float64, MATRIX))(outputs)
+
+    @cached_property
+    def derivatives(self):  # type: ignore[no-untyped-def]
+        return kernel(types.void(self._p, MATRIX, MATRIX, MATRIX))(derivatives)
+
+
+_RUN_MANY_ARGUMENTS = (
+    MATRIX,  # parameters
+    MATRIX,  # starts
+    VECTOR,  # energies
+    float64,  # end
+    boolean,  # speed_drive
+    float64,  # axial
+    float64,  # hold
+    boolean[::1],  # steady
+    int64[:, ::1],  # sizes
+    MATRIX,  # breaks
+    float64[:, :, :, ::1],  # coefficients
+    CUBE,  # harmonics
+    MATRIX,  # laws
+    _ADDRESSES,  # functions
+    float64,  # tolerance
+    MATRIX,  # scales
+    VECTOR,  # samples
+    CUBE,  # states
+    CUBE,  # forces
+    MATRIX,  # carries
+    int64[::1],  # status
+    int64,  # max_steps
+)
+
+
+def solver(p: NamedTuple) -> Solver:
+    """The compiled code of the mechanism whose constants ``p`` are."""
     return _solver(type(p))
 
 
-@cache
-def _solver(constants):  # type: ignore[no-untyped-def]
-    p = constants_type(constants)
-    signatures = {
-        run: int64(p, VECTOR, VECTOR, float64, boolean, float64, float64, boolean, _SOURCE, *_RUN_ARGUMENTS),
-        run_many: types.void(
-            p,
-            MATRIX,  # parameters
-            MATRIX,  # starts
-            VECTOR,  # energies
-            float64,  # end
-            boolean,  # speed_drive
-            float64,  # axial
-            float64,  # hold
-            boolean[::1],  # steady
-            int64[:, ::1],  # sizes
-            MATRIX,  # breaks
-            float64[:, :, :, ::1],  # coefficients
-            CUBE,  # harmonics
-            MATRIX,  # laws
-            _ADDRESSES,  # functions
-            float64,  # tolerance
-            MATRIX,  # scales
-            VECTOR,  # samples
-            CUBE,  # states
-            CUBE,  # forces
-            MATRIX,  # carries
-            int64[::1],  # status
-            int64,  # max_steps
-        ),
-        outputs: types.void(p, MATRIX, MATRIX, float64, MATRIX),
-        derivatives: types.void(p, MATRIX, MATRIX, MATRIX),
-    }
-    return SimpleNamespace(
-        **{function.__name__: kernel(signature)(function) for function, signature in signatures.items()}
-    )
+_solver = cache(Solver)
 
 
 @njit(error_model="numpy")

@@ -22,11 +22,10 @@ from numpy.typing import NDArray
 from linkwork.errors import InputError, LinkworkError
 from linkwork.parameters import fmi_name
 
-from .inputs import Channels, align, encode
+from .inputs import Channels, align, encode, given
 from .mechanism import InitialState, Parameters, mechanism_of
 from .simulate import (
     RunInterrupted,
-    given,
     held_channels,
     interruptible,
     sample_times,

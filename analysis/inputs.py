@@ -17,6 +17,8 @@ from scipy.interpolate import CubicSpline
 
 from linkwork.errors import InputError
 
+from .mechanism import InitialState, Mechanism
+
 #: Number of the crank speed among the channels, and of that channel whose rate of change counts besides: an axial speed.
 SPEED, LAST = 1, 4
 #: Where a function of each channel stands among the functions of a run, and where the rates of those two.
@@ -84,7 +86,7 @@ class Harmonics:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TorsionBar:
-    """Torque of a wound-up bar: torque (1 - th2 / release_angle) until the crank reaches release_angle, then none.
+    """Torque of a wound-up bar: torque (1 - angle / release_angle) until the crank reaches release_angle, then none.
 
     The thesis's launch (section 3.2.2): torque T0 in N.m, released at 1 rad. The switch is located exactly.
     """
@@ -101,7 +103,7 @@ class TorsionBar:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class InductionMotor:
-    """Torque of an induction motor by Kloss's formula, 2 Tb / (s / sb + sb / s) at the slip s = 1 - th2' / synchronous_speed.
+    """Torque of an induction motor by Kloss's formula, 2 Tb / (s / sb + sb / s) at the slip s = 1 - speed / synchronous_speed.
 
     Parameters
     ----------
@@ -128,7 +130,9 @@ class InductionMotor:
 
 @dataclass(frozen=True, slots=True)
 class Function:
-    """Any channel as a Python function ``f(t, th2, u, th2', u')`` of floats.
+    """Any channel as a Python function of time, crank angle, second coordinate and their rates, all floats.
+
+    The second coordinate is the five-bar's slider position u, the slider-crank's axial shift S1.
 
     It is compiled with Numba where it can be, else the run needs one of SciPy's methods. As a speed it must depend on
     ``t`` alone and needs its ``rate``, the acceleration. ``breaks`` are times (s) where it is not smooth.
@@ -141,7 +145,9 @@ class Function:
     def __post_init__(self) -> None:
         for name, value in (("function", self.function), ("rate", self.rate)):
             if not callable(value) and not (name == "rate" and value is None):
-                raise InputError(f"{name} of an input is {value!r}: it must be a function f(t, th2, u, th2', u')")
+                raise InputError(
+                    f"{name} of an input is {value!r}: it must be a function of t, both coordinates and their rates"
+                )
         if not np.all(np.isfinite(self.breaks)):
             raise InputError(f"the breaks of a function must be finite times, not {self.breaks}")
 
@@ -347,8 +353,10 @@ class SliderCrankInputs(Channels):
     groove: bool = False
 
     def __post_init__(self) -> None:
+        if not isinstance(self.groove, bool):
+            raise InputError(f"groove is {self.groove!r}: it must be True or False")
         given = [name for name in ("shift_speed", "axial_force") if getattr(self, name) is not None]
-        given += ["groove"] * bool(self.groove)
+        given += ["groove"] * self.groove
         if len(given) > 1:
             raise InputError(f"both {' and '.join(given)} are given: the shift can be made by one of them only")
         Channels.__post_init__(self)
@@ -361,6 +369,26 @@ class SliderCrankInputs(Channels):
 
 #: Kind of inputs of each mechanism, by its name.
 INPUTS_OF: dict[str, type[Inputs | SliderCrankInputs]] = {kind.MECHANISM: kind for kind in (Inputs, SliderCrankInputs)}
+
+
+def given(mechanism: Mechanism, inputs: Channels | None, initial: InitialState | None) -> tuple[Channels, Any]:
+    """Inputs and state at the start of a run, by default nothing and at rest; both must be of the mechanism.
+
+    Raises
+    ------
+    InputError
+        If they are another mechanism's.
+    """
+    kind = INPUTS_OF[mechanism.name]
+    inputs = kind() if inputs is None else inputs
+    initial = mechanism.initial() if initial is None else initial
+    for name, value, wanted in (("inputs", inputs, kind), ("initial", initial, mechanism.initial)):
+        if not isinstance(value, wanted):
+            raise InputError(
+                f"{name} is {type(value).__module__}.{type(value).__qualname__}: with parameters of the {mechanism.name} it "
+                f"must be {wanted.__module__}.{wanted.__qualname__}"
+            )
+    return inputs, initial
 
 
 @dataclass(frozen=True, slots=True)

@@ -14,7 +14,7 @@ import tomllib
 from collections.abc import Iterable, Mapping
 from dataclasses import MISSING, asdict, fields
 from functools import lru_cache
-from math import isfinite, pi
+from math import inf, isfinite, pi
 from pathlib import Path
 from typing import Any
 
@@ -333,7 +333,13 @@ def quantity(value: Any, unit: str, name: str) -> float:
     if isinstance(value, bool):
         raise ParameterError(name, value, wanted)
     if isinstance(value, (int, float)):
-        return float(value)
+        try:
+            number = float(value)
+        except OverflowError:  # a whole number beyond all floats
+            number = inf
+        if not isfinite(number):
+            raise ParameterError(name, value, "be a finite number")
+        return number
     if not isinstance(value, str):
         raise ParameterError(name, value, wanted)
     import pint
@@ -433,8 +439,8 @@ def parameters_to(parameters: Parameters) -> dict[str, Any]:
 def _mechanism_named(data: Mapping[str, Any]) -> Mechanism:
     """The mechanism that a file is about: its ``mechanism``, by default the five-bar."""
     name = data.get("mechanism", FIVE_BAR.name)
-    if name not in MECHANISMS:
-        raise unknown_name(str(name), MECHANISMS)
+    if not isinstance(name, str) or name not in MECHANISMS:
+        raise ParameterError("mechanism", name, f"be one of {', '.join(MECHANISMS)}")
     return MECHANISMS[name]
 
 
@@ -549,7 +555,7 @@ def case_from(
     mechanism = _mechanism_named(data)
     published = data.get("published")
     if published is not None:
-        if published not in PUBLISHED:
+        if not isinstance(published, str) or published not in PUBLISHED:
             raise unknown_name(str(published), PUBLISHED)
         base = PUBLISHED[published].parameters
         speed = PUBLISHED[published].crank_speed
@@ -570,6 +576,14 @@ def case_from(
     initial = mechanism.initial(**start | given)
     read = _inputs if mechanism is FIVE_BAR else _slider_crank_inputs
     inputs = read(data, folder, speed)
+    if inputs.axial_mode == 2 and getattr(parameters, "groove_amplitude", 1.0) == 0.0:
+        raise ParameterError(
+            "groove.amplitude", 0.0, "be given with axial.groove: a groove without it holds the shift at zero"
+        )
+    if inputs.axial_mode == 1 and not inputs.parts("shift_speed") and given.get("shift_velocity"):
+        raise ParameterError(
+            "initial.shift_velocity", given["shift_velocity"], "come with axial.force: the shift is held"
+        )
     stop_time, step, tolerance = _run_table(run, inputs)
     return Case(
         title=str(data.get("title", title)),
@@ -643,9 +657,16 @@ def _slider_crank_inputs(data: Mapping[str, Any], folder: Path, speed: float | N
     groove = axial.get("groove", False)
     if not isinstance(groove, bool):
         raise ParameterError("axial.groove", groove, "be true or false")
+    if len(axial) > 1:
+        raise ParameterError("axial", ", ".join(axial), "have one of speed, force and groove")
+    load = data.get("load", 0.0)
+    if isinstance(load, Mapping) and "kind" not in load:
+        raise ParameterError(
+            "load", ", ".join(load), "be one force, along the guide: a quantity, or a table with its kind"
+        )
     return SliderCrankInputs(
         **_drive(data, folder, speed),
-        load=_signal(data.get("load", 0.0), "N", "load", folder),
+        load=_signal(load, "N", "load", folder),
         shift_speed=_signal(axial["speed"], "m/s", "axial.speed", folder) if "speed" in axial else None,
         axial_force=_signal(axial["force"], "N", "axial.force", folder) if "force" in axial else None,
         groove=groove,

@@ -33,6 +33,7 @@ from linkwork.limits import LIMIT_SINE
 
 from . import symbolic
 from .inputs import Inputs
+from .mechanism import require_five_bar
 from .simulate import simulate
 
 if TYPE_CHECKING:
@@ -357,6 +358,7 @@ def find_equilibria(
     InputError
         If a force is not finite, or a torque is given for a crank that is held.
     """
+    require_five_bar(parameters, "an equilibrium")
     inputs = _static_inputs(crank_torque, slider_force, load, crank_angle)
     balance = _Balance(parameters, inputs)
     found: list[Equilibrium] = []
@@ -406,6 +408,7 @@ def find_equilibrium(
     EquilibriumError
         If there is no equilibrium, or none is found from the guess; says what is left, and where.
     """
+    require_five_bar(parameters, "an equilibrium")
     inputs = _static_inputs(crank_torque, slider_force, load, crank_angle)
     if guess is not None:
         th2 = float(guess[0]) if crank_angle is None else crank_angle
@@ -659,6 +662,7 @@ def linearise(parameters: FiveBarParameters, state: ArrayLike, inputs: dynamics.
     symbolic.MissingLibraryError
         If CasADi is not installed.
     """
+    require_five_bar(parameters, "a linear model")
     states = _six(np.atleast_2d(np.asarray(state, dtype=float)))
     if len(states) != 1:
         raise InputError(f"{len(states)} states: one is linearised about here, many by linearise_along")

@@ -140,7 +140,7 @@ SLIDER_CRANK = Mechanism(
 #: By name.
 MECHANISMS = {mechanism.name: mechanism for mechanism in (FIVE_BAR, SLIDER_CRANK)}
 
-#: Unit of every real output of every mechanism; outputs of one name have one unit.
+#: Unit of every real output of every mechanism; outputs of one name have one unit (a test holds them to it).
 OUTPUT_UNITS = {
     v.name: v.unit for mechanism in MECHANISMS.values() for v in mechanism.variables.OUTPUTS if v.kind == "Real"
 }
@@ -159,3 +159,17 @@ def mechanism_of(parameters: Any) -> Mechanism:
             return mechanism
     kinds = ", ".join(mechanism.parameters.__name__ for mechanism in MECHANISMS.values())
     raise InputError(f"parameters are {type(parameters).__name__}: they must be one of {kinds}")
+
+
+def require_five_bar(parameters: Any, what: str) -> None:
+    """Make sure that parameters are those of a five-bar, for an analysis that is of five-bars alone.
+
+    Raises
+    ------
+    InputError
+        If they are not, with ``what`` the analysis is.
+    """
+    if not isinstance(parameters, FIVE_BAR.parameters):
+        raise InputError(
+            f"{what} is of five-bars: the parameters are {type(parameters).__name__}, not FiveBarParameters"
+        )

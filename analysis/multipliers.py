@@ -34,6 +34,8 @@ from linkwork.errors import AssemblyError, InputError, IntegrationError
 from linkwork.five_bar.parameters import FiveBarParameters, InitialState
 from linkwork.friction import FRICTION_SPEED
 
+from .mechanism import require_five_bar
+
 Vector = NDArray[np.float64]
 ComplexVector = NDArray[np.complex128]
 
@@ -219,6 +221,7 @@ def assemble(parameters: FiveBarParameters, crank_angle: float, slider_position:
     AssemblyError
         If the links cannot be joined.
     """
+    require_five_bar(parameters, "the redundant form")
     l3, l4 = parameters.coupler_length, parameters.rocker_length
     links = _links(parameters)
     state = _state(np.array([crank_angle, 0.0, 0.0, slider_position]), np.zeros(4), links)

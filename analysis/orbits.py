@@ -26,6 +26,7 @@ from . import compiled, orbit_kernels
 from . import inputs as inputs_module
 from .floquet import TOLERANCE, StabilityVerdict, liouville, multipliers, verdict
 from .inputs import InductionMotor
+from .mechanism import require_five_bar
 
 #: Bound of the local error of a step; the solution is good to about a hundred times as much.
 INTEGRATOR_TOLERANCE = 1e-12
@@ -356,6 +357,7 @@ def find_orbit(
     >>> round(100.0 * orbit.start[0], 8), orbit.verdict().stability.value
     (-0.89553115, 'stable')
     """
+    require_five_bar(parameters, "a periodic motion")
     if len(load) != 2:
         raise InputError(f"load is {load}: it must be two numbers, its components along x and y")
     parts = () if torque is None else tuple(torque) if isinstance(torque, Sequence) else (torque,)
@@ -448,6 +450,10 @@ def drive_of(inputs: inputs_module.Inputs) -> Drive:
     InputError
         If an input varies, or nothing drives the crank.
     """
+    if not isinstance(inputs, inputs_module.Inputs):
+        raise InputError(
+            f"the inputs are {type(inputs).__name__}: periodic motions are of five-bars, whose inputs are Inputs"
+        )
     constant: dict[str, float] = {}
     motors: list[InductionMotor] = []
     for channel in inputs.CHANNELS:

@@ -27,6 +27,7 @@ from .branches import Branch, Family, follow, switch
 from .continuation import ContinuationError
 from .floquet import Crossing, Stability
 from .harmonic_balance import harmonic_balance
+from .mechanism import require_five_bar
 from .orbits import Drive, OrbitError, PeriodicOrbit, guess_of, orbit_of, scale_of
 from .simulate import interruptible, shown
 from .slider_equation import Load, Variant, mean_effective_mass, slider_equation
@@ -63,6 +64,7 @@ def natural_frequency(parameters: FiveBarParameters) -> float:
     >>> round(natural_frequency(SETS["rig-1-spring-a"].parameters) * 30.0 / pi, 1)
     591.8
     """
+    require_five_bar(parameters, "the natural frequency of the slider")
     if parameters.slider_stiffness <= 0.0:
         raise ParameterError("slider.stiffness", parameters.slider_stiffness, "be above zero for a natural frequency")
     return sqrt(parameters.slider_stiffness / mean_effective_mass(parameters))
@@ -209,6 +211,7 @@ def frequency_response(
     ResponseInterrupted
         On Ctrl-C, with the branches that there are.
     """
+    require_five_bar(parameters, "the frequency response")
     if drive is None:
         if vary != "drive.speed":
             raise InputError(
@@ -434,6 +437,7 @@ def sweep(
     InputError
         If the speeds are not positive or not in order.
     """
+    require_five_bar(parameters, "a sweep of the speed")
     grid = np.asarray(speeds, dtype=float)
     steps = np.diff(grid)
     if grid.ndim != 1 or len(grid) == 0 or not (np.isfinite(grid).all() and (grid > 0.0).all()):

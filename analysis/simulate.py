@@ -23,7 +23,7 @@ from linkwork.errors import InputError, Interrupted, LinkworkError
 from linkwork.limits import LIMIT_SINE, NEAR_LIMIT
 from linkwork.plant import check_tolerance
 
-from .inputs import FUNCTIONS, INPUTS_OF, Channels, Encoded, StateFunction, align, encode
+from .inputs import FUNCTIONS, Channels, Encoded, StateFunction, align, encode, given
 from .mechanism import MECHANISMS, OUTPUT_UNITS, InitialState, Mechanism, Parameters, mechanism_of
 from .trajectory import Occurrence, Trajectory
 
@@ -54,8 +54,8 @@ class Event:
     level : float
         Level of the output, in its SI unit.
     function : callable, optional
-        Instead of an output: ``f(t, th2, u, th2', u')`` of floats, compiled with Numba; the slider-crank's state is
-        (theta1, S1, theta1', S1').
+        Instead of an output: a function of time, crank angle, second coordinate (slider position or axial shift) and their
+        rates, all floats, compiled with Numba.
     direction : int
         +1 for rising, -1 for falling, 0 for both.
     stop : bool
@@ -210,26 +210,6 @@ def simulate(
             raise InputError(f"the compiled method takes no options, but was given {', '.join(options)}")
         return run.compiled(progress)
     return run.scipy(_solver(method), options, progress)
-
-
-def given(mechanism: Mechanism, inputs: Channels | None, initial: InitialState | None) -> tuple[Channels, Any]:
-    """Inputs and state at the start of a run, by default nothing and at rest; both must be of the mechanism.
-
-    Raises
-    ------
-    InputError
-        If they are another mechanism's.
-    """
-    kind = INPUTS_OF[mechanism.name]
-    inputs = kind() if inputs is None else inputs
-    initial = mechanism.initial() if initial is None else initial
-    for name, value, wanted in (("inputs", inputs, kind), ("initial", initial, mechanism.initial)):
-        if not isinstance(value, wanted):
-            raise InputError(
-                f"{name} is {type(value).__module__}.{type(value).__qualname__}: with parameters of the {mechanism.name} it "
-                f"must be {wanted.__module__}.{wanted.__qualname__}"
-            )
-    return inputs, initial
 
 
 def _solver(method: str | type[OdeSolver]) -> str | type[OdeSolver]:

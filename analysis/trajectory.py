@@ -73,6 +73,13 @@ class Trajectory:
 
     names: tuple[str, ...] = FIVE_BAR.output_names
 
+    def __post_init__(self) -> None:
+        if self.values.shape != (len(self.time), len(self.names)):
+            raise InputError(
+                f"a run with {len(self.time)} times and {len(self.names)} outputs needs values of that shape, not "
+                f"{self.values.shape}"
+            )
+
     def __getitem__(self, name: str) -> NDArray[np.float64]:
         return self.values[:, self.column(name)]
 

@@ -29,6 +29,8 @@ from linkwork.errors import InputError
 from linkwork.five_bar import kinematics
 from linkwork.five_bar.parameters import Constants, FiveBarParameters
 
+from .mechanism import require_five_bar
+
 #: Cells across the area in the first and in the finest grid.
 COARSEST, FINEST = 128, 4096
 #: Halvings of a cell's edge that locate the boundary on it.
@@ -123,6 +125,7 @@ def coupler_curve(parameters: FiveBarParameters, slider_position: float, n: int 
     InputError
         If the slider position is not a finite number, or n is less than 2.
     """
+    require_five_bar(parameters, "a coupler curve")
     if not isfinite(slider_position):
         raise InputError(f"slider position is {slider_position}: it must be a finite number of m")
     if n < 2:
@@ -266,6 +269,7 @@ def accessible_area(
     InputError
         If the range is not two increasing finite numbers, or the tolerance is not above zero.
     """
+    require_five_bar(parameters, "the accessible area of the coupler point")
     low, high = (float(end) for end in slider_range)
     if not (isfinite(low) and isfinite(high) and low < high):
         raise InputError(f"slider range is {low} m to {high} m: it must be two finite numbers, increasing")

@@ -101,7 +101,7 @@ SLIDER_CRANK_INTERNAL = (
         "kth, ks",
         r"\partial S_4/\partial\theta_1, \partial S_4/\partial S_1",
         "m/rad, 1",
-        "velocity coefficients; kth = 0 at the dead centres",
+        "velocity coefficients; kth = 0 at the dead centres of a constant shift",
     ),
     ("m11, m12, m22", r"M", "kg.m2, kg.m, kg", "inertia matrix of (theta1, S1)"),
     ("b1, b2", "", "N.m, N", "velocity terms of the equations of motion"),

@@ -54,8 +54,10 @@ def tolerance_option(context: click.Context, parameter: click.Parameter, value: 
     return value
 
 
-def number_or_text(text: str) -> int | float | str:
-    """A bare number on the command line is in SI; anything else is a text with its unit."""
+def number_or_text(text: str) -> bool | int | float | str:
+    """A bare number on the command line is in SI, true and false are what they are; anything else is a text with its unit."""
+    if text in ("true", "false"):
+        return text == "true"
     for kind in (int, float):
         try:
             return kind(text)
@@ -75,11 +77,15 @@ def changes(settings: Sequence[str], read: Callable[[str], Any], example: str) -
     return values
 
 
-def prepare_solver(*, orbits: bool = False) -> None:
-    """Load the compiled equations, and say why it takes so long where they are compiled first."""
-    with console.status("preparing the solver: its equations are compiled once, in about half a minute"):
-        from .. import compiled  # noqa: F401
+def prepare_solver(*parameters: Any, orbits: bool = False) -> None:
+    """Load the compiled equations of these mechanisms, and say why it takes so long where they are compiled first."""
+    with console.status("preparing the solver: a mechanism's equations are compiled once, in about half a minute"):
+        from .. import compiled
 
+        for p in parameters:
+            solver = compiled.solver(p.constants())
+            for kernel in ("run", "outputs"):
+                getattr(solver, kernel)
         if orbits:
             from .. import orbit_kernels  # noqa: F401
 

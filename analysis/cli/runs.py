@@ -116,7 +116,6 @@ def run(
     from ..simulate import RunInterrupted, simulate
 
     chosen = chosen_case(case, published, settings)
-    prepare_solver()
     if fmu is not None and method != "compiled":
         raise click.UsageError("--method is for a run in process: the FMU brings its own")
 
@@ -130,6 +129,8 @@ def run(
         "tolerance": chosen.tolerance if tolerance is None else tolerance,
     }
     interrupted = False
+    if fmu is None:
+        prepare_solver(chosen.parameters)
     try:
         if fmu is not None:
             result = cosimulate(fmu, chosen.parameters, chosen.inputs, progress=console.is_terminal, **common)
@@ -184,9 +185,7 @@ def _summary(title: str, result: Any) -> None:
     type=click.Path(dir_okay=False),
     help="The FMU to check; by default that of each case's mechanism in build, such as build/FiveBarSlider.fmu.",
 )
-@click.option(
-    "--all", "everything", is_flag=True, help="All standard cases (of the FMU's mechanism) instead of Table 3.1 alone."
-)
+@click.option("--all", "everything", is_flag=True, help="All standard cases (of the FMU's mechanism), not one of each.")
 @click.option(
     "--method",
     "methods",
@@ -225,9 +224,9 @@ def check(
 
     # of an FMU that is named, its own mechanism's
     wanted = None if fmu is None else _model_name(Path(fmu))
-    every = [name for name, case in CASES.items() if wanted in (None, mechanism_of(case.parameters).fmu)]
-    names = every if everything else list(cases) or ["table-3.1"]
-    prepare_solver()
+    every = {name: case for name, case in CASES.items() if wanted in (None, mechanism_of(case.parameters).fmu)}
+    first = {mechanism_of(case.parameters).name: name for name, case in reversed(every.items())}
+    names = list(every) if everything else list(cases) or list(first.values())[::-1]
     failed = []
     for name in names:
         if name in CASES:
@@ -236,6 +235,7 @@ def check(
             case = io.load_case(name)
         else:
             raise click.UsageError(f"{name!r} is neither a case file nor a standard case ({', '.join(CASES)})")
+        prepare_solver(case.parameters)
         stem = Path(name).stem if Path(name).suffix in (".toml", ".json") else name
         for method in methods:
             label = stem if method == "compiled" else f"{stem}-{method}"
@@ -349,6 +349,7 @@ def _parameters(title: str, parameters: Any) -> None:
             grid.add_row(variable.name, f"{value:.9g}", variable.unit, variable.description)
     console.print(grid)
     if mechanism is not FIVE_BAR:
+        console.print("where it can be assembled, dead centres, stroke: linkwork slider-crank info", highlight=False)
         return
     p = parameters.constants()
     angles = np.linspace(0.0, 2.0 * np.pi, 721)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import erf, isfinite, sqrt
 from textwrap import fill
@@ -25,8 +25,6 @@ _SHOWN = {"m": ("mm", 1e3), "m/s": ("mm/s", 1e3)}
 _LINEAR, _SAMPLES, _SECOND, _WORST = COLOURS[0], COLOURS[1], COLOURS[2], "0.45"
 #: Greatest and middle departures over the turn: where their ratio is above this, the axis is cut at a multiple of the latter.
 _PEAK, _CUT = 12.0, 4.0
-#: Steps of the angle, as a multiple of the middle one, over which no curve is drawn.
-_GAP = 2.5
 #: Difference of shares to first and second order below which the latter are not drawn.
 _TOLD = 0.02
 #: Letters in a line of the foot.
@@ -64,6 +62,8 @@ class ToleranceScene:
         Samples, and the most at any angle that cannot be assembled.
     singular : tuple of float
         Crank angles at which the quantity has a pole.
+    breaks : tuple of int
+        Number of each angle between which and the next the mechanism cannot be assembled: a gap in every curve.
     notes : tuple of str
         Sentences for the foot of the figure.
     """
@@ -85,6 +85,7 @@ class ToleranceScene:
     samples: int
     not_assembled: int
     singular: tuple[float, ...] = ()
+    breaks: tuple[int, ...] = ()
     notes: tuple[str, ...] = ()
 
 
@@ -137,12 +138,10 @@ def plot_tolerances(scene: ToleranceScene, *, title: str = "", shown: tuple[str,
 
 def _draw_band(axis: Axes, scene: ToleranceScene, label: str, factor: float) -> None:
     turn = np.degrees(scene.angle)
-    # angles that were left out are a gap in every curve
-    gaps = np.flatnonzero(np.diff(turn) > _GAP * np.median(np.diff(turn))) + 1
-    whole = np.insert(turn, gaps, turn[gaps])
+    whole = _broken(turn, scene.breaks, turn)
 
     def curve(values: FloatArray) -> FloatArray:
-        return np.insert(values * factor, gaps, np.nan)
+        return _broken(values * factor, scene.breaks)
 
     three = curve(3.0 * scene.deviation)
     axis.fill_between(whole, -three, three, color=_LINEAR, alpha=0.18, linewidth=0.0, label=r"linear, $\pm 3\,\sigma$")
@@ -164,7 +163,8 @@ def _draw_band(axis: Axes, scene: ToleranceScene, label: str, factor: float) -> 
     axis.axvline(turn[scene.at], color="0.35", linewidth=0.9, linestyle="-.")
     for angle in np.degrees(scene.singular):
         axis.axvline(angle, color="0.35", linewidth=0.9, linestyle=":")
-    reach = np.nanmax(np.abs(np.vstack([scene.departures, scene.worst])), axis=0) * factor
+    # of what is not NaN, if anything
+    reach = np.fmax.reduce(np.abs(np.vstack([scene.departures, scene.worst])), axis=0) * factor
     middle = float(np.nanmedian(reach))
     cut = float(np.nanmax(reach)) > _PEAK * middle > 0.0
     if cut:
@@ -174,6 +174,12 @@ def _draw_band(axis: Axes, scene: ToleranceScene, label: str, factor: float) -> 
     axis.set_xlabel("crank angle [deg]" + " (dotted: dead centres, cut off)" * cut)
     axis.set_ylabel(label)
     axis.legend(fontsize=8, loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=5, borderaxespad=0.2, columnspacing=1.2)
+
+
+def _broken(values: FloatArray, breaks: Sequence[int], fill: FloatArray | None = None) -> FloatArray:
+    """Values (n,) with one more after each of the numbers: NaN, or what ``fill`` (n,) has next."""
+    after = np.array(breaks, dtype=int) + 1
+    return np.insert(values, after, np.nan if fill is None else fill[after])
 
 
 def _draw_histogram(axis: Axes, scene: ToleranceScene, label: str, factor: float, unit: str) -> None:
@@ -191,7 +197,7 @@ def _draw_histogram(axis: Axes, scene: ToleranceScene, label: str, factor: float
             if edges[0] <= place <= edges[-1]:
                 axis.axvline(place, ymax=0.55, color=_LINEAR, linewidth=0.9, linestyle="--")
                 axis.text(place, 0.6, r"$3\,\sigma$", transform=axis.get_xaxis_transform(), ha="center", fontsize=8)
-    else:
+    elif isfinite(deviation):
         axis.axvline(0.0, ymax=0.72, color=_LINEAR, linewidth=2.0, label="linear estimate: no spread")
     told = [
         f"$\\sigma$ {what} {_figure(value * factor)} {unit}"
@@ -225,7 +231,10 @@ def _draw_shares(axis: Axes, scene: ToleranceScene) -> None:
     orders = [(0, _LINEAR, "linear")] * linear + [(1, _SECOND, "to second order")] * second
     axis.set_title("share in the variance" + ", linear" * (not second), fontsize=9)
     if not orders:
-        axis.text(0.5, 0.5, "no variance to first or second order", ha="center", va="center", fontsize=9)
+        none = "no variance to first or second order"
+        if not isfinite(scene.deviation[scene.at]):
+            none = "no variance: a dead centre is within the tolerances"
+        axis.text(0.5, 0.5, none, ha="center", va="center", fontsize=9)
         axis.set_axis_off()
         return
     height = 0.66 / len(orders)

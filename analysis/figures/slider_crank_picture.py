@@ -27,8 +27,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from linkwork.errors import AssemblyError, InputError
 from linkwork.slider_crank import kinematics
-from linkwork.slider_crank.mobility import Range, ShiftLaw, check_assembly, constant_shift, ranges
+from linkwork.slider_crank.mobility import PeriodicShift, Range, check_assembly, constant_shift, greatest_margin, ranges
 from linkwork.slider_crank.parameters import SliderCrankParameters
+from linkwork.slider_crank.published import INCH
 from linkwork.slider_crank.vectors import Vector
 
 from .linkage import COUPLER, CRANK, GROUND, SLIDER, TRACE
@@ -37,7 +38,7 @@ from .style import COLOURS, STYLE, finish
 FloatArray: TypeAlias = NDArray[np.float64]
 
 #: A metre in the units that pictures come in.
-UNITS = {"mm": 1e3, "cm": 1e2, "m": 1.0, "in": 1.0 / 0.0254}
+UNITS = {"mm": 1e3, "cm": 1e2, "m": 1.0, "in": 1.0 / INCH}
 #: Elevation and azimuth (deg) in which shift, offset and twist are all seen, the slider to the right of the crank.
 VIEW = (22.0, -112.0)
 #: Towards the light, along right, up and towards of the view.
@@ -90,14 +91,9 @@ def _checked_pose(parameters: SliderCrankParameters, angle: float, shift: float,
     return _pose(parameters, angle, shift, factor)
 
 
-def _limited(part: Range, law: ShiftLaw) -> bool:
-    """Whether the range ends before the crank has made all of the law's turns."""
-    return part.high - part.low < law.span * (1.0 - 1e-12)
-
-
-def _angles(part: Range, law: ShiftLaw) -> FloatArray:
+def _angles(part: Range, law: PeriodicShift) -> FloatArray:
     """Crank angles over a range, clear of its ends if it has any."""
-    inset = min(_INSET, 0.25 * (part.high - part.low)) if _limited(part, law) else 0.0
+    inset = min(_INSET, 0.25 * (part.high - part.low)) if not part.full(law.span) else 0.0
     count = max(9, ceil(_POINTS * (part.high - part.low) / (2.0 * pi)))
     return np.linspace(part.low + inset, part.high - inset, count)
 
@@ -111,13 +107,13 @@ def _factor(unit: str) -> float:
 class _Part:
     """A range of assembly: poses along it, those at its dead centres, and those at its ends where it has any."""
 
-    def __init__(self, parameters: SliderCrankParameters, part: Range, law: ShiftLaw, factor: float) -> None:
+    def __init__(self, parameters: SliderCrankParameters, part: Range, law: PeriodicShift, factor: float) -> None:
         self.angles = _angles(part, law)
         self.poses = [_pose(parameters, float(a), law.at(float(a))[0], factor) for a in self.angles]
         self.crank_pins = np.array([pose.crank_pin for pose in self.poses])
         self.slider_pins = np.array([pose.slider_pin for pose in self.poses])
         self.dead = [_pose(parameters, d.crank_angle, d.shift, factor) for d in part.dead_centres]
-        self.limits = [self.poses[0], self.poses[-1]] if _limited(part, law) else []
+        self.limits = [self.poses[0], self.poses[-1]] if not part.full(law.span) else []
 
 
 # Solids: faces of four corners, shape (n, 4, 3), in the ground frame, anticlockwise from outside
@@ -187,7 +183,7 @@ class _Scene:
     def __init__(
         self,
         parameters: SliderCrankParameters,
-        law: ShiftLaw,
+        law: PeriodicShift,
         poses: Sequence[_Pose],
         unit: str,
         view: tuple[float, float],
@@ -454,7 +450,7 @@ def plot_mechanism(
     crank_angle: float,
     shift: float = 0.0,
     *,
-    law: ShiftLaw | None = None,
+    law: PeriodicShift | None = None,
     unit: str = "mm",
     view: tuple[float, float] = VIEW,
     title: str = "",
@@ -472,7 +468,7 @@ def plot_mechanism(
         Crank angle theta1 (rad).
     shift : float
         Axial shift S1 (m).
-    law : ShiftLaw, optional
+    law : PeriodicShift, optional
         The shift over the crank angle, for the paths; by default it is held at ``shift``.
     unit : str
         Of the lengths in the letters: one of `UNITS`.
@@ -514,7 +510,7 @@ def animate_mechanism(
     parameters: SliderCrankParameters,
     path: str | Path,
     *,
-    law: ShiftLaw | None = None,
+    law: PeriodicShift | None = None,
     unit: str = "mm",
     view: tuple[float, float] = VIEW,
     frames: int = 48,
@@ -530,7 +526,7 @@ def animate_mechanism(
     parameters : SliderCrankParameters
     path : str or Path
         Of the GIF.
-    law : ShiftLaw, optional
+    law : PeriodicShift, optional
         The shift over the crank angle; by default none.
     unit, view, title
         As of `plot_mechanism`.
@@ -551,7 +547,7 @@ def animate_mechanism(
     widest = max(assembled_ranges(parameters, law), key=lambda part: part.high - part.low)
     ends = _angles(widest, law)[[0, -1]]
     share = np.linspace(0.0, 1.0, frames, endpoint=False)
-    if _limited(widest, law):
+    if not widest.full(law.span):
         # to and fro, slow at the ends
         share = 0.5 - 0.5 * np.cos(2.0 * pi * share)
     angles = ends[0] + share * (ends[1] - ends[0])
@@ -579,7 +575,7 @@ def animate_mechanism(
     return path
 
 
-def assembled_ranges(parameters: SliderCrankParameters, law: ShiftLaw) -> tuple[Range, ...]:
+def assembled_ranges(parameters: SliderCrankParameters, law: PeriodicShift) -> tuple[Range, ...]:
     """The ranges of crank angles in which the mechanism can be assembled, at least one.
 
     Raises
@@ -590,9 +586,7 @@ def assembled_ranges(parameters: SliderCrankParameters, law: ShiftLaw) -> tuple[
     found = ranges(parameters, law)
     if not found:
         # the sentence of the nearest there is to an assembly
-        angles = np.linspace(0.0, law.span, _POINTS)
-        p = parameters.constants()
-        nearest = float(max(angles, key=lambda a: kinematics.assembly_square(float(a), law.at(float(a))[0], p)))
+        nearest = greatest_margin(parameters, law).crank_angle
         try:
             check_assembly(parameters, nearest, law.at(nearest)[0])
         except AssemblyError as error:
@@ -617,7 +611,7 @@ def _slides(axis: Axes, parts: Sequence[_Part], unit: str) -> None:
 
 
 def plot_range(
-    parameters: SliderCrankParameters, *, law: ShiftLaw | None = None, unit: str = "mm", title: str = ""
+    parameters: SliderCrankParameters, *, law: PeriodicShift | None = None, unit: str = "mm", title: str = ""
 ) -> Figure:
     """Draw where the mechanism can be assembled: round the crank's circle, and over the crank angle.
 
@@ -628,7 +622,7 @@ def plot_range(
     Parameters
     ----------
     parameters : SliderCrankParameters
-    law : ShiftLaw, optional
+    law : PeriodicShift, optional
         The shift over the crank angle; by default none.
     unit : str
         One of `UNITS`.

@@ -18,10 +18,10 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import cache, cached_property
-from math import ceil, degrees, isfinite, pi, tau
+from math import ceil, degrees, isfinite, pi, radians, tau
 from pathlib import Path
 from types import MappingProxyType, SimpleNamespace
-from typing import Any, NamedTuple, Protocol, TypeAlias
+from typing import Any, NamedTuple, Protocol, TypeAlias, runtime_checkable
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -51,6 +51,10 @@ SAMPLES = 361
 _PIECES = 1440
 #: Sine of the angle between rod and crank axis below which frame 3 has no direction.
 _PARALLEL = 1e-12
+#: Angle (deg) from a singularity or a limit of assembly beyond which a value is told as an extreme, and shown.
+CLEAR_DEG = 10.0
+#: What is told of a mechanism whose slider force is sought in vain.
+NO_LEVER = "the slider has no lever on the crank at any angle, so that the torque determines no force on it"
 #: What `ForceTurn.sought` may be.
 TORQUE, SLIDER_FORCE = "torque", "slider force"
 
@@ -84,6 +88,19 @@ UNITS: Mapping[str, Mapping[str, tuple[str, float]]] = MappingProxyType(
 )
 
 
+def unit_table(units: str) -> Mapping[str, tuple[str, float]]:
+    """What of `UNITS` a file is written in.
+
+    Raises
+    ------
+    InputError
+        If there are no such units.
+    """
+    if units not in UNITS:
+        raise InputError(f"there are no units {units!r}: they are {' or '.join(UNITS)}")
+    return UNITS[units]
+
+
 class ShiftMotion(NamedTuple):
     """The axial shift (m) and its rates by time (m/s, m/s2)."""
 
@@ -92,13 +109,14 @@ class ShiftMotion(NamedTuple):
     acceleration: Any
 
 
+@runtime_checkable
 class ShiftLaw(Protocol):
     """How the crank shifts along its axis while it turns."""
 
     def at(self, angle: Any, speed: Any, acceleration: Any) -> ShiftMotion:
         """Shift and its rates by time at crank angles (rad), speeds (rad/s) and accelerations (rad/s2) of one shape."""
 
-    def repeating(self, parameters: SliderCrankParameters) -> mobility.ShiftLaw | None:
+    def repeating(self, parameters: SliderCrankParameters) -> mobility.PeriodicShift | None:
         """The law as `linkwork.slider_crank.mobility` takes it; None if it is not known to repeat after whole turns."""
 
 
@@ -123,7 +141,7 @@ class ConstantShift:
         zero = 0.0 * angle
         return ShiftMotion(self.value + zero, zero, zero)
 
-    def repeating(self, parameters: SliderCrankParameters) -> mobility.ShiftLaw:
+    def repeating(self, parameters: SliderCrankParameters) -> mobility.PeriodicShift:
         """See `ShiftLaw`."""
         return mobility.constant_shift(self.value)
 
@@ -159,12 +177,11 @@ class GrooveShift:
 
     def at(self, angle: Any, speed: Any, acceleration: Any) -> ShiftMotion:
         """See `ShiftLaw`."""
-        phase = self.ratio * angle
-        slope = self.amplitude * self.ratio * np.cos(phase)
-        shift = self.amplitude * np.sin(phase)
-        return ShiftMotion(shift, slope * speed, slope * acceleration - self.ratio * self.ratio * shift * speed * speed)
+        # all that the plant's function asks the constants for is amplitude and ratio
+        shift, pitch, bend = on_arrays().groove(angle, self)
+        return ShiftMotion(shift, pitch * speed, pitch * acceleration + bend * speed * speed)
 
-    def repeating(self, parameters: SliderCrankParameters) -> mobility.ShiftLaw | None:
+    def repeating(self, parameters: SliderCrankParameters) -> mobility.PeriodicShift | None:
         """See `ShiftLaw`."""
         try:
             return mobility.groove_shift(
@@ -366,10 +383,14 @@ class ForceTurn:
     def __len__(self) -> int:
         return len(self.angle)
 
+    @property
+    def _span(self) -> tuple[float, float]:
+        return float(self.angle.min()), float(self.angle.max())
+
     @cached_property
     def dead_centres(self) -> tuple[DeadCentre, ...]:
         """Configurations between the first and the last angle at which the slider turns back, located to the last digit."""
-        return _located(self, along=True)
+        return _located(self, *self._span, along=True)
 
     @cached_property
     def singularities(self) -> tuple[DeadCentre, ...]:
@@ -377,7 +398,57 @@ class ForceTurn:
 
         The zeros of ``ratio``: the same as the dead centres but where the shift moves and no groove in the shaft makes it.
         """
-        return self.dead_centres if in_the_shaft(self.law) else _located(self, along=False)
+        return self.dead_centres if in_the_shaft(self.law) else _located(self, *self._span, along=False)
+
+    @cached_property
+    def limits(self) -> tuple[float, ...]:
+        """Crank angles (rad) from the first to the last that was asked for at which a range of assembly ends.
+
+        There rod and guide are perpendicular, and velocity, acceleration and all forces grow without bound.
+        """
+        asked = np.concatenate([self.angle, self.unreachable])
+        return _limits(self, float(asked.min()), float(asked.max()))
+
+    @cached_property
+    def breaks(self) -> tuple[int, ...]:
+        """Index of each angle between which and the next the mechanism cannot be assembled."""
+        outside = np.sort(np.concatenate([self.unreachable, self.limits]))
+        low, high = np.minimum(self.angle[:-1], self.angle[1:]), np.maximum(self.angle[:-1], self.angle[1:])
+        between = np.searchsorted(outside, high) - np.searchsorted(outside, low, side="right")
+        return tuple(int(i) for i in np.flatnonzero(between > 0))
+
+    @property
+    def without_lever(self) -> bool:
+        """Whether the slider's force is sought and has no lever on the crank at any angle."""
+        return bool(np.ma.getmaskarray(self.slider_force).all()) and not self.singularities
+
+    @cached_property
+    def masked(self) -> tuple[str, ...]:
+        """What is masked and why, in sentences: ``reasons`` with one for each run of angles."""
+        told = []
+        dead, p = np.ma.getmaskarray(self.slider_force), self.parameters.constants()
+        for flags, what, why in _undetermined(dead, self._position, p):
+            for first, last in _runs(flags):
+                place = f"crank angle {_deg(self.angle[first])} deg"
+                if last > first:
+                    place = f"all {last - first + 1} crank angles from {_deg(self.angle[first])} to {_deg(self.angle[last])} deg"
+                told.append(f"{what} at {place}: {why}")
+        return tuple(told)
+
+    def clear(self, degrees: float = CLEAR_DEG, *, poles: bool = True) -> NDArray[np.bool_]:
+        """Which angles (n,) are further than ``degrees`` from where forces grow without bound.
+
+        That is at the limits of assembly and, where the slider's force is sought, at ``singularities``; without ``poles``
+        the limits alone. What is beyond the first and the last angle counts.
+        """
+        away = radians(degrees)
+        low, high = self._span
+        places = list(_limits(self, low - away, high + away))
+        if poles and self.sought == SLIDER_FORCE:
+            along = in_the_shaft(self.law)
+            places += [c.crank_angle for c in _located(self, low - away, high + away, along=along)]
+        distances = np.abs(self.angle[:, None] - np.array(places)[None, :])
+        return np.asarray((distances > away).all(axis=1))
 
     def vector(self, name: str, frame: int = 1) -> MaskedArray:
         """Components of a force or moment, masked where it is not determined.
@@ -440,8 +511,7 @@ class ForceTurn:
         InputError
             If there are no such units or frames.
         """
-        if units not in UNITS:
-            raise InputError(f"there are no units {units!r}: they are {' or '.join(UNITS)}")
+        known = unit_table(units)
         parts: list[tuple[str, str, Any]] = [
             ("crank angle", "rad", self.angle),
             ("shift", "m", self.shift),
@@ -465,7 +535,7 @@ class ForceTurn:
                 ]
         columns = {}
         for name, unit, values in parts:
-            written, one = UNITS[units][unit]
+            written, one = known[unit]
             columns[f"{name} [{written}]"] = np.ma.filled(values, np.nan) / one
         dead = np.ma.getmaskarray(self.slider_force)
         return columns | {
@@ -538,16 +608,25 @@ def force_turn(
     Raises
     ------
     InputError
-        If both ``load`` and ``torque`` are given, or a value is not finite or of the wrong shape.
+        If both ``load`` and ``torque`` are given, a value is no finite number or of the wrong shape, or ``shift`` is no law.
     AssemblyError
         If the rod does not reach the guide at an angle; it tells the ranges in which it does. With ``partial`` only if it
         does at none.
     """
     if load is not None and torque is not None:
         raise InputError("both load and torque are given: give the one, and the other is sought")
-    th = np.linspace(0.0, tau, SAMPLES) if angles is None else np.array(angles, dtype=float, ndmin=1)
+    if not isinstance(shift, ShiftLaw):
+        raise InputError(
+            f"the shift is {shift!r}: it must be a law of the shift, such as ConstantShift(0.01) or GrooveShift(0.01, 2.0)"
+        )
+    wanted = "the angles must be a list of finite numbers (rad), at least one"
+    th = (
+        np.linspace(0.0, tau, SAMPLES)
+        if angles is None
+        else np.atleast_1d(_numbers(angles, f"{wanted}, not {angles!r}"))
+    )
     if th.ndim != 1 or th.size == 0 or not np.isfinite(th).all():
-        raise InputError("the angles must be a list of finite numbers (rad), at least one")
+        raise InputError(wanted)
     n = th.size
     w = _each("crank_speed", crank_speed, n)
     e = _each("crank_acceleration", crank_acceleration, n)
@@ -578,20 +657,9 @@ def force_turn(
         return np.ma.MaskedArray(np.where(mask, np.nan, whole), mask=mask, fill_value=np.nan)
 
     reasons = [
-        (
-            int(i),
-            f"dead centre at crank angle {th[i]:.9g} rad ({degrees(th[i]):.4f} deg): the slider's force has no lever on the "
-            f"crank (kth = {found.ratio[i]:.1e} m), so that the torque does not determine it",
-        )
-        for i in np.flatnonzero(dead)
-    ]
-    reasons += [
-        (
-            int(i),
-            f"the rod is parallel to the crank axis at crank angle {th[i]:.9g} rad ({degrees(th[i]):.4f} deg): frame 3 has no "
-            "direction across it",
-        )
-        for i in np.flatnonzero(_parallel(found.position, p))
+        (int(i), f"{what} at crank angle {th[i]:.9g} rad ({degrees(th[i]):.4f} deg): {why}")
+        for flags, what, why in _undetermined(dead, found.position, p)
+        for i in np.flatnonzero(flags)
     ]
     return ForceTurn(
         parameters=parameters,
@@ -667,9 +735,17 @@ def forces_at(
     )
 
 
+def _numbers(value: ArrayLike, wanted: str) -> FloatArray:
+    """An array of floats."""
+    try:
+        return np.array(value, dtype=float)
+    except (TypeError, ValueError, OverflowError):
+        raise InputError(wanted) from None
+
+
 def _each(name: str, value: ArrayLike, n: int) -> FloatArray:
     """A finite value for each of n angles."""
-    values = np.asarray(value, dtype=float)
+    values = _numbers(value, f"{name} is {value!r}: it must be a number in SI or an array of them")
     if values.shape not in ((), (1,), (n,)):
         raise InputError(f"{name} has the shape {values.shape}: it must be a number or have one for each of {n} angles")
     if not np.isfinite(values).all():
@@ -686,6 +762,18 @@ def _parallel(q: Position, p: Constants) -> NDArray[np.bool_]:
     """Where the rod is parallel to the crank axis."""
     r = on_arrays().rod(q, p)
     return np.asarray(np.hypot(r.x, r.y) <= _PARALLEL * p.a2)
+
+
+def _undetermined(dead: NDArray[np.bool_], q: Position, p: Constants) -> tuple[tuple[NDArray[np.bool_], str, str], ...]:
+    """Where something is masked, what there is, and why."""
+    return (
+        (dead, "dead centre", "the slider's force has no lever on the crank, so that the torque does not determine it"),
+        (_parallel(q, p), "the rod is parallel to the crank axis", "frame 3 has no direction across it"),
+    )
+
+
+def _deg(angle: float) -> str:
+    return f"{degrees(float(angle)):.4f}"
 
 
 def _not_assembled(
@@ -718,38 +806,78 @@ def _runs(flags: NDArray[np.bool_]) -> list[tuple[int, int]]:
     return [(int(first), int(end) - 1) for first, end in zip(edges[::2], edges[1::2])]
 
 
-def _located(turn: ForceTurn, *, along: bool) -> tuple[DeadCentre, ...]:
-    """Zeros of the slider's velocity ``along`` the law of the shift, or with the shift held, over the angles of the turn."""
-    low, high = float(turn.angle.min()), float(turn.angle.max())
+def _located(turn: ForceTurn, low: float, high: float, *, along: bool) -> tuple[DeadCentre, ...]:
+    """Zeros of the slider's velocity ``along`` the law of the shift, or with the shift held, from ``low`` to ``high``."""
     repeating = turn.law.repeating(turn.parameters)
-    if repeating is not None:
-        find = mobility.dead_centres if along else mobility.singularities
-        span = repeating.span
-        turns = range(ceil((low - span) / span), ceil(high / span) + 1)
-        found = find(turn.parameters, repeating)
-        moved = (centre._replace(crank_angle=centre.crank_angle + span * n) for n in turns for centre in found)
-        return tuple(centre for centre in moved if low <= centre.crank_angle <= high)
+    if repeating is None:
+        return _sign_changes(turn, low, high, 1.0 if along else 0.0)
+    find = mobility.dead_centres if along else mobility.singularities
+    found = find(turn.parameters, repeating)
+    moved = (c._replace(crank_angle=c.crank_angle + more) for more in _turns(low, high, repeating.span) for c in found)
+    return tuple(centre for centre in moved if low <= centre.crank_angle <= high)
+
+
+def _limits(turn: ForceTurn, low: float, high: float) -> tuple[float, ...]:
+    """Ends of the ranges of assembly from ``low`` to ``high`` (rad)."""
+    repeating = turn.law.repeating(turn.parameters)
+    if repeating is None:
+        square = _along(turn).square
+        at = _places(low, high)
+        reached = square(at) > 0.0
+        return tuple(
+            float(brentq(lambda x: float(square(np.array([x]))[0]), at[i], at[i + 1], xtol=1e-14))
+            for i in np.flatnonzero(reached[1:] != reached[:-1])
+        )
+    parts = mobility.ranges(turn.parameters, repeating)
+    ends = {end for part in parts if not part.full(repeating.span) for end in (part.low, part.high)}
+    moved = (end + more for more in _turns(low, high, repeating.span) for end in ends)
+    return tuple(sorted(end for end in moved if low <= end <= high))
+
+
+def _turns(low: float, high: float, span: float) -> list[float]:
+    """What angles in [0, 2 span] are moved by to have all of them from ``low`` to ``high``."""
+    return [span * n for n in range(ceil(low / span) - 2, ceil(high / span) + 1)]
+
+
+def _places(low: float, high: float) -> FloatArray:
+    """Angles between which signs are compared."""
+    return np.linspace(low, high, ceil((high - low) / tau * _PIECES) + 1)
+
+
+class _Along(NamedTuple):
+    """Functions of crank angles (n,): the law's shift, and what is positive where the rod reaches the guide (m2)."""
+
+    shift: Callable[[FloatArray], ShiftMotion]
+    square: Callable[[FloatArray], FloatArray]
+    speed: float
+
+
+def _along(turn: ForceTurn) -> _Along:
     # the slope of the shift by the angle does not depend on the speed but under a law by time, which takes no other
-    speed = float(turn.speed[0])
-    return _sign_changes(turn.parameters, turn.law, low, high, speed if speed != 0.0 else 1.0, 1.0 if along else 0.0)
-
-
-def _sign_changes(
-    parameters: SliderCrankParameters, law: ShiftLaw, low: float, high: float, speed: float, pitch: float
-) -> tuple[DeadCentre, ...]:
-    """Zeros of kth + ``pitch`` S1' ks, at 1440 places in the turn and more closely where the sign changes."""
-    f, p = on_arrays(), parameters.constants()
+    speed = float(turn.speed[0]) or 1.0
+    f, p = on_arrays(), turn.parameters.constants()
 
     def shift(angle: FloatArray) -> ShiftMotion:
-        return law.at(angle, np.full(angle.shape, speed), np.zeros(angle.shape))
+        return turn.law.at(angle, np.full(angle.shape, speed), np.zeros(angle.shape))
+
+    def square(angle: FloatArray) -> FloatArray:
+        return np.asarray(f.assembly_square(angle, shift(angle).shift, p))
+
+    return _Along(shift, square, speed)
+
+
+def _sign_changes(turn: ForceTurn, low: float, high: float, pitch: float) -> tuple[DeadCentre, ...]:
+    """Zeros of kth + ``pitch`` S1' ks, at 1440 places in the turn and more closely where the sign changes."""
+    f, p = on_arrays(), turn.parameters.constants()
+    shift, square, speed = _along(turn)
 
     def slope(angle: FloatArray) -> FloatArray:
         moving = shift(angle)
         k = f.coefficients(f.position(angle, moving.shift, p), p)
         return np.asarray(k.kth + pitch * moving.velocity / speed * k.ks)
 
-    at = np.linspace(low, high, ceil((high - low) / tau * _PIECES) + 1)
-    reached = f.assembly_square(at, shift(at).shift, p) > (LIMIT_SINE * p.a2) ** 2
+    at = _places(low, high)
+    reached = square(at) > (LIMIT_SINE * p.a2) ** 2
     values = np.zeros(at.shape)
     values[reached] = slope(at[reached])
     positive = values > 0.0

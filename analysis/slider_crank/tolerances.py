@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 
 from linkwork.errors import InputError, ParameterError
 from linkwork.limits import LIMIT_SINE
-from linkwork.parameters import field_name
+from linkwork.parameters import POSITIVE, field_name
 from linkwork.slider_crank import parameters as parameters_module
 from linkwork.slider_crank import variables
 from linkwork.slider_crank.parameters import Constants, SliderCrankParameters
@@ -33,7 +33,18 @@ from ..dual import Dual, dual
 from ..dual import variables as independent
 from ..figures.slider_crank import ToleranceScene
 from .dual_dynamics import DEAD_CENTRE
-from .forces import SLIDER_FORCE, ForceTurn, MaskedArray, ShiftMotion, in_the_shaft, on_arrays, solve, with_groove
+from .forces import (
+    NO_LEVER,
+    SLIDER_FORCE,
+    ForceTurn,
+    MaskedArray,
+    ShiftMotion,
+    in_the_shaft,
+    on_arrays,
+    solve,
+    unit_table,
+    with_groove,
+)
 
 FloatArray: TypeAlias = NDArray[np.float64]
 
@@ -262,6 +273,9 @@ class Estimate:
         deviation; masked where the mechanism cannot be assembled there.
     second_shares : masked array, shape (m, n)
         As ``shares``, to second order; what two errors do together counts half for each.
+
+    Where the slider's force is sought and the errors, all at their extents, reach a dead centre, everything but ``nominal``
+    is masked: the quantity has a pole there, and neither mean nor variance.
     """
 
     nominal: MaskedArray
@@ -291,6 +305,7 @@ def estimate(
     extents = np.array([t.extent for t in tolerances])
     kurtoses = np.array([_DISTRIBUTIONS[t.distribution][1] for t in tolerances])
     n, m = len(turn), len(names)
+    near_pole = _near_pole(turn, names, extents)
     # half the differences of the derivatives over one standard deviation to either side, times both deviations
     curvature = {name: np.zeros((m, m, n)) for name in quantities}
     reached = np.ones(n, dtype=bool)
@@ -305,7 +320,8 @@ def estimate(
     result = {}
     for name in quantities:
         nominal = first.values[name]
-        steps = first.derivatives[name] * deviations[:, None]
+        pole = np.zeros(n, dtype=bool) if name in _FREE_OF_LOAD else near_pole
+        steps = np.ma.masked_where(np.broadcast_to(pole, (m, n)), first.derivatives[name]) * deviations[:, None]
         variance = (steps**2).sum(axis=0)
         h = 0.5 * (curvature[name] + curvature[name].swapaxes(0, 1))
         own = np.einsum("iin->in", h)
@@ -313,7 +329,7 @@ def estimate(
         pairs = (h**2).sum(axis=1) - own**2
         second = steps.filled(np.nan) ** 2 + 0.25 * (kurtoses - 1.0)[:, None] * own**2 + 0.5 * pairs
         whole = second.sum(axis=0)
-        lost = np.ma.getmaskarray(nominal) | ~reached
+        lost = np.ma.getmaskarray(nominal) | ~reached | pole
         # derivatives that are rounding errors share nothing out
         rounding = (1e-15 * nominal.filled(0.0)) ** 2
         vanishing = variance.filled(0.0) <= np.fmax(1e-12 * whole, rounding)
@@ -321,13 +337,25 @@ def estimate(
         result[name] = Estimate(
             nominal=nominal,
             deviation=np.ma.sqrt(variance),
-            worst=np.ma.abs(first.derivatives[name] * extents[:, None]).sum(axis=0),
+            worst=np.ma.abs(steps * (extents / deviations)[:, None]).sum(axis=0),
             shares=_share(steps**2, variance, vanishing),
             second_mean=np.ma.MaskedArray(nominal.filled(np.nan) + 0.5 * own.sum(axis=0), mask=lost, fill_value=np.nan),
             second_deviation=np.ma.MaskedArray(np.sqrt(whole), mask=lost, fill_value=np.nan),
             second_shares=_share(np.ma.MaskedArray(second), np.ma.MaskedArray(whole), still),
         )
     return result
+
+
+def _near_pole(turn: ForceTurn, names: tuple[str, ...], extents: FloatArray) -> NDArray[np.bool_]:
+    """Where errors at their extents make nothing of the lever of the slider's force, if that is sought (n,)."""
+    n = len(turn)
+    if turn.sought != SLIDER_FORCE:
+        return np.zeros(n, dtype=bool)
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        varied = _varied(turn, np.arange(n), _steps(names, n))
+        lever = dual(_evaluate(turn, np.arange(n), varied, ("slider.load",))[1])
+    change = (np.abs(np.broadcast_to(lever.dual, (len(names), n))) * extents[:, None]).sum(axis=0)
+    return np.asarray(np.abs(np.broadcast_to(lever.real, (n,))) <= change)
 
 
 def _share(parts: MaskedArray, whole: MaskedArray, none: NDArray[np.bool_]) -> MaskedArray:
@@ -394,7 +422,23 @@ class MonteCarlo:
 
     @cached_property
     def messages(self) -> tuple[str, ...]:
-        """In sentences: samples that cannot be assembled, poles, and where the linear estimate is off and why."""
+        """`notes` in SI."""
+        return self.notes()
+
+    def notes(self, units: str = "SI") -> tuple[str, ...]:
+        """In sentences: samples that cannot be assembled, poles, and where the linear estimate is off and why.
+
+        Parameters
+        ----------
+        units : str
+            One of `analysis.slider_crank.forces.UNITS`.
+
+        Raises
+        ------
+        InputError
+            If there are no such units.
+        """
+        known = unit_table(units)
         told = []
         if self.turn.unreachable.size:
             told.append(
@@ -409,19 +453,33 @@ class MonteCarlo:
         if self.undetermined.any():
             told.append(f"{int(self.undetermined.sum())} samples are at a dead centre: they have no slider force")
         for name, spread in self.spreads.items():
-            poles = np.flatnonzero(spread.mean.mask & ~np.ma.getmaskarray(spread.percentiles)[0])
-            if poles.size:
+            poles = np.ma.getmaskarray(spread.mean) & ~np.ma.getmaskarray(spread.percentiles)[0]
+            near = self._without_estimate(name) & ~poles
+            if poles.any():
+                places = np.flatnonzero(poles)
                 told.append(
-                    f"{name} has samples on both sides of a dead centre at {_at(self.turn, int(poles[0]))}"
-                    f"{_others(poles)}: it has no mean and no variance there, only percentiles"
+                    f"{name} has samples on both sides of a dead centre at {_at(self.turn, int(places[0]))}"
+                    f"{_others(places)}: it has no mean and no variance there, only percentiles"
                 )
-            told += self._off(name)
+            if near.any():
+                places = np.flatnonzero(near)
+                told.append(
+                    f"the tolerances reach a dead centre from {_at(self.turn, int(places[0]))}{_others(places)}: there is "
+                    f"no linear estimate of {name} there"
+                )
+            told += self._off(name, known)
         return tuple(told)
+
+    def _without_estimate(self, quantity: str) -> NDArray[np.bool_]:
+        """Where a quantity is determined and there is no estimate, for the nearness of a dead centre (n,)."""
+        linear = self.estimates[quantity]
+        return np.asarray(np.ma.getmaskarray(linear.deviation) & ~np.ma.getmaskarray(linear.nominal))
 
     def linear_is_off(self, quantity: str) -> NDArray[np.bool_]:
         """Where the linear estimate misses mean or standard deviation by more than 5 % of the latter (n,).
 
-        What five standard errors of the samples may account for is allowed on top.
+        What five standard errors of the samples may account for is allowed on top. Near a dead centre, where there is no
+        estimate or there are no mean and deviation to estimate, it is off.
         """
         spread, linear = self._spread(quantity), self.estimates[quantity]
         used = np.maximum(self.samples - self.not_assembled - self.undetermined, 2)
@@ -432,21 +490,25 @@ class MonteCarlo:
         off = (np.ma.abs(spread.mean - linear.nominal) > allowed + rounding) | (
             np.ma.abs(sd - linear.deviation) > allowed + rounding
         )
-        return cast(NDArray[np.bool_], np.ma.filled(off, False))
+        return cast(NDArray[np.bool_], np.ma.filled(off, False)) | self._without_estimate(quantity)
 
-    def scene(self, quantity: str = "slider.position", angle: float = 0.0) -> ToleranceScene:
+    def scene(self, quantity: str = "slider.position", angle: float = 0.0, *, units: str = "SI") -> ToleranceScene:
         """What `analysis.figures.plot_tolerances` draws, with the histogram at the angle nearest to ``angle`` (rad).
+
+        Its numbers are in SI; ``units`` are those of the notes at its foot.
 
         Raises
         ------
         ParameterError
             If the quantity was not sampled.
         InputError
-            If the quantity is not determined at that angle.
+            If the quantity is not determined at that angle, or there are no such units.
         """
         spread, linear = self._spread(quantity), self.estimates[quantity]
         i = int(np.argmin(np.abs(self.turn.angle - angle)))
         if np.ma.getmaskarray(spread.percentiles)[0, i] or np.ma.getmaskarray(linear.nominal)[i]:
+            if self.turn.without_lever:
+                raise InputError(f"{quantity} is not determined: {NO_LEVER}")
             raise InputError(f"{quantity} is not determined at {_at(self.turn, i)}: choose another angle")
         shares = np.column_stack([linear.shares[:, i].filled(np.nan), linear.second_shares[:, i].filled(np.nan)])
         return ToleranceScene(
@@ -469,31 +531,33 @@ class MonteCarlo:
             singular=()
             if self.turn.sought != SLIDER_FORCE or quantity in _FREE_OF_LOAD
             else tuple(centre.crank_angle for centre in self.turn.singularities),
-            notes=self.messages,
+            breaks=self.turn.breaks,
+            notes=self.notes(units),
         )
 
     def _spread(self, quantity: str) -> Spread:
         _check_names((quantity,), self.spreads, "quantity")
         return self.spreads[quantity]
 
-    def _off(self, name: str) -> list[str]:
-        off = np.flatnonzero(self.linear_is_off(name))
+    def _off(self, name: str, units: Mapping[str, tuple[str, float]]) -> list[str]:
+        off = np.flatnonzero(self.linear_is_off(name) & ~self._without_estimate(name))
         if not off.size:
             return []
-        spread, linear, unit = self.spreads[name], self.estimates[name], QUANTITIES[name]
+        spread, linear = self.spreads[name], self.estimates[name]
+        unit, one = units[QUANTITIES[name]]
         i = int(off[np.argmax(np.abs(linear.deviation[off] / spread.deviation[off] - 1.0))])
         second = linear.second_deviation[i]
-        told = "" if second is np.ma.masked else f", to second order {second:.3g} {unit}"
+        told = "" if second is np.ma.masked else f", to second order {second / one:.3g} {unit}"
         vanishing = bool(np.ma.getmaskarray(linear.shares)[0, i])
         return [
             f"the linear estimate of {name} is off at {_at(self.turn, i)}{_others(off)}: "
             + (
                 "its first derivatives vanish, "
                 if vanishing
-                else f"standard deviation {linear.deviation[i]:.3g} {unit}, "
+                else f"standard deviation {linear.deviation[i] / one:.3g} {unit}, "
             )
-            + f"the samples' standard deviation is {spread.deviation[i]:.3g} {unit}{told}; their mean is "
-            f"{spread.mean[i] - linear.nominal[i]:.3g} {unit} from the nominal value"
+            + f"the samples' standard deviation is {spread.deviation[i] / one:.3g} {unit}{told}; their mean is "
+            f"{(spread.mean[i] - linear.nominal[i]) / one:.3g} {unit} from the nominal value"
         ]
 
 
@@ -507,8 +571,8 @@ def monte_carlo(
 ) -> MonteCarlo:
     """Sample a mechanism whose dimensions are off by random amounts, at every angle of a turn.
 
-    The same samples are taken at all angles. An angle takes about 0.2 s with a million samples of the slider's motion, and 2 s
-    with all joint forces.
+    The same samples are taken at all angles. An angle takes about 0.2 s with a million samples of the slider's motion, and
+    about 2 to 3 s with all joint forces.
 
     Parameters
     ----------
@@ -524,9 +588,10 @@ def monte_carlo(
     Raises
     ------
     InputError
-        If there is no tolerance, or two of the same name, or fewer than two samples.
+        If there is no tolerance, or two of the same name, or fewer than two samples; if samples are no mechanism: a length
+        that is not above zero, or a crank whose inertia is less than its mass requires.
     ParameterError
-        If there is no such quantity, or a sample is no mechanism: a length that is not above zero, say.
+        If there is no such quantity.
     """
     _check_tolerances(tolerances)
     _check_names(quantities, QUANTITIES, "quantity")
@@ -539,6 +604,7 @@ def monte_carlo(
     n = len(turn)
     missed, dead = np.zeros(n, dtype=np.int64), np.zeros(n, dtype=np.int64)
     rows: dict[str, list[tuple[Any, ...]]] = {name: [] for name in quantities}
+    poles: dict[str, list[bool]] = {name: [] for name in quantities}
     for i in range(n):
         found = {name: np.empty(samples) for name in quantities}
         ratio = np.empty(samples)
@@ -552,18 +618,28 @@ def monte_carlo(
                 found[name][count : count + kept] = values[name]
             ratio[count : count + kept] = lever
             count += kept
-        pole = turn.sought == SLIDER_FORCE and count > 0 and ratio[:count].min() < 0.0 < ratio[:count].max()
+        across = turn.sought == SLIDER_FORCE and count > 0 and ratio[:count].min() < 0.0 < ratio[:count].max()
         for name in quantities:
-            rows[name].append(_statistics(found[name][:count], pole and name not in _FREE_OF_LOAD))
+            pole = bool(across) and name not in _FREE_OF_LOAD
+            rows[name].append(_statistics(found[name][:count], pole))
+            poles[name].append(pole)
     return MonteCarlo(
         turn=turn,
         tolerances=tuple(tolerances),
         samples=samples,
         seed=seed,
         spreads=MappingProxyType({name: _spread(parts) for name, parts in rows.items()}),
-        estimates=MappingProxyType(linear),
+        estimates=MappingProxyType({name: _without(linear[name], np.array(pole)) for name, pole in poles.items()}),
         not_assembled=missed,
         undetermined=dead,
+    )
+
+
+def _without(linear: Estimate, poles: NDArray[np.bool_]) -> Estimate:
+    """The estimate without what it says of angles at which the samples have a pole."""
+    values = {name: getattr(linear, name) for name in Estimate.__dataclass_fields__ if name != "nominal"}
+    return replace(
+        linear, **{name: np.ma.masked_where(np.broadcast_to(poles, x.shape), x) for name, x in values.items()}
     )
 
 
@@ -726,13 +802,37 @@ def _check_tolerances(tolerances: Sequence[Tolerance]) -> tuple[str, ...]:
 
 
 def _check_samples(parameters: SliderCrankParameters, drawn: Mapping[str, FloatArray]) -> None:
-    """Make sure that every sample is a mechanism, one parameter at a time."""
+    """Make sure that every sample is a mechanism, as `SliderCrankParameters` does of one.
+
+    Raises
+    ------
+    InputError
+        If some are none: which tolerances make them, and how many.
+    """
+    values: dict[str, Any] = {field.name: getattr(parameters, field.name) for field in fields(parameters)}
     for name, x in drawn.items():
-        if name not in (ANGLE, SHIFT):
-            nominal = getattr(parameters, field_name(name))
-            for extreme in (x.min(), x.max()):
-                changed: dict[str, Any] = {field_name(name): float(nominal + extreme)}
-                replace(parameters, **changed)
+        if name in (ANGLE, SHIFT):
+            continue
+        values[field_name(name)] = varied = values[field_name(name)] + x
+        lowest: dict[str, Any] = {field_name(name): float(varied.min())}
+        try:
+            replace(parameters, **lowest)
+        except ParameterError as error:
+            if error.name == name and lowest[field_name(name)] <= 0.0:
+                positive = error.requirement == POSITIVE
+                wrong = np.count_nonzero(varied <= 0.0 if positive else varied < 0.0)
+                raise InputError(
+                    f"the tolerance of {name} is too wide: in {wrong} of {x.size} samples it is "
+                    + ("not above zero" if positive else "below zero")
+                ) from None
+    steiner = values["crank_mass"] * (values["crank_cog_x"] ** 2 + values["crank_cog_y"] ** 2)
+    wrong = np.count_nonzero(values["crank_inertia"] < steiner * (1.0 - 1e-12))
+    if wrong:
+        names = [n for n in ("crank.inertia", "crank.mass", "crank.cog_x", "crank.cog_y") if n in drawn]
+        raise InputError(
+            f"the tolerance of {' and that of '.join(names)} is too wide: in {wrong} of {drawn[names[0]].size} samples "
+            "crank.inertia is less than crank.mass * (crank.cog_x^2 + crank.cog_y^2), which it holds"
+        )
 
 
 def _label(tolerance: Tolerance) -> str:

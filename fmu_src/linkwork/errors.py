@@ -48,7 +48,7 @@ class MissingParameterError(ParameterError):
 
 
 class AssemblyError(LinkworkError):
-    """The links cannot be joined at the given crank angle and slider position."""
+    """The links cannot be joined at the given configuration."""
 
 
 class InputError(LinkworkError, ValueError):

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping
 from dataclasses import fields
-from math import isfinite
+from math import isfinite, log10
 from numbers import Real
 from typing import Any
 
@@ -78,13 +78,18 @@ def check_constants(parameters: Any) -> None:
     Raises
     ------
     ParameterError
-        Naming the largest of the parameters.
+        Naming the most extreme of the parameters, by its order of magnitude.
     """
-    if not all(isfinite(constant) for constant in parameters.constants()):
-        largest = max((field.name for field in fields(parameters)), key=lambda name: abs(getattr(parameters, name)))
-        raise ParameterError(
-            fmi_name(largest), getattr(parameters, largest), "be small enough for finite moments of inertia"
-        )
+    try:
+        finite = all(isfinite(constant) for constant in parameters.constants())
+    except ArithmeticError:
+        finite = False
+    if finite:
+        return
+    values = {field.name: getattr(parameters, field.name) for field in fields(parameters)}
+    extreme = max((name for name in values if values[name]), key=lambda name: abs(log10(abs(values[name]))))
+    size = "small" if abs(values[extreme]) > 1.0 else "large"
+    raise ParameterError(fmi_name(extreme), values[extreme], f"be {size} enough for finite moments of inertia")
 
 
 def check_initial(initial: Any) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from math import cos, pi, sin
 from pathlib import Path
@@ -16,6 +17,11 @@ from analysis import Event, Inputs, Trajectory, compare, io, simulate, simulate_
 from analysis.case import Case, published_case
 from analysis.checks import CASES as CHECKS
 from analysis.inputs import Function, Harmonics, SliderCrankInputs, TorsionBar, encode, steps
+from analysis.linearise import linearise
+from analysis.mechanism import MECHANISMS, OUTPUT_UNITS
+from analysis.orbits import drive_of, find_orbit
+from analysis.resonance import natural_frequency
+from analysis.workspace import coupler_curve
 from linkwork.errors import AssemblyError, InputError, ParameterError
 from linkwork.five_bar.parameters import InitialState as FiveBarState
 from linkwork.five_bar.published import TABLE_3_1
@@ -272,6 +278,36 @@ def test_a_freedom_has_one_drive() -> None:
     assert encode(SliderCrankInputs()).value_names[3:] == ("axial_force", "load", "shift_speed", "rate of shift_speed")
 
 
+@pytest.mark.parametrize(
+    ("call", "what"),
+    [
+        (lambda p: find_orbit(p, speed=5.0), "a periodic motion"),
+        (lambda p: natural_frequency(p), "the natural frequency"),
+        (lambda p: linearise(p, (0.0, 0.0, 0.0, 0.0)), "a linear model"),
+        (lambda p: coupler_curve(p, 0.0), "a coupler curve"),
+    ],
+)
+def test_analyses_of_five_bars_refuse_it(call: Callable[[Any], Any], what: str) -> None:
+    with pytest.raises(InputError, match=f"{what} .*of five-bars: the parameters are SliderCrankParameters"):
+        call(PARAMETERS)
+
+
+def test_a_drive_of_another_mechanism_is_not_taken_for_one() -> None:
+    with pytest.raises(InputError, match="the inputs are SliderCrankInputs: periodic motions are of five-bars"):
+        drive_of(SliderCrankInputs(speed=5.0, load=3.0))
+
+
+def test_a_case_is_of_one_mechanism() -> None:
+    with pytest.raises(InputError, match="with parameters of the slider-crank it must be"):
+        Case(title="mixed", parameters=PARAMETERS, stop_time=1.0)
+
+
+def test_outputs_of_one_name_have_one_unit() -> None:
+    for mechanism in MECHANISMS.values():
+        units = {v.name: v.unit for v in mechanism.variables.OUTPUTS if v.kind == "Real"}
+        assert units == {name: OUTPUT_UNITS[name] for name in mechanism.output_names}
+
+
 # --- Files
 
 
@@ -320,10 +356,21 @@ stop_time = "0.5 s"
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        ('mechanism = "slider_crank"', "did you mean slider-crank"),
+        ('mechanism = "slider_crank"', "it must be one of five-bar, slider-crank"),
         ('mechanism = "five-bar"\npublished = "rahman-ideal"', "be that of the published set rahman-ideal"),
         ('published = "rahman-ideal"\n[axial]\nshift = 1.0', "there is no axial.shift"),
         ('published = "rahman-ideal"\n[axial]\ngroove = 1', "axial.groove is 1: it must be true or false"),
+        (
+            'published = "rahman-ideal"\n[axial]\ngroove = true',
+            "groove.amplitude is 0.0: it must be given with axial.groove",
+        ),
+        (
+            'published = "rahman-ideal"\n[axial]\nspeed = 0.1\ngroove = true',
+            "axial is 'speed, groove': it must have one",
+        ),
+        ('published = "rahman-ideal"\n[initial]\nshift_velocity = 0.1', "come with axial.force: the shift is held"),
+        ('published = "rahman-ideal"\n[load]\nfx = "3 N"', "load is 'fx': it must be one force, along the guide"),
+        ('mechanism = ["slider-crank"]', r"mechanism is \['slider-crank'\]: it must be one of five-bar, slider-crank"),
         ('published = "rahman-ideal"\n[coupler]\nlength = 1.0', "there is no coupler.length"),
         ('mechanism = "slider-crank"\n[crank]\nlength = 1.0', "parameter rod.length is missing"),
     ],

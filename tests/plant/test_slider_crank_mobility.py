@@ -344,7 +344,7 @@ def test_dead_centres_of_general_mechanisms_are_those_of_the_quartic() -> None:
     assert counts[2] > 10
 
 
-def assert_stroke_is_that_of_a_scan(par: SliderCrankParameters, law: M.ShiftLaw) -> None:
+def assert_stroke_is_that_of_a_scan(par: SliderCrankParameters, law: M.PeriodicShift) -> None:
     for part in M.ranges(par, law):
         # dense at the ends, where h is the root of the distance from them
         share = np.linspace(0.0, 1.0, 4001)
@@ -443,7 +443,7 @@ def grooved(par: SliderCrankParameters, amplitude: float, ratio: float) -> Slide
     return replace(par, groove_amplitude=amplitude, groove_ratio=ratio)
 
 
-def assert_law_agrees_with_a_scan(par: SliderCrankParameters, law: M.ShiftLaw) -> None:
+def assert_law_agrees_with_a_scan(par: SliderCrankParameters, law: M.PeriodicShift) -> None:
     """Dead centres and singularities against the changes of sign on a grid, and the ranges' ends."""
     p = par.constants()
 
@@ -552,7 +552,7 @@ def test_any_periodic_law() -> None:
         inner = 0.8 * sin(3.0 * th)
         return 0.1 * cos(th + inner), -0.1 * sin(th + inner) * (1.0 + 2.4 * cos(3.0 * th))
 
-    law = M.ShiftLaw(at=law_at, rate=0.4, curvature=4.0)
+    law = M.PeriodicShift(at=law_at, rate=0.4, curvature=4.0)
     for offset, twist in ((20.0, 310.0), (30.0, 232.0), (0.0, 270.0)):
         par = published.parameters(offset, twist)
         assert_law_agrees_with_a_scan(par, law)
@@ -591,7 +591,7 @@ def test_close_pairs_of_dead_centres_are_found() -> None:
             )
 
         # the slider's own part is weighed as the law is: only the law's part is left
-        law = M.ShiftLaw(
+        law = M.PeriodicShift(
             at=lambda th: (still(th)[0] + law_at(th)[0] - 0.05 * still(th)[0],
                            still(th)[1] + law_at(th)[1] - 0.05 * still(th)[1]),
             rate=1.0,
@@ -627,10 +627,10 @@ def test_shift_that_is_not_finite_is_refused(shift: float) -> None:
 def test_law_that_is_none_is_refused(changes: dict[str, object], message: str) -> None:
     law = {"at": lambda th: (0.1 * sin(th), 0.1 * cos(th)), "rate": 0.1, "curvature": 0.1} | changes
     with pytest.raises(InputError, match=message):
-        M.ShiftLaw(**law)  # type: ignore[arg-type]
+        M.PeriodicShift(**law)  # type: ignore[arg-type]
 
 
 def test_law_beyond_its_bound_is_refused_where_it_is() -> None:
-    law = M.ShiftLaw(at=lambda th: (0.1 * sin(th), 0.1 * cos(th)), rate=0.05, curvature=0.1)
+    law = M.PeriodicShift(at=lambda th: (0.1 * sin(th), 0.1 * cos(th)), rate=0.05, curvature=0.1)
     with pytest.raises(InputError, match=r"derivative .* at crank angle .* by no more than its rate, 0\.05 m/rad"):
         M.dead_centres(published.parameters(), law)

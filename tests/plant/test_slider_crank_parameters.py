@@ -236,3 +236,11 @@ def test_speed_torque_and_start_of_section_3_1() -> None:
     assert start == InitialState(crank_speed=published.CRANK_SPEED, shift_position=3.5 * INCH)
     assert (published.parameters(10.0), start) == published.OFFSET_CASE
     assert hypot(published.INCH - INCH, published.POUND_FORCE - POUND_FORCE, published.POUND_INCH - POUND_INCH) == 0.0
+
+
+@pytest.mark.parametrize("length", [1e-200, 1e-160])
+def test_a_rod_too_short_for_finite_moments_is_named(length: float) -> None:
+    with pytest.raises(
+        ParameterError, match=r"parameter rod\.length is 1e-\d+: it must be large enough for finite moments"
+    ):
+        replace(published.parameters(), rod_length=length)

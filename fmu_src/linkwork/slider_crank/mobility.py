@@ -20,6 +20,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 from itertools import pairwise
 from math import asin, cos, degrees, inf, isfinite, pi, sin, sqrt
+from sys import float_info
 from typing import NamedTuple
 
 from ..errors import AssemblyError, InputError, ParameterError
@@ -74,7 +75,7 @@ def check_assembly(parameters: SliderCrankParameters, crank_angle: float, shift:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class ShiftLaw:
+class PeriodicShift:
     """The axial shift as a function of the crank angle.
 
     Parameters
@@ -117,7 +118,7 @@ class ShiftLaw:
         return 2.0 * pi * self.turns
 
 
-def constant_shift(shift: float) -> ShiftLaw:
+def constant_shift(shift: float) -> PeriodicShift:
     """The law of a crank held at the shift S1 (m).
 
     Raises
@@ -127,10 +128,10 @@ def constant_shift(shift: float) -> ShiftLaw:
     """
     if not isfinite(shift):
         raise InputError(f"the shift is {shift!r} m: it must be a finite number")
-    return ShiftLaw(at=lambda _: (shift, 0.0), rate=0.0, curvature=0.0)
+    return PeriodicShift(at=lambda _: (shift, 0.0), rate=0.0, curvature=0.0)
 
 
-def groove_shift(parameters: SliderCrankParameters) -> ShiftLaw:
+def groove_shift(parameters: SliderCrankParameters) -> PeriodicShift:
     """The law of the parameters' groove, S1 = SS1 sin(alpha theta1) of eq 28.
 
     Raises
@@ -142,7 +143,7 @@ def groove_shift(parameters: SliderCrankParameters) -> ShiftLaw:
     ratio = Fraction(p.ratio).limit_denominator(_MOST_TURNS)
     if abs(float(ratio) - p.ratio) > 1e-12 * max(1.0, abs(p.ratio)):
         raise ParameterError("groove.ratio", p.ratio, f"repeat after at most {_MOST_TURNS} turns of the crank")
-    return ShiftLaw(
+    return PeriodicShift(
         at=lambda th: kinematics.groove(th, p),
         rate=abs(p.amplitude * p.ratio),
         curvature=abs(p.amplitude * p.ratio * p.ratio),
@@ -151,7 +152,7 @@ def groove_shift(parameters: SliderCrankParameters) -> ShiftLaw:
 
 
 class Margin(NamedTuple):
-    """Rod length less the crank pin's distance from the guide, at its least over the turn (m), and the angle there (rad)."""
+    """Rod length less the crank pin's distance from the guide, at an extreme of it over the turn (m), and the angle (rad)."""
 
     length: float
     crank_angle: float
@@ -192,6 +193,10 @@ class Range(NamedTuple):
     greatest: Place
     least: Place
 
+    def full(self, span: float) -> bool:
+        """Whether it has no ends: the crank makes all of the law's turns, its ``span``."""
+        return self.high - self.low >= span * (1.0 - 1e-12)
+
     @property
     def stroke(self) -> float:
         """Greatest less least slider position (m)."""
@@ -214,7 +219,7 @@ class _Change(NamedTuple):
     along_spread: float
 
 
-def _change(middle: float, half: float, law: ShiftLaw, p: Constants, pitch: float) -> _Change:
+def _change(middle: float, half: float, law: PeriodicShift, p: Constants, pitch: float) -> _Change:
     """D, A and B and their spreads over ``middle`` +- ``half``; ``pitch`` is 0 where A and B leave S1' out, else 1."""
     s1, ds1 = law.at(middle)[:2]
     if not (isfinite(s1) and abs(ds1) <= law.rate * (1.0 + 1e-9)):
@@ -251,7 +256,7 @@ def _change(middle: float, half: float, law: ShiftLaw, p: Constants, pitch: floa
 _Bounded = Callable[[float, float], tuple[float, float]]
 
 
-def _margin_slope(law: ShiftLaw, p: Constants) -> _Bounded:
+def _margin_slope(law: PeriodicShift, p: Constants) -> _Bounded:
     """A, whose zeros are the extremes of the distance between crank pin and guide."""
 
     def slope(middle: float, half: float) -> tuple[float, float]:
@@ -331,34 +336,43 @@ def _zeros(function: _Bounded, low: float, high: float, scale: float) -> list[_Z
     return found
 
 
-def _wrapped(angle: float, law: ShiftLaw) -> float:
+def _wrapped(angle: float, law: PeriodicShift) -> float:
     """The angle in [0, span): the remainder of a tiny negative number rounds to the span itself."""
     wrapped = angle % law.span
     return wrapped if wrapped < law.span else 0.0
 
 
-def _square(angle: float, law: ShiftLaw, p: Constants) -> float:
+def _square(angle: float, law: PeriodicShift, p: Constants) -> float:
     return kinematics.assembly_square(angle, law.at(angle)[0], p)
 
 
-def _extremes(law: ShiftLaw, p: Constants) -> list[float]:
+def _extremes(law: PeriodicShift, p: Constants) -> list[float]:
     """The angles at which the margin of assembly is least or greatest, in order; any one if it is the same everywhere."""
     zeros = _zeros(_margin_slope(law, p), _SEAM, _SEAM + law.span, (p.a1 + law.rate) * p.a2)
     return [zero.angle for zero in zeros] or [0.0]
 
 
-def assembly_margin(parameters: SliderCrankParameters, law: ShiftLaw) -> Margin:
+def assembly_margin(parameters: SliderCrankParameters, law: PeriodicShift) -> Margin:
     """The least margin of assembly over the turn, negative where the crank cannot turn fully, and where it is.
 
     The crank turns fully where the margin is zero or greater. The plant's steps also keep clear of the limit of assembly
     by `linkwork.limits.LIMIT_SINE`, 5e-7 of the rod's length.
     """
-    p = parameters.constants()
-    worst = min(_extremes(law, p), key=lambda angle: _square(angle, law, p))
-    return Margin(p.a2 - sqrt(p.a2 * p.a2 - _square(worst, law, p)), _wrapped(worst, law))
+    return _margin(min, law, parameters.constants())
 
 
-def turns_fully(parameters: SliderCrankParameters, law: ShiftLaw) -> bool:
+def greatest_margin(parameters: SliderCrankParameters, law: PeriodicShift) -> Margin:
+    """The greatest margin of assembly over the turn, negative where it can be assembled nowhere, and where it is."""
+    return _margin(max, law, parameters.constants())
+
+
+def _margin(choose: Callable[..., float], law: PeriodicShift, p: Constants) -> Margin:
+    """The margin at the extreme that ``choose``, min or max, takes."""
+    place = choose(_extremes(law, p), key=lambda angle: _square(angle, law, p))
+    return Margin(p.a2 - sqrt(p.a2 * p.a2 - _square(place, law, p)), _wrapped(place, law))
+
+
+def turns_fully(parameters: SliderCrankParameters, law: PeriodicShift) -> bool:
     """Whether the rod reaches the guide at every crank angle."""
     return assembly_margin(parameters, law).length >= 0.0
 
@@ -394,10 +408,12 @@ def greatest_shift(parameters: SliderCrankParameters) -> float | None:
     )
     if least < 0.0:
         return None
-    return least / abs(p.sa) if p.sa != 0.0 else inf
+    # a twist of pi has a sine of its rounding
+    parallel = abs(p.sa) <= 4.0 * float_info.epsilon * max(1.0, abs(parameters.guide_twist))
+    return inf if parallel else least / abs(p.sa)
 
 
-def _place(angle: float, law: ShiftLaw, p: Constants, *, limit: bool = False) -> Place:
+def _place(angle: float, law: PeriodicShift, p: Constants, *, limit: bool = False) -> Place:
     """Configuration at an angle at which the rod reaches the guide; at ``limit`` of assembly it is perpendicular to it."""
     shift = law.at(angle)[0]
     # at the limit the rounding of the angle would be a root of it in h
@@ -405,13 +421,13 @@ def _place(angle: float, law: ShiftLaw, p: Constants, *, limit: bool = False) ->
     return Place(_wrapped(angle, law), shift, h - p.a1 * sin(angle) * p.sa - shift * p.ca)
 
 
-def _dead_centres(low: float, high: float, law: ShiftLaw, p: Constants, pitch: float) -> tuple[DeadCentre, ...]:
+def _dead_centres(low: float, high: float, law: PeriodicShift, p: Constants, pitch: float) -> tuple[DeadCentre, ...]:
     slope = _slider_slope(lambda middle, half: _change(middle, half, law, p, pitch), p.branch)
     zeros = _zeros(slope, low, high, (p.a1 + law.rate) * p.a2)
     return tuple(sorted(DeadCentre(*_place(zero.angle, law, p), outer=zero.falling) for zero in zeros))
 
 
-def _range(low: float, high: float, law: ShiftLaw, p: Constants) -> Range:
+def _range(low: float, high: float, law: PeriodicShift, p: Constants) -> Range:
     dead = _dead_centres(low, high, law, p, 1.0)
     # a full turn is searched from the seam, and told from zero
     full = low == _SEAM
@@ -422,7 +438,7 @@ def _range(low: float, high: float, law: ShiftLaw, p: Constants) -> Range:
     return Range(start, end, dead, places[-1], places[0])
 
 
-def _assembled(law: ShiftLaw, p: Constants) -> list[tuple[float, float]]:
+def _assembled(law: PeriodicShift, p: Constants) -> list[tuple[float, float]]:
     """Ends of the ranges in which the rod reaches the guide."""
     extremes = _extremes(law, p)
     reached = [_square(angle, law, p) >= 0.0 for angle in extremes]
@@ -442,7 +458,7 @@ def _assembled(law: ShiftLaw, p: Constants) -> list[tuple[float, float]]:
     return sorted(zip(starts, ends), key=lambda pair: _wrapped(pair[0], law))
 
 
-def ranges(parameters: SliderCrankParameters, law: ShiftLaw) -> tuple[Range, ...]:
+def ranges(parameters: SliderCrankParameters, law: PeriodicShift) -> tuple[Range, ...]:
     """The ranges of crank angles in which the rod reaches the guide, each with its dead centres and its stroke.
 
     One from 0 to the span where the crank turns fully; none where it cannot be assembled at all; at most two at a constant
@@ -453,7 +469,7 @@ def ranges(parameters: SliderCrankParameters, law: ShiftLaw) -> tuple[Range, ...
     return tuple(_range(low, high, law, p) for low, high in _assembled(law, p))
 
 
-def dead_centres(parameters: SliderCrankParameters, law: ShiftLaw) -> tuple[DeadCentre, ...]:
+def dead_centres(parameters: SliderCrankParameters, law: PeriodicShift) -> tuple[DeadCentre, ...]:
     """All configurations in which the slider turns back, in the order of their angles: dS4/dtheta1 = 0 along the law.
 
     None where the slider stands still at every angle. At a constant shift there are two where the crank turns fully, of at
@@ -465,7 +481,7 @@ def dead_centres(parameters: SliderCrankParameters, law: ShiftLaw) -> tuple[Dead
     return tuple(sorted(centre for part in ranges(parameters, law) for centre in part.dead_centres))
 
 
-def singularities(parameters: SliderCrankParameters, law: ShiftLaw) -> tuple[DeadCentre, ...]:
+def singularities(parameters: SliderCrankParameters, law: PeriodicShift) -> tuple[DeadCentre, ...]:
     """The configurations along the law in which the crank's torque and the slider's force do not balance: kth = 0.
 
     kth is the derivative of the slider position by the crank angle at the shift held. Where the shift is driven by a force
