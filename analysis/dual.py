@@ -16,7 +16,7 @@ from that frame's axes and origin to those in which p and R are given, and its i
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any, TypeAlias, cast
 
 import numpy as np
@@ -43,16 +43,31 @@ _UNARY: dict[Any, Callable[[Array, Array], Any]] = {
     np.arcsin: lambda x, f: 1.0 / np.sqrt(1.0 - x * x),
     np.arccos: lambda x, f: -1.0 / np.sqrt(1.0 - x * x),
     np.arctan: lambda x, f: 1.0 / (1.0 + x * x),
+    np.sinh: lambda x, f: np.cosh(x),
+    np.cosh: lambda x, f: np.sinh(x),
     np.tanh: lambda x, f: 1.0 - f * f,
+    np.sign: lambda x, f: 0.0,
 }
 
 
-def _power(a: Dual, b: Dual, exponent_varies: bool) -> Dual:
+def _power(a: Dual, b: Dual) -> Dual:
     """a^b; the logarithm of a is taken only where b varies, so that a constant power of a negative number is one."""
     value = np.power(a.real, b.real)
     # b a^(b-1), which is 0 for b = 0 whatever a is
     slope = b.real * np.power(a.real, np.where(b.real == 0.0, 1.0, b.real - 1.0)) * a.dual
-    return Dual(value, slope + value * np.log(a.real) * b.dual if exponent_varies else slope)
+    # a^b log a is 0 in the limit for a = 0 and b > 0
+    varies = (b.dual != 0.0) & ~((a.real == 0.0) & (b.real > 0.0))
+    return Dual(value, slope + value * np.log(np.where(varies, a.real, 1.0)) * b.dual)
+
+
+def _matmul(a: Dual, b: Dual) -> Dual:
+    """a @ b, a vector on either side as NumPy has it."""
+    if a.real.ndim == 1:
+        return _matmul(a[None, :], b)[..., 0, :] if b.real.ndim > 1 else _matmul(a, b[:, None])[..., 0]
+    if b.real.ndim == 1:
+        return _matmul(a, b[:, None])[..., 0]
+    a, b = _aligned(a, b)
+    return Dual(a.real @ b.real, a.real @ b.dual + a.dual @ b.real)
 
 
 def _atan2(y: Dual, x: Dual) -> Dual:
@@ -62,14 +77,27 @@ def _atan2(y: Dual, x: Dual) -> Dual:
     )
 
 
-#: Functions of two arguments but the power, which asks for more than the values.
+def _hypot(a: Dual, b: Dual) -> Dual:
+    value = np.hypot(a.real, b.real)
+    return Dual(value, (a.real * a.dual + b.real * b.dual) / value)
+
+
+def _chosen(value: Array, a: Dual, b: Dual) -> Dual:
+    """The one of two that has the ``value``; of equal ones the first."""
+    return Dual(value, np.where(value == a.real, a.dual, b.dual))
+
+
+#: Functions of two arguments but the matrix product, whose vectors are a case of their own.
 _BINARY: dict[Any, Callable[[Dual, Dual], Dual]] = {
     np.add: lambda a, b: Dual(a.real + b.real, a.dual + b.dual),
     np.subtract: lambda a, b: Dual(a.real - b.real, a.dual - b.dual),
     np.multiply: lambda a, b: Dual(a.real * b.real, a.real * b.dual + a.dual * b.real),
     np.divide: lambda a, b: Dual(a.real / b.real, (a.dual - a.real / b.real * b.dual) / b.real),
-    np.matmul: lambda a, b: Dual(a.real @ b.real, a.real @ b.dual + a.dual @ b.real),
+    np.power: _power,
     np.arctan2: _atan2,
+    np.hypot: _hypot,
+    np.minimum: lambda a, b: _chosen(np.minimum(a.real, b.real), a, b),
+    np.maximum: lambda a, b: _chosen(np.maximum(a.real, b.real), a, b),
 }
 
 
@@ -81,8 +109,8 @@ class Dual(NDArrayOperatorsMixin):
     real, dual : array_like
         The parts. They are spread to a common shape, but the dual part may have more axes in front: directions in which
         derivatives are taken at once. So ``Dual(2.0, [1.0, 0.0])`` is one number with the derivatives in two directions, and
-        a real part of shape (n,) with m directions has a dual part of shape (m, n). All real parts that meet in a
-        calculation with directions must have the same number of axes (or none).
+        a real part of shape (n,) with m directions has a dual part of shape (m, n). In a calculation the axes of real parts
+        are matched with each other, and those of directions with each other.
     """
 
     __slots__ = ("dual", "real")
@@ -113,9 +141,32 @@ class Dual(NDArrayOperatorsMixin):
         """Transpose in the last two axes: of an orthogonal dual matrix the inverse (eq 4)."""
         return Dual(np.swapaxes(self.real, -1, -2), np.swapaxes(self.dual, -1, -2))
 
+    @property
+    def directions(self) -> int:
+        """How many axes of directions the dual part has in front."""
+        return self.dual.ndim - self.real.ndim
+
+    def sum(self, axis: int | None = None) -> Dual:
+        """Sum over an axis of the real part, or over all of them; not over directions."""
+        axes = tuple(range(-self.real.ndim, 0)) if axis is None else (axis - self.real.ndim if axis >= 0 else axis,)
+        real = self.real.sum(axes)
+        return Dual(real, self.dual.sum(axes))
+
+    def __len__(self) -> int:
+        """Length of the real part's first axis; a single number has none (TypeError)."""
+        return len(self.real)
+
+    def __iter__(self) -> Iterator[Dual]:
+        """The elements along the real part's first axis."""
+        return (self[i] for i in range(len(self)))
+
+    def __bool__(self) -> bool:
+        """Whether a single number's real part is not 0."""
+        return bool(self.real)
+
     def __getitem__(self, index: Any) -> Dual:
         """The elements that the index takes from the real part, with all their directions."""
-        directions = (slice(None),) * (self.dual.ndim - self.real.ndim)
+        directions = (slice(None),) * self.directions
         return Dual(self.real[index], self.dual[directions + (index if isinstance(index, tuple) else (index,))])
 
     def __array__(self, *_: Any, **__: Any) -> Array:
@@ -134,17 +185,46 @@ class Dual(NDArrayOperatorsMixin):
             return NotImplemented
         if ufunc in _COMPARISONS:
             return ufunc(*(x.real if isinstance(x, Dual) else x for x in inputs))
-        if ufunc is np.isfinite:
-            return np.isfinite(self.real) & np.isfinite(self.dual)
+        if ufunc in (np.isfinite, np.isnan):
+            both, every = (np.logical_and, np.all) if ufunc is np.isfinite else (np.logical_or, np.any)
+            return both(ufunc(self.real), every(ufunc(self.dual), axis=tuple(range(self.directions))))
         x = [dual(i) for i in inputs]
-        if ufunc is np.power:
-            return _power(x[0], x[1], exponent_varies=isinstance(inputs[1], Dual))
+        if ufunc is np.matmul:
+            return _matmul(*x)
         if ufunc in _BINARY:
-            return _BINARY[ufunc](x[0], x[1])
+            return _BINARY[ufunc](*_aligned(*x))
         if ufunc in _UNARY:
             value = ufunc(x[0].real)
             return Dual(value, _UNARY[ufunc](x[0].real, value) * x[0].dual)
         return NotImplemented
+
+    def __array_function__(self, function: Any, _: Any, arguments: Any, options: Any) -> Any:
+        """NumPy's sum and shape; any other function that is not one of element by element is refused.
+
+        Raises
+        ------
+        TypeError
+            With what there is in its place.
+        """
+        if function in (np.sum, np.shape) and len(arguments) == 1 and arguments[0] is self and options.keys() <= {"axis"}:
+            return self.sum(**options) if function is np.sum else self.shape
+        raise TypeError(
+            f"numpy.{function.__name__} does not take dual numbers, or not with these arguments: there are stack, join, dot, "
+            "cross and apply in analysis.dual and the method sum, or take the real or the dual part"
+        )
+
+
+def _aligned(*x: Dual) -> tuple[Dual, ...]:
+    """The same numbers with as many axes of the real part each, so that NumPy matches directions with directions."""
+    axes = max(part.real.ndim for part in x)
+    return tuple(part if part.real.ndim == axes or not part.directions else _with_axes(part, axes) for part in x)
+
+
+def _with_axes(x: Dual, axes: int) -> Dual:
+    ones = (1,) * (axes - x.real.ndim)
+    return Dual(
+        x.real.reshape(ones + x.real.shape), x.dual.reshape(x.dual.shape[: x.directions] + ones + x.real.shape)
+    )
 
 
 def _inexact(part: Any) -> Array:
@@ -179,21 +259,22 @@ def derivative(function: Callable[[Dual], Any], x: Any) -> Array:
 
 def stack(parts: Sequence[Any], axis: int = -1) -> Dual:
     """Dual numbers joined along a new axis, which is counted from the end (negative)."""
-    x = [dual(part) for part in parts]
+    x = _aligned(*(dual(part) for part in parts))
     real = np.broadcast_arrays(*(part.real for part in x))
     slopes = np.broadcast_arrays(*(part.dual for part in x), np.empty(real[0].shape))[:-1]
     return Dual(np.stack(real, axis), np.stack(slopes, axis))
 
 
 def join(*parts: Dual) -> Dual:
-    """Dual vectors or matrices joined along their last axis; none has directions, or all have."""
-    return Dual(np.concatenate([x.real for x in parts], -1), np.concatenate([x.dual for x in parts], -1))
+    """Dual vectors or matrices joined along their last axis."""
+    directions = np.broadcast_shapes(*(x.dual.shape[: x.directions] for x in parts))
+    slopes = [np.broadcast_to(x.dual, directions + x.real.shape) for x in parts]
+    return Dual(np.concatenate([x.real for x in parts], -1), np.concatenate(slopes, -1))
 
 
 def dot(a: Any, b: Any) -> Dual:
     """Product a . b of dual vectors (..., 3): of two unit screws the cosine of their dual angle."""
-    product = dual(a) * b
-    return Dual(product.real.sum(-1), product.dual.sum(-1))
+    return cast(Dual, dual(a) * b).sum(-1)
 
 
 def cross(a: Any, b: Any) -> Dual:
@@ -202,7 +283,7 @@ def cross(a: Any, b: Any) -> Dual:
     With a dual velocity a it is the rate of a screw b that moves with the body: its own rate in the frame of the body, if
     there is one, is to be added.
     """
-    x, y = dual(a), dual(b)
+    x, y = _aligned(dual(a), dual(b))
     return Dual(np.cross(x.real, y.real), np.cross(x.real, y.dual) + np.cross(x.dual, y.real))
 
 

@@ -173,7 +173,8 @@ def _of_mechanism(mechanism: Mechanism, frame: str, internal: tuple[tuple[str, s
     """Frame, FMI variables and symbols of one mechanism."""
     kind, variables = mechanism.parameters.__name__, mechanism.variables
     lines = [frame, "", "### FMI variables", ""]
-    lines += ["| symbol | identifier | FMI variable | unit | meaning |", "| --- | --- | --- | --- | --- |"]
+    lines += ["| symbol | identifier | FMI variable | unit | start | range | meaning |"]
+    lines += ["| --- | --- | --- | --- | --- | --- | --- |"]
     for variable in (*variables.PARAMETERS, *variables.INPUTS, *variables.OUTPUTS):
         if variable.name in mechanism.mechanism_variables:
             identifier = f"`{kind}.{field_name(variable.name)}`"
@@ -183,10 +184,9 @@ def _of_mechanism(mechanism: Mechanism, frame: str, internal: tuple[tuple[str, s
             identifier = f"`Outputs.{variable.name.replace('.', '_')}`"
         else:
             identifier = ""
-        unit = variable.unit or variable.kind
-        lines.append(
-            f"| {_symbol(variable.symbol)} | {identifier} | `{variable.name}` | {unit} | {variable.description} |"
-        )
+        start = "" if variable.causality == "output" else _start(variable)
+        cells = (_symbol(variable.symbol), identifier, f"`{variable.name}`", variable.unit or variable.kind, start)
+        lines.append(f"| {' | '.join(cells)} | {_range(variable)} | {variable.description} |")
     lines += [
         "",
         "### Symbols of the equations",
