@@ -80,7 +80,7 @@ def test_links_in_the_documentation_lead_somewhere():
 def test_the_code_of_the_readme_runs(tmp_path):
     build_fmu.build("FiveBarSlider", tmp_path / "build")
     blocks = re.findall(r"```python\n(.*?)```", (ROOT / "README.md").read_text(), flags=re.DOTALL)
-    assert len(blocks) == 4
+    assert len(blocks) == 5
     for block in blocks:
         assert len(block.strip().splitlines()) <= 12
         done = subprocess.run(

@@ -234,12 +234,20 @@ def test_erratum_7_the_axial_crank_force_cannot_be_prescribed() -> None:
 
 
 def test_erratum_9_eq_28a_has_s1_for_its_amplitude() -> None:
-    """S1 = SS1 sin(alpha theta1); S1 = S1 sin(alpha theta1), as printed, holds only for no shift or where the sine is 1."""
-    p = parameters()
-    constants = replace(p, groove_amplitude=0.07, groove_ratio=2.0).constants()
-    shift = kinematics.groove(0.4, constants).x
-    assert shift == pytest.approx(0.07 * np.sin(0.8))
-    assert abs(shift * np.sin(0.8) - shift) > 0.1 * shift
+    """S1 = SS1 sin(alpha theta1). The printed S1 = S1 sin(alpha theta1) has no way in it: S1 (1 - sin) = 0 leaves S1 = 0 at every
+    angle whose sine is not 1, and the groove's shift is not 0 there. Its velocity is held against a difference quotient."""
+    amplitude, ratio = 0.07, 2.0
+    constants = replace(parameters(), groove_amplitude=amplitude, groove_ratio=ratio).constants()
+    h = 1e-6
+    for angle in TURN + 0.1:
+        groove = kinematics.groove(angle, constants)
+        before, after = (kinematics.groove(angle + d, constants).shift for d in (-h, h))
+        assert groove.shift == pytest.approx(amplitude * np.sin(ratio * angle), abs=1e-15)
+        assert groove.pitch == pytest.approx((after - before) / (2.0 * h), abs=1e-8)
+    shifts = np.array([kinematics.groove(angle, constants).shift for angle in TURN + 0.1])
+    printed = shifts * np.sin(ratio * (TURN + 0.1))
+    # right where the sine is 1, and off by up to twice the amplitude: S1 sin - S1 at a sine of -1
+    assert np.abs(printed - shifts).max() == pytest.approx(2.0 * amplitude, rel=0.02)
 
 
 def test_erratum_9_row_6_of_eq_38_lacks_sin_eta2() -> None:
