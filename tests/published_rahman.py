@@ -8,8 +8,39 @@ and degrees, as printed; the factors to SI are at the top. Nothing here is the o
 
 from __future__ import annotations
 
-from types import MappingProxyType
-from typing import Mapping, NamedTuple
+from analysis.studies._rahman import (
+    DEAD_CENTRES_DEG,
+    GREATEST_SHIFTS_IN,
+    SPOTS,
+    STROKES_BY_TWIST_IN,
+    STROKES_IN,
+    Spot,
+)
+
+__all__ = [
+    "CRANK_IN",
+    "CRANK_RADIUS_IN",
+    "DEAD_CENTRES_DEG",
+    "DENSITY_LB_IN3",
+    "GRAVITY_IN_S2",
+    "GREATEST_SHIFTS_IN",
+    "INCH",
+    "MASSES_LB_S2_IN",
+    "OFFSETS_IN",
+    "POUND_FORCE",
+    "POUND_INCH",
+    "ROD_IN",
+    "ROD_RADIUS_IN",
+    "SHIFTS_IN",
+    "SLIDER_SIDE_IN",
+    "SPEED_RPM",
+    "SPOTS",
+    "STROKES_BY_TWIST_IN",
+    "STROKES_IN",
+    "TORQUE_LB_IN",
+    "TWISTS_DEG",
+    "Spot",
+]
 
 # One of the unit, in SI
 INCH = 0.0254
@@ -26,34 +57,3 @@ CRANK_RADIUS_IN, ROD_RADIUS_IN, SLIDER_SIDE_IN = 1.5, 1.0, 3.0
 DENSITY_LB_IN3, GRAVITY_IN_S2 = 0.28, 386.4
 SPEED_RPM = 50.0
 TORQUE_LB_IN = 100.0
-
-
-class Spot(NamedTuple):
-    """Values at theta1 = 30 deg, 50 rpm, branch +; the last two: slider force along -k4 at a torque of 100 lb.in, and the
-    torque that no slider force takes."""
-
-    offset_in: float
-    shift_in: float
-    twist_deg: float
-    position_in: float
-    velocity_in_s: float
-    acceleration_in_s2: float
-    slider_force_lb: float
-    torque_lb_in: float
-
-
-SPOTS = (
-    Spot(10.0, 3.5, 270.0, 51.518171, 68.488429, -62.88695, -15.328251, -100.49853),
-    Spot(20.0, 0.0, 310.0, 44.111244, 62.432803, 36.61340, -8.206263, 2.15027),
-)
-
-# At S1 = 0 and 270 deg, by the offset in inches. Section 3.2 sees spikes near 100 and 300 deg, and says the offset would
-# reduce the stroke: it does not
-DEAD_CENTRES_DEG: Mapping[float, tuple[float, float]] = MappingProxyType(
-    {10.0: (99.28, 285.26), 20.0: (108.82, 301.76), 30.0: (118.94, 322.14)}
-)
-STROKES_IN: Mapping[float, float] = MappingProxyType({0.0: 24.000, 10.0: 24.528, 20.0: 26.375, 30.0: 30.935})
-# At a4 = 20 in and S1 = 0, by the twist in degrees
-STROKES_BY_TWIST_IN: Mapping[float, float] = MappingProxyType({232.0: 21.85, 310.0: 21.39})
-# At 270 deg, by the offset: sqrt(a2^2 - (a1 + |a4|)^2)
-GREATEST_SHIFTS_IN: Mapping[float, float] = MappingProxyType({0.0: 48.539, 10.0: 44.900, 20.0: 38.419, 30.0: 27.129})

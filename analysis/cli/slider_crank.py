@@ -5,33 +5,30 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from math import degrees, isinf, radians
+from math import degrees, isinf
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 import numpy as np
+from click.core import ParameterSource
 from rich.markup import escape
 from rich.table import Table
 
 from linkwork.errors import InputError
 from linkwork.slider_crank import mobility
 from linkwork.slider_crank.parameters import SliderCrankParameters
-from linkwork.slider_crank.published import SETS, PublishedSet
+from linkwork.slider_crank.published import RAD_S_PER_RPM, SETS, PublishedSet
 
 from .common import CHECK_FAILED, changes, console, errors, handled, number_or_text, tolerance_option
 from .design import wrote
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
     from ..slider_crank.forces import ForceTurn, ShiftLaw
     from ..slider_crank.tolerances import MonteCarlo
 
 #: The case that everything starts from where no other is named.
 DEFAULT = "rahman-a4-10-s1-3.5"
-#: Angle (deg) from a singularity beyond which a value is told as an extreme, and shown.
-CLEAR_DEG = 10.0
 
 
 @click.group("slider-crank")
@@ -62,7 +59,7 @@ class _Chosen:
     speed: float
 
     @property
-    def law(self) -> mobility.ShiftLaw:
+    def law(self) -> mobility.PeriodicShift:
         """The shift over the crank angle, as mobility and pictures take it."""
         return mobility.constant_shift(self.shift) if self.groove is None else mobility.groove_shift(self.parameters)
 
@@ -87,7 +84,6 @@ _MECHANISM_OPTIONS: Sequence[Callable[[Callable[..., Any]], Callable[..., Any]]]
     click.option("--offset", metavar="LENGTH", help="Offset a4 between crank axis and guide, such as '10 in'."),
     click.option("--shift", metavar="LENGTH", help="Axial shift S1 of the crank, such as '3.5 in'."),
     click.option("--twist", metavar="ANGLE", help="Twist alpha4 between crank axis and guide, such as '310 deg'."),
-    click.option("--speed", metavar="SPEED", help="Crank speed, such as '50 rpm'."),
     click.option(
         "--groove",
         type=click.Choice(["shaft", "apart"]),
@@ -111,6 +107,7 @@ def mechanism_options(command: Callable[..., Any]) -> Callable[..., Any]:
     return command
 
 
+speed_option = click.option("--speed", metavar="SPEED", help="Crank speed, such as '50 rpm'.")
 out_option = click.option(
     "--out", default="out", show_default=True, type=click.Path(file_okay=False), help="Folder for the results."
 )
@@ -132,11 +129,12 @@ def _chosen(
     offset: str | None,
     shift: str | None,
     twist: str | None,
-    speed: str | None,
     groove: str | None,
     settings: Sequence[str],
+    speed: str | None = None,
+    paced: bool = False,
 ) -> _Chosen:
-    """The mechanism of the options.
+    """The mechanism of the options; ``paced`` says whether the speed matters.
 
     Raises
     ------
@@ -176,9 +174,38 @@ def _chosen(
         changed = io.parameters_from(values, parameters)
         assert isinstance(changed, SliderCrankParameters)
         parameters = changed
+    _check_groove(groove, parameters, values)
+    if file is not None:
+        taken = []
+        if shift is None and groove is None:
+            taken.append(f"S1 = {told.length(start)} (--shift)")
+            if parameters.groove_amplitude != 0.0:
+                taken.append("no groove (--groove)")
+        if paced and speed is None:
+            taken.append(f"a crank speed of {pace / RAD_S_PER_RPM:.6g} rpm (--speed)")
+        if taken:
+            _note(f"the file does not say, and is taken: {', '.join(taken)}")
     if base is not None and (values or shift is not None or groove is not None):
         name, title = "slider-crank", _words(told, parameters, start, groove)
     return _Chosen(name=name, title=title, parameters=parameters, shift=start, groove=groove, speed=pace)
+
+
+def _check_groove(groove: str | None, p: SliderCrankParameters, values: Mapping[str, Any]) -> None:
+    """Make sure that what is said of a groove has an effect."""
+    if groove is None:
+        for name in values:
+            if name.startswith("groove."):
+                raise click.UsageError(f"--set {name} has no effect without --groove shaft or --groove apart")
+    elif p.groove_amplitude == 0.0:
+        raise click.UsageError(
+            f"--groove {groove} with groove.amplitude = 0 makes no shift: give --set groove.amplitude='3 in', say, or hold "
+            "the crank with --shift"
+        )
+
+
+def _note(text: str) -> None:
+    """Tell what a reader must know beside the results."""
+    errors.print(f"note: {text}", style="yellow", markup=False, highlight=False, soft_wrap=True)
 
 
 def _words(told: _Units, p: SliderCrankParameters, shift: float, groove: str | None) -> str:
@@ -266,11 +293,16 @@ def info(units: str, **given: Any) -> None:
         console.print(
             f"range {full}: {ends} to {told.length(part.greatest.slider_position)}", highlight=False, soft_wrap=True
         )
+    found = mobility.dead_centres(p, law)
+    if not found:
+        still = all(part.stroke <= 1e-12 * p.rod_length for part in parts)
+        console.print("no dead centres" + ": the slider stands still, whatever the crank angle" * still)
+        return
     centres = Table(title="dead centres", title_justify="left")
     for heading in ("crank angle [deg]", f"shift [{length}]", f"slider position [{length}]"):
         centres.add_column(heading, justify="right")
     centres.add_column("which")
-    for d in mobility.dead_centres(p, law):
+    for d in found:
         centres.add_row(
             f"{degrees(d.crank_angle):.2f}",
             f"{d.shift * told.per('m'):.6g}",
@@ -281,16 +313,6 @@ def info(units: str, **given: Any) -> None:
 
 
 # Forces
-
-#: What joint forces and moments are told as: title of a panel, name, whether it is a moment.
-_JOINTS = (
-    ("force of the bearing on the crank", "bearing"),
-    ("moment of the bearing about O", "bearing_moment"),
-    ("force of the crank on the rod", "crank_pin"),
-    ("force of the slider on the rod", "slider_pin"),
-    ("force of the guide on the slider", "guide"),
-    ("moment of the guide on the slider", "guide_moment"),
-)
 
 
 def _problem(torque: str | None, load: str | None) -> dict[str, float]:
@@ -304,30 +326,31 @@ def _problem(torque: str | None, load: str | None) -> dict[str, float]:
     return {"load": 0.0 if load is None else io.quantity(number_or_text(load), "N", "--load")}
 
 
-def _turn(chosen: _Chosen, given: Mapping[str, float], points: int) -> ForceTurn:
-    """The force problem over the turn, or over what of it can be assembled."""
+def _turn(chosen: _Chosen, given: Mapping[str, float], points: int, *, at: float | None = None) -> ForceTurn:
+    """The force problem over the turn and ``at`` an angle of it, or over what of these can be assembled."""
     from ..slider_crank.forces import force_turn
 
+    angles = np.linspace(0.0, 2.0 * np.pi, points)
+    if at is not None and np.abs(angles - at).min() > 1e-9:
+        angles = np.sort(np.append(angles, at))
     turn = force_turn(
         chosen.parameters,
         crank_speed=chosen.speed,
         shift=chosen.force_law,
-        angles=np.linspace(0.0, 2.0 * np.pi, points),
+        angles=angles,
         partial=True,
         **given,
     )
     if len(turn.unreachable):
-        errors.print(
-            f"note: the rod does not reach the guide at {len(turn.unreachable)} of {points} crank angles, which are left out",
-            style="yellow",
-            highlight=False,
-            soft_wrap=True,
+        _note(
+            f"the rod does not reach the guide at {len(turn.unreachable)} of {len(angles)} crank angles, which are left out"
         )
     return turn
 
 
 @slider_crank.command()
 @mechanism_options
+@speed_option
 @click.option("--torque", metavar="TORQUE", help="On the crank; the slider's force is sought. Such as '100 lbf*in'.")
 @click.option("--load", metavar="FORCE", help="On the slider; the crank's torque is sought. 0 by default.")
 @click.option(
@@ -356,8 +379,9 @@ def forces(
 ) -> None:
     """Find all joint forces over a turn: with the torque given the slider's force, with the load given the torque.
 
-    With the torque given there is no finite slider force at the dead centres. They are told with the reason; extremes are of
-    what is more than 10 deg from them.
+    With the torque given there is no finite slider force at the dead centres, and where the crank cannot turn fully all
+    forces grow without bound towards the limits of assembly. They are told with the reason; extremes are of what is more than
+    10 deg from them.
 
     \b
     Examples:
@@ -366,11 +390,12 @@ def forces(
       linkwork slider-crank forces crank.toml --speed '300 rpm' --out results
     """
     from .. import io
+    from ..figures.slider_crank import plot_forces
 
     told = _Units(units)
-    chosen = _chosen(told, **given)
+    chosen = _chosen(told, paced=True, **given)
     turn = _turn(chosen, _problem(torque, load), points)
-    clear = _clear(turn)
+    clear = turn.clear()
     grid = Table(title=escape(f"{chosen.title}: {turn.sought} sought"), title_justify="left")
     for heading in ("quantity", "unit", "least", "at [deg]", "greatest", "at [deg]"):
         grid.add_column(heading, justify="left" if heading in ("quantity", "unit") else "right")
@@ -392,7 +417,8 @@ def forces(
     written = [turn.to_csv(folder / f"{chosen.name}-forces.csv", units=units)]
     if plot:
         for frame in dict.fromkeys(frames):
-            figure = forces_figure(f"{chosen.title}: joint forces in frame {frame}", turn, frame, units)
+            scene = turn.scene(frame, units=units)
+            figure = plot_forces(scene, title=f"{chosen.title}: joint forces in frame {frame}")
             written.append(io.save_figure(figure, folder / f"{chosen.name}-forces-frame-{frame}.png"))
     wrote(written)
 
@@ -403,6 +429,8 @@ def _texts(value: float, angle: float) -> tuple[str, str]:
 
 def _quantities(turn: ForceTurn, frames: Sequence[int]) -> list[tuple[str, str, Any]]:
     """Names, SI units and values of what is told of a turn."""
+    from ..slider_crank.forces import JOINTS, WORDS
+
     found: list[tuple[str, str, Any]] = [
         ("slider position", "m", turn.slider_position),
         ("crank torque", "N.m", turn.torque),
@@ -410,23 +438,10 @@ def _quantities(turn: ForceTurn, frames: Sequence[int]) -> list[tuple[str, str, 
         ("axial force on the crank", "N", turn.axial_force),
     ]
     for frame in dict.fromkeys(frames):
-        for words, name in _JOINTS:
-            vector = turn.vector(name, frame)
-            unit = "N.m" if words.startswith("moment") else "N"
-            found += [(f"{words}, {axis}{frame}", unit, vector[:, i]) for i, axis in enumerate("ijk")]
+        for name, moment in JOINTS.items():
+            vector, unit = turn.vector(name, frame), "N.m" if moment else "N"
+            found += [(f"{WORDS[name]}, {axis}{frame}", unit, vector[:, i]) for i, axis in enumerate("ijk")]
     return found
-
-
-def _clear(turn: ForceTurn) -> Any:
-    """Which points are clear of the singularities, as far as there are any for what is sought."""
-    from ..slider_crank.forces import SLIDER_FORCE
-
-    clear = np.ones(len(turn), dtype=bool)
-    if turn.sought == SLIDER_FORCE:
-        for place in turn.singularities:
-            away = np.abs((turn.angle - place.crank_angle + np.pi) % (2.0 * np.pi) - np.pi)
-            clear &= away > radians(CLEAR_DEG)
-    return clear
 
 
 def _extremes(angle: Any, values: Any, clear: Any) -> tuple[float, float, float, float] | None:
@@ -440,69 +455,28 @@ def _extremes(angle: Any, values: Any, clear: Any) -> tuple[float, float, float,
 
 
 def _singular(turn: ForceTurn, told: _Units) -> None:
-    """Dead centres, and what could not be determined there."""
-    from ..slider_crank.forces import SLIDER_FORCE
+    """Dead centres and limits of assembly, and what could not be determined there."""
+    from ..slider_crank.forces import CLEAR_DEG, SLIDER_FORCE
 
+    without = f"grows without bound towards it; within {CLEAR_DEG:g} deg it is not among the extremes"
     for d in turn.dead_centres:
         console.print(
             f"dead centre at {_angle(d.crank_angle)}, slider at {told.length(d.slider_position)}", highlight=False
         )
+    sentences = []
     if turn.sought == SLIDER_FORCE:
-        for d in turn.singularities:
-            console.print(
-                f"no slider force at {_angle(d.crank_angle)}: it has no lever on the crank there, and grows without "
-                f"bound towards it; within {CLEAR_DEG:g} deg it is not among the extremes",
-                highlight=False,
-                soft_wrap=True,
-            )
-    for _, reason in turn.reasons:
-        console.print(f"masked: {reason}", highlight=False, soft_wrap=True)
-
-
-def forces_figure(title: str, turn: ForceTurn, frame: int, units: str) -> Figure:
-    """Motion, torque, slider force and all joint forces and moments over the crank angle, by components in a frame."""
-    from ..figures import Curve, Panel, plot_curves
-
-    told = _Units(units)
-    clear = _clear(turn)
-    angle = np.degrees(turn.angle)
-    # a curve has a gap at a singularity, from one side of which to the other it changes its sign
-    gaps = [int(np.argmin(np.abs(turn.angle - d.crank_angle))) for d in turn.singularities if not clear.all()]
-    marks = {f"dead centre {degrees(d.crank_angle):.1f}°": degrees(d.crank_angle) for d in turn.dead_centres}
-
-    def panel(what: str, si: str, curves: Mapping[str, Any]) -> Panel:
-        scaled = {label: np.array(np.ma.filled(values * told.per(si), np.nan)) for label, values in curves.items()}
-        # towards a singularity curves leave the panel
-        shown = np.concatenate([values[clear & np.isfinite(values)] for values in scaled.values()])
-        for values in scaled.values():
-            values[gaps if si in ("N", "N.m") else []] = np.nan
-        limits = None
-        if len(shown):
-            low, high = float(shown.min()), float(shown.max())
-            room = 0.08 * (high - low) or 0.08 * abs(high) or 1.0
-            limits = low - room, high + room
-        return Panel(
-            x_label="crank angle [deg]",
-            y_label=f"[{told.name(si)}]",
-            curves=[Curve(x=angle, y=values, label=label) for label, values in scaled.items()],
-            verticals=marks,
-            title=what,
-            y_range=limits,
-            x_ticks=[60.0 * n for n in range(7)],
-            legend_at="outside",
-        )
-
-    panels = [
-        panel("slider position S4", "m", {"": turn.slider_position}),
-        panel("crank torque", "N.m", {"": turn.torque}),
-        panel("slider force, along -k4", "N", {"": turn.slider_force}),
-        panel("axial force on the crank", "N", {"": turn.axial_force}),
+        sentences += [
+            f"no slider force at {_angle(d.crank_angle)}: it has no lever on the crank there, and {without}"
+            for d in turn.singularities
+        ]
+    sentences += [
+        f"limit of assembly at {_angle(end)}: the rod is perpendicular to the guide there, and every force {without}"
+        for end in turn.limits
     ]
-    for words, name in _JOINTS:
-        vector = turn.vector(name, frame)
-        unit = "N.m" if words.startswith("moment") else "N"
-        panels.append(panel(words, unit, {f"{axis}{frame}": vector[:, i] for i, axis in enumerate("ijk")}))
-    return plot_curves(panels, title=title, columns=2, size=(5.2, 2.5))
+    if not turn.clear().any():
+        sentences.append("no crank angle is clear of these, and no force has extremes")
+    for sentence in (*sentences, *(f"masked: {text}" for text in turn.masked)):
+        console.print(sentence, highlight=False, soft_wrap=True)
 
 
 # Tolerances
@@ -519,6 +493,7 @@ _TOLERANCES = {
 
 @slider_crank.command()
 @mechanism_options
+@speed_option
 @click.option(
     "--tolerance",
     "widths",
@@ -581,16 +556,25 @@ def tolerances(
     from .. import io
     from ..figures.slider_crank import plot_tolerances
     from ..slider_crank import tolerances as study
+    from ..slider_crank.forces import NO_LEVER
 
     told = _Units(units)
-    chosen = _chosen(told, **given)
-    at = io.quantity(number_or_text(angle), "rad", "--angle")
+    chosen = _chosen(told, paced=True, **given)
+    at = _in_the_turn(io.quantity(number_or_text(angle), "rad", "--angle"), chosen)
     allowed = [_tolerance(text, distribution) for text in widths or (f"{k}={v}" for k, v in _TOLERANCES.items())]
     quantities = tuple(dict.fromkeys(quantities))
-    turn = _turn(chosen, _problem(torque, load), points)
+    turn = _turn(chosen, _problem(torque, load), points, at=at)
     exact = study.sensitivities(turn, tuple(t.name for t in allowed), quantities)
+    for quantity in quantities:
+        if np.ma.getmaskarray(exact.values[quantity]).all():
+            why = NO_LEVER if turn.without_lever else "all the crank angles are dead centres"
+            raise InputError(f"{quantity} is not determined: {why}; give --load in place of --torque")
     place = int(np.argmin(np.abs(turn.angle - at)))
-    here = f"{degrees(float(turn.angle[place])):.4g} deg"
+    here = f"{degrees(float(turn.angle[place])):.6g} deg"
+    if abs(float(turn.angle[place]) - at) > 1e-9:
+        _note(
+            f"it cannot be assembled at {degrees(at):.6g} deg: the nearest of the angles, {here}, is taken in its place"
+        )
     grid = Table(title=escape(f"{chosen.title}: sensitivities"), title_justify="left")
     for heading in ("quantity", "to", "unit", f"at {here}", "greatest", "at [deg]"):
         grid.add_column(heading, justify="left" if heading in ("quantity", "to", "unit") else "right")
@@ -602,15 +586,18 @@ def tolerances(
             scale = told.per(study.QUANTITIES[quantity]) / told.per(study.ERRORS[t.name])
             values = exact.of(quantity, t.name) * scale
             written[f"d {quantity} / d {t.name} [{unit}]"] = values.filled(np.nan)
-            considered = _clear(turn) if study.QUANTITIES[quantity] in ("N", "N.m") else True
-            top = int(np.argmax(np.where(considered, np.ma.abs(values).filled(-1.0), -1.0)))
+            considered = turn.clear(poles=study.QUANTITIES[quantity] in ("N", "N.m"))
+            greatest = np.where(considered, np.ma.abs(values).filled(-1.0), -1.0)
+            top = int(np.argmax(greatest))
             # what is rounding beside the greatest effect of any tolerance is none
             tiny = 1e-12 * effect / t.extent * scale
-            texts = (
+            texts = [
                 "none" if np.ma.is_masked(values[i]) else f"{values[i] if abs(values[i]) > tiny else 0.0:.6g}"
                 for i in (place, top)
-            )
-            grid.add_row(quantity, t.name, unit, *texts, f"{degrees(float(turn.angle[top])):.1f}")
+            ]
+            texts.append(f"{degrees(float(turn.angle[top])):.1f}")
+            # none may be clear of poles and limits
+            grid.add_row(quantity, t.name, unit, *(texts if greatest[top] >= 0.0 else (texts[0], "none", "")))
     console.print(grid)
     folder = Path(out)
     files = [io.write_csv(folder / f"{chosen.name}-sensitivities.csv", written)]
@@ -618,13 +605,35 @@ def tolerances(
         found = study.monte_carlo(turn, allowed, quantities=quantities, samples=samples, seed=seed)
     files.append(io.write_csv(folder / f"{chosen.name}-tolerances.csv", _spread_columns(found, quantities, told)))
     _spread_table(found, quantities, place, f"{chosen.title}: spread at {here}, {samples} samples", told)
-    for message in found.messages:
-        errors.print(f"note: {message}", style="yellow", markup=False, highlight=False, soft_wrap=True)
+    for message in found.notes(units):
+        _note(message)
     if plot:
         for quantity in quantities:
-            figure = plot_tolerances(found.scene(quantity, at), title=f"{chosen.title}: {quantity}")
+            si = study.QUANTITIES[quantity]
+            shown = (told.name(si), told.per(si)) if units == "inch" else None
+            scene = found.scene(quantity, at, units=units)
+            figure = plot_tolerances(scene, title=f"{chosen.title}: {quantity}", shown=shown)
             files.append(io.save_figure(figure, folder / f"{chosen.name}-tolerances-{quantity}.png"))
     wrote(files)
+
+
+def _in_the_turn(angle: float, chosen: _Chosen) -> float:
+    """The same crank angle from 0 to 360 deg.
+
+    Raises
+    ------
+    InputError
+        If it is outside of them and the shift there is another than a turn before or after.
+    """
+    full = 2.0 * np.pi
+    if 0.0 <= angle <= full:
+        return angle
+    if chosen.groove is not None and not chosen.parameters.groove_ratio.is_integer():
+        raise InputError(
+            f"--angle is {degrees(angle):.6g} deg: with groove.ratio = {chosen.parameters.groove_ratio:g} the shift is another "
+            "in every turn; give an angle from 0 to 360 deg"
+        )
+    return float(angle % full)
 
 
 def _ratio(above: str, below: str) -> str:
@@ -704,6 +713,7 @@ def _spread_table(found: MonteCarlo, quantities: Sequence[str], place: int, titl
 
 @slider_crank.command()
 @mechanism_options
+@speed_option
 @click.option("--torque", metavar="TORQUE", help="On the crank; the slider's force is sought.")
 @click.option("--load", metavar="FORCE", help="On the slider; the crank's torque is sought. 0 by default.")
 @click.option("--points", type=click.IntRange(2), default=361, show_default=True, help="Crank angles over the turn.")
@@ -744,11 +754,14 @@ def dual(
       linkwork slider-crank dual --two-rotations --units inch
     """
     told = _Units(units)
-    chosen = _chosen(told, **given)
-    folder = Path(out)
     if two_rotations:
-        _two_rotations(chosen, points, told, folder)
+        source = click.get_current_context().get_parameter_source
+        for name in ("torque", "load", "speed", "tolerance"):
+            if source(name) is not ParameterSource.DEFAULT:
+                raise click.UsageError(f"--{name} has no effect with --two-rotations, which is about positions alone")
+        _two_rotations(_chosen(told, **given), points, told, Path(out))
         return
+    chosen = _chosen(told, paced=True, **given)
     problem = _problem(torque, load)
     if chosen.groove == "shaft" and "torque" in problem:
         raise click.UsageError("--torque is for a shift that is driven apart from the crank: give --groove apart")
@@ -760,63 +773,27 @@ def dual(
 
 def _dual_table(chosen: _Chosen, problem: Mapping[str, float], points: int, tolerance: float) -> bool:
     """Show the differences; whether all are within the tolerance."""
-    from ..slider_crank.closure import close
-    from ..slider_crank.dual_dynamics import joint_loads, rates
-    from ..slider_crank.forces import on_arrays
+    from ..slider_crank.comparison import compare
 
-    turn = _turn(chosen, problem, points)
-    p = chosen.parameters
-    good = ~np.ma.getmaskarray(turn.slider_force)
-    closure = close(p, turn.angle[good], turn.shift[good])
-    moving: dict[str, Any] = {
-        "speed": turn.speed[good],
-        "acceleration": turn.acceleration[good],
-        "shift_velocity": turn.shift_velocity[good],
-        "shift_acceleration": turn.shift_acceleration[good],
-    }
-    motion = rates(closure, **moving)
-    pushed = on_arrays().slider_resistance(closure.slider_position, motion.slider_velocity, 0.0, p.constants())
-    if "torque" in problem:
-        loads = joint_loads(closure, torque=problem["torque"], **moving)
-    else:
-        loads = joint_loads(closure, slider_force=pushed + problem["load"], **moving)
-    pairs: list[tuple[str, str, Any, Any]] = [
-        ("slider position", "m", closure.slider_position, turn.slider_position),
-        ("slider velocity", "m/s", motion.slider_velocity, turn.slider_velocity),
-        ("slider acceleration", "m/s2", motion.slider_acceleration, turn.slider_acceleration),
-        ("slider force", "N", loads.slider_force - pushed, turn.slider_force),
-        ("axial force on the crank", "N", loads.axial, turn.axial_force),
-    ]
-    pairs += [
-        (words, "N.m" if words.startswith("moment") else "N", loads.components(name, 1), turn.vector(name))
-        for words, name in _JOINTS
-    ]
-    found = [(words, si, np.abs(a - np.ma.getdata(b)[good]).max(), np.abs(b[good]).max()) for words, si, a, b in pairs]
-    largest = {si: max(size for _, unit, _, size in found if unit == si) for _, si, _, _ in found}
+    found = compare(_turn(chosen, problem, points))
     grid = Table(
-        title=escape(f"{chosen.title}: dual numbers less vector mechanics, {int(good.sum())} crank angles"),
+        title=escape(f"{chosen.title}: dual numbers less vector mechanics, {found.angles} crank angles"),
         title_justify="left",
     )
     for heading in ("quantity", "unit", "largest", "largest difference", "relative", "verdict"):
         grid.add_column(heading, justify="left" if heading in ("quantity", "unit", "verdict") else "right")
-    agree = True
-    for words, si, difference, size in found:
-        relative = float(difference / largest[si]) if largest[si] > 0.0 else float(difference)
-        passed = relative <= tolerance
-        agree &= passed
-        grid.add_row(
-            words, si, f"{size:.6g}", f"{difference:.1e}", f"{relative:.1e}", "pass" if passed else "FAIL",
-            style=None if passed else "red",
-        )  # fmt: skip
+    for d in found.differences:
+        verdict, style = ("pass", None) if d.relative <= tolerance else ("FAIL", "red")
+        numbers = f"{d.largest:.6g}", f"{d.difference:.1e}", f"{d.relative:.1e}"
+        grid.add_row(d.quantity, d.unit, *numbers, verdict, style=style)
     console.print(grid)
     console.print(
-        f"the loop closes to {closure.rotation_residual.max():.1e} rad and {closure.length_residual.max():.1e} m in at most "
-        f"{closure.iterations} iterations; moment about the rod's line, which no equation asks for: "
-        f"{np.abs(loads.residual).max():.1e} N.m",
+        f"the loop closes to {found.rotation_residual:.1e} rad and {found.length_residual:.1e} m in at most "
+        f"{found.iterations} iterations; moment about the rod's line, which no equation asks for: {found.rod_moment:.1e} N.m",
         highlight=False,
         soft_wrap=True,
     )
-    return agree
+    return found.agrees(tolerance)
 
 
 def _two_rotations(chosen: _Chosen, points: int, told: _Units, folder: Path) -> None:

@@ -1,9 +1,9 @@
-"""What tolerances do to the slider-crank, as a figure for a design review."""
+"""The slider-crank's forces over the turn, and what tolerances do to it, as figures for a design review."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from math import erf, isfinite, sqrt
 from textwrap import fill
 
@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from linkwork.errors import InputError
 
+from .curves import Curve, Panel, plot_curves
 from .style import COLOURS, STYLE, finish
 
 FloatArray = NDArray[np.float64]
@@ -29,6 +30,83 @@ _PEAK, _CUT = 12.0, 4.0
 _TOLD = 0.02
 #: Letters in a line of the foot.
 _LINE = 140
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ForcePanel:
+    """Curves (n,) over the crank angle by their labels, in one unit, NaN where undetermined.
+
+    ``grows`` says whether they grow without bound towards a pole or a limit of assembly.
+    """
+
+    title: str
+    unit: str
+    curves: Mapping[str, FloatArray]
+    grows: bool
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ForceScene:
+    """Motion, forces and moments over the turn.
+
+    Attributes
+    ----------
+    angle : ndarray, shape (n,)
+        Crank angles (rad).
+    panels : sequence of ForcePanel
+    clear : ndarray of bool, shape (n,)
+        Angles at which nothing is near growing without bound: what the axes are scaled to.
+    breaks : tuple of int
+        Number of each angle between which and the next the mechanism cannot be assembled: a gap in every curve.
+    poles : tuple of int
+        Numbers of the angles nearest to a pole, across which what grows has no curve.
+    marks : mapping
+        Crank angles (rad) that are marked, by what they are marked with.
+    """
+
+    angle: FloatArray
+    panels: Sequence[ForcePanel]
+    clear: NDArray[np.bool_]
+    breaks: tuple[int, ...] = ()
+    poles: tuple[int, ...] = ()
+    marks: Mapping[str, float] = field(default_factory=dict)
+
+
+def plot_forces(scene: ForceScene, *, title: str) -> Figure:
+    """Plot forces and moments over the crank angle, one pair of axes for each panel.
+
+    Curves leave their axes towards poles and limits of assembly, and have gaps where there is no mechanism.
+    """
+    turn = np.degrees(scene.angle)
+    angle = _broken(turn, scene.breaks, turn)
+    panels = []
+    for panel in scene.panels:
+        curves, shown = [], []
+        for label, given in panel.curves.items():
+            values = np.array(given)
+            shown.append(values[np.isfinite(values) & (scene.clear | (not panel.grows))])
+            # from one side of a pole to the other a curve changes its sign
+            values[list(scene.poles) if panel.grows else []] = np.nan
+            curves.append(Curve(x=angle, y=_broken(values, scene.breaks), label=label))
+        inside = np.concatenate(shown)
+        limits = None
+        if len(inside):
+            low, high = float(inside.min()), float(inside.max())
+            room = 0.08 * (high - low) or 0.08 * abs(high) or 1.0
+            limits = low - room, high + room
+        panels.append(
+            Panel(
+                x_label="crank angle [deg]",
+                y_label=f"[{panel.unit}]",
+                curves=curves,
+                verticals={text: float(np.degrees(place)) for text, place in scene.marks.items()},
+                title=panel.title,
+                y_range=limits,
+                x_ticks=[60.0 * n for n in range(7)],
+                legend_at="outside",
+            )
+        )
+    return plot_curves(panels, title=title, columns=2, size=(5.2, 2.5))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -67,7 +67,11 @@ class Closure:
 
     @property
     def rod_frame(self) -> Dual:
-        """Frame of the rod in frame 1, its origin in the crank pin and i along the rod: (n, 3, 3)."""
+        """A frame fixed to the rod, in frame 1, its origin in the crank pin and i along the rod: (n, 3, 3).
+
+        It is not the frame 3 in which components of forces are told (`dual_dynamics.JointLoads.components`): its j and k are
+        turned about the rod by the idle spin, as the start of the iteration has left it.
+        """
         return self._frames[0]
 
     @property
@@ -98,7 +102,7 @@ def scale(p: SliderCrankParameters, shift: Array) -> float:
 def loop(p: SliderCrankParameters, th: Array, s1: Array, crank_ball: Array, slider_ball: Array, s4: Array) -> Dual:
     """The product M1 L2 L3 M4 (n, 3, 3) of eq 5, the identity where the loop is closed."""
     guide = _frames(p, th, s1, crank_ball, slider_ball)[1]
-    return cast(Dual, guide @ about_k(Dual(0.0, s4)) @ about_i(Dual(p.guide_twist, p.guide_offset)))
+    return cast(Dual, guide @ about_k(Dual(np.zeros_like(s4), s4)) @ about_i(Dual(p.guide_twist, p.guide_offset)))
 
 
 def estimate(p: SliderCrankParameters, th: Array, s1: Array) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -133,7 +137,7 @@ def close(parameters: SliderCrankParameters, crank_angle: Any, shift: Any, start
     Raises
     ------
     InputError
-        If an angle or a shift is not a finite number, or their shapes do not agree.
+        If an angle or a shift is not a finite number, or their shapes or the number of loops in ``start`` do not agree.
     AssemblyError
         If the rod does not reach the guide, with the length that it lacks at the worst of the given angles.
     ClosureError
@@ -147,6 +151,10 @@ def close(parameters: SliderCrankParameters, crank_angle: Any, shift: Any, start
         raise AssemblyError(
             f"the rod of {p.rod_length:.6g} m does not reach the guide at theta1 = {th[worst]:.6g} rad, S1 = {s1[worst]:.6g} "
             f"m: the crank pin is {p.rod_length + lacking[worst]:.6g} m from it, {lacking[worst]:.3g} m too far"
+        )
+    if start is not None and start.crank_angle.size not in (1, th.size):
+        raise InputError(
+            f"start has {start.crank_angle.size} loops for {th.size} points: it must have one, or one for each point"
         )
     if start is None:
         crank_ball, slider_ball, s4 = estimate(p, th, s1)

@@ -21,7 +21,7 @@ from functools import cache, cached_property
 from math import ceil, degrees, isfinite, pi, radians, tau
 from pathlib import Path
 from types import MappingProxyType, SimpleNamespace
-from typing import Any, NamedTuple, Protocol, TypeAlias, runtime_checkable
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, TypeAlias, runtime_checkable
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -41,6 +41,9 @@ from linkwork.slider_crank.vectors import Vector
 from .. import io
 from ..tracing import rebound
 from .dual_dynamics import DEAD_CENTRE
+
+if TYPE_CHECKING:
+    from ..figures.slider_crank import ForceScene
 
 FloatArray: TypeAlias = NDArray[np.float64]
 MaskedArray: TypeAlias = "np.ma.MaskedArray[Any, np.dtype[np.float64]]"
@@ -67,6 +70,17 @@ JOINTS: Mapping[str, bool] = MappingProxyType(
         "slider_pin": False,
         "guide": False,
         "guide_moment": True,
+    }
+)
+#: What forces and moments are told as.
+WORDS: Mapping[str, str] = MappingProxyType(
+    {
+        "bearing": "force of the bearing on the crank",
+        "bearing_moment": "moment of the bearing about O",
+        "crank_pin": "force of the crank on the rod",
+        "slider_pin": "force of the slider on the rod",
+        "guide": "force of the guide on the slider",
+        "guide_moment": "moment of the guide on the slider",
     }
 )
 #: Frames by number: of the ground, the crank, the rod and the guide.
@@ -425,13 +439,14 @@ class ForceTurn:
     @cached_property
     def masked(self) -> tuple[str, ...]:
         """What is masked and why, in sentences: ``reasons`` with one for each run of angles."""
-        told = []
+        told = [NO_LEVER] if self.without_lever else []
         dead, p = np.ma.getmaskarray(self.slider_force), self.parameters.constants()
-        for flags, what, why in _undetermined(dead, self._position, p):
+        for flags, what, why in _undetermined(dead & (not told), self._position, p):
             for first, last in _runs(flags):
                 place = f"crank angle {_deg(self.angle[first])} deg"
                 if last > first:
-                    place = f"all {last - first + 1} crank angles from {_deg(self.angle[first])} to {_deg(self.angle[last])} deg"
+                    ends = f"{_deg(self.angle[first])} to {_deg(self.angle[last])} deg"
+                    place = f"all {last - first + 1} crank angles from {ends}"
                 told.append(f"{what} at {place}: {why}")
         return tuple(told)
 
@@ -495,6 +510,44 @@ class ForceTurn:
                 turned = f.to_rod_frame(components, q, p)
             mask = mask | _parallel(q, p)[:, None]
         return np.ma.MaskedArray(_joined(turned, len(self)), mask=mask, fill_value=np.nan)
+
+    def scene(self, frame: int = 1, *, units: str = "SI") -> ForceScene:
+        """What `analysis.figures.slider_crank.plot_forces` draws: motion, torque and forces, by components in a frame.
+
+        Raises
+        ------
+        InputError
+            If there are no such frame or units.
+        """
+        from ..figures.slider_crank import ForcePanel, ForceScene
+
+        known = unit_table(units)
+
+        def panel(title: str, si: str, curves: Mapping[str, Any]) -> ForcePanel:
+            unit, one = known[si]
+            drawn = {label: np.array(np.ma.filled(x, np.nan)) / one for label, x in curves.items()}
+            return ForcePanel(title=title, unit=unit, curves=drawn, grows=si != "m")
+
+        panels = [
+            panel("slider position S4", "m", {"": self.slider_position}),
+            panel("crank torque", "N.m", {"": self.torque}),
+            panel("slider force, along -k4", "N", {"": self.slider_force}),
+            panel("axial force on the crank", "N", {"": self.axial_force}),
+        ]
+        for name, moment in JOINTS.items():
+            vector = self.vector(name, frame)
+            components = {f"{axis}{frame}": vector[:, i] for i, axis in enumerate("ijk")}
+            panels.append(panel(WORDS[name], "N.m" if moment else "N", components))
+        sought = self.singularities if self.sought == SLIDER_FORCE else ()
+        return ForceScene(
+            angle=self.angle,
+            panels=panels,
+            clear=self.clear(),
+            breaks=self.breaks,
+            poles=tuple(int(np.argmin(np.abs(self.angle - place.crank_angle))) for place in sought),
+            marks={f"dead centre {degrees(d.crank_angle):.1f}°": d.crank_angle for d in self.dead_centres}
+            | {f"limit {degrees(end):.1f}°": end for end in self.limits},
+        )
 
     def columns(self, units: str = "SI", frames: tuple[int, ...] = (1, 2, 3, 4)) -> dict[str, FloatArray]:
         """Everything by name with unit; NaN where a value is masked, which the last two columns tell.

@@ -32,10 +32,28 @@ from linkwork.slider_crank.mobility import (
 from linkwork.slider_crank.published import CRANK_SPEED, CRANK_TORQUE, INCH, POUND_FORCE, POUND_INCH, parameters
 
 from ..figures import COLOURS, Curve, Panel, plot_curves
-from ..slider_crank.closure import close
+from ..slider_crank.closure import follow
 from ..slider_crank.dual_dynamics import JointLoads, joint_loads
-from ..slider_crank.forces import ConstantShift, ForceTurn, force_turn
-from ._rahman import ASSIGNED, FAMILIES, FIGURES, IDEAL, QUANTITIES, SLIDER_MOMENTS, Case, Component
+from ..slider_crank.forces import CLEAR_DEG, ConstantShift, ForceTurn, force_turn
+from ._rahman import (
+    ASSIGNED,
+    AXIAL_LB,
+    DEAD_CENTRES_DEG,
+    FAMILIES,
+    FIGURES,
+    GREATEST_SHIFTS_IN,
+    IDEAL,
+    QUANTITIES,
+    SHIFTS_REACHED_IN,
+    SLIDER_MOMENTS,
+    SPIKES_DEG,
+    SPOTS,
+    STROKES_BY_TWIST_IN,
+    STROKES_IN,
+    TWISTS_REACHED_DEG,
+    Case,
+    Component,
+)
 from .study import BALANCE, REFERENCE, THESIS, Study, StudyResult, Verdict, at_least, at_most, near, padded
 
 if TYPE_CHECKING:
@@ -46,29 +64,17 @@ FloatArray = NDArray[np.float64]
 #: Crank angles of the curves (deg): half degrees, the whole ones among them.
 ANGLES_DEG = np.linspace(0.0, 360.0, 721)
 ANGLE = "crank angle theta1 [deg]"
-#: Angle (deg) beyond which a value counts as clear of a dead centre.
-CLEAR_DEG = 10.0
 #: Largest force or moment (lb, lb.in) that is taken for none, and largest relative difference of two ways of computing.
 NOTHING, SAME = 1e-6, 1e-9
 #: Torque on the crank (lb.in) and its length (in).
 TORQUE, CRANK = 100.0, 12.0
-#: Where the thesis sees the spikes (deg): in round hundreds, for the cases of a figure together.
-SPIKES, SPIKES_TO = (100.0, 300.0), 25.0
-#: Dead centres (deg) and strokes (in) at S1 = 0 and 270 deg by a4 (in); strokes at a4 = 20 in and S1 = 0 by alpha4 (deg).
-DEAD_CENTRES = {10.0: (99.28, 285.26), 20.0: (108.82, 301.76), 30.0: (118.94, 322.14)}
-STROKES = {0.0: 24.000, 10.0: 24.528, 20.0: 26.375, 30.0: 30.935}
-TWISTED_STROKES = {232.0: 21.85, 310.0: 21.39}
-#: Greatest shift (in) at which the crank turns fully, by a4 (in); the greatest to which the thesis's iteration converged.
-SHIFTS, SHIFT_REACHED = {0.0: 48.539, 10.0: 44.900, 20.0: 38.419, 30.0: 27.129}, 9.0
-#: Twists (deg) between which the thesis's iteration converged.
-TWISTS_REACHED = (232.0, 310.0)
-#: Slider force sought at theta1 = 30 deg (lb), by the family and the case.
-SPOTS = {("A", "a4 = 10 in"): 15.328251, ("C", "alpha4 = 310 deg"): 8.206263}
-#: Greatest magnitude of 2F2k clear of the dead centres (lb), and half a unit of the last figure given, likewise.
-AXIAL = {("A", "a4 = 10 in"): (4.1, 0.05), ("C", "alpha4 = 310 deg"): (27.0, 0.5)}
+#: How far (deg) "near" is taken to reach in "spikes near 100 and 300 deg": ours, the source gives no range.
+SPIKES_TO = 25.0
 
 _UNITS = {"lb": POUND_FORCE, "lb.in": POUND_INCH}
 _RAISES = "The offset a4 raises the joint forces."
+#: Stands for a claim where the text, as far as our source tells, says nothing of a quantity in these cases.
+NO_CLAIM = "Nothing is stated of it in our source; it is computed in two ways."
 
 
 @cache
@@ -106,8 +112,7 @@ def position(case: Case) -> FloatArray:
 @cache
 def clear(case: Case) -> NDArray[np.bool_]:
     """Which of the angles are whole degrees and clear of the dead centres."""
-    away = np.abs((ANGLES_DEG[:, None] - dead_centres_deg(case) + 180.0) % 360.0 - 180.0)
-    return np.asarray((ANGLES_DEG % 1.0 == 0.0) & (away.min(axis=1) > CLEAR_DEG))
+    return np.asarray((ANGLES_DEG % 1.0 == 0.0) & turn(case).clear(CLEAR_DEG))
 
 
 def greatest(case: Case, quantity: FloatArray) -> float:
@@ -131,8 +136,8 @@ def spikes_deg(case: Case, component: Component) -> FloatArray:
 
 @cache
 def dual(case: Case) -> JointLoads:
-    """All joint forces by dual vectors, at the angles that are clear of the dead centres."""
-    closed = close(
+    """All joint forces by dual vectors, at the angles that are clear of the dead centres; by continuation round the turn."""
+    closed = follow(
         parameters(case.offset_in, case.twist_deg), np.radians(ANGLES_DEG[clear(case)]), case.shift_in * INCH
     )
     return joint_loads(closed, speed=CRANK_SPEED, torque=CRANK_TORQUE)
@@ -215,38 +220,40 @@ def _slider(family: str) -> tuple[str, list[Verdict]]:
     ]
     claim = "The offset a4 reduces the stroke."
     if family == "A":
-        for a4, stroke in STROKES.items():
+        for a4, stroke in STROKES_IN.items():
             planar = Case("", a4, 0.0, 270.0)
             verdicts.append(near(f"stroke; a4 = {a4:g} in with S1 = 0", REFERENCE, stroke, _stroke(planar), 5e-4, "in"))
-        for a4, stated in DEAD_CENTRES.items():
+        for a4, stated in DEAD_CENTRES_DEG.items():
             found = dead_centres_deg(Case("", a4, 0.0, 270.0))
             verdicts += [
                 near(f"{which} dead centre; a4 = {a4:g} in with S1 = 0", REFERENCE, angle, at, 0.005, "deg")
                 for which, angle, at in zip(("first", "second"), stated, found)
             ]
     elif family == "B":
-        claim += " The mechanism is found up to a shift S1 of 9 in at most."
-        shifts = {a4: (greatest_shift(parameters(a4)) or 0.0) / INCH for a4 in SHIFTS}
-        statement = "greatest S1 at which the crank turns fully"
-        verdicts.append(at_most(f"{statement}, least of all a4", THESIS, SHIFT_REACHED, min(shifts.values()), "in"))
+        reached = SHIFTS_REACHED_IN[-1]
+        claim += f" The iteration converges up to S1 = {', '.join(f'{shift:g}' for shift in SHIFTS_REACHED_IN)} in."
+        shifts = {a4: (greatest_shift(parameters(a4)) or 0.0) / INCH for a4 in GREATEST_SHIFTS_IN}
+        statement = "greatest S1 to which the iteration converges, beside the least to which the crank turns fully"
+        verdicts.append(near(statement, THESIS, reached, min(shifts.values()), 0.5, "in"))
         verdicts += [
-            near(f"{statement}; a4 = {a4:g} in", REFERENCE, stated, shifts[a4], 5e-4, "in")
-            for a4, stated in SHIFTS.items()
+            near(f"greatest S1 at which the crank turns fully; a4 = {a4:g} in", REFERENCE, stated, shifts[a4], 5e-4, "in")
+            for a4, stated in GREATEST_SHIFTS_IN.items()
         ]
     else:
-        claim += " The mechanism is found at twists alpha4 from 232 to 310 deg."
+        least, most = TWISTS_REACHED_DEG
+        claim += f" The iteration converges at twists alpha4 from {least:g} to {most:g} deg."
         step = 5
         margins = [_margin(float(twist)) for twist in range(0, 360, step)]
-        reached = TWISTS_REACHED[1] - TWISTS_REACHED[0]
         width = step * sum(margin > 0.0 for margin in margins)
-        verdicts.append(near("range of alpha4 in which the crank turns fully", THESIS, reached, width, step, "deg"))
+        statement = "range of alpha4 in which the iteration converges, beside that in which the crank turns fully"
+        verdicts.append(near(statement, THESIS, most - least, width, step, "deg"))
         verdicts.append(
             at_least(f"least margin of assembly at every {step} deg of alpha4", REFERENCE, 0.0, min(margins), "in")
         )
         verdicts += [
-            near(f"stroke; {case.name}", REFERENCE, TWISTED_STROKES[case.twist_deg], _stroke(case), 0.005, "in")
+            near(f"stroke; {case.name}", REFERENCE, STROKES_BY_TWIST_IN[case.twist_deg], _stroke(case), 0.005, "in")
             for case in cases
-            if case.twist_deg in TWISTED_STROKES
+            if case.twist_deg in STROKES_BY_TWIST_IN
         ]
     return claim, verdicts
 
@@ -318,11 +325,16 @@ def _along_crank_axis(family: str) -> tuple[str, list[Verdict]]:
     for case in FAMILIES[family].cases:
         found = values(case, component)
         verdicts.append(_none("greatest magnitude of 2F2k", THESIS, case, found, "lb"))
-        if (family, case.name) in AXIAL:
-            stated, tolerance = AXIAL[family, case.name]
+        if case[1:] in AXIAL_LB:
+            stated, tolerance = AXIAL_LB[case[1:]]
             statement = f"greatest magnitude of 2F2k; {case.name}"
             verdicts.append(near(statement, REFERENCE, stated, greatest(case, found), tolerance, "lb"))
     return "2F2k = 0.", verdicts
+
+
+def _raises(family: str) -> str:
+    """What is stated of a force: that the offset raises it, and nothing where the offset is the same in all cases."""
+    return _RAISES if family == "A" else NO_CLAIM
 
 
 def _slider_pin(family: str) -> tuple[str, list[Verdict]]:
@@ -333,7 +345,7 @@ def _slider_pin(family: str) -> tuple[str, list[Verdict]]:
         for component in (_COMPONENTS["3F3j"], _COMPONENTS["3F3k"])
     )
     statement = "greatest difference of 3F3j and 3F3k between torque given and load given"
-    return _RAISES, [at_most(statement, BALANCE, NOTHING, found, "lb")]
+    return _raises(family), [at_most(statement, BALANCE, NOTHING, found, "lb")]
 
 
 def _slider_force(family: str) -> tuple[str, list[Verdict]]:
@@ -343,18 +355,20 @@ def _slider_force(family: str) -> tuple[str, list[Verdict]]:
     for case in FAMILIES[family].cases:
         found = spikes_deg(case, component)
         verdicts += [
-            near(f"{which} spike; {case.name}", THESIS, stated, at, SPIKES_TO, "deg")
-            for which, stated, at in zip(("first", "second"), SPIKES, found)
+            near(f"{which} spike, to within {SPIKES_TO:g} deg; {case.name}", THESIS, stated, at, SPIKES_TO, "deg")
+            for which, stated, at in zip(("first", "second"), SPIKES_DEG, found)
         ]
         if case.shift_in == 0.0 and case.twist_deg == IDEAL.twist_deg:
             verdicts += [
                 near(f"{which} spike; {case.name}", REFERENCE, stated, at, 0.005, "deg")
-                for which, stated, at in zip(("first", "second"), DEAD_CENTRES[case.offset_in], found)
+                for which, stated, at in zip(("first", "second"), DEAD_CENTRES_DEG[case.offset_in], found)
             ]
-        if (family, case.name) in SPOTS:
-            at_30 = values(case, component)[ANGLES_DEG == 30.0]
-            statement = f"4F4k at theta1 = 30 deg; {case.name}"
-            verdicts.append(near(statement, REFERENCE, SPOTS[family, case.name], at_30[0], 5e-7, "lb"))
+        for spot in SPOTS:
+            if case[1:] == spot[:3]:
+                (at_30,) = values(case, component)[ANGLES_DEG == 30.0]
+                statement = f"4F4k at theta1 = 30 deg; {case.name}"
+                # printed along -k4
+                verdicts.append(near(statement, REFERENCE, -spot.slider_force_lb, at_30, 5e-7, "lb"))
     return "There are spikes near 100 and 300 deg.", verdicts
 
 
@@ -376,7 +390,7 @@ def _slider_moments(family: str) -> tuple[str, list[Verdict]]:
 
 def _joint_force(family: str) -> tuple[str, list[Verdict]]:
     """Nothing more is said of this one."""
-    return _RAISES, []
+    return _raises(family), []
 
 
 _COMPONENTS = {component.symbol: component for quantity in QUANTITIES for component in quantity.components}

@@ -12,6 +12,7 @@ from click.testing import CliRunner
 
 from analysis import cli, io
 from analysis.cli import slider_crank
+from analysis.figures.slider_crank import plot_forces
 from analysis.slider_crank.forces import force_turn
 from linkwork.five_bar.published import TABLE_3_1
 from linkwork.slider_crank.published import CRANK_SPEED, INCH, parameters
@@ -110,6 +111,14 @@ class TestParameterFiles:
         assert rows(result.output)["crank a1, rod a2"] == ["0.3048 m, 2 m"]
         assert rows(result.output)["shift S1"] == ["0 m"]
 
+    def test_what_a_file_does_not_say_is_told(self, linkwork, tmp_path):
+        io.save_parameters(tmp_path / "mine.toml", replace(parameters(30.0), groove_amplitude=0.01))
+        said = " ".join(linkwork("forces", "mine.toml", "--points", 3, "--no-plot", "--units", "inch").stderr.split())
+        assert "S1 = 0 in (--shift), no groove (--groove), a crank speed of 50 rpm (--speed)" in said
+        assert "rpm" not in linkwork("info", "mine.toml").stderr
+        assert linkwork("forces", "mine.toml", "--points", 3, "--no-plot", "--shift", 0, "--speed", 1).stderr == ""
+        assert linkwork("info", "mine.toml", "--groove", "shaft").stderr == ""
+
     def test_a_file_of_the_other_mechanism(self, linkwork, tmp_path):
         io.save_parameters(tmp_path / "five.toml", TABLE_3_1)
         result = linkwork("info", "five.toml")
@@ -178,7 +187,7 @@ class TestForces:
 
     def test_the_plot_has_gaps_at_the_dead_centres_and_is_scaled_clear_of_them(self):
         turn = force_turn(parameters(10.0), crank_speed=CRANK_SPEED, angles=np.radians(np.arange(361.0)), torque=11.3)
-        figure = slider_crank.forces_figure("forces", turn, 4, "SI")
+        figure = plot_forces(turn.scene(4), title="forces")
         (axis,) = [a for a in figure.axes if a.get_title() == "slider force, along -k4"]
         values = axis.lines[0].get_ydata()
         assert [int(i) for i in np.flatnonzero(np.isnan(values))] == [99, 285]
@@ -192,9 +201,66 @@ class TestForces:
         position = figure.axes[titles.index("slider position S4")].lines[0].get_ydata()
         assert np.isfinite(position).all()
 
-    def test_a_crank_that_cannot_turn_fully(self, linkwork, tmp_path):
-        result = linkwork("forces", "--set", "rod.length=30 in", "--offset", "20 in", "--points", 73, "--no-plot")
+    def test_extremes_do_not_depend_on_the_number_of_points_where_there_are_limits(self, linkwork):
+        """Towards the ends of a range the forces grow without bound."""
+        found = []
+        for points in (721, 1441):
+            result = linkwork(
+                "forces", "--set", "rod.length=30 in", "--offset=-20 in", "--shift", 0, "--points", points, "--no-plot",
+            )  # fmt: skip
+            cells = rows(result.output)["force of the crank on the rod, i1"]
+            found.append([float(cells[1]), float(cells[3])])
+        assert found[0] == pytest.approx(found[1], rel=0.05)
+
+    def test_no_curve_where_it_cannot_be_assembled(self):
+        """The rod is too short from 146.4 to 213.6 deg, acos(-20/12 + 30/12): a gap in every panel."""
+        mechanism = replace(parameters(-20.0), rod_length=30.0 * INCH)
+        turn = force_turn(mechanism, crank_speed=CRANK_SPEED, angles=np.radians(np.arange(361.0)), load=-9.0, partial=True)
+        low = np.degrees(np.arccos(-10.0 / 12.0))
+        assert np.degrees(turn.limits) == pytest.approx([low, 360.0 - low])
+        assert [float(np.degrees(turn.angle[i])) for i in turn.breaks] == pytest.approx([146.0])
+        for axis in plot_forces(turn.scene(1), title="").axes:
+            for line in axis.lines:
+                x, y = np.asarray(line.get_xdata()), np.asarray(line.get_ydata())
+                if len(x) < 3:  # a mark
+                    continue
+                # every piece that is drawn is a degree long
+                drawn = np.isfinite(y[1:]) & np.isfinite(y[:-1])
+                assert np.diff(x)[drawn] == pytest.approx(1.0)
+                assert np.isnan(y).sum() == 1
+            if axis.get_title().startswith("force of the crank on the rod"):
+                clear = turn.vector("crank_pin")[turn.clear()]
+                assert np.ptp(axis.get_ylim()) < 1.3 * np.ptp(clear)
+
+    def test_a_slider_without_a_lever(self, linkwork):
+        """Guide and crank axis in one line: the slider stands still, whatever the crank does."""
+        still = ("--twist", "180 deg", "--offset", 0)
+        result = linkwork("forces", *still, "--torque", "1 N*m", "--no-plot")
         assert result.exit_code == 0
+        assert result.output.count("no lever on the crank") == 1
+        assert "the slider has no lever on the crank at any angle" in result.output
+        result = linkwork("info", *still)
+        assert rows(result.output)["greatest constant shift for a full turn"] == ["any"]
+        assert "no dead centres: the slider stands still" in result.output
+        for command, *more in (("dual",), ("tolerances", "--quantity", "slider.load", "--samples", 9)):
+            result = linkwork(command, *more, *still, "--torque", "1 N*m", "--points", 13)
+            assert result.exit_code == cli.WRONG
+            assert "the slider has no lever on the crank at any angle" in result.stderr
+        # what the load has no part in is determined all the same
+        result = linkwork("tolerances", *still, "--torque", "1", "--points", 3, "--samples", 9, "--no-plot")
+        assert result.exit_code == 0
+
+    def test_a_crank_that_cannot_turn_fully(self, linkwork, tmp_path):
+        result = linkwork(
+            "forces", "--set", "rod.length=30 in", "--offset", "20 in", "--points", 73, "--no-plot", "--load", "9 N"
+        )
+        assert result.exit_code == 0
+        # what grows without bound towards the ends of the range is no extreme
+        for end in ("35.32", "324.68"):
+            assert f"limit of assembly at {end} deg" in result.output
+        for name, cells in rows(result.output).items():
+            for angle in cells[2::2]:
+                assert 45.4 < float(angle) < 314.6 or name == "slider position", name
         # it does from 35.3 to 324.7 deg: 12 c + 20 is there sqrt(30^2 - 3.5^2)
         assert "the rod does not reach the guide at 16 of 73 crank angles" in " ".join(result.stderr.split())
         columns = csv(tmp_path / "out" / "slider-crank-forces.csv")
@@ -235,6 +301,51 @@ class TestTolerances:
         assert spread["slider.position linear standard deviation [in]"] == pytest.approx(sd, rel=1e-9)
         assert spread["slider.position standard deviation [in]"] == pytest.approx(sd, rel=0.1)
         assert (tmp_path / "out" / "slider-crank-tolerances-slider.position.png").read_bytes().startswith(b"\x89PNG")
+
+    @pytest.mark.parametrize("asked", ["-30 deg", "330 deg", "1050 deg"])
+    def test_the_angle_is_the_one_that_was_asked_for(self, linkwork, tmp_path, asked):
+        result = linkwork("tolerances", f"--angle={asked}", "--points", 5, "--samples", 50, "--no-plot")
+        assert result.exit_code == 0, result.output
+        assert "at 330 deg" in result.output
+        columns = csv(tmp_path / "out" / "rahman-a4-10-s1-3.5-tolerances.csv")
+        assert columns["crank angle [deg]"] == pytest.approx([0.0, 90.0, 180.0, 270.0, 330.0, 360.0])
+
+    def test_an_angle_that_cannot_be_assembled_is_told(self, linkwork):
+        short = ("--set", "rod.length=30 in", "--offset", "20 in", "--shift", 0)
+        result = linkwork("tolerances", *short, "--angle", 0, "--points", 37, "--samples", 50, "--no-plot")
+        assert result.exit_code == 0
+        assert "it cannot be assembled at 0 deg: the nearest of the angles, 40 deg, is taken" in " ".join(
+            result.stderr.split()
+        )
+
+    def test_an_angle_of_another_turn_under_a_groove_of_half_a_period(self, linkwork):
+        half = ("--groove", "apart", "--set", "groove.amplitude=1 in", "--set", "groove.ratio=0.5")
+        result = linkwork("tolerances", *half, "--angle", "390 deg")
+        assert result.exit_code == cli.WRONG
+        assert "give an angle from 0 to 360 deg" in " ".join(result.stderr.split())
+
+    def test_pictures_and_notes_are_in_inches_too(self, linkwork, monkeypatch):
+        from analysis.figures import slider_crank as figures
+
+        drawn = []
+        right = figures.plot_tolerances
+        monkeypatch.setattr(
+            figures, "plot_tolerances", lambda scene, **options: drawn.append((scene, options)) or right(scene, **options)
+        )
+        arguments = (
+            "tolerances", "--published", "rahman-ideal", "--tolerance", "shift.position=0.5 in", "--points", 3, "--samples",
+            500,
+        )  # fmt: skip
+        notes = [linkwork(*arguments, "--units", units).stderr for units in ("inch", "SI")]
+        (inch, inches), (si, sis) = drawn
+        assert inches["shown"] == pytest.approx(("in", 1.0 / INCH))
+        assert sis["shown"] is None
+        for told, scene, unit in zip(notes, (inch, si), ("in", "m")):
+            (note,) = scene.notes
+            assert note in " ".join(told.split())
+            assert re.search(rf"deviation is [\d.e-]+ {unit}, to second", note)
+        numbers = [float(re.search(r"deviation is ([\d.e-]+) ", scene.notes[0])[1]) for scene in (inch, si)]
+        assert numbers[0] * INCH == pytest.approx(numbers[1], rel=5e-3)
 
     def test_a_seed_gives_the_same_samples(self, linkwork, tmp_path):
         found = []
@@ -303,15 +414,15 @@ class TestDual:
         assert max(float(closed[1]), float(closed[2])) < 1e-12
 
     def test_a_disagreement_is_a_failed_check(self, linkwork, monkeypatch):
-        from analysis.slider_crank import dual_dynamics
+        from analysis.slider_crank import comparison
 
-        right = dual_dynamics.joint_loads
+        right = comparison.joint_loads
 
         def wrong(*arguments, **options):
             loads = right(*arguments, **options)
             return replace(loads, slider_pin=1.000001 * loads.slider_pin)
 
-        monkeypatch.setattr(dual_dynamics, "joint_loads", wrong)
+        monkeypatch.setattr(comparison, "joint_loads", wrong)
         result = linkwork("dual", "--points", 37)
         assert result.exit_code == cli.CHECK_FAILED
         assert rows(result.output)["force of the slider on the rod"][-1] == "FAIL"
@@ -375,13 +486,21 @@ class TestPicture:
         (["info", "--twist", "inf"], 1, "parameter guide.twist is inf"),
         (["info", "--offset", "ten"], 1, "parameter guide.offset is 'ten': it must be a number in m"),
         (["info", "--offset", "10 kg"], 1, "parameter guide.offset is '10 kg': it must be a number in m"),
-        (["info", "--shift", "nan"], 1, "the shift is nan m: it must be a finite number"),
+        (["info", "--shift", "nan"], 1, "parameter --shift is nan: it must be a finite number"),
         (["forces", "--speed", "50 Hz"], 1, "parameter --speed is '50 Hz': it must be in rad/s or rpm"),
-        (["forces", "--speed", "nan"], 1, "crank_speed is nan: it must be finite"),
-        (["forces", "--torque", "nan"], 1, "torque is nan: it must be finite"),
+        (["forces", "--speed", "nan"], 1, "parameter --speed is nan: it must be a finite number"),
+        (["forces", "--torque", "nan"], 1, "parameter --torque is nan: it must be a finite number"),
+        (["tolerances", "--angle", "nan"], 1, "parameter --angle is nan: it must be a finite number"),
+        (["picture", "--view", "nan", "10 deg"], 1, "parameter --view is nan: it must be a finite number"),
+        (["tolerances", "--tolerance", "rod.length=100 in", "--no-plot", "--points", "2"], 1,
+         "the tolerance of rod.length is too wide"),
+        (["info", "--speed", "50 rpm"], 2, "No such option"),
+        (["dual", "--two-rotations", "--torque", "1"], 2, "--torque has no effect with --two-rotations"),
+        (["info", "--set", "groove.ratio=2"], 2, "--set groove.ratio has no effect without --groove"),
+        (["forces", "--groove", "shaft"], 2, "--groove shaft with groove.amplitude = 0 makes no shift"),
         (["forces", "--torque", "1 N"], 1, "parameter --torque is '1 N': it must be a number in N.m"),
         (["forces", "--torque", "1", "--load", "1"], 2, "give --torque, and the slider's force is sought, or --load"),
-        (["dual", "--groove", "shaft", "--torque", "1"], 2, "give --groove apart"),
+        (["dual", "--groove", "shaft", "--set", "groove.amplitude=1 in", "--torque", "1"], 2, "give --groove apart"),
         (["info", "--groove", "shaft", "--shift", "1"], 2, "give one of them"),
         (["info", "--groove", "shaft", "--set", "groove.amplitude=1 in", "--set", "groove.ratio=0.1234567"], 1, "groove.ratio"),
         (["info", "--published", "rahman"], 1, "there is no rahman; did you mean rahman-"),

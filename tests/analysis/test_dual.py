@@ -86,6 +86,9 @@ FUNCTIONS: dict[str, Callable[[Any], Any]] = {
     "exp": np.exp,
     "log": np.log,
     "tanh": np.tanh,
+    "sinh": np.sinh,
+    "cosh": np.cosh,
+    "hypot": lambda x: np.sqrt(x * x + np.sin(x) ** 2) if not isinstance(x, Dual) else np.hypot(x, np.sin(x)),
     "arctan": np.arctan,
     "arcsin": lambda x: np.arcsin(0.4 * x),
     "arccos": lambda x: np.arccos(0.4 * x),
@@ -163,6 +166,98 @@ def test_several_directions_at_once() -> None:
     turned = apply(about_k(x), stack([y, 0.0 * y, 0.0 * y]))
     np.testing.assert_allclose(turned.dual[0], np.stack([-b * np.sin(a), b * np.cos(a), 0 * a], -1), rtol=1e-14)
     np.testing.assert_allclose(turned.dual[1], np.stack([np.cos(a), np.sin(a), 0 * a], -1), rtol=1e-14)
+
+
+@pytest.mark.parametrize("size", [1, 2, 3, 5])
+def test_directions_are_no_axis_of_the_numbers(size: int) -> None:
+    """Two numbers with two directions meet arrays of as many elements, fewer and more: by differences of the real parts."""
+    c, h = np.linspace(0.5, 2.0, size), 1e-6
+    operations: list[Callable[[Any, Any], Any]] = [
+        lambda x, y: x * c,
+        lambda x, y: c - x * y,
+        lambda x, y: c / x + y,
+        lambda x, y: x**c + c**y,
+        lambda x, y: np.arctan2(x, c) + np.hypot(c, y),
+        lambda x, y: np.minimum(x, c) + np.maximum(c, y),
+        lambda x, y: stack([x, c, y])[..., 0] if isinstance(x, Dual) else x + 0.0 * c,
+        lambda x, y: dot(stack([x, y, 0.0]), np.outer(c, [1.0, 2.0, 3.0])).real
+        if not isinstance(x, Dual)
+        else dot(stack([x, y, 0.0]), np.outer(c, [1.0, 2.0, 3.0])),
+    ]
+    x, y = variables(2.1, 3.2)
+    for operation in operations:
+        found = operation(x, y)
+        assert found.shape == (size,)
+        assert found.dual.shape == (2, size)
+        slopes = [
+            operation(2.1 + h, 3.2) - operation(2.1 - h, 3.2),
+            operation(2.1, 3.2 + h) - operation(2.1, 3.2 - h),
+        ]
+        np.testing.assert_allclose(found.dual, np.array(slopes) / (2.0 * h), rtol=1e-7, atol=1e-8)
+
+
+def test_directions_go_through_vectors_and_matrices_without_them() -> None:
+    x, y = variables(0.4, 2.0)
+    many = drawn(1, 2, 3)
+    vector = stack([x, y, 0.0])
+    for product in (cross(vector, many), cross(many, vector)):
+        assert product.dual.shape == (2, 2, 3)
+    np.testing.assert_allclose(cross(vector, many).dual[1], np.cross([0.0, 1.0, 0.0], many.real) + np.cross([0.4, 2.0, 0.0], many.dual))
+    turned = apply(about_k(x), many)
+    c, s = np.cos(0.4), np.sin(0.4)
+    rate = np.array([[-s, -c, 0.0], [c, -s, 0.0], [0.0, 0.0, 0.0]])
+    np.testing.assert_allclose(turned.dual[0], many.real @ rate.T + many.dual @ about_k(0.4).real.T, atol=1e-14)
+    np.testing.assert_allclose(turned.dual[1], many.dual @ about_k(0.4).real.T, atol=1e-14)
+    # a vector on either side of the product
+    matrix = about_k(x)
+    np.testing.assert_allclose((matrix @ np.array([1.0, 2.0, 3.0])).dual[0], rate @ [1.0, 2.0, 3.0], atol=1e-14)
+    np.testing.assert_allclose((np.array([1.0, 2.0, 3.0]) @ matrix).dual[0], rate.T @ [1.0, 2.0, 3.0], atol=1e-14)
+    squared = vector @ vector
+    np.testing.assert_allclose(squared.dual, [0.8, 4.0])
+    both = join(vector, many[0])
+    assert both.dual.shape == (2, 6)
+    np.testing.assert_array_equal(both.dual[0], [1.0, 0.0, 0.0, *many.dual[0]])
+
+
+@pytest.mark.parametrize("base", [-2.0, 0.0])
+def test_a_power_whose_exponent_does_not_vary_needs_no_logarithm(base: float) -> None:
+    same(Dual(base, 1.0) ** Dual(2.0), Dual(base**2, 2.0 * base))
+    same(Dual(base, 1.0) ** Dual([2.0, 3.0], 0.0), Dual([base**2, base**3], [2.0 * base, 3.0 * base**2]))
+    # 0^x is 0 for all x > 0
+    same(Dual(0.0) ** Dual(2.0, 1.0), Dual(0.0))
+
+
+def test_the_lesser_and_the_greater_of_two() -> None:
+    a, b = Dual([1.0, 5.0], [2.0, 3.0]), Dual([4.0, 4.0], [7.0, 8.0])
+    same(np.minimum(a, b), Dual([1.0, 4.0], [2.0, 8.0]))
+    same(np.maximum(a, b), Dual([4.0, 5.0], [7.0, 3.0]))
+    same(np.sign(Dual([-3.0, 2.0], 1.0)), Dual([-1.0, 1.0]))
+    same(abs(Dual(-3.0, 1.0)), Dual(3.0, -1.0))
+
+
+def test_what_is_not_finite_is_told_for_all_directions_of_a_number() -> None:
+    x = Dual([1.0, 2.0, np.nan], [[0.0, np.inf, 0.0], [1.0, np.nan, 1.0]])
+    assert np.isfinite(x).tolist() == [True, False, False]
+    assert np.isnan(x).tolist() == [False, True, True]
+
+
+def test_sum_length_and_elements() -> None:
+    x = Dual(np.arange(6.0).reshape(2, 3), np.arange(12.0).reshape(2, 2, 3))
+    for axis in (None, 0, 1, -1, -2):
+        total = np.sum(x, axis=axis)
+        assert isinstance(total, Dual)
+        np.testing.assert_array_equal(total.real, x.real.sum(axis))
+        np.testing.assert_array_equal(total.dual, [part.sum(axis) for part in x.dual])
+    assert len(x) == 2
+    assert [row.shape for row in x] == [(3,), (3,)]
+    assert np.shape(x) == (2, 3)
+    assert Dual(0.5)
+    assert not Dual(0.0, 1.0)
+    with pytest.raises(TypeError):
+        len(Dual(1.0))
+    for function in (np.mean, np.concatenate, lambda y: np.sum(y, keepdims=True)):
+        with pytest.raises(TypeError, match="stack, join"):
+            function(x)
 
 
 # ------------------------------------------------------------------ the plant's own functions

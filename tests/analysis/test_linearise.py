@@ -6,7 +6,7 @@ import cmath
 from dataclasses import replace
 from functools import cache
 from math import pi
-from types import FunctionType, ModuleType, SimpleNamespace
+from types import SimpleNamespace
 from typing import Any
 
 import control
@@ -32,6 +32,8 @@ from analysis.linearise import (
     settled_motion,
 )
 from analysis.orbits import find_orbit
+from analysis.tracing import rebound
+from linkwork import friction
 from linkwork.errors import AssemblyError, InputError, UnknownNameError
 from linkwork.five_bar import dynamics, kinematics
 from linkwork.five_bar.parameters import InitialState
@@ -56,21 +58,12 @@ def complex_atan2(y: complex, x: complex) -> complex:
 
 @cache
 def plain() -> SimpleNamespace:
-    """The plant's functions for complex numbers, bound anew and not by way of `analysis.symbolic`."""
+    """The plant's functions for complex numbers, bound anew not by way of `analysis.symbolic`."""
     elementary = {name: getattr(cmath, name) for name in ("sin", "cos", "sqrt", "tanh")} | {
         "atan2": lambda y, x: complex_atan2(complex(y), complex(x))
     }
 
-    def bound(module: ModuleType, others: dict[str, Any]) -> dict[str, Any]:
-        space = dict(vars(module)) | {name: f for name, f in others.items() if name in vars(module)}
-        for name, f in vars(module).items():
-            if isinstance(f, FunctionType) and f.__module__ == module.__name__:
-                space[name] = FunctionType(f.__code__, space, name)
-        return space
-
-    first = bound(kinematics, elementary)
-    own = {name: f for name, f in first.items() if isinstance(f, FunctionType)}
-    return SimpleNamespace(**bound(dynamics, elementary | own))
+    return rebound((friction, kinematics, dynamics), elementary)
 
 
 def complex_step(f: Any, x: Any) -> np.ndarray:

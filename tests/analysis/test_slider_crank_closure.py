@@ -220,6 +220,13 @@ def test_a_start_nearby_is_used() -> None:
     np.testing.assert_allclose(found.slider_position, close(p, [0.3, 0.31], 0.05).slider_position, atol=1e-13)
 
 
+def test_a_start_of_another_number_of_loops_is_refused() -> None:
+    p = parameters(10.0)
+    for count, points in ((2, [0.1, 0.2, 0.3]), (3, 0.1)):
+        with pytest.raises(InputError, match=f"start has {count} loops"):
+            close(p, points, 0.0, start=close(p, np.linspace(0.1, 0.3, count), 0.0))
+
+
 def test_an_iteration_that_ends_open_is_told_with_its_residual(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(C, "MAX_ITERATIONS", 1)
     with pytest.raises(ClosureError, match=r"residual .* rad and .* m after 1 iterations at theta1 = 0.7 rad"):

@@ -179,6 +179,18 @@ def test_scene_of_a_monte_carlo() -> None:
         assert len(panels(plot_tolerances(drawn))) == 3
 
 
+def test_next_to_a_dead_centre_there_is_no_estimate_to_draw() -> None:
+    common: dict[str, Any] = {"crank_speed": CRANK_SPEED, "shift": ConstantShift(3.5 * INCH)}
+    centre = force_turn(parameters(10.0), **common).dead_centres[0].crank_angle
+    turn = force_turn(parameters(10.0), angles=[0.5, 1.0, centre + 1e-5], torque=CRANK_TORQUE, **common)
+    found = monte_carlo(turn, [Tolerance("guide.offset", 5e-4)], samples=2000, quantities=("slider.load",))
+    figure = plot_tolerances(found.scene("slider.load", centre))
+    assert "no variance: a dead centre is within the tolerances" in texts(figure)
+    assert "linear estimate" not in texts(figure)
+    _, histogram, _ = panels(figure)
+    assert "linear estimate: no spread" not in [x.get_label() for x in histogram.lines]
+
+
 def test_where_the_linear_estimate_has_no_spread() -> None:
     turn = force_turn(parameters(0.0), crank_speed=CRANK_SPEED, angles=ANGLES)
     scene = monte_carlo(turn, [Tolerance(SHIFT, 5e-3)], samples=3000).scene("slider.position", 0.5 * pi)
@@ -200,7 +212,7 @@ def test_angles_that_were_left_out_are_a_gap() -> None:
     kept = np.delete(np.arange(25), [4, 5, 6, 7])
     scene = made()
     cut = {name: getattr(scene, name)[..., kept] for name in ("angle", "deviation", "worst", "departures", "mean")}
-    band, _, _ = panels(plot_tolerances(replace(scene, **cut)))
+    band, _, _ = panels(plot_tolerances(replace(scene, **cut, breaks=(3,))))
     for label in ("linear, worst case", "samples, 0.135 % and 99.865 %", "mean of the samples"):
         drawn = line(band, label)
         assert np.flatnonzero(np.isnan(drawn.get_ydata())).tolist() == [4]

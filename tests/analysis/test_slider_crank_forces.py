@@ -403,6 +403,55 @@ def test_where_the_crank_cannot_turn_fully() -> None:
     assert "it can turn" not in str(caught.value)
 
 
+def test_limits_of_assembly_are_where_the_cosine_says() -> None:
+    """At 270 deg the rod reaches the guide where |a1 c + a4| is at most sqrt(a2^2 - S1^2); by bounds and by signs."""
+    mechanism = replace(parameters(-20.0), rod_length=30.0 * INCH)
+    s1 = 3.5 * INCH
+    end = np.arccos((20.0 - np.sqrt(30.0**2 - 3.5**2)) / 12.0)
+    same = AngleShift(lambda th: s1 + 0.0 * th, lambda th: 0.0 * th, lambda th: 0.0 * th)
+    angles = np.linspace(-pi, 3.0 * pi, 145)
+    for law in (ConstantShift(s1), same):
+        turn = force_turn(mechanism, crank_speed=1.0, shift=law, angles=angles, load=1.0, partial=True)
+        assert turn.limits == pytest.approx([-end, end, tau - end, tau + end], abs=1e-9)
+        assert turn.angle[list(turn.breaks)] == pytest.approx([angles[angles < end].max()])
+        away = np.abs(turn.angle[:, None] - [-end, end, tau - end, tau + end]).min(axis=1)
+        assert turn.clear(12.0).tolist() == (away > radians(12.0)).tolist()
+    # both ends between two of the angles: no angle is left out, and there is a break all the same
+    coarse = force_turn(mechanism, crank_speed=1.0, shift=SHIFT, angles=[0.0, 2.0, tau - 2.0, tau], load=1.0)
+    assert coarse.unreachable.size == 0
+    assert coarse.breaks == (1,)
+    whole = force_turn(OFFSET, crank_speed=1.0, shift=SHIFT, load=1.0)
+    assert (whole.limits, whole.breaks) == ((), ())
+    assert whole.clear().all()
+
+
+def test_clear_of_the_dead_centres_where_the_force_is_sought() -> None:
+    """Also of one that is beyond the last angle."""
+    turn = force_turn(OFFSET, crank_speed=1.0, torque=1.0, angles=np.radians(np.arange(0.0, 95.0)))
+    first = DEAD_CENTRES_DEG[10.0][0]
+    away = np.abs(np.degrees(turn.angle) - first)
+    assert turn.clear(10.0).tolist() == (away > 10.0 + 0.05).tolist()
+    assert 0 < turn.clear(10.0).sum() < 95
+    assert turn.clear(poles=False).all()
+    assert force_turn(OFFSET, crank_speed=1.0, load=1.0).clear().all()
+
+
+def test_runs_of_masked_angles_are_told_once() -> None:
+    """Guide and crank axis in one line: the slider stands still, and its force has no lever."""
+    still = force_turn(parameters(0.0, 180.0), crank_speed=1.0, shift=SHIFT, torque=1.0)
+    assert len(still.reasons) == 361
+    assert still.without_lever
+    assert still.masked == (
+        "the slider has no lever on the crank at any angle, so that the torque determines no force on it",
+    )
+    ideal = force_turn(parameters(0.0), crank_speed=1.0, torque=1.0, angles=[1.0, 0.5 * pi, 0.5 * pi + 1e-12, 1.5 * pi])
+    assert not ideal.without_lever
+    assert [text.partition(":")[0] for text in ideal.masked] == [
+        "dead centre at all 3 crank angles from 90.0000 to 270.0000 deg"
+    ]
+    assert not force_turn(parameters(0.0), crank_speed=1.0, torque=1.0, angles=[0.5 * pi]).without_lever
+
+
 def test_a_rod_parallel_to_the_crank_axis_has_no_frame_3() -> None:
     """Guide and crank axis parallel, the crank pin on the guide: the thesis's frame 3 has no direction there."""
     mechanism = replace(parameters(12.0, 0.0), assembly_branch=-1)
@@ -462,6 +511,12 @@ def test_csv(tmp_path: Path) -> None:
         ({"angles": [0.0, np.nan]}, "list of finite numbers"),
         ({"angles": np.zeros((2, 2))}, "list of finite numbers"),
         ({"shift": AngleShift(lambda th: np.full(th.shape, np.nan), np.sin, np.cos)}, "the shift law's shift"),
+        ({"crank_speed": "50 rpm"}, "crank_speed is '50 rpm': it must be a number in SI"),
+        ({"load": object()}, "load is <object"),
+        ({"angles": "abc"}, "list of finite numbers .* not 'abc'"),
+        ({"angles": [[0.0], [1.0, 2.0]]}, "list of finite numbers"),
+        ({"shift": 3.5}, r"the shift is 3.5: it must be a law of the shift, such as ConstantShift\(0.01\)"),
+        ({"shift": mobility.constant_shift(0.1)}, "it must be a law of the shift"),
         ({"shift": TimeShift(np.sin, np.cos, np.sin), "crank_speed": 0.0}, "not 0 rad/s"),
         ({"shift": TimeShift(np.sin, np.cos, np.sin), "crank_acceleration": 1.0}, "constant"),
     ],

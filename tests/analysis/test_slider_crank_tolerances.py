@@ -334,7 +334,7 @@ def test_a_million_samples_agree_with_the_linear_estimate_in_seconds() -> None:
     quantities = ("slider.position", "slider.velocity", "crank_pin.fx", "guide.fx", "bearing.my")
     begin = perf_counter()
     result = monte_carlo(turn, TOLERANCES, quantities=quantities)
-    assert perf_counter() - begin < 30.0
+    assert perf_counter() - begin < 10.0
     assert result.samples == 1_000_000
     assert result.messages == ()
     for name in quantities:
@@ -382,12 +382,13 @@ def test_where_hardly_any_sample_can_be_assembled_nothing_is_made_up() -> None:
     turn = force_turn(IDEAL, crank_speed=1.0, shift=ConstantShift(limit - 1e-5), angles=[0.0])
     result = monte_carlo(turn, [Tolerance("rod.length", 1.0, distribution="uniform")], samples=2, seed=3)
     draws = Tolerance("rod.length", 1.0, distribution="uniform").draw(np.random.default_rng(3), 2)
-    assert (draws < 0.0).all() or result.not_assembled[0] == (draws < 0.0).sum()
+    # one of the two rods is shorter
+    assert (draws < 0.0).sum() == 1
+    assert result.not_assembled.tolist() == [1]
     spread = result.spreads["slider.position"]
-    if result.not_assembled[0] > 0:
-        assert spread.mean.mask.all()
-        assert np.ma.getmaskarray(spread.percentiles).all()
-        assert np.ma.getmaskarray(result.estimates["slider.position"].second_deviation).all()
+    assert spread.mean.mask.tolist() == [True]
+    assert np.ma.getmaskarray(spread.percentiles).all()
+    assert np.ma.getmaskarray(result.estimates["slider.position"].second_deviation).tolist() == [True]
 
 
 def test_angles_that_the_nominal_mechanism_cannot_reach_are_told() -> None:
@@ -409,12 +410,62 @@ def test_across_a_dead_centre_there_is_no_mean() -> None:
     assert not np.ma.getmaskarray(load.percentiles).any()
     assert load.percentiles[0, 1] < -1e3 < 1e3 < load.percentiles[-1, 1]
     assert load.counts[1].sum() == pytest.approx(0.999 * 20_000, abs=3)
+    # neither is there an estimate, and it is told as off
+    assert result.linear_is_off("slider.load").tolist() == [False, True]
+    linear = result.estimates["slider.load"]
+    for values in (linear.deviation, linear.worst, linear.second_mean, linear.second_deviation, *linear.shares):
+        assert np.ma.getmaskarray(values).tolist() == [False, True]
+    assert not np.ma.getmaskarray(linear.nominal).any()
+    for name in ("guide.mx", "slider.position"):
+        assert not np.ma.getmaskarray(result.estimates[name].deviation).any()
     for name in ("guide.mx", "slider.position"):
         assert not np.ma.getmaskarray(result.spreads[name].mean).any()
     assert sum("samples on both sides of a dead centre" in m and "slider.load" in m for m in result.messages) == 1
     # where the load is given the same place is like any other
     free = force_turn(OFFSET, load=3.0, angles=[centre], **common)
     assert monte_carlo(free, TOLERANCES, quantities=("crank_pin.fx",), samples=2000).messages == ()
+
+
+def test_an_estimate_ends_where_the_tolerances_reach_the_dead_centre() -> None:
+    """An error of the crank angle reaches as far as it is wide, with no samples too."""
+    common: dict[str, Any] = {"crank_speed": CRANK_SPEED, "shift": ConstantShift(3.5 * INCH)}
+    centre = force_turn(OFFSET, **common).dead_centres[0].crank_angle
+    width = 1e-3
+    turn = force_turn(OFFSET, torque=CRANK_TORQUE, angles=centre + width * np.array([-1.05, -0.95, 0.95, 1.05]), **common)
+    tolerances = [Tolerance(ANGLE, width)]
+    found = estimate(turn, tolerances, ("slider.load", "slider.position"))
+    assert np.ma.getmaskarray(found["slider.load"].deviation).tolist() == [False, True, True, False]
+    assert not np.ma.getmaskarray(found["slider.position"].deviation).any()
+    # hardly a sample of a normal error is as far out as three standard deviations
+    few = monte_carlo(turn, tolerances, quantities=("slider.load",), samples=10, seed=1)
+    assert not np.ma.getmaskarray(few.spreads["slider.load"].mean).any()
+    assert few.linear_is_off("slider.load")[1:3].all()
+    assert "the tolerances reach a dead centre from crank angle 9" in few.messages[0]
+
+
+def test_samples_that_are_no_mechanism_are_told() -> None:
+    turn = offset_turn([0.3])
+    count, deviation = 2000, 2.0
+    wide = Tolerance("rod.length", standard_deviation=deviation)
+    below = int((OFFSET.rod_length + wide.draw(np.random.default_rng(4), count) <= 0.0).sum())
+    with pytest.raises(InputError, match=rf"tolerance of rod\.length .* in {below} of {count} samples .* not above zero"):
+        monte_carlo(turn, [wide], samples=count, seed=4)
+    with pytest.raises(InputError, match=r"tolerance of slider\.mass .* it is below zero"):
+        monte_carlo(turn, [Tolerance("slider.mass", 50.0)], samples=count)
+    # each by itself is a crank, both together are not: inertia against mass times the square of its centre's distance
+    steiner = OFFSET.crank_mass * OFFSET.crank_cog_x**2
+    slack = OFFSET.crank_inertia - steiner
+    inertia = Tolerance("crank.inertia", 0.9 * slack, distribution="uniform")
+    apart = 0.9 * (sqrt(OFFSET.crank_inertia / OFFSET.crank_mass) - OFFSET.crank_cog_x)
+    centre = Tolerance("crank.cog_x", apart, distribution="uniform")
+    for one in (inertia, centre):
+        monte_carlo(turn, [one], samples=count)
+    generator = np.random.default_rng(0)
+    drawn = [t.draw(generator, count) for t in (inertia, centre)]
+    bad = int((OFFSET.crank_inertia + drawn[0] < OFFSET.crank_mass * (OFFSET.crank_cog_x + drawn[1]) ** 2).sum())
+    assert 0 < bad < count
+    with pytest.raises(InputError, match=rf"crank\.inertia and that of crank\.cog_x .* in {bad} of {count} samples"):
+        monte_carlo(turn, [inertia, centre], samples=count)
 
 
 def test_samples_at_a_dead_centre_itself_are_counted() -> None:
@@ -459,7 +510,5 @@ def test_wrong_input_is_told() -> None:
         estimate(turn, [Tolerance("rod.length", 1.0), Tolerance("rod.length", 2.0)])
     with pytest.raises(InputError, match="1 samples: there must be at least two"):
         monte_carlo(turn, TOLERANCES, samples=1)
-    with pytest.raises(ParameterError, match=r"crank\.length is -"):
-        monte_carlo(turn, [Tolerance("crank.length", 1.0)], samples=1000)
     with pytest.raises(ParameterError, match=r"crank_pin\.fx"):
         monte_carlo(turn, TOLERANCES, samples=10).scene("crank_pin.fx")

@@ -27,13 +27,12 @@ TURN = np.radians(np.arange(0.0, 360.0, 10.0))
 @pytest.mark.parametrize("offset", OFFSETS_IN)
 def test_it_is_right_in_the_plane(offset: float, branch: int) -> None:
     p = replace(parameters(offset), assembly_branch=branch)
-    if branch == 1:
-        found = settle(p, TURN, 0.0)
-        assert found.settled.all()
-        assert found.rotation_residual.max() < 1e-12
-        assert found.length_residual.max() < 1e-12
-        assert found.position_error.max() < 1e-12
-        np.testing.assert_allclose(found.unknowns, planar(p, TURN), atol=1e-12)
+    found = settle(p, TURN, 0.0)
+    assert found.settled.all()
+    assert found.rotation_residual.max() < 1e-12
+    assert found.length_residual.max() < 1e-12
+    assert found.position_error.max() < 1e-12
+    np.testing.assert_allclose(found.unknowns, planar(p, TURN), atol=1e-12)
     np.testing.assert_allclose(planar(p, TURN)[:, 4], close(p, TURN, 0.0).slider_position, atol=1e-12)
 
 
@@ -46,11 +45,12 @@ def test_its_chain_has_one_freedom(shift: float, angle: float) -> None:
     assert freedoms(p, angle, shift * INCH, settle(p, angle, shift * INCH).unknowns[0]) == 1
 
 
-# offset, shift (in), twist (deg); least rotation left (deg) and error of the slider position (in) at the worst angle
+# offset, shift (in), twist (deg); rotation left (deg) and error of the slider position (in) at the worst angle: marks of this
+# program's own, since the notes' numbers are of another reconstruction
 OPEN = [
-    pytest.param(10.0, 3.5, 270.0, 15.0, 1.0, id="shift"),
-    pytest.param(20.0, 0.0, 232.0, 25.0, 3.0, id="twist-232"),
-    pytest.param(20.0, 0.0, 310.0, 25.0, 3.0, id="twist-310"),
+    pytest.param(10.0, 3.5, 270.0, 20.2, 1.7, id="shift"),
+    pytest.param(20.0, 0.0, 232.0, 30.2, 4.7, id="twist-232"),
+    pytest.param(20.0, 0.0, 310.0, 30.2, 4.7, id="twist-310"),
 ]
 
 
@@ -62,8 +62,8 @@ def test_its_steps_become_small_on_open_loops(
     p = parameters(offset, twist)
     found = settle(p, TURN, shift * INCH)
     assert found.settled.all()
-    assert degrees(found.rotation_residual.max()) > left
-    assert found.position_error.max() / INCH > off
+    assert degrees(found.rotation_residual.max()) == pytest.approx(left, abs=1.0)
+    assert found.position_error.max() / INCH == pytest.approx(off, abs=0.3)
     truth = close(p, TURN, shift * INCH)
     assert truth.rotation_residual.max() < 1e-12
     assert truth.length_residual.max() < 1e-12
@@ -83,11 +83,15 @@ def test_where_it_settles_nothing_closes_better(
         product, _ = chain(p, np.array([angle]), np.array([shift * INCH]), (x * units)[None])
         return np.concatenate([(product.real[0] - np.eye(3)).ravel(), product.dual[0].ravel() / INCH])
 
+    def slopes(x: np.ndarray) -> np.ndarray:
+        """All at once by the complex step... """
+        raise NotImplementedError
+
     end = found.unknowns[0] / units
     reached = float(np.sum(errors(end) ** 2))
     assert reached > 1e-3
     for start in (planar(p, np.array([angle]))[0] / units, end + 0.01):
-        least = least_squares(errors, start, xtol=1e-14, ftol=1e-14, gtol=1e-14)
+        least = least_squares(errors, start, jac=slopes, xtol=1e-10, ftol=1e-10, gtol=1e-10)
         assert reached <= 2.0 * least.cost * (1.0 + 1e-6)
 
 

@@ -297,6 +297,27 @@ def test_any_shift_will_do_along_a_parallel_guide() -> None:
     assert M.greatest_shift(mechanism(0.5, 0.51, 0.005, 0.0)) is not None
 
 
+@pytest.mark.parametrize("turns", [-1.0, 1.0, 2.0, 3.0, 100.0])
+def test_a_parallel_guide_is_one_to_the_rounding_of_its_twist(turns: float) -> None:
+    assert M.greatest_shift(mechanism(0.5, 1.0, 0.2, turns * pi)) == inf
+    # a twist of a hundred-millionth of a degree is none of rounding
+    leaning = M.greatest_shift(mechanism(0.5, 1.0, 0.2, pi + radians(1e-8)))
+    assert leaning is not None
+    assert 1e8 < leaning < 1e11
+
+
+@several
+@given(drawn=mechanisms())
+def test_greatest_margin_is_the_greatest_of_a_scan(drawn: tuple[SliderCrankParameters, float]) -> None:
+    par, shift = drawn
+    margin = M.greatest_margin(par, M.constant_shift(shift))
+    angles = np.linspace(0.0, TURN, 2001)
+    scan = par.rod_length - np.sqrt(par.rod_length**2 - squares(par, shift, angles))
+    assert scan.max() - 1e-13 <= margin.length == pytest.approx(scan.max(), abs=1e-4)
+    there = squares(par, shift, np.array([margin.crank_angle]))[0]
+    assert par.rod_length - sqrt(par.rod_length**2 - there) == pytest.approx(margin.length, abs=1e-12)
+
+
 def test_thesis_case_assembles_at_every_twist() -> None:
     # a4 = 20, S1 = 0
     for twist in range(0, 360, 3):
