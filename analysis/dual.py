@@ -206,7 +206,12 @@ class Dual(NDArrayOperatorsMixin):
         TypeError
             With what there is in its place.
         """
-        if function in (np.sum, np.shape) and len(arguments) == 1 and arguments[0] is self and options.keys() <= {"axis"}:
+        if (
+            function in (np.sum, np.shape)
+            and len(arguments) == 1
+            and arguments[0] is self
+            and options.keys() <= {"axis"}
+        ):
             return self.sum(**options) if function is np.sum else self.shape
         raise TypeError(
             f"numpy.{function.__name__} does not take dual numbers, or not with these arguments: there are stack, join, dot, "
@@ -222,9 +227,7 @@ def _aligned(*x: Dual) -> tuple[Dual, ...]:
 
 def _with_axes(x: Dual, axes: int) -> Dual:
     ones = (1,) * (axes - x.real.ndim)
-    return Dual(
-        x.real.reshape(ones + x.real.shape), x.dual.reshape(x.dual.shape[: x.directions] + ones + x.real.shape)
-    )
+    return Dual(x.real.reshape(ones + x.real.shape), x.dual.reshape(x.dual.shape[: x.directions] + ones + x.real.shape))
 
 
 def _inexact(part: Any) -> Array:

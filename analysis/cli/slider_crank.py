@@ -24,7 +24,8 @@ from .common import CHECK_FAILED, changes, console, errors, handled, number_or_t
 from .design import wrote
 
 if TYPE_CHECKING:
-    from ..slider_crank.forces import ForceTurn, ShiftLaw
+    from ..slider_crank.forces import ForceTurn
+    from ..slider_crank.shifts import ShiftLaw
     from ..slider_crank.tolerances import MonteCarlo
 
 #: The case that everything starts from where no other is named.
@@ -66,7 +67,7 @@ class _Chosen:
     @property
     def force_law(self) -> ShiftLaw:
         """The shift over the crank angle, as the force problems take it."""
-        from ..slider_crank.forces import ConstantShift, GrooveShift
+        from ..slider_crank.shifts import ConstantShift, GrooveShift
 
         p = self.parameters
         if self.groove is None:
@@ -599,10 +600,10 @@ def tolerances(
             # none may be clear of poles and limits
             grid.add_row(quantity, t.name, unit, *(texts if greatest[top] >= 0.0 else (texts[0], "none", "")))
     console.print(grid)
-    folder = Path(out)
-    files = [io.write_csv(folder / f"{chosen.name}-sensitivities.csv", written)]
     with console.status(f"{samples} samples at {len(turn)} crank angles"):
         found = study.monte_carlo(turn, allowed, quantities=quantities, samples=samples, seed=seed)
+    folder = Path(out)
+    files = [io.write_csv(folder / f"{chosen.name}-sensitivities.csv", written)]
     files.append(io.write_csv(folder / f"{chosen.name}-tolerances.csv", _spread_columns(found, quantities, told)))
     _spread_table(found, quantities, place, f"{chosen.title}: spread at {here}, {samples} samples", told)
     for message in found.notes(units):

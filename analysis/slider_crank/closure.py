@@ -18,7 +18,7 @@ the iteration starts; positions and forces do not depend on it.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, TypeAlias, cast
 
 import numpy as np
@@ -59,6 +59,19 @@ class Closure:
     rotation_residual: FloatArray
     length_residual: FloatArray
     iterations: int
+
+    def at(self, points: Any) -> Closure:
+        """The loops of some of the points, by their indices (array_like of int): a start for others near them."""
+        chosen = (
+            "crank_angle",
+            "shift",
+            "crank_ball",
+            "slider_ball",
+            "slider_position",
+            "rotation_residual",
+            "length_residual",
+        )
+        return replace(self, **{name: getattr(self, name)[points] for name in chosen})
 
     @property
     def crank_frame(self) -> Dual:

@@ -11,7 +11,8 @@ from linkwork.errors import InputError
 
 from .closure import close
 from .dual_dynamics import joint_loads, rates
-from .forces import JOINTS, NO_LEVER, SLIDER_FORCE, WORDS, ForceTurn, in_the_shaft, on_arrays
+from .forces import JOINTS, NO_LEVER, SLIDER_FORCE, WORDS, ForceTurn
+from .shifts import in_the_shaft, on_arrays
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -16,21 +16,20 @@ The equations are the plant's own (`linkwork.slider_crank.dynamics`), evaluated 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
-from functools import cache, cached_property
-from math import ceil, degrees, isfinite, pi, radians, tau
+from dataclasses import dataclass
+from functools import cached_property
+from math import ceil, degrees, pi, radians, tau
 from pathlib import Path
-from types import MappingProxyType, SimpleNamespace
-from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, TypeAlias, runtime_checkable
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import brentq
 
-from linkwork import friction
-from linkwork.errors import AssemblyError, InputError, ParameterError
+from linkwork.errors import AssemblyError, InputError
 from linkwork.limits import LIMIT_SINE
-from linkwork.slider_crank import dynamics, kinematics, mobility, vectors
+from linkwork.slider_crank import mobility
 from linkwork.slider_crank.dynamics import Inputs
 from linkwork.slider_crank.kinematics import Position
 from linkwork.slider_crank.mobility import DeadCentre
@@ -39,11 +38,37 @@ from linkwork.slider_crank.published import INCH, POUND_FORCE, POUND_INCH
 from linkwork.slider_crank.vectors import Vector
 
 from .. import io
-from ..tracing import rebound
 from .dual_dynamics import DEAD_CENTRE
+from .shifts import (
+    AngleShift,
+    ConstantShift,
+    GrooveShift,
+    ShiftLaw,
+    ShiftMotion,
+    TimeShift,
+    in_the_shaft,
+    on_arrays,
+    with_groove,
+)
 
 if TYPE_CHECKING:
     from ..figures.slider_crank import ForceScene
+
+__all__ = [
+    "AngleShift",
+    "ConstantShift",
+    "ForceInstant",
+    "ForceTurn",
+    "GrooveShift",
+    "ShiftLaw",
+    "ShiftMotion",
+    "Solution",
+    "TimeShift",
+    "force_turn",
+    "forces_at",
+    "solve",
+    "unit_table",
+]
 
 FloatArray: TypeAlias = NDArray[np.float64]
 MaskedArray: TypeAlias = "np.ma.MaskedArray[Any, np.dtype[np.float64]]"
@@ -58,6 +83,8 @@ _PARALLEL = 1e-12
 CLEAR_DEG = 10.0
 #: What is told of a mechanism whose slider force is sought in vain.
 NO_LEVER = "the slider has no lever on the crank at any angle, so that the torque determines no force on it"
+#: The shift where none is given.
+_STILL = ConstantShift(0.0)
 #: What `ForceTurn.sought` may be.
 TORQUE, SLIDER_FORCE = "torque", "slider force"
 
@@ -115,158 +142,6 @@ def unit_table(units: str) -> Mapping[str, tuple[str, float]]:
     return UNITS[units]
 
 
-class ShiftMotion(NamedTuple):
-    """The axial shift (m) and its rates by time (m/s, m/s2)."""
-
-    shift: Any
-    velocity: Any
-    acceleration: Any
-
-
-@runtime_checkable
-class ShiftLaw(Protocol):
-    """How the crank shifts along its axis while it turns."""
-
-    def at(self, angle: Any, speed: Any, acceleration: Any) -> ShiftMotion:
-        """Shift and its rates by time at crank angles (rad), speeds (rad/s) and accelerations (rad/s2) of one shape."""
-
-    def repeating(self, parameters: SliderCrankParameters) -> mobility.PeriodicShift | None:
-        """The law as `linkwork.slider_crank.mobility` takes it; None if it is not known to repeat after whole turns."""
-
-
-@dataclass(frozen=True, slots=True)
-class ConstantShift:
-    """The crank held at a shift S1 (m).
-
-    Raises
-    ------
-    InputError
-        If it is not finite.
-    """
-
-    value: float = 0.0
-
-    def __post_init__(self) -> None:
-        if not isfinite(self.value):
-            raise InputError(f"the shift is {self.value!r} m: it must be a finite number")
-
-    def at(self, angle: Any, speed: Any, acceleration: Any) -> ShiftMotion:
-        """See `ShiftLaw`."""
-        zero = 0.0 * angle
-        return ShiftMotion(self.value + zero, zero, zero)
-
-    def repeating(self, parameters: SliderCrankParameters) -> mobility.PeriodicShift:
-        """See `ShiftLaw`."""
-        return mobility.constant_shift(self.value)
-
-
-@dataclass(frozen=True, slots=True)
-class GrooveShift:
-    """S1 = SS1 sin(alpha theta1), eq 28 (eq 28a prints S1 for SS1).
-
-    Parameters
-    ----------
-    amplitude : float
-        SS1 (m).
-    ratio : float
-        alpha, periods of the shift in a turn of the crank.
-    in_shaft : bool
-        Whether the groove is cut in the crank's shaft, so that the torque of the drive works against its flank: the groove of
-        the plant and the FMU. By default, as in the thesis, something apart from the crank's drive moves the crank along.
-
-    Raises
-    ------
-    InputError
-        If a value is not finite.
-    """
-
-    amplitude: float
-    ratio: float = 1.0
-    in_shaft: bool = False
-
-    def __post_init__(self) -> None:
-        for name in ("amplitude", "ratio"):
-            if not isfinite(getattr(self, name)):
-                raise InputError(f"the groove's {name} is {getattr(self, name)!r}: it must be a finite number")
-
-    def at(self, angle: Any, speed: Any, acceleration: Any) -> ShiftMotion:
-        """See `ShiftLaw`."""
-        # all that the plant's function asks the constants for is amplitude and ratio
-        shift, pitch, bend = on_arrays().groove(angle, self)
-        return ShiftMotion(shift, pitch * speed, pitch * acceleration + bend * speed * speed)
-
-    def repeating(self, parameters: SliderCrankParameters) -> mobility.PeriodicShift | None:
-        """See `ShiftLaw`."""
-        try:
-            return mobility.groove_shift(
-                replace(parameters, groove_amplitude=float(self.amplitude), groove_ratio=float(self.ratio))
-            )
-        except ParameterError:  # alpha is no ratio of small whole numbers
-            return None
-
-
-#: A function on arrays of angles or times.
-ArrayFunction: TypeAlias = Callable[[FloatArray], ArrayLike]
-
-
-@dataclass(frozen=True, slots=True)
-class AngleShift:
-    """A shift that is any function of the crank angle, with its first two derivatives.
-
-    ``value``, ``slope`` and ``curvature`` take an array of angles (rad) and give m, m/rad and m/rad2.
-    """
-
-    value: ArrayFunction
-    slope: ArrayFunction
-    curvature: ArrayFunction
-
-    def at(self, angle: Any, speed: Any, acceleration: Any) -> ShiftMotion:
-        """See `ShiftLaw`."""
-        slope = np.asarray(self.slope(angle))
-        return ShiftMotion(
-            np.asarray(self.value(angle)),
-            slope * speed,
-            slope * acceleration + np.asarray(self.curvature(angle)) * speed * speed,
-        )
-
-    def repeating(self, parameters: SliderCrankParameters) -> None:
-        """See `ShiftLaw`."""
-        return None
-
-
-@dataclass(frozen=True, slots=True)
-class TimeShift:
-    """A shift that is any function of time, with its first two derivatives, for a crank of constant speed.
-
-    ``value``, ``velocity`` and ``acceleration`` take an array of times (s) and give m, m/s and m/s2. The time is 0 where the
-    crank angle is.
-
-    Raises
-    ------
-    InputError
-        When it is evaluated at a speed that is zero or varies: give the law as an `AngleShift`.
-    """
-
-    value: ArrayFunction
-    velocity: ArrayFunction
-    acceleration: ArrayFunction
-
-    def at(self, angle: Any, speed: Any, acceleration: Any) -> ShiftMotion:
-        """See `ShiftLaw`."""
-        w = np.unique(speed)
-        if w.size != 1 or w[0] == 0.0 or np.any(acceleration):
-            raise InputError(
-                "a shift by time needs a crank speed that is constant and not 0 rad/s, to tell the time of each angle; "
-                "give the law by the angle"
-            )
-        time = angle / w[0]
-        return ShiftMotion(*(np.asarray(f(time)) for f in (self.value, self.velocity, self.acceleration)))
-
-    def repeating(self, parameters: SliderCrankParameters) -> None:
-        """See `ShiftLaw`."""
-        return None
-
-
 class Solution(NamedTuple):
     """What `solve` finds: `Position`, `Coefficients`, `Motion` and `Reactions` of the kind of numbers that it was given."""
 
@@ -276,23 +151,6 @@ class Solution(NamedTuple):
     reactions: Any
     load: Any
     ratio: Any
-
-
-def in_the_shaft(law: ShiftLaw) -> bool:
-    """Whether a groove in the crank's shaft makes the shift."""
-    return isinstance(law, GrooveShift) and law.in_shaft
-
-
-def with_groove(p: Constants, law: ShiftLaw) -> Constants:
-    """The constants with the groove of the law, where it is one."""
-    return p._replace(amplitude=law.amplitude, ratio=law.ratio) if isinstance(law, GrooveShift) else p
-
-
-@cache
-def on_arrays() -> SimpleNamespace:
-    """The plant's functions by name, for NumPy arrays and for what NumPy's functions work on (`analysis.dual`)."""
-    elementary = {"sin": np.sin, "cos": np.cos, "sqrt": np.sqrt, "atan2": np.arctan2, "tanh": np.tanh}
-    return rebound((friction, vectors, kinematics, dynamics), elementary)
 
 
 def solve(
@@ -633,7 +491,7 @@ def force_turn(
     *,
     crank_speed: ArrayLike,
     crank_acceleration: ArrayLike = 0.0,
-    shift: ShiftLaw = ConstantShift(0.0),
+    shift: ShiftLaw = _STILL,
     angles: ArrayLike | None = None,
     load: ArrayLike | None = None,
     torque: ArrayLike | None = None,
@@ -746,7 +604,7 @@ def forces_at(
     *,
     crank_speed: float,
     crank_acceleration: float = 0.0,
-    shift: ShiftLaw = ConstantShift(0.0),
+    shift: ShiftLaw = _STILL,
     load: float | None = None,
     torque: float | None = None,
 ) -> ForceInstant:

@@ -38,13 +38,10 @@ from .forces import (
     SLIDER_FORCE,
     ForceTurn,
     MaskedArray,
-    ShiftMotion,
-    in_the_shaft,
-    on_arrays,
     solve,
     unit_table,
-    with_groove,
 )
+from .shifts import ShiftMotion, in_the_shaft, on_arrays, with_groove
 
 FloatArray: TypeAlias = NDArray[np.float64]
 

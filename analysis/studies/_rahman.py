@@ -23,8 +23,6 @@ ASSIGNED = (
 )
 
 
-
-
 class Spot(NamedTuple):
     """Values at theta1 = 30 deg, 50 rpm, branch +; the last two: slider force along -k4 at a torque of 100 lb.in, and the
     torque that no slider force takes."""
@@ -61,8 +59,8 @@ STROKES_IN: Mapping[float, float] = MappingProxyType({0.0: 24.000, 10.0: 24.528,
 STROKES_BY_TWIST_IN: Mapping[float, float] = MappingProxyType({232.0: 21.85, 310.0: 21.39})
 #: Greatest shifts at which the crank turns fully at 270 deg, by the offset: sqrt(a2^2 - (a1 + |a4|)^2).
 GREATEST_SHIFTS_IN: Mapping[float, float] = MappingProxyType({0.0: 48.539, 10.0: 44.900, 20.0: 38.419, 30.0: 27.129})
-#: Greatest magnitude of 2F2k and half a unit of its last figure (lb), by a4, S1 (in) and alpha4 (deg). That it is meant clear of
-#: the dead centres, by 10 deg, is our reading: nearer to them it has no bound.
+#: Greatest magnitude of 2F2k and half a unit of its last figure (lb), by a4, S1 (in) and alpha4 (deg). That it is meant
+#: more than 10 deg from a dead centre is our reading: nearer to it there is no bound.
 AXIAL_LB: Mapping[tuple[float, float, float], tuple[float, float]] = MappingProxyType(
     {(10.0, 3.5, 270.0): (4.1, 0.05), (20.0, 0.0, 310.0): (27.0, 0.5)}
 )

@@ -32,7 +32,7 @@ from linkwork.slider_crank.mobility import (
 from linkwork.slider_crank.published import CRANK_SPEED, CRANK_TORQUE, INCH, POUND_FORCE, POUND_INCH, parameters
 
 from ..figures import COLOURS, Curve, Panel, plot_curves
-from ..slider_crank.closure import follow
+from ..slider_crank.closure import close, follow
 from ..slider_crank.dual_dynamics import JointLoads, joint_loads
 from ..slider_crank.forces import CLEAR_DEG, ConstantShift, ForceTurn, force_turn
 from ._rahman import (
@@ -64,6 +64,8 @@ FloatArray = NDArray[np.float64]
 #: Crank angles of the curves (deg): half degrees, the whole ones among them.
 ANGLES_DEG = np.linspace(0.0, 360.0, 721)
 ANGLE = "crank angle theta1 [deg]"
+#: Step (deg) in which the loop closed by dual matrices is followed round the turn.
+FOLLOW_DEG = 20.0
 #: Largest force or moment (lb, lb.in) that is taken for none, and largest relative difference of two ways of computing.
 NOTHING, SAME = 1e-6, 1e-9
 #: Torque on the crank (lb.in) and its length (in).
@@ -112,7 +114,8 @@ def position(case: Case) -> FloatArray:
 @cache
 def clear(case: Case) -> NDArray[np.bool_]:
     """Which of the angles are whole degrees and clear of the dead centres."""
-    return np.asarray((ANGLES_DEG % 1.0 == 0.0) & turn(case).clear(CLEAR_DEG))
+    # an angle at just this distance is not clear, however it is rounded
+    return np.asarray((ANGLES_DEG % 1.0 == 0.0) & turn(case).clear(CLEAR_DEG + 1e-6))
 
 
 def greatest(case: Case, quantity: FloatArray) -> float:
@@ -136,11 +139,15 @@ def spikes_deg(case: Case, component: Component) -> FloatArray:
 
 @cache
 def dual(case: Case) -> JointLoads:
-    """All joint forces by dual vectors, at the angles that are clear of the dead centres; by continuation round the turn."""
-    closed = follow(
-        parameters(case.offset_in, case.twist_deg), np.radians(ANGLES_DEG[clear(case)]), case.shift_in * INCH
-    )
-    return joint_loads(closed, speed=CRANK_SPEED, torque=CRANK_TORQUE)
+    """All joint forces by dual vectors, at the angles that are clear of the dead centres.
+
+    The loop is closed by continuation round the turn in steps of `FOLLOW_DEG`, and from these points in between.
+    """
+    mechanism, shift = parameters(case.offset_in, case.twist_deg), case.shift_in * INCH
+    angles = ANGLES_DEG[clear(case)]
+    turned = follow(mechanism, np.radians(np.arange(0.0, 361.0, FOLLOW_DEG)), shift)
+    before = turned.at((angles // FOLLOW_DEG).astype(int))
+    return joint_loads(close(mechanism, np.radians(angles), shift, before), speed=CRANK_SPEED, torque=CRANK_TORQUE)
 
 
 def difference_from_dual(case: Case, component: Component) -> float:
@@ -236,7 +243,9 @@ def _slider(family: str) -> tuple[str, list[Verdict]]:
         statement = "greatest S1 to which the iteration converges, beside the least to which the crank turns fully"
         verdicts.append(near(statement, THESIS, reached, min(shifts.values()), 0.5, "in"))
         verdicts += [
-            near(f"greatest S1 at which the crank turns fully; a4 = {a4:g} in", REFERENCE, stated, shifts[a4], 5e-4, "in")
+            near(
+                f"greatest S1 at which the crank turns fully; a4 = {a4:g} in", REFERENCE, stated, shifts[a4], 5e-4, "in"
+            )
             for a4, stated in GREATEST_SHIFTS_IN.items()
         ]
     else:

@@ -180,9 +180,11 @@ def test_directions_are_no_axis_of_the_numbers(size: int) -> None:
         lambda x, y: np.arctan2(x, c) + np.hypot(c, y),
         lambda x, y: np.minimum(x, c) + np.maximum(c, y),
         lambda x, y: stack([x, c, y])[..., 0] if isinstance(x, Dual) else x + 0.0 * c,
-        lambda x, y: dot(stack([x, y, 0.0]), np.outer(c, [1.0, 2.0, 3.0])).real
-        if not isinstance(x, Dual)
-        else dot(stack([x, y, 0.0]), np.outer(c, [1.0, 2.0, 3.0])),
+        lambda x, y: (
+            dot(stack([x, y, 0.0]), np.outer(c, [1.0, 2.0, 3.0])).real
+            if not isinstance(x, Dual)
+            else dot(stack([x, y, 0.0]), np.outer(c, [1.0, 2.0, 3.0]))
+        ),
     ]
     x, y = variables(2.1, 3.2)
     for operation in operations:
@@ -202,7 +204,9 @@ def test_directions_go_through_vectors_and_matrices_without_them() -> None:
     vector = stack([x, y, 0.0])
     for product in (cross(vector, many), cross(many, vector)):
         assert product.dual.shape == (2, 2, 3)
-    np.testing.assert_allclose(cross(vector, many).dual[1], np.cross([0.0, 1.0, 0.0], many.real) + np.cross([0.4, 2.0, 0.0], many.dual))
+    np.testing.assert_allclose(
+        cross(vector, many).dual[1], np.cross([0.0, 1.0, 0.0], many.real) + np.cross([0.4, 2.0, 0.0], many.dual)
+    )
     turned = apply(about_k(x), many)
     c, s = np.cos(0.4), np.sin(0.4)
     rate = np.array([[-s, -c, 0.0], [c, -s, 0.0], [0.0, 0.0, 0.0]])

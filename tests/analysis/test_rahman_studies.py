@@ -27,6 +27,7 @@ from ..published_rahman import (
     MASSES_LB_S2_IN,
     POUND_FORCE,
     ROD_IN,
+    ROD_RADIUS_IN,
     SPEED_RPM,
     SPOTS,
     STROKES_BY_TWIST_IN,
@@ -261,6 +262,24 @@ def rod_axes(case: Case) -> tuple[FloatArray, FloatArray, FloatArray]:
     return u, across, np.cross(u.T, across.T).T
 
 
+def pin_force(case: Case) -> FloatArray:
+    """Force of the crank on the rod (3, n) in frame 1, with the torque given.
+
+    Force R at the crank pin, P at the slider pin: R + P = m2 a, and about the rod's middle, for a rod along u without spin,
+    u x (P - R) a2/2 = I u x u''. So R = (m2 a - 2 I u''/a2)/2 + l u, and l from the torque: R along the crank's turn is T/a1.
+    """
+    u, _, _ = rod_axes(case)
+    twist = np.radians(case.twist_deg)
+    pin = -CRANK_IN * W * W * np.stack([C, S, 0.0 * C])
+    end = second_difference(case) * np.array([[0.0], [-np.sin(twist)], [-np.cos(twist)]])
+    mass = MASSES_LB_S2_IN[1]
+    inertia = mass * (ROD_RADIUS_IN**2 / 4.0 + ROD_IN**2 / 12.0)
+    across = 0.5 * (mass * 0.5 * (pin + end) - 2.0 * inertia / ROD_IN * (end - pin) / ROD_IN)
+    turning = np.stack([-S, C, 0.0 * C])
+    along = (TORQUE_LB_IN / CRANK_IN - (across * turning).sum(axis=0)) / (u * turning).sum(axis=0)
+    return across + along * u
+
+
 class TestStatements:
     """What section 3.2 states of the forces."""
 
@@ -305,6 +324,26 @@ class TestStatements:
             ]
             assert verdict.computed == pytest.approx(np.abs(printed).max(), abs=1e-9)
             assert verdict.holds == (case == TWISTS[1])
+
+    @pytest.mark.parametrize(
+        ("axis", "case", "stated"),
+        [("i", OFFSETS[0], 49.0), ("i", TWISTS[2], 302.0), ("j", OFFSETS[1], 18.0), ("j", TWISTS[2], 201.0)],
+        ids=["i-offset", "i-twist", "j-offset", "j-twist"],
+    )
+    def test_sizes_of_what_the_bearing_moments_lack(self, axis: str, case: Case, stated: float) -> None:
+        """The sizes in errata 13 and 14 are ours: here from a derivation of the pin force without the plant."""
+        on_rod = pin_force(case)
+        # the crank's centre of mass has no acceleration along the axis
+        axial = on_rod[2]
+        left_out = {"i": axial * CRANK_IN * S, "j": -axial * CRANK_IN * C}[axis][clear(case)]
+        assert np.abs(left_out).max() == pytest.approx(stated, abs=0.5)
+        symbol = f"1T1{axis}"
+        (verdict,) = [
+            v
+            for v in verdicts(figure_of(symbol, case), f"greatest magnitude of {symbol} - (")
+            if v.source == THESIS and v.statement.endswith(case.name)
+        ]
+        assert verdict.computed == pytest.approx(np.abs(left_out).max(), rel=1e-5)
 
     @pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)
     def test_spikes_are_at_the_dead_centres(self, case: Case) -> None:

@@ -34,9 +34,10 @@ from tests.published_rahman import (
 )
 from tests.slider_cranks import Case, cases, seeded
 
-several = settings(max_examples=60, derandomize=True, deadline=None)
+several = settings(max_examples=40, derandomize=True, deadline=None)
 every_case = pytest.mark.parametrize(("offset", "twist"), list(product(OFFSETS_IN, TWISTS_DEG)))
 TURN = np.radians(np.arange(0.0, 360.0, 10.0))
+COARSE = TURN[::3]
 FORCES = ("bearing", "axial", "crank_pin", "slider_pin", "guide", "slider_force")
 MOMENTS = ("bearing_moment", "guide_moment", "torque")
 
@@ -71,8 +72,8 @@ def test_agrees_with_vector_mechanics_in_all_cases_of_the_thesis_with_the_load_g
 ) -> None:
     for shift, branch in product(SHIFTS_IN, (1, -1)):
         p = replace(parameters(offset, twist), assembly_branch=branch)
-        found = joint_loads(close(p, TURN, shift * INCH), speed=CRANK_SPEED, slider_force=20.0)
-        expected = [plant(p, (th, shift * INCH, CRANK_SPEED, 0.0, 0.0, 0.0), 0.0, 0.0, 20.0) for th in TURN]
+        found = joint_loads(close(p, COARSE, shift * INCH), speed=CRANK_SPEED, slider_force=20.0)
+        expected = [plant(p, (th, shift * INCH, CRANK_SPEED, 0.0, 0.0, 0.0), 0.0, 0.0, 20.0) for th in COARSE]
         assert_same(found, expected, 1e-9)
         assert np.abs(found.residual).max() < 1e-9 * np.abs(found.bearing_moment).max()
 
@@ -86,7 +87,7 @@ def test_agrees_with_vector_mechanics_in_all_cases_of_the_thesis_with_the_torque
         p = replace(parameters(offset, twist), assembly_branch=branch)
         clear = [
             th
-            for th in TURN
+            for th in COARSE
             if abs(kinematics.coefficients(kinematics.position(th, shift * INCH, p.constants()), p.constants()).kth)
             > 0.02 * p.crank_length
         ]
