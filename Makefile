@@ -12,7 +12,7 @@ demo: $(READY)
 
 test: $(READY) lint
 	$(BIN)/python build_fmu.py
-	$(BIN)/python -m pytest
+	$(BIN)/python -m pytest --numprocesses auto --dist loadfile
 
 lint: $(READY)
 	$(BIN)/ruff check .
