@@ -12,7 +12,8 @@ demo: $(READY)
 
 test: $(READY) lint
 	$(BIN)/python build_fmu.py
-	$(BIN)/python -m pytest --numprocesses auto --dist loadfile
+	# the file that takes longest goes first, lest one core wait for it at the end
+	$(BIN)/python -m pytest --numprocesses auto --dist loadfile tests/test_docs.py tests
 
 lint: $(READY)
 	$(BIN)/ruff check .

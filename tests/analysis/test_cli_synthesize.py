@@ -271,7 +271,10 @@ def test_a_solution_with_a_defect_is_told(linkwork, tmp_path, monkeypatch) -> No
         (ELLIPSE + 'weights = [{ from = "4 deg", to = "50 deg" }]', "task.weights[0].weight is missing"),
         (ELLIPSE + 'rotation = { from = "0 deg" }', "task.rotation.to is missing"),
         ('[task]\nkind = "timed-path"\npoints = [[0, 0], [0, 0], [1, 1]]', "points 0 and 1 are the same"),
-        ('[task]\nkind = "timed-path"\npoints = [[0, 0], [nan, 0], [1, 1]]', "task.points[1] is nan: it must be a finite number"),
+        (
+            '[task]\nkind = "timed-path"\npoints = [[0, 0], [nan, 0], [1, 1]]',
+            "points[1] is nan: it must be a finite number",
+        ),
         ('[task]\nkind = "timed-path"\npoints = []', "0 are too few"),
         ('[task]\nkind = "timed-path"\npoints = [["1", 0], [1, 1]]', "come with its unit"),
         ('[task]\nkind = "untimed-path"\nfile = "none.svg"', "none.svg cannot be read"),
