@@ -198,19 +198,29 @@ def _(drive, axial, torque, acceleration, force, load, last, rate, p):  # type: 
     return _equations(p).applied
 
 
+def _reader(kind):  # type: ignore[no-untyped-def]
+    """A function that reads a NamedTuple of floats from a row that begins with them."""
+    size = len(kind._fields)
+
+    @njit(error_model="numpy")
+    def read(row):  # type: ignore[no-untyped-def]
+        return kind(*to_fixed_tuple(row, size))
+
+    return read
+
+
+#: Constants of the five-bar from a row of them.
+constants = _reader(FiveBarConstants)
+
+
 def _restored(row, p):  # type: ignore[no-untyped-def]
     """The inputs of the mechanism that the constants belong to, from a row that begins with them."""
 
 
 @overload(_restored, strict=False)
 def _(row, p):  # type: ignore[no-untyped-def]
-    inputs = _equations(p).Inputs
-    size = len(inputs._fields)
-
-    def restore(row, p):  # type: ignore[no-untyped-def]
-        return inputs(*to_fixed_tuple(row, size))
-
-    return restore
+    read = _reader(_equations(p).Inputs)
+    return lambda row, p: read(row)
 
 
 def _constants(row, p):  # type: ignore[no-untyped-def]
@@ -219,13 +229,8 @@ def _constants(row, p):  # type: ignore[no-untyped-def]
 
 @overload(_constants, strict=False)
 def _(row, p):  # type: ignore[no-untyped-def]
-    constants = p.instance_class
-    size = len(constants._fields)
-
-    def read(row, p):  # type: ignore[no-untyped-def]
-        return constants(*to_fixed_tuple(row, size))
-
-    return read
+    read = _reader(p.instance_class)
+    return lambda row, p: read(row)
 
 
 # DOP853: the weights of stage s are WEIGHT[ROW[s]:ROW[s + 1]], those of the stages FROM
@@ -239,7 +244,6 @@ _D = np.array(tableau.D)
 STAGES = tableau.STAGES
 EXPONENT = -1.0 / tableau.ORDER
 _N = 6
-_N_CONSTANTS = len(FiveBarConstants._fields)
 
 _FOLDER = str(cache_folder())
 
@@ -932,9 +936,3 @@ def solver(p: NamedTuple) -> Solver:
 
 
 _solver = cache(Solver)
-
-
-@njit(error_model="numpy")
-def constants(row):  # type: ignore[no-untyped-def]
-    """Constants of the five-bar from a row of them."""
-    return FiveBarConstants(*to_fixed_tuple(row, _N_CONSTANTS))

@@ -7,7 +7,7 @@ import threading
 import time as clock
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import lru_cache
 from itertools import chain
 from math import isfinite
@@ -419,6 +419,11 @@ class _Run:
     tolerance: float
     events: tuple[Event, ...]
     max_steps: int
+    p: Any = field(init=False)
+
+    def __post_init__(self) -> None:
+        # the equations' constants, once: with one of SciPy's methods every right-hand side asks for them
+        self.p = self.parameters.constants()
 
     def start(self) -> tuple[NDArray[np.float64], float, NDArray[np.float64]]:
         """State at the start, mechanical energy there, and the error scale.
@@ -430,7 +435,7 @@ class _Run:
         InputError
             If a commanded speed is not a finite number.
         """
-        p = self.parameters.constants()
+        p = self.p
         x = np.array([*self.mechanism.state(self.initial), 0.0, 0.0])
         values = channels(self.encoded, float(self.times[0]), False, x, self.encoded.law)
         if self.inputs.speed_drive:
@@ -447,15 +452,14 @@ class _Run:
         """The channels as the inputs of the equations."""
         torque, _, acceleration, force, load, last, rate = values
         drive, axial = float(self.inputs.speed_drive), float(self.inputs.axial_mode)
-        p = self.parameters.constants()
-        return self.mechanism.dynamics.applied(drive, axial, torque, acceleration, force, load, last, rate, p)
+        return self.mechanism.dynamics.applied(drive, axial, torque, acceleration, force, load, last, rate, self.p)
 
     @property
     def solver(self) -> Any:
         """The compiled code for the mechanism."""
         from . import compiled
 
-        return compiled.solver(self.parameters.constants())
+        return compiled.solver(self.p)
 
     @property
     def n_inputs(self) -> int:
@@ -466,7 +470,7 @@ class _Run:
         from . import compiled as k
 
         begun = clock.perf_counter()
-        p = self.parameters.constants()
+        p = self.p
         x, energy, scale = self.start()
         source, kept = compiled_source(self.encoded)
         watch, addresses, watching = self._watch()
@@ -557,7 +561,7 @@ class _Run:
                 march.run(method, options, show if progress else None)
             except KeyboardInterrupt:
                 interrupted = True
-        p = self.parameters.constants()
+        p = self.p
         names, dynamics = self.mechanism.output_names, self.mechanism.dynamics
         rows = march.rows
         if rows and rows[-1][0] < march.t:
@@ -590,7 +594,7 @@ class _March:
 
         self.run_ = run
         self.dynamics = run.mechanism.dynamics
-        self.p = run.parameters.constants()
+        self.p = run.p
         self.x, self.energy, self.scale = run.start()
         self.law = run.encoded.law.copy()
         self.t = float(run.times[0])
@@ -1000,7 +1004,7 @@ def _run_batch(runs: Sequence[_Run]) -> tuple[Any, ...]:
     status = np.empty(m, dtype=np.int64)
     first = runs[0]
     first.solver.run_many(
-        first.parameters.constants(), np.array([run.parameters.constants() for run in runs]), starts, energies,
+        first.p, np.array([run.p for run in runs]), starts, energies,
         first.times[-1], first.inputs.speed_drive, float(first.inputs.axial_mode), first.hold,
         np.array([e.steady for e in encoded]), sizes, breaks, coefficients, harmonics, np.array([e.law for e in encoded]),
         source.functions, first.tolerance, scales, first.times, states, forces, carries, status, first.max_steps,

@@ -7,7 +7,6 @@ state drawn and, with room, where the groove would have the crank.
 
 from __future__ import annotations
 
-import random
 from collections.abc import Callable
 from math import cos, hypot, pi, sin, sqrt
 from typing import NamedTuple
@@ -16,6 +15,7 @@ from hypothesis import strategies as st
 
 from linkwork.slider_crank import dynamics
 from linkwork.slider_crank.parameters import Constants, InitialState, SliderCrankParameters
+from tests.strategies import Uniform, drawn, of_seed
 
 #: What drives crank and shift: speed_drive, shift_drive, groove of `dynamics.Inputs`.
 DRIVES = {
@@ -26,8 +26,6 @@ DRIVES = {
     "speed-shift": (1.0, 1.0, 0.0),
     "speed-groove": (1.0, 0.0, 1.0),
 }
-
-Uniform = Callable[[float, float], float]
 
 
 class Case(NamedTuple):
@@ -136,18 +134,13 @@ def draw(uniform: Uniform, choose: Callable[[], bool]) -> Case:
 
 
 def seeded(seed: int) -> Case:
-    """The case of a seed, the same on every machine."""
-    source = random.Random(seed)
-    return draw(source.uniform, lambda: source.random() < 0.5)
+    """The case of a seed."""
+    return of_seed(draw, seed)
 
 
-@st.composite
-def cases(draw_from: st.DrawFn) -> Case:
+def cases() -> st.SearchStrategy[Case]:
     """Hypothesis strategy of `Case`."""
-    return draw(
-        lambda low, high: draw_from(st.floats(low, high, allow_subnormal=False)),
-        lambda: draw_from(st.booleans()),
-    )
+    return drawn(draw)
 
 
 def mechanisms() -> st.SearchStrategy[SliderCrankParameters]:

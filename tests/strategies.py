@@ -10,7 +10,7 @@ from __future__ import annotations
 import random
 from collections.abc import Callable
 from math import asin, cos, hypot, pi, sin, sqrt
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 from hypothesis import strategies as st
 
@@ -20,7 +20,10 @@ from linkwork.five_bar.parameters import FiveBarParameters, InitialState
 #: Least |sin(rocker angle - coupler angle)| of the states drawn.
 LEAST_SINE = 0.1
 
+T = TypeVar("T")
 Uniform = Callable[[float, float], float]
+#: A description of something random, over the two sources of numbers and of choices.
+Draw = Callable[[Uniform, Callable[[], bool]], T]
 
 
 class Case(NamedTuple):
@@ -101,19 +104,29 @@ def draw(uniform: Uniform, choose: Callable[[], bool]) -> Case:
     )
 
 
-def seeded(seed: int) -> Case:
-    """The case of a seed, the same on every machine."""
+def of_seed(draw: Draw[T], seed: int) -> T:
+    """What ``draw`` makes of a seed, the same on every machine."""
     source = random.Random(seed)
     return draw(source.uniform, lambda: source.random() < 0.5)
 
 
 @st.composite
-def cases(draw_from: st.DrawFn) -> Case:
-    """Hypothesis strategy of `Case`."""
+def drawn(draw_from: st.DrawFn, draw: Draw[T]) -> T:
+    """Hypothesis strategy of what ``draw`` makes."""
     return draw(
         lambda low, high: draw_from(st.floats(low, high, allow_subnormal=False)),
         lambda: draw_from(st.booleans()),
     )
+
+
+def seeded(seed: int) -> Case:
+    """The case of a seed."""
+    return of_seed(draw, seed)
+
+
+def cases() -> st.SearchStrategy[Case]:
+    """Hypothesis strategy of `Case`."""
+    return drawn(draw)
 
 
 def mechanisms() -> st.SearchStrategy[FiveBarParameters]:

@@ -20,7 +20,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 from math import cos, pi, sqrt
-from types import FunctionType, SimpleNamespace
+from types import SimpleNamespace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,6 +28,7 @@ from scipy.optimize import Bounds, NonlinearConstraint, OptimizeResult, differen
 
 from linkwork.five_bar import kinematics
 
+from ..tracing import rebound
 from .constraints import UNKNOWNS, Limits, Require
 from .polish import Polished, effective_cores, over_cores, quality_of
 from .program import TURNING, Answer, Start, half_planes, physical
@@ -56,10 +57,7 @@ NO_VALUE = 1e3
 EVALUATIONS = 600
 
 #: The plant's loop closure over arrays, its square root zero where the links cannot be joined.
-_joined = FunctionType(
-    kinematics.joined.__code__,
-    {"sqrt": lambda square: np.sqrt(np.maximum(square, 0.0)), "Position": kinematics.Position},
-)
+_joined = rebound((kinematics,), {"sqrt": lambda square: np.sqrt(np.maximum(square, 0.0))}).joined
 
 
 def by_differential_evolution(

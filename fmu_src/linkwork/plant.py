@@ -6,6 +6,7 @@ brings its parameters, its equations and its limit of assembly.
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import asdict
 from math import isfinite, ulp
 from typing import Any, ClassVar, NamedTuple, Self
@@ -139,8 +140,8 @@ class MechanismPlant:
         """The inputs in force as the equations read them."""
         raise NotImplementedError
 
-    def _jumped(self, x: Vector, commands: set[str]) -> Vector:
-        """The state with the commanded speeds applied, of those inputs."""
+    def _jumped(self, x: Vector, inputs: Any, commands: Collection[str]) -> Vector:
+        """The state with the commanded speeds applied, of those ``commands``."""
         raise NotImplementedError
 
     def _derivative(self, x: Vector, inputs: Any) -> Vector:
@@ -185,7 +186,8 @@ class MechanismPlant:
             If an input is not finite, or so large that an output is not.
         """
         self._check_inputs()
-        result = self._outputs(self._jumped(self.state, self._commanded), self._inputs())
+        i = self._inputs()
+        result = self._outputs(self._jumped(self.state, i, self._commanded), i)
         if not all(map(isfinite, result)):
             largest = max(self.inputs, key=lambda name: abs(self.inputs[name]))
             raise InputError(
@@ -223,7 +225,7 @@ class MechanismPlant:
         self._check_inputs()
         i = self._inputs()
         # a commanded speed that was not set again: the step starts from it all the same, as the contract says
-        x = self._jumped(self.state, set(self.COMMANDS))
+        x = self._jumped(self.state, i, self.COMMANDS)
         last = x
 
         def accept(y: Vector) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from math import asin, degrees
 from typing import ClassVar
 
@@ -129,7 +130,7 @@ class Plant(MechanismPlant):
         torque, acceleration, force = i["drive.torque"], i["drive.acceleration"], i["slider.force"]
         return dynamics.applied(drive, 0.0, torque, acceleration, force, i["load.fx"], i["load.fy"], 0.0, self._p)
 
-    def _jumped(self, x: Vector, commands: set[str]) -> Vector:
+    def _jumped(self, x: Vector, inputs: dynamics.Inputs, commands: Collection[str]) -> Vector:
         if self.drive_mode == SPEED_DRIVE and commands:
             return dynamics.jump_speed(x, self.inputs["drive.speed"], self._p)  # type: ignore[arg-type]
         return x

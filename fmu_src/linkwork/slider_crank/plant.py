@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from math import degrees
 from typing import ClassVar
 
@@ -123,14 +124,13 @@ class Plant(MechanismPlant):
             self._p,
         )
 
-    def _jumped(self, x: Vector, commands: set[str]) -> Vector:
-        i = self._inputs()
-        if not (commands and (i.speed_drive or i.shift_drive)):
+    def _jumped(self, x: Vector, inputs: dynamics.Inputs, commands: Collection[str]) -> Vector:
+        if not (commands and (inputs.speed_drive or inputs.shift_drive)):
             return x
         # a freedom that is driven and not commanded anew goes on as it goes
         speed = self.inputs["drive.speed"] if "drive.speed" in commands else x[2]
         shifting = self.inputs["axial.speed"] if "axial.speed" in commands else x[3]
-        return dynamics.jump(x, i, speed, shifting, self._p)  # type: ignore[arg-type]
+        return dynamics.jump(x, inputs, speed, shifting, self._p)  # type: ignore[arg-type]
 
     def _derivative(self, x: Vector, inputs: dynamics.Inputs) -> Vector:
         return dynamics.derivative(x, inputs, self._p)  # type: ignore[arg-type]
