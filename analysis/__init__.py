@@ -10,8 +10,8 @@
 
 from __future__ import annotations
 
-from .cosimulate import Comparison, CosimulationError, FmuRun, OutputDifference, compare, cosimulate
-from .inputs import (
+from .run.cosimulate import Comparison, CosimulationError, FmuRun, OutputDifference, compare, cosimulate
+from .run.inputs import (
     Function,
     Harmonics,
     InductionMotor,
@@ -23,8 +23,8 @@ from .inputs import (
     steps,
     table,
 )
-from .simulate import Ensemble, Event, RunInterrupted, sample_times, simulate, simulate_many
-from .trajectory import Occurrence, Trajectory
+from .run.simulate import Ensemble, Event, RunInterrupted, sample_times, simulate, simulate_many
+from .run.trajectory import Occurrence, Trajectory
 
 __all__ = [
     "Comparison",

@@ -20,8 +20,8 @@ from rich.table import Table
 from scipy.integrate import solve_ivp
 
 import build_fmu
-from analysis import compiled, simulate
-from analysis.inputs import SliderCrankInputs
+from analysis.run import compiled, simulate
+from analysis.run.inputs import SliderCrankInputs
 from analysis.slider_crank.closure import close
 from analysis.slider_crank.dual_dynamics import joint_loads
 from analysis.slider_crank.forces import ConstantShift, force_turn

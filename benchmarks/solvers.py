@@ -20,12 +20,13 @@ from rich.console import Console
 from rich.table import Table
 from scipy.integrate import solve_ivp
 
-from analysis import Inputs, TorsionBar, compiled, simulate
-from analysis.multipliers import SpeedDrive, simulate_redundant
+from analysis import Inputs, TorsionBar
+from analysis.run import compiled, simulate
 from benchmarks import engines
 from benchmarks.engines import ACCURACY, CASES, Case, relative_error
 from linkwork.five_bar import dynamics
 from linkwork.five_bar.parameters import InitialState
+from tests.oracles.multipliers import SpeedDrive, simulate_redundant
 
 TOLERANCES = 10.0 ** np.arange(-3.0, -11.0, -0.1)
 REPEATS = 7

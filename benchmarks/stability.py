@@ -22,9 +22,9 @@ from rich.console import Console
 from rich.table import Table
 from scipy.integrate import solve_ivp
 
-from analysis.grids import grid
-from analysis.orbits import INTEGRATOR_TOLERANCE, ORBIT_TOLERANCE, Drive
-from analysis.planes import Plane, plane
+from analysis.periodic.grids import grid
+from analysis.periodic.orbits import INTEGRATOR_TOLERANCE, ORBIT_TOLERANCE, Drive
+from analysis.periodic.planes import Plane, plane
 from linkwork.five_bar import dynamics
 from linkwork.five_bar.parameters import FiveBarParameters
 from linkwork.five_bar.published import RAD_S_PER_RPM, SETS

@@ -10,7 +10,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from textwrap import fill
 
-from analysis.mechanism import FIVE_BAR, SLIDER_CRANK, Mechanism
+from analysis.mechanisms import FIVE_BAR, SLIDER_CRANK, Mechanism
 from linkwork.parameters import field_name
 from linkwork.variables import Variable
 
@@ -300,8 +300,8 @@ RIG_2 = {"rig-2-approximations.png": "8.18", "rig-2-harmonics.png": "8.20", "rig
 
 def rig_2_pictures() -> None:
     """Draw the pictures of docs/rig-2.md."""
-    from analysis.io import save_figure
-    from analysis.resonance import approximations, frequency_response
+    from analysis.files.io import save_figure
+    from analysis.periodic.resonance import approximations, frequency_response
     from analysis.studies import load
     from linkwork.five_bar.published import RAD_S_PER_RPM, SETS
 
@@ -319,9 +319,9 @@ def hand_drawn_pictures() -> None:
     import numpy as np
 
     from analysis.cli.slider import drive_figure
-    from analysis.control.cases import load_slider_case
     from analysis.figures import Curve, Panel, plot_curves
-    from analysis.io import save_figure
+    from analysis.files.io import save_figure
+    from analysis.motion.cases import load_slider_case
     from analysis.synthesis import TargetPath
     from analysis.synthesis.cases import load_synthesis_case
 
@@ -363,7 +363,7 @@ def slider_crank_pictures() -> None:
 
     from analysis.figures.slider_crank import plot_tolerances
     from analysis.figures.slider_crank_picture import plot_mechanism, plot_range
-    from analysis.io import save_figure
+    from analysis.files.io import save_figure
     from analysis.slider_crank.forces import force_turn
     from analysis.slider_crank.tolerances import Tolerance, monte_carlo
     from linkwork.slider_crank.published import CRANK_SPEED, INCH, SETS, parameters
@@ -389,7 +389,7 @@ def slider_crank_pictures() -> None:
 def main(arguments: list[str]) -> int:
     """Write what is asked for."""
     if "--figures" in arguments:
-        from analysis.io import save_figure
+        from analysis.files.io import save_figure
         from analysis.studies import load
 
         (HERE / "youssef-figures.md").write_text(youssef_figures(), encoding="utf-8")

@@ -19,8 +19,8 @@ import numpy as np
 
 from analysis import figures
 from analysis.figures import Curve, Panel
-from analysis.linearise import PeriodicModel, find_equilibria, linearise, linearise_along, settled_motion
-from analysis.slider_control import (
+from analysis.linear.linearise import PeriodicModel, find_equilibria, linearise, linearise_along, settled_motion
+from analysis.linear.slider_control import (
     LoopResult,
     SampledController,
     SliderDesign,

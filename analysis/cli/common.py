@@ -80,14 +80,14 @@ def changes(settings: Sequence[str], read: Callable[[str], Any], example: str) -
 def prepare_solver(*parameters: Any, orbits: bool = False) -> None:
     """Load the compiled equations of these mechanisms, and say why it takes so long where they are compiled first."""
     with console.status("preparing the solver: a mechanism's equations are compiled once, in about half a minute"):
-        from .. import compiled
+        from ..run import compiled
 
         for p in parameters:
             solver = compiled.solver(p.constants())
             for kernel in ("run", "outputs"):
                 getattr(solver, kernel)
         if orbits:
-            from .. import orbit_kernels  # noqa: F401
+            from ..periodic import orbit_kernels  # noqa: F401
 
 
 def five_bar_case(file: str | None, published: str | None, settings: Sequence[str]) -> Any:
@@ -98,7 +98,7 @@ def five_bar_case(file: str | None, published: str | None, settings: Sequence[st
     InputError
         If it is another mechanism's.
     """
-    from ..mechanism import FIVE_BAR, mechanism_of
+    from ..mechanisms import FIVE_BAR, mechanism_of
 
     case = chosen_case(file, published, settings)
     mechanism = mechanism_of(case.parameters)
@@ -110,8 +110,8 @@ def five_bar_case(file: str | None, published: str | None, settings: Sequence[st
 
 
 def chosen_case(file: str | None, published: str | None, settings: Sequence[str]) -> Any:
-    from .. import io
-    from ..case import published_case
+    from ..files import io
+    from ..run.case import published_case
 
     if (file is None) == (published is None):
         raise click.UsageError("give either a case file or --published NAME")

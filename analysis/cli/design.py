@@ -85,7 +85,7 @@ def show_best(solution: Any) -> None:
 
 def write_described(solution: Any, folder: Path, title: str, *, curve: str, report: str, drawing: str) -> list[Path]:
     """The curve of a solution, its report, and its drawing as DXF and SVG, under these names; what was written."""
-    from .. import io
+    from ..files import io
 
     told = folder / f"{report}.txt"
     written = [solution.to_csv(folder / f"{curve}.csv"), told]
@@ -96,7 +96,7 @@ def write_described(solution: Any, folder: Path, title: str, *, curve: str, repo
 
 def write_solution(solution: Any, folder: Path, title: str, *, make: Any, plots: bool, animate: bool) -> list[Path]:
     """Everything about one solution: drawing, curve, report, parameters and a case that runs; what was written."""
-    from .. import io
+    from ..files import io
     from ..synthesis.linkage import SecondCrank
 
     written = write_described(solution, folder, title, curve="best-curve", report="best-report", drawing="best")
@@ -152,7 +152,7 @@ def synthesize(
       linkwork synthesize examples/hand-drawn.toml --out hand-drawn --animate
       linkwork synthesize examples/ellipse.toml --set constraints.largest_link='300 mm' --set task.n=36
     """
-    from .. import io
+    from ..files import io
     from ..synthesis import SynthesisInterrupted, TradeOffInterrupted
     from ..synthesis.cases import load_synthesis_case
 
@@ -200,7 +200,7 @@ def synthesize(
 
 
 def _trade_off(traded: Any, title: str, folder: Path, plots: bool) -> None:
-    from .. import io
+    from ..files import io
     from ..synthesis.report import error_unit, limit_told, quality_name, quality_unit
 
     there = [s for s in traded.solutions if s is not None]

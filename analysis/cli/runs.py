@@ -17,8 +17,8 @@ from linkwork.five_bar.kinematics import assembly_square
 from linkwork.five_bar.published import RAD_S_PER_RPM
 from linkwork.parameters import field_name
 
-from ..case import PUBLISHED
-from ..mechanism import FIVE_BAR, mechanism_of
+from ..mechanisms import FIVE_BAR, mechanism_of
+from ..run.case import PUBLISHED
 from .common import (
     CHECK_FAILED,
     ENDED_EARLY,
@@ -111,9 +111,9 @@ def run(
       linkwork run --published rig-1-spring-a --set slider.coulomb_friction='5 N'
       linkwork run examples/torsion-bar.toml --fmu build/FiveBarSlider.fmu --out results
     """
-    from .. import io
-    from ..cosimulate import cosimulate
-    from ..simulate import RunInterrupted, simulate
+    from ..files import io
+    from ..run.cosimulate import cosimulate
+    from ..run.simulate import RunInterrupted, simulate
 
     chosen = chosen_case(case, published, settings)
     if fmu is not None and method != "compiled":
@@ -218,9 +218,10 @@ def check(
       linkwork check --method compiled --method Radau
       linkwork check speed-jump examples/torsion-bar.toml
     """
-    from .. import figures, io
-    from ..checks import CASES
-    from ..checks import check as compare_case
+    from .. import figures
+    from ..files import io
+    from ..run.checks import CASES
+    from ..run.checks import check as compare_case
 
     # of an FMU that is named, its own mechanism's
     wanted = None if fmu is None else _model_name(Path(fmu))
@@ -311,7 +312,7 @@ def info(what: str | None) -> None:
       linkwork info table-3.1
       linkwork info build/FiveBarSlider.fmu
     """
-    from .. import io
+    from ..files import io
 
     if what is None:
         grid = Table(title="published sets")
@@ -333,7 +334,7 @@ def info(what: str | None) -> None:
 
 
 def _cache() -> Path:
-    from ..compiled import cache_folder
+    from ..run.compiled import cache_folder
 
     return cache_folder()
 

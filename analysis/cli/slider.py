@@ -56,7 +56,7 @@ def slider_motion(
       linkwork slider-motion examples/slider-motion.toml
       linkwork slider-motion examples/slider-motion.toml --set slider.stroke='20 mm' --harmonics 3
     """
-    from ..control.cases import load_slider_case
+    from ..motion.cases import load_slider_case
     from ..synthesis.linkage import SecondCrank, SliderMotion
 
     overrides = settings_of(settings)
@@ -89,7 +89,7 @@ def slider_motion(
 
 def _strategy(chosen: Any) -> tuple[Any, Interrupted | None]:
     """The simplest mechanism that will do; and what stopped the search, if anything did."""
-    from ..control import StrategyInterrupted
+    from ..motion import StrategyInterrupted
 
     stopped = None
     try:
@@ -138,7 +138,7 @@ def _moved(chosen: Any) -> tuple[Any, Interrupted | None]:
 
 def _show(title: str, solutions: Sequence[Any]) -> None:
     """The fixed pivot and the motions, a row each, in mm and degrees."""
-    from ..control.motion import greatest
+    from ..motion.motion import greatest
     from ..synthesis.linkage import SliderMotion
     from ..synthesis.report import degrees_told, error_unit, quality_name, quality_unit
 
@@ -179,7 +179,7 @@ def _show(title: str, solutions: Sequence[Any]) -> None:
 
 
 def _write_solution(solution: Any, folder: Path, title: str, plots: bool) -> list[Path]:
-    from .. import io
+    from ..files import io
 
     written = write_described(solution, folder, title, curve="curve", report="report", drawing="linkage")
     if plots:
@@ -197,7 +197,7 @@ def _motion_columns(linkage: Any, rotation: Any) -> dict[str, Any]:
 
 
 def _write_motion(solution: Any, folder: Path) -> Path:
-    from .. import io
+    from ..files import io
 
     turn = np.linspace(0.0, 2.0 * np.pi, 720, endpoint=False)
     return io.write_csv(folder / "motion.csv", _motion_columns(solution.linkage, turn))
@@ -208,8 +208,8 @@ def _write_motion(solution: Any, folder: Path) -> Path:
 
 def _dynamics(chosen: Any, solution: Any, folder: Path, plots: bool) -> list[Path]:
     """Force, torque and pin forces; a case that runs; then the run under control and the least effort, where asked for."""
-    from .. import io
-    from ..control.cases import run_case
+    from ..files import io
+    from ..motion.cases import run_case
 
     title = chosen.synthesis.title
     drive = chosen.driven(solution)
@@ -285,8 +285,8 @@ def drive_figure(title: str, drive: Any) -> Any:
 
 
 def _tracking(chosen: Any, drive: Any, folder: Path, plots: bool) -> list[Path]:
-    from .. import io
     from ..figures import Curve, Panel, plot_curves
+    from ..files import io
 
     run = chosen.tracked(drive)
     if run.loop.status:
@@ -336,8 +336,8 @@ def _tracking(chosen: Any, drive: Any, folder: Path, plots: bool) -> list[Path]:
 
 
 def _effort(chosen: Any, drive: Any, linkage: Any, folder: Path, plots: bool) -> list[Path]:
-    from .. import io
     from ..figures import Curve, Panel, plot_curves
+    from ..files import io
     from ..synthesis import RockerFunction
 
     with console.status("least effort"):

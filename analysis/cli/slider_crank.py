@@ -16,10 +16,11 @@ from rich.markup import escape
 from rich.table import Table
 
 from linkwork.errors import InputError
-from linkwork.slider_crank import mobility
 from linkwork.slider_crank.parameters import SliderCrankParameters
+from linkwork.slider_crank.plant import check_assembly
 from linkwork.slider_crank.published import RAD_S_PER_RPM, SETS, PublishedSet
 
+from ..slider_crank import mobility
 from .common import CHECK_FAILED, changes, console, errors, handled, number_or_text, tolerance_option
 from .design import wrote
 
@@ -142,7 +143,7 @@ def _chosen(
     LinkworkError
         If a file, a name or a value is wrong.
     """
-    from .. import io
+    from ..files import io
 
     if file is not None and published is not None:
         raise click.UsageError("give either a file of parameters or --published NAME")
@@ -318,7 +319,7 @@ def info(units: str, **given: Any) -> None:
 
 def _problem(torque: str | None, load: str | None) -> dict[str, float]:
     """What is given: ``torque`` (N.m) or ``load`` (N)."""
-    from .. import io
+    from ..files import io
 
     if torque is not None and load is not None:
         raise click.UsageError("give --torque, and the slider's force is sought, or --load, and the torque is")
@@ -390,8 +391,8 @@ def forces(
       linkwork slider-crank forces --load '-20 lbf' --frame 2 --frame 4
       linkwork slider-crank forces crank.toml --speed '300 rpm' --out results
     """
-    from .. import io
     from ..figures.slider_crank import plot_forces
+    from ..files import io
 
     told = _Units(units)
     chosen = _chosen(told, paced=True, **given)
@@ -554,8 +555,8 @@ def tolerances(
       linkwork slider-crank tolerances --tolerance guide.offset='0.5 mm' --tolerance guide.twist='0.2 deg'
       linkwork slider-crank tolerances --quantity slider.position --quantity crank_pin.fz --load '-20 lbf' --seed 7
     """
-    from .. import io
     from ..figures.slider_crank import plot_tolerances
+    from ..files import io
     from ..slider_crank import tolerances as study
     from ..slider_crank.forces import NO_LEVER
 
@@ -644,7 +645,7 @@ def _ratio(above: str, below: str) -> str:
 
 def _tolerance(text: str, distribution: str) -> Any:
     """A tolerance from NAME=HALF_WIDTH."""
-    from .. import io
+    from ..files import io
     from ..slider_crank.tolerances import ERRORS, Tolerance
 
     name, equals, value = (part.strip() for part in text.partition("="))
@@ -799,7 +800,7 @@ def _dual_table(chosen: _Chosen, problem: Mapping[str, float], points: int, tole
 
 def _two_rotations(chosen: _Chosen, points: int, told: _Units, folder: Path) -> None:
     """Where the thesis's iteration ends over the turn."""
-    from .. import io
+    from ..files import io
     from ..slider_crank.closure import shortage
     from ..slider_crank.two_rotations import settle
 
@@ -808,7 +809,7 @@ def _two_rotations(chosen: _Chosen, points: int, told: _Units, folder: Path) -> 
     reached = shortage(chosen.parameters, angle, shift) < 0.0
     if not reached.any():
         worst = int(np.argmin(shortage(chosen.parameters, angle, shift)))
-        mobility.check_assembly(chosen.parameters, float(angle[worst]), float(shift[worst]))
+        check_assembly(chosen.parameters, float(angle[worst]), float(shift[worst]))
     end = settle(chosen.parameters, angle[reached], shift[reached])
     length = told.name("m")
     columns = {
@@ -869,8 +870,8 @@ def picture(
       linkwork slider-crank picture --published rahman-a4-20-alpha4-310 --animate
       linkwork slider-crank picture --set rod.length='30 in' --offset '20 in' --angle '180 deg' --range
     """
-    from .. import io
     from ..figures import slider_crank_picture as pictures
+    from ..files import io
 
     told = _Units(units)
     chosen = _chosen(told, **given)

@@ -29,14 +29,14 @@ def _cores(context: click.Context, parameter: click.Parameter, value: int) -> in
 
 
 def _quantity(text: str, unit: str, name: str) -> float:
-    from .. import io
+    from ..files import io
 
     return io.quantity(number_or_text(text), unit, name)
 
 
 def _require_range(low: float, high: float, name: str, first: str, last: str) -> None:
     """Refuse a range that is none, in the words of the command line."""
-    from ..branches import told, unit_of
+    from ..periodic.branches import told, unit_of
 
     unit = unit_of(name)
     options = first if first == last else f"{first} and {last}"
@@ -48,7 +48,7 @@ def _require_range(low: float, high: float, name: str, first: str, last: str) ->
 
 def _drive(chosen: Any, speed: str | None) -> Any:
     """What drives the case, its constant forces with it; a speed given takes the place of its drive."""
-    from ..orbits import drive_of
+    from ..periodic.orbits import drive_of
 
     inputs = chosen.inputs
     if speed is not None:
@@ -120,9 +120,9 @@ def resonance(
       linkwork resonance --published rig-1-spring-b --from '100 rpm' --to '1300 rpm'
       linkwork resonance --published table-3.1 --vary slider.stiffness --from '1e5 dyn/cm' --to '2e6 dyn/cm'
     """
-    from .. import io
-    from ..branches import unit_of
-    from ..resonance import ResponseInterrupted, approximations, frequency_response, natural_frequency
+    from ..files import io
+    from ..periodic.branches import unit_of
+    from ..periodic.resonance import ResponseInterrupted, approximations, frequency_response, natural_frequency
 
     chosen = five_bar_case(case, published, settings)
     parameters = chosen.parameters
@@ -275,11 +275,11 @@ def stability(
       linkwork stability --published rig-2-spring-c --x-range '200 rpm' '1500 rpm' --y-range 0 '6e3 dyn.s/cm'
       linkwork stability --published rig-1-spring-a --y slider.stiffness --y-range '1e6 dyn/cm' '5e6 dyn/cm'
     """
-    from .. import io
-    from ..branches import unit_of
-    from ..charts import default_range, stability_chart
-    from ..orbits import orbit_of
-    from ..stability import linear_verdict
+    from ..files import io
+    from ..periodic.branches import unit_of
+    from ..periodic.charts import default_range, stability_chart
+    from ..periodic.orbits import orbit_of
+    from ..periodic.stability import linear_verdict
 
     chosen = five_bar_case(case, published, settings)
     parameters = chosen.parameters

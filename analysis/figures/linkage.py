@@ -24,7 +24,7 @@ from linkwork.five_bar.parameters import FiveBarParameters
 from .style import STYLE, finish
 
 if TYPE_CHECKING:
-    from ..trajectory import Trajectory
+    from ..run.trajectory import Trajectory
 
 #: Colours of the links in drawings.
 CRANK, COUPLER, ROCKER, SLIDER, GROUND, TRACE = "#D55E00", "#0072B2", "#009E73", "#5B6770", "#333333", "#CC79A7"
@@ -274,7 +274,7 @@ def draw_linkage(
         rad, m.
     title : str
     trace : array_like, shape (n, 2), optional
-        A path of P to draw too (m), such as an arc of `analysis.workspace.coupler_curve`.
+        A path of P to draw too (m), such as an arc of `analysis.youssef.workspace.coupler_curve`.
 
     Raises
     ------

@@ -16,7 +16,7 @@ from linkwork.five_bar.published import CM_PER_METRE, RAD_S_PER_RPM
 from .style import COLOURS, STYLE, finish
 
 if TYPE_CHECKING:
-    from ..branches import Branch
+    from ..periodic.branches import Branch
 
 #: Lines of the approximations beside.
 _LINES: tuple[Any, ...] = ("-.", ":", (0, (5, 1)))

@@ -27,11 +27,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from linkwork.errors import AssemblyError, InputError
 from linkwork.slider_crank import kinematics
-from linkwork.slider_crank.mobility import PeriodicShift, Range, check_assembly, constant_shift, greatest_margin, ranges
 from linkwork.slider_crank.parameters import SliderCrankParameters
+from linkwork.slider_crank.plant import check_assembly
 from linkwork.slider_crank.published import INCH
 from linkwork.slider_crank.vectors import Vector
 
+from ..slider_crank.mobility import PeriodicShift, Range, constant_shift, greatest_margin, ranges
 from .linkage import COUPLER, CRANK, GROUND, SLIDER, TRACE
 from .style import COLOURS, STYLE, finish
 

@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 from linkwork.errors import AssemblyError, InputError, LinkworkError
 from linkwork.slider_crank.parameters import SliderCrankParameters
 
-from ..dual import Array, Dual, about_i, about_k, axial, origin, skew, stack
+from ..numerics.dual import Array, Dual, about_i, about_k, axial, origin, skew, stack
 
 FloatArray: TypeAlias = NDArray[np.float64]
 

@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 from linkwork.errors import AssemblyError, InputError, LinkworkError
 from linkwork.slider_crank.parameters import SliderCrankParameters
 
-from ..dual import Dual, about_i, apply, cross, join, stack
+from ..numerics.dual import Dual, about_i, apply, cross, join, stack
 from .closure import Closure, scale
 
 FloatArray: TypeAlias = NDArray[np.float64]

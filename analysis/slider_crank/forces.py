@@ -29,16 +29,16 @@ from scipy.optimize import brentq
 
 from linkwork.errors import AssemblyError, InputError
 from linkwork.limits import LIMIT_SINE
-from linkwork.slider_crank import mobility
 from linkwork.slider_crank.dynamics import Inputs
 from linkwork.slider_crank.kinematics import Position
-from linkwork.slider_crank.mobility import DeadCentre
 from linkwork.slider_crank.parameters import Constants, SliderCrankParameters
 from linkwork.slider_crank.published import INCH, POUND_FORCE, POUND_INCH
 from linkwork.slider_crank.vectors import Vector
 
-from .. import io
+from ..files import io
+from . import mobility
 from .dual_dynamics import DEAD_CENTRE
+from .mobility import DeadCentre
 from .shifts import (
     AngleShift,
     ConstantShift,
@@ -164,7 +164,7 @@ def solve(
     torque: bool,
     groove: bool,
 ) -> Solution:
-    """Solve one of the force problems at configurations that can be assembled, on arrays or dual numbers (`analysis.dual`).
+    """Solve one of the force problems at configurations that can be assembled, on arrays or dual numbers.
 
     Parameters
     ----------

@@ -17,17 +17,18 @@ from numpy.typing import ArrayLike, NDArray
 
 from linkwork import friction
 from linkwork.errors import InputError, ParameterError
-from linkwork.slider_crank import dynamics, kinematics, mobility, vectors
+from linkwork.slider_crank import dynamics, kinematics, vectors
 from linkwork.slider_crank.parameters import Constants, SliderCrankParameters
 
-from ..tracing import rebound
+from ..numerics.tracing import rebound
+from . import mobility
 
 FloatArray: TypeAlias = NDArray[np.float64]
 
 
 @cache
 def on_arrays() -> SimpleNamespace:
-    """The plant's functions by name, for NumPy arrays and for what NumPy's functions work on (`analysis.dual`)."""
+    """The plant's functions by name, for NumPy arrays and for what NumPy's functions work on (`analysis.numerics.dual`)."""
     elementary = {"sin": np.sin, "cos": np.cos, "sqrt": np.sqrt, "atan2": np.arctan2, "tanh": np.tanh}
     return rebound((friction, vectors, kinematics, dynamics), elementary)
 
@@ -48,7 +49,7 @@ class ShiftLaw(Protocol):
         """Shift and its rates by time at crank angles (rad), speeds (rad/s) and accelerations (rad/s2) of one shape."""
 
     def repeating(self, parameters: SliderCrankParameters) -> mobility.PeriodicShift | None:
-        """The law as `linkwork.slider_crank.mobility` takes it; None if it is not known to repeat after whole turns."""
+        """The law as `analysis.slider_crank.mobility` takes it; None if it is not known to repeat after whole turns."""
 
 
 @dataclass(frozen=True, slots=True)

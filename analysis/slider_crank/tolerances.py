@@ -2,7 +2,7 @@
 
 The nominal mechanism and its motion are a `ForceTurn`; an error adds to one of its dimensions, masses or settings while all the
 others, and the motion of the crank, stay. Sensitivities are exact derivatives: the plant's own equations on dual numbers
-(`analysis.dual`). The same equations on arrays of random samples are the Monte Carlo.
+(`analysis.numerics.dual`). The same equations on arrays of random samples are the Monte Carlo.
 
 The linear estimate adds the variances of independent errors, each times the square of its derivative. It fails where the
 derivatives vanish: at the ideal mechanism (S1 = a4 = 0, alpha4 = 270 deg) the slider's position is of the second order in S1
@@ -29,9 +29,9 @@ from linkwork.slider_crank import parameters as parameters_module
 from linkwork.slider_crank import variables
 from linkwork.slider_crank.parameters import Constants, SliderCrankParameters
 
-from ..dual import Dual, dual
-from ..dual import variables as independent
 from ..figures.slider_crank import ToleranceScene
+from ..numerics.dual import Dual, dual
+from ..numerics.dual import variables as independent
 from .dual_dynamics import DEAD_CENTRE
 from .forces import (
     NO_LEVER,

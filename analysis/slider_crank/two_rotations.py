@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 from linkwork.slider_crank.parameters import SliderCrankParameters
 from linkwork.slider_crank.published import INCH
 
-from ..dual import Array, Dual, about_i, about_j, about_k, skew, stack
+from ..numerics.dual import Array, Dual, about_i, about_j, about_k, skew, stack
 from .closure import close, given, residuals
 
 FloatArray: TypeAlias = NDArray[np.float64]

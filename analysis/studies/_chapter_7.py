@@ -14,8 +14,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from linkwork.five_bar.published import CM_PER_METRE
 
-from ..control import slider_motion
 from ..figures import COLOURS, Curve, Panel
+from ..motion import slider_motion
 from ..synthesis import Linkage, SliderMotion, SliderUnknown, Solution, UntimedPath, evaluate, turn
 from ..synthesis.published import PROBLEMS
 from .study import BALANCE, StudyResult, Verdict, at_least, padded

@@ -16,8 +16,8 @@ from scipy.optimize import OptimizeResult, least_squares, minimize_scalar
 
 from linkwork.five_bar.parameters import FiveBarParameters
 
-from ..branches import Branch, Family, follow
-from ..resonance import Response
+from ..periodic.branches import Branch, Family, follow
+from ..periodic.resonance import Response
 from ._orbits import orbit, response
 from ._runs import rig_1
 

@@ -14,11 +14,11 @@ from numpy.typing import NDArray
 from linkwork.five_bar.parameters import FiveBarParameters
 from linkwork.five_bar.published import CM_PER_METRE, RAD_S_PER_RPM
 
-from ..branches import Branch
 from ..figures import Curve
-from ..floquet import Stability
-from ..orbits import PeriodicOrbit, find_orbit
-from ..resonance import Extremum, Response, frequency_response
+from ..periodic.branches import Branch
+from ..periodic.floquet import Stability
+from ..periodic.orbits import PeriodicOrbit, find_orbit
+from ..periodic.resonance import Extremum, Response, frequency_response
 from ._runs import SETTLING_TIME, steady_turn
 from .study import BALANCE, StudyResult, Verdict, at_most
 

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 from linkwork.five_bar.published import RAD_S_PER_RPM
 
 from ..figures import Panel, plot_curves
-from ..resonance import Response, natural_frequency
+from ..periodic.resonance import Response, natural_frequency
 from ._orbits import COARSE, FINE, between, response
 from ._runs import rig_1, steady_turn
 from .study import ASSIGNED, BALANCE, StudyResult, Verdict, at_most, curves_of

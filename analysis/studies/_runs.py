@@ -22,9 +22,9 @@ from linkwork.five_bar.published import (
     SETS,
 )
 
-from ..inputs import Inputs, TorsionBar
-from ..simulate import Event, simulate
-from ..trajectory import Trajectory
+from ..run.inputs import Inputs, TorsionBar
+from ..run.simulate import Event, simulate
+from ..run.trajectory import Trajectory
 
 #: Transmission at which the coupler and the rocker count as collinear: |sin(th4 - th3)|.
 COLLINEAR_SINE = 0.3

@@ -17,8 +17,8 @@ import numpy as np
 from linkwork.five_bar.published import chapter_4
 
 from ..figures import Curve, Panel, plot_curves
-from ..harmonic_balance import resonance
-from ..slider_equation import Variant
+from ..youssef.harmonic_balance import resonance
+from ..youssef.slider_equation import Variant
 from ._chapter_4 import harmonic, name, true_harmonic
 from .study import ASSIGNED, BALANCE, REFERENCE, Study, StudyResult, at_least, at_most, near
 

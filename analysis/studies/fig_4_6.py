@@ -19,8 +19,8 @@ from scipy.optimize import minimize_scalar
 from linkwork.five_bar.published import P45, SQUARE_OF_OMEGA_K, chapter_4
 
 from ..figures import COLOURS, Curve, Panel, plot_curves
-from ..harmonic_balance import resonance
-from ..slider_equation import Variant
+from ..youssef.harmonic_balance import resonance
+from ..youssef.slider_equation import Variant
 from ._chapter_4 import DAMPING, linear, name, true_motion
 from .fig_4_3 import RESONANCES
 from .study import ASSIGNED, BALANCE, REFERENCE, THESIS, Study, StudyResult, at_most, near, padded

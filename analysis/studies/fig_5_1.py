@@ -22,9 +22,9 @@ from linkwork.five_bar.parameters import FiveBarParameters
 from linkwork.five_bar.published import chapter_4
 
 from ..figures import COLOURS, Curve, Panel, plot_curves
-from ..fourier import FourierSeries
-from ..hill import Truncation, perturbed_region
-from ..slider_equation import Variant
+from ..numerics.fourier import FourierSeries
+from ..youssef.hill import Truncation, perturbed_region
+from ..youssef.slider_equation import Variant
 from ._chapter_5 import (
     APPENDIX_3,
     RIGHT,

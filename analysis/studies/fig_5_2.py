@@ -17,7 +17,7 @@ import numpy as np
 from linkwork.five_bar.published import chapter_4
 
 from ..figures import COLOURS, Curve, Panel, plot_curves
-from ..hill import perturbed_removing_damping
+from ..youssef.hill import perturbed_removing_damping
 from ._chapter_5 import (
     crank_speed,
     equation,

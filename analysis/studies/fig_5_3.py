@@ -22,10 +22,10 @@ import numpy as np
 from linkwork.five_bar.parameters import FiveBarParameters
 from linkwork.five_bar.published import chapter_4
 
-from ..boundaries import Box, Chart, chart
 from ..figures import COLOURS, Curve, Panel, plot_curves
-from ..orbits import Drive
-from ..planes import Operation
+from ..numerics.boundaries import Box, Chart, chart
+from ..periodic.orbits import Drive
+from ..periodic.planes import Operation
 from ._chapter_5 import (
     MOTIONS,
     crank_speed,

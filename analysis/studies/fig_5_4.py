@@ -14,11 +14,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..boundaries import Box, Chart, chart
 from ..figures import COLOURS, Curve, HeatMap, Panel, plot_charts
-from ..grids import Grid, grid
-from ..orbits import Drive
-from ..planes import Operation
+from ..numerics.boundaries import Box, Chart, chart
+from ..periodic.grids import Grid, grid
+from ..periodic.orbits import Drive
+from ..periodic.planes import Operation
 from ._chapter_5 import (
     MOTIONS,
     crank_speed,

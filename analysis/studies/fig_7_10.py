@@ -17,8 +17,8 @@ import numpy as np
 
 from linkwork.five_bar.published import CM_PER_METRE
 
-from ..control import SmoothnessCurve, smoothness_curve
 from ..figures import COLOURS, Curve, Panel, plot_curves
+from ..motion import SmoothnessCurve, smoothness_curve
 from ..synthesis import SliderUnknown, evaluate
 from ..synthesis.published import PROBLEMS
 from ._chapter_7 import ASSIGNED, ROCKER, TARGET, TURN, over_turn, rocker_motion, shown, slider, sound

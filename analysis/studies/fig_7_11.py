@@ -17,8 +17,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..control import Strategy, simplest_mechanism
 from ..figures import COLOURS, Curve, Panel, plot_curves
+from ..motion import Strategy, simplest_mechanism
 from ..synthesis import LeastTransmission, Linkage, Solution, evaluate
 from ..synthesis.published import WEIGHTED_N, rocker_function
 from ._chapter_7 import ASSIGNED, TARGET, TURN, angle_error, over_turn, sound

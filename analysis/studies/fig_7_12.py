@@ -25,7 +25,10 @@ from linkwork.five_bar import kinematics
 from linkwork.five_bar.parameters import FiveBarParameters
 from linkwork.five_bar.published import CM_PER_METRE
 
-from ..control import (
+from ..figures import COLOURS, Curve, Panel, plot_curves
+from ..linear.linearise import linearise_along
+from ..linear.slider_control import design_pid
+from ..motion import (
     LeastEffort,
     SliderDrive,
     TrackingResult,
@@ -34,10 +37,7 @@ from ..control import (
     least_effort,
     track,
 )
-from ..figures import COLOURS, Curve, Panel, plot_curves
-from ..fourier import FourierSeries
-from ..linearise import linearise_along
-from ..slider_control import design_pid
+from ..numerics.fourier import FourierSeries
 from ._chapter_7 import ASSIGNED, ROCKER, FloatArray, rocker_motion, shown, slider
 from .study import BALANCE, Study, StudyResult, Verdict, at_least, at_most, near, padded
 

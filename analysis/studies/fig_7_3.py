@@ -8,7 +8,7 @@ target the perpendicular rocker is as far as it goes.
 
 The thesis's figure and its data are lost. The printed linkage of the timed ellipse (a) and two targets, one of the ellipse
 and one that its coupler cannot point at, are our choice. The stationary points are computed here from the thesis's equations,
-and compared with the error over a dense range of positions, and with `analysis.control.variational_motion`.
+and compared with the error over a dense range of positions, and with `analysis.motion.variational_motion`.
 """
 
 from __future__ import annotations
@@ -21,8 +21,8 @@ import numpy as np
 
 from linkwork.five_bar.published import CM_PER_METRE
 
-from ..control import variational_motion
 from ..figures import COLOURS, Curve, Panel, plot_curves
+from ..motion import variational_motion
 from ..synthesis.kernels import coupler_path
 from ..synthesis.published import PROBLEMS
 from ._chapter_7 import ASSIGNED, FloatArray

@@ -22,8 +22,8 @@ import numpy as np
 
 from linkwork.five_bar.published import CM_PER_METRE
 
-from ..control import VariationalMotion, variational_motion
 from ..figures import COLOURS, Curve, Panel, plot_curves
+from ..motion import VariationalMotion, variational_motion
 from ..synthesis import evaluate
 from ..synthesis.kernels import link_directions
 from ..synthesis.published import PROBLEMS, WEIGHTED_N, rocker_function

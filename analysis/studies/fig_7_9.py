@@ -17,8 +17,8 @@ from typing import TYPE_CHECKING
 
 from linkwork.five_bar.published import CM_PER_METRE
 
-from ..control import slider_motion
 from ..figures import plot_curves
+from ..motion import slider_motion
 from ..synthesis import SliderUnknown, Solution
 from ..synthesis.linkage import LINKS
 from ..synthesis.published import PROBLEMS

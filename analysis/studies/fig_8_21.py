@@ -19,8 +19,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from ..branches import Branch
 from ..figures import COLOURS, Curve, Panel, plot_curves
+from ..periodic.branches import Branch
 from ._orbits import rpm
 from ._rig_2 import FASTEST, SLOWEST, motions, natural_speed
 from .study import ASSIGNED, BALANCE, Study, StudyResult, at_least, at_most, padded

@@ -23,18 +23,18 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from linkwork.slider_crank.mobility import (
-    assembly_margin,
-    constant_shift,
-    greatest_shift,
-    ranges,
-)
 from linkwork.slider_crank.published import CRANK_SPEED, CRANK_TORQUE, INCH, POUND_FORCE, POUND_INCH, parameters
 
 from ..figures import COLOURS, Curve, Panel, plot_curves
 from ..slider_crank.closure import close, follow
 from ..slider_crank.dual_dynamics import JointLoads, joint_loads
 from ..slider_crank.forces import CLEAR_DEG, ConstantShift, ForceTurn, force_turn
+from ..slider_crank.mobility import (
+    assembly_margin,
+    constant_shift,
+    greatest_shift,
+    ranges,
+)
 from ._rahman import (
     ASSIGNED,
     AXIAL_LB,

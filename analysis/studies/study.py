@@ -12,8 +12,8 @@ from numpy.typing import ArrayLike, NDArray
 from rich.console import Console
 from rich.table import Table
 
-from .. import io
 from ..figures import Curve
+from ..files import io
 from . import STUDIES, file_stem, is_figure
 
 if TYPE_CHECKING:

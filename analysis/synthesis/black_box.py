@@ -28,7 +28,7 @@ from scipy.optimize import Bounds, NonlinearConstraint, OptimizeResult, differen
 
 from linkwork.five_bar import kinematics
 
-from ..tracing import rebound
+from ..numerics.tracing import rebound
 from .constraints import UNKNOWNS, Limits, Require
 from .polish import Polished, effective_cores, over_cores, quality_of
 from .program import TURNING, Answer, Start, half_planes, physical

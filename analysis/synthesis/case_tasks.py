@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from linkwork.errors import InputError, MissingParameterError, ParameterError, UnknownNameError
 
-from ..io import check_names, quantity, read_points
+from ..files.io import check_names, quantity, read_points
 from .targets import TargetPath, function_from_formula, path_from_formula
 from .tasks import Motion, PrecisionPoints, RockerFunction, Straight, Task, TimedPath, UntimedPath, turn
 

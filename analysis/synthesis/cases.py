@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from linkwork.errors import MissingParameterError, ParameterError
 from linkwork.five_bar.parameters import FiveBarParameters
 
-from ..io import check_names, parameters_to, quantity, read_tables, unknown_name
+from ..files.io import check_names, parameters_to, quantity, read_tables, unknown_name
 from .case_tasks import flag, given, list_of, listed, one_of, pairs, section, task_from, whole
 from .constraints import (
     UNKNOWNS,

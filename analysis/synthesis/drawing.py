@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from linkwork.errors import AssemblyError
 
-from ..drawings import Circle, Drawing, Line, Polyline, Text
+from ..files.drawings import Circle, Drawing, Line, Polyline, Text
 
 if TYPE_CHECKING:
     from ..figures import LinkageScene

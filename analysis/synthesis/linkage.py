@@ -22,7 +22,7 @@ from numpy.typing import ArrayLike, NDArray
 from linkwork.errors import AssemblyError, ParameterError
 from linkwork.five_bar.parameters import FiveBarParameters
 
-from ..fourier import FourierSeries
+from ..numerics.fourier import FourierSeries
 from .kernels import PLACES, coupler_path, coupler_path_jacobian, link_directions, link_jacobian
 
 FloatArray = NDArray[np.float64]

@@ -21,7 +21,7 @@ from scipy.optimize import least_squares
 
 from linkwork.errors import InputError
 
-from ..simulate import interruptible, shown
+from ..run.simulate import interruptible, shown
 from .constraints import Limits
 from .kernels import coupler_path_jacobian, link_jacobian
 from .program import Answer, PivotUnknown, Program, SliderUnknown, Start, inside

@@ -1,6 +1,6 @@
 """The nonlinear program of a synthesis: exact derivatives by CasADi, solved by IPOPT.
 
-Loop closure is that of the plant, traced (`analysis.symbolic`). The program is stated in normal form (`tasks.Normal`,
+Loop closure is that of the plant, traced (`analysis.numerics.symbolic`). The program is stated in normal form (`tasks.Normal`,
 `constraints.Limits`); what a start decides - assembly, direction of travel, which triangle of a region, which link is the
 shortest - comes as parameters, so that one program serves all starts.
 """
@@ -21,8 +21,8 @@ from numpy.typing import NDArray
 
 from linkwork.errors import InputError, ParameterError
 
-from .. import symbolic
-from ..fourier import FourierSeries
+from ..numerics import symbolic
+from ..numerics.fourier import FourierSeries
 from .constraints import UNKNOWNS, Limits, Require
 from .linkage import Linkage, SecondCrank, SliderMotion
 from .tasks import Normal

@@ -12,7 +12,7 @@ from typing import Any
 
 from linkwork.errors import InputError, ParameterError
 
-from ..io import quantity, unknown_name
+from ..files.io import quantity, unknown_name
 from .constraints import UNKNOWNS, Require
 
 _COMPARED: Mapping[type[ast.cmpop], tuple[int, bool]] = {

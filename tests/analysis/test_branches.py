@@ -8,10 +8,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from analysis.branches import Branch, Family, follow, switch
-from analysis.continuation import ContinuationError
-from analysis.floquet import Crossing, Stability
-from analysis.orbits import Drive, OrbitError, find_orbit
+from analysis.numerics.continuation import ContinuationError
+from analysis.periodic.branches import Branch, Family, follow, switch
+from analysis.periodic.floquet import Crossing, Stability
+from analysis.periodic.orbits import Drive, OrbitError, find_orbit
 from linkwork.errors import InputError
 from linkwork.five_bar.parameters import FiveBarParameters
 from linkwork.five_bar.published import RAD_S_PER_RPM, SETS, TABLE_3_1

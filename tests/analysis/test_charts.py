@@ -8,13 +8,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from analysis import grids
-from analysis.branches import Family, follow
-from analysis.charts import StabilityChart, default_range, stability_chart
-from analysis.floquet import Crossing, Stability
-from analysis.orbits import Drive, find_orbit
-from analysis.resonance import natural_frequency
-from analysis.stability import telling_points
+from analysis.periodic import grids
+from analysis.periodic.branches import Family, follow
+from analysis.periodic.charts import StabilityChart, default_range, stability_chart
+from analysis.periodic.floquet import Crossing, Stability
+from analysis.periodic.orbits import Drive, find_orbit
+from analysis.periodic.resonance import natural_frequency
+from analysis.periodic.stability import telling_points
 from linkwork.errors import InputError, LinkworkError, UnknownNameError
 from linkwork.five_bar.published import RAD_S_PER_RPM, SETS, TABLE_3_1
 

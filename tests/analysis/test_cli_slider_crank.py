@@ -10,9 +10,10 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from analysis import cli, io
+from analysis import cli
 from analysis.cli import slider_crank
 from analysis.figures.slider_crank import plot_forces
+from analysis.files import io
 from analysis.slider_crank.forces import force_turn
 from linkwork.five_bar.published import TABLE_3_1
 from linkwork.slider_crank.published import CRANK_SPEED, INCH, parameters

@@ -12,12 +12,14 @@ import pytest
 import tomli_w
 from click.testing import CliRunner, Result
 
-from analysis import cli, control, io
+from analysis import cli
+from analysis import motion as control
 from analysis.cli import slider
-from analysis.control.cases import SliderCase, linkage_from_csv, load_slider_case
-from analysis.control.motion import motion_of_plant
-from analysis.fourier import FourierSeries
-from analysis.simulate import simulate
+from analysis.files import io
+from analysis.motion.cases import SliderCase, linkage_from_csv, load_slider_case
+from analysis.motion.motion import motion_of_plant
+from analysis.numerics.fourier import FourierSeries
+from analysis.run.simulate import simulate
 from analysis.synthesis import Linkage, SecondCrank, SliderMotion, SynthesisInterrupted, TimedPath, evaluate, synthesize
 from analysis.synthesis.tasks import turn
 from linkwork.errors import InputError, LinkworkError, ParameterError
@@ -341,7 +343,7 @@ def test_ctrl_c_keeps_the_best_so_far(linkwork, tmp_path, monkeypatch) -> None:
             raise SynthesisInterrupted(found, 3, 6)
         return found
 
-    monkeypatch.setattr("analysis.control.cases.slider_motion", stopped)
+    monkeypatch.setattr("analysis.motion.cases.slider_motion", stopped)
     case = tables(slider={"harmonics": [1, 2, 3], "starts": 3}, drive={"speed": "60 rpm"})
     result = linkwork(case, "--no-plots")
     assert result.exit_code == cli.INTERRUPTED
@@ -356,7 +358,7 @@ def test_ctrl_c_in_the_strategy_keeps_its_steps(linkwork, tmp_path, monkeypatch)
         found = control.simplest_mechanism(*arguments, **options)
         raise control.StrategyInterrupted(replace(found, steps=found.steps[:1], met=False))
 
-    monkeypatch.setattr("analysis.control.cases.simplest_mechanism", stopped)
+    monkeypatch.setattr("analysis.motion.cases.simplest_mechanism", stopped)
     strategy = {"tolerance": "1e-9 mm", "harmonics": 1, "ratios": [], "starts": 2}
     result = linkwork(tables(strategy=strategy), "--no-plots")
     assert result.exit_code == cli.INTERRUPTED

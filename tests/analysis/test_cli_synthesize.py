@@ -14,9 +14,10 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from analysis import cli, io
-from analysis.simulate import simulate
-from analysis.symbolic import library
+from analysis import cli
+from analysis.files import io
+from analysis.numerics.symbolic import library
+from analysis.run.simulate import simulate
 from analysis.synthesis import (
     Assembly,
     FullTurn,

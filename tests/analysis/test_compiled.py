@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 import linkwork
-from analysis import compiled
+from analysis.run import compiled
 from linkwork.five_bar import dynamics
 from tests.fmu.runner import run_in_process
 from tests.strategies import seeded
@@ -51,7 +51,8 @@ def _compile_and_run() -> dict[str, Any]:
     from time import perf_counter
 
     begun = perf_counter()
-    from analysis import Inputs, compiled, simulate, simulate_many
+    from analysis import Inputs, simulate_many
+    from analysis.run import compiled, simulate
     from linkwork.five_bar.published import TABLE_3_1
 
     run = simulate(TABLE_3_1, Inputs(speed=44.0), stop_time=0.1)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from analysis.continuation import ContinuationError, Evaluation, Follower, Point, Settings
+from analysis.numerics.continuation import ContinuationError, Evaluation, Follower, Point, Settings
 from linkwork.errors import AssemblyError, InputError
 
 

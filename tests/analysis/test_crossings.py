@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from analysis.branches import Family, SpecialPoint, follow
-from analysis.continuation import ContinuationError
-from analysis.crossings import CrossingCurve, follow_crossing
-from analysis.floquet import Crossing
-from analysis.orbits import Drive, find_orbit
+from analysis.numerics.continuation import ContinuationError
+from analysis.periodic.branches import Family, SpecialPoint, follow
+from analysis.periodic.crossings import CrossingCurve, follow_crossing
+from analysis.periodic.floquet import Crossing
+from analysis.periodic.orbits import Drive, find_orbit
 from linkwork.five_bar.parameters import FiveBarParameters
 from linkwork.five_bar.published import RAD_S_PER_RPM, SETS
 

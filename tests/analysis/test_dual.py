@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from analysis.dual import (
+from analysis.numerics.dual import (
     Dual,
     about_i,
     about_j,
@@ -27,7 +27,7 @@ from analysis.dual import (
     stack,
     variables,
 )
-from analysis.tracing import ELEMENTARY, rebound
+from analysis.numerics.tracing import ELEMENTARY, rebound
 from linkwork import friction
 from linkwork.slider_crank import dynamics, kinematics, vectors
 from tests.slider_cranks import DRIVES, seeded

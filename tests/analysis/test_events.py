@@ -11,24 +11,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from analysis import (
-    Event,
-    Function,
-    Harmonics,
-    Inputs,
-    TorsionBar,
-    Trajectory,
-    compiled,
-    ramp,
-    simulate,
-    steps,
-)
+from analysis import Event, Function, Harmonics, Inputs, TorsionBar, Trajectory, ramp, steps
+from analysis.run import compiled, simulate
 from linkwork.errors import InputError
 from linkwork.five_bar import dynamics
 from linkwork.five_bar.parameters import InitialState
 from linkwork.five_bar.published import SETS, TABLE_3_1
 
-solver = sys.modules["analysis.simulate"]
+solver = sys.modules["analysis.run.simulate"]
 
 SPEED = SETS["table-3.1"].crank_speed
 METHODS = ("compiled", "DOP853")

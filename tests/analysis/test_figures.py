@@ -9,8 +9,10 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from analysis import Inputs, figures, io, simulate
+from analysis import Inputs, figures
 from analysis.figures import Curve, Panel
+from analysis.files import io
+from analysis.run import simulate
 from linkwork.errors import AssemblyError, InputError
 from linkwork.five_bar.published import SETS, TABLE_3_1
 

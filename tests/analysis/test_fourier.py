@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from analysis.fourier import FourierSeries
+from analysis.numerics.fourier import FourierSeries
 from linkwork.errors import InputError
 
 X = np.linspace(0.0, 2.0 * np.pi, 16, endpoint=False)

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from analysis.hamming import BACK_VALUES, Hamming, Point
+from analysis.run.hamming import BACK_VALUES, Hamming, Point
 
 LOOSE = {"rtol": 1e3, "atol": 1e9}
 

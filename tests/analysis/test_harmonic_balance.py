@@ -11,9 +11,10 @@ import pytest
 
 pytest.importorskip("casadi")
 
-from analysis import harmonic_balance as hb
-from analysis.fourier import FourierSeries
-from analysis.harmonic_balance import (
+from analysis.numerics.fourier import FourierSeries
+from analysis.studies._runs import rig_1, steady_turn
+from analysis.youssef import harmonic_balance as hb
+from analysis.youssef.harmonic_balance import (
     HarmonicBalanceError,
     HarmonicMotion,
     harmonic_balance,
@@ -21,8 +22,7 @@ from analysis.harmonic_balance import (
     resonance,
     two_harmonics,
 )
-from analysis.slider_equation import Load, SliderEquation, Variant, balance, slider_equation
-from analysis.studies._runs import rig_1, steady_turn
+from analysis.youssef.slider_equation import Load, SliderEquation, Variant, balance, slider_equation
 from linkwork.errors import AssemblyError, InputError
 from linkwork.five_bar.parameters import FiveBarParameters
 from linkwork.five_bar.published import CM_PER_METRE, RAD_S_PER_RPM, TABLE_3_1, chapter_4

@@ -13,7 +13,8 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 from scipy.special import mathieu_a, mathieu_b
 
-from analysis.floquet import (
+from analysis.numerics.fourier import FourierSeries
+from analysis.periodic.floquet import (
     Crossing,
     Stability,
     VerdictError,
@@ -22,8 +23,7 @@ from analysis.floquet import (
     multipliers,
     verdict,
 )
-from analysis.fourier import FourierSeries
-from analysis.hill import (
+from analysis.youssef.hill import (
     PeriodicEquation,
     SingularEquationError,
     Truncation,
@@ -38,7 +38,7 @@ from analysis.hill import (
     perturbed_region,
     perturbed_removing_damping,
 )
-from analysis.slider_equation import SliderEquation, Variant, slider_equation
+from analysis.youssef.slider_equation import SliderEquation, Variant, slider_equation
 from linkwork.errors import InputError
 from linkwork.five_bar.published import chapter_4
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.interpolate import CubicSpline
 
-from analysis.inputs import (
+from analysis.run.inputs import (
     Function,
     Harmonics,
     InductionMotor,
@@ -22,7 +22,7 @@ from analysis.inputs import (
     steps,
     table,
 )
-from analysis.simulate import channels
+from analysis.run.simulate import channels
 from linkwork.errors import InputError
 
 REST = np.zeros(4)

@@ -11,17 +11,18 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import minimize
 
-from analysis import Inputs, simulate
-from analysis.control.inverse import best_spring, inverse_dynamics
-from analysis.fourier import FourierSeries
-from analysis.inputs import table
-from analysis.multipliers import FORCE_NAMES, assemble, rates, solve_multipliers
-from analysis.orbits import find_orbit
+from analysis import Inputs
+from analysis.motion.inverse import best_spring, inverse_dynamics
+from analysis.numerics.fourier import FourierSeries
+from analysis.periodic.orbits import find_orbit
+from analysis.run import simulate
+from analysis.run.inputs import table
 from linkwork.errors import AssemblyError, InputError
 from linkwork.five_bar import dynamics, kinematics
 from linkwork.five_bar.parameters import InitialState
 from linkwork.five_bar.published import SETS, TABLE_3_1
 from linkwork.friction import FRICTION_SPEED
+from tests.oracles.multipliers import FORCE_NAMES, assemble, rates, solve_multipliers
 
 RIG, SPEED, _ = SETS["rig-2-spring-c"]
 MOTION = FourierSeries(np.array([0.002, 0.004, 0.001]), np.array([0.0, 0.003, -0.002]))

@@ -9,8 +9,8 @@ from math import pi
 import numpy as np
 import pytest
 
-from analysis import io
-from analysis.inputs import Harmonics, Piecewise, TorsionBar
+from analysis.files import io
+from analysis.run.inputs import Harmonics, Piecewise, TorsionBar
 from linkwork.errors import InputError, MissingParameterError, ParameterError, UnknownNameError
 from linkwork.five_bar.published import SETS, TABLE_3_1
 

@@ -10,18 +10,18 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize
 
-from analysis import simulate
-from analysis.control.inverse import best_spring, inverse_dynamics
-from analysis.control.tracking import track
-from analysis.fourier import FourierSeries
-from analysis.orbits import find_orbit
+from analysis.motion.inverse import best_spring, inverse_dynamics
+from analysis.motion.tracking import track
+from analysis.numerics.fourier import FourierSeries
+from analysis.periodic.orbits import find_orbit
+from analysis.run import simulate
 from linkwork.errors import AssemblyError, InputError
 from linkwork.five_bar import kinematics
 from linkwork.five_bar.published import SETS, TABLE_3_1
 
 pytest.importorskip("casadi")
 
-from analysis.control.least_effort import EffortError, UnattainableError, _shortest_way, least_effort
+from analysis.motion.least_effort import EffortError, UnattainableError, _shortest_way, least_effort
 
 SPEED = SETS["rig-2-spring-c"].crank_speed
 RIG = replace(SETS["rig-2-spring-c"].parameters, coupler_point_distance=0.2, coupler_point_angle=0.5)

@@ -15,8 +15,8 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.linalg import eigh
 
-from analysis import Harmonics, InductionMotor, Inputs, simulate
-from analysis.linearise import (
+from analysis import Harmonics, InductionMotor, Inputs
+from analysis.linear.linearise import (
     AT_REST,
     LEAST_SAMPLES,
     LINEAR_OUTPUTS,
@@ -31,8 +31,9 @@ from analysis.linearise import (
     linearise_along,
     settled_motion,
 )
-from analysis.orbits import find_orbit
-from analysis.tracing import rebound
+from analysis.numerics.tracing import rebound
+from analysis.periodic.orbits import find_orbit
+from analysis.run import simulate
 from linkwork import friction
 from linkwork.errors import AssemblyError, InputError, UnknownNameError
 from linkwork.five_bar import dynamics, kinematics
@@ -58,7 +59,7 @@ def complex_atan2(y: complex, x: complex) -> complex:
 
 @cache
 def plain() -> SimpleNamespace:
-    """The plant's functions for complex numbers, bound anew not by way of `analysis.symbolic`."""
+    """The plant's functions for complex numbers, bound anew not by way of `analysis.numerics.symbolic`."""
     elementary = {name: getattr(cmath, name) for name in ("sin", "cos", "sqrt", "tanh")} | {
         "atan2": lambda y, x: complex_atan2(complex(y), complex(x))
     }

@@ -11,8 +11,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from analysis.fourier import FourierSeries
-from analysis.simulate import simulate
+from analysis.numerics.fourier import FourierSeries
+from analysis.run.simulate import simulate
 from analysis.synthesis import Linkage, SecondCrank, SliderMotion, Verdicts, judge, turn
 from linkwork.errors import AssemblyError, ParameterError
 from linkwork.five_bar import kinematics

@@ -15,9 +15,14 @@ import pytest
 from hypothesis import given, settings
 from scipy.integrate import RK45, solve_ivp
 
-from analysis import multipliers
-from analysis.hamming import Hamming
-from analysis.multipliers import (
+from analysis.run.hamming import Hamming
+from linkwork.errors import AssemblyError, InputError, IntegrationError
+from linkwork.five_bar import dynamics
+from linkwork.five_bar.parameters import InitialState
+from linkwork.five_bar.published import SETS, TABLE_3_1
+from tests import published
+from tests.oracles import multipliers
+from tests.oracles.multipliers import (
     FORCE_NAMES,
     RedundantRun,
     SpeedDrive,
@@ -28,11 +33,6 @@ from analysis.multipliers import (
     simulate_redundant,
     solve_multipliers,
 )
-from linkwork.errors import AssemblyError, InputError, IntegrationError
-from linkwork.five_bar import dynamics
-from linkwork.five_bar.parameters import InitialState
-from linkwork.five_bar.published import SETS, TABLE_3_1
-from tests import published
 from tests.published import CM, DYN, DYN_CM
 from tests.strategies import Case, cases, seeded
 

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from analysis import InductionMotor, Inputs, simulate
-from analysis.floquet import Crossing, Stability
-from analysis.orbits import (
+from analysis import InductionMotor, Inputs
+from analysis.periodic.floquet import Crossing, Stability
+from analysis.periodic.orbits import (
     Drive,
     OrbitAssemblyError,
     OrbitError,
@@ -20,6 +20,7 @@ from analysis.orbits import (
     largest_multipliers,
     orbit_of,
 )
+from analysis.run import simulate
 from linkwork.errors import AssemblyError, InputError
 from linkwork.five_bar import dynamics
 from linkwork.five_bar.parameters import FiveBarParameters, InitialState

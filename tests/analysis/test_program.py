@@ -12,7 +12,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy.optimize import nnls
 
-from analysis.fourier import FourierSeries
+from analysis.numerics.fourier import FourierSeries
 from analysis.synthesis import (
     USUAL,
     Assembly,
@@ -190,7 +190,7 @@ class TestLeastSquares:
         np.testing.assert_allclose(rate, (ends[0] - ends[1]) / (2.0 * h), atol=1e-8)
 
     def test_without_inequalities_casadi_is_not_needed(self, monkeypatch: pytest.MonkeyPatch) -> None:
-        from analysis import symbolic
+        from analysis.numerics import symbolic
 
         def missing() -> None:
             raise symbolic.MissingLibraryError("CasADi is not installed")

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from analysis.dual import Dual, about_j, about_k, axial, origin
+from analysis.numerics.dual import Dual, about_j, about_k, axial, origin
 from analysis.slider_crank.closure import close
 from analysis.slider_crank.dual_dynamics import binors, joint_loads, rates
 from analysis.slider_crank.two_rotations import chain, settle

@@ -13,10 +13,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from analysis import Inputs, resonance, simulate
-from analysis.floquet import Crossing, Stability
-from analysis.orbits import Drive, OrbitError
-from analysis.resonance import ResponseInterrupted, approximations, frequency_response, natural_frequency, sweep
+from analysis import Inputs
+from analysis.periodic import resonance
+from analysis.periodic.floquet import Crossing, Stability
+from analysis.periodic.orbits import Drive, OrbitError
+from analysis.periodic.resonance import (
+    ResponseInterrupted,
+    approximations,
+    frequency_response,
+    natural_frequency,
+    sweep,
+)
+from analysis.run import simulate
 from linkwork.errors import AssemblyError, InputError, ParameterError
 from linkwork.five_bar.published import RAD_S_PER_RPM, SETS, TABLE_3_1
 

@@ -24,16 +24,14 @@ from analysis import (
     TorsionBar,
     Trajectory,
     compare,
-    compiled,
     ramp,
     sample_times,
-    simulate,
     steps,
     table,
 )
-from analysis.inputs import encode
-from analysis.multipliers import SpeedDrive, rates, simulate_redundant, solve_multipliers
-from analysis.simulate import SCIPY_METHODS, Event, channels
+from analysis.run import compiled, simulate
+from analysis.run.inputs import encode
+from analysis.run.simulate import SCIPY_METHODS, Event, channels
 from linkwork.errors import AssemblyError, InputError, ParameterError
 from linkwork.five_bar import dynamics
 from linkwork.five_bar.kinematics import coefficients, position
@@ -48,12 +46,13 @@ from linkwork.five_bar.published import (
 from linkwork.limits import LIMIT_SINE
 from tests import published
 from tests.fmu.runner import run_in_process
+from tests.oracles.multipliers import SpeedDrive, rates, simulate_redundant, solve_multipliers
 from tests.strategies import seeded
 
 #: The compiled code of the five-bar.
 SOLVER = compiled.solver(TABLE_3_1.constants())
 # the module, whose name in the package is that of its function
-solver = sys.modules["analysis.simulate"]
+solver = sys.modules["analysis.run.simulate"]
 
 SPEED = SETS["table-3.1"].crank_speed
 MOTOR = InductionMotor(breakdown_torque=5.0, breakdown_slip=0.2, synchronous_speed=50.0)
@@ -630,7 +629,8 @@ def _interrupted_by_signal() -> list[Any]:
     import signal
     import threading
 
-    from analysis import Inputs, RunInterrupted, simulate
+    from analysis import Inputs, RunInterrupted
+    from analysis.run import simulate
     from linkwork.five_bar.published import TABLE_3_1
 
     simulate(TABLE_3_1, Inputs(speed=44.0), stop_time=0.1)

@@ -11,15 +11,15 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from analysis import Inputs, simulate
-from analysis.linearise import (
+from analysis import Inputs
+from analysis.linear.linearise import (
     find_equilibria,
     find_equilibrium,
     linearise,
     linearise_along,
     settled_motion,
 )
-from analysis.slider_control import (
+from analysis.linear.slider_control import (
     DesignError,
     LoopResult,
     SampledController,
@@ -30,6 +30,7 @@ from analysis.slider_control import (
     largest_difference,
     predict_loop,
 )
+from analysis.run import simulate
 from linkwork.errors import InputError, UnknownNameError
 from linkwork.five_bar import dynamics
 from linkwork.five_bar.parameters import InitialState

@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from analysis.dual import Dual, about_i, about_j, about_k, axial
+from analysis.numerics.dual import Dual, about_i, about_j, about_k, axial
 from analysis.slider_crank import closure as C
 from analysis.slider_crank.closure import ClosureError, close, estimate, follow, loop, residuals, shortage
 from linkwork.errors import AssemblyError, InputError

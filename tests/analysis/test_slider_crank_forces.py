@@ -17,6 +17,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from analysis.slider_crank import mobility
 from analysis.slider_crank.closure import close
 from analysis.slider_crank.dual_dynamics import joint_loads
 from analysis.slider_crank.forces import (
@@ -32,7 +33,7 @@ from analysis.slider_crank.forces import (
     forces_at,
 )
 from linkwork.errors import AssemblyError, InputError
-from linkwork.slider_crank import dynamics, kinematics, mobility
+from linkwork.slider_crank import dynamics, kinematics
 from linkwork.slider_crank.parameters import SliderCrankParameters
 from linkwork.slider_crank.published import CRANK_SPEED, CRANK_TORQUE, parameters
 from linkwork.slider_crank.vectors import Vector

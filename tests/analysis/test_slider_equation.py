@@ -10,8 +10,8 @@ import pytest
 
 pytest.importorskip("casadi")
 
-from analysis.fourier import FourierSeries
-from analysis.slider_equation import (
+from analysis.numerics.fourier import FourierSeries
+from analysis.youssef.slider_equation import (
     NO_LOAD,
     Load,
     SliderEquation,

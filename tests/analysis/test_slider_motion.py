@@ -11,8 +11,8 @@ import pytest
 from numpy.typing import NDArray
 from scipy.optimize import differential_evolution, minimize_scalar
 
-from analysis.control import SmoothnessInterrupted, motion, slider_motion, smoothness_curve
-from analysis.control.motion import greatest
+from analysis.motion import SmoothnessInterrupted, motion, slider_motion, smoothness_curve
+from analysis.motion.motion import greatest
 from analysis.synthesis import (
     Assembly,
     CrankUnknown,

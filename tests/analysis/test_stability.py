@@ -12,15 +12,14 @@ import numpy as np
 import pytest
 from scipy.special import mathieu_a, mathieu_b
 
-from analysis import grids, orbit_kernels, stability
-from analysis.boundaries import Box, Reason, chart, lowest, scan, trace
 from analysis.figures import Curve, HeatMap, Panel, plot_charts
-from analysis.floquet import Stability
-from analysis.grids import GridInterrupted, grid
-from analysis.hill import PeriodicEquation, crossing_test, hill_regions, monodromy
-from analysis.orbits import Drive, orbit_of
-from analysis.planes import Plane, plane
-from analysis.stability import (
+from analysis.numerics.boundaries import Box, Reason, chart, lowest, scan, trace
+from analysis.periodic import grids, orbit_kernels, stability
+from analysis.periodic.floquet import Stability
+from analysis.periodic.grids import GridInterrupted, grid
+from analysis.periodic.orbits import Drive, orbit_of
+from analysis.periodic.planes import Plane, plane
+from analysis.periodic.stability import (
     Outcome,
     RemovalError,
     confirm,
@@ -30,6 +29,7 @@ from analysis.stability import (
     removing_damping,
     removing_damping_over,
 )
+from analysis.youssef.hill import PeriodicEquation, crossing_test, hill_regions, monodromy
 from linkwork.errors import InputError, LinkworkError, ParameterError, UnknownNameError
 from linkwork.five_bar.published import SETS, SQUARE_OF_OMEGA_K, TABLE_3_1, chapter_4
 

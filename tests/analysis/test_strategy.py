@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from analysis.control import Step, Strategy, StrategyInterrupted, simplest_mechanism
-from analysis.control import strategy as strategy_module
-from analysis.fourier import FourierSeries
+from analysis.motion import Step, Strategy, StrategyInterrupted, simplest_mechanism
+from analysis.motion import strategy as strategy_module
+from analysis.numerics.fourier import FourierSeries
 from analysis.synthesis import (
     FullTurn,
     Grashof,

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from analysis import symbolic
+from analysis.numerics import symbolic
 from linkwork import friction
 from linkwork.errors import LinkworkError
 from linkwork.five_bar import dynamics, kinematics

@@ -12,9 +12,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from PIL import Image
 
-from analysis import figures, io
+from analysis import figures
 from analysis.figures.synthesis import LONGEST, magnification
-from analysis.fourier import FourierSeries
+from analysis.files import io
+from analysis.numerics.fourier import FourierSeries
 from analysis.synthesis import (
     InfeasibleError,
     Linkage,

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from analysis import symbolic
+from analysis.numerics import symbolic
 from analysis.synthesis.kernels import (
     COLUMNS,
     PLACES,

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from analysis.fourier import FourierSeries
+from analysis.numerics.fourier import FourierSeries
 from analysis.synthesis import (
     USUAL,
     Assembly,

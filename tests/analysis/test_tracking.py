@@ -8,11 +8,11 @@ from math import pi
 import numpy as np
 import pytest
 
-from analysis.control.inverse import inverse_dynamics
-from analysis.control.tracking import TrackingController, track
-from analysis.fourier import FourierSeries
-from analysis.linearise import find_equilibrium, linearise, linearise_along
-from analysis.slider_control import SampledController, control_loop, design_lqr, design_pid
+from analysis.linear.linearise import find_equilibrium, linearise, linearise_along
+from analysis.linear.slider_control import SampledController, control_loop, design_lqr, design_pid
+from analysis.motion.inverse import inverse_dynamics
+from analysis.motion.tracking import TrackingController, track
+from analysis.numerics.fourier import FourierSeries
 from linkwork.errors import AssemblyError, InputError
 from linkwork.five_bar import kinematics
 from linkwork.five_bar.parameters import InitialState

@@ -9,7 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from analysis import Inputs, Trajectory, simulate
+from analysis import Inputs, Trajectory
+from analysis.run import simulate
 from linkwork.errors import InputError
 from linkwork.five_bar import dynamics
 from linkwork.five_bar.published import SETS, TABLE_3_1

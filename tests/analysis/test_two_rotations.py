@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 from scipy.optimize import least_squares
 
-from analysis.dual import skew
+from analysis.numerics.dual import skew
 from analysis.slider_crank.closure import close
 from analysis.slider_crank.two_rotations import chain, freedoms, planar, settle
 from linkwork.slider_crank.published import INCH, parameters

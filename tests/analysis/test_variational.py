@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from analysis.control.variational import VariationalMotion, _path, variational_motion
-from analysis.fourier import FourierSeries
+from analysis.motion.variational import VariationalMotion, _path, variational_motion
+from analysis.numerics.fourier import FourierSeries
 from analysis.synthesis.kernels import link_directions
 from analysis.synthesis.linkage import Linkage, SecondCrank, SliderMotion
 from linkwork.errors import AssemblyError, InputError, ParameterError

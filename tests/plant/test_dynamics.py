@@ -14,13 +14,13 @@ import pytest
 from hypothesis import given, settings
 from scipy.integrate import solve_ivp
 
-from analysis.multipliers import FORCE_NAMES, assemble, rates, solve_multipliers
 from linkwork.five_bar import dynamics as D
 from linkwork.five_bar import kinematics as K
 from linkwork.five_bar.parameters import Constants, FiveBarParameters
 from linkwork.five_bar.published import SETS, TABLE_3_1
 from linkwork.friction import FRICTION_SPEED
 from tests import published
+from tests.oracles.multipliers import FORCE_NAMES, assemble, rates, solve_multipliers
 from tests.published import CM, DYN, DYN_CM, DYN_PER_CM, DYN_S_PER_CM
 from tests.strategies import LEAST_SINE, Case, cases, seeded, sine
 

@@ -5,7 +5,7 @@ pin P3 = (-a4, 0, 0) - S4 k4, k4 = (0, sin alpha4, cos alpha4), the rod's length
 foot of P2 on the guide and the distance h between them.
 
 The functions are straight lines of arithmetic on floats: no branches on the state, no NumPy, no I/O. The same code runs
-as it is inside the FMU, compiled under Numba, and on dual numbers and arrays (`analysis.tracing`).
+as it is inside the FMU, compiled under Numba, and on dual numbers and arrays (`analysis.numerics.tracing`).
 """
 
 from __future__ import annotations

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Collection
-from math import degrees
+from math import asin, degrees, sqrt
 from typing import ClassVar
 
 from .. import plant
+from ..errors import AssemblyError
 from ..integrate import Vector
-from ..limits import NEAR_LIMIT
+from ..limits import LIMIT_SINE, NEAR_LIMIT
 from ..plant import MechanismPlant, Mode
 from . import dynamics, kinematics
-from .mobility import check_assembly
 from .parameters import Constants, InitialState, SliderCrankParameters
 
 TORQUE_DRIVE = 0
@@ -31,6 +31,40 @@ INPUT_NAMES = (
     "axial.acceleration",
     "slider.load",
 )
+
+
+def check_assembly(parameters: SliderCrankParameters, crank_angle: float, shift: float) -> None:
+    """Make sure that the rod reaches the guide at a configuration, clear of the limit of assembly.
+
+    Parameters
+    ----------
+    parameters : SliderCrankParameters
+    crank_angle : float
+        Crank angle theta1 (rad).
+    shift : float
+        Axial shift S1 (m).
+
+    Raises
+    ------
+    AssemblyError
+        With the configuration, and by how much the rod is too short or how near it is to perpendicular to the guide.
+    """
+    p = parameters.constants()
+    square = kinematics.assembly_square(crank_angle, shift, p)
+    least = LIMIT_SINE * p.a2
+    if square >= least * least:
+        return
+    where = f"crank angle {crank_angle:.9g} rad ({degrees(crank_angle):.4f} deg) and shift {shift:.9g} m"
+    if square >= 0.0:
+        raise AssemblyError(
+            f"limit of assembly at {where}: the rod is within {degrees(asin(sqrt(square) / p.a2)):.3f} deg of "
+            f"perpendicular to the guide"
+        )
+    distance = sqrt(p.a2 * p.a2 - square)
+    raise AssemblyError(
+        f"the rod does not reach the guide at {where}: the crank pin is {distance:.9g} m from the guide, the rod is "
+        f"{p.a2:.9g} m long, {distance - p.a2:.9g} m too short"
+    )
 
 
 def configuration(crank_angle: float, shift: float) -> str:

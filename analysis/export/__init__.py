@@ -1,0 +1,1 @@
+"""Making FMUs of the mechanisms."""

@@ -1,0 +1,312 @@
+"""A linkage and its curves drawn to scale, as plain lines, circles, polylines and texts on named layers, for CAD.
+
+A `Drawing` is in m with y upwards and knows no mechanics; `to_dxf` and `to_svg` write it in a unit of length. The same
+drawing gives the same text, byte for byte.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+from dataclasses import dataclass
+from io import StringIO
+from math import isfinite
+from typing import Any
+from xml.etree import ElementTree
+
+import numpy as np
+from numpy.typing import NDArray
+
+from linkwork.errors import InputError, ParameterError, UnknownNameError
+
+Point = tuple[float, float]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Layer:
+    """How what is on a layer looks: its colour as 0xRRGGBB and the width of its lines (m)."""
+
+    colour: int
+    width: float
+
+
+#: The layers there are, drawn in this order.
+LAYERS = {
+    "ground": Layer(colour=0x404040, width=0.35e-3),
+    "guide": Layer(colour=0x808080, width=0.25e-3),
+    "crank": Layer(colour=0xC0392B, width=0.5e-3),
+    "coupler": Layer(colour=0x1F6FB4, width=0.5e-3),
+    "rocker": Layer(colour=0x2E8B57, width=0.5e-3),
+    "slider": Layer(colour=0x8E44AD, width=0.35e-3),
+    "coupler-curve": Layer(colour=0x1F6FB4, width=0.25e-3),
+    "target": Layer(colour=0xD35400, width=0.25e-3),
+    "text": Layer(colour=0x202020, width=0.18e-3),
+}
+
+#: Units of length: in m, and their code in the DXF variable $INSUNITS.
+UNITS = {"mm": (1e-3, 4), "cm": (1e-2, 5), "m": (1.0, 6), "in": (0.0254, 1)}
+#: Those that SVG has.
+SVG_UNITS = ("mm", "cm", "in")
+_NO_GUID = "{00000000-0000-0000-0000-000000000000}"
+#: Margin of an SVG around the drawing, as a share of its larger extent.
+MARGIN = 0.05
+
+
+def _check(layer: str, *numbers: float) -> None:
+    if layer not in LAYERS:
+        raise UnknownNameError(f"layer {layer!r}", tuple(LAYERS), None)
+    if not all(isfinite(number) for number in numbers):
+        raise InputError(f"on layer {layer}: {numbers} must be finite numbers")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Line:
+    """A straight line between two points (m)."""
+
+    layer: str
+    start: Point
+    end: Point
+
+    def __post_init__(self) -> None:
+        _check(self.layer, *self.start, *self.end)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Circle:
+    """A circle about a point (m), such as a pin."""
+
+    layer: str
+    centre: Point
+    radius: float
+
+    def __post_init__(self) -> None:
+        _check(self.layer, *self.centre, self.radius)
+        if self.radius <= 0.0:
+            raise InputError(
+                f"on layer {self.layer}: a circle's radius is {self.radius!r} m: it must be greater than zero"
+            )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Polyline:
+    """Points joined by straight lines, shape (n, 2) in m; the last one to the first if closed."""
+
+    layer: str
+    points: NDArray[np.float64]
+    closed: bool = False
+
+    def __post_init__(self) -> None:
+        points = np.array(self.points, dtype=float)
+        if points.ndim != 2 or points.shape[1] != 2 or len(points) < 2:
+            raise InputError(
+                f"on layer {self.layer}: a polyline of shape {points.shape}: it must be (n, 2), n at least 2"
+            )
+        _check(self.layer)
+        bad = np.flatnonzero(~np.isfinite(points).all(axis=1))
+        if len(bad):
+            raise InputError(
+                f"on layer {self.layer}: point {bad[0]} of a polyline is {points[bad[0]]}: it must be finite"
+            )
+        points.setflags(write=False)
+        object.__setattr__(self, "points", points)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Text:
+    """A line of text that starts at a point (m), in letters of a height (m)."""
+
+    layer: str
+    position: Point
+    height: float
+    text: str
+
+    def __post_init__(self) -> None:
+        _check(self.layer, *self.position, self.height)
+        if self.height <= 0.0:
+            raise InputError(f"a text's height is {self.height!r} m: it must be greater than zero")
+        if not self.text or not self.text.isprintable():
+            raise InputError(f"a text is {self.text!r}: it must be one line of printable characters")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Drawing:
+    """What is drawn, in m with y upwards.
+
+    Attributes
+    ----------
+    title : str
+        One line.
+    lines, circles, polylines, texts
+        In any order; they are drawn by layer.
+
+    Raises
+    ------
+    InputError
+        If nothing is drawn, all of it at one point, or the title is not one printable line.
+    """
+
+    title: str
+    lines: tuple[Line, ...] = ()
+    circles: tuple[Circle, ...] = ()
+    polylines: tuple[Polyline, ...] = ()
+    texts: tuple[Text, ...] = ()
+
+    def __post_init__(self) -> None:
+        if not self.title.isprintable():
+            raise InputError(f"the title is {self.title!r}: it must be one line of printable characters")
+        if not (self.lines or self.circles or self.polylines):
+            raise InputError("nothing is drawn: there must be a line, a circle or a polyline")
+        low, high = self.extents
+        if low == high:
+            raise InputError(f"all that is drawn is at one point, {low} m")
+
+    @property
+    def extents(self) -> tuple[Point, Point]:
+        """Lower left and upper right corner of all but the letters, whose starting points count (m)."""
+        points = np.vstack(
+            [np.array([p for line in self.lines for p in (line.start, line.end)]).reshape(-1, 2)]
+            + [np.array(c.centre) + side * c.radius for c in self.circles for side in (-1.0, 1.0)]
+            + [p.points for p in self.polylines]
+            + [np.array([t.position for t in self.texts]).reshape(-1, 2)]
+        )
+        (left, bottom), (right, top) = points.min(axis=0).tolist(), points.max(axis=0).tolist()
+        return (left, bottom), (right, top)
+
+
+def _unit(unit: str, known: Iterable[str]) -> tuple[float, int]:
+    names = tuple(known)
+    if unit not in names:
+        raise ParameterError("unit", unit, f"be one of {', '.join(names)}")
+    return UNITS[unit]
+
+
+def to_dxf(drawing: Drawing, unit: str = "mm") -> str:
+    """The drawing as DXF (AutoCAD 2010, UTF-8).
+
+    Parameters
+    ----------
+    drawing : Drawing
+    unit : str
+        One of `UNITS`; it is named in the header ($INSUNITS).
+
+    Returns
+    -------
+    str
+        Without a date: the header's times and identifiers are set to the constants 0.
+
+    Raises
+    ------
+    ParameterError
+        If the unit is not known.
+    """
+    from ezdxf.filemanagement import new
+    from ezdxf.version import __version__
+
+    metre, code = _unit(unit, UNITS)
+    document = new("R2010")
+    document.units = code
+    document.header["$MEASUREMENT"] = 0 if unit == "in" else 1
+    for name, layer in LAYERS.items():
+        entry = document.layers.add(name, lineweight=round(layer.width * 1e5))
+        entry.rgb = (layer.colour >> 16, layer.colour >> 8 & 255, layer.colour & 255)
+    space = document.modelspace()
+
+    def at(point: Point) -> Point:
+        return point[0] / metre, point[1] / metre
+
+    for line in drawing.lines:
+        space.add_line(at(line.start), at(line.end), dxfattribs={"layer": line.layer})
+    for circle in drawing.circles:
+        space.add_circle(at(circle.centre), circle.radius / metre, dxfattribs={"layer": circle.layer})
+    for polyline in drawing.polylines:
+        points = (polyline.points / metre).tolist()
+        space.add_lwpolyline(points, close=polyline.closed, dxfattribs={"layer": polyline.layer})
+    for text in drawing.texts:
+        space.add_text(
+            text.text,
+            height=text.height / metre,
+            dxfattribs={"layer": text.layer, "insert": at(text.position)},
+        )
+    (left, bottom), (right, top) = (at(corner) for corner in drawing.extents)
+    space.reset_extents((left, bottom, 0.0), (right, top, 0.0))
+    document.header.custom_vars.append("Title", drawing.title)
+    height = 1.1 * max(top - bottom, 0.5 * (right - left))
+    document.set_modelspace_vport(height, center=(0.5 * (left + right), 0.5 * (bottom + top)))
+    stream = StringIO()
+    document.write(stream)
+    # ezdxf dates each file, and leaves that out by a global option only
+    dxf = re.sub(r"(\$TDU?(?:CREATE|UPDATE)\n *40\n)[^\n]*", r"\g<1>0.0", stream.getvalue())
+    dxf = re.sub(r"(\$(?:FINGERPRINT|VERSION)GUID\n *2\n)[^\n]*", rf"\g<1>{_NO_GUID}", dxf)
+    return re.sub(rf"(?<=\n{re.escape(__version__)} @ )[^\n]*", "0", dxf)
+
+
+def to_svg(drawing: Drawing, unit: str = "mm") -> str:
+    """The drawing as SVG of real size: ``width`` and ``height`` in the unit, and one user unit one of it.
+
+    Parameters
+    ----------
+    drawing : Drawing
+    unit : str
+        One of `SVG_UNITS`.
+
+    Returns
+    -------
+    str
+        A group for each layer that has something on it, its name as ``id``. SVG's y points down: a point (x, y) is at
+        (x, -y), the origin kept, so that `analysis.files.io.read_points` reads back the same points.
+
+    Raises
+    ------
+    ParameterError
+        If the unit is not one of SVG's.
+    """
+    metre, _ = _unit(unit, SVG_UNITS)
+
+    def number(metres: float) -> str:
+        return format(metres / metre + 0.0, ".15g")
+
+    (left, bottom), (right, top) = drawing.extents
+    margin = MARGIN * max(right - left, top - bottom)
+    x, y = left - margin, -top - margin
+    width, height = right - left + 2.0 * margin, top - bottom + 2.0 * margin
+    root = ElementTree.Element(
+        "svg",
+        xmlns="http://www.w3.org/2000/svg",
+        width=f"{number(width)}{unit}",
+        height=f"{number(height)}{unit}",
+        viewBox=" ".join(number(v) for v in (x, y, width, height)),
+    )
+    if drawing.title:
+        ElementTree.SubElement(root, "title").text = drawing.title
+    groups: dict[str, ElementTree.Element] = {}
+    for name, layer in LAYERS.items():
+        groups[name] = ElementTree.Element(
+            "g",
+            id=name,
+            fill="none",
+            stroke=f"#{layer.colour:06x}",
+            attrib={"stroke-width": number(layer.width), "stroke-linejoin": "round", "stroke-linecap": "round"},
+        )
+
+    def put(layer: str, tag: str, **attributes: Any) -> ElementTree.Element:
+        return ElementTree.SubElement(
+            groups[layer], tag, {k: v if isinstance(v, str) else number(v) for k, v in attributes.items()}
+        )
+
+    for line in drawing.lines:
+        (x1, y1), (x2, y2) = line.start, line.end
+        put(line.layer, "line", x1=x1, y1=-y1, x2=x2, y2=-y2)
+    for circle in drawing.circles:
+        put(circle.layer, "circle", cx=circle.centre[0], cy=-circle.centre[1], r=circle.radius)
+    for polyline in drawing.polylines:
+        points = " L ".join(f"{number(px)},{number(-py)}" for px, py in polyline.points.tolist())
+        put(polyline.layer, "path", d=f"M {points}{' Z' if polyline.closed else ''}")
+    for text in drawing.texts:
+        element = put(text.layer, "text", x=text.position[0], y=-text.position[1], **{"font-size": text.height})
+        element.set("font-family", "sans-serif")
+        element.set("fill", f"#{LAYERS[text.layer].colour:06x}")
+        element.set("stroke", "none")
+        element.text = text.text
+    root.extend(group for group in groups.values() if len(group))
+    ElementTree.indent(root)
+    return ElementTree.tostring(root, encoding="unicode") + "\n"

@@ -1,0 +1,1 @@
+"""Linear models of a mechanism, and controllers designed on them."""

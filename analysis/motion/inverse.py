@@ -1,0 +1,398 @@
+"""Inverse dynamics: the control force, the crank torque and the pin forces of a prescribed motion of the slider.
+
+The slider follows u(th2) while the crank turns at a constant speed w2, so that u' = w2 du/dth2 and u'' = w2^2 d2u/dth2^2.
+The second equation of motion then is no differential equation any more but gives the force,
+
+    F2 = m22 u'' + b2 - Q2
+
+and with it the plant's own outputs give the torque on the crank (the first equation) and the forces in the pins and the
+guide. Spring, damper, guide friction, gravity and the load at P are all in Q2.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from math import degrees, inf, isfinite, pi
+
+import numpy as np
+from numpy.typing import NDArray
+
+from linkwork.errors import AssemblyError, InputError
+from linkwork.five_bar import dynamics, kinematics
+from linkwork.five_bar.parameters import Constants, FiveBarParameters
+from linkwork.five_bar.plant import check_assembly
+from linkwork.five_bar.variables import OUTPUT_NAMES
+
+from ..numerics.fourier import FourierSeries
+from ..run import compiled
+from ..run.trajectory import UNITS
+
+FloatArray = NDArray[np.float64]
+#: Force at P (N, N): constant, or a function of the crank angle (rad).
+Load = tuple[float, float] | Callable[[float], tuple[float, float]]
+
+#: Outputs that a prescribed motion has: all but the energies that count from the start of a run.
+NAMES = tuple(name for name in OUTPUT_NAMES if name not in ("energy.dissipated", "energy.supplied", "energy.residual"))
+_KEPT = [OUTPUT_NAMES.index(name) for name in NAMES]
+LEAST_SAMPLES = 16
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TurnBalance:
+    """Energy over one turn of a periodic motion (J): what comes in is what friction and damper take.
+
+    Attributes
+    ----------
+    force, torque, load : float
+        Work of the slider force, of the crank torque, of the load at P.
+    dissipated : float
+        By damper and guide friction.
+    """
+
+    force: float
+    torque: float
+    load: float
+    dissipated: float
+
+    @property
+    def residual(self) -> float:
+        """Work supplied less work dissipated (J); zero but for rounding where the samples carry the motion."""
+        return self.force + self.torque + self.load - self.dissipated
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class SliderDrive:
+    """One turn of the crank with the slider on a prescribed motion, at equal steps of the crank angle, the end left out.
+
+    Attributes
+    ----------
+    parameters : FiveBarParameters
+    slider : FourierSeries
+        u(th2) (m).
+    crank_speed : float
+        rad/s.
+    load : (float, float) or function of the crank angle
+        At P (N).
+    crank_angle, time : ndarray, shape (n,)
+        rad, s; both zero at the start.
+    states, inputs : ndarray, shape (n, 6)
+        States (th2, u, w2, v, 0, 0) and what acts on the plant, as `linkwork.five_bar.dynamics` has them, in speed drive.
+    values : ndarray, shape (n, 24)
+        Outputs of the FMI contract by `NAMES`.
+
+    Notes
+    -----
+    ``drive["pin.C.fx"]`` is an output over the turn, shape (n,). Peaks are those of the samples. `linearise.linearise_along`
+    takes a drive as the motion to linearise about.
+    """
+
+    parameters: FiveBarParameters
+    slider: FourierSeries
+    crank_speed: float
+    load: Load
+    crank_angle: FloatArray
+    time: FloatArray
+    states: FloatArray
+    inputs: FloatArray
+    values: FloatArray
+
+    def __getitem__(self, name: str) -> FloatArray:
+        if name not in NAMES:
+            raise InputError(f"a prescribed motion has no output {name!r}: it has {', '.join(NAMES)}")
+        return self.values[:, NAMES.index(name)]
+
+    def turn(self, samples: int) -> SliderDrive:
+        """The same motion at another number of samples."""
+        return inverse_dynamics(self.parameters, self.slider, self.crank_speed, load=self.load, samples=samples)
+
+    @property
+    def period(self) -> float:
+        """Time of one turn (s)."""
+        return 2.0 * pi / abs(self.crank_speed)
+
+    @property
+    def force(self) -> FloatArray:
+        """Control force on the slider (N), shape (n,)."""
+        return self.inputs[:, 3]
+
+    @property
+    def torque(self) -> FloatArray:
+        """Torque that keeps the crank's speed (N.m), shape (n,)."""
+        return self["drive.applied_torque"]
+
+    @property
+    def power(self) -> FloatArray:
+        """Power of the control force (W), shape (n,)."""
+        return self.force * self.states[:, 3]
+
+    @property
+    def mean_power(self) -> float:
+        """Mean of the power over the turn (W)."""
+        return float(self.power.mean())
+
+    @property
+    def peak_power(self) -> float:
+        """Largest power either way (W)."""
+        return float(np.abs(self.power).max())
+
+    @property
+    def positive_work(self) -> float:
+        """Work that the control force does over the turn while its power is positive (J)."""
+        return float(np.maximum(self.power, 0.0).mean()) * self.period
+
+    @property
+    def negative_work(self) -> float:
+        """Work that it takes up while its power is negative (J), at most zero."""
+        return float(np.minimum(self.power, 0.0).mean()) * self.period
+
+    @property
+    def rms_force(self) -> float:
+        """Root mean square of the control force over the turn (N)."""
+        return float(np.sqrt(np.mean(self.force**2)))
+
+    @property
+    def peak_force(self) -> float:
+        """Largest control force either way (N)."""
+        return float(np.abs(self.force).max())
+
+    @property
+    def peak_torque(self) -> float:
+        """Largest crank torque either way (N.m)."""
+        return float(np.abs(self.torque).max())
+
+    @property
+    def balance(self) -> TurnBalance:
+        """Energy over the turn."""
+        p = self.parameters.constants()
+        dissipated, load = 0.0, 0.0
+        for x, i in zip(self.states.tolist(), self.inputs.tolist()):
+            g = kinematics.position(x[0], x[1], p)
+            k = kinematics.coefficients(g, p)
+            px, py = kinematics.coupler_point_velocity(g, x[2], k.k32 * x[2] + k.k3u * x[3], p)
+            dissipated += dynamics.friction(x[3], p) * x[3]
+            load += i[4] * px + i[5] * py
+        step = self.period / len(self.time)
+        return TurnBalance(
+            force=self.mean_power * self.period,
+            torque=float(self.torque.mean()) * self.crank_speed * self.period,
+            load=load * step,
+            dissipated=dissipated * step,
+        )
+
+    def columns(self) -> Mapping[str, FloatArray]:
+        """Time, force, power and outputs by name with unit, as `analysis.files.io.write_csv` takes them."""
+        own = {"time [s]": self.time, "slider.force [N]": self.force, "slider.power [W]": self.power}
+        return own | {f"{name} [{UNITS[name]}]": self[name] for name in NAMES}
+
+
+def slider_force(
+    th2: float, u: float, w2: float, v: float, acceleration: float, load: tuple[float, float], p: Constants
+) -> float:
+    """Slider force F2 (N) that gives the slider an acceleration u'' (m/s2) at a constant crank speed.
+
+    Raises
+    ------
+    ValueError, ZeroDivisionError
+        If the links cannot be joined there.
+    """
+    g = kinematics.position(th2, u, p)
+    k = kinematics.coefficients(g, p)
+    w3, w4 = k.k32 * w2 + k.k3u * v, k.k42 * w2 + k.k4u * v
+    _, b2 = dynamics.velocity_terms(g, k, w2, w3, w4, *kinematics.centripetal(g, w2, w3, w4, p), p)
+    _, q2 = dynamics.applied_forces(g, k, u, v, *load, p)
+    return dynamics.inertia(g, k, p).m22 * acceleration + b2 - q2
+
+
+def inverse_dynamics(
+    parameters: FiveBarParameters,
+    slider: FourierSeries,
+    crank_speed: float,
+    *,
+    load: Load = (0.0, 0.0),
+    samples: int = 720,
+) -> SliderDrive:
+    """What it takes to move the slider along u(th2) while the crank turns at a constant speed.
+
+    Parameters
+    ----------
+    parameters : FiveBarParameters
+    slider : FourierSeries
+        Slider position u (m) over the crank angle th2; of a motion given by samples, `FourierSeries.from_samples`.
+    crank_speed : float
+        rad/s, not zero; below zero the crank turns clockwise.
+    load : (float, float) or function of the crank angle (rad)
+        Force at the coupler point P (N).
+    samples : int
+        Of the turn, at equal steps of the crank angle from 0 on.
+
+    Raises
+    ------
+    InputError
+        If the speed is zero or not finite, the load is not two finite numbers, or there are too few samples for the series.
+    AssemblyError
+        If the links cannot be joined somewhere on the turn, with where.
+    """
+    check_speed(crank_speed)
+    samples = whole(samples, "samples of a turn")
+    least = max(LEAST_SAMPLES, 2 * slider.order + 1)
+    if samples < least:
+        raise InputError(f"{samples} samples of a turn: a motion of order {slider.order} needs at least {least}")
+    p = parameters.constants()
+    time = 2.0 * pi / abs(crank_speed) * np.arange(samples) / samples
+    angle = crank_speed * time
+    slope = slider.derivative()
+    states, inputs = np.zeros((samples, 6)), np.zeros((samples, 6))
+    states[:, 0], states[:, 1], states[:, 2] = angle, slider(angle), crank_speed
+    states[:, 3] = crank_speed * slope(angle)
+    acceleration = crank_speed**2 * slope.derivative()(angle)
+    inputs[:, 0] = 1.0
+    for x, i, a in zip(states.tolist(), inputs, acceleration.tolist()):
+        _check_joined(parameters, x[0], x[1])
+        at_p = load_at(load, x[0])
+        i[3], i[4], i[5] = slider_force(x[0], x[1], x[2], x[3], a, at_p, p), *at_p
+    values = np.empty((samples, len(OUTPUT_NAMES)))
+    compiled.solver(p).outputs(p, states, inputs, 0.0, values)
+    return SliderDrive(
+        parameters=parameters,
+        slider=slider,
+        crank_speed=float(crank_speed),
+        load=load,
+        crank_angle=angle,
+        time=time,
+        states=states,
+        inputs=inputs,
+        values=values[:, _KEPT],
+    )
+
+
+def check_speed(crank_speed: float) -> None:
+    """Make sure that a constant crank speed (rad/s) is one.
+
+    Raises
+    ------
+    InputError
+        If it is zero or not finite.
+    """
+    if not (isfinite(crank_speed) and crank_speed != 0.0):
+        raise InputError(f"crank speed is {crank_speed} rad/s: it must be finite and not zero")
+
+
+def whole(value: float, what: str) -> int:
+    """Make sure that a number of something is a whole one.
+
+    Raises
+    ------
+    InputError
+        If it is not.
+    """
+    if not float(value).is_integer():
+        raise InputError(f"{value} {what}: it must be a whole number")
+    return int(value)
+
+
+def load_at(load: Load, crank_angle: float) -> tuple[float, float]:
+    """The load at P (N, N) at a crank angle (rad).
+
+    Raises
+    ------
+    InputError
+        If it is not two finite numbers.
+    """
+    given = load(crank_angle) if callable(load) else load
+    try:
+        fx, fy = (float(part) for part in given)
+    except (TypeError, ValueError):
+        raise InputError(
+            f"the load at P is {given!r} at crank angle {crank_angle:.9g} rad: it must be two numbers (N)"
+        ) from None
+    if not (isfinite(fx) and isfinite(fy)):
+        raise InputError(f"the load at P is ({fx}, {fy}) N at crank angle {crank_angle:.9g} rad: it must be finite")
+    return fx, fy
+
+
+def _check_joined(parameters: FiveBarParameters, crank_angle: float, slider_position: float) -> None:
+    try:
+        check_assembly(parameters, crank_angle, slider_position)
+    except AssemblyError as error:
+        raise AssemblyError(
+            f"the motion of the slider cannot be followed beyond {degrees(crank_angle):.2f} deg of the turn: {error}"
+        ) from None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BestSpring:
+    """The spring at the slider with which a motion takes the least control force.
+
+    Attributes
+    ----------
+    parameters : FiveBarParameters
+        With that spring in the place of the one they had.
+    stiffness, free_position : float
+        N/m, m; no spring is a stiffness of zero.
+    rms_force : float
+        Of the control force with it (N).
+    rms_force_without : float
+        Without any spring (N).
+    """
+
+    parameters: FiveBarParameters
+    stiffness: float
+    free_position: float
+    rms_force: float
+    rms_force_without: float
+
+
+def best_spring(
+    parameters: FiveBarParameters,
+    slider: FourierSeries,
+    crank_speed: float,
+    *,
+    free_position: tuple[float, float] | None = None,
+    load: Load = (0.0, 0.0),
+    samples: int = 720,
+) -> BestSpring:
+    """Stiffness and free position of the spring that minimise the rms control force of a motion.
+
+    The force is affine in k and k u0, so that this is linear least squares over the wedge k >= 0, low k <= k u0 <= high k:
+    its minimum inside, or else on one of the two edges.
+
+    Parameters
+    ----------
+    free_position : (float, float), optional
+        Least and greatest free position (m); by default the ground link's length either way. Without bounds a constant
+        force would pass for an endlessly soft spring.
+    parameters, slider, crank_speed, load, samples
+        As for `inverse_dynamics`; the spring of the parameters does not matter.
+
+    Raises
+    ------
+    InputError, AssemblyError
+        As `inverse_dynamics`; also if the bounds are not finite and in order.
+    """
+    low, high = free_position or (-parameters.ground_length, parameters.ground_length)
+    if not (-inf < low <= high < inf):
+        raise InputError(f"free position between {low} m and {high} m: the bounds must be finite and in order")
+    bare = replace(parameters, slider_stiffness=0.0, slider_spring_free_position=0.0)
+    drive = inverse_dynamics(bare, slider, crank_speed, load=load, samples=samples)
+    force, u = drive.force, drive.states[:, 1]
+
+    def with_spring(k: float, free: float) -> tuple[float, float, float]:
+        return float(np.sqrt(np.mean((force + k * (u - free)) ** 2))), k, free
+
+    candidates = [with_spring(0.0, 0.0)]
+    (k, preload), *_ = np.linalg.lstsq(np.column_stack([u, -np.ones_like(u)]), -force, rcond=None)
+    if k > 0.0 and low <= preload / k <= high:
+        candidates.append(with_spring(float(k), float(preload / k)))
+    for edge in (low, high):
+        stretch = u - edge
+        if (soft := -float(force @ stretch)) > 0.0:
+            candidates.append(with_spring(soft / float(stretch @ stretch), edge))
+    rms, stiffness, free = min(candidates)
+    return BestSpring(
+        parameters=replace(parameters, slider_stiffness=stiffness, slider_spring_free_position=free),
+        stiffness=stiffness,
+        free_position=free,
+        rms_force=rms,
+        rms_force_without=candidates[0][0],
+    )

@@ -1,0 +1,283 @@
+"""The direct search for the slider's motion: a Fourier series of the crank's rotation (thesis, chapter VII).
+
+The rocker pivot of a given linkage is moved so that it does its task better: mean, harmonics and the guide's angle are sought
+with exact Jacobians from several starts, within bounds of stroke, speed and acceleration; or the links together with them. The
+optimum at every crank angle by itself is in `analysis.motion.variational`; it may jump, a Fourier series cannot.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from math import inf, pi
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from linkwork.errors import InputError, Interrupted
+
+from ..numerics.fourier import FourierSeries
+from ..synthesis.constraints import Assembly, Constraint, FullTurn, InfeasibleError, limits_of
+from ..synthesis.linkage import Linkage, SliderMotion
+from ..synthesis.polish import polish
+from ..synthesis.program import PivotUnknown, SliderUnknown, Start, random_pivot
+from ..synthesis.solution import Solution, ranked
+from ..synthesis.solve import Synthesis, SynthesisInterrupted, fitted_form, infeasible, solutions_of, start_from
+from ..synthesis.tasks import Normal, Task
+
+FloatArray = NDArray[np.float64]
+
+
+def slider_motion(
+    task: Task,
+    linkage: Linkage | Solution,
+    unknown: PivotUnknown,
+    *,
+    bounds: Mapping[str, tuple[float, float]] | None = None,
+    constraints: Sequence[Constraint] = (FullTurn(),),
+    guesses: Sequence[Linkage | Solution] = (),
+    starts: int = 24,
+    solutions: int = 6,
+    seed: int = 0,
+    n_jobs: int = 1,
+    progress: bool = False,
+) -> Synthesis:
+    """Move the rocker pivot of a linkage so that it does a task as well as it can.
+
+    Parameters
+    ----------
+    task : Task
+        Of `analysis.synthesis`; weights are the task's own.
+    linkage : Linkage or Solution
+        Its dimensions are kept, but for those that ``bounds`` sets free. For an open path it must be a solution, which brings
+        the crank rotations of the stations.
+    unknown : SliderUnknown or CrankUnknown
+        Harmonics, and bounds of guide angle, stroke, speed and acceleration.
+    bounds : mapping, optional
+        Dimensions that are optimised together with the motion, (least, greatest) by name (m, rad).
+    constraints : sequence
+        By default the links stay joined over the turn.
+    guesses : sequence of Linkage or Solution
+        Searched from as well: their pivots' motion, and with free dimensions those too.
+    starts : int
+        Random starts besides: phases and amplitudes of the harmonics, guide angles all round.
+    solutions, seed, n_jobs, progress
+        As for `synthesize`.
+
+    Returns
+    -------
+    Synthesis
+        Solutions whose linkages have a moved pivot.
+
+    Raises
+    ------
+    InputError, InfeasibleError, SynthesisInterrupted, MissingLibraryError
+        As `synthesize`.
+    """
+    if starts < 1 and not guesses:
+        raise InputError(f"{starts} starts and no guess: there must be at least one of either")
+    begun = perf_counter()
+    normal = fitted_form(task, unknown)
+    given = linkage.linkage if isinstance(linkage, Solution) else linkage
+    kept: dict[str, Any] = {
+        name: value for name, value in given.values().items() if name != "branch" and name not in (bounds or {})
+    }
+    asked = {c.branch for c in constraints if isinstance(c, Assembly)}
+    if asked - {given.branch}:
+        raise InputError(
+            f"assembly {asked.pop():+d} is asked of a linkage that is assembled {given.branch:+d}: turn it over first"
+        )
+    assembly = () if asked else (Assembly(branch=given.branch),)
+    fixed = {name: (value, value) for name, value in kept.items()}
+    limits = limits_of(task, normal, fixed | dict(bounds or {}), (*constraints, *assembly))
+    begin = [_start(guess, normal, unknown) for guess in guesses]
+    random = np.random.default_rng(seed)
+    base = _start(linkage, normal, unknown)
+    begin += [replace(base, pivot=random_pivot(unknown, base.q[2], normal.unit, random)) for _ in range(starts)]
+    done = polish(normal, limits, begin, pivot=unknown, n_jobs=n_jobs, progress=progress)
+    # what is kept is kept to the last digit, whatever the normal form made of it
+    found = tuple(
+        Solution.of(task, replace(s.linkage, **kept), s.evaluation.rotation)
+        for s in solutions_of(task, normal, limits, done, unknown, solutions)
+    )
+    result = Synthesis(
+        task=task,
+        solutions=found,
+        method="scan",
+        seed=seed,
+        starts=done.done,
+        seconds=perf_counter() - begun,
+        complete=not done.interrupted,
+    )
+    if done.interrupted:
+        raise SynthesisInterrupted(result if found else None, done.done, len(begin))
+    if not found:
+        raise infeasible(done)
+    return result
+
+
+def _start(of: Linkage | Solution, normal: Normal, unknown: PivotUnknown) -> Start:
+    if isinstance(of, Solution):
+        return start_from(of.linkage, normal, unknown, of.evaluation.rotation)
+    return start_from(of, normal, unknown)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class SmoothnessCurve:
+    """Error of the task against the smoothness of the slider's motion.
+
+    Attributes
+    ----------
+    acceleration : ndarray, shape (n,)
+        Greatest |d2u/dphi2| that was allowed (m/rad2), increasing.
+    solutions : tuple of Solution or None
+        The best at each; None where there is none.
+    """
+
+    acceleration: FloatArray
+    solutions: tuple[Solution | None, ...]
+
+    @property
+    def error(self) -> np.ma.MaskedArray:
+        """Quality function at each, masked where there is no solution; shape (n,)."""
+        return np.ma.masked_invalid(np.array([np.nan if s is None else s.error for s in self.solutions]))
+
+    @property
+    def attained(self) -> np.ma.MaskedArray:
+        """Greatest |d2u/dphi2| of each motion (m/rad2)."""
+        return np.ma.masked_invalid(np.array([np.nan if s is None else greatest(s.linkage, 2) for s in self.solutions]))
+
+
+class SmoothnessInterrupted(Interrupted):
+    """A smoothness curve was stopped from the keyboard; ``curve`` has the best so far at each bound."""
+
+    def __init__(self, curve: SmoothnessCurve, done: int, problems: int) -> None:
+        self.curve = curve
+        super().__init__(f"stopped after {done} of {problems} problems of the smoothness curve")
+
+
+def greatest(linkage: Linkage, order: int) -> float:
+    """Greatest magnitude over a turn of the slider's position (order 0), or of a derivative of it by the crank's rotation."""
+    if not isinstance(linkage.pivot, SliderMotion):
+        return 0.0
+    series = linkage.pivot.series
+    for _ in range(order):
+        series = series.derivative()
+    return float(np.abs(series(np.linspace(0.0, 2.0 * pi, 720, endpoint=False))).max())
+
+
+def motion_of_plant(linkage: Linkage) -> FourierSeries:
+    """The slider's position (m) over the plant's crank angle th2 = phi + th20, for `inverse_dynamics` and `track`.
+
+    Raises
+    ------
+    InputError
+        If the rocker pivot is on a second crank.
+    """
+    if linkage.pivot is None:
+        return FourierSeries.constant(0.0)
+    if not isinstance(linkage.pivot, SliderMotion):
+        raise InputError("the rocker pivot is on a second crank: the plant has none")
+    series = linkage.pivot.series
+    turned = (series.cos - 1j * series.sin) * np.exp(-1j * linkage.crank_phase * np.arange(series.order + 1))
+    return FourierSeries(turned.real, -turned.imag)
+
+
+def smoothness_curve(
+    task: Task,
+    linkage: Linkage | Solution,
+    unknown: SliderUnknown,
+    accelerations: ArrayLike,
+    *,
+    bounds: Mapping[str, tuple[float, float]] | None = None,
+    constraints: Sequence[Constraint] = (FullTurn(),),
+    starts: int = 24,
+    seed: int = 0,
+    n_jobs: int = 1,
+    progress: bool = False,
+) -> SmoothnessCurve:
+    """Smoothness traded against error: the best motion for each bound of its second derivative, warm started.
+
+    From the motion without a bound through the roughest to the smoothest each problem starts from the solutions of the one
+    before, their harmonics shrunk to the new bound, and from its own random starts; then back, each problem keeping the
+    smoother solution or what is polished from it, so that the error never grows with the freedom.
+
+    Parameters
+    ----------
+    task, linkage, unknown, bounds, constraints, starts, seed, n_jobs, progress
+        As for `slider_motion`.
+    accelerations : array_like, shape (n,)
+        Bounds of |d2u/dphi2| (m/rad2), above zero.
+
+    Raises
+    ------
+    InputError
+        If the bounds are not usable, or the unknown is no slider.
+    SmoothnessInterrupted
+        On Ctrl-C, with the best so far at each bound.
+    """
+    if not isinstance(unknown, SliderUnknown):
+        raise InputError(f"the smoothness of {unknown!r}: it must be that of a SliderUnknown")
+    values = np.sort(np.array(accelerations, dtype=float, ndmin=1))
+    if values.ndim != 1 or len(values) < 2 or not (np.isfinite(values).all() and values[0] > 0.0):
+        raise InputError("bounds of acceleration must be finite numbers above zero, at least two")
+    found: dict[int, Solution] = {}
+
+    def best(acceleration: float, guesses: Sequence[Solution], own: int) -> tuple[Solution, ...]:
+        try:
+            result = slider_motion(
+                task,
+                linkage,
+                replace(unknown, acceleration=acceleration),
+                bounds=bounds,
+                constraints=constraints,
+                guesses=[replace(guess, linkage=_shrunk(guess.linkage, acceleration)) for guess in guesses],
+                starts=own,
+                solutions=3,
+                seed=seed,
+                n_jobs=n_jobs,
+                progress=progress,
+            )
+        except InfeasibleError:
+            return ()
+        return result.solutions
+
+    k, kept, done = -1, [], 0
+    try:
+        # what is best without a bound is the start for a wide one
+        previous = best(inf, [], starts)
+        down = range(len(values) - 1, -1, -1)
+        for own, k in [(starts, k) for k in down] + [(0, k) for k in reversed(down)]:
+            if not own and k == 0:
+                previous = ()
+            mine = [found[k]] if k in found else []
+            # on the way back what keeps the tighter bound keeps this one, too
+            kept = mine if own else [*previous, *mine]
+            if own or kept:
+                solutions = best(float(values[k]), [*previous, *mine], own)
+                if kept or solutions:
+                    found[k] = ranked([*kept, *solutions])[0]
+                    previous = solutions if own else (found[k],)
+            done += 1
+    except (SynthesisInterrupted, KeyboardInterrupt) as error:
+        if isinstance(error, SynthesisInterrupted) and error.synthesis is not None and k >= 0:
+            found[k] = ranked([*kept, *error.synthesis.solutions])[0]
+        raise SmoothnessInterrupted(_curve(values, found), done, 2 * len(values)) from None
+    return _curve(values, found)
+
+
+def _curve(values: FloatArray, found: Mapping[int, Solution]) -> SmoothnessCurve:
+    return SmoothnessCurve(acceleration=values, solutions=tuple(found.get(k) for k in range(len(values))))
+
+
+def _shrunk(linkage: Linkage, acceleration: float) -> Linkage:
+    """The linkage with its slider's harmonics made smaller, down to the bound."""
+    most = greatest(linkage, 2)
+    if not isinstance(linkage.pivot, SliderMotion) or most <= acceleration:
+        return linkage
+    series = linkage.pivot.series
+    factor = acceleration / most
+    mean = series.mean
+    return replace(linkage, pivot=replace(linkage.pivot, series=(series + -mean) * factor + mean))

@@ -1,0 +1,305 @@
+"""Feed-forward and feedback: the slider follows u(th2) on the full plant, and how well.
+
+The force over a sampling period h is
+
+    F2 = F_ff + feedback on (u - u_ref, u' - u_ref')
+
+F_ff is that of inverse dynamics on the model half a period ahead, th2 + w2 h/2, for a force that is held is right in the
+middle of its period: the error then goes with h^2, while that of the force at the sample goes with h. The reference
+goes with the measured crank. The feedback's gains, its integral and its limit are those of `slider_control`.
+
+The plant in the loop may differ from the model in what is not known beforehand: friction, masses, the load at P.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import inf, pi
+from pathlib import Path
+
+import numpy as np
+
+from linkwork.errors import InputError
+from linkwork.five_bar import kinematics
+from linkwork.five_bar.parameters import FiveBarParameters, InitialState
+
+from ..linear.slider_control import LoopResult, SampledController, SliderDesign, check_period, control_loop
+from ..numerics.fourier import FourierSeries
+from .inverse import FloatArray, Load, check_speed, inverse_dynamics, load_at, slider_force
+
+
+class TrackingController:
+    """Feed-forward by inverse dynamics on a model, feedback by a design, or both; a `slider_control.Controller`.
+
+    Parameters
+    ----------
+    parameters : FiveBarParameters
+        Of the model.
+    slider : FourierSeries
+        Reference u(th2) (m).
+    period : float
+        Of sampling (s).
+    design : SliderDesign, optional
+        Of the feedback, on a model in speed drive; by default there is none.
+    feedforward : bool
+        Without it the force that holds the slider on the design's linear model takes its place.
+    load : (float, float) or function of the crank angle
+        At P (N), as far as the feed-forward knows it.
+    limit : float
+        Largest force either way (N).
+
+    Raises
+    ------
+    InputError
+        If there is neither feed-forward nor feedback, or something given is not usable.
+    """
+
+    def __init__(
+        self,
+        parameters: FiveBarParameters,
+        slider: FourierSeries,
+        period: float,
+        *,
+        design: SliderDesign | None = None,
+        feedforward: bool = True,
+        load: Load = (0.0, 0.0),
+        limit: float = inf,
+    ) -> None:
+        check_period(period)
+        if design is None and not feedforward:
+            raise InputError("there is neither feed-forward nor feedback: at least one of them is needed")
+        if design is not None and not design.model.speed_drive:
+            raise InputError("the feedback was designed for a free crank: tracking needs a model in speed drive")
+        if not limit > 0.0:
+            raise InputError(f"limit of the force is {limit} N: it must be greater than zero")
+        self.period = period
+        self.limit = limit
+        self.feedback = None if design is None else SampledController(design, period, limit=limit)
+        self.feedforward = feedforward
+        self.load = load
+        self._p = parameters.constants()
+        self._slider, self._slope = slider, slider.derivative()
+        self._curvature = self._slope.derivative()
+
+    @property
+    def method(self) -> str:
+        """What it consists of."""
+        parts = ["feed-forward"] if self.feedforward else []
+        return " + ".join(parts + ([self.feedback.method] if self.feedback else []))
+
+    def reset(self) -> None:
+        """Forget the integral."""
+        if self.feedback:
+            self.feedback.reset()
+
+    def force(self, measured: Sequence[float], reference: float) -> float:
+        """The force (N) for the next period, from (th2, u, th2', u') and the reference (m)."""
+        th2, u, w2, v = measured
+        if self.feedforward:
+            forward = self._forward(th2 + 0.5 * w2 * self.period, w2)
+        else:
+            assert self.feedback is not None
+            forward = self.feedback.holding_force(reference)
+        if self.feedback is None:
+            return min(max(forward, -self.limit), self.limit)
+        return self.feedback.follow(forward, u - reference, v - w2 * float(self._slope(th2)))
+
+    def _forward(self, th2: float, w2: float) -> float:
+        u, v, a = float(self._slider(th2)), w2 * float(self._slope(th2)), w2 * w2 * float(self._curvature(th2))
+        return slider_force(th2, u, w2, v, a, load_at(self.load, th2), self._p)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TrackingMetrics:
+    """How well a motion was followed over the last turn.
+
+    Attributes
+    ----------
+    rms_error, peak_error : float
+        Of the slider against its reference (m).
+    rms_point_error, peak_point_error : float
+        Of the coupler point P against where the model has it on the reference (m).
+    rms_force, peak_force : float
+        N.
+    mean_power, peak_power : float
+        Of the slider force, the peak either way (W).
+    """
+
+    rms_error: float
+    peak_error: float
+    rms_point_error: float
+    peak_point_error: float
+    rms_force: float
+    peak_force: float
+    mean_power: float
+    peak_power: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class TrackingResult:
+    """A run of the slider along its reference, at the times at which the controller sampled.
+
+    Attributes
+    ----------
+    method : str
+        Of control.
+    crank_speed : float
+        rad/s.
+    loop : LoopResult
+        The run, with the plant's outputs in ``loop.trajectory``.
+    error : ndarray, shape (n,)
+        u - u_ref (m).
+    point_error : ndarray, shape (n,)
+        Distance of P from where the model has it on the reference (m).
+    power : ndarray, shape (n,)
+        Of the slider force, its mean over the period before each sample (W); zero at the first.
+    """
+
+    method: str
+    crank_speed: float
+    loop: LoopResult
+    error: FloatArray
+    point_error: FloatArray
+    power: FloatArray
+
+    def metrics(self) -> TrackingMetrics:
+        """Errors, force and power over the last turn.
+
+        Raises
+        ------
+        InputError
+            If the run ended early.
+        """
+        if self.loop.status:
+            raise InputError(f"the run did not reach its end: {self.loop.message}")
+        time = self.loop.time
+        last = time > time[-1] - 2.0 * pi / abs(self.crank_speed) * (1.0 - 1e-9)
+
+        def rms(values: FloatArray) -> float:
+            return float(np.sqrt(np.mean(values[last] ** 2)))
+
+        def peak(values: FloatArray) -> float:
+            return float(np.abs(values[last]).max())
+
+        return TrackingMetrics(
+            rms_error=rms(self.error),
+            peak_error=peak(self.error),
+            rms_point_error=rms(self.point_error),
+            peak_point_error=peak(self.point_error),
+            rms_force=rms(self.loop.force),
+            peak_force=peak(self.loop.force),
+            mean_power=float(self.power[last].mean()),
+            peak_power=peak(self.power),
+        )
+
+
+def track(
+    parameters: FiveBarParameters,
+    slider: FourierSeries,
+    *,
+    crank_speed: float,
+    period: float,
+    design: SliderDesign | None = None,
+    feedforward: bool = True,
+    revolutions: float = 10.0,
+    plant: FiveBarParameters | None = None,
+    load: Load = (0.0, 0.0),
+    known_load: Load = (0.0, 0.0),
+    limit: float = inf,
+    initial: InitialState | None = None,
+    fmu: str | Path | None = None,
+    tolerance: float = 1e-9,
+) -> TrackingResult:
+    """Let the slider follow u(th2) on the full nonlinear plant, in process or as its FMU.
+
+    Parameters
+    ----------
+    parameters : FiveBarParameters
+        Of the model: the feed-forward's, and the reference's of P.
+    slider : FourierSeries
+        Reference u(th2) (m).
+    crank_speed : float
+        Constant prescribed speed (rad/s).
+    period : float
+        Of sampling (s).
+    design : SliderDesign, optional
+        Of the feedback, by `slider_control` on a model in speed drive, such as the mean one along the reference:
+        ``linearise_along(parameters, inverse_dynamics(...)).mean()``. Without it there is no feedback.
+    feedforward : bool
+        Whether there is feed-forward.
+    revolutions : float
+        Turns of the crank.
+    plant : FiveBarParameters, optional
+        Of the plant; by default it is the model.
+    load, known_load : (float, float) or function of the crank angle
+        At P (N): what acts on the plant, held over a period at its value in the middle of it, and what the feed-forward
+        knows of it.
+    limit : float
+        Largest force either way (N).
+    initial : InitialState, optional
+        By default on the reference at crank angle 0.
+    fmu : path, optional
+        FiveBarSlider.fmu to be run instead of the plant in process.
+    tolerance : float
+        Of the plant's integrator.
+
+    Returns
+    -------
+    TrackingResult
+        A run in which the plant reaches the limit of assembly ends there with a status, a message and all data up to it.
+
+    Raises
+    ------
+    InputError
+        If something given is not usable.
+    AssemblyError
+        If the links of the model cannot be joined somewhere on the reference, or those of the plant at the start.
+    """
+    check_speed(crank_speed)
+    if not 0.0 < revolutions < inf:
+        raise InputError(f"{revolutions} revolutions: they must be a finite number greater than zero")
+    inverse_dynamics(parameters, slider, crank_speed, load=known_load)
+    controller = TrackingController(
+        parameters, slider, period, design=design, feedforward=feedforward, load=known_load, limit=limit
+    )
+    start = initial or InitialState(
+        crank_speed=crank_speed,
+        slider_position=float(slider(0.0)),
+        slider_velocity=crank_speed * float(slider.derivative()(0.0)),
+    )
+
+    def angle(t: float) -> float:
+        return start.crank_angle + crank_speed * t
+
+    loop = control_loop(
+        plant or parameters,
+        controller,
+        lambda t: float(slider(angle(t))),
+        initial=start,
+        stop_time=2.0 * pi * revolutions / abs(crank_speed),
+        crank_speed=crank_speed,
+        load=lambda t: load_at(load, angle(t + 0.5 * period)),
+        fmu=fmu,
+        tolerance=tolerance,
+    )
+    return TrackingResult(
+        method=controller.method,
+        crank_speed=float(crank_speed),
+        loop=loop,
+        error=loop.position - loop.reference,
+        point_error=_point_error(parameters, loop),
+        power=np.append(0.0, loop.force[:-1] * np.diff(loop.position) / np.diff(loop.time)),
+    )
+
+
+def _point_error(parameters: FiveBarParameters, loop: LoopResult) -> FloatArray:
+    """Distance of the coupler point from where the model has it on the reference."""
+    assert loop.trajectory is not None
+    p = parameters.constants()
+    wanted = [
+        kinematics.coupler_point(kinematics.position(th2, u, p), p)
+        for th2, u in zip(loop.states[:, 0].tolist(), loop.reference.tolist())
+    ]
+    there = np.column_stack([loop.trajectory["coupler.point.x"], loop.trajectory["coupler.point.y"]])
+    return np.asarray(np.linalg.norm(there - np.array(wanted), axis=1))

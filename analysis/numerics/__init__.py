@@ -1,0 +1,1 @@
+"""Numerical tools that know no mechanism: tracing, exact derivatives, dual numbers, Fourier series, continuation, curves."""

@@ -1,0 +1,1 @@
+"""Periodic motions: orbits, Floquet multipliers, branches, resonance, stability charts."""

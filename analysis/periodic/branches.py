@@ -1,0 +1,491 @@
+"""Branches of periodic motions: how an orbit changes with a parameter, where it loses its stability, and what branches off.
+
+The parameter is the speed, the torque, a force, any parameter of the FMI contract, or whatever a function of one number
+says. A branch is followed by arclength, past its folds; between its points are located where a Floquet multiplier crosses the
+unit circle: at +1 (fold), at -1 (period doubling), or as a complex pair (torus). From a period doubling one switches to the
+motion of twice the period.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from math import pi
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from linkwork.errors import InputError
+from linkwork.five_bar.parameters import Constants, FiveBarParameters
+from linkwork.five_bar.published import RAD_S_PER_RPM
+from linkwork.five_bar.variables import INPUTS, PARAMETERS
+from linkwork.parameters import field_name
+
+from ..files import io
+from ..numerics.continuation import ContinuationError, Curve, Evaluate, Evaluation, Follower, Point, Settings
+from .floquet import TOLERANCE, Crossing, Stability
+from .orbits import Drive, Period, PeriodicOrbit, Turn, period_from, scale_of
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+#: Parameters of the drive that can vary, by FMI name.
+OF_THE_DRIVE: Mapping[str, str] = {
+    "drive.speed": "speed",
+    "drive.torque": "torque",
+    "slider.force": "slider_force",
+    "load.fx": "load_x",
+    "load.fy": "load_y",
+}
+#: Relative step of the difference by which the constants are differentiated with respect to the parameter. The constants
+#: are smooth functions of it, most of them linear, and the derivative steers Newton's method only.
+_DIFFERENCE = 1e-6
+#: Distance from a period doubling at which the doubled branch is begun, relative to the crank's length.
+_SWITCH = 2e-3
+
+#: Unit of each parameter that can vary.
+UNITS_OF_VARIABLES = {
+    variable.name: variable.unit
+    for variable in (*INPUTS, *PARAMETERS)
+    if variable.name in OF_THE_DRIVE
+    or (field_name(variable.name) in FiveBarParameters.__dataclass_fields__ and variable.kind == "Real")
+}
+
+#: A branch is left where the links come this close to collinear (least |sin| of the transmission angle), or where its
+#: largest multiplier passes the greatest that single shooting follows with certainty.
+LEAST_SINE, GREATEST_MULTIPLIER = 0.02, 1e4
+
+
+def unit_of(name: str) -> str:
+    """Unit of a parameter or input by its FMI name.
+
+    Raises
+    ------
+    InputError
+        If there is nothing of that name.
+    """
+    if name not in UNITS_OF_VARIABLES:
+        raise InputError(f"there is no {name}: what can vary is {', '.join(UNITS_OF_VARIABLES)}")
+    return UNITS_OF_VARIABLES[name]
+
+
+def told(name: str, value: float, unit: str) -> str:
+    """A value in words, with its unit; speeds in rpm too."""
+    rpm = f" ({value / RAD_S_PER_RPM:.6g} rpm)" if unit == "rad/s" else ""
+    return f"{name} = {value:.6g} {unit}".rstrip() + rpm
+
+
+def require_drive(drive: Drive, name: str) -> None:
+    """Refuse a speed that varies under a torque, and a torque at prescribed speed.
+
+    Raises
+    ------
+    InputError
+        If the parameter does not act in this drive.
+    """
+    if name in ("drive.speed", "drive.torque") and (name == "drive.speed") != drive.speed_drive:
+        raise InputError(f"{name} cannot vary: the drive is by {'speed' if drive.speed_drive else 'torque'}")
+
+
+def with_values(
+    parameters: FiveBarParameters, drive: Drive, values: Mapping[str, float]
+) -> tuple[FiveBarParameters, Drive]:
+    """Mechanism and drive with other values of parameters by their FMI names."""
+    of_drive: dict[str, Any] = {OF_THE_DRIVE[name]: value for name, value in values.items() if name in OF_THE_DRIVE}
+    of_mechanism: dict[str, Any] = {field_name(name): v for name, v in values.items() if name not in OF_THE_DRIVE}
+    return (
+        replace(parameters, **of_mechanism) if of_mechanism else parameters,
+        replace(drive, **of_drive) if of_drive else drive,
+    )
+
+
+#: What varies: an FMI name, or a function of one number.
+Vary = str | Callable[[float], tuple[FiveBarParameters, Drive]]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Family:
+    """Periodic motions of a mechanism as one parameter varies.
+
+    Attributes
+    ----------
+    parameters : FiveBarParameters
+    drive : Drive
+    vary : str or callable
+        ``drive.speed``, ``drive.torque``, ``slider.force``, ``load.fx``, ``load.fy``, a parameter of the FMI contract such as
+        ``slider.damping``, or a function from a number to (FiveBarParameters, Drive).
+    name, unit : str
+        Of the parameter, for tables and plots; they follow from an FMI name.
+
+    Raises
+    ------
+    InputError
+        If there is nothing of that name, or it does not act in this drive.
+    """
+
+    parameters: FiveBarParameters
+    drive: Drive
+    vary: Vary = "drive.speed"
+    name: str = ""
+    unit: str = ""
+
+    def __post_init__(self) -> None:
+        if callable(self.vary):
+            object.__setattr__(self, "name", self.name or "parameter")
+            return
+        if self.vary not in UNITS_OF_VARIABLES:
+            raise InputError(
+                f"{self.vary!r} cannot vary: it must be one of {', '.join(UNITS_OF_VARIABLES)}, or a function"
+            )
+        require_drive(self.drive, self.vary)
+        object.__setattr__(self, "name", self.name or self.vary)
+        object.__setattr__(self, "unit", self.unit or unit_of(self.vary))
+
+    def at(self, value: float) -> tuple[FiveBarParameters, Drive]:
+        """Mechanism and drive at a value of the parameter."""
+        if callable(self.vary):
+            return self.vary(value)
+        return with_values(self.parameters, self.drive, {self.vary: value})
+
+    def tell(self, value: float) -> str:
+        """A value of the parameter in words, with its unit; speeds in rpm too."""
+        return told(self.name, value, self.unit)
+
+    def _direction(self, value: float, low: float, high: float) -> tuple[NDArray[np.float64], Constants]:
+        """Derivatives of drive vector and constants with respect to the parameter, by differences inside its range."""
+        step = _DIFFERENCE * max(abs(value), 1e-3 * (high - low))
+        a, b = max(value - step, low), min(value + step, high)
+        (p0, d0), (p1, d1) = self.at(a), self.at(b)
+        return (
+            (d1.vector() - d0.vector()) / (b - a),
+            Constants(*((y - x) / (b - a) for x, y in zip(p0.constants(), p1.constants()))),
+        )
+
+    def evaluate(self, turns: int, low: float, high: float) -> Evaluate:
+        """y(T) - y(0) with its derivatives over a range, as `continuation` follows it; its data are the `PeriodicOrbit`.
+
+        Beyond the range, where there may be no mechanism (friction below zero), it goes on in a straight line, so that a
+        branch can be followed up to the very end.
+        """
+
+        def evaluation(y: NDArray[np.float64], value: float) -> Evaluation:
+            inside = min(max(value, low), high)
+            parameters, drive = self.at(inside)
+            period = period_from(parameters, drive, y, turns, self._direction(inside, low, high), high - low)
+            residual = period.shift + period.slope * (value - inside)
+            orbit = orbit_from(parameters, drive, y, turns, period)
+            return Evaluation(residual, period.monodromy - np.eye(len(y)), period.slope, orbit)
+
+        return evaluation
+
+
+def orbit_from(
+    parameters: FiveBarParameters, drive: Drive, start: NDArray[np.float64], turns: int, period: Period
+) -> PeriodicOrbit:
+    """The orbit that one period from its start is, as far as it closes."""
+    return PeriodicOrbit(
+        parameters=parameters,
+        drive=drive,
+        turns=turns,
+        start=start.copy(),
+        monodromy=period.monodromy,
+        residual=float(np.abs(period.shift / scale_of(parameters, drive, start)).max()),
+        iterations=1,
+    )
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class SpecialPoint:
+    """Where a multiplier crosses the unit circle on a branch.
+
+    Attributes
+    ----------
+    kind : Crossing
+        FOLD, PERIOD_DOUBLING or TORUS.
+    parameter : float
+    orbit : PeriodicOrbit
+    after : int
+        Number of the branch's point after which it lies.
+    """
+
+    kind: Crossing
+    parameter: float
+    orbit: PeriodicOrbit
+    after: int
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Branch:
+    """Orbits along a curve, in its order.
+
+    Attributes
+    ----------
+    family : Family
+    turns : int
+        Turns of the crank in a period.
+    parameter : ndarray, shape (m,)
+    orbits : tuple of PeriodicOrbit
+    special : tuple of SpecialPoint
+    reached, closed : bool
+        Whether it ended at an end of the range or where it began; where it began.
+    reason : str
+        Why it ended. Where the branch was lost, its last point is the last good one.
+    """
+
+    family: Family
+    turns: int
+    parameter: NDArray[np.float64]
+    orbits: tuple[PeriodicOrbit, ...]
+    special: tuple[SpecialPoint, ...]
+    reached: bool
+    closed: bool
+    reason: str
+    # what `columns` has computed
+    _table: dict[str, NDArray[np.float64]] = field(default_factory=dict, init=False, repr=False)
+
+    def __len__(self) -> int:
+        return len(self.orbits)
+
+    @property
+    def amplitude(self) -> NDArray[np.float64]:
+        """Half the range of the slider position at each point (m), shape (m,)."""
+        return self.columns()["amplitude of u [m]"]
+
+    @property
+    def largest_multiplier(self) -> NDArray[np.float64]:
+        """Largest modulus of the Floquet multipliers at each point, shape (m,)."""
+        return np.array([orbit.largest for orbit in self.orbits])
+
+    def stability(self, tolerance: float = TOLERANCE) -> tuple[Stability, ...]:
+        """Verdict at each point."""
+        return tuple(orbit.verdict(tolerance).stability for orbit in self.orbits)
+
+    def columns(self) -> Mapping[str, NDArray[np.float64]]:
+        """What varies along the branch, by name with unit, each of shape (m,).
+
+        The parameter, mean speed (under a torque), turns in a period, amplitude, mean and first harmonics of u, largest
+        multiplier, stability, mean and greatest crank torque, greatest pin and guide forces, least transmission sine.
+        """
+        if not self._table:
+            turns = [orbit.turn() for orbit in self.orbits]
+            self._table.update({name: np.array([value(turn) for turn in turns]) for name, value in _OF_A_TURN.items()})
+        unit = f" [{self.family.unit}]" if self.family.unit else ""
+        first = {
+            f"{self.family.name}{unit}": self.parameter,
+            "turns in a period [1]": np.full(len(self), float(self.turns)),
+            "largest multiplier [1]": self.largest_multiplier,
+            "stable (1), marginal (0), unstable (-1)": np.array([_SIGN[s] for s in self.stability()]),
+        }
+        return first | self._table
+
+    def to_csv(self, path: str | Path) -> Path:
+        """Write the branch as a table, a row a point; see `columns`."""
+        return io.write_csv(path, self.columns())
+
+    def plot(self, *, title: str = "") -> Figure:
+        """Amplitude over the parameter, stable parts solid, with its special points."""
+        from .. import figures
+
+        return figures.plot_branches([self], title=title)
+
+
+def _greatest_of(pin: str) -> Callable[[Turn], float]:
+    return lambda turn: float(np.hypot(turn[f"pin.{pin}.fx"], turn[f"pin.{pin}.fy"]).max())
+
+
+#: Columns of a branch that come from the outputs over a period.
+_OF_A_TURN: Mapping[str, Callable[[Turn], float]] = {
+    "mean crank speed [rad/s]": lambda turn: 2.0 * pi * turn.turns / turn.period,
+    "amplitude of u [m]": lambda turn: turn.amplitude,
+    "mean of u [m]": lambda turn: float(turn["slider.position"].mean()),
+    "harmonic 1 of u [m]": lambda turn: turn.harmonic("slider.position", 1),
+    "harmonic 2 of u [m]": lambda turn: turn.harmonic("slider.position", 2),
+    "harmonic 3 of u [m]": lambda turn: turn.harmonic("slider.position", 3),
+    "mean crank torque [N.m]": lambda turn: float(turn["drive.applied_torque"].mean()),
+    "greatest crank torque [N.m]": lambda turn: float(np.abs(turn["drive.applied_torque"]).max()),
+    "greatest force in pin A [N]": _greatest_of("A"),
+    "greatest force in pin B [N]": _greatest_of("B"),
+    "greatest force in pin C [N]": _greatest_of("C"),
+    "greatest force in pin D [N]": _greatest_of("D"),
+    "greatest guide force [N]": lambda turn: float(np.abs(turn["slider.guide_force"]).max()),
+    "least sine of the transmission angle [1]": lambda turn: float(np.abs(np.sin(turn["transmission.angle"])).min()),
+}
+
+_SIGN = {Stability.STABLE: 1.0, Stability.MARGINAL: 0.0, Stability.UNSTABLE: -1.0}
+
+
+def follow(
+    family: Family,
+    orbit: PeriodicOrbit,
+    value: float,
+    *,
+    low: float,
+    high: float,
+    direction: int = 1,
+    first: float = 5e-3,
+    greatest: float = 2e-2,
+    most_points: int = 5000,
+    watch: Callable[[float], None] | None = None,
+    stop: Callable[[], bool] | None = None,
+) -> Branch:
+    """Follow the branch through an orbit to an end of the range of the parameter.
+
+    Parameters
+    ----------
+    family : Family
+    orbit : PeriodicOrbit
+        At the value of the parameter.
+    value : float
+        Where to begin, from ``low`` to ``high``.
+    low, high : float
+        Range of the parameter.
+    direction : int
+        +1 to higher values at first, -1 to lower.
+    first, greatest : float
+        Steps in scaled arc length: the range has length 1, and the crank's length counts as 1.
+    most_points : int
+    watch : callable, optional
+        Told the parameter of every point.
+    stop : callable, optional
+        Asked at every point whether to leave it at that.
+
+    Returns
+    -------
+    Branch
+        As far as it could be followed; ``reason`` says why it ended.
+
+    Raises
+    ------
+    ContinuationError
+        If the orbit is not on the family.
+    """
+    settings = Settings(low=low, high=high, first=min(first, greatest), greatest=greatest, most_points=most_points)
+    follower = _follower(family, orbit, settings)
+    return _branch(family, orbit.turns, follower, follower.start(orbit.start, value, direction), watch, stop)
+
+
+def switch(
+    family: Family,
+    doubling: SpecialPoint,
+    *,
+    low: float,
+    high: float,
+    first: float = 5e-3,
+    greatest: float = 2e-2,
+    most_points: int = 5000,
+    watch: Callable[[float], None] | None = None,
+    stop: Callable[[], bool] | None = None,
+) -> Branch:
+    """The branch of twice the period that leaves a branch at a period doubling.
+
+    Raises
+    ------
+    InputError
+        If the point is no period doubling.
+    ContinuationError
+        If no point on the new branch is found.
+    """
+    if doubling.kind is not Crossing.PERIOD_DOUBLING:
+        raise InputError(
+            f"the point at {doubling.parameter:.9g} is a {doubling.kind.value}: only a period doubling has a branch"
+        )
+    orbit = doubling.orbit
+    settings = Settings(low=low, high=high, first=min(first, greatest), greatest=greatest, most_points=most_points)
+    doubled = replace(orbit, turns=2 * orbit.turns, monodromy=orbit.monodromy @ orbit.monodromy)
+    follower = _follower(family, doubled, settings)
+    # the eigenvector of the multiplier -1 is the direction in which every second period differs
+    scale = follower.scale[:-1]
+    scaled = (orbit.monodromy + np.eye(len(scale))) * scale / scale[:, None]
+    vector = np.linalg.svd(scaled)[2][-1] * scale
+    base = follower.along(orbit.start, doubling.parameter, np.append(vector, 0.0))
+    for length in (_SWITCH, 4.0 * _SWITCH, 0.25 * _SWITCH, 16.0 * _SWITCH):
+        taken = follower.step(base, length)
+        # back on the undoubled branch the start repeats itself after half the period
+        if (
+            taken is not None
+            and abs(float((taken[0].y / scale - orbit.start / scale) @ (vector / scale))) > 0.5 * length
+        ):
+            return _branch(family, doubled.turns, follower, taken[0], watch, stop)
+    raise ContinuationError(f"the motion of twice the period is not met next to {family.tell(doubling.parameter)}")
+
+
+def _follower(family: Family, orbit: PeriodicOrbit, settings: Settings) -> Follower:
+    ends = [family.at(value) for value in (settings.low, settings.high)]
+    scale = np.max([scale_of(parameters, drive, orbit.start) for parameters, drive in ends], axis=0)
+    return Follower(family.evaluate(orbit.turns, settings.low, settings.high), scale, settings)
+
+
+def reason_to_leave(point: Point) -> str:
+    """Why a branch is not followed beyond a point; empty where it is."""
+    orbit = point.data
+    if orbit.largest > GREATEST_MULTIPLIER:
+        return f"its largest multiplier passes {GREATEST_MULTIPLIER:g}"
+    sine = float(np.abs(np.sin(orbit.turn(64)["transmission.angle"])).min())
+    if sine < LEAST_SINE:
+        return f"the links come near to collinear (sine of the transmission angle {sine:.3g})"
+    return ""
+
+
+def _branch(
+    family: Family,
+    turns: int,
+    follower: Follower,
+    first: Point,
+    watch: Callable[[float], None] | None,
+    stop: Callable[[], bool] | None,
+) -> Branch:
+    curve = follower.follow(
+        first,
+        watch=None if watch is None else lambda point: watch(point.parameter),
+        leave=lambda point: "it was interrupted" if stop is not None and stop() else reason_to_leave(point),
+    )
+    special = _special_points(curve, follower)
+    return Branch(
+        family=family,
+        turns=turns,
+        parameter=np.array([point.parameter for point in curve.points]),
+        orbits=tuple(point.data for point in curve.points),
+        special=tuple(special),
+        reached=curve.reached,
+        closed=curve.closed,
+        reason=curve.reason,
+    )
+
+
+def crossing_value(kind: Crossing, orbit: PeriodicOrbit) -> float:
+    """Smooth function of an orbit that is zero where a multiplier is +1, -1, or a pair has the product 1."""
+    monodromy = orbit.monodromy
+    if kind is Crossing.TORUS:
+        mu = orbit.multipliers
+        return float(np.prod([mu[i] * mu[j] - 1.0 for i in range(len(mu)) for j in range(i)]).real)
+    sign = 1.0 if kind is Crossing.FOLD else -1.0
+    return float(np.linalg.det(monodromy - sign * np.eye(len(monodromy))))
+
+
+def _tests(point: Point) -> dict[Crossing, float]:
+    """What changes its sign along a branch where a multiplier crosses the unit circle."""
+    # det(M - 1) is zero where a branch is crossed as well; the parameter turns back at a fold only
+    return {
+        kind: float(point.tangent[-1]) if kind is Crossing.FOLD else crossing_value(kind, point.data)
+        for kind in Crossing
+    }
+
+
+def _special_points(curve: Curve, follower: Follower) -> list[SpecialPoint]:
+    found: list[tuple[int, float, SpecialPoint]] = []
+    values = [_tests(point) for point in curve.points]
+    for i, length in enumerate(curve.steps):
+        for kind in Crossing:
+            # at prescribed speed the product of the two multipliers follows from the damping alone and crosses nothing
+            if kind is Crossing.TORUS and curve.points[i].data.drive.speed_drive:
+                continue
+            if not values[i][kind] * values[i + 1][kind] < 0.0:
+                continue
+            point, s = follower.locate(curve.points[i], length, lambda p, kind=kind: _tests(p)[kind])  # type: ignore[misc]
+            # a real pair with the product 1 is no torus
+            if kind is Crossing.TORUS and abs(point.data.multipliers[0].imag) < 1e-6:
+                continue
+            found.append((i, s, SpecialPoint(kind=kind, parameter=point.parameter, orbit=point.data, after=i)))
+    return [special for _, _, special in sorted(found, key=lambda entry: entry[:2])]

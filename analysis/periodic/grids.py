@@ -1,0 +1,202 @@
+"""Grids of the largest Floquet multiplier, each point on its own periodic orbit: over cores, kept on disk, gone on with."""
+
+from __future__ import annotations
+
+import hashlib
+import inspect
+import warnings
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import joblib
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from linkwork.errors import InputError, Interrupted, LinkworkError
+
+from ..files import io
+from ..run.compiled import cache_folder
+from ..run.simulate import interruptible, shown
+from . import floquet, orbit_kernels, orbits
+from .floquet import TOLERANCE, Stability
+from .planes import Operation, Plane
+
+
+class GridInterrupted(Interrupted):
+    """A grid was interrupted; the rows that were done are kept and the same call goes on from there.
+
+    Attributes
+    ----------
+    done, rows : int
+    """
+
+    def __init__(self, done: int, rows: int, folder: Path) -> None:
+        self.done = done
+        self.rows = rows
+        super().__init__(
+            f"interrupted with {done} of {rows} rows done, which are kept in {folder}: call again to go on"
+        )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Grid:
+    """The largest multiplier of the true orbit over a grid.
+
+    Attributes
+    ----------
+    x, y : ndarray, shapes (nx,) and (ny,)
+    largest : masked array, shape (ny, nx)
+        Largest modulus of the Floquet multipliers; masked where no orbit was found.
+    starts : ndarray, shape (ny, nx, n)
+        u (m) and u' (m/s) of the orbits at crank angle 0, under a torque the crank speed (rad/s) too; NaN where ``largest``
+        is masked.
+    status : ndarray of int, shape (ny, nx)
+        0, or why there is no orbit: a key of `orbit_kernels.REASONS`.
+    computed : int
+        Rows that were not in the cache.
+    """
+
+    x: NDArray[np.float64]
+    y: NDArray[np.float64]
+    largest: np.ma.MaskedArray[Any, np.dtype[np.float64]]
+    starts: NDArray[np.float64]
+    status: NDArray[np.int64]
+    computed: int
+
+    def reason(self, row: int, column: int) -> str:
+        """Why a point has no orbit; empty if it has one."""
+        return orbit_kernels.REASONS.get(int(self.status[row, column]), "")
+
+    def stability(self, tolerance: float = TOLERANCE) -> NDArray[Any]:
+        """`Stability` of each point, None where no orbit was found; an array of objects of shape (ny, nx)."""
+        margin = 1.0 - self.largest.filled(np.nan)
+        result = np.full(margin.shape, Stability.MARGINAL, dtype=object)
+        result[margin > tolerance] = Stability.STABLE
+        result[margin < -tolerance] = Stability.UNSTABLE
+        result[np.isnan(margin)] = None
+        return result
+
+
+def grid_folder() -> Path:
+    """Folder of the rows of grids that have been computed, beside that of the compiled code."""
+    return cache_folder().parent / "grids"
+
+
+def _sources() -> bytes:
+    """What the rows depend on beside their arguments: the plant's sources, by the cache's name, and those used here."""
+    digest = hashlib.sha256(cache_folder().name.encode())
+    for module in (orbit_kernels, orbits, floquet):
+        digest.update(inspect.getsource(module).encode())
+    return digest.digest()
+
+
+def grid(
+    operation: Plane,
+    x: ArrayLike,
+    y: ArrayLike,
+    *,
+    start: ArrayLike | None = None,
+    tolerance: float = orbits.INTEGRATOR_TOLERANCE,
+    folder: str | Path | None = None,
+    n_jobs: int | None = None,
+    progress: bool = False,
+) -> Grid:
+    """The largest Floquet multiplier of the true orbit at every point of a grid.
+
+    Each row is a task of joblib and, once done, a file in the cache, under a name that tells all it depends on: mechanisms,
+    speeds, guess, tolerance and sources. An interrupted grid goes on from the rows that are there.
+
+    Parameters
+    ----------
+    operation : callable
+        See `plane`.
+    x, y : array_like, shapes (nx,) and (ny,)
+        Values of the axes.
+    start : array_like, shape (2,) or (3,), optional
+        Guess of the first orbit of each row; see `find_orbit`.
+    tolerance : float
+        Bound of the integrator's local error.
+    folder : path, optional
+        Of the cache; `grid_folder` by default.
+    n_jobs : int, optional
+        Cores, as `joblib.Parallel`.
+    progress : bool
+        Show a progress bar.
+
+    Raises
+    ------
+    InputError
+        If an axis is empty or not finite, or there are no cores.
+    ParameterError
+        If a point is no mechanism.
+    GridInterrupted
+        On Ctrl-C.
+    """
+    xs, ys = (np.array(axis, dtype=float, ndmin=1) for axis in (x, y))
+    for name, axis in (("x", xs), ("y", ys)):
+        if axis.ndim != 1 or len(axis) == 0 or not np.isfinite(axis).all():
+            raise InputError(f"the axis {name} of a grid must be finite numbers, at least one")
+    if n_jobs == 0:
+        raise InputError("0 cores: it must be a number of them, or -1 for all")
+    guess = orbits.guess_of(operation(float(xs[0]), float(ys[0]))[1], start)
+    where = grid_folder() if folder is None else Path(folder)
+    where.mkdir(parents=True, exist_ok=True)
+    sources = _sources()
+    paths, missing = [], []
+    for value in ys.tolist():
+        row = [operation(first, value) for first in xs.tolist()]
+        digest = hashlib.sha256(sources)
+        digest.update(np.array([(*p.constants(), *drive.vector(), drive.speed_drive) for p, drive in row]).tobytes())
+        digest.update(np.array([*guess, tolerance]).tobytes())
+        path = where / f"{digest.hexdigest()[:32]}.npy"
+        paths.append(path)
+        if _read(path, len(xs), len(guess)) is None:
+            missing.append((path, row))
+    done = len(paths) - len(missing)
+    with interruptible() as interrupted, shown(progress, float(len(paths)), "stability") as show:
+        show(float(done))
+        tasks = (joblib.delayed(_compute_row)(path, row, guess, tolerance) for path, row in missing)
+        results = joblib.Parallel(n_jobs=n_jobs, return_as="generator_unordered")(tasks)
+        try:
+            for _ in results:
+                done += 1
+                show(float(done))
+                if interrupted:
+                    break
+        except KeyboardInterrupt:  # of a worker, or of one who raises it himself
+            interrupted.append(True)
+        finally:
+            with warnings.catch_warnings():
+                # that rows were cancelled is what was asked for
+                warnings.filterwarnings("ignore", message=".*still being processed", category=UserWarning)
+                results.close()
+        if interrupted and done < len(paths):
+            raise GridInterrupted(done, len(paths), where)
+    rows = [_read(path, len(xs), len(guess)) for path in paths]
+    if any(row is None for row in rows):
+        raise LinkworkError(f"a row of the grid cannot be read back from {where}")
+    data = np.array(rows, dtype=float)
+    status = data[..., -1].astype(np.int64)
+    return Grid(
+        x=xs,
+        y=ys,
+        largest=np.ma.MaskedArray(data[..., 0], mask=status != orbit_kernels.DONE),
+        starts=data[..., 1:-1],
+        status=status,
+        computed=len(missing),
+    )
+
+
+def _compute_row(path: Path, row: Sequence[Operation], guess: NDArray[np.float64], tolerance: float) -> None:
+    """Compute a row and write its file, which is there as a whole or not at all."""
+    mechanisms, drives = [p for p, _ in row], [drive for _, drive in row]
+    values, starts, status = orbits.largest_multipliers(mechanisms, drives, guess, tolerance=tolerance)
+    io.save_array(path, np.column_stack([values, starts, status]))
+
+
+def _read(path: Path, count: int, size: int) -> NDArray[np.float64] | None:
+    """A row from its file, columns multiplier, start (of ``size`` components) and status; None if it is not there."""
+    row = io.load_array(path)
+    return row if row is not None and row.shape == (count, size + 2) else None

@@ -1,0 +1,425 @@
+"""Stability of the periodic motion: test functions for charts, damping that removes a region, verdicts put to the test.
+
+A test function of a point of a plane (`planes`) is negative in a region of instability and zero on its boundary, where a
+Floquet multiplier is +1 or -1: of the linear equation about u = 0 (`linear_test`), as the thesis has it, or of the mechanism's
+own periodic orbit (`orbit_test`), which is right. `boundaries` traces where it is zero, `removing_damping` finds where a region
+ends, `grids` computes the largest multiplier of every point of a grid, and `confirm` puts a verdict to the test of a long
+nonlinear run.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import Enum
+from functools import cache
+from math import exp, log, pi
+
+import numpy as np
+import scipy.linalg
+from numpy.typing import ArrayLike, NDArray
+from scipy.optimize import brentq
+
+from linkwork.errors import InputError, LinkworkError
+from linkwork.five_bar.parameters import FiveBarParameters, InitialState
+
+from ..numerics.boundaries import Test, lowest
+from ..run.inputs import Inputs
+from ..run.simulate import simulate
+from ..youssef.hill import PeriodicEquation, crossing_test, monodromy
+from ..youssef.slider_equation import Load, Variant, slider_equation
+from .floquet import TOLERANCE, Stability, StabilityVerdict, multipliers, verdict
+from .grids import Grid
+from .orbits import Drive, OrbitError, PeriodicOrbit, orbit_of, period_from, scale_of
+from .planes import Plane
+
+#: Monodromy matrix at a point of a plane, shape (n, n).
+Monodromy = Callable[[float, float], NDArray[np.float64]]
+
+
+def linear_equation(parameters: FiveBarParameters, drive: Drive, variant: Variant = Variant.EXACT) -> PeriodicEquation:
+    """The slider's equation about u = 0, which is the motion only where nothing drives it: the thesis's.
+
+    Raises
+    ------
+    InputError
+        If the drive is by torque.
+    """
+    if drive.speed is None:
+        raise InputError("the linear equation is at constant speed: the drive is by torque")
+    load = Load(x=drive.load_x, y=drive.load_y, slider=drive.slider_force)
+    a, b, c = slider_equation(parameters, drive.speed, variant=variant, load=load).coefficients()
+    return PeriodicEquation(a=a, b=b, c=c)
+
+
+def linear_verdict(
+    parameters: FiveBarParameters, drive: Drive, *, variant: Variant = Variant.EXACT, tolerance: float = TOLERANCE
+) -> StabilityVerdict:
+    """The verdict on u = 0 by the linear equation; that on the true motion is `PeriodicOrbit.verdict`."""
+    return verdict(multipliers(monodromy(linear_equation(parameters, drive, variant))), tolerance)
+
+
+def linear_monodromy(operation: Plane, *, variant: Variant = Variant.EXACT) -> Monodromy:
+    """Monodromy matrix of the linear equation about u = 0 over a plane; points are remembered."""
+
+    @cache
+    def matrix(x: float, y: float) -> NDArray[np.float64]:
+        return monodromy(linear_equation(*operation(x, y), variant))
+
+    return matrix
+
+
+def orbit_monodromy(operation: Plane, *, start: ArrayLike | None = None) -> Monodromy:
+    """Monodromy matrix of the mechanism's own periodic orbit of one turn over a plane; points are remembered.
+
+    Each orbit is sought from the one found last, so that neighbouring points stay on one branch, then from the first guess; the
+    first by all the ways of `find_orbit`.
+
+    Parameters
+    ----------
+    start : array_like, shape (2,) or (3,), optional
+        Guess of the first: see `find_orbit`.
+    """
+    first = None if start is None else np.array(start, dtype=float)
+    last, found = first, False
+
+    @cache
+    def matrix(x: float, y: float) -> NDArray[np.float64]:
+        nonlocal last, found
+        parameters, drive = operation(x, y)
+        try:
+            orbit = orbit_of(parameters, drive, start=last, settle=not found)
+        except OrbitError:
+            if not found:
+                raise
+            orbit = orbit_of(parameters, drive, start=first, settle=False)
+        last, found = orbit.start, True
+        return orbit.monodromy
+
+    return matrix
+
+
+def test_of(matrix: Monodromy, multiplier: int) -> Test:
+    """Test function det(I - multiplier Phi) of a monodromy matrix over a plane; ``multiplier`` is +1 or -1."""
+    return lambda x, y: float(crossing_test(matrix(x, y), multiplier))
+
+
+def linear_test(operation: Plane, multiplier: int, *, variant: Variant = Variant.EXACT) -> Test:
+    """`test_of` of `linear_monodromy`."""
+    return test_of(linear_monodromy(operation, variant=variant), multiplier)
+
+
+def orbit_test(operation: Plane, multiplier: int, *, start: ArrayLike | None = None) -> Test:
+    """`test_of` of `orbit_monodromy`."""
+    return test_of(orbit_monodromy(operation, start=start), multiplier)
+
+
+# Removing damping
+
+
+class RemovalError(LinkworkError):
+    """The damping asked for does not lie in the range given."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RemovingDamping:
+    """The damping at which a region vanishes, and the point at which it does last.
+
+    Attributes
+    ----------
+    damping : float
+        In the unit of the range given.
+    x : float
+        The other parameter at the tip of the region.
+    residual : float
+        The test function there.
+    """
+
+    damping: float
+    x: float
+    residual: float
+
+
+def removing_damping(
+    test: Callable[[float, float], float],
+    x: tuple[float, float],
+    damping: tuple[float, float],
+    *,
+    samples: int = 40,
+    tolerance: float = 1e-8,
+) -> RemovingDamping:
+    """Damping at which a region of instability vanishes: where the least value of its test function is zero.
+
+    Parameters
+    ----------
+    test : callable
+        Test function of (x, damping).
+    x : (float, float)
+        Range of the other parameter, with this region and no other in it.
+    damping : (float, float)
+        Range in which the region vanishes: it is there at the lower end and not at the upper one.
+    samples : int
+        Of x, from which the least value is sought.
+    tolerance : float
+        Of the damping, relative to its upper end.
+
+    Raises
+    ------
+    RemovalError
+        If the region is not there at the lower end, or still there at the upper one.
+    LinkworkError
+        As the test function.
+    """
+
+    def least(d: float) -> float:
+        return lowest(lambda s: test(s, d), *x, samples=samples)[1]
+
+    low, high = (least(d) for d in damping)
+    if not low < 0.0:
+        raise RemovalError(f"there is no region between {x[0]:g} and {x[1]:g} at the damping {damping[0]:g}")
+    if not high > 0.0:
+        raise RemovalError(f"the region between {x[0]:g} and {x[1]:g} is still there at the damping {damping[1]:g}")
+    found = float(brentq(least, *damping, xtol=0.1 * tolerance * damping[1], rtol=1e-14))
+    place, value = lowest(lambda s: test(s, found), *x, samples=samples)
+    return RemovingDamping(damping=found, x=place, residual=value)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class WorstDamping:
+    """The greatest of the removing dampings over a further parameter: it removes the region everywhere.
+
+    Attributes
+    ----------
+    damping, x, other : float
+        The damping, and the point at which the region vanishes last.
+    """
+
+    damping: float
+    x: float
+    other: float
+
+
+def removing_damping_over(
+    test: Callable[[float, float, float], float],
+    x: Callable[[float], tuple[float, float]],
+    damping: tuple[float, float],
+    other: tuple[float, float],
+    *,
+    samples: int = 5,
+    tolerance: float = 1e-8,
+) -> WorstDamping:
+    """Damping that removes a region for every value of a further parameter.
+
+    Parameters
+    ----------
+    test : callable
+        Test function of (x, damping, other).
+    x : callable
+        Range of x at a value of the other parameter; see `removing_damping`.
+    damping : (float, float)
+    other : (float, float)
+        Range of the further parameter.
+    samples : int
+        Of it, from which the worst is sought.
+    tolerance : float
+        See `removing_damping`.
+    """
+
+    def removing(value: float) -> RemovingDamping:
+        return removing_damping(lambda s, d: test(s, d, value), x(value), damping, tolerance=tolerance)
+
+    worst, _ = lowest(lambda value: -removing(value).damping, *other, samples=samples, tolerance=1e-4)
+    found = removing(worst)
+    return WorstDamping(damping=found.damping, x=found.x, other=worst)
+
+
+# Long runs
+
+
+class Outcome(Enum):
+    """What a deviation did in a long run."""
+
+    DECAYS = "decays"
+    BOUNDED = "stays bounded"
+    GROWS = "grows"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Confirmation:
+    """A verdict beside a long run of the nonlinear mechanism from close to its periodic orbit.
+
+    Attributes
+    ----------
+    verdict : StabilityVerdict
+        By the multipliers of the orbit.
+    outcome : Outcome
+    growth : float
+        Factor a turn of the deviation along the leading multiplier's direction, by regression over the turns up to the first
+        at which it is lost in noise or greater than a hundredth of the crank.
+    deviations : ndarray, shape (n,)
+        Distance from the orbit at the crank angle 0 of each turn, relative to that at the start. It ends before the others
+        if the run does.
+    message : str
+        Why the run ended early; empty if it did not.
+    """
+
+    verdict: StabilityVerdict
+    outcome: Outcome
+    growth: float
+    deviations: NDArray[np.float64]
+    message: str
+
+    @property
+    def agrees(self) -> bool:
+        """Whether the run does what the verdict says; a marginal motion must neither decay nor grow.
+
+        A margin too small for the turns that were run is judged by the measured growth, which must be that of the multiplier.
+        """
+        expected = {
+            Stability.STABLE: Outcome.DECAYS,
+            Stability.UNSTABLE: Outcome.GROWS,
+            Stability.MARGINAL: Outcome.BOUNDED,
+        }
+        if self.outcome is expected[self.verdict.stability]:
+            return True
+        margin = abs(self.verdict.margin)
+        return self.outcome is Outcome.BOUNDED and abs(self.growth - 1.0 + self.verdict.margin) < 0.1 * margin
+
+
+#: Start of a long run: distance from the orbit relative to the crank's length, and the range over which growth is measured.
+DISTURBANCE, NOISE, LINEAR = 1e-5, 1e-8, 1e-2
+#: Margin from which on a long run tells growth from decay with certainty.
+MEASURABLE = 1e-2
+#: Turns of a run at least, and at most.
+FEWEST_TURNS, MOST_TURNS = 1000, 20_000
+#: Growth or decay over a run, of the envelope, from which it counts.
+NOTABLE = 3.0
+
+
+def confirm(
+    parameters: FiveBarParameters,
+    drive: Drive,
+    *,
+    turns: int | None = None,
+    start: ArrayLike | None = None,
+    disturbance: float = DISTURBANCE,
+    tolerance: float = TOLERANCE,
+) -> Confirmation:
+    """Run the nonlinear mechanism for many turns from a slightly disturbed periodic orbit.
+
+    Parameters
+    ----------
+    parameters : FiveBarParameters
+    drive : Drive
+    turns : int, optional
+        At least 20. Without it 1000, and more, up to 20000, where the margin is too small for them to tell growth from decay.
+    start : array_like, shape (2,) or (3,), optional
+        Guess of the orbit.
+    disturbance : float
+        Distance from the orbit at the start relative to the crank's length, in the direction that grows most.
+    tolerance : float
+        Of the verdict.
+
+    Raises
+    ------
+    OrbitError
+        If there is no periodic orbit.
+    InputError
+        If the number of turns or the disturbance is not usable.
+    LinkworkError
+        If the deviation grows or dies too fast to be measured.
+    """
+    if (turns is not None and turns < 20) or not NOISE < disturbance < LINEAR:
+        raise InputError(
+            f"{turns} turns from a disturbance of {disturbance}: 20 and more, and between {NOISE:g} and {LINEAR:g}"
+        )
+    orbit = orbit_of(parameters, drive, start=start)
+    verdict = orbit.verdict(tolerance)
+    if turns is None:
+        # as many as change the deviation by more than NOTABLE, where that can be had
+        turns = int(min(MOST_TURNS, max(FEWEST_TURNS, 2.0 * log(NOTABLE) / max(abs(verdict.margin), 1e-12))))
+    scale = scale_of(parameters, drive, orbit.start)
+    direction, measure = _leading(orbit, scale)
+    begin = orbit.start + disturbance * scale * direction
+    passed, message = _passages(parameters, drive, begin, turns)
+    away = (passed - orbit.start) / scale
+    size = np.linalg.norm(away, axis=1)
+    outside = np.flatnonzero((size > LINEAR) | (size < NOISE))
+    used = np.abs(away @ measure)[: outside[0] if len(outside) else None]
+    growth = _growth(used)
+    told = growth ** len(used)
+    if told > NOTABLE or size.max() > NOTABLE * LINEAR:
+        outcome = Outcome.GROWS
+    else:
+        outcome = Outcome.DECAYS if told < 1.0 / NOTABLE else Outcome.BOUNDED
+    return Confirmation(verdict=verdict, outcome=outcome, growth=growth, deviations=size / size[0], message=message)
+
+
+def _passages(
+    parameters: FiveBarParameters, drive: Drive, start: NDArray[np.float64], turns: int
+) -> tuple[NDArray[np.float64], str]:
+    """(u, u') and under a torque the crank speed at crank angle 0 of each turn, and why the run ended early, if it did."""
+    if drive.speed is not None:
+        run = simulate(
+            parameters,
+            Inputs(
+                speed=drive.speed,
+                force=drive.slider_force,
+                load_x=drive.load_x,
+                load_y=drive.load_y,
+            ),
+            initial=InitialState(slider_position=float(start[0]), slider_velocity=float(start[1])),
+            samples=2.0 * pi / drive.speed * np.arange(turns + 1),
+            stop_time=2.0 * pi * turns / drive.speed,
+            tolerance=1e-12,
+        )
+        return np.column_stack([run["slider.position"], run["slider.velocity"]]), run.message
+    passed = [start]
+    for _ in range(turns):
+        try:
+            passed.append(passed[-1] + period_from(parameters, drive, passed[-1], 1).shift)
+        except OrbitError as error:
+            return np.array(passed), str(error)
+    return np.array(passed), ""
+
+
+def telling_points(found: Grid) -> list[tuple[int, int]]:
+    """Three points of a grid that put it to the test: its most stable, its least stable, and the one nearest to a boundary.
+
+    The last is the point of the least margin, to either side, that a long run can still tell from none.
+
+    Returns
+    -------
+    list of (int, int)
+        Rows and columns, without repetition; none where the grid has no orbit.
+    """
+    margin = 1.0 - found.largest
+    if margin.count() == 0:
+        return []
+    size = np.ma.abs(margin)
+    near = np.ma.masked_where(size < MEASURABLE, size)
+    places = [int(margin.argmax()), int(margin.argmin())]
+    if near.count():
+        places.append(int(near.argmin()))
+    row, column = np.unravel_index(list(dict.fromkeys(places)), margin.shape)
+    return list(zip(row.tolist(), column.tolist()))
+
+
+def _leading(orbit: PeriodicOrbit, scale: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.complex128]]:
+    """Direction that grows most, of unit length, and what its growth is measured with, both in scaled components.
+
+    The product with the left eigenvector of the largest multiplier takes that factor each turn, of a complex pair too, where
+    the distance itself swings.
+    """
+    scaled = orbit.monodromy * scale / scale[:, None]
+    values, left, right = scipy.linalg.eig(scaled, left=True)
+    leading = int(np.argmax(np.abs(values)))
+    direction = right[:, leading].real
+    return direction / np.linalg.norm(direction), left[:, leading].conj()
+
+
+def _growth(size: NDArray[np.float64]) -> float:
+    """Factor a turn, by regression of the logarithms."""
+    if len(size) < 2:
+        raise LinkworkError("the deviation leaves the range of linear growth within a turn: take a smaller disturbance")
+    return exp(float(np.polyfit(np.arange(len(size)), np.log(size), 1)[0]))

@@ -1,0 +1,1 @@
+"""Running a mechanism: inputs, the compiled solver, trajectories, co-simulation, standard checks."""

@@ -1,0 +1,124 @@
+"""The result of a run: every output of the FMI contract over time."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from linkwork.errors import InputError
+
+from ..mechanisms import FIVE_BAR, OUTPUT_UNITS
+
+if TYPE_CHECKING:
+    import pandas
+    from matplotlib.figure import Figure
+
+#: Unit of each real output, by name.
+UNITS: Mapping[str, str] = MappingProxyType(OUTPUT_UNITS)
+
+
+@dataclass(frozen=True, slots=True)
+class Occurrence:
+    """An event that happened: its name, the time (s), and the state there in SI.
+
+    The state is crank angle, slider position or axial shift, and their rates.
+    """
+
+    name: str
+    time: float
+    state: tuple[float, float, float, float]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Trajectory:
+    """A run: times, outputs, how it ended, and how it was computed.
+
+    Attributes
+    ----------
+    time : ndarray, shape (n,)
+        Times of the samples (s).
+    values : ndarray, shape (n, m)
+        The outputs ``names``, in the order of the mechanism's FMI interface, SI units. At a sample where an input jumps,
+        the values after the jump.
+    status : int
+        0 if the run reached its end or a stopping event, else the solver.status of the FMI contract.
+    message : str
+        Why the run ended early; empty if it did not.
+    events : tuple of Occurrence
+        Events in the order of time.
+    source : str
+        What computed it, such as ``compiled DOP853`` or the name of an FMU.
+    statistics : mapping
+        Counts of the integrator, where it gives them: steps, rejected, evaluations, seconds in all
+        and seconds_integrating in the compiled loop.
+
+    Notes
+    -----
+    ``trajectory["slider.position"]`` is the column of an output, shape (n,).
+    """
+
+    time: NDArray[np.float64]
+    values: NDArray[np.float64]
+    status: int = 0
+    message: str = ""
+    events: tuple[Occurrence, ...] = ()
+    source: str = ""
+    statistics: Mapping[str, float] = field(default_factory=dict)
+
+    names: tuple[str, ...] = FIVE_BAR.output_names
+
+    def __post_init__(self) -> None:
+        if self.values.shape != (len(self.time), len(self.names)):
+            raise InputError(
+                f"a run with {len(self.time)} times and {len(self.names)} outputs needs values of that shape, not "
+                f"{self.values.shape}"
+            )
+
+    def __getitem__(self, name: str) -> NDArray[np.float64]:
+        return self.values[:, self.column(name)]
+
+    def __len__(self) -> int:
+        return len(self.time)
+
+    @property
+    def units(self) -> Mapping[str, str]:
+        """Unit of each output."""
+        return MappingProxyType({name: UNITS[name] for name in self.names})
+
+    def column(self, name: str) -> int:
+        """Number of the column of an output.
+
+        Raises
+        ------
+        InputError
+            If there is no output of that name.
+        """
+        try:
+            return self.names.index(name)
+        except ValueError:
+            raise InputError(f"there is no output {name!r}: the outputs are {', '.join(self.names)}") from None
+
+    def to_csv(self, path: str | Path) -> Path:
+        """Write time and all outputs to a CSV file whose header has names and units."""
+        from ..files import io
+
+        columns = {"time [s]": self.time} | {f"{name} [{UNITS[name]}]": self[name] for name in self.names}
+        return io.write_csv(path, columns)
+
+    def to_dataframe(self) -> pandas.DataFrame:
+        """The run as a DataFrame indexed by time; needs pandas (``pip install linkwork[dataframe]``)."""
+        import pandas
+
+        return pandas.DataFrame(self.values, index=pandas.Index(self.time, name="time"), columns=list(self.names))
+
+    def plot(self, names: Sequence[str] = ("slider.position", "drive.applied_torque"), **options: Any) -> Figure:
+        """Plot outputs over time, one panel each; see `analysis.figures.plot_outputs`."""
+        from .. import figures
+
+        return figures.plot_outputs(self.time, {name: (self[name], UNITS[name]) for name in names}, **options)

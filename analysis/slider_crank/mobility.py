@@ -1,0 +1,459 @@
+"""Where the slider-crank can be assembled and how far its slider goes: margin, ranges, dead centres, stroke.
+
+With f and g the crank pin's coordinates across the guide, as in `kinematics`, and S1 a function of theta1 (prime: by it)
+
+    D = a2^2 - f^2 - g^2       its square root is h: the rod reaches the guide where D >= 0
+    A = D'/2                   zero where the margin of assembly is least or greatest
+    S4' = A/h - B,  B = a1 cos(theta1) sin(alpha4) + S1' cos(alpha4)
+
+and the slider's dead centres are the zeros of h S4' = A - B h, which stays finite at the limit of assembly. The zeros are
+found by halving the turn: how much each of the two functions can change over a piece is bounded by the lengths and by the
+bounds of the law's derivatives, and a piece is dropped only where that excludes a zero. What is left is bisected to the
+last digit. So no zero is missed, but for pairs nearer to each other than `FINEST`, between which the slider moves by some
+1e-10 of the crank's length.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from itertools import pairwise
+from math import cos, inf, isfinite, pi, sin, sqrt
+from sys import float_info
+from typing import NamedTuple
+
+from linkwork.errors import InputError, ParameterError
+from linkwork.slider_crank import kinematics
+from linkwork.slider_crank.parameters import Constants, SliderCrankParameters
+
+#: Width (rad) of a piece of the turn that is not divided further. Two zeros of one piece go unseen.
+FINEST = 1e-3
+#: Share of its scale below which a function is taken as zero, of no sign: a slider that rests does not turn back by rounding.
+_ROUNDING = 1e-13
+#: Pieces into which the turn is divided first.
+_PIECES = 32
+#: Angle (rad) at which the search of a turn begins: none at which a mechanism is likely to have something to find.
+_SEAM = -0.7390851332151607
+#: Largest number of turns after which a groove's law is looked for to repeat.
+_MOST_TURNS = 64
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PeriodicShift:
+    """The axial shift as a function of the crank angle.
+
+    Parameters
+    ----------
+    at : callable
+        Of the crank angle (rad): the shift (m) and its first derivative by the angle (m/rad); further items are ignored,
+        so that it may be of the form of `kinematics.groove`.
+    rate, curvature : float
+        Bounds of the absolute first and second derivatives by the angle (m/rad, m/rad2). They need not be sharp.
+    turns : int
+        Whole turns of the crank after which the law repeats.
+
+    Raises
+    ------
+    InputError
+        If a bound is negative or not finite, if ``turns`` is not a whole number above zero, or if the law does not repeat.
+    """
+
+    at: Callable[[float], Sequence[float]]
+    rate: float
+    curvature: float
+    turns: int = 1
+
+    def __post_init__(self) -> None:
+        for name in ("rate", "curvature"):
+            bound = getattr(self, name)
+            if not (isfinite(bound) and bound >= 0.0):
+                raise InputError(f"the shift law's {name} is {bound!r}: it must be a finite number, zero or greater")
+        if isinstance(self.turns, bool) or not isinstance(self.turns, int) or self.turns < 1:
+            raise InputError(f"the shift law's turns are {self.turns!r}: they must be a whole number above zero")
+        first, last = self.at(0.0)[0], self.at(self.span)[0]
+        if not abs(first - last) <= 1e-9 * (self.rate + abs(first)):
+            raise InputError(
+                f"the shift law is {first:.9g} m at 0 and {last:.9g} m after {self.turns} turns: it must repeat after them"
+            )
+
+    @property
+    def span(self) -> float:
+        """Crank angle after which the law repeats (rad)."""
+        return 2.0 * pi * self.turns
+
+
+def constant_shift(shift: float) -> PeriodicShift:
+    """The law of a crank held at the shift S1 (m).
+
+    Raises
+    ------
+    InputError
+        If ``shift`` is not finite.
+    """
+    if not isfinite(shift):
+        raise InputError(f"the shift is {shift!r} m: it must be a finite number")
+    return PeriodicShift(at=lambda _: (shift, 0.0), rate=0.0, curvature=0.0)
+
+
+def groove_shift(parameters: SliderCrankParameters) -> PeriodicShift:
+    """The law of the parameters' groove, S1 = SS1 sin(alpha theta1) of eq 28.
+
+    Raises
+    ------
+    ParameterError
+        If alpha is not a ratio of whole numbers of which the lower is at most 64: the law repeats after that many turns.
+    """
+    p = parameters.constants()
+    ratio = Fraction(p.ratio).limit_denominator(_MOST_TURNS)
+    if abs(float(ratio) - p.ratio) > 1e-12 * max(1.0, abs(p.ratio)):
+        raise ParameterError("groove.ratio", p.ratio, f"repeat after at most {_MOST_TURNS} turns of the crank")
+    return PeriodicShift(
+        at=lambda th: kinematics.groove(th, p),
+        rate=abs(p.amplitude * p.ratio),
+        curvature=abs(p.amplitude * p.ratio * p.ratio),
+        turns=ratio.denominator,
+    )
+
+
+class Margin(NamedTuple):
+    """Rod length less the crank pin's distance from the guide, at an extreme of it over the turn (m), and the angle (rad)."""
+
+    length: float
+    crank_angle: float
+
+
+class Place(NamedTuple):
+    """Crank angle (rad), shift (m) and slider position (m) of a configuration."""
+
+    crank_angle: float
+    shift: float
+    slider_position: float
+
+
+class DeadCentre(NamedTuple):
+    """A configuration in which the slider turns back: angle (rad), shift and slider position (m).
+
+    ``outer`` is true where the slider is out furthest to the side of its assembly: at a maximum of S4 on branch +1, at a
+    minimum on branch -1.
+    """
+
+    crank_angle: float
+    shift: float
+    slider_position: float
+    outer: bool
+
+
+class Range(NamedTuple):
+    """A range of crank angles in which the rod reaches the guide, and the slider positions in it.
+
+    ``low`` is in [0, span) and ``high`` at most the span above it (rad); the other angles are in [0, span). The span is one
+    turn, or as many as the law of the shift takes to repeat. ``greatest`` and ``least`` are the extreme slider positions;
+    where the crank cannot turn fully they may be at an end of the range.
+    """
+
+    low: float
+    high: float
+    dead_centres: tuple[DeadCentre, ...]
+    greatest: Place
+    least: Place
+
+    def full(self, span: float) -> bool:
+        """Whether it has no ends: the crank makes all of the law's turns, its ``span``."""
+        return self.high - self.low >= span * (1.0 - 1e-12)
+
+    @property
+    def stroke(self) -> float:
+        """Greatest less least slider position (m)."""
+        return self.greatest.slider_position - self.least.slider_position
+
+
+class _Zero(NamedTuple):
+    angle: float
+    falling: bool
+
+
+class _Change(NamedTuple):
+    """D, A and B at the middle of a piece, and the most by which each differs from that inside it."""
+
+    square: float
+    pull: float
+    pull_spread: float
+    along: float
+    square_spread: float
+    along_spread: float
+
+
+def _change(middle: float, half: float, law: PeriodicShift, p: Constants, pitch: float) -> _Change:
+    """D, A and B and their spreads over ``middle`` +- ``half``; ``pitch`` is 0 where A and B leave S1' out, else 1."""
+    s1, ds1 = law.at(middle)[:2]
+    if not (isfinite(s1) and abs(ds1) <= law.rate * (1.0 + 1e-9)):
+        raise InputError(
+            f"the shift law is {s1:g} m with the derivative {ds1:g} m/rad at crank angle {middle:.9g} rad: it must be finite "
+            f"and change by no more than its rate, {law.rate:g} m/rad"
+        )
+    c, s = cos(middle), sin(middle)
+    most = abs(s1) + half * law.rate
+
+    def pull(pitch: float) -> tuple[float, float]:
+        # A with the squares of f and g taken together: they cancel where guide and crank axis are nearly parallel
+        by_shift = p.a1 * p.ca * (c * s1 + pitch * s * ds1) - pitch * p.sa * s1 * ds1
+        steepest = p.a1 * abs(p.a4) + abs(p.sa) * (
+            p.a1 * p.a1 * abs(p.sa)
+            + p.a1 * abs(p.ca) * (most + law.rate + pitch * (law.rate + law.curvature))
+            + pitch * abs(p.sa) * (law.rate * law.rate + most * law.curvature)
+        )
+        return p.a1 * p.a4 * s + p.sa * (p.a1 * p.a1 * p.sa * s * c + by_shift), half * steepest
+
+    total, total_spread = pull(1.0)
+    value, spread = (total, total_spread) if pitch == 1.0 else pull(pitch)
+    return _Change(
+        kinematics.assembly_square(middle, s1, p),
+        value,
+        spread,
+        p.a1 * c * p.sa + pitch * ds1 * p.ca,
+        2.0 * half * (abs(total) + total_spread),
+        half * (p.a1 * abs(p.sa) + pitch * law.curvature * abs(p.ca)),
+    )
+
+
+#: A function of the middle and the half width of a piece: its value in the middle, and its spread over the piece.
+_Bounded = Callable[[float, float], tuple[float, float]]
+
+
+def _margin_slope(law: PeriodicShift, p: Constants) -> _Bounded:
+    """A, whose zeros are the extremes of the distance between crank pin and guide."""
+
+    def slope(middle: float, half: float) -> tuple[float, float]:
+        change = _change(middle, half, law, p, 1.0)
+        return change.pull, change.pull_spread
+
+    return slope
+
+
+def _slider_slope(change_of: Callable[[float, float], _Change], branch: float) -> _Bounded:
+    """A - B h, of the sign of S4' on branch +1 and opposite to it on branch -1."""
+
+    def slope(middle: float, half: float) -> tuple[float, float]:
+        change = change_of(middle, half)
+        h = sqrt(max(0.0, change.square))
+        # |sqrt x - sqrt y| is at most the root of |x - y|, and |x - y| over either root
+        spread = sqrt(change.square_spread)
+        if change.square_spread < spread * h:
+            spread = change.square_spread / h
+        along = abs(change.along)
+        return (
+            change.pull - branch * change.along * h,
+            change.pull_spread + along * spread + change.along_spread * (h + spread),
+        )
+
+    return slope
+
+
+def _bisect(positive: Callable[[float], bool], low: float, high: float) -> float:
+    """Where ``positive`` changes between ``low`` and ``high``, at which it differs; to the last digit."""
+    at_low = positive(low)
+    while True:
+        middle = 0.5 * (low + high)
+        if middle in (low, high):
+            return middle
+        if positive(middle) == at_low:
+            low = middle
+        else:
+            high = middle
+
+
+def _zeros(function: _Bounded, low: float, high: float, scale: float) -> list[_Zero]:
+    """All zeros of ``function`` between ``low`` and ``high`` in which it changes its sign, in order.
+
+    Where it is zero to the rounding of ``scale`` over a stretch, the stretch is one zero if the signs before and after it
+    differ, and none otherwise.
+    """
+
+    def positive(x: float) -> bool:
+        return function(x, 0.0)[0] > 0.0
+
+    floor = _ROUNDING * scale
+    kept: list[float] = [low]
+
+    def search(a: float, b: float) -> None:
+        middle = 0.5 * (a + b)
+        value, spread = function(middle, 0.5 * (b - a))
+        if abs(value) > spread:
+            return
+        if b - a > FINEST and abs(value) + spread > floor:
+            search(a, middle)
+            search(middle, b)
+        else:
+            kept.extend((a, b) if a != kept[-1] else (b,))
+
+    for a, b in pairwise([low + (high - low) * n / _PIECES for n in range(_PIECES)] + [high]):
+        search(a, b)
+    # the sign changes in pieces that were kept alone
+    found: list[_Zero] = []
+    last: float | None = None
+    for x in kept:
+        if abs(function(x, 0.0)[0]) <= floor:
+            continue
+        if last is not None and positive(x) != positive(last):
+            found.append(_Zero(_bisect(positive, last, x), positive(last)))
+        last = x
+    return found
+
+
+def _wrapped(angle: float, law: PeriodicShift) -> float:
+    """The angle in [0, span): the remainder of a tiny negative number rounds to the span itself."""
+    wrapped = angle % law.span
+    return wrapped if wrapped < law.span else 0.0
+
+
+def _square(angle: float, law: PeriodicShift, p: Constants) -> float:
+    return kinematics.assembly_square(angle, law.at(angle)[0], p)
+
+
+def _extremes(law: PeriodicShift, p: Constants) -> list[float]:
+    """The angles at which the margin of assembly is least or greatest, in order; any one if it is the same everywhere."""
+    zeros = _zeros(_margin_slope(law, p), _SEAM, _SEAM + law.span, (p.a1 + law.rate) * p.a2)
+    return [zero.angle for zero in zeros] or [0.0]
+
+
+def assembly_margin(parameters: SliderCrankParameters, law: PeriodicShift) -> Margin:
+    """The least margin of assembly over the turn, negative where the crank cannot turn fully, and where it is.
+
+    The crank turns fully where the margin is zero or greater. The plant's steps also keep clear of the limit of assembly
+    by `linkwork.limits.LIMIT_SINE`, 5e-7 of the rod's length.
+    """
+    return _margin(min, law, parameters.constants())
+
+
+def greatest_margin(parameters: SliderCrankParameters, law: PeriodicShift) -> Margin:
+    """The greatest margin of assembly over the turn, negative where it can be assembled nowhere, and where it is."""
+    return _margin(max, law, parameters.constants())
+
+
+def _margin(choose: Callable[..., float], law: PeriodicShift, p: Constants) -> Margin:
+    """The margin at the extreme that ``choose``, min or max, takes."""
+    place = choose(_extremes(law, p), key=lambda angle: _square(angle, law, p))
+    return Margin(p.a2 - sqrt(p.a2 * p.a2 - _square(place, law, p)), _wrapped(place, law))
+
+
+def turns_fully(parameters: SliderCrankParameters, law: PeriodicShift) -> bool:
+    """Whether the rod reaches the guide at every crank angle."""
+    return assembly_margin(parameters, law).length >= 0.0
+
+
+def greatest_shift(parameters: SliderCrankParameters) -> float | None:
+    """The greatest constant shift |S1| (m) at which the crank turns fully; None if there is none.
+
+    It turns fully at a shift of either sign up to this one. With the guide parallel to the crank axis any shift will do, and
+    the value is infinite.
+    """
+    p = parameters.constants()
+    if p.a2 < p.a1 + abs(p.a4):
+        return None
+    # |S1 sin(alpha4) - a1 s cos(alpha4)| <= r = sqrt(a2^2 - f^2) at every angle: |S1 sin(alpha4)| is at most the least
+    # value of a1 s |cos(alpha4)| + r, which is that of a slider in the plane but for the cosine
+
+    def change_of(middle: float, half: float) -> _Change:
+        c, s = cos(middle), sin(middle)
+        f = p.a1 * c + p.a4
+        most = abs(f) + half * p.a1
+        lean = p.a1 * abs(p.ca)
+        spread = half * most * p.a1
+        return _Change(
+            p.a2 * p.a2 - f * f, f * p.a1 * s, spread + half * p.a1 * p.a1, -lean * c, 2.0 * spread, half * lean
+        )
+
+    def bound(angle: float) -> float:
+        f = p.a1 * cos(angle) + p.a4
+        return p.a1 * sin(angle) * abs(p.ca) + sqrt(max(0.0, p.a2 * p.a2 - f * f))
+
+    least = min(
+        bound(zero.angle) for zero in _zeros(_slider_slope(change_of, 1.0), _SEAM, _SEAM + 2.0 * pi, p.a1 * p.a2)
+    )
+    if least < 0.0:
+        return None
+    # a twist of pi has a sine of its rounding
+    parallel = abs(p.sa) <= 4.0 * float_info.epsilon * max(1.0, abs(parameters.guide_twist))
+    return inf if parallel else least / abs(p.sa)
+
+
+def _place(angle: float, law: PeriodicShift, p: Constants, *, limit: bool = False) -> Place:
+    """Configuration at an angle at which the rod reaches the guide; at ``limit`` of assembly it is perpendicular to it."""
+    shift = law.at(angle)[0]
+    # at the limit the rounding of the angle would be a root of it in h
+    h = 0.0 if limit else p.branch * sqrt(max(0.0, kinematics.assembly_square(angle, shift, p)))
+    return Place(_wrapped(angle, law), shift, h - p.a1 * sin(angle) * p.sa - shift * p.ca)
+
+
+def _dead_centres(low: float, high: float, law: PeriodicShift, p: Constants, pitch: float) -> tuple[DeadCentre, ...]:
+    slope = _slider_slope(lambda middle, half: _change(middle, half, law, p, pitch), p.branch)
+    zeros = _zeros(slope, low, high, (p.a1 + law.rate) * p.a2)
+    return tuple(sorted(DeadCentre(*_place(zero.angle, law, p), outer=zero.falling) for zero in zeros))
+
+
+def _range(low: float, high: float, law: PeriodicShift, p: Constants) -> Range:
+    dead = _dead_centres(low, high, law, p, 1.0)
+    # a full turn is searched from the seam, and told from zero
+    full = low == _SEAM
+    places = [_place(low, law, p, limit=not full), _place(high, law, p, limit=not full)]
+    places += [Place(*centre[:3]) for centre in dead]
+    places.sort(key=lambda place: place.slider_position)
+    start, end = (0.0, law.span) if full else (_wrapped(low, law), _wrapped(low, law) + (high - low))
+    return Range(start, end, dead, places[-1], places[0])
+
+
+def _assembled(law: PeriodicShift, p: Constants) -> list[tuple[float, float]]:
+    """Ends of the ranges in which the rod reaches the guide."""
+    extremes = _extremes(law, p)
+    reached = [_square(angle, law, p) >= 0.0 for angle in extremes]
+    if all(reached):
+        return [(_SEAM, _SEAM + law.span)]
+    # between two extremes D is monotonic; the turn closes with the first extreme, a span on
+    closed = [*extremes, extremes[0] + law.span]
+    starts: list[float] = []
+    ends: list[float] = []
+    for (a, b), at_a, at_b in zip(pairwise(closed), reached, [*reached[1:], reached[0]]):
+        if at_a != at_b:
+            crossing = _bisect(lambda x: _square(x, law, p) >= 0.0, a, b)
+            (ends if at_a else starts).append(crossing)
+    # a range that begins before the seam is ended by the first crossing after it, a span on
+    if ends and ends[0] < starts[0]:
+        ends.append(ends.pop(0) + law.span)
+    return sorted(zip(starts, ends), key=lambda pair: _wrapped(pair[0], law))
+
+
+def ranges(parameters: SliderCrankParameters, law: PeriodicShift) -> tuple[Range, ...]:
+    """The ranges of crank angles in which the rod reaches the guide, each with its dead centres and its stroke.
+
+    One from 0 to the span where the crank turns fully; none where it cannot be assembled at all; at most two at a constant
+    shift. Their ends, at which rod and guide are perpendicular, are those of geometry: the plant's steps stop as soon as the
+    rod is within `linkwork.limits.LIMIT_SINE` of that.
+    """
+    p = parameters.constants()
+    return tuple(_range(low, high, law, p) for low, high in _assembled(law, p))
+
+
+def dead_centres(parameters: SliderCrankParameters, law: PeriodicShift) -> tuple[DeadCentre, ...]:
+    """All configurations in which the slider turns back, in the order of their angles: dS4/dtheta1 = 0 along the law.
+
+    None where the slider stands still at every angle. At a constant shift there are two where the crank turns fully, of at
+    most four on both branches together.
+
+    With the crank torque given and the slider force sought, these are the singular configurations of a crank whose shift a
+    groove in its shaft makes, or at a constant shift. Where the shift is driven from outside it is `singularities`.
+    """
+    return tuple(sorted(centre for part in ranges(parameters, law) for centre in part.dead_centres))
+
+
+def singularities(parameters: SliderCrankParameters, law: PeriodicShift) -> tuple[DeadCentre, ...]:
+    """The configurations along the law in which the crank's torque and the slider's force do not balance: kth = 0.
+
+    kth is the derivative of the slider position by the crank angle at the shift held. Where the shift is driven by a force
+    of its own, it is this that multiplies the slider force in the crank's equation of motion (the thesis's force problem),
+    whatever the shift's rate. The slider itself stops here only where the shift is constant; ``outer`` says that its
+    position would turn back from a maximum (on branch +1) if the shift were held.
+    """
+    p = parameters.constants()
+    found = (_dead_centres(low, high, law, p, 0.0) for low, high in _assembled(law, p))
+    return tuple(sorted(centre for part in found for centre in part))

@@ -1,0 +1,1 @@
+"""Units of quantities, and quantities read from text."""

@@ -1,0 +1,1 @@
+"""Youssef's own theory: the linearised slider equation, harmonic balance, Hill's determinant, the workspace."""

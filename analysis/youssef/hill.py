@@ -1,0 +1,560 @@
+"""Linear equations with periodic coefficients, a y'' + b y' + c y = 0 with period 2 pi (Youssef, chapter V).
+
+Three ways to their stability that share nothing but the coefficients: the monodromy matrix by integration (`monodromies`),
+Hill's infinite determinant cut off at an order (`hill_multipliers`, `hill_determinant`, `boundary_stiffnesses`), and
+perturbation for small harmonics (`perturbed_region`).
+
+A region of parametric instability is numbered by N: it starts, as the harmonics vanish, from the stiffness at which the
+natural frequency is N/2 of the coefficients', and on its boundaries one Floquet multiplier is (-1)^N.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+from functools import lru_cache
+from math import ceil, isfinite, pi
+
+import numpy as np
+import scipy.linalg
+from numpy.typing import NDArray
+
+from linkwork.errors import InputError
+
+from ..numerics.fourier import FourierSeries
+from ..periodic.floquet import liouville
+
+#: Gauss points of a step: the method is of order 12.
+STAGES = 6
+#: Greatest product of step (rad) and rate of the equation, at which the error of a turn is still rounding.
+STEP_BY_RATE = 0.5
+#: Fewest samples of the coefficients over a turn from which their rates are judged.
+JUDGED = 64
+#: Harmonics beyond the coefficients' own that Hill's determinant takes in unless told otherwise.
+MORE_HARMONICS = 16
+#: Imaginary part, relative to the size of the boundaries, up to which one is real. Two that are about to meet are computed
+#: only to the square root of the rounding errors.
+REAL = 1e-8
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class PeriodicEquation:
+    """a y'' + b y' + c y = 0, ' = d/dx, with coefficients of period 2 pi.
+
+    Attributes
+    ----------
+    a, b, c : FourierSeries
+        ``a`` must not pass zero.
+    """
+
+    a: FourierSeries
+    b: FourierSeries
+    c: FourierSeries
+
+    @classmethod
+    def mathieu(cls, p: float, q: float, damping: float = 0.0) -> PeriodicEquation:
+        """Mathieu's y'' + damping y' + (p - 2 q cos 2 t) y = 0 with x = 2 t, so that the period pi becomes 2 pi."""
+        return cls(
+            a=FourierSeries.constant(4.0),
+            b=FourierSeries.constant(2.0 * damping),
+            c=FourierSeries(np.array([p, -2.0 * q]), np.zeros(2)),
+        )
+
+    @property
+    def order(self) -> int:
+        """Highest harmonic of the coefficients."""
+        return max(series.order for series in (self.a, self.b, self.c))
+
+    def stiffened(self, stiffness: float) -> PeriodicEquation:
+        """The equation with a constant added to c."""
+        return PeriodicEquation(a=self.a, b=self.b, c=self.c + stiffness)
+
+
+class SingularEquationError(InputError):
+    """The coefficient of y'' passes zero, where the equation loses its order."""
+
+
+# Floquet
+
+
+@lru_cache(maxsize=1)
+def _gauss() -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Nodes (s,), weights (s,) and matrix (s, s) of Gauss-Legendre collocation on [0, 1]."""
+    points, weights = np.polynomial.legendre.leggauss(STAGES)
+    nodes, weights = 0.5 * (1.0 + points), 0.5 * weights
+    # a[i, j] is the integral of the j-th Lagrange polynomial from 0 to node i, by the same rule
+    inside = np.multiply.outer(nodes, nodes)
+    matrix = np.empty((STAGES, STAGES))
+    for j in range(STAGES):
+        others = np.delete(nodes, j)
+        values = np.prod((inside[..., None] - others) / (nodes[j] - others), axis=-1)
+        matrix[:, j] = nodes * (values @ weights)
+    return nodes, weights, matrix
+
+
+@lru_cache(maxsize=32)
+def _waves(points: tuple[float, ...], order: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """cos(k x) and sin(k x) for k up to an order, shape (order + 1, points)."""
+    phase = np.multiply.outer(np.arange(order + 1), np.array(points))
+    return np.cos(phase), np.sin(phase)
+
+
+def _table(series: Sequence[FourierSeries], order: int) -> NDArray[np.float64]:
+    """Coefficients of many series filled up to an order, shape (2, n, order + 1): cosines, sines."""
+    table = np.zeros((2, len(series), order + 1))
+    for i, one in enumerate(series):
+        table[0, i, : one.order + 1], table[1, i, : one.order + 1] = one.cos, one.sin
+    return table
+
+
+def _slope(table: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The table of the derivatives."""
+    k = np.arange(table.shape[2])
+    return np.array([k * table[1], -k * table[0]])
+
+
+def _sampled(table: NDArray[np.float64], points: tuple[float, ...]) -> NDArray[np.float64]:
+    """Values at the same points, shape (n, points)."""
+    cos, sin = _waves(points, table.shape[2] - 1)
+    values: NDArray[np.float64] = table[0] @ cos + table[1] @ sin
+    return values
+
+
+def _tables(equations: Sequence[PeriodicEquation]) -> list[NDArray[np.float64]]:
+    """Tables of a, a', b, c."""
+    order = max(e.order for e in equations)
+    a, b, c = (_table([getattr(e, name) for e in equations], order) for name in "abc")
+    return [a, _slope(a), b, c]
+
+
+def _even(count: int) -> tuple[float, ...]:
+    return tuple((2.0 * pi / count * np.arange(count)).tolist())
+
+
+def _steps(tables: Sequence[NDArray[np.float64]]) -> int:
+    """Steps of a turn that keep the error at rounding."""
+    k = np.arange(tables[0].shape[2])
+    points = _even(max(JUDGED, 4 * len(k)))
+    a, slope, b, c = (_sampled(table, points) for table in tables)
+    sign = np.sign(a[:, :1])
+    if not (a * sign > 0.0).all():
+        worst = int(np.argmin((a * sign).min(axis=1)))
+        raise SingularEquationError(
+            f"the coefficient of y'' passes zero in equation {worst}: its order is not 2 throughout"
+        )
+    # a harmonic k of relative size e leaves an error of e (k h)^12
+    sizes = [np.hypot(*table).max(axis=0) for table in (tables[0], *tables[2:])]
+    harmonics = max(float((k * (size / size.max()) ** (0.5 / STAGES)).max()) for size in sizes if size.max() > 0.0)
+    fastest: float = max(np.sqrt(np.abs(c / a)).max(), np.abs((slope - b) / a).max(), harmonics, 1.0)
+    return ceil(2.0 * pi * fastest / STEP_BY_RATE)
+
+
+def monodromies(equations: Sequence[PeriodicEquation], *, steps: int | None = None) -> NDArray[np.float64]:
+    """Monodromy matrices of many equations at once: (y, y') after a turn from x = 0 is the matrix times (y, y') at x = 0.
+
+    Gauss-Legendre collocation of order 12 on (y, a y'): of a self-adjoint equation, b = a', it keeps the determinant 1.
+
+    Parameters
+    ----------
+    equations : sequence of PeriodicEquation
+    steps : int, optional
+        Of a turn; by default as many as bring the error down to rounding.
+
+    Returns
+    -------
+    ndarray, shape (n, 2, 2)
+
+    Raises
+    ------
+    InputError
+        If there is no equation, or the number of steps is not positive.
+    SingularEquationError
+        If a coefficient of y'' passes zero.
+    """
+    if not equations:
+        raise InputError("at least one equation is needed")
+    if steps is not None and steps < 1:
+        raise InputError(f"steps is {steps}: it must be at least 1")
+    tables = _tables(equations)
+    least = _steps(tables)
+    count = least if steps is None else steps
+    nodes, weights, matrix = _gauss()
+    h = 2.0 * pi / count
+    points = tuple((h * np.add.outer(np.arange(count), nodes)).ravel().tolist())
+    shape = (len(equations), count, STAGES)
+    a, slope, b, c = (_sampled(table, points).reshape(shape) for table in tables)
+    # z = (y, a y'): z' = A z
+    system = np.zeros((*shape, 2, 2))
+    system[..., 0, 1] = 1.0 / a
+    system[..., 1, 0] = -c
+    system[..., 1, 1] = (slope - b) / a
+    # stages Y_i = 1 + h sum_j a_ij A_j Y_j, all of a step at once
+    turned = np.moveaxis(system, 2, 3)[:, :, None]
+    blocks = np.eye(2 * STAGES).reshape(STAGES, 2, STAGES, 2) - h * matrix[:, None, :, None] * turned
+    right = np.broadcast_to(np.tile(np.eye(2), (STAGES, 1)), (*shape[:2], 2 * STAGES, 2))
+    stages = np.linalg.solve(blocks.reshape(*shape[:2], 2 * STAGES, 2 * STAGES), right).reshape(*shape, 2, 2)
+    passed = np.eye(2) + h * (weights[:, None, None] * (system @ stages)).sum(axis=2)
+    result = passed[:, 0]
+    for step in range(1, count):
+        result = passed[:, step] @ result
+    # back to (y, y'): a has the same value at both ends
+    ends = tables[0][0].sum(axis=1)
+    result = np.array(result, dtype=float)
+    result[:, 0, 1] *= ends
+    result[:, 1, 0] /= ends
+    return result
+
+
+def monodromy(equation: PeriodicEquation, *, steps: int | None = None) -> NDArray[np.float64]:
+    """Monodromy matrix of one equation, shape (2, 2); see `monodromies`."""
+    matrix: NDArray[np.float64] = monodromies([equation], steps=steps)[0]
+    return matrix
+
+
+def determinant(equation: PeriodicEquation) -> float:
+    """Determinant of the monodromy matrix by Liouville's formula, exp of minus the integral of b/a."""
+    points = _even(max(4 * JUDGED, 16 * equation.order))
+    a, b = _sampled(_table([equation.a, equation.b], equation.order), points)
+    return liouville(-b / a)
+
+
+def crossing_test(matrices: NDArray[np.float64], multiplier: int) -> NDArray[np.float64]:
+    """det(I - multiplier Phi), shape (...,), of monodromy matrices (..., n, n): zero where one multiplier is +1 or -1.
+
+    ``multiplier`` is +1 or -1. Positive where all multipliers are inside the unit circle; negative where one real multiplier
+    has passed it.
+    """
+    _require_sign(multiplier)
+    if matrices.shape[-1] != 2:
+        value: NDArray[np.float64] = np.asarray(np.linalg.det(np.eye(matrices.shape[-1]) - multiplier * matrices))
+        return value
+    trace = matrices[..., 0, 0] + matrices[..., 1, 1]
+    det = matrices[..., 0, 0] * matrices[..., 1, 1] - matrices[..., 0, 1] * matrices[..., 1, 0]
+    value = 1.0 - multiplier * trace + det
+    return value
+
+
+def _require_sign(multiplier: int) -> None:
+    if multiplier not in (1, -1):
+        raise InputError(f"multiplier is {multiplier}: the boundaries sought are those of +1 or -1")
+
+
+# Hill
+
+
+def _toeplitz(series: FourierSeries, size: int) -> NDArray[np.complex128]:
+    """Matrix of the product with a series in terms of exp(i k x): entry (n, k) is its coefficient n - k."""
+    coefficients = series.to_order(size).exponential[size:]
+    return np.asarray(scipy.linalg.toeplitz(coefficients[:size], coefficients[:size].conj()))
+
+
+def _harmonics(multiplier: int, order: int) -> NDArray[np.float64]:
+    """Harmonics of a motion of period 2 pi (multiplier +1) or 4 pi (-1), symmetric about zero."""
+    count, first = (2 * order + 1, -order) if multiplier == 1 else (2 * order, -order + 0.5)
+    k: NDArray[np.float64] = first + np.arange(count, dtype=float)
+    return k
+
+
+def _order(equation: PeriodicEquation, order: int | None, more: int = 0) -> int:
+    if order is None:
+        return 2 * equation.order + MORE_HARMONICS + more
+    if order < 1:
+        raise InputError(f"order is {order}: it must be at least 1")
+    return order
+
+
+def _operator(equation: PeriodicEquation, k: NDArray[np.float64]) -> NDArray[np.complex128]:
+    """a D^2 + b D + c on exp(i k x)."""
+    a, b, c = (_toeplitz(series, len(k)) for series in (equation.a, equation.b, equation.c))
+    matrix: NDArray[np.complex128] = -a * k**2 + 1j * b * k + c
+    return matrix
+
+
+def hill_determinant(equation: PeriodicEquation, multiplier: int, *, order: int | None = None) -> float:
+    """Hill's determinant for a multiplier, in exponential form; zero where the equation has that multiplier.
+
+    Row k is divided by -a0 (k^2 + 1). At one order, only sign and ratios mean something: those between equations that differ
+    by a constant in c tend to those of det(Phi - multiplier I) as the order grows.
+
+    Parameters
+    ----------
+    equation : PeriodicEquation
+        Damping is allowed.
+    multiplier : int
+        +1 for motions of period 2 pi, -1 for those of period 4 pi.
+    order : int, optional
+        Highest harmonic taken in.
+
+    Raises
+    ------
+    InputError
+        If the multiplier is neither, or the order is not positive.
+    """
+    _require_sign(multiplier)
+    k = _harmonics(multiplier, _order(equation, order))
+    scaled = _operator(equation, k) / (-equation.a.mean * (k**2 + 1.0))[:, None]
+    # real: the matrix turned about its middle is its complex conjugate
+    return float(np.linalg.det(scaled).real)
+
+
+def hill_multipliers(equation: PeriodicEquation, *, order: int | None = None) -> NDArray[np.complex128]:
+    """The two Floquet multipliers from Hill's quadratic eigenvalue problem, the larger modulus first.
+
+    y = exp(s x) sum over k of y_k exp(i k x) gives (s^2 A + s B + C) y_k = 0. In the untruncated problem s comes with all
+    s + i n, which have the same multiplier exp(2 pi s); the truncation spoils those whose harmonics it cuts.
+
+    Parameters
+    ----------
+    equation : PeriodicEquation
+    order : int, optional
+        Highest harmonic taken in.
+
+    Returns
+    -------
+    ndarray of complex, shape (2,)
+    """
+    n = _order(equation, order)
+    k = _harmonics(1, n)
+    mass, rate = (_toeplitz(series, len(k)) for series in (equation.a, equation.b))
+    linear = 2j * mass * k + rate
+    companion = np.block(
+        [
+            [np.zeros_like(mass), np.eye(len(k))],
+            [-np.linalg.solve(mass, _operator(equation, k)), -np.linalg.solve(mass, linear)],
+        ]
+    )
+    exponents, vectors = np.linalg.eig(companion)
+    weights = np.abs(vectors[: len(k)]) ** 2
+    centres = np.abs(k @ weights / weights.sum(axis=0))
+    order_of_centres = np.argsort(centres)
+    values = np.exp(2.0 * pi * exponents)
+    first = values[order_of_centres[0]]
+    # the other one among those in the middle, where only two different ones are
+    middle = values[centres <= max(0.25 * n, np.sort(centres)[3])]
+    second = middle[np.argmax(np.abs(middle - first))]
+    pair = np.array([first, second])
+    ordered: NDArray[np.complex128] = pair[np.argsort(-np.abs(pair), kind="stable")]
+    return ordered
+
+
+def boundary_stiffnesses(
+    equation: PeriodicEquation, multiplier: int, *, count: int, order: int | None = None
+) -> NDArray[np.complex128]:
+    """Constants that, added to c, give the equation the multiplier +1 or -1: all boundaries at once, as eigenvalues.
+
+    Parameters
+    ----------
+    equation : PeriodicEquation
+        With a > 0. Damping is allowed: two boundaries that have met become a complex pair, and their region is gone.
+    multiplier : int
+        +1 or -1.
+    count : int
+        How many, from the least real part on.
+    order : int, optional
+        Highest harmonic taken in.
+
+    Returns
+    -------
+    ndarray of complex, shape (count,)
+        In the order of their real parts.
+
+    Raises
+    ------
+    InputError
+        If the multiplier is neither, or the order does not give so many.
+    """
+    _require_sign(multiplier)
+    k = _harmonics(multiplier, _order(equation, order, count))
+    if not 1 <= count <= len(k):
+        raise InputError(
+            f"{count} boundaries from {len(k)} harmonics: ask for no more than those, and for one at least"
+        )
+    matrix = -_operator(equation, k)
+    hermitian = np.abs(matrix - matrix.conj().T).max() <= 1e-13 * np.abs(matrix).max()
+    found = np.linalg.eigvalsh(matrix) if hermitian else np.linalg.eigvals(matrix)
+    values: NDArray[np.complex128] = found.astype(np.complex128)
+    return values[np.argsort(values.real, kind="stable")][:count]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Region:
+    """A region of parametric instability on the axis of the stiffness added to c.
+
+    Attributes
+    ----------
+    number : int
+        N; the multiplier on its boundaries is (-1)^N.
+    low, high : float
+        Its boundaries.
+    """
+
+    number: int
+    low: float
+    high: float
+
+    @property
+    def width(self) -> float:
+        """Distance of the boundaries."""
+        return self.high - self.low
+
+
+def hill_regions(equation: PeriodicEquation, count: int, *, order: int | None = None) -> Mapping[int, Region]:
+    """The first ``count`` regions of instability by their number; one that damping has removed is not there.
+
+    Parameters
+    ----------
+    equation : PeriodicEquation
+        With a > 0.
+    count : int
+    order : int, optional
+        Highest harmonic taken in.
+    """
+    found = {}
+    for multiplier in (1, -1):
+        # of the multiplier +1 the least boundary has no partner: below it the motion falls away
+        alone = 1 if multiplier == 1 else 0
+        values = boundary_stiffnesses(equation, multiplier, count=count + 2 + alone, order=order)[alone:]
+        for pair in range((count + 1) // 2 if multiplier == -1 else count // 2):
+            low, high = values[2 * pair : 2 * pair + 2]
+            number = 2 * pair + (1 if multiplier == -1 else 2)
+            if max(abs(low.imag), abs(high.imag)) <= REAL * max(1.0, abs(high)):
+                found[number] = Region(number=number, low=float(low.real), high=float(high.real))
+    return dict(sorted(found.items()))
+
+
+# Perturbation
+
+
+class Truncation(StrEnum):
+    """Which perturbation formula is used.
+
+    Attributes
+    ----------
+    RIGHT
+        Ours, of the equation with M' y'.
+    PRINTED
+        Of the equation as (4.21) is printed, without M' y': an error of the thesis. It changes the sign with which the
+        harmonics of M enter the width.
+    APPENDIX_3
+        Ours without the factor 1/k0 in the terms of second order, as the listing of appendix 3 evaluates (5.16).
+    """
+
+    RIGHT = "right"
+    PRINTED = "printed"
+    APPENDIX_3 = "appendix 3"
+
+
+def perturbed_operator(
+    mass: FourierSeries,
+    stiffness: FourierSeries,
+    number: int,
+    *,
+    order: int = 2,
+    truncation: Truncation = Truncation.RIGHT,
+) -> NDArray[np.complex128]:
+    """The 2 x 2 matrix on exp(i n x), exp(-i n x), n = N/2, whose eigenvalues are the boundaries without damping.
+
+    (M y')' + (lambda + K) y = 0 on exp(i k x) is lambda y_j = sum over k of V_jk y_k with V_jk = M_(j-k) j k - K_(j-k),
+    M and K by their coefficients in exponential form and k0 the mean of M. To first order only the two harmonics +-n count;
+    the others act on them through
+
+        sum over q != +-n of V_jq V_qk / (k0 (n^2 - q^2)),
+
+    which is of second order in the harmonics of M and K.
+
+    Raises
+    ------
+    InputError
+        If the number is not positive, the order is neither 1 nor 2, or the mean of M is not positive.
+    """
+    if number < 1 or order not in (1, 2):
+        raise InputError(f"region {number} to order {order}: regions count from 1, and the order is 1 or 2")
+    if not mass.mean > 0.0:
+        raise InputError(f"the mean of M is {mass.mean}: it must be positive")
+    n, size = 0.5 * number, max(mass.order, stiffness.order)
+    reach = np.arange(-(size + number), size + 1.0) + n
+    k0 = mass.mean
+    m, k = (series.to_order(2 * len(reach)).exponential for series in (mass, stiffness))
+    middle = 2 * len(reach)
+
+    def coupling(j: float, q: float) -> complex:
+        difference = round(j - q) + middle
+        inertia = q * q if truncation is Truncation.PRINTED else j * q
+        own = k0 * inertia if j == q else 0.0
+        return complex(m[difference] * inertia - own - k[difference])
+
+    sides = (n, -n)
+    matrix = np.array([[coupling(j, q) + (k0 * n * n if j == q else 0.0) for q in sides] for j in sides])
+    if order == 2:
+        divisor = 1.0 if truncation is Truncation.APPENDIX_3 else k0
+        for q in reach.tolist():
+            if abs(q) != n:
+                through = np.array([[coupling(j, q) * coupling(q, i) for i in sides] for j in sides])
+                matrix = matrix + through / (divisor * (n * n - q * q))
+    return matrix
+
+
+def perturbed_region(
+    mass: FourierSeries,
+    stiffness: FourierSeries,
+    number: int,
+    *,
+    damping: float = 0.0,
+    order: int = 2,
+    truncation: Truncation = Truncation.RIGHT,
+) -> Region | None:
+    """Boundaries in lambda_k^2 of (M y')' + lambda_c y' + (lambda_k^2 + K) y = 0 for small harmonics of M and K.
+
+    To first order, eq (5.13),
+
+        lambda_k^2 = k0 N^2/4 - K0 -+ |N^2/4 M_N + K_N|,
+
+    with M_N and K_N the complex coefficients of exp(i N x); to second order, eq (5.16), see `perturbed_operator`; with
+    damping, eq (5.26), the square of the half width falls by (N lambda_c / 2)^2. The thesis's derivation is by Lindstedt's
+    method; the formulas here are ours, by degenerate perturbation of Hill's matrix, which gives the same series.
+
+    Parameters
+    ----------
+    mass, stiffness : FourierSeries
+        M and K.
+    number : int
+        N.
+    damping : float
+        lambda_c, which counts as of the order of the half width.
+    order : int
+        1 or 2.
+    truncation : Truncation
+
+    Returns
+    -------
+    Region or None
+        None where the damping has removed the region.
+
+    Raises
+    ------
+    InputError
+        As `perturbed_operator`, or if the damping is negative or not finite.
+    """
+    if not (isfinite(damping) and damping >= 0.0):
+        raise InputError(f"lambda_c is {damping}: it must be a finite number, zero or greater")
+    matrix = perturbed_operator(mass, stiffness, number, order=order, truncation=truncation)
+    middle = 0.5 * float((matrix[0, 0] + matrix[1, 1]).real)
+    square = float((matrix[0, 1] * matrix[1, 0]).real) - (0.5 * number * damping) ** 2
+    if square < 0.0:
+        return None
+    half = float(np.sqrt(square))
+    return Region(number=number, low=middle - half, high=middle + half)
+
+
+def perturbed_removing_damping(
+    mass: FourierSeries,
+    stiffness: FourierSeries,
+    number: int,
+    *,
+    order: int = 2,
+    truncation: Truncation = Truncation.RIGHT,
+) -> float:
+    """lambda_c at which the region N vanishes, after (5.26): twice the half width without damping, over N."""
+    matrix = perturbed_operator(mass, stiffness, number, order=order, truncation=truncation)
+    return 2.0 * float(np.sqrt(abs(matrix[0, 1] * matrix[1, 0]))) / number

@@ -1,0 +1,344 @@
+"""The slider's equation linearised about the four-bar u = 0 at constant crank speed (Youssef, eq 4.21).
+
+With zeta = u/l4, ' = d/d(theta2), masses relative to m45 = m4 + m5 and forces to m45 l4 omega^2,
+
+    (M zeta')' + lambda_c zeta' + (lambda_k^2 + K) zeta = F
+
+where lambda_k^2 = k/(m45 omega^2), lambda_c = mu/(m45 omega), and M, K, F have the period of the crank. They are
+the exact derivatives of the plant's own functions at u = u' = 0, so that any mechanism will do: coupler with mass, centres
+of mass anywhere, gravity, load, preloaded spring, inclined guide. The velocity terms bring M' zeta' with them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from enum import StrEnum
+from functools import cache
+from math import isfinite, pi, sqrt
+from types import MappingProxyType
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from linkwork.errors import AssemblyError, InputError
+from linkwork.five_bar.parameters import Constants, FiveBarParameters
+from linkwork.limits import LIMIT_SINE
+
+from ..numerics import symbolic
+from ..numerics.fourier import FourierSeries
+
+#: Part of the largest amplitude that the harmonics left out of the exact coefficients have at most.
+NEGLIGIBLE = 1e-13
+#: Samples of a turn from which the exact coefficients may be computed; doubled until the harmonics have died away.
+FEWEST_SAMPLES, MOST_SAMPLES = 64, 8192
+
+
+class Variant(StrEnum):
+    """Which coefficients M, K and F are used.
+
+    Attributes
+    ----------
+    EXACT
+        All harmonics.
+    FIRST_ORDER, SECOND_ORDER
+        Taylor polynomials in the crank's length (sigma2 = l2/l4), harmonics up to 1 and up to 2.
+    PRINTED
+        Those of second order without M' zeta'. Of (4.21) as printed we know that it leaves this term out, an error; that the
+        rest of it is right is inferred.
+    FORTRAN
+        Those of ``PRINTED`` with every first-order term halved, as in the listings of appendices 2 to 4. The listings also
+        differ from the printed formulas in K, in a way that we have no record of and could not infer, so that this variant
+        does not reproduce what they give. For I4 = 0.5, 1, 1.5 it has the resonance at 31.0936, 30.5902, 30.1106 rad/s
+        (listings: 31.0763, 30.5572, 30.0645), the first unstable region at lambda_k^2 = 0.25786-0.25968, 0.26573-0.26937,
+        0.27359-0.27905 (0.25786-0.26031, 0.26580-0.27054, 0.27382-0.28069), which omega_c = 0.33 removes (0.459).
+        With the first harmonic of K halved and that of M not, 0.459 comes out, and widths of the regions that are those of
+        the listings to 2e-5 once divided by 4 lambda_k^2; but neither the middles nor the resonances. Nothing tried has all.
+    """
+
+    EXACT = "exact"
+    FIRST_ORDER = "first order"
+    SECOND_ORDER = "second order"
+    PRINTED = "printed"
+    FORTRAN = "FORTRAN"
+
+
+#: Weights of the orders in the crank's length.
+_WEIGHTS: Mapping[Variant, tuple[float, ...]] = MappingProxyType(
+    {
+        Variant.FIRST_ORDER: (1.0, 1.0),
+        Variant.SECOND_ORDER: (1.0, 1.0, 1.0),
+        Variant.PRINTED: (1.0, 1.0, 1.0),
+        # appendices 2-4: every first-order term is half of what it should be
+        Variant.FORTRAN: (1.0, 0.5, 1.0),
+    }
+)
+
+
+class Load(NamedTuple):
+    """What acts on the mechanism from outside, constant: force at the coupler point P and on the slider (N)."""
+
+    x: float = 0.0
+    y: float = 0.0
+    slider: float = 0.0
+
+
+NO_LOAD = Load()
+
+
+class Balance(NamedTuple):
+    """Slider and crank equations at given motions of the slider, crank at constant speed; arrays of the motions' shape.
+
+    Attributes
+    ----------
+    force : ndarray
+        m22 u'' + b2 - Q2 - F2 (N): zero in a motion that the mechanism makes of its own.
+    by_acceleration, by_velocity, by_position : ndarray
+        Its derivatives with respect to u'' (the effective mass m22, kg), u' (N.s/m) and u (N/m).
+    torque : ndarray
+        Crank torque that holds the speed (N.m).
+    """
+
+    force: NDArray[np.float64]
+    by_acceleration: NDArray[np.float64]
+    by_velocity: NDArray[np.float64]
+    by_position: NDArray[np.float64]
+    torque: NDArray[np.float64]
+
+
+@cache
+def _traced() -> dict[str, Callable[..., tuple[NDArray[np.float64], ...]]]:
+    """``balance`` and ``taylor``: the slider's equation with its derivatives, for arrays of angles and motions.
+
+    ``taylor`` gives M m45, K m45 and F m45 l4 in SI at u = u' = 0: their values, first and halved second derivatives
+    with respect to the crank's length, one after the other.
+    """
+    casadi = symbolic.library()
+    f = symbolic.plant()
+    angle, u, v, a, w = (casadi.SX.sym(name) for name in ("angle", "u", "v", "a", "w"))
+    columns, p = symbolic.constants()
+    load = casadi.SX.sym("load", 3)
+    g = f.position(angle, u, p)
+    k = f.coefficients(g, p)
+    w3, w4 = k.k32 * w + k.k3u * v, k.k42 * w + k.k4u * v
+    m = f.inertia(g, k, p)
+    g3, g4 = f.centripetal(g, w, w3, w4, p)
+    b1, b2 = f.velocity_terms(g, k, w, w3, w4, g3, g4, p)
+    q1, q2 = f.applied_forces(g, k, u, v, load[0], load[1], p)
+    force = m.m22 * a + b2 - q2 - load[2]
+    torque = m.m12 * a + b1 - q1
+    by_position = casadi.jacobian(force, u)
+    balance = [force, m.m22, casadi.jacobian(force, v), by_position, torque]
+    arguments = [angle, u, v, a, w, columns, load]
+    rest = casadi.substitute([m.m22, by_position, -force], [u, v, a], [casadi.SX(0)] * 3)
+    first = [casadi.jacobian(value, p.l2) for value in rest]
+    second = [0.5 * casadi.jacobian(value, p.l2) for value in first]
+    outputs = {"balance": (arguments, balance), "taylor": ([angle, w, columns, load], rest + first + second)}
+    space: dict[str, Callable[..., tuple[NDArray[np.float64], ...]]] = {
+        name: getattr(np, name) for name in ("sin", "cos", "sqrt", "tanh", "fabs")
+    }
+    space["atan2"] = np.arctan2
+    for name, (ins, outs) in outputs.items():
+        function = casadi.Function(name, ins, [casadi.densify(out) for out in outs], {"cse": True})
+        exec(symbolic.source(function, name), space)
+    return {name: space[name] for name in outputs}
+
+
+def balance(
+    angle: ArrayLike,
+    position: ArrayLike,
+    velocity: ArrayLike,
+    acceleration: ArrayLike,
+    speed: float,
+    p: Constants,
+    load: Load = NO_LOAD,
+) -> Balance:
+    """The plant's equations with exact derivatives at motions u, u', u'' (m, m/s, m/s2) and crank angles, arrays of a shape.
+
+    Raises
+    ------
+    AssemblyError
+        If the links cannot be joined at one of them, or coupler and rocker are collinear.
+    """
+    arrays = np.broadcast_arrays(*(np.asarray(x, dtype=float) for x in (angle, position, velocity, acceleration)))
+    _require_assembly(arrays[0], arrays[1], p)
+    values = _traced()["balance"](*arrays, speed, p, load)
+    return Balance(*(np.broadcast_to(value, arrays[0].shape) for value in values))
+
+
+def _require_assembly(angle: NDArray[np.float64], position: NDArray[np.float64], p: Constants) -> None:
+    """Raise where |sin(th4 - th3)| is not above `LIMIT_SINE`."""
+    angle, position = angle.ravel(), position.ravel()
+    dx = p.l1 + position * p.ca - p.l2 * np.cos(angle)
+    dy = position * p.sa - p.l2 * np.sin(angle)
+    # the law of cosines in the triangle BCD
+    cosine = (p.l3**2 + p.l4**2 - dx**2 - dy**2) / (2.0 * p.l3 * p.l4)
+    worst = int(np.argmax(np.abs(cosine)))
+    if not abs(cosine[worst]) < sqrt(1.0 - LIMIT_SINE**2):
+        raise AssemblyError(
+            f"the cosine of the angle between coupler and rocker would be {cosine[worst]:.6g} at crank angle "
+            f"{angle[worst]:.6g} rad, slider position {position[worst]:.6g} m and crank length {p.l2:.6g} m: "
+            "the links cannot be joined or are collinear"
+        )
+
+
+def require_speed(speed: float) -> None:
+    """Raise `InputError` for a crank speed (rad/s) that is not finite and greater than zero."""
+    if not (isfinite(speed) and speed > 0.0):
+        raise InputError(f"crank speed {speed!r} rad/s: it must be finite and greater than zero")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SliderEquation:
+    """(M zeta')' + lambda_c zeta' + (lambda_k^2 + K) zeta = F, eq (4.21) put right; dimensionless.
+
+    Attributes
+    ----------
+    mass, stiffness, force : FourierSeries
+        M; K, without lambda_k^2; F.
+    spring, damping : float
+        lambda_k^2 and lambda_c.
+    mass_rate : bool
+        Whether M' zeta' is kept; (4.21) as printed leaves it out.
+    variant : Variant
+        Where the coefficients come from.
+
+    Raises
+    ------
+    InputError
+        If lambda_k^2 or lambda_c is not finite.
+    """
+
+    mass: FourierSeries
+    stiffness: FourierSeries
+    force: FourierSeries
+    spring: float
+    damping: float
+    mass_rate: bool = True
+    variant: Variant = Variant.EXACT
+
+    def __post_init__(self) -> None:
+        if not (isfinite(self.spring) and isfinite(self.damping)):
+            raise InputError(f"lambda_k^2 = {self.spring} and lambda_c = {self.damping} must be finite")
+
+    def coefficients(self) -> tuple[FourierSeries, FourierSeries, FourierSeries]:
+        """a, b, c of a zeta'' + b zeta' + c zeta = F: M, M' + lambda_c (or lambda_c alone), lambda_k^2 + K."""
+        rate = self.mass.derivative() if self.mass_rate else FourierSeries.constant(0.0)
+        return self.mass, rate + self.damping, self.stiffness + self.spring
+
+
+def slider_equation(
+    parameters: FiveBarParameters,
+    speed: float,
+    *,
+    variant: Variant = Variant.EXACT,
+    order: int | None = None,
+    load: Load = NO_LOAD,
+) -> SliderEquation:
+    """The slider's equation linearised about u = 0 at a crank speed.
+
+    Parameters
+    ----------
+    parameters : FiveBarParameters
+        Without Coulomb friction, which has no linear form.
+    speed : float
+        Crank speed omega (rad/s), greater than zero.
+    variant : Variant
+    order : int, optional
+        Highest harmonic kept of the exact coefficients; without it all down to rounding.
+    load : Load
+
+    Raises
+    ------
+    InputError
+        If the speed is not positive and finite, there is Coulomb friction, an order is asked for of a variant that has its
+        own, or the mechanism comes so near its limit of assembly that the harmonics do not die away.
+    AssemblyError
+        If at u = 0 the links cannot be joined over the whole turn.
+    """
+    require_speed(speed)
+    if parameters.slider_coulomb_friction:
+        raise InputError("slider.coulomb_friction must be 0: a linear equation cannot hold it")
+    if variant is not Variant.EXACT and order is not None:
+        raise InputError(f"an order cannot be chosen with the variant {variant.value!r}: it has its own")
+    p = parameters.constants()
+    if variant is Variant.EXACT:
+        mass, stiffness, force = _exact(p, speed, load, order)
+    else:
+        mass, stiffness, force = _taylor(p, speed, load, np.array(_WEIGHTS[variant]))
+    return SliderEquation(
+        mass=mass * (1.0 / p.m45),
+        stiffness=stiffness * (1.0 / (p.m45 * speed**2)),
+        force=force * (1.0 / (p.m45 * speed**2 * p.l4)),
+        spring=p.k / (p.m45 * speed**2),
+        damping=p.mu / (p.m45 * speed),
+        mass_rate=variant not in (Variant.PRINTED, Variant.FORTRAN),
+        variant=variant,
+    )
+
+
+def _without_spring(p: Constants, load: Load) -> tuple[Constants, Load]:
+    """The constants without spring and damper, and the load with the spring's preload."""
+    return p._replace(k=0.0, u0=0.0, mu=0.0, fc=0.0), load._replace(slider=load.slider + p.k * p.u0)
+
+
+def _exact(
+    p: Constants, speed: float, load: Load, order: int | None
+) -> tuple[FourierSeries, FourierSeries, FourierSeries]:
+    """m22 (kg), K m45 omega^2 (N/m) and F m45 l4 omega^2 (N) from samples, as many as it takes."""
+    bare, loaded = _without_spring(p, load)
+    samples = FEWEST_SAMPLES if order is None else max(FEWEST_SAMPLES, 4 * order)
+    while True:
+        angle = np.linspace(0.0, 2.0 * pi, samples, endpoint=False)
+        at_rest = balance(angle, 0.0, 0.0, 0.0, speed, bare, loaded)
+        series = [
+            FourierSeries.from_samples(values)
+            for values in (at_rest.by_acceleration, at_rest.by_position, -at_rest.force)
+        ]
+        tails = [_tail(one) for one in series]
+        if max(tails) < samples // 4:
+            mass, stiffness, force = (
+                one.to_order(tail if order is None else order) for one, tail in zip(series, tails)
+            )
+            return mass, stiffness, force
+        if samples >= MOST_SAMPLES:
+            raise InputError(
+                f"harmonics up to order {max(tails)} of {samples} samples matter: the mechanism comes too near its limit "
+                "of assembly for a Fourier series"
+            )
+        samples *= 2
+
+
+def _tail(series: FourierSeries) -> int:
+    """Order of the last harmonic that is more than rounding."""
+    size = np.abs(series.amplitudes)
+    return int(np.flatnonzero(size > NEGLIGIBLE * size.max())[-1]) if size.max() > 0.0 else 0
+
+
+def _taylor(
+    p: Constants, speed: float, load: Load, weights: NDArray[np.float64]
+) -> tuple[FourierSeries, FourierSeries, FourierSeries]:
+    """The same as Taylor polynomials in the crank's length, a weight per order; no harmonic is higher than that order."""
+    order = len(weights) - 1
+    bare, loaded = _without_spring(p, load)
+    # the function expands about no crank at all
+    bare = bare._replace(l2=0.0)
+    angle = np.linspace(0.0, 2.0 * pi, 8, endpoint=False)
+    _require_assembly(angle, np.zeros(8), bare)
+    terms = np.array([np.broadcast_to(term, 8) for term in _traced()["taylor"](angle, speed, bare, loaded)])
+    values = np.tensordot(weights * p.l2 ** np.arange(order + 1), terms.reshape(3, 3, 8)[: order + 1], axes=1)
+    mass, stiffness, force = (FourierSeries.from_samples(value, order) for value in values)
+    return mass, stiffness, force
+
+
+def mean_effective_mass(parameters: FiveBarParameters) -> float:
+    """Mean over a turn of what moves with the slider at u = 0, m22 (kg).
+
+    Raises
+    ------
+    AssemblyError
+        If at u = 0 the links cannot be joined over the whole turn.
+    """
+    p = parameters.constants()
+    return _exact(p, 1.0, NO_LOAD, 0)[0].mean

@@ -1,0 +1,422 @@
+"""Where the coupler point P can go: coupler curves at a held slider, and the area they sweep (Youssef, Fig 7.2).
+
+P has two freedoms, the crank angle th2 and the slider position u. At a fixed u it draws a coupler curve, closed where
+the crank turns fully and a pair of ends where the links part; over a range of u the curves fill the accessible area.
+
+The curves go forwards, through the plant's own kinematics. The area goes backwards: a point (x, y) is accessible if one
+of its at most four configurations is there,
+
+    |B - A| = l2 and |P - B| = r             two crank pins B, hence two couplers and two pins C
+    D on the guide and |C - D| = l4          two slider positions u for each
+    sin(th4 - th3) of the assembly's sign    and u in its range
+
+which is a test in closed form. It is laid over a square grid, the boundary is located between the grid's points by
+bisection, and the grid is halved until the area no longer changes. Nothing has to be known of the boundary's kind
+(coupler curves of the two ends of the range, limits of assembly, folds where P's two velocities are parallel), and holes
+come out by themselves.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import acos, atan2, hypot, isfinite, pi
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from linkwork.errors import InputError
+from linkwork.five_bar import kinematics
+from linkwork.five_bar.parameters import Constants, FiveBarParameters
+
+from ..mechanisms import require_five_bar
+
+#: Cells across the area in the first and in the finest grid.
+COARSEST, FINEST = 128, 4096
+#: Halvings of a cell's edge that locate the boundary on it.
+BISECTIONS = 40
+#: Share of the sampled configurations that a grid may leave outside before it is taken as too coarse.
+MISSED = 0.01
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Arc:
+    """A stretch of a coupler curve along which the links stay joined: crank angle (rad) and P (m), shapes (n,)."""
+
+    crank_angle: NDArray[np.float64]
+    x: NDArray[np.float64]
+    y: NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CouplerCurve:
+    """The path of P over a turn of the crank at a held slider.
+
+    Attributes
+    ----------
+    slider_position : float
+        m.
+    arcs : tuple of Arc
+        One if the crank turns fully, its last point then its first; else one per stretch between limits of assembly;
+        none if the links cannot be joined at any crank angle.
+    closed : bool
+        Whether the crank turns fully.
+    """
+
+    slider_position: float
+    arcs: tuple[Arc, ...]
+    closed: bool
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AccessibleArea:
+    """The area that P reaches.
+
+    Attributes
+    ----------
+    outer, holes : tuple of ndarray, shape (n, 2)
+        Boundaries (m), closed without repeating the first point; outer ones counter-clockwise, holes clockwise.
+    area : float
+        m2, holes taken out.
+    error : float
+        Change of the area at the last halving of the cells (m2); the area itself is about three times better.
+    missed : float
+        Share of configurations sampled over (th2, u) whose P lies outside by more than a cell: zero on a grid fine enough.
+    cells : int
+        Cells across the area in the last grid.
+    converged : bool
+        Whether ``error`` and ``missed`` are as small as was asked.
+    """
+
+    outer: tuple[NDArray[np.float64], ...]
+    holes: tuple[NDArray[np.float64], ...]
+    area: float
+    error: float
+    missed: float
+    cells: int
+    converged: bool
+
+    def contains(self, x: ArrayLike, y: ArrayLike) -> NDArray[np.bool_]:
+        """Whether points (m), each of shape (k,), lie inside the boundaries."""
+        x, y = np.atleast_1d(np.asarray(x, float)), np.atleast_1d(np.asarray(y, float))
+        inside = np.zeros(x.shape, dtype=bool)
+        for ring in (*self.outer, *self.holes):
+            for (x0, y0), (x1, y1) in zip(ring, np.roll(ring, -1, axis=0)):
+                if y0 != y1:
+                    crossed = (y0 > y) != (y1 > y)
+                    inside ^= crossed & (x < x0 + (y - y0) * ((x1 - x0) / (y1 - y0)))
+        return inside
+
+
+def coupler_curve(parameters: FiveBarParameters, slider_position: float, n: int = 720) -> CouplerCurve:
+    """Path of P over a turn of the crank with the slider held.
+
+    Parameters
+    ----------
+    parameters : FiveBarParameters
+        ``assembly_branch`` chooses the assembly.
+    slider_position : float
+        m.
+    n : int
+        Points of each arc less one. Along an open arc they crowd towards its ends, where P moves as the square root.
+
+    Raises
+    ------
+    InputError
+        If the slider position is not a finite number, or n is less than 2.
+    """
+    require_five_bar(parameters, "a coupler curve")
+    if not isfinite(slider_position):
+        raise InputError(f"slider position is {slider_position}: it must be a finite number of m")
+    if n < 2:
+        raise InputError(f"a coupler curve of {n} pieces: it needs at least 2")
+    p = parameters.constants()
+    spans = joined_spans(slider_position, p)
+    closed = len(spans) == 1 and spans[0][1] - spans[0][0] >= 2.0 * pi
+    arcs = []
+    for start, end in spans:
+        share = np.linspace(0.0, 1.0, n + 1) if closed else 0.5 - 0.5 * np.cos(np.linspace(0.0, pi, n + 1))
+        angle = start + share * (end - start)
+        middle = 0.5 * (start + end)
+        points = np.array([_coupler_point(th2, slider_position, middle, p) for th2 in angle.tolist()])
+        if closed:
+            points[-1] = points[0]
+        arcs.append(Arc(crank_angle=angle, x=points[:, 0], y=points[:, 1]))
+    return CouplerCurve(slider_position=slider_position, arcs=tuple(arcs), closed=closed)
+
+
+def coupler_curves(
+    parameters: FiveBarParameters, slider_positions: Sequence[float], n: int = 720
+) -> tuple[CouplerCurve, ...]:
+    """The family of coupler curves at several slider positions (m); see `coupler_curve`."""
+    return tuple(coupler_curve(parameters, float(u), n) for u in slider_positions)
+
+
+def joined_spans(u: float, p: Constants) -> list[tuple[float, float]]:
+    """Crank angles between which the links can be joined at slider position u: (start, end) in rad, end > start.
+
+    With e = |AD|, BD^2 = e^2 + l2^2 - 2 l2 e cos(th2 - phi) must lie between (l3 - l4)^2 and (l3 + l4)^2. Seen from the
+    direction phi of D the limits are symmetric.
+    """
+    dx, dy = p.l1 + u * p.ca, u * p.sa
+    e = hypot(dx, dy)
+    phi = atan2(dy, dx)
+
+    def angle(distance: float) -> float:
+        """|th2 - phi| at which BD has that length; 0 if it is always longer, pi if always shorter."""
+        if e == 0.0:
+            return 0.0 if p.l2 > distance else pi
+        return acos(min(1.0, max(-1.0, (e * e + p.l2 * p.l2 - distance * distance) / (2.0 * e * p.l2))))
+
+    least, most = angle(abs(p.l3 - p.l4)), angle(p.l3 + p.l4)
+    if p.l3 == p.l4 and e == p.l2:
+        least = 0.0
+    if not least < most:
+        return []
+    if most < pi:
+        if least > 0.0:
+            return [(phi - most, phi - least), (phi + least, phi + most)]
+        return [(phi - most, phi + most)]
+    if least > 0.0:
+        return [(phi + least, phi + 2.0 * pi - least)]
+    return [(0.0, 2.0 * pi)]
+
+
+def _coupler_point(th2: float, u: float, middle: float, p: Constants) -> tuple[float, float]:
+    """P at a configuration, which at the limit of assembly gives way towards the middle of its span by rounding errors."""
+    share = 1e-16
+    angle = th2
+    while True:
+        try:
+            return kinematics.coupler_point(kinematics.position(angle, u, p), p)
+        except (ValueError, ZeroDivisionError):
+            if share > 1e-3:
+                raise
+            angle = th2 + share * (middle - th2)
+            share *= 4.0
+
+
+def accessible(
+    parameters: FiveBarParameters, slider_range: tuple[float, float], x: ArrayLike, y: ArrayLike
+) -> NDArray[np.bool_]:
+    """Whether P can be at points with the slider in its range, in closed form.
+
+    Parameters
+    ----------
+    slider_range : (float, float)
+        Least and greatest slider position (m).
+    x, y : array_like
+        m, shapes that broadcast.
+
+    Returns
+    -------
+    ndarray of bool
+        All False where P is the crank pin B itself: it then has a circle to move on and no area.
+    """
+    p = parameters.constants()
+    low, high = slider_range
+    r = hypot(p.xp, p.yp)
+    # points as complex numbers, directions as complex numbers of length one
+    q = np.asarray(x, float) + 1j * np.asarray(y, float)
+    result = np.zeros(q.shape, dtype=bool)
+    if r == 0.0:
+        return result
+    to_coupler = complex(p.xp, -p.yp) / r
+    guide = complex(p.ca, p.sa)
+    d2 = np.maximum(np.abs(q) ** 2, np.finfo(float).tiny)
+    a = 0.5 * (d2 + p.l2**2 - r**2)
+    h2 = p.l2**2 * d2 - a**2
+    meets = h2 >= 0.0
+    h = np.sqrt(np.where(meets, h2, 0.0))
+    for side in (1.0, -1.0):
+        b = q * (a + side * 1j * h) / d2
+        coupler = (q - b) / r * to_coupler
+        # C from the slider's zero, in the frame of the guide
+        c = (b + p.l3 * coupler - p.l1) * guide.conjugate()
+        s2 = p.l4**2 - c.imag**2
+        reaches = meets & (s2 >= 0.0)
+        s = np.sqrt(np.where(reaches, s2, 0.0))
+        for end in (1.0, -1.0):
+            rocker = (end * s + 1j * c.imag) * guide
+            u = c.real - end * s
+            joined = p.branch * (coupler.conjugate() * rocker).imag >= 0.0
+            result |= reaches & joined & (low <= u) & (u <= high)
+    return result
+
+
+def accessible_area(
+    parameters: FiveBarParameters,
+    slider_range: tuple[float, float],
+    *,
+    tolerance: float = 1e-4,
+    finest: int = FINEST,
+) -> AccessibleArea:
+    """The area that the coupler point P reaches as crank and slider move independently.
+
+    Parameters
+    ----------
+    parameters : FiveBarParameters
+        Any, assembled everywhere, in part or nowhere; ``assembly_branch`` chooses the assembly.
+    slider_range : (float, float)
+        Least and greatest slider position (m).
+    tolerance : float
+        Change of the area, relative to it, at which the halving of the cells stops.
+    finest : int
+        Cells across the area at which it stops in any case.
+
+    Raises
+    ------
+    InputError
+        If the range is not two increasing finite numbers, or the tolerance is not above zero.
+    """
+    require_five_bar(parameters, "the accessible area of the coupler point")
+    low, high = (float(end) for end in slider_range)
+    if not (isfinite(low) and isfinite(high) and low < high):
+        raise InputError(f"slider range is {low} m to {high} m: it must be two finite numbers, increasing")
+    if not tolerance > 0.0:
+        raise InputError(f"tolerance is {tolerance}: it must be above zero")
+    sample = _sampled(parameters, low, high)
+    nothing = AccessibleArea(outer=(), holes=(), area=0.0, error=0.0, missed=0.0, cells=0, converged=True)
+    if not len(sample) or hypot(parameters.constants().xp, parameters.constants().yp) == 0.0:
+        return nothing
+    previous = None
+    cells = min(COARSEST, finest)
+    while True:
+        rings, missed = _trace(parameters, (low, high), sample, cells)
+        areas = [_signed_area(ring) for ring in rings]
+        area = float(sum(areas))
+        error = float("inf") if previous is None else abs(area - previous)
+        converged = missed <= MISSED and error <= tolerance * area
+        if converged or 2 * cells > finest:
+            return AccessibleArea(
+                outer=tuple(ring for ring, a in zip(rings, areas) if a > 0.0),
+                holes=tuple(ring for ring, a in zip(rings, areas) if a < 0.0),
+                area=area,
+                error=error,
+                missed=missed,
+                cells=cells,
+                converged=converged,
+            )
+        previous = area
+        cells *= 2
+
+
+def _sampled(parameters: FiveBarParameters, low: float, high: float) -> NDArray[np.float64]:
+    """P at configurations spread over crank angle and slider position, shape (k, 2)."""
+    curves = coupler_curves(parameters, np.linspace(low, high, 33).tolist(), n=120)
+    arcs = [np.column_stack([arc.x, arc.y]) for curve in curves for arc in curve.arcs]
+    return np.concatenate(arcs) if arcs else np.empty((0, 2))
+
+
+def _trace(
+    parameters: FiveBarParameters, slider_range: tuple[float, float], sample: NDArray[np.float64], cells: int
+) -> tuple[list[NDArray[np.float64]], float]:
+    """Boundaries on a grid with that many cells across, and the share of the sample that no cell of the area holds."""
+    least, most = sample.min(axis=0), sample.max(axis=0)
+    size = float((most - least).max()) / cells
+    margin = 0.02
+    while True:
+        # an odd offset, so that a symmetric mechanism does not put its axis on a row of points
+        origin = least - margin * (most - least) - 2.37 * size
+        count = np.ceil((most + margin * (most - least) + 2.37 * size - origin) / size).astype(int) + 1
+        xs = origin[0] + size * np.arange(count[0])
+        ys = origin[1] + size * np.arange(count[1])
+        inside = np.array([accessible(parameters, slider_range, xs, y) for y in ys])
+        if not (inside[0].any() or inside[-1].any() or inside[:, 0].any() or inside[:, -1].any()):
+            break
+        margin *= 2.0
+    i, j = ((sample - origin) / size).astype(int).T
+    corners = inside[j, i] | inside[j + 1, i] | inside[j, i + 1] | inside[j + 1, i + 1]
+    return _rings(parameters, slider_range, inside, xs, ys), float(1.0 - corners.mean())
+
+
+def _cell_pieces() -> dict[tuple[int, bool], list[tuple[int, int]]]:
+    """Boundary pieces of a cell, from edge to edge with the inside on the left.
+
+    The key is which corners are inside (bit 0 lower left, then counter-clockwise) and whether the centre is, which
+    tells the two saddles apart. Edges are numbered from the lower one, counter-clockwise.
+    """
+    pieces = {}
+    for code in range(1, 15):
+        corner = [bool(code >> bit & 1) for bit in range(4)]
+        ways = [(edge, corner[edge]) for edge in range(4) if corner[edge] != corner[(edge + 1) % 4]]
+        for centre in (False, True):
+            # walking round the cell, one leaves the inside at an edge; the boundary goes from there to where one
+            # entered it, or, with the inside joined across a saddle, to where one enters it next
+            step = 1 if centre else -1
+            pieces[code, centre] = [
+                (edge, ways[(k + step) % len(ways)][0]) for k, (edge, leaves) in enumerate(ways) if leaves
+            ]
+    return pieces
+
+
+_PIECES = _cell_pieces()
+
+
+def _rings(
+    parameters: FiveBarParameters,
+    slider_range: tuple[float, float],
+    inside: NDArray[np.bool_],
+    xs: NDArray[np.float64],
+    ys: NDArray[np.float64],
+) -> list[NDArray[np.float64]]:
+    """Closed boundaries of the grid's inside, each vertex bisected onto the boundary along its edge of the grid."""
+    rows, columns = inside.shape
+    code = (
+        inside[:-1, :-1].astype(int) + 2 * inside[:-1, 1:] + 4 * inside[1:, 1:] + 8 * inside[1:, :-1]
+    )  # lower left, lower right, upper right, upper left
+    saddle_j, saddle_i = np.nonzero((code == 5) | (code == 10))
+    half = 0.5 * (xs[1] - xs[0])
+    centre = np.zeros(code.shape, dtype=bool)
+    centre[saddle_j, saddle_i] = accessible(parameters, slider_range, xs[saddle_i] + half, ys[saddle_j] + half)
+    # numbers of a cell's edges: horizontal ones first, then vertical ones
+    vertical = rows * columns
+    j, i = np.nonzero((code > 0) & (code < 15))
+    edges = np.stack(
+        [j * columns + i, vertical + j * columns + i + 1, (j + 1) * columns + i, vertical + j * columns + i]
+    )
+    follows: dict[int, int] = {}
+    for numbers, cell_code, middle in zip(edges.T.tolist(), code[j, i].tolist(), centre[j, i].tolist()):
+        for start, end in _PIECES[cell_code, middle]:
+            follows[numbers[start]] = numbers[end]
+    vertices = _crossings(parameters, slider_range, inside, xs, ys, np.array(list(follows), dtype=int))
+    place = {edge: k for k, edge in enumerate(follows)}
+    rings = []
+    while follows:
+        edge, following = follows.popitem()
+        ring = [edge]
+        while following != edge:
+            ring.append(following)
+            following = follows.pop(following)
+        rings.append(vertices[[place[number] for number in ring]])
+    return sorted(rings, key=lambda ring: (-abs(_signed_area(ring)), *ring[0]))
+
+
+def _crossings(
+    parameters: FiveBarParameters,
+    slider_range: tuple[float, float],
+    inside: NDArray[np.bool_],
+    xs: NDArray[np.float64],
+    ys: NDArray[np.float64],
+    edges: NDArray[np.int64],
+) -> NDArray[np.float64]:
+    """The point of each numbered edge at which the area ends, shape (k, 2)."""
+    rows, columns = inside.shape
+    upright, number = np.divmod(edges, rows * columns)
+    j, i = np.divmod(number, columns)
+    far_j, far_i = j + upright, i + 1 - upright
+    first = np.column_stack([xs[i], ys[j]])
+    second = np.column_stack([xs[far_i], ys[far_j]])
+    swap = inside[far_j, far_i][:, None]
+    good, bad = np.where(swap, second, first), np.where(swap, first, second)
+    for _ in range(BISECTIONS):
+        middle = 0.5 * (good + bad)
+        keep = accessible(parameters, slider_range, middle[:, 0], middle[:, 1])[:, None]
+        good, bad = np.where(keep, middle, good), np.where(keep, bad, middle)
+    return good
+
+
+def _signed_area(ring: NDArray[np.float64]) -> float:
+    """Area within a closed ring (m2), negative if it runs clockwise; taken about its first point."""
+    x, y = (ring - ring[0]).T
+    return float(0.5 * np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y))

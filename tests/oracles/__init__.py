@@ -1,0 +1,1 @@
+"""Independent formulations, against which the plants are checked."""
