@@ -19,8 +19,7 @@ from rich.console import Console
 from rich.table import Table
 
 import build_fmu
-from analysis import Inputs
-from analysis.run import simulate
+from analysis import Inputs, simulate
 from linkwork.five_bar import dynamics
 from linkwork.five_bar.plant import SPEED_DRIVE, Plant
 from linkwork.five_bar.published import SETS

@@ -20,7 +20,8 @@ from rich.table import Table
 from scipy.integrate import solve_ivp
 
 import build_fmu
-from analysis.run import compiled, simulate
+from analysis import simulate
+from analysis.run import compiled
 from analysis.run.inputs import SliderCrankInputs
 from analysis.slider_crank.closure import close
 from analysis.slider_crank.dual_dynamics import joint_loads

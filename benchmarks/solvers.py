@@ -20,8 +20,8 @@ from rich.console import Console
 from rich.table import Table
 from scipy.integrate import solve_ivp
 
-from analysis import Inputs, TorsionBar
-from analysis.run import compiled, simulate
+from analysis import Inputs, TorsionBar, simulate
+from analysis.run import compiled
 from benchmarks import engines
 from benchmarks.engines import ACCURACY, CASES, Case, relative_error
 from linkwork.five_bar import dynamics

@@ -111,6 +111,7 @@ def run(
       linkwork run --published rig-1-spring-a --set slider.coulomb_friction='5 N'
       linkwork run examples/torsion-bar.toml --fmu build/FiveBarSlider.fmu --out results
     """
+    from .. import figures
     from ..files import io
     from ..run.cosimulate import cosimulate
     from ..run.simulate import RunInterrupted, simulate
@@ -145,7 +146,7 @@ def run(
         names = tuple(
             dict.fromkeys(("slider.position", second, "crank.speed", "drive.applied_torque", "transmission.angle"))
         )
-        written.append(io.save_figure(result.plot(names, title=chosen.title), Path(out) / f"{name}.png"))
+        written.append(io.save_figure(figures.plot(result, names, title=chosen.title), Path(out) / f"{name}.png"))
     _summary(chosen.title, result)
     for path in written:
         console.print(f"wrote {path}", highlight=False, soft_wrap=True)

@@ -6,46 +6,48 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from math import ceil
 from textwrap import fill
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any, TypeVar
 
 import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 from matplotlib.patches import PathPatch
 from matplotlib.path import Path as Outline
 from numpy.typing import ArrayLike, NDArray
 
-from .style import COLOURS, STYLE, finish
-
-if TYPE_CHECKING:
-    pass
-
+from ..run.trajectory import Trajectory
+from .dispatch import plot
+from .style import COLOURS, STYLE, Figure, finish
 
 _Part = TypeVar("_Part")
 
 
+@plot.register
 def plot_outputs(
-    time: ArrayLike, outputs: Mapping[str, tuple[NDArray[np.float64], str]], *, columns: int = 1, title: str = ""
+    run: Trajectory,
+    names: Sequence[str] = ("slider.position", "drive.applied_torque"),
+    *,
+    columns: int = 1,
+    title: str = "",
 ) -> Figure:
-    """Plot outputs over time, one panel each.
+    """Plot outputs of a run over time, one panel each.
 
     Parameters
     ----------
-    time : array_like, shape (n,)
-        s.
-    outputs : mapping
-        Name to (values of shape (n,), unit).
+    run : Trajectory
+    names : sequence of str
+        Outputs.
     columns : int
         Panels side by side.
+    title : str
     """
-    rows = ceil(len(outputs) / columns)
+    rows = ceil(len(names) / columns)
     with matplotlib.rc_context(STYLE):
         figure = Figure(figsize=(6.4 * columns, 1.0 + 1.9 * rows))
         axes = figure.subplots(rows, columns, sharex=True, squeeze=False)
-        for axis, (name, (values, unit)) in zip(axes.flat, outputs.items()):
-            axis.plot(time, values)
-            axis.set_ylabel(f"{name} [{unit}]")
+        for axis, name in zip(axes.flat, names):
+            axis.plot(run.time, run[name])
+            axis.set_ylabel(f"{name} [{run.units[name]}]")
         for axis in axes[-1]:
             axis.set_xlabel("time [s]")
         if title:

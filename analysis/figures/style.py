@@ -6,6 +6,8 @@ from typing import Any
 
 from matplotlib.figure import Figure
 
+__all__ = ["COLOURS", "STYLE", "Figure", "finish"]
+
 STYLE: dict[Any, Any] = {
     "figure.constrained_layout.use": True,
     "axes.grid": True,

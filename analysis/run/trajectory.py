@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +17,6 @@ from ..mechanisms import FIVE_BAR, OUTPUT_UNITS
 
 if TYPE_CHECKING:
     import pandas
-    from matplotlib.figure import Figure
 
 #: Unit of each real output, by name.
 UNITS: Mapping[str, str] = MappingProxyType(OUTPUT_UNITS)
@@ -116,9 +115,3 @@ class Trajectory:
         import pandas
 
         return pandas.DataFrame(self.values, index=pandas.Index(self.time, name="time"), columns=list(self.names))
-
-    def plot(self, names: Sequence[str] = ("slider.position", "drive.applied_torque"), **options: Any) -> Figure:
-        """Plot outputs over time, one panel each; see `analysis.figures.plot_outputs`."""
-        from .. import figures
-
-        return figures.plot_outputs(self.time, {name: (self[name], UNITS[name]) for name in names}, **options)

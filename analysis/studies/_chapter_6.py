@@ -8,22 +8,18 @@ from __future__ import annotations
 from collections.abc import Mapping
 from functools import cache
 from math import degrees, inf, pi
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from linkwork.five_bar.published import CM_PER_METRE
 
-from ..figures import COLOURS, Curve, Panel, plot_curves
+from ..figures import COLOURS, Curve, Figure, Panel, plot_curves
 from ..synthesis import LargestLink, Linkage, RockerFunction, Solution, evaluate, synthesize, trade_off, turn
 from ..synthesis.linkage import LINKS
 from ..synthesis.published import PROBLEMS
 from ..synthesis.tasks import normal_form
 from .study import BALANCE, REFERENCE, THESIS, StudyResult, Verdict, at_least, at_most, near, padded
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 FloatArray = NDArray[np.float64]
 

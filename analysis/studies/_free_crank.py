@@ -3,20 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from linkwork.five_bar.published import CM_PER_METRE, RAD_S_PER_RPM
 
-from ..figures import Panel, plot_curves
+from ..figures import Figure, Panel, plot_curves
 from ..run.trajectory import Trajectory
 from ._runs import STIFFNESSES, TORQUES, coast, launch, plain, scientific
 from .study import ASSIGNED, BALANCE, StudyResult, Verdict, at_most, curves_of
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 #: Quantity of a plot: what the axis calls it, output, factor to its unit, unit.
 SLIDER = ("slider position u", "slider.position", CM_PER_METRE, "cm")

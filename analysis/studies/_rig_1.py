@@ -10,18 +10,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import cache
-from typing import TYPE_CHECKING
 
 from linkwork.five_bar.published import RAD_S_PER_RPM
 
-from ..figures import Panel, plot_curves
+from ..figures import Figure, Panel, plot_curves
 from ..periodic.resonance import Response, natural_frequency
 from ._orbits import COARSE, FINE, between, response
 from ._runs import rig_1, steady_turn
 from .study import ASSIGNED, BALANCE, StudyResult, Verdict, at_most, curves_of
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 #: Speeds of the curves (rpm).
 SLOWEST, FASTEST = 100.0, 1200.0

@@ -8,22 +8,18 @@ at most but near resonance, where the thesis's two harmonics should do well. The
 from __future__ import annotations
 
 from math import sqrt
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from linkwork.five_bar.parameters import FiveBarParameters
 from linkwork.five_bar.published import CM_PER_METRE, RAD_S_PER_RPM, SETS
 
-from ..figures import COLOURS, Curve, Panel, plot_curves
+from ..figures import COLOURS, Curve, Figure, Panel, plot_curves
 from ..periodic.resonance import Response, natural_frequency
 from ..youssef.harmonic_balance import HarmonicMotion, nonlinear_harmonic_balance, two_harmonics
 from ..youssef.slider_equation import Variant, slider_equation
 from ._orbits import SAME, between, columns_of, curves_over_speed, multiplier_verdict, orbit, response, runs_verdict
 from .study import ASSIGNED, BALANCE, REFERENCE, THESIS, StudyResult, at_most, near, padded
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 #: Speeds of the curves (rpm).
 SLOWEST, FASTEST = 100.0, 1300.0

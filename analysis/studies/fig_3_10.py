@@ -10,16 +10,12 @@ number 3.10 is our assignment.
 from __future__ import annotations
 
 import sys
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..figures import COLOURS, Curve, Panel, plot_curves
+from ..figures import COLOURS, Curve, Figure, Panel, plot_curves
 from ._runs import TORQUES, launch
 from .study import ASSIGNED, REFERENCE, THESIS, Study, StudyResult, at_most, near
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 NUMBER = "3.10"
 

@@ -13,16 +13,12 @@ from __future__ import annotations
 
 import sys
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..figures import COLOURS, Curve, Panel, plot_curves
+from ..figures import COLOURS, Curve, Figure, Panel, plot_curves
 from ._runs import DAMPINGS, drift, plain, scientific
 from .study import REFERENCE, THESIS, Study, StudyResult, at_least, near, padded
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 NUMBER = "3.2"
 

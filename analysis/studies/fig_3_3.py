@@ -9,14 +9,10 @@ from __future__ import annotations
 
 import sys
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
-from ..figures import COLOURS, Curve, Panel, plot_curves
+from ..figures import COLOURS, Curve, Figure, Panel, plot_curves
 from ._runs import DAMPINGS, drift, plain, scientific
 from .study import REFERENCE, Study, StudyResult, near, padded
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 NUMBER = "3.3"
 

@@ -9,14 +9,10 @@ shrinks as the spring stiffens.
 from __future__ import annotations
 
 import sys
-from typing import TYPE_CHECKING
 
-from ..figures import COLOURS, Curve, Panel, plot_curves
+from ..figures import COLOURS, Curve, Figure, Panel, plot_curves
 from ._runs import SPEED, STIFFNESSES, least, plain, scientific, steady_turn, table_3_1
 from .study import BALANCE, REFERENCE, THESIS, Study, StudyResult, at_most, curves_of, near
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 NUMBER = "3.4"
 

@@ -8,13 +8,12 @@ numbers: between k = 5e5 and 2e6 dyn/cm, a factor of four, it differs by 9.6 % o
 from __future__ import annotations
 
 import sys
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from linkwork.five_bar.published import DYN_CM_PER_NEWTON_METRE
 
-from ..figures import Panel, plot_curves
+from ..figures import Figure, Panel, plot_curves
 from ._runs import (
     SPEED,
     STIFFNESSES,
@@ -26,9 +25,6 @@ from ._runs import (
     table_3_1,
 )
 from .study import REFERENCE, Study, StudyResult, curves_of, near
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 NUMBER = "3.5"
 

@@ -9,20 +9,16 @@ first harmonic without damping stands under this number is our assignment.
 from __future__ import annotations
 
 import sys
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from linkwork.five_bar.published import chapter_4
 
-from ..figures import COLOURS, Curve, Panel, plot_curves
+from ..figures import COLOURS, Curve, Figure, Panel, plot_curves
 from ..youssef.harmonic_balance import resonance
 from ..youssef.slider_equation import Variant
 from ._chapter_4 import INERTIA_RATIOS, harmonic
 from .study import ASSIGNED, BALANCE, REFERENCE, THESIS, Study, StudyResult, near
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 NUMBER = "4.3"
 #: Resonance (rad/s) by I4: of the thesis's code, and right.

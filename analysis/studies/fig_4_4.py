@@ -8,19 +8,15 @@ of the rocker's length. The captions are lost: that damping stands under this nu
 from __future__ import annotations
 
 import sys
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from linkwork.five_bar.published import chapter_4
 
-from ..figures import COLOURS, Curve, Panel, plot_curves
+from ..figures import COLOURS, Curve, Figure, Panel, plot_curves
 from ..youssef.slider_equation import slider_equation
 from ._chapter_4 import harmonic, true_harmonic
 from .study import ASSIGNED, BALANCE, Study, StudyResult, near
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 NUMBER = "4.4"
 INERTIA_RATIO = 1.0

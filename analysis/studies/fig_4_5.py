@@ -10,20 +10,16 @@ frequency stand under this number is our assignment.
 from __future__ import annotations
 
 import sys
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from linkwork.five_bar.published import chapter_4
 
-from ..figures import Curve, Panel, plot_curves
+from ..figures import Curve, Figure, Panel, plot_curves
 from ..youssef.harmonic_balance import resonance
 from ..youssef.slider_equation import Variant
 from ._chapter_4 import harmonic, name, true_harmonic
 from .study import ASSIGNED, BALANCE, REFERENCE, Study, StudyResult, at_least, at_most, near
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 NUMBER = "4.5"
 INERTIA_RATIO = 1.0

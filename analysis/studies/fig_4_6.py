@@ -11,22 +11,18 @@ resonance over the inertia stands under this number is our assignment.
 from __future__ import annotations
 
 import sys
-from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.optimize import minimize_scalar
 
 from linkwork.five_bar.published import P45, SQUARE_OF_OMEGA_K, chapter_4
 
-from ..figures import COLOURS, Curve, Panel, plot_curves
+from ..figures import COLOURS, Curve, Figure, Panel, plot_curves
 from ..youssef.harmonic_balance import resonance
 from ..youssef.slider_equation import Variant
 from ._chapter_4 import DAMPING, linear, name, true_motion
 from .fig_4_3 import RESONANCES
 from .study import ASSIGNED, BALANCE, REFERENCE, THESIS, Study, StudyResult, at_most, near, padded
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 NUMBER = "4.6"
 RATIOS = np.arange(0.25, 2.01, 0.25)

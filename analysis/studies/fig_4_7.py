@@ -12,22 +12,18 @@ from __future__ import annotations
 
 import sys
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from linkwork.five_bar.published import SIGMA2, chapter_4
 
-from ..figures import Panel, plot_curves
+from ..figures import Figure, Panel, plot_curves
 from ..numerics.fourier import FourierSeries
 from ..youssef.harmonic_balance import harmonic_balance, nonlinear_harmonic_balance
 from ..youssef.slider_equation import Variant, slider_equation
 from ._chapter_4 import DAMPING, linear, name, true_motion
 from .study import ASSIGNED, BALANCE, Study, StudyResult, at_most, curves_of, near, padded
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 NUMBER = "4.7"
 INERTIA_RATIO = 1.0

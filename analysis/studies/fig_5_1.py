@@ -13,7 +13,6 @@ stands under this number is our assignment.
 from __future__ import annotations
 
 import sys
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,7 +20,7 @@ from numpy.typing import NDArray
 from linkwork.five_bar.parameters import FiveBarParameters
 from linkwork.five_bar.published import chapter_4
 
-from ..figures import COLOURS, Curve, Panel, plot_curves
+from ..figures import COLOURS, Curve, Figure, Panel, plot_curves
 from ..numerics.fourier import FourierSeries
 from ..youssef.hill import Truncation, perturbed_region
 from ..youssef.slider_equation import Variant
@@ -39,9 +38,6 @@ from ._chapter_5 import (
     with_units,
 )
 from .study import ASSIGNED, BALANCE, REFERENCE, THESIS, Study, StudyResult, Verdict, at_most, near
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 NUMBER = "5.1"
 

@@ -10,13 +10,12 @@ that this chart stands under this number is our assignment.
 from __future__ import annotations
 
 import sys
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from linkwork.five_bar.published import chapter_4
 
-from ..figures import COLOURS, Curve, Panel, plot_curves
+from ..figures import COLOURS, Curve, Figure, Panel, plot_curves
 from ..youssef.hill import perturbed_removing_damping
 from ._chapter_5 import (
     crank_speed,
@@ -30,9 +29,6 @@ from ._chapter_5 import (
     with_units,
 )
 from .study import ASSIGNED, BALANCE, REFERENCE, THESIS, Study, StudyResult, Verdict, at_most, near
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 NUMBER = "5.2"
 

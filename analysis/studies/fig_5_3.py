@@ -15,14 +15,13 @@ from cmath import phase, rect
 from dataclasses import replace
 from functools import cache
 from math import pi
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from linkwork.five_bar.parameters import FiveBarParameters
 from linkwork.five_bar.published import chapter_4
 
-from ..figures import COLOURS, Curve, Panel, plot_curves
+from ..figures import COLOURS, Curve, Figure, Panel, plot_curves
 from ..numerics.boundaries import Box, Chart, chart
 from ..periodic.orbits import Drive
 from ..periodic.planes import Operation
@@ -38,9 +37,6 @@ from ._chapter_5 import (
     with_units,
 )
 from .study import ASSIGNED, BALANCE, Study, StudyResult, Verdict, at_least, at_most
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 NUMBER = "5.3"
 

@@ -10,11 +10,10 @@ from __future__ import annotations
 
 import sys
 from functools import cache
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..figures import COLOURS, Curve, HeatMap, Panel, plot_charts
+from ..figures import COLOURS, Curve, Figure, HeatMap, Panel, plot_charts
 from ..numerics.boundaries import Box, Chart, chart
 from ..periodic.grids import Grid, grid
 from ..periodic.orbits import Drive
@@ -30,9 +29,6 @@ from ._chapter_5 import (
     with_units,
 )
 from .study import ASSIGNED, BALANCE, Study, StudyResult, Verdict, at_most, near
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 NUMBER = "5.4"
 

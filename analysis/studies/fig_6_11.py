@@ -11,13 +11,12 @@ from __future__ import annotations
 
 import sys
 from math import degrees
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from linkwork.five_bar.published import CM_PER_METRE
 
-from ..figures import Curve, Panel, plot_curves
+from ..figures import Curve, Figure, Panel, plot_curves
 from ..synthesis import UntimedPath, turn
 from ..synthesis.areas import area_between, straightest_part
 from ..synthesis.published import (
@@ -42,9 +41,6 @@ from ._chapter_6 import (
     sound_verdicts,
 )
 from .study import BALANCE, REFERENCE, Study, StudyResult, at_least, at_most, near, padded
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 NUMBER = "6.11"
 PROBLEM = "packaging"

@@ -9,16 +9,12 @@ more is asked of it is shown. That this problem stands under this number is our 
 from __future__ import annotations
 
 import sys
-from typing import TYPE_CHECKING
 
-from ..figures import plot_curves
+from ..figures import Figure, plot_curves
 from ..synthesis import RockerFunction, evaluate, synthesize
 from ..synthesis.published import PROBLEMS, rocker_function
 from ._chapter_6 import ASSIGNED, angle_columns, best, error_verdicts, rocker_panels, trade_off_columns
 from .study import REFERENCE, THESIS, Study, StudyResult, at_most, near, padded
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 NUMBER = "6.7"
 PROBLEM = "rocker"

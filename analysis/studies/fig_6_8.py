@@ -10,11 +10,10 @@ from __future__ import annotations
 
 import sys
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..figures import plot_curves
+from ..figures import Figure, plot_curves
 from ..synthesis import Evaluation, RockerFunction, evaluate, synthesize
 from ..synthesis.published import DEG2_PER_RAD2, PROBLEMS, N, rocker_function
 from ._chapter_6 import (
@@ -28,9 +27,6 @@ from ._chapter_6 import (
     trade_off_columns,
 )
 from .study import REFERENCE, Study, StudyResult, at_most, near, padded
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 NUMBER = "6.8"
 PROBLEM = "rocker-weighted"

@@ -11,21 +11,17 @@ from __future__ import annotations
 
 import sys
 from functools import cache
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from linkwork.five_bar.published import CM_PER_METRE
 
-from ..figures import COLOURS, Curve, Panel, plot_curves
+from ..figures import COLOURS, Curve, Figure, Panel, plot_curves
 from ..motion import SmoothnessCurve, smoothness_curve
 from ..synthesis import SliderUnknown, evaluate
 from ..synthesis.published import PROBLEMS
 from ._chapter_7 import ASSIGNED, ROCKER, TARGET, TURN, over_turn, rocker_motion, shown, slider, sound
 from .study import BALANCE, Study, StudyResult, at_least, at_most
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 NUMBER = "7.10"
 HARMONICS = (2, 3)

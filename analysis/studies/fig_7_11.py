@@ -13,19 +13,15 @@ from __future__ import annotations
 import sys
 from functools import cache
 from math import degrees, radians
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..figures import COLOURS, Curve, Panel, plot_curves
+from ..figures import COLOURS, Curve, Figure, Panel, plot_curves
 from ..motion import Strategy, simplest_mechanism
 from ..synthesis import LeastTransmission, Linkage, Solution, evaluate
 from ..synthesis.published import WEIGHTED_N, rocker_function
 from ._chapter_7 import ASSIGNED, TARGET, TURN, angle_error, over_turn, sound
 from .study import BALANCE, Study, StudyResult, at_least, at_most, near, padded
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 NUMBER = "7.11"
 #: deg, at the worst crank rotation; least transmission angle (deg).

@@ -17,7 +17,7 @@ import sys
 from dataclasses import replace
 from functools import cache
 from math import degrees, pi, radians
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -25,7 +25,7 @@ from linkwork.five_bar import kinematics
 from linkwork.five_bar.parameters import FiveBarParameters
 from linkwork.five_bar.published import CM_PER_METRE
 
-from ..figures import COLOURS, Curve, Panel, plot_curves
+from ..figures import COLOURS, Curve, Figure, Panel, plot_curves
 from ..linear.linearise import linearise_along
 from ..linear.slider_control import design_pid
 from ..motion import (
@@ -40,9 +40,6 @@ from ..motion import (
 from ..numerics.fourier import FourierSeries
 from ._chapter_7 import ASSIGNED, ROCKER, FloatArray, rocker_motion, shown, slider
 from .study import BALANCE, Study, StudyResult, Verdict, at_least, at_most, near, padded
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 NUMBER = "7.12"
 #: rad/s.

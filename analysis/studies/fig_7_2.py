@@ -12,7 +12,6 @@ from __future__ import annotations
 import sys
 from dataclasses import replace
 from math import pi, radians
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,13 +20,10 @@ from linkwork.five_bar import kinematics
 from linkwork.five_bar.parameters import FiveBarParameters
 from linkwork.five_bar.published import CM_PER_METRE
 
-from ..figures import Curve, Panel, plot_curves
+from ..figures import Curve, Figure, Panel, plot_curves
 from ..youssef.workspace import AccessibleArea, accessible_area, coupler_curves
 from ._runs import table_3_1
 from .study import BALANCE, Study, StudyResult, at_most, padded
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 NUMBER = "7.2"
 

@@ -15,21 +15,18 @@ from __future__ import annotations
 
 import sys
 from math import hypot, pi, radians
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from linkwork.five_bar.published import CM_PER_METRE
 
-from ..figures import COLOURS, Curve, Panel, plot_curves
+from ..figures import COLOURS, Curve, Figure, Panel, plot_curves
 from ..motion import variational_motion
 from ..synthesis.kernels import coupler_path
 from ..synthesis.published import PROBLEMS
 from ._chapter_7 import ASSIGNED, FloatArray
 from .study import BALANCE, Study, StudyResult, at_least, at_most, near, padded
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 NUMBER = "7.3"
 LINKAGE = PROBLEMS["ellipse-a"].linkage

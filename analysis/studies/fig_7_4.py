@@ -17,7 +17,7 @@ from __future__ import annotations
 import sys
 from functools import cache
 from math import degrees, pi, radians
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from scipy.interpolate import CubicSpline
@@ -26,15 +26,12 @@ from scipy.optimize import fsolve, minimize_scalar
 from linkwork.five_bar import kinematics
 from linkwork.five_bar.published import CM_PER_METRE
 
-from ..figures import COLOURS, Curve, Panel, plot_curves
+from ..figures import COLOURS, Curve, Figure, Panel, plot_curves
 from ..numerics.fourier import FourierSeries
 from ..youssef.workspace import accessible_area, coupler_curves
 from ._chapter_7 import ASSIGNED, FloatArray
 from .fig_7_2 import POSITIONS, mechanism
 from .study import BALANCE, Study, StudyResult, at_least, at_most, near, padded
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 NUMBER = "7.4"
 

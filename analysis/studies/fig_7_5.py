@@ -16,22 +16,19 @@ from __future__ import annotations
 import sys
 from functools import cache
 from math import cos, degrees, inf, pi, radians, sin
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from linkwork.five_bar.published import CM_PER_METRE
 
-from ..figures import COLOURS, Curve, Panel, plot_curves
+from ..figures import COLOURS, Curve, Figure, Panel, plot_curves
 from ..motion import VariationalMotion, variational_motion
 from ..synthesis import evaluate
 from ..synthesis.kernels import link_directions
 from ..synthesis.published import PROBLEMS, WEIGHTED_N, rocker_function
 from ._chapter_7 import ASSIGNED, ROCKER, FloatArray, rocker_motion, shown, slider, wanted_angle, window
 from .study import BALANCE, Study, StudyResult, at_least, at_most, near
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 NUMBER = "7.5"
 N = 360

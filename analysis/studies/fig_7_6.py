@@ -12,13 +12,12 @@ from __future__ import annotations
 
 import sys
 from math import degrees
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from linkwork.five_bar.published import CM_PER_METRE
 
-from ..figures import COLOURS, plot_curves
+from ..figures import COLOURS, Figure, plot_curves
 from ..synthesis import evaluate
 from ..synthesis.published import PROBLEMS
 from ._chapter_7 import (
@@ -36,9 +35,6 @@ from ._chapter_7 import (
     window,
 )
 from .study import BALANCE, REFERENCE, THESIS, Study, StudyResult, at_least, at_most, near
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 NUMBER = "7.6"
 HARMONICS = (1, 2, 3)

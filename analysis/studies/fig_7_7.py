@@ -10,18 +10,14 @@ Which motion the thesis's figure shows is lost: that the two harmonics of path (
 from __future__ import annotations
 
 import sys
-from typing import TYPE_CHECKING
 
 from linkwork.five_bar.published import CM_PER_METRE
 
-from ..figures import plot_curves
+from ..figures import Figure, plot_curves
 from ..synthesis import evaluate
 from ..synthesis.published import PROBLEMS
 from ._chapter_7 import ASSIGNED, PATH, path_columns, path_motion, path_panels, shown, slider, sound
 from .study import BALANCE, REFERENCE, THESIS, Study, StudyResult, at_most, near
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 NUMBER = "7.7"
 #: cm2: of the fixed pivot; printed by the thesis for two harmonics, and the goal.

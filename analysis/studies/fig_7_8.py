@@ -11,16 +11,12 @@ the search, a right angle for the guide and 25 and 18 cm of stroke, are our choi
 from __future__ import annotations
 
 import sys
-from typing import TYPE_CHECKING
 
-from ..figures import plot_curves
+from ..figures import Figure, plot_curves
 from ..synthesis import UntimedPath
 from ..synthesis.published import PROBLEMS
 from ._chapter_7 import ASSIGNED, PATH, PATH_SEARCHES, path_columns, path_motion, path_panels, shown, slider, sound
 from .study import BALANCE, REFERENCE, Study, StudyResult, at_least, at_most
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 NUMBER = "7.8"
 #: Harmonics in words and in number, and the area that is to be reached (cm2).

@@ -13,11 +13,10 @@ from __future__ import annotations
 import sys
 from functools import cache
 from math import degrees, pi
-from typing import TYPE_CHECKING
 
 from linkwork.five_bar.published import CM_PER_METRE
 
-from ..figures import plot_curves
+from ..figures import Figure, plot_curves
 from ..motion import slider_motion
 from ..synthesis import SliderUnknown, Solution
 from ..synthesis.linkage import LINKS
@@ -25,9 +24,6 @@ from ..synthesis.published import PROBLEMS
 from ._chapter_6 import TRANSMISSION, best
 from ._chapter_7 import ASSIGNED, PATH, path_columns, path_motion, path_panels, shown, slider, sound
 from .study import BALANCE, REFERENCE, Study, StudyResult, at_least, at_most
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 NUMBER = "7.9"
 #: Greatest stroke (m).

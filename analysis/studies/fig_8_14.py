@@ -12,21 +12,17 @@ The captions are lost: that this curve stands under this number of 8.14 to 8.17 
 from __future__ import annotations
 
 import sys
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from linkwork.five_bar.published import CM_PER_METRE, RAD_S_PER_RPM
 
-from ..figures import COLOURS, Panel, plot_curves
+from ..figures import COLOURS, Figure, Panel, plot_curves
 from ..periodic.resonance import sweep
 from ._orbits import SAME, between, columns_of, curves_over_speed, multiplier_verdict, runs_verdict
 from ._rig_1 import FASTEST, SLOWEST, local_maximum, natural_speed, slow
 from ._runs import rig_1
 from .study import ASSIGNED, BALANCE, REFERENCE, THESIS, Study, StudyResult, at_most, near
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 NUMBER = "8.14"
 NAME = "spring A"

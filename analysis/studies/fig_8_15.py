@@ -16,14 +16,13 @@ from __future__ import annotations
 import sys
 from functools import cache
 from math import sqrt
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from linkwork.five_bar.published import CM_PER_METRE, RAD_S_PER_RPM
 
-from ..figures import COLOURS, Curve, Panel, plot_curves
+from ..figures import COLOURS, Curve, Figure, Panel, plot_curves
 from ..periodic.branches import SpecialPoint
 from ..periodic.floquet import Crossing
 from ..periodic.orbits import PeriodicOrbit
@@ -32,9 +31,6 @@ from ._orbits import columns_of, curves_over_speed, disturbed_verdict, orbit, rp
 from ._rig_1 import FASTEST, SLOWEST, SPLIT, local_maximum, natural_speed, resonant_b, slow
 from ._runs import rig_1
 from .study import ASSIGNED, BALANCE, REFERENCE, THESIS, Study, StudyResult, near, padded
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 NUMBER = "8.15"
 #: Step of the sweeps (rpm).

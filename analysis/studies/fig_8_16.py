@@ -11,22 +11,18 @@ The captions are lost: that this stands under this number of 8.14 to 8.17 is our
 from __future__ import annotations
 
 import sys
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from linkwork.five_bar.published import CM_PER_METRE
 
-from ..figures import Panel, plot_curves
+from ..figures import Figure, Panel, plot_curves
 from ..periodic.branches import Branch
 from ._orbits import ORDERS, SAME, highest, orbit, rpm
 from ._rig_1 import natural_speed, resonant_b, slow
 from ._runs import rig_1, steady_turn
 from .study import ASSIGNED, BALANCE, Study, StudyResult, at_most, curves_of, near, padded
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 NUMBER = "8.16"
 #: Speeds at which the harmonics are held against those of runs (rpm), by spring.

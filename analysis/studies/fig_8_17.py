@@ -23,22 +23,18 @@ The captions are lost: that this stands under this number of 8.14 to 8.17 is our
 from __future__ import annotations
 
 import sys
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from linkwork.five_bar.published import CM_PER_METRE
 
-from ..figures import COLOURS, Curve, Panel, plot_curves
+from ..figures import COLOURS, Curve, Figure, Panel, plot_curves
 from ..periodic.floquet import Crossing
 from ._friction import FITTED, RESONANCE_B, about_resonance, fit, misfit, size, speeds, upper_motion
 from ._orbits import between, columns_of, curves_over_speed
 from ._rig_1 import FASTEST, SLOWEST, natural_speed, slow
 from .study import ASSIGNED, BALANCE, THESIS, Study, StudyResult, Verdict, at_least, at_most, near, padded
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 NUMBER = "8.17"
 

@@ -12,13 +12,10 @@ The captions are lost: that this curve stands under this number of 8.18 to 8.21 
 from __future__ import annotations
 
 import sys
-from typing import TYPE_CHECKING
 
+from ..figures import Figure
 from ._rig_2 import amplitude_result, draw_amplitude
 from .study import Study, StudyResult
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 NUMBER = "8.19"
 SPRING = "d"

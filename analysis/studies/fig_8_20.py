@@ -11,19 +11,15 @@ The captions are lost: that this stands under this number of 8.18 to 8.21 is our
 from __future__ import annotations
 
 import sys
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from linkwork.five_bar.published import CM_PER_METRE
 
-from ..figures import COLOURS, Curve, Panel, plot_curves
+from ..figures import COLOURS, Curve, Figure, Panel, plot_curves
 from ._orbits import ORDERS, highest, orbit, rpm
 from ._rig_2 import FASTEST, SLOWEST, motions, natural_speed, resonance, rig_2, thesis_motion
 from .study import ASSIGNED, BALANCE, Study, StudyResult, at_most, near, padded
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 NUMBER = "8.20"
 SPRINGS = ("c", "d")

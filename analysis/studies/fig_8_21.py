@@ -14,19 +14,15 @@ The captions are lost: that this stands under this number of 8.18 to 8.21 is our
 from __future__ import annotations
 
 import sys
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..figures import COLOURS, Curve, Panel, plot_curves
+from ..figures import COLOURS, Curve, Figure, Panel, plot_curves
 from ..periodic.branches import Branch
 from ._orbits import rpm
 from ._rig_2 import FASTEST, SLOWEST, motions, natural_speed
 from .study import ASSIGNED, BALANCE, Study, StudyResult, at_least, at_most, padded
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 NUMBER = "8.21"
 SPRINGS = ("c", "d")

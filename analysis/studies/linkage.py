@@ -9,22 +9,18 @@ from __future__ import annotations
 import sys
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from linkwork.five_bar.published import CM_PER_METRE, RAD_S_PER_RPM
 
-from ..figures import animate_linkage, draw_linkage
+from ..figures import Figure, animate_linkage, draw_linkage
 from ..run.inputs import Inputs
 from ..run.simulate import simulate
 from ..run.trajectory import Trajectory
 from ._runs import SPEED
 from .fig_7_2 import mechanism
 from .study import BALANCE, Study, StudyResult, at_most
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 NUMBER = "linkage"
 

@@ -18,14 +18,13 @@ import sys
 from collections.abc import Callable, Iterable
 from functools import cache, partial
 from itertools import pairwise
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from linkwork.slider_crank.published import CRANK_SPEED, CRANK_TORQUE, INCH, POUND_FORCE, POUND_INCH, parameters
 
-from ..figures import COLOURS, Curve, Panel, plot_curves
+from ..figures import COLOURS, Curve, Figure, Panel, plot_curves
 from ..slider_crank.closure import close, follow
 from ..slider_crank.dual_dynamics import JointLoads, joint_loads
 from ..slider_crank.forces import CLEAR_DEG, ConstantShift, ForceTurn, force_turn
@@ -55,9 +54,6 @@ from ._rahman import (
     Component,
 )
 from .study import BALANCE, REFERENCE, THESIS, Study, StudyResult, Verdict, at_least, at_most, near, padded
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 FloatArray = NDArray[np.float64]
 

@@ -5,19 +5,15 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from rich.console import Console
 from rich.table import Table
 
-from ..figures import Curve
+from ..figures import Curve, Figure
 from ..files import io
 from . import STUDIES, file_stem, is_figure
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 #: Where a stated value comes from.
 THESIS = "thesis"

@@ -51,8 +51,8 @@ def _compile_and_run() -> dict[str, Any]:
     from time import perf_counter
 
     begun = perf_counter()
-    from analysis import Inputs, simulate_many
-    from analysis.run import compiled, simulate
+    from analysis import Inputs, simulate, simulate_many
+    from analysis.run import compiled
     from linkwork.five_bar.published import TABLE_3_1
 
     run = simulate(TABLE_3_1, Inputs(speed=44.0), stop_time=0.1)

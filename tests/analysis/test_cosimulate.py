@@ -21,11 +21,12 @@ from analysis import (
     TorsionBar,
     Trajectory,
     compare,
+    cosimulate,
     ramp,
+    simulate,
     steps,
     table,
 )
-from analysis.run import cosimulate, simulate
 from linkwork.errors import InputError
 from linkwork.five_bar.published import CM_PER_METRE, SETS, TABLE_3_1
 from linkwork.five_bar.variables import OUTPUT_NAMES
@@ -43,8 +44,7 @@ def _check_cases(fmu: str, names: list[str], method: str) -> list[Any]:
 
     import numpy as np
 
-    from analysis import Function, Harmonics, Inputs, TorsionBar, compare, ramp, steps
-    from analysis.run import cosimulate, simulate
+    from analysis import Function, Harmonics, Inputs, TorsionBar, compare, cosimulate, ramp, simulate, steps
     from analysis.run.checks import CASES
     from linkwork.five_bar.parameters import InitialState
     from linkwork.five_bar.published import TABLE_3_1
@@ -128,8 +128,7 @@ def _check_random_mechanisms(fmu: str, root: str, count: int) -> dict[str, Any]:
     import sys
 
     sys.path.insert(0, root)
-    from analysis import Harmonics, Inputs, compare
-    from analysis.run import cosimulate, simulate
+    from analysis import Harmonics, Inputs, compare, cosimulate, simulate
     from tests.strategies import seeded
 
     def waves(source: random.Random, mean: float, size: float) -> Harmonics:
@@ -191,8 +190,7 @@ def _runs(fmu: str) -> dict[str, Any]:
 
     import numpy as np
 
-    from analysis import CosimulationError, Function, Inputs, RunInterrupted, TorsionBar, steps
-    from analysis.run import cosimulate, simulate
+    from analysis import CosimulationError, Function, Inputs, RunInterrupted, TorsionBar, cosimulate, simulate, steps
     from linkwork.errors import InputError
     from linkwork.five_bar.parameters import InitialState
     from linkwork.five_bar.published import SETS, TABLE_3_1

@@ -15,8 +15,18 @@ import joblib
 import numpy as np
 import pytest
 
-from analysis import Ensemble, Function, Harmonics, InductionMotor, Inputs, TorsionBar, simulate_many, steps, table
-from analysis.run import simulate
+from analysis import (
+    Ensemble,
+    Function,
+    Harmonics,
+    InductionMotor,
+    Inputs,
+    TorsionBar,
+    simulate,
+    simulate_many,
+    steps,
+    table,
+)
 from linkwork.errors import AssemblyError, InputError, ParameterError
 from linkwork.five_bar.parameters import FiveBarParameters, InitialState
 from linkwork.five_bar.published import SETS, TABLE_3_1

@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from analysis import Event, Function, Harmonics, Inputs, TorsionBar, Trajectory, ramp, steps
-from analysis.run import compiled, simulate
+from analysis import Event, Function, Harmonics, Inputs, TorsionBar, Trajectory, ramp, simulate, steps
+from analysis.run import compiled
 from linkwork.errors import InputError
 from linkwork.five_bar import dynamics
 from linkwork.five_bar.parameters import InitialState

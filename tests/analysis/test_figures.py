@@ -9,10 +9,9 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from analysis import Inputs, figures
+from analysis import Inputs, figures, simulate
 from analysis.figures import Curve, Panel
 from analysis.files import io
-from analysis.run import simulate
 from linkwork.errors import AssemblyError, InputError
 from linkwork.five_bar.published import SETS, TABLE_3_1
 
@@ -25,9 +24,16 @@ def run():
 
 
 def test_outputs_have_a_panel_each(run) -> None:
-    figure = run.plot(("slider.position", "drive.applied_torque"), title="a run")
+    figure = figures.plot(run, ("slider.position", "drive.applied_torque"), title="a run")
     assert [axis.get_ylabel() for axis in figure.axes] == ["slider.position [m]", "drive.applied_torque [N.m]"]
     np.testing.assert_array_equal(figure.axes[0].lines[0].get_ydata(), run["slider.position"])
+
+
+@pytest.mark.parametrize("picture", [figures.plot, lambda result: figures.animate(result, "never.gif")])
+def test_a_type_that_has_no_picture_is_named(picture) -> None:
+    with pytest.raises(figures.DrawingError, match=r"of a builtins.dict$") as refused:
+        picture({})
+    assert refused.value.kind is dict
 
 
 def test_comparison(run) -> None:
@@ -40,7 +46,7 @@ def test_comparison(run) -> None:
 
 
 def test_the_look_does_not_depend_on_where_it_is_saved(run) -> None:
-    axis = run.plot().axes[0]
+    axis = figures.plot(run).axes[0]
     assert axis.yaxis.get_major_ticks()[0].gridline.get_alpha() == figures.STYLE["grid.alpha"]
     assert axis.get_yticklabels()[0].get_fontsize() == figures.STYLE["font.size"]
 
@@ -108,8 +114,8 @@ def test_drawing_what_cannot_be_joined() -> None:
 
 
 def test_saving_twice_gives_the_same_bytes(run, tmp_path: Path) -> None:
-    first = io.save_figure(run.plot(), tmp_path / "a.png").read_bytes()
-    second = io.save_figure(run.plot(), tmp_path / "b.png").read_bytes()
+    first = io.save_figure(figures.plot(run), tmp_path / "a.png").read_bytes()
+    second = io.save_figure(figures.plot(run), tmp_path / "b.png").read_bytes()
     assert first == second
 
 

@@ -15,7 +15,7 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.linalg import eigh
 
-from analysis import Harmonics, InductionMotor, Inputs
+from analysis import Harmonics, InductionMotor, Inputs, simulate
 from analysis.linear.linearise import (
     AT_REST,
     LEAST_SAMPLES,
@@ -33,7 +33,6 @@ from analysis.linear.linearise import (
 )
 from analysis.numerics.tracing import rebound
 from analysis.periodic.orbits import find_orbit
-from analysis.run import simulate
 from linkwork import friction
 from linkwork.errors import AssemblyError, InputError, UnknownNameError
 from linkwork.five_bar import dynamics, kinematics

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from analysis import InductionMotor, Inputs
+from analysis import InductionMotor, Inputs, simulate
 from analysis.periodic.floquet import Crossing, Stability
 from analysis.periodic.orbits import (
     Drive,
@@ -20,7 +20,6 @@ from analysis.periodic.orbits import (
     largest_multipliers,
     orbit_of,
 )
-from analysis.run import simulate
 from linkwork.errors import AssemblyError, InputError
 from linkwork.five_bar import dynamics
 from linkwork.five_bar.parameters import FiveBarParameters, InitialState

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from analysis import Inputs
+from analysis import Inputs, simulate
 from analysis.periodic import resonance
 from analysis.periodic.floquet import Crossing, Stability
 from analysis.periodic.orbits import Drive, OrbitError
@@ -24,7 +24,6 @@ from analysis.periodic.resonance import (
     natural_frequency,
     sweep,
 )
-from analysis.run import simulate
 from linkwork.errors import AssemblyError, InputError, ParameterError
 from linkwork.five_bar.published import RAD_S_PER_RPM, SETS, TABLE_3_1
 

@@ -26,10 +26,11 @@ from analysis import (
     compare,
     ramp,
     sample_times,
+    simulate,
     steps,
     table,
 )
-from analysis.run import compiled, simulate
+from analysis.run import compiled
 from analysis.run.inputs import encode
 from analysis.run.simulate import SCIPY_METHODS, Event, channels
 from linkwork.errors import AssemblyError, InputError, ParameterError
@@ -629,8 +630,7 @@ def _interrupted_by_signal() -> list[Any]:
     import signal
     import threading
 
-    from analysis import Inputs, RunInterrupted
-    from analysis.run import simulate
+    from analysis import Inputs, RunInterrupted, simulate
     from linkwork.five_bar.published import TABLE_3_1
 
     simulate(TABLE_3_1, Inputs(speed=44.0), stop_time=0.1)

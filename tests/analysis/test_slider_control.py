@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from analysis import Inputs
+from analysis import Inputs, simulate
 from analysis.linear.linearise import (
     find_equilibria,
     find_equilibrium,
@@ -30,7 +30,6 @@ from analysis.linear.slider_control import (
     largest_difference,
     predict_loop,
 )
-from analysis.run import simulate
 from linkwork.errors import InputError, UnknownNameError
 from linkwork.five_bar import dynamics
 from linkwork.five_bar.parameters import InitialState

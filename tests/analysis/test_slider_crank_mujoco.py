@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from analysis.run import simulate
+from analysis import simulate
 from analysis.run.inputs import SliderCrankInputs
 from linkwork.slider_crank import published
 from linkwork.slider_crank.parameters import InitialState, SliderCrankParameters

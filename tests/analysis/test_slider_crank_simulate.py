@@ -13,13 +13,12 @@ import pytest
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
-from analysis import Event, Inputs, Trajectory, compare, simulate_many
+from analysis import Event, Inputs, Trajectory, compare, simulate, simulate_many
 from analysis.files import io
 from analysis.linear.linearise import linearise
 from analysis.mechanisms import MECHANISMS, OUTPUT_UNITS
 from analysis.periodic.orbits import drive_of, find_orbit
 from analysis.periodic.resonance import natural_frequency
-from analysis.run import simulate
 from analysis.run.case import Case, published_case
 from analysis.run.checks import CASES as CHECKS
 from analysis.run.inputs import Function, Harmonics, SliderCrankInputs, TorsionBar, encode, steps

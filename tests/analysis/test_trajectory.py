@@ -9,8 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from analysis import Inputs, Trajectory
-from analysis.run import simulate
+from analysis import Inputs, Trajectory, figures, simulate
 from linkwork.errors import InputError
 from linkwork.five_bar import dynamics
 from linkwork.five_bar.published import SETS, TABLE_3_1
@@ -59,7 +58,7 @@ def test_output_that_does_not_exist(trajectory: Trajectory) -> None:
     with pytest.raises(InputError, match=r"there is no output 'slider.postion': the outputs are crank.angle, "):
         trajectory["slider.postion"]
     with pytest.raises(InputError, match="no output 'time'"):
-        trajectory.plot(["time"])
+        figures.plot(trajectory, ["time"])
 
 
 def test_csv_has_names_and_units_and_every_digit(trajectory: Trajectory, tmp_path: Path) -> None:
@@ -91,10 +90,8 @@ def test_data_frame_without_pandas(trajectory: Trajectory, monkeypatch: pytest.M
 
 
 def test_plot_shows_the_outputs_with_their_units(trajectory: Trajectory) -> None:
-    from matplotlib.figure import Figure
-
-    figure = trajectory.plot(["slider.position", "crank.speed", "pin.A.fx"], title="three")
-    assert isinstance(figure, Figure)
+    figure = figures.plot(trajectory, ["slider.position", "crank.speed", "pin.A.fx"], title="three")
+    assert isinstance(figure, figures.Figure)
     assert [axis.get_ylabel() for axis in figure.axes] == [
         "slider.position [m]",
         "crank.speed [rad/s]",
@@ -103,7 +100,7 @@ def test_plot_shows_the_outputs_with_their_units(trajectory: Trajectory) -> None
     (line,) = figure.axes[0].lines
     assert np.array_equal(line.get_xdata(), trajectory.time)
     assert np.array_equal(line.get_ydata(), trajectory["slider.position"])
-    assert len(trajectory.plot().axes) == 2
+    assert len(figures.plot(trajectory).axes) == 2
 
 
 def test_run_cannot_be_changed(trajectory: Trajectory) -> None:

@@ -1,0 +1,74 @@
+"""`plot` and `animate`: one name for the picture of any result.
+
+The module that draws a kind of result registers its function::
+
+    @plot.register
+    def plot_outputs(run: Trajectory, names: Sequence[str] = ..., *, title: str = "") -> Figure:
+        ...
+
+and keeps the function's own name for those who want its signature; users call ``figures.plot(run, title="a run")``.
+"""
+
+from __future__ import annotations
+
+from functools import singledispatch
+from pathlib import Path
+from typing import Any
+
+from matplotlib.figure import Figure
+
+from linkwork.errors import LinkworkError
+
+
+class DrawingError(LinkworkError, TypeError):
+    """There is no picture of this type of result; ``kind`` is the type."""
+
+    def __init__(self, kind: type, picture: str) -> None:
+        self.kind = kind
+        super().__init__(f"there is no {picture} of a {kind.__module__}.{kind.__qualname__}")
+
+
+@singledispatch
+def plot(result: Any, *details: Any, **options: Any) -> Figure:
+    """Plot a result: a run, a periodic motion, a chart, a linkage that was found.
+
+    Parameters
+    ----------
+    result : object
+        What an analysis returned.
+    *details, **options
+        What the picture of this type takes, such as ``title``: the function registered for the type
+        (``plot.dispatch(type(result))``) documents them.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        Not shown and not written: `analysis.files` saves it.
+
+    Raises
+    ------
+    DrawingError
+        If nothing draws this type.
+    """
+    raise DrawingError(type(result), "plot")
+
+
+@singledispatch
+def animate(result: Any, path: str | Path, *details: Any, **options: Any) -> Path:
+    """Write an animation (GIF) of a result and return its path.
+
+    Parameters
+    ----------
+    result : object
+        What moves: a solution of the synthesis, a mechanism.
+    path : str or Path
+        The file to write; folders that are missing are made.
+    *details, **options
+        What the animation of this type takes, such as ``frames``: see ``animate.dispatch(type(result))``.
+
+    Raises
+    ------
+    DrawingError
+        If nothing animates this type.
+    """
+    raise DrawingError(type(result), "animation")
