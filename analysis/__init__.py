@@ -6,49 +6,12 @@
 >>> run = simulate(table.parameters, Inputs(speed=table.crank_speed), stop_time=0.4, step=1e-3)
 >>> run["slider.position"].shape
 (401,)
+
+The names are those of ``__init__.pyi``; each is imported from its module when it is first used.
 """
 
 from __future__ import annotations
 
-from .run.cosimulate import Comparison, CosimulationError, FmuRun, OutputDifference, compare, cosimulate
-from .run.inputs import (
-    Function,
-    Harmonics,
-    InductionMotor,
-    Inputs,
-    Piecewise,
-    SliderCrankInputs,
-    TorsionBar,
-    ramp,
-    steps,
-    table,
-)
-from .run.simulate import Ensemble, Event, RunInterrupted, sample_times, simulate, simulate_many
-from .run.trajectory import Occurrence, Trajectory
+import lazy_loader
 
-__all__ = [
-    "Comparison",
-    "CosimulationError",
-    "Ensemble",
-    "Event",
-    "FmuRun",
-    "Function",
-    "Harmonics",
-    "InductionMotor",
-    "Inputs",
-    "Occurrence",
-    "OutputDifference",
-    "Piecewise",
-    "RunInterrupted",
-    "SliderCrankInputs",
-    "TorsionBar",
-    "Trajectory",
-    "compare",
-    "cosimulate",
-    "ramp",
-    "sample_times",
-    "simulate",
-    "simulate_many",
-    "steps",
-    "table",
-]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

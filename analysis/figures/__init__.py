@@ -1,39 +1,11 @@
-"""Plots and animations: the only package that draws."""
+"""Plots and animations: the only package that draws.
+
+``figures.plot(result)`` and ``figures.animate(result, path)`` draw any result that has a picture. The names are those of
+``__init__.pyi``; each is imported from its module when it is first used.
+"""
 
 from __future__ import annotations
 
-from .charts import HeatMap, plot_charts
-from .control import plot_bode, plot_poles
-from .curves import Curve, Panel, plot_comparison, plot_curves, plot_outputs
-from .dispatch import DrawingError, animate, plot
-from .linkage import animate_linkage, draw_linkage, icon
-from .response import plot_branches
-from .style import COLOURS, STYLE, Figure
-from .synthesis import LinkageScene, animate_solution, plot_alternatives, plot_solution, plot_trade_off
+import lazy_loader
 
-__all__ = [
-    "COLOURS",
-    "STYLE",
-    "Curve",
-    "DrawingError",
-    "Figure",
-    "HeatMap",
-    "LinkageScene",
-    "Panel",
-    "animate",
-    "animate_linkage",
-    "animate_solution",
-    "draw_linkage",
-    "icon",
-    "plot",
-    "plot_alternatives",
-    "plot_bode",
-    "plot_branches",
-    "plot_charts",
-    "plot_comparison",
-    "plot_curves",
-    "plot_outputs",
-    "plot_poles",
-    "plot_solution",
-    "plot_trade_off",
-]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

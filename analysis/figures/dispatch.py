@@ -6,18 +6,24 @@ The module that draws a kind of result registers its function::
     def plot_outputs(run: Trajectory, names: Sequence[str] = ..., *, title: str = "") -> Figure:
         ...
 
-and keeps the function's own name for those who want its signature; users call ``figures.plot(run, title="a run")``.
+and keeps the function's own name for those who want its signature; users call ``figures.plot(run, title="a run")``. The
+modules that draw are imported when a result comes that nothing imported so far can draw.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import singledispatch
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
 from matplotlib.figure import Figure
 
 from linkwork.errors import LinkworkError
+
+#: The modules that register what they draw, those that import fastest first.
+MODULES = ("curves", "response", "charts", "control", "synthesis", "slider_crank", "slider_crank_picture")
 
 
 class DrawingError(LinkworkError, TypeError):
@@ -26,6 +32,17 @@ class DrawingError(LinkworkError, TypeError):
     def __init__(self, kind: type, picture: str) -> None:
         self.kind = kind
         super().__init__(f"there is no {picture} of a {kind.__module__}.{kind.__qualname__}")
+
+
+def _registered(pictures: Any, result: object, name: str) -> Callable[..., Any]:
+    """The function that draws results of this type, looked for in one module after another."""
+    nothing = pictures.dispatch(object)
+    for module in MODULES:
+        import_module(f".{module}", __package__)
+        function: Callable[..., Any] = pictures.dispatch(type(result))
+        if function is not nothing:
+            return function
+    raise DrawingError(type(result), name)
 
 
 @singledispatch
@@ -50,7 +67,8 @@ def plot(result: Any, *details: Any, **options: Any) -> Figure:
     DrawingError
         If nothing draws this type.
     """
-    raise DrawingError(type(result), "plot")
+    figure: Figure = _registered(plot, result, "plot")(result, *details, **options)
+    return figure
 
 
 @singledispatch
@@ -71,4 +89,5 @@ def animate(result: Any, path: str | Path, *details: Any, **options: Any) -> Pat
     DrawingError
         If nothing animates this type.
     """
-    raise DrawingError(type(result), "animation")
+    written: Path = _registered(animate, result, "animation")(result, path, *details, **options)
+    return written
