@@ -14,6 +14,7 @@ from pathlib import Path
 
 from fmpy import extract, read_model_description
 from fmpy.fmi2 import FMU2Slave
+from linkwork.five_bar.plant import SPEED_DRIVE, Plant
 from pythonfmu.builder import FmuBuilder
 from rich.console import Console
 from rich.table import Table
@@ -21,7 +22,6 @@ from rich.table import Table
 import build_fmu
 from analysis import Inputs, simulate
 from linkwork.five_bar import dynamics
-from linkwork.five_bar.plant import SPEED_DRIVE, Plant
 from linkwork.five_bar.published import SETS
 
 STEP = 1e-3

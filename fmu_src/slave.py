@@ -1,6 +1,6 @@
 """What every slave of Linkwork shares: the XML of its interface, its lifecycle, its saved state, its log.
 
-A concrete slave names its variables and the plant it holds. pythonfmu by itself writes neither units nor dependencies nor
+A concrete slave names its mechanism. pythonfmu by itself writes neither units nor dependencies nor
 InitialUnknowns: `to_xml` completes them.
 """
 
@@ -30,8 +30,9 @@ from linkwork.errors import (
     StateError,
     StepError,
 )
+from linkwork.mechanism import Mechanism
 from linkwork.parameters import field_name
-from linkwork.plant import MechanismPlant
+from linkwork.plant import Plant
 from linkwork.variables import UNITS, Variable
 
 STATUS_GOOD = 0
@@ -99,12 +100,8 @@ class LinkworkSlave(Fmi2Slave):
     ``solver.status`` and ``solver.message`` say why. A bad parameter fails the initialisation.
     """
 
+    mechanism: ClassVar[Mechanism]
     variables: ClassVar[tuple[Variable, ...]]
-    position_parameters: ClassVar[tuple[str, ...]]
-    plant_class: ClassVar[type[MechanismPlant]]
-    initial_class: ClassVar[type]
-    #: (start, stop, step, tolerance) of the default experiment: s, s, s, relative.
-    experiment: ClassVar[tuple[float, float, float, float]]
 
     author = "The Linkwork developers"
     license = "MIT"
@@ -113,6 +110,8 @@ class LinkworkSlave(Fmi2Slave):
 
     def __init_subclass__(cls) -> None:
         super().__init_subclass__()
+        cls.description = cls.mechanism.description
+        cls.variables = cls.mechanism.variables
         # To find the class the wrapper runs its module's source again, at every instantiation, and then gives up a reference
         # to the module's namespace that it only borrowed: without one more each time the namespace dies with all its names
         ctypes.pythonapi.Py_IncRef(ctypes.py_object(vars(sys.modules[cls.__module__])))
@@ -129,7 +128,7 @@ class LinkworkSlave(Fmi2Slave):
         self._status_at = self._names.index("solver.status")
         self._message_at = self._names.index("solver.message")
         self._values: list[Any] = [v.start for v in self.variables]
-        self._plant: MechanismPlant | None = None
+        self._plant: Plant | None = None
         self._running = False
         self._stale = True
         #: status and sentence of what went wrong first since the last good step, other than steps out of order
@@ -139,28 +138,19 @@ class LinkworkSlave(Fmi2Slave):
         for index, variable in enumerate(self.variables):
             self.register_variable(self._declaration(index, variable), nested=False)
 
-    def _build(self) -> MechanismPlant:
+    def _build(self) -> Plant:
         """The plant for the present parameters and inputs, at its start."""
         values = dict(zip(self._names, self._values))
-        modes = [mode.name for mode in self.plant_class.MODES]
-        mechanism = {}
-        initial = {}
-        for variable in self.variables:
-            name = variable.name
-            if name.startswith("initial."):
-                initial[name.removeprefix("initial.")] = values[name]
-            elif variable.causality == "parameter" and name not in modes and name != "solver.tolerance":
-                mechanism[field_name(name)] = values[name]
+        m = self.mechanism
         own, master = values["solver.tolerance"], self._master_tolerance
-        return self.plant_class(
-            self.plant_class.PARAMETERS(**mechanism),
-            self.initial_class(**initial),
+        return Plant(
+            m,
+            m.parameters(**{field_name(name): values[name] for name in m.mechanism_variables}),
+            m.initial(**{field: values[f"initial.{field}"] for field in m.initial_variables}),
             tolerance=own if master is None else min(own, max(master, 1e-13)),
             time=self._start_time,
-            inputs={
-                variable.name: values[variable.name] for variable in self.variables if variable.causality == "input"
-            },
-            **{field_name(name): values[name] for name in modes},
+            inputs={name: values[name] for name in m.input_names},
+            **{field_name(mode.name): values[mode.name] for mode in m.modes},
         )
 
     # Interface
@@ -202,7 +192,7 @@ class LinkworkSlave(Fmi2Slave):
         slave.set("canGetAndSetFMUstate", "true")
         slave.set("canSerializeFMUstate", "true")
         root.insert(children.index(slave) + 1, self._unit_definitions())
-        start, stop, step, tolerance = self.experiment
+        start, stop, step, tolerance = self.mechanism.experiment
         experiment = Element(
             "DefaultExperiment",
             {"startTime": repr(start), "stopTime": repr(stop), "stepSize": repr(step), "tolerance": repr(tolerance)},
@@ -244,11 +234,12 @@ class LinkworkSlave(Fmi2Slave):
 
     def _structure(self) -> Element:
         index = {name: str(i + 1) for i, name in enumerate(self._names)}
-        inputs = [v.name for v in self.variables if v.causality == "input"]
-        on_inputs = {"state": [], "speed": [n for n in inputs if n in self.plant_class.COMMANDS], "all": inputs}
+        inputs = list(self.mechanism.input_names)
+        commands = [channel.name for channel in self.mechanism.channels if channel.kind == "command"]
+        on_inputs = {"state": [], "speed": commands, "all": inputs}
         at_start: dict[str, list[str] | None] = {
             "none": [],
-            "position": list(self.position_parameters),
+            "position": list(self.mechanism.position_parameters),
             "velocity": None,
             "all": None,
         }
@@ -463,7 +454,7 @@ class LinkworkSlave(Fmi2Slave):
                     f"the saved state belongs to {state.get('model')!r} with another interface, not to this "
                     f"{type(self).__name__}"
                 )
-            plant = None if state["plant"] is None else self.plant_class.restore(state["plant"])
+            plant = None if state["plant"] is None else Plant.restore(self.mechanism, state["plant"])
             values, cause = list(state["values"]), state["cause"]
             running, stale = state["running"], state["stale"]
             start_time, master_tolerance = state["start_time"], state["master_tolerance"]

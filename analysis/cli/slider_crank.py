@@ -12,12 +12,12 @@ from typing import TYPE_CHECKING, Any
 import click
 import numpy as np
 from click.core import ParameterSource
+from linkwork.slider_crank.plant import check_assembly
 from rich.markup import escape
 from rich.table import Table
 
 from linkwork.errors import InputError
 from linkwork.slider_crank.parameters import SliderCrankParameters
-from linkwork.slider_crank.plant import check_assembly
 from linkwork.slider_crank.published import RAD_S_PER_RPM, SETS, PublishedSet
 
 from ..slider_crank import mobility

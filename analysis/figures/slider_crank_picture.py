@@ -16,6 +16,7 @@ from typing import Any, TypeAlias
 
 import matplotlib
 import numpy as np
+from linkwork.slider_crank.plant import check_assembly
 from matplotlib.animation import PillowWriter
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -28,7 +29,6 @@ from numpy.typing import ArrayLike, NDArray
 from linkwork.errors import AssemblyError, InputError
 from linkwork.slider_crank import kinematics
 from linkwork.slider_crank.parameters import SliderCrankParameters
-from linkwork.slider_crank.plant import check_assembly
 from linkwork.slider_crank.published import INCH
 from linkwork.slider_crank.vectors import Vector
 

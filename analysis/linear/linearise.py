@@ -21,13 +21,13 @@ from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
 
 import control
 import numpy as np
+from linkwork.five_bar.plant import check_assembly
 from numpy.typing import ArrayLike, NDArray
 from scipy.integrate import solve_ivp
 
 from linkwork.errors import InputError, LinkworkError, UnknownNameError
 from linkwork.five_bar import dynamics, kinematics
 from linkwork.five_bar.parameters import FiveBarParameters
-from linkwork.five_bar.plant import check_assembly
 from linkwork.five_bar.variables import INPUTS, OUTPUT_NAMES, OUTPUTS
 from linkwork.limits import LIMIT_SINE
 

@@ -20,11 +20,11 @@ from typing import Protocol
 
 import control
 import numpy as np
+from linkwork.five_bar.plant import SPEED_DRIVE, TORQUE_DRIVE, Plant
 from numpy.typing import ArrayLike, NDArray
 
 from linkwork.errors import AssemblyError, InputError, IntegrationError, LinkworkError, UnknownNameError
 from linkwork.five_bar.parameters import FiveBarParameters, InitialState
-from linkwork.five_bar.plant import SPEED_DRIVE, TORQUE_DRIVE, Plant
 from linkwork.five_bar.variables import OUTPUT_NAMES
 
 from ..run.cosimulate import FmuRun

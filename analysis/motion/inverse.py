@@ -16,12 +16,12 @@ from dataclasses import dataclass, replace
 from math import degrees, inf, isfinite, pi
 
 import numpy as np
+from linkwork.five_bar.plant import check_assembly
 from numpy.typing import NDArray
 
 from linkwork.errors import AssemblyError, InputError
 from linkwork.five_bar import dynamics, kinematics
 from linkwork.five_bar.parameters import Constants, FiveBarParameters
-from linkwork.five_bar.plant import check_assembly
 from linkwork.five_bar.variables import OUTPUT_NAMES
 
 from ..numerics.fourier import FourierSeries

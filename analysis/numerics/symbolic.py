@@ -7,14 +7,10 @@ again as straight-line Python (`source`) for Numba to compile. CasADi is an extr
 
 from __future__ import annotations
 
-from functools import cache
-from types import SimpleNamespace
+from types import ModuleType, SimpleNamespace
 from typing import Any
 
-from linkwork import friction
 from linkwork.errors import LinkworkError
-from linkwork.five_bar import dynamics, kinematics
-from linkwork.five_bar.parameters import Constants
 
 from .tracing import ELEMENTARY, rebound
 
@@ -40,18 +36,10 @@ def library() -> Any:
     return casadi
 
 
-@cache
-def plant() -> SimpleNamespace:
-    """The functions of `kinematics` and `dynamics` by name, for CasADi symbols in the place of floats."""
+def traced(modules: tuple[ModuleType, ...]) -> SimpleNamespace:
+    """The functions of ``modules``, each of which may use those before it, for CasADi symbols in the place of floats."""
     casadi = library()
-    return rebound((friction, kinematics, dynamics), {name: getattr(casadi, name) for name in ELEMENTARY})
-
-
-def constants(name: str = "p") -> tuple[Any, Constants]:
-    """A column of symbols for the constants of the equations, and the same as `Constants`."""
-    casadi = library()
-    p = casadi.SX.sym(name, len(Constants._fields))
-    return p, Constants(*casadi.vertsplit(p))
+    return rebound(modules, {name: getattr(casadi, name) for name in ELEMENTARY})
 
 
 def source(function: Any, name: str) -> str:

@@ -6,18 +6,16 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from math import pi
 from types import MappingProxyType
+from typing import Any
 
 from linkwork.errors import InputError
-from linkwork.five_bar import published as five_bar_published
-from linkwork.five_bar.parameters import InitialState as FiveBarState
-from linkwork.slider_crank import published as slider_crank_published
 
-from ..mechanisms import InitialState, Parameters, mechanism_of
-from .inputs import INPUTS_OF, Channels, Inputs, given
+from ..mechanisms import MECHANISMS, InitialState, Parameters, mechanism_of
+from .inputs import Inputs, given
 
 #: The published sets of every mechanism, by name: each has parameters, initial, crank_speed and source.
-PUBLISHED: Mapping[str, five_bar_published.PublishedSet | slider_crank_published.PublishedSet] = MappingProxyType(
-    {**five_bar_published.SETS, **slider_crank_published.SETS}
+PUBLISHED: Mapping[str, Any] = MappingProxyType(
+    {name: entry for mechanism in MECHANISMS.values() for name, entry in mechanism.published.items()}
 )
 
 
@@ -29,7 +27,7 @@ class Case:
     ----------
     title : str
     parameters, initial, inputs
-        All of one mechanism, `analysis.mechanisms`; initial and inputs are by default those of a five-bar at rest.
+        All of one mechanism, `analysis.mechanisms`; by default it is at rest and nothing acts on it.
     stop_time : float
         End of the run (s); it starts at 0.
     step : float
@@ -39,15 +37,16 @@ class Case:
 
     title: str
     parameters: Parameters
-    initial: InitialState = field(default_factory=FiveBarState)
-    inputs: Channels = field(default_factory=Inputs)
+    initial: InitialState = None
+    inputs: Inputs = field(default_factory=Inputs)
     stop_time: float
     step: float = 1e-3
     tolerance: float = 1e-9
 
     def __post_init__(self) -> None:
-        # inputs and start of another mechanism are told here, not when it is run
-        given(mechanism_of(self.parameters), self.inputs, self.initial)
+        # inputs and start of another mechanism are refused here, not when it is run
+        _, initial = given(mechanism_of(self.parameters), self.inputs, self.initial)
+        object.__setattr__(self, "initial", initial)
 
 
 def published_case(name: str, *, revolutions: float = 3.0, steps_per_revolution: int = 360) -> Case:
@@ -66,7 +65,7 @@ def published_case(name: str, *, revolutions: float = 3.0, steps_per_revolution:
         title=entry.source,
         parameters=entry.parameters,
         initial=entry.initial,
-        inputs=INPUTS_OF[mechanism_of(entry.parameters).name](speed=entry.crank_speed),
+        inputs=Inputs(speed=entry.crank_speed),
         stop_time=revolutions * turn,
         step=turn / steps_per_revolution,
     )

@@ -13,9 +13,10 @@ from linkwork.five_bar.published import TABLE_3_1
 from linkwork.slider_crank.published import OFFSET_CASE
 
 from .case import Case, published_case
-from .cosimulate import Comparison, compare, cosimulate
-from .inputs import Harmonics, InductionMotor, Inputs, SliderCrankInputs, TorsionBar, ramp, steps, table
-from .simulate import simulate
+from .cosimulation import Comparison, compare, cosimulate
+from .inputs import Inputs
+from .signals import Harmonics, InductionMotor, TorsionBar, ramp, steps, table
+from .simulation import simulate
 from .trajectory import Trajectory
 
 _SPEED = 14.0 * pi  # 420 rpm
@@ -27,7 +28,7 @@ def _case(title: str, inputs: Inputs, **changes: Any) -> Case:
     )
 
 
-def _slider_crank(title: str, inputs: SliderCrankInputs, **changes: Any) -> Case:
+def _slider_crank(title: str, inputs: Inputs, **changes: Any) -> Case:
     parameters, initial = OFFSET_CASE
     return Case(
         title=f"slider-crank: {title}",
@@ -84,33 +85,33 @@ CASES: Mapping[str, Case] = MappingProxyType(
         "coulomb-friction": _case(
             "Coulomb friction of 5 N in the guide", Inputs(speed=_SPEED), slider_coulomb_friction=5.0
         ),
-        "slider-crank-constant-speed": _slider_crank("50 rpm, the shift held", SliderCrankInputs(speed=_RPM_50)),
+        "slider-crank-constant-speed": _slider_crank("50 rpm, the shift held", Inputs(speed=_RPM_50)),
         "slider-crank-torque": _slider_crank(
-            "a torque of 10 N.m against a load", SliderCrankInputs(torque=10.0, load=table([0.0, 1.2], [0.0, -20.0]))
+            "a torque of 10 N.m against a load", Inputs(torque=10.0, load=table([0.0, 1.2], [0.0, -20.0]))
         ),
         "slider-crank-shifted": _slider_crank(
             "ramp of the speed, the shift to and fro",
-            SliderCrankInputs(speed=ramp(2.0, 6.0, 0.2, 0.8), shift_speed=Harmonics(0.0, [0.2], [8.0], [0.0])),
+            Inputs(speed=ramp(2.0, 6.0, 0.2, 0.8), shift_speed=Harmonics(0.0, [0.2], [8.0], [0.0])),
         ),
         "slider-crank-jumps": _slider_crank(
             "jumps of both speeds",
-            SliderCrankInputs(speed=steps([0.0, 0.4], [5.0, 3.0]), shift_speed=steps([0.0, 0.6], [0.1, -0.1])),
+            Inputs(speed=steps([0.0, 0.4], [5.0, 3.0]), shift_speed=steps([0.0, 0.6], [0.1, -0.1])),
         ),
         "slider-crank-free-shift": _slider_crank(
             "both freedoms free, spring and damper on the shift",
-            SliderCrankInputs(torque=5.0, axial_force=Harmonics(0.0, [20.0], [6.0], [0.0])),
+            Inputs(torque=5.0, axial_force=Harmonics(0.0, [20.0], [6.0], [0.0])),
             shift_stiffness=500.0,
             shift_damping=20.0,
         ),
         "slider-crank-groove": _slider_crank(
             "a groove makes the shift",
-            SliderCrankInputs(torque=5.0, groove=True),
+            Inputs(torque=5.0, groove=True),
             groove_amplitude=0.1,
             groove_ratio=2.0,
         ),
         "slider-crank-general": _slider_crank(
             "general twist and masses, springs, dampers, friction, gravity, the other assembly",
-            SliderCrankInputs(speed=_RPM_50, axial_force=3.0),
+            Inputs(speed=_RPM_50, axial_force=3.0),
             **_GENERAL,
             shift_stiffness=800.0,
             slider_stiffness=200.0,

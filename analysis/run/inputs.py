@@ -1,258 +1,115 @@
-"""What acts on a mechanism during a run: crank torque or speed, slider or axial force, axial speed, load.
+"""What acts on a mechanism during a run: `Inputs`, and the same as the arrays that the compiled code reads.
 
-One object, `Inputs` for the five-bar and `SliderCrankInputs` for the slider-crank, serves `simulate` and `cosimulate`. A
-signal is a function of time; a torque may besides depend on the crank (torsion bar, induction motor), and any channel but a
-commanded speed may be a function of time and state.
+One object serves `simulate` and `cosimulate`, and every mechanism: which channels there are, the mechanism says.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
-from typing import Any, ClassVar
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from itertools import chain
+from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
-from scipy.interpolate import CubicSpline
+from numpy.typing import NDArray
 
 from linkwork.errors import InputError
+from linkwork.mechanism import Mechanism
 
-from ..mechanisms import InitialState, Mechanism
-
-#: Number of the crank speed among the channels, and of that channel whose rate of change counts besides: an axial speed.
-SPEED, LAST = 1, 4
-#: Where a function of each channel stands among the functions of a run, and where the rates of those two.
-SLOT_OF_CHANNEL = (0, 4, 1, 2, 3)
-SLOT_OF_RATE = {SPEED: 5, LAST: 6}
-FUNCTIONS = 7
-
-StateFunction = Callable[[float, float, float, float, float], float]
-
-
-@dataclass(frozen=True, slots=True)
-class Piecewise:
-    """A signal that is a polynomial of degree three at most between its breaks.
-
-    Parameters
-    ----------
-    breaks : ndarray, shape (n + 1,)
-        Times (s), increasing. Before the first and after the last the outer polynomials go on.
-    coefficients : ndarray, shape (n, 4)
-        Of the powers 0 to 3 of the time since the break on the left.
-
-    Notes
-    -----
-    A jump belongs to the piece on its right: the value at a break is the limit from the right.
-    """
-
-    breaks: NDArray[np.float64]
-    coefficients: NDArray[np.float64]
-
-    def __post_init__(self) -> None:
-        for name in ("breaks", "coefficients"):
-            object.__setattr__(self, name, np.array(getattr(self, name), dtype=float))
-        if self.breaks.ndim != 1 or len(self.breaks) < 2:
-            raise InputError(
-                f"a signal needs at least two breaks in one dimension, not an array of {self.breaks.shape}"
-            )
-        if self.coefficients.shape != (len(self.breaks) - 1, 4):
-            raise InputError(
-                f"a signal with {len(self.breaks)} breaks needs coefficients of shape ({len(self.breaks) - 1}, 4), "
-                f"not {self.coefficients.shape}"
-            )
-        if not (np.all(np.isfinite(self.breaks)) and np.all(np.isfinite(self.coefficients))):
-            raise InputError("a signal's breaks and coefficients must be finite numbers")
-        if np.any(np.diff(self.breaks) <= 0.0):
-            raise InputError(f"a signal's times must increase: they are {self.breaks}")
-
-
-@dataclass(frozen=True, slots=True)
-class Harmonics:
-    """mean + sum of amplitude cos(frequency t + phase); frequencies in rad/s, phases in rad, shapes (n,)."""
-
-    mean: float = 0.0
-    amplitudes: Sequence[float] = ()
-    frequencies: Sequence[float] = ()
-    phases: Sequence[float] = ()
-
-    def __post_init__(self) -> None:
-        if any(np.ndim(values) != 1 for values in (self.amplitudes, self.frequencies, self.phases)):
-            raise InputError("amplitudes, frequencies and phases of harmonics must be lists of numbers")
-        if not len(self.amplitudes) == len(self.frequencies) == len(self.phases):
-            raise InputError("harmonics need as many amplitudes as frequencies and phases")
-        if not np.all(np.isfinite([self.mean, *self.amplitudes, *self.frequencies, *self.phases])):
-            raise InputError("harmonics must be finite numbers")
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class TorsionBar:
-    """Torque of a wound-up bar: torque (1 - angle / release_angle) until the crank reaches release_angle, then none.
-
-    The thesis's launch (section 3.2.2): torque T0 in N.m, released at 1 rad. The switch is located exactly.
-    """
-
-    torque: float
-    release_angle: float = 1.0
-
-    def __post_init__(self) -> None:
-        if not np.isfinite(self.torque):
-            raise InputError(f"torque of the torsion bar is {self.torque}: it must be a finite number of N.m")
-        if not (np.isfinite(self.release_angle) and self.release_angle > 0.0):
-            raise InputError(f"release angle of the torsion bar is {self.release_angle}: it must be above 0 rad")
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class InductionMotor:
-    """Torque of an induction motor by Kloss's formula, 2 Tb / (s / sb + sb / s) at the slip s = 1 - speed / synchronous_speed.
-
-    Parameters
-    ----------
-    breakdown_torque : float
-        Greatest torque Tb (N.m).
-    breakdown_slip : float
-        Slip sb at which it is reached.
-    synchronous_speed : float
-        Speed of the field (rad/s).
-    """
-
-    breakdown_torque: float
-    breakdown_slip: float
-    synchronous_speed: float
-
-    def __post_init__(self) -> None:
-        if not np.isfinite(self.breakdown_torque):
-            raise InputError(f"breakdown torque is {self.breakdown_torque}: it must be a finite number of N.m")
-        if not (np.isfinite(self.breakdown_slip) and self.breakdown_slip > 0.0):
-            raise InputError(f"breakdown slip is {self.breakdown_slip}: it must be above 0")
-        if not (np.isfinite(self.synchronous_speed) and self.synchronous_speed != 0.0):
-            raise InputError(f"synchronous speed is {self.synchronous_speed}: it must be finite and not 0 rad/s")
-
-
-@dataclass(frozen=True, slots=True)
-class Function:
-    """Any channel as a Python function of time, crank angle, second coordinate and their rates, all floats.
-
-    The second coordinate is the five-bar's slider position u, the slider-crank's axial shift S1.
-
-    It is compiled with Numba where it can be, else the run needs one of SciPy's methods. As a speed it must depend on
-    ``t`` alone and needs its ``rate``, the acceleration. ``breaks`` are times (s) where it is not smooth.
-    """
-
-    function: StateFunction
-    rate: StateFunction | None = None
-    breaks: Sequence[float] = ()
-
-    def __post_init__(self) -> None:
-        for name, value in (("function", self.function), ("rate", self.rate)):
-            if not callable(value) and not (name == "rate" and value is None):
-                raise InputError(
-                    f"{name} of an input is {value!r}: it must be a function of t, both coordinates and their rates"
-                )
-        if not np.all(np.isfinite(self.breaks)):
-            raise InputError(f"the breaks of a function must be finite times, not {self.breaks}")
-
-
-Signal = float | Piecewise | Harmonics | Function
-Torque = Signal | TorsionBar | InductionMotor
-
-
-def ramp(start: float, end: float, from_time: float, to_time: float) -> Piecewise:
-    """A signal that goes from ``start`` to ``end`` along a straight line between two times (s)."""
-    if not to_time > from_time:
-        raise InputError(f"a ramp from {from_time} s to {to_time} s: it must end after it begins")
-    return table([from_time - 1.0, from_time, to_time, to_time + 1.0], [start, start, end, end])
-
-
-def steps(times: ArrayLike, values: ArrayLike) -> Piecewise:
-    """A signal with the value ``values[i]`` from ``times[i]`` on; shapes (n,) and (n,)."""
-    t, y = _points(times, values, least=1)
-    breaks = np.append(t, t[-1] + 1.0)
-    coefficients = np.zeros((len(t), 4))
-    coefficients[:, 0] = y
-    return Piecewise(breaks, coefficients)
-
-
-def table(times: ArrayLike, values: ArrayLike, kind: str = "linear") -> Piecewise:
-    """A signal through the points (times, values), shapes (n,): ``linear``, ``cubic`` (spline) or ``hold``.
-
-    Outside the table the first and the last value hold.
-    """
-    if kind == "hold":
-        return steps(times, values)
-    t, y = _points(times, values, least=2)
-    if kind == "linear":
-        slopes = np.diff(y) / np.diff(t)
-        inner = np.column_stack([y[:-1], slopes, np.zeros_like(slopes), np.zeros_like(slopes)])
-    elif kind == "cubic":
-        inner = CubicSpline(t, y).c[::-1].T
-    else:
-        raise InputError(f"kind of table is {kind!r}: it must be 'linear', 'cubic' or 'hold'")
-    flat = np.zeros((1, 4))
-    flat[0, 0] = y[0]
-    end = np.zeros((1, 4))
-    end[0, 0] = y[-1]
-    return Piecewise(np.concatenate([[t[0] - 1.0], t, [t[-1] + 1.0]]), np.vstack([flat, inner, end]))
-
-
-def _points(times: ArrayLike, values: ArrayLike, least: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    t = np.asarray(times, dtype=float)
-    y = np.asarray(values, dtype=float)
-    if t.ndim != 1 or t.shape != y.shape:
-        raise InputError(f"a table needs as many times as values in one dimension each, not {t.shape} and {y.shape}")
-    if len(t) < least:
-        raise InputError(f"a table needs at least {least} points, not {len(t)}")
-    if np.any(np.diff(t) <= 0.0):
-        raise InputError(f"a table's times must increase: they are {t}")
-    return t, y
-
+from ..mechanisms import MECHANISMS, InitialState
+from .signals import Function, Harmonics, InductionMotor, Piecewise, StateFunction, TorsionBar
 
 _NUMBER = (int, float, np.floating, np.integer)
+_SIGNALS = (*_NUMBER, Piecewise, Harmonics, Function, TorsionBar, InductionMotor)
 
 
-class Channels:
-    """What every mechanism's inputs share: named channels, each a signal or a sum of signals."""
+class Inputs:
+    """Everything that acts on a mechanism during a run. SI units; a plain number is a constant, a tuple of signals their sum.
 
-    __slots__ = ()
+    Parameters
+    ----------
+    **channels : signal or tuple of signals
+        By the names of the mechanism's channels. Of a five-bar: ``speed`` (crank speed, rad/s; the crank torque is then a
+        result) or ``torque`` (N.m), ``force`` (control force on the slider, N), ``load_x``, ``load_y`` (load on the coupler
+        point P, N). Of a slider-crank: ``speed`` or ``torque``; one of ``shift_speed`` (axial velocity of the crank, m/s),
+        ``axial_force`` (N) and ``groove=True`` (a groove in the shaft makes the shift, eq 28), without any of which the
+        shift is held as it is; ``load`` (force on the slider along the guide, N). None is the same as leaving it out.
 
-    #: Name of the mechanism that they act on.
-    MECHANISM: ClassVar[str]
-    #: Names of the channels, in the order of the compiled code.
-    CHANNELS: ClassVar[tuple[str, ...]]
-    #: Channels that are speeds: a jump of them is an impulse, and their rate counts.
-    COMMANDS: ClassVar[tuple[str, ...]]
+    Raises
+    ------
+    InputError
+        If no mechanism has such a channel, two ways of driving one freedom are given, or a value is not finite or of the
+        wrong kind.
 
-    speed: Signal | tuple[Signal, ...] | None
-    torque: Torque | tuple[Torque, ...] | None
+    Examples
+    --------
+    >>> Inputs(speed=44.0, force=(1.0, ramp(0.0, 2.0, 0.0, 0.5)))  # doctest: +SKIP
+    """
 
-    def __post_init__(self) -> None:
-        if self.speed is not None and self.torque is not None:
-            raise InputError("both speed and torque are given: the crank can be driven by one of them only")
-        for channel in self.CHANNELS:
-            for part in self.parts(channel):
-                kinds: tuple[type, ...] = (*_NUMBER, Piecewise, Harmonics, Function)
-                if channel == "torque":
-                    kinds = (*kinds, TorsionBar, InductionMotor)
-                if not isinstance(part, kinds):
-                    raise InputError(
-                        f"{channel} is {part!r}: it must be a number, a signal of analysis.run.inputs, or a Function"
-                    )
-                if isinstance(part, _NUMBER) and not np.isfinite(part):
-                    raise InputError(f"{channel} is {part}: it must be a finite number")
-        for command in self.COMMANDS:
-            if any(isinstance(part, Function) and part.rate is None for part in self.parts(command)):
-                unit = "rad/s2" if command == "speed" else "m/s2"
-                raise InputError(f"a {command} given as a Function needs its rate, the acceleration ({unit})")
-        for channel in self.CHANNELS:
-            for kind in (TorsionBar, InductionMotor, Function):
-                if sum(isinstance(part, kind) for part in self.parts(channel)) > 1:
-                    raise InputError(f"{channel} has more than one {kind.__name__}: one can be in force at a time")
+    __slots__ = ("_given",)
+    _given: dict[str, Any]
+
+    def __init__(self, **channels: Any) -> None:
+        known, flags = _arguments()
+        for name, value in channels.items():
+            if name not in known:
+                raise InputError(f"there is no input {name!r}: the inputs are {', '.join(known)}")
+            if name in flags and not isinstance(value, bool):
+                raise InputError(f"{name} is {value!r}: it must be True or False")
+            if name not in flags:
+                _check_channel(name, value)
+        given = {name: value for name, value in channels.items() if value is not None and value is not False}
+        for arguments in {mode.arguments for mechanism in MECHANISMS.values() for mode in mechanism.modes}:
+            both = [name for name in arguments if name in given]
+            if len(both) > 1:
+                raise InputError(f"both {' and '.join(both)} are given: the freedom can be driven by one of them only")
+        for name in (
+            channel.argument for m in MECHANISMS.values() for channel in m.channels if channel.kind == "command"
+        ):
+            for part in _parts(given.get(name)):
+                if isinstance(part, Function) and part.rate is None:
+                    unit = "rad/s2" if name == "speed" else "m/s2"
+                    raise InputError(f"a {name} given as a Function needs its rate, the acceleration ({unit})")
+        object.__setattr__(self, "_given", given)
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        raise AttributeError(f"inputs do not change: Inputs.replace({name}=...) makes new ones")
+
+    def __getattr__(self, name: str) -> Any:
+        if not name.startswith("_") and name in _arguments()[0]:
+            return self._given.get(name)
+        raise AttributeError(f"there is no input {name!r}: the inputs are {', '.join(_arguments()[0])}")
+
+    def __reduce__(self) -> Any:
+        return _of, (self._given,)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Inputs) and self._given == other._given
+
+    __hash__ = None  # type: ignore[assignment]
+
+    def __repr__(self) -> str:
+        return f"Inputs({', '.join(f'{name}={value!r}' for name, value in self._given.items())})"
+
+    def __iter__(self) -> Iterator[str]:
+        """Names of what is given."""
+        return iter(self._given)
+
+    def replace(self, **changes: Any) -> Inputs:
+        """The same inputs with some changed; None takes one away."""
+        return Inputs(**{**self._given, **changes})
 
     def parts(self, channel: str) -> tuple[Any, ...]:
         """The summands of a channel."""
-        value = getattr(self, channel)
-        if value is None:
-            return ()
-        return value if isinstance(value, tuple) else (value,)
+        return _parts(self._given.get(channel))
+
+    def modes(self, mechanism: Mechanism) -> dict[str, int]:
+        """The mechanism's modes, by name, that drive it by what is given."""
+        return {
+            mode.name: next((n for n, name in enumerate(mode.arguments) if name in self._given), mode.default)
+            for mode in mechanism.modes
+        }
 
     @property
     def held_exactly(self) -> bool:
@@ -260,118 +117,50 @@ class Channels:
 
         A commanded speed goes along the secant of a step, which is exact where it is constant.
         """
-        parts = [part for channel in self.CHANNELS for part in self.parts(channel)]
-        return all(isinstance(part, _NUMBER) for part in parts)
-
-    @property
-    def speed_drive(self) -> bool:
-        """Whether the crank speed is prescribed."""
-        return self.speed is not None
-
-    @property
-    def axial_mode(self) -> int:
-        """What moves the second coordinate: 0 a force, 1 a commanded speed, 2 a groove."""
-        return 0
+        return all(isinstance(part, _NUMBER) for name in self._given for part in self.parts(name))
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Inputs(Channels):
-    """Everything that acts on a five-bar slider during a run. SI units; a plain number is a constant.
-
-    Parameters
-    ----------
-    speed : signal, optional
-        Crank speed (rad/s). Where it is given the run is in speed drive: the crank torque is a result.
-    torque : signal, TorsionBar, InductionMotor or a tuple of them, optional
-        Crank torque (N.m). Excludes ``speed``.
-    force : signal
-        Control force on the slider (N).
-    load_x, load_y : signal
-        Load on the coupler point P (N).
-
-    Notes
-    -----
-    A tuple of signals is their sum.
-
-    Raises
-    ------
-    InputError
-        If both speed and torque are given, or a value is not finite or of the wrong kind.
-    """
-
-    MECHANISM: ClassVar[str] = "five-bar"
-    CHANNELS: ClassVar[tuple[str, ...]] = ("torque", "speed", "force", "load_x", "load_y")
-    COMMANDS: ClassVar[tuple[str, ...]] = ("speed",)
-
-    speed: Signal | tuple[Signal, ...] | None = None
-    torque: Torque | tuple[Torque, ...] | None = None
-    force: Signal | tuple[Signal, ...] = 0.0
-    load_x: Signal | tuple[Signal, ...] = 0.0
-    load_y: Signal | tuple[Signal, ...] = 0.0
+def _of(given: dict[str, Any]) -> Inputs:
+    return Inputs(**given)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class SliderCrankInputs(Channels):
-    """Everything that acts on a slider-crank during a run. SI units; a plain number is a constant.
-
-    Parameters
-    ----------
-    speed : signal, optional
-        Crank speed (rad/s). Where it is given the crank torque is a result.
-    torque : signal, TorsionBar, InductionMotor or a tuple of them, optional
-        Crank torque (N.m). Excludes ``speed``.
-    load : signal
-        Force on the slider along the guide (N), in the direction in which its position increases.
-    shift_speed : signal, optional
-        Axial velocity of the crank (m/s); the axial force is then a result.
-    axial_force : signal, optional
-        Force on the crank along its axis (N); the shift is then free.
-    groove : bool
-        Whether a groove in the crank shaft makes the shift, S1 = SS1 sin(alpha theta1) by eq 28, with the parameters'
-        ``groove_amplitude`` and ``groove_ratio``.
-
-    Notes
-    -----
-    Of ``shift_speed``, ``axial_force`` and ``groove`` one may be given; without any the shift is held as it is. A tuple of
-    signals is their sum. A `Function` is one of (t, theta1, S1, theta1', S1').
-
-    Raises
-    ------
-    InputError
-        If more than one drive of a freedom is given, or a value is not finite or of the wrong kind.
-    """
-
-    MECHANISM: ClassVar[str] = "slider-crank"
-    CHANNELS: ClassVar[tuple[str, ...]] = ("torque", "speed", "axial_force", "load", "shift_speed")
-    COMMANDS: ClassVar[tuple[str, ...]] = ("speed", "shift_speed")
-
-    speed: Signal | tuple[Signal, ...] | None = None
-    torque: Torque | tuple[Torque, ...] | None = None
-    load: Signal | tuple[Signal, ...] = 0.0
-    shift_speed: Signal | tuple[Signal, ...] | None = None
-    axial_force: Signal | tuple[Signal, ...] | None = None
-    groove: bool = False
-
-    def __post_init__(self) -> None:
-        if not isinstance(self.groove, bool):
-            raise InputError(f"groove is {self.groove!r}: it must be True or False")
-        given = [name for name in ("shift_speed", "axial_force") if getattr(self, name) is not None]
-        given += ["groove"] * self.groove
-        if len(given) > 1:
-            raise InputError(f"both {' and '.join(given)} are given: the shift can be made by one of them only")
-        Channels.__post_init__(self)
-
-    @property
-    def axial_mode(self) -> int:
-        """What makes the shift: 0 a force, 1 a commanded speed, 2 a groove; `linkwork.slider_crank.plant` names them."""
-        return 2 if self.groove else 0 if self.axial_force is not None else 1
+def _arguments() -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Names of all channels of all mechanisms, with the flags that choose a mode; and the flags."""
+    mechanisms = MECHANISMS.values()
+    channels = dict.fromkeys(c.argument for m in mechanisms for c in m.channels if c.kind != "rate")
+    modes = dict.fromkeys(name for m in mechanisms for mode in m.modes for name in mode.arguments)
+    return tuple(channels | modes), tuple(name for name in modes if name not in channels)
 
 
-#: Kind of inputs of each mechanism, by its name.
-INPUTS_OF: dict[str, type[Inputs | SliderCrankInputs]] = {kind.MECHANISM: kind for kind in (Inputs, SliderCrankInputs)}
+def _parts(value: Any) -> tuple[Any, ...]:
+    if value is None:
+        return ()
+    return value if isinstance(value, tuple) else (value,)
 
 
-def given(mechanism: Mechanism, inputs: Channels | None, initial: InitialState | None) -> tuple[Channels, Any]:
+def _check_channel(name: str, value: Any) -> None:
+    on_shafts = {
+        c.argument for m in MECHANISMS.values() for c in m.channels if c.kind == "force" and _turns(m, c.freedom)
+    }
+    parts = _parts(value)
+    kinds = _SIGNALS if name in on_shafts else _SIGNALS[:-2]
+    for part in parts:
+        if not isinstance(part, kinds):
+            raise InputError(
+                f"{name} is {part!r}: it must be a number, a signal of analysis.run.signals, or a Function"
+            )
+        if isinstance(part, _NUMBER) and not np.isfinite(part):
+            raise InputError(f"{name} is {part}: it must be a finite number")
+    for kind in (TorsionBar, InductionMotor, Function):
+        if sum(isinstance(part, kind) for part in parts) > 1:
+            raise InputError(f"{name} has more than one {kind.__name__}: one can be in force at a time")
+
+
+def _turns(mechanism: Mechanism, freedom: int) -> bool:
+    return freedom >= 0 and mechanism.freedoms[freedom].period > 0.0
+
+
+def given(mechanism: Mechanism, inputs: Inputs | None, initial: InitialState | None) -> tuple[Inputs, Any]:
     """Inputs and state at the start of a run, by default nothing and at rest; both must be of the mechanism.
 
     Raises
@@ -379,99 +168,146 @@ def given(mechanism: Mechanism, inputs: Channels | None, initial: InitialState |
     InputError
         If they are another mechanism's.
     """
-    kind = INPUTS_OF[mechanism.name]
-    inputs = kind() if inputs is None else inputs
+    inputs = Inputs() if inputs is None else inputs
+    if not isinstance(inputs, Inputs):
+        raise InputError(f"inputs is {inputs!r}: it must be analysis.Inputs")
+    modes = [name for mode in mechanism.modes for name in mode.arguments]
+    known = dict.fromkeys([*(c.argument for c in mechanism.channels if c.kind != "rate"), *modes])
+    for name in inputs:
+        if name not in known:
+            raise InputError(f"a {mechanism.name} has no input {name!r}: its inputs are {', '.join(known)}")
     initial = mechanism.initial() if initial is None else initial
-    for name, value, wanted in (("inputs", inputs, kind), ("initial", initial, mechanism.initial)):
-        if not isinstance(value, wanted):
-            raise InputError(
-                f"{name} is {type(value).__module__}.{type(value).__qualname__}: with parameters of the {mechanism.name} it "
-                f"must be {wanted.__module__}.{wanted.__qualname__}"
-            )
+    if not isinstance(initial, mechanism.initial):
+        kind, wanted = type(initial), mechanism.initial
+        raise InputError(
+            f"initial is {kind.__module__}.{kind.__qualname__}: with parameters of the {mechanism.name} it must be "
+            f"{wanted.__module__}.{wanted.__qualname__}"
+        )
     return inputs, initial
 
 
 @dataclass(frozen=True, slots=True)
 class Encoded:
-    """`Inputs` as the arrays that the compiled code reads.
+    """`Inputs` as the arrays that the compiled code reads; a signal is a channel that is not the rate of another.
 
     Attributes
     ----------
+    mechanism : Mechanism
+    modes : dict
     breaks : ndarray, shape (n + 1,)
-        Times at which some channel's polynomial changes.
-    coefficients : ndarray, shape (n, 5, 4)
-        Polynomials of the channels between the breaks.
+        Times at which some signal's polynomial changes.
+    coefficients : ndarray, shape (n, signals, 4)
+        Polynomials of the signals between the breaks.
     harmonics : ndarray, shape (m, 4)
-        Channel number, amplitude, frequency, phase.
+        Number of the signal, amplitude, frequency, phase.
+    places : ndarray of int, shape (signals, 2)
+        Numbers of the channels that are a signal and its rate, -1 where it has none.
     law : ndarray, shape (6,)
         Torsion bar: torque, release angle, 1 while it acts. Motor: breakdown torque and slip, synchronous speed.
+    law_places : ndarray of int, shape (3,)
+        Channel on which bar and motor act, and the components of the state that are its freedom's coordinate and rate.
+    commands : ndarray of int, shape (c, 3)
+        For each commanded rate in force its channel, the component of the state that it is, and the channel of its rate.
     functions : tuple
-        Python functions of the channels 0, 2, 3, 4 and 1, and of the rates of channels 1 and 4, or None.
-    kind : type
-        Of the inputs.
+        Of each signal the user's Python function and that of its rate, or None.
     """
 
+    mechanism: Mechanism
+    modes: dict[str, int]
     breaks: NDArray[np.float64]
     coefficients: NDArray[np.float64]
     harmonics: NDArray[np.float64]
+    places: NDArray[np.int64]
     law: NDArray[np.float64]
-    functions: tuple[StateFunction | None, ...] = field(default=(None,) * FUNCTIONS)
-    kind: type[Channels] = Inputs
-
-    @property
-    def value_names(self) -> tuple[str, ...]:
-        """Names of what the channels and the rates are worth at a time, in the order of the compiled code."""
-        torque, speed, *others = self.kind.CHANNELS
-        return (torque, speed, "acceleration", *others, f"rate of {others[-1]}")
+    law_places: NDArray[np.int64]
+    commands: NDArray[np.int64]
+    functions: tuple[tuple[StateFunction | None, StateFunction | None], ...]
 
     @property
     def steady(self) -> bool:
-        """Whether all channels, but for the torsion bar and of the speed its rate, are constant between the breaks.
+        """Whether all channels, but for the torsion bar, are constant between the breaks.
 
-        An axial speed counts by its value, though only its rate acts: where it is not constant the run takes the general way.
+        A signal whose rate counts, a commanded speed, has to be so by its rate: its value counts at the beginning of an
+        interval only.
         """
-        others = [c for c in range(self.coefficients.shape[1]) if c != SPEED]
+        moving = self.coefficients[:, :, 1:].copy()
+        moving[:, self.places[:, 1] >= 0, 0] = 0.0
         return bool(
             len(self.harmonics) == 0
             and self.law[3] == 0.0
-            and not any(self.functions)
-            and np.all(self.coefficients[:, others, 1:] == 0.0)
-            and np.all(self.coefficients[:, SPEED, 2:] == 0.0)
+            and not any(chain.from_iterable(self.functions))
+            and np.all(moving == 0.0)
         )
 
+    def value_name(self, channel: int) -> str:
+        """Name of a channel for a message."""
+        return self.mechanism.channels[channel].argument
 
-def encode(inputs: Channels) -> Encoded:
+
+@lru_cache(maxsize=64)
+def _signals(mechanism: Mechanism) -> tuple[tuple[str, int, int], ...]:
+    """Of each signal its name and the numbers of its channel and of that of its rate, or -1."""
+    rates = {channel.freedom: n for n, channel in enumerate(mechanism.channels) if channel.kind == "rate"}
+    return tuple(
+        (channel.argument, n, rates.get(channel.freedom, -1) if channel.kind == "command" else -1)
+        for n, channel in enumerate(mechanism.channels)
+        if channel.kind != "rate"
+    )
+
+
+def encode(inputs: Inputs, mechanism: Mechanism) -> Encoded:
     """Bring all channels onto common breaks."""
-    pieces = [(c, part) for c, name in enumerate(inputs.CHANNELS) for part in inputs.parts(name)]
+    signals = _signals(mechanism)
+    freedoms = len(mechanism.freedoms)
+    pieces = [(n, part) for n, (name, _, _) in enumerate(signals) for part in inputs.parts(name)]
     times = [part.breaks for _, part in pieces if isinstance(part, Piecewise)]
     for _, part in pieces:
         if isinstance(part, Function) and len(part.breaks) > 0:
             # every one of them is a break inside: the first and the last of the merged ones are none
             times.append(np.array([min(part.breaks) - 1.0, *part.breaks, max(part.breaks) + 1.0]))
     merged = np.unique(np.concatenate(times)) if times else np.array([0.0, 1.0])
-    coefficients = np.zeros((len(merged) - 1, len(inputs.CHANNELS), 4))
+    coefficients = np.zeros((len(merged) - 1, len(signals), 4))
     harmonics: list[tuple[float, float, float, float]] = []
     law = np.zeros(6)
     law[4] = law[5] = 1.0
-    functions: list[StateFunction | None] = [None] * FUNCTIONS
-    for c, part in pieces:
+    law_places = np.zeros(3, dtype=np.int64)
+    functions: list[tuple[StateFunction | None, StateFunction | None]] = [(None, None)] * len(signals)
+    for n, part in pieces:
         if isinstance(part, Piecewise):
-            coefficients[:, c, :] += _on_breaks(part, merged)
+            coefficients[:, n, :] += _on_breaks(part, merged)
         elif isinstance(part, Harmonics):
-            coefficients[:, c, 0] += part.mean
-            harmonics += [(float(c), *row) for row in zip(part.amplitudes, part.frequencies, part.phases)]
-        elif isinstance(part, TorsionBar):
-            law[0:3] = part.torque, part.release_angle, 1.0
-        elif isinstance(part, InductionMotor):
-            law[3:6] = part.breakdown_torque, part.breakdown_slip, part.synchronous_speed
+            coefficients[:, n, 0] += part.mean
+            harmonics += [(float(n), *row) for row in zip(part.amplitudes, part.frequencies, part.phases)]
+        elif isinstance(part, (TorsionBar, InductionMotor)):
+            channel = signals[n][1]
+            freedom = mechanism.channels[channel].freedom
+            if law_places[2] and law_places[0] != channel:
+                raise InputError("torsion bar and motor act on different channels: they must act on one")
+            law_places[:] = channel, freedom, freedoms + freedom
+            if isinstance(part, TorsionBar):
+                law[0:3] = part.torque, part.release_angle, 1.0
+            else:
+                law[3:6] = part.breakdown_torque, part.breakdown_slip, part.synchronous_speed
         elif isinstance(part, Function):
-            functions[SLOT_OF_CHANNEL[c]] = part.function
-            if c in SLOT_OF_RATE and part.rate is not None:
-                functions[SLOT_OF_RATE[c]] = part.rate
+            functions[n] = (part.function, part.rate if signals[n][2] >= 0 else None)
         else:
-            coefficients[:, c, 0] += float(part)
+            coefficients[:, n, 0] += float(part)
+    modes = inputs.modes(mechanism)
+    commanded = [
+        (n, freedoms + mechanism.channels[n].freedom, next(r for _, c, r in signals if c == n))
+        for n in mechanism.commands(modes)
+    ]
     return Encoded(
-        merged, coefficients, np.array(harmonics, dtype=float).reshape(-1, 4), law, tuple(functions), type(inputs)
+        mechanism=mechanism,
+        modes=modes,
+        breaks=merged,
+        coefficients=coefficients,
+        harmonics=np.array(harmonics, dtype=float).reshape(-1, 4),
+        places=np.array([row[1:] for row in signals], dtype=np.int64).reshape(-1, 2),
+        law=law,
+        law_places=law_places,
+        commands=np.array(commanded, dtype=np.int64).reshape(-1, 3),
+        functions=tuple(functions),
     )
 
 
@@ -498,3 +334,142 @@ def align(encoded: Encoded, times: NDArray[np.float64]) -> Encoded:
     rounding = 1e-9 * (high - low) + 4.0 * np.spacing(np.abs(encoded.breaks))
     moved = np.where(np.abs(nearest - encoded.breaks) <= rounding, nearest, encoded.breaks)
     return replace(encoded, breaks=moved) if np.all(np.diff(moved) > 0.0) else encoded
+
+
+# The inputs at a time, sampled in Python
+
+
+class NotFiniteError(InputError):
+    """An input, by its number among the channels, is not a finite number at a time and a state."""
+
+    def __init__(self, encoded: Encoded, number: int, t: float, x: NDArray[np.float64]) -> None:
+        self.number = number
+        where = encoded.mechanism.where(x)
+        super().__init__(f"the input {encoded.value_name(number)} is not a finite number at t = {t:.9g} s, {where}")
+
+
+def sample(
+    encoded: Encoded,
+    t: float,
+    x: NDArray[np.float64],
+    law: NDArray[np.float64],
+    *,
+    left: bool = False,
+    ahead: float = -np.inf,
+) -> NDArray[np.float64]:
+    """The channels at time t and state x, sampled in Python; the user's functions are called as the Python they are.
+
+    Parameters
+    ----------
+    law : ndarray, shape (6,)
+        That of ``encoded``, or what has become of it.
+    left : bool
+        Whether the limit from the left is meant where an input jumps.
+    ahead : float
+        Where it is later than t, the channels are those of one who samples them at t and holds them until then (s): commanded
+        rates go along the secant, a torsion bar acts with the torque of the middle of the step, and ``law`` is overwritten
+        once it is released.
+
+    Raises
+    ------
+    NotFiniteError
+        If one of them is not a finite number.
+    """
+    from . import compiled as k
+
+    x = np.ascontiguousarray(x)
+    if ahead > t and law[2] and x[encoded.law_places[1]] >= law[1]:
+        law[2] = 0.0
+    source = k.Source(
+        encoded.breaks, encoded.coefficients, encoded.harmonics, encoded.places, law, encoded.law_places,
+        np.zeros((len(encoded.places), 2), dtype=np.int64),
+    )  # fmt: skip
+    u = np.zeros(len(encoded.mechanism.channels))
+    k.channels(t, ahead, left, x, source, encoded.commands, u, np.empty_like(u))
+    if any(chain.from_iterable(encoded.functions)):
+        here = _of_functions(encoded, t, x)
+        u += here
+        if ahead > t and len(encoded.commands):
+            there = _of_functions(encoded, ahead, x)
+            for value, _, rate in encoded.commands:
+                u[rate] += (there[value] - here[value]) / (ahead - t) - here[rate]
+    lost = np.flatnonzero(~np.isfinite(u))
+    if len(lost):
+        raise NotFiniteError(encoded, _culprit(encoded, int(lost[0]), ahead > t), t, x)
+    return u
+
+
+def _culprit(encoded: Encoded, channel: int, held: bool) -> int:
+    """The channel to name: where inputs are held, a rate is the secant of a command."""
+    if held:
+        return next((int(value) for value, _, rate in encoded.commands if rate == channel), channel)
+    return channel
+
+
+def _of_functions(encoded: Encoded, t: float, x: NDArray[np.float64]) -> NDArray[np.float64]:
+    """What the user's functions add to the channels."""
+    added = np.zeros(len(encoded.mechanism.channels))
+    state = x[: 2 * len(encoded.mechanism.freedoms)].tolist()
+    for functions, places in zip(encoded.functions, encoded.places):
+        for function, place in zip(functions, places):
+            if function is not None:
+                value = function(t, *state)
+                if not isinstance(value, _NUMBER):
+                    raise InputError(f"an input function returned {value!r} at t = {t:.9g} s: it must return a float")
+                added[place] += float(value)
+    return added
+
+
+# User's functions, compiled
+
+
+@lru_cache(maxsize=256)
+def compile_function(function: StateFunction, freedoms: int) -> Any:
+    """A user's function as a C function of time and state; its ``address`` is what the compiled code calls. NaN where it raises.
+
+    Raises
+    ------
+    InputError
+        If Numba cannot compile it.
+    """
+    import numba
+    from numba.np.unsafe.ndarray import to_fixed_tuple
+
+    plain = function.py_func if isinstance(function, numba.core.registry.CPUDispatcher) else function
+    size = 2 * freedoms
+    try:
+        own = numba.njit(numba.float64(*[numba.float64] * (1 + size)), error_model="numpy")(plain)
+
+        @numba.cfunc(numba.float64(numba.float64, numba.types.CPointer(numba.float64)), error_model="numpy")
+        def guarded(t, x):  # type: ignore[no-untyped-def]
+            try:
+                return own(t, *to_fixed_tuple(numba.carray(x, (size,)), size))
+            except Exception:
+                return np.nan
+
+    except Exception as error:
+        raise InputError(
+            f"function {getattr(function, '__name__', function)!r} cannot be compiled with Numba: choose one of SciPy's "
+            f"methods, such as method='DOP853', which take any function. Numba says: {_reason(error)}"
+        ) from error
+    return guarded
+
+
+def _reason(error: Exception) -> str:
+    """The line of Numba's report that tells most."""
+    lines = [line.strip() for line in str(error).splitlines() if line.strip()]
+    telling = [line for line in lines if not line.startswith(("Failed in nopython", "During", "File", "- During"))]
+    return (telling or lines or [type(error).__name__])[0]
+
+
+def compiled_source(encoded: Encoded) -> tuple[Any, list[Any]]:
+    """The inputs as the compiled code reads them, with a law of their own, and what has to stay alive meanwhile."""
+    from . import compiled as k
+
+    freedoms = len(encoded.mechanism.freedoms)
+    kept = [[f and compile_function(f, freedoms) for f in row] for row in encoded.functions]
+    addresses = np.array([[f.address if f else 0 for f in row] for row in kept], dtype=np.int64).reshape(-1, 2)
+    source = k.Source(
+        encoded.breaks, encoded.coefficients, encoded.harmonics, encoded.places, encoded.law.copy(), encoded.law_places, addresses
+    )  # fmt: skip
+    return source, kept

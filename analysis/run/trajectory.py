@@ -13,25 +13,25 @@ from numpy.typing import NDArray
 
 from linkwork.errors import InputError
 
-from ..mechanisms import FIVE_BAR, OUTPUT_UNITS
+from ..mechanisms import FIVE_BAR, output_units
 
 if TYPE_CHECKING:
     import pandas
 
 #: Unit of each real output, by name.
-UNITS: Mapping[str, str] = MappingProxyType(OUTPUT_UNITS)
+UNITS: Mapping[str, str] = MappingProxyType(output_units())
 
 
 @dataclass(frozen=True, slots=True)
 class Occurrence:
     """An event that happened: its name, the time (s), and the state there in SI.
 
-    The state is crank angle, slider position or axial shift, and their rates.
+    The state is all coordinates of the mechanism and all their rates.
     """
 
     name: str
     time: float
-    state: tuple[float, float, float, float]
+    state: tuple[float, ...]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

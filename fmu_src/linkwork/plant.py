@@ -1,7 +1,6 @@
 """A mechanism as a stateful object: the shell around its equations that an FMU holds.
 
-What every mechanism shares is here: inputs, steps, refused steps, commanded speeds that jump, saved states. A concrete plant
-brings its parameters, its equations and its limit of assembly.
+Inputs, steps, refused steps, commanded rates that jump, saved states: the same for every `Mechanism`.
 """
 
 from __future__ import annotations
@@ -9,10 +8,13 @@ from __future__ import annotations
 from collections.abc import Collection
 from dataclasses import asdict
 from math import isfinite, ulp
-from typing import Any, ClassVar, NamedTuple, Self
+from typing import Any
 
 from .errors import AssemblyError, InputError, IntegrationError, LinkworkError, ParameterError, StateError, StepError
 from .integrate import UNDEFINED, Vector, integrate
+from .limits import NEAR_LIMIT
+from .mechanism import Mechanism
+from .parameters import fmi_name
 
 #: Loosest and tightest tolerance that a run accepts.
 TOLERANCE_RANGE = (1e-13, 1e-2)
@@ -31,146 +33,134 @@ def check_tolerance(tolerance: float) -> None:
         raise ParameterError("solver.tolerance", tolerance, f"be between {low:g} and {high:g}")
 
 
-def error_scale(length: float, mass: float, inertia: float, crank_speed: float) -> tuple[float, ...]:
-    """Magnitudes of a state's components below which the integrator's error counts as absolute.
-
-    Of a mechanism with a crank of that length (m) and moment of inertia (kg.m2), other links of that mass (kg), and a crank
-    speed at the start (rad/s).
-    """
-    speed = max(1.0, abs(crank_speed))
-    energy = 0.5 * (inertia + mass * length * length) * speed * speed
-    return (1.0, length, speed, length * speed, energy, energy)
-
-
-class Mode(NamedTuple):
-    """A way of driving a freedom: the parameter that chooses it and the words for its values, 0 and on."""
-
-    name: str
-    values: tuple[str, ...]
-
-
-class MechanismPlant:
+class Plant:
     """A mechanism in motion: state, inputs, and the step that takes it forward in time.
-
-    The state is the six-tuple (crank angle, second coordinate, their rates, dissipated work, supplied work).
 
     Parameters
     ----------
-    parameters
-        Those of the mechanism.
-    initial
-        Its state at the start; the commanded speeds there take the place of what it gives.
-    modes : dict
-        Value of each of `MODES` by name.
+    mechanism : Mechanism
+    parameters, initial
+        Of the mechanism's types. Commanded rates at the start take the place of those of ``initial``.
     tolerance : float
         Bound of the local error of a step.
     time : float
         Time at the start (s).
     inputs : dict, optional
         Inputs in force at the start, by FMI name; those left out are zero.
+    **modes : int
+        Value of each of the mechanism's modes, ``drive_mode`` for the parameter ``drive.mode``; those left out have their
+        default.
 
     Raises
     ------
     ParameterError, AssemblyError, InputError
     """
 
-    #: What it is, for the sentences.
-    KIND: ClassVar[str]
-    PARAMETERS: ClassVar[type]
-    MODES: ClassVar[tuple[Mode, ...]]
-    INPUT_NAMES: ClassVar[tuple[str, ...]]
-    #: Inputs that are speeds, a jump of which is an impulse.
-    COMMANDS: ClassVar[tuple[str, ...]]
-
     def __init__(
         self,
+        mechanism: Mechanism,
         parameters: Any,
         initial: Any,
         *,
-        modes: dict[str, int],
-        tolerance: float,
-        time: float,
-        inputs: dict[str, float] | None,
+        tolerance: float = 1e-9,
+        time: float = 0.0,
+        inputs: dict[str, float] | None = None,
+        **modes: int,
     ) -> None:
-        for mode in self.MODES:
-            if modes[mode.name] not in range(len(mode.values)):
+        self.mechanism = mechanism
+        self.modes = {mode.name: mode.default for mode in mechanism.modes}
+        for name, value in modes.items():
+            if fmi_name(name) not in self.modes:
+                raise TypeError(f"a {mechanism.name} has no {name}")
+            self.modes[fmi_name(name)] = value
+        for mode in mechanism.modes:
+            if self.modes[mode.name] not in range(len(mode.values)):
                 words = [f"{number} ({word})" for number, word in enumerate(mode.values)]
-                raise ParameterError(mode.name, modes[mode.name], f"be {', '.join(words[:-1])} or {words[-1]}")
+                raise ParameterError(mode.name, self.modes[mode.name], f"be {', '.join(words[:-1])} or {words[-1]}")
         check_tolerance(tolerance)
         if not isfinite(time):
             raise InputError(f"the time at the start is {time} s: it must be a finite number")
         self.parameters = parameters
-        self.modes = modes
         self.tolerance = tolerance
         self.time = time
-        self.inputs: dict[str, float] = dict.fromkeys(self.INPUT_NAMES, 0.0)
+        self.inputs: dict[str, float] = dict.fromkeys(mechanism.input_names, 0.0)
         self._commanded: set[str] = set()
         for name, value in (inputs or {}).items():
             self.set_input(name, value)
         self._check_inputs()
-        self._p: Any = parameters.constants()
+        self._derive()
         self.state: Vector = self._start(initial)
         self._check_state(self.state)
         self._commanded.clear()
         self._step_size = 0.0
-        self._scale = self._error_scale(self.state)
-        self.start_energy = self._energy(self.state)
+        self._scale = mechanism.error_scale(parameters, self.state)
+        self.start_energy = mechanism.equations.energy(self.state, self._p)
         if not isfinite(self.start_energy):
             raise InputError(f"the energy at the start is not finite: {self._started_from(self.state)}")
 
-    # What a concrete plant adds
+    def _derive(self) -> None:
+        """What follows from parameters and modes once and for all."""
+        self._p: Any = self.parameters.constants()
+        self._modes = tuple(float(self.modes[mode.name]) for mode in self.mechanism.modes)
+        self._commands = self.mechanism.commands(self.modes)
 
     def _start(self, initial: Any) -> Vector:
-        """State at the start."""
-        raise NotImplementedError
+        x = list(self.mechanism.state(initial))
+        for number in self._commands:
+            x[self._rate_of(number)] = float(self.inputs[self.mechanism.channels[number].name])
+        return self._settled(tuple(x))
+
+    def _rate_of(self, number: int) -> int:
+        """Place in the state of the rate that a channel commands."""
+        return len(self.mechanism.freedoms) + self.mechanism.channels[number].freedom
+
+    def _applied(self) -> Any:
+        """The inputs in force as the equations read them."""
+        return self.mechanism.equations.applied(self._modes, tuple(self.inputs.values()), self._p)
+
+    def _settled(self, x: Vector) -> Vector:
+        settled: Vector = self.mechanism.equations.start(x, self._applied(), self._p)
+        return settled
 
     def _check_state(self, x: Vector) -> None:
-        """Make sure that the links can be joined at ``x``, clear of the limit of assembly; else AssemblyError."""
-        raise NotImplementedError
+        self.mechanism.check_assembly(self.parameters, self._settled(x))
 
-    def _error_scale(self, x: Vector) -> Vector:
-        """Magnitudes of the state's components below which the integrator's error counts as absolute."""
-        raise NotImplementedError
-
-    def _energy(self, x: Vector) -> float:
-        """Mechanical energy (J)."""
-        raise NotImplementedError
-
-    def _inputs(self) -> Any:
-        """The inputs in force as the equations read them."""
-        raise NotImplementedError
-
-    def _jumped(self, x: Vector, inputs: Any, commands: Collection[str]) -> Vector:
-        """The state with the commanded speeds applied, of those ``commands``."""
-        raise NotImplementedError
-
-    def _derivative(self, x: Vector, inputs: Any) -> Vector:
-        raise NotImplementedError
-
-    def _outputs(self, x: Vector, inputs: Any) -> Any:
-        raise NotImplementedError
+    def _jumped(self, x: Vector, applied: Any, commanded: Collection[str]) -> Vector:
+        """The state with the commanded rates applied, of those inputs that are in ``commanded``."""
+        names = self.mechanism.input_names
+        if not any(names[number] in commanded for number in self._commands):
+            return x
+        u = list(self.inputs.values())
+        for number in self._commands:
+            # a freedom that is driven and not commanded anew goes on as it goes
+            if names[number] not in commanded:
+                u[number] = x[self._rate_of(number)]
+        jumped: Vector = self.mechanism.equations.jump(x, applied, tuple(u), self._p)
+        return jumped
 
     def _near_limit(self, x: Vector) -> bool:
         """Whether a failure at ``x`` is one of assembly."""
-        raise NotImplementedError
-
-    def _where(self, x: Vector) -> str:
-        """The configuration in words."""
-        raise NotImplementedError
+        try:
+            return abs(self.mechanism.equations.clearance(x, self._applied(), self._p)) < NEAR_LIMIT
+        except UNDEFINED:
+            return True
 
     def _started_from(self, x: Vector) -> str:
         """The state at the start in words, by the names of what it was given by."""
-        raise NotImplementedError
+        units = {v.name: v.unit for v in self.mechanism.variables}
+        source = {self._rate_of(number): self.mechanism.channels[number].name for number in self._commands}
+        fields = [freedom.initial[part] for part in (0, 1) for freedom in self.mechanism.freedoms]
+        names = [source.get(place, f"initial.{field}") for place, field in enumerate(fields)]
+        return ", ".join(f"{name} is {value:g} {units[name]}" for name, value in zip(names, x))
 
     # Inputs and outputs
 
     def set_input(self, name: str, value: float) -> None:
         """Set an input by its FMI name; it holds until it is set again. Checked at the next step, not here."""
         if name not in self.inputs:
-            raise InputError(f"there is no input {name!r}: the inputs are {', '.join(self.INPUT_NAMES)}")
+            raise InputError(f"there is no input {name!r}: the inputs are {', '.join(self.inputs)}")
         self.inputs[name] = value
-        if name in self.COMMANDS:
-            self._commanded.add(name)
+        self._commanded.add(name)
 
     def _check_inputs(self) -> None:
         for name, value in self.inputs.items():
@@ -186,8 +176,9 @@ class MechanismPlant:
             If an input is not finite, or so large that an output is not.
         """
         self._check_inputs()
-        i = self._inputs()
-        result = self._outputs(self._jumped(self.state, i, self._commanded), i)
+        i = self._applied()
+        x = self._jumped(self.state, i, self._commanded)
+        result = self.mechanism.equations.outputs(x, i, self.start_energy, self._p)
         if not all(map(isfinite, result)):
             largest = max(self.inputs, key=lambda name: abs(self.inputs[name]))
             raise InputError(
@@ -223,9 +214,10 @@ class MechanismPlant:
             way = "backwards" if time < self.time else "over a gap"
             raise StepError(f"a step {way}: it starts at t = {time:.9g} s, but the state is at t = {self.time:.9g} s")
         self._check_inputs()
-        i = self._inputs()
-        # a commanded speed that was not set again: the step starts from it all the same, as the contract says
-        x = self._jumped(self.state, i, self.COMMANDS)
+        i = self._applied()
+        derivative, p = self.mechanism.equations.derivative, self._p
+        # a commanded rate that was not set again: the step starts from it all the same, as the contract says
+        x = self._jumped(self.state, i, self.inputs)
         last = x
 
         def accept(y: Vector) -> None:
@@ -235,7 +227,7 @@ class MechanismPlant:
 
         try:
             result = integrate(
-                lambda y: self._derivative(y, i),
+                lambda y: derivative(y, i, p),
                 x,
                 step,
                 tolerance=self.tolerance,
@@ -256,8 +248,10 @@ class MechanismPlant:
         """The error with the time of the step and, where the cause is the limit of assembly, with that said."""
         if isinstance(error, IntegrationError):
             if self._near_limit(last):
-                return AssemblyError(f"in the step from t = {time:.9g} s: limit of assembly near {self._where(last)}")
-            return IntegrationError(f"in the step from t = {time:.9g} s: {error}, at {self._where(last)}")
+                return AssemblyError(
+                    f"in the step from t = {time:.9g} s: limit of assembly near {self.mechanism.where(last)}"
+                )
+            return IntegrationError(f"in the step from t = {time:.9g} s: {error}, at {self.mechanism.where(last)}")
         return type(error)(f"in the step from t = {time:.9g} s: {error}")
 
     # Saved state
@@ -278,7 +272,7 @@ class MechanismPlant:
         }
 
     @classmethod
-    def restore(cls, saved: dict[str, Any]) -> Self:
+    def restore(cls, mechanism: Mechanism, saved: dict[str, Any]) -> Plant:
         """The plant that `save` described.
 
         Raises
@@ -288,29 +282,33 @@ class MechanismPlant:
         """
         try:
             plant = cls.__new__(cls)
-            plant.parameters = cls.PARAMETERS(**saved["parameters"])
-            plant.modes = {mode.name: saved["modes"][mode.name] for mode in cls.MODES}
+            plant.mechanism = mechanism
+            plant.parameters = mechanism.parameters(**saved["parameters"])
+            plant.modes = {mode.name: saved["modes"][mode.name] for mode in mechanism.modes}
             plant.tolerance = saved["tolerance"]
             plant.time = saved["time"]
-            # an input that is not finite may well be saved: it is told at the next step
-            plant.inputs = {name: float(saved["inputs"][name]) for name in cls.INPUT_NAMES}
+            # an input that is not finite may well be saved: the next step reports it
+            plant.inputs = {name: float(saved["inputs"][name]) for name in mechanism.input_names}
             plant.state = tuple(saved["state"])
             plant._commanded = set(saved["commanded"])
             plant._step_size = saved["step_size"]
             plant._scale = tuple(saved["scale"])
             plant.start_energy = saved["start_energy"]
-            plant._p = plant.parameters.constants()
             check_tolerance(plant.tolerance)
             numbers = (plant.time, plant._step_size, plant.start_energy, *plant.state, *plant._scale)
             whole = (
-                all(plant.modes[mode.name] in range(len(mode.values)) for mode in cls.MODES)
-                and plant._commanded <= set(cls.COMMANDS)
-                and len(plant._scale) == len(plant.state) == 6
+                all(plant.modes[mode.name] in range(len(mode.values)) for mode in mechanism.modes)
+                and plant._commanded <= set(plant.inputs)
+                and len(plant._scale) == len(plant.state) == mechanism.size
                 and min(plant._scale) > 0.0
                 and all(isfinite(number) for number in numbers)
             )
+            if whole:
+                plant._derive()
         except (KeyError, TypeError, ValueError) as error:
-            raise StateError(f"the saved state is not one of a {cls.KIND}: {error!r}") from error
+            raise StateError(f"the saved state is not one of a {mechanism.name}: {error!r}") from error
         if not whole:
-            raise StateError(f"the saved state is not one of a {cls.KIND}: a number in it is missing or not finite")
+            raise StateError(
+                f"the saved state is not one of a {mechanism.name}: a number in it is missing or not finite"
+            )
         return plant

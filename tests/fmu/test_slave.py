@@ -5,12 +5,12 @@ from __future__ import annotations
 from typing import Any
 
 import pytest
-from pythonfmu.enums import Fmi2Status
-
 from five_bar_slave import FiveBarSlider
+from pythonfmu.enums import Fmi2Status
+from slider_crank_slave import SliderCrank
+
 from linkwork.errors import LinkworkError, ParameterError
 from slave import LinkworkSlave
-from slider_crank_slave import SliderCrank
 
 from .models import Model
 

@@ -9,6 +9,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+from linkwork.five_bar.plant import INPUT_NAMES, SPEED_DRIVE, TORQUE_DRIVE, Plant, check_assembly, error_scale
+from linkwork.slider_crank.plant import Plant as SliderCrankPlant
 from scipy.integrate import solve_ivp
 
 from linkwork.errors import (
@@ -23,11 +25,9 @@ from linkwork.errors import (
 from linkwork.five_bar import dynamics
 from linkwork.five_bar.kinematics import coefficients, position
 from linkwork.five_bar.parameters import InitialState
-from linkwork.five_bar.plant import INPUT_NAMES, SPEED_DRIVE, TORQUE_DRIVE, Plant, check_assembly, error_scale
 from linkwork.five_bar.published import SETS, TABLE_3_1
 from linkwork.limits import LIMIT_SINE
 from linkwork.plant import MechanismPlant, check_tolerance
-from linkwork.slider_crank.plant import Plant as SliderCrankPlant
 from linkwork.slider_crank.published import OFFSET_CASE
 from tests import published
 from tests.published import CM, DYN_CM, DYN_S_PER_CM

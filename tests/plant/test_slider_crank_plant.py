@@ -11,17 +11,17 @@ from math import cos, hypot, inf, isfinite, nan, pi, radians, sin, sqrt
 from typing import Any
 
 import pytest
+from linkwork.five_bar.plant import Plant as FiveBarPlant
+from linkwork.slider_crank.plant import INPUT_NAMES, Plant, error_scale
 from scipy.integrate import solve_ivp
 
 from linkwork.errors import AssemblyError, InputError, IntegrationError, LinkworkError, ParameterError, StateError
 from linkwork.five_bar.parameters import InitialState as FiveBarInitialState
-from linkwork.five_bar.plant import Plant as FiveBarPlant
 from linkwork.five_bar.published import TABLE_3_1
 from linkwork.limits import LIMIT_SINE
 from linkwork.slider_crank import dynamics
 from linkwork.slider_crank.kinematics import coefficients, position
 from linkwork.slider_crank.parameters import InitialState
-from linkwork.slider_crank.plant import INPUT_NAMES, Plant, error_scale
 from linkwork.slider_crank.published import CRANK_SPEED, OFFSET_CASE, parameters
 from tests.published_rahman import CRANK_IN, GREATEST_SHIFTS_IN, INCH, ROD_IN, SPOTS, Spot
 from tests.slider_cranks import DRIVES, Case, seeded

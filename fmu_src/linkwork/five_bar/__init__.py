@@ -1,1 +1,66 @@
-"""The five-bar slider of Youssef's thesis: parameters, kinematics, dynamics and the stateful plant."""
+"""The five-bar slider of Youssef's thesis: parameters, kinematics, dynamics, published data; `MECHANISM` is all of it."""
+
+from __future__ import annotations
+
+from math import pi
+
+from .. import friction
+from ..mechanism import Channel, Equations, Freedom, Mechanism, Mode
+from . import assembly, dynamics, kinematics, published, variables
+from .parameters import FiveBarParameters, InitialState
+
+MECHANISM = Mechanism(
+    name="five-bar",
+    fmu="FiveBarSlider",
+    title="Five-bar slider",
+    description="Five-bar slider: a four-bar linkage whose rocker pivot is a sprung, damped, controllable slider",
+    notes=(
+        "A four-bar linkage whose rocker-to-ground pivot D is a slider on a straight guide, held by a spring, opposed by "
+        "a damper and by friction, and driven by a control force. Crank angle and slider position are the two freedoms.",
+        "x runs along the ground link from the crank shaft A to the slider's zero, y to its left; angles are "
+        "counter-clockwise from x. Gravity is (-g sin, -g cos) of ground.inclination. A positive torque drives the crank "
+        "counter-clockwise. Pin forces: A of the ground on the crank, B of the crank on the coupler, C of the rocker on "
+        "the coupler, D of the slider on the rocker; slider.guide_force is the guide's force on the slider.",
+        "drive.mode 0: drive.torque acts on the crank. drive.mode 1: over a step the crank turns at drive.speed + "
+        "drive.acceleration (t - t_n), and drive.applied_torque is the torque that takes. Where the commanded speed jumps, "
+        "the slider's generalised momentum is conserved and the slider velocity jumps with it; a slave that is not given "
+        "drive.speed again starts the next step from the same drive.speed.",
+    ),
+    parameters=FiveBarParameters,
+    initial=InitialState,
+    published=published.SETS,
+    freedoms=(
+        Freedom(
+            "crank.angle",
+            "crank.speed",
+            ("crank_angle", "crank_speed"),
+            Mode("drive.mode", ("torque", "speed"), ("torque", "speed")),
+            2.0 * pi,
+        ),
+        Freedom("slider.position", "slider.velocity", ("slider_position", "slider_velocity")),
+    ),
+    channels=(
+        Channel("drive.torque", "torque", freedom=0),
+        Channel("drive.speed", "speed", "command", 0),
+        Channel("drive.acceleration", "acceleration", "rate", 0),
+        Channel("slider.force", "force", freedom=1),
+        Channel("load.fx", "load_x"),
+        Channel("load.fy", "load_y"),
+    ),
+    variables=variables.VARIABLES,
+    position_parameters=variables.POSITION_PARAMETERS,
+    experiment=(0.0, 0.4285714285714286, 1e-3, 1e-9),  # three revolutions at 420 rpm
+    modules=(friction, kinematics, dynamics),
+    equations=Equations(
+        applied=dynamics.applied,
+        derivative=dynamics.derivative,
+        outputs=dynamics.outputs,
+        clearance=dynamics.clearance,
+        jump=dynamics.jump,
+        start=dynamics.started,
+        energy=dynamics.mechanical_energy,
+    ),
+    check_assembly=lambda parameters, x: assembly.check_assembly(parameters, x[0], x[1]),
+    error_scale=lambda parameters, x: assembly.error_scale(parameters, x[2]),
+    where=lambda x: assembly.configuration(x[0], x[1]),
+)

@@ -312,24 +312,16 @@ def jump_speed(x: State, speed: float, p: Constants) -> State:
     return (x[0], x[1], speed, v, x[4], x[5] + work)
 
 
-def jump(x: State, i: Inputs, speed: float, last: float, p: Constants) -> State:
-    """State after the commanded speeds have jumped: that of the crank; the slider has none, ``last`` is of no effect."""
-    return jump_speed(x, speed, p)
+def jump(x: State, i: Inputs, u: tuple[float, ...], p: Constants) -> State:
+    """State after the commanded speed, where it is in force, has jumped to that among the channels ``u``."""
+    return jump_speed(x, (1.0 - i.speed_drive) * x[2] + i.speed_drive * u[1], p)
 
 
-def applied(
-    drive: float,
-    axial: float,
-    torque: float,
-    acceleration: float,
-    force: float,
-    load: float,
-    last: float,
-    rate: float,
-    p: Constants,
-) -> Inputs:
-    """Inputs from the channels of a run: torque, crank acceleration, force, and the load's two components."""
-    return Inputs(drive, (1.0 - drive) * torque, drive * acceleration, force, load, last)
+def applied(modes: tuple[float, ...], u: tuple[float, ...], p: Constants) -> Inputs:
+    """What acts on the plant, from drive.mode and the channels in the order of the FMI inputs."""
+    (drive,) = modes
+    torque, _, acceleration, force, load_x, load_y = u
+    return Inputs(drive, (1.0 - drive) * torque, drive * acceleration, force, load_x, load_y)
 
 
 def started(x: State, i: Inputs, p: Constants) -> State:

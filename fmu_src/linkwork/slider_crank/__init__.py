@@ -1,1 +1,80 @@
-"""The generalised, spatial slider-crank of Rahman's thesis: parameters, kinematics, dynamics and the stateful plant."""
+"""The generalised slider-crank of Rahman's thesis: parameters, kinematics, dynamics, published data; `MECHANISM` is all of it."""
+
+from __future__ import annotations
+
+from math import pi
+
+from .. import friction
+from ..mechanism import Channel, Equations, Freedom, Mechanism, Mode
+from . import assembly, dynamics, kinematics, published, variables, vectors
+from .parameters import InitialState, SliderCrankParameters
+
+MECHANISM = Mechanism(
+    name="slider-crank",
+    fmu="SliderCrank",
+    title="Generalised slider-crank",
+    description=(
+        "Generalised slider-crank: offset and twisted guide, rod on ball joints, crank that turns and shifts axially"
+    ),
+    notes=(
+        "A spatial slider-crank: the crank turns about its axis and shifts along it, a rod between two ball joints moves "
+        "a slider on a straight guide that is offset from the crank axis and twisted against it. Crank angle and axial "
+        "shift are the two freedoms; the rod's spin about its own line is idle and taken as none.",
+        "z runs along the crank axis, x along the common normal of axis and guide, away from the guide where "
+        "guide.offset is positive; the crank points along x at crank.angle 0 and turns about z. The guide passes through "
+        "(-guide.offset, 0, 0); the slider position increases along (0, -sin, -cos) of guide.twist. bearing: all that "
+        "the ground exerts on the crank, moments about the origin; crank_pin: force of the crank on the rod; slider_pin: "
+        "of the slider on the rod; guide: of the guide on the slider. Vectors are in the ground frame.",
+        "drive.mode 0: drive.torque acts on the crank. drive.mode 1: over a step the crank turns at drive.speed + "
+        "drive.acceleration (t - t_n), and drive.applied_torque is the torque that takes. axial.mode 0: axial.force acts "
+        "along the axis. axial.mode 1: over a step the crank shifts at axial.speed + axial.acceleration (t - t_n), from "
+        "initial.shift_position; axial.applied_force is the force that takes. axial.mode 2: a groove in the shaft makes "
+        "the shift groove.amplitude sin(groove.ratio crank.angle). Where a commanded speed jumps, the generalised momentum "
+        "of the other freedom is conserved, if nothing drives that one; a slave that is not given a speed again starts "
+        "the next step from the same one.",
+    ),
+    parameters=SliderCrankParameters,
+    initial=InitialState,
+    published=published.SETS,
+    freedoms=(
+        Freedom(
+            "crank.angle",
+            "crank.speed",
+            ("crank_angle", "crank_speed"),
+            Mode("drive.mode", ("torque", "speed"), ("torque", "speed")),
+            2.0 * pi,
+        ),
+        Freedom(
+            "shift.position",
+            "shift.velocity",
+            ("shift_position", "shift_velocity"),
+            # without any of them the shift is held as it is: commanded at rest
+            Mode("axial.mode", ("force", "speed", "groove"), ("axial_force", "shift_speed", "groove"), default=1),
+        ),
+    ),
+    channels=(
+        Channel("drive.torque", "torque", freedom=0),
+        Channel("drive.speed", "speed", "command", 0),
+        Channel("drive.acceleration", "acceleration", "rate", 0),
+        Channel("axial.force", "axial_force", freedom=1),
+        Channel("axial.speed", "shift_speed", "command", 1),
+        Channel("axial.acceleration", "rate of shift_speed", "rate", 1),
+        Channel("slider.load", "load"),
+    ),
+    variables=variables.VARIABLES,
+    position_parameters=variables.POSITION_PARAMETERS,
+    experiment=(0.0, 2.4, 5e-3, 1e-9),  # two revolutions at 50 rpm
+    modules=(friction, vectors, kinematics, dynamics),
+    equations=Equations(
+        applied=dynamics.applied,
+        derivative=dynamics.derivative,
+        outputs=dynamics.outputs,
+        clearance=dynamics.clearance,
+        jump=dynamics.jump,
+        start=dynamics.started,
+        energy=dynamics.mechanical_energy,
+    ),
+    check_assembly=lambda parameters, x: assembly.check_assembly(parameters, x[0], x[1]),
+    error_scale=lambda parameters, x: assembly.error_scale(parameters, x[2]),
+    where=lambda x: assembly.configuration(x[0], x[1]),
+)

@@ -331,12 +331,13 @@ def mechanical_energy(x: State, p: Constants) -> float:
     return kinetic_energy(inertia(q, coefficients(q, p), p), x[2], x[3]) + potential_energy(q, x[1], p)
 
 
-def jump(x: State, i: Inputs, speed: float, shift_velocity: float, p: Constants) -> State:
+def jump(x: State, i: Inputs, u: tuple[float, ...], p: Constants) -> State:
     """State after the commanded speeds have jumped, of whichever freedoms are driven by them.
 
     A jump is an impulse on the freedom that is driven. The other's generalised momentum has no impulse of its own and is
     conserved; a groove takes the shift along. The work of the impulses is the change of kinetic energy.
     """
+    speed, shift_velocity = u[1], u[4]
     x = grooved(x, i.groove, p)
     th, s1, w, v, dissipated, supplied = x
     q = position(th, s1, p)
@@ -351,21 +352,13 @@ def jump(x: State, i: Inputs, speed: float, shift_velocity: float, p: Constants)
     return (th, s1, w_new, v_new, dissipated, supplied + work)
 
 
-def applied(
-    drive: float,
-    axial: float,
-    torque: float,
-    acceleration: float,
-    force: float,
-    load: float,
-    last: float,
-    rate: float,
-    p: Constants,
-) -> Inputs:
-    """Inputs from the channels of a run: torque, crank acceleration, axial force, slider load, axial speed and its rate.
+def applied(modes: tuple[float, ...], u: tuple[float, ...], p: Constants) -> Inputs:
+    """What acts on the plant, from drive.mode and axial.mode and the channels in the order of the FMI inputs.
 
-    ``axial`` is 0 where the axial force is given, 1 where the axial speed is, 2 where a groove makes the shift.
+    ``axial.mode`` is 0 where the axial force is given, 1 where the axial speed is, 2 where a groove makes the shift.
     """
+    drive, axial = modes
+    torque, _, acceleration, force, _, rate, load = u
     # 1, 0, 0 and 0, 1, 0 and 0, 0, 1 for the three modes
     pushed = 0.5 * (1.0 - axial) * (2.0 - axial)
     shift_drive = axial * (2.0 - axial)

@@ -23,14 +23,11 @@ from linkwork.errors import InputError, LinkworkError
 from linkwork.parameters import fmi_name
 
 from ..mechanisms import InitialState, Parameters, mechanism_of
-from .inputs import Channels, align, encode, given
-from .simulate import (
-    RunInterrupted,
-    held_channels,
-    interruptible,
-    sample_times,
-    shown,
-)
+from .events import RunInterrupted, interruptible, shown
+from .inputs import Inputs
+from .inputs import sample as sample_inputs
+from .prepared import Run
+from .simulation import sample_times, settings_of
 from .trajectory import UNITS, Trajectory
 
 #: Outputs that are angles in (-pi, pi]: they differ by what is left after whole turns.
@@ -66,7 +63,7 @@ class FmuRun:
         if not Path(fmu).is_file():
             raise CosimulationError(f"there is no file {fmu}: build it with 'python build_fmu.py'")
         mechanism = mechanism_of(parameters)
-        self.input_names = mechanism.plant.INPUT_NAMES
+        self.input_names = mechanism.input_names
         self.output_names = mechanism.output_names
         self.messages: list[str] = []
         self._folder: str | None = None
@@ -101,7 +98,9 @@ class FmuRun:
             reals = {fmi_name(name): value for name, value in asdict(parameters).items()}
             reals |= {f"initial.{name}": value for name, value in asdict(initial).items()}
             reals |= {"solver.tolerance": tolerance} | inputs
-            integers = modes | {"assembly.branch": reals.pop("assembly.branch")}
+            integers = modes | {
+                v.name: int(reals.pop(v.name)) for v in mechanism.mechanism_variables.values() if v.kind == "Integer"
+            }
             self._slave.setReal([self._references[name] for name in reals], [float(v) for v in reals.values()])
             self._slave.setInteger([self._references[name] for name in integers], list(integers.values()))
             self._slave.enterInitializationMode()
@@ -156,7 +155,7 @@ class FmuRun:
 def cosimulate(
     fmu: str | Path,
     parameters: Parameters,
-    inputs: Channels | None = None,
+    inputs: Inputs | None = None,
     *,
     initial: InitialState | None = None,
     stop_time: float,
@@ -191,31 +190,31 @@ def cosimulate(
         If the times are not usable, or an input is not a finite number; the sentence names the input and the time.
     """
     begun = clock.perf_counter()
-    mechanism = mechanism_of(parameters)
-    inputs, initial = given(mechanism, inputs, initial)
-    times = sample_times(stop_time, step, start_time)
-    encoded = align(encode(inputs), times)
+    settings = settings_of(sample_times(stop_time, step, start_time), step, tolerance, 1)
+    times = settings.times
+    prepared = Run(parameters, inputs, initial, settings)
+    mechanism, encoded = prepared.mechanism, prepared.encoded
     law = encoded.law.copy()
     rows: list[list[float]] = []
     status, message = 0, ""
 
     def sampled(t: float, ahead: float, x: NDArray[np.float64]) -> dict[str, float]:
-        values = held_channels(encoded, t, ahead, x, law, inputs)
-        return {name: values[number] for name, number in mechanism.channel_of_input.items()}
+        u = sample_inputs(encoded, t, x, law, ahead=ahead)
+        return dict(zip(mechanism.input_names, u.tolist()))
 
-    second = [mechanism.output_names.index(f"{mechanism.second}.{what}") for what in ("position", "velocity")]
+    coordinates = [mechanism.output_names.index(freedom.coordinate) for freedom in mechanism.freedoms]
+    rates = [mechanism.output_names.index(freedom.rate) for freedom in mechanism.freedoms]
 
     def state(row: list[float]) -> NDArray[np.float64]:
-        # crank angle and speed are the first two outputs of every mechanism
-        return np.array([row[0], row[second[0]], row[1], row[second[1]]])
+        return np.array([*(row[n] for n in coordinates), *(row[n] for n in rates), 0.0, 0.0])
 
-    x = np.array(mechanism.state(initial))
+    x = np.array(mechanism.state(prepared.initial))
     first = sampled(times[0], times[1], x)
     run = FmuRun(
         fmu,
         parameters,
-        initial,
-        modes=mechanism.modes(inputs.speed_drive, inputs.axial_mode),
+        prepared.initial,
+        modes=encoded.modes,
         tolerance=tolerance,
         start_time=float(times[0]),
         inputs=first,

@@ -1,0 +1,363 @@
+"""Functions traced with CasADi as machine code in this process, and Numba kernels that call them by address.
+
+A ``casadi.Function`` of symbols is a list of elementary instructions. They are written out as LLVM's and compiled in some
+hundredths of a second: nothing is kept on disk, so that nothing can be out of date. Every function has the one form
+
+    f(t, a, b, c, d, out)        t a float, the others arrays of floats
+
+so that a kernel compiled once, in `kernel`, works with the functions of any mechanism. Kernels are kept on disk, in a folder
+whose name is a hash of all that they are compiled from.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import ctypes.util
+import hashlib
+import os
+import sys
+import tempfile
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from functools import cache
+from pathlib import Path
+from types import CodeType, ModuleType
+from typing import Any
+
+import llvmlite
+import numba
+import numpy as np
+from llvmlite import binding, ir
+from numba import float64, int64, njit, types
+from numba.core import event
+from numba.extending import intrinsic
+from platformdirs import user_cache_dir
+
+from linkwork.errors import LinkworkError
+
+VECTOR = float64[::1]
+MATRIX = float64[:, ::1]
+CUBE = float64[:, :, ::1]
+
+_DOUBLE = ir.DoubleType()
+_ARGUMENTS = [_DOUBLE, *[_DOUBLE.as_pointer()] * 5]
+
+# Machine code of functions
+
+
+class MachineCode:
+    """Machine code of functions, alive as long as the object is.
+
+    Parameters
+    ----------
+    functions : sequence of casadi.Function
+        Of SX, with the inputs (t, a, b, c, d) and dense outputs, which follow one another in ``out``, matrices column by
+        column.
+
+    Attributes
+    ----------
+    addresses : dict of str to int
+        Address of each function by its name.
+    fingerprint : str
+        Hash of the instructions.
+
+    Raises
+    ------
+    LinkworkError
+        If an operation has no counterpart here, or an output is not dense.
+    """
+
+    def __init__(self, functions: Sequence[Any]) -> None:
+        _prepare()
+        module = ir.Module("linkwork")
+        module.triple = binding.get_default_triple()
+        for function in functions:
+            _Writer(module, function).write()
+        text = str(module)
+        self.fingerprint = hashlib.sha256(text.encode()).hexdigest()
+        parsed = binding.parse_assembly(text)
+        machine = binding.Target.from_default_triple().create_target_machine(
+            opt=3,
+            jit=True,
+            cpu=binding.get_host_cpu_name(),
+            features=binding.get_host_cpu_features().flatten(),
+        )
+        passes = binding.create_pass_builder(machine, binding.create_pipeline_tuning_options(speed_level=2))
+        passes.getModulePassManager().run(parsed, passes)
+        self._engine = binding.create_mcjit_compiler(parsed, machine)
+        self._engine.finalize_object()
+        self.addresses = {f.name(): self._engine.get_function_address(f.name()) for f in functions}
+
+
+@cache
+def _prepare() -> None:
+    binding.initialize_native_target()
+    binding.initialize_native_asmprinter()
+    library = ctypes.CDLL("ucrtbase" if sys.platform == "win32" else ctypes.util.find_library("m"))
+    for name in ("sin", "cos", "tanh", "atan2"):
+        binding.add_symbol(name, int(ctypes.cast(getattr(library, name), ctypes.c_void_p).value or 0))
+
+
+class _Writer:
+    """Writes one function of CasADi into a module of LLVM."""
+
+    def __init__(self, module: ir.Module, function: Any) -> None:
+        self.module = module
+        self.source = function
+        target = ir.Function(module, ir.FunctionType(ir.VoidType(), _ARGUMENTS), function.name())
+        for argument in target.args[1:]:
+            argument.add_attribute("noalias")
+        self.arguments = target.args
+        self.build = ir.IRBuilder(target.append_basic_block())
+
+    def write(self) -> None:
+        f, build = self.source, self.build
+        sizes = [f.size1_out(i) * f.size2_out(i) for i in range(f.n_out())]
+        if any(f.nnz_out(i) != size for i, size in enumerate(sizes)):
+            raise LinkworkError(f"{f.name()}: an output has structural zeros; make it dense with casadi.densify")
+        first = np.cumsum([0, *sizes])
+        casadi = _casadi()
+        values: dict[int, Any] = {}
+        for k in range(f.n_instructions()):
+            code, ins, outs = f.instruction_id(k), f.instruction_input(k), f.instruction_output(k)
+            if code == casadi.OP_INPUT:
+                which, place = ins
+                argument = self.arguments[which]
+                values[outs[0]] = argument if which == 0 else build.load(build.gep(argument, [_index(place)]))
+            elif code == casadi.OP_OUTPUT:
+                which, place = outs
+                build.store(values[ins[0]], build.gep(self.arguments[5], [_index(int(first[which]) + place)]))
+            elif code == casadi.OP_CONST:
+                values[outs[0]] = ir.Constant(_DOUBLE, float(f.instruction_constant(k)))
+            else:
+                values[outs[0]] = self._operation(code, [values[i] for i in ins])
+        build.ret_void()
+
+    def _operation(self, code: int, operands: list[Any]) -> Any:
+        casadi, build = _casadi(), self.build
+        plain: dict[int, Callable[..., Any]] = {
+            casadi.OP_ADD: build.fadd,
+            casadi.OP_SUB: build.fsub,
+            casadi.OP_MUL: build.fmul,
+            casadi.OP_DIV: build.fdiv,
+            casadi.OP_NEG: build.fneg,
+            casadi.OP_SQ: lambda a: build.fmul(a, a),
+            casadi.OP_TWICE: lambda a: build.fadd(a, a),
+            casadi.OP_INV: lambda a: build.fdiv(ir.Constant(_DOUBLE, 1.0), a),
+            casadi.OP_ASSIGN: lambda a: a,
+        }
+        called = {
+            casadi.OP_SIN: "sin",
+            casadi.OP_COS: "cos",
+            casadi.OP_TANH: "tanh",
+            casadi.OP_ATAN2: "atan2",
+            casadi.OP_SQRT: "llvm.sqrt.f64",
+            casadi.OP_FABS: "llvm.fabs.f64",
+        }
+        if code in plain:
+            return plain[code](*operands)
+        if code not in called:
+            raise LinkworkError(f"{self.source.name()}: operation {code} of CasADi has no counterpart in machine code")
+        name = called[code]
+        target = self.module.globals.get(name)
+        if target is None:
+            target = ir.Function(self.module, ir.FunctionType(_DOUBLE, [_DOUBLE] * len(operands)), name)
+            target.attributes.add("nounwind")
+        return build.call(target, operands)
+
+
+def _index(place: int) -> Any:
+    return ir.Constant(ir.IntType(32), place)
+
+
+def _casadi() -> Any:
+    from .symbolic import library
+
+    return library()
+
+
+# Calls from kernels
+
+
+@intrinsic
+def evaluate(typing_context, address, t, a, b, c, d, out):  # type: ignore[no-untyped-def]
+    """Call a function of `MachineCode` by its address."""
+
+    def generate(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
+        pointers = [
+            context.make_array(kind)(context, builder, array).data
+            for kind, array in zip(signature.args[2:], arguments[2:])
+        ]
+        kind = ir.FunctionType(ir.VoidType(), _ARGUMENTS).as_pointer()
+        builder.call(builder.inttoptr(arguments[0], kind), [arguments[1], *pointers])
+        return context.get_dummy_value()
+
+    return types.void(int64, float64, a, b, c, d, out), generate
+
+
+@intrinsic
+def call_user(typing_context, address, t, x):  # type: ignore[no-untyped-def]
+    """Value of a user's C function f(t, x) of a float and an array of floats, by its address."""
+
+    def generate(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
+        kind = ir.FunctionType(_DOUBLE, _ARGUMENTS[:2]).as_pointer()
+        data = context.make_array(signature.args[2])(context, builder, arguments[2]).data
+        return builder.call(builder.inttoptr(arguments[0], kind), [arguments[1], data])
+
+    return float64(int64, float64, x), generate
+
+
+# Kernels
+
+# inner functions make no arrays: to count the references to those they are handed would cost more than all they do
+inner = njit(error_model="numpy", _nrt=False)
+
+
+def kernel(*signature: Any, purpose: str) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+    """Decorator: compile a function for its explicit signature when it is first called, and keep the machine code on disk.
+
+    Parameters
+    ----------
+    *signature
+        Numba's.
+    purpose : str
+        What it is for, as the end of "compiling ...", which is said once on standard error when it really is compiled.
+    """
+
+    def decorate(function: Callable[..., Any]) -> Callable[..., Any]:
+        return Kernel(function, signature, purpose)
+
+    return decorate
+
+
+class Kernel:
+    """A function that is compiled, or read from the cache, when it is first called."""
+
+    def __init__(self, function: Any, signature: tuple[Any, ...], purpose: str) -> None:
+        self.py_func = function
+        self.signature = signature
+        self.purpose = purpose
+        self.__doc__ = function.__doc__
+        self.__name__ = function.__name__
+        self._compiled: Any = None
+
+    @property
+    def compiled(self) -> Any:
+        """Numba's dispatcher."""
+        if self._compiled is None:
+            before = numba.config.CACHE_DIR
+            numba.config.CACHE_DIR = str(cache_folder(fingerprint(self.py_func)))
+            try:
+                with _announced(self.purpose):
+                    self._compiled = njit(*self.signature, cache=True, error_model="numpy", nogil=True)(self.py_func)
+            finally:
+                numba.config.CACHE_DIR = before
+        return self._compiled
+
+    def __call__(self, *arguments: Any) -> Any:
+        return (self._compiled or self.compiled)(*arguments)
+
+
+class _Announcer(event.Listener):
+    def __init__(self, purpose: str) -> None:
+        self.purpose: str | None = purpose
+
+    def on_start(self, event: Any) -> None:
+        if self.purpose is not None:
+            print(f"linkwork: compiling {self.purpose}, once on this machine ...", file=sys.stderr, flush=True)
+            self.purpose = None
+
+    def on_end(self, event: Any) -> None:
+        pass
+
+
+@contextmanager
+def _announced(purpose: str) -> Iterator[None]:
+    with event.install_listener("numba:compile", _Announcer(purpose)):
+        yield
+
+
+# The cache of kernels
+
+
+def fingerprint(function: Any) -> str:
+    """Hash of everything that a compiled function is compiled from: its code, and all functions and constants it reads."""
+    digest = hashlib.sha256(f"{numba.__version__} {llvmlite.__version__} {np.__version__}".encode())
+    seen: set[int] = set()
+
+    def add(value: Any) -> None:
+        value = getattr(value, "py_func", value)
+        if isinstance(value, ModuleType):
+            # of foreign libraries the version counts; ours are read by their functions' names
+            digest.update(value.__name__.encode())
+        elif isinstance(value, np.ndarray):
+            digest.update(value.tobytes())
+        elif hasattr(value, "__code__") or hasattr(value, "_defn"):
+            value = getattr(value, "_defn", value)
+            if id(value) in seen:
+                return
+            seen.add(id(value))
+            code = value.__code__
+            add_code(code)
+            for name in sorted(_names(code)):
+                if name in value.__globals__:
+                    digest.update(name.encode())
+                    add(value.__globals__[name])
+            for cell in value.__closure__ or ():
+                add(cell.cell_contents)
+        else:
+            digest.update(repr(value).encode())
+
+    def add_code(code: CodeType) -> None:
+        digest.update(code.co_code)
+        for constant in code.co_consts:
+            if isinstance(constant, CodeType):
+                add_code(constant)
+            else:
+                digest.update(repr(constant).encode())
+        digest.update(" ".join((*code.co_names, *code.co_varnames)).encode())
+
+    add(function)
+    return digest.hexdigest()
+
+
+def _names(code: CodeType) -> set[str]:
+    names = set(code.co_names)
+    for constant in code.co_consts:
+        if isinstance(constant, CodeType):
+            names |= _names(constant)
+    return names
+
+
+def cache_root() -> Path:
+    """Folder of all that is kept: LINKWORK_CACHE_DIR, else the user's cache folder."""
+    return Path(os.environ.get("LINKWORK_CACHE_DIR") or user_cache_dir("linkwork", appauthor=False))
+
+
+def cache_folder(key: str) -> Path:
+    """Folder for what belongs to ``key``, a hash: below `cache_root`, else a temporary folder."""
+    name = f"numba-{key[:16]}"
+    user = os.getuid() if hasattr(os, "getuid") else 0
+    folder = cache_root() / name
+    if _usable(folder):
+        return folder
+    folder = Path(tempfile.gettempdir()) / f"linkwork-{user}" / name
+    # what others can write to could make us run their code
+    if _usable(folder) and (os.name == "nt" or all(_private(f, user) for f in (folder.parent, folder))):
+        return folder
+    return Path(tempfile.mkdtemp(prefix="linkwork-"))
+
+
+def _usable(folder: Path) -> bool:
+    try:
+        for path in (folder.parent, folder):
+            path.mkdir(mode=0o700, parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=folder):
+            return True
+    except OSError:
+        return False
+
+
+def _private(folder: Path, user: int) -> bool:
+    status = folder.lstat()
+    return status.st_uid == user and not status.st_mode & 0o022

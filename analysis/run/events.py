@@ -1,0 +1,118 @@
+"""Events: what to look out for in a run, and how a run that is interrupted tells what it has."""
+
+from __future__ import annotations
+
+import signal
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from math import isfinite
+
+from linkwork.errors import InputError, Interrupted
+from linkwork.mechanism import Mechanism
+
+from ..mechanisms import output_units
+from .signals import StateFunction
+from .trajectory import Trajectory
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Event:
+    """Something to look out for in a run: an output that crosses a level, or a function that crosses zero.
+
+    Parameters
+    ----------
+    name : str
+        Name under which it is reported.
+    output : str, optional
+        An output of the FMI contract.
+    level : float
+        Level of the output, in its SI unit.
+    function : callable, optional
+        Instead of an output: a function of time, all coordinates and all their rates, floats, compiled with Numba.
+    direction : int
+        +1 for rising, -1 for falling, 0 for both.
+    stop : bool
+        Whether the run ends there.
+
+    Notes
+    -----
+    A value that jumps across the level because an input jumps counts as crossing it, at the time of the jump; one that
+    starts on the level does not. What happens more than once within a quarter of an integrator's step may be missed.
+    """
+
+    name: str
+    output: str | None = None
+    level: float = 0.0
+    function: StateFunction | None = None
+    direction: int = 0
+    stop: bool = False
+
+    def __post_init__(self) -> None:
+        if (self.output is None) == (self.function is None):
+            raise InputError(f"event {self.name!r} needs either an output or a function")
+        if self.output is not None and self.output not in output_units():
+            raise self._no_output(tuple(output_units()))
+        if self.function is not None and not callable(self.function):
+            raise InputError(f"event {self.name!r} has the function {self.function!r}: it must be callable")
+        if self.direction not in (-1, 0, 1):
+            raise InputError(f"event {self.name!r} has direction {self.direction}: it must be -1, 0 or +1")
+        if not isfinite(self.level):
+            raise InputError(f"event {self.name!r} has level {self.level}: it must be a finite number")
+
+    def column(self, mechanism: Mechanism) -> int:
+        """Number of the output among those of a mechanism.
+
+        Raises
+        ------
+        InputError
+            If the mechanism has no such output.
+        """
+        if self.output not in mechanism.output_names:
+            raise self._no_output(mechanism.output_names)
+        return mechanism.output_names.index(self.output)
+
+    def _no_output(self, names: tuple[str, ...]) -> InputError:
+        return InputError(f"event {self.name!r} is on {self.output!r}: the outputs are {', '.join(names)}")
+
+
+class RunInterrupted(Interrupted):
+    """A run was interrupted from the keyboard; ``trajectory`` holds what it had computed."""
+
+    def __init__(self, trajectory: Trajectory) -> None:
+        self.trajectory = trajectory
+        super().__init__(f"interrupted at t = {trajectory.time[-1]:.6g} s" if len(trajectory) else "interrupted")
+
+
+@contextmanager
+def interruptible() -> Iterator[list[bool]]:
+    """Hear Ctrl-C as an entry in a list, to be looked at between two steps or calls.
+
+    An exception would strike wherever it finds the interpreter: inside an FMU, whose interpreter this is, or inside Numba,
+    which may drop it.
+    """
+    heard: list[bool] = []
+    if threading.current_thread() is not threading.main_thread():
+        yield heard
+        return
+    before = signal.getsignal(signal.SIGINT)
+    signal.signal(signal.SIGINT, lambda *_: heard.append(True))
+    try:
+        yield heard
+    finally:
+        # None stands for a handler that was not set from Python
+        signal.signal(signal.SIGINT, signal.SIG_DFL if before is None else before)
+
+
+@contextmanager
+def shown(progress: bool, duration: float, what: str = "simulate") -> Iterator[Callable[[float], None]]:
+    """A progress bar over the time of a run, as a function of the time done; nothing at all where it is not wanted."""
+    if not progress:
+        yield lambda done: None
+        return
+    from rich.progress import Progress
+
+    with Progress(transient=True) as bar:
+        task = bar.add_task(what, total=duration)
+        yield lambda done: bar.update(task, completed=done)

@@ -1,0 +1,287 @@
+"""Runs by SciPy's ODE methods, and by others of its kind: independent of the compiled solver."""
+
+from __future__ import annotations
+
+import time as clock
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.integrate import OdeSolver, solve_ivp
+
+from linkwork.limits import LIMIT_SINE, NEAR_LIMIT
+
+from . import compiled as k
+from .events import Event, RunInterrupted, shown
+from .inputs import NotFiniteError, sample
+from .prepared import Run
+from .trajectory import Occurrence, Trajectory
+
+#: Evaluations of inputs that are not finite after which one of SciPy's methods is stopped.
+MOST_LOSSES = 300
+
+
+def solve(run: Run, method: str | type[OdeSolver], options: dict[str, Any], progress: bool) -> Trajectory:
+    """The same run by `solve_ivp`, interval by interval of smooth inputs."""
+    begun = clock.perf_counter()
+    march = March(run)
+    interrupted = False
+    with shown(progress, run.settings.times[-1] - run.settings.times[0]) as show:
+        try:
+            march.run(method, options, show if progress else None)
+        except KeyboardInterrupt:
+            interrupted = True
+    names = run.mechanism.output_names
+    rows = march.rows
+    if rows and rows[-1][0] < march.t:
+        rows = [*rows, (march.t, march.x, march.held)]
+    values = [run.mechanism.equations.outputs(tuple(x), held, march.energy, run.p) for _, x, held in rows]
+    code, message = run.verdict(march.status, march.t, march.x)
+    trajectory = Trajectory(
+        time=np.array([t for t, _, _ in rows]),
+        values=np.array(values).reshape(-1, len(names)),
+        names=names,
+        status=code,
+        message=message,
+        events=tuple(sorted(march.occurrences, key=lambda o: o.time)),
+        source=method if isinstance(method, str) else method.__name__,
+        statistics={"evaluations": float(march.evaluations), "seconds": clock.perf_counter() - begun},
+    )
+    if interrupted:
+        raise RunInterrupted(trajectory)
+    return trajectory
+
+
+class March:
+    """A run by `solve_ivp`: the loop of `compiled.run` over the intervals of smooth inputs, in Python.
+
+    It shares the equations and the sampling of the inputs with the compiled code, and neither integrator nor root finder.
+    """
+
+    def __init__(self, run: Run) -> None:
+        self.of = run
+        self.equations = run.mechanism.equations
+        self.settings = run.settings
+        start = run.start()
+        self.x, self.energy, self.scale = start.x, start.energy, start.scale
+        self.law = run.encoded.law.copy()
+        #: component of the state that a torsion bar acts by
+        self.angle = int(run.encoded.law_places[1])
+        self.t = float(run.settings.times[0])
+        #: what acts on the plant
+        self.held: Any = None
+        self.rows: list[tuple[float, NDArray[np.float64], Any]] = []
+        self.occurrences: list[Occurrence] = []
+        self.evaluations = 0
+        self.status = k.RUNNING
+        #: the input that was not finite inside a step, which is then tried again shorter, how often, and what went well
+        self._lost: int | None = None
+        self._losses = 0
+        self._good = self.t, self.x
+        #: value of each event at the end of the interval before; zero where it happened just there
+        self._gaps: list[float] | None = None
+
+    def _end_of_interval(self, interval: int) -> float:
+        times, breaks = self.settings.times, self.of.encoded.breaks[1:-1]
+        if self.settings.hold:
+            return float(times[interval + 1] if interval + 1 < len(times) else times[-1])
+        later = breaks[(breaks > self.t) & (breaks < times[-1])]
+        return float(later[0] if len(later) else times[-1])
+
+    def _sample(self, stop: float) -> NDArray[np.float64]:
+        """Sample the inputs at the beginning of an interval."""
+        e, t, end = self.of.encoded, self.t, self.settings.times[-1]
+        if self.settings.hold:
+            ahead = stop if t < end else t + self.settings.hold
+            u = sample(e, t, self.x, self.law, ahead=ahead)
+        else:
+            u = sample(e, t, self.x, self.law)
+        self.held = self.of.applied(u)
+        return u
+
+    def run(self, method: str | type[OdeSolver], options: dict[str, Any], show: Callable[[float], None] | None) -> None:
+        """March to the end, a stopping event, or where it goes no further."""
+        times, end = self.settings.times, self.settings.times[-1]
+        interval = 0
+        while True:
+            stop = self._end_of_interval(interval)
+            if self.law[2] and self.x[self.angle] >= self.law[1]:
+                self.law[2] = 0.0
+            u = self._sample(stop)
+            if len(self.of.encoded.commands) and self._gaps is not None:
+                self.x = np.array(self.equations.jump(tuple(self.x), self.held, tuple(u), self.of.p))
+            if len(self.rows) < len(times) and times[len(self.rows)] <= self.t:
+                self.rows.append((self.t, self.x, self.held))
+            self._notice_jumps()
+            if self.t >= end:
+                self.status = k.FINISHED
+            if self.status != k.RUNNING:
+                return
+            reached = self._interval(stop, method, options, show)
+            if self.status != k.RUNNING:
+                return
+            interval += reached
+
+    def _notice_jumps(self) -> None:
+        """Events that happen because the inputs jump."""
+        gaps = [self._gap(event, self.t, self.x, self.held) for event in self.of.events]
+        if self._gaps is not None:
+            # a zero marks an event that was just reported: wait until the value leaves zero
+            gaps = [before and gap for before, gap in zip(self._gaps, gaps)]
+        for event, before, after in zip(self.of.events, self._gaps or gaps, gaps):
+            up = before < 0.0 <= after and event.direction >= 0
+            down = before > 0.0 >= after and event.direction <= 0
+            if up or down:
+                self.occurrences.append(Occurrence(event.name, self.t, tuple(self.x[:-2].tolist())))
+                if event.stop:
+                    self.status = k.EVENT
+        self._gaps = gaps
+
+    def _gap(self, event: Event, t: float, x: NDArray[np.float64], held: Any) -> float:
+        if event.function is not None:
+            return float(event.function(t, *x[:-2].tolist()))
+        column = event.column(self.of.mechanism)
+        return float(self.equations.outputs(tuple(x), held, self.energy, self.of.p)[column] - event.level)
+
+    def _inputs(self, t: float, x: NDArray[np.float64], stop: float) -> Any:
+        if self.settings.hold or (self.of.encoded.steady and not self.law[2]):
+            return self.held
+        return self.of.applied(sample(self.of.encoded, t, x, self.law, left=t >= stop))
+
+    def _derivative(self, t: float, x: NDArray[np.float64], stop: float) -> NDArray[np.float64]:
+        # where there is no configuration or no input, so large a derivative has the step tried again shorter
+        nothing = np.full(len(x), 1e200)
+        try:
+            held = self._inputs(t, x, stop)
+        except NotFiniteError as error:
+            self._lost = error.number
+            self._losses += 1
+            if self._losses > MOST_LOSSES:
+                # LSODA would go on for ever
+                raise NotFiniteError(self.of.encoded, error.number, *self._good) from None
+            return nothing
+        try:
+            result = np.array(self.equations.derivative(tuple(x), held, self.of.p))
+        except (ArithmeticError, ValueError):
+            return nothing
+        # a trial of a step too long may be anywhere
+        if t > self._good[0] and np.abs(x).max() < 1e100:
+            self._good = t, x.copy()
+        return result
+
+    def _interval(
+        self, stop: float, method: str | type[OdeSolver], options: dict[str, Any], show: Callable[[float], None] | None
+    ) -> bool:
+        """Integrate up to ``stop``; whether it was reached."""
+        t0, x0 = self.t, self.x
+        times = self.settings.times
+        watched = self._watched(stop)
+        self._lost, self._losses, self._good = None, 0, (t0, x0)
+
+        def right_side(t: float, x: NDArray[np.float64]) -> NDArray[np.float64]:
+            if show is not None:
+                show(t - times[0])
+            return self._derivative(t, x, stop)
+
+        inner = times[(times > t0) & (times < stop)]
+        with np.errstate(over="ignore", invalid="ignore"):
+            solution = solve_ivp(
+                right_side,
+                (t0, stop),
+                x0,
+                method=method,
+                t_eval=np.append(inner, stop),
+                events=[function for _, function in watched],
+                rtol=max(self.settings.tolerance, 3e-14),
+                atol=self.settings.tolerance * self.scale,
+                **options,
+            )
+        self.evaluations += int(solution.nfev)
+        # in the order of `watched`: of what happens at one time, the limit and the release come first
+        happened = sorted(
+            (
+                (float(t), what, x)
+                for (what, _), ts, xs in zip(watched, solution.t_events, solution.y_events)
+                for t, x in zip(ts, xs)
+            ),
+            key=lambda item: item[0],
+        )
+        for t, event, x in happened:
+            if isinstance(event, Event):
+                self.occurrences.append(Occurrence(event.name, t, tuple(x[:-2].tolist())))
+        # SciPy gives empty lists where an event comes before the first of the times
+        for t, x in zip(solution.t, np.ascontiguousarray(np.asarray(solution.y).T)):
+            if t < stop:
+                self.rows.append((float(t), x, self._inputs(t, x, stop)))
+        what: str | Event = ""
+        if solution.status == 1:
+            t_cut = happened[-1][0]
+            _, what, self.x = next(item for item in happened if item[0] == t_cut and self._ends(item[1]))
+            self.t, self.x = t_cut, self.x.copy()
+            if what == "release":
+                self.x[self.angle] = self.law[1]
+            else:
+                self.status = k.LIMIT if what == "limit" else k.EVENT
+        elif solution.status == 0:
+            self.t, self.x = stop, solution.y[:, -1].copy()
+        else:
+            if self.rows[-1][0] > t0:
+                self.t, self.x = self.rows[-1][:2]
+            if self._lost is not None:
+                raise NotFiniteError(self.of.encoded, self._lost, *self._good)
+            clearance = self.equations.clearance(tuple(self.x), self.held, self.of.p)
+            self.status = k.LIMIT if abs(clearance) < NEAR_LIMIT else k.NO_STEP
+        self.held = self._inputs(self.t, self.x, stop)
+        # what happens together with the release or the end of the interval must neither be lost nor be reported twice: what
+        # has not been reported by now is left to the beginning of the next one
+        same = k.SAME * (self.t - t0)
+        just_now = [event for t, event, _ in happened if t >= self.t - same]
+        before = self.x - same * self._derivative(self.t, self.x, stop)
+        self._gaps = [
+            0.0 if event in just_now else self._gap(event, self.t - same, before, self.held) for event in self.of.events
+        ]
+        if what == "release":
+            self.law[2] = 0.0
+        return bool(solution.status == 0)
+
+    @staticmethod
+    def _ends(what: str | Event) -> bool:
+        return isinstance(what, str) or what.stop
+
+    def _watched(self, stop: float) -> list[tuple[str | Event, Callable[[float, NDArray[np.float64]], float]]]:
+        """Event functions for `solve_ivp`: the limit of assembly, the torsion bar's release, the user's."""
+
+        def limit(t: float, x: NDArray[np.float64]) -> float:
+            try:
+                return float(self.equations.clearance(tuple(x), self.held, self.of.p) - LIMIT_SINE)
+            except (ArithmeticError, ValueError):
+                return -1.0
+
+        def release(t: float, x: NDArray[np.float64]) -> float:
+            return float(x[self.angle] - self.law[1])
+
+        watched: list[tuple[str | Event, Any]] = [("limit", limit)]
+        if self.law[2] and not self.settings.hold:
+            watched.append(("release", release))
+        for _, function in watched:
+            function.terminal = True
+        release.direction = 1  # type: ignore[attr-defined]
+
+        t0, x0 = self.t, self.x
+        # SciPy reports an event that starts at zero: such a one is given the sign of what follows
+        x1 = x0 + 1e-6 * (stop - t0) * self._derivative(t0, x0, stop)
+
+        def of(event: Event, start: float) -> Callable[[float, NDArray[np.float64]], float]:
+            def value(t: float, x: NDArray[np.float64]) -> float:
+                if t == t0:
+                    gap = start or self._gap(event, t0 + 1e-6 * (stop - t0), x1, self._inputs(t0, x1, stop))
+                else:
+                    gap = self._gap(event, t, x, self._inputs(t, x, stop))
+                return gap or 1e-300
+
+            value.terminal = event.stop  # type: ignore[attr-defined]
+            value.direction = event.direction  # type: ignore[attr-defined]
+            return value
+
+        return watched + [(event, of(event, start)) for event, start in zip(self.of.events, self._gaps or [])]

@@ -1,0 +1,236 @@
+"""A run, prepared: what all ways of solving it share, and its solution by the compiled solver."""
+
+from __future__ import annotations
+
+import time as clock
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from linkwork.mechanism import Mechanism
+
+from ..mechanisms import InitialState, Parameters, mechanism_of
+from .equations import OUTPUTS, machine
+from .events import Event, RunInterrupted, interruptible, shown
+from .inputs import Encoded, Inputs, NotFiniteError, align, compile_function, compiled_source, encode, given, sample
+from .trajectory import Occurrence, Trajectory
+
+#: Steps of one compiled call, between which progress is shown and an interrupt is heard: about a tenth of a second.
+STEPS_PER_CALL = 50_000
+#: Events of one kind that one compiled call can report before it hands them over.
+EVENTS_PER_CALL = 1_000
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Settings:
+    """How a run is solved: times of its samples (s), hold (s, 0 for none), tolerance, steps at most."""
+
+    times: NDArray[np.float64]
+    hold: float
+    tolerance: float
+    max_steps: int
+
+
+@dataclass(frozen=True, slots=True)
+class Start:
+    """Where a run starts: state, mechanical energy (J), error scale."""
+
+    x: NDArray[np.float64]
+    energy: float
+    scale: NDArray[np.float64]
+
+
+@dataclass(slots=True)
+class Run:
+    """One run, prepared.
+
+    Raises
+    ------
+    InputError
+        If inputs or state at the start are another mechanism's.
+    """
+
+    parameters: Parameters
+    inputs: Inputs | None
+    initial: InitialState | None
+    settings: Settings
+    events: tuple[Event, ...] = ()
+    mechanism: Mechanism = field(init=False)
+    encoded: Encoded = field(init=False)
+    p: Any = field(init=False)
+    modes: tuple[float, ...] = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.mechanism = mechanism_of(self.parameters)
+        self.inputs, self.initial = given(self.mechanism, self.inputs, self.initial)
+        self.encoded = align(encode(self.inputs, self.mechanism), self.settings.times)
+        self.p = self.parameters.constants()
+        self.modes = tuple(float(value) for value in self.encoded.modes.values())
+
+    def start(self) -> Start:
+        """State, energy and scale at the start.
+
+        Raises
+        ------
+        AssemblyError
+            If the links cannot be joined there.
+        InputError
+            If an input is not a finite number.
+        """
+        x = np.array(self.mechanism.state(self.initial))
+        u = sample(self.encoded, float(self.settings.times[0]), x, self.encoded.law)
+        for channel, place, _ in self.encoded.commands:
+            x[place] = u[channel]
+        state = self.mechanism.equations.start(tuple(x.tolist()), self.applied(u), self.p)
+        self.mechanism.check_assembly(self.parameters, state)
+        scale = np.array(self.mechanism.error_scale(self.parameters, state))
+        return Start(np.array(state), self.mechanism.equations.energy(state, self.p), scale)
+
+    def applied(self, u: NDArray[np.float64]) -> Any:
+        """What acts on the plant, as the equations take it."""
+        return self.mechanism.equations.applied(self.modes, tuple(u.tolist()), self.p)
+
+    def problem(self, start: Start) -> Any:
+        """What does not change in the run, as the compiled code reads it."""
+        from .compiled import Problem
+
+        return Problem(
+            machine(self.mechanism).addresses,
+            np.array(self.modes),
+            np.array([*self.p, start.energy]),
+            start.scale,
+            self.encoded.commands,
+            self.settings.tolerance,
+            self.settings.hold,
+            float(self.settings.times[-1]),
+            self.encoded.steady,
+        )
+
+    def verdict(self, status: int, t: float, x: NDArray[np.float64]) -> tuple[int, str]:
+        """solver.status and solver.message of a run that ended with a status of the compiled code."""
+        from . import compiled as k
+
+        where = self.mechanism.where(x)
+        if status == k.LIMIT:
+            return 3, f"limit of assembly at t = {t:.9g} s, {where}"
+        if status == k.NO_STEP:
+            return 4, f"the step size fell below what t = {t:.9g} s can resolve, {where}"
+        if status == k.RUNNING:
+            return 4, f"{self.settings.max_steps} steps did not suffice: stopped at t = {t:.9g} s, {where}"
+        return 0, ""
+
+    def lost(self, channel: int, t: float, x: NDArray[np.float64]) -> NotFiniteError:
+        """The error of an input that is not finite, by the number of its channel."""
+        if self.settings.hold:
+            # where inputs are held, a rate is the secant of a command
+            channel = next((int(value) for value, _, rate in self.encoded.commands if rate == channel), channel)
+        return NotFiniteError(self.encoded, channel, t, x)
+
+    def compiled(self, progress: bool) -> Trajectory:
+        """Solve it with the compiled solver."""
+        from . import compiled as k
+
+        begun = clock.perf_counter()
+        start = self.start()
+        problem = self.problem(start)
+        source, kept = compiled_source(self.encoded)
+        watch, watching = self._watch()
+        kept += watching
+        times, size = self.settings.times, self.mechanism.size
+        inputs = len(self.mechanism.channels)
+        states, forces = np.full((len(times), size), np.nan), np.full((len(times), inputs), np.nan)
+        held, x = np.zeros(inputs), start.x.copy()
+        carries = np.zeros(1, dtype=k.CARRY)
+        carries["begin"] = times[0]
+        carry = carries[0]
+        status, integrating, most = k.RUNNING, 0.0, self.settings.max_steps
+        occurrences: list[list[float]] = []
+        with interruptible() as interrupted, shown(progress, times[-1] - times[0]) as show:
+            try:
+                while status == k.RUNNING and carry["steps"] < most and not interrupted:
+                    entered = clock.perf_counter()
+                    until = min(int(carry["steps"]) + STEPS_PER_CALL, most)
+                    status = k.run(
+                        problem, source, watch, held, carries, x, times, states, forces,
+                        len(self.mechanism.output_names), until,
+                    )  # fmt: skip
+                    integrating += clock.perf_counter() - entered
+                    occurrences += watch.found[: carry["found"]].tolist()
+                    carry["found"] = 0
+                    show(carry["begin"] + carry["elapsed"] - times[0])
+            except KeyboardInterrupt:  # of one who raises it himself
+                interrupted.append(True)
+        t = float(carry["begin"] + carry["elapsed"])
+        if status == k.BAD_INPUT:
+            raise self.lost(int(carry["lost"]), t, x)
+        done = int(carry["sample"])
+        times, states, forces = times[:done], states[:done], forces[:done]
+        if carry["started"] and times[-1] < t:
+            # the run ended between two samples: its last configuration is recorded too
+            times, states, forces = np.append(times, t), np.vstack([states, x]), np.vstack([forces, held])
+        code, message = self.verdict(status, t, x)
+        trajectory = Trajectory(
+            time=times,
+            values=outputs_of(self.mechanism, problem.modes, problem.p, states, forces),
+            status=code,
+            message=message,
+            events=tuple(
+                Occurrence(self.events[int(row[0])].name, row[1], tuple(row[2:-2]))
+                for row in sorted(occurrences, key=lambda row: row[1])
+            ),
+            source="compiled DOP853",
+            names=self.mechanism.output_names,
+            statistics={
+                "steps": float(carry["steps"] - carry["rejected"]),
+                "rejected": float(carry["rejected"]),
+                "evaluations": float(carry["evaluations"]),
+                "seconds_integrating": integrating,
+                "seconds": clock.perf_counter() - begun,
+            },
+        )
+        if interrupted:
+            raise RunInterrupted(trajectory)
+        return trajectory
+
+    def _watch(self) -> tuple[Any, list[Any]]:
+        """The events as the compiled code reads them, and what has to stay alive meanwhile."""
+        from .compiled import Watch
+
+        n = len(self.events)
+        table, addresses, kept = np.zeros((n, 4)), np.zeros(n, dtype=np.int64), []
+        for i, event in enumerate(self.events):
+            table[i] = 0.0, event.level, event.direction, event.stop
+            if event.function is None:
+                table[i, 0] = event.column(self.mechanism)
+            else:
+                kept.append(compile_function(event.function, len(self.mechanism.freedoms)))
+                addresses[i] = kept[-1].address
+        return Watch(table, addresses, np.zeros(n), np.empty((EVENTS_PER_CALL * n, 2 + self.mechanism.size))), kept
+
+
+def outputs_of(
+    mechanism: Mechanism,
+    modes: NDArray[np.float64],
+    p: NDArray[np.float64],
+    states: NDArray[np.float64],
+    inputs: NDArray[np.float64],
+) -> NDArray[np.float64]:
+    """All real outputs of a mechanism, shape (n, outputs), at rows of states and inputs.
+
+    Parameters
+    ----------
+    modes : ndarray
+        Values of the modes.
+    p : ndarray
+        Constants, and after them the mechanical energy at the start (J).
+    states, inputs : ndarray, shapes (n, states) and (n, channels)
+    """
+    from . import compiled as k
+
+    values = np.empty((len(states), len(mechanism.output_names)))
+    k.rows(
+        machine(mechanism).addresses[OUTPUTS], modes, p, np.ascontiguousarray(states), np.ascontiguousarray(inputs), values
+    )  # fmt: skip
+    return values

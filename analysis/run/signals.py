@@ -1,0 +1,192 @@
+"""Signals: what an input of a run can be as a function of time, and torques that depend on the crank."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from linkwork.errors import InputError
+
+#: A function of time, all coordinates and all their rates, floats.
+StateFunction = Callable[..., float]
+
+
+@dataclass(frozen=True, slots=True)
+class Piecewise:
+    """A signal that is a polynomial of degree three at most between its breaks.
+
+    Parameters
+    ----------
+    breaks : ndarray, shape (n + 1,)
+        Times (s), increasing. Before the first and after the last the outer polynomials go on.
+    coefficients : ndarray, shape (n, 4)
+        Of the powers 0 to 3 of the time since the break on the left.
+
+    Notes
+    -----
+    A jump belongs to the piece on its right: the value at a break is the limit from the right.
+    """
+
+    breaks: NDArray[np.float64]
+    coefficients: NDArray[np.float64]
+
+    def __post_init__(self) -> None:
+        for name in ("breaks", "coefficients"):
+            object.__setattr__(self, name, np.array(getattr(self, name), dtype=float))
+        if self.breaks.ndim != 1 or len(self.breaks) < 2:
+            raise InputError(
+                f"a signal needs at least two breaks in one dimension, not an array of {self.breaks.shape}"
+            )
+        if self.coefficients.shape != (len(self.breaks) - 1, 4):
+            raise InputError(
+                f"a signal with {len(self.breaks)} breaks needs coefficients of shape ({len(self.breaks) - 1}, 4), "
+                f"not {self.coefficients.shape}"
+            )
+        if not (np.all(np.isfinite(self.breaks)) and np.all(np.isfinite(self.coefficients))):
+            raise InputError("a signal's breaks and coefficients must be finite numbers")
+        if np.any(np.diff(self.breaks) <= 0.0):
+            raise InputError(f"a signal's times must increase: they are {self.breaks}")
+
+
+@dataclass(frozen=True, slots=True)
+class Harmonics:
+    """mean + sum of amplitude cos(frequency t + phase); frequencies in rad/s, phases in rad, shapes (n,)."""
+
+    mean: float = 0.0
+    amplitudes: Sequence[float] = ()
+    frequencies: Sequence[float] = ()
+    phases: Sequence[float] = ()
+
+    def __post_init__(self) -> None:
+        if any(np.ndim(values) != 1 for values in (self.amplitudes, self.frequencies, self.phases)):
+            raise InputError("amplitudes, frequencies and phases of harmonics must be lists of numbers")
+        if not len(self.amplitudes) == len(self.frequencies) == len(self.phases):
+            raise InputError("harmonics need as many amplitudes as frequencies and phases")
+        if not np.all(np.isfinite([self.mean, *self.amplitudes, *self.frequencies, *self.phases])):
+            raise InputError("harmonics must be finite numbers")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TorsionBar:
+    """Torque of a wound-up bar: torque (1 - angle / release_angle) until the crank reaches release_angle, then none.
+
+    The thesis's launch (section 3.2.2): torque T0 in N.m, released at 1 rad. The switch is located exactly.
+    """
+
+    torque: float
+    release_angle: float = 1.0
+
+    def __post_init__(self) -> None:
+        if not np.isfinite(self.torque):
+            raise InputError(f"torque of the torsion bar is {self.torque}: it must be a finite number of N.m")
+        if not (np.isfinite(self.release_angle) and self.release_angle > 0.0):
+            raise InputError(f"release angle of the torsion bar is {self.release_angle}: it must be above 0 rad")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class InductionMotor:
+    """Torque of an induction motor by Kloss's formula, 2 Tb / (s / sb + sb / s) at the slip s = 1 - speed / synchronous_speed.
+
+    Parameters
+    ----------
+    breakdown_torque : float
+        Greatest torque Tb (N.m).
+    breakdown_slip : float
+        Slip sb at which it is reached.
+    synchronous_speed : float
+        Speed of the field (rad/s).
+    """
+
+    breakdown_torque: float
+    breakdown_slip: float
+    synchronous_speed: float
+
+    def __post_init__(self) -> None:
+        if not np.isfinite(self.breakdown_torque):
+            raise InputError(f"breakdown torque is {self.breakdown_torque}: it must be a finite number of N.m")
+        if not (np.isfinite(self.breakdown_slip) and self.breakdown_slip > 0.0):
+            raise InputError(f"breakdown slip is {self.breakdown_slip}: it must be above 0")
+        if not (np.isfinite(self.synchronous_speed) and self.synchronous_speed != 0.0):
+            raise InputError(f"synchronous speed is {self.synchronous_speed}: it must be finite and not 0 rad/s")
+
+
+@dataclass(frozen=True, slots=True)
+class Function:
+    """Any channel as a Python function of time, of all coordinates of the mechanism and of all their rates, all floats.
+
+    Of a five-bar they are t, crank angle, slider position u, and their rates; of a slider-crank the second coordinate is the
+    axial shift S1. It is compiled with Numba where it can be, else the run needs one of SciPy's methods. As a speed it must depend on
+    ``t`` alone and needs its ``rate``, the acceleration. ``breaks`` are times (s) where it is not smooth.
+    """
+
+    function: StateFunction
+    rate: StateFunction | None = None
+    breaks: Sequence[float] = ()
+
+    def __post_init__(self) -> None:
+        for name, value in (("function", self.function), ("rate", self.rate)):
+            if not callable(value) and not (name == "rate" and value is None):
+                raise InputError(
+                    f"{name} of an input is {value!r}: it must be a function of t, the coordinates and their rates"
+                )
+        if not np.all(np.isfinite(self.breaks)):
+            raise InputError(f"the breaks of a function must be finite times, not {self.breaks}")
+
+
+Signal = float | Piecewise | Harmonics | Function
+Torque = Signal | TorsionBar | InductionMotor
+
+
+def ramp(start: float, end: float, from_time: float, to_time: float) -> Piecewise:
+    """A signal that goes from ``start`` to ``end`` along a straight line between two times (s)."""
+    if not to_time > from_time:
+        raise InputError(f"a ramp from {from_time} s to {to_time} s: it must end after it begins")
+    return table([from_time - 1.0, from_time, to_time, to_time + 1.0], [start, start, end, end])
+
+
+def steps(times: ArrayLike, values: ArrayLike) -> Piecewise:
+    """A signal with the value ``values[i]`` from ``times[i]`` on; shapes (n,) and (n,)."""
+    t, y = _points(times, values, least=1)
+    breaks = np.append(t, t[-1] + 1.0)
+    coefficients = np.zeros((len(t), 4))
+    coefficients[:, 0] = y
+    return Piecewise(breaks, coefficients)
+
+
+def table(times: ArrayLike, values: ArrayLike, kind: str = "linear") -> Piecewise:
+    """A signal through the points (times, values), shapes (n,): ``linear``, ``cubic`` (spline) or ``hold``.
+
+    Outside the table the first and the last value hold.
+    """
+    if kind == "hold":
+        return steps(times, values)
+    t, y = _points(times, values, least=2)
+    if kind == "linear":
+        slopes = np.diff(y) / np.diff(t)
+        inner = np.column_stack([y[:-1], slopes, np.zeros_like(slopes), np.zeros_like(slopes)])
+    elif kind == "cubic":
+        from scipy.interpolate import CubicSpline
+
+        inner = CubicSpline(t, y).c[::-1].T
+    else:
+        raise InputError(f"kind of table is {kind!r}: it must be 'linear', 'cubic' or 'hold'")
+    flat = np.zeros((1, 4))
+    flat[0, 0] = y[0]
+    end = np.zeros((1, 4))
+    end[0, 0] = y[-1]
+    return Piecewise(np.concatenate([[t[0] - 1.0], t, [t[-1] + 1.0]]), np.vstack([flat, inner, end]))
+
+
+def _points(times: ArrayLike, values: ArrayLike, least: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    t = np.asarray(times, dtype=float)
+    y = np.asarray(values, dtype=float)
+    if t.ndim != 1 or t.shape != y.shape:
+        raise InputError(f"a table needs as many times as values in one dimension each, not {t.shape} and {y.shape}")
+    if len(t) < least:
+        raise InputError(f"a table needs at least {least} points, not {len(t)}")
+    if np.any(np.diff(t) <= 0.0):
+        raise InputError(f"a table's times must increase: they are {t}")
+    return t, y

@@ -1,0 +1,242 @@
+"""What a mechanism is to everything that uses it: one object, `Mechanism`, that each mechanism's folder exports."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from importlib import import_module
+from types import ModuleType
+from typing import Any, NamedTuple
+
+from .variables import Variable
+
+State = tuple[float, ...]
+
+
+class Mode(NamedTuple):
+    """A way of driving a freedom: the parameter that chooses it.
+
+    Attributes
+    ----------
+    name : str
+        Of the FMI parameter.
+    values : tuple of str
+        Its values 0, 1, ... in words.
+    arguments : tuple of str
+        What chooses each value where the inputs of a run are given: the channel of that argument, or a flag of that name.
+    default : int
+        Value where none of them is given.
+    """
+
+    name: str
+    values: tuple[str, ...]
+    arguments: tuple[str, ...]
+    default: int = 0
+
+
+class Freedom(NamedTuple):
+    """A degree of freedom.
+
+    Attributes
+    ----------
+    coordinate, rate : str
+        FMI outputs that are the coordinate and its rate.
+    initial : (str, str)
+        Fields of the state at the start that give both.
+    mode : Mode or None
+        How it can be driven, if it can.
+    period : float
+        Increase of the coordinate after which the mechanism is in the same configuration; 0 where there is none.
+    """
+
+    coordinate: str
+    rate: str
+    initial: tuple[str, str]
+    mode: Mode | None = None
+    period: float = 0.0
+
+
+class Channel(NamedTuple):
+    """An input.
+
+    Attributes
+    ----------
+    name : str
+        Of the FMI input.
+    argument : str
+        Its name among the inputs of a run in Python and in case files; of a ``rate`` what messages call it.
+    kind : str
+        ``force``, ``command`` (the rate of a freedom, a jump of which is an impulse) or ``rate`` (of change of the command
+        of the same freedom, over a step).
+    freedom : int
+        Number of the freedom that it drives; -1 where it drives none directly.
+    """
+
+    name: str
+    argument: str
+    kind: str = "force"
+    freedom: int = -1
+
+
+class Equations(NamedTuple):
+    """The equations: straight lines of arithmetic on floats; x is the state, u the channels, p the constants.
+
+    Attributes
+    ----------
+    applied : callable
+        ``applied(modes, u, p)``: what acts on the plant, i, from the values of the modes and the channels.
+    derivative : callable
+        ``derivative(x, i, p)``: time derivative of the state.
+    outputs : callable
+        ``outputs(x, i, start_energy, p)``: all real outputs, in the order of the interface.
+    clearance : callable
+        ``clearance(x, i, p)``: how far the links are from the limit of assembly, in the measure of `limits.LIMIT_SINE`.
+    jump : callable
+        ``jump(x, i, u, p)``: the state after the commanded rates, where they are in force, have jumped to those in u.
+    start : callable
+        ``start(x, i, p)``: the state with those parts settled that others determine.
+    energy : callable
+        ``energy(x, p)``: mechanical energy (J).
+    """
+
+    applied: Callable[..., Any]
+    derivative: Callable[..., Any]
+    outputs: Callable[..., Any]
+    clearance: Callable[..., float]
+    jump: Callable[..., Any]
+    start: Callable[..., Any]
+    energy: Callable[..., float]
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Mechanism:
+    """A mechanism: its parameters, its interface and its equations.
+
+    The state of a run is the tuple of all coordinates, all their rates, the work dissipated and the work supplied.
+
+    Attributes
+    ----------
+    name : str
+        As case files and messages name it.
+    fmu : str
+        Name of its FMU.
+    title, description : str
+    notes : tuple of str
+        Paragraphs of the FMU's documentation.
+    parameters, initial : type
+        Dataclasses of its parameters, with a method ``constants``, and of its state at the start.
+    published : mapping
+        Published sets by name, each with ``parameters``, ``initial``, ``crank_speed`` (the rate of the first freedom that it
+        is run at) and ``source``.
+    freedoms : tuple of Freedom
+    channels : tuple of Channel
+        In the order of the FMI inputs.
+    variables : tuple of Variable
+        The FMI interface.
+    position_parameters : tuple of str
+        FMI parameters that set the configuration at the start.
+    experiment : tuple of float
+        Default experiment: start, stop and step (s), tolerance.
+    modules : tuple of modules
+        Those of the equations, each after the ones that it uses.
+    equations : Equations
+    check_assembly : callable
+        ``check_assembly(parameters, x)`` raises AssemblyError where the links cannot be joined clear of the limit.
+    error_scale : callable
+        ``error_scale(parameters, x)``: magnitudes of the state's components below which the integrator's error is absolute.
+    where : callable
+        ``where(x)``: a configuration in words.
+    """
+
+    name: str
+    fmu: str
+    title: str
+    description: str
+    notes: tuple[str, ...]
+    parameters: type
+    initial: type
+    published: Mapping[str, Any]
+    freedoms: tuple[Freedom, ...]
+    channels: tuple[Channel, ...]
+    variables: tuple[Variable, ...]
+    position_parameters: tuple[str, ...]
+    experiment: tuple[float, float, float, float]
+    modules: tuple[ModuleType, ...]
+    equations: Equations
+    check_assembly: Callable[[Any, Sequence[float]], None]
+    error_scale: Callable[[Any, Sequence[float]], tuple[float, ...]]
+    where: Callable[[Sequence[float]], str]
+
+    def __reduce__(self) -> Any:
+        # by its name: a copy would be another mechanism
+        return _load, (self.modules[-1].__package__,)
+
+    @property
+    def size(self) -> int:
+        """Number of components of the state."""
+        return 2 * len(self.freedoms) + 2
+
+    @property
+    def modes(self) -> tuple[Mode, ...]:
+        """The modes of all freedoms that have one."""
+        return tuple(freedom.mode for freedom in self.freedoms if freedom.mode is not None)
+
+    @property
+    def input_names(self) -> tuple[str, ...]:
+        """FMI names of the inputs."""
+        return tuple(channel.name for channel in self.channels)
+
+    @property
+    def output_names(self) -> tuple[str, ...]:
+        """FMI names of the real outputs, in the order of ``equations.outputs``."""
+        return tuple(v.name for v in self.variables if v.causality == "output" and v.kind == "Real")
+
+    @property
+    def mechanism_variables(self) -> dict[str, Variable]:
+        """The variables that are fields of the parameters, by FMI name."""
+        others = {mode.name for mode in self.modes} | {"solver.tolerance"}
+        return {
+            v.name: v
+            for v in self.variables
+            if v.causality == "parameter" and not v.name.startswith("initial.") and v.name not in others
+        }
+
+    @property
+    def initial_variables(self) -> dict[str, Variable]:
+        """The variables of the state at the start, by the name of the field."""
+        prefix = "initial."
+        return {v.name.removeprefix(prefix): v for v in self.variables if v.name.startswith(prefix)}
+
+    def commands(self, modes: Mapping[str, int]) -> tuple[int, ...]:
+        """Numbers of the channels that command a rate under ``modes``, values by the name of the mode."""
+        return tuple(
+            number
+            for number, channel in enumerate(self.channels)
+            if channel.kind == "command" and self._drives(channel, modes)
+        )
+
+    def _drives(self, channel: Channel, modes: Mapping[str, int]) -> bool:
+        mode = self.freedoms[channel.freedom].mode
+        return mode is None or mode.arguments[modes[mode.name]] == channel.argument
+
+    def state(self, initial: Any) -> State:
+        """The state that ``initial`` describes, no work done yet."""
+        coordinates = [float(getattr(initial, freedom.initial[0])) for freedom in self.freedoms]
+        rates = [float(getattr(initial, freedom.initial[1])) for freedom in self.freedoms]
+        return (*coordinates, *rates, 0.0, 0.0)
+
+
+def _load(package: str) -> Mechanism:
+    mechanism: Mechanism = import_module(package).MECHANISM
+    return mechanism
+
+
+def crank_scale(length: float, mass: float, inertia: float, crank_speed: float) -> tuple[float, ...]:
+    """`Mechanism.error_scale` of a mechanism of a crank and a second freedom along a line.
+
+    Of a crank of that length (m) and moment of inertia (kg.m2), other links of that mass (kg), and a crank speed at the
+    start (rad/s).
+    """
+    speed = max(1.0, abs(crank_speed))
+    energy = 0.5 * (inertia + mass * length * length) * speed * speed
+    return (1.0, length, speed, length * speed, energy, energy)
