@@ -1,63 +1,55 @@
-"""Compiled: one period of the plant with its variational equations, and Newton's method on the map over it.
+"""Compiled: one period of a mechanism with its variational equations, and Newton's method on the map over it.
 
-The independent variable is the crank angle, so that a period is known beforehand in either drive. The state is y = (u, u')
-at prescribed speed and y = (u, u', w2) under a torque; the angle runs from 0, which makes the map over a period that of the
-Poincare section th2 = 0. With y are integrated the columns of dy/dy0 and, where asked for, dy/dlambda for a parameter. The
-right-hand sides and their exact derivatives are those that `symbolic` traces from the plant; they are traced only where the
-machine code is not in the cache. The integrator is DOP853 as in `compiled`, for any number of columns.
+The independent variable is the angle of the mechanism's cyclic freedom, the crank, so that a period is known beforehand
+however it is driven. The state is y: the coordinates and the rates of the other freedoms, as far as they are free, and after
+them the crank's rate where a torque drives it. The angle runs from 0, which makes the map over a period that of the Poincare
+section there. With y are integrated the columns of dy/dy0 and, where asked for, dy/dlambda for a parameter. The right-hand
+sides and their exact derivatives are traced from the equations (`Flow`); the integrator is that of a run.
 """
 
 from __future__ import annotations
 
+from enum import IntEnum
 from functools import cache
-from math import cos, fabs, isfinite, pi, sin, sqrt, tanh
-from typing import Any
+from math import fabs, isfinite
+from typing import Any, NamedTuple
 
 import numpy as np
-from numba import boolean, float64, int64, njit
-from numba.extending import overload
+from numba import boolean, float64, int64, types
+from numpy.typing import NDArray
 
-from linkwork.five_bar import dynamics, kinematics
-from linkwork.limits import LIMIT_SINE
+from linkwork.limits import LIMIT_SINE, NEAR_LIMIT
+from linkwork.mechanism import Mechanism
 
 from ..numerics import symbolic
-from ..run.compiled import (
-    CONSTANTS,
-    EXPONENT,
-    FROM,
-    MATRIX,
-    NODES,
-    ROW,
-    STAGES,
-    VECTOR,
-    WEIGHT,
-    constants,
-    inner,
-    kernel,
-    local_error,
-)
+from ..numerics.codegen import MATRIX, VECTOR, MachineCode, evaluate, inner, kernel, part
+from ..run.compiled import SOURCE, Source, attempt, following, shorter
+from ..run.equations import constants, traced
 
-# what Numba traces while it compiles would fail with an error of Numba's: say it here
-symbolic.library()
 
-#: What drives the plant over an orbit: the prescribed speed, or the torque and an induction motor's breakdown torque,
-#: breakdown slip and synchronous speed (no motor with breakdown torque 0); slider force and load at P.
-DRIVE = ("level", "breakdown_torque", "breakdown_slip", "synchronous_speed", "force", "load_x", "load_y")
+class Status(IntEnum):
+    """How an integration or a solution ended."""
 
-# Status of an integration or a solution
-DONE = 0
-LIMIT = 3  # the links come to the limit of assembly
-NO_STEP = 4  # the tolerance cannot be met
-STALLED = 5  # the crank comes to rest
-DIVERGED = 6  # Newton's method does not converge
+    DONE = 0
+    LIMIT = 3
+    NO_STEP = 4
+    STALLED = 5
+    DIVERGED = 6
+
+
+# as plain numbers, for the compiled code
+DONE, LIMIT, NO_STEP, STALLED, DIVERGED = (int(status) for status in Status)
 
 #: Each in words.
 REASONS = {
-    LIMIT: "the links come to the limit of assembly within the period",
-    NO_STEP: "the integrator cannot meet its tolerance",
-    STALLED: "the crank comes to rest within the period",
-    DIVERGED: "Newton's method does not converge",
+    Status.LIMIT: "the links come to the limit of assembly within the period",
+    Status.NO_STEP: "the integrator cannot meet its tolerance",
+    Status.STALLED: "the crank comes to rest within the period",
+    Status.DIVERGED: "Newton's method does not converge",
 }
+
+#: Parameters of an induction motor among those of a drive.
+MOTOR = ("breakdown_torque", "breakdown_slip", "synchronous_speed")
 
 #: Least fraction of a radian that a step may have.
 _LEAST_STEP = 1e-9
@@ -66,251 +58,295 @@ _STALL = 1e-3
 #: Least fraction of a Newton correction that is tried.
 _LEAST_FRACTION = 1.0 / 4096.0
 
-
-def _torque_of(drive: Any, w: Any) -> Any:
-    """Torque of drive and motor (Kloss's formula as in `compiled`) at crank speed ``w``."""
-    slip = 1.0 - w / drive[3]
-    return drive[0] + 2.0 * drive[1] * slip * drive[2] / (slip * slip + drive[2] * drive[2])
+# Functions of a flow, by their numbers among its addresses
+PLAIN, VARIATIONAL, DIRECTIONAL, GAP, STATE = range(5)
+_NAMES = ("plain", "variational", "directional", "gap", "state")
 
 
-@cache
-def flow(speed_drive: bool, direction: bool) -> Any:
-    """Rates dy/dth2 and their exact derivatives as a ``casadi.Function``.
+class Flow:
+    """A mechanism as a flow over its crank's angle, driven in one way.
 
     Parameters
     ----------
-    speed_drive : bool
-        y = (u, u') at the speed drive[0], else y = (u, u', w2).
-    direction : bool
-        Whether the derivative along a direction in drive and constants is an output too.
+    mechanism : Mechanism
+    modes : tuple of int
+        Values of its modes.
 
-    Returns
-    -------
-    casadi.Function
-        Of th2, y, drive (7), constants (29) and, with ``direction``, its components in both; outputs f (n), df/dy (n, n),
-        and df/dlambda (n).
+    Attributes
+    ----------
+    crank : int
+        Number of the cyclic freedom.
+    free : tuple of int
+        Numbers of the other freedoms that are part of y; what is commanded is held where it is.
+    torque : bool
+        Whether the crank's rate is part of y.
+    components : tuple of (str, str)
+        Names and units of y.
+    size : int
+        Number of components of y.
     """
-    casadi = symbolic.library()
-    plant = symbolic.plant()
-    n = 2 if speed_drive else 3
-    th2, y, drive = casadi.SX.sym("th2"), casadi.SX.sym("y", n), casadi.SX.sym("drive", len(DRIVE))
-    p, k = symbolic.constants()
-    w = drive[0] if speed_drive else y[2]
-    torque = 0.0 if speed_drive else _torque_of(casadi.vertsplit(drive), w)
-    inputs = dynamics.Inputs(float(speed_drive), torque, 0.0, drive[4], drive[5], drive[6])
-    _, _, e2, a, _, _ = plant.derivative((th2, y[0], w, y[1], 0.0, 0.0), inputs, k)
-    rates = [y[1] / w, a / w] if speed_drive else [y[1] / w, a / w, e2 / w]
-    f = casadi.vertcat(*rates)
-    arguments, results = [th2, y, drive, p], [f, casadi.densify(casadi.jacobian(f, y))]
-    if direction:
-        d_drive, d_p = casadi.SX.sym("d_drive", len(DRIVE)), casadi.SX.sym("d_p", p.numel())
-        arguments += [d_drive, d_p]
-        results.append(casadi.densify(casadi.jtimes(f, drive, d_drive) + casadi.jtimes(f, p, d_p)))
-    return casadi.Function("flow", arguments, results, {"cse": True})
 
+    def __init__(self, mechanism: Mechanism, modes: tuple[int, ...]) -> None:
+        self.mechanism = mechanism
+        self.modes = modes
+        self.crank = next(n for n, freedom in enumerate(mechanism.freedoms) if freedom.period > 0.0)
+        by_name = {mode.name: value for mode, value in zip(mechanism.modes, modes)}
+        commanded = {mechanism.channels[n].freedom: n for n in mechanism.commands(by_name)}
+        forced = {c.argument for c in mechanism.channels if c.kind == "force"}
+        self.command = commanded.get(self.crank)
+        self.free = tuple(
+            n
+            for n, freedom in enumerate(mechanism.freedoms)
+            if n != self.crank
+            and (freedom.mode is None or freedom.mode.arguments[by_name[freedom.mode.name]] in forced)
+        )
+        self.torque = self.command is None
+        units = {v.name: v.unit for v in mechanism.variables}
+        freedoms = [mechanism.freedoms[n] for n in self.free]
+        names = [f.coordinate for f in freedoms] + [f.rate for f in freedoms]
+        names += [mechanism.freedoms[self.crank].rate] * self.torque
+        self.components = tuple((name, units[name]) for name in names)
+        self.size = len(names)
+        #: numbers of the channels of the drive, and of motor and held coordinates after them
+        self.inputs = len(mechanism.channels)
+        self.drive_size = self.inputs + len(MOTOR) + len(mechanism.freedoms)
+        self._code: dict[int, MachineCode] = {}
+        self._addresses: NDArray[np.int64] = np.zeros(len(_NAMES), dtype=np.int64)
 
-_motor = inner(_torque_of)
+    @property
+    def period(self) -> float:
+        """Angle of one turn (rad)."""
+        return self.mechanism.freedoms[self.crank].period
 
+    def addresses(self, *which: int) -> NDArray[np.int64]:
+        """Addresses of the machine code, of the functions of those numbers at least."""
+        missing = [n for n in which if n not in self._code]
+        if missing:
+            code = MachineCode([self.function(n) for n in missing])
+            for n in missing:
+                self._code[n] = code
+                self._addresses[n] = code.addresses[_NAMES[n]]
+        return self._addresses
 
-def _written(speed_drive: bool, direction: bool) -> Any:
-    """`flow` as a compiled function; traced only when Numba asks for its type."""
-    space = {"sin": sin, "cos": cos, "sqrt": sqrt, "tanh": tanh, "fabs": fabs}
-    exec(symbolic.source(flow(speed_drive, direction), "written"), space)
-    return inner(space["written"])
+    @cache  # noqa: B019 - flows are kept for good themselves
+    def function(self, which: int) -> Any:
+        """A function as a ``casadi.Function`` of angle, z, modes, drive with its direction, constants with theirs.
 
-
-def _speed_flow(th2: float, y: Any, drive: Any, p: Any) -> Any:
-    """f (2) and df/dy (4, by columns) at prescribed speed."""
-
-
-def _speed_flow_along(th2: float, y: Any, drive: Any, p: Any, d_drive: Any, d_p: Any) -> Any:
-    """The same and df/dlambda (2)."""
-
-
-def _torque_flow(th2: float, y: Any, drive: Any, p: Any) -> Any:
-    """f (3) and df/dy (9, by columns) under a torque."""
-
-
-def _torque_flow_along(th2: float, y: Any, drive: Any, p: Any, d_drive: Any, d_p: Any) -> Any:
-    """The same and df/dlambda (3)."""
-
-
-@overload(_speed_flow)
-def _(th2, y, drive, p):  # type: ignore[no-untyped-def]
-    written = _written(True, False)
-    return lambda th2, y, drive, p: written(th2, y, drive, p)
-
-
-@overload(_speed_flow_along)
-def _(th2, y, drive, p, d_drive, d_p):  # type: ignore[no-untyped-def]
-    written = _written(True, True)
-    return lambda th2, y, drive, p, d_drive, d_p: written(th2, y, drive, p, d_drive, d_p)
-
-
-@overload(_torque_flow)
-def _(th2, y, drive, p):  # type: ignore[no-untyped-def]
-    written = _written(False, False)
-    return lambda th2, y, drive, p: written(th2, y, drive, p)
-
-
-@overload(_torque_flow_along)
-def _(th2, y, drive, p, d_drive, d_p):  # type: ignore[no-untyped-def]
-    written = _written(False, True)
-    return lambda th2, y, drive, p, d_drive, d_p: written(th2, y, drive, p, d_drive, d_p)
-
-
-@inner
-def _rate(speed_drive, columns, th2, z, drive, p, d_drive, d_p, out):  # type: ignore[no-untyped-def]
-    """dz/dth2, z being y, then ``columns`` columns of derivatives; the last of n + 1 is that along lambda."""
-    if speed_drive:
-        if columns == 0:
-            r = _speed_flow(th2, z, drive, p)
-            out[0] = r[0]
-            out[1] = r[1]
-        elif columns == 2:
-            r = _speed_flow(th2, z, drive, p)
-            out[0] = r[0]
-            out[1] = r[1]
-            for j in range(2):
-                c = 2 + 2 * j
-                out[c] = r[2] * z[c] + r[4] * z[c + 1]
-                out[c + 1] = r[3] * z[c] + r[5] * z[c + 1]
+        ``plain``: dy/dangle. ``variational``: with the columns of dy/dy0. ``directional``: with that of dy/dlambda after
+        them. ``gap``: how far the links are from the limit of assembly. ``state``: the state of a run and the channels.
+        """
+        casadi = symbolic.library()
+        n, m = self.size, self.mechanism
+        angle, modes = casadi.SX.sym("angle"), casadi.SX.sym("modes", len(m.modes))
+        y, columns = casadi.SX.sym("y", n), casadi.SX.sym("columns", n, n + 1)
+        drive, d_drive = (casadi.SX.sym(name, self.drive_size) for name in ("drive", "d_drive"))
+        p, k = constants(m)
+        d_p = casadi.SX.sym("d_p", p.numel())
+        arguments = [angle, casadi.vertcat(y, casadi.vec(columns)), modes, casadi.vertcat(drive, d_drive), casadi.vertcat(p, d_p)]
+        x, u = self._state(angle, y, drive)
+        functions = traced(m)
+        applied = functions.__dict__[m.equations.applied.__name__](
+            tuple(casadi.vertsplit(modes)) if m.modes else (), tuple(casadi.vertsplit(u)) if self.inputs else (), k
+        )
+        if which == GAP:
+            settled = functions.__dict__[m.equations.start.__name__](x, applied, k)
+            results = [casadi.SX(functions.__dict__[m.equations.clearance.__name__](settled, applied, k))]
+        elif which == STATE:
+            settled = functions.__dict__[m.equations.start.__name__](x, applied, k)
+            results = [casadi.vertcat(*settled), u]
         else:
-            q = _speed_flow_along(th2, z, drive, p, d_drive, d_p)
-            out[0] = q[0]
-            out[1] = q[1]
-            for j in range(3):
-                c = 2 + 2 * j
-                out[c] = q[2] * z[c] + q[4] * z[c + 1]
-                out[c + 1] = q[3] * z[c] + q[5] * z[c + 1]
-            out[6] += q[6]
-            out[7] += q[7]
-    elif columns == 4:
-        q = _torque_flow_along(th2, z, drive, p, d_drive, d_p)
-        for i in range(3):
-            out[i] = q[i]
-        for j in range(4):
-            c = 3 + 3 * j
-            for i in range(3):
-                out[c + i] = q[3 + i] * z[c] + q[6 + i] * z[c + 1] + q[9 + i] * z[c + 2]
-        for i in range(3):
-            out[12 + i] += q[12 + i]
-    else:
-        r = _torque_flow(th2, z, drive, p)
-        for i in range(3):
-            out[i] = r[i]
+            rates = functions.__dict__[m.equations.derivative.__name__](x, applied, k)
+            places = self._places()
+            f = casadi.vertcat(*[rates[place] for place in places]) / x[len(m.freedoms) + self.crank]
+            results = [f]
+            if which != PLAIN:
+                jacobian = casadi.jacobian(f, y)
+                results.append(jacobian @ columns[:, :n])
+            if which == DIRECTIONAL:
+                along = casadi.jtimes(f, drive, d_drive) + casadi.jtimes(f, p, d_p)
+                results.append(jacobian @ columns[:, n] + along)
+        return casadi.Function(_NAMES[which], arguments, [casadi.densify(r) for r in results], {"cse": True})
+
+    def jacobian_trace(self) -> Any:
+        """Trace of the rates' Jacobian as a ``casadi.Function`` of angle, y, modes, drive and constants."""
+        casadi = symbolic.library()
+        plain = self.function(PLAIN)
+        shapes = [plain.size1_in(i) for i in range(plain.n_in())]
+        angle, y, modes, drive, p = (
+            casadi.SX.sym(name, size)
+            for name, size in zip(
+                ("angle", "y", "modes", "drive", "p"), (1, self.size, shapes[2], self.drive_size, shapes[4] // 2)
+            )
+        )
+        f = plain(
+            angle,
+            casadi.vertcat(y, casadi.DM.zeros(shapes[1] - self.size)),
+            modes,
+            casadi.vertcat(drive, casadi.DM.zeros(self.drive_size)),
+            casadi.vertcat(p, casadi.DM.zeros(shapes[4] // 2)),
+        )
+        return casadi.Function("trace", [angle, y, modes, drive, p], [casadi.trace(casadi.jacobian(f, y))])
+
+    def _places(self) -> list[int]:
+        """Components of the state of a run that make up y."""
+        rates = len(self.mechanism.freedoms)
+        return [*self.free, *(rates + n for n in self.free), *([rates + self.crank] * self.torque)]
+
+    def _state(self, angle: Any, y: Any, drive: Any) -> tuple[tuple[Any, ...], Any]:
+        """State of a run and channels, as expressions."""
+        casadi = symbolic.library()
+        m, freedoms = self.mechanism, len(self.mechanism.freedoms)
+        held = drive[self.inputs + len(MOTOR) :]
+        x = [*casadi.vertsplit(held), *[casadi.SX(0.0)] * freedoms, casadi.SX(0.0), casadi.SX(0.0)]
+        x[self.crank] = angle
+        for component, place in enumerate(self._places()):
+            x[place] = y[component]
+        u = drive[: self.inputs]
+        if self.command is not None:
+            x[freedoms + self.crank] = u[self.command]
+        else:
+            channel = next(
+                n for n, c in enumerate(m.channels) if c.kind == "force" and c.freedom == self.crank
+            )
+            u = casadi.vertcat(u)
+            u[channel] += _kloss(drive[self.inputs : self.inputs + len(MOTOR)], x[freedoms + self.crank])
+        return tuple(x), u
+
+
+def _kloss(motor: Any, speed: Any) -> Any:
+    """Torque of an induction motor (Kloss's formula, as in a run) at a crank speed."""
+    slip = 1.0 - speed / motor[2]
+    return 2.0 * motor[0] * slip * motor[1] / (slip * slip + motor[1] * motor[1])
+
+
+@cache
+def flow(mechanism: Mechanism, modes: tuple[int, ...]) -> Flow:
+    """The flow of a mechanism driven in one way, made when it is first asked for."""
+    return Flow(mechanism, modes)
+
+
+class Section(NamedTuple):
+    """A flow with numbers: addresses of its functions, modes, drive and constants with their directions after them, and
+    magnitudes of y and of lambda; whether the crank's rate is the last of y."""
+
+    equations: NDArray[np.int64]
+    modes: NDArray[np.float64]
+    drive: NDArray[np.float64]
+    p: NDArray[np.float64]
+    scale: NDArray[np.float64]
+    along: float
+    tolerance: float
+    torque: bool
+
+
+_SECTION = types.NamedTuple((int64[::1], VECTOR, VECTOR, VECTOR, VECTOR, float64, float64, boolean), Section)
+
+#: Inputs of a run that are not asked for: what drives an orbit is constant.
+NO_SOURCE = Source(
+    np.array([0.0, 1.0]),
+    np.zeros((1, 0, 4)),
+    np.zeros((0, 4)),
+    np.zeros((0, 2), dtype=np.int64),
+    np.zeros(6),
+    np.zeros(3, dtype=np.int64),
+    np.zeros((0, 2), dtype=np.int64),
+)
+
+
+class Room(NamedTuple):
+    """Room to work in: stages, state at their end, magnitudes of z, the rate of one component."""
+
+    k: NDArray[np.float64]
+    y: NDArray[np.float64]
+    sizes: NDArray[np.float64]
+    gap: NDArray[np.float64]
+
+
+@part
+def _room(section, columns):  # type: ignore[no-untyped-def]
+    """Room for y and so many columns: magnitudes of y, of dy_i/dy0_j and of dy_i/dlambda."""
+    n = section.scale.shape[0]
+    sizes = np.empty(n * (1 + columns))
+    for i in range(n):
+        sizes[i] = section.scale[i]
         for j in range(columns):
-            c = 3 + 3 * j
-            for i in range(3):
-                out[c + i] = r[3 + i] * z[c] + r[6 + i] * z[c + 1] + r[9 + i] * z[c + 2]
+            sizes[n + j * n + i] = section.scale[i] / (section.scale[j] if j < n else section.along)
+    return Room(np.zeros((13, sizes.shape[0])), np.empty(sizes.shape[0]), sizes, np.empty(1))
 
 
 @inner
-def _stage(s, size, z, k, h, y):  # type: ignore[no-untyped-def]
-    """State at stage s of a step of size h from z; stage 12 is its end."""
-    for i in range(size):
-        y[i] = 0.0
-    for n in range(ROW[s], ROW[s + 1]):
-        weight = WEIGHT[n]
-        stage = FROM[n]
-        for i in range(size):
-            y[i] += weight * k[stage, i]
-    for i in range(size):
-        y[i] = z[i] + h * y[i]
+def _clearance(section, angle, z, room):  # type: ignore[no-untyped-def]
+    evaluate(section.equations[GAP], angle, z, section.modes, section.drive, section.p, room.gap)
+    return room.gap[0]
 
 
 @inner
-def _turn(speed_drive, columns, p, drive, d_drive, d_p, begin, end, tolerance, scale, z, k, y, carry):  # type: ignore[no-untyped-def]
+def _turn(section, source, begin, end, z, room, carry):  # type: ignore[no-untyped-def]
     """Integrate z over a range of crank angles; carry[0] is the step to begin with and to go on with, carry[1] counts."""
-    n = 2 if speed_drive else 3
-    size = n * (1 + columns)
-    th2 = begin
-    slowest = _STALL * (drive[0] if speed_drive else z[2])
-    if not slowest > 0.0:
+    n = section.scale.shape[0]
+    size = z.shape[0]
+    equation = section.equations[PLAIN if size == n else VARIATIONAL if size == n * (1 + n) else DIRECTIONAL]
+    k, y = room.k, room.y
+    angle = begin
+    slowest = _STALL * z[n - 1] if section.torque else 0.0
+    if section.torque and not slowest > 0.0:
         return STALLED
-    g = kinematics.position(th2, z[0], p)
     # a NaN, beyond the limit of assembly, compares as not positive
-    if not p.branch * g.s43 > LIMIT_SINE:
+    if not _clearance(section, angle, z, room) > LIMIT_SINE:
         return LIMIT
-    _rate(speed_drive, columns, th2, z, drive, p, d_drive, d_p, k[0])
-    h_next = carry[0]
-    while th2 < end:
-        h = h_next
-        last = False
+    evaluate(equation, angle, z, section.modes, section.drive, section.p, k[0])
+    proposed = carry[0]
+    while angle < end:
         # no sliver of a step before the end
-        if th2 + 1.001 * h >= end:
-            h = end - th2
-            last = True
-        for s in range(1, STAGES):
-            _stage(s, size, z, k, h, y)
-            _rate(speed_drive, columns, th2 + NODES[s] * h, y, drive, p, d_drive, d_p, k[s])
-        _stage(STAGES, size, z, k, h, y)
-        error = local_error(size, z, y, k, h, scale) / tolerance
+        last = angle + 1.001 * proposed >= end
+        h = end - angle if last else proposed
+        error = attempt(
+            equation, section.modes, section.p, room.sizes, angle, h, z, k, y, True, 0, source, section.drive
+        )
+        error /= section.tolerance
         carry[1] += 1.0
         if not error <= 1.0:
             # beyond the limit of assembly the error is NaN
-            h_next = h * (max(0.2, 0.9 * error**EXPONENT) if isfinite(error) else 0.1)
-            if h_next < _LEAST_STEP:
-                g = kinematics.position(th2, z[0], p)
-                return LIMIT if p.branch * g.s43 < 0.05 else NO_STEP
+            proposed = shorter(h, error)
+            if proposed < _LEAST_STEP:
+                return LIMIT if _clearance(section, angle, z, room) < NEAR_LIMIT else NO_STEP
             continue
-        factor = 6.0 if error == 0.0 else min(6.0, 0.9 * error**EXPONENT)
-        h_next = max(h_next, factor * h) if last else max(0.2, factor) * h
-        th2 = end if last else th2 + h
-        g = kinematics.position(th2, y[0], p)
-        if not p.branch * g.s43 > LIMIT_SINE:
+        proposed = following(h, proposed, error)
+        angle = end if last else angle + h
+        if not _clearance(section, angle, y, room) > LIMIT_SINE:
             return LIMIT
-        if not speed_drive and not y[2] > slowest:
+        if section.torque and not y[n - 1] > slowest:
             return STALLED
         for i in range(size):
             z[i] = y[i]
         if not last:
-            _rate(speed_drive, columns, th2, z, drive, p, d_drive, d_p, k[0])
-    carry[0] = h_next
+            evaluate(equation, angle, z, section.modes, section.drive, section.p, k[0])
+    carry[0] = proposed
     return DONE
 
 
 @inner
-def _begin(n, columns, start, z):  # type: ignore[no-untyped-def]
+def _begin(n, start, z):  # type: ignore[no-untyped-def]
     """z at the beginning of a period: the start, the identity, zeros along lambda."""
-    for i in range(n * (1 + columns)):
+    for i in range(z.shape[0]):
         z[i] = 0.0
     for i in range(n):
         z[i] = start[i]
-        if columns > 0:
+        if z.shape[0] > n:
             z[n + i * n + i] = 1.0
 
 
-@njit(error_model="numpy")
-def _scales(n, columns, scale, along):  # type: ignore[no-untyped-def]
-    """Magnitudes of z: those of y, of dy_i/dy0_j and of dy_i/dlambda."""
-    out = np.empty(n * (1 + columns))
-    for i in range(n):
-        out[i] = scale[i]
-        for j in range(columns):
-            out[n + j * n + i] = scale[i] / (scale[j] if j < n else along)
-    return out
-
-
-@kernel(int64(boolean, CONSTANTS, VECTOR, VECTOR, CONSTANTS, float64, float64, VECTOR, float64, VECTOR, VECTOR))
-def period(speed_drive, p, drive, d_drive, d_p, end, tolerance, scale, along, z, carry):  # type: ignore[no-untyped-def]
+@kernel(int64(_SECTION, SOURCE, float64, VECTOR, VECTOR), purpose="the integrator of periodic motions")
+def period(section, source, end, z, carry):  # type: ignore[no-untyped-def]
     """Integrate y and as many columns of derivatives as ``z`` has room for from crank angle 0 to ``end``.
 
     Parameters
     ----------
-    speed_drive : bool
-    p : Constants
-    drive : ndarray, shape (7,)
-        See `DRIVE`.
-    d_drive, d_p : ndarray, shape (7,), and Constants
-        Derivatives of both with respect to lambda.
+    section : Section
+    source : Source
+        `NO_SOURCE`.
     end : float
-        Crank angle at the end (rad): 2 pi times the turns of a period.
-    tolerance : float
-    scale : ndarray, shape (n,)
-        Magnitudes of y.
-    along : float
-        Magnitude of lambda.
+        Crank angle at the end (rad): the turns of a period times that of one.
     z : ndarray, shape (n (1 + columns),)
         y at the start, and at the end when it returns; then dy/dy0 by columns (columns = n), then dy/dlambda (n + 1).
     carry : ndarray, shape (2,)
@@ -319,95 +355,93 @@ def period(speed_drive, p, drive, d_drive, d_p, end, tolerance, scale, along, z,
     Returns
     -------
     int
-        DONE, LIMIT, NO_STEP or STALLED.
+        A `Status` but DIVERGED.
     """
-    n = 2 if speed_drive else 3
-    columns = z.shape[0] // n - 1
-    sizes = _scales(n, columns, scale, along)
-    k = np.zeros((13, z.shape[0]))
-    y = np.empty(z.shape[0])
-    _begin(n, columns, z.copy(), z)
-    return _turn(speed_drive, columns, p, drive, d_drive, d_p, 0.0, end, tolerance, sizes, z, k, y, carry)
+    n = section.scale.shape[0]
+    room = _room(section, z.shape[0] // n - 1)
+    _begin(n, z.copy(), z)
+    return _turn(section, source, 0.0, end, z, room, carry)
 
 
-@njit(error_model="numpy")
-def _solve(speed_drive, p, drive, end, tolerance, scale, most, start, z, k, y, sizes, carry, report):  # type: ignore[no-untyped-def]
+@part
+def _size(correction, scale):  # type: ignore[no-untyped-def]
+    """Largest component relative to the scale."""
+    size = 0.0
+    for i in range(scale.shape[0]):
+        # a NaN must not get lost
+        relative = abs(correction[i]) / scale[i]
+        if not relative <= size:
+            size = relative
+    return size
+
+
+@part
+def _solve(section, source, end, most, start, z, room, carry, report):  # type: ignore[no-untyped-def]
     """Newton's method for y(end) = y(0); see `solve`.
 
     A correction is taken in part where the next one, found with the same matrix, would not be smaller (Deuflhard's natural
     monotonicity test), or where it leads out of the domain.
     """
-    n = 2 if speed_drive else 3
+    scale, tolerance = section.scale, section.tolerance
+    n = scale.shape[0]
     trial = start.copy()
     correction = np.zeros(n)
     following = np.empty(n)
     matrix = np.empty((n, n))
-    work = np.empty((n, n))
     size = 0.0
     fraction = 1.0
     report[0] = np.inf
     report[1] = 0.0
     for iteration in range(most):
         while True:
-            _begin(n, n, trial, z)
-            status = _turn(speed_drive, n, p, drive, drive, p, 0.0, end, tolerance, sizes, z, k, y, carry)
+            _begin(n, trial, z)
+            status = _turn(section, source, 0.0, end, z, room, carry)
             if iteration == 0 and status != DONE:
                 return status
             if status == DONE:
                 if iteration == 0:
                     break
-                for i in range(n):
-                    following[i] = z[i] - trial[i]
-                work[:] = matrix
-                _solve_small(work, following)
-                next_size = 0.0
-                for i in range(n):
-                    next_size = max(next_size, abs(following[i]) / scale[i])
+                following[:] = z[:n] - trial
+                solve_small(matrix.copy(), following)
+                next_size = _size(following, scale)
                 # near the solution corrections stop falling at the integrator's error
                 if next_size <= (1.0 - 0.25 * fraction) * size or next_size <= 100.0 * tolerance:
                     break
             fraction *= 0.5
             if fraction < _LEAST_FRACTION:
                 return status if status != DONE else DIVERGED
-            for i in range(n):
-                trial[i] = start[i] + fraction * correction[i]
-        report[0] = 0.0
+            trial[:] = start + fraction * correction
         report[1] = iteration + 1.0
+        start[:] = trial
+        correction[:] = z[:n] - trial
+        report[0] = _size(correction, scale)
         for i in range(n):
-            start[i] = trial[i]
-            correction[i] = z[i] - trial[i]
-            report[0] = max(report[0], abs(correction[i]) / scale[i])
             for j in range(n):
                 matrix[i, j] = (1.0 if i == j else 0.0) - z[n + j * n + i]
-        work[:] = matrix
-        if not _solve_small(work, correction):
+        if not solve_small(matrix.copy(), correction):
             return DIVERGED
-        size = 0.0
-        for i in range(n):
-            size = max(size, abs(correction[i]) / scale[i])
+        size = _size(correction, scale)
         if not isfinite(size):
             return DIVERGED
         # what was taken in part is tried less cautiously the next time
         fraction = min(1.0, 4.0 * fraction)
         if size <= 100.0 * tolerance:
             fraction = 1.0
-        for i in range(n):
-            trial[i] = start[i] + fraction * correction[i]
+        trial[:] = start + fraction * correction
         if size <= 100.0 * tolerance:
-            for i in range(n):
-                start[i] = trial[i]
+            start[:] = trial
             return DONE
     return DIVERGED
 
 
 @inner
-def _solve_small(a, b):  # type: ignore[no-untyped-def]
+def solve_small(a, b):  # type: ignore[no-untyped-def]
     """Solve a x = b in place by elimination with pivots; whether it could be."""
     n = b.shape[0]
     for c in range(n):
         pivot = c
         for r in range(c + 1, n):
-            if abs(a[r, c]) > abs(a[pivot, c]):
+            if fabs(a[r, c]) > fabs(a[pivot, c]):
                 pivot = r
         if a[pivot, c] == 0.0:
             return False
@@ -426,8 +460,8 @@ def _solve_small(a, b):  # type: ignore[no-untyped-def]
     return True
 
 
-@kernel(int64(boolean, CONSTANTS, VECTOR, float64, float64, VECTOR, int64, VECTOR, VECTOR, VECTOR))
-def solve(speed_drive, p, drive, end, tolerance, scale, most, start, z, report):  # type: ignore[no-untyped-def]
+@kernel(int64(_SECTION, SOURCE, float64, int64, VECTOR, VECTOR, VECTOR), purpose="the search for periodic motions")
+def solve(section, source, end, most, start, z, report):  # type: ignore[no-untyped-def]
     """Periodic orbit by Newton's method with step control on the map over a period.
 
     Parameters
@@ -441,125 +475,91 @@ def solve(speed_drive, p, drive, end, tolerance, scale, most, start, z, report):
     report : ndarray, shape (3,)
         Residual |y(end) - y(0)| relative to the scale before the last correction, iterations, steps; written.
 
-    The others, and what it returns, as for `period`; also DIVERGED.
+    The others as for `period`. Returns a `Status`.
     """
-    n = 2 if speed_drive else 3
-    sizes = _scales(n, n, scale, 1.0)
-    k = np.zeros((13, z.shape[0]))
-    y = np.empty(z.shape[0])
+    room = _room(section, section.scale.shape[0])
     carry = np.array([0.1, 0.0])
-    status = _solve(speed_drive, p, drive, end, tolerance, scale, most, start, z, k, y, sizes, carry, report)
+    status = _solve(section, source, end, most, start, z, room, carry, report)
     report[2] = carry[1]
     return status
 
 
-@kernel(int64(boolean, CONSTANTS, VECTOR, float64, VECTOR, float64, int64, VECTOR))
-def settle(speed_drive, p, drive, tolerance, scale, change, most, start):  # type: ignore[no-untyped-def]
+@kernel(int64(_SECTION, SOURCE, float64, float64, int64, VECTOR), purpose="the settling of motions")
+def settle(section, source, turn, change, most, start):  # type: ignore[no-untyped-def]
     """Follow the motion from ``start``, which is overwritten, turn by turn until one changes y by less than ``change``."""
-    n = 2 if speed_drive else 3
-    sizes = _scales(n, 0, scale, 1.0)
-    k = np.zeros((13, n))
-    y = np.empty(n)
+    room = _room(section, 0)
     z = start.copy()
     carry = np.array([0.1, 0.0])
     for _ in range(most):
-        status = _turn(speed_drive, 0, p, drive, drive, p, 0.0, 2.0 * pi, tolerance, sizes, z, k, y, carry)
+        status = _turn(section, source, 0.0, turn, z, room, carry)
         if status != DONE:
             return status
-        size = 0.0
-        for i in range(n):
-            size = max(size, abs(z[i] - start[i]) / scale[i])
-            start[i] = z[i]
+        size = _size(z - start, section.scale)
+        start[:] = z
         if size < change:
             return DONE
     return DONE
 
 
-@kernel(int64(boolean, CONSTANTS, VECTOR, float64, VECTOR, VECTOR, VECTOR, MATRIX, MATRIX))
-def sample(speed_drive, p, drive, tolerance, scale, start, angles, states, forces):  # type: ignore[no-untyped-def]
-    """States of the plant, shape (m, 6), and what acts on it, (m, 6), at increasing crank angles, from ``start`` at 0."""
-    n = 2 if speed_drive else 3
-    sizes = _scales(n, 0, scale, 1.0)
-    k = np.zeros((13, n))
-    y = np.empty(n)
+@kernel(int64(_SECTION, SOURCE, VECTOR, VECTOR, MATRIX), purpose="the sampling of periodic motions")
+def sample(section, source, start, angles, rows):  # type: ignore[no-untyped-def]
+    """States of a run and channels, shape (m, states + inputs), at increasing crank angles, from ``start`` at 0."""
+    room = _room(section, 0)
     z = start.copy()
     carry = np.array([0.1, 0.0])
-    th2 = 0.0
+    angle = 0.0
     for i in range(angles.shape[0]):
-        if angles[i] > th2:
-            status = _turn(speed_drive, 0, p, drive, drive, p, th2, angles[i], tolerance, sizes, z, k, y, carry)
+        if angles[i] > angle:
+            status = _turn(section, source, angle, angles[i], z, room, carry)
             if status != DONE:
                 return status
-            th2 = angles[i]
-        w = drive[0] if speed_drive else z[2]
-        states[i, 0] = th2
-        states[i, 1] = z[0]
-        states[i, 2] = w
-        states[i, 3] = z[1]
-        states[i, 4] = 0.0
-        states[i, 5] = 0.0
-        forces[i, 0] = 1.0 if speed_drive else 0.0
-        forces[i, 1] = 0.0 if speed_drive else _motor(drive, w)
-        forces[i, 2] = 0.0
-        forces[i, 3] = drive[4]
-        forces[i, 4] = drive[5]
-        forces[i, 5] = drive[6]
+            angle = angles[i]
+        evaluate(section.equations[STATE], angle, z, section.modes, section.drive, section.p, rows[i])
     return DONE
 
 
-@kernel(int64[::1](boolean, MATRIX, MATRIX, float64, float64, MATRIX, int64, VECTOR, MATRIX, MATRIX))
-def solve_row(speed_drive, parameters, drives, end, tolerance, scales, most, guess, starts, monodromies):  # type: ignore[no-untyped-def]
+@kernel(
+    types.void(_SECTION, SOURCE, MATRIX, MATRIX, MATRIX, float64, int64, VECTOR, MATRIX, MATRIX, int64[::1]),
+    purpose="grids of periodic motions",
+)
+def solve_row(section, source, parameters, drives, scales, end, most, guess, starts, monodromies, status):  # type: ignore[no-untyped-def]
     """Orbits of a row of mechanisms, each begun from the last: the rows of a chart.
 
     Parameters
     ----------
-    parameters, drives : ndarray, shapes (m, 29) and (m, 7)
+    parameters, drives : ndarray, shapes (m, constants) and (m, drive)
+        As in `Section`, which has the rest.
     scales : ndarray, shape (m, n)
     guess : ndarray, shape (n,)
         Start of the first.
     starts, monodromies : ndarray, shapes (m, n) and (m, n n)
         y at crank angle 0, and the monodromy matrix by columns; written where the status is DONE.
-
-    Returns
-    -------
-    ndarray of int64, shape (m,)
-        Status of each. Where Newton's method fails from the neighbour it is begun anew from the guess.
+    status : ndarray of int64, shape (m,)
+        `Status` of each; written. Where Newton's method fails from the neighbour it is begun anew from the guess.
     """
-    n = 2 if speed_drive else 3
-    m = parameters.shape[0]
-    status = np.empty(m, dtype=np.int64)
-    size = n * (1 + n)
-    z = np.empty(size)
-    k = np.zeros((13, size))
-    y = np.empty(size)
+    n = guess.shape[0]
+    z = np.empty(n * (1 + n))
     report = np.zeros(3)
     carry = np.array([0.1, 0.0])
     start = guess.copy()
     found = 0
-    for row in range(m):
-        p = constants(parameters[row])
-        sizes = _scales(n, n, scales[row], 1.0)
-        for i in range(n):
+    for row in range(parameters.shape[0]):
+        own = Section(
+            section.equations, section.modes, drives[row], parameters[row], scales[row], 1.0, section.tolerance, section.torque
+        )  # fmt: skip
+        room = _room(own, n)
+        if found > 1:
             # the secant through the last two
-            start[i] = 2.0 * starts[row - 1, i] - starts[row - 2, i] if found > 1 else start[i]
-        what = _solve(
-            speed_drive, p, drives[row], end, tolerance, scales[row], most, start, z, k, y, sizes, carry, report
-        )
+            start[:] = 2.0 * starts[row - 1] - starts[row - 2]
+        what = _solve(own, source, end, most, start, z, room, carry, report)
         if what != DONE:
-            for i in range(n):
-                start[i] = guess[i]
-            what = _solve(
-                speed_drive, p, drives[row], end, tolerance, scales[row], most, start, z, k, y, sizes, carry, report
-            )
+            start[:] = guess
+            what = _solve(own, source, end, most, start, z, room, carry, report)
         status[row] = what
         if what == DONE:
             found += 1
-            for i in range(n):
-                starts[row, i] = start[i]
-            for i in range(n * n):
-                monodromies[row, i] = z[n + i]
+            starts[row] = start
+            monodromies[row] = z[n:]
         else:
             found = 0
-            for i in range(n):
-                start[i] = guess[i]
-    return status
+            start[:] = guess

@@ -34,6 +34,5 @@ from .signals import steps as steps
 from .signals import table as table
 from .simulation import sample_times as sample_times
 from .simulation import simulate as simulate
-from .trajectory import UNITS as UNITS
 from .trajectory import Occurrence as Occurrence
 from .trajectory import Trajectory as Trajectory

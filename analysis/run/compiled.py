@@ -13,14 +13,14 @@ from math import cos, isfinite, isnan, sin
 from typing import NamedTuple
 
 import numpy as np
-from numba import boolean, float64, from_dtype, int64, njit, types
+from numba import boolean, float64, from_dtype, int64, types
 from numpy.typing import NDArray
 
 from linkwork import tableau
 from linkwork.integrate import GREATEST_FACTOR, LEAST_FACTOR, LEAST_STEP, SAFETY
 from linkwork.limits import LIMIT_SINE, NEAR_LIMIT
 
-from ..numerics.codegen import CUBE, MATRIX, VECTOR, call_user, evaluate, inner, kernel
+from ..numerics.codegen import CUBE, MATRIX, VECTOR, call_user, evaluate, inner, kernel, part
 from .equations import CLEARANCE, DERIVATIVE, JUMP, OUTPUTS
 
 # Status of a run, as the kernels return it: where the run has one, the solver.status of the FMI contract
@@ -128,7 +128,7 @@ CARRY = np.dtype(
 
 _ADDRESSES = int64[::1]
 _PLACES = int64[:, ::1]
-_SOURCE = types.NamedTuple((VECTOR, CUBE, MATRIX, _PLACES, VECTOR, _ADDRESSES, _PLACES), Source)
+SOURCE = types.NamedTuple((VECTOR, CUBE, MATRIX, _PLACES, VECTOR, _ADDRESSES, _PLACES), Source)
 _PROBLEM = types.NamedTuple((_ADDRESSES, VECTOR, VECTOR, VECTOR, _PLACES, float64, float64, float64, boolean), Problem)
 _WATCH = types.NamedTuple((MATRIX, _ADDRESSES, VECTOR, MATRIX), Watch)
 _CARRIES = from_dtype(CARRY)[::1]
@@ -209,7 +209,7 @@ def _held_bar(law, angle, speed, step):  # type: ignore[no-untyped-def]
 
 
 @kernel(
-    types.void(float64, float64, boolean, VECTOR, _SOURCE, _PLACES, VECTOR, VECTOR), purpose="the sampling of inputs"
+    types.void(float64, float64, boolean, VECTOR, SOURCE, _PLACES, VECTOR, VECTOR), purpose="the sampling of inputs"
 )
 def channels(t, ahead, left, x, source, commands, u, there):  # type: ignore[no-untyped-def]
     """Write the channels at time t and state x into u: the limit from the left or the right where an input jumps.
@@ -654,7 +654,7 @@ def _cross_interval(stop, piece, problem, source, watch, work, carry, x, samples
         carry.elapsed += h
 
 
-@njit(error_model="numpy")
+@part
 def _work(states, outputs, inputs):  # type: ignore[no-untyped-def]
     """Room for so many states, outputs and inputs."""
     return Work(
@@ -670,7 +670,7 @@ def _work(states, outputs, inputs):  # type: ignore[no-untyped-def]
     )
 
 
-@njit(error_model="numpy")
+@part
 def _run(problem, source, watch, work, carry, x, samples, states, forces, most):  # type: ignore[no-untyped-def]
     events = watch.table.shape[0]
     while True:
@@ -687,7 +687,7 @@ def _run(problem, source, watch, work, carry, x, samples, states, forces, most):
             return status
 
 
-_RUN = (_PROBLEM, _SOURCE, _WATCH, VECTOR, _CARRIES, VECTOR, VECTOR, MATRIX, MATRIX, int64, int64)
+_RUN = (_PROBLEM, SOURCE, _WATCH, VECTOR, _CARRIES, VECTOR, VECTOR, MATRIX, MATRIX, int64, int64)
 
 
 @kernel(int64(*_RUN), purpose="the solver")
@@ -750,7 +750,7 @@ _BATCH = types.NamedTuple(
 
 
 @kernel(
-    types.void(_PROBLEM, _SOURCE, _BATCH, _CARRIES, MATRIX, VECTOR, CUBE, CUBE, int64[::1], int64, int64),
+    types.void(_PROBLEM, SOURCE, _BATCH, _CARRIES, MATRIX, VECTOR, CUBE, CUBE, int64[::1], int64, int64),
     purpose="the solver of ensembles",
 )
 def run_many(problem, source, batch, carries, starts, samples, states, forces, status, outputs, most):  # type: ignore[no-untyped-def]

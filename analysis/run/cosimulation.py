@@ -22,13 +22,13 @@ from numpy.typing import NDArray
 from linkwork.errors import InputError, LinkworkError
 from linkwork.parameters import fmi_name
 
-from ..mechanisms import InitialState, Parameters, mechanism_of
+from ..mechanisms import InitialState, Parameters, mechanism_of, output_units
 from .events import RunInterrupted, interruptible, shown
 from .inputs import Inputs
 from .inputs import sample as sample_inputs
 from .prepared import Run
 from .simulation import sample_times, settings_of
-from .trajectory import UNITS, Trajectory
+from .trajectory import Trajectory
 
 #: Outputs that are angles in (-pi, pi]: they differ by what is left after whole turns.
 PRINCIPAL_ANGLES = ("coupler.angle", "rocker.angle")
@@ -311,6 +311,7 @@ def compare(a: Trajectory, b: Trajectory, *, tolerance: float = 1e-6) -> Compari
     if len(a) == 0 or len(a) != len(b) or not np.allclose(a.time, b.time, rtol=1e-12, atol=1e-15):
         ends = [f"{len(run)} samples" + (f" to t = {run.time[-1]:.9g} s" if len(run) else "") for run in (a, b)]
         raise InputError(f"the runs cannot be compared: {ends[0]}, and {ends[1]}")
+    units = output_units()
     largest = {name: float(np.max(np.abs(np.nan_to_num(a[name])), initial=0.0)) for name in a.names}
     differences = []
     for name in a.names:
@@ -323,31 +324,30 @@ def compare(a: Trajectory, b: Trajectory, *, tolerance: float = 1e-6) -> Compari
         differences.append(
             OutputDifference(
                 name=name,
-                unit=UNITS[name],
+                unit=units[name],
                 largest=float(difference.max()),
                 rms=float(np.sqrt(np.mean(difference**2))),
-                scale=max(largest[name], _floor(name, largest), np.finfo(float).tiny),
+                scale=max(largest[name], _floor(name, largest, units), np.finfo(float).tiny),
             )
         )
     return Comparison(differences=tuple(differences), tolerance=tolerance)
 
 
-def _floor(name: str, largest: dict[str, float]) -> float:
+def _floor(name: str, largest: dict[str, float], units: dict[str, str]) -> float:
     """Least scale of an output, from the largest magnitudes of the outputs like it."""
 
     def like(unit: str) -> float:
         residuals = ("closure.residual", "energy.residual")
-        return max(size for n, size in largest.items() if UNITS[n] == unit and n not in residuals)
+        return max((size for n, size in largest.items() if units[n] == unit and n not in residuals), default=0.0)
 
     if name.endswith(".angle"):
         return 1.0
-    lengths, speed = like("m"), largest["crank.speed"]
+    lengths, speed = like("m"), next((size for n, size in largest.items() if units[n] == "rad/s"), 0.0)
     if name == "closure.residual":
         return lengths
     if name == "energy.residual":
-        return like("J")
-    if name == "crank.speed":
-        return 0.0
+        # where there are no energies among the outputs, those of what turns and what is pushed
+        return like("J") or like("N.m") or 1.0
     scales = {
         "m": lengths,
         "m/s": lengths * speed,
@@ -358,4 +358,4 @@ def _floor(name: str, largest: dict[str, float]) -> float:
         "N.m": like("N") * lengths,
         "J": like("J"),
     }
-    return 1e-3 * scales[UNITS[name]]
+    return 1e-3 * scales.get(units[name], 0.0)

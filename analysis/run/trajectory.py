@@ -13,14 +13,10 @@ from numpy.typing import NDArray
 
 from linkwork.errors import InputError
 
-from ..mechanisms import FIVE_BAR, output_units
+from ..mechanisms import output_units
 
 if TYPE_CHECKING:
     import pandas
-
-#: Unit of each real output, by name.
-UNITS: Mapping[str, str] = MappingProxyType(output_units())
-
 
 @dataclass(frozen=True, slots=True)
 class Occurrence:
@@ -64,13 +60,12 @@ class Trajectory:
 
     time: NDArray[np.float64]
     values: NDArray[np.float64]
+    names: tuple[str, ...]
     status: int = 0
     message: str = ""
     events: tuple[Occurrence, ...] = ()
     source: str = ""
     statistics: Mapping[str, float] = field(default_factory=dict)
-
-    names: tuple[str, ...] = FIVE_BAR.output_names
 
     def __post_init__(self) -> None:
         if self.values.shape != (len(self.time), len(self.names)):
@@ -88,7 +83,8 @@ class Trajectory:
     @property
     def units(self) -> Mapping[str, str]:
         """Unit of each output."""
-        return MappingProxyType({name: UNITS[name] for name in self.names})
+        known = output_units()
+        return MappingProxyType({name: known[name] for name in self.names})
 
     def column(self, name: str) -> int:
         """Number of the column of an output.
@@ -107,7 +103,7 @@ class Trajectory:
         """Write time and all outputs to a CSV file whose header has names and units."""
         from ..files import io
 
-        columns = {"time [s]": self.time} | {f"{name} [{UNITS[name]}]": self[name] for name in self.names}
+        columns = {"time [s]": self.time} | {f"{name} [{unit}]": self[name] for name, unit in self.units.items()}
         return io.write_csv(path, columns)
 
     def to_dataframe(self) -> pandas.DataFrame:

@@ -1,0 +1,103 @@
+"""A driven pendulum: a mechanism of one freedom."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import pi
+from typing import NamedTuple
+
+from linkwork.mechanism import Channel, Equations, Freedom, Mechanism
+from linkwork.parameters import check_constants, check_initial, check_parameters
+from linkwork.variables import Variable, output, status_outputs, tolerance_parameter
+
+from . import equations
+from .equations import Constants
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Parameters:
+    """SI units."""
+
+    pendulum_inertia: float
+    pendulum_weight: float
+    pendulum_damping: float = 0.0
+
+    def __post_init__(self) -> None:
+        check_parameters(self, positive=("pendulum_inertia",), free_sign=(), signs={})
+        check_constants(self)
+
+    def constants(self) -> Constants:
+        """What the equations use."""
+        return Constants(self.pendulum_inertia, self.pendulum_damping, self.pendulum_weight)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Initial:
+    """State at the start: rad, rad/s."""
+
+    pendulum_angle: float = 0.0
+    pendulum_speed: float = 0.0
+
+    def __post_init__(self) -> None:
+        check_initial(self)
+
+
+class Published(NamedTuple):
+    """A set with a name."""
+
+    parameters: Parameters
+    initial: Initial
+    crank_speed: float
+    source: str
+
+
+VARIABLES = (
+    Variable("pendulum.inertia", "parameter", "kg.m2", "Moment of inertia", start=0.1, minimum=0.0),
+    Variable("pendulum.weight", "parameter", "N.m", "Greatest moment of its weight", start=2.0, minimum=0.0),
+    Variable("pendulum.damping", "parameter", "1", "Damping (N.m.s/rad)", start=0.02, minimum=0.0),
+    Variable("initial.pendulum_angle", "parameter", "rad", "Angle at the start"),
+    Variable("initial.pendulum_speed", "parameter", "rad/s", "Speed at the start"),
+    tolerance_parameter(),
+    Variable("drive.torque", "input", "N.m", "Torque on the pendulum"),
+    output("pendulum.angle", "rad", "Angle, counted on over full turns", "", "state", "position"),
+    output("pendulum.speed", "rad/s", "Speed", "", "state", "velocity"),
+    output("pendulum.acceleration", "rad/s2", "Angular acceleration"),
+    output("energy.residual", "J", "Energy balance", "", "state"),
+    *status_outputs(),
+)
+
+MECHANISM = Mechanism(
+    name="pendulum",
+    fmu="Pendulum",
+    title="Driven pendulum",
+    description="A damped pendulum driven by a torque",
+    notes=("One freedom.",),
+    parameters=Parameters,
+    initial=Initial,
+    published={
+        "pendulum-demo": Published(
+            Parameters(pendulum_inertia=0.1, pendulum_weight=2.0, pendulum_damping=0.02),
+            Initial(pendulum_speed=30.0),
+            30.0,
+            "made up for the tests",
+        )
+    },
+    freedoms=(Freedom("pendulum.angle", "pendulum.speed", ("pendulum_angle", "pendulum_speed"), period=2.0 * pi),),
+    channels=(Channel("drive.torque", "torque", freedom=0),),
+    variables=VARIABLES,
+    position_parameters=("initial.pendulum_angle",),
+    experiment=(0.0, 1.0, 1e-3, 1e-9),
+    modules=(equations,),
+    equations=Equations(
+        applied=equations.applied,
+        derivative=equations.derivative,
+        outputs=equations.outputs,
+        clearance=equations.clearance,
+        jump=equations.jump,
+        start=equations.start,
+        energy=equations.energy,
+    ),
+    check_assembly=lambda parameters, x: None,
+    error_scale=lambda parameters, x: (1.0, 10.0, 1.0, 1.0),
+    where=lambda x: f"angle {x[0]:.9g} rad",
+)

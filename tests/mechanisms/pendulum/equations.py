@@ -1,0 +1,56 @@
+"""A damped pendulum driven by a torque, angle th from the horizontal: J th'' = T - m g l cos(th) - c th'."""
+
+from __future__ import annotations
+
+from math import cos, sin
+from typing import NamedTuple
+
+State = tuple[float, float, float, float]
+
+
+class Constants(NamedTuple):
+    """J, c, m g l."""
+
+    inertia: float
+    damping: float
+    weight: float
+
+
+def applied(modes: tuple[float, ...], u: tuple[float, ...], p: Constants) -> float:
+    """The torque."""
+    return u[0]
+
+
+def acceleration(x: State, torque: float, p: Constants) -> float:
+    """Angular acceleration."""
+    return (torque - p.weight * cos(x[0]) - p.damping * x[1]) / p.inertia
+
+
+def derivative(x: State, torque: float, p: Constants) -> State:
+    """Time derivative of the state."""
+    return (x[1], acceleration(x, torque, p), p.damping * x[1] * x[1], torque * x[1])
+
+
+def energy(x: State, p: Constants) -> float:
+    """Mechanical energy (J)."""
+    return 0.5 * p.inertia * x[1] * x[1] + p.weight * sin(x[0])
+
+
+def outputs(x: State, torque: float, start_energy: float, p: Constants) -> tuple[float, ...]:
+    """All real outputs, in the order of the interface."""
+    return (x[0], x[1], acceleration(x, torque, p), energy(x, p) - start_energy + x[2] - x[3])
+
+
+def clearance(x: State, torque: float, p: Constants) -> float:
+    """There is no limit of assembly."""
+    return 1.0
+
+
+def jump(x: State, torque: float, u: tuple[float, ...], p: Constants) -> State:
+    """There is no commanded rate."""
+    return x
+
+
+def start(x: State, torque: float, p: Constants) -> State:
+    """A state at the start as it is."""
+    return x
