@@ -1,0 +1,213 @@
+"""Machine code of the equations, kernels that call it, and the cache that keeps kernels for the next process."""
+
+from __future__ import annotations
+
+import os
+import stat
+import tempfile
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from numba import float64, int64
+
+from analysis.mechanisms import FIVE_BAR, MECHANISMS, SLIDER_CRANK
+from analysis.numerics.codegen import VECTOR, MachineCode, cache_folder, evaluate, fingerprint, inner, kernel
+from analysis.run import compiled, machine
+from analysis.run.equations import CLEARANCE, DERIVATIVE, JUMP, OUTPUTS
+from linkwork.errors import LinkworkError
+from linkwork.mechanism import Mechanism
+from tests import slider_cranks, strategies
+from tests.fmu.runner import run_in_process
+
+casadi = pytest.importorskip("casadi")
+
+
+def call(mechanism: Mechanism, which: int, size: int, x: Any, modes: Any, u: Any, p: Any) -> np.ndarray:
+    """A function of the equations at one state."""
+    out = np.empty((1, size))
+    compiled.rows(
+        machine(mechanism).addresses[which], np.array(modes), np.array([*p, 0.3]), np.array([x]), np.array([u]), out
+    )
+    return out[0]
+
+
+@pytest.mark.parametrize("seed", range(20))
+@pytest.mark.parametrize("name", MECHANISMS)
+def test_machine_code_has_the_values_of_the_plain_functions(name: str, seed: int) -> None:
+    mechanism, equations = MECHANISMS[name], MECHANISMS[name].equations
+    case: Any = (strategies if mechanism is FIVE_BAR else slider_cranks).seeded(seed)
+    generator = np.random.default_rng(seed)
+    p, x = case.parameters.constants(), tuple(map(float, case.state))
+    u = tuple(generator.normal(size=len(mechanism.channels)).tolist())
+    for modes in np.ndindex(*[len(mode.values) for mode in mechanism.modes]):
+        flags = tuple(map(float, modes))
+        i = equations.applied(flags, u, p)
+        plain = {
+            DERIVATIVE: equations.derivative(x, i, p),
+            OUTPUTS: equations.outputs(x, i, 0.3, p),
+            CLEARANCE: (equations.clearance(x, i, p),),
+            JUMP: equations.jump(x, i, u, p),
+        }
+        for which, values in plain.items():
+            ours = call(mechanism, which, len(values), x, flags, u, p)
+            size = max(1.0, max(map(abs, values)))
+            assert ours == pytest.approx(values, rel=1e-11, abs=1e-13 * size)
+
+
+def test_configuration_that_does_not_exist_is_nan() -> None:
+    case = strategies.seeded(1)
+    x = (case.state[0], 100.0, *case.state[2:])
+    rates = call(FIVE_BAR, DERIVATIVE, 6, x, (0.0,), (0.0,) * 6, case.parameters.constants())
+    assert np.isnan(rates[2:4]).all()
+
+
+def test_equations_have_one_fingerprint_and_each_their_own() -> None:
+    assert machine(FIVE_BAR).fingerprint != machine(SLIDER_CRANK).fingerprint
+
+
+def function_of(expression: Any) -> Any:
+    symbols = [casadi.SX.sym("t"), *(casadi.SX.sym(name, 2) for name in "abcd")]
+    return casadi.Function("f", symbols, [casadi.densify(casadi.SX(expression(*symbols)))])
+
+
+@kernel(float64(int64, float64, VECTOR), purpose="a test")
+def value_at(address: Any, t: Any, a: Any) -> Any:
+    """First output of a function."""
+    out = np.empty(4)
+    evaluate(address, t, a, a, a, a, out)
+    return out[0]
+
+
+@pytest.mark.parametrize(
+    ("expression", "plain"),
+    [
+        (lambda t, a, *_: a[0] + t, lambda t, a: a[0] + t),
+        (lambda t, a, *_: (a[0] - a[1]) / (a[0] * t), lambda t, a: (a[0] - a[1]) / (a[0] * t)),
+        (lambda t, a, *_: casadi.sin(a[0]) * casadi.cos(a[1]), lambda t, a: np.sin(a[0]) * np.cos(a[1])),
+        (lambda t, a, *_: casadi.atan2(a[0], a[1]), lambda t, a: np.arctan2(a[0], a[1])),
+        (lambda t, a, *_: casadi.tanh(a[0]) + casadi.sqrt(a[0]), lambda t, a: np.tanh(a[0]) + np.sqrt(a[0])),
+        (lambda t, a, *_: casadi.fabs(-a[0] * a[0]) + 2 * a[1], lambda t, a: a[0] ** 2 + 2 * a[1]),
+        (lambda t, a, *_: 1 / a[0] - 3.5, lambda t, a: 1 / a[0] - 3.5),
+    ],
+)
+def test_every_operation(expression: Any, plain: Any) -> None:
+    a = np.array([0.7, 1.9])
+    code = MachineCode([function_of(expression)])
+    assert value_at(code.addresses["f"], 0.4, a) == pytest.approx(plain(0.4, a), rel=1e-15)
+
+
+def test_matrices_are_written_column_by_column() -> None:
+    symbols = [casadi.SX.sym("t"), *(casadi.SX.sym(name, 2) for name in "abcd")]
+    matrix = casadi.vertcat(casadi.horzcat(1.0, 2.0), casadi.horzcat(3.0, 4.0)) * symbols[1][0]
+    code = MachineCode([casadi.Function("f", symbols, [casadi.densify(matrix)])])
+    out = np.empty((1, 4))
+    one = np.ones(2)
+    compiled.rows(code.addresses["f"], one, one, np.array([[2.0, 0.0]]), np.array([[0.0, 0.0]]), out)
+    assert out[0].tolist() == [2.0, 6.0, 4.0, 8.0]
+
+
+def test_a_sparse_output_and_an_operation_without_counterpart_are_refused() -> None:
+    symbols = [casadi.SX.sym("t"), *(casadi.SX.sym(name, 2) for name in "abcd")]
+    with pytest.raises(LinkworkError, match="structural zeros"):
+        MachineCode([casadi.Function("f", symbols, [casadi.jacobian(symbols[1], symbols[1])])])
+    with pytest.raises(LinkworkError, match="no counterpart"):
+        MachineCode([casadi.Function("f", symbols, [casadi.erf(symbols[0])])])
+
+
+# --- The cache
+
+
+def _compile_and_run() -> dict[str, Any]:
+    from time import perf_counter
+
+    begun = perf_counter()
+    from analysis import Inputs, simulate, simulate_many
+    from analysis.run import compiled
+    from linkwork.five_bar.published import TABLE_3_1
+
+    run = simulate(TABLE_3_1, Inputs(speed=44.0), stop_time=0.1)
+    simulate_many([TABLE_3_1], Inputs(speed=44.0), stop_time=0.1)
+    kernels = [k.compiled.stats for k in (compiled.run, compiled.run_many, compiled.rows, compiled.channels)]
+    return {
+        "seconds": perf_counter() - begun,
+        "hits": sum(sum(stats.cache_hits.values()) for stats in kernels),
+        "misses": sum(sum(stats.cache_misses.values()) for stats in kernels),
+        "position": float(run["slider.position"][-1]),
+    }
+
+
+def test_second_process_finds_the_code_of_the_first(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("LINKWORK_CACHE_DIR", str(tmp_path / "cache"))
+    first = run_in_process(_compile_and_run, timeout=180.0)
+    second = run_in_process(_compile_and_run)
+    assert (first["hits"], first["misses"]) == (0, 4)
+    assert (second["hits"], second["misses"]) == (4, 0)
+    assert second["seconds"] < 0.5 * first["seconds"]
+    assert second["position"] == first["position"]
+    assert len(list((tmp_path / "cache").iterdir())) == 4
+    assert any((tmp_path / "cache").rglob("*.nbi"))
+
+
+def test_each_compilation_says_once_what_it_is_for(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("LINKWORK_CACHE_DIR", str(tmp_path / "cache"))
+
+    @inner
+    def helper(x: Any) -> Any:
+        return 2.0 * x
+
+    @kernel(float64(float64), purpose="an example")
+    def example(x: Any) -> Any:
+        return helper(x) + 1.0
+
+    assert example(2.0) == 5.0
+    assert example(3.0) == 7.0
+    assert capsys.readouterr().err == "linkwork: compiling an example, once on this machine ...\n"
+
+
+def test_fingerprint_follows_every_function_and_constant_that_is_compiled() -> None:
+    def with_helper(factor: float, source: str = "x * FACTOR") -> Any:
+        space: dict[str, Any] = {"FACTOR": factor, "inner": inner}
+        exec(f"@inner\ndef helper(x):\n    return {source}\ndef f(x):\n    return helper(x)\n", space)
+        return space["f"]
+
+    same = {fingerprint(with_helper(2.0)) for _ in range(3)}
+    assert len(same) == 1
+    others = {fingerprint(with_helper(3.0)), fingerprint(with_helper(2.0, "x + FACTOR"))}
+    assert len(same | others) == 3
+
+
+def test_folder_that_cannot_be_written_to_falls_back_to_a_temporary_one(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    blocked = tmp_path / "blocked"
+    blocked.touch()
+    monkeypatch.setenv("LINKWORK_CACHE_DIR", str(blocked / "below a file"))
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "temporary"))
+    (tmp_path / "temporary").mkdir()
+    folder = cache_folder("a" * 64)
+    assert folder.is_dir()
+    assert folder.is_relative_to(tmp_path / "temporary")
+    # the same again for the next process
+    assert cache_folder("a" * 64) == folder
+
+
+@pytest.mark.skipif(os.name == "nt", reason="permissions of POSIX")
+def test_temporary_folder_that_others_can_write_to_is_not_trusted(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    blocked = tmp_path / "blocked"
+    blocked.touch()
+    monkeypatch.setenv("LINKWORK_CACHE_DIR", str(blocked))
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    shared = cache_folder("b" * 64).parent
+    assert not stat.S_IMODE(shared.stat().st_mode) & 0o022
+    shared.chmod(0o777)
+    other = cache_folder("b" * 64)
+    assert other.is_dir()
+    assert not other.is_relative_to(shared)
