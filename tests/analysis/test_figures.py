@@ -37,8 +37,8 @@ def test_a_type_that_has_no_picture_is_named(picture) -> None:
 
 
 def test_comparison(run) -> None:
-    u = run["slider.position"]
-    figure = figures.plot_comparison(run.time, {"slider.position": (u, u + 1e-6, "m")}, title="case", labels=("a", "b"))
+    shifted = replace(run, time=run.time[:-1], values=run.values[:-1] + 1e-6)
+    figure = figures.plot_comparison(run, shifted, ["slider.position"], title="case", labels=("a", "b"))
     both, difference = figure.axes
     assert [line.get_label() for line in both.lines] == ["a", "b"]
     np.testing.assert_allclose(difference.lines[0].get_ydata(), 1e-6, rtol=1e-6)
