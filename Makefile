@@ -17,7 +17,7 @@ demo: $(RUN)
 
 quick: $(DEV)
 	$(PYTEST) --numprocesses auto -m 'not slow and not fmu' tests/plant $(addprefix tests/analysis/test_,$(addsuffix .py,\
-		areas charts continuation crossings drawings dual fourier io linkage startup symbolic two_rotations))
+		areas continuation crossings drawings dual events figures fourier inputs io linkage startup symbolic trajectory))
 
 test: $(DEV) lint
 	$(BIN)/python build_fmu.py
