@@ -1,4 +1,4 @@
-"""Pictures of the linkage: a still, an animation, the icon of the FMU."""
+"""Pictures of the five-bar: a still and an animation."""
 
 from __future__ import annotations
 
@@ -6,25 +6,22 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import cos, hypot, sin
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import matplotlib
 import numpy as np
-from matplotlib.animation import PillowWriter
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.figure import Figure
-from matplotlib.patches import Arc, Circle, FancyBboxPatch, Polygon, Rectangle
+from matplotlib.patches import Arc, Circle, Polygon
 from numpy.typing import ArrayLike, NDArray
 
 from linkwork.errors import AssemblyError, InputError
 from linkwork.five_bar import kinematics
 from linkwork.five_bar.parameters import FiveBarParameters
 
-from .style import STYLE, finish
-
-if TYPE_CHECKING:
-    from ..run.trajectory import Trajectory
+from ..run.trajectory import Trajectory
+from .animation import gif
+from .dispatch import plot
+from .style import STYLE, Figure, finish
 
 #: Colours of the links in drawings.
 CRANK, COUPLER, ROCKER, SLIDER, GROUND, TRACE = "#D55E00", "#0072B2", "#009E73", "#5B6770", "#333333", "#CC79A7"
@@ -257,6 +254,7 @@ def _distance(point: NDArray[np.float64], start: NDArray[np.float64], end: NDArr
     return hypot(*(point - start - share * way))
 
 
+@plot.register
 def draw_linkage(
     parameters: FiveBarParameters,
     crank_angle: float,
@@ -322,20 +320,17 @@ def animate_linkage(
     InputError
         If the run has fewer than two samples or there are fewer than two frames.
     """
-    if len(trajectory) < 2 or frames < 2:
-        raise InputError(f"an animation of {len(trajectory)} samples in {frames} frames: both must be at least 2")
-    path = Path(path)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    time, u = trajectory.time, CM_PER_METRE * trajectory["slider.position"]
+    if len(trajectory) < 2:
+        raise InputError(f"an animation of {len(trajectory)} samples: there must be at least 2")
+    time, slides = trajectory.time, trajectory["slider.position"]
+    u = CM_PER_METRE * slides
     trace = CM_PER_METRE * np.column_stack([trajectory["coupler.point.x"], trajectory["coupler.point.y"]])
     chosen = np.unique(np.searchsorted(time, np.linspace(time[0], time[-1], frames)).clip(0, len(time) - 1))
-    angles, slides = trajectory["crank.angle"], trajectory["slider.position"]
-    configurations = [_pins(parameters, float(angles[i]), float(slides[i])) for i in chosen]
+    configurations = [_pins(parameters, float(trajectory["crank.angle"][i]), float(slides[i])) for i in chosen]
     scene = _Scene(parameters, configurations)
     width, height = scene.high - scene.low
     with matplotlib.rc_context(STYLE):
         figure = Figure(figsize=(5.0, 5.0 * height / width + 1.9))
-        FigureCanvasAgg(figure)
         above, below = figure.subplots(2, 1, height_ratios=(5.0 * height / width, 1.7))
         if title:
             figure.suptitle(title, fontsize=10.5, fontweight="bold")
@@ -344,52 +339,12 @@ def animate_linkage(
         (dot,) = below.plot([], [], "o", color=SLIDER, markersize=5)
         below.set_xlabel("time [s]")
         below.set_ylabel("slider position [cm]")
-        writer = PillowWriter(fps=frames_per_second, metadata={})
-        with writer.saving(figure, str(path), dpi=80):
+        with gif(figure, path, frames=frames, frames_per_second=frames_per_second) as add_frame:
             for i, q in zip(chosen, configurations):
                 above.clear()
                 scene.prepare(above)
                 scene.draw(above, q, letters=False, trace=trace[: i + 1])
                 done.set_data(time[: i + 1], u[: i + 1])
                 dot.set_data(time[i : i + 1], u[i : i + 1])
-                if i == chosen[0]:
-                    # laid out once: the panels must not creep from frame to frame
-                    figure.draw_without_rendering()
-                    figure.set_layout_engine("none")
-                writer.grab_frame()
-    return path
-
-
-def icon(path: str | Path) -> Path:
-    """Write the icon of the component: the linkage in a few strokes, PNG, 200 by 200 pixels, the same bytes each time."""
-    path = Path(path)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    a, b, c, d = np.array([[38.0, 56.0], [58.0, 92.0], [118.0, 162.0], [136.0, 56.0]])
-    with matplotlib.rc_context({"lines.solid_capstyle": "round", "lines.solid_joinstyle": "round"}):
-        figure = Figure(figsize=(2.0, 2.0), facecolor="none")
-        FigureCanvasAgg(figure)
-        axis = figure.add_axes((0.0, 0.0, 1.0, 1.0))
-        axis.set(xlim=(0.0, 200.0), ylim=(0.0, 200.0))
-        axis.set_axis_off()
-        card = FancyBboxPatch((8, 8), 184, 184, boxstyle="round,pad=0,rounding_size=26", facecolor="white")
-        card.set(edgecolor="#B8C2C9", linewidth=2.0)
-        axis.add_patch(card)
-        axis.plot([20.0, 180.0], [37.0, 37.0], color=GROUND, linewidth=2.4)
-        for x in range(28, 184, 16):
-            axis.plot([x, x - 9.0], [36.0, 26.0], color=GROUND, linewidth=1.2)
-        axis.add_patch(
-            Polygon([a, (a[0] - 15.0, a[1] - 19.0), (a[0] + 15.0, a[1] - 19.0)], facecolor="#E4E8EB", edgecolor=GROUND)
-        )
-        axis.add_patch(Rectangle(d - (19.0, 19.0), 38.0, 38.0, facecolor="#C9D1D6", edgecolor=SLIDER, linewidth=1.6))
-        spring = (
-            np.array([0.0, 2.5, 5.0, 9.0, 13.0, 17.0, 19.5, 22.0]),
-            np.array([0.0, 0.0, 8.0, -8.0, 8.0, -8.0, 0.0, 0.0]),
-        )
-        axis.plot(d[0] + 19.0 + spring[0], d[1] + spring[1], color=SLIDER, linewidth=1.8)
-        axis.plot([178.0, 178.0], [37.0, 76.0], color=GROUND, linewidth=2.4)
-        for (start, end), colour in (((d, c), ROCKER), ((b, c), COUPLER), ((a, b), CRANK)):
-            axis.plot(*np.array([start, end]).T, color=colour, linewidth=6.5)
-        for pin in (a, b, c, d):
-            axis.add_patch(Circle(pin, 7.0, facecolor="white", edgecolor="black", linewidth=1.8, zorder=5))
-        figure.savefig(path, dpi=100, metadata={"Software": None})
-    return path
+                add_frame()
+    return Path(path)
