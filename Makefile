@@ -46,7 +46,7 @@ bench: $(DEV)
 	for part in solvers fmu stability synthesis slider_crank; do $(BIN)/python -m benchmarks.$$part || exit; done
 
 $(RUN): pyproject.toml | $(BIN)/pip
-	$(BIN)/pip install --quiet --editable .
+	$(BIN)/pip install --quiet --editable '.[symbolic]'
 	@touch $@
 
 $(DEV): pyproject.toml | $(BIN)/pip

@@ -15,31 +15,10 @@ from rich.table import Table
 
 from linkwork.errors import InputError, Interrupted, LinkworkError
 
-from . import CHECK_FAILED, ENDED_EARLY, INTERRUPTED, WRONG
-
-__all__ = [
-    "CHECK_FAILED",
-    "ENDED_EARLY",
-    "INTERRUPTED",
-    "WRONG",
-    "case_options",
-    "changes",
-    "chosen_case",
-    "console",
-    "errors",
-    "five_bar_case",
-    "handled",
-    "number_or_text",
-    "out_option",
-    "plot_option",
-    "prepare_solver",
-    "print_error",
-    "print_table",
-    "print_written",
-    "quantity",
-    "set_option",
-    "tolerance_option",
-]
+from . import CHECK_FAILED as CHECK_FAILED
+from . import ENDED_EARLY as ENDED_EARLY
+from . import INTERRUPTED as INTERRUPTED
+from . import WRONG as WRONG
 
 #: Wide enough for the tables where the output goes to a file or a pipe.
 console = Console() if sys.stdout.isatty() else Console(width=120)

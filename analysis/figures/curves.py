@@ -193,7 +193,11 @@ def lay_out(
 
 def draw_panel(axis: Axes, panel: Panel) -> None:
     for boundaries in panel.filled:
-        axis.add_patch(PathPatch(_outline(boundaries), facecolor="#56B4E9", alpha=0.22, edgecolor="none", zorder=0))
+        # boundaries that run clockwise are holes in the others
+        outline = Outline.make_compound_path(
+            *(Outline(np.vstack([ring, ring[:1]]), closed=True) for ring in boundaries)
+        )
+        axis.add_patch(PathPatch(outline, facecolor="#56B4E9", alpha=0.22, edgecolor="none", zorder=0))
     for number, curve in enumerate(panel.curves):
         axis.plot(
             curve.x,
@@ -207,10 +211,8 @@ def draw_panel(axis: Axes, panel: Panel) -> None:
             markeredgewidth=1.2,
             zorder=3 if curve.marker else 2,
         )
-    axis.set_xlabel(panel.x_label)
-    axis.set_ylabel(panel.y_label)
-    if panel.title:
-        axis.set_title(panel.title, fontsize=9)
+    axis.set(xlabel=panel.x_label, ylabel=panel.y_label)
+    axis.set_title(panel.title, fontsize=9)
     if "x" in panel.logarithmic:
         axis.set_xscale("log")
     if "y" in panel.logarithmic:
@@ -242,12 +244,3 @@ def draw_panel(axis: Axes, panel: Panel) -> None:
         outside: dict[str, Any] = {"loc": "upper left", "bbox_to_anchor": (1.0, 1.0)}
         where = outside if panel.legend_at == "outside" else {"loc": panel.legend_at}
         axis.legend(title=panel.legend or None, fontsize=8, title_fontsize=8, alignment="left", **where)
-
-
-def _outline(boundaries: Sequence[NDArray[np.float64]]) -> Outline:
-    """One path of closed boundaries; those that run clockwise are holes in the others."""
-    vertices, codes = [], []
-    for ring in boundaries:
-        vertices += [ring, ring[:1]]
-        codes += [Outline.MOVETO] + [Outline.LINETO] * (len(ring) - 1) + [Outline.CLOSEPOLY]
-    return Outline(np.concatenate(vertices), codes)

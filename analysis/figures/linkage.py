@@ -13,6 +13,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.patches import Arc, Circle, Polygon
 from numpy.typing import ArrayLike, NDArray
+from shapely import MultiLineString, Point
 
 from linkwork.errors import AssemblyError, InputError
 from linkwork.five_bar import kinematics
@@ -180,14 +181,12 @@ class _Scene:
         self._line(axis, [q.d, q.c], color=ROCKER, **width, zorder=6)
         self._line(axis, [q.b, q.c], color=COUPLER, **width, zorder=7)
         self._line(axis, [a, q.b], color=CRANK, **width, zorder=8)
-        for pin in (a, q.b, q.c, q.d):
-            axis.add_patch(
-                Circle(tuple(pin), 0.36 * self.unit, facecolor="white", edgecolor="black", linewidth=1.2, zorder=9)
-            )
+        dots = [(pin, 0.36, "white", 1.2, 9) for pin in (a, q.b, q.c, q.d)]
         if self.parameters.coupler_point_distance:
-            axis.add_patch(
-                Circle(tuple(q.p), 0.24 * self.unit, facecolor=TRACE, edgecolor="black", linewidth=0.9, zorder=10)
-            )
+            dots.append((q.p, 0.24, TRACE, 0.9, 10))
+        for pin, radius, colour, edge, order in dots:
+            look = {"facecolor": colour, "edgecolor": "black", "linewidth": edge, "zorder": order}
+            axis.add_patch(Circle((pin[0], pin[1]), radius * self.unit, **look))
 
     def _letters(self, axis: Axes, q: _Pins) -> None:
         unit = self.unit
@@ -204,15 +203,8 @@ class _Scene:
         # each pin's letter goes where it has most room
         centre = (q.b + q.c + q.d) / 3.0
         a = np.zeros(2)
-        lines = [
-            (a, q.b),
-            (q.b, q.c),
-            (q.c, q.d),
-            (q.b, q.p),
-            (q.c, q.p),
-            (a, np.array([0.0, -2.0 * unit])),
-            (a, self.zero),
-        ]
+        foot = np.array([0.0, -2.0 * unit])
+        lines = MultiLineString([(a, q.b), (q.b, q.c), (q.c, q.d), (q.b, q.p), (q.c, q.p), (a, foot), (a, self.zero)])
         taken = [theta]
         directions = np.radians(np.arange(0.0, 360.0, 15.0))
         pins = {"A": a, "B": q.b, "C": q.c} | ({"P": q.p} if self.parameters.coupler_point_distance else {})
@@ -220,8 +212,7 @@ class _Scene:
             places = pin + 1.15 * unit * np.column_stack([np.cos(directions), np.sin(directions)])
             room = [
                 min(
-                    *(_distance(place, *line) for line in lines),
-                    *(0.6 * hypot(*(place - other)) for other in (*taken, *pins.values())),
+                    lines.distance(Point(place)), *(0.6 * hypot(*(place - other)) for other in (*taken, *pins.values()))
                 )
                 for place in places
             ]
@@ -245,13 +236,6 @@ class _Scene:
 def _write(axis: Axes, point: NDArray[np.float64], words: str, **options: Any) -> None:
     look: dict[str, Any] = {"ha": "center", "va": "center", "fontsize": 10.5, "zorder": 11}
     axis.text(point[0], point[1], words, **look | options)
-
-
-def _distance(point: NDArray[np.float64], start: NDArray[np.float64], end: NDArray[np.float64]) -> float:
-    """Distance of a point from a straight line between two others."""
-    way = end - start
-    share = min(1.0, max(0.0, float((point - start) @ way) / max(float(way @ way), 1e-12)))
-    return hypot(*(point - start - share * way))
 
 
 @plot.register
