@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
+import pkgutil
 import re
 import shlex
 import shutil
@@ -77,6 +78,12 @@ def test_links_in_the_documentation_lead_somewhere():
     for page in (*ROOT.glob("*.md"), *(ROOT / "docs").glob("*.md")):
         for target in re.findall(r"\]\(([^)#:]+)\)", page.read_text()):
             assert (page.parent / target).exists(), f"{page.name}: {target}"
+
+
+def test_names_of_modules_in_the_documentation_are_right():
+    for page in (*ROOT.glob("*.md"), *(ROOT / "docs").glob("*.md")):
+        for name in re.findall(r"`((?:analysis|linkwork|tests|benchmarks)\.[\w.]+)`", page.read_text()):
+            assert pkgutil.resolve_name(name), page.name
 
 
 def test_the_code_of_the_readme_runs(tmp_path):
