@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence
 from functools import reduce, wraps
+from itertools import repeat
 from pathlib import Path
 from typing import Any
 
@@ -34,16 +35,6 @@ def print_written(paths: Iterable[Path]) -> None:
     """Name the files that were written."""
     for path in paths:
         console.print(f"wrote {path}", highlight=False, markup=False, soft_wrap=True)
-
-
-def print_table(title: str, headings: Sequence[str], rows: Iterable[Sequence[str]], *, right: Sequence[str]) -> None:
-    """Print a table; columns of the headings in ``right`` are aligned on the right, as numbers are."""
-    grid = Table(title=escape(title))
-    for heading in headings:
-        grid.add_column(escape(heading), justify="right" if heading in right else "left")
-    for row in rows:
-        grid.add_row(*map(escape, row), style="red" if "FAIL" in row else None)
-    console.print(grid)
 
 
 def handled(command: Callable[..., Any]) -> Callable[..., Any]:
@@ -187,3 +178,32 @@ def five_bar_case(file: str | None, published: str | None, settings: Sequence[st
             f"{file or published} is a case of the {mechanism.name}: this command is for cases of the {FIVE_BAR.name}"
         )
     return case
+
+
+def show_table(
+    title: str,
+    headings: Sequence[str],
+    rows: Iterable[Sequence[str]],
+    *,
+    words: Collection[str] = (),
+    styles: Iterable[str | None] = repeat(None),
+) -> None:
+    """Print a table.
+
+    Parameters
+    ----------
+    title : str
+    headings : sequence of str
+        Of the columns; none for a list of names and values.
+    rows : iterable of sequence of str
+    words : collection of str
+        The headings of columns of words, which are aligned to the left; the others are of numbers.
+    styles : iterable of str, optional
+        Of the rows, in rich's terms.
+    """
+    grid = Table(title=escape(title), title_justify="left", show_header=bool(headings))
+    for heading in headings:
+        grid.add_column(escape(heading), justify="left" if heading in words else "right")
+    for row, style in zip(rows, styles):
+        grid.add_row(*(escape(cell) for cell in row), style=style)
+    console.print(grid)

@@ -26,9 +26,9 @@ from .common import (
     plot_option,
     prepare_solver,
     print_error,
-    print_table,
     print_written,
     quantity,
+    show_table,
     tolerance_option,
 )
 
@@ -151,11 +151,11 @@ def _print_extremes(title: str, result: Any) -> None:
     """Print least, greatest and last value of each output of a run, and its events."""
     headings = ("output", "unit", "least", "greatest", "at the end")
     columns = ((name, result[name]) for name in result.names)
-    print_table(
+    show_table(
         f"{title}  ({result.source}, {len(result)} samples to t = {result.time[-1]:.6g} s)",
         headings,
         [(name, result.units[name], *(f"{v:.6g}" for v in (x.min(), x.max(), x[-1]))) for name, x in columns],
-        right=headings[2:],
+        words=headings[:2],
     )
     for event in result.events:
         console.print(f"{event.name} at t = {event.time:.9g} s", highlight=False)
@@ -277,22 +277,16 @@ def _write_comparison(stem: Path, title: str, in_process: Any, through_fmu: Any)
 
 
 def _print_comparison(title: str, comparison: Any) -> None:
-    headings = ("output", "unit", "largest difference", "rms", "relative", "verdict")
-    print_table(
+    verdicts = ["pass" if d.relative <= comparison.tolerance else "FAIL" for d in comparison.differences]
+    show_table(
         f"{title}, tolerance {comparison.tolerance:g}",
-        headings,
+        ("output", "unit", "largest difference", "rms", "relative", "verdict"),
         [
-            (
-                d.name,
-                d.unit,
-                f"{d.largest:.2e}",
-                f"{d.rms:.2e}",
-                f"{d.relative:.1e}",
-                "pass" if d.relative <= comparison.tolerance else "FAIL",
-            )
-            for d in comparison.differences
+            (d.name, d.unit, f"{d.largest:.2e}", f"{d.rms:.2e}", f"{d.relative:.1e}", verdict)
+            for d, verdict in zip(comparison.differences, verdicts)
         ],
-        right=headings[2:5],
+        words=("output", "unit", "verdict"),
+        styles=[None if verdict == "pass" else "red" for verdict in verdicts],
     )
 
 
@@ -315,7 +309,7 @@ def info(what: str | None) -> None:
 
     if what is None:
         sets = [(name, entry.source, f"{entry.crank_speed / RAD_S_PER_RPM:g}") for name, entry in PUBLISHED.items()]
-        print_table("published sets", ("name", "source", "speed [rpm]"), sets, right=())
+        show_table("published sets", ("name", "source", "speed [rpm]"), sets, words=("name", "source"))
         place = cache_folder()
         console.print(f"linkwork {__version__}; compiled code is kept in {place}", highlight=False, soft_wrap=True)
     elif what in PUBLISHED:
@@ -341,7 +335,7 @@ def _print_parameters(title: str, parameters: Any) -> None:
     mechanism = mechanism_of(parameters)
     values = [(v, getattr(parameters, field_name(v.name), None)) for v in mechanism.variables.PARAMETERS]
     rows = [(v.name, f"{value:.9g}", v.unit, v.description) for v, value in values if value is not None]
-    print_table(title, ("parameter", "value", "unit", "meaning"), rows, right=("value",))
+    show_table(title, ("parameter", "value", "unit", "meaning"), rows, words=("parameter", "unit", "meaning"))
     if mechanism is not FIVE_BAR:
         console.print("where it can be assembled, dead centres, stroke: linkwork slider-crank info", highlight=False)
         return
@@ -365,11 +359,11 @@ def _print_fmu(path: Path) -> None:
             return ""
         return f"{float(variable.start):.6g}" if variable.type == "Real" else str(variable.start)
 
-    print_table(
+    show_table(
         f"{description.modelName} {description.version}, FMI {description.fmiVersion}, {description.guid}",
         ("variable", "causality", "start", "unit", "description"),
         [(v.name, v.causality, start(v), v.unit or "", v.description) for v in description.modelVariables],
-        right=("start",),
+        words=("variable", "causality", "unit", "description"),
     )
     problems = validate_fmu(str(path))
     console.print("; ".join(problems) or "valid", style="red" if problems else "green")
