@@ -1,42 +1,61 @@
-# make demo: the main job on a fresh machine; make test: the tests. Each makes .venv itself.
+# make demo: both FMUs built, run and checked. make quick, test, test-all: less or more of the tests. Each makes .venv itself.
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
-READY := $(VENV)/.ready
+# what is installed: the package alone, or with all that its development needs
+RUN := $(VENV)/.run
+DEV := $(VENV)/.dev
+PYTEST := $(BIN)/python -m pytest
+# every file of tests on one core, so that its fixtures are made once; the file that takes longest goes first
+PARALLEL := --numprocesses auto --dist loadfile tests/test_docs.py tests
 
-.PHONY: demo test lint figures bench clean
+.PHONY: demo quick test test-all lint docs figures bench clean
 
-demo: $(READY)
+demo: $(RUN)
 	$(BIN)/python build_fmu.py
 	$(BIN)/linkwork check table-3.1 slider-crank-torque --method compiled --method Radau --out out
 
-test: $(READY) lint
-	$(BIN)/python build_fmu.py
-	# the file that takes longest goes first, lest one core wait for it at the end
-	$(BIN)/python -m pytest --numprocesses auto --dist loadfile tests/test_docs.py tests
+quick: $(DEV)
+	$(PYTEST) --numprocesses auto -m 'not slow and not fmu' tests/plant $(addprefix tests/analysis/test_,$(addsuffix .py,\
+		areas continuation crossings drawings dual events figures fourier inputs io linkage startup symbolic trajectory))
 
-lint: $(READY)
+test: $(DEV) lint
+	$(BIN)/python build_fmu.py
+	$(PYTEST) -m 'not slow' $(PARALLEL)
+
+test-all: $(DEV) lint
+	$(BIN)/python build_fmu.py
+	$(PYTEST) $(PARALLEL)
+
+lint: $(DEV)
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
+	$(BIN)/python docs/generate.py --check
 
-figures: $(READY)
+# what the documentation repeats of the code; FIGURES=1 computes the pages and pictures of the theses' figures too (an hour)
+docs: $(DEV)
+	$(BIN)/python docs/generate.py $(if $(FIGURES),--figures)
+
+figures: $(RUN)
 	$(BIN)/linkwork figures --out out/figures
 
-bench: $(READY)
+bench: $(DEV)
 	$(BIN)/pip install --quiet --editable '.[dev,bench]'
-	$(BIN)/python -m benchmarks.solvers
-	$(BIN)/python -m benchmarks.fmu
-	$(BIN)/python -m benchmarks.stability
-	$(BIN)/python -m benchmarks.synthesis
-	$(BIN)/python -m benchmarks.slider_crank
+	for part in solvers fmu stability synthesis slider_crank; do $(BIN)/python -m benchmarks.$$part || exit; done
 
-$(READY): pyproject.toml
+$(RUN): pyproject.toml | $(BIN)/pip
+	$(BIN)/pip install --quiet --editable '.[symbolic]'
+	@touch $@
+
+$(DEV): pyproject.toml | $(BIN)/pip
+	$(BIN)/pip install --quiet --editable '.[dev]'
+	@touch $@ $(RUN)
+
+$(BIN)/pip:
 	@$(PYTHON) -c 'import sys; sys.exit(0 if sys.version_info >= (3, 11) else "Linkwork needs Python 3.11 or newer: set PYTHON=python3.x")'
 	$(PYTHON) -m venv $(VENV)
-	$(BIN)/python -m pip install --quiet --editable '.[dev]'
-	@touch $(READY)
 
 clean:
 	rm -rf $(VENV) build out

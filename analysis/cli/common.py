@@ -1,27 +1,40 @@
-"""What the commands share: how they speak, how they fail, and which case they are about."""
+"""What the commands share: options, console output, exit codes, and the case that a command is about."""
 
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Sequence
-from functools import wraps
+from collections.abc import Callable, Collection, Iterable, Sequence
+from functools import reduce, wraps
+from itertools import repeat
 from pathlib import Path
 from typing import Any
 
 import click
 from rich.console import Console
+from rich.markup import escape
+from rich.table import Table
 
 from linkwork.errors import InputError, Interrupted, LinkworkError
 
-WRONG = 1
-ENDED_EARLY = 3
-CHECK_FAILED = 4
-INTERRUPTED = 130
-
+from . import CHECK_FAILED as CHECK_FAILED
+from . import ENDED_EARLY as ENDED_EARLY
+from . import INTERRUPTED as INTERRUPTED
+from . import WRONG as WRONG
 
 #: Wide enough for the tables where the output goes to a file or a pipe.
 console = Console() if sys.stdout.isatty() else Console(width=120)
 errors = Console(stderr=True)
+
+
+def print_error(text: str, style: str = "yellow") -> None:
+    """Print a sentence on standard error: a note in yellow, an error in red."""
+    errors.print(text, style=style, markup=False, highlight=False, soft_wrap=True)
+
+
+def print_written(paths: Iterable[Path]) -> None:
+    """Name the files that were written."""
+    for path in paths:
+        console.print(f"wrote {path}", highlight=False, markup=False, soft_wrap=True)
 
 
 def handled(command: Callable[..., Any]) -> Callable[..., Any]:
@@ -32,30 +45,65 @@ def handled(command: Callable[..., Any]) -> Callable[..., Any]:
         try:
             return command(*arguments, **options)
         except Interrupted as error:
-            errors.print(str(error), style="yellow", markup=False, highlight=False, soft_wrap=True)
-            sys.exit(INTERRUPTED)
+            text, style, code = str(error), "yellow", INTERRUPTED
         except LinkworkError as error:
-            errors.print(f"error: {error}", style="red", markup=False, highlight=False, soft_wrap=True)
-            sys.exit(WRONG)
+            text, style, code = f"error: {error}", "red", WRONG
         except OSError as error:
-            errors.print(f"error: {error.filename or 'a file'}: {error.strerror or error}", style="red", markup=False)
-            sys.exit(WRONG)
+            text, style, code = f"error: {error.filename or 'a file'}: {error.strerror or error}", "red", WRONG
         except KeyboardInterrupt:
-            errors.print("interrupted", style="yellow")
-            sys.exit(INTERRUPTED)
+            text, style, code = "interrupted", "yellow", INTERRUPTED
+        print_error(text, style)
+        sys.exit(code)
 
     return run
 
 
-def tolerance_option(context: click.Context, parameter: click.Parameter, value: float | None) -> float | None:
-    # written so that NaN, which compares with nothing, is refused too
+def check_tolerance(context: click.Context, parameter: click.Parameter, value: float | None) -> float | None:
+    """Callback of an option that is a tolerance; written so that NaN is refused too."""
     if value is not None and not 0.0 < value <= 1.0:
         raise click.BadParameter(f"{value} is not between 0 and 1")
     return value
 
 
+def tolerance_option(*names: str, default: float | None = None, help: str) -> Callable[..., Any]:
+    """An option that is a tolerance, between 0 and 1."""
+    return click.option(
+        *(names or ["--tolerance"]),
+        type=float,
+        callback=check_tolerance,
+        default=default,
+        show_default=default is not None,
+        help=help,
+    )
+
+
+def out_option(default: str = "out", help: str = "Folder for CSV and plots.") -> Callable[..., Any]:
+    """The option --out."""
+    return click.option("--out", default=default, show_default=True, type=click.Path(file_okay=False), help=help)
+
+
+def set_option(example: str) -> Callable[..., Any]:
+    """The option --set, which can be given often; ``example`` ends the sentence "Change a value, such as"."""
+    return click.option(
+        "--set", "settings", multiple=True, metavar="NAME=VALUE", help=f"Change a value, such as {example}."
+    )
+
+
+plot_option = click.option("--plot/--no-plot", default=True, show_default=True, help="Whether to write a plot.")
+
+
+def case_options(published: Iterable[str]) -> Callable[..., Any]:
+    """The argument CASE, --published with these sets, and --set: what `chosen_case` takes."""
+    options = (
+        click.argument("case", required=False, type=click.Path(exists=True, dir_okay=False)),
+        click.option("--published", metavar="NAME", help=f"A published set instead: {', '.join(published)}."),
+        set_option("slider.stiffness='2e6 dyn/cm' or drive.speed='300 rpm'; bare numbers are in SI"),
+    )
+    return lambda command: reduce(lambda done, option: option(done), reversed(options), command)
+
+
 def number_or_text(text: str) -> bool | int | float | str:
-    """A bare number on the command line is in SI, true and false are what they are; anything else is a text with its unit."""
+    """A value of the command line: true, false, a bare number in SI, or else a text with its unit."""
     if text in ("true", "false"):
         return text == "true"
     for kind in (int, float):
@@ -66,8 +114,15 @@ def number_or_text(text: str) -> bool | int | float | str:
     return text
 
 
+def quantity(text: str, unit: str, option: str) -> float:
+    """The value of an option in SI, from a text with its unit or a bare number."""
+    from ..files import io
+
+    return io.quantity(number_or_text(text), unit, option)
+
+
 def changes(settings: Sequence[str], read: Callable[[str], Any], example: str) -> dict[str, Any]:
-    """Values by dotted name from what was given as ``--set NAME=VALUE``."""
+    """Values by dotted name from the options ``--set NAME=VALUE``."""
     values: dict[str, Any] = {}
     for setting in settings:
         name, equals, text = setting.partition("=")
@@ -90,6 +145,22 @@ def prepare_solver(*parameters: Any, orbits: bool = False) -> None:
             from ..periodic import orbit_kernels  # noqa: F401
 
 
+def chosen_case(file: str | None, published: str | None, settings: Sequence[str]) -> Any:
+    """The case of a file or a published set, with the changes of ``--set``."""
+    from ..files import io
+    from ..run.case import published_case
+
+    if (file is None) == (published is None):
+        raise click.UsageError("give either a case file or --published NAME")
+    overrides = changes(settings, number_or_text, "slider.stiffness='2e6 dyn/cm'")
+    if file is not None:
+        return io.load_case(file, overrides)
+    assert published is not None
+    if overrides:
+        return io.case_from({"published": published}, folder=Path.cwd(), title=published, overrides=overrides)
+    return published_case(published)
+
+
 def five_bar_case(file: str | None, published: str | None, settings: Sequence[str]) -> Any:
     """The case that a command for five-bars is about.
 
@@ -109,16 +180,30 @@ def five_bar_case(file: str | None, published: str | None, settings: Sequence[st
     return case
 
 
-def chosen_case(file: str | None, published: str | None, settings: Sequence[str]) -> Any:
-    from ..files import io
-    from ..run.case import published_case
+def show_table(
+    title: str,
+    headings: Sequence[str],
+    rows: Iterable[Sequence[str]],
+    *,
+    words: Collection[str] = (),
+    styles: Iterable[str | None] = repeat(None),
+) -> None:
+    """Print a table.
 
-    if (file is None) == (published is None):
-        raise click.UsageError("give either a case file or --published NAME")
-    overrides = changes(settings, number_or_text, "slider.stiffness='2e6 dyn/cm'")
-    if file is not None:
-        return io.load_case(file, overrides)
-    assert published is not None
-    if overrides:
-        return io.case_from({"published": published}, folder=Path.cwd(), title=published, overrides=overrides)
-    return published_case(published)
+    Parameters
+    ----------
+    title : str
+    headings : sequence of str
+        Of the columns; none for a list of names and values.
+    rows : iterable of sequence of str
+    words : collection of str
+        The headings of columns of words, which are aligned to the left; the others are of numbers.
+    styles : iterable of str, optional
+        Of the rows, in rich's terms.
+    """
+    grid = Table(title=escape(title), title_justify="left", show_header=bool(headings))
+    for heading in headings:
+        grid.add_column(escape(heading), justify="left" if heading in words else "right")
+    for row, style in zip(rows, styles):
+        grid.add_row(*(escape(cell) for cell in row), style=style)
+    console.print(grid)

@@ -12,7 +12,7 @@ import click
 from rich.markup import escape
 from rich.table import Table
 
-from .common import INTERRUPTED, changes, console, errors, handled
+from .common import INTERRUPTED, changes, console, errors, handled, print_written
 
 
 def settings_of(settings: Sequence[str]) -> dict[str, Any]:
@@ -25,12 +25,6 @@ def settings_of(settings: Sequence[str]) -> dict[str, Any]:
             return text
 
     return changes(settings, value, "constraints.largest_link='300 mm'")
-
-
-def wrote(paths: Sequence[Path]) -> None:
-    """Tell what was written."""
-    for path in paths:
-        console.print(f"wrote {path}", highlight=False, soft_wrap=True)
 
 
 def show_solutions(title: str, solutions: Sequence[Any]) -> None:
@@ -176,7 +170,7 @@ def synthesize(
     written += write_solution(result.best, folder, chosen.title, make=chosen.make, plots=plots, animate=animate)
     if plots:
         written.append(io.save_figure(result.plot(title=chosen.title), folder / "alternatives.png"))
-    wrote(written)
+    print_written(written)
     if not result.best.verdicts.sound:
         errors.print(
             f"note: none of them is free of defects: the first has {result.best.verdicts}",
@@ -219,4 +213,4 @@ def _trade_off(traded: Any, title: str, folder: Path, plots: bool) -> None:
     written = [traded.to_csv(folder / "trade-off.csv")]
     if plots:
         written.append(io.save_figure(traded.plot(title=title), folder / "trade-off.png"))
-    wrote(written)
+    print_written(written)

@@ -1,38 +1,38 @@
-"""Commands that build, run, check and show."""
+"""Commands that build, run and check FMUs and cases, describe them, and make the theses' figures."""
 
 from __future__ import annotations
 
 import sys
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 from zipfile import BadZipFile
 
 import click
-import numpy as np
-from rich.table import Table
 
 from linkwork import __version__
-from linkwork.five_bar.kinematics import assembly_square
-from linkwork.five_bar.published import RAD_S_PER_RPM
-from linkwork.parameters import field_name
 
-from ..mechanisms import FIVE_BAR, mechanism_of
 from ..run.case import PUBLISHED
 from .common import (
     CHECK_FAILED,
     ENDED_EARLY,
     INTERRUPTED,
+    case_options,
     chosen_case,
     console,
-    errors,
     handled,
-    number_or_text,
+    out_option,
+    plot_option,
     prepare_solver,
+    print_error,
+    print_written,
+    quantity,
+    show_table,
     tolerance_option,
 )
 
-#: Outputs that the plot of a check shows, of those that the mechanism has.
+#: Outputs in the plot of a check, of those that the mechanism has.
 COMPARED = (
     "slider.position",
     "slider.velocity",
@@ -42,7 +42,7 @@ COMPARED = (
     "slider_pin.fx",
     "slider_pin.fy",
 )
-#: Where FMUs are looked for that are not named.
+#: Where the FMUs of the mechanisms are looked for.
 DEFAULT_FOLDER = Path("build")
 
 
@@ -70,33 +70,23 @@ def build(models: Sequence[str], dest: str) -> None:
 
 
 @click.command()
-@click.argument("case", required=False, type=click.Path(exists=True, dir_okay=False))
-@click.option("--published", metavar="NAME", help=f"Run a published set instead: {', '.join(PUBLISHED)}.")
+@case_options(PUBLISHED)
 @click.option("--fmu", type=click.Path(exists=True, dir_okay=False), help="Run through this FMU instead of in process.")
 @click.option(
     "--method", default="compiled", show_default=True, help="compiled, Hamming, or a method of SciPy's solve_ivp."
 )
-@click.option(
-    "--set",
-    "settings",
-    multiple=True,
-    metavar="NAME=VALUE",
-    help="Change a value, such as slider.stiffness='2e6 dyn/cm' or drive.speed='300 rpm'; bare numbers are in SI.",
-)
 @click.option("--stop-time", metavar="TIME", help="End of the run, such as '2 s'.")
 @click.option("--step", metavar="TIME", help="Step of the samples and of the co-simulation, such as '0.1 ms'.")
-@click.option("--tolerance", type=float, callback=tolerance_option, help="Tolerance of the solver; 1e-9 by default.")
-@click.option(
-    "--out", default="out", show_default=True, type=click.Path(file_okay=False), help="Folder for CSV and plot."
-)
-@click.option("--plot/--no-plot", default=True, show_default=True, help="Whether to write a plot.")
+@tolerance_option(help="Tolerance of the solver; 1e-9 by default.")
+@out_option(help="Folder for CSV and plot.")
+@plot_option
 @handled
 def run(
     case: str | None,
     published: str | None,
+    settings: Sequence[str],
     fmu: str | None,
     method: str,
-    settings: Sequence[str],
     stop_time: str | None,
     step: str | None,
     tolerance: float | None,
@@ -113,68 +103,60 @@ def run(
     """
     from .. import figures
     from ..files import io
+    from ..mechanisms import mechanism_of
     from ..run.cosimulate import cosimulate
     from ..run.simulate import RunInterrupted, simulate
 
     chosen = chosen_case(case, published, settings)
     if fmu is not None and method != "compiled":
         raise click.UsageError("--method is for a run in process: the FMU brings its own")
-
-    def seconds(text: str | None, default: float, name: str) -> float:
-        return default if text is None else io.quantity(number_or_text(text), "s", name)
-
-    common = {
-        "initial": chosen.initial,
-        "stop_time": seconds(stop_time, chosen.stop_time, "--stop-time"),
-        "step": seconds(step, chosen.step, "--step"),
-        "tolerance": chosen.tolerance if tolerance is None else tolerance,
-    }
+    times = (("stop_time", "--stop-time", stop_time), ("step", "--step", step))
+    changed: dict[str, Any] = {name: quantity(text, "s", option) for name, option, text in times if text is not None}
+    if tolerance is not None:
+        changed["tolerance"] = tolerance
+    chosen = replace(chosen, **changed)
+    common = {name: getattr(chosen, name) for name in ("initial", "stop_time", "step", "tolerance")}
+    common["progress"] = console.is_terminal
     interrupted = False
-    if fmu is None:
-        prepare_solver(chosen.parameters)
     try:
         if fmu is not None:
-            result = cosimulate(fmu, chosen.parameters, chosen.inputs, progress=console.is_terminal, **common)
+            result = cosimulate(fmu, chosen.parameters, chosen.inputs, **common)
         else:
-            result = simulate(chosen.parameters, chosen.inputs, method=method, progress=console.is_terminal, **common)
+            prepare_solver(chosen.parameters)
+            result = simulate(chosen.parameters, chosen.inputs, method=method, **common)
     except RunInterrupted as stopped:
         result, interrupted = stopped.trajectory, True
-    name = (Path(case).stem if case else str(published)) + ("-fmu" if fmu else "")
-    written = [result.to_csv(Path(out) / f"{name}.csv")]
+    stem = Path(out) / ((Path(case).stem if case else str(published)) + ("-fmu" if fmu else ""))
+    written = [result.to_csv(f"{stem}.csv")]
     if plot and len(result) > 1:
         second = f"{mechanism_of(chosen.parameters).second}.position"
-        names = tuple(
-            dict.fromkeys(("slider.position", second, "crank.speed", "drive.applied_torque", "transmission.angle"))
-        )
-        written.append(io.save_figure(figures.plot(result, names, title=chosen.title), Path(out) / f"{name}.png"))
-    _summary(chosen.title, result)
-    for path in written:
-        console.print(f"wrote {path}", highlight=False, soft_wrap=True)
+        names = dict.fromkeys(("slider.position", second, "crank.speed", "drive.applied_torque", "transmission.angle"))
+        written.append(io.save_figure(figures.plot(result, tuple(names), title=chosen.title), f"{stem}.png"))
+    _print_extremes(chosen.title, result)
+    print_written(written)
     if fmu is not None and not chosen.inputs.held_exactly:
-        errors.print(
-            f"note: inputs that vary over a step are sampled and held over it ({common['step']:.3g} s), as any master does; "
-            "a run in process lets them act continuously. Shorten --step until the result stands.",
-            style="yellow",
-            soft_wrap=True,
+        print_error(
+            f"note: inputs that vary over a step are sampled and held over it ({chosen.step:.3g} s), as any master does; "
+            "a run in process lets them act continuously. Shorten --step until the result no longer changes."
         )
     if interrupted:
-        errors.print(f"interrupted at t = {result.time[-1]:.6g} s; what was computed is kept", style="yellow")
+        print_error(f"interrupted at t = {result.time[-1]:.6g} s; what was computed is kept")
         sys.exit(INTERRUPTED)
     if result.status:
-        errors.print(
-            f"the run ended early: {result.message}", style="red", markup=False, highlight=False, soft_wrap=True
-        )
+        print_error(f"the run ended early: {result.message}", "red")
         sys.exit(ENDED_EARLY)
 
 
-def _summary(title: str, result: Any) -> None:
-    grid = Table(title=f"{title}  ({result.source}, {len(result)} samples to t = {result.time[-1]:.6g} s)")
-    for heading in ("output", "unit", "least", "greatest", "at the end"):
-        grid.add_column(heading, justify="left" if heading in ("output", "unit") else "right")
-    for name in result.names:
-        values = result[name]
-        grid.add_row(name, result.units[name], *(f"{v:.6g}" for v in (values.min(), values.max(), values[-1])))
-    console.print(grid)
+def _print_extremes(title: str, result: Any) -> None:
+    """Print least, greatest and last value of each output of a run, and its events."""
+    headings = ("output", "unit", "least", "greatest", "at the end")
+    columns = ((name, result[name]) for name in result.names)
+    show_table(
+        f"{title}  ({result.source}, {len(result)} samples to t = {result.time[-1]:.6g} s)",
+        headings,
+        [(name, result.units[name], *(f"{v:.6g}" for v in (x.min(), x.max(), x[-1]))) for name, x in columns],
+        words=headings[:2],
+    )
     for event in result.events:
         console.print(f"{event.name} at t = {event.time:.9g} s", highlight=False)
 
@@ -195,22 +177,13 @@ def _summary(title: str, result: Any) -> None:
     show_default=True,
     help="In-process method: compiled, Hamming, or one of SciPy's solve_ivp; can be given often.",
 )
-@click.option(
-    "--tolerance",
-    type=float,
-    callback=tolerance_option,
-    default=1e-6,
-    show_default=True,
-    help="Largest relative difference that passes.",
-)
-@click.option(
-    "--out", default="out", show_default=True, type=click.Path(file_okay=False), help="Folder for CSV and plots."
-)
+@tolerance_option(default=1e-6, help="Largest relative difference that passes.")
+@out_option()
 @handled
 def check(
     cases: Sequence[str], fmu: str | None, everything: bool, methods: Sequence[str], tolerance: float, out: str
 ) -> None:
-    """Hold the FMU against the in-process solver, output by output. CASES are names of standard cases or case files.
+    """Compare the FMU with the in-process solver, output by output. CASES are names of standard cases or case files.
 
     \b
     Examples:
@@ -219,62 +192,61 @@ def check(
       linkwork check --method compiled --method Radau
       linkwork check speed-jump examples/torsion-bar.toml
     """
-    from .. import figures
-    from ..files import io
-    from ..run.checks import CASES
+    from ..mechanisms import mechanism_of
     from ..run.checks import check as compare_case
 
-    # of an FMU that is named, its own mechanism's
-    wanted = None if fmu is None else _model_name(Path(fmu))
-    every = {name: case for name, case in CASES.items() if wanted in (None, mechanism_of(case.parameters).fmu)}
-    first = {mechanism_of(case.parameters).name: name for name, case in reversed(every.items())}
-    names = list(every) if everything else list(cases) or list(first.values())[::-1]
     failed = []
-    for name in names:
-        if name in CASES:
-            case = CASES[name]
-        elif Path(name).suffix in (".toml", ".json"):
-            case = io.load_case(name)
-        else:
-            raise click.UsageError(f"{name!r} is neither a case file nor a standard case ({', '.join(CASES)})")
+    chosen = _cases_to_check(cases, fmu, everything)
+    for name, case in chosen:
         prepare_solver(case.parameters)
-        stem = Path(name).stem if Path(name).suffix in (".toml", ".json") else name
         for method in methods:
-            label = stem if method == "compiled" else f"{stem}-{method}"
-            under_test = fmu or DEFAULT_FOLDER / f"{mechanism_of(case.parameters).fmu}.fmu"
-            a, b, comparison = compare_case(
-                under_test, case, method=method, tolerance=tolerance, progress=console.is_terminal
+            label = name if method == "compiled" else f"{name}-{method}"
+            in_process, through_fmu, comparison = compare_case(
+                fmu or DEFAULT_FOLDER / f"{mechanism_of(case.parameters).fmu}.fmu",
+                case,
+                method=method,
+                tolerance=tolerance,
+                progress=console.is_terminal,
             )
-            _comparison(f"{case.title}: FMU less in process ({a.source})", comparison)
-            folder = Path(out)
-            a.to_csv(folder / f"{label}-in-process.csv")
-            b.to_csv(folder / f"{label}-fmu.csv")
-            shown = [name for name in COMPARED if name in a.names]
-            n = min(len(a), len(b))
-            figure = figures.plot_comparison(
-                a.time[:n],
-                {o: (a[o][:n], b[o][:n], a.units[o]) for o in shown},
-                title=case.title,
-                labels=(f"in process ({a.source})", "FMU"),
-            )
-            io.save_figure(figure, folder / f"{label}.png")
-            console.print(f"wrote {folder / label}.png, -in-process.csv and -fmu.csv", highlight=False, soft_wrap=True)
-            for which, result in (("in process", a), ("FMU", b)):
-                if result.status:
-                    errors.print(
-                        f"{which}: the run ended early: {result.message}", style="yellow", markup=False, soft_wrap=True
-                    )
-            if not comparison.agrees or a.status != b.status:
+            _print_comparison(f"{case.title}: FMU less in process ({in_process.source})", comparison)
+            _write_comparison(Path(out) / label, case.title, in_process, through_fmu)
+            if not comparison.agrees or in_process.status != through_fmu.status:
                 failed.append(label)
     if failed:
-        errors.print(f"check failed: {', '.join(failed)}", style="red", highlight=False)
+        print_error(f"check failed: {', '.join(failed)}", "red")
         sys.exit(CHECK_FAILED)
-    count = len(names) * len(methods)
+    count = len(chosen) * len(methods)
     console.print(f"{count} of {count} checks pass", style="green", highlight=False)
 
 
+def _cases_to_check(names: Sequence[str], fmu: str | None, everything: bool) -> list[tuple[str, Any]]:
+    """Standard cases and case files with their names; without names the first case of each mechanism, or all.
+
+    Where an FMU is named, the standard cases are those of its mechanism.
+    """
+    from ..files import io
+    from ..mechanisms import mechanism_of
+    from ..run.checks import CASES
+
+    if not names or everything:
+        model = None if fmu is None else _model_name(Path(fmu))
+        of_model = [(name, mechanism_of(case.parameters).fmu) for name, case in CASES.items()]
+        of_model = [(name, its_model) for name, its_model in of_model if model in (None, its_model)]
+        first = {its_model: name for name, its_model in reversed(of_model)}
+        names = [name for name, its_model in of_model if everything or first[its_model] == name]
+    chosen = []
+    for name in names:
+        if name in CASES:
+            chosen.append((name, CASES[name]))
+        elif Path(name).suffix in (".toml", ".json"):
+            chosen.append((Path(name).stem, io.load_case(name)))
+        else:
+            raise click.UsageError(f"{name!r} is neither a case file nor a standard case ({', '.join(CASES)})")
+    return chosen
+
+
 def _model_name(path: Path) -> str | None:
-    """Name of the model in an FMU; None where there is none to read, which the check will tell."""
+    """Name of the model in an FMU; None where there is none to read, which the check reports."""
     from fmpy import read_model_description
 
     try:
@@ -283,29 +255,46 @@ def _model_name(path: Path) -> str | None:
         return None
 
 
-def _comparison(title: str, comparison: Any) -> None:
-    grid = Table(title=f"{title}, tolerance {comparison.tolerance:g}")
-    for heading in ("output", "unit", "largest difference", "rms", "relative", "verdict"):
-        grid.add_column(heading, justify="left" if heading in ("output", "unit", "verdict") else "right")
-    for d in comparison.differences:
-        good = d.relative <= comparison.tolerance
-        grid.add_row(
-            d.name,
-            d.unit,
-            f"{d.largest:.2e}",
-            f"{d.rms:.2e}",
-            f"{d.relative:.1e}",
-            "pass" if good else "FAIL",
-            style=None if good else "red",
-        )
-    console.print(grid)
+def _write_comparison(stem: Path, title: str, in_process: Any, through_fmu: Any) -> None:
+    """Write both runs of a check and their plot, and report a run that ended early."""
+    from .. import figures
+    from ..files import io
+
+    in_process.to_csv(f"{stem}-in-process.csv")
+    through_fmu.to_csv(f"{stem}-fmu.csv")
+    figure = figures.plot_comparison(
+        in_process,
+        through_fmu,
+        [name for name in COMPARED if name in in_process.names],
+        title=title,
+        labels=(f"in process ({in_process.source})", "FMU"),
+    )
+    io.save_figure(figure, f"{stem}.png")
+    console.print(f"wrote {stem}.png, -in-process.csv and -fmu.csv", highlight=False, soft_wrap=True)
+    for which, result in (("in process", in_process), ("FMU", through_fmu)):
+        if result.status:
+            print_error(f"{which}: the run ended early: {result.message}")
+
+
+def _print_comparison(title: str, comparison: Any) -> None:
+    verdicts = ["pass" if d.relative <= comparison.tolerance else "FAIL" for d in comparison.differences]
+    show_table(
+        f"{title}, tolerance {comparison.tolerance:g}",
+        ("output", "unit", "largest difference", "rms", "relative", "verdict"),
+        [
+            (d.name, d.unit, f"{d.largest:.2e}", f"{d.rms:.2e}", f"{d.relative:.1e}", verdict)
+            for d, verdict in zip(comparison.differences, verdicts)
+        ],
+        words=("output", "unit", "verdict"),
+        styles=[None if verdict == "pass" else "red" for verdict in verdicts],
+    )
 
 
 @click.command()
 @click.argument("what", required=False)
 @handled
 def info(what: str | None) -> None:
-    """Tell about the published sets, one of them, a parameter or case file, or an FMU.
+    """Describe the published sets, one of them, a parameter or case file, or an FMU.
 
     \b
     Examples:
@@ -313,78 +302,78 @@ def info(what: str | None) -> None:
       linkwork info table-3.1
       linkwork info build/FiveBarSlider.fmu
     """
+    from linkwork.five_bar.published import RAD_S_PER_RPM
+
     from ..files import io
+    from ..run.compiled import cache_folder
 
     if what is None:
-        grid = Table(title="published sets")
-        for heading in ("name", "source", "speed [rpm]"):
-            grid.add_column(heading)
-        for name, entry in PUBLISHED.items():
-            grid.add_row(name, entry.source, f"{entry.crank_speed / RAD_S_PER_RPM:g}")
-        console.print(grid)
-        console.print(f"linkwork {__version__}; compiled code is kept in {_cache()}", highlight=False, soft_wrap=True)
+        sets = [(name, entry.source, f"{entry.crank_speed / RAD_S_PER_RPM:g}") for name, entry in PUBLISHED.items()]
+        show_table("published sets", ("name", "source", "speed [rpm]"), sets, words=("name", "source"))
+        place = cache_folder()
+        console.print(f"linkwork {__version__}; compiled code is kept in {place}", highlight=False, soft_wrap=True)
     elif what in PUBLISHED:
-        _parameters(PUBLISHED[what].source, PUBLISHED[what].parameters)
+        _print_parameters(PUBLISHED[what].source, PUBLISHED[what].parameters)
     elif Path(what).suffix == ".fmu":
-        _fmu(Path(what))
+        _print_fmu(Path(what))
     elif Path(what).suffix in (".toml", ".json"):
         case = io.load_case(what)
-        _parameters(case.title, case.parameters)
+        _print_parameters(case.title, case.parameters)
     else:
         raise click.UsageError(f"{what!r} is neither a published set ({', '.join(PUBLISHED)}), a file, nor an FMU")
 
 
-def _cache() -> Path:
-    from ..run.compiled import cache_folder
+def _print_parameters(title: str, parameters: Any) -> None:
+    """Print a table of parameters, and whether a five-bar's crank turns fully."""
+    import numpy as np
 
-    return cache_folder()
+    from linkwork.five_bar.kinematics import assembly_square
+    from linkwork.parameters import field_name
 
+    from ..mechanisms import FIVE_BAR, mechanism_of
 
-def _parameters(title: str, parameters: Any) -> None:
-    grid = Table(title=title)
-    for heading in ("parameter", "value", "unit", "meaning"):
-        grid.add_column(heading, justify="right" if heading == "value" else "left")
     mechanism = mechanism_of(parameters)
-    for variable in mechanism.variables.PARAMETERS:
-        value = getattr(parameters, field_name(variable.name), None)
-        if value is not None:
-            grid.add_row(variable.name, f"{value:.9g}", variable.unit, variable.description)
-    console.print(grid)
+    values = [(v, getattr(parameters, field_name(v.name), None)) for v in mechanism.variables.PARAMETERS]
+    rows = [(v.name, f"{value:.9g}", v.unit, v.description) for v, value in values if value is not None]
+    show_table(title, ("parameter", "value", "unit", "meaning"), rows, words=("parameter", "unit", "meaning"))
     if mechanism is not FIVE_BAR:
         console.print("where it can be assembled, dead centres, stroke: linkwork slider-crank info", highlight=False)
         return
     p = parameters.constants()
-    angles = np.linspace(0.0, 2.0 * np.pi, 721)
-    square = [assembly_square(float(a), 0.0, p) for a in angles]
-    turns = "turns fully" if min(square) > 0.0 else "does not turn fully"
+    clearance = min(assembly_square(float(angle), 0.0, p) for angle in np.linspace(0.0, 2.0 * np.pi, 721))
+    turns = "turns fully" if clearance > 0.0 else "does not turn fully"
     console.print(f"with the slider at zero the crank {turns}", highlight=False)
 
 
-def _fmu(path: Path) -> None:
+def _print_fmu(path: Path) -> None:
+    """Print the variables of an FMU and whether it is valid; exits where it is not."""
     from fmpy import read_model_description
     from fmpy.validation import validate_fmu
 
     if not path.is_file():
         raise click.UsageError(f"there is no file {path}: build it with 'linkwork build'")
     description = read_model_description(str(path))
-    grid = Table(
-        title=f"{description.modelName} {description.version}, FMI {description.fmiVersion}, {description.guid}"
+
+    def start(variable: Any) -> str:
+        if variable.causality == "output":
+            return ""
+        return f"{float(variable.start):.6g}" if variable.type == "Real" else str(variable.start)
+
+    show_table(
+        f"{description.modelName} {description.version}, FMI {description.fmiVersion}, {description.guid}",
+        ("variable", "causality", "start", "unit", "description"),
+        [(v.name, v.causality, start(v), v.unit or "", v.description) for v in description.modelVariables],
+        words=("variable", "causality", "unit", "description"),
     )
-    for heading in ("variable", "causality", "start", "unit", "description"):
-        grid.add_column(heading, justify="right" if heading == "start" else "left")
-    for v in description.modelVariables:
-        start = "" if v.causality == "output" else f"{float(v.start):.6g}" if v.type == "Real" else str(v.start)
-        grid.add_row(v.name, v.causality, start, v.unit or "", v.description)
-    console.print(grid)
     problems = validate_fmu(str(path))
-    console.print("valid" if not problems else "; ".join(problems), style="green" if not problems else "red")
+    console.print("; ".join(problems) or "valid", style="red" if problems else "green")
     if problems:
         sys.exit(CHECK_FAILED)
 
 
 @click.command()
 @click.argument("numbers", nargs=-1)
-@click.option("--out", default="out/figures", show_default=True, type=click.Path(file_okay=False), help="Folder.")
+@out_option("out/figures", help="Folder.")
 @click.option("--list", "listing", is_flag=True, help="Only list the figures.")
 @handled
 def figures(numbers: Sequence[str], out: str, listing: bool) -> None:

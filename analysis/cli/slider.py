@@ -15,8 +15,8 @@ from rich.table import Table
 
 from linkwork.errors import Interrupted
 
-from .common import INTERRUPTED, console, errors, handled, prepare_solver
-from .design import settings_of, write_described, wrote
+from .common import INTERRUPTED, console, errors, handled, prepare_solver, print_written
+from .design import settings_of, write_described
 
 
 @click.command("slider-motion")
@@ -81,7 +81,7 @@ def slider_motion(
             written += _dynamics(chosen, solution, folder, plots)
     elif isinstance(pivot, SliderMotion):
         written.append(_write_motion(solution, folder))
-    wrote(written)
+    print_written(written)
     if stopped is not None:
         errors.print(f"{stopped}; the best so far is kept", style="yellow", highlight=False, soft_wrap=True)
         sys.exit(INTERRUPTED)

@@ -12,7 +12,6 @@ from .dispatch import animate as animate
 from .dispatch import plot as plot
 from .linkage import animate_linkage as animate_linkage
 from .linkage import draw_linkage as draw_linkage
-from .linkage import icon as icon
 from .response import plot_branches as plot_branches
 from .style import COLOURS as COLOURS
 from .style import STYLE as STYLE

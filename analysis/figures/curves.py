@@ -56,8 +56,9 @@ def plot_outputs(
 
 
 def plot_comparison(
-    time: ArrayLike,
-    outputs: Mapping[str, tuple[NDArray[np.float64], NDArray[np.float64], str]],
+    first: Trajectory,
+    second: Trajectory,
+    names: Sequence[str],
     *,
     title: str = "",
     labels: tuple[str, str] = ("first", "second"),
@@ -66,21 +67,25 @@ def plot_comparison(
 
     Parameters
     ----------
-    time : array_like, shape (n,)
-        s.
-    outputs : mapping
-        Name to (values of the first run, values of the second, unit), shapes (n,).
+    first, second : Trajectory
+        With the same samples, as far as both go.
+    names : sequence of str
+        Outputs.
+    title : str
     labels : (str, str)
         Names of the runs.
     """
+    n = min(len(first), len(second))
+    time = first.time[:n]
     with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(9.6, 0.9 + 1.8 * len(outputs)))
-        rows = figure.subplots(len(outputs), 2, sharex=True, squeeze=False, width_ratios=(3, 2))
-        for (both, difference), (name, (first, second, unit)) in zip(rows, outputs.items()):
-            both.plot(time, first, color=COLOURS[0], label=labels[0])
-            both.plot(time, second, "--", color=COLOURS[1], label=labels[1])
+        figure = Figure(figsize=(9.6, 0.9 + 1.8 * len(names)))
+        rows = figure.subplots(len(names), 2, sharex=True, squeeze=False, width_ratios=(3, 2))
+        for (both, difference), name in zip(rows, names):
+            a, b, unit = first[name][:n], second[name][:n], first.units[name]
+            both.plot(time, a, color=COLOURS[0], label=labels[0])
+            both.plot(time, b, "--", color=COLOURS[1], label=labels[1])
             both.set_ylabel(f"{name} [{unit}]", fontsize=8)
-            difference.plot(time, second - first, color="0.25", linewidth=1.0)
+            difference.plot(time, b - a, color="0.25", linewidth=1.0)
             difference.set_ylabel(f"difference [{unit}]", fontsize=8)
         rows[0, 0].legend(fontsize=8, ncols=2, loc="lower right", bbox_to_anchor=(1.0, 1.0), borderaxespad=0.1)
         rows[0, 1].set_title(f"{labels[1]} less {labels[0]}", fontsize=8.5)
@@ -188,7 +193,11 @@ def lay_out(
 
 def draw_panel(axis: Axes, panel: Panel) -> None:
     for boundaries in panel.filled:
-        axis.add_patch(PathPatch(_outline(boundaries), facecolor="#56B4E9", alpha=0.22, edgecolor="none", zorder=0))
+        # boundaries that run clockwise are holes in the others
+        outline = Outline.make_compound_path(
+            *(Outline(np.vstack([ring, ring[:1]]), closed=True) for ring in boundaries)
+        )
+        axis.add_patch(PathPatch(outline, facecolor="#56B4E9", alpha=0.22, edgecolor="none", zorder=0))
     for number, curve in enumerate(panel.curves):
         axis.plot(
             curve.x,
@@ -202,10 +211,8 @@ def draw_panel(axis: Axes, panel: Panel) -> None:
             markeredgewidth=1.2,
             zorder=3 if curve.marker else 2,
         )
-    axis.set_xlabel(panel.x_label)
-    axis.set_ylabel(panel.y_label)
-    if panel.title:
-        axis.set_title(panel.title, fontsize=9)
+    axis.set(xlabel=panel.x_label, ylabel=panel.y_label)
+    axis.set_title(panel.title, fontsize=9)
     if "x" in panel.logarithmic:
         axis.set_xscale("log")
     if "y" in panel.logarithmic:
@@ -237,12 +244,3 @@ def draw_panel(axis: Axes, panel: Panel) -> None:
         outside: dict[str, Any] = {"loc": "upper left", "bbox_to_anchor": (1.0, 1.0)}
         where = outside if panel.legend_at == "outside" else {"loc": panel.legend_at}
         axis.legend(title=panel.legend or None, fontsize=8, title_fontsize=8, alignment="left", **where)
-
-
-def _outline(boundaries: Sequence[NDArray[np.float64]]) -> Outline:
-    """One path of closed boundaries; those that run clockwise are holes in the others."""
-    vertices, codes = [], []
-    for ring in boundaries:
-        vertices += [ring, ring[:1]]
-        codes += [Outline.MOVETO] + [Outline.LINETO] * (len(ring) - 1) + [Outline.CLOSEPOLY]
-    return Outline(np.concatenate(vertices), codes)

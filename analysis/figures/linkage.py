@@ -1,4 +1,4 @@
-"""Pictures of the linkage: a still, an animation, the icon of the FMU."""
+"""Pictures of the five-bar: a still and an animation."""
 
 from __future__ import annotations
 
@@ -6,25 +6,23 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import cos, hypot, sin
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import matplotlib
 import numpy as np
-from matplotlib.animation import PillowWriter
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.figure import Figure
-from matplotlib.patches import Arc, Circle, FancyBboxPatch, Polygon, Rectangle
+from matplotlib.patches import Arc, Circle, Polygon
 from numpy.typing import ArrayLike, NDArray
+from shapely import MultiLineString, Point
 
 from linkwork.errors import AssemblyError, InputError
 from linkwork.five_bar import kinematics
 from linkwork.five_bar.parameters import FiveBarParameters
 
-from .style import STYLE, finish
-
-if TYPE_CHECKING:
-    from ..run.trajectory import Trajectory
+from ..run.trajectory import Trajectory
+from .animation import gif
+from .dispatch import plot
+from .style import STYLE, Figure, finish
 
 #: Colours of the links in drawings.
 CRANK, COUPLER, ROCKER, SLIDER, GROUND, TRACE = "#D55E00", "#0072B2", "#009E73", "#5B6770", "#333333", "#CC79A7"
@@ -183,14 +181,12 @@ class _Scene:
         self._line(axis, [q.d, q.c], color=ROCKER, **width, zorder=6)
         self._line(axis, [q.b, q.c], color=COUPLER, **width, zorder=7)
         self._line(axis, [a, q.b], color=CRANK, **width, zorder=8)
-        for pin in (a, q.b, q.c, q.d):
-            axis.add_patch(
-                Circle(tuple(pin), 0.36 * self.unit, facecolor="white", edgecolor="black", linewidth=1.2, zorder=9)
-            )
+        dots = [(pin, 0.36, "white", 1.2, 9) for pin in (a, q.b, q.c, q.d)]
         if self.parameters.coupler_point_distance:
-            axis.add_patch(
-                Circle(tuple(q.p), 0.24 * self.unit, facecolor=TRACE, edgecolor="black", linewidth=0.9, zorder=10)
-            )
+            dots.append((q.p, 0.24, TRACE, 0.9, 10))
+        for pin, radius, colour, edge, order in dots:
+            look = {"facecolor": colour, "edgecolor": "black", "linewidth": edge, "zorder": order}
+            axis.add_patch(Circle((pin[0], pin[1]), radius * self.unit, **look))
 
     def _letters(self, axis: Axes, q: _Pins) -> None:
         unit = self.unit
@@ -207,15 +203,8 @@ class _Scene:
         # each pin's letter goes where it has most room
         centre = (q.b + q.c + q.d) / 3.0
         a = np.zeros(2)
-        lines = [
-            (a, q.b),
-            (q.b, q.c),
-            (q.c, q.d),
-            (q.b, q.p),
-            (q.c, q.p),
-            (a, np.array([0.0, -2.0 * unit])),
-            (a, self.zero),
-        ]
+        foot = np.array([0.0, -2.0 * unit])
+        lines = MultiLineString([(a, q.b), (q.b, q.c), (q.c, q.d), (q.b, q.p), (q.c, q.p), (a, foot), (a, self.zero)])
         taken = [theta]
         directions = np.radians(np.arange(0.0, 360.0, 15.0))
         pins = {"A": a, "B": q.b, "C": q.c} | ({"P": q.p} if self.parameters.coupler_point_distance else {})
@@ -223,8 +212,7 @@ class _Scene:
             places = pin + 1.15 * unit * np.column_stack([np.cos(directions), np.sin(directions)])
             room = [
                 min(
-                    *(_distance(place, *line) for line in lines),
-                    *(0.6 * hypot(*(place - other)) for other in (*taken, *pins.values())),
+                    lines.distance(Point(place)), *(0.6 * hypot(*(place - other)) for other in (*taken, *pins.values()))
                 )
                 for place in places
             ]
@@ -250,13 +238,7 @@ def _write(axis: Axes, point: NDArray[np.float64], words: str, **options: Any) -
     axis.text(point[0], point[1], words, **look | options)
 
 
-def _distance(point: NDArray[np.float64], start: NDArray[np.float64], end: NDArray[np.float64]) -> float:
-    """Distance of a point from a straight line between two others."""
-    way = end - start
-    share = min(1.0, max(0.0, float((point - start) @ way) / max(float(way @ way), 1e-12)))
-    return hypot(*(point - start - share * way))
-
-
+@plot.register
 def draw_linkage(
     parameters: FiveBarParameters,
     crank_angle: float,
@@ -322,20 +304,17 @@ def animate_linkage(
     InputError
         If the run has fewer than two samples or there are fewer than two frames.
     """
-    if len(trajectory) < 2 or frames < 2:
-        raise InputError(f"an animation of {len(trajectory)} samples in {frames} frames: both must be at least 2")
-    path = Path(path)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    time, u = trajectory.time, CM_PER_METRE * trajectory["slider.position"]
+    if len(trajectory) < 2:
+        raise InputError(f"an animation of {len(trajectory)} samples: there must be at least 2")
+    time, slides = trajectory.time, trajectory["slider.position"]
+    u = CM_PER_METRE * slides
     trace = CM_PER_METRE * np.column_stack([trajectory["coupler.point.x"], trajectory["coupler.point.y"]])
     chosen = np.unique(np.searchsorted(time, np.linspace(time[0], time[-1], frames)).clip(0, len(time) - 1))
-    angles, slides = trajectory["crank.angle"], trajectory["slider.position"]
-    configurations = [_pins(parameters, float(angles[i]), float(slides[i])) for i in chosen]
+    configurations = [_pins(parameters, float(trajectory["crank.angle"][i]), float(slides[i])) for i in chosen]
     scene = _Scene(parameters, configurations)
     width, height = scene.high - scene.low
     with matplotlib.rc_context(STYLE):
         figure = Figure(figsize=(5.0, 5.0 * height / width + 1.9))
-        FigureCanvasAgg(figure)
         above, below = figure.subplots(2, 1, height_ratios=(5.0 * height / width, 1.7))
         if title:
             figure.suptitle(title, fontsize=10.5, fontweight="bold")
@@ -344,52 +323,12 @@ def animate_linkage(
         (dot,) = below.plot([], [], "o", color=SLIDER, markersize=5)
         below.set_xlabel("time [s]")
         below.set_ylabel("slider position [cm]")
-        writer = PillowWriter(fps=frames_per_second, metadata={})
-        with writer.saving(figure, str(path), dpi=80):
+        with gif(figure, path, frames=frames, frames_per_second=frames_per_second) as add_frame:
             for i, q in zip(chosen, configurations):
                 above.clear()
                 scene.prepare(above)
                 scene.draw(above, q, letters=False, trace=trace[: i + 1])
                 done.set_data(time[: i + 1], u[: i + 1])
                 dot.set_data(time[i : i + 1], u[i : i + 1])
-                if i == chosen[0]:
-                    # laid out once: the panels must not creep from frame to frame
-                    figure.draw_without_rendering()
-                    figure.set_layout_engine("none")
-                writer.grab_frame()
-    return path
-
-
-def icon(path: str | Path) -> Path:
-    """Write the icon of the component: the linkage in a few strokes, PNG, 200 by 200 pixels, the same bytes each time."""
-    path = Path(path)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    a, b, c, d = np.array([[38.0, 56.0], [58.0, 92.0], [118.0, 162.0], [136.0, 56.0]])
-    with matplotlib.rc_context({"lines.solid_capstyle": "round", "lines.solid_joinstyle": "round"}):
-        figure = Figure(figsize=(2.0, 2.0), facecolor="none")
-        FigureCanvasAgg(figure)
-        axis = figure.add_axes((0.0, 0.0, 1.0, 1.0))
-        axis.set(xlim=(0.0, 200.0), ylim=(0.0, 200.0))
-        axis.set_axis_off()
-        card = FancyBboxPatch((8, 8), 184, 184, boxstyle="round,pad=0,rounding_size=26", facecolor="white")
-        card.set(edgecolor="#B8C2C9", linewidth=2.0)
-        axis.add_patch(card)
-        axis.plot([20.0, 180.0], [37.0, 37.0], color=GROUND, linewidth=2.4)
-        for x in range(28, 184, 16):
-            axis.plot([x, x - 9.0], [36.0, 26.0], color=GROUND, linewidth=1.2)
-        axis.add_patch(
-            Polygon([a, (a[0] - 15.0, a[1] - 19.0), (a[0] + 15.0, a[1] - 19.0)], facecolor="#E4E8EB", edgecolor=GROUND)
-        )
-        axis.add_patch(Rectangle(d - (19.0, 19.0), 38.0, 38.0, facecolor="#C9D1D6", edgecolor=SLIDER, linewidth=1.6))
-        spring = (
-            np.array([0.0, 2.5, 5.0, 9.0, 13.0, 17.0, 19.5, 22.0]),
-            np.array([0.0, 0.0, 8.0, -8.0, 8.0, -8.0, 0.0, 0.0]),
-        )
-        axis.plot(d[0] + 19.0 + spring[0], d[1] + spring[1], color=SLIDER, linewidth=1.8)
-        axis.plot([178.0, 178.0], [37.0, 76.0], color=GROUND, linewidth=2.4)
-        for (start, end), colour in (((d, c), ROCKER), ((b, c), COUPLER), ((a, b), CRANK)):
-            axis.plot(*np.array([start, end]).T, color=colour, linewidth=6.5)
-        for pin in (a, b, c, d):
-            axis.add_patch(Circle(pin, 7.0, facecolor="white", edgecolor="black", linewidth=1.8, zorder=5))
-        figure.savefig(path, dpi=100, metadata={"Software": None})
-    return path
+                add_frame()
+    return Path(path)

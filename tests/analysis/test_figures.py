@@ -1,4 +1,4 @@
-"""Plots, drawings, animation and icon: that they show what they should, and refuse what they cannot."""
+"""Plots, drawings and animation: that they show what they should, and refuse what they cannot."""
 
 from __future__ import annotations
 
@@ -37,8 +37,8 @@ def test_a_type_that_has_no_picture_is_named(picture) -> None:
 
 
 def test_comparison(run) -> None:
-    u = run["slider.position"]
-    figure = figures.plot_comparison(run.time, {"slider.position": (u, u + 1e-6, "m")}, title="case", labels=("a", "b"))
+    shifted = replace(run, time=run.time[:-1], values=run.values[:-1] + 1e-6)
+    figure = figures.plot_comparison(run, shifted, ["slider.position"], title="case", labels=("a", "b"))
     both, difference = figure.axes
     assert [line.get_label() for line in both.lines] == ["a", "b"]
     np.testing.assert_allclose(difference.lines[0].get_ydata(), 1e-6, rtol=1e-6)
@@ -95,7 +95,7 @@ def test_logarithmic_axes() -> None:
     ids=["coupler point", "inclined", "no spring", "neither", "short crank"],
 )
 def test_drawing_holds_all_pins(parameters, tmp_path: Path) -> None:
-    figure = figures.draw_linkage(parameters, 2.0, 0.003, title="still")
+    figure = figures.plot(parameters, 2.0, 0.003, title="still")
     axis = figure.axes[0]
     letters = {text.get_text() for text in axis.texts}
     assert {"A", "B", "C", "D", r"$\theta_2$"} <= letters
@@ -110,7 +110,7 @@ def test_drawing_holds_all_pins(parameters, tmp_path: Path) -> None:
 
 def test_drawing_what_cannot_be_joined() -> None:
     with pytest.raises(AssemblyError, match=r"slider position 0\.5 m"):
-        figures.draw_linkage(TABLE_3_1, 0.0, 0.5)
+        figures.plot(TABLE_3_1, 0.0, 0.5)
 
 
 def test_saving_twice_gives_the_same_bytes(run, tmp_path: Path) -> None:
@@ -133,11 +133,3 @@ def test_animation(run, tmp_path: Path) -> None:
 def test_animation_of_nothing(run, tmp_path: Path) -> None:
     with pytest.raises(InputError, match="at least 2"):
         figures.animate_linkage(WITH_POINT, run, tmp_path / "run.gif", frames=1)
-
-
-def test_icon(tmp_path: Path) -> None:
-    path = figures.icon(tmp_path / "icon.png")
-    with Image.open(path) as image:
-        assert image.size == (200, 200)
-        assert "Software" not in image.info
-    assert figures.icon(tmp_path / "again.png").read_bytes() == path.read_bytes()
