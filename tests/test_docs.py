@@ -12,7 +12,6 @@ from pathlib import Path
 
 import pytest
 
-import build_fmu
 from analysis.studies import RAHMAN, YOUSSEF
 
 from .analysis.test_studies import REFUTED
@@ -77,8 +76,9 @@ def test_links_in_the_documentation_lead_somewhere():
             assert (page.parent / target).exists(), f"{page.name}: {target}"
 
 
-def test_the_code_of_the_readme_runs(tmp_path):
-    build_fmu.build("FiveBarSlider", tmp_path / "build")
+def test_the_code_of_the_readme_runs(fmus, tmp_path):
+    (tmp_path / "build").mkdir()
+    shutil.copy(fmus["FiveBarSlider"], tmp_path / "build")
     blocks = re.findall(r"```python\n(.*?)```", (ROOT / "README.md").read_text(), flags=re.DOTALL)
     assert len(blocks) == 5
     for block in blocks:
@@ -148,6 +148,7 @@ def run_page(name, tmp_path):
     return commands, checked, printed
 
 
+@pytest.mark.slow
 def test_the_page_from_a_hand_drawn_curve_to_an_fmu_runs_and_says_what_is_so(tmp_path):
     """Each command and each piece of Python in turn; what the page then shows is among what was printed."""
     commands, checked, printed = run_page("hand-drawn-to-fmu.md", tmp_path)
@@ -168,6 +169,7 @@ def test_the_page_from_a_hand_drawn_curve_to_an_fmu_runs_and_says_what_is_so(tmp
         assert (tmp_path / name).exists()
 
 
+@pytest.mark.slow
 def test_the_page_of_the_slider_crank_runs_and_says_what_is_so(tmp_path):
     commands, checked, printed = run_page("slider-crank.md", tmp_path)
     assert (commands, checked) == (15, 19)
