@@ -185,7 +185,11 @@ def rates(parameters: FiveBarParameters, q: ArrayLike, crank_speed: float, slide
 def mass_matrix(parameters: FiveBarParameters, q: ArrayLike) -> Vector:
     """Mass matrix of the redundant coordinates, shape (4, 4): sum over the links of m J_G^T J_G and I_G."""
     links = _links(parameters)
-    jacobian = _state(np.asarray(q, dtype=float), np.zeros(4), links).jacobian[:4]
+    return _mass_matrix(_state(np.asarray(q, dtype=float), np.zeros(4), links), links)
+
+
+def _mass_matrix(state: _State, links: _Links) -> Vector:
+    jacobian = state.jacobian[:4]
     return np.real(jacobian.conj().T @ (links.masses[:, None] * jacobian)) + np.diag(links.inertias)
 
 
@@ -218,7 +222,7 @@ def _system(
     if crank_acceleration is not None:
         loop = np.vstack([loop, [1.0, 0.0, 0.0, 0.0]])
         bias = np.append(bias, crank_acceleration)
-    matrix = np.block([[mass_matrix(parameters, q), loop.T], [loop, np.zeros((len(loop), len(loop)))]])
+    matrix = np.block([[_mass_matrix(state, links), loop.T], [loop, np.zeros((len(loop), len(loop)))]])
     return matrix, np.concatenate([force, bias])
 
 
