@@ -64,6 +64,28 @@ class Case(NamedTuple):
             self.load,
         )
 
+    def read(self, drive: str) -> dynamics.Inputs:
+        """The inputs as a plant under the drive has to read them: those of the other drives are none."""
+        i = self.inputs(drive)
+        return i._replace(
+            torque=0.0 if i.speed_drive else i.torque,
+            acceleration=i.acceleration if i.speed_drive else 0.0,
+            force=0.0 if i.shift_drive or i.groove else i.force,
+            shift_acceleration=i.shift_acceleration if i.shift_drive else 0.0,
+        )
+
+    def given(self) -> dict[str, float]:
+        """The inputs by their FMI names, the commanded speeds those of the state."""
+        return {
+            "drive.torque": self.torque,
+            "drive.speed": self.state[2],
+            "drive.acceleration": self.acceleration,
+            "axial.force": self.force,
+            "axial.speed": self.state[3],
+            "axial.acceleration": self.shift_acceleration,
+            "slider.load": self.load,
+        }
+
     def under(self, drive: str) -> dynamics.State:
         """The state as one of `DRIVES` has it: a groove determines shift and axial velocity."""
         return dynamics.grooved(self.state, DRIVES[drive][2], self.p)

@@ -15,7 +15,7 @@ from typing import NamedTuple, TypeVar
 from hypothesis import strategies as st
 
 from linkwork.five_bar import dynamics, kinematics
-from linkwork.five_bar.parameters import FiveBarParameters, InitialState
+from linkwork.five_bar.parameters import Constants, FiveBarParameters, InitialState
 
 #: Least |sin(rocker angle - coupler angle)| of the states drawn.
 LEAST_SINE = 0.1
@@ -33,6 +33,30 @@ class Case(NamedTuple):
     state: dynamics.State
     torque_inputs: dynamics.Inputs
     speed_inputs: dynamics.Inputs
+
+    @property
+    def p(self) -> Constants:
+        return self.parameters.constants()
+
+    def read(self, drive: str) -> dynamics.Inputs:
+        """The inputs as a plant driven by "torque" or "speed" has to read them."""
+        return self.torque_inputs if drive == "torque" else self.speed_inputs
+
+    def given(self) -> dict[str, float]:
+        """The inputs by their FMI names, the commanded speed that of the state."""
+        i = self.torque_inputs
+        return {
+            "drive.torque": i.torque,
+            "drive.speed": self.state[2],
+            "drive.acceleration": self.speed_inputs.acceleration,
+            "slider.force": i.force,
+            "load.fx": i.load_x,
+            "load.fy": i.load_y,
+        }
+
+    def under(self, drive: str) -> dynamics.State:
+        """The state under a drive: the same for both."""
+        return self.state
 
     @property
     def initial(self) -> InitialState:

@@ -6,10 +6,8 @@ from pathlib import Path
 
 import pytest
 
-import build_fmu
 
-
-@pytest.fixture(scope="session")
-def fmu(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """FiveBarSlider.fmu, built once from the sources as they are."""
-    return build_fmu.build("FiveBarSlider", tmp_path_factory.mktemp("fmu"))
+@pytest.fixture
+def fmu(fmus: dict[str, Path]) -> Path:
+    """FiveBarSlider.fmu."""
+    return fmus["FiveBarSlider"]

@@ -82,6 +82,7 @@ def area(linkage: Linkage) -> float:
     return float(curve.symmetric_difference(ellipse).area)
 
 
+@pytest.mark.slow
 class TestGoals:
     """What is to be reached with the printed links kept."""
 
@@ -180,6 +181,7 @@ class TestVariational:
         assert len(jumping.jumps) == 1
 
 
+@pytest.mark.slow
 class TestDynamics:
     """Fig 7.12."""
 
@@ -200,6 +202,7 @@ class TestDynamics:
         assert drive.mean_power + crank == pytest.approx(taken, rel=1e-3)
 
 
+@pytest.mark.slow
 def test_smoothness_and_strategy_say_the_same_as_their_steps() -> None:
     for n in fig_7_10.HARMONICS:
         for bound, solution in zip(fig_7_10.BOUNDS, fig_7_10.curve(n).solutions):

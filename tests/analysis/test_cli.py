@@ -19,11 +19,6 @@ from linkwork.five_bar.published import SETS, TABLE_3_1
 ROOT = Path(__file__).parents[2]
 
 
-@pytest.fixture(scope="module")
-def fmu(tmp_path_factory):
-    return build_fmu.build("FiveBarSlider", tmp_path_factory.mktemp("fmu"))
-
-
 @pytest.fixture
 def linkwork(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
@@ -205,19 +200,24 @@ def test_resonance_of_a_published_set(linkwork, tmp_path):
     assert rows.shape[1] == 4
 
 
-def test_resonance_tells_what_could_not_be_followed(linkwork, tmp_path):
+def test_resonance_reports_a_fold(linkwork):
     result = linkwork(
-        "resonance", "--published", "rig-1-spring-b", "--from", "900 rpm", "--to", "1100 rpm", "--no-plot"
+        "resonance", "--published", "rig-1-spring-b", "--from", "1030 rpm", "--to", "1060 rpm", "--no-plot"
     )
     assert result.exit_code == 0, result.output
     assert "fold at 1035.97" in result.output
+
+
+def test_resonance_reports_what_could_not_be_followed(linkwork, tmp_path):
     result = linkwork(
-        "resonance", "--published", "rig-1-spring-b", "--from", "500 rpm", "--to", "1100 rpm", "--no-plot"
-    )
+        "resonance", "--published", "table-3.1", "--vary", "slider.stiffness", "--from", "10 N/m", "--to", "350 N/m",
+        "--no-plot", "--no-doubled",
+    )  # fmt: skip
     assert result.exit_code == cli.ENDED_EARLY
-    assert "is followed to drive.speed" in result.output
-    assert not (tmp_path / "out" / "rig-1-spring-b-resonance.png").exists()
-    assert (tmp_path / "out" / "rig-1-spring-b-resonance.csv").exists()
+    assert "is followed to slider.stiffness = 312." in result.output
+    assert "links come near to collinear" in " ".join(result.output.split())
+    assert not (tmp_path / "out" / "table-3.1-resonance.png").exists()
+    assert (tmp_path / "out" / "table-3.1-resonance.csv").exists()
 
 
 def test_resonance_over_another_parameter(linkwork, tmp_path):

@@ -252,14 +252,9 @@ def _runs(fmu: str) -> dict[str, Any]:
     return json.loads(json.dumps(found, default=float))  # type: ignore[no-any-return]
 
 
-_CACHE: dict[Path, dict[str, Any]] = {}
-
-
-@pytest.fixture
-def runs(fmu: Path) -> dict[str, Any]:
-    if fmu not in _CACHE:
-        _CACHE[fmu] = run_in_process(_runs, fmu, timeout=120.0)
-    return _CACHE[fmu]
+@pytest.fixture(scope="module")
+def runs(fmus: dict[str, Path]) -> Any:
+    return run_in_process(_runs, fmus["FiveBarSlider"], timeout=120.0)
 
 
 def test_reference_numbers_through_the_fmu(runs: dict[str, Any]) -> None:

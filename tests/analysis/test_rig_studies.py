@@ -76,6 +76,7 @@ class TestRig1:
         assert speeds[-1] == pytest.approx(fig_8_15.speeds_of(Crossing.FOLD)[0], abs=1.0)
 
 
+@pytest.mark.slow
 class TestFriction:
     """Fig 8.17."""
 
@@ -158,6 +159,7 @@ def test_the_parts_of_a_branch_meet() -> None:
     assert (stable & unstable).sum() == 1
 
 
+@pytest.mark.slow
 class TestPage:
     """docs/rig-2.md."""
 

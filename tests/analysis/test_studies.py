@@ -116,7 +116,17 @@ def test_a_figure_there_is_not(number: str) -> None:
         studies.load(number)
 
 
-@pytest.mark.parametrize("number", studies.STUDIES)
+#: Studies whose results take more than a second or two.
+LONG = {
+    "3.2", "4.4", "4.5", "4.7", "5.1", "5.2", "5.3", "5.4", "6.7", "6.8", "6.9", "6.10", "7.6", "7.7", "7.8", "7.9", "7.10",
+    "7.11", "7.12", "8.15", "8.17", "8.18", "8.19", "8.20", "8.21",
+}  # fmt: skip
+every_study = pytest.mark.parametrize(
+    "number", [pytest.param(n, marks=pytest.mark.slow) if n in LONG else n for n in studies.STUDIES]
+)
+
+
+@every_study
 def test_verdicts(number: str) -> None:
     failed = {(number, v.statement) for v in result(number).verdicts if not v.holds}
     assert failed == {entry for entry in REFUTED if entry[0] == number}
@@ -125,7 +135,7 @@ def test_verdicts(number: str) -> None:
     assert all(np.isfinite(v.computed) for v in result(number).verdicts)
 
 
-@pytest.mark.parametrize("number", studies.STUDIES)
+@every_study
 def test_plot_and_data(number: str) -> None:
     study = studies.load(number)
     found = result(number)
@@ -157,6 +167,7 @@ def test_written_files(tmp_path: Path) -> None:
     np.testing.assert_array_equal(np.array(rows[1:], float), np.column_stack(list(found.columns.values())))
 
 
+@pytest.mark.slow
 def test_the_linkage_is_animated(tmp_path: Path) -> None:
     _, paths = studies.make("linkage", tmp_path)
     assert [path.name for path in paths] == ["linkage.png", "linkage.csv", "linkage.gif"]

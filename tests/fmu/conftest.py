@@ -1,4 +1,4 @@
-"""The FMUs under test, each built once, and variants of them built from changed copies of the sources."""
+"""The FMU under test, each of them in turn, and variants of it built from changed copies of the sources."""
 
 from __future__ import annotations
 
@@ -25,13 +25,6 @@ def changed_sources(folder: Path, changes: Changes) -> Path:
         assert old in text, f"{name} does not contain {old!r}"
         path.write_text(text.replace(old, new), encoding="utf-8")
     return sources
-
-
-@pytest.fixture(scope="session")
-def fmus(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
-    """Every FMU by its name, built from the sources as they are."""
-    folder = tmp_path_factory.mktemp("fmu")
-    return {name: build_fmu.build(name, folder) for name in MODELS}
 
 
 @pytest.fixture(params=list(MODELS))
