@@ -300,7 +300,7 @@ RIG_2 = {"rig-2-approximations.png": "8.18", "rig-2-harmonics.png": "8.20", "rig
 
 def rig_2_pictures() -> None:
     """Draw the pictures of docs/rig-2.md."""
-    from analysis.files.io import save_figure
+    from analysis.files import save_figure
     from analysis.periodic.resonance import approximations, frequency_response
     from analysis.studies import load
     from linkwork.five_bar.published import RAD_S_PER_RPM, SETS
@@ -320,7 +320,7 @@ def hand_drawn_pictures() -> None:
 
     from analysis.cli.slider import drive_figure
     from analysis.figures import Curve, Panel, plot_curves
-    from analysis.files.io import save_figure
+    from analysis.files import save_figure
     from analysis.motion.cases import load_slider_case
     from analysis.synthesis import TargetPath
     from analysis.synthesis.cases import load_synthesis_case
@@ -363,7 +363,7 @@ def slider_crank_pictures() -> None:
 
     from analysis.figures.slider_crank import plot_tolerances
     from analysis.figures.slider_crank_picture import plot_mechanism, plot_range
-    from analysis.files.io import save_figure
+    from analysis.files import save_figure
     from analysis.slider_crank.forces import force_turn
     from analysis.slider_crank.tolerances import Tolerance, monte_carlo
     from linkwork.slider_crank.published import CRANK_SPEED, INCH, SETS, parameters
@@ -389,7 +389,7 @@ def slider_crank_pictures() -> None:
 def main(arguments: list[str]) -> int:
     """Write what is asked for."""
     if "--figures" in arguments:
-        from analysis.files.io import save_figure
+        from analysis.files import save_figure
         from analysis.studies import load
 
         (HERE / "youssef-figures.md").write_text(youssef_figures(), encoding="utf-8")

@@ -110,15 +110,15 @@ def five_bar_case(file: str | None, published: str | None, settings: Sequence[st
 
 
 def chosen_case(file: str | None, published: str | None, settings: Sequence[str]) -> Any:
-    from ..files import io
     from ..run.case import published_case
+    from ..run.case_files import case_from, load_case
 
     if (file is None) == (published is None):
         raise click.UsageError("give either a case file or --published NAME")
     overrides = changes(settings, number_or_text, "slider.stiffness='2e6 dyn/cm'")
     if file is not None:
-        return io.load_case(file, overrides)
+        return load_case(file, overrides)
     assert published is not None
     if overrides:
-        return io.case_from({"published": published}, folder=Path.cwd(), title=published, overrides=overrides)
+        return case_from({"published": published}, folder=Path.cwd(), title=published, overrides=overrides)
     return published_case(published)

@@ -112,16 +112,17 @@ def run(
       linkwork run examples/torsion-bar.toml --fmu build/FiveBarSlider.fmu --out results
     """
     from .. import figures
-    from ..files import io
+    from ..files import save_figure
     from ..run.cosimulate import cosimulate
     from ..run.simulate import RunInterrupted, simulate
+    from ..units import quantity
 
     chosen = chosen_case(case, published, settings)
     if fmu is not None and method != "compiled":
         raise click.UsageError("--method is for a run in process: the FMU brings its own")
 
     def seconds(text: str | None, default: float, name: str) -> float:
-        return default if text is None else io.quantity(number_or_text(text), "s", name)
+        return default if text is None else quantity(number_or_text(text), "s", name)
 
     common = {
         "initial": chosen.initial,
@@ -146,7 +147,7 @@ def run(
         names = tuple(
             dict.fromkeys(("slider.position", second, "crank.speed", "drive.applied_torque", "transmission.angle"))
         )
-        written.append(io.save_figure(figures.plot(result, names, title=chosen.title), Path(out) / f"{name}.png"))
+        written.append(save_figure(figures.plot(result, names, title=chosen.title), Path(out) / f"{name}.png"))
     _summary(chosen.title, result)
     for path in written:
         console.print(f"wrote {path}", highlight=False, soft_wrap=True)
@@ -220,7 +221,8 @@ def check(
       linkwork check speed-jump examples/torsion-bar.toml
     """
     from .. import figures
-    from ..files import io
+    from ..files import save_figure
+    from ..run.case_files import load_case
     from ..run.checks import CASES
     from ..run.checks import check as compare_case
 
@@ -234,7 +236,7 @@ def check(
         if name in CASES:
             case = CASES[name]
         elif Path(name).suffix in (".toml", ".json"):
-            case = io.load_case(name)
+            case = load_case(name)
         else:
             raise click.UsageError(f"{name!r} is neither a case file nor a standard case ({', '.join(CASES)})")
         prepare_solver(case.parameters)
@@ -257,7 +259,7 @@ def check(
                 title=case.title,
                 labels=(f"in process ({a.source})", "FMU"),
             )
-            io.save_figure(figure, folder / f"{label}.png")
+            save_figure(figure, folder / f"{label}.png")
             console.print(f"wrote {folder / label}.png, -in-process.csv and -fmu.csv", highlight=False, soft_wrap=True)
             for which, result in (("in process", a), ("FMU", b)):
                 if result.status:
@@ -313,7 +315,7 @@ def info(what: str | None) -> None:
       linkwork info table-3.1
       linkwork info build/FiveBarSlider.fmu
     """
-    from ..files import io
+    from ..run.case_files import load_case
 
     if what is None:
         grid = Table(title="published sets")
@@ -328,7 +330,7 @@ def info(what: str | None) -> None:
     elif Path(what).suffix == ".fmu":
         _fmu(Path(what))
     elif Path(what).suffix in (".toml", ".json"):
-        case = io.load_case(what)
+        case = load_case(what)
         _parameters(case.title, case.parameters)
     else:
         raise click.UsageError(f"{what!r} is neither a published set ({', '.join(PUBLISHED)}), a file, nor an FMU")

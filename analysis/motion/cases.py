@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
+from functools import partial
 from math import inf, isfinite, pi
 from pathlib import Path
 from typing import Any, get_args
@@ -12,56 +12,99 @@ from typing import Any, get_args
 import numpy as np
 
 from linkwork.errors import InputError, LinkworkError, MissingParameterError, ParameterError
-from linkwork.five_bar.parameters import FiveBarParameters, InitialState
+from linkwork.five_bar.parameters import FiveBarParameters
 
-from ..files.io import check_names, parameters_to, quantity, read_tables, unknown_name
+from ..files import (
+    Choice,
+    Many,
+    Quantity,
+    Range,
+    Table,
+    Whole,
+    as_it_is,
+    check_names,
+    entry,
+    flag,
+    names_of,
+    overridden,
+    read,
+    read_rows,
+    read_tables,
+    table_of,
+    text,
+)
 from ..linear.linearise import linearise_along
 from ..linear.slider_control import design_pid
-from ..synthesis.case_tasks import flag, given, listed, one_of, section, whole
-from ..synthesis.cases import TABLES, SynthesisCase, overridden, synthesis_case_from
+from ..run.case_files import parameters_to
+from ..synthesis.cases import SynthesisCase, synthesis_case_from
 from ..synthesis.constraints import Assembly, Constraint
 from ..synthesis.linkage import ANGLES, LENGTHS, LINKS, Linkage
 from ..synthesis.program import SliderUnknown
 from ..synthesis.solution import Solution
 from ..synthesis.solve import Synthesis, synthesize
 from ..synthesis.tasks import RockerFunction, Task, TimedPath, UntimedPath
+from ..units import with_unit
 from .inverse import SliderDrive, best_spring, inverse_dynamics
 from .least_effort import Effort, LeastEffort, least_effort
 from .motion import motion_of_plant, slider_motion
 from .strategy import RATIOS, Criterion, Strategy, simplest_mechanism
 from .tracking import TrackingResult, track
 
-#: Tables of a case file besides those of a synthesis.
-OWN = ("linkage", "slider", "strategy", "drive", "load", "tracking", "least_effort")
 #: A name of a dimension in the columns of solutions.csv: by itself, or with its unit.
 DIMENSIONS = (*LENGTHS, *ANGLES)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SliderTable:
+    """The table ``[slider]``: the motion that is sought, as in `SliderCase`."""
+
+    harmonics: tuple[int, ...] = entry(Many(Whole(0), least=1, single=True), (2,))
+    links: str = entry(Choice(("kept", "free")), "kept")
+    guide_angle: tuple[float, float] = entry(Range(Quantity("rad")), (-pi, pi))
+    position: tuple[float, float] | None = entry(Range(Quantity("m")), None)
+    stroke: float = entry(Quantity("m", above=0.0), inf)
+    speed: float = entry(Quantity("m/rad", above=0.0), inf)
+    acceleration: float = entry(Quantity("m/rad**2", above=0.0), inf)
+    starts: int = entry(Whole(1), 24)
+
+    @property
+    def unknown(self) -> SliderUnknown:
+        """Bounds of the motion."""
+        return SliderUnknown(
+            harmonics=0,
+            guide_angle=self.guide_angle,
+            position=self.position,
+            stroke=self.stroke,
+            speed=self.speed,
+            acceleration=self.acceleration,
+        )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StrategyWanted:
     """Arguments of `simplest_mechanism`."""
 
-    tolerance: float
-    criterion: Criterion = "worst"
-    harmonics: int = 3
-    ratios: tuple[int, ...] = RATIOS
-    second_crank: float | None = None
-    starts: int = 12
+    tolerance: float = entry(as_it_is)
+    criterion: Criterion = entry(Choice(get_args(Criterion)), "worst")
+    harmonics: int = entry(Whole(1), 3)
+    ratios: tuple[int, ...] = entry(Many(Whole()), RATIOS)
+    second_crank: float | None = entry(Quantity("m", above=0.0), None)
+    starts: int = entry(Whole(1), 12)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DriveWanted:
     """What inverse dynamics is asked for: crank speed (rad/s), load at P (N), samples of a turn, the best spring or not."""
 
-    speed: float
+    speed: float = entry(Quantity("rad/s", above=0.0))
     load: tuple[float, float] = (0.0, 0.0)
-    samples: int = 720
-    best_spring: bool = False
+    samples: int = entry(Whole(72), 720)
+    best_spring: bool = entry(flag, False)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TrackingWanted:
-    """A run under control: arguments of `track`, and what its plant has that the model has not.
+    """A run under control: arguments of `track`, and what its plant has that the model does not.
 
     Attributes
     ----------
@@ -81,25 +124,25 @@ class TrackingWanted:
         Whether the feed-forward knows the load.
     """
 
-    period: float = 1e-3
-    bandwidth: float | None = None
-    feedforward: bool = True
-    revolutions: float = 5.0
-    limit: float = inf
-    coulomb_friction: float | None = None
-    mass_error: float = 0.0
-    load_known: bool = True
+    period: float = entry(Quantity("s", above=0.0), 1e-3)
+    bandwidth: float | None = entry(Quantity("rad/s", least=0.0), None)
+    feedforward: bool = entry(flag, True)
+    revolutions: float = entry(Quantity("1", above=0.0), 5.0)
+    limit: float = entry(Quantity("N", above=0.0), inf)
+    coulomb_friction: float | None = entry(Quantity("N", least=0.0), None)
+    mass_error: float = entry(Quantity("1", above=-1.0, requirement="be a share above -1"), 0.0)
+    load_known: bool = entry(flag, True)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class EffortWanted:
     """Arguments of `least_effort`: bound in m or rad."""
 
-    bound: float
-    cost: Effort = "force"
-    force: float = inf
-    speed: float = inf
-    intervals: int = 40
+    bound: float = entry(as_it_is)
+    cost: Effort = entry(Choice(get_args(Effort)), "force")
+    force: float = entry(Quantity("N", above=0.0), inf)
+    speed: float = entry(Quantity("m/s", above=0.0), inf)
+    intervals: int = entry(Whole(4), 40)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -184,18 +227,13 @@ class SliderCase:
         assert wanted is not None
         return simplest_mechanism(
             self.synthesis.task,
-            wanted.tolerance,
-            criterion=wanted.criterion,
             bounds=self._bounds(),
             constraints=self._constraints,
             stroke=self.unknown.stroke if isfinite(self.unknown.stroke) else None,
-            harmonics=wanted.harmonics,
-            ratios=wanted.ratios,
-            second_crank=wanted.second_crank,
-            starts=wanted.starts,
             seed=search.seed,
             n_jobs=search.jobs,
             progress=progress,
+            **asdict(wanted),
         )
 
     # Dynamics
@@ -300,27 +338,55 @@ def _around(linkage: Linkage, task: Task) -> dict[str, tuple[float, float]]:
 
 def run_case(drive: SliderDrive, title: str, force_file: str) -> dict[str, Any]:
     """Tables of a case file that runs one turn under the control force, read from a file; see `docs/case-files.md`."""
-    start = InitialState(
-        crank_speed=drive.crank_speed,
-        slider_position=float(drive.states[0, 1]),
-        slider_velocity=float(drive.states[0, 3]),
-    )
     assert not callable(drive.load)
+    _, position, _, velocity = drive.states[0].tolist()
     return {
         "title": title,
         **parameters_to(drive.parameters),
-        "initial": {
-            "slider_position": f"{start.slider_position!r} m",
-            "slider_velocity": f"{start.slider_velocity!r} m/s",
-        },
-        "drive": {"speed": f"{drive.crank_speed!r} rad/s"},
+        "initial": {"slider_position": with_unit(position, "m"), "slider_velocity": with_unit(velocity, "m/s")},
+        "drive": {"speed": with_unit(drive.crank_speed, "rad/s")},
         "force": {"kind": "table", "file": force_file, "interpolation": "cubic"},
-        "load": {"fx": f"{drive.load[0]!r} N", "fy": f"{drive.load[1]!r} N"},
-        "run": {"stop_time": f"{drive.period!r} s", "step": f"{drive.period / len(drive.time)!r} s"},
+        "load": {"fx": with_unit(drive.load[0], "N"), "fy": with_unit(drive.load[1], "N")},
+        "run": {"stop_time": with_unit(drive.period, "s"), "step": with_unit(drive.period / len(drive.time), "s")},
     }
 
 
 # Reading
+
+
+def _strategy(value: Any, name: str, *, angular: bool) -> StrategyWanted:
+    """The tolerance is one of an error, or of the quality function, which is squared."""
+    unit = ("rad" if angular else "m") + "**2" * (table_of(value, name).get("criterion") == "error")
+    found: StrategyWanted = read(StrategyWanted, value, name, readers={"tolerance": Quantity(unit, above=0.0)})
+    return found
+
+
+def _linkage(value: Any, name: str, *, folder: Path) -> Linkage:
+    """A linkage by its dimensions, or one of those in a file that `linkwork synthesize` wrote."""
+    if "file" not in table_of(value, name):
+        dimensions = {d: Quantity("rad" if d in ANGLES else "m") for d in DIMENSIONS}
+        return read(Linkage, value, name, readers={**dimensions, "branch": Whole()})  # type: ignore[no-any-return]
+    found = read(dict, value, name, readers={"file": text, "rank": Whole(1)})
+    return linkage_from_csv(folder / found["file"], found.get("rank", 1))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Load:
+    fx: float = entry(Quantity("N"), 0.0)
+    fy: float = entry(Quantity("N"), 0.0)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Tables:
+    """Tables of a case file besides those of a synthesis."""
+
+    linkage: Linkage | None = entry(as_it_is, None)
+    slider: SliderTable = entry(Table(SliderTable), SliderTable())
+    strategy: StrategyWanted | None = entry(as_it_is, None)
+    drive: DriveWanted | None = entry(Table(DriveWanted), None)
+    load: _Load = entry(Table(_Load), _Load())
+    tracking: TrackingWanted | None = entry(Table(TrackingWanted), None)
+    least_effort: EffortWanted | None = entry(as_it_is, None)
 
 
 def load_slider_case(path: str | Path, overrides: Mapping[str, Any] | None = None) -> SliderCase:
@@ -341,61 +407,45 @@ def slider_case_from(
     data: Mapping[str, Any], *, folder: Path, title: str = "", overrides: Mapping[str, Any] | None = None
 ) -> SliderCase:
     """A case from the tables of a case file; ``folder`` is where its files are looked for."""
-    data = overridden(data, overrides or {})
-    for name in data:
-        if name not in (*TABLES, *OWN) or name == "trade_off":
-            raise unknown_name(name, [n for n in (*TABLES, *OWN) if n != "trade_off"])
+    data = {"title": title} | overridden(data, overrides or {})
+    own = names_of(_Tables)
+    check_names(data, "", [name for name in (*names_of(SynthesisCase), *own) if name != "trade_off"])
     if "slider" not in data and "strategy" not in data:
         raise MissingParameterError("slider")
-    rest = {name: value for name, value in data.items() if name not in OWN}
-    synthesis = synthesis_case_from(rest, folder=folder, title=title)
-    linkage = _linkage(section(data, "linkage"), folder) if "linkage" in data else None
-    slider = section(data, "slider")
-    check_names(slider, "slider", (*_MOTION, "harmonics", "guide_angle", "position", "links", "starts"))
-    free = one_of(slider.get("links", "kept"), "slider.links", ("kept", "free")) == "free"
-    if linkage is not None and not free and synthesis.bounds:
-        first = next(iter(synthesis.bounds))
-        raise ParameterError(
-            f"bounds.{first}",
-            synthesis.bounds[first],
-            "not come with a [linkage] that is kept; set slider.links = 'free'",
-        )
-    if "drive" not in data:
-        for name in ("load", "tracking", "least_effort"):
-            if name in data:
-                raise MissingParameterError("drive.speed")
+    synthesis = synthesis_case_from({name: value for name, value in data.items() if name not in own}, folder=folder)
     angular = isinstance(synthesis.task, RockerFunction)
+    bound = Quantity("rad" if angular else "m", above=0.0)
+    tables: _Tables = read(
+        _Tables,
+        {name: value for name, value in data.items() if name in own},
+        "",
+        readers={
+            "linkage": partial(_linkage, folder=folder),
+            "strategy": partial(_strategy, angular=angular),
+            "least_effort": lambda value, name: read(EffortWanted, value, name, readers={"bound": bound}),
+        },
+    )
+    free = tables.slider.links == "free"
+    if tables.linkage is not None and not free and synthesis.bounds:
+        first, limits = next(iter(synthesis.bounds.items()))
+        raise ParameterError(
+            f"bounds.{first}", limits, "not come with a [linkage] that is kept; set slider.links = 'free'"
+        )
+    if tables.drive is None and any(name in data for name in ("load", "tracking", "least_effort")):
+        raise MissingParameterError("drive.speed")
+    load = (tables.load.fx, tables.load.fy)
     return SliderCase(
         synthesis=synthesis,
-        linkage=linkage,
-        harmonics=_harmonics(slider.get("harmonics", 2)),
-        unknown=_unknown_motion(slider),
+        linkage=tables.linkage,
+        harmonics=tuple(sorted(set(tables.slider.harmonics))),
+        unknown=tables.slider.unknown,
         free=free,
-        starts=whole(slider.get("starts", 24), "slider.starts", 1),
-        strategy=_strategy(section(data, "strategy"), angular) if "strategy" in data else None,
-        drive=_drive(section(data, "drive"), section(data, "load")) if "drive" in data else None,
-        tracking=_tracking(section(data, "tracking")) if "tracking" in data else None,
-        effort=_effort(section(data, "least_effort"), angular) if "least_effort" in data else None,
+        starts=tables.slider.starts,
+        strategy=tables.strategy,
+        drive=None if tables.drive is None else replace(tables.drive, load=load),
+        tracking=tables.tracking,
+        effort=tables.least_effort,
     )
-
-
-def _linkage(table: Mapping[str, Any], folder: Path) -> Linkage:
-    """A linkage by its dimensions, or one of those in a file that `linkwork synthesize` wrote."""
-    if "file" in table:
-        check_names(table, "linkage", ("file", "rank"))
-        return linkage_from_csv(folder / str(table["file"]), whole(table.get("rank", 1), "linkage.rank", 1))
-    check_names(table, "linkage", (*DIMENSIONS, "branch"))
-    values: dict[str, Any] = {
-        name: quantity(table[name], "rad" if name in ANGLES else "m", f"linkage.{name}")
-        for name in DIMENSIONS
-        if name in table
-    }
-    for name in LINKS:
-        if name not in values:
-            raise MissingParameterError(f"linkage.{name}")
-    if "branch" in table:
-        values["branch"] = whole(table["branch"], "linkage.branch")
-    return Linkage(**values)
 
 
 def linkage_from_csv(path: str | Path, rank: int = 1) -> Linkage:
@@ -406,11 +456,7 @@ def linkage_from_csv(path: str | Path, rank: int = 1) -> Linkage:
     InputError
         If the file cannot be read, is none of that kind, or has no linkage of that rank.
     """
-    try:
-        with Path(path).open(encoding="utf-8", newline="") as file:
-            rows = list(csv.DictReader(file))
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
-        raise InputError(f"{path} cannot be read: {getattr(error, 'strerror', None) or error}") from error
+    rows = read_rows(path)
     if rank > len(rows):
         raise InputError(f"{path} has {len(rows)} linkages: there is none of rank {rank}")
     row = rows[rank - 1]
@@ -424,108 +470,3 @@ def linkage_from_csv(path: str | Path, rank: int = 1) -> Linkage:
         raise InputError(
             f"{path} is no list of linkages as 'linkwork synthesize' writes it ({type(error).__name__}: {error})"
         ) from None
-
-
-#: Bounds of the motion by the crank's rotation in radians.
-_MOTION = {"stroke": "m", "speed": "m/rad", "acceleration": "m/rad**2"}
-
-
-def _harmonics(value: Any) -> tuple[int, ...]:
-    values = listed(value, "slider.harmonics") if isinstance(value, list) else [value]
-    numbers = sorted({whole(v, "slider.harmonics", 0) for v in values})
-    if not numbers:
-        raise ParameterError("slider.harmonics", value, "be a number or a list of some")
-    return tuple(numbers)
-
-
-def _range(value: Any, unit: str, name: str) -> tuple[float, float]:
-    ends = value if isinstance(value, list) else [value, value]
-    if len(ends) != 2:
-        raise ParameterError(name, value, "be one value, or two: [least, greatest]")
-    low, high = (quantity(end, unit, name) for end in ends)
-    if not low <= high:
-        raise ParameterError(name, value, "be in order: [least, greatest]")
-    return low, high
-
-
-def _unknown_motion(table: Mapping[str, Any]) -> SliderUnknown:
-    options: dict[str, Any] = {}
-    for name, unit in _MOTION.items():
-        if name in table:
-            options[name] = _positive(table[name], unit, f"slider.{name}")
-    if "guide_angle" in table:
-        options["guide_angle"] = _range(table["guide_angle"], "rad", "slider.guide_angle")
-    if "position" in table:
-        options["position"] = _range(table["position"], "m", "slider.position")
-    return SliderUnknown(harmonics=0, **options)
-
-
-def _positive(value: Any, unit: str, name: str) -> float:
-    number = quantity(value, unit, name)
-    if not (isfinite(number) and number > 0.0):
-        raise ParameterError(name, value, "be a finite number greater than zero")
-    return number
-
-
-def _strategy(table: Mapping[str, Any], angular: bool) -> StrategyWanted:
-    name = "strategy"
-    check_names(table, name, StrategyWanted.__dataclass_fields__)
-    criterion = one_of(table.get("criterion", "worst"), "strategy.criterion", get_args(Criterion))
-    unit = ("rad" if angular else "m") + ("**2" if criterion == "error" else "")
-    options: dict[str, Any] = {
-        key: whole(table[key], f"{name}.{key}", 1) for key in ("harmonics", "starts") if key in table
-    }
-    if "ratios" in table:
-        options["ratios"] = tuple(whole(v, "strategy.ratios") for v in listed(table["ratios"], "strategy.ratios"))
-    if "second_crank" in table:
-        options["second_crank"] = _positive(table["second_crank"], "m", "strategy.second_crank")
-    tolerance = _positive(given(table, "tolerance", name), unit, "strategy.tolerance")
-    return StrategyWanted(tolerance=tolerance, criterion=criterion, **options)  # type: ignore[arg-type]
-
-
-def _drive(table: Mapping[str, Any], load: Mapping[str, Any]) -> DriveWanted:
-    check_names(table, "drive", ("speed", "samples", "best_spring"))
-    check_names(load, "load", ("fx", "fy"))
-    return DriveWanted(
-        speed=_positive(given(table, "speed", "drive"), "rad/s", "drive.speed"),
-        load=(quantity(load.get("fx", 0.0), "N", "load.fx"), quantity(load.get("fy", 0.0), "N", "load.fy")),
-        samples=whole(table.get("samples", 720), "drive.samples", 72),
-        best_spring=flag(table.get("best_spring", False), "drive.best_spring"),
-    )
-
-
-def _tracking(table: Mapping[str, Any]) -> TrackingWanted:
-    check_names(table, "tracking", TrackingWanted.__dataclass_fields__)
-    options: dict[str, Any] = {
-        name: flag(table[name], f"tracking.{name}") for name in ("feedforward", "load_known") if name in table
-    }
-    for name, unit in (("period", "s"), ("revolutions", "1"), ("limit", "N")):
-        if name in table:
-            options[name] = _positive(table[name], unit, f"tracking.{name}")
-    for name, unit in (("bandwidth", "rad/s"), ("coulomb_friction", "N")):
-        if name in table:
-            value = quantity(table[name], unit, f"tracking.{name}")
-            if not 0.0 <= value < inf:
-                raise ParameterError(f"tracking.{name}", table[name], "be a finite number, zero or greater")
-            options[name] = value
-    if "mass_error" in table:
-        share = quantity(table["mass_error"], "1", "tracking.mass_error")
-        if not -1.0 < share < inf:
-            raise ParameterError("tracking.mass_error", table["mass_error"], "be a share above -1")
-        options["mass_error"] = share
-    return TrackingWanted(**options)
-
-
-def _effort(table: Mapping[str, Any], angular: bool) -> EffortWanted:
-    check_names(table, "least_effort", EffortWanted.__dataclass_fields__)
-    options: dict[str, Any] = {
-        name: _positive(table[name], unit, f"least_effort.{name}")
-        for name, unit in (("force", "N"), ("speed", "m/s"))
-        if name in table
-    }
-    if "intervals" in table:
-        options["intervals"] = whole(table["intervals"], "least_effort.intervals", 4)
-    if "cost" in table:
-        options["cost"] = one_of(table["cost"], "least_effort.cost", get_args(Effort))
-    bound = given(table, "bound", "least_effort")
-    return EffortWanted(bound=_positive(bound, "rad" if angular else "m", "least_effort.bound"), **options)

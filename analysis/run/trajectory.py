@@ -105,10 +105,10 @@ class Trajectory:
 
     def to_csv(self, path: str | Path) -> Path:
         """Write time and all outputs to a CSV file whose header has names and units."""
-        from ..files import io
+        from ..files import write_csv
 
         columns = {"time [s]": self.time} | {f"{name} [{UNITS[name]}]": self[name] for name in self.names}
-        return io.write_csv(path, columns)
+        return write_csv(path, columns)
 
     def to_dataframe(self) -> pandas.DataFrame:
         """The run as a DataFrame indexed by time; needs pandas (``pip install linkwork[dataframe]``)."""

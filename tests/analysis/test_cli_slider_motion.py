@@ -15,10 +15,10 @@ from click.testing import CliRunner, Result
 from analysis import cli
 from analysis import motion as control
 from analysis.cli import slider
-from analysis.files import io
 from analysis.motion.cases import SliderCase, linkage_from_csv, load_slider_case
 from analysis.motion.motion import motion_of_plant
 from analysis.numerics.fourier import FourierSeries
+from analysis.run.case_files import load_case, load_parameters
 from analysis.run.simulate import simulate
 from analysis.synthesis import Linkage, SecondCrank, SliderMotion, SynthesisInterrupted, TimedPath, evaluate, synthesize
 from analysis.synthesis.tasks import turn
@@ -124,9 +124,9 @@ def test_what_is_written_runs_and_reproduces_the_motion(linkwork, tmp_path) -> N
     load = {"fx": "2 N", "fy": "-3 N"}
     result = linkwork(tables(drive={"speed": "120 rpm"}, load=load), "--no-plots", "--out", "moved")
     assert result.exit_code == 0, result.output
-    case = io.load_case(tmp_path / "moved" / "five-bar.toml")
+    case = load_case(tmp_path / "moved" / "five-bar.toml")
     assert case.stop_time == pytest.approx(0.5)
-    assert io.load_parameters(tmp_path / "moved" / "five-bar-parameters.toml") == case.parameters
+    assert load_parameters(tmp_path / "moved" / "five-bar-parameters.toml") == case.parameters
     run = simulate(case.parameters, case.inputs, initial=case.initial, stop_time=case.stop_time, step=case.step)
     columns = csv(tmp_path / "moved" / "motion.csv")
     assert columns["slider position [m]"] == pytest.approx(columns["slider.position [m]"], abs=1e-15)
