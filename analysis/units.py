@@ -8,32 +8,12 @@ from math import inf, isfinite, pi
 from types import MappingProxyType
 from typing import Any
 
-from linkwork.errors import InputError, ParameterError
+from linkwork.errors import ParameterError
 
-#: Factors to SI.
 RAD_S_PER_RPM = pi / 30.0
-DEGREE = pi / 180.0
 INCH = 0.0254
-POUND_FORCE = 4.4482216152605
-CM_PER_METRE = 1e2
-
-#: Units of length, in m.
+#: Units of length (m).
 LENGTHS: Mapping[str, float] = MappingProxyType({"mm": 1e-3, "cm": 1e-2, "m": 1.0, "in": INCH})
-
-#: Systems of units that results are written in: of each SI unit the name, and how many of SI one of it is.
-SYSTEMS: Mapping[str, Mapping[str, tuple[str, float]]] = MappingProxyType(
-    {
-        "SI": {unit: (unit, 1.0) for unit in ("rad", "m", "m/s", "m/s2", "N", "N.m")},
-        "inch": {
-            "rad": ("deg", DEGREE),
-            "m": ("in", INCH),
-            "m/s": ("in/s", INCH),
-            "m/s2": ("in/s2", INCH),
-            "N": ("lb", POUND_FORCE),
-            "N.m": ("lb.in", POUND_FORCE * INCH),
-        },
-    }
-)
 
 #: Units of the FMI contract as pint spells them.
 _PINT = {
@@ -44,19 +24,6 @@ _PINT = {
     "rad/s2": "rad/s**2",
     "N.s/m": "N*s/m",
 }
-
-
-def unit_table(units: str) -> Mapping[str, tuple[str, float]]:
-    """The system of units of that name, of `SYSTEMS`.
-
-    Raises
-    ------
-    InputError
-        If there is none.
-    """
-    if units not in SYSTEMS:
-        raise InputError(f"there are no units {units!r}: they are {' or '.join(SYSTEMS)}")
-    return SYSTEMS[units]
 
 
 def with_unit(value: float, unit: str) -> str:

@@ -121,7 +121,7 @@ def _moved(chosen: Any) -> tuple[Any, Interrupted | None]:
     stopped = None
     four_bar = chosen.four_bar(progress=console.is_terminal)
     found = [four_bar]
-    for harmonics in chosen.harmonics:
+    for harmonics in chosen.slider.harmonics:
         try:
             result = chosen.move(four_bar, harmonics, tuple(found[1:]), progress=console.is_terminal)
         except SynthesisInterrupted as error:
@@ -227,7 +227,7 @@ def _dynamics(chosen: Any, solution: Any, folder: Path, plots: bool) -> list[Pat
         written.append(save_figure(drive_figure(title, drive), folder / "motion.png"))
     if chosen.tracking is not None:
         written += _tracking(chosen, drive, folder, plots)
-    if chosen.effort is not None:
+    if chosen.least_effort is not None:
         written += _effort(chosen, drive, solution.linkage, folder, plots)
     return written
 
@@ -350,7 +350,7 @@ def _effort(chosen: Any, drive: Any, linkage: Any, folder: Path, plots: bool) ->
         ("peak force", f"{np.abs(least.force).max():.5g} N"),
         (
             "departure allowed, and found by a run",
-            f"{scale * chosen.effort.bound:.4g}, {scale * least.attained:.4g} {unit}",
+            f"{scale * chosen.least_effort.bound:.4g}, {scale * least.attained:.4g} {unit}",
         ),
         ("change of effort as the intervals are halved", f"{least.mesh_effort:.1e}"),
     ]

@@ -12,7 +12,6 @@ from typing import Any, get_args
 import numpy as np
 
 from linkwork.errors import InputError, LinkworkError, MissingParameterError, ParameterError
-from linkwork.five_bar.parameters import FiveBarParameters
 
 from ..files import (
     Choice,
@@ -36,7 +35,7 @@ from ..files import (
 from ..linear.linearise import linearise_along
 from ..linear.slider_control import design_pid
 from ..run.case_files import parameters_to
-from ..synthesis.cases import SynthesisCase, synthesis_case_from
+from ..synthesis.cases import SynthesisCase, direction, synthesis_case_from
 from ..synthesis.constraints import Assembly, Constraint
 from ..synthesis.linkage import ANGLES, LENGTHS, LINKS, Linkage
 from ..synthesis.program import SliderUnknown
@@ -54,11 +53,26 @@ from .tracking import TrackingResult, track
 DIMENSIONS = (*LENGTHS, *ANGLES)
 
 
+def _increasing(value: Any, name: str) -> tuple[int, ...]:
+    return tuple(sorted(set(Many(Whole(0), least=1, single=True)(value, name))))
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SliderTable:
-    """The table ``[slider]``: the motion that is sought, as in `SliderCase`."""
+    """The motion that is sought.
 
-    harmonics: tuple[int, ...] = entry(Many(Whole(0), least=1, single=True), (2,))
+    Attributes
+    ----------
+    harmonics : tuple of int
+        Increasing; each is searched for, from the one before.
+    links : str
+        Whether the links are kept, or free: optimised together with the motion.
+    guide_angle, position, stroke, speed, acceleration
+        Bounds, as of `SliderUnknown`.
+    starts : int
+    """
+
+    harmonics: tuple[int, ...] = entry(_increasing, (2,))
     links: str = entry(Choice(("kept", "free")), "kept")
     guide_angle: tuple[float, float] = entry(Range(Quantity("rad")), (-pi, pi))
     position: tuple[float, float] | None = entry(Range(Quantity("m")), None)
@@ -67,17 +81,13 @@ class SliderTable:
     acceleration: float = entry(Quantity("m/rad**2", above=0.0), inf)
     starts: int = entry(Whole(1), 24)
 
-    @property
-    def unknown(self) -> SliderUnknown:
-        """Bounds of the motion."""
-        return SliderUnknown(
-            harmonics=0,
-            guide_angle=self.guide_angle,
-            position=self.position,
-            stroke=self.stroke,
-            speed=self.speed,
-            acceleration=self.acceleration,
-        )
+    def __post_init__(self) -> None:
+        self.unknown(0)  # checks them
+
+    def unknown(self, harmonics: int) -> SliderUnknown:
+        """A motion with so many harmonics and its bounds."""
+        bounds = {name: getattr(self, name) for name in ("guide_angle", "position", "stroke", "speed", "acceleration")}
+        return SliderUnknown(harmonics=harmonics, **bounds)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -94,10 +104,9 @@ class StrategyWanted:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DriveWanted:
-    """What inverse dynamics is asked for: crank speed (rad/s), load at P (N), samples of a turn, the best spring or not."""
+    """What inverse dynamics is asked for: crank speed (rad/s), samples of a turn, the best spring or not."""
 
     speed: float = entry(Quantity("rad/s", above=0.0))
-    load: tuple[float, float] = (0.0, 0.0)
     samples: int = entry(Whole(72), 720)
     best_spring: bool = entry(flag, False)
 
@@ -145,6 +154,14 @@ class EffortWanted:
     intervals: int = entry(Whole(4), 40)
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Load:
+    """Load at P (N), along the ground link and to its left."""
+
+    fx: float = entry(Quantity("N"), 0.0)
+    fy: float = entry(Quantity("N"), 0.0)
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class SliderCase:
     """What a case file asks for.
@@ -155,27 +172,35 @@ class SliderCase:
         Task, bounds, constraints, search, and what the linkage is made of.
     linkage : Linkage or None
         The one whose pivot is moved; None if it is to be found first.
-    harmonics : tuple of int
-        Increasing; each is searched for, from the one before.
-    unknown : SliderUnknown
-        Bounds of the motion.
-    free : bool
-        Whether the links are optimised together with the motion.
-    starts : int
-    strategy, drive, tracking, effort
+    slider : SliderTable
+        The motion that is sought.
+    strategy, drive, tracking, least_effort
         What is asked for besides; None for what is not.
+    load : Load, optional
     """
 
-    synthesis: SynthesisCase
-    linkage: Linkage | None
-    harmonics: tuple[int, ...] = (2,)
-    unknown: SliderUnknown
-    free: bool = False
-    starts: int = 24
-    strategy: StrategyWanted | None = None
-    drive: DriveWanted | None = None
-    tracking: TrackingWanted | None = None
-    effort: EffortWanted | None = None
+    synthesis: SynthesisCase = entry(as_it_is)
+    linkage: Linkage | None = entry(as_it_is, None)
+    slider: SliderTable = entry(Table(SliderTable), SliderTable())
+    strategy: StrategyWanted | None = entry(as_it_is, None)
+    drive: DriveWanted | None = entry(Table(DriveWanted), None)
+    load: Load | None = entry(Table(Load), None)
+    tracking: TrackingWanted | None = entry(Table(TrackingWanted), None)
+    least_effort: EffortWanted | None = entry(as_it_is, None)
+
+    def __post_init__(self) -> None:
+        if self.linkage is not None and not self.free and self.synthesis.bounds:
+            first, limits = next(iter(self.synthesis.bounds.items()))
+            raise ParameterError(
+                f"bounds.{first}", limits, "not come with a [linkage] that is kept; set slider.links = 'free'"
+            )
+        if self.drive is None and any((self.load, self.tracking, self.least_effort)):
+            raise MissingParameterError("drive.speed")
+
+    @property
+    def free(self) -> bool:
+        """Whether the links are optimised together with the motion."""
+        return self.slider.links == "free"
 
     @property
     def _constraints(self) -> tuple[Constraint, ...]:
@@ -188,7 +213,7 @@ class SliderCase:
         """Bounds of the links, where a linkage is given and they are kept, that linkage."""
         if self.linkage is None or self.free:
             return self.synthesis.bounds
-        return {name: (value, value) for name, value in self.linkage.values().items() if name != "branch"}
+        return _kept(self.linkage)
 
     def four_bar(self, *, progress: bool = False) -> Solution:
         """The linkage with its pivot fixed: the one given, evaluated, or the best that is found."""
@@ -198,10 +223,8 @@ class SliderCase:
         if isinstance(task, (TimedPath, RockerFunction)) or (isinstance(task, UntimedPath) and task.path.closed):
             return Solution.of(task, self.linkage)
         # where it is on the way of the task is not given: found with every dimension fixed
-        kept = {name: (value, value) for name, value in self.linkage.values().items() if name != "branch"}
-        only = (Assembly(branch=self.linkage.branch),)
-        seed = self.synthesis.search.seed
-        return synthesize(task, kept, only, seed=seed, candidates=1 << 10, starts=4, solutions=1).best
+        only, seed = (Assembly(branch=self.linkage.branch),), self.synthesis.search.seed
+        return synthesize(task, _kept(self.linkage), only, seed=seed, candidates=1 << 10, starts=4, solutions=1).best
 
     def move(self, four_bar: Solution, harmonics: int, guesses: tuple[Solution, ...], *, progress: bool) -> Synthesis:
         """The best motion with so many harmonics; see `slider_motion`."""
@@ -210,11 +233,11 @@ class SliderCase:
         return slider_motion(
             self.synthesis.task,
             four_bar,
-            replace(self.unknown, harmonics=harmonics),
+            self.slider.unknown(harmonics),
             bounds=bounds,
             constraints=self._constraints,
             guesses=guesses,
-            starts=self.starts,
+            starts=self.slider.starts,
             solutions=search.solutions,
             seed=search.seed,
             n_jobs=search.jobs,
@@ -229,7 +252,7 @@ class SliderCase:
             self.synthesis.task,
             bounds=self._bounds(),
             constraints=self._constraints,
-            stroke=self.unknown.stroke if isfinite(self.unknown.stroke) else None,
+            stroke=self.slider.stroke if isfinite(self.slider.stroke) else None,
             seed=search.seed,
             n_jobs=search.jobs,
             progress=progress,
@@ -238,30 +261,16 @@ class SliderCase:
 
     # Dynamics
 
-    def five_bar(self, linkage: Linkage) -> FiveBarParameters:
-        """Parameters of the plant: as `Make` says, the slider free to be moved."""
-        make = self.synthesis.make
-        return linkage.to_five_bar(
-            density=make.density,
-            section=(make.width, make.thickness),
-            slider_mass=make.slider_mass,
-            slider_stiffness=make.slider_stiffness or 0.0,
-            slider_damping=make.slider_damping or 0.0,
-            slider_coulomb_friction=make.slider_coulomb_friction,
-            gravity=make.gravity,
-        )
-
     def driven(self, solution: Solution) -> SliderDrive:
         """Force, torque and pin forces of the motion; the crank turns the way the task is done."""
         wanted = self.drive
         assert wanted is not None
-        at = solution.evaluation.rotation
-        backwards = at is not None and len(at) > 1 and at[-1] < at[0]
-        speed = -wanted.speed if backwards else wanted.speed
-        motion, parameters = motion_of_plant(solution.linkage), self.five_bar(solution.linkage)
+        speed = direction(solution) * wanted.speed
+        motion, parameters = motion_of_plant(solution.linkage), self.synthesis.make.moving(solution.linkage)
+        load = (0.0, 0.0) if self.load is None else (self.load.fx, self.load.fy)
         if wanted.best_spring:
-            parameters = best_spring(parameters, motion, speed, load=wanted.load, samples=wanted.samples).parameters
-        return inverse_dynamics(parameters, motion, speed, load=wanted.load, samples=wanted.samples)
+            parameters = best_spring(parameters, motion, speed, load=load, samples=wanted.samples).parameters
+        return inverse_dynamics(parameters, motion, speed, load=load, samples=wanted.samples)
 
     def tracked(self, drive: SliderDrive) -> TrackingResult:
         """The run under control."""
@@ -295,7 +304,7 @@ class SliderCase:
 
         Of a rocker function the rocker's angle, else the coupler point.
         """
-        wanted = self.effort
+        wanted = self.least_effort
         assert wanted is not None
         if drive.crank_speed < 0.0:
             raise InputError("least effort is for a crank that turns counter-clockwise; this task is done clockwise")
@@ -304,7 +313,7 @@ class SliderCase:
         else:
             target = np.column_stack([drive["coupler.point.x"], drive["coupler.point.y"]])
         ground = linkage.ground_length
-        low, high = self.unknown.position or (-ground, ground)
+        low, high = self.slider.position or (-ground, ground)
         return least_effort(
             drive.parameters,
             drive.crank_speed,
@@ -318,6 +327,11 @@ class SliderCase:
             intervals=wanted.intervals,
             guess=drive.slider,
         )
+
+
+def _kept(linkage: Linkage) -> dict[str, tuple[float, float]]:
+    """Bounds that fix the dimensions of a linkage."""
+    return {name: (value, value) for name, value in linkage.values().items() if name != "branch"}
 
 
 def _around(linkage: Linkage, task: Task) -> dict[str, tuple[float, float]]:
@@ -339,7 +353,7 @@ def _around(linkage: Linkage, task: Task) -> dict[str, tuple[float, float]]:
 def run_case(drive: SliderDrive, title: str, force_file: str) -> dict[str, Any]:
     """Tables of a case file that runs one turn under the control force, read from a file; see `docs/case-files.md`."""
     assert not callable(drive.load)
-    _, position, _, velocity = drive.states[0].tolist()
+    position, velocity = drive.states[0, [1, 3]].tolist()
     return {
         "title": title,
         **parameters_to(drive.parameters),
@@ -370,25 +384,6 @@ def _linkage(value: Any, name: str, *, folder: Path) -> Linkage:
     return linkage_from_csv(folder / found["file"], found.get("rank", 1))
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Load:
-    fx: float = entry(Quantity("N"), 0.0)
-    fy: float = entry(Quantity("N"), 0.0)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Tables:
-    """Tables of a case file besides those of a synthesis."""
-
-    linkage: Linkage | None = entry(as_it_is, None)
-    slider: SliderTable = entry(Table(SliderTable), SliderTable())
-    strategy: StrategyWanted | None = entry(as_it_is, None)
-    drive: DriveWanted | None = entry(Table(DriveWanted), None)
-    load: _Load = entry(Table(_Load), _Load())
-    tracking: TrackingWanted | None = entry(Table(TrackingWanted), None)
-    least_effort: EffortWanted | None = entry(as_it_is, None)
-
-
 def load_slider_case(path: str | Path, overrides: Mapping[str, Any] | None = None) -> SliderCase:
     """Read a case from a TOML or JSON file; see `docs/slider-cases.md`.
 
@@ -408,16 +403,16 @@ def slider_case_from(
 ) -> SliderCase:
     """A case from the tables of a case file; ``folder`` is where its files are looked for."""
     data = {"title": title} | overridden(data, overrides or {})
-    own = names_of(_Tables)
+    own = [name for name in names_of(SliderCase) if name != "synthesis"]
     check_names(data, "", [name for name in (*names_of(SynthesisCase), *own) if name != "trade_off"])
     if "slider" not in data and "strategy" not in data:
         raise MissingParameterError("slider")
     synthesis = synthesis_case_from({name: value for name, value in data.items() if name not in own}, folder=folder)
     angular = isinstance(synthesis.task, RockerFunction)
     bound = Quantity("rad" if angular else "m", above=0.0)
-    tables: _Tables = read(
-        _Tables,
-        {name: value for name, value in data.items() if name in own},
+    case: SliderCase = read(
+        SliderCase,
+        {"synthesis": synthesis} | {name: value for name, value in data.items() if name in own},
         "",
         readers={
             "linkage": partial(_linkage, folder=folder),
@@ -425,27 +420,7 @@ def slider_case_from(
             "least_effort": lambda value, name: read(EffortWanted, value, name, readers={"bound": bound}),
         },
     )
-    free = tables.slider.links == "free"
-    if tables.linkage is not None and not free and synthesis.bounds:
-        first, limits = next(iter(synthesis.bounds.items()))
-        raise ParameterError(
-            f"bounds.{first}", limits, "not come with a [linkage] that is kept; set slider.links = 'free'"
-        )
-    if tables.drive is None and any(name in data for name in ("load", "tracking", "least_effort")):
-        raise MissingParameterError("drive.speed")
-    load = (tables.load.fx, tables.load.fy)
-    return SliderCase(
-        synthesis=synthesis,
-        linkage=tables.linkage,
-        harmonics=tuple(sorted(set(tables.slider.harmonics))),
-        unknown=tables.slider.unknown,
-        free=free,
-        starts=tables.slider.starts,
-        strategy=tables.strategy,
-        drive=None if tables.drive is None else replace(tables.drive, load=load),
-        tracking=tables.tracking,
-        effort=tables.least_effort,
-    )
+    return case
 
 
 def linkage_from_csv(path: str | Path, rank: int = 1) -> Linkage:

@@ -47,7 +47,7 @@ from .constraints import (
     PivotRegion,
     limits_of,
 )
-from .linkage import ANGLES
+from .linkage import ANGLES, Linkage
 from .requirements import requirement
 from .solution import Solution
 from .solve import METHODS, Method, Synthesis, TradeOff, synthesize, trade_off
@@ -108,15 +108,21 @@ class Make:
     gravity: float = entry(Quantity("m/s2", least=0.0), 9.81)
     speed: float = entry(Quantity("rad/s", above=0.0), 2.0 * pi)
 
-    def five_bar(self, solution: Solution) -> FiveBarParameters:
-        """Parameters of the plant for a solution, its slider held."""
-        free = solution.to_five_bar(
+    def moving(self, linkage: Linkage) -> FiveBarParameters:
+        """Parameters of the plant for a linkage, its slider free to be moved."""
+        return linkage.to_five_bar(
             density=self.density,
             section=(self.width, self.thickness),
             slider_mass=self.slider_mass,
+            slider_stiffness=self.slider_stiffness or 0.0,
+            slider_damping=self.slider_damping or 0.0,
             slider_coulomb_friction=self.slider_coulomb_friction,
             gravity=self.gravity,
         )
+
+    def five_bar(self, solution: Solution) -> FiveBarParameters:
+        """Parameters of the plant for a solution, its slider held."""
+        free = self.moving(solution.linkage)
         mass = free.slider_mass + free.rocker_mass + free.coupler_mass
         frequency = max(STIFF, STIFF_TURNS * abs(self.speed))
         stiffness = mass * frequency**2 if self.slider_stiffness is None else self.slider_stiffness
@@ -127,7 +133,6 @@ class Make:
     def run_case(self, solution: Solution, title: str) -> dict[str, Any]:
         """Tables of a case file that runs the linkage through its task at constant speed; see `docs/case-files.md`."""
         at = solution.evaluation.rotation
-        backwards = at is not None and len(at) > 1 and at[-1] < at[0]
         start = (0.0 if at is None else float(at[0])) + solution.linkage.crank_phase
         run: dict[str, Any] = {"revolutions": 2.0}
         if not solution.verdicts.full_turn and at is not None:
@@ -137,9 +142,15 @@ class Make:
             "title": title,
             **parameters_to(self.five_bar(solution)),
             "initial": {"crank_angle": with_unit(remainder(start, tau), "rad")},
-            "drive": {"speed": with_unit(-self.speed if backwards else self.speed, "rad/s")},
+            "drive": {"speed": with_unit(direction(solution) * self.speed, "rad/s")},
             "run": run,
         }
+
+
+def direction(solution: Solution) -> float:
+    """The way in which the crank turns over the task: 1 counter-clockwise, -1 clockwise."""
+    at = solution.evaluation.rotation
+    return -1.0 if at is not None and len(at) > 1 and at[-1] < at[0] else 1.0
 
 
 def _transmission(value: Any, name: str) -> float | None:
