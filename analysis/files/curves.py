@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from linkwork.errors import InputError
 
 from ..units import INCH, LENGTHS, quantity
-from .paths import first_line, read_text
+from .paths import ending_of, first_line, read_text
 from .reader import unknown_name
 
 #: Lengths of SVG in m (CSS: an inch has 96 px, 72 pt, 6 pc).
@@ -62,9 +62,7 @@ def read_points(
         If the unit is not one of length.
     """
     path = Path(path)
-    ending = path.suffix.lower()
-    if ending not in (".csv", ".txt", ".svg"):
-        raise InputError(f"{path.name} ends in {path.suffix!r}: points are read from .csv, .txt or .svg")
+    ending = ending_of(path, (".csv", ".txt", ".svg"))
     scale = None if unit is None else quantity(f"1 {unit}", "m", "unit")
     text = read_text(path)
     if ending == ".svg":

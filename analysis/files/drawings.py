@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from linkwork.errors import InputError, ParameterError
 
 from ..units import LENGTHS
-from .paths import prepare
+from .paths import ending_of, prepare
 from .reader import unknown_name
 
 Point = tuple[float, float]
@@ -328,11 +328,7 @@ def save_drawing(path: str | Path, drawing: Drawing, *, unit: str = "mm") -> Pat
         If the unit is not one that the format has.
     """
     path = Path(path)
-    writers = {".dxf": to_dxf, ".svg": to_svg}
-    ending = path.suffix.lower()
-    if ending not in writers:
-        raise InputError(f"{path.name} ends in {path.suffix!r}: it must end in .dxf or .svg")
-    text = writers[ending](drawing, unit)
+    text = to_dxf(drawing, unit) if ending_of(path, (".dxf", ".svg")) == ".dxf" else to_svg(drawing, unit)
     prepare(path).write_bytes(text.encode())
     return path
 

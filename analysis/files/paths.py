@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -15,6 +15,21 @@ def prepare(path: str | Path) -> Path:
     path = Path(path)
     path.parent.mkdir(parents=True, exist_ok=True)
     return path
+
+
+def ending_of(path: Path, known: Sequence[str]) -> str:
+    """The ending of a path, in small letters.
+
+    Raises
+    ------
+    InputError
+        If it is not one of those known.
+    """
+    ending = path.suffix.lower()
+    if ending not in known:
+        endings = f"{', '.join(known[:-1])} or {known[-1]}"
+        raise InputError(f"{path.name} ends in {path.suffix!r}: it must end in {endings}")
+    return ending
 
 
 @contextmanager

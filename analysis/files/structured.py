@@ -12,8 +12,10 @@ import tomli_w
 
 from linkwork.errors import InputError
 
-from .paths import prepare, read_text
+from .paths import ending_of, prepare, read_text
 from .reader import table_of
+
+ENDINGS = (".toml", ".json")
 
 
 def write_tables(path: str | Path, data: Mapping[str, Any]) -> Path:
@@ -24,8 +26,8 @@ def write_tables(path: str | Path, data: Mapping[str, Any]) -> Path:
     InputError
         If the ending is another.
     """
-    ending = _ending(path := Path(path))
-    if ending == ".json":
+    path = Path(path)
+    if ending_of(path, ENDINGS) == ".json":
         text = json.dumps(data, indent=2) + "\n"
     else:
         # plain values before tables, as TOML asks
@@ -43,7 +45,7 @@ def read_tables(path: str | Path) -> dict[str, Any]:
         If the file cannot be read, or is not what its ending says.
     """
     path = Path(path)
-    ending = _ending(path)
+    ending = ending_of(path, ENDINGS)
     text = read_text(path)
     try:
         data = tomllib.loads(text) if ending == ".toml" else json.loads(text)
@@ -52,13 +54,6 @@ def read_tables(path: str | Path) -> dict[str, Any]:
     if not isinstance(data, dict):
         raise InputError(f"{path} must hold tables, not {type(data).__name__}")
     return data
-
-
-def _ending(path: Path) -> str:
-    ending = path.suffix.lower()
-    if ending not in (".toml", ".json"):
-        raise InputError(f"{path.name} ends in {ending!r}: it must end in .toml or .json")
-    return ending
 
 
 def overridden(

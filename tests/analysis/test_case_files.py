@@ -6,13 +6,10 @@ import json
 from dataclasses import fields, replace
 from math import pi
 
-import numpy as np
 import pytest
 
-from analysis.files import write_csv
 from analysis.run.case_files import load_case, load_parameters, parameters_from, parameters_to, save_parameters
 from analysis.run.inputs import Harmonics, Piecewise, TorsionBar
-from analysis.units import quantity
 from linkwork.errors import InputError, MissingParameterError, ParameterError, UnknownNameError
 from linkwork.five_bar.published import SETS, TABLE_3_1
 
@@ -29,54 +26,10 @@ def test_every_digit_of_an_awkward_number_is_kept(tmp_path):
     assert load_parameters(save_parameters(tmp_path / "m.toml", awkward)) == awkward
 
 
-@pytest.mark.parametrize(
-    ("text", "unit", "value"),
-    [
-        ("15.35 cm", "m", 0.1535),
-        ("2 in", "m", 0.0508),
-        ("420 rpm", "rad/s", 14 * pi),
-        ("1e6 dyn/cm", "N/m", 1000.0),
-        ("3e4 dyn*s/cm", "N.s/m", 30.0),
-        ("12500 g*cm^2", "kg.m2", 1.25e-3),
-        ("30 deg", "rad", pi / 6),
-        ("981 cm/s^2", "m/s2", 9.81),
-        ("1e8 dyn*cm", "N.m", 10.0),
-        ("0.01", "1", 0.01),
-        (0.25, "m", 0.25),
-        (3, "1", 3.0),
-    ],
-)
-def test_quantities_in_their_units(text, unit, value):
-    assert quantity(text, unit, "x") == pytest.approx(value, rel=1e-14)
-
-
-@pytest.mark.parametrize(
-    ("text", "unit"),
-    [
-        ("15 kg", "m"),
-        ("abc", "m"),
-        ("", "m"),
-        ([1.0], "m"),
-        (True, "m"),
-        ("1 furlongg", "m"),
-        (None, "m"),
-        ("inf m", "m"),
-    ],
-)
-def test_a_quantity_of_another_kind_is_refused_by_name(text, unit):
-    with pytest.raises(ParameterError, match=r"crank\.length"):
-        quantity(text, unit, "crank.length")
-
-
 def test_a_text_without_its_unit_is_refused():
     """ "30" for an angle was hardly meant in radians."""
     with pytest.raises(ParameterError, match=r"ground\.inclination is '30': it must come with its unit"):
         parameters_from({"ground": {"inclination": "30"}}, TABLE_3_1)
-
-
-def test_hertz_is_refused_for_a_speed_because_it_is_ambiguous():
-    with pytest.raises(ParameterError, match="2 pi"):
-        quantity("7 Hz", "rad/s", "drive.speed")
 
 
 def test_an_unknown_name_is_told_with_the_nearest():
@@ -237,19 +190,6 @@ def test_the_examples_load():
     assert len(runs) >= 2
     for path in runs:
         assert load_case(path).stop_time > 0.0
-
-
-def test_csv_keeps_every_digit_and_its_header(tmp_path):
-    values = np.array([0.1, 1 / 3, 1e-300])
-    path = write_csv(tmp_path / "deep" / "x.csv", {"a [m]": values, "b [N]": -values})
-    assert path.read_text().splitlines()[0] == "a [m],b [N]"
-    assert np.array_equal(np.loadtxt(path, delimiter=",", skiprows=1)[:, 0], values)
-    assert not list(tmp_path.rglob("*.part"))
-
-
-def test_csv_columns_of_different_length_are_refused(tmp_path):
-    with pytest.raises(InputError, match="differ in length"):
-        write_csv(tmp_path / "x.csv", {"a": [1.0], "b": [1.0, 2.0]})
 
 
 def test_every_parameter_has_its_place_in_a_file():
