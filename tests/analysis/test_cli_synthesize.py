@@ -86,7 +86,7 @@ def test_help_shows_examples(linkwork) -> None:
     assert "Examples:" in linkwork("synthesize", "--help").output
 
 
-def test_it_tells_and_writes_what_it_found(run) -> None:
+def test_it_reports_and_writes_what_it_found(run) -> None:
     result, folder = run
     written = {path.name for path in (folder / "out").iterdir()}
     assert written == {
@@ -237,7 +237,7 @@ def test_an_interrupted_trade_off_keeps_what_it_has(linkwork, tmp_path, monkeypa
     assert Path("out/solutions.csv").exists()
 
 
-def test_a_solution_with_a_defect_is_told(linkwork, tmp_path, monkeypatch) -> None:
+def test_a_solution_with_a_defect_is_reported(linkwork, tmp_path, monkeypatch) -> None:
     (tmp_path / "case.toml").write_text(CAPPED)
     found = cases.synthesize
 
@@ -315,7 +315,7 @@ def test_a_solution_with_a_defect_is_told(linkwork, tmp_path, monkeypatch) -> No
         ),
     ],
 )
-def test_what_is_wrong_is_told_in_a_sentence(linkwork, tmp_path, text, said) -> None:
+def test_what_is_wrong_is_reported_in_a_sentence(linkwork, tmp_path, text, said) -> None:
     (tmp_path / "case.toml").write_text(text)
     result = linkwork("synthesize", "case.toml")
     assert result.exit_code == cli.WRONG, result.output
