@@ -215,7 +215,7 @@ def _inputs(data: Mapping[str, Any], mechanism: Mechanism, folder: Path, speed: 
         }
         values = files.read(dict, data.get(group, {}), group, readers=inside)
         if group in EXCLUSIVE and len(values) > 1:
-            raise ParameterError(group, ", ".join(values), f"have only one of {', '.join(inside)}")
+            raise ParameterError(group, ", ".join(data[group]), f"have only one of {', '.join(inside)}")
         found |= {f"{group}.{name}": value for name, value in values.items()}
     if speed is not None and not data.get("drive"):
         found["drive.speed"] = speed
