@@ -11,6 +11,7 @@ from typing import Any
 from linkwork.errors import ParameterError
 
 RAD_S_PER_RPM = pi / 30.0
+CM_PER_METRE = 1e2
 INCH = 0.0254
 #: Units of length (m).
 LENGTHS: Mapping[str, float] = MappingProxyType({"mm": 1e-3, "cm": 1e-2, "m": 1.0, "in": INCH})

@@ -21,6 +21,7 @@ from linkwork.errors import AssemblyError, InputError
 from linkwork.five_bar import kinematics
 from linkwork.five_bar.parameters import FiveBarParameters
 
+from ..units import CM_PER_METRE
 from .style import STYLE, finish
 
 if TYPE_CHECKING:
@@ -28,8 +29,6 @@ if TYPE_CHECKING:
 
 #: Colours of the links in drawings.
 CRANK, COUPLER, ROCKER, SLIDER, GROUND, TRACE = "#D55E00", "#0072B2", "#009E73", "#5B6770", "#333333", "#CC79A7"
-
-CM_PER_METRE = 100.0
 
 
 @dataclass(frozen=True, slots=True)
