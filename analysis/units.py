@@ -1,1 +1,98 @@
-"""Units of quantities, and quantities read from text."""
+"""Units: quantities from numbers and texts such as "420 rpm", and the factors of the units that tables and figures use."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import lru_cache
+from math import inf, isfinite, pi
+from types import MappingProxyType
+from typing import Any
+
+from linkwork.errors import ParameterError
+
+RAD_S_PER_RPM = pi / 30.0
+CM_PER_METRE = 1e2
+INCH = 0.0254
+#: Units of length (m).
+LENGTHS: Mapping[str, float] = MappingProxyType({"mm": 1e-3, "cm": 1e-2, "m": 1.0, "in": INCH})
+
+#: Units of the FMI contract as pint spells them.
+_PINT = {
+    "1": "dimensionless",
+    "N.m": "N*m",
+    "kg.m2": "kg*m**2",
+    "m/s2": "m/s**2",
+    "rad/s2": "rad/s**2",
+    "N.s/m": "N*s/m",
+}
+
+
+def with_unit(value: float, unit: str) -> str:
+    """A number in SI as a text that `quantity` reads back, every digit kept."""
+    return f"{float(value)!r} {_PINT.get(unit, unit)}"
+
+
+@lru_cache(maxsize=1)
+def _registry() -> Any:
+    import pint  # takes a third of a second
+
+    return pint.UnitRegistry()
+
+
+def quantity(value: Any, unit: str, name: str, *, bare: str | None = None) -> float:
+    """A number in SI from a number or a text with a unit.
+
+    Parameters
+    ----------
+    value : float or str
+        ``0.1535`` or ``"15.35 cm"``. A text needs its unit: a bare "30" for an angle was hardly meant in radians.
+    unit : str
+        SI unit of the contract, such as ``N.s/m``.
+    name : str
+        What it is, for the error.
+    bare : str, optional
+        Unit of numbers that come without one, such as ``mm``; by default SI.
+
+    Raises
+    ------
+    ParameterError
+        If it is neither, the unit is missing or has another dimension, or the number is not finite. Hertz is refused for
+        a speed: a cycle is not a radian.
+    """
+    si = _PINT.get(unit, unit)
+    wanted = f"be a number in {unit}" if unit == "1" else f"be a number in {unit}, or a text with a unit of that kind"
+    if isinstance(value, bool) or not isinstance(value, (int, float, str)):
+        raise ParameterError(name, value, wanted)
+    if isinstance(value, str):
+        if unit == "rad/s" and "hz" in value.lower().replace("hertz", "hz"):
+            raise ParameterError(name, value, "be in rad/s or rpm: in Hz it would be ambiguous by a factor of 2 pi")
+        number = _converted(value, unit, si, name, wanted)
+    else:
+        try:
+            number = float(value)
+        except OverflowError:  # a whole number beyond all floats
+            number = inf
+        if bare is not None:
+            number *= quantity(f"1 {bare}", unit, f"unit of {name}")
+    if not isfinite(number):
+        raise ParameterError(name, value, "be a finite number")
+    return number
+
+
+def _converted(text: str, unit: str, si: str, name: str, wanted: str) -> float:
+    """A text with a unit in SI, by pint."""
+    try:
+        number = float(text)
+    except ValueError:
+        pass
+    else:
+        if unit == "1":
+            return number
+        raise ParameterError(name, text, f"come with its unit, such as '{text} {si}', or be a number, which is in SI")
+    import pint
+
+    try:
+        return float(_registry().Quantity(text).to(si).magnitude)
+    except (pint.PintError, ValueError, TypeError, AttributeError, ArithmeticError, SyntaxError) as error:
+        reason = (str(error) or type(error).__name__).splitlines()[0]
+        raise ParameterError(name, text, f"{wanted} ({reason})") from error

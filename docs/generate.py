@@ -171,7 +171,7 @@ def hand_drawn_pictures() -> Iterator[Picture]:
     small = load_slider_case(examples / "hand-drawn-slider.toml")
     four_bar = small.four_bar()
     moved = [four_bar]
-    for harmonics in small.harmonics:
+    for harmonics in small.slider.harmonics:
         moved.append(small.move(four_bar, harmonics, tuple(moved[1:]), progress=False).best)
     wanted = closed(four_bar.task.path.points, label="wanted", width=3.0, colour="0.8")
     still = closed(four_bar.curve(), label="four-bar", line="--")

@@ -114,11 +114,12 @@ def number_or_text(text: str) -> bool | int | float | str:
     return text
 
 
-def quantity(text: str, unit: str, option: str) -> float:
+def quantity_option(text: str, unit: str, option: str) -> float:
     """The value of an option in SI, from a text with its unit or a bare number."""
-    from ..files import io
+    from ..run.case_files import case_from, load_case
+    from ..units import quantity
 
-    return io.quantity(number_or_text(text), unit, option)
+    return quantity(number_or_text(text), unit, option)
 
 
 def changes(settings: Sequence[str], read: Callable[[str], Any], example: str) -> dict[str, Any]:
@@ -147,17 +148,18 @@ def prepare_solver(*parameters: Any, orbits: bool = False) -> None:
 
 def chosen_case(file: str | None, published: str | None, settings: Sequence[str]) -> Any:
     """The case of a file or a published set, with the changes of ``--set``."""
-    from ..files import io
+    from ..run.case_files import case_from, load_case
+    from ..units import quantity
     from ..run.case import published_case
 
     if (file is None) == (published is None):
         raise click.UsageError("give either a case file or --published NAME")
     overrides = changes(settings, number_or_text, "slider.stiffness='2e6 dyn/cm'")
     if file is not None:
-        return io.load_case(file, overrides)
+        return load_case(file, overrides)
     assert published is not None
     if overrides:
-        return io.case_from({"published": published}, folder=Path.cwd(), title=published, overrides=overrides)
+        return case_from({"published": published}, folder=Path.cwd(), title=published, overrides=overrides)
     return published_case(published)
 
 

@@ -79,28 +79,29 @@ def show_best(solution: Any) -> None:
 
 def write_described(solution: Any, folder: Path, title: str, *, curve: str, report: str, drawing: str) -> list[Path]:
     """The curve of a solution, its report, and its drawing as DXF and SVG, under these names; what was written."""
-    from ..files import io
+    from ..files import save_drawing
 
     told = folder / f"{report}.txt"
     written = [solution.to_csv(folder / f"{curve}.csv"), told]
     told.write_text(f"{title}\n\n{solution.report()}", encoding="utf-8")
     drawn = solution.drawing(title=title)
-    return written + [io.save_drawing(folder / f"{drawing}.{ending}", drawn) for ending in ("dxf", "svg")]
+    return written + [save_drawing(folder / f"{drawing}.{ending}", drawn) for ending in ("dxf", "svg")]
 
 
 def write_solution(solution: Any, folder: Path, title: str, *, make: Any, plots: bool, animate: bool) -> list[Path]:
     """Everything about one solution: drawing, curve, report, parameters and a case that runs; what was written."""
-    from ..files import io
+    from ..files import save_figure, write_tables
+    from ..run.case_files import save_parameters
     from ..synthesis.linkage import SecondCrank
 
     written = write_described(solution, folder, title, curve="best-curve", report="best-report", drawing="best")
     pivot = solution.linkage.pivot
     if not isinstance(pivot, SecondCrank):
-        written.append(io.save_parameters(folder / "five-bar-parameters.toml", make.five_bar(solution)))
+        written.append(save_parameters(folder / "five-bar-parameters.toml", make.five_bar(solution)))
     if pivot is None:
-        written.append(io.write_tables(folder / "five-bar.toml", make.run_case(solution, title)))
+        written.append(write_tables(folder / "five-bar.toml", make.run_case(solution, title)))
     if plots:
-        written.append(io.save_figure(solution.plot(title=title), folder / "best-linkage.png"))
+        written.append(save_figure(solution.plot(title=title), folder / "best-linkage.png"))
     if animate:
         with console.status("animating"):
             written.append(solution.animate(folder / "best.gif", title=title))
@@ -146,7 +147,7 @@ def synthesize(
       linkwork synthesize examples/hand-drawn.toml --out hand-drawn --animate
       linkwork synthesize examples/ellipse.toml --set constraints.largest_link='300 mm' --set task.n=36
     """
-    from ..files import io
+    from ..files import save_figure
     from ..synthesis import SynthesisInterrupted, TradeOffInterrupted
     from ..synthesis.cases import load_synthesis_case
 
@@ -194,7 +195,7 @@ def synthesize(
 
 
 def _trade_off(traded: Any, title: str, folder: Path, plots: bool) -> None:
-    from ..files import io
+    from ..files import save_figure
     from ..synthesis.report import error_unit, limit_told, quality_name, quality_unit
 
     there = [s for s in traded.solutions if s is not None]

@@ -102,10 +102,12 @@ def run(
       linkwork run examples/torsion-bar.toml --fmu build/FiveBarSlider.fmu --out results
     """
     from .. import figures
-    from ..files import io
+    from ..run.case_files import load_case
+    from ..files import save_figure
     from ..mechanisms import mechanism_of
     from ..run.cosimulate import cosimulate
     from ..run.simulate import RunInterrupted, simulate
+    from ..units import quantity
 
     chosen = chosen_case(case, published, settings)
     if fmu is not None and method != "compiled":
@@ -131,7 +133,7 @@ def run(
     if plot and len(result) > 1:
         second = f"{mechanism_of(chosen.parameters).second}.position"
         names = dict.fromkeys(("slider.position", second, "crank.speed", "drive.applied_torque", "transmission.angle"))
-        written.append(io.save_figure(figures.plot(result, tuple(names), title=chosen.title), f"{stem}.png"))
+        written.append(save_figure(figures.plot(result, tuple(names), title=chosen.title), f"{stem}.png"))
     _print_extremes(chosen.title, result)
     print_written(written)
     if fmu is not None and not chosen.inputs.held_exactly:
@@ -224,7 +226,8 @@ def _cases_to_check(names: Sequence[str], fmu: str | None, everything: bool) -> 
 
     Where an FMU is named, the standard cases are those of its mechanism.
     """
-    from ..files import io
+    from ..run.case_files import load_case
+    from ..files import save_figure
     from ..mechanisms import mechanism_of
     from ..run.checks import CASES
 
@@ -239,7 +242,7 @@ def _cases_to_check(names: Sequence[str], fmu: str | None, everything: bool) -> 
         if name in CASES:
             chosen.append((name, CASES[name]))
         elif Path(name).suffix in (".toml", ".json"):
-            chosen.append((Path(name).stem, io.load_case(name)))
+            chosen.append((Path(name).stem, load_case(name)))
         else:
             raise click.UsageError(f"{name!r} is neither a case file nor a standard case ({', '.join(CASES)})")
     return chosen
@@ -258,7 +261,8 @@ def _model_name(path: Path) -> str | None:
 def _write_comparison(stem: Path, title: str, in_process: Any, through_fmu: Any) -> None:
     """Write both runs of a check and their plot, and report a run that ended early."""
     from .. import figures
-    from ..files import io
+    from ..run.case_files import load_case
+    from ..files import save_figure
 
     in_process.to_csv(f"{stem}-in-process.csv")
     through_fmu.to_csv(f"{stem}-fmu.csv")
@@ -269,7 +273,7 @@ def _write_comparison(stem: Path, title: str, in_process: Any, through_fmu: Any)
         title=title,
         labels=(f"in process ({in_process.source})", "FMU"),
     )
-    io.save_figure(figure, f"{stem}.png")
+    save_figure(figure, f"{stem}.png")
     console.print(f"wrote {stem}.png, -in-process.csv and -fmu.csv", highlight=False, soft_wrap=True)
     for which, result in (("in process", in_process), ("FMU", through_fmu)):
         if result.status:
@@ -304,7 +308,8 @@ def info(what: str | None) -> None:
     """
     from linkwork.five_bar.published import RAD_S_PER_RPM
 
-    from ..files import io
+    from ..run.case_files import load_case
+    from ..files import save_figure
     from ..run.compiled import cache_folder
 
     if what is None:
@@ -317,7 +322,7 @@ def info(what: str | None) -> None:
     elif Path(what).suffix == ".fmu":
         _print_fmu(Path(what))
     elif Path(what).suffix in (".toml", ".json"):
-        case = io.load_case(what)
+        case = load_case(what)
         _print_parameters(case.title, case.parameters)
     else:
         raise click.UsageError(f"{what!r} is neither a published set ({', '.join(PUBLISHED)}), a file, nor an FMU")

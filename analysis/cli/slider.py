@@ -121,7 +121,7 @@ def _moved(chosen: Any) -> tuple[Any, Interrupted | None]:
     stopped = None
     four_bar = chosen.four_bar(progress=console.is_terminal)
     found = [four_bar]
-    for harmonics in chosen.harmonics:
+    for harmonics in chosen.slider.harmonics:
         try:
             result = chosen.move(four_bar, harmonics, tuple(found[1:]), progress=console.is_terminal)
         except SynthesisInterrupted as error:
@@ -179,11 +179,11 @@ def _show(title: str, solutions: Sequence[Any]) -> None:
 
 
 def _write_solution(solution: Any, folder: Path, title: str, plots: bool) -> list[Path]:
-    from ..files import io
+    from ..files import save_figure
 
     written = write_described(solution, folder, title, curve="curve", report="report", drawing="linkage")
     if plots:
-        written.append(io.save_figure(solution.plot(title=title), folder / "linkage.png"))
+        written.append(save_figure(solution.plot(title=title), folder / "linkage.png"))
     return written
 
 
@@ -197,10 +197,10 @@ def _motion_columns(linkage: Any, rotation: Any) -> dict[str, Any]:
 
 
 def _write_motion(solution: Any, folder: Path) -> Path:
-    from ..files import io
+    from ..files import write_csv
 
     turn = np.linspace(0.0, 2.0 * np.pi, 720, endpoint=False)
-    return io.write_csv(folder / "motion.csv", _motion_columns(solution.linkage, turn))
+    return write_csv(folder / "motion.csv", _motion_columns(solution.linkage, turn))
 
 
 # Dynamics
@@ -208,8 +208,9 @@ def _write_motion(solution: Any, folder: Path) -> Path:
 
 def _dynamics(chosen: Any, solution: Any, folder: Path, plots: bool) -> list[Path]:
     """Force, torque and pin forces; a case that runs; then the run under control and the least effort, where asked for."""
-    from ..files import io
+    from ..files import save_figure, write_csv, write_tables
     from ..motion.cases import run_case
+    from ..run.case_files import save_parameters
 
     title = chosen.synthesis.title
     drive = chosen.driven(solution)
@@ -217,16 +218,16 @@ def _dynamics(chosen: Any, solution: Any, folder: Path, plots: bool) -> list[Pat
     own = {}
     if solution.linkage.pivot is not None:
         own = _motion_columns(solution.linkage, drive.crank_angle - solution.linkage.crank_phase)
-    written = [io.write_csv(folder / "motion.csv", own | dict(drive.columns()))]
+    written = [write_csv(folder / "motion.csv", own | dict(drive.columns()))]
     end = {"time [s]": np.append(drive.time, drive.period), "slider.force [N]": np.append(drive.force, drive.force[0])}
-    written.append(io.write_csv(folder / "force.csv", end))
-    written.append(io.save_parameters(folder / "five-bar-parameters.toml", drive.parameters))
-    written.append(io.write_tables(folder / "five-bar.toml", run_case(drive, title, "force.csv")))
+    written.append(write_csv(folder / "force.csv", end))
+    written.append(save_parameters(folder / "five-bar-parameters.toml", drive.parameters))
+    written.append(write_tables(folder / "five-bar.toml", run_case(drive, title, "force.csv")))
     if plots:
-        written.append(io.save_figure(drive_figure(title, drive), folder / "motion.png"))
+        written.append(save_figure(drive_figure(title, drive), folder / "motion.png"))
     if chosen.tracking is not None:
         written += _tracking(chosen, drive, folder, plots)
-    if chosen.effort is not None:
+    if chosen.least_effort is not None:
         written += _effort(chosen, drive, solution.linkage, folder, plots)
     return written
 
@@ -286,7 +287,7 @@ def drive_figure(title: str, drive: Any) -> Any:
 
 def _tracking(chosen: Any, drive: Any, folder: Path, plots: bool) -> list[Path]:
     from ..figures import Curve, Panel, plot_curves
-    from ..files import io
+    from ..files import save_figure, write_csv
 
     run = chosen.tracked(drive)
     if run.loop.status:
@@ -320,7 +321,7 @@ def _tracking(chosen: Any, drive: Any, folder: Path, plots: bool) -> list[Path]:
         "slider force [N]": loop.force,
         "power [W]": run.power,
     }
-    written = [io.write_csv(folder / "tracking.csv", columns)]
+    written = [write_csv(folder / "tracking.csv", columns)]
     if plots:
         panels = [
             Panel(x_label="time [s]", y_label=label, curves=[Curve(x=loop.time, y=values)])
@@ -331,13 +332,13 @@ def _tracking(chosen: Any, drive: Any, folder: Path, plots: bool) -> list[Path]:
             )
         ]
         figure = plot_curves(panels, title=f"Tracking: {run.method}", size=(6.4, 2.2))
-        written.append(io.save_figure(figure, folder / "tracking.png"))
+        written.append(save_figure(figure, folder / "tracking.png"))
     return written
 
 
 def _effort(chosen: Any, drive: Any, linkage: Any, folder: Path, plots: bool) -> list[Path]:
     from ..figures import Curve, Panel, plot_curves
-    from ..files import io
+    from ..files import save_figure, write_csv
     from ..synthesis import RockerFunction
 
     with console.status("least effort"):
@@ -349,7 +350,7 @@ def _effort(chosen: Any, drive: Any, linkage: Any, folder: Path, plots: bool) ->
         ("peak force", f"{np.abs(least.force).max():.5g} N"),
         (
             "departure allowed, and found by a run",
-            f"{scale * chosen.effort.bound:.4g}, {scale * least.attained:.4g} {unit}",
+            f"{scale * chosen.least_effort.bound:.4g}, {scale * least.attained:.4g} {unit}",
         ),
         ("change of effort as the intervals are halved", f"{least.mesh_effort:.1e}"),
     ]
@@ -361,7 +362,7 @@ def _effort(chosen: Any, drive: Any, linkage: Any, folder: Path, plots: bool) ->
         "slider force [N]": least.force,
         f"departure [{'rad' if unit == 'deg' else 'm'}]": least.error,
     }
-    written = [io.write_csv(folder / "least-effort.csv", columns)]
+    written = [write_csv(folder / "least-effort.csv", columns)]
     if plots:
         x, before = np.degrees(least.crank_angle), np.degrees(drive.crank_angle)
         pairs = (
@@ -377,5 +378,5 @@ def _effort(chosen: Any, drive: Any, linkage: Any, folder: Path, plots: bool) ->
             for label, first, second in pairs
         ]
         figure = plot_curves(panels, title="Motion of least effort", size=(6.4, 2.6))
-        written.append(io.save_figure(figure, folder / "least-effort.png"))
+        written.append(save_figure(figure, folder / "least-effort.png"))
     return written

@@ -142,13 +142,15 @@ def _chosen(
     LinkworkError
         If a file, a name or a value is wrong.
     """
-    from ..files import io
+    from ..files import unknown_name
+    from ..run.case_files import load_parameters, parameters_from
+    from ..units import quantity
 
     if file is not None and published is not None:
         raise click.UsageError("give either a file of parameters or --published NAME")
     base: PublishedSet | None = None
     if file is not None:
-        loaded = io.load_parameters(file)
+        loaded = load_parameters(file)
         if not isinstance(loaded, SliderCrankParameters):
             raise InputError(
                 f'{file} is of a five-bar: for a slider-crank it must begin with mechanism = "slider-crank"'
@@ -158,7 +160,7 @@ def _chosen(
     else:
         name = DEFAULT if published is None else published
         if name not in SETS:
-            raise io.unknown_name(name, SETS)
+            raise unknown_name(name, SETS)
         base = SETS[name]
         title, parameters, start, pace = base.source, base.parameters, base.initial.shift_position, base.crank_speed
     values = changes(settings, number_or_text, "rod.length='45 in'")
@@ -168,11 +170,11 @@ def _chosen(
     if shift is not None:
         if groove is not None:
             raise click.UsageError("--shift holds the crank, --groove moves it: give one of them")
-        start = io.quantity(number_or_text(shift), "m", "--shift")
+        start = quantity(number_or_text(shift), "m", "--shift")
     if speed is not None:
-        pace = io.quantity(number_or_text(speed), "rad/s", "--speed")
+        pace = quantity(number_or_text(speed), "rad/s", "--speed")
     if values:
-        changed = io.parameters_from(values, parameters)
+        changed = parameters_from(values, parameters)
         assert isinstance(changed, SliderCrankParameters)
         parameters = changed
     _check_groove(groove, parameters, values)
@@ -318,13 +320,13 @@ def info(units: str, **given: Any) -> None:
 
 def _problem(torque: str | None, load: str | None) -> dict[str, float]:
     """What is given: ``torque`` (N.m) or ``load`` (N)."""
-    from ..files import io
+    from ..units import quantity
 
     if torque is not None and load is not None:
         raise click.UsageError("give --torque, and the slider's force is sought, or --load, and the torque is")
     if torque is not None:
-        return {"torque": io.quantity(number_or_text(torque), "N.m", "--torque")}
-    return {"load": 0.0 if load is None else io.quantity(number_or_text(load), "N", "--load")}
+        return {"torque": quantity(number_or_text(torque), "N.m", "--torque")}
+    return {"load": 0.0 if load is None else quantity(number_or_text(load), "N", "--load")}
 
 
 def _turn(chosen: _Chosen, given: Mapping[str, float], points: int, *, at: float | None = None) -> ForceTurn:
@@ -391,7 +393,7 @@ def forces(
       linkwork slider-crank forces crank.toml --speed '300 rpm' --out results
     """
     from ..figures.slider_crank import plot_forces
-    from ..files import io
+    from ..files import save_figure
 
     told = _Units(units)
     chosen = _chosen(told, paced=True, **given)
@@ -555,13 +557,14 @@ def tolerances(
       linkwork slider-crank tolerances --quantity slider.position --quantity crank_pin.fz --load '-20 lbf' --seed 7
     """
     from ..figures.slider_crank import plot_tolerances
-    from ..files import io
+    from ..files import save_figure, write_csv
     from ..slider_crank import tolerances as study
     from ..slider_crank.forces import NO_LEVER
+    from ..units import quantity as in_si
 
     told = _Units(units)
     chosen = _chosen(told, paced=True, **given)
-    at = _in_the_turn(io.quantity(number_or_text(angle), "rad", "--angle"), chosen)
+    at = _in_the_turn(in_si(number_or_text(angle), "rad", "--angle"), chosen)
     allowed = [_tolerance(text, distribution) for text in widths or (f"{k}={v}" for k, v in _TOLERANCES.items())]
     quantities = tuple(dict.fromkeys(quantities))
     turn = _turn(chosen, _problem(torque, load), points, at=at)
@@ -603,8 +606,8 @@ def tolerances(
     with console.status(f"{samples} samples at {len(turn)} crank angles"):
         found = study.monte_carlo(turn, allowed, quantities=quantities, samples=samples, seed=seed)
     folder = Path(out)
-    files = [io.write_csv(folder / f"{chosen.name}-sensitivities.csv", written)]
-    files.append(io.write_csv(folder / f"{chosen.name}-tolerances.csv", _spread_columns(found, quantities, told)))
+    files = [write_csv(folder / f"{chosen.name}-sensitivities.csv", written)]
+    files.append(write_csv(folder / f"{chosen.name}-tolerances.csv", _spread_columns(found, quantities, told)))
     _spread_table(found, quantities, place, f"{chosen.title}: spread at {here}, {samples} samples", told)
     for message in found.notes(units):
         _note(message)
@@ -644,15 +647,16 @@ def _ratio(above: str, below: str) -> str:
 
 def _tolerance(text: str, distribution: str) -> Any:
     """A tolerance from NAME=HALF_WIDTH."""
-    from ..files import io
+    from ..files import unknown_name
     from ..slider_crank.tolerances import ERRORS, Tolerance
+    from ..units import quantity
 
     name, equals, value = (part.strip() for part in text.partition("="))
     if not equals:
         raise click.UsageError(f"--tolerance {text!r}: it must be NAME=HALF_WIDTH, such as guide.offset='0.5 mm'")
     if name not in ERRORS:
-        raise io.unknown_name(name, ERRORS)
-    width = io.quantity(number_or_text(value), ERRORS[name], name)
+        raise unknown_name(name, ERRORS)
+    width = quantity(number_or_text(value), ERRORS[name], name)
     return Tolerance(name, half_width=width, distribution=distribution)
 
 
@@ -792,7 +796,7 @@ def _dual_table(chosen: _Chosen, problem: Mapping[str, float], points: int, tole
 
 def _two_rotations(chosen: _Chosen, points: int, told: _Units, folder: Path) -> None:
     """Where the thesis's iteration ends over the turn."""
-    from ..files import io
+    from ..files import write_csv
     from ..slider_crank.closure import shortage
     from ..slider_crank.two_rotations import settle
 
@@ -863,21 +867,22 @@ def picture(
       linkwork slider-crank picture --set rod.length='30 in' --offset '20 in' --angle '180 deg' --range
     """
     from ..figures import slider_crank_picture as pictures
-    from ..files import io
+    from ..files import save_figure
+    from ..units import quantity
 
     told = _Units(units)
     chosen = _chosen(told, **given)
     p, folder = chosen.parameters, Path(out)
-    turned = io.quantity(number_or_text(angle), "rad", "--angle")
+    turned = quantity(number_or_text(angle), "rad", "--angle")
     common: dict[str, Any] = {"law": chosen.law, "unit": told.picture, "title": chosen.title}
     seen = common
     if view is not None:
-        eye = [degrees(io.quantity(number_or_text(text), "rad", "--view")) for text in view]
+        eye = [degrees(quantity(number_or_text(text), "rad", "--view")) for text in view]
         seen = common | {"view": (eye[0], eye[1])}
     figure = pictures.plot_mechanism(p, turned, chosen.shift_at(turned), **seen)
-    written = [io.save_figure(figure, folder / f"{chosen.name}.png")]
+    written = [save_figure(figure, folder / f"{chosen.name}.png")]
     if with_range:
-        written.append(io.save_figure(pictures.plot_range(p, **common), folder / f"{chosen.name}-range.png"))
+        written.append(save_figure(pictures.plot_range(p, **common), folder / f"{chosen.name}-range.png"))
     if animate:
         with console.status(f"drawing {frames} pictures"):
             written.append(pictures.animate_mechanism(p, folder / f"{chosen.name}.gif", frames=frames, **seen))

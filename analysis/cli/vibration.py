@@ -29,9 +29,9 @@ def _cores(context: click.Context, parameter: click.Parameter, value: int) -> in
 
 
 def _quantity(text: str, unit: str, name: str) -> float:
-    from ..files import io
+    from ..units import quantity
 
-    return io.quantity(number_or_text(text), unit, name)
+    return quantity(number_or_text(text), unit, name)
 
 
 def _require_range(low: float, high: float, name: str, first: str, last: str) -> None:
@@ -120,7 +120,7 @@ def resonance(
       linkwork resonance --published rig-1-spring-b --from '100 rpm' --to '1300 rpm'
       linkwork resonance --published table-3.1 --vary slider.stiffness --from '1e5 dyn/cm' --to '2e6 dyn/cm'
     """
-    from ..files import io
+    from ..files import save_figure, write_csv
     from ..periodic.branches import unit_of
     from ..periodic.resonance import ResponseInterrupted, approximations, frequency_response, natural_frequency
 
@@ -176,10 +176,10 @@ def resonance(
     table = approximations(response) if over_speed else None
     _extrema(response, factor, shown_unit, table)
     if table is not None:
-        written.append(io.write_csv(f"{stem}-approximations.csv", table.columns()))
+        written.append(write_csv(f"{stem}-approximations.csv", table.columns()))
     if plot:
         figure = response.plot(title=chosen.title, rpm=over_speed, beside=table)
-        written.append(io.save_figure(figure, f"{stem}.png"))
+        written.append(save_figure(figure, f"{stem}.png"))
     for path in written:
         console.print(f"wrote {path}", highlight=False, soft_wrap=True)
     for problem in response.problems:
@@ -275,7 +275,7 @@ def stability(
       linkwork stability --published rig-2-spring-c --x-range '200 rpm' '1500 rpm' --y-range 0 '6e3 dyn.s/cm'
       linkwork stability --published rig-1-spring-a --y slider.stiffness --y-range '1e6 dyn/cm' '5e6 dyn/cm'
     """
-    from ..files import io
+    from ..files import save_figure
     from ..periodic.branches import unit_of
     from ..periodic.charts import default_range, stability_chart
     from ..periodic.orbits import orbit_of
@@ -336,7 +336,7 @@ def stability(
     written = [
         found.to_csv(f"{stem}.csv"),
         found.boundaries_to_csv(f"{stem}-boundaries.csv"),
-        io.save_figure(found.plot(title=chosen.title), f"{stem}.png"),
+        save_figure(found.plot(title=chosen.title), f"{stem}.png"),
     ]
     for path in written:
         console.print(f"wrote {path}", highlight=False, soft_wrap=True)

@@ -27,8 +27,6 @@ from .style import STYLE, Figure, finish
 #: Colours of the links in drawings.
 CRANK, COUPLER, ROCKER, SLIDER, GROUND, TRACE = "#D55E00", "#0072B2", "#009E73", "#5B6770", "#333333", "#CC79A7"
 
-CM_PER_METRE = 100.0
-
 
 @dataclass(frozen=True, slots=True)
 class _Pins:

@@ -11,8 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
-from linkwork.five_bar.published import CM_PER_METRE, RAD_S_PER_RPM
-
+from ..units import CM_PER_METRE, RAD_S_PER_RPM
 from .style import COLOURS, STYLE, finish
 
 if TYPE_CHECKING:

@@ -1,1 +1,10 @@
-"""Reading and writing files: tables, curves, drawings, parameters and cases."""
+"""Reading and writing files: tables of numbers, curves, drawings, and TOML or JSON with units; knows no mechanism.
+
+The names are those of ``__init__.pyi``; each is imported from its module when it is first used.
+"""
+
+from __future__ import annotations
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

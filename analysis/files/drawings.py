@@ -11,13 +11,18 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from io import StringIO
 from math import isfinite
+from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
 import numpy as np
 from numpy.typing import NDArray
 
-from linkwork.errors import InputError, ParameterError, UnknownNameError
+from linkwork.errors import InputError, ParameterError
+
+from ..units import LENGTHS
+from .paths import ending_of, prepare
+from .reader import unknown_name
 
 Point = tuple[float, float]
 
@@ -43,8 +48,8 @@ LAYERS = {
     "text": Layer(colour=0x202020, width=0.18e-3),
 }
 
-#: Units of length: in m, and their code in the DXF variable $INSUNITS.
-UNITS = {"mm": (1e-3, 4), "cm": (1e-2, 5), "m": (1.0, 6), "in": (0.0254, 1)}
+#: Units of length, by their code in the DXF variable $INSUNITS.
+UNITS = {"mm": 4, "cm": 5, "m": 6, "in": 1}
 #: Those that SVG has.
 SVG_UNITS = ("mm", "cm", "in")
 _NO_GUID = "{00000000-0000-0000-0000-000000000000}"
@@ -54,7 +59,7 @@ MARGIN = 0.05
 
 def _check(layer: str, *numbers: float) -> None:
     if layer not in LAYERS:
-        raise UnknownNameError(f"layer {layer!r}", tuple(LAYERS), None)
+        raise unknown_name(f"layer {layer!r}", LAYERS)
     if not all(isfinite(number) for number in numbers):
         raise InputError(f"on layer {layer}: {numbers} must be finite numbers")
 
@@ -173,11 +178,11 @@ class Drawing:
         return (left, bottom), (right, top)
 
 
-def _unit(unit: str, known: Iterable[str]) -> tuple[float, int]:
+def _metres(unit: str, known: Iterable[str]) -> float:
     names = tuple(known)
     if unit not in names:
         raise ParameterError("unit", unit, f"be one of {', '.join(names)}")
-    return UNITS[unit]
+    return LENGTHS[unit]
 
 
 def to_dxf(drawing: Drawing, unit: str = "mm") -> str:
@@ -202,9 +207,9 @@ def to_dxf(drawing: Drawing, unit: str = "mm") -> str:
     from ezdxf.filemanagement import new
     from ezdxf.version import __version__
 
-    metre, code = _unit(unit, UNITS)
+    metre = _metres(unit, UNITS)
     document = new("R2010")
-    document.units = code
+    document.units = UNITS[unit]
     document.header["$MEASUREMENT"] = 0 if unit == "in" else 1
     for name, layer in LAYERS.items():
         entry = document.layers.add(name, lineweight=round(layer.width * 1e5))
@@ -253,14 +258,14 @@ def to_svg(drawing: Drawing, unit: str = "mm") -> str:
     -------
     str
         A group for each layer that has something on it, its name as ``id``. SVG's y points down: a point (x, y) is at
-        (x, -y), the origin kept, so that `analysis.files.io.read_points` reads back the same points.
+        (x, -y), the origin kept, so that `analysis.files.read_points` reads back the same points.
 
     Raises
     ------
     ParameterError
         If the unit is not one of SVG's.
     """
-    metre, _ = _unit(unit, SVG_UNITS)
+    metre = _metres(unit, SVG_UNITS)
 
     def number(metres: float) -> str:
         return format(metres / metre + 0.0, ".15g")
@@ -310,3 +315,26 @@ def to_svg(drawing: Drawing, unit: str = "mm") -> str:
     root.extend(group for group in groups.values() if len(group))
     ElementTree.indent(root)
     return ElementTree.tostring(root, encoding="unicode") + "\n"
+
+
+def save_drawing(path: str | Path, drawing: Drawing, *, unit: str = "mm") -> Path:
+    """Write a drawing as DXF or SVG, as the path's ending says.
+
+    Raises
+    ------
+    InputError
+        If the ending is another.
+    ParameterError
+        If the unit is not one that the format has.
+    """
+    path = Path(path)
+    text = to_dxf(drawing, unit) if ending_of(path, (".dxf", ".svg")) == ".dxf" else to_svg(drawing, unit)
+    prepare(path).write_bytes(text.encode())
+    return path
+
+
+def save_figure(figure: Any, path: str | Path, *, dpi: int = 150) -> Path:
+    """Write a Matplotlib figure, as the format that the path's ending names."""
+    path = prepare(path)
+    figure.savefig(path, dpi=dpi)
+    return path

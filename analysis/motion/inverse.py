@@ -181,7 +181,7 @@ class SliderDrive:
         )
 
     def columns(self) -> Mapping[str, FloatArray]:
-        """Time, force, power and outputs by name with unit, as `analysis.files.io.write_csv` takes them."""
+        """Time, force, power and outputs by name with unit, as `analysis.files.write_csv` takes them."""
         own = {"time [s]": self.time, "slider.force [N]": self.force, "slider.power [W]": self.power}
         return own | {f"{name} [{UNITS[name]}]": self[name] for name in NAMES}
 

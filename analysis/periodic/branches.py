@@ -23,7 +23,7 @@ from linkwork.five_bar.published import RAD_S_PER_RPM
 from linkwork.five_bar.variables import INPUTS, PARAMETERS
 from linkwork.parameters import field_name
 
-from ..files import io
+from ..files import write_csv
 from ..numerics.continuation import ContinuationError, Curve, Evaluate, Evaluation, Follower, Point, Settings
 from .floquet import TOLERANCE, Crossing, Stability
 from .orbits import Drive, Period, PeriodicOrbit, Turn, period_from, scale_of
@@ -282,7 +282,7 @@ class Branch:
 
     def to_csv(self, path: str | Path) -> Path:
         """Write the branch as a table, a row a point; see `columns`."""
-        return io.write_csv(path, self.columns())
+        return write_csv(path, self.columns())
 
     def plot(self, *, title: str = "") -> Figure:
         """Amplitude over the parameter, stable parts solid, with its special points."""

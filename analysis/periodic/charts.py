@@ -20,7 +20,7 @@ from linkwork.five_bar.parameters import FiveBarParameters
 from linkwork.five_bar.published import RAD_S_PER_RPM
 from linkwork.parameters import field_name
 
-from ..files import io
+from ..files import write_csv
 from ..numerics.boundaries import Box, Test, chart
 from ..numerics.continuation import ContinuationError
 from ..run.simulate import shown
@@ -157,7 +157,7 @@ class StabilityChart:
             "largest multiplier [1]": self.grid.largest.filled(np.nan).ravel(),
             "status (0: orbit found)": self.grid.status.ravel().astype(float),
         }
-        return io.write_csv(path, columns)
+        return write_csv(path, columns)
 
     def boundaries_to_csv(self, path: str | Path) -> Path:
         """Write the boundaries as a table, a row a point, numbered in the first column."""
@@ -172,7 +172,7 @@ class StabilityChart:
             "multiplier (+1; -1; 0: a complex pair)",
             *(a.label for a in self.axes),
         )
-        return io.write_csv(path, dict(zip(names, np.concatenate(rows).T)))
+        return write_csv(path, dict(zip(names, np.concatenate(rows).T)))
 
     def plot(self, *, title: str = "") -> Figure:
         """The largest multiplier in colours, the boundaries, and the points of the long runs."""

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from linkwork.errors import InputError, Interrupted, LinkworkError
 
-from ..files import io
+from ..files import load_array, save_array
 from ..run.compiled import cache_folder
 from ..run.simulate import interruptible, shown
 from . import floquet, orbit_kernels, orbits
@@ -193,10 +193,10 @@ def _compute_row(path: Path, row: Sequence[Operation], guess: NDArray[np.float64
     """Compute a row and write its file, which is there as a whole or not at all."""
     mechanisms, drives = [p for p, _ in row], [drive for _, drive in row]
     values, starts, status = orbits.largest_multipliers(mechanisms, drives, guess, tolerance=tolerance)
-    io.save_array(path, np.column_stack([values, starts, status]))
+    save_array(path, np.column_stack([values, starts, status]))
 
 
 def _read(path: Path, count: int, size: int) -> NDArray[np.float64] | None:
     """A row from its file, columns multiplier, start (of ``size`` components) and status; None if it is not there."""
-    row = io.load_array(path)
+    row = load_array(path)
     return row if row is not None and row.shape == (count, size + 2) else None

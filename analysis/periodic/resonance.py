@@ -22,7 +22,7 @@ from scipy.signal import find_peaks
 from linkwork.errors import InputError, Interrupted, ParameterError
 from linkwork.five_bar.parameters import FiveBarParameters
 
-from ..files import io
+from ..files import write_csv
 from ..mechanisms import require_five_bar
 from ..numerics.continuation import ContinuationError
 from ..run.simulate import interruptible, shown
@@ -141,7 +141,7 @@ class Response:
         tables = [branch.columns() for branch in self.branches]
         columns = {"branch": np.concatenate([np.full(len(b), float(i + 1)) for i, b in enumerate(self.branches)])}
         columns |= {name: np.concatenate([table[name] for table in tables]) for name in tables[0]}
-        return io.write_csv(path, columns)
+        return write_csv(path, columns)
 
     def plot(self, *, title: str = "", rpm: bool = False, beside: Approximations | None = None) -> Figure:
         """Amplitude, crank torque and pin force over the parameter; see `analysis.figures.plot_branches`."""

@@ -101,7 +101,7 @@ class Trajectory:
 
     def to_csv(self, path: str | Path) -> Path:
         """Write time and all outputs to a CSV file whose header has names and units."""
-        from ..files import io
+        from ..files import write_csv
 
         columns = {"time [s]": self.time} | {f"{name} [{unit}]": self[name] for name, unit in self.units.items()}
         return io.write_csv(path, columns)

@@ -35,7 +35,7 @@ from linkwork.slider_crank.parameters import Constants, SliderCrankParameters
 from linkwork.slider_crank.published import INCH, POUND_FORCE, POUND_INCH
 from linkwork.slider_crank.vectors import Vector
 
-from ..files import io
+from ..files import write_csv
 from . import mobility
 from .dual_dynamics import DEAD_CENTRE
 from .mobility import DeadCentre
@@ -464,7 +464,7 @@ class ForceTurn:
         InputError
             As `columns`.
         """
-        return io.write_csv(path, self.columns(units, frames))
+        return write_csv(path, self.columns(units, frames))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

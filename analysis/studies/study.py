@@ -12,7 +12,7 @@ from rich.console import Console
 from rich.table import Table
 
 from ..figures import Curve, Figure
-from ..files import io
+from ..files import save_figure, write_csv
 from . import STUDIES, file_stem, is_figure
 
 #: Where a stated value comes from.
@@ -165,8 +165,8 @@ class Study:
         result = self.compute()
         stem = Path(out) / file_stem(self.number)
         paths = [
-            io.save_figure(self.draw(result), stem.with_suffix(".png")),
-            io.write_csv(stem.with_suffix(".csv"), result.columns),
+            save_figure(self.draw(result), stem.with_suffix(".png")),
+            write_csv(stem.with_suffix(".csv"), result.columns),
         ]
         if self.animate:
             paths.append(self.animate(result, stem.with_suffix(".gif")))

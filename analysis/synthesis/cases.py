@@ -3,19 +3,37 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
-from math import isfinite, pi, remainder, tau
+from dataclasses import asdict, dataclass, replace
+from functools import partial
+from math import pi, remainder, tau
 from pathlib import Path
 from typing import Any, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
-from linkwork.errors import MissingParameterError, ParameterError
+from linkwork.errors import ParameterError
 from linkwork.five_bar.parameters import FiveBarParameters
 
-from ..files.io import check_names, parameters_to, quantity, read_tables, unknown_name
-from .case_tasks import flag, given, list_of, listed, one_of, pairs, section, task_from, whole
+from ..files import (
+    Choice,
+    Many,
+    Quantity,
+    Range,
+    Table,
+    Whole,
+    as_it_is,
+    entry,
+    flag,
+    overridden,
+    read,
+    read_tables,
+    table_of,
+    text,
+)
+from ..run.case_files import parameters_to
+from ..units import with_unit
+from .case_tasks import points_of, task_from
 from .constraints import (
     UNKNOWNS,
     USUAL,
@@ -29,7 +47,7 @@ from .constraints import (
     PivotRegion,
     limits_of,
 )
-from .linkage import ANGLES
+from .linkage import ANGLES, Linkage
 from .requirements import requirement
 from .solution import Solution
 from .solve import METHODS, Method, Synthesis, TradeOff, synthesize, trade_off
@@ -37,22 +55,27 @@ from .tasks import Task, normal_form
 
 FloatArray = NDArray[np.float64]
 
-#: Tables of a case file.
-TABLES = ("title", "task", "bounds", "constraints", "search", "make", "trade_off")
 #: Stiffness of the slider that stands for a fixed pivot: natural frequency (rad/s), or multiples of the crank's speed.
 STIFF, STIFF_TURNS = 1000.0, 50.0
+
+
+def _cores(value: Any, name: str) -> int:
+    number = Whole(-1)(value, name)
+    if number == 0:
+        raise ParameterError(name, value, "be a number of cores, or -1 for all")
+    return number
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Search:
     """How it is searched: arguments of `synthesize`."""
 
-    method: Method = "scan"
-    seed: int = 0
-    candidates: int = 1 << 16
-    starts: int = 24
-    solutions: int = 6
-    jobs: int = 1
+    method: Method = entry(Choice(METHODS), "scan")
+    seed: int = entry(Whole(0), 0)
+    candidates: int = entry(Whole(1), 1 << 16)
+    starts: int = entry(Whole(1), 24)
+    solutions: int = entry(Whole(1), 6)
+    jobs: int = entry(_cores, 1)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -75,25 +98,31 @@ class Make:
         Of the crank (rad/s).
     """
 
-    density: float = 7850.0
-    width: float = 0.02
-    thickness: float = 0.005
-    slider_mass: float | None = None
-    slider_stiffness: float | None = None
-    slider_damping: float | None = None
-    slider_coulomb_friction: float = 0.0
-    gravity: float = 9.81
-    speed: float = 2.0 * pi
+    density: float = entry(Quantity("kg/m**3", above=0.0), 7850.0)
+    width: float = entry(Quantity("m", above=0.0), 0.02)
+    thickness: float = entry(Quantity("m", above=0.0), 0.005)
+    slider_mass: float | None = entry(Quantity("kg", least=0.0), None)
+    slider_stiffness: float | None = entry(Quantity("N/m", least=0.0), None)
+    slider_damping: float | None = entry(Quantity("N.s/m", least=0.0), None)
+    slider_coulomb_friction: float = entry(Quantity("N", least=0.0), 0.0)
+    gravity: float = entry(Quantity("m/s2", least=0.0), 9.81)
+    speed: float = entry(Quantity("rad/s", above=0.0), 2.0 * pi)
 
-    def five_bar(self, solution: Solution) -> FiveBarParameters:
-        """Parameters of the plant for a solution, its slider held."""
-        free = solution.to_five_bar(
+    def moving(self, linkage: Linkage) -> FiveBarParameters:
+        """Parameters of the plant for a linkage, its slider free to be moved."""
+        return linkage.to_five_bar(
             density=self.density,
             section=(self.width, self.thickness),
             slider_mass=self.slider_mass,
+            slider_stiffness=self.slider_stiffness or 0.0,
+            slider_damping=self.slider_damping or 0.0,
             slider_coulomb_friction=self.slider_coulomb_friction,
             gravity=self.gravity,
         )
+
+    def five_bar(self, solution: Solution) -> FiveBarParameters:
+        """Parameters of the plant for a solution, its slider held."""
+        free = self.moving(solution.linkage)
         mass = free.slider_mass + free.rocker_mass + free.coupler_mass
         frequency = max(STIFF, STIFF_TURNS * abs(self.speed))
         stiffness = mass * frequency**2 if self.slider_stiffness is None else self.slider_stiffness
@@ -104,61 +133,114 @@ class Make:
     def run_case(self, solution: Solution, title: str) -> dict[str, Any]:
         """Tables of a case file that runs the linkage through its task at constant speed; see `docs/case-files.md`."""
         at = solution.evaluation.rotation
-        backwards = at is not None and len(at) > 1 and at[-1] < at[0]
         start = (0.0 if at is None else float(at[0])) + solution.linkage.crank_phase
         run: dict[str, Any] = {"revolutions": 2.0}
         if not solution.verdicts.full_turn and at is not None:
             # a crank that cannot turn fully: from the first target to the last
-            run = {"stop_time": f"{float(np.ptp(at)) / self.speed!r} s"}
+            run = {"stop_time": with_unit(float(np.ptp(at)) / self.speed, "s")}
         return {
             "title": title,
             **parameters_to(self.five_bar(solution)),
-            "initial": {"crank_angle": f"{remainder(start, tau)!r} rad"},
-            "drive": {"speed": f"{-self.speed if backwards else self.speed!r} rad/s"},
+            "initial": {"crank_angle": with_unit(remainder(start, tau), "rad")},
+            "drive": {"speed": with_unit(direction(solution) * self.speed, "rad/s")},
             "run": run,
         }
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class TradeOffWanted:
-    """Arguments of `trade_off`."""
+def direction(solution: Solution) -> float:
+    """The way in which the crank turns over the task: 1 counter-clockwise, -1 clockwise."""
+    at = solution.evaluation.rotation
+    return -1.0 if at is not None and len(at) > 1 and at[-1] < at[0] else 1.0
 
-    over: str
-    limits: FloatArray
-    starts: int = 12
+
+def _transmission(value: Any, name: str) -> float | None:
+    if value is False:
+        return None
+    requirement = "be at least 0 and below 90 deg; a number without a unit is in rad"
+    return Quantity("rad", least=0.0, below=0.5 * pi, requirement=requirement)(value, name)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Constraints:
+    """The table ``[constraints]``; without one no transmission angle is given, and 40 degrees are kept."""
+
+    least_transmission_angle: float | None = entry(_transmission, LeastTransmission().angle)
+    over: str | None = entry(Choice(("turn", "task")), None)
+    full_turn: bool = entry(flag, False)
+    grashof: GrashofType | None = entry(Choice(get_args(GrashofType)), None)
+    largest_link: float | None = entry(Quantity("m"), None)
+    assembly: int | None = entry(Whole(), None)
+    pivot_A: FloatArray | None = entry(points_of, None)
+    pivot_D: FloatArray | None = entry(points_of, None)
+    require: tuple[Constraint, ...] = entry(Many(requirement), ())
+
+    def constraints(self) -> tuple[Constraint, ...]:
+        """The constraints; a crank that cannot turn fully is looked at where it works."""
+        found: list[Constraint] = []
+        if self.least_transmission_angle is not None:
+            swings = self.grashof in ("double-rocker", "rocker-crank", "triple-rocker")
+            over: Any = self.over or ("task" if swings else "turn")
+            found.append(LeastTransmission(angle=self.least_transmission_angle, over=over))
+        if self.full_turn:
+            found.append(FullTurn())
+        if self.grashof is not None:
+            found.append(Grashof(type=self.grashof))
+        if self.largest_link is not None:
+            found.append(LargestLink(length=self.largest_link))
+        if self.assembly is not None:
+            found.append(Assembly(branch=self.assembly))
+        if self.pivot_A is not None:
+            found.append(PivotRegion(pivot="A", polygon=self.pivot_A))
+        if self.pivot_D is not None:
+            found.append(PivotRegion(pivot="D", polygon=self.pivot_D))
+        return (*found, *self.require)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class TradeOffTable:
+    """The table ``[trade_off]``: arguments of `trade_off`."""
+
+    over: Any = entry(Choice(("size", "transmission")))
+    limits: tuple[float, ...] = entry(Many(as_it_is, least=2))
+    starts: int = entry(Whole(1), 12)
+
+
+#: The table ``[bounds]``: [least, greatest], or one value that fixes the dimension.
+BOUNDS = Table(dict, {name: Range(Quantity("rad" if name in ANGLES else "m"), ordered=False) for name in UNKNOWNS})
+
+
+def _constraints(value: Any, name: str) -> tuple[Constraint, ...]:
+    table: Constraints = read(Constraints, value, name)
+    return table.constraints()
+
+
+def _trade_off(value: Any, name: str) -> TradeOffTable:
+    limit = Quantity("m" if table_of(value, name).get("over") == "size" else "rad")
+    table: TradeOffTable = read(TradeOffTable, value, name, readers={"limits": Many(limit, least=2)})
+    return table
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class SynthesisCase:
     """What a case file asks for."""
 
-    title: str
-    task: Task
-    bounds: Mapping[str, tuple[float, float]] = field(default_factory=dict)
-    constraints: tuple[Constraint, ...] = USUAL
-    search: Search = field(default_factory=Search)
-    make: Make = field(default_factory=Make)
-    trade_off: TradeOffWanted | None = None
+    title: str = entry(text)
+    task: Task = entry(as_it_is)
+    bounds: Mapping[str, tuple[float, float]] = entry(BOUNDS, factory=dict)
+    constraints: tuple[Constraint, ...] = entry(_constraints, USUAL)
+    search: Search = entry(Table(Search), Search())
+    make: Make = entry(Table(Make), Make())
+    trade_off: TradeOffTable | None = entry(_trade_off, None)
 
     def __post_init__(self) -> None:
-        # contradictions are told before anything is searched
+        # contradictions are reported before anything is searched
         limits_of(self.task, normal_form(self.task), self.bounds, self.constraints)
 
     def solve(self, *, progress: bool = False) -> Synthesis:
         """Search; see `synthesize`."""
-        s = self.search
-        return synthesize(
-            self.task,
-            self.bounds,
-            self.constraints,
-            seed=s.seed,
-            method=s.method,
-            candidates=s.candidates,
-            starts=s.starts,
-            solutions=s.solutions,
-            n_jobs=s.jobs,
-            progress=progress,
-        )
+        options = asdict(self.search)
+        jobs = options.pop("jobs")
+        return synthesize(self.task, self.bounds, self.constraints, n_jobs=jobs, progress=progress, **options)
 
     def trade(self, *, progress: bool = False) -> TradeOff | None:
         """The trade-off that is asked for, if any; see `trade_off`."""
@@ -167,8 +249,8 @@ class SynthesisCase:
             return None
         return trade_off(
             self.task,
-            wanted.over,  # type: ignore[arg-type]
-            wanted.limits,
+            wanted.over,
+            np.array(wanted.limits),
             self.bounds,
             self.constraints,
             seed=self.search.seed,
@@ -202,150 +284,6 @@ def synthesis_case_from(
     data: Mapping[str, Any], *, folder: Path, title: str = "", overrides: Mapping[str, Any] | None = None
 ) -> SynthesisCase:
     """A synthesis from the tables of a case file; ``folder`` is where its files are looked for."""
-    data = overridden(data, overrides or {})
-    for name in data:
-        if name not in TABLES:
-            raise unknown_name(name, TABLES)
-    if "task" not in data:
-        raise MissingParameterError("task")
-    wanted = data.get("trade_off")
-    return SynthesisCase(
-        title=str(data.get("title", title)),
-        task=task_from(section(data, "task"), folder),
-        bounds=bounds_from(section(data, "bounds")),
-        constraints=constraints_from(section(data, "constraints")),
-        search=search_from(section(data, "search")),
-        make=make_from(section(data, "make")),
-        trade_off=None if wanted is None else _trade_off(section(data, "trade_off")),
-    )
-
-
-def overridden(data: Mapping[str, Any], overrides: Mapping[str, Any]) -> dict[str, Any]:
-    """The tables with single values replaced, by dotted name of any depth."""
-    result: dict[str, Any] = {k: dict(v) if isinstance(v, Mapping) else v for k, v in data.items()}
-    for name, value in overrides.items():
-        *groups, leaf = name.split(".")
-        place = result
-        for depth, group in enumerate(groups, start=1):
-            inner = place.get(group, {})
-            if not isinstance(inner, Mapping):
-                raise ParameterError(".".join(groups[:depth]), inner, "be a table")
-            place[group] = dict(inner)
-            place = place[group]
-        place[leaf] = value
-    return result
-
-
-# Bounds and constraints
-
-
-def bounds_from(table: Mapping[str, Any]) -> dict[str, tuple[float, float]]:
-    """Bounds of a table ``[bounds]``: [least, greatest], or one value that fixes the dimension."""
-    bounds: dict[str, tuple[float, float]] = {}
-    for name, value in table.items():
-        if name not in UNKNOWNS:
-            raise unknown_name(f"bounds.{name}", [f"bounds.{n}" for n in UNKNOWNS])
-        unit = "rad" if name in ANGLES else "m"
-        ends = value if isinstance(value, list) else [value, value]
-        if len(ends) != 2:
-            raise ParameterError(f"bounds.{name}", value, "be one value, or two: [least, greatest]")
-        low, high = (quantity(end, unit, f"bounds.{name}") for end in ends)
-        bounds[name] = low, high
-    return bounds
-
-
-#: Names in the table ``[constraints]``.
-CONSTRAINTS = (
-    "least_transmission_angle",
-    "over",
-    "full_turn",
-    "grashof",
-    "largest_link",
-    "assembly",
-    "pivot_A",
-    "pivot_D",
-    "require",
-)
-
-
-def constraints_from(table: Mapping[str, Any]) -> tuple[Constraint, ...]:
-    """Constraints of a table ``[constraints]``; 40 degrees over a full turn where no transmission angle is given."""
-    check_names(table, "constraints", CONSTRAINTS)
-    found: list[Constraint] = []
-    angle = table.get("least_transmission_angle", LeastTransmission().angle)
-    # a crank that cannot turn fully is looked at where it works
-    swings = table.get("grashof") in ("double-rocker", "rocker-crank", "triple-rocker")
-    over = one_of(table.get("over", "task" if swings else "turn"), "constraints.over", ("turn", "task"))
-    if angle is not False:
-        name = "constraints.least_transmission_angle"
-        value = quantity(angle, "rad", name)
-        if not 0.0 <= value < 0.5 * pi:
-            raise ParameterError(name, angle, "be at least 0 and below 90 deg; a number without a unit is in rad")
-        found.append(LeastTransmission(angle=value, over=over))  # type: ignore[arg-type]
-    if flag(table.get("full_turn", False), "constraints.full_turn"):
-        found.append(FullTurn())
-    if "grashof" in table:
-        found.append(Grashof(type=one_of(table["grashof"], "constraints.grashof", get_args(GrashofType))))  # type: ignore[arg-type]
-    if "largest_link" in table:
-        found.append(LargestLink(length=quantity(table["largest_link"], "m", "constraints.largest_link")))
-    if "assembly" in table:
-        found.append(Assembly(branch=whole(table["assembly"], "constraints.assembly")))
-    for pivot in ("A", "D"):
-        if f"pivot_{pivot}" in table:
-            corners = pairs(table[f"pivot_{pivot}"], f"constraints.pivot_{pivot}")
-            found.append(PivotRegion(pivot=pivot, polygon=corners))
-    found += [requirement(text) for text in listed(table.get("require", []), "constraints.require")]
-    return tuple(found)
-
-
-# The rest
-
-
-def search_from(table: Mapping[str, Any]) -> Search:
-    """How it is searched, of a table ``[search]``."""
-    check_names(table, "search", Search.__dataclass_fields__)
-    values: dict[str, Any] = {
-        name: whole(value, f"search.{name}", {"seed": 0, "jobs": -1}.get(name, 1))
-        for name, value in table.items()
-        if name != "method"
-    }
-    if values.get("jobs") == 0:
-        raise ParameterError("search.jobs", 0, "be a number of cores, or -1 for all")
-    if "method" in table:
-        values["method"] = one_of(table["method"], "search.method", METHODS)
-    return Search(**values)
-
-
-_MAKE = {
-    "density": "kg/m**3",
-    "width": "m",
-    "thickness": "m",
-    "slider_mass": "kg",
-    "slider_stiffness": "N/m",
-    "slider_damping": "N.s/m",
-    "slider_coulomb_friction": "N",
-    "gravity": "m/s2",
-    "speed": "rad/s",
-}
-
-
-def make_from(table: Mapping[str, Any]) -> Make:
-    """What the linkage is made of, of a table ``[make]``."""
-    check_names(table, "make", _MAKE)
-    values = {name: quantity(value, _MAKE[name], f"make.{name}") for name, value in table.items()}
-    for name, value in values.items():
-        above = name in ("density", "width", "thickness", "speed")
-        if not isfinite(value) or value < 0.0 or (above and value == 0.0):
-            raise ParameterError(
-                f"make.{name}", table[name], f"be {'greater than zero' if above else 'zero or greater'}"
-            )
-    return Make(**values)
-
-
-def _trade_off(table: Mapping[str, Any]) -> TradeOffWanted:
-    check_names(table, "trade_off", ("over", "limits", "starts"))
-    over = one_of(given(table, "over", "trade_off"), "trade_off.over", ("size", "transmission"))
-    limits = list_of(given(table, "limits", "trade_off"), "m" if over == "size" else "rad", "trade_off.limits")
-    if len(limits) < 2:
-        raise ParameterError("trade_off.limits", table["limits"], "be at least two")
-    return TradeOffWanted(over=over, limits=limits, starts=whole(table.get("starts", 12), "trade_off.starts", 1))
+    tables = {"title": title} | overridden(data, overrides or {})
+    case: SynthesisCase = read(SynthesisCase, tables, "", readers={"task": partial(task_from, folder=folder)})
+    return case

@@ -12,7 +12,8 @@ from typing import Any
 
 from linkwork.errors import InputError, ParameterError
 
-from ..files.io import quantity, unknown_name
+from ..files import unknown_name
+from ..units import quantity
 from .constraints import UNKNOWNS, Require
 
 _COMPARED: Mapping[type[ast.cmpop], tuple[int, bool]] = {
@@ -28,7 +29,7 @@ _MEASURE = re.compile(
 )
 
 
-def requirement(text: Any) -> Require:
+def requirement(text: Any, name: str = "constraints.require") -> Require:
     """A constraint from a text such as ``"crank_length + rocker_length <= 300 mm"``.
 
     Two sides about ``<=``, ``>=`` or ``==``, of dimensions by their name in `Linkage`, numbers with a unit of length or angle
@@ -41,11 +42,11 @@ def requirement(text: Any) -> Require:
         If it is none; the part that is not is named.
     """
     if not isinstance(text, str):
-        raise ParameterError("constraints.require", text, "be a list of texts such as 'crank_length <= 50 mm'")
+        raise ParameterError(name, text, "be a text such as 'crank_length <= 50 mm'")
     units = {"deg": "rad", "rad": "rad"}
 
     def in_si(found: re.Match[str]) -> str:
-        return repr(quantity(found[0], units.get(found[2], "m"), "constraints.require"))
+        return repr(quantity(found[0], units.get(found[2], "m"), name))
 
     plain = _MEASURE.sub(in_si, text)
     try:

@@ -390,7 +390,7 @@ class Solution:
 
     def to_csv(self, path: str | Path) -> Path:
         """Write `columns` to a CSV file."""
-        from ..files.io import write_csv
+        from ..files import write_csv
 
         return write_csv(path, self.columns())
 
@@ -413,7 +413,7 @@ class Solution:
         return figures.animate_solution(self.scene(title), path, frames=frames)
 
     def drawing(self, rotation: float | None = None, *, title: str = "") -> Drawing:
-        """The linkage, its coupler curve and the target at real size, for `analysis.files.io.save_drawing`.
+        """The linkage, its coupler curve and the target at real size, for `analysis.files.save_drawing`.
 
         Parameters
         ----------

@@ -80,7 +80,7 @@ class Synthesis:
 
     def to_csv(self, path: str | Path) -> Path:
         """Write `columns` to a CSV file."""
-        from ..files.io import write_csv
+        from ..files import write_csv
 
         return write_csv(path, self.columns())
 
@@ -325,7 +325,7 @@ class TradeOff:
 
     def to_csv(self, path: str | Path) -> Path:
         """Write each limit with its best linkage, in the columns of `Synthesis.columns`; limits without one are left out."""
-        from ..files.io import write_csv
+        from ..files import write_csv
 
         there = [(limit, s) for limit, s in zip(self.limit, self.solutions) if s is not None]
         unit = "largest link [m]" if self.over == "size" else "least transmission angle [rad]"

@@ -19,7 +19,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from linkwork.errors import InputError
 
-from ..files.io import quantity, read_points
+from ..files import read_points
+from ..units import quantity
 
 FloatArray = NDArray[np.float64]
 
@@ -154,7 +155,7 @@ class TargetPath:
     def from_file(
         cls, path: str | Path, *, unit: str | None = None, name: str | None = None, closed: bool | None = None
     ) -> TargetPath:
-        """The curve of a CSV or SVG file; see `analysis.files.io.read_points`. ``closed`` overrules what the file says.
+        """The curve of a CSV or SVG file; see `analysis.files.read_points`. ``closed`` overrules what the file says.
 
         Raises
         ------

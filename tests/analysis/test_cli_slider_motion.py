@@ -15,10 +15,10 @@ from click.testing import CliRunner, Result
 from analysis import cli
 from analysis import motion as control
 from analysis.cli import slider
-from analysis.files import io
 from analysis.motion.cases import SliderCase, linkage_from_csv, load_slider_case
 from analysis.motion.motion import motion_of_plant
 from analysis.numerics.fourier import FourierSeries
+from analysis.run.case_files import load_case, load_parameters
 from analysis.run.simulate import simulate
 from analysis.synthesis import Linkage, SecondCrank, SliderMotion, SynthesisInterrupted, TimedPath, evaluate, synthesize
 from analysis.synthesis.tasks import turn
@@ -124,9 +124,9 @@ def test_what_is_written_runs_and_reproduces_the_motion(linkwork, tmp_path) -> N
     load = {"fx": "2 N", "fy": "-3 N"}
     result = linkwork(tables(drive={"speed": "120 rpm"}, load=load), "--no-plots", "--out", "moved")
     assert result.exit_code == 0, result.output
-    case = io.load_case(tmp_path / "moved" / "five-bar.toml")
+    case = load_case(tmp_path / "moved" / "five-bar.toml")
     assert case.stop_time == pytest.approx(0.5)
-    assert io.load_parameters(tmp_path / "moved" / "five-bar-parameters.toml") == case.parameters
+    assert load_parameters(tmp_path / "moved" / "five-bar-parameters.toml") == case.parameters
     run = simulate(case.parameters, case.inputs, initial=case.initial, stop_time=case.stop_time, step=case.step)
     columns = csv(tmp_path / "moved" / "motion.csv")
     assert columns["slider position [m]"] == pytest.approx(columns["slider.position [m]"], abs=1e-15)
@@ -146,7 +146,7 @@ def test_what_is_written_runs_and_reproduces_the_motion(linkwork, tmp_path) -> N
     assert again.exit_code == 0, again.output
 
 
-def test_the_numbers_told_are_those_of_the_motion(linkwork, tmp_path) -> None:
+def test_the_numbers_reported_are_those_of_the_motion(linkwork, tmp_path) -> None:
     result = linkwork(tables(drive={"speed": "120 rpm"}), "--no-plots")
     columns = csv(tmp_path / "out" / "motion.csv")
     force = columns["slider.force [N]"]
@@ -212,7 +212,7 @@ def test_the_slider_is_made_as_the_case_says(tmp_path) -> None:
         "slider_coulomb_friction": "2 N",
         "slider_mass": "1 kg",
     }
-    made = read(tmp_path, tables(make=make)).five_bar(BASE)
+    made = read(tmp_path, tables(make=make)).synthesis.make.moving(BASE)
     assert (made.slider_damping, made.slider_stiffness, made.slider_coulomb_friction, made.slider_mass) == (
         20,
         300,
@@ -220,7 +220,7 @@ def test_the_slider_is_made_as_the_case_says(tmp_path) -> None:
         1,
     )
     # a pivot that is to move is not held, unlike that of a four-bar
-    free = read(tmp_path, tables(make={})).five_bar(BASE)
+    free = read(tmp_path, tables(make={})).synthesis.make.moving(BASE)
     assert free.slider_stiffness == free.slider_damping == 0.0
 
 
@@ -451,8 +451,8 @@ def test_the_motion_is_read_with_its_units(tmp_path) -> None:
         "acceleration": "50 mm/rad^2",
     }
     chosen = read(tmp_path, tables(slider=motion))
-    assert chosen.harmonics == (1, 3)
-    u = chosen.unknown
+    assert chosen.slider.harmonics == (1, 3)
+    u = chosen.slider.unknown(1)
     assert u.guide_angle == pytest.approx((radians(20.0), radians(20.0)))
     assert u.position == pytest.approx((-0.01, 0.02))
     assert (u.stroke, u.speed, u.acceleration) == pytest.approx((0.025, 0.03, 0.05))

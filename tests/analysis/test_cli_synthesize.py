@@ -15,8 +15,9 @@ import pytest
 from click.testing import CliRunner
 
 from analysis import cli
-from analysis.files import io
+from analysis.files import names_of
 from analysis.numerics.symbolic import library
+from analysis.run.case_files import case_from, load_case, load_parameters
 from analysis.run.simulate import simulate
 from analysis.synthesis import (
     Assembly,
@@ -85,7 +86,7 @@ def test_help_shows_examples(linkwork) -> None:
     assert "Examples:" in linkwork("synthesize", "--help").output
 
 
-def test_it_tells_and_writes_what_it_found(run) -> None:
+def test_it_reports_and_writes_what_it_found(run) -> None:
     result, folder = run
     written = {path.name for path in (folder / "out").iterdir()}
     assert written == {
@@ -109,8 +110,8 @@ def test_it_tells_and_writes_what_it_found(run) -> None:
 
 def test_the_five_bar_runs_and_its_point_traces_the_path(run, linkwork) -> None:
     _, folder = run
-    chosen = io.load_case(folder / "out" / "five-bar.toml")
-    assert io.load_parameters(folder / "out" / "five-bar-parameters.toml") == chosen.parameters
+    chosen = load_case(folder / "out" / "five-bar.toml")
+    assert load_parameters(folder / "out" / "five-bar-parameters.toml") == chosen.parameters
     motion = simulate(
         chosen.parameters, chosen.inputs, initial=chosen.initial, stop_time=chosen.stop_time, step=chosen.step
     )
@@ -181,7 +182,7 @@ def test_a_crank_that_swings_backwards_is_run_over_its_task_alone(tmp_path) -> N
     task = Motion(points=linkage.path(at) + 1e-3, angle=linkage.coupler_angle(at), rotation=at)
     solution = Solution.of(task, linkage)
     assert not solution.verdicts.full_turn
-    ran = io.case_from(cases.Make(speed=3.0).run_case(solution, "swing"), folder=tmp_path)
+    ran = case_from(cases.Make(speed=3.0).run_case(solution, "swing"), folder=tmp_path)
     motion = simulate(
         ran.parameters, ran.inputs, initial=ran.initial, stop_time=ran.stop_time, step=ran.stop_time / 10.0
     )
@@ -236,7 +237,7 @@ def test_an_interrupted_trade_off_keeps_what_it_has(linkwork, tmp_path, monkeypa
     assert Path("out/solutions.csv").exists()
 
 
-def test_a_solution_with_a_defect_is_told(linkwork, tmp_path, monkeypatch) -> None:
+def test_a_solution_with_a_defect_is_reported(linkwork, tmp_path, monkeypatch) -> None:
     (tmp_path / "case.toml").write_text(CAPPED)
     found = cases.synthesize
 
@@ -274,7 +275,7 @@ def test_a_solution_with_a_defect_is_told(linkwork, tmp_path, monkeypatch) -> No
         ('[task]\nkind = "timed-path"\npoints = [[0, 0], [0, 0], [1, 1]]', "points 0 and 1 are the same"),
         (
             '[task]\nkind = "timed-path"\npoints = [[0, 0], [nan, 0], [1, 1]]',
-            "points[1] is nan: it must be a finite number",
+            "points[1][0] is nan: it must be a finite number",
         ),
         ('[task]\nkind = "timed-path"\npoints = []', "0 are too few"),
         ('[task]\nkind = "timed-path"\npoints = [["1", 0], [1, 1]]', "come with its unit"),
@@ -307,14 +308,14 @@ def test_a_solution_with_a_defect_is_told(linkwork, tmp_path, monkeypatch) -> No
         (ELLIPSE + '[make]\nspeed = "1 Hz"', "be in rad/s or rpm"),
         (ELLIPSE + "[make]\nwidth = 0", "make.width is 0: it must be greater than zero"),
         (ELLIPSE + '[trade_off]\nover = "mass"\nlimits = [1, 2]', "the names are size, transmission"),
-        (ELLIPSE + '[trade_off]\nover = "size"\nlimits = [1]', "be at least two"),
+        (ELLIPSE + '[trade_off]\nover = "size"\nlimits = [1]', "have at least 2 entries"),
         (
             ELLIPSE + QUICK + "[constraints]\nlargest_link = 0.5\npivot_A = [[9, 9], [10, 9], [9, 10]]",
             "no linkage keeps all bounds and constraints",
         ),
     ],
 )
-def test_what_is_wrong_is_told_in_a_sentence(linkwork, tmp_path, text, said) -> None:
+def test_what_is_wrong_is_reported_in_a_sentence(linkwork, tmp_path, text, said) -> None:
     (tmp_path / "case.toml").write_text(text)
     result = linkwork("synthesize", "case.toml")
     assert result.exit_code == cli.WRONG, result.output
@@ -475,8 +476,15 @@ def test_the_examples_and_the_documentation_are_readable() -> None:
     page = (ROOT / "docs" / "synthesis-cases.md").read_text()
     (block,) = re.findall(r"```toml\n(.*?)```", page, flags=re.DOTALL)
     synthesis_case_from(tomllib.loads(block), folder=ROOT)
-    for names in (cases.TABLES, *KINDS.values(), cases.CONSTRAINTS):
-        for name in names:
+    for kind in (
+        cases.SynthesisCase,
+        *KINDS.values(),
+        cases.Constraints,
+        cases.Search,
+        cases.Make,
+        cases.TradeOffTable,
+    ):
+        for name in names_of(kind):
             assert re.search(rf"\b{name}\b", page), name
 
 
@@ -527,7 +535,7 @@ def test_a_requirement_is_kept(tmp_path) -> None:
 
 
 def test_wrong_kinds_of_values_are_refused(tmp_path) -> None:
-    with pytest.raises(ParameterError, match="be a list of texts"):
+    with pytest.raises(ParameterError, match="be a text such as"):
         case(ELLIPSE + "[constraints]\nrequire = [3]\n", tmp_path)
     with pytest.raises(ParameterError, match="be true or false"):
         case(ELLIPSE + '[constraints]\nfull_turn = "yes"\n', tmp_path)

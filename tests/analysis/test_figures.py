@@ -11,7 +11,7 @@ from PIL import Image
 
 from analysis import Inputs, figures, simulate
 from analysis.figures import Curve, Panel
-from analysis.files import io
+from analysis.files import save_figure
 from linkwork.errors import AssemblyError, InputError
 from linkwork.five_bar.published import SETS, TABLE_3_1
 
@@ -104,7 +104,7 @@ def test_drawing_holds_all_pins(parameters, tmp_path: Path) -> None:
         x, y = text.get_position()
         assert axis.get_xlim()[0] < x < axis.get_xlim()[1]
         assert axis.get_ylim()[0] < y < axis.get_ylim()[1]
-    path = io.save_figure(figure, tmp_path / "folder" / "still.png")
+    path = save_figure(figure, tmp_path / "folder" / "still.png")
     assert path.stat().st_size > 5000
 
 
@@ -114,8 +114,8 @@ def test_drawing_what_cannot_be_joined() -> None:
 
 
 def test_saving_twice_gives_the_same_bytes(run, tmp_path: Path) -> None:
-    first = io.save_figure(figures.plot(run), tmp_path / "a.png").read_bytes()
-    second = io.save_figure(figures.plot(run), tmp_path / "b.png").read_bytes()
+    first = save_figure(figures.plot(run), tmp_path / "a.png").read_bytes()
+    second = save_figure(figures.plot(run), tmp_path / "b.png").read_bytes()
     assert first == second
 
 

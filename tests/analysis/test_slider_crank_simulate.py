@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 from math import cos, pi, sin
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -14,7 +13,6 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
 from analysis import Event, Inputs, Trajectory, compare, simulate, simulate_many
-from analysis.files import io
 from analysis.linear.linearise import linearise
 from analysis.mechanisms import MECHANISMS, OUTPUT_UNITS
 from analysis.periodic.orbits import drive_of, find_orbit
@@ -309,78 +307,7 @@ def test_outputs_of_one_name_have_one_unit() -> None:
         assert units == {name: OUTPUT_UNITS[name] for name in mechanism.output_names}
 
 
-# --- Files
-
-
-@pytest.mark.parametrize("ending", ["toml", "json"])
-def test_parameters_come_back_to_the_last_digit(ending: str, tmp_path: Path) -> None:
-    p = replace(PARAMETERS, guide_twist=4.1, gravity_z=-1.0 / 3.0, assembly_branch=-1)
-    assert io.load_parameters(io.save_parameters(tmp_path / f"p.{ending}", p)) == p
-
-
-def test_case_file_of_a_slider_crank(tmp_path: Path) -> None:
-    path = tmp_path / "case.toml"
-    path.write_text(
-        """
-mechanism = "slider-crank"
-published = "rahman-a4-10-s1-3.5"
-load = { kind = "ramp", start = "0 N", end = "-20 N", from_time = "0 s", to_time = "1 s" }
-
-[guide]
-twist = "280 deg"
-
-[drive]
-torque = "10 N*m"
-
-[axial]
-speed = { kind = "harmonics", amplitudes = ["4 in/s"], frequencies = ["60 rpm"] }
-
-[initial]
-crank_angle = "30 deg"
-
-[run]
-stop_time = "0.5 s"
-"""
-    )
-    case = io.load_case(path)
-    assert case.parameters == published.parameters(10.0, 280.0)
-    assert case.initial == replace(INITIAL, crank_angle=pi / 6.0)
-    assert isinstance(case.inputs, SliderCrankInputs)
-    assert case.inputs.shift_speed == Harmonics(0.0, [4.0 * 0.0254], [2.0 * pi], [0.0])
-    assert run(case).status == 0
-    grooved = io.load_case(path, {"axial.groove": True, "groove.amplitude": "2 in"})
-    assert isinstance(grooved.inputs, SliderCrankInputs)
-    assert grooved.inputs.groove
-    assert grooved.inputs.shift_speed is None
-
-
-@pytest.mark.parametrize(
-    ("text", "said"),
-    [
-        ('mechanism = "slider_crank"', "it must be one of five-bar, slider-crank"),
-        ('mechanism = "five-bar"\npublished = "rahman-ideal"', "be that of the published set rahman-ideal"),
-        ('published = "rahman-ideal"\n[axial]\nshift = 1.0', "there is no axial.shift"),
-        ('published = "rahman-ideal"\n[axial]\ngroove = 1', "axial.groove is 1: it must be true or false"),
-        (
-            'published = "rahman-ideal"\n[axial]\ngroove = true',
-            "groove.amplitude is 0.0: it must be given with axial.groove",
-        ),
-        (
-            'published = "rahman-ideal"\n[axial]\nspeed = 0.1\ngroove = true',
-            "axial is 'speed, groove': it must have one",
-        ),
-        ('published = "rahman-ideal"\n[initial]\nshift_velocity = 0.1', "come with axial.force: the shift is held"),
-        ('published = "rahman-ideal"\n[load]\nfx = "3 N"', "load is 'fx': it must be one force, along the guide"),
-        ('mechanism = ["slider-crank"]', r"mechanism is \['slider-crank'\]: it must be one of five-bar, slider-crank"),
-        ('published = "rahman-ideal"\n[coupler]\nlength = 1.0', "there is no coupler.length"),
-        ('mechanism = "slider-crank"\n[crank]\nlength = 1.0', "parameter rod.length is missing"),
-    ],
-)
-def test_case_file_that_is_wrong_says_what(text: str, said: str, tmp_path: Path) -> None:
-    path = tmp_path / "case.toml"
-    path.write_text(text)
-    with pytest.raises((InputError, ParameterError), match=said):
-        io.load_case(path)
+# --- Published cases
 
 
 @pytest.mark.parametrize("name", published.SETS)

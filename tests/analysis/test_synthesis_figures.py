@@ -14,7 +14,7 @@ from PIL import Image
 
 from analysis import figures
 from analysis.figures.synthesis import LONGEST, magnification
-from analysis.files import io
+from analysis.files import read_points, save_drawing
 from analysis.numerics.fourier import FourierSeries
 from analysis.synthesis import (
     InfeasibleError,
@@ -242,12 +242,12 @@ def test_the_drawing_is_at_real_size(tmp_path) -> None:
     np.testing.assert_allclose(triangle.points, [pins["B"], pins["C"], pins["P"]])
     assert {t.text: t.layer for t in drawing.texts} == dict.fromkeys("ABCDP", "text")
     # what is written can be read back: the curve from SVG, links from DXF in mm
-    curve, closed = io.read_points(io.save_drawing(tmp_path / "a.svg", drawing), name="coupler-curve")
+    curve, closed = read_points(save_drawing(tmp_path / "a.svg", drawing), name="coupler-curve")
     assert closed
     np.testing.assert_allclose(
         curve, LINKAGE.path(np.linspace(0.0, 2.0 * np.pi, len(curve), endpoint=False)), atol=1e-9
     )
-    document = ezdxf.readfile(io.save_drawing(tmp_path / "a.dxf", drawing))
+    document = ezdxf.readfile(save_drawing(tmp_path / "a.dxf", drawing))
     crank = next(e for e in document.modelspace() if e.dxf.layer == "crank" and e.dxftype() == "LINE")
     assert (crank.dxf.end - crank.dxf.start).magnitude == pytest.approx(50.0)
     assert sum(e.dxf.layer == "target" for e in document.modelspace()) == len(ELLIPSE)

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from scipy.integrate import quad
 from scipy.special import ellipe
 
-from analysis.files.io import read_points, write_csv
+from analysis.files import read_points, write_csv
 from analysis.synthesis.areas import distance_to
 from analysis.synthesis.targets import (
     TargetPath,

@@ -4,94 +4,62 @@ from __future__ import annotations
 
 import json
 from dataclasses import fields, replace
-from math import pi
+from math import pi, radians
+from pathlib import Path
 
-import numpy as np
 import pytest
 
-from analysis.files import io
+from analysis import simulate
+from analysis.mechanisms import mechanism_of
+from analysis.run.case import PUBLISHED
+from analysis.run.case_files import load_case, load_parameters, parameters_from, parameters_to, save_parameters
 from analysis.run.inputs import Harmonics, Piecewise, TorsionBar
 from linkwork.errors import InputError, MissingParameterError, ParameterError, UnknownNameError
-from linkwork.five_bar.published import SETS, TABLE_3_1
+from linkwork.five_bar.published import TABLE_3_1
+
+A4_10 = PUBLISHED["rahman-a4-10-s1-3.5"]
+#: Numbers that are short in no unit.
+AWKWARD = (
+    replace(TABLE_3_1, slider_guide_angle=0.1 + 0.2, crank_length=0.05 * (1 + 2**-52)),
+    replace(A4_10.parameters, guide_twist=4.1, gravity_z=-1.0 / 3.0, assembly_branch=-1),
+)
 
 
 @pytest.mark.parametrize("ending", ["toml", "json"])
-@pytest.mark.parametrize("name", list(SETS))
-def test_a_saved_mechanism_comes_back_digit_for_digit(tmp_path, ending, name):
-    path = io.save_parameters(tmp_path / f"mechanism.{ending}", SETS[name].parameters)
-    assert io.load_parameters(path) == SETS[name].parameters
+@pytest.mark.parametrize("parameters", [*(entry.parameters for entry in PUBLISHED.values()), *AWKWARD])
+def test_a_saved_mechanism_comes_back_digit_for_digit(tmp_path, ending, parameters):
+    path = save_parameters(tmp_path / f"mechanism.{ending}", parameters)
+    assert load_parameters(path) == parameters
 
 
-def test_every_digit_of_an_awkward_number_is_kept(tmp_path):
-    awkward = replace(TABLE_3_1, slider_guide_angle=0.1 + 0.2, crank_length=0.05 * (1 + 2**-52))
-    assert io.load_parameters(io.save_parameters(tmp_path / "m.toml", awkward)) == awkward
-
-
-@pytest.mark.parametrize(
-    ("text", "unit", "value"),
-    [
-        ("15.35 cm", "m", 0.1535),
-        ("2 in", "m", 0.0508),
-        ("420 rpm", "rad/s", 14 * pi),
-        ("1e6 dyn/cm", "N/m", 1000.0),
-        ("3e4 dyn*s/cm", "N.s/m", 30.0),
-        ("12500 g*cm^2", "kg.m2", 1.25e-3),
-        ("30 deg", "rad", pi / 6),
-        ("981 cm/s^2", "m/s2", 9.81),
-        ("1e8 dyn*cm", "N.m", 10.0),
-        ("0.01", "1", 0.01),
-        (0.25, "m", 0.25),
-        (3, "1", 3.0),
-    ],
-)
-def test_quantities_in_their_units(text, unit, value):
-    assert io.quantity(text, unit, "x") == pytest.approx(value, rel=1e-14)
+@pytest.mark.parametrize("parameters", AWKWARD)
+def test_every_parameter_has_its_place_in_a_file(parameters):
+    data = parameters_to(parameters)
+    named = data.pop("mechanism", "five-bar")
+    assert named == mechanism_of(parameters).name
+    assert sum(len(v) if isinstance(v, dict) else 1 for v in data.values()) == len(fields(parameters))
+    assert json.loads(json.dumps(data)) == data
 
 
 @pytest.mark.parametrize(
-    ("text", "unit"),
+    ("data", "error", "said"),
     [
-        ("15 kg", "m"),
-        ("abc", "m"),
-        ("", "m"),
-        ([1.0], "m"),
-        (True, "m"),
-        ("1 furlongg", "m"),
-        (None, "m"),
-        ("inf m", "m"),
+        # "30" for an angle was hardly meant in radians
+        ({"ground": {"inclination": "30"}}, ParameterError, r"ground\.inclination is '30': it must come with its unit"),
+        ({"slider": {"stifness": 1.0}}, UnknownNameError, r"slider\.stifness; did you mean slider\.stiffness"),
+        ({"crank": {"length": -0.05}}, ParameterError, r"crank\.length is -0\.05"),
+        ({"slider.mass": float("nan")}, ParameterError, r"slider\.mass"),
+        ({"assembly": {"branch": 0.5}}, ParameterError, r"assembly\.branch"),
     ],
 )
-def test_a_quantity_of_another_kind_is_refused_by_name(text, unit):
-    with pytest.raises(ParameterError, match=r"crank\.length"):
-        io.quantity(text, unit, "crank.length")
-
-
-def test_a_text_without_its_unit_is_refused():
-    """ "30" for an angle was hardly meant in radians."""
-    with pytest.raises(ParameterError, match=r"ground\.inclination is '30': it must come with its unit"):
-        io.parameters_from({"ground": {"inclination": "30"}}, TABLE_3_1)
-
-
-def test_hertz_is_refused_for_a_speed_because_it_is_ambiguous():
-    with pytest.raises(ParameterError, match="2 pi"):
-        io.quantity("7 Hz", "rad/s", "drive.speed")
-
-
-def test_an_unknown_name_is_told_with_the_nearest():
-    with pytest.raises(UnknownNameError, match=r"slider\.stifness; did you mean slider\.stiffness"):
-        io.parameters_from({"slider": {"stifness": 1.0}}, TABLE_3_1)
+def test_wrong_parameters_are_named(data, error, said):
+    with pytest.raises(error, match=said):
+        parameters_from(data, TABLE_3_1)
 
 
 def test_missing_names_are_listed():
     with pytest.raises(MissingParameterError, match=r"ground\.length is missing.*rocker\.cog_distance"):
-        io.parameters_from({"slider": {"stiffness": 1.0}})
-
-
-def test_wrong_signs_and_numbers_that_are_not_finite_name_the_parameter(tmp_path):
-    for value, name in ((-0.05, "crank.length"), (float("nan"), "slider.mass")):
-        group, leaf = name.split(".")
-        with pytest.raises(ParameterError, match=name.replace(".", r"\.")):
-            io.parameters_from({group: {leaf: value}}, TABLE_3_1)
+        parameters_from({"slider": {"stiffness": 1.0}})
 
 
 @pytest.mark.parametrize(
@@ -107,18 +75,18 @@ def test_files_that_cannot_be_read(tmp_path, name, text, said):
     path = tmp_path / name
     path.write_text(text)
     with pytest.raises(InputError, match=said):
-        io.load_case(path)
+        load_case(path)
 
 
-def test_a_missing_file_is_told(tmp_path):
+def test_a_missing_file_is_reported(tmp_path):
     with pytest.raises(InputError, match="cannot be read"):
-        io.load_parameters(tmp_path / "nowhere.toml")
+        load_parameters(tmp_path / "nowhere.toml")
 
 
 def case(tmp_path, text, **overrides):
     path = tmp_path / "case.toml"
     path.write_text(text)
-    return io.load_case(path, overrides or None)
+    return load_case(path, overrides or None)
 
 
 def test_a_published_case_runs_three_turns_at_its_speed(tmp_path):
@@ -190,7 +158,10 @@ step = "1 ms"
             'published = "table-3.1"\n[drive.torque]\nkind = "torsion-bar"\ntorque = 1\nangle = 2',
             r"drive\.torque\.angle",
         ),
-        ('published = "table-3.1"\n[drive]\nspeed = 1\ntorque = 1', "both speed and torque"),
+        (
+            'published = "table-3.1"\n[drive]\nspeed = 1\ntorque = 1',
+            "drive is .speed, torque.: it must have only one of",
+        ),
         ('published = "table-3.1"\n[run]\nrevolutions = 0', r"run\.revolutions is 0: it must be greater than zero"),
         (
             'published = "table-3.1"\n[run]\nrevolutions = 1\nstop_time = "1 s"',
@@ -201,11 +172,65 @@ step = "1 ms"
         ('published = "table-3.1"\n[force]\nkind = "table"\ntimes = [0, 1]\nvalues = [1]', "as many times as values"),
         ('published = "table-3.1"\n[force]\nkind = "table"\ntimes = [1, 0]\nvalues = [1, 2]', "must increase"),
         ('published = "table-3.1"\n[force]\nkind = "table"\nfile = "no.csv"', "cannot be read as CSV"),
+        ('mechanism = "slider_crank"', "did you mean slider-crank"),
+        ('mechanism = "five-bar"\npublished = "rahman-ideal"', "be that of the published set rahman-ideal"),
+        ('published = "rahman-ideal"\n[axial]\nshift = 1.0', "there is no axial.shift"),
+        ('published = "rahman-ideal"\n[axial]\ngroove = 1', "axial.groove is 1: it must be true or false"),
+        (
+            'published = "rahman-ideal"\n[axial]\ngroove = true',
+            "groove.amplitude is 0.0: it must be given with axial.groove",
+        ),
+        (
+            'published = "rahman-ideal"\n[axial]\nspeed = 0.1\ngroove = true',
+            "axial is 'speed, groove': it must have only one of",
+        ),
+        ('published = "rahman-ideal"\n[initial]\nshift_velocity = 0.1', "come with axial.force"),
+        (
+            'published = "rahman-ideal"\n[load]\nfx = "3 N"',
+            "load is 'fx': it must be a quantity, or a table with a kind",
+        ),
+        ('mechanism = ["slider-crank"]', r"mechanism is \['slider-crank'\]: it must be one of five-bar, slider-crank"),
+        ('published = "rahman-ideal"\n[coupler]\nlength = 1.0', "there is no coupler.length"),
+        ('mechanism = "slider-crank"\n[crank]\nlength = 1.0', "parameter rod.length is missing"),
     ],
 )
-def test_a_wrong_case_is_told_in_a_sentence(tmp_path, text, said):
+def test_a_wrong_case_is_reported_in_a_sentence(tmp_path, text, said):
     with pytest.raises((ParameterError, InputError), match=said):
         case(tmp_path, text)
+
+
+def test_case_file_of_a_slider_crank(tmp_path):
+    text = """
+mechanism = "slider-crank"
+published = "rahman-a4-10-s1-3.5"
+load = { kind = "ramp", start = "0 N", end = "-20 N", from_time = "0 s", to_time = "1 s" }
+
+[guide]
+twist = "280 deg"
+
+[drive]
+torque = "10 N*m"
+
+[axial]
+speed = { kind = "harmonics", amplitudes = ["4 in/s"], frequencies = ["60 rpm"] }
+
+[initial]
+crank_angle = "30 deg"
+
+[run]
+stop_time = "0.5 s"
+"""
+    loaded = case(tmp_path, text)
+    assert loaded.parameters == replace(A4_10.parameters, guide_twist=radians(280.0))
+    assert loaded.initial == replace(A4_10.initial, crank_angle=pi / 6.0)
+    assert loaded.inputs.shift_speed == Harmonics(0.0, [4.0 * 0.0254], [2.0 * pi], [0.0])
+    assert (loaded.inputs.torque, loaded.inputs.speed) == ((10.0,), None)
+    assert isinstance(loaded.inputs.load, Piecewise)
+    run = simulate(loaded.parameters, loaded.inputs, initial=loaded.initial, stop_time=0.5, step=loaded.step)
+    assert run.status == 0
+    grooved = case(tmp_path, text, **{"axial.groove": True, "groove.amplitude": "2 in"})
+    assert grooved.inputs.groove
+    assert grooved.inputs.shift_speed is None
 
 
 def test_overrides_replace_parameters_drive_and_run(tmp_path):
@@ -227,31 +252,9 @@ def test_overrides_replace_parameters_drive_and_run(tmp_path):
 
 
 def test_the_examples_load():
-    from pathlib import Path
-
     examples = sorted((Path(__file__).parents[2] / "examples").glob("*.toml"))
     runs = [path for path in examples if "[task]" not in path.read_text(encoding="utf-8")]
     # those with a task are cases of the synthesis and of the slider's motion, and have their tests
     assert len(runs) >= 2
     for path in runs:
-        assert io.load_case(path).stop_time > 0.0
-
-
-def test_csv_keeps_every_digit_and_its_header(tmp_path):
-    values = np.array([0.1, 1 / 3, 1e-300])
-    path = io.write_csv(tmp_path / "deep" / "x.csv", {"a [m]": values, "b [N]": -values})
-    assert path.read_text().splitlines()[0] == "a [m],b [N]"
-    assert np.array_equal(np.loadtxt(path, delimiter=",", skiprows=1)[:, 0], values)
-    assert not list(tmp_path.rglob("*.part"))
-
-
-def test_csv_columns_of_different_length_are_refused(tmp_path):
-    with pytest.raises(InputError, match="differ in length"):
-        io.write_csv(tmp_path / "x.csv", {"a": [1.0], "b": [1.0, 2.0]})
-
-
-def test_every_parameter_has_its_place_in_a_file():
-    data = io.parameters_to(TABLE_3_1)
-    flat = sum(len(v) if isinstance(v, dict) else 1 for v in data.values())
-    assert flat == len(fields(TABLE_3_1))
-    assert json.loads(json.dumps(data)) == data
+        assert load_case(path).stop_time > 0.0

@@ -1,0 +1,180 @@
+"""Points of a curve from a CSV or SVG file."""
+
+from __future__ import annotations
+
+import re
+from math import isfinite
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from linkwork.errors import InputError
+
+from ..units import INCH, LENGTHS, quantity
+from .paths import ending_of, first_line, read_text
+from .reader import unknown_name
+
+#: Lengths of SVG in m (CSS: an inch has 96 px, 72 pt, 6 pc).
+_CSS = {**LENGTHS, "": INCH / 96, "px": INCH / 96, "pt": INCH / 72, "pc": INCH / 6}
+#: Deviation of the chords from a curve of an SVG file, as a share of the curve's extent.
+_CHORD_ERROR = 1e-4
+
+
+def read_points(
+    path: str | Path, *, unit: str | None = None, name: str | None = None
+) -> tuple[NDArray[np.float64], bool]:
+    """Points of a curve from a CSV or SVG file, as the path's ending says.
+
+    CSV (also ``.txt``): two columns, x and y, between commas, semicolons, tabs or spaces; a header line, empty lines and
+    lines that start with # are passed over. The curve is closed if its last point is its first again, which is then left
+    out.
+
+    SVG: the first path, or without one the first ellipse, circle, polygon, polyline, rectangle or line; ``name`` is the
+    ``id`` of the element, or of a group to take the first one from.
+    Transforms are honoured, and y, which points down in SVG, is turned upwards: a point (x, y) of the user space that the
+    drawing's ``viewBox`` is in comes out at (x, -y). Curves become chords that are within 1e-4 of the curve's extent.
+    The curve is closed if its path says so or ends where it started.
+
+    Parameters
+    ----------
+    path : path
+    unit : str, optional
+        Unit of the file's numbers, such as ``"mm"``. By default m for CSV; an SVG file's own scale (``width`` and
+        ``height`` with ``viewBox``; if it has none, pixels of 1/96 inch).
+    name : str, optional
+        ``id`` of the element or group of an SVG file.
+
+    Returns
+    -------
+    points : ndarray, shape (n, 2)
+        m.
+    closed : bool
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read, or is not of this kind; with the line for CSV.
+    UnknownNameError
+        If nothing in an SVG file has the name.
+    ParameterError
+        If the unit is not one of length.
+    """
+    path = Path(path)
+    ending = ending_of(path, (".csv", ".txt", ".svg"))
+    scale = None if unit is None else quantity(f"1 {unit}", "m", "unit")
+    text = read_text(path)
+    if ending == ".svg":
+        return _svg_points(path, text, scale, name)
+    if name is not None:
+        raise InputError(f"{path.name} has one curve without a name: {name!r} cannot be looked up in it")
+    rows = _two_columns(path, text)
+    closed = len(rows) > 2 and bool((rows[0] == rows[-1]).all())
+    return (1.0 if scale is None else scale) * (rows[:-1] if closed else rows), closed
+
+
+def _two_columns(path: Path, text: str) -> NDArray[np.float64]:
+    rows: list[tuple[float, float]] = []
+    header = False
+    for number, line in enumerate(text.splitlines(), start=1):
+        cells = re.split(r"\s*[,;]\s*|\s+", line.strip())
+        if cells == [""] or line.lstrip().startswith("#"):
+            continue
+        try:
+            x, y = (float(cell) for cell in cells)
+        except ValueError:
+            if not rows and not header and not any(_is_number(cell) for cell in cells):
+                header = True
+                continue
+            raise InputError(f"{path}, line {number}: {line.strip()!r} is not two numbers, x and y") from None
+        if not (isfinite(x) and isfinite(y)):
+            raise InputError(f"{path}, line {number}: {line.strip()!r} is not finite")
+        rows.append((x, y))
+    if not rows:
+        raise InputError(f"{path} has no points: it must have two columns of numbers, x and y")
+    return np.array(rows)
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
+
+
+def _svg_points(path: Path, text: str, scale: float | None, name: str | None) -> tuple[NDArray[np.float64], bool]:
+    from io import StringIO
+    from xml.etree import ElementTree
+
+    import svgelements
+
+    try:
+        root = ElementTree.fromstring(text)
+        drawing = svgelements.SVG.parse(StringIO(text))
+    except (ElementTree.ParseError, ValueError, TypeError, AttributeError, KeyError, IndexError) as error:
+        raise InputError(f"{path} is not valid SVG: {first_line(error)}") from error
+    if not isinstance(drawing, svgelements.SVG):
+        raise InputError(f"{path} is not valid SVG: its outermost element is {root.tag}")
+    metre = _svg_scale(path, root) if scale is None else scale
+    within = [drawing]
+    if name is not None:
+        kinds = (svgelements.Shape, svgelements.Group, svgelements.Use)
+        named = [element for element in drawing.elements() if isinstance(element, kinds) and element.id is not None]
+        within = [element for element in named if element.id == name]
+        if not within:
+            raise unknown_name(name, [str(element.id) for element in named])
+    shapes = [within[0]] if isinstance(within[0], svgelements.Shape) else within[0].select()
+    shapes = [shape for shape in shapes if isinstance(shape, svgelements.Shape)]
+    shapes.sort(key=lambda shape: not isinstance(shape, svgelements.Path))
+    if not shapes:
+        raise InputError(f"{path} has no path")
+    # back from the pixels of the page to the user space; svgelements rounds a millimetre to 3.7795296 px
+    curve = abs(svgelements.Path(shapes[0]) * ~svgelements.Matrix(drawing.viewbox_transform or ""))
+    curves = [part for part in curve.as_subpaths() if any(not isinstance(s, svgelements.Move) for s in part)]
+    if len(curves) != 1:
+        raise InputError(f"{path}: the path {shapes[0].id or ''} has {len(curves)} curves: it must have one")
+    segments = [s for s in curves[0] if not isinstance(s, svgelements.Move)]
+    extent = float(np.ptp(np.vstack([_chords(s, np.inf) for s in segments]), axis=0).max())
+    points = np.vstack([_chords(s, _CHORD_ERROR * extent) for s in segments])
+    # each segment starts where the one before ended, and may have no length, as a Z at the first point
+    points = points[np.append(True, np.hypot(*np.diff(points, axis=0).T) > 1e-9 * extent)]
+    gap = float(np.hypot(*(points[-1] - points[0])))
+    closed = gap <= 1e-9 * extent
+    return (points[:-1] if closed else points) * np.array([metre, -metre]), closed
+
+
+def _chords(segment: Any, allowed: float) -> NDArray[np.float64]:
+    """Points of a segment of an SVG path whose chords are within ``allowed`` of it."""
+    import svgelements
+
+    if isinstance(segment, svgelements.Line | svgelements.Close):
+        return np.array([segment.start, segment.end], dtype=float)
+    n = 8
+    while True:
+        # a chord from each second point to the next; between them the middles
+        points = np.array(segment.npoint(np.linspace(0.0, 1.0, 2 * n + 1)), dtype=float)
+        if n > 2000 or np.hypot(*(points[1::2] - 0.5 * (points[:-1:2] + points[2::2])).T).max() <= allowed:
+            return points[::2]
+        n *= 2
+
+
+def _svg_scale(path: Path, root: Any) -> float:
+    """Metres per user unit of an SVG document."""
+    lengths: list[float | None] = []
+    for key in ("width", "height"):
+        found = re.fullmatch(r"\s*((?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(px|mm|cm|in|pt|pc|)\s*", root.get(key, ""))
+        lengths.append(float(found[1]) * _CSS[found[2]] if found else None)
+    box = root.get("viewBox")
+    if box is None or lengths == [None, None]:
+        return _CSS["px"]
+    numbers = re.split(r"[\s,]+", box.strip())
+    if len(numbers) != 4 or not all(_is_number(n) for n in numbers) or min(float(n) for n in numbers[2:]) <= 0.0:
+        raise InputError(
+            f"{path} has the viewBox {box!r}: it must be four numbers, the width and the height above zero"
+        )
+    scales = [length / float(side) for length, side in zip(lengths, numbers[2:]) if length is not None]
+    if len(scales) == 2 and abs(scales[1] / scales[0] - 1.0) > 1e-6 and root.get("preserveAspectRatio") == "none":
+        raise InputError(f"{path} is stretched: one unit is {scales[0]:.6g} m wide and {scales[1]:.6g} m high")
+    return min(scales)

@@ -1,0 +1,300 @@
+"""Tables of a file read into frozen dataclasses, by what their fields say of units, bounds and choices.
+
+A reader is a function of a value and its dotted name: it returns what the value stands for, or raises a ParameterError that
+names it. `entry` attaches one to a field of a dataclass, and `read` reads a whole table:
+
+>>> @dataclass(frozen=True, slots=True, kw_only=True)
+... class Bar:
+...     length: float = entry(Quantity("m", above=0.0))
+...     holes: int = entry(Whole(least=1), 2)
+>>> read(Bar, {"length": "20 mm"}, "bar")
+Bar(length=0.02, holes=2)
+>>> read(Bar, {"length": "20 mm", "hoels": 3}, "bar")
+Traceback (most recent call last):
+    ...
+linkwork.errors.UnknownNameError: there is no bar.hoels; did you mean bar.holes? (the names are bar.length, bar.holes)
+"""
+
+from __future__ import annotations
+
+import difflib
+import inspect
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import MISSING, dataclass, field, fields, is_dataclass
+from math import inf
+from typing import Any, NamedTuple
+
+from linkwork.errors import MissingParameterError, ParameterError, UnknownNameError
+
+from ..units import quantity
+
+Reader = Callable[[Any, str], Any]
+
+
+def unknown_name(name: str, known: Iterable[str]) -> UnknownNameError:
+    """The error for a name that is not among those known, with the nearest of them."""
+    names = tuple(known)
+    near = difflib.get_close_matches(name, names, n=1)
+    return UnknownNameError(name, names, near[0] if near else None)
+
+
+def entry(reader: Reader, default: Any = MISSING, *, factory: Any = MISSING, key: str = "") -> Any:
+    """A field of a dataclass that `read` fills from a table.
+
+    Parameters
+    ----------
+    reader : callable
+        ``reader(value, name)``.
+    default, factory : optional
+        As of `dataclasses.field`; without either the entry must be in the table.
+    key : str, optional
+        Name in the table, where it is not the field's.
+    """
+    return field(default=default, default_factory=factory, metadata={"reader": reader, "key": key})
+
+
+class _Entry(NamedTuple):
+    field: str
+    read: Reader
+    required: bool
+
+
+def _entries(kind: Callable[..., Any], readers: Mapping[str, Reader], keys: Mapping[str, str]) -> dict[str, _Entry]:
+    """Entries of the tables of a kind, by their name in the table; those without a default are required."""
+    needed = set()
+    if kind is not dict:
+        arguments = inspect.signature(kind).parameters.values()
+        needed = {a.name for a in arguments if a.default is a.empty and a.kind is not a.VAR_KEYWORD}
+    own = {f.name: f.metadata for f in fields(kind) if "reader" in f.metadata} if is_dataclass(kind) else {}
+    named = {name: data["reader"] for name, data in own.items()} | dict(readers)
+    keys = {name: data["key"] for name, data in own.items() if data["key"]} | dict(keys)
+    return {keys.get(name, name): _Entry(name, reader, name in needed) for name, reader in named.items()}
+
+
+def names_of(kind: type) -> tuple[str, ...]:
+    """Names of the entries of a table that is read into a dataclass."""
+    return tuple(_entries(kind, {}, {}))
+
+
+def check_names(table: Mapping[str, Any], name: str, known: Iterable[str]) -> None:
+    """Make sure that a table has no other entries than these.
+
+    Raises
+    ------
+    UnknownNameError
+        For the first that is none of them.
+    """
+    prefix = f"{name}." if name else ""
+    known = tuple(known)
+    for key in table:
+        if key not in known:
+            raise unknown_name(prefix + key, [prefix + k for k in known])
+
+
+def read(
+    kind: Callable[..., Any],
+    value: Any,
+    name: str,
+    *,
+    readers: Mapping[str, Reader] | None = None,
+    keys: Mapping[str, str] | None = None,
+    base: Any = None,
+) -> Any:
+    """An object of a kind from a table.
+
+    Parameters
+    ----------
+    kind : dataclass, function or dict
+    value : mapping
+        The table.
+    name : str
+        Its dotted name; empty for a whole file.
+    readers : mapping, optional
+        Readers by field: of a kind whose fields have none, or in the place of those that they have.
+    keys : mapping, optional
+        Names in the table of fields that are named otherwise there.
+    base : dataclass instance, optional
+        What the table leaves out is taken from.
+
+    Raises
+    ------
+    UnknownNameError, MissingParameterError, ParameterError
+        If an entry is unknown, missing or wrong.
+    """
+    table = table_of(value, name)
+    entries = _entries(kind, readers or {}, keys or {})
+    check_names(table, name, entries)
+    prefix = f"{name}." if name else ""
+    missing = [prefix + key for key, e in entries.items() if e.required and key not in table and base is None]
+    if missing:
+        raise MissingParameterError(missing[0], tuple(missing[1:]))
+    values = {} if base is None else {f.name: getattr(base, f.name) for f in fields(base)}
+    for key in table:
+        if table[key] is None:  # null of JSON
+            raise ParameterError(prefix + key, None, "have a value, or be left out")
+    values |= {e.field: e.read(table[key], prefix + key) for key, e in entries.items() if key in table}
+    return kind(**values)
+
+
+# Readers without options
+
+
+def as_it_is(value: Any, name: str) -> Any:
+    """Anything, to be looked at later."""
+    return value
+
+
+def text(value: Any, name: str) -> str:
+    """A text; a number or a truth value is taken by its name."""
+    if isinstance(value, (list, Mapping)):
+        raise ParameterError(name, value, "be a text")
+    return str(value)
+
+
+def flag(value: Any, name: str) -> bool:
+    """True or false."""
+    if not isinstance(value, bool):
+        raise ParameterError(name, value, "be true or false")
+    return value
+
+
+def table_of(value: Any, name: str) -> Mapping[str, Any]:
+    """A table, whatever is in it."""
+    if not isinstance(value, Mapping):
+        raise ParameterError(name, value, "be a table")
+    return value
+
+
+# Readers with options
+
+
+@dataclass(frozen=True, slots=True)
+class Quantity:
+    """A quantity, in SI; see `analysis.units.quantity`.
+
+    Attributes
+    ----------
+    unit : str
+        SI unit, which says the dimension.
+    above, least, below : float, optional
+        Bounds in SI: greater than, not less than, less than.
+    bare : str, optional
+        Unit of numbers that come without one; by default SI.
+    requirement : str, optional
+        What is said of a number outside of the bounds, where they are not about zero.
+    """
+
+    unit: str
+    above: float = -inf
+    least: float = -inf
+    below: float = inf
+    bare: str | None = None
+    requirement: str = ""
+
+    def __call__(self, value: Any, name: str) -> float:
+        number = quantity(value, self.unit, name, bare=self.bare)
+        if not (number > self.above and self.least <= number < self.below):
+            about_zero = "be greater than zero" if self.above == 0.0 else "be zero or greater"
+            raise ParameterError(name, value, self.requirement or about_zero)
+        return number
+
+
+@dataclass(frozen=True, slots=True)
+class Whole:
+    """A whole number, not less than ``least``."""
+
+    least: int | None = None
+
+    def __call__(self, value: Any, name: str) -> int:
+        if isinstance(value, bool) or not isinstance(value, int):
+            raise ParameterError(name, value, "be a whole number")
+        if self.least is not None and value < self.least:
+            raise ParameterError(name, value, f"be at least {self.least}")
+        return value
+
+
+@dataclass(frozen=True, slots=True)
+class Choice:
+    """One of some texts."""
+
+    names: Iterable[str]
+
+    def __call__(self, value: Any, name: str) -> str:
+        names = tuple(self.names)
+        if not isinstance(value, str):
+            raise ParameterError(name, value, f"be one of {', '.join(names)}")
+        if value not in names:
+            near = difflib.get_close_matches(value, names, n=1)
+            raise UnknownNameError(f"{name} {value!r}", names, near[0] if near else None)
+        return value
+
+
+@dataclass(frozen=True, slots=True)
+class Many:
+    """A list, as a tuple.
+
+    Attributes
+    ----------
+    item : callable
+        Reader of what is in it; each has its number in the name.
+    least, length : int, optional
+        How many there must be.
+    single : bool
+        Whether one alone may stand without a list.
+    """
+
+    item: Reader
+    least: int = 0
+    length: int | None = None
+    single: bool = False
+
+    def __call__(self, value: Any, name: str) -> tuple[Any, ...]:
+        if self.single and not isinstance(value, list):
+            return (self.item(value, name),)
+        if not isinstance(value, list) or self.length not in (None, len(value)):
+            raise ParameterError(name, value, "be a list" if self.length is None else f"be a list of {self.length}")
+        if len(value) < self.least:
+            raise ParameterError(name, value, f"have at least {self.least} entries")
+        return tuple(self.item(v, f"{name}[{k}]") for k, v in enumerate(value))
+
+
+@dataclass(frozen=True, slots=True)
+class Range:
+    """[least, greatest], or one value for both."""
+
+    item: Reader
+    ordered: bool = True
+
+    def __call__(self, value: Any, name: str) -> tuple[Any, Any]:
+        ends = value if isinstance(value, list) else [value, value]
+        if len(ends) != 2:
+            raise ParameterError(name, value, "be one value, or two: [least, greatest]")
+        low, high = (self.item(end, name) for end in ends)
+        if self.ordered and low > high:
+            raise ParameterError(name, value, "be in order: [least, greatest]")
+        return low, high
+
+
+@dataclass(frozen=True, slots=True)
+class Table:
+    """A table inside a table: the arguments of `read`."""
+
+    kind: Callable[..., Any]
+    readers: Mapping[str, Reader] = field(default_factory=dict)
+
+    def __call__(self, value: Any, name: str) -> Any:
+        return read(self.kind, value, name, readers=self.readers)
+
+
+@dataclass(frozen=True, slots=True)
+class Kinds:
+    """A table whose entry ``kind`` says how the rest of it is read."""
+
+    readers: Mapping[str, Reader]
+
+    def __call__(self, value: Any, name: str) -> Any:
+        table = table_of(value, name)
+        if "kind" not in table:
+            raise MissingParameterError(f"{name}.kind")
+        kind = Choice(self.readers)(table["kind"], f"{name}.kind")
+        return self.readers[kind]({key: v for key, v in table.items() if key != "kind"}, name)

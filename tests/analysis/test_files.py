@@ -1,0 +1,200 @@
+"""Quantities with units, the reader of tables, CSV files and arrays."""
+
+from __future__ import annotations
+
+import doctest
+from dataclasses import dataclass
+from math import pi
+from typing import Any
+
+import numpy as np
+import pytest
+
+from analysis.files import (
+    Choice,
+    Kinds,
+    Many,
+    Quantity,
+    Range,
+    Table,
+    Whole,
+    entry,
+    flag,
+    load_array,
+    names_of,
+    overridden,
+    read,
+    read_csv,
+    read_rows,
+    reader,
+    save_array,
+    text,
+    write_csv,
+)
+from analysis.units import quantity, with_unit
+from linkwork.errors import InputError, MissingParameterError, ParameterError, UnknownNameError
+
+
+@pytest.mark.parametrize(
+    ("text", "unit", "value"),
+    [
+        ("15.35 cm", "m", 0.1535),
+        ("2 in", "m", 0.0508),
+        ("420 rpm", "rad/s", 14 * pi),
+        ("1e6 dyn/cm", "N/m", 1000.0),
+        ("3e4 dyn*s/cm", "N.s/m", 30.0),
+        ("12500 g*cm^2", "kg.m2", 1.25e-3),
+        ("30 deg", "rad", pi / 6),
+        ("981 cm/s^2", "m/s2", 9.81),
+        ("1e8 dyn*cm", "N.m", 10.0),
+        ("0.01", "1", 0.01),
+        (0.25, "m", 0.25),
+        (3, "1", 3.0),
+    ],
+)
+def test_quantities_in_their_units(text, unit, value):
+    assert quantity(text, unit, "x") == pytest.approx(value, rel=1e-14)
+
+
+@pytest.mark.parametrize(
+    ("text", "unit"),
+    [
+        ("15 kg", "m"),
+        ("abc", "m"),
+        ("", "m"),
+        ([1.0], "m"),
+        (True, "m"),
+        ("1 furlongg", "m"),
+        (None, "m"),
+        ("inf m", "m"),
+    ],
+)
+def test_a_quantity_of_another_kind_is_refused_by_name(text, unit):
+    with pytest.raises(ParameterError, match=r"crank\.length"):
+        quantity(text, unit, "crank.length")
+
+
+def test_hertz_is_refused_for_a_speed_because_it_is_ambiguous():
+    with pytest.raises(ParameterError, match="2 pi"):
+        quantity("7 Hz", "rad/s", "drive.speed")
+
+
+def test_a_number_without_a_unit_may_be_in_one():
+    assert quantity(20, "m", "x", bare="mm") == 0.02
+    assert quantity("2 cm", "m", "x", bare="mm") == 0.02
+    assert quantity(with_unit(0.1 + 0.2, "N.s/m"), "N.s/m", "x") == 0.1 + 0.2
+
+
+# The reader
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Pin:
+    at: tuple[float, float] = entry(Many(Quantity("m", bare="mm"), length=2))
+    fixed: bool = entry(flag, False)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Bar:
+    length: float = entry(Quantity("m", above=0.0))
+    play: float = entry(Quantity("m", least=0.0), 0.0)
+    begin: float = entry(Quantity("rad", below=7.0, requirement="be below 7"), 0.0, key="from")
+    holes: int = entry(Whole(1), 2)
+    material: str = entry(Choice(("steel", "brass")), "steel")
+    tilt: tuple[float, float] = entry(Range(Quantity("rad")), (0.0, 0.0))
+    pins: tuple[Pin, ...] = entry(Many(Table(Pin), least=1, single=True), ())
+    end: Any = entry(Kinds({"round": Table(dict, {"radius": Quantity("m")}), "flat": Table(dict)}), None)
+    name: str = entry(text, "")
+
+
+def test_a_table_becomes_a_dataclass():
+    table = {
+        "length": "2 cm",
+        "from": "180 deg",
+        "material": "brass",
+        "tilt": 0.5,
+        "pins": {"at": [1, "2 m"]},
+        "end": {"kind": "round", "radius": 1},
+        "name": 7,
+    }
+    end = {"radius": 1.0}
+    made = Bar(
+        length=0.02, begin=pi, material="brass", tilt=(0.5, 0.5), pins=(Pin(at=(0.001, 2.0)),), end=end, name="7"
+    )
+    assert read(Bar, table, "bar") == made
+    assert read(Bar, {"holes": 3}, "bar", base=made).holes == 3
+    assert names_of(Bar)[:3] == ("length", "play", "from")
+
+
+@pytest.mark.parametrize(
+    ("change", "error", "said"),
+    [
+        (3, ParameterError, "bar is 3: it must be a table"),
+        ({"lenght": 1}, UnknownNameError, r"no bar\.lenght; did you mean bar\.length\?"),
+        ({"length": 0}, ParameterError, r"bar\.length is 0: it must be greater than zero"),
+        ({"play": -1}, ParameterError, r"bar\.play is -1: it must be zero or greater"),
+        ({"length": None}, ParameterError, "have a value, or be left out"),
+        ({"from": 8}, ParameterError, "be below 7"),
+        ({"holes": 1.5}, ParameterError, "be a whole number"),
+        ({"holes": True}, ParameterError, "be a whole number"),
+        ({"holes": 0}, ParameterError, "be at least 1"),
+        ({"material": "stele"}, UnknownNameError, r"no bar\.material 'stele'; did you mean steel"),
+        ({"material": 3}, ParameterError, "be one of steel, brass"),
+        ({"tilt": [1, 2, 3]}, ParameterError, "one value, or two"),
+        ({"tilt": [2, 1]}, ParameterError, "be in order"),
+        ({"pins": []}, ParameterError, "have at least 1"),
+        ({"pins": [{"at": 3}]}, ParameterError, r"bar\.pins\[0\]\.at is 3: it must be a list of 2"),
+        ({"pins": [{"at": [1, "x"]}]}, ParameterError, r"bar\.pins\[0\]\.at\[1\] is 'x'"),
+        ({"pins": {}}, MissingParameterError, r"bar\.pins\.at is missing"),
+        ({"pins": {"at": [0, 0], "fixed": "yes"}}, ParameterError, "be true or false"),
+        ({"end": {}}, MissingParameterError, r"bar\.end\.kind is missing"),
+        ({"end": {"kind": "flat", "radius": 1}}, UnknownNameError, r"bar\.end\.radius"),
+        ({"name": []}, ParameterError, "be a text"),
+    ],
+)
+def test_what_a_table_may_not_hold_is_refused_by_name(change, error, said):
+    table = {"length": 1} | change if isinstance(change, dict) else change
+    with pytest.raises(error, match=said):
+        read(Bar, table, "bar")
+
+
+def test_the_example_of_the_reader():
+    assert doctest.testmod(reader).failed == 0
+
+
+def test_values_are_replaced_at_any_depth():
+    data = {"drive": {"speed": 1, "torque": {"kind": "ramp", "end": 2}}, "force": 3}
+    kept = {"drive": {"speed": 1, "torque": {"kind": "ramp", "end": 4}}, "force": 3}
+    assert overridden(data, {"drive.torque.end": 4}) == kept
+    del kept["drive"]["speed"]
+    assert overridden(data, {"drive.torque.end": 4}, exclusive=("drive",)) == kept
+    with pytest.raises(ParameterError, match="force is 3: it must be a table"):
+        overridden(data, {"force.x": 4})
+
+
+# Tables of numbers
+
+
+def test_csv_keeps_every_digit_and_its_header(tmp_path):
+    values = np.array([0.1, 1 / 3, 1e-300])
+    path = write_csv(tmp_path / "deep" / "x.csv", {"a [m]": values, "b [N]": -values})
+    assert path.read_text().splitlines()[0] == "a [m],b [N]"
+    assert np.array_equal(np.loadtxt(path, delimiter=",", skiprows=1)[:, 0], values)
+    assert not list(tmp_path.rglob("*.part"))
+
+
+def test_csv_columns_of_different_length_are_refused(tmp_path):
+    with pytest.raises(InputError, match="differ in length"):
+        write_csv(tmp_path / "x.csv", {"a": [1.0], "b": [1.0, 2.0]})
+
+
+def test_csv_and_arrays_are_read_back(tmp_path):
+    path = write_csv(tmp_path / "x.csv", {"a [m]": [0.1, 2.0], "fx, fy": [1.0, 1 / 3]})
+    assert read_csv(path).tolist() == [[0.1, 1.0], [2.0, 1 / 3]]
+    assert float(read_rows(path)[1]["fx, fy"]) == 1 / 3
+    assert np.array_equal(load_array(save_array(tmp_path / "deep" / "x.npy", [[1.0, 2.0]])), [[1.0, 2.0]])
+    (tmp_path / "y.npy").write_text("x")
+    assert load_array(tmp_path / "y.npy") is load_array(tmp_path / "none.npy") is None
+    for unreadable in (read_csv, read_rows):
+        with pytest.raises(InputError, match="cannot be read"):
+            unreadable(tmp_path / "none.csv")
