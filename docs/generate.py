@@ -361,19 +361,17 @@ def slider_crank_pictures() -> None:
 
     import numpy as np
 
-    from analysis.figures.slider_crank import plot_tolerances
-    from analysis.figures.slider_crank_picture import plot_mechanism, plot_range
+    from analysis import figures
     from analysis.files.io import save_figure
-    from analysis.slider_crank.forces import force_turn
-    from analysis.slider_crank.tolerances import Tolerance, monte_carlo
+    from analysis.slider_crank import Tolerance, force_turn, monte_carlo
     from linkwork.slider_crank.published import CRANK_SPEED, INCH, SETS, parameters
 
     case = SETS["rahman-a4-10-s1-3.5"]
     shift = case.initial.shift_position
-    figure = plot_mechanism(case.parameters, radians(30.0), shift, unit="in", title=case.source)
+    figure = figures.plot(case.parameters, radians(30.0), shift, unit="in", title=case.source)
     save_figure(figure, HERE / "slider-crank.png", dpi=110)
     short = replace(parameters(20.0), rod_length=30.0 * INCH)
-    figure = plot_range(short, unit="in", title="A rod of 30 in at a4 = 20 in, S1 = 0")
+    figure = figures.plot_range(short, unit="in", title="A rod of 30 in at a4 = 20 in, S1 = 0")
     save_figure(figure, HERE / "slider-crank-range.png", dpi=90)
     turn = force_turn(parameters(20.0), crank_speed=CRANK_SPEED, angles=np.linspace(0.0, 2.0 * np.pi, 73))
     names = ("crank.length", "rod.length", "guide.offset", "shift.position")
@@ -381,9 +379,8 @@ def slider_crank_pictures() -> None:
     allowed.append(Tolerance("guide.twist", half_width=radians(0.1)))
     found = monte_carlo(turn, allowed, samples=100_000)
     title = "Lengths within 0.25 mm and the twist within 0.1 deg, a4 = 20 in, S1 = 0"
-    save_figure(
-        plot_tolerances(found.scene(angle=radians(30.0)), title=title), HERE / "slider-crank-tolerances.png", dpi=90
-    )
+    figure = figures.plot(found, angle=radians(30.0), title=title)
+    save_figure(figure, HERE / "slider-crank-tolerances.png", dpi=90)
 
 
 def main(arguments: list[str]) -> int:

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence
 from functools import wraps
+from itertools import repeat
 from pathlib import Path
 from typing import Any
 
 import click
 from rich.console import Console
+from rich.markup import escape
+from rich.table import Table
 
 from linkwork.errors import InputError, Interrupted, LinkworkError
 
@@ -122,3 +125,32 @@ def chosen_case(file: str | None, published: str | None, settings: Sequence[str]
     if overrides:
         return io.case_from({"published": published}, folder=Path.cwd(), title=published, overrides=overrides)
     return published_case(published)
+
+
+def show_table(
+    title: str,
+    headings: Sequence[str],
+    rows: Iterable[Sequence[str]],
+    *,
+    words: Collection[str] = (),
+    styles: Iterable[str | None] = repeat(None),
+) -> None:
+    """Print a table.
+
+    Parameters
+    ----------
+    title : str
+    headings : sequence of str
+        Of the columns; none for a list of names and values.
+    rows : iterable of sequence of str
+    words : collection of str
+        The headings of columns of words, which are aligned to the left; the others are of numbers.
+    styles : iterable of str, optional
+        Of the rows, in rich's terms.
+    """
+    grid = Table(title=escape(title), title_justify="left", show_header=bool(headings))
+    for heading in headings:
+        grid.add_column(escape(heading), justify="left" if heading in words else "right")
+    for row, style in zip(rows, styles):
+        grid.add_row(*(escape(cell) for cell in row), style=style)
+    console.print(grid)

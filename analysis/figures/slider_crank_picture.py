@@ -25,14 +25,15 @@ from matplotlib.figure import Figure
 from matplotlib.patheffects import withStroke
 from numpy.typing import ArrayLike, NDArray
 
-from linkwork.errors import AssemblyError, InputError
+from linkwork.errors import InputError
 from linkwork.slider_crank import kinematics
 from linkwork.slider_crank.parameters import SliderCrankParameters
 from linkwork.slider_crank.plant import check_assembly
 from linkwork.slider_crank.published import INCH
 from linkwork.slider_crank.vectors import Vector
 
-from ..slider_crank.mobility import PeriodicShift, Range, constant_shift, greatest_margin, ranges
+from ..slider_crank import PeriodicShift, Range, assembled_ranges, constant_shift, ranges
+from .dispatch import animate, plot
 from .linkage import COUPLER, CRANK, GROUND, SLIDER, TRACE
 from .style import COLOURS, STYLE, finish
 
@@ -446,6 +447,7 @@ class _Scene:
                 axis.plot(*ends.T, color=label.look.get("color", "black"), linewidth=0.5, zorder=11)
 
 
+@plot.register
 def plot_mechanism(
     parameters: SliderCrankParameters,
     crank_angle: float,
@@ -507,6 +509,7 @@ def _sheet(scene: _Scene, wide: float, *, head: float, foot: float = 0.0) -> tup
     return figure, axis
 
 
+@animate.register
 def animate_mechanism(
     parameters: SliderCrankParameters,
     path: str | Path,
@@ -574,27 +577,6 @@ def animate_mechanism(
                 for artist in (*above.lines, *above.collections):
                     artist.remove()
     return path
-
-
-def assembled_ranges(parameters: SliderCrankParameters, law: PeriodicShift) -> tuple[Range, ...]:
-    """The ranges of crank angles in which the mechanism can be assembled, at least one.
-
-    Raises
-    ------
-    AssemblyError
-        If there is none, with by how much the rod is too short where that is least.
-    """
-    found = ranges(parameters, law)
-    if not found:
-        # the sentence of the nearest there is to an assembly
-        nearest = greatest_margin(parameters, law).crank_angle
-        try:
-            check_assembly(parameters, nearest, law.at(nearest)[0])
-        except AssemblyError as error:
-            raise AssemblyError(
-                f"it cannot be assembled at any crank angle; where it comes nearest to it, {error}"
-            ) from None
-    return found
 
 
 def _slides(axis: Axes, parts: Sequence[_Part], unit: str) -> None:

@@ -13,9 +13,9 @@ from hypothesis import strategies as st
 from matplotlib.collections import PolyCollection
 from PIL import Image
 
+from analysis.figures import animate_mechanism, plot_mechanism, plot_range
 from analysis.figures import slider_crank_picture as pictures
-from analysis.figures.slider_crank_picture import animate_mechanism, plot_mechanism, plot_range
-from analysis.slider_crank.mobility import constant_shift, groove_shift
+from analysis.slider_crank import constant_shift, groove_shift
 from linkwork.errors import AssemblyError, InputError
 from linkwork.slider_crank.published import INCH, parameters
 from tests import published_rahman as rahman
