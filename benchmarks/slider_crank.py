@@ -23,10 +23,7 @@ import build_fmu
 from analysis import simulate
 from analysis.run import compiled
 from analysis.run.inputs import SliderCrankInputs
-from analysis.slider_crank.closure import close
-from analysis.slider_crank.dual_dynamics import joint_loads
-from analysis.slider_crank.forces import ConstantShift, force_turn
-from analysis.slider_crank.tolerances import QUANTITIES, Tolerance, monte_carlo
+from analysis.slider_crank import QUANTITIES, ConstantShift, Tolerance, close, force_turn, joint_loads, monte_carlo
 from benchmarks.engines import ACCURACY
 from benchmarks.fmu import STEP, seconds_per_step
 from benchmarks.solvers import SCIPY_METHODS, TOLERANCES, best_time

@@ -13,6 +13,11 @@ from .dispatch import plot as plot
 from .linkage import animate_linkage as animate_linkage
 from .linkage import draw_linkage as draw_linkage
 from .response import plot_branches as plot_branches
+from .slider_crank import plot_forces as plot_forces
+from .slider_crank import plot_tolerances as plot_tolerances
+from .slider_crank_picture import animate_mechanism as animate_mechanism
+from .slider_crank_picture import plot_mechanism as plot_mechanism
+from .slider_crank_picture import plot_range as plot_range
 from .style import COLOURS as COLOURS
 from .style import STYLE as STYLE
 from .style import Figure as Figure

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
 from math import erf, isfinite, sqrt
 from textwrap import fill
+from typing import Any
 
 import matplotlib
 import numpy as np
@@ -16,189 +16,136 @@ from numpy.typing import NDArray
 
 from linkwork.errors import InputError
 
+from ..slider_crank import JOINTS, QUANTITIES, SLIDER_FORCE, SYMBOLS, ForceTurn, MonteCarlo, unit_table
 from .curves import Curve, Panel, plot_curves
+from .dispatch import plot
 from .style import COLOURS, STYLE, finish
 
 FloatArray = NDArray[np.float64]
 
-#: Units in which departures are shown, and how many of them one of SI is.
-_SHOWN = {"m": ("mm", 1e3), "m/s": ("mm/s", 1e3)}
+#: Units in which departures are shown where everything else is in SI, and their values in SI.
+_SHOWN = {"m": ("mm", 1e-3), "m/s": ("mm/s", 1e-3)}
 _LINEAR, _SAMPLES, _SECOND, _WORST = COLOURS[0], COLOURS[1], COLOURS[2], "0.45"
 #: Greatest and middle departures over the turn: where their ratio is above this, the axis is cut at a multiple of the latter.
 _PEAK, _CUT = 12.0, 4.0
 #: Difference of shares to first and second order below which the latter are not drawn.
-_TOLD = 0.02
+_SAME_SHARE = 0.02
 #: Letters in a line of the foot.
 _LINE = 140
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class ForcePanel:
-    """Curves (n,) over the crank angle by their labels, in one unit, NaN where undetermined.
-
-    ``grows`` says whether they grow without bound towards a pole or a limit of assembly.
-    """
-
-    title: str
-    unit: str
-    curves: Mapping[str, FloatArray]
-    grows: bool
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class ForceScene:
-    """Motion, forces and moments over the turn.
-
-    Attributes
-    ----------
-    angle : ndarray, shape (n,)
-        Crank angles (rad).
-    panels : sequence of ForcePanel
-    clear : ndarray of bool, shape (n,)
-        Angles at which nothing is near growing without bound: what the axes are scaled to.
-    breaks : tuple of int
-        Number of each angle between which and the next the mechanism cannot be assembled: a gap in every curve.
-    poles : tuple of int
-        Numbers of the angles nearest to a pole, across which what grows has no curve.
-    marks : mapping
-        Crank angles (rad) that are marked, by what they are marked with.
-    """
-
-    angle: FloatArray
-    panels: Sequence[ForcePanel]
-    clear: NDArray[np.bool_]
-    breaks: tuple[int, ...] = ()
-    poles: tuple[int, ...] = ()
-    marks: Mapping[str, float] = field(default_factory=dict)
-
-
-def plot_forces(scene: ForceScene, *, title: str) -> Figure:
-    """Plot forces and moments over the crank angle, one pair of axes for each panel.
+@plot.register
+def plot_forces(turn: ForceTurn, frame: int = 1, *, units: str = "SI", title: str = "") -> Figure:
+    """Plot motion, torque and joint forces over the crank angle, by components in a frame.
 
     Curves leave their axes towards poles and limits of assembly, and have gaps where there is no mechanism.
-    """
-    turn = np.degrees(scene.angle)
-    angle = _broken(turn, scene.breaks, turn)
-    panels = []
-    for panel in scene.panels:
-        curves, shown = [], []
-        for label, given in panel.curves.items():
-            values = np.array(given)
-            shown.append(values[np.isfinite(values) & (scene.clear | (not panel.grows))])
-            # from one side of a pole to the other a curve changes its sign
-            values[list(scene.poles) if panel.grows else []] = np.nan
-            curves.append(Curve(x=angle, y=_broken(values, scene.breaks), label=label))
-        inside = np.concatenate(shown)
-        limits = None
-        if len(inside):
-            low, high = float(inside.min()), float(inside.max())
-            room = 0.08 * (high - low) or 0.08 * abs(high) or 1.0
-            limits = low - room, high + room
-        panels.append(
-            Panel(
-                x_label="crank angle [deg]",
-                y_label=f"[{panel.unit}]",
-                curves=curves,
-                verticals={text: float(np.degrees(place)) for text, place in scene.marks.items()},
-                title=panel.title,
-                y_range=limits,
-                x_ticks=[60.0 * n for n in range(7)],
-                legend_at="outside",
-            )
-        )
-    return plot_curves(panels, title=title, columns=2, size=(5.2, 2.5))
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class ToleranceScene:
-    """What tolerances do to one quantity over the turn, and at one angle of it; SI and radians, NaN where undetermined.
-
-    Attributes
-    ----------
-    quantity, unit : str
-        By its FMI name.
-    angle : ndarray, shape (n,)
-        Crank angles.
-    deviation, worst : ndarray, shape (n,)
-        Linear estimates: standard deviation, greatest departure.
-    departures : ndarray, shape (p, n)
-        Percentiles of the samples less the nominal value, those of a normal distribution at -3, -2, 0, 2, 3 standard
-        deviations.
-    mean : ndarray, shape (n,)
-        Mean of the samples less the nominal value.
-    at : int
-        Number of the angle of histogram and shares.
-    nominal : float
-        Value there.
-    edges, counts : ndarray, shapes (b + 1,) and (b,)
-        Histogram of the samples less the nominal value; it need not hold all of them.
-    sample_deviation, second_deviation : float
-        Standard deviation of the samples, and estimated to second order.
-    shares : mapping
-        Of each tolerance, by its label, in the variance to first and to second order; NaN where that is zero.
-    samples, not_assembled : int
-        Samples, and the most at any angle that cannot be assembled.
-    singular : tuple of float
-        Crank angles at which the quantity has a pole.
-    breaks : tuple of int
-        Number of each angle between which and the next the mechanism cannot be assembled: a gap in every curve.
-    notes : tuple of str
-        Sentences for the foot of the figure.
-    """
-
-    quantity: str
-    unit: str
-    angle: FloatArray
-    deviation: FloatArray
-    worst: FloatArray
-    departures: FloatArray
-    mean: FloatArray
-    at: int
-    nominal: float
-    edges: FloatArray
-    counts: NDArray[np.int64]
-    sample_deviation: float
-    second_deviation: float
-    shares: Mapping[str, tuple[float, float]]
-    samples: int
-    not_assembled: int
-    singular: tuple[float, ...] = ()
-    breaks: tuple[int, ...] = ()
-    notes: tuple[str, ...] = ()
-
-
-def plot_tolerances(scene: ToleranceScene, *, title: str = "", shown: tuple[str, float] | None = None) -> Figure:
-    """Plot the band of errors over the turn, the samples at one angle, and which tolerance contributes how much there.
-
-    Above, the linear estimate (filled to three standard deviations, dashed the worst case of the signs) and percentiles of the
-    samples; below, the histogram of the samples beside the normal distribution of the linear estimate, and shares in the
-    variance. The foot tells what a reader must know of it: samples that cannot be assembled, where the estimate is off.
 
     Parameters
     ----------
-    scene : ToleranceScene
-        Of `analysis.slider_crank.tolerances.MonteCarlo.scene`.
+    turn : ForceTurn
+    frame : int
+        1 ground, 2 crank, 3 rod, 4 guide.
+    units : str
+        One of `analysis.slider_crank.UNITS`.
     title : str
-    shown : (str, float), optional
-        Unit of the figure and how many of it one of SI is, such as ("in", 1 / 0.0254); by default mm, mm/s, and SI for all
-        else.
 
     Raises
     ------
     InputError
-        If there are fewer than two angles.
+        If there are no such frame or units.
     """
-    if len(scene.angle) < 2:
-        raise InputError(f"a band over the turn needs two angles at least, not {len(scene.angle)}")
-    unit, factor = shown or _SHOWN.get(scene.unit, (scene.unit, 1.0))
-    name = scene.quantity.replace(".", " ").replace("_", " ")
-    lost = (
-        f"at worst {scene.not_assembled / scene.samples:.2%} of them cannot be assembled, and are left out"
-        if scene.not_assembled
-        else "all can be assembled"
+    contents: list[tuple[str, str, Mapping[str, Any]]] = [
+        ("slider position S4", "m", {"": turn.slider_position}),
+        ("crank torque", "N.m", {"": turn.torque}),
+        ("slider force, along -k4", "N", {"": turn.slider_force}),
+        ("axial force on the crank", "N", {"": turn.axial_force}),
+    ]
+    for name, joint in JOINTS.items():
+        components = {f"{axis}{frame}": values for axis, values in zip("ijk", turn.vector(name, frame).T)}
+        contents.append((joint.words, joint.unit, components))
+    known = unit_table(units)
+    panels = [_force_panel(turn, name, si, *known[si], curves) for name, si, curves in contents]
+    return plot_curves(panels, title=title, columns=2, size=(5.2, 2.5))
+
+
+def _force_panel(turn: ForceTurn, title: str, si: str, unit: str, one: float, components: Mapping[str, Any]) -> Panel:
+    """Curves over the turn by their labels, in a unit of the value ``one`` in SI."""
+    angle = np.degrees(turn.angle)
+    grows = si != "m"
+    poles = turn.singularities if grows and turn.sought == SLIDER_FORCE else ()
+    curves, inside = [], []
+    for label, given in components.items():
+        values = np.array(np.ma.filled(given, np.nan)) / one
+        inside.append(values[np.isfinite(values) & (turn.clear() | (not grows))])
+        # from one side of a pole to the other a curve changes its sign
+        values[[int(np.argmin(np.abs(turn.angle - place.crank_angle))) for place in poles]] = np.nan
+        curves.append(Curve(x=_broken(angle, turn.breaks, angle), y=_broken(values, turn.breaks), label=label))
+    limits = None
+    if np.concatenate(inside).size:
+        low, high = float(np.concatenate(inside).min()), float(np.concatenate(inside).max())
+        room = 0.08 * (high - low) or 0.08 * abs(high) or 1.0
+        limits = low - room, high + room
+    marks = {f"dead centre {np.degrees(d.crank_angle):.1f}°": d.crank_angle for d in turn.dead_centres}
+    marks |= {f"limit {np.degrees(end):.1f}°": end for end in turn.limits}
+    return Panel(
+        x_label="crank angle [deg]",
+        y_label=f"[{unit}]",
+        curves=curves,
+        verticals={text: float(np.degrees(place)) for text, place in marks.items()},
+        title=title,
+        y_range=limits,
+        x_ticks=[60.0 * n for n in range(7)],
+        legend_at="outside",
     )
-    foot = [f"{scene.samples:,} samples at each angle; {lost}.", *(f"{note}." for note in scene.notes)]
-    lines = "\n".join(fill(note[0].upper() + note[1:], _LINE, subsequent_indent="    ") for note in foot)
+
+
+@plot.register
+def plot_tolerances(
+    found: MonteCarlo,
+    quantity: str = "slider.position",
+    angle: float = 0.0,
+    *,
+    units: str = "SI",
+    title: str = "",
+) -> Figure:
+    """Plot the band of errors over the turn, the samples at one angle, and which tolerance contributes how much there.
+
+    Above, the linear estimate (filled to three standard deviations, dashed the worst case of the signs) and percentiles of the
+    samples; below, the histogram of the samples beside the normal distribution of the linear estimate, and shares in the
+    variance. The foot says what a reader must know of it: samples that cannot be assembled, where the estimate is off.
+
+    Parameters
+    ----------
+    found : MonteCarlo
+    quantity : str
+        One that was sampled.
+    angle : float
+        Crank angle (rad) of histogram and shares; the nearest there is.
+    units : str
+        One of `analysis.slider_crank.UNITS`. With "SI" lengths are shown in mm.
+    title : str
+
+    Raises
+    ------
+    ParameterError
+        If the quantity was not sampled.
+    InputError
+        If it is not determined at that angle, if there are fewer than two angles, or if there are no such units.
+    """
+    turn = found.turn
+    if len(turn) < 2:
+        raise InputError(f"a band over the turn needs two angles at least, not {len(turn)}")
+    at = found.place(quantity, angle)
+    si = QUANTITIES[quantity]
+    unit, one = unit_table(units)[si]
+    if units == "SI":
+        unit, one = _SHOWN.get(si, (unit, one))
+    name = quantity.replace(".", " ").replace("_", " ")
+    most = int(found.not_assembled.max())
+    lost = f"at worst {most / found.samples:.2%} of them cannot be assembled, and are left out"
+    foot = [f"{found.samples:,} samples at each angle; {lost if most else 'all can be assembled'}."]
+    foot += [f"{note[0].upper()}{note[1:]}." for note in found.notes(units)]
+    lines = "\n".join(fill(note, _LINE, subsequent_indent="    ") for note in foot)
     with matplotlib.rc_context(STYLE):
         figure = Figure(figsize=(9.6, 7.0 + 0.16 * lines.count("\n")))
         above, below = np.ravel(
@@ -206,51 +153,53 @@ def plot_tolerances(scene: ToleranceScene, *, title: str = "", shown: tuple[str,
         )
         band = above.subplots()
         histogram, bars = below.subplots(1, 2, width_ratios=(3, 2))
-        _draw_band(band, scene, f"error of {name} [{unit}]", factor)
-        _draw_histogram(histogram, scene, f"error of {name} [{unit}]", factor, unit)
-        _draw_shares(bars, scene)
+        _draw_band(band, found, quantity, at, one)
+        _draw_histogram(histogram, found, quantity, at, unit, one)
+        band.set_ylabel(f"error of {name} [{unit}]")
+        histogram.set_xlabel(f"error of {name} [{unit}]")
+        _draw_shares(bars, found, quantity, at)
         below.supxlabel(lines, fontsize=8, x=0.02, ha="left", color="0.25")
         figure.suptitle(fill(title or f"Tolerances: {name}", 110), fontsize=10.5, fontweight="bold")
         return finish(figure)
 
 
-def _draw_band(axis: Axes, scene: ToleranceScene, label: str, factor: float) -> None:
-    turn = np.degrees(scene.angle)
-    whole = _broken(turn, scene.breaks, turn)
+def _draw_band(axis: Axes, found: MonteCarlo, quantity: str, at: int, one: float) -> None:
+    turn, spread, linear = found.turn, found.spreads[quantity], found.estimates[quantity]
+    angle = np.degrees(turn.angle)
+    whole = _broken(angle, turn.breaks, angle)
 
-    def curve(values: FloatArray) -> FloatArray:
-        return _broken(values * factor, scene.breaks)
+    def curve(values: Any) -> FloatArray:
+        return _broken(np.ma.filled(values, np.nan) / one, turn.breaks)
 
-    three = curve(3.0 * scene.deviation)
+    three = curve(3.0 * linear.deviation)
     axis.fill_between(whole, -three, three, color=_LINEAR, alpha=0.18, linewidth=0.0, label=r"linear, $\pm 3\,\sigma$")
-    for sign in (1.0, -1.0):
-        axis.plot(
-            whole,
-            curve(sign * scene.worst),
-            "--",
-            color=_WORST,
-            linewidth=1.0,
-            label="linear, worst case" * (sign > 0.0),
-        )
-    low, lower, _, upper, high = (curve(row) for row in scene.departures)
-    axis.plot(whole, high, color=_SAMPLES, label="samples, 0.135 % and 99.865 %")
-    axis.plot(whole, low, color=_SAMPLES)
-    axis.plot(whole, upper, color=_SAMPLES, linewidth=0.8, alpha=0.7, label="samples, 2.3 % and 97.7 %")
-    axis.plot(whole, lower, color=_SAMPLES, linewidth=0.8, alpha=0.7)
-    axis.plot(whole, curve(scene.mean), ":", color="black", linewidth=1.2, label="mean of the samples")
-    axis.axvline(turn[scene.at], color="0.35", linewidth=0.9, linestyle="-.")
-    for angle in np.degrees(scene.singular):
-        axis.axvline(angle, color="0.35", linewidth=0.9, linestyle=":")
+    low, lower, _, upper, high = spread.percentiles - linear.nominal
+    dashed: dict[str, Any] = {"color": _WORST, "linewidth": 1.0, "linestyle": "--"}
+    thin: dict[str, Any] = {"color": _SAMPLES, "linewidth": 0.8, "alpha": 0.7}
+    mean: dict[str, Any] = {"color": "black", "linewidth": 1.2, "linestyle": ":"}
+    for values, look, label in (
+        (linear.worst, dashed, "linear, worst case"),
+        (-linear.worst, dashed, None),
+        (high, {"color": _SAMPLES}, "samples, 0.135 % and 99.865 %"),
+        (low, {"color": _SAMPLES}, None),
+        (upper, thin, "samples, 2.3 % and 97.7 %"),
+        (lower, thin, None),
+        (spread.mean - linear.nominal, mean, "mean of the samples"),
+    ):
+        axis.plot(whole, curve(values), label=label, **look)
+    axis.axvline(angle[at], color="0.35", linewidth=0.9, linestyle="-.")
+    for pole in found.poles(quantity):
+        axis.axvline(np.degrees(pole), color="0.35", linewidth=0.9, linestyle=":")
     # of what is not NaN, if anything
-    reach = np.fmax.reduce(np.abs(np.vstack([scene.departures, scene.worst])), axis=0) * factor
+    departures = [low, lower, upper, high, linear.worst]
+    reach = np.fmax.reduce([np.abs(np.ma.filled(values, np.nan)) for values in departures], axis=0) / one
     middle = float(np.nanmedian(reach))
     cut = float(np.nanmax(reach)) > _PEAK * middle > 0.0
     if cut:
         axis.set_ylim(-_CUT * middle, _CUT * middle)
-    axis.set_xlim(turn.min(), turn.max())
-    axis.xaxis.set_major_locator(MultipleLocator(30.0 if np.ptp(turn) > 120.0 else 10.0))
+    axis.set_xlim(angle.min(), angle.max())
+    axis.xaxis.set_major_locator(MultipleLocator(30.0 if np.ptp(angle) > 120.0 else 10.0))
     axis.set_xlabel("crank angle [deg]" + " (dotted: dead centres, cut off)" * cut)
-    axis.set_ylabel(label)
     axis.legend(fontsize=8, loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=5, borderaxespad=0.2, columnspacing=1.2)
 
 
@@ -260,12 +209,16 @@ def _broken(values: FloatArray, breaks: Sequence[int], fill: FloatArray | None =
     return np.insert(values, after, np.nan if fill is None else fill[after])
 
 
-def _draw_histogram(axis: Axes, scene: ToleranceScene, label: str, factor: float, unit: str) -> None:
-    edges = scene.edges * factor
+def _draw_histogram(axis: Axes, found: MonteCarlo, quantity: str, at: int, unit: str, one: float) -> None:
+    spread, linear = found.spreads[quantity], found.estimates[quantity]
+    nominal = float(linear.nominal[at])
+    edges = (spread.edges[at] - nominal) / one
     width = edges[1] - edges[0]
-    share = scene.counts / scene.samples
+    share = spread.counts[at] / found.samples
     axis.stairs(share, edges, fill=True, color=_SAMPLES, alpha=0.35, label="samples")
-    deviation = float(scene.deviation[scene.at]) * factor
+    deviation, of_samples, second = (
+        float(np.ma.filled(x[at], np.nan)) / one for x in (linear.deviation, spread.deviation, linear.second_deviation)
+    )
     # narrower than a bin it is a line
     if deviation > width:
         fine = np.linspace(edges[0], edges[-1], 400)
@@ -277,53 +230,48 @@ def _draw_histogram(axis: Axes, scene: ToleranceScene, label: str, factor: float
                 axis.text(place, 0.6, r"$3\,\sigma$", transform=axis.get_xaxis_transform(), ha="center", fontsize=8)
     elif isfinite(deviation):
         axis.axvline(0.0, ymax=0.72, color=_LINEAR, linewidth=2.0, label="linear estimate: no spread")
-    told = [
-        f"$\\sigma$ {what} {_figure(value * factor)} {unit}"
-        for what, value in (
-            ("of the samples", scene.sample_deviation),
-            ("linear", deviation / factor),
-            ("to second order", scene.second_deviation),
-        )
-        if isfinite(value)
-    ]
-    axis.set_xlabel(label)
+    sigmas = {"of the samples": of_samples, "linear": deviation, "to second order": second}
+    lines = [f"$\\sigma$ {what} {_figure(x)} {unit}" for what, x in sigmas.items() if isfinite(x)]
     axis.set_ylabel("share of the samples")
     axis.yaxis.set_major_formatter(PercentFormatter(1.0))
     axis.set_xlim(edges[0], edges[-1])
     axis.set_ylim(0.0, 1.5 * float(share.max()))
     axis.set_title(
-        f"at {np.degrees(scene.angle[scene.at]):.4g} deg, nominal {_figure(scene.nominal * factor, 6)} {unit}; "
-        f"{scene.counts.sum() / scene.samples:.1%} of the samples",
+        f"at {np.degrees(found.turn.angle[at]):.4g} deg, nominal {_figure(nominal / one, 6)} {unit}; "
+        f"{spread.counts[at].sum() / found.samples:.1%} of the samples",
         fontsize=9,
     )
     axis.legend(fontsize=8, loc="upper left")
-    axis.text(0.985, 0.97, "\n".join(told), transform=axis.transAxes, ha="right", va="top", fontsize=8)
+    axis.text(0.985, 0.97, "\n".join(lines), transform=axis.transAxes, ha="right", va="top", fontsize=8)
 
 
-def _draw_shares(axis: Axes, scene: ToleranceScene) -> None:
-    ordered = sorted(scene.shares.items(), key=lambda item: item[1][1] if isfinite(item[1][1]) else item[1][0])
-    names, shares = [name for name, _ in ordered], np.array([both for _, both in ordered])
-    linear, second = (bool(np.isfinite(column).all()) for column in shares.T)
+def _draw_shares(axis: Axes, found: MonteCarlo, quantity: str, at: int) -> None:
+    estimate = found.estimates[quantity]
+    both = np.ma.column_stack([estimate.shares[:, at], estimate.second_shares[:, at]]).filled(np.nan)
+    linear, second = (bool(np.isfinite(column).all()) for column in both.T)
+    order = np.argsort(both[:, 1] if second else both[:, 0], kind="stable")
+    shares = both[order]
+    names = [found.tolerances[i].name for i in order]
     # the second order is drawn where it says something else
-    second = second and not (linear and np.abs(shares[:, 1] - shares[:, 0]).max() < _TOLD)
+    second = second and not (linear and np.abs(shares[:, 1] - shares[:, 0]).max() < _SAME_SHARE)
     orders = [(0, _LINEAR, "linear")] * linear + [(1, _SECOND, "to second order")] * second
     axis.set_title("share in the variance" + ", linear" * (not second), fontsize=9)
     if not orders:
         none = "no variance to first or second order"
-        if not isfinite(scene.deviation[scene.at]):
+        if np.ma.getmaskarray(estimate.deviation)[at]:
             none = "no variance: a dead centre is within the tolerances"
         axis.text(0.5, 0.5, none, ha="center", va="center", fontsize=9)
         axis.set_axis_off()
         return
     height = 0.66 / len(orders)
     for number, (column, colour, label) in enumerate(orders):
-        for place, share in enumerate(shares[:, column].tolist()):
-            at = place + height * (0.5 * (len(orders) - 1) - number)
-            axis.barh(at, share, color=colour, alpha=0.8, height=height, label=label if place == 0 else None)
-            axis.text(share + 0.015, at, f"{share:.1%}" if share >= 5e-4 else "< 0.1%", va="center", fontsize=8)
+        places = np.arange(len(names)) + height * (0.5 * (len(orders) - 1) - number)
+        bars = axis.barh(places, shares[:, column], color=colour, alpha=0.8, height=height, label=label)
+        labels = [f"{share:.1%}" if share >= 5e-4 else "< 0.1%" for share in shares[:, column]]
+        axis.bar_label(bars, labels, padding=3, fontsize=8)
     if second:
         axis.legend(fontsize=8, loc="lower right")
-    axis.set_yticks(np.arange(len(names)), names)
+    axis.set_yticks(np.arange(len(names)), [f"{name} ${SYMBOLS[name]}$" if name in SYMBOLS else name for name in names])
     axis.set_xlim(0.0, 1.22 * float(np.nanmax(shares)))
     axis.xaxis.set_major_formatter(PercentFormatter(1.0, decimals=0))
     axis.grid(visible=False, axis="y")

@@ -1,39 +1,42 @@
 """Pictures of the generalised slider-crank: in space, moving, and its range of assembly.
 
 The mechanism is seen in orthographic projection with the common normal of crank axis and guide upright. Solids are faces
-that are painted from back to front; centre lines, paths and frames are lines under or over them. Letters look for a free
-place of their own, so that they can be read for any dimensions.
+that are painted from back to front; centre lines, paths and frames are lines under or over them. Letters are put where there
+is room for them, so that they can be read for any dimensions.
+
+Matplotlib's mplot3d would paint the faces as well, if all are in one collection, but it leaves wide margins round its cube:
+to fill the sheet, and to place letters, points must be projected here all the same, and that is all the projection there is.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
-from itertools import pairwise
+from dataclasses import dataclass
 from math import ceil, cos, degrees, isfinite, pi, radians, sin
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import Any, NamedTuple, TypeAlias
 
 import matplotlib
 import numpy as np
-from linkwork.slider_crank.plant import check_assembly
+import textalloc
 from matplotlib.animation import PillowWriter
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.collections import PolyCollection
-from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from matplotlib.patheffects import withStroke
 from numpy.typing import ArrayLike, NDArray
 
-from linkwork.errors import AssemblyError, InputError
+from linkwork.errors import InputError
 from linkwork.slider_crank import kinematics
 from linkwork.slider_crank.parameters import SliderCrankParameters
+from linkwork.slider_crank.plant import check_assembly
 from linkwork.slider_crank.published import INCH
 from linkwork.slider_crank.vectors import Vector
 
-from ..slider_crank.mobility import PeriodicShift, Range, constant_shift, greatest_margin, ranges
+from ..slider_crank import PeriodicShift, Range, assembled_ranges, constant_shift, ranges
+from .dispatch import animate, plot
 from .linkage import COUPLER, CRANK, GROUND, SLIDER, TRACE
+from .solids import ball, box, paint, tube
 from .style import COLOURS, STYLE, finish
 
 FloatArray: TypeAlias = NDArray[np.float64]
@@ -42,8 +45,6 @@ FloatArray: TypeAlias = NDArray[np.float64]
 UNITS = {"mm": 1e3, "cm": 1e2, "m": 1.0, "in": 1.0 / INCH}
 #: Elevation and azimuth (deg) in which shift, offset and twist are all seen, the slider to the right of the crank.
 VIEW = (22.0, -112.0)
-#: Towards the light, along right, up and towards of the view.
-_LIGHT = np.array([-0.25, 0.75, 0.61])
 #: Crank angles of a full turn at which paths and curves are computed.
 _POINTS = 361
 #: How far inside its ends a range is drawn (rad): at the ends the square root may be of a negative number by rounding.
@@ -116,66 +117,19 @@ class _Part:
         self.dead = [_pose(parameters, d.crank_angle, d.shift, factor) for d in part.dead_centres]
         self.limits = [self.poses[0], self.poses[-1]] if not part.full(law.span) else []
 
-
-# Solids: faces of four corners, shape (n, 4, 3), in the ground frame, anticlockwise from outside
-
-
-def _tube(start: FloatArray, end: FloatArray, radius: float, *, pieces: int = 1, sides: int = 16) -> FloatArray:
-    """A cylinder with closed ends; in pieces along its length, each painted at its own depth."""
-    way = (end - start) / np.linalg.norm(end - start)
-    first = np.cross(way, np.eye(3)[np.argmin(np.abs(way))])
-    first /= np.linalg.norm(first)
-    turn = np.linspace(0.0, 2.0 * pi, sides + 1)[:, None]
-    ring = radius * (np.cos(turn) * first + np.sin(turn) * np.cross(way, first))
-    stations = [start + share * (end - start) for share in np.linspace(0.0, 1.0, pieces + 1)]
-    faces = [
-        np.stack([near + ring[:-1], near + ring[1:], far + ring[1:], far + ring[:-1]], axis=1)
-        for near, far in pairwise(stations)
-    ]
-    for place, rim in ((start, ring[::-1]), (end, ring)):
-        middle = np.broadcast_to(place, rim[:-1].shape)
-        faces.append(np.stack([middle, place + rim[:-1], place + rim[1:], middle], axis=1))
-    return np.concatenate(faces)
+    @property
+    def marks(self) -> tuple[tuple[Sequence[_Pose], str, str, str], ...]:
+        """Places that are marked, what they are called, their colour and marker."""
+        return (self.dead, "dead centre", _DEAD, "D"), (self.limits, "limit", _LIMIT, "s")
 
 
-def _ball(centre: FloatArray, radius: float, *, sides: int = 20) -> FloatArray:
-    """A sphere."""
-    turn, rise = np.meshgrid(
-        np.linspace(0.0, 2.0 * pi, sides + 1), np.linspace(-0.5 * pi, 0.5 * pi, sides // 2 + 1), indexing="ij"
-    )
-    points = centre + radius * np.stack([np.cos(rise) * np.cos(turn), np.cos(rise) * np.sin(turn), np.sin(rise)], -1)
-    corners = (points[:-1, :-1], points[1:, :-1], points[1:, 1:], points[:-1, 1:])
-    return np.stack(corners, axis=2).reshape(-1, 4, 3)
-
-
-def _box(low: ArrayLike, high: ArrayLike, rows: FloatArray, origin: FloatArray, *, pieces: int = 1) -> FloatArray:
-    """A box between corners given along the rows, right-handed, from an origin; in pieces along the first of them."""
-    low, high = np.asarray(low, dtype=float), np.asarray(high, dtype=float)
-    faces = []
-    cuts = np.linspace(low[0], high[0], pieces + 1)
-    for number, (start, end) in enumerate(pairwise(cuts)):
-        ends = np.array([[start, low[1], low[2]], [end, high[1], high[2]]])
-        for axis in range(3):
-            u, v = (axis + 1) % 3, (axis + 2) % 3
-            for side, order in ((0, ((0, 0), (0, 1), (1, 1), (1, 0))), (1, ((0, 0), (1, 0), (1, 1), (0, 1)))):
-                if axis == 0 and number != (pieces - 1) * side:
-                    continue
-                corners = np.empty((4, 3))
-                corners[:, axis] = ends[side, axis]
-                for corner, (i, j) in zip(corners, order):
-                    corner[u], corner[v] = ends[i, u], ends[j, v]
-                faces.append(corners @ rows + origin)
-    return np.array(faces)
-
-
-@dataclass(frozen=True, slots=True)
-class _Label:
-    """A text that is to stand near a point, on one of the sides named first if it can: angles on the page (deg)."""
+class _Label(NamedTuple):
+    """A text that is to stand near a point in space."""
 
     point: FloatArray
     text: str
-    sides: tuple[float, ...] = (90.0, 270.0, 0.0, 180.0)
-    look: dict[str, Any] = field(default_factory=dict)
+    colour: str = "black"
+    size: float = 8.5
 
 
 class _Scene:
@@ -222,10 +176,6 @@ class _Scene:
     def page(self, points: ArrayLike) -> FloatArray:
         """Points (..., 3) of the ground frame on the page, (..., 2)."""
         return np.asarray(np.asarray(points, dtype=float) @ self.view[:2].T)
-
-    def _at_page(self, point: FloatArray) -> tuple[float, float]:
-        x, y = self.page(point)
-        return float(x), float(y)
 
     def _extent(self) -> tuple[FloatArray, FloatArray]:
         u = self.size
@@ -280,35 +230,19 @@ class _Scene:
         start, end = self._rail
         # the crank is cut where the ball is, so that the ball lies in a fork
         solids: list[tuple[FloatArray, str]] = [
-            (_tube(bearing * k1, (bearing + 3.2 * u) * k1, 0.95 * u, pieces=3), "#AEB7BE"),
-            (_tube(pose.centre, np.array([0.0, 0.0, self.high_shift + 6.6 * u]), 0.42 * u, pieces=16), CRANK),
-            (_tube(pose.centre - 0.42 * u * k1, pose.centre + 0.42 * u * k1, 0.85 * u, sides=24), CRANK),
-            (_box([0.6 * u, -0.45 * u, -0.3 * u], [self.a1 - 0.45 * u, 0.45 * u, 0.3 * u], crank, pose.centre, pieces=6),
+            (tube(bearing * k1, (bearing + 3.2 * u) * k1, 0.95 * u, pieces=3), "#AEB7BE"),
+            (tube(pose.centre, np.array([0.0, 0.0, self.high_shift + 6.6 * u]), 0.42 * u, pieces=16), CRANK),
+            (tube(pose.centre - 0.42 * u * k1, pose.centre + 0.42 * u * k1, 0.85 * u, sides=24), CRANK),
+            (box([0.6 * u, -0.45 * u, -0.3 * u], [self.a1 - 0.45 * u, 0.45 * u, 0.3 * u], crank, pose.centre, pieces=6),
              CRANK),
-            (_ball(pose.crank_pin, 0.66 * u), "#F0A57A"),
-            (_tube(pose.crank_pin + 0.5 * u * along, pin - 0.5 * u * along, 0.3 * u, pieces=30), COUPLER),
-            (_ball(pin, 0.66 * u), "#86BFE3"),
-            (_tube(pin + 0.5 * u * guide[2], pin + 0.95 * u * guide[2], 0.34 * u), SLIDER),
-            (_box([-1.6 * u, -1.2 * u, 0.9 * u], [1.6 * u, 1.2 * u, 2.0 * u], guide, pin, pieces=4), "#84929D"),
-            (_box([start, -0.7 * u, 2.0 * u], [end, 0.7 * u, 2.45 * u], guide, self.foot, pieces=24), "#D9DEE2"),
+            (ball(pose.crank_pin, 0.66 * u), "#F0A57A"),
+            (tube(pose.crank_pin + 0.5 * u * along, pin - 0.5 * u * along, 0.3 * u, pieces=30), COUPLER),
+            (ball(pin, 0.66 * u), "#86BFE3"),
+            (tube(pin + 0.5 * u * guide[2], pin + 0.95 * u * guide[2], 0.34 * u), SLIDER),
+            (box([-1.6 * u, -1.2 * u, 0.9 * u], [1.6 * u, 1.2 * u, 2.0 * u], guide, pin, pieces=4), "#84929D"),
+            (box([start, -0.7 * u, 2.0 * u], [end, 0.7 * u, 2.45 * u], guide, self.foot, pieces=24), "#D9DEE2"),
         ]  # fmt: skip
-        faces = np.concatenate([solid for solid, _ in solids])
-        paint = np.concatenate([np.broadcast_to(to_rgb(colour), (len(solid), 3)) for solid, colour in solids])
-        seen = faces @ self.view.T
-        normal = np.cross(seen[:, 2] - seen[:, 0], seen[:, 3] - seen[:, 1])
-        normal /= np.linalg.norm(normal, axis=1, keepdims=True)
-        front = normal[:, 2] > 0.0
-        bright = 0.6 + 0.4 * np.clip(normal @ (_LIGHT / np.linalg.norm(_LIGHT)), 0.0, 1.0)
-        colours = (bright[:, None] * paint)[front]
-        seen = seen[front]
-        order = np.argsort(seen[:, :, 2].mean(axis=1), kind="stable")
-        axis.add_collection(
-            PolyCollection(
-                list(seen[order, :, :2]), facecolors=colours[order], edgecolors=colours[order], linewidths=0.4, zorder=3
-            ),
-            autolim=False,
-        )
-        self.taken.extend([seen[:, :, :2].mean(axis=1), seen[:, ::2, :2].reshape(-1, 2)])
+        self.taken.extend(paint(axis, solids, self.view))
 
     def _centre_lines(self, axis: Axes, pose: _Pose) -> None:
         u = self.size
@@ -325,8 +259,8 @@ class _Scene:
         for part in self.parts:
             self._line(axis, part.crank_pins, color=TRACE, linewidth=1.6, zorder=2)
             self._line(axis, part.slider_pins, color=TRACE, linewidth=3.0, zorder=2)
-            for marked, colour, marker in ((part.dead, _DEAD, "D"), (part.limits, _LIMIT, "s")):
-                for place in marked:
+            for places, _, colour, marker in part.marks:
+                for place in places:
                     if letters:
                         joints = [place.centre, place.crank_pin, place.slider_pin]
                         self._line(axis, joints, color=colour, linewidth=0.9, linestyle="--", zorder=2)
@@ -362,90 +296,52 @@ class _Scene:
         for origin, rows in ((np.zeros(3), np.eye(3)), (self.foot, self.frame4)):
             for way in rows:
                 tip = origin + 2.4 * u * way
-                axis.annotate("", self._at_page(tip), self._at_page(origin), arrowprops=look, zorder=7)
+                end, start = self.page([tip, origin]).tolist()
+                axis.annotate("", end, start, arrowprops=look, zorder=7)
                 self.taken.append(self.page([origin + share * (tip - origin) for share in np.linspace(0.0, 1.0, 9)]))
 
     def _letters(self, axis: Axes, pose: _Pose) -> None:
-        u = self.size
+        u, small = self.size, 7.0
 
-        def told(length: float) -> str:
-            return f"{length:.4g} {self.unit}"
+        def length(value: float) -> str:
+            return f"{value:.4g} {self.unit}"
 
-        small = {"fontsize": 7.0}
-        labels = []
-        for number, origin, rows in ((1, np.zeros(3), np.eye(3)), (4, self.foot, self.frame4)):
-            for name, way in zip("ijk", rows):
-                across = self.page(way)
-                side = degrees(np.arctan2(across[1], across[0]))
-                sides = tuple(side + turn for turn in (0.0, 30.0, -30.0, 60.0, -60.0))
-                labels.append(_Label(origin + 2.45 * u * way, f"${name}_{number}$", sides))
-        labels += [
-            _Label(0.55 * pose.crank_pin + 0.45 * pose.centre, f"crank $a_1$ = {told(self.a1)}", (180.0, 0.0, 90.0, 270.0),
-                   {"color": "#8C3D00"}),
-            _Label(0.5 * (pose.crank_pin + pose.slider_pin), f"rod $a_2$ = {told(self.a2)}", look={"color": "#00507F"}),
-            _Label(self.at(pose.slide, self.side * 2.2 * u), f"slider $S_4$ = {told(pose.slide)}", (270.0, 300.0, 240.0),
-                   {"color": "#3F4A52"}),
-            _Label(np.array([0.0, 0.0, self.high_shift + 3.8 * u]), "bearing", (90.0, 180.0), {"color": "#3F4A52"}),
-            _Label(np.array([0.0, 0.0, self.low_shift - 4.0 * u]), "crank axis", (270.0, 0.0, 180.0), small),
-            _Label(self.at(max(self.most + 2.6 * u, 1.5 * u)), "guide", (0.0, 45.0, 315.0), small),
-            _Label(self.foot, rf"$\alpha_4$ = {degrees(self.parameters.guide_twist):.4g}°", (270.0, 225.0, 180.0),
-                   {"color": _TWIST}),
-        ]  # fmt: skip
+        labels = [
+            _Label(origin + 2.45 * u * way, f"${name}_{number}$")
+            for number, origin, rows in ((1, np.zeros(3), np.eye(3)), (4, self.foot, self.frame4))
+            for name, way in zip("ijk", rows)
+        ]
+        if abs(pose.centre[2]) > 1e-9 * u:
+            labels.append(_Label(0.5 * pose.centre, f"$S_1$ = {length(pose.centre[2])}", _SHIFT))
         if self.a4 != 0.0:
-            labels.append(_Label(0.5 * self.foot, f"$a_4$ = {told(self.a4)}", (180.0, 0.0)))
-        if abs(pose.centre[2]) > 1e-9 * self.size:
-            labels.append(
-                _Label(0.5 * pose.centre, f"$S_1$ = {told(pose.centre[2])}", (270.0, 0.0, 180.0), {"color": _SHIFT})
-            )
+            labels.append(_Label(0.5 * self.foot, f"$a_4$ = {length(self.a4)}"))
+        labels += [
+            _Label(0.55 * pose.crank_pin + 0.45 * pose.centre, f"crank $a_1$ = {length(self.a1)}", "#8C3D00"),
+            _Label(0.5 * (pose.crank_pin + pose.slider_pin), f"rod $a_2$ = {length(self.a2)}", "#00507F"),
+            _Label(self.at(pose.slide, self.side * 2.2 * u), f"slider $S_4$ = {length(pose.slide)}", "#3F4A52"),
+            _Label(np.array([0.0, 0.0, self.high_shift + 3.8 * u]), "bearing", "#3F4A52"),
+            _Label(np.array([0.0, 0.0, self.low_shift - 4.0 * u]), "crank axis", size=small),
+            _Label(self.at(max(self.most + 2.6 * u, 1.5 * u)), "guide", size=small),
+            _Label(self.foot, rf"$\alpha_4$ = {degrees(self.parameters.guide_twist):.4g}°", _TWIST),
+        ]
         for part in self.parts:
-            for marked, name, colour in ((part.dead, "dead centre", _DEAD), (part.limits, "limit", _LIMIT)):
-                for place in marked:
+            for places, name, colour, _ in part.marks:
+                for place in places:
                     text = f"{name} {degrees(place.angle) % 360.0:.2f}°"
-                    labels.append(_Label(place.slider_pin, text, (90.0, 60.0, 120.0, 270.0), small | {"color": colour}))
-                    labels.append(_Label(place.crank_pin, text, (135.0, 180.0, 90.0), small | {"color": colour}))
-        self._place(axis, labels)
-
-    def _place(self, axis: Axes, labels: Sequence[_Label]) -> None:
-        """Put each text where it covers least, sides named first preferred; with a thin line to its point if it is far."""
-        figure = axis.get_figure(root=True)
-        assert figure is not None
-        renderer = FigureCanvasAgg(figure).get_renderer()  # type: ignore[no-untyped-call]
-        to_pixels = axis.transData
-        taken = to_pixels.transform(np.concatenate(self.taken))
-        frame = to_pixels.transform([self.low, self.high])
-        boxes: list[FloatArray] = []
-        step = figure.dpi / 72.0
-        for label in labels:
-            look: dict[str, Any] = {"fontsize": 8.5, "ha": "center", "va": "center", "zorder": 12}
-            look["path_effects"] = [withStroke(linewidth=2.4, foreground="white")]
-            text = axis.text(0.0, 0.0, label.text, **(look | label.look))
-            extent = text.get_window_extent(renderer)
-            half = 0.5 * np.array([extent.width, extent.height]) + 1.0 * step
-            point = to_pixels.transform(self.page(label.point))
-            best: tuple[float, FloatArray, float] | None = None
-            for rank, side in enumerate((*label.sides, *range(15, 375, 30))):
-                way = np.array([cos(radians(side)), sin(radians(side))])
-                # from the point to the middle of a text that just does not cover it
-                clear = float(np.min(half / np.maximum(np.abs(way), 1e-9)))
-                for gap in (3.0, 8.0, 15.0, 25.0, 40.0, 60.0):
-                    middle = point + (clear + gap * step) * way
-                    covered = np.all(np.abs(taken - middle) < half, axis=1).sum()
-                    crossed = sum(bool(np.all(np.abs(box[0] - middle) < box[1] + half)) for box in boxes)
-                    outside = np.maximum(frame[0] - middle + half, middle + half - frame[1]).clip(0.0).sum()
-                    cost = 7.0 * covered + 60.0 * crossed + 8.0 * outside + 0.5 * gap + 0.6 * min(rank, 6)
-                    if best is None or cost < best[0]:
-                        best = cost, middle, gap
-            assert best is not None
-            _, middle, gap = best
-            boxes.append(np.array([middle, half]))
-            x, y = to_pixels.inverted().transform(middle)
-            text.set_position((float(x), float(y)))
-            if gap > 10.0:
-                edge = middle + np.clip(point - middle, -half, half)
-                ends = to_pixels.inverted().transform([point, edge])
-                axis.plot(*ends.T, color=label.look.get("color", "black"), linewidth=0.5, zorder=11)
+                    labels += [_Label(pin, text, colour, small) for pin in (place.slider_pin, place.crank_pin)]
+        x, y = self.page([label.point for label in labels]).T
+        x_taken, y_taken = np.concatenate(self.taken).T
+        colours = [label.colour for label in labels]
+        textalloc.allocate(
+            axis, x, y, [label.text for label in labels], x_scatter=x_taken, y_scatter=y_taken,
+            xlims=(self.low[0] + 0.5 * u, self.high[0] - 0.5 * u), ylims=(self.low[1], self.high[1]),
+            margin=0.003, min_distance=0.005, nbr_candidates=500,
+            textsize=[label.size for label in labels], textcolor=colours, linecolor=colours, linewidth=0.5,
+            plot_kwargs={"zorder": 11}, zorder=12, path_effects=[withStroke(linewidth=2.4, foreground="white")],
+        )  # fmt: skip
 
 
+@plot.register
 def plot_mechanism(
     parameters: SliderCrankParameters,
     crank_angle: float,
@@ -507,6 +403,7 @@ def _sheet(scene: _Scene, wide: float, *, head: float, foot: float = 0.0) -> tup
     return figure, axis
 
 
+@animate.register
 def animate_mechanism(
     parameters: SliderCrankParameters,
     path: str | Path,
@@ -576,33 +473,12 @@ def animate_mechanism(
     return path
 
 
-def assembled_ranges(parameters: SliderCrankParameters, law: PeriodicShift) -> tuple[Range, ...]:
-    """The ranges of crank angles in which the mechanism can be assembled, at least one.
-
-    Raises
-    ------
-    AssemblyError
-        If there is none, with by how much the rod is too short where that is least.
-    """
-    found = ranges(parameters, law)
-    if not found:
-        # the sentence of the nearest there is to an assembly
-        nearest = greatest_margin(parameters, law).crank_angle
-        try:
-            check_assembly(parameters, nearest, law.at(nearest)[0])
-        except AssemblyError as error:
-            raise AssemblyError(
-                f"it cannot be assembled at any crank angle; where it comes nearest to it, {error}"
-            ) from None
-    return found
-
-
 def _slides(axis: Axes, parts: Sequence[_Part], unit: str) -> None:
     """Slider position over the crank angle, with dead centres and limits."""
     for part in parts:
         axis.plot(np.degrees(part.angles), [pose.slide for pose in part.poses], color=COLOURS[0], zorder=3)
-        for marked, colour, marker in ((part.dead, _DEAD, "D"), (part.limits, _LIMIT, "s")):
-            for place in marked:
+        for places, _, colour, marker in part.marks:
+            for place in places:
                 low, turn = degrees(part.angles[0]), degrees(place.angle)
                 # a range may begin before zero and reach beyond a turn
                 shown = turn if turn >= low - 1e-6 else turn + 360.0 * ceil((low - 1e-6 - turn) / 360.0)
@@ -670,11 +546,8 @@ def _circle(axis: Axes, parts: Sequence[_Part], radius: float, unit: str) -> Non
     axis.plot(radius * np.cos(turn), radius * np.sin(turn), ":", color="0.5", linewidth=1.2)
     for part in parts:
         axis.plot(*part.crank_pins[:, :2].T, color=TRACE, linewidth=3.5)
-        for marked, name, colour, marker in (
-            (part.dead, "dead centre", _DEAD, "D"),
-            (part.limits, "limit", _LIMIT, "s"),
-        ):
-            for place in marked:
+        for places, name, colour, marker in part.marks:
+            for place in places:
                 x, y = place.crank_pin[:2]
                 axis.plot([0.0, x], [0.0, y], "--", color=colour, linewidth=0.9)
                 axis.plot(x, y, marker, color=colour, markersize=5.5, zorder=5)

@@ -146,12 +146,6 @@ class Dual(NDArrayOperatorsMixin):
         """How many axes of directions the dual part has in front."""
         return self.dual.ndim - self.real.ndim
 
-    def sum(self, axis: int | None = None) -> Dual:
-        """Sum over an axis of the real part, or over all of them; not over directions."""
-        axes = tuple(range(-self.real.ndim, 0)) if axis is None else (axis - self.real.ndim if axis >= 0 else axis,)
-        real = self.real.sum(axes)
-        return Dual(real, self.dual.sum(axes))
-
     def __len__(self) -> int:
         """Length of the real part's first axis; a single number has none (TypeError)."""
         return len(self.real)
@@ -177,7 +171,10 @@ class Dual(NDArrayOperatorsMixin):
         TypeError
             Always: an array of objects, or the real part alone, would be wrong in silence.
         """
-        raise TypeError("a dual number is not an array: take its real or its dual part, or join several with stack()")
+        raise TypeError(
+            "a dual number is not an array, and NumPy's functions but those of element by element do not take it: take its "
+            "real or its dual part, or join several with stack() or join() of analysis.numerics.dual"
+        )
 
     def __array_ufunc__(self, ufunc: Any, method: str, *inputs: Any, **options: Any) -> Any:
         """NumPy's function ``ufunc`` of dual numbers; one without a derivative here is a TypeError."""
@@ -197,26 +194,6 @@ class Dual(NDArrayOperatorsMixin):
             value = ufunc(x[0].real)
             return Dual(value, _UNARY[ufunc](x[0].real, value) * x[0].dual)
         return NotImplemented
-
-    def __array_function__(self, function: Any, _: Any, arguments: Any, options: Any) -> Any:
-        """NumPy's sum and shape; any other function that is not one of element by element is refused.
-
-        Raises
-        ------
-        TypeError
-            With what there is in its place.
-        """
-        if (
-            function in (np.sum, np.shape)
-            and len(arguments) == 1
-            and arguments[0] is self
-            and options.keys() <= {"axis"}
-        ):
-            return self.sum(**options) if function is np.sum else self.shape
-        raise TypeError(
-            f"numpy.{function.__name__} does not take dual numbers, or not with these arguments: there are stack, join, dot, "
-            "cross and apply in analysis.numerics.dual and the method sum, or take the real or the dual part"
-        )
 
 
 def _aligned(*x: Dual) -> tuple[Dual, ...]:
@@ -255,11 +232,6 @@ def variables(*values: Any) -> tuple[Dual, ...]:
     return tuple(Dual(a, unit) for a, unit in zip(real, directions))
 
 
-def derivative(function: Callable[[Dual], Any], x: Any) -> Array:
-    """Derivative of a function of one variable at ``x`` (array_like)."""
-    return dual(function(Dual(x, 1.0))).dual
-
-
 def stack(parts: Sequence[Any], axis: int = -1) -> Dual:
     """Dual numbers joined along a new axis, which is counted from the end (negative)."""
     x = _aligned(*(dual(part) for part in parts))
@@ -273,11 +245,6 @@ def join(*parts: Dual) -> Dual:
     directions = np.broadcast_shapes(*(x.dual.shape[: x.directions] for x in parts))
     slopes = [np.broadcast_to(x.dual, directions + x.real.shape) for x in parts]
     return Dual(np.concatenate([x.real for x in parts], -1), np.concatenate(slopes, -1))
-
-
-def dot(a: Any, b: Any) -> Dual:
-    """Product a . b of dual vectors (..., 3): of two unit screws the cosine of their dual angle."""
-    return cast(Dual, dual(a) * b).sum(-1)
 
 
 def cross(a: Any, b: Any) -> Dual:
@@ -320,11 +287,6 @@ def about_j(angle: Any) -> Dual:
 def about_k(angle: Any) -> Dual:
     """Matrix of a screw displacement about and along the k axis by a dual angle (eq 1)."""
     return _about(angle, 2)
-
-
-def frame(orientation: Any, origin: Any) -> Dual:
-    """Matrix R + eps [p]R of the frame of orientation R (..., 3, 3) and origin p (..., 3)."""
-    return Dual(orientation, _skew(np.asarray(origin)) @ orientation)
 
 
 def origin(m: Dual) -> Array:

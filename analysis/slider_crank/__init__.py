@@ -1,1 +1,10 @@
-"""Analysis of the generalised slider-crank: the thesis's own method by dual numbers, and what is built on the plant."""
+"""Analysis of the generalised slider-crank: the thesis's own method by dual numbers, and what is built on the plant.
+
+The names are those of ``__init__.pyi``; each is imported from its module when it is first used.
+"""
+
+from __future__ import annotations
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

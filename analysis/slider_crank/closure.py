@@ -18,18 +18,16 @@ the iteration starts; positions and forces do not depend on it.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from typing import Any, TypeAlias, cast
+from dataclasses import dataclass, fields, replace
+from typing import Any, cast
 
 import numpy as np
-from numpy.typing import NDArray
 
 from linkwork.errors import AssemblyError, InputError, LinkworkError
 from linkwork.slider_crank.parameters import SliderCrankParameters
 
 from ..numerics.dual import Array, Dual, about_i, about_k, axial, origin, skew, stack
-
-FloatArray: TypeAlias = NDArray[np.float64]
+from .quantities import FloatArray
 
 #: Largest residual of a closed loop: rotation in radians, and length as a share of the links' lengths together.
 TOLERANCE = 1e-12
@@ -62,16 +60,7 @@ class Closure:
 
     def at(self, points: Any) -> Closure:
         """The loops of some of the points, by their indices (array_like of int): a start for others near them."""
-        chosen = (
-            "crank_angle",
-            "shift",
-            "crank_ball",
-            "slider_ball",
-            "slider_position",
-            "rotation_residual",
-            "length_residual",
-        )
-        return replace(self, **{name: getattr(self, name)[points] for name in chosen})
+        return replace(self, **{name: getattr(self, name)[points] for name in _POINTWISE})
 
     @property
     def crank_frame(self) -> Dual:
@@ -82,7 +71,7 @@ class Closure:
     def rod_frame(self) -> Dual:
         """A frame fixed to the rod, in frame 1, its origin in the crank pin and i along the rod: (n, 3, 3).
 
-        It is not the frame 3 in which components of forces are told (`dual_dynamics.JointLoads.components`): its j and k are
+        It is not the frame 3 in which components of forces are given (`JointLoads.components`): its j and k are
         turned about the rod by the idle spin, as the start of the iteration has left it.
         """
         return self._frames[0]
@@ -105,6 +94,10 @@ class Closure:
     def slider_pin(self) -> FloatArray:
         """Position of the slider pin in frame 1 (m): (n, 3)."""
         return origin(self.guide_frame)
+
+
+#: Fields of `Closure` that have a value for each point.
+_POINTWISE = tuple(x.name for x in fields(Closure) if x.name not in ("parameters", "iterations"))
 
 
 def scale(p: SliderCrankParameters, shift: Array) -> float:
@@ -227,17 +220,8 @@ def follow(parameters: SliderCrankParameters, crank_angle: Any, shift: Any) -> C
     points: list[Closure] = []
     for angle, position in zip(th, s1):
         points.append(close(parameters, angle, position, points[-1] if points else None))
-    return Closure(
-        parameters=parameters,
-        crank_angle=th,
-        shift=s1,
-        crank_ball=np.concatenate([x.crank_ball for x in points]),
-        slider_ball=np.concatenate([x.slider_ball for x in points]),
-        slider_position=np.concatenate([x.slider_position for x in points]),
-        rotation_residual=np.concatenate([x.rotation_residual for x in points]),
-        length_residual=np.concatenate([x.length_residual for x in points]),
-        iterations=max(x.iterations for x in points),
-    )
+    joined: dict[str, Any] = {name: np.concatenate([getattr(x, name) for x in points]) for name in _POINTWISE}
+    return Closure(parameters=parameters, iterations=max(x.iterations for x in points), **joined)
 
 
 def residuals(product: Dual) -> tuple[FloatArray, FloatArray]:

@@ -11,7 +11,8 @@ from linkwork.errors import InputError
 
 from .closure import close
 from .dual_dynamics import joint_loads, rates
-from .forces import JOINTS, NO_LEVER, SLIDER_FORCE, WORDS, ForceTurn
+from .forces import NO_LEVER, SLIDER_FORCE, ForceTurn
+from .quantities import JOINTS
 from .shifts import in_the_shaft, on_arrays
 
 
@@ -65,8 +66,8 @@ def compare(turn: ForceTurn) -> Comparison:
     Raises
     ------
     InputError
-        If the slider's force is sought and a groove in the shaft makes the shift, which the dual method has not, or if it is
-        determined at none of the angles.
+        If the slider's force is sought and a groove in the shaft makes the shift, which the dual method does not cover, or if
+        it is determined at none of the angles.
     """
     sought = turn.sought == SLIDER_FORCE
     if sought and in_the_shaft(turn.law):
@@ -101,29 +102,22 @@ def compare(turn: ForceTurn) -> Comparison:
         ("slider force", "N", loads.slider_force - pushed, turn.slider_force),
         ("axial force on the crank", "N", loads.axial, turn.axial_force),
     ]
-    pairs += [
-        (WORDS[name], "N.m" if moment else "N", loads.components(name, 1), turn.vector(name))
-        for name, moment in JOINTS.items()
-    ]
+    pairs += [(joint.words, joint.unit, getattr(loads, name), turn.vector(name)) for name, joint in JOINTS.items()]
     found = [
         (words, unit, float(np.abs(b[good]).max()), float(np.abs(a - np.ma.getdata(b)[good]).max()))
         for words, unit, a, b in pairs
     ]
-    scales = {unit: max(size for _, other, size, _ in found if other == unit) for _, unit, _, _ in found}
+    scales = {unit: max(size for _, other, size, _ in found if other == unit) or 1.0 for _, unit, _, _ in found}
     return Comparison(
         differences=tuple(
             Difference(
-                quantity=words,
-                unit=unit,
-                largest=size,
-                difference=difference,
-                relative=difference / scales[unit] if scales[unit] > 0.0 else difference,
+                quantity=words, unit=unit, largest=size, difference=difference, relative=difference / scales[unit]
             )
             for words, unit, size, difference in found
         ),
         angles=int(good.sum()),
         rotation_residual=float(closure.rotation_residual.max()),
         length_residual=float(closure.length_residual.max()),
-        iterations=int(closure.iterations),
+        iterations=closure.iterations,
         rod_moment=float(np.abs(loads.residual).max()),
     )

@@ -17,21 +17,17 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, TypeAlias, cast
+from typing import Any, cast
 
 import numpy as np
-from numpy.typing import NDArray
 
 from linkwork.errors import AssemblyError, InputError, LinkworkError
 from linkwork.slider_crank.parameters import SliderCrankParameters
 
 from ..numerics.dual import Dual, about_i, apply, cross, join, stack
 from .closure import Closure, scale
+from .quantities import DEAD_CENTRE, FloatArray, check_joint, each
 
-FloatArray: TypeAlias = NDArray[np.float64]
-
-#: Share of the crank's length below which dS4/dtheta1 is taken as none: there no torque balances a force on the slider.
-DEAD_CENTRE = 1e-9
 #: Cosine of the angle between rod and guide below which the loop is at the limit of assembly.
 LIMIT_COSINE = 1e-9
 
@@ -116,7 +112,7 @@ class JointLoads:
     guide_moment: FloatArray
     residual: FloatArray
 
-    def components(self, name: str, number: int) -> FloatArray:
+    def components(self, name: str, frame: int) -> FloatArray:
         """Components (n, 3) of a force or moment in frame 1 (ground), 2 (crank), 3 (rod) or 4 (guide).
 
         The moments keep the points about which they are taken.
@@ -124,9 +120,8 @@ class JointLoads:
         Parameters
         ----------
         name : str
-            ``bearing``, ``bearing_moment``, ``crank_pin``, ``slider_pin``, ``guide`` or ``guide_moment``.
-        number : int
-            Number of the frame.
+            One of `JOINTS`.
+        frame : int
 
         Raises
         ------
@@ -134,12 +129,8 @@ class JointLoads:
             If there is no such force, moment or frame, or if frame 3 is not determined: it has j perpendicular to the rod
             and to the crank axis, which must not be parallel.
         """
-        if name not in _NAMED:
-            raise InputError(f"there is no force or moment {name!r}: the names are {', '.join(_NAMED)}")
-        if number not in _FRAMES:
-            raise InputError(f"there is no frame {number!r}: the frames are 1 (ground), 2 (crank), 3 (rod), 4 (guide)")
-        vectors: FloatArray = getattr(self, name)
-        return cast(FloatArray, np.einsum("nji,nj->ni", _FRAMES[number](self.closure), vectors))
+        check_joint(name, frame)
+        return cast(FloatArray, np.einsum("nji,nj->ni", _FRAMES[frame](self.closure), getattr(self, name)))
 
 
 def rates(
@@ -164,15 +155,8 @@ def rates(
         At the limit of assembly, where the rod is perpendicular to the guide.
     """
     n = closure.crank_angle.size
-    w, v, e, a = (
-        _values(name, x, n)
-        for name, x in (
-            ("speed", speed),
-            ("shift_velocity", shift_velocity),
-            ("acceleration", acceleration),
-            ("shift_acceleration", shift_acceleration),
-        )
-    )
+    w, v = each("speed", speed, n), each("shift_velocity", shift_velocity, n)
+    e, a = each("acceleration", acceleration, n), each("shift_acceleration", shift_acceleration, n)
     k = np.array([0.0, 0.0, 1.0])
     rod, guide = closure.rod_frame, closure.guide_frame
     cosine = np.abs(np.sum(rod.real[..., 0] * guide.real[..., 2], -1))
@@ -330,7 +314,7 @@ def joint_loads(
     # the rod's moment about its line is the equation that is met by itself
     kept = np.delete(np.arange(18), 9)
     given, value = (5, torque) if torque is not None else (17, slider_force)
-    known = _values("torque" if torque is not None else "slider_force", value, n) / (length if given == 5 else 1.0)
+    known = each("torque" if torque is not None else "slider_force", value, n) / (length if given == 5 else 1.0)
     free = np.delete(np.arange(18), given)
     unknown = np.linalg.solve(
         matrix[:, kept[:, None], free], (load[:, kept] - known[:, None] * matrix[:, kept, given])[..., None]
@@ -364,18 +348,6 @@ def _check_dead_centres(closure: Closure, motion: Rates) -> None:
         )
 
 
-def _values(name: str, x: Any, n: int) -> FloatArray:
-    """One finite value for each of n points."""
-    values = np.asarray(x, dtype=float)
-    if values.shape not in ((), (1,), (n,)):
-        raise InputError(
-            f"{name} has the shape {values.shape}: it must be a number or have one for each of the {n} points"
-        )
-    if not np.all(np.isfinite(values)):
-        raise InputError(f"{name} is {x!r}: it must be finite")
-    return np.broadcast_to(values, (n,))
-
-
 def _axes(frame: Dual) -> Dual:
     """The same axes with the origin in that of frame 1."""
     return Dual(frame.real)
@@ -401,4 +373,3 @@ _FRAMES: dict[int, Callable[[Closure], FloatArray]] = {
     3: _rod_axes,
     4: lambda closure: closure.guide_frame.real,
 }
-_NAMED = ("bearing", "bearing_moment", "crank_pin", "slider_pin", "guide", "guide_moment")

@@ -2,7 +2,7 @@
 
 Crank and shift move as prescribed, so that the axial force on the crank is an unknown (Rahman prescribes it, erratum 7).
 Then either the slider's load L is given and the crank's torque T sought, or the torque is given and the force on the slider
-sought (the thesis's problem). Both hang together by the crank's equation of motion
+sought (the thesis's problem). The two are related by the crank's equation of motion
 
     T = T0 - kth L,    kth = dS4/dtheta1 at the shift held,
 
@@ -15,131 +15,53 @@ The equations are the plant's own (`linkwork.slider_crank.dynamics`), evaluated 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from math import ceil, degrees, pi, radians, tau
-from pathlib import Path
+from math import degrees, radians, tau
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.optimize import brentq
 
 from linkwork.errors import AssemblyError, InputError
 from linkwork.limits import LIMIT_SINE
 from linkwork.slider_crank.dynamics import Inputs
 from linkwork.slider_crank.kinematics import Position
 from linkwork.slider_crank.parameters import Constants, SliderCrankParameters
-from linkwork.slider_crank.published import INCH, POUND_FORCE, POUND_INCH
 from linkwork.slider_crank.vectors import Vector
 
-from ..files import write_csv
 from . import mobility
-from .dual_dynamics import DEAD_CENTRE
+from .course import Course
 from .mobility import DeadCentre
-from .shifts import (
-    AngleShift,
-    ConstantShift,
-    GrooveShift,
-    ShiftLaw,
-    ShiftMotion,
-    TimeShift,
-    in_the_shaft,
-    on_arrays,
-    with_groove,
+from .quantities import (
+    DEAD_CENTRE,
+    JOINTS,
+    FloatArray,
+    MaskedArray,
+    check_joint,
+    each,
+    masked_array,
+    numbers,
+    unit_table,
 )
-
-if TYPE_CHECKING:
-    from ..figures.slider_crank import ForceScene
-
-__all__ = [
-    "AngleShift",
-    "ConstantShift",
-    "ForceInstant",
-    "ForceTurn",
-    "GrooveShift",
-    "ShiftLaw",
-    "ShiftMotion",
-    "Solution",
-    "TimeShift",
-    "force_turn",
-    "forces_at",
-    "solve",
-    "unit_table",
-]
-
-FloatArray: TypeAlias = NDArray[np.float64]
-MaskedArray: TypeAlias = "np.ma.MaskedArray[Any, np.dtype[np.float64]]"
+from .shifts import ConstantShift, ShiftLaw, ShiftMotion, in_the_shaft, on_arrays, with_groove
 
 #: Angles over the turn where none are given: every degree, both ends.
 SAMPLES = 361
-#: Pieces of a turn in which dead centres are looked for under a law that need not repeat; two in one piece go unseen.
-_PIECES = 1440
 #: Sine of the angle between rod and crank axis below which frame 3 has no direction.
 _PARALLEL = 1e-12
-#: Angle (deg) from a singularity or a limit of assembly beyond which a value is told as an extreme, and shown.
+#: Angle (deg) from a singularity or a limit of assembly beyond which a value is reported as an extreme, and shown.
 CLEAR_DEG = 10.0
-#: What is told of a mechanism whose slider force is sought in vain.
+#: Reason for which no slider force is found at any angle.
 NO_LEVER = "the slider has no lever on the crank at any angle, so that the torque determines no force on it"
+#: Reason for which none is found at a dead centre.
+_NO_LEVER_HERE = "the slider's force has no lever on the crank, so that the torque does not determine it"
 #: The shift where none is given.
 _STILL = ConstantShift(0.0)
-#: What `ForceTurn.sought` may be.
+#: Values of `ForceTurn.sought`.
 TORQUE, SLIDER_FORCE = "torque", "slider force"
-
-#: Forces and moments by name, and whether it is a moment.
-JOINTS: Mapping[str, bool] = MappingProxyType(
-    {
-        "bearing": False,
-        "bearing_moment": True,
-        "crank_pin": False,
-        "slider_pin": False,
-        "guide": False,
-        "guide_moment": True,
-    }
-)
-#: What forces and moments are told as.
-WORDS: Mapping[str, str] = MappingProxyType(
-    {
-        "bearing": "force of the bearing on the crank",
-        "bearing_moment": "moment of the bearing about O",
-        "crank_pin": "force of the crank on the rod",
-        "slider_pin": "force of the slider on the rod",
-        "guide": "force of the guide on the slider",
-        "guide_moment": "moment of the guide on the slider",
-    }
-)
-#: Frames by number: of the ground, the crank, the rod and the guide.
-FRAMES: Mapping[int, str] = MappingProxyType({1: "ground", 2: "crank", 3: "rod", 4: "guide"})
-
-#: Units of a file: for each SI unit the unit that is written and what one of it is in SI.
-UNITS: Mapping[str, Mapping[str, tuple[str, float]]] = MappingProxyType(
-    {
-        "SI": {unit: (unit, 1.0) for unit in ("rad", "m", "m/s", "m/s2", "N", "N.m")},
-        "inch": {
-            "rad": ("deg", pi / 180.0),
-            "m": ("in", INCH),
-            "m/s": ("in/s", INCH),
-            "m/s2": ("in/s2", INCH),
-            "N": ("lb", POUND_FORCE),
-            "N.m": ("lb.in", POUND_INCH),
-        },
-    }
-)
-
-
-def unit_table(units: str) -> Mapping[str, tuple[str, float]]:
-    """What of `UNITS` a file is written in.
-
-    Raises
-    ------
-    InputError
-        If there are no such units.
-    """
-    if units not in UNITS:
-        raise InputError(f"there are no units {units!r}: they are {' or '.join(UNITS)}")
-    return UNITS[units]
 
 
 class Solution(NamedTuple):
@@ -224,8 +146,6 @@ class ForceTurn:
         Of it that of what drives or holds the shift: without the spring and the damper there (N).
     ratio : ndarray, shape (n,)
         Lever of the slider's force on the crank, minus dT/dL (m): kth, or dS4/dtheta1 with a groove in the shaft.
-    reasons : tuple of (int, str)
-        Index of each point at which something is masked, and why.
     unreachable : ndarray, shape (m,)
         Angles that were asked for and left out because the rod does not reach the guide there (rad).
     """
@@ -247,7 +167,6 @@ class ForceTurn:
     axial_force: MaskedArray
     applied_axial_force: MaskedArray
     ratio: FloatArray
-    reasons: tuple[tuple[int, str], ...]
     unreachable: FloatArray
     _joints: Mapping[str, MaskedArray]
     _position: Position
@@ -256,13 +175,17 @@ class ForceTurn:
         return len(self.angle)
 
     @property
+    def _course(self) -> Course:
+        return Course(self.parameters, self.law, float(self.speed[0]))
+
+    @property
     def _span(self) -> tuple[float, float]:
         return float(self.angle.min()), float(self.angle.max())
 
     @cached_property
     def dead_centres(self) -> tuple[DeadCentre, ...]:
         """Configurations between the first and the last angle at which the slider turns back, located to the last digit."""
-        return _located(self, *self._span, along=True)
+        return self._course.dead_centres(*self._span)
 
     @cached_property
     def singularities(self) -> tuple[DeadCentre, ...]:
@@ -270,7 +193,7 @@ class ForceTurn:
 
         The zeros of ``ratio``: the same as the dead centres but where the shift moves and no groove in the shaft makes it.
         """
-        return self.dead_centres if in_the_shaft(self.law) else _located(self, *self._span, along=False)
+        return self.dead_centres if in_the_shaft(self.law) else self._course.singularities(*self._span)
 
     @cached_property
     def limits(self) -> tuple[float, ...]:
@@ -279,7 +202,7 @@ class ForceTurn:
         There rod and guide are perpendicular, and velocity, acceleration and all forces grow without bound.
         """
         asked = np.concatenate([self.angle, self.unreachable])
-        return _limits(self, float(asked.min()), float(asked.max()))
+        return self._course.limits(float(asked.min()), float(asked.max()))
 
     @cached_property
     def breaks(self) -> tuple[int, ...]:
@@ -294,19 +217,29 @@ class ForceTurn:
         """Whether the slider's force is sought and has no lever on the crank at any angle."""
         return bool(np.ma.getmaskarray(self.slider_force).all()) and not self.singularities
 
+    @property
+    def _parallel(self) -> NDArray[np.bool_]:
+        """Where the rod is parallel to the crank axis."""
+        p = self.parameters.constants()
+        r = on_arrays().rod(self._position, p)
+        return np.asarray(np.hypot(r.x, r.y) <= _PARALLEL * p.a2)
+
     @cached_property
     def masked(self) -> tuple[str, ...]:
-        """What is masked and why, in sentences: ``reasons`` with one for each run of angles."""
-        told = [NO_LEVER] if self.without_lever else []
-        dead, p = np.ma.getmaskarray(self.slider_force), self.parameters.constants()
-        for flags, what, why in _undetermined(dead & (not told), self._position, p):
+        """What is masked and why, in sentences, one for each run of angles."""
+        sentences = [NO_LEVER] if self.without_lever else []
+        dead = np.ma.getmaskarray(self.slider_force) & (not sentences)
+        for flags, what, why in (
+            (dead, "dead centre", _NO_LEVER_HERE),
+            (self._parallel, "the rod is parallel to the crank axis", "frame 3 has no direction across it"),
+        ):
             for first, last in _runs(flags):
                 place = f"crank angle {_deg(self.angle[first])} deg"
                 if last > first:
                     ends = f"{_deg(self.angle[first])} to {_deg(self.angle[last])} deg"
                     place = f"all {last - first + 1} crank angles from {ends}"
-                told.append(f"{what} at {place}: {why}")
-        return tuple(told)
+                sentences.append(f"{what} at {place}: {why}")
+        return tuple(sentences)
 
     def clear(self, degrees: float = CLEAR_DEG, *, poles: bool = True) -> NDArray[np.bool_]:
         """Which angles (n,) are further than ``degrees`` from where forces grow without bound.
@@ -316,10 +249,11 @@ class ForceTurn:
         """
         away = radians(degrees)
         low, high = self._span
-        places = list(_limits(self, low - away, high + away))
+        reach = low - away, high + away
+        places = list(self._course.limits(*reach))
         if poles and self.sought == SLIDER_FORCE:
-            along = in_the_shaft(self.law)
-            places += [c.crank_angle for c in _located(self, low - away, high + away, along=along)]
+            find = self._course.dead_centres if in_the_shaft(self.law) else self._course.singularities
+            places += [c.crank_angle for c in find(*reach)]
         distances = np.abs(self.angle[:, None] - np.array(places)[None, :])
         return np.asarray((distances > away).all(axis=1))
 
@@ -346,13 +280,7 @@ class ForceTurn:
         InputError
             If there is no such vector or frame.
         """
-        if name not in JOINTS:
-            raise InputError(f"there is no joint force or moment {name!r}: the names are {', '.join(JOINTS)}")
-        if frame not in FRAMES:
-            raise InputError(
-                f"there is no frame {frame!r}: the frames are "
-                + ", ".join(f"{number} ({whose})" for number, whose in FRAMES.items())
-            )
+        check_joint(name, frame)
         ground = self._joints[name]
         if frame == 1:
             return ground.copy()
@@ -366,49 +294,11 @@ class ForceTurn:
         else:
             with np.errstate(divide="ignore", invalid="ignore"):
                 turned = f.to_rod_frame(components, q, p)
-            mask = mask | _parallel(q, p)[:, None]
+            mask = mask | self._parallel[:, None]
         return np.ma.MaskedArray(_joined(turned, len(self)), mask=mask, fill_value=np.nan)
 
-    def scene(self, frame: int = 1, *, units: str = "SI") -> ForceScene:
-        """What `analysis.figures.slider_crank.plot_forces` draws: motion, torque and forces, by components in a frame.
-
-        Raises
-        ------
-        InputError
-            If there are no such frame or units.
-        """
-        from ..figures.slider_crank import ForcePanel, ForceScene
-
-        known = unit_table(units)
-
-        def panel(title: str, si: str, curves: Mapping[str, Any]) -> ForcePanel:
-            unit, one = known[si]
-            drawn = {label: np.array(np.ma.filled(x, np.nan)) / one for label, x in curves.items()}
-            return ForcePanel(title=title, unit=unit, curves=drawn, grows=si != "m")
-
-        panels = [
-            panel("slider position S4", "m", {"": self.slider_position}),
-            panel("crank torque", "N.m", {"": self.torque}),
-            panel("slider force, along -k4", "N", {"": self.slider_force}),
-            panel("axial force on the crank", "N", {"": self.axial_force}),
-        ]
-        for name, moment in JOINTS.items():
-            vector = self.vector(name, frame)
-            components = {f"{axis}{frame}": vector[:, i] for i, axis in enumerate("ijk")}
-            panels.append(panel(WORDS[name], "N.m" if moment else "N", components))
-        sought = self.singularities if self.sought == SLIDER_FORCE else ()
-        return ForceScene(
-            angle=self.angle,
-            panels=panels,
-            clear=self.clear(),
-            breaks=self.breaks,
-            poles=tuple(int(np.argmin(np.abs(self.angle - place.crank_angle))) for place in sought),
-            marks={f"dead centre {degrees(d.crank_angle):.1f}°": d.crank_angle for d in self.dead_centres}
-            | {f"limit {degrees(end):.1f}°": end for end in self.limits},
-        )
-
     def columns(self, units: str = "SI", frames: tuple[int, ...] = (1, 2, 3, 4)) -> dict[str, FloatArray]:
-        """Everything by name with unit; NaN where a value is masked, which the last two columns tell.
+        """Everything by name with unit, as for a file; NaN where a value is masked, which the last two columns tell.
 
         Parameters
         ----------
@@ -436,54 +326,17 @@ class ForceTurn:
             ("axial force", "N", self.axial_force),
             ("applied axial force", "N", self.applied_axial_force),
         ]
-        for frame in frames:
-            for name, moment in JOINTS.items():
-                components = self.vector(name, frame)
-                label = name.replace("_", " ")
-                parts += [
-                    (f"{label} {axis} in frame {frame}", "N.m" if moment else "N", components[:, i])
-                    for i, axis in enumerate("ijk")
-                ]
-        columns = {}
-        for name, unit, values in parts:
-            written, one = known[unit]
-            columns[f"{name} [{written}]"] = np.ma.filled(values, np.nan) / one
-        dead = np.ma.getmaskarray(self.slider_force)
+        parts += [
+            (f"{name.replace('_', ' ')} {axis} in frame {frame}", joint.unit, values)
+            for frame in frames
+            for name, joint in JOINTS.items()
+            for axis, values in zip("ijk", self.vector(name, frame).T)
+        ]
+        columns = {f"{name} [{known[unit][0]}]": np.ma.filled(x, np.nan) / known[unit][1] for name, unit, x in parts}
         return columns | {
-            "dead centre (1): forces not determined": dead.astype(float),
-            "rod parallel to crank axis (1): frame 3 not determined": _parallel(
-                self._position, self.parameters.constants()
-            ).astype(float),
+            "dead centre (1): forces not determined": np.ma.getmaskarray(self.slider_force).astype(float),
+            "rod parallel to crank axis (1): frame 3 not determined": self._parallel.astype(float),
         }
-
-    def to_csv(self, path: str | Path, *, units: str = "SI", frames: tuple[int, ...] = (1, 2, 3, 4)) -> Path:
-        """Write `columns` to a CSV file: a row for every angle, "nan" where a value is masked.
-
-        Raises
-        ------
-        InputError
-            As `columns`.
-        """
-        return write_csv(path, self.columns(units, frames))
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ForceInstant:
-    """The forces of one configuration, as `ForceTurn` has them for many; None where a value is not determined.
-
-    ``vectors`` are the joint forces and moments in the ground frame; ``reason`` says why any value is None.
-    """
-
-    angle: float
-    shift: float
-    slider_position: float
-    slider_velocity: float
-    slider_acceleration: float
-    torque: float
-    slider_force: float | None
-    axial_force: float | None
-    vectors: Mapping[str, Vector | None]
-    reason: str
 
 
 def force_turn(
@@ -505,7 +358,7 @@ def force_turn(
     crank_speed, crank_acceleration : array_like, scalar or shape (n,)
         theta1' (rad/s), theta1'' (rad/s2).
     shift : ShiftLaw
-        `ConstantShift`, `GrooveShift`, `AngleShift`, `TimeShift` or another. The parameters' own groove is not looked at.
+        `ConstantShift`, `GrooveShift`, `AngleShift`, `TimeShift` or another. The parameters' own groove is not used.
     angles : array_like, shape (n,), optional
         Crank angles (rad); 361 over the turn by default.
     load : array_like, scalar or shape (n,), optional
@@ -530,52 +383,31 @@ def force_turn(
         raise InputError(
             f"the shift is {shift!r}: it must be a law of the shift, such as ConstantShift(0.01) or GrooveShift(0.01, 2.0)"
         )
-    wanted = "the angles must be a list of finite numbers (rad), at least one"
-    th = (
-        np.linspace(0.0, tau, SAMPLES)
-        if angles is None
-        else np.atleast_1d(_numbers(angles, f"{wanted}, not {angles!r}"))
-    )
-    if th.ndim != 1 or th.size == 0 or not np.isfinite(th).all():
-        raise InputError(wanted)
+    th = _crank_angles(angles)
     n = th.size
-    w = _each("crank_speed", crank_speed, n)
-    e = _each("crank_acceleration", crank_acceleration, n)
-    given = _each("torque", torque, n) if torque is not None else _each("load", 0.0 if load is None else load, n)
-    moving = ShiftMotion(*(_each(f"the shift law's {name}", x, n) for name, x in shift.at(th, w, e)._asdict().items()))
+    w, e = each("crank_speed", crank_speed, n), each("crank_acceleration", crank_acceleration, n)
+    given = each("torque", torque, n) if torque is not None else each("load", 0.0 if load is None else load, n)
+    moving = ShiftMotion(*(each(f"the shift law's {name}", x, n) for name, x in shift.at(th, w, e)._asdict().items()))
     p = with_groove(parameters.constants(), shift)
-    in_shaft = in_the_shaft(shift)
-
-    f = on_arrays()
-    reached = f.assembly_square(th, moving.shift, p) >= (LIMIT_SINE * p.a2) ** 2
+    reached = on_arrays().assembly_square(th, moving.shift, p) >= (LIMIT_SINE * p.a2) ** 2
     if not (reached.any() if partial else reached.all()):
         raise _not_assembled(parameters, shift, th, moving.shift, reached)
     unreachable = th[~reached]
     th, w, e, given = (x[reached] for x in (th, w, e, given))
     moving = ShiftMotion(*(x[reached] for x in moving))
-    n = th.size
-
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        found = solve(p, th, moving, w, e, given=given, torque=torque is not None, groove=in_shaft)
-    dead = np.abs(found.ratio) <= DEAD_CENTRE * p.a1 if torque is not None else np.zeros(n, dtype=bool)
-    m, r = found.motion, found.reactions
+        found = solve(p, th, moving, w, e, given=given, torque=torque is not None, groove=in_the_shaft(shift))
+    n, m, r = th.size, found.motion, found.reactions
+    never = np.zeros(n, dtype=bool)
+    dead = never if torque is None else np.abs(found.ratio) <= DEAD_CENTRE * p.a1
 
-    def masked(values: Any, undetermined: bool = True) -> MaskedArray:
-        whole = _joined(values, n) if isinstance(values, Vector) else np.broadcast_to(values, (n,)).astype(float)
-        mask = dead if undetermined else np.zeros(n, dtype=bool)
-        if whole.ndim == 2:
-            mask = np.repeat(mask[:, None], 3, axis=1)
-        return np.ma.MaskedArray(np.where(mask, np.nan, whole), mask=mask, fill_value=np.nan)
+    def scalar(values: Any, where: NDArray[np.bool_] = dead) -> MaskedArray:
+        return masked_array(np.broadcast_to(values, (n,)), where)
 
-    reasons = [
-        (int(i), f"{what} at crank angle {th[i]:.9g} rad ({degrees(th[i]):.4f} deg): {why}")
-        for flags, what, why in _undetermined(dead, found.position, p)
-        for i in np.flatnonzero(flags)
-    ]
     return ForceTurn(
         parameters=parameters,
         law=shift,
-        sought=SLIDER_FORCE if torque is not None else TORQUE,
+        sought=TORQUE if torque is None else SLIDER_FORCE,
         angle=th,
         speed=w,
         acceleration=e,
@@ -585,102 +417,37 @@ def force_turn(
         slider_position=found.position.s4,
         slider_velocity=m.slider_velocity,
         slider_acceleration=m.slider_acceleration,
-        torque=masked(given if torque is not None else m.torque, undetermined=False),
-        slider_force=masked(found.load),
-        axial_force=masked(r.axial),
-        applied_axial_force=masked(m.force),
+        torque=scalar(m.torque if torque is None else given, never),
+        slider_force=scalar(found.load),
+        axial_force=scalar(r.axial),
+        applied_axial_force=scalar(m.force),
         ratio=found.ratio,
-        reasons=tuple(reasons),
         unreachable=unreachable,
         # the slider's mass times its acceleration has no part in the load
-        _joints=MappingProxyType({name: masked(getattr(r, name), name != "guide_moment") for name in JOINTS}),
+        _joints=MappingProxyType(
+            {
+                name: masked_array(_joined(getattr(r, name), n), (never if name == "guide_moment" else dead)[:, None])
+                for name in JOINTS
+            }
+        ),
         _position=found.position,
     )
 
 
-def forces_at(
-    parameters: SliderCrankParameters,
-    angle: float,
-    *,
-    crank_speed: float,
-    crank_acceleration: float = 0.0,
-    shift: ShiftLaw = _STILL,
-    load: float | None = None,
-    torque: float | None = None,
-) -> ForceInstant:
-    """`force_turn` at one crank angle (rad).
-
-    Raises
-    ------
-    InputError, AssemblyError
-        As `force_turn`.
-    """
-    turn = force_turn(
-        parameters,
-        crank_speed=crank_speed,
-        crank_acceleration=crank_acceleration,
-        shift=shift,
-        angles=[angle],
-        load=load,
-        torque=torque,
-    )
-
-    def determined(values: MaskedArray) -> float | None:
-        return None if np.ma.getmaskarray(values)[0] else float(values[0])
-
-    def components(name: str) -> Vector | None:
-        row = turn.vector(name)[0]
-        return None if np.ma.getmaskarray(row).any() else Vector(*row.tolist())
-
-    return ForceInstant(
-        angle=float(turn.angle[0]),
-        shift=float(turn.shift[0]),
-        slider_position=float(turn.slider_position[0]),
-        slider_velocity=float(turn.slider_velocity[0]),
-        slider_acceleration=float(turn.slider_acceleration[0]),
-        torque=float(turn.torque[0]),
-        slider_force=determined(turn.slider_force),
-        axial_force=determined(turn.axial_force),
-        vectors=MappingProxyType({name: components(name) for name in JOINTS}),
-        reason="; ".join(why for _, why in turn.reasons),
-    )
-
-
-def _numbers(value: ArrayLike, wanted: str) -> FloatArray:
-    """An array of floats."""
-    try:
-        return np.array(value, dtype=float)
-    except (TypeError, ValueError, OverflowError):
-        raise InputError(wanted) from None
-
-
-def _each(name: str, value: ArrayLike, n: int) -> FloatArray:
-    """A finite value for each of n angles."""
-    values = _numbers(value, f"{name} is {value!r}: it must be a number in SI or an array of them")
-    if values.shape not in ((), (1,), (n,)):
-        raise InputError(f"{name} has the shape {values.shape}: it must be a number or have one for each of {n} angles")
-    if not np.isfinite(values).all():
-        raise InputError(f"{name} is {value!r}: it must be finite")
-    return np.broadcast_to(values, (n,)).copy()
+def _crank_angles(angles: ArrayLike | None) -> FloatArray:
+    """Crank angles (n,) as they are asked for, by default over a turn."""
+    if angles is None:
+        return np.linspace(0.0, tau, SAMPLES)
+    message = "the angles must be a list of finite numbers (rad), at least one"
+    th = np.atleast_1d(numbers(angles, f"{message}, not {angles!r}"))
+    if th.ndim != 1 or th.size == 0 or not np.isfinite(th).all():
+        raise InputError(message)
+    return th
 
 
 def _joined(vector: Vector, n: int) -> FloatArray:
     """Components as an array (n, 3)."""
     return np.stack([np.broadcast_to(x, (n,)) for x in vector], axis=-1).astype(float)
-
-
-def _parallel(q: Position, p: Constants) -> NDArray[np.bool_]:
-    """Where the rod is parallel to the crank axis."""
-    r = on_arrays().rod(q, p)
-    return np.asarray(np.hypot(r.x, r.y) <= _PARALLEL * p.a2)
-
-
-def _undetermined(dead: NDArray[np.bool_], q: Position, p: Constants) -> tuple[tuple[NDArray[np.bool_], str, str], ...]:
-    """Where something is masked, what there is, and why."""
-    return (
-        (dead, "dead centre", "the slider's force has no lever on the crank, so that the torque does not determine it"),
-        (_parallel(q, p), "the rod is parallel to the crank axis", "frame 3 has no direction across it"),
-    )
 
 
 def _deg(angle: float) -> str:
@@ -715,88 +482,3 @@ def _runs(flags: NDArray[np.bool_]) -> list[tuple[int, int]]:
     """First and last index of each run of true values."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(int)))
     return [(int(first), int(end) - 1) for first, end in zip(edges[::2], edges[1::2])]
-
-
-def _located(turn: ForceTurn, low: float, high: float, *, along: bool) -> tuple[DeadCentre, ...]:
-    """Zeros of the slider's velocity ``along`` the law of the shift, or with the shift held, from ``low`` to ``high``."""
-    repeating = turn.law.repeating(turn.parameters)
-    if repeating is None:
-        return _sign_changes(turn, low, high, 1.0 if along else 0.0)
-    find = mobility.dead_centres if along else mobility.singularities
-    found = find(turn.parameters, repeating)
-    moved = (c._replace(crank_angle=c.crank_angle + more) for more in _turns(low, high, repeating.span) for c in found)
-    return tuple(centre for centre in moved if low <= centre.crank_angle <= high)
-
-
-def _limits(turn: ForceTurn, low: float, high: float) -> tuple[float, ...]:
-    """Ends of the ranges of assembly from ``low`` to ``high`` (rad)."""
-    repeating = turn.law.repeating(turn.parameters)
-    if repeating is None:
-        square = _along(turn).square
-        at = _places(low, high)
-        reached = square(at) > 0.0
-        return tuple(
-            float(brentq(lambda x: float(square(np.array([x]))[0]), at[i], at[i + 1], xtol=1e-14))
-            for i in np.flatnonzero(reached[1:] != reached[:-1])
-        )
-    parts = mobility.ranges(turn.parameters, repeating)
-    ends = {end for part in parts if not part.full(repeating.span) for end in (part.low, part.high)}
-    moved = (end + more for more in _turns(low, high, repeating.span) for end in ends)
-    return tuple(sorted(end for end in moved if low <= end <= high))
-
-
-def _turns(low: float, high: float, span: float) -> list[float]:
-    """What angles in [0, 2 span] are moved by to have all of them from ``low`` to ``high``."""
-    return [span * n for n in range(ceil(low / span) - 2, ceil(high / span) + 1)]
-
-
-def _places(low: float, high: float) -> FloatArray:
-    """Angles between which signs are compared."""
-    return np.linspace(low, high, ceil((high - low) / tau * _PIECES) + 1)
-
-
-class _Along(NamedTuple):
-    """Functions of crank angles (n,): the law's shift, and what is positive where the rod reaches the guide (m2)."""
-
-    shift: Callable[[FloatArray], ShiftMotion]
-    square: Callable[[FloatArray], FloatArray]
-    speed: float
-
-
-def _along(turn: ForceTurn) -> _Along:
-    # the slope of the shift by the angle does not depend on the speed but under a law by time, which takes no other
-    speed = float(turn.speed[0]) or 1.0
-    f, p = on_arrays(), turn.parameters.constants()
-
-    def shift(angle: FloatArray) -> ShiftMotion:
-        return turn.law.at(angle, np.full(angle.shape, speed), np.zeros(angle.shape))
-
-    def square(angle: FloatArray) -> FloatArray:
-        return np.asarray(f.assembly_square(angle, shift(angle).shift, p))
-
-    return _Along(shift, square, speed)
-
-
-def _sign_changes(turn: ForceTurn, low: float, high: float, pitch: float) -> tuple[DeadCentre, ...]:
-    """Zeros of kth + ``pitch`` S1' ks, at 1440 places in the turn and more closely where the sign changes."""
-    f, p = on_arrays(), turn.parameters.constants()
-    shift, square, speed = _along(turn)
-
-    def slope(angle: FloatArray) -> FloatArray:
-        moving = shift(angle)
-        k = f.coefficients(f.position(angle, moving.shift, p), p)
-        return np.asarray(k.kth + pitch * moving.velocity / speed * k.ks)
-
-    at = _places(low, high)
-    reached = square(at) > (LIMIT_SINE * p.a2) ** 2
-    values = np.zeros(at.shape)
-    values[reached] = slope(at[reached])
-    positive = values > 0.0
-    found = []
-    for i in np.flatnonzero((positive[1:] != positive[:-1]) & reached[1:] & reached[:-1]):
-        angle = brentq(lambda x: float(slope(np.array([x]))[0]), at[i], at[i + 1], xtol=1e-14)
-        moving = shift(np.array([angle]))
-        q = f.position(np.array([angle]), moving.shift, p)
-        outer = bool(positive[i]) == (p.branch > 0.0)
-        found.append(DeadCentre(float(angle), float(moving.shift[0]), float(q.s4[0]), outer))
-    return tuple(found)

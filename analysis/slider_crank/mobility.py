@@ -23,9 +23,10 @@ from math import cos, inf, isfinite, pi, sin, sqrt
 from sys import float_info
 from typing import NamedTuple
 
-from linkwork.errors import InputError, ParameterError
+from linkwork.errors import AssemblyError, InputError, ParameterError
 from linkwork.slider_crank import kinematics
 from linkwork.slider_crank.parameters import Constants, SliderCrankParameters
+from linkwork.slider_crank.plant import check_assembly
 
 #: Width (rad) of a piece of the turn that is not divided further. Two zeros of one piece go unseen.
 FINEST = 1e-3
@@ -337,11 +338,6 @@ def _margin(choose: Callable[..., float], law: PeriodicShift, p: Constants) -> M
     return Margin(p.a2 - sqrt(p.a2 * p.a2 - _square(place, law, p)), _wrapped(place, law))
 
 
-def turns_fully(parameters: SliderCrankParameters, law: PeriodicShift) -> bool:
-    """Whether the rod reaches the guide at every crank angle."""
-    return assembly_margin(parameters, law).length >= 0.0
-
-
 def greatest_shift(parameters: SliderCrankParameters) -> float | None:
     """The greatest constant shift |S1| (m) at which the crank turns fully; None if there is none.
 
@@ -432,6 +428,26 @@ def ranges(parameters: SliderCrankParameters, law: PeriodicShift) -> tuple[Range
     """
     p = parameters.constants()
     return tuple(_range(low, high, law, p) for low, high in _assembled(law, p))
+
+
+def assembled_ranges(parameters: SliderCrankParameters, law: PeriodicShift) -> tuple[Range, ...]:
+    """The `ranges` of a mechanism that can be assembled.
+
+    Raises
+    ------
+    AssemblyError
+        If there is none, with by how much the rod is too short where that is least.
+    """
+    found = ranges(parameters, law)
+    if not found:
+        nearest = greatest_margin(parameters, law).crank_angle
+        try:
+            check_assembly(parameters, nearest, law.at(nearest)[0])
+        except AssemblyError as error:
+            raise AssemblyError(
+                f"it cannot be assembled at any crank angle; where it comes nearest to it, {error}"
+            ) from None
+    return found
 
 
 def dead_centres(parameters: SliderCrankParameters, law: PeriodicShift) -> tuple[DeadCentre, ...]:

@@ -13,7 +13,7 @@ from types import SimpleNamespace
 from typing import Any, NamedTuple, Protocol, TypeAlias, runtime_checkable
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from linkwork import friction
 from linkwork.errors import InputError, ParameterError
@@ -22,8 +22,7 @@ from linkwork.slider_crank.parameters import Constants, SliderCrankParameters
 
 from ..numerics.tracing import rebound
 from . import mobility
-
-FloatArray: TypeAlias = NDArray[np.float64]
+from .quantities import FloatArray
 
 
 @cache

@@ -19,7 +19,7 @@ put; it is here where the planar mechanism closes with the angles of section 2.6
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, TypeAlias
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,8 +29,7 @@ from linkwork.slider_crank.published import INCH
 
 from ..numerics.dual import Array, Dual, about_i, about_j, about_k, skew, stack
 from .closure import close, given, residuals
-
-FloatArray: TypeAlias = NDArray[np.float64]
+from .quantities import FloatArray
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -86,7 +86,7 @@ class Family(NamedTuple):
 class Component(NamedTuple):
     """A component of a force or moment: its symbol, what it is, its unit as printed, and where it comes from.
 
-    ``source`` is a joint's vector of `analysis.slider_crank.forces.ForceTurn`, of which it is the component along ``axis`` of
+    ``source`` is a joint's vector of `analysis.slider_crank.ForceTurn`, of which it is the component along ``axis`` of
     ``frame``, or one of the two forces that are along an axis, "axial_force" and "slider_force". ``sign`` turns the sense of
     that one into the thesis's.
     """

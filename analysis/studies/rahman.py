@@ -25,13 +25,18 @@ from numpy.typing import NDArray
 from linkwork.slider_crank.published import CRANK_SPEED, CRANK_TORQUE, INCH, POUND_FORCE, POUND_INCH, parameters
 
 from ..figures import COLOURS, Curve, Figure, Panel, plot_curves
-from ..slider_crank.closure import close, follow
-from ..slider_crank.dual_dynamics import JointLoads, joint_loads
-from ..slider_crank.forces import CLEAR_DEG, ConstantShift, ForceTurn, force_turn
-from ..slider_crank.mobility import (
+from ..slider_crank import (
+    CLEAR_DEG,
+    ConstantShift,
+    ForceTurn,
+    JointLoads,
     assembly_margin,
+    close,
     constant_shift,
+    follow,
+    force_turn,
     greatest_shift,
+    joint_loads,
     ranges,
 )
 from ._rahman import (

@@ -9,12 +9,12 @@ from math import radians
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from matplotlib.text import Text
 
-from analysis import cli
+from analysis import cli, figures
 from analysis.cli import slider_crank
-from analysis.figures.slider_crank import plot_forces
-from analysis.run.case_files import save_parameters
-from analysis.slider_crank.forces import force_turn
+from analysis.files import io
+from analysis.slider_crank import ConstantShift, comparison, force_turn
 from linkwork.five_bar.published import TABLE_3_1
 from linkwork.slider_crank.published import CRANK_SPEED, INCH, parameters
 from tests import published_rahman as rahman
@@ -103,7 +103,7 @@ class TestInfo:
 class TestParameterFiles:
     @pytest.mark.parametrize("ending", ["toml", "json"])
     def test_a_file_is_read(self, linkwork, tmp_path, ending):
-        save_parameters(tmp_path / f"mine.{ending}", replace(parameters(30.0), rod_length=1.5))
+        io.save_parameters(tmp_path / f"mine.{ending}", replace(parameters(30.0), rod_length=1.5))
         result = linkwork("info", f"mine.{ending}", "--shift", "1 in")
         assert result.exit_code == 0, result.output
         assert rows(result.output)["crank a1, rod a2"] == ["0.3048 m, 1.5 m"]
@@ -113,7 +113,7 @@ class TestParameterFiles:
         assert rows(result.output)["shift S1"] == ["0 m"]
 
     def test_what_a_file_does_not_say_is_told(self, linkwork, tmp_path):
-        save_parameters(tmp_path / "mine.toml", replace(parameters(30.0), groove_amplitude=0.01))
+        io.save_parameters(tmp_path / "mine.toml", replace(parameters(30.0), groove_amplitude=0.01))
         said = " ".join(linkwork("forces", "mine.toml", "--points", 3, "--no-plot", "--units", "inch").stderr.split())
         assert "S1 = 0 in (--shift), no groove (--groove), a crank speed of 50 rpm (--speed)" in said
         assert "rpm" not in linkwork("info", "mine.toml").stderr
@@ -121,7 +121,7 @@ class TestParameterFiles:
         assert linkwork("info", "mine.toml", "--groove", "shaft").stderr == ""
 
     def test_a_file_of_the_other_mechanism(self, linkwork, tmp_path):
-        save_parameters(tmp_path / "five.toml", TABLE_3_1)
+        io.save_parameters(tmp_path / "five.toml", TABLE_3_1)
         result = linkwork("info", "five.toml")
         assert result.exit_code == cli.WRONG
         assert (
@@ -168,7 +168,7 @@ class TestForces:
         columns = csv(tmp_path / "out" / "rahman-a4-10-s1-3.5-forces.csv")
         assert columns["slider force [N]"] == pytest.approx(-20.0 * rahman.POUND_FORCE)
         slow = force_turn(
-            parameters(10.0), crank_speed=CRANK_SPEED, shift=slider_crank_shift(3.5), angles=[radians(30.0)]
+            parameters(10.0), crank_speed=CRANK_SPEED, shift=ConstantShift(3.5 * INCH), angles=[radians(30.0)]
         )
         assert columns["slider velocity [m/s]"][1] == pytest.approx(2.0 * slow.slider_velocity[0])
 
@@ -188,7 +188,7 @@ class TestForces:
 
     def test_the_plot_has_gaps_at_the_dead_centres_and_is_scaled_clear_of_them(self):
         turn = force_turn(parameters(10.0), crank_speed=CRANK_SPEED, angles=np.radians(np.arange(361.0)), torque=11.3)
-        figure = plot_forces(turn.scene(4), title="forces")
+        figure = figures.plot(turn, 4, title="forces")
         (axis,) = [a for a in figure.axes if a.get_title() == "slider force, along -k4"]
         values = axis.lines[0].get_ydata()
         assert [int(i) for i in np.flatnonzero(np.isnan(values))] == [99, 285]
@@ -222,7 +222,7 @@ class TestForces:
         low = np.degrees(np.arccos(-10.0 / 12.0))
         assert np.degrees(turn.limits) == pytest.approx([low, 360.0 - low])
         assert [float(np.degrees(turn.angle[i])) for i in turn.breaks] == pytest.approx([146.0])
-        for axis in plot_forces(turn.scene(1), title="").axes:
+        for axis in figures.plot(turn, title="").axes:
             for line in axis.lines:
                 x, y = np.asarray(line.get_xdata()), np.asarray(line.get_ydata())
                 if len(x) < 3:  # a mark
@@ -269,12 +269,6 @@ class TestForces:
         assert "the rod does not reach the guide at 16 of 73 crank angles" in " ".join(result.stderr.split())
         columns = csv(tmp_path / "out" / "slider-crank-forces.csv")
         assert len(columns["crank angle [rad]"]) == 57
-
-
-def slider_crank_shift(inches):
-    from analysis.slider_crank.forces import ConstantShift
-
-    return ConstantShift(inches * INCH)
 
 
 class TestTolerances:
@@ -329,28 +323,20 @@ class TestTolerances:
         assert "give an angle from 0 to 360 deg" in " ".join(result.stderr.split())
 
     def test_pictures_and_notes_are_in_inches_too(self, linkwork, monkeypatch):
-        from analysis.figures import slider_crank as figures
-
         drawn = []
-        right = figures.plot_tolerances
-        monkeypatch.setattr(
-            figures,
-            "plot_tolerances",
-            lambda scene, **options: drawn.append((scene, options)) or right(scene, **options),
-        )
+        right = figures.plot
+        monkeypatch.setattr(figures, "plot", lambda *a, **options: drawn.append(right(*a, **options)) or drawn[-1])
         arguments = (
             "tolerances", "--published", "rahman-ideal", "--tolerance", "shift.position=0.5 in", "--points", 3, "--samples",
             500,
         )  # fmt: skip
-        notes = [linkwork(*arguments, "--units", units).stderr for units in ("inch", "SI")]
-        (inch, inches), (si, sis) = drawn
-        assert inches["shown"] == pytest.approx(("in", 1.0 / INCH))
-        assert sis["shown"] is None
-        for told, scene, unit in zip(notes, (inch, si), ("in", "m")):
-            (note,) = scene.notes
-            assert note in " ".join(told.split())
-            assert re.search(rf"deviation is [\d.e-]+ {unit}, to second", note)
-        numbers = [float(re.search(r"deviation is ([\d.e-]+) ", scene.notes[0])[1]) for scene in (inch, si)]
+        notes = [" ".join(linkwork(*arguments, "--units", units).stderr.split()) for units in ("inch", "SI")]
+        for note, figure, units in zip(notes, drawn, (("in", "in"), ("m", "mm"))):
+            said = re.search(rf"the linear estimate.* deviation is [\d.e-]+ {units[0]}, to second .*", note)[0]
+            foot = " ".join(" ".join(x.get_text() for x in figure.findobj(Text)).split())
+            assert said[1:] in foot
+            assert f"error of slider position [{units[1]}]" in foot
+        numbers = [float(re.search(r"deviation is ([\d.e-]+) ", note)[1]) for note in notes]
         assert numbers[0] * INCH == pytest.approx(numbers[1], rel=5e-3)
 
     def test_a_seed_gives_the_same_samples(self, linkwork, tmp_path):
@@ -420,8 +406,6 @@ class TestDual:
         assert max(float(closed[1]), float(closed[2])) < 1e-12
 
     def test_a_disagreement_is_a_failed_check(self, linkwork, monkeypatch):
-        from analysis.slider_crank import comparison
-
         right = comparison.joint_loads
 
         def wrong(*arguments, **options):
@@ -457,12 +441,10 @@ class TestPicture:
             assert f"wrote out/{name}{ending}" in result.output
 
     def test_it_is_of_what_was_asked_for(self, linkwork, monkeypatch):
-        from analysis.figures import slider_crank_picture as pictures
-
         asked = []
-        right = pictures.plot_mechanism
+        right = figures.plot_mechanism
         monkeypatch.setattr(
-            pictures, "plot_mechanism", lambda *a, **options: asked.append((a, options)) or right(*a, **options)
+            figures, "plot_mechanism", lambda *a, **options: asked.append((a, options)) or right(*a, **options)
         )
         arguments = ("--angle", "45 deg", "--groove", "apart", "--set", "groove.amplitude=2 in", "--units", "inch")
         assert linkwork("picture", *arguments, "--view", "30 deg", "1 rad").exit_code == 0
@@ -531,7 +513,7 @@ def test_what_is_wrong_is_told_in_a_sentence(linkwork, tmp_path, arguments, code
 
 
 def test_a_file_and_a_published_case_exclude_each_other(linkwork, tmp_path):
-    save_parameters(tmp_path / "mine.toml", parameters(30.0))
+    io.save_parameters(tmp_path / "mine.toml", parameters(30.0))
     result = linkwork("info", "mine.toml", "--published", "rahman-ideal")
     assert result.exit_code == 2
     assert "give either a file of parameters or --published NAME" in result.stderr

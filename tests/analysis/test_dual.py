@@ -18,9 +18,7 @@ from analysis.numerics.dual import (
     apply,
     axial,
     cross,
-    derivative,
-    dot,
-    frame,
+    dual,
     join,
     origin,
     skew,
@@ -45,6 +43,10 @@ def duals(draw: st.DrawFn) -> Dual:
 def same(a: Dual, b: Dual, tolerance: float = 1e-12) -> None:
     np.testing.assert_allclose(a.real, b.real, rtol=tolerance, atol=tolerance)
     np.testing.assert_allclose(a.dual, b.dual, rtol=tolerance, atol=tolerance)
+
+
+def derivative(function: Callable[[Dual], Any], x: Any) -> Any:
+    return dual(function(Dual(x, 1.0))).dual
 
 
 def drawn(seed: int, *shape: int) -> Dual:
@@ -180,11 +182,7 @@ def test_directions_are_no_axis_of_the_numbers(size: int) -> None:
         lambda x, y: np.arctan2(x, c) + np.hypot(c, y),
         lambda x, y: np.minimum(x, c) + np.maximum(c, y),
         lambda x, y: stack([x, c, y])[..., 0] if isinstance(x, Dual) else x + 0.0 * c,
-        lambda x, y: (
-            dot(stack([x, y, 0.0]), np.outer(c, [1.0, 2.0, 3.0])).real
-            if not isinstance(x, Dual)
-            else dot(stack([x, y, 0.0]), np.outer(c, [1.0, 2.0, 3.0]))
-        ),
+        lambda x, y: np.outer(c, [1.0, 2.0]) @ (stack([x, y]) if isinstance(x, Dual) else np.array([x, y])),
     ]
     x, y = variables(2.1, 3.2)
     for operation in operations:
@@ -245,13 +243,8 @@ def test_what_is_not_finite_is_told_for_all_directions_of_a_number() -> None:
     assert np.isnan(x).tolist() == [False, True, True]
 
 
-def test_sum_length_and_elements() -> None:
+def test_length_and_elements() -> None:
     x = Dual(np.arange(6.0).reshape(2, 3), np.arange(12.0).reshape(2, 2, 3))
-    for axis in (None, 0, 1, -1, -2):
-        total = np.sum(x, axis=axis)
-        assert isinstance(total, Dual)
-        np.testing.assert_array_equal(total.real, x.real.sum(axis))
-        np.testing.assert_array_equal(total.dual, [part.sum(axis) for part in x.dual])
     assert len(x) == 2
     assert [row.shape for row in x] == [(3,), (3,)]
     assert np.shape(x) == (2, 3)
@@ -259,8 +252,8 @@ def test_sum_length_and_elements() -> None:
     assert not Dual(0.0, 1.0)
     with pytest.raises(TypeError):
         len(Dual(1.0))
-    for function in (np.mean, np.concatenate, lambda y: np.sum(y, keepdims=True)):
-        with pytest.raises(TypeError, match="stack, join"):
+    for function in (np.mean, np.sum, np.concatenate):
+        with pytest.raises(TypeError):
             function(x)
 
 
@@ -348,7 +341,7 @@ def test_displacements_compose_as_rigid_motions(seed: int) -> None:
     both = first @ second
     np.testing.assert_allclose(both.real, first.real @ second.real, atol=1e-13)
     np.testing.assert_allclose(origin(both), origin(first) + first.real @ origin(second), atol=1e-12)
-    same(frame(both.real, origin(both)), both)
+    same(Dual(both.real, skew(origin(both)).real @ both.real), both)
 
 
 @pytest.mark.parametrize(("about", "axis"), [(about_i, 0), (about_j, 1), (about_k, 2)])
@@ -367,20 +360,20 @@ def test_screw_displacement_about_an_axis(about: Callable[[Any], Dual], axis: in
 
 @given(seeds)
 @several
-def test_dot_and_cross_do_not_depend_on_the_frame(seed: int) -> None:
+def test_products_do_not_depend_on_the_frame(seed: int) -> None:
     a, b, m = drawn(seed, 3), drawn(seed + 1, 3), displacement(seed)
-    same(dot(apply(m, a), apply(m, b)), dot(a, b), 1e-10)
+    same(apply(m, a) @ apply(m, b), a @ b, 1e-10)
     same(cross(apply(m, a), apply(m, b)), apply(m, cross(a, b)), 1e-10)
     same(apply(skew(a), b), cross(a, b))
     same(axial(skew(a)), a)
     same(cross(a, b), -cross(b, a))
 
 
-def test_dot_of_unit_lines_is_the_cosine_of_their_dual_angle() -> None:
+def test_product_of_unit_lines_is_the_cosine_of_their_dual_angle() -> None:
     """A line along i through the origin, and one turned by 0.6 about k at the height 2 above it."""
     i = Dual([1.0, 0.0, 0.0])
     angle = Dual(0.6, 2.0)
-    same(dot(i, apply(about_k(angle), i)), np.cos(angle))
+    same(i @ apply(about_k(angle), i), np.cos(angle))
 
 
 @given(seeds)

@@ -14,9 +14,8 @@ import pytest
 from numpy.typing import NDArray
 
 from analysis.numerics.dual import Dual, about_j, about_k, axial, origin
-from analysis.slider_crank.closure import close
-from analysis.slider_crank.dual_dynamics import binors, joint_loads, rates
-from analysis.slider_crank.two_rotations import chain, settle
+from analysis.slider_crank import binors, close, joint_loads, rates, settle
+from analysis.slider_crank.two_rotations import chain
 from linkwork.slider_crank import kinematics
 from linkwork.slider_crank.published import CRANK_SPEED, CRANK_TORQUE, parameters
 from tests.published_rahman import (

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from analysis import studies
 from analysis.cli import main
-from analysis.slider_crank.forces import ConstantShift, force_turn
+from analysis.slider_crank import ConstantShift, force_turn
 from analysis.studies import rahman
 from analysis.studies._rahman import FAMILIES, FIGURES, IDEAL, QUANTITIES, SLIDER_MOMENTS, Case
 from analysis.studies.study import BALANCE, REFERENCE, THESIS, StudyResult, Verdict

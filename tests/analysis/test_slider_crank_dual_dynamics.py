@@ -12,8 +12,7 @@ from hypothesis import given, settings
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
-from analysis.slider_crank.closure import close, follow
-from analysis.slider_crank.dual_dynamics import DeadCentreError, JointLoads, Rates, binors, joint_loads, rates
+from analysis.slider_crank import DeadCentreError, JointLoads, Rates, binors, close, follow, joint_loads, rates
 from linkwork.errors import AssemblyError, InputError
 from linkwork.slider_crank import dynamics, kinematics
 from linkwork.slider_crank.parameters import SliderCrankParameters

@@ -13,9 +13,9 @@ from hypothesis import strategies as st
 from matplotlib.collections import PolyCollection
 from PIL import Image
 
+from analysis.figures import animate_mechanism, plot_mechanism, plot_range, solids
 from analysis.figures import slider_crank_picture as pictures
-from analysis.figures.slider_crank_picture import animate_mechanism, plot_mechanism, plot_range
-from analysis.slider_crank.mobility import constant_shift, groove_shift
+from analysis.slider_crank import constant_shift, groove_shift
 from linkwork.errors import AssemblyError, InputError
 from linkwork.slider_crank.published import INCH, parameters
 from tests import published_rahman as rahman
@@ -71,13 +71,13 @@ class TestSolids:
     def test_faces_point_outwards_and_enclose_the_volume(self, origin) -> None:
         rows = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])
         for faces, volume, tolerance in (
-            (pictures._box([-1.0, -2.0, 0.0], [3.0, 1.0, 2.0], rows, origin, pieces=3), 24.0, 1e-9),
+            (solids.box([-1.0, -2.0, 0.0], [3.0, 1.0, 2.0], rows, origin, pieces=3), 24.0, 1e-9),
             (
-                pictures._tube(origin, origin + np.array([0.0, 3.0, 4.0]), 0.5, pieces=4, sides=64),
+                solids.tube(origin, origin + np.array([0.0, 3.0, 4.0]), 0.5, pieces=4, sides=64),
                 5.0 * pi * 0.25,
                 0.01,
             ),
-            (pictures._ball(origin, 2.0, sides=60), 4.0 / 3.0 * pi * 8.0, 0.2),
+            (solids.ball(origin, 2.0, sides=60), 4.0 / 3.0 * pi * 8.0, 0.2),
         ):
             # divergence theorem: a third of the sum of area vector times place
             diagonals = np.cross(faces[:, 2] - faces[:, 0], faces[:, 3] - faces[:, 1])
@@ -87,9 +87,9 @@ class TestSolids:
 
     def test_only_faces_towards_the_eye_are_painted_from_back_to_front(self) -> None:
         figure = plot_mechanism(OFFSET, radians(30.0), 3.5 * INCH)
-        (solids,) = [c for c in figure.axes[0].collections if isinstance(c, PolyCollection)]
+        (painted,) = [c for c in figure.axes[0].collections if isinstance(c, PolyCollection)]
         area = [
-            0.5 * np.sum(v[:-1, 0] * v[1:, 1] - v[1:, 0] * v[:-1, 1]) for v in (p.vertices for p in solids.get_paths())
+            0.5 * np.sum(v[:-1, 0] * v[1:, 1] - v[1:, 0] * v[:-1, 1]) for v in (p.vertices for p in painted.get_paths())
         ]
         assert min(area) >= -1e-9
         assert len(area) > 500
@@ -123,8 +123,8 @@ class TestMechanism:
             figure = plot_mechanism(p, radians(200.0), shift)
             (axis,) = figure.axes
             assert axis.get_aspect() == 1.0
-            (solids,) = axis.collections
-            points = np.concatenate([path.vertices for path in solids.get_paths()])
+            (painted,) = axis.collections
+            points = np.concatenate([path.vertices for path in painted.get_paths()])
             (left, right), (low, high) = axis.get_xlim(), axis.get_ylim()
             assert (points > [left, low]).all()
             assert (points < [right, high]).all()

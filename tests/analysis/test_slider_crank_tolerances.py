@@ -16,16 +16,21 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from analysis.slider_crank.forces import AngleShift, ConstantShift, ForceTurn, GrooveShift, ShiftLaw, force_turn
-from analysis.slider_crank.tolerances import (
+from analysis.slider_crank import (
     ANGLE,
     DIMENSIONS,
     ERRORS,
     PERCENTILES,
     QUANTITIES,
     SHIFT,
+    AngleShift,
+    ConstantShift,
+    ForceTurn,
+    GrooveShift,
+    ShiftLaw,
     Tolerance,
     estimate,
+    force_turn,
     monte_carlo,
     sensitivities,
 )
@@ -297,7 +302,7 @@ def test_samples_are_those_of_the_closed_form() -> None:
         assert spread.counts[i].sum() == pytest.approx(0.999 * samples, abs=3)
         assert spread.edges[i, [0, -1]] == pytest.approx(np.percentile(values, [0.05, 99.95]), abs=1e-7)
     assert not result.not_assembled.any()
-    assert result.messages == ()
+    assert result.notes() == ()
     same = monte_carlo(offset_turn(angles), TOLERANCES, samples=samples, seed=5)
     other = monte_carlo(offset_turn(angles), TOLERANCES, samples=samples, seed=6)
     assert (same.spreads["slider.position"].mean == spread.mean).all()
@@ -336,7 +341,7 @@ def test_a_million_samples_agree_with_the_linear_estimate_in_seconds() -> None:
     result = monte_carlo(turn, TOLERANCES, quantities=quantities)
     assert perf_counter() - begin < 10.0
     assert result.samples == 1_000_000
-    assert result.messages == ()
+    assert result.notes() == ()
     for name in quantities:
         spread, linear = result.spreads[name], result.estimates[name]
         # the standard error of a standard deviation is 0.07 % of it
@@ -353,7 +358,7 @@ def test_where_the_first_derivatives_vanish_it_is_told() -> None:
     assert result.linear_is_off("slider.position").tolist() == [False, True]
     assert spread.deviation.data == pytest.approx(found.second_deviation.data, rel=0.02)
     assert spread.mean[1] == pytest.approx(found.second_mean[1], abs=0.02 * found.second_deviation[1])
-    (message,) = result.messages
+    (message,) = result.notes()
     assert (
         "the linear estimate of slider.position is off at crank angle 90 deg: its first derivatives vanish" in message
     )
@@ -370,8 +375,8 @@ def test_samples_that_cannot_be_assembled_are_counted(seed: int) -> None:
     assert abs(result.not_assembled[0] - beyond) < 5.0 * sqrt(beyond) + 0.002 * samples
     assert result.not_assembled[1] == 0
     assert not result.undetermined.any()
-    assert result.messages[0].startswith(f"{result.not_assembled[0]} of 20000 samples (1")
-    assert "cannot be assembled at crank angle 0 deg, the most of any angle" in result.messages[0]
+    assert result.notes()[0].startswith(f"{result.not_assembled[0]} of 20000 samples (1")
+    assert "cannot be assembled at crank angle 0 deg, the most of any angle" in result.notes()[0]
     spread = result.spreads["slider.position"]
     assert spread.least[0] > 0.0
     assert spread.counts[0].sum() <= samples - result.not_assembled[0]
@@ -395,7 +400,7 @@ def test_angles_that_the_nominal_mechanism_cannot_reach_are_told() -> None:
     turn = force_turn(IDEAL, crank_speed=1.0, shift=shift, angles=[0.0, 1.0, 2.0], partial=True)
     assert turn.unreachable.tolist() == [0.0]
     result = monte_carlo(turn, [Tolerance("rod.length", 1e-5)], samples=10)
-    assert result.messages == ("1 crank angles are left out: the nominal mechanism cannot be assembled there",)
+    assert result.notes() == ("1 crank angles are left out: the nominal mechanism cannot be assembled there",)
 
 
 def test_across_a_dead_centre_there_is_no_mean() -> None:
@@ -419,10 +424,10 @@ def test_across_a_dead_centre_there_is_no_mean() -> None:
         assert not np.ma.getmaskarray(result.estimates[name].deviation).any()
     for name in ("guide.mx", "slider.position"):
         assert not np.ma.getmaskarray(result.spreads[name].mean).any()
-    assert sum("samples on both sides of a dead centre" in m and "slider.load" in m for m in result.messages) == 1
+    assert sum("samples on both sides of a dead centre" in m and "slider.load" in m for m in result.notes()) == 1
     # where the load is given the same place is like any other
     free = force_turn(OFFSET, load=3.0, angles=[centre], **common)
-    assert monte_carlo(free, TOLERANCES, quantities=("crank_pin.fx",), samples=2000).messages == ()
+    assert monte_carlo(free, TOLERANCES, quantities=("crank_pin.fx",), samples=2000).notes() == ()
 
 
 def test_an_estimate_ends_where_the_tolerances_reach_the_dead_centre() -> None:
@@ -441,7 +446,7 @@ def test_an_estimate_ends_where_the_tolerances_reach_the_dead_centre() -> None:
     few = monte_carlo(turn, tolerances, quantities=("slider.load",), samples=10, seed=1)
     assert not np.ma.getmaskarray(few.spreads["slider.load"].mean).any()
     assert few.linear_is_off("slider.load")[1:3].all()
-    assert "the tolerances reach a dead centre from crank angle 9" in few.messages[0]
+    assert "the tolerances reach a dead centre from crank angle 9" in few.notes()[0]
 
 
 def test_samples_that_are_no_mechanism_are_told() -> None:
@@ -477,9 +482,9 @@ def test_samples_at_a_dead_centre_itself_are_counted() -> None:
     result = monte_carlo(turn, [Tolerance("rod.length", 1e-4)], quantities=("slider.load",), samples=500)
     assert result.undetermined.tolist() == [500, 0]
     assert np.ma.getmaskarray(result.spreads["slider.load"].percentiles)[0].tolist() == [True, False]
-    assert "500 samples are at a dead centre" in result.messages[0]
+    assert "500 samples are at a dead centre" in result.notes()[0]
     with pytest.raises(InputError, match=r"slider\.load is not determined at crank angle 90 deg"):
-        result.scene("slider.load", 0.5 * pi)
+        result.place("slider.load", 0.5 * pi)
 
 
 @pytest.mark.parametrize(
@@ -514,4 +519,4 @@ def test_wrong_input_is_told() -> None:
     with pytest.raises(InputError, match="1 samples: there must be at least two"):
         monte_carlo(turn, TOLERANCES, samples=1)
     with pytest.raises(ParameterError, match=r"crank_pin\.fx"):
-        monte_carlo(turn, TOLERANCES, samples=10).scene("crank_pin.fx")
+        monte_carlo(turn, TOLERANCES, samples=10).place("crank_pin.fx", 0.3)

@@ -1,0 +1,127 @@
+"""`linkwork slider-crank dual`: the thesis's dual-number method held against vector mechanics."""
+
+from __future__ import annotations
+
+import sys
+from math import tau
+from pathlib import Path
+
+import click
+import numpy as np
+from click.core import ParameterSource
+
+from linkwork.slider_crank.plant import check_assembly
+
+from ... import slider_crank as analysis
+from ..common import CHECK_FAILED, console, errors, show_table, tolerance_option
+from ..design import wrote
+from .options import Chosen, Problem, about_mechanism, out_option, with_problem
+
+
+@click.command()
+@about_mechanism
+@with_problem(points=361)
+@click.option(
+    "--tolerance",
+    type=float,
+    callback=tolerance_option,
+    default=1e-9,
+    show_default=True,
+    help="Largest relative difference that passes.",
+)
+@click.option(
+    "--two-rotations", is_flag=True, help="Show instead where the thesis's own closure ends, and how far open."
+)
+@out_option
+def dual(chosen: Chosen, problem: Problem, tolerance: float, two_rotations: bool, out: str) -> None:
+    """Hold the thesis's dual-number method against vector mechanics, quantity by quantity.
+
+    The loop is closed by dual matrices with true ball joints, forces by dual momenta. Differences are relative to the largest
+    quantity of the same unit. --two-rotations shows the thesis's own form, which gives each ball joint two rotations and
+    settles on loops that are not closed.
+
+    \b
+    Examples:
+      linkwork slider-crank dual
+      linkwork slider-crank dual --published rahman-a4-20-alpha4-310 --torque '100 lbf*in'
+      linkwork slider-crank dual --two-rotations --units inch
+    """
+    if two_rotations:
+        source = click.get_current_context().get_parameter_source
+        for name in ("torque", "load", "speed", "tolerance"):
+            if source(name) is not ParameterSource.DEFAULT:
+                raise click.UsageError(f"--{name} has no effect with --two-rotations, which is about positions alone")
+        _show_two_rotations(chosen, problem.points, Path(out))
+        return
+    if chosen.groove == "shaft" and "torque" in problem.given:
+        raise click.UsageError("--torque is for a shift that is driven apart from the crank: give --groove apart")
+    found = analysis.compare(problem.turn(chosen))
+    passed = [d.relative <= tolerance for d in found.differences]
+    show_table(
+        f"{chosen.title}: dual numbers less vector mechanics, {found.angles} crank angles",
+        ("quantity", "unit", "largest", "largest difference", "relative", "verdict"),
+        [
+            (
+                d.quantity,
+                d.unit,
+                f"{d.largest:.6g}",
+                f"{d.difference:.1e}",
+                f"{d.relative:.1e}",
+                "pass" if ok else "FAIL",
+            )
+            for d, ok in zip(found.differences, passed)
+        ],
+        words=("quantity", "unit", "verdict"),
+        styles=[None if ok else "red" for ok in passed],
+    )
+    console.print(
+        f"the loop closes to {found.rotation_residual:.1e} rad and {found.length_residual:.1e} m in at most "
+        f"{found.iterations} iterations; moment about the rod's line, which no equation asks for: {found.rod_moment:.1e} N.m",
+        highlight=False,
+        soft_wrap=True,
+    )
+    if not all(passed):
+        errors.print("check failed: the two do not agree", style="red")
+        sys.exit(CHECK_FAILED)
+    console.print("the two agree", style="green")
+
+
+def _show_two_rotations(chosen: Chosen, points: int, folder: Path) -> None:
+    """Show where the thesis's iteration ends over the turn."""
+    from ...files import io
+
+    angle = np.linspace(0.0, tau, points)
+    shift = np.array([chosen.shift_at(float(a)) for a in angle])
+    short = analysis.shortage(chosen.parameters, angle, shift)
+    reached = short < 0.0
+    if not reached.any():
+        worst = int(np.argmin(short))
+        check_assembly(chosen.parameters, float(angle[worst]), float(shift[worst]))
+    end = analysis.settle(chosen.parameters, angle[reached], shift[reached])
+    length, scale = chosen.units.name("m"), chosen.units.per("m")
+    columns = {
+        "crank angle [deg]": np.degrees(end.crank_angle),
+        f"slider position [{length}]": end.unknowns[:, 4] * scale,
+        f"off by [{length}]": end.position_error * scale,
+        "rotation residual [deg]": np.degrees(end.rotation_residual),
+        f"length residual [{length}]": end.length_residual * scale,
+        "steps": end.steps.astype(float),
+        "settled": end.settled.astype(float),
+    }
+    shown = range(0, len(end.steps), max(1, len(end.steps) // 12))
+    numbers = list(columns.values())[:-1]
+    show_table(
+        f"{chosen.title}: closure with two rotations per ball joint",
+        tuple(columns),
+        [(*(f"{x[i]:.6g}" for x in numbers), "yes" if end.settled[i] else "no") for i in shown],
+        styles=[None if end.settled[i] else "yellow" for i in shown],
+    )
+    console.print(
+        f"largest rotation residual {np.degrees(end.rotation_residual).max():.2f} deg, length residual "
+        f"{chosen.units.length(float(end.length_residual.max()))}; slider position off by up to "
+        f"{chosen.units.length(float(end.position_error.max()))}; the steps become small at {int(end.settled.sum())} of "
+        f"{len(end.settled)} crank angles",
+        highlight=False,
+        soft_wrap=True,
+    )
+    wrote([io.write_csv(folder / f"{chosen.name}-two-rotations.csv", columns)])

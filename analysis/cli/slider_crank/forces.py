@@ -1,0 +1,125 @@
+"""`linkwork slider-crank forces`: all joint forces over a turn."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import degrees
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+import numpy as np
+
+from ... import figures
+from ... import slider_crank as analysis
+from ..common import console, show_table
+from ..design import wrote
+from .options import Chosen, Problem, Units, about_mechanism, angle_text, out_option, plot_option, with_problem
+
+if TYPE_CHECKING:
+    from ...slider_crank import ForceTurn
+
+
+@click.command()
+@about_mechanism
+@with_problem(points=721)
+@click.option(
+    "--frame",
+    "frames",
+    type=click.IntRange(1, 4),
+    multiple=True,
+    default=(1,),
+    show_default=True,
+    help="Of the components shown: 1 ground, 2 crank, 3 rod, 4 guide; can be given often.",
+)
+@out_option
+@plot_option
+def forces(chosen: Chosen, problem: Problem, frames: Sequence[int], out: str, plot: bool) -> None:
+    """Find all joint forces over a turn: with the torque given the slider's force, with the load given the torque.
+
+    With the torque given there is no finite slider force at the dead centres, and where the crank cannot turn fully all
+    forces grow without bound towards the limits of assembly. These places are listed with the reason; extremes are of what is
+    more than 10 deg from them.
+
+    \b
+    Examples:
+      linkwork slider-crank forces --torque '100 lbf*in' --units inch
+      linkwork slider-crank forces --load '-20 lbf' --frame 2 --frame 4
+      linkwork slider-crank forces crank.toml --speed '300 rpm' --out results
+    """
+    from ...files import io
+
+    units, frames = chosen.units, tuple(dict.fromkeys(frames))
+    turn = problem.turn(chosen)
+    show_table(
+        f"{chosen.title}: {turn.sought} sought",
+        ("quantity", "unit", "least", "at [deg]", "greatest", "at [deg]"),
+        _extremes(turn, frames, units),
+        words=("quantity", "unit"),
+    )
+    for sentence in _special_places(turn, units):
+        console.print(sentence, highlight=False, soft_wrap=True)
+    stem = str(Path(out) / f"{chosen.name}-forces")
+    written = [io.write_csv(f"{stem}.csv", turn.columns(units.system))]
+    if plot:
+        for frame in frames:
+            title = f"{chosen.title}: joint forces in frame {frame}"
+            figure = figures.plot(turn, frame, units=units.system, title=title)
+            written.append(io.save_figure(figure, f"{stem}-frame-{frame}.png"))
+    wrote(written)
+
+
+def _extremes(turn: ForceTurn, frames: Sequence[int], units: Units) -> Sequence[Sequence[str]]:
+    """Least and greatest values with their angles, of what is clear of singularities and not masked."""
+    quantities: list[tuple[str, str, Any]] = [
+        ("slider position", "m", turn.slider_position),
+        ("crank torque", "N.m", turn.torque),
+        ("slider force", "N", turn.slider_force),
+        ("axial force on the crank", "N", turn.axial_force),
+    ]
+    quantities += [
+        (f"{joint.words}, {axis}{frame}", joint.unit, values)
+        for frame in frames
+        for name, joint in analysis.JOINTS.items()
+        for axis, values in zip("ijk", turn.vector(name, frame).T)
+    ]
+    clear = turn.clear()
+    found = []
+    size: dict[str, float] = {}
+    for name, si, values in quantities:
+        (good,) = np.nonzero(~np.ma.getmaskarray(values) & (clear | (si == "m")))
+        if good.size:
+            inside = np.ma.getdata(values)[good]
+            ends = [good[np.argmin(inside)], good[np.argmax(inside)]]
+            found.append((name, si, values, ends))
+            size[si] = max(size.get(si, 0.0), *np.abs(inside))
+    rows = []
+    for name, si, values, ends in found:
+        cells = [name, units.name(si)]
+        for i in ends:
+            # what is rounding beside the greatest of its kind is none
+            value = 0.0 if abs(values[i]) <= 1e-12 * size[si] else values[i] * units.per(si)
+            cells += [f"{value:.6g}", f"{degrees(turn.angle[i]):.1f}"]
+        rows.append(cells)
+    return rows
+
+
+def _special_places(turn: ForceTurn, units: Units) -> list[str]:
+    """Sentences on dead centres and limits of assembly, and on what could not be determined there."""
+    without = f"grows without bound towards it; within {analysis.CLEAR_DEG:g} deg it is not among the extremes"
+    sentences = [
+        f"dead centre at {angle_text(d.crank_angle)}, slider at {units.length(d.slider_position)}"
+        for d in turn.dead_centres
+    ]
+    if turn.sought == analysis.SLIDER_FORCE:
+        sentences += [
+            f"no slider force at {angle_text(d.crank_angle)}: it has no lever on the crank there, and {without}"
+            for d in turn.singularities
+        ]
+    sentences += [
+        f"limit of assembly at {angle_text(end)}: the rod is perpendicular to the guide there, and every force {without}"
+        for end in turn.limits
+    ]
+    if not turn.clear().any():
+        sentences.append("no crank angle is clear of these, and no force has extremes")
+    return [*sentences, *(f"masked: {text}" for text in turn.masked)]

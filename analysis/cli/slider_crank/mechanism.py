@@ -1,0 +1,118 @@
+"""`linkwork slider-crank info` and `picture`: where a mechanism can be assembled, and how it looks."""
+
+from __future__ import annotations
+
+from math import degrees, isinf
+from pathlib import Path
+from typing import Any
+
+import click
+
+from ... import figures
+from ... import slider_crank as analysis
+from ..common import console, show_table
+from ..design import wrote
+from .options import Chosen, about_mechanism, angle_text, out_option, quantity
+
+
+@click.command()
+@about_mechanism
+def info(chosen: Chosen) -> None:
+    """Report where the mechanism can be assembled, its dead centres, its stroke, and how far its crank may shift.
+
+    \b
+    Examples:
+      linkwork slider-crank info --units inch
+      linkwork slider-crank info --published rahman-a4-20-alpha4-310
+      linkwork slider-crank info --offset '30 in' --set rod.length='40 in'
+      linkwork slider-crank info --groove shaft --set groove.amplitude='3 in' --set groove.ratio=2
+    """
+    p, law, units = chosen.parameters, chosen.law, chosen.units
+    margin = analysis.assembly_margin(p, law)
+    parts = analysis.assembled_ranges(p, law)
+    most = analysis.greatest_shift(p)
+    rows = {
+        "crank a1, rod a2": f"{units.length(p.crank_length)}, {units.length(p.rod_length)}",
+        "offset a4, twist alpha4": f"{units.length(p.guide_offset)}, {degrees(p.guide_twist):.6g} deg",
+        "shift S1": units.length(chosen.shift) if chosen.groove is None else "made by the groove",
+        "assembly": f"branch {p.assembly_branch:+d}",
+        "the crank": "turns fully" if margin.length >= 0.0 else "does not turn fully",
+        "least assembly margin": f"{units.length(margin.length)} at {angle_text(margin.crank_angle)}",
+        "greatest constant shift for a full turn": (
+            "none: it cannot" if most is None else "any" if isinf(most) else units.length(most)
+        ),
+    }
+    show_table(chosen.title, (), rows.items())
+    for part in parts:
+        console.print(
+            f"range {angle_text(part.low)} to {angle_text(part.high)}: stroke {units.length(part.stroke)}, slider "
+            f"{units.length(part.least.slider_position)} to {units.length(part.greatest.slider_position)}",
+            highlight=False,
+            soft_wrap=True,
+        )
+    found = analysis.dead_centres(p, law)
+    if not found:
+        still = all(part.stroke <= 1e-12 * p.rod_length for part in parts)
+        console.print("no dead centres" + ": the slider stands still, whatever the crank angle" * still)
+        return
+    length, scale = units.name("m"), units.per("m")
+    show_table(
+        "dead centres",
+        ("crank angle [deg]", f"shift [{length}]", f"slider position [{length}]", "which"),
+        [
+            (
+                f"{degrees(d.crank_angle):.2f}",
+                f"{d.shift * scale:.6g}",
+                f"{d.slider_position * scale:.6g}",
+                "outer" if d.outer else "inner",
+            )
+            for d in found
+        ],
+        words=("which",),
+    )
+
+
+@click.command()
+@about_mechanism
+@click.option("--angle", default="30 deg", show_default=True, metavar="ANGLE", help="Crank angle of the picture.")
+@click.option("--view", nargs=2, metavar="ELEVATION AZIMUTH", help="Of the eye, such as '22 deg' '-112 deg'.")
+@click.option("--range", "with_range", is_flag=True, help="Draw also where it can be assembled.")
+@click.option("--animate", is_flag=True, help="Write also an animation, GIF.")
+@click.option("--frames", type=click.IntRange(2), default=48, show_default=True, help="Pictures in the animation.")
+@out_option
+def picture(
+    chosen: Chosen,
+    angle: str,
+    view: tuple[str, str] | None,
+    with_range: bool,
+    animate: bool,
+    frames: int,
+    out: str,
+) -> None:
+    """Draw the mechanism in space, with frames 1 and 4, paths and dead centres.
+
+    \b
+    Examples:
+      linkwork slider-crank picture --units inch
+      linkwork slider-crank picture --published rahman-a4-20-alpha4-310 --animate
+      linkwork slider-crank picture --set rod.length='30 in' --offset '20 in' --angle '180 deg' --range
+    """
+    from ...files import io
+
+    p, stem = chosen.parameters, str(Path(out) / chosen.name)
+    at = quantity(angle, "rad", "--angle")
+    common: dict[str, Any] = {
+        "law": chosen.law,
+        "unit": "in" if chosen.units.system == "inch" else "mm",
+        "title": chosen.title,
+    }
+    seen = common
+    if view is not None:
+        seen = common | {"view": tuple(degrees(quantity(text, "rad", "--view")) for text in view)}
+    written = [io.save_figure(figures.plot_mechanism(p, at, chosen.shift_at(at), **seen), f"{stem}.png")]
+    if with_range:
+        written.append(io.save_figure(figures.plot_range(p, **common), f"{stem}-range.png"))
+    if animate:
+        with console.status(f"drawing {frames} pictures"):
+            written.append(figures.animate(p, f"{stem}.gif", frames=frames, **seen))
+    wrote(written)

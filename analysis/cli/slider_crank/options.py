@@ -1,0 +1,302 @@
+"""Options that the commands about the slider-crank share: which mechanism, in which units, under which force or torque."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, fields
+from functools import wraps
+from math import degrees, tau
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+import numpy as np
+
+from linkwork.errors import InputError
+from linkwork.slider_crank.parameters import SliderCrankParameters
+from linkwork.slider_crank.published import RAD_S_PER_RPM, SETS
+
+from ... import slider_crank as analysis
+from ..common import changes, errors, handled, number_or_text
+
+if TYPE_CHECKING:
+    from ...slider_crank import ForceTurn, PeriodicShift, ShiftLaw
+
+#: The case that everything starts from where no other is named.
+DEFAULT = "rahman-a4-10-s1-3.5"
+
+Command = Callable[..., Any]
+
+
+class Units:
+    """Numbers as texts in the units of the output; angles are in degrees in either system."""
+
+    def __init__(self, system: str) -> None:
+        self.system = system
+        self._table = {**analysis.UNITS[system], "rad": analysis.UNITS["inch"]["rad"]}
+
+    def name(self, si: str) -> str:
+        """What the unit is called."""
+        return self._table.get(si, (si, 1.0))[0]
+
+    def per(self, si: str) -> float:
+        """How many of it one of SI is."""
+        return 1.0 / self._table.get(si, (si, 1.0))[1]
+
+    def length(self, value: float) -> str:
+        return f"{value * self.per('m'):.6g} {self.name('m')}"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Chosen:
+    """The mechanism that a command is about: its name for files, its title, how it shifts, its speed; and the units."""
+
+    name: str
+    title: str
+    parameters: SliderCrankParameters
+    shift: float
+    groove: str | None
+    speed: float
+    units: Units
+
+    @property
+    def law(self) -> PeriodicShift:
+        """The shift over the crank angle, for ranges and pictures."""
+        if self.groove is None:
+            return analysis.constant_shift(self.shift)
+        return analysis.groove_shift(self.parameters)
+
+    @property
+    def force_law(self) -> ShiftLaw:
+        """The shift over the crank angle, for the force problems."""
+        p = self.parameters
+        if self.groove is None:
+            return analysis.ConstantShift(self.shift)
+        return analysis.GrooveShift(p.groove_amplitude, p.groove_ratio, in_shaft=self.groove == "shaft")
+
+    def shift_at(self, crank_angle: float) -> float:
+        """Shift at a crank angle (m)."""
+        return float(self.law.at(crank_angle)[0])
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _MechanismOptions:
+    """What the command line says of the mechanism."""
+
+    file: str | None
+    published: str | None
+    offset: str | None
+    shift: str | None
+    twist: str | None
+    groove: str | None
+    settings: Sequence[str]
+    units: str
+    speed: str | None = None
+
+    def choose(self, *, paced: bool) -> Chosen:
+        """The mechanism; ``paced`` says whether the speed matters.
+
+        Raises
+        ------
+        LinkworkError
+            If a file, a name or a value is wrong.
+        """
+        from ...files import io
+
+        units = Units(self.units)
+        start, speed = 0.0, SETS[DEFAULT].crank_speed
+        name = self.published or DEFAULT
+        if self.file is not None:
+            if self.published is not None:
+                raise click.UsageError("give either a file of parameters or --published NAME")
+            loaded = io.load_parameters(self.file)
+            if not isinstance(loaded, SliderCrankParameters):
+                raise InputError(
+                    f'{self.file} is of a five-bar: for a slider-crank it must begin with mechanism = "slider-crank"'
+                )
+            parameters, name = loaded, Path(self.file).stem
+            title = name
+        elif name in SETS:
+            case = SETS[name]
+            title, parameters = case.source, case.parameters
+            start, speed = case.initial.shift_position, case.crank_speed
+        else:
+            raise io.unknown_name(name, SETS)
+        values = changes(self.settings, number_or_text, "rod.length='45 in'")
+        for key, text in (("guide.offset", self.offset), ("guide.twist", self.twist)):
+            if text is not None:
+                values[key] = number_or_text(text)
+        if self.shift is not None:
+            if self.groove is not None:
+                raise click.UsageError("--shift holds the crank, --groove moves it: give one of them")
+            start = quantity(self.shift, "m", "--shift")
+        if self.speed is not None:
+            speed = quantity(self.speed, "rad/s", "--speed")
+        if values:
+            changed = io.parameters_from(values, parameters)
+            assert isinstance(changed, SliderCrankParameters)
+            parameters = changed
+        self._check_groove(parameters, values)
+        if self.file is not None:
+            self._note_defaults(parameters, units.length(start), speed if paced else None)
+        elif values or self.shift is not None or self.groove is not None:
+            name, title = "slider-crank", _title(units, parameters, start, self.groove)
+        return Chosen(
+            name=name, title=title, parameters=parameters, shift=start, groove=self.groove, speed=speed, units=units
+        )
+
+    def _check_groove(self, p: SliderCrankParameters, values: Mapping[str, Any]) -> None:
+        """Make sure that what is said of a groove has an effect."""
+        if self.groove is None:
+            for name in values:
+                if name.startswith("groove."):
+                    raise click.UsageError(f"--set {name} has no effect without --groove shaft or --groove apart")
+        elif p.groove_amplitude == 0.0:
+            raise click.UsageError(
+                f"--groove {self.groove} with groove.amplitude = 0 makes no shift: give --set groove.amplitude='3 in', say, "
+                "or hold the crank with --shift"
+            )
+
+    def _note_defaults(self, p: SliderCrankParameters, start: str, speed: float | None) -> None:
+        """Say which values are used that neither the file nor the command line gives."""
+        used = []
+        if self.shift is None and self.groove is None:
+            used.append(f"S1 = {start} (--shift)")
+            if p.groove_amplitude != 0.0:
+                used.append("no groove (--groove)")
+        if speed is not None and self.speed is None:
+            used.append(f"a crank speed of {speed / RAD_S_PER_RPM:.6g} rpm (--speed)")
+        if used:
+            note(f"the file does not say, and is taken: {', '.join(used)}")
+
+
+def _title(units: Units, p: SliderCrankParameters, shift: float, groove: str | None) -> str:
+    """A title of a mechanism that has none."""
+    moved = f"S1 = {units.length(shift)}"
+    if groove is not None:
+        moved = f"SS1 = {units.length(p.groove_amplitude)}, alpha = {p.groove_ratio:g}"
+    return f"Slider-crank: a4 = {units.length(p.guide_offset)}, {moved}, alpha4 = {degrees(p.guide_twist):.6g} deg"
+
+
+@dataclass(frozen=True, slots=True)
+class Problem:
+    """A force problem: the ``torque`` (N.m) or ``load`` (N) that is given, and at how many crank angles."""
+
+    given: Mapping[str, float]
+    points: int
+
+    def turn(self, chosen: Chosen, *, at: float | None = None) -> ForceTurn:
+        """The solution over the turn and ``at`` an angle of it, or over what of these can be assembled."""
+        angles = np.linspace(0.0, tau, self.points)
+        if at is not None and np.abs(angles - at).min() > 1e-9:
+            angles = np.sort(np.append(angles, at))
+        turn = analysis.force_turn(
+            chosen.parameters,
+            crank_speed=chosen.speed,
+            shift=chosen.force_law,
+            angles=angles,
+            partial=True,
+            **self.given,
+        )
+        if len(turn.unreachable):
+            missing = f"{len(turn.unreachable)} of {len(angles)} crank angles"
+            note(f"the rod does not reach the guide at {missing}, which are left out")
+        return turn
+
+
+_MECHANISM_OPTIONS = (
+    click.argument("file", required=False, type=click.Path(exists=True, dir_okay=False)),
+    click.option("--published", metavar="NAME", help=f"A published case, by default {DEFAULT}: {', '.join(SETS)}."),
+    click.option("--offset", metavar="LENGTH", help="Offset a4 between crank axis and guide, such as '10 in'."),
+    click.option("--shift", metavar="LENGTH", help="Axial shift S1 of the crank, such as '3.5 in'."),
+    click.option("--twist", metavar="ANGLE", help="Twist alpha4 between crank axis and guide, such as '310 deg'."),
+    click.option(
+        "--groove",
+        type=click.Choice(["shaft", "apart"]),
+        help="S1 = groove.amplitude sin(groove.ratio theta1): made by a groove in the crank's shaft as in the FMU, or by "
+        "something apart from the crank as in the thesis.",
+    ),
+    click.option(
+        "--set",
+        "settings",
+        multiple=True,
+        metavar="NAME=VALUE",
+        help="Change a parameter by its name in the FMU, such as rod.length='45 in' or assembly.branch=-1.",
+    ),
+    click.option(
+        "--units",
+        type=click.Choice(["SI", "inch"]),
+        default="SI",
+        show_default=True,
+        help="Of the output; inch: inches, pounds force and degrees.",
+    ),
+)
+speed_option = click.option("--speed", metavar="SPEED", help="Crank speed, such as '50 rpm'.")
+out_option = click.option(
+    "--out", default="out", show_default=True, type=click.Path(file_okay=False), help="Folder for the results."
+)
+plot_option = click.option("--plot/--no-plot", default=True, show_default=True, help="Whether to write plots.")
+
+
+def about_mechanism(command: Command) -> Command:
+    """Give a command the options that choose a mechanism; in their place it takes ``chosen``."""
+
+    @wraps(command)
+    @handled
+    def run(**options: Any) -> Any:
+        own = {field.name: options.pop(field.name) for field in fields(_MechanismOptions) if field.name in options}
+        paced = "torque" in options and not options.get("two_rotations")
+        return command(chosen=_MechanismOptions(**own).choose(paced=paced), **options)
+
+    for option in reversed(_MECHANISM_OPTIONS):
+        run = option(run)
+    return run
+
+
+def with_problem(points: int) -> Callable[[Command], Command]:
+    """Give a command the options of the speed and of a force problem; in place of the latter it takes ``problem``."""
+
+    def decorate(command: Command) -> Command:
+        @wraps(command)
+        def run(*, torque: str | None, load: str | None, points: int, **options: Any) -> Any:
+            if torque is not None and load is not None:
+                raise click.UsageError("give --torque, and the slider's force is sought, or --load, and the torque is")
+            given = {"load": quantity("0" if load is None else load, "N", "--load")}
+            if torque is not None:
+                given = {"torque": quantity(torque, "N.m", "--torque")}
+            return command(problem=Problem(given, points), **options)
+
+        for option in (
+            click.option(
+                "--points",
+                type=click.IntRange(2),
+                default=points,
+                show_default=True,
+                help="Crank angles over the turn.",
+            ),
+            click.option("--load", metavar="FORCE", help="On the slider; the crank's torque is sought. 0 by default."),
+            click.option(
+                "--torque", metavar="TORQUE", help="On the crank; the slider's force is sought. Such as '100 lbf*in'."
+            ),
+            speed_option,
+        ):
+            run = option(run)
+        return run
+
+    return decorate
+
+
+def quantity(text: str, unit: str, name: str) -> float:
+    """An option's value in SI."""
+    from ...files import io
+
+    return io.quantity(number_or_text(text), unit, name)
+
+
+def note(text: str) -> None:
+    """Write what a reader must know beside the results, to standard error."""
+    errors.print(f"note: {text}", style="yellow", markup=False, highlight=False, soft_wrap=True)
+
+
+def angle_text(value: float) -> str:
+    return f"{degrees(value):.2f} deg"

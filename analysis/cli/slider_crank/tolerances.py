@@ -1,0 +1,223 @@
+"""`linkwork slider-crank tolerances`: what manufacturing tolerances do."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import degrees, tau
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+import numpy as np
+
+from linkwork.errors import InputError
+
+from ... import figures
+from ... import slider_crank as analysis
+from ..common import console, show_table
+from ..design import wrote
+from .options import Chosen, Problem, Units, about_mechanism, note, out_option, plot_option, quantity, with_problem
+
+if TYPE_CHECKING:
+    from ...slider_crank import ForceTurn, MonteCarlo, Sensitivities, Tolerance
+
+#: Half widths where none are given: of each length, and of the twist.
+_TOLERANCES = ("crank.length", "rod.length", "guide.offset", "shift.position", "guide.twist")
+_WIDTHS = {"m": "0.25 mm", "rad": "0.1 deg"}
+
+
+@click.command()
+@about_mechanism
+@with_problem(points=73)
+@click.option(
+    "--tolerance",
+    "widths",
+    multiple=True,
+    metavar="NAME=HALF_WIDTH",
+    help="What is in error and by how much, such as guide.offset='0.5 mm' or guide.twist='0.2 deg'; can be given often. By "
+    "default the lengths by 0.25 mm and the twist by 0.1 deg.",
+)
+@click.option(
+    "--distribution",
+    type=click.Choice(["normal", "uniform", "triangular"]),
+    default="normal",
+    show_default=True,
+    help="Of the errors; a normal one has three standard deviations in the half width.",
+)
+@click.option(
+    "--quantity",
+    "quantities",
+    multiple=True,
+    default=("slider.position",),
+    show_default=True,
+    metavar="NAME",
+    help="An output of the FMU, such as crank_pin.fz, or slider.load; can be given often.",
+)
+@click.option("--angle", default="30 deg", show_default=True, metavar="ANGLE", help="Crank angle of the histogram.")
+@click.option("--samples", type=click.IntRange(2), default=100_000, show_default=True, help="Of the Monte Carlo.")
+@click.option(
+    "--seed", type=click.IntRange(0), default=0, show_default=True, help="The same seed gives the same samples."
+)
+@out_option
+@plot_option
+def tolerances(
+    chosen: Chosen,
+    problem: Problem,
+    widths: Sequence[str],
+    distribution: str,
+    quantities: Sequence[str],
+    angle: str,
+    samples: int,
+    seed: int,
+    out: str,
+    plot: bool,
+) -> None:
+    """Report what manufacturing tolerances do: exact sensitivities, a linear estimate, and a Monte Carlo beside it.
+
+    \b
+    Examples:
+      linkwork slider-crank tolerances
+      linkwork slider-crank tolerances --tolerance guide.offset='0.5 mm' --tolerance guide.twist='0.2 deg'
+      linkwork slider-crank tolerances --quantity slider.position --quantity crank_pin.fz --load '-20 lbf' --seed 7
+    """
+    from ...files import io
+
+    at = _in_the_turn(quantity(angle, "rad", "--angle"), chosen)
+    units, quantities = chosen.units, tuple(dict.fromkeys(quantities))
+    defaults = [f"{name}={_WIDTHS[analysis.ERRORS[name]]}" for name in _TOLERANCES]
+    allowed = [_tolerance(text, distribution) for text in widths or defaults]
+    turn = problem.turn(chosen, at=at)
+    exact = analysis.sensitivities(turn, tuple(t.name for t in allowed), quantities)
+    for name in quantities:
+        if np.ma.getmaskarray(exact.values[name]).all():
+            why = analysis.NO_LEVER if turn.without_lever else "all the crank angles are dead centres"
+            raise InputError(f"{name} is not determined: {why}; give --load in place of --torque")
+    place = int(np.argmin(np.abs(turn.angle - at)))
+    here = f"{_degrees(turn, place):.6g} deg"
+    if abs(float(turn.angle[place]) - at) > 1e-9:
+        note(
+            f"it cannot be assembled at {degrees(at):.6g} deg: the nearest of the angles, {here}, is taken in its place"
+        )
+    rows, slopes = _slopes(exact, allowed, place, units)
+    headings = ("quantity", "to", "unit", f"at {here}", "greatest", "at [deg]")
+    show_table(f"{chosen.title}: sensitivities", headings, rows, words=("quantity", "to", "unit"))
+    with console.status(f"{samples} samples at {len(turn)} crank angles"):
+        found = analysis.monte_carlo(turn, allowed, quantities=quantities, samples=samples, seed=seed)
+    stem = str(Path(out) / chosen.name)
+    files = [io.write_csv(f"{stem}-sensitivities.csv", slopes)]
+    files.append(io.write_csv(f"{stem}-tolerances.csv", _spread_columns(found, units)))
+    _show_spread(found, place, f"{chosen.title}: spread at {here}, {samples} samples", units)
+    for message in found.notes(units.system):
+        note(message)
+    if plot:
+        for name in quantities:
+            figure = figures.plot(found, name, at, units=units.system, title=f"{chosen.title}: {name}")
+            files.append(io.save_figure(figure, f"{stem}-tolerances-{name}.png"))
+    wrote(files)
+
+
+def _degrees(turn: ForceTurn, i: int) -> float:
+    return degrees(float(turn.angle[i]))
+
+
+def _in_the_turn(angle: float, chosen: Chosen) -> float:
+    """The same crank angle from 0 to 360 deg.
+
+    Raises
+    ------
+    InputError
+        If it is outside of them and the shift there is another than a turn before or after.
+    """
+    if 0.0 <= angle <= tau:
+        return angle
+    if chosen.groove is not None and not chosen.parameters.groove_ratio.is_integer():
+        raise InputError(
+            f"--angle is {degrees(angle):.6g} deg: with groove.ratio = {chosen.parameters.groove_ratio:g} the shift is another "
+            "in every turn; give an angle from 0 to 360 deg"
+        )
+    return float(angle % tau)
+
+
+def _tolerance(text: str, distribution: str) -> Tolerance:
+    """A tolerance from NAME=HALF_WIDTH."""
+    from ...files import io
+
+    name, equals, value = (part.strip() for part in text.partition("="))
+    if not equals:
+        raise click.UsageError(f"--tolerance {text!r}: it must be NAME=HALF_WIDTH, such as guide.offset='0.5 mm'")
+    if name not in analysis.ERRORS:
+        raise io.unknown_name(name, analysis.ERRORS)
+    width = quantity(value, analysis.ERRORS[name], name)
+    return analysis.Tolerance(name, half_width=width, distribution=distribution)
+
+
+def _slopes(
+    exact: Sensitivities, allowed: Sequence[Tolerance], place: int, units: Units
+) -> tuple[Sequence[Sequence[str]], dict[str, Any]]:
+    """Rows of the table of sensitivities, and columns of their file."""
+    turn, rows = exact.turn, []
+    columns: dict[str, Any] = {"crank angle [deg]": np.degrees(turn.angle)}
+    for name in exact.derivatives:
+        si = analysis.QUANTITIES[name]
+        clear = turn.clear(poles=si in ("N", "N.m"))
+        effect = max(float(np.ma.abs(exact.of(name, t.name)).max()) * t.extent for t in allowed)
+        for t in allowed:
+            below = analysis.ERRORS[t.name]
+            unit, scale = _ratio(units.name(si), units.name(below)), units.per(si) / units.per(below)
+            values = exact.of(name, t.name) * scale
+            columns[f"d {name} / d {t.name} [{unit}]"] = values.filled(np.nan)
+            greatest = np.where(clear, np.ma.abs(values).filled(-1.0), -1.0)
+            top = int(np.argmax(greatest))
+            # what is rounding beside the greatest effect of any tolerance is none
+            tiny = 1e-12 * effect / t.extent * scale
+            here, most = (_number(values[i] if np.ma.abs(values[i]) > tiny else values[i] * 0.0) for i in (place, top))
+            # none may be clear of poles and limits
+            ends = (most, f"{_degrees(turn, top):.1f}") if greatest[top] >= 0.0 else ("none", "")
+            rows.append((name, t.name, unit, here, *ends))
+    return rows, columns
+
+
+def _number(value: Any, digits: int = 6) -> str:
+    return "none" if np.ma.is_masked(value) else f"{value:.{digits}g}"
+
+
+def _ratio(above: str, below: str) -> str:
+    """A unit over another."""
+    return f"{above}/({below})" if "." in below or "/" in below else f"{above}/{below}"
+
+
+def _spread_columns(found: MonteCarlo, units: Units) -> dict[str, Any]:
+    """Everything of a Monte Carlo over the turn."""
+    columns: dict[str, Any] = {"crank angle [deg]": np.degrees(found.turn.angle)}
+    for name, spread in found.spreads.items():
+        si, linear = analysis.QUANTITIES[name], found.estimates[name]
+        parts = {
+            "nominal": linear.nominal,
+            "linear standard deviation": linear.deviation,
+            "linear worst case": linear.worst,
+            "standard deviation": spread.deviation,
+            "mean": spread.mean,
+        }
+        parts |= {f"{share:.4g} %": row for share, row in zip(analysis.PERCENTILES, spread.percentiles)}
+        columns |= {
+            f"{name} {what} [{units.name(si)}]": (x * units.per(si)).filled(np.nan) for what, x in parts.items()
+        }
+    return columns | {"not assembled": found.not_assembled, "at a dead centre": found.undetermined}
+
+
+def _show_spread(found: MonteCarlo, place: int, title: str, units: Units) -> None:
+    """The estimates and the samples at one crank angle."""
+    rows = []
+    for name, spread in found.spreads.items():
+        si, linear = analysis.QUANTITIES[name], found.estimates[name]
+        values = (
+            (linear.nominal, 6),
+            (linear.deviation, 3),
+            (linear.second_deviation, 3),
+            (spread.deviation, 3),
+            (linear.worst, 3),
+            (spread.mean - linear.nominal, 2),
+        )
+        rows.append((name, units.name(si), *(_number(x[place] * units.per(si), digits) for x, digits in values)))
+    headings = "quantity", "unit", "nominal", "sd, linear", "sd, 2nd order", "sd, samples", "worst, linear", "mean off"
+    show_table(title, headings, rows, words=("quantity", "unit"))

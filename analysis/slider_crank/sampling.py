@@ -1,0 +1,390 @@
+"""Random samples of a slider-crank with tolerances, beside the estimates without samples (`tolerances`)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields, replace
+from math import degrees
+from types import MappingProxyType
+from typing import Any, NamedTuple, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from linkwork.errors import InputError, ParameterError
+from linkwork.limits import LIMIT_SINE
+from linkwork.parameters import POSITIVE, field_name
+from linkwork.slider_crank.parameters import SliderCrankParameters
+
+from .derivatives import ANGLE, FREE_OF_LOAD, KINEMATIC, QUANTITIES, SHIFT, check_names, vary
+from .forces import NO_LEVER, SLIDER_FORCE, ForceTurn
+from .quantities import DEAD_CENTRE, FloatArray, MaskedArray, masked_array, unit_table
+from .tolerances import Estimate, Tolerance, check_tolerances, estimate
+
+#: Percentiles that a Monte Carlo gives: the normal distribution's at -3, -2, 0, 2, 3 standard deviations.
+PERCENTILES = (0.13498980316300957, 2.275013194817921, 50.0, 97.72498680518208, 99.86501019683699)
+#: Share of the standard deviation by which the linear estimate may be off before it is reported.
+OFF = 0.05
+#: Samples that are worked on at once, few enough for the processor's cache.
+_CHUNK = 16384
+#: Bins of the histograms.
+_BINS = 80
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Spread:
+    """The samples of one quantity, angle by angle; n angles.
+
+    Attributes
+    ----------
+    mean, deviation : masked array, shape (n,)
+        Mean and standard deviation; masked where samples fall on both sides of a dead centre and the quantity has its pole
+        between them: there they do not exist, whatever a sum says.
+    percentiles : masked array, shape (p, n)
+        At `PERCENTILES`; masked only where there is no sample.
+    least, greatest : masked array, shape (n,)
+    edges : ndarray, shape (n, b + 1)
+    counts : ndarray, shape (n, b)
+        Histograms of the middle 99.9 % of the samples.
+    """
+
+    mean: MaskedArray
+    deviation: MaskedArray
+    percentiles: MaskedArray
+    least: MaskedArray
+    greatest: MaskedArray
+    edges: FloatArray
+    counts: NDArray[np.int64]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class MonteCarlo:
+    """Random samples of a mechanism with tolerances, beside the estimates without samples.
+
+    Attributes
+    ----------
+    turn : ForceTurn
+        The nominal mechanism, at the n angles.
+    tolerances : tuple of Tolerance
+    samples, seed : int
+    spreads : mapping
+        Quantity to `Spread`.
+    estimates : mapping
+        Quantity to `Estimate`.
+    not_assembled : ndarray of int, shape (n,)
+        Samples whose rod does not reach the guide; they are in no mean or percentile.
+    undetermined : ndarray of int, shape (n,)
+        Samples at a dead centre itself where the slider's force is sought; likewise.
+    """
+
+    turn: ForceTurn
+    tolerances: tuple[Tolerance, ...]
+    samples: int
+    seed: int
+    spreads: Mapping[str, Spread]
+    estimates: Mapping[str, Estimate]
+    not_assembled: NDArray[np.int64]
+    undetermined: NDArray[np.int64]
+
+    def notes(self, units: str = "SI") -> tuple[str, ...]:
+        """In sentences: samples that cannot be assembled, poles, and where the linear estimate is off and why.
+
+        Parameters
+        ----------
+        units : str
+            One of `UNITS`.
+
+        Raises
+        ------
+        InputError
+            If there are no such units.
+        """
+        known, turn = unit_table(units), self.turn
+        found = []
+        if turn.unreachable.size:
+            found.append(
+                f"{turn.unreachable.size} crank angles are left out: the nominal mechanism cannot be assembled there"
+            )
+        if self.not_assembled.any():
+            i = int(np.argmax(self.not_assembled))
+            found.append(
+                f"{self.not_assembled[i]} of {self.samples} samples ({100.0 * self.not_assembled[i] / self.samples:.3g} %) "
+                f"cannot be assembled at {_angle(turn, i)}, the most of any angle"
+            )
+        if self.undetermined.any():
+            found.append(f"{int(self.undetermined.sum())} samples are at a dead centre: they have no slider force")
+        for name, spread in self.spreads.items():
+            poles = np.ma.getmaskarray(spread.mean) & ~np.ma.getmaskarray(spread.percentiles)[0]
+            near = np.flatnonzero(self._without_estimate(name) & ~poles)
+            if poles.any():
+                found.append(
+                    f"{name} has samples on both sides of a dead centre at {_angles(turn, np.flatnonzero(poles))}: it has no "
+                    "mean and no variance there, only percentiles"
+                )
+            if near.size:
+                found.append(
+                    f"the tolerances reach a dead centre from {_angles(turn, near)}: there is no linear estimate of {name} "
+                    "there"
+                )
+            found += self._off(name, *known[QUANTITIES[name]])
+        return tuple(found)
+
+    def _without_estimate(self, quantity: str) -> NDArray[np.bool_]:
+        """Where a quantity is determined and there is no estimate, for the nearness of a dead centre (n,)."""
+        linear = self.estimates[quantity]
+        return np.asarray(np.ma.getmaskarray(linear.deviation) & ~np.ma.getmaskarray(linear.nominal))
+
+    def linear_is_off(self, quantity: str) -> NDArray[np.bool_]:
+        """Where the linear estimate misses mean or standard deviation by more than 5 % of the latter (n,).
+
+        What five standard errors of the samples may account for is allowed on top. Near a dead centre, where there is no
+        estimate or there are no mean and deviation to estimate, it is off.
+        """
+        check_names((quantity,), self.spreads, "quantity")
+        spread, linear = self.spreads[quantity], self.estimates[quantity]
+        used = np.maximum(self.samples - self.not_assembled - self.undetermined, 2)
+        sd = spread.deviation
+        # the standard error of the mean, and of a standard deviation up to a kurtosis of five, is this share of the latter
+        allowed = OFF * sd + 5.0 * sd / np.sqrt(used)
+        rounding = 1e-9 * np.ma.abs(linear.nominal)
+        off = (np.ma.abs(spread.mean - linear.nominal) > allowed + rounding) | (
+            np.ma.abs(sd - linear.deviation) > allowed + rounding
+        )
+        return cast(NDArray[np.bool_], np.ma.filled(off, False)) | self._without_estimate(quantity)
+
+    def place(self, quantity: str, angle: float) -> int:
+        """Index of the crank angle nearest to ``angle`` (rad), at which the quantity must be determined.
+
+        Raises
+        ------
+        ParameterError
+            If the quantity was not sampled.
+        InputError
+            If it is not determined there.
+        """
+        check_names((quantity,), self.spreads, "quantity")
+        i = int(np.argmin(np.abs(self.turn.angle - angle)))
+        spread, linear = self.spreads[quantity], self.estimates[quantity]
+        if np.ma.getmaskarray(spread.percentiles)[0, i] or np.ma.getmaskarray(linear.nominal)[i]:
+            if self.turn.without_lever:
+                raise InputError(f"{quantity} is not determined: {NO_LEVER}")
+            raise InputError(f"{quantity} is not determined at {_angle(self.turn, i)}: choose another angle")
+        return i
+
+    def poles(self, quantity: str) -> tuple[float, ...]:
+        """Crank angles (rad) at which a quantity of the nominal mechanism has a pole."""
+        free = self.turn.sought != SLIDER_FORCE or quantity in FREE_OF_LOAD
+        return () if free else tuple(centre.crank_angle for centre in self.turn.singularities)
+
+    def _off(self, name: str, unit: str, one: float) -> list[str]:
+        """The sentence on where the linear estimate is off at worst, if it is, in a unit of the value ``one`` in SI."""
+        off = np.flatnonzero(self.linear_is_off(name) & ~self._without_estimate(name))
+        if not off.size:
+            return []
+        spread, linear = self.spreads[name], self.estimates[name]
+        i = int(off[np.argmax(np.abs(linear.deviation[off] / spread.deviation[off] - 1.0))])
+        second = linear.second_deviation[i]
+        vanishing = bool(np.ma.getmaskarray(linear.shares)[0, i])
+        first = (
+            "its first derivatives vanish"
+            if vanishing
+            else f"standard deviation {linear.deviation[i] / one:.3g} {unit}"
+        )
+        to_second = "" if second is np.ma.masked else f", to second order {second / one:.3g} {unit}"
+        return [
+            f"the linear estimate of {name} is off at {_angle(self.turn, i)}{_others(off)}: {first}, the samples' standard "
+            f"deviation is {spread.deviation[i] / one:.3g} {unit}{to_second}; their mean is "
+            f"{(spread.mean[i] - linear.nominal[i]) / one:.3g} {unit} from the nominal value"
+        ]
+
+
+def monte_carlo(
+    turn: ForceTurn,
+    tolerances: Sequence[Tolerance],
+    *,
+    quantities: Sequence[str] = ("slider.position",),
+    samples: int = 1_000_000,
+    seed: int = 0,
+) -> MonteCarlo:
+    """Sample a mechanism whose dimensions are off by random amounts, at every angle of a turn.
+
+    The same samples are taken at all angles. An angle takes about 0.2 s with a million samples of the slider's motion, and
+    about 2 to 3 s with all joint forces.
+
+    Parameters
+    ----------
+    turn : ForceTurn
+        The nominal mechanism; see `sensitivities` for what is held.
+    tolerances : sequence of Tolerance
+    quantities : sequence of str
+        Of `QUANTITIES`.
+    samples : int
+    seed : int
+        Of the random numbers: the same seed gives the same samples.
+
+    Raises
+    ------
+    InputError
+        If there is no tolerance, or two of the same name, or fewer than two samples; if samples are no mechanism: a length
+        that is not above zero, or a crank whose inertia is less than its mass requires.
+    ParameterError
+        If there is no such quantity.
+    """
+    check_tolerances(tolerances)
+    check_names(quantities, QUANTITIES, "quantity")
+    if samples < 2:
+        raise InputError(f"{samples} samples: there must be at least two")
+    generator = np.random.default_rng(seed)
+    errors = {t.name: t.draw(generator, samples) for t in tolerances}
+    _check_samples(turn.parameters, errors)
+    linear = estimate(turn, tolerances, quantities)
+    drawn = [_draws(turn, i, errors, quantities) for i in range(len(turn))]
+    poles = {name: np.array([x.across and name not in FREE_OF_LOAD for x in drawn]) for name in quantities}
+    return MonteCarlo(
+        turn=turn,
+        tolerances=tuple(tolerances),
+        samples=samples,
+        seed=seed,
+        spreads=MappingProxyType(
+            {name: _spread([x.statistics[name] for x in drawn], poles[name]) for name in quantities}
+        ),
+        estimates=MappingProxyType({name: _without(linear[name], poles[name]) for name in quantities}),
+        not_assembled=np.array([x.not_assembled for x in drawn], dtype=np.int64),
+        undetermined=np.array([x.undetermined for x in drawn], dtype=np.int64),
+    )
+
+
+def _without(linear: Estimate, poles: NDArray[np.bool_]) -> Estimate:
+    """The estimate without what it says of angles at which the samples have a pole."""
+    values = {name: getattr(linear, name) for name in Estimate.__dataclass_fields__ if name != "nominal"}
+    return replace(
+        linear, **{name: np.ma.masked_where(np.broadcast_to(poles, x.shape), x) for name, x in values.items()}
+    )
+
+
+class _Draws(NamedTuple):
+    """The samples at one angle: statistics by quantity, whether they fall on both sides of a dead centre, what is left out."""
+
+    statistics: Mapping[str, tuple[Any, ...]]
+    across: bool
+    not_assembled: int
+    undetermined: int
+
+
+def _draws(turn: ForceTurn, i: int, errors: Mapping[str, FloatArray], quantities: Sequence[str]) -> _Draws:
+    """Work through the samples at angle i in chunks."""
+    samples = len(next(iter(errors.values())))
+    found = {name: np.empty(samples) for name in quantities}
+    levers = np.empty(samples)
+    count = missed = dead = 0
+    for start in range(0, samples, _CHUNK):
+        part = {name: x[start : start + _CHUNK] for name, x in errors.items()}
+        values, kept, lever, lost = _sampled(turn, i, part, quantities)
+        missed += lost
+        dead += len(next(iter(part.values()))) - lost - kept
+        for name in quantities:
+            found[name][count : count + kept] = values[name]
+        levers[count : count + kept] = lever
+        count += kept
+    across = turn.sought == SLIDER_FORCE and count > 0 and levers[:count].min() < 0.0 < levers[:count].max()
+    return _Draws({name: _statistics(found[name][:count]) for name in quantities}, bool(across), missed, dead)
+
+
+def _sampled(
+    turn: ForceTurn, i: int, errors: Mapping[str, FloatArray], quantities: Sequence[str]
+) -> tuple[dict[str, Any], int, Any, int]:
+    """Quantities of the samples that can be assembled and are determined at angle i, their number, the lever, and how many
+    cannot be assembled."""
+    size = len(next(iter(errors.values())))
+    varied = vary(turn, i, errors)
+    reached = np.broadcast_to(varied.square >= (LIMIT_SINE * varied.p.a2) ** 2, (size,))
+    kept = int(reached.sum())
+    lost = size - kept
+    if lost:
+        varied = vary(turn, i, {name: x[reached] for name, x in errors.items()})
+    found, lever = varied.evaluate(quantities)
+    if turn.sought == SLIDER_FORCE and not set(quantities) <= set(KINEMATIC):
+        there = np.broadcast_to(np.abs(lever) > DEAD_CENTRE * turn.parameters.crank_length, (kept,))
+        if not there.all():
+            found = {name: np.broadcast_to(x, (kept,))[there] for name, x in found.items()}
+            return found, int(there.sum()), np.broadcast_to(lever, (kept,))[there], lost
+    return found, kept, lever, lost
+
+
+def _statistics(values: FloatArray) -> tuple[Any, ...]:
+    """Fields of `Spread` in their order from the samples at one angle, NaN where there are none; sorts the samples."""
+    if values.size < 2:
+        none = np.nan
+        return none, none, np.full(len(PERCENTILES), none), none, none, np.zeros(_BINS + 1), np.zeros(_BINS)
+    values.sort()
+    places = np.array(PERCENTILES) / 100.0 * (values.size - 1)
+    below = np.minimum(places.astype(int), values.size - 2)
+    percentiles = values[below] + (places - below) * (values[below + 1] - values[below])
+    low, high = values[0], values[-1]
+    first, last = values[int(0.0005 * values.size)], values[int(0.9995 * (values.size - 1))]
+    # all samples alike have a bin of no width: a width that floats can tell is made
+    edges = first + np.linspace(0.0, max(last - first, 1e-12 * max(abs(low), abs(high)), 1e-300), _BINS + 1)
+    inside = np.searchsorted(values, edges[:-1])
+    counts = np.diff(inside, append=np.searchsorted(values, edges[-1], "right"))
+    return float(values.mean()), float(values.std(ddof=1)), percentiles, low, high, edges, counts
+
+
+def _spread(rows: Sequence[tuple[Any, ...]], poles: NDArray[np.bool_]) -> Spread:
+    """The statistics of all angles, without mean and deviation at the poles."""
+    mean, deviation, percentiles, least, greatest, edges, counts = (np.array(part) for part in zip(*rows))
+    return Spread(
+        mean=masked_array(mean, poles | np.isnan(mean)),
+        deviation=masked_array(deviation, poles | np.isnan(deviation)),
+        percentiles=masked_array(percentiles.T, np.isnan(percentiles.T)),
+        least=masked_array(least, np.isnan(least)),
+        greatest=masked_array(greatest, np.isnan(greatest)),
+        edges=edges,
+        counts=counts.astype(np.int64),
+    )
+
+
+def _check_samples(parameters: SliderCrankParameters, drawn: Mapping[str, FloatArray]) -> None:
+    """Make sure that every sample is a mechanism, as `SliderCrankParameters` does of one.
+
+    Raises
+    ------
+    InputError
+        If some are none: which tolerances make them, and how many.
+    """
+    values: dict[str, Any] = {field.name: getattr(parameters, field.name) for field in fields(parameters)}
+    for name, x in drawn.items():
+        if name in (ANGLE, SHIFT):
+            continue
+        values[field_name(name)] = varied = values[field_name(name)] + x
+        lowest: dict[str, Any] = {field_name(name): float(varied.min())}
+        try:
+            replace(parameters, **lowest)
+        except ParameterError as error:
+            if error.name == name and lowest[field_name(name)] <= 0.0:
+                positive = error.requirement == POSITIVE
+                wrong = np.count_nonzero(varied <= 0.0 if positive else varied < 0.0)
+                raise InputError(
+                    f"the tolerance of {name} is too wide: in {wrong} of {x.size} samples it is "
+                    + ("not above zero" if positive else "below zero")
+                ) from None
+    steiner = values["crank_mass"] * (values["crank_cog_x"] ** 2 + values["crank_cog_y"] ** 2)
+    wrong = np.count_nonzero(values["crank_inertia"] < steiner * (1.0 - 1e-12))
+    if wrong:
+        names = [n for n in ("crank.inertia", "crank.mass", "crank.cog_x", "crank.cog_y") if n in drawn]
+        raise InputError(
+            f"the tolerance of {' and that of '.join(names)} is too wide: in {wrong} of {drawn[names[0]].size} samples "
+            "crank.inertia is less than crank.mass * (crank.cog_x^2 + crank.cog_y^2), which it holds"
+        )
+
+
+def _angle(turn: ForceTurn, i: int) -> str:
+    return f"crank angle {degrees(float(turn.angle[i])):.6g} deg"
+
+
+def _angles(turn: ForceTurn, points: NDArray[Any]) -> str:
+    return _angle(turn, int(points[0])) + _others(points)
+
+
+def _others(points: NDArray[Any]) -> str:
+    others = points.size - 1
+    return f" and {others} other angles" if others > 1 else " and another angle" if others else ""
