@@ -318,12 +318,10 @@ def hand_drawn_pictures() -> None:
     """Draw the pictures of docs/hand-drawn-to-fmu.md."""
     import numpy as np
 
-    from analysis.cli.slider import drive_figure
-    from analysis.figures import Curve, Panel, plot_curves
+    from analysis.figures import Curve, Panel, plot, plot_curves
     from analysis.files.io import save_figure
-    from analysis.motion.cases import load_slider_case
-    from analysis.synthesis import TargetPath
-    from analysis.synthesis.cases import load_synthesis_case
+    from analysis.motion import load_slider_case
+    from analysis.synthesis import TargetPath, load_synthesis_case
 
     examples = HERE.parent / "examples"
 
@@ -340,7 +338,7 @@ def hand_drawn_pictures() -> None:
     points = closed(drawn.points, label="drawn", line="", marker=".", colour="0.55")
     smooth = closed(case.task.path.points, label="smoothed", width=1.0)
     picture("hand-drawn-curve.png", "A curve drawn by hand", [points, smooth])
-    save_figure(case.solve().best.plot(title="The linkage that was found"), HERE / "hand-drawn-linkage.png", dpi=90)
+    save_figure(plot(case.solve().best, title="The linkage that was found"), HERE / "hand-drawn-linkage.png", dpi=90)
     small = load_slider_case(examples / "hand-drawn-slider.toml")
     four_bar = small.four_bar()
     moved = [four_bar]
@@ -350,7 +348,7 @@ def hand_drawn_pictures() -> None:
     curves.append(closed(four_bar.curve(), label="four-bar", line="--"))
     curves.append(closed(moved[-1].curve(), label="slider moved,\n3 harmonics"))
     picture("hand-drawn-moved.png", "Links of at most 150 mm", curves)
-    figure = drive_figure("The slider's drive at 60 rpm", small.driven(moved[-1]))
+    figure = plot(small.driven(moved[-1]), title="The slider's drive at 60 rpm")
     save_figure(figure, HERE / "hand-drawn-motion.png", dpi=90)
 
 

@@ -22,7 +22,7 @@ from linkwork.slider_crank.published import RAD_S_PER_RPM, SETS, PublishedSet
 
 from ..slider_crank import mobility
 from .common import CHECK_FAILED, changes, console, errors, handled, number_or_text, tolerance_option
-from .design import wrote
+from .design import print_written
 
 if TYPE_CHECKING:
     from ..slider_crank.forces import ForceTurn
@@ -422,7 +422,7 @@ def forces(
             scene = turn.scene(frame, units=units)
             figure = plot_forces(scene, title=f"{chosen.title}: joint forces in frame {frame}")
             written.append(io.save_figure(figure, folder / f"{chosen.name}-forces-frame-{frame}.png"))
-    wrote(written)
+    print_written(written)
 
 
 def _texts(value: float, angle: float) -> tuple[str, str]:
@@ -616,7 +616,7 @@ def tolerances(
             scene = found.scene(quantity, at, units=units)
             figure = plot_tolerances(scene, title=f"{chosen.title}: {quantity}", shown=shown)
             files.append(io.save_figure(figure, folder / f"{chosen.name}-tolerances-{quantity}.png"))
-    wrote(files)
+    print_written(files)
 
 
 def _in_the_turn(angle: float, chosen: _Chosen) -> float:
@@ -836,7 +836,7 @@ def _two_rotations(chosen: _Chosen, points: int, told: _Units, folder: Path) -> 
         highlight=False,
         soft_wrap=True,
     )
-    wrote([io.write_csv(folder / f"{chosen.name}-two-rotations.csv", columns)])
+    print_written([io.write_csv(folder / f"{chosen.name}-two-rotations.csv", columns)])
 
 
 # Pictures
@@ -889,4 +889,4 @@ def picture(
     if animate:
         with console.status(f"drawing {frames} pictures"):
             written.append(pictures.animate_mechanism(p, folder / f"{chosen.name}.gif", frames=frames, **seen))
-    wrote(written)
+    print_written(written)

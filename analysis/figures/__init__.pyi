@@ -13,11 +13,13 @@ from .dispatch import plot as plot
 from .linkage import animate_linkage as animate_linkage
 from .linkage import draw_linkage as draw_linkage
 from .linkage import icon as icon
+from .motion import plot_drive as plot_drive
+from .motion import plot_least_effort as plot_least_effort
+from .motion import plot_tracking as plot_tracking
 from .response import plot_branches as plot_branches
 from .style import COLOURS as COLOURS
 from .style import STYLE as STYLE
 from .style import Figure as Figure
-from .synthesis import LinkageScene as LinkageScene
 from .synthesis import animate_solution as animate_solution
 from .synthesis import plot_alternatives as plot_alternatives
 from .synthesis import plot_solution as plot_solution

@@ -17,19 +17,34 @@ from linkwork.five_bar.parameters import FiveBarParameters, InitialState
 from ..files.io import check_names, parameters_to, quantity, read_tables, unknown_name
 from ..linear.linearise import linearise_along
 from ..linear.slider_control import design_pid
+from ..synthesis import (
+    ANGLES,
+    LENGTHS,
+    LINKS,
+    TABLES,
+    Assembly,
+    Constraint,
+    Linkage,
+    RockerFunction,
+    Search,
+    SliderUnknown,
+    Solution,
+    Synthesis,
+    SynthesisCase,
+    Task,
+    TimedPath,
+    UntimedPath,
+    overridden,
+    synthesis_case_from,
+    synthesize,
+)
 from ..synthesis.case_tasks import flag, given, listed, one_of, section, whole
-from ..synthesis.cases import TABLES, SynthesisCase, overridden, synthesis_case_from
-from ..synthesis.constraints import Assembly, Constraint
-from ..synthesis.linkage import ANGLES, LENGTHS, LINKS, Linkage
-from ..synthesis.program import SliderUnknown
-from ..synthesis.solution import Solution
-from ..synthesis.solve import Synthesis, synthesize
-from ..synthesis.tasks import RockerFunction, Task, TimedPath, UntimedPath
+from .collocation import Collocation, Effort, MotionLimits
 from .inverse import SliderDrive, best_spring, inverse_dynamics
-from .least_effort import Effort, LeastEffort, least_effort
+from .least_effort import LeastEffort, least_effort
 from .motion import motion_of_plant, slider_motion
 from .strategy import RATIOS, Criterion, Strategy, simplest_mechanism
-from .tracking import TrackingResult, track
+from .tracking import TrackingController, TrackingResult, track
 
 #: Tables of a case file besides those of a synthesis.
 OWN = ("linkage", "slider", "strategy", "drive", "load", "tracking", "least_effort")
@@ -158,7 +173,7 @@ class SliderCase:
         kept = {name: (value, value) for name, value in self.linkage.values().items() if name != "branch"}
         only = (Assembly(branch=self.linkage.branch),)
         seed = self.synthesis.search.seed
-        return synthesize(task, kept, only, seed=seed, candidates=1 << 10, starts=4, solutions=1).best
+        return synthesize(task, kept, only, search=Search(seed=seed, candidates=1 << 10, starts=4, solutions=1)).best
 
     def move(self, four_bar: Solution, harmonics: int, guesses: tuple[Solution, ...], *, progress: bool) -> Synthesis:
         """The best motion with so many harmonics; see `slider_motion`."""
@@ -171,11 +186,7 @@ class SliderCase:
             bounds=bounds,
             constraints=self._constraints,
             guesses=guesses,
-            starts=self.starts,
-            solutions=search.solutions,
-            seed=search.seed,
-            n_jobs=search.jobs,
-            progress=progress,
+            search=replace(search, method="scan", starts=self.starts, progress=progress),
         )
 
     def simplest(self, *, progress: bool = False) -> Strategy:
@@ -192,10 +203,7 @@ class SliderCase:
             harmonics=wanted.harmonics,
             ratios=wanted.ratios,
             second_crank=wanted.second_crank,
-            starts=wanted.starts,
-            seed=search.seed,
-            n_jobs=search.jobs,
-            progress=progress,
+            search=Search(starts=wanted.starts, seed=search.seed, n_jobs=search.n_jobs, progress=progress),
         )
 
     # Dynamics
@@ -238,18 +246,21 @@ class SliderCase:
             other["slider_coulomb_friction"] = wanted.coulomb_friction
         bandwidth = 10.0 * abs(drive.crank_speed) if wanted.bandwidth is None else wanted.bandwidth
         design = design_pid(linearise_along(model, drive).mean(), bandwidth=bandwidth) if bandwidth > 0.0 else None
-        return track(
+        controller = TrackingController(
             model,
             drive.slider,
-            crank_speed=drive.crank_speed,
-            period=wanted.period,
+            wanted.period,
             design=design,
             feedforward=wanted.feedforward,
+            load=drive.load if wanted.load_known else (0.0, 0.0),
+            limit=wanted.limit,
+        )
+        return track(
+            controller,
+            crank_speed=drive.crank_speed,
             revolutions=wanted.revolutions,
             plant=replace(model, **other),
             load=drive.load,
-            known_load=drive.load if wanted.load_known else (0.0, 0.0),
-            limit=wanted.limit,
         )
 
     def relaxed(self, drive: SliderDrive, linkage: Linkage) -> LeastEffort:
@@ -273,11 +284,9 @@ class SliderCase:
             target,
             wanted.bound,
             cost=wanted.cost,
-            stroke=(low, high),
-            speed=wanted.speed,
-            force=wanted.force,
+            limits=MotionLimits(stroke=(low, high), speed=wanted.speed, force=wanted.force),
             load=drive.load,
-            intervals=wanted.intervals,
+            collocation=Collocation(intervals=wanted.intervals),
             guess=drive.slider,
         )
 

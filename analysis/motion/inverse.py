@@ -102,6 +102,11 @@ class SliderDrive:
             raise InputError(f"a prescribed motion has no output {name!r}: it has {', '.join(NAMES)}")
         return self.values[:, NAMES.index(name)]
 
+    def pin_force(self, pin: str) -> FloatArray:
+        """Magnitude of the force in pin A, B, C or D (N), shape (n,)."""
+        magnitude: FloatArray = np.hypot(self[f"pin.{pin}.fx"], self[f"pin.{pin}.fy"])
+        return magnitude
+
     def turn(self, samples: int) -> SliderDrive:
         """The same motion at another number of samples."""
         return inverse_dynamics(self.parameters, self.slider, self.crank_speed, load=self.load, samples=samples)

@@ -31,8 +31,9 @@ from .constraints import (
 )
 from .linkage import ANGLES
 from .requirements import requirement
+from .search import METHODS, Search
 from .solution import Solution
-from .solve import METHODS, Method, Synthesis, TradeOff, synthesize, trade_off
+from .solve import Synthesis, TradeOff, synthesize, trade_off
 from .tasks import Task, normal_form
 
 FloatArray = NDArray[np.float64]
@@ -41,18 +42,6 @@ FloatArray = NDArray[np.float64]
 TABLES = ("title", "task", "bounds", "constraints", "search", "make", "trade_off")
 #: Stiffness of the slider that stands for a fixed pivot: natural frequency (rad/s), or multiples of the crank's speed.
 STIFF, STIFF_TURNS = 1000.0, 50.0
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Search:
-    """How it is searched: arguments of `synthesize`."""
-
-    method: Method = "scan"
-    seed: int = 0
-    candidates: int = 1 << 16
-    starts: int = 24
-    solutions: int = 6
-    jobs: int = 1
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -146,19 +135,8 @@ class SynthesisCase:
 
     def solve(self, *, progress: bool = False) -> Synthesis:
         """Search; see `synthesize`."""
-        s = self.search
-        return synthesize(
-            self.task,
-            self.bounds,
-            self.constraints,
-            seed=s.seed,
-            method=s.method,
-            candidates=s.candidates,
-            starts=s.starts,
-            solutions=s.solutions,
-            n_jobs=s.jobs,
-            progress=progress,
-        )
+        search = replace(self.search, progress=progress)
+        return synthesize(self.task, self.bounds, self.constraints, search=search)
 
     def trade(self, *, progress: bool = False) -> TradeOff | None:
         """The trade-off that is asked for, if any; see `trade_off`."""
@@ -171,10 +149,7 @@ class SynthesisCase:
             wanted.limits,
             self.bounds,
             self.constraints,
-            seed=self.search.seed,
-            starts=wanted.starts,
-            n_jobs=self.search.jobs,
-            progress=progress,
+            search=Search(seed=self.search.seed, starts=wanted.starts, n_jobs=self.search.n_jobs, progress=progress),
         )
 
 
@@ -300,10 +275,13 @@ def constraints_from(table: Mapping[str, Any]) -> tuple[Constraint, ...]:
 
 # The rest
 
+#: Names in the table ``[search]``.
+SEARCH = ("method", "seed", "candidates", "starts", "solutions", "jobs")
+
 
 def search_from(table: Mapping[str, Any]) -> Search:
     """How it is searched, of a table ``[search]``."""
-    check_names(table, "search", Search.__dataclass_fields__)
+    check_names(table, "search", SEARCH)
     values: dict[str, Any] = {
         name: whole(value, f"search.{name}", {"seed": 0, "jobs": -1}.get(name, 1))
         for name, value in table.items()
@@ -311,6 +289,8 @@ def search_from(table: Mapping[str, Any]) -> Search:
     }
     if values.get("jobs") == 0:
         raise ParameterError("search.jobs", 0, "be a number of cores, or -1 for all")
+    if "jobs" in values:
+        values["n_jobs"] = values.pop("jobs")
     if "method" in table:
         values["method"] = one_of(table["method"], "search.method", METHODS)
     return Search(**values)

@@ -16,12 +16,20 @@ from analysis import cli
 from analysis import motion as control
 from analysis.cli import slider
 from analysis.files import io
-from analysis.motion.cases import SliderCase, linkage_from_csv, load_slider_case
-from analysis.motion.motion import motion_of_plant
+from analysis.motion import SliderCase, linkage_from_csv, load_slider_case, motion_of_plant
 from analysis.numerics.fourier import FourierSeries
 from analysis.run.simulate import simulate
-from analysis.synthesis import Linkage, SecondCrank, SliderMotion, SynthesisInterrupted, TimedPath, evaluate, synthesize
-from analysis.synthesis.tasks import turn
+from analysis.synthesis import (
+    Linkage,
+    Search,
+    SecondCrank,
+    SliderMotion,
+    SynthesisInterrupted,
+    TimedPath,
+    evaluate,
+    synthesize,
+    turn,
+)
 from linkwork.errors import InputError, LinkworkError, ParameterError
 
 pytest.importorskip("casadi")
@@ -277,7 +285,7 @@ def test_the_linkage_is_found_first_or_read_from_what_synthesize_wrote(linkwork,
     del case["linkage"]
     found = read(tmp_path, case)
     first = found.four_bar()
-    result = synthesize(wanted, constraints=found.synthesis.constraints, starts=4, candidates=4096)
+    result = synthesize(wanted, constraints=found.synthesis.constraints, search=Search(starts=4, candidates=4096))
     assert first.error == pytest.approx(result.best.error, rel=1e-12)
     result.to_csv(tmp_path / "solutions.csv")
     for rank in range(1, len(result.solutions) + 1):
@@ -432,7 +440,7 @@ def test_a_list_of_linkages_is_checked(tmp_path) -> None:
     good = tmp_path / "solutions.csv"
     task = TimedPath(points=BASE.path(turn(12)))
     assert evaluate(task, BASE).error < 1e-20
-    synthesize(task, starts=2, candidates=1024).to_csv(good)
+    synthesize(task, search=Search(starts=2, candidates=1024)).to_csv(good)
     with pytest.raises(InputError, match="none of rank 99"):
         linkage_from_csv(good, 99)
     text = good.read_text(encoding="utf-8")

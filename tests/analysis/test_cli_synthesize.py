@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from analysis import cli
+from analysis import cli, figures
 from analysis.files import io
 from analysis.numerics.symbolic import library
 from analysis.run.simulate import simulate
@@ -28,19 +28,21 @@ from analysis.synthesis import (
     Motion,
     PivotRegion,
     PrecisionPoints,
+    Search,
     Solution,
     SynthesisInterrupted,
     TimedPath,
     TradeOff,
     TradeOffInterrupted,
     cases,
+    load_synthesis_case,
+    synthesis_case_from,
     turn,
 )
 from analysis.synthesis.case_tasks import KINDS
-from analysis.synthesis.cases import load_synthesis_case, synthesis_case_from
 from analysis.synthesis.constraints import UNKNOWNS
-from analysis.synthesis.program import traced
 from analysis.synthesis.requirements import requirement
+from analysis.synthesis.user_functions import traced
 from linkwork.errors import InputError, LinkworkError, ParameterError
 
 ROOT = Path(__file__).parents[2]
@@ -159,13 +161,12 @@ def test_what_the_tables_say_is_what_is_searched(tmp_path, monkeypatch) -> None:
     search = '[search]\nmethod = "simplex"\nseed = 5\ncandidates = 99\nstarts = 7\nsolutions = 2\njobs = 2\n'
     found = case(ELLIPSE + search + '[trade_off]\nover = "size"\nlimits = [1, 2]\nstarts = 3\n', tmp_path)
     found.solve(progress=True)
-    assert given == {
-        "seed": 5, "method": "simplex", "candidates": 99, "starts": 7, "solutions": 2, "n_jobs": 2, "progress": True,
-    }  # fmt: skip
+    search = Search(seed=5, method="simplex", candidates=99, starts=7, solutions=2, n_jobs=2, progress=True)
+    assert given == {"search": search}
     given.clear()
     found.trade()
     assert given.pop("limits").tolist() == [1.0, 2.0]
-    assert given == {"seed": 5, "starts": 3, "n_jobs": 2, "progress": False}
+    assert given == {"search": Search(seed=5, starts=3, n_jobs=2)}
 
 
 def test_a_crank_that_swings_backwards_is_run_over_its_task_alone(tmp_path) -> None:
@@ -192,7 +193,7 @@ def test_a_crank_that_swings_backwards_is_run_over_its_task_alone(tmp_path) -> N
 def test_an_animation_is_made_where_it_is_asked_for(linkwork, tmp_path, monkeypatch) -> None:
     (tmp_path / "case.toml").write_text(CAPPED)
     asked = []
-    monkeypatch.setattr(Solution, "animate", lambda self, path, **more: asked.append((path.name, more)) or path)
+    monkeypatch.setattr(figures, "animate", lambda solution, path, **more: asked.append((path.name, more)) or path)
     assert linkwork("synthesize", "case.toml", "--no-plots", "--animate").exit_code == 0
     assert asked == [("best.gif", {"title": "case"})]
 

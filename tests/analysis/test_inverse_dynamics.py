@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from scipy.optimize import minimize
 
 from analysis import Inputs, simulate
-from analysis.motion.inverse import best_spring, inverse_dynamics
+from analysis.motion import best_spring, inverse_dynamics
 from analysis.numerics.fourier import FourierSeries
 from analysis.periodic.orbits import find_orbit
 from analysis.run.inputs import table
