@@ -14,7 +14,7 @@ from pathlib import Path
 
 from fmpy import extract, read_model_description
 from fmpy.fmi2 import FMU2Slave
-from linkwork.five_bar.plant import SPEED_DRIVE, Plant
+from linkwork.five_bar.GONE import SPEED_DRIVE
 from pythonfmu.builder import FmuBuilder
 from rich.console import Console
 from rich.table import Table
@@ -23,6 +23,7 @@ import build_fmu
 from analysis import Inputs, simulate
 from linkwork.five_bar import dynamics
 from linkwork.five_bar.published import SETS
+from linkwork.plant import Plant
 
 STEP = 1e-3
 STEPS = 430

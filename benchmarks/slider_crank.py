@@ -21,8 +21,7 @@ from scipy.integrate import solve_ivp
 
 import build_fmu
 from analysis import simulate
-from analysis.run import compiled
-from analysis.run.inputs import SliderCrankInputs
+from analysis.run import Inputs, compiled
 from analysis.slider_crank import QUANTITIES, ConstantShift, Tolerance, close, force_turn, joint_loads, monte_carlo
 from benchmarks.engines import ACCURACY
 from benchmarks.fmu import STEP, seconds_per_step
@@ -43,7 +42,7 @@ def in_process(tolerance: float) -> np.ndarray:
 
 
 def _run(tolerance: float):  # type: ignore[no-untyped-def]
-    inputs = SliderCrankInputs(torque=TORQUE)
+    inputs = Inputs(torque=TORQUE)
     return simulate(PARAMETERS, inputs, initial=INITIAL, stop_time=STOP, samples=TIMES, tolerance=tolerance)
 
 

@@ -40,20 +40,21 @@ from rich.console import Console
 from rich.table import Table
 from scipy.optimize import Bounds, minimize
 
-from analysis.synthesis import LargestLink, Linkage, TimedPath, evaluate, synthesize, turn
-from analysis.synthesis.black_box import (
-    DRAWS,
-    EDGE,
-    EVALUATIONS,
-    PENALTY,
-    BlackBox,
-    evolve,
-    initial_simplex,
+from analysis.synthesis import (
+    LargestLink,
+    Linkage,
+    RockerFunction,
+    Search,
+    TimedPath,
+    evaluate,
+    normal_form,
+    synthesize,
+    turn,
 )
+from analysis.synthesis.black_box import DRAWS, EDGE, EVALUATIONS, PENALTY, BlackBox, evolve, initial_simplex
 from analysis.synthesis.constraints import Limits, limits_of
 from analysis.synthesis.kernels import coupler_path, coupler_path_jacobian
 from analysis.synthesis.polish import Polisher, fit_least_squares, quality_of
-from analysis.synthesis.program import Start, linkage_of, start_of
 from analysis.synthesis.published import (
     AREA_N,
     PACKAGING_FLATNESS,
@@ -66,7 +67,8 @@ from analysis.synthesis.published import (
     ellipse,
 )
 from analysis.synthesis.scan import scan
-from analysis.synthesis.tasks import Normal, RockerFunction, normal_form
+from analysis.synthesis.starts import Start, linkage_of, start_of
+from analysis.synthesis.tasks import Normal
 from linkwork.five_bar import kinematics
 
 FloatArray = NDArray[np.float64]
@@ -85,7 +87,7 @@ STARTS = 40
 PHASES = 360
 REPEATS = 15
 #: Least effort of `synthesize` that is timed beside its defaults.
-FEW = {"candidates": 1 << 12, "starts": 4}
+FEW = Search(candidates=1 << 12, starts=4)
 
 
 # Kernels
@@ -526,9 +528,9 @@ def by_freudenstein(trace: Trace, box: BlackBox, random: np.random.Generator) ->
     raise TimeUp
 
 
-Search = Callable[[Trace, BlackBox, np.random.Generator], None]
+BlackBoxSearch = Callable[[Trace, BlackBox, np.random.Generator], None]
 
-SEARCHES: dict[str, Search] = {
+SEARCHES: dict[str, BlackBoxSearch] = {
     "SciPy's differential evolution": by_scipy,
     "simplex, many starts (the thesis)": by_simplex,
     "pylinkage, particle swarm": by_swarm,
@@ -537,7 +539,7 @@ SEARCHES: dict[str, Search] = {
 }
 
 
-def searched(search: Search, contest: Contest, budget: float, enough: float) -> Trace:
+def searched(search: BlackBoxSearch, contest: Contest, budget: float, enough: float) -> Trace:
     """Runs of a search, in turn of either assembly, until its time is over or it has found enough."""
     trace = Trace(contest, budget, enough)
     with suppress(TimeUp):
@@ -546,12 +548,12 @@ def searched(search: Search, contest: Contest, budget: float, enough: float) -> 
     return trace
 
 
-def ours(contest: Contest, **more: int) -> Trace:
+def ours(contest: Contest, search: Search) -> Trace:
     """`synthesize`, its answer at the end of the call."""
     problem = contest.problem
     trace = Trace(contest, inf)
     begun = perf_counter()
-    result = synthesize(problem.task, problem.bounds, problem.constraints, **more)  # type: ignore[arg-type]
+    result = synthesize(problem.task, problem.bounds, problem.constraints, search=search)
     trace.points.append((perf_counter() - begun, problem.shown(result.best.error)))
     return trace
 
@@ -559,9 +561,9 @@ def ours(contest: Contest, **more: int) -> Trace:
 def contested(contest: Contest, budget: float) -> dict[str, Trace]:
     """Every search on a problem, ours first; those of pylinkage left out where it is not installed."""
     traces = {
-        "synthesize": ours(contest),
-        "synthesize, 2 cores": ours(contest, n_jobs=2),
-        f"synthesize, {FEW['starts']} starts": ours(contest, **FEW),
+        "synthesize": ours(contest, Search()),
+        "synthesize, 2 cores": ours(contest, Search(n_jobs=2)),
+        f"synthesize, {FEW.starts} starts": ours(contest, FEW),
     }
     enough = (1.0 + ENOUGH) * min(trace.best for trace in traces.values())
     searches = dict(SEARCHES)

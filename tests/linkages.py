@@ -7,7 +7,7 @@ from math import cos, hypot, pi, sqrt
 import numpy as np
 from hypothesis import strategies as st
 
-from analysis.synthesis.linkage import Linkage
+from analysis.synthesis import Linkage
 
 
 def drawn(random: np.random.Generator, *, least: float = 0.3) -> Linkage:

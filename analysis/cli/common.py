@@ -116,7 +116,6 @@ def number_or_text(text: str) -> bool | int | float | str:
 
 def quantity_option(text: str, unit: str, option: str) -> float:
     """The value of an option in SI, from a text with its unit or a bare number."""
-    from ..run.case_files import case_from, load_case
     from ..units import quantity
 
     return quantity(number_or_text(text), unit, option)
@@ -148,9 +147,8 @@ def prepare_solver(*parameters: Any, orbits: bool = False) -> None:
 
 def chosen_case(file: str | None, published: str | None, settings: Sequence[str]) -> Any:
     """The case of a file or a published set, with the changes of ``--set``."""
+    from ..run import published_case
     from ..run.case_files import case_from, load_case
-    from ..units import quantity
-    from ..run.case import published_case
 
     if (file is None) == (published is None):
         raise click.UsageError("give either a case file or --published NAME")

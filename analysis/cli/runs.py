@@ -13,7 +13,7 @@ import click
 
 from linkwork import __version__
 
-from ..run.case import PUBLISHED
+from ..run import PUBLISHED
 from .common import (
     CHECK_FAILED,
     ENDED_EARLY,
@@ -27,7 +27,6 @@ from .common import (
     prepare_solver,
     print_error,
     print_written,
-    quantity,
     show_table,
     tolerance_option,
 )
@@ -102,11 +101,9 @@ def run(
       linkwork run examples/torsion-bar.toml --fmu build/FiveBarSlider.fmu --out results
     """
     from .. import figures
-    from ..run.case_files import load_case
     from ..files import save_figure
     from ..mechanisms import mechanism_of
-    from ..run.cosimulate import cosimulate
-    from ..run.simulate import RunInterrupted, simulate
+    from ..run import RunInterrupted, cosimulate, simulate
     from ..units import quantity
 
     chosen = chosen_case(case, published, settings)
@@ -195,7 +192,7 @@ def check(
       linkwork check speed-jump examples/torsion-bar.toml
     """
     from ..mechanisms import mechanism_of
-    from ..run.checks import check as compare_case
+    from ..run import check as compare_case
 
     failed = []
     chosen = _cases_to_check(cases, fmu, everything)
@@ -226,10 +223,9 @@ def _cases_to_check(names: Sequence[str], fmu: str | None, everything: bool) -> 
 
     Where an FMU is named, the standard cases are those of its mechanism.
     """
-    from ..run.case_files import load_case
-    from ..files import save_figure
     from ..mechanisms import mechanism_of
-    from ..run.checks import CASES
+    from ..run import CASES
+    from ..run.case_files import load_case
 
     if not names or everything:
         model = None if fmu is None else _model_name(Path(fmu))
@@ -261,7 +257,6 @@ def _model_name(path: Path) -> str | None:
 def _write_comparison(stem: Path, title: str, in_process: Any, through_fmu: Any) -> None:
     """Write both runs of a check and their plot, and report a run that ended early."""
     from .. import figures
-    from ..run.case_files import load_case
     from ..files import save_figure
 
     in_process.to_csv(f"{stem}-in-process.csv")
@@ -308,9 +303,8 @@ def info(what: str | None) -> None:
     """
     from linkwork.five_bar.published import RAD_S_PER_RPM
 
+    from ..numerics.codegen import cache_folder
     from ..run.case_files import load_case
-    from ..files import save_figure
-    from ..run.compiled import cache_folder
 
     if what is None:
         sets = [(name, entry.source, f"{entry.crank_speed / RAD_S_PER_RPM:g}") for name, entry in PUBLISHED.items()]

@@ -2,21 +2,24 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Sequence
 from math import degrees
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 import numpy as np
-from rich.markup import escape
 from rich.table import Table
 
 from linkwork.errors import Interrupted
 
-from .common import INTERRUPTED, console, errors, handled, prepare_solver, print_written
-from .design import settings_of, write_described
+from .common import console, handled, prepare_solver
+from .design import leave_if_stopped, overrides_of, print_error, print_written, search_options, table, write_described
+
+if TYPE_CHECKING:
+    from ..motion import SliderCase, SliderDrive
+    from ..numerics.fourier import FourierSeries
+    from ..synthesis import Linkage, Solution
 
 
 @click.command("slider-motion")
@@ -29,12 +32,7 @@ from .design import settings_of, write_described
     help="Change a value, such as slider.stroke='30 mm' or slider.harmonics='[1, 2, 3]'.",
 )
 @click.option("--harmonics", type=click.IntRange(0), help="Of the slider's motion, in place of the case's.")
-@click.option("--seed", type=click.IntRange(0), help="Of the random starts: the same seed gives the same motion.")
-@click.option("--jobs", type=int, help="Cores; -1 for all.")
-@click.option(
-    "--out", default="out", show_default=True, type=click.Path(file_okay=False), help="Folder for the results."
-)
-@click.option("--plots/--no-plots", default=True, show_default=True, help="Whether to write plots.")
+@search_options
 @handled
 def slider_motion(
     case: str,
@@ -56,13 +54,11 @@ def slider_motion(
       linkwork slider-motion examples/slider-motion.toml
       linkwork slider-motion examples/slider-motion.toml --set slider.stroke='20 mm' --harmonics 3
     """
-    from ..motion.cases import load_slider_case
-    from ..synthesis.linkage import SecondCrank, SliderMotion
+    from ..files import write_csv
+    from ..motion import load_slider_case
+    from ..synthesis import SecondCrank, SliderMotion
 
-    overrides = settings_of(settings)
-    for name, value in (("slider.harmonics", harmonics), ("search.seed", seed), ("search.jobs", jobs)):
-        if value is not None:
-            overrides[name] = value
+    overrides = overrides_of(settings, slider__harmonics=harmonics, search__seed=seed, search__jobs=jobs)
     chosen = load_slider_case(case, overrides)
     prepare_solver()
     folder = Path(out)
@@ -72,22 +68,17 @@ def slider_motion(
     pivot = solution.linkage.pivot
     if stopped is None and chosen.drive is not None:
         if isinstance(pivot, SecondCrank):
-            errors.print(
-                "note: the pivot is on a second crank, which the plant has not: no forces are computed",
-                style="yellow",
-                soft_wrap=True,
-            )
+            print_error("note: the pivot is on a second crank, which the plant does not have: no forces are computed")
         else:
             written += _dynamics(chosen, solution, folder, plots)
     elif isinstance(pivot, SliderMotion):
-        written.append(_write_motion(solution, folder))
+        turn = np.linspace(0.0, 2.0 * np.pi, 720, endpoint=False)
+        written.append(write_csv(folder / "motion.csv", _motion_columns(pivot.series, turn)))
     print_written(written)
-    if stopped is not None:
-        errors.print(f"{stopped}; the best so far is kept", style="yellow", highlight=False, soft_wrap=True)
-        sys.exit(INTERRUPTED)
+    leave_if_stopped(stopped, "the best so far is kept")
 
 
-def _strategy(chosen: Any) -> tuple[Any, Interrupted | None]:
+def _strategy(chosen: SliderCase) -> tuple[Any, Interrupted | None]:
     """The simplest mechanism that will do; and what stopped the search, if anything did."""
     from ..motion import StrategyInterrupted
 
@@ -98,30 +89,24 @@ def _strategy(chosen: Any) -> tuple[Any, Interrupted | None]:
         if error.strategy is None:
             raise
         found, stopped = error.strategy, error
-    grid = Table(title=escape(f"{chosen.synthesis.title}: the simplest mechanism"), title_justify="left")
-    grid.add_column("mechanism")
-    grid.add_column("what came of it")
+    headings = ("mechanism", "what came of it")
+    grid = table(f"{chosen.synthesis.title}: the simplest mechanism", headings, left=headings)
     for step in found.steps:
         grid.add_row(step.mechanism, step.reason, style="green" if found.met and step is found.chosen else None)
     console.print(grid)
     if not found.met:
-        errors.print(
-            f"note: none meets the tolerance; the nearest is kept: {found.chosen.mechanism}",
-            style="yellow",
-            highlight=False,
-            soft_wrap=True,
-        )
+        print_error(f"note: none meets the tolerance; the nearest is kept: {found.chosen.mechanism}")
     return found.chosen.solution, stopped
 
 
-def _moved(chosen: Any) -> tuple[Any, Interrupted | None]:
+def _moved(chosen: SliderCase) -> tuple[Any, Interrupted | None]:
     """The best motion, harmonic by harmonic, beside the fixed pivot; and what stopped it, if anything did."""
     from ..synthesis import SynthesisInterrupted
 
     stopped = None
     four_bar = chosen.four_bar(progress=console.is_terminal)
     found = [four_bar]
-    for harmonics in chosen.slider.harmonics:
+    for harmonics in chosen.harmonics:
         try:
             result = chosen.move(four_bar, harmonics, tuple(found[1:]), progress=console.is_terminal)
         except SynthesisInterrupted as error:
@@ -132,20 +117,19 @@ def _moved(chosen: Any) -> tuple[Any, Interrupted | None]:
         found.append(result.best)
         if stopped:
             break
-    _show(chosen.synthesis.title, found)
+    _print_motions(chosen.synthesis.title, found)
     return min(found[1:] or found, key=lambda s: s.error), stopped
 
 
-def _show(title: str, solutions: Sequence[Any]) -> None:
+def _print_motions(title: str, solutions: Sequence[Solution]) -> None:
     """The fixed pivot and the motions, a row each, in mm and degrees."""
-    from ..motion.motion import greatest
-    from ..synthesis.linkage import SliderMotion
-    from ..synthesis.report import degrees_told, error_unit, quality_name, quality_unit
+    from ..motion import greatest
+    from ..synthesis import SliderMotion, error_unit, format_transmission, quality_name, quality_unit
 
-    (factor, unit), (scale, length) = quality_unit(solutions[0].task), error_unit(solutions[0].task)
-    grid = Table(title=escape(f"{title}: {quality_name(solutions[0].task)}"), title_justify="left")
-    grid.add_column("pivot", no_wrap=True)
+    task = solutions[0].task
+    (factor, unit), (scale, length) = quality_unit(task), error_unit(task)
     headings = (
+        "pivot",
         f"error [{unit}]",
         f"worst [{length}]",
         "stroke [mm]",
@@ -154,8 +138,8 @@ def _show(title: str, solutions: Sequence[Any]) -> None:
         "guide [deg]",
         "angle at C [deg]",
     )
-    for heading in headings:
-        grid.add_column(escape(heading), justify="right", no_wrap=heading.startswith("angle"))
+    grid = table(f"{title}: {quality_name(task)}", headings, left=("pivot",))
+    grid.columns[0].no_wrap = grid.columns[-1].no_wrap = True
     for s in solutions:
         pivot = s.linkage.pivot
         words, motion = "fixed", ["", "", "", ""]
@@ -172,67 +156,65 @@ def _show(title: str, solutions: Sequence[Any]) -> None:
             f"{factor * s.error:.5g}",
             f"{scale * s.evaluation.worst:.4g}",
             *motion,
-            degrees_told(s.verdicts),
+            format_transmission(s.verdicts),
             style=None if s.verdicts.sound else "yellow",
         )
     console.print(grid)
 
 
-def _write_solution(solution: Any, folder: Path, title: str, plots: bool) -> list[Path]:
+def _write_solution(solution: Solution, folder: Path, title: str, plots: bool) -> list[Path]:
+    written = write_described(solution, folder, title, curve="curve", text="report", drawn="linkage")
+    return written + _plotted(plots, solution, folder / "linkage.png", title=title)
+
+
+def _plotted(plots: bool, result: Any, path: Path, **options: Any) -> list[Path]:
+    """The picture of a result, where pictures are wanted."""
+    from .. import figures
     from ..files import save_figure
 
-    written = write_described(solution, folder, title, curve="curve", report="report", drawing="linkage")
-    if plots:
-        written.append(save_figure(solution.plot(title=title), folder / "linkage.png"))
-    return written
+    return [save_figure(figures.plot(result, **options), path)] if plots else []
 
 
-def _motion_columns(linkage: Any, rotation: Any) -> dict[str, Any]:
+def _motion_columns(series: FourierSeries, rotation: Any) -> dict[str, Any]:
     """The slider's position and its derivatives by the crank's rotation."""
-    series = linkage.pivot.series
     columns = {"crank rotation [rad]": rotation, "slider position [m]": series(rotation)}
     columns["du/dphi [m/rad]"] = series.derivative()(rotation)
     columns["d2u/dphi2 [m/rad2]"] = series.derivative().derivative()(rotation)
     return columns
 
 
-def _write_motion(solution: Any, folder: Path) -> Path:
-    from ..files import write_csv
-
-    turn = np.linspace(0.0, 2.0 * np.pi, 720, endpoint=False)
-    return write_csv(folder / "motion.csv", _motion_columns(solution.linkage, turn))
-
-
 # Dynamics
 
 
-def _dynamics(chosen: Any, solution: Any, folder: Path, plots: bool) -> list[Path]:
+def _dynamics(chosen: SliderCase, solution: Solution, folder: Path, plots: bool) -> list[Path]:
     """Force, torque and pin forces; a case that runs; then the run under control and the least effort, where asked for."""
-    from ..files import save_figure, write_csv, write_tables
-    from ..motion.cases import run_case
+    from ..files import write_csv, write_tables
+    from ..motion import run_case
     from ..run.case_files import save_parameters
+    from ..synthesis import SliderMotion
 
     title = chosen.synthesis.title
     drive = chosen.driven(solution)
-    _tell_drive(title, drive)
-    own = {}
-    if solution.linkage.pivot is not None:
-        own = _motion_columns(solution.linkage, drive.crank_angle - solution.linkage.crank_phase)
-    written = [write_csv(folder / "motion.csv", own | dict(drive.columns()))]
+    _print_drive(title, drive)
+    own, pivot = {}, solution.linkage.pivot
+    if isinstance(pivot, SliderMotion):
+        own = _motion_columns(pivot.series, drive.crank_angle - solution.linkage.crank_phase)
     end = {"time [s]": np.append(drive.time, drive.period), "slider.force [N]": np.append(drive.force, drive.force[0])}
-    written.append(write_csv(folder / "force.csv", end))
-    written.append(save_parameters(folder / "five-bar-parameters.toml", drive.parameters))
-    written.append(write_tables(folder / "five-bar.toml", run_case(drive, title, "force.csv")))
-    if plots:
-        written.append(save_figure(drive_figure(title, drive), folder / "motion.png"))
+    written = [
+        write_csv(folder / "motion.csv", own | dict(drive.columns())),
+        write_csv(folder / "force.csv", end),
+        save_parameters(folder / "five-bar-parameters.toml", drive.parameters),
+        write_tables(folder / "five-bar.toml", run_case(drive, title, "force.csv")),
+    ]
+    written += _plotted(plots, drive, folder / "motion.png", title=title)
     if chosen.tracking is not None:
         written += _tracking(chosen, drive, folder, plots)
-    if chosen.least_effort is not None:
+    if chosen.effort is not None:
         written += _effort(chosen, drive, solution.linkage, folder, plots)
     return written
 
 
-def _rows(title: str, rows: Sequence[tuple[str, str]]) -> None:
+def _print_rows(title: str, rows: Sequence[tuple[str, str]]) -> None:
     console.print(title, style="italic", highlight=False, markup=False, soft_wrap=True)
     grid = Table(show_header=False)
     grid.add_column()
@@ -242,7 +224,7 @@ def _rows(title: str, rows: Sequence[tuple[str, str]]) -> None:
     console.print(grid)
 
 
-def _tell_drive(title: str, drive: Any) -> None:
+def _print_drive(title: str, drive: SliderDrive) -> None:
     p = drive.parameters
     rows = [
         ("rms force", f"{drive.rms_force:.5g} N"),
@@ -251,67 +233,35 @@ def _tell_drive(title: str, drive: Any) -> None:
         ("peak power", f"{drive.peak_power:.5g} W"),
         ("work done in a turn, and taken up", f"{drive.positive_work:.5g} J, {-drive.negative_work:.5g} J"),
         ("peak crank torque", f"{drive.peak_torque:.5g} N.m"),
+        *((f"peak force in pin {pin}", f"{drive.pin_force(pin).max():.5g} N") for pin in "ABCD"),
     ]
-    rows += [(f"peak force in pin {pin}", f"{np.hypot(*_pin(drive, pin)).max():.5g} N") for pin in "ABCD"]
     if p.slider_stiffness:
         rows.append(("spring", f"{p.slider_stiffness:.5g} N/m, free at {1e3 * p.slider_spring_free_position:.5g} mm"))
     rows.append(("energy balance of a turn", f"{drive.balance.residual:.1e} J"))
-    _rows(f"{title}: the slider's drive at {abs(drive.crank_speed) * 30.0 / np.pi:.5g} rpm", rows)
+    _print_rows(f"{title}: the slider's drive at {abs(drive.crank_speed) * 30.0 / np.pi:.5g} rpm", rows)
 
 
-def _pin(drive: Any, pin: str) -> tuple[Any, Any]:
-    return drive[f"pin.{pin}.fx"], drive[f"pin.{pin}.fy"]
-
-
-def drive_figure(title: str, drive: Any) -> Any:
-    """Position, force, power and pin forces over the turn."""
-    from ..figures import Curve, Panel, plot_curves
-
-    x = np.degrees(np.abs(drive.crank_angle))
-    pins = [Curve(x=x, y=np.hypot(*_pin(drive, pin)), label=pin) for pin in "ABCD"]
-    parts = [
-        ("slider position [mm]", [Curve(x=x, y=1e3 * drive.states[:, 1])]),
-        ("control force [N]", [Curve(x=x, y=drive.force)]),
-        ("power of the force [W]", [Curve(x=x, y=drive.power)]),
-        ("crank torque [N.m]", [Curve(x=x, y=drive.torque)]),
-        ("transmission angle [deg]", [Curve(x=x, y=np.degrees(drive["transmission.angle"]))]),
-        ("pin forces [N]", pins),
-    ]
-    ticks = [0.0, 90.0, 180.0, 270.0, 360.0]
-    panels = [
-        Panel(x_label="crank angle [deg]", y_label=label, curves=curves, x_ticks=ticks, legend_at="outside")
-        for label, curves in parts
-    ]
-    return plot_curves(panels, title=title, columns=2, size=(4.4, 2.4))
-
-
-def _tracking(chosen: Any, drive: Any, folder: Path, plots: bool) -> list[Path]:
-    from ..figures import Curve, Panel, plot_curves
-    from ..files import save_figure, write_csv
+def _tracking(chosen: SliderCase, drive: SliderDrive, folder: Path, plots: bool) -> list[Path]:
+    from ..files import write_csv
 
     run = chosen.tracked(drive)
-    if run.loop.status:
-        errors.print(
-            f"note: the run under control ended early: {run.loop.message}",
-            style="yellow",
-            markup=False,
-            highlight=False,
-            soft_wrap=True,
-        )
+    loop = run.loop
+    if loop.status:
+        print_error(f"note: the run under control ended early: {loop.message}")
     else:
         m = run.metrics()
-        point = []
-        if drive.parameters.coupler_point_distance:
-            both = f"{1e3 * m.rms_point_error:.4g} mm, {1e3 * m.peak_point_error:.4g} mm"
-            point = [("coupler point error, rms and peak", both)]
         rows = [
             ("slider error, rms and peak", f"{1e3 * m.rms_error:.4g} mm, {1e3 * m.peak_error:.4g} mm"),
-            *point,
+            (
+                "coupler point error, rms and peak",
+                f"{1e3 * m.rms_point_error:.4g} mm, {1e3 * m.peak_point_error:.4g} mm",
+            ),
             ("force, rms and peak", f"{m.rms_force:.5g} N, {m.peak_force:.5g} N"),
             ("power, mean and peak", f"{m.mean_power:.5g} W, {m.peak_power:.5g} W"),
         ]
-        _rows(f"run under control over the last turn: {run.method}", rows)
-    loop = run.loop
+        if not drive.parameters.coupler_point_distance:
+            del rows[1]
+        _print_rows(f"run under control over the last turn: {run.method}", rows)
     columns = {
         "time [s]": loop.time,
         "slider position [m]": loop.position,
@@ -322,39 +272,28 @@ def _tracking(chosen: Any, drive: Any, folder: Path, plots: bool) -> list[Path]:
         "power [W]": run.power,
     }
     written = [write_csv(folder / "tracking.csv", columns)]
-    if plots:
-        panels = [
-            Panel(x_label="time [s]", y_label=label, curves=[Curve(x=loop.time, y=values)])
-            for label, values in (
-                ("slider error [mm]", 1e3 * run.error),
-                ("coupler point error [mm]", 1e3 * run.point_error),
-                ("control force [N]", loop.force),
-            )
-        ]
-        figure = plot_curves(panels, title=f"Tracking: {run.method}", size=(6.4, 2.2))
-        written.append(save_figure(figure, folder / "tracking.png"))
-    return written
+    return written + _plotted(plots, run, folder / "tracking.png")
 
 
-def _effort(chosen: Any, drive: Any, linkage: Any, folder: Path, plots: bool) -> list[Path]:
-    from ..figures import Curve, Panel, plot_curves
-    from ..files import save_figure, write_csv
-    from ..synthesis import RockerFunction
+def _effort(chosen: SliderCase, drive: SliderDrive, linkage: Linkage, folder: Path, plots: bool) -> list[Path]:
+    from ..files import write_csv
+    from ..synthesis import error_unit
 
+    assert chosen.effort is not None
     with console.status("least effort"):
         least = chosen.relaxed(drive, linkage)
-    scale, unit = (180.0 / np.pi, "deg") if isinstance(chosen.synthesis.task, RockerFunction) else (1e3, "mm")
+    scale, unit = error_unit(chosen.synthesis.task)
     rows = [
         ("effort minimised", f"{least.cost}: {least.effort:.5g} {'N rms' if least.cost == 'force' else 'W'}"),
         ("of the motion before", f"{drive.rms_force:.5g} N rms, {drive.mean_power:.5g} W mean"),
         ("peak force", f"{np.abs(least.force).max():.5g} N"),
         (
             "departure allowed, and found by a run",
-            f"{scale * chosen.least_effort.bound:.4g}, {scale * least.attained:.4g} {unit}",
+            f"{scale * chosen.effort.bound:.4g}, {scale * least.attained:.4g} {unit}",
         ),
         ("change of effort as the intervals are halved", f"{least.mesh_effort:.1e}"),
     ]
-    _rows("motion of least effort", rows)
+    _print_rows("motion of least effort", rows)
     columns = {
         "crank angle [rad]": least.crank_angle,
         "slider position [m]": least.position,
@@ -363,20 +302,4 @@ def _effort(chosen: Any, drive: Any, linkage: Any, folder: Path, plots: bool) ->
         f"departure [{'rad' if unit == 'deg' else 'm'}]": least.error,
     }
     written = [write_csv(folder / "least-effort.csv", columns)]
-    if plots:
-        x, before = np.degrees(least.crank_angle), np.degrees(drive.crank_angle)
-        pairs = (
-            ("slider position [mm]", 1e3 * drive.states[:, 1], 1e3 * least.position),
-            ("control force [N]", drive.force, least.force),
-        )
-        panels = [
-            Panel(
-                x_label="crank angle [deg]",
-                y_label=label,
-                curves=[Curve(x=before, y=first, label="before"), Curve(x=x, y=second, label="least effort")],
-            )
-            for label, first, second in pairs
-        ]
-        figure = plot_curves(panels, title="Motion of least effort", size=(6.4, 2.6))
-        written.append(save_figure(figure, folder / "least-effort.png"))
-    return written
+    return written + _plotted(plots, least, folder / "least-effort.png", before=drive)

@@ -12,6 +12,9 @@ from .dispatch import animate as animate
 from .dispatch import plot as plot
 from .linkage import animate_linkage as animate_linkage
 from .linkage import draw_linkage as draw_linkage
+from .motion import plot_drive as plot_drive
+from .motion import plot_least_effort as plot_least_effort
+from .motion import plot_tracking as plot_tracking
 from .response import plot_branches as plot_branches
 from .slider_crank import plot_forces as plot_forces
 from .slider_crank import plot_tolerances as plot_tolerances
@@ -21,7 +24,6 @@ from .slider_crank_picture import plot_range as plot_range
 from .style import COLOURS as COLOURS
 from .style import STYLE as STYLE
 from .style import Figure as Figure
-from .synthesis import LinkageScene as LinkageScene
 from .synthesis import animate_solution as animate_solution
 from .synthesis import plot_alternatives as plot_alternatives
 from .synthesis import plot_solution as plot_solution

@@ -15,7 +15,7 @@ from matplotlib.patches import PathPatch
 from matplotlib.path import Path as Outline
 from numpy.typing import ArrayLike, NDArray
 
-from ..run.trajectory import Trajectory
+from ..run import Trajectory
 from .dispatch import plot
 from .style import COLOURS, STYLE, Figure, finish
 

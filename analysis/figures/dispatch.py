@@ -23,7 +23,17 @@ from matplotlib.figure import Figure
 from linkwork.errors import LinkworkError
 
 #: The modules that register what they draw, those that import fastest first.
-MODULES = ("curves", "linkage", "response", "charts", "control", "synthesis", "slider_crank", "slider_crank_picture")
+MODULES = (
+    "curves",
+    "linkage",
+    "response",
+    "charts",
+    "control",
+    "synthesis",
+    "motion",
+    "slider_crank",
+    "slider_crank_picture",
+)
 
 
 class DrawingError(LinkworkError, TypeError):

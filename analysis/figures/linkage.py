@@ -19,7 +19,7 @@ from linkwork.errors import AssemblyError, InputError
 from linkwork.five_bar import kinematics
 from linkwork.five_bar.parameters import FiveBarParameters
 
-from ..run.trajectory import Trajectory
+from ..run import Trajectory
 from .animation import gif
 from .dispatch import plot
 from .style import STYLE, Figure, finish

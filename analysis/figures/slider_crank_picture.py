@@ -28,8 +28,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from linkwork.errors import InputError
 from linkwork.slider_crank import kinematics
+from linkwork.slider_crank.assembly import check_assembly
 from linkwork.slider_crank.parameters import SliderCrankParameters
-from linkwork.slider_crank.plant import check_assembly
 from linkwork.slider_crank.published import INCH
 from linkwork.slider_crank.vectors import Vector
 

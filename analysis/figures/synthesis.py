@@ -1,14 +1,14 @@
 """Pictures of linkages that were found: to scale with their curve and target, their errors, and what was traded for what.
 
-What is drawn comes as data (`LinkageScene`): nothing here knows what a task is. Lengths are shown in mm, angles in degrees.
+Lengths are shown in mm, angles in degrees.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping
 from math import ceil, hypot, log10
 from pathlib import Path
+from textwrap import fill
 from typing import Any
 
 import matplotlib
@@ -23,6 +23,18 @@ from numpy.typing import NDArray
 
 from linkwork.errors import InputError
 
+from ..synthesis import (
+    InfeasibleError,
+    LinkageScene,
+    Solution,
+    Synthesis,
+    TradeOff,
+    error_unit,
+    headline,
+    quality_name,
+    quality_unit,
+)
+from .dispatch import animate, plot
 from .linkage import COUPLER, CRANK, GROUND, ROCKER, SLIDER, TRACE
 from .style import COLOURS, STYLE, finish
 
@@ -35,57 +47,6 @@ MM_PER_METRE = 1e3
 LONGEST = 0.12
 #: Rotations at which a scene is looked at to frame it.
 FRAMED = 72
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class LinkageScene:
-    """A linkage with what it was found for, in m and rad.
-
-    Attributes
-    ----------
-    pins : callable
-        Places of A, B, C, D, E and, where there is a coupler point, P at a rotation of the crank; None where the links
-        cannot be joined.
-    rotation : ndarray, shape (n,)
-        Crank rotations over which the task is done.
-    curves : tuple of ndarray, shape (n, 2)
-        The coupler curve over all that the crank can turn, in pieces; none without a coupler point.
-    traced : ndarray, shape (n, 2), or None
-        The part of it that does the task.
-    target : ndarray, shape (n, 2), or None
-    line : bool or None
-        Whether the target is a line, closed (True) or open (False), or points (None).
-    timed : bool
-        Whether the crank rotations of the stations were given.
-    stations : mapping
-        Columns by name with unit, such as ``error [m]``; see `Solution.columns`.
-    guide : ndarray, shape (2, 2), or None
-        Ends of the travel of the slider that carries D.
-    second_crank : bool
-        Whether D is on a second crank about E.
-    transmission : ndarray, shape (2, n)
-        Crank rotation over a turn, and the angle between coupler and rocker, NaN where the links cannot be joined.
-    motion : (str, ndarray), or None
-        How the rocker pivot moves over the same rotations: ``slider position [m]`` or ``second crank [rad]``.
-    function : ndarray, shape (2, n), or None
-        Crank rotation and angle of the rocker over the task, of a rocker function.
-    title : str
-    """
-
-    pins: Callable[[float], Mapping[str, tuple[float, float]] | None]
-    rotation: FloatArray
-    curves: tuple[FloatArray, ...]
-    traced: FloatArray | None
-    target: FloatArray | None
-    line: bool | None
-    timed: bool
-    stations: Mapping[str, FloatArray]
-    guide: FloatArray | None
-    second_crank: bool
-    transmission: FloatArray
-    motion: tuple[str, FloatArray] | None
-    function: FloatArray | None
-    title: str = ""
 
 
 class _Frame:
@@ -135,10 +96,10 @@ def _draw_target(axis: Axes, scene: LinkageScene, *, size: float = 3.0) -> None:
         return
     points = MM_PER_METRE * scene.target
     look: dict[str, Any] = {"color": TARGET, "zorder": 3, "label": "target"}
-    if scene.line is None:
+    if scene.target_closed is None:
         axis.plot(*points.T, "o", markersize=size, fillstyle="none", markeredgewidth=0.9, **look)
     else:
-        closed = np.vstack([points, points[:1]]) if scene.line else points
+        closed = np.vstack([points, points[:1]]) if scene.target_closed else points
         axis.plot(*closed.T, linewidth=2.6, alpha=0.8, **look)
 
 
@@ -366,7 +327,8 @@ def _quarters(axis: Axes, turns: FloatArray) -> None:
     axis.set_xlabel("crank rotation [deg]")
 
 
-def plot_solution(scene: LinkageScene) -> Figure:
+@plot.register
+def plot_solution(solution: Solution, *, title: str = "") -> Figure:
     """A linkage to scale; its target and path with magnified errors, or its function; errors and transmission angle.
 
     Raises
@@ -374,6 +336,7 @@ def plot_solution(scene: LinkageScene) -> Figure:
     InputError
         If the links cannot be joined anywhere.
     """
+    scene = LinkageScene(solution, title)
     _, pins = _start(scene)
     frame = _Frame(scene, _around(scene))
     with matplotlib.rc_context(STYLE):
@@ -403,14 +366,16 @@ def plot_solution(scene: LinkageScene) -> Figure:
         return finish(figure)
 
 
-def plot_alternatives(scenes: Sequence[LinkageScene], *, title: str = "") -> Figure:
-    """Linkages beside one another, each to its own scale, under its own title.
+@plot.register
+def plot_alternatives(synthesis: Synthesis, *, title: str = "") -> Figure:
+    """The ranked linkages beside one another, each to its own scale, with its curve, the target and its errors.
 
     Raises
     ------
     InputError
         If there are none.
     """
+    scenes = [LinkageScene(s, f"{k}: {headline(s)}") for k, s in enumerate(synthesis.solutions, start=1)]
     if not scenes:
         raise InputError("there are no linkages to draw")
     columns = min(3, len(scenes))
@@ -433,23 +398,27 @@ def plot_alternatives(scenes: Sequence[LinkageScene], *, title: str = "") -> Fig
         return finish(figure)
 
 
-def plot_trade_off(
-    limit: FloatArray,
-    errors: Mapping[str, FloatArray],
-    *,
-    limit_label: str,
-    title: str = "",
-) -> Figure:
-    """Errors over a limit that is tightened, a panel each; limits without a linkage are marked below.
+@plot.register
+def plot_trade_off(traded: TradeOff, *, title: str = "") -> Figure:
+    """Quality function and worst error over the limit, a panel each; limits without a linkage are marked below.
 
-    Parameters
-    ----------
-    limit : ndarray, shape (n,)
-        In the unit of its label.
-    errors : mapping
-        What the axis is called, with its unit, to values; NaN where there is no linkage.
-    limit_label : str
+    Raises
+    ------
+    InfeasibleError
+        If there is no linkage at any of the limits.
     """
+    task = next((s.task for s in traded.solutions if s is not None), None)
+    if task is None:
+        raise InfeasibleError("there is no linkage at any of the limits: there is nothing to plot")
+    (factor, unit), (scale, length) = quality_unit(task), error_unit(task)
+    worst = np.array([np.nan if s is None else s.evaluation.worst for s in traded.solutions])
+    errors = {
+        f"{fill(quality_name(task), 26)} [{unit}]": factor * traded.error.filled(np.nan),
+        f"worst error [{length}]": scale * worst,
+    }
+    limit, limit_label = 1e3 * traded.limit, "limit of the largest link [mm]"
+    if traded.over == "transmission":
+        limit, limit_label = np.degrees(traded.limit), "least transmission angle asked for [deg]"
     order = np.argsort(limit)
     with matplotlib.rc_context(STYLE):
         figure = Figure(figsize=(6.4, 2.6 * len(errors) + 0.4))
@@ -474,7 +443,10 @@ def plot_trade_off(
         return finish(figure)
 
 
-def animate_solution(scene: LinkageScene, path: str | Path, *, frames: int = 48, frames_per_second: int = 20) -> Path:
+@animate.register
+def animate_solution(
+    solution: Solution, path: str | Path, *, title: str = "", frames: int = 48, frames_per_second: int = 20
+) -> Path:
     """Write a GIF of a turn, or of the part of one that the crank can make: the linkage, and the transmission angle below.
 
     Of a rocker function its angle with the target is below. Positions in which the links cannot be joined are left out.
@@ -486,6 +458,7 @@ def animate_solution(scene: LinkageScene, path: str | Path, *, frames: int = 48,
     """
     if frames < 2:
         raise InputError(f"an animation in {frames} frames: there must be at least 2")
+    scene = LinkageScene(solution, title)
     path = Path(path)
     path.parent.mkdir(parents=True, exist_ok=True)
     first, _ = _start(scene)

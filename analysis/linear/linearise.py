@@ -21,20 +21,19 @@ from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
 
 import control
 import numpy as np
-from linkwork.five_bar.plant import check_assembly
 from numpy.typing import ArrayLike, NDArray
 from scipy.integrate import solve_ivp
 
 from linkwork.errors import InputError, LinkworkError, UnknownNameError
 from linkwork.five_bar import dynamics, kinematics
+from linkwork.five_bar.assembly import check_assembly
 from linkwork.five_bar.parameters import FiveBarParameters
 from linkwork.five_bar.variables import INPUTS, OUTPUT_NAMES, OUTPUTS
 from linkwork.limits import LIMIT_SINE
 
 from ..mechanisms import require_five_bar
 from ..numerics import symbolic
-from ..run.inputs import Inputs
-from ..run.simulate import simulate
+from ..run import Inputs, simulate
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -106,9 +105,9 @@ def signal_name(name: str) -> str:
 @cache
 def _statics() -> Any:
     """(th2, u), (load_x, load_y), constants -> generalised forces at rest (2,), and less their derivative (2, 2)."""
-    casadi, plant = symbolic.library(), symbolic.plant()
+    casadi, plant = symbolic.library(), traced(FIVE_BAR)
     q, load = casadi.SX.sym("q", 2), casadi.SX.sym("load", 2)
-    p, constants = symbolic.constants()
+    p, constants = constants(FIVE_BAR)
     g = plant.position(q[0], q[1], constants)
     k = plant.coefficients(g, constants)
     forces = casadi.vertcat(*plant.applied_forces(g, k, q[1], 0.0, load[0], load[1], constants))
@@ -120,9 +119,9 @@ def _statics() -> Any:
 @cache
 def _derivatives() -> Any:
     """State (4,), inputs (6,), constants -> outputs and their derivatives, M, C, K and the inputs' forces."""
-    casadi, plant = symbolic.library(), symbolic.plant()
+    casadi, plant = symbolic.library(), traced(FIVE_BAR)
     x, i, a = casadi.SX.sym("x", 4), casadi.SX.sym("i", 6), casadi.SX.sym("a", 2)
-    p, constants = symbolic.constants()
+    p, constants = constants(FIVE_BAR)
     th2, u, w2, v = casadi.vertsplit(x)
     inputs = dynamics.Inputs(*casadi.vertsplit(i))
     g = plant.position(th2, u, constants)

@@ -20,17 +20,15 @@ from typing import Protocol
 
 import control
 import numpy as np
-from linkwork.five_bar.plant import SPEED_DRIVE, TORQUE_DRIVE, Plant
+from linkwork.five_bar.GONE import SPEED_DRIVE, TORQUE_DRIVE
 from numpy.typing import ArrayLike, NDArray
 
 from linkwork.errors import AssemblyError, InputError, IntegrationError, LinkworkError, UnknownNameError
 from linkwork.five_bar.parameters import FiveBarParameters, InitialState
 from linkwork.five_bar.variables import OUTPUT_NAMES
+from linkwork.plant import Plant
 
-from ..run.cosimulate import FmuRun
-from ..run.inputs import Function
-from ..run.simulate import sample_times
-from ..run.trajectory import Trajectory
+from ..run import FmuRun, Function, Trajectory, sample_times
 from .linearise import COORDINATES, RATES, LinearModel, PeriodicModel, signal_name
 
 FloatArray = NDArray[np.float64]

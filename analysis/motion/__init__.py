@@ -8,17 +8,23 @@ bound (`least_effort`).
 
 from __future__ import annotations
 
-from .inverse import BestSpring, SliderDrive, TurnBalance, best_spring, inverse_dynamics
-from .least_effort import EffortError, LeastEffort, least_effort
-from .motion import SmoothnessCurve, SmoothnessInterrupted, motion_of_plant, slider_motion, smoothness_curve
+from .cases import SliderCase, linkage_from_csv, load_slider_case, run_case, slider_case_from
+from .collocation import Collocation, EffortError, MotionLimits, UnattainableError
+from .inverse import BestSpring, Load, SliderDrive, TurnBalance, best_spring, inverse_dynamics
+from .least_effort import LeastEffort, least_effort
+from .motion import SmoothnessCurve, SmoothnessInterrupted, greatest, motion_of_plant, slider_motion, smoothness_curve
 from .strategy import Step, Strategy, StrategyInterrupted, simplest_mechanism
 from .tracking import TrackingController, TrackingMetrics, TrackingResult, track
 from .variational import VariationalMotion, variational_motion
 
 __all__ = [
     "BestSpring",
+    "Collocation",
     "EffortError",
     "LeastEffort",
+    "Load",
+    "MotionLimits",
+    "SliderCase",
     "SliderDrive",
     "SmoothnessCurve",
     "SmoothnessInterrupted",
@@ -29,12 +35,18 @@ __all__ = [
     "TrackingMetrics",
     "TrackingResult",
     "TurnBalance",
+    "UnattainableError",
     "VariationalMotion",
     "best_spring",
+    "greatest",
     "inverse_dynamics",
     "least_effort",
+    "linkage_from_csv",
+    "load_slider_case",
     "motion_of_plant",
+    "run_case",
     "simplest_mechanism",
+    "slider_case_from",
     "slider_motion",
     "smoothness_curve",
     "track",

@@ -44,10 +44,10 @@ from ..synthesis.solve import Synthesis, synthesize
 from ..synthesis.tasks import RockerFunction, Task, TimedPath, UntimedPath
 from ..units import with_unit
 from .inverse import SliderDrive, best_spring, inverse_dynamics
-from .least_effort import Effort, LeastEffort, least_effort
+from .least_effort import LeastEffort, least_effort
 from .motion import motion_of_plant, slider_motion
 from .strategy import RATIOS, Criterion, Strategy, simplest_mechanism
-from .tracking import TrackingResult, track
+from .tracking import TrackingController, TrackingResult, track
 
 #: A name of a dimension in the columns of solutions.csv: by itself, or with its unit.
 DIMENSIONS = (*LENGTHS, *ANGLES)
@@ -285,18 +285,21 @@ class SliderCase:
             other["slider_coulomb_friction"] = wanted.coulomb_friction
         bandwidth = 10.0 * abs(drive.crank_speed) if wanted.bandwidth is None else wanted.bandwidth
         design = design_pid(linearise_along(model, drive).mean(), bandwidth=bandwidth) if bandwidth > 0.0 else None
-        return track(
+        controller = TrackingController(
             model,
             drive.slider,
-            crank_speed=drive.crank_speed,
-            period=wanted.period,
+            wanted.period,
             design=design,
             feedforward=wanted.feedforward,
+            load=drive.load if wanted.load_known else (0.0, 0.0),
+            limit=wanted.limit,
+        )
+        return track(
+            controller,
+            crank_speed=drive.crank_speed,
             revolutions=wanted.revolutions,
             plant=replace(model, **other),
             load=drive.load,
-            known_load=drive.load if wanted.load_known else (0.0, 0.0),
-            limit=wanted.limit,
         )
 
     def relaxed(self, drive: SliderDrive, linkage: Linkage) -> LeastEffort:
@@ -320,11 +323,9 @@ class SliderCase:
             target,
             wanted.bound,
             cost=wanted.cost,
-            stroke=(low, high),
-            speed=wanted.speed,
-            force=wanted.force,
+            limits=MotionLimits(stroke=(low, high), speed=wanted.speed, force=wanted.force),
             load=drive.load,
-            intervals=wanted.intervals,
+            collocation=Collocation(intervals=wanted.intervals),
             guess=drive.slider,
         )
 

@@ -16,11 +16,11 @@ from dataclasses import dataclass, replace
 from math import degrees, inf, isfinite, pi
 
 import numpy as np
-from linkwork.five_bar.plant import check_assembly
 from numpy.typing import NDArray
 
 from linkwork.errors import AssemblyError, InputError
 from linkwork.five_bar import dynamics, kinematics
+from linkwork.five_bar.assembly import check_assembly
 from linkwork.five_bar.parameters import Constants, FiveBarParameters
 from linkwork.five_bar.variables import OUTPUT_NAMES
 
@@ -101,6 +101,11 @@ class SliderDrive:
         if name not in NAMES:
             raise InputError(f"a prescribed motion has no output {name!r}: it has {', '.join(NAMES)}")
         return self.values[:, NAMES.index(name)]
+
+    def pin_force(self, pin: str) -> FloatArray:
+        """Magnitude of the force in pin A, B, C or D (N), shape (n,)."""
+        magnitude: FloatArray = np.hypot(self[f"pin.{pin}.fx"], self[f"pin.{pin}.fy"])
+        return magnitude
 
     def turn(self, samples: int) -> SliderDrive:
         """The same motion at another number of samples."""

@@ -10,8 +10,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import inf, pi
-from time import perf_counter
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -19,13 +17,24 @@ from numpy.typing import ArrayLike, NDArray
 from linkwork.errors import InputError, Interrupted
 
 from ..numerics.fourier import FourierSeries
-from ..synthesis.constraints import Assembly, Constraint, FullTurn, InfeasibleError, limits_of
-from ..synthesis.linkage import Linkage, SliderMotion
-from ..synthesis.polish import polish
-from ..synthesis.program import PivotUnknown, SliderUnknown, Start, random_pivot
-from ..synthesis.solution import Solution, ranked
-from ..synthesis.solve import Synthesis, SynthesisInterrupted, fitted_form, infeasible, solutions_of, start_from
-from ..synthesis.tasks import Normal, Task
+from ..synthesis import (
+    USUAL_SEARCH,
+    Assembly,
+    Constraint,
+    FullTurn,
+    InfeasibleError,
+    Linkage,
+    PivotUnknown,
+    Search,
+    SliderMotion,
+    SliderUnknown,
+    Solution,
+    Synthesis,
+    SynthesisInterrupted,
+    Task,
+    improve,
+    ranked,
+)
 
 FloatArray = NDArray[np.float64]
 
@@ -38,11 +47,7 @@ def slider_motion(
     bounds: Mapping[str, tuple[float, float]] | None = None,
     constraints: Sequence[Constraint] = (FullTurn(),),
     guesses: Sequence[Linkage | Solution] = (),
-    starts: int = 24,
-    solutions: int = 6,
-    seed: int = 0,
-    n_jobs: int = 1,
-    progress: bool = False,
+    search: Search = USUAL_SEARCH,
 ) -> Synthesis:
     """Move the rocker pivot of a linkage so that it does a task as well as it can.
 
@@ -61,10 +66,8 @@ def slider_motion(
         By default the links stay joined over the turn.
     guesses : sequence of Linkage or Solution
         Searched from as well: their pivots' motion, and with free dimensions those too.
-    starts : int
-        Random starts besides: phases and amplitudes of the harmonics, guide angles all round.
-    solutions, seed, n_jobs, progress
-        As for `synthesize`.
+    search : Search
+        Its starts are random ones besides: phases and amplitudes of the harmonics, guide angles all round; there is no scan.
 
     Returns
     -------
@@ -76,52 +79,24 @@ def slider_motion(
     InputError, InfeasibleError, SynthesisInterrupted, MissingLibraryError
         As `synthesize`.
     """
-    if starts < 1 and not guesses:
-        raise InputError(f"{starts} starts and no guess: there must be at least one of either")
-    begun = perf_counter()
-    normal = fitted_form(task, unknown)
     given = linkage.linkage if isinstance(linkage, Solution) else linkage
-    kept: dict[str, Any] = {
-        name: value for name, value in given.values().items() if name != "branch" and name not in (bounds or {})
-    }
+    free = dict(bounds or {})
+    kept = {name: value for name, value in given.values().items() if name != "branch" and name not in free}
     asked = {c.branch for c in constraints if isinstance(c, Assembly)}
     if asked - {given.branch}:
         raise InputError(
             f"assembly {asked.pop():+d} is asked of a linkage that is assembled {given.branch:+d}: turn it over first"
         )
-    assembly = () if asked else (Assembly(branch=given.branch),)
-    fixed = {name: (value, value) for name, value in kept.items()}
-    limits = limits_of(task, normal, fixed | dict(bounds or {}), (*constraints, *assembly))
-    begin = [_start(guess, normal, unknown) for guess in guesses]
-    random = np.random.default_rng(seed)
-    base = _start(linkage, normal, unknown)
-    begin += [replace(base, pivot=random_pivot(unknown, base.q[2], normal.unit, random)) for _ in range(starts)]
-    done = polish(normal, limits, begin, pivot=unknown, n_jobs=n_jobs, progress=progress)
-    # what is kept is kept to the last digit, whatever the normal form made of it
-    found = tuple(
-        Solution.of(task, replace(s.linkage, **kept), s.evaluation.rotation)
-        for s in solutions_of(task, normal, limits, done, unknown, solutions)
+    return improve(
+        task,
+        linkage,
+        unknown,
+        bounds={name: (value, value) for name, value in kept.items()} | free,
+        constraints=(*constraints, *(() if asked else (Assembly(branch=given.branch),))),
+        guesses=guesses,
+        kept=kept,
+        search=search,
     )
-    result = Synthesis(
-        task=task,
-        solutions=found,
-        method="scan",
-        seed=seed,
-        starts=done.done,
-        seconds=perf_counter() - begun,
-        complete=not done.interrupted,
-    )
-    if done.interrupted:
-        raise SynthesisInterrupted(result if found else None, done.done, len(begin))
-    if not found:
-        raise infeasible(done)
-    return result
-
-
-def _start(of: Linkage | Solution, normal: Normal, unknown: PivotUnknown) -> Start:
-    if isinstance(of, Solution):
-        return start_from(of.linkage, normal, unknown, of.evaluation.rotation)
-    return start_from(of, normal, unknown)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -193,10 +168,7 @@ def smoothness_curve(
     *,
     bounds: Mapping[str, tuple[float, float]] | None = None,
     constraints: Sequence[Constraint] = (FullTurn(),),
-    starts: int = 24,
-    seed: int = 0,
-    n_jobs: int = 1,
-    progress: bool = False,
+    search: Search = USUAL_SEARCH,
 ) -> SmoothnessCurve:
     """Smoothness traded against error: the best motion for each bound of its second derivative, warm started.
 
@@ -206,7 +178,7 @@ def smoothness_curve(
 
     Parameters
     ----------
-    task, linkage, unknown, bounds, constraints, starts, seed, n_jobs, progress
+    task, linkage, unknown, bounds, constraints, search
         As for `slider_motion`.
     accelerations : array_like, shape (n,)
         Bounds of |d2u/dphi2| (m/rad2), above zero.
@@ -234,11 +206,7 @@ def smoothness_curve(
                 bounds=bounds,
                 constraints=constraints,
                 guesses=[replace(guess, linkage=_shrunk(guess.linkage, acceleration)) for guess in guesses],
-                starts=own,
-                solutions=3,
-                seed=seed,
-                n_jobs=n_jobs,
-                progress=progress,
+                search=replace(search, starts=own, solutions=3),
             )
         except InfeasibleError:
             return ()
@@ -247,9 +215,9 @@ def smoothness_curve(
     k, kept, done = -1, [], 0
     try:
         # what is best without a bound is the start for a wide one
-        previous = best(inf, [], starts)
+        previous = best(inf, [], search.starts)
         down = range(len(values) - 1, -1, -1)
-        for own, k in [(starts, k) for k in down] + [(0, k) for k in reversed(down)]:
+        for own, k in [(search.starts, k) for k in down] + [(0, k) for k in reversed(down)]:
             if not own and k == 0:
                 previous = ()
             mine = [found[k]] if k in found else []

@@ -8,20 +8,27 @@ independently. Each step starts from the one before, and says why it was not the
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from math import degrees, inf, isfinite
 from typing import Literal
 
-import numpy as np
-
 from linkwork.errors import InputError, Interrupted
 
-from ..synthesis.constraints import USUAL, Constraint, InfeasibleError
-from ..synthesis.program import CrankUnknown, SliderUnknown
-from ..synthesis.report import DEFECTS
-from ..synthesis.solution import Solution
-from ..synthesis.solve import Synthesis, SynthesisInterrupted, synthesize
-from ..synthesis.tasks import RockerFunction, Task
+from ..synthesis import (
+    QUICK_SEARCH,
+    USUAL,
+    Constraint,
+    CrankUnknown,
+    InfeasibleError,
+    RockerFunction,
+    Search,
+    SliderUnknown,
+    Solution,
+    Synthesis,
+    SynthesisInterrupted,
+    Task,
+    synthesize,
+)
 
 Criterion = Literal["error", "worst"]
 
@@ -99,10 +106,7 @@ def simplest_mechanism(
     harmonics: int = 3,
     ratios: Sequence[int] = RATIOS,
     second_crank: float | None = None,
-    starts: int = 12,
-    seed: int = 0,
-    n_jobs: int = 1,
-    progress: bool = False,
+    search: Search = QUICK_SEARCH,
 ) -> Strategy:
     """The simplest mechanism without a circuit, branch or order defect whose error is within a tolerance.
 
@@ -124,8 +128,8 @@ def simplest_mechanism(
         Gears that are tried.
     second_crank : float, optional
         Its greatest length (m); half the stroke by default.
-    starts, seed, n_jobs, progress
-        As for `synthesize`; of a four-bar twice as many starts.
+    search : Search
+        Of each mechanism; of a four-bar with twice as many starts.
 
     Returns
     -------
@@ -144,7 +148,7 @@ def simplest_mechanism(
         raise InputError(f"tolerance is {tolerance}: it must be a finite number greater than zero")
     if criterion not in ("error", "worst"):
         raise InputError(f"criterion {criterion!r}: it must be 'error' or 'worst'")
-    for name, value in (("harmonics", harmonics), ("starts", starts)):
+    for name, value in (("harmonics", harmonics), ("starts", search.starts)):
         if not (float(value).is_integer() and value >= 1):
             raise InputError(f"{value} {name}: it must be a whole number, at least one")
     for name, length in (("stroke", stroke), ("length of the second crank", second_crank)):
@@ -153,58 +157,55 @@ def simplest_mechanism(
     for ratio in ratios:
         if not (isfinite(ratio) and ratio == int(ratio)):
             raise InputError(f"ratio {ratio} of the gears: it must be a whole number, or the path does not close")
-    harmonics = int(harmonics)
-    search = _Search(task, tolerance, criterion, bounds, constraints, int(starts), seed, n_jobs, progress)
-    four_bar = search.first()
-    if search.met():
-        return search.result()
-    ground = four_bar.linkage.ground_length
-    reach = 0.5 * ground if stroke is None else stroke
+    tried = _Trials(task, tolerance, criterion, bounds, constraints, search)
+    four_bar = tried.four_bar()
+    if tried.met():
+        return tried.result()
+    numbers = range(1, int(harmonics) + 1)
+    reach = 0.5 * four_bar.linkage.ground_length if stroke is None else stroke
     guesses = [four_bar]
-    for count in range(1, harmonics + 1):
+    for count in numbers:
         slider = SliderUnknown(harmonics=count, stroke=reach)
-        words = f"four-bar with a moved slider, {count} harmonic{'s' if count > 1 else ''}"
-        found = search.attempt(words, slider, guesses)
-        if search.met():
-            return search.result()
+        found = tried.attempt(f"four-bar with a moved slider, {_harmonics(count)}", slider, guesses)
+        if tried.met():
+            return tried.result()
         guesses += [found] if found else []
     longest = 0.5 * reach if second_crank is None else second_crank
     between = (min(1e-3 * reach, 0.5 * longest), longest)
     geared: dict[int, Solution] = {}
     for ratio in ratios:
         crank = CrankUnknown(ratio=ratio, length=between)
-        words = f"five-bar, second crank geared {ratio}:1"
-        found = search.attempt(words, crank, [four_bar])
-        if search.met():
-            return search.result()
+        found = tried.attempt(f"five-bar, second crank geared {ratio}:1", crank, [four_bar])
+        if tried.met():
+            return tried.result()
         if found:
             geared[ratio] = found
     # from the best gears on, the second crank is turned by itself
     ratio = min(geared, key=lambda r: geared[r].error, default=1)
     guesses = [geared.get(ratio, four_bar)]
-    for count in range(1, harmonics + 1):
+    for count in numbers:
         crank = CrankUnknown(ratio=ratio, length=between, harmonics=count)
-        words = f"five-bar, second crank turned independently, {count} harmonic{'s' if count > 1 else ''}"
-        found = search.attempt(words, crank, guesses)
-        if search.met():
+        found = tried.attempt(f"five-bar, second crank turned independently, {_harmonics(count)}", crank, guesses)
+        if tried.met():
             break
         guesses += [found] if found else []
-    return search.result()
+    return tried.result()
+
+
+def _harmonics(count: int) -> str:
+    return f"{count} harmonic{'s' if count > 1 else ''}"
 
 
 @dataclass(eq=False)
-class _Search:
-    """The steps so far; fields as the arguments of `simplest_mechanism`."""
+class _Trials:
+    """The mechanisms tried so far; fields as the arguments of `simplest_mechanism`."""
 
     task: Task
     tolerance: float
     criterion: Criterion
     bounds: Mapping[str, tuple[float, float]] | None
     constraints: Sequence[Constraint]
-    starts: int
-    seed: int
-    n_jobs: int
-    progress: bool
+    search: Search
     steps: list[Step] = field(default_factory=list)
     _met: bool = False
 
@@ -212,9 +213,10 @@ class _Search:
         """Whether the last mechanism will do."""
         return self._met
 
-    def first(self) -> Solution:
+    def four_bar(self) -> Solution:
         """The best four-bar."""
-        solution = self._step("four-bar", self._found("four-bar", 2 * self.starts, None, ()))
+        search = replace(self.search, starts=2 * int(self.search.starts))
+        solution = self._step("four-bar", self._found("four-bar", search))
         assert solution is not None
         return solution
 
@@ -223,26 +225,20 @@ class _Search:
     ) -> Solution | None:
         """Links and the pivot's motion together, from a scan and from simpler mechanisms."""
         try:
-            found = self._found(mechanism, self.starts, unknown, guesses)
+            found = self._found(mechanism, self.search, unknown, guesses)
         except InfeasibleError:
             found = None
         return self._step(mechanism, found)
 
     def _found(
-        self, mechanism: str, starts: int, pivot: SliderUnknown | CrankUnknown | None, guesses: Sequence[Solution]
+        self,
+        mechanism: str,
+        search: Search,
+        pivot: SliderUnknown | CrankUnknown | None = None,
+        guesses: Sequence[Solution] = (),
     ) -> Synthesis:
         try:
-            return synthesize(
-                self.task,
-                self.bounds,
-                self.constraints,
-                seed=self.seed,
-                pivot=pivot,
-                guesses=guesses,
-                starts=starts,
-                n_jobs=self.n_jobs,
-                progress=self.progress,
-            )
+            return synthesize(self.task, self.bounds, self.constraints, pivot=pivot, guesses=guesses, search=search)
         except (SynthesisInterrupted, KeyboardInterrupt) as error:
             if isinstance(error, SynthesisInterrupted) and error.synthesis is not None:
                 self._step(mechanism, error.synthesis)
@@ -257,25 +253,24 @@ class _Search:
             return None
         solution = found.best
         value = solution.error if self.criterion == "error" else solution.evaluation.worst
-        defects = " and ".join(f"a {name} defect" for name in DEFECTS if not getattr(solution.verdicts, name))
+        defects = " and ".join(f"a {defect}" for defect in solution.verdicts.defects)
         within = value <= self.tolerance
         self._met = within and not defects
-        said = f"{self.criterion} {self._told(value)}"
+        said = f"{self.criterion} {self._text(value)}"
         reason = (
-            f"{said} is within {self._told(self.tolerance)}"
+            f"{said} is within {self._text(self.tolerance)}"
             if within
-            else f"{said} is {value / self.tolerance:.3g} times the tolerance {self._told(self.tolerance)}"
+            else f"{said} is {value / self.tolerance:.3g} times the tolerance {self._text(self.tolerance)}"
         )
         reason += f", with {defects}" if defects else ""
         reason += ": taken" if self._met else ": moved on" if found.complete else ": stopped"
         self.steps.append(Step(mechanism=mechanism, solution=solution, value=value, reason=reason))
         return solution
 
-    def _told(self, value: float) -> str:
-        angle = isinstance(self.task, RockerFunction)
-        if self.criterion == "worst":
-            return f"{degrees(value):.4g} deg" if angle else f"{1e3 * value:.4g} mm"
-        return f"{np.degrees(np.degrees(value)):.4g} deg2" if angle else f"{1e6 * value:.4g} mm2"
+    def _text(self, value: float) -> str:
+        unit = "deg" if isinstance(self.task, RockerFunction) else "mm"
+        scale = degrees(1.0) if unit == "deg" else 1e3
+        return f"{scale * value:.4g} {unit}" if self.criterion == "worst" else f"{scale * scale * value:.4g} {unit}2"
 
     def result(self) -> Strategy:
         return Strategy(steps=tuple(self.steps), met=self._met, tolerance=self.tolerance, criterion=self.criterion)

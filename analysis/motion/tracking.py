@@ -73,13 +73,12 @@ class TrackingController:
             raise InputError("the feedback was designed for a free crank: tracking needs a model in speed drive")
         if not limit > 0.0:
             raise InputError(f"limit of the force is {limit} N: it must be greater than zero")
-        self.period = period
-        self.limit = limit
+        self.parameters, self.slider, self.period, self.limit = parameters, slider, period, limit
         self.feedback = None if design is None else SampledController(design, period, limit=limit)
         self.feedforward = feedforward
         self.load = load
         self._p = parameters.constants()
-        self._slider, self._slope = slider, slider.derivative()
+        self._slope = slider.derivative()
         self._curvature = self._slope.derivative()
 
     @property
@@ -106,7 +105,7 @@ class TrackingController:
         return self.feedback.follow(forward, u - reference, v - w2 * float(self._slope(th2)))
 
     def _forward(self, th2: float, w2: float) -> float:
-        u, v, a = float(self._slider(th2)), w2 * float(self._slope(th2)), w2 * w2 * float(self._curvature(th2))
+        u, v, a = float(self.slider(th2)), w2 * float(self._slope(th2)), w2 * w2 * float(self._curvature(th2))
         return slider_force(th2, u, w2, v, a, load_at(self.load, th2), self._p)
 
 
@@ -195,18 +194,12 @@ class TrackingResult:
 
 
 def track(
-    parameters: FiveBarParameters,
-    slider: FourierSeries,
+    controller: TrackingController,
     *,
     crank_speed: float,
-    period: float,
-    design: SliderDesign | None = None,
-    feedforward: bool = True,
     revolutions: float = 10.0,
     plant: FiveBarParameters | None = None,
     load: Load = (0.0, 0.0),
-    known_load: Load = (0.0, 0.0),
-    limit: float = inf,
     initial: InitialState | None = None,
     fmu: str | Path | None = None,
     tolerance: float = 1e-9,
@@ -215,28 +208,17 @@ def track(
 
     Parameters
     ----------
-    parameters : FiveBarParameters
-        Of the model: the feed-forward's, and the reference's of P.
-    slider : FourierSeries
-        Reference u(th2) (m).
+    controller : TrackingController
+        With the reference; its feedback is designed by `slider_control` on a model in speed drive, such as the mean one along
+        the reference: ``linearise_along(parameters, inverse_dynamics(...)).mean()``.
     crank_speed : float
         Constant prescribed speed (rad/s).
-    period : float
-        Of sampling (s).
-    design : SliderDesign, optional
-        Of the feedback, by `slider_control` on a model in speed drive, such as the mean one along the reference:
-        ``linearise_along(parameters, inverse_dynamics(...)).mean()``. Without it there is no feedback.
-    feedforward : bool
-        Whether there is feed-forward.
     revolutions : float
         Turns of the crank.
     plant : FiveBarParameters, optional
-        Of the plant; by default it is the model.
-    load, known_load : (float, float) or function of the crank angle
-        At P (N): what acts on the plant, held over a period at its value in the middle of it, and what the feed-forward
-        knows of it.
-    limit : float
-        Largest force either way (N).
+        Of the plant; by default it is the controller's model.
+    load : (float, float) or function of the crank angle
+        At P (N), held over a period at its value in the middle of it; what the feed-forward knows of it is the controller's.
     initial : InitialState, optional
         By default on the reference at crank angle 0.
     fmu : path, optional
@@ -259,10 +241,8 @@ def track(
     check_speed(crank_speed)
     if not 0.0 < revolutions < inf:
         raise InputError(f"{revolutions} revolutions: they must be a finite number greater than zero")
-    inverse_dynamics(parameters, slider, crank_speed, load=known_load)
-    controller = TrackingController(
-        parameters, slider, period, design=design, feedforward=feedforward, load=known_load, limit=limit
-    )
+    parameters, slider = controller.parameters, controller.slider
+    inverse_dynamics(parameters, slider, crank_speed, load=controller.load)
     start = initial or InitialState(
         crank_speed=crank_speed,
         slider_position=float(slider(0.0)),
@@ -279,7 +259,7 @@ def track(
         initial=start,
         stop_time=2.0 * pi * revolutions / abs(crank_speed),
         crank_speed=crank_speed,
-        load=lambda t: load_at(load, angle(t + 0.5 * period)),
+        load=lambda t: load_at(load, angle(t + 0.5 * controller.period)),
         fmu=fmu,
         tolerance=tolerance,
     )

@@ -33,7 +33,7 @@ from numpy.typing import ArrayLike, NDArray
 from linkwork.errors import AssemblyError, InputError, ParameterError
 
 from ..numerics.fourier import FourierSeries
-from ..synthesis.linkage import Linkage, SecondCrank
+from ..synthesis import Linkage, SecondCrank
 
 FloatArray = NDArray[np.float64]
 

@@ -23,7 +23,7 @@ from linkwork.parameters import field_name
 from ..files import write_csv
 from ..numerics.boundaries import Box, Test, chart
 from ..numerics.continuation import ContinuationError
-from ..run.simulate import shown
+from ..run import shown
 from .branches import OF_THE_DRIVE, Family, SpecialPoint, follow, told, unit_of
 from .crossings import COMPLETE, follow_crossing
 from .floquet import Crossing

@@ -17,8 +17,8 @@ from numpy.typing import ArrayLike, NDArray
 from linkwork.errors import InputError, Interrupted, LinkworkError
 
 from ..files import load_array, save_array
-from ..run.compiled import cache_folder
-from ..run.simulate import interruptible, shown
+from ..numerics.codegen import cache_folder
+from ..run import interruptible, shown
 from . import floquet, orbit_kernels, orbits
 from .floquet import TOLERANCE, Stability
 from .planes import Operation, Plane

@@ -23,8 +23,8 @@ from linkwork.mechanism import Mechanism
 
 from ..numerics import symbolic
 from ..numerics.codegen import MATRIX, VECTOR, MachineCode, evaluate, inner, kernel, part
+from ..run import constants, traced
 from ..run.compiled import SOURCE, Source, attempt, following, shorter
-from ..run.equations import constants, traced
 
 
 class Status(IntEnum):
@@ -142,7 +142,13 @@ class Flow:
         drive, d_drive = (casadi.SX.sym(name, self.drive_size) for name in ("drive", "d_drive"))
         p, k = constants(m)
         d_p = casadi.SX.sym("d_p", p.numel())
-        arguments = [angle, casadi.vertcat(y, casadi.vec(columns)), modes, casadi.vertcat(drive, d_drive), casadi.vertcat(p, d_p)]
+        arguments = [
+            angle,
+            casadi.vertcat(y, casadi.vec(columns)),
+            modes,
+            casadi.vertcat(drive, d_drive),
+            casadi.vertcat(p, d_p),
+        ]
         x, u = self._state(angle, y, drive)
         functions = traced(m)
         applied = functions.__dict__[m.equations.applied.__name__](
@@ -205,9 +211,7 @@ class Flow:
         if self.command is not None:
             x[freedoms + self.crank] = u[self.command]
         else:
-            channel = next(
-                n for n, c in enumerate(m.channels) if c.kind == "force" and c.freedom == self.crank
-            )
+            channel = next(n for n, c in enumerate(m.channels) if c.kind == "force" and c.freedom == self.crank)
             u = casadi.vertcat(u)
             u[channel] += _kloss(drive[self.inputs : self.inputs + len(MOTOR)], x[freedoms + self.crank])
         return tuple(x), u

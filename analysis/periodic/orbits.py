@@ -23,9 +23,8 @@ from linkwork.five_bar.variables import OUTPUT_NAMES
 from linkwork.limits import LIMIT_SINE
 
 from ..mechanisms import require_five_bar
-from ..run import compiled
+from ..run import InductionMotor, compiled
 from ..run import inputs as inputs_module
-from ..run.inputs import InductionMotor
 from . import orbit_kernels
 from .floquet import TOLERANCE, StabilityVerdict, liouville, multipliers, verdict
 

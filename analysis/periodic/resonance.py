@@ -25,7 +25,7 @@ from linkwork.five_bar.parameters import FiveBarParameters
 from ..files import write_csv
 from ..mechanisms import require_five_bar
 from ..numerics.continuation import ContinuationError
-from ..run.simulate import interruptible, shown
+from ..run import interruptible, shown
 from ..youssef.harmonic_balance import harmonic_balance
 from ..youssef.slider_equation import Load, Variant, mean_effective_mass, slider_equation
 from . import orbit_kernels

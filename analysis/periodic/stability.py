@@ -24,8 +24,7 @@ from linkwork.errors import InputError, LinkworkError
 from linkwork.five_bar.parameters import FiveBarParameters, InitialState
 
 from ..numerics.boundaries import Test, lowest
-from ..run.inputs import Inputs
-from ..run.simulate import simulate
+from ..run import Inputs, simulate
 from ..youssef.hill import PeriodicEquation, crossing_test, monodromy
 from ..youssef.slider_equation import Load, Variant, slider_equation
 from .floquet import TOLERANCE, Stability, StabilityVerdict, multipliers, verdict

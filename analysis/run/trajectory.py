@@ -18,6 +18,7 @@ from ..mechanisms import output_units
 if TYPE_CHECKING:
     import pandas
 
+
 @dataclass(frozen=True, slots=True)
 class Occurrence:
     """An event that happened: its name, the time (s), and the state there in SI.
@@ -101,7 +102,6 @@ class Trajectory:
 
     def to_csv(self, path: str | Path) -> Path:
         """Write time and all outputs to a CSV file whose header has names and units."""
-        from ..files import write_csv
 
         columns = {"time [s]": self.time} | {f"{name} [{unit}]": self[name] for name, unit in self.units.items()}
         return io.write_csv(path, columns)

@@ -25,8 +25,8 @@ from typing import NamedTuple
 
 from linkwork.errors import AssemblyError, InputError, ParameterError
 from linkwork.slider_crank import kinematics
+from linkwork.slider_crank.assembly import check_assembly
 from linkwork.slider_crank.parameters import Constants, SliderCrankParameters
-from linkwork.slider_crank.plant import check_assembly
 
 #: Width (rad) of a piece of the turn that is not divided further. Two zeros of one piece go unseen.
 FINEST = 1e-3

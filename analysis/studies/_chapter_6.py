@@ -15,10 +15,20 @@ from numpy.typing import NDArray
 from linkwork.five_bar.published import CM_PER_METRE
 
 from ..figures import COLOURS, Curve, Figure, Panel, plot_curves
-from ..synthesis import LargestLink, Linkage, RockerFunction, Solution, evaluate, synthesize, trade_off, turn
-from ..synthesis.linkage import LINKS
+from ..synthesis import (
+    LINKS,
+    LargestLink,
+    Linkage,
+    RockerFunction,
+    Search,
+    Solution,
+    evaluate,
+    normal_form,
+    synthesize,
+    trade_off,
+    turn,
+)
 from ..synthesis.published import PROBLEMS
-from ..synthesis.tasks import normal_form
 from .study import BALANCE, REFERENCE, THESIS, StudyResult, Verdict, at_least, at_most, near, padded
 
 FloatArray = NDArray[np.float64]
@@ -41,7 +51,7 @@ ANGLES = (0.0, 20.0, 30.0, 35.0, 40.0, 45.0, 50.0, 55.0, 60.0)
 def best(name: str) -> Solution:
     """Our best linkage for a problem of chapter VI."""
     p = PROBLEMS[name]
-    return synthesize(p.task, p.bounds, p.constraints, starts=STARTS, candidates=CANDIDATES).best
+    return synthesize(p.task, p.bounds, p.constraints, search=Search(starts=STARTS, candidates=CANDIDATES)).best
 
 
 def error_verdicts(name: str, stated: float, tolerance: float, reference: float, digits: float) -> tuple[Verdict, ...]:
@@ -252,7 +262,7 @@ def trade_off_columns(name: str, tasks: Mapping[str, RockerFunction]) -> dict[st
     p = PROBLEMS[name]
     columns = {"least transmission angle [deg]": np.array(ANGLES)}
     for who, task in tasks.items():
-        found = trade_off(task, "transmission", np.radians(ANGLES), constraints=p.constraints, starts=3)
+        found = trade_off(task, "transmission", np.radians(ANGLES), constraints=p.constraints, search=Search(starts=3))
         columns[f"{who} least error [{p.unit}]"] = p.per_si * np.asarray(found.error.filled(np.nan))
     return columns
 

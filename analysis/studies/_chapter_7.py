@@ -16,7 +16,7 @@ from linkwork.five_bar.published import CM_PER_METRE
 
 from ..figures import COLOURS, Curve, Panel
 from ..motion import slider_motion
-from ..synthesis import Linkage, SliderMotion, SliderUnknown, Solution, UntimedPath, evaluate, turn
+from ..synthesis import Linkage, Search, SliderMotion, SliderUnknown, Solution, UntimedPath, evaluate, turn
 from ..synthesis.published import PROBLEMS
 from .study import BALANCE, StudyResult, Verdict, at_least, padded
 
@@ -40,7 +40,9 @@ TURN = np.linspace(0.0, 2.0 * pi, 721)
 def rocker_motion(harmonics: int) -> Solution:
     """The best Fourier series of the slider for the weighted rocker function, the printed links kept."""
     p = PROBLEMS[ROCKER]
-    return slider_motion(p.task, p.linkage, SliderUnknown(harmonics=harmonics), starts=ROCKER_STARTS).best
+    return slider_motion(
+        p.task, p.linkage, SliderUnknown(harmonics=harmonics), search=Search(starts=ROCKER_STARTS)
+    ).best
 
 
 @cache
@@ -53,7 +55,7 @@ def path_motion(harmonics: int) -> Solution:
     p = PROBLEMS[PATH]
     starts, stroke = PATH_SEARCHES[harmonics]
     unknown = SliderUnknown(harmonics=harmonics, guide_angle=(0.0, 0.5 * pi), stroke=stroke)
-    return slider_motion(p.task, p.linkage, unknown, starts=starts).best
+    return slider_motion(p.task, p.linkage, unknown, search=Search(starts=starts)).best
 
 
 def slider(linkage: Linkage) -> SliderMotion:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from linkwork.five_bar.published import CM_PER_METRE, RAD_S_PER_RPM
 
 from ..figures import Figure, Panel, plot_curves
-from ..run.trajectory import Trajectory
+from ..run import Trajectory
 from ._runs import STIFFNESSES, TORQUES, coast, launch, plain, scientific
 from .study import ASSIGNED, BALANCE, StudyResult, Verdict, at_most, curves_of
 

@@ -22,9 +22,7 @@ from linkwork.five_bar.published import (
     SETS,
 )
 
-from ..run.inputs import Inputs, TorsionBar
-from ..run.simulate import Event, simulate
-from ..run.trajectory import Trajectory
+from ..run import Event, Inputs, TorsionBar, Trajectory, simulate
 
 #: Transmission at which the coupler and the rocker count as collinear: |sin(th4 - th3)|.
 COLLINEAR_SINE = 0.3

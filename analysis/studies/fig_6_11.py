@@ -17,8 +17,7 @@ import numpy as np
 from linkwork.five_bar.published import CM_PER_METRE
 
 from ..figures import Curve, Figure, Panel, plot_curves
-from ..synthesis import UntimedPath, turn
-from ..synthesis.areas import area_between, straightest_part
+from ..synthesis import UntimedPath, area_between, straightest_part, turn
 from ..synthesis.published import (
     CM2_PER_M2,
     PACKAGING_FLATNESS,

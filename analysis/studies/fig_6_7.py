@@ -11,7 +11,7 @@ from __future__ import annotations
 import sys
 
 from ..figures import Figure, plot_curves
-from ..synthesis import RockerFunction, evaluate, synthesize
+from ..synthesis import RockerFunction, Search, evaluate, synthesize
 from ..synthesis.published import PROBLEMS, rocker_function
 from ._chapter_6 import ASSIGNED, angle_columns, best, error_verdicts, rocker_panels, trade_off_columns
 from .study import REFERENCE, THESIS, Study, StudyResult, at_most, near, padded
@@ -28,7 +28,7 @@ def compute() -> StudyResult:
     assert isinstance(p.task, RockerFunction)
     fewer = rocker_function(FEWER)
     printed = p.shown(evaluate(fewer, p.linkage).error)
-    found = p.shown(synthesize(fewer, p.bounds, p.constraints, starts=4, candidates=1 << 13).best.error)
+    found = p.shown(synthesize(fewer, p.bounds, p.constraints, search=Search(starts=4, candidates=1 << 13)).best.error)
     return StudyResult(
         number=NUMBER,
         claim="A four-bar makes the rocker function with a sum of squared errors of 700 deg2.",

@@ -14,7 +14,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..figures import Figure, plot_curves
-from ..synthesis import Evaluation, RockerFunction, evaluate, synthesize
+from ..synthesis import Evaluation, RockerFunction, Search, evaluate, synthesize
 from ..synthesis.published import DEG2_PER_RAD2, PROBLEMS, N, rocker_function
 from ._chapter_6 import (
     ASSIGNED,
@@ -43,7 +43,7 @@ def compute() -> StudyResult:
     p = PROBLEMS[PROBLEM]
     assert isinstance(p.task, RockerFunction)
     task = rocker_function(N, weighted=True, mounting=True)
-    mounted = synthesize(task, p.bounds, p.constraints, starts=STARTS, candidates=CANDIDATES).best
+    mounted = synthesize(task, p.bounds, p.constraints, search=Search(starts=STARTS, candidates=CANDIDATES)).best
     return StudyResult(
         number=NUMBER,
         claim="Weighted by 1000 from 60 to 260 degrees the rocker function is made with an error of 35.0 deg2.",

@@ -18,7 +18,7 @@ from linkwork.five_bar.published import CM_PER_METRE
 
 from ..figures import COLOURS, Curve, Figure, Panel, plot_curves
 from ..motion import SmoothnessCurve, smoothness_curve
-from ..synthesis import SliderUnknown, evaluate
+from ..synthesis import Search, SliderUnknown, evaluate
 from ..synthesis.published import PROBLEMS
 from ._chapter_7 import ASSIGNED, ROCKER, TARGET, TURN, over_turn, rocker_motion, shown, slider, sound
 from .study import BALANCE, Study, StudyResult, at_least, at_most
@@ -36,7 +36,11 @@ def curve(harmonics: int) -> SmoothnessCurve:
     """The best motion at each bound."""
     p = PROBLEMS[ROCKER]
     return smoothness_curve(
-        p.task, p.linkage, SliderUnknown(harmonics=harmonics), np.array(BOUNDS) / CM_PER_METRE, starts=STARTS
+        p.task,
+        p.linkage,
+        SliderUnknown(harmonics=harmonics),
+        np.array(BOUNDS) / CM_PER_METRE,
+        search=Search(starts=STARTS),
     )
 
 

@@ -18,7 +18,7 @@ import numpy as np
 
 from ..figures import COLOURS, Curve, Figure, Panel, plot_curves
 from ..motion import Strategy, simplest_mechanism
-from ..synthesis import LeastTransmission, Linkage, Solution, evaluate
+from ..synthesis import LeastTransmission, Linkage, Search, Solution, evaluate
 from ..synthesis.published import WEIGHTED_N, rocker_function
 from ._chapter_7 import ASSIGNED, TARGET, TURN, angle_error, over_turn, sound
 from .study import BALANCE, Study, StudyResult, at_least, at_most, near, padded
@@ -48,7 +48,7 @@ def strategy() -> Strategy:
         constraints=(LeastTransmission(angle=radians(TRANSMISSION)),),
         harmonics=HARMONICS,
         ratios=RATIOS,
-        starts=STARTS,
+        search=Search(starts=STARTS),
     )
 
 

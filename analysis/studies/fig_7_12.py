@@ -29,8 +29,10 @@ from ..figures import COLOURS, Curve, Figure, Panel, plot_curves
 from ..linear.linearise import linearise_along
 from ..linear.slider_control import design_pid
 from ..motion import (
+    Collocation,
     LeastEffort,
     SliderDrive,
+    TrackingController,
     TrackingResult,
     best_spring,
     inverse_dynamics,
@@ -105,13 +107,12 @@ def runs() -> dict[str, TrackingResult]:
     )
 
     def run(known: bool = False, feedback: bool = True, feedforward: bool = True) -> TrackingResult:
+        controller = TrackingController(
+            m.sprung, m.motion, PERIOD, design=design if feedback else None, feedforward=feedforward
+        )
         return track(
-            m.sprung,
-            m.motion,
+            controller,
             crank_speed=SPEED,
-            period=PERIOD,
-            design=design if feedback else None,
-            feedforward=feedforward,
             revolutions=TURNS,
             plant=m.sprung if known else plant,
             load=(0.0, 0.0) if known else LOAD,
@@ -147,7 +148,12 @@ def efforts() -> dict[float, LeastEffort]:
     free = replace(m.sprung, slider_coulomb_friction=0.0)
     return {
         tolerance: least_effort(
-            free, SPEED, rocker_angle, radians(tolerance), intervals=INTERVALS, halvings=0, guess=m.motion
+            free,
+            SPEED,
+            rocker_angle,
+            radians(tolerance),
+            collocation=Collocation(intervals=INTERVALS, halvings=0),
+            guess=m.motion,
         )
         for tolerance in TOLERANCES
     }

@@ -18,8 +18,7 @@ from linkwork.five_bar.published import CM_PER_METRE
 
 from ..figures import Figure, plot_curves
 from ..motion import slider_motion
-from ..synthesis import SliderUnknown, Solution
-from ..synthesis.linkage import LINKS
+from ..synthesis import LINKS, Search, SliderUnknown, Solution
 from ..synthesis.published import PROBLEMS
 from ._chapter_6 import TRANSMISSION, best
 from ._chapter_7 import ASSIGNED, PATH, path_columns, path_motion, path_panels, shown, slider, sound
@@ -47,7 +46,7 @@ def together(harmonics: int) -> Solution:
     }
     unknown = SliderUnknown(harmonics=harmonics, stroke=STROKE)
     motion = slider_motion(
-        p.task, four_bar, unknown, bounds=bounds, constraints=p.constraints, guesses=[four_bar], starts=0
+        p.task, four_bar, unknown, bounds=bounds, constraints=p.constraints, guesses=[four_bar], search=Search(starts=0)
     )
     return motion.best
 

@@ -15,9 +15,7 @@ import numpy as np
 from linkwork.five_bar.published import CM_PER_METRE, RAD_S_PER_RPM
 
 from ..figures import Figure, animate_linkage, draw_linkage
-from ..run.inputs import Inputs
-from ..run.simulate import simulate
-from ..run.trajectory import Trajectory
+from ..run import Inputs, Trajectory, simulate
 from ._runs import SPEED
 from .fig_7_2 import mechanism
 from .study import BALANCE, Study, StudyResult, at_most

@@ -11,9 +11,12 @@
 
 from __future__ import annotations
 
+from .areas import Straightness, area_between, distance_to, hausdorff, straightest_part, straightness
+from .cases import TABLES, SynthesisCase, load_synthesis_case, overridden, synthesis_case_from
 from .constraints import (
     USUAL,
     Assembly,
+    Constraint,
     FullTurn,
     Grashof,
     InfeasibleError,
@@ -22,17 +25,38 @@ from .constraints import (
     PivotRegion,
     Require,
 )
-from .linkage import Linkage, SecondCrank, SliderMotion
-from .program import CrankUnknown, SliderUnknown
-from .sensitivity import Rounding, Sensitivity
-from .solution import Evaluation, Solution, Verdicts, evaluate, judge
-from .solve import Synthesis, SynthesisInterrupted, TradeOff, TradeOffInterrupted, synthesize, trade_off
+from .drawing import drawing
+from .linkage import ANGLES, LENGTHS, LINKS, Linkage, SecondCrank, SliderMotion
+from .report import (
+    dimension_rows,
+    error_unit,
+    format_limit,
+    format_transmission,
+    headline,
+    quality_name,
+    quality_unit,
+    report,
+    rounding_line,
+)
+from .scene import LinkageScene
+from .search import QUICK_SEARCH, USUAL_SEARCH, Search
+from .sensitivity import Rounding, Sensitivity, costs, length_step, rounded, sensitivities
+from .solution import Evaluation, Solution, Verdicts, evaluate, judge, ranked
+from .solve import Synthesis, SynthesisInterrupted, TradeOff, TradeOffInterrupted, improve, synthesize, trade_off
+from .starts import CrankUnknown, PivotUnknown, SliderUnknown
 from .targets import TargetPath, function_from_formula, path_from_formula
-from .tasks import Motion, PrecisionPoints, RockerFunction, Straight, TimedPath, UntimedPath, turn
+from .tasks import Motion, PrecisionPoints, RockerFunction, Straight, Task, TimedPath, UntimedPath, normal_form, turn
 
 __all__ = [
+    "ANGLES",
+    "LENGTHS",
+    "LINKS",
+    "QUICK_SEARCH",
+    "TABLES",
     "USUAL",
+    "USUAL_SEARCH",
     "Assembly",
+    "Constraint",
     "CrankUnknown",
     "Evaluation",
     "FullTurn",
@@ -41,30 +65,61 @@ __all__ = [
     "LargestLink",
     "LeastTransmission",
     "Linkage",
+    "LinkageScene",
     "Motion",
     "PivotRegion",
+    "PivotUnknown",
     "PrecisionPoints",
     "Require",
     "RockerFunction",
     "Rounding",
+    "Search",
     "SecondCrank",
     "Sensitivity",
     "SliderMotion",
     "SliderUnknown",
     "Solution",
     "Straight",
+    "Straightness",
     "Synthesis",
+    "SynthesisCase",
     "SynthesisInterrupted",
     "TargetPath",
+    "Task",
     "TimedPath",
     "TradeOff",
     "TradeOffInterrupted",
     "UntimedPath",
     "Verdicts",
+    "area_between",
+    "costs",
+    "dimension_rows",
+    "distance_to",
+    "drawing",
+    "error_unit",
     "evaluate",
+    "format_limit",
+    "format_transmission",
     "function_from_formula",
+    "hausdorff",
+    "headline",
+    "improve",
     "judge",
+    "length_step",
+    "load_synthesis_case",
+    "normal_form",
+    "overridden",
     "path_from_formula",
+    "quality_name",
+    "quality_unit",
+    "ranked",
+    "report",
+    "rounded",
+    "rounding_line",
+    "sensitivities",
+    "straightest_part",
+    "straightness",
+    "synthesis_case_from",
     "synthesize",
     "trade_off",
     "turn",

@@ -29,10 +29,13 @@ from scipy.optimize import Bounds, NonlinearConstraint, OptimizeResult, differen
 from linkwork.five_bar import kinematics
 
 from ..numerics.tracing import rebound
-from .constraints import UNKNOWNS, Limits, Require
-from .polish import Polished, effective_cores, over_cores, quality_of
-from .program import TURNING, Answer, Start, half_planes, physical
+from .constraints import TURNING, UNKNOWNS, Limits, Require, half_planes
+from .linkage import BY_SHORTEST
+from .polish import Polished, kept_of, quality_of
+from .search import USUAL_SEARCH, Search, over_cores
+from .starts import Answer, Start
 from .tasks import Normal
+from .user_functions import physical
 
 FloatArray = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
@@ -60,35 +63,20 @@ EVALUATIONS = 600
 _joined = rebound((kinematics,), {"sqrt": lambda square: np.sqrt(np.maximum(square, 0.0))}).joined
 
 
-def by_differential_evolution(
-    normal: Normal, limits: Limits, *, seed: int, starts: int, n_jobs: int = 1, progress: bool = False
-) -> Polished:
+def by_differential_evolution(normal: Normal, limits: Limits, search: Search = USUAL_SEARCH) -> Polished:
     """SciPy's differential evolution, with the inequalities as its constraints.
 
     Parameters
     ----------
     normal : Normal
     limits : Limits
-    seed : int
-        The same seed gives the same answers, on any number of cores.
-    starts : int
-        Populations, in turn of either assembly.
-    n_jobs, progress
-        As for `synthesize`.
-
-    Raises
-    ------
-    InputError
-        If there are no cores.
+    search : Search
+        Its starts are populations, in turn of either assembly.
     """
-    return _searched(
-        partial(_evolved, normal, limits, seed), normal, starts, n_jobs, progress, "differential evolution"
-    )
+    return _searched(partial(_evolved, normal, limits, search.seed), search, "differential evolution")
 
 
-def by_simplex(
-    normal: Normal, limits: Limits, *, seed: int, starts: int, n_jobs: int = 1, progress: bool = False
-) -> Polished:
+def by_simplex(normal: Normal, limits: Limits, search: Search = USUAL_SEARCH) -> Polished:
     """The thesis's method: the downhill simplex of Nelder and Mead from many starts (`initial_simplex`).
 
     The constraints are bounds and, by loop closure at every crank angle (6.14), that the links can be joined; what violates one
@@ -96,15 +84,10 @@ def by_simplex(
 
     Parameters
     ----------
-    normal, limits, seed, starts, n_jobs, progress
+    normal, limits, search
         As for `by_differential_evolution`; each start is the best of `DRAWS` random linkages.
-
-    Raises
-    ------
-    InputError
-        If there are no cores.
     """
-    return _searched(partial(_descended, normal, limits, seed), normal, starts, n_jobs, progress, "simplex")
+    return _searched(partial(_descended, normal, limits, search.seed), search, "simplex")
 
 
 def initial_simplex(first: FloatArray, edge: float) -> FloatArray:
@@ -123,14 +106,9 @@ def initial_simplex(first: FloatArray, edge: float) -> FloatArray:
     return vertices
 
 
-def _searched(work: partial[Answer], normal: Normal, starts: int, n_jobs: int, progress: bool, what: str) -> Polished:
-    found, interrupted = over_cores(work, range(starts), cores=effective_cores(n_jobs), progress=progress, what=what)
-    return Polished(
-        kept=tuple(sorted((a for a in found if a.feasible), key=lambda a: a.start.quality)),
-        others=tuple(a for a in found if not a.feasible),
-        done=len(found),
-        interrupted=interrupted,
-    )
+def _searched(work: partial[Answer], search: Search, what: str) -> Polished:
+    found, interrupted = over_cores(work, range(search.starts), search, what)
+    return Polished.of(found, kept_of(found), interrupted)
 
 
 def _value(require: Require, p: SimpleNamespace) -> float:
@@ -418,7 +396,7 @@ class BlackBox:
             if limits.grashof == "triple-rocker":
                 found.append((name, -excess))
             else:
-                shortest = ("drag-link", "crank-rocker", "double-rocker", "rocker-crank").index(limits.grashof)
+                shortest = BY_SHORTEST.index(limits.grashof)
                 found += [(name, excess), (name, links[:, shortest] - order[:, 0])]
         for pivot, pieces in limits.regions:
             place = q[:, 0] + 1j * q[:, 1]

@@ -49,8 +49,9 @@ from .constraints import (
 )
 from .linkage import ANGLES, Linkage
 from .requirements import requirement
+from .search import METHODS, Search
 from .solution import Solution
-from .solve import METHODS, Method, Synthesis, TradeOff, synthesize, trade_off
+from .solve import Synthesis, TradeOff, synthesize, trade_off
 from .tasks import Task, normal_form
 
 FloatArray = NDArray[np.float64]
@@ -253,10 +254,7 @@ class SynthesisCase:
             np.array(wanted.limits),
             self.bounds,
             self.constraints,
-            seed=self.search.seed,
-            starts=wanted.starts,
-            n_jobs=self.search.jobs,
-            progress=progress,
+            search=Search(seed=self.search.seed, starts=wanted.starts, n_jobs=self.search.n_jobs, progress=progress),
         )
 
 

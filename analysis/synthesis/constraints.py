@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from math import isfinite, pi, radians
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from linkwork.errors import InputError, LinkworkError, ParameterError
 
 from .kernels import PLACES
-from .linkage import LINKS, names_of
+from .linkage import ANGLES, LINKS, names_of
 from .tasks import Normal, RockerFunction, Task
 
 FloatArray = NDArray[np.float64]
@@ -23,6 +23,8 @@ GrashofType = Literal["crank-rocker", "drag-link", "double-rocker", "rocker-cran
 UNKNOWNS = (*PLACES, "output_angle")
 #: Largest link by default, in sizes of the target; and, of a rocker function, in ground links.
 LARGEST = 5.0
+#: Least transmission angle at which a crank still counts as turning fully (rad).
+TURNING = 0.002
 #: Ground link of a rocker function by default (m): its angles do not depend on the size.
 GROUND = 0.1
 
@@ -65,9 +67,8 @@ class Grashof:
     type: GrashofType
 
     def __post_init__(self) -> None:
-        known = ("crank-rocker", "drag-link", "double-rocker", "rocker-crank", "triple-rocker")
-        if self.type not in known:
-            raise ParameterError("Grashof type", self.type, f"be one of {', '.join(known)}")
+        if self.type not in get_args(GrashofType):
+            raise ParameterError("Grashof type", self.type, f"be one of {', '.join(get_args(GrashofType))}")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -127,6 +128,16 @@ class PivotRegion:
 
         triangles = constrained_delaunay_triangles(Polygon(self.polygon))
         return [np.array(orient(t).exterior.coords)[:3] for t in triangles.geoms]
+
+
+def half_planes(triangle: FloatArray) -> FloatArray:
+    """Rows r with r . (x, y, 1) <= 0 inside a counter-clockwise triangle, shape (3, 3)."""
+    rows = np.zeros((3, 3))
+    for k in range(3):
+        (x0, y0), (x1, y1) = triangle[k], triangle[(k + 1) % 3]
+        length = float(np.hypot(x1 - x0, y1 - y0))
+        rows[k] = (y1 - y0) / length, (x0 - x1) / length, (y0 * x1 - x0 * y1) / length
+    return rows
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -217,56 +228,78 @@ def limits_of(
         raise InputError(f"constraints are {constraints!r}: they must be a sequence, even of one")
     bounds = dict(bounds or {})
     names_of(bounds)
-    unit, origin = normal.unit, normal.origin
-    kinds = (LeastTransmission, FullTurn, Grashof, LargestLink, Assembly, PivotRegion, Require)
     for c in constraints:
-        if not isinstance(c, kinds):
-            raise InputError(f"constraint {c!r} is none: use {', '.join(kind.__name__ for kind in kinds)}")
-    caps = [c.length for c in constraints if isinstance(c, LargestLink)]
-    function = isinstance(task, RockerFunction)
-    cap = min(caps, default=LARGEST * (GROUND if function else unit))
-    given: dict[str, tuple[float, float]] = {}
-    for name in UNKNOWNS:
-        if name in ("pivot_x", "pivot_y"):
-            middle = origin.real if name == "pivot_x" else origin.imag
-            usual = (middle - 4.0 * cap, middle + 4.0 * cap) if not function else (0.0, 0.0)
-        elif name in LINKS:
-            usual = (1e-3 * cap, cap)
-        elif name == "point_distance":
-            usual = (0.0, 0.0) if function else (0.0, cap)
-        elif name == "output_angle" and not normal.mounting:
-            usual = (0.0, 0.0)
-        elif any(isinstance(c, Require) for c in constraints):
-            # what is returned is what the function saw
-            usual = (-pi, pi)
-        else:
-            usual = (-4.0 * pi, 4.0 * pi)
-        if function and name in ("ground_angle", "point_angle"):
-            usual = (0.0, 0.0)
-        if function and name == "ground_length" and not caps and not set(LINKS) & set(bounds):
-            usual = (GROUND, GROUND)
-        low, high = _ordered(name, bounds[name], usual) if name in bounds else usual
-        if name in LINKS and high <= 0.0:
-            raise ParameterError(f"bound of {name}", high, "be above zero: a link has a length")
-        if name in LINKS or name == "point_distance":
-            if caps and low > cap:
-                raise InfeasibleError(
-                    f"{name} is to be at least {low:g} m, and no link longer than {cap:g} m: no linkage has both"
-                )
-            low, high = max(low, 1e-6 * cap if name in LINKS else 0.0), min(high, cap) if caps else high
-            if low > high:
-                raise InfeasibleError(
-                    f"{name} is to be at most {high:g} m: it is a distance and cannot be below {low:g} m"
-                )
-        given[name] = (low, high)
+        if not isinstance(c, Constraint):
+            raise InputError(
+                f"constraint {c!r} is none: use {', '.join(kind.__name__ for kind in get_args(Constraint))}"
+            )
+    given = _ends(task, normal, bounds, constraints)
     _check_links(given, constraints)
     lows, highs = (np.array([given[name][end] for name in UNKNOWNS]) for end in (0, 1))
-    shift = np.zeros(len(UNKNOWNS))
-    shift[:2] = origin.real, origin.imag
-    scale = np.ones(len(UNKNOWNS))
-    scale[:7] = unit
-    turn = max((c.angle for c in constraints if isinstance(c, LeastTransmission) and c.over == "turn"), default=None)
-    way = max((c.angle for c in constraints if isinstance(c, LeastTransmission) and c.over == "task"), default=None)
+    shift, scale = np.zeros(len(UNKNOWNS)), np.ones(len(UNKNOWNS))
+    shift[:2] = normal.origin.real, normal.origin.imag
+    scale[:7] = normal.unit
+    turn, way, grashof = _turning(constraints)
+    branches = {c.branch for c in constraints if isinstance(c, Assembly)}
+    if len(branches) > 1:
+        raise InfeasibleError("both assemblies are asked for at once")
+    return Limits(
+        low=(lows - shift) / scale,
+        high=(highs - shift) / scale,
+        turn=turn,
+        way=way,
+        grashof=grashof,
+        branches=tuple(branches) or (1, -1),
+        regions=tuple(
+            (c.pivot, tuple((piece - shift[:2]) / normal.unit for piece in c.pieces()))
+            for c in constraints
+            if isinstance(c, PivotRegion)
+        ),
+        requires=tuple(c for c in constraints if isinstance(c, Require)),
+    )
+
+
+def _ends(
+    task: Task, normal: Normal, bounds: Mapping[str, tuple[float, float]], constraints: Sequence[Constraint]
+) -> dict[str, tuple[float, float]]:
+    """Least and greatest value of every unknown (m, rad): as asked, or what is usual."""
+    caps = [c.length for c in constraints if isinstance(c, LargestLink)]
+    function = isinstance(task, RockerFunction)
+    cap = min(caps, default=LARGEST * (GROUND if function else normal.unit))
+    # where a function is required, what is returned is what that function saw
+    turns = 1.0 if any(isinstance(c, Require) for c in constraints) else 4.0
+    usual = dict.fromkeys(ANGLES, (-turns * pi, turns * pi)) | dict.fromkeys(LINKS, (1e-3 * cap, cap))
+    usual["point_distance"] = 0.0, cap
+    for name, middle in (("pivot_x", normal.origin.real), ("pivot_y", normal.origin.imag)):
+        usual[name] = middle - 4.0 * cap, middle + 4.0 * cap
+    if not normal.mounting:
+        usual["output_angle"] = 0.0, 0.0
+    if function:
+        usual |= dict.fromkeys(("pivot_x", "pivot_y", "point_distance", "ground_angle", "point_angle"), (0.0, 0.0))
+        if not caps and not set(LINKS) & set(bounds):
+            usual["ground_length"] = GROUND, GROUND
+    ends = {name: _ordered(name, bounds[name], usual[name]) if name in bounds else usual[name] for name in UNKNOWNS}
+    for name in (*LINKS, "point_distance"):
+        low, high = ends[name]
+        if name in LINKS and high <= 0.0:
+            raise ParameterError(f"bound of {name}", high, "be above zero: a link has a length")
+        if caps and low > cap:
+            raise InfeasibleError(
+                f"{name} is to be at least {low:g} m, and no link longer than {cap:g} m: no linkage has both"
+            )
+        low, high = max(low, 1e-6 * cap if name in LINKS else 0.0), min(high, cap) if caps else high
+        if low > high:
+            raise InfeasibleError(f"{name} is to be at most {high:g} m: it is a distance and cannot be below {low:g} m")
+        ends[name] = low, high
+    return ends
+
+
+def _turning(constraints: Sequence[Constraint]) -> tuple[float | None, float | None, str | None]:
+    """Least transmission angles over a turn and over the way of the task, and Grashof's type; see `Limits`."""
+    turn, way = (
+        max((c.angle for c in constraints if isinstance(c, LeastTransmission) and c.over == over), default=None)
+        for over in ("turn", "task")
+    )
     types = {c.type for c in constraints if isinstance(c, Grashof)}
     if len(types) > 1:
         raise InfeasibleError(f"Grashof types {', '.join(sorted(types))} are asked for at once: a four-bar has one")
@@ -278,23 +311,7 @@ def limits_of(
             raise InfeasibleError(f"the crank of a {type_} does not turn fully, which another constraint asks for")
         # on its way it must stay joined all the same
         way = way or 0.0
-    branches = {c.branch for c in constraints if isinstance(c, Assembly)}
-    if len(branches) > 1:
-        raise InfeasibleError("both assemblies are asked for at once")
-    return Limits(
-        low=(lows - shift) / scale,
-        high=(highs - shift) / scale,
-        turn=turn,
-        way=way,
-        grashof=type_,
-        branches=tuple(branches) or (1, -1),
-        regions=tuple(
-            (c.pivot, tuple((piece - shift[:2]) / unit for piece in c.pieces()))
-            for c in constraints
-            if isinstance(c, PivotRegion)
-        ),
-        requires=tuple(c for c in constraints if isinstance(c, Require)),
-    )
+    return turn, way, type_
 
 
 def _ordered(name: str, ends: tuple[float | None, float | None], usual: tuple[float, float]) -> tuple[float, float]:

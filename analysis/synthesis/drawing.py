@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from math import hypot
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,9 +10,8 @@ from numpy.typing import NDArray
 from linkwork.errors import AssemblyError
 
 from ..files.drawings import Circle, Drawing, Line, Polyline, Text
-
-if TYPE_CHECKING:
-    from ..figures import LinkageScene
+from .scene import LinkageScene
+from .solution import Solution
 
 FloatArray = NDArray[np.float64]
 
@@ -21,20 +19,22 @@ FloatArray = NDArray[np.float64]
 PIN, LETTER = 0.008, 0.022
 
 
-def drawing(scene: LinkageScene, rotation: float | None = None) -> Drawing:
-    """Links, pins, guide, coupler curve and target in the plane's own coordinates (m).
+def drawing(solution: Solution, rotation: float | None = None, *, title: str = "") -> Drawing:
+    """Links, pins, guide, coupler curve and target in the plane's own coordinates (m), for `files.save_drawing`.
 
     Parameters
     ----------
-    scene : LinkageScene
+    solution : Solution
     rotation : float, optional
         Of the crank (rad); the first at which the links are joined by default.
+    title : str
 
     Raises
     ------
     AssemblyError
         If the links cannot be joined there, or anywhere.
     """
+    scene = LinkageScene(solution, title)
     tried = (*scene.rotation, *scene.transmission[0]) if rotation is None else (rotation,)
     pins = next((found for phi in tried if (found := scene.pins(float(phi))) is not None), None)
     if pins is None:
@@ -45,19 +45,12 @@ def drawing(scene: LinkageScene, rotation: float | None = None) -> Drawing:
     drawn = [np.array(list(pins.values())), *(q for q in (*scene.curves, scene.target) if q is not None)]
     size = float(np.ptp(np.vstack(drawn), axis=0).max())
     radius, height = PIN * size, LETTER * size
-    lines = [
-        Line(layer="ground", start=a, end=e),
-        Line(layer="crank", start=a, end=b),
-        Line(layer="rocker", start=d, end=c),
-    ]
+    bar = {"ground": (a, e), "crank": (a, b), "rocker": (d, c)}
+    lines = [Line(layer=layer, start=start, end=end) for layer, (start, end) in bar.items()]
+    held = "ground" if scene.guide is None else "slider"
     circles = [
         Circle(layer=layer, centre=pin, radius=radius)
-        for layer, pin in (
-            ("ground", a),
-            ("crank", b),
-            ("rocker", c),
-            ("slider" if scene.guide is not None else "ground", d),
-        )
+        for layer, pin in (("ground", a), ("crank", b), ("rocker", c), (held, d))
     ]
     polylines = []
     if scene.second_crank:
@@ -76,8 +69,8 @@ def drawing(scene: LinkageScene, rotation: float | None = None) -> Drawing:
         lines.append(guide)
         polylines.append(block)
     polylines += [_curve("coupler-curve", piece) for piece in scene.curves]
-    if scene.target is not None and scene.line is not None:
-        polylines.append(Polyline(layer="target", points=scene.target, closed=scene.line))
+    if scene.target is not None and scene.target_closed is not None:
+        polylines.append(Polyline(layer="target", points=scene.target, closed=scene.target_closed))
     elif scene.target is not None:
         circles += [Circle(layer="target", centre=(x, y), radius=0.5 * radius) for x, y in scene.target.tolist()]
     texts = [

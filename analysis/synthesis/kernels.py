@@ -19,7 +19,7 @@ from numba import complex128, float64, int64, void
 
 from linkwork.five_bar.kinematics import joined
 
-from ..run.compiled import CUBE, MATRIX, VECTOR, kernel
+from ..numerics.codegen import CUBE, MATRIX, VECTOR, kernel
 
 #: The vector q: fields of `analysis.synthesis.Linkage`.
 PLACES = (

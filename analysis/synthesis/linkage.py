@@ -31,6 +31,8 @@ FloatArray = NDArray[np.float64]
 LINKS = ("ground_length", "crank_length", "coupler_length", "rocker_length")
 LENGTHS = ("pivot_x", "pivot_y", *LINKS, "point_distance")
 ANGLES = ("ground_angle", "crank_phase", "point_angle", "output_angle")
+#: Grashof's types of a four-bar of which a link turns fully, by the shortest link in the order of `LINKS`.
+BY_SHORTEST = ("drag-link", "crank-rocker", "double-rocker", "rocker-crank")
 #: Crank rotations over which a full turn is looked at.
 TURN = 360
 
@@ -300,19 +302,11 @@ class Linkage:
         One of crank-rocker, drag-link (both turn), double-rocker (the coupler turns), rocker-crank (the rocker turns, the crank
         does not), triple-rocker, change-point.
         """
-        lengths = {name: getattr(self, name) for name in LINKS}
-        shortest = min(lengths, key=lambda name: lengths[name])
-        excess = 2.0 * (min(lengths.values()) + max(lengths.values())) - sum(lengths.values())
-        if abs(excess) <= 1e-12 * sum(lengths.values()):
+        lengths = [getattr(self, name) for name in LINKS]
+        excess = 2.0 * (min(lengths) + max(lengths)) - sum(lengths)
+        if abs(excess) <= 1e-12 * sum(lengths):
             return "change-point"
-        if excess > 0.0:
-            return "triple-rocker"
-        return {
-            "ground_length": "drag-link",
-            "crank_length": "crank-rocker",
-            "coupler_length": "double-rocker",
-            "rocker_length": "rocker-crank",
-        }[shortest]
+        return "triple-rocker" if excess > 0.0 else BY_SHORTEST[lengths.index(min(lengths))]
 
     def transmission_range(self) -> tuple[float, float]:
         """Least and greatest angle between coupler and rocker at C over a turn (rad), in [0, pi].

@@ -6,30 +6,26 @@ stations among the unknowns, and then by the area itself, whose absolute value i
 
 from __future__ import annotations
 
-import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import product
 from math import inf, pi
-from typing import TypeVar
 
-import joblib
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from linkwork.errors import InputError
 
-from ..run.simulate import interruptible, shown
 from .constraints import Limits
 from .kernels import coupler_path_jacobian, link_jacobian
-from .program import Answer, PivotUnknown, Program, SliderUnknown, Start, inside
+from .program import Program
+from .search import USUAL_SEARCH, Search, over_cores
+from .starts import Answer, PivotUnknown, SliderUnknown, Start, inside
 from .tasks import Normal
 
 FloatArray = NDArray[np.float64]
-Item = TypeVar("Item")
-Made = TypeVar("Made")
 
 #: Sharpness of the area's absolute value, as shares of the root mean square distance that least squares left.
 BLURS = (0.3, 0.03)
@@ -54,6 +50,12 @@ class Polished:
     done: int
     interrupted: bool
 
+    @classmethod
+    def of(cls, found: Sequence[Answer], kept: Sequence[Answer], interrupted: bool) -> Polished:
+        """What came of all searches, and those that are kept, perhaps polished further."""
+        others = tuple(a for a in found if not a.feasible)
+        return cls(kept=tuple(kept), others=others, done=len(found), interrupted=interrupted)
+
     def reaching(self, quality: float, within: float = 0.01) -> int:
         """How many searches reached a quality, but for this share of it: "40 of 40 starts converge"."""
         return sum(a.start.quality <= quality * (1.0 + within) for a in self.kept)
@@ -65,99 +67,43 @@ def polish(
     starts: Sequence[Start],
     *,
     pivot: PivotUnknown | None = None,
-    n_jobs: int = 1,
-    progress: bool = False,
+    search: Search = USUAL_SEARCH,
 ) -> Polished:
     """Go from every start to an optimum. On Ctrl-C what was done is returned, marked as interrupted.
 
     Raises
     ------
-    InputError
-        If there are no cores.
     MissingLibraryError
         If there are inequalities and CasADi is not installed.
     """
-    cores = effective_cores(n_jobs)
+    cores = search.cores
     size = 1 if cores == 1 else max(1, -(-len(starts) // (3 * cores)))
     batches = [starts[k : k + size] for k in range(0, len(starts), size)]
-    if cores == 1:
-        worker = Polisher(normal, limits, pivot)
-
-        def fitted(batch: Sequence[Start]) -> list[Answer]:
-            return [worker.fit(start) for start in batch]
-    else:
-        fitted = partial(_batch, normal, limits, pivot)
-    parts, interrupted = over_cores(fitted, batches, cores=cores, progress=progress, what="polish")
+    worker = Polisher(normal, limits, pivot)
+    # a polisher holds compiled solvers, which do not travel: each batch makes its own
+    fitted = worker.fit_all if cores == 1 else partial(_batch, normal, limits, pivot)
+    parts, interrupted = over_cores(fitted, batches, search, "polish")
     found = [answer for part in parts for answer in part]
     # heard after the last of them it has nothing to stop
     interrupted = interrupted and len(found) < len(starts)
-    kept = sorted((a for a in found if a.feasible), key=lambda a: a.start.quality)
+    kept = kept_of(found)
     if not interrupted:
-        worker = Polisher(normal, limits, pivot)
         if normal.normals is not None:
             best = distinct(kept, AREAS, pivot)
-            kept, interrupted = over_cores(worker.area, best, cores=1, progress=progress, what="area")
+            kept, interrupted = over_cores(worker.area, best, replace(search, n_jobs=1), "area")
         elif pivot is None:
             kept = [*map(worker.finish, kept[:FINISHED]), *kept[FINISHED:]]
-        kept.sort(key=lambda a: a.start.quality)
-    return Polished(
-        kept=tuple(kept),
-        others=tuple(a for a in found if not a.feasible),
-        done=len(found),
-        interrupted=interrupted,
-    )
+        kept = kept_of(kept)
+    return Polished.of(found, kept, interrupted)
 
 
-def effective_cores(n_jobs: int) -> int:
-    """Number of cores, as `joblib.Parallel` counts them.
-
-    Raises
-    ------
-    InputError
-        If there are none.
-    """
-    if n_jobs == 0:
-        raise InputError("0 cores: it must be a number of them, or -1 for all")
-    return int(joblib.effective_n_jobs(n_jobs))
-
-
-def over_cores(
-    work: Callable[[Item], Made], items: Sequence[Item], *, cores: int, progress: bool, what: str
-) -> tuple[list[Made], bool]:
-    """What becomes of every item, in their order whatever the cores; on Ctrl-C of those that were done, and True."""
-    made: dict[int, Made] = {}
-    with interruptible() as interrupted, shown(progress, float(len(items)), what) as show:
-        if cores == 1:
-            for number, item in enumerate(items):
-                made[number] = work(item)
-                show(float(number + 1))
-                if interrupted:
-                    break
-        else:
-            tasks = (joblib.delayed(_numbered)(work, number, item) for number, item in enumerate(items))
-            results = joblib.Parallel(n_jobs=cores, return_as="generator_unordered")(tasks)
-            try:
-                for number, value in results:
-                    made[number] = value
-                    show(float(len(made)))
-                    if interrupted:
-                        break
-            except KeyboardInterrupt:  # of a worker
-                interrupted.append(True)
-            finally:
-                with warnings.catch_warnings():
-                    warnings.filterwarnings("ignore", message=".*still being processed", category=UserWarning)
-                    results.close()
-    return [made[number] for number in sorted(made)], bool(interrupted)
-
-
-def _numbered(work: Callable[[Item], Made], number: int, item: Item) -> tuple[int, Made]:
-    return number, work(item)
+def kept_of(answers: Sequence[Answer]) -> list[Answer]:
+    """Those that keep every constraint, best first."""
+    return sorted((a for a in answers if a.feasible), key=lambda a: a.start.quality)
 
 
 def _batch(normal: Normal, limits: Limits, pivot: PivotUnknown | None, starts: Sequence[Start]) -> list[Answer]:
-    worker = Polisher(normal, limits, pivot)
-    return [worker.fit(start) for start in starts]
+    return Polisher(normal, limits, pivot).fit_all(starts)
 
 
 def distinct(
@@ -212,6 +158,10 @@ class Polisher:
             if met.feasible:
                 return replace(met, start=replace(met.start, quality=self.program("squares").value(met.start)))
         return answer
+
+    def fit_all(self, starts: Sequence[Start]) -> list[Answer]:
+        """`fit` from each of them."""
+        return [self.fit(start) for start in starts]
 
     def _solved(self, start: Start) -> Answer:
         """By IPOPT; where a region is not convex, in several of its triangles, and on across the edges that hold it up."""

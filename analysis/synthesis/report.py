@@ -1,31 +1,25 @@
-"""What is told of a solution, in mm and degrees."""
+"""Text report of a solution, in mm and degrees."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from math import degrees, isfinite, pi
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from .linkage import ANGLES, SecondCrank, SliderMotion
-from .sensitivity import ANGLE_STEP, PIVOT_ANGLES, costs, length_step
+from .sensitivity import ANGLE_STEP, PIVOT_ANGLES, costs, length_step, rounded, sensitivities
+from .solution import Solution, Verdicts
 from .tasks import RockerFunction, Task, UntimedPath
-
-if TYPE_CHECKING:
-    from .solution import Solution, Verdicts
-
-#: What can be wrong with a solution, by the names in its verdicts.
-DEFECTS = ("circuit", "branch", "order")
 
 
 def quality_unit(task: Task) -> tuple[float, str]:
-    """Factor from SI, and unit, in which a task's quality function is told."""
+    """Factor from SI, and unit, in which a task's quality function is written."""
     return ((180.0 / pi) ** 2, "deg²") if isinstance(task, RockerFunction) else (1e6, "mm²")
 
 
 def error_unit(task: Task) -> tuple[float, str]:
-    """Factor from SI, and unit, in which a task's errors are told."""
+    """Factor from SI, and unit, in which a task's errors are written."""
     return (180.0 / pi, "deg") if isinstance(task, RockerFunction) else (1e3, "mm")
 
 
@@ -38,7 +32,7 @@ def quality_name(task: Task) -> str:
     return f"sum of {'weighted ' if weighted else ''}squared {what}"
 
 
-def value_told(name: str, value: float) -> str:
+def format_dimension(name: str, value: float) -> str:
     """A dimension with its unit."""
     if name in (*ANGLES, *PIVOT_ANGLES) or name.startswith("second_crank "):
         # + 0.0: no minus before a zero
@@ -52,12 +46,11 @@ def headline(solution: Solution) -> str:
     scale, length = error_unit(solution.task)
     v = solution.verdicts
     low, high = degrees(v.least_transmission), degrees(v.greatest_transmission)
-    defects = ", ".join(f"{name} defect" for name in DEFECTS if not getattr(v, name))
     return (
         f"{factor * solution.error:.4g} {unit}, worst {scale * solution.evaluation.worst:.3g} {length}\n"
         f"largest link {1e3 * solution.linkage.largest_link:.4g} mm, {low:.0f} to {high:.0f} deg"
         + (f"\n{straight}" if (straight := solution.straight()) else "")
-        + (f"\n{defects}" if defects else "")
+        + (f"\n{', '.join(v.defects)}" if v.defects else "")
     )
 
 
@@ -89,7 +82,7 @@ def report(solution: Solution) -> str:
         parts[0] += f"\nsecond crank at D: {linkage.pivot.ratio:g} turns for one of the first"
     if straight := solution.straight():
         parts[0] += f"\n{straight}"
-    parts += [table(dimension_rows(solution)), rounding_told(solution)]
+    parts += [table(dimension_rows(solution)), rounding_line(solution)]
     parts.append(table(_stations(solution)))
     return "\n\n".join(parts) + "\n"
 
@@ -103,37 +96,37 @@ def dimension_rows(solution: Solution) -> list[tuple[str, str, str, str, str]]:
     rows = [("dimension", "value", "off by", "moves the output by (rms)", "error grows by")]
     # where the crank's rotation is free, so is where it starts
     left_out = ("crank_phase",) if isinstance(solution.task, UntimedPath) else ()
-    for s in solution.sensitivities():
+    for s in sensitivities(solution):
         if s.name in left_out:
             continue
         if s.name not in dear:
-            rows.append((s.name, value_told(s.name, s.value), "", "", ""))
+            rows.append((s.name, format_dimension(s.name, s.value), "", "", ""))
             continue
         off = ANGLE_STEP if s.name in ANGLES else step
         cost = factor * max(dear[s.name], 0.0)
         told = f"{cost:.3g} {unit}" if isfinite(cost) else "no assembly"
         moved = f"{scale * off * s.shift:.3g} {length}"
-        rows.append((s.name, value_told(s.name, s.value), value_told(s.name, off), moved, told))
+        rows.append((s.name, format_dimension(s.name, s.value), format_dimension(s.name, off), moved, told))
     return rows
 
 
-def rounding_told(solution: Solution) -> str:
+def rounding_line(solution: Solution) -> str:
     """What rounding costs."""
     factor, unit = quality_unit(solution.task)
     step = length_step(solution.linkage)
-    rounding = solution.rounded(step, ANGLE_STEP)
+    rounding = rounded(solution, step)
     return (
         f"rounded to {1e3 * step:g} mm and {degrees(ANGLE_STEP):g} deg: {factor * rounding.error:.6g} {unit}; "
         f"mean over dimensions that are off by up to half as much: {factor * rounding.expected:.6g} {unit}"
     )
 
 
-def degrees_told(verdicts: Verdicts) -> str:
+def format_transmission(verdicts: Verdicts) -> str:
     """Range of the transmission angle."""
     return f"{degrees(verdicts.least_transmission):.1f} to {degrees(verdicts.greatest_transmission):.1f}"
 
 
-def limit_told(over: str, limit: float) -> str:
+def format_limit(over: str, limit: float) -> str:
     """A limit of a trade-off with its unit."""
     return f"{1e3 * limit:.6g} mm" if over == "size" else f"{degrees(limit):.4g} deg"
 

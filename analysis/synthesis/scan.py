@@ -22,9 +22,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import qmc
 
-from .constraints import InfeasibleError, Limits
+from .constraints import TURNING, InfeasibleError, Limits
 from .kernels import many_directions, match_windows
-from .program import TURNING, Start
+from .linkage import BY_SHORTEST
+from .starts import Start
 from .tasks import Normal
 
 FloatArray = NDArray[np.float64]
@@ -134,7 +135,7 @@ def _allowed(shapes: FloatArray, limits: Limits) -> NDArray[np.bool_]:
         if limits.grashof == "triple-rocker":
             allowed &= excess > 0.0
         else:
-            shortest = ("drag-link", "crank-rocker", "double-rocker", "rocker-crank").index(limits.grashof)
+            shortest = BY_SHORTEST.index(limits.grashof)
             allowed &= (excess < 0.0) & (links.argmin(axis=1) == shortest)
     least, most = _sizes(links, limits)
     # links that are fixed leave one size but for rounding

@@ -4,27 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import degrees, inf, pi, radians
+from math import degrees, inf, pi
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from linkwork.errors import AssemblyError, InputError
+from linkwork.errors import InputError
 from linkwork.five_bar.parameters import FiveBarParameters
 
+from ..files.io import write_csv
 from .areas import area_between, distance_to, straightness
 from .kernels import PLACES
-from .linkage import Linkage, SecondCrank, SliderMotion
+from .linkage import Linkage, SecondCrank
 from .tasks import PrecisionPoints, RockerFunction, Task, TimedPath, UntimedPath, normal_form
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-    from ..figures import LinkageScene
-    from ..files.drawings import Drawing
-    from .sensitivity import Rounding, Sensitivity
 
 FloatArray = NDArray[np.float64]
 
@@ -189,13 +183,17 @@ class Verdicts:
     greatest_transmission: float
 
     @property
+    def defects(self) -> tuple[str, ...]:
+        """What is wrong, such as "circuit defect"."""
+        return tuple(f"{name} defect" for name in ("circuit", "branch", "order") if not getattr(self, name))
+
+    @property
     def sound(self) -> bool:
         """No circuit, branch or order defect."""
-        return self.circuit and self.branch and self.order
+        return not self.defects
 
     def __str__(self) -> str:
-        words = [self.grashof, "full turn" if self.full_turn else "no full turn"]
-        words += [f"{name} defect" for name in ("circuit", "branch", "order") if not getattr(self, name)]
+        words = [self.grashof, "full turn" if self.full_turn else "no full turn", *self.defects]
         angles = f"{degrees(self.least_transmission):.1f} to {degrees(self.greatest_transmission):.1f} deg"
         return ", ".join(words) + f", transmission angle {angles}"
 
@@ -329,27 +327,6 @@ class Solution:
             return self.linkage.path(np.linspace(at[0], at[-1], n))
         return self.linkage.path(np.linspace(0.0, 2.0 * pi, n, endpoint=False))
 
-    def sensitivities(self) -> tuple[Sensitivity, ...]:
-        """What each dimension does to the error, by exact derivatives.
-
-        Of an untimed path, the squared distances to the curve at its stations, the crank rotations following.
-        """
-        from .sensitivity import sensitivities
-
-        return sensitivities(self)
-
-    def rounded(self, length: float | None = None, angle: float = radians(0.1)) -> Rounding:
-        """What rounding lengths and angles to whole steps costs.
-
-        Parameters
-        ----------
-        length, angle : float
-            Steps (m, rad); by default 0.1 mm, or less with a link below 1 mm (`sensitivity.length_step`), and 0.1 degrees.
-        """
-        from .sensitivity import rounded
-
-        return rounded(self, length, angle)
-
     def to_five_bar(self, **made_of: Any) -> FiveBarParameters:
         """Parameters of the plant and its FMU, masses from density and section; see `Linkage.to_five_bar`."""
         return self.linkage.to_five_bar(**made_of)
@@ -390,72 +367,7 @@ class Solution:
 
     def to_csv(self, path: str | Path) -> Path:
         """Write `columns` to a CSV file."""
-        from ..files import write_csv
-
         return write_csv(path, self.columns())
-
-    def report(self) -> str:
-        """Verdicts, dimensions with what an error in each costs, rounding, errors target by target; in mm and degrees."""
-        from .report import report
-
-        return report(self)
-
-    def plot(self, *, title: str = "") -> Figure:
-        """The linkage to scale, its path with magnified errors or its function, errors and transmission angle."""
-        from .. import figures
-
-        return figures.plot_solution(self.scene(title))
-
-    def animate(self, path: str | Path, *, title: str = "", frames: int = 48) -> Path:
-        """Write a GIF of a turn of the crank."""
-        from .. import figures
-
-        return figures.animate_solution(self.scene(title), path, frames=frames)
-
-    def drawing(self, rotation: float | None = None, *, title: str = "") -> Drawing:
-        """The linkage, its coupler curve and the target at real size, for `analysis.files.save_drawing`.
-
-        Parameters
-        ----------
-        rotation : float, optional
-            Of the crank (rad); the first at which the links are joined by default.
-        title : str
-        """
-        from .drawing import drawing
-
-        return drawing(self.scene(title), rotation)
-
-    def scene(self, title: str = "") -> LinkageScene:
-        """What a picture of it shows."""
-        from ..figures import LinkageScene
-
-        task, linkage = self.task, self.linkage
-        at = self.rotation
-        closed = isinstance(task, UntimedPath) and task.path.closed
-        span = float(np.ptp(at))
-        whole = closed or whole_turn(at)
-        begin = 0.0 if closed else float(at.min())
-        turn = begin + np.linspace(0.0, 2.0 * pi, 2 * CURVE + 1)
-        way = turn if whole else np.linspace(begin, begin + span, 2 * CURVE + 1)
-        target = target_points(task)
-        pointed = target is not None
-        slides = linkage.pivot if isinstance(linkage.pivot, SliderMotion) else None
-        return LinkageScene(
-            pins=lambda phi: _pins(linkage, phi, pointed),
-            rotation=way if whole else at,
-            curves=_pieces(linkage.path(turn)) if pointed else (),
-            traced=linkage.path(way) if pointed else None,
-            target=target,
-            line=task.path.closed if isinstance(task, UntimedPath) else None,
-            timed=not isinstance(task, UntimedPath) and task.rotation is not None,
-            stations=self.columns(),
-            guide=None if slides is None else _guide(linkage, slides, turn),
-            second_crank=isinstance(linkage.pivot, SecondCrank),
-            transmission=np.vstack([turn, angle_at_c(linkage, turn)]),
-            motion=_motion(linkage, turn),
-            function=None if pointed else np.vstack([way, linkage.rocker_angle(way)]),
-            title=title,
-        )
 
 
 def whole_turn(rotation: FloatArray) -> bool:
@@ -471,44 +383,11 @@ def target_points(task: Task) -> FloatArray | None:
     return np.asarray(task.path.points if isinstance(task, UntimedPath) else task.points)
 
 
-def _motion(linkage: Linkage, turn: FloatArray) -> tuple[str, FloatArray] | None:
-    if isinstance(linkage.pivot, SliderMotion):
-        return "slider position [m]", linkage.pivot.series(turn)
-    return None if linkage.pivot is None else ("second crank [rad]", linkage.pivot.angle(turn))
-
-
 def angle_at_c(linkage: Linkage, rotation: FloatArray) -> FloatArray:
     """Angle between coupler and rocker at C (rad), from 0 to pi, NaN where the links cannot be joined."""
     g = linkage.directions(rotation)
     angle: FloatArray = np.arctan2(np.abs(g[5]), g[4])
     return angle
-
-
-def _pins(linkage: Linkage, rotation: float, pointed: bool) -> dict[str, tuple[float, float]] | None:
-    try:
-        pins = linkage.pins(rotation)
-    except AssemblyError:
-        return None
-    if not pointed:
-        del pins["P"]
-    return pins
-
-
-def _pieces(points: FloatArray) -> tuple[FloatArray, ...]:
-    """A curve cut where it has no points."""
-    there = np.isfinite(points).all(axis=1)
-    edges = np.flatnonzero(np.diff(there.astype(int))) + 1
-    return tuple(p for p in np.split(points, edges) if np.isfinite(p).all() and len(p) > 1)
-
-
-def _guide(linkage: Linkage, motion: SliderMotion, turn: FloatArray) -> FloatArray:
-    """Ends of the slider's travel in the plane (m), shape (2, 2)."""
-    u = motion.series(turn)
-    ground = np.exp(1j * linkage.ground_angle)
-    ends = complex(linkage.pivot_x, linkage.pivot_y) + ground * (
-        linkage.ground_length + np.array([u.min(), u.max()]) * np.exp(1j * motion.guide_angle)
-    )
-    return np.column_stack([ends.real, ends.imag])
 
 
 def path_rate(linkage: Linkage, at: FloatArray, both: NDArray[np.complex128]) -> NDArray[np.complex128]:

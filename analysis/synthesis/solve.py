@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import isfinite
 from pathlib import Path
-from textwrap import fill
 from time import perf_counter
-from typing import TYPE_CHECKING, Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from linkwork.errors import InputError, Interrupted
 
+from ..files.io import write_csv
 from .black_box import by_differential_evolution, by_simplex
 from .constraints import (
     USUAL,
@@ -27,18 +27,14 @@ from .constraints import (
 )
 from .linkage import ANGLES, Linkage
 from .polish import Polished, distinct, polish
-from .program import Answer, PivotUnknown, Start, linkage_of, random_pivot, start_of
 from .scan import scan
+from .search import QUICK_SEARCH, USUAL_SEARCH, Search
 from .solution import Solution, nearest_rotations, ranked
+from .starts import Answer, PivotUnknown, Start, linkage_of, random_pivot, start_of
 from .tasks import Normal, RockerFunction, Task, UntimedPath, normal_form, reweighted
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-Method = Literal["scan", "differential-evolution", "simplex"]
 #: Stations of an untimed path where the pivot moves: more than with a fixed one, because harmonics put waves into the curve.
 STATIONS = 144
-METHODS: tuple[Method, ...] = ("scan", "differential-evolution", "simplex")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -80,17 +76,7 @@ class Synthesis:
 
     def to_csv(self, path: str | Path) -> Path:
         """Write `columns` to a CSV file."""
-        from ..files import write_csv
-
         return write_csv(path, self.columns())
-
-    def plot(self, *, title: str = "") -> Figure:
-        """The ranked linkages beside one another, each with its curve and the target."""
-        from .. import figures
-        from .report import headline
-
-        scenes = [s.scene(f"{k}: {headline(s)}") for k, s in enumerate(self.solutions, start=1)]
-        return figures.plot_alternatives(scenes, title=title)
 
 
 class SynthesisInterrupted(Interrupted):
@@ -106,21 +92,15 @@ def synthesize(
     bounds: Mapping[str, tuple[float, float]] | None = None,
     constraints: Sequence[Constraint] = USUAL,
     weights: ArrayLike | None = None,
-    seed: int = 0,
     *,
-    method: Method = "scan",
-    candidates: int = 1 << 16,
-    starts: int = 24,
-    solutions: int = 6,
     pivot: PivotUnknown | None = None,
     guesses: Sequence[Solution] = (),
-    n_jobs: int = 1,
-    progress: bool = False,
+    search: Search = USUAL_SEARCH,
 ) -> Synthesis:
     """Find linkages that do a task.
 
     A scan over many thousand four-bars, each placed in closed form, gives the starts; each is polished to an optimum with exact
-    derivatives. What cannot be done exactly is answered with the best there is, its error told.
+    derivatives. What cannot be done exactly is answered with the best there is, its error stated.
 
     Parameters
     ----------
@@ -132,25 +112,12 @@ def synthesize(
         See `analysis.synthesis.constraints`; by default a transmission angle of at least 40 degrees over a full turn.
     weights : array_like, optional
         One per target, in the place of the task's own.
-    seed : int
-        Of the scan: the same seed gives the same solutions, on any number of cores.
-    method : "scan", "differential-evolution" or "simplex"
-        The last two are for comparison: SciPy's differential evolution on the quality function as a black box, and the thesis's
-        downhill simplex from many starts.
-    candidates : int
-        Four-bars in the scan.
-    starts : int
-        Of them, how many are polished.
-    solutions : int
-        At most that many different linkages are returned.
     pivot : SliderUnknown or CrankUnknown, optional
         Move the rocker pivot, its motion sought together with the links.
     guesses : sequence of Solution
         Searched from as well.
-    n_jobs : int
-        Cores, as `joblib.Parallel`.
-    progress : bool
-        Show a progress bar.
+    search : Search
+        Method, starts, seed, cores.
 
     Raises
     ------
@@ -163,44 +130,90 @@ def synthesize(
     MissingLibraryError
         If there are inequalities, and CasADi is not installed.
     """
-    for name, value in (("candidates", candidates), ("starts", starts), ("solutions", solutions)):
-        if value < 1:
-            raise InputError(f"{value} {name}: there must be at least one")
-    if method not in METHODS:
-        raise InputError(f"method {method!r}: it must be one of {', '.join(METHODS)}")
-    if seed < 0 or int(seed) != seed or int(solutions) != solutions:
-        raise InputError(f"seed {seed} and {solutions} solutions: both must be whole numbers, the seed not below zero")
+    if search.starts < 1:
+        raise InputError(f"{search.starts} starts: there must be at least one")
     begun = perf_counter()
     task = reweighted(task, weights)
     normal = fitted_form(task, pivot)
     limits = limits_of(task, normal, bounds, constraints)
-    if method == "scan":
-        begin = [start_from(g.linkage, normal, pivot, g.evaluation.rotation) for g in guesses]
-        random = np.random.default_rng(seed)
+    if search.method == "scan":
+        begin = [_start(guess, normal, pivot) for guess in guesses]
+        total = len(begin) + search.starts
+        random = np.random.default_rng(search.seed)
         try:
-            scanned = scan(normal, limits, seed=seed, candidates=candidates, starts=starts)
+            scanned = scan(normal, limits, seed=search.seed, candidates=search.candidates, starts=search.starts)
         except KeyboardInterrupt:
-            raise SynthesisInterrupted(None, 0, len(begin) + starts) from None
+            raise SynthesisInterrupted(None, 0, total) from None
         for start in scanned:
             motion = start.pivot if pivot is None else random_pivot(pivot, start.q[2], normal.unit, random)
             begin.append(replace(start, pivot=motion))
-        done = polish(normal, limits, begin, pivot=pivot, n_jobs=n_jobs, progress=progress)
-        total = len(begin)
+        done, total = polish(normal, limits, begin, pivot=pivot, search=search), len(begin)
     else:
         if pivot is not None:
-            raise InputError(f"method {method!r} searches linkages with a fixed pivot: use 'scan'")
-        search = by_differential_evolution if method == "differential-evolution" else by_simplex
-        done = search(normal, limits, seed=seed, starts=starts, n_jobs=n_jobs, progress=progress)
-        total = starts
-    found = solutions_of(task, normal, limits, done, pivot, solutions)
-    seconds = perf_counter() - begun
+            raise InputError(f"method {search.method!r} searches linkages with a fixed pivot: use 'scan'")
+        black_box = by_differential_evolution if search.method == "differential-evolution" else by_simplex
+        done, total = black_box(normal, limits, search), search.starts
+    found = solutions_of(task, normal, limits, done, pivot, search.solutions)
+    return _result(task, found, done, total, search, begun)
+
+
+def improve(
+    task: Task,
+    linkage: Linkage | Solution,
+    pivot: PivotUnknown,
+    *,
+    bounds: Mapping[str, tuple[float, float]],
+    constraints: Sequence[Constraint],
+    guesses: Sequence[Linkage | Solution] = (),
+    kept: Collection[str] = (),
+    search: Search = USUAL_SEARCH,
+) -> Synthesis:
+    """Search from a linkage whose rocker pivot is moved, its motion at random as often as ``search.starts``, and from guesses.
+
+    Parameters
+    ----------
+    task, bounds, constraints, guesses, search
+        As for `synthesize`; there is no scan.
+    linkage : Linkage or Solution
+        For an open path a solution, which brings the crank rotations of the stations; likewise each guess.
+    pivot : SliderUnknown or CrankUnknown
+    kept : collection of str
+        Dimensions that are fixed, returned as they are to the last digit.
+
+    Raises
+    ------
+    InputError, InfeasibleError, SynthesisInterrupted, MissingLibraryError
+        As `synthesize`.
+    """
+    if search.starts < 1 and not guesses:
+        raise InputError(f"{search.starts} starts and no guess: there must be at least one of either")
+    begun = perf_counter()
+    normal = fitted_form(task, pivot)
+    limits = limits_of(task, normal, bounds, constraints)
+    base, *begin = (_start(of, normal, pivot) for of in (linkage, *guesses))
+    random = np.random.default_rng(search.seed)
+    begin += [replace(base, pivot=random_pivot(pivot, base.q[2], normal.unit, random)) for _ in range(search.starts)]
+    done = polish(normal, limits, begin, pivot=pivot, search=search)
+    given = linkage.linkage if isinstance(linkage, Solution) else linkage
+    same: dict[str, Any] = {name: getattr(given, name) for name in kept}
+    found = tuple(
+        Solution.of(task, replace(s.linkage, **same), s.evaluation.rotation)
+        for s in solutions_of(task, normal, limits, done, pivot, search.solutions)
+    )
+    return _result(task, found, done, len(begin), search, begun)
+
+
+def _result(
+    task: Task, found: tuple[Solution, ...], done: Polished, total: int, search: Search, begun: float
+) -> Synthesis:
+    """The result of a search of so many starts that began at a time of `perf_counter`; or why there is none."""
     result = Synthesis(
         task=task,
         solutions=found,
-        method=method,
-        seed=seed,
+        method=search.method,
+        seed=search.seed,
         starts=done.done,
-        seconds=seconds,
+        seconds=perf_counter() - begun,
         complete=not done.interrupted,
     )
     if done.interrupted:
@@ -217,25 +230,24 @@ def fitted_form(task: Task, pivot: PivotUnknown | None) -> Normal:
     return normal_form(task)
 
 
-def start_from(
-    linkage: Linkage, normal: Normal, pivot: PivotUnknown | None, rotation: NDArray[np.float64] | None = None
-) -> Start:
-    """A linkage as a start, its untimed stations at the given rotations, or else where it comes nearest to them.
+def _start(of: Linkage | Solution, normal: Normal, pivot: PivotUnknown | None) -> Start:
+    """A linkage as a start, its untimed stations at the solution's rotations, or else where it comes nearest to them.
 
     Raises
     ------
     InputError
         If rotations are needed and cannot be found so, because the path is open.
     """
+    linkage, rotation = (of.linkage, of.evaluation.rotation) if isinstance(of, Solution) else (of, None)
     if normal.timed:
-        return start_of(linkage, normal, pivot)
-    if rotation is None or len(rotation) != normal.n:
-        if normal.points is None or not normal.closed:
-            if rotation is None:
-                raise InputError("a start for an open path needs the crank rotations of its stations")
-            rotation = np.interp(np.linspace(0.0, 1.0, normal.n), np.linspace(0.0, 1.0, len(rotation)), rotation)
-        else:
+        rotation = None
+    elif rotation is None or len(rotation) != normal.n:
+        if normal.points is not None and normal.closed:
             rotation = nearest_rotations(linkage, normal.origin + normal.unit * normal.points)
+        elif rotation is None:
+            raise InputError("a start for an open path needs the crank rotations of its stations")
+        else:
+            rotation = np.interp(np.linspace(0.0, 1.0, normal.n), np.linspace(0.0, 1.0, len(rotation)), rotation)
     return start_of(linkage, normal, pivot, rotation)
 
 
@@ -323,35 +335,17 @@ class TradeOff:
         values = [np.nan if s is None else s.error for s in self.solutions]
         return np.ma.masked_invalid(np.array(values))
 
-    def to_csv(self, path: str | Path) -> Path:
-        """Write each limit with its best linkage, in the columns of `Synthesis.columns`; limits without one are left out."""
-        from ..files import write_csv
-
-        there = [(limit, s) for limit, s in zip(self.limit, self.solutions) if s is not None]
+    def columns(self) -> dict[str, list[float]]:
+        """Each limit with the columns of its best linkage, as in `Synthesis.columns`; limits without one are left out."""
+        there = [(float(limit), s) for limit, s in zip(self.limit, self.solutions) if s is not None]
         unit = "largest link [m]" if self.over == "size" else "least transmission angle [rad]"
         columns = columns_of([s for _, s in there])
-        del columns["rank"]
-        return write_csv(path, {f"limit of {unit}": [limit for limit, _ in there], **columns})
+        columns.pop("rank", None)
+        return {f"limit of {unit}": [limit for limit, _ in there], **columns}
 
-    def plot(self, *, title: str = "") -> Figure:
-        """Quality function and worst error over the limit."""
-        from .. import figures
-        from .report import error_unit, quality_name, quality_unit
-
-        task = next((s.task for s in self.solutions if s is not None), None)
-        if task is None:
-            raise InfeasibleError("there is no linkage at any of the limits: there is nothing to plot")
-        (factor, unit), (scale, length) = quality_unit(task), error_unit(task)
-        worst = np.array([np.nan if s is None else s.evaluation.worst for s in self.solutions])
-        size = self.over == "size"
-        name = fill(quality_name(task), 26)
-        error = factor * self.error.filled(np.nan)
-        return figures.plot_trade_off(
-            1e3 * self.limit if size else np.degrees(self.limit),
-            {f"{name} [{unit}]": error, f"worst error [{length}]": scale * worst},
-            limit_label="limit of the largest link [mm]" if size else "least transmission angle asked for [deg]",
-            title=title,
-        )
+    def to_csv(self, path: str | Path) -> Path:
+        """Write `columns` to a CSV file."""
+        return write_csv(path, self.columns())
 
 
 class TradeOffInterrupted(Interrupted):
@@ -369,12 +363,9 @@ def trade_off(
     bounds: Mapping[str, tuple[float, float]] | None = None,
     constraints: Sequence[Constraint] = USUAL,
     weights: ArrayLike | None = None,
-    seed: int = 0,
     *,
-    starts: int = 12,
     pivot: PivotUnknown | None = None,
-    n_jobs: int = 1,
-    progress: bool = False,
+    search: Search = QUICK_SEARCH,
 ) -> TradeOff:
     """Error against size or transmission angle, by the epsilon-constraint method with warm starts.
 
@@ -388,8 +379,10 @@ def trade_off(
     over : "size" or "transmission"
     limits : array_like, shape (n,)
         Largest links (m), or least transmission angles (rad).
-    bounds, constraints, weights, seed, starts, pivot, n_jobs, progress
+    bounds, constraints, weights, pivot
         As for `synthesize`; the limit takes the place of a constraint of its own kind.
+    search : Search
+        As for `synthesize`, but for the candidates, at most 16384, and the solutions.
 
     Raises
     ------
@@ -405,6 +398,7 @@ def trade_off(
     if values.ndim != 1 or len(values) < 2 or not np.isfinite(values).all():
         raise InputError("the limits of a trade-off must be finite numbers, at least two")
     rest = tuple(c for c in constraints if not isinstance(c, kind))
+    first = replace(search, candidates=min(search.candidates, 1 << 14), solutions=3)
     order = np.argsort(-values if over == "size" else values)
     found: dict[int, Solution] = {}
 
@@ -427,14 +421,9 @@ def trade_off(
                     bounds,
                     (*rest, limit),
                     weights,
-                    seed,
-                    starts=starts if number == 0 else 1,
-                    candidates=1 << 14 if number == 0 else 1 << 8,
-                    solutions=3,
                     pivot=pivot,
                     guesses=guesses,
-                    n_jobs=n_jobs,
-                    progress=progress,
+                    search=replace(first, starts=1, candidates=1 << 8) if number else first,
                 ).solutions
             except InfeasibleError:
                 result = ()

@@ -115,9 +115,9 @@ def _traced() -> dict[str, Callable[..., tuple[NDArray[np.float64], ...]]]:
     with respect to the crank's length, one after the other.
     """
     casadi = symbolic.library()
-    f = symbolic.plant()
+    f = traced(FIVE_BAR)
     angle, u, v, a, w = (casadi.SX.sym(name) for name in ("angle", "u", "v", "a", "w"))
-    columns, p = symbolic.constants()
+    columns, p = constants(FIVE_BAR)
     load = casadi.SX.sym("load", 3)
     g = f.position(angle, u, p)
     k = f.coefficients(g, p)

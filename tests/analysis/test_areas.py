@@ -16,14 +16,15 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy.spatial.distance import directed_hausdorff
 
-from analysis.synthesis.areas import (
+from analysis.synthesis import (
+    TargetPath,
     area_between,
     distance_to,
     hausdorff,
+    path_from_formula,
     straightest_part,
     straightness,
 )
-from analysis.synthesis.targets import TargetPath, path_from_formula
 from linkwork.errors import InputError
 
 FloatArray = NDArray[np.float64]

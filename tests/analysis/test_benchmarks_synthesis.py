@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize
 
-from analysis.synthesis import Linkage, evaluate, turn
+from analysis.synthesis import Linkage, Search, evaluate, turn
 from analysis.synthesis.black_box import PENALTY
-from analysis.synthesis.program import start_of
 from analysis.synthesis.published import PROBLEMS
+from analysis.synthesis.starts import start_of
 from benchmarks.synthesis import (
     SEARCHES,
     Contest,
@@ -43,7 +43,9 @@ def good(name: str) -> Linkage:
     from analysis.synthesis import synthesize
 
     problem = PROBLEMS[name]
-    return synthesize(problem.task, problem.bounds, problem.constraints, candidates=1 << 10, starts=2).best.linkage
+    return synthesize(
+        problem.task, problem.bounds, problem.constraints, search=Search(candidates=1 << 10, starts=2)
+    ).best.linkage
 
 
 @pytest.mark.parametrize("linkage", PUBLISHED)

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from analysis.synthesis import (
     USUAL,
+    Constraint,
     FullTurn,
     Grashof,
     InfeasibleError,
@@ -24,20 +25,22 @@ from analysis.synthesis import (
     PrecisionPoints,
     Require,
     RockerFunction,
+    Search,
     SliderUnknown,
     SynthesisInterrupted,
     TargetPath,
+    Task,
     TimedPath,
     UntimedPath,
+    normal_form,
     synthesize,
     turn,
 )
 from analysis.synthesis import black_box as module
 from analysis.synthesis.black_box import BlackBox, by_differential_evolution, by_simplex, initial_simplex
-from analysis.synthesis.constraints import Constraint, limits_of
+from analysis.synthesis.constraints import limits_of
 from analysis.synthesis.polish import Polished, quality_of
-from analysis.synthesis.program import start_of
-from analysis.synthesis.tasks import Task, normal_form
+from analysis.synthesis.starts import start_of
 from linkwork.errors import InputError
 from tests.linkages import drawn
 
@@ -251,7 +254,7 @@ class TestSearch:
             ground_length=0.1, crank_length=0.03, coupler_length=0.09, rocker_length=0.07, crank_phase=0.8
         )
         task = RockerFunction(angle=linkage.rocker_angle(turn(24)))
-        result = synthesize(task, method=method, starts=8)
+        result = synthesize(task, search=Search(method=method, starts=8))
         assert result.best.evaluation.worst < 0.02
         assert result.method == method
         assert result.starts == 8
@@ -265,7 +268,7 @@ class TestSearch:
         normal = normal_form(task)
         limits = limits_of(task, normal, None, USUAL)
         one, again, two, other = (
-            METHODS[method](normal, limits, seed=seed, starts=2, n_jobs=n)
+            METHODS[method](normal, limits, Search(seed=seed, starts=2, n_jobs=n))
             for seed, n in ((1, 1), (1, 1), (1, 2), (2, 1))
         )
 
@@ -288,7 +291,7 @@ class TestSearch:
         ids=["closed", "open", "points", "poses"],
     )
     def test_untimed_tasks_are_answered(self, method: Any, task: Task) -> None:
-        solution = synthesize(task, method=method, starts=2, constraints=[FullTurn(), SMALL]).best
+        solution = synthesize(task, search=Search(method=method, starts=2), constraints=[FullTurn(), SMALL]).best
         assert solution.evaluation.worst < 0.1
         assert solution.verdicts.order
 
@@ -296,7 +299,9 @@ class TestSearch:
         pytest.importorskip("casadi")
         constraints = [LeastTransmission(), SMALL]
         errors = {
-            method: synthesize(TASK, method=method, constraints=constraints, starts=4, candidates=1 << 12).best.error
+            method: synthesize(
+                TASK, search=Search(method=method, starts=4, candidates=1 << 12), constraints=constraints
+            ).best.error
             for method in ("scan", "differential-evolution", "simplex")
         }
         assert errors["scan"] < errors["differential-evolution"]
@@ -308,7 +313,7 @@ class TestSearch:
         )
         task = RockerFunction(angle=linkage.rocker_angle(turn(24)) + 0.01 * np.sin(3.0 * turn(24)))
         normal = normal_form(task)
-        done = by_simplex(normal, limits_of(task, normal, None, USUAL), seed=0, starts=6)
+        done = by_simplex(normal, limits_of(task, normal, None, USUAL), search=Search(seed=0, starts=6))
         best = done.kept[0].start.quality
         assert 1 <= done.reaching(best) <= 6
         assert done.reaching(0.5 * best) == 0
@@ -319,7 +324,7 @@ class TestSearch:
     def test_what_cannot_be_is_said_by_name(self, method: Any) -> None:
         impossible = Require(function=lambda p: 2.0 - math.cos(p.point_angle), name="a cosine of two")
         with pytest.raises(InfeasibleError, match="violates the a cosine of two by 1"):
-            synthesize(TASK, method=method, starts=2, constraints=[impossible])
+            synthesize(TASK, search=Search(method=method, starts=2), constraints=[impossible])
 
     @pytest.mark.parametrize("method", METHODS)
     @pytest.mark.parametrize(
@@ -335,7 +340,7 @@ class TestSearch:
     def test_a_requirement_without_a_value_is_violated(self, method: Any, function: Any) -> None:
         """Crank lengths from 90 mm on have one: what is below is no error, and no solution."""
         constraints = [SMALL, Require(function=function, name="own")]
-        found = synthesize(TASK, method=method, starts=2, constraints=constraints)
+        found = synthesize(TASK, search=Search(method=method, starts=2), constraints=constraints)
         assert found.best.linkage.crank_length > 0.0899
 
     @pytest.mark.parametrize("method", METHODS)
@@ -343,7 +348,7 @@ class TestSearch:
         linkage = drawn(np.random.default_rng(3), least=0.7)
         bounds = {n: (v, v) for n, v in linkage.values().items() if n not in ("branch", "output_angle")}
         task = TimedPath(points=linkage.path(turn(9)) + 1e-3)
-        found = synthesize(task, bounds, (), method=method, starts=2)
+        found = synthesize(task, bounds, (), search=Search(method=method, starts=2))
         assert found.best.error == pytest.approx(9 * 2e-6, rel=1e-9)
 
     @pytest.mark.parametrize("method", METHODS)
@@ -358,12 +363,12 @@ class TestSearch:
 
         monkeypatch.setattr(module.BlackBox, "answer", answer)
         with pytest.raises(SynthesisInterrupted, match="stopped after 1 of 50 searches") as caught:
-            synthesize(TASK, method=method, starts=50, constraints=[SMALL])
+            synthesize(TASK, search=Search(method=method, starts=50), constraints=[SMALL])
         assert caught.value.synthesis is not None
         assert not caught.value.synthesis.complete
 
     def test_bad_calls(self) -> None:
         with pytest.raises(InputError, match="searches linkages with a fixed pivot: use 'scan'"):
-            synthesize(TASK, method="simplex", pivot=SliderUnknown(harmonics=1))
+            synthesize(TASK, search=Search(method="simplex"), pivot=SliderUnknown(harmonics=1))
         with pytest.raises(InputError, match="0 cores"):
-            synthesize(TASK, method="simplex", n_jobs=0)
+            synthesize(TASK, search=Search(method="simplex", n_jobs=0))

@@ -11,9 +11,8 @@ import pytest
 
 from analysis import simulate
 from analysis.mechanisms import mechanism_of
-from analysis.run.case import PUBLISHED
+from analysis.run import PUBLISHED, Harmonics, Piecewise, TorsionBar
 from analysis.run.case_files import load_case, load_parameters, parameters_from, parameters_to, save_parameters
-from analysis.run.inputs import Harmonics, Piecewise, TorsionBar
 from linkwork.errors import InputError, MissingParameterError, ParameterError, UnknownNameError
 from linkwork.five_bar.published import TABLE_3_1
 

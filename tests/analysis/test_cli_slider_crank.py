@@ -13,7 +13,7 @@ from matplotlib.text import Text
 
 from analysis import cli, figures
 from analysis.cli import slider_crank
-from analysis.files import io
+from analysis.run.case_files import save_parameters
 from analysis.slider_crank import ConstantShift, comparison, force_turn
 from linkwork.five_bar.published import TABLE_3_1
 from linkwork.slider_crank.published import CRANK_SPEED, INCH, parameters
@@ -103,7 +103,7 @@ class TestInfo:
 class TestParameterFiles:
     @pytest.mark.parametrize("ending", ["toml", "json"])
     def test_a_file_is_read(self, linkwork, tmp_path, ending):
-        io.save_parameters(tmp_path / f"mine.{ending}", replace(parameters(30.0), rod_length=1.5))
+        save_parameters(tmp_path / f"mine.{ending}", replace(parameters(30.0), rod_length=1.5))
         result = linkwork("info", f"mine.{ending}", "--shift", "1 in")
         assert result.exit_code == 0, result.output
         assert rows(result.output)["crank a1, rod a2"] == ["0.3048 m, 1.5 m"]
@@ -113,7 +113,7 @@ class TestParameterFiles:
         assert rows(result.output)["shift S1"] == ["0 m"]
 
     def test_what_a_file_does_not_say_is_told(self, linkwork, tmp_path):
-        io.save_parameters(tmp_path / "mine.toml", replace(parameters(30.0), groove_amplitude=0.01))
+        save_parameters(tmp_path / "mine.toml", replace(parameters(30.0), groove_amplitude=0.01))
         said = " ".join(linkwork("forces", "mine.toml", "--points", 3, "--no-plot", "--units", "inch").stderr.split())
         assert "S1 = 0 in (--shift), no groove (--groove), a crank speed of 50 rpm (--speed)" in said
         assert "rpm" not in linkwork("info", "mine.toml").stderr
@@ -121,7 +121,7 @@ class TestParameterFiles:
         assert linkwork("info", "mine.toml", "--groove", "shaft").stderr == ""
 
     def test_a_file_of_the_other_mechanism(self, linkwork, tmp_path):
-        io.save_parameters(tmp_path / "five.toml", TABLE_3_1)
+        save_parameters(tmp_path / "five.toml", TABLE_3_1)
         result = linkwork("info", "five.toml")
         assert result.exit_code == cli.WRONG
         assert (
@@ -513,7 +513,7 @@ def test_what_is_wrong_is_told_in_a_sentence(linkwork, tmp_path, arguments, code
 
 
 def test_a_file_and_a_published_case_exclude_each_other(linkwork, tmp_path):
-    io.save_parameters(tmp_path / "mine.toml", parameters(30.0))
+    save_parameters(tmp_path / "mine.toml", parameters(30.0))
     result = linkwork("info", "mine.toml", "--published", "rahman-ideal")
     assert result.exit_code == 2
     assert "give either a file of parameters or --published NAME" in result.stderr

@@ -15,13 +15,21 @@ from click.testing import CliRunner, Result
 from analysis import cli
 from analysis import motion as control
 from analysis.cli import slider
-from analysis.motion.cases import SliderCase, linkage_from_csv, load_slider_case
-from analysis.motion.motion import motion_of_plant
+from analysis.motion import SliderCase, linkage_from_csv, load_slider_case, motion_of_plant
 from analysis.numerics.fourier import FourierSeries
+from analysis.run import simulate
 from analysis.run.case_files import load_case, load_parameters
-from analysis.run.simulate import simulate
-from analysis.synthesis import Linkage, SecondCrank, SliderMotion, SynthesisInterrupted, TimedPath, evaluate, synthesize
-from analysis.synthesis.tasks import turn
+from analysis.synthesis import (
+    Linkage,
+    Search,
+    SecondCrank,
+    SliderMotion,
+    SynthesisInterrupted,
+    TimedPath,
+    evaluate,
+    synthesize,
+    turn,
+)
 from linkwork.errors import InputError, LinkworkError, ParameterError
 
 pytest.importorskip("casadi")
@@ -146,7 +154,7 @@ def test_what_is_written_runs_and_reproduces_the_motion(linkwork, tmp_path) -> N
     assert again.exit_code == 0, again.output
 
 
-def test_the_numbers_reported_are_those_of_the_motion(linkwork, tmp_path) -> None:
+def test_the_numbers_told_are_those_of_the_motion(linkwork, tmp_path) -> None:
     result = linkwork(tables(drive={"speed": "120 rpm"}), "--no-plots")
     columns = csv(tmp_path / "out" / "motion.csv")
     force = columns["slider.force [N]"]
@@ -212,7 +220,7 @@ def test_the_slider_is_made_as_the_case_says(tmp_path) -> None:
         "slider_coulomb_friction": "2 N",
         "slider_mass": "1 kg",
     }
-    made = read(tmp_path, tables(make=make)).synthesis.make.moving(BASE)
+    made = read(tmp_path, tables(make=make)).five_bar(BASE)
     assert (made.slider_damping, made.slider_stiffness, made.slider_coulomb_friction, made.slider_mass) == (
         20,
         300,
@@ -220,7 +228,7 @@ def test_the_slider_is_made_as_the_case_says(tmp_path) -> None:
         1,
     )
     # a pivot that is to move is not held, unlike that of a four-bar
-    free = read(tmp_path, tables(make={})).synthesis.make.moving(BASE)
+    free = read(tmp_path, tables(make={})).five_bar(BASE)
     assert free.slider_stiffness == free.slider_damping == 0.0
 
 
@@ -277,7 +285,7 @@ def test_the_linkage_is_found_first_or_read_from_what_synthesize_wrote(linkwork,
     del case["linkage"]
     found = read(tmp_path, case)
     first = found.four_bar()
-    result = synthesize(wanted, constraints=found.synthesis.constraints, starts=4, candidates=4096)
+    result = synthesize(wanted, constraints=found.synthesis.constraints, search=Search(starts=4, candidates=4096))
     assert first.error == pytest.approx(result.best.error, rel=1e-12)
     result.to_csv(tmp_path / "solutions.csv")
     for rank in range(1, len(result.solutions) + 1):
@@ -432,7 +440,7 @@ def test_a_list_of_linkages_is_checked(tmp_path) -> None:
     good = tmp_path / "solutions.csv"
     task = TimedPath(points=BASE.path(turn(12)))
     assert evaluate(task, BASE).error < 1e-20
-    synthesize(task, starts=2, candidates=1024).to_csv(good)
+    synthesize(task, search=Search(starts=2, candidates=1024)).to_csv(good)
     with pytest.raises(InputError, match="none of rank 99"):
         linkage_from_csv(good, 99)
     text = good.read_text(encoding="utf-8")
@@ -451,8 +459,8 @@ def test_the_motion_is_read_with_its_units(tmp_path) -> None:
         "acceleration": "50 mm/rad^2",
     }
     chosen = read(tmp_path, tables(slider=motion))
-    assert chosen.slider.harmonics == (1, 3)
-    u = chosen.slider.unknown(1)
+    assert chosen.harmonics == (1, 3)
+    u = chosen.unknown
     assert u.guide_angle == pytest.approx((radians(20.0), radians(20.0)))
     assert u.position == pytest.approx((-0.01, 0.02))
     assert (u.stroke, u.speed, u.acceleration) == pytest.approx((0.025, 0.03, 0.05))

@@ -45,7 +45,7 @@ def _check_cases(fmu: str, names: list[str], method: str) -> list[Any]:
     import numpy as np
 
     from analysis import Function, Harmonics, Inputs, TorsionBar, compare, cosimulate, ramp, simulate, steps
-    from analysis.run.checks import CASES
+    from analysis.run import CASES
     from linkwork.five_bar.parameters import InitialState
     from linkwork.five_bar.published import TABLE_3_1
 

@@ -12,7 +12,8 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from analysis.run.hamming import BACK_VALUES, Hamming, Point
+from analysis.run import Hamming
+from analysis.run.hamming import BACK_VALUES, Point
 
 LOOSE = {"rtol": 1e3, "atol": 1e9}
 

@@ -9,20 +9,9 @@ import numpy as np
 import pytest
 from scipy.interpolate import CubicSpline
 
-from analysis.run.inputs import (
-    Function,
-    Harmonics,
-    InductionMotor,
-    Inputs,
-    Piecewise,
-    TorsionBar,
-    align,
-    encode,
-    ramp,
-    steps,
-    table,
-)
-from analysis.run.simulate import channels
+from analysis.run import Function, Harmonics, InductionMotor, Inputs, Piecewise, TorsionBar, ramp, steps, table
+from analysis.run.inputs import align, encode
+from analysis.run.simulation import channels
 from linkwork.errors import InputError
 
 REST = np.zeros(4)

@@ -12,10 +12,10 @@ from hypothesis import strategies as st
 from scipy.optimize import minimize
 
 from analysis import Inputs, simulate
-from analysis.motion.inverse import best_spring, inverse_dynamics
+from analysis.motion import best_spring, inverse_dynamics
 from analysis.numerics.fourier import FourierSeries
 from analysis.periodic.orbits import find_orbit
-from analysis.run.inputs import table
+from analysis.run import table
 from linkwork.errors import AssemblyError, InputError
 from linkwork.five_bar import dynamics, kinematics
 from linkwork.five_bar.parameters import InitialState

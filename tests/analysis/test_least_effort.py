@@ -11,8 +11,7 @@ import pytest
 from scipy.optimize import minimize
 
 from analysis import simulate
-from analysis.motion.inverse import best_spring, inverse_dynamics
-from analysis.motion.tracking import track
+from analysis.motion import Collocation, MotionLimits, TrackingController, best_spring, inverse_dynamics, track
 from analysis.numerics.fourier import FourierSeries
 from analysis.periodic.orbits import find_orbit
 from linkwork.errors import AssemblyError, InputError
@@ -21,7 +20,8 @@ from linkwork.five_bar.published import SETS, TABLE_3_1
 
 pytest.importorskip("casadi")
 
-from analysis.motion.least_effort import EffortError, UnattainableError, _shortest_way, least_effort
+from analysis.motion import EffortError, UnattainableError, least_effort
+from analysis.motion.collocation import shortest_way
 
 SPEED = SETS["rig-2-spring-c"].crank_speed
 RIG = replace(SETS["rig-2-spring-c"].parameters, coupler_point_distance=0.2, coupler_point_angle=0.5)
@@ -138,14 +138,19 @@ def test_a_fourier_series_under_scipy_finds_no_better(within) -> None:
 def test_the_residual_falls_with_the_order_of_the_method(points, degree) -> None:
     """A polynomial of degree d is good to the order d + 1 between its nodes; without active bounds all is smooth."""
     runs = [
-        least_effort(RIG, SPEED, TARGET, 0.02, intervals=n, points=points, degree=degree, halvings=0) for n in (20, 40)
+        least_effort(
+            RIG, SPEED, TARGET, 0.02, collocation=Collocation(intervals=n, points=points, degree=degree, halvings=0)
+        )
+        for n in (20, 40)
     ]
     assert np.log2(runs[0].deviation / runs[1].deviation) == pytest.approx(degree + 1, abs=0.15)
 
 
 def test_the_mesh_figures_are_the_change_by_halving() -> None:
-    coarse, fine = (least_effort(RIG, SPEED, TARGET, 1e-3, intervals=n, halvings=0) for n in (20, 40))
-    checked = least_effort(RIG, SPEED, TARGET, 1e-3, intervals=20, halvings=1)
+    coarse, fine = (
+        least_effort(RIG, SPEED, TARGET, 1e-3, collocation=Collocation(intervals=n, halvings=0)) for n in (20, 40)
+    )
+    checked = least_effort(RIG, SPEED, TARGET, 1e-3, collocation=Collocation(intervals=20, halvings=1))
     assert (checked.intervals, coarse.mesh_effort, coarse.mesh_position) == (40, inf, inf)
     assert checked.effort == pytest.approx(fine.effort, rel=1e-7)
     assert checked.mesh_effort == pytest.approx(abs(fine.effort - coarse.effort) / fine.effort, rel=1e-3)
@@ -156,16 +161,20 @@ def test_the_mesh_figures_are_the_change_by_halving() -> None:
 
 def test_bounds_on_the_way_are_kept() -> None:
     """Each costs effort, and each is met with equality somewhere."""
-    free = least_effort(RIG, SPEED, TARGET, 1e-3, halvings=0)
+    free = least_effort(RIG, SPEED, TARGET, 1e-3, collocation=Collocation(halvings=0))
     low, fast, strong = -0.0036, 0.2, 11.5
     assert free.position.min() < low - 2e-4
     assert np.abs(free.velocity).max() > fast
     assert np.abs(free.force).max() > strong
-    stroke = least_effort(RIG, SPEED, TARGET, 1e-3, stroke=(low, 0.01), halvings=0)
+    stroke = least_effort(
+        RIG, SPEED, TARGET, 1e-3, limits=MotionLimits(stroke=(low, 0.01)), collocation=Collocation(halvings=0)
+    )
     assert stroke.position.min() == pytest.approx(low, abs=1e-7)
-    speed = least_effort(RIG, SPEED, TARGET, 1e-3, speed=fast, halvings=0)
+    speed = least_effort(RIG, SPEED, TARGET, 1e-3, limits=MotionLimits(speed=fast), collocation=Collocation(halvings=0))
     assert np.abs(speed.velocity).max() == pytest.approx(fast, rel=1e-5)
-    force = least_effort(RIG, SPEED, TARGET, 1e-3, force=strong, halvings=0)
+    force = least_effort(
+        RIG, SPEED, TARGET, 1e-3, limits=MotionLimits(force=strong), collocation=Collocation(halvings=0)
+    )
     assert np.abs(force.force).max() == pytest.approx(strong, rel=1e-5)
     assert min(stroke.effort, speed.effort, force.effort) > free.effort * (1.0 + 1e-4)
 
@@ -181,8 +190,10 @@ def test_the_transmission_angle_is_kept() -> None:
         at = zip(found.crank_angle.tolist(), found.position.tolist())
         return np.array([kinematics.transmission_angle(kinematics.position(th2, u, c), c) for th2, u in at])
 
-    free = least_effort(p, 44.0, out, 0.03, halvings=0)
-    kept = least_effort(p, 44.0, out, 0.03, halvings=0, transmission=least)
+    free = least_effort(p, 44.0, out, 0.03, collocation=Collocation(halvings=0))
+    kept = least_effort(
+        p, 44.0, out, 0.03, collocation=Collocation(halvings=0), limits=MotionLimits(transmission=least)
+    )
     assert np.abs(np.sin(angles(free))).min() < sin(least) - 0.01
     assert np.abs(np.sin(angles(kept))).min() == pytest.approx(sin(least), abs=1e-6)
     assert kept.effort > free.effort
@@ -201,14 +212,14 @@ def test_a_spring_designed_along_saves_effort(within) -> None:
     assert found.parameters.slider_spring_free_position == pytest.approx(best.free_position, rel=2e-2)
     # and a free position that is bounded is kept
     for span, free in (((0.004, 0.05), 0.004), ((-0.05, 0.0), 0.0)):
-        held = least_effort(RIG, SPEED, TARGET, bound, spring=span, halvings=0)
+        held = least_effort(RIG, SPEED, TARGET, bound, spring=span, collocation=Collocation(halvings=0))
         assert held.parameters.slider_spring_free_position == pytest.approx(free, abs=1e-6)
         assert found.effort < 0.99 * held.effort
 
 
 @pytest.mark.parametrize("cost", ["power", "positive power"])
 def test_least_power(cost, within) -> None:
-    found = least_effort(RIG, SPEED, TARGET, 1e-3, cost=cost, force=20.0)
+    found = least_effort(RIG, SPEED, TARGET, 1e-3, cost=cost, limits=MotionLimits(force=20.0))
 
     def power(one):
         theta = 2.0 * pi * np.arange(4000) / 4000
@@ -221,7 +232,7 @@ def test_least_power(cost, within) -> None:
     # bound tightly, it is the power of the exact motion, which is negative for a part of the turn
     exact = inverse_dynamics(RIG, MOTION, SPEED)
     work = exact.positive_work - (exact.negative_work if cost == "power" else 0.0)
-    tight = least_effort(RIG, SPEED, TARGET, 1e-6, cost=cost, halvings=0)
+    tight = least_effort(RIG, SPEED, TARGET, 1e-6, cost=cost, collocation=Collocation(halvings=0))
     assert exact.negative_work < -0.1 * exact.positive_work
     assert tight.effort == pytest.approx(work / exact.period, rel=2e-2)
 
@@ -236,7 +247,9 @@ def test_a_rocker_function_with_gravity_and_a_load() -> None:
     theta = 2.0 * pi * np.arange(72) / 72
     samples = rocker_of(p, MOTION)(theta)
     exact = inverse_dynamics(p, MOTION, 44.0, load=load)
-    tight, loose = (least_effort(p, 44.0, samples, bound, load=load, halvings=0) for bound in (1e-4, 1e-2))
+    tight, loose = (
+        least_effort(p, 44.0, samples, bound, load=load, collocation=Collocation(halvings=0)) for bound in (1e-4, 1e-2)
+    )
     assert tight.effort == pytest.approx(exact.rms_force, rel=1e-2)
     assert loose.effort < 0.95 * tight.effort
     assert loose.error.max() == pytest.approx(1e-2, rel=1e-5)
@@ -248,19 +261,19 @@ def test_a_rocker_function_with_gravity_and_a_load() -> None:
     wanted = rocker_of(p, MOTION)(loose.crank_angle.tolist())
     assert loose.error == pytest.approx(np.abs(np.subtract(angle, wanted)), abs=1e-5)
     # whole turns of the target do not matter
-    turned = least_effort(p, 44.0, np.add(samples, 2.0 * pi), 1e-2, load=load, halvings=0)
+    turned = least_effort(p, 44.0, np.add(samples, 2.0 * pi), 1e-2, load=load, collocation=Collocation(halvings=0))
     assert turned.effort == pytest.approx(loose.effort, rel=1e-6)
 
 
 def test_the_motion_found_can_be_followed(within) -> None:
     one = within[1e-3]
-    result = track(RIG, one.motion(20), crank_speed=SPEED, period=5e-4, revolutions=8)
+    result = track(TrackingController(RIG, one.motion(20), 5e-4), crank_speed=SPEED, revolutions=8)
     metrics = result.metrics()
     assert metrics.rms_force == pytest.approx(one.effort, rel=1e-2)
     assert metrics.rms_error < 1e-5
 
 
-def test_the_shortest_way_is_that_of_all_closed_ways() -> None:
+def test_theshortest_way_is_that_of_all_closed_ways() -> None:
     """Of 4 positions at 6 angles there are 4096 closed ways; and its two limits of free and of dear travel."""
     rng = np.random.default_rng(3)
     miss, u = rng.random((6, 4)), np.arange(4.0)
@@ -271,7 +284,7 @@ def test_the_shortest_way_is_that_of_all_closed_ways() -> None:
             return sum(miss[i, k] + travel[way[i - 1], k] for i, k in enumerate(way))
 
         best = min(product(range(4), repeat=6), key=cost)
-        assert tuple(_shortest_way(miss, travel)) == best
+        assert tuple(shortest_way(miss, travel)) == best
     assert best == (int(miss.sum(axis=0).argmin()),) * 6
 
 
@@ -279,13 +292,13 @@ def test_what_cannot_be_is_told() -> None:
     with pytest.raises(
         UnattainableError, match=r"bound of 0\.001 m cannot be kept: at crank angle \d+\.0 deg the error is at"
     ):
-        least_effort(RIG, SPEED, TARGET, 1e-3, stroke=(-0.002, 0.006))
+        least_effort(RIG, SPEED, TARGET, 1e-3, limits=MotionLimits(stroke=(-0.002, 0.006)))
     with pytest.raises(UnattainableError, match=r"cannot be joined with a transmission angle of 5 deg"):
-        least_effort(RIG, SPEED, TARGET, 1e-3, stroke=(5.0, 6.0))
+        least_effort(RIG, SPEED, TARGET, 1e-3, limits=MotionLimits(stroke=(5.0, 6.0)))
     with pytest.raises(
         UnattainableError, match=r"and all other bounds: IPOPT ended after \d+ iterations with Inf"
     ) as caught:
-        least_effort(RIG, SPEED, TARGET, 1e-3, force=5.0)
+        least_effort(RIG, SPEED, TARGET, 1e-3, limits=MotionLimits(force=5.0))
     assert caught.value.status == "Infeasible_Problem_Detected"
     assert isinstance(caught.value, EffortError)
     with pytest.raises(InputError, match="P is the crank pin, which no slider moves"):
@@ -299,24 +312,33 @@ def test_what_cannot_be_is_told() -> None:
     [
         ({"bound": 0.0}, "bound of the error is 0"),
         ({"crank_speed": -1.0}, "crank speed is -1"),
-        ({"speed": 0.0}, "bound of the speed is 0"),
-        ({"force": -2.0}, "bound of the force is -2"),
-        ({"stroke": (0.1, -0.1)}, "two increasing numbers"),
-        ({"transmission": 2.0}, "least transmission angle is 2"),
         ({"spring": (0.1, -0.1)}, "free position between"),
-        ({"degree": 5}, "degree of the collocation is 5"),
         ({"cost": "work"}, "cost is 'work': it must be one of force, power, positive power"),
-        ({"points": "lobatto"}, "points is 'lobatto'"),
-        ({"intervals": 3}, "3 intervals, 1 halvings"),
-        ({"intervals": 20.5}, "20.5 intervals: it must be a whole number"),
-        ({"halvings": 0.5}, "0.5 halvings: it must be a whole number"),
-        ({"degree": 2.5}, "2.5 as the degree: it must be a whole number"),
         ({"target": np.zeros((8, 3))}, r"target of shape \(8, 3\)"),
         ({"target": np.full(8, np.nan)}, "a value of the target is not finite"),
         ({"target": lambda theta: np.zeros(3)}, r"gives values of shape \(3,\) for 1 crank angles"),
     ],
 )
 def test_bad_problems_are_told(options, message) -> None:
-    problem = {"crank_speed": SPEED, "target": TARGET, "bound": 1e-3} | options
     with pytest.raises(InputError, match=message):
-        least_effort(RIG, **problem)
+        least_effort(RIG, **{"crank_speed": SPEED, "target": TARGET, "bound": 1e-3} | options)
+
+
+@pytest.mark.parametrize(
+    ("settings", "options", "message"),
+    [
+        (MotionLimits, {"speed": 0.0}, "bound of the speed is 0"),
+        (MotionLimits, {"force": -2.0}, "bound of the force is -2"),
+        (MotionLimits, {"stroke": (0.1, -0.1)}, "two increasing numbers"),
+        (MotionLimits, {"transmission": 2.0}, "least transmission angle is 2"),
+        (Collocation, {"degree": 5}, "degree of the collocation is 5"),
+        (Collocation, {"points": "lobatto"}, "points is 'lobatto'"),
+        (Collocation, {"intervals": 3}, "3 intervals, 1 halvings"),
+        (Collocation, {"intervals": 20.5}, "20.5 intervals: it must be a whole number"),
+        (Collocation, {"halvings": 0.5}, "0.5 halvings: it must be a whole number"),
+        (Collocation, {"degree": 2.5}, "2.5 as the degree: it must be a whole number"),
+    ],
+)
+def test_bad_settings_are_refused(settings, options, message) -> None:
+    with pytest.raises(InputError, match=message):
+        settings(**options)

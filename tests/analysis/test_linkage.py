@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from analysis.numerics.fourier import FourierSeries
-from analysis.run.simulate import simulate
+from analysis.run import simulate
 from analysis.synthesis import Linkage, SecondCrank, SliderMotion, Verdicts, judge, turn
 from linkwork.errors import AssemblyError, ParameterError
 from linkwork.five_bar import kinematics

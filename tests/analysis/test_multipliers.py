@@ -15,7 +15,7 @@ import pytest
 from hypothesis import given, settings
 from scipy.integrate import solve_ivp
 
-from analysis.run.hamming import Hamming
+from analysis.run import Hamming
 from linkwork.five_bar import dynamics
 from linkwork.five_bar.parameters import InitialState
 from linkwork.five_bar.published import SETS, TABLE_3_1

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from math import radians
 from typing import Any
 
@@ -16,6 +17,7 @@ from analysis.numerics.fourier import FourierSeries
 from analysis.synthesis import (
     USUAL,
     Assembly,
+    Constraint,
     CrankUnknown,
     FullTurn,
     Grashof,
@@ -27,22 +29,26 @@ from analysis.synthesis import (
     PivotRegion,
     Require,
     RockerFunction,
+    Search,
     SecondCrank,
     SliderMotion,
     SliderUnknown,
     Solution,
     TargetPath,
+    Task,
     TimedPath,
     UntimedPath,
     evaluate,
+    normal_form,
     synthesize,
     turn,
 )
-from analysis.synthesis.constraints import Constraint, limits_of
+from analysis.synthesis.constraints import limits_of
 from analysis.synthesis.polish import fit_least_squares, polish, quality_of, residuals
-from analysis.synthesis.program import Program, Start, linkage_of, start_of
+from analysis.synthesis.program import Program
 from analysis.synthesis.scan import scan
-from analysis.synthesis.tasks import Normal, Task, normal_form
+from analysis.synthesis.starts import Start, linkage_of, start_of
+from analysis.synthesis.tasks import Normal
 from linkwork.errors import InputError, ParameterError
 from tests.linkages import drawn
 
@@ -60,8 +66,11 @@ TASK = TimedPath(points=ellipse())
 SMALL = LargestLink(length=0.5)
 
 
-def best(*constraints: Constraint, task: Task = TASK, **more: Any) -> Solution:
-    return synthesize(task, constraints=constraints, **{"candidates": 1 << 13, "starts": 4} | more).best
+FEW = Search(candidates=1 << 13, starts=4)
+
+
+def best(*constraints: Constraint, task: Task = TASK, search: Search = FEW, **more: Any) -> Solution:
+    return synthesize(task, constraints=constraints, search=search, **more).best
 
 
 class TestOptimum:
@@ -385,7 +394,7 @@ class TestMovedPivot:
 
     def test_the_slider_keeps_stroke_speed_and_acceleration(self) -> None:
         fixed = best(*USUAL, LargestLink(length=0.2))
-        few: dict[str, Any] = {"starts": 1, "candidates": 64, "guesses": [fixed]}
+        few: dict[str, Any] = {"search": Search(starts=1, candidates=64), "guesses": [fixed]}
         free = best(*USUAL, LargestLink(length=0.2), pivot=SliderUnknown(harmonics=2), **few)
         bounded = best(
             *USUAL,
@@ -409,7 +418,7 @@ class TestMovedPivot:
             SliderUnknown(harmonics=1),
             CrankUnknown(ratio=1, length=(0.001, 0.05), harmonics=1, speed=0.5),
         ):
-            solution = best(*USUAL, LargestLink(length=0.3), pivot=unknown, starts=1)
+            solution = best(*USUAL, LargestLink(length=0.3), pivot=unknown, search=replace(FEW, starts=1))
             normal = normal_form(TASK)
             limits = limits_of(TASK, normal, None, (*USUAL, LargestLink(length=0.3)))
             again = Program(normal, limits, unknown).solve(start_of(solution.linkage, normal, unknown))

@@ -22,15 +22,19 @@ from analysis.synthesis import (
     LeastTransmission,
     Linkage,
     RockerFunction,
+    Search,
     Synthesis,
     TimedPath,
     UntimedPath,
+    area_between,
     evaluate,
+    normal_form,
+    straightest_part,
+    straightness,
     synthesize,
     trade_off,
     turn,
 )
-from analysis.synthesis.areas import area_between, straightest_part, straightness
 from analysis.synthesis.published import (
     PACKAGING_FLATNESS,
     PACKAGING_OFFSET_CM,
@@ -41,7 +45,6 @@ from analysis.synthesis.published import (
     packaging_path,
     rocker_function,
 )
-from analysis.synthesis.tasks import normal_form
 from tests import published
 
 FloatArray = NDArray[np.float64]
@@ -105,7 +108,7 @@ def error_of(name: str, row: tuple[float, ...], side: int = 1, offset_deg: float
 @cache
 def solved(name: str) -> Synthesis:
     p = PROBLEMS[name]
-    return synthesize(p.task, p.bounds, p.constraints, starts=STARTS, candidates=CANDIDATES)
+    return synthesize(p.task, p.bounds, p.constraints, search=Search(starts=STARTS, candidates=CANDIDATES))
 
 
 # The printed linkages
@@ -152,7 +155,7 @@ def test_the_rocker_functions_number_of_crank_angles_matters() -> None:
     p = PROBLEMS["rocker"]
     true, least = published.ROCKER_AT_48
     assert p.shown(evaluate(rocker_function(48), p.linkage).error) == pytest.approx(true, abs=0.5)
-    found = synthesize(rocker_function(48), p.bounds, p.constraints, starts=4, candidates=1 << 13).best
+    found = synthesize(rocker_function(48), p.bounds, p.constraints, search=Search(starts=4, candidates=1 << 13)).best
     assert p.shown(found.error) == pytest.approx(least, abs=0.05)
 
 
@@ -243,13 +246,13 @@ def test_packaging_machine_pushes_straight() -> None:
 def test_a_free_mounting_angle() -> None:
     p = PROBLEMS["rocker-weighted"]
     task = rocker_function(72, weighted=True, mounting=True)
-    best = synthesize(task, p.bounds, p.constraints, starts=STARTS, candidates=CANDIDATES).best
+    best = synthesize(task, p.bounds, p.constraints, search=Search(starts=STARTS, candidates=CANDIDATES)).best
     assert window_sum(task, best.linkage) == pytest.approx(published.WINDOW_SUM_MOUNTED, abs=0.05)
     # another output angle is worse: the one found is the best for these links
     for step in (-1e-3, 1e-3):
         other = replace(best.linkage, output_angle=best.linkage.output_angle + step)
         assert evaluate(task, other).error > best.error
-    twice = synthesize(p.task, p.bounds, p.constraints, starts=STARTS, candidates=CANDIDATES).best
+    twice = synthesize(p.task, p.bounds, p.constraints, search=Search(starts=STARTS, candidates=CANDIDATES)).best
     assert twice.linkage.output_angle == 0.0
 
 
@@ -257,7 +260,7 @@ def test_a_free_mounting_angle() -> None:
 def test_error_against_transmission_angle(name: str) -> None:
     p = PROBLEMS[name]
     angles = np.radians([0.0, 30.0, 40.0, 50.0])
-    found = trade_off(p.task, "transmission", angles, constraints=p.constraints, starts=3)
+    found = trade_off(p.task, "transmission", angles, constraints=p.constraints, search=Search(starts=3))
     errors = p.shown(1.0) * np.asarray(found.error.filled(np.nan))
     assert errors[0] <= p.goal
     assert (np.diff(errors) > 0.0).all()

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from analysis.synthesis import (
     Assembly,
+    Constraint,
     FullTurn,
     Grashof,
     InfeasibleError,
@@ -21,16 +22,18 @@ from analysis.synthesis import (
     PrecisionPoints,
     RockerFunction,
     TargetPath,
+    Task,
     TimedPath,
     UntimedPath,
     evaluate,
+    normal_form,
     turn,
 )
-from analysis.synthesis.constraints import Constraint, Limits, limits_of
+from analysis.synthesis.constraints import Limits, limits_of
 from analysis.synthesis.polish import quality_of
-from analysis.synthesis.program import linkage_of
 from analysis.synthesis.scan import SHAPES, Candidates, _placed, _shapes, scan
-from analysis.synthesis.tasks import Normal, Task, normal_form
+from analysis.synthesis.starts import linkage_of
+from analysis.synthesis.tasks import Normal
 
 FloatArray = NDArray[np.float64]
 
@@ -62,7 +65,7 @@ def shape(linkage: Linkage, *, phase: float = 0.0, distance: float = 0.0, direct
 
 def first(candidates: Candidates, normal: Normal) -> Linkage:
     """The first candidate's linkage."""
-    from analysis.synthesis.program import Start
+    from analysis.synthesis.starts import Start
 
     return linkage_of(Start(q=candidates.q[0], branch=candidates.branch), normal)
 

@@ -30,9 +30,9 @@ from analysis import (
     steps,
     table,
 )
-from analysis.run import compiled
+from analysis.run import Event, compiled
 from analysis.run.inputs import encode
-from analysis.run.simulate import SCIPY_METHODS, Event, channels
+from analysis.run.simulation import SCIPY_METHODS, channels
 from linkwork.errors import AssemblyError, InputError, ParameterError
 from linkwork.five_bar import dynamics
 from linkwork.five_bar.kinematics import coefficients, position

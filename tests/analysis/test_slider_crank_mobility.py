@@ -13,12 +13,12 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from linkwork.slider_crank.plant import check_assembly
 
 from analysis.slider_crank import mobility as M
 from linkwork.errors import AssemblyError, InputError, ParameterError
 from linkwork.slider_crank import kinematics as K
 from linkwork.slider_crank import published
+from linkwork.slider_crank.assembly import check_assembly
 from linkwork.slider_crank.parameters import SliderCrankParameters
 from tests import published_rahman as rahman
 from tests.published_rahman import INCH

@@ -16,7 +16,7 @@ import pytest
 from numpy.typing import NDArray
 
 from analysis import simulate
-from analysis.run.inputs import SliderCrankInputs
+from analysis.run import Inputs
 from linkwork.slider_crank import published
 from linkwork.slider_crank.parameters import InitialState, SliderCrankParameters
 
@@ -163,7 +163,7 @@ class Engine:
 
 def ours(name: str, **options: Any) -> Any:
     p, initial, torque, force, load = CASES[name]
-    inputs = SliderCrankInputs(torque=torque, axial_force=force, load=load)
+    inputs = Inputs(torque=torque, axial_force=force, load=load)
     return simulate(p, inputs, initial=initial, stop_time=0.8, step=0.02, tolerance=1e-12, **options)
 
 

@@ -17,9 +17,9 @@ from analysis.linear.linearise import linearise
 from analysis.mechanisms import MECHANISMS, OUTPUT_UNITS
 from analysis.periodic.orbits import drive_of, find_orbit
 from analysis.periodic.resonance import natural_frequency
-from analysis.run.case import Case, published_case
-from analysis.run.checks import CASES as CHECKS
-from analysis.run.inputs import Function, Harmonics, SliderCrankInputs, TorsionBar, encode, steps
+from analysis.run import CASES as CHECKS
+from analysis.run import Case, Function, Harmonics, Inputs, TorsionBar, published_case, steps
+from analysis.run.inputs import encode
 from analysis.youssef.workspace import coupler_curve
 from linkwork.errors import AssemblyError, InputError, ParameterError
 from linkwork.five_bar.parameters import InitialState as FiveBarState
@@ -121,9 +121,7 @@ def test_momentum_gained_is_the_impulse_of_the_forces_from_outside(name: str) ->
 
 
 def test_power_of_the_drives_is_what_the_energy_gains() -> None:
-    inputs = SliderCrankInputs(
-        speed=Harmonics(4.0, [1.0], [3.0], [0.2]), shift_speed=Harmonics(0.0, [0.2], [8.0], [0.0])
-    )
+    inputs = Inputs(speed=Harmonics(4.0, [1.0], [3.0], [0.2]), shift_speed=Harmonics(0.0, [0.2], [8.0], [0.0]))
     result = simulate(PARAMETERS, inputs, initial=INITIAL, stop_time=1.2, step=2e-4, tolerance=1e-11)
     power = (
         result["drive.applied_torque"] * result["crank.speed"]
@@ -138,7 +136,7 @@ def test_power_of_the_drives_is_what_the_energy_gains() -> None:
 
 
 def test_shift_is_held_where_nothing_is_said() -> None:
-    result = simulate(PARAMETERS, SliderCrankInputs(torque=5.0), initial=INITIAL, stop_time=1.0, step=0.05)
+    result = simulate(PARAMETERS, Inputs(torque=5.0), initial=INITIAL, stop_time=1.0, step=0.05)
     assert np.all(result["shift.position"] == INITIAL.shift_position)
     assert np.all(result["shift.velocity"] == 0.0)
     assert np.abs(result["axial.applied_force"]).max() > 0.1
@@ -146,7 +144,7 @@ def test_shift_is_held_where_nothing_is_said() -> None:
 
 def test_groove_makes_the_shift_of_equation_28() -> None:
     p = replace(PARAMETERS, groove_amplitude=0.1, groove_ratio=1.7)
-    result = simulate(p, SliderCrankInputs(torque=5.0, groove=True), stop_time=2.0, step=0.02)
+    result = simulate(p, Inputs(torque=5.0, groove=True), stop_time=2.0, step=0.02)
     phase = 1.7 * result["crank.angle"]
     assert result["shift.position"] == pytest.approx(0.1 * np.sin(phase), abs=1e-15)
     assert result["shift.velocity"] == pytest.approx(0.17 * np.cos(phase) * result["crank.speed"], abs=1e-14)
@@ -154,7 +152,7 @@ def test_groove_makes_the_shift_of_equation_28() -> None:
 
 
 def test_commanded_shift_follows_its_speed() -> None:
-    inputs = SliderCrankInputs(speed=SPEED, shift_speed=Harmonics(0.0, [0.3], [5.0], [0.0]))
+    inputs = Inputs(speed=SPEED, shift_speed=Harmonics(0.0, [0.3], [5.0], [0.0]))
     result = simulate(PARAMETERS, inputs, initial=INITIAL, stop_time=1.0, step=0.05)
     t = result.time
     assert result["shift.velocity"] == pytest.approx(0.3 * np.cos(5.0 * t), abs=1e-8)
@@ -165,15 +163,15 @@ def test_commanded_shift_follows_its_speed() -> None:
 def test_commanded_shift_as_a_function_is_the_same_as_its_harmonics() -> None:
     wave = Function(lambda t, th, s, w, v: 0.3 * cos(5.0 * t), rate=lambda t, th, s, w, v: -1.5 * sin(5.0 * t))
     options: dict[str, Any] = {"initial": INITIAL, "stop_time": 1.0, "step": 0.05, "tolerance": 1e-10}
-    one = simulate(PARAMETERS, SliderCrankInputs(speed=SPEED, shift_speed=wave), **options)
-    other = SliderCrankInputs(speed=SPEED, shift_speed=Harmonics(0.0, [0.3], [5.0], [0.0]))
+    one = simulate(PARAMETERS, Inputs(speed=SPEED, shift_speed=wave), **options)
+    other = Inputs(speed=SPEED, shift_speed=Harmonics(0.0, [0.3], [5.0], [0.0]))
     assert compare(one, simulate(PARAMETERS, other, **options), tolerance=1e-8).agrees
 
 
 @pytest.mark.parametrize("method", ["compiled", "DOP853"])
 def test_jump_of_the_axial_speed_moves_the_free_crank(method: str) -> None:
     # the generalised momentum of the crank, m11 w + m12 v, is conserved across the jump
-    inputs = SliderCrankInputs(torque=0.0, shift_speed=steps([0.0, 0.5], [0.0, 0.4]))
+    inputs = Inputs(torque=0.0, shift_speed=steps([0.0, 0.5], [0.0, 0.4]))
     options: dict[str, Any] = {"initial": INITIAL, "method": method, "tolerance": 1e-11}
     at = {"samples": [0.0, 0.5 - 1e-9, 0.5, 0.6]}
     result = simulate(PARAMETERS, inputs, stop_time=0.6, **at, **options)
@@ -192,18 +190,18 @@ def test_events_are_found_on_outputs_of_the_slider_crank() -> None:
         Event(name="turn", function=lambda t, th, s, w, v: th - 2.0 * pi, stop=True),
     ]
     planar = published.parameters(10.0)
-    result = simulate(planar, SliderCrankInputs(speed=SPEED), stop_time=3.0, step=0.1, events=events)
+    result = simulate(planar, Inputs(speed=SPEED), stop_time=3.0, step=0.1, events=events)
     assert [event.name for event in result.events] == ["dead centre", "turn"]
     # Rahman's a4 = 10 in: 99.28 deg
     assert np.degrees(result.events[0].state[0]) == pytest.approx(99.28, abs=5e-3)
     assert result.time[-1] == pytest.approx(1.2, rel=1e-9)
     with pytest.raises(InputError, match=r"event 'pin' is on 'pin.A.fx': the outputs are crank.angle"):
-        simulate(planar, SliderCrankInputs(), stop_time=1.0, events=[Event(name="pin", output="pin.A.fx")])
+        simulate(planar, Inputs(), stop_time=1.0, events=[Event(name="pin", output="pin.A.fx")])
 
 
 def test_ensemble_is_its_runs_one_by_one() -> None:
     parameters = [published.parameters(a4) for a4 in (0.0, 10.0, 20.0)]
-    inputs = SliderCrankInputs(torque=3.0, axial_force=0.1)
+    inputs = Inputs(torque=3.0, axial_force=0.1)
     ensemble = simulate_many(parameters, inputs, initial=INITIAL, stop_time=0.5, step=0.01, n_jobs=1)
     for p, one in zip(parameters, ensemble):
         alone = simulate(p, inputs, initial=INITIAL, stop_time=0.5, step=0.01)
@@ -215,7 +213,7 @@ def test_ensemble_is_its_runs_one_by_one() -> None:
 
 
 def test_a_run_that_leaves_the_range_of_assembly_ends_at_its_limit() -> None:
-    inputs = SliderCrankInputs(speed=SPEED, shift_speed=2.0)
+    inputs = Inputs(speed=SPEED, shift_speed=2.0)
     result = simulate(PARAMETERS, inputs, initial=INITIAL, stop_time=3.0, step=0.01)
     other = simulate(PARAMETERS, inputs, initial=INITIAL, stop_time=3.0, step=0.01, method="DOP853")
     for ended in (result, other):
@@ -235,7 +233,7 @@ def test_a_run_that_leaves_the_range_of_assembly_ends_at_its_limit() -> None:
         (
             {"inputs": Inputs(speed=1.0)},
             InputError,
-            "with parameters of the slider-crank it must be .*SliderCrankInputs",
+            "with parameters of the slider-crank it must be .*Inputs",
         ),
         ({"initial": FiveBarState()}, InputError, "initial is linkwork.five_bar.*must be linkwork.slider_crank"),
         (
@@ -245,36 +243,36 @@ def test_a_run_that_leaves_the_range_of_assembly_ends_at_its_limit() -> None:
         ),
         ({"tolerance": 1.0}, ParameterError, "solver.tolerance"),
         (
-            {"inputs": SliderCrankInputs(load=Function(lambda t, th, s, w, v: float("nan")))},
+            {"inputs": Inputs(load=Function(lambda t, th, s, w, v: float("nan")))},
             InputError,
             "the input load is not a finite number at t = 0 s, crank angle 0 rad .* and axial shift",
         ),
         (
-            {"inputs": SliderCrankInputs(shift_speed=Harmonics(0.0, [1e200], [1e200], [0.0]), torque=1.0)},
+            {"inputs": Inputs(shift_speed=Harmonics(0.0, [1e200], [1e200], [0.0]), torque=1.0)},
             InputError,
             "the input (shift_speed|rate of shift_speed)",
         ),
     ],
 )
 def test_what_is_not_usable_is_refused(arguments: dict[str, Any], error: type, said: str) -> None:
-    settings: dict[str, Any] = {"inputs": SliderCrankInputs(), "initial": INITIAL} | arguments
+    settings: dict[str, Any] = {"inputs": Inputs(), "initial": INITIAL} | arguments
     with pytest.raises(error, match=said):
         simulate(PARAMETERS, settings.pop("inputs"), stop_time=0.5, hold=1e-3, **settings)
 
 
 def test_a_freedom_has_one_drive() -> None:
     with pytest.raises(InputError, match="both shift_speed and groove are given"):
-        SliderCrankInputs(shift_speed=1.0, groove=True)
+        Inputs(shift_speed=1.0, groove=True)
     with pytest.raises(InputError, match="both shift_speed and axial_force"):
-        SliderCrankInputs(shift_speed=1.0, axial_force=1.0)
+        Inputs(shift_speed=1.0, axial_force=1.0)
     with pytest.raises(InputError, match="both speed and torque"):
-        SliderCrankInputs(speed=1.0, torque=1.0)
+        Inputs(speed=1.0, torque=1.0)
     with pytest.raises(InputError, match="a shift_speed given as a Function needs its rate"):
-        SliderCrankInputs(shift_speed=Function(lambda t, th, s, w, v: 0.0))
+        Inputs(shift_speed=Function(lambda t, th, s, w, v: 0.0))
     with pytest.raises(InputError, match="load has more than one Function"):
-        SliderCrankInputs(load=(Function(lambda *x: 0.0), Function(lambda *x: 0.0)))
-    assert SliderCrankInputs(torque=TorsionBar(torque=1.0)).axial_mode == 1
-    assert encode(SliderCrankInputs()).value_names[3:] == ("axial_force", "load", "shift_speed", "rate of shift_speed")
+        Inputs(load=(Function(lambda *x: 0.0), Function(lambda *x: 0.0)))
+    assert Inputs(torque=TorsionBar(torque=1.0)).axial_mode == 1
+    assert encode(Inputs()).value_names[3:] == ("axial_force", "load", "shift_speed", "rate of shift_speed")
 
 
 @pytest.mark.parametrize(
@@ -292,8 +290,8 @@ def test_analyses_of_five_bars_refuse_it(call: Callable[[Any], Any], what: str) 
 
 
 def test_a_drive_of_another_mechanism_is_not_taken_for_one() -> None:
-    with pytest.raises(InputError, match="the inputs are SliderCrankInputs: periodic motions are of five-bars"):
-        drive_of(SliderCrankInputs(speed=5.0, load=3.0))
+    with pytest.raises(InputError, match="the inputs are Inputs: periodic motions are of five-bars"):
+        drive_of(Inputs(speed=5.0, load=3.0))
 
 
 def test_a_case_is_of_one_mechanism() -> None:

@@ -11,9 +11,10 @@ import pytest
 from numpy.typing import NDArray
 from scipy.optimize import differential_evolution, minimize_scalar
 
-from analysis.motion import SmoothnessInterrupted, motion, slider_motion, smoothness_curve
-from analysis.motion.motion import greatest
+from analysis.motion import SmoothnessInterrupted, greatest, motion, slider_motion, smoothness_curve
 from analysis.synthesis import (
+    ANGLES,
+    LENGTHS,
     Assembly,
     CrankUnknown,
     FullTurn,
@@ -21,24 +22,27 @@ from analysis.synthesis import (
     LeastTransmission,
     Linkage,
     RockerFunction,
+    Search,
     SecondCrank,
     SliderMotion,
     SliderUnknown,
     Synthesis,
     SynthesisInterrupted,
     TargetPath,
+    Task,
     TimedPath,
     UntimedPath,
     evaluate,
+    normal_form,
+    sensitivities,
     synthesize,
     turn,
 )
 from analysis.synthesis.constraints import limits_of
 from analysis.synthesis.kernels import link_directions
-from analysis.synthesis.linkage import ANGLES, LENGTHS
-from analysis.synthesis.program import Program, linkage_of, random_pivot, start_of
+from analysis.synthesis.program import Program
 from analysis.synthesis.published import PROBLEMS
-from analysis.synthesis.tasks import Task, normal_form
+from analysis.synthesis.starts import linkage_of, random_pivot, start_of
 from linkwork.errors import InputError, ParameterError
 from tests.linkages import drawn
 
@@ -75,13 +79,13 @@ def test_series_1_with_two_harmonics() -> None:
 
 def test_series_2_with_two_harmonics() -> None:
     """The goal is 4.05 cm2, the best that was found before 3.99; the thesis prints 4.3."""
-    found = slider_motion(PATH_B.task, PATH_B.linkage, SliderUnknown(harmonics=2), starts=10)
+    found = slider_motion(PATH_B.task, PATH_B.linkage, SliderUnknown(harmonics=2), search=Search(starts=10))
     assert PATH_B.shown(found.best.error) <= 4.05
     assert found.best.verdicts.sound
     # fitted at more stations than the task has, and told at the task's
     assert len(found.best.rotation) == 360
     assert len(found.best.evaluation.rotation) == PATH_B.task.samples
-    residual = {s.name: s.shift for s in found.best.sensitivities()}
+    residual = {s.name: s.shift for s in sensitivities(found.best)}
     assert residual["pivot_x"] < 1.0
     assert residual["slider cos 1"] > 0.0
 
@@ -89,7 +93,7 @@ def test_series_2_with_two_harmonics() -> None:
 @pytest.mark.parametrize("linkage", [PRINTED, PATH_B.linkage], ids=["rocker", "path"])
 def test_the_links_are_kept_to_the_bit(linkage: Linkage) -> None:
     problem = WEIGHTED if linkage is PRINTED else PATH_B
-    found = slider_motion(problem.task, linkage, SliderUnknown(harmonics=1), starts=3)
+    found = slider_motion(problem.task, linkage, SliderUnknown(harmonics=1), search=Search(starts=3))
     for solution in found.solutions:
         assert dimensions(solution.linkage) == dimensions(linkage)
         assert isinstance(solution.linkage.pivot, SliderMotion)
@@ -143,7 +147,7 @@ def test_without_harmonics_the_slider_is_set_once() -> None:
 
     least, most = 0.98 * PRINTED.ground_length, 1.02 * PRINTED.ground_length
     best = minimize_scalar(longer, bounds=(least, most), method="bounded", options={"xatol": 1e-12})
-    found = slider_motion(WEIGHTED.task, PRINTED, unknown, starts=4)
+    found = slider_motion(WEIGHTED.task, PRINTED, unknown, search=Search(starts=4))
     assert isinstance(found.best.linkage.pivot, SliderMotion)
     assert found.best.linkage.pivot.stroke == 0.0
     assert found.best.error == pytest.approx(best.fun, rel=1e-9)
@@ -158,7 +162,7 @@ def test_more_harmonics_are_never_worse_with_a_warm_start() -> None:
             PRINTED,
             SliderUnknown(harmonics=harmonics),
             guesses=[previous.best.linkage],
-            starts=4,
+            search=Search(starts=4),
         )
         assert found.best.error <= previous.best.error * (1.0 + 1e-9)
         previous = found
@@ -167,7 +171,7 @@ def test_more_harmonics_are_never_worse_with_a_warm_start() -> None:
 
 def test_a_guess_alone_is_enough_and_is_not_left_for_worse() -> None:
     guess = moved(2).best.linkage
-    found = slider_motion(WEIGHTED.task, PRINTED, SliderUnknown(harmonics=2), guesses=[guess], starts=0)
+    found = slider_motion(WEIGHTED.task, PRINTED, SliderUnknown(harmonics=2), guesses=[guess], search=Search(starts=0))
     assert found.starts == 1
     assert found.best.error <= moved(2).best.error * (1.0 + 1e-9)
 
@@ -175,7 +179,7 @@ def test_a_guess_alone_is_enough_and_is_not_left_for_worse() -> None:
 def test_the_slope_of_the_error_is_zero_where_no_bound_holds() -> None:
     """By the derivatives of the compiled kernels, not by the program's."""
     solution = moved(2).best
-    slopes = {s.name: s.slope for s in solution.sensitivities() if s.name.startswith(("slider", "guide"))}
+    slopes = {s.name: s.slope for s in sensitivities(solution) if s.name.startswith(("slider", "guide"))}
     assert len(slopes) == 6
     for name, slope in slopes.items():
         unit = 1.0 if name == "guide_angle" else PRINTED.ground_length
@@ -350,7 +354,7 @@ def test_links_and_slider_together_beat_either() -> None:
         for name in ("crank_length", "coupler_length", "rocker_length")
     }
     bounds |= {"ground_length": (PRINTED.ground_length,) * 2, "crank_phase": (-pi, pi)}
-    links = synthesize(WEIGHTED.task, bounds, (FullTurn(),), starts=8)
+    links = synthesize(WEIGHTED.task, bounds, (FullTurn(),), search=Search(starts=8))
     slider = moved(1)
     both = slider_motion(
         WEIGHTED.task,
@@ -358,7 +362,7 @@ def test_links_and_slider_together_beat_either() -> None:
         SliderUnknown(harmonics=1),
         bounds=bounds,
         guesses=[slider.best.linkage, links.best.linkage],
-        starts=6,
+        search=Search(starts=6),
     )
     assert both.best.error < 0.5 * min(links.best.error, slider.best.error)
     changed = both.best.linkage
@@ -376,7 +380,7 @@ def test_a_geared_second_crank_is_recovered() -> None:
     phi = turn(36)
     assert np.isfinite(wanted.path(phi)).all()
     task = TimedPath(points=wanted.path(phi))
-    found = slider_motion(task, base, CrankUnknown(ratio=2, length=(0.01, 0.3)), starts=8).best
+    found = slider_motion(task, base, CrankUnknown(ratio=2, length=(0.01, 0.3)), search=Search(starts=8)).best
     assert found.evaluation.worst < 1e-7
     assert isinstance(found.linkage.pivot, SecondCrank)
     assert found.linkage.pivot.length == pytest.approx(gear.length, rel=1e-6)
@@ -390,12 +394,12 @@ def test_a_solution_of_an_open_path_brings_its_rotations() -> None:
     t = np.linspace(-1.0, 1.0, 31)
     path = TargetPath(points=np.column_stack([0.1 * t, 0.02 * np.cos(2.5 * t) + 0.01 * t**3]), closed=False)
     task = UntimedPath(path=path, measure="distance", samples=36)
-    four_bar = synthesize(task, starts=4, candidates=1 << 12).best
-    found = slider_motion(task, four_bar, SliderUnknown(harmonics=1, stroke=0.05), starts=4)
+    four_bar = synthesize(task, search=Search(starts=4, candidates=1 << 12)).best
+    found = slider_motion(task, four_bar, SliderUnknown(harmonics=1, stroke=0.05), search=Search(starts=4))
     assert found.best.error <= four_bar.error
     assert dimensions(found.best.linkage) == dimensions(four_bar.linkage)
     with pytest.raises(InputError, match="open path"):
-        slider_motion(task, four_bar.linkage, SliderUnknown(harmonics=1), starts=2)
+        slider_motion(task, four_bar.linkage, SliderUnknown(harmonics=1), search=Search(starts=2))
 
 
 # Smoothness
@@ -431,7 +435,7 @@ def test_a_worse_polish_on_the_way_back_does_not_spoil_the_curve(monkeypatch: py
         return replace(found, solutions=worse)
 
     monkeypatch.setattr(motion, "slider_motion", second_best)
-    curve = smoothness_curve(WEIGHTED.task, PRINTED, SliderUnknown(harmonics=1), [0.005, 0.02], starts=3)
+    curve = smoothness_curve(WEIGHTED.task, PRINTED, SliderUnknown(harmonics=1), [0.005, 0.02], search=Search(starts=3))
     assert len(calls) == 5
     assert curve.error[1] == curve.error[0] < 10.0
     assert curve.solutions[1] is curve.solutions[0]
@@ -453,7 +457,7 @@ def test_an_interrupted_smoothness_curve_keeps_what_it_has(monkeypatch: pytest.M
     monkeypatch.setattr(motion, "slider_motion", stopped)
     done = max(0, stop - 2)
     with pytest.raises(SmoothnessInterrupted, match=f"stopped after {done} of 4 problems") as caught:
-        smoothness_curve(WEIGHTED.task, PRINTED, SliderUnknown(harmonics=1), [0.005, 0.02], starts=2)
+        smoothness_curve(WEIGHTED.task, PRINTED, SliderUnknown(harmonics=1), [0.005, 0.02], search=Search(starts=2))
     there = [s is not None for s in caught.value.curve.solutions]
     assert there == {1: [False, False], 3: [True, True]}.get(stop, [True, True])
     assert caught.value.curve.error.mask.tolist() == [not t for t in there] or all(there)
@@ -470,7 +474,8 @@ def test_smoothness_as_a_weight_does_the_same() -> None:
 
 def test_the_same_on_any_number_of_cores() -> None:
     one, two = (
-        slider_motion(WEIGHTED.task, PRINTED, SliderUnknown(harmonics=1), starts=6, seed=3, n_jobs=n) for n in (1, 2)
+        slider_motion(WEIGHTED.task, PRINTED, SliderUnknown(harmonics=1), search=Search(starts=6, seed=3, n_jobs=n))
+        for n in (1, 2)
     )
     assert [s.error for s in one.solutions] == [s.error for s in two.solutions]
     assert one.best.linkage.pivot.series.cos.tolist() == two.best.linkage.pivot.series.cos.tolist()
@@ -480,16 +485,16 @@ def test_a_linkage_scaled_and_moved_gets_the_same_motion() -> None:
     task = TimedPath(points=PROBLEMS["ellipse-b"].linkage.path(turn(24)) * [1.02, 0.97])
     linkage = PROBLEMS["ellipse-b"].linkage
     unknown = SliderUnknown(harmonics=1)
-    here = slider_motion(task, linkage, unknown, starts=4).best
+    here = slider_motion(task, linkage, unknown, search=Search(starts=4)).best
     far = replace(task, points=1000.0 * np.asarray(task.points) + [5e4, -2e4])
-    there = slider_motion(far, linkage.scaled(1000.0).moved(5e4, -2e4), unknown, starts=4).best
+    there = slider_motion(far, linkage.scaled(1000.0).moved(5e4, -2e4), unknown, search=Search(starts=4)).best
     assert there.error == pytest.approx(1e6 * here.error, rel=1e-5)
 
 
 def test_what_cannot_be_joined_is_infeasible() -> None:
     unknown = SliderUnknown(harmonics=1, position=(0.5, 0.6), guide_angle=(0.0, 0.0))
     with pytest.raises(InfeasibleError, match="no linkage keeps all bounds and constraints"):
-        slider_motion(WEIGHTED.task, PRINTED, unknown, starts=3)
+        slider_motion(WEIGHTED.task, PRINTED, unknown, search=Search(starts=3))
 
 
 @pytest.mark.parametrize(
@@ -513,9 +518,9 @@ def test_an_unknown_motion_is_checked(options: dict[str, object], words: str) ->
 def test_bad_input_is_named() -> None:
     unknown = SliderUnknown(harmonics=1)
     with pytest.raises(InputError, match="at least one of either"):
-        slider_motion(WEIGHTED.task, PRINTED, unknown, starts=0)
+        slider_motion(WEIGHTED.task, PRINTED, unknown, search=Search(starts=0))
     with pytest.raises(InputError, match="0 cores"):
-        slider_motion(WEIGHTED.task, PRINTED, unknown, n_jobs=0)
+        slider_motion(WEIGHTED.task, PRINTED, unknown, search=Search(n_jobs=0))
     with pytest.raises(ParameterError, match="crank_lenght"):
         slider_motion(WEIGHTED.task, PRINTED, unknown, bounds={"crank_lenght": (0.1, 0.2)})
     for wrong in ([0.01], [0.01, 0.0], [0.01, float("nan")], [[0.01, 0.02]]):

@@ -13,6 +13,8 @@ from analysis.motion import Step, Strategy, StrategyInterrupted, simplest_mechan
 from analysis.motion import strategy as strategy_module
 from analysis.numerics.fourier import FourierSeries
 from analysis.synthesis import (
+    ANGLES,
+    LENGTHS,
     FullTurn,
     Grashof,
     InfeasibleError,
@@ -22,6 +24,7 @@ from analysis.synthesis import (
     Motion,
     PrecisionPoints,
     RockerFunction,
+    Search,
     SecondCrank,
     SliderMotion,
     Solution,
@@ -30,7 +33,6 @@ from analysis.synthesis import (
     evaluate,
     turn,
 )
-from analysis.synthesis.linkage import ANGLES, LENGTHS
 from analysis.synthesis.published import PROBLEMS
 from linkwork.errors import InputError
 
@@ -58,12 +60,12 @@ def links_of(linkage: Linkage, share: float = 0.0) -> dict[str, tuple[float, flo
     return {n: (getattr(linkage, n) - d, getattr(linkage, n) + d) for n, d in spread.items() if n != "output_angle"}
 
 
-def strategy(traced: Linkage, tolerance: float, **options: Any) -> Strategy:
+def strategy(traced: Linkage, tolerance: float, *, starts: int = 4, **options: Any) -> Strategy:
     """For the path of a linkage, its links known but for a few hundredths."""
     task = TimedPath(points=traced.path(PHI))
     assert np.isfinite(task.points).all()
-    usual = {"bounds": links_of(BASE, 0.02), "constraints": (FullTurn(),), "harmonics": 2, "starts": 4, "stroke": 0.08}
-    return simplest_mechanism(task, tolerance, **usual | options)
+    usual = {"bounds": links_of(BASE, 0.02), "constraints": (FullTurn(),), "harmonics": 2, "stroke": 0.08}
+    return simplest_mechanism(task, tolerance, **usual | options, search=Search(starts=starts))
 
 
 def test_a_four_bar_is_enough_for_what_one_traces() -> None:
@@ -141,7 +143,7 @@ def test_what_none_can_do_is_answered_with_the_nearest() -> None:
     square = np.column_stack([np.interp(s, range(5), corners[:, k]) for k in (0, 1)])
     limits = (LeastTransmission(), LargestLink(length=0.4))
     found = simplest_mechanism(
-        TimedPath(points=square), 1e-3 * MM2, constraints=limits, harmonics=1, ratios=(-1,), starts=3
+        TimedPath(points=square), 1e-3 * MM2, constraints=limits, harmonics=1, ratios=(-1,), search=Search(starts=3)
     )
     assert not found.met
     assert len(found.steps) == 4
@@ -160,7 +162,12 @@ def test_the_worst_error_as_the_criterion_and_the_angles_of_a_rocker() -> None:
     weighted = PROBLEMS["rocker-weighted"]
     task = replace(weighted.task, weights=None)
     found = simplest_mechanism(
-        task, radians(14.0), criterion="worst", bounds=links_of(weighted.linkage), constraints=(FullTurn(),), starts=8
+        task,
+        radians(14.0),
+        criterion="worst",
+        bounds=links_of(weighted.linkage),
+        constraints=(FullTurn(),),
+        search=Search(starts=8),
     )
     assert found.criterion == "worst"
     assert found.met
@@ -169,7 +176,12 @@ def test_the_worst_error_as_the_criterion_and_the_angles_of_a_rocker() -> None:
         assert step.value == step.solution.evaluation.worst
         assert f"worst {degrees(step.value):.4g} deg" in step.reason
     error = simplest_mechanism(
-        task, 1.0, criterion="error", bounds=links_of(weighted.linkage), constraints=(FullTurn(),), starts=2
+        task,
+        1.0,
+        criterion="error",
+        bounds=links_of(weighted.linkage),
+        constraints=(FullTurn(),),
+        search=Search(starts=2),
     )
     assert len(error.steps) == 1
     assert f"is within {degrees(degrees(1.0)):.4g} deg2: taken" in str(error)
@@ -218,7 +230,7 @@ def test_constraints_without_even_a_four_bar() -> None:
         (inf, {}, "tolerance is inf"),
         (1.0, {"criterion": "best"}, "criterion 'best'"),
         (1.0, {"harmonics": 0}, "0 harmonics"),
-        (1.0, {"starts": 0}, "starts"),
+        (1.0, {"search": Search(starts=0)}, "starts"),
         (1.0, {"stroke": -0.1}, "stroke"),
         (1.0, {"stroke": float("nan")}, "stroke"),
         (1.0, {"second_crank": 0.0}, "second crank"),
@@ -226,8 +238,8 @@ def test_constraints_without_even_a_four_bar() -> None:
         (1.0, {"ratios": (float("nan"),)}, "ratio nan"),
         (1.0, {"ratios": (inf,)}, "ratio inf"),
         (1.0, {"harmonics": 1.5}, "1.5 harmonics"),
-        (1.0, {"starts": 2.5}, "2.5 starts"),
-        (1.0, {"starts": float("nan")}, "nan starts"),
+        (1.0, {"search": Search(starts=2.5)}, "2.5 starts"),
+        (1.0, {"search": Search(starts=float("nan"))}, "nan starts"),
     ],
 )
 def test_bad_input_is_named_before_anything_is_searched(
@@ -242,7 +254,7 @@ def test_bad_input_is_named_before_anything_is_searched(
 def test_two_calls_give_the_same() -> None:
     series = FourierSeries(np.array([0.0, 0.012]), np.array([0.0, 0.01]))
     traced = replace(BASE, pivot=SliderMotion(series, 0.4))
-    one, two = (strategy(traced, 1e-6 * MM2, harmonics=1, ratios=(), starts=2, seed=4) for _ in range(2))
+    one, two = (strategy(traced, 1e-6 * MM2, harmonics=1, ratios=(), starts=2) for _ in range(2))
     assert str(one) == str(two)
     assert [s.value for s in one.steps] == [s.value for s in two.steps]
     assert abs(one.chosen.solution.linkage.crank_phase) <= pi
@@ -253,7 +265,7 @@ def test_a_mechanism_with_a_defect_is_not_taken() -> None:
     points = [[0.0, 0.0], [0.05, 0.03], [0.1, 0.04], [0.15, 0.02], [0.16, -0.03], [0.1, -0.08], [0.05, 0.02]]
     task = PrecisionPoints(points=points)
     found = simplest_mechanism(
-        task, 2e-3, constraints=(Grashof(type="double-rocker"),), starts=3, harmonics=1, ratios=()
+        task, 2e-3, constraints=(Grashof(type="double-rocker"),), search=Search(starts=3), harmonics=1, ratios=()
     )
     for step in found.steps:
         if step.solution is not None and not step.solution.verdicts.sound and step.value <= 2e-3:
@@ -290,7 +302,13 @@ def test_the_worst_error_of_a_motion_counts_its_angles() -> None:
     """Points that a linkage traces, with directions that its coupler has not."""
     angle = BASE.coupler_angle(PHI) + 0.3 * np.sin(7.0 * PHI)
     motion = Motion(points=BASE.path(PHI), angle=angle, rotation=PHI, length=0.1)
-    options = {"bounds": links_of(BASE, 1e-3), "constraints": (FullTurn(),), "harmonics": 1, "ratios": (), "starts": 1}
+    options = {
+        "bounds": links_of(BASE, 1e-3),
+        "constraints": (FullTurn(),),
+        "harmonics": 1,
+        "ratios": (),
+        "search": Search(starts=1),
+    }
     found = simplest_mechanism(motion, 0.01, criterion="worst", **options)
     assert not found.met
     best = found.steps[0].solution.evaluation

@@ -22,9 +22,9 @@ casadi = pytest.importorskip("casadi")
 @cache
 def traced() -> dict[str, Any]:
     """CasADi functions of state, inputs and constants."""
-    plant = symbolic.plant()
+    plant = traced(FIVE_BAR)
     x, u = casadi.SX.sym("x", 6), casadi.SX.sym("u", 6)
-    p, constants = symbolic.constants()
+    p, constants = constants(FIVE_BAR)
     state, inputs = tuple(casadi.vertsplit(x)), dynamics.Inputs(*casadi.vertsplit(u))
     derivative = casadi.vertcat(*plant.derivative(state, inputs, constants))
     outputs = casadi.vertcat(*plant.outputs(state, inputs, 0.25, constants))
@@ -107,7 +107,7 @@ def test_without_casadi_the_error_names_the_extra(monkeypatch: pytest.MonkeyPatc
 
 
 def test_nothing_of_the_plain_modules_is_changed() -> None:
-    symbolic.plant()
+    traced(FIVE_BAR)
     assert kinematics.sin.__module__ == friction.tanh.__module__ == "math"
     assert dynamics.position is kinematics.position
 

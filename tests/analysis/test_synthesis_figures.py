@@ -19,6 +19,7 @@ from analysis.numerics.fourier import FourierSeries
 from analysis.synthesis import (
     InfeasibleError,
     Linkage,
+    LinkageScene,
     Motion,
     RockerFunction,
     SecondCrank,
@@ -29,9 +30,12 @@ from analysis.synthesis import (
     TimedPath,
     TradeOff,
     UntimedPath,
+    costs,
+    drawing,
+    length_step,
+    report,
     turn,
 )
-from analysis.synthesis.sensitivity import costs, length_step
 from linkwork.errors import AssemblyError, InputError
 
 PHI = turn(24)
@@ -83,7 +87,7 @@ def drawn(axis, label):
 
 def test_the_panels_of_a_path_show_target_path_errors_and_transmission_angle() -> None:
     solution = timed()
-    figure = solution.plot(title="ellipse")
+    figure = figures.plot(solution, title="ellipse")
     assert figure.get_suptitle() == "ellipse"
     linkage, task, errors, transmission = figure.axes
     assert [a.get_xlabel() for a in figure.axes] == ["x [mm]", "x [mm]", "crank rotation [deg]", "crank rotation [deg]"]
@@ -110,7 +114,7 @@ def test_the_panels_of_a_path_show_target_path_errors_and_transmission_angle() -
 
 def test_letters_stand_clear_of_the_links_and_of_each_other() -> None:
     for solution in (timed(), timed(SLIDING), timed(GEARED), rocker()):
-        axis = solution.plot().axes[0]
+        axis = figures.plot(solution).axes[0]
         places = {t.get_text(): np.array(t.get_position()) for t in axis.texts}
         pins = {name: 1e3 * np.array(place) for name, place in solution.linkage.pins(0.0).items()}
         everything = np.array(list(pins.values()))
@@ -128,7 +132,7 @@ def test_letters_stand_clear_of_the_links_and_of_each_other() -> None:
 
 def test_a_function_of_the_rocker_is_shown_with_its_target() -> None:
     solution = rocker()
-    figure = solution.plot()
+    figure = figures.plot(solution)
     panel = axis_of(figure, "rocker angle")
     np.testing.assert_allclose(drawn(panel, "target"), np.degrees(np.column_stack([PHI, 2.0 + 0.4 * np.sin(PHI)])))
     x, y = np.radians(drawn(panel, "rocker")).T
@@ -140,7 +144,7 @@ def test_a_function_of_the_rocker_is_shown_with_its_target() -> None:
 
 @pytest.mark.parametrize(("linkage", "label"), [(SLIDING, "slider position [mm]"), (GEARED, "second crank [deg]")])
 def test_a_moved_pivot_is_drawn_and_its_motion_shown(linkage, label) -> None:
-    figure = timed(linkage).plot()
+    figure = figures.plot(timed(linkage))
     panel = axis_of(figure, label.split(" ")[0])
     assert panel.get_ylabel().replace("\n", " ") == label
     x, y = panel.lines[0].get_xydata().T
@@ -151,7 +155,7 @@ def test_a_moved_pivot_is_drawn_and_its_motion_shown(linkage, label) -> None:
 
 
 def test_the_guide_spans_the_travel_of_the_slider() -> None:
-    scene = timed(SLIDING).scene()
+    scene = LinkageScene(timed(SLIDING))
     places = np.array([SLIDING.pins(float(phi))["D"] for phi in np.linspace(0.0, 2.0 * np.pi, 400)])
     along = (scene.guide[1] - scene.guide[0]) / hypot(*(scene.guide[1] - scene.guide[0]))
     travel = (places - scene.guide[0]) @ along
@@ -163,17 +167,17 @@ def test_the_guide_spans_the_travel_of_the_slider() -> None:
 def test_a_linkage_that_cannot_turn_fully_is_drawn_where_it_is_joined() -> None:
     task = Motion(points=ELLIPSE[:4], angle=np.zeros(4), rotation=[-0.3, -0.1, 0.1, 0.3])
     solution = Solution.of(task, SWINGING)
-    scene = solution.scene()
+    scene = LinkageScene(solution)
     assert not solution.verdicts.full_turn
     assert scene.curves
     assert all(np.isfinite(piece).all() for piece in scene.curves)
     assert np.isnan(scene.transmission[1]).any()
-    figure = solution.plot()
+    figure = figures.plot(solution)
     assert [a.get_ylabel() for a in figure.axes if "angle [deg]" in a.get_ylabel()][-1] == "error of angle [deg]"
     # the drawing refuses what is not finite
-    assert solution.drawing().polylines
+    assert drawing(solution).polylines
     with pytest.raises(AssemblyError, match="cannot be joined at a crank rotation of 3"):
-        solution.drawing(3.0)
+        drawing(solution, 3.0)
 
 
 @given(st.floats(1e-9, 1e9), st.floats(1e-6, 1e6))
@@ -192,12 +196,12 @@ def test_error_vectors_are_magnified_as_far_as_they_stay_short(worst: float, ext
 def test_alternatives_have_a_panel_each_under_their_errors(tmp_path) -> None:
     solutions = (timed(), timed(replace(LINKAGE, crank_length=0.048)), timed(SLIDING), timed(GEARED))
     result = Synthesis(task=solutions[0].task, solutions=solutions, method="scan", seed=0, starts=4, seconds=1.0)
-    figure = result.plot(title="all")
+    figure = figures.plot(result, title="all")
     shown = [axis for axis in figure.axes if axis.get_visible()]
     assert [axis.get_title().split(":")[0] for axis in shown] == ["1", "2", "3", "4"]
     assert f"{1e6 * solutions[0].error:.4g} mm²" in shown[0].get_title()
     with pytest.raises(InputError, match="no linkages"):
-        figures.plot_alternatives([])
+        figures.plot(replace(result, solutions=()))
     rows = np.genfromtxt(result.to_csv(tmp_path / "all.csv"), delimiter=",", names=True, deletechars="")
     np.testing.assert_allclose(rows["quality_[m2]"], [s.error for s in solutions])
     np.testing.assert_allclose(rows["crank_length_[m]"], [0.05, 0.048, 0.05, 0.05])
@@ -206,7 +210,7 @@ def test_alternatives_have_a_panel_each_under_their_errors(tmp_path) -> None:
 def test_a_trade_off_marks_limits_without_a_linkage(tmp_path) -> None:
     solutions = (None, timed(), timed(replace(LINKAGE, crank_length=0.048)))
     traded = TradeOff(over="size", limit=np.array([0.1, 0.3, 1.0]), solutions=solutions)
-    figure = traded.plot()
+    figure = figures.plot(traded)
     expected = ([1e6 * s.error for s in solutions[1:]], [1e3 * s.evaluation.worst for s in solutions[1:]])
     for axis, values in zip(figure.axes, expected):
         curve, none = axis.lines
@@ -217,16 +221,16 @@ def test_a_trade_off_marks_limits_without_a_linkage(tmp_path) -> None:
     rows = np.genfromtxt(traded.to_csv(tmp_path / "t.csv"), delimiter=",", names=True, deletechars="")
     np.testing.assert_allclose(rows["limit_of_largest_link_[m]"], [0.3, 1.0])
     with pytest.raises(InfeasibleError, match="at any of the limits"):
-        TradeOff(over="size", limit=np.array([0.1, 0.2]), solutions=(None, None)).plot()
+        figures.plot(TradeOff(over="size", limit=np.array([0.1, 0.2]), solutions=(None, None)))
 
 
 @pytest.mark.parametrize("solution", [timed(SLIDING), rocker()])
 def test_an_animation_is_a_turn_in_so_many_pictures(tmp_path, solution) -> None:
-    path = solution.animate(tmp_path / "turn.gif", title="a turn", frames=4)
+    path = figures.animate(solution, tmp_path / "turn.gif", title="a turn", frames=4)
     with Image.open(path) as picture:
         assert picture.n_frames == 4
     with pytest.raises(InputError, match="at least 2"):
-        solution.animate(path, frames=1)
+        figures.animate(solution, path, frames=1)
 
 
 # Drawing
@@ -234,36 +238,36 @@ def test_an_animation_is_a_turn_in_so_many_pictures(tmp_path, solution) -> None:
 
 def test_the_drawing_is_at_real_size(tmp_path) -> None:
     solution = timed()
-    drawing = solution.drawing(1.0, title="ellipse")
+    sheet = drawing(solution, 1.0, title="ellipse")
     pins = LINKAGE.pins(1.0)
-    lengths = {line.layer: hypot(line.end[0] - line.start[0], line.end[1] - line.start[1]) for line in drawing.lines}
+    lengths = {line.layer: hypot(line.end[0] - line.start[0], line.end[1] - line.start[1]) for line in sheet.lines}
     assert lengths == pytest.approx({"ground": 0.3, "crank": 0.05, "rocker": 0.215})
-    triangle = next(p for p in drawing.polylines if p.layer == "coupler")
+    triangle = next(p for p in sheet.polylines if p.layer == "coupler")
     np.testing.assert_allclose(triangle.points, [pins["B"], pins["C"], pins["P"]])
-    assert {t.text: t.layer for t in drawing.texts} == dict.fromkeys("ABCDP", "text")
+    assert {t.text: t.layer for t in sheet.texts} == dict.fromkeys("ABCDP", "text")
     # what is written can be read back: the curve from SVG, links from DXF in mm
-    curve, closed = read_points(save_drawing(tmp_path / "a.svg", drawing), name="coupler-curve")
+    curve, closed = read_points(save_drawing(tmp_path / "a.svg", sheet), name="coupler-curve")
     assert closed
     np.testing.assert_allclose(
         curve, LINKAGE.path(np.linspace(0.0, 2.0 * np.pi, len(curve), endpoint=False)), atol=1e-9
     )
-    document = ezdxf.readfile(save_drawing(tmp_path / "a.dxf", drawing))
+    document = ezdxf.readfile(save_drawing(tmp_path / "a.dxf", sheet))
     crank = next(e for e in document.modelspace() if e.dxf.layer == "crank" and e.dxftype() == "LINE")
     assert (crank.dxf.end - crank.dxf.start).magnitude == pytest.approx(50.0)
     assert sum(e.dxf.layer == "target" for e in document.modelspace()) == len(ELLIPSE)
 
 
 def test_the_drawing_of_moved_pivots_and_of_curves() -> None:
-    layers = {item.layer for item in timed(SLIDING).drawing().polylines}
+    layers = {item.layer for item in drawing(timed(SLIDING)).polylines}
     assert {"slider", "coupler-curve"} <= layers
-    assert any(line.layer == "guide" for line in timed(SLIDING).drawing().lines)
-    cranks = [line for line in timed(GEARED).drawing().lines if line.layer == "crank"]
+    assert any(line.layer == "guide" for line in drawing(timed(SLIDING)).lines)
+    cranks = [line for line in drawing(timed(GEARED)).lines if line.layer == "crank"]
     assert sorted(hypot(c.end[0] - c.start[0], c.end[1] - c.start[1]) for c in cranks) == pytest.approx([0.02, 0.05])
     for closed in (True, False):
-        target = next(p for p in untimed(closed).drawing().polylines if p.layer == "target")
+        target = next(p for p in drawing(untimed(closed)).polylines if p.layer == "target")
         assert target.closed is closed
     flat = Solution.of(TimedPath(points=ELLIPSE), replace(LINKAGE, point_angle=0.0))
-    assert not any(p.layer == "coupler" for p in flat.drawing().polylines)
+    assert not any(p.layer == "coupler" for p in drawing(flat).polylines)
 
 
 # Tables and report
@@ -315,7 +319,7 @@ def test_what_an_error_in_a_dimension_costs() -> None:
 
 def test_the_report_tells_dimensions_verdicts_and_errors() -> None:
     solution = timed()
-    text = solution.report()
+    text = report(solution)
     assert str(solution.verdicts) in text
     assert f"{1e6 * solution.error:.6g} mm²" in text
     row = next(line for line in text.splitlines() if line.startswith("crank_length")).split()
@@ -325,16 +329,16 @@ def test_the_report_tells_dimensions_verdicts_and_errors() -> None:
     assert len(stations) == 1 + len(PHI)
     assert float(stations[3].split()[6]) == pytest.approx(1e3 * solution.evaluation.errors[2], abs=1e-4)
     # where the rotation is free its start is no dimension
-    assert "crank_phase" not in untimed().report()
+    assert "crank_phase" not in report(untimed())
     function = rocker()
     squares = (np.degrees(function.evaluation.errors) ** 2).sum()
-    assert f"sum of squared errors of angle: {squares:.6g} deg²" in function.report()
-    assert "stroke" in timed(SLIDING).report()
-    assert "second crank at D: 2 turns" in timed(GEARED).report()
+    assert f"sum of squared errors of angle: {squares:.6g} deg²" in report(function)
+    assert "stroke" in report(timed(SLIDING))
+    assert "second crank at D: 2 turns" in report(timed(GEARED))
 
 
 @pytest.mark.parametrize(("factor", "step"), [(1.0, 1e-4), (1e3, 1e-4), (0.02, 1e-4), (0.015, 1e-5), (1e-3, 1e-6)])
 def test_small_linkages_are_rounded_to_finer_steps(factor, step) -> None:
     solution = Solution.of(TimedPath(points=factor * ELLIPSE), LINKAGE.scaled(factor))
     assert length_step(solution.linkage) == pytest.approx(step)
-    assert solution.report()
+    assert report(solution)

@@ -56,7 +56,7 @@ def traced() -> Any:
     The slider's displacement is (dx, dy) with u = 1 and the guide's direction (dx, dy).
     """
     casadi = symbolic.library()
-    plant = symbolic.plant()
+    plant = traced(FIVE_BAR)
     z = casadi.SX.sym("z", len(COLUMNS))
     phi, branch = casadi.SX.sym("phi"), casadi.SX.sym("branch")
     v = dict(zip(COLUMNS, casadi.vertsplit(z)))

@@ -14,14 +14,16 @@ from analysis.synthesis import (
     LargestLink,
     LeastTransmission,
     PrecisionPoints,
+    Search,
     Solution,
     TargetPath,
+    Task,
     TimedPath,
     UntimedPath,
+    normal_form,
     synthesize,
     turn,
 )
-from analysis.synthesis.tasks import Task, normal_form
 
 pytest.importorskip("casadi")
 FloatArray = NDArray[np.float64]
@@ -29,7 +31,7 @@ T = turn(80)
 
 
 def best(task: Task, *, candidates: int = 1 << 13, starts: int = 6, **more: Any) -> Solution:
-    solution = synthesize(task, candidates=candidates, starts=starts, **more).best
+    solution = synthesize(task, search=Search(candidates=candidates, starts=starts), **more).best
     assert solution.verdicts.sound
     return solution
 
@@ -107,7 +109,7 @@ class TestShapes:
         solution = best(task)
         assert solution.error < 0.05
         # nearer to what was meant than what was drawn is
-        from analysis.synthesis.areas import area_between
+        from analysis.synthesis import area_between
 
         meant = TargetPath(points=clean, closed=True)
         assert area_between(solution.curve(), meant) < 1.5 * area_between(noisy, meant)

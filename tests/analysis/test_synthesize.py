@@ -14,6 +14,8 @@ from numpy.typing import NDArray
 
 from analysis.numerics.fourier import FourierSeries
 from analysis.synthesis import (
+    ANGLES,
+    LENGTHS,
     USUAL,
     Assembly,
     FullTurn,
@@ -27,25 +29,28 @@ from analysis.synthesis import (
     PrecisionPoints,
     Require,
     RockerFunction,
+    Search,
     SecondCrank,
     SliderMotion,
     Solution,
     Straight,
+    Synthesis,
     SynthesisInterrupted,
     TargetPath,
     TimedPath,
     TradeOffInterrupted,
     UntimedPath,
     evaluate,
+    normal_form,
+    rounded,
+    sensitivities,
+    straightness,
     synthesize,
     trade_off,
     turn,
 )
-from analysis.synthesis.areas import straightness
 from analysis.synthesis.constraints import limits_of
-from analysis.synthesis.linkage import ANGLES, LENGTHS
 from analysis.synthesis.polish import Polished, polish
-from analysis.synthesis.tasks import normal_form
 from linkwork.errors import InputError, ParameterError
 from tests.linkages import drawn
 
@@ -54,12 +59,14 @@ FloatArray = NDArray[np.float64]
 
 ELLIPSE = np.column_stack([0.20 + 0.10 * np.cos(turn(24)), 0.15 + 0.05 * np.sin(turn(24))])
 TASK = TimedPath(points=ELLIPSE)
-QUICK: dict[str, Any] = {"candidates": 1 << 12, "starts": 4}
+QUICK = Search(candidates=1 << 12, starts=4)
 
 
 class TestResult:
     def test_solutions_are_ranked_different_and_what_they_say(self) -> None:
-        result = synthesize(TASK, starts=12, candidates=1 << 13, constraints=[*USUAL, LargestLink(length=0.3)])
+        result = synthesize(
+            TASK, search=Search(starts=12, candidates=1 << 13), constraints=[*USUAL, LargestLink(length=0.3)]
+        )
         errors = [s.error for s in result.solutions]
         assert errors == sorted(errors)
         assert result.best is result.solutions[0]
@@ -77,21 +84,21 @@ class TestResult:
     def test_the_same_seed_gives_the_same_bits_on_any_number_of_cores(self) -> None:
         tasks = (TASK, UntimedPath(path=TargetPath(points=ELLIPSE, closed=True), samples=24))
         for task in tasks:
-            one, again, two = (synthesize(task, seed=5, n_jobs=n, **QUICK) for n in (1, 1, 2))
+            one, again, two = (synthesize(task, search=replace(QUICK, seed=5, n_jobs=n)) for n in (1, 1, 2))
             for other in (again, two):
                 assert [s.linkage.values() for s in other.solutions] == [s.linkage.values() for s in one.solutions]
 
     def test_guesses_are_searched_from(self) -> None:
         task = Motion(points=ELLIPSE[::4], angle=turn(6))
-        good = synthesize(task, starts=12, candidates=1 << 12).best
-        poor = synthesize(task, starts=1, candidates=16, seed=3)
-        helped = synthesize(task, starts=1, candidates=16, seed=3, guesses=[good])
+        good = synthesize(task, search=Search(starts=12, candidates=1 << 12)).best
+        poor = synthesize(task, search=Search(starts=1, candidates=16, seed=3))
+        helped = synthesize(task, search=Search(starts=1, candidates=16, seed=3), guesses=[good])
         assert helped.starts == 2
         assert helped.best.error <= good.error * (1.0 + 1e-9)
         assert poor.best.error > 1.5 * good.error
 
     def test_its_best_is_a_plant_that_runs(self) -> None:
-        best = synthesize(TASK, **QUICK).best
+        best = synthesize(TASK, search=QUICK).best
         plant = best.to_five_bar(density=2700.0, section=(0.03, 0.01), slider_stiffness=1e6)
         assert plant == best.linkage.to_five_bar(density=2700.0, section=(0.03, 0.01), slider_stiffness=1e6)
         assert plant.crank_mass == pytest.approx(2700.0 * 0.03 * 0.01 * best.linkage.crank_length)
@@ -106,7 +113,7 @@ class TestResult:
 
         monkeypatch.setattr("analysis.synthesis.solve.polish", long)
         with pytest.raises(SynthesisInterrupted, match=r"stopped after \d+ of \d+ searches") as caught:
-            synthesize(TASK, n_jobs=n_jobs, **QUICK)
+            synthesize(TASK, search=replace(QUICK, n_jobs=n_jobs))
         timer.join()
         found = caught.value.synthesis
         assert found is not None
@@ -120,7 +127,7 @@ class TestResult:
 
         monkeypatch.setattr("analysis.synthesis.solve.scan", interrupted)
         with pytest.raises(SynthesisInterrupted, match="stopped after 0 of 7 searches") as caught:
-            synthesize(TASK, starts=7)
+            synthesize(TASK, search=Search(starts=7))
         assert caught.value.synthesis is None
 
 
@@ -164,8 +171,8 @@ def judged(kind: str) -> Solution:
     }[kind]()
     rotation = phi if kind in ("poses", "precision") else None
     if kind == "open":
+        from analysis.synthesis import normal_form
         from analysis.synthesis.solution import nearest_rotations
-        from analysis.synthesis.tasks import normal_form
 
         normal = normal_form(task)
         rotation = nearest_rotations(linkage, normal.origin + normal.unit * normal.points)  # type: ignore[operator]
@@ -198,7 +205,7 @@ class TestSensitivity:
         solution = judged(kind)
         h = 1e-6
         seen = 0
-        for s in solution.sensitivities():
+        for s in sensitivities(solution):
             ends = []
             for step in (h, -h):
                 changed = self.changed(solution.linkage, s.name, step)
@@ -206,7 +213,7 @@ class TestSensitivity:
             slope = (ends[0] - ends[1]) / (2.0 * h)
             # of a path, stations to the polygon of the curve
             tolerance = 2e-2 if kind in ("closed", "open") else 1e-5
-            largest = max(abs(t.slope) for t in solution.sensitivities())
+            largest = max(abs(t.slope) for t in sensitivities(solution))
             assert s.slope == pytest.approx(slope, rel=tolerance, abs=tolerance * largest), s.name
             seen += 1
         assert seen == {"rocker": 6, "motion": 11, "poses": 11, "slider": 14, "five-bar": 16}.get(kind, 10)
@@ -225,21 +232,21 @@ class TestSensitivity:
 
     def test_shifts_are_how_far_the_point_moves(self) -> None:
         solution = judged("timed")
-        for s in solution.sensitivities():
+        for s in sensitivities(solution):
             moved = self.changed(solution.linkage, s.name, 1e-6).path(solution.rotation)
             apart = np.hypot(*(moved - solution.linkage.path(solution.rotation)).T) / 1e-6
             assert s.shift == pytest.approx(float(np.sqrt(np.mean(apart**2))), rel=1e-4, abs=1e-9), s.name
 
     def test_at_an_optimum_that_no_bound_holds_the_slopes_vanish(self) -> None:
-        solution = synthesize(TASK, constraints=(), bounds={"ground_length": (0.3, 0.3)}, **QUICK).best
-        free = [s for s in solution.sensitivities() if s.name != "ground_length"]
-        held = next(s for s in solution.sensitivities() if s.name == "ground_length")
+        solution = synthesize(TASK, constraints=(), bounds={"ground_length": (0.3, 0.3)}, search=QUICK).best
+        free = [s for s in sensitivities(solution) if s.name != "ground_length"]
+        held = next(s for s in sensitivities(solution) if s.name == "ground_length")
         assert max(abs(s.slope) for s in free) < 1e-4 * abs(held.slope)
 
 
 class TestRounding:
     def test_dimensions_are_whole_steps(self) -> None:
-        rounding = judged("timed").rounded(length=1e-3, angle=radians(0.5))
+        rounding = rounded(judged("timed"), length=1e-3, angle=radians(0.5))
         for name, value in rounding.linkage.values().items():
             step = radians(0.5) if "angle" in name or "phase" in name else 1e-3
             if name != "branch":
@@ -267,20 +274,20 @@ class TestRounding:
                 break
         # the sample's own uncertainty, and what the second derivatives of the residuals add
         spread = np.std(errors) / np.sqrt(len(errors))
-        expected = solution.rounded(length=length, angle=angle).expected
+        expected = rounded(solution, length=length, angle=angle).expected
         assert expected == pytest.approx(np.mean(errors), abs=4.0 * spread + 0.05 * (np.mean(errors) - solution.error))
 
     @pytest.mark.parametrize("kind", [*SUMS, "closed", "open", "area"])
     def test_fine_steps_cost_nothing(self, kind: str) -> None:
         solution = judged(kind)
-        rounding = solution.rounded(length=1e-9, angle=1e-9)
+        rounding = rounded(solution, length=1e-9, angle=1e-9)
         assert rounding.expected == pytest.approx(solution.error, rel=1e-6)
         assert rounding.error == pytest.approx(solution.error, rel=1e-5)
 
     def test_expected_of_an_area_that_is_as_small_as_it_can_be(self) -> None:
         """Distances of either sign, few stations, and a target of few points: what is added starts from the area itself."""
         task = UntimedPath(path=TargetPath(points=ELLIPSE, closed=True), samples=36)
-        solution = synthesize(task, **QUICK).best
+        solution = synthesize(task, search=QUICK).best
         random = np.random.default_rng(0)
         errors = []
         for _ in range(400):
@@ -289,7 +296,7 @@ class TestRounding:
             errors.append(evaluate(task, replace(solution.linkage, **changed)).error)
         grown = float(np.mean(errors)) - solution.error
         spread = float(np.std(errors)) / np.sqrt(len(errors))
-        expected = solution.rounded(length=1e-4, angle=radians(0.1)).expected - solution.error
+        expected = rounded(solution, length=1e-4, angle=radians(0.1)).expected - solution.error
         assert expected == pytest.approx(grown, abs=3.0 * spread)
         assert spread < 0.06 * grown
 
@@ -309,16 +316,16 @@ class TestRounding:
 
         # of the angles, only these two turn the rocker
         grown = sum(mean(name) - solution.error for name in ("crank_phase", "output_angle"))
-        assert solution.rounded(length=1e-9, angle=angle).expected - solution.error == pytest.approx(grown, rel=1e-3)
+        assert rounded(solution, length=1e-9, angle=angle).expected - solution.error == pytest.approx(grown, rel=1e-3)
 
     def test_output_angle_and_moved_pivot_are_rounded_the_commanded_motion_is_not(self) -> None:
         motion = judged("motion")
         mounted = replace(motion, linkage=replace(motion.linkage, output_angle=0.1234))
-        assert mounted.rounded(angle=0.05).linkage.output_angle == pytest.approx(0.1)
+        assert rounded(mounted, angle=0.05).linkage.output_angle == pytest.approx(0.1)
         sliding, geared = judged("slider"), judged("five-bar")
-        assert sliding.rounded(angle=0.25).linkage.pivot.guide_angle == pytest.approx(0.5)  # type: ignore[union-attr]
-        assert sliding.rounded(length=0.01).linkage.pivot.series is sliding.linkage.pivot.series  # type: ignore[union-attr]
-        pivot = geared.rounded(length=1.0, angle=0.5).linkage.pivot
+        assert rounded(sliding, angle=0.25).linkage.pivot.guide_angle == pytest.approx(0.5)  # type: ignore[union-attr]
+        assert rounded(sliding, length=0.01).linkage.pivot.series is sliding.linkage.pivot.series  # type: ignore[union-attr]
+        pivot = rounded(geared, length=1.0, angle=0.5).linkage.pivot
         assert (pivot.length, pivot.phase) == (1.0, 0.5)  # type: ignore[union-attr]
 
     @pytest.mark.parametrize("factor", [1.0, 1e-3, 1e-5])
@@ -326,16 +333,16 @@ class TestRounding:
         """A link is not rounded away, and the error stays in proportion to the linkage."""
         linkage = known().scaled(factor)
         solution = Solution.of(TimedPath(points=off(known().path(turn(9))) * factor), linkage)
-        rounding = solution.rounded()
+        rounding = rounded(solution)
         assert rounding.error == pytest.approx(solution.error, rel=0.3)
-        assert solution.rounded(length=10.0 * linkage.largest_link).linkage.crank_length == 10.0 * linkage.largest_link
+        assert rounded(solution, length=10.0 * linkage.largest_link).linkage.crank_length == 10.0 * linkage.largest_link
 
     @pytest.mark.parametrize("step", [0.0, -1.0, np.nan])
     def test_steps_are_above_zero(self, step: float) -> None:
         with pytest.raises(InputError, match="step of length"):
-            judged("timed").rounded(length=step)
+            rounded(judged("timed"), length=step)
         with pytest.raises(InputError, match="step of angle"):
-            judged("timed").rounded(angle=step)
+            rounded(judged("timed"), angle=step)
 
 
 class TestTradeOff:
@@ -347,7 +354,7 @@ class TestTradeOff:
         self, over: Any, limits: list[float], looser: float
     ) -> None:
         constraints = [LargestLink(length=0.25)] if over == "transmission" else USUAL
-        front = trade_off(TASK, over, limits, constraints=constraints, starts=3)
+        front = trade_off(TASK, over, limits, constraints=constraints, search=Search(starts=3))
         order = np.argsort(looser * np.array(limits))
         errors = front.error[order]
         assert np.all(np.diff(errors) <= 1e-9 * errors[0])
@@ -361,7 +368,7 @@ class TestTradeOff:
 
     def test_an_area_only_grows_as_the_size_is_limited(self) -> None:
         task = UntimedPath(path=TargetPath(points=ELLIPSE, closed=True), samples=24)
-        errors = trade_off(task, "size", [0.2, 0.3, 1.0, 2.0], starts=4).error
+        errors = trade_off(task, "size", [0.2, 0.3, 1.0, 2.0], search=Search(starts=4)).error
         assert np.all(np.diff(errors) <= 0.0)
 
     def test_on_the_way_back_the_tighter_solution_is_kept(self, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -375,7 +382,7 @@ class TestTradeOff:
             return found if len(calls) == 3 else replace(found, solutions=(poor,))
 
         monkeypatch.setattr("analysis.synthesis.solve.synthesize", search)
-        front = trade_off(TASK, "size", [0.4, 0.6, 0.5], starts=1)
+        front = trade_off(TASK, "size", [0.4, 0.6, 0.5], search=Search(starts=1))
         assert len(calls) == 6
         assert front.solutions[0] is front.solutions[1] is front.solutions[2] is not poor
 
@@ -394,7 +401,7 @@ class TestTradeOff:
 
         monkeypatch.setattr("analysis.synthesis.solve.synthesize", search)
         with pytest.raises(TradeOffInterrupted, match=f"stopped after {stop} of 4 problems of the trade-off") as caught:
-            trade_off(TASK, "size", [0.3, 0.6], starts=1)
+            trade_off(TASK, "size", [0.3, 0.6], search=Search(starts=1))
         front = caught.value.trade_off
         there = [s is not None for s in front.solutions]
         # the looser limit is the first
@@ -403,7 +410,7 @@ class TestTradeOff:
 
     def test_where_there_is_none_it_is_masked(self) -> None:
         bounds = {"ground_length": (0.2, 0.3), "crank_length": (0.05, 0.05)}
-        front = trade_off(TASK, "size", [0.1, 0.4], bounds=bounds, starts=2)
+        front = trade_off(TASK, "size", [0.1, 0.4], bounds=bounds, search=Search(starts=2))
         assert front.solutions[0] is None
         assert front.error.mask.tolist() == [True, False]
 
@@ -421,13 +428,9 @@ class TestTradeOff:
 
 
 class TestPrecisionPoints:
-    def met(self, task: PrecisionPoints, **more: Any) -> Solution:
-        options: dict[str, Any] = {
-            "constraints": [FullTurn(), LargestLink(length=6.0)],
-            "starts": 30,
-            "candidates": 1 << 14,
-        }
-        solution = synthesize(task, **options | more).best
+    def met(self, task: PrecisionPoints, starts: int = 30) -> Solution:
+        search = Search(starts=starts, candidates=1 << 14)
+        solution = synthesize(task, constraints=[FullTurn(), LargestLink(length=6.0)], search=search).best
         assert solution.verdicts.sound
         return solution
 
@@ -484,11 +487,13 @@ class TestStraight:
             path=TargetPath(points=points, closed=True), measure="distance", samples=36, straight=straight
         )
         solution = synthesize(
-            task, starts=6, candidates=1 << 13, constraints=[LeastTransmission(), LargestLink(length=4.0)]
+            task,
+            search=Search(starts=6, candidates=1 << 13),
+            constraints=[LeastTransmission(), LargestLink(length=4.0)],
         ).best
         rotation = solution.evaluation.rotation
         assert rotation is not None
-        from analysis.synthesis.tasks import normal_form
+        from analysis.synthesis import normal_form
 
         part = normal_form(task).straight
         assert part is not None
@@ -550,11 +555,11 @@ class TestBadInput:
     @pytest.mark.parametrize(
         ("options", "error", "message"),
         [
-            ({"starts": 0}, InputError, "0 starts: there must be at least one"),
-            ({"candidates": 0}, InputError, "0 candidates"),
-            ({"n_jobs": 0}, InputError, "0 cores"),
+            ({"search": {"starts": 0}}, InputError, "0 starts: there must be at least one"),
+            ({"search": {"candidates": 0}}, InputError, "0 candidates"),
+            ({"search": {"n_jobs": 0}}, InputError, "0 cores"),
             (
-                {"method": "annealing"},
+                {"search": {"method": "annealing"}},
                 InputError,
                 "method 'annealing': it must be one of scan, differential-evolution, simplex",
             ),
@@ -605,12 +610,16 @@ class TestBadInput:
         ],
     )
     def test_calls(self, options: dict[str, Any], error: type[Exception] | None, message: str) -> None:
+        def called() -> Synthesis:
+            rest = {name: value for name, value in options.items() if name != "search"}
+            return synthesize(TASK, **rest, search=replace(QUICK, **options.get("search", {})))
+
         if error is None:
             # silly, and yet feasible: answered
-            assert synthesize(TASK, **QUICK | options).best.error > 10.0
+            assert called().best.error > 10.0
             return
         with refused(message, error):
-            synthesize(TASK, **QUICK | options)
+            called()
 
     def test_precision_points_have_no_weights(self) -> None:
         with refused("they have no weights"):
@@ -641,7 +650,9 @@ def test_a_crank_that_need_not_turn_fully_does_not() -> None:
     rotation = np.linspace(-0.9, 0.9, 15)
     task = TimedPath(points=linkage.path(rotation), rotation=rotation)
     solution = synthesize(
-        task, constraints=[LeastTransmission(angle=radians(20), over="task")], starts=10, candidates=1 << 14
+        task,
+        constraints=[LeastTransmission(angle=radians(20), over="task")],
+        search=Search(starts=10, candidates=1 << 14),
     ).best
     assert solution.evaluation.worst < 1e-3
     assert solution.verdicts.sound
@@ -651,15 +662,15 @@ class TestLimits:
     """What is asked over the turn and over the way of the task, and what is returned keeps its bounds."""
 
     def test_an_open_end_is_the_usual_one(self) -> None:
-        whole = synthesize(TASK, {"crank_length": (None, None)}, **QUICK)
-        assert whole.best.error == synthesize(TASK, **QUICK).best.error
-        assert synthesize(TASK, {"crank_length": (0.04, np.inf)}, **QUICK).best.linkage.crank_length >= 0.04
+        whole = synthesize(TASK, {"crank_length": (None, None)}, search=QUICK)
+        assert whole.best.error == synthesize(TASK, search=QUICK).best.error
+        assert synthesize(TASK, {"crank_length": (0.04, np.inf)}, search=QUICK).best.linkage.crank_length >= 0.04
 
     def test_over_the_turn_and_over_the_task_are_two_limits(self) -> None:
         points = np.column_stack([np.linspace(0.0, 0.1, 6), np.zeros(6)])
         task = TimedPath(points=points, rotation=np.linspace(0.0, 0.8, 6))
         both = (LeastTransmission(angle=radians(15.0)), LeastTransmission(angle=radians(60.0), over="task"))
-        best = synthesize(task, constraints=both, **QUICK).best
+        best = synthesize(task, constraints=both, search=QUICK).best
         assert best.linkage.least_transmission >= radians(15.0) - 1e-6
         assert (
             min(best.verdicts.least_transmission, np.pi - best.verdicts.greatest_transmission) >= radians(60.0) - 1e-4
@@ -672,23 +683,23 @@ class TestLimits:
 
     @pytest.mark.parametrize("low", [3.5, -3.5])
     def test_angles_are_returned_within_their_bounds(self, low: float) -> None:
-        best = synthesize(TASK, {"ground_angle": (low, low + 0.5)}, **QUICK).best
+        best = synthesize(TASK, {"ground_angle": (low, low + 0.5)}, search=QUICK).best
         assert low <= best.linkage.ground_angle <= low + 0.5
 
     def test_a_required_angle_is_the_one_that_is_returned(self) -> None:
         asked = Require(function=lambda p: p.ground_angle - 2.0, equal=True, name="ground angle")
-        best = synthesize(TASK, constraints=(*USUAL, asked), **QUICK).best
+        best = synthesize(TASK, constraints=(*USUAL, asked), search=QUICK).best
         assert best.linkage.ground_angle == pytest.approx(2.0, abs=1e-6)
 
     def test_two_links_may_be_fixed(self) -> None:
-        best = synthesize(TASK, {"ground_length": (0.3, 0.3), "crank_length": (0.06, 0.06)}, **QUICK).best
+        best = synthesize(TASK, {"ground_length": (0.3, 0.3), "crank_length": (0.06, 0.06)}, search=QUICK).best
         assert (best.linkage.ground_length, best.linkage.crank_length) == pytest.approx((0.3, 0.06), rel=1e-9)
 
     def test_a_grashof_type_is_no_change_point(self) -> None:
         points = np.column_stack([np.linspace(0.0, 0.1, 5), 0.02 * np.linspace(-1.0, 1.0, 5) ** 2])
         task = TimedPath(points=points, rotation=np.linspace(0.0, 1.5, 5))
         for type_ in ("rocker-crank", "double-rocker"):
-            result = synthesize(task, constraints=(Grashof(type=type_),), **QUICK)  # type: ignore[arg-type]
+            result = synthesize(task, constraints=(Grashof(type=type_),), search=QUICK)  # type: ignore[arg-type]
             assert {s.linkage.grashof for s in result.solutions} == {type_}
             assert result.best.verdicts.sound
 
@@ -702,20 +713,23 @@ class TestLimits:
         task = TimedPath(points=np.column_stack([0.2 + 0.1 * np.cos(turn(24)), 0.15 + 0.05 * np.sin(turn(24))]))
         cap = LargestLink(length=1.1285)
         region = PivotRegion(pivot="A", polygon=notched)
-        best = synthesize(task, constraints=(*USUAL, cap, region), starts=8, candidates=1 << 13).best
+        best = synthesize(task, constraints=(*USUAL, cap, region), search=Search(starts=8, candidates=1 << 13)).best
         boxes = [
             {"pivot_x": (x - half, x - 0.01), "pivot_y": (y - half, y + half)},
             {"pivot_x": (x + 0.01, x + half), "pivot_y": (y - half, y + half)},
             {"pivot_x": (x - half, x + half), "pivot_y": (y - 0.016, y + half)},
         ]
-        inner = min(synthesize(task, box, (*USUAL, cap), starts=8, candidates=1 << 13).best.error for box in boxes)
+        inner = min(
+            synthesize(task, box, (*USUAL, cap), search=Search(starts=8, candidates=1 << 13)).best.error
+            for box in boxes
+        )
         assert best.error <= inner * (1.0 + 1e-6)
 
     def test_exact_points_are_ranked_by_their_transmission_angle(self) -> None:
-        known = synthesize(TASK, **QUICK).best.linkage
+        known = synthesize(TASK, search=QUICK).best.linkage
         at = np.linspace(0.0, 4.0, 4)
         task = PrecisionPoints(points=known.path(at), rotation=at)
-        found = [s for s in synthesize(task, **QUICK).solutions if s.error < 1e-18]
+        found = [s for s in synthesize(task, search=QUICK).solutions if s.error < 1e-18]
         assert len(found) > 1
         angles = [s.linkage.least_transmission for s in found]
         assert angles == sorted(angles, reverse=True)
@@ -730,7 +744,7 @@ class TestLimits:
 
     def test_weights_of_an_area_are_in_its_error(self) -> None:
         path = TargetPath(points=ELLIPSE, closed=True)
-        linkage = synthesize(UntimedPath(path=path, samples=24), **QUICK).best.linkage
+        linkage = synthesize(UntimedPath(path=path, samples=24), search=QUICK).best.linkage
         shifted = replace(linkage, pivot_x=linkage.pivot_x + 1e-3)
         plain, twice = (
             Solution.of(UntimedPath(path=path, weights=np.full(len(ELLIPSE), w)), shifted).error for w in (1.0, 2.0)

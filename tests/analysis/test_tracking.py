@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from math import pi
+from math import inf, pi
 
 import numpy as np
 import pytest
 
 from analysis.linear.linearise import find_equilibrium, linearise, linearise_along
 from analysis.linear.slider_control import SampledController, control_loop, design_lqr, design_pid
-from analysis.motion.inverse import inverse_dynamics
-from analysis.motion.tracking import TrackingController, track
+from analysis.motion import TrackingController, inverse_dynamics, track
 from analysis.numerics.fourier import FourierSeries
 from linkwork.errors import AssemblyError, InputError
 from linkwork.five_bar import kinematics
@@ -43,8 +42,13 @@ def pid(model):
     return design_pid(model, bandwidth=150.0)
 
 
-def run(**options):
-    return track(RIG, MOTION, crank_speed=SPEED, **{"period": PERIOD} | options)
+def run(
+    model=RIG, motion=MOTION, *, period=PERIOD, design=None, feedforward=True, known=(0.0, 0.0), limit=inf, **options
+):
+    controller = TrackingController(
+        model, motion, period, design=design, feedforward=feedforward, load=known, limit=limit
+    )
+    return track(controller, **{"crank_speed": SPEED} | options)
 
 
 def test_the_mean_model_is_one_along_the_reference(model) -> None:
@@ -60,7 +64,7 @@ def test_the_feed_forward_error_goes_with_the_square_of_the_period() -> None:
 
 
 def test_the_known_load_is_fed_forward() -> None:
-    known = run(load=load, known_load=load, tolerance=1e-12).metrics()
+    known = run(load=load, known=load, tolerance=1e-12).metrics()
     unknown = run(load=load).metrics()
     assert known.rms_error < 1e-6
     assert unknown.rms_error > 300.0 * known.rms_error
@@ -110,7 +114,7 @@ def test_the_run_may_start_anywhere_and_go_backwards(pid) -> None:
         slider_position=float(MOTION(start)),
         slider_velocity=-SPEED * float(MOTION.derivative()(start)),
     )
-    result = track(RIG, MOTION, crank_speed=-SPEED, period=PERIOD, design=pid, initial=at, revolutions=3)
+    result = run(crank_speed=-SPEED, design=pid, initial=at, revolutions=3)
     assert np.abs(result.error).max() < 2e-6
     assert result.loop.reference == pytest.approx(MOTION(start - SPEED * result.loop.time), abs=1e-12)
 
@@ -148,9 +152,7 @@ def test_feedback_alone_holds_a_still_slider_as_the_control_loop_does(model) -> 
     still = FourierSeries.constant(0.003)
     design = design_lqr(model, {"slider.position": 1e7, "slider.velocity": 1e2}, integral=1e9)
     start = InitialState(slider_position=0.0)
-    result = track(
-        RIG, still, crank_speed=SPEED, period=PERIOD, design=design, feedforward=False, initial=start, revolutions=2
-    )
+    result = run(RIG, still, design=design, feedforward=False, initial=start, revolutions=2)
     loop = control_loop(
         RIG, SampledController(design, PERIOD), 0.003, initial=start, stop_time=4.0 * pi / SPEED, crank_speed=SPEED
     )
@@ -185,7 +187,7 @@ def test_the_fmu_is_followed_as_the_plant_is(fmu, pid) -> None:
 def test_a_run_that_loses_the_assembly_ends_there() -> None:
     """Without damper and feedback, and the force off by the wrong spring, table 3.1 comes apart."""
     soft = replace(TABLE_3_1, slider_stiffness=0.0, slider_damping=0.0)
-    result = track(TABLE_3_1, MOTION, crank_speed=44.0, period=PERIOD, plant=soft)
+    result = run(TABLE_3_1, MOTION, crank_speed=44.0, plant=soft)
     assert result.loop.status == 3
     assert len(result.error) == len(result.power) == len(result.point_error) == len(result.loop.time) < 1400
     with pytest.raises(InputError, match="did not reach its end: in the step"):
@@ -202,9 +204,9 @@ def test_bad_runs_are_told(pid) -> None:
     with pytest.raises(InputError, match="-1 revolutions"):
         run(revolutions=-1)
     with pytest.raises(InputError, match="crank speed is 0"):
-        track(RIG, MOTION, crank_speed=0.0, period=PERIOD)
+        run(crank_speed=0.0)
     with pytest.raises(AssemblyError, match="cannot be followed beyond"):
-        track(RIG, MOTION * 100.0, crank_speed=SPEED, period=PERIOD)
+        run(RIG, MOTION * 100.0)
     rest = find_equilibrium(TABLE_3_1)
     free = design_lqr(linearise(TABLE_3_1, rest.state, rest.inputs), {"slider.position": 1e6, "crank.angle": 1.0})
     with pytest.raises(InputError, match="designed for a free crank"):

@@ -11,10 +11,11 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from analysis.motion.variational import VariationalMotion, _path, variational_motion
+from analysis.motion import VariationalMotion, variational_motion
+from analysis.motion.variational import _path
 from analysis.numerics.fourier import FourierSeries
+from analysis.synthesis import Linkage, SecondCrank, SliderMotion
 from analysis.synthesis.kernels import link_directions
-from analysis.synthesis.linkage import Linkage, SecondCrank, SliderMotion
 from linkwork.errors import AssemblyError, InputError, ParameterError
 
 FloatArray = NDArray[np.float64]

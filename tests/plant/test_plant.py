@@ -25,14 +25,14 @@ from linkwork.errors import (
     StateError,
     StepError,
 )
+from linkwork.five_bar.assembly import check_assembly
 from linkwork.five_bar.parameters import InitialState
-from linkwork.five_bar.plant import Plant, check_assembly
 from linkwork.five_bar.published import SETS, TABLE_3_1
 from linkwork.limits import LIMIT_SINE
-from linkwork.plant import MechanismPlant, check_tolerance
+from linkwork.plant import MechanismPlant, Plant, check_tolerance
+from linkwork.plant import Plant as SliderCrankPlant
 from linkwork.slider_crank import dynamics
 from linkwork.slider_crank.parameters import InitialState as SliderCrankStart
-from linkwork.slider_crank.plant import Plant as SliderCrankPlant
 from linkwork.slider_crank.published import CRANK_SPEED, OFFSET_CASE, parameters
 from tests import published, slider_cranks, strategies
 from tests.published import CM, DYN_CM, DYN_S_PER_CM

@@ -10,7 +10,7 @@ import click
 import numpy as np
 from click.core import ParameterSource
 
-from linkwork.slider_crank.plant import check_assembly
+from linkwork.slider_crank.assembly import check_assembly
 
 from ... import slider_crank as analysis
 from ..common import CHECK_FAILED, console, errors, show_table, tolerance_option
@@ -88,7 +88,7 @@ def dual(chosen: Chosen, problem: Problem, tolerance: float, two_rotations: bool
 
 def _show_two_rotations(chosen: Chosen, points: int, folder: Path) -> None:
     """Show where the thesis's iteration ends over the turn."""
-    from ...files import io
+    from ...files import write_csv
 
     angle = np.linspace(0.0, tau, points)
     shift = np.array([chosen.shift_at(float(a)) for a in angle])
@@ -124,4 +124,4 @@ def _show_two_rotations(chosen: Chosen, points: int, folder: Path) -> None:
         highlight=False,
         soft_wrap=True,
     )
-    wrote([io.write_csv(folder / f"{chosen.name}-two-rotations.csv", columns)])
+    wrote([write_csv(folder / f"{chosen.name}-two-rotations.csv", columns)])

@@ -47,7 +47,7 @@ def forces(chosen: Chosen, problem: Problem, frames: Sequence[int], out: str, pl
       linkwork slider-crank forces --load '-20 lbf' --frame 2 --frame 4
       linkwork slider-crank forces crank.toml --speed '300 rpm' --out results
     """
-    from ...files import io
+    from ...files import save_figure, write_csv
 
     units, frames = chosen.units, tuple(dict.fromkeys(frames))
     turn = problem.turn(chosen)
@@ -60,12 +60,12 @@ def forces(chosen: Chosen, problem: Problem, frames: Sequence[int], out: str, pl
     for sentence in _special_places(turn, units):
         console.print(sentence, highlight=False, soft_wrap=True)
     stem = str(Path(out) / f"{chosen.name}-forces")
-    written = [io.write_csv(f"{stem}.csv", turn.columns(units.system))]
+    written = [write_csv(f"{stem}.csv", turn.columns(units.system))]
     if plot:
         for frame in frames:
             title = f"{chosen.title}: joint forces in frame {frame}"
             figure = figures.plot(turn, frame, units=units.system, title=title)
-            written.append(io.save_figure(figure, f"{stem}-frame-{frame}.png"))
+            written.append(save_figure(figure, f"{stem}-frame-{frame}.png"))
     wrote(written)
 
 

@@ -97,7 +97,7 @@ def picture(
       linkwork slider-crank picture --published rahman-a4-20-alpha4-310 --animate
       linkwork slider-crank picture --set rod.length='30 in' --offset '20 in' --angle '180 deg' --range
     """
-    from ...files import io
+    from ...files import save_figure
 
     p, stem = chosen.parameters, str(Path(out) / chosen.name)
     at = quantity(angle, "rad", "--angle")
@@ -109,9 +109,9 @@ def picture(
     seen = common
     if view is not None:
         seen = common | {"view": tuple(degrees(quantity(text, "rad", "--view")) for text in view)}
-    written = [io.save_figure(figures.plot_mechanism(p, at, chosen.shift_at(at), **seen), f"{stem}.png")]
+    written = [save_figure(figures.plot_mechanism(p, at, chosen.shift_at(at), **seen), f"{stem}.png")]
     if with_range:
-        written.append(io.save_figure(figures.plot_range(p, **common), f"{stem}-range.png"))
+        written.append(save_figure(figures.plot_range(p, **common), f"{stem}-range.png"))
     if animate:
         with console.status(f"drawing {frames} pictures"):
             written.append(figures.animate(p, f"{stem}.gif", frames=frames, **seen))

@@ -101,7 +101,9 @@ class _MechanismOptions:
         LinkworkError
             If a file, a name or a value is wrong.
         """
-        from ...files import io
+        from ...files import unknown_name
+        from ...run.case_files import load_parameters, parameters_from
+        from ...units import quantity
 
         units = Units(self.units)
         start, speed = 0.0, SETS[DEFAULT].crank_speed
@@ -109,7 +111,7 @@ class _MechanismOptions:
         if self.file is not None:
             if self.published is not None:
                 raise click.UsageError("give either a file of parameters or --published NAME")
-            loaded = io.load_parameters(self.file)
+            loaded = load_parameters(self.file)
             if not isinstance(loaded, SliderCrankParameters):
                 raise InputError(
                     f'{self.file} is of a five-bar: for a slider-crank it must begin with mechanism = "slider-crank"'
@@ -121,7 +123,7 @@ class _MechanismOptions:
             title, parameters = case.source, case.parameters
             start, speed = case.initial.shift_position, case.crank_speed
         else:
-            raise io.unknown_name(name, SETS)
+            raise unknown_name(name, SETS)
         values = changes(self.settings, number_or_text, "rod.length='45 in'")
         for key, text in (("guide.offset", self.offset), ("guide.twist", self.twist)):
             if text is not None:
@@ -133,7 +135,7 @@ class _MechanismOptions:
         if self.speed is not None:
             speed = quantity(self.speed, "rad/s", "--speed")
         if values:
-            changed = io.parameters_from(values, parameters)
+            changed = parameters_from(values, parameters)
             assert isinstance(changed, SliderCrankParameters)
             parameters = changed
         self._check_groove(parameters, values)
@@ -288,9 +290,9 @@ def with_problem(points: int) -> Callable[[Command], Command]:
 
 def quantity(text: str, unit: str, name: str) -> float:
     """An option's value in SI."""
-    from ...files import io
+    from ...units import quantity
 
-    return io.quantity(number_or_text(text), unit, name)
+    return quantity(number_or_text(text), unit, name)
 
 
 def note(text: str) -> None:

@@ -80,7 +80,7 @@ def tolerances(
       linkwork slider-crank tolerances --tolerance guide.offset='0.5 mm' --tolerance guide.twist='0.2 deg'
       linkwork slider-crank tolerances --quantity slider.position --quantity crank_pin.fz --load '-20 lbf' --seed 7
     """
-    from ...files import io
+    from ...files import save_figure, write_csv
 
     at = _in_the_turn(quantity(angle, "rad", "--angle"), chosen)
     units, quantities = chosen.units, tuple(dict.fromkeys(quantities))
@@ -104,15 +104,15 @@ def tolerances(
     with console.status(f"{samples} samples at {len(turn)} crank angles"):
         found = analysis.monte_carlo(turn, allowed, quantities=quantities, samples=samples, seed=seed)
     stem = str(Path(out) / chosen.name)
-    files = [io.write_csv(f"{stem}-sensitivities.csv", slopes)]
-    files.append(io.write_csv(f"{stem}-tolerances.csv", _spread_columns(found, units)))
+    files = [write_csv(f"{stem}-sensitivities.csv", slopes)]
+    files.append(write_csv(f"{stem}-tolerances.csv", _spread_columns(found, units)))
     _show_spread(found, place, f"{chosen.title}: spread at {here}, {samples} samples", units)
     for message in found.notes(units.system):
         note(message)
     if plot:
         for name in quantities:
             figure = figures.plot(found, name, at, units=units.system, title=f"{chosen.title}: {name}")
-            files.append(io.save_figure(figure, f"{stem}-tolerances-{name}.png"))
+            files.append(save_figure(figure, f"{stem}-tolerances-{name}.png"))
     wrote(files)
 
 
@@ -140,13 +140,13 @@ def _in_the_turn(angle: float, chosen: Chosen) -> float:
 
 def _tolerance(text: str, distribution: str) -> Tolerance:
     """A tolerance from NAME=HALF_WIDTH."""
-    from ...files import io
+    from ...files import unknown_name
 
     name, equals, value = (part.strip() for part in text.partition("="))
     if not equals:
         raise click.UsageError(f"--tolerance {text!r}: it must be NAME=HALF_WIDTH, such as guide.offset='0.5 mm'")
     if name not in analysis.ERRORS:
-        raise io.unknown_name(name, analysis.ERRORS)
+        raise unknown_name(name, analysis.ERRORS)
     width = quantity(value, analysis.ERRORS[name], name)
     return analysis.Tolerance(name, half_width=width, distribution=distribution)
 

@@ -1,0 +1,63 @@
+"""Pictures of the slider's motion: what it takes to drive it, how well it is followed, and what less effort looks like."""
+
+from __future__ import annotations
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from ..motion import LeastEffort, SliderDrive, TrackingResult
+from .curves import Curve, Panel, plot_curves
+from .dispatch import plot
+
+
+@plot.register
+def plot_drive(drive: SliderDrive, *, title: str = "") -> Figure:
+    """Position, force, power and pin forces over the turn."""
+    x = np.degrees(np.abs(drive.crank_angle))
+    parts = [
+        ("slider position [mm]", [Curve(x=x, y=1e3 * drive.states[:, 1])]),
+        ("control force [N]", [Curve(x=x, y=drive.force)]),
+        ("power of the force [W]", [Curve(x=x, y=drive.power)]),
+        ("crank torque [N.m]", [Curve(x=x, y=drive.torque)]),
+        ("transmission angle [deg]", [Curve(x=x, y=np.degrees(drive["transmission.angle"]))]),
+        ("pin forces [N]", [Curve(x=x, y=drive.pin_force(pin), label=pin) for pin in "ABCD"]),
+    ]
+    ticks = [0.0, 90.0, 180.0, 270.0, 360.0]
+    panels = [
+        Panel(x_label="crank angle [deg]", y_label=label, curves=curves, x_ticks=ticks, legend_at="outside")
+        for label, curves in parts
+    ]
+    return plot_curves(panels, title=title, columns=2, size=(4.4, 2.4))
+
+
+@plot.register
+def plot_tracking(run: TrackingResult, *, title: str = "") -> Figure:
+    """Errors of slider and coupler point, and the force, over the time of the run."""
+    time = run.loop.time
+    panels = [
+        Panel(x_label="time [s]", y_label=label, curves=[Curve(x=time, y=values)])
+        for label, values in (
+            ("slider error [mm]", 1e3 * run.error),
+            ("coupler point error [mm]", 1e3 * run.point_error),
+            ("control force [N]", run.loop.force),
+        )
+    ]
+    return plot_curves(panels, title=title or f"Tracking: {run.method}", size=(6.4, 2.2))
+
+
+@plot.register
+def plot_least_effort(least: LeastEffort, *, before: SliderDrive, title: str = "Motion of least effort") -> Figure:
+    """Position and force of least effort beside those of the motion before."""
+    x, old = np.degrees(least.crank_angle), np.degrees(before.crank_angle)
+    panels = [
+        Panel(
+            x_label="crank angle [deg]",
+            y_label=label,
+            curves=[Curve(x=old, y=first, label="before"), Curve(x=x, y=second, label="least effort")],
+        )
+        for label, first, second in (
+            ("slider position [mm]", 1e3 * before.states[:, 1], 1e3 * least.position),
+            ("control force [N]", before.force, least.force),
+        )
+    ]
+    return plot_curves(panels, title=title, size=(6.4, 2.6))

@@ -1,0 +1,251 @@
+"""What a search varies: the unknowns of a moved pivot, and starts and answers as vectors in normal form."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from math import inf, isfinite, pi
+
+import numpy as np
+from numpy.typing import NDArray
+
+from linkwork.errors import ParameterError
+
+from ..numerics.fourier import FourierSeries
+from .constraints import UNKNOWNS, Limits
+from .linkage import Linkage, SecondCrank, SliderMotion
+from .tasks import Normal
+
+FloatArray = NDArray[np.float64]
+
+#: Amplitudes at which the motion of a pivot is started, as shares of the ground link.
+AMPLITUDE = 0.1
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SliderUnknown:
+    """A slider whose motion is sought: a Fourier series with this many harmonics.
+
+    Attributes
+    ----------
+    harmonics : int
+        0 is a slider set once.
+    guide_angle : (float, float)
+        Bounds (rad); equal ones fix it.
+    position : (float, float), optional
+        Least and greatest slider position (m); by default one ground link to either side of its end, beyond which it would be
+        another linkage.
+    stroke : float
+        Greatest distance between the ends of its travel (m).
+    speed, acceleration : float
+        Greatest |du/dphi| (m/rad) and |d2u/dphi2| (m/rad2).
+    smoothness : float
+        Weight of the mean of (d2u/dphi2)^2 (1/rad4) added to the quality: trades error for smoothness.
+    """
+
+    harmonics: int
+    guide_angle: tuple[float, float] = (-pi, pi)
+    position: tuple[float, float] | None = None
+    stroke: float = inf
+    speed: float = inf
+    acceleration: float = inf
+    smoothness: float = 0.0
+
+    def __post_init__(self) -> None:
+        if self.harmonics < 0:
+            raise ParameterError("harmonics", self.harmonics, "be zero or greater")
+        low, high = self.guide_angle
+        if not (isfinite(low) and isfinite(high) and low <= high):
+            raise ParameterError("bounds of guide_angle", self.guide_angle, "be two finite angles in order (rad)")
+        if self.position is not None:
+            low, high = self.position
+            if not (isfinite(low) and isfinite(high) and low < high):
+                raise ParameterError(
+                    "bounds of slider position", self.position, "be two finite lengths, increasing (m)"
+                )
+        for name in ("stroke", "speed", "acceleration"):
+            if not getattr(self, name) > 0.0:
+                raise ParameterError(f"greatest {name}", getattr(self, name), "be greater than zero")
+        if not (isfinite(self.smoothness) and self.smoothness >= 0.0):
+            raise ParameterError("smoothness", self.smoothness, "be a finite number, zero or greater")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CrankUnknown:
+    """A second crank whose length, phase and, with ``harmonics``, independent rotation are sought.
+
+    Attributes
+    ----------
+    ratio : int
+        Turns for one of the first crank.
+    length : (float, float)
+        Bounds (m).
+    harmonics : int
+        Of the rotation added to the geared one; 0 of gears.
+    speed : float
+        Greatest deviation of d psi/d phi from the ratio.
+    """
+
+    ratio: int
+    length: tuple[float, float]
+    harmonics: int = 0
+    speed: float = inf
+
+    def __post_init__(self) -> None:
+        low, high = self.length
+        if not (isfinite(low) and isfinite(high) and 0.0 < low <= high):
+            raise ParameterError("bounds of the second crank", self.length, "be two lengths above zero, in order (m)")
+        if self.harmonics < 0 or self.ratio != int(self.ratio):
+            raise ParameterError(
+                "second crank", (self.ratio, self.harmonics), "have whole numbers of turns and harmonics"
+            )
+
+
+PivotUnknown = SliderUnknown | CrankUnknown
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Start:
+    """Where a search starts, or ends, in normal form.
+
+    Attributes
+    ----------
+    q : ndarray, shape (11,)
+        Of `constraints.UNKNOWNS`.
+    branch : int
+    pivot : ndarray
+        Unknowns of the moved pivot: guide angle, mean, cosines and sines in turn; or length, phase, cosines and sines.
+    rotation : ndarray, shape (n,), or None
+        Crank rotations of the stations where they are unknown.
+    quality : float
+        In units squared.
+    """
+
+    q: FloatArray
+    branch: int
+    quality: float = inf
+    pivot: FloatArray = field(default_factory=lambda: np.empty(0))
+    rotation: FloatArray | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Answer:
+    """What IPOPT says: where it ended, whether that satisfies every constraint, which it violates most, and its own word."""
+
+    start: Start
+    feasible: bool
+    converged: bool
+    violation: float
+    worst: str
+    status: str
+    iterations: int
+
+    @classmethod
+    def unjoined(cls, start: Start) -> Answer:
+        """Of a start whose links cannot be joined."""
+        return cls(
+            start=replace(start, quality=inf),
+            feasible=False,
+            converged=False,
+            violation=inf,
+            worst="loop closure",
+            status="the links cannot be joined at the start",
+            iterations=0,
+        )
+
+
+def random_pivot(unknown: PivotUnknown, ground: float, unit: float, random: np.random.Generator) -> FloatArray:
+    """Unknowns of a pivot at random: harmonics that fall off with their order, within the bounds of stroke and length.
+
+    Parameters
+    ----------
+    ground : float
+        Ground link (units).
+    unit : float
+        m.
+    """
+    orders = np.repeat(np.arange(1, unknown.harmonics + 1), 2)
+    waves = random.standard_normal(2 * unknown.harmonics) / (1.0 + orders)
+    if isinstance(unknown, CrankUnknown):
+        length = random.uniform(*unknown.length) / unit
+        return np.array([length, random.uniform(-pi, pi), *(0.3 * waves)])
+    low, high = unknown.guide_angle
+    # a guide is the same one from its other end
+    angle = low + min(high - low, pi) * random.random()
+    size = min(AMPLITUDE * ground, 0.25 * unknown.stroke / unit)
+    return np.array([angle, size * random.standard_normal(), *(size * waves)])
+
+
+def pivot_size(pivot: PivotUnknown | None) -> int:
+    """Number of the pivot's unknowns."""
+    if pivot is None:
+        return 0
+    return 2 + 2 * pivot.harmonics
+
+
+def pivot_bounds(pivot: PivotUnknown | None, unit: float) -> tuple[FloatArray, FloatArray]:
+    if pivot is None:
+        return np.empty(0), np.empty(0)
+    low, high = np.full(pivot_size(pivot), -inf), np.full(pivot_size(pivot), inf)
+    if isinstance(pivot, SliderUnknown):
+        low[0], high[0] = pivot.guide_angle
+    else:
+        low[0], high[0] = pivot.length[0] / unit, pivot.length[1] / unit
+    return low, high
+
+
+def inside(q: FloatArray, low: FloatArray, high: FloatArray) -> FloatArray:
+    """Unknowns within their bounds, angles by whole turns where that is enough."""
+    q = q.copy()
+    angles = slice(UNKNOWNS.index("ground_angle"), len(UNKNOWNS))
+    middle = 0.5 * (low[angles] + high[angles])
+    nearest = middle + (q[angles] - middle + pi) % (2.0 * pi) - pi
+    outside = (q[angles] < low[angles]) | (q[angles] > high[angles])
+    q[angles] = np.where(outside, nearest, q[angles])
+    return np.clip(q, low, high)
+
+
+def linkage_of(
+    start: Start, normal: Normal, pivot: PivotUnknown | None = None, limits: Limits | None = None
+) -> Linkage:
+    """The linkage of a start, in SI; its angles within a half turn of zero, or else within their limits."""
+    q = start.q.copy()
+    q[:7] *= normal.unit
+    q[0] += normal.origin.real
+    q[1] += normal.origin.imag
+    angles = slice(UNKNOWNS.index("ground_angle"), len(UNKNOWNS))
+    wrapped = (q[angles] + pi) % (2.0 * pi) - pi
+    if limits is not None:
+        outside = (wrapped < limits.low[angles]) | (wrapped > limits.high[angles])
+        wrapped = np.where(outside, q[angles], wrapped)
+    q[angles] = wrapped
+    v = start.pivot
+    moved: SliderMotion | SecondCrank | None = None
+    if isinstance(pivot, SliderUnknown) and len(v):
+        cosines, sines = np.append(v[1], v[2::2]), np.append(0.0, v[3::2])
+        moved = SliderMotion(FourierSeries(normal.unit * cosines, normal.unit * sines), float(v[0]))
+    elif isinstance(pivot, CrankUnknown) and len(v):
+        series = FourierSeries(np.append(0.0, v[2::2]), np.append(0.0, v[3::2]))
+        moved = SecondCrank(normal.unit * float(v[0]), pivot.ratio, float(v[1]), series)
+    return Linkage.from_vector(q, start.branch, pivot=moved)
+
+
+def start_of(
+    linkage: Linkage, normal: Normal, pivot: PivotUnknown | None = None, rotation: FloatArray | None = None
+) -> Start:
+    """A linkage as a start; the pivot's motion is cut off after, or filled up to, the harmonics sought."""
+    q = np.append(linkage.vector, linkage.output_angle)
+    q[0] -= normal.origin.real
+    q[1] -= normal.origin.imag
+    q[:7] /= normal.unit
+    v = np.zeros(pivot_size(pivot))
+    if isinstance(pivot, SliderUnknown) and isinstance(linkage.pivot, SliderMotion):
+        series = linkage.pivot.series.to_order(pivot.harmonics)
+        v[0], v[1] = linkage.pivot.guide_angle, series.mean / normal.unit
+        v[2::2], v[3::2] = series.cos[1:] / normal.unit, series.sin[1:] / normal.unit
+    elif isinstance(pivot, CrankUnknown):
+        v[0] = pivot.length[0] / normal.unit
+        if isinstance(linkage.pivot, SecondCrank):
+            series = linkage.pivot.series.to_order(pivot.harmonics)
+            v[0], v[1] = linkage.pivot.length / normal.unit, linkage.pivot.phase
+            v[2::2], v[3::2] = series.cos[1:], series.sin[1:]
+    return Start(q=q, branch=linkage.branch, pivot=v, rotation=rotation)
