@@ -106,7 +106,7 @@ def _moved(chosen: SliderCase) -> tuple[Any, Interrupted | None]:
     stopped = None
     four_bar = chosen.four_bar(progress=console.is_terminal)
     found = [four_bar]
-    for harmonics in chosen.harmonics:
+    for harmonics in chosen.slider.harmonics:
         try:
             result = chosen.move(four_bar, harmonics, tuple(found[1:]), progress=console.is_terminal)
         except SynthesisInterrupted as error:
@@ -209,7 +209,7 @@ def _dynamics(chosen: SliderCase, solution: Solution, folder: Path, plots: bool)
     written += _plotted(plots, drive, folder / "motion.png", title=title)
     if chosen.tracking is not None:
         written += _tracking(chosen, drive, folder, plots)
-    if chosen.effort is not None:
+    if chosen.least_effort is not None:
         written += _effort(chosen, drive, solution.linkage, folder, plots)
     return written
 
@@ -279,7 +279,7 @@ def _effort(chosen: SliderCase, drive: SliderDrive, linkage: Linkage, folder: Pa
     from ..files import write_csv
     from ..synthesis import error_unit
 
-    assert chosen.effort is not None
+    assert chosen.least_effort is not None
     with console.status("least effort"):
         least = chosen.relaxed(drive, linkage)
     scale, unit = error_unit(chosen.synthesis.task)
@@ -289,7 +289,7 @@ def _effort(chosen: SliderCase, drive: SliderDrive, linkage: Linkage, folder: Pa
         ("peak force", f"{np.abs(least.force).max():.5g} N"),
         (
             "departure allowed, and found by a run",
-            f"{scale * chosen.effort.bound:.4g}, {scale * least.attained:.4g} {unit}",
+            f"{scale * chosen.least_effort.bound:.4g}, {scale * least.attained:.4g} {unit}",
         ),
         ("change of effort as the intervals are halved", f"{least.mesh_effort:.1e}"),
     ]

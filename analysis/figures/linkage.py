@@ -20,6 +20,7 @@ from linkwork.five_bar import kinematics
 from linkwork.five_bar.parameters import FiveBarParameters
 
 from ..run import Trajectory
+from ..units import CM_PER_METRE
 from .animation import gif
 from .dispatch import plot
 from .style import STYLE, Figure, finish

@@ -35,14 +35,28 @@ from ..files import (
 from ..linear.linearise import linearise_along
 from ..linear.slider_control import design_pid
 from ..run.case_files import parameters_to
-from ..synthesis.cases import SynthesisCase, direction, synthesis_case_from
-from ..synthesis.constraints import Assembly, Constraint
-from ..synthesis.linkage import ANGLES, LENGTHS, LINKS, Linkage
-from ..synthesis.program import SliderUnknown
-from ..synthesis.solution import Solution
-from ..synthesis.solve import Synthesis, synthesize
-from ..synthesis.tasks import RockerFunction, Task, TimedPath, UntimedPath
+from ..synthesis import (
+    ANGLES,
+    LENGTHS,
+    LINKS,
+    Assembly,
+    Constraint,
+    Linkage,
+    RockerFunction,
+    Search,
+    SliderUnknown,
+    Solution,
+    Synthesis,
+    SynthesisCase,
+    Task,
+    TimedPath,
+    UntimedPath,
+    direction,
+    synthesis_case_from,
+    synthesize,
+)
 from ..units import with_unit
+from .collocation import Collocation, Effort, MotionLimits
 from .inverse import SliderDrive, best_spring, inverse_dynamics
 from .least_effort import LeastEffort, least_effort
 from .motion import motion_of_plant, slider_motion
@@ -224,7 +238,7 @@ class SliderCase:
             return Solution.of(task, self.linkage)
         # where it is on the way of the task is not given: found with every dimension fixed
         only, seed = (Assembly(branch=self.linkage.branch),), self.synthesis.search.seed
-        return synthesize(task, _kept(self.linkage), only, seed=seed, candidates=1 << 10, starts=4, solutions=1).best
+        return synthesize(task, _kept(self.linkage), only, search=Search(seed=seed, candidates=1 << 10, starts=4, solutions=1)).best
 
     def move(self, four_bar: Solution, harmonics: int, guesses: tuple[Solution, ...], *, progress: bool) -> Synthesis:
         """The best motion with so many harmonics; see `slider_motion`."""
@@ -237,11 +251,7 @@ class SliderCase:
             bounds=bounds,
             constraints=self._constraints,
             guesses=guesses,
-            starts=self.slider.starts,
-            solutions=search.solutions,
-            seed=search.seed,
-            n_jobs=search.jobs,
-            progress=progress,
+            search=search.search(method="scan", starts=self.slider.starts, progress=progress),
         )
 
     def simplest(self, *, progress: bool = False) -> Strategy:
@@ -253,10 +263,8 @@ class SliderCase:
             bounds=self._bounds(),
             constraints=self._constraints,
             stroke=self.slider.stroke if isfinite(self.slider.stroke) else None,
-            seed=search.seed,
-            n_jobs=search.jobs,
-            progress=progress,
-            **asdict(wanted),
+            search=Search(starts=wanted.starts, seed=search.seed, n_jobs=search.jobs, progress=progress),
+            **{name: value for name, value in asdict(wanted).items() if name != "starts"},
         )
 
     # Dynamics

@@ -104,7 +104,7 @@ class Trajectory:
         """Write time and all outputs to a CSV file whose header has names and units."""
 
         columns = {"time [s]": self.time} | {f"{name} [{unit}]": self[name] for name, unit in self.units.items()}
-        return io.write_csv(path, columns)
+        return write_csv(path, columns)
 
     def to_dataframe(self) -> pandas.DataFrame:
         """The run as a DataFrame indexed by time; needs pandas (``pip install linkwork[dataframe]``)."""

@@ -12,7 +12,7 @@
 from __future__ import annotations
 
 from .areas import Straightness, area_between, distance_to, hausdorff, straightest_part, straightness
-from .cases import TABLES, SynthesisCase, load_synthesis_case, overridden, synthesis_case_from
+from .cases import SynthesisCase, direction, load_synthesis_case, synthesis_case_from
 from .constraints import (
     USUAL,
     Assembly,
@@ -52,7 +52,6 @@ __all__ = [
     "LENGTHS",
     "LINKS",
     "QUICK_SEARCH",
-    "TABLES",
     "USUAL",
     "USUAL_SEARCH",
     "Assembly",
@@ -94,6 +93,7 @@ __all__ = [
     "area_between",
     "costs",
     "dimension_rows",
+    "direction",
     "distance_to",
     "drawing",
     "error_unit",
@@ -108,7 +108,6 @@ __all__ = [
     "length_step",
     "load_synthesis_case",
     "normal_form",
-    "overridden",
     "path_from_formula",
     "quality_name",
     "quality_unit",

@@ -49,7 +49,7 @@ from .constraints import (
 )
 from .linkage import ANGLES, Linkage
 from .requirements import requirement
-from .search import METHODS, Search
+from .search import METHODS, Method, Search
 from .solution import Solution
 from .solve import Synthesis, TradeOff, synthesize, trade_off
 from .tasks import Task, normal_form
@@ -68,8 +68,8 @@ def _cores(value: Any, name: str) -> int:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Search:
-    """How it is searched: arguments of `synthesize`."""
+class SearchTable:
+    """How it is searched; see `Search`."""
 
     method: Method = entry(Choice(METHODS), "scan")
     seed: int = entry(Whole(0), 0)
@@ -77,6 +77,11 @@ class Search:
     starts: int = entry(Whole(1), 24)
     solutions: int = entry(Whole(1), 6)
     jobs: int = entry(_cores, 1)
+
+    def search(self, **changes: Any) -> Search:
+        """The same as the argument of `synthesize`, with some of it changed."""
+        own = asdict(self)
+        return Search(**({"n_jobs": own.pop("jobs")} | own | changes))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -229,7 +234,7 @@ class SynthesisCase:
     task: Task = entry(as_it_is)
     bounds: Mapping[str, tuple[float, float]] = entry(BOUNDS, factory=dict)
     constraints: tuple[Constraint, ...] = entry(_constraints, USUAL)
-    search: Search = entry(Table(Search), Search())
+    search: SearchTable = entry(Table(SearchTable), SearchTable())
     make: Make = entry(Table(Make), Make())
     trade_off: TradeOffTable | None = entry(_trade_off, None)
 
@@ -239,9 +244,7 @@ class SynthesisCase:
 
     def solve(self, *, progress: bool = False) -> Synthesis:
         """Search; see `synthesize`."""
-        options = asdict(self.search)
-        jobs = options.pop("jobs")
-        return synthesize(self.task, self.bounds, self.constraints, n_jobs=jobs, progress=progress, **options)
+        return synthesize(self.task, self.bounds, self.constraints, search=self.search.search(progress=progress))
 
     def trade(self, *, progress: bool = False) -> TradeOff | None:
         """The trade-off that is asked for, if any; see `trade_off`."""
@@ -254,7 +257,7 @@ class SynthesisCase:
             np.array(wanted.limits),
             self.bounds,
             self.constraints,
-            search=Search(seed=self.search.seed, starts=wanted.starts, n_jobs=self.search.n_jobs, progress=progress),
+            search=Search(seed=self.search.seed, starts=wanted.starts, n_jobs=self.search.jobs, progress=progress),
         )
 
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from linkwork.errors import InputError
 from linkwork.five_bar.parameters import FiveBarParameters
 
-from ..files.io import write_csv
+from ..files import write_csv
 from .areas import area_between, distance_to, straightness
 from .kernels import PLACES
 from .linkage import Linkage, SecondCrank

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from linkwork.errors import InputError, Interrupted
 
-from ..files.io import write_csv
+from ..files import write_csv
 from .black_box import by_differential_evolution, by_simplex
 from .constraints import (
     USUAL,

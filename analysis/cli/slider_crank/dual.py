@@ -14,7 +14,7 @@ from linkwork.slider_crank.assembly import check_assembly
 
 from ... import slider_crank as analysis
 from ..common import CHECK_FAILED, console, errors, show_table, tolerance_option
-from ..design import wrote
+from ..common import print_written
 from .options import Chosen, Problem, about_mechanism, out_option, with_problem
 
 
@@ -124,4 +124,4 @@ def _show_two_rotations(chosen: Chosen, points: int, folder: Path) -> None:
         highlight=False,
         soft_wrap=True,
     )
-    wrote([write_csv(folder / f"{chosen.name}-two-rotations.csv", columns)])
+    print_written([write_csv(folder / f"{chosen.name}-two-rotations.csv", columns)])

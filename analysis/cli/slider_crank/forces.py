@@ -13,7 +13,7 @@ import numpy as np
 from ... import figures
 from ... import slider_crank as analysis
 from ..common import console, show_table
-from ..design import wrote
+from ..common import print_written
 from .options import Chosen, Problem, Units, about_mechanism, angle_text, out_option, plot_option, with_problem
 
 if TYPE_CHECKING:
@@ -66,7 +66,7 @@ def forces(chosen: Chosen, problem: Problem, frames: Sequence[int], out: str, pl
             title = f"{chosen.title}: joint forces in frame {frame}"
             figure = figures.plot(turn, frame, units=units.system, title=title)
             written.append(save_figure(figure, f"{stem}-frame-{frame}.png"))
-    wrote(written)
+    print_written(written)
 
 
 def _extremes(turn: ForceTurn, frames: Sequence[int], units: Units) -> Sequence[Sequence[str]]:

@@ -11,7 +11,7 @@ import click
 from ... import figures
 from ... import slider_crank as analysis
 from ..common import console, show_table
-from ..design import wrote
+from ..common import print_written
 from .options import Chosen, about_mechanism, angle_text, out_option, quantity
 
 
@@ -115,4 +115,4 @@ def picture(
     if animate:
         with console.status(f"drawing {frames} pictures"):
             written.append(figures.animate(p, f"{stem}.gif", frames=frames, **seen))
-    wrote(written)
+    print_written(written)

@@ -15,7 +15,7 @@ from linkwork.errors import InputError
 from ... import figures
 from ... import slider_crank as analysis
 from ..common import console, show_table
-from ..design import wrote
+from ..common import print_written
 from .options import Chosen, Problem, Units, about_mechanism, note, out_option, plot_option, quantity, with_problem
 
 if TYPE_CHECKING:
@@ -113,7 +113,7 @@ def tolerances(
         for name in quantities:
             figure = figures.plot(found, name, at, units=units.system, title=f"{chosen.title}: {name}")
             files.append(save_figure(figure, f"{stem}-tolerances-{name}.png"))
-    wrote(files)
+    print_written(files)
 
 
 def _degrees(turn: ForceTurn, i: int) -> float:
