@@ -110,8 +110,7 @@ def _smoothing(value: Any, name: str) -> Smoothing | None:
         return Smoothing() if value else None
     if not isinstance(value, Mapping):
         raise ParameterError(name, value, "be true, false, or a table with points and deviation")
-    found: Smoothing = read(Smoothing, value, name)
-    return found
+    return read(Smoothing, value, name)
 
 
 def _steps_or_list(value: Any, name: str) -> Any:
@@ -137,7 +136,7 @@ def _weights(value: Any, rotation: FloatArray | None, n: int = 0) -> FloatArray 
     numbers = {"begin": Whole(0), "end": Whole(0)} if rotation is None else {}
     weights = np.ones(len(at))
     for k, row in enumerate(rows):
-        window: Window = read(Window, row, f"{name}[{k}]", readers=numbers)
+        window = read(Window, row, f"{name}[{k}]", readers=numbers)
         within = (at >= window.begin - 1e-9) & (at <= window.end + 1e-9)
         if not within.any():
             raise ParameterError(f"{name}[{k}]", dict(row), "hold at least one target")
