@@ -11,7 +11,7 @@ from typing import Any, get_args
 
 import numpy as np
 
-from linkwork.errors import InputError, LinkworkError, MissingParameterError, ParameterError
+from linkwork.errors import InputError, MissingParameterError, ParameterError
 
 from ..files import (
     Choice,
@@ -436,10 +436,9 @@ def linkage_from_csv(path: str | Path, rank: int = 1) -> Linkage:
     columns = {name: f"{name} [{'rad' if name in ANGLES else 'm'}]" for name in DIMENSIONS}
     try:
         values: dict[str, Any] = {name: float(row[column]) for name, column in columns.items()}
-        return Linkage(**values, branch=int(float(row["branch"])))
+        values["branch"] = int(float(row["branch"]))
     except (KeyError, TypeError, ValueError) as error:
-        if isinstance(error, LinkworkError):
-            raise
         raise InputError(
             f"{path} is no list of linkages as 'linkwork synthesize' writes it ({type(error).__name__}: {error})"
         ) from None
+    return Linkage(**values)

@@ -263,14 +263,14 @@ def _reader(unit: str, folder: Path) -> Reader:
         motor = {"breakdown_torque": value, "breakdown_slip": Quantity("1"), "synchronous_speed": Quantity("rad/s")}
         kinds["induction-motor"] = Table(InductionMotor, motor)
 
-    def signal(given: Any, name: str) -> Any:
-        if not isinstance(given, Mapping):
-            return value(given, name)
-        if "kind" not in given:
+    def signal(item: Any, name: str) -> Any:
+        if not isinstance(item, Mapping):
+            return value(item, name)
+        if "kind" not in item:
             raise ParameterError(
-                name, ", ".join(given), f"be a quantity, or a table with a kind, of {', '.join(kinds)}"
+                name, ", ".join(item), f"be a quantity, or a table with a kind, of {', '.join(kinds)}"
             )
-        return Kinds(kinds)(given, name)
+        return Kinds(kinds)(item, name)
 
     return Many(signal, single=True) if unit == "N.m" else signal
 

@@ -219,6 +219,8 @@ class _Curve(_Formula):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TimedPathTable(_Curve):
+    """The table of a `TimedPath`."""
+
     rotation: Any = entry(_steps_or_list, None)
     weights: Any = entry(as_it_is, None)
 
@@ -231,6 +233,8 @@ class TimedPathTable(_Curve):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class UntimedPathTable(_Curve):
+    """The table of a `UntimedPath`."""
+
     measure: Any = entry(Choice(("area", "distance")), "area")
     samples: int = entry(Whole(8), 72)
     smoothing: Smoothing | None = entry(_smoothing, None)
@@ -253,6 +257,8 @@ class UntimedPathTable(_Curve):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PrecisionPointsTable(_Curve):
+    """The table of a `PrecisionPoints`."""
+
     angle: Any = entry(as_it_is, None)
     angle_unit: str | None = entry(_angle_unit, None)
     rotation: Any = entry(_steps_or_list, None)
@@ -274,6 +280,8 @@ class PrecisionPointsTable(_Curve):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MotionTable(PrecisionPointsTable):
+    """The table of a `Motion`."""
+
     weights: Any = entry(as_it_is, None)
 
     def task(self, folder: Path) -> Task:
@@ -285,6 +293,8 @@ class MotionTable(PrecisionPointsTable):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RockerFunctionTable(_Formula):
+    """The table of a `RockerFunction`."""
+
     angle: Any = entry(as_it_is, None)
     angle_unit: str | None = entry(_angle_unit, None)
     file: str | None = entry(text, None)

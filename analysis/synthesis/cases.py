@@ -68,7 +68,7 @@ def _cores(value: Any, name: str) -> int:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Search:
-    """How it is searched: arguments of `synthesize`."""
+    """Settings of the search: arguments of `synthesize`."""
 
     method: Method = entry(Choice(METHODS), "scan")
     seed: int = entry(Whole(0), 0)
