@@ -22,13 +22,14 @@ import inspect
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import MISSING, dataclass, field, fields, is_dataclass
 from math import inf
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 from linkwork.errors import MissingParameterError, ParameterError, UnknownNameError
 
 from ..units import quantity
 
 Reader = Callable[[Any, str], Any]
+Made = TypeVar("Made")
 
 
 def unknown_name(name: str, known: Iterable[str]) -> UnknownNameError:
@@ -92,14 +93,14 @@ def check_names(table: Mapping[str, Any], name: str, known: Iterable[str]) -> No
 
 
 def read(
-    kind: Callable[..., Any],
+    kind: Callable[..., Made],
     value: Any,
     name: str,
     *,
     readers: Mapping[str, Reader] | None = None,
     keys: Mapping[str, str] | None = None,
     base: Any = None,
-) -> Any:
+) -> Made:
     """An object of a kind from a table.
 
     Parameters

@@ -11,7 +11,7 @@ from typing import Any, get_args
 
 import numpy as np
 
-from linkwork.errors import InputError, LinkworkError, MissingParameterError, ParameterError
+from linkwork.errors import InputError, MissingParameterError, ParameterError
 
 from ..files import (
     Choice,
@@ -380,16 +380,15 @@ def run_case(drive: SliderDrive, title: str, force_file: str) -> dict[str, Any]:
 def _strategy(value: Any, name: str, *, angular: bool) -> StrategyWanted:
     """The tolerance is one of an error, or of the quality function, which is squared."""
     unit = ("rad" if angular else "m") + "**2" * (table_of(value, name).get("criterion") == "error")
-    found: StrategyWanted = read(StrategyWanted, value, name, readers={"tolerance": Quantity(unit, above=0.0)})
-    return found
+    return read(StrategyWanted, value, name, readers={"tolerance": Quantity(unit, above=0.0)})
 
 
 def _linkage(value: Any, name: str, *, folder: Path) -> Linkage:
     """A linkage by its dimensions, or one of those in a file that `linkwork synthesize` wrote."""
     if "file" not in table_of(value, name):
         dimensions = {d: Quantity("rad" if d in ANGLES else "m") for d in DIMENSIONS}
-        return read(Linkage, value, name, readers={**dimensions, "branch": Whole()})  # type: ignore[no-any-return]
-    found = read(dict, value, name, readers={"file": text, "rank": Whole(1)})
+        return read(Linkage, value, name, readers={**dimensions, "branch": Whole()})
+    found: dict[str, Any] = read(dict, value, name, readers={"file": text, "rank": Whole(1)})
     return linkage_from_csv(folder / found["file"], found.get("rank", 1))
 
 
@@ -419,7 +418,7 @@ def slider_case_from(
     synthesis = synthesis_case_from({name: value for name, value in data.items() if name not in own}, folder=folder)
     angular = isinstance(synthesis.task, RockerFunction)
     bound = Quantity("rad" if angular else "m", above=0.0)
-    case: SliderCase = read(
+    return read(
         SliderCase,
         {"synthesis": synthesis} | {name: value for name, value in data.items() if name in own},
         "",
@@ -429,7 +428,6 @@ def slider_case_from(
             "least_effort": lambda value, name: read(EffortWanted, value, name, readers={"bound": bound}),
         },
     )
-    return case
 
 
 def linkage_from_csv(path: str | Path, rank: int = 1) -> Linkage:
@@ -447,10 +445,9 @@ def linkage_from_csv(path: str | Path, rank: int = 1) -> Linkage:
     columns = {name: f"{name} [{'rad' if name in ANGLES else 'm'}]" for name in DIMENSIONS}
     try:
         values: dict[str, Any] = {name: float(row[column]) for name, column in columns.items()}
-        return Linkage(**values, branch=int(float(row["branch"])))
+        values["branch"] = int(float(row["branch"]))
     except (KeyError, TypeError, ValueError) as error:
-        if isinstance(error, LinkworkError):
-            raise
         raise InputError(
             f"{path} is no list of linkages as 'linkwork synthesize' writes it ({type(error).__name__}: {error})"
         ) from None
+    return Linkage(**values)

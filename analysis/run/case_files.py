@@ -191,7 +191,7 @@ def case_from(
     )
     inputs = _inputs(data, mechanism, folder, None if published is None else published.crank_speed)
     _check_shift(inputs, parameters, initial)
-    run: RunTable = files.read(RunTable, data.get("run", {}), "run")
+    run = files.read(RunTable, data.get("run", {}), "run")
     stop_time, step = run.times(inputs)
     return Case(
         title=str(data.get("title", title)),
@@ -213,7 +213,7 @@ def _inputs(data: Mapping[str, Any], mechanism: Mechanism, folder: Path, speed: 
         inside = {
             name.removeprefix(f"{group}."): reader for name, reader in readers.items() if name.startswith(f"{group}.")
         }
-        values = files.read(dict, data.get(group, {}), group, readers=inside)
+        values: dict[str, Any] = files.read(dict, data.get(group, {}), group, readers=inside)
         if group in EXCLUSIVE and len(values) > 1:
             raise ParameterError(group, ", ".join(data[group]), f"have only one of {', '.join(inside)}")
         found |= {f"{group}.{name}": value for name, value in values.items()}
@@ -263,14 +263,14 @@ def _reader(unit: str, folder: Path) -> Reader:
         motor = {"breakdown_torque": value, "breakdown_slip": Quantity("1"), "synchronous_speed": Quantity("rad/s")}
         kinds["induction-motor"] = Table(InductionMotor, motor)
 
-    def signal(given: Any, name: str) -> Any:
-        if not isinstance(given, Mapping):
-            return value(given, name)
-        if "kind" not in given:
+    def signal(item: Any, name: str) -> Any:
+        if not isinstance(item, Mapping):
+            return value(item, name)
+        if "kind" not in item:
             raise ParameterError(
-                name, ", ".join(given), f"be a quantity, or a table with a kind, of {', '.join(kinds)}"
+                name, ", ".join(item), f"be a quantity, or a table with a kind, of {', '.join(kinds)}"
             )
-        return Kinds(kinds)(given, name)
+        return Kinds(kinds)(item, name)
 
     return Many(signal, single=True) if unit == "N.m" else signal
 

@@ -110,8 +110,7 @@ def _smoothing(value: Any, name: str) -> Smoothing | None:
         return Smoothing() if value else None
     if not isinstance(value, Mapping):
         raise ParameterError(name, value, "be true, false, or a table with points and deviation")
-    found: Smoothing = read(Smoothing, value, name)
-    return found
+    return read(Smoothing, value, name)
 
 
 def _steps_or_list(value: Any, name: str) -> Any:
@@ -137,7 +136,7 @@ def _weights(value: Any, rotation: FloatArray | None, n: int = 0) -> FloatArray 
     numbers = {"begin": Whole(0), "end": Whole(0)} if rotation is None else {}
     weights = np.ones(len(at))
     for k, row in enumerate(rows):
-        window: Window = read(Window, row, f"{name}[{k}]", readers=numbers)
+        window = read(Window, row, f"{name}[{k}]", readers=numbers)
         within = (at >= window.begin - 1e-9) & (at <= window.end + 1e-9)
         if not within.any():
             raise ParameterError(f"{name}[{k}]", dict(row), "hold at least one target")
@@ -220,6 +219,8 @@ class _Curve(_Formula):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TimedPathTable(_Curve):
+    """The table of a `TimedPath`."""
+
     rotation: Any = entry(_steps_or_list, None)
     weights: Any = entry(as_it_is, None)
 
@@ -232,6 +233,8 @@ class TimedPathTable(_Curve):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class UntimedPathTable(_Curve):
+    """The table of a `UntimedPath`."""
+
     measure: Any = entry(Choice(("area", "distance")), "area")
     samples: int = entry(Whole(8), 72)
     smoothing: Smoothing | None = entry(_smoothing, None)
@@ -254,6 +257,8 @@ class UntimedPathTable(_Curve):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PrecisionPointsTable(_Curve):
+    """The table of a `PrecisionPoints`."""
+
     angle: Any = entry(as_it_is, None)
     angle_unit: str | None = entry(_angle_unit, None)
     rotation: Any = entry(_steps_or_list, None)
@@ -275,6 +280,8 @@ class PrecisionPointsTable(_Curve):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MotionTable(PrecisionPointsTable):
+    """The table of a `Motion`."""
+
     weights: Any = entry(as_it_is, None)
 
     def task(self, folder: Path) -> Task:
@@ -286,6 +293,8 @@ class MotionTable(PrecisionPointsTable):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RockerFunctionTable(_Formula):
+    """The table of a `RockerFunction`."""
+
     angle: Any = entry(as_it_is, None)
     angle_unit: str | None = entry(_angle_unit, None)
     file: str | None = entry(text, None)

@@ -168,7 +168,7 @@ def _transmission(value: Any, name: str) -> float | None:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Constraints:
-    """The table ``[constraints]``; without one no transmission angle is given, and 40 degrees are kept."""
+    """The table ``[constraints]``; a least transmission angle of None asks nothing."""
 
     least_transmission_angle: float | None = entry(_transmission, LeastTransmission().angle)
     over: str | None = entry(Choice(("turn", "task")), None)
@@ -216,14 +216,12 @@ BOUNDS = Table(dict, {name: Range(Quantity("rad" if name in ANGLES else "m"), or
 
 
 def _constraints(value: Any, name: str) -> tuple[Constraint, ...]:
-    table: Constraints = read(Constraints, value, name)
-    return table.constraints()
+    return read(Constraints, value, name).constraints()
 
 
 def _trade_off(value: Any, name: str) -> TradeOffTable:
     limit = Quantity("m" if table_of(value, name).get("over") == "size" else "rad")
-    table: TradeOffTable = read(TradeOffTable, value, name, readers={"limits": Many(limit, least=2)})
-    return table
+    return read(TradeOffTable, value, name, readers={"limits": Many(limit, least=2)})
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -286,5 +284,4 @@ def synthesis_case_from(
 ) -> SynthesisCase:
     """A synthesis from the tables of a case file; ``folder`` is where its files are looked for."""
     tables = {"title": title} | overridden(data, overrides or {})
-    case: SynthesisCase = read(SynthesisCase, tables, "", readers={"task": partial(task_from, folder=folder)})
-    return case
+    return read(SynthesisCase, tables, "", readers={"task": partial(task_from, folder=folder)})
