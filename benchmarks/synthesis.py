@@ -38,7 +38,6 @@ from numba import njit
 from numpy.typing import NDArray
 from rich.console import Console
 from rich.table import Table
-from scipy.optimize import Bounds, minimize
 
 from analysis.synthesis import (
     LargestLink,
@@ -51,7 +50,7 @@ from analysis.synthesis import (
     synthesize,
     turn,
 )
-from analysis.synthesis.black_box import DRAWS, EDGE, EVALUATIONS, PENALTY, BlackBox, evolve, initial_simplex
+from analysis.synthesis.black_box import DRAWS, PENALTY, BlackBox, descend, descend_from, evolve
 from analysis.synthesis.constraints import Limits, limits_of
 from analysis.synthesis.kernels import coupler_path, coupler_path_jacobian
 from analysis.synthesis.polish import Polisher, fit_least_squares, quality_of
@@ -218,7 +217,7 @@ class Contest:
         linkage = linkage_of(answer.start, self.normal)
         if not answer.feasible or (self.normal.straight is not None and not packs(linkage)):
             return inf
-        return self.problem.shown(evaluate(self.problem.task, linkage).error)
+        return self.problem.convert(evaluate(self.problem.task, linkage).error)
 
 
 def packs(linkage: Linkage) -> bool:
@@ -307,36 +306,12 @@ class Trace:
 
 def by_scipy(trace: Trace, box: BlackBox, random: np.random.Generator) -> None:
     """SciPy's differential evolution over whole generations, as `synthesize` does by the method of that name."""
-    evolve(box, random, lambda found: trace.offer(box, found.x))
+    evolve(box, random, lambda intermediate_result: trace.offer(box, intermediate_result.x))
 
 
 def by_simplex(trace: Trace, box: BlackBox, random: np.random.Generator) -> None:
     """The thesis's simplex, from the best of some random linkages."""
-    draws = random.uniform(box.low, box.high, (DRAWS, len(box.low)))
-    descend(box, draws[np.argmin(box.charged(draws))], trace.watched(box, charged(box)))
-
-
-def charged(box: BlackBox) -> Score:
-    """The charged quality of one linkage."""
-    return lambda x: float(box.charged(x[None, :])[0])
-
-
-def descend(box: BlackBox, first: FloatArray, score: Score) -> FloatArray:
-    """Nelder and Mead's simplex, regular at the start and away from the nearer bounds, as in `analysis.synthesis.black_box`."""
-    away = np.where(first > 0.5 * (box.low + box.high), -1.0, 1.0)
-    end: FloatArray = minimize(
-        score,
-        first,
-        method="Nelder-Mead",
-        bounds=Bounds(box.low, box.high),
-        options={
-            "initial_simplex": first + away * initial_simplex(np.zeros(len(first)), EDGE),
-            "maxfev": EVALUATIONS * len(first),
-            "xatol": 1e-7,
-            "fatol": 1e-12,
-        },
-    ).x
-    return end
+    descend(box, random, trace.watched(box, box.charge))
 
 
 # pylinkage
@@ -554,7 +529,7 @@ def ours(contest: Contest, search: Search) -> Trace:
     trace = Trace(contest, inf)
     begun = perf_counter()
     result = synthesize(problem.task, problem.bounds, problem.constraints, search=search)
-    trace.points.append((perf_counter() - begun, problem.shown(result.best.error)))
+    trace.points.append((perf_counter() - begun, problem.convert(result.best.error)))
     return trace
 
 
@@ -609,7 +584,7 @@ def convergence(weighted: bool, scanned: bool, number: int = STARTS) -> list[Sta
         first = np.clip(start.q[free], box.low, box.high)
         # angles within the turn that the box has
         first[-3:] = (start.q[free][-3:] + pi) % tau - pi
-        return float(box.quality(descend(box, first, charged(box))[None, :])[0])
+        return float(box.quality(descend_from(box, first, box.charge).x[None, :])[0])
 
     runs: dict[str, Callable[[Start], float]] = {
         "least squares, exact Jacobian": lambda start: fit_least_squares(normal, limits, start).start.quality,

@@ -45,7 +45,7 @@ def slider_motion(
 ) -> None:
     """Move the rocker pivot of a linkage by a slider, so that it does the task of a CASE file (TOML or JSON) better.
 
-    With a table [strategy] the simplest mechanism within a tolerance is sought, and why it moved on is told. With [drive] the
+    With a table [strategy] the simplest mechanism within a tolerance is sought, with the reason for each step. With [drive] the
     force, torque, power and pin forces of the motion follow, and a case that 'linkwork run' runs; with [tracking] a run under
     control, with [least_effort] the motion of least effort.
 

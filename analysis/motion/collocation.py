@@ -34,7 +34,7 @@ GUESS_ORDERS = (4, 8, 16, 32)
 ROUNDING = 1e-3
 #: Weight of the mean square force, in its scale, beside a mean power: alone that leaves the force free where u' = 0.
 FORCE_WEIGHT = 1e-4
-#: Quiet, and what is not found is told by an error of ours.
+#: Without output of its own: where nothing is found, an error says so.
 IPOPT = {
     "print_time": False,
     "error_on_fail": False,

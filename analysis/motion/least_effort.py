@@ -197,7 +197,7 @@ def _target(target: Target) -> Callable[[FloatArray], FloatArray]:
     """The target as a function of crank angles to P, shape (n, 2), or to the rocker's angle, shape (n,)."""
     if callable(target):
 
-        def given(theta: FloatArray) -> FloatArray:
+        def check(theta: FloatArray) -> FloatArray:
             values = np.asarray(target(theta), float)
             if values.shape not in ((len(theta),), (len(theta), 2)) or not np.isfinite(values).all():
                 raise InputError(
@@ -206,7 +206,7 @@ def _target(target: Target) -> Callable[[FloatArray], FloatArray]:
                 )
             return values
 
-        return given
+        return check
     values = np.asarray(target, float)
     if values.ndim not in (1, 2) or values.shape[1:] not in ((), (2,)) or len(values) < 3:
         raise InputError(
@@ -219,11 +219,11 @@ def _target(target: Target) -> Callable[[FloatArray], FloatArray]:
     angles = np.linspace(0.0, 2.0 * pi, len(values) + 1)
     spline = CubicSpline(angles, np.vstack([plane, plane[:1]]), bc_type="periodic")
 
-    def joined(theta: FloatArray) -> FloatArray:
+    def interpolate(theta: FloatArray) -> FloatArray:
         xy: FloatArray = spline(np.mod(theta, 2.0 * pi))
         return xy if values.ndim == 2 else np.asarray(np.arctan2(xy[:, 1], xy[:, 0]))
 
-    return joined
+    return interpolate
 
 
 def _checked(

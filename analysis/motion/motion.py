@@ -8,6 +8,7 @@ optimum at every crank angle by itself is in `analysis.motion.variational`; it m
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from math import inf, pi
 
@@ -33,7 +34,7 @@ from ..synthesis import (
     SynthesisInterrupted,
     Task,
     improve,
-    ranked,
+    there_and_back,
 )
 
 FloatArray = NDArray[np.float64]
@@ -195,49 +196,35 @@ def smoothness_curve(
     values = np.sort(np.array(accelerations, dtype=float, ndmin=1))
     if values.ndim != 1 or len(values) < 2 or not (np.isfinite(values).all() and values[0] > 0.0):
         raise InputError("bounds of acceleration must be finite numbers above zero, at least two")
+
+    def best(acceleration: float, guesses: Sequence[Solution], starts: int) -> tuple[Solution, ...]:
+        return slider_motion(
+            task,
+            linkage,
+            replace(unknown, acceleration=acceleration),
+            bounds=bounds,
+            constraints=constraints,
+            guesses=[replace(guess, linkage=_shrunk(guess.linkage, acceleration)) for guess in guesses],
+            search=replace(search, starts=starts, solutions=3),
+        ).solutions
+
     found: dict[int, Solution] = {}
-
-    def best(acceleration: float, guesses: Sequence[Solution], own: int) -> tuple[Solution, ...]:
+    done: int | None = 0
+    # what is best without a bound is the start for a wide one
+    with suppress(SynthesisInterrupted, KeyboardInterrupt):
         try:
-            result = slider_motion(
-                task,
-                linkage,
-                replace(unknown, acceleration=acceleration),
-                bounds=bounds,
-                constraints=constraints,
-                guesses=[replace(guess, linkage=_shrunk(guess.linkage, acceleration)) for guess in guesses],
-                search=replace(search, starts=own, solutions=3),
-            )
+            widest = best(inf, [], search.starts)
         except InfeasibleError:
-            return ()
-        return result.solutions
-
-    k, kept, done = -1, [], 0
-    try:
-        # what is best without a bound is the start for a wide one
-        previous = best(inf, [], search.starts)
-        down = range(len(values) - 1, -1, -1)
-        for own, k in [(search.starts, k) for k in down] + [(0, k) for k in reversed(down)]:
-            if not own and k == 0:
-                previous = ()
-            mine = [found[k]] if k in found else []
-            # on the way back what keeps the tighter bound keeps this one, too
-            kept = mine if own else [*previous, *mine]
-            if own or kept:
-                solutions = best(float(values[k]), [*previous, *mine], own)
-                if kept or solutions:
-                    found[k] = ranked([*kept, *solutions])[0]
-                    previous = solutions if own else (found[k],)
-            done += 1
-    except (SynthesisInterrupted, KeyboardInterrupt) as error:
-        if isinstance(error, SynthesisInterrupted) and error.synthesis is not None and k >= 0:
-            found[k] = ranked([*kept, *error.synthesis.solutions])[0]
-        raise SmoothnessInterrupted(_curve(values, found), done, 2 * len(values)) from None
-    return _curve(values, found)
-
-
-def _curve(values: FloatArray, found: Mapping[int, Solution]) -> SmoothnessCurve:
-    return SmoothnessCurve(acceleration=values, solutions=tuple(found.get(k) for k in range(len(values))))
+            widest = ()
+        found, done = there_and_back(
+            range(len(values))[::-1],
+            lambda k, guesses, back: best(float(values[k]), guesses, 0 if back else search.starts),
+            widest,
+        )
+    curve = SmoothnessCurve(acceleration=values, solutions=tuple(found.get(k) for k in range(len(values))))
+    if done is not None:
+        raise SmoothnessInterrupted(curve, done, 2 * len(values))
+    return curve
 
 
 def _shrunk(linkage: Linkage, acceleration: float) -> Linkage:

@@ -67,7 +67,7 @@ def error_verdicts(name: str, stated: float, tolerance: float, reference: float,
         The printed linkage's true error, and half the last digit of it.
     """
     p = PROBLEMS[name]
-    printed, found = p.shown(evaluate(p.task, p.linkage).error), p.shown(best(name).error)
+    printed, found = p.convert(evaluate(p.task, p.linkage).error), p.convert(best(name).error)
     return (
         near("error of the printed linkage", THESIS, stated, printed, tolerance, p.unit),
         near("error of the printed linkage", REFERENCE, reference, printed, digits, p.unit),

@@ -67,7 +67,7 @@ def slider(linkage: Linkage) -> SliderMotion:
 def shown(name: str, solution: Solution) -> float:
     """Error of a solution in the unit of print, evaluated afresh."""
     p = PROBLEMS[name]
-    return p.shown(evaluate(p.task, solution.linkage).error)
+    return p.convert(evaluate(p.task, solution.linkage).error)
 
 
 def wanted_angle(phi: ArrayLike) -> FloatArray:

@@ -97,7 +97,7 @@ def compute() -> StudyResult:
                 degrees(part.rotation),
                 "deg",
             ),
-            at_most("area between our curve and the ten points", REFERENCE, p.goal, p.shown(ours.error), "cm2"),
+            at_most("area between our curve and the ten points", REFERENCE, p.goal, p.convert(ours.error), "cm2"),
             at_most(
                 "height of our crank shaft",
                 BALANCE,

@@ -34,7 +34,7 @@ def over_rounding() -> tuple[float, float]:
     corners = (np.array(signs) for signs in product((-1.0, 1.0), repeat=len(half)))
     # the extremes of a nearly linear change are at the corners
     errors = [evaluate(p.task, Linkage.from_vector(p.linkage.vector + half * c, 1)).error for c in corners]
-    return p.shown(min(errors)), p.shown(max(errors))
+    return p.convert(min(errors)), p.convert(max(errors))
 
 
 def compute() -> StudyResult:

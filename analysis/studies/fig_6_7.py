@@ -27,8 +27,10 @@ def compute() -> StudyResult:
     p = PROBLEMS[PROBLEM]
     assert isinstance(p.task, RockerFunction)
     fewer = rocker_function(FEWER)
-    printed = p.shown(evaluate(fewer, p.linkage).error)
-    found = p.shown(synthesize(fewer, p.bounds, p.constraints, search=Search(starts=4, candidates=1 << 13)).best.error)
+    printed = p.convert(evaluate(fewer, p.linkage).error)
+    found = p.convert(
+        synthesize(fewer, p.bounds, p.constraints, search=Search(starts=4, candidates=1 << 13)).best.error
+    )
     return StudyResult(
         number=NUMBER,
         claim="A four-bar makes the rocker function with a sum of squared errors of 700 deg2.",

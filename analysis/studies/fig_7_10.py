@@ -47,13 +47,13 @@ def curve(harmonics: int) -> SmoothnessCurve:
 def compute() -> StudyResult:
     """Both curves, the fixed pivot, and the unbounded motions."""
     p = PROBLEMS[ROCKER]
-    fixed = p.shown(evaluate(p.task, p.linkage).error)
+    fixed = p.convert(evaluate(p.task, p.linkage).error)
     columns = {"crank rotation [deg]": np.degrees(TURN)}
     fill = np.full(TURN.size - len(BOUNDS), np.nan)
     verdicts = []
     for n in HARMONICS:
         found = curve(n)
-        error, attained = p.shown(1.0) * found.error, CM_PER_METRE * found.attained
+        error, attained = p.convert(1.0) * found.error, CM_PER_METRE * found.attained
         columns[f"bound; {n} harmonics [cm/rad2]"] = np.append(BOUNDS, fill)
         columns[f"greatest acceleration; {n} harmonics [cm/rad2]"] = np.append(attained.filled(np.nan), fill)
         columns[f"error; {n} harmonics [deg2]"] = np.append(error.filled(np.nan), fill)

@@ -14,6 +14,7 @@ and compared with the error over a dense range of positions, and with `analysis.
 from __future__ import annotations
 
 import sys
+from dataclasses import replace
 from math import hypot, pi, radians
 from typing import NamedTuple
 
@@ -23,7 +24,6 @@ from linkwork.five_bar.published import CM_PER_METRE
 
 from ..figures import COLOURS, Curve, Figure, Panel, plot_curves
 from ..motion import variational_motion
-from ..synthesis.kernels import coupler_path
 from ..synthesis.published import PROBLEMS
 from ._chapter_7 import ASSIGNED, FloatArray
 from .study import BALANCE, Study, StudyResult, at_least, at_most, near, padded
@@ -92,9 +92,8 @@ def stationary(target: complex) -> list[Stationary]:
 def swept(target: complex, branch: int, u: FloatArray) -> FloatArray:
     """Error over slider positions (m), by the linkage's own kinematics; NaN where the links cannot be joined."""
     phi = np.full(u.size, radians(ROTATION))
-    out = np.empty((2, u.size))
-    coupler_path(np.cos(phi), np.sin(phi), u, np.zeros(u.size), LINKAGE.vector, float(branch), out)
-    return np.asarray(np.hypot(out[0] - target.real, out[1] - target.imag))
+    x, y = replace(LINKAGE, branch=branch).path(phi, (u, np.zeros(u.size))).T
+    return np.asarray(np.hypot(x - target.real, y - target.imag))
 
 
 def reach() -> FloatArray:

@@ -25,7 +25,6 @@ from linkwork.five_bar.published import CM_PER_METRE
 from ..figures import COLOURS, Curve, Figure, Panel, plot_curves
 from ..motion import VariationalMotion, variational_motion
 from ..synthesis import evaluate
-from ..synthesis.kernels import link_directions
 from ..synthesis.published import PROBLEMS, WEIGHTED_N, rocker_function
 from ._chapter_7 import ASSIGNED, ROCKER, FloatArray, rocker_motion, shown, slider, wanted_angle, window
 from .study import BALANCE, Study, StudyResult, at_least, at_most, near
@@ -70,7 +69,7 @@ def motion(name: str, n: int = N) -> VariationalMotion:
 
 def error(name: str, n: int) -> float:
     """Sum of the squared errors (deg2), the heavy ones whole and the others by a thousandth, per 24 rotations."""
-    return PROBLEMS[ROCKER].shown(motion(name, n).squared_error) * 24.0 / n
+    return PROBLEMS[ROCKER].convert(motion(name, n).squared_error) * 24.0 / n
 
 
 def brute_force(name: str) -> float:
@@ -79,13 +78,11 @@ def brute_force(name: str) -> float:
     half = min(case.half_stroke, WIDE)
     u = np.linspace(-half, half, POSITIONS)
     guide = radians(case.guide)
-    worst, out = 0.0, np.empty((6, u.size))
+    worst = 0.0
     for k in range(0, N, EVERY):
         # the crank stands: one rotation at a time, all positions at once
         phi = np.full(u.size, found.rotation[k])
-        link_directions(
-            np.cos(phi), np.sin(phi), u * cos(guide), u * sin(guide), linkage.vector, float(linkage.branch), out
-        )
+        out = linkage.directions(phi, (u * cos(guide), u * sin(guide)))
         off = np.arctan2(out[3], out[2]) - radians(float(wanted_angle(found.rotation[k])))
         least = np.nanmin(np.abs((off + pi) % (2.0 * pi) - pi))
         worst = max(worst, abs(float(least) - float(found.error[k])))
@@ -104,7 +101,7 @@ def compute() -> StudyResult:
             verdicts.append(
                 at_most(f"difference from brute force; {name}", BALANCE, BRUTE_FORCE, brute_force(name), "deg")
             )
-    fixed = PROBLEMS[ROCKER].shown(evaluate(PROBLEMS[ROCKER].task, PROBLEMS[ROCKER].linkage).error)
+    fixed = PROBLEMS[ROCKER].convert(evaluate(PROBLEMS[ROCKER].task, PROBLEMS[ROCKER].linkage).error)
     along, exact, jumping, smooth = CASES
     two = rocker_motion(2)
     guide = degrees(slider(two.linkage).guide_angle)
@@ -129,7 +126,7 @@ def compute() -> StudyResult:
             "variational error, of that of two harmonics on the same guide",
             BALANCE,
             1.0,
-            PROBLEMS[ROCKER].shown(same_guide.squared_error) / shown(ROCKER, two),
+            PROBLEMS[ROCKER].convert(same_guide.squared_error) / shown(ROCKER, two),
         ),
     ]
     return StudyResult(

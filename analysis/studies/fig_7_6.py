@@ -47,7 +47,7 @@ def compute() -> StudyResult:
     p = PROBLEMS[ROCKER]
     found = {n: rocker_motion(n) for n in HARMONICS}
     errors = {n: shown(ROCKER, s) for n, s in found.items()}
-    fixed = p.shown(evaluate(p.task, p.linkage).error)
+    fixed = p.convert(evaluate(p.task, p.linkage).error)
     columns = {
         "crank rotation [deg]": np.degrees(TURN),
         "target angle [deg]": wanted_angle(TURN),

@@ -33,7 +33,7 @@ def compute() -> StudyResult:
             "area with the rocker pivot fixed",
             REFERENCE,
             UNMOVED,
-            p.shown(evaluate(p.task, p.linkage).error),
+            p.convert(evaluate(p.task, p.linkage).error),
             0.005,
             "cm2",
         ),

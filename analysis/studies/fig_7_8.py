@@ -34,7 +34,7 @@ def out_of_reach() -> float:
     reach = Point(p.linkage.pivot_x, p.linkage.pivot_y).buffer(
         p.linkage.crank_length + p.linkage.point_distance, quad_segs=QUARTER
     )
-    return p.shown(Polygon(p.task.path.points).difference(reach).area)
+    return p.convert(Polygon(p.task.path.points).difference(reach).area)
 
 
 def compute() -> StudyResult:

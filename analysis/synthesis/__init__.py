@@ -42,7 +42,16 @@ from .scene import LinkageScene
 from .search import QUICK_SEARCH, USUAL_SEARCH, Search
 from .sensitivity import Rounding, Sensitivity, costs, length_step, rounded, sensitivities
 from .solution import Evaluation, Solution, Verdicts, evaluate, judge, ranked
-from .solve import Synthesis, SynthesisInterrupted, TradeOff, TradeOffInterrupted, improve, synthesize, trade_off
+from .solve import (
+    Synthesis,
+    SynthesisInterrupted,
+    TradeOff,
+    TradeOffInterrupted,
+    improve,
+    synthesize,
+    there_and_back,
+    trade_off,
+)
 from .starts import CrankUnknown, PivotUnknown, SliderUnknown
 from .targets import TargetPath, function_from_formula, path_from_formula
 from .tasks import Motion, PrecisionPoints, RockerFunction, Straight, Task, TimedPath, UntimedPath, normal_form, turn
@@ -120,6 +129,7 @@ __all__ = [
     "straightness",
     "synthesis_case_from",
     "synthesize",
+    "there_and_back",
     "trade_off",
     "turn",
 ]

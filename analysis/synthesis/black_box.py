@@ -39,6 +39,7 @@ from .user_functions import physical
 
 FloatArray = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
+OneSearch = Callable[["BlackBox", np.random.Generator], OptimizeResult]
 
 #: Points of a coupler curve that a path is compared with.
 CURVE = 128
@@ -73,7 +74,7 @@ def by_differential_evolution(normal: Normal, limits: Limits, search: Search = U
     search : Search
         Its starts are populations, in turn of either assembly.
     """
-    return _searched(partial(_evolved, normal, limits, search.seed), search, "differential evolution")
+    return _searched(evolve, normal, limits, search, "differential evolution")
 
 
 def by_simplex(normal: Normal, limits: Limits, search: Search = USUAL_SEARCH) -> Polished:
@@ -87,7 +88,7 @@ def by_simplex(normal: Normal, limits: Limits, search: Search = USUAL_SEARCH) ->
     normal, limits, search
         As for `by_differential_evolution`; each start is the best of `DRAWS` random linkages.
     """
-    return _searched(partial(_descended, normal, limits, search.seed), search, "simplex")
+    return _searched(descend, normal, limits, search, "simplex")
 
 
 def initial_simplex(first: FloatArray, edge: float) -> FloatArray:
@@ -106,9 +107,19 @@ def initial_simplex(first: FloatArray, edge: float) -> FloatArray:
     return vertices
 
 
-def _searched(work: partial[Answer], search: Search, what: str) -> Polished:
+def _searched(one: OneSearch, normal: Normal, limits: Limits, search: Search, what: str) -> Polished:
+    work = partial(_one, one, normal, limits, search.seed)
     found, interrupted = over_cores(work, range(search.starts), search, what)
     return Polished.of(found, kept_of(found), interrupted)
+
+
+def _one(one: OneSearch, normal: Normal, limits: Limits, seed: int, number: int) -> Answer:
+    """One search, in turn of either assembly."""
+    box = BlackBox(normal, limits, limits.branches[number % len(limits.branches)])
+    if not len(box.low):
+        # the one linkage there is where bounds fix every dimension
+        return box.answer(OptimizeResult(x=box.low, success=True, message="every dimension is fixed", nit=0))
+    return box.answer(one(box, np.random.default_rng([seed, number])))
 
 
 def _value(require: Require, p: SimpleNamespace) -> float:
@@ -122,31 +133,14 @@ def _value(require: Require, p: SimpleNamespace) -> float:
     return NO_VALUE * require.scale if isinstance(value, complex) or not np.isfinite(value) else float(value)
 
 
-def _only(box: BlackBox) -> Answer:
-    """The one linkage there is where bounds fix every dimension."""
-    return box.answer(OptimizeResult(x=box.low, success=True, message="every dimension is fixed", nit=0))
-
-
-def _evolved(normal: Normal, limits: Limits, seed: int, number: int) -> Answer:
-    box = BlackBox(normal, limits, limits.branches[number % len(limits.branches)])
-
-    if not len(box.low):
-        return _only(box)
-    return box.answer(evolve(box, np.random.default_rng([seed, number])))
-
-
 def evolve(
     box: BlackBox, random: np.random.Generator, callback: Callable[[OptimizeResult], None] | None = None
 ) -> OptimizeResult:
-    """SciPy's differential evolution over whole generations; ``callback`` sees each of them, as SciPy's does."""
+    """SciPy's differential evolution over whole generations; ``callback(intermediate_result)`` sees each."""
 
     def violations(x: FloatArray) -> FloatArray:
         # of one vector first, of a generation then
         return box.violations(np.atleast_2d(x.T)).T.reshape(-1, *x.shape[1:])
-
-    def told(intermediate_result: OptimizeResult) -> None:
-        if callback is not None:
-            callback(intermediate_result)
 
     return differential_evolution(
         # SciPy asks for none where no member of a generation keeps the constraints
@@ -160,28 +154,30 @@ def evolve(
         vectorized=True,
         polish=False,
         constraints=(NonlinearConstraint(violations, -np.inf, 0.0),),
-        callback=told,
+        callback=callback,
         rng=random,
     )
 
 
-def _descended(normal: Normal, limits: Limits, seed: int, number: int) -> Answer:
-    box = BlackBox(normal, limits, limits.branches[number % len(limits.branches)])
-    if not len(box.low):
-        return _only(box)
-    draws = np.random.default_rng([seed, number]).uniform(box.low, box.high, (DRAWS, len(box.low)))
-    first = draws[np.argmin(box.charged(draws))]
-    # away from the nearer bound
+def descend(
+    box: BlackBox, random: np.random.Generator, score: Callable[[FloatArray], float] | None = None
+) -> OptimizeResult:
+    """Nelder and Mead's simplex on a score, by default `BlackBox.charge`, from the best of `DRAWS` random linkages."""
+    draws = random.uniform(box.low, box.high, (DRAWS, len(box.low)))
+    return descend_from(box, draws[np.argmin(box.charged(draws))], score or box.charge)
+
+
+def descend_from(box: BlackBox, first: FloatArray, score: Callable[[FloatArray], float]) -> OptimizeResult:
+    """Nelder and Mead's simplex from a linkage, regular at the start and away from the nearer bounds."""
     away = np.where(first > 0.5 * (box.low + box.high), -1.0, 1.0)
     simplex = first + away * initial_simplex(np.zeros(len(first)), EDGE)
-    result = minimize(
-        lambda x: float(box.charged(x[None, :])[0]),
+    return minimize(
+        score,
         first,
         method="Nelder-Mead",
         bounds=Bounds(box.low, box.high),
         options={"initial_simplex": simplex, "maxfev": EVALUATIONS * len(first), "xatol": 1e-7, "fatol": 1e-12},
     )
-    return box.answer(result)
 
 
 class BlackBox:
@@ -226,6 +222,10 @@ class BlackBox:
         charge = sum(np.maximum(value, 0.0) for _, value in self._inequalities(q, rotation))
         charged: FloatArray = self._errors(q, rotation) + PENALTY * self.normal.weights.sum() * charge
         return charged
+
+    def charge(self, x: FloatArray) -> float:
+        """`charged` of one linkage."""
+        return float(self.charged(x[None, :])[0])
 
     def violations(self, x: FloatArray) -> FloatArray:
         """Left sides of the inequalities g(x) <= 0, shape (m, number of them)."""

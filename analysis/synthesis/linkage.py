@@ -210,16 +210,19 @@ class Linkage:
         return self.pivot.displacement(rotation)
 
     def _arguments(
-        self, rotation: ArrayLike
+        self, rotation: ArrayLike, displacement: tuple[ArrayLike, ArrayLike] | None = None
     ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray, float]:
         phi = np.ascontiguousarray(rotation, dtype=float)
-        dx, dy = (np.ascontiguousarray(d) for d in self.displacement(phi))
+        dx, dy = (np.ascontiguousarray(d, dtype=float) for d in displacement or self.displacement(phi))
         return np.cos(phi), np.sin(phi), dx, dy, self.vector, float(self.branch)
 
-    def path(self, rotation: ArrayLike) -> FloatArray:
-        """Coupler point at rotations of the crank, shape (n, 2) in m; NaN where the links cannot be joined."""
+    def path(self, rotation: ArrayLike, displacement: tuple[ArrayLike, ArrayLike] | None = None) -> FloatArray:
+        """Coupler point at rotations of the crank, shape (n, 2) in m; NaN where the links cannot be joined.
+
+        ``displacement`` of the rocker pivot takes the place of what its own motion is, as in `directions`.
+        """
         out = np.empty((2, np.size(rotation)))
-        coupler_path(*self._arguments(rotation), out)
+        coupler_path(*self._arguments(rotation, displacement), out)
         return out.T
 
     def path_jacobian(self, rotation: ArrayLike) -> tuple[FloatArray, FloatArray]:
@@ -236,10 +239,10 @@ class Linkage:
         link_jacobian(*self._arguments(rotation), out, jacobian)
         return out, jacobian
 
-    def directions(self, rotation: ArrayLike) -> FloatArray:
+    def directions(self, rotation: ArrayLike, displacement: tuple[ArrayLike, ArrayLike] | None = None) -> FloatArray:
         """(c3, s3, c4, s4, c43, s43) of `kinematics.Position`, shape (6, n), in the frame of the ground link."""
         out = np.empty((6, np.size(rotation)))
-        link_directions(*self._arguments(rotation), out)
+        link_directions(*self._arguments(rotation, displacement), out)
         return out
 
     def coupler_angle(self, rotation: ArrayLike) -> FloatArray:

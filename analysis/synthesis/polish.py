@@ -22,7 +22,7 @@ from .constraints import Limits
 from .kernels import coupler_path_jacobian, link_jacobian
 from .program import Program
 from .search import USUAL_SEARCH, Search, over_cores
-from .starts import Answer, PivotUnknown, SliderUnknown, Start, inside
+from .starts import Answer, PivotUnknown, SliderUnknown, Start, apart, inside
 from .tasks import Normal
 
 FloatArray = NDArray[np.float64]
@@ -37,6 +37,8 @@ AREAS = 6
 FINISHED, LONG = 4, 1500
 #: How many triangles of a region that is not convex are tried at a time.
 PIECES = 3
+#: Linkages that differ by less than this, in shares of the longest link and in rad, count as one.
+DIFFERENT = 1e-3
 #: Share of the quality below which points count as met exactly (units squared).
 EXACT = 1e-14
 
@@ -106,16 +108,12 @@ def _batch(normal: Normal, limits: Limits, pivot: PivotUnknown | None, starts: S
     return Polisher(normal, limits, pivot).fit_all(starts)
 
 
-def distinct(
-    answers: Sequence[Answer], count: int, pivot: PivotUnknown | None = None, apart: float = 1e-3
-) -> list[Answer]:
+def distinct(answers: Sequence[Answer], count: int, pivot: PivotUnknown | None = None) -> list[Answer]:
     """The first answers that are different linkages: in their links, as shares of the longest, and their point and pivot."""
-    chosen: list[Answer] = []
-    marks: list[FloatArray] = []
-    for answer in answers:
-        q = answer.start.q
+
+    def mark(answer: Answer) -> FloatArray:
+        q, v = answer.start.q, answer.start.pivot
         largest = q[2:7].max()
-        v = answer.start.pivot
         if isinstance(pivot, SliderUnknown):
             # as vectors: a guide is the same one from its other end
             v = np.concatenate([np.cos(v[0]) * v[1:], np.sin(v[0]) * v[1:]])
@@ -123,15 +121,9 @@ def distinct(
         # the start of an untimed path's rotation is no dimension
         if answer.start.rotation is not None:
             mark[[8, 12]] = 0.0
-        mirror = [3.0 * answer.start.branch]
-        mark = np.concatenate([mark, mirror])
-        if any(np.abs(mark - other).max() < apart for other in marks):
-            continue
-        marks.append(mark)
-        chosen.append(answer)
-        if len(chosen) == count:
-            break
-    return chosen
+        return np.append(mark, 3.0 * answer.start.branch)
+
+    return apart(answers, mark, DIFFERENT, count)
 
 
 class Polisher:

@@ -7,7 +7,7 @@ makes it, with a crank that turns fully.
 
 >>> from analysis.synthesis import evaluate
 >>> problem = PROBLEMS["ellipse-a"]
->>> round(problem.shown(evaluate(problem.task, problem.linkage).error), 2)
+>>> round(problem.convert(evaluate(problem.task, problem.linkage).error), 2)
 5.64
 """
 
@@ -51,8 +51,8 @@ class PublishedProblem:
         As `synthesize` takes them; ours but for the bounds.
     printed : Linkage
         To the digits as they stand in print.
-    linkage : Linkage
-        As it must be read: misprints mended.
+    mended : Linkage, optional
+        With its misprints mended, where it has any.
     error : float or None
         Printed for it, in ``unit``.
     goal : float
@@ -68,15 +68,20 @@ class PublishedProblem:
     bounds: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     constraints: tuple[Constraint, ...]
     printed: Linkage
-    linkage: Linkage
+    mended: Linkage | None = None
     error: float | None
     goal: float
     unit: str = "cm2"
     per_si: float = CM2_PER_M2
     source: str
 
-    def shown(self, error: float) -> float:
-        """An error in SI in the unit of print."""
+    @property
+    def linkage(self) -> Linkage:
+        """The printed linkage as it must be read."""
+        return self.mended or self.printed
+
+    def convert(self, error: float) -> float:
+        """An error from SI to the unit of print."""
         return self.per_si * error
 
 
@@ -186,7 +191,6 @@ PROBLEMS: Mapping[str, PublishedProblem] = MappingProxyType(
             task=TimedPath(points=ellipse(10.0, N)),
             constraints=_capped(_ELLIPSE_A),
             printed=_ELLIPSE_A,
-            linkage=_ELLIPSE_A,
             error=0.889,
             goal=0.46,
             source="Youssef, chapter VI, ellipse (a), timed",
@@ -195,7 +199,6 @@ PROBLEMS: Mapping[str, PublishedProblem] = MappingProxyType(
             task=TimedPath(points=ellipse(15.0, N)),
             constraints=_capped(_ELLIPSE_B),
             printed=_ELLIPSE_B,
-            linkage=_ELLIPSE_B,
             error=4.001,
             goal=0.62,
             source="Youssef, chapter VI, ellipse (b), timed",
@@ -213,7 +216,7 @@ PROBLEMS: Mapping[str, PublishedProblem] = MappingProxyType(
             constraints=USUAL,
             printed=_BOUNDED,
             # ERRATA: a1 = 93.8 deg is printed without its sign
-            linkage=replace(_BOUNDED, ground_angle=radians(-93.8)),
+            mended=replace(_BOUNDED, ground_angle=radians(-93.8)),
             error=53.6,
             goal=6.4,
             source="Youssef, chapter VI, ellipse (a), timed, with bounds on the lengths",
@@ -222,7 +225,6 @@ PROBLEMS: Mapping[str, PublishedProblem] = MappingProxyType(
             task=rocker_function(N),
             constraints=(FullTurn(),),
             printed=_ROCKER,
-            linkage=_ROCKER,
             error=700.0,
             goal=1025.0,
             unit="deg2",
@@ -233,7 +235,6 @@ PROBLEMS: Mapping[str, PublishedProblem] = MappingProxyType(
             task=rocker_function(WEIGHTED_N, weighted=True),
             constraints=(FullTurn(),),
             printed=_WEIGHTED,
-            linkage=_WEIGHTED,
             error=35.0,
             goal=35.6,
             unit="deg2",
@@ -245,7 +246,7 @@ PROBLEMS: Mapping[str, PublishedProblem] = MappingProxyType(
             constraints=_capped(_PATH_A),
             printed=_PATH_A,
             # ERRATA: X0 = 154.85 cm, the point misplaced by a digit: the curve would lie 139 cm beside its target
-            linkage=replace(_PATH_A, pivot_x=15.485 / CM_PER_METRE),
+            mended=replace(_PATH_A, pivot_x=15.485 / CM_PER_METRE),
             error=2.3,
             goal=0.125,
             source="Youssef, chapter VI, path (a), area",
@@ -255,7 +256,7 @@ PROBLEMS: Mapping[str, PublishedProblem] = MappingProxyType(
             constraints=_capped(_PATH_B_READ),
             printed=_PATH_B,
             # ERRATA: l4 = 183.443 cm
-            linkage=_PATH_B_READ,
+            mended=_PATH_B_READ,
             error=12.6,
             goal=0.31,
             source="Youssef, chapter VI, path (b), area",
@@ -268,7 +269,6 @@ PROBLEMS: Mapping[str, PublishedProblem] = MappingProxyType(
             ),
             constraints=(LargestLink(length=_PACKAGING.point_distance), *USUAL),
             printed=_PACKAGING,
-            linkage=_PACKAGING,
             error=None,
             goal=620.0,
             source="Youssef, chapter VI and appendix 5, packaging machine",

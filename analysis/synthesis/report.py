@@ -104,9 +104,9 @@ def dimension_rows(solution: Solution) -> list[tuple[str, str, str, str, str]]:
             continue
         off = ANGLE_STEP if s.name in ANGLES else step
         cost = factor * max(dear[s.name], 0.0)
-        told = f"{cost:.3g} {unit}" if isfinite(cost) else "no assembly"
+        grown = f"{cost:.3g} {unit}" if isfinite(cost) else "no assembly"
         moved = f"{scale * off * s.shift:.3g} {length}"
-        rows.append((s.name, format_dimension(s.name, s.value), format_dimension(s.name, off), moved, told))
+        rows.append((s.name, format_dimension(s.name, s.value), format_dimension(s.name, off), moved, grown))
     return rows
 
 

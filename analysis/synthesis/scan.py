@@ -16,7 +16,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from math import cos, degrees, inf, pi
+from math import cos, degrees, inf, pi, sin
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,7 +25,7 @@ from scipy.stats import qmc
 from .constraints import TURNING, InfeasibleError, Limits
 from .kernels import many_directions, match_windows
 from .linkage import BY_SHORTEST
-from .starts import Start
+from .starts import Start, apart
 from .tasks import Normal
 
 FloatArray = NDArray[np.float64]
@@ -77,7 +77,7 @@ def scan(normal: Normal, limits: Limits, *, seed: int, candidates: int, starts: 
             found.append(_placed(normal, limits, shapes, branch, np.random.default_rng([seed, chunk, branch + 1])))
     if not found:
         raise InfeasibleError(f"no shape of four-bar {_why(limits, seed)}")
-    return _apart(found, normal, starts)
+    return _apart(found, starts)
 
 
 def _shapes(limits: Limits, seed: int, count: int) -> Iterator[FloatArray]:
@@ -395,25 +395,22 @@ def _even(curves: ComplexArray, k: int) -> tuple[ComplexArray, FloatArray]:
     return points, 2.0 * pi * (index + share) / n
 
 
-def _apart(found: list[Candidates], normal: Normal, starts: int) -> list[Start]:
+def _apart(found: list[Candidates], starts: int) -> list[Start]:
     """The best candidates of all, none within `APART` of a better one."""
-    rows = [
-        (float(c.quality[i]), int(c.branch), c.q[i], None if c.rotation is None else c.rotation[i])
+    best = [
+        Start(
+            q=c.q[i],
+            branch=c.branch,
+            quality=float(c.quality[i]),
+            rotation=None if c.rotation is None else c.rotation[i],
+        )
         for c in found
         for i in np.argsort(c.quality)[: 20 * starts]
         if np.isfinite(c.quality[i]) and np.isfinite(c.q[i]).all()
     ]
-    rows.sort(key=lambda row: row[0])
-    kept: list[Start] = []
-    marks: list[FloatArray] = []
-    for quality, branch, q, rotation in rows:
-        shape = np.log(q[3:6] / q[2])
-        begin = q[8] if rotation is None else rotation[0]
-        mark = np.array([*shape, cos(begin), np.sin(begin), 5.0 * branch])
-        if any(np.abs(mark - other).max() < APART for other in marks):
-            continue
-        marks.append(mark)
-        kept.append(Start(q=q, branch=branch, quality=quality, rotation=rotation))
-        if len(kept) == starts:
-            break
-    return kept
+
+    def mark(start: Start) -> FloatArray:
+        begin = start.q[8] if start.rotation is None else start.rotation[0]
+        return np.array([*np.log(start.q[3:6] / start.q[2]), cos(begin), sin(begin), 5.0 * start.branch])
+
+    return apart(sorted(best, key=lambda start: start.quality), mark, APART, starts)

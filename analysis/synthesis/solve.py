@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import isfinite
 from pathlib import Path
@@ -124,7 +124,7 @@ def synthesize(
     InputError
         If the task, the weights or a number here is not usable.
     InfeasibleError
-        If no linkage keeps all bounds and constraints; it names the one that is hurt most.
+        If no linkage keeps all bounds and constraints; it names the one that the nearest linkage violates most.
     SynthesisInterrupted
         On Ctrl-C, with the best so far.
     MissingLibraryError
@@ -272,8 +272,8 @@ def _stations(task: Task, normal: Normal, rotation: NDArray[np.float64] | None) 
     if own.closed:
         at = np.append(at, 1.0)
         turned = np.append(rotation, rotation[0] + np.copysign(2.0 * np.pi, rotation[-1] - rotation[0]))
-    told: NDArray[np.float64] = np.interp(own.shares, at, turned)
-    return told
+    rotations: NDArray[np.float64] = np.interp(own.shares, at, turned)
+    return rotations
 
 
 def infeasible(done: Polished) -> InfeasibleError:
@@ -400,40 +400,63 @@ def trade_off(
     rest = tuple(c for c in constraints if not isinstance(c, kind))
     first = replace(search, candidates=min(search.candidates, 1 << 14), solutions=3)
     order = np.argsort(-values if over == "size" else values)
+
+    def best(k: int, guesses: Sequence[Solution], back: bool) -> tuple[Solution, ...]:
+        limit: Constraint = LargestLink(length=values[k]) if over == "size" else LeastTransmission(angle=values[k])
+        how = replace(first, starts=1, candidates=1 << 8) if back else first
+        return synthesize(task, bounds, (*rest, limit), weights, pivot=pivot, guesses=guesses, search=how).solutions
+
+    found, done = there_and_back(order.tolist(), best)
+    result = TradeOff(over=over, limit=values, solutions=tuple(found.get(k) for k in range(len(values))))
+    if done is not None:
+        raise TradeOffInterrupted(result, done, 2 * len(values))
+    return result
+
+
+def there_and_back(
+    order: Sequence[int],
+    search: Callable[[int, Sequence[Solution], bool], Sequence[Solution]],
+    begin: Sequence[Solution] = (),
+) -> tuple[dict[int, Solution], int | None]:
+    """The best solutions of a row of problems, each started from the ones before it, from the loosest to the tightest and back.
+
+    Parameters
+    ----------
+    order : sequence of int
+        The problems, the loosest first.
+    search : callable
+        Solutions of a problem by its number, from guesses, on the way back or not; it may raise `InfeasibleError`.
+    begin : sequence of Solution
+        Guesses for the first problem.
+
+    Returns
+    -------
+    found : dict
+        The best solution of each problem that has one. On the way back what keeps the tighter limit keeps the looser one too:
+        errors can only grow as the limit is tightened.
+    done : int or None
+        If it was stopped from the keyboard, how many of twice the problems were done.
+    """
     found: dict[int, Solution] = {}
-
-    def result_so_far() -> TradeOff:
-        return TradeOff(over=over, limit=values, solutions=tuple(found.get(k) for k in range(len(values))))
-
-    for number, sequence in enumerate((order, order[::-1])):
-        previous: list[Solution] = []
-        for done, k in enumerate(sequence.tolist()):
-            limit: Constraint = LargestLink(length=values[k]) if over == "size" else LeastTransmission(angle=values[k])
+    for back in (False, True):
+        previous = [] if back else list(begin)
+        for number, k in enumerate(order[::-1] if back else order):
             own = [found[k]] if k in found else []
             guesses = [*previous, *own]
-            if number and not guesses:
+            if back and not guesses:
                 continue
-            # on the way back what keeps the tighter limit keeps this one, too
-            kept = guesses if number else own
+            kept = guesses if back else own
+            done: int | None = None
             try:
-                result = synthesize(
-                    task,
-                    bounds,
-                    (*rest, limit),
-                    weights,
-                    pivot=pivot,
-                    guesses=guesses,
-                    search=replace(first, starts=1, candidates=1 << 8) if number else first,
-                ).solutions
+                result = search(k, guesses, back)
             except InfeasibleError:
                 result = ()
             except (SynthesisInterrupted, KeyboardInterrupt) as error:
                 last = error.synthesis if isinstance(error, SynthesisInterrupted) else None
-                if best := ranked([*kept, *(last.solutions if last else ())])[:1]:
-                    found[k] = best[0]
-                raise TradeOffInterrupted(result_so_far(), number * len(values) + done, 2 * len(values)) from None
-            if not (result or kept):
-                continue
-            found[k] = ranked([*kept, *result])[0]
-            previous = [found[k]] if number else list(result)
-    return result_so_far()
+                result, done = last.solutions if last else (), back * len(order) + number
+            if result or kept:
+                found[k] = ranked([*kept, *result])[0]
+                previous = [found[k]] if back else list(result)
+            if done is not None:
+                return found, done
+    return found, None

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, replace
 from math import inf, isfinite, pi
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +18,7 @@ from .linkage import Linkage, SecondCrank, SliderMotion
 from .tasks import Normal
 
 FloatArray = NDArray[np.float64]
+Item = TypeVar("Item")
 
 #: Amplitudes at which the motion of a pivot is started, as shares of the ground link.
 AMPLITUDE = 0.1
@@ -249,3 +252,18 @@ def start_of(
             v[0], v[1] = linkage.pivot.length / normal.unit, linkage.pivot.phase
             v[2::2], v[3::2] = series.cos[1:], series.sin[1:]
     return Start(q=q, branch=linkage.branch, pivot=v, rotation=rotation)
+
+
+def apart(items: Iterable[Item], mark: Callable[[Item], FloatArray], distance: float, count: int) -> list[Item]:
+    """The first items, at most so many, whose marks differ from those of all before by the distance in some component."""
+    chosen: list[Item] = []
+    marks: list[FloatArray] = []
+    for item in items:
+        own = mark(item)
+        if any(np.abs(own - other).max() < distance for other in marks):
+            continue
+        marks.append(own)
+        chosen.append(item)
+        if len(chosen) == count:
+            break
+    return chosen

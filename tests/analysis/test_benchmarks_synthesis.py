@@ -118,7 +118,7 @@ def test_a_linkage_is_measured_by_the_task(name: str) -> None:
     linkage = good(name)
     box = next(b for b in contest.boxes if b.branch == linkage.branch)
     error = contest.error(box, unknowns(contest, linkage))
-    assert error == pytest.approx(problem.shown(evaluate(problem.task, linkage).error), rel=1e-9)
+    assert error == pytest.approx(problem.convert(evaluate(problem.task, linkage).error), rel=1e-9)
 
 
 def test_the_printed_packaging_machine_is_not_flat_enough() -> None:

@@ -128,7 +128,7 @@ def test_printed_data(name: str) -> None:
 @pytest.mark.parametrize("name", published.CHAPTER_6_ERRORS)
 def test_printed_linkages_evaluate_to(name: str) -> None:
     p, known = PROBLEMS[name], published.CHAPTER_6_ERRORS[name]
-    error = p.shown(evaluate(p.task, p.linkage).error)
+    error = p.convert(evaluate(p.task, p.linkage).error)
     assert error == pytest.approx(known.true, abs=known.digits)
     assert error == pytest.approx(error_of(name, read(name)), rel=1e-9)
 
@@ -138,14 +138,14 @@ def test_what_the_misprints_would_give(name: str) -> None:
     """As printed the curve is far off, and the error a multiple of the stated one."""
     p = PROBLEMS[name]
     assert p.error is not None
-    assert p.shown(evaluate(p.task, p.printed).error) > 3.0 * p.error
+    assert p.convert(evaluate(p.task, p.printed).error) > 3.0 * p.error
 
 
 def test_no_rounding_of_its_digits_gives_ellipse_a_its_printed_error() -> None:
     p = PROBLEMS["ellipse-a"]
     half = np.array([5e-5] * 7 + [radians(5e-3)] * 3)
     errors = [
-        p.shown(evaluate(p.task, Linkage.from_vector(p.linkage.vector + half * signs, 1)).error)
+        p.convert(evaluate(p.task, Linkage.from_vector(p.linkage.vector + half * signs, 1)).error)
         for signs in product((-1.0, 1.0), repeat=10)
     ]
     assert (min(errors), max(errors)) == pytest.approx(published.ELLIPSE_A_OVER_ROUNDING, abs=5e-3)
@@ -154,9 +154,9 @@ def test_no_rounding_of_its_digits_gives_ellipse_a_its_printed_error() -> None:
 def test_the_rocker_functions_number_of_crank_angles_matters() -> None:
     p = PROBLEMS["rocker"]
     true, least = published.ROCKER_AT_48
-    assert p.shown(evaluate(rocker_function(48), p.linkage).error) == pytest.approx(true, abs=0.5)
+    assert p.convert(evaluate(rocker_function(48), p.linkage).error) == pytest.approx(true, abs=0.5)
     found = synthesize(rocker_function(48), p.bounds, p.constraints, search=Search(starts=4, candidates=1 << 13)).best
-    assert p.shown(found.error) == pytest.approx(least, abs=0.05)
+    assert p.convert(found.error) == pytest.approx(least, abs=0.05)
 
 
 def test_the_window_includes_its_ends() -> None:
@@ -166,7 +166,7 @@ def test_the_window_includes_its_ends() -> None:
     weights = np.array(task.weights)
     assert np.flatnonzero(weights > 1.0).tolist() == list(range(4, 18))
     weights[4] = 1.0
-    assert p.shown(evaluate(replace(task, weights=weights), p.linkage).error) == pytest.approx(35.65, abs=5e-3)
+    assert p.convert(evaluate(replace(task, weights=weights), p.linkage).error) == pytest.approx(35.65, abs=5e-3)
     many = rocker_function(72, weighted=True)
     assert window_sum(many, p.linkage) == pytest.approx(published.WINDOW_SUM, abs=0.05)
     # 260 is a station of these
@@ -201,7 +201,7 @@ def test_the_printed_packaging_machine() -> None:
 def test_goals(name: str) -> None:
     p, result = PROBLEMS[name], solved(name)
     best = result.best
-    error = p.shown(best.error)
+    error = p.convert(best.error)
     assert error <= p.goal
     assert result.seconds < 30.0
     # by the thesis's own words, not the package's
@@ -261,7 +261,7 @@ def test_error_against_transmission_angle(name: str) -> None:
     p = PROBLEMS[name]
     angles = np.radians([0.0, 30.0, 40.0, 50.0])
     found = trade_off(p.task, "transmission", angles, constraints=p.constraints, search=Search(starts=3))
-    errors = p.shown(1.0) * np.asarray(found.error.filled(np.nan))
+    errors = p.convert(1.0) * np.asarray(found.error.filled(np.nan))
     assert errors[0] <= p.goal
     assert (np.diff(errors) > 0.0).all()
     for angle, solution in zip(angles, found.solutions):

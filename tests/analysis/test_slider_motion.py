@@ -61,7 +61,7 @@ def moved(harmonics: int, **bounds: float) -> Synthesis:
 
 def shown(result: Synthesis) -> float:
     """Error of the best as the thesis counts it, in deg2."""
-    return WEIGHTED.shown(result.best.error)
+    return WEIGHTED.convert(result.best.error)
 
 
 def dimensions(linkage: Linkage) -> dict[str, float]:
@@ -74,13 +74,13 @@ def dimensions(linkage: Linkage) -> dict[str, float]:
 def test_series_1_with_two_harmonics() -> None:
     """The goal is 0.76 at N = 24, the best that was found before 0.722; the thesis prints 4.8, which no reading confirms."""
     assert shown(moved(2)) <= 0.7221
-    assert WEIGHTED.shown(evaluate(WEIGHTED.task, moved(2).best.linkage).error) == shown(moved(2))
+    assert WEIGHTED.convert(evaluate(WEIGHTED.task, moved(2).best.linkage).error) == shown(moved(2))
 
 
 def test_series_2_with_two_harmonics() -> None:
     """The goal is 4.05 cm2, the best that was found before 3.99; the thesis prints 4.3."""
     found = slider_motion(PATH_B.task, PATH_B.linkage, SliderUnknown(harmonics=2), search=Search(starts=10))
-    assert PATH_B.shown(found.best.error) <= 4.05
+    assert PATH_B.convert(found.best.error) <= 4.05
     assert found.best.verdicts.sound
     # fitted at more stations than the task has, and told at the task's
     assert len(found.best.rotation) == 360
@@ -118,12 +118,12 @@ def test_one_harmonic_is_what_a_black_box_finds() -> None:
         if not np.isfinite(out[0]).all():
             return 1e6
         left = (np.arctan2(out[3], out[2])[: len(target)] - target + pi) % (2.0 * pi) - pi
-        return WEIGHTED.shown(float(weights @ left**2))
+        return WEIGHTED.convert(float(weights @ left**2))
 
     half = 0.5 * PRINTED.ground_length
     bounds = [(-0.5 * pi, 0.5 * pi), *[(-half, half)] * 3]
     found = [differential_evolution(quality, bounds, seed=seed, popsize=30, tol=1e-9).fun for seed in (1, 2)]
-    known = [WEIGHTED.shown(solution.error) for solution in moved(1).solutions]
+    known = [WEIGHTED.convert(solution.error) for solution in moved(1).solutions]
     for value in found:
         assert min(abs(value / own - 1.0) for own in known) < 1e-7
     assert min(found) == pytest.approx(known[0], rel=1e-7)
