@@ -300,9 +300,11 @@ RIG_2 = {"rig-2-approximations.png": "8.18", "rig-2-harmonics.png": "8.20", "rig
 
 def rig_2_pictures() -> None:
     """Draw the pictures of docs/rig-2.md."""
+    from analysis import figures
     from analysis.files.io import save_figure
-    from analysis.periodic.resonance import approximations, frequency_response
+    from analysis.periodic import frequency_response
     from analysis.studies import load
+    from analysis.youssef import approximations
     from linkwork.five_bar.published import RAD_S_PER_RPM, SETS
 
     for name, number in RIG_2.items():
@@ -310,7 +312,7 @@ def rig_2_pictures() -> None:
         save_figure(study.draw(study.compute()), HERE / name)
     rig = SETS["rig-2-spring-c"]
     response = frequency_response(rig.parameters, 100.0 * RAD_S_PER_RPM, 1300.0 * RAD_S_PER_RPM)
-    figure = response.plot(title=rig.source, rpm=True, beside=approximations(response))
+    figure = figures.plot(response, title=rig.source, rpm=True, beside=approximations(response))
     save_figure(figure, HERE / "rig-2-response.png")
 
 

@@ -15,8 +15,7 @@ from linkwork.errors import InputError, LinkworkError, MissingParameterError, Pa
 from linkwork.five_bar.parameters import FiveBarParameters, InitialState
 
 from ..files.io import check_names, parameters_to, quantity, read_tables, unknown_name
-from ..linear.linearise import linearise_along
-from ..linear.slider_control import design_pid
+from ..linear import design_pid, linearise_along
 from ..synthesis.case_tasks import flag, given, listed, one_of, section, whole
 from ..synthesis.cases import TABLES, SynthesisCase, overridden, synthesis_case_from
 from ..synthesis.constraints import Assembly, Constraint

@@ -71,6 +71,16 @@ class OrbitError(LinkworkError):
         )
 
 
+class VaryingInputError(InputError):
+    """An input varies in time, and so there is no periodic motion under it; ``channel`` is its name."""
+
+    def __init__(self, channel: str, value: object) -> None:
+        self.channel = channel
+        super().__init__(
+            f"{channel} is a {type(value).__name__}: what acts on a periodic motion must be constant, or an induction motor"
+        )
+
+
 class OrbitAssemblyError(OrbitError, AssemblyError):
     """The motion that was followed comes to the limit of assembly."""
 
@@ -464,10 +474,7 @@ def drive_of(inputs: inputs_module.Inputs) -> Drive:
             elif isinstance(part, (int, float, np.floating, np.integer)):
                 constant[channel] = constant.get(channel, 0.0) + float(part)
             else:
-                raise InputError(
-                    f"{channel} is a {type(part).__name__}: what acts on a periodic motion must be constant, or an "
-                    "induction motor"
-                )
+                raise VaryingInputError(channel, part)
     return Drive(
         speed=constant.get("speed"),
         torque=constant.get("torque", 0.0),

@@ -1,10 +1,9 @@
 """Stability of the periodic motion: test functions for charts, damping that removes a region, verdicts put to the test.
 
 A test function of a point of a plane (`planes`) is negative in a region of instability and zero on its boundary, where a
-Floquet multiplier is +1 or -1: of the linear equation about u = 0 (`linear_test`), as the thesis has it, or of the mechanism's
-own periodic orbit (`orbit_test`), which is right. `boundaries` traces where it is zero, `removing_damping` finds where a region
-ends, `grids` computes the largest multiplier of every point of a grid, and `confirm` puts a verdict to the test of a long
-nonlinear run.
+Floquet multiplier of the mechanism's own periodic orbit is +1 or -1 (`orbit_test`). `boundaries` traces where it is zero,
+`removing_damping` finds where a region ends, `grids` computes the largest multiplier of every point of a grid, and `confirm`
+puts a verdict to the test of a long nonlinear run.
 """
 
 from __future__ import annotations
@@ -26,47 +25,13 @@ from linkwork.five_bar.parameters import FiveBarParameters, InitialState
 from ..numerics.boundaries import Test, lowest
 from ..run.inputs import Inputs
 from ..run.simulate import simulate
-from ..youssef.hill import PeriodicEquation, crossing_test, monodromy
-from ..youssef.slider_equation import Load, Variant, slider_equation
-from .floquet import TOLERANCE, Stability, StabilityVerdict, multipliers, verdict
+from .floquet import TOLERANCE, Crossing, Stability, StabilityVerdict, crossing_test
 from .grids import Grid
 from .orbits import Drive, OrbitError, PeriodicOrbit, orbit_of, period_from, scale_of
 from .planes import Plane
 
 #: Monodromy matrix at a point of a plane, shape (n, n).
 Monodromy = Callable[[float, float], NDArray[np.float64]]
-
-
-def linear_equation(parameters: FiveBarParameters, drive: Drive, variant: Variant = Variant.EXACT) -> PeriodicEquation:
-    """The slider's equation about u = 0, which is the motion only where nothing drives it: the thesis's.
-
-    Raises
-    ------
-    InputError
-        If the drive is by torque.
-    """
-    if drive.speed is None:
-        raise InputError("the linear equation is at constant speed: the drive is by torque")
-    load = Load(x=drive.load_x, y=drive.load_y, slider=drive.slider_force)
-    a, b, c = slider_equation(parameters, drive.speed, variant=variant, load=load).coefficients()
-    return PeriodicEquation(a=a, b=b, c=c)
-
-
-def linear_verdict(
-    parameters: FiveBarParameters, drive: Drive, *, variant: Variant = Variant.EXACT, tolerance: float = TOLERANCE
-) -> StabilityVerdict:
-    """The verdict on u = 0 by the linear equation; that on the true motion is `PeriodicOrbit.verdict`."""
-    return verdict(multipliers(monodromy(linear_equation(parameters, drive, variant))), tolerance)
-
-
-def linear_monodromy(operation: Plane, *, variant: Variant = Variant.EXACT) -> Monodromy:
-    """Monodromy matrix of the linear equation about u = 0 over a plane; points are remembered."""
-
-    @cache
-    def matrix(x: float, y: float) -> NDArray[np.float64]:
-        return monodromy(linear_equation(*operation(x, y), variant))
-
-    return matrix
 
 
 def orbit_monodromy(operation: Plane, *, start: ArrayLike | None = None) -> Monodromy:
@@ -99,14 +64,9 @@ def orbit_monodromy(operation: Plane, *, start: ArrayLike | None = None) -> Mono
     return matrix
 
 
-def test_of(matrix: Monodromy, multiplier: int) -> Test:
-    """Test function det(I - multiplier Phi) of a monodromy matrix over a plane; ``multiplier`` is +1 or -1."""
-    return lambda x, y: float(crossing_test(matrix(x, y), multiplier))
-
-
-def linear_test(operation: Plane, multiplier: int, *, variant: Variant = Variant.EXACT) -> Test:
-    """`test_of` of `linear_monodromy`."""
-    return test_of(linear_monodromy(operation, variant=variant), multiplier)
+def test_of(matrix: Monodromy, crossing: Crossing | int) -> Test:
+    """Test function `crossing_test` of a monodromy matrix over a plane."""
+    return lambda x, y: float(crossing_test(matrix(x, y), crossing))
 
 
 def orbit_test(operation: Plane, multiplier: int, *, start: ArrayLike | None = None) -> Test:

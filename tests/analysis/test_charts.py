@@ -8,19 +8,29 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from analysis.periodic import grids
-from analysis.periodic.branches import Family, follow
-from analysis.periodic.charts import StabilityChart, default_range, stability_chart
-from analysis.periodic.floquet import Crossing, Stability
-from analysis.periodic.orbits import Drive, find_orbit
-from analysis.periodic.resonance import natural_frequency
-from analysis.periodic.stability import telling_points
+from analysis import figures
+from analysis.periodic import (
+    Crossing,
+    Drive,
+    Family,
+    Stability,
+    StabilityChart,
+    default_range,
+    find_orbit,
+    follow,
+    grids,
+    natural_frequency,
+    stability_chart,
+    telling_points,
+)
+from analysis.youssef import linear_motion
 from linkwork.errors import InputError, LinkworkError, UnknownNameError
 from linkwork.five_bar.published import RAD_S_PER_RPM, SETS, TABLE_3_1
 
 RPM = RAD_S_PER_RPM
 DRIVE = Drive(speed=60.0)
 RIG_2 = SETS["rig-2-spring-c"].parameters
+NAMES = ("drive.speed", "slider.damping")
 SPEEDS, DAMPINGS = (1120.0 * RPM, 1220.0 * RPM), (0.0, 2.0)
 
 
@@ -29,7 +39,9 @@ def found(tmp_path_factory: pytest.TempPathFactory) -> StabilityChart:
     """The first region of rig 2 with spring C."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(grids, "grid_folder", lambda: tmp_path_factory.mktemp("grids"))
-        return stability_chart(RIG_2, DRIVE, ranges=(SPEEDS, DAMPINGS), points=41)
+        return stability_chart(
+            RIG_2, DRIVE, ranges=(SPEEDS, DAMPINGS), points=41, beside=linear_motion(RIG_2, DRIVE, NAMES)
+        )
 
 
 def test_region_is_traced_and_is_where_the_multipliers_are_great(found: StabilityChart) -> None:
@@ -90,7 +102,7 @@ def test_files_and_plot(found: StabilityChart, tmp_path: Path) -> None:
     assert rows[:, 0].min() == pytest.approx(1120.0)
     traces = np.loadtxt(found.boundaries_to_csv(tmp_path / "boundaries.csv"), delimiter=",", skiprows=1)
     assert set(traces[:, 0]) == set(range(1, len(found.boundaries) + 1))
-    figure = found.plot(title="chart")
+    figure = figures.plot(found, title="chart")
     assert figure.axes[0].get_xlabel() == "drive.speed [rpm]"
 
 

@@ -14,7 +14,7 @@ from analysis import simulate
 from analysis.motion.inverse import best_spring, inverse_dynamics
 from analysis.motion.tracking import track
 from analysis.numerics.fourier import FourierSeries
-from analysis.periodic.orbits import find_orbit
+from analysis.periodic import find_orbit
 from linkwork.errors import AssemblyError, InputError
 from linkwork.five_bar import kinematics
 from linkwork.five_bar.published import SETS, TABLE_3_1

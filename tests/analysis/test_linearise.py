@@ -15,8 +15,8 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.linalg import eigh
 
-from analysis import Harmonics, InductionMotor, Inputs, simulate
-from analysis.linear.linearise import (
+from analysis import Harmonics, InductionMotor, Inputs, figures, simulate
+from analysis.linear import (
     AT_REST,
     LEAST_SAMPLES,
     LINEAR_OUTPUTS,
@@ -32,7 +32,7 @@ from analysis.linear.linearise import (
     settled_motion,
 )
 from analysis.numerics.tracing import rebound
-from analysis.periodic.orbits import find_orbit
+from analysis.periodic import find_orbit
 from linkwork import friction
 from linkwork.errors import AssemblyError, InputError, UnknownNameError
 from linkwork.five_bar import dynamics, kinematics
@@ -465,13 +465,13 @@ def test_state_space_has_the_names_and_poles_of_the_model() -> None:
 
 def test_bode_and_pole_plots(turning) -> None:
     model = turning.mean()
-    above, below = model.plot_bode(frequencies=[1.0, 10.0, 100.0], title="one").axes
+    above, below = figures.plot(model, frequencies=[1.0, 10.0, 100.0], title="one").axes
     assert (above.get_ylabel(), below.get_xlabel()) == ("magnitude [m/N]", "frequency [rad/s]")
     m, c, k = model.M[0, 0], model.C[0, 0], model.K[0, 0]
     exact = [1.0 / (k - m * w * w + 1j * c * w) for w in (1.0, 10.0, 100.0)]
     assert above.lines[0].get_ydata() == pytest.approx(np.abs(exact), rel=1e-9)
     assert below.lines[0].get_ydata() == pytest.approx(np.degrees(np.angle(exact)), rel=1e-9)
-    axis = model.plot_poles(output="slider.acceleration").axes[0]
+    axis = figures.plot_poles({"": model.to_state_space(("slider.acceleration",), ("slider.force",))}).axes[0]
     curves = {line.get_label(): line for line in axis.lines}
     assert np.abs(curves["poles"].get_xdata()) == pytest.approx(np.abs(model.poles.real))
     # force to acceleration: two zeros at nothing

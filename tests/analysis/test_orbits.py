@@ -10,12 +10,13 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from analysis import InductionMotor, Inputs, simulate
-from analysis.periodic.floquet import Crossing, Stability
-from analysis.periodic.orbits import (
+from analysis.periodic import (
+    Crossing,
     Drive,
     OrbitAssemblyError,
     OrbitError,
     PeriodicOrbit,
+    Stability,
     find_orbit,
     largest_multipliers,
     orbit_of,

@@ -14,16 +14,18 @@ import numpy as np
 import pytest
 
 from analysis import Inputs, simulate
-from analysis.periodic import resonance
-from analysis.periodic.floquet import Crossing, Stability
-from analysis.periodic.orbits import Drive, OrbitError
-from analysis.periodic.resonance import (
+from analysis.periodic import (
+    Crossing,
+    Drive,
+    OrbitError,
     ResponseInterrupted,
-    approximations,
+    Stability,
     frequency_response,
     natural_frequency,
+    resonance,
     sweep,
 )
+from analysis.youssef import approximations
 from linkwork.errors import AssemblyError, InputError, ParameterError
 from linkwork.five_bar.published import RAD_S_PER_RPM, SETS, TABLE_3_1
 

@@ -12,14 +12,7 @@ import pytest
 from scipy.linalg import expm
 
 from analysis import Inputs, simulate
-from analysis.linear.linearise import (
-    find_equilibria,
-    find_equilibrium,
-    linearise,
-    linearise_along,
-    settled_motion,
-)
-from analysis.linear.slider_control import (
+from analysis.linear import (
     DesignError,
     LoopResult,
     SampledController,
@@ -27,8 +20,13 @@ from analysis.linear.slider_control import (
     design_lqr,
     design_pi,
     design_pid,
+    find_equilibria,
+    find_equilibrium,
     largest_difference,
+    linearise,
+    linearise_along,
     predict_loop,
+    settled_motion,
 )
 from linkwork.errors import InputError, UnknownNameError
 from linkwork.five_bar import dynamics

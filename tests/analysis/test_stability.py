@@ -14,22 +14,25 @@ from scipy.special import mathieu_a, mathieu_b
 
 from analysis.figures import Curve, HeatMap, Panel, plot_charts
 from analysis.numerics.boundaries import Box, Reason, chart, lowest, scan, trace
-from analysis.periodic import grids, orbit_kernels, stability
-from analysis.periodic.floquet import Stability
-from analysis.periodic.grids import GridInterrupted, grid
-from analysis.periodic.orbits import Drive, orbit_of
-from analysis.periodic.planes import Plane, plane
-from analysis.periodic.stability import (
+from analysis.periodic import (
+    Drive,
+    GridInterrupted,
     Outcome,
+    Plane,
     RemovalError,
+    Stability,
     confirm,
-    linear_test,
-    linear_verdict,
+    crossing_test,
+    grid,
+    grids,
+    orbit_kernels,
+    orbit_of,
     orbit_test,
+    plane,
     removing_damping,
     removing_damping_over,
 )
-from analysis.youssef.hill import PeriodicEquation, crossing_test, hill_regions, monodromy
+from analysis.youssef import PeriodicEquation, hill_regions, linear_equation, linear_test, linear_verdict, monodromy
 from linkwork.errors import InputError, LinkworkError, ParameterError, UnknownNameError
 from linkwork.five_bar.published import SETS, SQUARE_OF_OMEGA_K, TABLE_3_1, chapter_4
 
@@ -311,7 +314,7 @@ def test_first_region_of_the_true_orbit(inertia_ratio: float) -> None:
 
 
 def test_linear_region_is_hills() -> None:
-    equation = stability.linear_equation(chapter_4(1.0), Drive(speed=crank_speed(0.26)))
+    equation = linear_equation(chapter_4(1.0), Drive(speed=crank_speed(0.26)))
     hill = hill_regions(equation, 1)[1]
     test = linear_test(first_region_plane(), -1)
     roots = scan(lambda x: test(x, 1.0), 0.25, 0.29, samples=60).roots

@@ -330,15 +330,3 @@ def _taylor(
     values = np.tensordot(weights * p.l2 ** np.arange(order + 1), terms.reshape(3, 3, 8)[: order + 1], axes=1)
     mass, stiffness, force = (FourierSeries.from_samples(value, order) for value in values)
     return mass, stiffness, force
-
-
-def mean_effective_mass(parameters: FiveBarParameters) -> float:
-    """Mean over a turn of what moves with the slider at u = 0, m22 (kg).
-
-    Raises
-    ------
-    AssemblyError
-        If at u = 0 the links cannot be joined over the whole turn.
-    """
-    p = parameters.constants()
-    return _exact(p, 1.0, NO_LOAD, 0)[0].mean
