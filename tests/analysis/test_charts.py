@@ -15,6 +15,7 @@ from analysis.periodic import (
     Family,
     Stability,
     StabilityChart,
+    charts,
     default_range,
     find_orbit,
     follow,
@@ -42,6 +43,13 @@ def found(tmp_path_factory: pytest.TempPathFactory) -> StabilityChart:
         return stability_chart(
             RIG_2, DRIVE, ranges=(SPEEDS, DAMPINGS), points=41, beside=linear_motion(RIG_2, DRIVE, NAMES)
         )
+
+
+@pytest.fixture
+def coarse(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Few lines and samples: enough where only a sentence is asked for."""
+    monkeypatch.setattr(charts, "LINES", (2, 2))
+    monkeypatch.setattr(charts, "SAMPLES", 12)
 
 
 def test_region_is_traced_and_is_where_the_multipliers_are_great(found: StabilityChart) -> None:
@@ -106,6 +114,7 @@ def test_files_and_plot(found: StabilityChart, tmp_path: Path) -> None:
     assert figure.axes[0].get_xlabel() == "drive.speed [rpm]"
 
 
+@pytest.mark.usefixtures("coarse")
 def test_crossings_of_other_motions_are_counted_not_traced() -> None:
     rig = SETS["rig-1-spring-a"].parameters
     # the period doubling at 379 to 527 rpm belongs to a motion of some 8 cm, beside the small one that the grid has
@@ -115,6 +124,7 @@ def test_crossings_of_other_motions_are_counted_not_traced() -> None:
     assert (chart.grid.largest < 1.0).all()
 
 
+@pytest.mark.usefixtures("coarse")
 def test_a_chart_under_a_torque_has_its_doublings_and_tori() -> None:
     # on the branch of one damper: torus at 0.1055 and 0.2644 N.m, period doubling at 0.3395 N.m
     drive = Drive(torque=0.2)
@@ -144,25 +154,27 @@ def test_a_chart_under_a_torque_has_its_doublings_and_tori() -> None:
     ].any()
 
 
-def test_points_without_an_orbit_are_told() -> None:
+@pytest.mark.usefixtures("coarse")
+def test_points_without_an_orbit_are_reported() -> None:
     chart = stability_chart(
         TABLE_3_1,
         Drive(speed=SETS["table-3.1"].crank_speed),
         ("slider.stiffness", "slider.damping"),
         ((150.0, 400.0), (20.0, 40.0)),
-        points=6,
+        points=3,
     )
     assert any("no orbit was found at" in problem and "slider.stiffness = " in problem for problem in chart.problems)
     assert np.ma.getmaskarray(chart.grid.largest).any()
 
 
+@pytest.mark.usefixtures("coarse")
 def test_a_chart_of_mechanisms_that_cannot_turn_says_so_and_keeps_the_rest() -> None:
     chart = stability_chart(
         TABLE_3_1,
         Drive(speed=SETS["table-3.1"].crank_speed),
         ("coupler.length", "rocker.length"),
         ((0.04, 0.15), (0.14, 0.16)),
-        points=5,
+        points=4,
     )
     assert chart.problems
     assert chart.grid.largest.count() > 0

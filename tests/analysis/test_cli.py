@@ -13,7 +13,7 @@ from click.testing import CliRunner
 
 import build_fmu
 from analysis import cli
-from analysis.periodic import find_orbit
+from analysis.periodic import branches, find_orbit
 from linkwork.five_bar.published import SETS, TABLE_3_1
 
 ROOT = Path(__file__).parents[2]
@@ -205,15 +205,14 @@ def test_resonance_of_a_published_set(linkwork, tmp_path):
     assert rows.shape[1] == 4
 
 
-def test_resonance_tells_what_could_not_be_followed(linkwork, tmp_path):
-    result = linkwork(
-        "resonance", "--published", "rig-1-spring-b", "--from", "900 rpm", "--to", "1100 rpm", "--no-plot"
-    )
+def test_resonance_reports_a_fold_and_what_could_not_be_followed(linkwork, tmp_path, monkeypatch):
+    command = ("resonance", "--published", "rig-1-spring-b", "--from", "1020 rpm", "--to", "1060 rpm", "--no-plot")
+    result = linkwork(*command)
     assert result.exit_code == 0, result.output
     assert "fold at 1035.97" in result.output
-    result = linkwork(
-        "resonance", "--published", "rig-1-spring-b", "--from", "500 rpm", "--to", "1100 rpm", "--no-plot"
-    )
+    # a branch that ends early: its links count as collinear from the first step on
+    monkeypatch.setattr(branches, "LEAST_SINE", 1.0)
+    result = linkwork(*command)
     assert result.exit_code == cli.ENDED_EARLY
     assert "is followed to drive.speed" in result.output
     assert not (tmp_path / "out" / "rig-1-spring-b-resonance.png").exists()

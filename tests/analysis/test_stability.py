@@ -366,7 +366,7 @@ def test_removing_damping_of_the_first_region() -> None:
     def test(x: float, omega_c: float, inertia_ratio: float) -> float:
         return orbit_test(first_region_plane(omega_c), -1)(x, inertia_ratio)
 
-    worst = removing_damping_over(test, lambda _: (0.26, 0.285), (0.0, 0.5), (1.1, 1.5), samples=3)
+    worst = removing_damping_over(test, lambda _: (0.26, 0.285), (0.0, 0.5), (1.1, 1.5), samples=3, tolerance=1e-5)
     assert worst.damping == pytest.approx(REMOVING_OMEGA_C, abs=5e-4)
     assert worst.other == 1.5
     assert REMOVING_OMEGA_C_THESIS / worst.damping > 2.5
