@@ -12,7 +12,6 @@ from math import isfinite, pi
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from linkwork.errors import InputError, LinkworkError
 from linkwork.five_bar import dynamics, kinematics
@@ -22,8 +21,7 @@ from linkwork.limits import LIMIT_SINE
 
 from ..mechanisms import require_five_bar
 from ..numerics import symbolic
-
-FloatArray = NDArray[np.float64]
+from .model import FloatArray
 
 #: Starts of the search for equilibria: crank angles over a turn, slider positions over its reach.
 GRID = (48, 81)

@@ -283,9 +283,9 @@ class Follower:
             if isinstance(taken, _Failure):
                 length *= SHRINKAGE
                 if length < settings.least:
-                    said = taken.text if taken.reason is Reason.NO_VALUE else ""
+                    message = taken.text if taken.reason is Reason.NO_VALUE else ""
                     stalled = f"the continuation stalls: {taken.text}"
-                    return Curve(tuple(points), tuple(steps), taken.reason, stalled, said)
+                    return Curve(tuple(points), tuple(steps), taken.reason, stalled, message)
                 continue
             point, count = taken
             end = None

@@ -24,7 +24,7 @@ class FourierSeries:
     Raises
     ------
     InputError
-        If the two have not the same length, or a coefficient is not finite.
+        If the two do not have the same length, or a coefficient is not finite.
     """
 
     cos: NDArray[np.float64]

@@ -60,9 +60,9 @@ from .stability import WorstDamping as WorstDamping
 from .stability import confirm as confirm
 from .stability import orbit_monodromy as orbit_monodromy
 from .stability import orbit_test as orbit_test
+from .stability import points_to_confirm as points_to_confirm
 from .stability import removing_damping as removing_damping
 from .stability import removing_damping_over as removing_damping_over
-from .stability import telling_points as telling_points
 from .stability import test_of as test_of
 from .sweeps import Jump as Jump
 from .sweeps import Sweep as Sweep

@@ -28,6 +28,8 @@ from .planes import Operation, format_value, require_variable, unit_of, with_val
 #: Relative step of the difference by which the constants are differentiated with respect to the parameter. The constants
 #: are smooth functions of it, most of them linear, and the derivative steers Newton's method only.
 _DIFFERENCE = 1e-6
+#: First step along a branch, in scaled arc length.
+_FIRST = 5e-3
 #: Distance from a period doubling at which the doubled branch is begun, relative to the crank's length.
 _SWITCH = 2e-3
 
@@ -245,7 +247,6 @@ def follow(
     low: float,
     high: float,
     direction: int = 1,
-    first: float = 5e-3,
     greatest: float = 2e-2,
     most_points: int = 5000,
     watch: Callable[[float], None] | None = None,
@@ -264,11 +265,11 @@ def follow(
         Range of the parameter.
     direction : int
         +1 to higher values at first, -1 to lower.
-    first, greatest : float
-        Steps in scaled arc length: the range has length 1, and the crank's length counts as 1.
+    greatest : float
+        Greatest step in scaled arc length: the range has length 1, and the crank's length counts as 1.
     most_points : int
     watch : callable, optional
-        Told the parameter of every point.
+        Called with the parameter of every point.
     stop : callable, optional
         Asked at every point whether to leave it at that.
 
@@ -282,7 +283,7 @@ def follow(
     ContinuationError
         If the orbit is not on the family.
     """
-    settings = Settings(low=low, high=high, first=min(first, greatest), greatest=greatest, most_points=most_points)
+    settings = _settings(low, high, greatest, most_points)
     follower = _follower(family, orbit, settings)
     return _branch(family, orbit.turns, follower, follower.start(orbit.start, value, direction), watch, stop)
 
@@ -293,7 +294,6 @@ def switch(
     *,
     low: float,
     high: float,
-    first: float = 5e-3,
     greatest: float = 2e-2,
     most_points: int = 5000,
     watch: Callable[[float], None] | None = None,
@@ -313,7 +313,7 @@ def switch(
             f"the point at {doubling.parameter:.9g} is a {doubling.kind.value}: only a period doubling has a branch"
         )
     orbit = doubling.orbit
-    settings = Settings(low=low, high=high, first=min(first, greatest), greatest=greatest, most_points=most_points)
+    settings = _settings(low, high, greatest, most_points)
     doubled = replace(orbit, turns=2 * orbit.turns, monodromy=orbit.monodromy @ orbit.monodromy)
     follower = _follower(family, doubled, settings)
     # the eigenvector of the multiplier -1 is the direction in which every second period differs
@@ -329,6 +329,10 @@ def switch(
     raise ContinuationError(
         f"the motion of twice the period is not met next to {family.format_value(doubling.parameter)}"
     )
+
+
+def _settings(low: float, high: float, greatest: float, most_points: int) -> Settings:
+    return Settings(low=low, high=high, first=min(_FIRST, greatest), greatest=greatest, most_points=most_points)
 
 
 def _follower(family: Family, orbit: PeriodicOrbit, settings: Settings) -> Follower:

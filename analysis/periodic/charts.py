@@ -34,8 +34,8 @@ from .stability import (
     Monodromy,
     confirm,
     orbit_monodromy,
+    points_to_confirm,
     removing_damping,
-    telling_points,
     test_of,
 )
 
@@ -58,14 +58,14 @@ _MULTIPLIER = {Crossing.FOLD: 1.0, Crossing.PERIOD_DOUBLING: -1.0, Crossing.TORU
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Axis:
-    """A parameter of a chart as it is shown: speeds in rpm, all else in SI.
+    """A parameter of a chart as it is printed and drawn: speeds in rpm, all else in SI.
 
     Attributes
     ----------
     name : str
         FMI name.
     unit : str
-        That it is shown in.
+        In which it is printed and drawn.
     factor : float
         From SI to that unit.
     si : str
@@ -351,7 +351,7 @@ class _Survey:
 
     def run_three_points(self) -> None:
         """Long runs at the points that put the grid to the test."""
-        for row, column in telling_points(self.grid):
+        for row, column in points_to_confirm(self.grid):
             x, y = float(self.grid.x[column]), float(self.grid.y[row])
             try:
                 check = confirm(*self.operation(x, y), start=self.grid.starts[row, column])
@@ -393,7 +393,7 @@ class _Survey:
                 (float(dampings.min()), greatest),
             )
         except LinkworkError:
-            # the test function ends at folds: what the traced boundary tells stands
+            # the test function ends at folds: take what the traced boundary says
             return f"{region}: goes up to {DAMPING} = {top:.4g} {up.si}, by its points"
         return f"{region}: gone from {DAMPING} = {found.damping:.8g} {up.si} on, last at {other.format_value(found.x)}"
 

@@ -105,7 +105,7 @@ def grid(
 ) -> Grid:
     """The largest Floquet multiplier of the true orbit at every point of a grid.
 
-    Each row is a task of joblib and, once done, a file in the cache, under a name that tells all it depends on: mechanisms,
+    Each row is a task of joblib and, once done, a file in the cache, under a name made from all it depends on: mechanisms,
     speeds, guess, tolerance and sources. An interrupted grid goes on from the rows that are there.
 
     Parameters

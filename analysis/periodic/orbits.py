@@ -343,7 +343,7 @@ def find_orbit(
         Turns of the crank in one period.
     start : array_like, shape (2,) or (3,), optional
         Guess of u (m) and u' (m/s) at crank angle 0, and under a torque of the crank speed (rad/s), which is needed there
-        unless a motor's synchronous speed tells it.
+        unless it follows from a motor's synchronous speed.
     settle : bool
         Whether other ways are tried where Newton's method fails from the guess: from where the motion goes by itself, and,
         at prescribed speed, by bringing down the spring from where the slider hardly moves.
@@ -491,7 +491,7 @@ def guess_of(drive: Drive, start: ArrayLike | None) -> NDArray[np.float64]:
     Raises
     ------
     InputError
-        If ``start`` has not the components of the state, or is needed and not there.
+        If ``start`` does not have the components of the state, or is missing and needed.
     """
     if start is None:
         if drive.speed_drive:

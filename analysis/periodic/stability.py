@@ -248,7 +248,7 @@ class Confirmation:
 
 #: Start of a long run: distance from the orbit relative to the crank's length, and the range over which growth is measured.
 DISTURBANCE, NOISE, LINEAR = 1e-5, 1e-8, 1e-2
-#: Margin from which on a long run tells growth from decay with certainty.
+#: Margin from which on a long run distinguishes growth from decay with certainty.
 MEASURABLE = 1e-2
 #: Turns of a run at least, and at most.
 FEWEST_TURNS, MOST_TURNS = 1000, 20_000
@@ -272,7 +272,7 @@ def confirm(
     parameters : FiveBarParameters
     drive : Drive
     turns : int, optional
-        At least 20. Without it 1000, and more, up to 20000, where the margin is too small for them to tell growth from decay.
+        At least 20. Without it 1000, and up to 20000 where the margin is too small to distinguish growth from decay.
     start : array_like, shape (2,) or (3,), optional
         Guess of the orbit.
     disturbance : float
@@ -307,11 +307,11 @@ def confirm(
     outside = np.flatnonzero((size > LINEAR) | (size < NOISE))
     used = np.abs(away @ measure)[: outside[0] if len(outside) else None]
     growth = _growth(used)
-    told = growth ** len(used)
-    if told > NOTABLE or size.max() > NOTABLE * LINEAR:
+    factor = growth ** len(used)
+    if factor > NOTABLE or size.max() > NOTABLE * LINEAR:
         outcome = Outcome.GROWS
     else:
-        outcome = Outcome.DECAYS if told < 1.0 / NOTABLE else Outcome.BOUNDED
+        outcome = Outcome.DECAYS if factor < 1.0 / NOTABLE else Outcome.BOUNDED
     return Confirmation(verdict=verdict, outcome=outcome, growth=growth, deviations=size / size[0], message=message)
 
 
@@ -343,10 +343,10 @@ def _passages(
     return np.array(passed), ""
 
 
-def telling_points(found: Grid) -> list[tuple[int, int]]:
+def points_to_confirm(found: Grid) -> list[tuple[int, int]]:
     """Three points of a grid that put it to the test: its most stable, its least stable, and the one nearest to a boundary.
 
-    The last is the point of the least margin, to either side, that a long run can still tell from none.
+    The last is the point of the least margin, to either side, that a long run can still measure.
 
     Returns
     -------

@@ -97,7 +97,7 @@ def sweep(
     start : array_like, shape (2,), optional
         u (m) and u' (m/s) at crank angle 0 at the first speed; at rest at u = 0 without it.
     watch : callable, optional
-        Told every speed.
+        Called with every speed.
 
     Raises
     ------

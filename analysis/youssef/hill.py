@@ -31,7 +31,7 @@ STAGES = 6
 STEP_BY_RATE = 0.5
 #: Fewest samples of the coefficients over a turn from which their rates are judged.
 JUDGED = 64
-#: Harmonics beyond the coefficients' own that Hill's determinant takes in unless told otherwise.
+#: Harmonics beyond the coefficients' own that Hill's determinant takes in by default.
 MORE_HARMONICS = 16
 #: Imaginary part, relative to the size of the boundaries, up to which one is real. Two that are about to meet are computed
 #: only to the square root of the rounding errors.

@@ -77,7 +77,7 @@ def test_the_unstable_motion_with_a_multiplier_of_1_154(softened: Branch) -> Non
 
 def test_fold_does_not_depend_on_the_steps(softened: Branch) -> None:
     orbit = find_orbit(TABLE_3_1, speed=SPEED)
-    fine = follow(softened.family, orbit, 1000.0, low=200.0, high=1000.0, direction=-1, first=1e-3, greatest=3e-3)
+    fine = follow(softened.family, orbit, 1000.0, low=200.0, high=1000.0, direction=-1, greatest=3e-3)
     assert fine.special[0].parameter == pytest.approx(softened.special[0].parameter, rel=1e-9)
 
 
@@ -228,7 +228,7 @@ def test_columns_are_those_of_the_orbits(softened: Branch, tmp_path: pytest.Temp
     assert figures.plot(softened, title="softened").axes[0].get_ylabel() == "amplitude of u [cm]"
 
 
-def test_watch_is_told_every_point() -> None:
+def test_watch_receives_every_point() -> None:
     orbit = find_orbit(TABLE_3_1, speed=SPEED)
     seen: list[float] = []
     watch: Callable[[float], None] = seen.append

@@ -21,8 +21,8 @@ from analysis.periodic import (
     follow,
     grids,
     natural_frequency,
+    points_to_confirm,
     stability_chart,
-    telling_points,
 )
 from analysis.youssef import linear_motion
 from linkwork.errors import InputError, LinkworkError, UnknownNameError
@@ -99,7 +99,7 @@ def test_long_runs_confirm_three_points(found: StabilityChart) -> None:
     assert all(run.confirmation.agrees for run in found.runs)
     assert {run.confirmation.verdict.stability for run in found.runs} == {Stability.STABLE, Stability.UNSTABLE}
     margins = 1.0 - found.grid.largest
-    rows = telling_points(found.grid)
+    rows = points_to_confirm(found.grid)
     assert float(margins[rows[0]]) == margins.max()
     assert float(margins[rows[1]]) == margins.min()
 

@@ -226,7 +226,7 @@ def test_a_neutral_equilibrium_is_found_and_not_called_stable() -> None:
     assert not one.stable
 
 
-def test_no_equilibrium_is_told() -> None:
+def test_no_equilibrium_is_reported() -> None:
     loose = replace(TABLE_3_1, gravity=0.0, slider_stiffness=0.0)
     with pytest.raises(EquilibriumError, match=r"no equilibrium under .* slider force 5 N"):
         find_equilibrium(loose, slider_force=5.0)
@@ -236,7 +236,7 @@ def test_no_equilibrium_is_told() -> None:
         find_equilibrium(loose, slider_force=5.0, crank_angle=0.3, guess=(0.0, 0.0))
 
 
-def test_bad_statics_are_told() -> None:
+def test_bad_statics_are_reported() -> None:
     with pytest.raises(InputError, match="crank torque is nan"):
         find_equilibrium(TABLE_3_1, crank_torque=float("nan"))
     with pytest.raises(InputError, match="crank is held"):
@@ -415,7 +415,7 @@ def test_names_that_there_are_not(turning) -> None:
         model.to_state_space(("closure.residual",))
 
 
-def test_bad_states_are_told() -> None:
+def test_bad_states_are_reported() -> None:
     with pytest.raises(InputError, match="shape"):
         linearise(TABLE_3_1, (0.0, 0.0, 0.0))
     with pytest.raises(InputError, match="not finite"):
@@ -430,7 +430,7 @@ def test_bad_states_are_told() -> None:
         linearise(TABLE_3_1, np.zeros((2, 4)))
 
 
-def test_bad_motions_are_told(turning) -> None:
+def test_bad_motions_are_reported(turning) -> None:
     states = turning.states
     with pytest.raises(InputError, match=f"at least {LEAST_SAMPLES}"):
         linearise_along(TABLE_3_1, states[:5], TURNING)

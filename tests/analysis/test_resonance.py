@@ -189,7 +189,7 @@ def test_an_interrupt_keeps_what_was_followed(monkeypatch: pytest.MonkeyPatch) -
     assert "it was interrupted" in stopped.value.response.problems[0]
 
 
-def test_one_end_without_an_orbit_is_a_problem_that_is_told() -> None:
+def test_one_end_without_an_orbit_is_a_problem_that_is_reported() -> None:
     drive = Drive(speed=SETS["table-3.1"].crank_speed)
     response = frequency_response(TABLE_3_1, 200.0, 1200.0, vary="slider.stiffness", drive=drive, doubled=False)
     assert "slider.stiffness = 200 N/m" in response.problems[0]

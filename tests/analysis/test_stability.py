@@ -129,7 +129,7 @@ def test_scan_finds_both_sides_of_a_region_however_narrow(width: float) -> None:
     assert np.array(line.intervals) == pytest.approx(np.array([(line.roots[0], line.roots[1])]))
 
 
-def test_a_gap_between_the_samples_is_told() -> None:
+def test_a_gap_between_the_samples_is_reported() -> None:
     def function(x: float) -> float:
         if 0.33 < x < 0.34:
             raise InputError("no value here")
@@ -373,7 +373,7 @@ def test_removing_damping_of_the_first_region() -> None:
     assert pytest.approx(REMOVING_OMEGA_C_OWN, rel=0.03) == REMOVING_OMEGA_C_THESIS
 
 
-def test_damping_out_of_range_is_told() -> None:
+def test_damping_out_of_range_is_reported() -> None:
     def test(p: float, damping: float) -> float:
         return mathieu(-1, damping)(p, 0.8)
 
