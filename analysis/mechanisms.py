@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 from linkwork import five_bar, slider_crank
@@ -13,6 +14,24 @@ SLIDER_CRANK = slider_crank.MECHANISM
 
 #: By name; one more is registered by ``MECHANISMS[mechanism.name] = mechanism``.
 MECHANISMS: dict[str, Mechanism] = {mechanism.name: mechanism for mechanism in (FIVE_BAR, SLIDER_CRANK)}
+
+
+class _Published(Mapping[str, Any]):
+    def __getitem__(self, name: str) -> Any:
+        for mechanism in MECHANISMS.values():
+            if name in mechanism.published:
+                return mechanism.published[name]
+        raise KeyError(name)
+
+    def __iter__(self) -> Iterator[str]:
+        return (name for mechanism in MECHANISMS.values() for name in mechanism.published)
+
+    def __len__(self) -> int:
+        return sum(len(mechanism.published) for mechanism in MECHANISMS.values())
+
+
+#: The published sets of every mechanism, by name: each has parameters, initial, crank_speed and source.
+PUBLISHED: Mapping[str, Any] = _Published()
 
 #: Parameters of a mechanism and its state at the start: instances of `Mechanism.parameters` and `Mechanism.initial`.
 Parameters = Any

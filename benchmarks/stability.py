@@ -22,9 +22,7 @@ from rich.console import Console
 from rich.table import Table
 from scipy.integrate import solve_ivp
 
-from analysis.periodic.grids import grid
-from analysis.periodic.orbits import INTEGRATOR_TOLERANCE, ORBIT_TOLERANCE, Drive
-from analysis.periodic.planes import Plane, plane
+from analysis.periodic import INTEGRATOR_TOLERANCE, ORBIT_TOLERANCE, Drive, Plane, grid, plane
 from linkwork.five_bar import dynamics
 from linkwork.five_bar.parameters import FiveBarParameters
 from linkwork.five_bar.published import RAD_S_PER_RPM, SETS
@@ -116,7 +114,7 @@ def main(points: int = POINTS) -> None:
     for heading in ("", "s", "ms a point and core", "ratio"):
         table.add_column(heading, justify="right" if heading else "left")
     per_point = 1e3 * CORES / points**2
-    table.add_row("grids.grid", f"{ours:.2f}", f"{ours * per_point:.3f}", "1")
+    table.add_row("periodic.grid", f"{ours:.2f}", f"{ours * per_point:.3f}", "1")
     table.add_row("the same again, from the cache on disk", f"{again:.2f}", "", "")
     table.add_row(
         f"SciPy DOP853, plain (from {ROWS * RUN} points)",

@@ -128,8 +128,9 @@ Picture = tuple[str, "Figure", int]
 def study_pictures() -> Iterator[Picture]:
     """The still of README.md, and the pictures of docs/rig-2.md, some of which are figures of the thesis."""
     from analysis import figures as draw
-    from analysis.periodic.resonance import approximations, frequency_response
+    from analysis.periodic import frequency_response
     from analysis.studies import load
+    from analysis.youssef import approximations
     from linkwork.five_bar.published import RAD_S_PER_RPM, SETS
 
     numbers = {"linkage": "linkage", "rig-2-approximations": "8.18", "rig-2-harmonics": "8.20", "rig-2-forces": "8.21"}
@@ -147,9 +148,8 @@ def hand_drawn_pictures() -> Iterator[Picture]:
 
     from analysis import figures as draw
     from analysis.cli.slider import drive_figure
-    from analysis.motion.cases import load_slider_case
-    from analysis.synthesis import TargetPath
-    from analysis.synthesis.cases import load_synthesis_case
+    from analysis.motion import load_slider_case
+    from analysis.synthesis import TargetPath, load_synthesis_case
 
     examples = HERE.parent / "examples"
 
@@ -187,10 +187,8 @@ def slider_crank_pictures() -> Iterator[Picture]:
 
     import numpy as np
 
-    from analysis.figures.slider_crank import plot_tolerances
-    from analysis.figures.slider_crank_picture import plot_mechanism, plot_range
-    from analysis.slider_crank.forces import force_turn
-    from analysis.slider_crank.tolerances import Tolerance, monte_carlo
+    from analysis.figures import plot_mechanism, plot_range, plot_tolerances
+    from analysis.slider_crank import Tolerance, force_turn, monte_carlo
     from linkwork.slider_crank.published import CRANK_SPEED, INCH, SETS, parameters
 
     case = SETS["rahman-a4-10-s1-3.5"]
@@ -211,7 +209,7 @@ def main(arguments: list[str]) -> int:
     """Fill the pages, or check them."""
     with_figures = "--figures" in arguments
     if with_figures:
-        from analysis.files.io import save_figure
+        from analysis.files import save_figure
 
         for pictures in (study_pictures, hand_drawn_pictures, slider_crank_pictures):
             for name, figure, dpi in pictures():

@@ -19,17 +19,21 @@ import numpy as np
 
 from analysis import figures
 from analysis.figures import Curve, Panel
-from analysis.linear.linearise import PeriodicModel, find_equilibria, linearise, linearise_along, settled_motion
-from analysis.linear.slider_control import (
+from analysis.linear import (
     LoopResult,
+    PeriodicModel,
     SampledController,
     SliderDesign,
     control_loop,
     design_lqr,
     design_pi,
     design_pid,
+    find_equilibria,
     largest_difference,
+    linearise,
+    linearise_along,
     predict_loop,
+    settled_motion,
 )
 from linkwork.five_bar import dynamics
 from linkwork.five_bar.parameters import FiveBarParameters, InitialState

@@ -132,19 +132,6 @@ def changes(settings: Sequence[str], read: Callable[[str], Any], example: str) -
     return values
 
 
-def prepare_solver(*parameters: Any, orbits: bool = False) -> None:
-    """Load the compiled equations of these mechanisms, and say why it takes so long where they are compiled first."""
-    with console.status("preparing the solver: a mechanism's equations are compiled once, in about half a minute"):
-        from ..run import compiled
-
-        for p in parameters:
-            solver = compiled.solver(p.constants())
-            for kernel in ("run", "outputs"):
-                getattr(solver, kernel)
-        if orbits:
-            from ..periodic import orbit_kernels  # noqa: F401
-
-
 def chosen_case(file: str | None, published: str | None, settings: Sequence[str]) -> Any:
     """The case of a file or a published set, with the changes of ``--set``."""
     from ..run import published_case

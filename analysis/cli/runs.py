@@ -13,7 +13,7 @@ import click
 
 from linkwork import __version__
 
-from ..run import PUBLISHED
+from ..mechanisms import MECHANISMS, PUBLISHED
 from .common import (
     CHECK_FAILED,
     ENDED_EARLY,
@@ -24,7 +24,6 @@ from .common import (
     handled,
     out_option,
     plot_option,
-    prepare_solver,
     print_error,
     print_written,
     show_table,
@@ -59,12 +58,16 @@ def build(models: Sequence[str], dest: str) -> None:
       linkwork build
       linkwork build FiveBarSlider --dest fmus
     """
-    import build_fmu
+    from ..export import build as build_one
+    from ..export import try_out
 
-    for name in models or build_fmu.MODELS:
+    known = {mechanism.fmu: mechanism for mechanism in MECHANISMS.values()}
+    for name in models or known:
+        if name not in known:
+            raise click.UsageError(f"there is no model {name!r}: the models are {', '.join(known)}")
         with console.status(f"building {name}"):
-            path = build_fmu.build(name, dest)
-            build_fmu.try_out(path)
+            path = build_one(known[name], dest)
+            try_out(path)
         console.print(f"{path}: valid, {path.stat().st_size / 1024:.0f} KiB", highlight=False, soft_wrap=True)
 
 
@@ -121,15 +124,15 @@ def run(
         if fmu is not None:
             result = cosimulate(fmu, chosen.parameters, chosen.inputs, **common)
         else:
-            prepare_solver(chosen.parameters)
             result = simulate(chosen.parameters, chosen.inputs, method=method, **common)
     except RunInterrupted as stopped:
         result, interrupted = stopped.trajectory, True
     stem = Path(out) / ((Path(case).stem if case else str(published)) + ("-fmu" if fmu else ""))
     written = [result.to_csv(f"{stem}.csv")]
     if plot and len(result) > 1:
-        second = f"{mechanism_of(chosen.parameters).second}.position"
-        names = dict.fromkeys(("slider.position", second, "crank.speed", "drive.applied_torque", "transmission.angle"))
+        freedoms = mechanism_of(chosen.parameters).freedoms
+        wanted = (*(f.coordinate for f in freedoms[1:]), freedoms[0].rate, "drive.applied_torque", "transmission.angle")
+        names = [name for name in dict.fromkeys(("slider.position", *wanted)) if name in result.names]
         written.append(save_figure(figures.plot(result, tuple(names), title=chosen.title), f"{stem}.png"))
     _print_extremes(chosen.title, result)
     print_written(written)
@@ -197,7 +200,6 @@ def check(
     failed = []
     chosen = _cases_to_check(cases, fmu, everything)
     for name, case in chosen:
-        prepare_solver(case.parameters)
         for method in methods:
             label = name if method == "compiled" else f"{name}-{method}"
             in_process, through_fmu, comparison = compare_case(
@@ -303,13 +305,13 @@ def info(what: str | None) -> None:
     """
     from linkwork.five_bar.published import RAD_S_PER_RPM
 
-    from ..numerics.codegen import cache_folder
+    from ..numerics.codegen import cache_root
     from ..run.case_files import load_case
 
     if what is None:
         sets = [(name, entry.source, f"{entry.crank_speed / RAD_S_PER_RPM:g}") for name, entry in PUBLISHED.items()]
         show_table("published sets", ("name", "source", "speed [rpm]"), sets, words=("name", "source"))
-        place = cache_folder()
+        place = cache_root()
         console.print(f"linkwork {__version__}; compiled code is kept in {place}", highlight=False, soft_wrap=True)
     elif what in PUBLISHED:
         _print_parameters(PUBLISHED[what].source, PUBLISHED[what].parameters)
@@ -332,8 +334,8 @@ def _print_parameters(title: str, parameters: Any) -> None:
     from ..mechanisms import FIVE_BAR, mechanism_of
 
     mechanism = mechanism_of(parameters)
-    values = [(v, getattr(parameters, field_name(v.name), None)) for v in mechanism.variables.PARAMETERS]
-    rows = [(v.name, f"{value:.9g}", v.unit, v.description) for v, value in values if value is not None]
+    values = [(v, getattr(parameters, field_name(v.name))) for v in mechanism.mechanism_variables.values()]
+    rows = [(v.name, f"{value:.9g}", v.unit, v.description) for v, value in values]
     show_table(title, ("parameter", "value", "unit", "meaning"), rows, words=("parameter", "unit", "meaning"))
     if mechanism is not FIVE_BAR:
         console.print("where it can be assembled, dead centres, stroke: linkwork slider-crank info", highlight=False)

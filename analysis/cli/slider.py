@@ -13,7 +13,7 @@ from rich.table import Table
 
 from linkwork.errors import Interrupted
 
-from .common import console, handled, prepare_solver
+from .common import console, handled
 from .design import leave_if_stopped, overrides_of, print_error, print_written, search_options, table, write_described
 
 if TYPE_CHECKING:
@@ -60,7 +60,6 @@ def slider_motion(
 
     overrides = overrides_of(settings, slider__harmonics=harmonics, search__seed=seed, search__jobs=jobs)
     chosen = load_slider_case(case, overrides)
-    prepare_solver()
     folder = Path(out)
     solution, stopped = _moved(chosen) if chosen.strategy is None else _strategy(chosen)
     folder.mkdir(parents=True, exist_ok=True)

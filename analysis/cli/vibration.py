@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import wraps
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +17,7 @@ from rich.table import Table
 from linkwork.errors import InputError
 from linkwork.five_bar.published import CM_PER_METRE, RAD_S_PER_RPM, SETS
 
-from .common import ENDED_EARLY, INTERRUPTED, console, errors, five_bar_case, handled, number_or_text, prepare_solver
+from .common import ENDED_EARLY, INTERRUPTED, console, errors, five_bar_case, handled, number_or_text
 
 #: Range of speeds where none is given, relative to the natural frequency.
 _RANGE = (0.15, 1.5)
@@ -36,82 +37,110 @@ def _quantity(text: str, unit: str, name: str) -> float:
 
 def _require_range(low: float, high: float, name: str, first: str, last: str) -> None:
     """Refuse a range that is none, in the words of the command line."""
-    from ..periodic.branches import told, unit_of
+    from ..periodic import format_value, unit_of
 
     unit = unit_of(name)
     options = first if first == last else f"{first} and {last}"
     if not low < high:
-        raise click.UsageError(f"{options}: from {told(name, low, unit)} to {told(name, high, unit)}: it must increase")
+        span = f"from {format_value(name, low, unit)} to {format_value(name, high, unit)}"
+        raise click.UsageError(f"{options}: {span}: it must increase")
     if name == "drive.speed" and low <= 0.0:
-        raise click.UsageError(f"{options}: it begins at {told(name, low, unit)}: speeds must be above zero")
+        raise click.UsageError(f"{options}: it begins at {format_value(name, low, unit)}: speeds must be above zero")
 
 
-def _drive(chosen: Any, speed: str | None) -> Any:
-    """What drives the case, its constant forces with it; a speed given takes the place of its drive."""
-    from ..periodic.orbits import drive_of
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Chosen:
+    """The case that a command is about, and how it is driven there."""
 
-    inputs = chosen.inputs
-    if speed is not None:
-        inputs = replace(inputs, speed=_quantity(speed, "rad/s", "--speed"), torque=None)
-        if chosen.inputs.torque is not None:
-            errors.print("note: the speed is prescribed; the case's torque is left out", style="yellow")
-    try:
-        return drive_of(inputs)
-    except InputError as error:
-        hint = "; --speed prescribes the speed instead" if str(error).startswith("torque") else ""
-        raise InputError(f"{chosen.title}: {error}{hint}") from None
+    case: Any
+    stem: str
+    speed: str | None
+    guess_speed: str | None
+    folder: Path
 
+    def drive(self, speed: str | None = None) -> Any:
+        """What drives the case, its constant forces with it; a speed given takes the place of its drive."""
+        from ..periodic import VaryingInputError, drive_of
 
-def _start(chosen: Any, drive: Any, guess_speed: str | None) -> Any:
-    """Guess of the orbit's start: none at prescribed speed, else with a crank speed."""
-    if drive.speed_drive:
-        if guess_speed is not None:
-            raise click.UsageError("--guess-speed is for a case driven by a torque: here the speed is prescribed")
+        inputs, speed = self.case.inputs, speed or self.speed
+        if speed is not None:
+            inputs = replace(inputs, speed=_quantity(speed, "rad/s", "--speed"), torque=None)
+            if self.case.inputs.torque is not None:
+                errors.print("note: the speed is prescribed; the case's torque is left out", style="yellow")
+        try:
+            return drive_of(inputs)
+        except InputError as error:
+            torque = isinstance(error, VaryingInputError) and error.channel == "torque"
+            hint = "; --speed prescribes the speed instead" if torque else ""
+            raise InputError(f"{self.case.title}: {error}{hint}") from None
+
+    def start(self, drive: Any) -> tuple[float, float, float] | None:
+        """Guess of the orbit's start: none at prescribed speed, else with a crank speed."""
+        if drive.speed_drive:
+            if self.guess_speed is not None:
+                raise click.UsageError("--guess-speed is for a case driven by a torque: here the speed is prescribed")
+            return None
+        if self.guess_speed is not None:
+            return (0.0, 0.0, _quantity(self.guess_speed, "rad/s", "--guess-speed"))
+        if self.case.initial.crank_speed > 0.0:
+            return (0.0, 0.0, self.case.initial.crank_speed)
+        if drive.motor is None:
+            raise click.UsageError("under a torque a guess of the crank speed is needed: --guess-speed '300 rpm'")
         return None
-    if guess_speed is not None:
-        return (0.0, 0.0, _quantity(guess_speed, "rad/s", "--guess-speed"))
-    if chosen.initial.crank_speed > 0.0:
-        return (0.0, 0.0, chosen.initial.crank_speed)
-    if drive.motor is None:
-        raise click.UsageError("under a torque a guess of the crank speed is needed: --guess-speed '300 rpm'")
-    return None
+
+    def finish(self, written: Sequence[Path], problems: Sequence[str], *, interrupted: bool = False) -> None:
+        """Report the files and what could not be computed, and exit with what that means."""
+        for path in written:
+            console.print(f"wrote {path}", highlight=False, soft_wrap=True)
+        for problem in problems:
+            errors.print(f"note: {problem}", style="yellow", markup=False, highlight=False, soft_wrap=True)
+        if interrupted or problems:
+            sys.exit(INTERRUPTED if interrupted else ENDED_EARLY)
 
 
-def _stem(case: str | None, published: str | None) -> str:
-    return Path(case).stem if case else str(published)
+def _about_a_case(command: Callable[..., None]) -> Callable[..., None]:
+    """Options of a command about a case, which it receives as one `_Chosen`."""
+
+    @handled
+    @wraps(command)
+    def with_case(
+        case: str | None,
+        published: str | None,
+        settings: Sequence[str],
+        speed: str | None,
+        guess_speed: str | None,
+        out: str,
+        **options: Any,
+    ) -> None:
+        chosen = five_bar_case(case, published, settings)
+        stem = Path(case).stem if case else str(published)
+        command(_Chosen(case=chosen, stem=stem, speed=speed, guess_speed=guess_speed, folder=Path(out)), **options)
+
+    for option in (
+        click.option("--out", default="out", show_default=True, type=click.Path(file_okay=False), help="Folder."),
+        click.option("--guess-speed", metavar="SPEED", help="Guess of the crank speed, for a case driven by a torque."),
+        click.option("--speed", metavar="SPEED", help="Prescribe this crank speed in the place of the case's drive."),
+        click.option("--set", "settings", multiple=True, metavar="NAME=VALUE", help="Change a value of the mechanism."),
+        click.option("--published", metavar="NAME", help=f"A published set instead: {', '.join(SETS)}."),
+        click.argument("case", required=False, type=click.Path(exists=True, dir_okay=False)),
+    ):
+        with_case = option(with_case)
+    return with_case
 
 
 @click.command()
-@click.argument("case", required=False, type=click.Path(exists=True, dir_okay=False))
-@click.option("--published", metavar="NAME", help=f"A published set instead: {', '.join(SETS)}.")
-@click.option("--set", "settings", multiple=True, metavar="NAME=VALUE", help="Change a value of the mechanism.")
+@_about_a_case
 @click.option("--vary", default="drive.speed", show_default=True, metavar="NAME", help="What varies, by its FMI name.")
 @click.option(
     "--from", "low", metavar="VALUE", help="Beginning of the range, such as '100 rpm'; bare numbers are in SI."
 )
 @click.option("--to", "high", metavar="VALUE", help="End of the range.")
-@click.option("--speed", metavar="SPEED", help="Prescribe this crank speed in the place of the case's drive.")
-@click.option("--guess-speed", metavar="SPEED", help="Guess of the crank speed, for a case driven by a torque.")
 @click.option("--doubled/--no-doubled", default=True, show_default=True, help="Follow motions of twice the period.")
-@click.option("--out", default="out", show_default=True, type=click.Path(file_okay=False), help="Folder.")
 @click.option("--plot/--no-plot", default=True, show_default=True, help="Whether to write a plot.")
-@handled
-def resonance(
-    case: str | None,
-    published: str | None,
-    settings: Sequence[str],
-    vary: str,
-    low: str | None,
-    high: str | None,
-    speed: str | None,
-    guess_speed: str | None,
-    doubled: bool,
-    out: str,
-    plot: bool,
-) -> None:
+def resonance(chosen: _Chosen, vary: str, low: str | None, high: str | None, doubled: bool, plot: bool) -> None:
     """Follow the periodic motion of a CASE file's or a published set's mechanism over the speed, or another parameter.
 
-    Writes amplitude, harmonics, crank torque and pin forces along the curve, and tells natural frequency, maxima, folds,
+    Writes amplitude, harmonics, crank torque and pin forces along the curve, and reports natural frequency, maxima, folds,
     period doublings, and the classical approximations beside the true motion.
 
     \b
@@ -120,74 +149,62 @@ def resonance(
       linkwork resonance --published rig-1-spring-b --from '100 rpm' --to '1300 rpm'
       linkwork resonance --published table-3.1 --vary slider.stiffness --from '1e5 dyn/cm' --to '2e6 dyn/cm'
     """
+    from .. import figures
     from ..files import save_figure, write_csv
-    from ..periodic.branches import unit_of
-    from ..periodic.resonance import ResponseInterrupted, approximations, frequency_response, natural_frequency
+    from ..periodic import ResponseInterrupted, frequency_response, natural_frequency, unit_of
+    from ..youssef import approximations
 
-    chosen = five_bar_case(case, published, settings)
-    parameters = chosen.parameters
+    parameters, title = chosen.case.parameters, chosen.case.title
     over_speed = vary == "drive.speed"
-    if over_speed and speed is not None:
+    if over_speed and chosen.speed is not None:
         raise click.UsageError(
             "--speed prescribes a speed, but it is the speed that varies: give --from and --to, or --vary"
         )
-    natural = natural_frequency(parameters) if parameters.slider_stiffness > 0.0 else None
-    unit = unit_of(vary)
-    if over_speed and natural is not None:
-        ends = [factor * natural for factor in _RANGE]
-    elif low is None or high is None:
-        why = (
-            "without a spring there is no natural frequency to begin with"
-            if over_speed
-            else "it has no range of its own"
-        )
-        raise click.UsageError(f"--from and --to are needed for {vary}: {why}")
-    else:
-        ends = [0.0, 0.0]
-    if low is not None:
-        ends[0] = _quantity(low, unit, "--from")
-    if high is not None:
-        ends[1] = _quantity(high, unit, "--to")
-    _require_range(ends[0], ends[1], vary, "--from", "--to")
-    drive = _drive(chosen, f"{ends[0]} rad/s" if over_speed else speed)
-    prepare_solver(orbits=True)
+    natural = natural_frequency(parameters) if over_speed and parameters.slider_stiffness > 0.0 else None
+    ends = _ends(vary, low, high, natural)
+    drive = chosen.drive(f"{ends[0]} rad/s" if over_speed else None)
+    start = chosen.start(drive)
     interrupted = False
     try:
         response = frequency_response(
-            parameters,
-            *ends,
-            drive=drive,
-            vary=vary,
-            start=_start(chosen, drive, guess_speed),
-            doubled=doubled,
-            progress=console.is_terminal,
+            parameters, *ends, drive=drive, vary=vary, start=start, doubled=doubled, progress=console.is_terminal
         )
     except ResponseInterrupted as stopped:
         response, interrupted = stopped.response, True
-    factor, shown_unit = (1.0 / RAD_S_PER_RPM, "rpm") if over_speed else (1.0, unit)
-    if over_speed and natural is not None:
+    factor, unit = (1.0 / RAD_S_PER_RPM, "rpm") if over_speed else (1.0, unit_of(vary))
+    if natural is not None:
         console.print(
             f"natural frequency (mean effective mass): {natural / RAD_S_PER_RPM:.2f} rpm, {natural:.5g} rad/s",
             highlight=False,
         )
-    _branches(chosen.title, response, factor, shown_unit)
-    stem = Path(out) / f"{_stem(case, published)}-resonance"
+    _branches(title, response, factor, unit)
+    stem = chosen.folder / f"{chosen.stem}-resonance"
     written = [response.to_csv(f"{stem}.csv")]
     table = approximations(response) if over_speed else None
-    _extrema(response, factor, shown_unit, table)
+    _extrema(response, factor, unit, table)
     if table is not None:
         written.append(write_csv(f"{stem}-approximations.csv", table.columns()))
     if plot:
-        figure = response.plot(title=chosen.title, rpm=over_speed, beside=table)
+        figure = figures.plot(response, title=title, rpm=over_speed, beside=table)
         written.append(save_figure(figure, f"{stem}.png"))
-    for path in written:
-        console.print(f"wrote {path}", highlight=False, soft_wrap=True)
-    for problem in response.problems:
-        errors.print(f"note: {problem}", style="yellow", markup=False, highlight=False, soft_wrap=True)
-    if interrupted:
-        sys.exit(INTERRUPTED)
-    if response.problems:
-        sys.exit(ENDED_EARLY)
+    chosen.finish(written, response.problems, interrupted=interrupted)
+
+
+def _ends(vary: str, low: str | None, high: str | None, natural: float | None) -> tuple[float, float]:
+    """The range to follow, by default about the natural frequency."""
+    from ..periodic import unit_of
+
+    unit = unit_of(vary)
+    if natural is None and (low is None or high is None):
+        speed = vary == "drive.speed"
+        why = "without a spring there is no natural frequency to begin with" if speed else "it has no range of its own"
+        raise click.UsageError(f"--from and --to are needed for {vary}: {why}")
+    ends = [
+        _quantity(text, unit, option) if text is not None else factor * (natural or 0.0)
+        for text, option, factor in zip((low, high), ("--from", "--to"), _RANGE)
+    ]
+    _require_range(ends[0], ends[1], vary, "--from", "--to")
+    return ends[0], ends[1]
 
 
 def _branches(title: str, response: Any, factor: float, unit: str) -> None:
@@ -196,7 +213,7 @@ def _branches(title: str, response: Any, factor: float, unit: str) -> None:
         grid.add_column(escape(heading), justify="left" if heading.startswith("what") else "right")
     for number, branch in enumerate(response.branches, start=1):
         words = [s.value for s in branch.stability()]
-        told = ", ".join(f"{words.count(word) / len(words):.0%} {word}" for word in dict.fromkeys(words))
+        shares = ", ".join(f"{words.count(word) / len(words):.0%} {word}" for word in dict.fromkeys(words))
         events = [f"{s.kind.value} at {factor * s.parameter:.6g}" for s in branch.special]
         grid.add_row(
             str(number),
@@ -204,7 +221,7 @@ def _branches(title: str, response: Any, factor: float, unit: str) -> None:
             str(len(branch)),
             f"{factor * branch.parameter[0]:.6g}",
             f"{factor * branch.parameter[-1]:.6g}",
-            told,
+            shares,
             "; ".join(events),
         )
     console.print(grid)
@@ -234,36 +251,25 @@ def _extrema(response: Any, factor: float, unit: str, table: Any) -> None:
 
 
 @click.command()
-@click.argument("case", required=False, type=click.Path(exists=True, dir_okay=False))
-@click.option("--published", metavar="NAME", help=f"A published set instead: {', '.join(SETS)}.")
-@click.option("--set", "settings", multiple=True, metavar="NAME=VALUE", help="Change a value of the mechanism.")
-@click.option("--speed", metavar="SPEED", help="Prescribe this crank speed in the place of the case's drive.")
-@click.option("--guess-speed", metavar="SPEED", help="Guess of the crank speed, for a case driven by a torque.")
+@_about_a_case
 @click.option("--x", "x", default="drive.speed", show_default=True, metavar="NAME", help="Parameter along x.")
 @click.option("--x-range", nargs=2, metavar="FROM TO", help="Its range, such as '100 rpm' '1500 rpm'.")
 @click.option("--y", "y", default="slider.damping", show_default=True, metavar="NAME", help="Parameter along y.")
 @click.option("--y-range", nargs=2, metavar="FROM TO", help="Its range, such as 0 '2e4 dyn.s/cm'.")
 @click.option("--points", default=80, show_default=True, type=click.IntRange(2, 2000), help="Points along each axis.")
 @click.option("--cores", default=-1, show_default=True, callback=_cores, help="Cores; -1 for all.")
-@click.option("--out", default="out", show_default=True, type=click.Path(file_okay=False), help="Folder.")
 @click.option("--chart/--no-chart", "charted", default=True, show_default=True, help="Chart, or the verdict alone.")
-@handled
 def stability(
-    case: str | None,
-    published: str | None,
-    settings: Sequence[str],
-    speed: str | None,
-    guess_speed: str | None,
+    chosen: _Chosen,
     x: str,
     x_range: tuple[str, str] | None,
     y: str,
     y_range: tuple[str, str] | None,
     points: int,
     cores: int,
-    out: str,
     charted: bool,
 ) -> None:
-    """Tell whether the periodic motion of a CASE file's or a published set's mechanism is stable, and chart where it is not.
+    """Report whether the periodic motion of a CASE file's or a published set's mechanism is stable, and chart where it is not.
 
     The verdict is on the motion at one speed, with its margin. The chart has the largest Floquet multiplier of the true orbit
     at every point, the boundaries of instability traced, that of the linear equation beside it, and three points confirmed by
@@ -275,75 +281,80 @@ def stability(
       linkwork stability --published rig-2-spring-c --x-range '200 rpm' '1500 rpm' --y-range 0 '6e3 dyn.s/cm'
       linkwork stability --published rig-1-spring-a --y slider.stiffness --y-range '1e6 dyn/cm' '5e6 dyn/cm'
     """
+    from .. import figures
     from ..files import save_figure
-    from ..periodic.branches import unit_of
-    from ..periodic.charts import default_range, stability_chart
-    from ..periodic.orbits import orbit_of
-    from ..periodic.stability import linear_verdict
+    from ..periodic import stability_chart
+    from ..youssef import linear_motion
 
-    chosen = five_bar_case(case, published, settings)
-    parameters = chosen.parameters
-    drive = _drive(chosen, speed)
-    start = _start(chosen, drive, guess_speed)
-    ranges: list[tuple[float, float]] = []
+    parameters, drive = chosen.case.parameters, chosen.drive()
+    start = chosen.start(drive)
+    ranges = ((0.0, 0.0), (0.0, 0.0))
     if charted:
-        for name, texts, option in ((x, x_range, "--x-range"), (y, y_range, "--y-range")):
-            if texts is None:
-                ranges.append(default_range(parameters, drive, name))
-            else:
-                low, high = (_quantity(text, unit_of(name), option) for text in texts)
-                _require_range(low, high, name, option, option)
-                ranges.append((low, high))
-    prepare_solver(orbits=True)
-    orbit = orbit_of(parameters, drive, start=start)
-    turn = orbit.turn()
-    told = ", ".join(f"{m.real:.6g}{m.imag:+.6g}i" if m.imag else f"{m.real:.6g}" for m in orbit.multipliers)
-    console.print(
-        f"{chosen.title} at {60.0 * turn.turns / turn.period:.6g} rpm: {orbit.verdict()}\n"
-        f"Floquet multipliers {told}; amplitude {CM_PER_METRE * turn.amplitude:.5g} cm",
-        highlight=False,
-        soft_wrap=True,
-    )
-    if drive.speed_drive and not parameters.slider_coulomb_friction:
-        console.print(
-            f"by the linear equation about u = 0, as in the thesis: {linear_verdict(parameters, drive)}",
-            highlight=False,
-            soft_wrap=True,
+        ranges = (
+            _axis_range(parameters, drive, x, x_range, "--x-range"),
+            _axis_range(parameters, drive, y, y_range, "--y-range"),
         )
-    if parameters.slider_coulomb_friction:
-        errors.print(
-            "note: Coulomb friction is smoothed over 1 mm/s: where the slider would stick, the model creeps to one place, and "
-            "its multipliers tell of the creep",
-            style="yellow",
-            highlight=False,
-            soft_wrap=True,
-        )
+    _report_verdict(chosen.case.title, parameters, drive, start)
     if not charted:
         return
     found = stability_chart(
         parameters,
         drive,
         (x, y),
-        (ranges[0], ranges[1]),
-        start=start,
+        ranges,
         points=points,
+        start=start,
+        beside=linear_motion(parameters, drive, (x, y)),
         n_jobs=cores,
         progress=console.is_terminal,
     )
     _regions(found)
     _runs(found)
-    stem = Path(out) / f"{_stem(case, published)}-stability"
+    stem = chosen.folder / f"{chosen.stem}-stability"
+    figure = figures.plot(found, title=chosen.case.title)
     written = [
         found.to_csv(f"{stem}.csv"),
         found.boundaries_to_csv(f"{stem}-boundaries.csv"),
-        save_figure(found.plot(title=chosen.title), f"{stem}.png"),
+        save_figure(figure, f"{stem}.png"),
     ]
-    for path in written:
-        console.print(f"wrote {path}", highlight=False, soft_wrap=True)
-    for problem in found.problems:
-        errors.print(f"note: {problem}", style="yellow", markup=False, highlight=False, soft_wrap=True)
-    if found.problems:
-        sys.exit(ENDED_EARLY)
+    chosen.finish(written, found.problems)
+
+
+def _axis_range(
+    parameters: Any, drive: Any, name: str, texts: tuple[str, str] | None, option: str
+) -> tuple[float, float]:
+    from ..periodic import default_range, unit_of
+
+    if texts is None:
+        return default_range(parameters, drive, name)
+    low, high = (_quantity(text, unit_of(name), option) for text in texts)
+    _require_range(low, high, name, option, option)
+    return low, high
+
+
+def _report_verdict(title: str, parameters: Any, drive: Any, start: Any) -> None:
+    """The verdict on the motion at one speed, beside that of the linear equation."""
+    from ..periodic import orbit_of
+    from ..youssef import linear_verdict
+
+    orbit = orbit_of(parameters, drive, start=start)
+    turn = orbit.turn()
+    values = ", ".join(f"{m.real:.6g}{m.imag:+.6g}i" if m.imag else f"{m.real:.6g}" for m in orbit.multipliers)
+    lines = [
+        f"{title} at {60.0 * turn.turns / turn.period:.6g} rpm: {orbit.verdict()}",
+        f"Floquet multipliers {values}; amplitude {CM_PER_METRE * turn.amplitude:.5g} cm",
+    ]
+    if drive.speed_drive and not parameters.slider_coulomb_friction:
+        lines.append(f"by the linear equation about u = 0, as in the thesis: {linear_verdict(parameters, drive)}")
+    console.print("\n".join(lines), highlight=False, soft_wrap=True)
+    if parameters.slider_coulomb_friction:
+        errors.print(
+            "note: Coulomb friction is smoothed over 1 mm/s: where the slider would stick, the model creeps to one place, "
+            "and its multipliers are those of the creep",
+            style="yellow",
+            highlight=False,
+            soft_wrap=True,
+        )
 
 
 def _regions(found: Any) -> None:
@@ -359,7 +370,9 @@ def _regions(found: Any) -> None:
             f"{axis.factor * points[:, i].min():.6g} to {axis.factor * points[:, i].max():.6g}"
             for i, axis in enumerate(found.axes)
         ]
-        grid.add_row(traced.motion, traced.kind.value, *spans, "; ".join(dict.fromkeys(traced.ends)))
+        grid.add_row(
+            traced.motion, traced.kind.value, *spans, "; ".join(dict.fromkeys(str(end) for end in traced.ends))
+        )
     if found.boundaries:
         console.print(grid)
     for removal in found.removals:

@@ -13,7 +13,10 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
-from .curves import Panel, draw_panel, lay_out
+from ..periodic import TRUE_ORBIT, Crossing, Outcome, StabilityChart
+from .curves import Curve, Panel, draw_panel, lay_out
+from .dispatch import plot
+from .style import COLOURS
 
 #: Colour of points that have no value.
 _NONE = "0.82"
@@ -96,3 +99,62 @@ def _draw_map(figure: Figure, axis: Axes, chart: HeatMap) -> None:
         # over the colours a legend needs a ground
         legend.set_frame_on(True)
         legend.get_frame().set_alpha(0.9)
+
+
+@plot.register
+def plot_stability_chart(chart: StabilityChart, *, title: str = "") -> Figure:
+    """The largest multiplier in colours, the boundaries, and the points of the long runs."""
+    x, y = chart.axes
+    looks = {
+        Crossing.PERIOD_DOUBLING: ("0.1", "-", "period doubling"),
+        Crossing.FOLD: (COLOURS[3], "-", "fold"),
+        Crossing.TORUS: (COLOURS[1], "-", "torus"),
+    }
+    marks = {Crossing.PERIOD_DOUBLING: (COLOURS[2], "-1"), Crossing.FOLD: (COLOURS[4], "+1")}
+    curves, named = [], set()
+    for traced in chart.boundaries:
+        if traced.motion == TRUE_ORBIT:
+            colour, line, label = looks[traced.kind]
+        else:
+            colour, multiplier = marks[traced.kind]
+            line, label = "--", f"{traced.motion}, multiplier {multiplier}"
+        curves.append(
+            Curve(
+                x=x.factor * traced.points[:, 0],
+                y=y.factor * traced.points[:, 1],
+                colour=colour,
+                line=line,
+                label="" if label in named else label,
+            )
+        )
+        named.add(label)
+    for outcome in dict.fromkeys(run.confirmation.outcome for run in chart.runs):
+        those = [run for run in chart.runs if run.confirmation.outcome is outcome]
+        curves.append(
+            Curve(
+                x=[x.factor * run.x for run in those],
+                y=[y.factor * run.y for run in those],
+                colour="0.1",
+                line="",
+                marker={Outcome.DECAYS: "o", Outcome.GROWS: "x", Outcome.BOUNDED: "s"}[outcome],
+                label=f"long run {outcome.value}",
+            )
+        )
+    low, high = (np.array([chart.box.x[i], chart.box.y[i]]) * [x.factor, y.factor] for i in (0, 1))
+    panel = Panel(
+        x_label=x.label,
+        y_label=y.label,
+        curves=curves,
+        legend_at="upper right",
+        x_range=(float(low[0]), float(high[0])),
+        y_range=(float(low[1]), float(high[1])),
+    )
+    map_ = HeatMap(
+        panel=panel,
+        x=x.factor * chart.grid.x,
+        y=y.factor * chart.grid.y,
+        values=chart.grid.largest,
+        label="largest Floquet multiplier",
+        missing="no orbit",
+    )
+    return plot_charts([map_], title=title, size=(7.2, 5.0))

@@ -12,6 +12,8 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MultipleLocator
 from numpy.typing import ArrayLike
 
+from ..linear import UNITS, LinearModel
+from .dispatch import plot
 from .style import COLOURS, STYLE, finish
 
 LINES = ("-", "--", "-.", ":")
@@ -54,6 +56,15 @@ def plot_bode(
             figure.suptitle(title, fontsize=10.5, fontweight="bold")
         figure.align_ylabels()
         return finish(figure)
+
+
+@plot.register
+def plot_linear_model(
+    model: LinearModel, output: str = "slider.position", input: str = "slider.force", **options: Any
+) -> Figure:
+    """Magnitude and phase of a linear model from one input to one output, by their FMI names; see `plot_bode`."""
+    per = f"({UNITS[input]})" if "." in UNITS[input] else UNITS[input]
+    return plot_bode({"": model.to_state_space((output,), (input,))}, unit=f"{UNITS[output]}/{per}", **options)
 
 
 def plot_poles(systems: Mapping[str, Any], *, title: str = "") -> Figure:

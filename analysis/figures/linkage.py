@@ -255,7 +255,7 @@ def draw_linkage(
         rad, m.
     title : str
     trace : array_like, shape (n, 2), optional
-        A path of P to draw too (m), such as an arc of `analysis.youssef.workspace.coupler_curve`.
+        A path of P to draw too (m), such as an arc of `analysis.youssef.coupler_curve`.
 
     Raises
     ------

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import matplotlib
 import numpy as np
@@ -11,11 +11,12 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
-from ..units import CM_PER_METRE, RAD_S_PER_RPM
-from .style import COLOURS, STYLE, finish
+from linkwork.five_bar.published import CM_PER_METRE, RAD_S_PER_RPM
 
-if TYPE_CHECKING:
-    from ..periodic.branches import Branch
+from ..periodic import Branch, Response
+from ..youssef import Approximations
+from .dispatch import plot
+from .style import COLOURS, STYLE, finish
 
 #: Lines of the approximations beside.
 _LINES: tuple[Any, ...] = ("-.", ":", (0, (5, 1)))
@@ -38,7 +39,7 @@ def plot_branches(
         Of one family.
     title : str
     rpm : bool
-        Whether a speed in rad/s is shown in rpm.
+        Whether a speed in rad/s is drawn in rpm.
     beside : mapping, optional
         Amplitudes by approximations: name to (parameter, amplitude in m), shapes (m,).
     """
@@ -91,6 +92,21 @@ def plot_branches(
         if title:
             figure.suptitle(title, fontsize=10.5, fontweight="bold")
         return finish(figure)
+
+
+@plot.register
+def plot_branch(branch: Branch, *, title: str = "") -> Figure:
+    """One branch: amplitude, crank torque and pin force over its parameter, with its special points."""
+    return plot_branches([branch], title=title)
+
+
+@plot.register
+def plot_response(
+    response: Response, *, title: str = "", rpm: bool = False, beside: Approximations | None = None
+) -> Figure:
+    """All branches of a response, with the classical approximations of the amplitude beside them; see `plot_branches`."""
+    others = {} if beside is None else {name: (beside.speed, a) for name, a in beside.amplitudes.items()}
+    return plot_branches(response.branches, title=title, rpm=rpm, beside=others)
 
 
 def _legend(branches: Sequence[Branch], others: Sequence[str]) -> list[Line2D]:

@@ -1,1 +1,10 @@
-"""Linear models of a mechanism, and controllers designed on them."""
+"""Linear models of the plant, and control of the slider designed on them.
+
+The names are those of ``__init__.pyi``; each is imported from its module when it is first used.
+"""
+
+from __future__ import annotations
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

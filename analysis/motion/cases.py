@@ -32,8 +32,7 @@ from ..files import (
     table_of,
     text,
 )
-from ..linear.linearise import linearise_along
-from ..linear.slider_control import design_pid
+from ..linear import design_pid, linearise_along
 from ..run.case_files import parameters_to
 from ..synthesis import (
     ANGLES,
@@ -238,7 +237,9 @@ class SliderCase:
             return Solution.of(task, self.linkage)
         # where it is on the way of the task is not given: found with every dimension fixed
         only, seed = (Assembly(branch=self.linkage.branch),), self.synthesis.search.seed
-        return synthesize(task, _kept(self.linkage), only, search=Search(seed=seed, candidates=1 << 10, starts=4, solutions=1)).best
+        return synthesize(
+            task, _kept(self.linkage), only, search=Search(seed=seed, candidates=1 << 10, starts=4, solutions=1)
+        ).best
 
     def move(self, four_bar: Solution, harmonics: int, guesses: tuple[Solution, ...], *, progress: bool) -> Synthesis:
         """The best motion with so many harmonics; see `slider_motion`."""

@@ -16,9 +16,10 @@ from linkwork.errors import InputError, LinkworkError
 from linkwork.five_bar.kinematics import assembly_square
 from linkwork.five_bar.parameters import FiveBarParameters
 
+from ..mechanisms import FIVE_BAR
 from ..numerics import symbolic
 from ..numerics.fourier import FourierSeries
-from ..run import Piecewise
+from ..run import Piecewise, traced
 from .inverse import FloatArray, Load, inverse_dynamics, load_at, whole
 
 Effort = Literal["force", "power", "positive power"]

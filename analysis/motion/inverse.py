@@ -24,9 +24,10 @@ from linkwork.five_bar.assembly import check_assembly
 from linkwork.five_bar.parameters import Constants, FiveBarParameters
 from linkwork.five_bar.variables import OUTPUT_NAMES
 
+from ..linear import UNITS
+from ..mechanisms import FIVE_BAR
+from ..run import outputs_of
 from ..numerics.fourier import FourierSeries
-from ..run import compiled
-from ..run.trajectory import UNITS
 
 FloatArray = NDArray[np.float64]
 #: Force at P (N, N): constant, or a function of the crank angle (rad).
@@ -251,13 +252,12 @@ def inverse_dynamics(
     states[:, 0], states[:, 1], states[:, 2] = angle, slider(angle), crank_speed
     states[:, 3] = crank_speed * slope(angle)
     acceleration = crank_speed**2 * slope.derivative()(angle)
-    inputs[:, 0] = 1.0
+    inputs[:, 1] = crank_speed
     for x, i, a in zip(states.tolist(), inputs, acceleration.tolist()):
         _check_joined(parameters, x[0], x[1])
         at_p = load_at(load, x[0])
         i[3], i[4], i[5] = slider_force(x[0], x[1], x[2], x[3], a, at_p, p), *at_p
-    values = np.empty((samples, len(OUTPUT_NAMES)))
-    compiled.solver(p).outputs(p, states, inputs, 0.0, values)
+    values = outputs_of(FIVE_BAR, np.array([1.0]), np.array([*p, 0.0]), states, inputs)
     return SliderDrive(
         parameters=parameters,
         slider=slider,

@@ -6,7 +6,7 @@ The force over a sampling period h is
 
 F_ff is that of inverse dynamics on the model half a period ahead, th2 + w2 h/2, for a force that is held is right in the
 middle of its period: the error then goes with h^2, while that of the force at the sample goes with h. The reference
-goes with the measured crank. The feedback's gains, its integral and its limit are those of `slider_control`.
+goes with the measured crank. The feedback's gains, its integral and its limit are those of `analysis.linear`.
 
 The plant in the loop may differ from the model in what is not known beforehand: friction, masses, the load at P.
 """
@@ -24,13 +24,13 @@ from linkwork.errors import InputError
 from linkwork.five_bar import kinematics
 from linkwork.five_bar.parameters import FiveBarParameters, InitialState
 
-from ..linear.slider_control import LoopResult, SampledController, SliderDesign, check_period, control_loop
+from ..linear import LoopResult, SampledController, SliderDesign, check_period, control_loop
 from ..numerics.fourier import FourierSeries
 from .inverse import FloatArray, Load, check_speed, inverse_dynamics, load_at, slider_force
 
 
 class TrackingController:
-    """Feed-forward by inverse dynamics on a model, feedback by a design, or both; a `slider_control.Controller`.
+    """Feed-forward by inverse dynamics on a model, feedback by a design, or both; a `Controller`.
 
     Parameters
     ----------

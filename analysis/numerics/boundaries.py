@@ -1,14 +1,13 @@
 """Boundaries in a chart: curves along which a smooth function of two parameters is zero, found and traced.
 
-It knows no mechanics. `scan` finds the roots along a line, close pairs too; `trace` follows a boundary from a point near it by
-predictor and corrector; `chart` finds and follows all that cross its lines.
+It knows no mechanics. `scan` finds the roots along a line, close pairs too; `trace` follows a boundary from a point near it;
+`chart` finds and follows all that cross its lines.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
-from enum import Enum
+from dataclasses import dataclass, replace
 from math import isfinite
 from typing import Any
 
@@ -17,6 +16,8 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq, minimize_scalar
 
 from linkwork.errors import InputError, LinkworkError
+
+from .continuation import ContinuationError, Curve, End, Evaluation, Follower, Reason, Settings
 
 #: A smooth function of a point of a chart, negative in a region of instability.
 Test = Callable[[float, float], float]
@@ -190,25 +191,6 @@ class Box:
         return np.array([self.x[0], self.y[0]])
 
 
-class Reason(Enum):
-    """Why a traced boundary ends."""
-
-    BOX = "it leaves the box"
-    CLOSED = "it is closed"
-    TIP = "it turns too sharply to follow, or meets another boundary"
-    NO_VALUE = "the test function has no value beyond"
-    LENGTH = "the number of points is used up"
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class End:
-    """An end of a traced boundary: why, the last good point, and what the test function had to say."""
-
-    reason: Reason
-    point: tuple[float, float]
-    message: str = ""
-
-
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Boundary:
     """A boundary in a chart; the region of instability is on the left of its direction.
@@ -262,84 +244,53 @@ class Boundary:
 _DIFFERENCE = 1e-4
 #: Shortest step of a trace, as far as which sharp turns are followed.
 _SHORTEST = 1e-6
-#: Cosine of the largest turn of the tangent in a step, and of that up to which the step grows.
-_TURN, _STRAIGHT = 0.94, 0.995
-#: Slope, relative to the steepest so far, below which two boundaries meet.
-_FLAT = 1e-6
+#: Largest turn of the tangent in a step (rad), and that up to which the step grows.
+_TURN, _STRAIGHT = 0.35, 0.1
 
 
 @dataclass(frozen=True, slots=True)
-class _Scaled:
-    """A test function on the box scaled to 1 by 1."""
+class _Zero:
+    """A test function as the one equation of a curve: the unknown is x, the parameter y."""
 
     test: Test
     box: Box
-    tolerance: float
 
-    def __call__(self, s: NDArray[np.float64]) -> float:
-        x, y = (self.box.corner + s * self.box.size).tolist()
-        value = self.test(x, y)
+    def residual(self, x: NDArray[np.float64], y: float) -> NDArray[np.float64]:
+        """The test function, shape (1,), in the unit of x as the scaling expects it."""
+        place = float(x[0]), y
+        value = self.test(*place)
         if not isfinite(value):
-            raise InputError(f"the test function is {value} at ({x:.9g}, {y:.9g})")
-        return value
+            raise InputError(f"the test function is {value} at ({place[0]:.9g}, {place[1]:.9g})")
+        return np.array([value * self.box.size[0]])
 
-    def gradient(self, s: NDArray[np.float64]) -> NDArray[np.float64]:
-        """By differences of second order that stay inside the box."""
-        slope = np.empty(2)
-        for axis in range(2):
+    def evaluate(self, x: NDArray[np.float64], y: float) -> Evaluation:
+        """With its slope, by differences of second order that stay inside the box; the data are the distance from zero."""
+        place, low, high = np.array([x[0], y]), self.box.corner, self.box.corner + self.box.size
+        here, slope = float(self.residual(x, y)[0]), np.empty(2)
+        for axis, size in enumerate(self.box.size):
             step = np.zeros(2)
-            step[axis] = _DIFFERENCE
-            if s[axis] < _DIFFERENCE:
-                slope[axis] = 4.0 * self(s + step) - self(s + 2.0 * step) - 3.0 * self(s)
-            elif s[axis] > 1.0 - _DIFFERENCE:
-                slope[axis] = 3.0 * self(s) - 4.0 * self(s - step) + self(s - 2.0 * step)
+            step[axis] = _DIFFERENCE * size
+
+            def ahead(steps: float, step: NDArray[np.float64] = step) -> float:
+                there = np.clip(place + steps * step, low, high)
+                return float(self.residual(there[:1], float(there[1]))[0])
+
+            if place[axis] - step[axis] < low[axis]:
+                change = 4.0 * ahead(1.0) - ahead(2.0) - 3.0 * here
+            elif place[axis] + step[axis] > high[axis]:
+                change = 3.0 * here - 4.0 * ahead(-1.0) + ahead(-2.0)
             else:
-                slope[axis] = self(s + step) - self(s - step)
-        slope /= 2.0 * _DIFFERENCE
-        return slope
-
-    def correct(
-        self, s: NDArray[np.float64], direction: NDArray[np.float64], slope: float, reach: float
-    ) -> tuple[NDArray[np.float64], int] | None:
-        """The root on a line through s, by the secant method from a known slope, and the iterations; None if none is near."""
-        r, value = 0.0, self(s)
-        for iteration in range(1, 13):
-            change = -value / slope
-            if not abs(r + change) <= reach:
-                return None
-            r += change
-            point = s + r * direction
-            if abs(change) <= self.tolerance:
-                return point, iteration
-            if not _inside(point):
-                # it is for the caller to find where the box is left
-                return point, iteration
-            new = self(point)
-            if new == 0.0:
-                return point, iteration
-            if change != 0.0 and new != value:
-                slope = (new - value) / change
-            value = new
-        return None
+                change = ahead(1.0) - ahead(-1.0)
+            slope[axis] = change / (2.0 * step[axis])
+        steepest = float(np.hypot(*(slope * self.box.size)))
+        return Evaluation(np.array([here]), slope[:1, None], slope[1:], abs(here) / steepest if steepest else 0.0)
 
 
-def _inside(s: NDArray[np.float64]) -> bool:
-    return bool((s >= 0.0).all() and (s <= 1.0).all())
+def trace(test: Test, seed: tuple[float, float], box: Box, *, step: float = 0.02, most: int = 5000) -> Boundary:
+    """Follow the boundary through a point, both ways; see `analysis.numerics.continuation`.
 
-
-def trace(
-    test: Test,
-    seed: tuple[float, float],
-    box: Box,
-    *,
-    step: float = 0.02,
-    tolerance: float = 1e-10,
-    most: int = 5000,
-) -> Boundary:
-    """Follow the boundary through a point, both ways, by predictor and corrector.
-
-    The predictor goes along the tangent, the corrector along the normal there; a step is taken again at half its length if
-    the tangent turns by more than 20 degrees, which also keeps the two sides of a narrow region apart: theirs are opposite.
+    A step is taken again at half its length if the tangent turns by more than 20 degrees, or if the other side of a narrow
+    region is met: its direction is opposite.
 
     Parameters
     ----------
@@ -350,8 +301,6 @@ def trace(
     box : Box
     step : float
         Longest step, with the box scaled to 1 by 1.
-    tolerance : float
-        Of the points, in the same scale.
     most : int
         Points at most, each way.
 
@@ -362,153 +311,55 @@ def trace(
     LinkworkError
         As the test function there.
     """
-    f = _Scaled(test, box, tolerance)
-    start = (np.array(seed, dtype=float) - box.corner) / box.size
-    if not _inside(start):
+    place = np.array(seed, dtype=float)
+    sides = [axis for axis in (0, 1) if seed[axis] in (box.x, box.y)[axis]]
+    if ((place < box.corner) | (place > box.corner + box.size)).any():
         raise InputError(f"the seed {seed} lies outside the box")
-    slope = f.gradient(start)
-    norm = float(np.hypot(*slope))
-    # along a side of the box if it lies on one, else along the normal
-    on_side = [axis for axis in range(2) if start[axis] in (0.0, 1.0)]
-    normal = np.array([0.0, 1.0])[:: 1 if on_side == [0] else -1] if len(on_side) == 1 else slope / (norm or 1.0)
-    along = float(slope @ normal)
-    corrected = f.correct(start, normal, along, step) if along != 0.0 else None
-    if corrected is None or not _inside(corrected[0]):
+    zero = _Zero(test, box)
+    settings = Settings(
+        low=box.y[0],
+        high=box.y[1],
+        bounds={0: box.x},
+        first=step,
+        least=min(_SHORTEST, step),
+        greatest=step,
+        most_points=most,
+        greatest_turn=_TURN,
+        growing_turn=_STRAIGHT,
+        oriented=True,
+    )
+    follower = Follower(zero.evaluate, box.size[:1], settings, zero.residual)
+    evaluation = zero.evaluate(place[:1], place[1])
+    # along a side of the box if the seed lies on one, else along the normal
+    across = np.array([-evaluation.slope[0] * box.size[1], evaluation.jacobian[0, 0] * box.size[0]])
+    if len(sides) == 1:
+        across = np.eye(2)[sides[0]]
+    try:
+        start = follower.start(place[:1], float(place[1]), 1, across / (float(np.hypot(*across)) or 1.0))
+    except ContinuationError as error:
+        raise InputError(f"no boundary within {step:g} of the box of the seed {seed}: {error}") from None
+    found = np.array([start.y[0], start.parameter])
+    if len(sides) == 1:
+        found[sides[0]] = place[sides[0]]
+        start = replace(start, y=found[:1], parameter=float(found[1]))
+    if (np.abs(found - place) > step * box.size).any() or follower.is_beyond(start):
         raise InputError(f"no boundary within {step:g} of the box of the seed {seed}")
-    start = corrected[0]
-    forth = _follow(f, start, 1.0, step, most)
-    if forth.reason is Reason.CLOSED:
-        sides = [forth]
-        points, tangents = forth.points, forth.tangents
-    else:
-        back = _follow(f, start, -1.0, step, most)
-        sides = [back, forth]
-        points, tangents = back.points[:0:-1] + forth.points, back.tangents[:0:-1] + forth.tangents
-    ends = [
-        End(reason=side.reason, point=_point(box.corner + side.points[-1] * box.size), message=side.message)
-        for side in sides
-    ]
+    if start.orientation < 0.0:
+        start = start.turned()
+    forth = follower.follow(start)
+    back = forth if forth.closed else follower.follow(start.turned())
+    way = [*forth.points] if forth.closed else [*(point.turned() for point in back.points[:0:-1]), *forth.points]
     return Boundary(
-        points=box.corner + np.array(points) * box.size,
-        tangents=np.array(tangents),
-        residual=max(side.residual for side in sides),
-        ends=(ends[0], ends[-1]),
+        points=np.array([[point.y[0], point.parameter] for point in way]),
+        tangents=np.array([point.tangent for point in way]),
+        residual=max(point.data for point in way),
+        ends=(_end(back), _end(forth)),
     )
 
 
-def _point(values: NDArray[np.float64]) -> tuple[float, float]:
-    return float(values[0]), float(values[1])
-
-
-@dataclass(slots=True)
-class _Way:
-    """One way along a boundary from its seed, scaled."""
-
-    points: list[NDArray[np.float64]]
-    tangents: list[NDArray[np.float64]]
-    residual: float
-    reason: Reason
-    message: str = ""
-
-
-def _follow(f: _Scaled, start: NDArray[np.float64], way: float, longest: float, most: int) -> _Way:
-    """Points from ``start``, it included, in the direction of the boundary (``way`` +1) or against it (-1)."""
-
-    def tangent_of(slope: NDArray[np.float64]) -> NDArray[np.float64]:
-        # the negative side, which the slope points away from, is on the left
-        direction: NDArray[np.float64] = np.array([-slope[1], slope[0]]) / np.hypot(*slope)
-        return direction
-
-    slope = f.gradient(start)
-    steepest = float(np.hypot(*slope))
-    tangent = tangent_of(slope)
-    path = _Way([start], [tangent], abs(f(start)) / steepest, Reason.LENGTH)
-    here, h, message = start, longest, ""
-    while len(path.points) < most:
-        if h < _SHORTEST:
-            path.reason, path.message = (Reason.NO_VALUE if message else Reason.TIP), message
-            return path
-        message = ""
-        try:
-            ahead = here + way * h * tangent
-            normal = np.array([-tangent[1], tangent[0]])
-            found = (ahead, 0) if not _inside(ahead) else f.correct(ahead, normal, float(slope @ normal), 0.5 * h)
-            leaves = found is not None and not _inside(found[0])
-            if found is not None and leaves:
-                found = _to_side(f, here, found[0], slope, h)
-                if found is not None and np.hypot(*(found[0] - here)) <= f.tolerance:
-                    path.reason = Reason.BOX
-                    return path
-            if found is None:
-                h *= 0.5
-                continue
-            there, iterations = found
-            new_slope = f.gradient(there)
-            size = float(np.hypot(*new_slope))
-            if size <= _FLAT * steepest:
-                h *= 0.5
-                continue
-            new_tangent = tangent_of(new_slope)
-            turn = float(new_tangent @ tangent)
-            progress = way * float((there - here) @ tangent)
-            if turn < _TURN or progress <= 0.0:
-                h *= 0.5
-                continue
-            residual = abs(f(there)) / size
-        except LinkworkError as error:
-            message = str(error)
-            h *= 0.5
-            continue
-        closed = len(path.points) > 3 and _passes(start, path.tangents[0], here, there, new_tangent)
-        if closed:
-            there, new_tangent = start, path.tangents[0]
-        path.points.append(there)
-        path.tangents.append(new_tangent)
-        path.residual = max(path.residual, residual)
-        if closed or leaves:
-            path.reason = Reason.CLOSED if closed else Reason.BOX
-            return path
-        here, slope, tangent, steepest = there, new_slope, new_tangent, max(steepest, size)
-        if turn > _STRAIGHT and iterations <= 4:
-            h = min(1.5 * h, longest)
-    return path
-
-
-def _to_side(
-    f: _Scaled, here: NDArray[np.float64], outside: NDArray[np.float64], slope: NDArray[np.float64], reach: float
-) -> tuple[NDArray[np.float64], int] | None:
-    """Where the boundary leaves the box between a point inside and one outside; None if not near the line between them."""
-    way = outside - here
-    with np.errstate(divide="ignore", invalid="ignore"):
-        parts = np.where(way > 0.0, (1.0 - here) / way, np.where(way < 0.0, -here / way, np.inf))
-    axis = int(np.argmin(parts))
-    part = float(parts[axis])
-    side = here + part * way
-    side[axis] = 1.0 if way[axis] > 0.0 else 0.0
-    if part * float(np.hypot(*way)) <= f.tolerance:
-        return here, 0
-    other = np.zeros(2)
-    other[1 - axis] = 1.0
-    along = float(slope @ other)
-    if along == 0.0:
-        return None
-    found = f.correct(side, other, along, 0.5 * reach)
-    return found if found is not None and _inside(found[0]) else None
-
-
-def _passes(
-    start: NDArray[np.float64],
-    direction: NDArray[np.float64],
-    here: NDArray[np.float64],
-    there: NDArray[np.float64],
-    tangent: NDArray[np.float64],
-) -> bool:
-    """Whether the step from here to there passes the start in its direction."""
-    chord = there - here
-    length = float(np.hypot(*chord))
-    part = float((start - here) @ chord) / length**2
-    distance = abs(float(chord[0] * (start - here)[1] - chord[1] * (start - here)[0])) / length
-    return 0.0 < part <= 1.0 and distance < 0.2 * length and float(tangent @ direction) > _TURN
+def _end(curve: Curve) -> End:
+    last = curve.points[-1]
+    return End(reason=curve.end, point=(float(last.y[0]), last.parameter), message=curve.message)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -542,7 +393,6 @@ def chart(
     lines: tuple[int, int] = (2, 5),
     samples: int = 200,
     step: float = 0.02,
-    tolerance: float = 1e-10,
     seeds: Iterable[tuple[float, float]] = (),
 ) -> Chart:
     """Find and trace the boundaries in a box.
@@ -550,14 +400,14 @@ def chart(
     Parameters
     ----------
     test : callable
-        See `linear_test` and `orbit_test`.
+        Negative in a region of instability.
     box : Box
     lines : (int, int)
         Lines x = const and y = const, evenly spaced from side to side, on which boundaries are sought: every one that crosses
         at least one of them is found. A line searched costs ``samples`` values of the test function.
     samples : int
         See `scan`.
-    step, tolerance : float
+    step : float
         See `trace`.
     seeds : iterable of (float, float)
         Points near further boundaries.
@@ -585,7 +435,7 @@ def chart(
         if axis is not None and any(_on(boundary, axis, seed, box) for boundary in found):
             continue
         try:
-            found.append(trace(test, seed, box, step=step, tolerance=tolerance))
+            found.append(trace(test, seed, box, step=step))
         except LinkworkError as error:
             if axis is None:
                 raise

@@ -31,6 +31,7 @@ from llvmlite import binding, ir
 from numba import float64, int64, njit, types
 from numba.core import event
 from numba.extending import intrinsic
+from numba.np.unsafe.ndarray import to_fixed_tuple
 from platformdirs import user_cache_dir
 
 from linkwork.errors import LinkworkError
@@ -205,6 +206,20 @@ def call_user(typing_context, address, t, x):  # type: ignore[no-untyped-def]
         return builder.call(builder.inttoptr(arguments[0], kind), [arguments[1], data])
 
     return float64(int64, float64, x), generate
+
+
+def user_function(function: Any, size: int) -> Any:
+    """A user's function f(t, x1, ..., x_size) as a C function of t and x, NaN where it raises, with its ``address``."""
+    own = njit(float64(*[float64] * (1 + size)), error_model="numpy")(getattr(function, "py_func", function))
+
+    @numba.cfunc(float64(float64, types.CPointer(float64)), error_model="numpy")
+    def guarded(t, x):  # type: ignore[no-untyped-def]
+        try:
+            return own(t, *to_fixed_tuple(numba.carray(x, (size,)), size))
+        except Exception:
+            return np.nan
+
+    return guarded
 
 
 # Kernels

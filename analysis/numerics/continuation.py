@@ -1,15 +1,16 @@
-"""Pseudo-arclength continuation: a curve of solutions of G(y, lambda) = 0, past its folds.
+"""Curves of solutions of G(y, lambda) = 0, past their folds, by predictor and corrector in arc length.
 
-It knows no mechanics: G comes with its exact derivatives, in the unknowns and in the parameter. Each step goes along the
-tangent and returns to the curve in the plane across it (E. L. Allgower, K. Georg, Numerical Continuation Methods,
-Springer 1990); its length follows from the effort of the correction and the turn of the tangent. Unknowns and parameter
-are scaled, so that an arc means the same whatever the units.
+It knows no mechanics. Each step goes along the tangent and returns to the curve in the plane across it (E. L. Allgower,
+K. Georg, Numerical Continuation Methods, Springer 1990); its length follows from the effort of the correction and the turn
+of the tangent. Unknowns and parameter are scaled, so that an arc means the same whatever the units. The corrections are
+Newton's where the derivatives of G come with it, and of the secant type (Broyden) where a value alone is cheaper.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from enum import Enum
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -22,27 +23,52 @@ from linkwork.errors import InputError, LinkworkError
 TOLERANCE = 1e-10
 #: Corrections at most, and the number of them from which on a step counts as hard.
 MOST_CORRECTIONS, HARD = 10, 5
-#: Greatest angle between the tangents at two neighbouring points (rad).
-GREATEST_TURN = 0.25
+#: Distance of a point from the end of the tangent, relative to the step, beyond which it may be of another curve.
+REACH = 0.5
 #: A step grows and shrinks by these.
 GROWTH, SHRINKAGE = 1.4, 0.5
+
+Vector = NDArray[np.float64]
 
 
 class Evaluation(NamedTuple):
     """G and its derivatives at a point: shapes (n,), (n, n), (n,); ``data`` goes into the `Point`."""
 
-    residual: NDArray[np.float64]
-    jacobian: NDArray[np.float64]
-    slope: NDArray[np.float64]
+    residual: Vector
+    jacobian: Vector
+    slope: Vector
     data: Any
 
 
 #: G(y, lambda); raises a `LinkworkError` where it is not defined.
-Evaluate = Callable[[NDArray[np.float64], float], Evaluation]
+Evaluate = Callable[[Vector, float], Evaluation]
 
 
 class ContinuationError(LinkworkError):
     """A curve could not be begun: the point given does not lead to one on it."""
+
+
+class Reason(Enum):
+    """Why a curve ends."""
+
+    BOX = "it leaves the box"
+    CLOSED = "it is closed"
+    TIP = "it turns too sharply to follow, or meets another boundary"
+    NO_VALUE = "the test function has no value beyond"
+    LENGTH = "the number of points is used up"
+    LEFT = "it is left"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class End:
+    """An end of a curve in a plane: why, the last good point, and why there is no value beyond, if that is it."""
+
+    reason: Reason
+    point: tuple[float, float]
+    message: str = ""
+
+    def __str__(self) -> str:
+        return self.message if self.reason is Reason.LEFT else self.reason.value
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -55,38 +81,61 @@ class Point:
     parameter : float
     tangent : ndarray, shape (n + 1,)
         Direction of the curve in scaled unknowns and parameter, of length 1.
+    derivatives : ndarray, shape (n, n + 1)
+        Of G with respect to unknowns and parameter, scaled.
     data : object
         What the evaluation gave with it.
     """
 
-    y: NDArray[np.float64]
+    y: Vector
     parameter: float
-    tangent: NDArray[np.float64]
+    tangent: Vector
+    derivatives: Vector
     data: Any
 
+    @property
+    def orientation(self) -> float:
+        """Sign of the determinant of the derivatives with the tangent below them: it changes where another curve is met."""
+        return float(np.linalg.slogdet(np.vstack([self.derivatives, self.tangent]))[0])
 
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+    def turned(self) -> Point:
+        """The same point, looking the other way."""
+        return replace(self, tangent=-self.tangent)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class Curve:
     """A curve as far as it was followed.
 
     Attributes
     ----------
     points : tuple of Point
+        Of a closed curve the last is the first.
     steps : tuple of float
         Scaled arc length from each point to the next, along the tangent of the former.
-    reached : bool
-        Whether it ended where it should: at an end of the range, or where it began.
-    closed : bool
-        Whether it came back to where it began.
+    end : Reason
+        Why it ended.
     reason : str
-        Why it ended, in words.
+        The same in words, with what stood in the way.
+    message : str
+        What G had to say where it has no value; empty elsewhere.
     """
 
     points: tuple[Point, ...]
     steps: tuple[float, ...]
-    reached: bool
-    closed: bool
+    end: Reason
     reason: str
+    message: str = ""
+
+    @property
+    def closed(self) -> bool:
+        """Whether it came back to where it began."""
+        return self.end is Reason.CLOSED
+
+    @property
+    def reached(self) -> bool:
+        """Whether it ended where it should: at an end of the range, or where it began."""
+        return self.end in (Reason.BOX, Reason.CLOSED)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -97,9 +146,15 @@ class Settings:
     ----------
     low, high : float
         Range of the parameter.
+    bounds : mapping
+        Ranges (low, high) of unknowns, by their number.
     first, least, greatest : float
         Steps in scaled arc length, in which the range of the parameter has length 1.
     most_points : int
+    greatest_turn, growing_turn : float
+        Greatest angle between the tangents at two neighbouring points (rad), and that up to which the step grows.
+    oriented : bool
+        Whether the curve ends where it meets another. This also keeps the two sides of a narrow region apart.
 
     Raises
     ------
@@ -109,10 +164,14 @@ class Settings:
 
     low: float
     high: float
+    bounds: Mapping[int, tuple[float, float]] = field(default_factory=dict)
     first: float = 5e-3
     least: float = 1e-8
     greatest: float = 2e-2
     most_points: int = 5000
+    greatest_turn: float = 0.25
+    growing_turn: float = 0.25
+    oriented: bool = False
 
     def __post_init__(self) -> None:
         if not (np.isfinite(self.low) and np.isfinite(self.high) and self.low < self.high):
@@ -123,42 +182,69 @@ class Settings:
             raise InputError(f"steps {self.least}, {self.first}, {self.greatest}: they must be positive and increasing")
 
 
+class _Failure(NamedTuple):
+    """Why a step could not be taken: TIP or NO_VALUE, and in words."""
+
+    reason: Reason
+    text: str
+
+
+class _Landing(NamedTuple):
+    """A corrected point: scaled, with its evaluation and the corrections it took."""
+
+    z: Vector
+    evaluation: Evaluation
+    corrections: int
+
+
 class Follower:
     """One curve being followed.
 
     Parameters
     ----------
     evaluate : callable
-        G with its derivatives; see `Evaluation`.
+        G with its derivatives; see `Evaluation`. It is not called beyond the bounds: there G goes on in a straight line.
     scale : array_like, shape (n,)
         Magnitudes of the unknowns.
     settings : Settings
+    residual : callable, optional
+        G alone, where its derivatives cost much more: the corrections are then of the secant type, from the derivatives at
+        the point before.
     """
 
-    def __init__(self, evaluate: Evaluate, scale: ArrayLike, settings: Settings) -> None:
+    def __init__(
+        self,
+        evaluate: Evaluate,
+        scale: ArrayLike,
+        settings: Settings,
+        residual: Callable[[Vector, float], Vector] | None = None,
+    ) -> None:
         self.evaluate = evaluate
         self.settings = settings
         self.scale = np.append(np.asarray(scale, dtype=float), settings.high - settings.low)
-        self._why = ""
+        self.residual = residual
+        self.low, self.high = np.full(len(self.scale), -np.inf), np.full(len(self.scale), np.inf)
+        for number, (low, high) in (*settings.bounds.items(), (-1, (settings.low, settings.high))):
+            self.low[number], self.high[number] = low, high
 
-    def start(self, y: ArrayLike, parameter: float, direction: int) -> Point:
+    def start(self, y: ArrayLike, parameter: float, direction: int, across: ArrayLike | None = None) -> Point:
         """The point of the curve at a parameter, near ``y``, looking to higher (+1) or lower (-1) parameters.
+
+        With ``across``, of shape (n + 1,) and scaled, it lies in the plane across this direction instead, and looks along it.
 
         Raises
         ------
         ContinuationError
-            If Newton's method at the fixed parameter does not lead to one.
+            If Newton's method does not lead to one.
         """
-        fixed = np.zeros(len(self.scale))
-        fixed[-1] = 1.0
+        fixed = np.append(np.zeros(len(self.scale) - 1), 1.0) if across is None else np.asarray(across, dtype=float)
         z = np.append(np.asarray(y, dtype=float), parameter) / self.scale
-        found = self._correct(z, fixed, z)
-        if found is None:
+        found = self._correct(z, fixed, None)
+        if isinstance(found, _Failure):
             raise ContinuationError(
-                f"no solution at the parameter {parameter:.9g} from the guess {np.asarray(y)}: {self._why}"
+                f"no solution at the parameter {parameter:.9g} from the guess {np.asarray(y)}: {found.text}"
             )
-        z, evaluation, _ = found
-        return self._point(z, evaluation, direction * fixed)
+        return self._point(found, direction * fixed)
 
     def along(self, y: ArrayLike, parameter: float, tangent: ArrayLike) -> Point:
         """A point as the first of a curve in a given direction (unscaled, shape (n + 1,)): a branch to be switched to."""
@@ -168,18 +254,14 @@ class Follower:
             y=np.asarray(y, dtype=float),
             parameter=parameter,
             tangent=direction / float(np.linalg.norm(direction)),
+            derivatives=self._scaled_evaluation(evaluation)[1],
             data=evaluation.data,
         )
 
-    def step(self, point: Point, length: float) -> tuple[Point, int] | None:
-        """The point an arc length further along the tangent, and the corrections it took; None if there is none."""
-        here = self._scaled(point)
-        ahead = here + length * point.tangent
-        found = self._correct(ahead, point.tangent, ahead)
-        if found is None:
-            return None
-        z, evaluation, count = found
-        return self._point(z, evaluation, point.tangent), count
+    def step(self, point: Point, length: float) -> Point | None:
+        """The point an arc length further along the tangent; None if there is none."""
+        found = self._step(point, length)
+        return None if isinstance(found, _Failure) else self._point(found, point.tangent)
 
     def follow(
         self,
@@ -190,46 +272,44 @@ class Follower:
     ) -> Curve:
         """Follow the curve from a point to an end of the range, back to the point, or as far as it goes.
 
-        ``watch`` is told of every point on the way; ``leave`` gives a reason to stop there, or an empty text.
+        ``watch`` receives every point on the way; ``leave`` gives a reason to stop there, or an empty text.
         """
         settings = self.settings
-        points, length = [first], settings.first
-        steps: list[float] = []
-        begin = self._scaled(first)
-        travelled = 0.0
-        why = ""
+        points, steps = [first], list[float]()
+        length = settings.first
         while len(points) < settings.most_points:
             last = points[-1]
             taken = self._attempt(last, length)
-            if isinstance(taken, str):
-                why = taken
+            if isinstance(taken, _Failure):
                 length *= SHRINKAGE
                 if length < settings.least:
-                    return self._curve(points, steps, reason=f"the continuation stalls: {why}")
+                    message = taken.text if taken.reason is Reason.NO_VALUE else ""
+                    stalled = f"the continuation stalls: {taken.text}"
+                    return Curve(tuple(points), tuple(steps), taken.reason, stalled, message)
                 continue
             point, count = taken
-            if not settings.low <= point.parameter <= settings.high:
-                end = settings.low if point.parameter < settings.low else settings.high
-                point, length = self.locate(last, length, _less(end))
-                points.append(point)
-                steps.append(length)
-                if watch:
-                    watch(point)
-                return self._curve(points, steps, reached=True, reason="the end of the range is reached")
+            end = None
+            if self.is_beyond(point):
+                point, length = self._to_bound(last, point, length)
+                if length <= TOLERANCE:
+                    return Curve(tuple(points), tuple(steps), Reason.BOX, "the end of the range is reached")
+                end = Reason.BOX, "the end of the range is reached"
+            elif len(points) > 3 and self._passes(first, last, point):
+                point, length = first, float((self._scaled(first) - self._scaled(last)) @ last.tangent)
+                end = Reason.CLOSED, "the curve closes"
             points.append(point)
             steps.append(length)
             if watch:
                 watch(point)
-            reason = leave(point) if leave else ""
-            if reason:
-                return self._curve(points, steps, reason=reason)
-            travelled += length
-            away = np.linalg.norm(self._scaled(point) - begin)
-            if travelled > 4.0 * length and away < 0.5 * length and float(point.tangent @ first.tangent) > 0.9:
-                return self._curve(points, steps, reached=True, closed=True, reason="the curve closes")
-            if count < HARD:
+            if end is None and leave and (reason := leave(point)):
+                end = Reason.LEFT, reason
+            if end is not None:
+                return Curve(tuple(points), tuple(steps), *end)
+            if count < HARD and float(point.tangent @ last.tangent) > np.cos(settings.growing_turn):
                 length = min(length * GROWTH, settings.greatest)
-        return self._curve(points, steps, reason=f"{settings.most_points} points, the most allowed, are reached")
+        return Curve(
+            tuple(points), tuple(steps), Reason.LENGTH, f"{settings.most_points} points, the most allowed, are reached"
+        )
 
     def locate(self, point: Point, length: float, test: Callable[[Point], float]) -> tuple[Point, float]:
         """The point within a step at which a test, of opposite signs at its ends, is zero, and its distance along the step."""
@@ -242,76 +322,140 @@ class Follower:
                 raise ContinuationError(
                     f"no point {s:.3g} beyond the parameter {point.parameter:.9g} within a step taken"
                 )
-            return found[0]
+            return found
 
         s = float(brentq(lambda s: test(at(s)), 0.0, length, xtol=1e-13, rtol=1e-14))
         return at(s), s
 
-    def _attempt(self, last: Point, length: float) -> tuple[Point, int] | str:
-        taken = self.step(last, length)
-        if taken is None:
-            return self._why
-        cosine = float(taken[0].tangent @ last.tangent)
-        if cosine < np.cos(GREATEST_TURN):
-            return "the curve turns too sharply"
-        if taken[1] > HARD + 2:
-            return "the corrections are many"
-        return taken
+    def _attempt(self, last: Point, length: float) -> tuple[Point, int] | _Failure:
+        """A step, if its end is on the same curve for certain, and the corrections it took."""
+        found = self._step(last, length)
+        if isinstance(found, _Failure):
+            return found
+        point = self._point(found, last.tangent)
+        away = np.linalg.norm(found.z - self._scaled(last) - length * last.tangent)
+        if float(point.tangent @ last.tangent) < np.cos(self.settings.greatest_turn):
+            return _Failure(Reason.TIP, "the curve turns too sharply")
+        if self.settings.oriented and point.orientation != last.orientation:
+            return _Failure(Reason.TIP, "the curve meets another")
+        if found.corrections > HARD + 2 or away > REACH * length:
+            return _Failure(Reason.TIP, "the corrections are many")
+        return point, found.corrections
 
-    def _correct(
-        self, z: NDArray[np.float64], normal: NDArray[np.float64], plane: NDArray[np.float64]
-    ) -> tuple[NDArray[np.float64], Evaluation, int] | None:
-        """Newton's method for G = 0 in the plane through ``plane`` across ``normal``; all scaled."""
-        self._why = "the corrections do not converge"
-        n = len(z) - 1
-        matrix = np.empty((n + 1, n + 1))
-        before = np.inf
+    def _step(self, point: Point, length: float) -> _Landing | _Failure:
+        return self._correct(self._scaled(point) + length * point.tangent, point.tangent, point)
+
+    def _correct(self, plane: Vector, normal: Vector, last: Point | None) -> _Landing | _Failure:
+        """Newton's or Broyden's method for G = 0 from a point in the plane through it across ``normal``; all scaled."""
+        n, z, before = len(plane) - 1, plane, np.inf
+        matrix = np.vstack([np.zeros((n, n + 1)), normal])
+        secant = self.residual is not None and last is not None
+        value = change = np.zeros(0)
+        if secant and last is not None:
+            matrix[:n] = last.derivatives
         for count in range(1, MOST_CORRECTIONS + 1):
             try:
-                evaluation = self.evaluate(z[:n] * self.scale[:n], float(z[n] * self.scale[n]))
+                if not secant:
+                    value, matrix[:n] = self._scaled_evaluation(evaluation := self._evaluate(z))
+                else:
+                    new = self._value(z)
+                    if count > 1:
+                        # Broyden's update: what the last correction has seen of the derivatives
+                        matrix[:n] += np.outer(new - value - matrix[:n] @ change, change) / (change @ change)
+                    value = new
+                change = -np.linalg.solve(matrix, np.append(value, normal @ (z - plane)))
+                size = float(np.abs(change).max())
+                if not np.isfinite(size) or (count > 3 and size > before):
+                    break
+                z, before = z + change, size
+                if size < TOLERANCE:
+                    return _Landing(z, self._evaluate(z) if secant else evaluation, count)
             except LinkworkError as error:
-                self._why = str(error)
-                return None
-            matrix[:n, :n] = evaluation.jacobian * self.scale[:n] / self.scale[:n, None]
-            matrix[:n, n] = evaluation.slope * self.scale[n] / self.scale[:n]
-            matrix[n] = normal
-            residual = np.append(evaluation.residual / self.scale[:n], normal @ (z - plane))
-            try:
-                correction = np.linalg.solve(matrix, residual)
+                return _Failure(Reason.NO_VALUE, str(error))
             except np.linalg.LinAlgError:
-                self._why = "the tangent is not unique"
-                return None
-            size = float(np.abs(correction).max())
-            if not np.isfinite(size) or (count > 3 and size > before):
-                return None
-            z = z - correction
-            if size < TOLERANCE:
-                return z, evaluation, count
-            before = size
-        return None
+                return _Failure(Reason.TIP, "the tangent is not unique")
+        return _Failure(Reason.TIP, "the corrections do not converge")
 
-    def _point(self, z: NDArray[np.float64], evaluation: Evaluation, ahead: NDArray[np.float64]) -> Point:
-        n = len(z) - 1
-        matrix = np.empty((n, n + 1))
-        matrix[:, :n] = evaluation.jacobian * self.scale[:n] / self.scale[:n, None]
-        matrix[:, n] = evaluation.slope * self.scale[n] / self.scale[:n]
+    def _inside(self, z: Vector) -> tuple[Vector, Vector]:
+        """Unscaled unknowns and parameter moved into the bounds, and how far they are beyond them."""
+        whole = z * self.scale
+        inside = np.clip(whole, self.low, self.high)
+        return inside, whole - inside
+
+    def _evaluate(self, z: Vector) -> Evaluation:
+        """G with its derivatives; beyond the bounds it goes on in a straight line."""
+        inside, beyond = self._inside(z)
+        found = self.evaluate(inside[:-1], float(inside[-1]))
+        further = found.jacobian @ beyond[:-1] + found.slope * beyond[-1]
+        return found._replace(residual=found.residual + further)
+
+    def _value(self, z: Vector) -> Vector:
+        inside, beyond = self._inside(z)
+        if self.residual is None or beyond.any():
+            value = self._evaluate(z).residual
+        else:
+            value = self.residual(inside[:-1], float(inside[-1]))
+        return np.asarray(value / self.scale[:-1])
+
+    def _scaled_evaluation(self, evaluation: Evaluation) -> tuple[Vector, Vector]:
+        """G, shape (n,), and its derivatives, shape (n, n + 1), in scaled unknowns and parameter."""
+        n = len(self.scale) - 1
+        derivatives = np.column_stack([evaluation.jacobian, evaluation.slope]) * self.scale / self.scale[:n, None]
+        return evaluation.residual / self.scale[:n], derivatives
+
+    def _point(self, found: _Landing, ahead: Vector) -> Point:
+        derivatives = self._scaled_evaluation(found.evaluation)[1]
         # the null vector, by the singular value decomposition: defined at folds too
-        tangent = np.linalg.svd(matrix)[2][-1]
+        tangent = np.linalg.svd(derivatives)[2][-1]
         if tangent @ ahead < 0.0:
             tangent = -tangent
-        unscaled = z * self.scale
-        return Point(y=unscaled[:n], parameter=float(unscaled[n]), tangent=tangent, data=evaluation.data)
+        unscaled = found.z * self.scale
+        return Point(
+            y=unscaled[:-1],
+            parameter=float(unscaled[-1]),
+            tangent=tangent,
+            derivatives=derivatives,
+            data=found.evaluation.data,
+        )
 
-    def _scaled(self, point: Point) -> NDArray[np.float64]:
-        scaled: NDArray[np.float64] = np.append(point.y, point.parameter) / self.scale
+    def _scaled(self, point: Point) -> Vector:
+        scaled: Vector = np.append(point.y, point.parameter) / self.scale
         return scaled
 
-    @staticmethod
-    def _curve(
-        points: Sequence[Point], steps: Sequence[float], *, reached: bool = False, closed: bool = False, reason: str
-    ) -> Curve:
-        return Curve(points=tuple(points), steps=tuple(steps), reached=reached, closed=closed, reason=reason)
+    def _to_bound(self, last: Point, beyond: Point, length: float) -> tuple[Point, float]:
+        """Where a step leaves the bounds, exactly on one of them, and its distance along the step."""
+        here, there = self._scaled(last), self._scaled(beyond)
+        low, high = self.low / self.scale, self.high / self.scale
+        way = there - here
+        with np.errstate(divide="ignore", invalid="ignore"):
+            parts = np.where(there > high, (high - here) / way, np.where(there < low, (low - here) / way, np.inf))
+        axis = int(np.argmin(parts))
+        bound = float((self.high if way[axis] > 0.0 else self.low)[axis])
+        if parts[axis] <= 0.0:
+            return last, 0.0
 
+        # the guess lies on the bound, and the corrections stay there
+        guess, fixed = here + parts[axis] * way, np.eye(len(here))[axis]
+        found = self._correct(guess, fixed, last)
+        if isinstance(found, _Landing) and np.linalg.norm(found.z - guess) < REACH * length:
+            point = self._point(found, last.tangent)
+            s = float((found.z - here) @ last.tangent)
+        else:
+            point, s = self.locate(last, length, lambda p: float(np.append(p.y, p.parameter)[axis]) - bound)
+        whole = np.append(point.y, point.parameter)
+        whole[axis] = bound
+        point = replace(point, y=whole[:-1], parameter=float(whole[-1]))
+        return self._to_bound(last, point, s) if self.is_beyond(point) else (point, s)
 
-def _less(end: float) -> Callable[[Point], float]:
-    return lambda point: point.parameter - end
+    def is_beyond(self, point: Point) -> bool:
+        """Whether a point lies out of the bounds."""
+        whole = np.append(point.y, point.parameter)
+        return bool((whole < self.low).any() or (whole > self.high).any())
+
+    def _passes(self, first: Point, last: Point, point: Point) -> bool:
+        """Whether the step between two points passes the first one in its direction."""
+        chord, way = self._scaled(point) - self._scaled(last), self._scaled(first) - self._scaled(last)
+        length = float(np.linalg.norm(chord))
+        part = float(way @ chord) / length**2
+        distance = float(np.linalg.norm(way - part * chord))
+        return 0.0 < part <= 1.0 and distance < 0.2 * length and float(point.tangent @ first.tangent) > 0.9

@@ -1,8 +1,10 @@
-"""Fourier series of real functions of the crank angle."""
+"""Fourier series of real periodic functions."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from math import pi
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -22,7 +24,7 @@ class FourierSeries:
     Raises
     ------
     InputError
-        If the two have not the same length, or a coefficient is not finite.
+        If the two do not have the same length, or a coefficient is not finite.
     """
 
     cos: NDArray[np.float64]
@@ -112,3 +114,13 @@ class FourierSeries:
         n = order + 1
         pad = max(0, n - len(self.cos))
         return FourierSeries(*(np.append(values[:n], np.zeros(pad)) for values in (self.cos, self.sin)))
+
+
+def trigonometric(values: NDArray[np.float64], period: float) -> Callable[[float], NDArray[np.float64]]:
+    """The trigonometric polynomial through values at n equal steps of a period, shape (n, ...), as a function."""
+    n = len(values)
+    order = (n - 1) // 2
+    c = np.fft.rfft(values, axis=0)[: order + 1] / n
+    c[1:] *= 2.0
+    turn = 2j * pi / period * np.arange(order + 1)
+    return lambda t: np.asarray(np.tensordot(np.exp(turn * t), c, axes=1).real)

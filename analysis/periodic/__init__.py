@@ -1,1 +1,10 @@
-"""Periodic motions: orbits, Floquet multipliers, branches, resonance, stability charts."""
+"""Periodic motions of a mechanism: orbits and their Floquet multipliers, branches, charts, resonance, stability.
+
+The names are those of ``__init__.pyi``; each is imported from its module when it is first used.
+"""
+
+from __future__ import annotations
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

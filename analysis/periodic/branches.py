@@ -12,97 +12,34 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from math import pi
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from linkwork.errors import InputError
 from linkwork.five_bar.parameters import Constants, FiveBarParameters
-from linkwork.five_bar.published import RAD_S_PER_RPM
-from linkwork.five_bar.variables import INPUTS, PARAMETERS
-from linkwork.parameters import field_name
 
 from ..files import write_csv
 from ..numerics.continuation import ContinuationError, Curve, Evaluate, Evaluation, Follower, Point, Settings
-from .floquet import TOLERANCE, Crossing, Stability
+from .floquet import TOLERANCE, Crossing, Stability, crossing_test
 from .orbits import Drive, Period, PeriodicOrbit, Turn, period_from, scale_of
+from .planes import Operation, format_value, require_variable, unit_of, with_values
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-#: Parameters of the drive that can vary, by FMI name.
-OF_THE_DRIVE: Mapping[str, str] = {
-    "drive.speed": "speed",
-    "drive.torque": "torque",
-    "slider.force": "slider_force",
-    "load.fx": "load_x",
-    "load.fy": "load_y",
-}
 #: Relative step of the difference by which the constants are differentiated with respect to the parameter. The constants
 #: are smooth functions of it, most of them linear, and the derivative steers Newton's method only.
 _DIFFERENCE = 1e-6
+#: First step along a branch, in scaled arc length.
+_FIRST = 5e-3
 #: Distance from a period doubling at which the doubled branch is begun, relative to the crank's length.
 _SWITCH = 2e-3
-
-#: Unit of each parameter that can vary.
-UNITS_OF_VARIABLES = {
-    variable.name: variable.unit
-    for variable in (*INPUTS, *PARAMETERS)
-    if variable.name in OF_THE_DRIVE
-    or (field_name(variable.name) in FiveBarParameters.__dataclass_fields__ and variable.kind == "Real")
-}
 
 #: A branch is left where the links come this close to collinear (least |sin| of the transmission angle), or where its
 #: largest multiplier passes the greatest that single shooting follows with certainty.
 LEAST_SINE, GREATEST_MULTIPLIER = 0.02, 1e4
 
 
-def unit_of(name: str) -> str:
-    """Unit of a parameter or input by its FMI name.
-
-    Raises
-    ------
-    InputError
-        If there is nothing of that name.
-    """
-    if name not in UNITS_OF_VARIABLES:
-        raise InputError(f"there is no {name}: what can vary is {', '.join(UNITS_OF_VARIABLES)}")
-    return UNITS_OF_VARIABLES[name]
-
-
-def told(name: str, value: float, unit: str) -> str:
-    """A value in words, with its unit; speeds in rpm too."""
-    rpm = f" ({value / RAD_S_PER_RPM:.6g} rpm)" if unit == "rad/s" else ""
-    return f"{name} = {value:.6g} {unit}".rstrip() + rpm
-
-
-def require_drive(drive: Drive, name: str) -> None:
-    """Refuse a speed that varies under a torque, and a torque at prescribed speed.
-
-    Raises
-    ------
-    InputError
-        If the parameter does not act in this drive.
-    """
-    if name in ("drive.speed", "drive.torque") and (name == "drive.speed") != drive.speed_drive:
-        raise InputError(f"{name} cannot vary: the drive is by {'speed' if drive.speed_drive else 'torque'}")
-
-
-def with_values(
-    parameters: FiveBarParameters, drive: Drive, values: Mapping[str, float]
-) -> tuple[FiveBarParameters, Drive]:
-    """Mechanism and drive with other values of parameters by their FMI names."""
-    of_drive: dict[str, Any] = {OF_THE_DRIVE[name]: value for name, value in values.items() if name in OF_THE_DRIVE}
-    of_mechanism: dict[str, Any] = {field_name(name): v for name, v in values.items() if name not in OF_THE_DRIVE}
-    return (
-        replace(parameters, **of_mechanism) if of_mechanism else parameters,
-        replace(drive, **of_drive) if of_drive else drive,
-    )
-
-
 #: What varies: an FMI name, or a function of one number.
-Vary = str | Callable[[float], tuple[FiveBarParameters, Drive]]
+Vary = str | Callable[[float], Operation]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -121,8 +58,10 @@ class Family:
 
     Raises
     ------
+    UnknownNameError
+        If there is no parameter of that name.
     InputError
-        If there is nothing of that name, or it does not act in this drive.
+        If it does not act in this drive.
     """
 
     parameters: FiveBarParameters
@@ -135,23 +74,19 @@ class Family:
         if callable(self.vary):
             object.__setattr__(self, "name", self.name or "parameter")
             return
-        if self.vary not in UNITS_OF_VARIABLES:
-            raise InputError(
-                f"{self.vary!r} cannot vary: it must be one of {', '.join(UNITS_OF_VARIABLES)}, or a function"
-            )
-        require_drive(self.drive, self.vary)
+        require_variable(self.drive, self.vary)
         object.__setattr__(self, "name", self.name or self.vary)
         object.__setattr__(self, "unit", self.unit or unit_of(self.vary))
 
-    def at(self, value: float) -> tuple[FiveBarParameters, Drive]:
+    def at(self, value: float) -> Operation:
         """Mechanism and drive at a value of the parameter."""
         if callable(self.vary):
             return self.vary(value)
         return with_values(self.parameters, self.drive, {self.vary: value})
 
-    def tell(self, value: float) -> str:
-        """A value of the parameter in words, with its unit; speeds in rpm too."""
-        return told(self.name, value, self.unit)
+    def format_value(self, value: float) -> str:
+        """A value of the parameter with its name and unit; speeds in rpm too."""
+        return format_value(self.name, value, self.unit)
 
     def _direction(self, value: float, low: float, high: float) -> tuple[NDArray[np.float64], Constants]:
         """Derivatives of drive vector and constants with respect to the parameter, by differences inside its range."""
@@ -164,19 +99,13 @@ class Family:
         )
 
     def evaluate(self, turns: int, low: float, high: float) -> Evaluate:
-        """y(T) - y(0) with its derivatives over a range, as `continuation` follows it; its data are the `PeriodicOrbit`.
-
-        Beyond the range, where there may be no mechanism (friction below zero), it goes on in a straight line, so that a
-        branch can be followed up to the very end.
-        """
+        """y(T) - y(0) with its derivatives over a range, as `continuation` follows it; its data are the `PeriodicOrbit`."""
 
         def evaluation(y: NDArray[np.float64], value: float) -> Evaluation:
-            inside = min(max(value, low), high)
-            parameters, drive = self.at(inside)
-            period = period_from(parameters, drive, y, turns, self._direction(inside, low, high), high - low)
-            residual = period.shift + period.slope * (value - inside)
+            parameters, drive = self.at(value)
+            period = period_from(parameters, drive, y, turns, self._direction(value, low, high), high - low)
             orbit = orbit_from(parameters, drive, y, turns, period)
-            return Evaluation(residual, period.monodromy - np.eye(len(y)), period.slope, orbit)
+            return Evaluation(period.shift, period.monodromy - np.eye(len(y)), period.slope, orbit)
 
         return evaluation
 
@@ -284,12 +213,6 @@ class Branch:
         """Write the branch as a table, a row a point; see `columns`."""
         return write_csv(path, self.columns())
 
-    def plot(self, *, title: str = "") -> Figure:
-        """Amplitude over the parameter, stable parts solid, with its special points."""
-        from .. import figures
-
-        return figures.plot_branches([self], title=title)
-
 
 def _greatest_of(pin: str) -> Callable[[Turn], float]:
     return lambda turn: float(np.hypot(turn[f"pin.{pin}.fx"], turn[f"pin.{pin}.fy"]).max())
@@ -324,7 +247,6 @@ def follow(
     low: float,
     high: float,
     direction: int = 1,
-    first: float = 5e-3,
     greatest: float = 2e-2,
     most_points: int = 5000,
     watch: Callable[[float], None] | None = None,
@@ -343,11 +265,11 @@ def follow(
         Range of the parameter.
     direction : int
         +1 to higher values at first, -1 to lower.
-    first, greatest : float
-        Steps in scaled arc length: the range has length 1, and the crank's length counts as 1.
+    greatest : float
+        Greatest step in scaled arc length: the range has length 1, and the crank's length counts as 1.
     most_points : int
     watch : callable, optional
-        Told the parameter of every point.
+        Called with the parameter of every point.
     stop : callable, optional
         Asked at every point whether to leave it at that.
 
@@ -361,7 +283,7 @@ def follow(
     ContinuationError
         If the orbit is not on the family.
     """
-    settings = Settings(low=low, high=high, first=min(first, greatest), greatest=greatest, most_points=most_points)
+    settings = _settings(low, high, greatest, most_points)
     follower = _follower(family, orbit, settings)
     return _branch(family, orbit.turns, follower, follower.start(orbit.start, value, direction), watch, stop)
 
@@ -372,7 +294,6 @@ def switch(
     *,
     low: float,
     high: float,
-    first: float = 5e-3,
     greatest: float = 2e-2,
     most_points: int = 5000,
     watch: Callable[[float], None] | None = None,
@@ -392,7 +313,7 @@ def switch(
             f"the point at {doubling.parameter:.9g} is a {doubling.kind.value}: only a period doubling has a branch"
         )
     orbit = doubling.orbit
-    settings = Settings(low=low, high=high, first=min(first, greatest), greatest=greatest, most_points=most_points)
+    settings = _settings(low, high, greatest, most_points)
     doubled = replace(orbit, turns=2 * orbit.turns, monodromy=orbit.monodromy @ orbit.monodromy)
     follower = _follower(family, doubled, settings)
     # the eigenvector of the multiplier -1 is the direction in which every second period differs
@@ -403,12 +324,15 @@ def switch(
     for length in (_SWITCH, 4.0 * _SWITCH, 0.25 * _SWITCH, 16.0 * _SWITCH):
         taken = follower.step(base, length)
         # back on the undoubled branch the start repeats itself after half the period
-        if (
-            taken is not None
-            and abs(float((taken[0].y / scale - orbit.start / scale) @ (vector / scale))) > 0.5 * length
-        ):
-            return _branch(family, doubled.turns, follower, taken[0], watch, stop)
-    raise ContinuationError(f"the motion of twice the period is not met next to {family.tell(doubling.parameter)}")
+        if taken is not None and abs(float((taken.y / scale - orbit.start / scale) @ (vector / scale))) > 0.5 * length:
+            return _branch(family, doubled.turns, follower, taken, watch, stop)
+    raise ContinuationError(
+        f"the motion of twice the period is not met next to {family.format_value(doubling.parameter)}"
+    )
+
+
+def _settings(low: float, high: float, greatest: float, most_points: int) -> Settings:
+    return Settings(low=low, high=high, first=min(_FIRST, greatest), greatest=greatest, most_points=most_points)
 
 
 def _follower(family: Family, orbit: PeriodicOrbit, settings: Settings) -> Follower:
@@ -454,21 +378,11 @@ def _branch(
     )
 
 
-def crossing_value(kind: Crossing, orbit: PeriodicOrbit) -> float:
-    """Smooth function of an orbit that is zero where a multiplier is +1, -1, or a pair has the product 1."""
-    monodromy = orbit.monodromy
-    if kind is Crossing.TORUS:
-        mu = orbit.multipliers
-        return float(np.prod([mu[i] * mu[j] - 1.0 for i in range(len(mu)) for j in range(i)]).real)
-    sign = 1.0 if kind is Crossing.FOLD else -1.0
-    return float(np.linalg.det(monodromy - sign * np.eye(len(monodromy))))
-
-
 def _tests(point: Point) -> dict[Crossing, float]:
     """What changes its sign along a branch where a multiplier crosses the unit circle."""
     # det(M - 1) is zero where a branch is crossed as well; the parameter turns back at a fold only
     return {
-        kind: float(point.tangent[-1]) if kind is Crossing.FOLD else crossing_value(kind, point.data)
+        kind: float(point.tangent[-1]) if kind is Crossing.FOLD else float(crossing_test(point.data.monodromy, kind))
         for kind in Crossing
     }
 

@@ -6,11 +6,9 @@ their FMI names, the crank speed among them.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
-from functools import partial
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -21,29 +19,25 @@ from linkwork.five_bar.published import RAD_S_PER_RPM
 from linkwork.parameters import field_name
 
 from ..files import write_csv
-from ..numerics.boundaries import Box, Test, chart
-from ..numerics.continuation import ContinuationError
+from ..numerics.boundaries import Box, chart
+from ..numerics.continuation import ContinuationError, End, Reason
 from ..run import shown
-from .branches import OF_THE_DRIVE, Family, SpecialPoint, follow, told, unit_of
-from .crossings import COMPLETE, follow_crossing
+from .branches import Branch, Family, SpecialPoint, follow
+from .crossings import follow_crossing
 from .floquet import Crossing
 from .grids import Grid, grid
 from .orbits import Drive, OrbitError, PeriodicOrbit, orbit_of, scale_of
-from .planes import Plane, plane, require_axis
+from .planes import OF_THE_DRIVE, Plane, format_value, plane, require_variable, unit_of
 from .resonance import natural_frequency
 from .stability import (
     Confirmation,
     Monodromy,
     confirm,
-    linear_monodromy,
     orbit_monodromy,
+    points_to_confirm,
     removing_damping,
-    telling_points,
     test_of,
 )
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 #: Crank speeds of a chart where none are given, relative to the natural frequency; others, relative to the value there is.
 _SPEEDS, _OTHERS = (0.3, 2.5), (0.1, 2.0)
@@ -56,32 +50,41 @@ SAME_MOTION = 0.4
 #: Distance, with the box scaled to 1 by 1, at which a point lies on a boundary.
 SAME = 5e-3
 DAMPING = "slider.damping"
+#: What the boundaries of the mechanism's own periodic motion are called.
+TRUE_ORBIT = "true orbit"
 #: Multiplier on a boundary, as it is written to files.
 _MULTIPLIER = {Crossing.FOLD: 1.0, Crossing.PERIOD_DOUBLING: -1.0, Crossing.TORUS: 0.0}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Axis:
-    """A parameter of a chart as it is shown: speeds in rpm, all else in SI.
+    """A parameter of a chart as it is printed and drawn: speeds in rpm, all else in SI.
 
     Attributes
     ----------
     name : str
         FMI name.
     unit : str
-        That it is shown in.
+        In which it is printed and drawn.
     factor : float
         From SI to that unit.
+    si : str
+        Its unit in SI.
     """
 
     name: str
     unit: str
     factor: float
+    si: str
 
     @property
     def label(self) -> str:
         """Name with unit."""
         return f"{self.name} [{self.unit}]"
+
+    def format_value(self, value: float) -> str:
+        """A value in SI with the parameter's name and unit."""
+        return format_value(self.name, value, self.si)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -93,18 +96,18 @@ class Traced:
     points : ndarray, shape (n, 2)
         In SI.
     motion : str
-        ``true orbit`` or ``linear equation``.
+        `TRUE_ORBIT`, or the name of a motion beside it.
     kind : Crossing
         What the multipliers do there: at -1 a period doubling, at +1 a fold, beyond which the orbit is no more; under a torque
         a complex pair may pass the unit circle, at a torus.
-    ends : (str, str)
-        Why it ends, at the first and at the last point.
+    ends : (End, End)
+        At the first and at the last point.
     """
 
     points: NDArray[np.float64]
     motion: str
     kind: Crossing
-    ends: tuple[str, str]
+    ends: tuple[End, End]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -128,7 +131,7 @@ class StabilityChart:
     grid : Grid
         Largest Floquet multiplier of the true orbit.
     boundaries : tuple of Traced
-        Of the true orbit, and of the linear equation about u = 0 where there is one.
+        Of the true orbit, and of the motions asked for beside it.
     removals : tuple of str
         The damping that removes the regions between the ends of the other axis, in words; none unless damping is an axis.
     runs : tuple of Run
@@ -164,7 +167,7 @@ class StabilityChart:
         rows = [np.empty((0, 5))]
         for number, traced in enumerate(self.boundaries, start=1):
             points = traced.points * [axis.factor for axis in self.axes]
-            head = [number, float(traced.motion == "true orbit"), _MULTIPLIER[traced.kind]]
+            head = [number, float(traced.motion == TRUE_ORBIT), _MULTIPLIER[traced.kind]]
             rows.append(np.column_stack([np.tile(head, (len(points), 1)), points]))
         names = (
             "boundary",
@@ -173,62 +176,6 @@ class StabilityChart:
             *(a.label for a in self.axes),
         )
         return write_csv(path, dict(zip(names, np.concatenate(rows).T)))
-
-    def plot(self, *, title: str = "") -> Figure:
-        """The largest multiplier in colours, the boundaries, and the points of the long runs."""
-        from ..figures import COLOURS, Curve, HeatMap, Panel, plot_charts
-
-        x, y = self.axes
-        looks = {
-            ("true orbit", Crossing.PERIOD_DOUBLING): ("0.1", "-", "period doubling"),
-            ("true orbit", Crossing.FOLD): (COLOURS[3], "-", "fold"),
-            ("true orbit", Crossing.TORUS): (COLOURS[1], "-", "torus"),
-            ("linear equation", Crossing.PERIOD_DOUBLING): (COLOURS[2], "--", "linear equation, multiplier -1"),
-            ("linear equation", Crossing.FOLD): (COLOURS[4], "--", "linear equation, multiplier +1"),
-        }
-        curves, named = [], set()
-        for traced in self.boundaries:
-            colour, line, label = looks[traced.motion, traced.kind]
-            curves.append(
-                Curve(
-                    x=x.factor * traced.points[:, 0],
-                    y=y.factor * traced.points[:, 1],
-                    colour=colour,
-                    line=line,
-                    label="" if label in named else label,
-                )
-            )
-            named.add(label)
-        for outcome in dict.fromkeys(run.confirmation.outcome for run in self.runs):
-            those = [run for run in self.runs if run.confirmation.outcome is outcome]
-            curves.append(
-                Curve(
-                    x=[x.factor * run.x for run in those],
-                    y=[y.factor * run.y for run in those],
-                    colour="0.1",
-                    line="",
-                    marker={"decays": "o", "grows": "x", "stays bounded": "s"}[outcome.value],
-                    label=f"long run {outcome.value}",
-                )
-            )
-        low, high = (np.array([self.box.x[i], self.box.y[i]]) * [x.factor, y.factor] for i in (0, 1))
-        panel = Panel(
-            x_label=x.label,
-            y_label=y.label,
-            curves=curves,
-            legend_at="upper right",
-            x_range=(float(low[0]), float(high[0])),
-            y_range=(float(low[1]), float(high[1])),
-        )
-        map_ = HeatMap(
-            panel=panel,
-            x=x.factor * self.grid.x,
-            y=y.factor * self.grid.y,
-            values=self.grid.largest,
-            label="largest Floquet multiplier",
-            missing="no orbit",
-        )
-        return plot_charts([map_], title=title, size=(7.2, 5.0))
 
 
 def stability_chart(
@@ -239,6 +186,7 @@ def stability_chart(
     *,
     points: int = 80,
     start: ArrayLike | None = None,
+    beside: Mapping[str, Callable[[Plane], Monodromy]] | None = None,
     n_jobs: int | None = None,
     progress: bool = False,
 ) -> StabilityChart:
@@ -257,6 +205,9 @@ def stability_chart(
         Of the grid, along each axis.
     start : array_like, shape (2,) or (3,), optional
         Guess of the orbits; under a torque it is needed: see `find_orbit`.
+    beside : mapping, optional
+        Other motions whose boundaries are traced too, such as `analysis.youssef.linear_motion`: name to their monodromy
+        matrix over a plane.
     n_jobs : int, optional
         Cores, as `joblib.Parallel`.
     progress : bool
@@ -274,122 +225,177 @@ def stability_chart(
     GridInterrupted
         On Ctrl-C; the same call goes on from the rows that are kept.
     """
-    axes = (_axis(names[0]), _axis(names[1]))
     spans = ranges or (default_range(parameters, drive, names[0]), default_range(parameters, drive, names[1]))
     box = Box(x=spans[0], y=spans[1])
     operation = plane(parameters, drive, *names)
-    found = grid(
-        operation,
-        np.linspace(*box.x, points),
-        np.linspace(*box.y, points),
-        start=start,
-        n_jobs=n_jobs,
-        progress=progress,
-    )
-    problems = _missing(found, axes)
-    matrices = {"true orbit": orbit_monodromy(operation, start=start)}
-    if drive.speed_drive and parameters.slider_coulomb_friction == 0.0 and "slider.coulomb_friction" not in names:
-        matrices["linear equation"] = linear_monodromy(operation)
-    traced: list[Traced] = []
-    for motion, matrix in matrices.items():
-        # where the true orbit folds it ends, and a test function with it: its folds are found on its branches
-        for kind in (Crossing.PERIOD_DOUBLING, Crossing.FOLD)[: 1 if motion == "true orbit" else 2]:
-            result = chart(test_of(matrix, 1 if kind is Crossing.FOLD else -1), box, lines=LINES, samples=SAMPLES)
-            traced += [
-                Traced(
-                    points=boundary.points,
-                    motion=motion,
-                    kind=kind,
-                    ends=(boundary.ends[0].reason.value, boundary.ends[1].reason.value),
-                )
-                for boundary in result.boundaries
-            ]
-            if result.gaps:
-                first = result.gaps[0]
-                problems.append(
-                    f"{motion}, {kind.value}: no value at {len(result.gaps)} points of the lines searched, the first at "
-                    f"{_place(axes, *first.point)}: {first.message}"
-                )
-    elsewhere = _add_crossings(operation, found, box, axes, start, traced, problems, progress)
-    runs = []
-    for row, column in telling_points(found):
-        x, y = float(found.x[column]), float(found.y[row])
-        try:
-            check = confirm(*operation(x, y), start=found.starts[row, column])
-        except LinkworkError as error:
-            problems.append(f"no long run at {_place(axes, x, y)}: {error}")
-        else:
-            runs.append(Run(x=x, y=y, confirmation=check))
+    x, y = (np.linspace(low, high, points) for low, high in spans)
+    found = grid(operation, x, y, start=start, n_jobs=n_jobs, progress=progress)
+    survey = _Survey(operation, (_axis(names[0]), _axis(names[1])), box, found, start)
+    survey.note_missing_orbits()
+    true = orbit_monodromy(operation, start=start)
+    # where the true orbit folds it ends, and a test function with it: its folds are found on its branches
+    survey.trace(TRUE_ORBIT, true, Crossing.PERIOD_DOUBLING)
+    for motion, of in (beside or {}).items():
+        matrix = of(operation)
+        for kind in (Crossing.PERIOD_DOUBLING, Crossing.FOLD):
+            survey.trace(motion, matrix, kind)
+    survey.follow_branches(progress)
+    survey.run_three_points()
     return StabilityChart(
-        axes=axes,
+        axes=survey.axes,
         box=box,
         grid=found,
-        boundaries=tuple(traced),
-        removals=_removals(matrices["true orbit"], box, names, traced),
-        runs=tuple(runs),
-        elsewhere=elsewhere,
-        problems=tuple(problems),
+        boundaries=tuple(survey.traced),
+        removals=survey.removals(true),
+        runs=tuple(survey.runs),
+        elsewhere=survey.elsewhere,
+        problems=tuple(survey.problems),
     )
 
 
-def _add_crossings(
-    at: Plane,
-    found: Grid,
-    box: Box,
-    axes: tuple[Axis, Axis],
-    guess: ArrayLike | None,
-    traced: list[Traced],
-    problems: list[str],
-    progress: bool,
-) -> int:
-    """Append the boundaries that the branches along lines y = const lead to, folds above all.
+@dataclass(slots=True)
+class _Survey:
+    """A chart as it is made."""
 
-    Those of other motions than the grid's are not traced; returns how many were met.
-    """
-    lost: list[str] = []
-    elsewhere = 0
-    with shown(progress, float(LINES[1]), "branches") as show:
-        for number, y in enumerate(np.linspace(*box.y, LINES[1]).tolist()):
-            for start, direction in ((box.x[0], 1), (box.x[1], -1)):
-                mechanism, drive = at(start, y)
-                family = Family(
-                    parameters=mechanism,
-                    drive=drive,
-                    vary=partial(_along, at, y),
-                    name=axes[0].name,
-                    unit=unit_of(axes[0].name),
-                )
-                try:
-                    orbit = orbit_of(mechanism, drive, start=guess)
-                    branch = follow(
-                        family,
-                        orbit,
-                        start,
-                        low=box.x[0],
-                        high=box.x[1],
-                        direction=direction,
-                        most_points=BRANCH_POINTS,
-                    )
-                except (OrbitError, ContinuationError) as error:
-                    lost.append(f"{_place(axes, start, y)}: {error}")
-                    continue
-                for special in branch.special:
-                    place = (special.parameter, y)
-                    if _is_known(place, special.kind, box, traced):
+    operation: Plane
+    axes: tuple[Axis, Axis]
+    box: Box
+    grid: Grid
+    start: ArrayLike | None
+    traced: list[Traced] = field(default_factory=list)
+    runs: list[Run] = field(default_factory=list)
+    elsewhere: int = 0
+    problems: list[str] = field(default_factory=list)
+
+    def place(self, x: float, y: float) -> str:
+        """A point of the chart in words."""
+        return ", ".join(axis.format_value(value) for axis, value in zip(self.axes, (x, y)))
+
+    def note_missing_orbits(self) -> None:
+        """Report the points of the grid without an orbit."""
+        places: NDArray[np.int64] = np.argwhere(np.ma.getmaskarray(self.grid.largest))
+        if len(places):
+            row, column = places[0].tolist()
+            self.problems.append(
+                f"no orbit was found at {len(places)} of {self.grid.largest.size} points (grey), the first at "
+                f"{self.place(float(self.grid.x[column]), float(self.grid.y[row]))}: {self.grid.reason(row, column)}"
+            )
+
+    def trace(self, motion: str, matrix: Monodromy, kind: Crossing) -> None:
+        """Find and trace the boundaries of a kind by their test function."""
+        result = chart(test_of(matrix, kind), self.box, lines=LINES, samples=SAMPLES)
+        self.traced += [Traced(points=b.points, motion=motion, kind=kind, ends=b.ends) for b in result.boundaries]
+        if result.gaps:
+            first = result.gaps[0]
+            self.problems.append(
+                f"{motion}, {kind.value}: no value at {len(result.gaps)} points of the lines searched, the first at "
+                f"{self.place(*first.point)}: {first.message}"
+            )
+
+    def follow_branches(self, progress: bool) -> None:
+        """The boundaries that the branches along lines y = const lead to, folds above all.
+
+        Those of other motions than the grid's are not traced but counted in ``elsewhere``.
+        """
+        lost: list[str] = []
+        low, high = self.box.x
+        with shown(progress, float(LINES[1]), "branches") as show:
+            for number, y in enumerate(np.linspace(*self.box.y, LINES[1]).tolist()):
+                for x, direction in ((low, 1), (high, -1)):
+                    try:
+                        branch = self._branch(x, y, direction)
+                    except (OrbitError, ContinuationError) as error:
+                        lost.append(f"{self.place(x, y)}: {error}")
                         continue
-                    if _is_of(found, special.orbit, place):
-                        _append(at, special, place, box, axes, traced, problems)
-                    else:
-                        elsewhere += 1
-                # the branch that goes through needs not be followed backwards
-                if branch.reached and not branch.special:
-                    break
-            show(number + 1.0)
-    if lost:
-        problems.append(
-            f"no branch to seek folds on from {len(lost)} of {2 * LINES[1]} ends of lines, the first {lost[0]}"
+                    for special in branch.special:
+                        self._follow_special(special, (special.parameter, y))
+                    # the branch that goes through needs not be followed backwards
+                    if branch.reached and not branch.special:
+                        break
+                show(number + 1.0)
+        if lost:
+            self.problems.append(
+                f"no branch to seek folds on from {len(lost)} of {2 * LINES[1]} ends of lines, the first {lost[0]}"
+            )
+
+    def _branch(self, x: float, y: float, direction: int) -> Branch:
+        mechanism, drive = self.operation(x, y)
+        family = Family(
+            parameters=mechanism,
+            drive=drive,
+            vary=lambda value: self.operation(value, y),
+            name=self.axes[0].name,
+            unit=self.axes[0].si,
         )
-    return elsewhere
+        low, high = self.box.x
+        orbit = orbit_of(mechanism, drive, start=self.start)
+        return follow(family, orbit, x, low=low, high=high, direction=direction, most_points=BRANCH_POINTS)
+
+    def _follow_special(self, special: SpecialPoint, place: tuple[float, float]) -> None:
+        """Follow a fold, period doubling or torus through the chart, unless it is known or of another motion."""
+        if any(_passes(boundary, special.kind, place, self.box) for boundary in self.traced):
+            return
+        if not _is_of(self.grid, special.orbit, place):
+            self.elsewhere += 1
+            return
+        what = f"the {special.kind.value} at {self.place(*place)}"
+        try:
+            curve = follow_crossing(self.operation, special.orbit, special.kind, place, x=self.box.x, y=self.box.y)
+        except ContinuationError as error:
+            self.problems.append(f"{what} is not followed: {error}")
+            return
+        self.traced.append(Traced(points=curve.points, motion=TRUE_ORBIT, kind=curve.kind, ends=curve.ends))
+        for end in curve.ends:
+            if end.reason not in (Reason.BOX, Reason.CLOSED):
+                self.problems.append(f"{what} is followed to {self.place(*end.point)} only: {end.message}")
+
+    def run_three_points(self) -> None:
+        """Long runs at the points that put the grid to the test."""
+        for row, column in points_to_confirm(self.grid):
+            x, y = float(self.grid.x[column]), float(self.grid.y[row])
+            try:
+                check = confirm(*self.operation(x, y), start=self.grid.starts[row, column])
+            except LinkworkError as error:
+                self.problems.append(f"no long run at {self.place(x, y)}: {error}")
+            else:
+                self.runs.append(Run(x=x, y=y, confirmation=check))
+
+    def removals(self, matrix: Monodromy) -> tuple[str, ...]:
+        """The damping that removes each region, where damping is one of the axes; a sentence a boundary of the true orbit."""
+        names = [axis.name for axis in self.axes]
+        if DAMPING not in names:
+            return ()
+        which = names.index(DAMPING)
+        return tuple(
+            self._removal(matrix, boundary, which)
+            for boundary in self.traced
+            if boundary.motion == TRUE_ORBIT and boundary.kind is not Crossing.TORUS and len(boundary.points) > 1
+        )
+
+    def _removal(self, matrix: Monodromy, boundary: Traced, which: int) -> str:
+        """The damping, along axis ``which``, that removes the region of a boundary."""
+        other, up = self.axes[1 - which], self.axes[which]
+        spans = (self.box.x, self.box.y)
+        across, dampings = boundary.points[:, 1 - which], boundary.points[:, which]
+        low, high, top = float(across.min()), float(across.max()), float(dampings.max())
+        greatest, size = spans[which][1], spans[which][1] - spans[which][0]
+        region = f"{boundary.kind.value} from {other.format_value(low)} to {other.format_value(high)}"
+        if top > greatest - 1e-6 * size:
+            return f"{region}: still there at {up.format_value(greatest)}"
+        # this region and no other
+        margin = 0.25 * (high - low)
+        x = (max(spans[1 - which][0], low - margin), min(spans[1 - which][1], high + margin))
+        test = test_of(matrix, boundary.kind)
+        try:
+            found = removing_damping(
+                lambda value, damping: test(value, damping) if which == 1 else test(damping, value),
+                x,
+                (float(dampings.min()), greatest),
+            )
+        except LinkworkError:
+            # the test function ends at folds: take what the traced boundary says
+            return f"{region}: goes up to {DAMPING} = {top:.4g} {up.si}, by its points"
+        return f"{region}: gone from {DAMPING} = {found.damping:.8g} {up.si} on, last at {other.format_value(found.x)}"
 
 
 def _is_of(found: Grid, orbit: PeriodicOrbit, place: tuple[float, float]) -> bool:
@@ -401,43 +407,16 @@ def _is_of(found: Grid, orbit: PeriodicOrbit, place: tuple[float, float]) -> boo
     return bool(np.any(distance < SAME_MOTION))
 
 
-def _append(
-    at: Plane,
-    special: SpecialPoint,
-    place: tuple[float, float],
-    box: Box,
-    axes: tuple[Axis, Axis],
-    traced: list[Traced],
-    problems: list[str],
-) -> None:
-    what = f"the {special.kind.value} at {_place(axes, *place)}"
-    try:
-        curve = follow_crossing(at, special.orbit, special.kind, place, x=box.x, y=box.y)
-    except ContinuationError as error:
-        problems.append(f"{what} is not followed: {error}")
-        return
-    traced.append(Traced(points=curve.points, motion="true orbit", kind=curve.kind, ends=curve.ends))
-    for end, point in zip(curve.ends, (curve.points[0], curve.points[-1])):
-        if end not in COMPLETE:
-            problems.append(f"{what} is followed to {_place(axes, *point.tolist())} only: {end}")
-
-
-def _along(at: Plane, y: float, x: float) -> tuple[FiveBarParameters, Drive]:
-    return at(x, y)
-
-
-def _is_known(place: tuple[float, float], kind: Crossing, box: Box, traced: Sequence[Traced]) -> bool:
-    """Whether a boundary of the true orbit that has been traced passes through a point, nearly."""
-    for boundary in traced:
-        if boundary.kind is kind and boundary.motion == "true orbit" and len(boundary.points) > 1:
-            s = (boundary.points - np.array(place)) / box.size
-            # distance of the point, now the origin, from each piece
-            pieces = np.diff(s, axis=0)
-            squares = np.maximum((pieces**2).sum(axis=1), 1e-300)
-            along = np.clip(-(s[:-1] * pieces).sum(axis=1) / squares, 0.0, 1.0)
-            if float(np.hypot(*(s[:-1] + along[:, None] * pieces).T).min()) < SAME:
-                return True
-    return False
+def _passes(boundary: Traced, kind: Crossing, place: tuple[float, float], box: Box) -> bool:
+    """Whether a boundary of the true orbit passes through a point, nearly."""
+    if boundary.kind is not kind or boundary.motion != TRUE_ORBIT or len(boundary.points) < 2:
+        return False
+    s = (boundary.points - np.array(place)) / box.size
+    # distance of the point, now the origin, from each piece
+    pieces = np.diff(s, axis=0)
+    squares = np.maximum((pieces**2).sum(axis=1), 1e-300)
+    along = np.clip(-(s[:-1] * pieces).sum(axis=1) / squares, 0.0, 1.0)
+    return float(np.hypot(*(s[:-1] + along[:, None] * pieces).T).min()) < SAME
 
 
 def default_range(parameters: FiveBarParameters, drive: Drive, name: str) -> tuple[float, float]:
@@ -448,7 +427,7 @@ def default_range(parameters: FiveBarParameters, drive: Drive, name: str) -> tup
     InputError
         If there is no value, or no such axis.
     """
-    require_axis(drive, name)
+    require_variable(drive, name)
     if name == "drive.speed" and parameters.slider_stiffness > 0.0:
         natural = natural_frequency(parameters)
         return (_SPEEDS[0] * natural, _SPEEDS[1] * natural)
@@ -461,62 +440,6 @@ def default_range(parameters: FiveBarParameters, drive: Drive, name: str) -> tup
 
 def _axis(name: str) -> Axis:
     unit = unit_of(name)
-    return (
-        Axis(name=name, unit="rpm", factor=1.0 / RAD_S_PER_RPM)
-        if unit == "rad/s"
-        else Axis(name=name, unit=unit, factor=1.0)
-    )
-
-
-def _place(axes: tuple[Axis, Axis], x: float, y: float) -> str:
-    return ", ".join(told(axis.name, value, unit_of(axis.name)) for axis, value in zip(axes, (x, y)))
-
-
-def _missing(found: Grid, axes: tuple[Axis, Axis]) -> list[str]:
-    places: NDArray[np.int64] = np.argwhere(np.ma.getmaskarray(found.largest))
-    if len(places) == 0:
-        return []
-    row, column = places[0].tolist()
-    return [
-        f"no orbit was found at {len(places)} of {found.largest.size} points (grey), the first at "
-        f"{_place(axes, float(found.x[column]), float(found.y[row]))}: {found.reason(row, column)}"
-    ]
-
-
-def _removals(matrix: Monodromy, box: Box, names: tuple[str, str], traced: Sequence[Traced]) -> tuple[str, ...]:
-    """The damping that removes each region, where damping is one of the axes; a sentence a boundary of the true orbit."""
-    if DAMPING not in names:
-        return ()
-    which = names.index(DAMPING)
-    other, damping = (box.x, box.y) if which == 1 else (box.y, box.x)
-    name, unit = names[1 - which], unit_of(names[1 - which])
-    sentences = []
-    for boundary in traced:
-        if boundary.motion != "true orbit" or boundary.kind is Crossing.TORUS or len(boundary.points) < 2:
-            continue
-        across, up = boundary.points[:, 1 - which], boundary.points[:, which]
-        span = f"{told(name, float(across.min()), unit)} to {told(name, float(across.max()), unit)}"
-        region = f"{boundary.kind.value} from {span}"
-        top = float(up.max())
-        if top > damping[1] - 1e-6 * (damping[1] - damping[0]):
-            sentences.append(f"{region}: still there at {DAMPING} = {damping[1]:.6g} {unit_of(DAMPING)}")
-            continue
-        # this region and no other
-        margin = 0.25 * float(np.ptp(across))
-        x = (max(other[0], float(across.min()) - margin), min(other[1], float(across.max()) + margin))
-        test = test_of(matrix, 1 if boundary.kind is Crossing.FOLD else -1)
-        try:
-            found = removing_damping(partial(_turned, test, which), x, (float(up.min()), damping[1]))
-        except LinkworkError:
-            # the test function ends at folds: what the traced boundary tells stands
-            sentences.append(f"{region}: goes up to {DAMPING} = {top:.4g} {unit_of(DAMPING)}, by its points")
-        else:
-            sentences.append(
-                f"{region}: gone from {DAMPING} = {found.damping:.8g} {unit_of(DAMPING)} on, last at "
-                f"{told(name, found.x, unit)}"
-            )
-    return tuple(sentences)
-
-
-def _turned(test: Test, which: int, other: float, damping: float) -> float:
-    return test(other, damping) if which == 1 else test(damping, other)
+    if unit == "rad/s":
+        return Axis(name=name, unit="rpm", factor=1.0 / RAD_S_PER_RPM, si=unit)
+    return Axis(name=name, unit=unit, factor=1.0, si=unit)

@@ -7,27 +7,19 @@ together, so that it goes on through the cusp where two folds meet and vanish.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from linkwork.five_bar.parameters import FiveBarParameters
-
-from ..numerics.continuation import Evaluate, Evaluation, Follower, Point, Settings
-from .branches import crossing_value, orbit_from, reason_to_leave
-from .floquet import Crossing
-from .orbits import Drive, PeriodicOrbit, period_from, scale_of
+from ..numerics.continuation import Curve, End, Evaluate, Evaluation, Follower, Settings
+from .branches import orbit_from, reason_to_leave
+from .floquet import Crossing, crossing_test
+from .orbits import PeriodicOrbit, period_from, scale_of
+from .planes import Plane
 
 #: Steps of the differences, relative to the scales: the multipliers are good to about 1e-10. They steer Newton's method only.
 _DIFFERENCE = 1e-5
-
-#: Ends of a curve that leave nothing to follow.
-COMPLETE = ("it leaves the box", "it is closed")
-
-#: Mechanism and drive at a point of the plane.
-At = Callable[[float, float], tuple[FiveBarParameters, Drive]]
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -40,18 +32,18 @@ class CrossingCurve:
     points : ndarray, shape (m, 2)
         Values of the two parameters.
     orbits : tuple of PeriodicOrbit
-    ends : (str, str)
-        Why it ends, at the first and at the last point.
+    ends : (End, End)
+        At the first and at the last point.
     """
 
     kind: Crossing
     points: NDArray[np.float64]
     orbits: tuple[PeriodicOrbit, ...]
-    ends: tuple[str, str]
+    ends: tuple[End, End]
 
 
 def follow_crossing(
-    at: At,
+    at: Plane,
     orbit: PeriodicOrbit,
     kind: Crossing,
     place: tuple[float, float],
@@ -85,44 +77,31 @@ def follow_crossing(
     ContinuationError
         If no point of the curve is near the orbit.
     """
-    settings = Settings(low=y[0], high=y[1], first=first, greatest=greatest, most_points=most_points)
+    n = len(orbit.start)
+    settings = Settings(low=y[0], high=y[1], bounds={n: x}, first=first, greatest=greatest, most_points=most_points)
     unknowns = np.append(scale_of(orbit.parameters, orbit.drive, orbit.start), x[1] - x[0])
-    follower = Follower(_evaluate(at, orbit.turns, kind, unknowns, x, y), unknowns, settings)
+    follower = Follower(_evaluate(at, orbit.turns, kind, unknowns, settings), unknowns, settings)
     begin = follower.start(np.append(orbit.start, place[0]), place[1], 1)
 
-    def leave(point: Point) -> str:
-        return reason_to_leave(point) if x[0] <= point.y[-1] <= x[1] else "it leaves the box"
-
-    up = follower.follow(begin, leave=leave)
-    backwards = Point(y=begin.y, parameter=begin.parameter, tangent=-begin.tangent, data=begin.data)
-    down = None if up.closed else follower.follow(backwards, leave=leave)
-    points = list(up.points) if down is None else [*reversed(down.points[1:]), *up.points]
-    inside = [p for p in points if x[0] <= p.y[-1] <= x[1]]
-    reasons = [_reason(curve.reason) for curve in (up if down is None else down, up)]
+    up = follower.follow(begin, leave=reason_to_leave)
+    down = up if up.closed else follower.follow(begin.turned(), leave=reason_to_leave)
+    points = [*up.points] if up.closed else [*reversed(down.points[1:]), *up.points]
     return CrossingCurve(
         kind=kind,
-        points=np.array([[p.y[-1], p.parameter] for p in inside]),
-        orbits=tuple(p.data for p in inside),
-        ends=(reasons[0], reasons[1]),
+        points=np.array([[p.y[-1], p.parameter] for p in points]),
+        orbits=tuple(p.data for p in points),
+        ends=(_end(down), _end(up)),
     )
 
 
-def _reason(text: str) -> str:
-    return "it leaves the box" if "end of the range" in text else "it is closed" if "closes" in text else text
+def _end(curve: Curve) -> End:
+    last = curve.points[-1]
+    message = "" if curve.reached else curve.reason
+    return End(reason=curve.end, point=(float(last.y[-1]), last.parameter), message=message)
 
 
-def _evaluate(
-    at: At,
-    turns: int,
-    kind: Crossing,
-    scale: NDArray[np.float64],
-    x: tuple[float, float],
-    y: tuple[float, float],
-) -> Evaluate:
-    """G = (y(T) - y(0), test) in the unknowns (y(0), x) and the parameter y, with its derivatives.
-
-    Beyond the box, where there may be no mechanism, it goes on in a straight line.
-    """
+def _evaluate(at: Plane, turns: int, kind: Crossing, scale: NDArray[np.float64], settings: Settings) -> Evaluate:
+    """G = (y(T) - y(0), test) in the unknowns (y(0), x) and the parameter y, with its derivatives."""
     n = len(scale) - 1
 
     def values(z: NDArray[np.float64]) -> tuple[NDArray[np.float64], PeriodicOrbit]:
@@ -130,23 +109,21 @@ def _evaluate(
         period = period_from(parameters, drive, z[:n], turns)
         orbit = orbit_from(parameters, drive, z[:n], turns, period)
         # the test has no dimension; it is given that of x, whose row it stands in
-        return np.append(period.shift, scale[n] * crossing_value(kind, orbit)), orbit
+        return np.append(period.shift, scale[n] * crossing_test(orbit.monodromy, kind)), orbit
 
-    steps = _DIFFERENCE * np.append(scale, y[1] - y[0])
-    low, high = np.full(n + 2, -np.inf), np.full(n + 2, np.inf)
-    low[n:], high[n:] = (x[0], y[0]), (x[1], y[1])
+    steps = _DIFFERENCE * np.append(scale, settings.high - settings.low)
+    high = np.append(np.full(n, np.inf), [settings.bounds[n][1], settings.high])
 
     def evaluation(unknowns: NDArray[np.float64], parameter: float) -> Evaluation:
         z = np.append(unknowns, parameter)
-        inside = np.clip(z, low, high)
-        here, orbit = values(inside)
+        here, orbit = values(z)
         columns = np.empty((n + 1, n + 2))
         for j, step in enumerate(steps):
-            there = inside.copy()
+            there = z.copy()
             # into the box, where there is a mechanism for certain
-            there[j] += step if inside[j] + step <= high[j] else -step
-            columns[:, j] = (values(there)[0] - here) / (there[j] - inside[j])
+            there[j] += step if z[j] + step <= high[j] else -step
+            columns[:, j] = (values(there)[0] - here) / (there[j] - z[j])
         columns[:n, :n] = orbit.monodromy - np.eye(n)
-        return Evaluation(here + columns @ (z - inside), columns[:, :-1], columns[:, -1], orbit)
+        return Evaluation(here, columns[:, :-1], columns[:, -1], orbit)
 
     return evaluation

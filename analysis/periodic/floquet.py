@@ -1,8 +1,8 @@
 """Floquet multipliers and what they say: verdicts with a margin, and how stability is lost.
 
 What a small deviation from a periodic motion becomes after one period is the monodromy matrix times what it was; the
-eigenvalues of that matrix are the Floquet multipliers. Linear equations with periodic coefficients (`analysis.youssef.hill`)
-and the orbits of the mechanism itself are judged here by the same rule.
+eigenvalues of that matrix are the Floquet multipliers. The orbits of the mechanism
+itself and linear equations with periodic coefficients are judged here by the same rule.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from linkwork.errors import InputError, LinkworkError
 
-#: Distance of the largest multiplier from the unit circle below which a verdict is "marginal", unless told otherwise.
+#: Distance of the largest multiplier from the unit circle below which a verdict is "marginal" by default.
 TOLERANCE = 1e-6
 #: Angle from the real axis (rad) below which a multiplier counts as real. A double one on the axis is computed only to the
 #: square root of the rounding errors.
@@ -29,7 +29,7 @@ class VerdictError(LinkworkError, TypeError):
 
 
 class Stability(Enum):
-    """What becomes of a small deviation: it dies out, grows, or the linear theory does not tell."""
+    """What becomes of a small deviation: it dies out, grows, or the linear theory does not decide."""
 
     STABLE = "stable"
     UNSTABLE = "unstable"
@@ -42,6 +42,10 @@ class Crossing(Enum):
     FOLD = "fold"  # at +1: two motions of the same period meet, or a branch point
     PERIOD_DOUBLING = "period doubling"  # at -1
     TORUS = "torus"  # a complex pair
+
+
+#: The real multiplier at a crossing.
+_SIGN = {Crossing.FOLD: 1, Crossing.PERIOD_DOUBLING: -1}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -167,3 +171,37 @@ def liouville(trace: ArrayLike, period: float = 2.0 * pi) -> float:
     if values.ndim != 1 or len(values) == 0 or not np.isfinite(values).all():
         raise InputError("the traces over a period must be finite numbers, at least one")
     return exp(period * float(values.mean()))
+
+
+def crossing_test(monodromy: NDArray[np.float64], crossing: Crossing | int) -> NDArray[np.float64]:
+    """Smooth function of monodromy matrices that is zero where a multiplier crosses the unit circle in this way.
+
+    Parameters
+    ----------
+    monodromy : ndarray, shape (..., n, n)
+    crossing : Crossing or int
+        +1 for a fold, -1 for a period doubling: det(I - multiplier Phi), positive where all multipliers are inside the unit
+        circle, negative where one real multiplier has passed it. For a torus the product, over all pairs of
+        multipliers, of their product less one.
+
+    Returns
+    -------
+    ndarray, shape (...,)
+    """
+    if crossing is Crossing.TORUS:
+        mu = multipliers(monodromy)
+        pairs = [mu[..., i] * mu[..., j] - 1.0 for i in range(mu.shape[-1]) for j in range(i)]
+        return np.asarray(np.prod(pairs, axis=0).real)
+    multiplier = _SIGN[crossing] if isinstance(crossing, Crossing) else crossing
+    require_sign(multiplier)
+    if monodromy.shape[-1] != 2:
+        return np.asarray(np.linalg.det(np.eye(monodromy.shape[-1]) - multiplier * monodromy))
+    trace = monodromy[..., 0, 0] + monodromy[..., 1, 1]
+    det = monodromy[..., 0, 0] * monodromy[..., 1, 1] - monodromy[..., 0, 1] * monodromy[..., 1, 0]
+    return np.asarray(1.0 - multiplier * trace + det)
+
+
+def require_sign(multiplier: int) -> None:
+    """Raise `InputError` for a multiplier that is neither +1 nor -1."""
+    if multiplier not in (1, -1):
+        raise InputError(f"multiplier is {multiplier}: the boundaries sought are those of +1 or -1")

@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from linkwork.errors import InputError, Interrupted, LinkworkError
 
 from ..files import load_array, save_array
-from ..numerics.codegen import cache_folder
+from ..numerics.codegen import cache_root
 from ..run import interruptible, shown
 from . import floquet, orbit_kernels, orbits
 from .floquet import TOLERANCE, Stability
@@ -81,7 +81,7 @@ class Grid:
 
 def grid_folder() -> Path:
     """Folder of the rows of grids that have been computed, beside that of the compiled code."""
-    return cache_folder().parent / "grids"
+    return cache_root() / "grids"
 
 
 def _sources() -> bytes:
@@ -105,7 +105,7 @@ def grid(
 ) -> Grid:
     """The largest Floquet multiplier of the true orbit at every point of a grid.
 
-    Each row is a task of joblib and, once done, a file in the cache, under a name that tells all it depends on: mechanisms,
+    Each row is a task of joblib and, once done, a file in the cache, under a name made from all it depends on: mechanisms,
     speeds, guess, tolerance and sources. An interrupted grid goes on from the rows that are there.
 
     Parameters

@@ -70,6 +70,16 @@ class OrbitError(LinkworkError):
         )
 
 
+class VaryingInputError(InputError):
+    """An input varies in time, and so there is no periodic motion under it; ``channel`` is its name."""
+
+    def __init__(self, channel: str, value: object) -> None:
+        self.channel = channel
+        super().__init__(
+            f"{channel} is a {type(value).__name__}: what acts on a periodic motion must be constant, or an induction motor"
+        )
+
+
 class OrbitAssemblyError(OrbitError, AssemblyError):
     """The motion that was followed comes to the limit of assembly."""
 
@@ -332,7 +342,7 @@ def find_orbit(
         Turns of the crank in one period.
     start : array_like, shape (2,) or (3,), optional
         Guess of u (m) and u' (m/s) at crank angle 0, and under a torque of the crank speed (rad/s), which is needed there
-        unless a motor's synchronous speed tells it.
+        unless it follows from a motor's synchronous speed.
     settle : bool
         Whether other ways are tried where Newton's method fails from the guess: from where the motion goes by itself, and,
         at prescribed speed, by bringing down the spring from where the slider hardly moves.
@@ -463,10 +473,7 @@ def drive_of(inputs: inputs_module.Inputs) -> Drive:
             elif isinstance(part, (int, float, np.floating, np.integer)):
                 constant[channel] = constant.get(channel, 0.0) + float(part)
             else:
-                raise InputError(
-                    f"{channel} is a {type(part).__name__}: what acts on a periodic motion must be constant, or an "
-                    "induction motor"
-                )
+                raise VaryingInputError(channel, part)
     return Drive(
         speed=constant.get("speed"),
         torque=constant.get("torque", 0.0),
@@ -483,7 +490,7 @@ def guess_of(drive: Drive, start: ArrayLike | None) -> NDArray[np.float64]:
     Raises
     ------
     InputError
-        If ``start`` has not the components of the state, or is needed and not there.
+        If ``start`` does not have the components of the state, or is missing and needed.
     """
     if start is None:
         if drive.speed_drive:

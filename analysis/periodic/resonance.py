@@ -1,18 +1,16 @@
 """Where the slider resonates, how large, and which harmonics: the true periodic motion over the speed.
 
 `frequency_response` follows the periodic motions of the full nonlinear plant over a range of speeds, past folds, from both
-ends of the range, and switches to the motions of twice the period; `sweep` goes through the speeds as a machine would, up or
-down, from one steady motion to the next, and tells where it jumps. `natural_frequency` is the classical estimate, from the
-mean effective mass. The approximations by harmonic balance are in `analysis.youssef.harmonic_balance`.
+ends of the range, and switches to the motions of twice the period. `natural_frequency` is the classical estimate, from the
+mean effective mass.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
-from math import sqrt
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from math import pi, sqrt
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -20,32 +18,40 @@ from scipy.optimize import minimize_scalar
 from scipy.signal import find_peaks
 
 from linkwork.errors import InputError, Interrupted, ParameterError
+from linkwork.five_bar import dynamics, kinematics
+from linkwork.five_bar.assembly import check_assembly
 from linkwork.five_bar.parameters import FiveBarParameters
 
 from ..files import write_csv
 from ..mechanisms import require_five_bar
 from ..numerics.continuation import ContinuationError
 from ..run import interruptible, shown
-from ..youssef.harmonic_balance import harmonic_balance
-from ..youssef.slider_equation import Load, Variant, mean_effective_mass, slider_equation
-from . import orbit_kernels
-from .branches import Branch, Family, follow, switch
+from .branches import Branch, Family, SpecialPoint, follow, switch
 from .floquet import Crossing, Stability
-from .orbits import Drive, OrbitError, PeriodicOrbit, guess_of, orbit_of, scale_of
+from .orbits import Drive, OrbitError, PeriodicOrbit, orbit_of, scale_of
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-#: Turns for which a motion that has lost its stability is followed to the next steady one, and the change a turn that ends it.
-JUMP_TURNS, SETTLED = 5000, 1e-9
-#: Change of the amplitude from one speed to the next, relative, beyond which the step is halved, and how often it may be.
-FAR, HALVINGS = 0.25, 6
-#: Periods, in turns, that a steady motion is looked for with.
-PERIODS = (1, 2, 3, 4)
+#: Crank angles over which the effective mass is averaged.
+MASS_SAMPLES = 1024
 #: How far a maximum of the amplitude stands out, relative to its height, to count as one.
 PROMINENCE = 1e-3
 #: Distance of two orbits' starts, relative to crank length and speed, below which they are the same.
 SAME = 1e-6
+
+
+def mean_effective_mass(parameters: FiveBarParameters) -> float:
+    """Mean over a turn of what moves with the slider at u = 0, m22 (kg).
+
+    Raises
+    ------
+    AssemblyError
+        If at u = 0 the links cannot be joined over the whole turn.
+    """
+    p, total = parameters.constants(), 0.0
+    for th2 in np.linspace(0.0, 2.0 * pi, MASS_SAMPLES, endpoint=False).tolist():
+        check_assembly(parameters, th2, 0.0)
+        g = kinematics.position(th2, 0.0, p)
+        total += dynamics.inertia(g, kinematics.coefficients(g, p), p).m22
+    return total / MASS_SAMPLES
 
 
 def natural_frequency(parameters: FiveBarParameters) -> float:
@@ -143,13 +149,6 @@ class Response:
         columns |= {name: np.concatenate([table[name] for table in tables]) for name in tables[0]}
         return write_csv(path, columns)
 
-    def plot(self, *, title: str = "", rpm: bool = False, beside: Approximations | None = None) -> Figure:
-        """Amplitude, crank torque and pin force over the parameter; see `analysis.figures.plot_branches`."""
-        from .. import figures
-
-        others = {} if beside is None else {name: (beside.speed, a) for name, a in beside.amplitudes.items()}
-        return figures.plot_branches(self.branches, title=title, rpm=rpm, beside=others)
-
 
 class ResponseInterrupted(Interrupted):
     """Ctrl-C: the branches that had been followed are in ``response``."""
@@ -222,95 +221,105 @@ def frequency_response(
     if not (np.isfinite(low) and np.isfinite(high) and low < high):
         raise InputError(f"the range is {low} to {high}: it must be finite and increasing")
     family = Family(parameters=parameters, drive=drive, vary=vary)
-    branches: list[Branch] = []
-    problems: list[str] = []
-    failures: list[OrbitError] = []
-    done = 0.0
     with interruptible() as interrupted, shown(progress, high - low, "follow") as show:
-
-        def watch(value: float) -> None:
-            nonlocal done
-            done = max(done, value - low)
-            show(done)
-
-        for value, direction, guess in ((low, 1, start), (high, -1, None)):
-            try:
-                at, driven = family.at(value)
-                if direction < 0 and not driven.speed_drive and branches:
-                    # no guess of the speed is to be had at the other end
-                    break
-                orbit = orbit_of(at, driven, start=guess)
-            except OrbitError as error:
-                failures.append(error)
-                problems.append(f"at {family.tell(value)}: {error}")
-                continue
-            if any(_passes(branch, value, orbit) for branch in branches):
-                continue
-            branch = follow(
-                family,
-                orbit,
-                value,
-                low=low,
-                high=high,
-                direction=direction,
-                greatest=greatest_step,
-                most_points=most_points,
-                watch=watch,
-                stop=lambda: bool(interrupted),
-            )
-            branches.append(branch)
-            if not branch.reached:
-                problems.append(_lost(branch))
-            if interrupted:
-                break
+        search = _Search(family, low, high, greatest_step, lambda: bool(interrupted))
+        search.follow_from_both_ends(start, most_points, show)
         if doubled and not interrupted:
-            _double(family, branches, problems, low, high, greatest_step, lambda: bool(interrupted))
-    if not branches:
-        raise failures[0]
-    response = Response(branches=tuple(branches), low=low, high=high, problems=tuple(problems))
+            search.follow_doublings()
+    if not search.branches:
+        raise search.failures[0]
+    response = Response(branches=tuple(search.branches), low=low, high=high, problems=tuple(search.problems))
     if interrupted:
         raise ResponseInterrupted(response)
     return response
 
 
-def _double(
-    family: Family,
-    branches: list[Branch],
-    problems: list[str],
-    low: float,
-    high: float,
-    greatest_step: float,
-    stop: Callable[[], bool],
-) -> None:
-    """Append the branches of twice the period; one that ends at another doubling is not followed back from there."""
-    ends: list[tuple[float, NDArray[np.float64]]] = []
-    for special in [s for branch in list(branches) for s in branch.special if s.kind is Crossing.PERIOD_DOUBLING]:
-        scale = scale_of(special.orbit.parameters, special.orbit.drive, special.orbit.start)
-        reach = high - low
-        if any(
-            abs(value - special.parameter) < 1e-3 * reach and np.abs((y - special.orbit.start) / scale).max() < 0.1
-            for value, y in ends
-        ):
-            continue
-        try:
-            branch = switch(family, special, low=low, high=high, greatest=greatest_step, stop=stop)
-        except (OrbitError, ContinuationError) as error:
-            problems.append(
-                f"the branch of twice the period at {family.tell(special.parameter)} is not followed: {error}"
+@dataclass(slots=True)
+class _Search:
+    """The branches of a response as they are followed, and what went wrong on the way."""
+
+    family: Family
+    low: float
+    high: float
+    greatest: float
+    stop: Callable[[], bool]
+    branches: list[Branch] = field(default_factory=list)
+    problems: list[str] = field(default_factory=list)
+    failures: list[OrbitError] = field(default_factory=list)
+
+    def follow_from_both_ends(self, start: ArrayLike | None, most_points: int, show: Callable[[float], None]) -> None:
+        """The branch from the low end, and that from the high end if it is another."""
+        done = 0.0
+
+        def watch(value: float) -> None:
+            nonlocal done
+            done = max(done, value - self.low)
+            show(done)
+
+        for value, direction, guess in ((self.low, 1, start), (self.high, -1, None)):
+            at, driven = self.family.at(value)
+            if direction < 0 and not driven.speed_drive and self.branches:
+                # there is no guess of the speed at the other end
+                break
+            try:
+                orbit = orbit_of(at, driven, start=guess)
+            except OrbitError as error:
+                self.failures.append(error)
+                self.problems.append(f"at {self.family.format_value(value)}: {error}")
+                continue
+            if any(_passes(branch, value, orbit) for branch in self.branches):
+                continue
+            self._keep(
+                follow(
+                    self.family,
+                    orbit,
+                    value,
+                    low=self.low,
+                    high=self.high,
+                    direction=direction,
+                    greatest=self.greatest,
+                    most_points=most_points,
+                    watch=watch,
+                    stop=self.stop,
+                )
             )
-            continue
-        branches.append(branch)
-        ends.append((float(branch.parameter[-1]), branch.orbits[-1].start))
+            if self.stop():
+                break
+
+    def follow_doublings(self) -> None:
+        """The branches of twice the period; one that ends at another doubling is not followed back from there."""
+        ends: list[tuple[float, NDArray[np.float64]]] = []
+
+        def is_end(special: SpecialPoint) -> bool:
+            orbit, reach = special.orbit, 1e-3 * (self.high - self.low)
+            scale = scale_of(orbit.parameters, orbit.drive, orbit.start)
+            return any(
+                abs(value - special.parameter) < reach and np.abs((y - orbit.start) / scale).max() < 0.1
+                for value, y in ends
+            )
+
+        for special in [s for branch in self.branches for s in branch.special if s.kind is Crossing.PERIOD_DOUBLING]:
+            if is_end(special):
+                continue
+            try:
+                branch = switch(
+                    self.family, special, low=self.low, high=self.high, greatest=self.greatest, stop=self.stop
+                )
+            except (OrbitError, ContinuationError) as error:
+                place = self.family.format_value(special.parameter)
+                self.problems.append(f"the branch of twice the period at {place} is not followed: {error}")
+                continue
+            self._keep(branch)
+            ends.append((float(branch.parameter[-1]), branch.orbits[-1].start))
+            if self.stop():
+                return
+
+    def _keep(self, branch: Branch) -> None:
+        self.branches.append(branch)
         if not branch.reached:
-            problems.append(_lost(branch))
-        if stop():
-            return
-
-
-def _lost(branch: Branch) -> str:
-    first, last = (branch.family.tell(float(branch.parameter[i])) for i in (0, -1))
-    period = "" if branch.turns == 1 else f"with a period of {branch.turns} turns "
-    return f"the branch {period}from {first} is followed to {last} only: {branch.reason}"
+            first, last = (self.family.format_value(float(branch.parameter[i])) for i in (0, -1))
+            period = "" if branch.turns == 1 else f"with a period of {branch.turns} turns "
+            self.problems.append(f"the branch {period}from {first} is followed to {last} only: {branch.reason}")
 
 
 def _passes(branch: Branch, value: float, orbit: PeriodicOrbit) -> bool:
@@ -356,236 +365,3 @@ def extrema(branch: Branch, sign: int = 1) -> tuple[Extremum, ...]:
 def _near(family: Family, value: float, orbit: PeriodicOrbit) -> PeriodicOrbit:
     parameters, drive = family.at(value)
     return orbit_of(parameters, drive, turns=orbit.turns, start=orbit.start, settle=False)
-
-
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Jump:
-    """Where a sweep left one steady motion for another.
-
-    Attributes
-    ----------
-    speed : float
-        The first on the new motion (rad/s).
-    amplitude_before, amplitude_after : float
-        m.
-    turns_before, turns_after : int
-        Turns in a period: a motion that doubles its period changes its amplitude but little.
-    """
-
-    speed: float
-    amplitude_before: float
-    amplitude_after: float
-    turns_before: int
-    turns_after: int
-
-
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Sweep:
-    """The steady motions that a machine meets as its speed changes step by step.
-
-    Attributes
-    ----------
-    speed : ndarray, shape (m,)
-        rad/s, in the order of the sweep.
-    orbits : tuple of (PeriodicOrbit or None)
-        None where no steady motion with a period of 1 to 4 turns was met.
-    flags : tuple of str
-        Why there is none; empty where there is one.
-    jumps : tuple of Jump
-    """
-
-    speed: NDArray[np.float64]
-    orbits: tuple[PeriodicOrbit | None, ...]
-    flags: tuple[str, ...]
-    jumps: tuple[Jump, ...]
-
-    @property
-    def amplitude(self) -> np.ma.MaskedArray[tuple[int], np.dtype[np.float64]]:
-        """Half the range of the slider position (m), masked where there is no steady motion; shape (m,)."""
-        values = [np.nan if orbit is None else orbit.amplitude for orbit in self.orbits]
-        return np.ma.masked_invalid(np.array(values))
-
-    @property
-    def turns(self) -> NDArray[np.int64]:
-        """Turns in a period; 0 where there is no steady motion. Shape (m,)."""
-        return np.array([0 if orbit is None else orbit.turns for orbit in self.orbits])
-
-
-def sweep(
-    parameters: FiveBarParameters,
-    speeds: ArrayLike,
-    *,
-    start: ArrayLike | None = None,
-    watch: Callable[[float], None] | None = None,
-) -> Sweep:
-    """Go through crank speeds as a machine would, each begun from the steady motion of the last.
-
-    Where that motion is lost or unstable at the new speed, the plant is followed for up to 5000 turns to the next steady one:
-    a jump. Speeds upward and downward may meet different motions.
-
-    Parameters
-    ----------
-    parameters : FiveBarParameters
-    speeds : array_like, shape (m,)
-        rad/s, increasing or decreasing.
-    start : array_like, shape (2,), optional
-        u (m) and u' (m/s) at crank angle 0 at the first speed; at rest at u = 0 without it.
-    watch : callable, optional
-        Told every speed.
-
-    Raises
-    ------
-    InputError
-        If the speeds are not positive or not in order.
-    """
-    require_five_bar(parameters, "a sweep of the speed")
-    grid = np.asarray(speeds, dtype=float)
-    steps = np.diff(grid)
-    if grid.ndim != 1 or len(grid) == 0 or not (np.isfinite(grid).all() and (grid > 0.0).all()):
-        raise InputError("speeds must be positive finite numbers, at least one")
-    if not ((steps > 0.0).all() or (steps < 0.0).all()):
-        raise InputError("speeds must increase, or decrease, from one to the next")
-    orbits: list[PeriodicOrbit | None] = []
-    flags: list[str] = []
-    jumps: list[Jump] = []
-    state = guess_of(Drive(speed=float(grid[0])), start)
-    last: PeriodicOrbit | None = None
-    for speed in grid.tolist():
-        drive = Drive(speed=speed)
-        orbit = None if last is None else _continued(parameters, speed, last)
-        flag = ""
-        if orbit is None:
-            try:
-                orbit = _settled(parameters, drive, state)
-            except OrbitError as error:
-                flag = str(error)
-            if orbit is not None and last is not None:
-                jumps.append(
-                    Jump(
-                        speed=speed,
-                        amplitude_before=last.amplitude,
-                        amplitude_after=orbit.amplitude,
-                        turns_before=last.turns,
-                        turns_after=orbit.turns,
-                    )
-                )
-        orbits.append(orbit)
-        flags.append(flag)
-        last = orbit
-        if orbit is not None:
-            state = orbit.start
-        if watch:
-            watch(speed)
-    return Sweep(speed=grid, orbits=tuple(orbits), flags=tuple(flags), jumps=tuple(jumps))
-
-
-def _continued(
-    parameters: FiveBarParameters, speed: float, last: PeriodicOrbit, halvings: int = HALVINGS
-) -> PeriodicOrbit | None:
-    """The stable motion that the last one becomes at another speed; None if it is lost on the way.
-
-    A neighbour that differs much may be another motion that Newton's method fell upon: it is sought again in half steps.
-    """
-    assert last.drive.speed is not None
-    try:
-        orbit = orbit_of(parameters, Drive(speed=speed), turns=last.turns, start=last.start, settle=False)
-    except OrbitError:
-        orbit = None
-    if orbit is not None:
-        far = abs(orbit.amplitude - last.amplitude) > FAR * max(orbit.amplitude, last.amplitude)
-        if not far and orbit.verdict(0.0).stability is Stability.STABLE:
-            return orbit
-    if halvings == 0:
-        return None
-    middle = _continued(parameters, 0.5 * (last.drive.speed + speed), last, halvings - 1)
-    return None if middle is None else _continued(parameters, speed, middle, halvings - 1)
-
-
-def _settled(
-    parameters: FiveBarParameters, drive: Drive, state: Sequence[float] | NDArray[np.float64]
-) -> PeriodicOrbit:
-    """The steady motion that the plant goes to by itself from a state at crank angle 0."""
-    start = np.array(state, dtype=float)
-    scale = scale_of(parameters, drive, start)
-    status = orbit_kernels.settle(
-        drive.speed_drive, parameters.constants(), drive.vector(), 1e-9, scale, SETTLED, JUMP_TURNS, start
-    )
-    if status != orbit_kernels.DONE:
-        raise OrbitError(orbit_kernels.REASONS[status], start, np.inf, 0)
-    for turns in PERIODS:
-        try:
-            orbit = orbit_of(parameters, drive, turns=turns, start=start, settle=False)
-        except OrbitError:
-            continue
-        if orbit.verdict(0.0).stability is Stability.STABLE and np.abs((orbit.start - start) / scale).max() < 1e-3:
-            return orbit
-    raise OrbitError(f"no steady motion with a period of 1 to 4 turns after {JUMP_TURNS} turns", start, np.inf, 0)
-
-
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Approximations:
-    """Amplitudes by the classical approximations over the speed, from the linear equation about u = 0.
-
-    Attributes
-    ----------
-    parameters : FiveBarParameters
-        Without Coulomb friction, which a linear equation cannot hold.
-    load : Load
-        Constant forces.
-    speed : ndarray, shape (m,)
-        rad/s.
-    amplitudes : mapping
-        Half the range of u (m) by the name of the approximation, each of shape (m,).
-    """
-
-    parameters: FiveBarParameters
-    load: Load
-    speed: NDArray[np.float64]
-    amplitudes: Mapping[str, NDArray[np.float64]]
-
-    def at(self, speed: float) -> dict[str, float]:
-        """The approximations at a speed (rad/s), not interpolated."""
-        return _approximate(self.parameters, speed, self.load)
-
-    def columns(self) -> dict[str, NDArray[np.float64]]:
-        """As a table, by name with unit."""
-        return {"drive.speed [rad/s]": self.speed} | {f"{name} [m]": v for name, v in self.amplitudes.items()}
-
-
-def approximations(response: Response, points: int = 160) -> Approximations:
-    """The classical approximations over the range of a response: two harmonics as printed and put right, and ten harmonics.
-
-    Raises
-    ------
-    InputError
-        If it is not the speed that varies.
-    """
-    if response.family.vary != "drive.speed":
-        raise InputError(f"{response.family.name} varies: the approximations are over the speed")
-    parameters = replace(response.family.parameters, slider_coulomb_friction=0.0)
-    drive = response.family.drive
-    load = Load(x=drive.load_x, y=drive.load_y, slider=drive.slider_force)
-    speeds = np.linspace(response.low, response.high, points)
-    rows = [_approximate(parameters, speed, load) for speed in speeds.tolist()]
-    return Approximations(
-        parameters=parameters,
-        load=load,
-        speed=speeds,
-        amplitudes={name: np.array([row[name] for row in rows]) for name in rows[0]},
-    )
-
-
-#: Approximations by name: variant of the linear equation and harmonics balanced.
-_APPROXIMATIONS = {
-    "two harmonics, printed (4.21)": (Variant.PRINTED, 2),
-    "two harmonics": (Variant.SECOND_ORDER, 2),
-    "ten harmonics": (Variant.EXACT, 10),
-}
-
-
-def _approximate(parameters: FiveBarParameters, speed: float, load: Load) -> dict[str, float]:
-    return {
-        name: parameters.rocker_length
-        * harmonic_balance(slider_equation(parameters, speed, variant=variant, load=load), order).amplitude
-        for name, (variant, order) in _APPROXIMATIONS.items()
-    }

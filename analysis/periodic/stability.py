@@ -1,10 +1,9 @@
 """Stability of the periodic motion: test functions for charts, damping that removes a region, verdicts put to the test.
 
 A test function of a point of a plane (`planes`) is negative in a region of instability and zero on its boundary, where a
-Floquet multiplier is +1 or -1: of the linear equation about u = 0 (`linear_test`), as the thesis has it, or of the mechanism's
-own periodic orbit (`orbit_test`), which is right. `boundaries` traces where it is zero, `removing_damping` finds where a region
-ends, `grids` computes the largest multiplier of every point of a grid, and `confirm` puts a verdict to the test of a long
-nonlinear run.
+Floquet multiplier of the mechanism's own periodic orbit is +1 or -1 (`orbit_test`). `boundaries` traces where it is zero,
+`removing_damping` finds where a region ends, `grids` computes the largest multiplier of every point of a grid, and `confirm`
+puts a verdict to the test of a long nonlinear run.
 """
 
 from __future__ import annotations
@@ -25,47 +24,13 @@ from linkwork.five_bar.parameters import FiveBarParameters, InitialState
 
 from ..numerics.boundaries import Test, lowest
 from ..run import Inputs, simulate
-from ..youssef.hill import PeriodicEquation, crossing_test, monodromy
-from ..youssef.slider_equation import Load, Variant, slider_equation
-from .floquet import TOLERANCE, Stability, StabilityVerdict, multipliers, verdict
+from .floquet import TOLERANCE, Crossing, Stability, StabilityVerdict, crossing_test
 from .grids import Grid
 from .orbits import Drive, OrbitError, PeriodicOrbit, orbit_of, period_from, scale_of
 from .planes import Plane
 
 #: Monodromy matrix at a point of a plane, shape (n, n).
 Monodromy = Callable[[float, float], NDArray[np.float64]]
-
-
-def linear_equation(parameters: FiveBarParameters, drive: Drive, variant: Variant = Variant.EXACT) -> PeriodicEquation:
-    """The slider's equation about u = 0, which is the motion only where nothing drives it: the thesis's.
-
-    Raises
-    ------
-    InputError
-        If the drive is by torque.
-    """
-    if drive.speed is None:
-        raise InputError("the linear equation is at constant speed: the drive is by torque")
-    load = Load(x=drive.load_x, y=drive.load_y, slider=drive.slider_force)
-    a, b, c = slider_equation(parameters, drive.speed, variant=variant, load=load).coefficients()
-    return PeriodicEquation(a=a, b=b, c=c)
-
-
-def linear_verdict(
-    parameters: FiveBarParameters, drive: Drive, *, variant: Variant = Variant.EXACT, tolerance: float = TOLERANCE
-) -> StabilityVerdict:
-    """The verdict on u = 0 by the linear equation; that on the true motion is `PeriodicOrbit.verdict`."""
-    return verdict(multipliers(monodromy(linear_equation(parameters, drive, variant))), tolerance)
-
-
-def linear_monodromy(operation: Plane, *, variant: Variant = Variant.EXACT) -> Monodromy:
-    """Monodromy matrix of the linear equation about u = 0 over a plane; points are remembered."""
-
-    @cache
-    def matrix(x: float, y: float) -> NDArray[np.float64]:
-        return monodromy(linear_equation(*operation(x, y), variant))
-
-    return matrix
 
 
 def orbit_monodromy(operation: Plane, *, start: ArrayLike | None = None) -> Monodromy:
@@ -98,14 +63,9 @@ def orbit_monodromy(operation: Plane, *, start: ArrayLike | None = None) -> Mono
     return matrix
 
 
-def test_of(matrix: Monodromy, multiplier: int) -> Test:
-    """Test function det(I - multiplier Phi) of a monodromy matrix over a plane; ``multiplier`` is +1 or -1."""
-    return lambda x, y: float(crossing_test(matrix(x, y), multiplier))
-
-
-def linear_test(operation: Plane, multiplier: int, *, variant: Variant = Variant.EXACT) -> Test:
-    """`test_of` of `linear_monodromy`."""
-    return test_of(linear_monodromy(operation, variant=variant), multiplier)
+def test_of(matrix: Monodromy, crossing: Crossing | int) -> Test:
+    """Test function `crossing_test` of a monodromy matrix over a plane."""
+    return lambda x, y: float(crossing_test(matrix(x, y), crossing))
 
 
 def orbit_test(operation: Plane, multiplier: int, *, start: ArrayLike | None = None) -> Test:
@@ -287,7 +247,7 @@ class Confirmation:
 
 #: Start of a long run: distance from the orbit relative to the crank's length, and the range over which growth is measured.
 DISTURBANCE, NOISE, LINEAR = 1e-5, 1e-8, 1e-2
-#: Margin from which on a long run tells growth from decay with certainty.
+#: Margin from which on a long run distinguishes growth from decay with certainty.
 MEASURABLE = 1e-2
 #: Turns of a run at least, and at most.
 FEWEST_TURNS, MOST_TURNS = 1000, 20_000
@@ -311,7 +271,7 @@ def confirm(
     parameters : FiveBarParameters
     drive : Drive
     turns : int, optional
-        At least 20. Without it 1000, and more, up to 20000, where the margin is too small for them to tell growth from decay.
+        At least 20. Without it 1000, and up to 20000 where the margin is too small to distinguish growth from decay.
     start : array_like, shape (2,) or (3,), optional
         Guess of the orbit.
     disturbance : float
@@ -346,11 +306,11 @@ def confirm(
     outside = np.flatnonzero((size > LINEAR) | (size < NOISE))
     used = np.abs(away @ measure)[: outside[0] if len(outside) else None]
     growth = _growth(used)
-    told = growth ** len(used)
-    if told > NOTABLE or size.max() > NOTABLE * LINEAR:
+    factor = growth ** len(used)
+    if factor > NOTABLE or size.max() > NOTABLE * LINEAR:
         outcome = Outcome.GROWS
     else:
-        outcome = Outcome.DECAYS if told < 1.0 / NOTABLE else Outcome.BOUNDED
+        outcome = Outcome.DECAYS if factor < 1.0 / NOTABLE else Outcome.BOUNDED
     return Confirmation(verdict=verdict, outcome=outcome, growth=growth, deviations=size / size[0], message=message)
 
 
@@ -382,10 +342,10 @@ def _passages(
     return np.array(passed), ""
 
 
-def telling_points(found: Grid) -> list[tuple[int, int]]:
+def points_to_confirm(found: Grid) -> list[tuple[int, int]]:
     """Three points of a grid that put it to the test: its most stable, its least stable, and the one nearest to a boundary.
 
-    The last is the point of the least margin, to either side, that a long run can still tell from none.
+    The last is the point of the least margin, to either side, that a long run can still measure.
 
     Returns
     -------

@@ -1,6 +1,11 @@
-from .case import PUBLISHED as PUBLISHED
 from .case import Case as Case
 from .case import published_case as published_case
+from .case_files import case_from as case_from
+from .case_files import load_case as load_case
+from .case_files import load_parameters as load_parameters
+from .case_files import parameters_from as parameters_from
+from .case_files import parameters_to as parameters_to
+from .case_files import save_parameters as save_parameters
 from .checks import CASES as CASES
 from .checks import check as check
 from .cosimulation import Comparison as Comparison

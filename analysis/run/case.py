@@ -2,21 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, field
 from math import pi
-from types import MappingProxyType
-from typing import Any
 
 from linkwork.errors import InputError
 
-from ..mechanisms import MECHANISMS, InitialState, Parameters, mechanism_of
+from ..mechanisms import PUBLISHED, InitialState, Parameters, mechanism_of
 from .inputs import Inputs, given
-
-#: The published sets of every mechanism, by name: each has parameters, initial, crank_speed and source.
-PUBLISHED: Mapping[str, Any] = MappingProxyType(
-    {name: entry for mechanism in MECHANISMS.values() for name, entry in mechanism.published.items()}
-)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

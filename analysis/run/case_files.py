@@ -7,43 +7,43 @@ dimension is checked. Names are those of the FMI contract: ``[slider] stiffness`
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from math import pi
 from pathlib import Path
 from typing import Any
 
 from linkwork.errors import InputError, MissingParameterError, ParameterError
+from linkwork.mechanism import Mechanism
 from linkwork.parameters import field_name
 
 from .. import files
 from ..files import Choice, Kinds, Many, Quantity, Reader, Table, Whole, entry
-from ..mechanisms import FIVE_BAR, MECHANISMS, Mechanism, Parameters, mechanism_of
+from ..mechanisms import MECHANISMS, PUBLISHED, Parameters, mechanism_of
 from ..units import with_unit
-from .case import PUBLISHED, Case
-from .inputs import INPUTS_OF, Channels, Harmonics, InductionMotor, Piecewise, TorsionBar, ramp, table
+from .case import Case
+from .inputs import Inputs
+from .signals import Harmonics, InductionMotor, Piecewise, TorsionBar, ramp, table
 
 # Parameters
 
 
-def parameters_from(
-    data: Mapping[str, Any], base: Parameters | None = None, mechanism: Mechanism = FIVE_BAR
-) -> Parameters:
+def parameters_from(data: Mapping[str, Any], mechanism: Mechanism, base: Parameters | None = None) -> Parameters:
     """Parameters from nested tables or dotted names; what they leave out is taken from ``base``.
 
     Parameters
     ----------
     data : mapping
-    base : FiveBarParameters or SliderCrankParameters, optional
     mechanism : Mechanism
-        Whose parameters they are; with a base, the base's.
+        Whose parameters they are.
+    base : optional
+        Parameters of the mechanism.
 
     Raises
     ------
     ParameterError
         If a name is unknown, a value is wrong, or, without a base, one is missing.
     """
-    mechanism = mechanism if base is None else mechanism_of(base)
     known = mechanism.mechanism_variables
     readers = {
         field_name(name): Whole() if variable.kind == "Integer" else Quantity(variable.unit)
@@ -85,38 +85,52 @@ def load_parameters(path: str | Path) -> Parameters:
     """
     data = files.read_tables(path)
     mechanism = _mechanism_of(data)
-    return parameters_from({k: v for k, v in data.items() if k != "mechanism"}, mechanism=mechanism)
+    return parameters_from({k: v for k, v in data.items() if k != "mechanism"}, mechanism)
 
 
-def _mechanism_of(data: Mapping[str, Any], usual: Mechanism = FIVE_BAR) -> Mechanism:
-    """The mechanism that a file is about: its ``mechanism``, or else the usual one."""
-    return MECHANISMS[Choice(MECHANISMS)(data.get("mechanism", usual.name), "mechanism")]
+def _mechanism_of(data: Mapping[str, Any]) -> Mechanism:
+    """The mechanism that a file is about: its ``mechanism``, or else the one whose parameters it names."""
+    if "mechanism" in data:
+        return MECHANISMS[Choice(MECHANISMS)(data["mechanism"], "mechanism")]
+    names = set(files.flattened(data))
+    found = {name: len(names & set(mechanism.mechanism_variables)) for name, mechanism in MECHANISMS.items()}
+    best = [name for name, count in found.items() if count == max(found.values())]
+    if len(best) > 1:
+        raise ParameterError("mechanism", "missing", f"be one of {', '.join(MECHANISMS)}")
+    return MECHANISMS[best[0]]
 
 
 # Cases
 
 #: Entries of every case file that are not parameters of the mechanism, beside those that say what acts on it.
 COMMON = ("mechanism", "title", "published", "initial", "run")
-#: Where a case file has what acts on a mechanism: the fields of its inputs by their name in the file, with the unit.
-ACTING: Mapping[str, Mapping[str, tuple[str, str]]] = {
-    "five-bar": {
-        "drive.speed": ("speed", "rad/s"),
-        "drive.torque": ("torque", "N.m"),
-        "force": ("force", "N"),
-        "load.fx": ("load_x", "N"),
-        "load.fy": ("load_y", "N"),
-    },
-    "slider-crank": {
-        "drive.speed": ("speed", "rad/s"),
-        "drive.torque": ("torque", "N.m"),
-        "axial.speed": ("shift_speed", "m/s"),
-        "axial.force": ("axial_force", "N"),
-        "axial.groove": ("groove", ""),  # true or false
-        "load": ("load", "N"),
-    },
-}
-#: Tables of which one entry counts, the way in which a freedom is driven.
-EXCLUSIVE = ("drive", "axial")
+
+
+def acting(mechanism: Mechanism) -> dict[str, tuple[str, str]]:
+    """What can act on a mechanism, by its name in a case file: the argument of `Inputs` and the unit, "" for a flag.
+
+    The name is that of the FMI input, or, where parameters stand in a table of that name, that of the argument.
+    """
+    units = {v.name: v.unit for v in mechanism.variables}
+    tables = {name.partition(".")[0] for name in mechanism.mechanism_variables}
+    channels = [channel for channel in mechanism.channels if channel.kind != "rate"]
+    # the way a freedom is driven has a table of its own, whatever else is called so
+    driven = _exclusive(mechanism)
+    known = {
+        (c.argument if c.name.partition(".")[0] in tables - driven else c.name): (c.argument, units[c.name])
+        for c in channels
+    }
+    arguments = {argument for argument, _ in known.values()}
+    for mode in mechanism.modes:
+        known |= {
+            f"{mode.name.partition('.')[0]}.{flag}": (flag, "") for flag in mode.arguments if flag not in arguments
+        }
+    return known
+
+
+def _exclusive(mechanism: Mechanism) -> set[str]:
+    """Tables of which one entry counts, the way in which a freedom is driven."""
+    return {mode.name.partition(".")[0] for mode in mechanism.modes}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -128,10 +142,10 @@ class RunTable:
     step: float | None = entry(Quantity("s"), None)
     tolerance: float = entry(Quantity("1"), 1e-9)
 
-    def times(self, inputs: Channels) -> tuple[float, float]:
+    def times(self, inputs: Inputs) -> tuple[float, float]:
         """End of the run and distance of the samples (s), by default three turns at a constant speed, in 360 steps each."""
         constant = isinstance(inputs.speed, (int, float)) and inputs.speed != 0.0
-        turn = 2.0 * pi / abs(inputs.speed) if constant else None  # type: ignore[arg-type]
+        turn = 2.0 * pi / abs(inputs.speed) if constant else None
         step = self.step if self.step is not None else 1e-3 if turn is None else turn / 360.0
         if self.stop_time is not None:
             if self.revolutions is not None:
@@ -169,25 +183,25 @@ def case_from(
     data: Mapping[str, Any], *, folder: Path, title: str = "", overrides: Mapping[str, Any] | None = None
 ) -> Case:
     """A case from the tables of a case file; ``folder`` is where its CSV tables are looked for."""
-    data = files.overridden(data, overrides or {}, exclusive=EXCLUSIVE)
+    exclusive = sorted(set().union(*map(_exclusive, MECHANISMS.values())))
+    data = files.overridden(data, overrides or {}, exclusive=exclusive)
     published = PUBLISHED[Choice(PUBLISHED)(data["published"], "published")] if "published" in data else None
-    usual = FIVE_BAR if published is None else mechanism_of(published.parameters)
-    mechanism = _mechanism_of(data, usual)
-    if published is not None and mechanism is not usual:
-        raise ParameterError("mechanism", mechanism.name, f"be that of the published set {data['published']}")
-    other = {*COMMON, *(name.partition(".")[0] for name in ACTING[mechanism.name])}
+    mechanism = _mechanism_of(data) if published is None else mechanism_of(published.parameters)
+    if data.get("mechanism", mechanism.name) != mechanism.name:
+        raise ParameterError("mechanism", data["mechanism"], f"be that of the published set {data['published']}")
+    other = {*COMMON, *(name.partition(".")[0] for name in acting(mechanism))}
     parameters = parameters_from(
         {name: value for name, value in data.items() if name not in other},
-        None if published is None else published.parameters,
         mechanism,
+        None if published is None else published.parameters,
     )
     initial = files.read(
         mechanism.initial,
         data.get("initial", {}),
         "initial",
         readers={name: Quantity(v.unit) for name, v in mechanism.initial_variables.items()},
-        # a five-bar's published start is at rest but for the speed, which the drive gives
-        base=None if published is None or mechanism is FIVE_BAR else published.initial,
+        # but for the speed that the drive gives
+        base=None if published is None else replace(published.initial, **{mechanism.freedoms[0].initial[1]: 0.0}),
     )
     inputs = _inputs(data, mechanism, folder, None if published is None else published.crank_speed)
     _check_shift(inputs, parameters, initial)
@@ -204,31 +218,33 @@ def case_from(
     )
 
 
-def _inputs(data: Mapping[str, Any], mechanism: Mechanism, folder: Path, speed: float | None) -> Channels:
+def _inputs(data: Mapping[str, Any], mechanism: Mechanism, folder: Path, speed: float | None) -> Inputs:
     """What acts on a mechanism; where nothing is said of the drive the crank turns at ``speed``."""
-    acting = ACTING[mechanism.name]
-    readers = {name: _reader(unit, folder) for name, (_, unit) in acting.items()}
-    found = {name: readers[name](data[name], name) for name in acting if name in data}
-    for group in dict.fromkeys(name.partition(".")[0] for name in acting if "." in name):
+    known, exclusive = acting(mechanism), _exclusive(mechanism)
+    readers = {name: _reader(unit, folder) for name, (_, unit) in known.items()}
+    found = {name: readers[name](data[name], name) for name in known if name in data}
+    for group in dict.fromkeys(name.partition(".")[0] for name in known if "." in name):
         inside = {
             name.removeprefix(f"{group}."): reader for name, reader in readers.items() if name.startswith(f"{group}.")
         }
         values: dict[str, Any] = files.read(dict, data.get(group, {}), group, readers=inside)
-        if group in EXCLUSIVE and len(values) > 1:
+        if group in exclusive and len(values) > 1:
             raise ParameterError(group, ", ".join(data[group]), f"have only one of {', '.join(inside)}")
         found |= {f"{group}.{name}": value for name, value in values.items()}
     if speed is not None and not data.get("drive"):
         found["drive.speed"] = speed
-    return INPUTS_OF[mechanism.name](**{acting[name][0]: value for name, value in found.items()})
+    return Inputs(**{known[name][0]: value for name, value in found.items()})
 
 
-def _check_shift(inputs: Channels, parameters: Any, initial: Any) -> None:
+def _check_shift(inputs: Inputs, parameters: Any, initial: Any) -> None:
     """Make sure that what is said of a slider-crank's shift has an effect."""
-    if inputs.axial_mode == 2 and parameters.groove_amplitude == 0.0:
+    if not hasattr(initial, "shift_velocity"):
+        return
+    if inputs.groove and parameters.groove_amplitude == 0.0:
         raise ParameterError(
             "groove.amplitude", 0.0, "be given with axial.groove: a groove without it holds the shift at zero"
         )
-    if inputs.axial_mode == 1 and not inputs.parts("shift_speed") and initial.shift_velocity:
+    if inputs.axial_force is None and not inputs.groove and inputs.shift_speed is None and initial.shift_velocity:
         raise ParameterError(
             "initial.shift_velocity", initial.shift_velocity, "come with axial.force: the shift is held"
         )
@@ -267,9 +283,7 @@ def _reader(unit: str, folder: Path) -> Reader:
         if not isinstance(item, Mapping):
             return value(item, name)
         if "kind" not in item:
-            raise ParameterError(
-                name, ", ".join(item), f"be a quantity, or a table with a kind, of {', '.join(kinds)}"
-            )
+            raise ParameterError(name, ", ".join(item), f"be a quantity, or a table with a kind, of {', '.join(kinds)}")
         return Kinds(kinds)(item, name)
 
     return Many(signal, single=True) if unit == "N.m" else signal

@@ -214,10 +214,8 @@ def _run_batch(runs: Sequence[Run]) -> tuple[Any, ...]:
     codes, messages = [], []
     for run, code, x, carry in zip(runs, status.tolist(), xs, carries):
         t = float(carry["begin"] + carry["elapsed"])
-        if code == k.BAD_INPUT:
-            verdict = code, str(run.lost(int(carry["lost"]), t, x))
-        else:
-            verdict = run.verdict(code, t, x)
-        codes.append(verdict[0])
-        messages.append(verdict[1])
+        bad = code == k.BAD_INPUT
+        final, message = (code, str(run.lost(int(carry["lost"]), t, x))) if bad else run.verdict(code, t, x)
+        codes.append(final)
+        messages.append(message)
     return states, forces, np.array(codes), carries["sample"].copy(), [start.energy for start in starts], messages

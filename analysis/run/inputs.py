@@ -344,7 +344,7 @@ class NotFiniteError(InputError):
 
     def __init__(self, encoded: Encoded, number: int, t: float, x: NDArray[np.float64]) -> None:
         self.number = number
-        where = encoded.mechanism.where(x)
+        where = encoded.mechanism.where(x.tolist())
         super().__init__(f"the input {encoded.value_name(number)} is not a finite number at t = {t:.9g} s, {where}")
 
 
@@ -425,34 +425,22 @@ def _of_functions(encoded: Encoded, t: float, x: NDArray[np.float64]) -> NDArray
 
 @lru_cache(maxsize=256)
 def compile_function(function: StateFunction, freedoms: int) -> Any:
-    """A user's function as a C function of time and state; its ``address`` is what the compiled code calls. NaN where it raises.
+    """A user's function as a C function of time and state, NaN where it raises; compiled code calls its ``address``.
 
     Raises
     ------
     InputError
         If Numba cannot compile it.
     """
-    import numba
-    from numba.np.unsafe.ndarray import to_fixed_tuple
+    from ..numerics.codegen import user_function
 
-    plain = function.py_func if isinstance(function, numba.core.registry.CPUDispatcher) else function
-    size = 2 * freedoms
     try:
-        own = numba.njit(numba.float64(*[numba.float64] * (1 + size)), error_model="numpy")(plain)
-
-        @numba.cfunc(numba.float64(numba.float64, numba.types.CPointer(numba.float64)), error_model="numpy")
-        def guarded(t, x):  # type: ignore[no-untyped-def]
-            try:
-                return own(t, *to_fixed_tuple(numba.carray(x, (size,)), size))
-            except Exception:
-                return np.nan
-
+        return user_function(function, 2 * freedoms)
     except Exception as error:
         raise InputError(
             f"function {getattr(function, '__name__', function)!r} cannot be compiled with Numba: choose one of SciPy's "
             f"methods, such as method='DOP853', which take any function. Numba says: {_reason(error)}"
         ) from error
-    return guarded
 
 
 def _reason(error: Exception) -> str:
@@ -469,7 +457,6 @@ def compiled_source(encoded: Encoded) -> tuple[Any, list[Any]]:
     freedoms = len(encoded.mechanism.freedoms)
     kept = [[f and compile_function(f, freedoms) for f in row] for row in encoded.functions]
     addresses = np.array([[f.address if f else 0 for f in row] for row in kept], dtype=np.int64).reshape(-1, 2)
-    source = k.Source(
-        encoded.breaks, encoded.coefficients, encoded.harmonics, encoded.places, encoded.law.copy(), encoded.law_places, addresses
-    )  # fmt: skip
+    e = encoded
+    source = k.Source(e.breaks, e.coefficients, e.harmonics, e.places, e.law.copy(), e.law_places, addresses)
     return source, kept

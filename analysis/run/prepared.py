@@ -112,7 +112,7 @@ class Run:
         """solver.status and solver.message of a run that ended with a status of the compiled code."""
         from . import compiled as k
 
-        where = self.mechanism.where(x)
+        where = self.mechanism.where(x.tolist())
         if status == k.LIMIT:
             return 3, f"limit of assembly at t = {t:.9g} s, {where}"
         if status == k.NO_STEP:

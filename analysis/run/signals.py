@@ -118,8 +118,8 @@ class Function:
     """Any channel as a Python function of time, of all coordinates of the mechanism and of all their rates, all floats.
 
     Of a five-bar they are t, crank angle, slider position u, and their rates; of a slider-crank the second coordinate is the
-    axial shift S1. It is compiled with Numba where it can be, else the run needs one of SciPy's methods. As a speed it must depend on
-    ``t`` alone and needs its ``rate``, the acceleration. ``breaks`` are times (s) where it is not smooth.
+    axial shift S1. It is compiled with Numba where it can be, else the run needs one of SciPy's methods. As a speed it must
+    depend on ``t`` alone and needs its ``rate``, the acceleration. ``breaks`` are times (s) where it is not smooth.
     """
 
     function: StateFunction

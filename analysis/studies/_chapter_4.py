@@ -15,8 +15,15 @@ from numpy.typing import NDArray
 
 from linkwork.five_bar.published import SQUARE_OF_OMEGA_K, chapter_4
 
-from ..youssef.harmonic_balance import HarmonicMotion, SliderMotion, nonlinear_harmonic_balance, two_harmonics
-from ..youssef.slider_equation import SliderEquation, Variant, slider_equation
+from ..youssef import (
+    HarmonicMotion,
+    SliderEquation,
+    SliderMotion,
+    Variant,
+    nonlinear_harmonic_balance,
+    slider_equation,
+    two_harmonics,
+)
 
 #: Inertia ratios I4 of which the thesis's resonances are known.
 INERTIA_RATIOS = (0.5, 1.0, 1.5)

@@ -21,12 +21,18 @@ from linkwork.five_bar.parameters import FiveBarParameters
 from linkwork.five_bar.published import SQUARE_OF_OMEGA_K, chapter_4
 
 from ..numerics.boundaries import Box, Chart, Test, chart
-from ..periodic.floquet import Stability
-from ..periodic.orbits import Drive
-from ..periodic.planes import Operation, Plane
-from ..periodic.stability import Confirmation, RemovingDamping, confirm, linear_test, orbit_test, removing_damping
-from ..youssef.hill import PeriodicEquation, Region, hill_regions
-from ..youssef.slider_equation import SliderEquation, Variant, slider_equation
+from ..periodic import (
+    Confirmation,
+    Drive,
+    Operation,
+    Plane,
+    RemovingDamping,
+    Stability,
+    confirm,
+    orbit_test,
+    removing_damping,
+)
+from ..youssef import PeriodicEquation, Region, SliderEquation, Variant, hill_regions, linear_test, slider_equation
 from .study import BALANCE, StudyResult, Verdict, at_most, near, padded
 
 #: First region in lambda_k^2 by I4: the right one, and the thesis's by its appendix 3.

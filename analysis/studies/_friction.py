@@ -16,8 +16,7 @@ from scipy.optimize import OptimizeResult, least_squares, minimize_scalar
 
 from linkwork.five_bar.parameters import FiveBarParameters
 
-from ..periodic.branches import Branch, Family, follow
-from ..periodic.resonance import Response
+from ..periodic import Branch, Family, Response, follow
 from ._orbits import orbit, response
 from ._runs import rig_1
 

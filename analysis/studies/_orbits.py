@@ -15,10 +15,7 @@ from linkwork.five_bar.parameters import FiveBarParameters
 from linkwork.five_bar.published import CM_PER_METRE, RAD_S_PER_RPM
 
 from ..figures import Curve
-from ..periodic.branches import Branch
-from ..periodic.floquet import Stability
-from ..periodic.orbits import PeriodicOrbit, find_orbit
-from ..periodic.resonance import Extremum, Response, frequency_response
+from ..periodic import Branch, Extremum, PeriodicOrbit, Response, Stability, find_orbit, frequency_response
 from ._runs import SETTLING_TIME, steady_turn
 from .study import BALANCE, StudyResult, Verdict, at_most
 

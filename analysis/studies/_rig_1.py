@@ -14,7 +14,7 @@ from functools import cache
 from linkwork.five_bar.published import RAD_S_PER_RPM
 
 from ..figures import Figure, Panel, plot_curves
-from ..periodic.resonance import Response, natural_frequency
+from ..periodic import Response, natural_frequency
 from ._orbits import COARSE, FINE, between, response
 from ._runs import rig_1, steady_turn
 from .study import ASSIGNED, BALANCE, StudyResult, Verdict, at_most, curves_of

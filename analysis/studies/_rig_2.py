@@ -15,9 +15,8 @@ from linkwork.five_bar.parameters import FiveBarParameters
 from linkwork.five_bar.published import CM_PER_METRE, RAD_S_PER_RPM, SETS
 
 from ..figures import COLOURS, Curve, Figure, Panel, plot_curves
-from ..periodic.resonance import Response, natural_frequency
-from ..youssef.harmonic_balance import HarmonicMotion, nonlinear_harmonic_balance, two_harmonics
-from ..youssef.slider_equation import Variant, slider_equation
+from ..periodic import Response, natural_frequency
+from ..youssef import HarmonicMotion, Variant, nonlinear_harmonic_balance, slider_equation, two_harmonics
 from ._orbits import SAME, between, columns_of, curves_over_speed, multiplier_verdict, orbit, response, runs_verdict
 from .study import ASSIGNED, BALANCE, REFERENCE, THESIS, StudyResult, at_most, near, padded
 

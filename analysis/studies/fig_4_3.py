@@ -15,8 +15,7 @@ import numpy as np
 from linkwork.five_bar.published import chapter_4
 
 from ..figures import COLOURS, Curve, Figure, Panel, plot_curves
-from ..youssef.harmonic_balance import resonance
-from ..youssef.slider_equation import Variant
+from ..youssef import Variant, resonance
 from ._chapter_4 import INERTIA_RATIOS, harmonic
 from .study import ASSIGNED, BALANCE, REFERENCE, THESIS, Study, StudyResult, near
 

@@ -14,7 +14,7 @@ import numpy as np
 from linkwork.five_bar.published import chapter_4
 
 from ..figures import COLOURS, Curve, Figure, Panel, plot_curves
-from ..youssef.slider_equation import slider_equation
+from ..youssef import slider_equation
 from ._chapter_4 import harmonic, true_harmonic
 from .study import ASSIGNED, BALANCE, Study, StudyResult, near
 

@@ -16,8 +16,7 @@ import numpy as np
 from linkwork.five_bar.published import chapter_4
 
 from ..figures import Curve, Figure, Panel, plot_curves
-from ..youssef.harmonic_balance import resonance
-from ..youssef.slider_equation import Variant
+from ..youssef import Variant, resonance
 from ._chapter_4 import harmonic, name, true_harmonic
 from .study import ASSIGNED, BALANCE, REFERENCE, Study, StudyResult, at_least, at_most, near
 

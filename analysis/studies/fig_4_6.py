@@ -18,8 +18,7 @@ from scipy.optimize import minimize_scalar
 from linkwork.five_bar.published import P45, SQUARE_OF_OMEGA_K, chapter_4
 
 from ..figures import COLOURS, Curve, Figure, Panel, plot_curves
-from ..youssef.harmonic_balance import resonance
-from ..youssef.slider_equation import Variant
+from ..youssef import Variant, resonance
 from ._chapter_4 import DAMPING, linear, name, true_motion
 from .fig_4_3 import RESONANCES
 from .study import ASSIGNED, BALANCE, REFERENCE, THESIS, Study, StudyResult, at_most, near, padded

@@ -20,8 +20,7 @@ from linkwork.five_bar.published import SIGMA2, chapter_4
 
 from ..figures import Figure, Panel, plot_curves
 from ..numerics.fourier import FourierSeries
-from ..youssef.harmonic_balance import harmonic_balance, nonlinear_harmonic_balance
-from ..youssef.slider_equation import Variant, slider_equation
+from ..youssef import Variant, harmonic_balance, nonlinear_harmonic_balance, slider_equation
 from ._chapter_4 import DAMPING, linear, name, true_motion
 from .study import ASSIGNED, BALANCE, Study, StudyResult, at_most, curves_of, near, padded
 

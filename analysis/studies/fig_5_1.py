@@ -22,8 +22,7 @@ from linkwork.five_bar.published import chapter_4
 
 from ..figures import COLOURS, Curve, Figure, Panel, plot_curves
 from ..numerics.fourier import FourierSeries
-from ..youssef.hill import Truncation, perturbed_region
-from ..youssef.slider_equation import Variant
+from ..youssef import Truncation, Variant, perturbed_region
 from ._chapter_5 import (
     APPENDIX_3,
     RIGHT,

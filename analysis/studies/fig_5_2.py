@@ -16,7 +16,7 @@ import numpy as np
 from linkwork.five_bar.published import chapter_4
 
 from ..figures import COLOURS, Curve, Figure, Panel, plot_curves
-from ..youssef.hill import perturbed_removing_damping
+from ..youssef import perturbed_removing_damping
 from ._chapter_5 import (
     crank_speed,
     equation,

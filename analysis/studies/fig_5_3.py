@@ -23,8 +23,7 @@ from linkwork.five_bar.published import chapter_4
 
 from ..figures import COLOURS, Curve, Figure, Panel, plot_curves
 from ..numerics.boundaries import Box, Chart, chart
-from ..periodic.orbits import Drive
-from ..periodic.planes import Operation
+from ..periodic import Drive, Operation
 from ._chapter_5 import (
     MOTIONS,
     crank_speed,

@@ -15,9 +15,7 @@ import numpy as np
 
 from ..figures import COLOURS, Curve, Figure, HeatMap, Panel, plot_charts
 from ..numerics.boundaries import Box, Chart, chart
-from ..periodic.grids import Grid, grid
-from ..periodic.orbits import Drive
-from ..periodic.planes import Operation
+from ..periodic import Drive, Grid, Operation, grid
 from ._chapter_5 import (
     MOTIONS,
     crank_speed,

@@ -26,8 +26,7 @@ from linkwork.five_bar.parameters import FiveBarParameters
 from linkwork.five_bar.published import CM_PER_METRE
 
 from ..figures import COLOURS, Curve, Figure, Panel, plot_curves
-from ..linear.linearise import linearise_along
-from ..linear.slider_control import design_pid
+from ..linear import design_pid, linearise_along
 from ..motion import (
     Collocation,
     LeastEffort,

@@ -21,7 +21,7 @@ from linkwork.five_bar.parameters import FiveBarParameters
 from linkwork.five_bar.published import CM_PER_METRE
 
 from ..figures import Curve, Figure, Panel, plot_curves
-from ..youssef.workspace import AccessibleArea, accessible_area, coupler_curves
+from ..youssef import AccessibleArea, accessible_area, coupler_curves
 from ._runs import table_3_1
 from .study import BALANCE, Study, StudyResult, at_most, padded
 

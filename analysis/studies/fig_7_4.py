@@ -28,7 +28,7 @@ from linkwork.five_bar.published import CM_PER_METRE
 
 from ..figures import COLOURS, Curve, Figure, Panel, plot_curves
 from ..numerics.fourier import FourierSeries
-from ..youssef.workspace import accessible_area, coupler_curves
+from ..youssef import accessible_area, coupler_curves
 from ._chapter_7 import ASSIGNED, FloatArray
 from .fig_7_2 import POSITIONS, mechanism
 from .study import BALANCE, Study, StudyResult, at_least, at_most, near, padded

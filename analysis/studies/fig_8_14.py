@@ -18,7 +18,7 @@ import numpy as np
 from linkwork.five_bar.published import CM_PER_METRE, RAD_S_PER_RPM
 
 from ..figures import COLOURS, Figure, Panel, plot_curves
-from ..periodic.resonance import sweep
+from ..periodic import sweep
 from ._orbits import SAME, between, columns_of, curves_over_speed, multiplier_verdict, runs_verdict
 from ._rig_1 import FASTEST, SLOWEST, local_maximum, natural_speed, slow
 from ._runs import rig_1

@@ -23,10 +23,7 @@ from numpy.typing import NDArray
 from linkwork.five_bar.published import CM_PER_METRE, RAD_S_PER_RPM
 
 from ..figures import COLOURS, Curve, Figure, Panel, plot_curves
-from ..periodic.branches import SpecialPoint
-from ..periodic.floquet import Crossing
-from ..periodic.orbits import PeriodicOrbit
-from ..periodic.resonance import Sweep, sweep
+from ..periodic import Crossing, PeriodicOrbit, SpecialPoint, Sweep, sweep
 from ._orbits import columns_of, curves_over_speed, disturbed_verdict, orbit, rpm, runs_verdict
 from ._rig_1 import FASTEST, SLOWEST, SPLIT, local_maximum, natural_speed, resonant_b, slow
 from ._runs import rig_1

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from linkwork.five_bar.published import CM_PER_METRE
 
 from ..figures import Figure, Panel, plot_curves
-from ..periodic.branches import Branch
+from ..periodic import Branch
 from ._orbits import ORDERS, SAME, highest, orbit, rpm
 from ._rig_1 import natural_speed, resonant_b, slow
 from ._runs import rig_1, steady_turn

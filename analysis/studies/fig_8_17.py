@@ -30,7 +30,7 @@ from numpy.typing import NDArray
 from linkwork.five_bar.published import CM_PER_METRE
 
 from ..figures import COLOURS, Curve, Figure, Panel, plot_curves
-from ..periodic.floquet import Crossing
+from ..periodic import Crossing
 from ._friction import FITTED, RESONANCE_B, about_resonance, fit, misfit, size, speeds, upper_motion
 from ._orbits import between, columns_of, curves_over_speed
 from ._rig_1 import FASTEST, SLOWEST, natural_speed, slow

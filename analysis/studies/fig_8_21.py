@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..figures import COLOURS, Curve, Figure, Panel, plot_curves
-from ..periodic.branches import Branch
+from ..periodic import Branch
 from ._orbits import rpm
 from ._rig_2 import FASTEST, SLOWEST, motions, natural_speed
 from .study import ASSIGNED, BALANCE, Study, StudyResult, at_least, at_most, padded

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from linkwork.errors import AssemblyError
 
-from ..files.drawings import Circle, Drawing, Line, Polyline, Text
+from ..files import Circle, Drawing, Line, Polyline, Text
 from .scene import LinkageScene
 from .solution import Solution
 

@@ -18,7 +18,9 @@ from numpy.typing import NDArray
 
 from linkwork.errors import InputError
 
+from ..mechanisms import FIVE_BAR
 from ..numerics import symbolic
+from ..run import traced as equations
 from .constraints import TURNING, UNKNOWNS, Limits, half_planes
 from .linkage import BY_SHORTEST
 from .starts import Answer, CrankUnknown, PivotUnknown, SliderUnknown, Start, inside, pivot_bounds, pivot_size
@@ -131,7 +133,7 @@ class Program:
         casadi = self._casadi
         c2, s2 = casadi.cos(phi + p.crank_phase), casadi.sin(phi + p.crank_phase)
         dx, dy = self._displacement(v, phi)
-        g = traced(FIVE_BAR).joined(
+        g = equations(FIVE_BAR).joined(
             c2,
             s2,
             p.ground_length + dx - p.crank_length * c2,

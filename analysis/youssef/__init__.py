@@ -1,1 +1,10 @@
-"""Youssef's own theory: the linearised slider equation, harmonic balance, Hill's determinant, the workspace."""
+"""Youssef's theory of the five-bar slider: linear equation, harmonic balance, Hill, workspace.
+
+The names are those of ``__init__.pyi``; each is imported from its module when it is first used.
+"""
+
+from __future__ import annotations
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from linkwork.errors import InputError
 
 from ..numerics.fourier import FourierSeries
-from ..periodic.floquet import liouville
+from ..periodic import liouville, require_sign
 
 #: Gauss points of a step: the method is of order 12.
 STAGES = 6
@@ -31,7 +31,7 @@ STAGES = 6
 STEP_BY_RATE = 0.5
 #: Fewest samples of the coefficients over a turn from which their rates are judged.
 JUDGED = 64
-#: Harmonics beyond the coefficients' own that Hill's determinant takes in unless told otherwise.
+#: Harmonics beyond the coefficients' own that Hill's determinant takes in by default.
 MORE_HARMONICS = 16
 #: Imaginary part, relative to the size of the boundaries, up to which one is real. Two that are about to meet are computed
 #: only to the square root of the rounding errors.
@@ -219,27 +219,6 @@ def determinant(equation: PeriodicEquation) -> float:
     return liouville(-b / a)
 
 
-def crossing_test(matrices: NDArray[np.float64], multiplier: int) -> NDArray[np.float64]:
-    """det(I - multiplier Phi), shape (...,), of monodromy matrices (..., n, n): zero where one multiplier is +1 or -1.
-
-    ``multiplier`` is +1 or -1. Positive where all multipliers are inside the unit circle; negative where one real multiplier
-    has passed it.
-    """
-    _require_sign(multiplier)
-    if matrices.shape[-1] != 2:
-        value: NDArray[np.float64] = np.asarray(np.linalg.det(np.eye(matrices.shape[-1]) - multiplier * matrices))
-        return value
-    trace = matrices[..., 0, 0] + matrices[..., 1, 1]
-    det = matrices[..., 0, 0] * matrices[..., 1, 1] - matrices[..., 0, 1] * matrices[..., 1, 0]
-    value = 1.0 - multiplier * trace + det
-    return value
-
-
-def _require_sign(multiplier: int) -> None:
-    if multiplier not in (1, -1):
-        raise InputError(f"multiplier is {multiplier}: the boundaries sought are those of +1 or -1")
-
-
 # Hill
 
 
@@ -291,7 +270,7 @@ def hill_determinant(equation: PeriodicEquation, multiplier: int, *, order: int 
     InputError
         If the multiplier is neither, or the order is not positive.
     """
-    _require_sign(multiplier)
+    require_sign(multiplier)
     k = _harmonics(multiplier, _order(equation, order))
     scaled = _operator(equation, k) / (-equation.a.mean * (k**2 + 1.0))[:, None]
     # real: the matrix turned about its middle is its complex conjugate
@@ -364,7 +343,7 @@ def boundary_stiffnesses(
     InputError
         If the multiplier is neither, or the order does not give so many.
     """
-    _require_sign(multiplier)
+    require_sign(multiplier)
     k = _harmonics(multiplier, _order(equation, order, count))
     if not 1 <= count <= len(k):
         raise InputError(

@@ -334,7 +334,7 @@ def _cell_pieces() -> dict[tuple[int, bool], list[tuple[int, int]]]:
     """Boundary pieces of a cell, from edge to edge with the inside on the left.
 
     The key is which corners are inside (bit 0 lower left, then counter-clockwise) and whether the centre is, which
-    tells the two saddles apart. Edges are numbered from the lower one, counter-clockwise.
+    distinguishes the two saddles. Edges are numbered from the lower one, counter-clockwise.
     """
     pieces = {}
     for code in range(1, 15):

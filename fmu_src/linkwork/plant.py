@@ -69,10 +69,10 @@ class Plant:
     ) -> None:
         self.mechanism = mechanism
         self.modes = {mode.name: mode.default for mode in mechanism.modes}
-        for name, value in modes.items():
+        for name, mode_value in modes.items():
             if fmi_name(name) not in self.modes:
                 raise TypeError(f"a {mechanism.name} has no {name}")
-            self.modes[fmi_name(name)] = value
+            self.modes[fmi_name(name)] = mode_value
         for mode in mechanism.modes:
             if self.modes[mode.name] not in range(len(mode.values)):
                 words = [f"{number} ({word})" for number, word in enumerate(mode.values)]

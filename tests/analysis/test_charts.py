@@ -8,19 +8,30 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from analysis.periodic import grids
-from analysis.periodic.branches import Family, follow
-from analysis.periodic.charts import StabilityChart, default_range, stability_chart
-from analysis.periodic.floquet import Crossing, Stability
-from analysis.periodic.orbits import Drive, find_orbit
-from analysis.periodic.resonance import natural_frequency
-from analysis.periodic.stability import telling_points
+from analysis import figures
+from analysis.periodic import (
+    Crossing,
+    Drive,
+    Family,
+    Stability,
+    StabilityChart,
+    charts,
+    default_range,
+    find_orbit,
+    follow,
+    grids,
+    natural_frequency,
+    points_to_confirm,
+    stability_chart,
+)
+from analysis.youssef import linear_motion
 from linkwork.errors import InputError, LinkworkError, UnknownNameError
 from linkwork.five_bar.published import RAD_S_PER_RPM, SETS, TABLE_3_1
 
 RPM = RAD_S_PER_RPM
 DRIVE = Drive(speed=60.0)
 RIG_2 = SETS["rig-2-spring-c"].parameters
+NAMES = ("drive.speed", "slider.damping")
 SPEEDS, DAMPINGS = (1120.0 * RPM, 1220.0 * RPM), (0.0, 2.0)
 
 
@@ -29,7 +40,16 @@ def found(tmp_path_factory: pytest.TempPathFactory) -> StabilityChart:
     """The first region of rig 2 with spring C."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(grids, "grid_folder", lambda: tmp_path_factory.mktemp("grids"))
-        return stability_chart(RIG_2, DRIVE, ranges=(SPEEDS, DAMPINGS), points=41)
+        return stability_chart(
+            RIG_2, DRIVE, ranges=(SPEEDS, DAMPINGS), points=41, beside=linear_motion(RIG_2, DRIVE, NAMES)
+        )
+
+
+@pytest.fixture
+def coarse(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Few lines and samples: enough where only a sentence is asked for."""
+    monkeypatch.setattr(charts, "LINES", (2, 2))
+    monkeypatch.setattr(charts, "SAMPLES", 12)
 
 
 def test_region_is_traced_and_is_where_the_multipliers_are_great(found: StabilityChart) -> None:
@@ -79,7 +99,7 @@ def test_long_runs_confirm_three_points(found: StabilityChart) -> None:
     assert all(run.confirmation.agrees for run in found.runs)
     assert {run.confirmation.verdict.stability for run in found.runs} == {Stability.STABLE, Stability.UNSTABLE}
     margins = 1.0 - found.grid.largest
-    rows = telling_points(found.grid)
+    rows = points_to_confirm(found.grid)
     assert float(margins[rows[0]]) == margins.max()
     assert float(margins[rows[1]]) == margins.min()
 
@@ -90,10 +110,11 @@ def test_files_and_plot(found: StabilityChart, tmp_path: Path) -> None:
     assert rows[:, 0].min() == pytest.approx(1120.0)
     traces = np.loadtxt(found.boundaries_to_csv(tmp_path / "boundaries.csv"), delimiter=",", skiprows=1)
     assert set(traces[:, 0]) == set(range(1, len(found.boundaries) + 1))
-    figure = found.plot(title="chart")
+    figure = figures.plot(found, title="chart")
     assert figure.axes[0].get_xlabel() == "drive.speed [rpm]"
 
 
+@pytest.mark.usefixtures("coarse")
 def test_crossings_of_other_motions_are_counted_not_traced() -> None:
     rig = SETS["rig-1-spring-a"].parameters
     # the period doubling at 379 to 527 rpm belongs to a motion of some 8 cm, beside the small one that the grid has
@@ -103,6 +124,7 @@ def test_crossings_of_other_motions_are_counted_not_traced() -> None:
     assert (chart.grid.largest < 1.0).all()
 
 
+@pytest.mark.usefixtures("coarse")
 def test_a_chart_under_a_torque_has_its_doublings_and_tori() -> None:
     # on the branch of one damper: torus at 0.1055 and 0.2644 N.m, period doubling at 0.3395 N.m
     drive = Drive(torque=0.2)
@@ -132,25 +154,27 @@ def test_a_chart_under_a_torque_has_its_doublings_and_tori() -> None:
     ].any()
 
 
-def test_points_without_an_orbit_are_told() -> None:
+@pytest.mark.usefixtures("coarse")
+def test_points_without_an_orbit_are_reported() -> None:
     chart = stability_chart(
         TABLE_3_1,
         Drive(speed=SETS["table-3.1"].crank_speed),
         ("slider.stiffness", "slider.damping"),
         ((150.0, 400.0), (20.0, 40.0)),
-        points=6,
+        points=3,
     )
     assert any("no orbit was found at" in problem and "slider.stiffness = " in problem for problem in chart.problems)
     assert np.ma.getmaskarray(chart.grid.largest).any()
 
 
+@pytest.mark.usefixtures("coarse")
 def test_a_chart_of_mechanisms_that_cannot_turn_says_so_and_keeps_the_rest() -> None:
     chart = stability_chart(
         TABLE_3_1,
         Drive(speed=SETS["table-3.1"].crank_speed),
         ("coupler.length", "rocker.length"),
         ((0.04, 0.15), (0.14, 0.16)),
-        points=5,
+        points=4,
     )
     assert chart.problems
     assert chart.grid.largest.count() > 0

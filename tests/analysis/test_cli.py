@@ -13,7 +13,7 @@ from click.testing import CliRunner
 
 import build_fmu
 from analysis import cli
-from analysis.periodic.orbits import find_orbit
+from analysis.periodic import find_orbit
 from linkwork.five_bar.published import SETS, TABLE_3_1
 
 ROOT = Path(__file__).parents[2]

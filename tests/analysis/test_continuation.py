@@ -86,7 +86,7 @@ def test_where_the_equation_ends_the_curve_stalls_at_the_last_good_point() -> No
     assert 0.499 < result.points[-1].parameter <= 0.5
 
 
-def test_the_most_points_are_told() -> None:
+def test_the_most_points_are_reported() -> None:
     f = follower(CUBIC, -1.0, 1.0, most_points=7)
     result = f.follow(f.start([-1.3], -1.0, 1))
     assert len(result.points) == 7
@@ -94,7 +94,7 @@ def test_the_most_points_are_told() -> None:
     assert "7 points" in result.reason
 
 
-def test_a_reason_to_leave_is_told() -> None:
+def test_a_reason_to_leave_is_reported() -> None:
     f = follower(CUBIC, -1.0, 1.0)
     seen: list[Point] = []
     result = f.follow(f.start([-1.3], -1.0, 1), watch=seen.append, leave=lambda p: "far enough" if p.y[0] > 0 else "")

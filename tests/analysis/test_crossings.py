@@ -7,11 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from analysis.numerics.continuation import ContinuationError
-from analysis.periodic.branches import Family, SpecialPoint, follow
-from analysis.periodic.crossings import CrossingCurve, follow_crossing
-from analysis.periodic.floquet import Crossing
-from analysis.periodic.orbits import Drive, find_orbit
+from analysis.numerics.continuation import ContinuationError, Reason
+from analysis.periodic import Crossing, CrossingCurve, Drive, Family, SpecialPoint, find_orbit, follow, follow_crossing
 from linkwork.five_bar.parameters import FiveBarParameters
 from linkwork.five_bar.published import RAD_S_PER_RPM, SETS
 
@@ -62,7 +59,7 @@ def test_beyond_the_greatest_friction_of_the_curve_the_branch_from_below_has_no_
     assert 4.5 < top < 5.0
     assert specials(replace(RIG_1_B, slider_coulomb_friction=top - 0.05), SPEEDS[0], 1)
     assert not specials(replace(RIG_1_B, slider_coulomb_friction=top + 0.05), SPEEDS[0], 1)
-    assert folds.ends == ("it leaves the box", "it leaves the box")
+    assert [end.reason for end in folds.ends] == [Reason.BOX, Reason.BOX]
 
 
 def test_a_doubling_moves_with_the_damping() -> None:

@@ -15,8 +15,8 @@ import pytest
 import svgelements
 from ezdxf import bbox
 
-from analysis.files import read_points, save_drawing
-from analysis.files.drawings import LAYERS, UNITS, Circle, Drawing, Line, Polyline, Text, to_dxf, to_svg
+from analysis.files import Circle, Drawing, Line, Polyline, Text, read_points, save_drawing, to_dxf, to_svg
+from analysis.files.drawings import LAYERS, UNITS
 from linkwork.errors import InputError, LinkworkError, ParameterError, UnknownNameError
 
 RNG = np.random.default_rng(4)

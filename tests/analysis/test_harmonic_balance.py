@@ -13,16 +13,20 @@ pytest.importorskip("casadi")
 
 from analysis.numerics.fourier import FourierSeries
 from analysis.studies._runs import rig_1, steady_turn
-from analysis.youssef import harmonic_balance as hb
-from analysis.youssef.harmonic_balance import (
+from analysis.youssef import (
     HarmonicBalanceError,
     HarmonicMotion,
+    Load,
+    SliderEquation,
+    Variant,
+    balance,
     harmonic_balance,
     nonlinear_harmonic_balance,
     resonance,
+    slider_equation,
     two_harmonics,
 )
-from analysis.youssef.slider_equation import Load, SliderEquation, Variant, balance, slider_equation
+from analysis.youssef import harmonics as hb
 from linkwork.errors import AssemblyError, InputError
 from linkwork.five_bar.parameters import FiveBarParameters
 from linkwork.five_bar.published import CM_PER_METRE, RAD_S_PER_RPM, TABLE_3_1, chapter_4

@@ -14,21 +14,23 @@ from scipy.optimize import brentq
 from scipy.special import mathieu_a, mathieu_b
 
 from analysis.numerics.fourier import FourierSeries
-from analysis.periodic.floquet import (
+from analysis.periodic import (
     Crossing,
     Stability,
     VerdictError,
     crossing,
+    crossing_test,
     liouville,
     multipliers,
     verdict,
 )
-from analysis.youssef.hill import (
+from analysis.youssef import (
     PeriodicEquation,
     SingularEquationError,
+    SliderEquation,
     Truncation,
+    Variant,
     boundary_stiffnesses,
-    crossing_test,
     determinant,
     hill_determinant,
     hill_multipliers,
@@ -37,8 +39,8 @@ from analysis.youssef.hill import (
     monodromy,
     perturbed_region,
     perturbed_removing_damping,
+    slider_equation,
 )
-from analysis.youssef.slider_equation import SliderEquation, Variant, slider_equation
 from linkwork.errors import InputError
 from linkwork.five_bar.published import chapter_4
 

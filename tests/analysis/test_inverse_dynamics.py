@@ -14,7 +14,7 @@ from scipy.optimize import minimize
 from analysis import Inputs, simulate
 from analysis.motion import best_spring, inverse_dynamics
 from analysis.numerics.fourier import FourierSeries
-from analysis.periodic.orbits import find_orbit
+from analysis.periodic import find_orbit
 from analysis.run import table
 from linkwork.errors import AssemblyError, InputError
 from linkwork.five_bar import dynamics, kinematics

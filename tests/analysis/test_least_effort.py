@@ -13,7 +13,7 @@ from scipy.optimize import minimize
 from analysis import simulate
 from analysis.motion import Collocation, MotionLimits, TrackingController, best_spring, inverse_dynamics, track
 from analysis.numerics.fourier import FourierSeries
-from analysis.periodic.orbits import find_orbit
+from analysis.periodic import find_orbit
 from linkwork.errors import AssemblyError, InputError
 from linkwork.five_bar import kinematics
 from linkwork.five_bar.published import SETS, TABLE_3_1

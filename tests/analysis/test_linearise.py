@@ -15,8 +15,8 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.linalg import eigh
 
-from analysis import Harmonics, InductionMotor, Inputs, simulate
-from analysis.linear.linearise import (
+from analysis import Harmonics, InductionMotor, Inputs, figures, simulate
+from analysis.linear import (
     AT_REST,
     LEAST_SAMPLES,
     LINEAR_OUTPUTS,
@@ -32,7 +32,7 @@ from analysis.linear.linearise import (
     settled_motion,
 )
 from analysis.numerics.tracing import rebound
-from analysis.periodic.orbits import find_orbit
+from analysis.periodic import find_orbit
 from linkwork import friction
 from linkwork.errors import AssemblyError, InputError, UnknownNameError
 from linkwork.five_bar import dynamics, kinematics
@@ -226,7 +226,7 @@ def test_a_neutral_equilibrium_is_found_and_not_called_stable() -> None:
     assert not one.stable
 
 
-def test_no_equilibrium_is_told() -> None:
+def test_no_equilibrium_is_reported() -> None:
     loose = replace(TABLE_3_1, gravity=0.0, slider_stiffness=0.0)
     with pytest.raises(EquilibriumError, match=r"no equilibrium under .* slider force 5 N"):
         find_equilibrium(loose, slider_force=5.0)
@@ -236,7 +236,7 @@ def test_no_equilibrium_is_told() -> None:
         find_equilibrium(loose, slider_force=5.0, crank_angle=0.3, guess=(0.0, 0.0))
 
 
-def test_bad_statics_are_told() -> None:
+def test_bad_statics_are_reported() -> None:
     with pytest.raises(InputError, match="crank torque is nan"):
         find_equilibrium(TABLE_3_1, crank_torque=float("nan"))
     with pytest.raises(InputError, match="crank is held"):
@@ -415,7 +415,7 @@ def test_names_that_there_are_not(turning) -> None:
         model.to_state_space(("closure.residual",))
 
 
-def test_bad_states_are_told() -> None:
+def test_bad_states_are_reported() -> None:
     with pytest.raises(InputError, match="shape"):
         linearise(TABLE_3_1, (0.0, 0.0, 0.0))
     with pytest.raises(InputError, match="not finite"):
@@ -430,7 +430,7 @@ def test_bad_states_are_told() -> None:
         linearise(TABLE_3_1, np.zeros((2, 4)))
 
 
-def test_bad_motions_are_told(turning) -> None:
+def test_bad_motions_are_reported(turning) -> None:
     states = turning.states
     with pytest.raises(InputError, match=f"at least {LEAST_SAMPLES}"):
         linearise_along(TABLE_3_1, states[:5], TURNING)
@@ -465,13 +465,13 @@ def test_state_space_has_the_names_and_poles_of_the_model() -> None:
 
 def test_bode_and_pole_plots(turning) -> None:
     model = turning.mean()
-    above, below = model.plot_bode(frequencies=[1.0, 10.0, 100.0], title="one").axes
+    above, below = figures.plot(model, frequencies=[1.0, 10.0, 100.0], title="one").axes
     assert (above.get_ylabel(), below.get_xlabel()) == ("magnitude [m/N]", "frequency [rad/s]")
     m, c, k = model.M[0, 0], model.C[0, 0], model.K[0, 0]
     exact = [1.0 / (k - m * w * w + 1j * c * w) for w in (1.0, 10.0, 100.0)]
     assert above.lines[0].get_ydata() == pytest.approx(np.abs(exact), rel=1e-9)
     assert below.lines[0].get_ydata() == pytest.approx(np.degrees(np.angle(exact)), rel=1e-9)
-    axis = model.plot_poles(output="slider.acceleration").axes[0]
+    axis = figures.plot_poles({"": model.to_state_space(("slider.acceleration",), ("slider.force",))}).axes[0]
     curves = {line.get_label(): line for line in axis.lines}
     assert np.abs(curves["poles"].get_xdata()) == pytest.approx(np.abs(model.poles.real))
     # force to acceleration: two zeros at nothing

@@ -10,12 +10,13 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from analysis import InductionMotor, Inputs, simulate
-from analysis.periodic.floquet import Crossing, Stability
-from analysis.periodic.orbits import (
+from analysis.periodic import (
+    Crossing,
     Drive,
     OrbitAssemblyError,
     OrbitError,
     PeriodicOrbit,
+    Stability,
     find_orbit,
     largest_multipliers,
     orbit_of,
@@ -239,7 +240,7 @@ def test_limit_of_assembly_is_an_error_of_its_own() -> None:
         find_orbit(TABLE_3_1, speed=SPEED, start=(1.0, 0.0))
 
 
-def test_a_crank_that_stalls_is_told() -> None:
+def test_a_crank_that_stalls_is_reported() -> None:
     with pytest.raises(OrbitError, match="comes to rest"):
         find_orbit(TABLE_3_1, torque=-2.0, start=(0.0, 0.0, 5.0), settle=False)
 

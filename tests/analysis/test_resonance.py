@@ -14,16 +14,18 @@ import numpy as np
 import pytest
 
 from analysis import Inputs, simulate
-from analysis.periodic import resonance
-from analysis.periodic.floquet import Crossing, Stability
-from analysis.periodic.orbits import Drive, OrbitError
-from analysis.periodic.resonance import (
+from analysis.periodic import (
+    Crossing,
+    Drive,
+    OrbitError,
     ResponseInterrupted,
-    approximations,
+    Stability,
     frequency_response,
     natural_frequency,
+    resonance,
     sweep,
 )
+from analysis.youssef import approximations
 from linkwork.errors import AssemblyError, InputError, ParameterError
 from linkwork.five_bar.published import RAD_S_PER_RPM, SETS, TABLE_3_1
 
@@ -187,7 +189,7 @@ def test_an_interrupt_keeps_what_was_followed(monkeypatch: pytest.MonkeyPatch) -
     assert "it was interrupted" in stopped.value.response.problems[0]
 
 
-def test_one_end_without_an_orbit_is_a_problem_that_is_told() -> None:
+def test_one_end_without_an_orbit_is_a_problem_that_is_reported() -> None:
     drive = Drive(speed=SETS["table-3.1"].crank_speed)
     response = frequency_response(TABLE_3_1, 200.0, 1200.0, vary="slider.stiffness", drive=drive, doubled=False)
     assert "slider.stiffness = 200 N/m" in response.problems[0]

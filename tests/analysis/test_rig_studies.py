@@ -16,8 +16,7 @@ from click.testing import CliRunner
 
 from analysis import Inputs, simulate
 from analysis.cli import main
-from analysis.periodic.floquet import Crossing
-from analysis.periodic.resonance import natural_frequency
+from analysis.periodic import Crossing, natural_frequency
 from analysis.studies import _friction, _rig_1, _rig_2, fig_8_15, fig_8_16, fig_8_21
 from analysis.studies._orbits import between, columns_of, highest, orbit, rpm
 from analysis.studies._runs import rig_1, steady_turn

@@ -12,14 +12,7 @@ import pytest
 from scipy.linalg import expm
 
 from analysis import Inputs, simulate
-from analysis.linear.linearise import (
-    find_equilibria,
-    find_equilibrium,
-    linearise,
-    linearise_along,
-    settled_motion,
-)
-from analysis.linear.slider_control import (
+from analysis.linear import (
     DesignError,
     LoopResult,
     SampledController,
@@ -27,8 +20,13 @@ from analysis.linear.slider_control import (
     design_lqr,
     design_pi,
     design_pid,
+    find_equilibria,
+    find_equilibrium,
     largest_difference,
+    linearise,
+    linearise_along,
     predict_loop,
+    settled_motion,
 )
 from linkwork.errors import InputError, UnknownNameError
 from linkwork.five_bar import dynamics
@@ -152,7 +150,7 @@ def test_designs_that_cannot_be(held, hanging) -> None:
         design_lqr(held, WEIGHTS, integral=-1.0)
 
 
-def test_a_crank_that_no_slider_force_holds_is_told() -> None:
+def test_a_crank_that_no_slider_force_holds_is_reported() -> None:
     """Without gravity a free crank turns as it likes: its double pole at zero is out of the slider's reach, or nearly."""
     horizontal = SETS["rig-2-spring-c"].parameters
     rest = find_equilibrium(horizontal, guess=(0.0, 0.0))
@@ -347,7 +345,7 @@ def test_the_fmu_runs_the_same_loop(fmu, held) -> None:
     assert outside.trajectory.values == pytest.approx(inside.trajectory.values, abs=1e-9)
 
 
-def test_bad_loops_are_told(held) -> None:
+def test_bad_loops_are_reported(held) -> None:
     design = design_lqr(held, WEIGHTS)
     for period in (0.0, float("nan")):
         with pytest.raises(InputError, match="sampling period is"):
@@ -404,7 +402,7 @@ def test_metrics_of_a_known_run() -> None:
     assert down.metrics(band=0.05).overshoot == pytest.approx(0.2)
 
 
-def test_bad_metrics_are_told() -> None:
+def test_bad_metrics_are_reported() -> None:
     run = result([0.0, 0.5, 1.0])
     with pytest.raises(InputError, match="band of settling"):
         run.metrics(band=0.0)

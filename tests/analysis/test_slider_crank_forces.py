@@ -14,10 +14,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
-from analysis.files.io import write_csv
 from hypothesis import given
 from hypothesis import strategies as st
 
+from analysis.files import write_csv
 from analysis.slider_crank import (
     FRAMES,
     JOINTS,

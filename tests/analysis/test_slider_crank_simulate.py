@@ -13,14 +13,13 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
 from analysis import Event, Inputs, Trajectory, compare, simulate, simulate_many
-from analysis.linear.linearise import linearise
+from analysis.linear import linearise
 from analysis.mechanisms import MECHANISMS, OUTPUT_UNITS
-from analysis.periodic.orbits import drive_of, find_orbit
-from analysis.periodic.resonance import natural_frequency
+from analysis.periodic import drive_of, find_orbit, natural_frequency
 from analysis.run import CASES as CHECKS
-from analysis.run import Case, Function, Harmonics, Inputs, TorsionBar, published_case, steps
+from analysis.run import Case, Function, Harmonics, TorsionBar, published_case, steps
 from analysis.run.inputs import encode
-from analysis.youssef.workspace import coupler_curve
+from analysis.youssef import coupler_curve
 from linkwork.errors import AssemblyError, InputError, ParameterError
 from linkwork.five_bar.parameters import InitialState as FiveBarState
 from linkwork.five_bar.published import TABLE_3_1

@@ -11,15 +11,8 @@ import pytest
 pytest.importorskip("casadi")
 
 from analysis.numerics.fourier import FourierSeries
-from analysis.youssef.slider_equation import (
-    NO_LOAD,
-    Load,
-    SliderEquation,
-    Variant,
-    balance,
-    mean_effective_mass,
-    slider_equation,
-)
+from analysis.periodic import mean_effective_mass
+from analysis.youssef import NO_LOAD, Load, SliderEquation, Variant, balance, slider_equation
 from linkwork.errors import AssemblyError, InputError
 from linkwork.five_bar import dynamics, kinematics
 from linkwork.five_bar.parameters import FiveBarParameters

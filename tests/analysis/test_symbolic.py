@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import sys
 from functools import cache
 from typing import Any
@@ -10,9 +9,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from analysis.mechanisms import FIVE_BAR
 from analysis.numerics import symbolic
+from analysis.run import constants, traced
 from linkwork import friction
-from linkwork.errors import LinkworkError
 from linkwork.five_bar import dynamics, kinematics
 from tests.strategies import seeded
 
@@ -20,27 +20,26 @@ casadi = pytest.importorskip("casadi")
 
 
 @cache
-def traced() -> dict[str, Any]:
+def functions() -> dict[str, Any]:
     """CasADi functions of state, inputs and constants."""
     plant = traced(FIVE_BAR)
     x, u = casadi.SX.sym("x", 6), casadi.SX.sym("u", 6)
-    p, constants = constants(FIVE_BAR)
+    p, k = constants(FIVE_BAR)
     state, inputs = tuple(casadi.vertsplit(x)), dynamics.Inputs(*casadi.vertsplit(u))
-    derivative = casadi.vertcat(*plant.derivative(state, inputs, constants))
-    outputs = casadi.vertcat(*plant.outputs(state, inputs, 0.25, constants))
-    jumped = casadi.vertcat(*plant.jump_speed(state, u[0], constants))
+    derivative = casadi.vertcat(*plant.derivative(state, inputs, k))
+    outputs = casadi.vertcat(*plant.outputs(state, inputs, 0.25, k))
+    jumped = casadi.vertcat(*plant.jump_speed(state, u[0], k))
     jacobian = casadi.densify(casadi.jacobian(derivative, x))
     return {
         "derivative": casadi.Function("derivative", [x, u, p], [derivative]),
         "outputs": casadi.Function("outputs", [x, u, p], [outputs]),
         "jump": casadi.Function("jump", [x, u, p], [jumped]),
         "jacobian": casadi.Function("jacobian", [x, u, p], [jacobian]),
-        "both": casadi.Function("both", [x, u, p], [derivative, jacobian], {"cse": True}),
     }
 
 
 def numbers(function: str, *arguments: Any) -> np.ndarray:
-    return np.asarray(traced()[function](*(casadi.DM(list(a)) for a in arguments))).squeeze()
+    return np.asarray(functions()[function](*(casadi.DM(list(a)) for a in arguments))).squeeze()
 
 
 @pytest.mark.parametrize("seed", range(25))
@@ -73,33 +72,6 @@ def test_jacobian_is_that_of_differences(seed: int) -> None:
     assert np.all(np.abs(exact - differences) <= 1e-4 * size + 1e-9)
 
 
-@pytest.mark.parametrize("seed", range(10))
-def test_straight_line_python_has_the_values_of_the_traced_function(seed: int) -> None:
-    space = {name: getattr(math, name) for name in ("sin", "cos", "sqrt", "tanh", "atan2", "fabs")}
-    exec(symbolic.source(traced()["both"], "both"), space)
-    case = seeded(seed)
-    p = case.parameters.constants()
-    written = space["both"](case.state, case.torque_inputs, p)  # type: ignore[operator]
-    assert len(written) == 42
-    assert written[:6] == pytest.approx(dynamics.derivative(case.state, case.torque_inputs, p), rel=1e-11)
-    # column by column
-    expected = numbers("jacobian", case.state, case.torque_inputs, p)
-    assert pytest.approx(expected, rel=1e-11, abs=1e-12) == np.reshape(written[6:], (6, 6)).T
-
-
-def test_a_sparse_output_is_refused() -> None:
-    x = casadi.SX.sym("x", 2)
-    f = casadi.Function("f", [x], [casadi.jacobian(x, x)])
-    with pytest.raises(LinkworkError, match="structural zeros"):
-        symbolic.source(f, "f")
-
-
-def test_an_operation_without_counterpart_is_refused() -> None:
-    x = casadi.SX.sym("x")
-    with pytest.raises(LinkworkError, match="no counterpart"):
-        symbolic.source(casadi.Function("f", [x], [casadi.erf(x)]), "f")
-
-
 def test_without_casadi_the_error_names_the_extra(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "casadi", None)
     with pytest.raises(symbolic.MissingLibraryError, match=r"linkwork\[symbolic\]"):
@@ -114,6 +86,6 @@ def test_nothing_of_the_plain_modules_is_changed() -> None:
 
 def test_traced_function_becomes_c_code(tmp_path: Any) -> None:
     generator = casadi.CodeGenerator("five_bar.c")
-    generator.add(traced()["derivative"])
+    generator.add(functions()["derivative"])
     generator.generate(f"{tmp_path}/")
     assert "derivative" in (tmp_path / "five_bar.c").read_text(encoding="utf-8")

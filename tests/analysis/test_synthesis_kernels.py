@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from analysis.mechanisms import FIVE_BAR
 from analysis.numerics import symbolic
 from analysis.synthesis.kernels import (
     COLUMNS,

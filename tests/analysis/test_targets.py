@@ -7,12 +7,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from analysis.files.io import read_points, write_csv
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import quad
 from scipy.special import ellipe
 
+from analysis.files import read_points, write_csv
 from analysis.synthesis import TargetPath, distance_to, function_from_formula, path_from_formula
 from analysis.synthesis.targets import even_odd_area, formula
 from linkwork.errors import InputError, ParameterError, UnknownNameError

@@ -8,8 +8,15 @@ from math import inf, pi
 import numpy as np
 import pytest
 
-from analysis.linear.linearise import find_equilibrium, linearise, linearise_along
-from analysis.linear.slider_control import SampledController, control_loop, design_lqr, design_pid
+from analysis.linear import (
+    SampledController,
+    control_loop,
+    design_lqr,
+    design_pid,
+    find_equilibrium,
+    linearise,
+    linearise_along,
+)
 from analysis.motion import TrackingController, inverse_dynamics, track
 from analysis.numerics.fourier import FourierSeries
 from linkwork.errors import AssemblyError, InputError
@@ -148,7 +155,7 @@ def test_force_and_power_are_those_of_inverse_dynamics(pid) -> None:
 
 
 def test_feedback_alone_holds_a_still_slider_as_the_control_loop_does(model) -> None:
-    """A reference that stands still: the law is that of `slider_control` as it is there."""
+    """A reference that stands still: the law is that of a `SampledController` as it is there."""
     still = FourierSeries.constant(0.003)
     design = design_lqr(model, {"slider.position": 1e7, "slider.velocity": 1e2}, integral=1e9)
     start = InitialState(slider_position=0.0)

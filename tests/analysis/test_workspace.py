@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from analysis.youssef.workspace import accessible, accessible_area, coupler_curve, coupler_curves
+from analysis.youssef import accessible, accessible_area, coupler_curve, coupler_curves
 from linkwork.errors import InputError
 from linkwork.five_bar import kinematics
 from linkwork.five_bar.parameters import FiveBarParameters

@@ -13,8 +13,7 @@ from click.core import ParameterSource
 from linkwork.slider_crank.assembly import check_assembly
 
 from ... import slider_crank as analysis
-from ..common import CHECK_FAILED, console, errors, show_table, tolerance_option
-from ..common import print_written
+from ..common import CHECK_FAILED, console, errors, print_written, show_table, tolerance_option
 from .options import Chosen, Problem, about_mechanism, out_option, with_problem
 
 

@@ -10,8 +10,7 @@ import click
 
 from ... import figures
 from ... import slider_crank as analysis
-from ..common import console, show_table
-from ..common import print_written
+from ..common import console, print_written, show_table
 from .options import Chosen, about_mechanism, angle_text, out_option, quantity
 
 

@@ -17,6 +17,7 @@ from linkwork.slider_crank.parameters import SliderCrankParameters
 from linkwork.slider_crank.published import RAD_S_PER_RPM, SETS
 
 from ... import slider_crank as analysis
+from ...mechanisms import SLIDER_CRANK
 from ..common import changes, errors, handled, number_or_text
 
 if TYPE_CHECKING:
@@ -135,7 +136,7 @@ class _MechanismOptions:
         if self.speed is not None:
             speed = quantity(self.speed, "rad/s", "--speed")
         if values:
-            changed = parameters_from(values, parameters)
+            changed = parameters_from(values, SLIDER_CRANK, parameters)
             assert isinstance(changed, SliderCrankParameters)
             parameters = changed
         self._check_groove(parameters, values)

@@ -14,8 +14,7 @@ from linkwork.errors import InputError
 
 from ... import figures
 from ... import slider_crank as analysis
-from ..common import console, show_table
-from ..common import print_written
+from ..common import console, print_written, show_table
 from .options import Chosen, Problem, Units, about_mechanism, note, out_option, plot_option, quantity, with_problem
 
 if TYPE_CHECKING:

@@ -14,7 +14,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from enum import StrEnum
-from functools import cache
+from functools import cache, partial
 from math import isfinite, pi, sqrt
 from types import MappingProxyType
 from typing import NamedTuple
@@ -26,8 +26,10 @@ from linkwork.errors import AssemblyError, InputError
 from linkwork.five_bar.parameters import Constants, FiveBarParameters
 from linkwork.limits import LIMIT_SINE
 
+from ..mechanisms import FIVE_BAR
 from ..numerics import symbolic
 from ..numerics.fourier import FourierSeries
+from ..run import constants, traced
 
 #: Part of the largest amplitude that the harmonics left out of the exact coefficients have at most.
 NEGLIGIBLE = 1e-13
@@ -135,14 +137,10 @@ def _traced() -> dict[str, Callable[..., tuple[NDArray[np.float64], ...]]]:
     first = [casadi.jacobian(value, p.l2) for value in rest]
     second = [0.5 * casadi.jacobian(value, p.l2) for value in first]
     outputs = {"balance": (arguments, balance), "taylor": ([angle, w, columns, load], rest + first + second)}
-    space: dict[str, Callable[..., tuple[NDArray[np.float64], ...]]] = {
-        name: getattr(np, name) for name in ("sin", "cos", "sqrt", "tanh", "fabs")
+    return {
+        name: partial(symbolic.over, casadi.Function(name, ins, [casadi.densify(out) for out in outs], {"cse": True}))
+        for name, (ins, outs) in outputs.items()
     }
-    space["atan2"] = np.arctan2
-    for name, (ins, outs) in outputs.items():
-        function = casadi.Function(name, ins, [casadi.densify(out) for out in outs], {"cse": True})
-        exec(symbolic.source(function, name), space)
-    return {name: space[name] for name in outputs}
 
 
 def balance(
@@ -330,15 +328,3 @@ def _taylor(
     values = np.tensordot(weights * p.l2 ** np.arange(order + 1), terms.reshape(3, 3, 8)[: order + 1], axes=1)
     mass, stiffness, force = (FourierSeries.from_samples(value, order) for value in values)
     return mass, stiffness, force
-
-
-def mean_effective_mass(parameters: FiveBarParameters) -> float:
-    """Mean over a turn of what moves with the slider at u = 0, m22 (kg).
-
-    Raises
-    ------
-    AssemblyError
-        If at u = 0 the links cannot be joined over the whole turn.
-    """
-    p = parameters.constants()
-    return _exact(p, 1.0, NO_LOAD, 0)[0].mean

@@ -19,7 +19,7 @@ from linkwork.errors import AssemblyError, InputError, LinkworkError
 from linkwork.five_bar.parameters import FiveBarParameters
 
 from ..numerics.fourier import FourierSeries
-from .slider_equation import NO_LOAD, Balance, Load, SliderEquation, Variant, balance, require_speed, slider_equation
+from .equation import NO_LOAD, Balance, Load, SliderEquation, Variant, balance, require_speed, slider_equation
 
 #: Orders that the nonlinear balance goes through where none is given.
 ORDERS = (8, 16, 32, 64, 128, 256)

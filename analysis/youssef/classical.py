@@ -1,0 +1,85 @@
+"""The classical approximations of the slider's amplitude over the speed, from the linear equation about u = 0."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from linkwork.errors import InputError
+from linkwork.five_bar.parameters import FiveBarParameters
+
+from ..periodic import Response
+from .equation import Load, Variant, slider_equation
+from .harmonics import harmonic_balance
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Approximations:
+    """Amplitudes by the classical approximations over the speed, from the linear equation about u = 0.
+
+    Attributes
+    ----------
+    parameters : FiveBarParameters
+        Without Coulomb friction, which a linear equation cannot hold.
+    load : Load
+        Constant forces.
+    speed : ndarray, shape (m,)
+        rad/s.
+    amplitudes : mapping
+        Half the range of u (m) by the name of the approximation, each of shape (m,).
+    """
+
+    parameters: FiveBarParameters
+    load: Load
+    speed: NDArray[np.float64]
+    amplitudes: Mapping[str, NDArray[np.float64]]
+
+    def at(self, speed: float) -> dict[str, float]:
+        """The approximations at a speed (rad/s), not interpolated."""
+        return _approximate(self.parameters, speed, self.load)
+
+    def columns(self) -> dict[str, NDArray[np.float64]]:
+        """As a table, by name with unit."""
+        return {"drive.speed [rad/s]": self.speed} | {f"{name} [m]": v for name, v in self.amplitudes.items()}
+
+
+def approximations(response: Response, points: int = 160) -> Approximations:
+    """The classical approximations over the range of a response: two harmonics as printed and put right, and ten harmonics.
+
+    Raises
+    ------
+    InputError
+        If it is not the speed that varies.
+    """
+    if response.family.vary != "drive.speed":
+        raise InputError(f"{response.family.name} varies: the approximations are over the speed")
+    parameters = replace(response.family.parameters, slider_coulomb_friction=0.0)
+    drive = response.family.drive
+    load = Load(x=drive.load_x, y=drive.load_y, slider=drive.slider_force)
+    speeds = np.linspace(response.low, response.high, points)
+    rows = [_approximate(parameters, speed, load) for speed in speeds.tolist()]
+    return Approximations(
+        parameters=parameters,
+        load=load,
+        speed=speeds,
+        amplitudes={name: np.array([row[name] for row in rows]) for name in rows[0]},
+    )
+
+
+#: Approximations by name: variant of the linear equation and harmonics balanced.
+_APPROXIMATIONS = {
+    "two harmonics, printed (4.21)": (Variant.PRINTED, 2),
+    "two harmonics": (Variant.SECOND_ORDER, 2),
+    "ten harmonics": (Variant.EXACT, 10),
+}
+
+
+def _approximate(parameters: FiveBarParameters, speed: float, load: Load) -> dict[str, float]:
+    return {
+        name: parameters.rocker_length
+        * harmonic_balance(slider_equation(parameters, speed, variant=variant, load=load), order).amplitude
+        for name, (variant, order) in _APPROXIMATIONS.items()
+    }
