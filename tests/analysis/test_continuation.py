@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from analysis.numerics.continuation import ContinuationError, Evaluation, Follower, Point, Settings
+from analysis.numerics.continuation import ContinuationError, Evaluation, Follower, Point, Reason, Settings
 from linkwork.errors import AssemblyError, InputError
 
 
@@ -84,6 +84,34 @@ def test_where_the_equation_ends_the_curve_stalls_at_the_last_good_point() -> No
     assert "stalls" in result.reason
     assert "the links part" in result.reason
     assert 0.499 < result.points[-1].parameter <= 0.5
+
+
+@pytest.mark.parametrize("secant", [False, True])
+def test_a_curve_ends_exactly_on_a_bound_beyond_which_nothing_is_evaluated(secant: bool) -> None:
+    seen: list[tuple[float, float]] = []
+
+    def evaluate(y: np.ndarray, parameter: float) -> Evaluation:
+        seen.append((float(y[0]), parameter))
+        return CIRCLE(y, parameter)
+
+    settings = Settings(low=-2.0, high=2.0, bounds={0: (-0.5, 1.5)}, greatest=0.05)
+    f = Follower(evaluate, [1.0], settings, (lambda y, b: evaluate(y, b).residual) if secant else None)
+    first = f.start([1.0], 0.0, 1)
+    for begin, side in ((first, 1.0), (first.turned(), -1.0)):
+        result = f.follow(begin)
+        assert result.end is Reason.BOX
+        assert result.points[-1].y[0] == -0.5
+        assert result.points[-1].parameter == pytest.approx(side * np.sqrt(0.75), abs=1e-9)
+    assert all(-0.5 <= y <= 1.5 for y, _ in seen)
+
+
+def test_an_oriented_curve_ends_where_it_meets_another() -> None:
+    lines = curve(lambda y, b: y * y - b * b, lambda y, b: 2 * y, lambda y, b: -2 * b)
+    for oriented, end in ((True, Reason.TIP), (False, Reason.BOX)):
+        f = follower(lines, -1.0, 1.0, oriented=oriented, least=1e-6)
+        result = f.follow(f.start([-0.9], -0.9, 1))
+        assert result.end is end
+        assert result.points[-1].parameter == pytest.approx(0.0 if oriented else 1.0, abs=1e-3)
 
 
 def test_the_most_points_are_reported() -> None:
