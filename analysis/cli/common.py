@@ -134,8 +134,7 @@ def changes(settings: Sequence[str], read: Callable[[str], Any], example: str) -
 
 def chosen_case(file: str | None, published: str | None, settings: Sequence[str]) -> Any:
     """The case of a file or a published set, with the changes of ``--set``."""
-    from ..run import published_case
-    from ..run.case_files import case_from, load_case
+    from ..run import case_from, load_case, published_case
 
     if (file is None) == (published is None):
         raise click.UsageError("give either a case file or --published NAME")

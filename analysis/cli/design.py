@@ -138,7 +138,7 @@ def write_solution(
     """Everything about one solution: drawing, curve, report, parameters and a case that runs; what was written."""
     from .. import figures
     from ..files import save_figure, write_tables
-    from ..run.case_files import save_parameters
+    from ..run import save_parameters
     from ..synthesis import SecondCrank
 
     written = write_described(solution, folder, title, curve="best-curve", text="best-report", drawn="best")

@@ -226,8 +226,7 @@ def _cases_to_check(names: Sequence[str], fmu: str | None, everything: bool) -> 
     Where an FMU is named, the standard cases are those of its mechanism.
     """
     from ..mechanisms import mechanism_of
-    from ..run import CASES
-    from ..run.case_files import load_case
+    from ..run import CASES, load_case
 
     if not names or everything:
         model = None if fmu is None else _model_name(Path(fmu))
@@ -306,7 +305,7 @@ def info(what: str | None) -> None:
     from linkwork.five_bar.published import RAD_S_PER_RPM
 
     from ..numerics.codegen import cache_root
-    from ..run.case_files import load_case
+    from ..run import load_case
 
     if what is None:
         sets = [(name, entry.source, f"{entry.crank_speed / RAD_S_PER_RPM:g}") for name, entry in PUBLISHED.items()]

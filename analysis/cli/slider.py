@@ -189,7 +189,7 @@ def _dynamics(chosen: SliderCase, solution: Solution, folder: Path, plots: bool)
     """Force, torque and pin forces; a case that runs; then the run under control and the least effort, where asked for."""
     from ..files import write_csv, write_tables
     from ..motion import run_case
-    from ..run.case_files import save_parameters
+    from ..run import save_parameters
     from ..synthesis import SliderMotion
 
     title = chosen.synthesis.title

@@ -33,7 +33,7 @@ from ..files import (
     text,
 )
 from ..linear import design_pid, linearise_along
-from ..run.case_files import parameters_to
+from ..run import parameters_to
 from ..synthesis import (
     ANGLES,
     LENGTHS,

@@ -26,8 +26,8 @@ from linkwork.five_bar.variables import OUTPUT_NAMES
 
 from ..linear import UNITS
 from ..mechanisms import FIVE_BAR
-from ..run import outputs_of
 from ..numerics.fourier import FourierSeries
+from ..run import outputs_of
 
 FloatArray = NDArray[np.float64]
 #: Force at P (N, N): constant, or a function of the crank angle (rad).

@@ -86,7 +86,7 @@ def grid_folder() -> Path:
 
 def _sources() -> bytes:
     """What the rows depend on beside their arguments: the plant's sources, by the cache's name, and those used here."""
-    digest = hashlib.sha256(cache_folder().name.encode())
+    digest = hashlib.sha256(machine(FIVE_BAR).fingerprint.encode())
     for module in (orbit_kernels, orbits, floquet):
         digest.update(inspect.getsource(module).encode())
     return digest.digest()

@@ -6,12 +6,11 @@ dimension is checked. Names are those of the FMI contract: ``[slider] stiffness`
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
 from functools import partial
-from math import pi
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from linkwork.errors import InputError, MissingParameterError, ParameterError
 from linkwork.mechanism import Mechanism
@@ -19,7 +18,7 @@ from linkwork.parameters import field_name
 
 from .. import files
 from ..files import Choice, Kinds, Many, Quantity, Reader, Table, Whole, entry
-from ..mechanisms import MECHANISMS, PUBLISHED, Parameters, mechanism_of
+from ..mechanisms import FIVE_BAR, MECHANISMS, PUBLISHED, Parameters, mechanism_of
 from ..units import with_unit
 from .case import Case
 from .inputs import Inputs
@@ -28,22 +27,26 @@ from .signals import Harmonics, InductionMotor, Piecewise, TorsionBar, ramp, tab
 # Parameters
 
 
-def parameters_from(data: Mapping[str, Any], mechanism: Mechanism, base: Parameters | None = None) -> Parameters:
+def parameters_from(
+    data: Mapping[str, Any], base: Parameters | None = None, mechanism: Mechanism | None = None
+) -> Parameters:
     """Parameters from nested tables or dotted names; what they leave out is taken from ``base``.
 
     Parameters
     ----------
     data : mapping
+    base : parameters of a mechanism, optional
     mechanism : Mechanism
-        Whose parameters they are.
-    base : optional
-        Parameters of the mechanism.
+        Whose parameters they are; with a base, the base's.
 
     Raises
     ------
     ParameterError
         If a name is unknown, a value is wrong, or, without a base, one is missing.
     """
+    if base is not None:
+        mechanism = mechanism_of(base)
+    assert mechanism is not None
     known = mechanism.mechanism_variables
     readers = {
         field_name(name): Whole() if variable.kind == "Integer" else Quantity(variable.unit)
@@ -57,9 +60,9 @@ def parameters_from(data: Mapping[str, Any], mechanism: Mechanism, base: Paramet
 
 
 def parameters_to(parameters: Parameters) -> dict[str, Any]:
-    """Parameters as nested tables of texts with SI units, every digit kept; those of the five-bar need no ``mechanism``."""
+    """Parameters as nested tables of texts with SI units, every digit kept; with the name of the ``mechanism``."""
     mechanism = mechanism_of(parameters)
-    data: dict[str, Any] = {} if mechanism is FIVE_BAR else {"mechanism": mechanism.name}
+    data: dict[str, Any] = {"mechanism": mechanism.name}
     for name, variable in mechanism.mechanism_variables.items():
         value = getattr(parameters, field_name(name))
         group, _, leaf = name.rpartition(".")
@@ -85,7 +88,7 @@ def load_parameters(path: str | Path) -> Parameters:
     """
     data = files.read_tables(path)
     mechanism = _mechanism_of(data)
-    return parameters_from({k: v for k, v in data.items() if k != "mechanism"}, mechanism)
+    return parameters_from({k: v for k, v in data.items() if k != "mechanism"}, mechanism=mechanism)
 
 
 def _mechanism_of(data: Mapping[str, Any]) -> Mechanism:
@@ -96,7 +99,7 @@ def _mechanism_of(data: Mapping[str, Any]) -> Mechanism:
     found = {name: len(names & set(mechanism.mechanism_variables)) for name, mechanism in MECHANISMS.items()}
     best = [name for name, count in found.items() if count == max(found.values())]
     if len(best) > 1:
-        raise ParameterError("mechanism", "missing", f"be one of {', '.join(MECHANISMS)}")
+        raise ParameterError("mechanism", "missing", f"be given: one of {', '.join(MECHANISMS)}")
     return MECHANISMS[best[0]]
 
 
@@ -106,31 +109,32 @@ def _mechanism_of(data: Mapping[str, Any]) -> Mechanism:
 COMMON = ("mechanism", "title", "published", "initial", "run")
 
 
-def acting(mechanism: Mechanism) -> dict[str, tuple[str, str]]:
-    """What can act on a mechanism, by its name in a case file: the argument of `Inputs` and the unit, "" for a flag.
+class Acting(NamedTuple):
+    """Something that acts on a mechanism: its name among the inputs of a run, and its unit; a flag has none."""
 
-    The name is that of the FMI input, or, where parameters stand in a table of that name, that of the argument.
+    argument: str
+    unit: str
+
+
+def acting_on(mechanism: Mechanism) -> dict[str, Acting]:
+    """What may act on a mechanism, by its name in case files.
+
+    That is the name of the FMI input, without its table if there are parameters in that: ``slider.force`` is ``force``. A flag
+    that drives a freedom stands in the table of the freedom's mode: ``axial.groove``.
     """
-    units = {v.name: v.unit for v in mechanism.variables}
     tables = {name.partition(".")[0] for name in mechanism.mechanism_variables}
-    channels = [channel for channel in mechanism.channels if channel.kind != "rate"]
-    # the way a freedom is driven has a table of its own, whatever else is called so
-    driven = _exclusive(mechanism)
-    known = {
-        (c.argument if c.name.partition(".")[0] in tables - driven else c.name): (c.argument, units[c.name])
-        for c in channels
-    }
-    arguments = {argument for argument, _ in known.values()}
+    units = {variable.name: variable.unit for variable in mechanism.variables}
+    found = {}
+    for channel in mechanism.channels:
+        if channel.kind != "rate":
+            table, _, leaf = channel.name.rpartition(".")
+            found[leaf if table in tables else channel.name] = Acting(channel.argument, units[channel.name])
+    channels = {channel.argument for channel in mechanism.channels}
     for mode in mechanism.modes:
-        known |= {
-            f"{mode.name.partition('.')[0]}.{flag}": (flag, "") for flag in mode.arguments if flag not in arguments
-        }
-    return known
-
-
-def _exclusive(mechanism: Mechanism) -> set[str]:
-    """Tables of which one entry counts, the way in which a freedom is driven."""
-    return {mode.name.partition(".")[0] for mode in mechanism.modes}
+        for flag in mode.arguments:
+            if flag not in channels:
+                found[f"{mode.name.rpartition('.')[0]}.{flag}"] = Acting(flag, "")
+    return found
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -142,10 +146,9 @@ class RunTable:
     step: float | None = entry(Quantity("s"), None)
     tolerance: float = entry(Quantity("1"), 1e-9)
 
-    def times(self, inputs: Inputs) -> tuple[float, float]:
+    def times(self, inputs: Inputs, mechanism: Mechanism) -> tuple[float, float]:
         """End of the run and distance of the samples (s), by default three turns at a constant speed, in 360 steps each."""
-        constant = isinstance(inputs.speed, (int, float)) and inputs.speed != 0.0
-        turn = 2.0 * pi / abs(inputs.speed) if constant else None
+        turn = _turn(inputs, mechanism)
         step = self.step if self.step is not None else 1e-3 if turn is None else turn / 360.0
         if self.stop_time is not None:
             if self.revolutions is not None:
@@ -155,9 +158,21 @@ class RunTable:
             return (3.0 if self.revolutions is None else self.revolutions) * turn, step
         if self.revolutions is None:
             raise MissingParameterError("run.stop_time")
-        raise ParameterError(
-            "run.revolutions", self.revolutions, "come with a constant drive.speed; give run.stop_time"
-        )
+        raise ParameterError("run.revolutions", self.revolutions, "come with a constant speed; give run.stop_time")
+
+
+def _command(mechanism: Mechanism) -> str | None:
+    """Name among the inputs of the command of the first freedom, such as the crank's speed."""
+    return next((c.argument for c in mechanism.channels if c.kind == "command" and c.freedom == 0), None)
+
+
+def _turn(inputs: Inputs, mechanism: Mechanism) -> float | None:
+    """Duration of a turn of the first freedom (s) where it turns at a constant speed."""
+    command, period = _command(mechanism), mechanism.freedoms[0].period
+    parts = () if command is None else inputs.parts(command)
+    if len(parts) != 1 or not isinstance(parts[0], (int, float)) or parts[0] * period == 0.0:
+        return None
+    return period / abs(parts[0])
 
 
 def load_case(path: str | Path, overrides: Mapping[str, Any] | None = None) -> Case:
@@ -183,30 +198,38 @@ def case_from(
     data: Mapping[str, Any], *, folder: Path, title: str = "", overrides: Mapping[str, Any] | None = None
 ) -> Case:
     """A case from the tables of a case file; ``folder`` is where its CSV tables are looked for."""
-    exclusive = sorted(set().union(*map(_exclusive, MECHANISMS.values())))
-    data = files.overridden(data, overrides or {}, exclusive=exclusive)
-    published = PUBLISHED[Choice(PUBLISHED)(data["published"], "published")] if "published" in data else None
-    mechanism = _mechanism_of(data) if published is None else mechanism_of(published.parameters)
-    if data.get("mechanism", mechanism.name) != mechanism.name:
-        raise ParameterError("mechanism", data["mechanism"], f"be that of the published set {data['published']}")
-    other = {*COMMON, *(name.partition(".")[0] for name in acting(mechanism))}
+    named = {**data, **(overrides or {})}
+    published = PUBLISHED[Choice(PUBLISHED)(named["published"], "published")] if "published" in named else None
+    mechanism = _mechanism_of(named) if published is None else mechanism_of(published.parameters)
+    if named.get("mechanism", mechanism.name) != mechanism.name:
+        raise ParameterError("mechanism", named["mechanism"], f"be that of the published set {named['published']}")
+    acting = acting_on(mechanism)
+    tables = {name.partition(".")[0] for name in acting}
+    driving = {mode.name.rpartition(".")[0] for mode in mechanism.modes} & tables
+    data = files.overridden(data, overrides or {}, exclusive=driving)
     parameters = parameters_from(
-        {name: value for name, value in data.items() if name not in other},
-        mechanism,
+        {name: value for name, value in data.items() if name not in tables and name not in COMMON},
         None if published is None else published.parameters,
+        mechanism,
     )
     initial = files.read(
         mechanism.initial,
         data.get("initial", {}),
         "initial",
         readers={name: Quantity(v.unit) for name, v in mechanism.initial_variables.items()},
-        # but for the speed that the drive gives
-        base=None if published is None else replace(published.initial, **{mechanism.freedoms[0].initial[1]: 0.0}),
+        # a five-bar's published start is at rest but for the speed, which the drive gives
+        base=None if published is None or mechanism is FIVE_BAR else published.initial,
     )
-    inputs = _inputs(data, mechanism, folder, None if published is None else published.crank_speed)
-    _check_shift(inputs, parameters, initial)
-    run = files.read(RunTable, data.get("run", {}), "run")
-    stop_time, step = run.times(inputs)
+    readers = {name: _reader(unit, folder) for name, (_, unit) in acting.items()}
+    found = _found(data, readers, driving)
+    given = {acting[name].argument: value for name, value in found.items()}
+    command, mode = _command(mechanism), mechanism.freedoms[0].mode
+    if published is not None and command is not None and mode is not None and not given.keys() & set(mode.arguments):
+        given[command] = published.crank_speed
+    inputs = Inputs(**given)
+    _check_drives(mechanism, inputs, parameters, initial)
+    run: RunTable = files.read(RunTable, data.get("run", {}), "run")
+    stop_time, step = run.times(inputs, mechanism)
     return Case(
         title=str(data.get("title", title)),
         parameters=parameters,
@@ -218,36 +241,36 @@ def case_from(
     )
 
 
-def _inputs(data: Mapping[str, Any], mechanism: Mechanism, folder: Path, speed: float | None) -> Inputs:
-    """What acts on a mechanism; where nothing is said of the drive the crank turns at ``speed``."""
-    known, exclusive = acting(mechanism), _exclusive(mechanism)
-    readers = {name: _reader(unit, folder) for name, (_, unit) in known.items()}
-    found = {name: readers[name](data[name], name) for name in known if name in data}
-    for group in dict.fromkeys(name.partition(".")[0] for name in known if "." in name):
-        inside = {
-            name.removeprefix(f"{group}."): reader for name, reader in readers.items() if name.startswith(f"{group}.")
-        }
+def _found(data: Mapping[str, Any], readers: Mapping[str, Reader], driving: Collection[str]) -> dict[str, Any]:
+    """What is said of what acts, by its name in the file; of the tables of ``driving`` one entry may be given."""
+    found = {name: reader(data[name], name) for name, reader in readers.items() if name in data}
+    for group in dict.fromkeys(name.partition(".")[0] for name in readers if "." in name):
+        inside = {name.removeprefix(f"{group}."): r for name, r in readers.items() if name.startswith(f"{group}.")}
         values: dict[str, Any] = files.read(dict, data.get(group, {}), group, readers=inside)
-        if group in exclusive and len(values) > 1:
+        if group in driving and len(values) > 1:
             raise ParameterError(group, ", ".join(data[group]), f"have only one of {', '.join(inside)}")
         found |= {f"{group}.{name}": value for name, value in values.items()}
-    if speed is not None and not data.get("drive"):
-        found["drive.speed"] = speed
-    return Inputs(**{known[name][0]: value for name, value in found.items()})
+    return found
 
 
-def _check_shift(inputs: Inputs, parameters: Any, initial: Any) -> None:
-    """Make sure that what is said of a slider-crank's shift has an effect."""
-    if not hasattr(initial, "shift_velocity"):
-        return
-    if inputs.groove and parameters.groove_amplitude == 0.0:
+def _check_drives(mechanism: Mechanism, inputs: Inputs, parameters: Any, initial: Any) -> None:
+    """Make sure that what is said of a freedom has an effect."""
+    if inputs.parts("groove") and parameters.groove_amplitude == 0.0:
         raise ParameterError(
             "groove.amplitude", 0.0, "be given with axial.groove: a groove without it holds the shift at zero"
         )
-    if inputs.axial_force is None and not inputs.groove and inputs.shift_speed is None and initial.shift_velocity:
-        raise ParameterError(
-            "initial.shift_velocity", initial.shift_velocity, "come with axial.force: the shift is held"
-        )
+    modes = inputs.modes(mechanism)
+    names = {argument: name for name, (argument, _) in acting_on(mechanism).items()}
+    for freedom in mechanism.freedoms:
+        rate = getattr(initial, freedom.initial[1])
+        if freedom.mode is None or rate == 0.0:
+            continue
+        chosen = freedom.mode.arguments[modes[freedom.mode.name]]
+        if not inputs.parts(chosen) and chosen in (c.argument for c in mechanism.channels if c.kind == "command"):
+            force = names[freedom.mode.arguments[0]]
+            raise ParameterError(
+                f"initial.{freedom.initial[1]}", rate, f"come with {force}: without it {freedom.coordinate} is held"
+            )
 
 
 # What acts

@@ -102,6 +102,7 @@ class Trajectory:
 
     def to_csv(self, path: str | Path) -> Path:
         """Write time and all outputs to a CSV file whose header has names and units."""
+        from ..files import write_csv
 
         columns = {"time [s]": self.time} | {f"{name} [{unit}]": self[name] for name, unit in self.units.items()}
         return write_csv(path, columns)

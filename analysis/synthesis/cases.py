@@ -31,7 +31,7 @@ from ..files import (
     table_of,
     text,
 )
-from ..run.case_files import parameters_to
+from ..run import parameters_to
 from ..units import with_unit
 from .case_tasks import points_of, task_from
 from .constraints import (

@@ -10,9 +10,18 @@ from pathlib import Path
 import pytest
 
 from analysis import simulate
-from analysis.mechanisms import PUBLISHED, mechanism_of
-from analysis.run import Harmonics, Piecewise, TorsionBar
-from analysis.run.case_files import load_case, load_parameters, parameters_from, parameters_to, save_parameters
+from analysis.mechanisms import mechanism_of
+from analysis.run import (
+    Harmonics,
+    Piecewise,
+    TorsionBar,
+    load_case,
+    load_parameters,
+    parameters_from,
+    parameters_to,
+    save_parameters,
+)
+from analysis.run.case import PUBLISHED
 from linkwork.errors import InputError, MissingParameterError, ParameterError, UnknownNameError
 from linkwork.five_bar.published import TABLE_3_1
 

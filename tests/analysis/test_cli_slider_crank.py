@@ -13,7 +13,7 @@ from matplotlib.text import Text
 
 from analysis import cli, figures
 from analysis.cli import slider_crank
-from analysis.run.case_files import save_parameters
+from analysis.run import save_parameters
 from analysis.slider_crank import ConstantShift, comparison, force_turn
 from linkwork.five_bar.published import TABLE_3_1
 from linkwork.slider_crank.published import CRANK_SPEED, INCH, parameters

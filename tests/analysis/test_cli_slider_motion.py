@@ -17,8 +17,7 @@ from analysis import motion as control
 from analysis.cli import slider
 from analysis.motion import SliderCase, linkage_from_csv, load_slider_case, motion_of_plant
 from analysis.numerics.fourier import FourierSeries
-from analysis.run import simulate
-from analysis.run.case_files import load_case, load_parameters
+from analysis.run import load_case, load_parameters, simulate
 from analysis.synthesis import (
     Linkage,
     Search,

@@ -16,8 +16,7 @@ from click.testing import CliRunner
 
 from analysis import cli, figures
 from analysis.numerics.symbolic import library
-from analysis.run import simulate
-from analysis.run.case_files import case_from, load_case, load_parameters
+from analysis.run import case_from, load_case, load_parameters, simulate
 from analysis.synthesis import (
     Assembly,
     FullTurn,

@@ -17,7 +17,6 @@ from linkwork.slider_crank.parameters import SliderCrankParameters
 from linkwork.slider_crank.published import RAD_S_PER_RPM, SETS
 
 from ... import slider_crank as analysis
-from ...mechanisms import SLIDER_CRANK
 from ..common import changes, errors, handled, number_or_text
 
 if TYPE_CHECKING:
@@ -103,7 +102,7 @@ class _MechanismOptions:
             If a file, a name or a value is wrong.
         """
         from ...files import unknown_name
-        from ...run.case_files import load_parameters, parameters_from
+        from ...run import load_parameters, parameters_from
         from ...units import quantity
 
         units = Units(self.units)
@@ -136,7 +135,7 @@ class _MechanismOptions:
         if self.speed is not None:
             speed = quantity(self.speed, "rad/s", "--speed")
         if values:
-            changed = parameters_from(values, SLIDER_CRANK, parameters)
+            changed = parameters_from(values, parameters)
             assert isinstance(changed, SliderCrankParameters)
             parameters = changed
         self._check_groove(parameters, values)
