@@ -38,7 +38,7 @@ PLACES = (
 COLUMNS = (*PLACES, "dx", "dy")
 
 
-@kernel(void(VECTOR, VECTOR, VECTOR, VECTOR, VECTOR, float64, MATRIX))
+@kernel(void(VECTOR, VECTOR, VECTOR, VECTOR, VECTOR, float64, MATRIX), purpose="the curves of linkages")
 def coupler_path(c, s, dx, dy, q, branch, out):  # type: ignore[no-untyped-def]
     """Coupler point in the plane: out[0] = x, out[1] = y, shape (2, n)."""
     l1, l2, l3, l4 = q[2], q[3], q[4], q[5]
@@ -57,7 +57,7 @@ def coupler_path(c, s, dx, dy, q, branch, out):  # type: ignore[no-untyped-def]
         y[j] = y0 + ay * c2 + ax * s2 + py * g.c3 + px * g.s3
 
 
-@kernel(void(VECTOR, VECTOR, VECTOR, VECTOR, VECTOR, float64, MATRIX, CUBE))
+@kernel(void(VECTOR, VECTOR, VECTOR, VECTOR, VECTOR, float64, MATRIX, CUBE), purpose="the curves of linkages")
 def coupler_path_jacobian(c, s, dx, dy, q, branch, out, jac):  # type: ignore[no-untyped-def]
     """The same, and its derivatives: jac[k, 0] = dx/d(k), jac[k, 1] = dy/d(k) for k in `COLUMNS`, shape (12, 2, n)."""
     l1, l2, l3, l4 = q[2], q[3], q[4], q[5]
@@ -107,7 +107,7 @@ def coupler_path_jacobian(c, s, dx, dy, q, branch, out, jac):  # type: ignore[no
         jac[11, 1, j] = g.s4 * ty
 
 
-@kernel(void(VECTOR, VECTOR, VECTOR, VECTOR, VECTOR, float64, MATRIX))
+@kernel(void(VECTOR, VECTOR, VECTOR, VECTOR, VECTOR, float64, MATRIX), purpose="the curves of linkages")
 def link_directions(c, s, dx, dy, q, branch, out):  # type: ignore[no-untyped-def]
     """Directions of coupler and rocker: out = c3, s3, c4, s4, c43, s43, shape (6, n)."""
     l1, l2, l3, l4 = q[2], q[3], q[4], q[5]
@@ -124,7 +124,7 @@ def link_directions(c, s, dx, dy, q, branch, out):  # type: ignore[no-untyped-de
         out[5, j] = g.s43
 
 
-@kernel(void(VECTOR, VECTOR, VECTOR, VECTOR, VECTOR, float64, MATRIX, CUBE))
+@kernel(void(VECTOR, VECTOR, VECTOR, VECTOR, VECTOR, float64, MATRIX, CUBE), purpose="the curves of linkages")
 def link_jacobian(c, s, dx, dy, q, branch, out, jac):  # type: ignore[no-untyped-def]
     """Angles of coupler and rocker from the ground link, out = th3, th4 in (-pi, pi], shape (2, n), and their derivatives.
 
@@ -158,7 +158,7 @@ def link_jacobian(c, s, dx, dy, q, branch, out, jac):  # type: ignore[no-untyped
         jac[11, 1, j] = g.s3 * w4
 
 
-@kernel(void(VECTOR, VECTOR, MATRIX, float64, complex128[:, ::1], complex128[:, ::1]))
+@kernel(void(VECTOR, VECTOR, MATRIX, float64, complex128[:, ::1], complex128[:, ::1]), purpose="the curves of linkages")
 def many_directions(c, s, shapes, branch, coupler, rocker):  # type: ignore[no-untyped-def]
     """Directions of coupler and rocker, from the ground link, of many four-bars at the same crank rotations.
 
@@ -176,7 +176,7 @@ def many_directions(c, s, shapes, branch, coupler, rocker):  # type: ignore[no-u
             rocker[i, j] = complex(g.c4, g.s4)
 
 
-@kernel(void(complex128[:, ::1], complex128[::1], int64[::1], int64[::1], MATRIX))
+@kernel(void(complex128[:, ::1], complex128[::1], int64[::1], int64[::1], MATRIX), purpose="the curves of linkages")
 def match_windows(curves, target, starts, spans, best):  # type: ignore[no-untyped-def]
     """The piece of each curve that a target looks most alike, up to a similarity: for open targets.
 
