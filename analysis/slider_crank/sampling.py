@@ -39,7 +39,7 @@ class Spread:
     ----------
     mean, deviation : masked array, shape (n,)
         Mean and standard deviation; masked where samples fall on both sides of a dead centre and the quantity has its pole
-        between them: there they do not exist, whatever a sum says.
+        between them: there they do not exist, although a sum of the samples does.
     percentiles : masked array, shape (p, n)
         At `PERCENTILES`; masked only where there is no sample.
     least, greatest : masked array, shape (n,)
@@ -322,7 +322,7 @@ def _statistics(values: FloatArray) -> tuple[Any, ...]:
     percentiles = values[below] + (places - below) * (values[below + 1] - values[below])
     low, high = values[0], values[-1]
     first, last = values[int(0.0005 * values.size)], values[int(0.9995 * (values.size - 1))]
-    # all samples alike have a bin of no width: a width that floats can tell is made
+    # all samples alike have a bin of no width: it is given a width that floats can represent
     edges = first + np.linspace(0.0, max(last - first, 1e-12 * max(abs(low), abs(high)), 1e-300), _BINS + 1)
     inside = np.searchsorted(values, edges[:-1])
     counts = np.diff(inside, append=np.searchsorted(values, edges[-1], "right"))

@@ -146,7 +146,7 @@ class _MechanismOptions:
         )
 
     def _check_groove(self, p: SliderCrankParameters, values: Mapping[str, Any]) -> None:
-        """Make sure that what is said of a groove has an effect."""
+        """Make sure that the options about a groove have an effect."""
         if self.groove is None:
             for name in values:
                 if name.startswith("groove."):

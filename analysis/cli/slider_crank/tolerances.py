@@ -21,7 +21,7 @@ from .options import Chosen, Problem, Units, about_mechanism, note, out_option, 
 if TYPE_CHECKING:
     from ...slider_crank import ForceTurn, MonteCarlo, Sensitivities, Tolerance
 
-#: Half widths where none are given: of each length, and of the twist.
+#: What is in error by default, and the half widths of lengths and of the twist.
 _TOLERANCES = ("crank.length", "rod.length", "guide.offset", "shift.position", "guide.twist")
 _WIDTHS = {"m": "0.25 mm", "rad": "0.1 deg"}
 
