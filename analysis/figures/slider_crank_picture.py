@@ -212,8 +212,10 @@ class _Scene:
 
     def _line(self, axis: Axes, points: ArrayLike, **look: Any) -> None:
         default: dict[str, Any] = {"color": GROUND, "linewidth": 1.0, "zorder": 4, "solid_capstyle": "round"}
-        self.lines.append(self.page(points).T)
-        axis.plot(*self.lines[-1], **default | look)
+        shown = self.page(points).T
+        axis.plot(*shown, **default | look)
+        # some thirty pieces of a curve will do for the letters
+        self.lines.append(shown[:, :: max(1, shown.shape[1] // 30)])
 
     def _solids(self, axis: Axes, pose: _Pose) -> None:
         u, s, pin = self.size, self.side, pose.slider_pin
