@@ -166,8 +166,9 @@ class _Scene:
         #: Rows: right and up on the page, and towards the eye, in the ground frame.
         self.view = np.array([right, np.cross(towards, right), towards])
         self.low, self.high = self._extent()
-        #: Points on the page that letters should keep clear of.
-        self.taken: list[FloatArray] = []
+        #: Points (n, 2) and lines (2, n) on the page that letters should keep clear of.
+        self.covered = np.empty((0, 2))
+        self.lines: list[FloatArray] = []
 
     def at(self, slide: float, x: float = 0.0, y: float = 0.0) -> FloatArray:
         """The point at a slider position, off the guide by x and y of frame 4."""
@@ -201,7 +202,7 @@ class _Scene:
 
     def draw(self, axis: Axes, pose: _Pose, *, letters: bool = True) -> None:
         """Draw everything at one configuration."""
-        self.taken = []
+        self.lines = []
         self._centre_lines(axis, pose)
         self._paths(axis, pose, letters)
         self._solids(axis, pose)
@@ -210,13 +211,11 @@ class _Scene:
             self._letters(axis, pose)
 
     def _line(self, axis: Axes, points: ArrayLike, **look: Any) -> None:
-        shown = self.page(points)
         default: dict[str, Any] = {"color": GROUND, "linewidth": 1.0, "zorder": 4, "solid_capstyle": "round"}
-        axis.plot(*shown.T, **default | look)
-        if len(shown) > 1:
-            way = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(shown, axis=0), axis=1)))
-            places = np.linspace(0.0, way[-1], max(2, ceil(2.5 * way[-1] / self.size)))
-            self.taken.append(np.column_stack([np.interp(places, way, x) for x in shown.T]))
+        shown = self.page(points).T
+        axis.plot(*shown, **default | look)
+        # some thirty pieces of a curve will do for the letters
+        self.lines.append(shown[:, :: max(1, shown.shape[1] // 30)])
 
     def _solids(self, axis: Axes, pose: _Pose) -> None:
         u, s, pin = self.size, self.side, pose.slider_pin
@@ -242,7 +241,7 @@ class _Scene:
             (box([-1.6 * u, -1.2 * u, 0.9 * u], [1.6 * u, 1.2 * u, 2.0 * u], guide, pin, pieces=4), "#84929D"),
             (box([start, -0.7 * u, 2.0 * u], [end, 0.7 * u, 2.45 * u], guide, self.foot, pieces=24), "#D9DEE2"),
         ]  # fmt: skip
-        self.taken.extend(paint(axis, solids, self.view))
+        self.covered = paint(axis, solids, self.view)
 
     def _centre_lines(self, axis: Axes, pose: _Pose) -> None:
         u = self.size
@@ -295,10 +294,9 @@ class _Scene:
         }
         for origin, rows in ((np.zeros(3), np.eye(3)), (self.foot, self.frame4)):
             for way in rows:
-                tip = origin + 2.4 * u * way
-                end, start = self.page([tip, origin]).tolist()
-                axis.annotate("", end, start, arrowprops=look, zorder=7)
-                self.taken.append(self.page([origin + share * (tip - origin) for share in np.linspace(0.0, 1.0, 9)]))
+                start, end = self.page([origin, origin + 2.4 * u * way])
+                axis.annotate("", end.tolist(), start.tolist(), arrowprops=look, zorder=7)
+                self.lines.append(np.array([start, end]).T)
 
     def _letters(self, axis: Axes, pose: _Pose) -> None:
         u, small = self.size, 7.0
@@ -330,10 +328,11 @@ class _Scene:
                     text = f"{name} {degrees(place.angle) % 360.0:.2f}°"
                     labels += [_Label(pin, text, colour, small) for pin in (place.slider_pin, place.crank_pin)]
         x, y = self.page([label.point for label in labels]).T
-        x_taken, y_taken = np.concatenate(self.taken).T
+        x_covered, y_covered = self.covered.T
         colours = [label.colour for label in labels]
         textalloc.allocate(
-            axis, x, y, [label.text for label in labels], x_scatter=x_taken, y_scatter=y_taken,
+            axis, x, y, [label.text for label in labels], x_scatter=x_covered, y_scatter=y_covered,
+            x_lines=[line[0] for line in self.lines], y_lines=[line[1] for line in self.lines],
             xlims=(self.low[0] + 0.5 * u, self.high[0] - 0.5 * u), ylims=(self.low[1], self.high[1]),
             margin=0.003, min_distance=0.005, nbr_candidates=500,
             textsize=[label.size for label in labels], textcolor=colours, linecolor=colours, linewidth=0.5,

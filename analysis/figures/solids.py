@@ -70,7 +70,7 @@ def box(low: ArrayLike, high: ArrayLike, rows: FloatArray, origin: FloatArray, *
     return np.array(faces)
 
 
-def paint(axis: Axes, solids: Sequence[tuple[FloatArray, str]], view: FloatArray) -> list[FloatArray]:
+def paint(axis: Axes, solids: Sequence[tuple[FloatArray, str]], view: FloatArray) -> FloatArray:
     """Paint the faces of solids, each with its colour, that are turned towards the eye.
 
     Parameters
@@ -82,8 +82,8 @@ def paint(axis: Axes, solids: Sequence[tuple[FloatArray, str]], view: FloatArray
 
     Returns
     -------
-    list of ndarray
-        Points (n, 2) on the page that are covered: middles and corners of the faces.
+    ndarray, shape (n, 2)
+        Points on the page that are covered: middles and corners of the faces.
     """
     seen = np.concatenate([solid for solid, _ in solids]) @ view.T
     colours = np.concatenate([np.broadcast_to(to_rgb(colour), (len(solid), 3)) for solid, colour in solids])
@@ -97,4 +97,4 @@ def paint(axis: Axes, solids: Sequence[tuple[FloatArray, str]], view: FloatArray
         PolyCollection(list(seen[:, :, :2]), facecolors=colours, edgecolors=colours, linewidths=0.4, zorder=3),
         autolim=False,
     )
-    return [seen[:, :, :2].mean(axis=1), seen[:, ::2, :2].reshape(-1, 2)]
+    return np.concatenate([seen[:, :, :2].mean(axis=1), seen[:, ::2, :2].reshape(-1, 2)])

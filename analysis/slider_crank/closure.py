@@ -31,7 +31,7 @@ from .quantities import FloatArray
 
 #: Largest residual of a closed loop: rotation in radians, and length as a share of the links' lengths together.
 TOLERANCE = 1e-12
-#: Newton's method doubles the digits in each step; only next to the limit of assembly it gains but a bit.
+#: Newton's method doubles the digits in each step; only next to the limit of assembly does it gain one bit a step.
 MAX_ITERATIONS = 60
 
 
@@ -150,7 +150,7 @@ def close(parameters: SliderCrankParameters, crank_angle: Any, shift: Any, start
         If the iteration ends in a loop that is not closed or in the other assembly.
     """
     p = parameters
-    th, s1 = given(crank_angle, shift)
+    th, s1 = points_of(crank_angle, shift)
     lacking = shortage(p, th, s1)
     worst = int(np.argmax(lacking))
     if lacking[worst] > TOLERANCE * scale(p, s1):
@@ -202,7 +202,7 @@ def close(parameters: SliderCrankParameters, crank_angle: Any, shift: Any, start
 def follow(parameters: SliderCrankParameters, crank_angle: Any, shift: Any) -> Closure:
     """Close the loop by continuation: the first point from the planar estimate, every other from the one before it.
 
-    The rod then turns from point to point without spin. The points are to be close to each other: steps of 20 degrees are.
+    The rod then turns from point to point without spin. The points must be close to each other, by 20 degrees or less.
 
     Parameters
     ----------
@@ -216,7 +216,7 @@ def follow(parameters: SliderCrankParameters, crank_angle: Any, shift: Any) -> C
     InputError, AssemblyError, ClosureError
         As `close`; a step that would change the assembly is a ClosureError.
     """
-    th, s1 = given(crank_angle, shift)
+    th, s1 = points_of(crank_angle, shift)
     points: list[Closure] = []
     for angle, position in zip(th, s1):
         points.append(close(parameters, angle, position, points[-1] if points else None))
@@ -235,7 +235,7 @@ def residuals(product: Dual) -> tuple[FloatArray, FloatArray]:
     return 2.0 * np.arcsin(np.minimum(chord, 1.0)), np.linalg.norm(origin(product), axis=-1)
 
 
-def given(crank_angle: Any, shift: Any) -> tuple[FloatArray, FloatArray]:
+def points_of(crank_angle: Any, shift: Any) -> tuple[FloatArray, FloatArray]:
     """Crank angles and shifts of one shape (n,)."""
     try:
         th, s1 = np.broadcast_arrays(np.asarray(crank_angle, dtype=float), np.asarray(shift, dtype=float))

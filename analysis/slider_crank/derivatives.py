@@ -29,7 +29,7 @@ from .shifts import ShiftMotion, in_the_shaft, on_arrays, with_groove
 
 #: What is in error besides the mechanism's parameters: the crank angle and the axial shift, by the names of their outputs.
 ANGLE, SHIFT = "crank.angle", "shift.position"
-#: The errors whose sensitivities are given where none are named: theta1, S1, a1, a2, a4, alpha4.
+#: The errors for which sensitivities are computed by default: theta1, S1, a1, a2, a4, alpha4.
 DIMENSIONS = (ANGLE, SHIFT, "crank.length", "rod.length", "guide.offset", "guide.twist")
 _ERRORS = {
     v.name: v

@@ -150,7 +150,7 @@ def rates(
     Raises
     ------
     InputError
-        If a rate is not finite or has not one value or one for each point of the closure.
+        If a rate is not finite, or is neither one value nor one for each point of the closure.
     AssemblyError
         At the limit of assembly, where the rod is perpendicular to the guide.
     """

@@ -48,7 +48,7 @@ from .quantities import (
 )
 from .shifts import ConstantShift, ShiftLaw, ShiftMotion, in_the_shaft, on_arrays, with_groove
 
-#: Angles over the turn where none are given: every degree, both ends.
+#: Angles over the turn by default: every degree, both ends.
 SAMPLES = 361
 #: Sine of the angle between rod and crank axis below which frame 3 has no direction.
 _PARALLEL = 1e-12
@@ -58,7 +58,7 @@ CLEAR_DEG = 10.0
 NO_LEVER = "the slider has no lever on the crank at any angle, so that the torque determines no force on it"
 #: Reason for which none is found at a dead centre.
 _NO_LEVER_HERE = "the slider's force has no lever on the crank, so that the torque does not determine it"
-#: The shift where none is given.
+#: The shift by default.
 _STILL = ConstantShift(0.0)
 #: Values of `ForceTurn.sought`.
 TORQUE, SLIDER_FORCE = "torque", "slider force"
@@ -298,7 +298,7 @@ class ForceTurn:
         return np.ma.MaskedArray(_joined(turned, len(self)), mask=mask, fill_value=np.nan)
 
     def columns(self, units: str = "SI", frames: tuple[int, ...] = (1, 2, 3, 4)) -> dict[str, FloatArray]:
-        """Everything by name with unit, as for a file; NaN where a value is masked, which the last two columns tell.
+        """Everything by name with unit, as for a file; NaN where a value is masked; the last two columns say why.
 
         Parameters
         ----------
@@ -374,8 +374,8 @@ def force_turn(
     InputError
         If both ``load`` and ``torque`` are given, a value is no finite number or of the wrong shape, or ``shift`` is no law.
     AssemblyError
-        If the rod does not reach the guide at an angle; it tells the ranges in which it does. With ``partial`` only if it
-        does at none.
+        If the rod does not reach the guide at an angle, with the ranges in which it does; with ``partial`` only if it does at
+        none.
     """
     if load is not None and torque is not None:
         raise InputError("both load and torque are given: give the one, and the other is sought")

@@ -390,7 +390,7 @@ def _dead_centres(low: float, high: float, law: PeriodicShift, p: Constants, pit
 
 def _range(low: float, high: float, law: PeriodicShift, p: Constants) -> Range:
     dead = _dead_centres(low, high, law, p, 1.0)
-    # a full turn is searched from the seam, and told from zero
+    # a full turn is searched from the seam, and reported from zero
     full = low == _SEAM
     places = [_place(low, law, p, limit=not full), _place(high, law, p, limit=not full)]
     places += [Place(*centre[:3]) for centre in dead]

@@ -39,7 +39,7 @@ class Spread:
     ----------
     mean, deviation : masked array, shape (n,)
         Mean and standard deviation; masked where samples fall on both sides of a dead centre and the quantity has its pole
-        between them: there they do not exist, whatever a sum says.
+        between them: there they do not exist, although a sum of the samples does.
     percentiles : masked array, shape (p, n)
         At `PERCENTILES`; masked only where there is no sample.
     least, greatest : masked array, shape (n,)
@@ -276,39 +276,24 @@ def _draws(turn: ForceTurn, i: int, errors: Mapping[str, FloatArray], quantities
     samples = len(next(iter(errors.values())))
     found = {name: np.empty(samples) for name in quantities}
     levers = np.empty(samples)
+    with_pole = turn.sought == SLIDER_FORCE and not set(quantities) <= set(KINEMATIC)
     count = missed = dead = 0
     for start in range(0, samples, _CHUNK):
         part = {name: x[start : start + _CHUNK] for name, x in errors.items()}
-        values, kept, lever, lost = _sampled(turn, i, part, quantities)
-        missed += lost
-        dead += len(next(iter(part.values()))) - lost - kept
-        for name in quantities:
-            found[name][count : count + kept] = values[name]
-        levers[count : count + kept] = lever
+        size = min(_CHUNK, samples - start)
+        varied = vary(turn, i, part)
+        reached = np.broadcast_to(varied.square >= (LIMIT_SINE * varied.p.a2) ** 2, (size,))
+        values, lever = varied.evaluate(quantities)
+        determined = np.abs(lever) > DEAD_CENTRE * turn.parameters.crank_length if with_pole else True
+        good = reached & determined
+        kept = int(good.sum())
+        for x, all_of_it in [(levers, lever), *((found[name], values[name]) for name in quantities)]:
+            x[count : count + kept] = np.broadcast_to(all_of_it, (size,))[good]
         count += kept
-    across = turn.sought == SLIDER_FORCE and count > 0 and levers[:count].min() < 0.0 < levers[:count].max()
+        missed += size - int(reached.sum())
+        dead += int(reached.sum()) - kept
+    across = with_pole and count > 0 and levers[:count].min() < 0.0 < levers[:count].max()
     return _Draws({name: _statistics(found[name][:count]) for name in quantities}, bool(across), missed, dead)
-
-
-def _sampled(
-    turn: ForceTurn, i: int, errors: Mapping[str, FloatArray], quantities: Sequence[str]
-) -> tuple[dict[str, Any], int, Any, int]:
-    """Quantities of the samples that can be assembled and are determined at angle i, their number, the lever, and how many
-    cannot be assembled."""
-    size = len(next(iter(errors.values())))
-    varied = vary(turn, i, errors)
-    reached = np.broadcast_to(varied.square >= (LIMIT_SINE * varied.p.a2) ** 2, (size,))
-    kept = int(reached.sum())
-    lost = size - kept
-    if lost:
-        varied = vary(turn, i, {name: x[reached] for name, x in errors.items()})
-    found, lever = varied.evaluate(quantities)
-    if turn.sought == SLIDER_FORCE and not set(quantities) <= set(KINEMATIC):
-        there = np.broadcast_to(np.abs(lever) > DEAD_CENTRE * turn.parameters.crank_length, (kept,))
-        if not there.all():
-            found = {name: np.broadcast_to(x, (kept,))[there] for name, x in found.items()}
-            return found, int(there.sum()), np.broadcast_to(lever, (kept,))[there], lost
-    return found, kept, lever, lost
 
 
 def _statistics(values: FloatArray) -> tuple[Any, ...]:
@@ -322,7 +307,7 @@ def _statistics(values: FloatArray) -> tuple[Any, ...]:
     percentiles = values[below] + (places - below) * (values[below + 1] - values[below])
     low, high = values[0], values[-1]
     first, last = values[int(0.0005 * values.size)], values[int(0.9995 * (values.size - 1))]
-    # all samples alike have a bin of no width: a width that floats can tell is made
+    # all samples alike have a bin of no width: it is given a width that floats can represent
     edges = first + np.linspace(0.0, max(last - first, 1e-12 * max(abs(low), abs(high)), 1e-300), _BINS + 1)
     inside = np.searchsorted(values, edges[:-1])
     counts = np.diff(inside, append=np.searchsorted(values, edges[-1], "right"))

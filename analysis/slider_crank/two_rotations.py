@@ -28,7 +28,7 @@ from linkwork.slider_crank.parameters import SliderCrankParameters
 from linkwork.slider_crank.published import INCH
 
 from ..numerics.dual import Array, Dual, about_i, about_j, about_k, skew, stack
-from .closure import close, given, residuals
+from .closure import close, points_of, residuals
 from .quantities import FloatArray
 
 
@@ -104,7 +104,7 @@ def settle(
     InputError, AssemblyError, ClosureError
         As `closure.close`, by which the truth is found.
     """
-    th, s1 = given(crank_angle, shift)
+    th, s1 = points_of(crank_angle, shift)
     truth = close(parameters, th, s1)
     q = planar(parameters, th)
     steps = np.zeros(th.size, dtype=int)

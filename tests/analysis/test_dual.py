@@ -25,7 +25,8 @@ from analysis.numerics.dual import (
     stack,
     variables,
 )
-from analysis.numerics.tracing import ELEMENTARY, rebound
+from analysis.numerics.tracing import rebound
+from analysis.slider_crank.shifts import on_arrays
 from linkwork import friction
 from linkwork.slider_crank import dynamics, kinematics, vectors
 from tests.slider_cranks import DRIVES, seeded
@@ -237,7 +238,7 @@ def test_the_lesser_and_the_greater_of_two() -> None:
     same(abs(Dual(-3.0, 1.0)), Dual(3.0, -1.0))
 
 
-def test_what_is_not_finite_is_told_for_all_directions_of_a_number() -> None:
+def test_what_is_not_finite_is_reported_for_all_directions_of_a_number() -> None:
     x = Dual([1.0, 2.0, np.nan], [[0.0, np.inf, 0.0], [1.0, np.nan, 1.0]])
     assert np.isfinite(x).tolist() == [True, False, False]
     assert np.isnan(x).tolist() == [False, True, True]
@@ -264,10 +265,6 @@ def test_length_and_elements() -> None:
 def test_the_plant_differentiated_through_tracing(seed: int) -> None:
     """Slider position, and torque and accelerations of the equations of motion, by the state and all parameters."""
     case = seeded(seed)
-    traced = rebound(
-        (friction, vectors, kinematics, dynamics),
-        dict(zip(ELEMENTARY, (np.sin, np.cos, np.sqrt, np.arctan2, np.tanh))),
-    )
     inputs = case.inputs("torque-force" if seed % 2 else "speed-shift")
     names = [name for name in case.p._fields if name != "branch"]
 
@@ -281,14 +278,14 @@ def test_the_plant_differentiated_through_tracing(seed: int) -> None:
         return [q.s4, k.kth, k.ks, motion.torque, motion.crank_acceleration, motion.force, *reactions.guide]
 
     x = [*case.state[:4], *(getattr(case.p, name) for name in names)]
-    exact = outputs(traced, variables(*x))
+    exact = outputs(on_arrays(), variables(*x))
     complex_step = np.array(
         [
-            [np.imag(y) / 1e-30 for y in outputs(traced, [v + 1e-30j * (j == i) for j, v in enumerate(x)])]
+            [np.imag(y) / 1e-30 for y in outputs(on_arrays(), [v + 1e-30j * (j == i) for j, v in enumerate(x)])]
             for i in range(len(x))
         ]
     )
-    values = outputs(dynamics_and_kinematics(), x)
+    values = outputs(rebound((friction, vectors, kinematics, dynamics), {}), x)
     for y, value, by_step in zip(exact, values, complex_step.T):
         result = y if isinstance(y, Dual) else Dual(y, np.zeros(len(x)))
         assert result.real == pytest.approx(value, rel=1e-13, abs=1e-13)
@@ -297,20 +294,11 @@ def test_the_plant_differentiated_through_tracing(seed: int) -> None:
         )
 
 
-def dynamics_and_kinematics() -> Any:
-    """The plant's functions as they are, on floats."""
-    return rebound((friction, vectors, kinematics, dynamics), {})
-
-
 def test_every_drive_of_the_plant_takes_dual_numbers() -> None:
     case = seeded(3)
-    traced = rebound(
-        (friction, vectors, kinematics, dynamics),
-        dict(zip(ELEMENTARY, (np.sin, np.cos, np.sqrt, np.arctan2, np.tanh))),
-    )
     for drive in DRIVES:
-        x = traced.grooved((Dual(case.state[0], 1.0), *case.state[1:]), DRIVES[drive][2], case.p)
-        rate = traced.derivative(x, case.inputs(drive), case.p)
+        x = on_arrays().grooved((Dual(case.state[0], 1.0), *case.state[1:]), DRIVES[drive][2], case.p)
+        rate = on_arrays().derivative(x, case.inputs(drive), case.p)
         h = 1e-6
 
         def at(angle: float, drive: str = drive) -> np.ndarray:

@@ -265,7 +265,7 @@ def test_erratum_9_row_6_of_eq_38_lacks_sin_eta2() -> None:
 @pytest.mark.parametrize("entry", [(0, 0), (1, 0), (2, 2)])
 def test_erratum_9_eq_51a_has_cos_theta3_for_cos_eta3(entry: tuple[int, int]) -> None:
     """The notes say only that one stands for the other. cos eta3 comes into a momentum by three entries of Z(theta3) Y(eta3),
-    between slider and rod: with cos theta3 in any of them, a momentum changes its size with the frame in which it is told."""
+    between slider and rod: with cos theta3 in any of them, a momentum changes its size with the frame in which it is given."""
     theta, eta = -1.3, 0.2
     right = about_k(theta).real @ about_j(eta).real
     printed = right.copy()

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from itertools import pairwise, product
 from math import atan2, cos, hypot, inf, nan, pi, radians, sin
+from typing import Any
 
 import numpy as np
 import pytest
@@ -185,7 +186,7 @@ def test_closes_up_to_the_limit_of_the_shift_and_says_by_how_much_the_rod_is_sho
 
 @given(cases(), st.floats(0.01, 0.9))
 @several
-def test_a_rod_too_short_is_told_with_what_it_lacks(case: Case, share: float) -> None:
+def test_a_rod_too_short_is_reported_with_what_it_lacks(case: Case, share: float) -> None:
     th, s1 = case.state[:2]
     p = case.parameters
     # the guide through (-a4, 0, 0) along k4: the distance of the crank pin from it
@@ -206,7 +207,7 @@ def test_the_half_turned_loop_is_not_taken_for_closed() -> None:
     assert distance[0] == 0.0
 
 
-def test_a_start_at_the_other_assembly_is_told() -> None:
+def test_a_start_at_the_other_assembly_is_reported() -> None:
     p = parameters(10.0)
     other = close(replace(p, assembly_branch=-1), 0.3, 0.0)
     with pytest.raises(ClosureError, match="closes in assembly -1"):
@@ -228,7 +229,7 @@ def test_a_start_of_another_number_of_loops_is_refused() -> None:
             close(p, points, 0.0, start=close(p, np.linspace(0.1, 0.3, count), 0.0))
 
 
-def test_an_iteration_that_ends_open_is_told_with_its_residual(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_iteration_that_ends_open_is_reported_with_its_residual(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(C, "MAX_ITERATIONS", 1)
     with pytest.raises(ClosureError, match=r"residual .* rad and .* m after 1 iterations at theta1 = 0.7 rad"):
         close(parameters(10.0, 232.0), 0.7, 9.0 * INCH)
@@ -244,21 +245,22 @@ def test_rod_perpendicular_to_the_guide_is_the_last_loop_that_closes(twist: floa
             close(p, 0.0, INCH)
 
 
-@pytest.mark.parametrize("bad", [nan, inf])
-def test_values_that_are_not_finite_are_refused(bad: float) -> None:
-    with pytest.raises(InputError, match="crank angle 1 is"):
-        close(parameters(), [0.0, bad], 0.0)
-    with pytest.raises(InputError, match="shift 0 is"):
-        close(parameters(), 0.0, bad)
-
-
-def test_shapes_that_do_not_agree_are_refused() -> None:
-    with pytest.raises(InputError, match="one length"):
-        close(parameters(), [0.0, 1.0], [0.0, 1.0, 2.0])
-    with pytest.raises(InputError, match="one axis"):
-        close(parameters(), [[0.0]], 0.0)
-    with pytest.raises(InputError, match="one axis"):
-        follow(parameters(), [], 0.0)
+@pytest.mark.parametrize(
+    ("angle", "shift", "message"),
+    [
+        ([0.0, nan], 0.0, "crank angle 1 is nan"),
+        ([0.0, inf], 0.0, "crank angle 1 is inf"),
+        (0.0, nan, "shift 0 is nan"),
+        (0.0, inf, "shift 0 is inf"),
+        ([0.0, 1.0], [0.0, 1.0, 2.0], "one length"),
+        ([[0.0]], 0.0, "one axis"),
+        ([], 0.0, "one axis"),
+    ],
+)
+@pytest.mark.parametrize("how", [close, follow])
+def test_points_that_are_none_are_refused(how: Any, angle: Any, shift: Any, message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        how(parameters(), angle, shift)
 
 
 def test_crank_frame() -> None:

@@ -1,4 +1,4 @@
-"""The figure of tolerances draws what it is given, in the units it says, and tells what a reader must know."""
+"""The figure of tolerances draws what it is given, in the units it says, and says what a reader must know."""
 
 from __future__ import annotations
 
@@ -117,9 +117,9 @@ def test_histogram_beside_the_normal_estimate() -> None:
     marks = sorted(float(np.asarray(x.get_xdata())[0]) for x in histogram.lines if x.get_linestyle() == "--")
     assert marks == pytest.approx([-0.9, 0.9])
     assert histogram.get_title().startswith("at 0 deg, nominal 1250 mm; 99.9%")
-    told = texts(figure)
+    said = texts(figure)
     for words in ("of the samples 0.295 mm", "linear 0.3 mm", "to second order 0.305 mm"):
-        assert words in told
+        assert words in said
 
 
 def bars(axis: Axes) -> dict[str, list[float]]:
@@ -137,9 +137,9 @@ def test_shares_largest_on_top() -> None:
     assert bars(shares) == {"rod.length $a_2$": [0.7], "guide.offset $a_4$": [0.2998], "crank.mass $m_1$": [0.0002]}
     assert list(bars(shares)) == ["rod.length $a_2$", "guide.offset $a_4$", "crank.mass $m_1$"]
     assert shares.get_title() == "share in the variance, linear"
-    told = texts(figure)
+    said = texts(figure)
     for words in ("70.0%", "30.0%", "< 0.1%"):
-        assert words in told
+        assert words in said
 
 
 def test_shares_to_second_order_where_they_say_something_else() -> None:
@@ -153,16 +153,16 @@ def test_shares_to_second_order_where_they_say_something_else() -> None:
     assert "no variance to first or second order" in texts(neither)
 
 
-def test_foot_tells_what_must_be_known() -> None:
+def test_foot_says_what_must_be_known() -> None:
     assert "1,000,000 samples at each angle; all can be assembled." in texts(plot(made()))
     found = made(not_assembled=np.where(pi == ANGLES, 12_300, 0))
-    told = " ".join(texts(plot(found)).split())
-    assert "at worst 1.23% of them cannot be assembled, and are left out." in told
+    said = " ".join(texts(plot(found)).split())
+    assert "at worst 1.23% of them cannot be assembled, and are left out." in said
     first, second = found.notes()
-    assert f" {first[0].upper()}{first[1:]}. {second[0].upper()}{second[1:]}." in told
+    assert f" {first[0].upper()}{first[1:]}. {second[0].upper()}{second[1:]}." in said
 
 
-def test_poles_are_cut_off_and_told() -> None:
+def test_poles_are_cut_off_and_reported() -> None:
     peak = 1.0 + 1e4 * np.exp(-(((ANGLES - pi) / 0.1) ** 2))
     torque = force_turn(parameters(0.0), crank_speed=1.0, angles=ANGLES, torque=1.0)
     found = made("slider.load", peak, turn=torque)

@@ -270,7 +270,7 @@ def test_dead_centres_are_where_they_are_published(offset: float) -> None:
     assert [c.outer for c in turn.dead_centres] == [True, False]
 
 
-def test_dead_centres_are_told_over_the_angles_that_were_asked_for() -> None:
+def test_dead_centres_are_reported_over_the_angles_that_were_asked_for() -> None:
     first, second = (radians(x) for x in DEAD_CENTRES_DEG[10.0])
     mechanism = parameters(10.0)
     turn = force_turn(mechanism, crank_speed=1.0, angles=np.linspace(-pi, 3.0 * pi, 50))
@@ -435,7 +435,7 @@ def test_clear_of_the_dead_centres_where_the_force_is_sought() -> None:
     assert force_turn(OFFSET, crank_speed=1.0, load=1.0).clear().all()
 
 
-def test_runs_of_masked_angles_are_told_once() -> None:
+def test_runs_of_masked_angles_are_reported_once() -> None:
     """Guide and crank axis in one line: the slider stands still, and its force has no lever."""
     still = force_turn(parameters(0.0, 180.0), crank_speed=1.0, shift=SHIFT, torque=1.0)
     assert np.ma.getmaskarray(still.slider_force).sum() == 361
@@ -520,12 +520,12 @@ def test_csv(tmp_path: Path) -> None:
         ({"shift": TimeShift(np.sin, np.cos, np.sin), "crank_acceleration": 1.0}, "constant"),
     ],
 )
-def test_wrong_input_is_told(changes: dict[str, Any], message: str) -> None:
+def test_wrong_input_is_reported(changes: dict[str, Any], message: str) -> None:
     with pytest.raises(InputError, match=message):
         force_turn(OFFSET, **{"crank_speed": 1.0} | changes)
 
 
-def test_wrong_names_are_told() -> None:
+def test_wrong_names_are_reported() -> None:
     turn = force_turn(OFFSET, crank_speed=1.0, angles=[0.0])
     with pytest.raises(InputError, match="no joint force or moment 'pin'"):
         turn.vector("pin")

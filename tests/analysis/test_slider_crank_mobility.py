@@ -588,44 +588,25 @@ def test_any_periodic_law() -> None:
         assert np.array(sharper) == pytest.approx(np.array(M.dead_centres(par, law)), abs=1e-12)
 
 
-def test_close_pairs_of_dead_centres_are_found() -> None:
-    # along the guide's axis the slider goes with the shift: S4' = S4'(still) - S1' cos; a law made to stop it twice
-    par = mechanism(0.5, 3.0, 0.4, 0.0)
+@pytest.mark.parametrize("gap", [0.05, 1e-2, 2e-3])
+def test_close_pairs_of_dead_centres_are_found(gap: float) -> None:
+    """Along the crank's axis the slider goes with the shift: one that stops it twice, at 1 +- gap, and turns it back.
 
-    def still(th: float) -> tuple[float, float]:
-        root = sqrt(9.0 - (0.5 * cos(th) + 0.4) ** 2 - 0.25 * sin(th) ** 2)
-        return root, 0.2 * sin(th) / root
+    S4 = still - S1 is made 0.05 ((2 a^2 - 1) sin u - a/2 sin 2u) with u = theta1 - 1 and a = cos(gap), so that its rate is
+    0.05 (a - cos u)(1 + 2 a cos u).
+    """
+    par, a = mechanism(0.5, 3.0, 0.4, 0.0), cos(gap)
 
-    for gap in (0.05, 1e-2, 2e-3):
-        # S4 = still - S1 with S4' = (2 - cos(th - 1)) (cos(gap) - cos(th - 1)), zero at 1 +- gap and nowhere else,
-        # and made to close the turn by its mean, which moves the zeros little for it is taken at the other side
-        def speed(th: float, gap: float = gap) -> float:
-            u = th - 1.0
-            return (cos(gap) - cos(u)) * (1.0 + cos(u))
+    def law_at(th: float) -> tuple[float, float]:
+        u = th - 1.0
+        still = sqrt(9.0 - (0.5 * cos(th) + 0.4) ** 2 - 0.25 * sin(th) ** 2)
+        moved = (2.0 * a * a - 1.0) * sin(u) - 0.5 * a * sin(2.0 * u)
+        return still - 0.05 * moved, 0.2 * sin(th) / still - 0.05 * (a - cos(u)) * (1.0 + 2.0 * a * cos(u))
 
-        mean = float(np.mean([speed(x) for x in np.arange(0.0, TURN, TURN / 64)]))
-
-        def law_at(th: float, gap: float = gap, mean: float = mean) -> tuple[float, float]:
-            root, slope = still(th)
-            u = th - 1.0
-            # integral of the speed less mean (1 - cos u)^3 / 2.5, whose mean is one and which is all but zero at u = 0
-            a = cos(gap)
-            integral = (a - 0.5) * u + (a - 1.0) * sin(u) - 0.25 * sin(2.0 * u)
-            cube = 2.5 * u - 3.75 * sin(u) + 0.75 * sin(2.0 * u) - sin(3.0 * u) / 12.0
-            return 0.05 * (root - integral + mean * cube / 2.5), 0.05 * (
-                slope - speed(th, gap) + mean * (1.0 - cos(u)) ** 3 / 2.5
-            )
-
-        # the slider's own part is weighed as the law is: only the law's part is left
-        law = M.PeriodicShift(
-            at=lambda th: (still(th)[0] + law_at(th)[0] - 0.05 * still(th)[0],
-                           still(th)[1] + law_at(th)[1] - 0.05 * still(th)[1]),
-            rate=1.0,
-            curvature=1.0,
-        )  # fmt: skip
-        angles = [centre.crank_angle for centre in M.dead_centres(par, law)]
-        assert min(angles, key=lambda a: abs(a - 1.0 + gap)) == pytest.approx(1.0 - gap, abs=0.01 * gap)
-        assert min(angles, key=lambda a: abs(a - 1.0 - gap)) == pytest.approx(1.0 + gap, abs=0.01 * gap)
+    law = M.PeriodicShift(at=law_at, rate=1.0, curvature=1.0)
+    others = [1.0 - np.arccos(-0.5 / a) + TURN, 1.0 + np.arccos(-0.5 / a)]
+    angles = [centre.crank_angle for centre in M.dead_centres(par, law)]
+    assert angles == pytest.approx(sorted([1.0 - gap, 1.0 + gap, *others]), abs=1e-8)
 
 
 # ------------------------------------------------------------------ what is refused

@@ -350,7 +350,7 @@ def test_a_million_samples_agree_with_the_linear_estimate_in_seconds() -> None:
         assert not result.linear_is_off(name).any()
 
 
-def test_where_the_first_derivatives_vanish_it_is_told() -> None:
+def test_where_the_first_derivatives_vanish_a_note_says_so() -> None:
     turn = force_turn(IDEAL, crank_speed=1.0, angles=[0.0, 0.5 * pi])
     tolerances = [Tolerance("guide.offset", 5e-3), Tolerance(SHIFT, 5e-3), Tolerance("guide.twist", radians(0.5))]
     result = monte_carlo(turn, tolerances, samples=200_000)
@@ -395,7 +395,7 @@ def test_where_hardly_any_sample_can_be_assembled_nothing_is_made_up() -> None:
     assert np.ma.getmaskarray(result.estimates["slider.position"].second_deviation).tolist() == [True]
 
 
-def test_angles_that_the_nominal_mechanism_cannot_reach_are_told() -> None:
+def test_angles_that_the_nominal_mechanism_cannot_reach_are_reported() -> None:
     shift = ConstantShift((GREATEST_SHIFTS_IN[0.0] + 1.0) * INCH)
     turn = force_turn(IDEAL, crank_speed=1.0, shift=shift, angles=[0.0, 1.0, 2.0], partial=True)
     assert turn.unreachable.tolist() == [0.0]
@@ -414,7 +414,7 @@ def test_across_a_dead_centre_there_is_no_mean() -> None:
     assert not np.ma.getmaskarray(load.percentiles).any()
     assert load.percentiles[0, 1] < -1e3 < 1e3 < load.percentiles[-1, 1]
     assert load.counts[1].sum() == pytest.approx(0.999 * 20_000, abs=3)
-    # neither is there an estimate, and it is told as off
+    # neither is there an estimate, and it is reported as off
     assert result.linear_is_off("slider.load").tolist() == [False, True]
     linear = result.estimates["slider.load"]
     for values in (linear.deviation, linear.worst, linear.second_mean, linear.second_deviation, *linear.shares):
@@ -449,7 +449,7 @@ def test_an_estimate_ends_where_the_tolerances_reach_the_dead_centre() -> None:
     assert "the tolerances reach a dead centre from crank angle 9" in few.notes()[0]
 
 
-def test_samples_that_are_no_mechanism_are_told() -> None:
+def test_samples_that_are_no_mechanism_are_reported() -> None:
     turn = offset_turn([0.3])
     count, deviation = 2000, 2.0
     wide = Tolerance("rod.length", standard_deviation=deviation)
@@ -499,12 +499,12 @@ def test_samples_at_a_dead_centre_itself_are_counted() -> None:
         (("rod.length", 1.0, None, "cauchy"), InputError, "'cauchy': it must be one of normal, uniform, triangular"),
     ],
 )
-def test_wrong_tolerances_are_told(arguments: tuple[Any, ...], error: type[Exception], message: str) -> None:
+def test_wrong_tolerances_are_reported(arguments: tuple[Any, ...], error: type[Exception], message: str) -> None:
     with pytest.raises(error, match=message):
         Tolerance(*arguments)
 
 
-def test_wrong_input_is_told() -> None:
+def test_wrong_input_is_reported() -> None:
     turn = offset_turn([0.3])
     with pytest.raises(ParameterError, match=r"crank_pin\.f"):
         sensitivities(turn, quantities=["crank_pin.f"])

@@ -12,7 +12,7 @@ from click.core import ParameterSource
 
 from linkwork.slider_crank.assembly import check_assembly
 
-from ... import slider_crank as analysis
+from ... import slider_crank as sc
 from ..common import CHECK_FAILED, console, errors, print_written, show_table, tolerance_option
 from .options import Chosen, Problem, about_mechanism, out_option, with_problem
 
@@ -54,7 +54,7 @@ def dual(chosen: Chosen, problem: Problem, tolerance: float, two_rotations: bool
         return
     if chosen.groove == "shaft" and "torque" in problem.given:
         raise click.UsageError("--torque is for a shift that is driven apart from the crank: give --groove apart")
-    found = analysis.compare(problem.turn(chosen))
+    found = sc.compare(problem.turn(chosen))
     passed = [d.relative <= tolerance for d in found.differences]
     show_table(
         f"{chosen.title}: dual numbers less vector mechanics, {found.angles} crank angles",
@@ -91,12 +91,12 @@ def _show_two_rotations(chosen: Chosen, points: int, folder: Path) -> None:
 
     angle = np.linspace(0.0, tau, points)
     shift = np.array([chosen.shift_at(float(a)) for a in angle])
-    short = analysis.shortage(chosen.parameters, angle, shift)
+    short = sc.shortage(chosen.parameters, angle, shift)
     reached = short < 0.0
     if not reached.any():
         worst = int(np.argmin(short))
         check_assembly(chosen.parameters, float(angle[worst]), float(shift[worst]))
-    end = analysis.settle(chosen.parameters, angle[reached], shift[reached])
+    end = sc.settle(chosen.parameters, angle[reached], shift[reached])
     length, scale = chosen.units.name("m"), chosen.units.per("m")
     columns = {
         "crank angle [deg]": np.degrees(end.crank_angle),

@@ -11,7 +11,7 @@ import click
 import numpy as np
 
 from ... import figures
-from ... import slider_crank as analysis
+from ... import slider_crank as sc
 from ..common import console, print_written, show_table
 from .options import Chosen, Problem, Units, about_mechanism, angle_text, out_option, plot_option, with_problem
 
@@ -79,7 +79,7 @@ def _extremes(turn: ForceTurn, frames: Sequence[int], units: Units) -> Sequence[
     quantities += [
         (f"{joint.words}, {axis}{frame}", joint.unit, values)
         for frame in frames
-        for name, joint in analysis.JOINTS.items()
+        for name, joint in sc.JOINTS.items()
         for axis, values in zip("ijk", turn.vector(name, frame).T)
     ]
     clear = turn.clear()
@@ -105,12 +105,12 @@ def _extremes(turn: ForceTurn, frames: Sequence[int], units: Units) -> Sequence[
 
 def _special_places(turn: ForceTurn, units: Units) -> list[str]:
     """Sentences on dead centres and limits of assembly, and on what could not be determined there."""
-    without = f"grows without bound towards it; within {analysis.CLEAR_DEG:g} deg it is not among the extremes"
+    without = f"grows without bound towards it; within {sc.CLEAR_DEG:g} deg it is not among the extremes"
     sentences = [
         f"dead centre at {angle_text(d.crank_angle)}, slider at {units.length(d.slider_position)}"
         for d in turn.dead_centres
     ]
-    if turn.sought == analysis.SLIDER_FORCE:
+    if turn.sought == sc.SLIDER_FORCE:
         sentences += [
             f"no slider force at {angle_text(d.crank_angle)}: it has no lever on the crank there, and {without}"
             for d in turn.singularities

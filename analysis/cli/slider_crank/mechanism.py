@@ -9,7 +9,7 @@ from typing import Any
 import click
 
 from ... import figures
-from ... import slider_crank as analysis
+from ... import slider_crank as sc
 from ..common import console, print_written, show_table
 from .options import Chosen, about_mechanism, angle_text, out_option, quantity
 
@@ -27,9 +27,9 @@ def info(chosen: Chosen) -> None:
       linkwork slider-crank info --groove shaft --set groove.amplitude='3 in' --set groove.ratio=2
     """
     p, law, units = chosen.parameters, chosen.law, chosen.units
-    margin = analysis.assembly_margin(p, law)
-    parts = analysis.assembled_ranges(p, law)
-    most = analysis.greatest_shift(p)
+    margin = sc.assembly_margin(p, law)
+    parts = sc.assembled_ranges(p, law)
+    most = sc.greatest_shift(p)
     rows = {
         "crank a1, rod a2": f"{units.length(p.crank_length)}, {units.length(p.rod_length)}",
         "offset a4, twist alpha4": f"{units.length(p.guide_offset)}, {degrees(p.guide_twist):.6g} deg",
@@ -49,7 +49,7 @@ def info(chosen: Chosen) -> None:
             highlight=False,
             soft_wrap=True,
         )
-    found = analysis.dead_centres(p, law)
+    found = sc.dead_centres(p, law)
     if not found:
         still = all(part.stroke <= 1e-12 * p.rod_length for part in parts)
         console.print("no dead centres" + ": the slider stands still, whatever the crank angle" * still)

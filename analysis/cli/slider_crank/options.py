@@ -16,7 +16,7 @@ from linkwork.errors import InputError
 from linkwork.slider_crank.parameters import SliderCrankParameters
 from linkwork.slider_crank.published import RAD_S_PER_RPM, SETS
 
-from ... import slider_crank as analysis
+from ... import slider_crank as sc
 from ..common import changes, errors, handled, number_or_text
 
 if TYPE_CHECKING:
@@ -33,7 +33,7 @@ class Units:
 
     def __init__(self, system: str) -> None:
         self.system = system
-        self._table = {**analysis.UNITS[system], "rad": analysis.UNITS["inch"]["rad"]}
+        self._table = {**sc.UNITS[system], "rad": sc.UNITS["inch"]["rad"]}
 
     def name(self, si: str) -> str:
         """What the unit is called."""
@@ -63,16 +63,16 @@ class Chosen:
     def law(self) -> PeriodicShift:
         """The shift over the crank angle, for ranges and pictures."""
         if self.groove is None:
-            return analysis.constant_shift(self.shift)
-        return analysis.groove_shift(self.parameters)
+            return sc.constant_shift(self.shift)
+        return sc.groove_shift(self.parameters)
 
     @property
     def force_law(self) -> ShiftLaw:
         """The shift over the crank angle, for the force problems."""
         p = self.parameters
         if self.groove is None:
-            return analysis.ConstantShift(self.shift)
-        return analysis.GrooveShift(p.groove_amplitude, p.groove_ratio, in_shaft=self.groove == "shaft")
+            return sc.ConstantShift(self.shift)
+        return sc.GrooveShift(p.groove_amplitude, p.groove_ratio, in_shaft=self.groove == "shaft")
 
     def shift_at(self, crank_angle: float) -> float:
         """Shift at a crank angle (m)."""
@@ -148,7 +148,7 @@ class _MechanismOptions:
         )
 
     def _check_groove(self, p: SliderCrankParameters, values: Mapping[str, Any]) -> None:
-        """Make sure that what is said of a groove has an effect."""
+        """Make sure that the options about a groove have an effect."""
         if self.groove is None:
             for name in values:
                 if name.startswith("groove."):
@@ -192,7 +192,7 @@ class Problem:
         angles = np.linspace(0.0, tau, self.points)
         if at is not None and np.abs(angles - at).min() > 1e-9:
             angles = np.sort(np.append(angles, at))
-        turn = analysis.force_turn(
+        turn = sc.force_turn(
             chosen.parameters,
             crank_speed=chosen.speed,
             shift=chosen.force_law,

@@ -13,14 +13,14 @@ import numpy as np
 from linkwork.errors import InputError
 
 from ... import figures
-from ... import slider_crank as analysis
+from ... import slider_crank as sc
 from ..common import console, print_written, show_table
 from .options import Chosen, Problem, Units, about_mechanism, note, out_option, plot_option, quantity, with_problem
 
 if TYPE_CHECKING:
     from ...slider_crank import ForceTurn, MonteCarlo, Sensitivities, Tolerance
 
-#: Half widths where none are given: of each length, and of the twist.
+#: What is in error by default, and the half widths of lengths and of the twist.
 _TOLERANCES = ("crank.length", "rod.length", "guide.offset", "shift.position", "guide.twist")
 _WIDTHS = {"m": "0.25 mm", "rad": "0.1 deg"}
 
@@ -83,13 +83,13 @@ def tolerances(
 
     at = _in_the_turn(quantity(angle, "rad", "--angle"), chosen)
     units, quantities = chosen.units, tuple(dict.fromkeys(quantities))
-    defaults = [f"{name}={_WIDTHS[analysis.ERRORS[name]]}" for name in _TOLERANCES]
+    defaults = [f"{name}={_WIDTHS[sc.ERRORS[name]]}" for name in _TOLERANCES]
     allowed = [_tolerance(text, distribution) for text in widths or defaults]
     turn = problem.turn(chosen, at=at)
-    exact = analysis.sensitivities(turn, tuple(t.name for t in allowed), quantities)
+    exact = sc.sensitivities(turn, tuple(t.name for t in allowed), quantities)
     for name in quantities:
         if np.ma.getmaskarray(exact.values[name]).all():
-            why = analysis.NO_LEVER if turn.without_lever else "all the crank angles are dead centres"
+            why = sc.NO_LEVER if turn.without_lever else "all the crank angles are dead centres"
             raise InputError(f"{name} is not determined: {why}; give --load in place of --torque")
     place = int(np.argmin(np.abs(turn.angle - at)))
     here = f"{_degrees(turn, place):.6g} deg"
@@ -101,7 +101,7 @@ def tolerances(
     headings = ("quantity", "to", "unit", f"at {here}", "greatest", "at [deg]")
     show_table(f"{chosen.title}: sensitivities", headings, rows, words=("quantity", "to", "unit"))
     with console.status(f"{samples} samples at {len(turn)} crank angles"):
-        found = analysis.monte_carlo(turn, allowed, quantities=quantities, samples=samples, seed=seed)
+        found = sc.monte_carlo(turn, allowed, quantities=quantities, samples=samples, seed=seed)
     stem = str(Path(out) / chosen.name)
     files = [write_csv(f"{stem}-sensitivities.csv", slopes)]
     files.append(write_csv(f"{stem}-tolerances.csv", _spread_columns(found, units)))
@@ -144,10 +144,10 @@ def _tolerance(text: str, distribution: str) -> Tolerance:
     name, equals, value = (part.strip() for part in text.partition("="))
     if not equals:
         raise click.UsageError(f"--tolerance {text!r}: it must be NAME=HALF_WIDTH, such as guide.offset='0.5 mm'")
-    if name not in analysis.ERRORS:
-        raise unknown_name(name, analysis.ERRORS)
-    width = quantity(value, analysis.ERRORS[name], name)
-    return analysis.Tolerance(name, half_width=width, distribution=distribution)
+    if name not in sc.ERRORS:
+        raise unknown_name(name, sc.ERRORS)
+    width = quantity(value, sc.ERRORS[name], name)
+    return sc.Tolerance(name, half_width=width, distribution=distribution)
 
 
 def _slopes(
@@ -157,11 +157,11 @@ def _slopes(
     turn, rows = exact.turn, []
     columns: dict[str, Any] = {"crank angle [deg]": np.degrees(turn.angle)}
     for name in exact.derivatives:
-        si = analysis.QUANTITIES[name]
+        si = sc.QUANTITIES[name]
         clear = turn.clear(poles=si in ("N", "N.m"))
         effect = max(float(np.ma.abs(exact.of(name, t.name)).max()) * t.extent for t in allowed)
         for t in allowed:
-            below = analysis.ERRORS[t.name]
+            below = sc.ERRORS[t.name]
             unit, scale = _ratio(units.name(si), units.name(below)), units.per(si) / units.per(below)
             values = exact.of(name, t.name) * scale
             columns[f"d {name} / d {t.name} [{unit}]"] = values.filled(np.nan)
@@ -189,7 +189,7 @@ def _spread_columns(found: MonteCarlo, units: Units) -> dict[str, Any]:
     """Everything of a Monte Carlo over the turn."""
     columns: dict[str, Any] = {"crank angle [deg]": np.degrees(found.turn.angle)}
     for name, spread in found.spreads.items():
-        si, linear = analysis.QUANTITIES[name], found.estimates[name]
+        si, linear = sc.QUANTITIES[name], found.estimates[name]
         parts = {
             "nominal": linear.nominal,
             "linear standard deviation": linear.deviation,
@@ -197,7 +197,7 @@ def _spread_columns(found: MonteCarlo, units: Units) -> dict[str, Any]:
             "standard deviation": spread.deviation,
             "mean": spread.mean,
         }
-        parts |= {f"{share:.4g} %": row for share, row in zip(analysis.PERCENTILES, spread.percentiles)}
+        parts |= {f"{share:.4g} %": row for share, row in zip(sc.PERCENTILES, spread.percentiles)}
         columns |= {
             f"{name} {what} [{units.name(si)}]": (x * units.per(si)).filled(np.nan) for what, x in parts.items()
         }
@@ -208,7 +208,7 @@ def _show_spread(found: MonteCarlo, place: int, title: str, units: Units) -> Non
     """The estimates and the samples at one crank angle."""
     rows = []
     for name, spread in found.spreads.items():
-        si, linear = analysis.QUANTITIES[name], found.estimates[name]
+        si, linear = sc.QUANTITIES[name], found.estimates[name]
         values = (
             (linear.nominal, 6),
             (linear.deviation, 3),
