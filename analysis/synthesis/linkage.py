@@ -11,8 +11,7 @@ evaluated by `analysis.synthesis.kernels`.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, replace
 from math import cos, hypot, isfinite, pi, sin
 from typing import Any
 
@@ -35,6 +34,12 @@ ANGLES = ("ground_angle", "crank_phase", "point_angle", "output_angle")
 BY_SHORTEST = ("drag-link", "crank-rocker", "double-rocker", "rocker-crank")
 #: Crank rotations over which a full turn is looked at.
 TURN = 360
+
+
+def wrapped(angle: FloatArray) -> FloatArray:
+    """Angles within half a turn of zero, in [-pi, pi)."""
+    value: FloatArray = (angle + pi) % (2.0 * pi) - pi
+    return value
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -432,17 +437,3 @@ class Linkage:
             ground_inclination=self.ground_angle,
             assembly_branch=self.branch,
         )
-
-
-def names_of(values: Mapping[str, Any]) -> None:
-    """Make sure that these are names of a linkage's dimensions.
-
-    Raises
-    ------
-    ParameterError
-        If one is not.
-    """
-    known = {f.name for f in fields(Linkage)} - {"branch", "pivot"}
-    for name in values:
-        if name not in known:
-            raise ParameterError(name, values[name], f"have the name of a dimension: {', '.join(sorted(known))}")

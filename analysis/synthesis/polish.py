@@ -20,7 +20,8 @@ from linkwork.errors import InputError
 
 from .constraints import Limits
 from .kernels import coupler_path_jacobian, link_jacobian
-from .program import Program
+from .linkage import wrapped
+from .program import Objective, Program
 from .search import USUAL_SEARCH, Search, over_cores
 from .starts import Answer, PivotUnknown, SliderUnknown, Start, apart, inside
 from .tasks import Normal
@@ -135,10 +136,10 @@ class Polisher:
         self.by_least_squares = limits.bounds_only and pivot is None and normal.straight is None and few
         self._programs: dict[str, Program] = {}
 
-    def program(self, objective: str) -> Program:
+    def program(self, objective: Objective) -> Program:
         """The program with this objective."""
         if objective not in self._programs:
-            self._programs[objective] = Program(self.normal, self.limits, self.pivot, objective)  # type: ignore[arg-type]
+            self._programs[objective] = Program(self.normal, self.limits, self.pivot, objective)
         return self._programs[objective]
 
     def fit(self, start: Start) -> Answer:
@@ -235,7 +236,7 @@ def residuals(
         own = np.column_stack([jacobian[:10, which].T, np.ones(n)])
         own[:, 7] += 0.0 if normal.of_rocker else 1.0
         factor = normal.leverage * root
-        parts.append(factor * ((left + pi) % (2.0 * pi) - pi))
+        parts.append(factor * wrapped(left))
         jacobians.append(factor[:, None] * own)
         rates.append(factor * jacobian[8, which])
     return np.concatenate(parts), np.concatenate(jacobians), np.concatenate(rates)

@@ -192,10 +192,10 @@ class Program:
                 quality = casadi.sum1(weights * (ex**2 + ey**2))
             if turned is not None:
                 quality = quality + normal.leverage**2 * casadi.sum1(weights * turned**2)
-        straight = normal.straight
-        if straight is not None:
+        straight, points = normal.straight, normal.points
+        if straight is not None and points is not None:
             part = slice(straight.start, straight.end + 1)
-            line = normal.points[straight.end] - normal.points[straight.start]  # type: ignore[index]
+            line = points[straight.end] - points[straight.start]
             line /= abs(line)
             off = (ey * line.real - ex * line.imag)[part]
             spent = phi[straight.end] - phi[straight.start]
@@ -207,7 +207,7 @@ class Program:
                 half = 0.5 * straight.flatness
                 # along the straight line through the part's ends, at the stations and in between
                 x, y = self._closed(p, v, self._way(phi[part])[0], branch)[1]
-                begin = normal.points[straight.start]  # type: ignore[index]
+                begin = points[straight.start]
                 away = (y - begin.imag) * line.real - (x - begin.real) * line.imag
                 self._within(away - level, -half, half, "flatness of the straight part")
         return quality
