@@ -688,7 +688,7 @@ def main(budget: float = BUDGET, names: Sequence[str] = tuple(PROBLEMS)) -> None
     console.print(kernel_table())
     # machine code, CasADi and the workers are loaded before the clock
     for cores in (1, 2):
-        ours(Contest.of(PROBLEMS["ellipse-a"]), n_jobs=cores)
+        ours(Contest.of(PROBLEMS["ellipse-a"]), Search(n_jobs=cores))
     console.print(contest_table(names, budget, console))
     console.print(start_table())
     try:

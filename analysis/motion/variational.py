@@ -17,8 +17,9 @@ a function the rocker has to be at th4*. So the error as a function of u has its
     for a function;
     at an end of the range of u: a limit of assembly (sin(t - s) = 0, BD = l3 + l4 or |l3 - l4|) or an end of the stroke.
 
-The first two kinds are the thesis's (7.6)-(7.15). The third it has not: without it the best may lie in the other assembly,
-past a dead centre. A linkage that keeps its assembly ends there, and one that keeps a least transmission angle before.
+The first two kinds are the thesis's (7.6)-(7.15). The third kind is not in the thesis: without it the best may lie
+in the other assembly, past a dead centre. A linkage that keeps its assembly ends there, and one that keeps a least
+transmission angle before.
 """
 
 from __future__ import annotations

@@ -218,7 +218,7 @@ def limits_of(
     Raises
     ------
     ParameterError
-        If a bound's name is none of a dimension, or its ends are the wrong way round.
+        If a bound does not have the name of a dimension, or its ends are in the wrong order.
     InfeasibleError
         If they contradict one another.
     """

@@ -32,7 +32,7 @@ LENGTHS = ("pivot_x", "pivot_y", *LINKS, "point_distance")
 ANGLES = ("ground_angle", "crank_phase", "point_angle", "output_angle")
 #: Grashof's types of a four-bar of which a link turns fully, by the shortest link in the order of `LINKS`.
 BY_SHORTEST = ("drag-link", "crank-rocker", "double-rocker", "rocker-crank")
-#: Crank rotations over which a full turn is looked at.
+#: Crank rotations at which a full turn is evaluated.
 TURN = 360
 
 
@@ -319,8 +319,8 @@ class Linkage:
     def transmission_range(self) -> tuple[float, float]:
         """Least and greatest angle between coupler and rocker at C over a turn (rad), in [0, pi].
 
-        With a fixed pivot it is at its extremes with the crank along the ground link; with a moving one it is looked for over
-        `TURN` rotations. Where the crank cannot turn fully the extremes are 0 or pi.
+        With a fixed pivot it is at its extremes with the crank along the ground link; with a moving one it is found over `TURN`
+        rotations. Where the crank cannot turn fully the extremes are 0 or pi.
         """
         l3, l4 = self.coupler_length, self.rocker_length
         if self.pivot is None:

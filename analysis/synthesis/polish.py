@@ -46,7 +46,7 @@ EXACT = 1e-14
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Polished:
-    """What became of starts: answers that keep every constraint, best first, and the others."""
+    """The answers of all starts: those that keep every constraint, best first, and the others."""
 
     kept: tuple[Answer, ...]
     others: tuple[Answer, ...]
@@ -87,7 +87,7 @@ def polish(
     fitted = worker.fit_all if cores == 1 else partial(_batch, normal, limits, pivot)
     parts, interrupted = over_cores(fitted, batches, search, "polish")
     found = [answer for part in parts for answer in part]
-    # heard after the last of them it has nothing to stop
+    # an interruption after the last search has nothing to stop
     interrupted = interrupted and len(found) < len(starts)
     kept = kept_of(found)
     if not interrupted:

@@ -192,7 +192,7 @@ class Verdicts:
 def judge(linkage: Linkage, rotation: FloatArray, *, closed: bool) -> Verdicts:
     """Verdicts over the crank rotations from the first to the last of ``rotation``, or over a turn.
 
-    The distance from crank pin to rocker pivot, on which everything depends, is looked at densely and, with a fixed pivot,
+    The distance from crank pin to rocker pivot, on which everything depends, is evaluated densely and, with a fixed pivot,
     where the crank lies along the ground link.
     """
     steps = np.diff(rotation)
@@ -233,7 +233,7 @@ def _kind(linkage: Linkage) -> str:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StraightPart:
-    """The straight part of a path as it is traced, looked at densely.
+    """The straight part of a path as it is traced, evaluated densely.
 
     Attributes
     ----------

@@ -132,7 +132,7 @@ class Start:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Answer:
-    """What IPOPT says: where it ended, whether that satisfies every constraint, which it violates most, and its own word."""
+    """Where an optimiser ended, whether every constraint is satisfied there, which is violated most, and its status."""
 
     start: Start
     feasible: bool

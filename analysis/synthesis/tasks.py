@@ -128,7 +128,7 @@ class Straight:
     rotation : float
         Crank rotation within which it must be run through (rad).
     flatness : float, optional
-        Largest extent across the line over that part (m); only wished for, by ``weight``, without.
+        Largest extent across the line over that part (m); without it flatness is only favoured, by ``weight``.
     weight : float
         Of the deviation across the line there.
     """
@@ -256,8 +256,8 @@ class Motion:
 class PrecisionPoints:
     """The coupler point is to pass exactly through a few points, in their order, at any crank rotations or at given ones.
 
-    A four-bar can do nine untimed points or five timed ones, and rarely with good manners; what cannot be done exactly comes as
-    close as it can. With an ``angle`` they are poses: five untimed.
+    A four-bar can do nine untimed points or five timed ones, and rarely with a good transmission angle; what
+    cannot be done exactly comes as close as it can. With an ``angle`` they are poses: five untimed.
 
     Attributes
     ----------
