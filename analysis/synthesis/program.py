@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from linkwork.errors import InputError
 
 from ..numerics import symbolic
-from .constraints import TURNING, UNKNOWNS, Limits, half_planes
+from .constraints import TURNING, UNKNOWNS, Limits, half_planes, transmission
 from .linkage import BY_SHORTEST
 from .starts import Answer, CrankUnknown, PivotUnknown, SliderUnknown, Start, inside, pivot_bounds, pivot_size
 from .tasks import Normal
@@ -250,12 +250,9 @@ class Program:
 
     def _transmitting(self, p: Any, nearest: Any, farthest: Any, least: float, tilt: Any) -> None:
         """|cos mu| is at most cos(least), and at most the tilt: for squares of the distance BD, written without division."""
-        l3, l4 = p.coupler_length, p.rocker_length
-        joint = l3 * l3 + l4 * l4
         for cosine in (cos(max(least, TURNING)), *([] if tilt is None else [tilt])):
-            product = 2.0 * l3 * l4 * cosine
-            self._at_most(joint - nearest - product, "transmission angle")
-            self._at_most(farthest - joint - product, "transmission angle")
+            for excess in transmission(p.coupler_length, p.rocker_length, nearest, farthest, cosine):
+                self._at_most(excess, "transmission angle")
 
     def _reach(self, p: Any, v: Any, x: Any) -> Any:
         """Square of the distance from crank pin to rocker pivot at rotations."""
