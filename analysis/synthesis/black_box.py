@@ -29,8 +29,8 @@ from scipy.optimize import Bounds, NonlinearConstraint, OptimizeResult, differen
 from linkwork.five_bar import kinematics
 
 from ..numerics.tracing import rebound
-from .constraints import TURNING, UNKNOWNS, Limits, Require, half_planes, transmission
-from .linkage import BY_SHORTEST
+from .constraints import TURNING, UNKNOWNS, Limits, Require, half_planes
+from .linkage import BY_SHORTEST, transmission_excess
 from .polish import Polished, kept_of, quality_of
 from .search import USUAL_SEARCH, Search, over_cores
 from .starts import Answer, Start
@@ -381,7 +381,7 @@ class BlackBox:
             ]
             if least is not None:
                 # as lengths, so that no constraint outweighs another
-                both = transmission(l3, l4, nearest**2, farthest**2, cos(max(least, TURNING)))
+                both = transmission_excess(l3, l4, nearest**2, farthest**2, cos(max(least, TURNING)))
                 found += [("transmission angle", excess / (l3 + l4)) for excess in both]
         if limits.grashof is not None:
             links = q[:, 2:6]

@@ -130,15 +130,6 @@ class PivotRegion:
         return [np.array(orient(t).exterior.coords)[:3] for t in triangles.geoms]
 
 
-def transmission(l3: Any, l4: Any, nearest: Any, farthest: Any, cosine: Any) -> tuple[Any, Any]:
-    """Left sides of g <= 0 by which |cos mu| at C is at most a cosine, without division; of numbers, arrays and symbols.
-
-    ``nearest`` and ``farthest`` are the squares of the least and the greatest distance from B to D.
-    """
-    joint, product = l3 * l3 + l4 * l4, 2.0 * l3 * l4 * cosine
-    return joint - nearest - product, farthest - joint - product
-
-
 def half_planes(triangle: FloatArray) -> FloatArray:
     """Rows r with r . (x, y, 1) <= 0 inside a counter-clockwise triangle, shape (3, 3)."""
     rows = np.zeros((3, 3))

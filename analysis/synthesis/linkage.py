@@ -42,6 +42,15 @@ def wrapped(angle: FloatArray) -> FloatArray:
     return value
 
 
+def transmission_excess(l3: Any, l4: Any, nearest: Any, farthest: Any, cosine: Any) -> tuple[Any, Any]:
+    """Left sides of g <= 0 by which |cos mu| at C is at most a cosine, without division; of numbers, arrays and symbols.
+
+    ``nearest`` and ``farthest`` are the squares of the least and the greatest distance from B to D.
+    """
+    joint, product = l3 * l3 + l4 * l4, 2.0 * l3 * l4 * cosine
+    return joint - nearest - product, farthest - joint - product
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class SliderMotion:
     """The rocker pivot D moves along a guide as a Fourier series of the crank's rotation.

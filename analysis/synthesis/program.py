@@ -19,8 +19,8 @@ from numpy.typing import NDArray
 from linkwork.errors import InputError
 
 from ..numerics import symbolic
-from .constraints import TURNING, UNKNOWNS, Limits, half_planes, transmission
-from .linkage import BY_SHORTEST
+from .constraints import TURNING, UNKNOWNS, Limits, half_planes
+from .linkage import BY_SHORTEST, transmission_excess
 from .starts import Answer, CrankUnknown, PivotUnknown, SliderUnknown, Start, inside, pivot_bounds, pivot_size
 from .tasks import Normal
 from .user_functions import physical, traced
@@ -251,7 +251,7 @@ class Program:
     def _transmitting(self, p: Any, nearest: Any, farthest: Any, least: float, tilt: Any) -> None:
         """|cos mu| is at most cos(least), and at most the tilt: for squares of the distance BD, written without division."""
         for cosine in (cos(max(least, TURNING)), *([] if tilt is None else [tilt])):
-            for excess in transmission(p.coupler_length, p.rocker_length, nearest, farthest, cosine):
+            for excess in transmission_excess(p.coupler_length, p.rocker_length, nearest, farthest, cosine):
                 self._at_most(excess, "transmission angle")
 
     def _reach(self, p: Any, v: Any, x: Any) -> Any:

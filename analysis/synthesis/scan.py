@@ -22,9 +22,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import qmc
 
-from .constraints import TURNING, InfeasibleError, Limits, transmission
+from .constraints import TURNING, InfeasibleError, Limits
 from .kernels import many_directions, match_windows
-from .linkage import BY_SHORTEST
+from .linkage import BY_SHORTEST, transmission_excess
 from .starts import Start, apart
 from .tasks import Normal
 
@@ -126,7 +126,7 @@ def _allowed(shapes: FloatArray, limits: Limits) -> NDArray[np.bool_]:
     l1, l2, l3, l4 = links.T
     allowed = np.ones(len(shapes), dtype=bool)
     if limits.turn is not None:
-        for excess in transmission(l3, l4, (l1 - l2) ** 2, (l1 + l2) ** 2, cos(max(limits.turn, TURNING))):
+        for excess in transmission_excess(l3, l4, (l1 - l2) ** 2, (l1 + l2) ** 2, cos(max(limits.turn, TURNING))):
             allowed &= excess <= 0.0
     if limits.grashof is not None:
         order = np.sort(links, axis=1)
