@@ -93,7 +93,7 @@ FEW = Search(candidates=1 << 12, starts=4)
 
 
 @njit
-def _curves(repeats, c, s, zero, q, out):  # type: ignore[no-untyped-def]
+def _curves(repeats, c, s, zero, q, out):
     total = 0.0
     for _ in range(repeats):
         # never the same linkage twice, and a result that is used: nothing to be left out by the compiler
@@ -104,7 +104,7 @@ def _curves(repeats, c, s, zero, q, out):  # type: ignore[no-untyped-def]
 
 
 @njit
-def _jacobians(repeats, c, s, zero, q, out, jacobian):  # type: ignore[no-untyped-def]
+def _jacobians(repeats, c, s, zero, q, out, jacobian):
     total = 0.0
     for _ in range(repeats):
         q[8] += 1e-9
@@ -165,7 +165,7 @@ def _kernel_times_of_pylinkage(linkage: Linkage, n: int) -> dict[str, float]:
     arrays = (data.constraints, data.joint_types, data.parent_indices, data.constraint_offsets, data.solve_order)
 
     @njit
-    def loop(repeats, positions, constraints, types, parents, offsets, order):  # type: ignore[no-untyped-def]
+    def loop(repeats, positions, constraints, types, parents, offsets, order):
         total = 0.0
         for _ in range(repeats):
             total += simulate(positions, constraints, types, parents, offsets, order, n, 1.0)[0, 4, 0]
@@ -688,7 +688,7 @@ def main(budget: float = BUDGET, names: Sequence[str] = tuple(PROBLEMS)) -> None
     console.print(kernel_table())
     # machine code, CasADi and the workers are loaded before the clock
     for cores in (1, 2):
-        ours(Contest.of(PROBLEMS["ellipse-a"]), n_jobs=cores)
+        ours(Contest.of(PROBLEMS["ellipse-a"]), Search(n_jobs=cores))
     console.print(contest_table(names, budget, console))
     console.print(start_table())
     try:

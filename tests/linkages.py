@@ -1,4 +1,4 @@
-"""Random linkages in the plane, every dimension general."""
+"""Linkages in the plane and a target for the tests: one that is fixed, and random ones, every dimension general."""
 
 from __future__ import annotations
 
@@ -6,8 +6,29 @@ from math import cos, hypot, pi, sqrt
 
 import numpy as np
 from hypothesis import strategies as st
+from numpy.typing import NDArray
 
-from analysis.synthesis import Linkage
+from analysis.synthesis import Linkage, turn
+
+#: A crank-rocker for the tests that move its rocker pivot.
+BASE = Linkage(
+    pivot_x=0.02,
+    pivot_y=-0.03,
+    ground_length=0.20,
+    crank_length=0.06,
+    coupler_length=0.18,
+    rocker_length=0.16,
+    point_distance=0.12,
+    ground_angle=0.3,
+    crank_phase=0.7,
+    point_angle=0.8,
+)
+
+
+def ellipse(n: int) -> NDArray[np.float64]:
+    """The thesis's first target, an ellipse of 20 cm by 10 cm, at n equal steps of the crank; shape (n, 2) in m."""
+    phi = turn(n)
+    return np.column_stack([0.20 + 0.10 * np.cos(phi), 0.15 + 0.05 * np.sin(phi)])
 
 
 def drawn(random: np.random.Generator, *, least: float = 0.3) -> Linkage:

@@ -78,7 +78,7 @@ def slider_motion(
 
 
 def _strategy(chosen: SliderCase) -> tuple[Any, Interrupted | None]:
-    """The simplest mechanism that will do; and what stopped the search, if anything did."""
+    """The simplest mechanism within the tolerance; and the interruption of the search, if there was one."""
     from ..motion import StrategyInterrupted
 
     stopped = None
@@ -99,7 +99,7 @@ def _strategy(chosen: SliderCase) -> tuple[Any, Interrupted | None]:
 
 
 def _moved(chosen: SliderCase) -> tuple[Any, Interrupted | None]:
-    """The best motion, harmonic by harmonic, beside the fixed pivot; and what stopped it, if anything did."""
+    """The best motion, harmonic by harmonic, beside the fixed pivot; and the interruption, if there was one."""
     from ..synthesis import SynthesisInterrupted
 
     stopped = None

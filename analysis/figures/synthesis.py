@@ -45,7 +45,7 @@ TARGET = "#E69F00"
 MM_PER_METRE = 1e3
 #: Length of the longest error vector, as a share of the target's extent.
 LONGEST = 0.12
-#: Rotations at which a scene is looked at to frame it.
+#: Rotations whose positions the frame of a picture must hold.
 FRAMED = 72
 
 

@@ -200,7 +200,7 @@ def shortest_way(miss: FloatArray, travel: FloatArray) -> NDArray[np.intp]:
     """Numbers of the positions, shape (n,), of the closed way of least miss and travel, by dynamic programming.
 
     ``miss`` has shape (n, m), and ``travel`` (m, m) is the cost from a position to the next. Of three turns the middle one is
-    taken, which knows nothing of where they begin and end.
+    taken: the choice of the first and the last position does not reach it.
     """
     n = len(miss)
     cost, sources = np.zeros(miss.shape[1]), []
@@ -399,7 +399,7 @@ class Problem:
         s, r, f = casadi.MX.sym("s", n, d + 1), casadi.MX.sym("r", n, d + 1), casadi.MX.sym("f", n, d)
         spring = casadi.MX.sym("spring", 2)
 
-        # what there is at each collocation point, interval by interval
+        # values at each collocation point, interval by interval
         def row(values: Any) -> Any:
             return casadi.reshape(values.T, 1, n * d)
 

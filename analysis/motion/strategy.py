@@ -210,7 +210,7 @@ class _Trials:
     _met: bool = False
 
     def met(self) -> bool:
-        """Whether the last mechanism will do."""
+        """Whether the last mechanism meets the tolerance without a defect."""
         return self._met
 
     def four_bar(self) -> Solution:
@@ -245,7 +245,7 @@ class _Trials:
             raise StrategyInterrupted(self.result() if self.steps else None) from None
 
     def _step(self, mechanism: str, found: Synthesis | None) -> Solution | None:
-        """Enter a mechanism and say whether it will do."""
+        """Record a mechanism, with the reason why it is taken or not."""
         if found is None:
             self.steps.append(
                 Step(mechanism=mechanism, solution=None, value=inf, reason="none keeps the constraints: moved on")

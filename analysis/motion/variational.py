@@ -17,8 +17,9 @@ a function the rocker has to be at th4*. So the error as a function of u has its
     for a function;
     at an end of the range of u: a limit of assembly (sin(t - s) = 0, BD = l3 + l4 or |l3 - l4|) or an end of the stroke.
 
-The first two kinds are the thesis's (7.6)-(7.15). The third it has not: without it the best may lie in the other assembly,
-past a dead centre. A linkage that keeps its assembly ends there, and one that keeps a least transmission angle before.
+The first two kinds are the thesis's (7.6)-(7.15). The third kind is not in the thesis: without it the best may lie
+in the other assembly, past a dead centre. A linkage that keeps its assembly ends there, and one that keeps a least
+transmission angle before.
 """
 
 from __future__ import annotations
@@ -137,6 +138,18 @@ class _Problem:
     stroke: tuple[float, float]
     least_transmission: float
     assemblies: tuple[int, ...]
+
+    def __post_init__(self) -> None:
+        if isinstance(self.linkage.pivot, SecondCrank):
+            raise ParameterError("pivot", self.linkage.pivot, "be fixed or a slider")
+        if not isfinite(self.guide_angle):
+            raise ParameterError("guide_angle", self.guide_angle, "be a finite number of rad")
+        if not self.stroke[0] <= self.stroke[1]:
+            raise ParameterError("stroke", self.stroke, "be a least and a greatest slider position in m")
+        if not 0.0 <= self.least_transmission < 0.5 * pi:
+            raise ParameterError("least_transmission", self.least_transmission, "be from 0 to less than pi/2 rad")
+        if not self.assemblies or not set(self.assemblies) <= {1, -1}:
+            raise ParameterError("assemblies", self.assemblies, "be of +1 and -1")
 
     @property
     def labels(self) -> tuple[NDArray[np.str_], NDArray[np.int64]]:
@@ -301,7 +314,8 @@ def variational_motion(
     w = np.ones(n) if weights is None else np.array(weights, dtype=float)
     if w.shape != (n,) or not np.isfinite(w).all() or w.min() < 0.0:
         raise InputError(f"weights of shape {w.shape} at {n} rotations: they must be ({n},), finite and not negative")
-    _check(linkage, aim.ndim == 2, guide_angle, stroke, least_transmission, assemblies)
+    if aim.ndim == 2 and linkage.point_distance == 0.0:
+        raise ParameterError("point_distance", 0.0, "not be zero: the slider does not move the crank pin")
     problem = _Problem(
         linkage=linkage,
         guide_angle=float(guide_angle),
@@ -336,29 +350,6 @@ def variational_motion(
         jumps=steps[~bridged[steps, choice[steps], choice[(steps + 1) % n]]],
         guide_angle=problem.guide_angle,
     )
-
-
-def _check(
-    linkage: Linkage,
-    path: bool,
-    guide_angle: float,
-    stroke: tuple[float, float],
-    least_transmission: float,
-    assemblies: tuple[int, ...] | None,
-) -> None:
-    """Refuse what makes no sense."""
-    if isinstance(linkage.pivot, SecondCrank):
-        raise ParameterError("pivot", linkage.pivot, "be fixed or a slider")
-    if path and linkage.point_distance == 0.0:
-        raise ParameterError("point_distance", 0.0, "not be zero: the slider does not move the crank pin")
-    if not isfinite(guide_angle):
-        raise ParameterError("guide_angle", guide_angle, "be a finite number of rad")
-    if not stroke[0] <= stroke[1]:
-        raise ParameterError("stroke", stroke, "be a least and a greatest slider position in m")
-    if not 0.0 <= least_transmission < 0.5 * pi:
-        raise ParameterError("least_transmission", least_transmission, "be from 0 to less than pi/2 rad")
-    if assemblies is not None and (not assemblies or not set(assemblies) <= {1, -1}):
-        raise ParameterError("assemblies", assemblies, "be of +1 and -1")
 
 
 def _wrapped(angle: FloatArray) -> FloatArray:

@@ -30,7 +30,7 @@ from linkwork.five_bar import kinematics
 
 from ..numerics.tracing import rebound
 from .constraints import TURNING, UNKNOWNS, Limits, Require, half_planes
-from .linkage import BY_SHORTEST
+from .linkage import BY_SHORTEST, transmission_excess
 from .polish import Polished, kept_of, quality_of
 from .search import USUAL_SEARCH, Search, over_cores
 from .starts import Answer, Start
@@ -380,14 +380,9 @@ class BlackBox:
                 ("loop closure", np.abs(l3 - l4) - nearest),
             ]
             if least is not None:
-                cosine = cos(max(least, TURNING))
-                joint, product = l3 * l3 + l4 * l4, 2.0 * l3 * l4 * cosine
                 # as lengths, so that no constraint outweighs another
-                size = l3 + l4
-                found += [
-                    ("transmission angle", (joint - nearest**2 - product) / size),
-                    ("transmission angle", (farthest**2 - joint - product) / size),
-                ]
+                both = transmission_excess(l3, l4, nearest**2, farthest**2, cos(max(least, TURNING)))
+                found += [("transmission angle", excess / (l3 + l4)) for excess in both]
         if limits.grashof is not None:
             links = q[:, 2:6]
             order = np.sort(links, axis=1)

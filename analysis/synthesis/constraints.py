@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from linkwork.errors import InputError, LinkworkError, ParameterError
 
 from .kernels import PLACES
-from .linkage import ANGLES, LINKS, names_of
+from .linkage import ANGLES, LINKS
 from .tasks import Normal, RockerFunction, Task
 
 FloatArray = NDArray[np.float64]
@@ -218,7 +218,7 @@ def limits_of(
     Raises
     ------
     ParameterError
-        If a bound's name is none of a dimension, or its ends are the wrong way round.
+        If a bound does not have the name of a dimension, or its ends are in the wrong order.
     InfeasibleError
         If they contradict one another.
     """
@@ -227,7 +227,9 @@ def limits_of(
     if not isinstance(constraints, Sequence):
         raise InputError(f"constraints are {constraints!r}: they must be a sequence, even of one")
     bounds = dict(bounds or {})
-    names_of(bounds)
+    for name in bounds:
+        if name not in UNKNOWNS:
+            raise ParameterError(name, bounds[name], f"have the name of a dimension: {', '.join(sorted(UNKNOWNS))}")
     for c in constraints:
         if not isinstance(c, Constraint):
             raise InputError(

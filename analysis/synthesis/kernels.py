@@ -17,9 +17,12 @@ from math import atan2, cos, sin
 import numpy as np
 from numba import complex128, float64, int64, void
 
-from linkwork.five_bar.kinematics import joined
+from linkwork.five_bar import kinematics
 
-from ..numerics.codegen import CUBE, MATRIX, VECTOR, kernel
+from ..numerics.codegen import CUBE, MATRIX, VECTOR, inner, kernel
+
+#: The plant's own loop closure.
+joined = inner(kinematics.joined)
 
 #: The vector q: fields of `analysis.synthesis.Linkage`.
 PLACES = (
@@ -39,7 +42,7 @@ COLUMNS = (*PLACES, "dx", "dy")
 
 
 @kernel(void(VECTOR, VECTOR, VECTOR, VECTOR, VECTOR, float64, MATRIX), purpose="the curves of linkages")
-def coupler_path(c, s, dx, dy, q, branch, out):  # type: ignore[no-untyped-def]
+def coupler_path(c, s, dx, dy, q, branch, out):
     """Coupler point in the plane: out[0] = x, out[1] = y, shape (2, n)."""
     l1, l2, l3, l4 = q[2], q[3], q[4], q[5]
     ct, st = cos(q[8]), sin(q[8])
@@ -58,7 +61,7 @@ def coupler_path(c, s, dx, dy, q, branch, out):  # type: ignore[no-untyped-def]
 
 
 @kernel(void(VECTOR, VECTOR, VECTOR, VECTOR, VECTOR, float64, MATRIX, CUBE), purpose="the curves of linkages")
-def coupler_path_jacobian(c, s, dx, dy, q, branch, out, jac):  # type: ignore[no-untyped-def]
+def coupler_path_jacobian(c, s, dx, dy, q, branch, out, jac):
     """The same, and its derivatives: jac[k, 0] = dx/d(k), jac[k, 1] = dy/d(k) for k in `COLUMNS`, shape (12, 2, n)."""
     l1, l2, l3, l4 = q[2], q[3], q[4], q[5]
     ct, st = cos(q[8]), sin(q[8])
@@ -108,7 +111,7 @@ def coupler_path_jacobian(c, s, dx, dy, q, branch, out, jac):  # type: ignore[no
 
 
 @kernel(void(VECTOR, VECTOR, VECTOR, VECTOR, VECTOR, float64, MATRIX), purpose="the curves of linkages")
-def link_directions(c, s, dx, dy, q, branch, out):  # type: ignore[no-untyped-def]
+def link_directions(c, s, dx, dy, q, branch, out):
     """Directions of coupler and rocker: out = c3, s3, c4, s4, c43, s43, shape (6, n)."""
     l1, l2, l3, l4 = q[2], q[3], q[4], q[5]
     ct, st = cos(q[8]), sin(q[8])
@@ -125,7 +128,7 @@ def link_directions(c, s, dx, dy, q, branch, out):  # type: ignore[no-untyped-de
 
 
 @kernel(void(VECTOR, VECTOR, VECTOR, VECTOR, VECTOR, float64, MATRIX, CUBE), purpose="the curves of linkages")
-def link_jacobian(c, s, dx, dy, q, branch, out, jac):  # type: ignore[no-untyped-def]
+def link_jacobian(c, s, dx, dy, q, branch, out, jac):
     """Angles of coupler and rocker from the ground link, out = th3, th4 in (-pi, pi], shape (2, n), and their derivatives.
 
     jac[k, 0] = dth3/d(k), jac[k, 1] = dth4/d(k) for k in `COLUMNS`, shape (12, 2, n): loop closure differentiated, projected on
@@ -159,7 +162,7 @@ def link_jacobian(c, s, dx, dy, q, branch, out, jac):  # type: ignore[no-untyped
 
 
 @kernel(void(VECTOR, VECTOR, MATRIX, float64, complex128[:, ::1], complex128[:, ::1]), purpose="the curves of linkages")
-def many_directions(c, s, shapes, branch, coupler, rocker):  # type: ignore[no-untyped-def]
+def many_directions(c, s, shapes, branch, coupler, rocker):
     """Directions of coupler and rocker, from the ground link, of many four-bars at the same crank rotations.
 
     ``shapes`` has the rows (l2/l1, l3/l1, l4/l1, crank phase), shape (m, 4); the directions come as complex numbers, shape
@@ -177,7 +180,7 @@ def many_directions(c, s, shapes, branch, coupler, rocker):  # type: ignore[no-u
 
 
 @kernel(void(complex128[:, ::1], complex128[::1], int64[::1], int64[::1], MATRIX), purpose="the curves of linkages")
-def match_windows(curves, target, starts, spans, best):  # type: ignore[no-untyped-def]
+def match_windows(curves, target, starts, spans, best):
     """The piece of each curve that a target looks most alike, up to a similarity: for open targets.
 
     Each curve is given at even steps of the crank over a turn, shape (m, n); a piece begins at one of ``starts`` and goes over

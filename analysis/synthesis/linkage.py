@@ -11,8 +11,7 @@ evaluated by `analysis.synthesis.kernels`.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, replace
 from math import cos, hypot, isfinite, pi, sin
 from typing import Any
 
@@ -33,8 +32,23 @@ LENGTHS = ("pivot_x", "pivot_y", *LINKS, "point_distance")
 ANGLES = ("ground_angle", "crank_phase", "point_angle", "output_angle")
 #: Grashof's types of a four-bar of which a link turns fully, by the shortest link in the order of `LINKS`.
 BY_SHORTEST = ("drag-link", "crank-rocker", "double-rocker", "rocker-crank")
-#: Crank rotations over which a full turn is looked at.
+#: Crank rotations at which a full turn is evaluated.
 TURN = 360
+
+
+def wrapped(angle: FloatArray) -> FloatArray:
+    """Angles within half a turn of zero, in [-pi, pi)."""
+    value: FloatArray = (angle + pi) % (2.0 * pi) - pi
+    return value
+
+
+def transmission_excess(l3: Any, l4: Any, nearest: Any, farthest: Any, cosine: Any) -> tuple[Any, Any]:
+    """Left sides of g <= 0 by which |cos mu| at C is at most a cosine, without division; of numbers, arrays and symbols.
+
+    ``nearest`` and ``farthest`` are the squares of the least and the greatest distance from B to D.
+    """
+    joint, product = l3 * l3 + l4 * l4, 2.0 * l3 * l4 * cosine
+    return joint - nearest - product, farthest - joint - product
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -314,8 +328,8 @@ class Linkage:
     def transmission_range(self) -> tuple[float, float]:
         """Least and greatest angle between coupler and rocker at C over a turn (rad), in [0, pi].
 
-        With a fixed pivot it is at its extremes with the crank along the ground link; with a moving one it is looked for over
-        `TURN` rotations. Where the crank cannot turn fully the extremes are 0 or pi.
+        With a fixed pivot it is at its extremes with the crank along the ground link; with a moving one it is found over `TURN`
+        rotations. Where the crank cannot turn fully the extremes are 0 or pi.
         """
         l3, l4 = self.coupler_length, self.rocker_length
         if self.pivot is None:
@@ -432,17 +446,3 @@ class Linkage:
             ground_inclination=self.ground_angle,
             assembly_branch=self.branch,
         )
-
-
-def names_of(values: Mapping[str, Any]) -> None:
-    """Make sure that these are names of a linkage's dimensions.
-
-    Raises
-    ------
-    ParameterError
-        If one is not.
-    """
-    known = {f.name for f in fields(Linkage)} - {"branch", "pivot"}
-    for name in values:
-        if name not in known:
-            raise ParameterError(name, values[name], f"have the name of a dimension: {', '.join(sorted(known))}")

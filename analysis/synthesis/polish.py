@@ -20,7 +20,8 @@ from linkwork.errors import InputError
 
 from .constraints import Limits
 from .kernels import coupler_path_jacobian, link_jacobian
-from .program import Program
+from .linkage import wrapped
+from .program import Objective, Program
 from .search import USUAL_SEARCH, Search, over_cores
 from .starts import Answer, PivotUnknown, SliderUnknown, Start, apart, inside
 from .tasks import Normal
@@ -45,7 +46,7 @@ EXACT = 1e-14
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Polished:
-    """What became of starts: answers that keep every constraint, best first, and the others."""
+    """The answers of all starts: those that keep every constraint, best first, and the others."""
 
     kept: tuple[Answer, ...]
     others: tuple[Answer, ...]
@@ -86,7 +87,7 @@ def polish(
     fitted = worker.fit_all if cores == 1 else partial(_batch, normal, limits, pivot)
     parts, interrupted = over_cores(fitted, batches, search, "polish")
     found = [answer for part in parts for answer in part]
-    # heard after the last of them it has nothing to stop
+    # an interruption after the last search has nothing to stop
     interrupted = interrupted and len(found) < len(starts)
     kept = kept_of(found)
     if not interrupted:
@@ -135,10 +136,10 @@ class Polisher:
         self.by_least_squares = limits.bounds_only and pivot is None and normal.straight is None and few
         self._programs: dict[str, Program] = {}
 
-    def program(self, objective: str) -> Program:
+    def program(self, objective: Objective) -> Program:
         """The program with this objective."""
         if objective not in self._programs:
-            self._programs[objective] = Program(self.normal, self.limits, self.pivot, objective)  # type: ignore[arg-type]
+            self._programs[objective] = Program(self.normal, self.limits, self.pivot, objective)
         return self._programs[objective]
 
     def fit(self, start: Start) -> Answer:
@@ -235,7 +236,7 @@ def residuals(
         own = np.column_stack([jacobian[:10, which].T, np.ones(n)])
         own[:, 7] += 0.0 if normal.of_rocker else 1.0
         factor = normal.leverage * root
-        parts.append(factor * ((left + pi) % (2.0 * pi) - pi))
+        parts.append(factor * wrapped(left))
         jacobians.append(factor[:, None] * own)
         rates.append(factor * jacobian[8, which])
     return np.concatenate(parts), np.concatenate(jacobians), np.concatenate(rates)

@@ -22,7 +22,7 @@ from ..mechanisms import FIVE_BAR
 from ..numerics import symbolic
 from ..run import traced as equations
 from .constraints import TURNING, UNKNOWNS, Limits, half_planes
-from .linkage import BY_SHORTEST
+from .linkage import BY_SHORTEST, transmission_excess
 from .starts import Answer, CrankUnknown, PivotUnknown, SliderUnknown, Start, inside, pivot_bounds, pivot_size
 from .tasks import Normal
 from .user_functions import physical, traced
@@ -194,10 +194,10 @@ class Program:
                 quality = casadi.sum1(weights * (ex**2 + ey**2))
             if turned is not None:
                 quality = quality + normal.leverage**2 * casadi.sum1(weights * turned**2)
-        straight = normal.straight
-        if straight is not None:
+        straight, points = normal.straight, normal.points
+        if straight is not None and points is not None:
             part = slice(straight.start, straight.end + 1)
-            line = normal.points[straight.end] - normal.points[straight.start]  # type: ignore[index]
+            line = points[straight.end] - points[straight.start]
             line /= abs(line)
             off = (ey * line.real - ex * line.imag)[part]
             spent = phi[straight.end] - phi[straight.start]
@@ -209,7 +209,7 @@ class Program:
                 half = 0.5 * straight.flatness
                 # along the straight line through the part's ends, at the stations and in between
                 x, y = self._closed(p, v, self._way(phi[part])[0], branch)[1]
-                begin = normal.points[straight.start]  # type: ignore[index]
+                begin = points[straight.start]
                 away = (y - begin.imag) * line.real - (x - begin.real) * line.imag
                 self._within(away - level, -half, half, "flatness of the straight part")
         return quality
@@ -252,12 +252,9 @@ class Program:
 
     def _transmitting(self, p: Any, nearest: Any, farthest: Any, least: float, tilt: Any) -> None:
         """|cos mu| is at most cos(least), and at most the tilt: for squares of the distance BD, written without division."""
-        l3, l4 = p.coupler_length, p.rocker_length
-        joint = l3 * l3 + l4 * l4
         for cosine in (cos(max(least, TURNING)), *([] if tilt is None else [tilt])):
-            product = 2.0 * l3 * l4 * cosine
-            self._at_most(joint - nearest - product, "transmission angle")
-            self._at_most(farthest - joint - product, "transmission angle")
+            for excess in transmission_excess(p.coupler_length, p.rocker_length, nearest, farthest, cosine):
+                self._at_most(excess, "transmission angle")
 
     def _reach(self, p: Any, v: Any, x: Any) -> Any:
         """Square of the distance from crank pin to rocker pivot at rotations."""

@@ -24,7 +24,7 @@ from scipy.stats import qmc
 
 from .constraints import TURNING, InfeasibleError, Limits
 from .kernels import many_directions, match_windows
-from .linkage import BY_SHORTEST
+from .linkage import BY_SHORTEST, transmission_excess
 from .starts import Start, apart
 from .tasks import Normal
 
@@ -126,9 +126,8 @@ def _allowed(shapes: FloatArray, limits: Limits) -> NDArray[np.bool_]:
     l1, l2, l3, l4 = links.T
     allowed = np.ones(len(shapes), dtype=bool)
     if limits.turn is not None:
-        cosine = cos(max(limits.turn, TURNING))
-        joint, product = l3 * l3 + l4 * l4, 2.0 * l3 * l4 * cosine
-        allowed &= (joint - (l1 - l2) ** 2 <= product) & ((l1 + l2) ** 2 - joint <= product)
+        for excess in transmission_excess(l3, l4, (l1 - l2) ** 2, (l1 + l2) ** 2, cos(max(limits.turn, TURNING))):
+            allowed &= excess <= 0.0
     if limits.grashof is not None:
         order = np.sort(links, axis=1)
         excess = order[:, 0] + order[:, 3] - order[:, 1] - order[:, 2]

@@ -77,7 +77,7 @@ QUICK_SEARCH = Search(starts=12)
 def over_cores(
     work: Callable[[Item], Made], items: Sequence[Item], search: Search, what: str
 ) -> tuple[list[Made], bool]:
-    """What becomes of every item, in their order whatever the cores; on Ctrl-C of those that were done, and True."""
+    """The results of all items, in their order on any number of cores; on Ctrl-C of those that were done, and True."""
     made: dict[int, Made] = {}
     with interruptible() as interrupted, shown(search.progress, float(len(items)), what) as show:
         if search.cores == 1:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from linkwork.errors import InputError
 
 from .kernels import PLACES
-from .linkage import ANGLES, LENGTHS, LINKS, Linkage, SecondCrank, SliderMotion
+from .linkage import ANGLES, LENGTHS, LINKS, Linkage, SecondCrank, SliderMotion, wrapped
 from .solution import CURVE, Solution, evaluate, nearest_rotations, path_rate
 from .tasks import Normal, RockerFunction, UntimedPath, normal_form
 
@@ -89,7 +89,7 @@ def derivatives(solution: Solution) -> tuple[list[str], FloatArray, FloatArray, 
     at = normal.rotation if normal.rotation is not None else solution.evaluation.rotation
     if at is None:
         assert normal.points is not None
-        at = nearest_rotations(linkage, normal.origin + normal.unit * normal.points)
+        at = nearest_rotations(linkage, normal.places)
     weights = np.tile(normal.weights, 1 if normal.points is None or isinstance(task, UntimedPath) else 2)
     if normal.points is not None and normal.angle is not None:
         weights = np.append(weights, normal.weights)
@@ -98,11 +98,11 @@ def derivatives(solution: Solution) -> tuple[list[str], FloatArray, FloatArray, 
 
 def _residuals(linkage: Linkage, normal: Normal, at: FloatArray, across: bool) -> tuple[FloatArray, FloatArray]:
     """Derivatives (m, k) of the residuals, and residuals (m,): of points, ``across`` the curve or x and y; of angles."""
-    columns = [column for _, column in _pivot_columns(linkage, at)]
+    columns = [column for _, _, column in _pivot(linkage, at)]
     angular = normal.angle is not None
     parts, blocks = [], []
     if normal.points is not None:
-        points = normal.origin + normal.unit * normal.points
+        points = normal.places
         place, jacobian = linkage.path_jacobian(at)
         left = place @ np.array([1.0, 1j]) - points
         both = jacobian[:, 0] + 1j * jacobian[:, 1]
@@ -129,7 +129,7 @@ def _residuals(linkage: Linkage, normal: Normal, at: FloatArray, across: bool) -
         if not normal.of_rocker:
             own[:, PLACES.index("ground_angle")] += 1.0
         leverage = normal.leverage * normal.unit
-        parts.append(leverage * ((left_angle + pi) % (2.0 * pi) - pi))
+        parts.append(leverage * wrapped(left_angle))
         blocks.append(leverage * own)
     return np.vstack(blocks), np.concatenate(parts)
 
@@ -143,7 +143,7 @@ def sensitivities(solution: Solution) -> tuple[Sensitivity, ...]:
     slopes = 2.0 * jacobian.T @ (weights * residual)
     stations = len(normal_form(solution.task).weights)
     shifts = np.sqrt((jacobian**2).sum(axis=0) / stations)
-    values = solution.linkage.values() | _pivot_values(solution.linkage)
+    values = _values(solution.linkage)
     # a rocker's angle has nothing to do with where the linkage stands, nor with its coupler point
     idle = set(PLACES) - {*LINKS, "crank_phase"} if isinstance(solution.task, RockerFunction) else set()
     return tuple(
@@ -198,7 +198,7 @@ def _expected(solution: Solution, steps: Mapping[str, float]) -> float:
             # the crank rotations follow
             assert normal.points is not None
             ends = () if normal.closed or given is None else (float(given.min()), float(given.max()))
-            at = nearest_rotations(made, normal.origin + normal.unit * normal.points, *ends)
+            at = nearest_rotations(made, normal.places, *ends)
         assert at is not None
         return _residuals(made, normal, at, isinstance(task, UntimedPath))
 
@@ -267,49 +267,37 @@ def _mean_absolute(mean: FloatArray, spread: FloatArray) -> FloatArray:
 def _names(linkage: Linkage, normal: Normal) -> list[str]:
     """Dimensions that there are derivatives with respect to, in their order."""
     mounted = [] if normal.angle is None else ["output_angle"]
-    return [*PLACES, *mounted, *[name for name, _ in _pivot_columns(linkage, np.zeros(1))]]
+    return [*PLACES, *mounted, *(name for name, _, _ in _pivot(linkage, np.zeros(1)))]
 
 
-def _pivot_columns(linkage: Linkage, at: FloatArray) -> list[tuple[str, tuple[FloatArray, FloatArray]]]:
-    """Dimensions of a moved pivot, and the derivatives of its displacement with respect to each."""
+def _pivot(linkage: Linkage, at: FloatArray) -> list[tuple[str, float, tuple[FloatArray, FloatArray]]]:
+    """Dimensions of a moved pivot: name, value, and the derivatives of its displacement at crank rotations."""
     pivot = linkage.pivot
-    columns: list[tuple[str, tuple[FloatArray, FloatArray]]] = []
     if isinstance(pivot, SliderMotion):
-        c, s = np.cos(pivot.guide_angle), np.sin(pivot.guide_angle)
-        u = pivot.series(at)
-        columns.append(("guide_angle", (-s * u, c * u)))
-        for k in range(pivot.series.order + 1):
-            for kind, value in (("cos", np.cos(k * at)), ("sin", np.sin(k * at)))[: 1 if k == 0 else 2]:
-                columns.append((f"slider {kind} {k}", (c * value, s * value)))
+        c, s, u = np.cos(pivot.guide_angle), np.sin(pivot.guide_angle), pivot.series(at)
+        own, first, along = "slider", 0, (c, s)
+        found = [("guide_angle", pivot.guide_angle, (-s * u, c * u))]
     elif isinstance(pivot, SecondCrank):
-        psi = pivot.angle(at)
-        turned = -pivot.length * np.sin(psi), pivot.length * np.cos(psi)
-        columns += [(SECOND, (np.cos(psi), np.sin(psi))), ("second_crank_phase", turned)]
+        c, s = np.cos(pivot.angle(at)), np.sin(pivot.angle(at))
         # the mean of the series is the phase's
-        for k in range(1, pivot.series.order + 1):
-            for kind, value in (("cos", np.cos(k * at)), ("sin", np.sin(k * at))):
-                columns.append((f"second_crank {kind} {k}", (turned[0] * value, turned[1] * value)))
-    return columns
-
-
-def _pivot_values(linkage: Linkage) -> dict[str, float]:
-    pivot = linkage.pivot
-    if isinstance(pivot, SliderMotion):
-        values = {"guide_angle": pivot.guide_angle}
-    elif isinstance(pivot, SecondCrank):
-        values = {SECOND: pivot.length, "second_crank_phase": pivot.phase}
+        own, first, along = "second_crank", 1, (-pivot.length * s, pivot.length * c)
+        found = [(SECOND, pivot.length, (c, s)), ("second_crank_phase", pivot.phase, along)]
     else:
-        return {}
-    own = "slider" if isinstance(pivot, SliderMotion) else "second_crank"
-    for k in range(pivot.series.order + 1):
-        values[f"{own} cos {k}"] = float(pivot.series.cos[k])
-        values[f"{own} sin {k}"] = float(pivot.series.sin[k])
-    return values
+        return []
+    for k in range(first, pivot.series.order + 1):
+        waves = (("cos", pivot.series.cos[k], np.cos(k * at)), ("sin", pivot.series.sin[k], np.sin(k * at)))
+        for kind, value, wave in waves[: 1 if k == 0 else 2]:
+            found.append((f"{own} {kind} {k}", float(value), (along[0] * wave, along[1] * wave)))
+    return found
+
+
+def _values(linkage: Linkage) -> dict[str, float]:
+    return linkage.values() | {name: value for name, value, _ in _pivot(linkage, np.zeros(1))}
 
 
 def _made(linkage: Linkage) -> dict[str, float]:
     """Dimensions that are made, and so are off by something: a commanded motion is not among them."""
-    values = linkage.values() | _pivot_values(linkage)
+    values = _values(linkage)
     return {name: values[name] for name in (*LENGTHS, *ANGLES, SECOND, *PIVOT_ANGLES) if name in values}
 
 

@@ -17,7 +17,8 @@ from linkwork.five_bar.parameters import FiveBarParameters
 from ..files import write_csv
 from .areas import area_between, distance_to, straightness
 from .kernels import PLACES
-from .linkage import Linkage, SecondCrank
+from .linkage import Linkage, SecondCrank, wrapped
+from .targets import halves
 from .tasks import PrecisionPoints, RockerFunction, Task, TimedPath, UntimedPath, normal_form
 
 FloatArray = NDArray[np.float64]
@@ -96,8 +97,7 @@ def evaluate(task: Task, linkage: Linkage, rotation: FloatArray | None = None) -
         raise InputError("the task gives no crank rotations: say at which ones the linkage is to be compared")
     at = np.asarray(given, dtype=float)
     if isinstance(task, RockerFunction):
-        left = linkage.rocker_angle(at) - np.asarray(task.angle)
-        left = (left + pi) % (2.0 * pi) - pi
+        left = wrapped(linkage.rocker_angle(at) - np.asarray(task.angle))
         error = float(np.asarray(task.weights) @ left**2)
         return Evaluation(error=error if np.isfinite(error) else inf, errors=left, angle_errors=None, rotation=at)
     points = np.asarray(task.points)
@@ -106,8 +106,7 @@ def evaluate(task: Task, linkage: Linkage, rotation: FloatArray | None = None) -
     squares = distance**2
     turned, length = None, 0.0
     if not isinstance(task, TimedPath) and task.angle is not None:
-        turned, length = linkage.coupler_angle(at) - np.asarray(task.angle), float(task.length or 0.0)
-        turned = (turned + pi) % (2.0 * pi) - pi
+        turned, length = wrapped(linkage.coupler_angle(at) - np.asarray(task.angle)), float(task.length or 0.0)
         squares = squares + (length * turned) ** 2
     error = float(weights @ squares)
     return Evaluation(
@@ -130,27 +129,19 @@ def _of_path(task: UntimedPath, linkage: Linkage, rotation: FloatArray | None) -
     distance = distance_to(curve, points, closed=path.closed)
     weights = np.asarray(task.weights)
     normal = normal_form(task)
-    assert normal.points is not None
-    if task.measure == "area" and (weights == weights[0]).all():
+    stations = normal.places
+    apart = distance_to(curve, np.column_stack([stations.real, stations.imag]), closed=path.closed)
+    if task.measure == "distance":
+        error = float(normal.weights @ apart**2)
+    elif (weights == weights[0]).all():
         error = float(weights[0]) * area_between(curve, path, closed=path.closed)
-    elif task.measure == "area":
+    else:
         # a weighted area: along the target with its weights, and along the curve with those of the nearest stations, by halves
-        stations = normal.origin + normal.unit * normal.points
-        apart = distance_to(curve, np.column_stack([stations.real, stations.imag]), closed=path.closed)
         traced = curve @ np.array([1.0, 1j])
         steps = np.abs(np.diff(np.append(traced, traced[0]) if path.closed else traced))
-        along = (
-            0.5 * (steps + np.roll(steps, 1)) if path.closed else 0.5 * (np.append(steps, 0.0) + np.append(0.0, steps))
-        )
         nearest = np.abs(traced[:, None] - stations[None, :]).argmin(axis=1)
-        back = distance_to(points, curve, closed=path.closed)
-        error = 0.5 * float(
-            normal.weights @ (normal.unit * normal.arc * apart) + normal.weights[nearest] @ (along * back)
-        )
-    else:
-        stations = normal.origin + normal.unit * normal.points
-        apart = distance_to(curve, np.column_stack([stations.real, stations.imag]), closed=path.closed)
-        error = float(normal.weights @ apart**2)
+        back = halves(steps, path.closed) * distance_to(points, curve, closed=path.closed)
+        error = 0.5 * float(normal.weights @ (normal.unit * normal.arc * apart) + normal.weights[nearest] @ back)
     return Evaluation(error=error, errors=distance, angle_errors=None, rotation=rotation)
 
 
@@ -201,7 +192,7 @@ class Verdicts:
 def judge(linkage: Linkage, rotation: FloatArray, *, closed: bool) -> Verdicts:
     """Verdicts over the crank rotations from the first to the last of ``rotation``, or over a turn.
 
-    The distance from crank pin to rocker pivot, on which everything depends, is looked at densely and, with a fixed pivot,
+    The distance from crank pin to rocker pivot, on which everything depends, is evaluated densely and, with a fixed pivot,
     where the crank lies along the ground link.
     """
     steps = np.diff(rotation)
@@ -242,7 +233,7 @@ def _kind(linkage: Linkage) -> str:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StraightPart:
-    """The straight part of a path as it is traced, looked at densely.
+    """The straight part of a path as it is traced, evaluated densely.
 
     Attributes
     ----------

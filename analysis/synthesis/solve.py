@@ -243,7 +243,7 @@ def _start(of: Linkage | Solution, normal: Normal, pivot: PivotUnknown | None) -
         rotation = None
     elif rotation is None or len(rotation) != normal.n:
         if normal.points is not None and normal.closed:
-            rotation = nearest_rotations(linkage, normal.origin + normal.unit * normal.points)
+            rotation = nearest_rotations(linkage, normal.places)
         elif rotation is None:
             raise InputError("a start for an open path needs the crank rotations of its stations")
         else:

@@ -14,7 +14,7 @@ from linkwork.errors import ParameterError
 
 from ..numerics.fourier import FourierSeries
 from .constraints import UNKNOWNS, Limits
-from .linkage import Linkage, SecondCrank, SliderMotion
+from .linkage import Linkage, SecondCrank, SliderMotion, wrapped
 from .tasks import Normal
 
 FloatArray = NDArray[np.float64]
@@ -132,7 +132,7 @@ class Start:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Answer:
-    """What IPOPT says: where it ended, whether that satisfies every constraint, which it violates most, and its own word."""
+    """Where an optimiser ended, whether every constraint is satisfied there, which is violated most, and its status."""
 
     start: Start
     feasible: bool
@@ -201,7 +201,7 @@ def inside(q: FloatArray, low: FloatArray, high: FloatArray) -> FloatArray:
     q = q.copy()
     angles = slice(UNKNOWNS.index("ground_angle"), len(UNKNOWNS))
     middle = 0.5 * (low[angles] + high[angles])
-    nearest = middle + (q[angles] - middle + pi) % (2.0 * pi) - pi
+    nearest = middle + wrapped(q[angles] - middle)
     outside = (q[angles] < low[angles]) | (q[angles] > high[angles])
     q[angles] = np.where(outside, nearest, q[angles])
     return np.clip(q, low, high)
@@ -216,11 +216,11 @@ def linkage_of(
     q[0] += normal.origin.real
     q[1] += normal.origin.imag
     angles = slice(UNKNOWNS.index("ground_angle"), len(UNKNOWNS))
-    wrapped = (q[angles] + pi) % (2.0 * pi) - pi
+    near = wrapped(q[angles])
     if limits is not None:
-        outside = (wrapped < limits.low[angles]) | (wrapped > limits.high[angles])
-        wrapped = np.where(outside, q[angles], wrapped)
-    q[angles] = wrapped
+        outside = (near < limits.low[angles]) | (near > limits.high[angles])
+        near = np.where(outside, q[angles], near)
+    q[angles] = near
     v = start.pivot
     moved: SliderMotion | SecondCrank | None = None
     if isinstance(pivot, SliderUnknown) and len(v):

@@ -71,6 +71,14 @@ def arc_lengths(vertices: FloatArray) -> FloatArray:
     return np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(vertices, axis=0).T))])
 
 
+def halves(lengths: FloatArray, closed: bool) -> FloatArray:
+    """Half of both segments at each point of a polyline, from the lengths of its segments."""
+    before = np.roll(lengths, 1) if closed else np.append(0.0, lengths)
+    after = lengths if closed else np.append(lengths, 0.0)
+    both: FloatArray = 0.5 * (before + after)
+    return both
+
+
 def along(vertices: FloatArray, s: ArrayLike) -> FloatArray:
     """Points of a polyline at arc lengths s, shape (len(s), 2)."""
     lengths = arc_lengths(vertices)
@@ -221,11 +229,7 @@ class TargetPath:
     @property
     def weights(self) -> FloatArray:
         """Arc length that belongs to each point: half of both segments at it (m), shape (n,); their sum is the length."""
-        lengths = self._segments()[1]
-        before = np.roll(lengths, 1) if self.closed else np.append(0.0, lengths)
-        after = lengths if self.closed else np.append(lengths, 0.0)
-        halves: FloatArray = 0.5 * (before + after)
-        return halves
+        return halves(self._segments()[1], self.closed)
 
     @property
     def normals(self) -> FloatArray:

@@ -13,14 +13,14 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from math import hypot, isfinite, pi
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from linkwork.errors import InputError
 
-from .targets import TargetPath
+from .targets import TargetPath, halves
 
 FloatArray = NDArray[np.float64]
 Measure = Literal["area", "distance"]
@@ -55,7 +55,9 @@ def _numbers(values: ArrayLike, what: str, n: int) -> FloatArray:
     return numbers
 
 
-def _rotation(values: ArrayLike, n: int) -> FloatArray:
+def _rotation(values: ArrayLike | None, n: int) -> FloatArray:
+    if values is None:
+        return turn(n)
     rotation = _numbers(values, "crank rotations", n)
     steps = np.diff(rotation)
     if not (np.all(steps > 0.0) or np.all(steps < 0.0)):
@@ -78,6 +80,12 @@ def _weights(values: ArrayLike | None, n: int) -> FloatArray:
         k = int(np.argmin(weights))
         raise InputError(f"weight {k} is {weights[k]:g}: none may be below zero, nor all be zero")
     return weights
+
+
+def _set(task: Any, **values: Any) -> None:
+    """Set fields of a frozen task as it is made."""
+    for name, value in values.items():
+        object.__setattr__(task, name, value)
 
 
 def turn(n: int) -> FloatArray:
@@ -105,10 +113,8 @@ class TimedPath:
 
     def __post_init__(self) -> None:
         points = _points(self.points, "target points", 2)
-        object.__setattr__(self, "points", points)
-        rotation = turn(len(points)) if self.rotation is None else _rotation(self.rotation, len(points))
-        object.__setattr__(self, "rotation", rotation)
-        object.__setattr__(self, "weights", _weights(self.weights, len(points)))
+        n = len(points)
+        _set(self, points=points, rotation=_rotation(self.rotation, n), weights=_weights(self.weights, n))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -122,7 +128,7 @@ class Straight:
     rotation : float
         Crank rotation within which it must be run through (rad).
     flatness : float, optional
-        Largest extent across the line over that part (m); only wished for, by ``weight``, without.
+        Largest extent across the line over that part (m); without it flatness is only favoured, by ``weight``.
     weight : float
         Of the deviation across the line there.
     """
@@ -179,7 +185,7 @@ class UntimedPath:
             raise InputError(
                 f"the straight part ends at point {self.straight.end}, the path has {len(self.path.points)}"
             )
-        object.__setattr__(self, "weights", _weights(self.weights, len(self.path.points)))
+        _set(self, weights=_weights(self.weights, len(self.path.points)))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -206,10 +212,8 @@ class RockerFunction:
         if angle.ndim != 1 or len(angle) < 3:
             raise InputError(f"target angles have the shape {angle.shape}: they must be a list of at least 3")
         _finite(angle, "target angles")
-        object.__setattr__(self, "angle", angle)
-        rotation = turn(len(angle)) if self.rotation is None else _rotation(self.rotation, len(angle))
-        object.__setattr__(self, "rotation", rotation)
-        object.__setattr__(self, "weights", _weights(self.weights, len(angle)))
+        n = len(angle)
+        _set(self, angle=angle, rotation=_rotation(self.rotation, n), weights=_weights(self.weights, n))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -238,23 +242,22 @@ class Motion:
     def __post_init__(self) -> None:
         points = _points(self.points, "target points", 2)
         n = len(points)
-        object.__setattr__(self, "points", points)
-        object.__setattr__(self, "angle", _numbers(self.angle, "target angles", n))
+        _set(self, points=points, angle=_numbers(self.angle, "target angles", n))
         if self.rotation is not None:
-            object.__setattr__(self, "rotation", _rotation(self.rotation, n))
+            _set(self, rotation=_rotation(self.rotation, n))
         if self.length is None:
-            object.__setattr__(self, "length", 0.5 * _extent(points))
+            _set(self, length=0.5 * _extent(points))
         elif not (isfinite(self.length) and self.length > 0.0):
             raise InputError(f"length is {self.length}: it must be a finite number greater than zero (m/rad)")
-        object.__setattr__(self, "weights", _weights(self.weights, n))
+        _set(self, weights=_weights(self.weights, n))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class PrecisionPoints:
     """The coupler point is to pass exactly through a few points, in their order, at any crank rotations or at given ones.
 
-    A four-bar can do nine untimed points or five timed ones, and rarely with good manners; what cannot be done exactly comes as
-    close as it can. With an ``angle`` they are poses: five untimed.
+    A four-bar can do nine untimed points or five timed ones, and rarely with a good transmission angle; what
+    cannot be done exactly comes as close as it can. With an ``angle`` they are poses: five untimed.
 
     Attributes
     ----------
@@ -273,14 +276,12 @@ class PrecisionPoints:
 
     def __post_init__(self) -> None:
         points = _points(self.points, "precision points", 2)
-        object.__setattr__(self, "points", points)
-        n = len(points)
-        for name in ("angle", "rotation"):
-            if getattr(self, name) is not None:
-                check = _rotation if name == "rotation" else lambda v, m: _numbers(v, "target angles", m)
-                object.__setattr__(self, name, check(getattr(self, name), n))
-        if self.angle is not None and self.length is None:
-            object.__setattr__(self, "length", 0.5 * _extent(points))
+        _set(self, points=points)
+        if self.rotation is not None:
+            _set(self, rotation=_rotation(self.rotation, len(points)))
+        if self.angle is not None:
+            length = 0.5 * _extent(points) if self.length is None else self.length
+            _set(self, angle=_numbers(self.angle, "target angles", len(points)), length=length)
 
 
 Task = TimedPath | UntimedPath | RockerFunction | Motion | PrecisionPoints
@@ -345,6 +346,12 @@ class Normal:
     def n(self) -> int:
         """Number of stations."""
         return len(self.weights)
+
+    @property
+    def places(self) -> NDArray[np.complex128]:
+        """Targets of the coupler point in the plane (m), shape (n,)."""
+        assert self.points is not None
+        return self.origin + self.unit * self.points
 
     @property
     def timed(self) -> bool:
@@ -456,7 +463,6 @@ def _of_path(task: UntimedPath) -> Normal:
     tangent = np.where(np.abs(tangent) < 1e-9 * step, at(s) - at(s - step), tangent)
     tangent /= np.abs(tangent)
     edges = np.diff(np.append(s, length[-1])) if closed else np.diff(s)
-    arc = 0.5 * (edges + np.roll(edges, 1)) if closed else 0.5 * (np.append(edges, 0.0) + np.append(0.0, edges))
     if straight is not None:
         first, last = (int(np.argmin(np.abs(s - length[k]))) for k in (straight.start, straight.end))
         flatness = None if straight.flatness is None else straight.flatness / unit
@@ -473,6 +479,6 @@ def _of_path(task: UntimedPath) -> Normal:
         rotation=None,
         closed=closed,
         normals=1j * tangent if task.measure == "area" else None,
-        arc=arc / unit,
+        arc=halves(edges, closed) / unit,
         straight=straight,
     )

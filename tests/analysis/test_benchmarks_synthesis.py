@@ -171,7 +171,7 @@ def test_what_improves_is_offered() -> None:
     box = contest.boxes[0]
     trace = Trace(contest, 10.0)
     offered: list[float] = []
-    trace.offer = lambda box, x: offered.append(float(x[0]))  # type: ignore[method-assign]
+    trace.offer = lambda box, x: offered.append(float(x[0]))
     score = trace.watched(box, lambda x: float(x[0] ** 2))
     minimize(score, [3.0], method="Nelder-Mead")
     assert offered[0] == 3.0
@@ -183,7 +183,7 @@ def test_what_improves_is_offered() -> None:
 def test_every_search_finds_a_rocker_function(search: object) -> None:
     contest = Contest.of(PROBLEMS["rocker"])
     # a long way from the optimum of 1019, but no linkage at random does it
-    trace = searched(search, contest, 20.0, 3000.0)  # type: ignore[arg-type]
+    trace = searched(search, contest, 20.0, 3000.0)
     assert trace.best <= 3000.0
     assert all(b < a for (_, a), (_, b) in pairwise(trace.points))
 

@@ -42,10 +42,10 @@ from analysis.synthesis.constraints import limits_of
 from analysis.synthesis.polish import Polished, quality_of
 from analysis.synthesis.starts import start_of
 from linkwork.errors import InputError
-from tests.linkages import drawn
+from tests.linkages import drawn, ellipse
 
 FloatArray = NDArray[np.float64]
-ELLIPSE = np.column_stack([0.20 + 0.10 * np.cos(turn(18)), 0.15 + 0.05 * np.sin(turn(18))])
+ELLIPSE = ellipse(18)
 TASK = TimedPath(points=ELLIPSE)
 SMALL = LargestLink(length=0.5)
 
@@ -148,12 +148,12 @@ class TestQuality:
         assert black.quality(x)[0] < 1e-6
         np.testing.assert_allclose(black._rotations(x, black._linkages(x))[0], phi, atol=0.02)
         # backwards they come in order as well, shuffled they do not
-        back = box(replace(task, points=task.points[::-1], angle=None if task.angle is None else task.angle[::-1]))  # type: ignore[index]
+        back = box(replace(task, points=task.points[::-1], angle=None if task.angle is None else task.angle[::-1]))
         assert back.quality(unknowns(back, linkage))[0] < 1e-6
         mixed = np.array([0, 3, 1, 4, 2])
         shuffled = box(
             replace(task, points=task.points[mixed], angle=None if task.angle is None else task.angle[mixed])
-        )  # type: ignore[index, call-overload]
+        )
         assert shuffled.quality(unknowns(shuffled, linkage))[0] > 1e-3
 
     def test_the_order_is_the_best_there_is(self) -> None:
@@ -165,7 +165,7 @@ class TestQuality:
         linkage = drawn(np.random.default_rng(11))
         linkage = replace(linkage, branch=1)
         x = unknowns(black, linkage)
-        points = black.normal.origin + black.normal.unit * black.normal.points  # type: ignore[operator]
+        points = black.normal.origin + black.normal.unit * black.normal.points
         curve = linkage.path(2.0 * pi * np.arange(60) / 60) @ np.array([1.0, 1j])
         brute = min(
             float((np.abs(curve[list(chosen)][::way] - points) ** 2).sum())

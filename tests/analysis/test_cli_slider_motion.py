@@ -30,24 +30,12 @@ from analysis.synthesis import (
     turn,
 )
 from linkwork.errors import InputError, LinkworkError, ParameterError
+from tests.linkages import BASE
 
 pytest.importorskip("casadi")
 
 ROOT = Path(__file__).parents[2]
 EXAMPLE = ROOT / "examples" / "slider-motion.toml"
-#: A four-bar, and the path of its coupler point with D moved.
-BASE = Linkage(
-    pivot_x=0.02,
-    pivot_y=-0.03,
-    ground_length=0.20,
-    crank_length=0.06,
-    coupler_length=0.18,
-    rocker_length=0.16,
-    point_distance=0.12,
-    ground_angle=0.3,
-    crank_phase=0.7,
-    point_angle=0.8,
-)
 MOTION = SliderMotion(FourierSeries(np.array([0.0, 0.012]), np.array([0.0, 0.01])), 0.4)
 LINKAGE = {
     name: f"{getattr(BASE, name)!r} {'rad' if name.endswith(('angle', 'phase')) else 'm'}"

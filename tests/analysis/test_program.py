@@ -50,18 +50,13 @@ from analysis.synthesis.scan import scan
 from analysis.synthesis.starts import Start, linkage_of, start_of
 from analysis.synthesis.tasks import Normal
 from linkwork.errors import InputError, ParameterError
-from tests.linkages import drawn
+from tests.linkages import drawn, ellipse
 
 pytest.importorskip("casadi")
 FloatArray = NDArray[np.float64]
 
 
-def ellipse(n: int = 24) -> FloatArray:
-    phi = turn(n)
-    return np.column_stack([0.20 + 0.10 * np.cos(phi), 0.15 + 0.05 * np.sin(phi)])
-
-
-TASK = TimedPath(points=ellipse())
+TASK = TimedPath(points=ellipse(24))
 #: Four-bars within which the target, 0.22 m across, can be traced.
 SMALL = LargestLink(length=0.5)
 
@@ -80,7 +75,7 @@ class TestOptimum:
         Karush, Kuhn and Tucker: -grad f = sum of multipliers times the gradients of what is active, the multipliers of
         inequalities none below zero. Least squares with such multipliers; as a share of the gradient's parts.
         """
-        z = start.q.copy() if not rotation else np.concatenate([start.q, start.rotation])  # type: ignore[list-item]
+        z = start.q.copy() if not rotation else np.concatenate([start.q, start.rotation])
 
         def quality(x: FloatArray) -> float:
             at = Start(q=x[:11], branch=start.branch, rotation=x[11:] if rotation else None)
@@ -90,7 +85,7 @@ class TestOptimum:
 
         def inequalities(x: FloatArray) -> FloatArray:
             l1, l2, l3, l4 = x[2:6]
-            product = 2.0 * l3 * l4 * math.cos(limits.turn)  # type: ignore[arg-type]
+            product = 2.0 * l3 * l4 * math.cos(limits.turn)
             return np.array(
                 [
                     l3 * l3 + l4 * l4 - (l1 - l2) ** 2 - product,
@@ -363,11 +358,11 @@ class TestWeights:
         heavy = best(*USUAL, LargestLink(length=0.2), weights=weights)
         assert heavy.evaluation.errors[7] < 0.2 * plain.evaluation.errors[7]
         assert heavy.error == pytest.approx(float(weights @ heavy.evaluation.errors**2))
-        same = best(*USUAL, LargestLink(length=0.2), task=TimedPath(points=ellipse(), weights=weights))
+        same = best(*USUAL, LargestLink(length=0.2), task=TimedPath(points=ellipse(24), weights=weights))
         assert same.error == heavy.error
 
     def test_a_weight_of_zero_leaves_a_point_out(self) -> None:
-        points = ellipse()
+        points = ellipse(24)
         points[5] += 0.05
         weights = np.ones(24)
         weights[5] = 0.0
@@ -430,7 +425,7 @@ class TestUntimed:
         known = drawn(np.random.default_rng(8), least=0.9)
         path = TargetPath(points=known.path(turn(180)), closed=True)
         for measure in ("area", "distance"):
-            task = UntimedPath(path=path, measure=measure, samples=48)  # type: ignore[arg-type]
+            task = UntimedPath(path=path, measure=measure, samples=48)
             solution = best(*USUAL, task=task)
             normal = normal_form(task)
             assert solution.error < 5e-3 * normal.unit**2

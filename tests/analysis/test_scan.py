@@ -196,7 +196,7 @@ class TestShapes:
     @pytest.mark.parametrize("type_", ["crank-rocker", "drag-link", "double-rocker", "rocker-crank", "triple-rocker"])
     def test_only_the_type_asked_for_is_tried(self, type_: str) -> None:
         task = TimedPath(points=KNOWN.path(turn(8)))
-        _, limits = stated(task, Grashof(type=type_))  # type: ignore[arg-type]
+        _, limits = stated(task, Grashof(type=type_))
         rows = np.vstack(list(_shapes(limits, 0, 300)))
         # about one in a hundred is a drag link
         assert len(rows) > 100

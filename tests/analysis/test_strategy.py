@@ -35,22 +35,11 @@ from analysis.synthesis import (
 )
 from analysis.synthesis.published import PROBLEMS
 from linkwork.errors import InputError
+from tests.linkages import BASE
 
 pytest.importorskip("casadi")
 
 MM2 = 1e-6
-BASE = Linkage(
-    pivot_x=0.02,
-    pivot_y=-0.03,
-    ground_length=0.20,
-    crank_length=0.06,
-    coupler_length=0.18,
-    rocker_length=0.16,
-    point_distance=0.12,
-    ground_angle=0.3,
-    crank_phase=0.7,
-    point_angle=0.8,
-)
 PHI = turn(24)
 
 

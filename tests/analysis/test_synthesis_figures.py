@@ -37,9 +37,10 @@ from analysis.synthesis import (
     turn,
 )
 from linkwork.errors import AssemblyError, InputError
+from tests.linkages import ellipse
 
 PHI = turn(24)
-ELLIPSE = np.column_stack([0.20 + 0.10 * np.cos(PHI), 0.15 + 0.05 * np.sin(PHI)])
+ELLIPSE = ellipse(24)
 #: A crank-rocker near the constrained optimum of the thesis's first ellipse.
 LINKAGE = Linkage(
     pivot_x=0.2,

@@ -52,12 +52,12 @@ from analysis.synthesis import (
 from analysis.synthesis.constraints import limits_of
 from analysis.synthesis.polish import Polished, polish
 from linkwork.errors import InputError, ParameterError
-from tests.linkages import drawn
+from tests.linkages import drawn, ellipse
 
 pytest.importorskip("casadi")
 FloatArray = NDArray[np.float64]
 
-ELLIPSE = np.column_stack([0.20 + 0.10 * np.cos(turn(24)), 0.15 + 0.05 * np.sin(turn(24))])
+ELLIPSE = ellipse(24)
 TASK = TimedPath(points=ELLIPSE)
 QUICK = Search(candidates=1 << 12, starts=4)
 
@@ -175,7 +175,7 @@ def judged(kind: str) -> Solution:
         from analysis.synthesis.solution import nearest_rotations
 
         normal = normal_form(task)
-        rotation = nearest_rotations(linkage, normal.origin + normal.unit * normal.points)  # type: ignore[operator]
+        rotation = nearest_rotations(linkage, normal.origin + normal.unit * normal.points)
     return Solution.of(task, linkage, rotation)
 
 
@@ -303,7 +303,7 @@ class TestRounding:
     def test_expected_knows_how_the_residuals_are_curved(self) -> None:
         """One dimension off, and a large error: by Simpson's rule, which integrates the cubic of it exactly."""
         solution = judged("rocker")
-        task = replace(solution.task, angle=solution.linkage.rocker_angle(solution.task.rotation) + 0.5)  # type: ignore[call-arg]
+        task = replace(solution.task, angle=solution.linkage.rocker_angle(solution.task.rotation) + 0.5)
         solution = Solution.of(task, solution.linkage)
         angle = radians(2.0)
 
@@ -323,10 +323,10 @@ class TestRounding:
         mounted = replace(motion, linkage=replace(motion.linkage, output_angle=0.1234))
         assert rounded(mounted, angle=0.05).linkage.output_angle == pytest.approx(0.1)
         sliding, geared = judged("slider"), judged("five-bar")
-        assert rounded(sliding, angle=0.25).linkage.pivot.guide_angle == pytest.approx(0.5)  # type: ignore[union-attr]
-        assert rounded(sliding, length=0.01).linkage.pivot.series is sliding.linkage.pivot.series  # type: ignore[union-attr]
+        assert rounded(sliding, angle=0.25).linkage.pivot.guide_angle == pytest.approx(0.5)
+        assert rounded(sliding, length=0.01).linkage.pivot.series is sliding.linkage.pivot.series
         pivot = rounded(geared, length=1.0, angle=0.5).linkage.pivot
-        assert (pivot.length, pivot.phase) == (1.0, 0.5)  # type: ignore[union-attr]
+        assert (pivot.length, pivot.phase) == (1.0, 0.5)
 
     @pytest.mark.parametrize("factor", [1.0, 1e-3, 1e-5])
     def test_small_linkages_by_themselves_are_rounded_to_finer_steps(self, factor: float) -> None:
@@ -476,7 +476,7 @@ class TestPrecisionPoints:
         phi = np.linspace(0.0, 4.0, 5)
         linkage = known(8)
         task = Motion(points=linkage.path(phi), angle=linkage.coupler_angle(phi) + 0.3, rotation=phi)
-        assert self.met(task, starts=12).error < 1e-12  # type: ignore[arg-type]
+        assert self.met(task, starts=12).error < 1e-12
 
 
 class TestStraight:
@@ -542,7 +542,7 @@ class TestBadInput:
             (lambda: Motion(points=ELLIPSE[:3], angle=[1.0, 2.0]), "target angles have the shape"),
             (lambda: Motion(points=ELLIPSE[:3], angle=[1, 2, 3], length=-1.0), "length is -1.0"),
             (lambda: UntimedPath(path=TargetPath(points=ELLIPSE, closed=True), samples=4), "4 samples of a path"),
-            (lambda: UntimedPath(path=TargetPath(points=ELLIPSE, closed=True), measure="mean"), "measure is 'mean'"),  # type: ignore[arg-type]
+            (lambda: UntimedPath(path=TargetPath(points=ELLIPSE, closed=True), measure="mean"), "measure is 'mean'"),
             (lambda: Straight(start=3, end=3, rotation=1.0), "it must run forward"),
             (lambda: Straight(start=0, end=3, rotation=0.0), "crank rotation of the straight part is 0.0"),
             (lambda: Straight(start=0, end=3, rotation=1.0, flatness=0.0), "flatness is 0.0"),
@@ -699,7 +699,7 @@ class TestLimits:
         points = np.column_stack([np.linspace(0.0, 0.1, 5), 0.02 * np.linspace(-1.0, 1.0, 5) ** 2])
         task = TimedPath(points=points, rotation=np.linspace(0.0, 1.5, 5))
         for type_ in ("rocker-crank", "double-rocker"):
-            result = synthesize(task, constraints=(Grashof(type=type_),), search=QUICK)  # type: ignore[arg-type]
+            result = synthesize(task, constraints=(Grashof(type=type_),), search=QUICK)
             assert {s.linkage.grashof for s in result.solutions} == {type_}
             assert result.best.verdicts.sound
 

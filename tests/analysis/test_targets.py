@@ -203,7 +203,7 @@ def test_measures_do_not_depend_on_place_and_scale(scale: float, shift: float) -
 )
 def test_bad_points_are_refused(points: list[list[float]], closed: bool, message: str) -> None:
     with pytest.raises(InputError, match=message):
-        TargetPath(points=points, closed=closed)  # type: ignore[arg-type]
+        TargetPath(points=points, closed=closed)
 
 
 def test_a_straight_open_curve_is_a_target() -> None:

@@ -165,7 +165,7 @@ def problems(count: int, path: bool, seed: int) -> Iterator[tuple[Linkage, Float
 def optimum(linkage: Linkage, phi: FloatArray, target: FloatArray, **settings: object) -> VariationalMotion | None:
     """The variational motion, none where the linkage has none."""
     try:
-        return variational_motion(linkage, phi, target, **settings)  # type: ignore[arg-type]
+        return variational_motion(linkage, phi, target, **settings)
     except AssemblyError:
         return None
 
@@ -176,7 +176,7 @@ def path_settings(settings: dict[str, object], branch: float) -> tuple[float, tu
         settings["stroke"],
         settings["least_transmission"],
         branch,
-    )  # type: ignore[return-value]
+    )
 
 
 class TestBruteForce:
@@ -215,9 +215,9 @@ class TestGeometry:
             if motion is None:
                 continue
             sine = np.sin(motion.rocker_angle - motion.coupler_angle)
-            least = np.sin(settings["least_transmission"])  # type: ignore[call-overload]
+            least = np.sin(settings["least_transmission"])
             assert (motion.branch * sine >= least - 1e-12).all()
-            low, high = settings["stroke"]  # type: ignore[misc]
+            low, high = settings["stroke"]
             assert ((low <= motion.u) & (motion.u <= high)).all()
             loop = (
                 linkage.crank_length * np.exp(1j * (phi + linkage.crank_phase))
@@ -268,8 +268,8 @@ class TestGeometry:
             perpendicular = np.cos(other - motion.guide_angle)[kind == "perpendicular"]
             np.testing.assert_allclose(perpendicular, 0.0, atol=1e-13)
             at_c = np.abs(np.sin(motion.rocker_angle - motion.coupler_angle))[kind == "limit"]
-            np.testing.assert_allclose(at_c, np.sin(settings["least_transmission"]), atol=1e-14)  # type: ignore[call-overload]
-            assert np.isin(motion.u[kind == "stroke"], settings["stroke"]).all()  # type: ignore[arg-type]
+            np.testing.assert_allclose(at_c, np.sin(settings["least_transmission"]), atol=1e-14)
+            assert np.isin(motion.u[kind == "stroke"], settings["stroke"]).all()
 
     @pytest.mark.parametrize("path", [True, False])
     def test_the_thesis_candidates_are_all_where_the_assembly_may_change(self, path: bool) -> None:
@@ -281,7 +281,7 @@ class TestGeometry:
                 continue
             assert np.isin(both.kind, ["target", "perpendicular"]).all()
             own = [optimum(linkage, phi, target, assemblies=(b,), **free) for b in (1, -1)]
-            np.testing.assert_allclose(both.error, np.minimum(own[0].error, own[1].error), atol=1e-15)  # type: ignore[union-attr]
+            np.testing.assert_allclose(both.error, np.minimum(own[0].error, own[1].error), atol=1e-15)
             compared += sum("limit" in motion.kind for motion in own if motion)
         # and where it may not, the limits of assembly are needed
         assert compared > 15
@@ -425,7 +425,7 @@ class TestJumps:
             free = optimum(linkage, phi, target, **settings)
             if free is None:
                 continue
-            motion = variational_motion(linkage, phi, target, continuous=True, **settings)  # type: ignore[arg-type]
+            motion = variational_motion(linkage, phi, target, continuous=True, **settings)
             assert (motion.error >= free.error - 1e-13).all()
             assert len(motion.jumps) <= len(free.jumps)
             for step in (1e-4, -1e-4):
@@ -494,7 +494,7 @@ class TestJumps:
             chosen_from[random.integers(m, size=n), np.arange(n)] = True
             bridged = random.uniform(size=(n, m, m)) < 0.5
 
-            def rank(  # type: ignore[no-untyped-def]
+            def rank(
                 choice: tuple[int, ...], squares=squares, travel=travel, bridged=bridged
             ) -> tuple[int, float, float]:
                 steps = range(n if closed else n - 1)
@@ -587,7 +587,7 @@ class TestRefusals:
     )
     def test_bad_input(self, rotation: list[float], target: FloatArray, more: dict[str, object], says: str) -> None:
         with pytest.raises((InputError, ParameterError), match=says):
-            variational_motion(WEIGHTED_ROCKER, rotation, target, **more)  # type: ignore[arg-type]
+            variational_motion(WEIGHTED_ROCKER, rotation, target, **more)
 
     def test_a_second_crank(self) -> None:
         with pytest.raises(ParameterError, match="pivot"):
