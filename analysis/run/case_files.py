@@ -267,9 +267,7 @@ def _reader(unit: str, folder: Path) -> Reader:
         if not isinstance(item, Mapping):
             return value(item, name)
         if "kind" not in item:
-            raise ParameterError(
-                name, ", ".join(item), f"be a quantity, or a table with a kind, of {', '.join(kinds)}"
-            )
+            raise ParameterError(name, ", ".join(item), f"be a quantity, or a table with a kind, of {', '.join(kinds)}")
         return Kinds(kinds)(item, name)
 
     return Many(signal, single=True) if unit == "N.m" else signal
