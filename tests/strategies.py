@@ -38,9 +38,13 @@ class Case(NamedTuple):
     def p(self) -> Constants:
         return self.parameters.constants()
 
-    def read(self, drive: str) -> dynamics.Inputs:
-        """The inputs as a plant driven by "torque" or "speed" has to read them."""
+    def inputs(self, drive: str) -> dynamics.Inputs:
+        """The inputs under a drive by "torque" or "speed"."""
         return self.torque_inputs if drive == "torque" else self.speed_inputs
+
+    def read(self, drive: str) -> dynamics.Inputs:
+        """The inputs as a plant under the drive has to read them: the same."""
+        return self.inputs(drive)
 
     def given(self) -> dict[str, float]:
         """The inputs by their FMI names, the commanded speed that of the state."""
