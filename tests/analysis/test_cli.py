@@ -9,7 +9,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
 
 import build_fmu
 from analysis import cli
@@ -17,16 +16,6 @@ from analysis.periodic.orbits import find_orbit
 from linkwork.five_bar.published import SETS, TABLE_3_1
 
 ROOT = Path(__file__).parents[2]
-
-
-@pytest.fixture
-def linkwork(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-
-    def call(*arguments):
-        return CliRunner().invoke(cli.main, [str(a) for a in arguments], catch_exceptions=False)
-
-    return call
 
 
 def in_own_process(*arguments, cwd):
@@ -338,7 +327,7 @@ def test_resonance_over_the_torque(linkwork):
 
 
 @pytest.mark.parametrize("command", ["resonance", "stability"])
-def test_commands_for_five_bars_refuse_a_slider_crank(command: str) -> None:
-    result = CliRunner().invoke(cli.main, [command, "--published", "rahman-ideal"])
+def test_commands_for_five_bars_refuse_a_slider_crank(linkwork, command: str) -> None:
+    result = linkwork(command, "--published", "rahman-ideal")
     assert result.exit_code == 1
     assert "rahman-ideal is a case of the slider-crank: this command is for cases of the five-bar" in result.stderr

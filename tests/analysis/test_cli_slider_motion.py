@@ -24,6 +24,8 @@ from analysis.synthesis import Linkage, SecondCrank, SliderMotion, SynthesisInte
 from analysis.synthesis.tasks import turn
 from linkwork.errors import InputError, LinkworkError, ParameterError
 
+from .conftest import csv
+
 pytest.importorskip("casadi")
 
 ROOT = Path(__file__).parents[2]
@@ -65,15 +67,12 @@ def tables(**more: Any) -> dict[str, Any]:
 
 
 @pytest.fixture
-def linkwork(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-
-    def call(case: dict[str, Any] | Path, *arguments: object) -> Result:
+def linkwork(linkwork, tmp_path):
+    def call(case: dict[str, Any] | Path, *words: object) -> Result:
         if isinstance(case, dict):
             (tmp_path / "case.toml").write_text(tomli_w.dumps(case), encoding="utf-8")
             case = tmp_path / "case.toml"
-        words = ["slider-motion", str(case), *map(str, arguments)]
-        return CliRunner().invoke(cli.main, words, catch_exceptions=False)
+        return linkwork("slider-motion", case, *words)
 
     return call
 
@@ -82,11 +81,6 @@ def read(tmp_path: Path, case: dict[str, Any]) -> SliderCase:
     path = tmp_path / "read.toml"
     path.write_text(tomli_w.dumps(case), encoding="utf-8")
     return load_slider_case(path)
-
-
-def csv(path: Path) -> dict[str, np.ndarray]:
-    head = path.read_text(encoding="utf-8").splitlines()[0].split(",")
-    return dict(zip(head, np.loadtxt(path, delimiter=",", skiprows=1).T))
 
 
 def test_the_example_does_what_it_says(linkwork, tmp_path) -> None:

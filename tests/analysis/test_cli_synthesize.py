@@ -51,16 +51,6 @@ CAPPED = ELLIPSE + QUICK + '[constraints]\nlargest_link = "50 cm"\n'
 SQUARE = "[[0, 0], [1, 0], [1, 1], [0, 1]]"
 
 
-@pytest.fixture
-def linkwork(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-
-    def call(*arguments):
-        return CliRunner().invoke(cli.main, [str(a) for a in arguments], catch_exceptions=False)
-
-    return call
-
-
 def case(text: str, folder: Path, **overrides):
     path = folder / "case.toml"
     path.write_text(text)
