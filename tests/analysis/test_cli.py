@@ -159,6 +159,7 @@ def test_a_run_through_the_fmu_says_that_its_inputs_are_held(fmu, tmp_path):
     assert "note" not in done.stderr
 
 
+@pytest.mark.fmu
 def test_build_builds(linkwork, tmp_path):
     result = linkwork("build", "--dest", tmp_path / "fmus")
     assert result.exit_code == 0
