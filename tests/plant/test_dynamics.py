@@ -8,8 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache
-from math import cos, hypot, log, pi, radians, sin, tanh
+from math import cos, hypot, pi, radians, sin, tanh
 from types import ModuleType
 from typing import Any, NamedTuple
 
@@ -31,7 +30,7 @@ from tests.oracles import bodies
 from tests.oracles.bodies import Body, in_plane
 from tests.oracles.differences import along
 from tests.oracles.multipliers import FORCE_NAMES, assemble, rates, solve_multipliers
-from tests.published import CM, DYN, DYN_CM, DYN_PER_CM, DYN_S_PER_CM
+from tests.published import CM, DYN, DYN_CM, DYN_S_PER_CM
 from tests.strategies import LEAST_SINE, Case, cases, seeded, sine
 
 several = settings(max_examples=100, derandomize=True, deadline=None)
@@ -609,28 +608,6 @@ def test_energy_residual_stays_at_rounding_with_everything_switched_on(seed: int
 SPEED = D.Inputs(1.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
-def steady(
-    stiffness_dyn_cm: float, damping_dyn_s_cm: float = 3e4, turns: int = 12
-) -> tuple[np.ndarray, np.ndarray, Any]:
-    """Table 3.1 at 420 rpm after ``turns``: angles in degrees over one more turn, and states of shape (361, 6)."""
-    return _steady(stiffness_dyn_cm, damping_dyn_s_cm, turns)
-
-
-@lru_cache(maxsize=8)
-def _steady(stiffness_dyn_cm: float, damping_dyn_s_cm: float, turns: int) -> tuple[np.ndarray, np.ndarray, Any]:
-    parameters = replace(
-        TABLE_3_1,
-        slider_stiffness=stiffness_dyn_cm * DYN_PER_CM,
-        slider_damping=damping_dyn_s_cm * DYN_S_PER_CM,
-    )
-    w = SETS["table-3.1"].crank_speed
-    degrees = np.arange(361.0)
-    times = np.concatenate([[0.0], (np.radians(degrees) + 2 * pi * turns) / w])
-    p = parameters.constants()
-    result = run(p, (0.0, 0.0, w, 0.0, 0.0, 0.0), lambda x: SPEED, times)
-    return degrees, result.y.T[1:], p
-
-
 def test_slider_at_the_known_angles_of_table_3_1() -> None:
     angles = list(published.U_CM_AT_CRANK_DEG)
     w = SETS["table-3.1"].crank_speed
@@ -651,44 +628,6 @@ def test_crank_torque_at_the_start_of_table_3_1() -> None:
     assert e.motion.torque / DYN_CM == pytest.approx(published.CRANK_TORQUE_AT_START_DYN_CM, rel=5e-10)
 
 
-def test_steady_state_of_table_3_1() -> None:
-    _, states, _ = steady(1e6)
-    assert states[0, 1] / CM == pytest.approx(published.STEADY_U_CM, abs=1e-8)
-    assert states[0, 3] / CM == pytest.approx(published.STEADY_U_RATE_CM_S, abs=1e-7)
-    assert states[-1, 1] == pytest.approx(states[0, 1], abs=1e-9)
-
-
-@pytest.mark.parametrize("stiffness_dyn_cm", [5e5, 1e6, 2e6])
-def test_least_and_mean_steady_slider_position(stiffness_dyn_cm: float) -> None:
-    # fig. 3.4; k = 5e5 is the slowest to settle
-    degrees, states, _ = steady(stiffness_dyn_cm, turns=20)
-    u = states[:, 1] / CM
-    n = int(u[:-1].argmin())
-    before, least, after = u[:-1][[n - 1, n, (n + 1) % 360]]
-    at = degrees[n] + 0.5 * (before - after) / (before - 2 * least + after)
-    assert at == pytest.approx(published.LEAST_STEADY_U_AT_DEG[stiffness_dyn_cm], abs=0.06)
-    assert u[:-1].mean() == pytest.approx(published.MEAN_STEADY_U_CM[stiffness_dyn_cm], abs=6e-4)
-
-
-def steady_torque_dyn_cm(stiffness_dyn_cm: float) -> tuple[np.ndarray, np.ndarray]:
-    degrees, states, p = steady(stiffness_dyn_cm, turns=20)
-    return degrees, np.array([FIVE_BAR.evaluate(tuple(x), SPEED, p).motion.torque / DYN_CM for x in states.tolist()])
-
-
-def test_steady_torque_hardly_depends_on_the_spring() -> None:
-    # fig. 3.5: relative to the peak at the middle one of the three springs
-    (_, soft), (_, middle), (_, stiff) = (steady_torque_dyn_cm(k) for k in (5e5, 1e6, 2e6))
-    difference = np.abs(soft - stiff).max() / np.abs(middle).max()
-    assert difference == pytest.approx(published.TORQUE_DIFFERENCE_OF_PEAK, abs=6e-4)
-
-
-def test_steady_torque_reverses_steeply() -> None:
-    degrees, torque = steady_torque_dyn_cm(1e6)
-    (high_deg, high), (low_deg, low) = published.TORQUE_REVERSAL_DEG_DYN_CM
-    assert (degrees[torque.argmax()], degrees[torque.argmin()]) == pytest.approx((high_deg, low_deg), abs=1.0)
-    assert (torque.max(), torque.min()) == pytest.approx((high, low), rel=5e-3)
-
-
 @pytest.mark.slow
 def test_drift_grows_without_gravity() -> None:
     # fig. 3.3, over ten turns with the dampers under which the drift is near linear
@@ -704,52 +643,23 @@ def test_drift_grows_without_gravity() -> None:
         assert drifts[1] / drifts[0] == pytest.approx(published.DRIFT_GROWTH_WITHOUT_GRAVITY, abs=0.01)
 
 
-@pytest.mark.parametrize("damping_dyn_s_cm", [1e4, 5e4, 1e5, pytest.param(5e5, marks=pytest.mark.slow)])
-def test_slider_without_spring_drifts_until_the_links_are_nearly_collinear(damping_dyn_s_cm: float) -> None:
-    # fig. 3.2
-    p = replace(TABLE_3_1, slider_stiffness=0.0, slider_damping=damping_dyn_s_cm * DYN_S_PER_CM).constants()
-    w = SETS["table-3.1"].crank_speed
-
-    def collinear(t: float, x: np.ndarray) -> float:
-        return K.position(x[0], x[1], p).s43 - 0.3
-
-    collinear.terminal = True  # type: ignore[attr-defined]
-    result = run(p, (0.0, 0.0, w, 0.0, 0.0, 0.0), lambda x: SPEED, (0.0, 45 * 2 * pi / w), events=collinear)
-    turns = result.t[-1] * w / (2 * pi)
-    assert turns == pytest.approx(published.TURNS_TO_SINE_0_3[damping_dyn_s_cm], abs=0.5 if turns > 10 else 0.06)
-
-
-def torque_run(torque_dyn_cm: float, end: float) -> tuple[float, np.ndarray]:
-    """Fig. 3.6: T = T0 (1 - th2) from rest up to th2 = 1 rad, then none: the time of that, and the state at ``end``."""
+def test_torque_driven_run_of_table_3_1() -> None:
+    # fig. 3.6: T = T0 (1 - th2) from rest up to th2 = 1 rad, then none
     p = TABLE_3_1.constants()
-    t0 = torque_dyn_cm * DYN_CM
+    t0 = published.TORQUE_T0_DYN_CM * DYN_CM
 
     def one_radian(t: float, x: np.ndarray) -> float:
         return x[0] - 1.0
 
     one_radian.terminal = True  # type: ignore[attr-defined]
-    one_radian.direction = 1.0  # type: ignore[attr-defined]
     first = run(p, [0.0] * 6, lambda x: REST._replace(torque=t0 * (1.0 - float(x[0]))), (0.0, 1.0), events=one_radian)
     t1 = float(first.t_events[0][0])
-    if end <= t1:
-        return t1, first.y_events[0][0]
-    return t1, run(p, first.y_events[0][0], lambda x: REST, (t1, end)).y[:, -1]
-
-
-def test_torque_driven_run_of_table_3_1() -> None:
-    t1, x = torque_run(published.TORQUE_T0_DYN_CM, 0.25)
     assert t1 == pytest.approx(published.TORQUE_END_TIME_S, abs=1e-11)
+    x = run(p, first.y_events[0][0], lambda x: REST, (t1, 0.25)).y[:, -1]
     known = published.TORQUE_AT_0_25_S
     assert x[0] == pytest.approx(known["th2_rad"], abs=6e-8)
     assert x[1] / CM == pytest.approx(known["u_cm"], abs=6e-9)
     assert x[2] == pytest.approx(known["th2_rate_rad_s"], abs=6e-8)
-
-
-def test_time_to_one_radian_goes_with_the_root_of_the_torque() -> None:
-    # section 3.2.2: T0 t^2 is nearly constant, where the thesis has T0 t
-    t_low, t_high = (torque_run(t0, 0.0)[0] for t0 in (1e7, 2e8))
-    exponent = log(2e8 / 1e7) / log(t_high / t_low)
-    assert exponent == pytest.approx(published.TORQUE_TIME_EXPONENT, abs=0.02)
 
 
 def test_outputs_carry_the_configuration_and_the_forces() -> None:
