@@ -7,7 +7,6 @@ the rod as one rigid body, its angular velocity from the velocities of its ends.
 from __future__ import annotations
 
 from collections.abc import Callable
-from itertools import product
 from math import cos, sin
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -21,7 +20,7 @@ from linkwork.five_bar.kinematics import coefficients, position
 from linkwork.five_bar.published import TABLE_3_1
 from tests.published_rahman import CRANK_IN, CRANK_RADIUS_IN, INCH, MASSES_LB_S2_IN, POUND_FORCE, ROD_IN, ROD_RADIUS_IN
 
-from .models import each
+from .models import MODES, each
 from .runner import run_in_process
 
 Array = NDArray[np.float64]
@@ -160,11 +159,6 @@ MECHANICS = {
         0.05,
         (*SAME, "shift.position"),
     ),
-}
-#: Every way to drive each mechanism.
-MODES = {
-    "FiveBarSlider": {"torque": {"drive.mode": 0}, "speed": {"drive.mode": 1}},
-    "SliderCrank": {f"{d}-{a}": {"drive.mode": d, "axial.mode": a} for d, a in product((0, 1), (0, 1, 2))},
 }
 
 
