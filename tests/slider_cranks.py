@@ -72,7 +72,7 @@ class Case(NamedTuple):
             shift_acceleration=i.shift_acceleration if i.shift_drive else 0.0,
         )
 
-    def given(self) -> dict[str, float]:
+    def fmi_inputs(self) -> dict[str, float]:
         """The inputs by their FMI names, the commanded speeds those of the state."""
         return {
             "drive.torque": self.torque,

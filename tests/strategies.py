@@ -46,7 +46,7 @@ class Case(NamedTuple):
         """The inputs as a plant under the drive has to read them: the same."""
         return self.inputs(drive)
 
-    def given(self) -> dict[str, float]:
+    def fmi_inputs(self) -> dict[str, float]:
         """The inputs by their FMI names, the commanded speed that of the state."""
         i = self.torque_inputs
         return {

@@ -93,7 +93,7 @@ def test_a_run_that_ends_early_keeps_its_data_and_exits_with_3(linkwork, tmp_pat
         (["info", "nothing"], 2, "neither a published set"),
     ],
 )
-def test_what_is_wrong_is_told_in_a_sentence(linkwork, arguments, code, said):
+def test_what_is_wrong_is_reported_in_a_sentence(linkwork, arguments, code, said):
     result = linkwork(*arguments)
     assert result.exit_code == code
     assert said in " ".join((result.output + result.stderr).split())

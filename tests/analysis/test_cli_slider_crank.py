@@ -103,7 +103,7 @@ class TestParameterFiles:
         assert rows(result.output)["crank a1, rod a2"] == ["0.3048 m, 2 m"]
         assert rows(result.output)["shift S1"] == ["0 m"]
 
-    def test_what_a_file_does_not_say_is_told(self, linkwork, tmp_path):
+    def test_what_a_file_does_not_say_is_reported(self, linkwork, tmp_path):
         io.save_parameters(tmp_path / "mine.toml", replace(parameters(30.0), groove_amplitude=0.01))
         said = " ".join(linkwork("forces", "mine.toml", "--points", 3, "--no-plot", "--units", "inch").stderr.split())
         assert "S1 = 0 in (--shift), no groove (--groove), a crank speed of 50 rpm (--speed)" in said
@@ -151,8 +151,8 @@ class TestForces:
         assert "torque sought" in result.output
         assert "no slider force" not in result.output
         everywhere = columns["crank torque [lb.in]"]
-        told = [float(x) for x in rows(result.output)["crank torque"][1::2]]
-        assert told == pytest.approx([everywhere.min(), everywhere.max()], rel=1e-5)
+        reported = [float(x) for x in rows(result.output)["crank torque"][1::2]]
+        assert reported == pytest.approx([everywhere.min(), everywhere.max()], rel=1e-5)
 
     def test_a_load_and_a_speed(self, linkwork, tmp_path):
         linkwork("forces", "--load", "-20 lbf", "--speed", "100 rpm", "--points", 13, "--no-plot")
@@ -305,7 +305,7 @@ class TestTolerances:
         columns = csv(tmp_path / "out" / "rahman-a4-10-s1-3.5-tolerances.csv")
         assert columns["crank angle [deg]"] == pytest.approx([0.0, 90.0, 180.0, 270.0, 330.0, 360.0])
 
-    def test_an_angle_that_cannot_be_assembled_is_told(self, linkwork):
+    def test_an_angle_that_cannot_be_assembled_is_reported(self, linkwork):
         short = ("--set", "rod.length=30 in", "--offset", "20 in", "--shift", 0)
         result = linkwork("tolerances", *short, "--angle", 0, "--points", 37, "--samples", 50, "--no-plot")
         assert result.exit_code == 0
@@ -337,9 +337,9 @@ class TestTolerances:
         (inch, inches), (si, sis) = drawn
         assert inches["shown"] == pytest.approx(("in", 1.0 / INCH))
         assert sis["shown"] is None
-        for told, scene, unit in zip(notes, (inch, si), ("in", "m")):
+        for note_of_scene, scene, unit in zip(notes, (inch, si), ("in", "m")):
             (note,) = scene.notes
-            assert note in " ".join(told.split())
+            assert note in " ".join(note_of_scene.split())
             assert re.search(rf"deviation is [\d.e-]+ {unit}, to second", note)
         numbers = [float(re.search(r"deviation is ([\d.e-]+) ", scene.notes[0])[1]) for scene in (inch, si)]
         assert numbers[0] * INCH == pytest.approx(numbers[1], rel=5e-3)
@@ -364,12 +364,12 @@ class TestTolerances:
             slope = slopes[f"d {quantity} / d guide.twist [N/deg]"]
             deviation = columns[f"{quantity} linear standard deviation [N]"]
             assert deviation == pytest.approx(np.abs(slope) * 0.3 / np.sqrt(3.0))
-        # the greatest told is clear of the dead centres
+        # the greatest reported is clear of the dead centres
         top = next(line for line in result.output.splitlines() if "slider.load" in line and "N/deg" in line)
         angle = float(top.strip("│ ").split("│")[-1])
         assert min(abs(angle - 99.3), abs(angle - 285.3)) > 10.0
 
-    def test_what_a_reader_must_know_is_told(self, linkwork):
+    def test_what_a_reader_must_know_is_reported(self, linkwork):
         """At the ideal mechanism the position is of the second order in S1 and the twist."""
         result = linkwork(
             "tolerances", "--published", "rahman-ideal", "--tolerance", "shift.position=5 mm", "--points", 3, "--samples",
@@ -513,7 +513,7 @@ class TestPicture:
         (["picture", "--out", "/proc/no"], 1, "/proc/no: No such file or directory"),
     ],
 )  # fmt: skip
-def test_what_is_wrong_is_told_in_a_sentence(linkwork, tmp_path, arguments, code, said):
+def test_what_is_wrong_is_reported_in_a_sentence(linkwork, tmp_path, arguments, code, said):
     result = linkwork(*arguments)
     assert result.exit_code == code, result.output
     assert said in " ".join((result.output + result.stderr).split())

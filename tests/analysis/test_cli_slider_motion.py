@@ -140,7 +140,7 @@ def test_what_is_written_runs_and_reproduces_the_motion(linkwork, tmp_path) -> N
     assert again.exit_code == 0, again.output
 
 
-def test_the_numbers_told_are_those_of_the_motion(linkwork, tmp_path) -> None:
+def test_the_numbers_reported_are_those_of_the_motion(linkwork, tmp_path) -> None:
     result = linkwork(tables(drive={"speed": "120 rpm"}), "--no-plots")
     columns = csv(tmp_path / "out" / "motion.csv")
     force = columns["slider.force [N]"]

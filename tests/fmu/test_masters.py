@@ -191,10 +191,10 @@ def need(master: str) -> None:
         [sys.executable, "-c", f"import {master}"], capture_output=True, text=True, timeout=60, check=False
     )
     if done.returncode != 0:
-        told = f"{master} cannot be imported; it needs {NEEDS[master]}: {done.stderr.strip().splitlines()[-1]}"
+        message = f"{master} cannot be imported; it needs {NEEDS[master]}: {done.stderr.strip().splitlines()[-1]}"
         if os.environ.get("LINKWORK_ALL_MASTERS"):
-            pytest.fail(told)
-        pytest.skip(told)
+            pytest.fail(message)
+        pytest.skip(message)
 
 
 def run(master: str, fmu: Path, model: Model, **changes: Any) -> dict[str, Any]:

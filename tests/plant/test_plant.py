@@ -94,7 +94,7 @@ class Kind:
     def of_seed(self, seed: int, drive: str, **options: Any) -> Any:
         """A random mechanism in a random state with all of its inputs set."""
         case = self.cases.seeded(seed)
-        return self.new(case.parameters, case.initial, **modes(drive), inputs=case.given(), **options)
+        return self.new(case.parameters, case.initial, **modes(drive), inputs=case.fmi_inputs(), **options)
 
 
 FIVE_BAR = Kind(
