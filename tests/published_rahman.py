@@ -8,7 +8,7 @@ and degrees, as printed; the factors to SI are at the top. Nothing here is the o
 
 from __future__ import annotations
 
-from analysis.studies._rahman import (
+from analysis.studies._rahman import (  # noqa: F401
     DEAD_CENTRES_DEG,
     GREATEST_SHIFTS_IN,
     SPOTS,
@@ -16,31 +16,6 @@ from analysis.studies._rahman import (
     STROKES_IN,
     Spot,
 )
-
-__all__ = [
-    "CRANK_IN",
-    "CRANK_RADIUS_IN",
-    "DEAD_CENTRES_DEG",
-    "DENSITY_LB_IN3",
-    "GRAVITY_IN_S2",
-    "GREATEST_SHIFTS_IN",
-    "INCH",
-    "MASSES_LB_S2_IN",
-    "OFFSETS_IN",
-    "POUND_FORCE",
-    "POUND_INCH",
-    "ROD_IN",
-    "ROD_RADIUS_IN",
-    "SHIFTS_IN",
-    "SLIDER_SIDE_IN",
-    "SPEED_RPM",
-    "SPOTS",
-    "STROKES_BY_TWIST_IN",
-    "STROKES_IN",
-    "TORQUE_LB_IN",
-    "TWISTS_DEG",
-    "Spot",
-]
 
 # One of the unit, in SI
 INCH = 0.0254

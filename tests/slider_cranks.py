@@ -11,11 +11,9 @@ from collections.abc import Callable
 from math import cos, hypot, pi, sin, sqrt
 from typing import NamedTuple
 
-from hypothesis import strategies as st
-
 from linkwork.slider_crank import dynamics
 from linkwork.slider_crank.parameters import Constants, InitialState, SliderCrankParameters
-from tests.strategies import Uniform, drawn, of_seed
+from tests.strategies import Uniform, suppliers
 
 #: What drives crank and shift: speed_drive, shift_drive, groove of `dynamics.Inputs`.
 DRIVES = {
@@ -74,7 +72,7 @@ class Case(NamedTuple):
             shift_acceleration=i.shift_acceleration if i.shift_drive else 0.0,
         )
 
-    def given(self) -> dict[str, float]:
+    def fmi_inputs(self) -> dict[str, float]:
         """The inputs by their FMI names, the commanded speeds those of the state."""
         return {
             "drive.torque": self.torque,
@@ -155,16 +153,4 @@ def draw(uniform: Uniform, choose: Callable[[], bool]) -> Case:
     )
 
 
-def seeded(seed: int) -> Case:
-    """The case of a seed."""
-    return of_seed(draw, seed)
-
-
-def cases() -> st.SearchStrategy[Case]:
-    """Hypothesis strategy of `Case`."""
-    return drawn(draw)
-
-
-def mechanisms() -> st.SearchStrategy[SliderCrankParameters]:
-    """Hypothesis strategy of valid mechanisms."""
-    return cases().map(lambda case: case.parameters)
+seeded, cases, mechanisms = suppliers(draw)

@@ -10,7 +10,7 @@ from __future__ import annotations
 import random
 from collections.abc import Callable
 from math import asin, cos, hypot, pi, sin, sqrt
-from typing import NamedTuple, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 from hypothesis import strategies as st
 
@@ -38,11 +38,15 @@ class Case(NamedTuple):
     def p(self) -> Constants:
         return self.parameters.constants()
 
-    def read(self, drive: str) -> dynamics.Inputs:
-        """The inputs as a plant driven by "torque" or "speed" has to read them."""
+    def inputs(self, drive: str) -> dynamics.Inputs:
+        """The inputs under a drive by "torque" or "speed"."""
         return self.torque_inputs if drive == "torque" else self.speed_inputs
 
-    def given(self) -> dict[str, float]:
+    def read(self, drive: str) -> dynamics.Inputs:
+        """The inputs as a plant under the drive has to read them: the same."""
+        return self.inputs(drive)
+
+    def fmi_inputs(self) -> dict[str, float]:
         """The inputs by their FMI names, the commanded speed that of the state."""
         i = self.torque_inputs
         return {
@@ -128,12 +132,6 @@ def draw(uniform: Uniform, choose: Callable[[], bool]) -> Case:
     )
 
 
-def of_seed(draw: Draw[T], seed: int) -> T:
-    """What ``draw`` makes of a seed, the same on every machine."""
-    source = random.Random(seed)
-    return draw(source.uniform, lambda: source.random() < 0.5)
-
-
 @st.composite
 def drawn(draw_from: st.DrawFn, draw: Draw[T]) -> T:
     """Hypothesis strategy of what ``draw`` makes."""
@@ -143,19 +141,20 @@ def drawn(draw_from: st.DrawFn, draw: Draw[T]) -> T:
     )
 
 
-def seeded(seed: int) -> Case:
-    """The case of a seed."""
-    return of_seed(draw, seed)
+def suppliers(draw: Draw[T]) -> tuple[Callable[[int], T], Callable[[], st.SearchStrategy[T]], Callable[[], Any]]:
+    """What makes of ``draw`` the case of a seed, the same on every machine; a strategy of cases; one of mechanisms."""
+
+    def seeded(seed: int) -> T:
+        source = random.Random(seed)
+        return draw(source.uniform, lambda: source.random() < 0.5)
+
+    def cases() -> st.SearchStrategy[T]:
+        return drawn(draw)
+
+    return seeded, cases, lambda: cases().map(lambda case: case.parameters)
 
 
-def cases() -> st.SearchStrategy[Case]:
-    """Hypothesis strategy of `Case`."""
-    return drawn(draw)
-
-
-def mechanisms() -> st.SearchStrategy[FiveBarParameters]:
-    """Hypothesis strategy of valid mechanisms."""
-    return cases().map(lambda case: case.parameters)
+seeded, cases, mechanisms = suppliers(draw)
 
 
 def sine(case: Case, th2: float, u: float) -> float:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import replace
+from functools import partial
 from math import radians
 
 import numpy as np
@@ -19,18 +20,14 @@ from linkwork.five_bar.published import TABLE_3_1
 from linkwork.slider_crank.published import CRANK_SPEED, INCH, parameters
 from tests import published_rahman as rahman
 
+from .conftest import csv
+
 COMMANDS = ("info", "forces", "tolerances", "dual", "picture")
 
 
 @pytest.fixture
-def linkwork(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-
-    def call(*arguments):
-        words = ["slider-crank", *(str(a) for a in arguments)]
-        return CliRunner().invoke(cli.main, words, catch_exceptions=False)
-
-    return call
+def linkwork(linkwork):
+    return partial(linkwork, "slider-crank")
 
 
 def rows(output):
@@ -41,11 +38,6 @@ def rows(output):
         if len(cells) > 1:
             found[cells[0]] = cells[1:]
     return found
-
-
-def csv(path):
-    head = path.read_text(encoding="utf-8").splitlines()[0].split(",")
-    return dict(zip(head, np.loadtxt(path, delimiter=",", skiprows=1).T))
 
 
 @pytest.mark.parametrize("command", [[], *([name] for name in COMMANDS)])

@@ -32,6 +32,8 @@ from analysis.synthesis import (
 from linkwork.errors import InputError, LinkworkError, ParameterError
 from tests.linkages import BASE
 
+from .conftest import csv
+
 pytest.importorskip("casadi")
 
 ROOT = Path(__file__).parents[2]
@@ -60,15 +62,12 @@ def tables(**more: Any) -> dict[str, Any]:
 
 
 @pytest.fixture
-def linkwork(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-
-    def call(case: dict[str, Any] | Path, *arguments: object) -> Result:
+def linkwork(linkwork, tmp_path):
+    def call(case: dict[str, Any] | Path, *words: object) -> Result:
         if isinstance(case, dict):
             (tmp_path / "case.toml").write_text(tomli_w.dumps(case), encoding="utf-8")
             case = tmp_path / "case.toml"
-        words = ["slider-motion", str(case), *map(str, arguments)]
-        return CliRunner().invoke(cli.main, words, catch_exceptions=False)
+        return linkwork("slider-motion", case, *words)
 
     return call
 
@@ -77,11 +76,6 @@ def read(tmp_path: Path, case: dict[str, Any]) -> SliderCase:
     path = tmp_path / "read.toml"
     path.write_text(tomli_w.dumps(case), encoding="utf-8")
     return load_slider_case(path)
-
-
-def csv(path: Path) -> dict[str, np.ndarray]:
-    head = path.read_text(encoding="utf-8").splitlines()[0].split(",")
-    return dict(zip(head, np.loadtxt(path, delimiter=",", skiprows=1).T))
 
 
 def test_the_example_does_what_it_says(linkwork, tmp_path) -> None:
@@ -141,7 +135,7 @@ def test_what_is_written_runs_and_reproduces_the_motion(linkwork, tmp_path) -> N
     assert again.exit_code == 0, again.output
 
 
-def test_the_numbers_told_are_those_of_the_motion(linkwork, tmp_path) -> None:
+def test_the_numbers_reported_are_those_of_the_motion(linkwork, tmp_path) -> None:
     result = linkwork(tables(drive={"speed": "120 rpm"}), "--no-plots")
     columns = csv(tmp_path / "out" / "motion.csv")
     force = columns["slider.force [N]"]

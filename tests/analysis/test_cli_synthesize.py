@@ -52,16 +52,6 @@ CAPPED = ELLIPSE + QUICK + '[constraints]\nlargest_link = "50 cm"\n'
 SQUARE = "[[0, 0], [1, 0], [1, 1], [0, 1]]"
 
 
-@pytest.fixture
-def linkwork(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-
-    def call(*arguments):
-        return CliRunner().invoke(cli.main, [str(a) for a in arguments], catch_exceptions=False)
-
-    return call
-
-
 def case(text: str, folder: Path, **overrides):
     path = folder / "case.toml"
     path.write_text(text)
@@ -86,7 +76,7 @@ def test_help_shows_examples(linkwork) -> None:
     assert "Examples:" in linkwork("synthesize", "--help").output
 
 
-def test_it_tells_and_writes_what_it_found(run) -> None:
+def test_it_reports_and_writes_what_it_found(run) -> None:
     result, folder = run
     written = {path.name for path in (folder / "out").iterdir()}
     assert written == {
@@ -96,7 +86,7 @@ def test_it_tells_and_writes_what_it_found(run) -> None:
     assert all(f"wrote {folder / 'out' / name}" in result.output for name in written)
     rows = np.genfromtxt(folder / "out" / "solutions.csv", delimiter=",", names=True, deletechars="")
     first = rows[0] if rows.ndim else rows
-    # as told, in mm2, and what the curve's file adds up to
+    # as reported, in mm2, and what the curve's file adds up to
     assert f"{1e6 * first['quality_[m2]']:.5g}" in result.output
     curve = np.genfromtxt(folder / "out" / "best-curve.csv", delimiter=",", names=True, deletechars="")
     assert (curve["error_[m]"] ** 2).sum() == pytest.approx(first["quality_[m2]"])
@@ -236,7 +226,7 @@ def test_an_interrupted_trade_off_keeps_what_it_has(linkwork, tmp_path, monkeypa
     assert Path("out/solutions.csv").exists()
 
 
-def test_a_solution_with_a_defect_is_told(linkwork, tmp_path, monkeypatch) -> None:
+def test_a_solution_with_a_defect_is_reported(linkwork, tmp_path, monkeypatch) -> None:
     (tmp_path / "case.toml").write_text(CAPPED)
     found = cases.synthesize
 
@@ -314,7 +304,7 @@ def test_a_solution_with_a_defect_is_told(linkwork, tmp_path, monkeypatch) -> No
         ),
     ],
 )
-def test_what_is_wrong_is_told_in_a_sentence(linkwork, tmp_path, text, said) -> None:
+def test_what_is_wrong_is_reported_in_a_sentence(linkwork, tmp_path, text, said) -> None:
     (tmp_path / "case.toml").write_text(text)
     result = linkwork("synthesize", "case.toml")
     assert result.exit_code == cli.WRONG, result.output

@@ -197,7 +197,7 @@ def _runs(fmu: str) -> dict[str, Any]:
 
     found: dict[str, Any] = {}
 
-    def told(of: str, **options: Any) -> None:
+    def report(of: str, **options: Any) -> None:
         try:
             cosimulate(fmu, **options)
             found[of] = "nothing"
@@ -224,13 +224,13 @@ def _runs(fmu: str) -> dict[str, Any]:
     found["lost"] = [lost.status, lost.message, len(lost), lost.time[-1], bool(np.isfinite(lost.values).all())]
     found["same"] = [same.status, len(same), np.abs(same["slider.position"][:50] - lost["slider.position"]).max()]
 
-    told("bad parameter", parameters=TABLE_3_1, stop_time=0.1, tolerance=0.5)
+    report("bad parameter", parameters=TABLE_3_1, stop_time=0.1, tolerance=0.5)
     apart = InitialState(slider_position=1.0)
-    told("not assembled", parameters=TABLE_3_1, initial=apart, stop_time=0.1)
+    report("not assembled", parameters=TABLE_3_1, initial=apart, stop_time=0.1)
     wrong = Function(lambda t, th2, u, w2, v: np.sqrt(0.0505 - t))
     with np.errstate(invalid="ignore"):
-        told("not a number", parameters=TABLE_3_1, inputs=Inputs(force=wrong), stop_time=0.1)
-    told("no time", parameters=TABLE_3_1, stop_time=0.0)
+        report("not a number", parameters=TABLE_3_1, inputs=Inputs(force=wrong), stop_time=0.1)
+    report("no time", parameters=TABLE_3_1, stop_time=0.0)
 
     # Ctrl-C is heard between two steps
     def force(t: float, th2: float, u: float, w2: float, v: float) -> float:
@@ -286,7 +286,7 @@ def test_refused_step_ends_the_run_with_status_message_and_data(runs: dict[str, 
     assert runs["same"][2] < 1e-9
 
 
-def test_what_the_fmu_refuses_is_told_in_its_sentence(runs: dict[str, Any]) -> None:
+def test_what_the_fmu_refuses_is_reported_in_its_sentence(runs: dict[str, Any]) -> None:
     kind, sentence = runs["bad parameter"]
     assert kind == "CosimulationError"
     assert "parameter solver.tolerance is 0.5: it must be between 1e-13 and 0.01" in sentence

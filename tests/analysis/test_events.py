@@ -257,7 +257,7 @@ def test_output_that_depends_on_changing_inputs_is_located_with_the_inputs_of_it
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_event_at_the_time_of_the_release_is_told_once(method: str) -> None:
+def test_event_at_the_time_of_the_release_is_reported_once(method: str) -> None:
     bar = Inputs(torque=TorsionBar(torque=10.0))
     events = [
         Event(name="angle", output="crank.angle", level=1.0),

@@ -293,7 +293,7 @@ def test_ramp_of_half_a_turn_in_numbers() -> None:
         (lambda: Harmonics(1.0, 5.0, 30.0, 0.3), "must be lists of numbers"),  # type: ignore[arg-type]
     ],
 )
-def test_slips_in_a_signal_are_told_in_its_own_words(make: Any, said: str) -> None:
+def test_slips_in_a_signal_are_reported_in_its_own_words(make: Any, said: str) -> None:
     with pytest.raises(InputError, match=said):
         make()
 

@@ -56,6 +56,13 @@ MODELS = {
 }
 
 
+#: Every way to drive each.
+MODES = {
+    "FiveBarSlider": {"torque": {"drive.mode": 0}, "speed": {"drive.mode": 1}},
+    "SliderCrank": {f"{d}-{a}": {"drive.mode": d, "axial.mode": a} for d in (0, 1) for a in (0, 1, 2)},
+}
+
+
 def each(cases: Mapping[str, Mapping[str, Any]], *names: str) -> pytest.MarkDecorator:
     """Parametrise a test over the cases of each model, by model and by the name of the case.
 

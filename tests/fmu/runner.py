@@ -54,7 +54,7 @@ def run_in_process(
             # masters unpack FMUs into the folder for temporary files, and not all of them clean up
             env=os.environ | {"PYTHONDONTWRITEBYTECODE": "1", "TMPDIR": folder},
         )
-        told = f"{code.__name__} ended with {done.returncode}\n{done.stdout}\n{done.stderr}"
-        assert done.returncode == 0, told
-        assert result.is_file(), told
+        message = f"{code.__name__} ended with {done.returncode}\n{done.stdout}\n{done.stderr}"
+        assert done.returncode == 0, message
+        assert result.is_file(), message
         return json.loads(result.read_text())

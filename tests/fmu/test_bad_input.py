@@ -405,7 +405,7 @@ def wrong_calls(fmu: str, folder: str) -> list[Any]:
     return found
 
 
-def test_wrong_variables_are_told_and_do_not_take_the_process_along(fmu: Path, tmp_path: Path) -> None:
+def test_wrong_variables_are_reported_and_do_not_take_the_process_along(fmu: Path, tmp_path: Path) -> None:
     found = run_in_process(wrong_calls, fmu, tmp_path)
     assert [status for status, _ in found] == [4] * 9
     sentences = [said[0] for _, said in found]

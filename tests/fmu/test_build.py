@@ -1,4 +1,4 @@
-"""Building: what is in the archive, which GUID it bears, and how a failure is told."""
+"""Building: what is in the archive, which GUID it bears, and how a failure is reported."""
 
 from __future__ import annotations
 
@@ -160,7 +160,7 @@ def test_failed_build_leaves_the_old_fmu(tmp_path: Path, fmu: Path, model: Model
 
 
 @pytest.mark.parametrize(
-    ("arguments", "code", "told"),
+    ("arguments", "code", "message"),
     [
         (["FiveBarSlider"], 0, "FiveBarSlider.fmu: valid"),
         ([], 0, "SliderCrank.fmu: valid"),
@@ -169,7 +169,7 @@ def test_failed_build_leaves_the_old_fmu(tmp_path: Path, fmu: Path, model: Model
     ],
     ids=["one", "all", "unknown", "usage"],
 )
-def test_exit_codes(tmp_path: Path, arguments: list[str], code: int, told: str) -> None:
+def test_exit_codes(tmp_path: Path, arguments: list[str], code: int, message: str) -> None:
     done = subprocess.run(
         [sys.executable, str(Path(build_fmu.__file__)), "--dest", str(tmp_path), *arguments],
         capture_output=True,
@@ -178,6 +178,6 @@ def test_exit_codes(tmp_path: Path, arguments: list[str], code: int, told: str) 
         check=False,
     )
     assert done.returncode == code, done.stderr
-    assert told in (done.stdout if code == 0 else done.stderr)
+    assert message in (done.stdout if code == 0 else done.stderr)
     built = {path.stem for path in tmp_path.glob("*.fmu")}
     assert built == (set() if code else set(arguments or MODELS))

@@ -10,7 +10,7 @@ from xml.etree.ElementTree import Element
 
 import pytest
 
-from .models import Model, each
+from .models import MODES, Model, each
 from .runner import run_in_process
 from .test_description import INPUTS, ROWS, unknowns
 
@@ -70,11 +70,6 @@ MECHANISMS = {
         "slider.load": 14.0,
     },
 }
-#: Every way to drive each.
-MODES = {
-    "FiveBarSlider": [{"drive.mode": drive} for drive in (0, 1)],
-    "SliderCrank": [{"drive.mode": drive, "axial.mode": axial} for drive in (0, 1) for axial in (0, 1, 2)],
-}
 
 
 def perturb_inputs(fmu: str, folder: str, mechanism: dict[str, float], modes: list[dict[str, int]]) -> list[list[Any]]:
@@ -133,7 +128,7 @@ Changed = Callable[[str], list[tuple[dict[str, int], str, list[str]]]]
 def changed(fmus: dict[str, Path], tmp_path_factory: pytest.TempPathFactory) -> Changed:
     @cache
     def of(model: str) -> list[tuple[dict[str, int], str, list[str]]]:
-        arguments = (MECHANISMS[model], MODES[model])
+        arguments = (MECHANISMS[model], list(MODES[model].values()))
         found = run_in_process(perturb_inputs, fmus[model], tmp_path_factory.mktemp("run"), *arguments)
         return [(mode, name, outputs) for mode, _, name, outputs in found]
 
@@ -185,7 +180,7 @@ def test_outputs_at_the_start_change_only_with_what_they_declare(
     description: Element, fmu: Path, model: Model, tmp_path: Path
 ) -> None:
     declared = unknowns(description, "InitialUnknowns")
-    found = run_in_process(perturb_start, fmu, tmp_path, MECHANISMS[model.name], MODES[model.name])
+    found = run_in_process(perturb_start, fmu, tmp_path, MECHANISMS[model.name], list(MODES[model.name].values()))
     rows = ROWS[model.name]
     assert set(found) == {name for name, causality, kind, *_ in rows if causality != "output" and kind == "Real"}
     for name, outputs in MOVED[model.name].items():

@@ -1,7 +1,6 @@
 """The FMUs give the reference numbers: the five-bar of Table 3.1 at 420 rpm, the slider-crank of section 3.1 at 50 rpm.
 
-Those of the five-bar were derived independently of this project and cross-checked against two multibody engines; cgs as noted,
-SI here. Those of the slider-crank are in `tests.published_rahman`.
+They are in `tests.published` and `tests.published_rahman`.
 """
 
 from __future__ import annotations
@@ -13,14 +12,10 @@ from typing import Any
 import pytest
 
 import tests.published_rahman as rahman
+from tests import published
+from tests.published import CM, DYN, DYN_CM
 
 from .runner import run_in_process
-
-POSITION_CM = {90: 0.5091697521, 360: -1.0018190123, 720: -0.8902721383, 1080: -0.8955749071}
-TORQUE_AT_REST_DYN_CM = -1.129656931e7
-FORCE_AT_C_DYN = (79534.254, 537313.426)
-STEADY_POSITION_CM = -0.89553115
-STEADY_VELOCITY_CM_S = -21.92156554
 
 
 def revolutions(fmu: str, folder: str, pattern: list[int], tolerance: float, turns: int) -> dict[str, Any]:
@@ -46,29 +41,29 @@ def revolutions(fmu: str, folder: str, pattern: list[int], tolerance: float, tur
 )
 def test_three_turns(five_bar: Path, tmp_path: Path, pattern: list[int]) -> None:
     seen = run_in_process(revolutions, five_bar, tmp_path, pattern, 1e-9, 3)
-    assert seen["0"]["drive.applied_torque"] == pytest.approx(TORQUE_AT_REST_DYN_CM * 1e-7, rel=1e-9)
-    for angle, position in POSITION_CM.items():
-        assert seen[str(angle)]["slider.position"] == pytest.approx(position * 1e-2, rel=1e-8)
+    assert seen["0"]["drive.applied_torque"] == pytest.approx(published.CRANK_TORQUE_AT_START_DYN_CM * DYN_CM, rel=1e-9)
+    for angle, position in published.U_CM_AT_CRANK_DEG.items():
+        assert seen[str(angle)]["slider.position"] == pytest.approx(position * CM, rel=1e-8)
     # printed to 1e-3 dyn
-    fx, fy = (force * 1e-5 for force in FORCE_AT_C_DYN)
+    fx, fy = (force * DYN for force in published.FORCE_AT_C_AT_360_DEG_DYN)
     assert seen["360"]["pin.C.fx"] == pytest.approx(fx, abs=1e-8)
     assert seen["360"]["pin.C.fy"] == pytest.approx(fy, abs=5e-8)
 
 
 def test_three_turns_at_a_tighter_tolerance(five_bar: Path, tmp_path: Path) -> None:
     seen = run_in_process(revolutions, five_bar, tmp_path, [90], 1e-13, 3)
-    for angle, position in POSITION_CM.items():
-        assert seen[str(angle)]["slider.position"] == pytest.approx(position * 1e-2, abs=0.6e-12)
-    assert seen["360"]["pin.C.fx"] == pytest.approx(FORCE_AT_C_DYN[0] * 1e-5, abs=0.6e-8)
-    assert seen["360"]["pin.C.fy"] == pytest.approx(FORCE_AT_C_DYN[1] * 1e-5, abs=0.6e-8)
+    for angle, position in published.U_CM_AT_CRANK_DEG.items():
+        assert seen[str(angle)]["slider.position"] == pytest.approx(position * CM, abs=0.6e-12)
+    for axis, force in zip("xy", published.FORCE_AT_C_AT_360_DEG_DYN):
+        assert seen["360"][f"pin.C.f{axis}"] == pytest.approx(force * DYN, abs=0.6e-8)
     for quantity in seen.values():
         assert quantity["closure.residual"] < 1e-15
 
 
 def test_steady_state(five_bar: Path, tmp_path: Path) -> None:
     last = run_in_process(revolutions, five_bar, tmp_path, [90], 1e-9, 40)["14400"]
-    assert last["slider.position"] == pytest.approx(STEADY_POSITION_CM * 1e-2, rel=1e-8)
-    assert last["slider.velocity"] == pytest.approx(STEADY_VELOCITY_CM_S * 1e-2, rel=1e-8)
+    assert last["slider.position"] == pytest.approx(published.STEADY_U_CM * CM, rel=1e-8)
+    assert last["slider.velocity"] == pytest.approx(published.STEADY_U_RATE_CM_S * CM, rel=1e-8)
 
 
 #: Lengths in inches and angles in degrees as the thesis gives them, in the FMU's units.

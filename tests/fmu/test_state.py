@@ -256,7 +256,7 @@ def damaged(fmu: str, folder: str, pieces: list[str]) -> list[Any]:
         instance.run([1e-3])
         before = instance.outputs()
         status, state = instance.deserialize(piece.encode("utf-8"))
-        assert status == 0, "what is wrong is told when the state is set"
+        assert status == 0, "what is wrong is reported when the state is set"
         found.append([instance.restore(state), instance.log, instance.outputs() == before])
         instance.free()
     return found

@@ -166,7 +166,7 @@ def test_no_sliver_is_left_for_the_last_step() -> None:
     assert np.diff(times).min() > 0.3
 
 
-def test_every_accepted_state_is_shown_and_may_stop_the_run() -> None:
+def test_every_accepted_state_is_reported_and_may_stop_the_run() -> None:
     seen: list[Vector] = []
 
     def accept(x: Vector) -> None:

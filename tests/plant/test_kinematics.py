@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
 from dataclasses import replace
 from math import atan2, cos, hypot, pi, radians, sin, sqrt
 
@@ -12,19 +11,13 @@ from hypothesis import given, settings
 from linkwork.five_bar import kinematics as K
 from linkwork.five_bar.parameters import Constants, reach
 from linkwork.five_bar.published import TABLE_3_1
+from tests.oracles.differences import derivative
 from tests.strategies import Case, cases, seeded
 
 SEEDS = range(40)
 #: Step of the differences in radians; the nearer the limit of assembly, which is at sin(th4 - th3)^2 / 2, the shorter.
 STEP = 5e-3
 several = settings(max_examples=100, derandomize=True, deadline=None)
-
-
-def derivative(f: Callable[[float], Sequence[float]], h: float) -> list[float]:
-    """Derivative of ``f`` at 0: central differences of order 6."""
-    weights = ((1, 45 / 60), (2, -9 / 60), (3, 1 / 60))
-    values = {s * k: f(s * k * h) for k, _ in weights for s in (-1, 1)}
-    return [sum(w * (values[k][j] - values[-k][j]) for k, w in weights) / h for j in range(len(values[1]))]
 
 
 def angles(th2: float, u: float, p: Constants, near: tuple[float, float]) -> tuple[float, float]:

@@ -382,7 +382,7 @@ def test_published_set_is_the_data_of_section_3_1(offset_in: float, twist_deg: f
     assert par.guide_twist == pytest.approx(radians(twist_deg), rel=1e-15)
     masses = [m * mass for m in rahman.MASSES_LB_S2_IN]
     assert (par.crank_mass, par.rod_mass, par.slider_mass) == pytest.approx(masses, rel=1e-14)
-    # radii of gyration as printed, about the link's end; the rod's is told about its centre of mass
+    # radii of gyration as printed, about the link's end; the rod's is given about its centre of mass
     r1, r2 = rahman.CRANK_RADIUS_IN, rahman.ROD_RADIUS_IN
     assert par.crank_inertia == pytest.approx(masses[0] * (r1**2 / 4 + 12.0**2 / 3) * INCH**2, rel=1e-12)
     at_end = par.rod_inertia + par.rod_mass * par.rod_cog_distance**2

@@ -13,7 +13,7 @@ from linkwork.slider_crank import kinematics as K
 from linkwork.slider_crank import published
 from linkwork.slider_crank.parameters import Constants
 from linkwork.slider_crank.vectors import Vector, add, cross, dot, scale, subtract
-from tests.plant.test_kinematics import derivative
+from tests.oracles.differences import derivative
 from tests.published_rahman import INCH, SPOTS, Spot
 from tests.slider_cranks import Case, cases, seeded
 
