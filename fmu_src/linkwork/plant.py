@@ -85,6 +85,7 @@ class Plant:
         self.time = time
         self.inputs: dict[str, float] = dict.fromkeys(mechanism.input_names, 0.0)
         self._commanded: set[str] = set()
+        self._rates = self._rate_names()
         for name, value in (inputs or {}).items():
             self.set_input(name, value)
         self._check_inputs()
@@ -103,6 +104,10 @@ class Plant:
         self._p: Any = self.parameters.constants()
         self._modes = tuple(float(self.modes[mode.name]) for mode in self.mechanism.modes)
         self._commands = self.mechanism.commands(self.modes)
+
+    def _rate_names(self) -> set[str]:
+        """Inputs that are commanded rates, whatever the modes."""
+        return {channel.name for channel in self.mechanism.channels if channel.kind == "command"}
 
     def _start(self, initial: Any) -> Vector:
         x = list(self.mechanism.state(initial))
@@ -160,7 +165,8 @@ class Plant:
         if name not in self.inputs:
             raise InputError(f"there is no input {name!r}: the inputs are {', '.join(self.inputs)}")
         self.inputs[name] = value
-        self._commanded.add(name)
+        if name in self._rates:
+            self._commanded.add(name)
 
     def _check_inputs(self) -> None:
         for name, value in self.inputs.items():
@@ -291,6 +297,7 @@ class Plant:
             plant.inputs = {name: float(saved["inputs"][name]) for name in mechanism.input_names}
             plant.state = tuple(saved["state"])
             plant._commanded = set(saved["commanded"])
+            plant._rates = plant._rate_names()
             plant._step_size = saved["step_size"]
             plant._scale = tuple(saved["scale"])
             plant.start_energy = saved["start_energy"]
@@ -298,7 +305,7 @@ class Plant:
             numbers = (plant.time, plant._step_size, plant.start_energy, *plant.state, *plant._scale)
             whole = (
                 all(plant.modes[mode.name] in range(len(mode.values)) for mode in mechanism.modes)
-                and plant._commanded <= set(plant.inputs)
+                and plant._commanded <= plant._rates
                 and len(plant._scale) == len(plant.state) == mechanism.size
                 and min(plant._scale) > 0.0
                 and all(isfinite(number) for number in numbers)

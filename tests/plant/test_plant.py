@@ -29,8 +29,8 @@ from linkwork.five_bar.assembly import check_assembly
 from linkwork.five_bar.parameters import InitialState
 from linkwork.five_bar.published import SETS, TABLE_3_1
 from linkwork.limits import LIMIT_SINE
-from linkwork.plant import MechanismPlant, Plant, check_tolerance
-from linkwork.plant import Plant as SliderCrankPlant
+from linkwork.mechanism import Mechanism
+from linkwork.plant import Plant, check_tolerance
 from linkwork.slider_crank import dynamics
 from linkwork.slider_crank.parameters import InitialState as SliderCrankStart
 from linkwork.slider_crank.published import CRANK_SPEED, OFFSET_CASE, parameters
@@ -49,7 +49,7 @@ class Kind:
     """A mechanism for the tests of what every plant does."""
 
     name: str
-    plant: type[MechanismPlant]
+    mechanism: Mechanism
     equations: ModuleType
     cases: ModuleType
     #: The thesis's mechanism and start.
@@ -69,17 +69,17 @@ class Kind:
 
     @property
     def commands(self) -> tuple[str, ...]:
-        return self.plant.COMMANDS
+        return tuple(c.name for c in self.mechanism.channels if c.kind == "command")
 
     @property
     def input_names(self) -> tuple[str, ...]:
-        return self.plant.INPUT_NAMES
+        return self.mechanism.input_names
 
     def new(self, parameters: Any, initial: Any, **options: Any) -> Any:
-        return self.plant(parameters, initial, **options)
+        return Plant(self.mechanism, parameters, initial, **options)
 
     def restore(self, saved: dict[str, Any]) -> Any:
-        return self.plant.restore(saved)
+        return Plant.restore(self.mechanism, saved)
 
     def start(self, drive: str, **options: Any) -> Any:
         """A plant that starts the thesis's run under a drive, with other ``options``."""
@@ -98,8 +98,8 @@ class Kind:
 
 
 FIVE_BAR = Kind(
-    "five-bar slider",
-    Plant,
+    "five-bar",
+    five_bar.MECHANISM,
     five_bar,
     strategies,
     TABLE_3_1,
@@ -114,7 +114,7 @@ FIVE_BAR = Kind(
 )
 SLIDER_CRANK = Kind(
     "slider-crank",
-    SliderCrankPlant,
+    slider_crank.MECHANISM,
     slider_crank,
     slider_cranks,
     *OFFSET_CASE,  # a4 = 10 in, S1 = 3.5 in at 50 rpm
@@ -140,15 +140,15 @@ def modes(drive: str) -> dict[str, int]:
     return chosen | ({"axial_mode": ("force", "shift", "groove").index(shifting)} if shifting else {})
 
 
-def speed_plant(**options: Any) -> MechanismPlant:
+def speed_plant(**options: Any) -> Plant:
     return FIVE_BAR.start("speed", initial=options.pop("initial", InitialState()), **options)
 
 
-def default(drive: str = "speed-shift", **options: Any) -> MechanismPlant:
+def default(drive: str = "speed-shift", **options: Any) -> Plant:
     return SLIDER_CRANK.start(drive, **options)
 
 
-def go(plant: MechanismPlant, steps: int, step: float) -> None:
+def go(plant: Plant, steps: int, step: float) -> None:
     start = plant.time
     for n in range(steps):
         plant.step(start + n * step, step)
@@ -329,14 +329,14 @@ def test_step_size_is_carried_from_step_to_step(monkeypatch: pytest.MonkeyPatch)
     go(plant, 10, 1e-4)
     assert plant.save()["step_size"] > 1e-4
     calls = 0
-    original = five_bar.dynamics.derivative
+    equations = plant.mechanism.equations
 
     def counted(*arguments: Any) -> five_bar.dynamics.State:
         nonlocal calls
         calls += 1
-        return original(*arguments)
+        return equations.derivative(*arguments)
 
-    monkeypatch.setattr(five_bar.dynamics, "derivative", counted)
+    monkeypatch.setattr(plant, "mechanism", replace(plant.mechanism, equations=equations._replace(derivative=counted)))
     plant.step(10 * 1e-4, 1e-4)
     assert calls == 13  # one step of the integrator, with the evaluations at its start and its end
 
@@ -433,13 +433,11 @@ def test_energy_balance_of_the_slider_crank_under_every_drive(drive: str) -> Non
 # ------------------------------------------------------------------ what a step refuses
 
 
-def snapshot(plant: MechanismPlant) -> str:
+def snapshot(plant: Plant) -> str:
     return json.dumps(plant.save())
 
 
-def assert_refused(
-    plant: MechanismPlant, error: type[LinkworkError], match: str, time: float, step: float
-) -> LinkworkError:
+def assert_refused(plant: Plant, error: type[LinkworkError], match: str, time: float, step: float) -> LinkworkError:
     """The step fails with the message, leaves everything as it was, and the plant goes on as if it had not been asked."""
     before = snapshot(plant)
     with pytest.raises(error, match=match) as caught:
@@ -516,7 +514,7 @@ def test_errors_count_as_absolute_below_the_scale_of_the_mechanism(kind: Kind) -
     par = kind.parameters
 
     def scale(speed: float) -> Any:
-        return kind.equations.plant.error_scale(par, speed)
+        return kind.equations.assembly.error_scale(par, speed)
 
     mass = sum(getattr(par, name) for name in kind.masses)
     energy = 0.5 * (par.crank_inertia + mass * par.crank_length**2) * 40.0**2
@@ -539,7 +537,7 @@ def test_step_that_cannot_meet_its_tolerance(kind: Kind, drive: str, name: str, 
     assert_refused(plant, IntegrationError, match, 0.0, 1.0)
 
 
-def falling(**options: Any) -> MechanismPlant:
+def falling(**options: Any) -> Plant:
     """Without spring and nearly without damper the slider drifts to the limit of assembly within four turns."""
     return speed_plant(
         parameters=replace(TABLE_3_1, slider_stiffness=0.0, slider_damping=1e4 * DYN_S_PER_CM), **options
@@ -710,7 +708,7 @@ def test_start_with_inputs_that_are_not_usable(kind: Kind, name: str) -> None:
 @pytest.mark.parametrize(
     ("kind", "drive", "options", "names"),
     [
-        (FIVE_BAR, "torque", {"initial": InitialState(slider_velocity=1e180)}, r"slider_velocity 1e\+180"),
+        (FIVE_BAR, "torque", {"initial": InitialState(slider_velocity=1e180)}, r"slider_velocity is 1e\+180"),
         (FIVE_BAR, "speed", {"inputs": {"drive.speed": 1e300}}, r"drive\.speed is 1e\+300"),
         *(
             (SLIDER_CRANK, drive, options, names)
@@ -723,14 +721,14 @@ def test_start_with_inputs_that_are_not_usable(kind: Kind, name: str) -> None:
                 (
                     "torque-force",
                     {"initial": SliderCrankStart(shift_velocity=1e180)},
-                    r"initial\.shift_velocity\) 1e\+180 m/s",
+                    r"initial\.shift_velocity is 1e\+180 m/s",
                 ),
                 ("speed-shift", {"inputs": {"drive.speed": 1e300}}, r"drive\.speed is 1e\+300 rad/s"),
-                ("speed-shift", {"inputs": {"axial.speed": 1e300}}, r"axial\.speed\) 1e\+300 m/s"),
+                ("speed-shift", {"inputs": {"axial.speed": 1e300}}, r"axial\.speed is 1e\+300 m/s"),
                 (
                     "speed-groove",
                     {"inputs": {"drive.speed": 1e300}},
-                    r"drive\.speed is 1e\+300 rad/s, .*groove\.amplitude",
+                    r"drive\.speed is 1e\+300 rad/s",
                 ),
             ]
         ),
@@ -823,7 +821,7 @@ def test_start_in_a_groove_too_deep_says_by_how_much() -> None:
 def test_start_at_the_limit_of_the_rods_reach(offset: float) -> None:
     mechanism = parameters(offset)
 
-    def start(shift: float) -> MechanismPlant:
+    def start(shift: float) -> Plant:
         return default(parameters=mechanism, initial=SliderCrankStart(shift_position=shift))
 
     stretched = sqrt(ROD_IN**2 - (CRANK_IN + offset) ** 2)
@@ -925,7 +923,7 @@ DAMAGE: dict[str, list[tuple[str, Any]]] = {
         ("commanded", "no"),
         ("commanded", ["drive.torque"]),
     ],
-    "five-bar slider": [
+    "five-bar": [
         ("parameters", {**running(FIVE_BAR).save()["parameters"], "crank_length": -1.0}),
         ("modes", {"drive.mode": 7}),
     ],
