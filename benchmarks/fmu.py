@@ -19,8 +19,9 @@ from pythonfmu.builder import FmuBuilder
 from rich.console import Console
 from rich.table import Table
 
-import build_fmu
 from analysis import Inputs, simulate
+from analysis.export import build
+from build_fmu import FMUS
 from linkwork.five_bar import dynamics
 from linkwork.five_bar.published import SETS
 from linkwork.plant import Plant
@@ -90,7 +91,7 @@ def main() -> None:
         script = Path(folder) / "trivial_slave.py"
         script.write_text(TRIVIAL)
         trivial = seconds_per_step(Path(FmuBuilder.build_FMU(script, dest=folder, needsExecutionTool=False)))
-        ours = seconds_per_step(build_fmu.build("FiveBarSlider", folder))
+        ours = seconds_per_step(build(FMUS["FiveBarSlider"], folder))
 
     def in_process() -> float:
         begun = time.perf_counter()

@@ -19,13 +19,14 @@ from rich.console import Console
 from rich.table import Table
 from scipy.integrate import solve_ivp
 
-import build_fmu
 from analysis import simulate
+from analysis.export import build
 from analysis.run import Inputs, compiled
 from analysis.slider_crank import QUANTITIES, ConstantShift, Tolerance, close, force_turn, joint_loads, monte_carlo
 from benchmarks.engines import ACCURACY
 from benchmarks.fmu import STEP, seconds_per_step
 from benchmarks.solvers import SCIPY_METHODS, TOLERANCES, best_time
+from build_fmu import FMUS
 from linkwork.slider_crank import dynamics, published
 from linkwork.slider_crank.kinematics import coefficients, position
 
@@ -188,7 +189,7 @@ def main() -> None:
         f"a right-hand side takes {1e9 * fast:.0f} ns compiled, {1e6 * plain:.1f} microseconds in plain Python"
     )
     with tempfile.TemporaryDirectory() as folder:
-        whole, bare = seconds_per_step(Path(build_fmu.build("SliderCrank", folder)))
+        whole, bare = seconds_per_step(Path(build(FMUS["SliderCrank"], folder)))
     console.print(
         f"the FMU takes {1e6 * whole:.0f} microseconds a step of {1e3 * STEP:g} ms, inputs and outputs included, and "
         f"{1e6 * bare:.0f} for doStep alone: {STEP / whole:.1f} times faster than real time"

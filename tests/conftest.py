@@ -6,7 +6,8 @@ from pathlib import Path
 
 import pytest
 
-import build_fmu
+from analysis.export import build
+from build_fmu import FMUS
 
 #: Files, and the argument of `test_studies`, whose tests share results that take long, by the group they make. Run with
 #: ``--dist loadgroup`` each group goes to one worker, and so does every other file.
@@ -40,4 +41,4 @@ def group(item: pytest.Item) -> str:
 def fmus(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     """Every FMU by its name, built from the sources as they are."""
     folder = tmp_path_factory.mktemp("fmu")
-    return {name: build_fmu.build(name, folder) for name in build_fmu.MODELS}
+    return {name: build(mechanism, folder) for name, mechanism in FMUS.items()}

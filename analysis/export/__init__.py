@@ -1,5 +1,5 @@
 """Making FMUs of the mechanisms."""
 
-from .python_fmu import BuildError, build, try_out
+from .python_fmu import SOURCES, BuildError, build, try_out
 
-__all__ = ["BuildError", "build", "try_out"]
+__all__ = ["SOURCES", "BuildError", "build", "try_out"]

@@ -9,7 +9,6 @@ from math import radians
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
 from matplotlib.text import Text
 
 from analysis import cli, figures

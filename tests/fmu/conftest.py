@@ -10,7 +10,8 @@ from zipfile import ZipFile
 
 import pytest
 
-import build_fmu
+from analysis.export import SOURCES, build
+from build_fmu import FMUS
 
 from .models import MODELS, Changes, Model
 
@@ -18,7 +19,7 @@ from .models import MODELS, Changes, Model
 def changed_sources(folder: Path, changes: Changes) -> Path:
     """A copy of the source root in ``folder`` with the changes made, each of them found at least once."""
     sources = folder / "fmu_src"
-    shutil.copytree(build_fmu.SOURCES, sources, ignore=shutil.ignore_patterns("__pycache__"))
+    shutil.copytree(SOURCES, sources, ignore=shutil.ignore_patterns("__pycache__"))
     for name, (old, new) in changes.items():
         path = sources / name
         text = path.read_text(encoding="utf-8")
@@ -62,13 +63,13 @@ def build_variant(tmp_path: Path, model: Model) -> Callable[[Changes], Path]:
     """Builds the FMU under test from changed sources, each time in a folder of its own."""
     count = 0
 
-    def build(changes: Changes) -> Path:
+    def variant(changes: Changes) -> Path:
         nonlocal count
         count += 1
         folder = tmp_path / f"variant-{count}"
-        return build_fmu.build(model.name, folder, changed_sources(folder, changes))
+        return build(FMUS[model.name], folder, changed_sources(folder, changes))
 
-    return build
+    return variant
 
 
 def model_description(fmu: Path) -> ElementTree.Element:

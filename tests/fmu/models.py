@@ -14,19 +14,23 @@ Changes = dict[str, tuple[str, str]]
 class Model(NamedTuple):
     """What a test has to know of an FMU to be the same for all of them.
 
-    ``slave`` and ``plant`` name its module and its package, ``force`` is an input that drives the first or the second freedom
+    ``plant`` names its package, ``force`` is an input that drives the first or the second freedom
     where a torque drives the crank, ``too_much`` a value of it that ends in the limit of assembly within a tenth of a
     second. ``free`` are values that leave both freedoms to forces, ``equation`` is a change of one constant in its
     equations of motion, which shows in torque drive.
     """
 
     name: str
-    slave: str
     plant: str
     force: str
     too_much: float
     free: dict[str, float]
     equation: Changes
+
+    @property
+    def slave(self) -> str:
+        """Name of the slave's module."""
+        return f"{self.plant}_slave"
 
 
 MODELS = {
@@ -34,7 +38,6 @@ MODELS = {
     for model in (
         Model(
             "FiveBarSlider",
-            "five_bar_slave",
             "five_bar",
             "slider.force",
             1e5,
@@ -44,7 +47,6 @@ MODELS = {
         ),
         Model(
             "SliderCrank",
-            "slider_crank_slave",
             "slider_crank",
             "axial.force",
             1e5,

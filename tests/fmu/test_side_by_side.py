@@ -121,11 +121,12 @@ def rebuild(root: str, folder: str, name: str, values: dict[str, float], changes
     sys.path.insert(0, root)
     from fmpy import simulate_fmu
 
-    import build_fmu
+    from analysis.export import SOURCES, build
+    from build_fmu import FMUS
 
     folder = Path(folder)
     sources = folder / "fmu_src"
-    shutil.copytree(build_fmu.SOURCES, sources, ignore=shutil.ignore_patterns("__pycache__"))
+    shutil.copytree(SOURCES, sources, ignore=shutil.ignore_patterns("__pycache__"))
     ((path, (old, new)),) = changes.items()
     dynamics = sources / path
     text = dynamics.read_text(encoding="utf-8")
@@ -133,8 +134,8 @@ def rebuild(root: str, folder: str, name: str, values: dict[str, float], changes
     modules = []
     for source in (text, text.replace(old, new), text):
         dynamics.write_text(source, encoding="utf-8")
-        fmu = build_fmu.build(name, folder / "build", sources)
-        tops = ("linkwork_", build_fmu.MODELS[name].slave + "_")
+        fmu = build(FMUS[name], folder / "build", sources)
+        tops = ("linkwork_", "five_bar_slave_", "slider_crank_slave_")
         modules.append(sorted(module for module in sys.modules if module.startswith(tops)))
         end = simulate_fmu(
             fmu,

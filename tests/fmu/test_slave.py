@@ -5,16 +5,15 @@ from __future__ import annotations
 from typing import Any
 
 import pytest
-from five_bar_slave import FiveBarSlider
 from pythonfmu.enums import Fmi2Status
-from slider_crank_slave import SliderCrank
 
+from build_fmu import FMUS
 from linkwork.errors import LinkworkError, ParameterError
 from slave import LinkworkSlave
 
 from .models import Model
 
-SLAVES = {"FiveBarSlider": FiveBarSlider, "SliderCrank": SliderCrank}
+SLAVES = {name: type(name, (LinkworkSlave,), {"mechanism": mechanism}) for name, mechanism in FMUS.items()}
 
 
 @pytest.fixture
