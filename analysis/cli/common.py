@@ -127,6 +127,11 @@ def chosen_case(file: str | None, published: str | None, settings: Sequence[str]
     return published_case(published)
 
 
+def say(text: str) -> None:
+    """Print a sentence as it is, in one line."""
+    console.print(text, markup=False, highlight=False, soft_wrap=True)
+
+
 def show_table(
     title: str,
     headings: Sequence[str],

@@ -12,7 +12,7 @@ import numpy as np
 
 from ... import figures
 from ... import slider_crank as sc
-from ..common import console, show_table
+from ..common import say, show_table
 from ..design import wrote
 from .options import Chosen, Problem, Units, about_mechanism, angle_text, out_option, plot_option, with_problem
 
@@ -58,7 +58,7 @@ def forces(chosen: Chosen, problem: Problem, frames: Sequence[int], out: str, pl
         words=("quantity", "unit"),
     )
     for sentence in _special_places(turn, units):
-        console.print(sentence, highlight=False, soft_wrap=True)
+        say(sentence)
     stem = str(Path(out) / f"{chosen.name}-forces")
     written = [io.write_csv(f"{stem}.csv", turn.columns(units.system))]
     if plot:

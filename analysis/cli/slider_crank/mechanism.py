@@ -10,7 +10,7 @@ import click
 
 from ... import figures
 from ... import slider_crank as sc
-from ..common import console, show_table
+from ..common import console, say, show_table
 from ..design import wrote
 from .options import Chosen, about_mechanism, angle_text, out_option, quantity
 
@@ -44,11 +44,9 @@ def info(chosen: Chosen) -> None:
     }
     show_table(chosen.title, (), rows.items())
     for part in parts:
-        console.print(
+        say(
             f"range {angle_text(part.low)} to {angle_text(part.high)}: stroke {units.length(part.stroke)}, slider "
-            f"{units.length(part.least.slider_position)} to {units.length(part.greatest.slider_position)}",
-            highlight=False,
-            soft_wrap=True,
+            f"{units.length(part.least.slider_position)} to {units.length(part.greatest.slider_position)}"
         )
     found = sc.dead_centres(p, law)
     if not found:
@@ -109,7 +107,7 @@ def picture(
     seen = common
     if view is not None:
         seen = common | {"view": tuple(degrees(quantity(text, "rad", "--view")) for text in view)}
-    written = [io.save_figure(figures.plot_mechanism(p, at, chosen.shift_at(at), **seen), f"{stem}.png")]
+    written = [io.save_figure(figures.plot(p, at, float(chosen.shift_at(at)), **seen), f"{stem}.png")]
     if with_range:
         written.append(io.save_figure(figures.plot_range(p, **common), f"{stem}-range.png"))
     if animate:
