@@ -15,18 +15,18 @@ from functools import cache, partial
 from pathlib import Path
 
 import numpy as np
-from rich.console import Console
-from rich.table import Table
 from scipy.integrate import solve_ivp
 
-from analysis import simulate
 from analysis.export import build
-from analysis.run import Inputs, compiled
+from build_fmu import FMUS
+from analysis import simulate
+from analysis.cli.common import say, show_table
+from analysis.run import compiled
+from analysis.run.inputs import SliderCrankInputs
 from analysis.slider_crank import QUANTITIES, ConstantShift, Tolerance, close, force_turn, joint_loads, monte_carlo
 from benchmarks.engines import ACCURACY
 from benchmarks.fmu import STEP, seconds_per_step
 from benchmarks.solvers import SCIPY_METHODS, TOLERANCES, best_time
-from build_fmu import FMUS
 from linkwork.slider_crank import dynamics, published
 from linkwork.slider_crank.kinematics import coefficients, position
 
@@ -43,7 +43,7 @@ def in_process(tolerance: float) -> np.ndarray:
 
 
 def _run(tolerance: float):  # type: ignore[no-untyped-def]
-    inputs = Inputs(torque=TORQUE)
+    inputs = SliderCrankInputs(torque=TORQUE)
     return simulate(PARAMETERS, inputs, initial=INITIAL, stop_time=STOP, samples=TIMES, tolerance=tolerance)
 
 
@@ -81,30 +81,30 @@ def loosest(run: Callable[[float], np.ndarray]) -> tuple[float, float]:
     raise RuntimeError("the accuracy is not reached at any tolerance")
 
 
-def runs() -> Table:
-    """The runs in time."""
+def runs() -> None:
+    """Measure and print the runs in time."""
     tolerance, error = loosest(in_process)
     whole = best_time(partial(in_process, tolerance), 30)
     statistics = [_run(tolerance).statistics for _ in range(30)]
     inner = min(s["seconds_integrating"] for s in statistics)
-    table = Table(title=f"{STOP} s under {TORQUE:g} N.m, error at most {ACCURACY:g} of the stroke")
-    for heading in ("solver", "error", "time [ms]", "times the integration"):
-        table.add_column(heading)
-
-    def row(name: str, error: float, seconds: float) -> None:
-        table.add_row(name, f"{error:.1e}", f"{1e3 * seconds:.3f}", f"{seconds / inner:.1f}")
-
-    row(f"in process, the integration ({int(statistics[0]['steps'])} steps)", error, inner)
-    row("in process, the whole call of simulate", error, whole)
-    best: tuple[float, float, str] | None = None
+    others = []
     for method in SCIPY_METHODS:
-        setting, error = loosest(partial(by_scipy, method))
-        seconds = best_time(partial(by_scipy, method, setting), 3)
-        if best is None or seconds < best[0]:
-            best = (seconds, error, method)
-    assert best is not None
-    row(f"SciPy, plain-Python right-hand side, best method ({best[2]})", best[1], best[0])
-    return table
+        setting, off = loosest(partial(by_scipy, method))
+        others.append((best_time(partial(by_scipy, method, setting), 3), off, method))
+    best = min(others)
+    show_table(
+        f"{STOP} s under {TORQUE:g} N.m, error at most {ACCURACY:g} of the stroke",
+        ("solver", "error", "time [ms]", "times the integration"),
+        [
+            (name, f"{off:.1e}", f"{1e3 * seconds:.3f}", f"{seconds / inner:.1f}")
+            for name, off, seconds in (
+                (f"in process, the integration ({int(statistics[0]['steps'])} steps)", error, inner),
+                ("in process, the whole call of simulate", error, whole),
+                (f"SciPy, plain-Python right-hand side, best method ({best[2]})", best[1], best[0]),
+            )
+        ],
+        words=("solver",),
+    )
 
 
 def right_hand_side() -> tuple[float, float]:
@@ -133,40 +133,40 @@ def _dual_turn() -> None:
     joint_loads(closure, speed=INITIAL.crank_speed, slider_force=0.0)
 
 
-def forces() -> Table:
-    """All joint forces over a turn of 361 points."""
+def forces() -> None:
+    """Measure and print all joint forces over a turn of 361 points."""
     shift = ConstantShift(INITIAL.shift_position)
     arrays = best_time(lambda: force_turn(PARAMETERS, crank_speed=INITIAL.crank_speed, shift=shift, angles=ANGLES))
-    table = Table(title="all joint forces at 361 angles")
-    for heading in ("method", "time [ms]", "ratio"):
-        table.add_column(heading)
-    for name, seconds in (
-        ("vector mechanics on arrays, force_turn", arrays),
-        ("vector mechanics, the plant in plain Python", best_time(_scalar_turn)),
-        ("dual numbers: closure by Newton-Raphson, 17 equations", best_time(_dual_turn)),
-    ):
-        table.add_row(name, f"{1e3 * seconds:.1f}", f"{seconds / arrays:.1f}")
-    return table
+    times = {
+        "vector mechanics on arrays, force_turn": arrays,
+        "vector mechanics, the plant in plain Python": best_time(_scalar_turn),
+        "dual numbers: closure by Newton-Raphson, 17 equations": best_time(_dual_turn),
+    }
+    show_table(
+        "all joint forces at 361 angles",
+        ("method", "time [ms]", "ratio"),
+        [(name, f"{1e3 * seconds:.1f}", f"{seconds / arrays:.1f}") for name, seconds in times.items()],
+        words=("method",),
+    )
 
 
-def tolerances() -> Table:
-    """Monte Carlo with a million samples at one angle."""
+def tolerances() -> None:
+    """Measure and print Monte Carlo with a million samples at one angle."""
     turn = force_turn(
         PARAMETERS,
         crank_speed=INITIAL.crank_speed,
         shift=ConstantShift(INITIAL.shift_position),
-        angles=np.array([np.pi / 6.0]),
+        angles=np.pi / 6.0,
     )
-    off = [
-        Tolerance(name="guide.offset", half_width=5e-4),
-        Tolerance(name="shift.position", half_width=5e-4),
-        Tolerance(name="guide.twist", half_width=2e-3),
-        Tolerance(name="crank.length", half_width=1e-4),
-        Tolerance(name="rod.length", half_width=2e-4),
-    ]
-    table = Table(title="a million samples of five tolerances at one angle")
-    for heading in ("quantities", "time [s]", "standard deviation of S4 over the linear estimate"):
-        table.add_column(heading)
+    widths = {
+        "guide.offset": 5e-4,
+        "shift.position": 5e-4,
+        "guide.twist": 2e-3,
+        "crank.length": 1e-4,
+        "rod.length": 2e-4,
+    }
+    off = [Tolerance(name, half_width) for name, half_width in widths.items()]
+    rows = []
     for name, quantities in (
         ("slider position", ("slider.position",)),
         ("motion of the slider, torque and every joint force", tuple(QUANTITIES)),
@@ -175,27 +175,25 @@ def tolerances() -> Table:
         seconds = best_time(lambda q=quantities, f=found: f.append(monte_carlo(turn, off, quantities=q)), 3)
         spread, linear = found[0].spreads["slider.position"], found[0].estimates["slider.position"]
         ratio = float(spread.deviation[0] / linear.deviation[0])
-        table.add_row(name, f"{seconds:.2f}", f"{ratio:.5f}")
-    return table
+        rows.append((name, f"{seconds:.2f}", f"{ratio:.5f}"))
+    headings = "quantities", "time [s]", "standard deviation of S4 over the linear estimate"
+    show_table("a million samples of five tolerances at one angle", headings, rows, words=("quantities",))
 
 
 def main() -> None:
     """Measure and print the tables."""
-    console = Console(width=140)
     in_process(1e-6)
-    console.print(runs())
+    runs()
     fast, plain = right_hand_side()
-    console.print(
-        f"a right-hand side takes {1e9 * fast:.0f} ns compiled, {1e6 * plain:.1f} microseconds in plain Python"
-    )
+    say(f"a right-hand side takes {1e9 * fast:.0f} ns compiled, {1e6 * plain:.1f} microseconds in plain Python")
     with tempfile.TemporaryDirectory() as folder:
         whole, bare = seconds_per_step(Path(build(FMUS["SliderCrank"], folder)))
-    console.print(
+    say(
         f"the FMU takes {1e6 * whole:.0f} microseconds a step of {1e3 * STEP:g} ms, inputs and outputs included, and "
         f"{1e6 * bare:.0f} for doStep alone: {STEP / whole:.1f} times faster than real time"
     )
-    console.print(forces())
-    console.print(tolerances())
+    forces()
+    tolerances()
 
 
 if __name__ == "__main__":

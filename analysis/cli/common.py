@@ -166,6 +166,11 @@ def five_bar_case(file: str | None, published: str | None, settings: Sequence[st
     return case
 
 
+def say(text: str) -> None:
+    """Print a sentence as it is, in one line."""
+    console.print(text, markup=False, highlight=False, soft_wrap=True)
+
+
 def show_table(
     title: str,
     headings: Sequence[str],

@@ -64,7 +64,6 @@ class _Pose:
 
 
 def _pose(parameters: SliderCrankParameters, angle: float, shift: float, factor: float) -> _Pose:
-    """The joints at a configuration in which the rod reaches the guide."""
     p = parameters.constants()
     q = kinematics.position(angle, shift, p)
     return _Pose(

@@ -280,6 +280,47 @@ def joint_loads(
     if torque is not None:
         _check_dead_centres(closure, motion)
     length = scale(p, closure.shift)
+    pin, front = _ball_frames(closure)
+    matrix, load = _equations(closure, motion, length)
+    # the rod's moment about its line is the equation that is met by itself
+    kept = np.delete(np.arange(18), 9)
+    given, value = (5, torque) if torque is not None else (17, slider_force)
+    known = each("torque" if torque is not None else "slider_force", value, n) / (length if given == 5 else 1.0)
+    free = np.delete(np.arange(18), given)
+    unknown = np.linalg.solve(
+        matrix[:, kept[:, None], free], (load[:, kept] - known[:, None] * matrix[:, kept, given])[..., None]
+    )[..., 0]
+    f = np.insert(unknown, given, known, axis=-1)
+    guide = closure.guide_frame.real
+    return JointLoads(
+        closure=closure,
+        torque=f[:, 5] * length,
+        axial=f[:, 4],
+        slider_force=f[:, 17],
+        bearing=np.concatenate([f[:, :2], np.zeros((n, 1))], -1),
+        bearing_moment=f[:, [2, 3, 5]] * length,
+        crank_pin=np.einsum("nij,nj->ni", pin.real, f[:, 6:9]),
+        slider_pin=np.einsum("nij,nj->ni", front.real, f[:, 9:12]),
+        guide=np.einsum("nij,nj->ni", guide[..., :2], f[:, 12:14]),
+        guide_moment=np.einsum("nij,nj->ni", guide, f[:, 14:17]) * length,
+        residual=(np.einsum("ni,ni->n", matrix[:, 9], f) - load[:, 9]) * length,
+    )
+
+
+def _ball_frames(closure: Closure) -> tuple[Dual, Dual]:
+    """The crank's frame moved to the crank pin, and the rod's moved to the slider pin."""
+    p = closure.parameters
+    pin = closure.crank_frame @ about_i(Dual(0.0, p.crank_length))
+    return cast(Dual, pin), cast(Dual, closure.rod_frame @ about_i(Dual(0.0, p.rod_length)))
+
+
+def _equations(closure: Closure, motion: Rates, length: float) -> tuple[FloatArray, FloatArray]:
+    """Matrix (n, 18, 18) and right-hand side (n, 18) of eqs 62 to 64, moments and moments' arms divided by ``length``.
+
+    The unknowns, by the screws of their lines of action or axes: bearing 1Fi, 1Fj, 1Ti, 1Tj, axial 1Fk, torque 1Tk; crank
+    pin 2F; slider pin 3F; guide 4Fi, 4Fj, 4T; force on the slider.
+    """
+    p, n = closure.parameters, closure.crank_angle.size
     axes = np.broadcast_to(np.eye(3), (n, 3, 3))
     forces, moments = Dual(axes), Dual(np.zeros_like(axes), axes * length)
     # bodies' frames in frame 1, and momentum rates less gravity in them: D'Alembert (eqs 62 to 64), with the signs of f1
@@ -295,11 +336,8 @@ def joint_loads(
             (motion.crank_rate, motion.rod_rate, motion.slider_rate),
         )
     ]
-    # screws of the unknowns in frame 1, lines of action or axes of moments: bearing 1Fi, 1Fj, 1Ti, 1Tj, axial 1Fk, torque
-    # 1Tk; crank pin 2F; slider pin 3F; guide 4Fi, 4Fj, 4T; force on the slider
+    pin, front = _ball_frames(closure)
     ground = join(forces[..., :2], moments[..., :2], forces[..., 2:], moments[..., 2:])
-    pin = cast(Dual, closure.crank_frame @ about_i(Dual(0.0, p.crank_length)))
-    front = cast(Dual, frames[1] @ about_i(Dual(0.0, p.rod_length)))
     guiding = join(frames[2][..., :2], frames[2] @ moments, -frames[2][..., 2:])
     nothing = Dual(np.zeros((n, 3, 6)))
     on_crank = join(ground, -pin, nothing[..., :3], nothing)
@@ -310,31 +348,7 @@ def joint_loads(
         local = cast(Dual, body.T @ screws)
         rows.append(np.concatenate([local.real, local.dual / length], -2))
         right.append(np.concatenate([rate.real, rate.dual / length], -1))
-    matrix, load = np.concatenate(rows, -2), np.concatenate(right, -1)
-    # the rod's moment about its line is the equation that is met by itself
-    kept = np.delete(np.arange(18), 9)
-    given, value = (5, torque) if torque is not None else (17, slider_force)
-    known = each("torque" if torque is not None else "slider_force", value, n) / (length if given == 5 else 1.0)
-    free = np.delete(np.arange(18), given)
-    unknown = np.linalg.solve(
-        matrix[:, kept[:, None], free], (load[:, kept] - known[:, None] * matrix[:, kept, given])[..., None]
-    )[..., 0]
-    f = np.insert(unknown, given, known, axis=-1)
-    residual = (np.einsum("ni,ni->n", matrix[:, 9], f) - load[:, 9]) * length
-    zero = np.zeros((n, 1))
-    return JointLoads(
-        closure=closure,
-        torque=f[:, 5] * length,
-        axial=f[:, 4],
-        slider_force=f[:, 17],
-        bearing=np.concatenate([f[:, :2], zero], -1),
-        bearing_moment=f[:, [2, 3, 5]] * length,
-        crank_pin=np.einsum("nij,nj->ni", pin.real, f[:, 6:9]),
-        slider_pin=np.einsum("nij,nj->ni", front.real, f[:, 9:12]),
-        guide=np.einsum("nij,nj->ni", frames[2].real[..., :2], f[:, 12:14]),
-        guide_moment=np.einsum("nij,nj->ni", frames[2].real, f[:, 14:17]) * length,
-        residual=residual,
-    )
+    return np.concatenate(rows, -2), np.concatenate(right, -1)
 
 
 def _check_dead_centres(closure: Closure, motion: Rates) -> None:

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import build_fmu
+from analysis import export
 from analysis import cli
 from analysis.periodic import find_orbit
 from linkwork.five_bar.published import SETS, TABLE_3_1
@@ -188,7 +188,7 @@ def test_ctrl_c_is_clean(linkwork, monkeypatch):
     def interrupted(*arguments, **options):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(build_fmu, "build", interrupted)
+    monkeypatch.setattr(export, "build", interrupted)
     result = linkwork("build")
     assert result.exit_code == cli.INTERRUPTED
     assert "interrupted" in result.stderr

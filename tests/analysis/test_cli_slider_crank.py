@@ -433,10 +433,8 @@ class TestPicture:
 
     def test_it_is_of_what_was_asked_for(self, linkwork, monkeypatch):
         asked = []
-        right = figures.plot_mechanism
-        monkeypatch.setattr(
-            figures, "plot_mechanism", lambda *a, **options: asked.append((a, options)) or right(*a, **options)
-        )
+        right = figures.plot
+        monkeypatch.setattr(figures, "plot", lambda *a, **options: asked.append((a, options)) or right(*a, **options))
         arguments = ("--angle", "45 deg", "--groove", "apart", "--set", "groove.amplitude=2 in", "--units", "inch")
         assert linkwork("picture", *arguments, "--view", "30 deg", "1 rad").exit_code == 0
         ((p, angle, shift), options) = asked[0]

@@ -55,6 +55,10 @@ TOLERANCES = (
 )
 
 
+#: Angle of a dead centre of the offset mechanism at S1 = 3.5 in.
+DEAD = force_turn(OFFSET, crank_speed=CRANK_SPEED, shift=ConstantShift(3.5 * INCH)).dead_centres[0].crank_angle
+
+
 def offset_turn(angles: Any, **given: Any) -> ForceTurn:
     return force_turn(OFFSET, crank_speed=CRANK_SPEED, shift=ConstantShift(3.5 * INCH), angles=angles, **given)
 
@@ -404,9 +408,7 @@ def test_angles_that_the_nominal_mechanism_cannot_reach_are_reported() -> None:
 
 
 def test_across_a_dead_centre_there_is_no_mean() -> None:
-    common: dict[str, Any] = {"crank_speed": CRANK_SPEED, "shift": ConstantShift(3.5 * INCH)}
-    centre = force_turn(OFFSET, **common).dead_centres[0].crank_angle
-    turn = force_turn(OFFSET, torque=CRANK_TORQUE, angles=[centre - 0.5, centre + 1e-5], **common)
+    turn = offset_turn([DEAD - 0.5, DEAD + 1e-5], torque=CRANK_TORQUE)
     result = monte_carlo(turn, TOLERANCES, quantities=("slider.load", "guide.mx", "slider.position"), samples=20_000)
     load = result.spreads["slider.load"]
     assert np.ma.getmaskarray(load.mean).tolist() == [False, True]
@@ -422,22 +424,17 @@ def test_across_a_dead_centre_there_is_no_mean() -> None:
     assert not np.ma.getmaskarray(linear.nominal).any()
     for name in ("guide.mx", "slider.position"):
         assert not np.ma.getmaskarray(result.estimates[name].deviation).any()
-    for name in ("guide.mx", "slider.position"):
         assert not np.ma.getmaskarray(result.spreads[name].mean).any()
     assert sum("samples on both sides of a dead centre" in m and "slider.load" in m for m in result.notes()) == 1
     # where the load is given the same place is like any other
-    free = force_turn(OFFSET, load=3.0, angles=[centre], **common)
+    free = offset_turn([DEAD], load=3.0)
     assert monte_carlo(free, TOLERANCES, quantities=("crank_pin.fx",), samples=2000).notes() == ()
 
 
 def test_an_estimate_ends_where_the_tolerances_reach_the_dead_centre() -> None:
     """An error of the crank angle reaches as far as it is wide, with no samples too."""
-    common: dict[str, Any] = {"crank_speed": CRANK_SPEED, "shift": ConstantShift(3.5 * INCH)}
-    centre = force_turn(OFFSET, **common).dead_centres[0].crank_angle
     width = 1e-3
-    turn = force_turn(
-        OFFSET, torque=CRANK_TORQUE, angles=centre + width * np.array([-1.05, -0.95, 0.95, 1.05]), **common
-    )
+    turn = offset_turn(DEAD + width * np.array([-1.05, -0.95, 0.95, 1.05]), torque=CRANK_TORQUE)
     tolerances = [Tolerance(ANGLE, width)]
     found = estimate(turn, tolerances, ("slider.load", "slider.position"))
     assert np.ma.getmaskarray(found["slider.load"].deviation).tolist() == [False, True, True, False]

@@ -13,7 +13,7 @@ from click.core import ParameterSource
 from linkwork.slider_crank.assembly import check_assembly
 
 from ... import slider_crank as sc
-from ..common import CHECK_FAILED, console, errors, print_written, show_table, tolerance_option
+from ..common import CHECK_FAILED, console, errors, print_written, say, show_table, tolerance_option
 from .options import Chosen, Problem, about_mechanism, out_option, with_problem
 
 
@@ -73,11 +73,9 @@ def dual(chosen: Chosen, problem: Problem, tolerance: float, two_rotations: bool
         words=("quantity", "unit", "verdict"),
         styles=[None if ok else "red" for ok in passed],
     )
-    console.print(
+    say(
         f"the loop closes to {found.rotation_residual:.1e} rad and {found.length_residual:.1e} m in at most "
-        f"{found.iterations} iterations; moment about the rod's line, which no equation asks for: {found.rod_moment:.1e} N.m",
-        highlight=False,
-        soft_wrap=True,
+        f"{found.iterations} iterations; moment about the rod's line, which no equation asks for: {found.rod_moment:.1e} N.m"
     )
     if not all(passed):
         errors.print("check failed: the two do not agree", style="red")
@@ -90,7 +88,7 @@ def _show_two_rotations(chosen: Chosen, points: int, folder: Path) -> None:
     from ...files import write_csv
 
     angle = np.linspace(0.0, tau, points)
-    shift = np.array([chosen.shift_at(float(a)) for a in angle])
+    shift = chosen.shift_at(angle)
     short = sc.shortage(chosen.parameters, angle, shift)
     reached = short < 0.0
     if not reached.any():
@@ -115,12 +113,10 @@ def _show_two_rotations(chosen: Chosen, points: int, folder: Path) -> None:
         [(*(f"{x[i]:.6g}" for x in numbers), "yes" if end.settled[i] else "no") for i in shown],
         styles=[None if end.settled[i] else "yellow" for i in shown],
     )
-    console.print(
+    say(
         f"largest rotation residual {np.degrees(end.rotation_residual).max():.2f} deg, length residual "
         f"{chosen.units.length(float(end.length_residual.max()))}; slider position off by up to "
         f"{chosen.units.length(float(end.position_error.max()))}; the steps become small at {int(end.settled.sum())} of "
-        f"{len(end.settled)} crank angles",
-        highlight=False,
-        soft_wrap=True,
+        f"{len(end.settled)} crank angles"
     )
     print_written([write_csv(folder / f"{chosen.name}-two-rotations.csv", columns)])

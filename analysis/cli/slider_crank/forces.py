@@ -12,7 +12,7 @@ import numpy as np
 
 from ... import figures
 from ... import slider_crank as sc
-from ..common import console, print_written, show_table
+from ..common import console, print_written, say, show_table
 from .options import Chosen, Problem, Units, about_mechanism, angle_text, out_option, plot_option, with_problem
 
 if TYPE_CHECKING:
@@ -57,7 +57,7 @@ def forces(chosen: Chosen, problem: Problem, frames: Sequence[int], out: str, pl
         words=("quantity", "unit"),
     )
     for sentence in _special_places(turn, units):
-        console.print(sentence, highlight=False, soft_wrap=True)
+        say(sentence)
     stem = str(Path(out) / f"{chosen.name}-forces")
     written = [write_csv(f"{stem}.csv", turn.columns(units.system))]
     if plot:

@@ -10,7 +10,7 @@ import click
 
 from ... import figures
 from ... import slider_crank as sc
-from ..common import console, print_written, show_table
+from ..common import console, print_written, say, show_table
 from .options import Chosen, about_mechanism, angle_text, out_option, quantity
 
 
@@ -43,11 +43,9 @@ def info(chosen: Chosen) -> None:
     }
     show_table(chosen.title, (), rows.items())
     for part in parts:
-        console.print(
+        say(
             f"range {angle_text(part.low)} to {angle_text(part.high)}: stroke {units.length(part.stroke)}, slider "
-            f"{units.length(part.least.slider_position)} to {units.length(part.greatest.slider_position)}",
-            highlight=False,
-            soft_wrap=True,
+            f"{units.length(part.least.slider_position)} to {units.length(part.greatest.slider_position)}"
         )
     found = sc.dead_centres(p, law)
     if not found:

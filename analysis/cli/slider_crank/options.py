@@ -74,9 +74,9 @@ class Chosen:
             return sc.ConstantShift(self.shift)
         return sc.GrooveShift(p.groove_amplitude, p.groove_ratio, in_shaft=self.groove == "shaft")
 
-    def shift_at(self, crank_angle: float) -> float:
-        """Shift at a crank angle (m)."""
-        return float(self.law.at(crank_angle)[0])
+    def shift_at(self, crank_angle: Any) -> Any:
+        """Shift at crank angles (m)."""
+        return self.force_law.at(crank_angle, 0.0, 0.0).shift
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
