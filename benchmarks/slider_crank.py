@@ -17,16 +17,15 @@ from pathlib import Path
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from analysis.export import build
-from build_fmu import FMUS
 from analysis import simulate
 from analysis.cli.common import say, show_table
-from analysis.run import compiled
-from analysis.run.inputs import SliderCrankInputs
+from analysis.export import build
+from analysis.run import Inputs, compiled
 from analysis.slider_crank import QUANTITIES, ConstantShift, Tolerance, close, force_turn, joint_loads, monte_carlo
 from benchmarks.engines import ACCURACY
 from benchmarks.fmu import STEP, seconds_per_step
 from benchmarks.solvers import SCIPY_METHODS, TOLERANCES, best_time
+from build_fmu import FMUS
 from linkwork.slider_crank import dynamics, published
 from linkwork.slider_crank.kinematics import coefficients, position
 
@@ -43,7 +42,7 @@ def in_process(tolerance: float) -> np.ndarray:
 
 
 def _run(tolerance: float):  # type: ignore[no-untyped-def]
-    inputs = SliderCrankInputs(torque=TORQUE)
+    inputs = Inputs(torque=TORQUE)
     return simulate(PARAMETERS, inputs, initial=INITIAL, stop_time=STOP, samples=TIMES, tolerance=tolerance)
 
 

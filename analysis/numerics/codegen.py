@@ -212,10 +212,14 @@ def user_function(function: Any, size: int) -> Any:
     """A user's function f(t, x1, ..., x_size) as a C function of t and x, NaN where it raises, with its ``address``."""
     own = njit(float64(*[float64] * (1 + size)), error_model="numpy")(getattr(function, "py_func", function))
 
+    @njit(error_model="numpy")
+    def spread(t, x):  # type: ignore[no-untyped-def]
+        return own(t, *to_fixed_tuple(numba.carray(x, (size,)), size))
+
     @numba.cfunc(float64(float64, types.CPointer(float64)), error_model="numpy")
     def guarded(t, x):  # type: ignore[no-untyped-def]
         try:
-            return own(t, *to_fixed_tuple(numba.carray(x, (size,)), size))
+            return spread(t, x)
         except Exception:
             return np.nan
 

@@ -445,9 +445,13 @@ def _begin_interval(stop, piece, problem, source, watch, work, carry, x, samples
     if law[2] != 0.0 and x[source.law_places[1]] >= law[1]:
         law[2] = 0.0
     channels_at(t, piece, x, source, held)
-    if problem.hold > 0.0:
-        _hold(t, stop if t < problem.end else t + problem.hold, x, source, problem.commands, held, work.ahead)
     lost = _not_finite(held)
+    if problem.hold > 0.0 and lost < 0:
+        _hold(t, stop if t < problem.end else t + problem.hold, x, source, problem.commands, held, work.ahead)
+        for n in range(problem.commands.shape[0]):
+            # a rate is then the secant of a command
+            if not isfinite(held[problem.commands[n, 2]]):
+                lost = problem.commands[n, 0]
     if lost >= 0:
         carry.lost = lost
         return BAD_INPUT

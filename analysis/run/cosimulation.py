@@ -26,8 +26,8 @@ from ..mechanisms import InitialState, Parameters, mechanism_of, output_units
 from .events import RunInterrupted, interruptible, shown
 from .inputs import Inputs
 from .inputs import sample as sample_inputs
-from .prepared import Run
-from .simulation import sample_times, settings_of
+from .prepared import Run, Settings
+from .simulation import sample_times
 from .trajectory import Trajectory
 
 #: Outputs that are angles in (-pi, pi]: they differ by what is left after whole turns.
@@ -190,8 +190,9 @@ def cosimulate(
         If the times are not usable, or an input is not a finite number; the sentence names the input and the time.
     """
     begun = clock.perf_counter()
-    settings = settings_of(sample_times(stop_time, step, start_time), step, tolerance, 1)
-    times = settings.times
+    times = sample_times(stop_time, step, start_time)
+    # the FMU itself judges the tolerance
+    settings = Settings(times=times, hold=step, tolerance=tolerance, max_steps=1)
     prepared = Run(parameters, inputs, initial, settings)
     mechanism, encoded = prepared.mechanism, prepared.encoded
     law = encoded.law.copy()

@@ -61,7 +61,7 @@ class Inputs:
                 _check_channel(name, value)
         given = {name: value for name, value in channels.items() if value is not None and value is not False}
         for arguments in {mode.arguments for mechanism in MECHANISMS.values() for mode in mechanism.modes}:
-            both = [name for name in arguments if name in given]
+            both = [name for name in given if name in arguments]
             if len(both) > 1:
                 raise InputError(f"both {' and '.join(both)} are given: the freedom can be driven by one of them only")
         for name in (
@@ -386,24 +386,20 @@ def sample(
     )  # fmt: skip
     u = np.zeros(len(encoded.mechanism.channels))
     k.channels(t, ahead, left, x, source, encoded.commands, u, np.empty_like(u))
+    here = np.zeros_like(u)
     if any(chain.from_iterable(encoded.functions)):
         here = _of_functions(encoded, t, x)
         u += here
-        if ahead > t and len(encoded.commands):
+        if ahead > t and len(encoded.commands) and np.isfinite(here).all():
             there = _of_functions(encoded, ahead, x)
             for value, _, rate in encoded.commands:
                 u[rate] += (there[value] - here[value]) / (ahead - t) - here[rate]
-    lost = np.flatnonzero(~np.isfinite(u))
-    if len(lost):
-        raise NotFiniteError(encoded, _culprit(encoded, int(lost[0]), ahead > t), t, x)
+    for lost in np.flatnonzero(~np.isfinite(u)):
+        # where inputs are held, a rate is the secant of a command
+        commands = {int(rate): int(value) for value, _, rate in encoded.commands}
+        secant = ahead > t and np.isfinite(here[lost])
+        raise NotFiniteError(encoded, commands.get(int(lost), int(lost)) if secant else int(lost), t, x)
     return u
-
-
-def _culprit(encoded: Encoded, channel: int, held: bool) -> int:
-    """The channel to name: where inputs are held, a rate is the secant of a command."""
-    if held:
-        return next((int(value) for value, _, rate in encoded.commands if rate == channel), channel)
-    return channel
 
 
 def _of_functions(encoded: Encoded, t: float, x: NDArray[np.float64]) -> NDArray[np.float64]:

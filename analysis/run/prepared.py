@@ -123,9 +123,6 @@ class Run:
 
     def lost(self, channel: int, t: float, x: NDArray[np.float64]) -> NotFiniteError:
         """The error of an input that is not finite, by the number of its channel."""
-        if self.settings.hold:
-            # where inputs are held, a rate is the secant of a command
-            channel = next((int(value) for value, _, rate in self.encoded.commands if rate == channel), channel)
         return NotFiniteError(self.encoded, channel, t, x)
 
     def compiled(self, progress: bool) -> Trajectory:

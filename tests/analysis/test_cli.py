@@ -10,8 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from analysis import export
-from analysis import cli
+from analysis import cli, export
 from analysis.periodic import find_orbit
 from linkwork.five_bar.published import SETS, TABLE_3_1
 

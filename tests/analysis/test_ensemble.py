@@ -153,7 +153,7 @@ def test_progress_changes_nothing(capfd: pytest.CaptureFixture[str]) -> None:
         ({"parameters": []}, InputError, "at least one set of parameters"),
         ({"inputs": [Inputs()]}, InputError, "1 inputs for 3 sets of parameters"),
         ({"initial": [InitialState()] * 4}, InputError, "4 initial states for 3"),
-        ({"inputs": [Inputs(), Inputs(speed=1.0), Inputs()]}, InputError, "all give the speed or all the torque"),
+        ({"inputs": [Inputs(), Inputs(speed=1.0), Inputs()]}, InputError, "all drive the mechanism in the same way"),
         (
             {"initial": [InitialState(), InitialState(), InitialState(slider_position=1.0)]},
             AssemblyError,

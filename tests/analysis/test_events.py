@@ -18,7 +18,7 @@ from linkwork.five_bar import dynamics
 from linkwork.five_bar.parameters import InitialState
 from linkwork.five_bar.published import SETS, TABLE_3_1
 
-solver = sys.modules["analysis.run.simulate"]
+solver = sys.modules["analysis.run.prepared"]
 
 SPEED = SETS["table-3.1"].crank_speed
 METHODS = ("compiled", "DOP853")

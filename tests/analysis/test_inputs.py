@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from scipy.interpolate import CubicSpline
 
+from analysis.mechanisms import FIVE_BAR
 from analysis.run import Function, Harmonics, InductionMotor, Inputs, Piecewise, TorsionBar, ramp, steps, table
-from analysis.run.inputs import align, encode
-from analysis.run.simulation import channels
+from analysis.run.inputs import align, encode, sample
 from linkwork.errors import InputError
 
 REST = np.zeros(4)
@@ -19,9 +19,9 @@ REST = np.zeros(4)
 
 def value(inputs: Inputs, t: float, *, left: bool = False, x: Any = REST) -> dict[str, float]:
     """All channels at a time, and the acceleration."""
-    encoded = encode(inputs)
-    names = ("torque", "speed", "acceleration", "force", "load_x", "load_y", "rate of load_y")
-    return dict(zip(names, channels(encoded, t, left, np.asarray(x, float), encoded.law)))
+    encoded = encode(inputs, FIVE_BAR)
+    names = [channel.argument for channel in FIVE_BAR.channels]
+    return dict(zip(names, sample(encoded, t, np.asarray(x, float), encoded.law, left=left).tolist()))
 
 
 def force(signal: Any, t: float, *, left: bool = False) -> float:
@@ -30,8 +30,8 @@ def force(signal: Any, t: float, *, left: bool = False) -> float:
 
 def test_nothing_given_is_nothing() -> None:
     assert set(value(Inputs(), 0.3).values()) == {0.0}
-    assert not Inputs().speed_drive
-    assert Inputs(speed=0.0).speed_drive
+    assert Inputs().modes(FIVE_BAR) == {"drive.mode": 0}
+    assert Inputs(speed=0.0).modes(FIVE_BAR) == {"drive.mode": 1}
 
 
 def test_constants_of_every_channel_go_where_they_belong() -> None:
@@ -42,7 +42,6 @@ def test_constants_of_every_channel_go_where_they_belong() -> None:
         "force": 2.0,
         "load_x": 3.0,
         "load_y": 4.0,
-        "rate of load_y": 0.0,
     }
     assert value(Inputs(speed=np.float64(5.0)), 7.0)["speed"] == 5.0
 
@@ -94,11 +93,11 @@ def test_harmonics_and_their_rate() -> None:
     assert at["acceleration"] == pytest.approx(-6.0 * sin(2.2) + 40.0 * sin(30.0), rel=1e-14)
 
 
-@pytest.mark.parametrize("channel", Inputs.CHANNELS)
+@pytest.mark.parametrize("channel", ["torque", "speed", "force", "load_x", "load_y"])
 def test_harmonics_of_every_channel_go_where_they_belong(channel: str) -> None:
     at = value(Inputs(**{channel: Harmonics(1.0, [2.0], [3.0], [0.0])}), 0.25)
     assert at.pop(channel) == pytest.approx(1.0 + 2.0 * cos(0.75), rel=1e-14)
-    rates = {"speed": {"acceleration"}, "load_y": {"rate of load_y"}}
+    rates = {"speed": {"acceleration"}}
     assert {name for name, v in at.items() if v} == rates.get(channel, set())
 
 
@@ -135,9 +134,7 @@ def test_functions_see_time_and_state() -> None:
         0.5,
         x=[1.0, 2.0, 3.0, 4.0],
     )
-    assert at == {"torque": 10.5, "speed": 0.0, "acceleration": 0.0, "force": 2.0, "load_x": 3.0, "load_y": 4.0} | {
-        "rate of load_y": 0.0
-    }
+    assert at == {"torque": 10.5, "speed": 0.0, "acceleration": 0.0, "force": 2.0, "load_x": 3.0, "load_y": 4.0}
     speed = Function(lambda t, th2, u, w2, v: t * t, rate=lambda t, th2, u, w2, v: 2.0 * t)
     at = value(Inputs(speed=speed), 3.0)
     assert (at["speed"], at["acceleration"]) == (9.0, 6.0)
@@ -175,20 +172,20 @@ def test_signals_with_breaks_of_their_own_are_not_changed_by_being_brought_toget
 def test_all_breaks_of_a_function_are_breaks_inside() -> None:
     # the outermost of the merged breaks bound nothing: pieces go on beyond them
     for breaks in ([0.3], [0.1, 0.3]):
-        encoded = encode(Inputs(force=Function(lambda t, th2, u, w2, v: 0.0, breaks=breaks)))
+        encoded = encode(Inputs(force=Function(lambda t, th2, u, w2, v: 0.0, breaks=breaks)), FIVE_BAR)
         assert encoded.breaks[1:-1].tolist() == breaks
 
 
 def test_breaks_that_miss_a_sample_by_rounding_are_moved_onto_it() -> None:
     times = 0.1 * np.arange(11)
     assert times[3] != 0.3
-    moved = align(encode(Inputs(force=steps([0.0, 0.3, 0.55], [0.0, 1.0, 2.0]))), times)
+    moved = align(encode(Inputs(force=steps([0.0, 0.3, 0.55], [0.0, 1.0, 2.0])), FIVE_BAR), times)
     assert moved.breaks[1] == times[3]
     assert moved.breaks[2] == 0.55
     # late in the day a float misses by more than a billionth of a step
     late = 1e6 + 1e-3 * np.arange(101)
     breaks = np.nextafter(late[[20, 50, 70]], np.inf)
-    moved = align(encode(Inputs(force=steps(breaks, [0.0, 1.0, 2.0]))), late)
+    moved = align(encode(Inputs(force=steps(breaks, [0.0, 1.0, 2.0])), FIVE_BAR), late)
     assert moved.breaks[:3].tolist() == late[[20, 50, 70]].tolist()
 
 
@@ -209,7 +206,7 @@ def test_breaks_that_miss_a_sample_by_rounding_are_moved_onto_it() -> None:
     ],
 )
 def test_inputs_that_are_constant_between_breaks(inputs: Inputs, steady: bool) -> None:
-    assert encode(inputs).steady is steady
+    assert encode(inputs, FIVE_BAR).steady is steady
 
 
 def test_a_signal_keeps_its_numbers_to_itself() -> None:

@@ -30,9 +30,10 @@ from analysis import (
     steps,
     table,
 )
+from analysis.mechanisms import FIVE_BAR
 from analysis.run import Event, compiled
-from analysis.run.inputs import encode
-from analysis.run.simulation import SCIPY_METHODS, channels
+from analysis.run.inputs import encode, sample
+from analysis.run.simulation import SCIPY_METHODS
 from linkwork.errors import AssemblyError, InputError, ParameterError
 from linkwork.five_bar import dynamics
 from linkwork.five_bar.kinematics import coefficients, position
@@ -51,9 +52,8 @@ from tests.oracles.multipliers import SpeedDrive, rates, simulate_redundant, sol
 from tests.strategies import seeded
 
 #: The compiled code of the five-bar.
-SOLVER = compiled.solver(TABLE_3_1.constants())
 # the module, whose name in the package is that of its function
-solver = sys.modules["analysis.run.simulate"]
+solver = sys.modules["analysis.run.prepared"]
 
 SPEED = SETS["table-3.1"].crank_speed
 MOTOR = InductionMotor(breakdown_torque=5.0, breakdown_slip=0.2, synchronous_speed=50.0)
@@ -107,16 +107,16 @@ def test_held_inputs_by_an_independent_integrator(case: str) -> None:
 def test_the_multiplier_form_gives_the_same_motion_and_forces(case: str) -> None:
     parameters, inputs = CASES[case]
     stop = 0.02 if case == "torsion-bar" else 0.04
-    initial = InitialState(crank_speed=SPEED if inputs.speed_drive else 0.0)
+    initial = InitialState(crank_speed=SPEED if "speed" in inputs else 0.0)
     ours = run(case, stop_time=stop, step=stop / 4, initial=initial, tolerance=1e-11)
-    encoded = encode(inputs)
+    encoded = encode(inputs, FIVE_BAR)
 
     def acting(t: float, q: np.ndarray, qd: np.ndarray) -> tuple[float, float, float, float]:
         x = np.array([q[0], q[3], qd[0], qd[3]])
-        torque, _, _, force, load_x, load_y, _ = channels(encoded, t, False, x, encoded.law)
+        torque, _, _, force, load_x, load_y = sample(encoded, t, x, encoded.law)
         return torque, force, load_x, load_y
 
-    speed = SpeedDrive(SPEED) if inputs.speed_drive else None
+    speed = SpeedDrive(SPEED) if "speed" in inputs else None
     theirs = simulate_redundant(parameters, initial, acting, ours.time, speed=speed)
     for column, name, scale in ((0, "crank.angle", 1.0), (3, "slider.position", 0.01)):
         assert np.abs(theirs.q[:, column] - ours[name]).max() < 1e-8 * scale
@@ -368,7 +368,8 @@ def test_held_inputs_are_constant_between_the_points_of_the_grid() -> None:
     times = sample_times(STOP, 4e-3)
     force = table([0.0, 0.03, 0.08, STOP], [0.0, 4.0, -3.0, 1.0], "cubic")
     held = table_3_1(Inputs(torque=0.5, force=force), hold=4e-3, step=4e-3)
-    values = [channels(encode(Inputs(force=force)), t, False, np.zeros(4), np.ones(6))[3] for t in times]
+    encoded = encode(Inputs(force=force), FIVE_BAR)
+    values = [sample(encoded, t, np.zeros(4), encoded.law)[3] for t in times]
     stepped = table_3_1(Inputs(torque=0.5, force=steps(times, values)), step=4e-3)
     assert compare(held, stepped, tolerance=1e-12).agrees
 
@@ -475,13 +476,13 @@ def test_a_run_cut_into_small_calls_is_the_same_run(case: str, monkeypatch: pyte
     options: dict[str, Any] = {"events": events, "hold": hold, "step": hold or 2e-3}
     whole = table_3_1(inputs, **options)
     calls = []
-    original = SOLVER.run
+    original = compiled.run
 
     def counted(*arguments: Any) -> int:
         calls.append(1)
         return int(original(*arguments))
 
-    monkeypatch.setattr(SOLVER, "run", counted)
+    monkeypatch.setattr(compiled, "run", counted)
     for steps_per_call in (1, 3):
         monkeypatch.setattr(solver, "STEPS_PER_CALL", steps_per_call)
         # room for the events of one step only
@@ -563,7 +564,7 @@ def test_right_hand_side_that_the_step_size_cannot_resolve() -> None:
 
 
 def _interrupting(after: int) -> Callable[..., int]:
-    original = SOLVER.run
+    original = compiled.run
     calls = []
 
     def run(*arguments: Any) -> int:
@@ -578,7 +579,7 @@ def _interrupting(after: int) -> Callable[..., int]:
 def test_interrupt_keeps_the_data(monkeypatch: pytest.MonkeyPatch) -> None:
     whole = table_3_1()
     monkeypatch.setattr(solver, "STEPS_PER_CALL", 10)
-    monkeypatch.setattr(SOLVER, "run", _interrupting(1))
+    monkeypatch.setattr(compiled, "run", _interrupting(1))
     with pytest.raises(RunInterrupted, match=r"interrupted at t = 0\.\d+ s") as caught:
         table_3_1()
     kept = caught.value.trajectory
@@ -588,7 +589,7 @@ def test_interrupt_keeps_the_data(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_interrupt_before_the_first_step(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(SOLVER, "run", _interrupting(0))
+    monkeypatch.setattr(compiled, "run", _interrupting(0))
     with pytest.raises(RunInterrupted, match=r"^interrupted$") as caught:
         table_3_1()
     assert len(caught.value.trajectory) == 0
@@ -596,14 +597,14 @@ def test_interrupt_before_the_first_step(monkeypatch: pytest.MonkeyPatch) -> Non
 
 def test_interrupt_in_the_last_call_is_not_forgotten(monkeypatch: pytest.MonkeyPatch) -> None:
     # else a loop over many short runs could not be stopped
-    original = SOLVER.run
+    original = compiled.run
 
     def run(*arguments: Any) -> int:
         os.kill(os.getpid(), signal.SIGINT)
         return int(original(*arguments))
 
     before = signal.getsignal(signal.SIGINT)
-    monkeypatch.setattr(SOLVER, "run", run)
+    monkeypatch.setattr(compiled, "run", run)
     with pytest.raises(RunInterrupted, match=r"interrupted at t = 0\.12 s") as caught:
         table_3_1()
     monkeypatch.undo()

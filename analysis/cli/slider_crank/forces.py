@@ -12,7 +12,7 @@ import numpy as np
 
 from ... import figures
 from ... import slider_crank as sc
-from ..common import console, print_written, say, show_table
+from ..common import print_written, say, show_table
 from .options import Chosen, Problem, Units, about_mechanism, angle_text, out_option, plot_option, with_problem
 
 if TYPE_CHECKING:
