@@ -2,39 +2,55 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from analysis.export import build
 from build_fmu import FMUS
 
-#: Files, and the argument of `test_studies`, whose tests share results that take long, by the group they make. Run with
-#: ``--dist loadgroup`` each group goes to one worker, and so does every other file.
-GROUPS = {
-    "test_chapter_7.py": "studies of chapter 7",
-    "test_rig_studies.py": "studies of chapter 8",
-    "test_rahman_studies.py": "studies of chapter R",
-}
+#: Tests of several files that share results which take long, by the unit of work they make; every other file is one.
+#: Pages of the documentation are one each.
+UNITS = (
+    (r".*/test_studies\.py::.*\[(\d+)\.\d+\]", r"studies of chapter \1"),
+    (r".*/test_studies\.py::.*\[R\d+\]|.*/test_rahman_studies\.py::.*", "studies of Rahman"),
+    (r".*/test_chapter_7\.py::.*", "studies of chapter 7"),
+    (r".*/test_rig_studies\.py::.*", "studies of chapter 8"),
+    (r"(.*/test_docs\.py::test_the_page_.*)", r"\1"),
+    (r"(.*?)::.*", r"\1"),
+)
 
 
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Mark what builds or runs an FMU, and name the group of tests that a worker is to run."""
+def unit(nodeid: str) -> str:
+    """Unit of work to which a test belongs."""
+    return next(match.expand(name) for pattern, name in UNITS if (match := re.fullmatch(pattern, nodeid)))
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
+    """With ``--dist loadfile``: units of work go to the workers in the order in which they are collected."""
+    from xdist.scheduler import LoadFileScheduling
+
+    class Units(LoadFileScheduling):
+        def _split_scope(self, nodeid: str) -> str:
+            return unit(nodeid)
+
+    if config.getoption("dist") != "loadfile":
+        return None
+    # else those with the most tests would go first, and the few that take long last
+    config.option.loadscopereorder = False
+    return Units(config, log)
+
+
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Mark what builds or runs an FMU; on several cores the pages of the documentation, which take longest, go first."""
+    if hasattr(config, "workerinput"):
+        items.sort(key=lambda item: item.path.name != "test_docs.py")
     for item in items:
         if "fmus" in getattr(item, "fixturenames", ()) or item.path.parent.name == "fmu":
             item.add_marker(pytest.mark.fmu)
-        item.add_marker(pytest.mark.xdist_group(group(item)))
-
-
-def group(item: pytest.Item) -> str:
-    """Group of a test: that of its study's chapter, each page of the documentation by itself, else its file."""
-    call = getattr(item, "callspec", None)
-    if item.path.name == "test_studies.py" and call and "number" in call.params:
-        number = call.params["number"]
-        return f"studies of chapter {number.partition('.')[0] if '.' in number else number[:1]}"
-    if item.path.name == "test_docs.py" and item.get_closest_marker("slow"):
-        return item.name
-    return GROUPS.get(item.path.name, str(item.path))
 
 
 @pytest.fixture(scope="session")
