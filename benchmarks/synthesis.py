@@ -91,6 +91,8 @@ FEW = Search(candidates=1 << 12, starts=4)
 
 # Kernels
 
+_path, _jacobian = (njit(error_model="numpy")(kernel.py_func) for kernel in (coupler_path, coupler_path_jacobian))
+
 
 @njit
 def _curves(repeats, c, s, zero, q, out):
@@ -98,7 +100,7 @@ def _curves(repeats, c, s, zero, q, out):
     for _ in range(repeats):
         # never the same linkage twice, and a result that is used: nothing to be left out by the compiler
         q[8] += 1e-9
-        coupler_path(c, s, zero, zero, q, 1.0, out)
+        _path(c, s, zero, zero, q, 1.0, out)
         total += out[0, 0]
     return total
 
@@ -108,7 +110,7 @@ def _jacobians(repeats, c, s, zero, q, out, jacobian):
     total = 0.0
     for _ in range(repeats):
         q[8] += 1e-9
-        coupler_path_jacobian(c, s, zero, zero, q, 1.0, out, jacobian)
+        _jacobian(c, s, zero, zero, q, 1.0, out, jacobian)
         total += out[0, 0] + jacobian[9, 1, 0]
     return total
 

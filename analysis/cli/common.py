@@ -114,11 +114,11 @@ def number_or_text(text: str) -> bool | int | float | str:
     return text
 
 
-def quantity_option(text: str, unit: str, option: str) -> float:
+def quantity(text: str, unit: str, option: str) -> float:
     """The value of an option in SI, from a text with its unit or a bare number."""
-    from ..units import quantity
+    from .. import units
 
-    return quantity(number_or_text(text), unit, option)
+    return units.quantity(number_or_text(text), unit, option)
 
 
 def changes(settings: Sequence[str], read: Callable[[str], Any], example: str) -> dict[str, Any]:

@@ -26,6 +26,7 @@ from .common import (
     plot_option,
     print_error,
     print_written,
+    quantity,
     show_table,
     tolerance_option,
 )
@@ -107,7 +108,6 @@ def run(
     from ..files import save_figure
     from ..mechanisms import mechanism_of
     from ..run import RunInterrupted, cosimulate, simulate
-    from ..units import quantity
 
     chosen = chosen_case(case, published, settings)
     if fmu is not None and method != "compiled":

@@ -20,14 +20,7 @@ from .options import Chosen, Problem, about_mechanism, out_option, with_problem
 @click.command()
 @about_mechanism
 @with_problem(points=361)
-@click.option(
-    "--tolerance",
-    type=float,
-    callback=tolerance_option,
-    default=1e-9,
-    show_default=True,
-    help="Largest relative difference that passes.",
-)
+@tolerance_option(default=1e-9, help="Largest relative difference that passes.")
 @click.option(
     "--two-rotations", is_flag=True, help="Show instead where the thesis's own closure ends, and how far open."
 )

@@ -17,7 +17,7 @@ from linkwork.slider_crank.parameters import SliderCrankParameters
 from linkwork.slider_crank.published import RAD_S_PER_RPM, SETS
 
 from ... import slider_crank as sc
-from ..common import changes, errors, handled, number_or_text
+from ..common import changes, errors, handled, number_or_text, quantity
 
 if TYPE_CHECKING:
     from ...slider_crank import ForceTurn, PeriodicShift, ShiftLaw
@@ -103,7 +103,6 @@ class _MechanismOptions:
         """
         from ...files import unknown_name
         from ...run import load_parameters, parameters_from
-        from ...units import quantity
 
         units = Units(self.units)
         start, speed = 0.0, SETS[DEFAULT].crank_speed
@@ -286,13 +285,6 @@ def with_problem(points: int) -> Callable[[Command], Command]:
         return run
 
     return decorate
-
-
-def quantity(text: str, unit: str, name: str) -> float:
-    """An option's value in SI."""
-    from ...units import quantity
-
-    return quantity(number_or_text(text), unit, name)
 
 
 def note(text: str) -> None:
