@@ -48,10 +48,7 @@ def variables(of: str, page: str) -> str:
     table = MECHANISMS[of].variables
     return _markdown(
         "| variable | causality | unit | start | range | meaning |",
-        (
-            (f"`{v.name}`", v.causality, v.unit or v.kind, _start(v), _range(v), v.description)
-            for v in (*table.PARAMETERS, *table.INPUTS, *table.OUTPUTS)
-        ),
+        ((f"`{v.name}`", v.causality, v.unit or v.kind, _start(v), _range(v), v.description) for v in table),
     )
 
 
@@ -81,7 +78,7 @@ def symbols(of: str, page: str) -> str:
                 _range(v),
                 v.description,
             )
-            for v in (*table.PARAMETERS, *table.INPUTS, *table.OUTPUTS)
+            for v in table
         ),
     )
 
@@ -147,7 +144,6 @@ def hand_drawn_pictures() -> Iterator[Picture]:
     import numpy as np
 
     from analysis import figures as draw
-    from analysis.cli.slider import drive_figure
     from analysis.motion import load_slider_case
     from analysis.synthesis import TargetPath, load_synthesis_case
 
@@ -177,7 +173,7 @@ def hand_drawn_pictures() -> Iterator[Picture]:
     still = closed(four_bar.curve(), label="four-bar", line="--")
     moving = closed(moved[-1].curve(), label="slider moved,\n3 harmonics")
     yield "hand-drawn-moved", picture("Links of at most 150 mm", wanted, still, moving), 110
-    yield "hand-drawn-motion", drive_figure("The slider's drive at 60 rpm", small.driven(moved[-1])), 90
+    yield "hand-drawn-motion", draw.plot(small.driven(moved[-1]), title="The slider's drive at 60 rpm"), 90
 
 
 def slider_crank_pictures() -> Iterator[Picture]:

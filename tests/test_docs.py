@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
+import pkgutil
 import re
 import shlex
 import shutil
@@ -27,20 +28,22 @@ def generate():
     return module
 
 
-def test_the_nomenclature_is_up_to_date(generate):
-    assert (ROOT / "docs" / "nomenclature.md").read_text() == generate.nomenclature(), "run: python docs/generate.py"
+def test_the_tables_of_the_documentation_are_up_to_date(generate):
+    stale = [page.name for page in generate.PAGES if generate.filled(page.read_text()) != page.read_text()]
+    assert stale == [], "run: make docs"
 
 
-def test_the_variable_table_of_the_readme_is_up_to_date(generate):
-    text = (ROOT / "README.md").read_text()
-    assert generate.readme(text) == text, "run: python docs/generate.py"
+def test_every_mechanism_has_its_tables(generate):
+    marked = {match for page in generate.PAGES for match in generate.MARKED.findall(page.read_text())}
+    assert {of for table, of in marked if table == "symbols"} == set(generate.MECHANISMS)
+    assert {table for table, _ in marked} == set(generate.TABLES)
 
 
 @pytest.mark.parametrize(("name", "studies"), [("youssef-figures.md", YOUSSEF), ("rahman-figures.md", RAHMAN)])
 def test_every_study_is_on_the_page_of_its_figures_with_what_does_not_hold(name, studies):
     page = (ROOT / "docs" / name).read_text()
     for number, title in studies.items():
-        assert title in page, f"{number}: run python docs/generate.py --figures"
+        assert title in page, f"{number}: run make docs FIGURES=1"
     parts = re.split(r"^## Fig (\S+)  ", page, flags=re.MULTILINE)
     stated = {
         (number, line.split(" | ")[0].removeprefix("| "))
@@ -48,7 +51,7 @@ def test_every_study_is_on_the_page_of_its_figures_with_what_does_not_hold(name,
         for line in part.splitlines()
         if "**does not hold**" in line
     }
-    assert stated == {entry for entry in REFUTED if entry[0] in studies}, "run: python docs/generate.py --figures"
+    assert stated == {entry for entry in REFUTED if entry[0] in studies}, "run: make docs FIGURES=1"
 
 
 def test_every_erratum_has_its_test():
@@ -71,9 +74,15 @@ def test_every_erratum_has_its_test():
 
 
 def test_links_in_the_documentation_lead_somewhere():
-    for page in (ROOT / "README.md", *(ROOT / "docs").glob("*.md")):
+    for page in (*ROOT.glob("*.md"), *(ROOT / "docs").glob("*.md")):
         for target in re.findall(r"\]\(([^)#:]+)\)", page.read_text()):
             assert (page.parent / target).exists(), f"{page.name}: {target}"
+
+
+def test_names_of_modules_in_the_documentation_are_right():
+    for page in (*ROOT.glob("*.md"), *(ROOT / "docs").glob("*.md")):
+        for name in re.findall(r"`((?:analysis|linkwork|tests|benchmarks)\.[\w.]+)`", page.read_text()):
+            assert pkgutil.resolve_name(name), page.name
 
 
 def test_the_code_of_the_readme_runs(fmus, tmp_path):

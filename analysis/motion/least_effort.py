@@ -165,8 +165,6 @@ def least_effort(
         If IPOPT ends in any other way without a solution.
     AssemblyError
         If the links cannot be joined along ``guess``.
-    symbolic.MissingLibraryError
-        If CasADi is not installed.
     """
     problem = Problem(
         parameters=parameters,

@@ -77,7 +77,7 @@ def slider_motion(
 
     Raises
     ------
-    InputError, InfeasibleError, SynthesisInterrupted, MissingLibraryError
+    InputError, InfeasibleError, SynthesisInterrupted
         As `synthesize`.
     """
     given = linkage.linkage if isinstance(linkage, Solution) else linkage

@@ -12,29 +12,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from linkwork.errors import LinkworkError
-
 from .tracing import ELEMENTARY, rebound
 
 
-class MissingLibraryError(LinkworkError):
-    """A library that is an extra is not installed."""
-
-
 def library() -> Any:
-    """CasADi.
+    """CasADi, imported when it is first used: that takes a tenth of a second."""
+    import casadi
 
-    Raises
-    ------
-    MissingLibraryError
-        If it is not installed.
-    """
-    try:
-        import casadi
-    except ImportError:
-        raise MissingLibraryError(
-            "exact derivatives need CasADi, which is not installed: pip install 'linkwork[symbolic]'"
-        ) from None
     return casadi
 
 

@@ -72,13 +72,7 @@ def polish(
     pivot: PivotUnknown | None = None,
     search: Search = USUAL_SEARCH,
 ) -> Polished:
-    """Go from every start to an optimum. On Ctrl-C what was done is returned, marked as interrupted.
-
-    Raises
-    ------
-    MissingLibraryError
-        If there are inequalities and CasADi is not installed.
-    """
+    """Go from every start to an optimum. On Ctrl-C what was done is returned, marked as interrupted."""
     cores = search.cores
     size = 1 if cores == 1 else max(1, -(-len(starts) // (3 * cores)))
     batches = [starts[k : k + size] for k in range(0, len(starts), size)]

@@ -127,8 +127,6 @@ def synthesize(
         If no linkage keeps all bounds and constraints; it names the one that the nearest linkage violates most.
     SynthesisInterrupted
         On Ctrl-C, with the best so far.
-    MissingLibraryError
-        If there are inequalities, and CasADi is not installed.
     """
     if search.starts < 1:
         raise InputError(f"{search.starts} starts: there must be at least one")
@@ -182,7 +180,7 @@ def improve(
 
     Raises
     ------
-    InputError, InfeasibleError, SynthesisInterrupted, MissingLibraryError
+    InputError, InfeasibleError, SynthesisInterrupted
         As `synthesize`.
     """
     if search.starts < 1 and not guesses:

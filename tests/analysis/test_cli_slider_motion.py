@@ -201,7 +201,7 @@ def test_the_slider_is_made_as_the_case_says(tmp_path) -> None:
         "slider_coulomb_friction": "2 N",
         "slider_mass": "1 kg",
     }
-    made = read(tmp_path, tables(make=make)).five_bar(BASE)
+    made = read(tmp_path, tables(make=make)).synthesis.make.moving(BASE)
     assert (made.slider_damping, made.slider_stiffness, made.slider_coulomb_friction, made.slider_mass) == (
         20,
         300,
@@ -209,7 +209,7 @@ def test_the_slider_is_made_as_the_case_says(tmp_path) -> None:
         1,
     )
     # a pivot that is to move is not held, unlike that of a four-bar
-    free = read(tmp_path, tables(make={})).five_bar(BASE)
+    free = read(tmp_path, tables(make={})).synthesis.make.moving(BASE)
     assert free.slider_stiffness == free.slider_damping == 0.0
 
 
@@ -440,8 +440,8 @@ def test_the_motion_is_read_with_its_units(tmp_path) -> None:
         "acceleration": "50 mm/rad^2",
     }
     chosen = read(tmp_path, tables(slider=motion))
-    assert chosen.harmonics == (1, 3)
-    u = chosen.unknown
+    assert chosen.slider.harmonics == (1, 3)
+    u = chosen.slider.unknown(1)
     assert u.guide_angle == pytest.approx((radians(20.0), radians(20.0)))
     assert u.position == pytest.approx((-0.01, 0.02))
     assert (u.stroke, u.speed, u.acceleration) == pytest.approx((0.025, 0.03, 0.05))

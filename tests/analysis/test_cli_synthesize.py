@@ -15,6 +15,7 @@ import pytest
 from click.testing import CliRunner
 
 from analysis import cli, figures
+from analysis.files import names_of
 from analysis.numerics.symbolic import library
 from analysis.run import case_from, load_case, load_parameters, simulate
 from analysis.synthesis import (
@@ -264,7 +265,7 @@ def test_a_solution_with_a_defect_is_reported(linkwork, tmp_path, monkeypatch) -
         ('[task]\nkind = "timed-path"\npoints = [[0, 0], [0, 0], [1, 1]]', "points 0 and 1 are the same"),
         (
             '[task]\nkind = "timed-path"\npoints = [[0, 0], [nan, 0], [1, 1]]',
-            "points[1] is nan: it must be a finite number",
+            "points[1][0] is nan: it must be a finite number",
         ),
         ('[task]\nkind = "timed-path"\npoints = []', "0 are too few"),
         ('[task]\nkind = "timed-path"\npoints = [["1", 0], [1, 1]]', "come with its unit"),
@@ -297,7 +298,7 @@ def test_a_solution_with_a_defect_is_reported(linkwork, tmp_path, monkeypatch) -
         (ELLIPSE + '[make]\nspeed = "1 Hz"', "be in rad/s or rpm"),
         (ELLIPSE + "[make]\nwidth = 0", "make.width is 0: it must be greater than zero"),
         (ELLIPSE + '[trade_off]\nover = "mass"\nlimits = [1, 2]', "the names are size, transmission"),
-        (ELLIPSE + '[trade_off]\nover = "size"\nlimits = [1]', "be at least two"),
+        (ELLIPSE + '[trade_off]\nover = "size"\nlimits = [1]', "have at least 2 entries"),
         (
             ELLIPSE + QUICK + "[constraints]\nlargest_link = 0.5\npivot_A = [[9, 9], [10, 9], [9, 10]]",
             "no linkage keeps all bounds and constraints",
@@ -465,8 +466,15 @@ def test_the_examples_and_the_documentation_are_readable() -> None:
     page = (ROOT / "docs" / "synthesis-cases.md").read_text()
     (block,) = re.findall(r"```toml\n(.*?)```", page, flags=re.DOTALL)
     synthesis_case_from(tomllib.loads(block), folder=ROOT)
-    for names in (cases.TABLES, *KINDS.values(), cases.CONSTRAINTS):
-        for name in names:
+    for kind in (
+        cases.SynthesisCase,
+        *KINDS.values(),
+        cases.Constraints,
+        cases.SearchTable,
+        cases.Make,
+        cases.TradeOffTable,
+    ):
+        for name in names_of(kind):
             assert re.search(rf"\b{name}\b", page), name
 
 
@@ -517,7 +525,7 @@ def test_a_requirement_is_kept(tmp_path) -> None:
 
 
 def test_wrong_kinds_of_values_are_refused(tmp_path) -> None:
-    with pytest.raises(ParameterError, match="be a list of texts"):
+    with pytest.raises(ParameterError, match="be a text such as"):
         case(ELLIPSE + "[constraints]\nrequire = [3]\n", tmp_path)
     with pytest.raises(ParameterError, match="be true or false"):
         case(ELLIPSE + '[constraints]\nfull_turn = "yes"\n', tmp_path)

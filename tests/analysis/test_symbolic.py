@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from functools import cache
 from typing import Any
 
@@ -10,7 +9,6 @@ import numpy as np
 import pytest
 
 from analysis.mechanisms import FIVE_BAR
-from analysis.numerics import symbolic
 from analysis.run import constants, traced
 from linkwork import friction
 from linkwork.five_bar import dynamics, kinematics
@@ -70,12 +68,6 @@ def test_jacobian_is_that_of_differences(seed: int) -> None:
         differences[:, j] = (sides[0] - sides[1]) / (2.0 * scale)
     size = np.abs(exact).max(axis=1, keepdims=True)
     assert np.all(np.abs(exact - differences) <= 1e-4 * size + 1e-9)
-
-
-def test_without_casadi_the_error_names_the_extra(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(sys.modules, "casadi", None)
-    with pytest.raises(symbolic.MissingLibraryError, match=r"linkwork\[symbolic\]"):
-        symbolic.library()
 
 
 def test_nothing_of_the_plain_modules_is_changed() -> None:
