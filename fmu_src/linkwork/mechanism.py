@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from importlib import import_module
 from types import ModuleType
 from typing import Any, NamedTuple
@@ -108,7 +109,7 @@ class Equations(NamedTuple):
     energy: Callable[..., float]
 
 
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Mechanism:
     """A mechanism: its parameters, its interface and its equations.
 
@@ -171,27 +172,27 @@ class Mechanism:
         # by its name: a copy would be another mechanism
         return _load, (self.modules[-1].__package__,)
 
-    @property
+    @cached_property
     def size(self) -> int:
         """Number of components of the state."""
         return 2 * len(self.freedoms) + 2
 
-    @property
+    @cached_property
     def modes(self) -> tuple[Mode, ...]:
         """The modes of all freedoms that have one."""
         return tuple(freedom.mode for freedom in self.freedoms if freedom.mode is not None)
 
-    @property
+    @cached_property
     def input_names(self) -> tuple[str, ...]:
         """FMI names of the inputs."""
         return tuple(channel.name for channel in self.channels)
 
-    @property
+    @cached_property
     def output_names(self) -> tuple[str, ...]:
         """FMI names of the real outputs, in the order of ``equations.outputs``."""
         return tuple(v.name for v in self.variables if v.causality == "output" and v.kind == "Real")
 
-    @property
+    @cached_property
     def mechanism_variables(self) -> dict[str, Variable]:
         """The variables that are fields of the parameters, by FMI name."""
         others = {mode.name for mode in self.modes} | {"solver.tolerance"}
@@ -201,7 +202,7 @@ class Mechanism:
             if v.causality == "parameter" and not v.name.startswith("initial.") and v.name not in others
         }
 
-    @property
+    @cached_property
     def initial_variables(self) -> dict[str, Variable]:
         """The variables of the state at the start, by the name of the field."""
         prefix = "initial."

@@ -67,7 +67,7 @@ def test_wrong_parameters_are_named(data, error, said):
 
 def test_missing_names_are_listed():
     with pytest.raises(MissingParameterError, match=r"ground\.length is missing.*rocker\.cog_distance"):
-        parameters_from({"slider": {"stiffness": 1.0}})
+        parameters_from({"slider": {"stiffness": 1.0}}, mechanism=FIVE_BAR)
 
 
 @pytest.mark.parametrize(
