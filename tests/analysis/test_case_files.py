@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from analysis import simulate
-from analysis.mechanisms import mechanism_of
+from analysis.mechanisms import FIVE_BAR, mechanism_of
 from analysis.run import (
     Harmonics,
     Piecewise,
