@@ -147,25 +147,6 @@ def chosen_case(file: str | None, published: str | None, settings: Sequence[str]
     return published_case(published)
 
 
-def five_bar_case(file: str | None, published: str | None, settings: Sequence[str]) -> Any:
-    """The case that a command for five-bars is about.
-
-    Raises
-    ------
-    InputError
-        If it is another mechanism's.
-    """
-    from ..mechanisms import FIVE_BAR, mechanism_of
-
-    case = chosen_case(file, published, settings)
-    mechanism = mechanism_of(case.parameters)
-    if mechanism is not FIVE_BAR:
-        raise InputError(
-            f"{file or published} is a case of the {mechanism.name}: this command is for cases of the {FIVE_BAR.name}"
-        )
-    return case
-
-
 def say(text: str) -> None:
     """Print a sentence as it is, in one line."""
     console.print(text, markup=False, highlight=False, soft_wrap=True)

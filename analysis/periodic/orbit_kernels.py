@@ -18,8 +18,10 @@ import numpy as np
 from numba import boolean, float64, int64, types
 from numpy.typing import NDArray
 
+from linkwork.errors import InputError
 from linkwork.limits import LIMIT_SINE, NEAR_LIMIT
 from linkwork.mechanism import Mechanism
+from linkwork.variables import Variable
 
 from ..numerics import symbolic
 from ..numerics.codegen import MATRIX, VECTOR, MachineCode, evaluate, inner, kernel, part
@@ -63,6 +65,34 @@ PLAIN, VARIATIONAL, DIRECTIONAL, GAP, STATE = range(5)
 _NAMES = ("plain", "variational", "directional", "gap", "state")
 
 
+class Crank(NamedTuple):
+    """The cyclic freedom of a mechanism: its number, and those of the channels of its rate and of the torque on it, or None."""
+
+    freedom: int
+    command: int | None
+    torque: int | None
+
+
+@cache
+def crank_of(mechanism: Mechanism) -> Crank:
+    """The cyclic freedom of a mechanism.
+
+    Raises
+    ------
+    InputError
+        If it has none.
+    """
+    number = next((n for n, freedom in enumerate(mechanism.freedoms) if freedom.period > 0.0), None)
+    if number is None:
+        raise InputError(f"a {mechanism.name} has no freedom that turns: it has no periodic motions over an angle")
+
+    def channel(kind: str) -> int | None:
+        found = (n for n, c in enumerate(mechanism.channels) if c.kind == kind and c.freedom == number)
+        return next(found, None)
+
+    return Crank(number, channel("command"), channel("force"))
+
+
 class Flow:
     """A mechanism as a flow over its crank's angle, driven in one way.
 
@@ -81,7 +111,11 @@ class Flow:
     torque : bool
         Whether the crank's rate is part of y.
     components : tuple of (str, str)
-        Names and units of y.
+        FMI names and units of y.
+    labels : tuple of str
+        What messages call them: by symbols where there are short ones.
+    places : tuple of int
+        Components of the state of a run that make up y.
     size : int
         Number of components of y.
     """
@@ -89,7 +123,7 @@ class Flow:
     def __init__(self, mechanism: Mechanism, modes: tuple[int, ...]) -> None:
         self.mechanism = mechanism
         self.modes = modes
-        self.crank = next(n for n, freedom in enumerate(mechanism.freedoms) if freedom.period > 0.0)
+        self.crank = crank_of(mechanism).freedom
         by_name = {mode.name: value for mode, value in zip(mechanism.modes, modes)}
         commanded = {mechanism.channels[n].freedom: n for n in mechanism.commands(by_name)}
         forced = {c.argument for c in mechanism.channels if c.kind == "force"}
@@ -101,11 +135,19 @@ class Flow:
             and (freedom.mode is None or freedom.mode.arguments[by_name[freedom.mode.name]] in forced)
         )
         self.torque = self.command is None
-        units = {v.name: v.unit for v in mechanism.variables}
+        rates = len(mechanism.freedoms)
+        self.places = (*self.free, *(rates + n for n in self.free), *([rates + self.crank] * self.torque))
+        variables = {v.name: v for v in mechanism.variables}
         freedoms = [mechanism.freedoms[n] for n in self.free]
-        names = [f.coordinate for f in freedoms] + [f.rate for f in freedoms]
-        names += [mechanism.freedoms[self.crank].rate] * self.torque
-        self.components = tuple((name, units[name]) for name in names)
+        crank_rate = mechanism.freedoms[self.crank].rate
+        names = [f.coordinate for f in freedoms] + [f.rate for f in freedoms] + [crank_rate] * self.torque
+        labels = [label(variables[f.coordinate]) for f in freedoms]
+        labels += [
+            f"{name}'" if name == variables[f.coordinate].symbol else label(variables[f.rate])
+            for f, name in zip(freedoms, labels)
+        ]
+        self.labels = (*labels, *[label(variables[crank_rate])] * self.torque)
+        self.components = tuple((name, variables[name].unit) for name in names)
         self.size = len(names)
         #: numbers of the channels of the drive, and of motor and held coordinates after them
         self.inputs = len(mechanism.channels)
@@ -120,13 +162,27 @@ class Flow:
 
     def addresses(self, *which: int) -> NDArray[np.int64]:
         """Addresses of the machine code, of the functions of those numbers at least."""
-        missing = [n for n in which if n not in self._code]
-        if missing:
-            code = MachineCode([self.function(n) for n in missing])
-            for n in missing:
-                self._code[n] = code
-                self._addresses[n] = code.addresses[_NAMES[n]]
+        for n in which:
+            if n not in self._code:
+                self._code[n] = MachineCode([self.function(n)])
+                self._addresses[n] = self._code[n].addresses[_NAMES[n]]
         return self._addresses
+
+    def fingerprint(self, *which: int) -> str:
+        """Of the machine code of the functions of those numbers."""
+        self.addresses(*which)
+        return " ".join(self._code[n].fingerprint for n in which)
+
+    def state(self, y: NDArray[np.float64], drive: NDArray[np.float64]) -> tuple[float, ...]:
+        """State of a run at the crank angle 0, from y and the numbers of the drive."""
+        rates = len(self.mechanism.freedoms)
+        x = [*drive[self.inputs + len(MOTOR) : self.drive_size].tolist(), *[0.0] * (rates + 2)]
+        x[self.crank] = 0.0
+        if self.command is not None:
+            x[rates + self.crank] = float(drive[self.command])
+        for place, value in zip(self.places, y.tolist()):
+            x[place] = value
+        return tuple(x)
 
     @cache  # noqa: B019 - flows are kept for good themselves
     def function(self, which: int) -> Any:
@@ -162,8 +218,7 @@ class Flow:
             results = [casadi.vertcat(*settled), u]
         else:
             rates = functions.__dict__[m.equations.derivative.__name__](x, applied, k)
-            places = self._places()
-            f = casadi.vertcat(*[rates[place] for place in places]) / x[len(m.freedoms) + self.crank]
+            f = casadi.vertcat(*[rates[place] for place in self.places]) / x[len(m.freedoms) + self.crank]
             results = [f]
             if which != PLAIN:
                 jacobian = casadi.jacobian(f, y)
@@ -193,11 +248,6 @@ class Flow:
         )
         return casadi.Function("trace", [angle, y, modes, drive, p], [casadi.trace(casadi.jacobian(f, y))])
 
-    def _places(self) -> list[int]:
-        """Components of the state of a run that make up y."""
-        rates = len(self.mechanism.freedoms)
-        return [*self.free, *(rates + n for n in self.free), *([rates + self.crank] * self.torque)]
-
     def _state(self, angle: Any, y: Any, drive: Any) -> tuple[tuple[Any, ...], Any]:
         """State of a run and channels, as expressions."""
         casadi = symbolic.library()
@@ -205,16 +255,22 @@ class Flow:
         held = drive[self.inputs + len(MOTOR) :]
         x = [*casadi.vertsplit(held), *[casadi.SX(0.0)] * freedoms, casadi.SX(0.0), casadi.SX(0.0)]
         x[self.crank] = angle
-        for component, place in enumerate(self._places()):
+        for component, place in enumerate(self.places):
             x[place] = y[component]
         u = drive[: self.inputs]
         if self.command is not None:
             x[freedoms + self.crank] = u[self.command]
         else:
-            channel = next(n for n, c in enumerate(m.channels) if c.kind == "force" and c.freedom == self.crank)
+            channel = crank_of(m).torque
             u = casadi.vertcat(u)
             u[channel] += _kloss(drive[self.inputs : self.inputs + len(MOTOR)], x[freedoms + self.crank])
         return tuple(x), u
+
+
+def label(variable: Variable) -> str:
+    """What messages and tables call a variable: its symbol if that is a short one, else its name with spaces."""
+    symbol = variable.symbol
+    return symbol if symbol and "\\" not in symbol else variable.name.replace(".", " ")
 
 
 def _kloss(motor: Any, speed: Any) -> Any:
