@@ -14,7 +14,7 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from linkwork.errors import InputError, Interrupted, LinkworkError
+from linkwork.errors import Interrupted, LinkworkError
 
 from . import CHECK_FAILED as CHECK_FAILED
 from . import ENDED_EARLY as ENDED_EARLY

@@ -69,7 +69,10 @@ class _Chosen:
         if value is not None and self.case.inputs.torque is not None:
             errors.print("note: the speed is prescribed; the case's torque is left out", style="yellow")
         try:
-            return drive_of(self.case.parameters, self.case.inputs, self.case.initial, speed=value)
+            drive = drive_of(self.case.parameters, self.case.inputs, self.case.initial, speed=value)
+            # that something is free is asked first
+            drive.flow(mechanism_of(self.case.parameters))
+            return drive
         except InputError as error:
             torque = isinstance(error, VaryingInputError) and error.channel == "torque"
             hint = "; --speed prescribes the speed instead" if torque else ""
@@ -282,7 +285,9 @@ def _extrema(response: Any, factor: float, unit: str, table: Any) -> None:
 @_about_a_case
 @click.option("--x", "x", metavar="NAME", help="Parameter along x, by its FMI name; by default the crank speed.")
 @click.option("--x-range", nargs=2, metavar="FROM TO", help="Its range, such as '100 rpm' '1500 rpm'.")
-@click.option("--y", "y", metavar="NAME", help="Parameter along y; by default the damping of what the crank shakes.")
+@click.option(
+    "--y", "y", metavar="NAME", help="Parameter along y; by default the damping of the first freedom beside the crank."
+)
 @click.option("--y-range", nargs=2, metavar="FROM TO", help="Its range, such as 0 '2e4 dyn.s/cm'.")
 @click.option("--points", default=80, show_default=True, type=click.IntRange(2, 2000), help="Points along each axis.")
 @click.option("--cores", default=-1, show_default=True, callback=_cores, help="Cores; -1 for all.")
@@ -368,7 +373,7 @@ def _report_verdict(title: str, parameters: Any, drive: Any, start: Any) -> None
     from ..youssef import linear_verdict
 
     orbit = orbit_of(parameters, drive, start=start)
-    turn, (what, size, unit) = orbit.turn(), _swing(orbit)
+    turn, (_, size, unit) = orbit.turn(), _swing(orbit)
     values = ", ".join(f"{m.real:.6g}{m.imag:+.6g}i" if m.imag else f"{m.real:.6g}" for m in orbit.multipliers)
     lines = [
         f"{title} at {60.0 * turn.turns / turn.period:.6g} rpm: {orbit.verdict()}",

@@ -21,8 +21,8 @@ from linkwork.errors import InputError
 from ..files import write_csv
 from ..mechanisms import Parameters, mechanism_of
 from ..numerics.continuation import ContinuationError, Curve, Evaluate, Evaluation, Follower, Point, Settings
-from .floquet import TOLERANCE, Crossing, Stability, crossing_test
 from .drives import Drive
+from .floquet import TOLERANCE, Crossing, Stability, crossing_test
 from .orbit_kernels import label
 from .orbits import Direction, Period, PeriodicOrbit, Turn, period_from, scale_of
 from .planes import Operation, format_value, require_variable, unit_of, with_values
@@ -53,8 +53,8 @@ class Family:
     parameters : parameters of a mechanism
     drive : Drive
     vary : str or callable
-        FMI name of an input that acts, such as ``drive.speed``, ``drive.torque`` or ``slider.force``, or of a parameter, such as
-        ``slider.damping``; or a function from a number to (parameters, Drive).
+        FMI name of an input that acts, such as ``drive.speed``, ``drive.torque`` or ``slider.force``, or of a parameter, such
+        as ``slider.damping``; or a function from a number to (parameters, Drive).
     name, unit : str
         Of the parameter, for tables and plots; they follow from an FMI name.
 

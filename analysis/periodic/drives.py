@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cache
 from math import isfinite
 from typing import Any
 
@@ -163,6 +164,7 @@ class Drive:
         return Inputs(**acting)
 
 
+@cache
 def forces_of(mechanism: Mechanism) -> dict[str, Channel]:
     """The inputs of a mechanism that are forces, but for the crank's torque, by FMI name."""
     crank = crank_of(mechanism).freedom

@@ -373,6 +373,7 @@ def orbit_of(
     if turns < 1 or turns != int(turns):
         raise InputError(f"turns is {turns}: a period has a whole number of them, at least one")
     guess = guess_of(drive.flow(mechanism_of(parameters)), drive, start)
+    _check_period(parameters, drive, guess, turns)
     _check_assembly(parameters, drive, guess)
     try:
         return _newton(parameters, drive, turns, guess)
@@ -396,7 +397,7 @@ def orbit_of(
 def settle_from(
     parameters: Parameters, drive: Drive, start: NDArray[np.float64], *, tolerance: float, change: float, turns: int
 ) -> tuple[Status, NDArray[np.float64]]:
-    """Where the motion goes by itself from ``start``, in so many turns at most or until one changes y by less than ``change``."""
+    """Where the motion goes by itself from ``start``, until a turn changes y by less than ``change``, or for so many turns."""
     settled = start.copy()
     section = section_of(parameters, drive, start, PLAIN, tolerance=tolerance)
     status = orbit_kernels.settle(
@@ -464,6 +465,25 @@ def guess_of(flow: Flow, drive: Drive, start: ArrayLike | None) -> NDArray[np.fl
     if flow.torque and not guess[-1] > 0.0:
         raise InputError(f"{flow.labels[-1]} at the start is {guess[-1]} rad/s: it must be above zero")
     return guess
+
+
+def _check_period(parameters: Parameters, drive: Drive, start: NDArray[np.float64], turns: int) -> None:
+    """Make sure that a mechanism in which no input but a groove or the like drives a freedom repeats itself after the turns."""
+    mechanism = mechanism_of(parameters)
+    if set(drive.arguments(mechanism).values()) <= {channel.argument for channel in mechanism.channels}:
+        return
+    flow = drive.flow(mechanism)
+    section, plain = section_of(parameters, drive, start, PLAIN), flow.function(PLAIN)
+    z = np.append(start, np.zeros(flow.size * (flow.size + 1)))
+    rates = [
+        np.asarray(plain(angle + way, z, section.modes, section.drive, section.p)).ravel()
+        for way in (0.0, flow.period * turns)
+        for angle in (0.5, 2.0)
+    ]
+    if not np.allclose(rates[:2], rates[2:], rtol=1e-6, atol=0.0):
+        raise InputError(
+            f"the {mechanism.name} is not in the same configuration after {turns} turn(s): give another number"
+        )
 
 
 def _check_assembly(parameters: Parameters, drive: Drive, start: NDArray[np.float64]) -> None:
@@ -549,7 +569,7 @@ def failure(
 
 
 def _times(speed: NDArray[np.float64], way: float) -> tuple[NDArray[np.float64], float]:
-    """Time at equal steps of the crank angle over ``way``, and the period, by integration of the Fourier series of 1 / speed."""
+    """Time at equal steps of the crank angle over ``way``, and the period, by integrating the Fourier series of 1 / speed."""
     n = len(speed)
     c = np.fft.rfft(1.0 / speed) / n
     angle = np.arange(n) * (way / n)

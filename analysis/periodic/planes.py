@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
+from functools import cache
 from typing import Any
 
 from linkwork.errors import InputError, UnknownNameError
@@ -21,6 +22,7 @@ Operation = tuple[Parameters, Drive]
 Plane = Callable[[float, float], Operation]
 
 
+@cache
 def _of_the_crank(mechanism: Mechanism) -> dict[str, str]:
     """FMI names of the crank's speed and torque: what of `Drive` each is."""
     crank = crank_of(mechanism)
