@@ -19,7 +19,7 @@ from linkwork.parameters import field_name
 
 from ..mechanisms import FIVE_BAR, PUBLISHED, mechanism_of
 from ..units import RAD_S_PER_RPM
-from .common import ENDED_EARLY, INTERRUPTED, chosen_case, console, errors, handled, number_or_text
+from .common import ENDED_EARLY, INTERRUPTED, case_options, chosen_case, console, errors, handled, out_option, quantity
 
 #: Range of speeds where none is given, relative to the natural frequency.
 _RANGE = (0.15, 1.5)
@@ -29,12 +29,6 @@ def _cores(context: click.Context, parameter: click.Parameter, value: int) -> in
     if value == 0 or value < -1:
         raise click.BadParameter(f"{value} is neither -1, for all, nor a number of cores")
     return value
-
-
-def _quantity(text: str, unit: str, name: str) -> float:
-    from ..units import quantity
-
-    return quantity(number_or_text(text), unit, name)
 
 
 def _require_range(parameters: Any, low: float, high: float, name: str, first: str, last: str) -> None:
@@ -65,7 +59,7 @@ class _Chosen:
         from ..periodic import VaryingInputError, drive_of
 
         speed = speed or self.speed
-        value = None if speed is None else _quantity(speed, "rad/s", "--speed")
+        value = None if speed is None else quantity(speed, "rad/s", "--speed")
         if value is not None and self.case.inputs.torque is not None:
             errors.print("note: the speed is prescribed; the case's torque is left out", style="yellow")
         try:
@@ -88,7 +82,7 @@ class _Chosen:
         flow = drive.flow(mechanism)
         speed = float(getattr(self.case.initial, mechanism.freedoms[flow.crank].initial[1]))
         if self.guess_speed is not None:
-            speed = _quantity(self.guess_speed, "rad/s", "--guess-speed")
+            speed = quantity(self.guess_speed, "rad/s", "--guess-speed")
         elif speed <= 0.0:
             if drive.motor is None:
                 raise click.UsageError("under a torque a guess of the crank speed is needed: --guess-speed '300 rpm'")
@@ -124,12 +118,10 @@ def _about_a_case(command: Callable[..., None]) -> Callable[..., None]:
         command(_Chosen(case=chosen, stem=stem, speed=speed, guess_speed=guess_speed, folder=Path(out)), **options)
 
     for option in (
-        click.option("--out", default="out", show_default=True, type=click.Path(file_okay=False), help="Folder."),
+        out_option(help="Folder."),
         click.option("--guess-speed", metavar="SPEED", help="Guess of the crank speed, for a case driven by a torque."),
         click.option("--speed", metavar="SPEED", help="Prescribe this crank speed in the place of the case's drive."),
-        click.option("--set", "settings", multiple=True, metavar="NAME=VALUE", help="Change a value of the mechanism."),
-        click.option("--published", metavar="NAME", help=f"A published set instead: {', '.join(PUBLISHED)}."),
-        click.argument("case", required=False, type=click.Path(exists=True, dir_okay=False)),
+        case_options(PUBLISHED),
     ):
         with_case = option(with_case)
     return with_case
@@ -218,7 +210,7 @@ def _ends(parameters: Any, vary: str, low: str | None, high: str | None, natural
         why = "without a spring there is no natural frequency to begin with" if speed else "it has no range of its own"
         raise click.UsageError(f"--from and --to are needed for {vary}: {why}")
     ends = [
-        _quantity(text, unit, option) if text is not None else factor * (natural or 0.0)
+        quantity(text, unit, option) if text is not None else factor * (natural or 0.0)
         for text, option, factor in zip((low, high), ("--from", "--to"), _RANGE)
     ]
     _require_range(parameters, ends[0], ends[1], vary, "--from", "--to")
@@ -362,7 +354,7 @@ def _axis_range(
 
     if texts is None:
         return default_range(parameters, drive, name)
-    low, high = (_quantity(text, unit_of(mechanism_of(parameters), name), option) for text in texts)
+    low, high = (quantity(text, unit_of(mechanism_of(parameters), name), option) for text in texts)
     _require_range(parameters, low, high, name, option, option)
     return low, high
 

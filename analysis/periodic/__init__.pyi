@@ -39,7 +39,6 @@ from .orbits import ORBIT_TOLERANCE as ORBIT_TOLERANCE
 from .orbits import OrbitAssemblyError as OrbitAssemblyError
 from .orbits import OrbitError as OrbitError
 from .orbits import PeriodicOrbit as PeriodicOrbit
-from .orbits import Turn as Turn
 from .orbits import find_orbit as find_orbit
 from .orbits import largest_multipliers as largest_multipliers
 from .orbits import orbit_of as orbit_of
@@ -70,3 +69,4 @@ from .stability import test_of as test_of
 from .sweeps import Jump as Jump
 from .sweeps import Sweep as Sweep
 from .sweeps import sweep as sweep
+from .turns import Turn as Turn

@@ -23,9 +23,10 @@ from ..mechanisms import Parameters, mechanism_of
 from ..numerics.continuation import ContinuationError, Curve, Evaluate, Evaluation, Follower, Point, Settings
 from .drives import Drive
 from .floquet import TOLERANCE, Crossing, Stability, crossing_test
-from .orbit_kernels import label
-from .orbits import Direction, Period, PeriodicOrbit, Turn, period_from, scale_of
+from .flows import label
+from .orbits import Direction, Period, PeriodicOrbit, period_from, scale_of
 from .planes import Operation, format_value, require_variable, unit_of, with_values
+from .turns import Turn
 
 #: Relative step of the difference by which the constants are differentiated with respect to the parameter. The constants
 #: are smooth functions of it, most of them linear, and the derivative steers Newton's method only.

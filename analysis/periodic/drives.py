@@ -17,7 +17,7 @@ from linkwork.mechanism import Channel, Mechanism, Mode
 from ..mechanisms import InitialState, Parameters, mechanism_of
 from ..run import InductionMotor, Inputs
 from ..run.inputs import given
-from .orbit_kernels import Flow, crank_of, flow
+from .flows import Flow, crank_of, flow
 
 #: A torque on the crank: constant, a motor's, or both.
 Torque = float | InductionMotor | Sequence[float | InductionMotor]

@@ -21,7 +21,8 @@ from ..numerics.codegen import cache_root, fingerprint
 from ..run import interruptible, shown
 from . import orbit_kernels, orbits
 from .floquet import TOLERANCE, Stability, multipliers
-from .orbit_kernels import GAP, VARIATIONAL, Status
+from .flows import GAP, VARIATIONAL
+from .orbit_kernels import Status
 from .planes import Operation, Plane
 
 

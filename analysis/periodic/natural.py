@@ -15,7 +15,7 @@ from linkwork.parameters import field_name
 from ..mechanisms import Parameters, mechanism_of
 from ..numerics import symbolic
 from ..run import constants, traced
-from .orbit_kernels import crank_of
+from .flows import crank_of
 
 #: Crank angles over which the effective mass is averaged.
 MASS_SAMPLES = 1024

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
-from math import pi
 from typing import NamedTuple
 
 import numpy as np
@@ -24,8 +23,10 @@ from ..run import Inputs, outputs_of
 from . import orbit_kernels
 from .drives import Drive, Torque, drive_of
 from .floquet import TOLERANCE, StabilityVerdict, liouville, multipliers, verdict
+from .flows import DIRECTIONAL, GAP, PLAIN, STATE, VARIATIONAL, Flow
 from .natural import mean_effective_mass, stiffness_name
-from .orbit_kernels import DIRECTIONAL, GAP, NO_SOURCE, PLAIN, STATE, VARIATIONAL, Flow, Section, Status
+from .orbit_kernels import NO_SOURCE, Section, Status
+from .turns import Turn, times_of
 
 #: Bound of the local error of a step; the solution is good to about a hundred times as much.
 INTEGRATOR_TOLERANCE = 1e-12
@@ -79,78 +80,6 @@ class OrbitError(LinkworkError):
 
 class OrbitAssemblyError(OrbitError, AssemblyError):
     """The motion that was followed comes to the limit of assembly."""
-
-
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Turn:
-    """One period of an orbit at equal steps of the crank angle, its end left out.
-
-    Attributes
-    ----------
-    angle : ndarray, shape (n,)
-        Crank angle (rad), from 0.
-    time : ndarray, shape (n,)
-        s, from 0.
-    period : float
-        s.
-    states, inputs : ndarray, shapes (n, states) and (n, channels)
-        States of a run, no work done, and the channels in force.
-    values : ndarray, shape (n, outputs)
-        Outputs by `names`: all of the FMI interface but the energies that count from the start of a run.
-    turns : int
-        Turns of the crank in the period.
-    names : tuple of str
-    swing : str
-        The output whose amplitude is meant where none is named: the first free coordinate, such as ``slider.position``, or
-        the crank's speed where nothing else is free.
-
-    Notes
-    -----
-    ``turn["slider.position"]`` is an output over the period, shape (n,).
-    """
-
-    angle: NDArray[np.float64]
-    time: NDArray[np.float64]
-    period: float
-    states: NDArray[np.float64]
-    inputs: NDArray[np.float64]
-    values: NDArray[np.float64]
-    turns: int
-    names: tuple[str, ...]
-    swing: str
-
-    def __getitem__(self, name: str) -> NDArray[np.float64]:
-        if name not in self.names:
-            raise InputError(f"an orbit has no output {name!r}: it has {', '.join(self.names)}")
-        return self.values[:, self.names.index(name)]
-
-    @property
-    def amplitude(self) -> float:
-        """Half the distance between the least and the greatest value of ``swing``, of a slider position (m).
-
-        From the Fourier series of the turn on a grid eight times as fine: good to a millionth of itself, all the samples
-        being enough for the series.
-        """
-        u = self[self.swing]
-        n = 8 * len(u)
-        fine = np.fft.irfft(np.fft.rfft(u), n) * (n / len(u))
-        return 0.5 * float(np.ptp(fine))
-
-    def harmonic(self, name: str, order: float) -> float:
-        """Amplitude of a harmonic of an output, its order counted in turns of the crank: 1/2 where the period is two turns.
-
-        Raises
-        ------
-        InputError
-            If the period does not hold the harmonic a whole number of times, or the samples are too few for it.
-        """
-        number = order * self.turns
-        if number != int(number) or not 0 < number < len(self.angle) / 2:
-            raise InputError(
-                f"order {order} of an orbit of {self.turns} turn(s) with {len(self.angle)} samples: its orders are "
-                f"multiples of 1/{self.turns} up to {(len(self.angle) - 1) // 2 / self.turns:g}"
-            )
-        return 2.0 * float(np.abs(np.fft.rfft(self[name])[int(number)])) / len(self.angle)
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -219,7 +148,7 @@ class PeriodicOrbit:
         states, channels = rows[:, : mechanism.size], rows[:, mechanism.size :]
         values = outputs_of(mechanism, section.modes, np.array([*self.parameters.constants(), 0.0]), states, channels)
         keep = [n for n, name in enumerate(mechanism.output_names) if name not in _OF_A_RUN]
-        time, period = _times(states[:, len(mechanism.freedoms) + flow.crank], flow.period * self.turns)
+        time, period = times_of(states[:, len(mechanism.freedoms) + flow.crank], flow.period * self.turns)
         return Turn(
             angle=angles,
             time=time,
@@ -566,21 +495,6 @@ def failure(
     """The error that says what a status of `orbit_kernels` means."""
     kind = OrbitAssemblyError if status == Status.LIMIT else OrbitError
     return kind(orbit_kernels.REASONS[Status(status)], flow, start, float(residual), iterations)
-
-
-def _times(speed: NDArray[np.float64], way: float) -> tuple[NDArray[np.float64], float]:
-    """Time at equal steps of the crank angle over ``way``, and the period, by integrating the Fourier series of 1 / speed."""
-    n = len(speed)
-    c = np.fft.rfft(1.0 / speed) / n
-    angle = np.arange(n) * (way / n)
-    k = np.arange(len(c)) * (2.0 * pi / way)
-    integral = np.zeros(len(c), dtype=complex)
-    integral[1:] = c[1:] / (1j * k[1:])
-    if n % 2 == 0:
-        integral[-1] = 0.0
-    wave = np.fft.irfft(integral * n, n)
-    mean = float(c[0].real)
-    return mean * angle + wave - wave[0], way * mean
 
 
 def largest_multipliers(

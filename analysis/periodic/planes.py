@@ -14,7 +14,7 @@ from linkwork.parameters import field_name
 from ..mechanisms import Parameters, mechanism_of
 from ..units import RAD_S_PER_RPM
 from .drives import Drive, forces_of, require_acting
-from .orbit_kernels import crank_of
+from .flows import crank_of
 
 #: A mechanism and what drives it.
 Operation = tuple[Parameters, Drive]
