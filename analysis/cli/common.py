@@ -14,7 +14,7 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from linkwork.errors import InputError, Interrupted, LinkworkError
+from linkwork.errors import Interrupted, LinkworkError
 
 from . import CHECK_FAILED as CHECK_FAILED
 from . import ENDED_EARLY as ENDED_EARLY
@@ -145,25 +145,6 @@ def chosen_case(file: str | None, published: str | None, settings: Sequence[str]
     if overrides:
         return case_from({"published": published}, folder=Path.cwd(), title=published, overrides=overrides)
     return published_case(published)
-
-
-def five_bar_case(file: str | None, published: str | None, settings: Sequence[str]) -> Any:
-    """The case that a command for five-bars is about.
-
-    Raises
-    ------
-    InputError
-        If it is another mechanism's.
-    """
-    from ..mechanisms import FIVE_BAR, mechanism_of
-
-    case = chosen_case(file, published, settings)
-    mechanism = mechanism_of(case.parameters)
-    if mechanism is not FIVE_BAR:
-        raise InputError(
-            f"{file or published} is a case of the {mechanism.name}: this command is for cases of the {FIVE_BAR.name}"
-        )
-    return case
 
 
 def say(text: str) -> None:

@@ -1,10 +1,10 @@
-"""Commands about periodic motions: where the slider resonates, and where it is unstable."""
+"""Commands about periodic motions: where a mechanism resonates, and where it is unstable."""
 
 from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import wraps
 from pathlib import Path
 from typing import Any
@@ -14,10 +14,12 @@ import numpy as np
 from rich.markup import escape
 from rich.table import Table
 
-from linkwork.errors import InputError
-from linkwork.five_bar.published import CM_PER_METRE, RAD_S_PER_RPM, SETS
+from linkwork.errors import InputError, ParameterError
+from linkwork.parameters import field_name
 
-from .common import ENDED_EARLY, INTERRUPTED, console, errors, five_bar_case, handled, number_or_text
+from ..mechanisms import FIVE_BAR, PUBLISHED, mechanism_of
+from ..units import RAD_S_PER_RPM
+from .common import ENDED_EARLY, INTERRUPTED, case_options, chosen_case, console, errors, handled, out_option, quantity
 
 #: Range of speeds where none is given, relative to the natural frequency.
 _RANGE = (0.15, 1.5)
@@ -29,22 +31,16 @@ def _cores(context: click.Context, parameter: click.Parameter, value: int) -> in
     return value
 
 
-def _quantity(text: str, unit: str, name: str) -> float:
-    from ..units import quantity
-
-    return quantity(number_or_text(text), unit, name)
-
-
-def _require_range(low: float, high: float, name: str, first: str, last: str) -> None:
+def _require_range(parameters: Any, low: float, high: float, name: str, first: str, last: str) -> None:
     """Refuse a range that is none, in the words of the command line."""
-    from ..periodic import format_value, unit_of
+    from ..periodic import format_value, speed_name, unit_of
 
-    unit = unit_of(name)
+    unit = unit_of(mechanism_of(parameters), name)
     options = first if first == last else f"{first} and {last}"
     if not low < high:
         span = f"from {format_value(name, low, unit)} to {format_value(name, high, unit)}"
         raise click.UsageError(f"{options}: {span}: it must increase")
-    if name == "drive.speed" and low <= 0.0:
+    if name == speed_name(mechanism_of(parameters)) and low <= 0.0:
         raise click.UsageError(f"{options}: it begins at {format_value(name, low, unit)}: speeds must be above zero")
 
 
@@ -62,31 +58,36 @@ class _Chosen:
         """What drives the case, its constant forces with it; a speed given takes the place of its drive."""
         from ..periodic import VaryingInputError, drive_of
 
-        inputs, speed = self.case.inputs, speed or self.speed
-        if speed is not None:
-            inputs = replace(inputs, speed=_quantity(speed, "rad/s", "--speed"), torque=None)
-            if self.case.inputs.torque is not None:
-                errors.print("note: the speed is prescribed; the case's torque is left out", style="yellow")
+        speed = speed or self.speed
+        value = None if speed is None else quantity(speed, "rad/s", "--speed")
+        if value is not None and self.case.inputs.torque is not None:
+            errors.print("note: the speed is prescribed; the case's torque is left out", style="yellow")
         try:
-            return drive_of(inputs)
+            drive = drive_of(self.case.parameters, self.case.inputs, self.case.initial, speed=value)
+            # that something is free is asked first
+            drive.flow(mechanism_of(self.case.parameters))
+            return drive
         except InputError as error:
             torque = isinstance(error, VaryingInputError) and error.channel == "torque"
             hint = "; --speed prescribes the speed instead" if torque else ""
             raise InputError(f"{self.case.title}: {error}{hint}") from None
 
-    def start(self, drive: Any) -> tuple[float, float, float] | None:
-        """Guess of the orbit's start: none at prescribed speed, else with a crank speed."""
+    def start(self, drive: Any) -> list[float] | None:
+        """Guess of the orbit's start: none at prescribed speed, else all at zero with a crank speed."""
         if drive.speed_drive:
             if self.guess_speed is not None:
                 raise click.UsageError("--guess-speed is for a case driven by a torque: here the speed is prescribed")
             return None
+        mechanism = mechanism_of(self.case.parameters)
+        flow = drive.flow(mechanism)
+        speed = float(getattr(self.case.initial, mechanism.freedoms[flow.crank].initial[1]))
         if self.guess_speed is not None:
-            return (0.0, 0.0, _quantity(self.guess_speed, "rad/s", "--guess-speed"))
-        if self.case.initial.crank_speed > 0.0:
-            return (0.0, 0.0, self.case.initial.crank_speed)
-        if drive.motor is None:
-            raise click.UsageError("under a torque a guess of the crank speed is needed: --guess-speed '300 rpm'")
-        return None
+            speed = quantity(self.guess_speed, "rad/s", "--guess-speed")
+        elif speed <= 0.0:
+            if drive.motor is None:
+                raise click.UsageError("under a torque a guess of the crank speed is needed: --guess-speed '300 rpm'")
+            return None
+        return [*[0.0] * (flow.size - 1), speed]
 
     def finish(self, written: Sequence[Path], problems: Sequence[str], *, interrupted: bool = False) -> None:
         """Report the files and what could not be computed, and exit with what that means."""
@@ -112,17 +113,15 @@ def _about_a_case(command: Callable[..., None]) -> Callable[..., None]:
         out: str,
         **options: Any,
     ) -> None:
-        chosen = five_bar_case(case, published, settings)
+        chosen = chosen_case(case, published, settings)
         stem = Path(case).stem if case else str(published)
         command(_Chosen(case=chosen, stem=stem, speed=speed, guess_speed=guess_speed, folder=Path(out)), **options)
 
     for option in (
-        click.option("--out", default="out", show_default=True, type=click.Path(file_okay=False), help="Folder."),
+        out_option(help="Folder."),
         click.option("--guess-speed", metavar="SPEED", help="Guess of the crank speed, for a case driven by a torque."),
         click.option("--speed", metavar="SPEED", help="Prescribe this crank speed in the place of the case's drive."),
-        click.option("--set", "settings", multiple=True, metavar="NAME=VALUE", help="Change a value of the mechanism."),
-        click.option("--published", metavar="NAME", help=f"A published set instead: {', '.join(SETS)}."),
-        click.argument("case", required=False, type=click.Path(exists=True, dir_okay=False)),
+        case_options(PUBLISHED),
     ):
         with_case = option(with_case)
     return with_case
@@ -151,17 +150,18 @@ def resonance(chosen: _Chosen, vary: str, low: str | None, high: str | None, dou
     """
     from .. import figures
     from ..files import save_figure, write_csv
-    from ..periodic import ResponseInterrupted, frequency_response, natural_frequency, unit_of
+    from ..periodic import ResponseInterrupted, frequency_response, speed_name, unit_of
     from ..youssef import approximations
 
     parameters, title = chosen.case.parameters, chosen.case.title
-    over_speed = vary == "drive.speed"
+    mechanism = mechanism_of(parameters)
+    over_speed = vary == speed_name(mechanism)
     if over_speed and chosen.speed is not None:
         raise click.UsageError(
             "--speed prescribes a speed, but it is the speed that varies: give --from and --to, or --vary"
         )
-    natural = natural_frequency(parameters) if over_speed and parameters.slider_stiffness > 0.0 else None
-    ends = _ends(vary, low, high, natural)
+    natural = _natural(parameters) if over_speed else None
+    ends = _ends(parameters, vary, low, high, natural)
     drive = chosen.drive(f"{ends[0]} rad/s" if over_speed else None)
     start = chosen.start(drive)
     interrupted = False
@@ -171,7 +171,7 @@ def resonance(chosen: _Chosen, vary: str, low: str | None, high: str | None, dou
         )
     except ResponseInterrupted as stopped:
         response, interrupted = stopped.response, True
-    factor, unit = (1.0 / RAD_S_PER_RPM, "rpm") if over_speed else (1.0, unit_of(vary))
+    factor, unit = (1.0 / RAD_S_PER_RPM, "rpm") if over_speed else (1.0, unit_of(mechanism, vary))
     if natural is not None:
         console.print(
             f"natural frequency (mean effective mass): {natural / RAD_S_PER_RPM:.2f} rpm, {natural:.5g} rad/s",
@@ -180,7 +180,7 @@ def resonance(chosen: _Chosen, vary: str, low: str | None, high: str | None, dou
     _branches(title, response, factor, unit)
     stem = chosen.folder / f"{chosen.stem}-resonance"
     written = [response.to_csv(f"{stem}.csv")]
-    table = approximations(response) if over_speed else None
+    table = approximations(response) if over_speed and mechanism is FIVE_BAR else None
     _extrema(response, factor, unit, table)
     if table is not None:
         written.append(write_csv(f"{stem}-approximations.csv", table.columns()))
@@ -190,20 +190,30 @@ def resonance(chosen: _Chosen, vary: str, low: str | None, high: str | None, dou
     chosen.finish(written, response.problems, interrupted=interrupted)
 
 
-def _ends(vary: str, low: str | None, high: str | None, natural: float | None) -> tuple[float, float]:
-    """The range to follow, by default about the natural frequency."""
-    from ..periodic import unit_of
+def _natural(parameters: Any) -> float | None:
+    """The natural frequency, None where there is no spring."""
+    from ..periodic import natural_frequency
 
-    unit = unit_of(vary)
+    try:
+        return natural_frequency(parameters)
+    except ParameterError:
+        return None
+
+
+def _ends(parameters: Any, vary: str, low: str | None, high: str | None, natural: float | None) -> tuple[float, float]:
+    """The range to follow, by default about the natural frequency."""
+    from ..periodic import speed_name, unit_of
+
+    unit = unit_of(mechanism_of(parameters), vary)
     if natural is None and (low is None or high is None):
-        speed = vary == "drive.speed"
+        speed = vary == speed_name(mechanism_of(parameters))
         why = "without a spring there is no natural frequency to begin with" if speed else "it has no range of its own"
         raise click.UsageError(f"--from and --to are needed for {vary}: {why}")
     ends = [
-        _quantity(text, unit, option) if text is not None else factor * (natural or 0.0)
+        quantity(text, unit, option) if text is not None else factor * (natural or 0.0)
         for text, option, factor in zip((low, high), ("--from", "--to"), _RANGE)
     ]
-    _require_range(ends[0], ends[1], vary, "--from", "--to")
+    _require_range(parameters, ends[0], ends[1], vary, "--from", "--to")
     return ends[0], ends[1]
 
 
@@ -227,23 +237,36 @@ def _branches(title: str, response: Any, factor: float, unit: str) -> None:
     console.print(grid)
 
 
+def _swing(orbit: Any) -> tuple[str, float, str]:
+    """What the amplitude is of, and the factor and unit in which it is printed: centimetres of lengths."""
+    what, unit = orbit.swing
+    return (what, 100.0, "cm") if unit == "m" else (what, 1.0, unit)
+
+
+def _friction(parameters: Any) -> bool:
+    """Whether there is Coulomb friction."""
+    names = mechanism_of(parameters).mechanism_variables
+    return any(getattr(parameters, field_name(name)) for name in names if name.endswith(".coulomb_friction"))
+
+
 def _extrema(response: Any, factor: float, unit: str, table: Any) -> None:
     entries = [("maximum", e) for e in response.maxima()] + [("minimum", e) for e in response.minima()]
     if not entries:
         console.print("the amplitude has neither a maximum nor a minimum inside the range", highlight=False)
         return
-    grid = Table(title="where the amplitude of the slider is largest and least", title_justify="left")
+    what, size, cm = _swing(response.branches[0].orbits[0])
+    grid = Table(title=f"where the amplitude of {what} is largest and least", title_justify="left")
     names = () if table is None else tuple(table.amplitudes)
-    for heading in ("", f"at [{unit}]", "amplitude [cm]", "motion", *(f"{name} [cm]" for name in names)):
+    for heading in ("", f"at [{unit}]", f"amplitude [{cm}]", "motion", *(f"{name} [{cm}]" for name in names)):
         grid.add_column(escape(heading), justify="left" if heading in ("", "motion") else "right")
-    if table is not None and response.family.parameters.slider_coulomb_friction:
+    if table is not None and _friction(response.family.parameters):
         console.print("the approximations are of the mechanism without its Coulomb friction", highlight=False)
     for word, extremum in sorted(entries, key=lambda entry: entry[1].parameter):
-        others = [] if table is None else [f"{CM_PER_METRE * v:.4f}" for v in table.at(extremum.parameter).values()]
+        others = [] if table is None else [f"{size * v:.4f}" for v in table.at(extremum.parameter).values()]
         grid.add_row(
             word,
             f"{factor * extremum.parameter:.2f}",
-            f"{CM_PER_METRE * extremum.amplitude:.4f}",
+            f"{size * extremum.amplitude:.4f}",
             extremum.stability.value,
             *others,
         )
@@ -252,18 +275,20 @@ def _extrema(response: Any, factor: float, unit: str, table: Any) -> None:
 
 @click.command()
 @_about_a_case
-@click.option("--x", "x", default="drive.speed", show_default=True, metavar="NAME", help="Parameter along x.")
+@click.option("--x", "x", metavar="NAME", help="Parameter along x, by its FMI name; by default the crank speed.")
 @click.option("--x-range", nargs=2, metavar="FROM TO", help="Its range, such as '100 rpm' '1500 rpm'.")
-@click.option("--y", "y", default="slider.damping", show_default=True, metavar="NAME", help="Parameter along y.")
+@click.option(
+    "--y", "y", metavar="NAME", help="Parameter along y; by default the damping of the first freedom beside the crank."
+)
 @click.option("--y-range", nargs=2, metavar="FROM TO", help="Its range, such as 0 '2e4 dyn.s/cm'.")
 @click.option("--points", default=80, show_default=True, type=click.IntRange(2, 2000), help="Points along each axis.")
 @click.option("--cores", default=-1, show_default=True, callback=_cores, help="Cores; -1 for all.")
 @click.option("--chart/--no-chart", "charted", default=True, show_default=True, help="Chart, or the verdict alone.")
 def stability(
     chosen: _Chosen,
-    x: str,
+    x: str | None,
     x_range: tuple[str, str] | None,
-    y: str,
+    y: str | None,
     y_range: tuple[str, str] | None,
     points: int,
     cores: int,
@@ -283,16 +308,18 @@ def stability(
     """
     from .. import figures
     from ..files import save_figure
-    from ..periodic import stability_chart
+    from ..periodic import damping_name, speed_name, stability_chart
     from ..youssef import linear_motion
 
     parameters, drive = chosen.case.parameters, chosen.drive()
     start = chosen.start(drive)
-    ranges = ((0.0, 0.0), (0.0, 0.0))
+    names, ranges = ("", ""), ((0.0, 0.0), (0.0, 0.0))
     if charted:
+        mechanism = mechanism_of(parameters)
+        names = (x or speed_name(mechanism) or "drive.speed", y or damping_name(mechanism))
         ranges = (
-            _axis_range(parameters, drive, x, x_range, "--x-range"),
-            _axis_range(parameters, drive, y, y_range, "--y-range"),
+            _axis_range(parameters, drive, names[0], x_range, "--x-range"),
+            _axis_range(parameters, drive, names[1], y_range, "--y-range"),
         )
     _report_verdict(chosen.case.title, parameters, drive, start)
     if not charted:
@@ -300,11 +327,11 @@ def stability(
     found = stability_chart(
         parameters,
         drive,
-        (x, y),
+        names,
         ranges,
         points=points,
         start=start,
-        beside=linear_motion(parameters, drive, (x, y)),
+        beside=linear_motion(parameters, drive, names) if mechanism_of(parameters) is FIVE_BAR else None,
         n_jobs=cores,
         progress=console.is_terminal,
     )
@@ -327,8 +354,8 @@ def _axis_range(
 
     if texts is None:
         return default_range(parameters, drive, name)
-    low, high = (_quantity(text, unit_of(name), option) for text in texts)
-    _require_range(low, high, name, option, option)
+    low, high = (quantity(text, unit_of(mechanism_of(parameters), name), option) for text in texts)
+    _require_range(parameters, low, high, name, option, option)
     return low, high
 
 
@@ -338,16 +365,17 @@ def _report_verdict(title: str, parameters: Any, drive: Any, start: Any) -> None
     from ..youssef import linear_verdict
 
     orbit = orbit_of(parameters, drive, start=start)
-    turn = orbit.turn()
+    turn, (_, size, unit) = orbit.turn(), _swing(orbit)
     values = ", ".join(f"{m.real:.6g}{m.imag:+.6g}i" if m.imag else f"{m.real:.6g}" for m in orbit.multipliers)
     lines = [
         f"{title} at {60.0 * turn.turns / turn.period:.6g} rpm: {orbit.verdict()}",
-        f"Floquet multipliers {values}; amplitude {CM_PER_METRE * turn.amplitude:.5g} cm",
+        f"Floquet multipliers {values}; amplitude {size * turn.amplitude:.5g} {unit}",
     ]
-    if drive.speed_drive and not parameters.slider_coulomb_friction:
+    friction = _friction(parameters)
+    if drive.speed_drive and not friction and mechanism_of(parameters) is FIVE_BAR:
         lines.append(f"by the linear equation about u = 0, as in the thesis: {linear_verdict(parameters, drive)}")
     console.print("\n".join(lines), highlight=False, soft_wrap=True)
-    if parameters.slider_coulomb_friction:
+    if friction:
         errors.print(
             "note: Coulomb friction is smoothed over 1 mm/s: where the slider would stick, the model creeps to one place, "
             "and its multipliers are those of the creep",

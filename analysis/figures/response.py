@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import matplotlib
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from linkwork.five_bar.published import CM_PER_METRE, RAD_S_PER_RPM
 
-from ..periodic import Branch, Response
+from ..periodic import FORCE, Branch, Response
 from ..youssef import Approximations
 from .dispatch import plot
 from .style import COLOURS, STYLE, finish
@@ -46,27 +46,25 @@ def plot_branches(
     family = branches[0].family
     factor = 1.0 / RAD_S_PER_RPM if rpm else 1.0
     unit = "rpm" if rpm else family.unit
+    what, si = branches[0].orbits[0].swing
+    scale, shown = (CM_PER_METRE, "cm") if si == "m" else (1.0, si)
+    rows = _rows(branches[0], f"amplitude of {what} [{shown}]", scale)
     with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(7.2, 7.6))
-        axes = figure.subplots(3, 1, sharex=True, height_ratios=(2.2, 1.0, 1.0))
+        figure = Figure(figsize=(7.2, 3.4 + 2.1 * (len(rows) - 1)))
+        heights = (2.2, *(1.0 for _ in rows[1:]))
+        axes = figure.subplots(len(rows), 1, sharex=True, height_ratios=heights, squeeze=False)[:, 0]
         for number, branch in enumerate(branches):
-            table = branch.columns()
-            stable = table["stable (1), marginal (0), unstable (-1)"] > 0.0
+            stable = branch.columns()["stable (1), marginal (0), unstable (-1)"] > 0.0
             x = factor * branch.parameter
-            rows = (
-                CM_PER_METRE * table["amplitude of u [m]"],
-                table["greatest crank torque [N.m]"],
-                np.max([table[f"greatest force in pin {pin} [N]"] for pin in "ABCD"], axis=0),
-            )
-            for axis, y in zip(axes, rows):
+            for axis, (_, y) in zip(axes, rows):
                 for part, line in ((stable, "-"), (~stable, "--")):
                     # a part reaches to the first point of the next, so that there is no gap between them
                     wide = part | np.append(part[1:], False) & ~part if line == "--" else part
-                    axis.plot(x, np.where(wide, y, np.nan), line, color=COLOURS[number % len(COLOURS)])
+                    axis.plot(x, np.where(wide, y(branch), np.nan), line, color=COLOURS[number % len(COLOURS)])
             for special in branch.special:
                 axes[0].plot(
                     factor * special.parameter,
-                    CM_PER_METRE * special.orbit.amplitude,
+                    scale * special.orbit.amplitude,
                     _MARKERS[special.kind.value],
                     color="black",
                     markersize=4.5,
@@ -75,16 +73,13 @@ def plot_branches(
                 )
         others = dict(beside or {})
         for (parameter, amplitude), line in zip(others.values(), _LINES):
-            axes[0].plot(
-                factor * parameter, CM_PER_METRE * amplitude, linestyle=line, color="0.45", linewidth=0.9, zorder=1
-            )
+            axes[0].plot(factor * parameter, scale * amplitude, linestyle=line, color="0.45", linewidth=0.9, zorder=1)
         # what is linear has resonances without bound; the true motion sets the scale
-        top = max(CM_PER_METRE * float(branch.amplitude.max()) for branch in branches)
+        top = max(scale * float(branch.amplitude.max()) for branch in branches)
         axes[0].set_ylim(0.0, 1.15 * top)
-        axes[0].set_ylabel("amplitude of u [cm]")
-        axes[1].set_ylabel("greatest crank\ntorque [N.m]")
-        axes[2].set_ylabel("greatest\npin force [N]")
-        axes[2].set_xlabel(f"{family.name} [{unit}]" if unit else family.name)
+        for axis, (label, _) in zip(axes, rows):
+            axis.set_ylabel(label)
+        axes[-1].set_xlabel(f"{family.name} [{unit}]" if unit else family.name)
         for axis in axes[1:]:
             axis.set_yscale("log")
         axes[0].legend(handles=_legend(branches, tuple(others)), fontsize=8)
@@ -92,6 +87,19 @@ def plot_branches(
         if title:
             figure.suptitle(title, fontsize=10.5, fontweight="bold")
         return finish(figure)
+
+
+def _rows(branch: Branch, label: str, scale: float) -> list[tuple[str, Callable[[Branch], NDArray[np.float64]]]]:
+    """Labels of what is drawn, and its values along a branch: amplitude, and crank torque and joint forces if there are any."""
+    names = list(branch.columns())
+    torque, forces = "greatest crank torque [N.m]", [name for name in names if name.startswith(FORCE)]
+    rows: list[tuple[str, Callable[[Branch], NDArray[np.float64]]]] = [(label, lambda b: scale * b.amplitude)]
+    if torque in names:
+        rows.append(("greatest crank\ntorque [N.m]", lambda b: b.columns()[torque]))
+    if forces:
+        kind = "pin" if all(name.startswith(f"{FORCE}pin ") for name in forces) else "joint"
+        rows.append((f"greatest\n{kind} force [N]", lambda b: np.max([b.columns()[n] for n in forces], axis=0)))
+    return rows
 
 
 @plot.register

@@ -179,7 +179,7 @@ def linearise_along(
     if isinstance(motion, Orbit):
         if inputs is not None or period is not None:
             raise InputError("inputs and period are those of the orbit: they cannot be given besides")
-        states, inputs, period = _in_time(motion.turn(samples))
+        states, inputs, period = _in_time(motion.turn(samples), parameters)
     else:
         states = six_states(motion)
     n = len(states)
@@ -204,7 +204,7 @@ def linearise_along(
     return model
 
 
-def _in_time(turn: Turn) -> tuple[FloatArray, tuple[dynamics.Inputs, ...], float]:
+def _in_time(turn: Turn, parameters: FiveBarParameters) -> tuple[FloatArray, tuple[dynamics.Inputs, ...], float]:
     """States and inputs of a turn at equal steps of time instead of the crank angle, and its period."""
     n, period = len(turn.time), turn.period
     angle = turn.states[:, 0] - turn.states[0, 0]
@@ -212,6 +212,9 @@ def _in_time(turn: Turn) -> tuple[FloatArray, tuple[dynamics.Inputs, ...], float
     wanted = period * np.arange(n) / n
     lead = trigonometric(turn.time - wanted, way)
     columns = np.hstack([turn.states[:, 1:4], turn.inputs])
+    p = parameters.constants()
+    # the commanded speed is above zero where there is one
+    mode = float(turn.inputs[0, 1] > 0.0)
     values = trigonometric(columns, way)
     states, inputs = np.empty((n, 6)), []
     for k, t in enumerate(wanted):
@@ -224,7 +227,7 @@ def _in_time(turn: Turn) -> tuple[FloatArray, tuple[dynamics.Inputs, ...], float
                 break
         here = values(x)
         states[k] = turn.states[0, 0] + x, here[0], here[1], here[2], 0.0, 0.0
-        inputs.append(dynamics.Inputs(float(turn.inputs[0, 0]), *here[4:].tolist()))
+        inputs.append(dynamics.applied((mode,), tuple(here[3:].tolist()), p))
     return states, tuple(inputs), period
 
 

@@ -10,20 +10,23 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
-from math import pi
+from functools import reduce
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from linkwork.errors import InputError
-from linkwork.five_bar.parameters import Constants, FiveBarParameters
 
 from ..files import write_csv
+from ..mechanisms import Parameters, mechanism_of
 from ..numerics.continuation import ContinuationError, Curve, Evaluate, Evaluation, Follower, Point, Settings
+from .drives import Drive
 from .floquet import TOLERANCE, Crossing, Stability, crossing_test
-from .orbits import Drive, Period, PeriodicOrbit, Turn, period_from, scale_of
+from .flows import label
+from .orbits import Direction, Period, PeriodicOrbit, period_from, scale_of
 from .planes import Operation, format_value, require_variable, unit_of, with_values
+from .turns import Turn
 
 #: Relative step of the difference by which the constants are differentiated with respect to the parameter. The constants
 #: are smooth functions of it, most of them linear, and the derivative steers Newton's method only.
@@ -33,7 +36,7 @@ _FIRST = 5e-3
 #: Distance from a period doubling at which the doubled branch is begun, relative to the crank's length.
 _SWITCH = 2e-3
 
-#: A branch is left where the links come this close to collinear (least |sin| of the transmission angle), or where its
+#: A branch is left where the links come this close to the limit of assembly (least sine, as `LIMIT_SINE`), or where its
 #: largest multiplier passes the greatest that single shooting follows with certainty.
 LEAST_SINE, GREATEST_MULTIPLIER = 0.02, 1e4
 
@@ -48,11 +51,11 @@ class Family:
 
     Attributes
     ----------
-    parameters : FiveBarParameters
+    parameters : parameters of a mechanism
     drive : Drive
     vary : str or callable
-        ``drive.speed``, ``drive.torque``, ``slider.force``, ``load.fx``, ``load.fy``, a parameter of the FMI contract such as
-        ``slider.damping``, or a function from a number to (FiveBarParameters, Drive).
+        FMI name of an input that acts, such as ``drive.speed``, ``drive.torque`` or ``slider.force``, or of a parameter, such
+        as ``slider.damping``; or a function from a number to (parameters, Drive).
     name, unit : str
         Of the parameter, for tables and plots; they follow from an FMI name.
 
@@ -64,7 +67,7 @@ class Family:
         If it does not act in this drive.
     """
 
-    parameters: FiveBarParameters
+    parameters: Parameters
     drive: Drive
     vary: Vary = "drive.speed"
     name: str = ""
@@ -74,9 +77,9 @@ class Family:
         if callable(self.vary):
             object.__setattr__(self, "name", self.name or "parameter")
             return
-        require_variable(self.drive, self.vary)
+        require_variable(self.parameters, self.drive, self.vary)
         object.__setattr__(self, "name", self.name or self.vary)
-        object.__setattr__(self, "unit", self.unit or unit_of(self.vary))
+        object.__setattr__(self, "unit", self.unit or unit_of(mechanism_of(self.parameters), self.vary))
 
     def at(self, value: float) -> Operation:
         """Mechanism and drive at a value of the parameter."""
@@ -88,15 +91,13 @@ class Family:
         """A value of the parameter with its name and unit; speeds in rpm too."""
         return format_value(self.name, value, self.unit)
 
-    def _direction(self, value: float, low: float, high: float) -> tuple[NDArray[np.float64], Constants]:
-        """Derivatives of drive vector and constants with respect to the parameter, by differences inside its range."""
+    def _direction(self, value: float, low: float, high: float) -> Direction:
+        """By differences inside the parameter's range."""
         step = _DIFFERENCE * max(abs(value), 1e-3 * (high - low))
         a, b = max(value - step, low), min(value + step, high)
-        (p0, d0), (p1, d1) = self.at(a), self.at(b)
-        return (
-            (d1.vector() - d0.vector()) / (b - a),
-            Constants(*((y - x) / (b - a) for x, y in zip(p0.constants(), p1.constants()))),
-        )
+        mechanism = mechanism_of(self.parameters)
+        vectors, numbers = zip(*((d.vector(mechanism), np.array(p.constants())) for p, d in (self.at(a), self.at(b))))
+        return Direction((vectors[1] - vectors[0]) / (b - a), (numbers[1] - numbers[0]) / (b - a))
 
     def evaluate(self, turns: int, low: float, high: float) -> Evaluate:
         """y(T) - y(0) with its derivatives over a range, as `continuation` follows it; its data are the `PeriodicOrbit`."""
@@ -111,7 +112,7 @@ class Family:
 
 
 def orbit_from(
-    parameters: FiveBarParameters, drive: Drive, start: NDArray[np.float64], turns: int, period: Period
+    parameters: Parameters, drive: Drive, start: NDArray[np.float64], turns: int, period: Period
 ) -> PeriodicOrbit:
     """The orbit that one period from its start is, as far as it closes."""
     return PeriodicOrbit(
@@ -179,8 +180,9 @@ class Branch:
 
     @property
     def amplitude(self) -> NDArray[np.float64]:
-        """Half the range of the slider position at each point (m), shape (m,)."""
-        return self.columns()["amplitude of u [m]"]
+        """Half the range of the first free coordinate at each point, of a slider position (m); shape (m,)."""
+        label, unit = self.orbits[0].swing
+        return self.columns()[f"amplitude of {label} [{unit}]"]
 
     @property
     def largest_multiplier(self) -> NDArray[np.float64]:
@@ -194,12 +196,14 @@ class Branch:
     def columns(self) -> Mapping[str, NDArray[np.float64]]:
         """What varies along the branch, by name with unit, each of shape (m,).
 
-        The parameter, mean speed (under a torque), turns in a period, amplitude, mean and first harmonics of u, largest
-        multiplier, stability, mean and greatest crank torque, greatest pin and guide forces, least transmission sine.
+        The parameter, mean speed (under a torque), turns in a period, and of the first free coordinate, a five-bar's u,
+        amplitude, mean and first harmonics; largest multiplier, stability; of what the mechanism has, mean and greatest crank
+        torque, greatest forces in pins, guide and bearings, least transmission sine.
         """
         if not self._table:
             turns = [orbit.turn() for orbit in self.orbits]
-            self._table.update({name: np.array([value(turn) for turn in turns]) for name, value in _OF_A_TURN.items()})
+            values = _of_a_turn(self.orbits[0], turns[0])
+            self._table.update({name: np.array([value(turn) for turn in turns]) for name, value in values.items()})
         unit = f" [{self.family.unit}]" if self.family.unit else ""
         first = {
             f"{self.family.name}{unit}": self.parameter,
@@ -214,27 +218,38 @@ class Branch:
         return write_csv(path, self.columns())
 
 
-def _greatest_of(pin: str) -> Callable[[Turn], float]:
-    return lambda turn: float(np.hypot(turn[f"pin.{pin}.fx"], turn[f"pin.{pin}.fy"]).max())
+#: Beginning of the names of the columns of forces in joints.
+FORCE = "greatest force in "
 
 
-#: Columns of a branch that come from the outputs over a period.
-_OF_A_TURN: Mapping[str, Callable[[Turn], float]] = {
-    "mean crank speed [rad/s]": lambda turn: 2.0 * pi * turn.turns / turn.period,
-    "amplitude of u [m]": lambda turn: turn.amplitude,
-    "mean of u [m]": lambda turn: float(turn["slider.position"].mean()),
-    "harmonic 1 of u [m]": lambda turn: turn.harmonic("slider.position", 1),
-    "harmonic 2 of u [m]": lambda turn: turn.harmonic("slider.position", 2),
-    "harmonic 3 of u [m]": lambda turn: turn.harmonic("slider.position", 3),
-    "mean crank torque [N.m]": lambda turn: float(turn["drive.applied_torque"].mean()),
-    "greatest crank torque [N.m]": lambda turn: float(np.abs(turn["drive.applied_torque"]).max()),
-    "greatest force in pin A [N]": _greatest_of("A"),
-    "greatest force in pin B [N]": _greatest_of("B"),
-    "greatest force in pin C [N]": _greatest_of("C"),
-    "greatest force in pin D [N]": _greatest_of("D"),
-    "greatest guide force [N]": lambda turn: float(np.abs(turn["slider.guide_force"]).max()),
-    "least sine of the transmission angle [1]": lambda turn: float(np.abs(np.sin(turn["transmission.angle"])).min()),
-}
+def _of_a_turn(orbit: PeriodicOrbit, first: Turn) -> dict[str, Callable[[Turn], float]]:
+    """Columns of a branch that come from the outputs over a period, of those outputs that the mechanism has."""
+    mechanism = mechanism_of(orbit.parameters)
+    rate = next(v for v in mechanism.variables if v.name == mechanism.freedoms[orbit.flow.crank].rate)
+    swing, what = first.swing, "{} [{}]".format(*orbit.swing)
+    columns: dict[str, Callable[[Turn], float]] = {
+        f"mean {label(rate)} [rad/s]": lambda turn: orbit.flow.period * turn.turns / turn.period,
+        f"amplitude of {what}": lambda turn: turn.amplitude,
+        f"mean of {what}": lambda turn: float(turn[swing].mean()),
+    }
+    for order in (1, 2, 3):
+        columns[f"harmonic {order} of {what}"] = lambda turn, order=order: turn.harmonic(swing, order)  # type: ignore[misc]
+    if "drive.applied_torque" in first.names:
+        columns["mean crank torque [N.m]"] = lambda turn: float(turn["drive.applied_torque"].mean())
+        columns["greatest crank torque [N.m]"] = lambda turn: float(np.abs(turn["drive.applied_torque"]).max())
+    for joint in dict.fromkeys(name.removesuffix(".fx") for name in first.names if name.endswith(".fx")):
+        parts = [f"{joint}.f{axis}" for axis in "xyz" if f"{joint}.f{axis}" in first.names]
+        columns[f"{FORCE}{joint.replace('.', ' ')} [N]"] = lambda turn, parts=parts: float(  # type: ignore[misc]
+            reduce(np.hypot, (turn[part] for part in parts)).max()
+        )
+    if "slider.guide_force" in first.names:
+        columns["greatest guide force [N]"] = lambda turn: float(np.abs(turn["slider.guide_force"]).max())
+    if "transmission.angle" in first.names:
+        columns["least sine of the transmission angle [1]"] = lambda turn: float(
+            np.abs(np.sin(turn["transmission.angle"])).min()
+        )
+    return columns
+
 
 _SIGN = {Stability.STABLE: 1.0, Stability.MARGINAL: 0.0, Stability.UNSTABLE: -1.0}
 
@@ -346,9 +361,9 @@ def reason_to_leave(point: Point) -> str:
     orbit = point.data
     if orbit.largest > GREATEST_MULTIPLIER:
         return f"its largest multiplier passes {GREATEST_MULTIPLIER:g}"
-    sine = float(np.abs(np.sin(orbit.turn(64)["transmission.angle"])).min())
+    sine = orbit.clearance(64)
     if sine < LEAST_SINE:
-        return f"the links come near to collinear (sine of the transmission angle {sine:.3g})"
+        return f"the links come near to the limit of assembly (sine of the angle to it {sine:.3g})"
     return ""
 
 
@@ -392,8 +407,12 @@ def _special_points(curve: Curve, follower: Follower) -> list[SpecialPoint]:
     values = [_tests(point) for point in curve.points]
     for i, length in enumerate(curve.steps):
         for kind in Crossing:
-            # at prescribed speed the product of the two multipliers follows from the damping alone and crosses nothing
-            if kind is Crossing.TORUS and curve.points[i].data.drive.speed_drive:
+            # the product of two multipliers at prescribed speed follows from the damping alone and crosses nothing
+            if (
+                kind is Crossing.TORUS
+                and curve.points[i].data.drive.speed_drive
+                and len(curve.points[i].data.start) < 3
+            ):
                 continue
             if not values[i][kind] * values[i + 1][kind] < 0.0:
                 continue

@@ -13,22 +13,23 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from linkwork.errors import InputError, LinkworkError
-from linkwork.five_bar.parameters import FiveBarParameters
-from linkwork.five_bar.published import RAD_S_PER_RPM
-from linkwork.parameters import field_name
+from linkwork.errors import InputError, LinkworkError, ParameterError
+from linkwork.mechanism import Mechanism
 
 from ..files import write_csv
+from ..mechanisms import Parameters, mechanism_of
 from ..numerics.boundaries import Box, chart
 from ..numerics.continuation import ContinuationError, End, Reason
 from ..run import shown
+from ..units import RAD_S_PER_RPM
 from .branches import Branch, Family, SpecialPoint, follow
 from .crossings import follow_crossing
+from .drives import Drive
 from .floquet import Crossing
 from .grids import Grid, grid
-from .orbits import Drive, OrbitError, PeriodicOrbit, orbit_of, scale_of
-from .planes import OF_THE_DRIVE, Plane, format_value, plane, require_variable, unit_of
-from .resonance import natural_frequency
+from .natural import first_freedom, natural_frequency
+from .orbits import OrbitError, PeriodicOrbit, orbit_of, scale_of
+from .planes import Plane, format_value, plane, require_variable, speed_name, unit_of, value_of
 from .stability import (
     Confirmation,
     Monodromy,
@@ -49,7 +50,6 @@ BRANCH_POINTS = 600
 SAME_MOTION = 0.4
 #: Distance, with the box scaled to 1 by 1, at which a point lies on a boundary.
 SAME = 5e-3
-DAMPING = "slider.damping"
 #: What the boundaries of the mechanism's own periodic motion are called.
 TRUE_ORBIT = "true orbit"
 #: Multiplier on a boundary, as it is written to files.
@@ -179,9 +179,9 @@ class StabilityChart:
 
 
 def stability_chart(
-    parameters: FiveBarParameters,
+    parameters: Parameters,
     drive: Drive,
-    names: tuple[str, str] = ("drive.speed", DAMPING),
+    names: tuple[str, str] | None = None,
     ranges: tuple[tuple[float, float], tuple[float, float]] | None = None,
     *,
     points: int = 80,
@@ -194,16 +194,17 @@ def stability_chart(
 
     Parameters
     ----------
-    parameters : FiveBarParameters
+    parameters : parameters of a mechanism
     drive : Drive
         Speed, or torque, and constant forces, where they are no axes.
-    names : (str, str)
-        FMI names of the parameters along x and y; ``drive.speed`` is the crank speed.
+    names : (str, str), optional
+        FMI names of the parameters along x and y; without it the crank speed and the damping of the first freedom beside the
+        crank, of a five-bar ``drive.speed`` and ``slider.damping``.
     ranges : ((float, float), (float, float)), optional
         Their ranges in SI; see `default_range`.
     points : int
         Of the grid, along each axis.
-    start : array_like, shape (2,) or (3,), optional
+    start : array_like, shape (n,), optional
         Guess of the orbits; under a torque it is needed: see `find_orbit`.
     beside : mapping, optional
         Other motions whose boundaries are traced too, such as `analysis.youssef.linear_motion`: name to their monodromy
@@ -225,12 +226,16 @@ def stability_chart(
     GridInterrupted
         On Ctrl-C; the same call goes on from the rows that are kept.
     """
+    mechanism = mechanism_of(parameters)
+    names = names or (speed_name(mechanism) or "drive.speed", damping_name(mechanism))
     spans = ranges or (default_range(parameters, drive, names[0]), default_range(parameters, drive, names[1]))
     box = Box(x=spans[0], y=spans[1])
     operation = plane(parameters, drive, *names)
     x, y = (np.linspace(low, high, points) for low, high in spans)
     found = grid(operation, x, y, start=start, n_jobs=n_jobs, progress=progress)
-    survey = _Survey(operation, (_axis(names[0]), _axis(names[1])), box, found, start)
+    survey = _Survey(
+        operation, (_axis(mechanism, names[0]), _axis(mechanism, names[1])), box, found, start, damping_name(mechanism)
+    )
     survey.note_missing_orbits()
     true = orbit_monodromy(operation, start=start)
     # where the true orbit folds it ends, and a test function with it: its folds are found on its branches
@@ -262,6 +267,7 @@ class _Survey:
     box: Box
     grid: Grid
     start: ArrayLike | None
+    damping: str
     traced: list[Traced] = field(default_factory=list)
     runs: list[Run] = field(default_factory=list)
     elsewhere: int = 0
@@ -363,9 +369,9 @@ class _Survey:
     def removals(self, matrix: Monodromy) -> tuple[str, ...]:
         """The damping that removes each region, where damping is one of the axes; a sentence a boundary of the true orbit."""
         names = [axis.name for axis in self.axes]
-        if DAMPING not in names:
+        if self.damping not in names:
             return ()
-        which = names.index(DAMPING)
+        which = names.index(self.damping)
         return tuple(
             self._removal(matrix, boundary, which)
             for boundary in self.traced
@@ -394,8 +400,8 @@ class _Survey:
             )
         except LinkworkError:
             # the test function ends at folds: take what the traced boundary says
-            return f"{region}: goes up to {DAMPING} = {top:.4g} {up.si}, by its points"
-        return f"{region}: gone from {DAMPING} = {found.damping:.8g} {up.si} on, last at {other.format_value(found.x)}"
+            return f"{region}: goes up to {self.damping} = {top:.4g} {up.si}, by its points"
+        return f"{region}: gone from {self.damping} = {found.damping:.8g} {up.si} on, last at {other.format_value(found.x)}"
 
 
 def _is_of(found: Grid, orbit: PeriodicOrbit, place: tuple[float, float]) -> bool:
@@ -419,7 +425,7 @@ def _passes(boundary: Traced, kind: Crossing, place: tuple[float, float], box: B
     return float(np.hypot(*(s[:-1] + along[:, None] * pieces).T).min()) < SAME
 
 
-def default_range(parameters: FiveBarParameters, drive: Drive, name: str) -> tuple[float, float]:
+def default_range(parameters: Parameters, drive: Drive, name: str) -> tuple[float, float]:
     """Range of an axis where none is given: speeds about the natural frequency, others about the value there is.
 
     Raises
@@ -427,19 +433,27 @@ def default_range(parameters: FiveBarParameters, drive: Drive, name: str) -> tup
     InputError
         If there is no value, or no such axis.
     """
-    require_variable(drive, name)
-    if name == "drive.speed" and parameters.slider_stiffness > 0.0:
-        natural = natural_frequency(parameters)
-        return (_SPEEDS[0] * natural, _SPEEDS[1] * natural)
-    at_drive = OF_THE_DRIVE.get(name)
-    value = float(getattr(drive, at_drive) if at_drive else getattr(parameters, field_name(name)))
+    require_variable(parameters, drive, name)
+    if name == speed_name(mechanism_of(parameters)):
+        try:
+            natural = natural_frequency(parameters)
+        except ParameterError:
+            pass
+        else:
+            return (_SPEEDS[0] * natural, _SPEEDS[1] * natural)
+    value = value_of(parameters, drive, name)
     if value <= 0.0:
         raise InputError(f"{name} is {value:g} here: give the range of the axis")
     return (_OTHERS[0] * value, _OTHERS[1] * value)
 
 
-def _axis(name: str) -> Axis:
-    unit = unit_of(name)
+def damping_name(mechanism: Mechanism) -> str:
+    """FMI name of the damping of the first freedom beside the crank, as it is where the mechanism has one."""
+    return mechanism.freedoms[first_freedom(mechanism)].coordinate.partition(".")[0] + ".damping"
+
+
+def _axis(mechanism: Mechanism, name: str) -> Axis:
+    unit = unit_of(mechanism, name)
     if unit == "rad/s":
         return Axis(name=name, unit="rpm", factor=1.0 / RAD_S_PER_RPM, si=unit)
     return Axis(name=name, unit=unit, factor=1.0, si=unit)

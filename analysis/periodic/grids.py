@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import inspect
 import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -17,10 +16,13 @@ from numpy.typing import ArrayLike, NDArray
 from linkwork.errors import InputError, Interrupted, LinkworkError
 
 from ..files import load_array, save_array
-from ..numerics.codegen import cache_root
+from ..mechanisms import mechanism_of
+from ..numerics.codegen import cache_root, fingerprint
 from ..run import interruptible, shown
-from . import floquet, orbit_kernels, orbits
-from .floquet import TOLERANCE, Stability
+from . import orbit_kernels, orbits
+from .floquet import TOLERANCE, Stability, multipliers
+from .flows import GAP, VARIATIONAL
+from .orbit_kernels import Status
 from .planes import Operation, Plane
 
 
@@ -50,10 +52,9 @@ class Grid:
     largest : masked array, shape (ny, nx)
         Largest modulus of the Floquet multipliers; masked where no orbit was found.
     starts : ndarray, shape (ny, nx, n)
-        u (m) and u' (m/s) of the orbits at crank angle 0, under a torque the crank speed (rad/s) too; NaN where ``largest``
-        is masked.
+        Starts of the orbits, see `PeriodicOrbit`; NaN where ``largest`` is masked.
     status : ndarray of int, shape (ny, nx)
-        0, or why there is no orbit: a key of `orbit_kernels.REASONS`.
+        `orbit_kernels.Status`: 0, or why there is no orbit.
     computed : int
         Rows that were not in the cache.
     """
@@ -67,7 +68,7 @@ class Grid:
 
     def reason(self, row: int, column: int) -> str:
         """Why a point has no orbit; empty if it has one."""
-        return orbit_kernels.REASONS.get(int(self.status[row, column]), "")
+        return orbit_kernels.REASONS.get(Status(self.status[row, column]), "")
 
     def stability(self, tolerance: float = TOLERANCE) -> NDArray[Any]:
         """`Stability` of each point, None where no orbit was found; an array of objects of shape (ny, nx)."""
@@ -84,14 +85,6 @@ def grid_folder() -> Path:
     return cache_root() / "grids"
 
 
-def _sources() -> bytes:
-    """What the rows depend on beside their arguments: the plant's sources, by the cache's name, and those used here."""
-    digest = hashlib.sha256(machine(FIVE_BAR).fingerprint.encode())
-    for module in (orbit_kernels, orbits, floquet):
-        digest.update(inspect.getsource(module).encode())
-    return digest.digest()
-
-
 def grid(
     operation: Plane,
     x: ArrayLike,
@@ -106,7 +99,7 @@ def grid(
     """The largest Floquet multiplier of the true orbit at every point of a grid.
 
     Each row is a task of joblib and, once done, a file in the cache, under a name made from all it depends on: mechanisms,
-    speeds, guess, tolerance and sources. An interrupted grid goes on from the rows that are there.
+    drives, guess, tolerance and the machine code. An interrupted grid goes on from the rows that are there.
 
     Parameters
     ----------
@@ -114,7 +107,7 @@ def grid(
         See `plane`.
     x, y : array_like, shapes (nx,) and (ny,)
         Values of the axes.
-    start : array_like, shape (2,) or (3,), optional
+    start : array_like, shape (n,), optional
         Guess of the first orbit of each row; see `find_orbit`.
     tolerance : float
         Bound of the integrator's local error.
@@ -140,16 +133,22 @@ def grid(
             raise InputError(f"the axis {name} of a grid must be finite numbers, at least one")
     if n_jobs == 0:
         raise InputError("0 cores: it must be a number of them, or -1 for all")
-    guess = orbits.guess_of(operation(float(xs[0]), float(ys[0]))[1], start)
+    parameters, drive = operation(float(xs[0]), float(ys[0]))
+    mechanism = mechanism_of(parameters)
+    flow = drive.flow(mechanism)
+    guess = orbits.guess_of(flow, drive, start)
     where = grid_folder() if folder is None else Path(folder)
     where.mkdir(parents=True, exist_ok=True)
-    sources = _sources()
+    # what computes the rows, beside their arguments
+    code = (flow.fingerprint(VARIATIONAL, GAP), fingerprint(orbit_kernels.solve_row), fingerprint(multipliers))
     paths, missing = [], []
     for value in ys.tolist():
         row = [operation(first, value) for first in xs.tolist()]
-        digest = hashlib.sha256(sources)
-        digest.update(np.array([(*p.constants(), *drive.vector(), drive.speed_drive) for p, drive in row]).tobytes())
-        digest.update(np.array([*guess, tolerance]).tobytes())
+        digest = hashlib.sha256(" ".join(code).encode())
+        scales = [orbits.scale_of(p, drive, guess) for p, drive in row]
+        numbers = [(*p.constants(), *drive.vector(mechanism), *scale) for (p, drive), scale in zip(row, scales)]
+        digest.update(np.array(numbers).tobytes())
+        digest.update(np.array([*guess, *flow.modes, flow.torque, tolerance]).tobytes())
         path = where / f"{digest.hexdigest()[:32]}.npy"
         paths.append(path)
         if _read(path, len(xs), len(guess)) is None:
@@ -182,7 +181,7 @@ def grid(
     return Grid(
         x=xs,
         y=ys,
-        largest=np.ma.MaskedArray(data[..., 0], mask=status != orbit_kernels.DONE),
+        largest=np.ma.MaskedArray(data[..., 0], mask=status != Status.DONE),
         starts=data[..., 1:-1],
         status=status,
         computed=len(missing),

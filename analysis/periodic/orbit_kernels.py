@@ -4,27 +4,24 @@ The independent variable is the angle of the mechanism's cyclic freedom, the cra
 however it is driven. The state is y: the coordinates and the rates of the other freedoms, as far as they are free, and after
 them the crank's rate where a torque drives it. The angle runs from 0, which makes the map over a period that of the Poincare
 section there. With y are integrated the columns of dy/dy0 and, where asked for, dy/dlambda for a parameter. The right-hand
-sides and their exact derivatives are traced from the equations (`Flow`); the integrator is that of a run.
+sides and their exact derivatives are traced from the equations (`flows`); the integrator is that of a run.
 """
 
 from __future__ import annotations
 
 from enum import IntEnum
-from functools import cache
 from math import fabs, isfinite
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numba import boolean, float64, int64, types
 from numpy.typing import NDArray
 
 from linkwork.limits import LIMIT_SINE, NEAR_LIMIT
-from linkwork.mechanism import Mechanism
 
-from ..numerics import symbolic
-from ..numerics.codegen import MATRIX, VECTOR, MachineCode, evaluate, inner, kernel, part
-from ..run import constants, traced
+from ..numerics.codegen import MATRIX, VECTOR, evaluate, inner, kernel, part
 from ..run.compiled import SOURCE, Source, attempt, following, shorter
+from .flows import DIRECTIONAL, GAP, PLAIN, STATE, VARIATIONAL
 
 
 class Status(IntEnum):
@@ -48,185 +45,12 @@ REASONS = {
     Status.DIVERGED: "Newton's method does not converge",
 }
 
-#: Parameters of an induction motor among those of a drive.
-MOTOR = ("breakdown_torque", "breakdown_slip", "synchronous_speed")
-
 #: Least fraction of a radian that a step may have.
 _LEAST_STEP = 1e-9
 #: Crank speed below which the crank counts as stalled, relative to that at the start.
 _STALL = 1e-3
 #: Least fraction of a Newton correction that is tried.
 _LEAST_FRACTION = 1.0 / 4096.0
-
-# Functions of a flow, by their numbers among its addresses
-PLAIN, VARIATIONAL, DIRECTIONAL, GAP, STATE = range(5)
-_NAMES = ("plain", "variational", "directional", "gap", "state")
-
-
-class Flow:
-    """A mechanism as a flow over its crank's angle, driven in one way.
-
-    Parameters
-    ----------
-    mechanism : Mechanism
-    modes : tuple of int
-        Values of its modes.
-
-    Attributes
-    ----------
-    crank : int
-        Number of the cyclic freedom.
-    free : tuple of int
-        Numbers of the other freedoms that are part of y; what is commanded is held where it is.
-    torque : bool
-        Whether the crank's rate is part of y.
-    components : tuple of (str, str)
-        Names and units of y.
-    size : int
-        Number of components of y.
-    """
-
-    def __init__(self, mechanism: Mechanism, modes: tuple[int, ...]) -> None:
-        self.mechanism = mechanism
-        self.modes = modes
-        self.crank = next(n for n, freedom in enumerate(mechanism.freedoms) if freedom.period > 0.0)
-        by_name = {mode.name: value for mode, value in zip(mechanism.modes, modes)}
-        commanded = {mechanism.channels[n].freedom: n for n in mechanism.commands(by_name)}
-        forced = {c.argument for c in mechanism.channels if c.kind == "force"}
-        self.command = commanded.get(self.crank)
-        self.free = tuple(
-            n
-            for n, freedom in enumerate(mechanism.freedoms)
-            if n != self.crank
-            and (freedom.mode is None or freedom.mode.arguments[by_name[freedom.mode.name]] in forced)
-        )
-        self.torque = self.command is None
-        units = {v.name: v.unit for v in mechanism.variables}
-        freedoms = [mechanism.freedoms[n] for n in self.free]
-        names = [f.coordinate for f in freedoms] + [f.rate for f in freedoms]
-        names += [mechanism.freedoms[self.crank].rate] * self.torque
-        self.components = tuple((name, units[name]) for name in names)
-        self.size = len(names)
-        #: numbers of the channels of the drive, and of motor and held coordinates after them
-        self.inputs = len(mechanism.channels)
-        self.drive_size = self.inputs + len(MOTOR) + len(mechanism.freedoms)
-        self._code: dict[int, MachineCode] = {}
-        self._addresses: NDArray[np.int64] = np.zeros(len(_NAMES), dtype=np.int64)
-
-    @property
-    def period(self) -> float:
-        """Angle of one turn (rad)."""
-        return self.mechanism.freedoms[self.crank].period
-
-    def addresses(self, *which: int) -> NDArray[np.int64]:
-        """Addresses of the machine code, of the functions of those numbers at least."""
-        missing = [n for n in which if n not in self._code]
-        if missing:
-            code = MachineCode([self.function(n) for n in missing])
-            for n in missing:
-                self._code[n] = code
-                self._addresses[n] = code.addresses[_NAMES[n]]
-        return self._addresses
-
-    @cache  # noqa: B019 - flows are kept for good themselves
-    def function(self, which: int) -> Any:
-        """A function as a ``casadi.Function`` of angle, z, modes, drive with its direction, constants with theirs.
-
-        ``plain``: dy/dangle. ``variational``: with the columns of dy/dy0. ``directional``: with that of dy/dlambda after
-        them. ``gap``: how far the links are from the limit of assembly. ``state``: the state of a run and the channels.
-        """
-        casadi = symbolic.library()
-        n, m = self.size, self.mechanism
-        angle, modes = casadi.SX.sym("angle"), casadi.SX.sym("modes", len(m.modes))
-        y, columns = casadi.SX.sym("y", n), casadi.SX.sym("columns", n, n + 1)
-        drive, d_drive = (casadi.SX.sym(name, self.drive_size) for name in ("drive", "d_drive"))
-        p, k = constants(m)
-        d_p = casadi.SX.sym("d_p", p.numel())
-        arguments = [
-            angle,
-            casadi.vertcat(y, casadi.vec(columns)),
-            modes,
-            casadi.vertcat(drive, d_drive),
-            casadi.vertcat(p, d_p),
-        ]
-        x, u = self._state(angle, y, drive)
-        functions = traced(m)
-        applied = functions.__dict__[m.equations.applied.__name__](
-            tuple(casadi.vertsplit(modes)) if m.modes else (), tuple(casadi.vertsplit(u)) if self.inputs else (), k
-        )
-        if which == GAP:
-            settled = functions.__dict__[m.equations.start.__name__](x, applied, k)
-            results = [casadi.SX(functions.__dict__[m.equations.clearance.__name__](settled, applied, k))]
-        elif which == STATE:
-            settled = functions.__dict__[m.equations.start.__name__](x, applied, k)
-            results = [casadi.vertcat(*settled), u]
-        else:
-            rates = functions.__dict__[m.equations.derivative.__name__](x, applied, k)
-            places = self._places()
-            f = casadi.vertcat(*[rates[place] for place in places]) / x[len(m.freedoms) + self.crank]
-            results = [f]
-            if which != PLAIN:
-                jacobian = casadi.jacobian(f, y)
-                results.append(jacobian @ columns[:, :n])
-            if which == DIRECTIONAL:
-                along = casadi.jtimes(f, drive, d_drive) + casadi.jtimes(f, p, d_p)
-                results.append(jacobian @ columns[:, n] + along)
-        return casadi.Function(_NAMES[which], arguments, [casadi.densify(r) for r in results], {"cse": True})
-
-    def jacobian_trace(self) -> Any:
-        """Trace of the rates' Jacobian as a ``casadi.Function`` of angle, y, modes, drive and constants."""
-        casadi = symbolic.library()
-        plain = self.function(PLAIN)
-        shapes = [plain.size1_in(i) for i in range(plain.n_in())]
-        angle, y, modes, drive, p = (
-            casadi.SX.sym(name, size)
-            for name, size in zip(
-                ("angle", "y", "modes", "drive", "p"), (1, self.size, shapes[2], self.drive_size, shapes[4] // 2)
-            )
-        )
-        f = plain(
-            angle,
-            casadi.vertcat(y, casadi.DM.zeros(shapes[1] - self.size)),
-            modes,
-            casadi.vertcat(drive, casadi.DM.zeros(self.drive_size)),
-            casadi.vertcat(p, casadi.DM.zeros(shapes[4] // 2)),
-        )
-        return casadi.Function("trace", [angle, y, modes, drive, p], [casadi.trace(casadi.jacobian(f, y))])
-
-    def _places(self) -> list[int]:
-        """Components of the state of a run that make up y."""
-        rates = len(self.mechanism.freedoms)
-        return [*self.free, *(rates + n for n in self.free), *([rates + self.crank] * self.torque)]
-
-    def _state(self, angle: Any, y: Any, drive: Any) -> tuple[tuple[Any, ...], Any]:
-        """State of a run and channels, as expressions."""
-        casadi = symbolic.library()
-        m, freedoms = self.mechanism, len(self.mechanism.freedoms)
-        held = drive[self.inputs + len(MOTOR) :]
-        x = [*casadi.vertsplit(held), *[casadi.SX(0.0)] * freedoms, casadi.SX(0.0), casadi.SX(0.0)]
-        x[self.crank] = angle
-        for component, place in enumerate(self._places()):
-            x[place] = y[component]
-        u = drive[: self.inputs]
-        if self.command is not None:
-            x[freedoms + self.crank] = u[self.command]
-        else:
-            channel = next(n for n, c in enumerate(m.channels) if c.kind == "force" and c.freedom == self.crank)
-            u = casadi.vertcat(u)
-            u[channel] += _kloss(drive[self.inputs : self.inputs + len(MOTOR)], x[freedoms + self.crank])
-        return tuple(x), u
-
-
-def _kloss(motor: Any, speed: Any) -> Any:
-    """Torque of an induction motor (Kloss's formula, as in a run) at a crank speed."""
-    slip = 1.0 - speed / motor[2]
-    return 2.0 * motor[0] * slip * motor[1] / (slip * slip + motor[1] * motor[1])
-
-
-@cache
-def flow(mechanism: Mechanism, modes: tuple[int, ...]) -> Flow:
-    """The flow of a mechanism driven in one way, made when it is first asked for."""
-    return Flow(mechanism, modes)
 
 
 class Section(NamedTuple):

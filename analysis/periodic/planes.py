@@ -4,39 +4,38 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
+from functools import cache
 from typing import Any
 
 from linkwork.errors import InputError, UnknownNameError
-from linkwork.five_bar.parameters import FiveBarParameters
-from linkwork.five_bar.published import RAD_S_PER_RPM
-from linkwork.five_bar.variables import INPUTS, PARAMETERS
+from linkwork.mechanism import Mechanism
 from linkwork.parameters import field_name
 
-from .orbits import Drive
+from ..mechanisms import Parameters, mechanism_of
+from ..units import RAD_S_PER_RPM
+from .drives import Drive, forces_of, require_acting
+from .flows import crank_of
 
 #: A mechanism and what drives it.
-Operation = tuple[FiveBarParameters, Drive]
+Operation = tuple[Parameters, Drive]
 #: The operation at a point of a chart.
 Plane = Callable[[float, float], Operation]
 
-#: Parameters of the drive that can vary, by FMI name.
-OF_THE_DRIVE: Mapping[str, str] = {
-    "drive.speed": "speed",
-    "drive.torque": "torque",
-    "slider.force": "slider_force",
-    "load.fx": "load_x",
-    "load.fy": "load_y",
-}
-#: Unit of each parameter that can vary.
-UNITS_OF_VARIABLES = {
-    variable.name: variable.unit
-    for variable in (*INPUTS, *PARAMETERS)
-    if variable.name in OF_THE_DRIVE
-    or (field_name(variable.name) in FiveBarParameters.__dataclass_fields__ and variable.kind == "Real")
-}
+
+@cache
+def _of_the_crank(mechanism: Mechanism) -> dict[str, str]:
+    """FMI names of the crank's speed and torque: what of `Drive` each is."""
+    crank = crank_of(mechanism)
+    numbers = {"torque": crank.torque, "speed": crank.command}
+    return {mechanism.channels[n].name: what for what, n in numbers.items() if n is not None}
 
 
-def require_variable(drive: Drive, name: str) -> None:
+def speed_name(mechanism: Mechanism) -> str | None:
+    """FMI name of the crank's prescribed speed, such as ``drive.speed``; None where it cannot be prescribed."""
+    return next((name for name, what in _of_the_crank(mechanism).items() if what == "speed"), None)
+
+
+def require_variable(parameters: Parameters, drive: Drive, name: str) -> None:
     """Check that a parameter of this name can vary in this drive.
 
     Raises
@@ -46,22 +45,40 @@ def require_variable(drive: Drive, name: str) -> None:
     InputError
         If it does not act in this drive: a speed under a torque, a torque at prescribed speed.
     """
-    unit_of(name)
-    if name in ("drive.speed", "drive.torque") and (name == "drive.speed") != drive.speed_drive:
+    mechanism = mechanism_of(parameters)
+    unit_of(mechanism, name)
+    what = _of_the_crank(mechanism).get(name)
+    if what is not None and (what == "speed") != drive.speed_drive:
         raise InputError(f"{name} cannot vary: the drive is by {'speed' if drive.speed_drive else 'torque'}")
+    if name in forces_of(mechanism):
+        require_acting(drive, mechanism, forces_of(mechanism)[name])
 
 
-def unit_of(name: str) -> str:
-    """Unit of a parameter or input by its FMI name.
+def unit_of(mechanism: Mechanism, name: str) -> str:
+    """Unit of what can vary of a mechanism and its drive, by its FMI name.
 
     Raises
     ------
     UnknownNameError
-        If there is no parameter of that name.
+        If there is no such thing.
     """
-    if name not in UNITS_OF_VARIABLES:
-        raise UnknownNameError(name, tuple(UNITS_OF_VARIABLES), None)
-    return UNITS_OF_VARIABLES[name]
+    of_mechanism = [v.name for v in mechanism.mechanism_variables.values() if v.kind == "Real"]
+    names = (*_of_the_crank(mechanism), *forces_of(mechanism), *of_mechanism)
+    if name not in names:
+        raise UnknownNameError(name, names, None)
+    return next(v.unit for v in mechanism.variables if v.name == name)
+
+
+def value_of(parameters: Parameters, drive: Drive, name: str) -> float:
+    """The value there is of what can vary; NaN of a speed under a torque."""
+    mechanism = mechanism_of(parameters)
+    what = _of_the_crank(mechanism).get(name)
+    if what is not None:
+        value = getattr(drive, what)
+        return float("nan") if value is None else float(value)
+    if name in forces_of(mechanism):
+        return float(drive.forces.get(name, 0.0))
+    return float(getattr(parameters, field_name(name)))
 
 
 def format_value(name: str, value: float, unit: str) -> str:
@@ -70,24 +87,27 @@ def format_value(name: str, value: float, unit: str) -> str:
     return f"{name} = {value:.6g} {unit}".rstrip() + rpm
 
 
-def with_values(
-    parameters: FiveBarParameters, drive: Drive, values: Mapping[str, float]
-) -> tuple[FiveBarParameters, Drive]:
+def with_values(parameters: Parameters, drive: Drive, values: Mapping[str, float]) -> Operation:
     """Mechanism and drive with other values of parameters by their FMI names."""
-    of_drive: dict[str, Any] = {OF_THE_DRIVE[name]: value for name, value in values.items() if name in OF_THE_DRIVE}
-    of_mechanism: dict[str, Any] = {field_name(name): v for name, v in values.items() if name not in OF_THE_DRIVE}
+    mechanism = mechanism_of(parameters)
+    of_crank, forces = _of_the_crank(mechanism), forces_of(mechanism)
+    of_drive: dict[str, Any] = {of_crank[name]: value for name, value in values.items() if name in of_crank}
+    acting = {name: value for name, value in values.items() if name in forces}
+    of_mechanism = {field_name(n): v for n, v in values.items() if n not in of_crank and n not in forces}
+    if acting:
+        of_drive["forces"] = {**drive.forces, **acting}
     return (
         replace(parameters, **of_mechanism) if of_mechanism else parameters,
         replace(drive, **of_drive) if of_drive else drive,
     )
 
 
-def plane(parameters: FiveBarParameters, drive: Drive, x: str, y: str) -> Plane:
+def plane(parameters: Parameters, drive: Drive, x: str, y: str) -> Plane:
     """The plane of two parameters; all else stays as it is.
 
     Parameters
     ----------
-    parameters : FiveBarParameters
+    parameters : parameters of a mechanism
     drive : Drive
     x, y : str
         Parameters of mechanism or drive by their names in the FMI contract, such as ``slider.damping``, ``drive.speed`` or
@@ -103,7 +123,7 @@ def plane(parameters: FiveBarParameters, drive: Drive, x: str, y: str) -> Plane:
     if x == y:
         raise InputError(f"both axes are {x!r}: a chart needs two parameters")
     for name in (x, y):
-        require_variable(drive, name)
+        require_variable(parameters, drive, name)
 
     def operation(first: float, second: float) -> Operation:
         return with_values(parameters, drive, {x: first, y: second})

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from math import pi, sqrt
 from pathlib import Path
 
 import numpy as np
@@ -17,64 +16,21 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import minimize_scalar
 from scipy.signal import find_peaks
 
-from linkwork.errors import InputError, Interrupted, ParameterError
-from linkwork.five_bar import dynamics, kinematics
-from linkwork.five_bar.assembly import check_assembly
-from linkwork.five_bar.parameters import FiveBarParameters
+from linkwork.errors import InputError, Interrupted
 
 from ..files import write_csv
-from ..mechanisms import require_five_bar
+from ..mechanisms import Parameters
 from ..numerics.continuation import ContinuationError
 from ..run import interruptible, shown
 from .branches import Branch, Family, SpecialPoint, follow, switch
+from .drives import Drive
 from .floquet import Crossing, Stability
-from .orbits import Drive, OrbitError, PeriodicOrbit, orbit_of, scale_of
+from .orbits import OrbitError, PeriodicOrbit, orbit_of, scale_of
 
-#: Crank angles over which the effective mass is averaged.
-MASS_SAMPLES = 1024
 #: How far a maximum of the amplitude stands out, relative to its height, to count as one.
 PROMINENCE = 1e-3
 #: Distance of two orbits' starts, relative to crank length and speed, below which they are the same.
 SAME = 1e-6
-
-
-def mean_effective_mass(parameters: FiveBarParameters) -> float:
-    """Mean over a turn of what moves with the slider at u = 0, m22 (kg).
-
-    Raises
-    ------
-    AssemblyError
-        If at u = 0 the links cannot be joined over the whole turn.
-    """
-    p, total = parameters.constants(), 0.0
-    for th2 in np.linspace(0.0, 2.0 * pi, MASS_SAMPLES, endpoint=False).tolist():
-        check_assembly(parameters, th2, 0.0)
-        g = kinematics.position(th2, 0.0, p)
-        total += dynamics.inertia(g, kinematics.coefficients(g, p), p).m22
-    return total / MASS_SAMPLES
-
-
-def natural_frequency(parameters: FiveBarParameters) -> float:
-    """Natural frequency of the slider on its spring (rad/s), from the mean over a turn of the effective mass m22 at u = 0.
-
-    Raises
-    ------
-    ParameterError
-        If there is no spring.
-    AssemblyError
-        If the four-bar u = 0 cannot make the turn.
-
-    Examples
-    --------
-    >>> from math import pi
-    >>> from linkwork.five_bar.published import SETS
-    >>> round(natural_frequency(SETS["rig-1-spring-a"].parameters) * 30.0 / pi, 1)
-    591.8
-    """
-    require_five_bar(parameters, "the natural frequency of the slider")
-    if parameters.slider_stiffness <= 0.0:
-        raise ParameterError("slider.stiffness", parameters.slider_stiffness, "be above zero for a natural frequency")
-    return sqrt(parameters.slider_stiffness / mean_effective_mass(parameters))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -161,7 +117,7 @@ class ResponseInterrupted(Interrupted):
 
 
 def frequency_response(
-    parameters: FiveBarParameters,
+    parameters: Parameters,
     low: float,
     high: float,
     *,
@@ -177,7 +133,7 @@ def frequency_response(
 
     Parameters
     ----------
-    parameters : FiveBarParameters
+    parameters : parameters of a mechanism
     low, high : float
         Range of the parameter: speed in rad/s, torque in N.m, else in the unit of the FMI contract.
     drive : Drive, optional
@@ -211,7 +167,6 @@ def frequency_response(
     ResponseInterrupted
         On Ctrl-C, with the branches that there are.
     """
-    require_five_bar(parameters, "the frequency response")
     if drive is None:
         if vary != "drive.speed":
             raise InputError(

@@ -12,7 +12,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
 from functools import cache
-from math import exp, log, pi
+from math import exp, log
 
 import numpy as np
 import scipy.linalg
@@ -20,13 +20,14 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import brentq
 
 from linkwork.errors import InputError, LinkworkError
-from linkwork.five_bar.parameters import FiveBarParameters, InitialState
 
+from ..mechanisms import Parameters, mechanism_of
 from ..numerics.boundaries import Test, lowest
-from ..run import Inputs, simulate
+from ..run import simulate
+from .drives import Drive
 from .floquet import TOLERANCE, Crossing, Stability, StabilityVerdict, crossing_test
 from .grids import Grid
-from .orbits import Drive, OrbitError, PeriodicOrbit, orbit_of, period_from, scale_of
+from .orbits import OrbitError, PeriodicOrbit, orbit_of, period_from, scale_of
 from .planes import Plane
 
 #: Monodromy matrix at a point of a plane, shape (n, n).
@@ -41,7 +42,7 @@ def orbit_monodromy(operation: Plane, *, start: ArrayLike | None = None) -> Mono
 
     Parameters
     ----------
-    start : array_like, shape (2,) or (3,), optional
+    start : array_like, shape (n,), optional
         Guess of the first: see `find_orbit`.
     """
     first = None if start is None else np.array(start, dtype=float)
@@ -256,7 +257,7 @@ NOTABLE = 3.0
 
 
 def confirm(
-    parameters: FiveBarParameters,
+    parameters: Parameters,
     drive: Drive,
     *,
     turns: int | None = None,
@@ -268,11 +269,11 @@ def confirm(
 
     Parameters
     ----------
-    parameters : FiveBarParameters
+    parameters : parameters of a mechanism
     drive : Drive
     turns : int, optional
         At least 20. Without it 1000, and up to 20000 where the margin is too small to distinguish growth from decay.
-    start : array_like, shape (2,) or (3,), optional
+    start : array_like, shape (n,), optional
         Guess of the orbit.
     disturbance : float
         Distance from the orbit at the start relative to the crank's length, in the direction that grows most.
@@ -315,24 +316,26 @@ def confirm(
 
 
 def _passages(
-    parameters: FiveBarParameters, drive: Drive, start: NDArray[np.float64], turns: int
+    parameters: Parameters, drive: Drive, start: NDArray[np.float64], turns: int
 ) -> tuple[NDArray[np.float64], str]:
-    """(u, u') and under a torque the crank speed at crank angle 0 of each turn, and why the run ended early, if it did."""
+    """y at crank angle 0 of each turn, and why the run ended early, if it did."""
     if drive.speed is not None:
+        mechanism = mechanism_of(parameters)
+        flow = drive.flow(mechanism)
+        x, count = flow.state(start, drive.vector(mechanism)), len(mechanism.freedoms)
+        initial: dict[str, float] = {}
+        for number, freedom in enumerate(mechanism.freedoms):
+            initial |= dict(zip(freedom.initial, (x[number], x[count + number])))
+        turn = flow.period / drive.speed
         run = simulate(
             parameters,
-            Inputs(
-                speed=drive.speed,
-                force=drive.slider_force,
-                load_x=drive.load_x,
-                load_y=drive.load_y,
-            ),
-            initial=InitialState(slider_position=float(start[0]), slider_velocity=float(start[1])),
-            samples=2.0 * pi / drive.speed * np.arange(turns + 1),
-            stop_time=2.0 * pi * turns / drive.speed,
+            drive.inputs(mechanism),
+            initial=mechanism.initial(**initial),
+            samples=turn * np.arange(turns + 1),
+            stop_time=turn * turns,
             tolerance=1e-12,
         )
-        return np.column_stack([run["slider.position"], run["slider.velocity"]]), run.message
+        return np.column_stack([run[name] for name, _ in flow.components]), run.message
     passed = [start]
     for _ in range(turns):
         try:

@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from linkwork.errors import InputError
-from linkwork.five_bar.parameters import FiveBarParameters
 
-from ..mechanisms import require_five_bar
-from . import orbit_kernels
+from ..mechanisms import Parameters, mechanism_of
+from .drives import Drive
 from .floquet import Stability
-from .orbits import Drive, OrbitError, PeriodicOrbit, guess_of, orbit_of, scale_of
+from .orbit_kernels import REASONS, Status
+from .orbits import OrbitError, PeriodicOrbit, guess_of, orbit_of, scale_of, settle_from
 
 #: Turns for which a motion that has lost its stability is followed to the next steady one, and the change a turn that ends it.
 JUMP_TURNS, SETTLED = 5000, 1e-9
@@ -78,9 +78,10 @@ class Sweep:
 
 
 def sweep(
-    parameters: FiveBarParameters,
+    parameters: Parameters,
     speeds: ArrayLike,
     *,
+    drive: Drive | None = None,
     start: ArrayLike | None = None,
     watch: Callable[[float], None] | None = None,
 ) -> Sweep:
@@ -91,11 +92,13 @@ def sweep(
 
     Parameters
     ----------
-    parameters : FiveBarParameters
+    parameters : parameters of a mechanism
     speeds : array_like, shape (m,)
         rad/s, increasing or decreasing.
-    start : array_like, shape (2,), optional
-        u (m) and u' (m/s) at crank angle 0 at the first speed; at rest at u = 0 without it.
+    drive : Drive, optional
+        What acts beside the speed, which takes the place of its own.
+    start : array_like, shape (n,), optional
+        y at crank angle 0 at the first speed, of a five-bar u (m) and u' (m/s); at rest at zero without it.
     watch : callable, optional
         Called with every speed.
 
@@ -104,7 +107,6 @@ def sweep(
     InputError
         If the speeds are not positive or not in order.
     """
-    require_five_bar(parameters, "a sweep of the speed")
     grid = np.asarray(speeds, dtype=float)
     steps = np.diff(grid)
     if grid.ndim != 1 or len(grid) == 0 or not (np.isfinite(grid).all() and (grid > 0.0).all()):
@@ -114,15 +116,15 @@ def sweep(
     orbits: list[PeriodicOrbit | None] = []
     flags: list[str] = []
     jumps: list[Jump] = []
-    state = guess_of(Drive(speed=float(grid[0])), start)
+    drive = drive or Drive(speed=float(grid[0]))
+    state = guess_of(_at(drive, float(grid[0])).flow(mechanism_of(parameters)), drive, start)
     last: PeriodicOrbit | None = None
     for speed in grid.tolist():
-        drive = Drive(speed=speed)
         orbit = None if last is None else _continued(parameters, speed, last)
         flag = ""
         if orbit is None:
             try:
-                orbit = _settled(parameters, drive, state)
+                orbit = _settled(parameters, _at(drive, speed), state)
             except OrbitError as error:
                 flag = str(error)
             if orbit is not None and last is not None:
@@ -145,8 +147,13 @@ def sweep(
     return Sweep(speed=grid, orbits=tuple(orbits), flags=tuple(flags), jumps=tuple(jumps))
 
 
+def _at(drive: Drive, speed: float) -> Drive:
+    """The drive at a prescribed speed."""
+    return replace(drive, speed=speed, torque=0.0, motor=None)
+
+
 def _continued(
-    parameters: FiveBarParameters, speed: float, last: PeriodicOrbit, halvings: int = HALVINGS
+    parameters: Parameters, speed: float, last: PeriodicOrbit, halvings: int = HALVINGS
 ) -> PeriodicOrbit | None:
     """The stable motion that the last one becomes at another speed; None if it is lost on the way.
 
@@ -154,7 +161,7 @@ def _continued(
     """
     assert last.drive.speed is not None
     try:
-        orbit = orbit_of(parameters, Drive(speed=speed), turns=last.turns, start=last.start, settle=False)
+        orbit = orbit_of(parameters, _at(last.drive, speed), turns=last.turns, start=last.start, settle=False)
     except OrbitError:
         orbit = None
     if orbit is not None:
@@ -167,17 +174,13 @@ def _continued(
     return None if middle is None else _continued(parameters, speed, middle, halvings - 1)
 
 
-def _settled(
-    parameters: FiveBarParameters, drive: Drive, state: Sequence[float] | NDArray[np.float64]
-) -> PeriodicOrbit:
+def _settled(parameters: Parameters, drive: Drive, state: Sequence[float] | NDArray[np.float64]) -> PeriodicOrbit:
     """The steady motion that the plant goes to by itself from a state at crank angle 0."""
     start = np.array(state, dtype=float)
-    scale = scale_of(parameters, drive, start)
-    status = orbit_kernels.settle(
-        drive.speed_drive, parameters.constants(), drive.vector(), 1e-9, scale, SETTLED, JUMP_TURNS, start
-    )
-    if status != orbit_kernels.DONE:
-        raise OrbitError(orbit_kernels.REASONS[status], start, np.inf, 0)
+    scale, flow = scale_of(parameters, drive, start), drive.flow(mechanism_of(parameters))
+    status, start = settle_from(parameters, drive, start, tolerance=1e-9, change=SETTLED, turns=JUMP_TURNS)
+    if status is not Status.DONE:
+        raise OrbitError(REASONS[status], flow, start, np.inf, 0)
     for turns in PERIODS:
         try:
             orbit = orbit_of(parameters, drive, turns=turns, start=start, settle=False)
@@ -185,4 +188,4 @@ def _settled(
             continue
         if orbit.verdict(0.0).stability is Stability.STABLE and np.abs((orbit.start - start) / scale).max() < 1e-3:
             return orbit
-    raise OrbitError(f"no steady motion with a period of 1 to 4 turns after {JUMP_TURNS} turns", start, np.inf, 0)
+    raise OrbitError(f"no steady motion with a period of 1 to 4 turns after {JUMP_TURNS} turns", flow, start, np.inf, 0)

@@ -14,6 +14,7 @@ from linkwork.five_bar.parameters import FiveBarParameters
 from ..periodic import Response
 from .equation import Load, Variant, slider_equation
 from .harmonics import harmonic_balance
+from .stability import load_of
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -57,8 +58,7 @@ def approximations(response: Response, points: int = 160) -> Approximations:
     if response.family.vary != "drive.speed":
         raise InputError(f"{response.family.name} varies: the approximations are over the speed")
     parameters = replace(response.family.parameters, slider_coulomb_friction=0.0)
-    drive = response.family.drive
-    load = Load(x=drive.load_x, y=drive.load_y, slider=drive.slider_force)
+    load = load_of(response.family.drive)
     speeds = np.linspace(response.low, response.high, points)
     rows = [_approximate(parameters, speed, load) for speed in speeds.tolist()]
     return Approximations(

@@ -17,6 +17,12 @@ from .equation import Load, Variant, slider_equation
 from .hill import PeriodicEquation, monodromy
 
 
+def load_of(drive: Drive) -> Load:
+    """The constant forces of a drive of a five-bar."""
+    x, y, slider = (drive.forces.get(name, 0.0) for name in ("load.fx", "load.fy", "slider.force"))
+    return Load(x=x, y=y, slider=slider)
+
+
 def linear_equation(parameters: FiveBarParameters, drive: Drive, variant: Variant = Variant.EXACT) -> PeriodicEquation:
     """The slider's equation about u = 0, which is the motion only where nothing drives it: the thesis's.
 
@@ -27,8 +33,7 @@ def linear_equation(parameters: FiveBarParameters, drive: Drive, variant: Varian
     """
     if drive.speed is None:
         raise InputError("the linear equation is at constant speed: the drive is by torque")
-    load = Load(x=drive.load_x, y=drive.load_y, slider=drive.slider_force)
-    a, b, c = slider_equation(parameters, drive.speed, variant=variant, load=load).coefficients()
+    a, b, c = slider_equation(parameters, drive.speed, variant=variant, load=load_of(drive)).coefficients()
     return PeriodicEquation(a=a, b=b, c=c)
 
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from analysis import InductionMotor, Inputs, simulate
+from analysis import InductionMotor, Inputs, ramp, simulate
 from analysis.periodic import (
     Crossing,
     Drive,
@@ -57,7 +57,8 @@ def plain_period(orbit: PeriodicOrbit, start: np.ndarray) -> np.ndarray:
             slip = 1.0 - w / drive.motor.synchronous_speed
             ratio = slip / drive.motor.breakdown_slip
             torque += 2.0 * drive.motor.breakdown_torque * ratio / (1.0 + ratio * ratio)
-        return dynamics.Inputs(float(drive.speed_drive), torque, 0.0, drive.slider_force, drive.load_x, drive.load_y)
+        forces = (drive.forces.get(name, 0.0) for name in ("slider.force", "load.fx", "load.fy"))
+        return dynamics.Inputs(float(drive.speed_drive), torque, 0.0, *forces)
 
     end = 2.0 * pi * orbit.turns
 
@@ -76,7 +77,7 @@ def plain_period(orbit: PeriodicOrbit, start: np.ndarray) -> np.ndarray:
         events=turned,
     )
     x = solution.y_events[0][0]
-    return np.array([x[1], x[3], x[2]][: drive.size])
+    return np.array([x[1], x[3], x[2]][: len(start)])
 
 
 def test_steady_motion_of_table_3_1_is_the_published_one() -> None:
@@ -89,11 +90,11 @@ def test_steady_motion_of_table_3_1_is_the_published_one() -> None:
 
 ORBITS = {
     "Table 3.1": (TABLE_3_1, Drive(speed=SPEED), None),
-    "general": (GENERAL, Drive(speed=30.0, slider_force=2.0, load_x=1.0, load_y=-3.0), None),
+    "general": (GENERAL, Drive(speed=30.0, forces={"slider.force": 2.0, "load.fx": 1.0, "load.fy": -3.0}), None),
     "unstable": (replace(TABLE_3_1, slider_stiffness=260.0), Drive(speed=SPEED), (-0.0475, -0.5)),
     "motor": (TABLE_3_1, Drive(motor=MOTOR), None),
     "torque": (SETS["rig-2-spring-c"].parameters, Drive(torque=0.01), (0.0, 0.0, 56.0)),
-    "general torque": (GENERAL, Drive(motor=MOTOR, torque=-0.3, slider_force=2.0, load_y=-3.0), None),
+    "general torque": (GENERAL, Drive(motor=MOTOR, torque=-0.3, forces={"slider.force": 2.0, "load.fy": -3.0}), None),
 }
 
 
@@ -104,16 +105,16 @@ def orbit(request: pytest.FixtureRequest) -> PeriodicOrbit:
 
 
 def test_motion_repeats_itself_on_the_plain_equations(orbit: PeriodicOrbit) -> None:
-    scale = np.array([0.05, 2.0, 40.0])[: orbit.drive.size]
+    scale = np.array([0.05, 2.0, 40.0])[: len(orbit.start)]
     assert np.abs((plain_period(orbit, orbit.start) - orbit.start) / scale).max() < 1e-8 * max(1.0, orbit.largest)
 
 
 def test_monodromy_matrix_is_that_of_differences(orbit: PeriodicOrbit) -> None:
-    for j, step in enumerate((1e-6, 4e-5, 1e-3)[: orbit.drive.size]):
-        aside = np.zeros(orbit.drive.size)
+    for j, step in enumerate((1e-6, 4e-5, 1e-3)[: len(orbit.start)]):
+        aside = np.zeros(len(orbit.start))
         aside[j] = step
         column = (plain_period(orbit, orbit.start + aside) - plain_period(orbit, orbit.start - aside)) / (2.0 * step)
-        size = np.array([0.05, 2.0, 40.0])[: orbit.drive.size] / np.array([0.05, 2.0, 40.0])[j]
+        size = np.array([0.05, 2.0, 40.0])[: len(orbit.start)] / np.array([0.05, 2.0, 40.0])[j]
         assert np.abs((column - orbit.monodromy[:, j]) / size).max() < 2e-6 * max(1.0, orbit.largest)
 
 
@@ -260,8 +261,9 @@ def test_a_crank_that_stalls_is_reported() -> None:
         ({"speed": 1.0, "start": (0.0, float("nan"))}, "must be 2 finite numbers"),
         ({"speed": 1.0, "turns": 0}, "turns is 0"),
         ({"speed": 1.0, "turns": 1.5}, r"turns is 1\.5"),
-        ({"speed": 1.0, "load": (1.0,)}, "load is"),
-        ({"speed": 1.0, "load": (float("nan"), 0.0)}, "load_x is nan"),
+        ({"speed": 1.0, "initial": 3.0}, "initial is"),
+        ({"inputs": Inputs(speed=1.0, shift_speed=1.0)}, "no input 'shift_speed'"),
+        ({"inputs": Inputs(speed=1.0, force=ramp(0.0, 1.0, 0.0, 1.0))}, "force is a Piecewise"),
     ],
 )
 def test_bad_input(arguments: dict[str, object], message: str) -> None:

@@ -15,7 +15,6 @@ from scipy.interpolate import CubicSpline
 from analysis import Event, Inputs, Trajectory, compare, simulate, simulate_many
 from analysis.linear import linearise
 from analysis.mechanisms import MECHANISMS, SLIDER_CRANK, output_units
-from analysis.periodic import drive_of, find_orbit, natural_frequency
 from analysis.run import CASES as CHECKS
 from analysis.run import Case, Function, Harmonics, TorsionBar, published_case, steps
 from analysis.run.inputs import encode
@@ -274,8 +273,6 @@ def test_a_freedom_has_one_drive() -> None:
 @pytest.mark.parametrize(
     ("call", "what"),
     [
-        (lambda p: find_orbit(p, speed=5.0), "a periodic motion"),
-        (lambda p: natural_frequency(p), "the natural frequency"),
         (lambda p: linearise(p, (0.0, 0.0, 0.0, 0.0)), "a linear model"),
         (lambda p: coupler_curve(p, 0.0), "a coupler curve"),
     ],
@@ -283,11 +280,6 @@ def test_a_freedom_has_one_drive() -> None:
 def test_analyses_of_five_bars_refuse_it(call: Callable[[Any], Any], what: str) -> None:
     with pytest.raises(InputError, match=f"{what} .*of five-bars: the parameters are SliderCrankParameters"):
         call(PARAMETERS)
-
-
-def test_a_drive_of_another_mechanism_is_not_taken_for_one() -> None:
-    with pytest.raises(InputError, match="the inputs are Inputs: periodic motions are of five-bars"):
-        drive_of(Inputs(speed=5.0, load=3.0))
 
 
 def test_a_case_is_of_one_mechanism() -> None:

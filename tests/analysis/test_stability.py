@@ -66,7 +66,7 @@ def mathieu(multiplier: int, damping: float = 0.0) -> Callable[[float, float], f
 
 
 def test_plane_varies_two_parameters_of_mechanism_and_drive() -> None:
-    drive = Drive(speed=44.0, load_y=-3.0)
+    drive = Drive(speed=44.0, forces={"load.fy": -3.0})
     operation = plane(TABLE_3_1, drive, "slider.stiffness", "crank.length")
     assert operation(2e3, 0.04) == (replace(TABLE_3_1, slider_stiffness=2e3, crank_length=0.04), drive)
     assert plane(TABLE_3_1, drive, "drive.speed", "slider.damping")(30.0, 5.0) == (
@@ -74,7 +74,7 @@ def test_plane_varies_two_parameters_of_mechanism_and_drive() -> None:
         replace(drive, speed=30.0),
     )
     assert plane(TABLE_3_1, drive, "slider.force", "load.fx")(2.0, 5.0)[1] == replace(
-        drive, slider_force=2.0, load_x=5.0
+        drive, forces={"load.fy": -3.0, "slider.force": 2.0, "load.fx": 5.0}
     )
     with pytest.raises(UnknownNameError, match=r"slider\.stifness"):
         plane(TABLE_3_1, drive, "slider.stifness", "drive.speed")

@@ -1,0 +1,257 @@
+"""What drives a mechanism over a periodic motion: its crank's speed or torque, and what stays as it is."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cache
+from math import isfinite
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from linkwork.errors import InputError, UnknownNameError
+from linkwork.mechanism import Channel, Mechanism, Mode
+
+from ..mechanisms import InitialState, Parameters, mechanism_of
+from ..run import InductionMotor, Inputs
+from ..run.inputs import given
+from .flows import Flow, crank_of, flow
+
+#: A torque on the crank: constant, a motor's, or both.
+Torque = float | InductionMotor | Sequence[float | InductionMotor]
+
+
+class VaryingInputError(InputError):
+    """An input varies in time, and so there is no periodic motion under it; ``channel`` is its name."""
+
+    def __init__(self, channel: str, value: object) -> None:
+        self.channel = channel
+        super().__init__(
+            f"{channel} is a {type(value).__name__}: what acts on a periodic motion must be constant, or an induction motor"
+        )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Drive:
+    """What drives a mechanism over an orbit: a speed of its cyclic freedom, the crank, or a torque on it; all else constant.
+
+    Attributes
+    ----------
+    speed : float or None
+        Prescribed crank speed (rad/s), above zero; None for a drive by torque.
+    torque : float
+        Constant torque on the crank (N.m): the mean torque.
+    motor : InductionMotor or None
+        A motor whose torque is added.
+    forces : mapping of str to float
+        Constant forces by the FMI names of their inputs, such as ``slider.force`` or ``load.fx`` (N).
+    held : mapping of str to float
+        Coordinates of freedoms that are held, by their FMI names, such as ``shift.position``; 0 where they are left out.
+    modes : mapping of str to int
+        Modes of other freedoms than the crank, by name, such as ``axial.mode``. Without it a freedom with a mode is free where
+        its force is among ``forces``, be it 0, and else in its default mode.
+
+    Raises
+    ------
+    InputError
+        If a value is not finite, the speed is not above zero, or there are both a speed and a torque.
+    """
+
+    speed: float | None = None
+    torque: float = 0.0
+    motor: InductionMotor | None = None
+    forces: Mapping[str, float] = field(default_factory=dict)
+    held: Mapping[str, float] = field(default_factory=dict)
+    modes: Mapping[str, int] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        if self.speed is not None and not (isfinite(self.speed) and self.speed > 0.0):
+            raise InputError(f"speed is {self.speed} rad/s: it must be a finite number above zero")
+        for name, value in {"torque": self.torque, **self.forces, **self.held}.items():
+            if not isfinite(value):
+                raise InputError(f"{name} is {value}: it must be a finite number")
+        if self.speed is not None and (self.torque != 0.0 or self.motor is not None):
+            raise InputError("both a speed and a torque are given: an orbit has either")
+        if self.speed is None and self.torque == 0.0 and self.motor is None:
+            raise InputError("neither a speed nor a torque is given: an orbit needs one of them")
+
+    @property
+    def speed_drive(self) -> bool:
+        """Whether the speed is prescribed."""
+        return self.speed is not None
+
+    def arguments(self, mechanism: Mechanism) -> dict[str, str]:
+        """What drives each freedom that has a mode: the mode's name, and the one of its `Mode.arguments`."""
+        found, crank = {}, crank_of(mechanism)
+        for number, freedom in enumerate(mechanism.freedoms):
+            if (mode := freedom.mode) is None:
+                continue
+            if mode.name in self.modes:
+                found[mode.name] = mode.arguments[self.modes[mode.name]]
+                continue
+            kind = "command" if number == crank.freedom and self.speed_drive else "force"
+            channel = next((c for c in mechanism.channels if c.freedom == number and c.kind == kind), None)
+            acts = channel is not None and (number == crank.freedom or channel.name in self.forces)
+            found[mode.name] = channel.argument if acts and channel else mode.arguments[mode.default]
+        return found
+
+    def flow(self, mechanism: Mechanism) -> Flow:
+        """The mechanism's flow, driven in this way.
+
+        Raises
+        ------
+        InputError
+            If the mechanism cannot be driven so, or nothing of it is free.
+        """
+        crank = crank_of(mechanism)
+        if (crank.command if self.speed_drive else crank.torque) is None:
+            what = "speed" if self.speed_drive else "torque on"
+            raise InputError(f"a {mechanism.name} has no input for the {what} its crank: drive it otherwise")
+        chosen = self.arguments(mechanism)
+        made = flow(mechanism, tuple(mode.arguments.index(chosen[mode.name]) for mode in mechanism.modes))
+        if made.size == 0:
+            raise InputError(
+                f"nothing of the {mechanism.name} is free at a prescribed speed: drive it by a torque, or another freedom by "
+                f"a force, such as {_forces(mechanism)} = 0"
+            )
+        return made
+
+    def vector(self, mechanism: Mechanism) -> NDArray[np.float64]:
+        """The numbers of the drive, as `orbit_kernels.Section` has them.
+
+        Raises
+        ------
+        UnknownNameError
+            If there is no input or held coordinate of a name.
+        InputError
+            If a force does not act.
+        """
+        crank, numbers = crank_of(mechanism), {c.name: n for n, c in enumerate(mechanism.channels)}
+        u = np.zeros(len(numbers))
+        if self.speed is not None and crank.command is not None:
+            u[crank.command] = self.speed
+        elif crank.torque is not None:
+            u[crank.torque] = self.torque
+        forces = forces_of(mechanism)
+        for name, value in self.forces.items():
+            if name not in forces:
+                raise UnknownNameError(name, tuple(forces), None)
+            require_acting(self, mechanism, forces[name])
+            u[numbers[name]] = value
+        motor = (0.0, 1.0, 1.0)
+        if self.motor is not None:
+            motor = (self.motor.breakdown_torque, self.motor.breakdown_slip, self.motor.synchronous_speed)
+        coordinates = [f.coordinate for f in mechanism.freedoms]
+        for name in self.held:
+            if name not in coordinates:
+                raise UnknownNameError(name, tuple(coordinates), None)
+        return np.array([*u, *motor, *(self.held.get(name, 0.0) for name in coordinates)])
+
+    def inputs(self, mechanism: Mechanism) -> Inputs:
+        """The inputs of a run that drive the mechanism in this way."""
+        crank = crank_of(mechanism)
+        acting: dict[str, Any] = {c.argument: self.forces[c.name] for c in mechanism.channels if c.name in self.forces}
+        if self.speed_drive:
+            acting[mechanism.channels[crank.command or 0].argument] = self.speed
+        else:
+            torque = self.torque if self.motor is None else (self.torque, self.motor)
+            acting[mechanism.channels[crank.torque or 0].argument] = torque
+        known = {c.argument for c in mechanism.channels}
+        for argument in self.arguments(mechanism).values():
+            acting.setdefault(argument, 0.0 if argument in known else True)
+        return Inputs(**acting)
+
+
+@cache
+def forces_of(mechanism: Mechanism) -> dict[str, Channel]:
+    """The inputs of a mechanism that are forces, but for the crank's torque, by FMI name."""
+    crank = crank_of(mechanism).freedom
+    return {c.name: c for c in mechanism.channels if c.kind == "force" and c.freedom != crank}
+
+
+def _forces(mechanism: Mechanism) -> str:
+    return next((c.name for c in forces_of(mechanism).values() if c.freedom >= 0), "none")
+
+
+def require_acting(drive: Drive, mechanism: Mechanism, channel: Channel) -> None:
+    """Make sure that a channel acts under a drive.
+
+    Raises
+    ------
+    InputError
+        If the freedom is driven otherwise.
+    """
+    mode = mechanism.freedoms[channel.freedom].mode if channel.freedom >= 0 else None
+    chosen = "" if mode is None else drive.arguments(mechanism)[mode.name]
+    if mode is not None and chosen != channel.argument:
+        raise InputError(f"{channel.name} does not act: {mode.name} is {_value(mode, chosen)}")
+
+
+def _value(mode: Mode, argument: str) -> str:
+    return mode.values[mode.arguments.index(argument)]
+
+
+def drive_of(
+    parameters: Parameters,
+    inputs: Inputs | None = None,
+    initial: InitialState | None = None,
+    *,
+    speed: float | None = None,
+    torque: Torque | None = None,
+) -> Drive:
+    """The drive of an orbit under the inputs of a run, which must not vary in time.
+
+    Parameters
+    ----------
+    parameters : parameters of a mechanism
+    inputs : Inputs, optional
+    initial : state at the start, optional
+        Where freedoms that are neither free nor the crank's are held.
+    speed, torque : optional
+        In the place of what drives the crank in the inputs.
+
+    Raises
+    ------
+    VaryingInputError
+        If an input varies.
+    InputError
+        If nothing drives the crank, or another freedom is commanded to go on.
+    """
+    mechanism = mechanism_of(parameters)
+    inputs, initial = given(mechanism, inputs, initial)
+    crank = crank_of(mechanism)
+    constant: dict[str, float] = {}
+    motors: list[InductionMotor] = []
+    for number, channel in enumerate(mechanism.channels):
+        if channel.freedom == crank.freedom and (speed is not None or torque is not None):
+            continue
+        for part in inputs.parts(channel.argument) if channel.kind != "rate" else ():
+            if isinstance(part, InductionMotor) and number == crank.torque:
+                motors.append(part)
+            elif isinstance(part, (int, float, np.floating, np.integer)):
+                constant[channel.name] = constant.get(channel.name, 0.0) + float(part)
+            else:
+                raise VaryingInputError(channel.argument, part)
+    named = [None if n is None else mechanism.channels[n].name for n in (crank.command, crank.torque)]
+    for channel in mechanism.channels:
+        if channel.kind == "command" and channel.name != named[0] and constant.get(channel.name, 0.0) != 0.0:
+            raise InputError(
+                f"{channel.argument} is {constant[channel.name]}: a motion that goes on so is not periodic"
+            )
+    parts = () if torque is None else tuple(torque) if isinstance(torque, Sequence) else (torque,)
+    motors += [part for part in parts if isinstance(part, InductionMotor)]
+    if len(motors) > 1:
+        raise InputError(f"{len(motors)} motors: an orbit has one at most")
+    modes = inputs.modes(mechanism)
+    free = flow(mechanism, tuple(modes.values())).free
+    other = [f for n, f in enumerate(mechanism.freedoms) if n not in (crank.freedom, *free)]
+    return Drive(
+        speed=constant.get(named[0] or "") if speed is None else speed,
+        torque=constant.get(named[1] or "", 0.0) + sum(float(p) for p in parts if not isinstance(p, InductionMotor)),
+        motor=motors[0] if motors else None,
+        forces={name: constant[name] for name in forces_of(mechanism) if name in constant},
+        held={f.coordinate: float(getattr(initial, f.initial[0])) for f in other},
+        modes={f.mode.name: modes[f.mode.name] for f in other if f.mode is not None},
+    )
