@@ -12,6 +12,7 @@ from zipfile import BadZipFile
 import click
 
 from linkwork import __version__
+from linkwork.errors import InputError
 
 from ..mechanisms import MECHANISMS, PUBLISHED
 from .common import (
@@ -65,7 +66,7 @@ def build(models: Sequence[str], dest: str) -> None:
     known = {mechanism.fmu: mechanism for mechanism in MECHANISMS.values()}
     for name in models or known:
         if name not in known:
-            raise click.UsageError(f"there is no model {name!r}: the models are {', '.join(known)}")
+            raise InputError(f"there is no model {name!r}: the models are {', '.join(known)}")
         with console.status(f"building {name}"):
             path = build_one(known[name], dest)
             try_out(path)

@@ -10,8 +10,8 @@ import click
 
 from ... import figures
 from ... import slider_crank as sc
-from ..common import console, print_written, say, show_table
-from .options import Chosen, about_mechanism, angle_text, out_option, quantity
+from ..common import console, print_written, quantity, say, show_table
+from .options import Chosen, about_mechanism, angle_text, out_option
 
 
 @click.command()

@@ -14,8 +14,8 @@ from linkwork.errors import InputError
 
 from ... import figures
 from ... import slider_crank as sc
-from ..common import console, print_written, show_table
-from .options import Chosen, Problem, Units, about_mechanism, note, out_option, plot_option, quantity, with_problem
+from ..common import console, print_written, quantity, show_table
+from .options import Chosen, Problem, Units, about_mechanism, note, out_option, plot_option, with_problem
 
 if TYPE_CHECKING:
     from ...slider_crank import ForceTurn, MonteCarlo, Sensitivities, Tolerance
