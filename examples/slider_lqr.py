@@ -17,13 +17,13 @@ from pathlib import Path
 
 import numpy as np
 
-from analysis import figures
+from analysis import Inputs, figures
 from analysis.figures import Curve, Panel
 from analysis.linear import (
+    Design,
     LoopResult,
     PeriodicModel,
     SampledController,
-    SliderDesign,
     control_loop,
     design_lqr,
     design_pi,
@@ -35,13 +35,11 @@ from analysis.linear import (
     predict_loop,
     settled_motion,
 )
-from linkwork.five_bar import dynamics
 from linkwork.five_bar.parameters import FiveBarParameters, InitialState
 from linkwork.five_bar.published import RAD_S_PER_RPM, SETS, TABLE_3_1
 
 RIG_2 = SETS["rig-2-spring-c"].parameters
 PERIOD = 1e-3
-TURNING = dynamics.Inputs(1.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 #: 1 mm weighs as much as 1 N, 0.1 m/s as much as 1 N.
 WEIGHTS = {"slider.position": 1e6, "slider.velocity": 1e2}
@@ -49,13 +47,14 @@ WEIGHTS = {"slider.position": 1e6, "slider.velocity": 1e2}
 
 def turning(parameters: FiveBarParameters, speed: float) -> tuple[PeriodicModel, InitialState]:
     """Linear models along the motion at a constant crank speed, and the start of that motion."""
-    motion = settled_motion(parameters, speed)
+    inputs = Inputs(speed=speed)
+    motion = settled_motion(parameters, inputs)
     th2, u, w2, v = motion[0, :4].tolist()
     start = InitialState(crank_angle=th2, crank_speed=w2, slider_position=u, slider_velocity=v)
-    return linearise_along(parameters, motion, TURNING), start
+    return linearise_along(parameters, motion, inputs), start
 
 
-def describe(design: SliderDesign) -> str:
+def describe(design: Design) -> str:
     gains = ", ".join(f"{gain:.5g}" for gain in design.gains)
     return (
         f"{design.method}: k = ({gains}), k_i = {design.integral_gain:.5g}, phase margin "
@@ -64,7 +63,7 @@ def describe(design: SliderDesign) -> str:
     )
 
 
-def still(fmu: Path | None) -> tuple[PeriodicModel, list[SliderDesign], LoopResult]:
+def still(fmu: Path | None) -> tuple[PeriodicModel, list[Design], LoopResult]:
     """Rig 2, spring C, at 585 rpm: the slider kept at the middle of its travel."""
     speed = 585.0 * RAD_S_PER_RPM
     models, start = turning(RIG_2, speed)
@@ -81,7 +80,7 @@ def still(fmu: Path | None) -> tuple[PeriodicModel, list[SliderDesign], LoopResu
     for design in designs:
         print(f"  {describe(design)}")
         controller = SampledController(design, PERIOD)
-        loop = control_loop(RIG_2, controller, middle, initial=start, stop_time=1.0, crank_speed=speed, fmu=fmu)
+        loop = control_loop(RIG_2, controller, middle, Inputs(speed=speed), initial=start, stop_time=1.0, fmu=fmu)
         periodic = predict_loop(models, controller, middle, stop_time=1.0)
         averaged = predict_loop(models, controller, middle, stop_time=1.0, averaged=True)
         for name, run in (("plant", loop), ("periodic model", periodic), ("mean model", averaged)):
@@ -116,7 +115,7 @@ def steps(fmu: Path | None) -> None:
                 return low + size * (t >= 1.0 - 0.5 * PERIOD)
 
             loop = control_loop(
-                TABLE_3_1, controller, reference, initial=start, stop_time=2.0, crank_speed=speed, fmu=fmu
+                TABLE_3_1, controller, reference, Inputs(speed=speed), initial=start, stop_time=2.0, fmu=fmu
             )
             linear = predict_loop(models, controller, reference, stop_time=2.0)
             # what the turning crank leaves counts as settled
@@ -139,28 +138,26 @@ def balance(fmu: Path | None) -> None:
     upper = next(one for one in find_equilibria(TABLE_3_1) if not one.stable)
     model = linearise(TABLE_3_1, upper.state, upper.inputs)
     design = design_lqr(model, {"crank.angle": 1e2, "slider.position": 1e6}, 1.0)
-    print(
-        f"Table 3.1, free crank: balance it at {degrees(upper.crank_angle):.3f} deg, "
-        f"u = {1e3 * upper.slider_position:.4f} mm"
-    )
+    angle, position = upper.coordinates.tolist()
+    print(f"Table 3.1, free crank: balance it at {degrees(angle):.3f} deg, u = {1e3 * position:.4f} mm")
     print(f"  poles without control {', '.join(f'{pole:.3f}' for pole in model.poles)} 1/s")
     print(f"  {describe(design)}")
     controller = SampledController(design, PERIOD)
     for lean in (0.01, 0.1, 0.2, 0.3):
-        start = InitialState(crank_angle=upper.crank_angle + lean, slider_position=upper.slider_position)
-        loop = control_loop(TABLE_3_1, controller, upper.slider_position, initial=start, stop_time=2.0, fmu=fmu)
-        linear = predict_loop(model, controller, upper.slider_position, stop_time=2.0, deviation=[lean, 0.0, 0.0, 0.0])
+        start = InitialState(crank_angle=angle + lean, slider_position=position)
+        loop = control_loop(TABLE_3_1, controller, position, initial=start, stop_time=2.0, fmu=fmu)
+        linear = predict_loop(model, controller, position, stop_time=2.0, deviation=[lean, 0.0, 0.0, 0.0])
         if loop.status:
             print(f"  from {lean:.2f} rad off: lost, {loop.message}; the linear model would have held it")
             continue
         gap = np.abs(loop.states[:, 0] - linear.states[:, 0]).max()
         print(
-            f"  from {lean:.2f} rad off: {abs(loop.states[-1, 0] - upper.crank_angle):.1e} rad off after 2 s, peak force "
+            f"  from {lean:.2f} rad off: {abs(loop.states[-1, 0] - angle):.1e} rad off after 2 s, peak force "
             f"{np.abs(loop.force).max():.2f} N, crank differs by up to {gap:.1e} rad from the linear model"
         )
 
 
-def draw(folder: Path, models: PeriodicModel, designs: list[SliderDesign], loop: LoopResult) -> None:
+def draw(folder: Path, models: PeriodicModel, designs: list[Design], loop: LoopResult) -> None:
     mean = models.mean()
     system = mean.to_state_space(("slider.position",), ("slider.force",))
     closed = {f"with {design.method}": design.closed(("slider.position",)) for design in designs}

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MultipleLocator
 from numpy.typing import ArrayLike
 
-from ..linear import UNITS, LinearModel
+from ..linear import LinearModel
 from .dispatch import plot
 from .style import COLOURS, STYLE, finish
 
@@ -60,11 +60,17 @@ def plot_bode(
 
 @plot.register
 def plot_linear_model(
-    model: LinearModel, output: str = "slider.position", input: str = "slider.force", **options: Any
+    model: LinearModel, output: str | None = None, input: str | None = None, **options: Any
 ) -> Figure:
-    """Magnitude and phase of a linear model from one input to one output, by their FMI names; see `plot_bode`."""
-    per = f"({UNITS[input]})" if "." in UNITS[input] else UNITS[input]
-    return plot_bode({"": model.to_state_space((output,), (input,))}, unit=f"{UNITS[output]}/{per}", **options)
+    """Magnitude and phase of a linear model from one input to one output, by their FMI names; see `plot_bode`.
+
+    By default from the force on the last free freedom to the last free coordinate.
+    """
+    units = {v.name: v.unit for v in model.mechanism.variables}
+    source = model.force_channel()[0] if input is None else input
+    target = model.state_names[len(model.state_names) // 2 - 1] if output is None else output
+    per = f"({units[source]})" if "." in units[source] else units[source]
+    return plot_bode({"": model.to_state_space((target,), (source,))}, unit=f"{units[target]}/{per}", **options)
 
 
 def plot_poles(systems: Mapping[str, Any], *, title: str = "") -> Figure:

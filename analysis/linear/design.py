@@ -1,9 +1,9 @@
-"""Control of the slider by its force, designed on a linear model.
+"""Control of a coordinate by the force (or torque) on it, designed on a linear model.
 
-Every design is one law of the deviations x from an operating point x0 with the force F0, at a reference r of the slider's
-position whose own operating point is x0 + x_s (r - u0), F0 + F_s (r - u0) on the linear model:
+Every design is one law of the deviations x from an operating point x0 with the force F0, at a reference r of the coordinate u
+whose own operating point is x0 + x_s (r - u0), F0 + F_s (r - u0) on the linear model:
 
-    F2 = F0 + F_s (r - u0) - k (x - x0 - x_s (r - u0)) - k_i * integral of (u - r)
+    F = F0 + F_s (r - u0) - k (x - x0 - x_s (r - u0)) - k_i * integral of (u - r)
 
 LQR chooses k and k_i by weights, PID by poles, PI (no gain on the velocity) by crossover and phase margin.
 """
@@ -21,9 +21,7 @@ from numpy.typing import ArrayLike, NDArray
 from linkwork.errors import InputError, LinkworkError, UnknownNameError
 
 from ..run import Function
-from .model import COORDINATES, RATES, FloatArray, LinearModel, by_magnitude, signal_name
-
-MEASURED = (*COORDINATES, *RATES)
+from .model import FloatArray, LinearModel, LinearModelError, by_magnitude, signal_name
 
 
 class DesignError(LinkworkError):
@@ -31,8 +29,8 @@ class DesignError(LinkworkError):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class SliderDesign:
-    """A control law for the slider force, with what the linear model says of it.
+class Design:
+    """A control law for a force, with what the linear model says of it. Units are those of a force and a position.
 
     Attributes
     ----------
@@ -40,8 +38,12 @@ class SliderDesign:
         LQR, PID or PI.
     model : LinearModel
         On which it was designed.
+    channel : str
+        FMI name of the force.
+    freedom : int
+        Number of the freedom that it drives, and controls.
     gains : ndarray, shape (2 n,)
-        k: of the model's state (q, q'), in N per rad, m, rad/s, m/s.
+        k: of the model's state (q, q'), in N per unit of each.
     integral_gain : float
         k_i (N/(m.s)); zero if there is no integral action.
     target, target_slope : ndarray, shape (2 n,)
@@ -62,6 +64,8 @@ class SliderDesign:
 
     method: str
     model: LinearModel
+    channel: str
+    freedom: int
     gains: FloatArray
     integral_gain: float
     target: FloatArray
@@ -75,39 +79,46 @@ class SliderDesign:
     delay_margin: float
 
     @property
-    def loop(self) -> control.StateSpace:
-        """The open loop, from the slider force to what the controller takes from it."""
-        return _loop(self.model, self.gains, self.integral_gain)
+    def coordinate(self) -> str:
+        """FMI name of the coordinate that it controls."""
+        return self.model.mechanism.freedoms[self.freedom].coordinate
 
-    def closed(self, outputs: Sequence[str] = ("slider.position",)) -> control.StateSpace:
-        """The closed loop, from a force that disturbs the slider to outputs by their FMI names."""
-        a, b = _integrating(self.model)
-        row = np.append(self.gains, self.integral_gain)[None, :]
-        whole = self.model.to_state_space(outputs, ("slider.force",))
-        c = np.hstack([whole.C, np.zeros((len(outputs), 1))]) - whole.D @ row
-        if not self.integral_gain:
-            a, b, row, c = a[:-1, :-1], b[:-1], row[:, :-1], c[:, :-1]
-        return control.ss(
-            a - b @ row, b, c, whole.D, inputs=["slider_force"], outputs=[signal_name(name) for name in outputs]
-        )
+    @property
+    def plant(self) -> _Plant:
+        """What the force does."""
+        return _Plant(self.model, self.channel)
+
+    @property
+    def loop(self) -> control.StateSpace:
+        """The open loop, from the force to what the controller takes from it."""
+        return self.plant.loop(self.gains, self.integral_gain)
+
+    def closed(self, outputs: Sequence[str] | None = None) -> control.StateSpace:
+        """The closed loop, from a force that disturbs the coordinate to outputs by their FMI names, by default itself."""
+        chosen = (self.coordinate,) if outputs is None else outputs
+        a, b, row = self.plant.fed_back(self.gains, self.integral_gain)
+        whole = self.model.to_state_space(chosen, (self.channel,))
+        c = np.hstack([whole.C, np.zeros((len(chosen), a.shape[0] - whole.nstates))]) - whole.D @ row
+        names = {"inputs": [signal_name(self.channel)], "outputs": [signal_name(name) for name in chosen]}
+        return control.ss(a - b @ row, b, c, whole.D, **names)
 
     def sampled_poles(self, period: float) -> NDArray[np.complex128]:
         """Poles (in z) of the linear model under the law sampled every ``period`` s and held: inside the unit circle or not."""
         check_period(period)
-        a, b = _plant(self.model)
+        a, b = self.plant.a, self.plant.b
         held = control.sample_system(control.ss(a, b, np.eye(len(a)), np.zeros((len(a), 1))), period, method="zoh")
         n = len(a)
         closed = np.zeros((n + 1, n + 1))
         closed[:n, :n] = held.A - held.B @ self.gains[None, :]
         closed[:n, n:] = -held.B * self.integral_gain
-        closed[n, n // 2 - 1] = period
+        closed[n, self.plant.place] = period
         closed[n, n] = 1.0
         # without integral action nothing depends on the integral
         kept = closed if self.integral_gain else closed[:n, :n]
         return by_magnitude(np.linalg.eigvals(kept))
 
     def continuous(self, reference: float) -> Function:
-        """The law without sampling, as the ``force`` of `analysis.run.inputs.Inputs`.
+        """The law without sampling, as the force among `analysis.run.Inputs`.
 
         Raises
         ------
@@ -116,84 +127,98 @@ class SliderDesign:
         """
         if self.integral_gain:
             raise DesignError("a law with integral action is no function of the state: run it with control_loop")
-        k_th2, k_u, k_w2, k_v = on_plant(self.model, self.gains)
-        step = reference - float(self.target[len(self.target) // 2 - 1])
-        th2_0, u_0, w2_0, v_0 = on_plant(self.model, self.target + step * self.target_slope)
-        bias = self.force + step * self.force_slope
+        gains = tuple(self.on_plant(self.gains).tolist())
+        step = reference - float(self.target[self.plant.place])
+        bias = self.force + step * self.force_slope + float(self.gains @ (self.target + step * self.target_slope))
 
-        def force(t: float, th2: float, u: float, w2: float, v: float) -> float:
-            return bias - k_th2 * (th2 - th2_0) - k_u * (u - u_0) - k_w2 * (w2 - w2_0) - k_v * (v - v_0)
+        def force(t: float, *x: float) -> float:
+            wanted = bias
+            for k in range(len(gains)):
+                wanted -= gains[k] * x[k]
+            return wanted
 
         return Function(force)
 
-
-def on_plant(model: LinearModel, values: FloatArray) -> tuple[float, float, float, float]:
-    """Values by the model's state as values by (th2, u, th2', u'), zero where the model has no such state."""
-    named = dict(zip(model.state_names, values.tolist()))
-    th2, u, w2, v = (named.get(name, 0.0) for name in MEASURED)
-    return th2, u, w2, v
-
-
-def _plant(model: LinearModel) -> tuple[FloatArray, FloatArray]:
-    """A, and the column of B that belongs to the slider force."""
-    column = model.input_names.index("slider.force")
-    return model.A, model.B[:, [column]]
+    def on_plant(self, values: FloatArray) -> FloatArray:
+        """Values by the model's state as values by all coordinates and all rates, zero where the model has no such state."""
+        whole = np.zeros(2 * len(self.model.mechanism.freedoms))
+        whole[self.model.places] = values
+        return whole
 
 
-def _integrating(model: LinearModel) -> tuple[FloatArray, FloatArray]:
-    """The same with the integral of the slider's position as the last state."""
-    a, b = _plant(model)
-    n = len(a)
-    whole = np.zeros((n + 1, n + 1))
-    whole[:n, :n] = a
-    whole[n, n // 2 - 1] = 1.0
-    return whole, np.vstack([b, [[0.0]]])
+class _Plant:
+    """What a force does on a linear model: A, its column of B, and the place of the coordinate that it drives."""
+
+    def __init__(self, model: LinearModel, channel: str | None) -> None:
+        try:
+            self.channel, self.freedom = model.force_channel(channel)
+        except LinearModelError as error:
+            raise DesignError(str(error)) from None
+        self.a: FloatArray = model.A
+        self.b: FloatArray = model.B[:, [model.input_names.index(self.channel)]]
+        self.place = model.layout.free.index(self.freedom)
+
+    def integrating(self) -> tuple[FloatArray, FloatArray]:
+        """A and B with the integral of the coordinate as the last state."""
+        n = len(self.a)
+        whole = np.zeros((n + 1, n + 1))
+        whole[:n, :n] = self.a
+        whole[n, self.place] = 1.0
+        return whole, np.vstack([self.b, [[0.0]]])
+
+    def fed_back(self, gains: FloatArray, integral_gain: float) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """A, B and the row of the gains, with the integral as the last state where it has a gain."""
+        if integral_gain:
+            return *self.integrating(), np.append(gains, integral_gain)[None, :]
+        return self.a, self.b, gains[None, :]
+
+    def loop(self, gains: FloatArray, integral_gain: float) -> control.StateSpace:
+        a, b, row = self.fed_back(gains, integral_gain)
+        return control.ss(a, b, row, 0.0, inputs=[signal_name(self.channel)], outputs=["feedback"])
 
 
-def _loop(model: LinearModel, gains: FloatArray, integral_gain: float) -> control.StateSpace:
-    a, b = _integrating(model)
-    row = np.append(gains, integral_gain)[None, :]
-    if not integral_gain:
-        a, b, row = a[:-1, :-1], b[:-1], row[:, :-1]
-    return control.ss(a, b, row, 0.0, inputs=["slider_force"], outputs=["feedback"])
-
-
-def _design(method: str, model: LinearModel, gains: FloatArray, integral_gain: float) -> SliderDesign:
+def _design(method: str, model: LinearModel, channel: str | None, gains: FloatArray, integral_gain: float) -> Design:
     """The design of these gains, once it is seen to be stable."""
-    a, b = _plant(model)
-    n = len(a)
-    if not model.speed_drive and model.state[2] != 0.0:
-        raise DesignError(
-            f"{method}: the free crank turns at {model.state[2]:.4g} rad/s: a law that holds its angle needs an equilibrium"
-        )
+    plant, freedoms = _Plant(model, channel), model.mechanism.freedoms
+    for n in model.layout.free:
+        if freedoms[n].period and model.state[len(freedoms) + n] != 0.0:
+            raise DesignError(
+                f"{method}: {freedoms[n].coordinate} is free and turns at {model.state[len(freedoms) + n]:.4g} rad/s: "
+                "a law that holds it needs an equilibrium"
+            )
     if not (np.all(np.isfinite(gains)) and isfinite(integral_gain)):
         raise DesignError(f"{method}: the gains {gains} and {integral_gain} are not finite")
-    loop = _loop(model, gains, integral_gain)
+    loop = plant.loop(gains, integral_gain)
     poles = by_magnitude(np.linalg.eigvals(loop.A - loop.B @ loop.C))
     if poles.real.max() >= -1e-9 * np.abs(poles).max():
         raise DesignError(
             f"{method}: the closed loop is not stable, its poles are {np.array2string(poles, precision=4)} 1/s"
         )
-    # where the linear model stays with the slider 1 m further on
+    # where the linear model stays with the coordinate 1 further on
+    n = len(plant.a)
     border = np.zeros((n + 1, n + 1))
-    border[:n, :n], border[:n, n:], border[n, n // 2 - 1] = a, b, 1.0
+    border[:n, :n], border[:n, n:], border[n, plant.place] = plant.a, plant.b, 1.0
     try:
         still = np.linalg.solve(border, np.append(np.zeros(n), 1.0))
     except np.linalg.LinAlgError:
-        raise DesignError(f"{method}: no slider force holds the slider at another position") from None
+        raise DesignError(
+            f"{method}: no {plant.channel} holds {freedoms[plant.freedom].coordinate} elsewhere"
+        ) from None
     gain, phase, _, _, crossings, _ = control.stability_margins(loop, returnall=True)
     phase, crossings = np.atleast_1d(np.radians(phase)), np.atleast_1d(crossings)
     # a margin below zero is one of a loop that needs its gain: as a delay it is a turn less that
     delays = np.where(phase > 0.0, phase, phase + 2.0 * pi) / crossings
     gains_up = [float(value) for value in np.atleast_1d(gain) if value > 1.0]
-    return SliderDesign(
+    return Design(
         method=method,
         model=model,
+        channel=plant.channel,
+        freedom=plant.freedom,
         gains=gains,
         integral_gain=integral_gain,
-        target=_values(model),
+        target=model.state[model.places],
         target_slope=still[:n],
-        force=model.inputs.force,
+        force=float(model.channels[model.mechanism.input_names.index(plant.channel)]),
         force_slope=float(still[n]),
         poles=poles,
         gain_margin=min(gains_up, default=inf),
@@ -203,15 +228,14 @@ def _design(method: str, model: LinearModel, gains: FloatArray, integral_gain: f
     )
 
 
-def _values(model: LinearModel) -> FloatArray:
-    """The operating point by the model's state."""
-    named = dict(zip(MEASURED, model.state[:4].tolist()))
-    return np.array([named[name] for name in model.state_names])
-
-
 def design_lqr(
-    model: LinearModel, q: Mapping[str, float] | ArrayLike, r: float = 1.0, *, integral: float = 0.0
-) -> SliderDesign:
+    model: LinearModel,
+    q: Mapping[str, float] | ArrayLike,
+    r: float = 1.0,
+    *,
+    integral: float = 0.0,
+    channel: str | None = None,
+) -> Design:
     """State feedback that minimises the integral of x' Q x + r F^2 (+ integral * (integral of u)^2) on the linear model.
 
     Parameters
@@ -224,7 +248,9 @@ def design_lqr(
     r : float
         Weight of the force.
     integral : float
-        Weight of the integral of the slider's position (1/s2); above zero the law has integral action.
+        Weight of the integral of the coordinate (1/s2); above zero the law has integral action.
+    channel : str, optional
+        FMI name of the force; by default that on the last free freedom (`LinearModel.force_channel`).
 
     Raises
     ------
@@ -253,16 +279,15 @@ def design_lqr(
         raise DesignError(f"weight of the force is {r}: it must be finite and greater than zero")
     if not (isfinite(integral) and integral >= 0.0):
         raise DesignError(f"weight of the integral is {integral}: it must be finite and not below zero")
-    a, b = _integrating(model)
+    plant = _Plant(model, channel)
     if integral:
         weights = np.block([[weights, np.zeros((n, 1))], [np.zeros((1, n)), np.array([[integral]])]])
-    else:
-        a, b = a[:-1, :-1], b[:-1]
+    a, b, _ = plant.fed_back(np.zeros(n), integral)
     try:
         gains = np.asarray(control.lqr(a, b, weights, [[r]])[0])[0]
     except (np.linalg.LinAlgError, ValueError, control.ControlArgument) as error:
-        raise DesignError(f"LQR: the slider force cannot stabilise this model under these weights ({error})") from error
-    return _design("LQR", model, gains[:n], float(gains[n]) if integral else 0.0)
+        raise DesignError(f"LQR: {plant.channel} cannot stabilise this model under these weights ({error})") from error
+    return _design("LQR", model, plant.channel, gains[:n], float(gains[n]) if integral else 0.0)
 
 
 def design_pid(
@@ -271,25 +296,30 @@ def design_pid(
     poles: Sequence[complex] | None = None,
     bandwidth: float | None = None,
     damping: float = 0.7,
-) -> SliderDesign:
+    channel: str | None = None,
+) -> Design:
     """PID with the derivative on the measured velocity, by the three poles of the closed loop.
 
     Parameters
     ----------
     model : LinearModel
-        In speed drive, where the slider is the one freedom.
+        Of one free freedom, such as a five-bar's in speed drive.
     poles : sequence of 3 complex, optional
         1/s, real or in conjugate pairs, left of the imaginary axis.
     bandwidth, damping : float
         Instead of poles (rad/s): they are -bandwidth times 1 and damping +- i sqrt(1 - damping^2).
+    channel : str, optional
+        FMI name of the force; by default that on the last free freedom (`LinearModel.force_channel`).
 
     Raises
     ------
     DesignError
         If the model has more than one freedom, or the poles are not usable.
     """
-    if not model.speed_drive:
-        raise DesignError("a PID places the three poles of one freedom: with a free crank use design_lqr")
+    if len(model.layout.free) != 1:
+        raise DesignError(
+            f"a PID places the three poles of one freedom: with {len(model.layout.free)} free ones use design_lqr"
+        )
     if (poles is None) == (bandwidth is None):
         raise DesignError("a PID needs either its poles or its bandwidth")
     if bandwidth is not None:
@@ -305,15 +335,19 @@ def design_pid(
             f"poles {wanted.tolist()}: there must be three, real or conjugate, left of the imaginary axis"
         )
     _, a2, a1, a0 = polynomial.real.tolist()
-    # m s^3 + (c + k_d) s^2 + (k + k_p) s + k_i = m (s^3 + a2 s^2 + a1 s + a0)
+    # m s^3 + (c + f k_d) s^2 + (k + f k_p) s + f k_i = m (s^3 + a2 s^2 + a1 s + a0), f the force of a unit of the channel
+    plant = _Plant(model, channel)
     m, c, k = (float(matrix[0, 0]) for matrix in (model.M, model.C, model.K))
-    return _design("PID", model, np.array([m * a1 - k, m * a2 - c]), m * a0)
+    f = float(model.F[0, model.input_names.index(plant.channel)])
+    return _design("PID", model, plant.channel, np.array([m * a1 - k, m * a2 - c]) / f, m * a0 / f)
 
 
-def design_pi(model: LinearModel, *, bandwidth: float, phase_margin: float = pi / 3.0) -> SliderDesign:
+def design_pi(
+    model: LinearModel, *, bandwidth: float, phase_margin: float = pi / 3.0, channel: str | None = None
+) -> Design:
     """PI whose loop has the gain 1 at ``bandwidth``, and there at least the phase margin.
 
-    Where the slider itself lags so little that an integral alone leaves more than the margin, there is no proportional part.
+    Where the coordinate itself lags so little that an integral alone leaves more than the margin, there is no proportional part.
 
     Parameters
     ----------
@@ -322,30 +356,34 @@ def design_pi(model: LinearModel, *, bandwidth: float, phase_margin: float = pi 
         Crossover (rad/s).
     phase_margin : float
         rad.
+    channel : str, optional
+        FMI name of the force; by default that on the last free freedom (`LinearModel.force_channel`).
 
     Raises
     ------
     DesignError
-        If a PI cannot: it has no phase lead to give, and so none where a sprung slider needs it, near its resonance and
+        If a PI cannot: it has no phase lead to give, and so none where a sprung mass needs it, near its resonance and
         above.
     """
     _check_positive("bandwidth", bandwidth, "rad/s")
     if not 0.0 < phase_margin < pi:
         raise DesignError(f"phase margin is {phase_margin} rad: it must be between 0 and pi")
-    system = model.to_state_space(("slider.position",), ("slider.force",))
+    plant = _Plant(model, channel)
+    coordinate = model.state_names[plant.place]
+    system = model.to_state_space((coordinate,), (plant.channel,))
     response = complex(system(1j * bandwidth))
     needed = np.exp(1j * (phase_margin - pi)) / response
     if needed.imag >= 0.0:
         raise DesignError(
-            f"PI: at {bandwidth:g} rad/s the slider lags by {np.degrees(-np.angle(response)) % 360.0:.1f} deg, which leaves "
+            f"PI: at {bandwidth:g} rad/s {coordinate} lags by {np.degrees(-np.angle(response)) % 360.0:.1f} deg, which leaves "
             f"no phase margin of {np.degrees(phase_margin):.1f} deg without phase lead: use design_pid, or a bandwidth "
             "further below the resonance"
         )
     proportional, integral = float(needed.real), float(-bandwidth * needed.imag)
     if proportional < 0.0:
         proportional, integral = 0.0, bandwidth / abs(response)
-    gains = np.array([proportional if name == "slider.position" else 0.0 for name in model.state_names])
-    design = _design("PI", model, gains, integral)
+    gains = np.array([proportional if name == coordinate else 0.0 for name in model.state_names])
+    design = _design("PI", model, plant.channel, gains, integral)
     if design.phase_margin < phase_margin - 1e-6:
         raise DesignError(
             f"PI: the gain of the loop comes back to 1 at {design.crossover:.4g} rad/s, near the resonance, and leaves a "

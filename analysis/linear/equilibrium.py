@@ -1,30 +1,32 @@
-"""Operating points at rest: equilibria of the plant, hanging freely or with the crank held.
+"""Operating points at rest: equilibria of a mechanism, free or with some of its freedoms held.
 
-They are found by Newton's method on the generalised forces at rest, whose exact derivatives CasADi traces from the plant's own
-functions (`analysis.numerics.symbolic`). CasADi is an extra: ``pip install 'linkwork[symbolic]'``.
+They are found by Newton's method on the generalised forces at rest, M a, with exact derivatives by CasADi
+(`analysis.run.expressions`).
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
 from functools import cache
-from math import isfinite, pi
+from math import isfinite
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
+from scipy.ndimage import minimum_filter
 
 from linkwork.errors import InputError, LinkworkError
-from linkwork.five_bar import dynamics, kinematics
-from linkwork.five_bar.assembly import check_assembly
-from linkwork.five_bar.parameters import FiveBarParameters
 from linkwork.limits import LIMIT_SINE
+from linkwork.mechanism import Mechanism
+from linkwork.parameters import fmi_name
 
-from ..mechanisms import FIVE_BAR, require_five_bar
+from ..mechanisms import InitialState, Parameters, mechanism_of
 from ..numerics import symbolic
-from ..run import constants, traced
-from .model import FloatArray
+from ..run import Inputs, expressions, given
+from .model import FloatArray, Layout, Modes, channels_along, layout
 
-#: Starts of the search for equilibria: crank angles over a turn, slider positions over its reach.
+#: Points of the search for equilibria along a freedom that comes round again, over a turn, and along another, over its reach.
 GRID = (48, 81)
 #: Largest imbalance of an equilibrium, relative to the forces that balance.
 BALANCE = 1e-12
@@ -36,123 +38,171 @@ class EquilibriumError(LinkworkError):
 
 
 @cache
-def _statics() -> Any:
-    """(th2, u), (load_x, load_y), constants -> generalised forces at rest (2,), and less their derivative (2, 2)."""
-    casadi, plant = symbolic.library(), traced(FIVE_BAR)
-    q, load = casadi.SX.sym("q", 2), casadi.SX.sym("load", 2)
-    p, c = constants(FIVE_BAR)
-    g = plant.position(q[0], q[1], c)
-    k = plant.coefficients(g, c)
-    forces = casadi.vertcat(*plant.applied_forces(g, k, q[1], 0.0, load[0], load[1], c))
-    return casadi.Function(
-        "statics", [q, load, p], [forces, casadi.densify(-casadi.jacobian(forces, q))], {"cse": True}
-    )
+def _statics(mechanism: Mechanism, modes: Modes) -> tuple[Any, Any]:
+    """Two functions of coordinates, channels and constants.
+
+    Of both the first result is the generalised forces at rest on the freedoms that are free; the others are the clearance,
+    and less the forces' derivatives by those freedoms and the generalised forces of unit forces of the channels.
+    """
+    casadi, traces, its = symbolic.library(), expressions(mechanism), layout(mechanism, modes)
+    x, mode_symbols, u, p = traces.symbols
+    n, free = len(mechanism.freedoms), list(its.free)
+    q = casadi.SX.sym("q", n)
+
+    def at_rest(expression: Any) -> Any:
+        still = casadi.vertcat(q, casadi.SX.zeros(mechanism.size - n))
+        values = casadi.DM(list(map(float, modes)))
+        return casadi.substitute(casadi.substitute(expression, mode_symbols, values), x, still)
+
+    inertia = casadi.hessian(traces.energy, x[n : 2 * n])[0][free, free]
+    forces = casadi.mtimes(at_rest(inertia), at_rest(traces.derivative[n : 2 * n][free]))
+    derivatives = [-casadi.jacobian(forces, q)[:, free], casadi.jacobian(forces, u)[:, list(its.forces)]]
+
+    def function(*results: Any) -> Any:
+        return casadi.Function("statics", [q, u, p], [casadi.densify(r) for r in results], {"cse": True})
+
+    return function(forces, at_rest(traces.clearance)), function(forces, *derivatives)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Equilibrium:
-    """A configuration in which the plant stays at rest.
+    """A configuration in which a mechanism stays at rest.
 
     Attributes
     ----------
-    parameters : FiveBarParameters
-    crank_angle, slider_position : float
-        rad, m.
-    inputs : dynamics.Inputs
-        What acts on it; ``speed_drive`` is 1 where the crank is held.
-    torque : float
-        Torque on the crank (N.m): the one given, or that which holds it.
-    stiffness : ndarray, shape (2, 2)
-        Less the derivative of the generalised forces with respect to (th2, u).
+    parameters
+        Of the mechanism.
+    coordinates : ndarray
+        Of all freedoms.
+    inputs : Inputs
+        What acts on it; a freedom that is held has the commanded rate 0.
+    holding : dict
+        Generalised force (N.m or N) that holds each freedom which is held, by its coordinate.
+    stiffness : ndarray
+        Less the derivative of the generalised forces with respect to the freedoms that are free or held.
     residual : float
         Largest imbalance, relative to the forces that balance.
     iterations : int
         Of Newton's method.
+
+    Notes
+    -----
+    ``rest["slider.position"]`` is an output of the mechanism there.
     """
 
-    parameters: FiveBarParameters
-    crank_angle: float
-    slider_position: float
-    inputs: dynamics.Inputs
-    torque: float
+    parameters: Parameters
+    coordinates: FloatArray
+    inputs: Inputs
+    holding: dict[str, float]
     stiffness: FloatArray
     residual: float
     iterations: int
 
+    def __getitem__(self, name: str) -> float:
+        mechanism, p = mechanism_of(self.parameters), self.parameters.constants()
+        if name not in mechanism.output_names:
+            raise InputError(f"there is no output {name!r}: the outputs are {', '.join(mechanism.output_names)}")
+        modes, channels = channels_along(mechanism, self.inputs, np.zeros(1), np.array([self.state]))
+        applied = mechanism.equations.applied(tuple(map(float, modes)), tuple(channels[0].tolist()), p)
+        outputs = mechanism.equations.outputs(self.state, applied, 0.0, p)
+        return float(outputs[mechanism.output_names.index(name)])
+
     @property
-    def state(self) -> dynamics.State:
+    def state(self) -> tuple[float, ...]:
         """The state of the plant there."""
-        return (self.crank_angle, self.slider_position, 0.0, 0.0, 0.0, 0.0)
+        return mechanism_of(self.parameters).state(self.initial)
+
+    @property
+    def initial(self) -> InitialState:
+        """The start of a run there."""
+        mechanism = mechanism_of(self.parameters)
+        names = [freedom.initial[0] for freedom in mechanism.freedoms]
+        return mechanism.initial(**dict(zip(names, self.coordinates.tolist())))
 
     @property
     def stable(self) -> bool:
         """Whether it is a minimum of the potential energy of springs, gravity and constant forces in the free freedoms."""
-        scale = np.array([1.0, self.parameters.crank_length])
-        first = int(self.inputs.speed_drive)
-        free = (scale[:, None] * self.stiffness * scale)[first:, first:]
+        balance = _Balance.of(self.parameters, self.inputs)
+        free = (balance.scale[:, None] * self.stiffness * balance.scale)[np.ix_(balance.free, balance.free)]
         values = np.linalg.eigvalsh(free)
         return bool(values[0] > 1e-9 * np.abs(values).max())
 
     @property
     def potential(self) -> float:
-        """Potential energy of springs, gravity and the constant forces (J); the torque's part counts from th2 = 0."""
-        p = self.parameters.constants()
-        g = kinematics.position(self.crank_angle, self.slider_position, p)
-        x, y = kinematics.coupler_point(g, p)
-        i = self.inputs
-        work = i.torque * self.crank_angle + i.force * self.slider_position + i.load_x * x + i.load_y * y
-        return dynamics.potential_energy(g, self.slider_position, p) - work
+        """Potential energy of springs, gravity and the constant forces (J); a force's part counts from displacement 0."""
+        mechanism = mechanism_of(self.parameters)
+        work = 0.0
+        for channel in mechanism.channels:
+            force = getattr(self.inputs, channel.argument) if channel.kind == "force" else None
+            where = mechanism.freedoms[channel.freedom].coordinate if channel.freedom >= 0 else channel.displacement
+            if force and where:
+                work += force * self[where]
+        return mechanism.equations.energy(self.state, self.parameters.constants()) - work
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class _Balance:
-    """The equations of rest: forces over the freedoms that are free, made comparable by the crank's length."""
+    """The equations of rest: forces over the freedoms that are free, made comparable by the mechanism's own scales.
 
-    parameters: FiveBarParameters
-    inputs: dynamics.Inputs
+    Attributes
+    ----------
+    modes : tuple of int
+        In which what is held is free, under no force: the forces then are those that hold it.
+    its : Layout
+        What is moved in those modes: free or held.
+    free : list of int
+        Which of those are free.
+    scale : ndarray
+        Of the coordinates of those.
+    """
+
+    parameters: Parameters
+    mechanism: Mechanism
+    inputs: Inputs
+    channels: FloatArray
+    modes: Modes
+    its: Layout
+    free: list[int]
+    scale: FloatArray
+
+    @classmethod
+    def of(cls, parameters: Parameters, inputs: Inputs) -> _Balance:
+        mechanism = mechanism_of(parameters)
+        given(mechanism, inputs, None)
+        if not inputs.held_exactly:
+            raise InputError(f"{inputs}: at an equilibrium all of them must be constant")
+        still = np.zeros((1, mechanism.size))
+        modes, channels = channels_along(mechanism, inputs, np.zeros(1), still)
+        forces = {channel.argument for channel in mechanism.channels if channel.kind == "force"}
+        held = layout(mechanism, modes).commanded
+        loose = list(modes)
+        for place, mode in enumerate(mechanism.modes):
+            if any(mechanism.freedoms[n].mode is mode for n in held):
+                loose[place] = next((k for k, name in enumerate(mode.arguments) if name in forces), modes[place])
+        its = layout(mechanism, tuple(loose))
+        free = [place for place, n in enumerate(its.free) if n not in held]
+        if not free:
+            raise InputError(f"no freedom of the {mechanism.name} is free: there is no equilibrium to be found")
+        scale = np.array(mechanism.error_scale(parameters, tuple(still[0].tolist())))[list(its.free)]
+        return cls(
+            parameters=parameters, mechanism=mechanism, inputs=inputs, channels=channels[0],
+            modes=tuple(loose), its=its, free=free, scale=scale,
+        )  # fmt: skip
 
     @property
-    def free(self) -> slice:
-        return slice(int(self.inputs.speed_drive), 2)
+    def constants(self) -> FloatArray:
+        return np.array([*self.parameters.constants(), 0.0])
 
-    @property
-    def scale(self) -> FloatArray:
-        return np.array([1.0, self.parameters.crank_length])[self.free]
+    def imbalance(self, coordinates: FloatArray) -> FloatArray:
+        """Norms of the forces over the free freedoms at coordinates, shape (freedoms, n); infinite beyond the limit."""
+        n = coordinates.shape[1]
+        columns = (np.tile(value[:, None], n) for value in (self.channels, self.constants))
+        forces, clearance = map(np.asarray, _statics(self.mechanism, self.modes)[0].map(n)(coordinates, *columns))
+        norms = np.linalg.norm(self.scale[self.free, None] * forces[self.free], axis=0)
+        joined = np.isfinite(norms) & (clearance[0] >= LIMIT_SINE)
+        return np.where(joined, norms, np.inf)
 
-    def size(self, u: float) -> float:
-        """Magnitude of the generalised forces that have to balance (N.m)."""
-        p, i = self.parameters, self.inputs
-        moved = p.crank_mass + p.coupler_mass + p.rocker_mass + p.slider_mass
-        forces = (
-            p.slider_stiffness * (abs(u) + abs(p.slider_spring_free_position) + p.crank_length),
-            moved * p.gravity,
-            abs(i.force),
-            abs(i.load_x),
-            abs(i.load_y),
-        )
-        return p.crank_length * sum(forces) + abs(i.torque)
-
-    def forces(self, th2: float, u: float) -> tuple[float, float]:
-        """Generalised forces (N.m, N) at rest, torque and slider force included.
-
-        Raises
-        ------
-        ValueError, ZeroDivisionError
-            If the links cannot be joined there.
-        """
-        p, i = self.parameters.constants(), self.inputs
-        g = kinematics.position(th2, u, p)
-        q1, q2 = dynamics.applied_forces(g, kinematics.coefficients(g, p), u, 0.0, i.load_x, i.load_y, p)
-        return q1 + i.torque, q2 + i.force
-
-    def imbalance(self, th2: float, u: float) -> float:
-        """Norm of the forces over the freedoms that are free (N.m); infinite where the links cannot be joined."""
-        p = self.parameters.constants()
-        if kinematics.assembly_square(th2, u, p) < (LIMIT_SINE * p.l3 * p.l4) ** 2:
-            return float("inf")
-        return float(np.linalg.norm(self.scale * np.array(self.forces(th2, u))[self.free]))
-
-    def solve(self, th2: float, u: float) -> Equilibrium:
+    def solve(self, guess: FloatArray) -> Equilibrium:
         """Newton's method with halved steps where the imbalance would grow.
 
         Raises
@@ -160,163 +210,175 @@ class _Balance:
         EquilibriumError
             If it does not converge.
         """
-        p, i = self.parameters.constants(), self.inputs
-        q = np.array([th2, u])
-        before = self.imbalance(*q)
+        q, moved = guess.copy(), np.array(self.its.free)[self.free]
+        before = self.imbalance(q[:, None])[0]
         for iteration in range(MOST_ITERATIONS):
-            _, slope = _statics()(q, [i.load_x, i.load_y], list(p))
-            stiffness = np.asarray(slope)
-            if before <= BALANCE * self.size(q[1]):
-                force = self.forces(*q)[0] - i.torque
-                torque = -force if i.speed_drive else i.torque
-                residual = float(before / self.size(q[1]))
-                return Equilibrium(
-                    parameters=self.parameters, crank_angle=float(q[0]), slider_position=float(q[1]), inputs=i,
-                    torque=float(torque), stiffness=stiffness, residual=residual, iterations=iteration,
-                )  # fmt: skip
-            scaled = self.scale[:, None] * stiffness[self.free, self.free] * self.scale
-            right = self.scale * np.array(self.forces(*q))[self.free]
+            forces, stiffness, of_inputs = map(
+                np.asarray, _statics(self.mechanism, self.modes)[1](q, self.channels, self.constants)
+            )
+            size = self._size(q, stiffness, of_inputs)
+            scale = self.scale[self.free]
+            scaled = scale[:, None] * stiffness[np.ix_(self.free, self.free)] * scale
             # where the equilibrium is neutral the shortest of the steps that reach it is taken
-            step = self.scale * np.linalg.lstsq(scaled, right, rcond=1e-10)[0]
-            for halving in range(40):
-                trial = q.copy()
-                trial[self.free] += 0.5**halving * step
-                after = self.imbalance(*trial)
-                if after < before:
-                    break
-            else:
+            step = scale * np.linalg.lstsq(scaled, scale * forces[self.free, 0], rcond=1e-10)[0]
+            trials = np.tile(q[:, None], 40)
+            trials[moved] += step[:, None] * 0.5 ** np.arange(40)
+            after = self.imbalance(trials)
+            # as long as a step still brings much more it is taken
+            if before <= BALANCE * size and not np.any(after < 0.1 * before):
+                return self._found(q, forces[:, 0], stiffness, before / size if size else 0.0, iteration)
+            if not np.any(after < before):
                 break
-            q, before = trial, after
+            first = int(np.argmax(after < before))
+            q, before = trials[:, first].copy(), after[first]
         raise EquilibriumError(
-            f"no equilibrium found from crank angle {th2:.9g} rad and slider position {u:.9g} m: an imbalance of "
-            f"{before:.3g} N.m is left at crank angle {q[0]:.9g} rad and slider position {q[1]:.9g} m"
+            f"no equilibrium found from {self._words(guess)}: an imbalance of {before:.3g} N.m is left at {self._words(q)}"
         )
 
-    def starts(self, crank_angle: float | None) -> list[tuple[float, float]]:
+    def _size(self, q: FloatArray, stiffness: FloatArray, of_inputs: FloatArray) -> float:
+        """Magnitude of the generalised forces that have to balance (N.m)."""
+        # what comes round again has no displacement that a spring would feel
+        far = [0.0 if self.mechanism.freedoms[n].period else abs(q[n]) for n in self.its.free]
+        elastic = self.scale @ np.abs(stiffness) @ (self.scale + far)
+        return float(elastic + self.scale @ np.abs(of_inputs) @ np.abs(self.channels[list(self.its.forces)]))
+
+    def _found(
+        self, q: FloatArray, forces: FloatArray, stiffness: FloatArray, residual: float, iterations: int
+    ) -> Equilibrium:
+        held = [(self.mechanism.freedoms[n].coordinate, k) for k, n in enumerate(self.its.free) if k not in self.free]
+        return Equilibrium(
+            parameters=self.parameters, coordinates=q, inputs=self.inputs, stiffness=stiffness,
+            holding={name: -float(forces[k]) for name, k in held}, residual=float(residual), iterations=iterations,
+        )  # fmt: skip
+
+    def _words(self, q: FloatArray) -> str:
+        return self.mechanism.where([*q.tolist(), *[0.0] * (self.mechanism.size - len(q))])
+
+    def starts(self, held: FloatArray) -> list[FloatArray]:
         """Points of a grid over all configurations where the imbalance is less than at their neighbours."""
-        p = self.parameters.constants()
-        reach = p.l1 + p.l2 + p.l3 + p.l4
-        angles = 2.0 * pi * np.arange(GRID[0]) / GRID[0] if crank_angle is None else np.array([crank_angle])
-        positions = np.linspace(-reach, reach, GRID[1])
-        values = np.array([[self.imbalance(th2, u) for u in positions] for th2 in angles])
-        least = values.copy()
-        for along in (-1, 0, 1):
-            turned = np.roll(values, along, axis=0)
-            padded = np.pad(turned, ((0, 0), (1, 1)), constant_values=np.inf)
-            for across in (0, 1, 2):
-                least = np.minimum(least, padded[:, across : across + len(positions)])
-        rows, columns = np.nonzero(np.isfinite(values) & (values <= least))
-        return [(float(angles[r]), float(positions[c])) for r, c in zip(rows, columns)]
+        lengths = [
+            abs(getattr(self.parameters, field.name))
+            for field in fields(self.parameters)
+            if self.mechanism.mechanism_variables[fmi_name(field.name)].unit == "m"
+        ]
+        axes, ends = [], []
+        for k in self.free:
+            period = self.mechanism.freedoms[self.its.free[k]].period
+            reach = max(sum(lengths), self.scale[k])
+            axes.append(period * np.arange(GRID[0]) / GRID[0] if period else np.linspace(-reach, reach, GRID[1]))
+            ends.append("wrap" if period else "constant")
+        points = np.meshgrid(*axes, indexing="ij")
+        columns = np.tile(held[:, None], points[0].size)
+        columns[np.array(self.its.free)[self.free]] = [axis.ravel() for axis in points]
+        values = self.imbalance(columns).reshape(points[0].shape)
+        least = minimum_filter(values, size=3, mode=ends, cval=np.inf)
+        return list(columns[:, (np.isfinite(values) & (values <= least)).ravel()].T)
 
 
-def _static_inputs(
-    crank_torque: float, slider_force: float, load: tuple[float, float], crank_angle: float | None
-) -> dynamics.Inputs:
-    named = {"crank torque": crank_torque, "slider force": slider_force, "load.fx": load[0], "load.fy": load[1]}
-    for name, value in named.items():
+def _held(
+    parameters: Parameters, inputs: Inputs | None, held: Mapping[str, float] | None
+) -> tuple[_Balance, FloatArray]:
+    """The equations of rest, and coordinates that are zero but for those of freedoms that are held."""
+    mechanism = mechanism_of(parameters)
+    inputs, _ = given(mechanism, inputs, None)
+    coordinates = np.zeros(len(mechanism.freedoms))
+    commands = {mechanism.freedoms[c.freedom].coordinate: c for c in mechanism.channels if c.kind == "command"}
+    for name, value in (held or {}).items():
+        if name not in commands:
+            raise InputError(f"{name} cannot be held: what can is {', '.join(commands) or 'nothing'}")
         if not isfinite(value):
             raise InputError(f"{name} is {value}: it must be a finite number")
-    if crank_angle is not None and not isfinite(crank_angle):
-        raise InputError(f"crank angle is {crank_angle} rad: it must be a finite number")
-    if crank_angle is not None and crank_torque != 0.0:
-        raise InputError(f"crank torque is {crank_torque} N.m, but the crank is held: the torque is a result then")
-    return dynamics.Inputs(float(crank_angle is not None), crank_torque, 0.0, slider_force, *load)
+        inputs = inputs.replace(**{commands[name].argument: 0.0})
+        coordinates[commands[name].freedom] = value
+    return _Balance.of(parameters, inputs), coordinates
 
 
 def find_equilibria(
-    parameters: FiveBarParameters,
-    *,
-    crank_torque: float = 0.0,
-    slider_force: float = 0.0,
-    load: tuple[float, float] = (0.0, 0.0),
-    crank_angle: float | None = None,
+    parameters: Parameters, inputs: Inputs | None = None, *, held: Mapping[str, float] | None = None
 ) -> tuple[Equilibrium, ...]:
     """All equilibria that a search from a grid over the configurations finds, the one of least potential energy first.
 
     Parameters
     ----------
-    parameters : FiveBarParameters
-    crank_torque, slider_force : float
-        N.m, N.
-    load : (float, float)
-        On the coupler point P (N).
-    crank_angle : float, optional
-        Angle at which the crank is held (rad); by default it is free.
+    parameters
+        Of the mechanism.
+    inputs : Inputs, optional
+        Constant forces; by default none. A freedom whose rate is commanded, which must be 0, is held.
+    held : mapping, optional
+        Coordinates (rad, m) of freedoms that are held, such as ``{"crank.angle": 0.5}``; of one that is held by the inputs
+        alone it is 0.
 
     Returns
     -------
     tuple of Equilibrium
-        Crank angles of a free crank in (-pi, pi]. Where the equilibria are not isolated, some of them.
+        Angles of freedoms that come round again in (-pi, pi]. Where the equilibria are not isolated, some of them.
 
     Raises
     ------
     InputError
-        If a force is not finite, or a torque is given for a crank that is held.
+        If a force is not constant, a freedom that is held moves or is driven by a force, or nothing is free.
     """
-    require_five_bar(parameters, "an equilibrium")
-    inputs = _static_inputs(crank_torque, slider_force, load, crank_angle)
-    balance = _Balance(parameters, inputs)
+    balance, coordinates = _held(parameters, inputs, held)
     found: list[Equilibrium] = []
-    for start in balance.starts(crank_angle):
+    for start in balance.starts(coordinates):
         try:
-            one = balance.solve(*start)
+            one = balance.solve(start)
         except EquilibriumError:
             continue
-        if crank_angle is None:
-            th2 = pi - (pi - one.crank_angle) % (2.0 * pi)
-            one = balance.solve(th2, one.slider_position)
-        gaps = (
-            abs(one.crank_angle - other.crank_angle)
-            + abs(one.slider_position - other.slider_position) / parameters.crank_length
-            for other in found
-        )
+        turned = one.coordinates.copy()
+        for n in (balance.its.free[k] for k in balance.free):
+            if period := balance.mechanism.freedoms[n].period:
+                turned[n] = 0.5 * period - (0.5 * period - turned[n]) % period
+        one = balance.solve(turned)
+        places = list(balance.its.free)
+        gaps = (np.sum(np.abs(one.coordinates - other.coordinates)[places] / balance.scale) for other in found)
         if min(gaps, default=1.0) > 1e-6:
             found.append(one)
     return tuple(sorted(found, key=lambda one: one.potential))
 
 
 def find_equilibrium(
-    parameters: FiveBarParameters,
+    parameters: Parameters,
+    inputs: Inputs | None = None,
     *,
-    crank_torque: float = 0.0,
-    slider_force: float = 0.0,
-    load: tuple[float, float] = (0.0, 0.0),
-    crank_angle: float | None = None,
-    guess: tuple[float, float] | None = None,
+    held: Mapping[str, float] | None = None,
+    guess: ArrayLike | None = None,
 ) -> Equilibrium:
-    """An equilibrium of the plant at rest: hanging freely, or with the crank held.
+    """An equilibrium of a mechanism at rest: hanging freely, or with some of its freedoms held.
 
     Parameters
     ----------
-    parameters, crank_torque, slider_force, load, crank_angle
+    parameters, inputs, held
         As for `find_equilibria`.
-    guess : (float, float), optional
-        Crank angle (rad) and slider position (m) from where to search; of a crank that is held the angle is not used. By
-        default the stable equilibrium of least potential energy is taken, or, where there is none, the lowest of all.
+    guess : array_like, optional
+        All coordinates (rad, m) from where to search; of a freedom that is held its own is not used. By default the stable
+        equilibrium of least potential energy is taken, or, where there is none, the lowest of all.
 
     Raises
     ------
     InputError
-        If a force is not finite, or a torque is given for a crank that is held.
+        As `find_equilibria`.
     AssemblyError
         If the links cannot be joined at the guess.
     EquilibriumError
         If there is no equilibrium, or none is found from the guess; says what is left, and where.
     """
-    require_five_bar(parameters, "an equilibrium")
-    inputs = _static_inputs(crank_torque, slider_force, load, crank_angle)
     if guess is not None:
-        th2 = float(guess[0]) if crank_angle is None else crank_angle
-        check_assembly(parameters, th2, float(guess[1]))
-        return _Balance(parameters, inputs).solve(th2, float(guess[1]))
-    found = find_equilibria(
-        parameters, crank_torque=crank_torque, slider_force=slider_force, load=load, crank_angle=crank_angle
-    )
+        balance, coordinates = _held(parameters, inputs, held)
+        start = np.array(guess, dtype=float)
+        if start.shape != coordinates.shape or not np.all(np.isfinite(start)):
+            raise InputError(f"a guess {guess}: it must be {len(coordinates)} finite numbers")
+        fixed = layout(balance.mechanism, tuple(balance.inputs.modes(balance.mechanism).values())).commanded
+        start[list(fixed)] = coordinates[list(fixed)]
+        state = [*start.tolist(), *[0.0] * (balance.mechanism.size - len(start))]
+        balance.mechanism.check_assembly(parameters, state)
+        return balance.solve(start)
+    found = find_equilibria(parameters, inputs, held=held)
     if not found:
-        held = "" if crank_angle is None else f" with the crank held at {crank_angle:.9g} rad"
+        given_words = [f"{name} = {value:g}" for name, value in (held or {}).items()]
+        under = ", ".join(f"{name} {getattr(inputs, name)}" for name in inputs or ()) or "no force"
         raise EquilibriumError(
-            f"there is no equilibrium{held} under the crank torque {crank_torque:g} N.m, the slider force "
-            f"{slider_force:g} N and the load ({load[0]:g}, {load[1]:g}) N, as far as a grid of {GRID[0]} crank angles "
-            f"and {GRID[1]} slider positions shows"
+            f"there is no equilibrium{' with ' * bool(held) + ', '.join(given_words)} under {under}, as far as a grid of "
+            f"{GRID[0]} angles and {GRID[1]} positions shows"
         )
     return next((one for one in found if one.stable), found[0])

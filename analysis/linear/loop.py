@@ -13,25 +13,51 @@ from pathlib import Path
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from linkwork.errors import AssemblyError, InputError, IntegrationError
-from linkwork.five_bar.parameters import FiveBarParameters, InitialState
-from linkwork.five_bar.variables import OUTPUT_NAMES
+from linkwork.mechanism import Channel, Mechanism
 from linkwork.plant import Plant
 
-from ..mechanisms import FIVE_BAR
-from ..run import FmuRun, Trajectory, sample_times
-from .design import MEASURED, SliderDesign, check_period, on_plant
+from ..mechanisms import InitialState, Parameters, mechanism_of
+from ..run import FmuRun, Inputs, Trajectory, align, encode, given, sample, sample_times
+from .design import Design, check_period
 from .model import FloatArray, LinearModel
 from .periodic import PeriodicModel
 
 #: A value, or a function of time (s) that is sampled with the controller.
 Reference = float | Callable[[float], float]
-Load = tuple[float, float] | Callable[[float], tuple[float, float]]
-_COLUMNS = [OUTPUT_NAMES.index(name) for name in MEASURED]
 #: Largest product of a step of the linear model's Runge-Kutta method with its fastest rate.
 FINE_STEP = 0.03
+#: How far from rest, relative to the mechanism's scales and stiffness, a model may be that a loop is predicted on.
+AT_REST = 1e-6
+
+
+def limited(force: float, limit: float) -> float:
+    """A force within a limit either way."""
+    return min(max(force, -limit), limit)
+
+
+def check_limit(limit: float) -> None:
+    """Make sure that a limit of a force (N) is usable.
+
+    Raises
+    ------
+    InputError
+        If it is not greater than zero.
+    """
+    if not limit > 0.0:
+        raise InputError(f"limit of the force is {limit} N: it must be greater than zero")
+
+
+def rms(values: FloatArray) -> float:
+    """Root mean square."""
+    return float(np.sqrt(np.mean(values**2)))
+
+
+def peak(values: FloatArray) -> float:
+    """Largest magnitude."""
+    return float(np.abs(values).max())
 
 
 class SampledController:
@@ -39,24 +65,25 @@ class SampledController:
 
     Parameters
     ----------
-    design : SliderDesign
+    design : Design
     period : float
         s.
     limit : float
         Largest force either way (N). At the limit the integral does not grow further against it.
     """
 
-    def __init__(self, design: SliderDesign, period: float, *, limit: float = inf) -> None:
+    def __init__(self, design: Design, period: float, *, limit: float = inf) -> None:
         check_period(period)
-        if not limit > 0.0:
-            raise InputError(f"limit of the force is {limit} N: it must be greater than zero")
+        check_limit(limit)
         self.design = design
         self.period = period
         self.limit = limit
         self.integral = 0.0
-        self._gains = on_plant(design.model, design.gains)
-        self._target = on_plant(design.model, design.target)
-        self._slope = on_plant(design.model, design.target_slope)
+        self.channel = design.channel
+        self._place = design.freedom
+        self._gains: list[float] = design.on_plant(design.gains).tolist()
+        self._target: list[float] = design.on_plant(design.target).tolist()
+        self._slope: list[float] = design.on_plant(design.target_slope).tolist()
 
     def reset(self) -> None:
         """Forget the integral."""
@@ -68,33 +95,33 @@ class SampledController:
         return self.design.method
 
     def force(self, measured: Sequence[float], reference: float) -> float:
-        """The force (N) for the next period, from (th2, u, th2', u') and the reference (m)."""
-        step = reference - self._target[1]
+        """The force for the next period, from all coordinates and all rates and the reference of the coordinate."""
+        step = reference - self._target[self._place]
         wanted = self.holding_force(reference)
         for gain, value, target, slope in zip(self._gains, measured, self._target, self._slope):
             wanted -= gain * (value - target - slope * step)
-        return self._limited(wanted, measured[1] - reference)
+        return self._limited(wanted, measured[self._place] - reference)
 
     def holding_force(self, reference: float) -> float:
-        """The force (N) that holds the slider at a reference (m) on the linear model."""
-        return self.design.force + self.design.force_slope * (reference - self._target[1])
+        """The force that holds the coordinate at a reference on the linear model."""
+        return self.design.force + self.design.force_slope * (reference - self._target[self._place])
 
     def follow(self, feedforward: float, position_error: float, velocity_error: float) -> float:
-        """The force (N) for the next period along a moving reference, from the slider's errors (m, m/s) against it.
+        """The force for the next period along a moving reference, from the errors of coordinate and rate against it.
 
-        ``feedforward`` (N) takes the place of the holding force; no gain acts on the crank.
+        ``feedforward`` takes the place of the holding force; no gain acts on other freedoms.
         """
-        _, k_u, _, k_v = self._gains
+        k_u, k_v = self._gains[self._place], self._gains[len(self._gains) // 2 + self._place]
         return self._limited(feedforward - k_u * position_error - k_v * velocity_error, position_error)
 
     def _limited(self, wanted: float, error: float) -> float:
-        """The force wanted, integral added, within the limit; the integral goes on by the error (m)."""
+        """The force wanted, integral added, within the limit; the integral goes on by the error."""
         d = self.design
         wanted -= d.integral_gain * self.integral
         # a force beyond the limit is not asked for still louder
         if abs(wanted) <= self.limit or wanted * d.integral_gain * error > 0.0:
             self.integral += self.period * error
-        return min(max(wanted, -self.limit), self.limit)
+        return limited(wanted, self.limit)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -104,13 +131,13 @@ class LoopMetrics:
     Attributes
     ----------
     settling_time : float or None
-        From the start to when the slider stays within the band about the reference (s); None if it does not.
+        From the start to when the coordinate stays within the band about the reference (s); None if it does not.
     overshoot : float
-        How far the slider goes past the reference, as a share of the way to it.
+        How far it goes past the reference, as a share of the way to it.
     peak_force : float
         Largest force either way (N).
     rms_error, peak_error : float
-        Of the slider against the reference over the window at the end (m).
+        Against the reference over the window at the end (m).
     rms_force : float
         Over that window (N).
     """
@@ -131,10 +158,12 @@ class LoopResult:
     ----------
     time : ndarray, shape (n,)
         s.
-    states : ndarray, shape (n, 4)
-        (th2, u, th2', u').
+    states : ndarray, shape (n, 2 f)
+        All coordinates, then all rates: of a five-bar (th2, u, th2', u').
     force, reference : ndarray, shape (n,)
         N, m; each holds until the next sample.
+    freedom : int
+        Number of the freedom that is controlled; by default the last.
     trajectory : Trajectory or None
         All outputs of the plant; a linear model has none.
     status : int
@@ -147,14 +176,27 @@ class LoopResult:
     states: FloatArray
     force: FloatArray
     reference: FloatArray
+    freedom: int = -1
     trajectory: Trajectory | None = None
     status: int = 0
     message: str = ""
 
     @property
     def position(self) -> FloatArray:
-        """Slider position (m), shape (n,)."""
-        return self.states[:, 1]
+        """The coordinate that is controlled (m), shape (n,)."""
+        return self.states[:, : self.states.shape[1] // 2][:, self.freedom]
+
+    def end(self, window: float) -> NDArray[np.bool_]:
+        """Which samples are in the window (s) at the end.
+
+        Raises
+        ------
+        InputError
+            If the run ended early.
+        """
+        if self.status:
+            raise InputError(f"the run did not reach its end: {self.message}")
+        return np.asarray(self.time > self.time[-1] - window * (1.0 - 1e-9))
 
     def metrics(self, *, band: float, start: float = 0.0, window: float | None = None) -> LoopMetrics:
         """Settling, overshoot, force and tracking error.
@@ -173,12 +215,11 @@ class LoopResult:
         InputError
             If band or window is not greater than zero, the start is not within the run, or the run ended early.
         """
-        if self.status:
-            raise InputError(f"the loop did not reach its end: {self.message}")
         if not band > 0.0:
             raise InputError(f"band of settling is {band} m: it must be greater than zero")
         length = self.time[-1] - self.time[0]
         window = 0.1 * length if window is None else window
+        end = self.end(window)
         if not 0.0 < window <= length * (1.0 + 1e-9) or not self.time[0] <= start < self.time[-1]:
             raise InputError(
                 f"a window of {window} s and a start at {start} s: both must lie within the run from {self.time[0]:g} s to "
@@ -193,25 +234,27 @@ class LoopResult:
             settled = float(self.time[after] - self.time[first]) if after < len(self.time) else None
         way = self.reference[first] - self.position[first]
         past = float((np.sign(way) * error[first:]).max())
-        end = self.time > self.time[-1] - window * (1.0 - 1e-9)
         return LoopMetrics(
             settling_time=settled,
             overshoot=max(0.0, past) / abs(float(way)) if way else 0.0,
-            peak_force=float(np.abs(self.force).max()),
-            rms_error=float(np.sqrt(np.mean(error[end] ** 2))),
-            peak_error=float(np.abs(error[end]).max()),
-            rms_force=float(np.sqrt(np.mean(self.force[end] ** 2))),
+            peak_force=peak(self.force),
+            rms_error=rms(error[end]),
+            peak_error=peak(error[end]),
+            rms_force=rms(self.force[end]),
         )
 
 
 class Controller(Protocol):
-    """What closes a loop every ``period`` s."""
+    """What closes a loop every ``period`` s, by the force ``channel``."""
 
     @property
     def period(self) -> float: ...
 
     @property
     def method(self) -> str: ...
+
+    @property
+    def channel(self) -> str: ...
 
     def reset(self) -> None: ...
 
@@ -223,51 +266,69 @@ class _Plant(Protocol):
 
     def measure(self) -> Sequence[float]: ...
 
-    def act(self, force: float, load: tuple[float, float]) -> None: ...
+    def act(self, time: float, ahead: float, measured: Sequence[float], force: float) -> None: ...
 
     def step(self, time: float, step: float) -> tuple[int, str]: ...
 
 
-def _run_loop(plant: _Plant, controller: Controller, reference: Reference, load: Load, times: FloatArray) -> LoopResult:
+def _run_loop(
+    plant: _Plant, controller: Controller, reference: Reference, times: FloatArray, freedom: int
+) -> LoopResult:
     """Measure, compute, hold, step; the controller starts afresh."""
     controller.reset()
     rows: list[tuple[float, ...]] = []
     status, message = 0, ""
-    for index, t in enumerate(times.tolist()):
+    ahead = [*times[1:].tolist(), float(times[-1]) + controller.period]
+    for t, later in zip(times.tolist(), ahead):
         measured = tuple(plant.measure())
         wanted = reference(t) if callable(reference) else reference
         if not isfinite(wanted):
             raise InputError(f"the reference is {wanted} m at t = {t:.9g} s: it must be a finite number")
         force = controller.force(measured, wanted)
         rows.append((*measured, force, wanted))
-        plant.act(force, load(t) if callable(load) else load)
-        if index + 1 < len(times):
-            status, message = plant.step(t, float(times[index + 1]) - t)
+        plant.act(t, later, measured, force)
+        if len(rows) < len(times):
+            status, message = plant.step(t, later - t)
         if status:
             break
     table = np.array(rows)
     return LoopResult(
         time=times[: len(table)],
-        states=table[:, :4],
-        force=table[:, 4],
-        reference=table[:, 5],
+        states=table[:, :-2],
+        force=table[:, -2],
+        reference=table[:, -1],
+        freedom=freedom,
         status=status,
         message=message,
     )
 
 
-class _InProcess:
+class _Driven:
+    """The nonlinear plant, in this process or as its FMU: what acts on it besides the controller is sampled and held."""
+
+    def __init__(self, mechanism: Mechanism, inputs: Inputs, channel: str, times: FloatArray) -> None:
+        self.mechanism, self.channel = mechanism, channel
+        self._encoded = align(encode(inputs, mechanism), times)
+        self._law = self._encoded.law.copy()
+        self.modes = self._encoded.modes
+        self.rows: list[Sequence[float]] = []
+
+    def inputs(self, time: float, ahead: float, measured: Sequence[float]) -> dict[str, float]:
+        """All inputs by their FMI names, the controller's at 0."""
+        x = np.array([*measured, 0.0, 0.0])
+        return dict(zip(self.mechanism.input_names, sample(self._encoded, time, x, self._law, ahead=ahead).tolist()))
+
+
+class _InProcess(_Driven):
     """The plant in this process."""
 
-    def __init__(self, plant: Plant) -> None:
-        self.plant = plant
-        self.rows: list[tuple[float, ...]] = []
+    plant: Plant
 
     def measure(self) -> Sequence[float]:
-        return self.plant.state[:4]
+        return self.plant.state[:-2]
 
-    def act(self, force: float, load: tuple[float, float]) -> None:
-        for name, value in (("slider.force", force), ("load.fx", load[0]), ("load.fy", load[1])):
+    def act(self, time: float, ahead: float, measured: Sequence[float], force: float) -> None:
+        for name, value in (self.inputs(time, ahead, measured) | {self.channel: force}).items():
             self.plant.set_input(name, value)
         self.rows.append(self.plant.outputs())
 
@@ -279,37 +340,40 @@ class _InProcess:
         return 0, ""
 
 
-class _Fmu:
+class _Fmu(_Driven):
     """The plant's FMU."""
 
-    def __init__(self, run: FmuRun, inputs: dict[str, float]) -> None:
-        self.run = run
-        self.inputs = inputs
-        self.rows: list[list[float]] = []
+    run: FmuRun
 
     def measure(self) -> Sequence[float]:
-        values = self.run.outputs()
-        return [values[column] for column in _COLUMNS]
+        values = dict(zip(self.mechanism.output_names, self.run.outputs()))
+        freedoms = self.mechanism.freedoms
+        return [values[f.coordinate] for f in freedoms] + [values[f.rate] for f in freedoms]
 
-    def act(self, force: float, load: tuple[float, float]) -> None:
-        self.inputs |= {"slider.force": force, "load.fx": load[0], "load.fy": load[1]}
-        self.run.set_inputs(self.inputs)
+    def act(self, time: float, ahead: float, measured: Sequence[float], force: float) -> None:
+        self.run.set_inputs(self.inputs(time, ahead, measured) | {self.channel: force})
         self.rows.append(self.run.outputs())
 
     def step(self, time: float, step: float) -> tuple[int, str]:
         return self.run.step(time, step)
 
 
+def _channel(mechanism: Mechanism, name: str) -> Channel:
+    """The force of the controller among the channels."""
+    for channel in mechanism.channels:
+        if channel.name == name and channel.kind == "force" and channel.freedom >= 0:
+            return channel
+    raise InputError(f"the controller acts by {name!r}, which is no force on a freedom of the {mechanism.name}")
+
+
 def control_loop(
-    parameters: FiveBarParameters,
+    parameters: Parameters,
     controller: Controller,
     reference: Reference,
+    inputs: Inputs | None = None,
     *,
     initial: InitialState,
     stop_time: float,
-    crank_speed: float | None = None,
-    crank_torque: float = 0.0,
-    load: Load = (0.0, 0.0),
     fmu: str | Path | None = None,
     tolerance: float = 1e-9,
 ) -> LoopResult:
@@ -317,22 +381,21 @@ def control_loop(
 
     Parameters
     ----------
-    parameters : FiveBarParameters
+    parameters
+        Of a mechanism.
     controller : Controller
         Such as a `SampledController`; starts with its integral at zero.
     reference : float or function of time
-        Slider position to hold (m).
-    initial : InitialState
+        Of the coordinate that is controlled, such as the slider position (m).
+    inputs : Inputs, optional
+        All else that acts, such as the speed of the crank (0 of one that is held), sampled and held with the controller. By
+        default nothing does.
+    initial
+        State at the start.
     stop_time : float
         s.
-    crank_speed : float, optional
-        Constant prescribed speed (rad/s), 0 of a crank that is held; by default the crank is free.
-    crank_torque : float
-        On a free crank (N.m).
-    load : (float, float) or function of time
-        On the coupler point P (N), sampled and held with the controller.
     fmu : path, optional
-        FiveBarSlider.fmu to be run instead of the plant in process.
+        The mechanism's FMU to be run instead of the plant in process.
     tolerance : float
         Of the plant's integrator.
 
@@ -345,36 +408,37 @@ def control_loop(
     Raises
     ------
     InputError
-        If something given is not usable.
+        If something given is not usable, or the inputs have the controller's own force.
     AssemblyError
         If the links cannot be joined at the start.
     """
-    if crank_speed is not None and crank_torque:
-        raise InputError("both crank speed and torque are given: the crank can be driven by one of them only")
+    mechanism = mechanism_of(parameters)
+    inputs, initial = given(mechanism, inputs, initial)
+    channel = _channel(mechanism, controller.channel)
+    if channel.argument in inputs:
+        raise InputError(f"{channel.argument} is among the inputs, but it is the controller's")
+    # an argument that is given, be it 0, chooses the mode in which it acts
+    inputs = inputs.replace(**{channel.argument: 0.0})
     times = sample_times(stop_time, controller.period)
-    mode = int(crank_speed is not None)
-    inputs = {
-        "drive.torque": crank_torque,
-        "drive.speed": crank_speed or 0.0,
-        "drive.acceleration": 0.0,
-        "slider.force": 0.0,
-        "load.fx": 0.0,
-        "load.fy": 0.0,
-    }
     if fmu is None:
-        inner = _InProcess(Plant(FIVE_BAR, parameters, initial, drive_mode=mode, tolerance=tolerance, inputs=inputs))
-        result = _run_loop(inner, controller, reference, load, times)
+        inner = _InProcess(mechanism, inputs, controller.channel, times)
+        first = inner.inputs(float(times[0]), float(times[1]), mechanism.state(initial)[:-2])
+        modes = {name.replace(".", "_"): value for name, value in inner.modes.items()}
+        inner.plant = Plant(mechanism, parameters, initial, tolerance=tolerance, inputs=first, **modes)
+        result = _run_loop(inner, controller, reference, times, channel.freedom)
         rows, source = np.array(inner.rows), "plant in process"
     else:
-        modes = {"drive.mode": mode}
-        with FmuRun(fmu, parameters, initial, modes=modes, inputs=inputs, start_time=0.0, tolerance=tolerance) as run:
-            outer = _Fmu(run, inputs)
-            result = _run_loop(outer, controller, reference, load, times)
-            rows, source = np.array(outer.rows), str(fmu)
+        outer = _Fmu(mechanism, inputs, controller.channel, times)
+        first = outer.inputs(float(times[0]), float(times[1]), mechanism.state(initial)[:-2])
+        with FmuRun(
+            fmu, parameters, initial, modes=outer.modes, inputs=first, start_time=0.0, tolerance=tolerance
+        ) as outer.run:
+            result = _run_loop(outer, controller, reference, times, channel.freedom)
+        rows, source = np.array(outer.rows), str(fmu)
     trajectory = Trajectory(
         time=result.time,
         values=rows,
-        names=FIVE_BAR.output_names,
+        names=mechanism.output_names,
         status=result.status,
         message=result.message,
         source=f"{source}, {controller.method} sampled",
@@ -385,14 +449,22 @@ def control_loop(
 class _Linear:
     """Deviations of a linear model from the motion that it is about."""
 
-    def __init__(self, model: LinearModel | PeriodicModel, averaged: bool, deviation: FloatArray) -> None:
+    def __init__(
+        self,
+        model: LinearModel | PeriodicModel,
+        channel: str,
+        inputs: Inputs | None,
+        averaged: bool,
+        deviation: FloatArray,
+    ) -> None:
         one = model if isinstance(model, LinearModel) else model.mean()
-        self.names = one.state_names
-        self.free = [MEASURED.index(name) for name in self.names]
-        self.columns = [one.input_names.index(name) for name in ("slider.force", "load.fx", "load.fy")]
-        self.acting = np.array([one.inputs.force, one.inputs.load_x, one.inputs.load_y])
-        still = one.state[:4]
+        self.mechanism, self.places = one.mechanism, one.places
+        self.encoded = None if inputs is None else encode(given(self.mechanism, inputs, None)[0], self.mechanism)
+        n, forces = 2 * len(self.mechanism.freedoms), list(one.layout.forces)
+        self.forces, self.own = forces, forces.index(self.mechanism.input_names.index(channel))
+        still, acting = one.state[:n], one.channels[forces]
         self.motion: Callable[[float], FloatArray] = lambda t: still
+        self.acting = acting
         if isinstance(model, PeriodicModel):
             self.motion = model.motion()
         if isinstance(model, LinearModel) or averaged:
@@ -404,22 +476,27 @@ class _Linear:
         self.rate = float(np.abs(np.linalg.eigvals(model.A)).max())
         self.x = deviation
         self.t = 0.0
-        self.w = np.zeros(3)
+        self.w = np.zeros(len(forces))
 
     def measure(self) -> Sequence[float]:
         values = self.motion(self.t).copy()
-        values[self.free] += self.x
+        values[self.places] += self.x
         return [float(value) for value in values]
 
-    def act(self, force: float, load: tuple[float, float]) -> None:
-        self.w = np.array([force, *load]) - self.acting
+    def act(self, time: float, ahead: float, measured: Sequence[float], force: float) -> None:
+        held = self.acting.copy()
+        if self.encoded is not None:
+            x = np.array([*measured, 0.0, 0.0])
+            held = sample(self.encoded, time, x, self.encoded.law)[self.forces]
+        held[self.own] = force
+        self.w = held - self.acting
 
     def step(self, time: float, step: float) -> tuple[int, str]:
         count = max(1, ceil(step * self.rate / FINE_STEP))
         h = step / count
 
         def rates(t: float, x: FloatArray) -> FloatArray:
-            change: FloatArray = self.a(t) @ x + self.b(t)[:, self.columns] @ self.w
+            change: FloatArray = self.a(t) @ x + self.b(t)[:, : len(self.w)] @ self.w
             return change
 
         for number in range(count):
@@ -437,10 +514,10 @@ def predict_loop(
     model: LinearModel | PeriodicModel,
     controller: Controller,
     reference: Reference,
+    inputs: Inputs | None = None,
     *,
     stop_time: float,
     deviation: ArrayLike | None = None,
-    load: Load = (0.0, 0.0),
     averaged: bool = False,
 ) -> LoopResult:
     """The same loop around the linear model: what the design foretells of `control_loop`.
@@ -449,8 +526,10 @@ def predict_loop(
     ----------
     model : LinearModel or PeriodicModel
         About an equilibrium; or about a periodic motion, to which the deviations are then added, from its first sample on.
-    controller, reference, stop_time, load
+    controller, reference, stop_time
         As for `control_loop`.
+    inputs : Inputs, optional
+        Of which the forces act; what is commanded goes as in the motion. By default all acts as in the motion.
     deviation : array_like, shape (2 n,), optional
         Of the model's state from its operating point at the start.
     averaged : bool
@@ -465,20 +544,32 @@ def predict_loop(
     start = np.zeros(n) if deviation is None else np.array(deviation, dtype=float)
     if start.shape != (n,) or not np.all(np.isfinite(start)):
         raise InputError(f"a deviation of shape {start.shape}: it must be {n} finite numbers")
+    channel = _channel(model.mechanism, controller.channel)
+    if controller.channel not in model.input_names:
+        raise InputError(f"the controller acts by {controller.channel}, which is no input of the model")
     if isinstance(model, LinearModel):
-        p = model.parameters
-        moving = np.abs([*(p.crank_length * model.acceleration[:1]), *model.acceleration[1:], *model.state[2:4]]).max()
-        if moving > 1e-6 * max(p.gravity, 1.0):
-            raise InputError(
-                f"the model is about a state that moves (u'' = {model.acceleration[1]:.3g} m/s2): predict about an "
-                "equilibrium, or about a periodic motion by its PeriodicModel"
-            )
+        _check_rest(model)
     times = sample_times(stop_time, controller.period)
-    return _run_loop(_Linear(model, averaged, start), controller, reference, load, times)
+    plant = _Linear(model, controller.channel, inputs, averaged, start)
+    return _run_loop(plant, controller, reference, times, channel.freedom)
+
+
+def _check_rest(model: LinearModel) -> None:
+    """Make sure that nothing moves or starts to move where the model is."""
+    mechanism, n = model.mechanism, len(model.mechanism.freedoms)
+    scale = np.array(mechanism.error_scale(model.parameters, (0.0,) * mechanism.size))[:n]
+    free, size = list(model.layout.free), len(model.layout.free)
+    stiffness = np.abs(model.A[size:, :size] * scale[free] / scale[free, None]).max()
+    moving = np.maximum(np.abs(model.acceleration), np.abs(model.state[n : 2 * n])) / scale
+    if moving.max() > AT_REST * max(1.0, stiffness):
+        raise InputError(
+            f"the model is about a state that moves, by {mechanism.freedoms[int(moving.argmax())].rate} above all: predict "
+            "about an equilibrium, or about a periodic motion by its PeriodicModel"
+        )
 
 
 def largest_difference(first: LoopResult, second: LoopResult) -> float:
-    """Largest difference of the slider's position between two runs of as many samples (m)."""
+    """Largest difference of the coordinate that is controlled between two runs of as many samples (m)."""
     if first.time.shape != second.time.shape:
         raise InputError(f"runs of {len(first.time)} and {len(second.time)} samples: there must be as many in both")
     return float(np.abs(first.position - second.position).max())

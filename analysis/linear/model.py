@@ -1,12 +1,13 @@
-"""Linear models of the plant about one state.
+"""Linear models of a mechanism about one state.
 
-In the deviations q of (th2, u), or of u alone where the crank's motion is prescribed, and w of the inputs,
+In the deviations q of the freedoms that are free, and w of the inputs,
 
     M q'' + C q' + K q = F w
 
-with the exact derivatives of the plant's own functions, traced with CasADi (`analysis.numerics.symbolic`). The residual that is
-differentiated is m q'' + b - Q - (T, F2) of `linkwork.five_bar.dynamics`. Away from an equilibrium the accelerations are
-not zero, and K holds the derivative of m times them. CasADi is an extra: ``pip install 'linkwork[symbolic]'``.
+with the exact derivatives of the mechanism's own equations, traced with CasADi (`analysis.run.expressions`): of the
+accelerations a(q, q', w) they give K = -M da/dq, C = -M da/dq' and F = M da/dw, where M is the Hessian of the energy with
+respect to the rates. Away from an equilibrium the accelerations are not zero, and K holds the derivative of M times them.
+A freedom whose rate is commanded is none of q but acts through three inputs: acceleration, speed and coordinate.
 """
 
 from __future__ import annotations
@@ -15,7 +16,6 @@ import difflib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
-from types import MappingProxyType
 from typing import Any
 
 import control
@@ -23,36 +23,18 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from linkwork.errors import InputError, LinkworkError, UnknownNameError
-from linkwork.five_bar import dynamics
-from linkwork.five_bar.assembly import check_assembly
-from linkwork.five_bar.parameters import FiveBarParameters
-from linkwork.five_bar.variables import INPUTS, OUTPUT_NAMES, OUTPUTS
+from linkwork.mechanism import Mechanism
 
-from ..mechanisms import FIVE_BAR, require_five_bar
+from ..mechanisms import Parameters, mechanism_of
 from ..numerics import symbolic
-from ..run import constants, traced
+from ..run import Inputs, encode, expressions, given, sample
 
 FloatArray = NDArray[np.float64]
+#: Values of a mechanism's modes, in its order.
+Modes = tuple[int, ...]
 
-#: Outputs that a linear model does not have, and what they are.
-WITHOUT: Mapping[str, str] = MappingProxyType(
-    dict.fromkeys(
-        ("energy.dissipated", "energy.supplied", "energy.residual"),
-        "an integral over the run, no function of the state",
-    )
-    | {"closure.residual": "zero everywhere"}
-)
-#: Outputs of a linear model, in the order of the FMI contract.
-LINEAR_OUTPUTS = tuple(name for name in OUTPUT_NAMES if name not in WITHOUT)
-_ROWS = [OUTPUT_NAMES.index(name) for name in LINEAR_OUTPUTS]
-COORDINATES: tuple[str, ...] = ("crank.angle", "slider.position")
-RATES: tuple[str, ...] = ("crank.speed", "slider.velocity")
-TORQUE_INPUTS = ("drive.torque", "slider.force", "load.fx", "load.fy")
-#: In speed drive the crank's motion acts on the slider through its angle, speed and acceleration.
-SPEED_INPUTS = ("slider.force", "load.fx", "load.fy", "drive.acceleration", "drive.speed", "crank.angle")
-#: Unit of every input and output, by name.
-UNITS: Mapping[str, str] = MappingProxyType({v.name: v.unit for v in (*INPUTS, *OUTPUTS)})
-AT_REST = dynamics.Inputs(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+#: Largest difference of a commanded rate from that of the state, relative to the larger of the two and 1.
+SAME_RATE = 1e-6
 
 
 class LinearModelError(LinkworkError):
@@ -64,53 +46,140 @@ def signal_name(name: str) -> str:
     return name.replace(".", "_")
 
 
-@cache
-def _derivatives() -> Any:
-    """State (4,), inputs (6,), constants -> outputs and their derivatives, M, C, K and the inputs' forces."""
-    casadi, plant = symbolic.library(), traced(FIVE_BAR)
-    x, i, a = casadi.SX.sym("x", 4), casadi.SX.sym("i", 6), casadi.SX.sym("a", 2)
-    p, c = constants(FIVE_BAR)
-    th2, u, w2, v = casadi.vertsplit(x)
-    inputs = dynamics.Inputs(*casadi.vertsplit(i))
-    g = plant.position(th2, u, c)
-    k = plant.coefficients(g, c)
-    w3, w4 = k.k32 * w2 + k.k3u * v, k.k42 * w2 + k.k4u * v
-    m = plant.inertia(g, k, c)
-    b1, b2 = plant.velocity_terms(g, k, w2, w3, w4, *plant.centripetal(g, w2, w3, w4, c), c)
-    q1, q2 = plant.applied_forces(g, k, u, v, inputs.load_x, inputs.load_y, c)
-    residual = casadi.vertcat(
-        m.m11 * a[0] + m.m12 * a[1] + b1 - q1 - inputs.torque,
-        m.m12 * a[0] + m.m22 * a[1] + b2 - q2 - inputs.force,
-    )
-    by_state = casadi.jacobian(residual, x)
-    second_order = casadi.Function(
-        "second_order",
-        [x, a, i, p],
-        [casadi.jacobian(residual, a), by_state[:, 2:], by_state[:, :2], -casadi.jacobian(residual, i)],
-    )
-    state = (th2, u, w2, v, 0.0, 0.0)
-    rates = plant.derivative(state, inputs, c)
-    acceleration = casadi.vertcat(rates[2], rates[3])
-    y = casadi.vertcat(*plant.outputs(state, inputs, 0.0, c))[_ROWS]
-    results = [y, casadi.jacobian(y, x), casadi.jacobian(y, i), *second_order(x, acceleration, i, p)]
-    return casadi.Function("derivatives", [x, i, p], [casadi.densify(r) for r in results], {"cse": True})
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Layout:
+    """What is free, what is commanded and what acts on a mechanism in given modes.
+
+    Attributes
+    ----------
+    free, commanded : tuple of int
+        Numbers of the freedoms that forces move, and of those whose rates are commanded. Others, such as one that a groove
+        ties to another, are neither.
+    forces : tuple of int
+        Numbers of the channels whose forces act.
+    input_names : tuple of str
+        Of a linear model: the forces, then of each commanded freedom its acceleration, speed and coordinate.
+    state_names : tuple of str
+        Coordinates of the free freedoms, then their rates.
+    """
+
+    free: tuple[int, ...]
+    commanded: tuple[int, ...]
+    forces: tuple[int, ...]
+    input_names: tuple[str, ...]
+    state_names: tuple[str, ...]
 
 
 @cache
-def _mapped(samples: int) -> Any:
-    return _derivatives().map(samples)
+def layout(mechanism: Mechanism, modes: Modes) -> Layout:
+    """What is free, what is commanded and what acts."""
+    names = {mode.name: mode.arguments[value] for mode, value in zip(mechanism.modes, modes)}
+
+    def acts(number: int) -> bool:
+        channel = mechanism.channels[number]
+        mode = mechanism.freedoms[channel.freedom].mode if channel.freedom >= 0 else None
+        return mode is None or names[mode.name] == channel.argument
+
+    acting = [n for n in range(len(mechanism.channels)) if acts(n)]
+    kinds = {n: mechanism.channels[n].kind for n in acting}
+    driven = {
+        kind: {mechanism.channels[n].freedom for n in acting if kinds[n] == kind} for kind in ("force", "command")
+    }
+    freedoms = range(len(mechanism.freedoms))
+    commanded = tuple(n for n in freedoms if n in driven["command"])
+    free = tuple(
+        n for n in freedoms if n not in commanded and (mechanism.freedoms[n].mode is None or n in driven["force"])
+    )
+    forces = tuple(n for n in acting if kinds[n] == "force")
+    inputs = [mechanism.channels[n].name for n in forces]
+    for n in commanded:
+        inputs += [_channel_of(mechanism, n, "rate"), _channel_of(mechanism, n, "command")]
+        inputs.append(mechanism.freedoms[n].coordinate)
+    names_of = [mechanism.freedoms[n] for n in free]
+    return Layout(
+        free=free,
+        commanded=commanded,
+        forces=forces,
+        input_names=tuple(inputs),
+        state_names=tuple([f.coordinate for f in names_of] + [f.rate for f in names_of]),
+    )
+
+
+def _channel_of(mechanism: Mechanism, freedom: int, kind: str) -> str:
+    return next(c.name for c in mechanism.channels if c.kind == kind and c.freedom == freedom)
+
+
+@cache
+def missing_outputs(mechanism: Mechanism) -> Mapping[str, str]:
+    """Outputs that a linear model does not have, and what they are."""
+    casadi, traces = symbolic.library(), expressions(mechanism)
+    x, _, _, p = traces.symbols
+    of_the_run = casadi.vertcat(x[2 * len(mechanism.freedoms) :], p[-1])
+    integrals = casadi.which_depends(traces.outputs, of_the_run, 1, True)
+    found = {
+        name: "an integral over the run, no function of the state"
+        for name, integral in zip(mechanism.output_names, integrals)
+        if integral
+    }
+    return found | {name: "zero everywhere" for name in mechanism.output_names if name == "closure.residual"}
+
+
+@cache
+def linear_outputs(mechanism: Mechanism) -> tuple[str, ...]:
+    """Outputs of a linear model, in the order of the FMI contract."""
+    return tuple(name for name in mechanism.output_names if name not in missing_outputs(mechanism))
+
+
+@cache
+def _derivatives(mechanism: Mechanism, modes: Modes) -> Any:
+    """State, channels, constants -> outputs, accelerations, M, C, K, F and the outputs' derivatives by state and inputs."""
+    casadi, traces, its = symbolic.library(), expressions(mechanism), layout(mechanism, modes)
+    x, mode_symbols, u, p = traces.symbols
+    n = len(mechanism.freedoms)
+    coordinates, rates = [x[k] for k in its.free], [x[n + k] for k in its.free]
+    state = casadi.vertcat(*coordinates, *rates)
+    channels = dict(zip(mechanism.input_names, casadi.vertsplit(u)))
+    acting = [channels[mechanism.channels[k].name] for k in its.forces]
+    for k in its.commanded:
+        acting += [channels[_channel_of(mechanism, k, "rate")], x[n + k], x[k]]
+    w = casadi.vertcat(*acting)
+
+    def in_modes(expression: Any) -> Any:
+        return casadi.substitute(expression, mode_symbols, casadi.DM(list(map(float, modes))))
+
+    accelerations = in_modes(traces.derivative[n : 2 * n])
+    a = accelerations[list(its.free)]
+    inertia = casadi.hessian(in_modes(traces.energy), casadi.vertcat(*rates))[0]
+    by_state = -casadi.mtimes(inertia, casadi.jacobian(a, state))
+    size = len(its.free)
+    y = in_modes(traces.outputs)[[mechanism.output_names.index(name) for name in linear_outputs(mechanism)]]
+    results = [
+        y,
+        accelerations,
+        inertia,
+        by_state[:, size:],
+        by_state[:, :size],
+        casadi.mtimes(inertia, casadi.jacobian(a, w)),
+        casadi.jacobian(y, state),
+        casadi.jacobian(y, w),
+    ]
+    return casadi.Function("derivatives", [x, u, p], [casadi.densify(r) for r in results], {"cse": True})
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Matrices:
     """The arrays of a linear model, or those of many stacked along the first axis.
 
-    n is 2 in torque drive, with q = (crank angle, slider position), and 1 in speed drive, with q = (slider position);
-    m is the number of inputs; l that of `LINEAR_OUTPUTS`. All are deviations from the operating point, in SI.
+    n is the number of freedoms that are free: of a five-bar 2 in torque drive, with q = (crank angle, slider position), and
+    1 in speed drive, with q = (slider position); m is the number of inputs, l that of outputs, f of all freedoms. All are
+    deviations from the operating point, in SI.
 
     Attributes
     ----------
-    parameters : FiveBarParameters
+    parameters
+        Of a mechanism.
+    modes : tuple of int
+        Values of its modes.
     M, C, K : ndarray, shape (..., n, n)
         Inertia, damping and stiffness.
     F : ndarray, shape (..., n, m)
@@ -121,11 +190,12 @@ class Matrices:
         Derivatives of the outputs with respect to the inputs.
     outputs : ndarray, shape (..., l)
         The outputs at the operating point.
-    acceleration : ndarray, shape (..., 2)
-        th2'' and u'' there.
+    acceleration : ndarray, shape (..., f)
+        Of all freedoms there.
     """
 
-    parameters: FiveBarParameters
+    parameters: Parameters
+    modes: Modes
     M: FloatArray
     C: FloatArray
     K: FloatArray
@@ -134,6 +204,37 @@ class Matrices:
     D: FloatArray
     outputs: FloatArray
     acceleration: FloatArray
+
+    @property
+    def mechanism(self) -> Mechanism:
+        """The mechanism."""
+        return mechanism_of(self.parameters)
+
+    @property
+    def layout(self) -> Layout:
+        """What is free, what is commanded and what acts."""
+        return layout(self.mechanism, self.modes)
+
+    @property
+    def input_names(self) -> tuple[str, ...]:
+        """FMI names of the inputs. The coordinate of a commanded freedom is one of them: its motion acts in three parts."""
+        return self.layout.input_names
+
+    @property
+    def state_names(self) -> tuple[str, ...]:
+        """FMI names of the first-order state (q, q')."""
+        return self.layout.state_names
+
+    @property
+    def output_names(self) -> tuple[str, ...]:
+        """FMI names of the outputs: all of the contract but `missing_outputs`."""
+        return linear_outputs(self.mechanism)
+
+    @property
+    def places(self) -> list[int]:
+        """Places of (q, q') in the state of the plant."""
+        free, n = self.layout.free, len(self.mechanism.freedoms)
+        return [*free, *(n + k for k in free)]
 
     @property
     def A(self) -> FloatArray:
@@ -153,34 +254,23 @@ class Matrices:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class LinearModel(Matrices):
-    """The plant about one state, or the mean of that along a periodic motion; see `Matrices`.
+    """A mechanism about one state, or the mean of that along a periodic motion; see `Matrices`.
 
     Attributes
     ----------
-    state : ndarray, shape (6,)
-        Operating point (th2, u, w2, v, dissipated, supplied); of a mean model the mean over the period.
-    inputs : dynamics.Inputs
-        In force there.
+    state : ndarray
+        Operating point: all coordinates, all rates, work dissipated and supplied; of a mean model the mean over the period.
+    channels : ndarray
+        The mechanism's channels in force there.
     """
 
     state: FloatArray
-    inputs: dynamics.Inputs
+    channels: FloatArray
 
     @property
-    def speed_drive(self) -> bool:
-        """Whether the crank's motion is prescribed."""
-        return self.inputs.speed_drive == 1.0
-
-    @property
-    def input_names(self) -> tuple[str, ...]:
-        """FMI names of the inputs. In speed drive ``crank.angle`` is one of them: what the crank does, in three parts."""
-        return SPEED_INPUTS if self.speed_drive else TORQUE_INPUTS
-
-    @property
-    def state_names(self) -> tuple[str, ...]:
-        """FMI names of the first-order state (q, q')."""
-        free = slice(int(self.speed_drive), 2)
-        return COORDINATES[free] + RATES[free]
+    def inputs(self) -> Inputs:
+        """What acts there, as constants; of commands the rate of change is not among them."""
+        return constant_inputs(self.mechanism, self.modes, self.channels)
 
     @property
     def poles(self) -> NDArray[np.complex128]:
@@ -193,15 +283,36 @@ class LinearModel(Matrices):
         squares = np.linalg.eigvals(np.linalg.solve(self.M, self.K))
         return np.sort(np.sqrt(squares.real[(squares.real > 0.0) & (squares.imag == 0.0)]))
 
+    def force_channel(self, name: str | None = None) -> tuple[str, int]:
+        """A force that drives a free freedom: its name, and the number of the freedom.
+
+        Parameters
+        ----------
+        name : str, optional
+            By default that on the last of the free freedoms: of a five-bar ``slider.force``.
+
+        Raises
+        ------
+        LinearModelError
+            If there is no such force.
+        """
+        mechanism, its = self.mechanism, self.layout
+        channels = [mechanism.channels[n] for n in its.forces if mechanism.channels[n].freedom in its.free]
+        for channel in sorted(channels, key=lambda one: -one.freedom):
+            if name in (None, channel.name):
+                return channel.name, channel.freedom
+        known = ", ".join(channel.name for channel in channels) or "none"
+        raise LinearModelError(f"no force {name or ''} drives a freedom of this model; those that do: {known}")
+
     def to_state_space(
-        self, outputs: Sequence[str] = ("slider.position",), inputs: Sequence[str] | None = None
+        self, outputs: Sequence[str] | None = None, inputs: Sequence[str] | None = None
     ) -> control.StateSpace:
         """The model for python-control.
 
         Parameters
         ----------
-        outputs, inputs : sequence of str
-            FMI names; by default all inputs of the drive.
+        outputs, inputs : sequence of str, optional
+            FMI names; by default the last free coordinate, such as ``slider.position``, and all inputs.
 
         Returns
         -------
@@ -213,10 +324,14 @@ class LinearModel(Matrices):
         UnknownNameError
             If there is no such input or output.
         LinearModelError
-            If an output is one that a linear model does not have (`WITHOUT`).
+            If an output is one that a linear model does not have (`missing_outputs`).
         """
         chosen = self.input_names if inputs is None else inputs
-        rows = [_index(name, LINEAR_OUTPUTS) for name in outputs]
+        wanted = [self.state_names[len(self.state_names) // 2 - 1]] if outputs is None else outputs
+        for name in wanted:
+            if name in (missing := missing_outputs(self.mechanism)):
+                raise LinearModelError(f"a linear model has no output {name}: it is {missing[name]}")
+        rows = [_index(name, self.output_names) for name in wanted]
         columns = [_index(name, self.input_names) for name in chosen]
         return control.ss(
             self.A,
@@ -224,7 +339,7 @@ class LinearModel(Matrices):
             self.H[rows],
             self.D[np.ix_(rows, columns)],
             inputs=[signal_name(name) for name in chosen],
-            outputs=[signal_name(name) for name in outputs],
+            outputs=[signal_name(name) for name in wanted],
             states=[signal_name(name) for name in self.state_names],
         )
 
@@ -235,95 +350,131 @@ def by_magnitude(values: ArrayLike) -> NDArray[np.complex128]:
     return whole[np.lexsort((whole.imag, np.abs(whole)))]
 
 
-def _index(name: str, known: tuple[str, ...]) -> int:
-    if name in WITHOUT:
-        raise LinearModelError(f"a linear model has no output {name}: it is {WITHOUT[name]}")
-    if name not in known:
-        near = difflib.get_close_matches(name, known, n=1)
-        raise UnknownNameError(name, known, near[0] if near else None)
-    return known.index(name)
+def _index(name: str, names: tuple[str, ...]) -> int:
+    if name not in names:
+        raise UnknownNameError(name, names, next(iter(difflib.get_close_matches(name, names, n=1)), None))
+    return names.index(name)
 
 
-def evaluate(
-    parameters: FiveBarParameters, states: FloatArray, inputs: Sequence[dynamics.Inputs]
-) -> dict[str, FloatArray]:
-    """The arrays of `Matrices` at n states, stacked along the first axis."""
-    n = len(states)
-    for row, (th2, u) in enumerate(states[:, :2]):
-        if not np.all(np.isfinite(states[row])):
-            raise InputError(f"the state {states[row]} is not finite")
-        check_assembly(parameters, float(th2), float(u))
-    i = np.array(inputs, dtype=float)
-    if not np.all(np.isfinite(i)):
-        raise InputError(f"the inputs {i[~np.isfinite(i).all(axis=1)][0]} are not finite")
-    p = np.array(parameters.constants())
-    raw = _mapped(n)(states[:, :4].T, i.T, np.tile(p[:, None], n))
-
-    def stack(value: Any) -> FloatArray:
-        array = np.asarray(value)
-        return np.moveaxis(array.reshape(array.shape[0], n, -1), 1, 0)
-
-    y, h, d, m, c, k, f = map(stack, raw)
-    rows = [LINEAR_OUTPUTS.index(name) for name in ("crank.acceleration", "slider.acceleration")]
-    # columns of the inputs: speed_drive, torque, acceleration, force, load_x, load_y
-    if i[0, 0] == 0.0:
-        forces, feedthrough, free, seen = f[:, :, [1, 3, 4, 5]], d[:, :, [1, 3, 4, 5]], slice(0, 2), [0, 1, 2, 3]
-    else:
-        crank = -np.concatenate([m[:, 1:, :1], c[:, 1:, :1], k[:, 1:, :1]], axis=2)
-        forces, free, seen = np.concatenate([f[:, 1:, [3, 4, 5]], crank], axis=2), slice(1, 2), [1, 3]
-        feedthrough = np.concatenate([d[:, :, [3, 4, 5, 2]], h[:, :, [2, 0]]], axis=2)
-    return {
-        "M": m[:, free, free],
-        "C": c[:, free, free],
-        "K": k[:, free, free],
-        "F": forces,
-        "H": h[:, :, seen],
-        "D": feedthrough,
-        "outputs": y[:, :, 0],
-        "acceleration": y[:, rows, 0],
-    }
+def constant_inputs(mechanism: Mechanism, modes: Modes, channels: ArrayLike) -> Inputs:
+    """Inputs that are the constants ``channels``, in the given modes."""
+    values = dict(zip((channel.argument for channel in mechanism.channels), np.asarray(channels, float).tolist()))
+    forces = {mechanism.channels[n].argument for n in layout(mechanism, modes).forces}
+    acting = {name: values[name] for name in forces if values[name] != 0.0}
+    # what chooses a mode and is no channel is a flag, such as groove
+    chosen = [mode.arguments[value] for mode, value in zip(mechanism.modes, modes)]
+    return Inputs(**acting | {name: values.get(name, True) for name in chosen})
 
 
-def six_states(states: ArrayLike) -> FloatArray:
-    """States of shape (n, 4) or (n, 6) as (n, 6)."""
-    array = np.array(states, dtype=float)
-    if array.ndim != 2 or array.shape[1] not in (4, 6) or len(array) == 0:
-        raise InputError(f"states of shape {array.shape}: each must be (th2, u, th2', u') or the plant's six-tuple")
-    return np.hstack([array, np.zeros((len(array), 6 - array.shape[1]))])
-
-
-def checked_inputs(inputs: dynamics.Inputs) -> dynamics.Inputs:
-    if inputs.speed_drive not in (0.0, 1.0):
-        raise InputError(f"speed_drive is {inputs.speed_drive}: it must be 0 (torque drive) or 1 (speed drive)")
-    return inputs
-
-
-def linearise(parameters: FiveBarParameters, state: ArrayLike, inputs: dynamics.Inputs = AT_REST) -> LinearModel:
-    """The linear model at a state of the plant.
-
-    Parameters
-    ----------
-    parameters : FiveBarParameters
-    state : array_like, shape (4,) or (6,)
-        (th2, u, th2', u'), such as `Equilibrium.state`. It need be no equilibrium: the deviations are then those from
-        the motion through it, and the model holds at that instant.
-    inputs : dynamics.Inputs
-        In force there, such as `Equilibrium.inputs`; their ``speed_drive`` chooses the freedoms.
+def evaluate(parameters: Parameters, modes: Modes, states: FloatArray, channels: FloatArray) -> dict[str, FloatArray]:
+    """The arrays of `Matrices` at states, shape (s, size), under channels, shape (s, channels), along the first axis.
 
     Raises
     ------
     InputError
-        If state or inputs are not finite or of the wrong shape.
+        If a state or a channel is not finite, or nothing is free.
+    AssemblyError
+        If the links cannot be joined at a state.
+    """
+    mechanism = mechanism_of(parameters)
+    its, p, n = layout(mechanism, modes), parameters.constants(), len(states)
+    if not its.free:
+        raise InputError(f"no freedom of the {mechanism.name} is free: there is nothing to linearise")
+    for row, u in zip(states, channels):
+        if not np.all(np.isfinite(row)):
+            raise InputError(f"the state {row} is not finite")
+        applied = mechanism.equations.applied(tuple(map(float, modes)), tuple(u.tolist()), p)
+        mechanism.check_assembly(parameters, mechanism.equations.start(tuple(row.tolist()), applied, p))
+    constants = np.tile(np.array([*p, 0.0])[:, None], n)
+    raw = _derivatives(mechanism, modes).map(n)(states.T, channels.T, constants)
+
+    def stack(value: Any, columns: int) -> FloatArray:
+        array = np.asarray(value)
+        return np.moveaxis(array.reshape(array.shape[0], n, columns), 1, 0)
+
+    size, inputs = len(its.free), len(its.input_names)
+    y, a, m, c, k, f, h, d = map(stack, raw, (1, 1, size, size, size, inputs, 2 * size, inputs))
+    # adding nothing makes a plain zero of -0.0
+    return {
+        "M": m,
+        "C": c + 0.0,
+        "K": k + 0.0,
+        "F": f,
+        "H": h,
+        "D": d,
+        "outputs": y[:, :, 0],
+        "acceleration": a[:, :, 0],
+    }
+
+
+def whole_states(mechanism: Mechanism, states: ArrayLike) -> FloatArray:
+    """States with or without the work at their end, shape (n, 2 f) or (n, 2 f + 2), as those with it."""
+    array, n = np.array(states, dtype=float), 2 * len(mechanism.freedoms)
+    if array.ndim != 2 or array.shape[1] not in (n, mechanism.size) or len(array) == 0:
+        raise InputError(
+            f"states of shape {array.shape}: each must be all coordinates and all rates of the {mechanism.name}, {n} numbers, "
+            f"or its whole state of {mechanism.size}"
+        )
+    return np.hstack([array, np.zeros((len(array), mechanism.size - array.shape[1]))])
+
+
+def channels_along(
+    mechanism: Mechanism, inputs: Inputs | None, times: FloatArray, states: FloatArray
+) -> tuple[Modes, FloatArray]:
+    """Modes and channels, shape (s, channels), under inputs at times and states.
+
+    Raises
+    ------
+    InputError
+        If the inputs are another mechanism's or not finite, or command a rate that is not that of the states.
+    """
+    inputs, _ = given(mechanism, inputs, None)
+    encoded = encode(inputs, mechanism)
+    for row in states:
+        if not np.all(np.isfinite(row)):
+            raise InputError(f"the state {row} is not finite")
+    values = np.array([sample(encoded, float(t), x, encoded.law) for t, x in zip(times, states)])
+    for channel, place, _ in encoded.commands:
+        gap = np.abs(values[:, channel] - states[:, place])
+        if np.any(gap > SAME_RATE * np.maximum(1.0, np.abs(states[:, place]))):
+            worst = int(np.argmax(gap))
+            raise InputError(
+                f"the inputs command {mechanism.channels[channel].name} {values[worst, channel]:g}, but in the state it is "
+                f"{states[worst, place]:g}"
+            )
+    return tuple(encoded.modes.values()), values
+
+
+def linearise(parameters: Parameters, state: ArrayLike, inputs: Inputs | None = None) -> LinearModel:
+    """The linear model at a state of a mechanism.
+
+    Parameters
+    ----------
+    parameters
+        Of the mechanism.
+    state : array_like
+        All coordinates, then all rates, such as `Equilibrium.state`: of a five-bar (th2, u, th2', u'). It need be no
+        equilibrium: the deviations are then those from the motion through it, and the model holds at that instant.
+    inputs : Inputs, optional
+        In force there at time 0, such as `Equilibrium.inputs`; they choose what is free. By default nothing acts.
+
+    Raises
+    ------
+    InputError
+        If state or inputs are not finite, of the wrong shape, or do not go together; or nothing is free.
     AssemblyError
         If the links cannot be joined there.
-    symbolic.MissingLibraryError
-        If CasADi is not installed.
     """
-    require_five_bar(parameters, "a linear model")
-    states = six_states(np.atleast_2d(np.asarray(state, dtype=float)))
+    mechanism = mechanism_of(parameters)
+    states = whole_states(mechanism, np.atleast_2d(np.asarray(state, dtype=float)))
     if len(states) != 1:
         raise InputError(f"{len(states)} states: one is linearised about here, many by linearise_along")
-    arrays = evaluate(parameters, states, [checked_inputs(inputs)])
+    modes, channels = channels_along(mechanism, inputs, np.zeros(1), states)
+    arrays = evaluate(parameters, modes, states, channels)
     return LinearModel(
-        parameters=parameters, state=states[0], inputs=inputs, **{name: a[0] for name, a in arrays.items()}
+        parameters=parameters,
+        modes=modes,
+        state=states[0],
+        channels=channels[0],
+        **{name: a[0] for name, a in arrays.items()},
     )

@@ -1,8 +1,8 @@
-"""Linear models of the plant along a periodic motion."""
+"""Linear models of a mechanism along a periodic motion."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, fields
 from math import isfinite, pi
 from typing import Protocol, runtime_checkable
@@ -12,22 +12,21 @@ from numpy.typing import ArrayLike
 from scipy.integrate import solve_ivp
 
 from linkwork.errors import InputError
-from linkwork.five_bar import dynamics
-from linkwork.five_bar.parameters import FiveBarParameters
+from linkwork.mechanism import Mechanism
 
+from ..mechanisms import InitialState, Parameters, mechanism_of
 from ..numerics.fourier import trigonometric
-from ..run import Inputs, simulate
+from ..run import Inputs, given, simulate
 from .model import (
-    AT_REST,
-    COORDINATES,
-    RATES,
     FloatArray,
     LinearModel,
     LinearModelError,
     Matrices,
-    checked_inputs,
+    Modes,
+    channels_along,
     evaluate,
-    six_states,
+    layout,
+    whole_states,
 )
 
 #: Least samples of a period that carry its harmonics.
@@ -37,7 +36,7 @@ MOST_ITERATIONS = 60
 
 
 class Turn(Protocol):
-    """One period of a motion at equal steps of the crank angle from 0, its end left out, such as `orbits.Turn`."""
+    """One period of a motion at equal steps of the angle that comes round, its end left out, such as `periodic.Turn`."""
 
     @property
     def time(self) -> FloatArray: ...
@@ -49,7 +48,14 @@ class Turn(Protocol):
     def states(self) -> FloatArray: ...
 
     @property
-    def inputs(self) -> FloatArray: ...
+    def inputs(self) -> FloatArray:
+        """The mechanism's channels, shape (n, channels)."""
+        ...
+
+    @property
+    def modes(self) -> Modes:
+        """Values of the mechanism's modes."""
+        ...
 
 
 @runtime_checkable
@@ -61,16 +67,16 @@ class Orbit(Protocol):
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class PeriodicModel(Matrices):
-    """The plant about a periodic motion: linear models at s evenly spaced times of a period; see `Matrices`.
+    """A mechanism about a periodic motion: linear models at s evenly spaced times of a period; see `Matrices`.
 
     Attributes
     ----------
     period : float
         s.
-    states : ndarray, shape (s, 6)
+    states : ndarray, shape (s, size)
         The motion at the times k period / s, k = 0 ... s - 1.
-    inputs : tuple of dynamics.Inputs
-        In force there.
+    channels : ndarray, shape (s, channels)
+        The mechanism's channels in force there.
 
     Notes
     -----
@@ -79,17 +85,24 @@ class PeriodicModel(Matrices):
 
     period: float
     states: FloatArray
-    inputs: tuple[dynamics.Inputs, ...]
+    channels: FloatArray
 
     def __len__(self) -> int:
         return len(self.states)
 
     def __getitem__(self, index: int) -> LinearModel:
-        return self._model(lambda values: values[index], self.inputs[index])
+        return self._model(lambda values: values[index])
 
-    def _model(self, reduce: Callable[[FloatArray], FloatArray], inputs: dynamics.Inputs) -> LinearModel:
-        arrays = {f.name: reduce(getattr(self, f.name)) for f in fields(Matrices) if f.name != "parameters"}
-        return LinearModel(parameters=self.parameters, inputs=inputs, state=reduce(self.states), **arrays)
+    def _model(self, reduce: Callable[[FloatArray], FloatArray]) -> LinearModel:
+        own = ("parameters", "modes")
+        arrays = {f.name: reduce(getattr(self, f.name)) for f in fields(Matrices) if f.name not in own}
+        return LinearModel(
+            parameters=self.parameters,
+            modes=self.modes,
+            state=reduce(self.states),
+            channels=reduce(self.channels),
+            **arrays,
+        )
 
     @property
     def times(self) -> FloatArray:
@@ -101,20 +114,51 @@ class PeriodicModel(Matrices):
 
         It foretells slow deviations of a motion whose M and K vary little; `monodromy` says what the motion does in truth.
         """
-        average = dynamics.Inputs(*np.mean(np.array(self.inputs), axis=0).tolist())
-        return self._model(lambda values: np.asarray(values.mean(axis=0)), average)
+        return self._model(lambda values: np.asarray(values.mean(axis=0)))
 
     def interpolated(self, values: FloatArray) -> Callable[[float], FloatArray]:
         """The trigonometric polynomial through values at the samples, shape (s, ...), as a function of time."""
         return trigonometric(values, self.period)
 
     def motion(self) -> Callable[[float], FloatArray]:
-        """The motion itself as a function of time: (th2, u, th2', u')."""
-        states = self.states[:, :4].copy()
-        rate = 2.0 * pi * round(float(states[:, 2].mean()) * self.period / (2.0 * pi)) / self.period
-        states[:, 0] -= rate * self.times
-        periodic = self.interpolated(states)
-        return lambda t: periodic(t) + np.array([rate * t, 0.0, 0.0, 0.0])
+        """The motion itself as a function of time: all coordinates, then all rates."""
+        n = len(self.mechanism.freedoms)
+        rates = np.append(self._secular(), np.zeros(n))
+        periodic = self.interpolated(self.states[:, : 2 * n] - self.times[:, None] * rates)
+        return lambda t: periodic(t) + t * rates
+
+    def _secular(self) -> FloatArray:
+        """Mean rates of the freedoms that come round: whole turns in the period; of the others zero."""
+        freedoms = self.mechanism.freedoms
+        way = self.states[:, len(freedoms) : 2 * len(freedoms)].mean(axis=0) * self.period
+        return (
+            np.array([f.period * round(w / f.period) if f.period else 0.0 for f, w in zip(freedoms, way)]) / self.period
+        )
+
+    def check(self) -> None:
+        """Make sure that the rates of the free freedoms are the derivatives of the samples taken as periodic.
+
+        Of a wrong period, an end sampled twice or an unsettled motion they are not.
+
+        Raises
+        ------
+        InputError
+            With the freedom of which they are not.
+        """
+        mechanism, n, secular = self.mechanism, len(self), self._secular()
+        scale = mechanism.error_scale(self.parameters, tuple(self.states[0].tolist()))
+        units = {v.name: v.unit for v in mechanism.variables}
+        for k in self.layout.free:
+            freedom, rate = mechanism.freedoms[k], self.states[:, len(mechanism.freedoms) + k]
+            c = np.fft.rfft(self.states[:, k] - secular[k] * self.times) * 2j * pi / self.period * np.arange(n // 2 + 1)
+            if n % 2 == 0:
+                c[-1] = 0.0
+            gap = float(np.abs(np.fft.irfft(c, n) + secular[k] - rate).max())
+            if gap > 1e-2 * float(np.abs(rate).max()) + 1e-9 * scale[k] / self.period:
+                raise InputError(
+                    f"the {n} states are not evenly spaced over one period of {self.period:.9g} s, its end left out: "
+                    f"{freedom.rate} differs from the derivative of {freedom.coordinate} by {gap:.3g} {units[freedom.rate]}"
+                )
 
     def monodromy(self, tolerance: float = 1e-10) -> FloatArray:
         """What a period makes of the deviations (q, q'), shape (2 n, 2 n): Phi' = A(t) Phi from the unit matrix.
@@ -144,9 +188,9 @@ class PeriodicModel(Matrices):
 
 
 def linearise_along(
-    parameters: FiveBarParameters,
+    parameters: Parameters,
     motion: ArrayLike | Orbit,
-    inputs: dynamics.Inputs | Sequence[dynamics.Inputs] | None = None,
+    inputs: Inputs | None = None,
     *,
     period: float | None = None,
     samples: int = 128,
@@ -155,16 +199,17 @@ def linearise_along(
 
     Parameters
     ----------
-    parameters : FiveBarParameters
-    motion : array_like, shape (s, 4) or (s, 6), or an orbit
-        States at evenly spaced times of one period, the end of it left out; or an object such as
-        `analysis.periodic.PeriodicOrbit`.
-    inputs : dynamics.Inputs or sequence of s of them
-        In force along the motion of an array; by default nothing acts, in torque drive. A torque or force that follows
+    parameters
+        Of the mechanism.
+    motion : array_like, shape (s, states), or an orbit
+        States at evenly spaced times of one period, the end of it left out: all coordinates, then all rates; or an object
+        such as `analysis.periodic.PeriodicOrbit`.
+    inputs : Inputs, optional
+        In force along the motion of an array, which begins at time 0; by default nothing acts. A torque or force that follows
         the state by a law of its own, a motor's or a controller's, enters with its value: the slope of the law is none of
         the plant's.
     period : float, optional
-        s. By default that of the orbit, and of an array at a constant prescribed speed one turn of the crank.
+        s. By default that of the orbit, and of an array at a constant prescribed speed one turn.
     samples : int
         Samples of an orbit; of an array there are as many as it has.
 
@@ -176,125 +221,132 @@ def linearise_along(
     AssemblyError
         If the links cannot be joined at one of them.
     """
+    mechanism = mechanism_of(parameters)
     if isinstance(motion, Orbit):
         if inputs is not None or period is not None:
             raise InputError("inputs and period are those of the orbit: they cannot be given besides")
-        states, inputs, period = _in_time(motion.turn(samples), parameters)
+        turn = motion.turn(samples)
+        states, channels = _in_time(mechanism, turn)
+        modes, period = turn.modes, turn.period
     else:
-        states = six_states(motion)
-    n = len(states)
-    if n < LEAST_SAMPLES:
-        raise InputError(f"{n} samples of a period: at least {LEAST_SAMPLES} are needed")
-    each = (inputs,) * n if isinstance(inputs, dynamics.Inputs) else (AT_REST,) * n if inputs is None else tuple(inputs)
-    if len(each) != n or len({checked_inputs(i).speed_drive for i in each}) != 1:
-        raise InputError(f"{len(each)} inputs along {n} states: there must be one for each, all of one drive")
-    speed = float(states[0, 2])
-    if period is None:
-        if each[0].speed_drive == 0.0 or np.ptp(states[:, 2]) > 1e-9 * abs(speed) or speed == 0.0:
-            raise InputError(
-                "the period must be given: it follows from the states at a constant prescribed speed alone"
-            )
-        period = 2.0 * pi / abs(speed)
+        states = whole_states(mechanism, motion)
+        inputs, _ = given(mechanism, inputs, None)
+        if period is None:
+            period = _one_turn(mechanism, tuple(inputs.modes(mechanism).values()), states)
+    if len(states) < LEAST_SAMPLES:
+        raise InputError(f"{len(states)} samples of a period: at least {LEAST_SAMPLES} are needed")
     if not (isfinite(period) and period > 0.0):
         raise InputError(f"period is {period} s: it must be a finite number greater than zero")
-    model = PeriodicModel(
-        parameters=parameters, period=period, states=states, inputs=each, **evaluate(parameters, states, each)
-    )
-    _check_periodic(model)
+    if not isinstance(motion, Orbit):
+        modes, channels = channels_along(mechanism, inputs, period * np.arange(len(states)) / len(states), states)
+    arrays = evaluate(parameters, modes, states, channels)
+    model = PeriodicModel(parameters=parameters, modes=modes, period=period, states=states, channels=channels, **arrays)
+    model.check()
     return model
 
 
-def _in_time(turn: Turn, parameters: FiveBarParameters) -> tuple[FloatArray, tuple[dynamics.Inputs, ...], float]:
-    """States and inputs of a turn at equal steps of time instead of the crank angle, and its period."""
-    n, period = len(turn.time), turn.period
-    angle = turn.states[:, 0] - turn.states[0, 0]
+def _one_turn(mechanism: Mechanism, modes: Modes, states: FloatArray) -> float:
+    """Time of a turn of the freedom that is commanded to come round at a constant speed."""
+    for n in layout(mechanism, modes).commanded:
+        rate, speed = states[:, len(mechanism.freedoms) + n], float(states[0, len(mechanism.freedoms) + n])
+        if mechanism.freedoms[n].period and speed != 0.0 and np.ptp(rate) <= 1e-9 * abs(speed):
+            return mechanism.freedoms[n].period / abs(speed)
+    raise InputError("the period must be given: it follows from the states at a constant prescribed speed alone")
+
+
+def _in_time(mechanism: Mechanism, turn: Turn) -> tuple[FloatArray, FloatArray]:
+    """States and channels of a turn at equal steps of time instead of the angle that comes round."""
+    n, count, period = len(turn.time), len(mechanism.freedoms), turn.period
+    crank = next(k for k, freedom in enumerate(mechanism.freedoms) if freedom.period)
+    angle = turn.states[:, crank] - turn.states[0, crank]
     way = angle[-1] * n / (n - 1)
     wanted = period * np.arange(n) / n
     lead = trigonometric(turn.time - wanted, way)
-    columns = np.hstack([turn.states[:, 1:4], turn.inputs])
-    p = parameters.constants()
-    # the commanded speed is above zero where there is one
-    mode = float(turn.inputs[0, 1] > 0.0)
+    columns = np.hstack([turn.states[:, : 2 * count], turn.inputs])
+    columns[:, crank] = 0.0
     values = trigonometric(columns, way)
-    states, inputs = np.empty((n, 6)), []
+    found = np.empty_like(columns)
     for k, t in enumerate(wanted):
         x = angle[k]
         for _ in range(MOST_ITERATIONS):
-            # dt/d(th2) = 1 / th2'
-            step = (period * x / way + float(lead(x)) - t) * float(values(x)[1])
+            # dt/d(angle) = 1 / rate
+            step = (period * x / way + float(lead(x)) - t) * float(values(x)[count + crank])
             x -= step
             if abs(step) <= 1e-13 * way:
                 break
-        here = values(x)
-        states[k] = turn.states[0, 0] + x, here[0], here[1], here[2], 0.0, 0.0
-        inputs.append(dynamics.applied((mode,), tuple(here[3:].tolist()), p))
-    return states, tuple(inputs), period
-
-
-def _check_periodic(model: PeriodicModel) -> None:
-    """Make sure that the slider's velocity is the derivative of its position along the samples taken as periodic.
-
-    Of a wrong period, an end sampled twice or an unsettled motion it is not.
-    """
-    u, v = model.states[:, 1], model.states[:, 3]
-    n = len(u)
-    c = np.fft.rfft(u) * 2j * pi / model.period * np.arange(n // 2 + 1)
-    if n % 2 == 0:
-        c[-1] = 0.0
-    gap = float(np.abs(np.fft.irfft(c, n) - v).max())
-    if gap > 1e-2 * float(np.abs(v).max()) + 1e-9 * model.parameters.crank_length / model.period:
-        raise InputError(
-            f"the {n} states are not evenly spaced over one period of {model.period:.9g} s, its end left out: the slider's "
-            f"velocity differs from the derivative of its position by {gap:.3g} m/s"
-        )
+        found[k] = values(x)
+        found[k, crank] = turn.states[0, crank] + x
+    return whole_states(mechanism, found[:, : 2 * count]), found[:, 2 * count :]
 
 
 def settled_motion(
-    parameters: FiveBarParameters, crank_speed: float, *, samples: int = 128, turns: int = 200, force: float = 0.0
+    parameters: Parameters,
+    inputs: Inputs,
+    *,
+    initial: InitialState | None = None,
+    samples: int = 128,
+    turns: int = 200,
 ) -> FloatArray:
-    """The motion that the slider settles to at a constant crank speed, by running on until it repeats itself.
+    """The motion that a mechanism settles to at a constant speed, by running on until it repeats itself.
 
     Parameters
     ----------
-    parameters : FiveBarParameters
-    crank_speed : float
-        rad/s, not zero.
+    parameters
+        Of the mechanism.
+    inputs : Inputs
+        With the speed of a freedom that comes round, such as ``Inputs(speed=40.0)``; all else constant, too.
+    initial : optional
+        Start of the run; by default all is zero, and the others at rest.
     samples : int
-        States of the last turn, evenly spaced from th2 = 0, its end left out.
+        States of the last turn, evenly spaced, its end left out.
     turns : int
-        Turns of the crank from rest of the slider.
-    force : float
-        Constant slider force (N).
+        Turns that are run.
 
     Returns
     -------
-    ndarray, shape (samples, 6)
+    ndarray, shape (samples, size)
 
     Raises
     ------
+    InputError
+        If the inputs are not constant or command no speed.
     LinearModelError
-        If the run ends early, or the last two turns differ by more than 1e-7 of the crank's length.
+        If the run ends early, or the last two turns differ by more than 1e-7 of the mechanism's scales.
     """
-    if not (isfinite(crank_speed) and crank_speed != 0.0):
-        raise InputError(f"crank speed is {crank_speed} rad/s: it must be finite and not zero")
-    turn = 2.0 * pi / abs(crank_speed)
+    mechanism = mechanism_of(parameters)
+    inputs, initial = given(mechanism, inputs, initial)
+    modes, n = tuple(inputs.modes(mechanism).values()), len(mechanism.freedoms)
+    its = layout(mechanism, modes)
+    speeds = {c.freedom: (c, getattr(inputs, c.argument)) for c in mechanism.channels if c.kind == "command"}
+    crank = next((k for k in its.commanded if mechanism.freedoms[k].period), None)
+    if crank is None or not inputs.held_exactly:
+        raise InputError(
+            f"{inputs}: a motion settles at a constant speed of a freedom that comes round, all else constant"
+        )
+    channel, speed = speeds[crank]
+    if not speed:
+        raise InputError(f"{channel.argument} is {speed}: it must be a finite number that is not zero")
+    turn = mechanism.freedoms[crank].period / abs(speed)
     last = turn * (turns - 2 + np.arange(2 * samples + 1) / samples)
     run = simulate(
         parameters,
-        Inputs(speed=crank_speed, force=force),
+        inputs,
+        initial=initial,
         stop_time=float(last[-1]),
         samples=np.concatenate([[0.0], last]),
         tolerance=1e-12,
     )
     if run.status:
-        raise LinearModelError(f"there is no steady motion at {crank_speed:g} rad/s: {run.message}")
-    names = (*COORDINATES, *RATES, "energy.dissipated", "energy.supplied")
-    before, after = np.split(np.column_stack([run[name] for name in names])[1:-1], 2)
-    gap = float(np.abs(after[:, 1] - before[:, 1]).max())
-    if gap > 1e-7 * parameters.crank_length:
+        raise LinearModelError(f"there is no steady motion at {speed:g} {channel.name}: {run.message}")
+    names = [f.coordinate for f in mechanism.freedoms] + [f.rate for f in mechanism.freedoms]
+    before, after = np.split(whole_states(mechanism, np.column_stack([run[name] for name in names])[1:-1]), 2)
+    scale = np.array(mechanism.error_scale(parameters, tuple(after[0].tolist())))[:n]
+    gap = np.abs(after[:, :n] - before[:, :n]).max(axis=0) / scale
+    worst = max(its.free, key=lambda k: gap[k])
+    if gap[worst] > 1e-7:
         raise LinearModelError(
-            f"the motion at {crank_speed:g} rad/s has not settled after {turns} turns: the slider is still {gap:.3g} m "
-            "from where it was a turn before"
+            f"the motion at {channel.name} {speed:g} has not settled after {turns} turns: "
+            f"{mechanism.freedoms[worst].coordinate} still differs by {gap[worst] * scale[worst]:.3g} from a turn before"
         )
-    after[:, 0] -= 2.0 * pi * np.copysign(turns - 1, crank_speed)
+    after[:, crank] -= mechanism.freedoms[crank].period * np.copysign(turns - 1, speed)
     return after

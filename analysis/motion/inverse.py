@@ -24,8 +24,7 @@ from linkwork.five_bar.assembly import check_assembly
 from linkwork.five_bar.parameters import Constants, FiveBarParameters
 from linkwork.five_bar.variables import OUTPUT_NAMES
 
-from ..linear import UNITS
-from ..mechanisms import FIVE_BAR
+from ..mechanisms import FIVE_BAR, output_units
 from ..numerics.fourier import FourierSeries
 from ..run import outputs_of
 
@@ -78,7 +77,7 @@ class SliderDrive:
     crank_angle, time : ndarray, shape (n,)
         rad, s; both zero at the start.
     states, inputs : ndarray, shape (n, 6)
-        States (th2, u, w2, v, 0, 0) and what acts on the plant, as `linkwork.five_bar.dynamics` has them, in speed drive.
+        States (th2, u, w2, v, 0, 0) and channels of the plant.
     values : ndarray, shape (n, 24)
         Outputs of the FMI contract by `NAMES`.
 
@@ -111,6 +110,11 @@ class SliderDrive:
     def turn(self, samples: int) -> SliderDrive:
         """The same motion at another number of samples."""
         return inverse_dynamics(self.parameters, self.slider, self.crank_speed, load=self.load, samples=samples)
+
+    @property
+    def modes(self) -> tuple[int, ...]:
+        """Values of the mechanism's modes: the crank's speed is commanded."""
+        return (1,)
 
     @property
     def period(self) -> float:
@@ -189,7 +193,8 @@ class SliderDrive:
     def columns(self) -> Mapping[str, FloatArray]:
         """Time, force, power and outputs by name with unit, as `analysis.files.write_csv` takes them."""
         own = {"time [s]": self.time, "slider.force [N]": self.force, "slider.power [W]": self.power}
-        return own | {f"{name} [{UNITS[name]}]": self[name] for name in NAMES}
+        units = output_units()
+        return own | {f"{name} [{units[name]}]": self[name] for name in NAMES}
 
 
 def slider_force(

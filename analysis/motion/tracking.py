@@ -24,8 +24,19 @@ from linkwork.errors import InputError
 from linkwork.five_bar import kinematics
 from linkwork.five_bar.parameters import FiveBarParameters, InitialState
 
-from ..linear import LoopResult, SampledController, SliderDesign, check_period, control_loop
+from ..linear import (
+    Design,
+    LoopResult,
+    SampledController,
+    check_limit,
+    check_period,
+    control_loop,
+    limited,
+    peak,
+    rms,
+)
 from ..numerics.fourier import FourierSeries
+from ..run import Function, Inputs
 from .inverse import FloatArray, Load, check_speed, inverse_dynamics, load_at, slider_force
 
 
@@ -40,7 +51,7 @@ class TrackingController:
         Reference u(th2) (m).
     period : float
         Of sampling (s).
-    design : SliderDesign, optional
+    design : Design, optional
         Of the feedback, on a model in speed drive; by default there is none.
     feedforward : bool
         Without it the force that holds the slider on the design's linear model takes its place.
@@ -55,13 +66,15 @@ class TrackingController:
         If there is neither feed-forward nor feedback, or something given is not usable.
     """
 
+    channel = "slider.force"
+
     def __init__(
         self,
         parameters: FiveBarParameters,
         slider: FourierSeries,
         period: float,
         *,
-        design: SliderDesign | None = None,
+        design: Design | None = None,
         feedforward: bool = True,
         load: Load = (0.0, 0.0),
         limit: float = inf,
@@ -69,10 +82,9 @@ class TrackingController:
         check_period(period)
         if design is None and not feedforward:
             raise InputError("there is neither feed-forward nor feedback: at least one of them is needed")
-        if design is not None and not design.model.speed_drive:
+        if design is not None and "crank.angle" in design.model.state_names:
             raise InputError("the feedback was designed for a free crank: tracking needs a model in speed drive")
-        if not limit > 0.0:
-            raise InputError(f"limit of the force is {limit} N: it must be greater than zero")
+        check_limit(limit)
         self.parameters, self.slider, self.period, self.limit = parameters, slider, period, limit
         self.feedback = None if design is None else SampledController(design, period, limit=limit)
         self.feedforward = feedforward
@@ -101,7 +113,7 @@ class TrackingController:
             assert self.feedback is not None
             forward = self.feedback.holding_force(reference)
         if self.feedback is None:
-            return min(max(forward, -self.limit), self.limit)
+            return limited(forward, self.limit)
         return self.feedback.follow(forward, u - reference, v - w2 * float(self._slope(th2)))
 
     def _forward(self, th2: float, w2: float) -> float:
@@ -170,26 +182,19 @@ class TrackingResult:
         InputError
             If the run ended early.
         """
-        if self.loop.status:
-            raise InputError(f"the run did not reach its end: {self.loop.message}")
-        time = self.loop.time
-        last = time > time[-1] - 2.0 * pi / abs(self.crank_speed) * (1.0 - 1e-9)
-
-        def rms(values: FloatArray) -> float:
-            return float(np.sqrt(np.mean(values[last] ** 2)))
-
-        def peak(values: FloatArray) -> float:
-            return float(np.abs(values[last]).max())
-
+        last = self.loop.end(2.0 * pi / abs(self.crank_speed))
+        error, point_error, force, power = (
+            values[last] for values in (self.error, self.point_error, self.loop.force, self.power)
+        )
         return TrackingMetrics(
-            rms_error=rms(self.error),
-            peak_error=peak(self.error),
-            rms_point_error=rms(self.point_error),
-            peak_point_error=peak(self.point_error),
-            rms_force=rms(self.loop.force),
-            peak_force=peak(self.loop.force),
-            mean_power=float(self.power[last].mean()),
-            peak_power=peak(self.power),
+            rms_error=rms(error),
+            peak_error=peak(error),
+            rms_point_error=rms(point_error),
+            peak_point_error=peak(point_error),
+            rms_force=rms(force),
+            peak_force=peak(force),
+            mean_power=float(power.mean()),
+            peak_power=peak(power),
         )
 
 
@@ -209,7 +214,7 @@ def track(
     Parameters
     ----------
     controller : TrackingController
-        With the reference; its feedback is designed by `slider_control` on a model in speed drive, such as the mean one along
+        With the reference; its feedback is designed by `analysis.linear` on a model in speed drive, such as the mean one along
         the reference: ``linearise_along(parameters, inverse_dynamics(...)).mean()``.
     crank_speed : float
         Constant prescribed speed (rad/s).
@@ -252,14 +257,16 @@ def track(
     def angle(t: float) -> float:
         return start.crank_angle + crank_speed * t
 
+    def load_part(part: int) -> Function:
+        return Function(lambda t, *state: load_at(load, angle(t + 0.5 * controller.period))[part])
+
     loop = control_loop(
         plant or parameters,
         controller,
         lambda t: float(slider(angle(t))),
+        Inputs(speed=crank_speed, load_x=load_part(0), load_y=load_part(1)),
         initial=start,
         stop_time=2.0 * pi * revolutions / abs(crank_speed),
-        crank_speed=crank_speed,
-        load=lambda t: load_at(load, angle(t + 0.5 * controller.period)),
         fmu=fmu,
         tolerance=tolerance,
     )

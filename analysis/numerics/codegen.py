@@ -210,7 +210,7 @@ def call_user(typing_context, address, t, x):  # type: ignore[no-untyped-def]
 
 def user_function(function: Any, size: int) -> Any:
     """A user's function f(t, x1, ..., x_size) as a C function of t and x, NaN where it raises, with its ``address``."""
-    own = njit(float64(*[float64] * (1 + size)), error_model="numpy")(getattr(function, "py_func", function))
+    own = njit(error_model="numpy")(getattr(function, "py_func", function))
 
     @njit(error_model="numpy")
     def spread(t, x):  # type: ignore[no-untyped-def]

@@ -157,6 +157,7 @@ class PeriodicOrbit:
             inputs=channels,
             values=values[:, keep],
             turns=self.turns,
+            modes=flow.modes,
             names=tuple(mechanism.output_names[n] for n in keep),
             swing=flow.components[0][0],
         )

@@ -29,6 +29,8 @@ class Turn:
         Outputs by `names`: all of the FMI interface but the energies that count from the start of a run.
     turns : int
         Turns of the crank in the period.
+    modes : tuple of int
+        Values of the mechanism's modes.
     names : tuple of str
     swing : str
         The output whose amplitude is meant where none is named: the first free coordinate, such as ``slider.position``, or
@@ -46,6 +48,7 @@ class Turn:
     inputs: NDArray[np.float64]
     values: NDArray[np.float64]
     turns: int
+    modes: tuple[int, ...]
     names: tuple[str, ...]
     swing: str
 

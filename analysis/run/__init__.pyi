@@ -26,6 +26,10 @@ from .events import interruptible as interruptible
 from .events import shown as shown
 from .hamming import Hamming as Hamming
 from .inputs import Inputs as Inputs
+from .inputs import align as align
+from .inputs import encode as encode
+from .inputs import given as given
+from .inputs import sample as sample
 from .prepared import outputs_of as outputs_of
 from .signals import Function as Function
 from .signals import Harmonics as Harmonics

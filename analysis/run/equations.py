@@ -53,6 +53,7 @@ class Traced(NamedTuple):
     outputs: Any
     clearance: Any
     jump: Any
+    energy: Any
 
 
 @cache
@@ -80,6 +81,7 @@ def expressions(mechanism: Mechanism) -> Traced:
         of("outputs", values, applied, energy, k),
         of("clearance", values, applied, k),
         of("jump", values, applied, channels, k),
+        of("energy", getattr(functions, mechanism.equations.start.__name__)(values, applied, k), k),
     )
 
 

@@ -71,12 +71,15 @@ class Channel(NamedTuple):
         of the same freedom, over a step).
     freedom : int
         Number of the freedom that it drives; -1 where it drives none directly.
+    displacement : str
+        Of a force that drives no freedom directly, the output that is the displacement of what it acts on, along it.
     """
 
     name: str
     argument: str
     kind: str = "force"
     freedom: int = -1
+    displacement: str = ""
 
 
 class Equations(NamedTuple):

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import asdict
-from math import cos, hypot, pi, sin
+from dataclasses import asdict, replace
+from math import acos, cos, hypot, pi, sin, sqrt
 from pathlib import Path
 from typing import Any
 
@@ -13,11 +13,28 @@ import pytest
 from fmpy import simulate_fmu
 from fmpy.validation import validate_fmu
 from scipy.integrate import solve_ivp
+from scipy.linalg import expm
 
 from analysis import Inputs, compare, cosimulate, simulate
 from analysis.export import build
-from analysis.mechanisms import MECHANISMS
+from analysis.linear import (
+    SampledController,
+    control_loop,
+    design_lqr,
+    design_pid,
+    find_equilibria,
+    find_equilibrium,
+    largest_difference,
+    linearise,
+    linearise_along,
+    predict_loop,
+    settled_motion,
+)
+from analysis.mechanisms import FIVE_BAR, MECHANISMS, SLIDER_CRANK
+from linkwork.five_bar.published import TABLE_3_1
 from linkwork.mechanism import Mechanism
+from linkwork.plant import Plant
+from linkwork.slider_crank.published import OFFSET_CASE
 from tests.mechanisms import pendulum, rotor_on_cart
 
 ROTOR, PENDULUM = rotor_on_cart.MECHANISM, pendulum.MECHANISM
@@ -168,3 +185,165 @@ def test_inputs_of_another_mechanism_are_refused() -> None:
 
     with pytest.raises(InputError, match="a pendulum has no input 'force': its inputs are torque"):
         simulate(demo(PENDULUM).parameters, Inputs(force=1.0), stop_time=0.1)
+
+
+# linear models, equilibria and control
+
+
+def test_cart_under_a_turning_rotor_is_an_oscillator() -> None:
+    """M s'' + c s' + k s = F; the rotor acts by m l sin(th) th'' + m l cos(th) th'^2, differentiated by hand."""
+    published = demo(ROTOR)
+    p, w, th = published.parameters.constants(), 20.0, 0.7
+    model = linearise(published.parameters, (th, 0.01, w, 0.2), Inputs(speed=w))
+    assert model.state_names == ("cart.position", "cart.velocity")
+    assert model.input_names == ("cart.force", "drive.acceleration", "drive.speed", "rotor.angle")
+    assert [float(matrix[0, 0]) for matrix in (model.M, model.C, model.K)] == pytest.approx([p.mass, p.c, p.k])
+    by_hand = [1.0, p.unbalance * sin(th), 2.0 * p.unbalance * cos(th) * w, -p.unbalance * sin(th) * w * w]
+    assert model.F[0] == pytest.approx(by_hand, rel=1e-12)
+    assert model.natural_frequencies == pytest.approx([sqrt(p.k / p.mass)])
+    assert -model.poles[0].real / abs(model.poles[0]) == pytest.approx(p.c / (2.0 * sqrt(p.k * p.mass)))
+    system = model.to_state_space(("cart.position",), ("cart.force",))
+    for omega in (1.0, 20.0, 90.0):
+        exact = 1.0 / (p.k - p.mass * omega * omega + 1j * p.c * omega)
+        assert complex(system(1j * omega)) == pytest.approx(exact, rel=1e-10)
+
+
+def test_free_rotor_hangs_and_swings_with_the_cart() -> None:
+    published = demo(ROTOR)
+    p = published.parameters.constants()
+    hanging, upright = find_equilibria(published.parameters, Inputs(torque=0.0, force=30.0))
+    assert hanging.coordinates == pytest.approx([-pi / 2.0, 30.0 / p.k], abs=1e-9)
+    assert upright.coordinates == pytest.approx([pi / 2.0, 30.0 / p.k], abs=1e-9)
+    assert (hanging.stable, upright.stable) == (True, False)
+    assert upright.potential - hanging.potential == pytest.approx(2.0 * p.weight)
+    model = linearise(published.parameters, hanging.state, hanging.inputs)
+    np.testing.assert_allclose(model.M, [[p.inertia, p.unbalance], [p.unbalance, p.mass]], rtol=1e-12)
+    np.testing.assert_allclose(model.C, [[0.0, 0.0], [0.0, p.c]], atol=1e-12)
+    np.testing.assert_allclose(model.K, [[p.weight, 0.0], [0.0, p.k]], rtol=1e-12, atol=1e-9)
+    # held where it is, the rotor takes the moment of its weight
+    held = find_equilibrium(published.parameters, held={"rotor.angle": 0.4})
+    assert held.holding["rotor.angle"] == pytest.approx(p.weight * cos(0.4))
+
+
+def test_pendulum_swings_as_by_hand() -> None:
+    published = demo(PENDULUM)
+    p = published.parameters.constants()
+    hanging, upright = find_equilibria(published.parameters)
+    assert [float(one.coordinates[0]) for one in (hanging, upright)] == pytest.approx([-pi / 2.0, pi / 2.0])
+    model = linearise(published.parameters, hanging.state)
+    assert model.natural_frequencies == pytest.approx([sqrt(p.weight / p.inertia)])
+    assert np.poly(model.poles) == pytest.approx([1.0, p.damping / p.inertia, p.weight / p.inertia])
+    pushed = find_equilibrium(published.parameters, Inputs(torque=0.5 * p.weight))
+    assert pushed["pendulum.angle"] == pytest.approx(-acos(0.5))
+
+
+def test_torque_balances_the_pendulum_upside_down() -> None:
+    published = demo(PENDULUM)
+    _, upright = find_equilibria(published.parameters)
+    model = linearise(published.parameters, upright.state)
+    controller = SampledController(design_pid(model, bandwidth=20.0), 2e-3)
+    start = replace(upright.initial, pendulum_angle=upright["pendulum.angle"] + 0.1)
+    loop = control_loop(published.parameters, controller, pi / 2.0, initial=start, stop_time=2.0)
+    assert loop.position[0] == pytest.approx(pi / 2.0 + 0.1)
+    assert loop.position[-1] == pytest.approx(pi / 2.0, abs=1e-6)
+    linear = predict_loop(model, controller, pi / 2.0, stop_time=2.0, deviation=[0.1, 0.0])
+    assert largest_difference(loop, linear) < 1e-3
+
+
+def test_cart_is_held_in_process_and_through_the_fmu(fmus: dict[str, Path]) -> None:
+    """The rotor shakes it: far less with control than without."""
+    published, turning = demo(ROTOR), Inputs(speed=20.0)
+    models = linearise_along(published.parameters, settled_motion(published.parameters, turning), turning)
+    controller = SampledController(design_pid(models.mean(), bandwidth=300.0), 1e-3)
+    options: dict[str, Any] = {"initial": published.initial, "stop_time": 0.5}
+    loop = control_loop(published.parameters, controller, 0.0, turning, **options)
+    outside = control_loop(published.parameters, controller, 0.0, turning, fmu=fmus["rotor-on-cart"], **options)
+    np.testing.assert_allclose(outside.states, loop.states, atol=1e-11)
+    window = loop.metrics(band=1e-3, window=models.period)
+    assert window.peak_error < 0.05 * np.ptp(models.states[:, 1])
+
+
+def test_cart_about_its_shaken_motion_is_time_invariant() -> None:
+    published, turning = demo(ROTOR), Inputs(speed=20.0)
+    models = linearise_along(published.parameters, settled_motion(published.parameters, turning), turning)
+    assert models.period == pytest.approx(pi / 10.0)
+    np.testing.assert_allclose(models.monodromy(), expm(models.mean().A * models.period), atol=1e-8)
+    wrong = {"speed": 20.0, "force": 5.0}
+    assert linearise_along(published.parameters, models.states, Inputs(**wrong)).mean().inputs == Inputs(**wrong)
+
+
+#: The slider-crank of the FMU with a spring and a damper along the crank's axis.
+SPRUNG = replace(OFFSET_CASE[0], shift_stiffness=2e4, shift_spring_free_position=0.05, shift_damping=150.0)
+
+
+def differences(mechanism: Mechanism, parameters: Any, state: Any, places: list[int], **modes: float) -> np.ndarray:
+    """Derivatives of the plant's derivative by some components of its state, the others left."""
+    p, h = parameters.constants(), 1e-6
+    applied = mechanism.equations.applied(tuple(modes.values()), (0.0,) * len(mechanism.channels), p)
+
+    def rates(step: np.ndarray) -> np.ndarray:
+        return np.array(mechanism.equations.derivative(tuple(np.array(state) + step), applied, p))[places]
+
+    columns = np.eye(mechanism.size)[places] * h
+    return np.array([(rates(column) - rates(-column)) / (2.0 * h) for column in columns]).T
+
+
+@pytest.mark.parametrize("speed", [None, 0.0, 5.0])
+def test_shift_of_the_slider_crank_is_that_of_differences(speed: float | None) -> None:
+    drive = {} if speed is None else {"speed": speed}
+    model = linearise(SPRUNG, (0.4, 0.06, speed or 0.0, 0.1), Inputs(axial_force=0.0, **drive))
+    assert model.places == ([0, 1, 2, 3] if speed is None else [1, 3])
+    exact = differences(SLIDER_CRANK, SPRUNG, model.state, model.places, drive=float(speed is not None), axial=0.0)
+    size = np.abs(exact).max(axis=1, keepdims=True)
+    assert np.all(np.abs(model.A - exact) < 1e-7 * size)
+    assert np.sort_complex(np.linalg.eigvals(model.A)) == pytest.approx(
+        np.sort_complex(np.linalg.eigvals(exact)), rel=1e-6
+    )
+
+
+def test_a_groove_leaves_one_freedom() -> None:
+    """The shift goes with the crank: its inertia is that of both, seen from the crank."""
+    grooved = replace(SPRUNG, groove_amplitude=0.05, groove_ratio=2.0)
+    model = linearise(grooved, (0.4, 0.0, 2.0, 0.0), Inputs(groove=True))
+    assert (model.state_names, model.inputs) == (("crank.angle", "crank.speed"), Inputs(groove=True, torque=0.0))
+    exact = differences(SLIDER_CRANK, grooved, model.state, model.places, drive=0.0, axial=2.0)
+    np.testing.assert_allclose(model.A, exact, rtol=1e-6)
+    assert model.F[0, model.input_names.index("drive.torque")] == pytest.approx(1.0)
+
+
+def test_axial_force_holds_the_shift_elsewhere() -> None:
+    """The crank held: LQR on axial.force, closed around the plant."""
+    rest = find_equilibrium(SPRUNG, Inputs(axial_force=0.0), held={"crank.angle": 0.4}, guess=(0.0, 0.05))
+    assert rest["shift.position"] == pytest.approx(0.05, abs=1e-2)
+    plant = Plant(SLIDER_CRANK, SPRUNG, rest.initial, drive_mode=1, axial_mode=0)
+    plant.step(0.0, 1.0)
+    assert plant.state[1] == pytest.approx(rest["shift.position"], abs=1e-9)
+    model = linearise(SPRUNG, rest.state, rest.inputs)
+    design = design_lqr(model, {"shift.position": 1e8, "shift.velocity": 1e4}, integral=1e10)
+    assert (design.channel, design.coordinate) == ("axial.force", "shift.position")
+    target = rest["shift.position"] + 0.01
+    controller = SampledController(design, 1e-3)
+    loop = control_loop(SPRUNG, controller, target, Inputs(speed=0.0), initial=rest.initial, stop_time=1.5)
+    assert loop.position[-1] == pytest.approx(target, abs=1e-6)
+    linear = predict_loop(model, controller, target, stop_time=1.5)
+    assert largest_difference(loop, linear) < 0.02 * 0.01
+
+
+FORCES = {
+    "five-bar": (FIVE_BAR, TABLE_3_1, (0.6, 0.01, 0.0, 0.0), {}),
+    "slider-crank": (SLIDER_CRANK, SPRUNG, (0.4, 0.06, 0.0, 0.0), {"axial_force": 0.0}),
+    "rotor": (ROTOR, demo(ROTOR).parameters, (0.6, 0.01, 0.0, 0.0), {"torque": 0.0}),
+}
+
+
+@pytest.mark.parametrize("name", FORCES)
+def test_forces_act_along_their_displacements(name: str) -> None:
+    """Generalised force of a unit force: the gradient of the displacement that its channel names."""
+    mechanism, parameters, state, channels = FORCES[name]
+    model = linearise(parameters, state, Inputs(**channels))
+    n = len(mechanism.freedoms)
+    for channel in mechanism.channels:
+        if channel.kind == "force":
+            where = mechanism.freedoms[channel.freedom].coordinate if channel.freedom >= 0 else channel.displacement
+            gradient = model.H[model.output_names.index(where), :n]
+            np.testing.assert_allclose(model.F[:, model.input_names.index(channel.name)], gradient, atol=1e-9)

@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
 from analysis import Event, Inputs, Trajectory, compare, simulate, simulate_many
-from analysis.linear import linearise
 from analysis.mechanisms import MECHANISMS, SLIDER_CRANK, output_units
 from analysis.run import CASES as CHECKS
 from analysis.run import Case, Function, Harmonics, TorsionBar, published_case, steps
@@ -273,7 +272,6 @@ def test_a_freedom_has_one_drive() -> None:
 @pytest.mark.parametrize(
     ("call", "what"),
     [
-        (lambda p: linearise(p, (0.0, 0.0, 0.0, 0.0)), "a linear model"),
         (lambda p: coupler_curve(p, 0.0), "a coupler curve"),
     ],
 )

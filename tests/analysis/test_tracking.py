@@ -8,6 +8,7 @@ from math import inf, pi
 import numpy as np
 import pytest
 
+from analysis import Inputs
 from analysis.linear import (
     SampledController,
     control_loop,
@@ -161,7 +162,7 @@ def test_feedback_alone_holds_a_still_slider_as_the_control_loop_does(model) -> 
     start = InitialState(slider_position=0.0)
     result = run(RIG, still, design=design, feedforward=False, initial=start, revolutions=2)
     loop = control_loop(
-        RIG, SampledController(design, PERIOD), 0.003, initial=start, stop_time=4.0 * pi / SPEED, crank_speed=SPEED
+        RIG, SampledController(design, PERIOD), 0.003, Inputs(speed=SPEED), initial=start, stop_time=4.0 * pi / SPEED
     )
     # the mean velocity about which the design was made is zero but for rounding
     assert result.loop.states == pytest.approx(loop.states, abs=1e-9)
@@ -170,8 +171,8 @@ def test_feedback_alone_holds_a_still_slider_as_the_control_loop_does(model) -> 
 
 def test_a_controller_starts_each_run_afresh(pid) -> None:
     controller = TrackingController(RIG, MOTION, PERIOD, design=pid)
-    options = {"initial": InitialState(crank_speed=SPEED), "stop_time": 0.05, "crank_speed": SPEED}
-    first, second = (control_loop(RIG, controller, 0.0, **options).force for _ in range(2))
+    options = {"initial": InitialState(crank_speed=SPEED), "stop_time": 0.05}
+    first, second = (control_loop(RIG, controller, 0.0, Inputs(speed=SPEED), **options).force for _ in range(2))
     assert np.array_equal(first, second)
 
 

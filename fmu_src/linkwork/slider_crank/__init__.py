@@ -59,7 +59,7 @@ MECHANISM = Mechanism(
         Channel("axial.force", "axial_force", freedom=1),
         Channel("axial.speed", "shift_speed", "command", 1),
         Channel("axial.acceleration", "rate of shift_speed", "rate", 1),
-        Channel("slider.load", "load"),
+        Channel("slider.load", "load", displacement="slider.position"),
     ),
     variables=variables.VARIABLES,
     position_parameters=variables.POSITION_PARAMETERS,
