@@ -83,8 +83,18 @@ class Drive:
         return self.speed is not None
 
     def arguments(self, mechanism: Mechanism) -> dict[str, str]:
-        """What drives each freedom that has a mode: the mode's name, and the one of its `Mode.arguments`."""
+        """What drives each freedom that has a mode: the mode's name, and the one of its `Mode.arguments`.
+
+        Raises
+        ------
+        InputError
+            If a mode is not one of a freedom beside the crank, or has no such value.
+        """
         found, crank = {}, crank_of(mechanism)
+        others = {f.mode.name: f.mode for n, f in enumerate(mechanism.freedoms) if f.mode and n != crank.freedom}
+        for name, value in self.modes.items():
+            if name not in others or value not in range(len(others[name].values)):
+                raise InputError(f"{name} = {value} is no mode of a {mechanism.name} that a drive can have")
         for number, freedom in enumerate(mechanism.freedoms):
             if (mode := freedom.mode) is None:
                 continue
@@ -107,7 +117,7 @@ class Drive:
         """
         crank = crank_of(mechanism)
         if (crank.command if self.speed_drive else crank.torque) is None:
-            what = "speed" if self.speed_drive else "torque on"
+            what = "speed of" if self.speed_drive else "torque on"
             raise InputError(f"a {mechanism.name} has no input for the {what} its crank: drive it otherwise")
         chosen = self.arguments(mechanism)
         made = flow(mechanism, tuple(mode.arguments.index(chosen[mode.name]) for mode in mechanism.modes))
@@ -124,9 +134,9 @@ class Drive:
         Raises
         ------
         UnknownNameError
-            If there is no input or held coordinate of a name.
+            If there is no force of a name.
         InputError
-            If a force does not act.
+            If a force does not act, or a coordinate is not one that is held.
         """
         crank, numbers = crank_of(mechanism), {c.name: n for n, c in enumerate(mechanism.channels)}
         u = np.zeros(len(numbers))
@@ -143,10 +153,11 @@ class Drive:
         motor = (0.0, 1.0, 1.0)
         if self.motor is not None:
             motor = (self.motor.breakdown_torque, self.motor.breakdown_slip, self.motor.synchronous_speed)
+        free = self.flow(mechanism).free
         coordinates = [f.coordinate for f in mechanism.freedoms]
         for name in self.held:
-            if name not in coordinates:
-                raise UnknownNameError(name, tuple(coordinates), None)
+            if name not in coordinates or coordinates.index(name) in (crank.freedom, *free):
+                raise InputError(f"{name} is no coordinate of the {mechanism.name} that is held in this drive")
         return np.array([*u, *motor, *(self.held.get(name, 0.0) for name in coordinates)])
 
     def inputs(self, mechanism: Mechanism) -> Inputs:

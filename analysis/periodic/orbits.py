@@ -284,7 +284,7 @@ def find_orbit(
     >>> from linkwork.five_bar.published import SETS
     >>> table = SETS["table-3.1"]
     >>> orbit = find_orbit(table.parameters, speed=table.crank_speed)
-    >>> round(100.0 * orbit.start[0], 8), orbit.verdict().stability.value
+    >>> round(100.0 * float(orbit.start[0]), 8), orbit.verdict().stability.value
     (-0.89553115, 'stable')
     """
     drive = drive_of(parameters, inputs, initial, speed=speed, torque=torque)

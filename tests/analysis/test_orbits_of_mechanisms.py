@@ -214,8 +214,14 @@ def test_what_cannot_be_periodic_is_refused() -> None:
     grooved = replace(SPRUNG, groove_amplitude=0.05, groove_ratio=0.5)
     with pytest.raises(InputError, match="not in the same configuration after 1 turn"):
         find_orbit(grooved, Inputs(groove=True), torque=1.0, start=(5.0,))
-    with pytest.raises(InputError, match=r"axial\.force does not act: axial\.mode is speed"):
-        orbit_of(SPRUNG, Drive(torque=1.0, forces=FREE, modes={"axial.mode": 1}), start=(5.0,))
+    for given, message in (
+        ({"forces": FREE, "modes": {"axial.mode": 1}}, r"axial\.force does not act: axial\.mode is speed"),
+        ({"held": {"crank.angle": 1.0}}, r"crank\.angle is no coordinate .* that is held"),
+        ({"modes": {"axial.mode": 3}}, r"axial\.mode = 3 is no mode"),
+        ({"modes": {"drive.mode": 0}}, r"drive\.mode = 0 is no mode"),
+    ):
+        with pytest.raises(InputError, match=message):
+            orbit_of(SPRUNG, Drive(torque=1.0, **given), start=(5.0,))
 
 
 def test_drive_and_inputs_are_each_others() -> None:
