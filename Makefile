@@ -17,7 +17,7 @@ demo: $(RUN)
 
 quick: $(DEV)
 	$(PYTEST) --numprocesses auto -m 'not slow and not fmu' tests/plant $(addprefix tests/analysis/test_,$(addsuffix .py,\
-		areas continuation crossings drawings dual events figures fourier inputs io linkage startup symbolic trajectory))
+		areas case_files codegen continuation drawings dual events figures files fourier inputs linkage startup symbolic trajectory))
 
 test: $(DEV) lint
 	$(BIN)/python build_fmu.py
