@@ -20,7 +20,8 @@ from numpy.typing import NDArray
 from linkwork.limits import LIMIT_SINE, NEAR_LIMIT
 
 from ..numerics.codegen import MATRIX, VECTOR, evaluate, inner, kernel, part
-from ..run.compiled import SOURCE, Source, attempt, following, shorter
+from ..run.sources import SOURCE, Source
+from ..run.stepping import attempt, following, shorter
 from .flows import DIRECTIONAL, GAP, PLAIN, STATE, VARIATIONAL
 
 

@@ -9,19 +9,20 @@ of the torsion bar.
 
 from __future__ import annotations
 
-from math import cos, isfinite, isnan, sin
+from math import isfinite, isnan
 from typing import NamedTuple
 
 import numpy as np
 from numba import boolean, float64, from_dtype, int64, types
 from numpy.typing import NDArray
 
-from linkwork import tableau
-from linkwork.integrate import GREATEST_FACTOR, LEAST_FACTOR, LEAST_STEP, SAFETY
+from linkwork.integrate import LEAST_STEP
 from linkwork.limits import LIMIT_SINE, NEAR_LIMIT
 
 from ..numerics.codegen import CUBE, MATRIX, VECTOR, call_user, evaluate, inner, kernel, part
 from .equations import CLEARANCE, DERIVATIVE, JUMP, OUTPUTS
+from .sources import ADDRESSES, PLACES, SOURCE, Source, channels_at, find, hold
+from .stepping import EXPONENT, NODES, STAGES, attempt, following, interpolant, interpolate, shorter, stage
 
 # Status of a run, as the kernels return it: where the run has one, the solver.status of the FMI contract
 RUNNING = -1
@@ -42,23 +43,6 @@ OUTPUT, LEVEL, DIRECTION, STOPS = range(4)
 NOTHING = -3
 RELEASE = -2
 ASSEMBLY = -1
-
-
-class Source(NamedTuple):
-    """Inputs as the compiled code reads them.
-
-    ``breaks``, ``coefficients``, ``harmonics``, ``law`` and ``law_places`` are those of `inputs.Encoded`; ``places``, shape
-    (signals, 2), are the numbers of the channels that take a signal's value and its rate, -1 for none; ``functions``, shape
-    (signals, 2), the addresses of users' functions for both, or 0.
-    """
-
-    breaks: NDArray[np.float64]
-    coefficients: NDArray[np.float64]
-    harmonics: NDArray[np.float64]
-    places: NDArray[np.int64]
-    law: NDArray[np.float64]
-    law_places: NDArray[np.int64]
-    functions: NDArray[np.int64]
 
 
 class Problem(NamedTuple):
@@ -126,210 +110,15 @@ CARRY = np.dtype(
     ]
 )
 
-_ADDRESSES = int64[::1]
-_PLACES = int64[:, ::1]
-SOURCE = types.NamedTuple((VECTOR, CUBE, MATRIX, _PLACES, VECTOR, _ADDRESSES, _PLACES), Source)
-_PROBLEM = types.NamedTuple((_ADDRESSES, VECTOR, VECTOR, VECTOR, _PLACES, float64, float64, float64, boolean), Problem)
-_WATCH = types.NamedTuple((MATRIX, _ADDRESSES, VECTOR, MATRIX), Watch)
+_PROBLEM = types.NamedTuple((ADDRESSES, VECTOR, VECTOR, VECTOR, PLACES, float64, float64, float64, boolean), Problem)
+_WATCH = types.NamedTuple((MATRIX, ADDRESSES, VECTOR, MATRIX), Watch)
 _CARRIES = from_dtype(CARRY)[::1]
-
-# DOP853: the weights of stage s are WEIGHT[ROW[s]:ROW[s + 1]], those of the stages FROM
-ROW = np.cumsum([0, *(len(row) for row in tableau.A)])
-FROM = np.array([stage for row in tableau.A for stage, _ in row])
-WEIGHT = np.array([weight for row in tableau.A for _, weight in row])
-NODES = np.array(tableau.C)
-E3 = np.array(tableau.E3)
-E5 = np.array(tableau.E5)
-_D = np.array(tableau.D)
-STAGES = tableau.STAGES
-EXPONENT = -1.0 / tableau.ORDER
-
-# Inputs
-
-
-@inner
-def _find(t, breaks):  # type: ignore[no-untyped-def]
-    """Piece of the polynomials in force from t on; the outer ones go on beyond the ends."""
-    n = breaks.shape[0] - 1
-    i = np.searchsorted(breaks, t, side="right") - 1
-    return min(max(i, 0), n - 1)
-
-
-@inner
-def _find_before(t, breaks):  # type: ignore[no-untyped-def]
-    """Piece of the polynomials in force up to t."""
-    piece = _find(t, breaks)
-    return piece - 1 if piece > 0 and t == breaks[piece] else piece
-
-
-@inner
-def channels_at(t, piece, x, source, u):  # type: ignore[no-untyped-def]
-    """Write the channels at time t and state x, on a given piece of the polynomials, into u."""
-    s = t - source.breaks[piece]
-    for n in range(source.places.shape[0]):
-        c = source.coefficients[piece, n]
-        value, rate = source.places[n]
-        u[value] = c[0] + s * (c[1] + s * (c[2] + s * c[3]))
-        if rate >= 0:
-            u[rate] = c[1] + s * (2.0 * c[2] + s * 3.0 * c[3])
-    harmonics = source.harmonics
-    for k in range(harmonics.shape[0]):
-        value, rate = source.places[int(harmonics[k, 0])]
-        phase = harmonics[k, 2] * t + harmonics[k, 3]
-        u[value] += harmonics[k, 1] * cos(phase)
-        if rate >= 0:
-            u[rate] -= harmonics[k, 1] * harmonics[k, 2] * sin(phase)
-    law = source.law
-    channel, coordinate, speed = source.law_places
-    if law[2] != 0.0:
-        u[channel] += law[0] * (1.0 - x[coordinate] / law[1])
-    if law[3] != 0.0:
-        # Kloss: 2 Tb / (s / sb + sb / s), written so that it holds at synchronous speed
-        slip = 1.0 - x[speed] / law[5]
-        u[channel] += 2.0 * law[3] * slip * law[4] / (slip * slip + law[4] * law[4])
-    for n in range(source.functions.shape[0]):
-        function, of_rate = source.functions[n]
-        if function != 0:
-            u[source.places[n, 0]] += call_user(function, t, x)
-        if of_rate != 0:
-            u[source.places[n, 1]] += call_user(of_rate, t, x)
-
-
-@inner
-def _held_bar(law, angle, speed, step):  # type: ignore[no-untyped-def]
-    """What to add to the torsion bar's torque at an angle where it is held over a step, at a speed.
-
-    The torque at the angle predicted for the middle of the step makes the impulse right to second order; that at the
-    beginning would act half a step late. The bar does not pull back.
-    """
-    if law[2] == 0.0:
-        return 0.0
-    middle = angle + 0.5 * step * speed
-    return law[0] * (max(0.0, 1.0 - middle / law[1]) - (1.0 - angle / law[1]))
-
-
-@kernel(
-    types.void(float64, float64, boolean, VECTOR, SOURCE, _PLACES, VECTOR, VECTOR), purpose="the sampling of inputs"
-)
-def channels(t, ahead, left, x, source, commands, u, there):  # type: ignore[no-untyped-def]
-    """Write the channels at time t and state x into u: the limit from the left or the right where an input jumps.
-
-    Where ``ahead`` is later than t they are those of one who holds them until then: `_hold`; ``there`` is room for channels.
-    """
-    channels_at(t, _find_before(t, source.breaks) if left else _find(t, source.breaks), x, source, u)
-    if ahead > t:
-        _hold(t, ahead, x, source, commands, u, there)
-
-
-@inner
-def _hold(t, ahead, x, source, commands, u, there):  # type: ignore[no-untyped-def]
-    """Make of the channels at time t those of one who holds them until ``ahead``.
-
-    A torsion bar acts with the torque of the middle of the step; a commanded rate goes along the secant, so that it meets
-    the command again at the next point of the grid.
-    """
-    channel, coordinate, speed = source.law_places
-    u[channel] += _held_bar(source.law, x[coordinate], x[speed], ahead - t)
-    if commands.shape[0] > 0:
-        channels_at(ahead, _find_before(ahead, source.breaks), x, source, there)
-        for n in range(commands.shape[0]):
-            value, rate = commands[n, 0], commands[n, 2]
-            u[rate] = (there[value] - u[value]) / (ahead - t)
-
-
-# Steps
 
 
 @inner
 def _copy(source, target):  # type: ignore[no-untyped-def]
     for i in range(target.shape[0]):
         target[i] = source[i]
-
-
-@inner
-def _stage(s, x, k, h, y):  # type: ignore[no-untyped-def]
-    """State at stage s of a step of size h from x; stage 12 is its end."""
-    n = x.shape[0]
-    for i in range(n):
-        y[i] = 0.0
-    for j in range(ROW[s], ROW[s + 1]):
-        weight = WEIGHT[j]
-        stage = FROM[j]
-        for i in range(n):
-            y[i] += weight * k[stage, i]
-    for i in range(n):
-        y[i] = x[i] + h * y[i]
-
-
-@inner
-def attempt(equation, modes, p, scale, t, h, x, k, y, constant, piece, source, u):  # type: ignore[no-untyped-def]
-    """A step of size h from x at t, into y, whose rates at the start are k[0]; its error relative to ``scale``.
-
-    ``equation`` is the address of the right-hand side, ``u`` what acts; where it is not ``constant`` it is sampled at each
-    stage.
-    """
-    for s in range(1, STAGES):
-        _stage(s, x, k, h, y)
-        if not constant:
-            channels_at(t + NODES[s] * h, piece, y, source, u)
-        evaluate(equation, t + NODES[s] * h, y, modes, u, p, k[s])
-    _stage(STAGES, x, k, h, y)
-    return _local_error(x, y, k, h, scale)
-
-
-@inner
-def _local_error(x, y, k, h, scale):  # type: ignore[no-untyped-def]
-    """Hairer's estimate of the error of a step from x to y relative to the scale, of order 8 in h."""
-    sum3 = sum5 = 0.0
-    for i in range(x.shape[0]):
-        e3 = e5 = 0.0
-        for j in range(STAGES):
-            e3 += E3[j] * k[j, i]
-            e5 += E5[j] * k[j, i]
-        weight = scale[i] + max(abs(x[i]), abs(y[i]))
-        sum3 += (e3 / weight) ** 2
-        sum5 += (e5 / weight) ** 2
-    bottom = sum5 + 0.01 * sum3
-    return 0.0 if bottom == 0.0 else h * sum5 / np.sqrt(bottom * x.shape[0])
-
-
-@inner
-def shorter(h, error):  # type: ignore[no-untyped-def]
-    """The step to try after one of size h was refused for its error, relative to the tolerance."""
-    return h * (max(LEAST_FACTOR, SAFETY * error**EXPONENT) if 1.0 < error < 1e30 else 0.25)
-
-
-@inner
-def following(h, proposed, error):  # type: ignore[no-untyped-def]
-    """The step to try after one of size h, where ``proposed`` was, went well; one cut short does not shorten it."""
-    factor = GREATEST_FACTOR if error == 0.0 else min(GREATEST_FACTOR, SAFETY * error**EXPONENT)
-    return max(proposed, factor * h) if h < proposed else max(LEAST_FACTOR, factor) * h
-
-
-@inner
-def _interpolant(x, y, k, h, f):  # type: ignore[no-untyped-def]
-    """Coefficients of the interpolant between x and y (Hairer's contd8); k holds all sixteen stages."""
-    for i in range(x.shape[0]):
-        delta = y[i] - x[i]
-        f[0, i] = delta
-        f[1, i] = h * k[0, i] - delta
-        f[2, i] = 2.0 * delta - h * (k[12, i] + k[0, i])
-        for r in range(4):
-            total = 0.0
-            for j in range(16):
-                total += _D[r, j] * k[j, i]
-            f[3 + r, i] = h * total
-
-
-@inner
-def _interpolate(s, x, f, out):  # type: ignore[no-untyped-def]
-    """State at the fraction s of the step."""
-    for i in range(x.shape[0]):
-        y = 0.0
-        for r in range(7):
-            y += f[6 - r, i]
-            y *= s if r % 2 == 0 else 1.0 - s
-        out[i] = x[i] + y
 
 
 # Events
@@ -373,7 +162,7 @@ def _record(carry, watch, e, t, x):  # type: ignore[no-untyped-def]
 @inner
 def _inside(s, t, h, x, constant, piece, source, work):  # type: ignore[no-untyped-def]
     """Write state and inputs at the fraction s of a step from x at t into ``work.dense`` and ``work.inside``."""
-    _interpolate(s, x, work.f, work.dense)
+    interpolate(s, x, work.f, work.dense)
     if constant:
         _copy(work.held, work.inside)
     else:
@@ -417,7 +206,7 @@ def _events_of_step(t, h, x, constant, piece, problem, source, watch, work, carr
                 gap = _gap(e, t + s1 * h, work.dense, work.inside, problem, source, watch, work.outputs)
             if _crosses(watch.gaps[e], gap, watch.table[e, DIRECTION]):
                 s = _locate(e, s0, s1, t, h, x, constant, piece, problem, source, watch, work)
-                _interpolate(s, x, work.f, work.dense)
+                interpolate(s, x, work.f, work.dense)
                 _record(carry, watch, e, s, work.dense)
                 if watch.table[e, STOPS] != 0.0 and s < first:
                     what, first = e, s
@@ -447,7 +236,7 @@ def _begin_interval(stop, piece, problem, source, watch, work, carry, x, samples
     channels_at(t, piece, x, source, held)
     lost = _not_finite(held)
     if problem.hold > 0.0 and lost < 0:
-        _hold(t, stop if t < problem.end else t + problem.hold, x, source, problem.commands, held, work.ahead)
+        hold(t, stop if t < problem.end else t + problem.hold, x, source, problem.commands, held, work.ahead)
         for n in range(problem.commands.shape[0]):
             # a rate is then the secant of a command
             if not isfinite(held[problem.commands[n, 2]]):
@@ -519,12 +308,12 @@ def _cut_of_step(t, h, t_new, x, constant, piece, problem, source, watch, work, 
         return NOTHING, 2.0
     _copy(work.held, work.inside)
     for s in range(13, 16):
-        _stage(s, x, work.k, h, work.z)
+        stage(s, x, work.k, h, work.z)
         if not constant:
             channels_at(t + NODES[s] * h, piece, work.z, source, work.inside)
         evaluate(problem.equations[DERIVATIVE], t, work.z, problem.modes, work.inside, problem.p, work.k[s])
     carry.evaluations += 3
-    _interpolant(x, work.y, work.k, h, work.f)
+    interpolant(x, work.y, work.k, h, work.f)
     what, cut = NOTHING, 2.0
     if limit:
         what = ASSEMBLY
@@ -552,7 +341,7 @@ def _settle_events(before, cut, elapsed, h, watch, carry):  # type: ignore[no-un
 @inner
 def _end_at(what, cut, t_new, h, x, constant, piece, problem, source, watch, work, carry, before):  # type: ignore[no-untyped-def]
     """End a step at the fraction where something cuts it short; the status."""
-    _interpolate(cut, x, work.f, work.dense)
+    interpolate(cut, x, work.f, work.dense)
     _copy(work.dense, x)
     if what == RELEASE:
         x[source.law_places[1]] = source.law[1]
@@ -580,7 +369,7 @@ def _sample_step(t_new, h, x, constant, piece, source, work, carry, samples, sta
     """Record the samples inside a step; one at its end waits for the next, or for the next interval's inputs."""
     while carry.sample < samples.shape[0] and samples[carry.sample] < t_new:
         n = carry.sample
-        _interpolate(((samples[n] - carry.begin) - carry.elapsed) / h, x, work.f, states[n])
+        interpolate(((samples[n] - carry.begin) - carry.elapsed) / h, x, work.f, states[n])
         if constant:
             _copy(work.held, forces[n])
         else:
@@ -678,7 +467,7 @@ def _work(states, outputs, inputs):  # type: ignore[no-untyped-def]
 def _run(problem, source, watch, work, carry, x, samples, states, forces, most):  # type: ignore[no-untyped-def]
     events = watch.table.shape[0]
     while True:
-        piece = _find(carry.begin, source.breaks)
+        piece = find(carry.begin, source.breaks)
         stop = _end_of_interval(problem, source, samples, carry, piece)
         if carry.midway == 0:
             if carry.found + (1 + EVENTS_PER_STEP) * events > watch.found.shape[0]:

@@ -375,7 +375,7 @@ def sample(
     NotFiniteError
         If one of them is not a finite number.
     """
-    from . import compiled as k
+    from . import sources as k
 
     x = np.ascontiguousarray(x)
     if ahead > t and law[2] and x[encoded.law_places[1]] >= law[1]:
@@ -448,7 +448,7 @@ def _reason(error: Exception) -> str:
 
 def compiled_source(encoded: Encoded) -> tuple[Any, list[Any]]:
     """The inputs as the compiled code reads them, with a law of their own, and what has to stay alive meanwhile."""
-    from . import compiled as k
+    from . import sources as k
 
     freedoms = len(encoded.mechanism.freedoms)
     kept = [[f and compile_function(f, freedoms) for f in row] for row in encoded.functions]

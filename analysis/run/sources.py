@@ -1,0 +1,122 @@
+"""The inputs of a run inside compiled code: what each channel is worth at a time and a state, and held over a step."""
+
+from __future__ import annotations
+
+from math import cos, sin
+from typing import NamedTuple
+
+import numpy as np
+from numba import boolean, float64, int64, types
+from numpy.typing import NDArray
+
+from ..numerics.codegen import CUBE, MATRIX, VECTOR, call_user, inner, kernel
+
+
+class Source(NamedTuple):
+    """Inputs as the compiled code reads them.
+
+    ``breaks``, ``coefficients``, ``harmonics``, ``law`` and ``law_places`` are those of `inputs.Encoded`; ``places``, shape
+    (signals, 2), are the numbers of the channels that take a signal's value and its rate, -1 for none; ``functions``, shape
+    (signals, 2), the addresses of users' functions for both, or 0.
+    """
+
+    breaks: NDArray[np.float64]
+    coefficients: NDArray[np.float64]
+    harmonics: NDArray[np.float64]
+    places: NDArray[np.int64]
+    law: NDArray[np.float64]
+    law_places: NDArray[np.int64]
+    functions: NDArray[np.int64]
+
+
+ADDRESSES = int64[::1]
+PLACES = int64[:, ::1]
+SOURCE = types.NamedTuple((VECTOR, CUBE, MATRIX, PLACES, VECTOR, ADDRESSES, PLACES), Source)
+
+
+@inner
+def find(t, breaks):  # type: ignore[no-untyped-def]
+    """Piece of the polynomials in force from t on; the outer ones go on beyond the ends."""
+    n = breaks.shape[0] - 1
+    i = np.searchsorted(breaks, t, side="right") - 1
+    return min(max(i, 0), n - 1)
+
+
+@inner
+def _find_before(t, breaks):  # type: ignore[no-untyped-def]
+    """Piece of the polynomials in force up to t."""
+    piece = find(t, breaks)
+    return piece - 1 if piece > 0 and t == breaks[piece] else piece
+
+
+@inner
+def channels_at(t, piece, x, source, u):  # type: ignore[no-untyped-def]
+    """Write the channels at time t and state x, on a given piece of the polynomials, into u."""
+    s = t - source.breaks[piece]
+    for n in range(source.places.shape[0]):
+        c = source.coefficients[piece, n]
+        value, rate = source.places[n]
+        u[value] = c[0] + s * (c[1] + s * (c[2] + s * c[3]))
+        if rate >= 0:
+            u[rate] = c[1] + s * (2.0 * c[2] + s * 3.0 * c[3])
+    harmonics = source.harmonics
+    for k in range(harmonics.shape[0]):
+        value, rate = source.places[int(harmonics[k, 0])]
+        phase = harmonics[k, 2] * t + harmonics[k, 3]
+        u[value] += harmonics[k, 1] * cos(phase)
+        if rate >= 0:
+            u[rate] -= harmonics[k, 1] * harmonics[k, 2] * sin(phase)
+    law = source.law
+    channel, coordinate, speed = source.law_places
+    if law[2] != 0.0:
+        u[channel] += law[0] * (1.0 - x[coordinate] / law[1])
+    if law[3] != 0.0:
+        # Kloss: 2 Tb / (s / sb + sb / s), written so that it holds at synchronous speed
+        slip = 1.0 - x[speed] / law[5]
+        u[channel] += 2.0 * law[3] * slip * law[4] / (slip * slip + law[4] * law[4])
+    for n in range(source.functions.shape[0]):
+        function, of_rate = source.functions[n]
+        if function != 0:
+            u[source.places[n, 0]] += call_user(function, t, x)
+        if of_rate != 0:
+            u[source.places[n, 1]] += call_user(of_rate, t, x)
+
+
+@inner
+def _held_bar(law, angle, speed, step):  # type: ignore[no-untyped-def]
+    """What to add to the torsion bar's torque at an angle where it is held over a step, at a speed.
+
+    The torque at the angle predicted for the middle of the step makes the impulse right to second order; that at the
+    beginning would act half a step late. The bar does not pull back.
+    """
+    if law[2] == 0.0:
+        return 0.0
+    middle = angle + 0.5 * step * speed
+    return law[0] * (max(0.0, 1.0 - middle / law[1]) - (1.0 - angle / law[1]))
+
+
+@kernel(types.void(float64, float64, boolean, VECTOR, SOURCE, PLACES, VECTOR, VECTOR), purpose="the sampling of inputs")
+def channels(t, ahead, left, x, source, commands, u, there):  # type: ignore[no-untyped-def]
+    """Write the channels at time t and state x into u: the limit from the left or the right where an input jumps.
+
+    Where ``ahead`` is later than t they are those of one who holds them until then: `hold`; ``there`` is room for channels.
+    """
+    channels_at(t, _find_before(t, source.breaks) if left else find(t, source.breaks), x, source, u)
+    if ahead > t:
+        hold(t, ahead, x, source, commands, u, there)
+
+
+@inner
+def hold(t, ahead, x, source, commands, u, there):  # type: ignore[no-untyped-def]
+    """Make of the channels at time t those of one who holds them until ``ahead``.
+
+    A torsion bar acts with the torque of the middle of the step; a commanded rate goes along the secant, so that it meets
+    the command again at the next point of the grid.
+    """
+    channel, coordinate, speed = source.law_places
+    u[channel] += _held_bar(source.law, x[coordinate], x[speed], ahead - t)
+    if commands.shape[0] > 0:
+        channels_at(ahead, _find_before(ahead, source.breaks), x, source, there)
+        for n in range(commands.shape[0]):
+            value, rate = commands[n, 0], commands[n, 2]
+            u[rate] = (there[value] - u[value]) / (ahead - t)

@@ -1,0 +1,108 @@
+"""A step of the integrator in compiled code, shared by runs and periodic motions: DOP853 for arrays (`linkwork.tableau`)."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from linkwork import tableau
+from linkwork.integrate import GREATEST_FACTOR, LEAST_FACTOR, SAFETY
+
+from ..numerics.codegen import evaluate, inner
+from .sources import channels_at
+
+# DOP853: the weights of stage s are WEIGHT[ROW[s]:ROW[s + 1]], those of the stages FROM
+ROW = np.cumsum([0, *(len(row) for row in tableau.A)])
+FROM = np.array([stage for row in tableau.A for stage, _ in row])
+WEIGHT = np.array([weight for row in tableau.A for _, weight in row])
+NODES = np.array(tableau.C)
+E3 = np.array(tableau.E3)
+E5 = np.array(tableau.E5)
+_D = np.array(tableau.D)
+STAGES = tableau.STAGES
+EXPONENT = -1.0 / tableau.ORDER
+
+
+@inner
+def stage(s, x, k, h, y):  # type: ignore[no-untyped-def]
+    """State at stage s of a step of size h from x; stage 12 is its end."""
+    n = x.shape[0]
+    for i in range(n):
+        y[i] = 0.0
+    for j in range(ROW[s], ROW[s + 1]):
+        weight = WEIGHT[j]
+        stage = FROM[j]
+        for i in range(n):
+            y[i] += weight * k[stage, i]
+    for i in range(n):
+        y[i] = x[i] + h * y[i]
+
+
+@inner
+def attempt(equation, modes, p, scale, t, h, x, k, y, constant, piece, source, u):  # type: ignore[no-untyped-def]
+    """A step of size h from x at t, into y, whose rates at the start are k[0]; its error relative to ``scale``.
+
+    ``equation`` is the address of the right-hand side, ``u`` what acts; where it is not ``constant`` it is sampled at each
+    stage.
+    """
+    for s in range(1, STAGES):
+        stage(s, x, k, h, y)
+        if not constant:
+            channels_at(t + NODES[s] * h, piece, y, source, u)
+        evaluate(equation, t + NODES[s] * h, y, modes, u, p, k[s])
+    stage(STAGES, x, k, h, y)
+    return _local_error(x, y, k, h, scale)
+
+
+@inner
+def _local_error(x, y, k, h, scale):  # type: ignore[no-untyped-def]
+    """Hairer's estimate of the error of a step from x to y relative to the scale, of order 8 in h."""
+    sum3 = sum5 = 0.0
+    for i in range(x.shape[0]):
+        e3 = e5 = 0.0
+        for j in range(STAGES):
+            e3 += E3[j] * k[j, i]
+            e5 += E5[j] * k[j, i]
+        weight = scale[i] + max(abs(x[i]), abs(y[i]))
+        sum3 += (e3 / weight) ** 2
+        sum5 += (e5 / weight) ** 2
+    bottom = sum5 + 0.01 * sum3
+    return 0.0 if bottom == 0.0 else h * sum5 / np.sqrt(bottom * x.shape[0])
+
+
+@inner
+def shorter(h, error):  # type: ignore[no-untyped-def]
+    """The step to try after one of size h was refused for its error, relative to the tolerance."""
+    return h * (max(LEAST_FACTOR, SAFETY * error**EXPONENT) if 1.0 < error < 1e30 else 0.25)
+
+
+@inner
+def following(h, proposed, error):  # type: ignore[no-untyped-def]
+    """The step to try after one of size h, where ``proposed`` was, went well; one cut short does not shorten it."""
+    factor = GREATEST_FACTOR if error == 0.0 else min(GREATEST_FACTOR, SAFETY * error**EXPONENT)
+    return max(proposed, factor * h) if h < proposed else max(LEAST_FACTOR, factor) * h
+
+
+@inner
+def interpolant(x, y, k, h, f):  # type: ignore[no-untyped-def]
+    """Coefficients of the interpolant between x and y (Hairer's contd8); k holds all sixteen stages."""
+    for i in range(x.shape[0]):
+        delta = y[i] - x[i]
+        f[0, i] = delta
+        f[1, i] = h * k[0, i] - delta
+        f[2, i] = 2.0 * delta - h * (k[12, i] + k[0, i])
+        for r in range(4):
+            total = 0.0
+            for j in range(16):
+                total += _D[r, j] * k[j, i]
+            f[3 + r, i] = h * total
+
+
+@inner
+def interpolate(s, x, f, out):  # type: ignore[no-untyped-def]
+    """State at the fraction s of the step."""
+    for i in range(x.shape[0]):
+        y = 0.0
+        for r in range(7):
+            y += f[6 - r, i]
+            y *= s if r % 2 == 0 else 1.0 - s
+        out[i] = x[i] + y
