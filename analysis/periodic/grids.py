@@ -14,9 +14,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from linkwork.errors import InputError, Interrupted, LinkworkError
+from linkwork.mechanism import Mechanism
 
 from ..files import load_array, save_array
-from ..mechanisms import mechanism_of
+from ..mechanisms import MECHANISMS, mechanism_of
 from ..numerics.codegen import cache_root, fingerprint
 from ..run import interruptible, shown
 from . import orbit_kernels, orbits
@@ -156,7 +157,7 @@ def grid(
     done = len(paths) - len(missing)
     with interruptible() as interrupted, shown(progress, float(len(paths)), "stability") as show:
         show(float(done))
-        tasks = (joblib.delayed(_compute_row)(path, row, guess, tolerance) for path, row in missing)
+        tasks = (joblib.delayed(_compute_row)(mechanism, path, row, guess, tolerance) for path, row in missing)
         results = joblib.Parallel(n_jobs=n_jobs, return_as="generator_unordered")(tasks)
         try:
             for _ in results:
@@ -188,8 +189,12 @@ def grid(
     )
 
 
-def _compute_row(path: Path, row: Sequence[Operation], guess: NDArray[np.float64], tolerance: float) -> None:
+def _compute_row(
+    mechanism: Mechanism, path: Path, row: Sequence[Operation], guess: NDArray[np.float64], tolerance: float
+) -> None:
     """Compute a row and write its file, which is there as a whole or not at all."""
+    # one that was registered by the caller is not in another process
+    MECHANISMS.setdefault(mechanism.name, mechanism)
     mechanisms, drives = [p for p, _ in row], [drive for _, drive in row]
     values, starts, status = orbits.largest_multipliers(mechanisms, drives, guess, tolerance=tolerance)
     save_array(path, np.column_stack([values, starts, status]))

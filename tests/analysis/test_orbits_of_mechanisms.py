@@ -26,9 +26,11 @@ from analysis.periodic import (
     drive_of,
     find_orbit,
     frequency_response,
+    grid,
     mean_effective_mass,
     natural_frequency,
     orbit_of,
+    plane,
     stability_chart,
 )
 from linkwork.errors import InputError, ParameterError, UnknownNameError
@@ -144,6 +146,16 @@ def test_what_is_free_names_the_components_and_the_amplitude() -> None:
         natural_frequency(PENDULUM)
     with pytest.raises(UnknownNameError, match=r"there is no load\.fx"):
         orbit_of(ROTOR, Drive(speed=3.0, forces={"load.fx": 1.0}))
+
+
+def test_grid_over_cores_has_the_multipliers_of_the_linear_oscillator(tmp_path: Path) -> None:
+    speeds, dampings = np.array([20.0, 30.0, 45.0]), np.array([2.0, 6.0])
+    operation = plane(ROTOR, Drive(speed=30.0), "drive.speed", "cart.damping")
+    found = grid(operation, speeds, dampings, folder=tmp_path, n_jobs=2)
+    # both multipliers of a damped oscillation have the modulus exp(-c T / 2 M)
+    exact = np.exp(-dampings[:, None] * pi / speeds / ROTOR.constants().mass)
+    assert found.largest.filled(np.nan) == pytest.approx(exact, abs=1e-9)
+    assert grid(operation, speeds, dampings, folder=tmp_path).computed == 0
 
 
 # The slider-crank
