@@ -347,7 +347,8 @@ def design_pi(
 ) -> Design:
     """PI whose loop has the gain 1 at ``bandwidth``, and there at least the phase margin.
 
-    Where the coordinate lags so little that an integral alone leaves more than the margin, there is no proportional part.
+    Where the coordinate itself lags so little that an integral alone leaves more than the margin, there is no proportional
+    part.
 
     Parameters
     ----------

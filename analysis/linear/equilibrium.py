@@ -245,14 +245,22 @@ class _Balance:
     def _found(
         self, q: FloatArray, forces: FloatArray, stiffness: FloatArray, residual: float, iterations: int
     ) -> Equilibrium:
+        # a freedom that is tied to another goes where that takes it
+        applied = self.mechanism.equations.applied(
+            tuple(map(float, self.modes)), tuple(self.channels.tolist()), self.parameters.constants()
+        )
+        state = self.mechanism.equations.start(self._state(q), applied, self.parameters.constants())
         held = [(self.mechanism.freedoms[n].coordinate, k) for k, n in enumerate(self.its.free) if k not in self.free]
         return Equilibrium(
-            parameters=self.parameters, coordinates=q, inputs=self.inputs, stiffness=stiffness,
+            parameters=self.parameters, coordinates=np.array(state[: len(q)]), inputs=self.inputs, stiffness=stiffness,
             holding={name: -float(forces[k]) for name, k in held}, residual=float(residual), iterations=iterations,
         )  # fmt: skip
 
     def _words(self, q: FloatArray) -> str:
-        return self.mechanism.where([*q.tolist(), *[0.0] * (self.mechanism.size - len(q))])
+        return self.mechanism.where(self._state(q))
+
+    def _state(self, q: FloatArray) -> tuple[float, ...]:
+        return (*q.tolist(), *[0.0] * (self.mechanism.size - len(q)))
 
     def starts(self, held: FloatArray) -> list[FloatArray]:
         """Points of a grid over all configurations where the imbalance is less than at their neighbours."""

@@ -309,6 +309,10 @@ def test_a_groove_leaves_one_freedom() -> None:
     exact = differences(SLIDER_CRANK, grooved, model.state, model.places, drive=0.0, axial=2.0)
     np.testing.assert_allclose(model.A, exact, rtol=1e-6)
     assert model.F[0, model.input_names.index("drive.torque")] == pytest.approx(1.0)
+    # at rest the spring along the axis is as near to its free length as the groove lets it
+    rest = find_equilibrium(replace(grooved, shift_spring_free_position=0.06), Inputs(groove=True))
+    assert rest.stable
+    assert rest.coordinates[1] == rest["shift.position"] == pytest.approx(0.05, rel=1e-9)
 
 
 def test_axial_force_holds_the_shift_elsewhere() -> None:
