@@ -13,9 +13,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from analysis.numerics.dual import Dual, about_i, about_j, about_k, axial
-from analysis.slider_crank import ClosureError, close, estimate, follow, shortage
+from analysis.slider_crank import ClosureError, close, follow, shortage
 from analysis.slider_crank import closure as C
-from analysis.slider_crank.closure import loop, residuals
+from analysis.slider_crank.closure import estimate, loop, residuals
 from linkwork.errors import AssemblyError, InputError
 from linkwork.slider_crank import kinematics
 from linkwork.slider_crank.parameters import SliderCrankParameters

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from analysis.mechanisms import FIVE_BAR
 from analysis.numerics import symbolic
+from analysis.run import traced
 from analysis.synthesis.kernels import (
     COLUMNS,
     PLACES,
@@ -51,7 +52,7 @@ def evaluated(
 
 
 @cache
-def traced() -> Any:
+def function() -> Any:
     """Coupler point in the plane and link angles, by `position` and `coupler_point` of the plant, with their Jacobian.
 
     The slider's displacement is (dx, dy) with u = 1 and the guide's direction (dx, dy).
@@ -89,7 +90,7 @@ def test_path_angles_and_jacobians_are_those_of_the_plant(seed: int) -> None:
     path, path_jacobian = evaluated(coupler_path_jacobian, 2, phi, dx, dy, q, branch)
     angles, angle_jacobian = evaluated(link_jacobian, 2, phi, dx, dy, q, branch)
     for j in range(len(phi)):
-        values, jacobian = (np.asarray(a) for a in traced()(np.append(q, [dx[j], dy[j]]), phi[j], branch))
+        values, jacobian = (np.asarray(a) for a in function()(np.append(q, [dx[j], dy[j]]), phi[j], branch))
         np.testing.assert_allclose(path[:, j], values[:2, 0], rtol=0.0, atol=1e-13)
         np.testing.assert_allclose(np.exp(1j * angles[:, j]), np.exp(1j * values[2:, 0]), rtol=0.0, atol=1e-13)
         np.testing.assert_allclose(path_jacobian[:, :, j], jacobian[:2].T, rtol=1e-11, atol=1e-12)
