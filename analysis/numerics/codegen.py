@@ -21,6 +21,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
+from threading import RLock
 from types import CodeType, ModuleType
 from typing import Any
 
@@ -45,9 +46,13 @@ _ARGUMENTS = [_DOUBLE, *[_DOUBLE.as_pointer()] * 5]
 
 # Machine code of functions
 
+#: Held while code is made, so that threads make it once and each finds it whole.
+MAKING = RLock()
+_ALIVE: list[Any] = []
+
 
 class MachineCode:
-    """Machine code of functions, alive as long as the object is.
+    """Machine code of functions, which stays in the process for good: someone may hold an address.
 
     Parameters
     ----------
@@ -85,9 +90,10 @@ class MachineCode:
         )
         passes = binding.create_pass_builder(machine, binding.create_pipeline_tuning_options(speed_level=2))
         passes.getModulePassManager().run(parsed, passes)
-        self._engine = binding.create_mcjit_compiler(parsed, machine)
-        self._engine.finalize_object()
-        self.addresses = {f.name(): self._engine.get_function_address(f.name()) for f in functions}
+        engine = binding.create_mcjit_compiler(parsed, machine)
+        engine.finalize_object()
+        _ALIVE.append(engine)
+        self.addresses = {f.name(): engine.get_function_address(f.name()) for f in functions}
 
 
 @cache
@@ -95,8 +101,26 @@ def _prepare() -> None:
     binding.initialize_native_target()
     binding.initialize_native_asmprinter()
     library = ctypes.CDLL("ucrtbase" if sys.platform == "win32" else ctypes.util.find_library("m"))
-    for name in ("sin", "cos", "tanh", "atan2"):
-        binding.add_symbol(name, int(ctypes.cast(getattr(library, name), ctypes.c_void_p).value or 0))
+    for name in (
+        "sin",
+        "cos",
+        "tan",
+        "asin",
+        "acos",
+        "atan",
+        "atan2",
+        "sinh",
+        "cosh",
+        "tanh",
+        "exp",
+        "log",
+        "pow",
+        "hypot",
+    ):
+        address = ctypes.cast(getattr(library, name), ctypes.c_void_p).value
+        if not address:
+            raise LinkworkError(f"the C library of this machine has no function {name}")
+        binding.add_symbol(name, address)
 
 
 class _Writer:
@@ -146,25 +170,46 @@ class _Writer:
             casadi.OP_TWICE: lambda a: build.fadd(a, a),
             casadi.OP_INV: lambda a: build.fdiv(ir.Constant(_DOUBLE, 1.0), a),
             casadi.OP_ASSIGN: lambda a: a,
+            casadi.OP_SIGN: self._sign,
         }
         called = {
             casadi.OP_SIN: "sin",
             casadi.OP_COS: "cos",
-            casadi.OP_TANH: "tanh",
+            casadi.OP_TAN: "tan",
+            casadi.OP_ASIN: "asin",
+            casadi.OP_ACOS: "acos",
+            casadi.OP_ATAN: "atan",
             casadi.OP_ATAN2: "atan2",
+            casadi.OP_SINH: "sinh",
+            casadi.OP_COSH: "cosh",
+            casadi.OP_TANH: "tanh",
+            casadi.OP_EXP: "exp",
+            casadi.OP_LOG: "log",
+            casadi.OP_POW: "pow",
+            casadi.OP_CONSTPOW: "pow",
+            casadi.OP_HYPOT: "hypot",
             casadi.OP_SQRT: "llvm.sqrt.f64",
             casadi.OP_FABS: "llvm.fabs.f64",
         }
         if code in plain:
             return plain[code](*operands)
         if code not in called:
-            raise LinkworkError(f"{self.source.name()}: operation {code} of CasADi has no counterpart in machine code")
+            name = next((n for n in dir(casadi) if n.startswith("OP_") and getattr(casadi, n) == code), str(code))
+            raise LinkworkError(
+                f"{self.source.name()}: CasADi's operation {name} has no counterpart in machine code; equations are "
+                "straight lines of arithmetic and functions such as sin, sqrt, exp"
+            )
         name = called[code]
         target = self.module.globals.get(name)
         if target is None:
             target = ir.Function(self.module, ir.FunctionType(_DOUBLE, [_DOUBLE] * len(operands)), name)
             target.attributes.add("nounwind")
         return build.call(target, operands)
+
+    def _sign(self, a: Any) -> Any:
+        zero, one, less = (ir.Constant(_DOUBLE, value) for value in (0.0, 1.0, -1.0))
+        negative = self.build.select(self.build.fcmp_ordered("<", a, zero), less, zero)
+        return self.build.select(self.build.fcmp_ordered(">", a, zero), one, negative)
 
 
 def _index(place: int) -> Any:
@@ -265,14 +310,17 @@ class Kernel:
     @property
     def compiled(self) -> Any:
         """Numba's dispatcher."""
-        if self._compiled is None:
-            before = numba.config.CACHE_DIR
-            numba.config.CACHE_DIR = str(cache_folder(fingerprint(self.py_func)))
-            try:
-                with _announced(self.purpose):
-                    self._compiled = njit(*self.signature, cache=True, error_model="numpy", nogil=True)(self.py_func)
-            finally:
-                numba.config.CACHE_DIR = before
+        with MAKING:
+            if self._compiled is None:
+                before = numba.config.CACHE_DIR
+                numba.config.CACHE_DIR = str(cache_folder(fingerprint(self.py_func, self.signature)))
+                try:
+                    with _announced(self.purpose):
+                        self._compiled = njit(*self.signature, cache=True, error_model="numpy", nogil=True)(
+                            self.py_func
+                        )
+                finally:
+                    numba.config.CACHE_DIR = before
         return self._compiled
 
     def __call__(self, *arguments: Any) -> Any:
@@ -301,26 +349,40 @@ def _announced(purpose: str) -> Iterator[None]:
 # The cache of kernels
 
 
-def fingerprint(function: Any) -> str:
-    """Hash of everything that a compiled function is compiled from: its code, and all functions and constants it reads."""
-    digest = hashlib.sha256(f"{numba.__version__} {llvmlite.__version__} {np.__version__}".encode())
+def fingerprint(function: Any, signature: Any = None) -> str:
+    """Hash of everything that a compiled function is compiled from.
+
+    That is its code and all functions and constants that it reads, how Numba is to compile them, and the sources of our
+    modules in which they are, for what cannot be seen in a function alone, such as the fields of a NamedTuple.
+    """
+    digest = hashlib.sha256(f"{numba.__version__} {llvmlite.__version__} {np.__version__} {signature}".encode())
     seen: set[int] = set()
+    files = {Path(__file__)}
 
     def add(value: Any) -> None:
-        value = getattr(value, "py_func", value)
+        digest.update(repr(sorted(getattr(value, "targetoptions", {}).items(), key=str)).encode())
+        value = getattr(value, "py_func", getattr(value, "_defn", value))
         if isinstance(value, ModuleType):
-            # of foreign libraries the version counts; ours are read by their functions' names
             digest.update(value.__name__.encode())
+            note(value.__name__)
         elif isinstance(value, np.ndarray):
-            digest.update(value.tobytes())
-        elif hasattr(value, "__code__") or hasattr(value, "_defn"):
-            value = getattr(value, "_defn", value)
+            digest.update(f"{value.dtype} {value.shape}".encode() + value.tobytes())
+        elif isinstance(value, (tuple, list)):
+            for item in value:
+                add(item)
+        elif isinstance(value, (set, frozenset)):
+            add(sorted(value, key=str))
+        elif isinstance(value, type):
+            digest.update(f"{value.__qualname__} {getattr(value, '_fields', '')}".encode())
+            note(value.__module__)
+        elif hasattr(value, "__code__"):
             if id(value) in seen:
                 return
             seen.add(id(value))
-            code = value.__code__
-            add_code(code)
-            for name in sorted(_names(code)):
+            note(value.__module__)
+            add_code(value.__code__)
+            add(value.__defaults__)
+            for name in sorted(_names(value.__code__)):
                 if name in value.__globals__:
                     digest.update(name.encode())
                     add(value.__globals__[name])
@@ -329,16 +391,23 @@ def fingerprint(function: Any) -> str:
         else:
             digest.update(repr(value).encode())
 
+    def note(module: str | None) -> None:
+        """Remember the source of a module of ours."""
+        if module is not None and module.partition(".")[0] in ("analysis", "linkwork") and module in sys.modules:
+            files.add(Path(str(sys.modules[module].__file__)))
+
     def add_code(code: CodeType) -> None:
         digest.update(code.co_code)
         for constant in code.co_consts:
             if isinstance(constant, CodeType):
                 add_code(constant)
             else:
-                digest.update(repr(constant).encode())
+                add(constant)
         digest.update(" ".join((*code.co_names, *code.co_varnames)).encode())
 
     add(function)
+    for path in sorted(files):
+        digest.update(path.read_bytes())
     return digest.hexdigest()
 
 

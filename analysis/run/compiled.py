@@ -535,10 +535,11 @@ class Batch(NamedTuple):
     coefficients: NDArray[np.float64]
     harmonics: NDArray[np.float64]
     laws: NDArray[np.float64]
+    law_places: NDArray[np.int64]
 
 
 _BATCH = types.NamedTuple(
-    (MATRIX, MATRIX, boolean[::1], int64[:, ::1], MATRIX, float64[:, :, :, ::1], CUBE, MATRIX), Batch
+    (MATRIX, MATRIX, boolean[::1], int64[:, ::1], MATRIX, float64[:, :, :, ::1], CUBE, MATRIX, PLACES), Batch
 )
 
 
@@ -547,8 +548,8 @@ _BATCH = types.NamedTuple(
     purpose="the solver of ensembles",
 )
 def run_many(problem, source, batch, carries, starts, samples, states, forces, status, outputs, most):  # type: ignore[no-untyped-def]
-    """Many runs one after the other: `run` for each row, without events; what ``problem`` and ``source`` say holds for all,
-    where ``batch`` has nothing of its own."""
+    """Many runs one after the other: `run` for each row, without events; ``problem`` and ``source`` hold for all unless
+    ``batch`` has its own."""
     watch = Watch(np.empty((0, 4)), np.empty(0, dtype=np.int64), np.empty(0), np.empty((0, 2 + starts.shape[1])))
     work = _work(starts.shape[1], outputs, forces.shape[2])
     for i in range(starts.shape[0]):
@@ -559,7 +560,7 @@ def run_many(problem, source, batch, carries, starts, samples, states, forces, s
             batch.harmonics[i, :waves],
             source.places,
             batch.laws[i],
-            source.law_places,
+            batch.law_places[i],
             source.functions,
         )
         alike = Problem(

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from linkwork.errors import InputError, LinkworkError
 
-from ..mechanisms import InitialState, Parameters, mechanism_of
+from ..mechanisms import MECHANISMS, InitialState, Parameters, mechanism_of
 from .inputs import Inputs, compiled_source, given
 from .prepared import Run, outputs_of
 from .simulation import sample_times, settings_of
@@ -181,6 +181,8 @@ def _run_batch(runs: Sequence[Run]) -> tuple[Any, ...]:
     from . import compiled as k
 
     first, m, n = runs[0], len(runs), len(runs[0].settings.times)
+    # a worker does not know a mechanism that the caller has registered
+    MECHANISMS.setdefault(first.mechanism.name, first.mechanism)
     mechanism, encoded = first.mechanism, [run.encoded for run in runs]
     starts = [run.start() for run in runs]
     sizes = np.array([(len(e.coefficients), len(e.harmonics)) for e in encoded])
@@ -194,6 +196,7 @@ def _run_batch(runs: Sequence[Run]) -> tuple[Any, ...]:
         coefficients=np.zeros((m, pieces, *encoded[0].coefficients.shape[1:])),
         harmonics=np.zeros((m, waves, 4)),
         laws=np.array([e.law for e in encoded]),
+        law_places=np.array([e.law_places for e in encoded]),
     )
     for i, e in enumerate(encoded):
         batch.breaks[i, : len(e.breaks)] = e.breaks

@@ -108,7 +108,15 @@ class Machine:
         self.fingerprint = self._code.fingerprint
 
 
-@cache
+_MACHINES: dict[Mechanism, Machine] = {}
+
+
 def machine(mechanism: Mechanism) -> Machine:
-    """The machine code of a mechanism's equations, made when it is first asked for."""
-    return Machine(mechanism)
+    """The machine code of a mechanism's equations, made when it is first asked for, by one thread."""
+    if mechanism not in _MACHINES:
+        from ..numerics.codegen import MAKING
+
+        with MAKING:
+            if mechanism not in _MACHINES:
+                _MACHINES[mechanism] = Machine(mechanism)
+    return _MACHINES[mechanism]
