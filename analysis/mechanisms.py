@@ -1,19 +1,145 @@
-"""The mechanisms there are: one line each."""
+"""The mechanisms there are, one line each, and the check that the parts of one fit together."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from dataclasses import fields
 from typing import Any
 
 from linkwork import five_bar, slider_crank
-from linkwork.errors import InputError
+from linkwork.errors import InputError, LinkworkError
 from linkwork.mechanism import Mechanism
+from linkwork.parameters import fmi_name
+from linkwork.variables import UNITS
 
 FIVE_BAR = five_bar.MECHANISM
 SLIDER_CRANK = slider_crank.MECHANISM
 
-#: By name; one more is registered by ``MECHANISMS[mechanism.name] = mechanism``.
-MECHANISMS: dict[str, Mechanism] = {mechanism.name: mechanism for mechanism in (FIVE_BAR, SLIDER_CRANK)}
+#: By name; `register` adds one.
+MECHANISMS: dict[str, Mechanism] = {}
+
+
+class MechanismError(LinkworkError):
+    """The parts of a mechanism do not fit together."""
+
+
+def check(mechanism: Mechanism) -> None:
+    """Make sure that the parts of a mechanism fit together.
+
+    Raises
+    ------
+    MechanismError
+        With the first of what does not.
+    """
+    # the later take for granted what the earlier look at
+    for faults in (_faults_of_interface, _faults_of_drives, _faults_of_equations):
+        for fault in faults(mechanism):
+            raise MechanismError(f"mechanism {mechanism.name}: {fault}")
+
+
+def register(mechanism: Mechanism) -> None:
+    """Make a mechanism known to the analyses, case files and the command line.
+
+    Raises
+    ------
+    MechanismError
+        If its parts do not fit together, or another has its name or its FMU's.
+    """
+    check(mechanism)
+    for other in MECHANISMS.values():
+        if other is not mechanism and (other.name == mechanism.name or other.fmu == mechanism.fmu):
+            raise MechanismError(f"there is a mechanism {other.name} with the FMU {other.fmu} already")
+    MECHANISMS[mechanism.name] = mechanism
+
+
+def _faults_of_interface(m: Mechanism) -> Iterator[str]:
+    names = [v.name for v in m.variables]
+    for v in m.variables:
+        if v.causality not in ("parameter", "input", "output"):
+            yield f"{v.name} has the causality {v.causality!r}: it must be parameter, input or output"
+        if v.kind == "Real" and v.unit not in UNITS:
+            yield f"{v.name} has the unit {v.unit!r}: it must be one of {', '.join(UNITS)}"
+        if v.depends not in ("state", "speed", "all"):
+            yield f"{v.name} depends on {v.depends!r}: it must be state, speed or all"
+        if v.level not in ("position", "velocity", "all", "none"):
+            yield f"{v.name} has the level {v.level!r}: it must be position, velocity, all or none"
+    for name in dict.fromkeys(name for name in names if names.count(name) > 1):
+        yield f"two variables are called {name}"
+    for name in ("solver.tolerance", "solver.status", "solver.message", *(mode.name for mode in m.modes)):
+        if name not in names:
+            yield f"there is no variable {name}"
+    for name in (*(n for f in m.freedoms for n in (f.coordinate, f.rate)), *(c.displacement for c in m.channels)):
+        if name and name not in m.output_names:
+            yield f"there is no output {name}"
+    for name in m.position_parameters:
+        if name not in names:
+            yield f"there is no parameter {name}"
+    for what, wanted, there in (
+        ("the parameters", {fmi_name(f.name) for f in fields(m.parameters)}, set(m.mechanism_variables)),
+        ("the state at the start", {f.name for f in fields(m.initial)}, set(m.initial_variables)),
+    ):
+        if wanted != there:
+            yield f"{what} and its variables differ: {', '.join(sorted(wanted ^ there))}"
+    for name in (n for f in m.freedoms for n in f.initial):
+        if name not in m.initial_variables:
+            yield f"the state at the start has no {name}"
+
+
+def _faults_of_drives(m: Mechanism) -> Iterator[str]:
+    inputs = tuple(v.name for v in m.variables if v.causality == "input")
+    if inputs != m.input_names:
+        yield f"the channels are {', '.join(m.input_names)}: they must be the inputs in their order, {', '.join(inputs)}"
+    arguments = [c.argument for c in m.channels]
+    tables = {name.partition(".")[0] for name in m.mechanism_variables}
+    leaves = [
+        leaf
+        for table, _, leaf in (c.name.rpartition(".") for c in m.channels if c.kind != "rate")
+        if table in tables  # as case files name it
+    ]
+    for what, called in (("have the argument", arguments), ("are in case files", leaves)):
+        for name in dict.fromkeys(name for name in called if called.count(name) > 1):
+            yield f"two channels {what} {name}: it must be one"
+    for c in m.channels:
+        if c.kind not in ("force", "command", "rate"):
+            yield f"the channel {c.name} is a {c.kind!r}: it must be force, command or rate"
+        if not -1 <= c.freedom < len(m.freedoms) or (c.kind != "force" and c.freedom < 0):
+            yield f"the channel {c.name} drives freedom {c.freedom} of {len(m.freedoms)}"
+        if c.kind == "command" and not any(r.kind == "rate" and r.freedom == c.freedom for r in m.channels):
+            yield f"the command {c.name} has no channel for its rate"
+    for number, freedom in enumerate(m.freedoms):
+        own = {c.argument for c in m.channels if c.freedom == number and c.kind != "rate"}
+        mode = freedom.mode
+        if mode is None:
+            continue
+        if len(mode.values) != len(mode.arguments) or not 0 <= mode.default < len(mode.values):
+            yield f"{mode.name}: {len(mode.values)} values, {len(mode.arguments)} arguments, default {mode.default}"
+        if not own <= set(mode.arguments):
+            yield f"{mode.name} is chosen by {', '.join(mode.arguments)}: it must have {', '.join(sorted(own))}"
+
+
+def _faults_of_equations(m: Mechanism) -> Iterator[str]:
+    if not m.published:
+        yield "there is no published set: it must have one at least"
+    for name, known in m.published.items():
+        p, e, x = known.parameters.constants(), m.equations, m.state(known.initial)
+        if not hasattr(p, "_fields"):
+            yield f"the constants are a {type(p).__name__}: they must be a NamedTuple"
+            return
+        u = (0.0,) * len(m.channels)
+        acting = e.applied(tuple(float(mode.default) for mode in m.modes), u, p)
+        for what, size, found in (
+            ("outputs", len(m.output_names), e.outputs(x, acting, 0.0, p)),
+            ("derivative", m.size, e.derivative(x, acting, p)),
+            ("jump", m.size, e.jump(x, acting, u, p)),
+            ("start", m.size, e.start(x, acting, p)),
+            ("error_scale", m.size, m.error_scale(known.parameters, x)),
+        ):
+            if len(found) != size:
+                yield f"{what} gives {len(found)} numbers with {name}: it must give {size}"
+
+
+for _mechanism in (FIVE_BAR, SLIDER_CRANK):
+    register(_mechanism)
 
 
 class _Published(Mapping[str, Any]):

@@ -60,7 +60,7 @@ def symbols(of: str, page: str) -> str:
         if variable.name in mechanism.mechanism_variables:
             return f"`{mechanism.parameters.__name__}.{field_name(variable.name)}`"
         if variable.name.startswith("initial."):
-            return f"`InitialState.{variable.name.removeprefix('initial.')}`"
+            return f"`{mechanism.initial.__name__}.{variable.name.removeprefix('initial.')}`"
         if variable.causality == "output" and variable.kind == "Real":
             return f"`Outputs.{variable.name.replace('.', '_')}`"
         return ""

@@ -475,7 +475,7 @@ class LinkworkSlave(Fmi2Slave):
 
     @staticmethod
     def _fmu_state_from_bytes(state: bytes) -> dict[str, Any]:
-        # no exception may leave here, where there is no instance to keep: the damage is told when the state is set
+        # no exception may leave here, where there is no instance to keep: a damaged state is reported when it is set
         try:
             saved = json.loads(state.decode("utf-8"))
         except ValueError as error:

@@ -32,16 +32,8 @@ from .common import (
     tolerance_option,
 )
 
-#: Outputs in the plot of a check, of those that the mechanism has.
-COMPARED = (
-    "slider.position",
-    "slider.velocity",
-    "drive.applied_torque",
-    "pin.C.fx",
-    "pin.C.fy",
-    "slider_pin.fx",
-    "slider_pin.fy",
-)
+#: Outputs in the plot of a check beside the freedoms, of those that the mechanism has.
+COMPARED = ("drive.applied_torque", "pin.C.fx", "pin.C.fy", "slider_pin.fx", "slider_pin.fy")
 #: Where the FMUs of the mechanisms are looked for.
 DEFAULT_FOLDER = Path("build")
 
@@ -107,7 +99,6 @@ def run(
     """
     from .. import figures
     from ..files import save_figure
-    from ..mechanisms import mechanism_of
     from ..run import RunInterrupted, cosimulate, simulate
 
     chosen = chosen_case(case, published, settings)
@@ -131,10 +122,7 @@ def run(
     stem = Path(out) / ((Path(case).stem if case else str(published)) + ("-fmu" if fmu else ""))
     written = [result.to_csv(f"{stem}.csv")]
     if plot and len(result) > 1:
-        freedoms = mechanism_of(chosen.parameters).freedoms
-        wanted = (*(f.coordinate for f in freedoms[1:]), freedoms[0].rate, "drive.applied_torque", "transmission.angle")
-        names = [name for name in dict.fromkeys(("slider.position", *wanted)) if name in result.names]
-        written.append(save_figure(figures.plot(result, tuple(names), title=chosen.title), f"{stem}.png"))
+        written.append(save_figure(figures.plot(result, title=chosen.title), f"{stem}.png"))
     _print_extremes(chosen.title, result)
     print_written(written)
     if fmu is not None and not chosen.inputs.held_exactly:
@@ -211,7 +199,7 @@ def check(
                 progress=console.is_terminal,
             )
             _print_comparison(f"{case.title}: FMU less in process ({in_process.source})", comparison)
-            _write_comparison(Path(out) / label, case.title, in_process, through_fmu)
+            _write_comparison(Path(out) / label, case, in_process, through_fmu)
             if not comparison.agrees or in_process.status != through_fmu.status:
                 failed.append(label)
     if failed:
@@ -235,6 +223,8 @@ def _cases_to_check(names: Sequence[str], fmu: str | None, everything: bool) -> 
         of_model = [(name, its_model) for name, its_model in of_model if model in (None, its_model)]
         first = {its_model: name for name, its_model in reversed(of_model)}
         names = [name for name, its_model in of_model if everything or first[its_model] == name]
+        if model is not None and not names:
+            raise click.UsageError(f"there is no standard case of {model}: name a case file")
     chosen = []
     for name in names:
         if name in CASES:
@@ -256,18 +246,21 @@ def _model_name(path: Path) -> str | None:
         return None
 
 
-def _write_comparison(stem: Path, title: str, in_process: Any, through_fmu: Any) -> None:
+def _write_comparison(stem: Path, case: Any, in_process: Any, through_fmu: Any) -> None:
     """Write both runs of a check and their plot, and report a run that ended early."""
     from .. import figures
     from ..files import save_figure
+    from ..mechanisms import mechanism_of
 
     in_process.to_csv(f"{stem}-in-process.csv")
     through_fmu.to_csv(f"{stem}-fmu.csv")
+    freedoms = mechanism_of(case.parameters).freedoms
+    of_freedoms = [name for f in (freedoms[1:] or freedoms) for name in (f.coordinate, f.rate)]
     figure = figures.plot_comparison(
         in_process,
         through_fmu,
-        [name for name in COMPARED if name in in_process.names],
-        title=title,
+        [name for name in (*of_freedoms, *COMPARED) if name in in_process.names],
+        title=case.title,
         labels=(f"in process ({in_process.source})", "FMU"),
     )
     save_figure(figure, f"{stem}.png")
@@ -295,33 +288,57 @@ def _print_comparison(title: str, comparison: Any) -> None:
 @click.argument("what", required=False)
 @handled
 def info(what: str | None) -> None:
-    """Describe the published sets, one of them, a parameter or case file, or an FMU.
+    """Describe the mechanisms and published sets, one of them, a parameter or case file, or an FMU.
 
     \b
     Examples:
       linkwork info
+      linkwork info five-bar
       linkwork info table-3.1
       linkwork info build/FiveBarSlider.fmu
     """
     from linkwork.five_bar.published import RAD_S_PER_RPM
 
+    from ..mechanisms import MECHANISMS
     from ..numerics.codegen import cache_root
     from ..run import load_case
 
     if what is None:
+        kinds = [(m.name, m.title, f"{m.fmu}.fmu") for m in MECHANISMS.values()]
+        show_table("mechanisms", ("name", "what it is", "FMU"), kinds, words=("name", "what it is", "FMU"))
         sets = [(name, entry.source, f"{entry.crank_speed / RAD_S_PER_RPM:g}") for name, entry in PUBLISHED.items()]
         show_table("published sets", ("name", "source", "speed [rpm]"), sets, words=("name", "source"))
         place = cache_root()
         console.print(f"linkwork {__version__}; compiled code is kept in {place}", highlight=False, soft_wrap=True)
     elif what in PUBLISHED:
         _print_parameters(PUBLISHED[what].source, PUBLISHED[what].parameters)
+    elif what in MECHANISMS:
+        _print_mechanism(MECHANISMS[what])
     elif Path(what).suffix == ".fmu":
         _print_fmu(Path(what))
     elif Path(what).suffix in (".toml", ".json"):
         case = load_case(what)
         _print_parameters(case.title, case.parameters)
     else:
-        raise click.UsageError(f"{what!r} is neither a published set ({', '.join(PUBLISHED)}), a file, nor an FMU")
+        names = ", ".join((*MECHANISMS, *PUBLISHED))
+        raise click.UsageError(f"{what!r} is neither a mechanism or published set ({names}), a file, nor an FMU")
+
+
+def _print_mechanism(mechanism: Any) -> None:
+    """Print what a case file may say of a mechanism: parameters, state at the start, and what acts."""
+    from ..run import acting_on
+
+    what = acting_on(mechanism)
+    meaning = {v.name: v.description for v in mechanism.variables}
+    inputs = {c.argument: meaning[c.name] for c in mechanism.channels}
+    parameters = (*mechanism.mechanism_variables.values(), *mechanism.initial_variables.values())
+    rows = [
+        *((v.name, v.unit, v.description) for v in parameters),
+        *((name, unit, inputs.get(argument, "true or false")) for name, (argument, unit) in what.items()),
+    ]
+    show_table(
+        mechanism.title, ("in a case file", "unit", "meaning"), rows, words=("in a case file", "unit", "meaning")
+    )
 
 
 def _print_parameters(title: str, parameters: Any) -> None:
@@ -331,14 +348,15 @@ def _print_parameters(title: str, parameters: Any) -> None:
     from linkwork.five_bar.kinematics import assembly_square
     from linkwork.parameters import field_name
 
-    from ..mechanisms import FIVE_BAR, mechanism_of
+    from ..mechanisms import FIVE_BAR, SLIDER_CRANK, mechanism_of
 
     mechanism = mechanism_of(parameters)
     values = [(v, getattr(parameters, field_name(v.name))) for v in mechanism.mechanism_variables.values()]
     rows = [(v.name, f"{value:.9g}", v.unit, v.description) for v, value in values]
     show_table(title, ("parameter", "value", "unit", "meaning"), rows, words=("parameter", "unit", "meaning"))
-    if mechanism is not FIVE_BAR:
+    if mechanism is SLIDER_CRANK:
         console.print("where it can be assembled, dead centres, stroke: linkwork slider-crank info", highlight=False)
+    if mechanism is not FIVE_BAR:
         return
     p = parameters.constants()
     clearance = min(assembly_square(float(angle), 0.0, p) for angle in np.linspace(0.0, 2.0 * np.pi, 721))

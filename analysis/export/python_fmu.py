@@ -30,6 +30,8 @@ import linkwork
 from linkwork.errors import LinkworkError
 from linkwork.mechanism import Mechanism
 
+from ..mechanisms import check
+
 PACKAGE = Path(__file__).resolve().parents[1]
 #: The source root: beside the analysis package in a checkout, inside it where Linkwork is installed as a wheel.
 SOURCES = next(
@@ -74,7 +76,10 @@ def build(mechanism: Mechanism, dest: Path | str = "build", sources: Path | str 
     ------
     BuildError
         If the sources are incomplete, or the FMU is not valid.
+    MechanismError
+        If the parts of the mechanism do not fit together.
     """
+    check(mechanism)
     name = mechanism.fmu
     sources = Path(sources)
     for needed in ("slave.py", "linkwork/__init__.py"):
@@ -146,7 +151,7 @@ def _stage(mechanism: Mechanism, sources: Path, stage: Path) -> tuple[Path, Path
         digest.update(f"{name}\0{text}\0".encode())
     tag = digest.hexdigest()[:8]
     for name, text in files.items():
-        text = re.sub(r"^(from|import) linkwork\b", rf"\1 linkwork_{tag}", text, flags=re.MULTILINE)
+        text = re.sub(r"^(\s*)(from|import) linkwork\b", rf"\1\2 linkwork_{tag}", text, flags=re.MULTILINE)
         text = re.sub(r"^from slave import", f"from slave_{tag} import", text, flags=re.MULTILINE)
         parts = Path(name).parts
         inside = parts[0] == "linkwork"

@@ -15,6 +15,7 @@ from matplotlib.patches import PathPatch
 from matplotlib.path import Path as Outline
 from numpy.typing import ArrayLike, NDArray
 
+from ..mechanisms import MECHANISMS
 from ..run import Trajectory
 from .dispatch import plot
 from .style import COLOURS, STYLE, Figure, finish
@@ -25,7 +26,7 @@ _Part = TypeVar("_Part")
 @plot.register
 def plot_outputs(
     run: Trajectory,
-    names: Sequence[str] = ("slider.position", "drive.applied_torque"),
+    names: Sequence[str] | None = None,
     *,
     columns: int = 1,
     title: str = "",
@@ -35,12 +36,13 @@ def plot_outputs(
     Parameters
     ----------
     run : Trajectory
-    names : sequence of str
-        Outputs.
+    names : sequence of str, optional
+        Outputs; by default those that move, the rate of what drives, and the torque, of those that the run has.
     columns : int
         Panels side by side.
     title : str
     """
+    names = _telling(run) if names is None else names
     rows = ceil(len(names) / columns)
     with matplotlib.rc_context(STYLE):
         figure = Figure(figsize=(6.4 * columns, 1.0 + 1.9 * rows))
@@ -53,6 +55,14 @@ def plot_outputs(
         if title:
             figure.suptitle(title)
         return finish(figure)
+
+
+def _telling(run: Trajectory) -> list[str]:
+    mechanism = max(MECHANISMS.values(), key=lambda m: len(set(m.output_names) & set(run.names)))
+    first, *others = mechanism.freedoms
+    moving = ("slider.position", *(freedom.coordinate for freedom in others), first.rate)
+    wanted = dict.fromkeys((*moving, "drive.applied_torque", "transmission.angle"))
+    return [name for name in wanted if name in run.names] or list(run.names[:4])
 
 
 def plot_comparison(

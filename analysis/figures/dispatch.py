@@ -41,7 +41,7 @@ class DrawingError(LinkworkError, TypeError):
 
     def __init__(self, kind: type, picture: str) -> None:
         self.kind = kind
-        super().__init__(f"there is no {picture} of a {kind.__module__}.{kind.__qualname__}")
+        super().__init__(f"results of the type {kind.__qualname__} have no {picture}")
 
 
 def _registered(pictures: Any, result: object, name: str) -> Callable[..., Any]:

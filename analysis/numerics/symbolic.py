@@ -6,13 +6,18 @@ evaluated as a ``casadi.Function``, or turned into machine code (`codegen`).
 
 from __future__ import annotations
 
-from types import ModuleType, SimpleNamespace
+from types import ModuleType
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .tracing import ELEMENTARY, rebound
+from .tracing import Rebound, rebound
+
+#: What equations may take from `math`.
+ELEMENTARY = (
+    "sin", "cos", "tan", "asin", "acos", "atan", "atan2", "sinh", "cosh", "tanh", "exp", "log", "sqrt", "fabs", "hypot",
+)  # fmt: skip
 
 
 def library() -> Any:
@@ -22,8 +27,8 @@ def library() -> Any:
     return casadi
 
 
-def traced(modules: tuple[ModuleType, ...]) -> SimpleNamespace:
-    """The functions of ``modules``, each of which may use those before it, for CasADi symbols in the place of floats."""
+def traced(modules: tuple[ModuleType, ...]) -> Rebound:
+    """The functions of ``modules`` for CasADi symbols in the place of floats."""
     casadi = library()
     return rebound(modules, {name: getattr(casadi, name) for name in ELEMENTARY})
 

@@ -1,37 +1,64 @@
 """The plant's own functions on other numbers than floats: the code objects as they stand, their globals bound anew.
 
-The equations are straight lines of arithmetic that take ``sin``, ``cos``, ``sqrt``, ``atan2`` and ``tanh`` from `math`. With
-these bound to those of another library the same code runs on CasADi's symbols, on NumPy's arrays, on dual numbers. The
-modules themselves are not touched.
+The equations are straight lines of arithmetic that take what is not arithmetic from `math`. With that bound to the functions
+of another library the same code runs on CasADi's symbols, on NumPy's arrays, on dual numbers. The modules themselves are not
+touched.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
+from collections.abc import Callable, Mapping
 from types import FunctionType, ModuleType, SimpleNamespace
 from typing import Any
 
-#: What the plant's functions take from `math`.
-ELEMENTARY = ("sin", "cos", "sqrt", "atan2", "tanh")
+from linkwork.errors import LinkworkError
 
 
-def rebound(modules: tuple[ModuleType, ...], elementary: Mapping[str, Any]) -> SimpleNamespace:
-    """The functions of ``modules`` by name, on the numbers that ``elementary`` is for.
+class Rebound(SimpleNamespace):
+    """Functions by name; of two of one name that of the later module."""
+
+    def __init__(self, functions: Mapping[Callable[..., Any], FunctionType]) -> None:
+        super().__init__(**{f.__name__: f for f in functions.values()})
+        self._functions = functions
+
+    def of(self, function: Callable[..., Any]) -> Callable[..., Any]:
+        """What became of a function.
+
+        Raises
+        ------
+        LinkworkError
+            If it stands in none of the modules.
+        """
+        if function not in self._functions:
+            name = f"{function.__module__}.{function.__qualname__}"
+            raise LinkworkError(f"{name} is in none of the modules of the mechanism: its module must be one of them")
+        return self._functions[function]
+
+
+def rebound(modules: tuple[ModuleType, ...], elementary: Mapping[str, Any]) -> Rebound:
+    """The functions of ``modules``, on the numbers that ``elementary`` is for.
 
     Parameters
     ----------
     modules : tuple of modules
-        Each may use the functions of those before it.
+        Their functions call each other's where they are imported by name.
     elementary : mapping
-        A function for each name of `ELEMENTARY`.
+        Functions by the names that they have in `math`.
     """
-    known: dict[str, Any] = dict(elementary)
-    names: dict[str, Any] = {}
-    for module in modules:
-        space = dict(vars(module)) | {name: f for name, f in known.items() if name in vars(module)}
+    spaces = [dict(vars(module)) for module in modules]
+    functions: dict[Callable[..., Any], FunctionType] = {}
+    for module, space in zip(modules, spaces):
         for name, f in vars(module).items():
             if isinstance(f, FunctionType) and f.__module__ == module.__name__:
-                space[name] = FunctionType(f.__code__, space, name, f.__defaults__)
-                known[name] = space[name]
-        names |= space
-    return SimpleNamespace(**names)
+                functions[f] = FunctionType(f.__code__, space, name, f.__defaults__)
+                functions[f].__kwdefaults__ = f.__kwdefaults__
+    for space in spaces:
+        for name, value in space.items():
+            if value is math:
+                space[name] = SimpleNamespace(**{**vars(math), **elementary})
+            elif name in elementary:
+                space[name] = elementary[name]
+            elif isinstance(value, FunctionType) and value in functions:
+                space[name] = functions[value]
+    return Rebound(functions)

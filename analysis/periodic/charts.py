@@ -448,8 +448,10 @@ def default_range(parameters: Parameters, drive: Drive, name: str) -> tuple[floa
 
 
 def damping_name(mechanism: Mechanism) -> str:
-    """FMI name of the damping of the first freedom beside the crank, as it is where the mechanism has one."""
-    return mechanism.freedoms[first_freedom(mechanism)].coordinate.partition(".")[0] + ".damping"
+    """FMI name of the damping of the first freedom beside the crank, or of the first damping that the mechanism has."""
+    own = mechanism.freedoms[first_freedom(mechanism)].coordinate.partition(".")[0] + ".damping"
+    names = [name for name in mechanism.mechanism_variables if name.endswith(".damping")]
+    return own if own in names or not names else names[0]
 
 
 def _axis(mechanism: Mechanism, name: str) -> Axis:

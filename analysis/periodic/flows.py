@@ -13,7 +13,7 @@ from linkwork.mechanism import Mechanism
 from linkwork.variables import Variable
 
 from ..numerics import symbolic
-from ..numerics.codegen import MachineCode
+from ..numerics.codegen import MAKING, MachineCode
 from ..run import constants, traced
 
 #: Parameters of an induction motor among those of a drive.
@@ -121,10 +121,12 @@ class Flow:
 
     def addresses(self, *which: int) -> NDArray[np.int64]:
         """Addresses of the machine code, of the functions of those numbers at least."""
-        for n in which:
-            if n not in self._code:
-                self._code[n] = MachineCode([self.function(n)])
-                self._addresses[n] = self._code[n].addresses[_NAMES[n]]
+        with MAKING:
+            for n in which:
+                if n not in self._code:
+                    code = MachineCode([self.function(n)])
+                    self._addresses[n] = code.addresses[_NAMES[n]]
+                    self._code[n] = code
         return self._addresses
 
     def fingerprint(self, *which: int) -> str:
@@ -166,17 +168,17 @@ class Flow:
         ]
         x, u = self._state(angle, y, drive)
         functions = traced(m)
-        applied = functions.__dict__[m.equations.applied.__name__](
+        applied = functions.of(m.equations.applied)(
             tuple(casadi.vertsplit(modes)) if m.modes else (), tuple(casadi.vertsplit(u)) if self.inputs else (), k
         )
         if which == GAP:
-            settled = functions.__dict__[m.equations.start.__name__](x, applied, k)
-            results = [casadi.SX(functions.__dict__[m.equations.clearance.__name__](settled, applied, k))]
+            settled = functions.of(m.equations.start)(x, applied, k)
+            results = [casadi.SX(functions.of(m.equations.clearance)(settled, applied, k))]
         elif which == STATE:
-            settled = functions.__dict__[m.equations.start.__name__](x, applied, k)
+            settled = functions.of(m.equations.start)(x, applied, k)
             results = [casadi.vertcat(*settled), u]
         else:
-            rates = functions.__dict__[m.equations.derivative.__name__](x, applied, k)
+            rates = functions.of(m.equations.derivative)(x, applied, k)
             f = casadi.vertcat(*[rates[place] for place in self.places]) / x[len(m.freedoms) + self.crank]
             results = [f]
             if which != PLAIN:

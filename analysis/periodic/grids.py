@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import inspect
 import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -141,7 +142,12 @@ def grid(
     where = grid_folder() if folder is None else Path(folder)
     where.mkdir(parents=True, exist_ok=True)
     # what computes the rows, beside their arguments
-    code = (flow.fingerprint(VARIATIONAL, GAP), fingerprint(orbit_kernels.solve_row), fingerprint(multipliers))
+    code = (
+        flow.fingerprint(VARIATIONAL, GAP),
+        fingerprint(orbit_kernels.solve_row),
+        fingerprint(multipliers),
+        inspect.getsource(orbits),
+    )
     paths, missing = [], []
     for value in ys.tolist():
         row = [operation(first, value) for first in xs.tolist()]
@@ -149,7 +155,7 @@ def grid(
         scales = [orbits.scale_of(p, drive, guess) for p, drive in row]
         numbers = [(*p.constants(), *drive.vector(mechanism), *scale) for (p, drive), scale in zip(row, scales)]
         digest.update(np.array(numbers).tobytes())
-        digest.update(np.array([*guess, *flow.modes, flow.torque, tolerance]).tobytes())
+        digest.update(np.array([*guess, *flow.modes, flow.torque, flow.period, tolerance]).tobytes())
         path = where / f"{digest.hexdigest()[:32]}.npy"
         paths.append(path)
         if _read(path, len(xs), len(guess)) is None:
@@ -165,7 +171,7 @@ def grid(
                 show(float(done))
                 if interrupted:
                     break
-        except KeyboardInterrupt:  # of a worker, or of one who raises it himself
+        except KeyboardInterrupt:  # of a worker, or raised by the caller's code
             interrupted.append(True)
         finally:
             with warnings.catch_warnings():

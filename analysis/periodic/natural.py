@@ -50,7 +50,7 @@ def _hessians(mechanism: Mechanism) -> Any:
     p, k = constants(mechanism)
     x = [casadi.SX(0.0)] * mechanism.size
     x[crank_of(mechanism).freedom], x[n], x[freedoms + n] = angle, s, v
-    energy = getattr(traced(mechanism), mechanism.equations.energy.__name__)(tuple(x), k)
+    energy = traced(mechanism).of(mechanism.equations.energy)(tuple(x), k)
     seconds = [casadi.densify(casadi.jacobian(casadi.jacobian(energy, z), z)) for z in (v, s)]
     at_rest = casadi.substitute(seconds, [s, v], [casadi.SX(0.0)] * 2)
     return casadi.Function("hessians", [angle, p], at_rest)

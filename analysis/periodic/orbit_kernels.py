@@ -10,7 +10,7 @@ sides and their exact derivatives are traced from the equations (`flows`); the i
 from __future__ import annotations
 
 from enum import IntEnum
-from math import fabs, isfinite
+from math import fabs, isfinite, isnan
 from typing import NamedTuple
 
 import numpy as np
@@ -197,10 +197,10 @@ def _size(correction, scale):  # type: ignore[no-untyped-def]
     """Largest component relative to the scale."""
     size = 0.0
     for i in range(scale.shape[0]):
-        # a NaN must not get lost
         relative = abs(correction[i]) / scale[i]
-        if not relative <= size:
-            size = relative
+        if isnan(relative):
+            return relative
+        size = max(size, relative)
     return size
 
 

@@ -530,7 +530,7 @@ def largest_multipliers(
     """
     mechanism = mechanism_of(rows[0])
     flow = drives[0].flow(mechanism)
-    if any(drive.flow(mechanism) is not flow for drive in drives):
+    if any(drive.flow(mechanism).modes != flow.modes for drive in drives):
         raise InputError("a row has both drives by speed and by torque, or other modes: it must have one kind")
     n, first = flow.size, guess_of(flow, drives[0], guess)
     section = section_of(rows[0], drives[0], first, VARIATIONAL, tolerance=tolerance)

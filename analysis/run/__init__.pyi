@@ -1,5 +1,6 @@
 from .case import Case as Case
 from .case import published_case as published_case
+from .case_files import acting_on as acting_on
 from .case_files import case_from as case_from
 from .case_files import load_case as load_case
 from .case_files import load_parameters as load_parameters

@@ -255,7 +255,7 @@ def _found(data: Mapping[str, Any], readers: Mapping[str, Reader], driving: Coll
 
 def _check_drives(mechanism: Mechanism, inputs: Inputs, parameters: Any, initial: Any) -> None:
     """Make sure that what is said of a freedom has an effect."""
-    if inputs.parts("groove") and parameters.groove_amplitude == 0.0:
+    if inputs.parts("groove") and getattr(parameters, "groove_amplitude", None) == 0.0:
         raise ParameterError(
             "groove.amplitude", 0.0, "be given with axial.groove: a groove without it holds the shift at zero"
         )

@@ -3,24 +3,30 @@
 from __future__ import annotations
 
 from functools import cache
-from types import SimpleNamespace
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from linkwork.errors import LinkworkError
 from linkwork.mechanism import Mechanism
 
 from ..numerics import symbolic
+from ..numerics.tracing import Rebound
 
 #: The functions that a run needs, by their numbers among `Machine.addresses`.
 DERIVATIVE, OUTPUTS, CLEARANCE, JUMP = range(4)
 _NAMES = ("derivative", "outputs", "clearance", "jump")
 
+_ALLOWED = (
+    "equations must be arithmetic without branches, of functions in the mechanism's modules, imported by name, and of "
+    f"{', '.join(symbolic.ELEMENTARY)} of math"
+)
+
 
 @cache
-def traced(mechanism: Mechanism) -> SimpleNamespace:
-    """The functions of the mechanism's modules by name, for CasADi symbols in the place of floats."""
+def traced(mechanism: Mechanism) -> Rebound:
+    """The functions of the mechanism's modules, for CasADi symbols in the place of floats."""
     return symbolic.traced(mechanism.modules)
 
 
@@ -58,7 +64,13 @@ class Traced(NamedTuple):
 
 @cache
 def expressions(mechanism: Mechanism) -> Traced:
-    """The equations as expressions in the channels and modes that a run knows."""
+    """The equations as expressions in the channels and modes that a run knows.
+
+    Raises
+    ------
+    LinkworkError
+        If they are more than straight lines of arithmetic and of the functions `symbolic.ELEMENTARY`.
+    """
     casadi = symbolic.library()
     functions = traced(mechanism)
     x = casadi.SX.sym("x", mechanism.size)
@@ -69,19 +81,36 @@ def expressions(mechanism: Mechanism) -> Traced:
     values, channels = tuple(casadi.vertsplit(x)), tuple(casadi.vertsplit(u)) if mechanism.channels else ()
 
     def of(what: str, *arguments: Any) -> Any:
-        result = getattr(functions, getattr(mechanism.equations, what).__name__)(*arguments)
-        return casadi.densify(casadi.vertcat(*result) if isinstance(result, tuple) else casadi.SX(result))
+        result = call(what, *arguments)
+        column = casadi.densify(casadi.vertcat(*result) if isinstance(result, tuple) else casadi.SX(result))
+        # float(symbol), which the functions of math and NumPy call, is NaN
+        for n, element in enumerate(casadi.vertsplit(column)):
+            leaves = casadi.Function("leaves", [x, modes, u, casadi.vertcat(p, energy)], [element])
+            codes = range(leaves.n_instructions())
+            if any(
+                leaves.instruction_id(i) == casadi.OP_CONST and np.isnan(leaves.instruction_constant(i)) for i in codes
+            ):
+                raise LinkworkError(
+                    f"the {what} of {mechanism.name}, number {n}, is no expression in its arguments: {_ALLOWED}"
+                )
+        return column
 
-    applied = getattr(functions, mechanism.equations.applied.__name__)(
-        tuple(casadi.vertsplit(modes)) if mechanism.modes else (), channels, k
-    )
+    def call(what: str, *arguments: Any) -> Any:
+        try:
+            return functions.of(getattr(mechanism.equations, what))(*arguments)
+        except RuntimeError as error:
+            if "truth value" not in str(error):
+                raise
+            raise LinkworkError(f"the {what} of {mechanism.name} branches on its arguments: {_ALLOWED}") from error
+
+    applied = call("applied", tuple(casadi.vertsplit(modes)) if mechanism.modes else (), channels, k)
     return Traced(
         Symbols(x, modes, u, casadi.vertcat(p, energy)),
         of("derivative", values, applied, k),
         of("outputs", values, applied, energy, k),
         of("clearance", values, applied, k),
         of("jump", values, applied, channels, k),
-        of("energy", getattr(functions, mechanism.equations.start.__name__)(values, applied, k), k),
+        of("energy", call("start", values, applied, k), k),
     )
 
 

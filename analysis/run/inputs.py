@@ -55,7 +55,7 @@ class Inputs:
         for name, value in channels.items():
             if name not in known:
                 raise InputError(f"there is no input {name!r}: the inputs are {', '.join(known)}")
-            if name in flags and not isinstance(value, bool):
+            if name in flags and value is not None and not isinstance(value, bool):
                 raise InputError(f"{name} is {value!r}: it must be True or False")
             if name not in flags:
                 _check_channel(name, value)
@@ -121,7 +121,10 @@ class Inputs:
 
 
 def _of(given: dict[str, Any]) -> Inputs:
-    return Inputs(**given)
+    """Inputs that were checked when they were made: a process that reads them may not know their mechanism."""
+    inputs = object.__new__(Inputs)
+    object.__setattr__(inputs, "_given", given)
+    return inputs
 
 
 def _arguments() -> tuple[tuple[str, ...], tuple[str, ...]]:
@@ -366,7 +369,7 @@ def sample(
     left : bool
         Whether the limit from the left is meant where an input jumps.
     ahead : float
-        Where it is later than t, the channels are those of one who samples them at t and holds them until then (s): commanded
+        Where it is later than t, the channels are sampled at t and held until then (s): commanded
         rates go along the secant, a torsion bar acts with the torque of the middle of the step, and ``law`` is overwritten
         once it is released.
 
@@ -440,7 +443,7 @@ def compile_function(function: StateFunction, freedoms: int) -> Any:
 
 
 def _reason(error: Exception) -> str:
-    """The line of Numba's report that tells most."""
+    """The line of Numba's report that names the cause."""
     lines = [line.strip() for line in str(error).splitlines() if line.strip()]
     telling = [line for line in lines if not line.startswith(("Failed in nopython", "During", "File", "- During"))]
     return (telling or lines or [type(error).__name__])[0]

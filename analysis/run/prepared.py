@@ -157,7 +157,7 @@ class Run:
                     occurrences += watch.found[: carry["found"]].tolist()
                     carry["found"] = 0
                     show(carry["begin"] + carry["elapsed"] - times[0])
-            except KeyboardInterrupt:  # of one who raises it himself
+            except KeyboardInterrupt:  # raised by the caller's code
                 interrupted.append(True)
         t = float(carry["begin"] + carry["elapsed"])
         if status == k.BAD_INPUT:

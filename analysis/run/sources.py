@@ -89,8 +89,6 @@ def _held_bar(law, angle, speed, step):  # type: ignore[no-untyped-def]
     The torque at the angle predicted for the middle of the step makes the impulse right to second order; that at the
     beginning would act half a step late. The bar does not pull back.
     """
-    if law[2] == 0.0:
-        return 0.0
     middle = angle + 0.5 * step * speed
     return law[0] * (max(0.0, 1.0 - middle / law[1]) - (1.0 - angle / law[1]))
 
@@ -99,7 +97,7 @@ def _held_bar(law, angle, speed, step):  # type: ignore[no-untyped-def]
 def channels(t, ahead, left, x, source, commands, u, there):  # type: ignore[no-untyped-def]
     """Write the channels at time t and state x into u: the limit from the left or the right where an input jumps.
 
-    Where ``ahead`` is later than t they are those of one who holds them until then: `hold`; ``there`` is room for channels.
+    Where ``ahead`` is later than t they are held until then: `hold`; ``there`` is room for channels.
     """
     channels_at(t, _find_before(t, source.breaks) if left else find(t, source.breaks), x, source, u)
     if ahead > t:
@@ -108,13 +106,14 @@ def channels(t, ahead, left, x, source, commands, u, there):  # type: ignore[no-
 
 @inner
 def hold(t, ahead, x, source, commands, u, there):  # type: ignore[no-untyped-def]
-    """Make of the channels at time t those of one who holds them until ``ahead``.
+    """Turn the channels at time t into those of a master that holds them until ``ahead``.
 
     A torsion bar acts with the torque of the middle of the step; a commanded rate goes along the secant, so that it meets
     the command again at the next point of the grid.
     """
-    channel, coordinate, speed = source.law_places
-    u[channel] += _held_bar(source.law, x[coordinate], x[speed], ahead - t)
+    if source.law[2] != 0.0:
+        channel, coordinate, speed = source.law_places
+        u[channel] += _held_bar(source.law, x[coordinate], x[speed], ahead - t)
     if commands.shape[0] > 0:
         channels_at(ahead, _find_before(ahead, source.breaks), x, source, there)
         for n in range(commands.shape[0]):

@@ -9,7 +9,6 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cache
 from math import isfinite
-from types import SimpleNamespace
 from typing import Any, NamedTuple, Protocol, TypeAlias, runtime_checkable
 
 import numpy as np
@@ -20,13 +19,13 @@ from linkwork.errors import InputError, ParameterError
 from linkwork.slider_crank import dynamics, kinematics, vectors
 from linkwork.slider_crank.parameters import Constants, SliderCrankParameters
 
-from ..numerics.tracing import rebound
+from ..numerics.tracing import Rebound, rebound
 from . import mobility
 from .quantities import FloatArray
 
 
 @cache
-def on_arrays() -> SimpleNamespace:
+def on_arrays() -> Rebound:
     """The plant's functions by name, for NumPy arrays and for what NumPy's functions work on (`analysis.numerics.dual`)."""
     elementary = {"sin": np.sin, "cos": np.cos, "sqrt": np.sqrt, "atan2": np.arctan2, "tanh": np.tanh}
     return rebound((friction, vectors, kinematics, dynamics), elementary)

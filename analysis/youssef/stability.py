@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from linkwork.errors import InputError
 from linkwork.five_bar.parameters import FiveBarParameters
 
+from ..mechanisms import require_five_bar
 from ..numerics.boundaries import Test
 from ..periodic import TOLERANCE, Drive, Monodromy, Plane, StabilityVerdict, multipliers, test_of, verdict
 from .equation import Load, Variant, slider_equation
@@ -33,6 +34,7 @@ def linear_equation(parameters: FiveBarParameters, drive: Drive, variant: Varian
     """
     if drive.speed is None:
         raise InputError("the linear equation is at constant speed: the drive is by torque")
+    require_five_bar(parameters, "the linear equation")
     a, b, c = slider_equation(parameters, drive.speed, variant=variant, load=load_of(drive)).coefficients()
     return PeriodicEquation(a=a, b=b, c=c)
 

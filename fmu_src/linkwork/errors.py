@@ -43,7 +43,7 @@ class MissingParameterError(ParameterError):
 
     def __init__(self, name: str, others: tuple[str, ...] = ()) -> None:
         super().__init__(name, None, "be given")
-        also = f", and so are {', '.join(others)}" if others else ""
+        also = f", and so {'is' if len(others) == 1 else 'are'} {', '.join(others)}" if others else ""
         self.args = (f"parameter {name} is missing{also}",)
 
 

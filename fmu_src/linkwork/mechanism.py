@@ -9,6 +9,7 @@ from importlib import import_module
 from types import ModuleType
 from typing import Any, NamedTuple
 
+from .errors import LinkworkError
 from .variables import Variable
 
 State = tuple[float, ...]
@@ -83,7 +84,10 @@ class Channel(NamedTuple):
 
 
 class Equations(NamedTuple):
-    """The equations: straight lines of arithmetic on floats; x is the state, u the channels, p the constants.
+    """The equations: straight lines of arithmetic on floats; x is the state, u the channels, p the constants, a NamedTuple.
+
+    What a mechanism has no use for returns what it was given, or a constant: `jump` and `start` the state, where no rate is
+    commanded; `clearance` 1.0, where the links can always be assembled.
 
     Attributes
     ----------
@@ -130,9 +134,10 @@ class Mechanism:
     parameters, initial : type
         Dataclasses of its parameters, with a method ``constants``, and of its state at the start.
     published : mapping
-        Published sets by name, each with ``parameters``, ``initial``, ``crank_speed`` (the rate of the first freedom that it
-        is run at) and ``source``.
+        Published sets by name, one at least, each with ``parameters``, ``initial``, ``crank_speed`` (the rate of the first
+        freedom that it is run at) and ``source``.
     freedoms : tuple of Freedom
+        The first is the crank, where one turns.
     channels : tuple of Channel
         In the order of the FMI inputs.
     variables : tuple of Variable
@@ -142,7 +147,7 @@ class Mechanism:
     experiment : tuple of float
         Default experiment: start, stop and step (s), tolerance.
     modules : tuple of modules
-        Those of the equations, each after the ones that it uses.
+        Those of the equations and of all functions that they call; the last in the package that has ``MECHANISM``.
     equations : Equations
     check_assembly : callable
         ``check_assembly(parameters, x)`` raises AssemblyError where the links cannot be joined clear of the limit.
@@ -172,8 +177,11 @@ class Mechanism:
     where: Callable[[Sequence[float]], str]
 
     def __reduce__(self) -> Any:
-        # by its name: a copy would be another mechanism
-        return _load, (self.modules[-1].__package__,)
+        # by its package: a copy would be another mechanism
+        package = str(self.modules[-1].__package__)
+        if getattr(import_module(package), "MECHANISM", None) is not self:
+            raise LinkworkError(f"this {self.name} is not the MECHANISM of {package}: another process cannot import it")
+        return _load, (package,)
 
     @cached_property
     def size(self) -> int:

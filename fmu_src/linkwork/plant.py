@@ -137,7 +137,7 @@ class Plant:
             return x
         u = list(self.inputs.values())
         for number in self._commands:
-            # a freedom that is driven and not commanded anew goes on as it goes
+            # a commanded freedom without a new command keeps its rate
             if names[number] not in commanded:
                 u[number] = x[self._rate_of(number)]
         jumped: Vector = self.mechanism.equations.jump(x, applied, tuple(u), self._p)
@@ -214,7 +214,7 @@ class Plant:
             raise StepError(f"a step of {step} s from t = {time} s: both must be finite numbers")
         if step <= 0.0:
             raise StepError(f"a step of {step:.9g} s at t = {time:.9g} s: it must be greater than zero")
-        # what rounding in the master's own sum of steps can make, and no more: a repeated step of a microsecond is told
+        # what rounding in the master's own sum of steps can make, and no more: a repeated step of a microsecond is refused
         slack = min(1e-6 * step, 1e-9) + 8.0 * ulp(max(abs(time), abs(self.time)))
         if abs(time - self.time) > slack:
             way = "backwards" if time < self.time else "over a gap"

@@ -126,6 +126,19 @@ def test_info_lists_the_published_sets_and_one_of_them(linkwork):
     assert "turns fully" in result.output
 
 
+@pytest.mark.parametrize(
+    ("mechanism", "names"),
+    [
+        ("five-bar", ("crank.length", "initial.crank_angle", "drive.torque", "force", "load.fx")),
+        ("slider-crank", ("gravity.x", "initial.shift_position", "axial.groove", "drive.speed")),
+    ],
+)
+def test_info_on_a_mechanism_lists_the_names_of_case_files(linkwork, mechanism, names):
+    result = linkwork("info", mechanism)
+    assert result.exit_code == 0
+    assert all(f" {name} " in result.output for name in names)
+
+
 def test_info_on_an_fmu(linkwork, fmu):
     result = linkwork("info", fmu)
     assert result.exit_code == 0

@@ -37,9 +37,14 @@ def call(mechanism: Mechanism, which: int, size: int, x: Any, modes: Any, u: Any
 @pytest.mark.parametrize("name", MECHANISMS)
 def test_machine_code_has_the_values_of_the_plain_functions(name: str, seed: int) -> None:
     mechanism, equations = MECHANISMS[name], MECHANISMS[name].equations
-    case: Any = (strategies if mechanism is FIVE_BAR else slider_cranks).seeded(seed)
     generator = np.random.default_rng(seed)
-    p, x = case.parameters.constants(), tuple(map(float, case.state))
+    if mechanism in (FIVE_BAR, SLIDER_CRANK):
+        case: Any = (strategies if mechanism is FIVE_BAR else slider_cranks).seeded(seed)
+        p, x = case.parameters.constants(), tuple(map(float, case.state))
+    else:
+        known = next(iter(mechanism.published.values()))
+        p, rates = known.parameters.constants(), 1.0 + generator.normal(size=mechanism.size)
+        x = tuple((np.array(mechanism.state(known.initial)) + 1e-3 * rates).tolist())
     u = tuple(generator.normal(size=len(mechanism.channels)).tolist())
     for modes in np.ndindex(*[len(mode.values) for mode in mechanism.modes]):
         flags = tuple(map(float, modes))

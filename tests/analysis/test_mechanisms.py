@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import pickle
+import sys
 from collections.abc import Iterator
 from dataclasses import asdict, replace
 from math import acos, cos, hypot, pi, sin, sqrt
@@ -30,7 +32,9 @@ from analysis.linear import (
     predict_loop,
     settled_motion,
 )
-from analysis.mechanisms import FIVE_BAR, MECHANISMS, SLIDER_CRANK
+from analysis.mechanisms import FIVE_BAR, MECHANISMS, SLIDER_CRANK, MechanismError, check, register
+from analysis.run import TorsionBar, expressions, simulate_many
+from linkwork.errors import LinkworkError
 from linkwork.five_bar.published import TABLE_3_1
 from linkwork.mechanism import Mechanism
 from linkwork.plant import Plant
@@ -44,7 +48,7 @@ ROTOR, PENDULUM = rotor_on_cart.MECHANISM, pendulum.MECHANISM
 def registered() -> Iterator[None]:
     """The one line."""
     for mechanism in (ROTOR, PENDULUM):
-        MECHANISMS[mechanism.name] = mechanism
+        register(mechanism)
     yield
     for mechanism in (ROTOR, PENDULUM):
         del MECHANISMS[mechanism.name]
@@ -351,3 +355,98 @@ def test_forces_act_along_their_displacements(name: str) -> None:
             where = mechanism.freedoms[channel.freedom].coordinate if channel.freedom >= 0 else channel.displacement
             gradient = model.H[model.output_names.index(where), :n]
             np.testing.assert_allclose(model.F[:, model.input_names.index(channel.name)], gradient, atol=1e-9)
+
+
+def swapped(mechanism: Mechanism, name: str, **changes: Any) -> tuple[Any, ...]:
+    """The variables with those of one changed."""
+    return tuple(v._replace(**changes) if v.name == name else v for v in mechanism.variables)
+
+
+#: What a mechanism's author may get wrong: the field with its wrong value, and what is said.
+FAULTS: dict[str, tuple[str, Any, str]] = {
+    "unit": ("variables", swapped(ROTOR, "cart.position", unit="metre"), "cart.position has the unit 'metre'"),
+    "causality": ("variables", swapped(ROTOR, "cart.position", causality="out"), "the causality 'out'"),
+    "depends": ("variables", swapped(ROTOR, "cart.position", depends="stat"), "depends on 'stat'"),
+    "output left out": (
+        "variables",
+        tuple(v for v in ROTOR.variables if v.name != "drive.applied_torque"),
+        "outputs gives .* numbers with",
+    ),
+    "no output": (
+        "freedoms",
+        (ROTOR.freedoms[0]._replace(rate="crank.sped"), ROTOR.freedoms[1]),
+        "no output crank.sped",
+    ),
+    "no field": (
+        "freedoms",
+        (ROTOR.freedoms[0], ROTOR.freedoms[1]._replace(initial=("postion", "cart_velocity"))),
+        "the state at the start has no postion",
+    ),
+    "kind": ("channels", (ROTOR.channels[0]._replace(kind="comand"), *ROTOR.channels[1:]), "is a 'comand'"),
+    "order of channels": ("channels", ROTOR.channels[::-1], "must be the inputs in their order"),
+    "no published set": ("published", {}, "no published set"),
+    "length": ("equations", ROTOR.equations._replace(derivative=lambda x, i, p: (0.0,)), "derivative gives 1 numbers"),
+    "mode": (
+        "freedoms",
+        (
+            ROTOR.freedoms[0]._replace(mode=ROTOR.freedoms[0].mode._replace(arguments=("torque", "rate"))),
+            ROTOR.freedoms[1],
+        ),
+        "is chosen by torque, rate",
+    ),
+}
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+def test_parts_that_do_not_fit_are_named(fault: str, tmp_path: Path) -> None:
+    field, wrong, said = FAULTS[fault]
+    broken = replace(ROTOR, **{field: wrong})
+    with pytest.raises(MechanismError, match=f"mechanism {ROTOR.name}: .*{said}"):
+        check(broken)
+    with pytest.raises(MechanismError):
+        build(broken, tmp_path)
+
+
+def test_only_what_can_be_imported_goes_to_another_process() -> None:
+    assert pickle.loads(pickle.dumps(ROTOR)) is ROTOR
+    with pytest.raises(LinkworkError, match=r"is not the MECHANISM of tests\.mechanisms\.rotor_on_cart"):
+        pickle.dumps(replace(ROTOR, title="another"))
+
+
+def test_no_mechanism_takes_the_name_of_another() -> None:
+    with pytest.raises(MechanismError, match="five-bar with the FMU FiveBarSlider already"):
+        register(replace(PENDULUM, name="five-bar"))
+    assert MECHANISMS["five-bar"] is FIVE_BAR
+
+
+def branching(x: Any, i: Any, p: Any) -> Any:
+    return (x[0], 1.0 if x[0] > 0.0 else 0.0, *x[2:])
+
+
+def by_numpy(x: Any, i: Any, p: Any) -> Any:
+    return (float(x[0]), *x[1:])
+
+
+@pytest.mark.parametrize(
+    ("derivative", "said"), [(branching, "branches on its arguments"), (by_numpy, "is no expression")]
+)
+def test_equations_that_cannot_be_traced_are_named(derivative: Any, said: str) -> None:
+    module = sys.modules[__name__]
+    own = replace(
+        PENDULUM, equations=PENDULUM.equations._replace(derivative=derivative), modules=(module, *PENDULUM.modules)
+    )
+    with pytest.raises(LinkworkError, match=f"the derivative of {PENDULUM.name},? .*{said}.* of math"):
+        expressions(own)
+    with pytest.raises(LinkworkError, match="is in none of the modules"):
+        expressions(replace(own, modules=PENDULUM.modules))
+
+
+def test_ensemble_of_inputs_that_differ_in_kind() -> None:
+    """A torsion bar acts where it is and nowhere else, in whatever order the runs come."""
+    bar, plain = Inputs(torque=(0.2, TorsionBar(torque=0.5, release_angle=2.0))), Inputs(torque=0.2)
+    p = demo(PENDULUM).parameters
+    alone = {n: simulate(p, inputs, stop_time=0.5, step=0.01) for n, inputs in enumerate((bar, plain))}
+    for order in ((0, 1), (1, 0)):
+        found = simulate_many([p, p], [(bar, plain)[n] for n in order], stop_time=0.5, step=0.01)
+        for run, n in zip(found, order):
+            np.testing.assert_array_equal(run.values, alone[n].values)

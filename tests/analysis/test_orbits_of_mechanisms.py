@@ -16,7 +16,7 @@ from scipy.interpolate import CubicHermiteSpline
 from scipy.optimize import root
 
 from analysis import InductionMotor, Inputs, figures, simulate
-from analysis.mechanisms import MECHANISMS
+from analysis.mechanisms import MECHANISMS, register
 from analysis.periodic import (
     Crossing,
     Drive,
@@ -48,7 +48,7 @@ SPEED = rahman.CRANK_SPEED
 @pytest.fixture(autouse=True, scope="module")
 def registered() -> Iterator[None]:
     for module in (rotor_on_cart, pendulum):
-        MECHANISMS[module.MECHANISM.name] = module.MECHANISM
+        register(module.MECHANISM)
     yield
     for module in (rotor_on_cart, pendulum):
         del MECHANISMS[module.MECHANISM.name]
