@@ -33,7 +33,7 @@ from analysis.linear import (
     settled_motion,
 )
 from analysis.mechanisms import FIVE_BAR, MECHANISMS, SLIDER_CRANK, MechanismError, check, register
-from analysis.run import TorsionBar, expressions, simulate_many
+from analysis.run import InductionMotor, expressions, simulate_many
 from linkwork.errors import LinkworkError
 from linkwork.five_bar.published import TABLE_3_1
 from linkwork.mechanism import Mechanism
@@ -442,11 +442,12 @@ def test_equations_that_cannot_be_traced_are_named(derivative: Any, said: str) -
 
 
 def test_ensemble_of_inputs_that_differ_in_kind() -> None:
-    """A torsion bar acts where it is and nowhere else, in whatever order the runs come."""
-    bar, plain = Inputs(torque=(0.2, TorsionBar(torque=0.5, release_angle=2.0))), Inputs(torque=0.2)
+    """A motor acts where it is and nowhere else, in whatever order the runs come."""
+    motor = InductionMotor(breakdown_torque=0.5, breakdown_slip=0.2, synchronous_speed=30.0)
+    driven, plain = Inputs(torque=(0.2, motor)), Inputs(torque=0.2)
     p = demo(PENDULUM).parameters
-    alone = {n: simulate(p, inputs, stop_time=0.5, step=0.01) for n, inputs in enumerate((bar, plain))}
+    alone = {n: simulate(p, inputs, stop_time=0.5, step=0.01) for n, inputs in enumerate((driven, plain))}
     for order in ((0, 1), (1, 0)):
-        found = simulate_many([p, p], [(bar, plain)[n] for n in order], stop_time=0.5, step=0.01)
+        found = simulate_many([p, p], [(driven, plain)[n] for n in order], stop_time=0.5, step=0.01)
         for run, n in zip(found, order):
             np.testing.assert_array_equal(run.values, alone[n].values)
