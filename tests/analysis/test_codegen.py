@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import stat
 import tempfile
@@ -14,6 +15,7 @@ from numba import float64, int64
 
 from analysis.mechanisms import FIVE_BAR, MECHANISMS, SLIDER_CRANK
 from analysis.numerics.codegen import VECTOR, MachineCode, cache_folder, evaluate, fingerprint, inner, kernel
+from analysis.numerics.symbolic import ELEMENTARY
 from analysis.run import compiled, machine
 from analysis.run.equations import CLEARANCE, DERIVATIVE, JUMP, OUTPUTS
 from linkwork.errors import LinkworkError
@@ -101,6 +103,29 @@ def test_every_operation(expression: Any, plain: Any) -> None:
     a = np.array([0.7, 1.9])
     code = MachineCode([function_of(expression)])
     assert value_at(code.addresses["f"], 0.4, a) == pytest.approx(plain(0.4, a), rel=1e-15)
+
+
+@pytest.mark.parametrize("name", [*ELEMENTARY, "pow"])
+def test_what_equations_may_call_and_its_derivatives(name: str) -> None:
+    """Values are those of the standard library; derivatives those of CasADi's own interpreter."""
+    function, a = getattr(casadi, name, lambda x, y: x**y), np.array([0.7, 1.9])
+    arguments = 2 if name in ("atan2", "hypot", "pow") else 1
+
+    def derivatives(order: int) -> Any:
+        def expression(t: Any, x: Any, *_: Any) -> Any:
+            f = function(*casadi.vertsplit(x)[:arguments])
+            for _ in range(order):
+                f = casadi.gradient(f, x)[0]
+            return f
+
+        return function_of(expression)
+
+    value = value_at(MachineCode([derivatives(0)]).addresses["f"], 0.0, a)
+    assert value == pytest.approx(getattr(math, name)(*a[:arguments]), rel=4e-16)
+    for order in (1, 2):
+        traced = derivatives(order)
+        found = value_at(MachineCode([traced]).addresses["f"], 0.0, a)
+        assert found == pytest.approx(float(traced(0.0, a, a, a, a)), rel=4e-15, abs=1e-15)
 
 
 def test_matrices_are_written_column_by_column() -> None:
