@@ -89,7 +89,7 @@ def test_a_run_that_ends_early_keeps_its_data_and_exits_with_3(linkwork, tmp_pat
         (["check", "no-such-case"], 2, "neither a case file nor a standard case"),
         (["figures", "9.9"], 2, "there is no figure 9.9"),
         (["build", "SixBar"], 1, "there is no model 'SixBar'"),
-        (["info", "nothing"], 2, "neither a published set"),
+        (["info", "nothing"], 2, "neither a mechanism or published set"),
         (["resonance", "--published", "table-3.1", "--vary", "slider.mess"], 1, "there is no slider.mess"),
         (["resonance", "--published", "table-3.1", "--vary", "slider.damping"], 2, "--from and --to are needed"),
         (["resonance", "--published", "table-3.1", "--from", "100 rpm", "--to", "50 rpm"], 2, "must increase"),

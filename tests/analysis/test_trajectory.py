@@ -100,7 +100,8 @@ def test_plot_shows_the_outputs_with_their_units(trajectory: Trajectory) -> None
     (line,) = figure.axes[0].lines
     assert np.array_equal(line.get_xdata(), trajectory.time)
     assert np.array_equal(line.get_ydata(), trajectory["slider.position"])
-    assert len(figures.plot(trajectory).axes) == 2
+    names = [axis.get_ylabel().split()[0] for axis in figures.plot(trajectory).axes]
+    assert names == ["slider.position", "crank.speed", "drive.applied_torque", "transmission.angle"]
 
 
 def test_run_cannot_be_changed(trajectory: Trajectory) -> None:
