@@ -36,17 +36,19 @@ def parameters_from(
     ----------
     data : mapping
     base : parameters of a mechanism, optional
-    mechanism : Mechanism
-        Whose parameters they are; with a base, the base's.
+    mechanism : Mechanism, optional
+        Whose parameters they are: by default the base's, or what ``data`` says.
 
     Raises
     ------
     ParameterError
         If a name is unknown, a value is wrong, or, without a base, one is missing.
     """
-    if base is not None:
-        mechanism = mechanism_of(base)
-    assert mechanism is not None
+    if mechanism is None:
+        mechanism = _mechanism_of(data) if base is None else mechanism_of(base)
+    if data.get("mechanism", mechanism.name) != mechanism.name:
+        raise ParameterError("mechanism", data["mechanism"], f"be {mechanism.name}")
+    data = {name: value for name, value in data.items() if name != "mechanism"}
     known = mechanism.mechanism_variables
     readers = {
         field_name(name): Whole() if variable.kind == "Integer" else Quantity(variable.unit)
@@ -86,9 +88,7 @@ def load_parameters(path: str | Path) -> Parameters:
     ParameterError
         As `parameters_from`.
     """
-    data = files.read_tables(path)
-    mechanism = _mechanism_of(data)
-    return parameters_from({k: v for k, v in data.items() if k != "mechanism"}, mechanism=mechanism)
+    return parameters_from(files.read_tables(path))
 
 
 def _mechanism_of(data: Mapping[str, Any]) -> Mechanism:

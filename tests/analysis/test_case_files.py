@@ -65,6 +65,16 @@ def test_wrong_parameters_are_named(data, error, said):
         parameters_from(data, TABLE_3_1)
 
 
+@pytest.mark.parametrize("name", PUBLISHED)
+def test_parameters_say_whose_they_are(name):
+    parameters = PUBLISHED[name].parameters
+    data = parameters_to(parameters)
+    assert parameters_from(data) == parameters
+    other = "slider-crank" if data["mechanism"] == "five-bar" else "five-bar"
+    with pytest.raises(ParameterError, match=f"mechanism is '{other}': it must be {data['mechanism']}"):
+        parameters_from({"mechanism": other}, parameters)
+
+
 def test_missing_names_are_listed():
     with pytest.raises(MissingParameterError, match=r"ground\.length is missing.*rocker\.cog_distance"):
         parameters_from({"slider": {"stiffness": 1.0}}, mechanism=FIVE_BAR)
