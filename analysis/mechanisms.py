@@ -8,7 +8,7 @@ from typing import Any
 
 from linkwork import five_bar, slider_crank
 from linkwork.errors import InputError, LinkworkError
-from linkwork.mechanism import Mechanism
+from linkwork.mechanism import Channel, Mechanism
 from linkwork.parameters import fmi_name
 from linkwork.variables import UNITS
 
@@ -90,13 +90,8 @@ def _faults_of_drives(m: Mechanism) -> Iterator[str]:
     if inputs != m.input_names:
         yield f"the channels are {', '.join(m.input_names)}: they must be the inputs in their order, {', '.join(inputs)}"
     arguments = [c.argument for c in m.channels]
-    tables = {name.partition(".")[0] for name in m.mechanism_variables}
-    leaves = [
-        leaf
-        for table, _, leaf in (c.name.rpartition(".") for c in m.channels if c.kind != "rate")
-        if table in tables  # as case files name it
-    ]
-    for what, called in (("have the argument", arguments), ("are in case files", leaves)):
+    in_files = [name_in_files(m, c) for c in m.channels if c.kind != "rate"]
+    for what, called in (("have the argument", arguments), ("are in case files", in_files)):
         for name in dict.fromkeys(name for name in called if called.count(name) > 1):
             yield f"two channels {what} {name}: it must be one"
     for c in m.channels:
@@ -138,10 +133,6 @@ def _faults_of_equations(m: Mechanism) -> Iterator[str]:
                 yield f"{what} gives {len(found)} numbers with {name}: it must give {size}"
 
 
-for _mechanism in (FIVE_BAR, SLIDER_CRANK):
-    register(_mechanism)
-
-
 class _Published(Mapping[str, Any]):
     def __getitem__(self, name: str) -> Any:
         for mechanism in MECHANISMS.values():
@@ -162,6 +153,13 @@ PUBLISHED: Mapping[str, Any] = _Published()
 #: Parameters of a mechanism and its state at the start: instances of `Mechanism.parameters` and `Mechanism.initial`.
 Parameters = Any
 InitialState = Any
+
+
+def name_in_files(mechanism: Mechanism, channel: Channel) -> str:
+    """Name of a channel in case files: that of the input, less its table if there are parameters in that."""
+    tables = {name.partition(".")[0] for name in mechanism.mechanism_variables}
+    table, _, leaf = channel.name.rpartition(".")
+    return leaf if table in tables else channel.name
 
 
 def mechanism_of(parameters: Parameters) -> Mechanism:
@@ -201,3 +199,7 @@ def require_five_bar(parameters: Parameters, what: str) -> None:
         raise InputError(
             f"{what} is of five-bars: the parameters are {type(parameters).__name__}, not FiveBarParameters"
         )
+
+
+for _mechanism in (FIVE_BAR, SLIDER_CRANK):
+    register(_mechanism)

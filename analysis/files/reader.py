@@ -32,11 +32,11 @@ Reader = Callable[[Any, str], Any]
 Made = TypeVar("Made")
 
 
-def unknown_name(name: str, known: Iterable[str]) -> UnknownNameError:
-    """The error for a name that is not among those known, with the nearest of them."""
+def unknown_name(name: str, known: Iterable[str], words: str | None = None) -> UnknownNameError:
+    """The error for a name that is not among those known, with the nearest of them; ``words`` say it more fully."""
     names = tuple(known)
     near = difflib.get_close_matches(name, names, n=1)
-    return UnknownNameError(name, names, near[0] if near else None)
+    return UnknownNameError(words or name, names, near[0] if near else None)
 
 
 def entry(reader: Reader, default: Any = MISSING, *, factory: Any = MISSING, key: str = "") -> Any:
@@ -225,8 +225,7 @@ class Choice:
         if not isinstance(value, str):
             raise ParameterError(name, value, f"be one of {', '.join(names)}")
         if value not in names:
-            near = difflib.get_close_matches(value, names, n=1)
-            raise UnknownNameError(f"{name} {value!r}", names, near[0] if near else None)
+            raise unknown_name(value, names, f"{name} {value!r}")
         return value
 
 

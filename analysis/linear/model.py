@@ -12,7 +12,6 @@ A freedom whose rate is commanded is none of q but acts through three inputs: ac
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
@@ -22,9 +21,10 @@ import control
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from linkwork.errors import InputError, LinkworkError, UnknownNameError
+from linkwork.errors import InputError, LinkworkError
 from linkwork.mechanism import Mechanism
 
+from ..files import unknown_name
 from ..mechanisms import Parameters, mechanism_of
 from ..numerics import symbolic
 from ..run import Inputs, encode, expressions, given, sample
@@ -352,7 +352,7 @@ def by_magnitude(values: ArrayLike) -> NDArray[np.complex128]:
 
 def _index(name: str, names: tuple[str, ...]) -> int:
     if name not in names:
-        raise UnknownNameError(name, names, next(iter(difflib.get_close_matches(name, names, n=1)), None))
+        raise unknown_name(name, names)
     return names.index(name)
 
 

@@ -96,27 +96,40 @@ class MachineCode:
         self.addresses = {f.name(): engine.get_function_address(f.name()) for f in functions}
 
 
+#: Functions of the C library by CasADi's operations.
+_FUNCTIONS = {
+    "OP_SIN": "sin",
+    "OP_COS": "cos",
+    "OP_TAN": "tan",
+    "OP_ASIN": "asin",
+    "OP_ACOS": "acos",
+    "OP_ATAN": "atan",
+    "OP_ATAN2": "atan2",
+    "OP_SINH": "sinh",
+    "OP_COSH": "cosh",
+    "OP_TANH": "tanh",
+    "OP_EXP": "exp",
+    "OP_LOG": "log",
+    "OP_POW": "pow",
+    "OP_CONSTPOW": "pow",
+    "OP_HYPOT": "hypot",
+}
+_INTRINSICS = {"OP_SQRT": "llvm.sqrt.f64", "OP_FABS": "llvm.fabs.f64"}
+
+
+@cache
+def _operations() -> dict[int, str]:
+    """CasADi's names of its operations by their codes."""
+    casadi = _casadi()
+    return {getattr(casadi, name): name for name in dir(casadi) if name.startswith("OP_")}
+
+
 @cache
 def _prepare() -> None:
     binding.initialize_native_target()
     binding.initialize_native_asmprinter()
     library = ctypes.CDLL("ucrtbase" if sys.platform == "win32" else ctypes.util.find_library("m"))
-    for name in (
-        "sin",
-        "cos",
-        "tan",
-        "asin",
-        "acos",
-        "atan",
-        "atan2",
-        "sinh",
-        "cosh",
-        "tanh",
-        "exp",
-        "log",
-        "pow",
-        "hypot",
-    ):
+    for name in set(_FUNCTIONS.values()):
         address = ctypes.cast(getattr(library, name), ctypes.c_void_p).value
         if not address:
             raise LinkworkError(f"the C library of this machine has no function {name}")
@@ -133,7 +146,19 @@ class _Writer:
         for argument in target.args[1:]:
             argument.add_attribute("noalias")
         self.arguments = target.args
-        self.build = ir.IRBuilder(target.append_basic_block())
+        self.build = build = ir.IRBuilder(target.append_basic_block())
+        self.plain: dict[str, Callable[..., Any]] = {
+            "OP_ADD": build.fadd,
+            "OP_SUB": build.fsub,
+            "OP_MUL": build.fmul,
+            "OP_DIV": build.fdiv,
+            "OP_NEG": build.fneg,
+            "OP_SQ": lambda a: build.fmul(a, a),
+            "OP_TWICE": lambda a: build.fadd(a, a),
+            "OP_INV": lambda a: build.fdiv(ir.Constant(_DOUBLE, 1.0), a),
+            "OP_ASSIGN": lambda a: a,
+            "OP_SIGN": self._sign,
+        }
 
     def write(self) -> None:
         f, build = self.source, self.build
@@ -159,52 +184,20 @@ class _Writer:
         build.ret_void()
 
     def _operation(self, code: int, operands: list[Any]) -> Any:
-        casadi, build = _casadi(), self.build
-        plain: dict[int, Callable[..., Any]] = {
-            casadi.OP_ADD: build.fadd,
-            casadi.OP_SUB: build.fsub,
-            casadi.OP_MUL: build.fmul,
-            casadi.OP_DIV: build.fdiv,
-            casadi.OP_NEG: build.fneg,
-            casadi.OP_SQ: lambda a: build.fmul(a, a),
-            casadi.OP_TWICE: lambda a: build.fadd(a, a),
-            casadi.OP_INV: lambda a: build.fdiv(ir.Constant(_DOUBLE, 1.0), a),
-            casadi.OP_ASSIGN: lambda a: a,
-            casadi.OP_SIGN: self._sign,
-        }
-        called = {
-            casadi.OP_SIN: "sin",
-            casadi.OP_COS: "cos",
-            casadi.OP_TAN: "tan",
-            casadi.OP_ASIN: "asin",
-            casadi.OP_ACOS: "acos",
-            casadi.OP_ATAN: "atan",
-            casadi.OP_ATAN2: "atan2",
-            casadi.OP_SINH: "sinh",
-            casadi.OP_COSH: "cosh",
-            casadi.OP_TANH: "tanh",
-            casadi.OP_EXP: "exp",
-            casadi.OP_LOG: "log",
-            casadi.OP_POW: "pow",
-            casadi.OP_CONSTPOW: "pow",
-            casadi.OP_HYPOT: "hypot",
-            casadi.OP_SQRT: "llvm.sqrt.f64",
-            casadi.OP_FABS: "llvm.fabs.f64",
-        }
-        if code in plain:
-            return plain[code](*operands)
-        if code not in called:
-            name = next((n for n in dir(casadi) if n.startswith("OP_") and getattr(casadi, n) == code), str(code))
+        operation = _operations().get(code, str(code))
+        if operation in self.plain:
+            return self.plain[operation](*operands)
+        name = (_FUNCTIONS | _INTRINSICS).get(operation)
+        if name is None:
             raise LinkworkError(
-                f"{self.source.name()}: CasADi's operation {name} has no counterpart in machine code; equations are "
+                f"{self.source.name()}: CasADi's operation {operation} has no counterpart in machine code; equations are "
                 "straight lines of arithmetic and functions such as sin, sqrt, exp"
             )
-        name = called[code]
         target = self.module.globals.get(name)
         if target is None:
             target = ir.Function(self.module, ir.FunctionType(_DOUBLE, [_DOUBLE] * len(operands)), name)
             target.attributes.add("nounwind")
-        return build.call(target, operands)
+        return self.build.call(target, operands)
 
     def _sign(self, a: Any) -> Any:
         zero, one, less = (ir.Constant(_DOUBLE, value) for value in (0.0, 1.0, -1.0))

@@ -18,7 +18,7 @@ from linkwork.parameters import field_name
 
 from .. import files
 from ..files import Choice, Kinds, Many, Quantity, Reader, Table, Whole, entry
-from ..mechanisms import FIVE_BAR, MECHANISMS, PUBLISHED, Parameters, mechanism_of
+from ..mechanisms import FIVE_BAR, MECHANISMS, PUBLISHED, Parameters, mechanism_of, name_in_files
 from ..units import with_unit
 from .case import Case
 from .inputs import Inputs
@@ -119,16 +119,14 @@ class Acting(NamedTuple):
 def acting_on(mechanism: Mechanism) -> dict[str, Acting]:
     """What may act on a mechanism, by its name in case files.
 
-    That is the name of the FMI input, without its table if there are parameters in that: ``slider.force`` is ``force``. A flag
+    That of a channel is as in `name_in_files`: ``slider.force`` is ``force``. A flag
     that drives a freedom stands in the table of the freedom's mode: ``axial.groove``.
     """
-    tables = {name.partition(".")[0] for name in mechanism.mechanism_variables}
     units = {variable.name: variable.unit for variable in mechanism.variables}
     found = {}
     for channel in mechanism.channels:
         if channel.kind != "rate":
-            table, _, leaf = channel.name.rpartition(".")
-            found[leaf if table in tables else channel.name] = Acting(channel.argument, units[channel.name])
+            found[name_in_files(mechanism, channel)] = Acting(channel.argument, units[channel.name])
     channels = {channel.argument for channel in mechanism.channels}
     for mode in mechanism.modes:
         for flag in mode.arguments:

@@ -99,9 +99,9 @@ def expressions(mechanism: Mechanism) -> Traced:
         try:
             return functions.of(getattr(mechanism.equations, what))(*arguments)
         except RuntimeError as error:
-            if "truth value" not in str(error):
-                raise
-            raise LinkworkError(f"the {what} of {mechanism.name} branches on its arguments: {_ALLOWED}") from error
+            raise LinkworkError(
+                f"the {what} of {mechanism.name} cannot be traced, as where it branches on its arguments: {_ALLOWED}"
+            ) from error
 
     applied = call("applied", tuple(casadi.vertsplit(modes)) if mechanism.modes else (), channels, k)
     return Traced(

@@ -31,7 +31,8 @@ MEASURED_TO = 5.0
 
 def rig_2(spring: str) -> FiveBarParameters:
     """Rig 2 with spring ``c`` or ``d``."""
-    return SETS[f"rig-2-spring-{spring}"].parameters
+    parameters: FiveBarParameters = SETS[f"rig-2-spring-{spring}"].parameters
+    return parameters
 
 
 def natural_speed(spring: str) -> float:

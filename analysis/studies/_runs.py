@@ -20,6 +20,7 @@ from linkwork.five_bar.published import (
     DYN_PER_CM_PER_NEWTON_PER_METRE,
     RAD_S_PER_RPM,
     SETS,
+    TABLE_3_1,
 )
 
 from ..run import Event, Inputs, TorsionBar, Trajectory, simulate
@@ -46,7 +47,7 @@ LAUNCH_TIME, COAST_TIME = 0.5, 2.0
 def table_3_1(stiffness: float, damping: float = 3e4, gravity: float = 9.81) -> FiveBarParameters:
     """The mechanism of Table 3.1 with a spring (dyn/cm), a damper (dyn.s/cm) and gravity (m/s2)."""
     return replace(
-        SETS["table-3.1"].parameters,
+        TABLE_3_1,
         slider_stiffness=stiffness / DYN_PER_CM_PER_NEWTON_PER_METRE,
         slider_damping=damping / DYN_PER_CM_PER_NEWTON_PER_METRE,
         gravity=gravity,
@@ -55,7 +56,8 @@ def table_3_1(stiffness: float, damping: float = 3e4, gravity: float = 9.81) -> 
 
 def rig_1(spring: str, friction: float = 0.0) -> FiveBarParameters:
     """Rig 1 with spring ``a`` or ``b``, and Coulomb friction in the guide (N)."""
-    return replace(SETS[f"rig-1-spring-{spring}"].parameters, slider_coulomb_friction=friction)
+    parameters: FiveBarParameters = SETS[f"rig-1-spring-{spring}"].parameters
+    return replace(parameters, slider_coulomb_friction=friction)
 
 
 def plain(value: float) -> str:

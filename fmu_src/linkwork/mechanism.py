@@ -116,6 +116,15 @@ class Equations(NamedTuple):
     energy: Callable[..., float]
 
 
+class PublishedSet(NamedTuple):
+    """A mechanism as printed: parameters, state at the start, the rate of the first freedom that it is run at, source."""
+
+    parameters: Any
+    initial: Any
+    crank_speed: float
+    source: str
+
+
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Mechanism:
     """A mechanism: its parameters, its interface and its equations.
@@ -134,8 +143,7 @@ class Mechanism:
     parameters, initial : type
         Dataclasses of its parameters, with a method ``constants``, and of its state at the start.
     published : mapping
-        Published sets by name, one at least, each with ``parameters``, ``initial``, ``crank_speed`` (the rate of the first
-        freedom that it is run at) and ``source``.
+        `PublishedSet` by name, one at least.
     freedoms : tuple of Freedom
         The first is the crank, where one turns.
     channels : tuple of Channel
@@ -164,7 +172,7 @@ class Mechanism:
     notes: tuple[str, ...]
     parameters: type
     initial: type
-    published: Mapping[str, Any]
+    published: Mapping[str, PublishedSet]
     freedoms: tuple[Freedom, ...]
     channels: tuple[Channel, ...]
     variables: tuple[Variable, ...]

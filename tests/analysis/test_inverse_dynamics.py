@@ -23,7 +23,7 @@ from linkwork.five_bar.published import SETS, TABLE_3_1
 from linkwork.friction import FRICTION_SPEED
 from tests.oracles.multipliers import FORCE_NAMES, assemble, rates, solve_multipliers
 
-RIG, SPEED, _ = SETS["rig-2-spring-c"]
+RIG, SPEED = SETS["rig-2-spring-c"].parameters, SETS["rig-2-spring-c"].crank_speed
 MOTION = FourierSeries(np.array([0.002, 0.004, 0.001]), np.array([0.0, 0.003, -0.002]))
 #: P off both links, guide and ground inclined, all centres of mass off their links.
 GENERAL = replace(

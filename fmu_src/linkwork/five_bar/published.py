@@ -7,8 +7,9 @@ from __future__ import annotations
 
 from math import pi
 from types import MappingProxyType
-from typing import Mapping, NamedTuple
+from typing import Mapping
 
+from ..mechanism import PublishedSet
 from .parameters import FiveBarParameters, InitialState
 
 # Divisors, because 206 / 1000 is the float nearest to 0.206 and 206 * 0.001 is not.
@@ -22,17 +23,10 @@ DYN_PER_CM_PER_NEWTON_PER_METRE = 1e3
 RAD_S_PER_RPM = pi / 30.0
 
 
-class PublishedSet(NamedTuple):
-    """A mechanism as printed, the crank speed it is run at (rad/s), and its source."""
-
-    parameters: FiveBarParameters
-    crank_speed: float
-    source: str
-
-    @property
-    def initial(self) -> InitialState:
-        """The thesis's start: th2 = u = u' = 0 at the running speed."""
-        return InitialState(crank_speed=self.crank_speed)
+def _at(crank_speed_rpm: float, parameters: FiveBarParameters, source: str) -> PublishedSet:
+    """A set with the thesis's start: th2 = u = u' = 0 at the running speed."""
+    speed = crank_speed_rpm * RAD_S_PER_RPM
+    return PublishedSet(parameters, InitialState(crank_speed=speed), speed, source)
 
 
 def _from_cgs(
@@ -90,26 +84,16 @@ def _rig_2(stiffness_dyn_cm: float) -> FiveBarParameters:
 
 SETS: Mapping[str, PublishedSet] = MappingProxyType(
     {
-        "table-3.1": PublishedSet(
-            _table_3_1(1e6, 3e4), 420 * RAD_S_PER_RPM, "Youssef, Table 3.1, with fig. 3.4's spring"
-        ),
-        "appendix-1": PublishedSet(_table_3_1(1.5e6, 2.8e4), 450 * RAD_S_PER_RPM, "Youssef, appendix 1"),
-        "rig-1-spring-a": PublishedSet(
-            _rig_1(3e6), 420 * RAD_S_PER_RPM, "Youssef, Table 8.1, spring A (speed and crank inertia assumed)"
-        ),
-        "rig-1-spring-b": PublishedSet(
-            _rig_1(11e6), 420 * RAD_S_PER_RPM, "Youssef, Table 8.1, spring B (speed and crank inertia assumed)"
-        ),
-        "rig-2-spring-c": PublishedSet(
-            _rig_2(4e6), 420 * RAD_S_PER_RPM, "Youssef, Table 8.2, spring C (speed and crank inertia assumed)"
-        ),
-        "rig-2-spring-d": PublishedSet(
-            _rig_2(8e6), 420 * RAD_S_PER_RPM, "Youssef, Table 8.2, spring D (speed and crank inertia assumed)"
-        ),
+        "table-3.1": _at(420, _table_3_1(1e6, 3e4), "Youssef, Table 3.1, with fig. 3.4's spring"),
+        "appendix-1": _at(450, _table_3_1(1.5e6, 2.8e4), "Youssef, appendix 1"),
+        "rig-1-spring-a": _at(420, _rig_1(3e6), "Youssef, Table 8.1, spring A (speed and crank inertia assumed)"),
+        "rig-1-spring-b": _at(420, _rig_1(11e6), "Youssef, Table 8.1, spring B (speed and crank inertia assumed)"),
+        "rig-2-spring-c": _at(420, _rig_2(4e6), "Youssef, Table 8.2, spring C (speed and crank inertia assumed)"),
+        "rig-2-spring-d": _at(420, _rig_2(8e6), "Youssef, Table 8.2, spring D (speed and crank inertia assumed)"),
     }
 )
 
-TABLE_3_1 = SETS["table-3.1"].parameters
+TABLE_3_1: FiveBarParameters = SETS["table-3.1"].parameters
 
 
 #: Chapters IV and V: sigma2 = l2/l4, p45 = m4/(m4 + m5), k/(m4 + m5) (1/s2) and so omega_k = 31.623 rad/s.

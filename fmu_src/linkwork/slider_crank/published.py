@@ -8,8 +8,9 @@ from __future__ import annotations
 
 from math import pi, radians
 from types import MappingProxyType
-from typing import Mapping, NamedTuple
+from typing import Mapping
 
+from ..mechanism import PublishedSet
 from .parameters import InitialState, SliderCrankParameters
 
 INCH = 0.0254
@@ -50,15 +51,6 @@ def parameters(offset_in: float = 0.0, twist_deg: float = 270.0) -> SliderCrankP
 def initial(shift_in: float = 0.0) -> InitialState:
     """The start at 50 rpm with the shift S1 (inches) of one of the cases."""
     return InitialState(crank_speed=CRANK_SPEED, shift_position=shift_in * INCH)
-
-
-class PublishedSet(NamedTuple):
-    """A case as printed, the state it starts from, the crank speed (rad/s), and its source."""
-
-    parameters: SliderCrankParameters
-    initial: InitialState
-    crank_speed: float
-    source: str
 
 
 def _case(offset_in: float, shift_in: float, twist_deg: float) -> PublishedSet:

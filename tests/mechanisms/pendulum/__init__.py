@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from math import pi
-from typing import NamedTuple
 
-from linkwork.mechanism import Channel, Equations, Freedom, Mechanism
+from linkwork.mechanism import Channel, Equations, Freedom, Mechanism, PublishedSet
 from linkwork.parameters import check_constants, check_initial, check_parameters
 from linkwork.variables import Variable, output, status_outputs, tolerance_parameter
 
@@ -42,15 +41,6 @@ class Initial:
         check_initial(self)
 
 
-class Published(NamedTuple):
-    """A set with a name."""
-
-    parameters: Parameters
-    initial: Initial
-    crank_speed: float
-    source: str
-
-
 VARIABLES = (
     Variable("pendulum.inertia", "parameter", "kg.m2", "Moment of inertia", start=0.1, minimum=0.0),
     Variable("pendulum.weight", "parameter", "N.m", "Greatest moment of its weight", start=2.0, minimum=0.0),
@@ -75,7 +65,7 @@ MECHANISM = Mechanism(
     parameters=Parameters,
     initial=Initial,
     published={
-        "pendulum-demo": Published(
+        "pendulum-demo": PublishedSet(
             Parameters(pendulum_inertia=0.1, pendulum_weight=2.0, pendulum_damping=0.02),
             Initial(pendulum_speed=30.0),
             30.0,

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from math import pi
-from typing import NamedTuple
 
-from linkwork.mechanism import Channel, Equations, Freedom, Mechanism, Mode
+from linkwork.mechanism import Channel, Equations, Freedom, Mechanism, Mode, PublishedSet
 from linkwork.parameters import check_constants, check_initial, check_parameters
 from linkwork.variables import Variable, output, status_outputs, tolerance_parameter
 
@@ -56,15 +55,6 @@ class Initial:
         check_initial(self)
 
 
-class Published(NamedTuple):
-    """A set with a name."""
-
-    parameters: Parameters
-    initial: Initial
-    crank_speed: float
-    source: str
-
-
 _DEMO = Parameters(
     rotor_mass=0.5, rotor_radius=0.05, rotor_inertia=2e-3, cart_mass=2.0, cart_stiffness=1500.0, cart_damping=6.0
 )
@@ -112,7 +102,7 @@ MECHANISM = Mechanism(
     notes=("The rotor turns in the vertical plane of the cart's motion.",),
     parameters=Parameters,
     initial=Initial,
-    published={"rotor-demo": Published(_DEMO, Initial(rotor_speed=_SPEED), _SPEED, "made up for the tests")},
+    published={"rotor-demo": PublishedSet(_DEMO, Initial(rotor_speed=_SPEED), _SPEED, "made up for the tests")},
     freedoms=(
         Freedom(
             "rotor.angle",
