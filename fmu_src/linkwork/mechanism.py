@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from importlib import import_module
+from math import degrees
 from types import ModuleType
 from typing import Any, NamedTuple
 
@@ -160,9 +161,8 @@ class Mechanism:
     check_assembly : callable
         ``check_assembly(parameters, x)`` raises AssemblyError where the links cannot be joined clear of the limit.
     error_scale : callable
-        ``error_scale(parameters, x)``: magnitudes of the state's components below which the integrator's error is absolute.
-    where : callable
-        ``where(x)``: a configuration in words.
+        ``error_scale(parameters, x)``: magnitudes of the state's components below which the integrator's error is absolute; a
+        straight line of arithmetic like the equations.
     """
 
     name: str
@@ -182,7 +182,6 @@ class Mechanism:
     equations: Equations
     check_assembly: Callable[[Any, Sequence[float]], None]
     error_scale: Callable[[Any, Sequence[float]], tuple[float, ...]]
-    where: Callable[[Sequence[float]], str]
 
     def __reduce__(self) -> Any:
         # by its package: a copy would be another mechanism
@@ -238,6 +237,16 @@ class Mechanism:
     def _drives(self, channel: Channel, modes: Mapping[str, int]) -> bool:
         mode = self.freedoms[channel.freedom].mode
         return mode is None or mode.arguments[modes[mode.name]] == channel.argument
+
+    def where(self, x: Sequence[float]) -> str:
+        """A configuration in words, by the freedoms' coordinates."""
+        units = {v.name: v.unit for v in self.variables}
+        words = []
+        for freedom, value in zip(self.freedoms, x):
+            unit = units[freedom.coordinate]
+            in_degrees = f" ({degrees(value):.4f} deg)" if unit == "rad" else ""
+            words.append(f"{freedom.coordinate.replace('.', ' ')} {value:.9g} {unit}{in_degrees}")
+        return " and ".join(words)
 
     def state(self, initial: Any) -> State:
         """The state that ``initial`` describes, no work done yet."""

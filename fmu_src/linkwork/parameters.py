@@ -5,11 +5,12 @@ A field ``coupler_point_distance`` is the FMI parameter ``coupler.point_distance
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import fields
 from math import isfinite, log10
 from numbers import Real
-from typing import Any
+from types import MappingProxyType
+from typing import Any, NamedTuple
 
 from .errors import ParameterError
 
@@ -27,24 +28,53 @@ def field_name(name: str) -> str:
     return name.replace(".", "_", 1)
 
 
-def check_parameters(
-    parameters: Any, *, positive: Collection[str], free_sign: Collection[str], signs: Mapping[str, str]
-) -> None:
-    """Check the fields of a frozen dataclass of parameters, and make plain numbers of them.
+class Least(NamedTuple):
+    """A least value of one parameter that depends on others.
 
-    Parameters
+    Attributes
     ----------
-    parameters : dataclass instance
-    positive, free_sign : collections of str
+    field : str
+        Field of the parameter.
+    of : callable
+        ``of(parameters)``: that value; a straight line of arithmetic.
+    requirement : str
+        What would be right, as the end of the sentence "it must ..."; ``%g`` stands for the value.
+    """
+
+    field: str
+    of: Callable[[Any], float]
+    requirement: str
+
+
+class Rules(NamedTuple):
+    """What the fields of a dataclass of parameters must be, beside finite; its attribute ``RULES``.
+
+    Attributes
+    ----------
+    positive, free_sign : tuple of str
         Fields that must be greater than zero, and those that may have either sign; the others may be zero or greater.
     signs : mapping
         Fields that are +1 or -1, and what the sign means, as the end of the sentence "it must be +1 or -1, ...".
+    least : tuple of Least
+        Bounds by other parameters.
+    """
+
+    positive: tuple[str, ...] = ()
+    free_sign: tuple[str, ...] = ()
+    signs: Mapping[str, str] = MappingProxyType({})
+    least: tuple[Least, ...] = ()
+
+
+def check_parameters(parameters: Any) -> None:
+    """Check a frozen dataclass of parameters by its ``RULES``, and make plain numbers of its fields.
 
     Raises
     ------
     ParameterError
-        For the first field that is not as it must be.
+        For the first field that is not as it must be; where all are, for the most extreme one if the constants of the
+        equations are not finite.
     """
+    rules: Rules = parameters.RULES
     for field in fields(parameters):
         name = fmi_name(field.name)
         value = getattr(parameters, field.name)
@@ -52,34 +82,28 @@ def check_parameters(
             raise ParameterError(name, value, "be a number in SI units")
         try:
             number: float = float(value)
-            if field.name in signs and number.is_integer():
+            if field.name in rules.signs and number.is_integer():
                 number = int(number)
         except (OverflowError, ValueError):
             raise ParameterError(name, value, "be a finite number") from None
         # plain Python numbers, whatever kind was given: the equations and JSON know no other
         object.__setattr__(parameters, field.name, number)
         value = number
-        if field.name in signs:
+        if field.name in rules.signs:
             if value not in (1, -1):
-                raise ParameterError(name, value, f"be +1 or -1, {signs[field.name]}")
-        elif field.name in positive:
+                raise ParameterError(name, value, f"be +1 or -1, {rules.signs[field.name]}")
+        elif field.name in rules.positive:
             if not (isfinite(value) and value > 0.0):
                 raise ParameterError(name, value, POSITIVE)
-        elif field.name in free_sign:
+        elif field.name in rules.free_sign:
             if not isfinite(value):
                 raise ParameterError(name, value, "be a finite number")
         elif not (isfinite(value) and value >= 0.0):
             raise ParameterError(name, value, NOT_NEGATIVE)
-
-
-def check_constants(parameters: Any) -> None:
-    """Make sure that the derived constants are finite.
-
-    Raises
-    ------
-    ParameterError
-        Naming the most extreme of the parameters, by its order of magnitude.
-    """
+    for least in rules.least:
+        bound, value = least.of(parameters), getattr(parameters, least.field)
+        if value < bound:
+            raise ParameterError(fmi_name(least.field), value, least.requirement.replace("%g", f"{bound:g}"))
     try:
         finite = all(isfinite(constant) for constant in parameters.constants())
     except ArithmeticError:

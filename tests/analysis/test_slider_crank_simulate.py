@@ -216,7 +216,7 @@ def test_a_run_that_leaves_the_range_of_assembly_ends_at_its_limit() -> None:
     for ended in (result, other):
         assert ended.status == 3
         assert "limit of assembly at t = " in ended.message
-        assert " and axial shift " in ended.message
+        assert " and shift position " in ended.message
     assert result.time[-1] == pytest.approx(other.time[-1], rel=1e-7)
     assert np.sin(result["transmission.angle"][-1]) == pytest.approx(1e-3, rel=1e-6)
 
@@ -238,7 +238,7 @@ def test_a_run_that_leaves_the_range_of_assembly_ends_at_its_limit() -> None:
         (
             {"inputs": Inputs(load=Function(lambda t, th, s, w, v: float("nan")))},
             InputError,
-            "the input load is not a finite number at t = 0 s, crank angle 0 rad .* and axial shift",
+            "the input load is not a finite number at t = 0 s, crank angle 0 rad .* and shift position",
         ),
         (
             {"inputs": Inputs(shift_speed=Harmonics(0.0, [1e200], [1e200], [0.0]), torque=1.0)},

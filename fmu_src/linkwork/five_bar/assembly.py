@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from math import asin, degrees
 
 from ..errors import AssemblyError
@@ -43,10 +44,7 @@ def configuration(crank_angle: float, slider_position: float) -> str:
     return f"crank angle {crank_angle:.9g} rad ({degrees(crank_angle):.4f} deg) and slider position {slider_position:.9g} m"
 
 
-def error_scale(parameters: FiveBarParameters, crank_speed: float) -> tuple[float, ...]:
-    """Magnitudes of the state's components below which the integrator's error counts as absolute.
-
-    ``crank_speed`` is the speed at the start (rad/s).
-    """
+def error_scale(parameters: FiveBarParameters, x: Sequence[float]) -> tuple[float, ...]:
+    """Magnitudes of the state's components below which the integrator's error counts as absolute, by the state at the start."""
     mass = parameters.coupler_mass + parameters.rocker_mass + parameters.slider_mass
-    return crank_scale(parameters.crank_length, mass, parameters.crank_inertia, crank_speed)
+    return crank_scale(parameters.crank_length, mass, parameters.crank_inertia, x[2])

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from math import cos, hypot, sin
-from typing import NamedTuple
+from typing import ClassVar, NamedTuple
 
-from ..errors import ParameterError
-from ..parameters import check_constants, check_initial, check_parameters
+from ..parameters import Least, Rules, check_initial, check_parameters
 
 
 class Constants(NamedTuple):
@@ -49,19 +48,39 @@ class Constants(NamedTuple):
     gy: float
 
 
-_POSITIVE = ("ground_length", "crank_length", "coupler_length", "rocker_length", "crank_inertia")
-_FREE_SIGN = (
-    "crank_cog_distance",
-    "coupler_cog_distance",
-    "rocker_cog_distance",
-    "crank_cog_angle",
-    "coupler_cog_angle",
-    "rocker_cog_angle",
-    "slider_guide_angle",
-    "slider_spring_free_position",
-    "coupler_point_distance",
-    "coupler_point_angle",
-    "ground_inclination",
+def _crank_inertia_of_mass(p: FiveBarParameters) -> float:
+    # the digits that a printed moment of inertia may lack
+    return p.crank_mass * p.crank_cog_distance * p.crank_cog_distance * (1.0 - 1e-12)
+
+
+def _slider_mass_above_none(p: FiveBarParameters) -> float:
+    return 1e-300 - p.rocker_mass
+
+
+_RULES = Rules(
+    positive=("ground_length", "crank_length", "coupler_length", "rocker_length", "crank_inertia"),
+    free_sign=(
+        "crank_cog_distance",
+        "coupler_cog_distance",
+        "rocker_cog_distance",
+        "crank_cog_angle",
+        "coupler_cog_angle",
+        "rocker_cog_angle",
+        "slider_guide_angle",
+        "slider_spring_free_position",
+        "coupler_point_distance",
+        "coupler_point_angle",
+        "ground_inclination",
+    ),
+    signs={"assembly_branch": "the sign of sin(rocker.angle - coupler.angle)"},
+    least=(
+        Least(
+            "crank_inertia",
+            _crank_inertia_of_mass,
+            "be at least crank.mass * crank.cog_distance^2 = %g kg.m2: it is taken about the shaft A",
+        ),
+        Least("slider_mass", _slider_mass_above_none, "be greater than zero where rocker.mass is zero"),
+    ),
 )
 
 
@@ -80,6 +99,8 @@ class FiveBarParameters:
         If a value is not finite or has the wrong sign, if ``assembly_branch`` is neither +1 nor -1, if the crank's
         inertia about A is less than its mass requires, or if nothing moves with the slider.
     """
+
+    RULES: ClassVar[Rules] = _RULES
 
     ground_length: float
     crank_length: float
@@ -110,22 +131,7 @@ class FiveBarParameters:
     assembly_branch: int = 1
 
     def __post_init__(self) -> None:
-        check_parameters(
-            self,
-            positive=_POSITIVE,
-            free_sign=_FREE_SIGN,
-            signs={"assembly_branch": "the sign of sin(rocker.angle - coupler.angle)"},
-        )
-        steiner = self.crank_mass * self.crank_cog_distance * self.crank_cog_distance
-        if self.crank_inertia < steiner * (1.0 - 1e-12):
-            raise ParameterError(
-                "crank.inertia",
-                self.crank_inertia,
-                f"be at least crank.mass * crank.cog_distance^2 = {steiner:g} kg.m2: it is taken about the shaft A",
-            )
-        if self.rocker_mass + self.slider_mass <= 0.0:
-            raise ParameterError("slider.mass", self.slider_mass, "be greater than zero where rocker.mass is zero")
-        check_constants(self)
+        check_parameters(self)
 
     def constants(self) -> Constants:
         """The constants of the equations."""

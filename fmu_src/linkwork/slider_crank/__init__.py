@@ -75,6 +75,5 @@ MECHANISM = Mechanism(
         energy=dynamics.mechanical_energy,
     ),
     check_assembly=lambda parameters, x: assembly.check_assembly(parameters, x[0], x[1]),
-    error_scale=lambda parameters, x: assembly.error_scale(parameters, x[2]),
-    where=lambda x: assembly.configuration(x[0], x[1]),
+    error_scale=assembly.error_scale,
 )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from math import asin, degrees, sqrt
 
 from ..errors import AssemblyError
@@ -45,15 +46,7 @@ def check_assembly(parameters: SliderCrankParameters, crank_angle: float, shift:
     )
 
 
-def configuration(crank_angle: float, shift: float) -> str:
-    """A configuration in words."""
-    return f"crank angle {crank_angle:.9g} rad ({degrees(crank_angle):.4f} deg) and axial shift {shift:.9g} m"
-
-
-def error_scale(parameters: SliderCrankParameters, crank_speed: float) -> tuple[float, ...]:
-    """Magnitudes of the state's components below which the integrator's error counts as absolute.
-
-    ``crank_speed`` is the speed at the start (rad/s).
-    """
+def error_scale(parameters: SliderCrankParameters, x: Sequence[float]) -> tuple[float, ...]:
+    """Magnitudes of the state's components below which the integrator's error counts as absolute, by the state at the start."""
     mass = parameters.crank_mass + parameters.rod_mass + parameters.slider_mass
-    return crank_scale(parameters.crank_length, mass, parameters.crank_inertia, crank_speed)
+    return crank_scale(parameters.crank_length, mass, parameters.crank_inertia, x[2])

@@ -9,10 +9,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from math import cos, sin
-from typing import NamedTuple
+from typing import ClassVar, NamedTuple
 
-from ..errors import ParameterError
-from ..parameters import check_constants, check_initial, check_parameters
+from ..parameters import Least, Rules, check_initial, check_parameters
 
 
 class Constants(NamedTuple):
@@ -61,26 +60,41 @@ class Constants(NamedTuple):
     gz: float
 
 
-_POSITIVE = ("crank_length", "rod_length", "crank_mass", "crank_inertia")
-_FREE_SIGN = (
-    "guide_offset",
-    "guide_twist",
-    "crank_cog_x",
-    "crank_cog_y",
-    "crank_cog_z",
-    "crank_product_xz",
-    "crank_product_yz",
-    "rod_cog_distance",
-    "slider_cog_x",
-    "slider_cog_y",
-    "slider_cog_z",
-    "slider_spring_free_position",
-    "shift_spring_free_position",
-    "groove_amplitude",
-    "groove_ratio",
-    "gravity_x",
-    "gravity_y",
-    "gravity_z",
+def _crank_inertia_of_mass(p: SliderCrankParameters) -> float:
+    # the digits that a printed moment of inertia may lack
+    return p.crank_mass * (p.crank_cog_x * p.crank_cog_x + p.crank_cog_y * p.crank_cog_y) * (1.0 - 1e-12)
+
+
+_RULES = Rules(
+    positive=("crank_length", "rod_length", "crank_mass", "crank_inertia"),
+    free_sign=(
+        "guide_offset",
+        "guide_twist",
+        "crank_cog_x",
+        "crank_cog_y",
+        "crank_cog_z",
+        "crank_product_xz",
+        "crank_product_yz",
+        "rod_cog_distance",
+        "slider_cog_x",
+        "slider_cog_y",
+        "slider_cog_z",
+        "slider_spring_free_position",
+        "shift_spring_free_position",
+        "groove_amplitude",
+        "groove_ratio",
+        "gravity_x",
+        "gravity_y",
+        "gravity_z",
+    ),
+    signs={"assembly_branch": "the side of the crank pin's foot on the guide on which the slider is"},
+    least=(
+        Least(
+            "crank_inertia",
+            _crank_inertia_of_mass,
+            "be at least crank.mass * (crank.cog_x^2 + crank.cog_y^2) = %g kg.m2: it is taken about the axis",
+        ),
+    ),
 )
 
 
@@ -107,6 +121,8 @@ class SliderCrankParameters:
         If a value is not finite or has the wrong sign, if ``assembly_branch`` is neither +1 nor -1, or if the crank's
         inertia is less than its mass requires.
     """
+
+    RULES: ClassVar[Rules] = _RULES
 
     crank_length: float
     rod_length: float
@@ -141,20 +157,7 @@ class SliderCrankParameters:
     assembly_branch: int = 1
 
     def __post_init__(self) -> None:
-        check_parameters(
-            self,
-            positive=_POSITIVE,
-            free_sign=_FREE_SIGN,
-            signs={"assembly_branch": "the side of the crank pin's foot on the guide on which the slider is"},
-        )
-        steiner = self.crank_mass * (self.crank_cog_x * self.crank_cog_x + self.crank_cog_y * self.crank_cog_y)
-        if self.crank_inertia < steiner * (1.0 - 1e-12):
-            raise ParameterError(
-                "crank.inertia",
-                self.crank_inertia,
-                f"be at least crank.mass * (crank.cog_x^2 + crank.cog_y^2) = {steiner:g} kg.m2: it is taken about the axis",
-            )
-        check_constants(self)
+        check_parameters(self)
 
     def constants(self) -> Constants:
         """The constants of the equations."""

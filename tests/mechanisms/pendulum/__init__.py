@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from math import pi
+from typing import ClassVar
 
 from linkwork.mechanism import Channel, Equations, Freedom, Mechanism, PublishedSet
-from linkwork.parameters import check_constants, check_initial, check_parameters
+from linkwork.parameters import Rules, check_initial, check_parameters
 from linkwork.variables import Variable, output, status_outputs, tolerance_parameter
 
 from . import equations
@@ -17,13 +18,14 @@ from .equations import Constants
 class Parameters:
     """SI units."""
 
+    RULES: ClassVar[Rules] = Rules(positive=("pendulum_inertia",))
+
     pendulum_inertia: float
     pendulum_weight: float
     pendulum_damping: float = 0.0
 
     def __post_init__(self) -> None:
-        check_parameters(self, positive=("pendulum_inertia",), free_sign=(), signs={})
-        check_constants(self)
+        check_parameters(self)
 
     def constants(self) -> Constants:
         """What the equations use."""
@@ -88,6 +90,5 @@ MECHANISM = Mechanism(
         energy=equations.energy,
     ),
     check_assembly=lambda parameters, x: None,
-    error_scale=lambda parameters, x: (1.0, 10.0, 1.0, 1.0),
-    where=lambda x: f"angle {x[0]:.9g} rad",
+    error_scale=equations.error_scale,
 )

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from math import pi
+from typing import ClassVar
 
 from linkwork.mechanism import Channel, Equations, Freedom, Mechanism, Mode, PublishedSet
-from linkwork.parameters import check_constants, check_initial, check_parameters
+from linkwork.parameters import Rules, check_initial, check_parameters
 from linkwork.variables import Variable, output, status_outputs, tolerance_parameter
 
 from . import equations
@@ -17,6 +18,8 @@ from .equations import Constants
 class Parameters:
     """SI units."""
 
+    RULES: ClassVar[Rules] = Rules(positive=("rotor_mass", "rotor_radius", "cart_mass"))
+
     rotor_mass: float
     rotor_radius: float
     rotor_inertia: float
@@ -26,8 +29,7 @@ class Parameters:
     gravity: float = 9.81
 
     def __post_init__(self) -> None:
-        check_parameters(self, positive=("rotor_mass", "rotor_radius", "cart_mass"), free_sign=(), signs={})
-        check_constants(self)
+        check_parameters(self)
 
     def constants(self) -> Constants:
         """What the equations use."""
@@ -133,6 +135,5 @@ MECHANISM = Mechanism(
         energy=equations.energy,
     ),
     check_assembly=lambda parameters, x: None,
-    error_scale=lambda parameters, x: (1.0, 0.05, 10.0, 1.0, 1.0, 1.0),
-    where=lambda x: f"rotor angle {x[0]:.9g} rad and cart position {x[1]:.9g} m",
+    error_scale=equations.error_scale,
 )
