@@ -10,7 +10,9 @@ from linkwork import five_bar, slider_crank
 from linkwork.errors import InputError, LinkworkError
 from linkwork.mechanism import Channel, Mechanism
 from linkwork.parameters import fmi_name
-from linkwork.variables import UNITS
+from linkwork.variables import UNITS, status_variables
+
+STATUS_NAMES = tuple(v.name for v in status_variables())
 
 FIVE_BAR = five_bar.MECHANISM
 SLIDER_CRANK = slider_crank.MECHANISM
@@ -55,8 +57,11 @@ def register(mechanism: Mechanism) -> None:
 def _faults_of_interface(m: Mechanism) -> Iterator[str]:
     names = [v.name for v in m.variables]
     for v in m.variables:
-        if v.causality not in ("parameter", "input", "output"):
-            yield f"{v.name} has the causality {v.causality!r}: it must be parameter, input or output"
+        known = ("local",) if v.name in STATUS_NAMES else ("parameter", "input", "output")
+        if v.causality not in known:
+            yield f"{v.name} has the causality {v.causality!r}: it must be {' or '.join(known)}"
+        if v.rate_of and not {v.name, v.rate_of} <= set(m.output_names):
+            yield f"{v.name} is the rate of {v.rate_of!r}: both must be real outputs"
         if v.kind == "Real" and v.unit not in UNITS:
             yield f"{v.name} has the unit {v.unit!r}: it must be one of {', '.join(UNITS)}"
         if v.depends not in ("state", "speed", "all"):
@@ -65,12 +70,16 @@ def _faults_of_interface(m: Mechanism) -> Iterator[str]:
             yield f"{v.name} has the level {v.level!r}: it must be position, velocity, all or none"
     for name in dict.fromkeys(name for name in names if names.count(name) > 1):
         yield f"two variables are called {name}"
-    for name in ("solver.tolerance", "solver.status", "solver.message", *(mode.name for mode in m.modes)):
+    for name in ("solver.tolerance", *STATUS_NAMES, *(mode.name for mode in m.modes)):
         if name not in names:
             yield f"there is no variable {name}"
     for name in (*(n for f in m.freedoms for n in (f.coordinate, f.rate)), *(c.displacement for c in m.channels)):
         if name and name not in m.output_names:
             yield f"there is no output {name}"
+    rate_of = {v.name: v.rate_of for v in m.variables}
+    for freedom in m.freedoms:
+        if rate_of.get(freedom.rate) != freedom.coordinate:
+            yield f"{freedom.rate} is the rate of {rate_of.get(freedom.rate)!r}: it must be that of {freedom.coordinate}"
     for name in m.position_parameters:
         if name not in names:
             yield f"there is no parameter {name}"

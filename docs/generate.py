@@ -28,7 +28,7 @@ MARKED = re.compile(r"<!-- (\w+) ([\w-]+): begin -->\n.*?<!-- \1 \2: end -->", r
 
 
 def _start(variable: Variable) -> str:
-    if variable.causality == "output":
+    if variable.causality in ("output", "local"):
         return ""
     return f"{variable.start:.9g}" if isinstance(variable.start, float) else str(variable.start)
 

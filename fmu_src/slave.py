@@ -1,7 +1,7 @@
-"""What every slave of Linkwork shares: the XML of its interface, its lifecycle, its saved state, its log.
+"""What every slave of Linkwork shares: its lifecycle, its values, its saved state, its log.
 
-A concrete slave names its mechanism. pythonfmu by itself writes neither units nor dependencies nor
-InitialUnknowns: `to_xml` completes them.
+A concrete slave names its mechanism. Its variables are not registered with pythonfmu, which would only describe them: the
+model description comes with the archive.
 """
 
 from __future__ import annotations
@@ -10,17 +10,14 @@ import atexit
 import ctypes
 import json
 import sys
-import uuid
 from collections.abc import Callable
 from functools import wraps
 from pathlib import Path
 from typing import Any, ClassVar
-from xml.etree.ElementTree import Element, SubElement
 
-from pythonfmu import Fmi2Causality, Fmi2Slave, Fmi2Variability, Integer, Real, String
-from pythonfmu.enums import Fmi2Initial, Fmi2Status
+from pythonfmu import Fmi2Slave
+from pythonfmu.enums import Fmi2Status
 
-from linkwork import __version__
 from linkwork.errors import (
     AssemblyError,
     InputError,
@@ -33,7 +30,7 @@ from linkwork.errors import (
 from linkwork.mechanism import Mechanism
 from linkwork.parameters import field_name
 from linkwork.plant import Plant
-from linkwork.variables import UNITS, Variable
+from linkwork.variables import Variable
 
 STATUS_GOOD = 0
 STATUS_NOT_INITIALISED = 5
@@ -47,10 +44,12 @@ STATUS = (
     (ParameterError, 6),
 )
 
-#: Namespace of the GUIDs, so that an interface of the same variables always has the same one.
-GUID_NAMESPACE = uuid.uuid5(uuid.NAMESPACE_URL, "urn:linkwork:fmi")
-
-_TYPES = {"Real": Real, "Integer": Integer, "String": String}
+#: Why a value is not taken, by causality.
+_NOT_TAKEN = {
+    "output": "an output",
+    "local": "a local variable",
+    "parameter": "a fixed parameter, set after the initialisation",
+}
 
 #: Libraries of FMUs that `_end_library_in_order` has seen to.
 _libraries: set[Path] = set()
@@ -102,15 +101,11 @@ class LinkworkSlave(Fmi2Slave):
 
     mechanism: ClassVar[Mechanism]
     variables: ClassVar[tuple[Variable, ...]]
-
-    author = "The Linkwork developers"
-    license = "MIT"
-    copyright = "Copyright (c) 2026 The Linkwork developers"
-    version = __version__
+    #: GUID in the model description, which saved states carry
+    guid_of_interface: ClassVar[str] = ""
 
     def __init_subclass__(cls) -> None:
         super().__init_subclass__()
-        cls.description = cls.mechanism.description
         cls.variables = cls.mechanism.variables
         # To find the class the wrapper runs its module's source again, at every instantiation, and then gives up a reference
         # to the module's namespace that it only borrowed: without one more each time the namespace dies with all its names
@@ -124,6 +119,7 @@ class LinkworkSlave(Fmi2Slave):
         self._names = [v.name for v in self.variables]
         self._kinds = [v.kind for v in self.variables]
         self._causalities = [v.causality for v in self.variables]
+        self._computed = [v.causality in ("output", "local") for v in self.variables]
         self._outputs = [i for i, v in enumerate(self.variables) if v.causality == "output" and v.kind == "Real"]
         self._status_at = self._names.index("solver.status")
         self._message_at = self._names.index("solver.message")
@@ -135,8 +131,6 @@ class LinkworkSlave(Fmi2Slave):
         self._cause: tuple[int, str] | None = None
         self._start_time = 0.0
         self._master_tolerance: float | None = None
-        for index, variable in enumerate(self.variables):
-            self.register_variable(self._declaration(index, variable), nested=False)
 
     def _build(self) -> Plant:
         """The plant for the present parameters and inputs, at its start."""
@@ -152,116 +146,6 @@ class LinkworkSlave(Fmi2Slave):
             inputs={name: values[name] for name in m.input_names},
             **{field_name(mode.name): values[mode.name] for mode in m.modes},
         )
-
-    # Interface
-
-    def _declaration(self, index: int, variable: Variable) -> Any:
-        output = variable.causality == "output"
-        fixed = variable.causality == "parameter"
-        continuous = Fmi2Variability.continuous if variable.kind == "Real" else Fmi2Variability.discrete
-        return _TYPES[variable.kind](
-            variable.name,
-            causality=Fmi2Causality[variable.causality],
-            variability=Fmi2Variability.fixed if fixed else continuous,
-            # approx, not calculated: only so may an output carry the start value that people look for in the XML
-            initial=Fmi2Initial.approx if output else Fmi2Initial.exact if fixed else None,
-            description=variable.description,
-            getter=self._getter(index),
-            setter=None,
-        )
-
-    def _getter(self, index: int) -> Callable[[], Any]:
-        return lambda: self._values[index]
-
-    def interface_guid(self) -> str:
-        """GUID of the interface: it changes when a variable, its type, unit or start does, and only then."""
-        lines = [
-            "|".join((v.name, v.causality, v.kind, v.unit, repr(v.start), repr(v.minimum), repr(v.maximum)))
-            for v in self.variables
-        ]
-        return str(uuid.uuid5(GUID_NAMESPACE, "\n".join([type(self).__name__, *lines])))
-
-    def to_xml(self, model_options: dict[str, str] | None = None) -> Element:
-        """Model description: pythonfmu's, completed by units, bounds, dependencies and InitialUnknowns."""
-        root: Element = super().to_xml(model_options or {})
-        root.set("guid", self.interface_guid())
-        children = list(root)
-        slave = next(c for c in children if c.tag == "CoSimulation")
-        slave.set("needsExecutionTool", "false")
-        slave.set("canHandleVariableCommunicationStepSize", "true")
-        slave.set("canGetAndSetFMUstate", "true")
-        slave.set("canSerializeFMUstate", "true")
-        root.insert(children.index(slave) + 1, self._unit_definitions())
-        start, stop, step, tolerance = self.mechanism.experiment
-        experiment = Element(
-            "DefaultExperiment",
-            {"startTime": repr(start), "stopTime": repr(stop), "stepSize": repr(step), "tolerance": repr(tolerance)},
-        )
-        listed = next(c for c in root if c.tag == "ModelVariables")
-        root.insert(list(root).index(listed), experiment)
-        error = self._refresh()
-        if error is not None:
-            raise error
-        for variable, value, scalar in zip(self.variables, self._values, listed):
-            self._complete(variable, value, scalar[0])
-        structure = next(c for c in root if c.tag == "ModelStructure")
-        root.remove(structure)
-        root.append(self._structure())
-        return root
-
-    def _unit_definitions(self) -> Element:
-        definitions = Element("UnitDefinitions")
-        for name in dict.fromkeys(v.unit for v in self.variables if v.unit):
-            unit = UNITS[name]
-            node = SubElement(definitions, "Unit", {"name": name})
-            powers = {"kg": unit.kg, "m": unit.m, "s": unit.s, "rad": unit.rad}
-            SubElement(node, "BaseUnit", {base: str(power) for base, power in powers.items() if power})
-            for display, factor in unit.displays:
-                SubElement(node, "DisplayUnit", {"name": display, "factor": repr(factor)})
-        return definitions
-
-    @staticmethod
-    def _complete(variable: Variable, start: float | int | str, node: Element) -> None:
-        if variable.unit:
-            node.set("unit", variable.unit)
-        if variable.display:
-            node.set("displayUnit", variable.display)
-        for bound, value in (("min", variable.minimum), ("max", variable.maximum)):
-            if value is not None:
-                node.set(bound, repr(value))
-        # pythonfmu writes 16 digits; 17 are needed for the same number to come back
-        node.set("start", str(start) if variable.kind == "String" else repr(start))
-
-    def _structure(self) -> Element:
-        index = {name: str(i + 1) for i, name in enumerate(self._names)}
-        inputs = list(self.mechanism.input_names)
-        commands = [channel.name for channel in self.mechanism.channels if channel.kind == "command"]
-        on_inputs = {"state": [], "speed": commands, "all": inputs}
-        at_start: dict[str, list[str] | None] = {
-            "none": [],
-            "position": list(self.mechanism.position_parameters),
-            "velocity": None,
-            "all": None,
-        }
-        structure = Element("ModelStructure")
-        outputs = SubElement(structure, "Outputs")
-        initial = SubElement(structure, "InitialUnknowns")
-        for variable in self.variables:
-            if variable.causality != "output":
-                continue
-            SubElement(
-                outputs,
-                "Unknown",
-                {
-                    "index": index[variable.name],
-                    "dependencies": " ".join(index[n] for n in on_inputs[variable.depends]),
-                },
-            )
-            unknown = SubElement(initial, "Unknown", {"index": index[variable.name]})
-            known = at_start[variable.level]
-            if known is not None:
-                unknown.set("dependencies", " ".join(sorted((index[n] for n in known), key=int)))
-        return structure
 
     # Lifecycle
 
@@ -357,7 +241,7 @@ class LinkworkSlave(Fmi2Slave):
     def _get(self, references: list[int], kind: str) -> list[Any]:
         for reference in references:
             self._check_reference(reference, kind)
-        if self._stale and any(self._causalities[r] == "output" for r in references):
+        if self._stale and any(self._computed[r] for r in references):
             # a read does not fail, for there are masters that take what it returns all the same: the last good outputs
             # stay, and the initialisation or the next step will be refused
             error = self._refresh()
@@ -380,10 +264,11 @@ class LinkworkSlave(Fmi2Slave):
             self._check_reference(reference, kind)
             name = self._names[reference]
             causality = self._causalities[reference]
-            if causality == "output" and not self._running:
+            computed = self._computed[reference]
+            if computed and not self._running:
                 continue  # a guess for the initialisation, which is solved without one
-            if causality == "output" or (causality == "parameter" and self._running):
-                why = "an output" if causality == "output" else "a fixed parameter, set after the initialisation"
+            if computed or (causality == "parameter" and self._running):
+                why = _NOT_TAKEN[causality]
                 self._say(f"{name} is {why}: the value {value!r} was not taken", Fmi2Status.warning)
                 continue
             self._values[reference] = value
@@ -434,7 +319,7 @@ class LinkworkSlave(Fmi2Slave):
     def _get_fmu_state(self) -> dict[str, Any]:
         return {
             "model": type(self).__name__,
-            "interface": self.interface_guid(),
+            "interface": self.guid_of_interface,
             "values": list(self._values),
             "running": self._running,
             "stale": self._stale,
@@ -449,7 +334,7 @@ class LinkworkSlave(Fmi2Slave):
         try:
             if "damaged" in state:
                 raise StateError(f"the serialised state is damaged: {state['damaged']}")
-            if state.get("interface") != self.interface_guid():
+            if state.get("interface") != self.guid_of_interface:
                 raise StateError(
                     f"the saved state belongs to {state.get('model')!r} with another interface, not to this "
                     f"{type(self).__name__}"

@@ -374,7 +374,7 @@ def _print_fmu(path: Path) -> None:
     description = read_model_description(str(path))
 
     def start(variable: Any) -> str:
-        if variable.causality == "output":
+        if variable.start is None or variable.causality == "output":
             return ""
         return f"{float(variable.start):.6g}" if variable.type == "Real" else str(variable.start)
 

@@ -18,10 +18,10 @@ import tempfile
 import zipfile
 from collections.abc import Iterator
 from contextlib import contextmanager
-from datetime import UTC, datetime
 from importlib import import_module
 from importlib.metadata import version
 from pathlib import Path
+from typing import NamedTuple
 
 from fmpy.validation import validate_fmu
 from pythonfmu.builder import FmuBuilder
@@ -31,6 +31,7 @@ from linkwork.errors import LinkworkError
 from linkwork.mechanism import Mechanism
 
 from ..mechanisms import check
+from .description import PYTHON, description, token
 
 PACKAGE = Path(__file__).resolve().parents[1]
 #: The source root: beside the analysis package in a checkout, inside it where Linkwork is installed as a wheel.
@@ -90,7 +91,7 @@ def build(mechanism: Mechanism, dest: Path | str = "build", sources: Path | str 
     with tempfile.TemporaryDirectory(prefix="linkwork-fmu-") as folder:
         stage = Path(folder) / "stage"
         stage.mkdir()
-        script, package, base = _stage(mechanism, sources, stage)
+        staged = _stage(mechanism, sources, stage)
         documentation = Path(folder) / "documentation"
         documentation.mkdir()
         (documentation / "index.html").write_text(_documentation(mechanism), encoding="utf-8")
@@ -98,19 +99,17 @@ def build(mechanism: Mechanism, dest: Path | str = "build", sources: Path | str 
         shutil.copy2(LICENSE, documentation / "licenses" / "license.txt")
         with _import_state():
             try:
+                described = _describe(staged)
                 raw = FmuBuilder.build_FMU(
-                    script,
+                    staged.script,
                     dest=Path(folder) / "raw",
-                    project_files=[package, base],
+                    project_files=[staged.package, staged.slave],
                     documentation_folder=documentation,
-                    needsExecutionTool=False,
-                    canGetAndSetFMUstate=True,
-                    canSerializeFMUstate=True,
                 )
             except Exception as error:  # the sources run here, and may raise anything
                 raise BuildError(f"{name}.fmu cannot be built from {sources}: {error!r}") from error
         finished = Path(folder) / f"{name}.fmu"
-        _repack(Path(raw), finished)
+        _repack(Path(raw), finished, described)
         problems = validate_fmu(str(finished))
         if problems:
             raise BuildError(f"{name}.fmu is not valid: " + "; ".join(problems))
@@ -128,10 +127,20 @@ from slave import LinkworkSlave
 
 class {name}(LinkworkSlave):
     mechanism = MECHANISM
+    guid_of_interface = ""
 """
 
 
-def _stage(mechanism: Mechanism, sources: Path, stage: Path) -> tuple[Path, Path, Path]:
+class _Staged(NamedTuple):
+    """What travels inside an FMU: the script with its slave, the package of the plant, what all slaves share."""
+
+    script: Path
+    package: Path
+    slave: Path
+    mechanism: str
+
+
+def _stage(mechanism: Mechanism, sources: Path, stage: Path) -> _Staged:
     """Copy plant and slave under names that carry a hash of their content; a mechanism from elsewhere joins the plant."""
     shared = sources / "linkwork"
     package = str(mechanism.modules[-1].__package__)
@@ -158,7 +167,22 @@ def _stage(mechanism: Mechanism, sources: Path, stage: Path) -> tuple[Path, Path
         target = stage.joinpath(f"linkwork_{tag}", *parts[1:]) if inside else stage / f"{Path(name).stem}_{tag}.py"
         target.parent.mkdir(parents=True, exist_ok=True)
         target.write_text(text, encoding="utf-8")
-    return stage / f"{folder}_slave_{tag}.py", stage / f"linkwork_{tag}", stage / f"slave_{tag}.py"
+    return _Staged(
+        stage / f"{folder}_slave_{tag}.py",
+        stage / f"linkwork_{tag}",
+        stage / f"slave_{tag}.py",
+        f"linkwork_{tag}.{folder}",
+    )
+
+
+def _describe(staged: _Staged) -> bytes:
+    """The model description of what was staged, not of what is imported here; its slave takes the GUID."""
+    sys.path.insert(0, str(staged.script.parent))
+    mechanism = import_module(staged.mechanism).MECHANISM
+    guid = f'guid_of_interface = "{token(mechanism, PYTHON)}"'
+    script = staged.script.read_text(encoding="utf-8").replace('guid_of_interface = ""', guid)
+    staged.script.write_text(script, encoding="utf-8")
+    return description(mechanism, PYTHON)
 
 
 @contextmanager
@@ -177,22 +201,14 @@ def _import_state() -> Iterator[None]:
                 del sys.modules[name]
 
 
-def _repack(raw: Path, finished: Path) -> None:
-    """Write the archive again: deflated, in order, with fixed times, the icon, and a reproducible date if asked for."""
+def _repack(raw: Path, finished: Path, described: bytes) -> None:
+    """Write the archive again: deflated, in order, with fixed times, the icon, and our model description."""
     with (
         zipfile.ZipFile(raw) as source,
         zipfile.ZipFile(finished, "w", zipfile.ZIP_DEFLATED, compresslevel=9) as target,
     ):
         entries = {name: source.read(name) for name in source.namelist()}
-        entries["model.png"] = ICON.read_bytes()
-        epoch = os.environ.get("SOURCE_DATE_EPOCH")
-        if epoch is not None:
-            stamp = datetime.fromtimestamp(int(epoch), UTC).isoformat(timespec="seconds").encode()
-            entries["modelDescription.xml"] = re.sub(
-                rb'generationDateAndTime="[^"]*"',
-                b'generationDateAndTime="' + stamp + b'"',
-                entries["modelDescription.xml"],
-            )
+        entries |= {"model.png": ICON.read_bytes(), "modelDescription.xml": described}
         # the model description first, as FMI readers look for it first
         for name in sorted(entries, key=lambda entry: (entry != "modelDescription.xml", entry)):
             info = zipfile.ZipInfo(name.replace("\\", "/"), EPOCH)
@@ -210,7 +226,7 @@ def _documentation(mechanism: Mechanism) -> str:
             for label, value in (("min", variable.minimum), ("max", variable.maximum))
             if value is not None
         ]
-        start = "" if variable.causality == "output" else f"{variable.start}"
+        start = "" if variable.causality in ("output", "local") else f"{variable.start}"
         cells = (variable.name, variable.causality, variable.unit, start, ", ".join(bounds), variable.description)
         rows.append("<tr>" + "".join(f"<td>{html.escape(cell)}</td>" for cell in cells) + "</tr>")
     notes = "\n".join(f"<p>{html.escape(note)}</p>" for note in (*mechanism.notes, *_EVERY_MODEL))

@@ -21,6 +21,7 @@ class Unit(NamedTuple):
 
 UNITS = {
     "1": Unit(),
+    "s": Unit(s=1),
     "m": Unit(m=1, displays=(("mm", 1e3),)),
     "m/s": Unit(m=1, s=-1),
     "m/s2": Unit(m=1, s=-2),
@@ -34,6 +35,7 @@ UNITS = {
     "N/m": Unit(kg=1, s=-2),
     "N.s/m": Unit(kg=1, s=-1),
     "J": Unit(kg=1, m=2, s=-2),
+    "W": Unit(kg=1, m=2, s=-3),
 }
 
 
@@ -45,7 +47,7 @@ class Variable(NamedTuple):
     name : str
         Name in the contract.
     causality : str
-        ``parameter``, ``input`` or ``output``.
+        ``parameter``, ``input``, ``output`` or ``local``.
     unit : str
         A key of `UNITS`; empty for Integer and String.
     description : str
@@ -63,6 +65,8 @@ class Variable(NamedTuple):
         Of an output: ``state`` (on no input), ``speed`` (on the commanded speeds), or ``all`` inputs.
     level : str
         Of an output at the start: what it depends on, ``position``, ``velocity`` or ``all``.
+    rate_of : str
+        Of an output, the output that it is the time derivative of; empty where it is of none.
     """
 
     name: str
@@ -77,6 +81,7 @@ class Variable(NamedTuple):
     display: str = ""
     depends: str = "all"
     level: str = "all"
+    rate_of: str = ""
 
 
 def output(
@@ -90,9 +95,12 @@ def output(
     minimum: float | None = None,
     maximum: float | None = None,
     display: str = "",
+    rate_of: str = "",
 ) -> Variable:
     """A real output."""
-    return Variable(name, "output", unit, description, symbol, 0.0, "Real", minimum, maximum, display, depends, level)
+    return Variable(
+        name, "output", unit, description, symbol, 0.0, "Real", minimum, maximum, display, depends, level, rate_of
+    )
 
 
 def tolerance_parameter() -> Variable:
@@ -109,12 +117,15 @@ def tolerance_parameter() -> Variable:
     )
 
 
-def status_outputs() -> tuple[Variable, Variable]:
-    """The two outputs every slave of ours has: why its last step was refused, if it was."""
+def status_variables() -> tuple[Variable, Variable]:
+    """The two variables every FMU of ours has: why its last step was refused, if it was.
+
+    They are local, because there are masters that read every output as a Real.
+    """
     return (
         Variable(
             "solver.status",
-            "output",
+            "local",
             "",
             "0 good; 1 step out of order; 2 input not finite; 3 limit of assembly; 4 tolerance not met; "
             "5 not initialised; 6 bad parameter; 9 internal error",
@@ -127,7 +138,7 @@ def status_outputs() -> tuple[Variable, Variable]:
         ),
         Variable(
             "solver.message",
-            "output",
+            "local",
             "",
             "Why the last step was refused, in one sentence; empty while solver.status is 0",
             start="",

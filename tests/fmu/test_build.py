@@ -146,8 +146,9 @@ def test_failed_build_leaves_the_old_fmu(tmp_path: Path, fmu: Path, model: Model
     dest = tmp_path / "build"
     dest.mkdir()
     shutil.copy2(fmu, dest)
-    # outputs and variables out of step: what is built would not be valid
-    broken = changed_sources(tmp_path, {"linkwork/variables.py": ('"kg.m2": Unit(kg=1, m=2)', '"kg.m3": Unit(kg=1)')})
+    # a name that the naming convention does not allow: what is built would not be valid
+    variables = f"linkwork/{model.plant}/variables.py"
+    broken = changed_sources(tmp_path, {variables: ('"closure.residual"', '"closure residual"')})
     with pytest.raises(BuildError):
         build(FMUS[model.name], dest, broken)
     assert [path.name for path in dest.iterdir()] == [fmu.name]

@@ -8,7 +8,7 @@ from __future__ import annotations
 from math import pi
 
 from ..parameters import field_name
-from ..variables import Variable, output, status_outputs, tolerance_parameter
+from ..variables import Variable, output, status_variables, tolerance_parameter
 from .published import SETS
 
 _SET = SETS["table-3.1"]
@@ -151,8 +151,17 @@ OUTPUTS = (
     output(
         "crank.angle", "rad", "Crank angle, counted on over full turns", "\\theta_2", "state", "position", display="deg"
     ),
-    output("crank.speed", "rad/s", "Crank speed", "\\dot\\theta_2", "speed", "velocity", display="rpm"),
-    output("crank.acceleration", "rad/s2", "Crank acceleration", "\\ddot\\theta_2"),
+    output(
+        "crank.speed",
+        "rad/s",
+        "Crank speed",
+        "\\dot\\theta_2",
+        "speed",
+        "velocity",
+        display="rpm",
+        rate_of="crank.angle",
+    ),
+    output("crank.acceleration", "rad/s2", "Crank acceleration", "\\ddot\\theta_2", rate_of="crank.speed"),
     output(
         "coupler.angle",
         "rad",
@@ -176,8 +185,8 @@ OUTPUTS = (
         display="deg",
     ),
     output("slider.position", "m", "Slider position along the guide", "u", "state", "position"),
-    output("slider.velocity", "m/s", "Slider velocity", "\\dot u", "speed", "velocity"),
-    output("slider.acceleration", "m/s2", "Slider acceleration", "\\ddot u"),
+    output("slider.velocity", "m/s", "Slider velocity", "\\dot u", "speed", "velocity", rate_of="slider.position"),
+    output("slider.acceleration", "m/s2", "Slider acceleration", "\\ddot u", rate_of="slider.velocity"),
     output("coupler.point.x", "m", "Coupler point P, along the ground link from A", "x", "state", "position"),
     output("coupler.point.y", "m", "Coupler point P, to the left of the ground link", "y", "state", "position"),
     output("drive.applied_torque", "N.m", "Torque on the crank; in speed drive the torque that holds the speed", "T_1"),
@@ -211,7 +220,7 @@ OUTPUTS = (
         maximum=pi,
         display="deg",
     ),
-    *status_outputs(),
+    *status_variables(),
 )
 
 VARIABLES = PARAMETERS + INPUTS + OUTPUTS

@@ -8,7 +8,7 @@ from __future__ import annotations
 from math import pi
 
 from ..parameters import field_name
-from ..variables import Variable, output, status_outputs, tolerance_parameter
+from ..variables import Variable, output, status_variables, tolerance_parameter
 from .published import CRANK_SPEED, OFFSET_CASE
 
 _MECHANISM, _INITIAL = OFFSET_CASE
@@ -181,16 +181,33 @@ OUTPUTS = (
     output(
         "crank.angle", "rad", "Crank angle, counted on over full turns", "\\theta_1", "state", "position", display="deg"
     ),
-    output("crank.speed", "rad/s", "Crank speed", "\\dot\\theta_1", "speed", "velocity", display="rpm"),
-    output("crank.acceleration", "rad/s2", "Crank acceleration", "\\ddot\\theta_1"),
+    output(
+        "crank.speed",
+        "rad/s",
+        "Crank speed",
+        "\\dot\\theta_1",
+        "speed",
+        "velocity",
+        display="rpm",
+        rate_of="crank.angle",
+    ),
+    output("crank.acceleration", "rad/s2", "Crank acceleration", "\\ddot\\theta_1", rate_of="crank.speed"),
     output("shift.position", "m", "Axial shift of the crank", "S_1", "state", "position"),
-    output("shift.velocity", "m/s", "Axial velocity of the crank", "\\dot S_1", "speed", "velocity"),
-    output("shift.acceleration", "m/s2", "Axial acceleration of the crank", "\\ddot S_1"),
+    output(
+        "shift.velocity",
+        "m/s",
+        "Axial velocity of the crank",
+        "\\dot S_1",
+        "speed",
+        "velocity",
+        rate_of="shift.position",
+    ),
+    output("shift.acceleration", "m/s2", "Axial acceleration of the crank", "\\ddot S_1", rate_of="shift.velocity"),
     output(
         "slider.position", "m", "Slider position along the guide, from the common normal", "S_4", "state", "position"
     ),
-    output("slider.velocity", "m/s", "Slider velocity", "\\dot S_4", "speed", "velocity"),
-    output("slider.acceleration", "m/s2", "Slider acceleration", "\\ddot S_4"),
+    output("slider.velocity", "m/s", "Slider velocity", "\\dot S_4", "speed", "velocity", rate_of="slider.position"),
+    output("slider.acceleration", "m/s2", "Slider acceleration", "\\ddot S_4", rate_of="slider.velocity"),
     *_vector("crank_pin.", "m", "Crank pin", "state", "position"),
     *_vector("slider_pin.", "m", "Slider pin", "state", "position"),
     *_vector("rod.w", "rad/s", "Angular velocity of the rod, none about itself", "speed", "velocity"),
@@ -241,7 +258,7 @@ OUTPUTS = (
         "state",
         "position",
     ),
-    *status_outputs(),
+    *status_variables(),
 )
 
 VARIABLES = PARAMETERS + INPUTS + OUTPUTS

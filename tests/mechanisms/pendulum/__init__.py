@@ -8,7 +8,7 @@ from typing import ClassVar
 
 from linkwork.mechanism import Channel, Equations, Freedom, Mechanism, PublishedSet
 from linkwork.parameters import Rules, check_initial, check_parameters
-from linkwork.variables import Variable, output, status_outputs, tolerance_parameter
+from linkwork.variables import Variable, output, status_variables, tolerance_parameter
 
 from . import equations
 from .equations import Constants
@@ -52,10 +52,10 @@ VARIABLES = (
     tolerance_parameter(),
     Variable("drive.torque", "input", "N.m", "Torque on the pendulum"),
     output("pendulum.angle", "rad", "Angle, counted on over full turns", "", "state", "position"),
-    output("pendulum.speed", "rad/s", "Speed", "", "state", "velocity"),
-    output("pendulum.acceleration", "rad/s2", "Angular acceleration"),
+    output("pendulum.speed", "rad/s", "Speed", "", "state", "velocity", rate_of="pendulum.angle"),
+    output("pendulum.acceleration", "rad/s2", "Angular acceleration", rate_of="pendulum.speed"),
     output("energy.residual", "J", "Energy balance", "", "state"),
-    *status_outputs(),
+    *status_variables(),
 )
 
 MECHANISM = Mechanism(

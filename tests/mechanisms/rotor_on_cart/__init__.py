@@ -8,7 +8,7 @@ from typing import ClassVar
 
 from linkwork.mechanism import Channel, Equations, Freedom, Mechanism, Mode, PublishedSet
 from linkwork.parameters import Rules, check_initial, check_parameters
-from linkwork.variables import Variable, output, status_outputs, tolerance_parameter
+from linkwork.variables import Variable, output, status_variables, tolerance_parameter
 
 from . import equations
 from .equations import Constants
@@ -86,14 +86,14 @@ VARIABLES = (
     Variable("drive.acceleration", "input", "rad/s2", "Its rate of change over a step"),
     Variable("cart.force", "input", "N", "Force on the cart"),
     output("rotor.angle", "rad", "Angle, counted on over full turns", "", "state", "position"),
-    output("rotor.speed", "rad/s", "Speed", "", "speed", "velocity"),
-    output("rotor.acceleration", "rad/s2", "Angular acceleration"),
+    output("rotor.speed", "rad/s", "Speed", "", "speed", "velocity", rate_of="rotor.angle"),
+    output("rotor.acceleration", "rad/s2", "Angular acceleration", rate_of="rotor.speed"),
     output("cart.position", "m", "Position of the cart", "", "state", "position"),
-    output("cart.velocity", "m/s", "Velocity of the cart", "", "speed", "velocity"),
-    output("cart.acceleration", "m/s2", "Acceleration of the cart"),
+    output("cart.velocity", "m/s", "Velocity of the cart", "", "speed", "velocity", rate_of="cart.position"),
+    output("cart.acceleration", "m/s2", "Acceleration of the cart", rate_of="cart.velocity"),
     output("drive.applied_torque", "N.m", "Torque on the rotor"),
     output("energy.residual", "J", "Energy balance", "", "speed"),
-    *status_outputs(),
+    *status_variables(),
 )
 
 MECHANISM = Mechanism(

@@ -1,0 +1,456 @@
+"""The descriptions inside FMUs, for every kind of them, from the mechanism's table of variables.
+
+``modelDescription.xml`` for all kinds; ``terminalsAndIcons.xml`` and ``buildDescription.xml`` of FMI 3.0.
+"""
+
+from __future__ import annotations
+
+import os
+import uuid
+from collections.abc import Iterable, Mapping, Sequence
+from datetime import UTC, datetime
+from functools import cache
+from importlib.metadata import version
+from typing import Any, NamedTuple
+from xml.etree.ElementTree import Element, SubElement, indent, tostring
+
+import linkwork
+from linkwork.mechanism import Mechanism, Mode
+from linkwork.parameters import field_name
+from linkwork.plant import Plant
+from linkwork.variables import UNITS, Variable
+
+from ..numerics import symbolic
+from ..run import expressions
+from .interface import Entry, derivatives, indicator, interface, states
+
+#: Namespace of the GUIDs, so that an interface of the same variables always has the same one.
+GUID_NAMESPACE = uuid.uuid5(uuid.NAMESPACE_URL, "urn:linkwork:fmi")
+
+AUTHOR = "The Linkwork developers"
+
+#: Categories of the log.
+LOG_CATEGORIES = ("Warning", "Discard", "Error", "Fatal")
+
+Attributes = Mapping[str, str]
+References = frozenset[int]
+
+
+class Kind(NamedTuple):
+    """A kind of FMU.
+
+    Attributes
+    ----------
+    fmi : int
+        Major version of FMI.
+    suffix : str
+        What its model identifier has after the name of the mechanism's FMU; its file name has it with hyphens.
+    tool : str
+        What makes it.
+    interfaces : mapping
+        Its interface types, each with its capability flags.
+    """
+
+    fmi: int
+    suffix: str
+    tool: str
+    interfaces: Mapping[str, Attributes]
+
+    @property
+    def native(self) -> bool:
+        """Whether it has the variables of `interface` and model exchange, not the mechanism's variables alone."""
+        return "ModelExchange" in self.interfaces
+
+    def identifier(self, mechanism: Mechanism) -> str:
+        """Model identifier."""
+        return f"{mechanism.fmu}{self.suffix}"
+
+    def file_name(self, mechanism: Mechanism) -> str:
+        """Name of the archive."""
+        return f"{self.identifier(mechanism).replace('_', '-')}.fmu"
+
+
+def _true(*flags: str) -> dict[str, str]:
+    return dict.fromkeys(flags, "true")
+
+
+_STEPS = {"needsExecutionTool": "false"} | _true("canHandleVariableCommunicationStepSize")
+_STATE_2 = {"canBeInstantiatedOnlyOncePerProcess": "false"} | _true(
+    "canNotUseMemoryManagementFunctions", "canGetAndSetFMUstate", "canSerializeFMUstate"
+)
+_NATIVE_2 = {"needsExecutionTool": "false"} | _STATE_2 | _true("providesDirectionalDerivative")
+_NATIVE_3 = {"needsExecutionTool": "false", "canBeInstantiatedOnlyOncePerProcess": "false"} | _true(
+    "canGetAndSetFMUState", "canSerializeFMUState", "providesDirectionalDerivatives", "providesAdjointDerivatives"
+)
+
+PYTHON = Kind(
+    2,
+    "",
+    f"PythonFMU {version('pythonfmu')}",
+    {"CoSimulation": _STEPS | {"canInterpolateInputs": "false"} | _STATE_2},
+)
+NATIVE = Kind(
+    2,
+    "_native",
+    f"Linkwork {linkwork.__version__}",
+    {
+        "ModelExchange": _NATIVE_2 | _true("completedIntegratorStepNotNeeded"),
+        "CoSimulation": _NATIVE_2 | _STEPS | _true("canInterpolateInputs") | {"maxOutputDerivativeOrder": "1"},
+    },
+)
+NATIVE_FMI3 = Kind(
+    3,
+    "_native_fmi3",
+    f"Linkwork {linkwork.__version__}",
+    {
+        "ModelExchange": _NATIVE_3
+        | {"needsCompletedIntegratorStep": "false", "providesEvaluateDiscreteStates": "false"},
+        "CoSimulation": _NATIVE_3
+        | _STEPS
+        | _true("providesIntermediateUpdate", "mightReturnEarlyFromDoStep", "canReturnEarlyAfterIntermediateUpdate")
+        | {"maxOutputDerivativeOrder": "1", "hasEventMode": "false", "providesEvaluateDiscreteStates": "false"},
+    },
+)
+KINDS = {"python": PYTHON, "native": NATIVE, "native-fmi3": NATIVE_FMI3}
+
+
+def token(mechanism: Mechanism, kind: Kind) -> str:
+    """GUID or instantiation token: it changes when a variable, its type, unit or start does, and only then."""
+    lines = [
+        "|".join((v.name, v.causality, v.kind, v.unit, repr(v.start), repr(v.minimum), repr(v.maximum)))
+        for v in (entry.variable for entry in _entries(mechanism, kind))
+    ]
+    return str(uuid.uuid5(GUID_NAMESPACE, "\n".join([kind.identifier(mechanism), *lines])))
+
+
+def description(mechanism: Mechanism, kind: Kind, sources: Sequence[str] = ()) -> bytes:
+    """``modelDescription.xml`` of an FMU.
+
+    The same mechanism gives the same bytes, but for the date of generation, which ``SOURCE_DATE_EPOCH`` sets.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+    kind : Kind
+    sources : sequence of str
+        Files to compile, below ``sources/`` of the archive; FMI 2.0 lists them here, FMI 3.0 in `build_description`.
+    """
+    entries = _entries(mechanism, kind)
+    root = Element(
+        "fmiModelDescription",
+        {
+            "fmiVersion": f"{kind.fmi}.0",
+            "modelName": mechanism.fmu,
+            "guid" if kind.fmi == 2 else "instantiationToken": token(mechanism, kind),
+            "generationTool": kind.tool,
+            "generationDateAndTime": _date(),
+            "variableNamingConvention": "structured",
+            "description": mechanism.description,
+            "author": AUTHOR,
+            "license": "MIT",
+            "version": linkwork.__version__,
+            "copyright": f"Copyright (c) 2026 {AUTHOR}",
+        },
+    )
+    if kind.native and kind.fmi == 2:
+        root.set("numberOfEventIndicators", "1")
+    for name, flags in kind.interfaces.items():
+        node = SubElement(root, name, {"modelIdentifier": kind.identifier(mechanism), **flags})
+        if sources and kind.fmi == 2:
+            listed = SubElement(node, "SourceFiles")
+            for source in sources:
+                SubElement(listed, "File", {"name": source})
+    root.append(_unit_definitions(entries))
+    if kind.native and mechanism.modes:
+        root.append(_type_definitions(mechanism, kind))
+    categories = SubElement(root, "LogCategories")
+    for status in LOG_CATEGORIES:
+        text = f"Log messages with fmi{kind.fmi}{status} status."
+        SubElement(categories, "Category", {"name": f"logStatus{status}", "description": text})
+    SubElement(categories, "Category", {"name": "logAll", "description": "Log all messages."})
+    names = ("startTime", "stopTime", "stepSize", "tolerance")
+    SubElement(root, "DefaultExperiment", dict(zip(names, map(repr, mechanism.experiment))))
+    root.append(_variables(mechanism, kind, entries))
+    root.append(_structure(mechanism, kind, entries))
+    return _written(root)
+
+
+def _entries(mechanism: Mechanism, kind: Kind) -> tuple[Entry, ...]:
+    entries = interface(mechanism)
+    return entries if kind.native else entries[: len(mechanism.variables)]
+
+
+def _date() -> str:
+    epoch = os.environ.get("SOURCE_DATE_EPOCH")
+    moment = datetime.now(UTC) if epoch is None else datetime.fromtimestamp(int(epoch), UTC)
+    return moment.isoformat(timespec="seconds")
+
+
+def _written(root: Element) -> bytes:
+    indent(root, "\t")
+    return f'<?xml version="1.0" encoding="UTF-8"?>\n{tostring(root, encoding="unicode")}\n'.encode()
+
+
+def _unit_definitions(entries: Iterable[Entry]) -> Element:
+    definitions = Element("UnitDefinitions")
+    for name in dict.fromkeys(entry.variable.unit for entry in entries if entry.variable.unit):
+        unit = UNITS[name]
+        node = SubElement(definitions, "Unit", {"name": name})
+        powers = {"kg": unit.kg, "m": unit.m, "s": unit.s, "rad": unit.rad}
+        SubElement(node, "BaseUnit", {base: str(power) for base, power in powers.items() if power})
+        for display, factor in unit.displays:
+            SubElement(node, "DisplayUnit", {"name": display, "factor": repr(factor)})
+    return definitions
+
+
+def _type_name(mode: Mode) -> str:
+    # no variable may have the name of a type
+    return "".join(part.capitalize() for part in mode.name.split("."))
+
+
+def _type_definitions(mechanism: Mechanism, kind: Kind) -> Element:
+    definitions = Element("TypeDefinitions")
+    for mode in mechanism.modes:
+        if kind.fmi == 2:
+            node = SubElement(SubElement(definitions, "SimpleType", {"name": _type_name(mode)}), "Enumeration")
+        else:
+            node = SubElement(definitions, "EnumerationType", {"name": _type_name(mode)})
+        for value, word in enumerate(mode.values):
+            SubElement(node, "Item", {"name": word, "value": str(value)})
+    return definitions
+
+
+#: Names of the types of variables in each version of FMI.
+_TYPES = {
+    2: {"Real": "Real", "Integer": "Integer", "String": "String"},
+    3: {"Real": "Float64", "Integer": "Int32", "String": "String"},
+}
+_VARIABILITY = {"parameter": "fixed"}
+# approx, not calculated: only so may an output carry the start value that people look for in the XML
+_INITIAL = {"parameter": "exact", "output": "approx", "local": "calculated"}
+
+
+def _variables(mechanism: Mechanism, kind: Kind, entries: Iterable[Entry]) -> Element:
+    modes = {mode.name: _type_name(mode) for mode in mechanism.modes} if kind.native else {}
+    starts = _outputs_at_start(mechanism)
+    reinitialised = _reinitialised(mechanism) if kind.native else ()
+    listed = Element("ModelVariables")
+    for entry in entries:
+        variable = entry.variable
+        attributes = {
+            "name": variable.name,
+            "valueReference": str(entry.reference),
+            "description": variable.description,
+            "causality": variable.causality,
+            "variability": _VARIABILITY.get(
+                variable.causality, "continuous" if variable.kind == "Real" else "discrete"
+            ),
+        }
+        if variable.causality in _INITIAL:
+            attributes["initial"] = _INITIAL[variable.causality]
+        value = _value(variable, starts.get(variable.name, variable.start))
+        if kind.native and entry.derivative_of is not None:
+            value["derivative"] = _number(kind, entry.derivative_of)
+        if entry.reference in reinitialised:
+            value["reinit"] = "true"
+        tag = _TYPES[kind.fmi][variable.kind]
+        if variable.name in modes:
+            tag = "Enumeration"
+            value["declaredType"] = modes[variable.name]
+        if kind.fmi == 2:
+            SubElement(SubElement(listed, "ScalarVariable", attributes), tag, value)
+            continue
+        if entry.role == "output":
+            attributes["intermediateUpdate"] = "true"
+        start = value.pop("start", None) if tag == "String" else None
+        node = SubElement(listed, tag, attributes | value)
+        if start is not None:
+            SubElement(node, "Start", {"value": start})
+    return listed
+
+
+def _value(variable: Variable, start: float | int | str) -> dict[str, str]:
+    """Attributes of a variable that are those of its type."""
+    kind = {"Real": float, "Integer": int, "String": str}[variable.kind]
+
+    def text(value: Any) -> str:
+        # 17 digits, for the same number to come back
+        return value if kind is str else repr(kind(value))
+
+    value = {}
+    if variable.causality not in ("local", "independent"):
+        value["start"] = text(start)
+    if variable.unit:
+        value["unit"] = variable.unit
+    if variable.display:
+        value["displayUnit"] = variable.display
+    for name, bound in (("min", variable.minimum), ("max", variable.maximum)):
+        if bound is not None:
+            value[name] = text(bound)
+    return value
+
+
+def _outputs_at_start(mechanism: Mechanism) -> dict[str, float]:
+    """The real outputs where all parameters and inputs have their start values."""
+    m = mechanism
+    values: dict[str, Any] = {v.name: v.start for v in m.variables}
+    plant = Plant(
+        m,
+        m.parameters(**{field_name(name): values[name] for name in m.mechanism_variables}),
+        m.initial(**{field: values[f"initial.{field}"] for field in m.initial_variables}),
+        tolerance=values["solver.tolerance"],
+        time=m.experiment[0],
+        inputs={name: values[name] for name in m.input_names},
+        **{field_name(mode.name): values[mode.name] for mode in m.modes},
+    )
+    return dict(zip(m.output_names, plant.outputs()))
+
+
+# Structure
+
+
+def _number(kind: Kind, reference: int) -> str:
+    """How the model structure and derivatives refer to a variable: by its index, in FMI 3.0 by its value reference."""
+    return str(reference + 1 if kind.fmi == 2 else reference)
+
+
+def _structure(mechanism: Mechanism, kind: Kind, entries: Sequence[Entry]) -> Element:
+    reference = {entry.variable.name: entry.reference for entry in entries}
+    outputs = [entry.reference for entry in entries if entry.role == "output"]
+    depends = _on_inputs(mechanism)
+    groups: list[tuple[str, Sequence[int]]] = [("Output", outputs)]
+    initial = outputs
+    if kind.native:
+        depends = {of: depends.get(of, frozenset()) | on for of, on in _traced_dependencies(mechanism).items()}
+        groups.append(("ContinuousStateDerivative" if kind.fmi == 3 else "Derivative", derivatives(mechanism)))
+        initial = sorted({*outputs, *states(mechanism), *derivatives(mechanism)})
+    at_start: dict[str, Iterable[int] | None] = {
+        "none": (),
+        "position": sorted(reference[name] for name in mechanism.position_parameters),
+    }
+    structure = Element("ModelStructure")
+
+    def add(group: str, references: Iterable[int], of: Mapping[int, Iterable[int] | None]) -> None:
+        # FMI 2.0 has each group in an element of its own
+        parent = structure if kind.fmi == 3 else SubElement(structure, f"{group}s")
+        for number in references:
+            name = "valueReference" if kind.fmi == 3 else "index"
+            node = SubElement(parent, group if kind.fmi == 3 else "Unknown", {name: _number(kind, number)})
+            on = of[number]
+            if on is not None:
+                node.set("dependencies", " ".join(_number(kind, known) for known in sorted(on)))
+
+    for group, references in groups:
+        add(group, references, depends)
+    add("InitialUnknown", initial, {n: at_start.get(entries[n].variable.level) for n in initial})
+    if kind.native and kind.fmi == 3:
+        add("EventIndicator", [indicator(mechanism)], depends)
+    return structure
+
+
+def _on_inputs(mechanism: Mechanism) -> dict[int, References]:
+    """Inputs that each output depends on, as the table states it, by value references."""
+    reference = {entry.variable.name: entry.reference for entry in interface(mechanism)}
+    inputs = {
+        "state": frozenset[int](),
+        "speed": frozenset(reference[c.name] for c in mechanism.channels if c.kind == "command"),
+        "all": frozenset(reference[name] for name in mechanism.input_names),
+    }
+    return {reference[v.name]: inputs[v.depends] for v in mechanism.variables if v.causality == "output"}
+
+
+@cache
+def _traced_dependencies(mechanism: Mechanism) -> dict[int, References]:
+    """What outputs, derivatives and the event indicator depend on by the equations, by value references.
+
+    On the states, and on the inputs: directly, and through the jump of a commanded rate.
+    """
+    casadi = symbolic.library()
+    traced = expressions(mechanism)
+    x, u = traced.symbols.x, traced.symbols.u
+    reference = {entry.variable.name: entry.reference for entry in interface(mechanism)}
+    known = [(x, states(mechanism)), (u, [reference[name] for name in mechanism.input_names])]
+    found: dict[int, set[int]] = {}
+    for column, unknowns in (
+        (traced.outputs, [reference[name] for name in mechanism.output_names]),
+        (traced.derivative, derivatives(mechanism)),
+        (traced.clearance, [indicator(mechanism)]),
+    ):
+        for on, references in known:
+            expression = column if on is x else casadi.substitute(column, x, traced.jump)
+            pattern = casadi.jacobian_sparsity(expression, on)
+            for row, col in zip(*pattern.get_triplet()):
+                found.setdefault(unknowns[row], set()).add(references[col])
+        for unknown in unknowns:
+            found.setdefault(unknown, set())
+    return {unknown: frozenset(on) for unknown, on in found.items()}
+
+
+def _reinitialised(mechanism: Mechanism) -> tuple[int, ...]:
+    """Value references of the states that a jump of a commanded rate changes."""
+    casadi = symbolic.library()
+    traced = expressions(mechanism)
+    before, after = casadi.vertsplit(traced.symbols.x), casadi.vertsplit(traced.jump)
+    return tuple(state for state, old, new in zip(states(mechanism), before, after) if not casadi.is_equal(old, new))
+
+
+# FMI 3.0
+
+
+def terminals(mechanism: Mechanism) -> bytes:
+    """``terminalsAndIcons.xml``: what belongs together at a shaft, a slider or a loaded point.
+
+    A terminal for each freedom, with coordinate, rate and acceleration, its inputs, and the torque or force applied; one for
+    the inputs of each point that a load acts on, with its displacement.
+    """
+    root = Element("fmiTerminalsAndIcons", {"fmiVersion": "3.0"})
+    listed = SubElement(root, "Terminals")
+    for name, (text, members) in _terminals(mechanism).items():
+        node = SubElement(listed, "Terminal", {"name": name, "matchingRule": "bus", "description": text})
+        for member, variable in members.items():
+            SubElement(
+                node,
+                "TerminalMemberVariable",
+                {"variableName": variable, "memberName": member, "variableKind": "signal"},
+            )
+    return _written(root)
+
+
+def _terminals(mechanism: Mechanism) -> dict[str, tuple[str, dict[str, str]]]:
+    """Terminals by name: the description, and variables by the name of the member."""
+    rate = {v.rate_of: v.name for v in mechanism.variables if v.rate_of}
+    found: dict[str, tuple[str, dict[str, str]]] = {}
+
+    def leaf(name: str) -> str:
+        return name.rpartition(".")[2]
+
+    def table(name: str) -> str:
+        return name.rpartition(".")[0]
+
+    def motion(of: str) -> dict[str, str]:
+        return {leaf(of): of} | (motion(rate[of]) if of in rate else {})
+
+    for number, freedom in enumerate(mechanism.freedoms):
+        members = motion(freedom.coordinate)
+        channels = [channel for channel in mechanism.channels if channel.freedom == number]
+        for channel in channels:
+            members[leaf(channel.name) if channel.kind == "force" else f"commanded_{leaf(channel.name)}"] = channel.name
+        applied = tuple({f"{table(channel.name)}.applied_" for channel in channels})
+        members |= {leaf(name): name for name in mechanism.output_names if name.startswith(applied)}
+        found[table(freedom.coordinate)] = (f"Motion of {freedom.coordinate} and what drives it", members)
+    for channel in mechanism.channels:
+        if channel.freedom < 0:
+            _, members = found.setdefault(table(channel.name), ("Load, and motion of the point that it acts on", {}))
+            members[leaf(channel.name)] = channel.name
+            members |= motion(channel.displacement) if channel.displacement else {}
+    return found
+
+
+def build_description(identifier: str, sources: Sequence[str]) -> bytes:
+    """``buildDescription.xml``: how to compile the files ``sources`` below ``sources/``, C11 with no options."""
+    root = Element("fmiBuildDescription", {"fmiVersion": "3.0"})
+    configuration = SubElement(root, "BuildConfiguration", {"modelIdentifier": identifier})
+    files = SubElement(configuration, "SourceFileSet", {"language": "C11"})
+    for source in sources:
+        SubElement(files, "SourceFile", {"name": source})
+    return _written(root)
