@@ -1,0 +1,65 @@
+"""Model descriptions of either version of FMI as the tests read them."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+from xml.etree import ElementTree
+from xml.etree.ElementTree import Element
+
+#: Types and parts of the model structure of FMI 2.0 as FMI 3.0 calls them, and the other way about.
+_TYPES = {"Float64": "Real", "Int32": "Integer"}
+_PARTS = {"Output": "Outputs", "ContinuousStateDerivative": "Derivatives", "InitialUnknown": "InitialUnknowns"}
+
+
+class Scalar(NamedTuple):
+    """A variable; ``kind`` is its type as FMI 2.0 calls it, ``attributes`` are all of it and its type."""
+
+    name: str
+    reference: int
+    kind: str
+    attributes: dict[str, str]
+
+
+def root_of(xml: bytes | Element) -> Element:
+    """The root of an XML document."""
+    return xml if isinstance(xml, Element) else ElementTree.fromstring(xml)
+
+
+def read_scalars(xml: bytes | Element) -> list[Scalar]:
+    """The variables, in their order."""
+    found = []
+    for node in root_of(xml).find("ModelVariables"):
+        if node.tag == "ScalarVariable":
+            kind, attributes = node[0].tag, node.attrib | node[0].attrib
+        else:
+            start = node.find("Start")
+            kind, attributes = (
+                _TYPES.get(node.tag, node.tag),
+                node.attrib | ({} if start is None else {"start": start.get("value")}),
+            )
+        found.append(Scalar(node.get("name"), int(node.get("valueReference")), kind, attributes))
+    return found
+
+
+def read_unknowns(xml: bytes | Element, part: str) -> dict[str, set[str] | None]:
+    """Names of what each unknown of a part of the model structure depends on; None where it may be all.
+
+    ``part`` is the name of its elements in FMI 3.0.
+    """
+    root = root_of(xml)
+    scalars = read_scalars(root)
+    structure = root.find("ModelStructure")
+    if root.get("fmiVersion") == "2.0":
+        key, names = "index", {n + 1: scalar.name for n, scalar in enumerate(scalars)}
+        listed = structure.find(_PARTS[part]) if part in _PARTS else None
+        nodes = [] if listed is None else list(listed)
+    else:
+        key, names = "valueReference", {scalar.reference: scalar.name for scalar in scalars}
+        nodes = structure.findall(part)
+    found: dict[str, set[str] | None] = {}
+    for node in nodes:
+        on = node.get("dependencies")
+        name = names[int(node.get(key))]
+        assert name not in found, f"{name} is listed twice in {part}"
+        found[name] = None if on is None else {names[int(known)] for known in on.split()}
+    return found
