@@ -366,6 +366,10 @@ def swapped(mechanism: Mechanism, name: str, **changes: Any) -> tuple[Any, ...]:
 FAULTS: dict[str, tuple[str, Any, str]] = {
     "unit": ("variables", swapped(ROTOR, "cart.position", unit="metre"), "cart.position has the unit 'metre'"),
     "causality": ("variables", swapped(ROTOR, "cart.position", causality="out"), "the causality 'out'"),
+    "local": ("variables", swapped(ROTOR, "cart.position", causality="local"), "must be parameter or input or output"),
+    "status": ("variables", swapped(ROTOR, "solver.status", causality="output"), "'output': it must be local"),
+    "rate of nothing": ("variables", swapped(ROTOR, "cart.acceleration", rate_of="cart.speed"), "rate of 'cart.speed'"),
+    "rate of a freedom": ("variables", swapped(ROTOR, "cart.velocity", rate_of=""), "must be that of cart.position"),
     "depends": ("variables", swapped(ROTOR, "cart.position", depends="stat"), "depends on 'stat'"),
     "output left out": (
         "variables",

@@ -10,9 +10,10 @@ from xml.etree.ElementTree import Element
 
 import pytest
 
+from .described import read_unknowns
 from .models import MODES, Model, each
 from .runner import run_in_process
-from .test_description import INPUTS, ROWS, unknowns
+from .test_description import INPUTS, ROWS
 
 # nothing zero and nothing aligned, so that no dependency hides
 MECHANISMS = {
@@ -139,7 +140,7 @@ def changed(fmus: dict[str, Path], tmp_path_factory: pytest.TempPathFactory) -> 
 def test_outputs_that_change_at_once_are_those_declared(
     description: Element, changed: Changed, model: Model, name: str
 ) -> None:
-    declared = {output for output, on in unknowns(description, "Outputs").items() if name in on}
+    declared = {output for output, on in read_unknowns(description, "Output").items() if name in on}
     # the one dependency declared to be safe that there is not: the acceleration is commanded apart from the speed
     never = {"drive.speed": {"crank.acceleration"}, "axial.speed": {"shift.acceleration"}}.get(name, set())
     assert {
@@ -179,7 +180,7 @@ MOVED = {
 def test_outputs_at_the_start_change_only_with_what_they_declare(
     description: Element, fmu: Path, model: Model, tmp_path: Path
 ) -> None:
-    declared = unknowns(description, "InitialUnknowns")
+    declared = read_unknowns(description, "InitialUnknown")
     found = run_in_process(perturb_start, fmu, tmp_path, MECHANISMS[model.name], list(MODES[model.name].values()))
     rows = ROWS[model.name]
     assert set(found) == {name for name, causality, kind, *_ in rows if causality != "output" and kind == "Real"}

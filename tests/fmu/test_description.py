@@ -2,16 +2,31 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from math import pi
 from pathlib import Path
 from xml.etree.ElementTree import Element
 
+import fmpy
 import pytest
+from fmpy.model_description import read_build_description, read_model_description
 from fmpy.validation import validate_fmu
+from lxml import etree
 
 import linkwork
+from analysis.export import description as writer
+from analysis.mechanisms import FIVE_BAR, MECHANISMS, SLIDER_CRANK
+from build_fmu import FMUS
+from linkwork.mechanism import Mechanism
 
+from ..mechanisms import pendulum, rotor_on_cart
+from .conftest import model_description
+from .described import Scalar, read_scalars, read_unknowns, root_of
 from .models import MODELS, Model, each
+
+KINDS = writer.KINDS
+#: Those that the tests have of their own, as well.
+EVERY = {m.fmu: m for m in (*MECHANISMS.values(), pendulum.MECHANISM, rotor_on_cart.MECHANISM)}
 
 # The contracts, written out: name, causality, type, unit, start; a "?" is an output whose start follows from the others.
 CONTRACTS = {}
@@ -190,6 +205,9 @@ solver.message              local     String  -      -
 """
 ROWS = {model: [tuple(line.split()) for line in contract.split("\n") if line] for model, contract in CONTRACTS.items()}
 
+#: What native FMUs have beside them.
+ADDED = ("time", "power.dissipated", "power.supplied", "assembly.margin_to_limit")
+
 #: Exponents of kg, m, s and rad; the other base units of SI do not occur.
 UNITS = {
     "1": (0, 0, 0, 0),
@@ -206,6 +224,8 @@ UNITS = {
     "N/m": (1, 0, -2, 0),
     "N.s/m": (1, 0, -1, 0),
     "J": (1, 2, -2, 0),
+    "s": (0, 0, 1, 0),
+    "W": (1, 2, -3, 0),
 }
 
 #: Bounds of what every model has, and of what one has.
@@ -256,54 +276,139 @@ DEPENDENCIES = {
 }
 
 
-def scalars(description: Element) -> dict[str, Element]:
-    return {node.get("name"): node for node in description.find("ModelVariables")}
+@pytest.fixture(params=list(KINDS))
+def kind(request: pytest.FixtureRequest) -> str:
+    """Each kind of FMU in turn."""
+    return request.param
+
+
+@pytest.fixture(scope="module")
+def roots(fmus: dict[str, Path]) -> dict[tuple[str, str], Element]:
+    """Model descriptions by model and kind: that inside the Python FMU, and what the writer makes for the native ones."""
+    return {
+        (model, kind): model_description(fmus[model])
+        if kind == "python"
+        else root_of(writer.description(FMUS[model], KINDS[kind], ["all.c"]))
+        for model in MODELS
+        for kind in KINDS
+    }
+
+
+@pytest.fixture
+def description(roots: dict[tuple[str, str], Element], model: Model, kind: str) -> Element:
+    """Root of the model description of a model as a kind of FMU."""
+    return roots[model.name, kind]
+
+
+def scalars(description: Element) -> dict[str, Scalar]:
+    """The variables by name."""
+    return {scalar.name: scalar for scalar in read_scalars(description)}
 
 
 def test_validator_finds_nothing(fmu: Path) -> None:
     assert validate_fmu(str(fmu)) == []
 
 
-def test_variables_are_those_of_the_contract_in_its_order(description: Element, model: Model) -> None:
-    assert list(scalars(description)) == [row[0] for row in ROWS[model.name]]
+def written(mechanism: Mechanism, kind: str, folder: Path) -> Path:
+    """All descriptions of an FMU in ``folder``, as in an unpacked archive."""
+    xml = {"modelDescription.xml": writer.description(mechanism, KINDS[kind], ["all.c"])}
+    if KINDS[kind].fmi == 3:
+        identifier = KINDS[kind].identifier(mechanism)
+        xml["sources/buildDescription.xml"] = writer.build_description(identifier, ["all.c", "equations.c"])
+        xml["terminalsAndIcons/terminalsAndIcons.xml"] = writer.terminals(mechanism)
+    for name, text in xml.items():
+        (folder / name).parent.mkdir(exist_ok=True)
+        (folder / name).write_bytes(text)
+    return folder
+
+
+@pytest.mark.parametrize("mechanism", EVERY.values(), ids=list(EVERY))
+def test_validator_finds_nothing_in_what_is_written(mechanism: Mechanism, kind: str, tmp_path: Path) -> None:
+    assert validate_fmu(str(written(mechanism, kind, tmp_path))) == []
+    read = read_model_description(tmp_path)
+    assert len(read.derivatives) == (0 if kind == "python" else mechanism.size)
+    assert read.numberOfContinuousStates == len(read.derivatives)
+
+
+def test_what_is_written_is_the_same_each_time(
+    model: Model, kind: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("SOURCE_DATE_EPOCH", "1700000000")
+    first, second = (writer.description(FMUS[model.name], KINDS[kind]) for _ in range(2))
+    assert first == second
+    assert b'generationDateAndTime="2023-11-14T22:13:20+00:00"' in first
+
+
+def test_variables_are_those_of_the_contract_in_its_order(description: Element, model: Model, kind: str) -> None:
+    added = () if kind == "python" else ADDED
+    found = scalars(description)
+    assert list(found) == [*(row[0] for row in ROWS[model.name]), *added]
+    assert [scalar.reference for scalar in found.values()] == list(range(len(found)))
 
 
 @each(
-    {model: {row[0]: row for row in rows} for model, rows in ROWS.items()}, "name", "causality", "kind", "unit", "start"
+    {model: {row[0]: row for row in rows} for model, rows in ROWS.items()},
+    "name",
+    "causality",
+    "type_name",
+    "unit",
+    "start",
 )
 def test_variable(
-    description: Element, model: Model, name: str, causality: str, kind: str, unit: str, start: str
+    description: Element, model: Model, kind: str, name: str, causality: str, type_name: str, unit: str, start: str
 ) -> None:
-    node = scalars(description)[name]
-    value = node[0]
-    assert node.get("causality") == causality
-    assert value.tag == kind
-    assert node.get("variability") == {"parameter": "fixed"}.get(
-        causality, "continuous" if kind == "Real" else "discrete"
+    scalar = scalars(description)[name]
+    value = scalar.attributes
+    assert value["causality"] == causality
+    mode = name in ("drive.mode", "axial.mode") and kind != "python"
+    assert scalar.kind == ("Enumeration" if mode else type_name)
+    assert value["variability"] == {"parameter": "fixed"}.get(
+        causality, "continuous" if type_name == "Real" else "discrete"
     )
-    assert len(node.get("description")) > 8
+    assert value.get("initial") == {"parameter": "exact", "output": "approx", "local": "calculated"}.get(causality)
+    assert len(value["description"]) > 8
     assert value.get("unit", "-") == unit
-    if causality == "local":
-        assert value.get("start") is None
+    if start == "-":
+        assert "start" not in value
     elif start == "?":
-        assert float(value.get("start")) != 0.0
+        assert float(value["start"]) != 0.0
     else:
         # forces are sums of greater ones, to whose rounding they are zero
         zero = 1e-13 if unit == "N" else 1e-15
-        assert float(value.get("start")) == pytest.approx(float(start), rel=1e-9, abs=zero)
+        assert float(value["start"]) == pytest.approx(float(start), rel=1e-9, abs=zero)
     signed = causality != "parameter" or "product" in name or unit not in NOT_NEGATIVE
     low, high = (COMMON_BOUNDS | BOUNDS[model.name]).get(name, (None if signed else 0.0, None))
     for bound, expected in (("min", low), ("max", high)):
         given = value.get(bound)
         assert (None if given is None else float(given)) == expected
-        if given is not None and causality != "local":
-            assert (float(value.get("start")) - float(given)) * (1 if bound == "min" else -1) >= 0.0
+        if given is not None and start != "-":
+            assert (float(value["start"]) - float(given)) * (1 if bound == "min" else -1) >= 0.0
     # shafts turn in rpm; the rod's angular velocity is a vector in space
     display = None if name.startswith("rod.w") else {"rad": "deg", "rad/s": "rpm"}.get(unit)
     assert value.get("displayUnit") == display
 
 
-def test_unit_definitions(description: Element, model: Model) -> None:
+#: Words of the values of each mode.
+WORDS = {"drive.mode": ["torque", "speed"], "axial.mode": ["force", "speed", "groove"]}
+
+
+@pytest.mark.parametrize("kind", ["native", "native-fmi3"], indirect=True)
+def test_modes_are_enumerations_in_native_fmus(description: Element, model: Model, kind: str) -> None:
+    types = {}
+    for node in description.find("TypeDefinitions"):
+        items = node[0] if KINDS[kind].fmi == 2 else node
+        assert items.tag == {2: "Enumeration", 3: "EnumerationType"}[KINDS[kind].fmi]
+        types[node.get("name")] = [(item.get("name"), item.get("value")) for item in items]
+    modes = [s for s in read_scalars(description) if s.kind == "Enumeration"]
+    assert [s.name for s in modes] == [mode.name for mode in FMUS[model.name].modes]
+    assert len(types) == len(modes)
+    assert not set(types) & set(scalars(description)), "a type and a variable of one name"
+    for scalar in modes:
+        items = types[scalar.attributes["declaredType"]]
+        assert items == [(word, str(value)) for value, word in enumerate(WORDS[scalar.name])]
+
+
+def test_unit_definitions(description: Element, model: Model, kind: str) -> None:
     defined = {}
     displays = {}
     for node in description.find("UnitDefinitions"):
@@ -312,34 +417,51 @@ def test_unit_definitions(description: Element, model: Model) -> None:
         defined[node.get("name")] = tuple(int(base.get(name, 0)) for name in ("kg", "m", "s", "rad"))
         displays |= {(node.get("name"), d.get("name")): float(d.get("factor")) for d in node.findall("DisplayUnit")}
     # those that its variables use, and no others
-    assert defined == {unit: UNITS[unit] for unit in {row[3] for row in ROWS[model.name]} - {"-"}}
+    added = set() if kind == "python" else {"s", "W"}
+    assert defined == {unit: UNITS[unit] for unit in {row[3] for row in ROWS[model.name]} - {"-"} | added}
     assert displays["rad", "deg"] == pytest.approx(57.29577951308232, rel=1e-15)
     assert displays["rad/s", "rpm"] == pytest.approx(9.549296585513721, rel=1e-15)
     assert displays["m", "mm"] == 1000.0
 
 
-def unknowns(description: Element, part: str) -> dict[str, set[str] | None]:
-    """Names an unknown depends on; None where all are meant."""
-    names = list(scalars(description))
-    found = {}
-    for node in description.find("ModelStructure").find(part):
-        listed = node.get("dependencies")
-        found[names[int(node.get("index")) - 1]] = (
-            None if listed is None else {names[int(i) - 1] for i in listed.split()}
-        )
-    return found
-
-
 def test_output_dependencies(description: Element, model: Model) -> None:
+    """Of inputs; `test_interface` has those of states."""
     outputs = [row[0] for row in ROWS[model.name] if row[1] == "output"]
-    declared = unknowns(description, "Outputs")
+    declared = read_unknowns(description, "Output")
     assert list(declared) == outputs
-    assert declared == {name: DEPENDENCIES[model.name].get(name, INPUTS[model.name]) for name in outputs}
+    assert {name: on & INPUTS[model.name] for name, on in declared.items()} == {
+        name: DEPENDENCIES[model.name].get(name, INPUTS[model.name]) for name in outputs
+    }
 
 
-def test_initial_unknowns_are_all_outputs(description: Element, model: Model) -> None:
-    initial = unknowns(description, "InitialUnknowns")
-    assert list(initial) == [row[0] for row in ROWS[model.name] if row[1] == "output"]
+#: The states that are no outputs, and the derivatives.
+DERIVATIVES = {
+    "FiveBarSlider": ["crank.speed", "slider.velocity", "crank.acceleration", "slider.acceleration"],
+    "SliderCrank": ["crank.speed", "shift.velocity", "crank.acceleration", "shift.acceleration"],
+}
+
+
+def test_derivatives_of_the_state_are_those_of_native_fmus(description: Element, model: Model, kind: str) -> None:
+    expected = [] if kind == "python" else [*DERIVATIVES[model.name], "power.dissipated", "power.supplied"]
+    assert list(read_unknowns(description, "ContinuousStateDerivative")) == expected
+    number = {s.name: s.reference + (KINDS[kind].fmi == 2) for s in read_scalars(description)}
+    derivative = {s.name: s.attributes.get("derivative") for s in read_scalars(description)}
+    pairs = {"crank.speed": "crank.angle", "slider.acceleration": "slider.velocity"}
+    pairs |= {} if kind == "python" else {"power.supplied": "energy.supplied"}
+    for name, of in pairs.items():
+        assert derivative[name] == (None if kind == "python" else str(number[of]))
+
+
+def test_event_indicator(description: Element, kind: str) -> None:
+    listed = read_unknowns(description, "EventIndicator")
+    assert list(listed) == (["assembly.margin_to_limit"] if kind == "native-fmi3" else [])
+    assert description.get("numberOfEventIndicators") == ("1" if kind == "native" else None)
+
+
+def test_initial_unknowns_are_all_outputs_and_derivatives(description: Element, model: Model, kind: str) -> None:
+    initial = read_unknowns(description, "InitialUnknown")
+    powers = [] if kind == "python" else ["power.dissipated", "power.supplied"]
+    assert list(initial) == [*(row[0] for row in ROWS[model.name] if row[1] == "output"), *powers]
     assert initial["crank.acceleration"] is None
     assert "initial.crank_angle" in initial["crank.angle"]
     assert "crank.mass" not in initial["crank.angle"]
@@ -347,25 +469,47 @@ def test_initial_unknowns_are_all_outputs(description: Element, model: Model) ->
 
 #: Stop time and step of the default experiment: three turns at 420 rpm, two at 50 rpm.
 EXPERIMENTS = {"FiveBarSlider": (3 / 7, 1e-3), "SliderCrank": (2 * 60 / 50, 5e-3)}
+_STATE_2 = {"canGetAndSetFMUstate", "canSerializeFMUstate", "canNotUseMemoryManagementFunctions"}
+_STATE_3 = {
+    *("canGetAndSetFMUState", "canSerializeFMUState"),
+    *("providesDirectionalDerivatives", "providesAdjointDerivatives"),
+}
+#: Of each kind, what each interface can do.
+CAPABILITIES = {
+    "python": {"CoSimulation": _STATE_2 | {"canHandleVariableCommunicationStepSize"}},
+    "native": {
+        "ModelExchange": _STATE_2 | {"providesDirectionalDerivative", "completedIntegratorStepNotNeeded"},
+        "CoSimulation": _STATE_2
+        | {"providesDirectionalDerivative", "canHandleVariableCommunicationStepSize", "canInterpolateInputs"},
+    },
+    "native-fmi3": {
+        "ModelExchange": _STATE_3,
+        "CoSimulation": _STATE_3
+        | {"canHandleVariableCommunicationStepSize", "providesIntermediateUpdate"}
+        | {"mightReturnEarlyFromDoStep", "canReturnEarlyAfterIntermediateUpdate"},
+    },
+}
+SUFFIXES = {"python": "", "native": "_native", "native-fmi3": "_native_fmi3"}
 
 
-def test_experiment_and_capabilities(description: Element, model: Model) -> None:
+def test_experiment_and_capabilities(description: Element, model: Model, kind: str) -> None:
     experiment = {name: float(value) for name, value in description.find("DefaultExperiment").attrib.items()}
     stop, step = EXPERIMENTS[model.name]
     assert experiment == {"startTime": 0.0, "stopTime": pytest.approx(stop), "stepSize": step, "tolerance": 1e-9}
-    flags = dict(description.find("CoSimulation").attrib)
-    assert flags.pop("modelIdentifier") == model.name
-    assert {name for name, value in flags.items() if value == "true"} == {
-        "canHandleVariableCommunicationStepSize",
-        "canGetAndSetFMUstate",
-        "canSerializeFMUstate",
-        "canNotUseMemoryManagementFunctions",
-    }
-    assert flags["needsExecutionTool"] == "false"
+    interfaces = {node.tag: node for node in description if node.get("modelIdentifier")}
+    assert list(interfaces) == list(CAPABILITIES[kind])
+    for name, node in interfaces.items():
+        flags = dict(node.attrib)
+        assert flags.pop("modelIdentifier") == model.name + SUFFIXES[kind]
+        assert {flag for flag, value in flags.items() if value == "true"} == CAPABILITIES[kind][name]
+        assert flags["needsExecutionTool"] == flags["canBeInstantiatedOnlyOncePerProcess"] == "false"
+        native_steps = name == "CoSimulation" and kind != "python"
+        assert flags.get("maxOutputDerivativeOrder") == ("1" if native_steps else None)
+        assert [file.get("name") for file in node.iter("File")] == (["all.c"] if kind == "native" else [])
 
 
-def test_who_made_it(description: Element, model: Model) -> None:
-    assert description.get("fmiVersion") == "2.0"
+def test_who_made_it(description: Element, model: Model, kind: str) -> None:
+    assert description.get("fmiVersion") == ("3.0" if kind == "native-fmi3" else "2.0")
     assert description.get("modelName") == model.name
     assert description.get("author") == "The Linkwork developers"
     assert description.get("license") == "MIT"
@@ -373,3 +517,85 @@ def test_who_made_it(description: Element, model: Model) -> None:
     assert "The Linkwork developers" in description.get("copyright")
     assert "slider" in description.get("description")
     assert description.get("variableNamingConvention") == "structured"
+    assert description.get("generationTool").split()[0] == ("PythonFMU" if kind == "python" else "Linkwork")
+
+
+def test_names_and_tokens_of_all_kinds_differ(roots: dict[tuple[str, str], Element]) -> None:
+    tokens = {root.get("guid") or root.get("instantiationToken") for root in roots.values()}
+    assert len(tokens - {None}) == len(roots)
+    assert [kind.file_name(FIVE_BAR) for kind in KINDS.values()] == [
+        "FiveBarSlider.fmu",
+        "FiveBarSlider-native.fmu",
+        "FiveBarSlider-native-fmi3.fmu",
+    ]
+
+
+def test_intermediate_values_are_those_of_outputs(roots: dict[tuple[str, str], Element], model: Model) -> None:
+    found = read_scalars(roots[model.name, "native-fmi3"])
+    assert [s.name for s in found if s.attributes.get("intermediateUpdate") == "true"] == [
+        row[0] for row in ROWS[model.name] if row[1] == "output"
+    ]
+
+
+CRANK = {
+    **{name: f"crank.{name}" for name in ("angle", "speed", "acceleration")},
+    **{"torque": "drive.torque", "applied_torque": "drive.applied_torque"},
+    **{f"commanded_{name}": f"drive.{name}" for name in ("speed", "acceleration")},
+}
+MOTION = ("position", "velocity", "acceleration")
+#: Members of the terminals of each mechanism.
+TERMINALS = {
+    "FiveBarSlider": {
+        "crank": CRANK,
+        "slider": {**{name: f"slider.{name}" for name in MOTION}, "force": "slider.force"},
+        "load": {"fx": "load.fx", "fy": "load.fy", "x": "coupler.point.x", "y": "coupler.point.y"},
+    },
+    "SliderCrank": {
+        "crank": CRANK,
+        "shift": {
+            **{name: f"shift.{name}" for name in MOTION},
+            **{"force": "axial.force", "applied_force": "axial.applied_force"},
+            **{f"commanded_{name}": f"axial.{name}" for name in ("speed", "acceleration")},
+        },
+        "slider": {**{name: f"slider.{name}" for name in MOTION}, "load": "slider.load"},
+    },
+}
+
+
+def members(xml: bytes) -> Iterator[tuple[str, str, str]]:
+    for terminal in root_of(xml).find("Terminals"):
+        for member in terminal:
+            yield terminal.get("name"), member.get("memberName"), member.get("variableName")
+
+
+def test_terminals_gather_what_is_connected_together(model: Model) -> None:
+    found: dict[str, dict[str, str]] = {}
+    for terminal, member, variable in members(writer.terminals(FMUS[model.name])):
+        found.setdefault(terminal, {})[member] = variable
+    assert found == TERMINALS[model.name]
+
+
+#: The schema of each further file of FMI 3.0.
+SCHEMAS = {
+    "terminalsAndIcons/terminalsAndIcons.xml": "fmi3TerminalsAndIcons.xsd",
+    "sources/buildDescription.xml": "fmi3BuildDescription.xsd",
+}
+
+
+@pytest.mark.parametrize("name", SCHEMAS)
+@pytest.mark.parametrize("mechanism", EVERY.values(), ids=list(EVERY))
+def test_further_files_of_fmi_3_follow_their_schemas(mechanism: Mechanism, name: str, tmp_path: Path) -> None:
+    folder = written(mechanism, "native-fmi3", tmp_path)
+    schema = etree.XMLSchema(file=str(Path(fmpy.__file__).parent / "schema" / "fmi3" / SCHEMAS[name]))
+    schema.assertValid(etree.parse(str(folder / name)))
+    variables = set(scalars(root_of((folder / "modelDescription.xml").read_bytes())))
+    for _, _, variable in members(writer.terminals(mechanism)):
+        assert variable in variables
+
+
+def test_build_description(tmp_path: Path) -> None:
+    written(SLIDER_CRANK, "native-fmi3", tmp_path)
+    (configuration,) = read_build_description(tmp_path)
+    assert configuration.modelIdentifier == "SliderCrank_native_fmi3"
+    (files,) = configuration.sourceFileSets
+    assert (files.language, files.sourceFiles) == ("C11", ["all.c", "equations.c"])
