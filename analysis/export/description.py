@@ -321,7 +321,7 @@ def _structure(mechanism: Mechanism, kind: Kind, entries: Sequence[Entry]) -> El
     groups: list[tuple[str, Sequence[int]]] = [("Output", outputs)]
     initial = outputs
     if kind.native:
-        depends = {of: depends.get(of, frozenset()) | on for of, on in _traced_dependencies(mechanism).items()}
+        depends = {of: depends.get(of, frozenset()) | on for of, on in traced_dependencies(mechanism).items()}
         groups.append(("ContinuousStateDerivative" if kind.fmi == 3 else "Derivative", derivatives(mechanism)))
         initial = sorted({*outputs, *states(mechanism), *derivatives(mechanism)})
     at_start: dict[str, Iterable[int] | None] = {
@@ -360,7 +360,7 @@ def _on_inputs(mechanism: Mechanism) -> dict[int, References]:
 
 
 @cache
-def _traced_dependencies(mechanism: Mechanism) -> dict[int, References]:
+def traced_dependencies(mechanism: Mechanism) -> dict[int, References]:
     """What outputs, derivatives and the event indicator depend on by the equations, by value references.
 
     On the states, and on the inputs: directly, and through the jump of a commanded rate.

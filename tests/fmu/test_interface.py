@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from analysis.export.description import NATIVE, NATIVE_FMI3, PYTHON, Kind, description
+from analysis.export.description import NATIVE, NATIVE_FMI3, PYTHON, Kind, description, traced_dependencies
 from analysis.export.interface import derivatives, indicator, interface, states
 from analysis.mechanisms import FIVE_BAR, SLIDER_CRANK
 from linkwork.limits import LIMIT_SINE
@@ -241,8 +241,17 @@ def test_dependencies_are_those_of_the_equations(mechanism: Mechanism, kind: Kin
     inputs = set(mechanism.input_names)
     for unknown, on in seen.items():
         assert on <= declared[unknown], unknown
-        # the inputs are those of the contract, which a test of the running FMU holds to be what changes
+        # of the inputs declared some are multiplied by modes that exclude one another
         assert declared[unknown] - inputs == on - inputs, unknown
+
+
+def test_the_table_states_the_dependencies_of_the_equations(mechanism: Mechanism) -> None:
+    """On inputs: what `Variable.depends` says is what the traced equations have, by the jumps as well."""
+    declared = read_unknowns(description(mechanism, PYTHON), "Output")
+    reference = {entry.variable.name: entry.reference for entry in interface(mechanism)}
+    traced = traced_dependencies(mechanism)
+    for name, on in declared.items():
+        assert {reference[known] for known in on} == traced[reference[name]] - set(states(mechanism)), name
 
 
 def test_only_states_that_jump_are_reinitialised(mechanism: Mechanism) -> None:
