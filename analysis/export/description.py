@@ -183,7 +183,7 @@ def _entries(mechanism: Mechanism, kind: Kind) -> tuple[Entry, ...]:
 def _date() -> str:
     epoch = os.environ.get("SOURCE_DATE_EPOCH")
     moment = datetime.now(UTC) if epoch is None else datetime.fromtimestamp(int(epoch), UTC)
-    return moment.isoformat(timespec="seconds")
+    return moment.strftime("%Y-%m-%dT%H:%M:%SZ")
 
 
 def _written(root: Element) -> bytes:
