@@ -1,0 +1,694 @@
+#include "instance.h"
+
+#include <math.h>
+#include <stdarg.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* Life */
+
+static char *copy(const char *text)
+{
+    char *result = malloc(strlen(text) + 1);
+    return result ? strcpy(result, text) : NULL;
+}
+
+Instance *instance_new(const char *name, const char *token, Interface interface, bool logging, void *environment,
+                       void (*log)(const Instance *, Status, const char *, const char *), void (*logger)(void))
+{
+    Instance *c = calloc(1, sizeof *c);
+    if (!c)
+        return NULL;
+    c->interface = interface;
+    c->logging = logging;
+    c->environment = environment;
+    c->log = log;
+    c->logger = logger;
+    c->name = copy(name ? name : "");
+    c->text = calloc(1, SENTENCE);
+    bool good = c->name && c->text;
+    if (good && c->name[0] == 0) {
+        instance_say(c, ERROR, "an instance must have a name");
+        good = false;
+    }
+    if (good && (!token || strcmp(token, TOKEN) != 0)) {
+        instance_say(c, ERROR, "the GUID or token is %s: that of this FMU is %s", token ? token : "missing", TOKEN);
+        good = false;
+    }
+    if (!good) {
+        instance_free(c);
+        return NULL;
+    }
+    instance_reset(c);
+    return c;
+}
+
+void instance_free(Instance *c)
+{
+    if (!c)
+        return;
+    free(c->name);
+    free(c->text);
+    free(c);
+}
+
+void instance_reset(Instance *c)
+{
+    c->s = (Saved){.phase = INSTANTIATED};
+    plant_reset(&c->s.plant);
+    c->stale = true;
+    c->stopped = false;
+}
+
+static const char *phase_name(int phase)
+{
+    switch (phase) {
+    case INSTANTIATED: return "before the initialisation";
+    case INITIALIZATION: return "in initialisation mode";
+    case EVENT: return "in event mode";
+    case CONTINUOUS: return "in continuous-time mode";
+    case STEP: return "in step mode";
+    case INTERMEDIATE: return "during an intermediate update";
+    default: return "after termination";
+    }
+}
+
+bool instance_allows(Instance *c, const char *function, int phases)
+{
+    if (!c)
+        return false;
+    if ((int)c->s.phase & phases)
+        return true;
+    instance_say(c, ERROR, "%s: not allowed %s", function, phase_name((int)c->s.phase));
+    return false;
+}
+
+Status instance_say(const Instance *c, Status status, const char *format, ...)
+{
+    static const char *const categories[] = {"logAll", "logStatusWarning", "logStatusDiscard", "logStatusError"};
+    char sentence[2 * SENTENCE];
+    va_list arguments;
+    va_start(arguments, format);
+    vsnprintf(sentence, sizeof sentence, format, arguments);
+    va_end(arguments);
+    if (c->logging || status == ERROR) /* an error is worth a sentence whether or not debugging was asked for */
+        c->log(c, status, categories[status], sentence);
+    return status;
+}
+
+/* Keep a reason for solver.status and solver.message. */
+static void note(Instance *c, Reason reason, const char *sentence)
+{
+    c->s.reason = reason;
+    snprintf(c->s.message, SENTENCE, "%s", sentence);
+}
+
+static void forget(Instance *c)
+{
+    note(c, GOOD, "");
+    c->s.cause = GOOD;
+    c->s.cause_message[0] = 0;
+}
+
+Status instance_setup(Instance *c, bool tolerance_given, double tolerance, double start)
+{
+    Digits number;
+    if (!isfinite(start))
+        return instance_say(c, ERROR, "the time at the start is %s s: it must be a finite number", digits(number, start));
+    if (tolerance_given && !(isfinite(tolerance) && tolerance > 0.0))
+        return instance_say(c, ERROR, "the tolerance is %s: it must be greater than zero", digits(number, tolerance));
+    c->s.plant.start_time = start;
+    c->s.plant.time = start;
+    c->s.plant.master_tolerance = tolerance_given ? tolerance : 0.0;
+    c->s.plant.begun = 0.0;
+    c->stale = true;
+    return OK;
+}
+
+static Reason refresh(Instance *c, char sentence[SENTENCE])
+{
+    Reason reason = GOOD;
+    if (!c->stale)
+        return GOOD;
+    if (c->s.plant.begun == 0.0)
+        reason = plant_begin(&c->s.plant, sentence);
+    if (reason == GOOD)
+        reason = plant_outputs(&c->s.plant, sentence);
+    c->stale = reason != GOOD;
+    return reason;
+}
+
+Status instance_exit_initialization(Instance *c)
+{
+    char sentence[SENTENCE];
+    c->stale = true;
+    Reason reason = refresh(c, sentence);
+    if (reason != GOOD) {
+        note(c, reason, sentence);
+        return instance_say(c, ERROR, "%s", sentence);
+    }
+    forget(c);
+    c->s.phase = c->interface == CO_SIMULATION ? STEP : EVENT;
+    return OK;
+}
+
+/* Values */
+
+static const Variable *variable(Instance *c, const char *function, unsigned reference, Kind kind)
+{
+    static const char *const names[] = {"Real or Float64", "Integer or Int32", "Enumeration", "String"};
+    if (reference >= VARIABLES) {
+        instance_say(c, ERROR, "%s: there is no variable with the value reference %u", function, reference);
+        return NULL;
+    }
+    if (variables[reference].kind != kind) {
+        instance_say(c, ERROR, "%s: variable %s is of type %s", function, variables[reference].name,
+                     names[variables[reference].kind]);
+        return NULL;
+    }
+    return &variables[reference];
+}
+
+/* Bring the outputs up to date. A read does not fail: the last good outputs stay, and the next step will be refused. */
+static void read_outputs(Instance *c)
+{
+    char sentence[SENTENCE];
+    Reason reason = refresh(c, sentence);
+    bool refused = ((int)c->s.phase & STEP) && c->s.reason != GOOD;
+    if (reason != GOOD && !refused)
+        note(c, reason, sentence);
+}
+
+static double computed(Instance *c, int row)
+{
+    double derivative[STATES];
+    if (row < STATE_ROW)
+        return c->s.plant.outputs[row];
+    if (row < DERIVATIVE_ROW) {
+        double x[STATES];
+        plant_present(&c->s.plant, x);
+        return x[row - STATE_ROW];
+    }
+    if (row < MARGIN_ROW) {
+        plant_derivative(&c->s.plant, derivative);
+        return derivative[row - DERIVATIVE_ROW];
+    }
+    return row == MARGIN_ROW ? plant_margin(&c->s.plant) : c->s.plant.time;
+}
+
+Status instance_get(Instance *c, const char *function, unsigned reference, Kind kind, double *value)
+{
+    const Variable *v = variable(c, function, reference, kind);
+    if (!v)
+        return ERROR;
+    if (v->causality != COMPUTED)
+        *value = c->s.plant.given[reference];
+    else {
+        if (c->stale)
+            read_outputs(c);
+        *value = (int)reference == status_at ? c->s.reason : computed(c, v->row);
+    }
+    return OK;
+}
+
+Status instance_get_text(Instance *c, const char *function, unsigned reference, const char **value)
+{
+    if (!variable(c, function, reference, STRING))
+        return ERROR;
+    if (c->stale)
+        read_outputs(c);
+    memcpy(c->text, c->s.message, SENTENCE);
+    *value = c->text;
+    return OK;
+}
+
+Status instance_set(Instance *c, const char *function, unsigned reference, Kind kind, double value)
+{
+    const Variable *v = variable(c, function, reference, kind);
+    Plant *a = &c->s.plant;
+    int phase = (int)c->s.phase;
+    if (!v)
+        return ERROR;
+    if (v->causality == COMPUTED)
+        return instance_say(c, ERROR, "%s: %s is computed, it cannot be set", function, v->name);
+    if (v->causality == PARAMETER && !(phase & (INSTANTIATED | INITIALIZATION)))
+        return instance_say(c, ERROR, "%s: %s is a fixed parameter, it cannot be set %s", function, v->name, phase_name(phase));
+    a->given[reference] = value;
+    c->stale = true;
+    if (!(phase & RUNNING))
+        a->begun = 0.0;
+    else if (c->interface == CO_SIMULATION)
+        for (int k = 0; k < COMMANDS; k++)
+            if (input_at[commands[k].input] == (int)reference)
+                a->fresh[k] = 1.0;
+    return OK;
+}
+
+static int input_number(unsigned reference)
+{
+    for (int i = 0; i < INPUTS; i++)
+        if (input_at[i] == (int)reference)
+            return i;
+    return -1;
+}
+
+Status instance_set_slope(Instance *c, const char *function, unsigned reference, int order, double slope)
+{
+    Digits number;
+    const Variable *v = variable(c, function, reference, REAL);
+    if (!v)
+        return ERROR;
+    if (v->causality != INPUT || order != 1)
+        return instance_say(c, ERROR, "%s: derivative %d of %s: the first derivatives of the inputs can be set", function, order,
+                            v->name);
+    if (!isfinite(slope))
+        return instance_say(c, ERROR, "%s: the derivative of %s is %s: it must be a finite number", function, v->name,
+                            digits(number, slope));
+    c->s.plant.slopes[input_number(reference)] = slope;
+    return OK;
+}
+
+Status instance_output_slopes(
+    Instance *c, const char *function, const unsigned references[], size_t count, const int orders[], double values[])
+{
+    Plant *a = &c->s.plant;
+    double given[VARIABLES] = {0}, rows[ROWS], derivative[STATES];
+    for (size_t i = 0; i < count; i++) {
+        const Variable *v = variable(c, function, references[i], REAL);
+        if (!v)
+            return ERROR;
+        if (v->causality != COMPUTED || orders[i] != 1)
+            return instance_say(c, ERROR, "%s: derivative %d of %s: the first derivatives of the outputs can be read", function,
+                                orders[i], v->name);
+    }
+    for (int i = 0; i < INPUTS; i++)
+        given[input_at[i]] = a->last_slopes[i];
+    for (int k = 0; k < COMMANDS; k++) {
+        /* a command that moves is an acceleration */
+        given[input_at[commands[k].acceleration]] = 0.0;
+        given[input_at[commands[k].input]] = 0.0;
+    }
+    if (!plant_derivative(a, derivative))
+        return instance_say(c, DISCARD, "%s: the derivatives are not finite", function);
+    plant_forward(a, false, false, given, derivative, rows);
+    rows[TIME_ROW] = 1.0;
+    for (size_t i = 0; i < count; i++)
+        values[i] = rows[variables[references[i]].row];
+    return OK;
+}
+
+/* Steps */
+
+Status instance_step(Instance *c, double time, double step, const Watch *watch)
+{
+    char sentence[SENTENCE];
+    Reason ended;
+    Reason reason = plant_step(&c->s.plant, time, step, watch, c->early_return, &ended, sentence);
+    c->last_successful = c->s.plant.time;
+    c->stopped = reason == GOOD && ended != GOOD;
+    if (reason == GOOD) {
+        c->stale = true;
+        forget(c);
+        if (ended != GOOD)
+            note(c, ended, "the step ended early, at the limit of assembly");
+        return OK;
+    }
+    if (reason == STEP_OUT_OF_ORDER && c->s.cause != GOOD) {
+        /* a master that goes on after a refused step leaves a gap: what is to be known is why the first was refused */
+        char both[SENTENCE];
+        snprintf(both, SENTENCE, "%.120s; before that, %.270s", sentence, c->s.cause_message);
+        note(c, (Reason)c->s.cause, both);
+    } else {
+        note(c, reason, sentence);
+        if (reason != STEP_OUT_OF_ORDER) {
+            c->s.cause = reason;
+            memcpy(c->s.cause_message, c->s.message, SENTENCE);
+        }
+    }
+    return instance_say(c, DISCARD, "%s", c->s.message);
+}
+
+/* Model exchange */
+
+Status instance_new_discrete_states(Instance *c, bool *terminate, bool *values_changed)
+{
+    *values_changed = plant_jump(&c->s.plant);
+    *terminate = !(plant_margin(&c->s.plant) >= 0.0);
+    c->stale = true;
+    if (*terminate) {
+        note(c, LIMIT_OF_ASSEMBLY, "the motion has reached the limit of assembly");
+        instance_say(c, WARNING, "%s", c->s.message);
+    }
+    return OK;
+}
+
+Status instance_set_time(Instance *c, double time)
+{
+    Digits number;
+    if (!isfinite(time))
+        return instance_say(c, ERROR, "the time is %s s: it must be a finite number", digits(number, time));
+    c->s.plant.time = time;
+    c->stale = true;
+    return OK;
+}
+
+bool instance_counts(Instance *c, const char *function, size_t count, size_t right)
+{
+    if (count == right)
+        return true;
+    instance_say(c, ERROR, "%s: %lu numbers: it must be %lu", function, (unsigned long)count, (unsigned long)right);
+    return false;
+}
+
+Status instance_set_states(Instance *c, const char *function, const double x[], size_t count)
+{
+    if (!instance_counts(c, function, count, STATES))
+        return ERROR;
+    for (int i = 0; i < STATES; i++)
+        if (!isfinite(x[i]))
+            return instance_say(c, DISCARD, "%s: a state is not finite", function);
+    memcpy(c->s.plant.x, x, sizeof c->s.plant.x);
+    c->stale = true;
+    return OK;
+}
+
+/* Make sure that the state follows from what is given, for what is read in initialisation mode. */
+static Status begun(Instance *c, const char *function)
+{
+    char sentence[SENTENCE];
+    if (c->s.plant.begun != 0.0)
+        return OK;
+    Reason reason = plant_begin(&c->s.plant, sentence);
+    if (reason == GOOD)
+        return OK;
+    note(c, reason, sentence);
+    return instance_say(c, ERROR, "%s: %s", function, sentence);
+}
+
+Status instance_states(Instance *c, const char *function, double x[], size_t count)
+{
+    if (!instance_counts(c, function, count, STATES) || begun(c, function) != OK)
+        return ERROR;
+    memcpy(x, c->s.plant.x, sizeof c->s.plant.x);
+    return OK;
+}
+
+Status instance_nominals(Instance *c, const char *function, double nominals[], size_t count)
+{
+    if (!instance_counts(c, function, count, STATES) || begun(c, function) != OK)
+        return ERROR;
+    memcpy(nominals, c->s.plant.scale, sizeof c->s.plant.scale);
+    return OK;
+}
+
+Status instance_derivatives(Instance *c, const char *function, double result[], size_t count)
+{
+    double derivative[STATES];
+    if (!instance_counts(c, function, count, STATES) || begun(c, function) != OK)
+        return ERROR;
+    if (!plant_derivative(&c->s.plant, derivative))
+        return instance_say(c, DISCARD, "%s: the derivatives are not finite", function);
+    memcpy(result, derivative, sizeof derivative);
+    return OK;
+}
+
+Status instance_indicators(Instance *c, const char *function, double result[], size_t count)
+{
+    if (!instance_counts(c, function, count, 1) || begun(c, function) != OK)
+        return ERROR;
+    double margin = plant_margin(&c->s.plant);
+    if (isnan(margin))
+        return instance_say(c, DISCARD, "%s: the links cannot be joined", function);
+    result[0] = margin;
+    return OK;
+}
+
+/* Derivatives */
+
+static int state_number(unsigned reference)
+{
+    for (int i = 0; i < STATES; i++)
+        if (state_at[i] == (int)reference)
+            return i;
+    return -1;
+}
+
+/* Whether a variable can be changed in the present state: what is given, and the state itself in model exchange. */
+static bool known(Instance *c, const char *function, unsigned reference, bool start)
+{
+    const Variable *v = variable(c, function, reference, REAL);
+    if (!v)
+        return false;
+    bool state = v->causality == COMPUTED && !start && c->interface == MODEL_EXCHANGE && state_number(reference) >= 0;
+    if (state || v->causality == INPUT || (v->causality == PARAMETER && start))
+        return true;
+    instance_say(c, ERROR, "%s: %s is no known of a derivative %s", function, v->name, phase_name((int)c->s.phase));
+    return false;
+}
+
+static bool unknown(Instance *c, const char *function, unsigned reference)
+{
+    const Variable *v = variable(c, function, reference, REAL);
+    if (v && v->causality != COMPUTED)
+        instance_say(c, ERROR, "%s: %s is no unknown of a derivative", function, v->name);
+    return v && v->causality == COMPUTED;
+}
+
+Status instance_directional(
+    Instance *c, const char *function, bool adjoint, const unsigned unknowns[], size_t unknown_count, const unsigned knowns[],
+    size_t known_count, const double seed[], double result[])
+{
+    const Plant *a = &c->s.plant;
+    bool start = (int)c->s.phase == INITIALIZATION, commanded[ROOM(COMMANDS)] = {false};
+    double given[VARIABLES] = {0}, x[STATES] = {0}, rows[ROWS] = {0};
+    for (size_t i = 0; i < known_count; i++)
+        if (!known(c, function, knowns[i], start))
+            return ERROR;
+    for (size_t i = 0; i < unknown_count; i++)
+        if (!unknown(c, function, unknowns[i]))
+            return ERROR;
+    if (begun(c, function) != OK)
+        return ERROR;
+    if (adjoint) {
+        for (size_t i = 0; i < unknown_count; i++)
+            rows[variables[unknowns[i]].row] += seed[i];
+        for (size_t i = 0; i < known_count; i++)
+            for (int k = 0; k < COMMANDS; k++)
+                commanded[k] |= c->interface == CO_SIMULATION && input_at[commands[k].input] == (int)knowns[i];
+        plant_reverse(a, start, rows, commanded, given, x);
+    } else {
+        for (size_t i = 0; i < known_count; i++) {
+            int state = start ? -1 : state_number(knowns[i]);
+            if (state >= 0)
+                x[state] += seed[i];
+            else
+                given[knowns[i]] += seed[i];
+        }
+        plant_forward(a, start, c->interface == CO_SIMULATION, given, x, rows);
+    }
+    for (size_t i = 0; i < (adjoint ? known_count : unknown_count); i++) {
+        int state = adjoint && !start ? state_number(knowns[i]) : -1;
+        result[i] = !adjoint ? rows[variables[unknowns[i]].row] : state >= 0 ? x[state] : given[knowns[i]];
+        if (!isfinite(result[i]))
+            return instance_say(c, DISCARD, "%s: a derivative is not finite", function);
+    }
+    return OK;
+}
+
+/* Saved state: a copy of Saved, and as text the same as JSON. Numbers are written as the hexadecimal digits of their bits, which
+   are the same on every platform and in every locale. */
+
+typedef struct {
+    const char *name;
+    size_t offset, count; /* of numbers */
+} Field;
+
+#define FIELD(member) {#member, offsetof(Saved, member), sizeof(((Saved *)0)->member) / sizeof(double)}
+
+static const Field fields[] = {
+    FIELD(phase), FIELD(reason), FIELD(cause),
+    FIELD(plant.begun), FIELD(plant.time), FIELD(plant.start_time), FIELD(plant.master_tolerance), FIELD(plant.tolerance),
+    FIELD(plant.step_size), FIELD(plant.given), FIELD(plant.slopes), FIELD(plant.last_slopes), FIELD(plant.fresh),
+    FIELD(plant.applied), FIELD(plant.modes), FIELD(plant.p), FIELD(plant.x), FIELD(plant.scale), FIELD(plant.outputs),
+};
+
+enum { FIELDS = sizeof fields / sizeof *fields };
+
+Status instance_save(Instance *c, void **state)
+{
+    Saved *saved = *state ? *state : malloc(sizeof *saved);
+    if (!saved)
+        return instance_say(c, ERROR, "no memory for a saved state");
+    *saved = c->s;
+    *state = saved;
+    return OK;
+}
+
+Status instance_restore(Instance *c, const void *state)
+{
+    if (!state)
+        return instance_say(c, ERROR, "there is no saved state to restore");
+    c->s = *(const Saved *)state;
+    c->stale = true;
+    c->stopped = false;
+    return OK;
+}
+
+/* Text that is counted where there is no room for it. */
+typedef struct {
+    char *text;
+    size_t size;
+} Out;
+
+static void put(Out *out, const char *text)
+{
+    for (; *text; text++, out->size++)
+        if (out->text)
+            out->text[out->size] = *text;
+}
+
+static void put_text(Out *out, const char *name, const char *text)
+{
+    put(out, ",\"");
+    put(out, name);
+    put(out, "\":\"");
+    for (; *text; text++) {
+        char c = *text == '"' || *text == '\\' || (unsigned char)*text < ' ' ? '\'' : *text;
+        put(out, (char[]){c, 0});
+    }
+    put(out, "\"");
+}
+
+static void write(Out *out, const Saved *saved)
+{
+    put(out, "{\"model\":\"" MODEL_IDENTIFIER "\",\"token\":\"" TOKEN "\"");
+    for (int f = 0; f < FIELDS; f++) {
+        const double *numbers = (const double *)((const char *)saved + fields[f].offset);
+        put(out, ",\"");
+        put(out, fields[f].name);
+        put(out, "\":\"");
+        for (size_t i = 0; i < fields[f].count; i++) {
+            uint64_t bits;
+            memcpy(&bits, &numbers[i], sizeof bits);
+            for (int shift = 60; shift >= 0; shift -= 4)
+                put(out, (char[]){"0123456789abcdef"[(bits >> shift) & 15], 0});
+        }
+        put(out, "\"");
+    }
+    put_text(out, "message", saved->message);
+    put_text(out, "cause_message", saved->cause_message);
+    put(out, "}");
+}
+
+void instance_forget_saved(void **state)
+{
+    if (state) {
+        free(*state);
+        *state = NULL;
+    }
+}
+
+size_t instance_serialized_size(const void *state)
+{
+    Out out = {0};
+    write(&out, state);
+    return out.size;
+}
+
+Status instance_serialize(Instance *c, const char *function, const void *state, char *text, size_t size)
+{
+    Out out = {.text = text};
+    if (!instance_counts(c, function, size, instance_serialized_size(state)))
+        return ERROR;
+    write(&out, state);
+    return OK;
+}
+
+typedef struct {
+    const char *at, *end;
+} In;
+
+static bool take(In *in, const char *text)
+{
+    size_t length = strlen(text);
+    if ((size_t)(in->end - in->at) < length || memcmp(in->at, text, length) != 0)
+        return false;
+    in->at += length;
+    return true;
+}
+
+static bool take_name(In *in, const char *name)
+{
+    return take(in, ",\"") && take(in, name) && take(in, "\":\"");
+}
+
+static bool take_text(In *in, const char *name, char text[SENTENCE])
+{
+    if (!take_name(in, name))
+        return false;
+    int length = 0;
+    for (; in->at < in->end && *in->at != '"'; in->at++) {
+        if (length == SENTENCE - 1 || (unsigned char)*in->at < ' ')
+            return false;
+        text[length++] = *in->at;
+    }
+    text[length] = 0;
+    return take(in, "\"");
+}
+
+static bool take_number(In *in, double *number)
+{
+    uint64_t bits = 0;
+    if (in->end - in->at < 16)
+        return false;
+    for (int i = 0; i < 16; i++) {
+        const char *digit = strchr("0123456789abcdef", *in->at);
+        if (!*in->at || !digit)
+            return false;
+        bits = bits << 4 | (uint64_t)(digit - "0123456789abcdef");
+        in->at++;
+    }
+    memcpy(number, &bits, sizeof bits);
+    return true;
+}
+
+static bool whole(double value, double least, double most)
+{
+    return least <= value && value <= most && value == floor(value);
+}
+
+/* Whether what was read can be worked with: what is not a number in it shows in the next step. */
+static bool sound(const Saved *s)
+{
+    for (int v = 0; v < VARIABLES; v++)
+        if (variables[v].kind != REAL && variables[v].causality == PARAMETER && !whole(s->plant.given[v], -2147483648.0, 2147483647.0))
+            return false;
+    return whole(s->phase, INSTANTIATED, TERMINATED) && ((int)s->phase & ((int)s->phase - 1)) == 0 && whole(s->reason, GOOD, INTERNAL) &&
+           whole(s->cause, GOOD, INTERNAL) && isfinite(s->plant.time);
+}
+
+Status instance_deserialize(Instance *c, const char *text, size_t size, void **state)
+{
+    Saved *saved = calloc(1, sizeof *saved);
+    In in = {text, text + size};
+    if (!saved)
+        return instance_say(c, ERROR, "no memory for a saved state");
+    bool good = take(&in, "{\"model\":\"" MODEL_IDENTIFIER "\",\"token\":\"" TOKEN "\"");
+    for (int f = 0; f < FIELDS && good; f++) {
+        double *numbers = (double *)((char *)saved + fields[f].offset);
+        good = take_name(&in, fields[f].name);
+        for (size_t i = 0; i < fields[f].count && good; i++)
+            good = take_number(&in, &numbers[i]);
+        good = good && take(&in, "\"");
+    }
+    good = good && take_text(&in, "message", saved->message) && take_text(&in, "cause_message", saved->cause_message) &&
+           take(&in, "}") && in.at == in.end && sound(saved);
+    if (!good) {
+        free(saved);
+        return instance_say(c, ERROR, "the serialised state is damaged, or not one of a " MODEL_IDENTIFIER);
+    }
+    *state = saved;
+    return OK;
+}

@@ -1,0 +1,102 @@
+/* What both faces share: an instance, the states it can be in, its values, its log, its saved state. */
+#ifndef INSTANCE_H
+#define INSTANCE_H
+
+#include <stddef.h>
+
+#include "plant.h"
+
+/* As in both standards. */
+typedef enum { OK, WARNING, DISCARD, ERROR } Status;
+
+typedef enum { MODEL_EXCHANGE, CO_SIMULATION } Interface;
+
+/* States of an instance, to be combined where a function is allowed in several. */
+enum {
+    INSTANTIATED = 1,
+    INITIALIZATION = 2,
+    EVENT = 4,
+    CONTINUOUS = 8,
+    STEP = 16,
+    INTERMEDIATE = 32,
+    TERMINATED = 64,
+    RUNNING = EVENT | CONTINUOUS | STEP | INTERMEDIATE,
+    SETTLED = INITIALIZATION | RUNNING | TERMINATED
+};
+
+typedef struct Instance Instance;
+
+/* All that a saved state keeps. */
+typedef struct {
+    Plant plant;
+    double phase;
+    double reason, cause;  /* solver.status; the first reason since the last good step, other than steps out of order */
+    char message[SENTENCE], cause_message[SENTENCE];
+} Saved;
+
+struct Instance {
+    Saved s;
+    Interface interface;
+    bool logging;
+    bool stale;            /* the outputs are older than state and inputs */
+    bool stopped;          /* an early return at the limit of assembly */
+    double last_successful;
+    char *name;
+    void (*log)(const Instance *c, Status status, const char *category, const char *message);
+    void *environment;
+    void (*logger)(void);         /* of the face's own type */
+    void (*update)(void);
+    bool early_return;
+    char *text;            /* what the last get of a string returned */
+};
+
+Instance *instance_new(const char *name, const char *token, Interface interface, bool logging, void *environment,
+                       void (*log)(const Instance *, Status, const char *, const char *), void (*logger)(void));
+void instance_free(Instance *c);
+void instance_reset(Instance *c);
+
+/* Whether an instance is there and may be called this in its state: if not, that is said in the log. */
+bool instance_allows(Instance *c, const char *function, int phases);
+
+/* Whether a count is right: if not, that is said in the log. */
+bool instance_counts(Instance *c, const char *function, size_t count, size_t right);
+
+/* Say a sentence, and return the status. */
+Status instance_say(const Instance *c, Status status, const char *format, ...);
+
+Status instance_setup(Instance *c, bool tolerance_given, double tolerance, double start);
+Status instance_exit_initialization(Instance *c);
+
+/* Values: `kinds` is one of the kinds that a function is for, or two. */
+Status instance_get(Instance *c, const char *function, unsigned reference, Kind kind, double *value);
+Status instance_get_text(Instance *c, const char *function, unsigned reference, const char **value);
+Status instance_set(Instance *c, const char *function, unsigned reference, Kind kind, double value);
+Status instance_set_slope(Instance *c, const char *function, unsigned reference, int order, double slope);
+Status instance_output_slopes(
+    Instance *c, const char *function, const unsigned references[], size_t count, const int orders[], double values[]);
+
+Status instance_step(Instance *c, double time, double step, const Watch *watch);
+
+/* Model exchange */
+Status instance_new_discrete_states(Instance *c, bool *terminate, bool *values_changed);
+Status instance_set_time(Instance *c, double time);
+Status instance_set_states(Instance *c, const char *function, const double x[], size_t count);
+Status instance_states(Instance *c, const char *function, double x[], size_t count);
+Status instance_nominals(Instance *c, const char *function, double nominals[], size_t count);
+Status instance_derivatives(Instance *c, const char *function, double result[], size_t count);
+Status instance_indicators(Instance *c, const char *function, double result[], size_t count);
+
+/* Derivatives of unknowns with respect to knowns, times a change of these, or the unknowns' weights times them. */
+Status instance_directional(
+    Instance *c, const char *function, bool adjoint, const unsigned unknowns[], size_t unknown_count, const unsigned knowns[],
+    size_t known_count, const double seed[], double result[]);
+
+/* Saved state */
+Status instance_save(Instance *c, void **state);
+Status instance_restore(Instance *c, const void *state);
+void instance_forget_saved(void **state);
+size_t instance_serialized_size(const void *state);
+Status instance_serialize(Instance *c, const char *function, const void *state, char *text, size_t size);
+Status instance_deserialize(Instance *c, const char *text, size_t size, void **state);
+
+#endif

@@ -1,0 +1,79 @@
+/* A mechanism in motion: what is given, its state, and the step that takes it forward in time. The twin of linkwork.plant. */
+#ifndef PLANT_H
+#define PLANT_H
+
+#include <stdbool.h>
+
+#include "model.h"
+
+enum { SENTENCE = 400 };
+
+/* solver.status */
+typedef enum {
+    GOOD, STEP_OUT_OF_ORDER, INPUT_NOT_FINITE, LIMIT_OF_ASSEMBLY, TOLERANCE_NOT_MET, NOT_INITIALISED, BAD_PARAMETER,
+    INTERNAL = 9
+} Reason;
+
+/* Numbers alone: a saved state is a copy of it. */
+typedef struct {
+    double given[VARIABLES];        /* parameters and inputs, by value reference */
+    double slopes[ROOM(INPUTS)];    /* rates of change of the inputs over the next step */
+    double last_slopes[ROOM(INPUTS)];
+    double fresh[ROOM(COMMANDS)];   /* 1 where the command was set since the last step (co-simulation) */
+    double applied[ROOM(COMMANDS)]; /* the commands as the state has them (model exchange) */
+    double modes[ROOM(MODES)];
+    double p[CONSTANTS];
+    double x[STATES];
+    double scale[STATES];           /* magnitudes below which the error of a component is absolute */
+    double outputs[OUTPUTS];        /* the last that could be computed */
+    double begun;                   /* 1 where state and constants follow from what is given */
+    double time, start_time;
+    double master_tolerance;        /* 0: none */
+    double tolerance, step_size;
+} Plant;
+
+/* What a step calls after each step of the integrator but the last; it may change inputs, or shorten the duration. */
+typedef struct {
+    void (*call)(void *context, Plant *plant, double *end);
+    void *context;
+} Watch;
+
+/* Put start values in the place of all that was given. */
+void plant_reset(Plant *a);
+
+/* Constants and state from what is given; on failure the reason, with the sentence. */
+Reason plant_begin(Plant *a, char sentence[SENTENCE]);
+
+/* Whether a command is in force under the modes. */
+bool plant_commanded(const Plant *a, const Command *command);
+
+/* Go forward by a step under the inputs in force. A step that fails leaves all as it was. Where `early`, a step into the limit
+   of assembly ends there and is good, with the reason LIMIT_OF_ASSEMBLY in `ended`. */
+Reason plant_step(Plant *a, double time, double step, const Watch *watch, bool early, Reason *ended, char sentence[SENTENCE]);
+
+/* The state with the commands that were set since the last step applied. */
+void plant_present(const Plant *a, double x[STATES]);
+
+/* Apply the commands that differ from those applied before; whether the state changed (model exchange). */
+bool plant_jump(Plant *a);
+
+/* All outputs anew; on failure the last good ones stay. */
+Reason plant_outputs(Plant *a, char sentence[SENTENCE]);
+bool plant_derivative(const Plant *a, double derivative[STATES]);
+double plant_margin(const Plant *a);
+
+/* Changes of all rows with those of what is given (by value reference) and of the state; `start`: at the start of a run, where
+   state and constants follow from what is given; `commanding`: a change of a command that is in force applies it. */
+void plant_forward(
+    const Plant *a, bool start, bool commanding, const double given[VARIABLES], const double x[STATES], double rows[ROWS]);
+
+/* The gradient of a weighted sum of rows; `commanded` as the commands whose inputs it is asked for. */
+void plant_reverse(
+    const Plant *a, bool start, const double rows[ROWS], const bool commanded[ROOM(COMMANDS)], double given[VARIABLES],
+    double x[STATES]);
+
+/* A number in words, in any locale. */
+typedef char Digits[32];
+const char *digits(Digits text, double value);
+
+#endif
