@@ -9,7 +9,7 @@ from typing import Any
 from linkwork import five_bar, slider_crank
 from linkwork.errors import InputError, LinkworkError
 from linkwork.mechanism import Channel, Mechanism
-from linkwork.parameters import fmi_name
+from linkwork.parameters import Rules, fmi_name
 from linkwork.variables import UNITS, status_variables
 
 STATUS_NAMES = tuple(v.name for v in status_variables())
@@ -83,6 +83,8 @@ def _faults_of_interface(m: Mechanism) -> Iterator[str]:
     for name in m.position_parameters:
         if name not in names:
             yield f"there is no parameter {name}"
+    if not isinstance(getattr(m.parameters, "RULES", None), Rules):
+        yield f"{m.parameters.__name__} has no RULES: it must have an attribute of that name, a linkwork.parameters.Rules"
     for what, wanted, there in (
         ("the parameters", {fmi_name(f.name) for f in fields(m.parameters)}, set(m.mechanism_variables)),
         ("the state at the start", {f.name for f in fields(m.initial)}, set(m.initial_variables)),

@@ -1,5 +1,21 @@
 """Making FMUs of the mechanisms."""
 
-from .python_fmu import SOURCES, BuildError, build, try_out
+from .archive import SOURCES, BuildError, try_out
+from .description import KINDS, NATIVE, NATIVE_FMI3, PYTHON, Kind
+from .native_fmu import PLATFORMS, build_native, this_platform
+from .python_fmu import build
 
-__all__ = ["SOURCES", "BuildError", "build", "try_out"]
+__all__ = [
+    "KINDS",
+    "NATIVE",
+    "NATIVE_FMI3",
+    "PLATFORMS",
+    "PYTHON",
+    "SOURCES",
+    "BuildError",
+    "Kind",
+    "build",
+    "build_native",
+    "this_platform",
+    "try_out",
+]

@@ -27,10 +27,10 @@ def library() -> Any:
     return casadi
 
 
-def traced(modules: tuple[ModuleType, ...]) -> Rebound:
-    """The functions of ``modules`` for CasADi symbols in the place of floats."""
+def traced(modules: tuple[ModuleType, ...], **others: Any) -> Rebound:
+    """The functions of ``modules`` for CasADi symbols in the place of floats; ``others`` are called by their names."""
     casadi = library()
-    return rebound(modules, {name: getattr(casadi, name) for name in ELEMENTARY})
+    return rebound(modules, {name: getattr(casadi, name) for name in ELEMENTARY} | others)
 
 
 def over(function: Any, *arguments: Any) -> tuple[NDArray[np.float64], ...]:

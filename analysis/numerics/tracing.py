@@ -7,6 +7,7 @@ touched.
 
 from __future__ import annotations
 
+import builtins
 import math
 from collections.abc import Callable, Mapping
 from types import FunctionType, ModuleType, SimpleNamespace
@@ -16,10 +17,10 @@ from linkwork.errors import LinkworkError
 
 
 class Rebound(SimpleNamespace):
-    """Functions by name; of two of one name that of the later module."""
+    """Functions by name; of two of one name that of the later module. Methods of classes by `of` alone."""
 
     def __init__(self, functions: Mapping[Callable[..., Any], FunctionType]) -> None:
-        super().__init__(**{f.__name__: f for f in functions.values()})
+        super().__init__(**{f.__name__: f for f in functions.values() if "." not in f.__qualname__})
         self._functions = functions
 
     def of(self, function: Callable[..., Any]) -> Callable[..., Any]:
@@ -44,16 +45,20 @@ def rebound(modules: tuple[ModuleType, ...], elementary: Mapping[str, Any]) -> R
     modules : tuple of modules
         Their functions call each other's where they are imported by name.
     elementary : mapping
-        Functions by the names that they have in `math`.
+        Functions by the names that they have in `math`, or among the built-in ones.
     """
     spaces = [dict(vars(module)) for module in modules]
     functions: dict[Callable[..., Any], FunctionType] = {}
     for module, space in zip(modules, spaces):
-        for name, f in vars(module).items():
-            if isinstance(f, FunctionType) and f.__module__ == module.__name__:
-                functions[f] = FunctionType(f.__code__, space, name, f.__defaults__)
+        own = [value for value in vars(module).values() if getattr(value, "__module__", None) == module.__name__]
+        methods = [f for value in own if isinstance(value, type) for f in vars(value).values()]
+        for f in (*own, *methods):
+            if isinstance(f, FunctionType) and f.__globals__ is vars(module) and f.__closure__ is None:
+                functions[f] = FunctionType(f.__code__, space, f.__name__, f.__defaults__)
                 functions[f].__kwdefaults__ = f.__kwdefaults__
+                functions[f].__qualname__ = f.__qualname__
     for space in spaces:
+        space |= {name: f for name, f in elementary.items() if hasattr(builtins, name)}
         for name, value in space.items():
             if value is math:
                 space[name] = SimpleNamespace(**{**vars(math), **elementary})

@@ -11,6 +11,7 @@ from types import ModuleType
 from typing import Any, NamedTuple
 
 from .errors import LinkworkError
+from .parameters import Rules
 from .variables import Variable
 
 State = tuple[float, ...]
@@ -142,7 +143,7 @@ class Mechanism:
     notes : tuple of str
         Paragraphs of the FMU's documentation.
     parameters, initial : type
-        Dataclasses of its parameters, with a method ``constants``, and of its state at the start.
+        Dataclasses of its parameters, with a method ``constants`` and ``RULES``, and of its state at the start.
     published : mapping
         `PublishedSet` by name, one at least.
     freedoms : tuple of Freedom
@@ -194,6 +195,12 @@ class Mechanism:
     def size(self) -> int:
         """Number of components of the state."""
         return 2 * len(self.freedoms) + 2
+
+    @cached_property
+    def rules(self) -> Rules:
+        """What the parameters must be."""
+        rules: Rules = self.parameters.RULES  # type: ignore[attr-defined]
+        return rules
 
     @cached_property
     def modes(self) -> tuple[Mode, ...]:

@@ -13,7 +13,7 @@ from typing import Any
 from .errors import AssemblyError, InputError, IntegrationError, LinkworkError, ParameterError, StateError, StepError
 from .integrate import UNDEFINED, Vector, integrate
 from .limits import NEAR_LIMIT
-from .mechanism import Mechanism
+from .mechanism import Mechanism, Mode
 from .parameters import fmi_name
 
 #: Loosest and tightest tolerance that a run accepts.
@@ -31,6 +31,12 @@ def check_tolerance(tolerance: float) -> None:
     low, high = TOLERANCE_RANGE
     if not low <= tolerance <= high:
         raise ParameterError("solver.tolerance", tolerance, f"be between {low:g} and {high:g}")
+
+
+def mode_requirement(mode: Mode) -> str:
+    """What the value of a mode must be, as the end of the sentence "it must ..."."""
+    words = [f"{number} ({word})" for number, word in enumerate(mode.values)]
+    return f"be {', '.join(words[:-1])} or {words[-1]}"
 
 
 class Plant:
@@ -75,8 +81,7 @@ class Plant:
             self.modes[fmi_name(name)] = mode_value
         for mode in mechanism.modes:
             if self.modes[mode.name] not in range(len(mode.values)):
-                words = [f"{number} ({word})" for number, word in enumerate(mode.values)]
-                raise ParameterError(mode.name, self.modes[mode.name], f"be {', '.join(words[:-1])} or {words[-1]}")
+                raise ParameterError(mode.name, self.modes[mode.name], mode_requirement(mode))
         check_tolerance(tolerance)
         if not isfinite(time):
             raise InputError(f"the time at the start is {time} s: it must be a finite number")

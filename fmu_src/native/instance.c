@@ -87,7 +87,7 @@ bool instance_allows(Instance *c, const char *function, int phases)
 
 Status instance_say(const Instance *c, Status status, const char *format, ...)
 {
-    static const char *const categories[] = {"logAll", "logStatusWarning", "logStatusDiscard", "logStatusError"};
+    static const char *const categories[] = {"", "Warning", "Discard", "Error"};
     char sentence[2 * SENTENCE];
     va_list arguments;
     va_start(arguments, format);
@@ -561,7 +561,7 @@ static void put_text(Out *out, const char *name, const char *text)
     put(out, "\"");
 }
 
-static void write(Out *out, const Saved *saved)
+static void write_state(Out *out, const Saved *saved)
 {
     put(out, "{\"model\":\"" MODEL_IDENTIFIER "\",\"token\":\"" TOKEN "\"");
     for (int f = 0; f < FIELDS; f++) {
@@ -593,7 +593,7 @@ void instance_forget_saved(void **state)
 size_t instance_serialized_size(const void *state)
 {
     Out out = {0};
-    write(&out, state);
+    write_state(&out, state);
     return out.size;
 }
 
@@ -602,7 +602,7 @@ Status instance_serialize(Instance *c, const char *function, const void *state, 
     Out out = {.text = text};
     if (!instance_counts(c, function, size, instance_serialized_size(state)))
         return ERROR;
-    write(&out, state);
+    write_state(&out, state);
     return OK;
 }
 

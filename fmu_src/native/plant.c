@@ -17,7 +17,7 @@ const char *digits(Digits text, double value)
     return text;
 }
 
-static bool finite(const double values[], int count)
+static bool all_finite(const double values[], int count)
 {
     for (int i = 0; i < count; i++)
         if (!isfinite(values[i]))
@@ -245,12 +245,12 @@ Reason plant_begin(Plant *a, char sentence[SENTENCE])
         a->modes[i] = a->given[mode_at[i]];
     what_begins(a, own, state, u);
     call(equations_begin, (const double *[]){a->modes, own, state, u}, (double *[]){a->p, a->x, a->scale});
-    if (!finite(a->p, CONSTANTS - 1))
+    if (!all_finite(a->p, CONSTANTS - 1))
         return blame_extreme(a, sentence);
     reason = check_assembly(clearance_of(a, a->x), a->x, sentence);
     if (reason != GOOD)
         return reason;
-    if (!finite(a->p, CONSTANTS) || !finite(a->x, STATES) || !finite(a->scale, STATES)) {
+    if (!all_finite(a->p, CONSTANTS) || !all_finite(a->x, STATES) || !all_finite(a->scale, STATES)) {
         char where[SENTENCE];
         configuration(a->x, where);
         snprintf(sentence, SENTENCE, "the energy at the start is not finite: %s", where);
@@ -376,7 +376,7 @@ static Reason integrate(
     Reason reason;
     inputs_after(a, 0.0, u);
     derivative_of(a, x, u, k[0]);
-    if (!finite(k[0], STATES))
+    if (!all_finite(k[0], STATES))
         return not_met(a, x, time, "the accelerations are not finite", sentence);
     double proposal = a->step_size > 0.0 ? a->step_size : first_step(a, x, k[0], *duration);
     for (int steps = 1;; steps++) {
@@ -393,7 +393,7 @@ static Reason integrate(
         if (error <= 1.0 && !last) {
             inputs_after(a, done + h, u);
             derivative_of(a, result, u, slope);
-            if (!finite(slope, STATES))
+            if (!all_finite(slope, STATES))
                 error = NAN;
         }
         if (error <= 1.0) {
@@ -506,7 +506,7 @@ Reason plant_outputs(Plant *a, char sentence[SENTENCE])
     plant_present(a, x);
     inputs(a, u);
     call(equations_outputs, (const double *[]){x, a->modes, u, a->p}, (double *[]){y});
-    if (!finite(y, OUTPUTS)) {
+    if (!all_finite(y, OUTPUTS)) {
         int largest = 0;
         Digits time, number;
         for (int i = 1; i < INPUTS; i++)
@@ -526,7 +526,7 @@ bool plant_derivative(const Plant *a, double derivative[STATES])
     plant_present(a, x);
     inputs(a, u);
     derivative_of(a, x, u, derivative);
-    return finite(derivative, STATES);
+    return all_finite(derivative, STATES);
 }
 
 double plant_margin(const Plant *a)

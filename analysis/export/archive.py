@@ -1,0 +1,141 @@
+"""What every kind of FMU has in its archive, and how the archive is written and tried."""
+
+from __future__ import annotations
+
+import html
+import os
+import subprocess
+import sys
+import zipfile
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+from fmpy.validation import validate_fmu
+
+import linkwork
+from linkwork.errors import LinkworkError
+from linkwork.mechanism import Mechanism
+from linkwork.variables import Variable
+
+PACKAGE = Path(__file__).resolve().parents[1]
+#: The source root: beside the analysis package in a checkout, inside it where Linkwork is installed as a wheel.
+SOURCES = next(
+    (folder for folder in (PACKAGE.parent / "fmu_src", PACKAGE / "_fmu_src") if folder.is_dir()),
+    PACKAGE.parent / "fmu_src",
+)
+ICON = SOURCES / "icon.png"
+LICENSE = next(
+    (path for path in (SOURCES / "LICENSE", PACKAGE.parent / "LICENSE") if path.is_file()), SOURCES / "LICENSE"
+)
+#: Modification time of every file in the zip, so that the same sources give the same archive.
+EPOCH = (1980, 1, 1, 0, 0, 0)
+
+
+#: What holds for all of them.
+_EVERY_MODEL = (
+    "A step that cannot be taken (not positive, out of order, an input that is not finite, the limit of assembly) is "
+    "refused with fmi2Discard. The last good state stays readable and can be saved; solver.status and "
+    "solver.message say why. Steps are integrated by a Runge-Kutta method of order 8 whose local error is held to "
+    "solver.tolerance, or to the master's tolerance where that is tighter.",
+)
+
+
+class BuildError(LinkworkError):
+    """An FMU could not be built, or what was built is not valid."""
+
+
+def write(entries: Mapping[str, bytes], target: Path) -> Path:
+    """Write an FMU: deflated, in order, with fixed times; in place only if it is valid.
+
+    Raises
+    ------
+    BuildError
+        If it is not valid.
+    """
+    # moved into place whole: a reader never sees half an FMU, and a failed build leaves the old one
+    part = target.with_suffix(".part.fmu")
+    try:
+        with zipfile.ZipFile(part, "w", zipfile.ZIP_DEFLATED, compresslevel=9) as archive:
+            # the model description first, as FMI readers look for it first
+            for name in sorted(entries, key=lambda entry: (entry != "modelDescription.xml", entry)):
+                info = zipfile.ZipInfo(name, EPOCH)
+                info.compress_type = zipfile.ZIP_DEFLATED
+                info.external_attr = 0o644 << 16
+                archive.writestr(info, entries[name])
+        problems = validate_fmu(str(part))
+        if problems:
+            raise BuildError(f"{target.name} is not valid: " + "; ".join(problems))
+        os.replace(part, target)
+    finally:
+        part.unlink(missing_ok=True)
+    return target
+
+
+def documentation(
+    mechanism: Mechanism, variables: Sequence[Variable], title: str, made: str, notes: Sequence[str]
+) -> dict[str, bytes]:
+    """Icon, licence and the HTML page inside an FMU: what the model is, how it is ``made``, and the table of its variables."""
+    rows = []
+    for variable in variables:
+        bounds = [
+            f"{label} {value:g}"
+            for label, value in (("min", variable.minimum), ("max", variable.maximum))
+            if value is not None
+        ]
+        start = "" if variable.causality in ("output", "local") else f"{variable.start}"
+        cells = (variable.name, variable.causality, variable.unit, start, ", ".join(bounds), variable.description)
+        rows.append("<tr>" + "".join(f"<td>{html.escape(cell)}</td>" for cell in cells) + "</tr>")
+    paragraphs = "\n".join(f"<p>{html.escape(note)}</p>" for note in (*mechanism.notes, *_EVERY_MODEL, *notes))
+    body = "\n".join(rows)
+    page = f"""<!DOCTYPE html>
+<html lang="en">
+<head>
+<meta charset="utf-8">
+<title>{title}</title>
+<style>
+body {{ font-family: sans-serif; max-width: 70em; margin: 2em auto; padding: 0 1em; color: #222; }}
+table {{ border-collapse: collapse; font-size: 90%; }}
+th, td {{ text-align: left; padding: 0.2em 0.7em; border-bottom: 1px solid #ddd; vertical-align: top; }}
+td:first-child {{ font-family: monospace; white-space: nowrap; }}
+</style>
+</head>
+<body>
+<h1><img src="../model.png" alt="" height="60"> {html.escape(mechanism.title)}</h1>
+<p>{html.escape(made)}, Linkwork {linkwork.__version__}. MIT licence.</p>
+{paragraphs}
+<h2>Variables</h2>
+<table>
+<tr><th>name</th><th>causality</th><th>unit</th><th>start</th><th>range</th><th>description</th></tr>
+{body}
+</table>
+</body>
+</html>
+"""
+    return {
+        "model.png": ICON.read_bytes(),
+        "documentation/index.html": page.encode(),
+        "documentation/licenses/license.txt": LICENSE.read_bytes(),
+    }
+
+
+_TRIAL = """
+import sys
+from fmpy import simulate_fmu
+result = simulate_fmu(sys.argv[1], stop_time=0.02, step_size=1e-3, output_interval=1e-3)
+assert len(result) == 21, len(result)
+"""
+
+
+def try_out(fmu: Path) -> None:
+    """Run twenty steps of the FMU through FMPy in a process of its own.
+
+    Raises
+    ------
+    BuildError
+        With what the run printed, if it failed.
+    """
+    done = subprocess.run(
+        [sys.executable, "-c", _TRIAL, str(fmu)], capture_output=True, text=True, timeout=120, check=False
+    )
+    if done.returncode != 0:
+        raise BuildError(f"{fmu.name} was built but does not run:\n{done.stdout}{done.stderr}")

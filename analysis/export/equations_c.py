@@ -1,0 +1,312 @@
+"""The C of a native FMU that depends on the mechanism: its equations, as CasADi writes them, and its tables."""
+
+from __future__ import annotations
+
+import itertools
+import json
+import sys
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import fields
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from types import FunctionType, ModuleType, SimpleNamespace
+from typing import Any
+
+from linkwork import integrate as integrator
+from linkwork import limits, plant, tableau
+from linkwork.mechanism import Mechanism
+from linkwork.parameters import NOT_NEGATIVE, POSITIVE, fmi_name
+
+from ..numerics import symbolic
+from ..run import equations
+from .description import Kind, token
+from .interface import Entry, interface, states
+
+
+def generated(mechanism: Mechanism, kind: Kind) -> dict[str, str]:
+    """The generated files by name: sizes.h, tables.c, tableau.h and equations.c."""
+    return {
+        "sizes.h": _sizes(mechanism, kind),
+        "tables.c": _tables(mechanism),
+        "tableau.h": _tableau(),
+        "equations.c": _equations(mechanism),
+    }
+
+
+# Equations
+
+
+def _equations(mechanism: Mechanism) -> str:
+    casadi = symbolic.library()
+    options = {"with_header": False, "main": False, "casadi_int": "int", "with_export": False, "with_mem": False}
+    generator = casadi.CodeGenerator("equations.c", options)
+    for function in functions(mechanism):
+        generator.add(function)
+    with TemporaryDirectory(prefix="linkwork-c-") as folder:
+        generator.generate(f"{folder}/")
+        return (Path(folder) / "equations.c").read_text(encoding="utf-8")
+
+
+def functions(mechanism: Mechanism) -> list[Any]:
+    """The equations that the C shell calls, as functions of CasADi; see model.h for their arguments."""
+    casadi = symbolic.library()
+    sx, join = casadi.SX, casadi.vertcat
+    trace = equations.expressions(mechanism)
+    s = trace.symbols
+    own, state, p, x, scale, bounds = _beginning(mechanism, s.modes, s.u)
+    dx, du, dp = (sx.sym(f"d{n}", *v.shape) for n, v in (("x", s.x), ("u", s.u), ("p", s.p)))
+    at, change = join(s.x, s.u, s.p), join(dx, du, dp)
+    values = [trace.outputs, trace.derivative, trace.clearance]
+    given = join(own, state, s.u)
+    dgiven = [sx.sym(f"d{n}", *v.shape) for n, v in (("own", own), ("state", state), ("u", s.u))]
+
+    def forward(results: list[Any], of: Any, change: Any) -> list[Any]:
+        return [casadi.densify(casadi.jtimes(result, of, change)) for result in results]
+
+    def reverse(results: list[Any], of: Any, parts: list[Any]) -> tuple[list[Any], list[Any]]:
+        """Weights of the results, and the gradient of their weighted sum by the parts of what they are of."""
+        weights = [sx.sym(f"g{n}", *result.shape) for n, result in enumerate(results)]
+        gradient = casadi.densify(casadi.jtimes(join(*results), of, join(*weights), True))
+        ends = [0]
+        for part in parts:
+            ends.append(ends[-1] + part.numel())
+        return weights, [gradient[a:b] for a, b in itertools.pairwise(ends)]
+
+    begin, run = [s.modes, own, state, s.u], [s.x, s.modes, s.u, s.p]
+    weights, gradient = reverse(values, at, [s.x, s.u, s.p])
+    jump_weights, jump_gradient = reverse([trace.jump], at, [s.x, s.u, s.p])
+    begin_weights, begin_gradient = reverse([p, x], given, [own, state, s.u])
+    table = {
+        "bounds": ([own], [bounds]),
+        "begin": (begin, [p, x, scale]),
+        "begin_forward": ([*begin, *dgiven], forward([p, x], given, join(*dgiven))),
+        "begin_reverse": ([*begin, *begin_weights], begin_gradient),
+        "derivative": (run, [trace.derivative]),
+        "outputs": (run, [trace.outputs]),
+        "clearance": (run, [trace.clearance]),
+        "jump": (run, [trace.jump]),
+        "jump_forward": ([*run, dx, du, dp], forward([trace.jump], at, change)),
+        "jump_reverse": ([*run, *jump_weights], jump_gradient),
+        "forward": ([*run, dx, du, dp], forward(values, at, change)),
+        "reverse": ([*run, *weights], gradient),
+    }
+    return [
+        casadi.Function(f"equations_{name}", arguments, [casadi.densify(r) for r in results], {"cse": True})
+        for name, (arguments, results) in table.items()
+    ]
+
+
+def _beginning(mechanism: Mechanism, modes: Any, u: Any) -> tuple[Any, ...]:
+    """Parameters and given state as symbols; constants with the energy, state, its scale and the least parameters of these."""
+    casadi = symbolic.library()
+    kind = mechanism.parameters
+    names = [field.name for field in fields(kind)]
+    functions = symbolic.traced(_modules(mechanism), max=casadi.fmax, min=casadi.fmin, float=lambda value: value)
+    methods = {
+        name: functions.of(f) for name, f in vars(kind).items() if isinstance(f, FunctionType) and name[:2] != "__"
+    }
+    own = casadi.SX.sym("own", len(names))
+    parameters = type("Traced", (SimpleNamespace,), methods)(**dict(zip(names, casadi.vertsplit(own))))
+    state = casadi.SX.sym("state", 2 * len(mechanism.freedoms))
+    k = parameters.constants()
+    channels = tuple(casadi.vertsplit(u)) if mechanism.channels else ()
+    e = mechanism.equations
+    acting = functions.of(e.applied)(tuple(casadi.vertsplit(modes)) if mechanism.modes else (), channels, k)
+    x = functions.of(e.start)((*casadi.vertsplit(state), 0.0, 0.0), acting, k)
+    energy = functions.of(e.energy)(x, k)
+    scale = functions.of(mechanism.error_scale)(parameters, x)
+    bounds = [functions.of(least.of)(parameters) for least in mechanism.rules.least]
+    return own, state, *(casadi.densify(casadi.vertcat(*v)) for v in ((*k, energy), x, scale, bounds))
+
+
+def _modules(mechanism: Mechanism) -> tuple[ModuleType, ...]:
+    """The modules of the equations, and of what constants and scales are computed by."""
+    of: Iterable[Callable[..., Any]] = (mechanism.parameters, mechanism.error_scale)
+    further = {sys.modules[f.__module__]: None for f in of} | {sys.modules[Mechanism.__module__]: None}
+    return tuple(dict.fromkeys((*further, *mechanism.modules)))
+
+
+# Tables
+
+
+def _text(value: str) -> str:
+    return json.dumps(value)  # a JSON string of ASCII is a C string
+
+
+def _number(value: float) -> str:
+    return repr(float(value))
+
+
+def _array(name: str, values: Sequence[object], size: str, kind: str = "int") -> str:
+    body = ", ".join(map(str, values)) or "{0}" if kind != "int" else ", ".join(map(str, values)) or "0"
+    return f"const {kind} {name}[{size}] = {{{body}}};"
+
+
+def _sizes(mechanism: Mechanism, kind: Kind) -> str:
+    commands = [c for c in mechanism.channels if c.kind == "command"]
+    sizes = {
+        "VARIABLES": len(interface(mechanism)),
+        "PARAMETERS": len(fields(mechanism.parameters)),
+        "BOUNDS": len(mechanism.rules.least),
+        "FREEDOMS": len(mechanism.freedoms),
+        "MODES": len(mechanism.modes),
+        "INPUTS": len(mechanism.channels),
+        "COMMANDS": len(commands),
+        "OUTPUTS": len(mechanism.output_names),
+        "STATES": mechanism.size,
+        # and the energy at the start
+        "CONSTANTS": len(next(iter(mechanism.published.values())).parameters.constants()) + 1,
+    }
+    constants = {
+        "LIMIT_CLEARANCE": limits.LIMIT_SINE,
+        "NEAR_CLEARANCE": limits.NEAR_LIMIT,
+        "LEAST_TOLERANCE": plant.TOLERANCE_RANGE[0],
+    }
+    return "\n".join(
+        [
+            f"/* Sizes of a {mechanism.name}, and its names. Generated. */",
+            f"#define MODEL_IDENTIFIER {_text(kind.identifier(mechanism))}",
+            f"#define TOKEN {_text(token(mechanism, kind))}",
+            f"enum {{ {', '.join(f'{name} = {size}' for name, size in sizes.items())} }};",
+            *(f"#define {name} {_number(value)}" for name, value in constants.items()),
+            "",
+        ]
+    )
+
+
+def _tables(mechanism: Mechanism) -> str:
+    entries = interface(mechanism)
+    reference = {entry.variable.name: entry.reference for entry in entries}
+    units = {entry.variable.name: entry.variable.unit for entry in entries}
+    own = [fmi_name(field.name) for field in fields(mechanism.parameters)]
+    initial = [f"initial.{freedom.initial[n]}" for n in (0, 1) for freedom in mechanism.freedoms]
+    freedoms = [
+        f"{{{_text(f.coordinate.replace('.', ' '))}, {_text(units[f.coordinate])}}}" for f in mechanism.freedoms
+    ]
+    rules = [f"{{{own.index(fmi_name(least.field))}, {_text(least.requirement)}}}" for least in mechanism.rules.least]
+    rows = ",\n".join(f"    {_row(mechanism, entry)}" for entry in entries)
+    return "\n".join(
+        [
+            f"/* Tables of a {mechanism.name}. Generated. */",
+            '#include "model.h"',
+            "",
+            f"const Variable variables[VARIABLES] = {{\n{rows},\n}};",
+            _array("parameter_at", [reference[name] for name in own], "ROOM(PARAMETERS)"),
+            _array("initial_at", [reference[name] for name in initial], "2 * FREEDOMS"),
+            _array("mode_at", [reference[mode.name] for mode in mechanism.modes], "ROOM(MODES)"),
+            _array("input_at", [reference[name] for name in mechanism.input_names], "ROOM(INPUTS)"),
+            _array("state_at", states(mechanism), "STATES"),
+            *(f"const int {n}_at = {reference[f'solver.{n}']};" for n in ("tolerance", "status", "message")),
+            _array("freedoms", freedoms, "FREEDOMS", "FreedomName"),
+            _array("commands", _commands(mechanism), "ROOM(COMMANDS)", "Command"),
+            _array("least", rules, "ROOM(BOUNDS)", "Least"),
+            "",
+        ]
+    )
+
+
+_KINDS = {"Real": "REAL", "Integer": "INTEGER", "String": "STRING"}
+
+
+def _row(mechanism: Mechanism, entry: Entry) -> str:
+    v = entry.variable
+    mode = entry.role == "mode"
+    causality = {"parameter": "PARAMETER", "input": "INPUT"}.get(v.causality, "COMPUTED")
+    rule, low, high, requirement = _rule(mechanism, entry) if causality == "PARAMETER" else ("ANY", 0.0, 0.0, "")
+    cells = (
+        _text(v.name),
+        _text(v.unit),
+        "ENUMERATION" if mode else _KINDS[v.kind],
+        causality,
+        _number(v.start) if causality != "COMPUTED" else "0.0",  # type: ignore[arg-type]
+        _place(mechanism, entry),
+        rule,
+        _number(low),
+        _number(high),
+        _text(requirement),
+    )
+    return "{" + ", ".join(map(str, cells)) + "}"
+
+
+def _place(mechanism: Mechanism, entry: Entry) -> str:
+    """Row of what is computed."""
+    if entry.role == "output":
+        return str(mechanism.output_names.index(entry.variable.name))
+    if entry.role == "state":
+        return f"STATE_ROW + {states(mechanism).index(entry.reference)}"
+    if entry.role == "derivative":
+        return f"DERIVATIVE_ROW + {states(mechanism).index(entry.derivative_of)}"
+    return {"indicator": "MARGIN_ROW", "time": "TIME_ROW"}.get(entry.role, "-1")
+
+
+def _rule(mechanism: Mechanism, entry: Entry) -> tuple[str, float, float, str]:
+    """What a parameter must be: the rule, bounds, and the requirement in words."""
+    rules = mechanism.rules
+    name = entry.variable.name.replace(".", "_", 1)
+    if entry.role == "tolerance":
+        low, high = plant.TOLERANCE_RANGE
+        return "WITHIN", low, high, f"be between {low:g} and {high:g}"
+    if entry.role == "mode":
+        mode = next(mode for mode in mechanism.modes if mode.name == entry.variable.name)
+        return "WITHIN", 0.0, len(mode.values) - 1.0, plant.mode_requirement(mode)
+    if entry.role == "initial" or name in rules.free_sign:
+        return "ANY", 0.0, 0.0, "be a finite number"
+    if name in rules.signs:
+        return "PLUS_OR_MINUS_ONE", 0.0, 0.0, f"be +1 or -1, {rules.signs[name]}"
+    if name in rules.positive:
+        return "POSITIVE", 0.0, 0.0, POSITIVE
+    return "NOT_NEGATIVE", 0.0, 0.0, NOT_NEGATIVE
+
+
+def _commands(mechanism: Mechanism) -> list[str]:
+    """Which channel commands which rate, in which mode."""
+    rows = []
+    for number, channel in enumerate(mechanism.channels):
+        if channel.kind != "command":
+            continue
+        mode = mechanism.freedoms[channel.freedom].mode
+        rate = next(
+            n for n, other in enumerate(mechanism.channels) if other.kind == "rate" and other.freedom == channel.freedom
+        )
+        at = (
+            number,
+            len(mechanism.freedoms) + channel.freedom,
+            -1 if mode is None else mechanism.modes.index(mode),
+            0 if mode is None else mode.arguments.index(channel.argument),
+            rate,
+        )
+        rows.append("{" + ", ".join(map(str, at)) + "}")
+    return rows
+
+
+def _tableau() -> str:
+    """The coefficients of the integrator."""
+    rows = tableau.A[: tableau.STAGES + 1]
+    ends = [0, 0]
+    for row in rows[1:]:
+        ends.append(ends[-1] + len(row))
+    errors = [i for i in range(tableau.STAGES) if tableau.E5[i] != 0.0]
+    number = _number
+    arrays: list[tuple[str, str, Sequence[object]]] = [
+        ("double", "C", [number(c) for c in tableau.C[: tableau.STAGES]]),
+        ("int", "A_ROW", ends[: len(rows) + 1]),
+        ("int", "A_STAGE", [stage for row in rows for stage, _ in row]),
+        ("double", "A_WEIGHT", [number(weight) for row in rows for _, weight in row]),
+        ("int", "E_STAGE", errors),
+        ("double", "E3", [number(tableau.E3[i]) for i in errors]),
+        ("double", "E5", [number(tableau.E5[i]) for i in errors]),
+    ]
+    constants = {
+        "SAFETY": integrator.SAFETY,
+        "LEAST_FACTOR": integrator.LEAST_FACTOR,
+        "GREATEST_FACTOR": integrator.GREATEST_FACTOR,
+        "LEAST_STEP": integrator.LEAST_STEP,
+    }
+    lines = [
+        "/* Coefficients of DOP853: Hairer, Norsett, Wanner, Solving Ordinary Differential Equations I. Generated. */",
+        f"enum {{ STAGES = {tableau.STAGES}, ORDER = {tableau.ORDER}, ERROR_STAGES = {len(errors)} }};",
+        *(f"#define {name} {number(value)}" for name, value in constants.items()),
+        *(f"static const {kind} {name}[] = {{{', '.join(map(str, values))}}};" for kind, name, values in arrays),
+        "",
+    ]
+    return "\n".join(lines)

@@ -1,0 +1,194 @@
+"""Making the native FMUs: the equations as C, the C shell around them, compiled for any platform by Zig.
+
+Model exchange and co-simulation in one archive, FMI 2.0 or 3.0. The sources travel in it.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import os
+import platform as machine
+import struct
+import subprocess
+import sys
+import tempfile
+from collections.abc import Sequence
+from importlib import resources
+from pathlib import Path
+from typing import NamedTuple
+
+from linkwork.errors import InputError
+from linkwork.mechanism import Mechanism
+
+from ..mechanisms import check
+from ..numerics.codegen import cache_root
+from .archive import SOURCES, BuildError, documentation, write
+from .description import Kind, build_description, description, terminals
+from .equations_c import generated
+from .interface import interface
+
+
+class Platform(NamedTuple):
+    """A platform: what Zig calls it, the suffix of its libraries, its folders by the version of FMI."""
+
+    target: str
+    suffix: str
+    folder_fmi2: str
+    folder_fmi3: str
+
+
+#: By the name that FMI 3.0 has for them. glibc 2.17 is that of RHEL 7; all later ones run what needs it.
+PLATFORMS = {
+    "x86_64-linux": Platform("x86_64-linux-gnu.2.17", "so", "linux64", "x86_64-linux"),
+    "aarch64-linux": Platform("aarch64-linux-gnu.2.17", "so", "aarch64-linux", "aarch64-linux"),
+    "x86_64-windows": Platform("x86_64-windows-gnu", "dll", "win64", "x86_64-windows"),
+    "x86_64-darwin": Platform("x86_64-macos", "dylib", "darwin64", "x86_64-darwin"),
+    "aarch64-darwin": Platform("aarch64-macos", "dylib", "darwin64", "aarch64-darwin"),
+}
+
+#: The same arithmetic on every platform: no fused multiplications. A trap on undefined behaviour is for tests.
+OPTIONS = (
+    "-std=c11", "-O2", "-shared", "-fPIC", "-fvisibility=hidden", "-ffp-contract=off", "-fno-sanitize=undefined",
+    "-ffunction-sections", "-Wl,--gc-sections", "-s",
+)  # fmt: skip
+
+_SHELL = ("model.h", "plant.h", "plant.c", "instance.h", "instance.c")
+_HEADERS = {
+    2: ("fmi2Functions.h", "fmi2FunctionTypes.h", "fmi2TypesPlatform.h"),
+    3: ("fmi3Functions.h", "fmi3FunctionTypes.h", "fmi3PlatformTypes.h"),
+}
+_NOTES = (
+    "The equations are those of the Python sources of Linkwork, written as C and compiled; nothing but the C library is "
+    "needed. The sources are in the archive.",
+    "In model exchange the state is that of crank and slider and the work done; the event indicator is the distance from "
+    "the limit of assembly. A commanded speed is taken at the initialisation and at events: between events the "
+    "acceleration input is its rate of change.",
+)
+
+
+def this_platform() -> str:
+    """Name of the platform that this process runs on.
+
+    Raises
+    ------
+    BuildError
+        If it is none of `PLATFORMS`.
+    """
+    architecture = {"amd64": "x86_64", "arm64": "aarch64"}.get(machine.machine().lower(), machine.machine().lower())
+    name = f"{architecture}-{machine.system().lower()}"
+    if name not in PLATFORMS:
+        raise BuildError(f"native FMUs are not made for {name}: the platforms are {', '.join(PLATFORMS)}")
+    return name
+
+
+def build_native(
+    mechanism: Mechanism, kind: Kind, dest: Path | str = "build", platforms: Sequence[str] | None = None
+) -> Path:
+    """Build a native FMU of a mechanism and return its path.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+    kind : Kind
+        `description.NATIVE` or `description.NATIVE_FMI3`.
+    dest : path
+        Folder for the FMU; made if it is not there.
+    platforms : sequence of str, optional
+        Names of `PLATFORMS`; that of this process by default.
+
+    Raises
+    ------
+    BuildError
+        If Zig is not installed, a file does not compile, or the FMU is not valid.
+    InputError
+        If there is no such platform.
+    MechanismError
+        If the parts of the mechanism do not fit together.
+    """
+    check(mechanism)
+    platforms = [this_platform()] if platforms is None else list(platforms)
+    for name in platforms:
+        if name not in PLATFORMS:
+            raise InputError(f"there is no platform {name!r}: the platforms are {', '.join(PLATFORMS)}")
+    dest = Path(dest)
+    dest.mkdir(parents=True, exist_ok=True)
+    sources = source_files(mechanism, kind)
+    compiled = [name for name in sources if name.endswith(".c")]
+    identifier = kind.identifier(mechanism)
+    entries = {f"sources/{name}": text.encode() for name, text in sources.items()}
+    entries |= _binaries(identifier, kind, sources, platforms)
+    entries["modelDescription.xml"] = description(mechanism, kind, compiled)
+    entries["sources/buildDescription.xml"] = build_description(identifier, compiled)
+    if kind.fmi == 3:
+        entries["terminalsAndIcons/terminalsAndIcons.xml"] = terminals(mechanism)
+    made = f"FMI {kind.fmi}.0 model exchange and co-simulation"
+    variables = [entry.variable for entry in interface(mechanism)]
+    entries |= documentation(mechanism, variables, mechanism.title, made, _NOTES)
+    return write(entries, dest / kind.file_name(mechanism))
+
+
+def source_files(mechanism: Mechanism, kind: Kind) -> dict[str, str]:
+    """All C files of a native FMU by name: the shell, the standard's headers, what is generated."""
+    shell = SOURCES / "native"
+    headers = resources.files("fmpy") / "c-code"
+    files = {name: (shell / name).read_text(encoding="utf-8") for name in (f"fmi{kind.fmi}.c", *_SHELL)}
+    files |= {name: (headers / name).read_text(encoding="utf-8") for name in _HEADERS[kind.fmi]}
+    return files | generated(mechanism, kind)
+
+
+def _binaries(identifier: str, kind: Kind, sources: dict[str, str], platforms: Sequence[str]) -> dict[str, bytes]:
+    """The libraries by their place in the archive; those of one place, for two architectures of macOS, joined."""
+    found: dict[str, list[bytes]] = {}
+    with tempfile.TemporaryDirectory(prefix="linkwork-native-") as folder:
+        for name, text in sources.items():
+            (Path(folder) / name).write_text(text, encoding="utf-8")
+        files = [name for name in sources if name.endswith(".c")]
+        for name in platforms:
+            platform = PLATFORMS[name]
+            place = platform.folder_fmi2 if kind.fmi == 2 else platform.folder_fmi3
+            library = f"{identifier}.{platform.suffix}"
+            compile_library(folder, files, library, platform.target)
+            found.setdefault(f"binaries/{place}/{library}", []).append((Path(folder) / library).read_bytes())
+    return {place: parts[0] if len(parts) == 1 else _universal(parts) for place, parts in found.items()}
+
+
+def compile_library(
+    folder: Path | str, files: Sequence[str], library: str, target: str, options: Sequence[str] = OPTIONS
+) -> None:
+    """Compile C files of a folder to a library in it.
+
+    Raises
+    ------
+    BuildError
+        With what the compiler printed, if it failed, or if it is not installed.
+    """
+    if importlib.util.find_spec("ziglang") is None:
+        raise BuildError("native FMUs are compiled by Zig, which is not installed: pip install 'linkwork[native]'")
+    cache = cache_root() / "zig"
+    if not cache.is_dir():
+        sys.stderr.write("linkwork: Zig compiles what it needs itself, once on this machine ...\n")
+    environment = {"ZIG_GLOBAL_CACHE_DIR": str(cache), "ZIG_LOCAL_CACHE_DIR": str(cache)}
+    done = subprocess.run(
+        [sys.executable, "-m", "ziglang", "cc", "-target", target, *options, "-o", library, *files, "-lm"],
+        cwd=folder,
+        env=os.environ | environment,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    if done.returncode != 0:
+        raise BuildError(f"{library} cannot be compiled for {target}:\n{done.stderr}")
+
+
+def _universal(parts: Sequence[bytes]) -> bytes:
+    """Libraries of macOS for several architectures in one file, as Apple's loader reads it (<mach-o/fat.h>)."""
+    align = 14  # pages of 16 KiB
+    header = struct.pack(">II", 0xCAFEBABE, len(parts))
+    body = b""
+    start = 1 << align
+    for part in parts:
+        cpu, subtype = struct.unpack_from("<ii", part, 4)
+        offset = start + len(body)
+        header += struct.pack(">iiIII", cpu, subtype, offset, len(part), align)
+        body += part + bytes(-len(part) % (1 << align))
+    return header + bytes(start - len(header)) + body
