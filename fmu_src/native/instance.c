@@ -112,9 +112,11 @@ static void forget(Instance *c)
     c->s.cause_message[0] = 0;
 }
 
-Status instance_setup(Instance *c, bool tolerance_given, double tolerance, double start)
+Status instance_setup(Instance *c, bool tolerance_given, double tolerance, double start, bool stop_given, double stop)
 {
     Digits number;
+    if (stop_given && !(stop > start))
+        return instance_say(c, ERROR, "the stop time is %s s: it must be after the start time", digits(number, stop));
     if (!isfinite(start))
         return instance_say(c, ERROR, "the time at the start is %s s: it must be a finite number", digits(number, start));
     if (tolerance_given && !(isfinite(tolerance) && tolerance > 0.0))
@@ -213,6 +215,15 @@ Status instance_get(Instance *c, const char *function, unsigned reference, Kind 
     return OK;
 }
 
+Status instance_get_integer(Instance *c, const char *function, unsigned reference, Kind kind, int *value)
+{
+    double number;
+    if (instance_get(c, function, reference, kind, &number) != OK)
+        return ERROR;
+    *value = (int)number;
+    return OK;
+}
+
 Status instance_get_text(Instance *c, const char *function, unsigned reference, const char **value)
 {
     if (!variable(c, function, reference, STRING))
@@ -299,6 +310,20 @@ Status instance_output_slopes(
     return OK;
 }
 
+/* What this FMU has none of is good where nothing is asked for. */
+Status instance_none(Instance *c, const char *function, size_t count)
+{
+    return count == 0 ? OK : instance_say(c, ERROR, "%s: this FMU has nothing of the kind", function);
+}
+
+bool instance_counts(Instance *c, const char *function, size_t count, size_t right)
+{
+    if (count == right)
+        return true;
+    instance_say(c, ERROR, "%s: %lu numbers: it must be %lu", function, (unsigned long)count, (unsigned long)right);
+    return false;
+}
+
 /* Steps */
 
 Status instance_step(Instance *c, double time, double step, const Watch *watch)
@@ -306,7 +331,6 @@ Status instance_step(Instance *c, double time, double step, const Watch *watch)
     char sentence[SENTENCE];
     Reason ended;
     Reason reason = plant_step(&c->s.plant, time, step, watch, c->early_return, &ended, sentence);
-    c->last_successful = c->s.plant.time;
     c->stopped = reason == GOOD && ended != GOOD;
     if (reason == GOOD) {
         c->stale = true;
@@ -332,7 +356,7 @@ Status instance_step(Instance *c, double time, double step, const Watch *watch)
 
 /* Model exchange */
 
-Status instance_new_discrete_states(Instance *c, bool *terminate, bool *values_changed)
+void instance_new_discrete_states(Instance *c, bool *terminate, bool *values_changed)
 {
     *values_changed = plant_jump(&c->s.plant);
     *terminate = !(plant_margin(&c->s.plant) >= 0.0);
@@ -341,25 +365,16 @@ Status instance_new_discrete_states(Instance *c, bool *terminate, bool *values_c
         note(c, LIMIT_OF_ASSEMBLY, "the motion has reached the limit of assembly");
         instance_say(c, WARNING, "%s", c->s.message);
     }
-    return OK;
 }
 
-Status instance_set_time(Instance *c, double time)
+Status instance_set_time(Instance *c, const char *function, double time)
 {
     Digits number;
     if (!isfinite(time))
-        return instance_say(c, ERROR, "the time is %s s: it must be a finite number", digits(number, time));
+        return instance_say(c, ERROR, "%s: the time is %s s: it must be a finite number", function, digits(number, time));
     c->s.plant.time = time;
     c->stale = true;
     return OK;
-}
-
-bool instance_counts(Instance *c, const char *function, size_t count, size_t right)
-{
-    if (count == right)
-        return true;
-    instance_say(c, ERROR, "%s: %lu numbers: it must be %lu", function, (unsigned long)count, (unsigned long)right);
-    return false;
 }
 
 Status instance_set_states(Instance *c, const char *function, const double x[], size_t count)
@@ -387,41 +402,19 @@ static Status begun(Instance *c, const char *function)
     return instance_say(c, ERROR, "%s: %s", function, sentence);
 }
 
-Status instance_states(Instance *c, const char *function, double x[], size_t count)
+Status instance_get_states(Instance *c, const char *function, What what, double values[], size_t count)
 {
-    if (!instance_counts(c, function, count, STATES) || begun(c, function) != OK)
+    double derivative[STATES], margin;
+    const double *found = what == VALUES ? c->s.plant.x : what == NOMINALS ? c->s.plant.scale : derivative;
+    if (!instance_counts(c, function, count, what == INDICATORS ? 1 : STATES) || begun(c, function) != OK)
         return ERROR;
-    memcpy(x, c->s.plant.x, sizeof c->s.plant.x);
-    return OK;
-}
-
-Status instance_nominals(Instance *c, const char *function, double nominals[], size_t count)
-{
-    if (!instance_counts(c, function, count, STATES) || begun(c, function) != OK)
-        return ERROR;
-    memcpy(nominals, c->s.plant.scale, sizeof c->s.plant.scale);
-    return OK;
-}
-
-Status instance_derivatives(Instance *c, const char *function, double result[], size_t count)
-{
-    double derivative[STATES];
-    if (!instance_counts(c, function, count, STATES) || begun(c, function) != OK)
-        return ERROR;
-    if (!plant_derivative(&c->s.plant, derivative))
-        return instance_say(c, DISCARD, "%s: the derivatives are not finite", function);
-    memcpy(result, derivative, sizeof derivative);
-    return OK;
-}
-
-Status instance_indicators(Instance *c, const char *function, double result[], size_t count)
-{
-    if (!instance_counts(c, function, count, 1) || begun(c, function) != OK)
-        return ERROR;
-    double margin = plant_margin(&c->s.plant);
-    if (isnan(margin))
-        return instance_say(c, DISCARD, "%s: the links cannot be joined", function);
-    result[0] = margin;
+    if (what == INDICATORS) {
+        margin = plant_margin(&c->s.plant);
+        found = &margin;
+    }
+    if ((what == DERIVATIVES && !plant_derivative(&c->s.plant, derivative)) || (what == INDICATORS && isnan(margin)))
+        return instance_say(c, DISCARD, "%s: the equations are not defined at this state", function);
+    memcpy(values, found, count * sizeof *values);
     return OK;
 }
 
@@ -497,24 +490,12 @@ Status instance_directional(
     return OK;
 }
 
-/* Saved state: a copy of Saved, and as text the same as JSON. Numbers are written as the hexadecimal digits of their bits, which
-   are the same on every platform and in every locale. */
+/* Saved state: a copy of Saved, and as text the same as JSON. Its numbers are written as the hexadecimal digits of their bits,
+   which are the same on every platform and in every locale. */
 
-typedef struct {
-    const char *name;
-    size_t offset, count; /* of numbers */
-} Field;
+#define HEADER "{\"model\":\"" MODEL_IDENTIFIER "\",\"token\":\"" TOKEN "\",\"format\":1,\"numbers\":\""
 
-#define FIELD(member) {#member, offsetof(Saved, member), sizeof(((Saved *)0)->member) / sizeof(double)}
-
-static const Field fields[] = {
-    FIELD(phase), FIELD(reason), FIELD(cause),
-    FIELD(plant.begun), FIELD(plant.time), FIELD(plant.start_time), FIELD(plant.master_tolerance), FIELD(plant.tolerance),
-    FIELD(plant.step_size), FIELD(plant.given), FIELD(plant.slopes), FIELD(plant.last_slopes), FIELD(plant.fresh),
-    FIELD(plant.applied), FIELD(plant.modes), FIELD(plant.p), FIELD(plant.x), FIELD(plant.scale), FIELD(plant.outputs),
-};
-
-enum { FIELDS = sizeof fields / sizeof *fields };
+static const char hexadecimal[] = "0123456789abcdef";
 
 Status instance_save(Instance *c, void **state)
 {
@@ -551,35 +532,25 @@ static void put(Out *out, const char *text)
 
 static void put_text(Out *out, const char *name, const char *text)
 {
-    put(out, ",\"");
     put(out, name);
-    put(out, "\":\"");
     for (; *text; text++) {
         char c = *text == '"' || *text == '\\' || (unsigned char)*text < ' ' ? '\'' : *text;
         put(out, (char[]){c, 0});
     }
-    put(out, "\"");
 }
 
-static void write_state(Out *out, const Saved *saved)
+static void put_saved(Out *out, const Saved *saved)
 {
-    put(out, "{\"model\":\"" MODEL_IDENTIFIER "\",\"token\":\"" TOKEN "\"");
-    for (int f = 0; f < FIELDS; f++) {
-        const double *numbers = (const double *)((const char *)saved + fields[f].offset);
-        put(out, ",\"");
-        put(out, fields[f].name);
-        put(out, "\":\"");
-        for (size_t i = 0; i < fields[f].count; i++) {
-            uint64_t bits;
-            memcpy(&bits, &numbers[i], sizeof bits);
-            for (int shift = 60; shift >= 0; shift -= 4)
-                put(out, (char[]){"0123456789abcdef"[(bits >> shift) & 15], 0});
-        }
-        put(out, "\"");
+    put(out, HEADER);
+    for (size_t i = 0; i < NUMBERS; i++) {
+        uint64_t bits;
+        memcpy(&bits, (const char *)saved + i * sizeof bits, sizeof bits);
+        for (int shift = 60; shift >= 0; shift -= 4)
+            put(out, (char[]){hexadecimal[bits >> shift & 15], 0});
     }
-    put_text(out, "message", saved->message);
-    put_text(out, "cause_message", saved->cause_message);
-    put(out, "}");
+    put_text(out, "\",\"message\":\"", saved->message);
+    put_text(out, "\",\"cause\":\"", saved->cause_message);
+    put(out, "\"}");
 }
 
 void instance_forget_saved(void **state)
@@ -593,7 +564,7 @@ void instance_forget_saved(void **state)
 size_t instance_serialized_size(const void *state)
 {
     Out out = {0};
-    write_state(&out, state);
+    put_saved(&out, state);
     return out.size;
 }
 
@@ -602,7 +573,7 @@ Status instance_serialize(Instance *c, const char *function, const void *state, 
     Out out = {.text = text};
     if (!instance_counts(c, function, size, instance_serialized_size(state)))
         return ERROR;
-    write_state(&out, state);
+    put_saved(&out, state);
     return OK;
 }
 
@@ -619,36 +590,30 @@ static bool take(In *in, const char *text)
     return true;
 }
 
-static bool take_name(In *in, const char *name)
-{
-    return take(in, ",\"") && take(in, name) && take(in, "\":\"");
-}
-
 static bool take_text(In *in, const char *name, char text[SENTENCE])
 {
-    if (!take_name(in, name))
-        return false;
     int length = 0;
+    if (!take(in, name))
+        return false;
     for (; in->at < in->end && *in->at != '"'; in->at++) {
         if (length == SENTENCE - 1 || (unsigned char)*in->at < ' ')
             return false;
         text[length++] = *in->at;
     }
     text[length] = 0;
-    return take(in, "\"");
+    return true;
 }
 
-static bool take_number(In *in, double *number)
+static bool take_number(In *in, char *number)
 {
     uint64_t bits = 0;
     if (in->end - in->at < 16)
         return false;
-    for (int i = 0; i < 16; i++) {
-        const char *digit = strchr("0123456789abcdef", *in->at);
-        if (!*in->at || !digit)
+    for (int i = 0; i < 16; i++, in->at++) {
+        const char *digit = memchr(hexadecimal, *in->at, 16);
+        if (!digit)
             return false;
-        bits = bits << 4 | (uint64_t)(digit - "0123456789abcdef");
-        in->at++;
+        bits = bits << 4 | (uint64_t)(digit - hexadecimal);
     }
     memcpy(number, &bits, sizeof bits);
     return true;
@@ -675,16 +640,11 @@ Status instance_deserialize(Instance *c, const char *text, size_t size, void **s
     In in = {text, text + size};
     if (!saved)
         return instance_say(c, ERROR, "no memory for a saved state");
-    bool good = take(&in, "{\"model\":\"" MODEL_IDENTIFIER "\",\"token\":\"" TOKEN "\"");
-    for (int f = 0; f < FIELDS && good; f++) {
-        double *numbers = (double *)((char *)saved + fields[f].offset);
-        good = take_name(&in, fields[f].name);
-        for (size_t i = 0; i < fields[f].count && good; i++)
-            good = take_number(&in, &numbers[i]);
-        good = good && take(&in, "\"");
-    }
-    good = good && take_text(&in, "message", saved->message) && take_text(&in, "cause_message", saved->cause_message) &&
-           take(&in, "}") && in.at == in.end && sound(saved);
+    bool good = take(&in, HEADER);
+    for (size_t i = 0; i < NUMBERS && good; i++)
+        good = take_number(&in, (char *)saved + i * sizeof(double));
+    good = good && take_text(&in, "\",\"message\":\"", saved->message) && take_text(&in, "\",\"cause\":\"", saved->cause_message) &&
+           take(&in, "\"}") && in.at == in.end && sound(saved);
     if (!good) {
         free(saved);
         return instance_say(c, ERROR, "the serialised state is damaged, or not one of a " MODEL_IDENTIFIER);

@@ -24,9 +24,12 @@ enum {
     SETTLED = INITIALIZATION | RUNNING | TERMINATED
 };
 
+/* What there is of each state; and the event indicators. */
+typedef enum { VALUES, DERIVATIVES, NOMINALS, INDICATORS } What;
+
 typedef struct Instance Instance;
 
-/* All that a saved state keeps. */
+/* All that a saved state keeps: numbers, all of them double, and two sentences. */
 typedef struct {
     Plant plant;
     double phase;
@@ -34,13 +37,14 @@ typedef struct {
     char message[SENTENCE], cause_message[SENTENCE];
 } Saved;
 
+#define NUMBERS (offsetof(Saved, message) / sizeof(double))
+
 struct Instance {
     Saved s;
     Interface interface;
     bool logging;
     bool stale;            /* the outputs are older than state and inputs */
     bool stopped;          /* an early return at the limit of assembly */
-    double last_successful;
     char *name;
     void (*log)(const Instance *c, Status status, const char *category, const char *message);
     void *environment;
@@ -64,27 +68,28 @@ bool instance_counts(Instance *c, const char *function, size_t count, size_t rig
 /* Say a sentence, and return the status. */
 Status instance_say(const Instance *c, Status status, const char *format, ...);
 
-Status instance_setup(Instance *c, bool tolerance_given, double tolerance, double start);
+Status instance_setup(Instance *c, bool tolerance_given, double tolerance, double start, bool stop_given, double stop);
 Status instance_exit_initialization(Instance *c);
 
 /* Values: `kinds` is one of the kinds that a function is for, or two. */
 Status instance_get(Instance *c, const char *function, unsigned reference, Kind kind, double *value);
+Status instance_get_integer(Instance *c, const char *function, unsigned reference, Kind kind, int *value);
 Status instance_get_text(Instance *c, const char *function, unsigned reference, const char **value);
 Status instance_set(Instance *c, const char *function, unsigned reference, Kind kind, double value);
 Status instance_set_slope(Instance *c, const char *function, unsigned reference, int order, double slope);
 Status instance_output_slopes(
     Instance *c, const char *function, const unsigned references[], size_t count, const int orders[], double values[]);
 
+/* The status of a call for what this FMU has none of, for a number of them. */
+Status instance_none(Instance *c, const char *function, size_t count);
+
 Status instance_step(Instance *c, double time, double step, const Watch *watch);
 
 /* Model exchange */
-Status instance_new_discrete_states(Instance *c, bool *terminate, bool *values_changed);
-Status instance_set_time(Instance *c, double time);
+void instance_new_discrete_states(Instance *c, bool *terminate, bool *values_changed);
+Status instance_set_time(Instance *c, const char *function, double time);
 Status instance_set_states(Instance *c, const char *function, const double x[], size_t count);
-Status instance_states(Instance *c, const char *function, double x[], size_t count);
-Status instance_nominals(Instance *c, const char *function, double nominals[], size_t count);
-Status instance_derivatives(Instance *c, const char *function, double result[], size_t count);
-Status instance_indicators(Instance *c, const char *function, double result[], size_t count);
+Status instance_get_states(Instance *c, const char *function, What what, double values[], size_t count);
 
 /* Derivatives of unknowns with respect to knowns, times a change of these, or the unknowns' weights times them. */
 Status instance_directional(

@@ -280,12 +280,12 @@ static double attempt(const Plant *a, double t, const double x[STATES], double h
 {
     double u[ROOM(INPUTS)], sum5 = 0.0, sum3 = 0.0;
     for (int stage = 1; stage <= STAGES; stage++) {
-        for (int i = 0; i < STATES; i++) {
-            double sum = 0.0;
-            for (int w = A_ROW[stage]; w < A_ROW[stage + 1]; w++)
-                sum += A_WEIGHT[w] * k[A_STAGE[w]][i];
-            result[i] = x[i] + h * sum;
-        }
+        double sum[STATES] = {0.0};
+        for (int w = A_ROW[stage]; w < A_ROW[stage + 1]; w++)
+            for (int i = 0; i < STATES; i++)
+                sum[i] += A_WEIGHT[w] * k[A_STAGE[w]][i];
+        for (int i = 0; i < STATES; i++)
+            result[i] = x[i] + h * sum[i];
         if (stage < STAGES) {
             inputs_after(a, t + C[stage] * h, u);
             derivative_of(a, result, u, k[stage]);
@@ -443,23 +443,22 @@ static Reason integrate(
 
 static Reason check_step(const Plant *a, double time, double step, char sentence[SENTENCE])
 {
+    /* what rounding in the master's own sum of steps can make, and no more */
+    double greater = fmax(fabs(time), fabs(a->time));
+    double slack = fmin(1e-6 * step, 1e-9) + 8.0 * (nextafter(greater, INFINITY) - greater);
+    bool numbers = isfinite(time) && isfinite(step);
+    if (numbers && step > 0.0 && fabs(time - a->time) <= slack)
+        return GOOD;
     Digits at, of, own;
     digits(at, time);
     digits(of, step);
-    digits(own, a->time);
-    if (!(isfinite(time) && isfinite(step)))
+    if (!numbers)
         snprintf(sentence, SENTENCE, "a step of %s s from t = %s s: both must be finite numbers", of, at);
     else if (step <= 0.0)
         snprintf(sentence, SENTENCE, "a step of %s s at t = %s s: it must be greater than zero", of, at);
-    else {
-        /* what rounding in the master's own sum of steps can make, and no more */
-        double greater = fmax(fabs(time), fabs(a->time));
-        double slack = fmin(1e-6 * step, 1e-9) + 8.0 * (nextafter(greater, INFINITY) - greater);
-        if (fabs(time - a->time) <= slack)
-            return GOOD;
+    else
         snprintf(sentence, SENTENCE, "a step %s: it starts at t = %s s, but the state is at t = %s s",
-                 time < a->time ? "backwards" : "over a gap", at, own);
-    }
+                 time < a->time ? "backwards" : "over a gap", at, digits(own, a->time));
     return STEP_OUT_OF_ORDER;
 }
 
