@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import os
 import re
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from analysis.export import build
+from analysis.export import NATIVE, NATIVE_FMI3, build, build_native
 from build_fmu import FMUS
 
 #: Tests of several files that share results which take long, by the unit of work they make; every other file is one.
@@ -49,7 +50,7 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     if hasattr(config, "workerinput"):
         items.sort(key=lambda item: item.path.name != "test_docs.py")
     for item in items:
-        if "fmus" in getattr(item, "fixturenames", ()) or item.path.parent.name == "fmu":
+        if {"fmus", "natives"} & set(getattr(item, "fixturenames", ())) or item.path.parent.name == "fmu":
             item.add_marker(pytest.mark.fmu)
 
 
@@ -58,3 +59,14 @@ def fmus(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     """Every FMU by its name, built from the sources as they are."""
     folder = tmp_path_factory.mktemp("fmu")
     return {name: build(mechanism, folder) for name, mechanism in FMUS.items()}
+
+
+@pytest.fixture(scope="session")
+def natives(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+    """Every native FMU by the name of its file, for this machine; LINKWORK_NATIVE_FMUS names a folder of others to test."""
+    given = os.environ.get("LINKWORK_NATIVE_FMUS")
+    if given:
+        return {path.stem: path for path in Path(given).glob("*.fmu")}
+    folder = tmp_path_factory.mktemp("native")
+    built = [build_native(mechanism, kind, folder) for mechanism in FMUS.values() for kind in (NATIVE, NATIVE_FMI3)]
+    return {path.stem: path for path in built}
