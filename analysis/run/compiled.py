@@ -273,7 +273,7 @@ def _begin_interval(stop, piece, problem, source, watch, work, carry, x, samples
 
 @inner
 def _not_finite(u):  # type: ignore[no-untyped-def]
-    """Number of a channel that is not finite; -1 if there is none."""
+    """Number of a channel, or of another component, that is not finite; -1 if there is none."""
     for i in range(u.shape[0]):
         if not isfinite(u[i]):
             return i
@@ -298,14 +298,15 @@ def _refused(t, h, piece, constant, problem, source, work, carry, x):  # type: i
 
 
 @inner
-def _cut_of_step(t, h, t_new, x, constant, piece, problem, source, watch, work, carry, samples):  # type: ignore[no-untyped-def]
-    """What cuts a good step short, and at which fraction of it; records the events and makes the interpolant if need be."""
+def _released(y, problem, source):  # type: ignore[no-untyped-def]
+    """Whether the torsion bar is released in a step that ends at y."""
     law = source.law
-    limit = _clearance(problem, work.y, work.held, work.outputs) < LIMIT_SINE
-    release = law[2] != 0.0 and problem.hold == 0.0 and work.y[source.law_places[1]] >= law[1]
-    sampled = carry.sample < samples.shape[0] and samples[carry.sample] < t_new
-    if not (limit or release or sampled or watch.table.shape[0] > 0):
-        return NOTHING, 2.0
+    return law[2] != 0.0 and problem.hold == 0.0 and y[source.law_places[1]] >= law[1]
+
+
+@inner
+def _cut_of_step(clearance, t, h, x, constant, piece, problem, source, watch, work, carry):  # type: ignore[no-untyped-def]
+    """What cuts a good step short, and at which fraction of it; makes the interpolant and records the events."""
     _copy(work.held, work.inside)
     for s in range(13, 16):
         stage(s, x, work.k, h, work.z)
@@ -315,10 +316,10 @@ def _cut_of_step(t, h, t_new, x, constant, piece, problem, source, watch, work, 
     carry.evaluations += 3
     interpolant(x, work.y, work.k, h, work.f)
     what, cut = NOTHING, 2.0
-    if limit:
+    if clearance < LIMIT_SINE:
         what = ASSEMBLY
         cut = _locate(ASSEMBLY, 0.0, 1.0, t, h, x, constant, piece, problem, source, watch, work)
-    if release:
+    if _released(work.y, problem, source):
         s = _locate(RELEASE, 0.0, 1.0, t, h, x, constant, piece, problem, source, watch, work)
         if s < cut:
             what, cut = RELEASE, s
@@ -415,13 +416,25 @@ def _cross_interval(stop, piece, problem, source, watch, work, carry, x, samples
         error /= problem.tolerance
         good = error <= 1.0
         t_new = stop if last else carry.begin + (carry.elapsed + h)
+        # inside: whether something is to be found or recorded in the step
+        clearance, inside = 0.0, False
         if good:
             if not constant:
                 channels_at(t_new, piece, y, source, held)
-            evaluate(derivative, t_new, y, problem.modes, held, problem.p, k[12])
-            carry.evaluations += 1
-            for i in range(x.shape[0]):
-                good &= not isnan(k[12, i])
+            clearance = _clearance(problem, y, held, work.outputs)
+            inside = (
+                clearance < LIMIT_SINE
+                or _released(y, problem, source)
+                or (carry.sample < samples.shape[0] and samples[carry.sample] < t_new)
+                or watch.table.shape[0] > 0
+            )
+            # a NaN, beyond the limit of assembly
+            good = not isnan(clearance)
+            # the interpolant and the next step begin with the right-hand side at the end; after the last nobody asks for it
+            if inside or not last:
+                evaluate(derivative, t_new, y, problem.modes, held, problem.p, k[12])
+                carry.evaluations += 1
+                good &= _not_finite(k[12]) < 0
         if not good:
             carry.rejected += 1
             carry.step = shorter(h, error)
@@ -430,7 +443,9 @@ def _cross_interval(stop, piece, problem, source, watch, work, carry, x, samples
             continue
         carry.step = following(h, carry.step, error)
         before = carry.found
-        what, cut = _cut_of_step(t, h, t_new, x, constant, piece, problem, source, watch, work, carry, samples)
+        what, cut = NOTHING, 2.0
+        if inside:
+            what, cut = _cut_of_step(clearance, t, h, x, constant, piece, problem, source, watch, work, carry)
         _settle_events(before, cut, carry.elapsed, h, watch, carry)
         if what != NOTHING:
             t_new = carry.begin + (carry.elapsed + cut * h)

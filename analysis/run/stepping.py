@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from math import isfinite, nan
+
 import numpy as np
 
 from linkwork import tableau
@@ -55,13 +57,15 @@ def attempt(equation, modes, p, scale, t, h, x, k, y, constant, piece, source, u
 
 @inner
 def _local_error(x, y, k, h, scale):  # type: ignore[no-untyped-def]
-    """Hairer's estimate of the error of a step from x to y relative to the scale, of order 8 in h."""
+    """Hairer's estimate of the error of a step from x to y relative to the scale, of order 8 in h; NaN if y is not finite."""
     sum3 = sum5 = 0.0
     for i in range(x.shape[0]):
         e3 = e5 = 0.0
         for j in range(STAGES):
             e3 += E3[j] * k[j, i]
             e5 += E5[j] * k[j, i]
+        if not isfinite(y[i]):
+            return nan
         weight = scale[i] + max(abs(x[i]), abs(y[i]))
         sum3 += (e3 / weight) ** 2
         sum5 += (e5 / weight) ** 2

@@ -133,6 +133,8 @@ def integrate(
 ) -> Result:
     """Integrate x' = f(x) over ``duration``, ending exactly there.
 
+    The right-hand side is not evaluated at the end itself: whether it is defined there is for ``accept`` to say.
+
     Parameters
     ----------
     f : callable
@@ -148,7 +150,7 @@ def integrate(
     step : float
         First step to try, as `Result.step` of the interval before gave it; 0 chooses one.
     accept : callable, optional
-        Called with each accepted state; may raise to stop the integration.
+        Called with each accepted state, which is finite; may raise to stop the integration.
     max_steps : int
         Accepted and refused steps allowed.
 
@@ -174,14 +176,19 @@ def integrate(
                 f"{max_steps} steps did not suffice: stopped {done:g} s into an interval of {duration:g} s"
             )
         evaluations += 11
+        k_new = k1
         try:
             x_new, error = rk_step(f, x, k1, h, scale)
             error /= tolerance
-            k_new = f(x_new) if error <= 1.0 else k1
+            if error <= 1.0 and not all(map(isfinite, x_new)):
+                error = float("nan")
+            # the next step begins with the right-hand side at its start; after the last one nobody asks for it
+            if error <= 1.0 and not last:
+                evaluations += 1
+                k_new = f(x_new)
         except UNDEFINED:
             error = float("nan")
         if error <= 1.0:
-            evaluations += 1
             if accept is not None:
                 accept(x_new)
             factor = GREATEST_FACTOR if error == 0.0 else min(GREATEST_FACTOR, SAFETY * error ** (-1.0 / tableau.ORDER))

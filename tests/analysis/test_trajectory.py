@@ -48,10 +48,18 @@ def test_counts_of_the_integrator(trajectory: Trajectory) -> None:
     assert set(counts) == {"steps", "rejected", "evaluations", "seconds", "seconds_integrating"}
     assert 0.0 < counts["seconds_integrating"] < counts["seconds"]
     attempts = counts["steps"] + counts["rejected"]
-    # twelve a step and three for its interpolant; a refused one spends eleven, or twelve
+    # twelve a step and three for its interpolant; a refused one, and the last one of an interval, spends eleven, or twelve
     assert 11 * attempts < counts["evaluations"] < 15 * attempts + 20
     assert counts["seconds"] > 0.0
     assert trajectory.source == "compiled DOP853"
+
+
+def test_counts_of_short_intervals() -> None:
+    inputs = Inputs(speed=SETS["table-3.1"].crank_speed)
+    counts = simulate(TABLE_3_1, inputs, stop_time=0.05, step=5e-4, hold=5e-4).statistics
+    assert counts["rejected"] == 0
+    # each interval is one step, but for the first ones: eleven evaluations, and that at its start
+    assert counts["evaluations"] == 12 * counts["steps"]
 
 
 def test_output_that_does_not_exist(trajectory: Trajectory) -> None:

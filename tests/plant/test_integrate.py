@@ -121,10 +121,13 @@ def test_ends_exactly_and_counts_its_evaluations() -> None:
         calls += 1
         return (1.0, x[1])
 
-    result = integrate(f, (0.0, 1.0), 0.3, tolerance=1e-10, scale=UNIT)
-    assert result.x[0] == pytest.approx(0.3, rel=1e-15)
-    assert result.x[1] == pytest.approx(exp(0.3), rel=1e-10)
-    assert result.evaluations == calls
+    accepted: list[Vector] = []
+    result = integrate(f, (0.0, 1.0), 3.0, tolerance=1e-10, scale=UNIT, accept=accepted.append)
+    assert result.x[0] == pytest.approx(3.0, rel=1e-15)
+    assert result.x[1] == pytest.approx(exp(3.0), rel=1e-9)
+    assert len(accepted) > 1
+    # the start, and that of every step after the first is the end of the one before
+    assert result.evaluations == calls == 11 * result.steps + len(accepted)
 
 
 def test_step_size_is_carried_over_and_not_shortened_by_the_end() -> None:
@@ -136,8 +139,8 @@ def test_step_size_is_carried_over_and_not_shortened_by_the_end() -> None:
         x, step = result.x, result.step
         evaluations += result.evaluations
     assert step >= natural
-    # one step in each piece: 11 evaluations, and those at its start and its end
-    assert evaluations == 500 * 13
+    # one step in each piece: 11 evaluations, and that at its start; nobody asks for that at its end
+    assert evaluations == 500 * 12
     assert np.abs(np.array(x) - pendulum_at(5.0)).max() < 1e-12
     # the carried step is tried first, so that the next interval begins where this one left off
     first = integrate(pendulum, PENDULUM_START, 1.5 * natural, tolerance=1e-9, scale=UNIT)
@@ -223,6 +226,26 @@ def test_right_hand_side_that_is_not_finite_is_refused(value: float) -> None:
         integrate(
             f, (0.0, 0.0), 1.0, tolerance=1e-9, scale=UNIT, accept=lambda x: isfinite(x[1]) or pytest.fail("not finite")
         )
+
+
+def test_right_hand_side_at_the_end_is_not_evaluated() -> None:
+    calls = 0
+
+    def f(x: Vector) -> Vector:
+        nonlocal calls
+        calls += 1
+        if calls > 12:
+            raise ValueError("not defined at the end")
+        return (1.0, 1.0)
+
+    result = integrate(f, (0.0, 0.0), 1.0, tolerance=1e-3, scale=UNIT, step=1.0)
+    assert result.x == pytest.approx(UNIT, rel=1e-15)
+
+
+def test_a_state_that_is_not_finite_is_refused() -> None:
+    # its error relative to its size would be zero
+    with pytest.raises(IntegrationError, match="step size fell"):
+        integrate(lambda x: (1e307,), (1.79e308,), 1.0, tolerance=1e-3, scale=(1.0,), step=1.0)
 
 
 def test_a_stray_error_is_not_swallowed() -> None:
