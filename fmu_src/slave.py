@@ -51,6 +51,14 @@ _NOT_TAKEN = {
     "parameter": "a fixed parameter, set after the initialisation",
 }
 
+#: The states of a run: what is allowed in each, FMI 2.0.4 says in 4.2.4.
+INSTANTIATED, INITIALISING, RUNNING, TERMINATED = PHASES = (
+    "instantiated",
+    "in initialisation",
+    "running",
+    "terminated",
+)
+
 #: Libraries of FMUs that `_end_library_in_order` has seen to.
 _libraries: set[Path] = set()
 
@@ -116,6 +124,9 @@ class LinkworkSlave(Fmi2Slave):
         self._wrapped = "logger" in kwargs
         if self._wrapped:
             _end_library_in_order(self.resources, type(self).__name__)
+            # put there by the wrapper at each instantiation; everything is imported by now
+            if self.resources in sys.path:
+                sys.path.remove(self.resources)
         self._names = [v.name for v in self.variables]
         self._kinds = [v.kind for v in self.variables]
         self._causalities = [v.causality for v in self.variables]
@@ -125,7 +136,7 @@ class LinkworkSlave(Fmi2Slave):
         self._message_at = self._names.index("solver.message")
         self._values: list[Any] = [v.start for v in self.variables]
         self._plant: Plant | None = None
-        self._running = False
+        self._phase = INSTANTIATED
         self._stale = True
         #: status and sentence of what went wrong first since the last good step, other than steps out of order
         self._cause: tuple[int, str] | None = None
@@ -149,30 +160,43 @@ class LinkworkSlave(Fmi2Slave):
 
     # Lifecycle
 
+    def _expect(self, call: str, phase: str) -> None:
+        """Refuse a call in another phase than the one it belongs to."""
+        if self._phase != phase:
+            raise self._fail(StepError(f"{call} out of order: the slave is {self._phase}, not {phase}"))
+
     @_guarded
     def setup_experiment(self, start_time: float, stop_time: float | None, tolerance: float | None) -> None:
+        self._expect("fmi2SetupExperiment", INSTANTIATED)
         self._start_time = start_time
         self._master_tolerance = tolerance
         self._plant = None
         self._stale = True
 
+    @_guarded
     def enter_initialization_mode(self) -> None:
-        pass
+        self._expect("fmi2EnterInitializationMode", INSTANTIATED)
+        self._phase = INITIALISING
 
     @_guarded
     def exit_initialization_mode(self) -> None:
+        self._expect("fmi2ExitInitializationMode", INITIALISING)
         error = self._refresh()
         if error is not None:
             raise self._fail(error) from error
         self._values[self._status_at] = STATUS_GOOD
         self._values[self._message_at] = ""
         self._cause = None
-        self._running = True
+        self._phase = RUNNING
 
     @_guarded
     def do_step(self, current_time: float, step_size: float) -> bool:
         try:
-            if not self._running or self._plant is None:
+            if self._phase == TERMINATED:
+                return self._refuse(
+                    _status(StepError()), f"a step at t = {current_time:.9g} s after the end of the run"
+                )
+            if self._phase != RUNNING or self._plant is None:
                 why = f": {self._cause[1]}" if self._cause else ""
                 return self._refuse(
                     STATUS_NOT_INITIALISED, f"a step at t = {current_time:.9g} s before the initialisation{why}"
@@ -197,7 +221,8 @@ class LinkworkSlave(Fmi2Slave):
             return self._refuse(*self._cause)
 
     def terminate(self) -> None:
-        self._running = False
+        # whatever the phase: a master that cleans up does no harm
+        self._phase = TERMINATED
 
     def _refuse(self, status: int, sentence: str) -> bool:
         self._values[self._status_at] = status
@@ -245,7 +270,7 @@ class LinkworkSlave(Fmi2Slave):
             # a read does not fail, for there are masters that take what it returns all the same: the last good outputs
             # stay, and the initialisation or the next step will be refused
             error = self._refresh()
-            refused = self._running and self._values[self._status_at] != STATUS_GOOD
+            refused = self._phase in (RUNNING, TERMINATED) and self._values[self._status_at] != STATUS_GOOD
             if error is not None and not refused:
                 self._values[self._status_at] = _status(error)
                 self._values[self._message_at] = str(error)
@@ -260,14 +285,17 @@ class LinkworkSlave(Fmi2Slave):
             raise self._fail(LinkworkError(f"variable {self._names[reference]} is not of type {kind}"))
 
     def _set(self, references: list[int], values: list[Any], kind: str) -> None:
+        if self._phase == TERMINATED:
+            self._expect(f"fmi2Set{kind}", RUNNING)
+        running = self._phase == RUNNING
         for reference, value in zip(references, values):
             self._check_reference(reference, kind)
             name = self._names[reference]
             causality = self._causalities[reference]
             computed = self._computed[reference]
-            if computed and not self._running:
+            if computed and not running:
                 continue  # a guess for the initialisation, which is solved without one
-            if computed or (causality == "parameter" and self._running):
+            if computed or (causality == "parameter" and running):
                 why = _NOT_TAKEN[causality]
                 self._say(f"{name} is {why}: the value {value!r} was not taken", Fmi2Status.warning)
                 continue
@@ -276,7 +304,7 @@ class LinkworkSlave(Fmi2Slave):
             if causality == "parameter":
                 self._plant = None
             elif self._plant is not None:
-                if self._running:
+                if running:
                     self._plant.set_input(name, value)
                 else:
                     self._plant = None
@@ -321,7 +349,7 @@ class LinkworkSlave(Fmi2Slave):
             "model": type(self).__name__,
             "interface": self.guid_of_interface,
             "values": list(self._values),
-            "running": self._running,
+            "phase": self._phase,
             "stale": self._stale,
             "cause": self._cause,
             "start_time": self._start_time,
@@ -341,8 +369,10 @@ class LinkworkSlave(Fmi2Slave):
                 )
             plant = None if state["plant"] is None else Plant.restore(self.mechanism, state["plant"])
             values, cause = list(state["values"]), state["cause"]
-            running, stale = state["running"], state["stale"]
+            phase, stale = state["phase"], state["stale"]
             start_time, master_tolerance = state["start_time"], state["master_tolerance"]
+            if phase not in PHASES or (phase == RUNNING and plant is None):
+                raise StateError(f"the saved state is damaged: a slave that is {phase!r} without a plant")
         except LinkworkError as error:
             raise self._fail(error) from error
         except (KeyError, TypeError) as error:
@@ -350,7 +380,7 @@ class LinkworkSlave(Fmi2Slave):
         self._plant = plant
         self._values = values
         self._cause = None if cause is None else (cause[0], cause[1])
-        self._running, self._stale = running, stale
+        self._phase, self._stale = phase, stale
         self._start_time, self._master_tolerance = start_time, master_tolerance
 
     @staticmethod

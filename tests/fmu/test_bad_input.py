@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from .models import Changes, Model, each
+from .models import MODELS, Changes, Model, each
 from .runner import run_in_process
 from .test_description import INPUTS
 
@@ -109,6 +109,9 @@ def initialise_badly(fmu: str, folder: str, cases: list[dict[str, Any]], times: 
             instance.free()
             if k == 0:
                 found.append([trouble, after, outputs, instance.log])
+            # without logging, too, the cause is to be read
+            assert [trouble, after] == found[-1][:2]
+            assert bool(instance.log) == (k % 2 == 0)
     # the process is as good as before
     instance = fmu.instantiate().start()
     instance.run([1e-3] * 10)
@@ -325,18 +328,13 @@ def out_of_order(fmu: str, folder: str) -> list[Any]:
     found.append([instance.set("crank.angle", 1.0), instance.get("crank.angle") == 1.0, instance.log[-1]])
     assert instance.restore(state) == 0
     found.append([instance.step(0.0, 1e-3), instance.trouble()])
-    instance.start()
-    instance.run([1e-3])
-    assert instance.terminate() == 0
-    last = instance.outputs()
-    found.append([instance.step(1e-3, 1e-3), instance.outputs() == last])
     instance.free_state(state)
     instance.free()
     return found
 
 
 def test_calls_out_of_order(fmu: Path, model: Model, tmp_path: Path) -> None:
-    before, parameter, output, restored, after = run_in_process(out_of_order, fmu, tmp_path)
+    before, parameter, output, restored = run_in_process(out_of_order, fmu, tmp_path)
     assert before == [2, [5, "a step at t = 0 s before the initialisation"]]
     # the default: 5 cm, 12 in
     assert parameter[:2] == [0, pytest.approx({"FiveBarSlider": 0.05, "SliderCrank": 0.3048}[model.name], rel=1e-15)]
@@ -348,7 +346,75 @@ def test_calls_out_of_order(fmu: Path, model: Model, tmp_path: Path) -> None:
     assert output[:2] == [0, False]
     assert output[2][2] == "crank.angle is an output: the value 1.0 was not taken"
     assert restored == before
-    assert after == [2, True]
+
+
+#: Calls that lead to each phase of a run, and those that are refused there.
+PHASES: dict[str, tuple[list[str], list[str]]] = {
+    "instantiated": ([], ["exit", "step"]),
+    "in initialisation": (["setup", "enter"], ["setup", "enter", "step"]),
+    "running": (["setup", "enter", "exit", "step"], ["setup", "enter", "exit"]),
+    "terminated": (
+        ["setup", "enter", "exit", "step", "terminate"],
+        ["setup", "enter", "exit", "step", "set input", "set parameter"],
+    ),
+}
+
+
+def refused_calls(fmu: str, folder: str, name: str, lead: list[str], calls: list[str]) -> list[Any]:
+    """Status of each call, solver.status, the sentence, and whether it left the outputs; then of what is right to do."""
+    from bare_master import Fmu
+
+    fmu = Fmu(fmu, folder)
+
+    def do(instance, call):
+        if call == "step":
+            return instance.step(0.0, 1e-3)
+        if call.startswith("set "):
+            return instance.set(name if call == "set input" else "crank.length", 0.06)
+        return getattr(instance, call)()
+
+    found = []
+    for call in calls:
+        instance = fmu.instantiate()
+        assert [do(instance, one) for one in lead] == [0] * len(lead)
+        before = instance.outputs()
+        # more than once: a refused call leaves nothing behind that the next one breaks on
+        statuses = [do(instance, call) for _ in range(3)]
+        trouble, said = instance.trouble(), [text for status, _, text in instance.log if status == 3]
+        same = instance.outputs() == before
+        rest = [one for one in ("setup", "enter", "exit") if one not in lead]
+        onward = [do(instance, one) for one in rest]
+        if "terminate" not in lead:
+            time = 1e-3 if "step" in lead else 0.0
+            onward += [instance.step(time, 1e-3), *instance.trouble()]
+        onward += [instance.terminate(), instance.terminate()]
+        instance.free()
+        found.append([statuses, trouble, said, same, onward])
+    return found
+
+
+@each(dict.fromkeys(MODELS, PHASES), "lead", "calls")
+def test_calls_that_the_phase_of_a_run_does_not_allow(
+    fmu: Path, model: Model, tmp_path: Path, request: pytest.FixtureRequest, lead: list[str], calls: list[str]
+) -> None:
+    phase = request.node.callspec.id.partition("-")[2]
+    for call, (statuses, trouble, said, same, onward) in zip(
+        calls, run_in_process(refused_calls, fmu, tmp_path, model.force, lead, calls)
+    ):
+        if call == "step":
+            # discarded, as any step that cannot be taken
+            assert statuses == [2] * 3
+            assert trouble[0] == (1 if phase == "terminated" else 5)
+            assert trouble[1].startswith("a step at t = 0 s " + ("after" if phase == "terminated" else "before"))
+        else:
+            # fatal: the wrapper has no other answer to an exception
+            assert statuses == [4] * 3
+            assert trouble == [1, said[0]]
+            assert said == said[:1] * 3
+            assert f"out of order: the slave is {phase}, not" in said[0]
+        assert same
+        # and the run goes on as if nothing had been
+        assert [one for one in onward if one] == []
 
 
 def go_on_regardless(fmu: str, folder: str, name: str, value: float) -> list[Any]:

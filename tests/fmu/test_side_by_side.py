@@ -72,6 +72,29 @@ def test_all_models_in_one_process(fmus: dict[str, Path], tmp_path: Path) -> Non
         assert late == [apart[name][1][0] for name in order]
 
 
+def module_path(fmus: list[str], folder: str) -> list[Any]:
+    """The module path before, and after instances of each FMU, one of them reset."""
+    import sys
+    from pathlib import Path
+
+    from bare_master import Fmu
+
+    before = list(sys.path)
+    loaded = [Fmu(fmu, Path(folder) / str(k)) for k, fmu in enumerate(fmus)]
+    for _ in range(3):
+        for fmu in loaded:
+            instance = fmu.instantiate().start()
+            assert instance.reset() == 0
+            instance.start().run([1e-3])
+            instance.free()
+    return [before, list(sys.path)]
+
+
+def test_module_path_of_the_process_stays_as_it_was(fmus: dict[str, Path], tmp_path: Path) -> None:
+    before, after = run_in_process(module_path, [str(fmus[name]) for name in MODELS], tmp_path)
+    assert after == before
+
+
 def fail_together(fmus: list[str], folder: str, values: list[dict[str, float]], bad: list[list[Any]]) -> list[Any]:
     """Instances of several FMUs that refuse a step, each in its turn, and are restored, beside the others."""
     from pathlib import Path

@@ -135,5 +135,6 @@ def test_master_tolerance_outside_the_range_is_brought_into_it(kind: type[Linkwo
     for given, taken in [(None, 1e-9), (1e-3, 1e-9), (1e-11, 1e-11), (0.0, 1e-13), (-1.0, 1e-13)]:
         slave = kind(instance_name="slave")
         slave.setup_experiment(0.0, None, given)
+        slave.enter_initialization_mode()
         slave.exit_initialization_mode()
         assert slave._get_fmu_state()["plant"]["tolerance"] == taken

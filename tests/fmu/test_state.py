@@ -269,7 +269,7 @@ def test_damaged_state_is_refused(fmu: Path, model: Model, tmp_path: Path) -> No
         "not JSON",
         "[1, 2]",
         json.dumps(whole | {"interface": "another"}),
-        json.dumps({name: value for name, value in whole.items() if name != "running"}),
+        json.dumps({name: value for name, value in whole.items() if name != "phase"}),
         json.dumps(whole | {"plant": {"time": 0.0}}),
         json.dumps(whole | {"plant": whole["plant"] | {"parameters": {"crank_length": -1.0}}}),
     ]
