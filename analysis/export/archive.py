@@ -17,6 +17,8 @@ from linkwork.errors import LinkworkError
 from linkwork.mechanism import Mechanism
 from linkwork.variables import Variable
 
+from ..run import unpacking_folder
+
 PACKAGE = Path(__file__).resolve().parents[1]
 #: The source root: beside the analysis package in a checkout, inside it where Linkwork is installed as a wheel.
 SOURCES = next(
@@ -135,7 +137,13 @@ def try_out(fmu: Path) -> None:
         With what the run printed, if it failed.
     """
     done = subprocess.run(
-        [sys.executable, "-c", _TRIAL, str(fmu)], capture_output=True, text=True, timeout=120, check=False
+        [sys.executable, "-c", _TRIAL, str(fmu)],
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=False,
+        # where FMPy unpacks it
+        env=os.environ | dict.fromkeys(("TMPDIR", "TEMP", "TMP"), unpacking_folder()),
     )
     if done.returncode != 0:
         raise BuildError(f"{fmu.name} was built but does not run:\n{done.stdout}{done.stderr}")

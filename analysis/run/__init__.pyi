@@ -15,6 +15,7 @@ from .cosimulation import FmuRun as FmuRun
 from .cosimulation import OutputDifference as OutputDifference
 from .cosimulation import compare as compare
 from .cosimulation import cosimulate as cosimulate
+from .cosimulation import unpacking_folder as unpacking_folder
 from .ensemble import Ensemble as Ensemble
 from .ensemble import simulate_many as simulate_many
 from .equations import constants as constants

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import os
+import re
 import shutil
-import sys
+import tempfile
 import time as clock
 from ctypes import byref
 from dataclasses import asdict, dataclass, replace
@@ -36,6 +38,28 @@ PRINCIPAL_ANGLES = ("coupler.angle", "rocker.angle")
 
 class CosimulationError(LinkworkError):
     """An FMU could not be loaded or initialised; the sentence is the FMU's own where it gave one."""
+
+
+def unpacking_folder() -> str:
+    """Folder to unpack an FMU in: that for temporary files, or another one if it is none that a Python FMU can read.
+
+    An FMU is told the URI of its folder. PythonFMU's wrapper decodes "%20" in it and nothing else, and where it does not find
+    its files then it ends the process.
+
+    Raises
+    ------
+    CosimulationError
+        If there is none.
+    """
+    here = tempfile.gettempdir()
+    others = ("/tmp", "/var/tmp") if os.name == "posix" else (os.environ.get("PUBLIC"), "C:/Windows/Temp")
+    for folder in (here, *others):
+        if folder and os.access(folder, os.W_OK) and not re.search("%(?!20)", Path(folder).absolute().as_uri()):
+            return folder
+    raise CosimulationError(
+        f"an FMU cannot be unpacked in {here}: of the characters in the folder's name PythonFMU's wrapper reads letters from a "
+        "to z, digits, spaces and - . _ ~ alone; set TMPDIR to another folder"
+    )
 
 
 class FmuRun:
@@ -86,7 +110,8 @@ class FmuRun:
         self._callbacks.logger = fmi2CallbackLoggerTYPE(self._log)
         addLoggerProxy(byref(self._callbacks))
         try:
-            self._folder = extract(str(fmu))
+            self._folder = tempfile.mkdtemp(dir=unpacking_folder())
+            extract(str(fmu), self._folder)
             self._slave = FMU2Slave(
                 guid=description.guid,
                 unzipDirectory=self._folder,
@@ -144,12 +169,8 @@ class FmuRun:
         slave = self.__dict__.pop("_slave", None)
         if slave is not None and slave.component:
             slave.freeInstance()
-        if self._folder is None:
-            return
-        # the wrapper puts the unpacked FMU on the module path of this process and leaves it there
-        resources = str(Path(self._folder) / "resources")
-        sys.path[:] = [entry for entry in sys.path if Path(entry) != Path(resources)]
-        shutil.rmtree(self._folder, ignore_errors=True)
+        if self._folder is not None:
+            shutil.rmtree(self._folder, ignore_errors=True)
 
 
 def cosimulate(

@@ -63,15 +63,16 @@ class Fmu:
         system, suffix = ("win", "dll") if sys.platform == "win32" else ("linux", "so")
         self.library = ctypes.CDLL(str(self.folder / "binaries" / f"{system}64" / f"{self.identifier}.{suffix}"))
 
-    def instantiate(self, name="slave", *, guid=None, logging=True):
+    def instantiate(self, name="slave", *, guid=None, logging=True, resources=None):
         """A new instance."""
-        return Instance(self, name, guid or self.root.get("guid"), logging)
+        resources = resources or (self.folder / "resources").as_uri()
+        return Instance(self, name, guid or self.root.get("guid"), logging, resources)
 
 
 class Instance:
     """One slave. The methods named after FMI functions return their status."""
 
-    def __init__(self, fmu, name, guid, logging):
+    def __init__(self, fmu, name, guid, logging, resources):
         self.fmu = fmu
         self.log = []
         # the references keep the callbacks alive as long as the instance may call them
@@ -80,7 +81,6 @@ class Instance:
         )
         create = fmu.library.fmi2Instantiate
         create.restype = c_void_p
-        resources = (fmu.folder / "resources").as_uri()
         component = create(
             name.encode(),
             c_int(CO_SIMULATION),
