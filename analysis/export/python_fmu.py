@@ -1,6 +1,6 @@
 """Making the Python FMUs.
 
-Each carries the plant, its slave and pythonfmu, and needs nothing but a Python 3 in the importing process. The plant
+Each carries the plant, its slave and pythonfmu, and needs nothing but a Python of `OLDEST` in the importing process. The plant
 and the slave travel under names with a short hash of their content, because FMUs in one process share one interpreter:
 so different mechanisms, builds and versions run side by side, each on its own equations.
 """
@@ -26,9 +26,12 @@ from ..mechanisms import check
 from .archive import SOURCES, BuildError, documentation, write
 from .description import PYTHON, description, token
 
+#: The oldest Python that what travels in the FMUs runs on.
+OLDEST = (3, 10)
+
 _NEEDS_PYTHON = (
-    "The importing process needs a Python 3 whose symbols it exports. A master that is not itself Python must preload "
-    "the Python library (on Linux: LD_PRELOAD=libpython3.x.so)."
+    f"The importing process needs a Python {OLDEST[0]}.{OLDEST[1]} or newer whose symbols it exports. A master that is not "
+    "itself Python must preload the Python library (on Linux: LD_PRELOAD=libpython3.x.so)."
 )
 
 
@@ -80,7 +83,12 @@ def build(mechanism: Mechanism, dest: Path | str = "build", sources: Path | str 
     return write(entries, dest / PYTHON.file_name(mechanism))
 
 
-_SLAVE = """from linkwork{package} import MECHANISM
+_SLAVE = """import sys
+
+if sys.version_info < {oldest}:
+    raise ImportError("{name}.fmu needs Python %d.%d or newer: this is %d.%d" % ({oldest} + sys.version_info[:2]))
+
+from linkwork{package} import MECHANISM
 from slave import LinkworkSlave
 
 
@@ -113,7 +121,7 @@ def _stage(mechanism: Mechanism, sources: Path, stage: Path) -> _Staged:
     kept |= {f"linkwork/{folder}/{path.relative_to(own).as_posix()}": path for path in sorted(own.rglob("*.py"))}
     files = {name: path.read_text(encoding="utf-8") for name, path in kept.items()}
     files["slave.py"] = (sources / "slave.py").read_text(encoding="utf-8")
-    files[f"{folder}_slave.py"] = _SLAVE.format(package=f".{folder}", name=mechanism.fmu)
+    files[f"{folder}_slave.py"] = _SLAVE.format(package=f".{folder}", name=mechanism.fmu, oldest=OLDEST)
     digest = hashlib.sha256()
     for name, text in sorted(files.items()):
         digest.update(f"{name}\0{text}\0".encode())

@@ -1,13 +1,17 @@
-"""The FMU runs on a Python with nothing installed."""
+"""The FMU runs on a Python with nothing installed, and on older and newer ones than that of the tests."""
 
 from __future__ import annotations
 
+import os
+import shutil
+import subprocess
 import sys
-import venv
 from pathlib import Path
 from typing import Any
 
 import pytest
+
+from analysis.export import SOURCES, python_fmu
 
 from .models import each
 from .runner import run_in_process
@@ -66,11 +70,28 @@ def run_fmpy(fmu: str, values: dict[str, float], steps: int) -> list[list[float]
     return [[float(row[name]) for name in outputs] for row in result]
 
 
-@pytest.fixture(scope="module")
-def bare_python(tmp_path_factory: pytest.TempPathFactory) -> Path:
+#: Versions of Python, the oldest that the FMUs run on and newer ones; each is looked for on the path and in pyenv.
+OLDEST = ".".join(map(str, python_fmu.OLDEST))
+VERSIONS = ["of the tests", OLDEST, "3.12", "3.13"]
+
+
+def interpreter(version: str) -> str:
+    """A Python of that version; the test is skipped where there is none."""
+    if version == "of the tests":
+        return sys.executable
+    homes = Path(os.environ.get("PYENV_ROOT", Path.home() / ".pyenv")) / "versions"
+    for found in (shutil.which(f"python{version}"), *sorted(homes.glob(f"{version}.*/bin/python"))):
+        asked = [str(found), "-c", "import sys, venv; print('%d.%d' % sys.version_info[:2])"]
+        if found and subprocess.run(asked, capture_output=True, text=True, check=False).stdout.strip() == version:
+            return str(found)
+    pytest.skip(f"there is no Python {version} on this machine")
+
+
+@pytest.fixture(scope="module", params=VERSIONS)
+def bare_python(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A virtual environment without even pip."""
     folder = tmp_path_factory.mktemp("bare") / "venv"
-    venv.EnvBuilder(with_pip=False, symlinks=sys.platform != "win32").create(folder)
+    subprocess.run([interpreter(request.param), "-m", "venv", "--without-pip", str(folder)], check=True)
     return folder / ("Scripts/python.exe" if sys.platform == "win32" else "bin/python")
 
 
@@ -82,3 +103,35 @@ def test_same_values_as_through_fmpy_bit_for_bit(
     assert len(bare) == 101
     assert bare[0] != bare[-1]
     assert bare == run_in_process(run_fmpy, fmu, values, 100)
+
+
+def instantiate_only(fmu: str, folder: str) -> str:
+    """What an FMU says that cannot be instantiated."""
+    from bare_master import Fmu
+
+    try:
+        Fmu(fmu, folder).instantiate()
+    except RuntimeError as error:
+        return str(error)
+    return ""
+
+
+@pytest.mark.parametrize("version", ["3.8", "3.9"])
+def test_older_python_is_refused_with_a_sentence(fmu: Path, tmp_path: Path, version: str) -> None:
+    said = run_in_process(instantiate_only, fmu, tmp_path, python=interpreter(version), options=("-I",))
+    assert f"{fmu.name} needs Python {OLDEST} or newer: this is {version}" in said
+
+
+def test_sources_use_nothing_newer_than_the_oldest_python(tmp_path: Path) -> None:
+    # where there is no such interpreter: syntax and the standard library's names, by the types of that version
+    options = ["--python-version", OLDEST, "--cache-dir", str(tmp_path), "--config-file", ""]
+    what = ["--ignore-missing-imports", "--package", "linkwork", "--module", "slave"]
+    done = subprocess.run(
+        [sys.executable, "-m", "mypy", *options, *what],
+        capture_output=True,
+        text=True,
+        check=False,
+        cwd=SOURCES,
+        env=os.environ | {"MYPYPATH": str(SOURCES)},
+    )
+    assert done.returncode == 0, done.stdout + done.stderr

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shutil
 import subprocess
 import sys
@@ -46,6 +47,22 @@ def test_archive(fmu: Path, model: Model) -> None:
     assert {f"binaries/linux64/{model.name}.so", f"binaries/win64/{model.name}.dll"} <= set(names)
     others = [other.plant for other in MODELS.values() if other != model]
     assert not [name for name in names if name.endswith(".pyc") or any(other in name for other in others)]
+
+
+def test_what_the_binaries_need_is_what_the_documentation_says(fmu: Path, model: Model) -> None:
+    with ZipFile(fmu) as archive:
+        linux = archive.read(f"binaries/linux64/{model.name}.so")
+        windows = archive.read(f"binaries/win64/{model.name}.dll")
+    page = (Path(__file__).parents[2] / "docs" / "fmu.md").read_text(encoding="utf-8")
+    # the names of symbols' versions and of libraries stand in the files as text
+    newest = max(int(minor) for minor in re.findall(rb"\0GLIBC_2\.(\d+)", linux))
+    assert f"glibc 2.{newest} and" in page
+    newest = max(int(minor) for minor in re.findall(rb"\0GLIBCXX_3\.4\.(\d+)", linux))
+    assert f"`GLIBCXX_3.4.{newest}`" in page
+    # that of the stable ABI, which has no number of a minor version
+    assert {b"python3.dll", b"MSVCP140.dll"} <= set(re.findall(rb"\w+\.dll", windows))
+    assert not re.search(rb"python3\d+\.dll", windows)
+    assert re.findall(rb"libpython[\w.]*", linux) == []
 
 
 def test_modules_inside_carry_the_hash_of_their_content(fmu: Path, model: Model, build_variant: Build) -> None:
