@@ -1,0 +1,31 @@
+"""The benchmark of the FMUs runs."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import benchmarks.fmu
+
+from .runner import run_in_process
+
+
+def short_benchmark(root: str) -> str:
+    """The benchmark's output with a few steps of each."""
+    import contextlib
+    import io
+    import sys
+
+    sys.path.insert(0, root)
+    import benchmarks.fmu
+
+    benchmarks.fmu.STEPS, benchmarks.fmu.REPEATS = 5, 1
+    with contextlib.redirect_stdout(io.StringIO()) as output:
+        benchmarks.fmu.main()
+    return output.getvalue()
+
+
+def test_benchmark() -> None:
+    root = Path(benchmarks.fmu.__file__).resolve().parents[1]
+    output = run_in_process(short_benchmark, root, options=())
+    assert "FMU through FMPy" in output
+    assert "one right-hand side in plain Python" in output
