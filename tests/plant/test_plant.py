@@ -341,6 +341,20 @@ def test_step_size_is_carried_from_step_to_step(monkeypatch: pytest.MonkeyPatch)
     assert calls == 12  # one step of the integrator, with the evaluation at its start and without that at its end
 
 
+def test_end_of_a_step_that_cannot_be_assembled_is_refused_without_the_equations(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    plant = speed_plant()
+    monkeypatch.setattr(plant, "_step_size", 1.0)
+    before = plant.state
+    # they are not asked at the end of a step, and know no limit here: the slider goes a metre
+    equations = plant.mechanism.equations._replace(derivative=lambda x, i, p: (0.0, 10.0, 0.0, 0.0, 0.0, 0.0))
+    monkeypatch.setattr(plant, "mechanism", replace(plant.mechanism, equations=equations))
+    with pytest.raises(AssemblyError, match=r"in the step from t = 0 s: the links cannot be joined at .* position 1"):
+        plant.step(0.0, 0.1)
+    assert plant.state == before
+
+
 @EVERY_DRIVE
 def test_setting_the_same_speeds_again_does_nothing(kind: Kind, drive: str) -> None:
     plain, again = kind.start(drive), kind.start(drive)
