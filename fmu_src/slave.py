@@ -138,7 +138,7 @@ class LinkworkSlave(Fmi2Slave):
         self._plant: Plant | None = None
         self._phase = INSTANTIATED
         self._stale = True
-        #: status and sentence of what went wrong first since the last good step, other than steps out of order
+        #: status and sentence of what went wrong first since the last good step, other than calls out of order
         self._cause: tuple[int, str] | None = None
         self._start_time = 0.0
         self._master_tolerance: float | None = None
@@ -193,9 +193,7 @@ class LinkworkSlave(Fmi2Slave):
     def do_step(self, current_time: float, step_size: float) -> bool:
         try:
             if self._phase == TERMINATED:
-                return self._refuse(
-                    _status(StepError()), f"a step at t = {current_time:.9g} s after the end of the run"
-                )
+                raise StepError(f"a step at t = {current_time:.9g} s after the end of the run")
             if self._phase != RUNNING or self._plant is None:
                 why = f": {self._cause[1]}" if self._cause else ""
                 return self._refuse(
@@ -236,8 +234,9 @@ class LinkworkSlave(Fmi2Slave):
 
     def _fail(self, error: LinkworkError) -> LinkworkError:
         """Log the sentence of an error that must be raised, for the wrapper's own message may leave it out."""
-        self._cause = (_status(error), str(error))
-        self._values[self._status_at], self._values[self._message_at] = self._cause
+        said = self._values[self._status_at], self._values[self._message_at] = (_status(error), str(error))
+        if not isinstance(error, StepError):
+            self._cause = said
         self._say(str(error), Fmi2Status.error)
         return error
 
