@@ -184,7 +184,7 @@ def test_failed_build_leaves_the_old_fmu(tmp_path: Path, fmu: Path, model: Model
 )
 def test_exit_codes(tmp_path: Path, arguments: list[str], code: int, message: str) -> None:
     done = subprocess.run(
-        [sys.executable, str(Path(build_fmu.__file__)), "--dest", str(tmp_path), *arguments],
+        [sys.executable, str(Path(build_fmu.__file__)), *arguments, "--dest", str(tmp_path), "--kinds", "python"],
         capture_output=True,
         text=True,
         timeout=120,
