@@ -29,9 +29,13 @@ fmu = Fmu(*sys.argv[2:4])
 uri = (fmu.folder / "resources").as_uri()
 """
 
-#: Calls by what they do; the plain one lives.
-CALLS = {
+#: Calls that are good or that the wrapper accepts, and those that end the process.
+LIVING = {
     "three slashes": "fmu.instantiate().start()",
+    "wrong GUID": "fmu.instantiate(guid='wrong').start()",
+}
+CALLS = {
+    **LIVING,
     "one slash": "fmu.instantiate(resources=uri.replace('file:///', 'file:/'))",
     "a host": "fmu.instantiate(resources=uri.replace('file:///', 'file://localhost/'))",
     "no string": """
@@ -69,7 +73,7 @@ def test_names_of_folders(five_bar: Path, tmp_path: Path, name: str, monkeypatch
 @pytest.mark.skipif(sys.platform == "win32", reason="a crash has another code there")
 @pytest.mark.parametrize("call", CALLS)
 def test_calls_that_end_the_process(five_bar: Path, tmp_path: Path, call: str) -> None:
-    assert (end_of(five_bar, tmp_path, CALLS[call]) < 0) == (call != "three slashes")
+    assert (end_of(five_bar, tmp_path, CALLS[call]) < 0) == (call not in LIVING)
 
 
 def cosimulate_in(fmu: str, root: str, folders: list[str]) -> list[Any]:
