@@ -376,7 +376,7 @@ def _print_fmu(path: Path) -> None:
     def start(variable: Any) -> str:
         if variable.start is None or variable.causality == "output":
             return ""
-        return f"{float(variable.start):.6g}" if variable.type == "Real" else str(variable.start)
+        return f"{float(variable.start):.6g}" if variable.type in ("Real", "Float64") else str(variable.start)
 
     show_table(
         f"{description.modelName} {description.version}, FMI {description.fmiVersion}, {description.guid}",

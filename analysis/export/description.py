@@ -260,7 +260,7 @@ def _variables(mechanism: Mechanism, kind: Kind, entries: Iterable[Entry]) -> El
         if kind.fmi == 2:
             SubElement(SubElement(listed, "ScalarVariable", attributes), tag, value)
             continue
-        if entry.role == "output":
+        if attributes["variability"] == "continuous" and variable.causality != "independent":
             attributes["intermediateUpdate"] = "true"
         start = value.pop("start", None) if tag == "String" else None
         node = SubElement(listed, tag, attributes | value)

@@ -6,11 +6,14 @@ import csv
 import subprocess
 import sys
 from pathlib import Path
+from zipfile import ZipFile
 
 import numpy as np
 import pytest
 
 from analysis import Inputs, cli, export
+from analysis.export.description import KINDS, description
+from analysis.mechanisms import FIVE_BAR
 from analysis.periodic import find_orbit
 from linkwork.five_bar.published import SETS, TABLE_3_1
 
@@ -143,6 +146,17 @@ def test_info_on_an_fmu(linkwork, fmu):
     result = linkwork("info", fmu)
     assert result.exit_code == 0
     assert "valid" in result.output
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_info_on_every_kind_of_fmu_shows_starts_alike(linkwork, kind, tmp_path):
+    with ZipFile(tmp_path / "some.fmu", "w") as archive:
+        archive.writestr("modelDescription.xml", description(FIVE_BAR, KINDS[kind]))
+    result = linkwork("info", str(tmp_path / "some.fmu"))
+    assert result.exit_code == 0
+    row = next(line for line in result.output.splitlines() if line.startswith("│ drive.speed "))
+    assert "43.9823" in row.split()
+    assert "None" not in result.output
 
 
 def test_check_passes_and_writes_its_files(fmu, tmp_path):

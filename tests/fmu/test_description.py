@@ -545,10 +545,13 @@ def test_names_and_tokens_of_all_kinds_differ(roots: dict[tuple[str, str], Eleme
     ]
 
 
-def test_intermediate_values_are_those_of_outputs(roots: dict[tuple[str, str], Element], model: Model) -> None:
+def test_inputs_and_what_is_computed_take_part_in_intermediate_updates(
+    roots: dict[tuple[str, str], Element], model: Model
+) -> None:
     found = read_scalars(roots[model.name, "native-fmi3"])
     assert [s.name for s in found if s.attributes.get("intermediateUpdate") == "true"] == [
-        row[0] for row in ROWS[model.name] if row[1] == "output"
+        *(row[0] for row in ROWS[model.name] if row[1] in ("input", "output")),
+        *ADDED[1:],
     ]
 
 
