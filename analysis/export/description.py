@@ -232,7 +232,9 @@ _INITIAL = {"parameter": "exact", "output": "approx", "local": "calculated"}
 
 def _variables(mechanism: Mechanism, kind: Kind, entries: Iterable[Entry]) -> Element:
     modes = {mode.name: _type_name(mode) for mode in mechanism.modes} if kind.native else {}
-    starts = _outputs_at_start(mechanism)
+    plant = _started(mechanism)
+    starts = dict(zip(mechanism.output_names, plant.outputs()))
+    scale = dict(zip(states(mechanism), mechanism.error_scale(plant.parameters, plant.state))) if kind.native else {}
     reinitialised = _reinitialised(mechanism) if kind.native else ()
     listed = Element("ModelVariables")
     for entry in entries:
@@ -251,6 +253,8 @@ def _variables(mechanism: Mechanism, kind: Kind, entries: Iterable[Entry]) -> El
         value = _value(variable, starts.get(variable.name, variable.start))
         if kind.native and entry.derivative_of is not None:
             value["derivative"] = _number(kind, entry.derivative_of)
+        if entry.reference in scale:
+            value["nominal"] = repr(scale[entry.reference])
         if entry.reference in reinitialised:
             value["reinit"] = "true"
         tag = _TYPES[kind.fmi][variable.kind]
@@ -290,11 +294,11 @@ def _value(variable: Variable, start: float | int | str) -> dict[str, str]:
     return value
 
 
-def _outputs_at_start(mechanism: Mechanism) -> dict[str, float]:
-    """The real outputs where all parameters and inputs have their start values."""
+def _started(mechanism: Mechanism) -> Plant:
+    """The mechanism at its start, where all parameters and inputs have their start values."""
     m = mechanism
     values: dict[str, Any] = {v.name: v.start for v in m.variables}
-    plant = Plant(
+    return Plant(
         m,
         m.parameters(**{field_name(name): values[name] for name in m.mechanism_variables}),
         m.initial(**{field: values[f"initial.{field}"] for field in m.initial_variables}),
@@ -303,7 +307,6 @@ def _outputs_at_start(mechanism: Mechanism) -> dict[str, float]:
         inputs={name: values[name] for name in m.input_names},
         **{field_name(mode.name): values[mode.name] for mode in m.modes},
     )
-    return dict(zip(m.output_names, plant.outputs()))
 
 
 # Structure

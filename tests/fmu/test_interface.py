@@ -267,6 +267,21 @@ def test_only_states_that_jump_are_reinitialised(mechanism: Mechanism) -> None:
         assert marked == jumps[mechanism.name]
 
 
+def test_nominals_are_the_magnitudes_that_errors_are_measured_by(mechanism: Mechanism) -> None:
+    plant = Plant(
+        mechanism,
+        mechanism.parameters(**{field_name(n): v.start for n, v in mechanism.mechanism_variables.items()}),
+        mechanism.initial(**{f: v.start for f, v in mechanism.initial_variables.items()}),
+        inputs={v.name: v.start for v in mechanism.variables if v.causality == "input"},
+        **{field_name(v.name): v.start for v in mechanism.variables if v.name.endswith(".mode")},
+    )
+    entries = interface(mechanism)
+    expected = dict(zip((entries[r].variable.name for r in states(mechanism)), plant._scale))
+    for kind in (NATIVE, NATIVE_FMI3):
+        scalars = read_scalars(description(mechanism, kind))
+        assert {s.name: float(s.attributes["nominal"]) for s in scalars if "nominal" in s.attributes} == expected
+
+
 def test_value_references_are_the_same_in_every_kind(mechanism: Mechanism) -> None:
     python, native, native_3 = (
         {s.name: s.reference for s in read_scalars(description(mechanism, kind))}
