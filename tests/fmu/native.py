@@ -1,0 +1,254 @@
+"""The library of a native FMU, called function by function: every call returns its status, nothing is checked or hidden."""
+
+from __future__ import annotations
+
+import ctypes
+import re
+import zipfile
+from collections.abc import Iterator, Sequence
+from ctypes import POINTER, byref, c_char_p, c_double, c_int, c_int32, c_int64, c_size_t, c_uint32, c_void_p
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+import fmpy.fmi2
+import fmpy.fmi3
+
+OK, WARNING, DISCARD, ERROR = range(4)
+
+LOG_2 = ctypes.CFUNCTYPE(None, c_void_p, c_char_p, c_int, c_char_p, c_char_p, c_char_p)
+LOG_3 = ctypes.CFUNCTYPE(None, c_void_p, c_int, c_char_p, c_char_p)
+UPDATE = ctypes.CFUNCTYPE(
+    None, c_void_p, c_double, ctypes.c_bool, ctypes.c_bool, ctypes.c_bool, ctypes.c_bool,
+    POINTER(ctypes.c_bool), POINTER(c_double),
+)  # fmt: skip
+
+
+class Callbacks(ctypes.Structure):
+    """``fmi2CallbackFunctions``; the sentence of a message is the argument of its format ``%s``."""
+
+    _fields_ = (
+        ("logger", LOG_2),
+        ("allocate", c_void_p),
+        ("free", c_void_p),
+        ("step_finished", c_void_p),
+        ("environment", c_void_p),
+    )
+
+
+class Library:
+    """A native FMU, unpacked and loaded.
+
+    Attributes
+    ----------
+    fmi : int
+        Major version of FMI.
+    references : dict of str to int
+    token : str
+    dll : ctypes.CDLL
+    """
+
+    def __init__(self, fmu: Path, folder: Path) -> None:
+        with zipfile.ZipFile(fmu) as archive:
+            archive.extractall(folder)
+        root = ElementTree.parse(folder / "modelDescription.xml").getroot()
+        self.fmi = int(str(root.get("fmiVersion"))[0])
+        self.token = str(root.get("guid") or root.get("instantiationToken"))
+        listed = root.find("ModelVariables")
+        assert listed is not None
+        self.references = {str(v.get("name")): int(str(v.get("valueReference"))) for v in listed}
+        self.folder = folder
+        (path,) = (folder / "binaries").rglob("*.so")
+        self.path = path
+        self.dll = ctypes.CDLL(str(path))
+        module = fmpy.fmi2 if self.fmi == 2 else fmpy.fmi3
+        text = Path(str(module.__file__)).read_text(encoding="utf-8")
+        #: all functions of the standard
+        self.functions = sorted(set(re.findall(rf"\bfmi{self.fmi}[A-Z]\w+(?=TYPE\b)", text)) - _NO_FUNCTIONS)
+        for name in self.functions:
+            function = getattr(self.dll, name, None)
+            if function is not None and name.startswith((f"fmi{self.fmi}Instantiate",)):
+                function.restype = c_void_p
+
+    def instance(self, interface: str = "cs", **options: Any) -> Instance:
+        """A new instance."""
+        return Instance(self, interface, **options)
+
+
+_NO_FUNCTIONS = {"fmi2CallbackLogger", "fmi2CallbackAllocateMemory", "fmi2CallbackFreeMemory", "fmi2StepFinished"}
+
+
+class Instance:
+    """An instance; ``log`` are the pairs (status, sentence) that it has logged."""
+
+    def __init__(
+        self,
+        library: Library,
+        interface: str,
+        *,
+        token: str | None = None,
+        name: bytes | None = b"test",
+        logging: bool = False,
+        callbacks: bool = True,
+        early: bool = False,
+        event_mode: bool = False,
+        update: Any = None,
+    ) -> None:
+        self.library, self.interface = library, interface
+        self.log: list[tuple[int, str]] = []
+        dll = library.dll
+        key = (library.token if token is None else token).encode() if token != "" else None
+        if library.fmi == 2:
+            self._logger: Any = LOG_2(lambda _, name, status, category, form, text: self._say(status, text, form))
+            self._callbacks = Callbacks(logger=self._logger)
+            given = byref(self._callbacks) if callbacks else None
+            self.handle = dll.fmi2Instantiate(
+                name, int(interface == "cs"), key, b"file:/nowhere", given, 0, int(logging)
+            )
+        else:
+            self._logger = LOG_3(lambda _, status, category, text: self._say(status, text))
+            logger = self._logger if callbacks else None
+            self._update = None if update is None else UPDATE(update)
+            head = (name, key, None, ctypes.c_bool(False), ctypes.c_bool(logging))
+            if interface == "me":
+                self.handle = dll.fmi3InstantiateModelExchange(*head, None, logger)
+            else:
+                flags = (ctypes.c_bool(event_mode), ctypes.c_bool(early))
+                self.handle = dll.fmi3InstantiateCoSimulation(
+                    *head, *flags, None, c_size_t(0), None, logger, self._update
+                )
+
+    def _say(self, status: int, text: bytes, form: bytes = b"%s") -> None:
+        assert form == b"%s"
+        self.log.append((status, text.decode("ascii")))
+
+    def __call__(self, function: str, *arguments: Any) -> int:
+        """Status of a function without its prefix; Python's floats are doubles, its integers size_t or int as they come."""
+        converted = [c_double(a) if isinstance(a, float) else a for a in arguments]
+        return int(getattr(self.library.dll, f"fmi{self.library.fmi}{function}")(c_void_p(self.handle), *converted))
+
+    def free(self) -> None:
+        """Free the instance."""
+        getattr(self.library.dll, f"fmi{self.library.fmi}FreeInstance")(c_void_p(self.handle))
+
+    # Values
+
+    def get(self, *names: str) -> list[float]:
+        """Values of real variables."""
+        values = (c_double * len(names))()
+        assert self(self.real("Get"), *self.arrays(names, values)) == OK
+        return list(values)
+
+    def set(self, **values: float) -> int:
+        """Set variables, with ``__`` for the dot of a name; whole numbers are of integers."""
+        status = OK
+        for key, value in values.items():
+            name = key.replace("__", ".")
+            if isinstance(value, float):
+                status = max(status, self(self.real("Set"), *self.arrays([name], (c_double * 1)(value))))
+            else:
+                status = max(status, self.set_integer(name, value))
+        return status
+
+    def set_integer(self, name: str, value: int) -> int:
+        """Set an integer or an enumeration."""
+        if self.library.fmi == 2:
+            return self("SetInteger", *self.arrays([name], (c_int * 1)(value)))
+        if name.endswith(".mode"):
+            return self("SetInt64", *self.arrays([name], (c_int64 * 1)(value)))
+        return self("SetInt32", *self.arrays([name], (c_int32 * 1)(value)))
+
+    def text(self, name: str = "solver.message") -> str:
+        """Value of a string."""
+        values = (c_char_p * 1)()
+        assert self("GetString", *self.arrays([name], values)) == OK
+        return (values[0] or b"").decode()
+
+    def status(self) -> int:
+        """Value of ``solver.status``."""
+        values = (c_int32 * 1)()
+        name = "GetInteger" if self.library.fmi == 2 else "GetInt32"
+        assert self(name, *self.arrays(["solver.status"], values)) == OK
+        return values[0]
+
+    def real(self, verb: str) -> str:
+        """Name of the function for real values."""
+        return f"{verb}Real" if self.library.fmi == 2 else f"{verb}Float64"
+
+    def arrays(self, names: Sequence[str], values: Any) -> tuple[Any, ...]:
+        """Arguments of a get or a set."""
+        references = (c_uint32 * len(names))(*(self.library.references[name] for name in names))
+        count = c_size_t(len(names))
+        return (
+            (references, count, values) if self.library.fmi == 2 else (references, count, values, c_size_t(len(values)))
+        )
+
+    # Life
+
+    def enter(self, start: float = 0.0, tolerance: float | None = None) -> int:
+        """To initialisation mode."""
+        given = tolerance is not None
+        limits = (c_double(tolerance or 0.0), c_double(start))
+        if self.library.fmi == 2:
+            status = self("SetupExperiment", int(given), *limits, 0, c_double(0.0))
+            return max(status, self("EnterInitializationMode"))
+        return self("EnterInitializationMode", ctypes.c_bool(given), *limits, ctypes.c_bool(False), c_double(0.0))
+
+    def start(self, **values: float) -> Instance:
+        """Through the initialisation."""
+        assert self.set(**values) == OK
+        assert self.enter() == OK
+        assert self("ExitInitializationMode") == OK
+        return self
+
+    def step(self, time: float, step: float) -> int:
+        """A communication step."""
+        if self.library.fmi == 2:
+            return self("DoStep", time, step, 1)
+        flags = (ctypes.c_bool * 3)()
+        self.reached = c_double()
+        refs = [byref(flags, i) for i in range(3)]
+        status = self("DoStep", time, step, ctypes.c_bool(True), *refs, byref(self.reached))
+        self.event, self.terminate, self.early = list(flags)
+        return status
+
+    def discrete(self) -> tuple[bool, bool]:
+        """New discrete states: whether the simulation is to end, whether the states changed."""
+        if self.library.fmi == 2:
+            info = (c_int * 8)()
+            assert self("NewDiscreteStates", info) == OK
+            return bool(info[1]), bool(info[3])
+        flags = (ctypes.c_bool * 5)()
+        time = c_double()
+        refs = [byref(flags, i) for i in range(5)]
+        assert self("UpdateDiscreteStates", *refs, byref(time)) == OK
+        return flags[1], flags[3]
+
+    def saved(self) -> c_void_p:
+        """A saved state."""
+        state = c_void_p()
+        assert self("GetFMUstate" if self.library.fmi == 2 else "GetFMUState", byref(state)) == OK
+        return state
+
+    def states(self, which: str = "ContinuousStates", count: int = 6) -> list[float]:
+        """Continuous states, or their derivatives or nominal values."""
+        values = (c_double * count)()
+        assert self(f"Get{which}", values, c_size_t(count)) == OK
+        return list(values)
+
+
+def phases(library: Library, interface: str) -> Iterator[tuple[str, Instance]]:
+    """An instance in each state that the interface has, those during a callback apart."""
+    names = ["instantiated", "initialization", "step" if interface == "cs" else "event"]
+    names += ["continuous"] if interface == "me" else []
+    for name in (*names, "terminated"):
+        instance = library.instance(interface)
+        if name != "instantiated":
+            assert instance.enter() == OK
+        if name not in ("instantiated", "initialization"):
+            assert instance("ExitInitializationMode") == OK
+        if name == "continuous":
+            assert instance("EnterContinuousTimeMode") == OK
+        if name == "terminated":
+            assert instance("Terminate") == OK
+        yield name, instance

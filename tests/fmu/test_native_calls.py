@@ -1,0 +1,453 @@
+"""Every function of the standards, in every state of an instance, with and without its pointers, on the native FMUs.
+
+The tables say what FMI 2.0.4 (3.2.3 and 4.2.4) and FMI 3.0.2 (2.3, 3.2 and 4.2) allow.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import math
+from collections.abc import Callable, Iterator
+from ctypes import byref, c_bool, c_char, c_char_p, c_double, c_int, c_int32, c_int64, c_size_t, c_uint32, c_void_p
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from .native import DISCARD, ERROR, OK, Instance, Library, phases
+
+INITIAL, RUN = {"instantiated"}, {"step", "event", "continuous"}
+READ = {"initialization", "terminated"} | RUN
+ANY = INITIAL | READ
+SET = {"instantiated", "initialization", "step", "event"}
+WITH_STATES = {"initialization", "event", "continuous", "terminated"}
+
+#: Interfaces and states in which a function is allowed; in others it is an error.
+ALLOWED: dict[int, dict[str, tuple[set[str], set[str]]]] = {
+    2: {
+        "SetDebugLogging": ({"cs", "me"}, ANY),
+        "SetupExperiment": ({"cs", "me"}, INITIAL),
+        "EnterInitializationMode": ({"cs", "me"}, INITIAL),
+        "ExitInitializationMode": ({"cs", "me"}, {"initialization"}),
+        "Terminate": ({"cs", "me"}, RUN),
+        "Reset": ({"cs", "me"}, ANY),
+        "GetReal": ({"cs", "me"}, READ),
+        "GetInteger": ({"cs", "me"}, READ),
+        "GetString": ({"cs", "me"}, READ),
+        "SetReal": ({"cs", "me"}, SET | {"continuous"}),
+        "SetInteger": ({"cs", "me"}, {"instantiated", "initialization"}),  # all integers are fixed parameters
+        "GetFMUstate": ({"cs", "me"}, ANY),
+        "SetFMUstate": ({"cs", "me"}, ANY),
+        "FreeFMUstate": ({"cs", "me"}, ANY),
+        "SerializedFMUstateSize": ({"cs", "me"}, ANY),
+        "SerializeFMUstate": ({"cs", "me"}, ANY),
+        "DeSerializeFMUstate": ({"cs", "me"}, ANY),
+        "GetDirectionalDerivative": ({"cs", "me"}, READ),
+        "EnterEventMode": ({"me"}, {"event", "continuous"}),
+        "NewDiscreteStates": ({"me"}, {"event"}),
+        "EnterContinuousTimeMode": ({"me"}, {"event"}),
+        "CompletedIntegratorStep": ({"me"}, {"continuous"}),
+        "SetTime": ({"me"}, {"event", "continuous"}),
+        "SetContinuousStates": ({"me"}, {"continuous"}),
+        "GetDerivatives": ({"me"}, WITH_STATES),
+        "GetEventIndicators": ({"me"}, WITH_STATES),
+        "GetContinuousStates": ({"me"}, WITH_STATES),
+        "GetNominalsOfContinuousStates": ({"me"}, WITH_STATES),
+        "SetRealInputDerivatives": ({"cs"}, {"initialization", "step"}),
+        "GetRealOutputDerivatives": ({"cs"}, {"step", "terminated"}),
+        "DoStep": ({"cs"}, {"step"}),
+        "CancelStep": (set(), set()),
+        "GetStatus": ({"cs"}, {"step", "terminated"}),
+        "GetRealStatus": ({"cs"}, {"step", "terminated"}),
+        "GetBooleanStatus": ({"cs"}, {"step", "terminated"}),
+        "GetStringStatus": ({"cs"}, {"step", "terminated"}),
+        "GetIntegerStatus": (set(), set()),
+    },
+    3: {
+        "SetDebugLogging": ({"cs", "me"}, ANY),
+        "EnterInitializationMode": ({"cs", "me"}, INITIAL),
+        "ExitInitializationMode": ({"cs", "me"}, {"initialization"}),
+        "Terminate": ({"cs", "me"}, RUN),
+        "Reset": ({"cs", "me"}, ANY),
+        "GetFloat64": ({"cs", "me"}, READ),
+        "GetInt32": ({"cs", "me"}, READ),
+        "GetInt64": ({"cs", "me"}, READ),
+        "GetString": ({"cs", "me"}, READ),
+        "SetFloat64": ({"cs", "me"}, SET | {"continuous"}),
+        "SetInt32": ({"cs", "me"}, {"instantiated", "initialization"}),
+        "SetInt64": ({"cs", "me"}, {"instantiated", "initialization"}),
+        "GetFMUState": ({"cs", "me"}, ANY),
+        "SetFMUState": ({"cs", "me"}, ANY),
+        "FreeFMUState": ({"cs", "me"}, ANY),
+        "SerializedFMUStateSize": ({"cs", "me"}, ANY),
+        "SerializeFMUState": ({"cs", "me"}, ANY),
+        "DeserializeFMUState": ({"cs", "me"}, ANY),
+        "GetDirectionalDerivative": ({"cs", "me"}, READ),
+        "GetAdjointDerivative": ({"cs", "me"}, READ),
+        "EnterEventMode": ({"me"}, {"continuous"}),
+        "UpdateDiscreteStates": ({"me"}, {"event"}),
+        "EnterContinuousTimeMode": ({"me"}, {"event"}),
+        "CompletedIntegratorStep": ({"me"}, {"continuous"}),
+        "SetTime": ({"me"}, {"continuous"}),
+        "SetContinuousStates": ({"me"}, {"continuous"}),
+        "GetContinuousStateDerivatives": ({"me"}, WITH_STATES),
+        "GetEventIndicators": ({"me"}, WITH_STATES),
+        "GetContinuousStates": ({"me"}, WITH_STATES),
+        "GetNominalsOfContinuousStates": ({"me"}, WITH_STATES),
+        "GetNumberOfContinuousStates": ({"me"}, ANY),
+        "GetNumberOfEventIndicators": ({"me"}, ANY),
+        "GetOutputDerivatives": ({"cs"}, {"step", "terminated"}),
+        "DoStep": ({"cs"}, {"step"}),
+    }
+    | {
+        name: (set(), set())
+        for name in (
+            "EnterConfigurationMode", "ExitConfigurationMode", "EvaluateDiscreteStates", "EnterStepMode",
+            "ActivateModelPartition", "GetNumberOfVariableDependencies", "GetVariableDependencies",
+        )
+    },
+}  # fmt: skip
+
+#: Functions for values of types that no variable has: good for none, an error for one.
+EMPTY = {
+    2: ("GetBoolean", "SetBoolean"),
+    3: tuple(
+        f"{verb}{kind}"
+        for kind in ("Float32", "Int8", "UInt8", "Int16", "UInt16", "UInt32", "UInt64", "Boolean", "Binary", "Clock")
+        for verb in ("Get", "Set")
+    )
+    + tuple(
+        f"{verb}{what}{form}"
+        for verb, forms in (("Get", ("Decimal", "Fraction")), ("Set", ("Decimal", "Fraction")))
+        for what in ("Interval", "Shift")
+        for form in forms
+    ),
+}
+
+
+@pytest.fixture(scope="module", params=["FiveBarSlider-native", "FiveBarSlider-native-fmi3", "SliderCrank-native-fmi3"])
+def library(
+    request: pytest.FixtureRequest, natives: dict[str, Path], tmp_path_factory: pytest.TempPathFactory
+) -> Library:
+    return Library(natives[request.param], tmp_path_factory.mktemp("library"))
+
+
+class Good:
+    """Arguments of every function with which it is good, pointers last so that they can be left out one by one."""
+
+    def __init__(self, instance: Instance) -> None:
+        self.c = c = instance
+        self.kept: list[Any] = []
+        one = c.library.references
+        self.force, self.out = (c_uint32 * 1)(one["drive.torque"]), (c_uint32 * 1)(one["crank.acceleration"])
+        self.number = (c_double * 1)(0.0)
+        self.n = c_size_t(1)
+        self.x = (c_double * 6)()
+
+    def arguments(self, name: str) -> tuple[Any, ...]:
+        c, n, three = self.c, self.n, self.c.library.fmi == 3
+        values = (n,) if three else ()
+        size = c_size_t()
+        if name == "SetDebugLogging":
+            return (c_bool(True) if three else 1, c_size_t(0), None)
+        if name in ("SetupExperiment",):
+            return (0, 0.0, 0.0, 0, 0.0)
+        if name == "EnterInitializationMode" and three:
+            return (c_bool(False), 0.0, 0.0, c_bool(False), 0.0)
+        if name in ("GetReal", "GetFloat64"):
+            return (self.out, n, self.number, *values)
+        if name in ("SetReal", "SetFloat64"):
+            return (self.force, n, self.number, *values)
+        if "Integer" in name or name.endswith(("Int32", "Int64")):
+            if name.endswith("Status"):
+                return (3, (c_int * 1)())
+            kind = "drive.mode" if name.endswith("Int64") else "assembly.branch"
+            number = ((c_int64 if name.endswith("Int64") else c_int32) * 1)(1)
+            return ((c_uint32 * 1)(c.library.references[kind]), n, number, *values)
+        if name == "GetString":
+            return ((c_uint32 * 1)(c.library.references["solver.message"]), n, (c_char_p * 1)(), *values)
+        if name.lower() == "getfmustate":
+            return (byref(c_void_p()),)
+        if name.lower() == "setfmustate":
+            return (self.state(),)
+        if name.lower() == "freefmustate":
+            return (byref(self.state()),)
+        if name.lower() == "serializedfmustatesize":
+            return (self.state(), byref(size))
+        if name.lower() in ("serializefmustate", "deserializefmustate"):
+            state = self.state()
+            c(f"SerializedFMU{'S' if three else 's'}tateSize", state, byref(size))
+            text = (c_char * size.value)()
+            serialize = "SerializeFMUState" if three else "SerializeFMUstate"
+            if name == serialize:
+                return (state, text, size)
+            assert c(serialize, state, text, size) == OK
+            return (text, size, byref(c_void_p()))
+        if name in ("GetDirectionalDerivative", "GetAdjointDerivative"):
+            seed, result = (c_double * 1)(1.0), (c_double * 1)()
+            return (self.out, n, self.force, n, seed, *values, result, *values)
+        if name in ("SetRealInputDerivatives", "GetRealOutputDerivatives", "GetOutputDerivatives"):
+            return (self.force if name[0] == "S" else self.out, n, (c_int * 1)(1), self.number, *values)
+        if name == "NewDiscreteStates":
+            return ((c_int * 8)(),)
+        if name == "UpdateDiscreteStates":
+            return (*(byref(c_bool()) for _ in range(5)), byref(c_double()))
+        if name == "CompletedIntegratorStep":
+            return (c_bool(True) if three else 1, byref(c_int()), byref(c_int()))
+        if name == "SetTime":
+            return (0.5,)
+        if name == "SetContinuousStates":
+            return (self.x, c_size_t(6))
+        if name.startswith("GetNumberOf"):
+            return (byref(size),) if "Variable" not in name else (c_uint32(0), byref(size))
+        if name == "GetEventIndicators":
+            return ((c_double * 1)(), n)
+        if name.startswith(("GetContinuousStates", "GetContinuousStateD", "GetNominals", "GetDerivatives")):
+            return (self.x, c_size_t(6))
+        if name == "DoStep":
+            reached = (*(byref(c_bool()) for _ in range(3)), byref(c_double())) if three else ()
+            return (0.0, 1e-3, c_bool(True) if three else 1, *reached)
+        if name in ("GetStatus", "GetRealStatus", "GetBooleanStatus", "GetStringStatus"):
+            kind, value = {
+                "GetStatus": (0, c_int), "GetRealStatus": (2, c_double),
+                "GetBooleanStatus": (3, c_int), "GetStringStatus": (1, c_char_p),
+            }[name]  # fmt: skip
+            return (kind, byref(value()))
+        if name == "ActivateModelPartition":
+            return (c_uint32(0), 0.0)
+        if name == "GetVariableDependencies":
+            return (c_uint32(0), None, None, None, None, c_size_t(0))
+        return ()
+
+    def state(self) -> c_void_p:
+        self.kept.append(self.c.saved())
+        return self.kept[-1]
+
+
+def kind_of(library: Library) -> dict[str, tuple[set[str], set[str]]]:
+    return ALLOWED[library.fmi]
+
+
+def every(library: Library) -> Iterator[tuple[str, str, str, Callable[[], Instance]]]:
+    """Each function in each state of each interface; the last makes an instance in that state."""
+    for name in kind_of(library):
+        for interface in ("cs", "me"):
+            for phase, instance in phases(library, interface):
+                yield name, interface, phase, lambda instance=instance: instance  # type: ignore[misc]
+
+
+def test_the_tables_have_every_function_of_the_standard(library: Library) -> None:
+    prefix = f"fmi{library.fmi}"
+    known = {prefix + name for name in (*kind_of(library), *EMPTY[library.fmi], "FreeInstance", "GetVersion")}
+    known |= {"fmi2Instantiate", "fmi2GetTypesPlatform", "fmi2SetString"} if library.fmi == 2 else {
+        "fmi3InstantiateCoSimulation", "fmi3InstantiateModelExchange", "fmi3InstantiateScheduledExecution",
+        "fmi3SetString",
+    }  # fmt: skip
+    assert set(library.functions) == known
+
+
+def test_a_function_is_good_where_it_is_allowed_and_an_error_elsewhere(library: Library) -> None:
+    wrong = []
+    for name, interface, phase, make in every(library):
+        c = make()
+        interfaces, states = kind_of(library)[name]
+        arguments = Good(c).arguments(name)
+        c.log.clear()
+        status = c(name, *arguments)
+        wanted = OK if interface in interfaces and phase in states else ERROR
+        if status != wanted:
+            wrong.append((name, interface, phase, status, c.log))
+        if wanted == ERROR:
+            # one sentence that names the function, though no logging was asked for, and an instance that goes on
+            assert len(c.log) == 1, (name, phase, c.log)
+            assert c.log[0][0] == ERROR
+            assert f"fmi{library.fmi}{name}" in c.log[0][1] or "fixed parameter" in c.log[0][1]
+            assert c("Reset") == OK
+            assert c.enter() == OK
+        c.free()
+    assert wrong == []
+
+
+def test_a_missing_pointer_is_an_error(library: Library) -> None:
+    harmless = {"SetDebugLogging", "FreeFMUstate", "FreeFMUState", "GetVariableDependencies"}
+    for name, (interfaces, states) in kind_of(library).items():
+        for interface in interfaces:
+            for phase, c in phases(library, interface):
+                if phase in states and name not in harmless:
+                    arguments = Good(c).arguments(name)
+                    for place, argument in enumerate(arguments):
+                        if isinstance(argument, ctypes.Array | c_void_p) or "CArgObject" in type(argument).__name__:
+                            left_out = (*arguments[:place], None, *arguments[place + 1 :])
+                            c.log.clear()
+                            assert c(name, *left_out) == ERROR, (name, place)
+                            assert "a pointer is missing" in c.log[0][1]
+                c.free()
+
+
+def test_no_instance_is_an_error(library: Library) -> None:
+    c = library.instance()
+    good = Good(c)
+    for name in kind_of(library):
+        arguments = good.arguments(name)
+        handle, c.handle = c.handle, None
+        assert c(name, *arguments) == ERROR, name
+        c.free()  # does nothing
+        c.handle = handle
+    c.free()
+
+
+def test_types_that_no_variable_has(library: Library) -> None:
+    c = library.instance().start()
+    for name in EMPTY[library.fmi]:
+        assert c(name, None, c_size_t(0), None, c_size_t(0), c_size_t(0)) == OK, name
+        assert c(name, None, c_size_t(1), None, c_size_t(1), c_size_t(1)) == ERROR, name
+        assert "nothing of the kind" in c.log[-1][1]
+    c.free()
+
+
+def test_references_and_types(library: Library) -> None:
+    c = library.instance().start()
+    references = library.references
+
+    def get(name: str, reference: int) -> int:
+        return c(name, (c_uint32 * 1)(reference), c_size_t(1), (c_int64 * 1)(), c_size_t(1))
+
+    integers = ["GetInteger"] if library.fmi == 2 else ["GetInt32", "GetInt64"]
+    for name, wrong in (
+        (c.real("Get"), ("solver.status", "drive.mode", "solver.message")),
+        (integers[0], ("crank.angle", "solver.message")),
+        ("GetString", ("crank.angle", "drive.mode", "solver.status")),
+    ):
+        for other in wrong:
+            assert get(name, references[other]) == ERROR
+            assert c.log[-1] == (ERROR, c.log[-1][1])
+            assert other in c.log[-1][1]
+        for outside in (len(references), 2**31, 2**32 - 1):
+            assert get(name, outside) == ERROR
+            assert f"no variable with the value reference {outside}" in c.log[-1][1]
+    for name in integers:
+        wanted = "drive.mode" if name == "GetInt64" else "assembly.branch"
+        assert get(name, references[wanted]) == OK
+    assert c("SetString", *c.arrays(["solver.message"], (c_char_p * 1)(b"\xff"))) == ERROR
+    assert c("SetString", *c.arrays(["crank.angle"], (c_char_p * 1)(b"\xff"))) == ERROR
+    c.free()
+
+
+def test_what_is_computed_or_fixed_cannot_be_set(library: Library) -> None:
+    for name, sentence in (("crank.angle", "is computed"), ("time", "is computed")):
+        c = library.instance()
+        assert c.set(**{name: 1.0}) == ERROR
+        assert sentence in c.log[-1][1]
+        c.free()
+    c = library.instance().start()
+    before = c.get("crank.acceleration")
+    assert c.set(slider__damping=3.0) == ERROR
+    assert "slider.damping is a fixed parameter, it cannot be set in step mode" in c.log[-1][1]
+    assert c.get("crank.acceleration") == before
+    assert c.step(0.0, 1e-3) == OK
+    c.free()
+
+
+@pytest.mark.parametrize(
+    ("options", "sentence"),
+    [
+        ({"token": "{wrong}"}, "the GUID or token is {wrong}: that of this FMU is"),
+        ({"token": ""}, "the GUID or token is missing"),
+        ({"name": b""}, "an instance must have a name"),
+        ({"name": None}, "an instance must have a name"),
+    ],
+)
+def test_instances_that_are_refused(library: Library, options: dict[str, Any], sentence: str) -> None:
+    for interface in ("cs", "me"):
+        c = library.instance(interface, **options)
+        assert c.handle is None
+        ((status, logged),) = c.log
+        assert (status, sentence in logged) == (ERROR, True)
+        # and without anyone to say it to
+        assert library.instance(interface, callbacks=False, **options).handle is None
+
+
+def test_interfaces_that_there_are_not(library: Library) -> None:
+    dll = library.dll
+    token = library.token.encode()
+    if library.fmi == 2:
+        assert dll.fmi2Instantiate(b"x", 7, token, None, None, 0, 0) is None
+        return
+    for refused, sentence in (
+        (library.instance(event_mode=True), "no event mode"),
+        (None, "no scheduled execution"),
+    ):
+        if refused is not None:
+            assert refused.handle is None
+            assert sentence in refused.log[0][1]
+    said: list[bytes] = []
+    from .native import LOG_3
+
+    log = LOG_3(lambda _, status, category, text: said.append(text))
+    for logger in (log, None):
+        head = (b"x", token, None, c_bool(False), c_bool(False), None, logger, None, None, None)
+        assert dll.fmi3InstantiateScheduledExecution(*head) is None
+    assert said == [b"this FMU has no scheduled execution"]
+
+
+def test_no_callbacks_at_all(library: Library) -> None:
+    c = library.instance(callbacks=False).start()
+    assert c.step(5.0, 1e-3) == DISCARD
+    assert c("ExitInitializationMode") == ERROR
+    assert c.step(0.0, 1e-3) == OK
+    c.free()
+
+
+def test_times_of_the_setup(library: Library) -> None:
+    def setup(tolerance: float | None, start: float, stop: float | None) -> int:
+        c = library.instance()
+        given, ends = tolerance is not None, stop is not None
+        numbers = (c_double(tolerance or 0.0), c_double(start), c_double(stop or 0.0))
+        if library.fmi == 2:
+            status = c("SetupExperiment", int(given), numbers[0], numbers[1], int(ends), numbers[2])
+        else:
+            status = c("EnterInitializationMode", c_bool(given), numbers[0], numbers[1], c_bool(ends), numbers[2])
+        said.append(c.log[-1][1] if c.log else "")
+        c.free()
+        return status
+
+    said: list[str] = []
+    assert setup(1e-6, 1.0, 2.0) == OK
+    for tolerance, start, stop, sentence in (
+        (None, math.nan, None, "the time at the start is nan s: it must be a finite number"),
+        (None, 0.0, 0.0, "the stop time is 0 s: it must be after the start time"),
+        (None, 1.0, math.nan, "the stop time is nan s"),
+        (0.0, 0.0, None, "the tolerance is 0: it must be greater than zero"),
+        (math.inf, 0.0, None, "the tolerance is inf"),
+    ):
+        assert setup(tolerance, start, stop) == ERROR
+        assert sentence in said[-1]
+
+
+def test_messages_have_a_decimal_point_in_every_locale(library: Library) -> None:
+    libc = ctypes.CDLL(None)
+    libc.setlocale.restype = c_char_p
+    numeric = 1
+    before = libc.setlocale(numeric, None)
+    if libc.setlocale(numeric, b"de_DE.UTF-8") is None:
+        pytest.skip("there is no locale with a decimal comma on this machine")
+    try:
+        c = library.instance().start()
+        assert c.step(0.25, 1e-3) == DISCARD
+        assert "it starts at t = 0.25 s" in c.text()
+        c.free()
+    finally:
+        libc.setlocale(numeric, before)
+
+
+def test_debug_logging_says_what_is_refused(library: Library) -> None:
+    quiet, loud = library.instance().start(), library.instance(logging=True).start()
+    for c, times in ((quiet, 0), (loud, 1)):
+        assert c.step(5.0, 1e-3) == DISCARD
+        assert [status for status, _ in c.log] == [DISCARD] * times
+    on = (c_bool(True) if library.fmi == 3 else 1, c_size_t(0), None)
+    assert quiet("SetDebugLogging", *on) == OK
+    assert quiet.step(5.0, 1e-3) == DISCARD
+    assert "a step over a gap" in quiet.log[-1][1]
+    quiet.free()
+    loud.free()
