@@ -242,6 +242,8 @@ Status instance_set(Instance *c, const char *function, unsigned reference, Kind 
     int phase = (int)c->s.phase;
     if (!v)
         return ERROR;
+    if (v->causality == COMPUTED && v->row >= 0 && v->row < STATE_ROW && phase == INSTANTIATED)
+        return OK; /* a guess of an output for the initialisation, which is solved without one */
     if (v->causality == COMPUTED)
         return instance_say(c, ERROR, "%s: %s is computed, it cannot be set", function, v->name);
     if (v->causality == PARAMETER && !(phase & (INSTANTIATED | INITIALIZATION)))

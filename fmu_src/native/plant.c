@@ -303,6 +303,8 @@ static double attempt(const Plant *a, double t, const double x[STATES], double h
         sum5 += error5 * error5;
         sum3 += error3 * error3;
     }
+    if (!all_finite(result, STATES))
+        return NAN; /* an infinite component has no error relative to itself */
     double denominator = sum5 + 0.01 * sum3;
     if (denominator == 0.0)
         return 0.0;

@@ -11,9 +11,6 @@ from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
-import fmpy.fmi2
-import fmpy.fmi3
-
 OK, WARNING, DISCARD, ERROR = range(4)
 
 LOG_2 = ctypes.CFUNCTYPE(None, c_void_p, c_char_p, c_int, c_char_p, c_char_p, c_char_p)
@@ -61,10 +58,9 @@ class Library:
         (path,) = (folder / "binaries").rglob("*.so")
         self.path = path
         self.dll = ctypes.CDLL(str(path))
-        module = fmpy.fmi2 if self.fmi == 2 else fmpy.fmi3
-        text = Path(str(module.__file__)).read_text(encoding="utf-8")
+        text = (folder / "sources" / f"fmi{self.fmi}Functions.h").read_text(encoding="utf-8")
         #: all functions of the standard
-        self.functions = sorted(set(re.findall(rf"\bfmi{self.fmi}[A-Z]\w+(?=TYPE\b)", text)) - _NO_FUNCTIONS)
+        self.functions = sorted(set(re.findall(rf"\bfmi{self.fmi}[A-Z]\w+(?=TYPE\b)", text)))
         for name in self.functions:
             function = getattr(self.dll, name, None)
             if function is not None and name.startswith((f"fmi{self.fmi}Instantiate",)):
@@ -73,9 +69,6 @@ class Library:
     def instance(self, interface: str = "cs", **options: Any) -> Instance:
         """A new instance."""
         return Instance(self, interface, **options)
-
-
-_NO_FUNCTIONS = {"fmi2CallbackLogger", "fmi2CallbackAllocateMemory", "fmi2CallbackFreeMemory", "fmi2StepFinished"}
 
 
 class Instance:
