@@ -12,6 +12,8 @@ import pytest
 from analysis.export import NATIVE, NATIVE_FMI3, build, build_native
 from build_fmu import FMUS
 
+from .mechanisms import pendulum, rotor_on_cart
+
 #: Tests of several files that share results which take long, by the unit of work they make; every other file is one.
 #: Pages of the documentation are one each.
 UNITS = (
@@ -61,6 +63,10 @@ def fmus(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     return {name: build(mechanism, folder) for name, mechanism in FMUS.items()}
 
 
+#: Those of the project, and those of the tests: without modes, inputs that command, or energies among the outputs.
+NATIVE_MECHANISMS = (*FMUS.values(), rotor_on_cart.MECHANISM, pendulum.MECHANISM)
+
+
 @pytest.fixture(scope="session")
 def natives(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     """Every native FMU by the name of its file, for this machine; LINKWORK_NATIVE_FMUS names a folder of others to test."""
@@ -68,5 +74,5 @@ def natives(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     if given:
         return {path.stem: path for path in Path(given).glob("*.fmu")}
     folder = tmp_path_factory.mktemp("native")
-    built = [build_native(mechanism, kind, folder) for mechanism in FMUS.values() for kind in (NATIVE, NATIVE_FMI3)]
+    built = [build_native(mechanism, kind, folder) for mechanism in NATIVE_MECHANISMS for kind in (NATIVE, NATIVE_FMI3)]
     return {path.stem: path for path in built}

@@ -130,7 +130,8 @@ def _modules(mechanism: Mechanism) -> tuple[ModuleType, ...]:
 
 
 def _text(value: str) -> str:
-    return json.dumps(value)  # a JSON string of ASCII is a C string
+    # a JSON string of ASCII is a C string; saved states quote sentences in which these texts are
+    return json.dumps(value.replace('"', "'").replace("\\", "/"))
 
 
 def _number(value: float) -> str:
@@ -229,7 +230,9 @@ def _row(mechanism: Mechanism, entry: Entry) -> str:
 
 
 def _place(mechanism: Mechanism, entry: Entry) -> str:
-    """Row of what is computed."""
+    """Row of what is computed; number of an input."""
+    if entry.role == "input":
+        return str(mechanism.input_names.index(entry.variable.name))
     if entry.role == "output":
         return str(mechanism.output_names.index(entry.variable.name))
     if entry.role == "state":
@@ -287,6 +290,7 @@ def _tableau() -> str:
         ends.append(ends[-1] + len(row))
     errors = [i for i in range(tableau.STAGES) if tableau.E5[i] != 0.0]
     number = _number
+    steps = (integrator.integrate.__kwdefaults__ or {})["max_steps"]
     arrays: list[tuple[str, str, Sequence[object]]] = [
         ("double", "C", [number(c) for c in tableau.C[: tableau.STAGES]]),
         ("int", "A_ROW", ends[: len(rows) + 1]),
@@ -304,7 +308,7 @@ def _tableau() -> str:
     }
     lines = [
         "/* Coefficients of DOP853: Hairer, Norsett, Wanner, Solving Ordinary Differential Equations I. Generated. */",
-        f"enum {{ STAGES = {tableau.STAGES}, ORDER = {tableau.ORDER}, ERROR_STAGES = {len(errors)} }};",
+        f"enum {{ STAGES = {tableau.STAGES}, ORDER = {tableau.ORDER}, ERROR_STAGES = {len(errors)}, MAX_STEPS = {steps} }};",
         *(f"#define {name} {number(value)}" for name, value in constants.items()),
         *(f"static const {kind} {name}[] = {{{', '.join(map(str, values))}}};" for kind, name, values in arrays),
         "",

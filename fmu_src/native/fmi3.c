@@ -143,9 +143,8 @@ GET(String, instance_get_text(c, __func__, references[i], &values[i]))
 SET(Float64, SETTABLE | CONTINUOUS | INTERMEDIATE, instance_set(c, __func__, references[i], REAL, values[i]))
 SET(Int32, SETTABLE, instance_set(c, __func__, references[i], INTEGER, values[i]))
 SET(Int64, SETTABLE, instance_set(c, __func__, references[i], ENUMERATION, (double)values[i]))
-SET(String, SETTABLE, instance_set(c, __func__, references[i], STRING, 0.0))
 
-/* What there is none of: other types, clocks, structural parameters, dependencies by element, scheduled execution */
+/* What there is none of: strings to set, other types, clocks, structural parameters, dependencies by element, scheduled execution */
 
 #ifdef __GNUC__
 #pragma GCC diagnostic ignored "-Wunused-parameter"
@@ -172,6 +171,7 @@ NONE_OF(UInt16)
 NONE_OF(UInt32)
 NONE_OF(UInt64)
 NONE_OF(Boolean)
+NONE_OF_CLOCKS(SetString, const fmi3String values[], size_t count)
 NONE_OF_CLOCKS(GetBinary, size_t sizes[], fmi3Binary values[], size_t count)
 NONE_OF_CLOCKS(SetBinary, const size_t sizes[], const fmi3Binary values[], size_t count)
 NONE_OF_CLOCKS(GetClock, fmi3Clock values[])
@@ -260,14 +260,14 @@ GET_DERIVATIVE(AdjointDerivative, true, unknown_count, known_count)
 
 fmi3Status fmi3EnterEventMode(fmi3Instance component)
 {
-    ALLOW_IN(MODEL_EXCHANGE, CONTINUOUS)
+    ALLOW(CONTINUOUS)
     c->s.phase = EVENT;
     return fmi3OK;
 }
 
 fmi3Status fmi3EnterContinuousTimeMode(fmi3Instance component)
 {
-    ALLOW_IN(MODEL_EXCHANGE, EVENT)
+    ALLOW(EVENT)
     c->s.phase = CONTINUOUS;
     return fmi3OK;
 }
@@ -276,7 +276,7 @@ fmi3Status fmi3UpdateDiscreteStates(
     fmi3Instance component, fmi3Boolean *again, fmi3Boolean *terminate, fmi3Boolean *nominals_changed, fmi3Boolean *values_changed,
     fmi3Boolean *next_event_given, fmi3Float64 *next_event)
 {
-    ALLOW_IN(MODEL_EXCHANGE, EVENT)
+    ALLOW(EVENT)
     NEED(again && terminate && nominals_changed && values_changed && next_event_given && next_event)
     *again = *nominals_changed = *next_event_given = fmi3False;
     *next_event = 0.0;
@@ -286,7 +286,7 @@ fmi3Status fmi3UpdateDiscreteStates(
 
 fmi3Status fmi3CompletedIntegratorStep(fmi3Instance component, fmi3Boolean no_going_back, fmi3Boolean *event, fmi3Boolean *terminate)
 {
-    ALLOW_IN(MODEL_EXCHANGE, CONTINUOUS)
+    ALLOW(CONTINUOUS)
     NEED(event && terminate)
     *event = *terminate = fmi3False;
     return fmi3OK;
@@ -294,13 +294,13 @@ fmi3Status fmi3CompletedIntegratorStep(fmi3Instance component, fmi3Boolean no_go
 
 fmi3Status fmi3SetTime(fmi3Instance component, fmi3Float64 time)
 {
-    ALLOW_IN(MODEL_EXCHANGE, CONTINUOUS)
+    ALLOW(CONTINUOUS)
     RETURN(instance_set_time(c, __func__, time));
 }
 
 fmi3Status fmi3SetContinuousStates(fmi3Instance component, const fmi3Float64 x[], size_t count)
 {
-    ALLOW_IN(MODEL_EXCHANGE, CONTINUOUS)
+    ALLOW(CONTINUOUS)
     NEED(x)
     RETURN(instance_set_states(c, __func__, x, count));
 }
@@ -359,7 +359,7 @@ static void intermediate_update(void *context, Plant *plant, double *end)
 fmi3Status fmi3DoStep(fmi3Instance component, fmi3Float64 time, fmi3Float64 step, fmi3Boolean no_going_back,
                       fmi3Boolean *event_needed, fmi3Boolean *terminate, fmi3Boolean *early_return, fmi3Float64 *last_successful)
 {
-    ALLOW_IN(CO_SIMULATION, STEP)
+    ALLOW(STEP)
     NEED(event_needed && terminate && early_return && last_successful)
     Watch watch = {intermediate_update, c};
     Status status = instance_step(c, time, step, c->update ? &watch : NULL);

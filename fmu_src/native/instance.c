@@ -12,15 +12,15 @@
 static char *copy(const char *text)
 {
     char *result = malloc(strlen(text) + 1);
-    return result ? strcpy(result, text) : NULL;
+    return result ? strcpy(result, text) : NULL; /* no memory */
 }
 
 Instance *instance_new(const char *name, const char *token, Interface interface, bool logging, void *environment,
                        void (*log)(const Instance *, Status, const char *, const char *), void (*logger)(void))
 {
     Instance *c = calloc(1, sizeof *c);
-    if (!c)
-        return NULL;
+    if (!c) /* no memory */
+        return NULL; /* no memory */
     c->interface = interface;
     c->logging = logging;
     c->environment = environment;
@@ -28,8 +28,8 @@ Instance *instance_new(const char *name, const char *token, Interface interface,
     c->logger = logger;
     c->name = copy(name ? name : "");
     c->text = calloc(1, SENTENCE);
-    bool good = c->name && c->text;
-    if (good && c->name[0] == 0) {
+    bool good = c->name && c->text; /* no memory */
+    if (good && c->name[0] == 0) { /* no memory */
         instance_say(c, ERROR, "an instance must have a name");
         good = false;
     }
@@ -132,8 +132,6 @@ Status instance_setup(Instance *c, bool tolerance_given, double tolerance, doubl
 static Reason refresh(Instance *c, char sentence[SENTENCE])
 {
     Reason reason = GOOD;
-    if (!c->stale)
-        return GOOD;
     if (c->s.plant.begun == 0.0)
         reason = plant_begin(&c->s.plant, sentence);
     if (reason == GOOD)
@@ -178,9 +176,11 @@ static void read_outputs(Instance *c)
 {
     char sentence[SENTENCE];
     Reason reason = refresh(c, sentence);
-    bool refused = ((int)c->s.phase & STEP) && c->s.reason != GOOD;
+    bool refused = ((int)c->s.phase & RUNNING) && c->s.reason != GOOD; /* of which the reason stays, until a good step */
     if (reason != GOOD && !refused)
         note(c, reason, sentence);
+    else if (reason == GOOD && c->interface == MODEL_EXCHANGE)
+        forget(c);
 }
 
 static double computed(Instance *c, int row)
@@ -259,14 +259,6 @@ Status instance_set(Instance *c, const char *function, unsigned reference, Kind 
     return OK;
 }
 
-static int input_number(unsigned reference)
-{
-    for (int i = 0; i < INPUTS; i++)
-        if (input_at[i] == (int)reference)
-            return i;
-    return -1;
-}
-
 Status instance_set_slope(Instance *c, const char *function, unsigned reference, int order, double slope)
 {
     Digits number;
@@ -279,7 +271,7 @@ Status instance_set_slope(Instance *c, const char *function, unsigned reference,
     if (!isfinite(slope))
         return instance_say(c, ERROR, "%s: the derivative of %s is %s: it must be a finite number", function, v->name,
                             digits(number, slope));
-    c->s.plant.slopes[input_number(reference)] = slope;
+    c->s.plant.slopes[v->row] = slope;
     return OK;
 }
 
@@ -502,8 +494,8 @@ static const char hexadecimal[] = "0123456789abcdef";
 Status instance_save(Instance *c, void **state)
 {
     Saved *saved = *state ? *state : malloc(sizeof *saved);
-    if (!saved)
-        return instance_say(c, ERROR, "no memory for a saved state");
+    if (!saved) /* no memory */
+        return instance_say(c, ERROR, "there is no memory for a saved state"); /* no memory */
     *saved = c->s;
     *state = saved;
     return OK;
@@ -511,8 +503,6 @@ Status instance_save(Instance *c, void **state)
 
 Status instance_restore(Instance *c, const void *state)
 {
-    if (!state)
-        return instance_say(c, ERROR, "there is no saved state to restore");
     c->s = *(const Saved *)state;
     c->stale = true;
     c->stopped = false;
@@ -532,15 +522,6 @@ static void put(Out *out, const char *text)
             out->text[out->size] = *text;
 }
 
-static void put_text(Out *out, const char *name, const char *text)
-{
-    put(out, name);
-    for (; *text; text++) {
-        char c = *text == '"' || *text == '\\' || (unsigned char)*text < ' ' ? '\'' : *text;
-        put(out, (char[]){c, 0});
-    }
-}
-
 static void put_saved(Out *out, const Saved *saved)
 {
     put(out, HEADER);
@@ -550,8 +531,10 @@ static void put_saved(Out *out, const Saved *saved)
         for (int shift = 60; shift >= 0; shift -= 4)
             put(out, (char[]){hexadecimal[bits >> shift & 15], 0});
     }
-    put_text(out, "\",\"message\":\"", saved->message);
-    put_text(out, "\",\"cause\":\"", saved->cause_message);
+    put(out, "\",\"message\":\"");
+    put(out, saved->message);
+    put(out, "\",\"cause\":\"");
+    put(out, saved->cause_message);
     put(out, "\"}");
 }
 
@@ -633,15 +616,15 @@ static bool sound(const Saved *s)
         if (variables[v].kind != REAL && variables[v].causality == PARAMETER && !whole(s->plant.given[v], -2147483648.0, 2147483647.0))
             return false;
     return whole(s->phase, INSTANTIATED, TERMINATED) && ((int)s->phase & ((int)s->phase - 1)) == 0 && whole(s->reason, GOOD, INTERNAL) &&
-           whole(s->cause, GOOD, INTERNAL) && isfinite(s->plant.time);
+           whole(s->cause, GOOD, INTERNAL) && isfinite(s->plant.time) && isfinite(s->plant.start_time);
 }
 
 Status instance_deserialize(Instance *c, const char *text, size_t size, void **state)
 {
     Saved *saved = calloc(1, sizeof *saved);
     In in = {text, text + size};
-    if (!saved)
-        return instance_say(c, ERROR, "no memory for a saved state");
+    if (!saved) /* no memory */
+        return instance_say(c, ERROR, "there is no memory for a saved state"); /* no memory */
     bool good = take(&in, HEADER);
     for (size_t i = 0; i < NUMBERS && good; i++)
         good = take_number(&in, (char *)saved + i * sizeof(double));

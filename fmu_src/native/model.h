@@ -21,7 +21,7 @@ typedef struct {
     Kind kind;
     Causality causality;
     double start;            /* of a parameter or an input */
-    int row;                 /* of what is computed: its place among the rows, see below */
+    int row;                 /* of what is computed: its place among the rows, see below; of an input: its number */
     Rule rule;
     double least, most;
     const char *requirement; /* what would be right, as the end of the sentence "it must ..." */

@@ -6,7 +6,8 @@
 
 #include "tableau.h"
 
-enum { MAX_STEPS = 20000 };
+/* The least part of a step that is worth an early return. */
+#define LEAST_ADVANCE 1e-9
 
 const char *digits(Digits text, double value)
 {
@@ -209,8 +210,7 @@ static Reason check_assembly(double clearance, const double x[STATES], char sent
     if (clearance >= LIMIT_CLEARANCE)
         return GOOD;
     configuration(x, where);
-    snprintf(sentence, SENTENCE, isnan(clearance) || clearance < 0.0 ? "the links cannot be joined at %s" : "limit of assembly at %s",
-             where);
+    snprintf(sentence, SENTENCE, clearance >= 0.0 ? "limit of assembly at %s" : "the links cannot be joined at %s", where);
     return LIMIT_OF_ASSEMBLY;
 }
 
@@ -229,12 +229,7 @@ static void what_begins(const Plant *a, double own[ROOM(PARAMETERS)], double sta
 Reason plant_begin(Plant *a, char sentence[SENTENCE])
 {
     double own[ROOM(PARAMETERS)], state[2 * FREEDOMS], u[ROOM(INPUTS)];
-    Digits number;
     a->begun = 0.0;
-    if (!isfinite(a->start_time)) {
-        snprintf(sentence, SENTENCE, "the time at the start is %s s: it must be a finite number", digits(number, a->start_time));
-        return INPUT_NOT_FINITE;
-    }
     a->time = a->start_time;
     Reason reason = check_parameters(a, sentence);
     if (reason == GOOD)
@@ -250,7 +245,7 @@ Reason plant_begin(Plant *a, char sentence[SENTENCE])
     reason = check_assembly(clearance_of(a, a->x), a->x, sentence);
     if (reason != GOOD)
         return reason;
-    if (!all_finite(a->p, CONSTANTS) || !all_finite(a->x, STATES) || !all_finite(a->scale, STATES)) {
+    if (!all_finite(a->p, CONSTANTS)) {
         char where[SENTENCE];
         configuration(a->x, where);
         snprintf(sentence, SENTENCE, "the energy at the start is not finite: %s", where);
@@ -325,10 +320,10 @@ static double up_to_limit(const Plant *a, double t, double x[STATES], double h, 
 {
     double low = 0.0, high = h, best[STATES], tried[STATES];
     memcpy(best, x, sizeof best);
-    for (int n = 0; n < 60 && high - low > 1e-15 * h; n++) {
+    while (high - low > 1e-15 * h) {
         double middle = 0.5 * (low + high);
-        double error = attempt(a, t, x, middle, k, tried);
-        if (isfinite(error) && clearance_of(a, tried) >= LIMIT_CLEARANCE) {
+        attempt(a, t, x, middle, k, tried);
+        if (clearance_of(a, tried) >= LIMIT_CLEARANCE) {
             low = middle;
             memcpy(best, tried, sizeof best);
         } else {
@@ -435,7 +430,7 @@ static Reason integrate(
             }
         }
     }
-    if (!early || reason != LIMIT_OF_ASSEMBLY || done == 0.0)
+    if (!early || reason != LIMIT_OF_ASSEMBLY || done < LEAST_ADVANCE * *duration)
         return reason;
     *ended = LIMIT_OF_ASSEMBLY;
     *duration = done;
@@ -510,6 +505,9 @@ Reason plant_outputs(Plant *a, char sentence[SENTENCE])
     if (!all_finite(y, OUTPUTS)) {
         int largest = 0;
         Digits time, number;
+        reason = check_assembly(clearance_of(a, x), x, sentence);
+        if (reason != GOOD)
+            return reason;
         for (int i = 1; i < INPUTS; i++)
             if (fabs(u[i]) > fabs(u[largest]))
                 largest = i;

@@ -287,8 +287,9 @@ def test_a_missing_pointer_is_an_error(library: Library) -> None:
 def test_no_instance_is_an_error(library: Library) -> None:
     c = library.instance()
     good = Good(c)
-    for name in kind_of(library):
-        arguments = good.arguments(name)
+    calls = {name: good.arguments(name) for name in kind_of(library)}
+    calls |= {name: (None, c_size_t(0), None, c_size_t(0)) for name in (*EMPTY[library.fmi], "SetString")}
+    for name, arguments in calls.items():
         handle, c.handle = c.handle, None
         assert c(name, *arguments) == ERROR, name
         c.free()  # does nothing
@@ -315,7 +316,7 @@ def test_references_and_types(library: Library) -> None:
     integers = ["GetInteger"] if library.fmi == 2 else ["GetInt32", "GetInt64"]
     for name, wrong in (
         (c.real("Get"), ("solver.status", "drive.mode", "solver.message")),
-        (integers[0], ("crank.angle", "solver.message")),
+        *((integer, ("crank.angle", "solver.message")) for integer in integers),
         ("GetString", ("crank.angle", "drive.mode", "solver.status")),
     ):
         for other in wrong:
@@ -325,10 +326,17 @@ def test_references_and_types(library: Library) -> None:
         for outside in (len(references), 2**31, 2**32 - 1):
             assert get(name, outside) == ERROR
             assert f"no variable with the value reference {outside}" in c.log[-1][1]
+    c("Reset")
+    assert c.set(**{"solver.message": 1.0}) == ERROR
+    assert c.set(**{"solver.status": 1}) == ERROR
+    assert "solver.status is computed" in c.log[-1][1]
+    c.start()
     for name in integers:
         wanted = "drive.mode" if name == "GetInt64" else "assembly.branch"
         assert get(name, references[wanted]) == OK
     assert c("SetString", *c.arrays(["solver.message"], (c_char_p * 1)(b"\xff"))) == ERROR
+    assert c("SetString", None, c_size_t(1), None, c_size_t(1)) == ERROR
+    assert c("SetString", None, c_size_t(0), None, c_size_t(0)) == OK
     assert c("SetString", *c.arrays(["crank.angle"], (c_char_p * 1)(b"\xff"))) == ERROR
     c.free()
 

@@ -1,0 +1,132 @@
+"""The C of native FMUs under GCC's instruments: the tests of native FMUs run on it in a process of their own.
+
+Every line and every branch of the shell is reached, or it says here why it is not; no access outside of what is allocated and
+no undefined behaviour is found on the way.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+import zipfile
+from pathlib import Path
+from typing import NamedTuple
+
+import pytest
+
+from analysis.export import NATIVE, NATIVE_FMI3, build_native
+from analysis.export.native_fmu import source_files
+
+from ..conftest import NATIVE_MECHANISMS
+
+ROOT = Path(__file__).resolve().parents[2]
+SHELL = ROOT / "fmu_src" / "native"
+#: The tests that call native FMUs function by function.
+TESTS = ("test_native_calls.py", "test_native_runs.py")
+
+#: Lines that no test reaches, and lines with a branch that none takes, by a part of their text: why.
+NOT_REACHED = {
+    "/* no memory */": "memory does not run out in a test",
+    "command->mode < 0 ||": "no mechanism of the tests has a command that is always in force",
+    "i < FREEDOMS && end < SENTENCE": "no mechanism has so many freedoms that a sentence overflows",
+}
+
+#: The same on machines without a locale that has a decimal comma.
+NOT_EVERYWHERE = {"if (*c == ',')", "*c = '.';"}
+
+
+class Line(NamedTuple):
+    """A line of the shell that was not reached, or a branch at its end that was not taken."""
+
+    file: str
+    number: int
+    text: str
+
+
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(not (shutil.which("gcc") and shutil.which("gcov")), reason="GCC and its gcov are not installed"),
+]
+
+
+def instrumented(folder: Path, *flags: str) -> Path:
+    """Native FMUs with libraries compiled by GCC with flags; their objects are in folders beside them."""
+    fmus = folder / "fmus"
+    for mechanism in NATIVE_MECHANISMS:
+        for kind in (NATIVE, NATIVE_FMI3):
+            fmu = build_native(mechanism, kind, fmus)
+            objects = folder / fmu.stem
+            objects.mkdir()
+            sources = source_files(mechanism, kind)
+            for name, text in sources.items():
+                (objects / name).write_text(text, encoding="utf-8")
+            library = f"{kind.identifier(mechanism)}.so"
+            files = [name for name in sources if name.endswith(".c")]
+            always = ["-std=c11", "-ffp-contract=off", "-shared", "-fPIC"]
+            subprocess.run(["gcc", *always, *flags, "-o", library, *files, "-lm"], cwd=objects, check=True)
+            with zipfile.ZipFile(fmu) as archive:
+                entries = {name: archive.read(name) for name in archive.namelist()}
+            with zipfile.ZipFile(fmu, "w") as archive:
+                for name, content in entries.items():
+                    archive.writestr(name, (objects / library).read_bytes() if name.endswith(".so") else content)
+    return fmus
+
+
+def counted(folder: Path) -> tuple[dict[Line, int], dict[tuple[Line, int], int]]:
+    """How often each line and each branch of the shell was executed, in all libraries together."""
+    lines: dict[Line, int] = {}
+    branches: dict[tuple[Line, int], int] = {}
+    texts = {path.name: path.read_text(encoding="utf-8").splitlines() for path in SHELL.glob("*.[ch]")}
+    for data in folder.glob("*/*.gcda"):
+        done = subprocess.run(
+            ["gcov", "--json-format", "--stdout", "--branch-probabilities", data.name],
+            cwd=data.parent, check=True, capture_output=True, text=True,
+        )  # fmt: skip
+        for document in done.stdout.splitlines():
+            for file in json.loads(document)["files"]:
+                name = Path(file["file"]).name
+                for line in file["lines"] if name in texts else ():
+                    at = Line(name, line["line_number"], texts[name][line["line_number"] - 1].strip())
+                    lines[at] = lines.get(at, 0) + line["count"]
+                    for number, branch in enumerate(line["branches"]):
+                        key = (at, number)
+                        branches[key] = branches.get(key, 0) + branch["count"]
+    return lines, branches
+
+
+def run_tests(fmus: Path, **environment: str) -> None:
+    """Run the tests of native FMUs on the FMUs of a folder."""
+    done = subprocess.run(
+        [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", *(f"tests/fmu/{name}" for name in TESTS)],
+        cwd=ROOT,
+        env=os.environ | environment | {"LINKWORK_NATIVE_FMUS": str(fmus)},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stdout[-4000:] + done.stderr[-4000:]
+
+
+def test_every_line_and_branch_of_the_shell_is_reached(tmp_path: Path) -> None:
+    run_tests(instrumented(tmp_path, "-O0", "--coverage"))
+    lines, branches = counted(tmp_path)
+    assert len(lines) > 700
+    missed = {line for line, count in lines.items() if count == 0}
+    missed |= {line for (line, _), count in branches.items() if count == 0}
+    known = (*NOT_REACHED, *NOT_EVERYWHERE)
+    assert sorted(line for line in missed if not any(part in line.text for part in known)) == []
+    assert [part for part in NOT_REACHED if not any(part in line.text for line in missed)] == [], "reached now"
+
+
+def test_sanitizers_find_nothing(tmp_path: Path) -> None:
+    runtime = subprocess.run(
+        ["gcc", "-print-file-name=libasan.so"], capture_output=True, text=True, check=True
+    ).stdout.strip()
+    if not Path(runtime).is_absolute():
+        pytest.skip("GCC has no runtime of its AddressSanitizer here")
+    flags = ("-O1", "-g", "-fsanitize=address,undefined", "-fno-sanitize-recover=all")
+    # Python itself keeps memory to the end
+    run_tests(instrumented(tmp_path, *flags), LD_PRELOAD=runtime, ASAN_OPTIONS="detect_leaks=0")

@@ -1,0 +1,891 @@
+"""Runs of the native FMUs call by call: what is refused and in which words, saved states, events, intermediate updates."""
+
+from __future__ import annotations
+
+import ctypes
+import json
+import math
+from ctypes import byref, c_bool, c_char, c_double, c_int, c_size_t, c_uint32, c_void_p
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from linkwork.limits import LIMIT_SINE
+
+from .native import DISCARD, ERROR, OK, WARNING, Instance, Library
+
+#: A force that ends in the limit of assembly within a tenth of a second, by the model; modes that leave both freedoms free.
+TOO_MUCH = {
+    "FiveBarSlider": ("slider__force", {"drive__mode": 0}),
+    "SliderCrank": ("axial__force", {"drive__mode": 0, "axial__mode": 0}),
+}
+FILES = ["FiveBarSlider-native", "FiveBarSlider-native-fmi3", "SliderCrank-native", "SliderCrank-native-fmi3"]
+
+
+@pytest.fixture(scope="module")
+def libraries(natives: dict[str, Path], tmp_path_factory: pytest.TempPathFactory) -> dict[str, Library]:
+    return {name: Library(natives[name], tmp_path_factory.mktemp("library")) for name in FILES}
+
+
+@pytest.fixture(params=FILES)
+def library(request: pytest.FixtureRequest, libraries: dict[str, Library]) -> Library:
+    return libraries[request.param]
+
+
+@pytest.fixture(params=FILES[:2])
+def five_bar(request: pytest.FixtureRequest, libraries: dict[str, Library]) -> Library:
+    return libraries[request.param]
+
+
+@pytest.fixture
+def fmi3(libraries: dict[str, Library]) -> Library:
+    return libraries["FiveBarSlider-native-fmi3"]
+
+
+def model(library: Library) -> str:
+    return library.path.name.partition("_")[0]
+
+
+# Initialisation
+
+
+@pytest.mark.parametrize(
+    ("values", "sentence"),
+    [
+        ({"crank__length": -1.0}, "parameter crank.length is -1: it must be a finite number greater than zero"),
+        ({"crank__mass": -0.5}, "parameter crank.mass is -0.5: it must be a finite number, zero or greater"),
+        ({"gravity": math.nan}, "parameter gravity is nan: it must be a finite number, zero or greater"),
+        ({"initial__crank_angle": math.inf}, "parameter initial.crank_angle is inf: it must be a finite number"),
+        ({"solver__tolerance": 0.1}, "parameter solver.tolerance is 0.1: it must be between 1e-13 and 0.01"),
+        ({"assembly__branch": 2}, "parameter assembly.branch is 2: it must be +1 or -1, the sign of"),
+        ({"drive__mode": 2}, "parameter drive.mode is 2: it must be 0 (torque) or 1 (speed)"),
+        ({"drive__mode": -1}, "parameter drive.mode is -1: it must be 0 (torque) or 1 (speed)"),
+        (
+            {"crank__mass": 1.0, "crank__cog_distance": 0.5},
+            "parameter crank.inertia is 0.00125: it must be at least crank.mass * crank.cog_distance^2 = 0.25 kg.m2",
+        ),
+        (
+            {"rocker__mass": 0.0, "slider__mass": 0.0},
+            "parameter slider.mass is 0: it must be greater than zero where rocker.mass is zero",
+        ),
+        ({"coupler__mass": 1e300, "crank__length": 1e10}, "parameter coupler.mass is 1e+300: it must be small enough"),
+        (
+            {"coupler__cog_distance": 1e200, "rocker__inertia": 1e-300},
+            "parameter rocker.inertia is 1e-300: it must be large enough",
+        ),
+        ({"crank__length": 9.0}, "the links cannot be joined at crank angle 0 rad (0 deg) and slider position 0 m"),
+        ({"initial__slider_velocity": 1e200}, "the energy at the start is not finite: crank angle 0 rad"),
+        ({"drive__speed": math.nan}, "input drive.speed is nan at t = 0 s: it must be a finite number"),
+        (
+            {"slider__force": 1e300, "drive__mode": 0, "drive__torque": 1e308},
+            "an output is not finite at t = 0 s: input drive.torque is",
+        ),
+        (
+            {"slider__force": 1e308, "drive__mode": 0, "drive__torque": 1e300},
+            "an output is not finite at t = 0 s: input slider.force is",
+        ),
+    ],
+)
+def test_what_the_initialisation_refuses(five_bar: Library, values: dict[str, float], sentence: str) -> None:
+    c = five_bar.instance()
+    c.set(**values)
+    c.enter()
+    assert c("ExitInitializationMode") == ERROR
+    ((status, logged),) = c.log
+    assert status == ERROR
+    assert sentence in logged
+    # for who has no log
+    assert c.text() == logged
+    assert c.status() in (2, 3, 6)
+    # the values can be mended, and the instance goes on
+    good = five_bar.instance()
+    assert c("Reset") == OK
+    c.start()
+    good.start()
+    assert c.get("crank.acceleration", "pin.C.fx") == good.get("crank.acceleration", "pin.C.fx")
+    assert c.step(0.0, 1e-3) == OK
+    c.free()
+    good.free()
+
+
+def test_a_limit_of_assembly_at_the_start(five_bar: Library) -> None:
+    c = five_bar.instance()
+    reach = 0.3  # coupler and rocker
+    ends = reach - 2e-8
+    c.set(crank__length=0.05, ground__length=ends + 0.05)
+    c.enter()
+    assert c("ExitInitializationMode") == ERROR
+    assert "limit of assembly at crank angle 0 rad" in c.log[-1][1]
+    assert c.status() == 3
+    c.free()
+
+
+def test_outputs_in_initialisation_mode_follow_what_is_set(library: Library) -> None:
+    c = library.instance()
+    assert c.enter() == OK
+    at_rest = c.get("crank.angle")
+    c.set(initial__crank_angle=0.25)
+    assert at_rest == [0.0]
+    assert c.get("crank.angle") == [0.25]
+    # a bad value: the read is good, the outputs stay, the status says why
+    c.set(crank__length=-1.0)
+    assert c.get("crank.angle") == [0.25]
+    assert c.status() == 6
+    assert "crank.length" in c.text()
+    c.set(crank__length=0.05)
+    assert c("ExitInitializationMode") == OK
+    assert (c.status(), c.text()) == (0, "")
+    c.free()
+
+
+def test_time_starts_where_the_master_says(library: Library) -> None:
+    c = library.instance()
+    assert c.enter(start=2.5, tolerance=1e-11) == OK
+    assert c("ExitInitializationMode") == OK
+    assert c.get("time") == [2.5]
+    assert c.step(2.5, 1e-3) == OK
+    assert c.get("time") == [2.501]
+    c.free()
+
+
+def test_the_tighter_of_both_tolerances_holds(library: Library) -> None:
+    def after(own: float, master: float | None) -> list[float]:
+        c = library.instance()
+        c.set(solver__tolerance=own)
+        c.enter(tolerance=master)
+        assert c("ExitInitializationMode") == OK
+        assert c.step(0.0, 0.1) == OK
+        values = c.get("slider.position", "energy.supplied")
+        c.free()
+        return values
+
+    assert after(1e-6, 1e-11) == after(1e-11, None) == after(1e-11, 1e-6)
+    assert after(1e-6, 1e-11) != after(1e-6, None)
+    assert after(1e-13, None) == after(1e-2, 1e-30)
+
+
+# Steps
+
+
+@pytest.mark.parametrize(
+    ("time", "step", "sentence"),
+    [
+        (0.0, 0.0, "a step of 0 s at t = 0 s: it must be greater than zero"),
+        (0.0, -1.0, "a step of -1 s at t = 0 s: it must be greater than zero"),
+        (0.0, math.nan, "a step of nan s from t = 0 s: both must be finite numbers"),
+        (math.inf, 1.0, "a step of 1 s from t = inf s: both must be finite numbers"),
+        (0.5, 1e-3, "a step over a gap: it starts at t = 0.5 s, but the state is at t = 0 s"),
+        (-0.5, 1e-3, "a step backwards: it starts at t = -0.5 s, but the state is at t = 0 s"),
+    ],
+)
+def test_steps_out_of_order(library: Library, time: float, step: float, sentence: str) -> None:
+    c, other = library.instance().start(), library.instance().start()
+    assert c.step(time, step) == DISCARD
+    assert (c.status(), c.text()) == (1, sentence)
+    for instance in (c, other):
+        assert instance.step(0.0, 1e-3) == OK
+    assert (c.status(), c.text()) == (0, "")
+    assert c.get("crank.angle", "energy.residual") == other.get("crank.angle", "energy.residual")
+    c.free()
+    other.free()
+
+
+def test_an_input_that_is_not_finite(library: Library) -> None:
+    c = library.instance().start()
+    before = c.get("drive.applied_torque")
+    c.set(drive__torque=math.inf)
+    assert c.get("drive.applied_torque") == before
+    assert c.status() == 2
+    assert c.step(0.0, 1e-3) == DISCARD
+    assert c.text() == "input drive.torque is inf at t = 0 s: it must be a finite number"
+    # the first cause stays
+    assert c.step(1e-3, 1e-3) == DISCARD
+    assert c.status() == 2
+    assert c.text().startswith("a step over a gap")
+    assert "; before that, input drive.torque is inf" in c.text()
+    c.set(drive__torque=0.0)
+    assert c.step(0.0, 1e-3) == OK
+    c.free()
+
+
+def to_the_limit(library: Library, **options: Any) -> Instance:
+    force, modes = TOO_MUCH[model(library)]
+    c = library.instance(**options).start(**modes)
+    c.set(**{force: 1e5})
+    return c
+
+
+def test_the_limit_of_assembly_refuses_a_step(library: Library) -> None:
+    c = to_the_limit(library)
+    before = c.get("crank.angle", "energy.kinetic")
+    assert c.step(0.0, 0.1) == DISCARD
+    assert c.status() == 3
+    assert "limit of assembly" in c.text()
+    assert c.get("crank.angle", "energy.kinetic", "time") == [*before, 0.0]
+    if library.fmi == 2:
+        number, state, flag = c_double(), c_int(), c_int()
+        assert c("GetRealStatus", 2, byref(number)) == OK
+        assert c("GetStatus", 0, byref(state)) == OK
+        assert c("GetBooleanStatus", 3, byref(flag)) == OK
+        assert (number.value, state.value, flag.value) == (0.0, DISCARD, 1)
+        for kind in (0, 1):
+            sentence = ctypes.c_char_p()
+            assert c("GetStringStatus", kind, byref(sentence)) == OK
+            assert (sentence.value or b"").decode() == c.text()
+        for name in ("GetStatus", "GetRealStatus", "GetBooleanStatus", "GetStringStatus", "GetIntegerStatus"):
+            assert c(name, 17, byref(c_double())) == ERROR
+            assert "no status of kind 17" in c.log[-1][1]
+    # the run goes on with another force
+    c.set(**{TOO_MUCH[model(library)][0]: 0.0})
+    assert c.step(0.0, 1e-3) == OK
+    c.free()
+
+
+def test_a_step_ends_early_at_the_limit(libraries: dict[str, Library]) -> None:
+    for name in FILES[1::2]:
+        library = libraries[name]
+        c = to_the_limit(library, early=True)
+        assert c.step(0.0, 0.1) == OK
+        assert (c.early, c.terminate, c.event) == (True, True, False)
+        assert 0.0 < c.reached.value < 0.1
+        assert c.get("time") == [c.reached.value]
+        assert c.status() == 3
+        assert c.text() == "the step ended early, at the limit of assembly"
+        (margin,) = c.get("assembly.margin_to_limit")
+        assert 0.0 <= margin < 1e-6
+        assert abs(c.get("energy.residual")[0]) < 1e-6 * c.get("energy.kinetic")[0]
+        # nothing is left of the way
+        reached = c.reached.value
+        for _ in range(100):
+            if c.step(c.reached.value, 1e-3) == DISCARD:
+                break
+            assert c.terminate
+        assert (c.status(), c.early, c.terminate) == (3, False, False)
+        assert c.reached.value - reached < 1e-6
+        c.free()
+
+
+def test_steps_that_cannot_meet_the_tolerance(five_bar: Library) -> None:
+    c = five_bar.instance().start(drive__mode=0)
+    c.set(drive__torque=1e200)
+    assert c.step(0.0, 1.0) == DISCARD
+    assert c.status() == 4
+    assert "in the step from t = 0 s: the step size fell to" in c.text()
+    assert ", at crank angle 0 rad (0 deg) and slider position 0 m" in c.text()
+    c.free()
+    # accelerations that are not finite from the beginning
+    c = five_bar.instance().start(drive__mode=0)
+    c.set(drive__torque=1e308, slider__force=1e308)
+    assert c.step(0.0, 1.0) == DISCARD
+    assert "the accelerations are not finite" in c.text()
+    c.free()
+    # more steps than there may be
+    c = five_bar.instance().start(slider__stiffness=1e12, slider__damping=0.0)
+    assert c.step(0.0, 10.0) == DISCARD
+    assert "20000 steps did not suffice: stopped" in c.text()
+    c.free()
+
+
+def test_an_early_return_is_for_the_limit_alone(fmi3: Library) -> None:
+    c = fmi3.instance(early=True).start(drive__mode=0)
+    c.set(drive__torque=1e200)
+    assert c.step(0.0, 1.0) == DISCARD
+    assert (c.status(), c.early, c.reached.value) == (4, False, 0.0)
+    c.free()
+
+
+def test_every_way_into_the_limit_is_refused_or_ends_early(libraries: dict[str, Library]) -> None:
+    """Loose steps come upon the limit in every way: by an accepted step, by one whose end is beyond, by shrinking steps."""
+    words = set()
+    for name in FILES[1::2]:
+        force, modes = TOO_MUCH[model(libraries[name])]
+        for early in (False, True):
+            for power in range(60):
+                c = libraries[name].instance(early=early).start(**modes, solver__tolerance=1e-2)
+                c.set(**{force: (-1.0) ** power * 10.0 ** (2.0 + power / 12.0)})
+                time = 0.0
+                for _ in range(40):
+                    status = c.step(time, 0.01)
+                    time += 0.01
+                    if status != OK or c.early:
+                        break
+                else:
+                    c.free()
+                    continue
+                assert c.status() == 3, c.text()
+                words.add(" ".join(c.text().partition("s: ")[2].split()[:4]))
+                (margin,) = c.get("assembly.margin_to_limit")
+                assert margin >= 0.0
+                c.free()
+    # a step so long that the least step of the integrator is too long near the limit
+    for name in FILES[1::2]:
+        force, modes = TOO_MUCH[model(libraries[name])]
+        c = libraries[name].instance().start(**modes)
+        c.set(**{force: 1e5})
+        assert c.step(0.0, 1e8) == DISCARD
+        assert c.status() == 3
+        words.add(" ".join(c.text().partition("s: ")[2].split()[:4]))
+        c.free()
+    assert words - {""} == {"limit of assembly at", "limit of assembly near", "the links cannot be"}
+
+
+def test_a_mechanism_at_rest_takes_any_step(five_bar: Library) -> None:
+    rest = {"drive__speed": 0.0, "initial__crank_speed": 0.0, "gravity": 0.0}
+    c = five_bar.instance().start(**rest)
+    before = c.get("slider.position", "crank.angle")
+    assert c.step(0.0, 3.0) == OK
+    assert c.get("slider.position", "crank.angle") == before
+    c.free()
+
+
+# Inputs that move over a step, outputs that do
+
+
+def slopes(c: Instance, names: list[str], values: Any, order: int = 1) -> int:
+    """Input derivatives of FMI 2.0, or output derivatives of either version."""
+    references, n, found, *rest = c.arrays(names, values)
+    orders = (c_int * len(names))(*[order] * len(names))
+    what = "GetRealOutputDerivatives" if c.library.fmi == 2 else "GetOutputDerivatives"
+    return c(what, references, n, orders, found, *rest)
+
+
+def test_what_moves(library: Library) -> None:
+    c = library.instance().start()
+    one, out = (c_double * 1)(1.0), (c_double * 1)()
+    force = "slider.force" if model(library) == "FiveBarSlider" else "slider.load"
+    if library.fmi == 2:
+
+        def give(name: str, order: int, value: float) -> int:
+            return c("SetRealInputDerivatives", *c.arrays([name], one)[:2], (c_int * 1)(order), (c_double * 1)(value))
+
+        assert give("crank.angle", 1, 1.0) == ERROR
+        assert give(force, 2, 1.0) == ERROR
+        assert "derivative 2 of" in c.log[-1][1]
+        assert give(force, 1, math.nan) == ERROR
+        assert f"the derivative of {force} is nan" in c.log[-1][1]
+        assert give("solver.status", 1, 1.0) == ERROR
+        assert give(force, 1, 1000.0) == OK
+    assert c.step(0.0, 0.01) == OK
+    # in the place of the force that moved is where it has come to
+    assert c.get(force) == [10.0 if library.fmi == 2 else 0.0]
+    assert slopes(c, ["crank.angle"], out) == OK
+    assert list(out) == c.get("crank.speed")
+    assert slopes(c, ["time"], out) == OK
+    assert list(out) == [1.0]
+    assert slopes(c, [force], out) == ERROR
+    assert slopes(c, ["crank.angle"], out, order=2) == ERROR
+    assert "derivative 2 of crank.angle" in c.log[-1][1]
+    assert slopes(c, ["solver.status"], out) == ERROR
+    c.free()
+
+
+def test_output_derivatives_that_are_not_finite(five_bar: Library) -> None:
+    c = five_bar.instance().start(drive__mode=0)
+    c.set(drive__torque=math.nan)
+    assert slopes(c, ["crank.speed"], (c_double * 1)()) == DISCARD
+    c.free()
+
+
+def test_a_commanded_speed_that_moves(libraries: dict[str, Library]) -> None:
+    # drive.speed with a slope is drive.acceleration
+    library = libraries["FiveBarSlider-native"]
+    moving, given = library.instance().start(), library.instance().start()
+    references, n, _ = moving.arrays(["drive.speed"], None)
+    assert moving("SetRealInputDerivatives", references, n, (c_int * 1)(1), (c_double * 1)(100.0)) == OK
+    given.set(drive__acceleration=100.0)
+    for c in (moving, given):
+        assert c.step(0.0, 0.05) == OK
+    names = ("crank.speed", "slider.position", "energy.supplied")
+    assert moving.get(*names) == pytest.approx(given.get(*names), rel=1e-12)
+    assert moving.get("drive.speed") == [43.982297150257104 + 5.0]
+    moving.free()
+    given.free()
+
+
+def test_jumps_of_a_commanded_speed(five_bar: Library) -> None:
+    c, again = five_bar.instance().start(), five_bar.instance().start()
+    before = c.get("slider.velocity")
+    c.set(drive__speed=50.0)
+    assert c.get("crank.speed") == [50.0]
+    assert c.get("slider.velocity") != before
+    power = c.get("power.supplied", "power.dissipated")
+    assert all(map(math.isfinite, power))
+    again.set(drive__speed=50.0)
+    for instance in (c, again):
+        assert instance.step(0.0, 1e-3) == OK
+    assert c.get("crank.speed", "slider.velocity") == again.get("crank.speed", "slider.velocity")
+    c.free()
+    again.free()
+
+
+# Saved states
+
+
+def serialized(c: Instance, state: c_void_p) -> bytes:
+    three = c.library.fmi == 3
+    size = c_size_t()
+    assert c(f"SerializedFMU{'S' if three else 's'}tateSize", state, byref(size)) == OK
+    text = (c_char * size.value)()
+    name = "SerializeFMUState" if three else "SerializeFMUstate"
+    assert c(name, state, text, c_size_t(size.value + 1)) == ERROR
+    assert "it must be" in c.log[-1][1]
+    assert c(name, state, text, size) == OK
+    return bytes(text.raw)
+
+
+def restored(c: Instance, text: bytes) -> int:
+    three = c.library.fmi == 3
+    state = c_void_p()
+    status = c("DeserializeFMUState" if three else "DeSerializeFMUstate", text, c_size_t(len(text)), byref(state))
+    if status == OK:
+        status = c("SetFMUState" if three else "SetFMUstate", state)
+        assert c("FreeFMUState" if three else "FreeFMUstate", byref(state)) == OK
+        assert state.value is None
+    return status
+
+
+NAMES = ("crank.angle", "crank.acceleration", "energy.supplied", "energy.residual", "time")
+
+
+def test_a_run_goes_on_from_a_saved_state_bit_for_bit(library: Library) -> None:
+    c = library.instance().start()
+    assert c.step(0.0, 0.01) == OK
+    assert c.step(5.0, 0.01) == DISCARD  # a sentence to save
+    c.set(drive__torque=math.inf)
+    assert c.step(0.01, 0.01) == DISCARD
+    c.set(drive__torque=0.0)
+    state = c.saved()
+    text = serialized(c, state)
+    assert json.loads(text)["model"] == library.path.stem
+    assert c.step(0.01, 0.01) == OK
+    wanted = c.get(*NAMES)
+    # saved into the same place again
+    assert c("GetFMUState" if library.fmi == 3 else "GetFMUstate", byref(state)) == OK
+    assert c.step(0.02, 0.01) == OK
+    later = c.get(*NAMES)
+    assert c("SetFMUState" if library.fmi == 3 else "SetFMUstate", state) == OK
+    assert c.step(0.02, 0.01) == OK
+    assert c.get(*NAMES) == later
+    # in another instance, from text
+    other = library.instance()
+    assert restored(other, text) == OK
+    assert other.status() == 2
+    assert other.step(0.01, 0.01) == OK
+    assert other.get(*NAMES) == wanted
+    c("FreeFMUState" if library.fmi == 3 else "FreeFMUstate", byref(state))
+    c("FreeFMUState" if library.fmi == 3 else "FreeFMUstate", None)
+    c.free()
+    other.free()
+
+
+def test_damaged_states_are_refused(library: Library) -> None:
+    c = library.instance().start()
+    text = serialized(c, c.saved())
+    start = text.index(b'numbers":"') + 10
+    phase = text.index(b'","message')  # the last numbers before it are phase, reason and cause
+    count = (phase - start) // 16
+    given = sorted(library.references.items(), key=lambda item: item[1])
+    branch = next(reference for name, reference in given if name == "assembly.branch")
+
+    def number(place: int, value: float) -> bytes:
+        import struct
+
+        at = start + 16 * place
+        return text[:at] + struct.pack(">d", value).hex().encode() + text[at + 16 :]
+
+    half = number(branch, 0.5)
+    damaged = [
+        b"", b"{}", text[:-1], text + b" ", text[:200], text[: start + 20], text.replace(b'"format":1', b'"format":2'),
+        text[:start] + b"G" + text[start + 1 :], text[:start] + b"\x00" + text[start + 1 :],
+        text.replace(b'"message":"', b'"massage":"'), text.replace(b'"message":"', b'"message":"\n'),
+        text.replace(b'"message":"', b'"message":"' + b"x" * 400), text.replace(b'"cause":"', b'"cause":'),
+        text[: text.index(b'"message":"') + 11], half, number(branch, 1e10), number(branch, -1e10), number(branch, math.nan),
+        number(count - 3, 3.0), number(count - 3, 1000.0), number(count - 3, 0.5), number(count - 3, math.nan),
+        number(count - 2, 77.0), number(count - 1, -1.0),
+    ]  # fmt: skip
+    for place, wrong in enumerate(damaged):
+        assert restored(c, wrong) == ERROR, place
+        assert "the serialised state is damaged" in c.log[-1][1]
+    assert restored(c, text) == OK
+    assert c.step(0.0, 1e-3) == OK
+    c.free()
+
+
+def test_a_state_with_a_time_that_is_not_finite_is_refused(five_bar: Library) -> None:
+    import struct
+
+    c = five_bar.instance()
+    assert c.enter(start=1.25) == OK
+    text = serialized(c, c.saved())
+    time = struct.pack(">d", 1.25).hex().encode()
+    assert text.count(time) == 2
+    nan = struct.pack(">d", math.nan).hex().encode()
+    assert restored(c, text.replace(time, nan)) == ERROR
+    assert restored(c, text.replace(time, nan, 1)) == ERROR
+    assert restored(c, nan.join(text.rsplit(time, 1))) == ERROR
+    assert restored(c, text) == OK
+    c.free()
+
+
+def test_quotes_in_a_sentence_do_not_spoil_the_text(five_bar: Library) -> None:
+    c = five_bar.instance().start()
+    c.step(5.0, 1.0)
+    saved = json.loads(serialized(c, c.saved()))
+    assert saved["message"] == c.text()
+    c.free()
+
+
+# Derivatives
+
+
+def directional(
+    c: Instance, unknowns: list[str], knowns: list[str], seed: list[float], kind: str = "Directional"
+) -> Any:
+    """Status, or the result where it is good."""
+    refs = c.library.references
+    result = (c_double * (len(unknowns) if kind == "Directional" else len(knowns)))()
+    seeds = (c_double * len(seed))(*seed)
+    left, right = ((c_uint32 * len(names))(*(refs[n] for n in names)) for names in (unknowns, knowns))
+    arguments: list[Any] = [left, c_size_t(len(unknowns)), right, c_size_t(len(knowns)), seeds]
+    if c.library.fmi == 3:
+        arguments += [c_size_t(len(seed)), result, c_size_t(len(result))]
+    else:
+        arguments += [result]
+    status = c(f"Get{kind}Derivative", *arguments)
+    return list(result) if status == OK else status
+
+
+@pytest.mark.parametrize("kind", ["Directional", "Adjoint"])
+def test_derivatives_that_there_are_not(library: Library, kind: str) -> None:
+    if library.fmi == 2 and kind == "Adjoint":
+        pytest.skip("FMI 2.0 has no adjoint derivatives")
+    c = library.instance()
+    c.enter()
+    assert directional(c, ["crank.acceleration"], ["solver.status"], [1.0], kind) == ERROR
+    assert directional(c, ["solver.status"], ["drive.torque"], [1.0], kind) == ERROR
+    assert directional(c, ["drive.torque"], ["drive.torque"], [1.0], kind) == ERROR
+    assert "drive.torque is no unknown" in c.log[-1][1]
+    assert directional(c, ["crank.acceleration"], ["crank.angle"], [1.0], kind) == ERROR
+    assert "crank.angle is no known of a derivative in initialisation mode" in c.log[-1][1]
+    assert directional(c, ["crank.acceleration"], ["initial.crank_angle"], [1.0], kind) != ERROR
+    assert directional(c, ["crank.acceleration"], ["drive.torque"], [math.nan], kind) == DISCARD
+    c.set(crank__length=-1.0)
+    assert directional(c, ["crank.acceleration"], ["drive.torque"], [1.0], kind) == ERROR
+    assert "crank.length is -1" in c.log[-1][1]
+    c.free()
+    c = library.instance().start()
+    assert directional(c, ["crank.acceleration"], ["crank.length"], [1.0], kind) == ERROR
+    assert "crank.length is no known of a derivative in step mode" in c.log[-1][1]
+    assert directional(c, ["crank.acceleration"], ["crank.angle"], [1.0], kind) == ERROR  # a state, in co-simulation
+    if library.fmi == 3:
+        refs = (c_uint32 * 1)(c.library.references["crank.acceleration"])
+        one = (c_double * 1)(1.0)
+        for counts in ((2, 1), (1, 2)):
+            sizes = [c_size_t(n) for n in counts]
+            assert (
+                c(f"Get{kind}Derivative", refs, c_size_t(1), refs, c_size_t(1), one, sizes[0], one, sizes[1]) == ERROR
+            )
+            assert "2 numbers: it must be 1" in c.log[-1][1]
+        assert (
+            c(f"Get{kind}Derivative", None, c_size_t(0), None, c_size_t(0), None, c_size_t(0), None, c_size_t(0)) == OK
+        )
+    else:
+        assert c("GetDirectionalDerivative", None, c_size_t(0), None, c_size_t(0), None, None) == OK
+    c.free()
+
+
+@pytest.mark.parametrize("file", FILES)
+@pytest.mark.parametrize("modes", [{}, {"drive__mode": 0}])
+def test_derivatives_against_differences(libraries: dict[str, Library], file: str, modes: dict[str, Any]) -> None:
+    """A coarse check of all paths; `test_agreement` holds them to the traced equations."""
+    library = libraries[file]
+    outputs = ["crank.speed", "crank.acceleration", "drive.applied_torque", "energy.kinetic", "power.supplied"]
+    inputs = ["drive.speed", "drive.torque", "drive.acceleration"]
+    if model(library) == "SliderCrank":
+        inputs += ["axial.speed", "axial.force"]
+
+    def check(c: Instance, knowns: list[str], moved: Any) -> None:
+        for known in knowns:
+            exact = directional(c, outputs, [known], [1.0])
+            h = 1e-5
+            up, down = moved(known, h), moved(known, -h)
+            assert exact == pytest.approx([(a - b) / (2 * h) for a, b in zip(up, down)], rel=2e-5, abs=2e-4), known
+            if library.fmi == 3:
+                for number in range(len(outputs)):
+                    weights = [float(n == number) for n in range(len(outputs))]
+                    (gradient,) = directional(c, outputs, [known], weights, "Adjoint")
+                    assert gradient == pytest.approx(exact[number], rel=1e-11, abs=1e-11)
+
+    def in_steps(known: str, change: float) -> list[float]:
+        other = library.instance().start(**modes)
+        assert other.step(0.0, 0.01) == OK
+        other.set(**{known: other.get(known)[0] + change})
+        values = other.get(*outputs)
+        other.free()
+        return values
+
+    c = library.instance().start(**modes)
+    assert c.step(0.0, 0.01) == OK
+    c.set(drive__speed=c.get("drive.speed")[0])
+    check(c, inputs, in_steps)
+    c.free()
+
+    def at_start(known: str, change: float) -> list[float]:
+        other = library.instance()
+        other.set(**modes)
+        other.enter()
+        other.set(**{known: other.get(known)[0] + change})
+        values = other.get(*outputs)
+        other.free()
+        return values
+
+    c = library.instance()
+    c.set(**modes)
+    c.enter()
+    check(c, [*inputs, "crank.length", "initial.crank_angle", "initial.crank_speed"], at_start)
+    c.free()
+
+    exchange = library.instance("me").start(**modes)
+    assert exchange("EnterContinuousTimeMode") == OK
+
+    def of_state(known: str, change: float) -> list[float]:
+        place = {"crank.angle": 0, "crank.speed": 2}.get(known)
+        kept = exchange.states(count=6)
+        if place is None:
+            value = exchange.get(known)[0]
+            exchange.set(**{known: value + change})
+            values = exchange.get(*outputs)
+            exchange.set(**{known: value})
+            return values
+        x = (c_double * 6)(*(v + change * (n == place) for n, v in enumerate(kept)))
+        assert exchange("SetContinuousStates", x, c_size_t(6)) == OK
+        values = exchange.get(*outputs)
+        assert exchange("SetContinuousStates", (c_double * 6)(*kept), c_size_t(6)) == OK
+        return values
+
+    check(exchange, ["crank.angle", "crank.speed", "drive.torque", "drive.speed"], of_state)
+    exchange.free()
+
+
+def test_the_states_are_the_knowns_of_model_exchange(five_bar: Library) -> None:
+    c = five_bar.instance("me").start()
+    assert directional(c, ["crank.acceleration"], ["crank.speed"], [1.0]) != ERROR
+    assert directional(c, ["crank.acceleration"], ["crank.acceleration"], [1.0]) == ERROR
+    c.free()
+
+
+def test_works_that_are_no_outputs(natives: dict[str, Path], tmp_path: Path) -> None:
+    for number, name in enumerate(("Pendulum-native", "Pendulum-native-fmi3")):
+        c = Library(natives[name], tmp_path / str(number)).instance().start(initial__pendulum_speed=10.0)
+        assert c.step(0.0, 0.1) == OK
+        dissipated, supplied = c.get("energy.dissipated", "energy.supplied")
+        assert (dissipated > 0.0, supplied) == (True, 0.0)
+        c.set(drive__torque=1.0)
+        assert c.step(0.1, 0.1) == OK
+        assert c.get("energy.supplied") != [0.0]
+        c.free()
+
+
+# Model exchange
+
+
+def test_model_exchange_by_hand(library: Library) -> None:
+    c = library.instance("me")
+    assert c.enter() == OK
+    assert c.states()[0] == 0.0
+    assert c("ExitInitializationMode") == OK
+    assert c.discrete() == (False, False)
+    assert c("EnterContinuousTimeMode") == OK
+    x, nominals = c.states(), c.states("NominalsOfContinuousStates")
+    assert min(nominals) > 0.0
+    name = "Derivatives" if library.fmi == 2 else "ContinuousStateDerivatives"
+    rates = c.states(name)
+    assert rates[:2] == x[2:4]
+    assert rates[4:] == c.get("power.dissipated", "power.supplied")
+    assert c.get("assembly.margin_to_limit") == c.states("EventIndicators", 1)
+    for which in ("ContinuousStates", name, "NominalsOfContinuousStates"):
+        assert c(f"Get{which}", (c_double * 9)(), c_size_t(9)) == ERROR
+        assert "9 numbers: it must be 6" in c.log[-1][1]
+    assert c("GetEventIndicators", (c_double * 2)(), c_size_t(2)) == ERROR
+    assert c("SetContinuousStates", (c_double * 5)(), c_size_t(5)) == ERROR
+    assert c("SetContinuousStates", (c_double * 6)(math.nan), c_size_t(6)) == DISCARD
+    assert c("SetTime", math.nan) == ERROR
+    assert "the time is nan s" in c.log[-1][1]
+    assert c("SetTime", 0.25) == OK
+    assert c.get("time") == [0.25]
+    assert c("CompletedIntegratorStep", c_bool(True) if library.fmi == 3 else 1, byref(c_int(1)), byref(c_int(1))) == OK
+    # a command that changes is applied at the event, once
+    c.set(drive__speed=50.0)
+    assert c.get("crank.speed") == [x[2]]
+    assert c("EnterEventMode") == OK
+    assert c.discrete() == (False, True)
+    assert c.states()[2] == 50.0
+    assert c.discrete() == (False, False)
+    assert c("EnterContinuousTimeMode") == OK
+    c.free()
+
+
+def test_model_exchange_beyond_the_limit(five_bar: Library) -> None:
+    c = five_bar.instance("me").start()
+    assert c("EnterContinuousTimeMode") == OK
+    assert c("SetContinuousStates", (c_double * 6)(0.0, 9.0, 1.0, 0.0, 0.0, 0.0), c_size_t(6)) == OK
+    name = "Derivatives" if five_bar.fmi == 2 else "ContinuousStateDerivatives"
+    assert c(f"Get{name}", (c_double * 6)(), c_size_t(6)) == DISCARD
+    assert c("GetEventIndicators", (c_double * 1)(), c_size_t(1)) == DISCARD
+    assert "the equations are not defined" in c.log[-1][1] if c.log else True
+    assert c("EnterEventMode") == OK
+    assert c.discrete()[0]
+    assert c.status() == 3
+    assert c.text() == "the motion has reached the limit of assembly"
+    c.free()
+    c = five_bar.instance("me")
+    c.set(crank__length=-1.0)
+    c.enter()
+    assert c("GetContinuousStates", (c_double * 6)(), c_size_t(6)) == ERROR
+    assert "crank.length is -1" in c.log[-1][1]
+    c.free()
+
+
+def test_the_limit_in_words_for_who_logs(five_bar: Library) -> None:
+    c = five_bar.instance("me", logging=True).start()
+    assert c("EnterContinuousTimeMode") == OK
+    assert c("SetContinuousStates", (c_double * 6)(0.0, 9.0, 1.0, 0.0, 0.0, 0.0), c_size_t(6)) == OK
+    assert c("EnterEventMode") == OK
+    assert c.discrete()[0]
+    assert c.log == [(WARNING, "the motion has reached the limit of assembly")]
+    c.free()
+
+
+def test_the_clearance_at_the_limit_is_the_least_that_is_followed(five_bar: Library) -> None:
+    c = five_bar.instance().start()
+    (margin,) = c.get("assembly.margin_to_limit")
+    (angle,) = c.get("transmission.angle")
+    assert margin == pytest.approx(math.sin(angle) - LIMIT_SINE, rel=1e-12)
+    c.free()
+
+
+# Intermediate updates of FMI 3.0
+
+
+def test_intermediate_updates(fmi3: Library) -> None:
+    seen: list[tuple[float, float]] = []
+    made: list[Instance] = []
+    forbidden: list[int] = []
+
+    def update(
+        _: Any, time: float, settable: bool, gettable: bool, finished: bool, can_end: bool, ask: Any, end: Any
+    ) -> None:
+        (c,) = made
+        assert (settable, gettable, finished, can_end) == (True, True, True, False)
+        assert c.get("time") == [time]
+        seen.append((time, c.get("crank.angle")[0]))
+        forbidden.append(c("Reset"))
+        ask[0], end[0] = True, time  # not allowed, not heeded
+
+    made.append(fmi3.instance(update=update))
+    c = made[0].start()
+    plain = fmi3.instance().start()
+    for instance in (c, plain):
+        assert instance.step(0.0, 0.1) == OK
+        assert not instance.early
+    assert len(seen) > 3
+    assert [time for time, _ in seen] == sorted({time for time, _ in seen})
+    assert max(seen)[0] < 0.1
+    assert set(forbidden) == {ERROR}
+    assert "not allowed during an intermediate update" in c.log[-1][1]
+    assert c.get(*NAMES) == plain.get(*NAMES)
+    c.free()
+    plain.free()
+
+
+def test_inputs_set_in_an_intermediate_update_hold_from_there(fmi3: Library) -> None:
+    made: list[Instance] = []
+    times: list[float] = []
+
+    def update(_: Any, time: float, *rest: Any) -> None:
+        if not times:
+            times.append(time)
+            made[0].set(slider__force=3.0, drive__speed=60.0)
+
+    made.append(fmi3.instance(update=update))
+    c = made[0].start()
+    assert c.step(0.0, 0.05) == OK
+    two = fmi3.instance().start()
+    assert two.step(0.0, times[0]) == OK
+    two.set(slider__force=3.0, drive__speed=60.0)
+    assert two.step(times[0], 0.05 - times[0]) == OK
+    names = ("crank.angle", "crank.speed", "slider.position", "slider.velocity", "energy.supplied")
+    assert c.get(*names) == pytest.approx(two.get(*names), rel=1e-8)
+    c.free()
+    two.free()
+
+
+def test_an_input_that_is_not_finite_in_an_update_refuses_the_step(fmi3: Library) -> None:
+    made: list[Instance] = []
+    made.append(fmi3.instance(update=lambda *arguments: made[0].set(slider__force=math.nan) and None))
+    c = made[0].start()
+    assert c.step(0.0, 0.05) == DISCARD
+    assert c.status() == 2
+    assert c.get("time", "slider.force") == [0.0, 0.0]
+    c.free()
+
+
+@pytest.mark.parametrize("ahead", [0.0, 0.004, 1.0])
+def test_an_update_may_end_the_step(fmi3: Library, ahead: float) -> None:
+    made: list[Instance] = []
+    asked: list[float] = []
+
+    def update(
+        _: Any, time: float, settable: bool, gettable: bool, finished: bool, can_end: bool, ask: Any, end: Any
+    ) -> None:
+        assert can_end
+        if not asked:
+            asked.append(time + ahead)
+            ask[0], end[0] = True, time + ahead
+
+    made.append(fmi3.instance(early=True, update=update))
+    c = made[0].start()
+    assert c.step(0.0, 0.05) == OK
+    ends = min(asked[0], 0.05)
+    assert c.early == (ends < 0.05)
+    assert not c.terminate
+    assert c.reached.value == pytest.approx(ends, abs=1e-15)
+    assert c.get("time") == [c.reached.value]
+    assert c.step(c.reached.value, 0.01) == OK
+    c.free()
+
+
+# Arrays of nothing
+
+
+def test_nothing_asked_is_nothing_wrong(library: Library) -> None:
+    c = library.instance().start()
+    none = (None, c_size_t(0), None) if library.fmi == 2 else (None, c_size_t(0), None, c_size_t(0))
+    kinds = ("Real", "Integer", "String") if library.fmi == 2 else ("Float64", "Int32", "Int64", "String")
+    for kind in kinds:
+        for verb in ("Get", "Set"):
+            assert c(f"{verb}{kind}", *none) == OK
+    slope = (None, c_size_t(0), None, None) if library.fmi == 2 else (None, c_size_t(0), None, None, c_size_t(0))
+    assert c("GetRealOutputDerivatives" if library.fmi == 2 else "GetOutputDerivatives", *slope) == OK
+    if library.fmi == 2:
+        assert c("SetRealInputDerivatives", *slope) == OK
+    else:
+        names = ["crank.angle"]
+        references, n, values, _ = c.arrays(names, (c_double * 1)())
+        for kind in kinds:
+            for verb in ("Get", "Set") if kind != "String" else ("Get",):
+                assert c(f"{verb}{kind}", references, n, values, c_size_t(2)) == ERROR
+                assert "2 numbers: it must be 1" in c.log[-1][1]
+        assert c("GetOutputDerivatives", references, n, (c_int * 1)(1), values, c_size_t(2)) == ERROR
+    c.free()
+
+
+def test_versions(library: Library) -> None:
+    version = getattr(library.dll, f"fmi{library.fmi}GetVersion")
+    version.restype = ctypes.c_char_p
+    assert version() == f"{library.fmi}.0".encode()
+    if library.fmi == 2:
+        platform = library.dll.fmi2GetTypesPlatform
+        platform.restype = ctypes.c_char_p
+        assert platform() == b"default"
