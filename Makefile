@@ -1,4 +1,4 @@
-# make demo: both FMUs built, run and checked. make quick, test, test-all: less or more of the tests. Each makes .venv itself.
+# make demo: all FMUs built, run and checked. make quick, test, test-all: less or more of the tests. Each makes .venv itself.
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
@@ -46,7 +46,7 @@ bench: $(DEV)
 	for part in solvers fmu stability synthesis slider_crank; do $(BIN)/python -m benchmarks.$$part || exit; done
 
 $(RUN): pyproject.toml | $(BIN)/pip
-	$(BIN)/pip install --quiet --editable .
+	$(BIN)/pip install --quiet --editable '.[native]'
 	@touch $@
 
 $(DEV): pyproject.toml | $(BIN)/pip

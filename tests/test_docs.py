@@ -85,9 +85,10 @@ def test_names_of_modules_in_the_documentation_are_right():
             assert pkgutil.resolve_name(name), page.name
 
 
-def test_the_code_of_the_readme_runs(fmus, tmp_path):
+def test_the_code_of_the_readme_runs(fmus, natives, tmp_path):
     (tmp_path / "build").mkdir()
-    shutil.copy(fmus["FiveBarSlider"], tmp_path / "build")
+    for fmu in (fmus["FiveBarSlider"], natives["FiveBarSlider-native"]):
+        shutil.copy(fmu, tmp_path / "build")
     blocks = re.findall(r"```python\n(.*?)```", (ROOT / "README.md").read_text(), flags=re.DOTALL)
     assert len(blocks) == 5
     for block in blocks:
