@@ -1,10 +1,12 @@
-/* What both faces check of every call, before anything else: the state of the instance, and pointers. */
+/* What both faces have in common: the checks of every call, and the functions that both standards have alike.
+
+   A face defines the names of its standard before: FMI(Status) is fmi2Status or fmi3Status, STATE(Get, ) is fmi2GetFMUstate or
+   fmi3GetFMUState, DESERIALIZE the one that these two spell differently. */
 #ifndef FACE_H
 #define FACE_H
 
 #include "instance.h"
 
-/* A face defines FMI(Name), its name for something of the standard: FMI(Status) is fmi2Status or fmi3Status. */
 #define RETURN(status) return (FMI(Status))(status)
 
 #define SAY(...) RETURN(instance_say(c, ERROR, __VA_ARGS__))
@@ -38,5 +40,127 @@ enum {
     WITH_STATES = INITIALIZATION | EVENT | CONTINUOUS | TERMINATED,
     SETTABLE = INSTANTIATED | INITIALIZATION | EVENT | STEP
 };
+
+/* Life */
+
+const char *FMI(GetVersion)(void)
+{
+    return FMI(Version);
+}
+
+void FMI(FreeInstance)(void *component)
+{
+    instance_free(component);
+}
+
+FMI(Status) FMI(SetDebugLogging)(void *component, FMI(Boolean) logging, size_t count, const FMI(String) categories[])
+{
+    (void)count, (void)categories; /* all of them */
+    ALLOW(ANY_STATE)
+    c->logging = logging;
+    return FMI(OK);
+}
+
+FMI(Status) FMI(ExitInitializationMode)(void *component)
+{
+    ALLOW(INITIALIZATION)
+    RETURN(instance_exit_initialization(c));
+}
+
+FMI(Status) FMI(Terminate)(void *component)
+{
+    ALLOW(EVENT | CONTINUOUS | STEP)
+    c->s.phase = TERMINATED;
+    return FMI(OK);
+}
+
+FMI(Status) FMI(Reset)(void *component)
+{
+    ALLOW(ANY_STATE & ~INTERMEDIATE)
+    instance_reset(c);
+    return FMI(OK);
+}
+
+/* Saved state */
+
+FMI(Status) STATE(Get, )(void *component, void **state)
+{
+    ALLOW(ANY_STATE & ~INTERMEDIATE)
+    NEED(state)
+    RETURN(instance_save(c, state));
+}
+
+FMI(Status) STATE(Set, )(void *component, void *state)
+{
+    ALLOW(ANY_STATE & ~INTERMEDIATE)
+    NEED(state)
+    RETURN(instance_restore(c, state));
+}
+
+FMI(Status) STATE(Free, )(void *component, void **state)
+{
+    ALLOW(ANY_STATE)
+    instance_forget_saved(state);
+    return FMI(OK);
+}
+
+FMI(Status) STATE(Serialized, Size)(void *component, void *state, size_t *size)
+{
+    ALLOW(ANY_STATE)
+    NEED(state && size)
+    *size = instance_serialized_size(state);
+    return FMI(OK);
+}
+
+FMI(Status) STATE(Serialize, )(void *component, void *state, FMI(Byte) bytes[], size_t size)
+{
+    ALLOW(ANY_STATE)
+    NEED(state && bytes)
+    RETURN(instance_serialize(c, __func__, state, (char *)bytes, size));
+}
+
+FMI(Status) DESERIALIZE(void *component, const FMI(Byte) bytes[], size_t size, void **state)
+{
+    ALLOW(ANY_STATE)
+    NEED(bytes && state)
+    RETURN(instance_deserialize(c, (const char *)bytes, size, state));
+}
+
+/* Model exchange */
+
+FMI(Status) FMI(EnterContinuousTimeMode)(void *component)
+{
+    ALLOW(EVENT)
+    c->s.phase = CONTINUOUS;
+    return FMI(OK);
+}
+
+FMI(Status) FMI(CompletedIntegratorStep)(void *component, FMI(Boolean) final, FMI(Boolean) *event, FMI(Boolean) *terminate)
+{
+    (void)final;
+    ALLOW(CONTINUOUS)
+    NEED(event && terminate)
+    *event = *terminate = false;
+    return FMI(OK);
+}
+
+FMI(Status) FMI(SetContinuousStates)(void *component, const double x[], size_t count)
+{
+    ALLOW(CONTINUOUS)
+    NEED(x)
+    RETURN(instance_set_states(c, __func__, x, count));
+}
+
+#define GET_STATES(name, what)                                                     \
+    FMI(Status) FMI(name)(void *component, double values[], size_t count)          \
+    {                                                                              \
+        ALLOW_IN(MODEL_EXCHANGE, WITH_STATES)                                      \
+        NEED(values)                                                               \
+        RETURN(instance_get_states(c, __func__, what, values, count));             \
+    }
+
+GET_STATES(GetContinuousStates, VALUES)
+GET_STATES(GetNominalsOfContinuousStates, NOMINALS)
+GET_STATES(GetEventIndicators, INDICATORS)
 
 #endif

@@ -2,6 +2,8 @@
 #include "fmi2Functions.h"
 
 #define FMI(name) fmi2##name
+#define STATE(verb, noun) fmi2##verb##FMUstate##noun
+#define DESERIALIZE fmi2DeSerializeFMUstate
 
 #include "face.h"
 
@@ -18,11 +20,6 @@ const char *fmi2GetTypesPlatform(void)
     return fmi2TypesPlatform;
 }
 
-const char *fmi2GetVersion(void)
-{
-    return fmi2Version;
-}
-
 fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String guid, fmi2String resources,
                               const fmi2CallbackFunctions *functions, fmi2Boolean visible, fmi2Boolean logging)
 {
@@ -35,20 +32,6 @@ fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String guid, f
                         functions ? (void (*)(void))functions->logger : NULL);
 }
 
-void fmi2FreeInstance(fmi2Component component)
-{
-    instance_free(component);
-}
-
-fmi2Status fmi2SetDebugLogging(fmi2Component component, fmi2Boolean logging, size_t count, const fmi2String categories[])
-{
-    (void)count;
-    (void)categories; /* all of them */
-    ALLOW(ANY_STATE)
-    c->logging = logging;
-    return fmi2OK;
-}
-
 /* Life */
 
 fmi2Status fmi2SetupExperiment(fmi2Component component, fmi2Boolean tolerance_given, fmi2Real tolerance, fmi2Real start,
@@ -58,27 +41,10 @@ fmi2Status fmi2SetupExperiment(fmi2Component component, fmi2Boolean tolerance_gi
     RETURN(instance_setup(c, tolerance_given, tolerance, start, stop_given, stop));
 }
 
-#define ENTER(name, from, to)                           \
-    fmi2Status fmi2##name(fmi2Component component)      \
-    {                                                   \
-        ALLOW(from)                                     \
-        c->s.phase = to;                                \
-        return fmi2OK;                                  \
-    }
-
-ENTER(EnterInitializationMode, INSTANTIATED, INITIALIZATION)
-ENTER(Terminate, EVENT | CONTINUOUS | STEP, TERMINATED)
-
-fmi2Status fmi2ExitInitializationMode(fmi2Component component)
+fmi2Status fmi2EnterInitializationMode(fmi2Component component)
 {
-    ALLOW(INITIALIZATION)
-    RETURN(instance_exit_initialization(c));
-}
-
-fmi2Status fmi2Reset(fmi2Component component)
-{
-    ALLOW(ANY_STATE)
-    instance_reset(c);
+    ALLOW(INSTANTIATED)
+    c->s.phase = INITIALIZATION;
     return fmi2OK;
 }
 
@@ -146,51 +112,6 @@ fmi2Status fmi2SetBoolean(fmi2Component component, const Reference references[],
     RETURN(instance_none(c, __func__, count));
 }
 
-/* Saved state */
-
-fmi2Status fmi2GetFMUstate(fmi2Component component, fmi2FMUstate *state)
-{
-    ALLOW(ANY_STATE)
-    NEED(state)
-    RETURN(instance_save(c, state));
-}
-
-fmi2Status fmi2SetFMUstate(fmi2Component component, fmi2FMUstate state)
-{
-    ALLOW(ANY_STATE)
-    NEED(state)
-    RETURN(instance_restore(c, state));
-}
-
-fmi2Status fmi2FreeFMUstate(fmi2Component component, fmi2FMUstate *state)
-{
-    ALLOW(ANY_STATE)
-    instance_forget_saved(state);
-    return fmi2OK;
-}
-
-fmi2Status fmi2SerializedFMUstateSize(fmi2Component component, fmi2FMUstate state, size_t *size)
-{
-    ALLOW(ANY_STATE)
-    NEED(state && size)
-    *size = instance_serialized_size(state);
-    return fmi2OK;
-}
-
-fmi2Status fmi2SerializeFMUstate(fmi2Component component, fmi2FMUstate state, fmi2Byte bytes[], size_t size)
-{
-    ALLOW(ANY_STATE)
-    NEED(state && bytes)
-    RETURN(instance_serialize(c, __func__, state, bytes, size));
-}
-
-fmi2Status fmi2DeSerializeFMUstate(fmi2Component component, const fmi2Byte bytes[], size_t size, fmi2FMUstate *state)
-{
-    ALLOW(ANY_STATE)
-    NEED(bytes && state)
-    RETURN(instance_deserialize(c, bytes, size, state));
-}
-
 fmi2Status fmi2GetDirectionalDerivative(fmi2Component component, const Reference unknowns[], size_t unknown_count,
                                         const Reference knowns[], size_t known_count, const fmi2Real change[], fmi2Real result[])
 {
@@ -208,13 +129,6 @@ fmi2Status fmi2EnterEventMode(fmi2Component component)
     return fmi2OK;
 }
 
-fmi2Status fmi2EnterContinuousTimeMode(fmi2Component component)
-{
-    ALLOW(EVENT)
-    c->s.phase = CONTINUOUS;
-    return fmi2OK;
-}
-
 fmi2Status fmi2NewDiscreteStates(fmi2Component component, fmi2EventInfo *info)
 {
     bool terminate, changed;
@@ -225,40 +139,13 @@ fmi2Status fmi2NewDiscreteStates(fmi2Component component, fmi2EventInfo *info)
     return fmi2OK;
 }
 
-fmi2Status fmi2CompletedIntegratorStep(fmi2Component component, fmi2Boolean no_going_back, fmi2Boolean *event, fmi2Boolean *terminate)
-{
-    (void)no_going_back;
-    ALLOW(CONTINUOUS)
-    NEED(event && terminate)
-    *event = *terminate = fmi2False;
-    return fmi2OK;
-}
-
 fmi2Status fmi2SetTime(fmi2Component component, fmi2Real time)
 {
     ALLOW(EVENT | CONTINUOUS)
     RETURN(instance_set_time(c, __func__, time));
 }
 
-fmi2Status fmi2SetContinuousStates(fmi2Component component, const fmi2Real x[], size_t count)
-{
-    ALLOW(CONTINUOUS)
-    NEED(x)
-    RETURN(instance_set_states(c, __func__, x, count));
-}
-
-#define GET_STATES(name, what)                                                              \
-    fmi2Status fmi2Get##name(fmi2Component component, fmi2Real values[], size_t count)      \
-    {                                                                                       \
-        ALLOW_IN(MODEL_EXCHANGE, WITH_STATES)                                               \
-        NEED(values)                                                                        \
-        RETURN(instance_get_states(c, __func__, what, values, count));                      \
-    }
-
-GET_STATES(ContinuousStates, VALUES)
-GET_STATES(Derivatives, DERIVATIVES)
-GET_STATES(NominalsOfContinuousStates, NOMINALS)
-GET_STATES(EventIndicators, INDICATORS)
+GET_STATES(GetDerivatives, DERIVATIVES)
 
 /* Co-simulation */
 

@@ -2,6 +2,8 @@
 #include "fmi3Functions.h"
 
 #define FMI(name) fmi3##name
+#define STATE(verb, noun) fmi3##verb##FMUState##noun
+#define DESERIALIZE fmi3DeserializeFMUState
 
 #include "face.h"
 
@@ -15,11 +17,6 @@ static void log_message(const Instance *c, Status status, const char *category, 
 {
     if (c->logger)
         ((fmi3LogMessageCallback)c->logger)(c->environment, (fmi3Status)status, category, message);
-}
-
-const char *fmi3GetVersion(void)
-{
-    return fmi3Version;
 }
 
 fmi3Instance fmi3InstantiateModelExchange(fmi3String name, fmi3String token, fmi3String resources, fmi3Boolean visible,
@@ -61,19 +58,6 @@ fmi3Instance fmi3InstantiateScheduledExecution(
     return NULL;
 }
 
-void fmi3FreeInstance(fmi3Instance component)
-{
-    instance_free(component);
-}
-
-fmi3Status fmi3SetDebugLogging(fmi3Instance component, fmi3Boolean logging, size_t count, const fmi3String categories[])
-{
-    (void)count, (void)categories; /* all of them */
-    ALLOW(ANY_STATE)
-    c->logging = logging;
-    return fmi3OK;
-}
-
 /* Life */
 
 fmi3Status fmi3EnterInitializationMode(fmi3Instance component, fmi3Boolean tolerance_given, fmi3Float64 tolerance,
@@ -84,26 +68,6 @@ fmi3Status fmi3EnterInitializationMode(fmi3Instance component, fmi3Boolean toler
     if (status == OK)
         c->s.phase = INITIALIZATION;
     RETURN(status);
-}
-
-fmi3Status fmi3ExitInitializationMode(fmi3Instance component)
-{
-    ALLOW(INITIALIZATION)
-    RETURN(instance_exit_initialization(c));
-}
-
-fmi3Status fmi3Terminate(fmi3Instance component)
-{
-    ALLOW(EVENT | CONTINUOUS | STEP)
-    c->s.phase = TERMINATED;
-    return fmi3OK;
-}
-
-fmi3Status fmi3Reset(fmi3Instance component)
-{
-    ALLOW(ANY_STATE & ~INTERMEDIATE)
-    instance_reset(c);
-    return fmi3OK;
 }
 
 /* Values */
@@ -193,51 +157,6 @@ NONE(GetNumberOfVariableDependencies, 1, fmi3Instance component, Reference refer
 NONE(GetVariableDependencies, 1, fmi3Instance component, Reference dependent, size_t dependent_elements[],
      Reference independents[], size_t independent_elements[], fmi3DependencyKind kinds[], size_t count)
 
-/* Saved state */
-
-fmi3Status fmi3GetFMUState(fmi3Instance component, fmi3FMUState *state)
-{
-    ALLOW(ANY_STATE & ~INTERMEDIATE)
-    NEED(state)
-    RETURN(instance_save(c, state));
-}
-
-fmi3Status fmi3SetFMUState(fmi3Instance component, fmi3FMUState state)
-{
-    ALLOW(ANY_STATE & ~INTERMEDIATE)
-    NEED(state)
-    RETURN(instance_restore(c, state));
-}
-
-fmi3Status fmi3FreeFMUState(fmi3Instance component, fmi3FMUState *state)
-{
-    ALLOW(ANY_STATE)
-    instance_forget_saved(state);
-    return fmi3OK;
-}
-
-fmi3Status fmi3SerializedFMUStateSize(fmi3Instance component, fmi3FMUState state, size_t *size)
-{
-    ALLOW(ANY_STATE)
-    NEED(state && size)
-    *size = instance_serialized_size(state);
-    return fmi3OK;
-}
-
-fmi3Status fmi3SerializeFMUState(fmi3Instance component, fmi3FMUState state, fmi3Byte bytes[], size_t size)
-{
-    ALLOW(ANY_STATE)
-    NEED(state && bytes)
-    RETURN(instance_serialize(c, __func__, state, (char *)bytes, size));
-}
-
-fmi3Status fmi3DeserializeFMUState(fmi3Instance component, const fmi3Byte bytes[], size_t size, fmi3FMUState *state)
-{
-    ALLOW(ANY_STATE)
-    NEED(bytes && state)
-    RETURN(instance_deserialize(c, (const char *)bytes, size, state));
-}
-
 /* Derivatives */
 
 #define GET_DERIVATIVE(name, adjoint, seeds, results)                                                                   \
@@ -265,13 +184,6 @@ fmi3Status fmi3EnterEventMode(fmi3Instance component)
     return fmi3OK;
 }
 
-fmi3Status fmi3EnterContinuousTimeMode(fmi3Instance component)
-{
-    ALLOW(EVENT)
-    c->s.phase = CONTINUOUS;
-    return fmi3OK;
-}
-
 fmi3Status fmi3UpdateDiscreteStates(
     fmi3Instance component, fmi3Boolean *again, fmi3Boolean *terminate, fmi3Boolean *nominals_changed, fmi3Boolean *values_changed,
     fmi3Boolean *next_event_given, fmi3Float64 *next_event)
@@ -284,39 +196,13 @@ fmi3Status fmi3UpdateDiscreteStates(
     return fmi3OK;
 }
 
-fmi3Status fmi3CompletedIntegratorStep(fmi3Instance component, fmi3Boolean no_going_back, fmi3Boolean *event, fmi3Boolean *terminate)
-{
-    ALLOW(CONTINUOUS)
-    NEED(event && terminate)
-    *event = *terminate = fmi3False;
-    return fmi3OK;
-}
-
 fmi3Status fmi3SetTime(fmi3Instance component, fmi3Float64 time)
 {
     ALLOW(CONTINUOUS)
     RETURN(instance_set_time(c, __func__, time));
 }
 
-fmi3Status fmi3SetContinuousStates(fmi3Instance component, const fmi3Float64 x[], size_t count)
-{
-    ALLOW(CONTINUOUS)
-    NEED(x)
-    RETURN(instance_set_states(c, __func__, x, count));
-}
-
-#define GET_STATES(name, what)                                                              \
-    fmi3Status fmi3Get##name(fmi3Instance component, fmi3Float64 values[], size_t count)    \
-    {                                                                                       \
-        ALLOW_IN(MODEL_EXCHANGE, WITH_STATES)                                               \
-        NEED(values)                                                                        \
-        RETURN(instance_get_states(c, __func__, what, values, count));                      \
-    }
-
-GET_STATES(ContinuousStates, VALUES)
-GET_STATES(ContinuousStateDerivatives, DERIVATIVES)
-GET_STATES(NominalsOfContinuousStates, NOMINALS)
-GET_STATES(EventIndicators, INDICATORS)
+GET_STATES(GetContinuousStateDerivatives, DERIVATIVES)
 
 #define GET_NUMBER(name, number)                                          \
     fmi3Status fmi3Get##name(fmi3Instance component, size_t *count)       \
