@@ -12,8 +12,11 @@ from tempfile import TemporaryDirectory
 from types import FunctionType, ModuleType, SimpleNamespace
 from typing import Any
 
+import numpy as np
+
 from linkwork import integrate as integrator
 from linkwork import limits, plant, tableau
+from linkwork.errors import LinkworkError
 from linkwork.mechanism import Mechanism
 from linkwork.parameters import NOT_NEGATIVE, POSITIVE, fmi_name
 
@@ -35,6 +38,8 @@ def generated(mechanism: Mechanism, kind: Kind) -> dict[str, str]:
 
 # Equations
 
+_START = "constants, RULES and error_scale must be arithmetic without branches, as the equations must"
+
 
 def _equations(mechanism: Mechanism) -> str:
     casadi = symbolic.library()
@@ -53,7 +58,10 @@ def functions(mechanism: Mechanism) -> list[Any]:
     sx, join = casadi.SX, casadi.vertcat
     trace = equations.expressions(mechanism)
     s = trace.symbols
-    own, state, p, x, scale, bounds = _beginning(mechanism, s.modes, s.u)
+    try:
+        own, state, p, x, scale, bounds = _beginning(mechanism, s.modes, s.u)
+    except RuntimeError as error:
+        raise LinkworkError(f"the start of {mechanism.name} cannot be traced: {_START}") from error
     dx, du, dp = (sx.sym(f"d{n}", *v.shape) for n, v in (("x", s.x), ("u", s.u), ("p", s.p)))
     at, change = join(s.x, s.u, s.p), join(dx, du, dp)
     values = [trace.outputs, trace.derivative, trace.clearance]
@@ -90,6 +98,7 @@ def functions(mechanism: Mechanism) -> list[Any]:
         "forward": ([*run, dx, du, dp], forward(values, at, change)),
         "reverse": ([*run, *weights], gradient),
     }
+    _check_start(mechanism, casadi.Function("begin", *table["begin"]))
     return [
         casadi.Function(f"equations_{name}", arguments, [casadi.densify(r) for r in results], {"cse": True})
         for name, (arguments, results) in table.items()
@@ -117,6 +126,22 @@ def _beginning(mechanism: Mechanism, modes: Any, u: Any) -> tuple[Any, ...]:
     scale = functions.of(mechanism.error_scale)(parameters, x)
     bounds = [functions.of(least.of)(parameters) for least in mechanism.rules.least]
     return own, state, *(casadi.densify(casadi.vertcat(*v)) for v in ((*k, energy), x, scale, bounds))
+
+
+def _check_start(mechanism: Mechanism, begin: Any) -> None:
+    """Make sure that the trace of the start is the start: what NumPy or `float` had to do with it would be lost."""
+    for name, known in mechanism.published.items():
+        modes = [float(mode.default) for mode in mechanism.modes]
+        state = mechanism.state(known.initial)[: 2 * len(mechanism.freedoms)]
+        own = [float(getattr(known.parameters, field.name)) for field in fields(known.parameters)]
+        constants, _, scale = begin(modes, own, state, [0.0] * len(mechanism.channels))
+        found = [*np.asarray(constants).ravel()[:-1], *np.asarray(scale).ravel()]
+        wanted = [
+            *known.parameters.constants(),
+            *mechanism.error_scale(known.parameters, mechanism.state(known.initial)),
+        ]
+        if not np.allclose(found, wanted, rtol=1e-12, atol=0.0):
+            raise LinkworkError(f"the start of {mechanism.name}, traced, is another with the set {name}: {_START}")
 
 
 def _modules(mechanism: Mechanism) -> tuple[ModuleType, ...]:
