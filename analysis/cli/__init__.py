@@ -24,6 +24,7 @@ COMMANDS = {
     "check": ("runs", "Compare the FMU with the in-process solver, output by output."),
     "figures": ("runs", "Make the theses' figures, a still and an animation."),
     "info": ("runs", "Describe published sets, a parameter or case file, an FMU."),
+    "probe": ("probe", "Probe an FMU of any make with legal and forbidden calls."),
     "resonance": ("vibration", "Follow the periodic motion over speed or a parameter."),
     "run": ("runs", "Run a case file or a published set."),
     "slider-crank": ("slider_crank", "Analyse the generalised slider-crank of Rahman's thesis."),

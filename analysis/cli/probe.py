@@ -1,0 +1,117 @@
+"""The command that probes an FMU of any make."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+import click
+
+from ..files import write_tables
+from ..probe import CRASH, SEVERITIES, WRONG, Finding, Report, replay
+from ..probe import probe as probe_fmu
+from .common import CHECK_FAILED, console, handled, print_error, print_written, say, show_table
+
+
+@click.command()
+@click.argument("fmu", type=click.Path(exists=True, dir_okay=False))
+@click.option(
+    "--calls", default=20_000, show_default=True, type=click.IntRange(1), help="Random calls for each interface."
+)
+@click.option("--seed", default=0, show_default=True, help="The same seed makes the same calls.")
+@click.option(
+    "--time",
+    "seconds",
+    default=600.0,
+    show_default=True,
+    type=click.FloatRange(0.0),
+    help="No new random calls after so many s.",
+)
+@click.option(
+    "--interface", type=click.Choice(["cs", "me"]), help="One interface only: co-simulation or model exchange."
+)
+@click.option(
+    "--hang", default=20.0, show_default=True, type=click.FloatRange(0.1), help="A call that takes so many s hangs."
+)
+@click.option("--out", type=click.Path(dir_okay=False), help="File for the report: .md or .json.")
+@click.option("--strict", is_flag=True, help="Fail on what is questionable, too.")
+@click.option(
+    "--replay",
+    "case",
+    metavar="CASE",
+    help="Run one case of a report again and show its calls, such as 0/cs/forbidden/12.",
+)
+@handled
+def probe(
+    fmu: str,
+    calls: int,
+    seed: int,
+    seconds: float,
+    interface: str | None,
+    hang: float,
+    out: str | None,
+    strict: bool,
+    case: str | None,
+) -> None:
+    """Probe an FMU of any make: random calls, legal and forbidden, saved states, derivatives, ranges, leaks, folders.
+
+    The FMU runs in processes of its own, so that its crash is a finding. The exit code is 4 if something crashes or is wrong.
+
+    \b
+    Examples:
+      linkwork probe build/FiveBarSlider.fmu
+      linkwork probe other.fmu --calls 1000000 --seed 7 --out report.md
+      linkwork probe other.fmu --replay 7/cs/forbidden/12
+    """
+    if case is not None:
+        lines, findings = replay(fmu, case, hang=hang)
+        for line in lines:
+            say(line)
+    else:
+        with console.status("probing") as status:
+            report = probe_fmu(
+                fmu, calls=calls, seed=seed, seconds=seconds, interface=interface, hang=hang,
+                progress=lambda what: status.update(f"probing {what}"),
+            )  # fmt: skip
+        findings = report.findings
+        if out is not None:
+            print_written([_write(report, Path(out))])
+        rows = [(o.check, o.interface, str(o.cases), str(o.calls), f"{o.seconds:.1f}", o.said) for o in report.outcomes]
+        show_table(
+            f"Probe of {report.fmu}",
+            ("check", "interface", "cases", "calls", "s", "result"),
+            rows,
+            words=("check", "interface", "result"),
+        )
+    _show(findings)
+    failing = SEVERITIES if strict else (CRASH, WRONG)
+    failed = [finding for finding in findings if finding.severity in failing]
+    if failed:
+        print_error(f"probe failed: {len(failed)} findings", "red")
+        sys.exit(CHECK_FAILED)
+    say("no finding" if not findings else f"{len(findings)} questionable findings, nothing wrong")
+
+
+def _write(report: Report, path: Path) -> Path:
+    """Write the report, in the form that the ending of the file says."""
+    if path.suffix != ".md":
+        return write_tables(path, report.to_dict())
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(report.to_markdown(), encoding="utf-8")
+    return path
+
+
+def _show(findings: Sequence[Finding]) -> None:
+    """A table of the findings, those of one kind in one row."""
+    kinds: dict[tuple[str, str], list[Finding]] = {}
+    for finding in findings:
+        kinds.setdefault((finding.severity, finding.kind), []).append(finding)
+    rows = []
+    for (severity, kind), members in kinds.items():
+        about = (
+            members[0].text if len(members) == 1 else f"{kind}: {', '.join(dict.fromkeys(m.about for m in members))}"
+        )
+        rows.append((severity, str(len(members)), about, members[0].replay))
+    if rows:
+        show_table("Findings", ("severity", "kinds", "what", "replay"), rows, words=("severity", "what", "replay"))

@@ -1,0 +1,78 @@
+"""The process in which the FMU runs: ``python -m analysis.probe.child JOB``. It may crash; its parent reads what it left."""
+
+from __future__ import annotations
+
+import json
+import sys
+import time
+import traceback
+from pathlib import Path
+from typing import Any
+
+from .context import AFTER_FATAL, FAILED, Context
+from .journal import Journal
+from .session import Library, ProbeError
+
+
+def main(path: str) -> int:
+    """Run the cases of a job."""
+    job = json.loads(Path(path).read_text(encoding="utf-8"))
+    _no_core_dump()
+    context = _context(job)
+    if context is None:
+        return 0
+    from .checks import CHECKS
+
+    check = CHECKS[job["check"]]
+    run = check.make(context)
+    last = check.cases(context.model) if check.cases else sys.maxsize
+    until = time.monotonic() + job["seconds"]
+    for case in range(job["first"], min(last, job["last"])):
+        spent = context.journal.calls >= job["calls"] or time.monotonic() > until
+        if spent and case >= getattr(run, "least", 0):
+            break
+        context.journal.begin(case)
+        try:
+            run(context, case)
+        except ProbeError as error:
+            context.say(f"not made: {error}")
+        if context.journal.fatal:
+            return AFTER_FATAL
+    context.finish()
+    return 0
+
+
+def _context(job: dict[str, Any]) -> Context | None:
+    """What the check works with; None where the library cannot be loaded."""
+    from .model import read_model
+
+    folder, work = Path(job["folder"]), Path(job["work"])
+    journal = Journal(Path(job["journal"]))
+    model = read_model(folder, job["interface"])
+    common = {"seed": job["seed"], "check": job["check"], "avoided": frozenset(job["avoided"])}
+    findings = Path(job["findings"])
+    try:
+        library = Library(model, folder)
+    except Exception as error:  # FMPy raises Exception itself, and AttributeError for a function that is missing
+        with findings.open("a", encoding="utf-8") as file:
+            file.write(json.dumps({"unloadable": str(error)}) + "\n")
+        return None
+    return Context(model=model, library=library, folder=folder, work=work, journal=journal, findings=findings, **common)
+
+
+def _no_core_dump() -> None:
+    try:
+        import resource
+    except ImportError:  # Windows
+        return
+    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+
+
+if __name__ == "__main__":
+    try:
+        code = main(sys.argv[1])
+    except Exception:  # told from a crash of the FMU by its exit code
+        traceback.print_exc()
+        code = FAILED
+    sys.stderr.flush()
+    sys.exit(code)

@@ -1,0 +1,90 @@
+"""What a check works with, in the process that runs it."""
+
+from __future__ import annotations
+
+import json
+import random
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from .journal import Journal
+from .model import Model
+from .session import Library, Session
+
+#: Exit codes of the process of a check: an instance returned Fatal, and the process is of no more use; the probe itself failed.
+AFTER_FATAL, FAILED = 3, 70
+
+
+@dataclass(slots=True, kw_only=True)
+class Context:
+    """The FMU, the journal of calls and the file of findings of one check.
+
+    Parameters
+    ----------
+    model : Model
+    library : Library
+    folder : pathlib.Path
+        The extracted FMU.
+    work : pathlib.Path
+        A folder of the probe for files of its own.
+    journal : Journal
+    findings : pathlib.Path
+        Where findings go, a line of JSON each.
+    seed : int
+    check : str
+    avoided : frozenset of str
+        Faults that crashed often enough.
+    """
+
+    model: Model
+    library: Library
+    folder: Path
+    work: Path
+    journal: Journal
+    findings: Path
+    seed: int
+    check: str
+    avoided: frozenset[str] = frozenset()
+    _shown: dict[tuple[str, str], int] = field(default_factory=dict)
+
+    def session(self) -> Session:
+        """A session without an instance yet."""
+        return Session(self.library, self.model, self.journal, self.folder)
+
+    def random(self, case: int, check: str = "") -> random.Random:
+        """The random numbers of a case of a check (this one by default): the same each time."""
+        return random.Random(f"{self.seed}/{self.model.interface}/{check or self.check}/{case}")
+
+    def replay(self) -> str:
+        """The name of the case at hand, for --replay."""
+        return f"{self.seed}/{self.model.interface}/{self.check}/{self.journal.case}"
+
+    def note(self, severity: str, key: str, text: str) -> None:
+        """Note a finding; of one kind only the first and those with fewer calls carry them."""
+        lines = self.journal.lines()
+        best = self._shown.get((severity, key), 1 << 30)
+        self._shown[severity, key] = min(best, len(lines))
+        finding = {"severity": severity, "key": key, "text": text, "calls": lines if len(lines) < best else None}
+        self._write(finding | {"replay": self.replay()})
+
+    def tell(self, subject: str) -> None:
+        """Say what the case is about, so that a crash can be laid to it."""
+        self._write({"subject": subject, "case": self.journal.case})
+
+    def say(self, sentence: str) -> None:
+        """A sentence for the table of checks: what was measured, or why it was not."""
+        self._write({"said": sentence})
+
+    def finish(self) -> None:
+        """Say that the process came to its end by itself."""
+        self._write({"finished": True})
+
+    def _write(self, record: dict[str, Any]) -> None:
+        with self.findings.open("a", encoding="utf-8") as file:
+            file.write(json.dumps(record) + "\n")
+
+
+#: Runs one case of a check.
+Case = Callable[[Context, int], None]

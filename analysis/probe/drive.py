@@ -1,0 +1,206 @@
+"""An ordinary run of an FMU, step by step, for the checks that compare runs."""
+
+from __future__ import annotations
+
+import ctypes
+import math
+import random
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from fmpy import fmi2
+
+from .model import CONDITIONS, Variable
+from .session import Session
+from .walk import references, value
+
+#: What all variables are at one time: by group of functions their values, bit by bit.
+Values = dict[str, bytes]
+#: Values of inputs for one step.
+Inputs = Mapping[Variable, Any]
+
+_EVENT_ITERATIONS = 100
+
+
+class Run:
+    """A run of one instance: it is initialized when it is made, and each step is one communication step or one of Euler's.
+
+    Parameters
+    ----------
+    session : Session
+    fresh : bool
+        False for an instance that was reset, or whose state is about to be restored.
+    start : mapping, optional
+        Values to set before the initialization.
+    """
+
+    def __init__(self, session: Session, *, instantiate: bool = True, start: Inputs | None = None) -> None:
+        self.session, self.model = session, session.model
+        self.time = self.model.start_time
+        self.next_event = math.inf
+        if instantiate:
+            session.instantiate()
+            if not session.instance:
+                session.need("Instantiate")
+        if start:
+            self.set(start)
+        self.initialize()
+        self.finish_initialization()
+
+    def initialize(self) -> None:
+        """Into the initialization mode."""
+        setup = [False, 0.0, self.time, False, 0.0]
+        if self.model.version == 2:
+            self.session.need("SetupExperiment", *setup)
+            setup = []
+        self.session.need("EnterInitializationMode", *setup)
+
+    def finish_initialization(self) -> None:
+        """Out of it, to where steps can be made."""
+        self.session.need("ExitInitializationMode")
+        if self.model.interface == "me":
+            self._iterate()
+
+    def _iterate(self) -> None:
+        for _ in range(_EVENT_ITERATIONS):
+            if not self._update():
+                break
+        self.session.need("EnterContinuousTimeMode")
+
+    def _update(self) -> bool:
+        """One update of the discrete states; whether another is needed."""
+        if self.model.version == 2:
+            info = fmi2.fmi2EventInfo()
+            self.session.need("NewDiscreteStates", info)
+            needed, defined, time = info.newDiscreteStatesNeeded, info.nextEventTimeDefined, info.nextEventTime
+        else:
+            flags = [ctypes.c_bool() for _ in range(5)]
+            at = ctypes.c_double()
+            self.session.need("UpdateDiscreteStates", *flags, at)
+            needed, defined, time = flags[0].value, flags[4].value, at.value
+        self.next_event = time if defined else math.inf
+        return bool(needed)
+
+    def set(self, values: Inputs) -> None:
+        """Set variables."""
+        for group in dict.fromkeys(variable.group for variable in values):
+            chosen = [variable for variable in values if variable.group == group and variable.size == 1]
+            if chosen:
+                array = (self.model.c_types[group] * len(chosen))(*(values[variable] for variable in chosen))
+                extra = [len(chosen)] if self.model.version == 3 else []
+                self.session.need("Set" + group, references(chosen), len(chosen), array, *extra)
+
+    def get(self, variables: Sequence[Variable]) -> Any:
+        """The values of variables of one group, as a C array."""
+        group = variables[0].group
+        size = sum(variable.size for variable in variables)
+        array = (self.model.c_types[group] * size)()
+        extra = [size] if self.model.version == 3 else []
+        self.session.need("Get" + group, references(variables), len(variables), array, *extra)
+        return array
+
+    def values(self) -> Values:
+        """Every variable, bit by bit."""
+        found = {}
+        for group in self.model.groups:
+            array = self.get(self.model.named(group))
+            found[group] = b"\0".join(text or b"" for text in array) if group == "String" else bytes(array)
+        if self.model.interface == "me" and self.model.states:
+            found["states"] = bytes(self.states("GetContinuousStates"))
+        return found
+
+    def states(self, name: str) -> Any:
+        """Continuous states or their derivatives."""
+        array = (ctypes.c_double * self.model.states)()
+        if self.model.states:
+            self.session.need(name, array, self.model.states)
+        return array
+
+    def step(self, size: float, inputs: Inputs | None = None) -> None:
+        """Set inputs and make one step."""
+        if self.model.interface == "cs":
+            self.set(inputs or {})
+            self._do_step(size)
+        else:
+            self._euler(size, inputs or {})
+
+    def _do_step(self, size: float) -> None:
+        if self.model.version == 2:
+            self.session.need("DoStep", self.time, size, 0)
+        else:
+            flags = [ctypes.c_bool() for _ in range(3)]
+            self.session.need("DoStep", self.time, size, False, *flags, ctypes.c_double())
+        self.time += size
+
+    def _euler(self, size: float, inputs: Inputs) -> None:
+        """One explicit step, with an event where a time event or a new discrete input asks for one."""
+        continuous = {v: x for v, x in inputs.items() if CONDITIONS["5"](v)}
+        others = {v: x for v, x in inputs.items() if v not in continuous}
+        self.set(continuous)
+        new, old = self.states("Get" + self._derivatives), self.states("GetContinuousStates")
+        target = min(self.time + size, self.next_event)
+        size, self.time = target - self.time, target
+        self.session.need("SetTime", target)
+        if self.model.states:
+            new[:] = [x + size * dx for x, dx in zip(old, new)]
+            self.session.need("SetContinuousStates", new, self.model.states)
+        kind = ctypes.c_int if self.model.version == 2 else ctypes.c_bool
+        event, end = kind(), kind()
+        self.session.need("CompletedIntegratorStep", 0, event, end)
+        if event.value or others or target >= self.next_event:
+            self.session.need("EnterEventMode")
+            self.set(others)
+            self._iterate()
+
+    @property
+    def _derivatives(self) -> str:
+        return "Derivatives" if self.model.version == 2 else "ContinuousStateDerivatives"
+
+    def save(self, into: Any = None) -> Any:
+        """The saved state."""
+        state = ctypes.c_void_p() if into is None else into
+        self.session.need("GetFMUstate" if self.model.version == 2 else "GetFMUState", state)
+        return state
+
+    def restore(self, state: Any, time: float, next_event: float = math.inf) -> None:
+        """Back to a saved state, of this time."""
+        self.session.need("SetFMUstate" if self.model.version == 2 else "SetFMUState", state)
+        self.time, self.next_event = time, next_event
+
+    def forget(self, state: Any) -> None:
+        """Free a saved state."""
+        self.session.need("FreeFMUstate" if self.model.version == 2 else "FreeFMUState", state)
+
+
+def random_inputs(rng: random.Random, run_model: Any, count: int) -> list[dict[Variable, Any]]:
+    """Values of the inputs for so many steps; continuous ones change each step, others seldom."""
+    inputs = [v for v in run_model.variables if v.causality == "input" and v.size == 1]
+    steps = []
+    for number in range(count):
+        changing = [v for v in inputs if v.is_real or number % 7 == 3]
+        steps.append({v: value(rng, v) for v in changing})
+    return steps
+
+
+def step_size(model: Any) -> float:
+    """The step of a run: the default one, a tenth of it where the probe integrates by Euler's method."""
+    return float(model.step if model.interface == "cs" else model.step / 10)
+
+
+def differing(one: Values, other: Values, model: Any) -> str:
+    """The first variable that differs between two sets of values; empty where none does."""
+    for group, data in one.items():
+        if data == other[group]:
+            continue
+        if group in ("states", "String"):
+            return group
+        size = ctypes.sizeof(model.c_types[group])
+        position = next(i for i in range(0, len(data), size) if data[i : i + size] != other[group][i : i + size])
+        kind = model.c_types[group]
+        a, b = (kind.from_buffer_copy(d[position : position + size]).value for d in (data, other[group]))
+        count = position // size
+        for variable in model.named(group):
+            if count < variable.size:
+                return f"{variable.name} ({a!r} and {b!r})"
+            count -= variable.size
+    return ""

@@ -1,0 +1,261 @@
+"""Calls that the standards forbid: each a change of legal arguments, or a function in a state where it is not allowed.
+
+A fault says what it means when the FMU accepts it: `WRONG` where the standard demands an error, `QUESTIONABLE` where it asks
+for care, `None` where only a crash or a hang counts. `ACCEPT` is for unusual calls that are allowed: an error is then what is
+questionable.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import math
+import re
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from fmpy import fmi2, fmi3
+
+from .findings import QUESTIONABLE, WRONG
+from .machines import MACHINES
+from .model import CONDITIONS, Model
+from .session import WARNING
+from .walk import Walk, access, byte_array, references
+
+ACCEPT = "accept"
+NAN, INF = math.nan, math.inf
+
+#: Changes a list of legal arguments; None where the fault does not apply here.
+Change = Callable[[Walk, str, list[Any]], list[Any] | None]
+
+
+@dataclass(frozen=True, slots=True)
+class Fault:
+    """A forbidden call: the function, what is wrong with it, and what it means when it is accepted."""
+
+    function: str
+    what: str
+    accepted: str | None
+    change: Change
+    state: str | None = None  # where the call is made; None: wherever the function is allowed
+
+    @property
+    def key(self) -> str:
+        return f"{self.function}{' in ' + self.state if self.state else ''}: {self.what}"
+
+
+def put(position: int, value: Any) -> Change:
+    """Another value at a position (counted from the end where negative)."""
+
+    def change(walk: Walk, name: str, arguments: list[Any]) -> list[Any] | None:
+        if len(arguments) <= position:
+            return None
+        arguments[position] = value(walk, arguments) if callable(value) else value
+        return arguments
+
+    return change
+
+
+def _fill(position: int, number: float) -> Change:
+    def change(walk: Walk, name: str, arguments: list[Any]) -> list[Any] | None:
+        arguments[position][0] = number
+        return arguments
+
+    return change
+
+
+def _unknown(walk: Walk, arguments: Sequence[Any]) -> Any:
+    used = {v.reference for v in walk.model.variables}
+    free = next(n for n in (0xFFFFFFF0, 0x7FFFFFFF, 0x00FFFFFF) if n not in used)
+    return (ctypes.c_uint * len(arguments[0]))(*[free] * len(arguments[0]))
+
+
+def _other_type(walk: Walk, name: str, arguments: list[Any]) -> list[Any] | None:
+    own = {v.reference for v in walk.model.variables if v.group == name[3:]}
+    others = [v for v in walk.model.variables if v.reference not in own and v.size == 1]
+    if not others:
+        return None
+    one = [references([walk.rng.choice(others)]), 1, (walk.model.c_types[name[3:]] * 1)()]
+    return [*one, 1] if walk.model.version == 3 else one
+
+
+def _not_settable(walk: Walk, name: str, arguments: list[Any]) -> list[Any] | None:
+    allowed = CONDITIONS[walk.cell(name)]
+    forbidden = [v for v in walk.model.variables if v.group == name[3:] and not allowed(v)]
+    return access(walk, "Set", [walk.rng.choice(forbidden)]) if forbidden else None
+
+
+def _constant(walk: Walk, name: str, arguments: list[Any]) -> list[Any] | None:
+    constants = [v for v in walk.model.variables if v.group == name[3:] and v.variability == "constant"]
+    return access(walk, "Set", [walk.rng.choice(constants)]) if constants else None
+
+
+def _longer(walk: Walk, name: str, arguments: list[Any]) -> list[Any]:
+    """One value more than there should be, in an array that has room for it."""
+    array = arguments[-2]
+    longer = (array._type_ * (len(array) + 1))()
+    longer[: len(array)] = list(array)
+    return [*arguments[:-2], longer, len(array) + 1]
+
+
+def _bytes(data: Callable[[bytes], bytes]) -> Change:
+    def change(walk: Walk, name: str, arguments: list[Any]) -> list[Any]:
+        altered = data(bytes(arguments[0]))
+        return [byte_array(walk.session, altered), len(altered), ctypes.c_void_p()]
+
+    return change
+
+
+def _too_small(walk: Walk, name: str, arguments: list[Any]) -> list[Any] | None:
+    size = len(arguments[1]) - 1
+    return [arguments[0], byte_array(walk.session, bytes(size)), size] if size >= 0 else None
+
+
+def _unknown_category(walk: Walk, name: str, arguments: list[Any]) -> list[Any]:
+    return [True, 1, (ctypes.c_char_p * 1)(b"no such category")]
+
+
+def _start(position: int, value: float) -> Change:
+    """Another time or tolerance at the start: of SetupExperiment (FMI 2) or EnterInitializationMode (FMI 3)."""
+
+    def change(walk: Walk, name: str, arguments: list[Any]) -> list[Any] | None:
+        if len(arguments) != 5:
+            return None
+        arguments[0], arguments[3] = True, position == 4
+        arguments[position] = value
+        return arguments
+
+    return change
+
+
+#: function (a pattern over names without prefix), what is wrong, the meaning of acceptance, the change
+_TABLE: tuple[tuple[str, str, str | None, Change], ...] = (
+    ("[GS]et{type}", "unknown value reference", WRONG, put(0, _unknown)),
+    ("[GS]et{type}", "value reference of another type", WRONG, _other_type),
+    ("[GS]et{type}", "NULL value references", WRONG, put(0, None)),
+    ("[GS]et{type}", "NULL values", WRONG, put(2, None)),
+    ("[GS]et{type}", "wrong number of values", WRONG, put(3, lambda walk, a: a[3] - 1)),
+    ("Set{type}", "a variable that may not be set", WRONG, _not_settable),
+    ("Set{type}", "a constant", WRONG, _constant),
+    ("SetReal|SetFloat64", "NaN", None, _fill(2, NAN)),
+    ("SetReal|SetFloat64", "infinity", None, _fill(2, INF)),
+    ("SetReal|SetFloat64", "1e300", None, _fill(2, 1e300)),
+    ("SetString", "NULL string", QUESTIONABLE, lambda walk, n, a: [a[0], a[1], (ctypes.c_char_p * a[1])(), *a[3:]]),
+    ("SetString", "invalid UTF-8", QUESTIONABLE, _fill(2, b"\xff\xfe\xc3(")),  # type: ignore[arg-type]
+    ("SetString", "1 MB of text", None, _fill(2, b"x" * 1_000_000)),  # type: ignore[arg-type]
+    ("DoStep", "step of zero", QUESTIONABLE, put(1, 0.0)),
+    ("DoStep", "negative step", WRONG, put(1, lambda walk, a: -a[1])),
+    ("DoStep", "step of NaN", WRONG, put(1, NAN)),
+    ("DoStep", "infinite step", WRONG, put(1, INF)),
+    ("DoStep", "time of NaN", WRONG, put(0, NAN)),
+    ("DoStep", "a gap in time", QUESTIONABLE, put(0, lambda walk, a: a[0] + 10 * a[1])),
+    ("DoStep", "a time in the past", QUESTIONABLE, put(0, lambda walk, a: a[0] - 10 * a[1])),
+    ("DoStep", "NULL results", QUESTIONABLE, put(3, None)),
+    ("SetTime", "NaN", QUESTIONABLE, put(0, NAN)),
+    ("SetTime", "infinity", QUESTIONABLE, put(0, INF)),
+    ("SetTime", "before the start", QUESTIONABLE, put(0, lambda walk, a: walk.model.start_time - 1.0)),
+    ("SetupExperiment|EnterInitializationMode", "start at NaN", QUESTIONABLE, _start(2, NAN)),
+    ("SetupExperiment|EnterInitializationMode", "stop before start", QUESTIONABLE, _start(4, -1e9)),
+    ("SetupExperiment|EnterInitializationMode", "tolerance of NaN", QUESTIONABLE, _start(1, NAN)),
+    ("SetupExperiment|EnterInitializationMode", "negative tolerance", QUESTIONABLE, _start(1, -1.0)),
+    ("GetFMU[sS]tate", "NULL", WRONG, put(0, None)),
+    ("SetFMU[sS]tate", "NULL state", WRONG, put(0, None)),
+    ("FreeFMU[sS]tate", "NULL pointer", ACCEPT, put(0, None)),
+    ("FreeFMU[sS]tate", "pointer to NULL", ACCEPT, put(0, lambda walk, a: ctypes.c_void_p())),
+    ("Serialize.*Size|Serialize.*tate", "NULL state", WRONG, put(0, None)),
+    ("Serialized.*Size", "NULL size", WRONG, put(1, None)),
+    ("Serialize.*tate", "NULL bytes", WRONG, put(1, None)),
+    ("Serialize.*tate", "too little room", WRONG, _too_small),
+    ("De[sS]erialize.*", "NULL bytes", WRONG, put(0, None)),
+    ("De[sS]erialize.*", "NULL state", WRONG, put(2, None)),
+    ("De[sS]erialize.*", "no bytes", WRONG, _bytes(lambda data: b"")),
+    ("De[sS]erialize.*", "bytes of something else", WRONG, _bytes(lambda data: b"this is not a state" * 10)),
+    ("De[sS]erialize.*", "half of the bytes", WRONG, _bytes(lambda data: data[: len(data) // 2])),
+    ("De[sS]erialize.*", "a byte changed", None, _bytes(lambda data: data[:-9] + b"\x55" + data[-8:])),
+    ("Get(Directional|Adjoint)Derivative", "unknown unknown", WRONG, put(0, _unknown)),
+    ("Get(Directional|Adjoint)Derivative", "unknown known", WRONG, put(2, lambda walk, a: _unknown(walk, [a[2]]))),
+    ("Get(Directional|Adjoint)Derivative", "NULL seed", WRONG, put(4, None)),
+    ("Get(Directional|Adjoint)Derivative", "NaN seed", None, _fill(4, NAN)),
+    ("[GS]etContinuousStates|Get.*Derivatives|GetEventInd.*|GetNom.*", "one too many", WRONG, _longer),
+    ("[GS]etContinuousStates|Get.*StateDer.*|GetDerivatives|GetEventInd.*|GetNom.*", "NULL array", WRONG, put(0, None)),
+    ("SetContinuousStates", "NaN", None, _fill(0, NAN)),
+    ("Get.*OutputDerivatives|SetRealInputDerivatives", "order 0", WRONG, _fill(2, 0)),
+    ("Get.*OutputDerivatives|SetRealInputDerivatives", "order 1000", WRONG, _fill(2, 1000)),
+    ("Get.*OutputDerivatives|SetRealInputDerivatives", "unknown value reference", WRONG, put(0, _unknown)),
+    ("Get(Real|Boolean|String|)Status", "unknown kind", WRONG, put(0, 99)),
+    ("Get(Real|Boolean|String|)Status", "NULL value", WRONG, put(1, None)),
+    ("CompletedIntegratorStep", "NULL results", WRONG, put(1, None)),
+    ("NewDiscreteStates|UpdateDiscreteStates", "NULL results", WRONG, put(0, None)),
+    ("SetDebugLogging", "unknown category", QUESTIONABLE, _unknown_category),
+    ("SetDebugLogging", "NULL categories", WRONG, lambda walk, n, a: [True, 1, None]),
+)  # fmt: skip
+
+
+def catalogue(walk: Walk) -> list[Fault]:
+    """Every fault that can be tried on this FMU, in an order that does not change."""
+    model, machine = walk.model, walk.machine
+    groups = "(" + "|".join(model.groups) + ")"
+    faults = [
+        Fault(name, what, accepted, change)
+        for pattern, what, accepted, change in _TABLE
+        for name in walk.functions
+        if re.fullmatch(pattern.replace("{type}", groups), name)
+    ]
+    faults += [Fault(name, "NULL instance", WRONG, lambda walk, n, a: a) for name in walk.functions]
+    faults += [
+        Fault(name, "out of order", WRONG, lambda walk, n, a: a, state)
+        for name in machine.allowed
+        if name in walk.functions or name in ("CancelStep", "GetIntegerStatus")
+        for state in machine.states
+        if machine.cell(name, state) == "." and machine.path(state) is not None
+    ]
+    return faults
+
+
+@dataclass(frozen=True, slots=True)
+class BadStart:
+    """A forbidden or unusual instantiation: another argument, or another function."""
+
+    what: str
+    accepted: str | None
+    position: int
+    value: Any
+    function: str | None = None
+
+    @property
+    def key(self) -> str:
+        return f"Instantiate: {self.what}"
+
+
+def bad_starts(model: Model) -> list[BadStart]:
+    """Every bad instantiation that can be tried on this FMU."""
+    two = model.version == 2
+    token = {2: 2, 3: 1}[model.version]
+    starts = [
+        BadStart("wrong GUID" if two else "wrong token", WRONG if two else QUESTIONABLE, token, b"{0}"),
+        BadStart("NULL GUID" if two else "NULL token", WRONG, token, None),
+        BadStart("NULL name", WRONG, 0, None),
+        BadStart("empty name", QUESTIONABLE, 0, b""),
+        BadStart("name of invalid UTF-8", None, 0, b"\xff\xfe\xc3("),
+    ]
+    if two:
+        other = fmi2.fmi2ModelExchange if model.interface == "cs" else fmi2.fmi2CoSimulation
+        starts += [
+            BadStart("NULL callbacks", WRONG, 4, None),
+            BadStart("unknown type", WRONG, 1, 99),
+            *([] if model.other_interface else [BadStart("an interface that it does not have", WRONG, 1, other)]),
+        ]
+    elif model.interface == "cs":
+        starts += [] if model.event_mode else [BadStart("event mode that it does not have", WRONG, 5, True)]
+        starts += [BadStart("NULL logger", ACCEPT, 10, fmi3.fmi3LogMessageCallback())]
+    else:
+        starts += [BadStart("NULL logger", ACCEPT, 6, fmi3.fmi3LogMessageCallback())]
+    return starts
+
+
+def refused(status: int) -> bool:
+    """Whether a status refuses a call."""
+    return status > WARNING
+
+
+__all__ = ["ACCEPT", "MACHINES", "BadStart", "Fault", "bad_starts", "catalogue", "refused"]

@@ -1,0 +1,127 @@
+"""Findings, how serious they are, and the report of a probe."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, field
+from typing import Any, Protocol
+
+CRASH, WRONG, QUESTIONABLE = "crash", "wrong", "questionable"
+SEVERITIES = (CRASH, WRONG, QUESTIONABLE)
+
+
+class Note(Protocol):
+    """Takes a finding: how serious, a key (what it is about, and its kind), and a sentence."""
+
+    def __call__(self, severity: str, key: str, text: str) -> None: ...
+
+
+@dataclass(slots=True, kw_only=True)
+class Finding:
+    """One fault of an FMU, with the calls that show it.
+
+    Parameters
+    ----------
+    severity : str
+        One of `SEVERITIES`.
+    key : str
+        Interface, what it is about, and kind; findings of one key are one.
+    text : str
+        A sentence.
+    calls : list of str
+        The calls of the shortest case that shows it.
+    replay : str
+        What `--replay` takes.
+    count : int
+        How many cases show it.
+    """
+
+    severity: str
+    key: str
+    text: str
+    calls: list[str]
+    replay: str
+    count: int = 1
+
+    @property
+    def about(self) -> str:
+        """The function, variable or folder that it is about: the first part of the key after the interface."""
+        return self.key.split(": ")[1] if self.key.count(": ") > 1 else ""
+
+    @property
+    def kind(self) -> str:
+        """What it has in common with findings about others: the rest of the key."""
+        return ": ".join(self.key.split(": ")[2:]) or self.text
+
+
+@dataclass(slots=True, kw_only=True)
+class Outcome:
+    """What became of one check: how many cases and calls, and a sentence of what was measured or why it was not made."""
+
+    check: str
+    interface: str
+    cases: int
+    calls: int
+    seconds: float
+    said: str = ""
+
+
+@dataclass(slots=True, kw_only=True)
+class Report:
+    """The report of a probe."""
+
+    fmu: str
+    fmi_version: str
+    seed: int
+    findings: list[Finding] = field(default_factory=list)
+    outcomes: list[Outcome] = field(default_factory=list)
+
+    @property
+    def calls(self) -> int:
+        return sum(outcome.calls for outcome in self.outcomes)
+
+    def of(self, *severities: str) -> list[Finding]:
+        """The findings of these severities."""
+        return [finding for finding in self.findings if finding.severity in severities]
+
+    def add(self, finding: Finding) -> None:
+        """Add a finding, or count it where one of its kind is known; the shorter list of calls is kept."""
+        for known in self.findings:
+            if (known.severity, known.key) == (finding.severity, finding.key):
+                known.count += finding.count
+                if len(finding.calls) < len(known.calls):
+                    known.calls, known.replay, known.text = finding.calls, finding.replay, finding.text
+                return
+        self.findings.append(finding)
+        self.findings.sort(key=lambda f: SEVERITIES.index(f.severity))
+
+    def to_dict(self) -> dict[str, Any]:
+        """The report as plain data, for JSON."""
+        return asdict(self)
+
+    def to_markdown(self) -> str:
+        """The report as Markdown."""
+        counts = ", ".join(f"{len(self.of(severity))} {severity}" for severity in SEVERITIES)
+        lines = [
+            f"# Probe of {self.fmu}",
+            "",
+            f"FMI {self.fmi_version}, seed {self.seed}, {self.calls} calls. Findings: {counts}.",
+            "",
+            "| check | interface | cases | calls | s | result |",
+            "| --- | --- | --- | --- | --- | --- |",
+            *(
+                f"| {o.check} | {o.interface} | {o.cases} | {o.calls} | {o.seconds:.1f} | {o.said} |"
+                for o in self.outcomes
+            ),
+        ]
+        for number, finding in enumerate(self.findings, 1):
+            seen = f", in {finding.count} cases" if finding.count > 1 else ""
+            replay = f"`--replay {finding.replay}`" if finding.replay else ""
+            lines += ["", f"## {number}. {finding.severity}: {finding.text}", "", f"{replay}{seen}", "", "```"]
+            lines += [*last_calls(finding.calls, 30), "```"]
+        return "\n".join(lines) + "\n"
+
+
+def last_calls(calls: Sequence[str], most: int) -> list[str]:
+    """The last calls of a list, with a line that says how many were left out."""
+    return list(calls) if len(calls) <= most else [f"... {len(calls) - most} calls", *calls[-most:]]

@@ -1,0 +1,79 @@
+"""A file of the calls of the case at hand, written before each call is made, so that it survives a crash of the process."""
+
+from __future__ import annotations
+
+import mmap
+import struct
+from pathlib import Path
+from typing import NamedTuple
+
+#: Bytes of text; a longer case keeps its latest calls.
+_ROOM = 1 << 17
+_HEADER = struct.Struct("<qqq")
+
+
+class Entry(NamedTuple):
+    """What a journal says: the number of the case, how many calls were begun in all, and the latest ones as text."""
+
+    case: int
+    calls: int
+    lines: list[str]
+
+
+class Journal:
+    """A journal that this process writes."""
+
+    def __init__(self, path: Path) -> None:
+        path.write_bytes(bytes(_HEADER.size + _ROOM))
+        with path.open("r+b") as file:
+            self._map = mmap.mmap(file.fileno(), 0)
+        self.case = -1
+        self.calls = 0
+        self.fatal = False  # whether a call of this case returned Fatal
+        self._end = 0
+        self.begin(-1)
+
+    def begin(self, case: int) -> None:
+        """Start a case: its calls take the place of those of the case before."""
+        self.case, self._end, self.fatal = case, 0, False
+        self._mark()
+
+    def call(self, text: str) -> None:
+        """Note a call that is about to be made."""
+        self.calls += 1
+        self.write("\n" + text)
+
+    def write(self, text: str) -> None:
+        """Add to the line of the latest call."""
+        data = text.encode("utf-8", "backslashreplace")[: _ROOM // 4]
+        if self._end + len(data) > _ROOM:
+            kept = self._text()[-_ROOM // 4 :]
+            self._map[_HEADER.size : _HEADER.size + len(kept)] = kept
+            self._end = len(kept)
+        start = _HEADER.size + self._end
+        self._map[start : start + len(data)] = data
+        self._end += len(data)
+        self._mark()
+
+    def lines(self) -> list[str]:
+        """The calls of the case at hand."""
+        return _lines(self._text())
+
+    def _text(self) -> bytes:
+        return self._map[_HEADER.size : _HEADER.size + self._end]
+
+    def _mark(self) -> None:
+        _HEADER.pack_into(self._map, 0, self.case, self.calls, self._end)
+
+
+def read(path: Path) -> Entry:
+    """A journal as another process left it; case -1 where none was begun."""
+    data = path.read_bytes() if path.exists() else b""
+    if len(data) < _HEADER.size:
+        return Entry(-1, 0, [])
+    case, calls, end = _HEADER.unpack_from(data)
+    return Entry(case, calls, _lines(data[_HEADER.size : _HEADER.size + end]))
+
+
+def _lines(text: bytes) -> list[str]:
+    return text.decode("utf-8", "replace").strip("\n").split("\n") if text else []

@@ -1,0 +1,203 @@
+"""The standards' state machines: which function may be called in which state, and where it leads.
+
+The tables are those of FMI 2.0.4 (3.2.3 for model exchange, 4.2.4 for co-simulation) and, for FMI 3.0, the functions that 2.3,
+3.2 and 4.2 list as allowed in each state. Two states are finer than the standard's, because it says the same in words: `ready`
+is instantiated after `SetupExperiment`, and `settled` is the event mode after an update that needs no other. In FMI 3.0
+`error` is the state Terminated, into which an error leads.
+
+A cell holds `x`: allowed; `.`: not allowed; `?`: not judged, because the standard leaves it open; `e`: allowed if the importer
+uses the event mode; a digit: allowed for the variables of the standard's footnote of that number, see `model.CONDITIONS`.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import dataclass
+
+_FMI2 = """
+SetDebugLogging              x
+Reset                        x
+GetFMUstate                  x
+SetFMUstate                  x
+FreeFMUstate                 x
+SerializedFMUstateSize       x
+SerializeFMUstate            x
+DeSerializeFMUstate          x
+"""
+
+_FMI2_CS = """
+                             instantiated ready initialization step failed terminated error
+SetupExperiment              x ? . . . . .
+EnterInitializationMode      ? x . . . . .
+ExitInitializationMode       . . x . . . .
+Terminate                    . . . x x . .
+GetReal                      . . 2 x x x x
+GetInteger                   . . 2 x x x x
+GetBoolean                   . . 2 x x x x
+GetString                    . . 2 x x x x
+SetReal                      1 1 3 6 . . .
+SetInteger                   1 1 3 6 . . .
+SetBoolean                   1 1 3 6 . . .
+SetString                    1 1 3 6 . . .
+GetDirectionalDerivative     . . x x x x x
+SetRealInputDerivatives      x x x x . . .
+GetRealOutputDerivatives     . . . x x x x
+DoStep                       . . . x ? . .
+CancelStep                   . . . . . . .
+GetStatus                    . . . x x x .
+GetRealStatus                . . . x x x .
+GetIntegerStatus             . . . x x x .
+GetBooleanStatus             . . . x x x .
+GetStringStatus              . . . x x x .
+"""
+
+_FMI2_ME = """
+                             instantiated ready initialization event settled continuous terminated error
+SetupExperiment              x ? . . . . . .
+EnterInitializationMode      ? x . . . . . .
+ExitInitializationMode       . . x . . . . .
+Terminate                    . . . x x x . .
+GetReal                      . . 2 x x x x x
+GetInteger                   . . 2 x x x x x
+GetBoolean                   . . 2 x x x x x
+GetString                    . . 2 x x x x x
+SetReal                      1 1 3 4 4 5 . .
+SetInteger                   1 1 3 4 4 . . .
+SetBoolean                   1 1 3 4 4 . . .
+SetString                    1 1 3 4 4 . . .
+GetDirectionalDerivative     . . x x x x x x
+EnterEventMode               . . . x x x . .
+NewDiscreteStates            . . . x x . . .
+EnterContinuousTimeMode      . . . ? x . . .
+CompletedIntegratorStep      . . . . . x . .
+SetTime                      . . . ? ? x . .
+SetContinuousStates          . . . . . x . .
+GetEventIndicators           . . x x x x x x
+GetContinuousStates          . . x x x x x x
+GetDerivatives               . . x x x x x x
+GetNominalsOfContinuousStates x x x x x x x x
+"""
+
+_FMI3 = """
+SetDebugLogging              x
+Reset                        x
+GetFMUState                  x
+SetFMUState                  x
+FreeFMUState                 x
+SerializedFMUStateSize       x
+SerializeFMUState            x
+DeserializeFMUState          x
+"""
+
+_FMI3_CS = """
+                             instantiated initialization event settled step error
+EnterInitializationMode      x . . . . .
+ExitInitializationMode       . x . . . .
+Terminate                    . . x x x .
+GetDirectionalDerivative     . x x x x x
+GetAdjointDerivative         . x x x x x
+EnterEventMode               . . . . e .
+EvaluateDiscreteStates       . . x x . .
+UpdateDiscreteStates         . . x x . .
+EnterStepMode                . . ? x . .
+GetOutputDerivatives         . . . . x x
+DoStep                       . . . . x .
+"""
+
+_FMI3_ME = """
+                             instantiated initialization event settled continuous error
+EnterInitializationMode      x . . . . .
+ExitInitializationMode       . x . . . .
+Terminate                    . . x x x .
+GetDirectionalDerivative     . x x x x x
+GetAdjointDerivative         . x x x x x
+EnterEventMode               . . . . x .
+EvaluateDiscreteStates       . . x x . .
+UpdateDiscreteStates         . . x x . .
+EnterContinuousTimeMode      . . ? x . .
+CompletedIntegratorStep      . . . . x .
+SetTime                      . . . . x .
+SetContinuousStates          . . . . x .
+GetContinuousStateDerivatives . x x x x x
+GetEventIndicators           . x x x x x
+GetContinuousStates          . x x x x x
+GetNominalsOfContinuousStates . x x x x x
+GetNumberOfContinuousStates  x ? x x ? ?
+GetNumberOfEventIndicators   x ? x x ? ?
+"""
+
+FLOATS = ("Float32", "Float64")
+DISCRETE = ("Int8", "UInt8", "Int16", "UInt16", "Int32", "UInt32", "Int64", "UInt64", "Boolean", "String")
+
+#: Where a function leads that returns OK; what is not here leaves the state as it is.
+LEADS_TO = {
+    "SetupExperiment": "ready",
+    "EnterInitializationMode": "initialization",
+    "Terminate": "terminated",
+    "Reset": "instantiated",
+    "EnterEventMode": "event",
+    "NewDiscreteStates": "settled",
+    "UpdateDiscreteStates": "settled",
+    "EnterContinuousTimeMode": "continuous",
+    "EnterStepMode": "step",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Machine:
+    """The table of one interface: `allowed[function][state]` is a cell; `states` in order."""
+
+    version: int
+    interface: str
+    states: tuple[str, ...]
+    allowed: dict[str, dict[str, str]]
+
+    def cell(self, function: str, state: str, event_mode: bool = False) -> str:
+        """The cell of a function in a state, with `e` decided."""
+        cell = self.allowed[function][state]
+        return ("x" if event_mode else ".") if cell == "e" else cell
+
+    def follow(self, function: str, state: str, event_mode: bool = False) -> str:
+        """The state after a call that returned OK."""
+        if function == "ExitInitializationMode":
+            return "event" if self.interface == "me" or event_mode else "step"
+        following = LEADS_TO.get(function, state)
+        return "error" if following == "terminated" and self.version == 3 else following
+
+    def path(self, target: str, event_mode: bool = False) -> list[str] | None:
+        """The shortest calls from `instantiated` to a state; None where no call that returns OK leads there."""
+        reached: dict[str, list[str]] = {"instantiated": []}
+        queue = deque(["instantiated"])
+        while queue:
+            state = queue.popleft()
+            for function in (*LEADS_TO, "ExitInitializationMode"):
+                if function in self.allowed and self.cell(function, state, event_mode) == "x":
+                    following = self.follow(function, state, event_mode)
+                    if following not in reached:
+                        reached[following] = [*reached[state], function]
+                        queue.append(following)
+        return reached.get(target)
+
+
+def _machine(version: int, interface: str, common: str, table: str) -> Machine:
+    heading, *rows = table.strip().splitlines()
+    states = tuple(heading.split())
+    allowed = {row.split()[0]: dict(zip(states, row.split()[1:], strict=True)) for row in rows}
+    allowed |= {row.split()[0]: dict.fromkeys(states, row.split()[1]) for row in common.strip().splitlines()}
+    if version == 3:
+        # the third standard lets every variable be read in every state, and has a function for each type
+        last = {"cs": "6", "me": "5"}[interface]
+        for kind in (*FLOATS, *DISCRETE):
+            allowed["Get" + kind] = dict.fromkeys(states, "x")
+            running = "." if interface == "me" and kind in DISCRETE else last
+            allowed["Set" + kind] = dict(zip(states, ("1", "3", "4", "4", running, "."), strict=True))
+    return Machine(version, interface, states, allowed)
+
+
+#: The four machines, by version and interface.
+MACHINES = {
+    (2, "cs"): _machine(2, "cs", _FMI2, _FMI2_CS),
+    (2, "me"): _machine(2, "me", _FMI2, _FMI2_ME),
+    (3, "cs"): _machine(3, "cs", _FMI3, _FMI3_CS),
+    (3, "me"): _machine(3, "me", _FMI3, _FMI3_ME),
+}

@@ -1,0 +1,234 @@
+"""What the probe has to know of an FMU: its variables by type and by what may be done to them, its states and capabilities."""
+
+from __future__ import annotations
+
+import ctypes
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from linkwork.errors import InputError
+
+#: The functions and the C type of each type of variable, for FMI 2 and FMI 3.
+TYPES: dict[int, dict[str, tuple[str, Any]]] = {
+    2: {
+        "Real": ("Real", ctypes.c_double),
+        "Integer": ("Integer", ctypes.c_int),
+        "Enumeration": ("Integer", ctypes.c_int),
+        "Boolean": ("Boolean", ctypes.c_int),
+        "String": ("String", ctypes.c_char_p),
+    },
+    3: {
+        "Float32": ("Float32", ctypes.c_float),
+        "Float64": ("Float64", ctypes.c_double),
+        "Enumeration": ("Int64", ctypes.c_int64),
+        "Boolean": ("Boolean", ctypes.c_bool),
+        "String": ("String", ctypes.c_char_p),
+        **{
+            f"{sign}Int{bits}": (f"{sign}Int{bits}", getattr(ctypes, f"c_{sign.lower()}int{bits}"))
+            for sign in ("", "U")
+            for bits in (8, 16, 32, 64)
+        },
+    },
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Variable:
+    """A variable of the model description, with its numbers read."""
+
+    name: str
+    reference: int
+    group: str  # of functions: SetReal, SetFloat64, ...
+    causality: str
+    variability: str
+    initial: str | None
+    start: Any
+    minimum: float
+    maximum: float
+    nominal: float
+    size: int
+    is_state: bool
+
+    @property
+    def is_real(self) -> bool:
+        return self.group in ("Real", "Float64", "Float32")
+
+
+def _settable(variable: Variable) -> bool:
+    return variable.variability != "constant" and variable.causality != "independent"
+
+
+#: The standard's footnotes: for which variables a cell of the table of functions lets the call through.
+CONDITIONS: dict[str, Callable[[Variable], bool]] = {
+    "1": lambda v: _settable(v) and (v.initial in ("exact", "approx") or v.causality == "input"),
+    "2": lambda v: v.causality == "output",
+    "3": lambda v: _settable(v) and (v.initial == "exact" or v.causality == "input"),
+    "4": lambda v: v.causality == "input" or (v.causality == "parameter" and v.variability == "tunable"),
+    "5": lambda v: (v.causality == "input" and v.variability == "continuous") or v.is_state,
+    "6": lambda v: v.causality == "input" or (v.causality == "parameter" and v.variability == "tunable"),
+    "x": lambda v: True,
+}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Model:
+    """One interface of an FMU."""
+
+    version: int
+    interface: str
+    name: str
+    identifier: str
+    token: str
+    variables: tuple[Variable, ...]
+    states: int
+    indicators: int
+    start_time: float
+    step: float
+    fixed_step: bool
+    can_save: bool
+    can_serialize: bool
+    directional: bool
+    adjoint: bool
+    output_order: int
+    input_derivatives: bool
+    event_mode: bool
+    evaluates_discrete: bool
+    other_interface: bool
+    once: bool  # can be instantiated only once in a process
+    initial_unknowns: frozenset[str]
+    #: (unknown, known) pairs of the model structure that are Real: derivatives and outputs
+    dependencies: tuple[tuple[Variable, tuple[Variable, ...]], ...] = field(repr=False)
+
+    def named(self, group: str, condition: str = "x") -> list[Variable]:
+        """The variables of a group of functions that meet a condition."""
+        meets = CONDITIONS[condition]
+        if condition == "2":
+            return [v for v in self.variables if v.group == group and (meets(v) or v.name in self.initial_unknowns)]
+        return [v for v in self.variables if v.group == group and meets(v)]
+
+    @property
+    def groups(self) -> list[str]:
+        return list(dict.fromkeys(v.group for v in self.variables))
+
+    @property
+    def c_types(self) -> dict[str, Any]:
+        return dict(TYPES[self.version].values())
+
+
+def interfaces(description: Any) -> list[str]:
+    """The interfaces of an FMU that the probe knows: cs, me."""
+    return [name for name, value in (("cs", description.coSimulation), ("me", description.modelExchange)) if value]
+
+
+def read_model(folder: Path, interface: str) -> Model:
+    """The interface of an extracted FMU."""
+    from fmpy import read_model_description
+
+    description = read_model_description(str(folder), validate=False)
+    version = description.fmiMajorVersion
+    if version not in TYPES:
+        raise InputError(f"the FMU is of FMI {description.fmiVersion}: the probe is for 2.0 and 3.0")
+    about = description.coSimulation if interface == "cs" else description.modelExchange
+    if about is None:
+        raise InputError(f"the FMU has no interface {interface!r}: it has {', '.join(interfaces(description))}")
+    experiment = description.defaultExperiment
+    start, stop, step = (
+        None if experiment is None or (text := getattr(experiment, name)) is None else float(text)
+        for name in ("startTime", "stopTime", "stepSize")
+    )
+    start = start or 0.0
+    fixed = interface == "cs" and not about.canHandleVariableCommunicationStepSize
+    derivatives = [unknown.variable for unknown in description.derivatives]
+    states = {variable.derivative.name for variable in derivatives if variable.derivative is not None}
+    by_name = {
+        v.name: _variable(v, version, v.name in states) for v in description.modelVariables if v.type in TYPES[version]
+    }
+    return Model(
+        version=version,
+        interface=interface,
+        name=description.modelName,
+        identifier=about.modelIdentifier,
+        token=description.guid,
+        variables=tuple(by_name.values()),
+        states=description.numberOfContinuousStates,
+        indicators=description.numberOfEventIndicators,
+        start_time=start,
+        step=getattr(about, "fixedInternalStepSize", None) or step or ((stop - start) / 500 if stop else 0.01),
+        fixed_step=fixed,
+        can_save=about.canGetAndSetFMUstate,
+        can_serialize=about.canSerializeFMUstate,
+        directional=_first(about, "providesDirectionalDerivative", "providesDirectionalDerivatives"),
+        adjoint=_first(about, "providesAdjointDerivatives"),
+        output_order=getattr(about, "maxOutputDerivativeOrder", 0),
+        input_derivatives=getattr(about, "canInterpolateInputs", False),
+        event_mode=getattr(about, "hasEventMode", False),
+        evaluates_discrete=getattr(about, "providesEvaluateDiscreteStates", False),
+        other_interface=len(interfaces(description)) > 1,
+        once=about.canBeInstantiatedOnlyOncePerProcess,
+        initial_unknowns=frozenset(u.variable.name for u in description.initialUnknowns if u.variable is not None),
+        dependencies=tuple(_dependencies(description, by_name)),
+    )
+
+
+def _dependencies(description: Any, by_name: dict[str, Variable]) -> list[tuple[Variable, tuple[Variable, ...]]]:
+    """Each derivative and output that is a scalar Real, with the inputs and states that may influence it."""
+    knowns = [v for v in by_name.values() if v.is_real and v.size == 1 and CONDITIONS["5"](v)]
+    pairs = []
+    for unknown in [*description.derivatives, *description.outputs]:
+        variable = by_name.get(unknown.variable.name)
+        if variable is None or not variable.is_real or variable.size != 1 or variable.variability != "continuous":
+            continue
+        named = None if unknown.dependencies is None else {v.name for v in unknown.dependencies}
+        pairs.append((variable, tuple(k for k in knowns if named is None or k.name in named)))
+    return [(unknown, known) for unknown, known in pairs if known]
+
+
+def _number(text: Any, default: float) -> float:
+    try:
+        return float(text)
+    except (TypeError, ValueError):
+        return default
+
+
+def _start(variable: Any, group: str) -> Any:
+    text = variable.start
+    if group == "String":
+        return (text or "").encode()
+    if group == "Boolean":
+        return str(text).split()[0] in ("true", "1") if text else False
+    value = _number(str(text).split()[0] if text else None, 0.0)
+    return value if group in ("Real", "Float64", "Float32") else int(value)
+
+
+def _variable(variable: Any, version: int, is_state: bool) -> Variable:
+    group = TYPES[version][variable.type][0]
+    declared = variable.declaredType
+    bounds = [
+        _number(getattr(variable, name) or getattr(declared, name, None), default)
+        for name, default in (("min", -math.inf), ("max", math.inf), ("nominal", 1.0))
+    ]
+    if variable.type == "Enumeration" and declared is not None and declared.items:
+        items = [int(item.value) for item in declared.items]
+        bounds[:2] = min(items), max(items)
+    return Variable(
+        name=variable.name,
+        reference=variable.valueReference,
+        group=group,
+        causality=variable.causality or "local",
+        variability=variable.variability or ("continuous" if group in ("Real", "Float64", "Float32") else "discrete"),
+        initial=variable.initial,
+        start=_start(variable, group),
+        minimum=bounds[0],
+        maximum=bounds[1],
+        nominal=bounds[2],
+        size=math.prod(variable.shape or ()) if variable.dimensions else 1,
+        is_state=is_state,
+    )
+
+
+def _first(about: Any, *names: str) -> bool:
+    """Whether an interface has any of these capabilities, which the versions of FMI name differently."""
+    return any(getattr(about, name, False) for name in names)

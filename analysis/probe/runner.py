@@ -1,0 +1,279 @@
+"""The parent of the probe: it starts a process for each check, watches it, and makes findings of what it left."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+from zipfile import BadZipFile
+
+from linkwork.errors import InputError
+
+from . import journal
+from .context import AFTER_FATAL, FAILED
+from .findings import CRASH, WRONG, Finding, Outcome, Report
+from .model import interfaces, read_model
+from .session import ProbeError
+
+#: After so many crashes a forbidden call is not tried again, and after so many in all a check ends.
+_CRASHES_OF_ONE, _CRASHES = 2, 60
+
+
+@dataclass(slots=True, kw_only=True)
+class _Job:
+    """One check on one interface, and what has come of it so far."""
+
+    check: str
+    interface: str
+    folder: Path
+    work: Path
+    seed: int
+    calls: int
+    seconds: float
+    hang: float
+    first: int = 0
+    last: int = sys.maxsize
+    done: int = 0
+    crashes: dict[str, int] = field(default_factory=dict)
+    said: list[str] = field(default_factory=list)
+    stopped: str = ""
+
+    @property
+    def journal(self) -> Path:
+        return self.work / "journal"
+
+    @property
+    def records(self) -> Path:
+        return self.work / "records"
+
+
+def probe(
+    fmu: str | Path,
+    *,
+    calls: int = 20_000,
+    seed: int = 0,
+    seconds: float = 600.0,
+    interface: str | None = None,
+    hang: float = 20.0,
+    progress: Callable[[str], None] | None = None,
+) -> Report:
+    """Probe an FMU.
+
+    Parameters
+    ----------
+    fmu : path
+        FMI 2.0 or 3.0, with a library for this machine.
+    calls : int
+        Calls of random sequences for each interface.
+    seed : int
+        The same seed makes the same calls.
+    seconds : float
+        After this time no more cases of random sequences are begun.
+    interface : str, optional
+        cs or me; all that the FMU has by default.
+    hang : float
+        Seconds after which a call that has not returned is taken to hang.
+    progress : callable, optional
+        Takes the name of each check before it is run.
+
+    Returns
+    -------
+    Report
+    """
+    from .checks import CHECKS
+    from .static import check_statically
+
+    with tempfile.TemporaryDirectory(prefix="probe-") as temporary:
+        work = Path(temporary)
+        description = _extract(Path(fmu), work / "fmu")
+        report = Report(fmu=Path(fmu).name, fmi_version=description.fmiVersion, seed=seed)
+        for finding in check_statically(Path(fmu), description):
+            report.add(finding)
+        until = time.monotonic() + seconds
+        for name in _chosen(interface, interfaces(description)):
+            model = read_model(work / "fmu", name)
+            for check, about in CHECKS.items():
+                if about.cases is not None and about.cases(model) == 0:
+                    continue
+                if progress is not None:
+                    progress(f"{name}: {about.title}")
+                share = int(calls * about.share) if about.share else sys.maxsize
+                job = _Job(
+                    check=check, interface=name, folder=work / "fmu", work=work, seed=seed, calls=share,
+                    seconds=max(0.0, until - time.monotonic()) if about.share else 1e9, hang=hang,
+                )  # fmt: skip
+                if not _run(job, report):
+                    break
+        return report
+
+
+def replay(fmu: str | Path, case: str, *, hang: float = 20.0) -> tuple[list[str], list[Finding]]:
+    """Run one case again, named as in a report: its calls, and its findings."""
+    from .checks import CHECKS
+
+    seed, interface, check, number = (case.split("/") + [""] * 4)[:4]
+    if check not in CHECKS or not number.isdigit() or not seed.lstrip("-").isdigit() or interface not in ("cs", "me"):
+        raise InputError(f"there is no case {case!r}: it must be as in a report, such as 0/cs/forbidden/12")
+    with tempfile.TemporaryDirectory(prefix="probe-") as temporary:
+        work = Path(temporary)
+        description = _extract(Path(fmu), work / "fmu")
+        _chosen(interface, interfaces(description))
+        report = Report(fmu=Path(fmu).name, fmi_version=description.fmiVersion, seed=int(seed))
+        job = _Job(
+            check=check, interface=interface, folder=work / "fmu", work=work, seed=int(seed), calls=sys.maxsize,
+            seconds=1e9, hang=hang, first=int(number), last=int(number) + 1,
+        )  # fmt: skip
+        _run(job, report)
+        return journal.read(job.journal).lines, report.findings
+
+
+def _extract(fmu: Path, folder: Path) -> Any:
+    """Extract an FMU; its description."""
+    from fmpy import extract, read_model_description
+
+    try:
+        extract(str(fmu), str(folder))
+        description = read_model_description(str(folder), validate=False)
+    except (BadZipFile, OSError) as error:
+        raise InputError(f"{fmu} is not an FMU: {error}") from error
+    if not description.fmiVersion.startswith(("2.", "3.")):
+        raise InputError(f"{fmu} is of FMI {description.fmiVersion}: the probe is for 2.0 and 3.0")
+    return description
+
+
+def _chosen(interface: str | None, offered: Sequence[str]) -> Sequence[str]:
+    if interface is not None and interface not in offered:
+        raise InputError(
+            f"the FMU has no interface {interface!r}: it has {', '.join(offered) or 'none that is probed'}"
+        )
+    return offered if interface is None else [interface]
+
+
+def _run(job: _Job, report: Report) -> bool:
+    """Run a check to its end, with a new process after each crash; whether the FMU can be loaded at all."""
+    begun = time.monotonic()
+    cases = loadable = 0
+    while job.first < job.last and not job.stopped:
+        loadable = _one_process(job, report, begun)
+        cases = max(cases, job.first)
+        if not loadable:
+            break
+    said = "; ".join(dict.fromkeys([*job.said, *([job.stopped] if job.stopped != "finished" else [])]))
+    seconds = time.monotonic() - begun
+    report.outcomes.append(
+        Outcome(check=job.check, interface=job.interface, cases=cases, calls=job.done, seconds=seconds, said=said)
+    )
+    return bool(loadable)
+
+
+def _one_process(job: _Job, report: Report, begun: float) -> bool:
+    """Run cases from `job.first` until the process ends, for whatever reason."""
+    for path in (job.journal, job.records):
+        path.unlink(missing_ok=True)
+    order = {
+        "folder": str(job.folder), "work": str(job.work), "journal": str(job.journal), "findings": str(job.records),
+        "check": job.check, "interface": job.interface, "seed": job.seed, "first": job.first, "last": job.last,
+        "calls": max(0, job.calls - job.done), "seconds": job.seconds - (time.monotonic() - begun),
+        "avoided": [key for key, count in job.crashes.items() if count >= _CRASHES_OF_ONE],
+    }  # fmt: skip
+    (job.work / "job.json").write_text(json.dumps(order), encoding="utf-8")
+    code, hangs, errors = _watch(job)
+    entry = journal.read(job.journal)
+    job.done += entry.calls
+    records = _records(job.records)
+    subject = _collect(records, job, report)
+    unloadable = [record["unloadable"] for record in records if "unloadable" in record]
+    if unloadable:
+        report.add(Finding(severity=WRONG, key="load", text=f"cannot be loaded: {unloadable[0]}", calls=[], replay=""))
+        return False
+    if code == FAILED:
+        raise ProbeError(f"the probe itself failed in {job.check} ({job.interface}), case {entry.case}:\n{errors}")
+    job.first = max(job.first, entry.case) + 1
+    if any("finished" in record for record in records):
+        job.stopped = "finished"
+    elif code != AFTER_FATAL:
+        _crashed(job, report, entry, subject, "hangs" if hangs else f"ends with {_ending(code)}", errors)
+    if sum(job.crashes.values()) >= _CRASHES:
+        job.stopped = f"ended after {_CRASHES} crashes"
+    return True
+
+
+def _watch(job: _Job) -> tuple[int, bool, str]:
+    """Start the process and wait for its end, or end it where a call does not return; exit code, hang, standard error."""
+    paths = os.pathsep.join(dict.fromkeys([*(path or os.getcwd() for path in sys.path)]))
+    environment = {**os.environ, "PYTHONPATH": paths}
+    stderr = job.work / "stderr"
+    with stderr.open("wb") as errors:
+        command = [sys.executable, "-m", f"{__package__}.child", str(job.work / "job.json")]
+        process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=errors, env=environment, cwd=job.work)
+        calls, since, hangs = -1, time.monotonic(), False
+        try:
+            while True:
+                try:
+                    process.wait(timeout=0.5)
+                    break
+                except subprocess.TimeoutExpired:
+                    made = journal.read(job.journal).calls
+                    if made != calls:
+                        calls, since = made, time.monotonic()
+                    elif time.monotonic() - since > job.hang:
+                        hangs = True
+                        process.kill()
+        finally:
+            if process.poll() is None:
+                process.kill()
+                process.wait()
+    return process.returncode, hangs, stderr.read_text(encoding="utf-8", errors="replace")[-2000:]
+
+
+def _records(path: Path) -> list[dict[str, Any]]:
+    if not path.exists():
+        return []
+    return [json.loads(line) for line in path.read_text(encoding="utf-8").splitlines() if line.endswith("}")]
+
+
+def _collect(records: Sequence[dict[str, Any]], job: _Job, report: Report) -> str:
+    """Take the findings of a process; the subject of its last case."""
+    subject = ""
+    for record in records:
+        if "severity" in record:
+            calls = record["calls"] or ["?"] * (1 << 20)  # never shorter than those that are known
+            report.add(Finding(**{**record, "calls": calls, "key": f"{job.interface}: {record['key']}"}))
+        elif "said" in record:
+            job.said.append(record["said"])
+        elif "subject" in record:
+            subject = record["subject"]
+    return subject
+
+
+def _crashed(job: _Job, report: Report, entry: journal.Entry, subject: str, how: str, errors: str) -> None:
+    last = entry.lines[-1] if entry.lines else ""
+    name = last.split("(")[0] or "the loading of the library"
+    where = f"after {name}" if " -> " in last else f"in {name}"
+    about = subject or name
+    job.crashes[about] = job.crashes.get(about, 0) + 1
+    said = errors.strip().splitlines()
+    text = f"the process {how} {where}"
+    text += f"; {subject}" if subject else ""
+    text += f" ({said[-1][:200]})" if said else ""
+    replay_name = f"{job.seed}/{job.interface}/{job.check}/{entry.case}"
+    report.add(
+        Finding(severity=CRASH, key=f"{job.interface}: {about}", text=text, calls=entry.lines, replay=replay_name)
+    )
+    if entry.case < 0:
+        job.stopped = "ended: it crashes before the first case"
+
+
+def _ending(code: int) -> str:
+    try:
+        return signal.Signals(-code).name if code < 0 else f"exit code {code}"
+    except ValueError:
+        return f"signal {-code}"

@@ -1,0 +1,140 @@
+"""Random sequences of calls, legal ones and such with one forbidden call: a case is one life of an instance."""
+
+from __future__ import annotations
+
+import random
+from functools import cached_property
+
+from .context import Context
+from .faults import ACCEPT, BadStart, Fault, bad_starts, catalogue, refused
+from .findings import QUESTIONABLE, WRONG
+from .session import ERROR, FATAL, OK, STATUS, Session
+from .walk import Walk
+
+#: Calls of a legal life.
+_LENGTH = 60
+
+
+def legal(context: Context, case: int) -> None:
+    """A life of random legal calls."""
+    rng = context.random(case)
+    session = context.session()
+    if not session.instantiate(event_mode=rng.random() < 0.7, early_return=rng.random() < 0.5):
+        context.note(
+            WRONG, "Instantiate: NULL", f"{session.prefix}Instantiate returned NULL for a legal call{_said(session)}"
+        )
+        return
+    walk = Walk(session, rng, context.note)
+    for _ in range(rng.randint(5, 2 * _LENGTH)):
+        walk.step()
+        if walk.state == "error" and rng.random() < 0.5:
+            break
+    _end(walk)
+
+
+class Forbidden:
+    """Lives with one forbidden call each: every fault of the catalogue in turn."""
+
+    def __init__(self, context: Context) -> None:
+        self.context = context
+
+    @cached_property
+    def faults(self) -> list[Fault | BadStart]:
+        walk = Walk(self.context.session(), random.Random(0), self.context.note)
+        return [*bad_starts(self.context.model), *catalogue(walk)]
+
+    @property
+    def least(self) -> int:
+        """Cases that are run whatever number of calls was asked for: each fault once."""
+        return len(self.faults)
+
+    def __call__(self, context: Context, case: int) -> None:
+        fault = self.faults[case % len(self.faults)]
+        if fault.key in context.avoided:
+            return
+        context.tell(fault.key)
+        rng = context.random(case)
+        session = context.session()
+        walk = Walk(session, rng, context.note)
+        walk.judged = False
+        if isinstance(fault, BadStart):
+            self._start(walk, fault)
+        elif session.instantiate(event_mode=rng.random() < 0.5):
+            self._call(walk, fault)
+            _aftermath(walk)
+
+    def _start(self, walk: Walk, fault: BadStart) -> None:
+        session = walk.session
+        _, arguments = session.instantiation()
+        arguments[fault.position] = fault.value
+        made = session.instantiate(arguments)
+        if made and fault.accepted not in (None, ACCEPT):
+            self.context.note(str(fault.accepted), fault.key, f"{session.prefix}Instantiate accepts {fault.what}")
+        elif not made and fault.accepted == ACCEPT:
+            self.context.note(
+                QUESTIONABLE, fault.key, f"{session.prefix}Instantiate refuses {fault.what}, which is allowed"
+            )
+        if made:
+            _aftermath(walk)
+
+    def _call(self, walk: Walk, fault: Fault) -> None:
+        rng, session, machine = walk.rng, walk.session, walk.machine
+        reachable = [state for state in machine.states if machine.path(state, session.event_mode) is not None]
+        where = [state for state in reachable if machine.cell(fault.function, state, session.event_mode) not in ".?"]
+        target = fault.state or (rng.choice(where) if where else None)
+        if target is None or not walk.go(target) or (fault.state and walk.cell(fault.function) != "."):
+            return
+        if walk.model.can_save and not walk.saved and "FMU" in fault.function:
+            walk.call({2: "GetFMUstate", 3: "GetFMUState"}[walk.model.version])
+        arguments = walk.arguments(fault.function, whatever=True)
+        changed = None if arguments is None else fault.change(walk, fault.function, arguments)
+        if changed is None:
+            return
+        session.journal.write(f"\n# forbidden: {fault.what}")
+        instance = None if fault.what == "NULL instance" else session.instance
+        state, before = walk.state, len(session.messages)
+        status = session.call_on(instance, fault.function, *changed)
+        full = f"{session.prefix}{fault.function}"
+        if fault.accepted == ACCEPT:
+            if refused(status):
+                self.context.note(QUESTIONABLE, fault.key, f"{full} refuses {fault.what}, which the standard allows")
+        elif not refused(status) and fault.accepted is not None:
+            what = f"a call in the state {state!r}, where it is not allowed" if fault.state else fault.what
+            self.context.note(fault.accepted, fault.key, f"{full} accepts {what}")
+        elif status == FATAL:
+            self.context.note(
+                QUESTIONABLE, f"{fault.key}: Fatal", f"{full} returns Fatal for {fault.what}: Error would do"
+            )
+        elif status == ERROR and instance and len(session.messages) == before < 100:
+            self.context.note(
+                QUESTIONABLE,
+                f"{fault.function}: Error without a message",
+                f"{full} logs no reason for its Error, with logging on",
+            )
+        if status == ERROR and instance:
+            walk.state = "error"
+
+
+def _aftermath(walk: Walk) -> None:
+    """What may follow a forbidden call: reading, going on, a new start, the end. Only a crash counts."""
+    for _ in range(walk.rng.randint(0, 12)):
+        walk.step()
+    if walk.state == "error" and walk.rng.random() < 0.5 and walk.session.call("Reset") == OK:
+        walk.after("Reset", [], OK)
+        walk.go("step" if walk.model.interface == "cs" else "continuous")
+    _end(walk)
+
+
+def _end(walk: Walk) -> None:
+    if not walk.session.journal.fatal:
+        name = {2: "FreeFMUstate", 3: "FreeFMUState"}[walk.model.version]
+        for state, *_ in walk.saved:
+            walk.session.call(name, state)
+        walk.session.free()
+
+
+def _said(session: Session) -> str:
+    return f": {session.messages[-1]}" if session.messages else ""
+
+
+__all__ = ["STATUS", "Forbidden", "legal"]

@@ -1,0 +1,168 @@
+"""One instance of an FMU: the functions of its library as FMPy declares them, each call noted before it is made."""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+from urllib.parse import quote
+
+from fmpy import calloc, fmi2, fmi3, free
+
+from linkwork.errors import LinkworkError
+
+from .journal import Journal
+from .model import Model
+
+OK, WARNING, DISCARD, ERROR, FATAL, PENDING = range(6)
+STATUS = ("OK", "Warning", "Discard", "Error", "Fatal", "Pending")
+
+
+class ProbeError(LinkworkError):
+    """A check could not be made, because a call that it needs was refused."""
+
+
+_CLASSES = {
+    (2, "cs"): fmi2.FMU2Slave,
+    (2, "me"): fmi2.FMU2Model,
+    (3, "cs"): fmi3.FMU3Slave,
+    (3, "me"): fmi3.FMU3Model,
+}
+
+
+class Library:
+    """The shared library of an extracted FMU."""
+
+    def __init__(self, model: Model, folder: Path) -> None:
+        made = _CLASSES[model.version, model.interface](
+            guid=model.token, modelIdentifier=model.identifier, unzipDirectory=str(folder), instanceName="probe"
+        )
+        self._dll = made.dll  # its functions carry the argument types that FMPy declares
+        self._prefix = f"fmi{model.version}"
+        self.messages: list[str] = []
+        #: What an instance calls back; one for all, so that the probe itself keeps nothing of an instance.
+        self.callbacks: Any
+        if model.version == 2:
+            self.callbacks = fmi2.fmi2CallbackFunctions(
+                logger=fmi2.fmi2CallbackLoggerTYPE(lambda _e, _n, status, _c, message: self._log(message)),
+                allocateMemory=ctypes.cast(calloc, fmi2.fmi2CallbackAllocateMemoryTYPE),
+                freeMemory=ctypes.cast(free, fmi2.fmi2CallbackFreeMemoryTYPE),
+            )
+        else:
+            self.callbacks = fmi3.fmi3LogMessageCallback(lambda _e, status, _c, message: self._log(message))
+
+    def _log(self, message: bytes | None) -> None:
+        if len(self.messages) < 100:
+            self.messages.append((message or b"").decode("utf-8", "replace"))
+
+    def function(self, name: str) -> Any:
+        """A function by its name without the prefix."""
+        return getattr(self._dll, self._prefix + name)
+
+
+class Session:
+    """An instance, or the attempt at one.
+
+    Parameters
+    ----------
+    library : Library
+    model : Model
+    journal : Journal
+    folder : pathlib.Path
+        Where the FMU was extracted to.
+    """
+
+    def __init__(self, library: Library, model: Model, journal: Journal, folder: Path) -> None:
+        self.library, self.model, self.journal, self.folder = library, model, journal, folder
+        self.instance: Any = None
+        self.messages = library.messages
+        self.messages.clear()
+        self.prefix = f"fmi{model.version}"
+        self.event_mode = False
+
+    def instantiation(self, *, event_mode: bool = False, early_return: bool = False) -> tuple[str, list[Any]]:
+        """The function that makes an instance and its legal arguments, which a fault may change."""
+        model = self.model
+        token = model.token.encode()
+        self.event_mode = event_mode and model.event_mode
+        if model.version == 2:
+            kind = fmi2.fmi2CoSimulation if model.interface == "cs" else fmi2.fmi2ModelExchange
+            return "Instantiate", [b"probe", kind, token, uri(self.folder / "resources"), self.library.callbacks, 0, 1]
+        path = f"{self.folder / 'resources'}/".encode()
+        if model.interface == "me":
+            return "InstantiateModelExchange", [b"probe", token, path, False, True, None, self.library.callbacks]
+        more = [
+            self.event_mode,
+            early_return,
+            None,
+            0,
+            None,
+            self.library.callbacks,
+            fmi3.fmi3IntermediateUpdateCallback(),
+        ]
+        return "InstantiateCoSimulation", [b"probe", token, path, False, True, *more]
+
+    def instantiate(self, arguments: Iterable[Any] | None = None, **options: bool) -> bool:
+        """Make the instance; whether there is one."""
+        name, legal = self.instantiation(**options)
+        self.instance = self._make(name, legal if arguments is None else list(arguments))
+        self.journal.write(" -> an instance" if self.instance else " -> NULL")
+        return bool(self.instance)
+
+    def call(self, name: str, *arguments: Any) -> int:
+        """Call a function with the instance as first argument; its status."""
+        return self.call_on(self.instance, name, *arguments)
+
+    def call_on(self, instance: Any, name: str, *arguments: Any) -> int:
+        """Call a function with any instance, NULL for example."""
+        status = self._make(name, [instance, *arguments], shown=1 if instance else 0)
+        if status is None:
+            return OK
+        self.journal.fatal |= status == FATAL
+        self.journal.write(f" -> {STATUS[status] if 0 <= status < len(STATUS) else status}")
+        return int(status)
+
+    def need(self, name: str, *arguments: Any) -> None:
+        """Call a function that must succeed for a check to go on."""
+        status = self.call(name, *arguments)
+        if status > WARNING:
+            said = f": {self.messages[-1]}" if self.messages else ""
+            self.journal.write(f"\n# the check ends here{said}")
+            raise ProbeError(f"{self.prefix}{name} returned {STATUS[status]}{said}")
+
+    def free(self) -> None:
+        """Free the instance, if there is one."""
+        if self.instance:
+            self.call("FreeInstance")
+            self.instance = None
+
+    def _make(self, name: str, arguments: list[Any], shown: int = 0) -> Any:
+        text = ", ".join(show(argument) for argument in arguments[shown:])
+        self.journal.call(f"{self.prefix}{name}({text})")
+        return self.library.function(name)(*arguments)
+
+
+def uri(folder: Path) -> bytes:
+    """The URI of a folder, every character that has a meaning in one percent-encoded."""
+    return (
+        "file://" + quote(("" if folder.as_posix().startswith("/") else "/") + folder.as_posix(), safe="/:")
+    ).encode()
+
+
+def show(argument: Any) -> str:
+    """An argument as text for the list of calls."""
+    if argument is None:
+        return "NULL"
+    if isinstance(argument, bytes):
+        return repr(argument)[1:] if len(argument) < 80 else f"{argument[:20]!r}... ({len(argument)} bytes)"
+    if isinstance(argument, ctypes.Array):
+        values = [repr(v)[1:] if isinstance(v, bytes) else str(v) for v in argument[:6]] if len(argument) < 1000 else []
+        return f"[{', '.join(values)}{', ...' if len(argument) > len(values) else ''}]"
+    if isinstance(argument, ctypes.Structure):
+        return f"&{type(argument).__name__}"
+    if isinstance(argument, ctypes.c_void_p):
+        return "state" if argument.value else "&NULL"
+    if isinstance(argument, ctypes._SimpleCData):
+        return f"&{argument.value}"
+    return repr(argument) if isinstance(argument, (int, float, bool)) else type(argument).__name__

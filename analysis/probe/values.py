@@ -1,0 +1,179 @@
+"""Checks of single values: derivatives against differences, declared bounds, starts."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from .context import Context
+from .drive import Run, random_inputs, step_size
+from .findings import QUESTIONABLE, WRONG
+from .model import Model, Variable
+from .session import ProbeError
+from .walk import derivative_arguments
+
+#: Steps of the differences, relative to the size of the known; the best of them is compared.
+_DIFFERENCES = (1e-3, 1e-4, 1e-5, 1e-6, 1e-7)
+#: Difference of a derivative from the best difference, relative to the largest of the row, that is called wrong.
+DERIVATIVE_TOLERANCE = 1e-4
+
+
+def derivatives(context: Context, case: int) -> None:
+    """Directional derivatives against differences, at the start and after random steps; adjoint against directional ones."""
+    model, rng = context.model, context.random(case)
+    run = _at_a_point(context, case)
+    worst, name = 0.0, ""
+    for unknown, knowns in rng.sample(model.dependencies, min(len(model.dependencies), 40)):
+        knowns = tuple(k for k in knowns if model.interface == "me" or k.causality == "input")
+        row = [_directional(run, [unknown], [known], [1.0])[0] for known in knowns]
+        scale = max(map(abs, row), default=0.0) or 1.0
+        for known, declared in zip(knowns, row):
+            error, difference = min(_difference(run, unknown, known, step, declared) for step in _DIFFERENCES)
+            error /= max(scale, abs(difference))
+            if error > worst:
+                worst, name = error, f"d {unknown.name} / d {known.name}"
+            if not error <= DERIVATIVE_TOLERANCE:
+                text = f"d {unknown.name} / d {known.name} is {declared!r}, differences give {difference:.9g}"
+                context.note(WRONG, f"d {unknown.name} / d {known.name}: derivative", text)
+        if knowns:
+            seed = [rng.gauss(0, 1) for _ in knowns]
+            _sums(context, run, unknown, knowns, seed, row)
+    run.session.free()
+    context.say(f"largest relative error {worst:.1e}{' of ' + name if name else ''}")
+
+
+def _at_a_point(context: Context, case: int) -> Run:
+    """A run at which derivatives can be asked for: in continuous-time mode; for co-simulation in initialization mode."""
+    if context.model.interface == "me":
+        run = Run(context.session())
+        for inputs in random_inputs(context.random(case), context.model, 5 * case):
+            run.step(step_size(context.model), inputs)
+        return run
+    run = Run.__new__(Run)
+    run.session, run.model, run.time = context.session(), context.model, context.model.start_time
+    if not run.session.instantiate():
+        raise ProbeError("no instance was made")
+    run.initialize()
+    return run
+
+
+def _directional(
+    run: Run, unknowns: Sequence[Variable], knowns: Sequence[Variable], seed: Sequence[float]
+) -> list[float]:
+    arguments = derivative_arguments(run.model.version, unknowns, knowns, seed)
+    run.session.need("GetDirectionalDerivative", *arguments)
+    return list(arguments[5 if run.model.version == 2 else 6])
+
+
+def _difference(run: Run, unknown: Variable, known: Variable, step: float, declared: float) -> tuple[float, float]:
+    """How far a central difference is from the declared derivative, and the difference."""
+    here = run.get([known])[0]
+    step *= abs(here) or min(abs(known.nominal), 1.0)
+    sides = []
+    for side in (here + step, here - step):
+        run.set({known: side})
+        sides.append(run.get([unknown])[0])
+    run.set({known: here})
+    difference = (sides[0] - sides[1]) / (2 * step)
+    error = abs(difference - declared)
+    return (error if math.isfinite(error) else math.inf), difference
+
+
+def _sums(
+    context: Context,
+    run: Run,
+    unknown: Variable,
+    knowns: Sequence[Variable],
+    seed: Sequence[float],
+    row: Sequence[float],
+) -> None:
+    """A derivative along several knowns is the sum over them; the adjoint one of a row is that row."""
+    terms = [a * b for a, b in zip(row, seed)]
+    room = 1e-9 * (sum(map(abs, terms)) or 1.0)
+    along = _directional(run, [unknown], knowns, seed)[0]
+    if not abs(along - sum(terms)) <= room:
+        context.note(
+            WRONG,
+            f"{unknown.name}: derivative along several knowns",
+            f"the derivative of {unknown.name} along several knowns is {along!r}, not the sum {sum(terms)!r}",
+        )
+    if context.model.adjoint:
+        arguments = derivative_arguments(run.model.version, [unknown], knowns, [2.0], transposed=True)
+        run.session.need("GetAdjointDerivative", *arguments)
+        for known, adjoint, declared in zip(knowns, arguments[6], row):
+            if not abs(adjoint - 2 * declared) <= 1e-9 * max(abs(2 * declared), 1e-9 * max(map(abs, row))):
+                text = f"the adjoint derivative of {unknown.name} in {known.name} is {adjoint / 2!r}, the other {declared!r}"
+                context.note(WRONG, f"d {unknown.name} / d {known.name}: adjoint derivative", text)
+
+
+def bounds(context: Context, case: int) -> None:
+    """Over a run with random inputs every variable stays within its declared bounds, and no output is NaN."""
+    model = context.model
+    numbers = [v for v in model.variables if v.group not in ("String", "Boolean") and v.size == 1]
+    watched = [v for v in numbers if v.causality == "output" or math.isfinite(v.minimum) or math.isfinite(v.maximum)]
+    run = Run(context.session())
+    for inputs in random_inputs(context.random(case), model, 200):
+        run.step(step_size(model), inputs)
+        for group in dict.fromkeys(v.group for v in watched):
+            chosen = [v for v in watched if v.group == group]
+            for variable, found in zip(chosen, run.get(chosen)):
+                if math.isnan(found):
+                    context.note(
+                        QUESTIONABLE, f"{variable.name}: NaN", f"{variable.name} is NaN after a step that returned OK"
+                    )
+                elif not variable.minimum <= found <= variable.maximum:
+                    limits = f"{variable.minimum:g} .. {variable.maximum:g}"
+                    text = f"{variable.causality} {variable.name} is {found!r}, outside its declared range {limits}"
+                    context.note(WRONG, f"{variable.name}: outside its range", text)
+    run.session.free()
+
+
+def starts(context: Context, case: int) -> None:
+    """After the initialization parameters and inputs have the start values of the model description."""
+    run = Run(context.session())
+    for group in context.model.groups:
+        chosen = [v for v in context.model.named(group, "3") if v.size == 1 and v.causality in ("parameter", "input")]
+        for variable, found in zip(chosen, run.get(chosen) if chosen else ()):
+            expected = context.model.c_types[group](variable.start).value
+            if (found or (b"" if group == "String" else 0)) != expected:
+                text = f"{variable.causality} {variable.name} starts as {found!r}, declared is {variable.start!r}"
+                context.note(WRONG, f"{variable.name}: another start", text)
+    run.session.free()
+
+
+def bounded_parameters(model: Model) -> list[tuple[Variable, float]]:
+    """Each parameter with a value beyond each of its declared bounds."""
+    parameters = [
+        v
+        for v in model.variables
+        if v.causality == "parameter" and v.group not in ("String", "Boolean") and v.size == 1
+    ]
+    beyond = []
+    for variable in parameters:
+        if abs(variable.minimum) < 1e300 and variable.minimum > -(2**31) + 1:
+            beyond.append((variable, variable.minimum - max(1.0, abs(variable.minimum))))
+        if abs(variable.maximum) < 1e300 and variable.maximum < 2**31 - 1:
+            beyond.append((variable, variable.maximum + max(1.0, abs(variable.maximum))))
+    return [(v, x) for v, x in beyond if v.is_real or "U" not in v.group or x >= 0]
+
+
+def out_of_bounds(context: Context, case: int) -> None:
+    """A parameter beyond its declared bounds is refused, when it is set or at the end of the initialization."""
+    variable, beyond = bounded_parameters(context.model)[case]
+    session = context.session()
+    if not session.instantiate():
+        return
+    chosen = beyond if variable.is_real else int(beyond)
+    try:
+        Run(session, instantiate=False, start={variable: chosen})
+    except ProbeError:
+        if not session.journal.fatal:
+            session.free()
+        return
+    limits = f"{variable.minimum:g} .. {variable.maximum:g}"
+    text = f"parameter {variable.name} = {chosen:g} is accepted, its declared range is {limits}"
+    context.note(QUESTIONABLE, f"{variable.name}: accepted beyond its range", text)
+    session.free()
+
+
+__all__ = ["bounded_parameters", "bounds", "derivatives", "out_of_bounds", "starts"]

@@ -1,0 +1,461 @@
+"""Random legal calls on one instance, with the state that the standard's machine is in after each."""
+
+from __future__ import annotations
+
+import ctypes
+import math
+import random
+from collections.abc import Callable, Sequence
+from typing import Any
+
+from fmpy import fmi2
+
+from .findings import QUESTIONABLE, WRONG, Note
+from .machines import MACHINES
+from .model import TYPES, Variable
+from .session import DISCARD, ERROR, OK, STATUS, WARNING, Session
+
+#: How often a function is chosen, where it is not 1.
+_WEIGHTS = {
+    "Terminate": 0.1,
+    "Reset": 0.2,
+    "SetDebugLogging": 0.3,
+    "DoStep": 6,
+    "SetTime": 4,
+    "CompletedIntegratorStep": 3,
+}
+#: Functions that may have a reason to refuse: those that compute, with the values that the probe chose, for example.
+_MAY_REFUSE = (
+    *("EnterInitializationMode", "ExitInitializationMode", "DoStep", "CompletedIntegratorStep", "SetContinuousStates"),
+    *("NewDiscreteStates", "UpdateDiscreteStates", "EvaluateDiscreteStates"),
+    *("GetDerivatives", "GetContinuousStateDerivatives", "GetEventIndicators"),
+    *("GetStatus", "GetRealStatus", "GetBooleanStatus", "GetStringStatus"),  # of use after Discard and Pending only
+)
+_STATES = 3
+
+
+def references(variables: Sequence[Variable]) -> Any:
+    """The value references of variables, for C."""
+    return (ctypes.c_uint * len(variables))(*(v.reference for v in variables))
+
+
+def value(rng: random.Random, variable: Variable) -> Any:
+    """A value that a variable should take: its start, or one near it and within its bounds."""
+    if variable.group == "String":
+        return (
+            variable.start
+            if variable.causality == "parameter"
+            else rng.choice([b"", b"text", "äöü €".encode(), b"x" * 999])
+        )
+    if variable.group == "Boolean":
+        return bool(rng.getrandbits(1)) if variable.causality == "input" else variable.start
+    if not variable.is_real:
+        if variable.causality == "input" and variable.maximum - variable.minimum < 1000:
+            return rng.randint(int(variable.minimum), int(variable.maximum))
+        return variable.start
+    if rng.random() < 0.3:
+        return variable.start
+    scale = abs(variable.start) or min(abs(variable.nominal), 1.0)
+    return min(max(variable.start + 0.03 * scale * rng.gauss(0, 1), variable.minimum), variable.maximum)
+
+
+class Walk:
+    """A walk through the states of one instance.
+
+    Parameters
+    ----------
+    session : Session
+    rng : random.Random
+    note : Note
+        Takes findings.
+    """
+
+    def __init__(self, session: Session, rng: random.Random, note: Note) -> None:
+        self.session, self.rng, self.note = session, rng, note
+        self.model = session.model
+        self.machine = MACHINES[self.model.version, self.model.interface]
+        self.state = "instantiated"
+        self.time = self.model.start_time
+        self.next_event = math.inf
+        self.forced: str | None = None
+        self.saved: list[tuple[Any, str, float, float]] = []
+        self.judged = True
+        self.functions = [name for name in self.machine.allowed if self._offered(name)]
+
+    def _offered(self, name: str) -> bool:
+        """Whether the FMU says that it has a function, or has variables for it."""
+        key, model = name.lower(), self.model
+        if "serializ" in key:
+            return model.can_serialize and model.can_save
+        if "fmustate" in key:
+            return model.can_save
+        group = name[3:]
+        if group in dict(TYPES[model.version].values()) and name[:3] in ("Get", "Set"):
+            return group in model.groups
+        return {
+            "getdirectionalderivative": model.directional,
+            "getadjointderivative": model.adjoint,
+            "setrealinputderivatives": model.input_derivatives,
+            "getrealoutputderivatives": model.output_order > 0,
+            "getoutputderivatives": model.output_order > 0,
+            "evaluatediscretestates": model.evaluates_discrete,
+            "geteventindicators": model.indicators > 0,
+            "getintegerstatus": False,  # the standard defines no status that is an Integer
+            "cancelstep": False,
+        }.get(key, "continuousstate" not in key or "number" in key or model.states > 0)
+
+    def cell(self, name: str) -> str:
+        """What the standard's table says of a function in the present state; after Fatal nothing is allowed."""
+        if self.session.journal.fatal:
+            return "."
+        return self.machine.cell(name, self.state, self.session.event_mode)
+
+    def step(self) -> None:
+        """Make one random legal call, or the one that the FMU asked for."""
+        if self.forced is not None:
+            name, self.forced = self.forced, None
+            if self.cell(name) not in ".?" and self.call(name):
+                return
+        names = [name for name in self.functions if self.cell(name) not in ".?"]
+        for _ in range(20 if names else 0):
+            if self.call(self.rng.choices(names, [_WEIGHTS.get(name, 1.0) for name in names])[0]):
+                return
+
+    def go(self, target: str, most: int = 2) -> bool:
+        """Walk to a state, with up to ``most`` random calls in each state on the way; whether it was reached."""
+        if target == "ready" and self.model.version == 3:
+            return False
+        for function in self.machine.path(target, self.session.event_mode) or []:
+            for _ in range(self.rng.randint(0, most)):
+                names = [n for n in self.functions if self.cell(n) not in ".?" and self._stays(n)]
+                if names:
+                    self.call(self.rng.choice(names))
+            if self.cell(function) in ".?":
+                return False
+            while (
+                self.call(function)
+                and self.state == "event"
+                and function in ("NewDiscreteStates", "UpdateDiscreteStates")
+            ):
+                if self.rng.random() < 0.05:
+                    return False  # an event iteration that does not end
+        return self.state == target
+
+    def _stays(self, name: str) -> bool:
+        return self.machine.follow(name, "", True) == "" and name.lower() != "setfmustate"
+
+    def call(self, name: str) -> bool:
+        """Make a call with legal arguments, if there are some; whether it was made and accepted."""
+        arguments = self.arguments(name)
+        if arguments is None:
+            return False
+        before = self.state
+        status = self.session.call(name, *arguments)
+        self._judge(name, before, status)
+        self.after(name, arguments, status)
+        return status <= WARNING
+
+    def _judge(self, name: str, state: str, status: int) -> None:
+        if not self.judged or state in ("error", "failed") or status <= WARNING:
+            return
+        full = self.session.prefix + name
+        if status not in (DISCARD, ERROR):
+            text = f"{full} returned {STATUS[status] if status < len(STATUS) else status} for a legal call"
+            self.note(WRONG, f"{name}: strange status", text)
+        elif status == ERROR:
+            severity = QUESTIONABLE if name in _MAY_REFUSE or name.startswith("Set") else WRONG
+            said = f" ({self.session.messages[-1]})" if self.session.messages else ""
+            self.note(
+                severity,
+                f"{name} in {state}: legal call refused",
+                f"{full} returned Error for a legal call in the state {state!r}{said}",
+            )
+
+    def after(self, name: str, arguments: Sequence[Any], status: int) -> None:
+        """Follow the machine and keep what the call returned."""
+        if status == ERROR:
+            self.state = "error"
+            return
+        if status > WARNING:
+            if name == "DoStep" and self.model.version == 2:
+                self.state = "failed"
+            return
+        key = name.lower()
+        if key in _AFTER:
+            _AFTER[key](self, arguments)
+        if key not in ("newdiscretestates", "updatediscretestates", "setfmustate"):
+            self.state = self.machine.follow(name, self.state, self.session.event_mode)
+        if self.state == "continuous" and self.time >= self.next_event and self.forced is None:
+            self.forced = "EnterEventMode"
+
+    def arguments(self, name: str, whatever: bool = False) -> list[Any] | None:
+        """Legal arguments of a function; None where there are none now, but ``whatever`` allows those of any variable."""
+        group = name[3:]
+        if name[:3] in ("Get", "Set") and group in self.model.c_types:
+            return self._access(name[:3], group, whatever)
+        make = _ARGUMENTS.get(name.lower())
+        return make(self) if make else []
+
+    def _access(self, verb: str, group: str, whatever: bool) -> list[Any] | None:
+        cell = self.cell(verb + group)
+        if cell in ".?":  # only for a call out of order
+            cell = "x" if verb == "Get" else "3"
+        variables = self.model.named(group, cell)
+        if not variables and whatever:
+            variables = self.model.named(group)
+        if not variables:
+            return None
+        return access(self, verb, self.rng.sample(variables, min(len(variables), self.rng.randint(1, 4))))
+
+    def pick(self, pairs: Sequence[tuple[Variable, tuple[Variable, ...]]]) -> tuple[Variable, Variable] | None:
+        """A random unknown and a known that it depends on."""
+        if not pairs:
+            return None
+        unknown, knowns = self.rng.choice(pairs)
+        return unknown, self.rng.choice(knowns)
+
+
+def access(walk: Walk, verb: str, variables: Sequence[Variable]) -> list[Any]:
+    """Arguments that get or set these variables, which are of one group."""
+    c_type = walk.model.c_types[variables[0].group]
+    size = sum(v.size for v in variables)
+    values = (c_type * size)()
+    if verb == "Set":
+        values[:] = [value(walk.rng, v) for v in variables for _ in range(v.size)]
+    return [references(variables), len(variables), values, *([size] if walk.model.version == 3 else [])]
+
+
+def _setup(walk: Walk) -> list[Any]:
+    return [walk.rng.random() < 0.5, 1e-6, walk.model.start_time, 0, 0.0]
+
+
+def _do_step(walk: Walk) -> list[Any]:
+    size = walk.model.step * (1.0 if walk.model.fixed_step else walk.rng.choice([1.0, 1.0, 0.1, 0.37, 2.0]))
+    if walk.model.version == 2:
+        return [walk.time, size, 0]
+    return [walk.time, size, False, ctypes.c_bool(), ctypes.c_bool(), ctypes.c_bool(), ctypes.c_double()]
+
+
+def _set_state(walk: Walk) -> list[Any] | None:
+    return [walk.rng.choice(walk.saved)[0]] if walk.saved else None
+
+
+def _get_state(walk: Walk) -> list[Any] | None:
+    reuse = walk.saved and (len(walk.saved) >= _STATES or walk.rng.random() < 0.2)
+    return [walk.rng.choice(walk.saved)[0]] if reuse else [ctypes.c_void_p()]
+
+
+def serialized(session: Session, state: Any) -> bytes:
+    """The bytes of a saved state."""
+    serialize = {2: "SerializeFMUstate", 3: "SerializeFMUState"}[session.model.version]
+    size = ctypes.c_size_t()
+    session.need(serialize.replace("Serialize", "Serialized") + "Size", state, size)
+    buffer = byte_array(session, bytes(size.value))
+    session.need(serialize, state, buffer, size.value)
+    return bytes(buffer)
+
+
+def byte_array(session: Session, data: bytes) -> Any:
+    """Bytes as the array that the functions of a version take."""
+    kind = ctypes.c_char if session.model.version == 2 else ctypes.c_ubyte
+    return (kind * len(data)).from_buffer_copy(data)
+
+
+def _serialize(walk: Walk) -> list[Any] | None:
+    if not walk.saved:
+        return None
+    state = walk.rng.choice(walk.saved)[0]
+    size = ctypes.c_size_t()
+    names = {2: "SerializedFMUstateSize", 3: "SerializedFMUStateSize"}
+    if walk.session.call(names[walk.model.version], state, size) > WARNING:
+        return None
+    return [state, byte_array(walk.session, bytes(size.value)), size.value]
+
+
+def _deserialize(walk: Walk) -> list[Any] | None:
+    arguments = _serialize(walk)
+    name = {2: "SerializeFMUstate", 3: "SerializeFMUState"}[walk.model.version]
+    if arguments is None or walk.session.call(name, *arguments) > WARNING:
+        return None
+    return [arguments[1], arguments[2], arguments[0]]
+
+
+def _states(count: str) -> Callable[[Walk], list[Any] | None]:
+    def arguments(walk: Walk) -> list[Any] | None:
+        number = getattr(walk.model, count)
+        return [(ctypes.c_double * number)(), number] if number else None
+
+    return arguments
+
+
+def _set_states(walk: Walk) -> list[Any] | None:
+    arguments = _states("states")(walk)
+    if arguments is None or walk.session.call("GetContinuousStates", *arguments) > WARNING:
+        return None
+    arguments[0][:] = [x + 1e-4 * walk.rng.gauss(0, 1) * (abs(x) or 1.0) for x in arguments[0]]
+    return arguments
+
+
+def _set_time(walk: Walk) -> list[Any]:
+    return [min(walk.time + walk.model.step * walk.rng.random(), walk.next_event)]
+
+
+def _derivative(transposed: bool) -> Callable[[Walk], list[Any] | None]:
+    def arguments(walk: Walk) -> list[Any] | None:
+        chosen = walk.pick(walk.model.dependencies)
+        if chosen is None or walk.state in ("instantiated", "ready", "initialization"):
+            return None
+        return derivative_arguments(walk.model.version, [chosen[0]], [chosen[1]], [1.0], transposed)
+
+    return arguments
+
+
+def derivative_arguments(
+    version: int,
+    unknowns: Sequence[Variable],
+    knowns: Sequence[Variable],
+    seed: Sequence[float],
+    transposed: bool = False,
+) -> list[Any]:
+    """Arguments of a directional (or adjoint) derivative; the last array (FMI 2) or the last but one takes the result."""
+    given = (ctypes.c_double * len(seed))(*seed)
+    result = (ctypes.c_double * len(knowns if transposed else unknowns))()
+    about = [references(unknowns), len(unknowns), references(knowns), len(knowns)]
+    return [*about, given, result] if version == 2 else [*about, given, len(given), result, len(result)]
+
+
+def _output_derivatives(walk: Walk) -> list[Any] | None:
+    outputs = [
+        v for v in walk.model.variables if v.causality == "output" and v.is_real and v.variability == "continuous"
+    ]
+    if not outputs:
+        return None
+    extra = [1] if walk.model.version == 3 else []
+    return [references([walk.rng.choice(outputs)]), 1, (ctypes.c_int * 1)(1), (ctypes.c_double * 1)(), *extra]
+
+
+def _input_derivatives(walk: Walk) -> list[Any] | None:
+    inputs = [v for v in walk.model.variables if v.causality == "input" and v.is_real and v.variability == "continuous"]
+    if not inputs:
+        return None
+    slope = walk.rng.gauss(0, 1)
+    return [references([walk.rng.choice(inputs)]), 1, (ctypes.c_int * 1)(1), (ctypes.c_double * 1)(slope)]
+
+
+def _update(walk: Walk) -> list[Any]:
+    if walk.model.version == 2:
+        return [fmi2.fmi2EventInfo()]
+    return [*(ctypes.c_bool() for _ in range(5)), ctypes.c_double()]
+
+
+def _completed(walk: Walk) -> list[Any]:
+    kind = ctypes.c_int if walk.model.version == 2 else ctypes.c_bool
+    return [0, kind(), kind()]
+
+
+#: Legal arguments, by the name of a function in lower case; a function that is not here has none.
+_ARGUMENTS: dict[str, Callable[[Walk], list[Any] | None]] = {
+    "setdebuglogging": lambda walk: [walk.rng.random() < 0.9, 0, None],
+    "setupexperiment": _setup,
+    "enterinitializationmode": lambda walk: _setup(walk) if walk.model.version == 3 else [],
+    "dostep": _do_step,
+    "getfmustate": _get_state,
+    "setfmustate": _set_state,
+    "freefmustate": _set_state,
+    "serializedfmustatesize": lambda walk: [*_s, ctypes.c_size_t()] if (_s := _set_state(walk)) else None,
+    "serializefmustate": _serialize,
+    "deserializefmustate": _deserialize,
+    "getcontinuousstates": _states("states"),
+    "getderivatives": _states("states"),
+    "getcontinuousstatederivatives": _states("states"),
+    "getnominalsofcontinuousstates": _states("states"),
+    "geteventindicators": _states("indicators"),
+    "getnumberofcontinuousstates": lambda walk: [ctypes.c_size_t()],
+    "getnumberofeventindicators": lambda walk: [ctypes.c_size_t()],
+    "setcontinuousstates": _set_states,
+    "settime": _set_time,
+    "getdirectionalderivative": _derivative(False),
+    "getadjointderivative": _derivative(True),
+    "getrealoutputderivatives": _output_derivatives,
+    "getoutputderivatives": _output_derivatives,
+    "setrealinputderivatives": _input_derivatives,
+    "newdiscretestates": _update,
+    "updatediscretestates": _update,
+    "completedintegratorstep": _completed,
+    "getstatus": lambda walk: [fmi2.fmi2DoStepStatus, ctypes.c_int()],
+    "getrealstatus": lambda walk: [fmi2.fmi2LastSuccessfulTime, ctypes.c_double()],
+    "getbooleanstatus": lambda walk: [fmi2.fmi2Terminated, ctypes.c_int()],
+    "getstringstatus": lambda walk: [fmi2.fmi2PendingStatus, ctypes.c_char_p()],
+    "getintegerstatus": lambda walk: [fmi2.fmi2LastSuccessfulTime, ctypes.c_int()],
+    "cancelstep": lambda walk: [],
+}  # fmt: skip
+
+
+def _stepped(walk: Walk, arguments: Sequence[Any]) -> None:
+    walk.time += arguments[1]
+    if walk.model.version == 3:
+        event, terminate, early, reached = (argument.value for argument in arguments[3:])
+        if early:
+            walk.time = reached
+        walk.forced = "Terminate" if terminate else "EnterEventMode" if event else None
+
+
+def _kept(walk: Walk, arguments: Sequence[Any]) -> None:
+    walk.saved = [entry for entry in walk.saved if entry[0] is not arguments[-1]]
+    if walk.state not in ("error", "failed"):
+        walk.saved.append((arguments[-1], walk.state, walk.time, walk.next_event))
+
+
+def _restored(walk: Walk, arguments: Sequence[Any]) -> None:
+    walk.forced = None
+    for state, *rest in walk.saved:
+        if state is arguments[0]:
+            walk.state, walk.time, walk.next_event = rest  # type: ignore[assignment]
+
+
+def _freed(walk: Walk, arguments: Sequence[Any]) -> None:
+    if arguments[0].value:
+        walk.note(
+            QUESTIONABLE,
+            "FreeFMUState: pointer kept",
+            f"{walk.session.prefix}FreeFMUstate does not set the pointer to NULL",
+        )
+    walk.saved = [entry for entry in walk.saved if entry[0] is not arguments[0]]
+
+
+def _updated(walk: Walk, arguments: Sequence[Any]) -> None:
+    info = arguments[0]
+    fields = (
+        [getattr(info, name) for name, _ in info._fields_] if walk.model.version == 2 else [a.value for a in arguments]
+    )
+    needed, terminate, _, _, defined, time = fields
+    walk.state = "event" if needed else "settled"
+    walk.next_event = time if defined else math.inf
+    walk.forced = "Terminate" if terminate else None
+
+
+def _integrated(walk: Walk, arguments: Sequence[Any]) -> None:
+    walk.forced = "Terminate" if arguments[2].value else "EnterEventMode" if arguments[1].value else None
+
+
+def _at(walk: Walk, arguments: Sequence[Any]) -> None:
+    walk.time = arguments[0]
+
+
+def _begun(walk: Walk, arguments: Sequence[Any]) -> None:
+    walk.time, walk.next_event, walk.forced = walk.model.start_time, math.inf, None
+
+
+_AFTER: dict[str, Callable[[Walk, Sequence[Any]], None]] = {
+    "dostep": _stepped,
+    "getfmustate": _kept,
+    "setfmustate": _restored,
+    "freefmustate": _freed,
+    "newdiscretestates": _updated,
+    "updatediscretestates": _updated,
+    "completedintegratorstep": _integrated,
+    "settime": _at,
+    "reset": _begun,
+}
+
+__all__ = ["OK", "Walk", "access", "byte_array", "derivative_arguments", "references", "serialized", "value"]
