@@ -32,7 +32,7 @@ from .common import CHECK_FAILED, console, handled, print_error, print_written, 
     "--interface", type=click.Choice(["cs", "me"]), help="One interface only: co-simulation or model exchange."
 )
 @click.option(
-    "--hang", default=20.0, show_default=True, type=click.FloatRange(0.1), help="A call that takes so many s hangs."
+    "--hang", default=10.0, show_default=True, type=click.FloatRange(0.1), help="A call that takes so many s hangs."
 )
 @click.option("--out", type=click.Path(dir_okay=False), help="File for the report: .md or .json.")
 @click.option("--strict", is_flag=True, help="Fail on what is questionable, too.")

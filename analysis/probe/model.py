@@ -8,6 +8,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree
 
 from linkwork.errors import InputError
 
@@ -58,7 +59,7 @@ class Variable:
 
 
 def _settable(variable: Variable) -> bool:
-    return variable.variability != "constant" and variable.causality != "independent"
+    return variable.variability != "constant" and variable.causality not in ("independent", "structuralParameter")
 
 
 #: The standard's footnotes: for which variables a cell of the table of functions lets the call through.
@@ -140,6 +141,7 @@ def read_model(folder: Path, interface: str) -> Model:
         for name in ("startTime", "stopTime", "stepSize")
     )
     start = start or 0.0
+    offered = _capabilities(folder, interface)
     fixed = interface == "cs" and not about.canHandleVariableCommunicationStepSize
     derivatives = [unknown.variable for unknown in description.derivatives]
     states = {variable.derivative.name for variable in derivatives if variable.derivative is not None}
@@ -156,12 +158,14 @@ def read_model(folder: Path, interface: str) -> Model:
         states=description.numberOfContinuousStates,
         indicators=description.numberOfEventIndicators,
         start_time=start,
-        step=getattr(about, "fixedInternalStepSize", None) or step or ((stop - start) / 500 if stop else 0.01),
+        step=_number(getattr(about, "fixedInternalStepSize", None), 0.0)
+        or step
+        or ((stop - start) / 500 if stop else 0.01),
         fixed_step=fixed,
         can_save=about.canGetAndSetFMUstate,
         can_serialize=about.canSerializeFMUstate,
-        directional=_first(about, "providesDirectionalDerivative", "providesDirectionalDerivatives"),
-        adjoint=_first(about, "providesAdjointDerivatives"),
+        directional=bool(offered & {"providesDirectionalDerivative", "providesDirectionalDerivatives"}),
+        adjoint="providesAdjointDerivatives" in offered,
         output_order=getattr(about, "maxOutputDerivativeOrder", 0),
         input_derivatives=getattr(about, "canInterpolateInputs", False),
         event_mode=getattr(about, "hasEventMode", False),
@@ -229,6 +233,8 @@ def _variable(variable: Any, version: int, is_state: bool) -> Variable:
     )
 
 
-def _first(about: Any, *names: str) -> bool:
-    """Whether an interface has any of these capabilities, which the versions of FMI name differently."""
-    return any(getattr(about, name, False) for name in names)
+def _capabilities(folder: Path, interface: str) -> set[str]:
+    """The flags of an interface that are true, from the file: FMPy does not read all of them."""
+    root = ElementTree.parse(folder / "modelDescription.xml").getroot()
+    element = root.find({"cs": "CoSimulation", "me": "ModelExchange"}[interface])
+    return set() if element is None else {name for name, value in element.items() if value in ("true", "1")}

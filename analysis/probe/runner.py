@@ -62,7 +62,7 @@ def probe(
     seed: int = 0,
     seconds: float = 600.0,
     interface: str | None = None,
-    hang: float = 20.0,
+    hang: float = 10.0,
     progress: Callable[[str], None] | None = None,
 ) -> Report:
     """Probe an FMU.
@@ -115,7 +115,7 @@ def probe(
         return report
 
 
-def replay(fmu: str | Path, case: str, *, hang: float = 20.0) -> tuple[list[str], list[Finding]]:
+def replay(fmu: str | Path, case: str, *, hang: float = 10.0) -> tuple[list[str], list[Finding]]:
     """Run one case again, named as in a report: its calls, and its findings."""
     from .checks import CHECKS
 

@@ -105,7 +105,7 @@ class Forbidden:
             self.context.note(
                 QUESTIONABLE, f"{fault.key}: Fatal", f"{full} returns Fatal for {fault.what}: Error would do"
             )
-        elif status == ERROR and instance and len(session.messages) == before < 100:
+        elif status == ERROR and instance and walk.logging and len(session.messages) == before < 100:
             self.context.note(
                 QUESTIONABLE,
                 f"{fault.function}: Error without a message",

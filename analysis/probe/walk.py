@@ -79,7 +79,7 @@ class Walk:
         self.next_event = math.inf
         self.forced: str | None = None
         self.saved: list[tuple[Any, str, float, float]] = []
-        self.judged = True
+        self.judged = self.logging = True
         self.functions = [name for name in self.machine.allowed if self._offered(name)]
 
     def _offered(self, name: str) -> bool:
@@ -446,6 +446,10 @@ def _begun(walk: Walk, arguments: Sequence[Any]) -> None:
     walk.time, walk.next_event, walk.forced = walk.model.start_time, math.inf, None
 
 
+def _logged(walk: Walk, arguments: Sequence[Any]) -> None:
+    walk.logging = bool(arguments[0])
+
+
 _AFTER: dict[str, Callable[[Walk, Sequence[Any]], None]] = {
     "dostep": _stepped,
     "getfmustate": _kept,
@@ -456,6 +460,7 @@ _AFTER: dict[str, Callable[[Walk, Sequence[Any]], None]] = {
     "completedintegratorstep": _integrated,
     "settime": _at,
     "reset": _begun,
+    "setdebuglogging": _logged,
 }
 
 __all__ = ["OK", "Walk", "access", "byte_array", "derivative_arguments", "references", "serialized", "value"]
