@@ -34,6 +34,7 @@ from .common import CHECK_FAILED, console, handled, print_error, print_written, 
 @click.option(
     "--hang", default=10.0, show_default=True, type=click.FloatRange(0.1), help="A call that takes so many s hangs."
 )
+@click.option("--check", "checks", multiple=True, metavar="CHECK", help="Only this check; can be given often.")
 @click.option("--out", type=click.Path(dir_okay=False), help="File for the report: .md or .json.")
 @click.option("--strict", is_flag=True, help="Fail on what is questionable, too.")
 @click.option(
@@ -49,6 +50,7 @@ def probe(
     seed: int,
     seconds: float,
     interface: str | None,
+    checks: Sequence[str],
     hang: float,
     out: str | None,
     strict: bool,
@@ -71,7 +73,7 @@ def probe(
     else:
         with console.status("probing") as status:
             report = probe_fmu(
-                fmu, calls=calls, seed=seed, seconds=seconds, interface=interface, hang=hang,
+                fmu, calls=calls, seed=seed, seconds=seconds, interface=interface, hang=hang, checks=checks,
                 progress=lambda what: status.update(f"probing {what}"),
             )  # fmt: skip
         findings = report.findings

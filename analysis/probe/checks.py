@@ -11,7 +11,7 @@ from .leaks import leaks
 from .model import Model
 from .repeats import deserialize_there, repeated, restored, serialize_here, split
 from .sequences import Forbidden, legal
-from .values import bounded_parameters, bounds, derivatives, out_of_bounds, starts
+from .values import bounded_parameters, bounds, derivatives, out_of_bounds, past_the_end, starts
 
 
 class Check(NamedTuple):
@@ -53,6 +53,7 @@ CHECKS = {
     "parameters": Check(
         "parameters beyond their ranges", _is(out_of_bounds), lambda model: len(bounded_parameters(model))
     ),
+    "stop": Check("a step past the stop time", _is(past_the_end), lambda model: 1 if model.interface == "cs" else 0),
     "leaks": Check("memory over lives, steps and states", _is(leaks), lambda model: 3 if model.can_save else 2),
     "places": Check("folders and resource locations", _is(places.places), places.count),
     "legal": Check("random legal calls", _is(legal), share=0.5),

@@ -28,13 +28,17 @@ class Run:
     Parameters
     ----------
     session : Session
-    fresh : bool
-        False for an instance that was reset, or whose state is about to be restored.
+    instantiate : bool
+        False for a session that has an instance, which was reset for example.
     start : mapping, optional
         Values to set before the initialization.
+    stop : float, optional
+        The time at which the run ends, if the FMU is told.
     """
 
-    def __init__(self, session: Session, *, instantiate: bool = True, start: Inputs | None = None) -> None:
+    def __init__(
+        self, session: Session, *, instantiate: bool = True, start: Inputs | None = None, stop: float | None = None
+    ) -> None:
         self.session, self.model = session, session.model
         self.time = self.model.start_time
         self.next_event = math.inf
@@ -44,12 +48,12 @@ class Run:
                 session.need("Instantiate")
         if start:
             self.set(start)
-        self.initialize()
+        self.initialize(stop)
         self.finish_initialization()
 
-    def initialize(self) -> None:
+    def initialize(self, stop: float | None = None) -> None:
         """Into the initialization mode."""
-        setup = [False, 0.0, self.time, False, 0.0]
+        setup = [False, 0.0, self.time, stop is not None, stop or 0.0]
         if self.model.version == 2:
             self.session.need("SetupExperiment", *setup)
             setup = []

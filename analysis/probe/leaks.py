@@ -2,53 +2,99 @@
 
 from __future__ import annotations
 
+import ctypes
 import os
 import time
 from collections.abc import Callable
 from pathlib import Path
+from typing import NamedTuple
 
 from .context import Context
 from .drive import Run, step_size
 from .findings import WRONG
 
-#: Growth for each repetition, in bytes, that is called a leak; and the least growth in all, which the allocator may cause.
-_EACH, _LEAST = 64, 96 * 1024
 #: Seconds and repetitions that a measurement takes at most.
 _SECONDS, _MOST = 6.0, 4000
 
 
-def resident() -> int | None:
-    """Resident memory of this process, in bytes; None where the system does not say it simply."""
+class Memory(NamedTuple):
+    """Memory of this process in bytes: what its allocator has given out, and what is resident; 0 where it is not known."""
+
+    heap: int
+    resident: int
+
+
+#: Growth that is called a leak: for each repetition, and in all, because the probe and Python's allocator grow a little.
+_EACH = Memory(heap=8, resident=64)
+_LEAST = Memory(heap=16 * 1024, resident=192 * 1024)
+
+
+class _MallInfo(ctypes.Structure):
+    """What glibc's mallinfo2 returns; its fields are sizes."""
+
+    _fields_ = [
+        (name, ctypes.c_size_t)
+        for name in (
+            "arena",
+            "ordblks",
+            "smblks",
+            "hblks",
+            "hblkhd",
+            "usmblks",
+            "fsmblks",
+            "uordblks",
+            "fordblks",
+            "keepcost",
+        )
+    ]
+
+
+def memory() -> Memory | None:
+    """The memory of this process; None where the system does not say it simply."""
     status = Path("/proc/self/statm")
     if not status.exists():
         return None
-    return int(status.read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE")
+    resident = int(status.read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE")
+    try:
+        function = ctypes.CDLL(None).mallinfo2
+    except AttributeError:  # another C library than glibc 2.33 or newer
+        return Memory(0, resident)
+    function.restype = _MallInfo
+    info = function()
+    return Memory(info.uordblks + info.hblkhd, resident)
 
 
 def leaks(context: Context, case: int) -> None:
     """Case 0: lives of instances. Case 1: steps of one. Case 2: saved states of one."""
-    if resident() is None:
+    if memory() is None:
         context.say("not made: this system does not say how much memory is used")
         return
     what, repeat, end = (_lives, _steps, _states)[case](context)
     count, grown = _measure(repeat)
     end()
-    context.say(f"{what}: {grown / 1024:.0f} KiB over {count}")
-    if grown > _LEAST and grown / count > _EACH:
-        context.note(WRONG, f"{what}: leak", f"memory grows by {grown / count:.0f} bytes for each of {count} {what}")
+    context.say(f"{what}: {max(grown) / 1024:.0f} KiB over {count}")
+    for growth, each, least in zip(grown, _EACH, _LEAST):
+        if growth > least and growth / count > each:
+            context.note(
+                WRONG, f"{what}: leak", f"memory grows by {growth / count:.0f} bytes for each of {count} {what}"
+            )
+            return
 
 
-def _measure(repeat: Callable[[], None]) -> tuple[int, int]:
+def _measure(repeat: Callable[[], None]) -> tuple[int, Memory]:
     """Repetitions in the second half of a measurement, and by how much the memory grew over them."""
     until = time.monotonic() + _SECONDS / 2
     warm = 0
     while warm < 20 or (warm < _MOST // 2 and time.monotonic() < until):
         repeat()
         warm += 1
-    before = resident() or 0
+    before = memory()
     for _ in range(warm):
         repeat()
-    return warm, (resident() or 0) - before
+    after = memory()
+    assert before is not None
+    assert after is not None
+    return warm, Memory(*(b - a for a, b in zip(before, after)))
 
 
 _Repeated = tuple[str, Callable[[], None], Callable[[], None]]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import random
 from functools import cached_property
 
@@ -9,7 +10,7 @@ from .context import Context
 from .faults import ACCEPT, BadStart, Fault, bad_starts, catalogue, refused
 from .findings import QUESTIONABLE, WRONG
 from .session import ERROR, FATAL, OK, STATUS, Session
-from .walk import Walk
+from .walk import Walk, access
 
 #: Calls of a legal life.
 _LENGTH = 60
@@ -60,7 +61,7 @@ class Forbidden:
         if isinstance(fault, BadStart):
             self._start(walk, fault)
         elif session.instantiate(event_mode=rng.random() < 0.5):
-            self._call(walk, fault)
+            self._call(walk, fault, case // len(self.faults))
             _aftermath(walk)
 
     def _start(self, walk: Walk, fault: BadStart) -> None:
@@ -77,11 +78,14 @@ class Forbidden:
         if made:
             _aftermath(walk)
 
-    def _call(self, walk: Walk, fault: Fault) -> None:
-        rng, session, machine = walk.rng, walk.session, walk.machine
+    def _call(self, walk: Walk, fault: Fault, again: int) -> None:
+        session, machine = walk.session, walk.machine
         reachable = [state for state in machine.states if machine.path(state, session.event_mode) is not None]
         where = [state for state in reachable if machine.cell(fault.function, state, session.event_mode) not in ".?"]
-        target = fault.state or (rng.choice(where) if where else None)
+        where.sort(
+            key=lambda state: state not in ("step", "continuous")
+        )  # each time in another state, where the run is first
+        target = fault.state or (where[again % len(where)] if where else None)
         if target is None or not walk.go(target) or (fault.state and walk.cell(fault.function) != "."):
             return
         if walk.model.can_save and not walk.saved and "FMU" in fault.function:
@@ -111,8 +115,20 @@ class Forbidden:
                 f"{fault.function}: Error without a message",
                 f"{full} logs no reason for its Error, with logging on",
             )
+        elif fault.what in ("NaN", "infinity"):
+            self._poisoned(walk, fault)
         if status == ERROR and instance:
             walk.state = "error"
+
+    def _poisoned(self, walk: Walk, fault: Fault) -> None:
+        """Whether a step with an input that is no number returns OK and outputs that are none."""
+        outputs = [v for v in walk.model.variables if v.causality == "output" and v.group == fault.function[3:]]
+        if not outputs or walk.state != "step" or not walk.call("DoStep"):
+            return
+        arguments = access(walk, "Get", outputs)
+        if walk.session.call(f"Get{outputs[0].group}", *arguments) == OK and not all(map(math.isfinite, arguments[2])):
+            text = f"an input of {fault.what} is accepted, DoStep returns OK, and outputs are no numbers"
+            self.context.note(QUESTIONABLE, f"{fault.key}: goes through", text)
 
 
 def _aftermath(walk: Walk) -> None:

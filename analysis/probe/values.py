@@ -141,6 +141,24 @@ def starts(context: Context, case: int) -> None:
     run.session.free()
 
 
+def past_the_end(context: Context, case: int) -> None:
+    """A step past the stop time that was set is refused, as both standards ask."""
+    size = step_size(context.model)
+    run = Run(context.session(), stop=context.model.start_time + 4 * size)
+    for _ in range(4):
+        run.step(size)
+    try:
+        run.step(size)
+    except ProbeError:
+        context.say("refused")
+    else:
+        context.note(
+            WRONG, "DoStep: past the stop time", f"{run.session.prefix}DoStep accepts a step past the stop time"
+        )
+    if not context.journal.fatal:
+        run.session.free()
+
+
 def bounded_parameters(model: Model) -> list[tuple[Variable, float]]:
     """Each parameter with a value beyond each of its declared bounds."""
     parameters = [
@@ -176,4 +194,4 @@ def out_of_bounds(context: Context, case: int) -> None:
     session.free()
 
 
-__all__ = ["bounded_parameters", "bounds", "derivatives", "out_of_bounds", "starts"]
+__all__ = ["bounded_parameters", "bounds", "derivatives", "out_of_bounds", "past_the_end", "starts"]

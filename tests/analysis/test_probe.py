@@ -1,0 +1,174 @@
+"""The probe finds what was planted in an FMU, says how to see it again, and finds nothing in the same FMU without the fault."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+import zipfile
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+
+from analysis import probe
+from analysis.cli import main
+from linkwork.errors import InputError
+
+SOURCES = Path(__file__).parent / "probed"
+PLATFORM = {"linux": "linux64", "win32": "win64", "darwin": "darwin64"}[sys.platform]
+ENDING = {"linux": ".so", "win32": ".dll", "darwin": ".dylib"}[sys.platform]
+
+pytestmark = pytest.mark.fmu
+
+
+@pytest.fixture(scope="session")
+def fmu(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The FMU of `probed`, compiled; PROBE_FAULT plants its faults when it runs."""
+    import fmpy
+
+    folder = tmp_path_factory.mktemp("probed")
+    library = folder / f"probed{ENDING}"
+    headers = Path(fmpy.__file__).parent / "c-code"
+    compiler = [
+        sys.executable,
+        "-m",
+        "ziglang",
+        "cc",
+        "-shared",
+        "-fPIC",
+        "-O1",
+        "-std=c11",
+        "-Wall",
+        "-fno-sanitize=all",
+    ]
+    made = subprocess.run(
+        [*compiler, f"-I{headers}", SOURCES / "probed.c", "-o", library, "-lm"], capture_output=True, text=True
+    )
+    assert made.returncode == 0, made.stderr
+    path = folder / "probed.fmu"
+    with zipfile.ZipFile(path, "w") as archive:
+        archive.write(SOURCES / "modelDescription.xml", "modelDescription.xml")
+        archive.write(library, f"binaries/{PLATFORM}/{library.name}")
+        archive.writestr("resources/readme.txt", "nothing\n")
+    return path
+
+
+@pytest.mark.parametrize("interface", ["cs", "me"])
+def test_nothing_is_found_in_a_correct_fmu(fmu, interface, monkeypatch):
+    monkeypatch.delenv("PROBE_FAULT", raising=False)
+    report = probe.probe(fmu, calls=6000, interface=interface)
+    assert [finding.text for finding in report.findings] == []
+    assert all("not made" not in outcome.said for outcome in report.outcomes)
+    assert report.calls > 6000
+
+
+#: fault, interface, check that finds it, severity, key of the finding
+PLANTED = [
+    ("crash", "cs", "forbidden", "crash", "GetInteger: unknown value reference"),
+    ("free", "me", "forbidden", "crash", "FreeFMUstate: NULL pointer"),
+    ("end", "cs", "forbidden", "crash", "DoStep: negative step"),
+    ("hang", "cs", "forbidden", "crash", "DoStep: negative step"),
+    ("guid", "me", "forbidden", "wrong", "Instantiate: wrong GUID"),
+    ("order", "cs", "forbidden", "wrong", "DoStep in instantiated: out of order"),
+    ("order", "me", "forbidden", "wrong", "SetContinuousStates in event: out of order"),
+    ("step", "cs", "forbidden", "wrong", "DoStep: negative step"),
+    ("nan", "cs", "forbidden", "questionable", "SetReal: NaN: goes through"),
+    ("refuse", "cs", "legal", "wrong", "GetReal in step: legal call refused"),
+    ("place", "cs", "places", "crash", "'Müller': folder named so"),
+    ("state", "cs", "restore", "wrong", "after more steps: state not restored"),
+    ("state", "me", "restore", "wrong", "after Reset: state not restored"),
+    ("serialized", "cs", "deserialize", "wrong", "another process: state not restored"),
+    ("derivative", "cs", "derivatives", "wrong", "d y / d u: derivative"),
+    ("derivative", "me", "derivatives", "wrong", "d der(x) / d u: derivative"),
+    ("leak", "cs", "leaks", "wrong", "lives: leak"),
+    ("leaking step", "cs", "leaks", "wrong", "steps: leak"),
+    ("leaking state", "me", "leaks", "wrong", "saved states: leak"),
+    ("range", "cs", "bounds", "wrong", "y: outside its range"),
+    ("start", "cs", "starts", "wrong", "k: another start"),
+    ("reset", "cs", "repeat", "wrong", "Reset: another run"),
+    ("shared", "cs", "repeat", "wrong", "two instances: another run"),
+    ("stop", "cs", "stop", "wrong", "DoStep: past the stop time"),
+    ("bounds", "cs", "parameters", "questionable", "k: accepted beyond its range"),
+    ("euler", "cs", "split", "questionable", "step and halves: difference"),
+]
+
+
+def names(calls: list[str]) -> list[str]:
+    return [call.split("(")[0] for call in calls]
+
+
+@pytest.mark.parametrize(("fault", "interface", "check", "severity", "key"), PLANTED)
+def test_a_planted_fault_is_found(fmu, fault, interface, check, severity, key, monkeypatch):
+    monkeypatch.setenv("PROBE_FAULT", fault)
+    checks = ["serialize", check] if check == "deserialize" else [check]
+    report = probe.probe(fmu, calls=3000, interface=interface, checks=checks, hang=2.0)
+    found = {(finding.severity, finding.key): finding for finding in report.findings}
+    finding = found[severity, f"{interface}: {key}"]
+    assert finding.calls
+    if severity != "questionable" and check != "deserialize":  # the case alone shows it again
+        calls, again = probe.replay(fmu, finding.replay, hang=2.0)
+        assert finding.key in {one.key for one in again}
+        if check != "leaks":  # of which only the latest calls are kept
+            assert names(calls)[: len(finding.calls)] == names(finding.calls)
+
+
+def test_the_same_seed_makes_the_same_calls(fmu, monkeypatch):
+    monkeypatch.delenv("PROBE_FAULT", raising=False)
+    lives = [probe.replay(fmu, f"{seed}/me/legal/3")[0] for seed in (1, 1, 2)]
+    assert names(lives[0]) == names(lives[1]) != names(lives[2])
+    assert len(lives[0]) > 5
+
+
+def run(*arguments: object) -> tuple[int, str]:
+    result = CliRunner().invoke(main, ["probe", *map(str, arguments)])
+    return result.exit_code, result.output
+
+
+def test_the_command_reports_and_replays(fmu, tmp_path, monkeypatch):
+    monkeypatch.setenv("PROBE_FAULT", "guid")
+    common = (fmu, "--interface", "cs", "--calls", 300, "--check", "forbidden", "--out")
+    code, output = run(*common, tmp_path / "report.md")
+    assert code == 4
+    assert "accepts wrong GUID" in output
+    text = (tmp_path / "report.md").read_text(encoding="utf-8")
+    assert "wrong: fmi2Instantiate accepts wrong GUID" in text
+    assert "--replay 0/cs/forbidden/0" in text
+    assert "fmi2Instantiate('probe', 1, '{0}'" in text
+    run(*common, tmp_path / "report.json")
+    report = json.loads((tmp_path / "report.json").read_text(encoding="utf-8"))
+    assert [finding["severity"] for finding in report["findings"]] == ["wrong"]
+    code, output = run(fmu, "--replay", "0/cs/forbidden/0")
+    assert code == 4
+    assert "fmi2Instantiate('probe', 1, '{0}'" in output
+    monkeypatch.setenv("PROBE_FAULT", "euler")
+    assert run(fmu, "--check", "split")[0] == 0
+    assert run(fmu, "--check", "split", "--strict")[0] == 4
+
+
+@pytest.mark.parametrize(
+    ("options", "sentence"),
+    [
+        (["--check", "nothing"], "there is no check 'nothing': the checks are starts"),
+        (["--replay", "0/cs/nothing/1"], "there is no case '0/cs/nothing/1'"),
+    ],
+)
+def test_wrong_options_are_named(fmu, options, sentence):
+    code, output = run(fmu, *options)
+    assert code == 1
+    assert sentence in output
+
+
+def test_what_is_no_fmu_is_said(tmp_path):
+    path = tmp_path / "no.fmu"
+    path.write_text("nothing")
+    with pytest.raises(InputError, match="is not an FMU"):
+        probe.probe(path)
+
+
+def test_a_library_that_is_missing_is_a_finding(fmu, tmp_path):
+    bare = tmp_path / "bare.fmu"
+    with zipfile.ZipFile(fmu) as source, zipfile.ZipFile(bare, "w") as target:
+        target.writestr("modelDescription.xml", source.read("modelDescription.xml"))
+    report = probe.probe(bare, interface="me")
+    assert [finding.text[:17] for finding in report.findings] == ["cannot be loaded:"]
