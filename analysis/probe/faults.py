@@ -206,6 +206,7 @@ def catalogue(walk: Walk) -> list[Fault]:
         if re.fullmatch(pattern.replace("{type}", groups), name)
     ]
     faults += [Fault(name, "NULL instance", WRONG, lambda walk, n, a: a) for name in walk.functions]
+    faults.append(Fault("FreeInstance", "NULL instance", ACCEPT, lambda walk, n, a: a))
     faults += [
         Fault(name, "out of order", WRONG, lambda walk, n, a: a, state)
         for name in machine.allowed

@@ -23,8 +23,8 @@ from .findings import CRASH, WRONG, Finding, Outcome, Report
 from .model import interfaces, read_model
 from .session import ProbeError
 
-#: After so many crashes a forbidden call is not tried again, and after so many in all a check ends.
-_CRASHES_OF_ONE, _CRASHES = 2, 60
+#: After so many crashes a check ends; a forbidden call that crashed is not tried again.
+_CRASHES = 100
 
 
 @dataclass(slots=True, kw_only=True)
@@ -188,7 +188,7 @@ def _one_process(job: _Job, report: Report, begun: float) -> bool:
         "folder": str(job.folder), "work": str(job.work), "journal": str(job.journal), "findings": str(job.records),
         "check": job.check, "interface": job.interface, "seed": job.seed, "first": job.first, "last": job.last,
         "calls": max(0, job.calls - job.done), "seconds": job.seconds - (time.monotonic() - begun),
-        "avoided": [key for key, count in job.crashes.items() if count >= _CRASHES_OF_ONE],
+        "avoided": list(job.crashes),
     }  # fmt: skip
     (job.work / "job.json").write_text(json.dumps(order), encoding="utf-8")
     code, hangs, errors = _watch(job)

@@ -81,7 +81,8 @@ class Forbidden:
     def _call(self, walk: Walk, fault: Fault, again: int) -> None:
         session, machine = walk.session, walk.machine
         reachable = [state for state in machine.states if machine.path(state, session.event_mode) is not None]
-        where = [state for state in reachable if machine.cell(fault.function, state, session.event_mode) not in ".?"]
+        allowed = fault.function in machine.allowed  # FreeInstance is not: it ends a life
+        where = [s for s in reachable if not allowed or machine.cell(fault.function, s, session.event_mode) not in ".?"]
         where.sort(
             key=lambda state: state not in ("step", "continuous")
         )  # each time in another state, where the run is first
