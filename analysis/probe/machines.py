@@ -6,7 +6,8 @@ is instantiated after `SetupExperiment`, and `settled` is the event mode after a
 `error` is the state Terminated, into which an error leads.
 
 A cell holds `x`: allowed; `.`: not allowed; `?`: not judged, because the standard leaves it open; `e`: allowed if the importer
-uses the event mode; a digit: allowed for the variables of the standard's footnote of that number, see `model.CONDITIONS`.
+uses the event mode; another letter or a digit: allowed for some variables, see `model.CONDITIONS`, where the digits are the
+standard's footnotes.
 """
 
 from __future__ import annotations
@@ -185,10 +186,10 @@ def _machine(version: int, interface: str, common: str, table: str) -> Machine:
     allowed = {row.split()[0]: dict(zip(states, row.split()[1:], strict=True)) for row in rows}
     allowed |= {row.split()[0]: dict.fromkeys(states, row.split()[1]) for row in common.strip().splitlines()}
     if version == 3:
-        # the third standard lets every variable be read in every state, and has a function for each type
-        last = {"cs": "6", "me": "5"}[interface]
+        # every variable can be read in every state, in Instantiated those with a start; a function for each type
+        last = {"cs": "6", "me": "i"}[interface]
         for kind in (*FLOATS, *DISCRETE):
-            allowed["Get" + kind] = dict.fromkeys(states, "x")
+            allowed["Get" + kind] = dict.fromkeys(states, "x") | {"instantiated": "s"}
             running = "." if interface == "me" and kind in DISCRETE else last
             allowed["Set" + kind] = dict(zip(states, ("1", "3", "4", "4", running, "."), strict=True))
     return Machine(version, interface, states, allowed)

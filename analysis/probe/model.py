@@ -70,6 +70,9 @@ CONDITIONS: dict[str, Callable[[Variable], bool]] = {
     "4": lambda v: v.causality == "input" or (v.causality == "parameter" and v.variability == "tunable"),
     "5": lambda v: (v.causality == "input" and v.variability == "continuous") or v.is_state,
     "6": lambda v: v.causality == "input" or (v.causality == "parameter" and v.variability == "tunable"),
+    # of our own: what FMI 3.0 lets through without doubt
+    "s": lambda v: v.causality in ("input", "parameter") or v.initial == "exact",
+    "i": lambda v: v.causality == "input" and v.variability == "continuous",
     "x": lambda v: True,
 }
 
@@ -85,6 +88,7 @@ class Model:
     token: str
     variables: tuple[Variable, ...]
     states: int
+    state_names: tuple[str, ...]  # in the order of the state vector; empty where a state is no scalar
     indicators: int
     start_time: float
     step: float
@@ -144,9 +148,9 @@ def read_model(folder: Path, interface: str) -> Model:
     offered = _capabilities(folder, interface)
     fixed = interface == "cs" and not about.canHandleVariableCommunicationStepSize
     derivatives = [unknown.variable for unknown in description.derivatives]
-    states = {variable.derivative.name for variable in derivatives if variable.derivative is not None}
+    names = tuple(variable.derivative.name for variable in derivatives if variable.derivative is not None)
     by_name = {
-        v.name: _variable(v, version, v.name in states) for v in description.modelVariables if v.type in TYPES[version]
+        v.name: _variable(v, version, v.name in names) for v in description.modelVariables if v.type in TYPES[version]
     }
     return Model(
         version=version,
@@ -156,6 +160,7 @@ def read_model(folder: Path, interface: str) -> Model:
         token=description.guid,
         variables=tuple(by_name.values()),
         states=description.numberOfContinuousStates,
+        state_names=names if len(names) == description.numberOfContinuousStates else (),
         indicators=description.numberOfEventIndicators,
         start_time=start,
         step=_number(getattr(about, "fixedInternalStepSize", None), 0.0)

@@ -23,6 +23,9 @@ class ProbeError(LinkworkError):
     """A check could not be made, because a call that it needs was refused."""
 
 
+_LOGGER = ctypes.CFUNCTYPE(
+    None, ctypes.c_void_p, ctypes.c_char_p, ctypes.c_int, ctypes.c_char_p, ctypes.c_char_p, ctypes.c_void_p
+)
 _CLASSES = {
     (2, "cs"): fmi2.FMU2Slave,
     (2, "me"): fmi2.FMU2Model,
@@ -44,16 +47,20 @@ class Library:
         #: What an instance calls back; one for all, so that the probe itself keeps nothing of an instance.
         self.callbacks: Any
         if model.version == 2:
+            # the logger is variadic: one more argument is taken for the message "%s"; FMPy's type has none
+            self._logger = _LOGGER(lambda _e, _n, status, _c, message, more: self._log(message, more))
             self.callbacks = fmi2.fmi2CallbackFunctions(
-                logger=fmi2.fmi2CallbackLoggerTYPE(lambda _e, _n, status, _c, message: self._log(message)),
+                logger=ctypes.cast(self._logger, fmi2.fmi2CallbackLoggerTYPE),
                 allocateMemory=ctypes.cast(calloc, fmi2.fmi2CallbackAllocateMemoryTYPE),
                 freeMemory=ctypes.cast(free, fmi2.fmi2CallbackFreeMemoryTYPE),
             )
         else:
             self.callbacks = fmi3.fmi3LogMessageCallback(lambda _e, status, _c, message: self._log(message))
 
-    def _log(self, message: bytes | None) -> None:
+    def _log(self, message: bytes | None, more: int | None = None) -> None:
         if len(self.messages) < 100:
+            if message == b"%s" and more:
+                message = ctypes.cast(more, ctypes.c_char_p).value
             self.messages.append((message or b"").decode("utf-8", "replace"))
 
     def function(self, name: str) -> Any:

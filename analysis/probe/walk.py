@@ -212,7 +212,9 @@ class Walk:
         if not pairs:
             return None
         unknown, knowns = self.rng.choice(pairs)
-        return unknown, self.rng.choice(knowns)
+        if self.model.interface == "cs":  # its states are no knowns of its steps
+            knowns = tuple(known for known in knowns if known.causality == "input")
+        return (unknown, self.rng.choice(knowns)) if knowns else None
 
 
 def access(walk: Walk, verb: str, variables: Sequence[Variable]) -> list[Any]:
