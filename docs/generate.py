@@ -101,8 +101,37 @@ def figures(of: str, page: str) -> str:
     return "\n".join(lines)
 
 
+def probe(of: str, page: str) -> str:
+    """What `linkwork probe` checks, or the forbidden calls that it makes."""
+    from analysis.probe import QUESTIONABLE, WRONG
+    from analysis.probe.checks import CHECKS
+    from analysis.probe.faults import ACCEPT, FAULTS
+
+    if of == "checks":
+        return _markdown("| check | what it looks at |", ((f"`{name}`", check.title) for name, check in CHECKS.items()))
+    whats: dict[str, dict[str | None, list[str]]] = {}
+    for functions, what, accepted, _ in FAULTS:
+        whats.setdefault(functions, {}).setdefault(accepted, []).append(what)
+    columns = (WRONG, QUESTIONABLE, None, ACCEPT)
+    return _markdown(
+        "| functions | wrong if accepted | questionable if accepted | only a crash counts | must be accepted |",
+        (
+            (
+                f"`{functions.replace('|', chr(96) + ', ' + chr(96))}`",
+                *("; ".join(row.get(column, ())) for column in columns),
+            )
+            for functions, row in whats.items()
+        ),
+    )
+
+
 #: What fills a table, from what it is of and the text of its page; `figures` takes long.
-TABLES: dict[str, Callable[[str, str], str]] = {"variables": variables, "symbols": symbols, "figures": figures}
+TABLES: dict[str, Callable[[str, str], str]] = {
+    "variables": variables,
+    "symbols": symbols,
+    "figures": figures,
+    "probe": probe,
+}
 
 
 def filled(page: str, *, with_figures: bool = False) -> str:

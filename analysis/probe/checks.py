@@ -34,28 +34,56 @@ def _derivatives(model: Model) -> int:
     return 0 if not (model.directional and model.dependencies) else 1 if model.interface == "cs" else 3
 
 
+def _saves(model: Model) -> bool:
+    return model.can_save and model.can_serialize
+
+
 #: In the order in which they are made.
 CHECKS = {
-    "starts": Check("start values", _is(starts), lambda model: 1),
-    "repeat": Check("the same calls, the same values", _is(repeated), lambda model: 2),
-    "restore": Check("restored states", _is(restored), lambda model: 3 if model.can_save else 0),
+    "starts": Check(
+        "parameters and inputs have their declared starts after the initialization", _is(starts), lambda model: 1
+    ),
+    "repeat": Check(
+        "the same calls give the same bits: in a new instance, after a reset, beside another instance",
+        _is(repeated),
+        lambda model: 2,
+    ),
+    "restore": Check(
+        "a run continued from a restored state gives the same bits, whatever came between",
+        _is(restored),
+        lambda model: 3 if model.can_save else 0,
+    ),
     "serialize": Check(
-        "serialized states", _is(serialize_here), lambda model: 2 if model.can_save and model.can_serialize else 0
+        "a state becomes bytes, each time the same", _is(serialize_here), lambda model: 2 * _saves(model)
     ),
     "deserialize": Check(
-        "serialized states in another process",
+        "a run continued from those bytes in another process gives the same bits",
         _is(deserialize_there),
-        lambda m: 2 if m.can_save and m.can_serialize else 0,
+        lambda model: 2 * _saves(model),
     ),
-    "split": Check("one step and two halves", _is(split), lambda model: 1 if model.interface == "cs" else 0),
-    "derivatives": Check("derivatives and differences", _is(derivatives), _derivatives),
-    "bounds": Check("declared ranges over a run", _is(bounds), lambda model: 2),
+    "split": Check(
+        "one step and two halves: the largest difference", _is(split), lambda model: model.interface == "cs"
+    ),
+    "derivatives": Check("directional and adjoint derivatives against differences", _is(derivatives), _derivatives),
+    "bounds": Check(
+        "over a run with random inputs every variable keeps to its declared range", _is(bounds), lambda model: 2
+    ),
     "parameters": Check(
-        "parameters beyond their ranges", _is(out_of_bounds), lambda model: len(bounded_parameters(model))
+        "a parameter beyond its declared range is refused",
+        _is(out_of_bounds),
+        lambda model: len(bounded_parameters(model)),
     ),
-    "stop": Check("a step past the stop time", _is(past_the_end), lambda model: 1 if model.interface == "cs" else 0),
-    "leaks": Check("memory over lives, steps and states", _is(leaks), lambda model: 3 if model.can_save else 2),
-    "places": Check("folders and resource locations", _is(places.places), places.count),
-    "legal": Check("random legal calls", _is(legal), share=0.5),
-    "forbidden": Check("forbidden calls", Forbidden, share=0.5),
+    "stop": Check("a step past the stop time is refused", _is(past_the_end), lambda model: model.interface == "cs"),
+    "leaks": Check(
+        "memory does not grow over lives of instances, steps, saved states",
+        _is(leaks),
+        lambda model: 3 if model.can_save else 2,
+    ),
+    "places": Check(
+        "it works in folders of any name, with resources said in every form that the standard allows",
+        _is(places.places),
+        places.count,
+    ),
+    "legal": Check("random legal calls are accepted", _is(legal), share=0.5),
+    "forbidden": Check("a forbidden call is refused, and the instance can still be freed", Forbidden, share=0.5),
 }

@@ -110,7 +110,7 @@ def probe(
                 if (checks and check not in checks) or (about.cases is not None and about.cases(model) == 0):
                     continue
                 if progress is not None:
-                    progress(f"{name}: {about.title}")
+                    progress(f"{name}: {check}")
                 share = int(calls * about.share) if about.share else sys.maxsize
                 job = _Job(
                     check=check, interface=name, folder=work / "fmu", work=work, seed=seed, calls=share,
@@ -133,11 +133,12 @@ def replay(fmu: str | Path, case: str, *, hang: float = 10.0) -> tuple[list[str]
         description = _extract(Path(fmu), work / "fmu")
         _chosen(interface, interfaces(description))
         report = Report(fmu=Path(fmu).name, fmi_version=description.fmiVersion, seed=int(seed))
-        job = _Job(
-            check=check, interface=interface, folder=work / "fmu", work=work, seed=int(seed), calls=sys.maxsize,
-            seconds=1e9, hang=hang, first=int(number), last=int(number) + 1,
-        )  # fmt: skip
-        _run(job, report)
+        for name in [*(["serialize"] if check == "deserialize" else []), check]:
+            job = _Job(
+                check=name, interface=interface, folder=work / "fmu", work=work, seed=int(seed), calls=sys.maxsize,
+                seconds=1e9, hang=hang, first=int(number), last=int(number) + 1,
+            )  # fmt: skip
+            _run(job, report)
         return journal.read(job.journal).lines, report.findings
 
 
