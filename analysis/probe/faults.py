@@ -128,7 +128,9 @@ def _start(position: int, value: float) -> Change:
     return change
 
 
-_VECTORS = "[GS]etContinuousStates|GetNominalsOfContinuousStates|GetDerivatives|GetContinuousStateDerivatives|GetEventIndicators"
+_VECTORS = (
+    "[GS]etContinuousStates|GetNominalsOfContinuousStates|GetDerivatives|Get.*StateDerivatives|GetEventIndicators"
+)
 _SLOPES = "GetRealOutputDerivatives|GetOutputDerivatives|SetRealInputDerivatives"
 
 #: function (a pattern over names without prefix), what is wrong, the meaning of acceptance, the change

@@ -16,19 +16,16 @@ from analysis.cli import main
 from linkwork.errors import InputError
 
 SOURCES = Path(__file__).parent / "probed"
-PLATFORM = {"linux": "linux64", "win32": "win64", "darwin": "darwin64"}[sys.platform]
 ENDING = {"linux": ".so", "win32": ".dll", "darwin": ".dylib"}[sys.platform]
 
 pytestmark = pytest.mark.fmu
 
 
-@pytest.fixture(scope="session")
-def fmu(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The FMU of `probed`, compiled; PROBE_FAULT plants its faults when it runs."""
+def compiled(folder: Path, name: str, description: str, platform: str) -> Path:
+    """An FMU of `probed`, compiled; PROBE_FAULT plants its faults when it runs."""
     import fmpy
 
-    folder = tmp_path_factory.mktemp("probed")
-    library = folder / f"probed{ENDING}"
+    library = folder / f"{name}{ENDING}"
     headers = Path(fmpy.__file__).parent / "c-code"
     compiler = [
         sys.executable,
@@ -42,22 +39,39 @@ def fmu(tmp_path_factory: pytest.TempPathFactory) -> Path:
         "-Wall",
         "-fno-sanitize=all",
     ]
-    made = subprocess.run(
-        [*compiler, f"-I{headers}", SOURCES / "probed.c", "-o", library, "-lm"], capture_output=True, text=True
-    )
+    command = [*compiler, f"-I{headers}", SOURCES / f"{name}.c", "-o", library, "-lm"]
+    made = subprocess.run(command, capture_output=True, text=True)
     assert made.returncode == 0, made.stderr
-    path = folder / "probed.fmu"
+    path = folder / f"{name}.fmu"
     with zipfile.ZipFile(path, "w") as archive:
-        archive.write(SOURCES / "modelDescription.xml", "modelDescription.xml")
-        archive.write(library, f"binaries/{PLATFORM}/{library.name}")
+        archive.write(SOURCES / description, "modelDescription.xml")
+        archive.write(library, f"binaries/{platform}/{library.name}")
         archive.writestr("resources/readme.txt", "nothing\n")
     return path
 
 
+@pytest.fixture(scope="session")
+def fmus(tmp_path_factory: pytest.TempPathFactory) -> dict[int, Path]:
+    """The FMU of FMI 2.0 and that of FMI 3.0."""
+    from fmpy import platform, platform_tuple
+
+    folder = tmp_path_factory.mktemp("probed")
+    return {
+        2: compiled(folder, "probed", "modelDescription.xml", platform),
+        3: compiled(folder, "probed3", "probed3.xml", platform_tuple),
+    }
+
+
+@pytest.fixture(scope="session")
+def fmu(fmus: dict[int, Path]) -> Path:
+    return fmus[2]
+
+
 @pytest.mark.parametrize("interface", ["cs", "me"])
-def test_nothing_is_found_in_a_correct_fmu(fmu, interface, monkeypatch):
+@pytest.mark.parametrize("version", [2, 3])
+def test_nothing_is_found_in_a_correct_fmu(fmus, version, interface, monkeypatch):
     monkeypatch.delenv("PROBE_FAULT", raising=False)
-    report = probe.probe(fmu, calls=6000, interface=interface)
+    report = probe.probe(fmus[version], calls=6000, interface=interface)
     assert [finding.text for finding in report.findings] == []
     assert all("not made" not in outcome.said for outcome in report.outcomes)
     assert report.calls > 6000
@@ -111,6 +125,28 @@ def test_a_planted_fault_is_found(fmu, fault, interface, check, severity, key, m
         assert finding.key in {one.key for one in again}
         if check != "leaks":  # of which only the latest calls are kept
             assert names(calls)[: len(finding.calls)] == names(finding.calls)
+
+
+#: The same for FMI 3.0, where the probe goes another way.
+PLANTED_IN_3 = [
+    ("free", "cs", "forbidden", "crash", "FreeFMUState: NULL pointer"),
+    ("step", "cs", "forbidden", "wrong", "DoStep: step of zero"),
+    ("guid", "cs", "forbidden", "questionable", "Instantiate: wrong token"),
+    ("order", "me", "forbidden", "wrong", "SetTime in event: out of order"),
+    ("refuse", "cs", "legal", "wrong", "GetFloat64 in step: legal call refused"),
+    ("state", "me", "restore", "wrong", "after Terminate: state not restored"),
+    ("serialized", "me", "deserialize", "wrong", "another process: state not restored"),
+    ("derivative", "me", "derivatives", "wrong", "d y / d u: derivative"),
+    ("adjoint", "me", "derivatives", "wrong", "d der(x) / d x: adjoint derivative"),
+    ("leak", "me", "leaks", "wrong", "lives: leak"),
+    ("start", "me", "starts", "wrong", "k: another start"),
+    ("stop", "cs", "stop", "wrong", "DoStep: past the stop time"),
+]
+
+
+@pytest.mark.parametrize(("fault", "interface", "check", "severity", "key"), PLANTED_IN_3)
+def test_a_planted_fault_is_found_in_fmi_3(fmus, fault, interface, check, severity, key, monkeypatch):
+    test_a_planted_fault_is_found(fmus[3], fault, interface, check, severity, key, monkeypatch)
 
 
 def test_the_same_seed_makes_the_same_calls(fmu, monkeypatch):
