@@ -164,7 +164,9 @@ def show(argument: Any) -> str:
     if isinstance(argument, bytes):
         return repr(argument)[1:] if len(argument) < 80 else f"{argument[:20]!r}... ({len(argument)} bytes)"
     if isinstance(argument, ctypes.Array):
-        values = [repr(v)[1:] if isinstance(v, bytes) else str(v) for v in argument[:6]] if len(argument) < 1000 else []
+        if len(argument) > 100 or issubclass(argument._type_, (ctypes.c_char, ctypes.c_ubyte)):
+            return f"[{len(argument)} values]"
+        values = [repr(v)[1:] if isinstance(v, bytes) else str(v) for v in argument[:6]]
         return f"[{', '.join(values)}{', ...' if len(argument) > len(values) else ''}]"
     if isinstance(argument, ctypes.Structure):
         return f"&{type(argument).__name__}"

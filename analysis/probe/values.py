@@ -80,7 +80,7 @@ def _difference(run: Run, unknown: Variable, known: Variable, step: float, decla
         sides.append(run.get([unknown])[0])
     _put(run, known, here)
     difference = (sides[0] - sides[1]) / (2 * step)
-    rounding = 1e-15 * abs(unknown.nominal) / step
+    rounding = 1e-14 * max(*map(abs, sides), abs(unknown.nominal)) / step
     error = max(0.0, abs(difference - declared) - rounding)
     return (error if math.isfinite(difference) else math.inf), difference
 

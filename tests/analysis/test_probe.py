@@ -6,6 +6,7 @@ import json
 import subprocess
 import sys
 import zipfile
+from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
@@ -147,6 +148,23 @@ PLANTED_IN_3 = [
 @pytest.mark.parametrize(("fault", "interface", "check", "severity", "key"), PLANTED_IN_3)
 def test_a_planted_fault_is_found_in_fmi_3(fmus, fault, interface, check, severity, key, monkeypatch):
     test_a_planted_fault_is_found(fmus[3], fault, interface, check, severity, key, monkeypatch)
+
+
+@pytest.mark.slow
+def test_an_fmu_of_others_is_probed(tmp_path):
+    """The example that PythonFMU comes with: it runs, and its wrapper crashes in folders that it does not expect."""
+    from pythonfmu.builder import FmuBuilder
+
+    slave = Path(find_spec("pythonfmu").origin).parent / "tests" / "slaves" / "pythonslave.py"
+    made = FmuBuilder.build_FMU(slave, dest=tmp_path)
+    report = probe.probe(made, checks=["repeat", "split", "places", "legal"], calls=2000)
+    crashed = {finding.about for finding in report.of(probe.CRASH)}
+    assert {"'Müller'", "'(a)'", "'100%'", "file:/path"} <= crashed
+    assert "'with space'" not in crashed
+    assert not [finding for finding in report.findings if "/repeat/" in finding.replay]
+    assert [outcome.said[:30] for outcome in report.outcomes if outcome.check == "split"] == [
+        "largest relative difference 2."
+    ]
 
 
 def test_the_same_seed_makes_the_same_calls(fmu, monkeypatch):
