@@ -162,9 +162,9 @@ def test_an_fmu_of_others_is_probed(tmp_path):
     assert {"'Müller'", "'(a)'", "'100%'", "file:/path"} <= crashed
     assert "'with space'" not in crashed
     assert not [finding for finding in report.findings if "/repeat/" in finding.replay]
-    assert [outcome.said[:30] for outcome in report.outcomes if outcome.check == "split"] == [
-        "largest relative difference 2."
-    ]
+    assert "largest relative difference" in next(
+        outcome.said for outcome in report.outcomes if outcome.check == "split"
+    )
 
 
 def test_the_same_seed_makes_the_same_calls(fmu, monkeypatch):
