@@ -55,10 +55,9 @@ void FMI(FreeInstance)(void *component)
 
 FMI(Status) FMI(SetDebugLogging)(void *component, FMI(Boolean) logging, size_t count, const FMI(String) categories[])
 {
-    (void)count, (void)categories; /* all of them */
     ALLOW(ANY_STATE)
-    c->logging = logging;
-    return FMI(OK);
+    NEED(count == 0 || categories)
+    RETURN(instance_log(c, __func__, logging, count, categories));
 }
 
 FMI(Status) FMI(ExitInitializationMode)(void *component)
@@ -151,16 +150,15 @@ FMI(Status) FMI(SetContinuousStates)(void *component, const double x[], size_t c
     RETURN(instance_set_states(c, __func__, x, count));
 }
 
-#define GET_STATES(name, what)                                                     \
+#define GET_STATES(name, what, phases)                                             \
     FMI(Status) FMI(name)(void *component, double values[], size_t count)          \
     {                                                                              \
-        ALLOW_IN(MODEL_EXCHANGE, WITH_STATES)                                      \
+        ALLOW_IN(MODEL_EXCHANGE, phases)                                           \
         NEED(values)                                                               \
         RETURN(instance_get_states(c, __func__, what, values, count));             \
     }
 
-GET_STATES(GetContinuousStates, VALUES)
-GET_STATES(GetNominalsOfContinuousStates, NOMINALS)
-GET_STATES(GetEventIndicators, INDICATORS)
+GET_STATES(GetContinuousStates, VALUES, WITH_STATES)
+GET_STATES(GetEventIndicators, INDICATORS, WITH_STATES)
 
 #endif

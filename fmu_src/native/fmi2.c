@@ -7,6 +7,8 @@
 
 #include "face.h"
 
+#include <string.h>
+
 typedef fmi2ValueReference Reference;
 
 static void log_message(const Instance *c, Status status, const char *category, const char *message)
@@ -25,11 +27,10 @@ fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String guid, f
 {
     (void)resources; /* nothing is read: any folder will do */
     (void)visible;
-    if (type != fmi2ModelExchange && type != fmi2CoSimulation)
+    if (!functions || (type != fmi2ModelExchange && type != fmi2CoSimulation))
         return NULL;
     return instance_new(name, guid, type == fmi2CoSimulation ? CO_SIMULATION : MODEL_EXCHANGE, logging,
-                        functions ? functions->componentEnvironment : NULL, log_message,
-                        functions ? (void (*)(void))functions->logger : NULL);
+                        functions->componentEnvironment, log_message, (void (*)(void))functions->logger);
 }
 
 /* Life */
@@ -77,11 +78,23 @@ fmi2Status fmi2GetString(fmi2Component component, const Reference references[], 
     EACH(instance_get_text(c, __func__, references[i], &values[i]))
 }
 
+/* Continuous states may be set by themselves, too. */
+static Status set_real(Instance *c, const char *function, Reference reference, double value)
+{
+    int state = c->s.phase == CONTINUOUS ? instance_state(reference) : -1;
+    if (state < 0)
+        return instance_set(c, function, reference, REAL, value);
+    double x[STATES];
+    memcpy(x, c->s.plant.x, sizeof x);
+    x[state] = value;
+    return instance_set_states(c, function, x, STATES);
+}
+
 fmi2Status fmi2SetReal(fmi2Component component, const Reference references[], size_t count, const fmi2Real values[])
 {
     ALLOW(SETTABLE | CONTINUOUS)
     NEED(ARRAYS)
-    EACH(instance_set(c, __func__, references[i], REAL, values[i]))
+    EACH(set_real(c, __func__, references[i], values[i]))
 }
 
 fmi2Status fmi2SetInteger(fmi2Component component, const Reference references[], size_t count, const fmi2Integer values[])
@@ -145,14 +158,15 @@ fmi2Status fmi2SetTime(fmi2Component component, fmi2Real time)
     RETURN(instance_set_time(c, __func__, time));
 }
 
-GET_STATES(GetDerivatives, DERIVATIVES)
+GET_STATES(GetDerivatives, DERIVATIVES, WITH_STATES)
+GET_STATES(GetNominalsOfContinuousStates, NOMINALS, INSTANTIATED | WITH_STATES)
 
 /* Co-simulation */
 
 fmi2Status fmi2SetRealInputDerivatives(fmi2Component component, const Reference references[], size_t count,
                                        const fmi2Integer orders[], const fmi2Real values[])
 {
-    ALLOW_IN(CO_SIMULATION, INITIALIZATION | STEP)
+    ALLOW_IN(CO_SIMULATION, INSTANTIATED | INITIALIZATION | STEP)
     NEED(ARRAYS && (count == 0 || orders))
     EACH(instance_set_slope(c, __func__, references[i], orders[i], values[i]))
 }

@@ -76,7 +76,7 @@ fmi3Status fmi3EnterInitializationMode(fmi3Instance component, fmi3Boolean toler
     fmi3Status fmi3Get##type(fmi3Instance component, const Reference references[], size_t count,                    \
                              fmi3##type values[], size_t value_count)                                               \
     {                                                                                                               \
-        ALLOW(SETTLED)                                                                                              \
+        ALLOW(ANY_STATE)                                                                                            \
         NEED(ARRAYS)                                                                                                \
         COUNTS(value_count, count)                                                                                  \
         EACH(call)                                                                                                  \
@@ -202,7 +202,8 @@ fmi3Status fmi3SetTime(fmi3Instance component, fmi3Float64 time)
     RETURN(instance_set_time(c, __func__, time));
 }
 
-GET_STATES(GetContinuousStateDerivatives, DERIVATIVES)
+GET_STATES(GetContinuousStateDerivatives, DERIVATIVES, WITH_STATES)
+GET_STATES(GetNominalsOfContinuousStates, NOMINALS, WITH_STATES)
 
 #define GET_NUMBER(name, number)                                          \
     fmi3Status fmi3Get##name(fmi3Instance component, size_t *count)       \

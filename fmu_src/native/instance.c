@@ -1,5 +1,6 @@
 #include "instance.h"
 
+#include <float.h>
 #include <math.h>
 #include <stdarg.h>
 #include <stdint.h>
@@ -22,7 +23,7 @@ Instance *instance_new(const char *name, const char *token, Interface interface,
     if (!c) /* no memory */
         return NULL; /* no memory */
     c->interface = interface;
-    c->logging = logging;
+    c->logging = logging ? ALL_CATEGORIES : 0;
     c->environment = environment;
     c->log = log;
     c->logger = logger;
@@ -85,15 +86,32 @@ bool instance_allows(Instance *c, const char *function, int phases)
     return false;
 }
 
+static const char *const categories[] = {"", "Warning", "Discard", "Error", "Fatal"};
+
+Status instance_log(Instance *c, const char *function, bool on, size_t count, const char *const names[])
+{
+    int wanted = count == 0 ? ALL_CATEGORIES : 0;
+    for (size_t i = 0; i < count; i++) {
+        int n = 1;
+        while (n <= FATAL && !(names[i] && strcmp(names[i], categories[n]) == 0))
+            n++;
+        if (n > FATAL)
+            return instance_say(c, ERROR, "%s: there is no category %s", function, names[i] ? names[i] : "without a name");
+        wanted |= 1 << n;
+    }
+    c->logging = on ? c->logging | wanted : c->logging & ~wanted;
+    return OK;
+}
+
 Status instance_say(const Instance *c, Status status, const char *format, ...)
 {
-    static const char *const categories[] = {"", "Warning", "Discard", "Error"};
     char sentence[2 * SENTENCE];
     va_list arguments;
     va_start(arguments, format);
     vsnprintf(sentence, sizeof sentence, format, arguments);
     va_end(arguments);
-    if (c->logging || status == ERROR) /* an error is worth a sentence whether or not debugging was asked for */
+    /* an error is worth a sentence whether or not debugging was asked for */
+    if (c->logging >> status & 1 || status == ERROR)
         c->log(c, status, categories[status], sentence);
     return status;
 }
@@ -122,6 +140,7 @@ Status instance_setup(Instance *c, bool tolerance_given, double tolerance, doubl
     if (tolerance_given && !(isfinite(tolerance) && tolerance > 0.0))
         return instance_say(c, ERROR, "the tolerance is %s: it must be greater than zero", digits(number, tolerance));
     c->s.plant.start_time = start;
+    c->s.plant.stop_time = stop_given ? stop : INFINITY;
     c->s.plant.time = start;
     c->s.plant.master_tolerance = tolerance_given ? tolerance : 0.0;
     c->s.plant.begun = 0.0;
@@ -323,7 +342,12 @@ bool instance_counts(Instance *c, const char *function, size_t count, size_t rig
 Status instance_step(Instance *c, double time, double step, const Watch *watch)
 {
     char sentence[SENTENCE];
+    Digits end, stop;
     Reason ended;
+    /* beyond what rounding in the master's sum of steps can make */
+    if (time + step > c->s.plant.stop_time + 1e-6 * step + 1e-12 * fabs(time))
+        return instance_say(c, ERROR, "a step to t = %s s: the stop time is %s s", digits(end, time + step),
+                            digits(stop, c->s.plant.stop_time));
     Reason reason = plant_step(&c->s.plant, time, step, watch, c->early_return, &ended, sentence);
     c->stopped = reason == GOOD && ended != GOOD;
     if (reason == GOOD) {
@@ -364,8 +388,9 @@ void instance_new_discrete_states(Instance *c, bool *terminate, bool *values_cha
 Status instance_set_time(Instance *c, const char *function, double time)
 {
     Digits number;
-    if (!isfinite(time))
-        return instance_say(c, ERROR, "%s: the time is %s s: it must be a finite number", function, digits(number, time));
+    if (!(c->s.plant.start_time <= time && time <= fmin(c->s.plant.stop_time, DBL_MAX)))
+        return instance_say(c, ERROR, "%s: the time is %s s: it must be between start and stop time", function,
+                            digits(number, time));
     c->s.plant.time = time;
     c->stale = true;
     return OK;
@@ -414,7 +439,7 @@ Status instance_get_states(Instance *c, const char *function, What what, double 
 
 /* Derivatives */
 
-static int state_number(unsigned reference)
+int instance_state(unsigned reference)
 {
     for (int i = 0; i < STATES; i++)
         if (state_at[i] == (int)reference)
@@ -428,7 +453,7 @@ static bool known(Instance *c, const char *function, unsigned reference, bool st
     const Variable *v = variable(c, function, reference, REAL);
     if (!v)
         return false;
-    bool state = v->causality == COMPUTED && !start && c->interface == MODEL_EXCHANGE && state_number(reference) >= 0;
+    bool state = v->causality == COMPUTED && !start && c->interface == MODEL_EXCHANGE && instance_state(reference) >= 0;
     if (state || v->causality == INPUT || (v->causality == PARAMETER && start))
         return true;
     instance_say(c, ERROR, "%s: %s is no known of a derivative %s", function, v->name, phase_name((int)c->s.phase));
@@ -467,7 +492,7 @@ Status instance_directional(
         plant_reverse(a, start, rows, commanded, given, x);
     } else {
         for (size_t i = 0; i < known_count; i++) {
-            int state = start ? -1 : state_number(knowns[i]);
+            int state = start ? -1 : instance_state(knowns[i]);
             if (state >= 0)
                 x[state] += seed[i];
             else
@@ -476,7 +501,7 @@ Status instance_directional(
         plant_forward(a, start, c->interface == CO_SIMULATION, given, x, rows);
     }
     for (size_t i = 0; i < (adjoint ? known_count : unknown_count); i++) {
-        int state = adjoint && !start ? state_number(knowns[i]) : -1;
+        int state = adjoint && !start ? instance_state(knowns[i]) : -1;
         result[i] = !adjoint ? rows[variables[unknowns[i]].row] : state >= 0 ? x[state] : given[knowns[i]];
         if (!isfinite(result[i]))
             return instance_say(c, DISCARD, "%s: a derivative is not finite", function);

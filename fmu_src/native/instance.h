@@ -7,7 +7,10 @@
 #include "plant.h"
 
 /* As in both standards. */
-typedef enum { OK, WARNING, DISCARD, ERROR } Status;
+typedef enum { OK, WARNING, DISCARD, ERROR, FATAL } Status;
+
+/* Those of the log, as the bits of their statuses. */
+enum { ALL_CATEGORIES = 1 << WARNING | 1 << DISCARD | 1 << ERROR | 1 << FATAL };
 
 typedef enum { MODEL_EXCHANGE, CO_SIMULATION } Interface;
 
@@ -42,7 +45,7 @@ typedef struct {
 struct Instance {
     Saved s;
     Interface interface;
-    bool logging;
+    int logging;           /* categories that are logged */
     bool stale;            /* the outputs are older than state and inputs */
     bool stopped;          /* an early return at the limit of assembly */
     char *name;
@@ -65,6 +68,9 @@ bool instance_allows(Instance *c, const char *function, int phases);
 /* Whether a count is right: if not, that is said in the log. */
 bool instance_counts(Instance *c, const char *function, size_t count, size_t right);
 
+/* Log some categories, or all of them, or no longer. */
+Status instance_log(Instance *c, const char *function, bool on, size_t count, const char *const names[]);
+
 /* Say a sentence, and return the status. */
 Status instance_say(const Instance *c, Status status, const char *format, ...);
 
@@ -84,6 +90,9 @@ Status instance_output_slopes(
 Status instance_none(Instance *c, const char *function, size_t count);
 
 Status instance_step(Instance *c, double time, double step, const Watch *watch);
+
+/* Number of the state that a value reference is of; -1 where it is none. */
+int instance_state(unsigned reference);
 
 /* Model exchange */
 void instance_new_discrete_states(Instance *c, bool *terminate, bool *values_changed);

@@ -125,7 +125,7 @@ bool plant_jump(Plant *a)
 
 void plant_reset(Plant *a)
 {
-    *a = (Plant){0};
+    *a = (Plant){.stop_time = INFINITY};
     for (int v = 0; v < VARIABLES; v++)
         a->given[v] = variables[v].start;
 }
@@ -259,8 +259,6 @@ Reason plant_begin(Plant *a, char sentence[SENTENCE])
         a->fresh[c] = 0.0;
         a->applied[c] = u[commands[c].input];
     }
-    memset(a->slopes, 0, sizeof a->slopes);
-    memset(a->last_slopes, 0, sizeof a->last_slopes);
     a->begun = 1.0;
     return GOOD;
 }

@@ -27,7 +27,7 @@ typedef struct {
     double scale[STATES];           /* magnitudes below which the error of a component is absolute */
     double outputs[OUTPUTS];        /* the last that could be computed */
     double begun;                   /* 1 where state and constants follow from what is given */
-    double time, start_time;
+    double time, start_time, stop_time; /* infinite: none */
     double master_tolerance;        /* 0: none */
     double tolerance, step_size;
 } Plant;

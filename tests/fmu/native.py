@@ -93,8 +93,8 @@ class Instance:
         key = (library.token if token is None else token).encode() if token != "" else None
         if library.fmi == 2:
             self._logger: Any = LOG_2(lambda _, name, status, category, form, text: self._say(status, text, form))
-            self._callbacks = Callbacks(logger=self._logger)
-            given = byref(self._callbacks) if callbacks else None
+            self._callbacks = Callbacks(logger=self._logger) if callbacks else Callbacks()
+            given = byref(self._callbacks)
             self.handle = dll.fmi2Instantiate(
                 name, int(interface == "cs"), key, b"file:/nowhere", given, 0, int(logging)
             )

@@ -14,7 +14,7 @@ from typing import Any
 
 import pytest
 
-from .native import DISCARD, ERROR, OK, Instance, Library, phases
+from .native import DISCARD, ERROR, LOG_3, OK, Callbacks, Instance, Library, phases
 
 INITIAL, RUN = {"instantiated"}, {"step", "event", "continuous"}
 READ = {"initialization", "terminated"} | RUN
@@ -52,8 +52,8 @@ ALLOWED: dict[int, dict[str, tuple[set[str], set[str]]]] = {
         "GetDerivatives": ({"me"}, WITH_STATES),
         "GetEventIndicators": ({"me"}, WITH_STATES),
         "GetContinuousStates": ({"me"}, WITH_STATES),
-        "GetNominalsOfContinuousStates": ({"me"}, WITH_STATES),
-        "SetRealInputDerivatives": ({"cs"}, {"initialization", "step"}),
+        "GetNominalsOfContinuousStates": ({"me"}, INITIAL | WITH_STATES),
+        "SetRealInputDerivatives": ({"cs"}, {"instantiated", "initialization", "step"}),
         "GetRealOutputDerivatives": ({"cs"}, {"step", "terminated"}),
         "DoStep": ({"cs"}, {"step"}),
         "CancelStep": (set(), set()),
@@ -69,10 +69,10 @@ ALLOWED: dict[int, dict[str, tuple[set[str], set[str]]]] = {
         "ExitInitializationMode": ({"cs", "me"}, {"initialization"}),
         "Terminate": ({"cs", "me"}, RUN),
         "Reset": ({"cs", "me"}, ANY),
-        "GetFloat64": ({"cs", "me"}, READ),
-        "GetInt32": ({"cs", "me"}, READ),
-        "GetInt64": ({"cs", "me"}, READ),
-        "GetString": ({"cs", "me"}, READ),
+        "GetFloat64": ({"cs", "me"}, ANY),
+        "GetInt32": ({"cs", "me"}, ANY),
+        "GetInt64": ({"cs", "me"}, ANY),
+        "GetString": ({"cs", "me"}, ANY),
         "SetFloat64": ({"cs", "me"}, SET | {"continuous"}),
         "SetInt32": ({"cs", "me"}, {"instantiated", "initialization"}),
         "SetInt64": ({"cs", "me"}, {"instantiated", "initialization"}),
@@ -383,7 +383,8 @@ def test_interfaces_that_there_are_not(library: Library) -> None:
     dll = library.dll
     token = library.token.encode()
     if library.fmi == 2:
-        assert dll.fmi2Instantiate(b"x", 7, token, None, None, 0, 0) is None
+        assert dll.fmi2Instantiate(b"x", 7, token, None, byref(Callbacks()), 0, 0) is None
+        assert dll.fmi2Instantiate(b"x", 1, token, None, None, 0, 0) is None  # no callbacks
         return
     for refused, sentence in (
         (library.instance(event_mode=True), "no event mode"),
@@ -393,8 +394,6 @@ def test_interfaces_that_there_are_not(library: Library) -> None:
             assert refused.handle is None
             assert sentence in refused.log[0][1]
     said: list[bytes] = []
-    from .native import LOG_3
-
     log = LOG_3(lambda _, status, category, text: said.append(text))
     for logger in (log, None):
         head = (b"x", token, None, c_bool(False), c_bool(False), None, logger, None, None, None)
@@ -450,6 +449,54 @@ def test_messages_have_a_decimal_point_in_every_locale(library: Library) -> None
         c.free()
     finally:
         libc.setlocale(numeric, before)
+
+
+def test_categories_of_the_log(library: Library) -> None:
+    c = library.instance().start()
+
+    def ask(on: bool, *names: bytes | None) -> int:
+        flag: Any = c_bool(on) if library.fmi == 3 else int(on)
+        return c("SetDebugLogging", flag, c_size_t(len(names)), (c_char_p * max(len(names), 1))(*names))
+
+    assert c("SetDebugLogging", c_bool(True) if library.fmi == 3 else 1, c_size_t(1), None) == ERROR
+    c.log.clear()
+    assert ask(True, b"Warning", b"Error") == OK
+    assert c.step(5.0, 1e-3) == DISCARD
+    assert c.log == []
+    assert ask(True, b"Discard") == OK
+    assert c.step(5.0, 1e-3) == DISCARD
+    assert len(c.log) == 1
+    assert ask(False, b"Discard") == OK
+    assert c.step(5.0, 1e-3) == DISCARD
+    assert len(c.log) == 1
+    for name, word in ((b"Dscard", "Dscard"), (None, "without a name")):
+        assert ask(True, b"Fatal", name) == ERROR
+        assert f"there is no category {word}" in c.log[-1][1]
+    c.free()
+
+
+def test_no_step_past_the_stop_time(library: Library) -> None:
+    for interface in ("cs", "me"):
+        c = library.instance(interface)
+        numbers = (c_double(0.0), c_double(1.0), c_double(2.0))
+        if library.fmi == 2:
+            assert c("SetupExperiment", 0, *numbers[:2], 1, numbers[2]) == OK
+            assert c("EnterInitializationMode") == OK
+        else:
+            assert c("EnterInitializationMode", c_bool(False), *numbers[:2], c_bool(True), numbers[2]) == OK
+        assert c("ExitInitializationMode") == OK
+        if interface == "cs":
+            assert c.step(1.0, 1.1) == ERROR
+            assert c.log[-1][1] == "a step to t = 2.1 s: the stop time is 2 s"
+            assert c.step(1.0, 0.1) == OK
+            assert c.step(1.1, 0.9 + 1e-9) == OK
+        else:
+            assert c("EnterContinuousTimeMode") == OK
+            for time in (0.9, 2.1, math.nan, math.inf):
+                assert c("SetTime", time) == ERROR
+                assert "it must be between start and stop time" in c.log[-1][1]
+            assert c("SetTime", 2.0) == OK
+        c.free()
 
 
 def test_debug_logging_says_what_is_refused(library: Library) -> None:

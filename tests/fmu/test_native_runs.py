@@ -711,9 +711,15 @@ def test_model_exchange_by_hand(library: Library) -> None:
     assert c("SetContinuousStates", (c_double * 5)(), c_size_t(5)) == ERROR
     assert c("SetContinuousStates", (c_double * 6)(math.nan), c_size_t(6)) == DISCARD
     assert c("SetTime", math.nan) == ERROR
-    assert "the time is nan s" in c.log[-1][1]
+    assert "the time is nan s: it must be between start and stop time" in c.log[-1][1]
     assert c("SetTime", 0.25) == OK
     assert c.get("time") == [0.25]
+    if library.fmi == 2:  # states by themselves
+        assert c.set(crank__angle=0.5) == OK
+        assert c.states() == [0.5, *x[1:]]
+        assert c.set(crank__angle=math.nan) == ERROR
+        assert c.set(crank__angle=x[0]) == OK
+    assert c.set(crank__acceleration=1.0) == ERROR
     assert c("CompletedIntegratorStep", c_bool(True) if library.fmi == 3 else 1, byref(c_int(1)), byref(c_int(1))) == OK
     # a command that changes is applied at the event, once
     c.set(drive__speed=50.0)
