@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from functools import lru_cache
 from math import inf, isfinite, pi
@@ -79,20 +80,33 @@ def quantity(value: Any, unit: str, name: str, *, bare: str | None = None) -> fl
     return number
 
 
+#: A quantity in text: a number with a decimal point, then a product of units, each with one small exponent at most. Nothing
+#: else reaches pint, which would take "1,5 mm" for 15 mm, "1 500 mm" for 500 mm, and compute 9**9**9.
+_NUMBER = r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]{1,4})?"
+_FACTOR = r"(?:[^\W\d_]+|[°%])(?:\s*(?:\*\*|\^)\s*-?[0-9]|[²³]|-?[0-9])?"
+_PRODUCT = rf"{_FACTOR}(?:(?:\s*[*/·.]\s*|\s+){_FACTOR})*"
+_GRAMMAR = re.compile(rf"\s*({_NUMBER})\s*({_PRODUCT}(?:\s*/\s*\({_PRODUCT}\))?)?\s*")
+#: Longest text that is looked at.
+_LONGEST = 100
+_PLAIN = "it is read as a number with a decimal point, without spaces or separators in it, and a unit"
+
+
 def _converted(text: str, unit: str, si: str, name: str, wanted: str) -> float:
     """A text with a unit in SI, by pint."""
-    try:
-        number = float(text)
-    except ValueError:
-        pass
-    else:
+    match = _GRAMMAR.fullmatch(text) if len(text) <= _LONGEST else None
+    if match is None:
+        shown = text if len(text) <= _LONGEST else f"{text[:_LONGEST]}..."
+        raise ParameterError(name, shown, f"{wanted}: {_PLAIN}")
+    number, of = float(match[1]), match[2]
+    if of is None:
         if unit == "1":
             return number
         raise ParameterError(name, text, f"come with its unit, such as '{text} {si}', or be a number, which is in SI")
     import pint
 
     try:
-        return float(_registry().Quantity(text).to(si).magnitude)
+        of = re.sub(r"(?<=[^\W\d_])(-?[0-9])", r"**\1", of.replace("·", "*"))  # m2 for m**2, as FMI has it
+        return float(_registry().Quantity(number, of).to(si).magnitude)
     except (pint.PintError, ValueError, TypeError, AttributeError, ArithmeticError, SyntaxError) as error:
         reason = (str(error) or type(error).__name__).splitlines()[0]
         raise ParameterError(name, text, f"{wanted} ({reason})") from error

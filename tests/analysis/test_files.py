@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import doctest
+import re
 from dataclasses import dataclass
 from math import pi
 from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from analysis.files import (
     Choice,
@@ -48,6 +51,13 @@ from linkwork.errors import InputError, MissingParameterError, ParameterError, U
         ("981 cm/s^2", "m/s2", 9.81),
         ("1e8 dyn*cm", "N.m", 10.0),
         ("0.01", "1", 0.01),
+        ("3 kg.m2", "kg.m2", 3.0),
+        ("9.81 m/s2", "m/s2", 9.81),
+        ("5mm", "m", 5e-3),
+        (".5 m s-1", "m/s", 0.5),
+        ("2 N / (m)", "N/m", 2.0),
+        ("30°", "rad", pi / 6),
+        ("1 µm", "m", 1e-6),
         (0.25, "m", 0.25),
         (3, "1", 3.0),
     ],
@@ -72,6 +82,34 @@ def test_quantities_in_their_units(text, unit, value):
 def test_a_quantity_of_another_kind_is_refused_by_name(text, unit):
     with pytest.raises(ParameterError, match=r"crank\.length"):
         quantity(text, unit, "crank.length")
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "1,5 mm", "1 000 mm", "1'000 mm", "1 500 mm", "1.5.2 mm", "1 m; 2", "1 m 2", "9**9**9 m", "10**100000000 m",
+        "1 m**9**9**9", "1 m**99", "7" * 5000, "7" * 5000 + " m", "(" * 5000, "-" * 50_000 + "1 m", "1_0 m", "nan m",
+        "inf m", "0x10 m", "1e99999 m", "1 (m)", "2*3 m", "m", "", "1 + 1 m", "1 m" + "*m" * 200, "1 m.",
+        "\ufeff1 m", "1 m\n2", "\u0661 m",
+    ],
+)  # fmt: skip
+def test_what_is_no_number_and_unit_is_refused(text):
+    with pytest.raises(ParameterError, match="parameter x is") as caught:
+        quantity(text, "m", "x")
+    assert len(str(caught.value)) < 500
+
+
+@given(st.text(alphabet="0123456789.,'eE+-*/^() \tmsNradgk%°_;", max_size=24))
+def test_no_rubbish_is_read_as_a_quantity(text):
+    """What is read starts with a number as Python reads it, and what follows has no number but exponents of one digit."""
+    try:
+        value = quantity(text, "m", "x")
+    except ParameterError:
+        return
+    number = re.match(r"\s*[+-]?[\d.]+(?:[eE][+-]?\d+)?", text)
+    rest = text[number.end() :]
+    assert re.fullmatch(r"[^\d]*(?:[^\W\d_°]\s*(?:\*\*|\^)?\s*-?\d[^\d]*)*", rest)
+    assert value == pytest.approx(float(number[0]) * quantity("1" + rest, "m", "x"), rel=1e-12)
 
 
 def test_hertz_is_refused_for_a_speed_because_it_is_ambiguous():
