@@ -21,7 +21,7 @@ from linkwork.errors import InputError
 from linkwork.mechanism import Mechanism
 
 from ..mechanisms import check
-from ..numerics.codegen import cache_root
+from ..numerics.codegen import code_folder
 from .archive import SOURCES, BuildError, documentation, write
 from .description import Kind, build_description, description, terminals
 from .equations_c import generated
@@ -164,8 +164,8 @@ def compile_library(
     """
     if importlib.util.find_spec("ziglang") is None:
         raise BuildError("native FMUs are compiled by Zig, which is not installed: pip install 'linkwork[native]'")
-    cache = cache_root() / "zig"
-    if not cache.is_dir():
+    cache = code_folder("zig")
+    if not any(cache.iterdir()):
         sys.stderr.write("linkwork: Zig compiles what it needs itself, once on this machine ...\n")
     environment = {"ZIG_GLOBAL_CACHE_DIR": str(cache), "ZIG_LOCAL_CACHE_DIR": str(cache)}
     done = subprocess.run(

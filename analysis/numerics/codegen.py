@@ -418,17 +418,33 @@ def cache_root() -> Path:
 
 
 def cache_folder(key: str) -> Path:
-    """Folder for what belongs to ``key``, a hash: below `cache_root`, else a temporary folder."""
-    name = f"numba-{key[:16]}"
+    """Folder for machine code that belongs to ``key``, a hash."""
+    return code_folder(f"numba-{key[:16]}")
+
+
+def code_folder(name: str) -> Path:
+    """Folder for what is loaded as code: below `cache_root` if nobody else can write there, else below a temporary one.
+
+    What others can write to could make us run their code: that is said once on standard error, and not used.
+    """
     user = os.getuid() if hasattr(os, "getuid") else 0
     folder = cache_root() / name
     if _usable(folder):
-        return folder
+        if _ours(folder, user):
+            return folder
+        _say_shared(folder.parent)
     folder = Path(tempfile.gettempdir()) / f"linkwork-{user}" / name
-    # what others can write to could make us run their code
-    if _usable(folder) and (os.name == "nt" or all(_private(f, user) for f in (folder.parent, folder))):
+    if _usable(folder) and _ours(folder, user):
         return folder
     return Path(tempfile.mkdtemp(prefix="linkwork-"))
+
+
+@cache
+def _say_shared(folder: Path) -> None:
+    sys.stderr.write(
+        f"linkwork: others can write to {folder}, or to a folder above it: compiled code is kept elsewhere; "
+        "LINKWORK_CACHE_DIR can name a folder of yours alone\n"
+    )
 
 
 def _usable(folder: Path) -> bool:
@@ -441,6 +457,28 @@ def _usable(folder: Path) -> bool:
         return False
 
 
-def _private(folder: Path, user: int) -> bool:
-    status = folder.lstat()
-    return status.st_uid == user and not status.st_mode & 0o022
+def _ours(folder: Path, user: int) -> bool:
+    """Whether only ``user`` and root can change what is in a folder, or put another in its place."""
+    if os.name == "nt":
+        return True  # user_cache_dir is below the user's profile, which others cannot write to
+    folder = folder.resolve()
+    for path in (folder, *folder.parents):
+        status = path.stat()
+        shared = status.st_mode & 0o002 or (status.st_mode & 0o020 and not _of_one(status.st_gid, user))
+        # in a folder with the sticky bit others can write, but not touch what is not theirs
+        if status.st_uid not in (user, 0) or (shared and (path == folder or not status.st_mode & 0o1000)):
+            return False
+    with os.scandir(folder) as entries:
+        return folder.stat().st_uid == user and all(e.stat(follow_symlinks=False).st_uid == user for e in entries)
+
+
+def _of_one(group: int, user: int) -> bool:
+    """Whether a group is that of a user alone, of the user's name, as many systems make them."""
+    import grp
+    import pwd
+
+    try:
+        name = pwd.getpwuid(user).pw_name
+        return grp.getgrgid(group).gr_name == name and not set(grp.getgrgid(group).gr_mem) - {name}
+    except KeyError:
+        return False

@@ -14,7 +14,17 @@ import pytest
 from numba import float64, int64
 
 from analysis.mechanisms import FIVE_BAR, MECHANISMS, SLIDER_CRANK
-from analysis.numerics.codegen import VECTOR, MachineCode, cache_folder, evaluate, fingerprint, inner, kernel
+from analysis.numerics.codegen import (
+    VECTOR,
+    MachineCode,
+    _say_shared,
+    cache_folder,
+    code_folder,
+    evaluate,
+    fingerprint,
+    inner,
+    kernel,
+)
 from analysis.numerics.symbolic import ELEMENTARY
 from analysis.run import compiled, machine
 from analysis.run.equations import CLEARANCE, DERIVATIVE, JUMP, OUTPUTS
@@ -225,6 +235,57 @@ def test_folder_that_cannot_be_written_to_falls_back_to_a_temporary_one(
     assert folder.is_relative_to(tmp_path / "temporary")
     # the same again for the next process
     assert cache_folder("a" * 64) == folder
+
+
+@pytest.mark.skipif(os.name == "nt", reason="permissions of POSIX")
+@pytest.mark.parametrize(
+    ("place", "mode", "trusted"),
+    [
+        ("above", 0o700, True),
+        ("above", 0o755, True),
+        ("above", 0o777, False),
+        ("above", 0o1777, True),  # as /tmp: what is in it belongs to who made it
+        ("root", 0o777, False),
+        ("root", 0o1777, True),
+        ("root", 0o773, False),
+        ("folder", 0o777, False),
+        ("folder", 0o1777, False),
+        ("folder", 0o702, False),
+    ],
+)
+def test_code_is_kept_only_where_nobody_else_can_write(
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    place: str,
+    mode: int,
+    trusted: bool,
+) -> None:
+    root = tmp_path / "above" / "root"
+    monkeypatch.setenv("LINKWORK_CACHE_DIR", str(root))
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "temporary"))
+    (tmp_path / "temporary").mkdir()
+    folder = code_folder("kept")
+    assert folder == root / "kept"
+    {"above": root.parent, "root": root, "folder": folder}[place].chmod(mode)
+    _say_shared.cache_clear()
+    again, more = code_folder("kept"), code_folder("kept")
+    assert (again == folder) == trusted
+    assert again == more
+    said = capsys.readouterr().err
+    assert said.count(f"linkwork: others can write to {root}") == (not trusted)
+
+
+@pytest.mark.skipif(not hasattr(os, "getuid") or os.getuid() != 0, reason="only root gives files away")
+@pytest.mark.parametrize("what", ["folder", "file", "above"])
+def test_code_of_another_user_is_not_loaded(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, what: str) -> None:
+    root = tmp_path / "above" / "root"
+    monkeypatch.setenv("LINKWORK_CACHE_DIR", str(root))
+    folder = code_folder("kept")
+    (folder / "planted.nbi").touch()
+    assert code_folder("kept") == folder
+    os.chown({"folder": folder, "file": folder / "planted.nbi", "above": root.parent}[what], 12345, 0)
+    assert code_folder("kept") != folder
 
 
 @pytest.mark.skipif(os.name == "nt", reason="permissions of POSIX")
