@@ -6,11 +6,11 @@ import ast
 import math
 import re
 from collections.abc import Callable, Mapping
-from math import isfinite, pi
+from math import pi
 from types import CodeType, FunctionType, SimpleNamespace
 from typing import Any
 
-from linkwork.errors import InputError, ParameterError
+from linkwork.errors import InputError, LinkworkError, ParameterError
 
 from ..files import unknown_name
 from ..units import quantity
@@ -23,6 +23,8 @@ _COMPARED: Mapping[type[ast.cmpop], tuple[int, bool]] = {
     ast.Gt: (-1, False),
     ast.Eq: (1, True),
 }
+#: Longest text that is read.
+_LONGEST = 1000
 _REQUIRED = ("sin", "cos", "tan", "asin", "acos", "atan", "atan2", "sqrt", "exp", "log", "hypot")
 _MEASURE = re.compile(
     r"(?<![\w.])(\d+\.?\d*(?:[eE][-+]?\d+)?|\.\d+(?:[eE][-+]?\d+)?)\s*(um|mm|cm|m|km|in|ft|deg|rad)\b"
@@ -43,6 +45,10 @@ def requirement(text: Any, name: str = "constraints.require") -> Require:
     """
     if not isinstance(text, str):
         raise ParameterError(name, text, "be a text such as 'crank_length <= 50 mm'")
+    if len(text) > _LONGEST:
+        raise InputError(
+            f"the requirement {text[:40]!r}... has {len(text)} characters: it must have {_LONGEST} at most"
+        )
     units = {"deg": "rad", "rad": "rad"}
 
     def in_si(found: re.Match[str]) -> str:
@@ -57,17 +63,22 @@ def requirement(text: Any, name: str = "constraints.require") -> Require:
     if not (isinstance(tree, ast.Compare) and len(tree.ops) == 1 and type(tree.ops[0]) in _COMPARED):
         raise InputError(f"the requirement {text!r} is no comparison: it must have two sides about <=, >= or ==")
     numbers: list[float] = []
-    for side in (tree.left, tree.comparators[0]):
-        _check_side(side, text, numbers)
     sign, equal = _COMPARED[type(tree.ops[0])]
-    difference = ast.BinOp(tree.left, ast.Sub(), tree.comparators[0])
-    if sign < 0:
-        difference = ast.BinOp(tree.comparators[0], ast.Sub(), tree.left)
-    function = _of_dimensions(difference)
+    sides = (tree.left, tree.comparators[0])
     try:
-        function(SimpleNamespace(**dict.fromkeys(UNKNOWNS, 0.1)))
+        for side in sides:
+            _check_side(side, text, numbers)
+        function = _of_dimensions(ast.BinOp(sides[sign < 0], ast.Sub(), sides[sign > 0]))
+        if math.isinf(function(SimpleNamespace(**dict.fromkeys(UNKNOWNS, 0.1)))):
+            raise OverflowError
+    except RecursionError:
+        raise InputError(f"the requirement {text!r} is nested too deeply") from None
     except TypeError as error:
         raise InputError(f"the requirement {text!r} cannot be evaluated: {error}") from None
+    except OverflowError:
+        raise InputError(f"the requirement {text!r} has a number that is too large") from None
+    except LinkworkError:
+        raise
     except (ValueError, ArithmeticError):
         pass  # of these dimensions only
     scale = max((abs(number) for number in numbers if number), default=1.0)
@@ -79,7 +90,7 @@ def _check_side(node: ast.AST, text: str, numbers: list[float]) -> None:
         return InputError(f"in the requirement {text!r}: {ast.unparse(node)!r} {reason}")
 
     match node:
-        case ast.Constant(value=int() | float() as number) if not isinstance(number, bool) and isfinite(number):
+        case ast.Constant(value=int() | float() as number) if not isinstance(number, bool) and abs(number) < 1e300:
             numbers.append(float(number))
         case ast.Name(id=name):
             if name not in (*UNKNOWNS, "pi"):
@@ -99,12 +110,15 @@ def _check_side(node: ast.AST, text: str, numbers: list[float]) -> None:
 
 
 class _Dimensions(ast.NodeTransformer):
-    """Names of dimensions become attributes of the argument."""
+    """Names of dimensions become attributes of the argument, numbers floats."""
 
     def visit_Name(self, node: ast.Name) -> ast.AST:
         if node.id not in UNKNOWNS:
             return node
         return ast.Attribute(value=ast.Name(id="p", ctx=ast.Load()), attr=node.id, ctx=ast.Load())
+
+    def visit_Constant(self, node: ast.Constant) -> ast.AST:
+        return ast.Constant(float(node.value))  # type: ignore[arg-type]  # 9**9**9 of integers would never end
 
 
 def _of_dimensions(tree: ast.expr) -> Callable[[Any], Any]:
