@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import csv
+import hashlib
+import io
+import warnings
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -65,16 +68,31 @@ def read_rows(path: str | Path) -> list[dict[str, str]]:
 
 def save_array(path: str | Path, values: ArrayLike) -> Path:
     """Write an array to a file that is there complete or not at all, for caches; see `load_array`."""
-    with whole(path := Path(path)) as part, part.open("wb") as file:
-        np.save(file, np.asarray(values, dtype=float))
+    content = io.BytesIO()
+    np.save(content, np.asarray(values, dtype=float))
+    with whole(path := Path(path)) as part:
+        part.write_bytes(content.getvalue() + hashlib.sha256(content.getvalue()).digest())
     return path
 
 
 def load_array(path: str | Path) -> NDArray[np.float64] | None:
-    """An array from a file of `save_array`; None if it is not there or damaged."""
+    """An array from a file of `save_array`; None if it is not there, or, with a warning, if it is damaged.
+
+    The hash at its end says whether it is what was written.
+    """
+    path = Path(path)
     try:
-        with Path(path).open("rb") as file:
-            values: NDArray[np.float64] = np.load(file)
-    except (OSError, ValueError, EOFError):
+        if not path.is_file():
+            return None
+        content = path.read_bytes()
+    except OSError:
         return None
+    content, digest = content[:-_DIGEST], content[-_DIGEST:]
+    if hashlib.sha256(content).digest() != digest:
+        warnings.warn(f"{path} is damaged: what was in it is computed again", RuntimeWarning, stacklevel=2)
+        return None
+    values: NDArray[np.float64] = np.load(io.BytesIO(content))
     return values
+
+
+_DIGEST = hashlib.sha256().digest_size

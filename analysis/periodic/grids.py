@@ -156,7 +156,7 @@ def grid(
         numbers = [(*p.constants(), *drive.vector(mechanism), *scale) for (p, drive), scale in zip(row, scales)]
         digest.update(np.array(numbers).tobytes())
         digest.update(np.array([*guess, *flow.modes, flow.torque, flow.period, tolerance]).tobytes())
-        path = where / f"{digest.hexdigest()[:32]}.npy"
+        path = where / f"{digest.hexdigest()[:32]}.row"
         paths.append(path)
         if _read(path, len(xs), len(guess)) is None:
             missing.append((path, row))

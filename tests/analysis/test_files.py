@@ -221,6 +221,22 @@ def test_csv_keeps_every_digit_and_its_header(tmp_path):
     assert not list(tmp_path.rglob("*.part"))
 
 
+@pytest.mark.parametrize("harm", ["flipped", "cut", "longer", "junk", "empty", "of another library"])
+def test_a_damaged_array_is_not_there(tmp_path, harm):
+    path = save_array(tmp_path / "x.npy", [[1.0, 2.0]])
+    content = path.read_bytes()
+    flipped = bytearray(content)
+    flipped[-40] ^= 1  # in a number
+    if harm == "of another library":
+        np.save(path, np.array([1.0, 2.0]))
+    else:
+        path.write_bytes(
+            {"flipped": flipped, "cut": content[:-9], "longer": content + b" ", "junk": b"x" * 50, "empty": b""}[harm]
+        )
+    with pytest.warns(RuntimeWarning, match=r"x\.npy is damaged: what was in it is computed again"):
+        assert load_array(path) is None
+
+
 def test_csv_columns_of_different_length_are_refused(tmp_path):
     with pytest.raises(InputError, match="differ in length"):
         write_csv(tmp_path / "x.csv", {"a": [1.0], "b": [1.0, 2.0]})
@@ -231,8 +247,7 @@ def test_csv_and_arrays_are_read_back(tmp_path):
     assert read_csv(path).tolist() == [[0.1, 1.0], [2.0, 1 / 3]]
     assert float(read_rows(path)[1]["fx, fy"]) == 1 / 3
     assert np.array_equal(load_array(save_array(tmp_path / "deep" / "x.npy", [[1.0, 2.0]])), [[1.0, 2.0]])
-    (tmp_path / "y.npy").write_text("x")
-    assert load_array(tmp_path / "y.npy") is load_array(tmp_path / "none.npy") is None
+    assert load_array(tmp_path / "none.npy") is load_array(tmp_path) is None
     for unreadable in (read_csv, read_rows):
         with pytest.raises(InputError, match="cannot be read"):
             unreadable(tmp_path / "none.csv")
