@@ -392,7 +392,7 @@ class LinkworkSlave(Fmi2Slave):
         # no exception may leave here, where there is no instance to keep: a damaged state is reported when it is set
         try:
             saved = json.loads(state.decode("utf-8"))
-        except ValueError as error:
+        except (ValueError, RecursionError) as error:
             return {"damaged": repr(error)}
         return saved if isinstance(saved, dict) else {"damaged": "it is not one of a Linkwork slave"}
 

@@ -15,8 +15,10 @@ import ctypes
 import ctypes.util
 import hashlib
 import os
+import shutil
 import sys
 import tempfile
+import warnings
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import cache
@@ -305,16 +307,31 @@ class Kernel:
         """Numba's dispatcher."""
         with MAKING:
             if self._compiled is None:
-                before = numba.config.CACHE_DIR
-                numba.config.CACHE_DIR = str(cache_folder(fingerprint(self.py_func, self.signature)))
+                folder = cache_folder(fingerprint(self.py_func, self.signature))
                 try:
-                    with _announced(self.purpose):
-                        self._compiled = njit(*self.signature, cache=True, error_model="numpy", nogil=True)(
-                            self.py_func
-                        )
-                finally:
-                    numba.config.CACHE_DIR = before
+                    self._compiled = self._compile(folder)
+                except Exception as error:
+                    if not any(folder.glob("**/*.nb[ic]")):
+                        raise
+                    # Numba reads what is damaged as whatever it happens to be
+                    warnings.warn(
+                        f"the compiled code in {folder} is damaged ({error!r}): it is compiled again",
+                        RuntimeWarning,
+                        stacklevel=3,
+                    )
+                    shutil.rmtree(folder)
+                    folder.mkdir(mode=0o700)
+                    self._compiled = self._compile(folder)
         return self._compiled
+
+    def _compile(self, folder: Path) -> Any:
+        before = numba.config.CACHE_DIR
+        numba.config.CACHE_DIR = str(folder)
+        try:
+            with _announced(self.purpose):
+                return njit(*self.signature, cache=True, error_model="numpy", nogil=True)(self.py_func)
+        finally:
+            numba.config.CACHE_DIR = before
 
     def __call__(self, *arguments: Any) -> Any:
         return (self._compiled or self.compiled)(*arguments)

@@ -16,6 +16,7 @@ from numba import float64, int64
 from analysis.mechanisms import FIVE_BAR, MECHANISMS, SLIDER_CRANK
 from analysis.numerics.codegen import (
     VECTOR,
+    Kernel,
     MachineCode,
     _say_shared,
     cache_folder,
@@ -235,6 +236,39 @@ def test_folder_that_cannot_be_written_to_falls_back_to_a_temporary_one(
     assert folder.is_relative_to(tmp_path / "temporary")
     # the same again for the next process
     assert cache_folder("a" * 64) == folder
+
+
+@pytest.mark.parametrize("suffix", ["nbi", "nbc"])
+@pytest.mark.parametrize("harm", ["cut", "empty", "junk"])
+def test_damaged_machine_code_is_compiled_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, suffix: str, harm: str
+) -> None:
+    monkeypatch.setenv("LINKWORK_CACHE_DIR", str(tmp_path))
+
+    def made() -> Kernel:
+        return Kernel(_doubled, (float64(float64),), "a test")
+
+    assert made()(2.0) == 4.0
+    (path,) = tmp_path.rglob(f"*.{suffix}")
+    content = path.read_bytes()
+    path.write_bytes({"cut": content[: len(content) // 2], "empty": b"", "junk": b"junk" * 99}[harm])
+    with pytest.warns(RuntimeWarning, match="is damaged .* it is compiled again"):
+        assert made()(2.0) == 4.0
+    assert made()(3.0) == 6.0  # from the cache, without a warning
+
+
+def _doubled(x):  # type: ignore[no-untyped-def]
+    return 2.0 * x
+
+
+def test_what_cannot_be_compiled_is_an_error_all_the_same(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("LINKWORK_CACHE_DIR", str(tmp_path))
+    with pytest.raises(Exception, match=r"Cannot unify|No implementation"):
+        _ = Kernel(_mistyped, (float64(float64),), "a test").compiled
+
+
+def _mistyped(x):  # type: ignore[no-untyped-def]
+    return x + "x"
 
 
 @pytest.mark.skipif(os.name == "nt", reason="permissions of POSIX")
