@@ -267,6 +267,7 @@ def test_damaged_state_is_refused(fmu: Path, model: Model, tmp_path: Path) -> No
     whole = json.loads(run_in_process(save_diverge_restore, fmu, tmp_path / "a", *arguments)["data"])
     pieces = [
         "not JSON",
+        "[" * 200_000,
         "[1, 2]",
         json.dumps(whole | {"interface": "another"}),
         json.dumps({name: value for name, value in whole.items() if name != "phase"}),
