@@ -293,3 +293,17 @@ class TestSecondHarmonic:
         for variant in (Variant.PRINTED, Variant.FORTRAN):
             assert self.ratio(variant) == pytest.approx(1.01, abs=0.01)
         assert self.ratio(Variant.FORTRAN) < published.SECOND_HARMONIC_TOO_SMALL < self.ratio(Variant.FIRST_ORDER)
+
+
+def test_the_iterations_of_all_orders_are_counted() -> None:
+    speed = 420.0 * RAD_S_PER_RPM
+    whole = nonlinear_harmonic_balance(TABLE_3_1, speed)
+    start, each = None, []
+    for order in hb.ORDERS:
+        found = nonlinear_harmonic_balance(TABLE_3_1, speed, order, start=start)
+        each.append(found.iterations)
+        start = found.series
+        if len(found.series.amplitudes) == len(whole.series.amplitudes):
+            break
+    assert len(each) > 1
+    assert whole.iterations == sum(each)

@@ -13,6 +13,7 @@ from scipy.optimize import minimize
 
 from analysis import Inputs, simulate
 from analysis.motion import best_spring, inverse_dynamics
+from analysis.motion.inverse import NAMES
 from analysis.numerics.fourier import FourierSeries
 from analysis.periodic import find_orbit
 from analysis.run import table
@@ -271,3 +272,16 @@ def test_a_motion_that_no_spring_helps_gets_none() -> None:
     assert above.rms_force < 1e-10 * above.rms_force_without
     with pytest.raises(InputError, match="finite and in order"):
         best_spring(hanging, motion, 5.0, free_position=(0.1, -0.1))
+
+
+def test_extremes_are_those_of_either_way() -> None:
+    """A force against the motion, power and torque alike: the greatest is that of the greatest magnitude."""
+    drive = inverse_dynamics(RIG, MOTION, SPEED, samples=64)
+    for name, peak in (("power", "peak_power"), ("force", "peak_force"), ("torque", "peak_torque")):
+        values = getattr(drive, name)
+        assert getattr(drive, peak) == np.abs(values).max()
+    inputs, states, values = drive.inputs.copy(), drive.states.copy(), drive.values.copy()
+    inputs[:, 3], states[:, 3] = np.linspace(-3.0, 1.0, 64), 1.0
+    values[:, NAMES.index("drive.applied_torque")] = np.linspace(-5.0, 2.0, 64)
+    against = replace(drive, inputs=inputs, states=states, values=values)
+    assert (against.peak_power, against.peak_force, against.peak_torque) == (3.0, 3.0, 5.0)

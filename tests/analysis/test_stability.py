@@ -433,6 +433,19 @@ def test_grid_goes_on_from_what_is_there(tmp_path: Path, monkeypatch: pytest.Mon
     assert (mended.largest == again.largest).all()
 
 
+@pytest.mark.parametrize("part", ["fingerprint", "getsource"])
+def test_rows_of_other_code_are_not_taken(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, part: str) -> None:
+    def computed() -> int:
+        return grid(first_region_plane(), XS[:2], YS[:2], folder=tmp_path).computed
+
+    assert (computed(), computed()) == (2, 0)
+    owner = grids if part == "fingerprint" else grids.inspect
+    original = getattr(owner, part)
+    changed = {grids.multipliers} if part == "fingerprint" else {grids.orbits}
+    monkeypatch.setattr(owner, part, lambda code: original(code) + (" changed" if code in changed else ""))
+    assert (computed(), computed()) == (2, 0)
+
+
 def test_grid_in_processes(tmp_path: Path) -> None:
     apart = grid(first_region_plane(), XS, YS, folder=tmp_path / "apart", n_jobs=2)
     here = grid(first_region_plane(), XS, YS, folder=tmp_path / "here")

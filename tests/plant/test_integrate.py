@@ -262,3 +262,13 @@ def test_finite_escape_time_is_refused() -> None:
 def test_most_steps() -> None:
     with pytest.raises(IntegrationError, match="20 steps did not suffice"):
         integrate(lambda x: (1.0, cos(1e4 * x[0])), (0.0, 0.0), 1.0, tolerance=1e-9, scale=UNIT, max_steps=20)
+
+
+def test_as_many_steps_as_are_needed_suffice() -> None:
+    def run(max_steps: int) -> int:
+        return integrate(pendulum, PENDULUM_START, 10.0, tolerance=1e-9, scale=UNIT, max_steps=max_steps).steps
+
+    needed = run(1000)
+    assert run(needed) == needed
+    with pytest.raises(IntegrationError, match=f"{needed - 1} steps did not suffice"):
+        run(needed - 1)

@@ -492,9 +492,24 @@ def test_rounding_of_the_masters_clock_is_no_gap() -> None:
 
 @EVERY_KIND
 @pytest.mark.parametrize("sign", [1.0, -1.0])
-def test_a_millionth_of_the_step_is_what_counts_as_rounding(sign: float, kind: Kind) -> None:
-    running(kind).step(0.01 + sign * 0.9e-9, 1e-3)
-    assert_refused(running(kind), StepError, "a step (backwards|over a gap)", 0.01 + sign * 1.1e-9, 1e-3)
+@pytest.mark.parametrize(("step", "slack"), [(1e-6, 1e-12), (1e-5, 1e-11), (1e-3, 1e-9), (0.1, 1e-9)])
+def test_a_millionth_of_the_step_or_a_nanosecond_counts_as_rounding(
+    step: float, slack: float, sign: float, kind: Kind
+) -> None:
+    running(kind).step(0.01 + sign * 0.9 * slack, step)
+    assert_refused(running(kind), StepError, "a step (backwards|over a gap)", 0.01 + sign * 1.1 * slack, step)
+
+
+@pytest.mark.parametrize(
+    ("kind", "words"),
+    [
+        (FIVE_BAR, "crank angle 1 rad (57.2958 deg) and slider position -0.02 m"),
+        (SLIDER_CRANK, "crank angle 1 rad (57.2958 deg) and shift position -0.02 m"),
+    ],
+    ids=["five-bar", "slider-crank"],
+)
+def test_a_configuration_in_words(kind: Kind, words: str) -> None:
+    assert running(kind).mechanism.where((1.0, -0.02, 3.0, 4.0, 5.0, 6.0)) == words
 
 
 @pytest.mark.parametrize("value", [nan, inf, -inf])
