@@ -11,6 +11,7 @@ import pytest
 from analysis import figures
 from analysis.numerics.continuation import ContinuationError
 from analysis.periodic import Branch, Crossing, Drive, Family, OrbitError, Stability, find_orbit, follow, switch
+from analysis.periodic.branches import _of_a_turn
 from linkwork.errors import InputError, LinkworkError
 from linkwork.five_bar.parameters import FiveBarParameters
 from linkwork.five_bar.published import RAD_S_PER_RPM, SETS, TABLE_3_1
@@ -222,6 +223,12 @@ def test_columns_are_those_of_the_orbits(softened: Branch, tmp_path: pytest.Temp
     assert columns["amplitude of u [m]"][20] == orbit.amplitude
     assert columns["harmonic 2 of u [m]"][20] == turn.harmonic("slider.position", 2)
     assert columns["greatest force in pin C [N]"][20] == np.hypot(turn["pin.C.fx"], turn["pin.C.fy"]).max()
+    # the greatest of either way: that of the turn with all signs reversed is the same
+    of_a_turn, reversed_turn = _of_a_turn(orbit, turn), replace(turn, values=-turn.values)
+    for name, output in (("crank torque [N.m]", "drive.applied_torque"), ("guide force [N]", "slider.guide_force")):
+        greatest = np.abs(turn[output]).max()
+        assert of_a_turn[f"greatest {name}"](turn) == of_a_turn[f"greatest {name}"](reversed_turn) == greatest
+        assert columns[f"greatest {name}"][20] == greatest
     path = softened.to_csv(tmp_path / "branch.csv")  # type: ignore[operator]
     rows = np.loadtxt(path, delimiter=",", skiprows=1)
     assert rows.shape == (len(softened), len(columns))

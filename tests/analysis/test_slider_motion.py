@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from scipy.optimize import differential_evolution, minimize_scalar
 
 from analysis.motion import SmoothnessInterrupted, greatest, motion, slider_motion, smoothness_curve
+from analysis.numerics.fourier import FourierSeries
 from analysis.synthesis import (
     ANGLES,
     LENGTHS,
@@ -533,3 +534,12 @@ def test_bad_input_is_named() -> None:
 def test_an_assembly_that_contradicts_the_linkage_is_refused() -> None:
     with pytest.raises(InputError, match="assembly -1 is asked of a linkage that is assembled"):
         slider_motion(WEIGHTED.task, PRINTED, SliderUnknown(harmonics=1), constraints=(Assembly(branch=-1),))
+
+
+def test_the_motion_of_the_plant_is_the_linkages_at_the_turned_angle() -> None:
+    """u over the plant's crank angle th2 = phi + th20 is u over the rotation phi."""
+    series = FourierSeries(np.array([0.01, 0.02, -0.003]), np.array([0.0, 0.005, 0.007]))
+    for phase in (0.0, 0.7, -2.1):
+        linkage = replace(PRINTED, crank_phase=phase, pivot=SliderMotion(series=series))
+        phi = np.linspace(0.0, 2.0 * pi, 17)
+        assert motion.motion_of_plant(linkage)(phi + phase) == pytest.approx(series(phi), abs=1e-15)

@@ -245,6 +245,29 @@ def test_state_saved_after_a_refused_step(fmu: Path, model: Model, tmp_path: Pat
         assert after == [0, ""]
 
 
+def set_up_and_restored(fmu: str, folder: str, tolerance: float) -> list[float]:
+    """Outputs after a step of two instances, the one with the master's tolerance, the other from its state before the start."""
+    from bare_master import Fmu
+
+    fmu = Fmu(fmu, folder)
+    one, other = fmu.instantiate(), fmu.instantiate()
+    one.setup(start=1.0, tolerance=tolerance)
+    other.restore(one.save())
+    found = []
+    for instance in (one, other):
+        assert [instance.enter(), instance.exit(), instance.step(1.0, 0.05)] == [0, 0, 0]
+        found.append(instance.outputs()["energy.supplied"])
+        instance.free()
+    return found
+
+
+def test_a_state_saved_before_the_initialisation_has_the_masters_times_and_tolerance(fmu: Path, tmp_path: Path) -> None:
+    loose, restored = run_in_process(set_up_and_restored, fmu, tmp_path / "a", 1e-9)
+    tight, restored_tight = run_in_process(set_up_and_restored, fmu, tmp_path / "b", 1e-13)
+    assert (loose, tight) == (restored, restored_tight)
+    assert loose != tight
+
+
 def damaged(fmu: str, folder: str, pieces: list[str]) -> list[Any]:
     """Status and log of restoring what is not a state of this FMU; the instance is freed afterwards."""
     from bare_master import Fmu
