@@ -1,6 +1,4 @@
 from .run.cosimulation import Comparison as Comparison
-from .run.cosimulation import CosimulationError as CosimulationError
-from .run.cosimulation import FmuRun as FmuRun
 from .run.cosimulation import OutputDifference as OutputDifference
 from .run.cosimulation import compare as compare
 from .run.cosimulation import cosimulate as cosimulate
@@ -8,6 +6,8 @@ from .run.ensemble import Ensemble as Ensemble
 from .run.ensemble import simulate_many as simulate_many
 from .run.events import Event as Event
 from .run.events import RunInterrupted as RunInterrupted
+from .run.fmu import CosimulationError as CosimulationError
+from .run.fmu import FmuRun as FmuRun
 from .run.inputs import Inputs as Inputs
 from .run.signals import Function as Function
 from .run.signals import Harmonics as Harmonics

@@ -9,13 +9,11 @@ from .case_files import parameters_to as parameters_to
 from .case_files import save_parameters as save_parameters
 from .checks import CASES as CASES
 from .checks import check as check
+from .cosimulation import INTERFACES as INTERFACES
 from .cosimulation import Comparison as Comparison
-from .cosimulation import CosimulationError as CosimulationError
-from .cosimulation import FmuRun as FmuRun
 from .cosimulation import OutputDifference as OutputDifference
 from .cosimulation import compare as compare
 from .cosimulation import cosimulate as cosimulate
-from .cosimulation import unpacking_folder as unpacking_folder
 from .ensemble import Ensemble as Ensemble
 from .ensemble import simulate_many as simulate_many
 from .equations import constants as constants
@@ -26,6 +24,10 @@ from .events import Event as Event
 from .events import RunInterrupted as RunInterrupted
 from .events import interruptible as interruptible
 from .events import shown as shown
+from .fmu import CosimulationError as CosimulationError
+from .fmu import FmuModel as FmuModel
+from .fmu import FmuRun as FmuRun
+from .fmu import unpacking_folder as unpacking_folder
 from .hamming import Hamming as Hamming
 from .inputs import Inputs as Inputs
 from .inputs import align as align

@@ -1,33 +1,24 @@
-"""Run a built FMU through FMPy with the inputs of `simulate`, and compare two runs."""
+"""Run an FMU through FMPy with the inputs of `simulate`, and compare two runs."""
 
 from __future__ import annotations
 
-import os
-import re
-import shutil
-import tempfile
 import time as clock
-from ctypes import byref
-from dataclasses import asdict, dataclass, replace
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from math import pi
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from fmpy import extract, read_model_description
-from fmpy.fmi1 import FMICallException
-from fmpy.fmi2 import FMU2Slave, fmi2CallbackFunctions, fmi2CallbackLoggerTYPE
-from fmpy.logging import addLoggerProxy
 from numpy.typing import NDArray
 
-from linkwork.errors import InputError, LinkworkError
-from linkwork.parameters import fmi_name
+from linkwork.errors import InputError
 
-from ..mechanisms import InitialState, Parameters, mechanism_of, output_units
+from ..mechanisms import InitialState, Parameters, output_units
 from .events import RunInterrupted, interruptible, shown
-from .inputs import Inputs
-from .inputs import sample as sample_inputs
+from .fmu import CosimulationError, FmuModel, FmuRun
+from .inputs import Inputs, release, sample
 from .prepared import Run, Settings
 from .simulation import sample_times
 from .trajectory import Trajectory
@@ -36,141 +27,9 @@ from .trajectory import Trajectory
 PRINCIPAL_ANGLES = ("coupler.angle", "rocker.angle")
 
 
-class CosimulationError(LinkworkError):
-    """An FMU could not be loaded or initialised; the sentence is the FMU's own where it gave one."""
-
-
-def unpacking_folder() -> str:
-    """Folder to unpack an FMU in: that for temporary files, or another one if it is none that a Python FMU can read.
-
-    An FMU is told the URI of its folder. PythonFMU's wrapper decodes "%20" in it and nothing else, and where it does not find
-    its files then it ends the process.
-
-    Raises
-    ------
-    CosimulationError
-        If there is none.
-    """
-    here = tempfile.gettempdir()
-    others = ("/tmp", "/var/tmp") if os.name == "posix" else (os.environ.get("PUBLIC"), "C:/Windows/Temp")
-    for folder in (here, *others):
-        if folder and os.access(folder, os.W_OK) and not re.search("%(?!20)", Path(folder).absolute().as_uri()):
-            return folder
-    raise CosimulationError(
-        f"an FMU cannot be unpacked in {here}: of the characters in the folder's name PythonFMU's wrapper reads letters from a "
-        "to z, digits, spaces and - . _ ~ alone; set TMPDIR to another folder"
-    )
-
-
-class FmuRun:
-    """An instance of an FMU of Linkwork through FMPy: set inputs, step, read outputs.
-
-    Which mechanism it must be of, the parameters say. Use as a context manager.
-
-    Raises
-    ------
-    CosimulationError
-        If the file is no such FMU, or its initialisation fails.
-    """
-
-    def __init__(
-        self,
-        fmu: str | Path,
-        parameters: Parameters,
-        initial: InitialState,
-        *,
-        modes: dict[str, int],
-        tolerance: float,
-        start_time: float,
-        inputs: dict[str, float],
-    ) -> None:
-        if not Path(fmu).is_file():
-            raise CosimulationError(f"there is no file {fmu}: build it with 'python build_fmu.py'")
-        mechanism = mechanism_of(parameters)
-        self.input_names = mechanism.input_names
-        self.output_names = mechanism.output_names
-        self.messages: list[str] = []
-        self._folder: str | None = None
-        try:
-            description = read_model_description(str(fmu))
-        except Exception as error:
-            raise CosimulationError(f"{fmu} is not an FMU: {error}") from error
-        self._references = {v.name: v.valueReference for v in description.modelVariables}
-        needed = (*self.input_names, *self.output_names, "solver.status")
-        missing = [name for name in needed if name not in self._references]
-        if description.coSimulation is None:
-            missing.insert(0, "co-simulation")
-        if missing:
-            named = ", ".join(missing[:3]) + (f" and {len(missing) - 3} others" if len(missing) > 3 else "")
-            raise CosimulationError(
-                f"{fmu} is not a {mechanism.fmu} for co-simulation, which these parameters need, but "
-                f"{description.modelName}: it has no {named}"
-            )
-        self._callbacks = fmi2CallbackFunctions()
-        self._callbacks.logger = fmi2CallbackLoggerTYPE(self._log)
-        addLoggerProxy(byref(self._callbacks))
-        try:
-            self._folder = tempfile.mkdtemp(dir=unpacking_folder())
-            extract(str(fmu), self._folder)
-            self._slave = FMU2Slave(
-                guid=description.guid,
-                unzipDirectory=self._folder,
-                modelIdentifier=description.coSimulation.modelIdentifier,
-                instanceName="linkwork",
-            )
-            self._slave.instantiate(callbacks=self._callbacks, loggingOn=True)
-            self._slave.setupExperiment(tolerance=tolerance, startTime=start_time)
-            reals = {fmi_name(name): value for name, value in asdict(parameters).items()}
-            reals |= {f"initial.{name}": value for name, value in asdict(initial).items()}
-            reals |= {"solver.tolerance": tolerance} | inputs
-            integers = modes | {
-                v.name: int(reals.pop(v.name)) for v in mechanism.mechanism_variables.values() if v.kind == "Integer"
-            }
-            self._slave.setReal([self._references[name] for name in reals], [float(v) for v in reals.values()])
-            self._slave.setInteger([self._references[name] for name in integers], list(integers.values()))
-            self._slave.enterInitializationMode()
-            self._slave.exitInitializationMode()
-        except Exception as error:  # FMPy raises plain ones, too
-            self.close()
-            reasons = [m for m in self.messages if not m.startswith("Fatal py exception")]
-            raise CosimulationError("; ".join(reasons) or f"{fmu}: {error}") from error
-        self._inputs = [self._references[name] for name in self.input_names]
-        self._outputs = [self._references[name] for name in self.output_names]
-
-    def _log(self, environment: Any, name: bytes, status: int, category: bytes, message: bytes) -> None:
-        self.messages.append(message.decode("utf-8", errors="replace"))
-
-    def __enter__(self) -> FmuRun:
-        return self
-
-    def __exit__(self, *exception: object) -> None:
-        self.close()
-
-    def set_inputs(self, values: dict[str, float]) -> None:
-        """Set all inputs."""
-        self._slave.setReal(self._inputs, [values[name] for name in self.input_names])
-
-    def outputs(self) -> list[float]:
-        """All real outputs, in the order of the contract."""
-        return list(self._slave.getReal(self._outputs))
-
-    def step(self, time: float, step: float) -> tuple[int, str]:
-        """Take one communication step; returns solver.status and solver.message, 0 and an empty string where it succeeds."""
-        try:
-            self._slave.doStep(time, step)
-        except FMICallException:
-            status = self._slave.getInteger([self._references["solver.status"]])[0]
-            message = self._slave.getString([self._references["solver.message"]])[0]
-            return int(status), message.decode() if isinstance(message, bytes) else str(message)
-        return 0, ""
-
-    def close(self) -> None:
-        """Free the instance and remove the unpacked FMU."""
-        slave = self.__dict__.pop("_slave", None)
-        if slave is not None and slave.component:
-            slave.freeInstance()
-        if self._folder is not None:
-            shutil.rmtree(self._folder, ignore_errors=True)
+#: Ways of running an FMU: co-simulation with inputs held over each step, the same with inputs that go linearly over it, model
+#: exchange under CVode.
+INTERFACES = ("co-simulation", "linear-co-simulation", "model-exchange")
 
 
 def cosimulate(
@@ -183,12 +42,10 @@ def cosimulate(
     step: float = 1e-3,
     start_time: float = 0.0,
     tolerance: float = 1e-9,
+    interface: str = "co-simulation",
     progress: bool = False,
 ) -> Trajectory:
-    """Run an FMU of Linkwork through FMPy.
-
-    The inputs are sampled at each communication point and held over the step, commanded speeds go along the secant:
-    ``simulate(..., hold=step)`` does the same in process.
+    """Run an FMU of Linkwork of any kind through FMPy.
 
     Parameters
     ----------
@@ -197,6 +54,12 @@ def cosimulate(
         As for `simulate`.
     step : float
         Communication step (s); every one is recorded.
+    interface : str
+        ``co-simulation``: the inputs are sampled at each communication point and held over the step, commanded speeds go along
+        the secant; ``simulate(..., hold=step)`` does the same in process. ``linear-co-simulation``: over a step they go
+        linearly to what they will be at its end, as predicted where they depend on the motion; commanded speeds go along a
+        parabola. ``model-exchange``: FMPy's CVode integrates the FMU's derivatives, and the inputs act continuously, as in
+        process without ``hold``. The Python FMU has the first, native FMUs of FMI 2.0 all, of FMI 3.0 the first and the last.
 
     Returns
     -------
@@ -206,67 +69,163 @@ def cosimulate(
     Raises
     ------
     CosimulationError
-        If the FMU cannot be loaded or refuses to initialise.
+        If the FMU cannot be loaded, has no such interface, or refuses to initialise.
     InputError
         If the times are not usable, or an input is not a finite number; the sentence names the input and the time.
     """
+    if interface not in INTERFACES:
+        raise InputError(f"interface is {interface!r}: it must be one of {', '.join(INTERFACES)}")
     begun = clock.perf_counter()
     times = sample_times(stop_time, step, start_time)
     # the FMU itself judges the tolerance
-    settings = Settings(times=times, hold=step, tolerance=tolerance, max_steps=1)
-    prepared = Run(parameters, inputs, initial, settings)
-    mechanism, encoded = prepared.mechanism, prepared.encoded
-    law = encoded.law.copy()
-    rows: list[list[float]] = []
-    status, message = 0, ""
-
-    def sampled(t: float, ahead: float, x: NDArray[np.float64]) -> dict[str, float]:
-        u = sample_inputs(encoded, t, x, law, ahead=ahead)
-        return dict(zip(mechanism.input_names, u.tolist()))
-
-    coordinates = [mechanism.output_names.index(freedom.coordinate) for freedom in mechanism.freedoms]
-    rates = [mechanism.output_names.index(freedom.rate) for freedom in mechanism.freedoms]
-
-    def state(row: list[float]) -> NDArray[np.float64]:
-        return np.array([*(row[n] for n in coordinates), *(row[n] for n in rates), 0.0, 0.0])
-
-    x = np.array(mechanism.state(prepared.initial))
-    first = sampled(times[0], times[1], x)
-    run = FmuRun(
+    prepared = Run(parameters, inputs, initial, Settings(times=times, hold=step, tolerance=tolerance, max_steps=1))
+    march = (
+        _Continuous(prepared) if interface == "model-exchange" else _Stepwise(prepared, interface != "co-simulation")
+    )
+    recorded: list[tuple[float, list[float]]] = []
+    instance = march.instance(
         fmu,
         parameters,
         prepared.initial,
-        modes=encoded.modes,
+        modes=prepared.encoded.modes,
         tolerance=tolerance,
         start_time=float(times[0]),
-        inputs=first,
+        inputs=march.first(),
     )
-    with run, interruptible() as interrupted, shown(progress, times[-1] - times[0], "co-simulate") as show:
-        rows.append(run.outputs())
-        for t, t_next in pairwise(times):
-            status, message = run.step(float(t), float(t_next - t))
-            if status:
-                break
-            # the outputs belong to the inputs that begin here: read the state, sample, set, read all
-            x = state(run.outputs())
-            later = t_next + step if t_next == times[-1] else times[len(rows) + 1]
-            run.set_inputs(sampled(float(t_next), float(later), x))
-            rows.append(run.outputs())
-            show(float(t_next - times[0]))
+    with instance, interruptible() as interrupted, shown(progress, times[-1] - times[0], "co-simulate") as show:
+        for t, row in march.rows(instance):
+            recorded.append((t, row))
+            show(t - float(times[0]))
             if interrupted:
                 break
     trajectory = Trajectory(
-        time=times[: len(rows)],
-        values=np.array(rows),
-        status=status,
-        message=message,
-        names=mechanism.output_names,
-        source=Path(fmu).name,
-        statistics={"steps": float(len(rows) - 1), "seconds": clock.perf_counter() - begun},
+        time=np.array([t for t, _ in recorded]),
+        values=np.array([row for _, row in recorded]),
+        status=march.status,
+        message=march.message,
+        names=prepared.mechanism.output_names,
+        source=Path(fmu).name + march.title,
+        statistics={"steps": float(len(recorded) - 1), "seconds": clock.perf_counter() - begun},
     )
     if interrupted:
         raise RunInterrupted(trajectory)
     return trajectory
+
+
+class _Stepwise:
+    """Communication steps over which inputs are held or linear."""
+
+    instance = FmuRun
+
+    def __init__(self, prepared: Run, linear: bool) -> None:
+        self.encoded, self.linear, self.times = prepared.encoded, linear, prepared.settings.times
+        self.title = ", linear inputs" if linear else ""
+        self.mechanism = prepared.mechanism
+        self.start = np.array(self.mechanism.state(prepared.initial))
+        self.law = self.encoded.law.copy()
+        self.status, self.message = 0, ""
+        names = self.mechanism.output_names
+        rate_of = {v.rate_of: v.name for v in self.mechanism.variables if v.rate_of}
+        freedoms = self.mechanism.freedoms
+        self.coordinates = [names.index(f.coordinate) for f in freedoms]
+        self.rates = [names.index(f.rate) for f in freedoms]
+        self.accelerations = [names.index(rate_of[f.rate]) for f in freedoms]
+
+    def first(self) -> dict[str, float]:
+        """The inputs at the start."""
+        return self.inputs(0, self.start)
+
+    def inputs(self, number: int, x: NDArray[np.float64]) -> dict[str, float]:
+        """The inputs at a communication point and a state, until the next one."""
+        times, t = self.times, float(self.times[number])
+        if self.linear:
+            release(self.encoded, x, self.law)
+            ahead = -np.inf
+        else:
+            ahead = float(times[number + 1] if number + 1 < len(times) else t + times[1] - times[0])
+        return self._named(sample(self.encoded, t, x, self.law, ahead=ahead))
+
+    def _named(self, u: NDArray[np.float64]) -> dict[str, float]:
+        return dict(zip(self.mechanism.input_names, u.tolist()))
+
+    def slopes(self, number: int, row: list[float]) -> dict[str, float]:
+        """How the inputs go from a communication point to the next, where the state is predicted from the outputs."""
+        t, ahead = float(self.times[number]), float(self.times[number + 1])
+        h, x = ahead - t, self.state(row)
+        n, law = len(self.rates), self.law.copy()
+        acceleration = np.array([row[i] for i in self.accelerations])
+        there = x.copy()
+        there[:n] += h * (x[n : 2 * n] + 0.5 * h * acceleration)
+        there[n : 2 * n] += h * acceleration
+        release(self.encoded, there, law)
+        change = sample(self.encoded, ahead, there, law, left=True) - sample(self.encoded, t, x, self.law)
+        change[self.encoded.commands[:, 0]] = 0.0
+        return self._named(change / h)
+
+    def state(self, row: list[float]) -> NDArray[np.float64]:
+        """The state that a row of outputs shows, without the work done."""
+        return np.array([*(row[n] for n in self.coordinates), *(row[n] for n in self.rates), 0.0, 0.0])
+
+    def rows(self, run: Any) -> Iterator[tuple[float, list[float]]]:
+        """Times and outputs, until the end or a refused step."""
+        if self.linear and not run.interpolates:
+            raise CosimulationError(
+                f"{run.name} does not take inputs that are linear over a step: it can only hold them"
+            )
+        row = run.outputs()
+        yield float(self.times[0]), row
+        for number, (t, t_next) in enumerate(pairwise(self.times)):
+            if self.linear:
+                run.set_slopes(self.slopes(number, row))
+            self.status, self.message = run.step(float(t), float(t_next - t))
+            if self.status:
+                return
+            # the outputs belong to the inputs that begin here: read the state, sample, set, read all
+            run.set_inputs(self.inputs(number + 1, self.state(run.outputs())))
+            row = run.outputs()
+            yield float(t_next), row
+
+
+class _Continuous:
+    """Model exchange, in which inputs act continuously."""
+
+    instance = FmuModel
+    title = ", model exchange"
+
+    def __init__(self, prepared: Run) -> None:
+        self.prepared = prepared
+        self.status, self.message = 0, ""
+
+    def first(self) -> dict[str, float]:
+        """The inputs at the start."""
+        prepared = self.prepared
+        x, law = np.array(prepared.mechanism.state(prepared.initial)), prepared.encoded.law.copy()
+        release(prepared.encoded, x, law)
+        u = sample(prepared.encoded, float(prepared.settings.times[0]), x, law)
+        return dict(zip(prepared.mechanism.input_names, u.tolist()))
+
+    def rows(self, model: Any) -> Iterator[tuple[float, list[float]]]:
+        """Times and outputs, until the end or the limit of assembly, where the last configuration is given, too."""
+        from .exchange import Exchange, ExchangeError
+
+        times = self.prepared.settings.times
+        solver = Exchange(model, self.prepared.encoded, times, self.prepared.settings.tolerance)
+        yield solver.time, model.outputs()
+        for goal in times[1:].tolist():
+            while solver.time < goal:
+                try:
+                    ended = solver.advance(goal)
+                except ExchangeError as error:
+                    self.status = 4
+                    self.message = f"{error}, in the step from t = {solver.time:.9g} s"
+                    return
+                if ended:
+                    where = self.prepared.mechanism.where(solver.state.tolist())
+                    self.status, self.message = 3, f"limit of assembly at t = {solver.time:.9g} s, {where}"
+                    break
+            yield solver.time, model.outputs()
+            if self.status:
+                return
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

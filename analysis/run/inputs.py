@@ -381,8 +381,8 @@ def sample(
     from . import sources as k
 
     x = np.ascontiguousarray(x)
-    if ahead > t and law[2] and x[encoded.law_places[1]] >= law[1]:
-        law[2] = 0.0
+    if ahead > t:
+        release(encoded, x, law)
     source = k.Source(
         encoded.breaks, encoded.coefficients, encoded.harmonics, encoded.places, law, encoded.law_places,
         np.zeros((len(encoded.places), 2), dtype=np.int64),
@@ -403,6 +403,12 @@ def sample(
         secant = ahead > t and np.isfinite(here[lost])
         raise NotFiniteError(encoded, commands.get(int(lost), int(lost)) if secant else int(lost), t, x)
     return u
+
+
+def release(encoded: Encoded, x: NDArray[np.float64], law: NDArray[np.float64]) -> None:
+    """Release a torsion bar, in ``law``, that at state x has turned as far as it was wound."""
+    if law[2] and x[encoded.law_places[1]] >= law[1]:
+        law[2] = 0.0
 
 
 def _of_functions(encoded: Encoded, t: float, x: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -1,0 +1,169 @@
+"""Model exchange: an FMU's derivatives, integrated by CVode of SUNDIALS as FMPy brings it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from ctypes import c_int, c_void_p
+from typing import Any
+
+import numpy as np
+from fmpy.fmi1 import FMICallException
+from fmpy.sundials import CVodeSolver
+from fmpy.sundials.cvode import sundials_cvode
+from fmpy.sundials.nvector_serial import NV_DATA_S
+from fmpy.sundials.sundials_types import sunrealtype
+from numpy.typing import NDArray
+
+from .fmu import FmuModel
+from .inputs import Encoded, release, sample
+
+#: Steps of CVode between two samples, at most.
+MOST_STEPS = 100_000
+
+#: Which FMPy leaves out: no step goes beyond this time, where an input jumps.
+_set_stop_time = sundials_cvode.CVodeSetStopTime
+_set_stop_time.argtypes = [c_void_p, sunrealtype]
+_set_stop_time.restype = c_int
+
+#: What a function that CVode calls returns.
+_GOOD, _SHORTER_STEP, _NO_WAY = 0, 1, -1
+
+
+class ExchangeError(Exception):
+    """CVode could not go on."""
+
+
+class Exchange(CVodeSolver):  # type: ignore[misc]
+    """An FMU in model exchange, and what acts on it.
+
+    Between the times at which inputs jump they are continuous functions of time and state: a commanded rate moves by its rate
+    of change. At those times the FMU is brought into event mode, where it takes commands.
+
+    Parameters
+    ----------
+    model : FmuModel
+    encoded : Encoded
+        The inputs.
+    times : ndarray
+        Samples (s).
+    tolerance : float
+        CVode's relative tolerance; the absolute one of a state is that times its nominal value.
+    """
+
+    def __init__(self, model: FmuModel, encoded: Encoded, times: NDArray[np.float64], tolerance: float) -> None:
+        self.model, self.encoded = model, encoded
+        self.names = encoded.mechanism.input_names
+        self.time = float(times[0])
+        self.law = encoded.law.copy()
+        inside = encoded.breaks[(encoded.breaks > times[0]) & (encoded.breaks <= times[-1])]
+        self.ends = [*inside.tolist(), np.inf]
+        self.failure: Exception | None
+        super().__init__(
+            nx=model.states,
+            # the release of a torsion bar is an event of the inputs
+            nz=model.indicators + 1,
+            get_x=lambda x, n: model.get_states(x),
+            set_x=lambda x, n: None,
+            get_dx=None,
+            get_z=None,
+            get_nominals=lambda x, n: model.get_nominals(x),
+            set_time=None,
+            input=None,
+            startTime=self.time,
+            relativeTolerance=tolerance,
+            maxNumSteps=MOST_STEPS,
+        )
+        self.begin()
+
+    @property
+    def state(self) -> NDArray[np.float64]:
+        """The state at the present time."""
+        return self._array(self.px)
+
+    def _array(self, x: Any) -> NDArray[np.float64]:
+        return np.ctypeslib.as_array(x, (self.nx,))
+
+    def inputs(self, t: float, x: NDArray[np.float64], left: bool = False) -> dict[str, float]:
+        """All inputs at a time and a state."""
+        return dict(zip(self.names, sample(self.encoded, t, x, self.law, left=left).tolist()))
+
+    def begin(self, *, released: bool = False) -> bool:
+        """An event at the present time, from which on the inputs are smooth again; returns whether the run ends here."""
+        release(self.encoded, self.state, self.law)
+        if released:
+            self.law[2] = 0.0
+        self.ends = [end for end in self.ends if end > self.time]
+        self.still = self.encoded.steady and self.law[2] == 0.0
+        ended = self.model.event(self.inputs(self.time, self.state))
+        self.reset(self.time)
+        if np.isfinite(self.ends[0]):
+            _set_stop_time(self.cvode_mem, self.ends[0])
+        return ended
+
+    def advance(self, goal: float) -> bool:
+        """Go on to a time, or to an event before it; returns whether the run ends there.
+
+        Raises
+        ------
+        NotFiniteError
+            If an input is not a finite number.
+        ExchangeError
+            If CVode fails.
+        """
+        goal = min(goal, self.ends[0])
+        self.failure = None
+        roots = np.zeros(self.nz)
+        if goal - self.time > 16.0 * np.spacing(max(abs(goal), abs(self.time))):
+            try:
+                _, roots, self.time = self.step(self.time, goal)
+            except (RuntimeError, TypeError) as error:
+                raise self._reason(error) from error
+        else:
+            self.time = goal
+        self.put(self.time, self.px)
+        return self.begin(released=bool(roots[-1])) if roots.any() or self.time >= self.ends[0] else False
+
+    def _reason(self, error: Exception) -> Exception:
+        """Why CVode failed: because of the inputs, where it was they that could not be had."""
+        if self.failure is None or isinstance(self.failure, FMICallException):
+            return ExchangeError(str(error))
+        return self.failure
+
+    def put(self, t: float, x: Any) -> None:
+        """Bring the FMU to a time and a state of CVode's."""
+        self.model.put(t, x)
+        if not self.still:
+            self.model.set_inputs(self.inputs(t, self._array(x), left=t >= self.ends[0]))
+
+    # What CVode calls
+
+    def _tried(self, work: Callable[[], None]) -> int:
+        try:
+            work()
+        except FMICallException as error:  # there is no such state
+            self.failure = error
+            return _SHORTER_STEP
+        except Exception as error:  # of the inputs: it cannot pass through CVode
+            self.failure = error
+            return _NO_WAY
+        return _GOOD
+
+    def f(self, t: float, y: Any, ydot: Any, user_data: Any) -> int:
+        """Time derivative of the state."""
+
+        def work() -> None:
+            self.put(t, NV_DATA_S(y))
+            self.model.get_derivatives(NV_DATA_S(ydot))
+
+        return self._tried(work)
+
+    def g(self, t: float, y: Any, gout: Any, user_data: Any) -> int:
+        """Functions whose zeros are events."""
+
+        def work() -> None:
+            x = NV_DATA_S(y)
+            self.put(t, x)
+            self.model.get_indicators(gout)
+            gout[self.nz - 1] = self._array(x)[self.encoded.law_places[1]] - self.law[1] if self.law[2] else 1.0
+
+        return self._tried(work)

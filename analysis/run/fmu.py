@@ -1,0 +1,300 @@
+"""Instances of Linkwork's FMUs through FMPy: any kind of FMU, co-simulation and model exchange."""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import tempfile
+from collections.abc import Mapping
+from ctypes import byref
+from dataclasses import asdict
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any, ClassVar, Self
+
+from fmpy import extract, read_model_description
+from fmpy.fmi1 import FMICallException
+from fmpy.fmi2 import FMU2Model, FMU2Slave, fmi2CallbackFunctions, fmi2CallbackLoggerTYPE
+from fmpy.fmi3 import FMU3Model, FMU3Slave
+from fmpy.logging import addLoggerProxy
+
+from linkwork.errors import LinkworkError
+from linkwork.parameters import fmi_name
+
+from ..mechanisms import InitialState, Parameters, mechanism_of
+
+#: What FMPy's getters and setters are called, by the type of a variable.
+_ACCESS = MappingProxyType(
+    {
+        "Real": "Real",
+        "Integer": "Integer",
+        "String": "String",
+        "Enumeration": "Integer",
+        "Float64": "Float64",
+        "Int32": "Int32",
+        "Int64": "Int64",
+    }
+)
+_ACCESS_FMI3 = MappingProxyType(_ACCESS | {"Enumeration": "Int64"})
+
+
+class CosimulationError(LinkworkError):
+    """An FMU could not be loaded or initialised; the sentence is the FMU's own where it gave one."""
+
+
+def unpacking_folder() -> str:
+    """Folder to unpack an FMU in: that for temporary files, or another one if it is none that a Python FMU can read.
+
+    An FMU is told the URI of its folder. PythonFMU's wrapper decodes "%20" in it and nothing else, and where it does not find
+    its files then it ends the process.
+
+    Raises
+    ------
+    CosimulationError
+        If there is none.
+    """
+    here = tempfile.gettempdir()
+    others = ("/tmp", "/var/tmp") if os.name == "posix" else (os.environ.get("PUBLIC"), "C:/Windows/Temp")
+    for folder in (here, *others):
+        if folder and os.access(folder, os.W_OK) and not re.search("%(?!20)", Path(folder).absolute().as_uri()):
+            return folder
+    raise CosimulationError(
+        f"an FMU cannot be unpacked in {here}: of the characters in the folder's name PythonFMU's wrapper reads letters from a "
+        "to z, digits, spaces and - . _ ~ alone; set TMPDIR to another folder"
+    )
+
+
+class _Instance:
+    """An instance of an FMU of Linkwork through FMPy, initialised. Use as a context manager.
+
+    Which mechanism it must be of, the parameters say; which version of FMI it is, the file says.
+
+    Parameters
+    ----------
+    fmu : path
+    parameters, initial
+        Of a mechanism.
+    modes : dict
+        Values of the mechanism's modes, by name.
+    tolerance, start_time : float
+    inputs : dict
+        At the start, by name.
+
+    Raises
+    ------
+    CosimulationError
+        If the file is no such FMU, or its initialisation fails.
+    """
+
+    interface: ClassVar[str]
+    #: The attribute of FMPy's model description that has the interface, and the class that runs it, by the version of FMI.
+    _described: ClassVar[str]
+    _classes: ClassVar[Mapping[str, type]]
+
+    def __init__(
+        self,
+        fmu: str | Path,
+        parameters: Parameters,
+        initial: InitialState,
+        *,
+        modes: dict[str, int],
+        tolerance: float,
+        start_time: float,
+        inputs: dict[str, float],
+    ) -> None:
+        if not Path(fmu).is_file():
+            raise CosimulationError(f"there is no file {fmu}: build it with 'python build_fmu.py'")
+        mechanism = mechanism_of(parameters)
+        self.input_names = mechanism.input_names
+        self.output_names = mechanism.output_names
+        self.name = Path(fmu).name
+        self.messages: list[str] = []
+        self._folder: str | None = None
+        try:
+            self.description = read_model_description(str(fmu))
+        except Exception as error:
+            raise CosimulationError(f"{fmu} is not an FMU: {error}") from error
+        self._variables = {v.name: v for v in self.description.modelVariables}
+        described = getattr(self.description, self._described)
+        missing = [] if described else [self.interface]
+        missing += [n for n in (*self.input_names, *self.output_names, "solver.status") if n not in self._variables]
+        if missing:
+            named = ", ".join(missing[:3]) + (f" and {len(missing) - 3} others" if len(missing) > 3 else "")
+            raise CosimulationError(
+                f"{fmu} is not a {mechanism.fmu} for {self.interface}, which these parameters need, but "
+                f"{self.description.modelName}: it has no {named}"
+            )
+        try:
+            self._folder = tempfile.mkdtemp(dir=unpacking_folder())
+            extract(str(fmu), self._folder)
+            self._fmu = self._classes[self.description.fmiVersion[0]](
+                guid=self.description.guid,
+                unzipDirectory=self._folder,
+                modelIdentifier=described.modelIdentifier,
+                instanceName="linkwork",
+            )
+            values = {fmi_name(name): value for name, value in asdict(parameters).items()}
+            values |= {f"initial.{name}": value for name, value in asdict(initial).items()}
+            self._initialise(values | {"solver.tolerance": tolerance} | modes | inputs, tolerance, start_time)
+        except Exception as error:  # FMPy raises plain ones, too
+            self.close()
+            reasons = [m for m in self.messages if not m.startswith("Fatal py exception")]
+            raise CosimulationError("; ".join(reasons) or f"{fmu}: {error}") from error
+        self._inputs = self._references(self.input_names)
+        self._outputs = self._references(self.output_names)
+        self._set_reals = getattr(self._fmu, f"set{self._real}")
+        self._get_reals = getattr(self._fmu, f"get{self._real}")
+
+    @property
+    def _fmi3(self) -> bool:
+        return bool(self.description.fmiVersion.startswith("3"))
+
+    @property
+    def _real(self) -> str:
+        return "Float64" if self._fmi3 else "Real"
+
+    def _references(self, names: tuple[str, ...]) -> list[int]:
+        return [self._variables[name].valueReference for name in names]
+
+    def _initialise(self, values: Mapping[str, float], tolerance: float, start_time: float) -> None:
+        if self._fmi3:
+            self._fmu.instantiate(loggingOn=True, logMessage=self._log_fmi3)
+        else:
+            self._callbacks = fmi2CallbackFunctions()
+            self._callbacks.logger = fmi2CallbackLoggerTYPE(self._log_fmi2)
+            addLoggerProxy(byref(self._callbacks))
+            self._fmu.instantiate(callbacks=self._callbacks, loggingOn=True)
+            self._fmu.setupExperiment(tolerance=tolerance, startTime=start_time)
+        groups: dict[str, dict[int, float]] = {}
+        for name, value in values.items():
+            variable = self._variables[name]
+            groups.setdefault(self._access(variable), {})[variable.valueReference] = value
+        for access, group in groups.items():
+            kind = float if access == self._real else int
+            getattr(self._fmu, f"set{access}")(list(group), [kind(value) for value in group.values()])
+        if self._fmi3:
+            self._fmu.enterInitializationMode(tolerance=tolerance, startTime=start_time)
+        else:
+            self._fmu.enterInitializationMode()
+        self._fmu.exitInitializationMode()
+
+    def _access(self, variable: Any) -> str:
+        return (_ACCESS_FMI3 if self._fmi3 else _ACCESS)[variable.type]
+
+    def _log_fmi2(self, environment: Any, name: bytes, status: int, category: bytes, message: bytes) -> None:
+        self.messages.append(message.decode("utf-8", errors="replace"))
+
+    def _log_fmi3(self, environment: Any, status: int, category: bytes, message: bytes) -> None:
+        self.messages.append(message.decode("utf-8", errors="replace"))
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *exception: object) -> None:
+        self.close()
+
+    def set_inputs(self, values: Mapping[str, float]) -> None:
+        """Set all inputs."""
+        self._set_reals(self._inputs, [values[name] for name in self.input_names])
+
+    def outputs(self) -> list[float]:
+        """All real outputs, in the order of the contract."""
+        return list(self._get_reals(self._outputs))
+
+    def trouble(self) -> tuple[int, str]:
+        """solver.status and solver.message."""
+        found = []
+        for name in ("solver.status", "solver.message"):
+            variable = self._variables[name]
+            found.append(getattr(self._fmu, f"get{self._access(variable)}")([variable.valueReference])[0])
+        status, message = found
+        return int(status), message.decode() if isinstance(message, bytes) else str(message)
+
+    def close(self) -> None:
+        """Free the instance and remove the unpacked FMU."""
+        fmu = self.__dict__.pop("_fmu", None)
+        if fmu is not None and fmu.component:
+            fmu.freeInstance()
+        if self._folder is not None:
+            shutil.rmtree(self._folder, ignore_errors=True)
+
+
+class FmuRun(_Instance):
+    """An instance of an FMU for co-simulation: set inputs, step, read outputs."""
+
+    interface = "co-simulation"
+    _described = "coSimulation"
+    _classes = MappingProxyType({"2": FMU2Slave, "3": FMU3Slave})
+
+    def step(self, time: float, step: float) -> tuple[int, str]:
+        """Take one communication step; returns solver.status and solver.message, 0 and an empty string where it succeeds."""
+        try:
+            self._fmu.doStep(time, step)
+        except FMICallException:
+            return self.trouble()
+        return 0, ""
+
+    @property
+    def interpolates(self) -> bool:
+        """Whether it takes inputs that are linear over a step."""
+        return bool(getattr(self.description.coSimulation, "canInterpolateInputs", False))
+
+    def set_slopes(self, values: Mapping[str, float]) -> None:
+        """Set how all inputs change over the next step, their time derivatives."""
+        self._fmu.setRealInputDerivatives(self._inputs, [1] * len(values), [values[name] for name in self.input_names])
+
+
+class FmuModel(_Instance):
+    """An instance of an FMU for model exchange, in continuous-time mode once it is made: states, derivatives, events.
+
+    Attributes
+    ----------
+    states : int
+        Number of continuous states.
+    """
+
+    interface = "model exchange"
+    _described = "modelExchange"
+    _classes = MappingProxyType({"2": FMU2Model, "3": FMU3Model})
+
+    def __init__(self, *arguments: Any, **options: Any) -> None:
+        super().__init__(*arguments, **options)
+        self.states = int(self.description.numberOfContinuousStates)
+        self.indicators = int(self.description.numberOfEventIndicators)
+        fmu = self._fmu
+        self._derivatives = fmu.getContinuousStateDerivatives if self._fmi3 else fmu.getDerivatives
+        self._update = fmu.updateDiscreteStates if self._fmi3 else fmu.newDiscreteStates
+        self.update()
+
+    def put(self, time: float, x: Any) -> None:
+        """Set time and states, an array of ctypes."""
+        self._fmu.setTime(time)
+        self._fmu.setContinuousStates(x, self.states)
+
+    def get_states(self, x: Any) -> None:
+        """Write the states into an array of ctypes, as the getters below do."""
+        self._fmu.getContinuousStates(x, self.states)
+
+    def get_nominals(self, x: Any) -> None:
+        self._fmu.getNominalsOfContinuousStates(x, self.states)
+
+    def get_derivatives(self, rates: Any) -> None:
+        self._derivatives(rates, self.states)
+
+    def get_indicators(self, z: Any) -> None:
+        self._fmu.getEventIndicators(z, self.indicators)
+
+    def event(self, inputs: Mapping[str, float]) -> bool:
+        """An event at which the inputs take other values; returns whether the FMU asks for the end of the run."""
+        self._fmu.enterEventMode()
+        self.set_inputs(inputs)
+        return self.update()
+
+    def update(self) -> bool:
+        """New discrete states, then continuous-time mode; returns whether the FMU asks for the end of the run."""
+        again, terminate = True, False
+        while again and not terminate:
+            again, terminate, *_ = self._update()
+        self._fmu.enterContinuousTimeMode()
+        return terminate
