@@ -296,8 +296,11 @@ Status instance_set_slope(Instance *c, const char *function, unsigned reference,
 Status instance_output_slopes(
     Instance *c, const char *function, const unsigned references[], size_t count, const int orders[], double values[])
 {
-    Plant *a = &c->s.plant;
+    Plant here = c->s.plant, *a = &here;
     double given[VARIABLES] = {0}, rows[ROWS], derivative[STATES];
+    /* the motion goes on from the state with the commands applied */
+    plant_present(&c->s.plant, here.x);
+    memset(here.fresh, 0, sizeof here.fresh);
     for (size_t i = 0; i < count; i++) {
         const Variable *v = variable(c, function, references[i], REAL);
         if (!v)
