@@ -25,7 +25,11 @@ Status instance_save(Instance *c, void **state)
 
 Status instance_restore(Instance *c, const void *state)
 {
-    c->s = *(const Saved *)state;
+    const Saved *saved = state;
+    if ((int)saved->phase & (c->interface == CO_SIMULATION ? EVENT | CONTINUOUS : STEP))
+        return instance_say(c, ERROR, "the saved state is not one of %s",
+                            c->interface == CO_SIMULATION ? "co-simulation" : "model exchange");
+    c->s = *saved;
     c->stale = true;
     c->stopped = false;
     return OK;
