@@ -69,6 +69,11 @@ def build(models: Sequence[str], dest: str) -> None:
 @case_options(PUBLISHED)
 @click.option("--fmu", type=click.Path(exists=True, dir_okay=False), help="Run through this FMU instead of in process.")
 @click.option(
+    "--interface",
+    help="How the FMU is run: co-simulation with its inputs held over each step, as by default, linear-co-simulation (linear "
+    "over it), or model-exchange under CVode.",
+)
+@click.option(
     "--method", default="compiled", show_default=True, help="compiled, Hamming, or a method of SciPy's solve_ivp."
 )
 @click.option("--stop-time", metavar="TIME", help="End of the run, such as '2 s'.")
@@ -82,6 +87,7 @@ def run(
     published: str | None,
     settings: Sequence[str],
     fmu: str | None,
+    interface: str | None,
     method: str,
     stop_time: str | None,
     step: str | None,
@@ -96,14 +102,18 @@ def run(
       linkwork run --published table-3.1
       linkwork run --published rig-1-spring-a --set slider.coulomb_friction='5 N'
       linkwork run examples/torsion-bar.toml --fmu build/FiveBarSlider.fmu --out results
+      linkwork run --published table-3.1 --fmu build/FiveBarSlider-native.fmu --interface model-exchange
     """
     from .. import figures
     from ..files import save_figure
-    from ..run import RunInterrupted, cosimulate, simulate
+    from ..run import INTERFACES, RunInterrupted, cosimulate, simulate
 
     chosen = chosen_case(case, published, settings)
     if fmu is not None and method != "compiled":
         raise click.UsageError("--method is for a run in process: the FMU brings its own")
+    if fmu is None and interface is not None:
+        raise click.UsageError("--interface is for a run through an FMU: give --fmu")
+    interface = interface or INTERFACES[0]
     times = (("stop_time", "--stop-time", stop_time), ("step", "--step", step))
     changed: dict[str, Any] = {name: quantity(text, "s", option) for name, option, text in times if text is not None}
     if tolerance is not None:
@@ -114,7 +124,7 @@ def run(
     interrupted = False
     try:
         if fmu is not None:
-            result = cosimulate(fmu, chosen.parameters, chosen.inputs, **common)
+            result = cosimulate(fmu, chosen.parameters, chosen.inputs, interface=interface, **common)
         else:
             result = simulate(chosen.parameters, chosen.inputs, method=method, **common)
     except RunInterrupted as stopped:
@@ -125,7 +135,7 @@ def run(
         written.append(save_figure(figures.plot(result, title=chosen.title), f"{stem}.png"))
     _print_extremes(chosen.title, result)
     print_written(written)
-    if fmu is not None and not chosen.inputs.held_exactly:
+    if fmu is not None and interface == INTERFACES[0] and not chosen.inputs.held_exactly:
         print_error(
             f"note: inputs that vary over a step are sampled and held over it ({chosen.step:.3g} s), as any master does; "
             "a run in process lets them act continuously. Shorten --step until the result no longer changes."
@@ -157,8 +167,9 @@ def _print_extremes(title: str, result: Any) -> None:
 @click.option(
     "--fmu",
     type=click.Path(dir_okay=False),
-    help="The FMU to check; by default that of each case's mechanism in build, such as build/FiveBarSlider.fmu.",
+    help="The FMU to check; by default those of every kind of each case's mechanism in build, such as build/FiveBarSlider.fmu.",
 )
+@click.option("--interface", "only", help="co-simulation or model-exchange; by default every one that the FMU has.")
 @click.option("--all", "everything", is_flag=True, help="All standard cases (of the FMU's mechanism), not one of each.")
 @click.option(
     "--method",
@@ -166,47 +177,91 @@ def _print_extremes(title: str, result: Any) -> None:
     multiple=True,
     default=("compiled",),
     show_default=True,
-    help="In-process method: compiled, Hamming, or one of SciPy's solve_ivp; can be given often.",
+    help="In-process method: compiled, Hamming, or one of SciPy's solve_ivp; can be given often. Model exchange, which brings "
+    "CVode, is held against the first of them alone.",
 )
 @tolerance_option(default=1e-6, help="Largest relative difference that passes.")
 @out_option()
 @handled
 def check(
-    cases: Sequence[str], fmu: str | None, everything: bool, methods: Sequence[str], tolerance: float, out: str
+    cases: Sequence[str],
+    fmu: str | None,
+    only: str | None,
+    everything: bool,
+    methods: Sequence[str],
+    tolerance: float,
+    out: str,
 ) -> None:
-    """Compare the FMU with the in-process solver, output by output. CASES are names of standard cases or case files.
+    """Compare FMUs with the in-process solver, output by output. CASES are names of standard cases or case files.
+
+    Of several kinds of FMU and interfaces one line each is printed, and all outputs of those that fail; of a single one all
+    outputs.
 
     \b
     Examples:
       linkwork check
       linkwork check --all --tolerance 1e-8
       linkwork check --method compiled --method Radau
-      linkwork check speed-jump examples/torsion-bar.toml
+      linkwork check speed-jump examples/torsion-bar.toml --fmu build/FiveBarSlider-native.fmu
     """
     from ..mechanisms import mechanism_of
     from ..run import check as compare_case
 
-    failed = []
-    chosen = _cases_to_check(cases, fmu, everything)
-    for name, case in chosen:
-        for method in methods:
-            label = name if method == "compiled" else f"{name}-{method}"
+    failed, count = [], 0
+    for name, case in _cases_to_check(cases, fmu, everything):
+        model = mechanism_of(case.parameters).fmu
+        runs = [
+            (path, interface, words, method)
+            for path, interface, words in _fmus_to_check(model, fmu, only)
+            for method in (methods if interface == "co-simulation" else methods[:1])
+        ]
+        lines, verdicts = [], []
+        for path, interface, words, method in runs:
             in_process, through_fmu, comparison = compare_case(
-                fmu or DEFAULT_FOLDER / f"{mechanism_of(case.parameters).fmu}.fmu",
-                case,
-                method=method,
-                tolerance=tolerance,
-                progress=console.is_terminal,
+                path, case, interface=interface, method=method, tolerance=tolerance, progress=console.is_terminal
             )
-            _print_comparison(f"{case.title}: FMU less in process ({in_process.source})", comparison)
-            _write_comparison(Path(out) / label, case, in_process, through_fmu)
-            if not comparison.agrees or in_process.status != through_fmu.status:
+            good = comparison.agrees and in_process.status == through_fmu.status
+            marks = (path.stem.removeprefix(model)[1:], interface if interface != "co-simulation" else "")
+            label = "-".join((name, *filter(None, marks), *([method] if method != "compiled" else [])))
+            if not good:
                 failed.append(label)
+            if not good or len(runs) <= len(methods):
+                _print_comparison(
+                    f"{case.title}: {path.name}, {words}, less in process ({in_process.source})", comparison
+                )
+            if not good or path == runs[0][0]:
+                _write_comparison(Path(out) / label, case, in_process, through_fmu)
+            worst = comparison.worst
+            verdicts.append(good)
+            lines.append(
+                (path.name, words, in_process.source, worst.name, f"{worst.relative:.1e}", "pass" if good else "FAIL")
+            )
+        if len(runs) > len(methods):
+            headings = ("FMU", "interface", "in process", "largest difference in", "relative", "verdict")
+            show_table(
+                f"{case.title}, tolerance {tolerance:g}", headings, lines, words=headings[:4] + headings[5:],
+                styles=[None if good else "red" for good in verdicts],
+            )  # fmt: skip
+        count += len(runs)
     if failed:
         print_error(f"check failed: {', '.join(failed)}", "red")
         sys.exit(CHECK_FAILED)
-    count = len(chosen) * len(methods)
     console.print(f"{count} of {count} checks pass", style="green", highlight=False)
+
+
+def _fmus_to_check(model: str, fmu: str | None, only: str | None) -> list[tuple[Path, str, str]]:
+    """FMUs of a model, each with its interfaces (or the one asked for) by name and in words."""
+    from ..run import CHECKED, offered
+
+    if only is not None and only not in CHECKED:
+        raise click.UsageError(f"--interface {only}: it must be {' or '.join(CHECKED)}")
+    kinds = sorted(DEFAULT_FOLDER.glob(f"{model}-*.fmu")) if fmu is None else []
+    first = DEFAULT_FOLDER / f"{model}.fmu" if fmu is None else Path(fmu)
+    paths = [path for path in (first, *kinds) if path.is_file()] or [first]
+    found = [(path, name, words) for path in paths for name, words in offered(path).items() if only in (None, name)]
+    if not found:
+        raise InputError(f"{', '.join(map(str, paths))}: there is no {only} in it")
+    return found
 
 
 def _cases_to_check(names: Sequence[str], fmu: str | None, everything: bool) -> list[tuple[str, Any]]:

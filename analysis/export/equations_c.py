@@ -25,6 +25,9 @@ from ..run import equations
 from .description import Kind, token
 from .interface import Entry, interface, states
 
+#: Lost in every sum with a square that is not zero.
+TINY = 1e-300
+
 
 def generated(mechanism: Mechanism, kind: Kind) -> dict[str, str]:
     """The generated files by name: sizes.h, tables.c, tableau.h and equations.c."""
@@ -64,7 +67,7 @@ def functions(mechanism: Mechanism) -> list[Any]:
         raise LinkworkError(f"the start of {mechanism.name} cannot be traced: {_START}") from error
     dx, du, dp = (sx.sym(f"d{n}", *v.shape) for n, v in (("x", s.x), ("u", s.u), ("p", s.p)))
     at, change = join(s.x, s.u, s.p), join(dx, du, dp)
-    values = [trace.outputs, trace.derivative, trace.clearance]
+    values = [_smooth_outputs(mechanism, s), trace.derivative, trace.clearance]
     given = join(own, state, s.u)
     dgiven = [sx.sym(f"d{n}", *v.shape) for n, v in (("own", own), ("state", state), ("u", s.u))]
 
@@ -103,6 +106,18 @@ def functions(mechanism: Mechanism) -> list[Any]:
         casadi.Function(f"equations_{name}", arguments, [casadi.densify(r) for r in results], {"cse": True})
         for name, (arguments, results) in table.items()
     ]
+
+
+def _smooth_outputs(mechanism: Mechanism, s: equations.Symbols) -> Any:
+    """The outputs as they are differentiated: a length, the root of squares, changes by 0 where it is 0, not by 0/0."""
+    casadi = symbolic.library()
+    functions = symbolic.traced(mechanism.modules, sqrt=lambda value: casadi.sqrt(value + TINY))
+    *p, energy = casadi.vertsplit(s.p)
+    k = type(next(iter(mechanism.published.values())).parameters.constants())(*p)
+    modes, channels = (tuple(casadi.vertsplit(v)) if v.numel() else () for v in (s.modes, s.u))
+    acting = functions.of(mechanism.equations.applied)(modes, channels, k)
+    x = tuple(casadi.vertsplit(s.x))
+    return casadi.densify(casadi.vertcat(*functions.of(mechanism.equations.outputs)(x, acting, energy, k)))
 
 
 def _beginning(mechanism: Mechanism, modes: Any, u: Any) -> tuple[Any, ...]:

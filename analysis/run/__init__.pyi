@@ -8,6 +8,7 @@ from .case_files import parameters_from as parameters_from
 from .case_files import parameters_to as parameters_to
 from .case_files import save_parameters as save_parameters
 from .checks import CASES as CASES
+from .checks import CHECKED as CHECKED
 from .checks import check as check
 from .cosimulation import INTERFACES as INTERFACES
 from .cosimulation import Comparison as Comparison
@@ -27,6 +28,7 @@ from .events import shown as shown
 from .fmu import CosimulationError as CosimulationError
 from .fmu import FmuModel as FmuModel
 from .fmu import FmuRun as FmuRun
+from .fmu import offered as offered
 from .fmu import unpacking_folder as unpacking_folder
 from .hamming import Hamming as Hamming
 from .inputs import Inputs as Inputs

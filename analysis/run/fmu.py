@@ -65,6 +65,33 @@ def unpacking_folder() -> str:
     )
 
 
+def _description(fmu: str | Path) -> Any:
+    """FMPy's model description."""
+    if not Path(fmu).is_file():
+        raise CosimulationError(f"there is no file {fmu}: build it with 'python build_fmu.py'")
+    try:
+        return read_model_description(str(fmu))
+    except Exception as error:
+        raise CosimulationError(f"{fmu} is not an FMU: {error}") from error
+
+
+def offered(fmu: str | Path) -> dict[str, str]:
+    """The interfaces that an FMU has, as `cosimulate` calls them, each with its name and version in words.
+
+    Raises
+    ------
+    CosimulationError
+        If the file is no FMU.
+    """
+    description = _description(fmu)
+    kinds: dict[str, type[_Instance]] = {"co-simulation": FmuRun, "model-exchange": FmuModel}
+    return {
+        name: f"{kind.interface}, FMI {description.fmiVersion}"
+        for name, kind in kinds.items()
+        if getattr(description, kind.described)
+    }
+
+
 class _Instance:
     """An instance of an FMU of Linkwork through FMPy, initialised. Use as a context manager.
 
@@ -88,8 +115,8 @@ class _Instance:
     """
 
     interface: ClassVar[str]
-    #: The attribute of FMPy's model description that has the interface, and the class that runs it, by the version of FMI.
-    _described: ClassVar[str]
+    #: The attribute of FMPy's model description that has the interface; the class that runs it, by the version of FMI.
+    described: ClassVar[str]
     _classes: ClassVar[Mapping[str, type]]
 
     def __init__(
@@ -103,20 +130,15 @@ class _Instance:
         start_time: float,
         inputs: dict[str, float],
     ) -> None:
-        if not Path(fmu).is_file():
-            raise CosimulationError(f"there is no file {fmu}: build it with 'python build_fmu.py'")
         mechanism = mechanism_of(parameters)
         self.input_names = mechanism.input_names
         self.output_names = mechanism.output_names
         self.name = Path(fmu).name
         self.messages: list[str] = []
         self._folder: str | None = None
-        try:
-            self.description = read_model_description(str(fmu))
-        except Exception as error:
-            raise CosimulationError(f"{fmu} is not an FMU: {error}") from error
+        self.description = _description(fmu)
         self._variables = {v.name: v for v in self.description.modelVariables}
-        described = getattr(self.description, self._described)
+        described = getattr(self.description, self.described)
         missing = [] if described else [self.interface]
         missing += [n for n in (*self.input_names, *self.output_names, "solver.status") if n not in self._variables]
         if missing:
@@ -224,7 +246,7 @@ class FmuRun(_Instance):
     """An instance of an FMU for co-simulation: set inputs, step, read outputs."""
 
     interface = "co-simulation"
-    _described = "coSimulation"
+    described = "coSimulation"
     _classes = MappingProxyType({"2": FMU2Slave, "3": FMU3Slave})
 
     def step(self, time: float, step: float) -> tuple[int, str]:
@@ -255,7 +277,7 @@ class FmuModel(_Instance):
     """
 
     interface = "model exchange"
-    _described = "modelExchange"
+    described = "modelExchange"
     _classes = MappingProxyType({"2": FMU2Model, "3": FMU3Model})
 
     def __init__(self, *arguments: Any, **options: Any) -> None:
