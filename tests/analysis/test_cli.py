@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -90,6 +91,12 @@ def test_a_run_that_ends_early_keeps_its_data_and_exits_with_3(linkwork, tmp_pat
         (["run", "nowhere.toml"], 2, "does not exist"),
         (["check", "--fmu", "nowhere.fmu"], 1, "there is no file nowhere.fmu"),
         (["check", "no-such-case"], 2, "neither a case file nor a standard case"),
+        (["check", "--interface", "both"], 2, "--interface both: it must be co-simulation or model-exchange"),
+        (
+            ["run", "--published", "table-3.1", "--interface", "model-exchange"],
+            2,
+            "--interface is for a run through an FMU",
+        ),
         (["figures", "9.9"], 2, "there is no figure 9.9"),
         (["build", "SixBar"], 1, "there is no model 'SixBar'"),
         (["info", "nothing"], 2, "neither a mechanism or published set"),
@@ -171,6 +178,61 @@ def test_check_passes_and_writes_its_files(fmu, tmp_path):
         "table-3.1-Radau-in-process.csv",
         "table-3.1-Radau-fmu.csv",
     }
+
+
+def test_check_of_every_kind_of_fmu_says_which(fmu, natives, tmp_path):
+    folder = tmp_path / "build"
+    folder.mkdir()
+    for path in (fmu, natives["FiveBarSlider-native"], natives["FiveBarSlider-native-fmi3"]):
+        shutil.copy(path, folder)
+    done = in_own_process("check", "table-3.1", "--method", "compiled", "--method", "RK45", cwd=tmp_path)
+    assert done.returncode == 0, done.stdout + done.stderr
+    # model exchange is CVode's against one method
+    assert "8 of 8 checks pass" in done.stdout
+    for words, count in {
+        "co-simulation, FMI 2.0": 4,
+        "co-simulation, FMI 3.0": 2,
+        "model exchange, FMI 2.0": 1,
+    }.items():
+        assert done.stdout.count(words) == count
+    assert {p.name for p in (tmp_path / "out").glob("*.png")} == {"table-3.1.png", "table-3.1-RK45.png"}
+
+
+def test_check_of_one_interface_of_a_native_fmu(linkwork, natives, tmp_path):
+    result = linkwork(
+        "check", "speed-jump", "--fmu", natives["FiveBarSlider-native-fmi3"], "--interface", "model-exchange"
+    )
+    assert result.exit_code == 0
+    assert "1 of 1 checks pass" in result.output
+    assert "model exchange, FMI 3.0" in result.output
+    assert "slider.guide_force" in result.output
+    assert (tmp_path / "out" / "speed-jump-native-fmi3-model-exchange.png").is_file()
+
+
+def test_the_failing_kind_is_named(linkwork, natives):
+    result = linkwork("check", "coulomb-friction", "--fmu", natives["FiveBarSlider-native"], "--tolerance", "1e-11")
+    assert result.exit_code == cli.CHECK_FAILED
+    assert result.stderr.strip() == "check failed: coulomb-friction-native-model-exchange"
+
+
+@pytest.mark.parametrize("interface", ["co-simulation", "linear-co-simulation", "model-exchange"])
+def test_run_through_each_interface(linkwork, natives, tmp_path, interface):
+    fmu = natives["FiveBarSlider-native"]
+    result = linkwork(
+        "run", ROOT / "examples" / "torsion-bar.toml", "--fmu", fmu, "--interface", interface, "--no-plot"
+    )
+    assert result.exit_code == 0
+    assert ("note: inputs that vary over a step are sampled and held" in result.stderr) == (
+        interface == "co-simulation"
+    )
+    rows = np.loadtxt(tmp_path / "out" / "torsion-bar-fmu.csv", delimiter=",", skiprows=1)
+    assert np.isfinite(rows).all()
+
+
+def test_an_interface_that_the_fmu_has_not(linkwork, fmu):
+    result = linkwork("check", "--fmu", fmu, "--interface", "model-exchange")
+    assert result.exit_code == 1
+    assert "there is no model-exchange in it" in result.stderr
 
 
 def test_a_check_that_fails_exits_with_4(fmu, tmp_path):
