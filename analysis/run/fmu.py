@@ -24,19 +24,8 @@ from linkwork.parameters import fmi_name
 
 from ..mechanisms import InitialState, Parameters, mechanism_of
 
-#: What FMPy's getters and setters are called, by the type of a variable.
-_ACCESS = MappingProxyType(
-    {
-        "Real": "Real",
-        "Integer": "Integer",
-        "String": "String",
-        "Enumeration": "Integer",
-        "Float64": "Float64",
-        "Int32": "Int32",
-        "Int64": "Int64",
-    }
-)
-_ACCESS_FMI3 = MappingProxyType(_ACCESS | {"Enumeration": "Int64"})
+#: What FMPy's getters and setters of enumerations are called, by the version of FMI; those of other types as the type.
+_OF_ENUMERATIONS = MappingProxyType({"2": "Integer", "3": "Int64"})
 
 
 class CosimulationError(LinkworkError):
@@ -148,7 +137,9 @@ class _Instance:
                 f"{self.description.modelName}: it has no {named}"
             )
         try:
-            self._folder = tempfile.mkdtemp(dir=unpacking_folder())
+            # native FMUs read nothing from their folder
+            wrapped = str(self.description.generationTool).startswith("PythonFMU")
+            self._folder = tempfile.mkdtemp(dir=unpacking_folder() if wrapped else None)
             extract(str(fmu), self._folder)
             self._fmu = self._classes[self.description.fmiVersion[0]](
                 guid=self.description.guid,
@@ -202,7 +193,9 @@ class _Instance:
         self._fmu.exitInitializationMode()
 
     def _access(self, variable: Any) -> str:
-        return (_ACCESS_FMI3 if self._fmi3 else _ACCESS)[variable.type]
+        """What FMPy's getter and setter of a variable are called."""
+        kind = str(variable.type)
+        return _OF_ENUMERATIONS[self.description.fmiVersion[0]] if kind == "Enumeration" else kind
 
     def _log_fmi2(self, environment: Any, name: bytes, status: int, category: bytes, message: bytes) -> None:
         self.messages.append(message.decode("utf-8", errors="replace"))
@@ -272,16 +265,16 @@ class FmuModel(_Instance):
 
     Attributes
     ----------
-    states : int
-        Number of continuous states.
+    states, indicators : int
+        Numbers of continuous states and of event indicators.
     """
 
     interface = "model exchange"
     described = "modelExchange"
     _classes = MappingProxyType({"2": FMU2Model, "3": FMU3Model})
 
-    def __init__(self, *arguments: Any, **options: Any) -> None:
-        super().__init__(*arguments, **options)
+    def _initialise(self, values: Mapping[str, float], tolerance: float, start_time: float) -> None:
+        super()._initialise(values, tolerance, start_time)
         self.states = int(self.description.numberOfContinuousStates)
         self.indicators = int(self.description.numberOfEventIndicators)
         fmu = self._fmu

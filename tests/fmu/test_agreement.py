@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tempfile
 from dataclasses import replace
 from math import nan
 from pathlib import Path
@@ -9,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from fmpy import extract
 
 from analysis import CosimulationError, Function, Harmonics, InductionMotor, Inputs, cosimulate, simulate
 from analysis.mechanisms import mechanism_of
@@ -194,6 +196,21 @@ def without_exchange(root: str, fmu: str) -> str:
     except CosimulationError as error:
         return str(error)
     return ""
+
+
+@pytest.mark.parametrize("file", ["FiveBarSlider-native", "FiveBarSlider-native-fmi3"])
+def test_native_fmus_run_from_folders_of_any_name(
+    natives: dict[str, Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, file: str
+) -> None:
+    folder = tmp_path / "M\u00fcller (1) # %41 & co"
+    folder.mkdir()
+    used = []
+    monkeypatch.setattr(tempfile, "tempdir", str(folder))
+    monkeypatch.setattr("analysis.run.fmu.extract", lambda fmu, to: (used.append(Path(to).parent), extract(fmu, to)))
+    run = cosimulate(natives[file], TABLE_3_1, Inputs(speed=44.0), stop_time=0.01)
+    assert len(run) == 11
+    assert used == [folder]
+    assert not list(folder.iterdir())
 
 
 def test_model_exchange_ends_at_the_limit_of_assembly(natives: dict[str, Path]) -> None:
