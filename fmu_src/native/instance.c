@@ -390,8 +390,9 @@ void instance_new_discrete_states(Instance *c, bool *terminate, bool *values_cha
 Status instance_set_time(Instance *c, const char *function, double time)
 {
     Digits number;
-    if (!(c->s.plant.start_time <= time && time <= fmin(c->s.plant.stop_time, DBL_MAX)))
-        return instance_say(c, ERROR, "%s: the time is %s s: it must be between start and stop time", function,
+    /* a solver tries steps that go past the stop time, to come back to it */
+    if (!(c->s.plant.start_time <= time && time <= DBL_MAX))
+        return instance_say(c, ERROR, "%s: the time is %s s: it must be finite and not before the start", function,
                             digits(number, time));
     c->s.plant.time = time;
     c->stale = true;

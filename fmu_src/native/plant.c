@@ -571,13 +571,9 @@ void plant_forward(
         for (int c = 0; c < COMMANDS; c++)
             changed[c] = commanding && du[commands[c].input] != 0.0;
         if (commanded_state(a, changed, u, marked)) {
-            double djump[ROOM(INPUTS)];
-            memcpy(djump, du, sizeof djump);
-            for (int c = 0; c < COMMANDS; c++)
-                if (plant_commanded(a, &commands[c]) && !marked[c])
-                    djump[commands[c].input] = dx[commands[c].rate];
+            /* no state is a known here: it is in model exchange alone, where events apply the commands */
             call(equations_jump, (const double *[]){a->x, a->modes, u, a->p}, (double *[]){after});
-            call(equations_jump_forward, (const double *[]){a->x, a->modes, u, a->p, dx, djump, dp}, (double *[]){dafter});
+            call(equations_jump_forward, (const double *[]){a->x, a->modes, u, a->p, dx, du, dp}, (double *[]){dafter});
             memcpy(dx, dafter, sizeof dx);
         }
     }
@@ -610,12 +606,9 @@ void plant_reverse(
         double before[STATES], gjump[ROOM(INPUTS)], unused[CONSTANTS];
         commanded_state(a, commanded, u, marked);
         call(equations_jump_reverse, (const double *[]){a->x, a->modes, u, a->p, x}, (double *[]){before, gjump, unused});
-        memcpy(x, before, sizeof before);
         for (int c = 0; c < COMMANDS; c++)
             if (marked[c])
                 given[input_at[commands[c].input]] += gjump[commands[c].input];
-            else if (plant_commanded(a, &commands[c]))
-                x[commands[c].rate] += gjump[commands[c].input];
     }
     if (start) {
         double own[ROOM(PARAMETERS)], state[2 * FREEDOMS], gown[ROOM(PARAMETERS)], gstate[2 * FREEDOMS];

@@ -492,10 +492,11 @@ def test_no_step_past_the_stop_time(library: Library) -> None:
             assert c.step(1.1, 0.9 + 1e-9) == OK
         else:
             assert c("EnterContinuousTimeMode") == OK
-            for time in (0.9, 2.1, math.nan, math.inf):
+            for time in (0.9, math.nan, math.inf):
                 assert c("SetTime", time) == ERROR
-                assert "it must be between start and stop time" in c.log[-1][1]
-            assert c("SetTime", 2.0) == OK
+                assert "it must be finite and not before the start" in c.log[-1][1]
+            # solvers try what is beyond the end, and come back
+            assert c("SetTime", 2.1) == OK
         c.free()
 
 
