@@ -256,6 +256,14 @@ def test_after_steps(library: Library, fresh: bool) -> None:
         else:
             for n, name in enumerate(knowns):
                 sums_close(instance, of.unknowns, [name], right[:, [n]], size[:, [n]])
+            for n, name in enumerate(knowns):
+                if name in commands:
+                    # one of them set, the other freedom goes on as it does
+                    saved, jumped = instance.saved(), [*u[:n], u[n] * 1.1 + 0.1, *u[n + 1 :]]
+                    assert put(instance, {name: jumped[n]}) == OK
+                    rows, _ = of.run(case, x, jumped, p, [name])
+                    close(np.array(instance.get(*of.unknowns)), rows - limit(of), np.abs(rows) + 1.0)
+                    assert instance(f"SetFMU{'s' if library.fmi == 2 else 'S'}tate", saved) == OK
         instance.free()
 
 
