@@ -220,6 +220,7 @@ def test_at_the_start(library: Library, kind: str) -> None:
         close(found, right, size)
         sums_close(instance, of.unknowns, knowns, right, size)
         assert not call(instance, False, of.unknowns, ["solver.tolerance"], [1.0]).any()
+        assert not call(instance, False, ["time"], knowns, [1.0] * len(knowns)).any()
         if number < 3:
             close(by_differences(instance, of.unknowns, knowns), right, size, 1e-6)
         instance.free()
@@ -345,6 +346,7 @@ def test_output_derivatives(library: Library, fresh: bool) -> None:
         moving = np.array([slopes.get(name, 0.0) for name in of.mechanism.input_names])
         right = whole @ np.concatenate([rates, moving])
         found = output_slopes(instance, of.unknowns)
+        assert output_slopes(instance, ["time"]) == 1.0
         scale = np.abs(whole) @ np.abs(np.concatenate([rates, moving])) + 1.0
         # a residual, and a moment that a free shaft's bearing does not take, are small differences of others
         scale = np.where(
