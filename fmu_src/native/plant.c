@@ -115,8 +115,9 @@ bool plant_jump(Plant *a)
     bool marked[ROOM(COMMANDS)];
     for (int c = 0; c < COMMANDS; c++) {
         double value = a->given[input_at[commands[c].input]];
-        marked[c] = value != a->applied[c];
-        a->applied[c] = value;
+        marked[c] = isfinite(value) && value != a->applied[c]; /* the state stays good: solver.status tells of the input */
+        if (marked[c])
+            a->applied[c] = value;
     }
     return apply(a, marked, a->x);
 }

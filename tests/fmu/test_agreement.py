@@ -236,6 +236,23 @@ def test_model_exchange_ends_at_the_limit_of_assembly(natives: dict[str, Path]) 
         np.testing.assert_array_equal(run.time[:-1], within.time[:-1])
 
 
+@pytest.mark.parametrize("file", ["FiveBarSlider-native", "FiveBarSlider-native-fmi3"])
+def test_a_command_that_is_not_finite_does_not_reach_the_state(
+    natives: dict[str, Path], tmp_path: Path, file: str
+) -> None:
+    instance = Library(natives[file], tmp_path / "library").instance("me").start(drive__speed=44.0)
+    states = instance.states()
+    assert put(instance, {"drive.speed": nan}) == OK
+    assert instance.discrete() == (False, False)
+    assert instance.states() == states
+    assert instance.status() == 2
+    assert put(instance, {"drive.speed": 45.0}) == OK
+    assert instance.discrete() == (False, True)
+    assert instance.status() == 0
+    assert instance.get("crank.speed") == [45.0]
+    assert np.isfinite(instance.states()).all()
+
+
 def test_inputs_that_fail_under_cvode_are_named(natives: dict[str, Path]) -> None:
     def run(function: Any) -> None:
         inputs = Inputs(speed=44.0, force=Function(function))
