@@ -25,7 +25,13 @@ from ..conftest import NATIVE_MECHANISMS
 ROOT = Path(__file__).resolve().parents[2]
 SHELL = ROOT / "fmu_src" / "native"
 #: The tests that call native FMUs function by function.
-TESTS = ("test_native_calls.py", "test_native_runs.py")
+TESTS = (
+    "test_native_calls.py",
+    "test_native_runs.py",
+    "test_derivatives.py",
+    "test_agreement.py::test_states_of_another_kind_are_refused",
+    "test_agreement.py::test_a_command_that_is_not_finite_does_not_reach_the_state",
+)
 
 #: Lines that no test reaches, and lines with a branch that none takes, by a part of their text: why.
 NOT_REACHED = {
