@@ -1,32 +1,48 @@
-"""Cost of a communication step of the FMU, beside a trivial slave and beside the in-process solver.
+"""Cost of a communication step: of every kind of FMU, from a host in C and through FMPy, beside what is bare.
 
     python -m benchmarks.fmu
 
-Table 3.1 at 420 rpm, steps of 1 ms through FMPy, all inputs set and all outputs read at each step; the trivial slave has
-as many variables and does nothing. Each row is the best of several runs.
+Table 3.1 at 420 rpm, steps of 1 ms. In each step all inputs are set and all outputs read. The trivial slave of PythonFMU has
+as many variables and does nothing; the smallest native FMU is a pendulum. Each number is the best of several runs. The
+right-hand sides of a step are counted, and timed in a C loop of their own at the states that the steps call them with.
 """
 
 from __future__ import annotations
 
+import subprocess
+import sysconfig
 import tempfile
 import time
+from collections.abc import Callable
 from pathlib import Path
 
 from fmpy import extract, read_model_description
 from fmpy.fmi2 import FMU2Slave
+from fmpy.fmi3 import FMU3Slave
 from pythonfmu.builder import FmuBuilder
 from rich.console import Console
 from rich.table import Table
 
 from analysis import Inputs, simulate
-from analysis.export import build
-from build_fmu import FMUS
+from analysis.export import (
+    NATIVE,
+    NATIVE_FMI3,
+    PLATFORMS,
+    build,
+    build_native,
+    compile_library,
+    source_files,
+    this_platform,
+)
 from linkwork.five_bar import MECHANISM
 from linkwork.plant import Plant
+from tests.fmu.c_host import compile_host, run_host, unpack
+from tests.mechanisms.pendulum import MECHANISM as PENDULUM
 
 STEP = 1e-3
 STEPS = 430
-REPEATS = 5
+REPEATS = 7
+GOALS = (2.0, 100.0)  # times the bare right-hand sides, at most; times less than the Python FMU, at least
 
 TRIVIAL = """
 from pythonfmu import Fmi2Causality, Fmi2Slave, Real
@@ -37,7 +53,7 @@ class Trivial(Fmi2Slave):
         super().__init__(**kwargs)
         for i in range(6):
             setattr(self, f"i{i}", 0.0)
-            self.register_variable(Real(f"i{i}", causality=Fmi2Causality.input))
+            self.register_variable(Real(f"i{i}", causality=Fmi2Causality.input, start=0.0))
         for i in range(27):
             setattr(self, f"o{i}", 0.0)
             self.register_variable(Real(f"o{i}", causality=Fmi2Causality.output))
@@ -47,105 +63,136 @@ class Trivial(Fmi2Slave):
 """
 
 
-def seconds_per_step(fmu: Path) -> tuple[float, float]:
-    """Best time of a step with its inputs set and outputs read, and of the bare ``doStep`` (s)."""
+def best(measure: Callable[[], float]) -> float:
+    """Least of several measurements."""
+    return min(measure() for _ in range(REPEATS))
+
+
+def by_fmpy(fmu: Path) -> float:
+    """Time of a step through FMPy, inputs set and outputs read (s)."""
     description = read_model_description(str(fmu))
-    folder = extract(str(fmu))
-    reals = [v for v in description.modelVariables if v.type == "Real"]
+    fmi3 = description.fmiVersion == "3.0"
+    reals = [v for v in description.modelVariables if v.type in ("Real", "Float64")]
     inputs = [v.valueReference for v in reals if v.causality == "input"]
     starts = [float(v.start) for v in reals if v.causality == "input"]
     outputs = [v.valueReference for v in reals if v.causality == "output"]
-    whole, bare = [], []
-    for _ in range(REPEATS):
-        slave = FMU2Slave(
-            guid=description.guid,
-            unzipDirectory=folder,
-            modelIdentifier=description.coSimulation.modelIdentifier,
-            instanceName="benchmark",
-        )
-        slave.instantiate()
+    slave = (FMU3Slave if fmi3 else FMU2Slave)(
+        guid=description.instantiationToken if fmi3 else description.guid,
+        unzipDirectory=extract(str(fmu)),
+        modelIdentifier=description.coSimulation.modelIdentifier,
+        instanceName="benchmark",
+    )
+    slave.instantiate()
+    if not fmi3:
         slave.setupExperiment(startTime=0.0)
-        slave.enterInitializationMode()
-        slave.exitInitializationMode()
-        inside = 0.0
-        begun = time.perf_counter()
-        for k in range(STEPS):
-            slave.setReal(inputs, starts)
-            before = time.perf_counter()
-            slave.doStep(k * STEP, STEP)
-            inside += time.perf_counter() - before
-            slave.getReal(outputs)
-        whole.append((time.perf_counter() - begun) / STEPS)
-        bare.append(inside / STEPS)
-        slave.terminate()
-        if hasattr(slave.dll, "finalizePythonInterpreter"):
-            # else PythonFMU's library uses, when it is unloaded, what it has freed; our slaves see to it themselves
-            slave.dll.finalizePythonInterpreter()
-        slave.freeInstance()
-    return min(whole), min(bare)
+    slave.enterInitializationMode()
+    slave.exitInitializationMode()
+    put, read = (slave.setFloat64, slave.getFloat64) if fmi3 else (slave.setReal, slave.getReal)
+    begun = time.perf_counter()
+    for k in range(STEPS):
+        put(inputs, starts)
+        slave.doStep(k * STEP, STEP)
+        read(outputs)
+    took = (time.perf_counter() - begun) / STEPS
+    slave.terminate()
+    if hasattr(slave.dll, "finalizePythonInterpreter"):
+        # else PythonFMU's library uses, when it is unloaded, what it has freed; our slaves see to it themselves
+        slave.dll.finalizePythonInterpreter()
+    slave.freeInstance()
+    return took
 
 
-def plain_step() -> tuple[float, float]:
-    """Best time of a step and its outputs of the plant in plain Python, and of one right-hand side (s)."""
+def by_host(host: Path, fmu: Path, folder: Path) -> float:
+    """Best time of a step from the host in C, inputs set and outputs read (s)."""
+    unpacked = unpack(fmu, folder / fmu.stem)
+    inputs = {s.name: float(s.attributes["start"]) for s in unpacked.reals("input")}
+    native = (unpacked.folder / "sources").is_dir()
+    # PythonFMU's library expects that of Python in the process
+    preload = {} if native else {"LD_PRELOAD": str(sysconfig.get_config_var("INSTSONAME"))}
+
+    def measure() -> float:
+        run = run_host(host, unpacked, {}, inputs=inputs, steps=STEPS, step=STEP, environment=preload)
+        assert run["status"] == 0, run["logged"]
+        return float(run["microseconds"]) * 1e-6
+
+    return best(measure)
+
+
+def right_hand_sides(folder: Path) -> tuple[float, float]:
+    """How many right-hand sides a step makes, and the best time of a bare one (s)."""
+    files = source_files(MECHANISM, NATIVE)
+    driver = Path(__file__).with_name("right_hand_sides.c")
+    for name, text in files.items():
+        (folder / name).write_text(text, encoding="utf-8")
+    sources = [name for name in files if name.endswith(".c") and name != "equations.c"]
+    options = ("-std=c11", "-O2", "-ffp-contract=off", "-fno-sanitize=undefined", "-D_GNU_SOURCE", "-I.")
+    target = PLATFORMS[this_platform()].target
+    compile_library(folder, [str(driver), *sources], "right_hand_sides", target, options)
+    command = [str(folder / "right_hand_sides"), str(STEPS), str(STEP), "200"]
+    counted, nanoseconds, _ = subprocess.run(
+        command, input="", capture_output=True, text=True, check=True
+    ).stdout.split()
+    return float(counted), float(nanoseconds) * 1e-9
+
+
+def plain_step() -> float:
+    """Time of a step and its outputs of the plant in plain Python (s)."""
     entry = MECHANISM.published["table-3.1"]
-    steps, sides = [], []
-    for _ in range(REPEATS):
-        plant = Plant(
-            MECHANISM, entry.parameters, entry.initial, inputs={"drive.speed": entry.crank_speed}, drive_mode=1
-        )
-        begun = time.perf_counter()
-        for k in range(STEPS):
-            plant.step(k * STEP, STEP)
-            plant.outputs()
-        steps.append((time.perf_counter() - begun) / STEPS)
-        equations, p = MECHANISM.equations, entry.parameters.constants()
-        i = equations.applied((1.0,), tuple(plant.inputs.values()), p)
-        begun = time.perf_counter()
-        for _ in range(STEPS):
-            equations.derivative(plant.state, i, p)
-        sides.append((time.perf_counter() - begun) / STEPS)
-    return min(steps), min(sides)
+    plant = Plant(MECHANISM, entry.parameters, entry.initial, inputs={"drive.speed": entry.crank_speed}, drive_mode=1)
+    begun = time.perf_counter()
+    for k in range(STEPS):
+        plant.step(k * STEP, STEP)
+        plant.outputs()
+    return (time.perf_counter() - begun) / STEPS
 
 
 def compiled_step() -> float:
-    """Best time of a step in process, inputs held as the FMU's (s)."""
+    """Time of a step in process, inputs held as the FMU's (s)."""
     entry = MECHANISM.published["table-3.1"]
-    inputs = Inputs(speed=entry.crank_speed)
-    times = []
-    for _ in range(1 + REPEATS):
-        begun = time.perf_counter()
-        run = simulate(entry.parameters, inputs, stop_time=STEPS * STEP, step=STEP, hold=STEP)
-        assert run.status == 0
-        times.append((time.perf_counter() - begun) / STEPS)
-    # the first one loads what is compiled
-    return min(times[1:])
+    begun = time.perf_counter()
+    run = simulate(entry.parameters, Inputs(speed=entry.crank_speed), stop_time=STEPS * STEP, step=STEP, hold=STEP)
+    assert run.status == 0
+    return (time.perf_counter() - begun) / STEPS
 
 
 def main() -> None:
     """Measure and print the table."""
-    with tempfile.TemporaryDirectory() as folder:
-        script = Path(folder) / "trivial_slave.py"
-        script.write_text(TRIVIAL)
-        trivial = seconds_per_step(Path(FmuBuilder.build_FMU(script, dest=folder, needsExecutionTool=False)))
-        ours = seconds_per_step(build(FMUS["FiveBarSlider"], folder))
-    plain, side = plain_step()
-
-    table = Table(title=f"Table 3.1 at 420 rpm, 1 ms steps, tolerance 1e-9; best of {REPEATS}")
-    for heading in ("what", "microseconds a step", "times the trivial slave", "of real time"):
-        table.add_column(heading, justify="left" if heading == "what" else "right")
-    rows = (
-        ("FMU through FMPy, inputs set and outputs read", ours[0]),
-        ("FMU through FMPy, doStep alone", ours[1]),
-        ("trivial slave, inputs set and outputs read", trivial[0]),
-        ("trivial slave, doStep alone", trivial[1]),
-        ("the plant in plain Python, without FMI", plain),
-        ("in process, compiled, inputs held likewise", compiled_step()),
-    )
-    for what, seconds in rows:
-        table.add_row(what, f"{seconds * 1e6:.2f}", f"{seconds / trivial[0]:.2f}", f"{seconds / STEP:.2%}")
     console = Console()
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        script = folder / "trivial_slave.py"
+        script.write_text(TRIVIAL)
+        fmus = {
+            "Python FMU": build(MECHANISM, folder),
+            "native FMU, FMI 2.0": build_native(MECHANISM, NATIVE, folder),
+            "native FMU, FMI 3.0": build_native(MECHANISM, NATIVE_FMI3, folder),
+            "PythonFMU's trivial slave": Path(FmuBuilder.build_FMU(script, dest=folder, needsExecutionTool=False)),
+            "smallest native FMU: a pendulum": build_native(PENDULUM, NATIVE, folder),
+        }
+        host = compile_host(folder)
+        seconds = {what: (by_host(host, fmu, folder), best(lambda f=fmu: by_fmpy(f))) for what, fmu in fmus.items()}
+        counted, bare = right_hand_sides(folder)
+
+    compiled_step()  # the first one loads what is compiled
+    table = Table(title=f"Table 3.1 at 420 rpm, 1 ms steps, tolerance 1e-9; microseconds a step, best of {REPEATS}")
+    for heading in ("what", "from C", "through FMPy"):
+        table.add_column(heading, justify="left" if heading == "what" else "right")
+    rows: dict[str, tuple[float | None, float | None]] = {
+        **seconds,
+        f"{counted:.2f} bare right-hand sides of {bare * 1e9:.0f} ns": (counted * bare, None),
+        "the plant in plain Python, without FMI": (None, best(plain_step)),
+        "in process, compiled, inputs held likewise": (None, best(compiled_step)),
+    }
+    for what, pair in rows.items():
+        table.add_row(what, *("" if value is None else f"{value * 1e6:.2f}" for value in pair))
     console.print(table)
-    console.print(f"one right-hand side in plain Python: {side * 1e6:.2f} microseconds", highlight=False)
+    python, native = (seconds[what][0] for what in ("Python FMU", "native FMU, FMI 2.0"))
+    for what, ratio, goal, met in (
+        ("times its bare right-hand sides", native / (counted * bare), f"at most {GOALS[0]:g}", GOALS[0].__ge__),
+        ("times less than the Python FMU", python / native, f"at least {GOALS[1]:g}", GOALS[1].__le__),
+    ):
+        verdict = "met" if met(ratio) else "missed"
+        console.print(f"native FMU from C: {ratio:.2f} {what}; goal {goal}: {verdict}", highlight=False)
 
 
 if __name__ == "__main__":

@@ -2,7 +2,7 @@
 
 from .archive import SOURCES, BuildError, try_out
 from .description import KINDS, NATIVE, NATIVE_FMI3, PYTHON, Kind
-from .native_fmu import PLATFORMS, build_native, this_platform
+from .native_fmu import PLATFORMS, build_native, compile_library, source_files, this_platform
 from .python_fmu import build
 
 __all__ = [
@@ -16,6 +16,8 @@ __all__ = [
     "Kind",
     "build",
     "build_native",
+    "compile_library",
+    "source_files",
     "this_platform",
     "try_out",
 ]

@@ -26,6 +26,6 @@ def short_benchmark(root: str) -> str:
 
 def test_benchmark() -> None:
     root = Path(benchmarks.fmu.__file__).resolve().parents[1]
-    output = run_in_process(short_benchmark, root, options=())
-    assert "FMU through FMPy" in output
-    assert "one right-hand side in plain Python" in output
+    output = run_in_process(short_benchmark, root, options=(), timeout=300.0)
+    for what in ("through FMPy", "native FMU, FMI 3.0", "bare right-hand sides", "times less than the Python FMU"):
+        assert what in output
