@@ -51,6 +51,8 @@ $(RUN): pyproject.toml | $(BIN)/pip
 
 $(DEV): pyproject.toml | $(BIN)/pip
 	$(BIN)/pip install --quiet --editable '.[dev]'
+# CoFMUPy wants one version of FMPy and others of what it does not import: a folder of its own, for the tests of that master
+	$(BIN)/pip install --quiet --no-deps --upgrade --target $(VENV)/cofmupy cofmupy==1.0.0 fmpy==0.3.20
 	@touch $@ $(RUN)
 
 $(BIN)/pip:

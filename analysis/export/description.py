@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
 import linkwork
-from linkwork.mechanism import Mechanism, Mode
+from linkwork.mechanism import Mechanism
 from linkwork.parameters import field_name
 from linkwork.plant import Plant
 from linkwork.variables import UNITS, Variable
@@ -161,8 +161,6 @@ def description(mechanism: Mechanism, kind: Kind, sources: Sequence[str] = ()) -
             for source in sources:
                 SubElement(listed, "File", {"name": source})
     root.append(_unit_definitions(entries))
-    if kind.native and mechanism.modes:
-        root.append(_type_definitions(mechanism, kind))
     categories = SubElement(root, "LogCategories")
     for status in LOG_CATEGORIES:
         text = f"Log messages with fmi{kind.fmi}{status} status."
@@ -203,24 +201,8 @@ def _unit_definitions(entries: Iterable[Entry]) -> Element:
     return definitions
 
 
-def _type_name(mode: Mode) -> str:
-    # no variable may have the name of a type
-    return "".join(part.capitalize() for part in mode.name.split("."))
-
-
-def _type_definitions(mechanism: Mechanism, kind: Kind) -> Element:
-    definitions = Element("TypeDefinitions")
-    for mode in mechanism.modes:
-        if kind.fmi == 2:
-            node = SubElement(SubElement(definitions, "SimpleType", {"name": _type_name(mode)}), "Enumeration")
-        else:
-            node = SubElement(definitions, "EnumerationType", {"name": _type_name(mode)})
-        for value, word in enumerate(mode.values):
-            SubElement(node, "Item", {"name": word, "value": str(value)})
-    return definitions
-
-
-#: Names of the types of variables in each version of FMI.
+#: Names of the types of variables in each version of FMI. Modes are integers, not enumerations: of the masters in the tests,
+#: libcosim, ecos and PathSim can set no enumeration.
 _TYPES = {
     2: {"Real": "Real", "Integer": "Integer", "String": "String"},
     3: {"Real": "Float64", "Integer": "Int32", "String": "String"},
@@ -231,7 +213,6 @@ _INITIAL = {"parameter": "exact", "output": "approx", "local": "calculated"}
 
 
 def _variables(mechanism: Mechanism, kind: Kind, entries: Iterable[Entry]) -> Element:
-    modes = {mode.name: _type_name(mode) for mode in mechanism.modes} if kind.native else {}
     plant = _started(mechanism)
     starts = dict(zip(mechanism.output_names, plant.outputs()))
     scale = dict(zip(states(mechanism), mechanism.error_scale(plant.parameters, plant.state))) if kind.native else {}
@@ -258,9 +239,6 @@ def _variables(mechanism: Mechanism, kind: Kind, entries: Iterable[Entry]) -> El
         if entry.reference in reinitialised:
             value["reinit"] = "true"
         tag = _TYPES[kind.fmi][variable.kind]
-        if variable.name in modes:
-            tag = "Enumeration"
-            value["declaredType"] = modes[variable.name]
         if kind.fmi == 2:
             SubElement(SubElement(listed, "ScalarVariable", attributes), tag, value)
             continue

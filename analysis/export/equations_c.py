@@ -251,13 +251,12 @@ _KINDS = {"Real": "REAL", "Integer": "INTEGER", "String": "STRING"}
 
 def _row(mechanism: Mechanism, entry: Entry) -> str:
     v = entry.variable
-    mode = entry.role == "mode"
     causality = {"parameter": "PARAMETER", "input": "INPUT"}.get(v.causality, "COMPUTED")
     rule, low, high, requirement = _rule(mechanism, entry) if causality == "PARAMETER" else ("ANY", 0.0, 0.0, "")
     cells = (
         _text(v.name),
         _text(v.unit),
-        "ENUMERATION" if mode else _KINDS[v.kind],
+        _KINDS[v.kind],
         causality,
         _number(v.start) if causality != "COMPUTED" else "0.0",  # type: ignore[arg-type]
         _place(mechanism, entry),

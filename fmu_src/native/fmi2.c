@@ -51,12 +51,6 @@ fmi2Status fmi2EnterInitializationMode(fmi2Component component)
 
 /* Values */
 
-/* Enumerations are integers here. */
-static Kind integer_kind(Reference reference)
-{
-    return reference < VARIABLES && variables[reference].kind == ENUMERATION ? ENUMERATION : INTEGER;
-}
-
 fmi2Status fmi2GetReal(fmi2Component component, const Reference references[], size_t count, fmi2Real values[])
 {
     ALLOW(SETTLED)
@@ -68,7 +62,7 @@ fmi2Status fmi2GetInteger(fmi2Component component, const Reference references[],
 {
     ALLOW(SETTLED)
     NEED(ARRAYS)
-    EACH(instance_get_integer(c, __func__, references[i], integer_kind(references[i]), &values[i]))
+    EACH(instance_get_integer(c, __func__, references[i], &values[i]))
 }
 
 fmi2Status fmi2GetString(fmi2Component component, const Reference references[], size_t count, fmi2String values[])
@@ -101,7 +95,7 @@ fmi2Status fmi2SetInteger(fmi2Component component, const Reference references[],
 {
     ALLOW(SETTABLE)
     NEED(ARRAYS)
-    EACH(instance_set(c, __func__, references[i], integer_kind(references[i]), values[i]))
+    EACH(instance_set(c, __func__, references[i], INTEGER, values[i]))
 }
 
 fmi2Status fmi2SetString(fmi2Component component, const Reference references[], size_t count, const fmi2String values[])

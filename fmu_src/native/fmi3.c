@@ -92,21 +92,11 @@ fmi3Status fmi3EnterInitializationMode(fmi3Instance component, fmi3Boolean toler
         EACH(call)                                                                                                  \
     }
 
-static Status get_enumeration(Instance *c, const char *function, Reference reference, fmi3Int64 *value)
-{
-    int number;
-    Status status = instance_get_integer(c, function, reference, ENUMERATION, &number);
-    *value = number;
-    return status;
-}
-
 GET(Float64, instance_get(c, __func__, references[i], REAL, &values[i]))
-GET(Int32, instance_get_integer(c, __func__, references[i], INTEGER, &values[i]))
-GET(Int64, get_enumeration(c, __func__, references[i], &values[i]))
+GET(Int32, instance_get_integer(c, __func__, references[i], &values[i]))
 GET(String, instance_get_text(c, __func__, references[i], &values[i]))
 SET(Float64, SETTABLE | CONTINUOUS | INTERMEDIATE, instance_set(c, __func__, references[i], REAL, values[i]))
 SET(Int32, SETTABLE, instance_set(c, __func__, references[i], INTEGER, values[i]))
-SET(Int64, SETTABLE, instance_set(c, __func__, references[i], ENUMERATION, (double)values[i]))
 
 /* What there is none of: strings to set, other types, clocks, structural parameters, dependencies by element, scheduled execution */
 
@@ -133,6 +123,7 @@ NONE_OF(UInt8)
 NONE_OF(Int16)
 NONE_OF(UInt16)
 NONE_OF(UInt32)
+NONE_OF(Int64)
 NONE_OF(UInt64)
 NONE_OF(Boolean)
 NONE_OF_CLOCKS(SetString, const fmi3String values[], size_t count)

@@ -176,7 +176,7 @@ Status instance_exit_initialization(Instance *c)
 
 static const Variable *variable(Instance *c, const char *function, unsigned reference, Kind kind)
 {
-    static const char *const names[] = {"Real or Float64", "Integer or Int32", "Enumeration", "String"};
+    static const char *const names[] = {"Real or Float64", "Integer or Int32", "String"};
     if (reference >= VARIABLES) {
         instance_say(c, ERROR, "%s: there is no variable with the value reference %u", function, reference);
         return NULL;
@@ -233,10 +233,10 @@ Status instance_get(Instance *c, const char *function, unsigned reference, Kind 
     return OK;
 }
 
-Status instance_get_integer(Instance *c, const char *function, unsigned reference, Kind kind, int *value)
+Status instance_get_integer(Instance *c, const char *function, unsigned reference, int *value)
 {
     double number;
-    if (instance_get(c, function, reference, kind, &number) != OK)
+    if (instance_get(c, function, reference, INTEGER, &number) != OK)
         return ERROR;
     *value = (int)number;
     return OK;

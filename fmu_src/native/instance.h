@@ -77,9 +77,9 @@ Status instance_say(const Instance *c, Status status, const char *format, ...);
 Status instance_setup(Instance *c, bool tolerance_given, double tolerance, double start, bool stop_given, double stop);
 Status instance_exit_initialization(Instance *c);
 
-/* Values: `kinds` is one of the kinds that a function is for, or two. */
+/* Values */
 Status instance_get(Instance *c, const char *function, unsigned reference, Kind kind, double *value);
-Status instance_get_integer(Instance *c, const char *function, unsigned reference, Kind kind, int *value);
+Status instance_get_integer(Instance *c, const char *function, unsigned reference, int *value);
 Status instance_get_text(Instance *c, const char *function, unsigned reference, const char **value);
 Status instance_set(Instance *c, const char *function, unsigned reference, Kind kind, double value);
 Status instance_set_slope(Instance *c, const char *function, unsigned reference, int order, double slope);

@@ -7,7 +7,7 @@
 /* C has no arrays of no elements: a mechanism may have no inputs and no modes */
 #define ROOM(count) ((count) > 0 ? (count) : 1)
 
-typedef enum { REAL, INTEGER, ENUMERATION, STRING } Kind;
+typedef enum { REAL, INTEGER, STRING } Kind;
 
 /* COMPUTED: outputs and locals */
 typedef enum { PARAMETER, INPUT, COMPUTED } Causality;

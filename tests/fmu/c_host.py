@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import ctypes
 import json
 import os
 import subprocess
+import sysconfig
 import tempfile
 import zipfile
 from collections.abc import Mapping, Sequence
@@ -12,6 +14,8 @@ from importlib import resources
 from pathlib import Path
 from typing import Any, NamedTuple
 from xml.etree import ElementTree
+
+import pytest
 
 from analysis.export import PLATFORMS, compile_library, this_platform
 
@@ -29,6 +33,17 @@ def compile_host(folder: Path, platform: str | None = None) -> Path:
     options = ("-std=c11", "-O2", "-D_GNU_SOURCE", "-Wall", "-Wextra", "-Werror", "-I", headers)
     compile_library(folder, [str(SOURCE)], name, PLATFORMS[platform].target, (*options, *libraries))
     return folder / name
+
+
+def libpython() -> str:
+    """Name of Python's own library, which a master in C has to load before the Python FMU; a test that needs it is skipped
+    where there is none."""
+    name = sysconfig.get_config_var("INSTSONAME") or ""
+    try:
+        ctypes.CDLL(name or "libpython3.so")
+    except OSError:
+        pytest.skip(f"there is no library {name} of this Python for a master in C to load")
+    return name
 
 
 class Unpacked(NamedTuple):

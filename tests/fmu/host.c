@@ -5,7 +5,7 @@
    runs as many instances, so many at a time, through so many steps, all alike. Lines of the plan:
 
        r REFERENCE VALUE       a real that is set before the initialisation
-       m REFERENCE VALUE       an integer or enumeration that is set before the initialisation
+       m REFERENCE VALUE       an integer that is set before the initialisation
        i REFERENCE VALUE       a real input that is set before each step
        c REFERENCE VALUE STEP  a real input that is set before the step of this number, and from then on
        o REFERENCE             a real that is read after each step
@@ -131,9 +131,8 @@ static void begin(Run *run)
     set(c, &reals, 0, reals.count);
     for (size_t i = 0; i < modes.count; i++) {
         int whole = (int)modes.value[i];
-        fmi3Int64 label = whole;
         need(fmi == 2 ? (int)FMI2(SetInteger)(c, &modes.reference[i], 1, &whole)
-                      : (int)FMI3(SetInt64)(c, &modes.reference[i], 1, &label, 1), "set a mode");
+                      : (int)FMI3(SetInt32)(c, &modes.reference[i], 1, &whole, 1), "set a mode");
     }
     if (fmi == 2) {
         need(FMI2(SetupExperiment)(c, 0, 0.0, 0.0, 0, 0.0), "setup");
@@ -162,43 +161,46 @@ static int event(void *c)
     return ended;
 }
 
-static void slope(void *c, double time, const double x[], double result[])
+static int slope(void *c, double time, const double x[], double result[])
 {
     size_t n = (size_t)states;
     if (fmi == 2) {
         need(FMI2(SetTime)(c, time), "time");
         need(FMI2(SetContinuousStates)(c, x, n), "states");
-        need(FMI2(GetDerivatives)(c, result, n), "derivatives");
-    } else {
-        need(FMI3(SetTime)(c, time), "time");
-        need(FMI3(SetContinuousStates)(c, x, n), "states");
-        need(FMI3(GetContinuousStateDerivatives)(c, result, n), "derivatives");
+        return (int)FMI2(GetDerivatives)(c, result, n);
     }
+    need(FMI3(SetTime)(c, time), "time");
+    need(FMI3(SetContinuousStates)(c, x, n), "states");
+    return (int)FMI3(GetContinuousStateDerivatives)(c, result, n);
 }
 
-static void runge_kutta(void *c, double time, double h)
+/* A step by the classical method; where the equations are not defined the state is left as it was. */
+static int runge_kutta(void *c, double time, double h)
 {
     double x[MOST], y[MOST], k[4][MOST];
     static const double at[] = {0.0, 0.5, 0.5, 1.0};
     size_t n = (size_t)states;
+    int status = 0;
     need(fmi == 2 ? (int)FMI2(GetContinuousStates)(c, x, n) : (int)FMI3(GetContinuousStates)(c, x, n), "states");
-    for (int s = 0; s < 4; s++) {
+    for (int s = 0; s < 4 && status < 2; s++) {
         for (int i = 0; i < states; i++)
             y[i] = x[i] + (s ? h * at[s] * k[s - 1][i] : 0.0);
-        slope(c, time + at[s] * h, y, k[s]);
+        status = slope(c, time + at[s] * h, y, k[s]);
     }
-    for (int i = 0; i < states; i++)
+    for (int i = 0; i < states && status < 2; i++)
         x[i] += h / 6.0 * (k[0][i] + 2.0 * k[1][i] + 2.0 * k[2][i] + k[3][i]);
-    slope(c, time + h, x, y); /* leaves the state and the time there */
+    slope(c, status < 2 ? time + h : time, x, y); /* leaves state and time there */
+    return status;
 }
 
 static int advance(Run *run, double time)
 {
     void *c = run->component;
     if (exchange) {
-        for (int part = 0; part < PARTS; part++)
-            runge_kutta(c, time + part * (step_size / PARTS), step_size / PARTS);
-        return 0;
+        int status = 0;
+        for (int part = 0; part < PARTS && status < 2; part++)
+            status = runge_kutta(c, time + part * (step_size / PARTS), step_size / PARTS);
+        return status;
     }
     if (fmi == 2)
         return (int)call.step2(c, time, step_size, fmi2True);

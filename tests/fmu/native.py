@@ -6,7 +6,7 @@ import ctypes
 import re
 import zipfile
 from collections.abc import Iterator, Sequence
-from ctypes import POINTER, byref, c_char_p, c_double, c_int, c_int32, c_int64, c_size_t, c_uint32, c_void_p
+from ctypes import POINTER, byref, c_char_p, c_double, c_int, c_int32, c_size_t, c_uint32, c_void_p
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -144,11 +144,9 @@ class Instance:
         return status
 
     def set_integer(self, name: str, value: int) -> int:
-        """Set an integer or an enumeration."""
+        """Set an integer."""
         if self.library.fmi == 2:
             return self("SetInteger", *self.arrays([name], (c_int * 1)(value)))
-        if name.endswith(".mode"):
-            return self("SetInt64", *self.arrays([name], (c_int64 * 1)(value)))
         return self("SetInt32", *self.arrays([name], (c_int32 * 1)(value)))
 
     def text(self, name: str = "solver.message") -> str:

@@ -375,8 +375,7 @@ def test_variable(
     scalar = scalars(description)[name]
     value = scalar.attributes
     assert value["causality"] == causality
-    mode = name in ("drive.mode", "axial.mode") and kind != "python"
-    assert scalar.kind == ("Enumeration" if mode else type_name)
+    assert scalar.kind == type_name
     assert value["variability"] == {"parameter": "fixed"}.get(
         causality, "continuous" if type_name == "Real" else "discrete"
     )
@@ -401,26 +400,6 @@ def test_variable(
     # shafts turn in rpm; the rod's angular velocity is a vector in space
     display = None if name.startswith("rod.w") else {"rad": "deg", "rad/s": "rpm"}.get(unit)
     assert value.get("displayUnit") == display
-
-
-#: Words of the values of each mode.
-WORDS = {"drive.mode": ["torque", "speed"], "axial.mode": ["force", "speed", "groove"]}
-
-
-@pytest.mark.parametrize("kind", ["native", "native-fmi3"], indirect=True)
-def test_modes_are_enumerations_in_native_fmus(description: Element, model: Model, kind: str) -> None:
-    types = {}
-    for node in description.find("TypeDefinitions"):
-        items = node[0] if KINDS[kind].fmi == 2 else node
-        assert items.tag == {2: "Enumeration", 3: "EnumerationType"}[KINDS[kind].fmi]
-        types[node.get("name")] = [(item.get("name"), item.get("value")) for item in items]
-    modes = [s for s in read_scalars(description) if s.kind == "Enumeration"]
-    assert [s.name for s in modes] == [mode.name for mode in FMUS[model.name].modes]
-    assert len(types) == len(modes)
-    assert not set(types) & set(scalars(description)), "a type and a variable of one name"
-    for scalar in modes:
-        items = types[scalar.attributes["declaredType"]]
-        assert items == [(word, str(value)) for value, word in enumerate(WORDS[scalar.name])]
 
 
 def test_unit_definitions(description: Element, model: Model, kind: str) -> None:

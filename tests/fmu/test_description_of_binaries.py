@@ -28,7 +28,7 @@ class Fmu(NamedTuple):
         instance = instantiate_fmu(self.folder, self.description, "ModelExchange")
         reference = {v.name: v.valueReference for v in self.description.modelVariables}
         for name, value in (modes or {}).items():
-            (instance.setInteger if fmi2 else instance.setInt64)([reference[name]], [value])
+            (instance.setInteger if fmi2 else instance.setInt32)([reference[name]], [value])
         if fmi2:
             instance.setupExperiment(startTime=0.0)
         instance.enterInitializationMode()

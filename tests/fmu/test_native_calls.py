@@ -71,11 +71,9 @@ ALLOWED: dict[int, dict[str, tuple[set[str], set[str]]]] = {
         "Reset": ({"cs", "me"}, ANY),
         "GetFloat64": ({"cs", "me"}, ANY),
         "GetInt32": ({"cs", "me"}, ANY),
-        "GetInt64": ({"cs", "me"}, ANY),
         "GetString": ({"cs", "me"}, ANY),
         "SetFloat64": ({"cs", "me"}, SET | {"continuous"}),
         "SetInt32": ({"cs", "me"}, {"instantiated", "initialization"}),
-        "SetInt64": ({"cs", "me"}, {"instantiated", "initialization"}),
         "GetFMUState": ({"cs", "me"}, ANY),
         "SetFMUState": ({"cs", "me"}, ANY),
         "FreeFMUState": ({"cs", "me"}, ANY),
@@ -113,7 +111,19 @@ EMPTY = {
     2: ("GetBoolean", "SetBoolean"),
     3: tuple(
         f"{verb}{kind}"
-        for kind in ("Float32", "Int8", "UInt8", "Int16", "UInt16", "UInt32", "UInt64", "Boolean", "Binary", "Clock")
+        for kind in (
+            "Float32",
+            "Int8",
+            "UInt8",
+            "Int16",
+            "UInt16",
+            "UInt32",
+            "Int64",
+            "UInt64",
+            "Boolean",
+            "Binary",
+            "Clock",
+        )
         for verb in ("Get", "Set")
     )
     + tuple(
@@ -158,12 +168,10 @@ class Good:
             return (self.out, n, self.number, *values)
         if name in ("SetReal", "SetFloat64"):
             return (self.force, n, self.number, *values)
-        if "Integer" in name or name.endswith(("Int32", "Int64")):
+        if "Integer" in name or name.endswith("Int32"):
             if name.endswith("Status"):
                 return (3, (c_int * 1)())
-            kind = "drive.mode" if name.endswith("Int64") else "assembly.branch"
-            number = ((c_int64 if name.endswith("Int64") else c_int32) * 1)(1)
-            return ((c_uint32 * 1)(c.library.references[kind]), n, number, *values)
+            return ((c_uint32 * 1)(c.library.references["drive.mode"]), n, (c_int32 * 1)(1), *values)
         if name == "GetString":
             return ((c_uint32 * 1)(c.library.references["solver.message"]), n, (c_char_p * 1)(), *values)
         if name.lower() == "getfmustate":
@@ -313,10 +321,10 @@ def test_references_and_types(library: Library) -> None:
     def get(name: str, reference: int) -> int:
         return c(name, (c_uint32 * 1)(reference), c_size_t(1), (c_int64 * 1)(), c_size_t(1))
 
-    integers = ["GetInteger"] if library.fmi == 2 else ["GetInt32", "GetInt64"]
+    integer = "GetInteger" if library.fmi == 2 else "GetInt32"
     for name, wrong in (
         (c.real("Get"), ("solver.status", "drive.mode", "solver.message")),
-        *((integer, ("crank.angle", "solver.message")) for integer in integers),
+        (integer, ("crank.angle", "solver.message")),
         ("GetString", ("crank.angle", "drive.mode", "solver.status")),
     ):
         for other in wrong:
@@ -331,9 +339,7 @@ def test_references_and_types(library: Library) -> None:
     assert c.set(**{"solver.status": 1}) == ERROR
     assert "solver.status is computed" in c.log[-1][1]
     c.start()
-    for name in integers:
-        wanted = "drive.mode" if name == "GetInt64" else "assembly.branch"
-        assert get(name, references[wanted]) == OK
+    assert get(integer, references["drive.mode"]) == OK
     assert c("SetString", *c.arrays(["solver.message"], (c_char_p * 1)(b"\xff"))) == ERROR
     assert c("SetString", None, c_size_t(1), None, c_size_t(1)) == ERROR
     assert c("SetString", None, c_size_t(0), None, c_size_t(0)) == OK

@@ -1,0 +1,221 @@
+"""The masters of the tests. Each of these functions runs in a process of its own, and imports what it needs inside itself.
+
+All run a case of 100 steps of 1 ms, in which one input changes after half of them. What they return has the outputs at the
+end and the time, if the master tells them, `solver.status` likewise, and in ``said`` whatever sentence reached the user.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+
+def by_fmpy(
+    fmu: str,
+    reals: dict[str, float],
+    integers: dict[str, int],
+    changed: str,
+    later: float,
+    outputs: list[str],
+    kind: str,
+) -> Any:
+    """The case by FMPy's own simulate_fmu; model exchange by CVode."""
+    import numpy as np
+    from fmpy import read_model_description, simulate_fmu
+    from fmpy.fmi1 import FMICallException
+
+    names = [v.name for v in read_model_description(fmu).modelVariables if v.causality == "input"]
+    before = [reals.get(name, 0.0) for name in names]
+    after = [later if name == changed else reals.get(name, 0.0) for name in names]
+    # the jump is where the communication point is: halves of rounded milliseconds would make a step of their own
+    half = 50 * 1e-3
+    signals = np.array(
+        [(0.0, *before), (half, *before), (half, *after), (0.1, *after)],
+        dtype=[("time", float), *((name, float) for name in names)],
+    )
+    said: list[str] = []
+    try:
+        result = simulate_fmu(
+            fmu,
+            fmi_type=kind,
+            stop_time=0.1,
+            step_size=1e-3,
+            output_interval=1e-3,
+            relative_tolerance=1e-10 if kind == "ModelExchange" else None,
+            start_values=reals | integers,
+            input=signals,
+            output=[*outputs, "solver.status"],
+            debug_logging=True,
+            # of FMI 2.0 and 3.0
+            logger=lambda *arguments: said.append(arguments[-1].decode()),
+        )
+    except FMICallException as error:
+        return {"said": [*said, str(error)]}
+    return {
+        "end": {name: float(result[-1][name]) for name in outputs},
+        "time": float(result[-1]["time"]),
+        "status": int(result[-1]["solver.status"]),
+        "said": said,
+    }
+
+
+def by_libcosimpy(
+    fmu: str,
+    reals: dict[str, float],
+    integers: dict[str, int],
+    changed: str,
+    later: float,
+    outputs: list[str],
+    kind: str,
+) -> Any:
+    """The case by libcosim's fixed-step algorithm."""
+    import zipfile
+    from xml.etree import ElementTree
+
+    from libcosimpy.CosimExecution import CosimExecution
+    from libcosimpy.CosimLogging import CosimLogLevel, log_output_level
+    from libcosimpy.CosimManipulator import CosimManipulator
+    from libcosimpy.CosimObserver import CosimObserver
+    from libcosimpy.CosimSlave import CosimLocalSlave
+
+    log_output_level(CosimLogLevel.DEBUG)
+    root = ElementTree.fromstring(zipfile.ZipFile(fmu).read("modelDescription.xml"))
+    reference = {v.get("name"): int(v.get("valueReference")) for v in root.find("ModelVariables")}
+    execution = CosimExecution.from_step_size(1_000_000)  # ns
+    slave = execution.add_local_slave(CosimLocalSlave(fmu_path=fmu, instance_name="slider"))
+    observer = CosimObserver.create_last_value()
+    execution.add_observer(observer)
+    override = CosimManipulator.create_override()
+    execution.add_manipulator(override)
+    for name, value in reals.items():
+        assert execution.real_initial_value(slave, reference[name], value)
+    for name, value in integers.items():
+        assert execution.integer_initial_value(slave, reference[name], value)
+    assert execution.step(50)
+    override.slave_real_values(slave, [reference[changed]], [later])
+    good = execution.step(50)
+    return {
+        "end": dict(zip(outputs, observer.last_real_values(slave, [reference[name] for name in outputs]))),
+        "time": execution.status().current_time * 1e-9,
+        "status": observer.last_integer_values(slave, [reference["solver.status"]])[0],
+        "said": [] if good else ["the step failed"],
+    }
+
+
+def by_ecospy(
+    fmu: str,
+    reals: dict[str, float],
+    integers: dict[str, int],
+    changed: str,
+    later: float,
+    outputs: list[str],
+    kind: str,
+) -> Any:
+    """The case by ecos."""
+    from ecospy import EcosSimulation, EcosSimulationStructure
+
+    with EcosSimulationStructure() as structure:
+        structure.add_model("slider", fmu)
+        structure.add_parameter_set("case", {f"slider::{name}": value for name, value in (reals | integers).items()})
+        with EcosSimulation(structure=structure, step_size=1e-3) as simulation:
+            simulation.init(parameter_set="case")
+            simulation.step(50)
+            simulation.set_real(f"slider::{changed}", later)
+            time = simulation.step(50)
+            found = {
+                "end": {name: simulation.get_real(f"slider::{name}") for name in outputs},
+                "time": time,
+                "status": simulation.get_integer("slider::solver.status"),
+                "said": [simulation.get_string("slider::solver.message")],
+            }
+            simulation.terminate()
+    return found
+
+
+def by_cofmupy(
+    fmu: str,
+    reals: dict[str, float],
+    integers: dict[str, int],
+    changed: str,
+    later: float,
+    outputs: list[str],
+    kind: str,
+) -> Any:
+    """The case by CoFMUPy. It sets Reals alone, and all inputs: those that it is not given to zero."""
+    import sys
+
+    sys.path.insert(0, f"{sys.prefix}/cofmupy")  # with the version of FMPy that it is for
+    from cofmupy import Coordinator
+    from fmpy.fmi1 import FMICallException
+
+    assert not integers
+    slider = {"id": "slider", "name": "slider", "path": fmu, "initialization": reals}
+    coordinator = Coordinator()
+    coordinator.start({"fmus": [slider], "connections": [], "cosim_method": "jacobi", "iterative": False})
+    said = []
+    for step in range(100):
+        inputs = {"slider": {changed: [later]}} if step == 50 else None
+        try:
+            coordinator.master.do_step(1e-3, input_dict=inputs)
+        except FMICallException as error:
+            said.append(str(error))
+            break
+    handler = coordinator.master.fmu_handlers["slider"]
+    return {
+        "end": {name: handler.get_variable(name)[0] for name in outputs},
+        "time": coordinator.master.current_time,
+        "status": handler.get_variable("solver.status")[0],
+        "said": said,
+    }
+
+
+def by_pathsim(
+    fmu: str,
+    reals: dict[str, float],
+    integers: dict[str, int],
+    changed: str,
+    later: float,
+    outputs: list[str],
+    kind: str,
+) -> Any:
+    """The case by PathSim; model exchange by its Runge-Kutta method of order 5."""
+    from fmpy.fmi1 import FMICallException
+    from pathsim import Connection, Simulation
+    from pathsim.blocks import Source
+    from pathsim.solvers import RKDP54
+    from pathsim_fmi.blocks import CoSimulationFMU, ModelExchangeFMU
+
+    exchange = kind == "ModelExchange"
+    start = reals | integers
+    block = ModelExchangeFMU(fmu, "slider", start) if exchange else CoSimulationFMU(fmu, "slider", start, dt=1e-3)
+    wrapper = block.fmu_wrapper
+    # in the middle of a step: the inputs of one are those at its beginning
+    half = 0.05 if exchange else 0.0495
+
+    def source(name: str) -> Any:
+        before = reals.get(name, 0.0)
+        return Source(lambda t: later if name == changed and t > half else before)
+
+    sources = {name: source(name) for name in wrapper.input_refs}
+    connections = [Connection(source, block[place]) for place, source in enumerate(sources.values())]
+    blocks = [*sources.values(), block]
+    said = []
+    try:
+        if exchange:
+            tolerances = {"tolerance_lte_abs": 1e-12, "tolerance_lte_rel": 1e-10}
+            simulation = Simulation(blocks, connections, dt=1e-4, log=False, Solver=RKDP54, **tolerances)
+            # a step of the solver may not go over the jump
+            simulation.run(0.05)
+            simulation.run(0.05, reset=False)
+        else:
+            simulation = Simulation(blocks, connections, dt=1e-3, log=False)
+            # it steps at the beginning of each period, at 0.099 s for the last time
+            simulation.run(0.0985)
+    except (FMICallException, RuntimeError) as error:
+        said.append(str(error))
+    read = wrapper.fmu.getInteger if wrapper.fmi_version == "2.0" else wrapper.fmu.getInt32
+    return {
+        "end": dict(zip(wrapper.output_refs, map(float, wrapper.get_outputs_as_array()))),
+        "time": float(simulation.time) + (0.0 if exchange else 1e-3),
+        "status": read([wrapper.variable_map["solver.status"].valueReference])[0],
+        "said": said,
+    }
