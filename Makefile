@@ -9,7 +9,7 @@ PYTEST := $(BIN)/python -m pytest
 # every file of tests on one core, so that its fixtures are made once; the file that takes longest goes first
 PARALLEL := --numprocesses auto --dist loadfile tests/test_docs.py tests
 
-.PHONY: demo quick test test-all lint docs figures bench clean
+.PHONY: demo quick test test-all lint docs figures bench release clean
 
 demo: $(RUN)
 	$(BIN)/python build_fmu.py
@@ -45,6 +45,12 @@ bench: $(DEV)
 	$(BIN)/pip install --quiet --editable '.[dev,bench]'
 	for part in solvers fmu stability synthesis slider_crank; do $(BIN)/python -m benchmarks.$$part || exit; done
 
+# wheel, FMUs of every kind for all platforms, and what fmi-standard.org asks to be published with them
+release: $(DEV)
+	rm -rf dist
+	$(BIN)/pip wheel --quiet --no-deps --wheel-dir dist .
+	$(BIN)/python build_fmu.py --platforms all --dest dist --publish dist/compatibility
+
 $(RUN): pyproject.toml | $(BIN)/pip
 	$(BIN)/pip install --quiet --editable '.[native]'
 	@touch $@
@@ -60,4 +66,4 @@ $(BIN)/pip:
 	$(PYTHON) -m venv $(VENV)
 
 clean:
-	rm -rf $(VENV) build out
+	rm -rf $(VENV) build dist out

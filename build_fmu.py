@@ -9,7 +9,7 @@ import argparse
 import sys
 from collections.abc import Sequence
 
-from analysis.export import KINDS, PLATFORMS, PYTHON, build, build_native, this_platform, try_out
+from analysis.export import KINDS, PLATFORMS, PYTHON, build, build_native, publish, this_platform, try_out
 from analysis.mechanisms import MECHANISMS
 from linkwork.errors import InputError, LinkworkError
 
@@ -29,6 +29,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
         "--platforms", nargs="+", choices=["all", *PLATFORMS], metavar="PLATFORM",
         help=f"for which platforms native FMUs are compiled: all, or some of {', '.join(PLATFORMS)}; by default for this one",
     )  # fmt: skip
+    parser.add_argument(
+        "--publish",
+        metavar="FOLDER",
+        help="write each FMU there too, with inputs, reference results and who imports it",
+    )
     options = parser.parse_args(arguments)
     try:
         here = this_platform() if any(KINDS[kind] is not PYTHON for kind in options.kinds) else ""
@@ -45,6 +50,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 )
                 if python or here in platforms:
                     try_out(fmu)
+                    if options.publish:
+                        publish(FMUS[name], kind, fmu, options.publish)
                 made = "" if python else f", {' '.join(platforms)}"
                 print(f"{fmu}: valid, {fmu.stat().st_size / 1024:.0f} KiB{made}")
     except LinkworkError as error:

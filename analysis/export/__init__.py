@@ -1,6 +1,7 @@
 """Making FMUs of the mechanisms."""
 
 from .archive import SOURCES, BuildError, try_out
+from .compatibility import publish
 from .description import KINDS, NATIVE, NATIVE_FMI3, PYTHON, Kind
 from .native_fmu import PLATFORMS, build_native, compile_library, source_files, this_platform
 from .python_fmu import build
@@ -17,6 +18,7 @@ __all__ = [
     "build",
     "build_native",
     "compile_library",
+    "publish",
     "source_files",
     "this_platform",
     "try_out",

@@ -128,8 +128,14 @@ assert len(result) == 21, len(result)
 """
 
 
-def try_out(fmu: Path) -> None:
-    """Run twenty steps of the FMU through FMPy in a process of its own.
+def try_out(fmu: Path, script: str = _TRIAL, *arguments: str) -> None:
+    """Run the FMU through FMPy in a process of its own, by default for twenty steps.
+
+    Parameters
+    ----------
+    fmu : path
+    script : str
+        What the process runs; the path of the FMU is its first argument, others are given.
 
     Raises
     ------
@@ -137,7 +143,7 @@ def try_out(fmu: Path) -> None:
         With what the run printed, if it failed.
     """
     done = subprocess.run(
-        [sys.executable, "-c", _TRIAL, str(fmu)],
+        [sys.executable, "-c", script, str(fmu), *arguments],
         capture_output=True,
         text=True,
         timeout=120,
@@ -146,4 +152,4 @@ def try_out(fmu: Path) -> None:
         env=os.environ | dict.fromkeys(("TMPDIR", "TEMP", "TMP"), unpacking_folder()),
     )
     if done.returncode != 0:
-        raise BuildError(f"{fmu.name} was built but does not run:\n{done.stdout}{done.stderr}")
+        raise BuildError(f"{fmu.name} was built but does not run as it should:\n{done.stdout}{done.stderr}")

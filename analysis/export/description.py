@@ -213,7 +213,7 @@ _INITIAL = {"parameter": "exact", "output": "approx", "local": "calculated"}
 
 
 def _variables(mechanism: Mechanism, kind: Kind, entries: Iterable[Entry]) -> Element:
-    plant = _started(mechanism)
+    plant = started(mechanism)
     starts = dict(zip(mechanism.output_names, plant.outputs()))
     scale = dict(zip(states(mechanism), mechanism.error_scale(plant.parameters, plant.state))) if kind.native else {}
     reinitialised = _reinitialised(mechanism) if kind.native else ()
@@ -272,7 +272,7 @@ def _value(variable: Variable, start: float | int | str) -> dict[str, str]:
     return value
 
 
-def _started(mechanism: Mechanism) -> Plant:
+def started(mechanism: Mechanism) -> Plant:
     """The mechanism at its start, where all parameters and inputs have their start values."""
     m = mechanism
     values: dict[str, Any] = {v.name: v.start for v in m.variables}

@@ -1,0 +1,159 @@
+"""What https://fmi-standard.org asks the makers of FMUs to publish: each with inputs, reference results and who imports it.
+
+The files and their forms are those of "Compatibility information" in the contributing guide of that site.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import shutil
+import sys
+from collections.abc import Mapping, Sequence
+from importlib import metadata
+from pathlib import Path
+
+import linkwork
+from linkwork.mechanism import Mechanism
+
+from .archive import try_out
+from .description import NATIVE_FMI3, PYTHON, Kind, started
+
+#: Importers that the tests of Linkwork run the FMUs in: the package, and with which kinds of FMU by which interfaces.
+IMPORTERS = {
+    "FMPy": "all; co-simulation, and model exchange of the native ones",
+    "libcosimpy": "those of FMI 2.0; co-simulation",
+    "ecospy": "all; co-simulation",
+    "cofmupy": "all; co-simulation",
+    "pathsim-fmi": "all; co-simulation, and model exchange of the native ones",
+}
+#: At most so many variables in the reference results, and within what of them an importer should be.
+VARIABLES = 10
+RELATIVE, ABSOLUTE = 1e-6, 1e-6
+
+
+def publish(mechanism: Mechanism, kind: Kind, fmu: Path, folder: Path | str) -> Path:
+    """Write an FMU with its compatibility information into a folder of its name below a folder, and return that.
+
+    `{name}.fmu`, its inputs `{name}_in.csv`, reference results `{name}_ref.csv` and how they come about `{name}_ref.opt`,
+    and `Readme.txt`. The reference is computed by the plant in Python; FMPy has to come to the same with the FMU.
+
+    Raises
+    ------
+    BuildError
+        If FMPy's results differ from the reference.
+    """
+    place = Path(folder) / fmu.stem
+    place.mkdir(parents=True, exist_ok=True)
+    names, rows = reference(mechanism)
+    start, stop, step, _ = mechanism.experiment
+    starts = {v.name: float(v.start) for v in mechanism.variables if v.name in mechanism.input_names}
+    inputs = [starts[name] for name in mechanism.input_names]
+    shutil.copy2(fmu, place)
+    written = {
+        "_in.csv": table(["time", *mechanism.input_names], [[start, *inputs], [stop, *inputs]]),
+        "_ref.csv": table(names, rows),
+        "_ref.opt": options(mechanism),
+    }
+    for suffix, text in written.items():
+        (place / f"{fmu.stem}{suffix}").write_text(text, encoding="utf-8")
+    (place / "Readme.txt").write_text(readme(mechanism, kind), encoding="utf-8")
+    try_out(place / fmu.name, _COMPARISON, *map(str, (start, stop, step, RELATIVE, ABSOLUTE)))
+    return place
+
+
+_COMPARISON = """
+import csv
+import sys
+import numpy as np
+from fmpy import simulate_fmu
+fmu = sys.argv[1]
+start, stop, step, relative, absolute = map(float, sys.argv[2:])
+with open(fmu.replace(".fmu", "_ref.csv"), newline="") as file:
+    names, *rows = csv.reader(file)
+reference = np.array(rows, dtype=float)
+run = {"start_time": start, "stop_time": stop, "step_size": step, "output_interval": step, "output": names[1:]}
+found = simulate_fmu(fmu, fmi_type="CoSimulation", **run)
+assert len(found) == len(reference), (len(found), len(reference))
+for place, name in enumerate(names):
+    assert np.allclose(found[name], reference[:, place], rtol=relative, atol=absolute), f"{name} is not that of the reference"
+"""
+
+
+def reference(mechanism: Mechanism) -> tuple[list[str], list[list[float]]]:
+    """Time and the most important outputs of the default experiment, by the plant in Python, a row each step."""
+    start, stop, step, _ = mechanism.experiment
+    first = [name for freedom in mechanism.freedoms for name in (freedom.coordinate, freedom.rate)]
+    names = list(dict.fromkeys([*first, *mechanism.output_names]))[: VARIABLES - 1]
+    places = [mechanism.output_names.index(name) for name in names]
+    plant = started(mechanism)
+    count = int((stop - start) / step * (1.0 + 1e-12))
+    times = [start + n * step for n in range(count + 1)]
+    # as FMPy's: the last step is what is left
+    if stop - times[-1] > 1e-6 * step:
+        times.append(stop)
+    rows = []
+    for n, time in enumerate(times):
+        if n:
+            plant.step(times[n - 1], time - times[n - 1])
+        outputs = plant.outputs()
+        rows.append([time, *(outputs[place] for place in places)])
+    return ["time", *names], rows
+
+
+def table(names: Sequence[str], rows: Sequence[Sequence[float]]) -> str:
+    """Comma-separated values in the form that fmi-standard.org asks for: names in quotes, numbers as in C."""
+    text = io.StringIO()
+    csv.writer(text, quoting=csv.QUOTE_ALL, lineterminator="\n").writerow(names)
+    csv.writer(text, lineterminator="\n").writerows([[repr(float(value)) for value in row] for row in rows])
+    return text.getvalue()
+
+
+def options(mechanism: Mechanism) -> str:
+    """What the reference was computed with, and within what of it an importer should be."""
+    start, stop, step, _ = mechanism.experiment
+    values: Mapping[str, float | str] = {
+        "StartTime": start,
+        "StopTime": stop,
+        "StepSize": step,
+        "RelTol": RELATIVE,
+        "AbsTol": ABSOLUTE,
+        "SolverType": "FixedStep",
+        "OutputIntervalLength": step,
+    }
+    return "".join(f"{name}, {value}\n" for name, value in values.items())
+
+
+def readme(mechanism: Mechanism, kind: Kind) -> str:
+    """What the FMU is, what of FMI can be tested with it, and what imports it."""
+    features = {
+        2: "saved and serialised states, directional derivatives, derivatives of inputs and outputs over time, a state event",
+        3: "saved and serialised states, directional and adjoint derivatives, intermediate update, early return, terminals, "
+        "a state event",
+    }[kind.fmi]
+    features = "saved and serialised states, variable steps" if kind is PYTHON else features
+    version = "3.0" if kind is NATIVE_FMI3 else "2.0"
+    importers = "\n".join(
+        f"  {name} {installed}: {what}" for name, what in IMPORTERS.items() if (installed := _version(name))
+    )
+    notes = "\n".join(mechanism.notes)
+    return f"""{mechanism.title}
+
+FMI {version}, {" and ".join({"CoSimulation": "co-simulation", "ModelExchange": "model exchange"}[i] for i in kind.interfaces)}.
+Made by Linkwork {linkwork.__version__}, {kind.tool}. Provided by the developers of Linkwork, not by the Modelica Association.
+
+{notes}
+
+Features of FMI that can be tested with it: {features}.
+The reference is the default experiment with constant inputs, computed by the equations in Python.
+
+Checked by FMPy's validation against the schemas and rules of FMI.
+Importers that the tests of this version run it in, by kind of FMU:
+{importers}
+"""
+
+
+def _version(package: str) -> str | None:
+    """Version of an installed package; CoFMUPy is in a folder of its own."""
+    found = metadata.distributions(name=package, path=[*sys.path, f"{sys.prefix}/cofmupy"])
+    return next((distribution.version for distribution in found), None)
