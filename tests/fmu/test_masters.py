@@ -7,6 +7,8 @@ the whole project is checked.
 from __future__ import annotations
 
 import os
+import re
+import shutil
 import subprocess
 import sys
 from collections.abc import Callable
@@ -340,3 +342,30 @@ def test_bad_parameter_under_libcosimpy(run: Callable[..., dict[str, Any]], mode
     # libcosim itself ends the process on a failed initialisation, but not before the sentence is in its log
     with pytest.raises(AssertionError, match=r"parameter slider\.damping is -1(\.0)?: it must be"):
         run(Row("libcosimpy", kind), reals=CASES[model.name].reals | {"slider.damping": -1.0})
+
+
+PAGE = Path(__file__).parents[2] / "docs" / "masters.md"
+#: Which section of the page is of which master.
+SECTIONS = {"FMPy": "fmpy", "libcosim": "libcosimpy", "ecos": "ecospy", "CoFMUPy": "cofmupy", "PathSim": "pathsim"}
+
+
+@pytest.mark.parametrize("section", SECTIONS)
+def test_the_code_of_the_page_runs(natives: dict[str, Path], tmp_path: Path, section: str) -> None:
+    need(SECTIONS[section])
+    found = re.search(rf"^## {section}: tried$(.*?)^## ", PAGE.read_text(encoding="utf-8"), re.DOTALL | re.MULTILINE)
+    code = "\n".join(re.findall(r"```python\n(.*?)```", found.group(1), flags=re.DOTALL))
+    (tmp_path / "build").mkdir()
+    for name in ("FiveBarSlider-native", "FiveBarSlider-native-fmi3"):
+        shutil.copy2(natives[name], tmp_path / "build" / f"{name}.fmu")
+    done = subprocess.run(
+        [sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, timeout=120, check=False
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
+def test_the_page_says_of_every_master_whether_it_was_tried() -> None:
+    page = PAGE.read_text(encoding="utf-8")
+    stated = dict(re.findall(r"^\| ([\w ]+?)(?: \d.*?| \(.*?)? \| (tried|untried) \|", page, flags=re.MULTILINE))
+    sections = dict(re.findall(r"^## (.*): (tried|untried)$", page, flags=re.MULTILINE))
+    assert {name.lower(): tried for name, tried in stated.items()} == {n.lower(): t for n, t in sections.items()}
+    assert {name for name, tried in sections.items() if tried == "tried"} == {*SECTIONS, "A host in C"}
