@@ -196,8 +196,8 @@ static void read_outputs(Instance *c)
     bool refused = ((int)c->s.phase & RUNNING) && c->s.reason != GOOD; /* of which the reason stays, until a good step */
     if (reason != GOOD && !refused)
         note(c, reason, sentence);
-    else if (reason == GOOD && c->interface == MODEL_EXCHANGE)
-        forget(c);
+    else if (reason == GOOD && c->s.reason != GOOD && c->interface == MODEL_EXCHANGE && plant_margin(&c->s.plant) >= 0.0)
+        forget(c); /* but not what ended the run: the limit of assembly */
 }
 
 static double computed(Instance *c, int row)
