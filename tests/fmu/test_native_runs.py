@@ -753,6 +753,31 @@ def test_model_exchange_beyond_the_limit(five_bar: Library) -> None:
     c.free()
 
 
+def test_the_limit_stays_the_reason_until_the_state_is_clear_of_it(five_bar: Library) -> None:
+    c = five_bar.instance("me").start()
+    assert c("EnterContinuousTimeMode") == OK
+    x = c.states()
+
+    def put(position: float) -> float:
+        assert c("SetContinuousStates", (c_double * 6)(x[0], position, *x[2:]), c_size_t(6)) == OK
+        return c.get("assembly.margin_to_limit")[0]
+
+    clear, beyond = x[1], 9.0
+    for _ in range(45):
+        middle = 0.5 * (clear + beyond)
+        clear, beyond = (middle, beyond) if put(middle) >= 0.0 else (clear, middle)
+    assert put(beyond) < 0.0
+    assert c("EnterEventMode") == OK
+    assert c.discrete()[0]
+    c.get("crank.acceleration")
+    assert c.status() == 3
+    assert c("EnterContinuousTimeMode") == OK
+    put(x[1])
+    c.get("crank.acceleration")
+    assert c.status() == 0
+    c.free()
+
+
 def test_the_limit_in_words_for_who_logs(five_bar: Library) -> None:
     c = five_bar.instance("me", logging=True).start()
     assert c("EnterContinuousTimeMode") == OK
