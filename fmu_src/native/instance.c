@@ -390,7 +390,7 @@ Status instance_set_time(Instance *c, const char *function, double time)
 {
     Digits number;
     /* a solver tries steps that go past the stop time, to come back to it */
-    if (!(c->s.plant.start_time <= time && time <= DBL_MAX))
+    if (!(c->s.plant.start_time <= time && isfinite(time)))
         return instance_say(c, ERROR, "%s: the time is %s s: it must be finite and not before the start", function,
                             digits(number, time));
     c->s.plant.time = time;
