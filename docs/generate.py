@@ -165,7 +165,7 @@ def study_pictures() -> Iterator[Picture]:
         yield name, study.draw(study.compute()), 150
     rig = SETS["rig-2-spring-c"]
     response = frequency_response(rig.parameters, 100.0 * RAD_S_PER_RPM, 1300.0 * RAD_S_PER_RPM)
-    yield "rig-2-response", draw.plot(response, title=rig.source, rpm=True, beside=approximations(response)), 150
+    yield "rig-2-response", draw.plot(response, title=rig.source, beside=approximations(response)), 150
 
 
 def hand_drawn_pictures() -> Iterator[Picture]:

@@ -4,9 +4,7 @@ from .control import plot_bode as plot_bode
 from .control import plot_poles as plot_poles
 from .curves import Curve as Curve
 from .curves import Panel as Panel
-from .curves import plot_comparison as plot_comparison
 from .curves import plot_curves as plot_curves
-from .curves import plot_outputs as plot_outputs
 from .dispatch import DrawingError as DrawingError
 from .dispatch import animate as animate
 from .dispatch import plot as plot
@@ -16,6 +14,8 @@ from .motion import plot_drive as plot_drive
 from .motion import plot_least_effort as plot_least_effort
 from .motion import plot_tracking as plot_tracking
 from .response import plot_branches as plot_branches
+from .runs import plot_comparison as plot_comparison
+from .runs import plot_outputs as plot_outputs
 from .slider_crank import plot_forces as plot_forces
 from .slider_crank import plot_tolerances as plot_tolerances
 from .slider_crank_picture import animate_mechanism as animate_mechanism

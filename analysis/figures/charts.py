@@ -94,7 +94,7 @@ def _draw_map(figure: Figure, axis: Axes, chart: HeatMap) -> None:
         handles, labels = axis.get_legend_handles_labels()
         handles.append(Patch(facecolor=_NONE))
         where: Any = chart.panel.legend_at if chart.panel.legend_at != "outside" else "best"
-        axis.legend(handles, [*labels, chart.missing], fontsize=8, loc=where, frameon=True, framealpha=0.9)
+        axis.legend(handles, [*labels, chart.missing], loc=where, frameon=True, framealpha=0.9)
     elif legend is not None:
         # over the colours a legend needs a ground
         legend.set_frame_on(True)

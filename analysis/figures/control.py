@@ -3,24 +3,30 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from math import inf
+from typing import Any, NamedTuple, TypeAlias
 
 import control
-import matplotlib
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MultipleLocator
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
-from ..linear import LinearModel
+from ..linear import Design, LinearModel
 from .dispatch import plot
-from .style import COLOURS, STYLE, finish
+from .style import BOLD, COLOURS, LINE, LINES, REFERENCE, finish, legend_above, styled, write_title
 
-LINES = ("-", "--", "-.", ":")
+FloatArray: TypeAlias = NDArray[np.float64]
 
 
 def plot_bode(
-    systems: Mapping[str, Any], *, unit: str = "", frequencies: ArrayLike | None = None, title: str = ""
+    systems: Mapping[str, Any],
+    *,
+    unit: str = "",
+    frequencies: ArrayLike | None = None,
+    margins: bool = False,
+    title: str = "",
 ) -> Figure:
     """Plot magnitude and phase of systems with one input and one output over each other.
 
@@ -32,30 +38,85 @@ def plot_bode(
         Of the output over the input; the magnitude is not in decibels.
     frequencies : array_like, shape (n,), optional
         rad/s; by default python-control's choice for all of them.
+    margins : bool
+        Of systems that are open loops: mark gain and phase margins, and state them in the legend.
+    title : str
     """
     responses = control.frequency_response(list(systems.values()), frequencies)
-    with matplotlib.rc_context(STYLE):
+    with styled():
         figure = Figure(figsize=(6.4, 4.8))
         above, below = figure.subplots(2, 1, sharex=True, height_ratios=(3, 2))
-        for number, (label, response) in enumerate(zip(systems, responses)):
+        for number, ((label, system), response) in enumerate(zip(systems.items(), responses)):
             look = {"color": COLOURS[number % len(COLOURS)], "linestyle": LINES[number % len(LINES)]}
             # python-control squeezes the axes of one input and one output away
             value = np.asarray(response.frdata)[0, 0]
             phase = np.degrees(np.unwrap(np.angle(value)))
             # from the branch in which the first value is within half a turn
             phase -= 360.0 * round(phase[0] / 360.0)
-            above.loglog(response.omega, np.abs(value), label=label or None, **look)
+            words = label
+            if margins:
+                found = _Margins.of(system)
+                words = ": ".join(text for text in (label, found.report()) if text)
+                _mark_margins(above, below, found, response.omega, phase, look["color"])
+            above.loglog(response.omega, np.abs(value), label=words or None, **look)
             below.semilogx(response.omega, phase, **look)
+        if margins:
+            above.axhline(1.0, **REFERENCE)
+            below.axhline(-180.0, **REFERENCE)
         above.set_ylabel(f"magnitude [{unit}]" if unit else "magnitude")
         below.set_ylabel("phase [deg]")
         below.set_xlabel("frequency [rad/s]")
         below.yaxis.set_major_locator(MultipleLocator(90.0))
-        if any(systems):
-            above.legend(fontsize=8)
-        if title:
-            figure.suptitle(title, fontsize=10.5, fontweight="bold")
+        if any(systems) or margins:
+            legend_above(above, ncols=1 if margins else 4)
+        write_title(figure, title)
         figure.align_ylabels()
         return finish(figure)
+
+
+class _Margins(NamedTuple):
+    """Margins of an open loop, as pairs (margin, frequency in rad/s): factors on the gain, and angles in deg."""
+
+    gains: tuple[tuple[float, float], ...] = ()
+    phase: tuple[float, float] | None = None
+    stable: bool = True
+
+    @classmethod
+    def of(cls, system: Any) -> _Margins:
+        """The least factors up and down, and the least angle, at which the closed loop ceases to be stable, if it is."""
+        poles = control.feedback(system, 1).poles()
+        if not np.all(np.abs(poles) < 1.0 if system.isdtime(strict=True) else poles.real < 0.0):
+            return cls(stable=False)
+        gain, phase, _, at_gain, at_phase, _ = control.stability_margins(system, returnall=True)
+        pairs = sorted(zip(np.atleast_1d(gain).tolist(), np.atleast_1d(at_gain).tolist()))
+        down, up = [p for p in pairs if 0.0 < p[0] < 1.0], [p for p in pairs if 1.0 < p[0] < inf]
+        angles = zip(np.atleast_1d(phase).tolist(), np.atleast_1d(at_phase).tolist())
+        return cls((*down[-1:], *up[:1]), min(angles, key=lambda pair: abs(pair[0]), default=None))
+
+    def report(self) -> str:
+        """In words."""
+        if not self.stable:
+            return "the closed loop is not stable"
+        words = [f"gain {'reduction ' if gain < 1.0 else ''}margin {gain:.3g}" for gain, _ in self.gains]
+        words += [] if self.phase is None else [f"phase margin {abs(self.phase[0]):.1f} deg"]
+        return ", ".join(words) or "stable at any gain"
+
+
+def _mark_margins(above: Axes, below: Axes, found: _Margins, omega: FloatArray, phase: FloatArray, colour: str) -> None:
+    """Bars: from the magnitude to 1 where the phase is -180 deg, and from the phase to -180 deg where the magnitude is 1."""
+    look: dict[str, Any] = {"color": colour, "linewidth": BOLD, "marker": "o", "zorder": 4}
+    for gain, at in found.gains:
+        above.plot([at, at], [1.0 / gain, 1.0], gid="gain margin", **look)
+    if found.phase is not None:
+        at = found.phase[1]
+        there = float(np.interp(np.log(at), np.log(omega), phase))
+        below.plot([at, at], [there, there - found.phase[0]], gid="phase margin", **look)
+
+
+@plot.register
+def plot_design(design: Design, *, frequencies: ArrayLike | None = None, title: str = "") -> Figure:
+    """Magnitude and phase of a controller's open loop, with its margins; see `plot_bode`."""
+    return plot_bode({design.method: design.loop}, frequencies=frequencies, margins=True, title=title)
 
 
 @plot.register
@@ -81,24 +142,23 @@ def plot_poles(systems: Mapping[str, Any], *, title: str = "") -> Figure:
     systems : mapping
         What the legend calls it to a linear system of python-control.
     """
-    with matplotlib.rc_context(STYLE):
+    with styled():
         figure = Figure(figsize=(6.4, 5.0))
         axis = figure.subplots()
-        axis.axhline(0.0, color="0.6", linewidth=0.8, zorder=1)
-        axis.axvline(0.0, color="0.6", linewidth=0.8, zorder=1)
+        axis.axhline(0.0, **REFERENCE)
+        axis.axvline(0.0, **REFERENCE)
         for number, (label, system) in enumerate(systems.items()):
             points = control.pole_zero_map(system)
             colour = COLOURS[number % len(COLOURS)]
             look: dict[str, Any] = {"linestyle": "none", "color": colour, "zorder": 3}
             poles, zeros = np.asarray(points.poles), np.asarray(points.zeros)
-            axis.plot(poles.real, poles.imag, marker="x", label=f"{label} poles".strip(), markeredgewidth=1.4, **look)
+            axis.plot(poles.real, poles.imag, marker="x", label=f"{label} poles".strip(), markeredgewidth=LINE, **look)
             if len(zeros):
                 axis.plot(zeros.real, zeros.imag, marker="o", fillstyle="none", label=f"{label} zeros".strip(), **look)
         axis.set_xlabel("real part [1/s]")
         axis.set_ylabel("imaginary part [rad/s]")
         axis.set_aspect("equal", adjustable="datalim")
         axis.margins(0.12)
-        axis.legend(fontsize=8)
-        if title:
-            figure.suptitle(title, fontsize=10.5, fontweight="bold")
+        axis.legend()
+        write_title(figure, title)
         return finish(figure)

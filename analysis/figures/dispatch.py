@@ -12,19 +12,22 @@ modules that draw are imported when a result comes that nothing imported so far 
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import singledispatch
 from importlib import import_module
 from pathlib import Path
 from typing import Any
 
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from linkwork.errors import LinkworkError
 
+from ..run import Trajectory
+
 #: The modules that register what they draw, those that import fastest first.
 MODULES = (
-    "curves",
+    "runs",
     "linkage",
     "response",
     "charts",
@@ -34,6 +37,8 @@ MODULES = (
     "slider_crank",
     "slider_crank_picture",
 )
+#: Those that register the picture of a mechanism.
+MECHANISMS = ("linkage", "slider_crank_picture")
 
 
 class DrawingError(LinkworkError, TypeError):
@@ -44,15 +49,22 @@ class DrawingError(LinkworkError, TypeError):
         super().__init__(f"results of the type {kind.__qualname__} have no {picture}")
 
 
-def _registered(pictures: Any, result: object, name: str) -> Callable[..., Any]:
-    """The function that draws results of this type, looked for in one module after another."""
+def _find(pictures: Any, kind: type, modules: Sequence[str] = MODULES) -> Callable[..., Any] | None:
+    """The function that draws results of a type, looked for in one module after another; None if there is none."""
     nothing = pictures.dispatch(object)
-    for module in MODULES:
+    for module in modules:
         import_module(f".{module}", __package__)
-        function: Callable[..., Any] = pictures.dispatch(type(result))
+        function: Callable[..., Any] = pictures.dispatch(kind)
         if function is not nothing:
             return function
-    raise DrawingError(type(result), name)
+    return None
+
+
+def _registered(pictures: Any, result: object, name: str) -> Callable[..., Any]:
+    function = _find(pictures, type(result))
+    if function is None:
+        raise DrawingError(type(result), name)
+    return function
 
 
 @singledispatch
@@ -101,3 +113,25 @@ def animate(result: Any, path: str | Path, *details: Any, **options: Any) -> Pat
     """
     written: Path = _registered(animate, result, "animation")(result, path, *details, **options)
     return written
+
+
+@singledispatch
+def draw_mechanism(parameters: Any, axis: Axes, run: Trajectory) -> str:
+    """Draw a mechanism on axes as it is at the start of a run, with the paths of its points over the run.
+
+    Returns
+    -------
+    str
+        What is drawn, for a caption.
+
+    Raises
+    ------
+    DrawingError
+        If there is no picture of this mechanism: see `has_picture`.
+    """
+    raise DrawingError(type(parameters), "picture")
+
+
+def has_picture(parameters: object) -> bool:
+    """Whether `draw_mechanism` draws the mechanism of these parameters."""
+    return _find(draw_mechanism, type(parameters), MECHANISMS) is not None

@@ -8,7 +8,6 @@ from math import cos, hypot, sin
 from pathlib import Path
 from typing import Any
 
-import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.patches import Arc, Circle, Polygon
@@ -22,11 +21,31 @@ from linkwork.five_bar.parameters import FiveBarParameters
 from ..run import Trajectory
 from ..units import CM_PER_METRE
 from .animation import gif
-from .dispatch import plot
-from .style import STYLE, Figure, finish
+from .dispatch import draw_mechanism, plot
+from .style import (
+    BOLD,
+    COUPLER,
+    CRANK,
+    GROUND,
+    HAIR,
+    LETTER,
+    LINE,
+    ROCKER,
+    SLIDER,
+    SMALL,
+    THIN,
+    TITLE,
+    TRACE,
+    Figure,
+    finish,
+    styled,
+    write_title,
+)
 
-#: Colours of the links in drawings.
-CRANK, COUPLER, ROCKER, SLIDER, GROUND, TRACE = "#D55E00", "#0072B2", "#009E73", "#5B6770", "#333333", "#CC79A7"
+#: Angle (deg) from the ground link at which the letter of the crank angle stands clear of a crank that lies on it.
+_LEAST_TURN = 32.0
+#: Samples of a run by which its picture is framed.
+_FRAMED = 200
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,8 +90,8 @@ def _pins(parameters: FiveBarParameters, crank_angle: float, slider_position: fl
 class _Scene:
     """A mechanism to be drawn at one configuration or several, in one frame that holds them all. Lengths in cm."""
 
-    def __init__(self, parameters: FiveBarParameters, configurations: Sequence[_Pins]) -> None:
-        self.parameters = parameters
+    def __init__(self, parameters: FiveBarParameters, configurations: Sequence[_Pins], letter: float = LETTER) -> None:
+        self.parameters, self.letter = parameters, letter
         k = parameters.constants()
         #: Length by which pins, supports and letters are drawn.
         self.unit = CM_PER_METRE * (k.l1 + k.l3 + k.l4) / 45.0
@@ -108,14 +127,14 @@ class _Scene:
         """Draw everything at one configuration; ``trace`` is the path of P, shape (n, 2), in cm."""
         self._ground(axis, letters)
         if trace is not None and len(trace):
-            axis.plot(*trace.T, color=TRACE, linewidth=1.4, zorder=2, solid_capstyle="round")
+            axis.plot(*trace.T, color=TRACE, linewidth=LINE, zorder=2, solid_capstyle="round")
         self._slider(axis, q)
         self._links(axis, q)
         if letters:
             self._letters(axis, q)
 
     def _line(self, axis: Axes, points: Sequence[NDArray[np.float64]], **options: Any) -> None:
-        look: dict[str, Any] = {"color": GROUND, "linewidth": 1.1, "solid_capstyle": "butt"}
+        look: dict[str, Any] = {"color": GROUND, "linewidth": LINE, "solid_capstyle": "butt"}
         axis.plot(*np.array(points).T, **look | options)
 
     def _hatch(self, axis: Axes, start: NDArray[np.float64], end: NDArray[np.float64], count: int) -> None:
@@ -125,15 +144,15 @@ class _Scene:
         feet = [start + share * (end - start) for share in (np.arange(count) + 0.9) / count]
         gap = np.full(2, np.nan)
         points = [point for foot in feet for point in (foot, foot + stroke, gap)]
-        self._line(axis, points, linewidth=0.7, zorder=1)
+        self._line(axis, points, linewidth=HAIR, zorder=1)
 
     def _ground(self, axis: Axes, letters: bool) -> None:
         unit = self.unit
-        self._line(axis, [np.zeros(2), self.zero], linewidth=0.7, linestyle=(0, (9, 3, 2, 3)), color="0.55", zorder=0)
+        self._line(axis, [np.zeros(2), self.zero], linewidth=HAIR, linestyle=(0, (9, 3, 2, 3)), color="0.55", zorder=0)
         # the bearing of A
         foot, half = -1.75 * unit, 1.0 * unit
         bearing = np.array([[-0.3 * unit, 0.0], [-half, foot], [half, foot], [0.3 * unit, 0.0]])
-        axis.add_patch(Polygon(bearing, facecolor="0.92", edgecolor=GROUND, linewidth=1.1, zorder=5))
+        axis.add_patch(Polygon(bearing, facecolor="0.92", edgecolor=GROUND, linewidth=LINE, zorder=5))
         ends = np.array([-1.5 * unit, foot]), np.array([1.5 * unit, foot])
         self._line(axis, ends)
         self._hatch(axis, *ends, count=6)
@@ -150,7 +169,7 @@ class _Scene:
     def _slider(self, axis: Axes, q: _Pins) -> None:
         unit = self.unit
         block = [self.at(q.u + s * 1.5 * unit, n * unit) for s, n in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
-        axis.add_patch(Polygon(block, facecolor="#C9D1D6", edgecolor=SLIDER, linewidth=1.2, zorder=4))
+        axis.add_patch(Polygon(block, facecolor="#C9D1D6", edgecolor=SLIDER, linewidth=LINE, zorder=4))
         start, end = q.u + 1.5 * unit, self.wall
         side = 0.55 * unit if self.sprung and self.damped else 0.0
         if self.sprung:
@@ -158,7 +177,7 @@ class _Scene:
             swing = np.zeros(len(share))
             swing[2:-2] = 0.38 * unit * (-1.0) ** np.arange(len(share) - 4)
             spring = [self.at(start + s * (end - start), side + w) for s, w in zip(share, swing)]
-            self._line(axis, spring, color=SLIDER, linewidth=1.2, zorder=3)
+            self._line(axis, spring, color=SLIDER, linewidth=LINE, zorder=3)
         if self.damped:
             middle, width, deep = 0.5 * (start + end), 0.32 * unit, 1.6 * unit
             cup = ((-0.5, 1), (0.5, 1), (0.5, -1), (-0.5, -1))
@@ -166,7 +185,7 @@ class _Scene:
             self._line(axis, [self.at(middle + 0.5 * deep, -side), self.at(end, -side)], color=SLIDER, zorder=3)
             self._line(axis, [self.at(start, -side), self.at(middle, -side)], color=SLIDER, zorder=3)
             piston = [self.at(middle, w * width - side) for w in (-0.8, 0.8)]
-            self._line(axis, piston, color=SLIDER, linewidth=2.0, zorder=3)
+            self._line(axis, piston, color=SLIDER, linewidth=BOLD, zorder=3)
 
     def _links(self, axis: Axes, q: _Pins) -> None:
         a = np.zeros(2)
@@ -174,7 +193,7 @@ class _Scene:
         offset = abs(float(np.cross(np.append(q.c - q.b, 0.0), np.append(q.p - q.b, 0.0))[2]))
         if offset > 0.02 * hypot(*(q.c - q.b)) ** 2:
             axis.add_patch(Polygon([q.b, q.c, q.p], facecolor=COUPLER, alpha=0.16, edgecolor="none", zorder=5))
-            self._line(axis, [q.b, q.p, q.c], color=COUPLER, linewidth=1.4, zorder=6)
+            self._line(axis, [q.b, q.p, q.c], color=COUPLER, linewidth=LINE, zorder=6)
         elif self.parameters.coupler_point_distance:
             self._line(axis, [q.b, q.p], color=COUPLER, **width, zorder=6)
         self._line(axis, [q.d, q.c], color=ROCKER, **width, zorder=6)
@@ -190,15 +209,15 @@ class _Scene:
     def _letters(self, axis: Axes, q: _Pins) -> None:
         unit = self.unit
         side = -1.0 if (q.c - q.d) @ self.along > 0.0 else 1.0
-        _write(axis, q.d + 0.95 * side * unit * self.along, "D")
+        self._write(axis, q.d + 0.95 * side * unit * self.along, "D")
         # the crank angle
         turn = np.degrees(q.crank_angle) % 360.0
         radius = max(0.5 * CM_PER_METRE * self.parameters.crank_length, 1.3 * unit)
-        arc: dict[str, Any] = {"color": GROUND, "linewidth": 0.9, "zorder": 3}
+        arc: dict[str, Any] = {"color": GROUND, "linewidth": THIN, "zorder": 3}
         axis.add_patch(Arc((0, 0), 2 * radius, 2 * radius, theta1=0.0, theta2=turn, **arc))
-        half = np.radians(0.5 * turn)
+        half = np.radians(max(0.5 * turn, _LEAST_TURN))
         theta = (radius + 0.95 * unit) * np.array([cos(half), sin(half)])
-        _write(axis, theta, r"$\theta_2$")
+        self._write(axis, theta, r"$\theta_2$")
         # each pin's letter goes where it has most room
         centre = (q.b + q.c + q.d) / 3.0
         a = np.zeros(2)
@@ -218,23 +237,29 @@ class _Scene:
             # and where several have as much, outside the loop
             outwards = (places - pin) @ (pin - centre) / (unit * max(hypot(*(pin - centre)), 1e-9))
             best = places[int(np.argmax(np.array(room) + 0.1 * unit * outwards))]
-            _write(axis, best, name)
+            self._write(axis, best, name)
             taken.append(best)
         # the slider position
         level = -2.35 * unit
         for s in {0.0, q.u}:
-            self._line(axis, [self.at(s, -1.75 * unit), self.at(s, level - 0.4 * unit)], linewidth=0.7)
+            self._line(axis, [self.at(s, -1.75 * unit), self.at(s, level - 0.4 * unit)], linewidth=HAIR)
         if abs(q.u) > 1.2 * unit:
-            arrow = {"arrowstyle": "-|>", "color": GROUND, "shrinkA": 0, "shrinkB": 0, "linewidth": 0.8}
+            arrow = {"arrowstyle": "-|>", "color": GROUND, "shrinkA": 0, "shrinkB": 0, "linewidth": HAIR}
             axis.annotate("", tuple(self.at(q.u, level)), tuple(self.at(0.0, level)), arrowprops=arrow)
         slope = (np.degrees(self.parameters.slider_guide_angle) + 90.0) % 180.0 - 90.0
         place = self.at(0.5 * q.u, level - 1.05 * unit)
-        _write(axis, place, f"$u = {q.u:.2f}$ cm", fontsize=9, rotation=slope, rotation_mode="anchor")
+        self._write(
+            axis,
+            place,
+            f"$u = {10.0 * q.u:.1f}$ mm",
+            fontsize=0.86 * self.letter,
+            rotation=slope,
+            rotation_mode="anchor",
+        )
 
-
-def _write(axis: Axes, point: NDArray[np.float64], words: str, **options: Any) -> None:
-    look: dict[str, Any] = {"ha": "center", "va": "center", "fontsize": 10.5, "zorder": 11}
-    axis.text(point[0], point[1], words, **look | options)
+    def _write(self, axis: Axes, point: NDArray[np.float64], words: str, **options: Any) -> None:
+        look: dict[str, Any] = {"ha": "center", "va": "center", "fontsize": self.letter, "zorder": 11}
+        axis.text(point[0], point[1], words, **look | options)
 
 
 @plot.register
@@ -266,14 +291,31 @@ def draw_linkage(
     path = CM_PER_METRE * (np.empty((0, 2)) if trace is None else np.asarray(trace, dtype=float))
     scene = _Scene(parameters, [q, *(replace(q, p=point) for point in path if np.all(np.isfinite(point)))])
     width, height = scene.high - scene.low
-    with matplotlib.rc_context(STYLE):
+    with styled():
         figure = Figure(figsize=(6.4, 6.4 * height / width + (0.3 if title else 0.0)))
         axis = figure.subplots()
         scene.prepare(axis)
         scene.draw(axis, q, trace=path)
         if title:
-            axis.set_title(title, fontsize=10.5, fontweight="bold")
+            axis.set_title(title, fontsize=TITLE, fontweight="bold")
         return finish(figure)
+
+
+@draw_mechanism.register
+def _draw_at_start(parameters: FiveBarParameters, axis: Axes, run: Trajectory) -> str:
+    """As it starts, with the path of P; of C where P is no point of its own."""
+    shown = np.linspace(0, len(run) - 1, min(len(run), _FRAMED)).astype(int)
+    configurations = [_pins(parameters, run["crank.angle"][i], run["slider.position"][i]) for i in shown]
+    if parameters.coupler_point_distance:
+        name, path = "P", CM_PER_METRE * np.column_stack([run["coupler.point.x"], run["coupler.point.y"]])
+    else:
+        k, turned, tilted = parameters.constants(), run["crank.angle"], run["coupler.angle"]
+        x, y = (k.l2 * f(turned) + k.l3 * f(tilted) for f in (np.cos, np.sin))
+        name, path = "C", CM_PER_METRE * np.column_stack([x, y])
+    scene = _Scene(parameters, configurations, SMALL)
+    scene.prepare(axis)
+    scene.draw(axis, configurations[0], trace=path)
+    return f"at {run.time[0]:.4g} s, with the path of {name} over the run"
 
 
 def animate_linkage(
@@ -306,22 +348,21 @@ def animate_linkage(
     if len(trajectory) < 2:
         raise InputError(f"an animation of {len(trajectory)} samples: there must be at least 2")
     time, slides = trajectory.time, trajectory["slider.position"]
-    u = CM_PER_METRE * slides
+    u = 1e3 * slides
     trace = CM_PER_METRE * np.column_stack([trajectory["coupler.point.x"], trajectory["coupler.point.y"]])
     chosen = np.unique(np.searchsorted(time, np.linspace(time[0], time[-1], frames)).clip(0, len(time) - 1))
     configurations = [_pins(parameters, float(trajectory["crank.angle"][i]), float(slides[i])) for i in chosen]
     scene = _Scene(parameters, configurations)
     width, height = scene.high - scene.low
-    with matplotlib.rc_context(STYLE):
+    with styled():
         figure = Figure(figsize=(5.0, 5.0 * height / width + 1.9))
         above, below = figure.subplots(2, 1, height_ratios=(5.0 * height / width, 1.7))
-        if title:
-            figure.suptitle(title, fontsize=10.5, fontweight="bold")
+        write_title(figure, title)
         below.plot(time, u, color="0.8")
         (done,) = below.plot([], [], color=SLIDER)
         (dot,) = below.plot([], [], "o", color=SLIDER, markersize=5)
         below.set_xlabel("time [s]")
-        below.set_ylabel("slider position [cm]")
+        below.set_ylabel("slider position [mm]")
         with gif(figure, path, frames=frames, frames_per_second=frames_per_second) as add_frame:
             for i, q in zip(chosen, configurations):
                 above.clear()

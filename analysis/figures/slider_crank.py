@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from math import erf, isfinite, sqrt
 from textwrap import fill
 from typing import Any
 
-import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -19,7 +18,7 @@ from linkwork.errors import InputError
 from ..slider_crank import JOINTS, QUANTITIES, SLIDER_FORCE, SYMBOLS, ForceTurn, MonteCarlo, unit_table
 from .curves import Curve, Panel, plot_curves
 from .dispatch import plot
-from .style import COLOURS, STYLE, finish
+from .style import BOLD, COLOURS, HAIR, LINE, MARK, PLAIN, SMALL, THIN, finish, styled, write_notes, write_title
 
 FloatArray = NDArray[np.float64]
 
@@ -30,15 +29,18 @@ _LINEAR, _SAMPLES, _SECOND, _WORST = COLOURS[0], COLOURS[1], COLOURS[2], "0.45"
 _PEAK, _CUT = 12.0, 4.0
 #: Difference of shares to first and second order below which the latter are not drawn.
 _SAME_SHARE = 0.02
+#: Share of the largest value of its unit below which a curve is zero.
+_ZERO = 1e-12
 #: Letters in a line of the foot.
-_LINE = 140
+_LETTERS = 140
 
 
 @plot.register
 def plot_forces(turn: ForceTurn, frame: int = 1, *, units: str = "SI", title: str = "") -> Figure:
     """Plot motion, torque and joint forces over the crank angle, by components in a frame.
 
-    Curves leave their axes towards poles and limits of assembly, and have gaps where there is no mechanism.
+    Curves leave their axes towards poles and limits of assembly, and have gaps where there is no mechanism. Dead centres and
+    limits are dashed lines, named at the foot; so is what is zero throughout, which has no panel.
 
     Parameters
     ----------
@@ -64,8 +66,25 @@ def plot_forces(turn: ForceTurn, frame: int = 1, *, units: str = "SI", title: st
         components = {f"{axis}{frame}": values for axis, values in zip("ijk", turn.vector(name, frame).T)}
         contents.append((joint.words, joint.unit, components))
     known = unit_table(units)
-    panels = [_force_panel(turn, name, si, *known[si], curves) for name, si, curves in contents]
-    return plot_curves(panels, title=title, columns=2, size=(5.2, 2.5))
+    # zero but for rounding: against the largest of the same unit
+    sizes = {name: _largest(curves.values()) for name, _, curves in contents}
+    scales = {si: max(sizes[name] for name, other, _ in contents if other == si) for _, si, _ in contents}
+    zero = [name for name, si, _ in contents if sizes[name] <= _ZERO * scales[si]]
+    panels = [_force_panel(turn, name, si, *known[si], curves) for name, si, curves in contents if name not in zero]
+    notes = [f"Dashed: {', '.join(_marks(turn))}."] if _marks(turn) else []
+    notes += [f"Zero throughout, not drawn: {'; '.join(zero)}."] if zero else []
+    return plot_curves(panels, title=title, columns=2, size=(5.2, 2.5), notes=notes)
+
+
+def _largest(curves: Iterable[Any]) -> float:
+    """Largest magnitude of curves, where they are determined."""
+    return max(float(np.nanmax(np.abs(np.ma.filled(values, np.nan)), initial=0.0)) for values in curves)
+
+
+def _marks(turn: ForceTurn) -> dict[str, float]:
+    """Crank angles (deg) of the dead centres and of the limits of assembly, by their names."""
+    marks = {f"dead centre {np.degrees(d.crank_angle):.1f}°": np.degrees(d.crank_angle) for d in turn.dead_centres}
+    return marks | {f"limit of assembly {np.degrees(end):.1f}°": np.degrees(end) for end in turn.limits}
 
 
 def _force_panel(turn: ForceTurn, title: str, si: str, unit: str, one: float, components: Mapping[str, Any]) -> Panel:
@@ -85,13 +104,11 @@ def _force_panel(turn: ForceTurn, title: str, si: str, unit: str, one: float, co
         low, high = float(np.concatenate(inside).min()), float(np.concatenate(inside).max())
         room = 0.08 * (high - low) or 0.08 * abs(high) or 1.0
         limits = low - room, high + room
-    marks = {f"dead centre {np.degrees(d.crank_angle):.1f}°": d.crank_angle for d in turn.dead_centres}
-    marks |= {f"limit {np.degrees(end):.1f}°": end for end in turn.limits}
     return Panel(
         x_label="crank angle [deg]",
         y_label=f"[{unit}]",
         curves=curves,
-        verticals={text: float(np.degrees(place)) for text, place in marks.items()},
+        dashed=list(_marks(turn).values()),
         title=title,
         y_range=limits,
         x_ticks=[60.0 * n for n in range(7)],
@@ -145,12 +162,10 @@ def plot_tolerances(
     lost = f"at worst {most / found.samples:.2%} of them cannot be assembled, and are left out"
     foot = [f"{found.samples:,} samples at each angle; {lost if most else 'all can be assembled'}."]
     foot += [f"{note[0].upper()}{note[1:]}." for note in found.notes(units)]
-    lines = "\n".join(fill(note, _LINE, subsequent_indent="    ") for note in foot)
-    with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(9.6, 7.0 + 0.16 * lines.count("\n")))
-        above, below = np.ravel(
-            figure.subfigures(2, 1, squeeze=False, height_ratios=(1.0, 1.0 + 0.03 * lines.count("\n")))
-        )
+    lines = sum(len(fill(note, _LETTERS).splitlines()) for note in foot) - 1
+    with styled():
+        figure = Figure(figsize=(9.6, 7.0 + 0.16 * lines))
+        above, below = np.ravel(figure.subfigures(2, 1, squeeze=False, height_ratios=(1.0, 1.0 + 0.03 * lines)))
         band = above.subplots()
         histogram, bars = below.subplots(1, 2, width_ratios=(3, 2))
         _draw_band(band, found, quantity, at, one)
@@ -158,8 +173,8 @@ def plot_tolerances(
         band.set_ylabel(f"error of {name} [{unit}]")
         histogram.set_xlabel(f"error of {name} [{unit}]")
         _draw_shares(bars, found, quantity, at)
-        below.supxlabel(lines, fontsize=8, x=0.02, ha="left", color="0.25")
-        figure.suptitle(fill(title or f"Tolerances: {name}", 110), fontsize=10.5, fontweight="bold")
+        write_notes(below, foot)
+        write_title(figure, title or f"Tolerances: {name}")
         return finish(figure)
 
 
@@ -174,9 +189,9 @@ def _draw_band(axis: Axes, found: MonteCarlo, quantity: str, at: int, one: float
     three = curve(3.0 * linear.deviation)
     axis.fill_between(whole, -three, three, color=_LINEAR, alpha=0.18, linewidth=0.0, label=r"linear, $\pm 3\,\sigma$")
     low, lower, _, upper, high = spread.percentiles - linear.nominal
-    dashed: dict[str, Any] = {"color": _WORST, "linewidth": 1.0, "linestyle": "--"}
-    thin: dict[str, Any] = {"color": _SAMPLES, "linewidth": 0.8, "alpha": 0.7}
-    mean: dict[str, Any] = {"color": "black", "linewidth": 1.2, "linestyle": ":"}
+    dashed: dict[str, Any] = {"color": _WORST, "linewidth": THIN, "linestyle": "--"}
+    thin: dict[str, Any] = {"color": _SAMPLES, "linewidth": HAIR, "alpha": 0.7}
+    mean: dict[str, Any] = {"color": "black", "linewidth": LINE, "linestyle": ":"}
     for values, look, label in (
         (linear.worst, dashed, "linear, worst case"),
         (-linear.worst, dashed, None),
@@ -187,9 +202,9 @@ def _draw_band(axis: Axes, found: MonteCarlo, quantity: str, at: int, one: float
         (spread.mean - linear.nominal, mean, "mean of the samples"),
     ):
         axis.plot(whole, curve(values), label=label, **look)
-    axis.axvline(angle[at], color="0.35", linewidth=0.9, linestyle="-.")
+    axis.axvline(angle[at], color=MARK["color"], linewidth=THIN, linestyle="-.")
     for pole in found.poles(quantity):
-        axis.axvline(np.degrees(pole), color="0.35", linewidth=0.9, linestyle=":")
+        axis.axvline(np.degrees(pole), color=MARK["color"], linewidth=THIN, linestyle=":")
     # of what is not NaN, if anything
     departures = [low, lower, upper, high, linear.worst]
     reach = np.fmax.reduce([np.abs(np.ma.filled(values, np.nan)) for values in departures], axis=0) / one
@@ -200,7 +215,7 @@ def _draw_band(axis: Axes, found: MonteCarlo, quantity: str, at: int, one: float
     axis.set_xlim(angle.min(), angle.max())
     axis.xaxis.set_major_locator(MultipleLocator(30.0 if np.ptp(angle) > 120.0 else 10.0))
     axis.set_xlabel("crank angle [deg]" + " (dotted: dead centres, cut off)" * cut)
-    axis.legend(fontsize=8, loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=5, borderaxespad=0.2, columnspacing=1.2)
+    axis.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=5, borderaxespad=0.2, columnspacing=1.2)
 
 
 def _broken(values: FloatArray, breaks: Sequence[int], fill: FloatArray | None = None) -> FloatArray:
@@ -226,10 +241,10 @@ def _draw_histogram(axis: Axes, found: MonteCarlo, quantity: str, at: int, unit:
         axis.plot(fine, curve, color=_LINEAR, label="linear estimate, normal")
         for place in (-3.0 * deviation, 3.0 * deviation):
             if edges[0] <= place <= edges[-1]:
-                axis.axvline(place, ymax=0.55, color=_LINEAR, linewidth=0.9, linestyle="--")
-                axis.text(place, 0.6, r"$3\,\sigma$", transform=axis.get_xaxis_transform(), ha="center", fontsize=8)
+                axis.axvline(place, ymax=0.55, color=_LINEAR, linewidth=THIN, linestyle="--")
+                axis.text(place, 0.6, r"$3\,\sigma$", transform=axis.get_xaxis_transform(), ha="center", fontsize=SMALL)
     elif isfinite(deviation):
-        axis.axvline(0.0, ymax=0.72, color=_LINEAR, linewidth=2.0, label="linear estimate: no spread")
+        axis.axvline(0.0, ymax=0.72, color=_LINEAR, linewidth=BOLD, label="linear estimate: no spread")
     sigmas = {"of the samples": of_samples, "linear": deviation, "to second order": second}
     lines = [f"$\\sigma$ {what} {_figure(x)} {unit}" for what, x in sigmas.items() if isfinite(x)]
     axis.set_ylabel("share of the samples")
@@ -239,10 +254,10 @@ def _draw_histogram(axis: Axes, found: MonteCarlo, quantity: str, at: int, unit:
     axis.set_title(
         f"at {np.degrees(found.turn.angle[at]):.4g} deg, nominal {_figure(nominal / one, 6)} {unit}; "
         f"{spread.counts[at].sum() / found.samples:.1%} of the samples",
-        fontsize=9,
+        fontsize=PLAIN,
     )
-    axis.legend(fontsize=8, loc="upper left")
-    axis.text(0.985, 0.97, "\n".join(lines), transform=axis.transAxes, ha="right", va="top", fontsize=8)
+    axis.legend(loc="upper left")
+    axis.text(0.985, 0.97, "\n".join(lines), transform=axis.transAxes, ha="right", va="top", fontsize=SMALL)
 
 
 def _draw_shares(axis: Axes, found: MonteCarlo, quantity: str, at: int) -> None:
@@ -255,12 +270,12 @@ def _draw_shares(axis: Axes, found: MonteCarlo, quantity: str, at: int) -> None:
     # the second order is drawn where it says something else
     second = second and not (linear and np.abs(shares[:, 1] - shares[:, 0]).max() < _SAME_SHARE)
     orders = [(0, _LINEAR, "linear")] * linear + [(1, _SECOND, "to second order")] * second
-    axis.set_title("share in the variance" + ", linear" * (not second), fontsize=9)
+    axis.set_title("share in the variance" + ", linear" * (not second))
     if not orders:
         none = "no variance to first or second order"
         if np.ma.getmaskarray(estimate.deviation)[at]:
             none = "no variance: a dead centre is within the tolerances"
-        axis.text(0.5, 0.5, none, ha="center", va="center", fontsize=9)
+        axis.text(0.5, 0.5, none, ha="center", va="center", fontsize=PLAIN)
         axis.set_axis_off()
         return
     height = 0.66 / len(orders)
@@ -268,9 +283,9 @@ def _draw_shares(axis: Axes, found: MonteCarlo, quantity: str, at: int) -> None:
         places = np.arange(len(names)) + height * (0.5 * (len(orders) - 1) - number)
         bars = axis.barh(places, shares[:, column], color=colour, alpha=0.8, height=height, label=label)
         labels = [f"{share:.1%}" if share >= 5e-4 else "< 0.1%" for share in shares[:, column]]
-        axis.bar_label(bars, labels, padding=3, fontsize=8)
+        axis.bar_label(bars, labels, padding=3, fontsize=SMALL)
     if second:
-        axis.legend(fontsize=8, loc="lower right")
+        axis.legend(loc="lower right")
     axis.set_yticks(np.arange(len(names)), [f"{name} ${SYMBOLS[name]}$" if name in SYMBOLS else name for name in names])
     axis.set_xlim(0.0, 1.22 * float(np.nanmax(shares)))
     axis.xaxis.set_major_formatter(PercentFormatter(1.0, decimals=0))

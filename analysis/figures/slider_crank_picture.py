@@ -16,7 +16,6 @@ from math import ceil, cos, degrees, isfinite, pi, radians, sin
 from pathlib import Path
 from typing import Any, NamedTuple, TypeAlias
 
-import matplotlib
 import numpy as np
 import textalloc
 from matplotlib.animation import PillowWriter
@@ -33,11 +32,26 @@ from linkwork.slider_crank.parameters import SliderCrankParameters
 from linkwork.slider_crank.published import INCH
 from linkwork.slider_crank.vectors import Vector
 
+from ..run import Trajectory
 from ..slider_crank import PeriodicShift, Range, assembled_ranges, constant_shift, ranges
-from .dispatch import animate, plot
-from .linkage import COUPLER, CRANK, GROUND, SLIDER, TRACE
+from .dispatch import animate, draw_mechanism, plot
 from .solids import ball, box, paint, tube
-from .style import COLOURS, STYLE, finish
+from .style import (
+    BOLD,
+    COLOURS,
+    COUPLER,
+    CRANK,
+    GROUND,
+    HAIR,
+    LINE,
+    SLIDER,
+    THIN,
+    TINY,
+    TRACE,
+    finish,
+    styled,
+    write_title,
+)
 
 FloatArray: TypeAlias = NDArray[np.float64]
 
@@ -122,6 +136,19 @@ class _Part:
         return (self.dead, "dead centre", _DEAD, "D"), (self.limits, "limit", _LIMIT, "s")
 
 
+class _Track(NamedTuple):
+    """What a run goes through, drawn like a `_Part`."""
+
+    poses: Sequence[_Pose]
+    crank_pins: FloatArray
+    slider_pins: FloatArray
+    marks: tuple[tuple[Sequence[_Pose], str, str, str], ...] = ()
+
+
+def _parts(parameters: SliderCrankParameters, law: PeriodicShift, factor: float) -> list[_Part]:
+    return [_Part(parameters, part, law, factor) for part in ranges(parameters, law)]
+
+
 class _Label(NamedTuple):
     """A text that is to stand near a point in space."""
 
@@ -137,7 +164,7 @@ class _Scene:
     def __init__(
         self,
         parameters: SliderCrankParameters,
-        law: PeriodicShift,
+        parts: Sequence[_Part | _Track],
         poses: Sequence[_Pose],
         unit: str,
         view: tuple[float, float],
@@ -146,7 +173,7 @@ class _Scene:
         factor = _factor(unit)
         p = parameters.constants()
         self.a1, self.a2, self.a4 = factor * p.a1, factor * p.a2, factor * p.a4
-        self.parts = [_Part(parameters, part, law, factor) for part in ranges(parameters, law)]
+        self.parts = parts
         #: Length by which joints, supports and letters are drawn.
         self.size = (self.a1 + self.a2 + abs(self.a4)) / 26.0
         #: Rows: i, j, k of frame 4.
@@ -210,7 +237,7 @@ class _Scene:
             self._letters(axis, pose)
 
     def _line(self, axis: Axes, points: ArrayLike, **look: Any) -> None:
-        default: dict[str, Any] = {"color": GROUND, "linewidth": 1.0, "zorder": 4, "solid_capstyle": "round"}
+        default: dict[str, Any] = {"color": GROUND, "linewidth": THIN, "zorder": 4, "solid_capstyle": "round"}
         shown = self.page(points).T
         axis.plot(*shown, **default | look)
         # some thirty pieces of a curve will do for the letters
@@ -244,32 +271,32 @@ class _Scene:
 
     def _centre_lines(self, axis: Axes, pose: _Pose) -> None:
         u = self.size
-        dashes = {"linestyle": (0, (9, 2, 2, 2)), "linewidth": 0.8, "color": "0.4", "zorder": 1}
+        dashes = {"linestyle": (0, (9, 2, 2, 2)), "linewidth": HAIR, "color": "0.4", "zorder": 1}
         self._line(axis, [[0, 0, self.low_shift - 4.0 * u], [0, 0, self.high_shift + 8.0 * u]], **dashes)
         ends = min(self.least - 2.3 * u, -1.5 * u), max(self.most + 2.6 * u, 1.5 * u)
         self._line(axis, [self.at(slide) for slide in ends], **dashes)
         turn = np.linspace(0.0, 2.0 * pi, 181)
         ring = self.a1 * np.column_stack([np.cos(turn), np.sin(turn), 0.0 * turn])
-        self._line(axis, ring + pose.centre, color="0.6", linewidth=0.9, linestyle=":", zorder=1)
+        self._line(axis, ring + pose.centre, color="0.6", linewidth=THIN, linestyle=":", zorder=1)
 
     def _paths(self, axis: Axes, pose: _Pose, letters: bool) -> None:
         """Paths of the pins; crank and rod in thin lines at the dead centres and at the limits of assembly."""
         for part in self.parts:
-            self._line(axis, part.crank_pins, color=TRACE, linewidth=1.6, zorder=2)
+            self._line(axis, part.crank_pins, color=TRACE, linewidth=BOLD, zorder=2)
             self._line(axis, part.slider_pins, color=TRACE, linewidth=3.0, zorder=2)
             for places, _, colour, marker in part.marks:
                 for place in places:
                     if letters:
                         joints = [place.centre, place.crank_pin, place.slider_pin]
-                        self._line(axis, joints, color=colour, linewidth=0.9, linestyle="--", zorder=2)
+                        self._line(axis, joints, color=colour, linewidth=THIN, linestyle="--", zorder=2)
                     pins = self.page([place.crank_pin, place.slider_pin])
-                    edge: dict[str, Any] = {"markeredgecolor": "white", "markeredgewidth": 0.6}
+                    edge: dict[str, Any] = {"markeredgecolor": "white", "markeredgewidth": HAIR}
                     axis.plot(*pins.T, marker, color=colour, markersize=5.0, zorder=6, **edge)
 
     def _dimensions(self, axis: Axes, pose: _Pose, letters: bool) -> None:
         u = self.size
         if self.a4 != 0.0:
-            self._line(axis, [np.zeros(3), self.foot], color="black", linewidth=1.5, zorder=5)
+            self._line(axis, [np.zeros(3), self.foot], color="black", linewidth=LINE, zorder=5)
         if abs(pose.centre[2]) > 1e-9 * self.size:
             self._line(axis, [np.zeros(3), pose.centre], color=_SHIFT, linewidth=2.6, zorder=6)
         if not letters:
@@ -277,16 +304,20 @@ class _Scene:
         if self.a4 != 0.0:
             # the direction of the crank axis once more, at the guide
             self._line(
-                axis, [self.foot, self.foot + np.array([0.0, 0.0, 2.6 * u])], color="0.4", linewidth=0.8, linestyle="--"
+                axis,
+                [self.foot, self.foot + np.array([0.0, 0.0, 2.6 * u])],
+                color="0.4",
+                linewidth=HAIR,
+                linestyle="--",
             )
         t = np.linspace(0.0, self.parameters.guide_twist, 121)
         self._line(
-            axis, self.foot + 1.5 * u * np.column_stack([0.0 * t, np.sin(t), np.cos(t)]), color=_TWIST, linewidth=1.4
+            axis, self.foot + 1.5 * u * np.column_stack([0.0 * t, np.sin(t), np.cos(t)]), color=_TWIST, linewidth=LINE
         )
         look = {
             "arrowstyle": "-|>",
             "color": "black",
-            "linewidth": 1.0,
+            "linewidth": THIN,
             "mutation_scale": 8,
             "shrinkA": 0,
             "shrinkB": 0,
@@ -334,7 +365,7 @@ class _Scene:
             x_lines=[line[0] for line in self.lines], y_lines=[line[1] for line in self.lines],
             xlims=(self.low[0] + 0.5 * u, self.high[0] - 0.5 * u), ylims=(self.low[1], self.high[1]),
             margin=0.003, min_distance=0.005, nbr_candidates=500,
-            textsize=[label.size for label in labels], textcolor=colours, linecolor=colours, linewidth=0.5,
+            textsize=[label.size for label in labels], textcolor=colours, linecolor=colours, linewidth=HAIR,
             plot_kwargs={"zorder": 11}, zorder=12, path_effects=[withStroke(linewidth=2.4, foreground="white")],
         )  # fmt: skip
 
@@ -380,13 +411,28 @@ def plot_mechanism(
         If angle or shift are not finite, or the unit is not known.
     """
     pose = _checked_pose(parameters, crank_angle, shift, _factor(unit))
-    scene = _Scene(parameters, constant_shift(shift) if law is None else law, [pose], unit, view)
-    with matplotlib.rc_context(STYLE | {"figure.constrained_layout.use": False}):
+    parts = _parts(parameters, constant_shift(shift) if law is None else law, _factor(unit))
+    scene = _Scene(parameters, parts, [pose], unit, view)
+    with styled(laid_out=False):
         figure, axis = _sheet(scene, 9.0, head=0.35 if title else 0.0)
         scene.draw(axis, pose)
-        if title:
-            figure.suptitle(title, fontsize=10.5, fontweight="bold")
+        write_title(figure, title)
         return finish(figure)
+
+
+@draw_mechanism.register
+def _draw_at_start(parameters: SliderCrankParameters, axis: Axes, run: Trajectory) -> str:
+    """As it starts, with the paths of both pins."""
+    factor = UNITS["mm"]
+    shown = np.linspace(0, len(run) - 1, min(len(run), _POINTS)).astype(int)
+    poses = [_pose(parameters, run["crank.angle"][i], run["shift.position"][i], factor) for i in shown]
+    crank, slider = (
+        factor * np.column_stack([run[f"{pin}.{x}"] for x in "xyz"]) for pin in ("crank_pin", "slider_pin")
+    )
+    scene = _Scene(parameters, [_Track(poses, crank, slider)], poses, "mm", VIEW)
+    scene.prepare(axis)
+    scene.draw(axis, poses[0], letters=False)
+    return f"at {run.time[0]:.4g} s, with the paths of the pins over the run"
 
 
 def _sheet(scene: _Scene, wide: float, *, head: float, foot: float = 0.0) -> tuple[Figure, Axes]:
@@ -448,17 +494,17 @@ def animate_mechanism(
         share = 0.5 - 0.5 * np.cos(2.0 * pi * share)
     angles = ends[0] + share * (ends[1] - ends[0])
     poses = [_pose(parameters, float(a), law.at(float(a))[0], factor) for a in angles]
-    scene = _Scene(parameters, law, poses, unit, view)
+    parts = _parts(parameters, law, factor)
+    scene = _Scene(parameters, parts, poses, unit, view)
     path = Path(path)
     path.parent.mkdir(parents=True, exist_ok=True)
-    with matplotlib.rc_context(STYLE | {"figure.constrained_layout.use": False}):
+    with styled(laid_out=False):
         head, foot = (0.35 if title else 0.0), 1.6
         figure, above = _sheet(scene, 7.0, head=head, foot=foot)
         total = figure.get_figheight()
         below = figure.add_axes((0.11, 0.45 / total, 0.86, (foot - 0.55) / total))
-        if title:
-            figure.suptitle(title, fontsize=10.5, fontweight="bold")
-        _slides(below, scene.parts, unit)
+        write_title(figure, title)
+        _slides(below, parts, unit)
         (dot,) = below.plot([], [], "o", color=CRANK, markersize=5, zorder=7)
         writer = PillowWriter(fps=frames_per_second, metadata={})
         with writer.saving(figure, str(path), dpi=80):
@@ -511,12 +557,12 @@ def plot_range(
     law = constant_shift(0.0) if law is None else law
     factor = _factor(unit)
     p = parameters.constants()
-    parts = [_Part(parameters, part, law, factor) for part in ranges(parameters, law)]
+    parts = _parts(parameters, law, factor)
     ends = [*(a for part in parts for a in part.angles[[0, -1]]), 0.0, law.span]
     angles = np.linspace(min(ends), max(ends), 2 * _POINTS)
     square = np.array([kinematics.assembly_square(float(a), law.at(float(a))[0], p) for a in angles])
     margin = factor * (p.a2 - np.sqrt(p.a2 * p.a2 - square))
-    with matplotlib.rc_context(STYLE):
+    with styled():
         figure = Figure(figsize=(9.6, 4.4))
         panels = figure.subplot_mosaic(
             [["circle", "margin"], ["circle", "slider"]], width_ratios=(1.0, 1.35), height_ratios=(1.0, 1.0)
@@ -525,15 +571,14 @@ def plot_range(
         upper = panels["margin"]
         upper.fill_between(np.degrees(angles), margin, 0.0, where=(margin < 0.0).tolist(), color="0.85", linewidth=0.0)
         upper.plot(np.degrees(angles), margin, color=COLOURS[0])
-        upper.axhline(0.0, color="0.3", linewidth=0.8)
+        upper.axhline(0.0, color="0.3", linewidth=HAIR)
         upper.set_ylabel(f"assembly margin [{unit}]")
         upper.sharex(panels["slider"])
         _slides(panels["slider"], parts, unit)
         for angle in (degrees(float(part.angles[end])) for part in parts if part.limits for end in (0, -1)):
             for axis in (upper, panels["slider"]):
-                axis.axvline(angle, color=_LIMIT, linewidth=0.9, linestyle="--", zorder=1)
-        if title:
-            figure.suptitle(title, fontsize=10.5, fontweight="bold")
+                axis.axvline(angle, color=_LIMIT, linewidth=THIN, linestyle="--", zorder=1)
+        write_title(figure, title)
         figure.align_ylabels([upper, panels["slider"]])
         return finish(figure)
 
@@ -541,18 +586,18 @@ def plot_range(
 def _circle(axis: Axes, parts: Sequence[_Part], radius: float, unit: str) -> None:
     """The crank pin's circle seen against the crank axis, with what of it the crank can reach."""
     turn = np.linspace(0.0, 2.0 * pi, 181)
-    axis.plot(radius * np.cos(turn), radius * np.sin(turn), ":", color="0.5", linewidth=1.2)
+    axis.plot(radius * np.cos(turn), radius * np.sin(turn), ":", color="0.5", linewidth=LINE)
     for part in parts:
         axis.plot(*part.crank_pins[:, :2].T, color=TRACE, linewidth=3.5)
         for places, name, colour, marker in part.marks:
             for place in places:
                 x, y = place.crank_pin[:2]
-                axis.plot([0.0, x], [0.0, y], "--", color=colour, linewidth=0.9)
+                axis.plot([0.0, x], [0.0, y], "--", color=colour, linewidth=THIN)
                 axis.plot(x, y, marker, color=colour, markersize=5.5, zorder=5)
                 side = "left" if x > 0.3 * radius else "right" if x < -0.3 * radius else "center"
                 out = 10.0 * x / radius, 18.0 * y / radius
                 text = f"{name}\n{degrees(place.angle) % 360.0:.2f}°"
-                look: dict[str, Any] = {"color": colour, "fontsize": 7.5, "ha": side, "va": "center"}
+                look: dict[str, Any] = {"color": colour, "fontsize": TINY, "ha": side, "va": "center"}
                 axis.annotate(text, (x, y), out, textcoords="offset points", **look)
     axis.plot(0.0, 0.0, "o", color=CRANK, markersize=6)
     axis.set_aspect("equal")
@@ -560,4 +605,4 @@ def _circle(axis: Axes, parts: Sequence[_Part], radius: float, unit: str) -> Non
     axis.set_ylim(-1.4 * radius, 1.4 * radius)
     axis.set_xlabel(f"$i_1$ [{unit}]")
     axis.set_ylabel(f"$j_1$ [{unit}]")
-    axis.set_title("crank pin" if parts else "crank pin: the rod reaches the guide nowhere", fontsize=9)
+    axis.set_title("crank pin" if parts else "crank pin: the rod reaches the guide nowhere")

@@ -1,26 +1,88 @@
-"""How every figure looks."""
+"""How every figure looks: one table of Matplotlib's settings, and the colours, widths and sizes that they do not name.
+
+A figure is made within ``with styled():``, which also keeps the user's own settings of Matplotlib out of it.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from textwrap import fill
 from typing import Any
 
+import matplotlib.style
+from cycler import cycler
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-__all__ = ["COLOURS", "STYLE", "Figure", "finish"]
-
-STYLE: dict[Any, Any] = {
-    "figure.constrained_layout.use": True,
-    "axes.grid": True,
-    "grid.alpha": 0.3,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "lines.linewidth": 1.3,
-    "legend.frameon": False,
-    "font.size": 9,
-}
+__all__ = ["COLOURS", "STYLE", "Figure", "finish", "styled"]
 
 #: Colours that stay apart for colour-blind readers and in grey (Okabe and Ito), in the order of curves.
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
+#: Line styles in the order of curves that may cover each other.
+LINES: tuple[Any, ...] = ("-", "--", "-.", ":")
+#: Colours of the links in drawings.
+CRANK, COUPLER, ROCKER, SLIDER, GROUND, TRACE = "#D55E00", "#0072B2", "#009E73", "#5B6770", "#333333", "#CC79A7"
+#: Colour of what is asked for, of areas, of the text of marks.
+TARGET, SHADE, MARKED = "#E69F00", "#56B4E9", "0.25"
+
+#: Letters: of the figure's title, of drawings, of titles of panels and axes, of legends and notes, of marks in a panel.
+TITLE, LETTER, PLAIN, SMALL, TINY = 10.5, 10.5, 9.0, 8.0, 7.5
+#: Widths of lines: of a curve that counts more than others, of curves, of those beside, of lines of reference.
+BOLD, LINE, THIN, HAIR = 1.8, 1.3, 0.9, 0.7
+
+STYLE: dict[Any, Any] = {
+    "figure.constrained_layout.use": True,
+    "figure.titlesize": TITLE,
+    "figure.titleweight": "bold",
+    "font.family": "DejaVu Sans",  # comes with Matplotlib: the same picture on every machine
+    "font.size": PLAIN,
+    "axes.grid": True,
+    "axes.prop_cycle": cycler(color=COLOURS),
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.titlesize": PLAIN,
+    "axes.labelsize": PLAIN,
+    "grid.alpha": 0.3,
+    "legend.frameon": False,
+    "legend.fontsize": SMALL,
+    "legend.title_fontsize": SMALL,
+    "lines.linewidth": LINE,
+    "lines.markersize": 4.5,
+}
+
+#: A line at a value that means something, such as zero, and one at a place that is marked.
+REFERENCE: dict[str, Any] = {"color": "0.6", "linewidth": HAIR, "zorder": 1}
+MARK: dict[str, Any] = {"color": "0.35", "linewidth": THIN, "linestyle": ":", "zorder": 1}
+#: Letters to the inch of a figure's title, and of notes.
+_LETTERS, _NOTED = 11.6, 15.0
+
+
+@contextmanager
+def styled(*, laid_out: bool = True) -> Iterator[None]:
+    """Matplotlib with this style, whatever the user's is; ``laid_out`` unless the axes are placed by hand."""
+    with matplotlib.style.context(STYLE | {"figure.constrained_layout.use": laid_out}, after_reset=True):
+        yield
+
+
+def write_title(figure: Figure, title: str) -> None:
+    """The title of a figure, on as many lines as it takes; nothing if it is empty."""
+    if title:
+        figure.suptitle(fill(title, int(_LETTERS * figure.get_figwidth())))
+
+
+def write_notes(figure: Any, notes: Sequence[str]) -> None:
+    """Sentences at the foot of a figure: what its reader must know, and what was left out of it."""
+    width = int(_NOTED * figure.get_figure(root=True).get_figwidth())
+    lines = "\n".join(fill(note, width, subsequent_indent="    ") for note in notes)
+    if lines:
+        figure.supxlabel(lines, fontsize=SMALL, x=0.02, ha="left", color=MARKED)
+
+
+def legend_above(axis: Axes, **options: Any) -> None:
+    """A legend over the axes, where no curve can be."""
+    where: dict[str, Any] = {"loc": "lower right", "bbox_to_anchor": (1.0, 1.0), "borderaxespad": 0.1, "ncols": 4}
+    axis.legend(**where | {"borderpad": 0.2, "columnspacing": 1.2} | options)
 
 
 def finish(figure: Figure) -> Figure:

@@ -11,7 +11,6 @@ from pathlib import Path
 from textwrap import fill
 from typing import Any
 
-import matplotlib
 import numpy as np
 from matplotlib.animation import PillowWriter
 from matplotlib.axes import Axes
@@ -35,13 +34,27 @@ from ..synthesis import (
     quality_unit,
 )
 from .dispatch import animate, plot
-from .linkage import COUPLER, CRANK, GROUND, ROCKER, SLIDER, TRACE
-from .style import COLOURS, STYLE, finish
+from .style import (
+    BOLD,
+    COLOURS,
+    COUPLER,
+    CRANK,
+    GROUND,
+    HAIR,
+    LETTER,
+    LINE,
+    ROCKER,
+    SLIDER,
+    TARGET,
+    THIN,
+    TRACE,
+    finish,
+    styled,
+    write_title,
+)
 
 FloatArray = NDArray[np.float64]
 
-#: Colour of what is asked for.
-TARGET = "#E69F00"
 MM_PER_METRE = 1e3
 #: Length of the longest error vector, as a share of the target's extent.
 LONGEST = 0.12
@@ -77,7 +90,7 @@ def _one_scale(axis: Axes, low: FloatArray, high: FloatArray) -> None:
 
 
 def _line(axis: Axes, points: Any, **options: Any) -> None:
-    look: dict[str, Any] = {"color": GROUND, "linewidth": 1.1, "solid_capstyle": "round"}
+    look: dict[str, Any] = {"color": GROUND, "linewidth": LINE, "solid_capstyle": "round"}
     axis.plot(*np.array(points).T, **look | options)
 
 
@@ -85,10 +98,10 @@ def _support(axis: Axes, at: FloatArray, unit: float) -> None:
     """The bearing of a pin that does not move."""
     foot, half = at[1] - 1.5 * unit, 0.85 * unit
     corners = np.array([at, [at[0] - half, foot], [at[0] + half, foot]])
-    axis.add_patch(Polygon(corners, facecolor="0.92", edgecolor=GROUND, linewidth=0.9, zorder=5))
-    _line(axis, [(at[0] - 1.3 * unit, foot), (at[0] + 1.3 * unit, foot)], linewidth=0.9, zorder=5)
+    axis.add_patch(Polygon(corners, facecolor="0.92", edgecolor=GROUND, linewidth=THIN, zorder=5))
+    _line(axis, [(at[0] - 1.3 * unit, foot), (at[0] + 1.3 * unit, foot)], linewidth=THIN, zorder=5)
     for x in np.linspace(at[0] - 0.9 * unit, at[0] + 1.3 * unit, 5):
-        _line(axis, [(x, foot), (x - 0.5 * unit, foot - 0.5 * unit)], linewidth=0.6, zorder=5)
+        _line(axis, [(x, foot), (x - 0.5 * unit, foot - 0.5 * unit)], linewidth=HAIR, zorder=5)
 
 
 def _draw_target(axis: Axes, scene: LinkageScene, *, size: float = 3.0) -> None:
@@ -97,7 +110,7 @@ def _draw_target(axis: Axes, scene: LinkageScene, *, size: float = 3.0) -> None:
     points = MM_PER_METRE * scene.target
     look: dict[str, Any] = {"color": TARGET, "zorder": 3, "label": "target"}
     if scene.target_closed is None:
-        axis.plot(*points.T, "o", markersize=size, fillstyle="none", markeredgewidth=0.9, **look)
+        axis.plot(*points.T, "o", markersize=size, fillstyle="none", markeredgewidth=THIN, **look)
     else:
         closed = np.vstack([points, points[:1]]) if scene.target_closed else points
         axis.plot(*closed.T, linewidth=2.6, alpha=0.8, **look)
@@ -105,15 +118,15 @@ def _draw_target(axis: Axes, scene: LinkageScene, *, size: float = 3.0) -> None:
 
 def _draw_curves(axis: Axes, scene: LinkageScene, *, traced: bool = True) -> None:
     for piece in scene.curves:
-        axis.plot(*(MM_PER_METRE * piece).T, color=TRACE, alpha=0.45, linewidth=0.9, zorder=2)
+        axis.plot(*(MM_PER_METRE * piece).T, color=TRACE, alpha=0.45, linewidth=THIN, zorder=2)
     if not scene.curves:
         # of a function of the rocker's angle, the ways of B and C
         places = [pins for phi in _around(scene) if (pins := scene.pins(float(phi))) is not None]
         for name, colour in (("B", CRANK), ("C", ROCKER)):
             way = MM_PER_METRE * np.array([pins[name] for pins in places])
-            axis.plot(*way.T, color=colour, alpha=0.35, linewidth=0.9, zorder=2)
+            axis.plot(*way.T, color=colour, alpha=0.35, linewidth=THIN, zorder=2)
     if traced and scene.traced is not None:
-        axis.plot(*(MM_PER_METRE * scene.traced).T, color=TRACE, linewidth=1.6, zorder=4)
+        axis.plot(*(MM_PER_METRE * scene.traced).T, color=TRACE, linewidth=BOLD, zorder=4)
 
 
 def _draw_linkage(
@@ -125,7 +138,7 @@ def _draw_linkage(
     a, b, c, d, e = (at[name] for name in "ABCDE")
     p = at.get("P")
     link: dict[str, Any] = {"linewidth": 3.6 if letters else 2.4}
-    _line(axis, [a, e], linewidth=0.7, linestyle=(0, (9, 3, 2, 3)), color="0.55", zorder=1)
+    _line(axis, [a, e], linewidth=HAIR, linestyle=(0, (9, 3, 2, 3)), color="0.55", zorder=1)
     _support(axis, a, unit)
     if scene.guide is not None:
         _draw_slider(axis, MM_PER_METRE * scene.guide, d, unit)
@@ -135,14 +148,14 @@ def _draw_linkage(
         _line(axis, [e, d], color=CRANK, zorder=8, **link)
     if p is not None:
         axis.add_patch(Polygon([b, c, p], facecolor=COUPLER, alpha=0.14, edgecolor="none", zorder=5))
-        _line(axis, [b, p, c], color=COUPLER, linewidth=1.2, zorder=6)
+        _line(axis, [b, p, c], color=COUPLER, linewidth=LINE, zorder=6)
     _line(axis, [d, c], color=ROCKER, zorder=6, **link)
     _line(axis, [b, c], color=COUPLER, zorder=7, **link)
     _line(axis, [a, b], color=CRANK, zorder=8, **link)
     for pin in (a, b, c, d, *([e] if scene.second_crank else [])):
-        axis.add_patch(Circle(tuple(pin), 0.36 * unit, facecolor="white", edgecolor="black", linewidth=1.0, zorder=9))
+        axis.add_patch(Circle(tuple(pin), 0.36 * unit, facecolor="white", edgecolor="black", linewidth=THIN, zorder=9))
     if p is not None:
-        axis.add_patch(Circle(tuple(p), 0.32 * unit, facecolor=TRACE, edgecolor="black", linewidth=0.9, zorder=10))
+        axis.add_patch(Circle(tuple(p), 0.32 * unit, facecolor=TRACE, edgecolor="black", linewidth=THIN, zorder=10))
     if letters:
         _write_letters(axis, scene, at, unit)
 
@@ -154,9 +167,9 @@ def _draw_slider(axis: Axes, guide: FloatArray, d: FloatArray, unit: float) -> N
     left = np.array([-along[1], along[0]])
     for side in (-0.8, 0.8):
         rail = [guide[0] - 2.2 * unit * along + side * unit * left, guide[1] + 2.2 * unit * along + side * unit * left]
-        _line(axis, rail, linewidth=1.0, zorder=3)
+        _line(axis, rail, linewidth=THIN, zorder=3)
     block = [d + s * 1.3 * unit * along + n * 0.8 * unit * left for s, n in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
-    axis.add_patch(Polygon(block, facecolor="#C9D1D6", edgecolor=SLIDER, linewidth=1.1, zorder=4))
+    axis.add_patch(Polygon(block, facecolor="#C9D1D6", edgecolor=SLIDER, linewidth=LINE, zorder=4))
 
 
 def _write_letters(axis: Axes, scene: LinkageScene, at: Mapping[str, FloatArray], unit: float) -> None:
@@ -186,7 +199,7 @@ def _write_letters(axis: Axes, scene: LinkageScene, at: Mapping[str, FloatArray]
             near = np.hypot(*(places[:, None] - curve[None, :]).transpose(2, 0, 1)).min(axis=1)
             room = np.minimum(room, near)
         place = places[int(np.argmax(room))]
-        axis.text(place[0], place[1], name, ha="center", va="center", fontsize=10.5, zorder=11)
+        axis.text(place[0], place[1], name, ha="center", va="center", fontsize=LETTER, zorder=11)
         marks.append(place)
 
 
@@ -238,13 +251,13 @@ def _enlarged(axis: Axes, scene: LinkageScene) -> None:
     times = "" if factor == 1.0 else f" (x {factor:g})"
     _draw_target(axis, scene, size=4.0)
     if scene.traced is not None:
-        axis.plot(*(MM_PER_METRE * scene.traced).T, color=TRACE, linewidth=1.3, zorder=4, label="path")
-    axis.plot(*strokes.T, color=CRANK, linewidth=0.8, zorder=5, label=f"error{times}")
+        axis.plot(*(MM_PER_METRE * scene.traced).T, color=TRACE, linewidth=LINE, zorder=4, label="path")
+    axis.plot(*strokes.T, color=CRANK, linewidth=HAIR, zorder=5, label=f"error{times}")
     points = np.vstack([wanted, ends])
     low, high = points.min(axis=0), points.max(axis=0)
     rim = 0.06 * float((high - low).max())
     _one_scale(axis, low - rim, high + rim)
-    axis.legend(fontsize=7.5, loc="lower center", bbox_to_anchor=(0.5, 0.99), ncols=3, borderpad=0.2)
+    axis.legend(loc="lower center", bbox_to_anchor=(0.5, 0.99), ncols=3, borderpad=0.2)
 
 
 def _stations(scene: LinkageScene) -> tuple[FloatArray, str]:
@@ -261,11 +274,11 @@ def _rocker(axis: Axes, scene: LinkageScene) -> None:
     columns = scene.stations
     x = np.degrees(columns["crank rotation [rad]"])
     axis.plot(*np.degrees(scene.function), color=ROCKER, label="rocker", zorder=4)
-    look: dict[str, Any] = {"markersize": 3.5, "fillstyle": "none", "markeredgewidth": 0.9}
+    look: dict[str, Any] = {"markersize": 3.5, "fillstyle": "none", "markeredgewidth": THIN}
     axis.plot(x, np.degrees(columns["target angle [rad]"]), "o", color=TARGET, label="target", zorder=3, **look)
     axis.set_xlabel("crank rotation [deg]")
     axis.set_ylabel("rocker angle [deg]")
-    axis.legend(fontsize=7.5, loc="lower center", bbox_to_anchor=(0.5, 0.99), ncols=2, borderpad=0.2)
+    axis.legend(loc="lower center", bbox_to_anchor=(0.5, 0.99), ncols=2, borderpad=0.2)
 
 
 def _errors(axis: Axes, scene: LinkageScene) -> None:
@@ -282,7 +295,7 @@ def _errors(axis: Axes, scene: LinkageScene) -> None:
         beside = axis.twinx() if "error [m]" in columns else axis
         turned = np.degrees(columns["error of angle [rad]"])
         colour = COLOURS[2] if beside is not axis else COLOURS[0]
-        beside.axhline(0.0, color="0.6", linewidth=0.7)
+        beside.axhline(0.0, color="0.6", linewidth=HAIR)
         beside.plot(x, turned, color=colour, linestyle="-" if beside is axis else "--", **few)
         beside.set_ylabel("error of angle [deg]", color=colour if beside is not axis else "black")
         if beside is not axis:
@@ -299,9 +312,9 @@ def _transmission(axis: Axes, scene: LinkageScene) -> None:
     turns, angles = np.degrees(rotation), np.degrees(angle)
     begin, end = np.degrees([scene.rotation.min(), scene.rotation.max()])
     within = (turns >= begin - 1e-9) & (turns <= end + 1e-9)
-    axis.plot(turns, angles, color=COUPLER, linewidth=1.0, alpha=0.5)
-    axis.plot(turns, np.where(within, angles, np.nan), color=COUPLER, linewidth=1.8)
-    axis.axhline(90.0, color="0.6", linewidth=0.7)
+    axis.plot(turns, angles, color=COUPLER, linewidth=THIN, alpha=0.5)
+    axis.plot(turns, np.where(within, angles, np.nan), color=COUPLER, linewidth=BOLD)
+    axis.axhline(90.0, color="0.6", linewidth=HAIR)
     axis.set_ylim(0.0, 180.0)
     axis.set_yticks([0.0, 40.0, 90.0, 140.0, 180.0])
     _quarters(axis, turns)
@@ -339,7 +352,7 @@ def plot_solution(solution: Solution, *, title: str = "") -> Figure:
     scene = LinkageScene(solution, title)
     _, pins = _start(scene)
     frame = _Frame(scene, _around(scene))
-    with matplotlib.rc_context(STYLE):
+    with styled():
         right = ["task", "errors", "transmission", *(["motion"] if scene.motion is not None else [])]
         figure = Figure(figsize=(10.4, 3.1 + 1.3 * len(right)))
         panels = figure.subplot_mosaic(
@@ -360,8 +373,7 @@ def plot_solution(solution: Solution, *, title: str = "") -> Figure:
         _transmission(panels["transmission"], scene)
         if scene.motion is not None:
             _motion(panels["motion"], scene)
-        if scene.title:
-            figure.suptitle(scene.title, fontsize=10.5, fontweight="bold")
+        write_title(figure, scene.title)
         figure.align_ylabels([panels[name] for name in right])
         return finish(figure)
 
@@ -380,7 +392,7 @@ def plot_alternatives(synthesis: Synthesis, *, title: str = "") -> Figure:
         raise InputError("there are no linkages to draw")
     columns = min(3, len(scenes))
     rows = ceil(len(scenes) / columns)
-    with matplotlib.rc_context(STYLE):
+    with styled():
         figure = Figure(figsize=(3.5 * columns, 3.5 * rows + (0.3 if title else 0.0)))
         axes = figure.subplots(rows, columns, squeeze=False).ravel()
         for axis, scene in zip(axes, scenes):
@@ -390,11 +402,10 @@ def plot_alternatives(synthesis: Synthesis, *, title: str = "") -> Figure:
             _draw_target(axis, scene, size=1.8)
             _draw_curves(axis, scene)
             _draw_linkage(axis, scene, frame, pins, letters=False)
-            axis.set_title(scene.title, fontsize=8.5)
+            axis.set_title(scene.title)
         for axis in axes[len(scenes) :]:
             axis.set_visible(False)
-        if title:
-            figure.suptitle(title, fontsize=10.5, fontweight="bold")
+        write_title(figure, title)
         return finish(figure)
 
 
@@ -420,7 +431,7 @@ def plot_trade_off(traded: TradeOff, *, title: str = "") -> Figure:
     if traded.over == "transmission":
         limit, limit_label = np.degrees(traded.limit), "least transmission angle asked for [deg]"
     order = np.argsort(limit)
-    with matplotlib.rc_context(STYLE):
+    with styled():
         figure = Figure(figsize=(6.4, 2.6 * len(errors) + 0.4))
         axes = figure.subplots(len(errors), 1, sharex=True, squeeze=False).ravel()
         for axis, (label, values) in zip(axes, errors.items()):
@@ -434,11 +445,10 @@ def plot_trade_off(traded: TradeOff, *, title: str = "") -> Figure:
                 foot = {"transform": axis.get_xaxis_transform(), "clip_on": False, "zorder": 5}
                 none = limit[~there]
                 axis.plot(none, np.full(len(none), 0.04), "x", color=COLOURS[1], label="no linkage", **foot)
-                axis.legend(fontsize=8)
+                axis.legend()
             axis.set_ylabel(label)
         axes[-1].set_xlabel(limit_label)
-        if title:
-            figure.suptitle(title, fontsize=10.5, fontweight="bold")
+        write_title(figure, title)
         figure.align_ylabels()
         return finish(figure)
 
@@ -467,12 +477,11 @@ def animate_solution(
     frame = _Frame(scene, _around(scene))
     width, height = frame.high - frame.low
     tall = float(np.clip(5.0 * height / width, 2.5, 7.0))
-    with matplotlib.rc_context(STYLE):
+    with styled():
         figure = Figure(figsize=(5.4, tall + 2.1))
         FigureCanvasAgg(figure)
         above, below = figure.subplots(2, 1, height_ratios=(tall, 1.6))
-        if scene.title:
-            figure.suptitle(scene.title, fontsize=10.5, fontweight="bold")
+        write_title(figure, scene.title)
         if scene.function is not None:
             _rocker(below, scene)
         else:
@@ -497,7 +506,7 @@ def animate_solution(
                         artist.remove()
                 if "P" in pins:
                     trace.append(MM_PER_METRE * np.array(pins["P"]))
-                    _line(above, trace, color=TRACE, linewidth=1.6, zorder=4)
+                    _line(above, trace, color=TRACE, linewidth=BOLD, zorder=4)
                 _draw_linkage(above, scene, frame, pins, letters=False)
                 at = x[0] + (np.degrees(phi) - x[0]) % 360.0
                 now.set_data([at], [np.interp(at, x, y) if at <= x[-1] + 1e-9 else np.nan])

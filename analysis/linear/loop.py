@@ -442,6 +442,7 @@ def control_loop(
         status=result.status,
         message=result.message,
         source=f"{source}, {controller.method} sampled",
+        parameters=parameters,
     )
     return replace(result, trajectory=trajectory)
 

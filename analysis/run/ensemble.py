@@ -69,6 +69,7 @@ class Ensemble:
             status=int(self.status[index]),
             message=self.messages[index],
             source="compiled DOP853",
+            parameters=self.parameters[index],
             names=mechanism.output_names,
         )
 

@@ -45,6 +45,7 @@ def solve(run: Run, method: str | type[OdeSolver], options: dict[str, Any], prog
         status=code,
         message=message,
         events=tuple(sorted(march.occurrences, key=lambda o: o.time)),
+        parameters=run.parameters,
         source=method if isinstance(method, str) else method.__name__,
         statistics={"evaluations": float(march.evaluations), "seconds": clock.perf_counter() - begun},
     )

@@ -178,6 +178,7 @@ class Run:
                 for row in sorted(occurrences, key=lambda row: row[1])
             ),
             source="compiled DOP853",
+            parameters=self.parameters,
             names=self.mechanism.output_names,
             statistics={
                 "steps": float(carry["steps"] - carry["rejected"]),

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from linkwork.errors import InputError
 
-from ..mechanisms import output_units
+from ..mechanisms import Parameters, output_units
 
 if TYPE_CHECKING:
     import pandas
@@ -53,6 +53,8 @@ class Trajectory:
     statistics : mapping
         Counts of the integrator, where it gives them: steps, rejected, evaluations, seconds in all
         and seconds_integrating in the compiled loop.
+    parameters : parameters of a mechanism, optional
+        Those of the mechanism that ran.
 
     Notes
     -----
@@ -67,6 +69,7 @@ class Trajectory:
     events: tuple[Occurrence, ...] = ()
     source: str = ""
     statistics: Mapping[str, float] = field(default_factory=dict)
+    parameters: Parameters | None = None
 
     def __post_init__(self) -> None:
         if self.values.shape != (len(self.time), len(self.names)):

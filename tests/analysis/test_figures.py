@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import combinations
 from pathlib import Path
 
+import matplotlib
 import numpy as np
 import pytest
 from PIL import Image
@@ -12,8 +14,12 @@ from PIL import Image
 from analysis import Inputs, figures, simulate
 from analysis.figures import Curve, Panel
 from analysis.files import save_figure
+from analysis.mechanisms import MECHANISMS
 from linkwork.errors import AssemblyError, InputError
 from linkwork.five_bar.published import SETS, TABLE_3_1
+from linkwork.slider_crank.published import SETS as SLIDER_CRANKS
+
+from ..mechanisms import pendulum, rotor_on_cart
 
 WITH_POINT = replace(TABLE_3_1, coupler_point_distance=0.12, coupler_point_angle=0.5)
 
@@ -23,10 +29,98 @@ def run():
     return simulate(WITH_POINT, Inputs(speed=44.0), stop_time=0.15, step=5e-3)
 
 
+def labels_of(figure: figures.Figure) -> list[str]:
+    """What the panels are of, with units."""
+    return [axis.get_ylabel().replace("\n", " ") for axis in figure.axes if axis.get_ylabel()]
+
+
+def test_a_run_has_its_mechanism_beside_and_no_panel_for_a_constant(run) -> None:
+    figure = figures.plot(run, title="driven at a speed")
+    *curves, forces, mechanism = figure.axes
+    assert labels_of(figure) == [
+        "slider.position [mm]",
+        "drive.applied_torque [N.m]",
+        "transmission.angle [deg]",
+        "pin forces [N]",
+    ]
+    assert figure.get_supxlabel() == "Constant, not drawn: crank.speed 420.2 rpm."
+    np.testing.assert_allclose(curves[-1].lines[0].get_ydata(), np.degrees(run["transmission.angle"]), rtol=1e-12)
+    magnitude = {line.get_label(): line.get_ydata() for line in forces.lines}
+    assert list(magnitude) == ["A", "B", "C", "D"]
+    np.testing.assert_allclose(magnitude["C"], np.hypot(run["pin.C.fx"], run["pin.C.fy"]), rtol=1e-12)
+    # the path of P over the whole run, in cm
+    paths = [line.get_xydata() for line in mechanism.lines if len(line.get_xydata()) == len(run)]
+    path = 100.0 * np.column_stack([run["coupler.point.x"], run["coupler.point.y"]])
+    assert any(np.allclose(one, path, rtol=1e-12) for one in paths)
+
+
+def test_without_a_point_of_its_own_the_path_is_that_of_c() -> None:
+    run = simulate(TABLE_3_1, Inputs(speed=44.0), stop_time=0.15, step=5e-3)
+    mechanism = figures.plot(run).axes[-1]
+    assert "path of C" in mechanism.get_title()
+    (path,) = [line.get_xydata() for line in mechanism.lines if len(line.get_xydata()) == len(run)]
+    # C is the rocker's length from D
+    d = np.array([[TABLE_3_1.ground_length, 0.0]]) + run["slider.position"][:, None] * np.array([1.0, 0.0])
+    np.testing.assert_allclose(np.hypot(*(path / 100.0 - d).T), TABLE_3_1.rocker_length, rtol=1e-9)
+
+
+def test_a_run_of_a_slider_crank_has_its_joint_forces_and_its_picture() -> None:
+    known = SLIDER_CRANKS["rahman-a4-10-s1-3.5"]
+    run = simulate(known.parameters, Inputs(speed=known.crank_speed), initial=known.initial, stop_time=0.2, step=2e-2)
+    figure = figures.plot(run)
+    assert labels_of(figure)[0::4] == ["slider.position [mm]", "joint forces [N]"]
+    assert figure.get_supxlabel() == "Constant, not drawn: shift.position 88.9 mm, crank.speed 50 rpm."
+    assert figure.axes[-1].collections  # the solids
+
+
+@pytest.mark.parametrize(
+    ("mechanism", "labels"),
+    [
+        (pendulum.MECHANISM, ["pendulum.angle [deg]", "pendulum.speed [rpm]"]),
+        (rotor_on_cart.MECHANISM, ["cart.position [mm]", "rotor.speed [rpm]"]),
+    ],
+    ids=lambda value: getattr(value, "name", ""),
+)
+def test_a_mechanism_that_nothing_draws_has_its_curves(mechanism, labels, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(MECHANISMS, mechanism.name, mechanism)
+    known = next(iter(mechanism.published.values()))
+    run = simulate(known.parameters, initial=known.initial, stop_time=0.5, step=1e-2)
+    figure = figures.plot(run)
+    assert labels_of(figure) == labels
+    assert len(figure.axes) == len(labels)
+
+
+def test_a_run_in_which_nothing_changes_says_so(run) -> None:
+    still = replace(run, values=np.broadcast_to(run.values[0], run.values.shape))
+    figure = figures.plot(still)
+    assert labels_of(figure) == []
+    assert [text.get_text() for text in figure.axes[0].texts] == ["nothing changes in this run"]
+    assert "pin force A" in figure.get_supxlabel()
+
+
+def test_a_run_that_ended_early_says_why(run) -> None:
+    figure = figures.plot(replace(run, status=3, message="limit of assembly at t = 1 s"))
+    assert figure.get_supxlabel().splitlines()[-1] == "The run ended early: limit of assembly at t = 1 s."
+
+
+def test_texts_of_a_run_cover_neither_each_other_nor_its_curves(run) -> None:
+    figure = figures.plot(run, title="a run")
+    for axis in figure.axes[:-1]:
+        boxes = [
+            text.get_window_extent() for text in (axis.yaxis.label, axis.xaxis.label, *axis.texts) if text.get_text()
+        ]
+        legend = axis.get_legend()
+        boxes += [legend.get_window_extent()] if legend else []
+        assert not any(one.overlaps(other) for one, other in combinations(boxes, 2))
+        for line in axis.lines:
+            path = line.get_transform().transform_path(line.get_path())
+            assert not any(path.intersects_bbox(box, filled=False) for box in boxes)
+
+
 def test_outputs_have_a_panel_each(run) -> None:
     figure = figures.plot(run, ("slider.position", "drive.applied_torque"), title="a run")
-    assert [axis.get_ylabel() for axis in figure.axes] == ["slider.position [m]", "drive.applied_torque [N.m]"]
-    np.testing.assert_array_equal(figure.axes[0].lines[0].get_ydata(), run["slider.position"])
+    assert [axis.get_ylabel() for axis in figure.axes] == ["slider.position\n[mm]", "drive.applied_torque\n[N.m]"]
+    np.testing.assert_allclose(figure.axes[0].lines[0].get_ydata(), 1e3 * run["slider.position"], rtol=1e-15)
 
 
 @pytest.mark.parametrize("picture", [figures.plot, lambda result: figures.animate(result, "never.gif")])
@@ -41,8 +135,22 @@ def test_comparison(run) -> None:
     figure = figures.plot_comparison(run, shifted, ["slider.position"], title="case", labels=("a", "b"))
     both, difference = figure.axes
     assert [line.get_label() for line in both.lines] == ["a", "b"]
-    np.testing.assert_allclose(difference.lines[0].get_ydata(), 1e-6, rtol=1e-6)
-    assert (both.get_ylabel(), difference.get_ylabel()) == ("slider.position [m]", "difference [m]")
+    np.testing.assert_allclose(difference.lines[0].get_ydata(), 1e-3, rtol=1e-6)
+    assert (both.get_ylabel(), difference.get_ylabel()) == ("slider.position\n[mm]", "difference\n[mm]")
+
+
+@pytest.mark.parametrize(
+    ("factor", "text"),
+    [(1.0, "identical"), (1.0 + 1e-14, "identical but for rounding,\n"), (1.0 + 1e-11, "")],
+)
+def test_runs_that_are_the_same_are_called_identical(run, factor: float, text: str) -> None:
+    figure = figures.plot_comparison(run, replace(run, values=factor * run.values), ["slider.position"])
+    beside = figure.axes[1]
+    found = "".join(words.get_text() for words in beside.texts)
+    assert found.startswith(text)
+    assert (found == "identical") == (factor == 1.0)
+    # either the words or a curve
+    assert bool(beside.lines) == (text == "")
 
 
 def test_the_look_does_not_depend_on_where_it_is_saved(run) -> None:
@@ -74,6 +182,31 @@ def test_curves() -> None:
     path = axis.patches[0].get_path()
     assert path.contains_point((0.5, 0.5))
     assert len(path.codes) == 10
+
+
+@pytest.mark.parametrize("height", [0.0, 0.5, 1.0])
+def test_names_of_places_cover_no_curve(height: float) -> None:
+    x = np.linspace(0.0, 10.0, 200)
+    curves = [Curve(x=x, y=height + 0.04 * np.sin(3.0 * x), label="wave"), Curve(x=[0.0, 10.0], y=[0.0, 1.0])]
+    panel = Panel(
+        x_label="x", y_label="y", curves=curves, verticals={"first place": 3.0, "second place": 3.4, "end": 9.9}
+    )
+    axis = figures.plot_curves([panel], title="", size=(6.4, 3.7)).axes[0]
+    boxes = [text.get_window_extent() for text in axis.texts]
+    assert len(boxes) == 3
+    assert not any(
+        one.overlaps(other) for one, other in combinations([*boxes, axis.get_legend().get_window_extent()], 2)
+    )
+    for line in axis.lines[:2]:
+        path = line.get_transform().transform_path(line.get_path())
+        assert not any(path.intersects_bbox(box, filled=False) for box in boxes)
+
+
+def test_the_look_does_not_depend_on_the_users_settings(run, tmp_path: Path) -> None:
+    plain = save_figure(figures.plot(run), tmp_path / "a.png").read_bytes()
+    with matplotlib.rc_context({"font.size": 20.0, "axes.grid": False, "lines.linewidth": 7.0, "xtick.labelsize": 3.0}):
+        own = figures.plot(run)
+    assert save_figure(own, tmp_path / "b.png").read_bytes() == plain
 
 
 def test_logarithmic_axes() -> None:

@@ -20,6 +20,7 @@ from analysis.linear import (
     LEAST_SAMPLES,
     EquilibriumError,
     LinearModelError,
+    design_pid,
     find_equilibria,
     find_equilibrium,
     linear_outputs,
@@ -471,6 +472,31 @@ def test_state_space_has_the_names_and_poles_of_the_model() -> None:
     assert system.output_labels == ["slider_position", "pin_C_fx"]
     assert system.state_labels == ["crank_angle", "slider_position", "crank_speed", "slider_velocity"]
     assert np.sort_complex(system.poles()) == pytest.approx(np.sort_complex(model.poles), rel=1e-10)
+
+
+@pytest.mark.parametrize("gain", [2.0, 20.0])
+def test_margins_are_marked_where_the_loop_has_them(gain: float) -> None:
+    """g/(s + 1)^3 turns by 180 deg at sqrt(3), where it is g/8; above g = 8 the closed loop is not stable."""
+    loop = control.tf([gain], [1.0, 3.0, 3.0, 1.0])
+    above, below = figures.plot_bode({"loop": loop}, margins=True).axes
+    bars = {line.get_gid(): line.get_xydata() for line in (*above.lines, *below.lines) if line.get_gid()}
+    (words,) = [text.get_text() for text in above.get_legend().get_texts()]
+    if gain > 8.0:
+        assert bars == {}
+        assert words == "loop: the closed loop is not stable"
+        return
+    assert bars["gain margin"] == pytest.approx(np.array([[3.0**0.5, gain / 8.0], [3.0**0.5, 1.0]]))
+    crossing = (gain ** (2.0 / 3.0) - 1.0) ** 0.5
+    phase = -3.0 * np.degrees(np.arctan(crossing))
+    assert bars["phase margin"] == pytest.approx(np.array([[crossing, phase], [crossing, -180.0]]), rel=1e-4)
+    assert words == f"loop: gain margin 4, phase margin {180.0 + phase:.1f} deg"
+
+
+def test_the_plot_of_a_design_has_its_margins(turning) -> None:
+    design = design_pid(turning.mean(), bandwidth=150.0)
+    above, _ = figures.plot(design, title="PID").axes
+    (words,) = [text.get_text() for text in above.get_legend().get_texts()]
+    assert f"phase margin {np.degrees(design.phase_margin):.1f} deg" in words
 
 
 def test_bode_and_pole_plots(turning) -> None:

@@ -13,13 +13,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from analysis import Inputs, simulate
+from analysis import Inputs, figures, simulate
 from analysis.periodic import (
     Crossing,
     Drive,
     OrbitError,
     ResponseInterrupted,
     Stability,
+    find_orbit,
     frequency_response,
     natural_frequency,
     resonance,
@@ -127,6 +128,27 @@ def test_friction_removes_the_coexistence() -> None:
     response = frequency_response(replace(RIG["b"], slider_coulomb_friction=20.0), 900.0 * RPM, 1200.0 * RPM)
     assert not response.problems
     assert not any(branch.special for branch in response.branches)
+
+
+def test_approximations_hidden_under_the_true_motion_are_drawn_by_their_errors() -> None:
+    near = frequency_response(RIG["c"], 500.0 * RPM, 700.0 * RPM)
+    main, errors, *rest = figures.plot(near, beside=approximations(near, points=5)).axes
+    assert rest[-1].get_xlabel() == "drive.speed [rpm]"
+    assert main.get_legend() is None
+    drawn = {line.get_label(): line for line in errors.lines}
+    assert list(drawn) == ["two harmonics, printed (4.21)", "two harmonics", "ten harmonics"]
+    x, error = drawn["two harmonics"].get_data()
+    place = int(np.argmax(x > 600.0))
+    orbit = find_orbit(RIG["c"], speed=float(x[place]) * RPM)
+    linear = approximations(near, points=2).at(x[place] * RPM)["two harmonics"]
+    assert error[place] == pytest.approx(100.0 * abs(linear / orbit.amplitude - 1.0), rel=1e-3)
+
+
+def test_approximations_that_can_be_seen_are_in_the_legend() -> None:
+    far = frequency_response(RIG["b"], 900.0 * RPM, 1100.0 * RPM)
+    main = figures.plot(far, beside=approximations(far, points=5)).axes[0]
+    assert "two harmonics" in [text.get_text() for text in main.get_legend().get_texts()]
+    assert "two harmonics" in [line.get_label() for line in main.lines]
 
 
 def test_approximations_beside_the_true_motion() -> None:

@@ -29,7 +29,8 @@ SHORT = replace(parameters(30.0), rod_length=0.9)
 
 def scene_of(p, angle, shift, view=pictures.VIEW, unit="in"):
     pose = pictures._checked_pose(p, angle, shift, pictures.UNITS[unit])
-    return pictures._Scene(p, constant_shift(shift), [pose], unit, view), pose
+    parts = pictures._parts(p, constant_shift(shift), pictures.UNITS[unit])
+    return pictures._Scene(p, parts, [pose], unit, view), pose
 
 
 def texts_of(figure):
@@ -151,7 +152,7 @@ class TestMechanism:
         p = replace(OFFSET, groove_amplitude=3.0 * INCH, groove_ratio=2.0)
         law = groove_shift(p)
         pose = pictures._checked_pose(p, 0.4, law.at(0.4)[0], pictures.UNITS["in"])
-        scene = pictures._Scene(p, law, [pose], "in", pictures.VIEW)
+        scene = pictures._Scene(p, pictures._parts(p, law, pictures.UNITS["in"]), [pose], "in", pictures.VIEW)
         (part,) = scene.parts
         x, y, z = part.crank_pins.T
         assert z == pytest.approx(3.0 * np.sin(2.0 * np.arctan2(y, x)), abs=1e-9)

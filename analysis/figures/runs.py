@@ -1,0 +1,242 @@
+"""Runs over time: one with its mechanism beside, and two over each other. Units are those that people think in."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from math import ceil
+from typing import TypeAlias
+
+import numpy as np
+from matplotlib.axes import Axes
+from numpy.typing import NDArray
+
+from linkwork.mechanism import Mechanism
+from linkwork.variables import UNITS, Variable
+
+from ..mechanisms import MECHANISMS, mechanism_of
+from ..run import Trajectory
+from .dispatch import draw_mechanism, has_picture, plot
+from .style import COLOURS, LINES, MARKED, SMALL, Figure, finish, legend_above, styled, write_notes, write_title
+
+FloatArray: TypeAlias = NDArray[np.float64]
+
+#: Share of the largest value, or of the unit where that is more, by which what is constant may vary.
+_STILL = 1e-9
+#: Share of the largest value by which two runs differ in nothing but rounding.
+_ROUNDING = 1e-12
+#: Inches: width of the mechanism's picture and of a panel, height of a panel.
+_PICTURE, _WIDTH, _HEIGHT = 4.2, 6.4, 1.55
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Rows:
+    """What a panel of a run shows: its name, its unit, and its curves by what the legend calls them."""
+
+    name: str
+    unit: str
+    curves: Mapping[str, FloatArray]
+
+    @property
+    def label(self) -> str:
+        return f"{self.name}\n[{self.unit}]"
+
+
+@plot.register
+def plot_outputs(
+    run: Trajectory,
+    names: Sequence[str] | None = None,
+    *,
+    columns: int = 1,
+    title: str = "",
+) -> Figure:
+    """Plot a run: outputs over time, and the mechanism as it starts with the path of its coupler point.
+
+    Lengths are in mm, angles in degrees and speeds in rpm, by the units of the mechanism's table of variables.
+
+    Parameters
+    ----------
+    run : Trajectory
+    names : sequence of str, optional
+        Outputs, a panel each and no mechanism. By default what moves, what drives, and the magnitudes of the joint forces, of
+        what the run has; what is constant is left out, and stated at the foot.
+    columns : int
+        Panels side by side.
+    title : str
+    """
+    table, picture = _variables(run), False
+    notes: list[str] = []
+    if names is None:
+        panels, notes = _moving(_telling(run, table))
+        picture = run.parameters is not None and len(run) > 0 and has_picture(run.parameters)
+    else:
+        panels = [_output(run, table, name) for name in names]
+    if run.status:
+        notes.append(f"The run ended early: {run.message}.")
+    rows = ceil(len(panels) / columns)
+    with styled():
+        left = _PICTURE if picture else 0.0
+        figure = Figure(figsize=(left + _WIDTH * columns, max(1.0 + _HEIGHT * rows, 3.6 if picture else 0.0)))
+        # a footnote is beneath both
+        wide = (left, _WIDTH * columns) if picture else (1.0,)
+        *drawing, curves = figure.subfigures(1, len(wide), width_ratios=wide, squeeze=False)[0]
+        axes = curves.subplots(rows, columns, sharex=True, squeeze=False)
+        for axis, panel in zip(axes.flat, panels):
+            _draw(axis, run.time, panel)
+        for axis in axes.flat[len(panels) :]:
+            axis.remove()
+        for axis in axes[-1]:
+            axis.set_xlabel("time [s]")
+        curves.align_ylabels()
+        for beside in drawing:
+            axis = beside.subplots()
+            axis.set_anchor("N")
+            axis.set_title(draw_mechanism(run.parameters, axis, run), fontsize=SMALL, color=MARKED)
+        write_title(figure, title)
+        write_notes(figure, notes)
+        return finish(figure)
+
+
+def _draw(axis: Axes, time: FloatArray, panel: _Rows) -> None:
+    if not panel.curves:
+        axis.text(0.5, 0.5, panel.name, transform=axis.transAxes, ha="center", va="center")
+        axis.set_axis_off()
+        return
+    for number, (name, values) in enumerate(panel.curves.items()):
+        axis.plot(time, values, label=name or None, linestyle=LINES[number % len(LINES)])
+    axis.set_ylabel(panel.label)
+    if any(panel.curves):
+        legend_above(axis)
+
+
+def _mechanism(run: Trajectory) -> Mechanism:
+    """The mechanism of a run; of one that does not say, the one that it has most outputs of."""
+    if run.parameters is not None:
+        return mechanism_of(run.parameters)
+    return max(MECHANISMS.values(), key=lambda m: len(set(m.output_names) & set(run.names)))
+
+
+def _variables(run: Trajectory) -> dict[str, Variable]:
+    """The variables of a run's outputs, of whatever mechanism they are."""
+    mechanisms = (*MECHANISMS.values(), _mechanism(run))
+    return {v.name: v for m in mechanisms for v in m.variables if v.name in run.names}
+
+
+def _shown(variable: Variable) -> tuple[str, float]:
+    """The unit that people think in, and what a value in SI is multiplied by."""
+    displays = dict(UNITS[variable.unit].displays)
+    unit = variable.display or next(iter(displays), variable.unit)
+    return unit, displays.get(unit, 1.0)
+
+
+def _output(run: Trajectory, table: Mapping[str, Variable], name: str) -> _Rows:
+    values = run[name]  # an unknown name is refused there
+    unit, factor = _shown(table[name])
+    return _Rows(name=name, unit=unit, curves={"": factor * values})
+
+
+def _telling(run: Trajectory, table: Mapping[str, Variable]) -> list[_Rows]:
+    """What tells most of a run: coordinates but the crank's, its speed, what drives, the angle of transmission, forces."""
+    mechanism = _mechanism(run)
+    first, *others = mechanism.freedoms
+    moving = [freedom.coordinate for freedom in others or (first,)]
+    driven = [name for name in run.names if ".applied_" in name]
+    wanted = dict.fromkeys(("slider.position", *moving, first.rate, *driven, "transmission.angle"))
+    panels = [_output(run, table, name) for name in wanted if name in run.names]
+    forces = _magnitudes(run)
+    if forces:
+        what = "pin forces" if all(name.startswith("pin ") for name in forces) else "joint forces"
+        panels.append(_Rows(name=what, unit="N", curves={name.removeprefix("pin "): f for name, f in forces.items()}))
+    return panels or [_output(run, table, name) for name in run.names[:4]]
+
+
+def _magnitudes(run: Trajectory) -> dict[str, FloatArray]:
+    """Magnitudes of the forces of which a run has the components, ``name.fx`` and so on."""
+    stems = [name.removesuffix(".fx") for name in run.names if name.endswith(".fx")]
+    parts = {stem: [f"{stem}.f{axis}" for axis in "xyz" if f"{stem}.f{axis}" in run.names] for stem in stems}
+    return {
+        stem.replace(".", " ").replace("_", " "): np.sqrt(sum(run[name] ** 2 for name in names))
+        for stem, names in parts.items()
+    }
+
+
+def _moving(panels: Sequence[_Rows]) -> tuple[list[_Rows], list[str]]:
+    """Panels without what is constant, and the sentence that states it."""
+    kept, still = [], []
+    for panel in panels:
+        curves = {name: values for name, values in panel.curves.items() if not _constant(values)}
+        still += [
+            f"{f'{panel.name[:-1]} {name}' if name else panel.name} {_value(values)} {panel.unit}"
+            for name, values in panel.curves.items()
+            if name not in curves
+        ]
+        if curves:
+            kept.append(_Rows(name=panel.name, unit=panel.unit, curves=curves))
+    if not kept:
+        kept = [_Rows(name="nothing changes in this run", unit="", curves={})]
+    return kept, [f"Constant, not drawn: {', '.join(still)}."] if still else []
+
+
+def _constant(values: FloatArray) -> bool:
+    return len(values) == 0 or bool(np.ptp(values) <= _STILL * max(1.0, float(np.abs(values).max())))
+
+
+def _value(values: FloatArray) -> str:
+    """The value of what is constant, for print: what is below the resolution is zero."""
+    mean = float(values.mean()) if len(values) else 0.0
+    return f"{mean:.4g}" if abs(mean) > _STILL else "0"
+
+
+def plot_comparison(
+    first: Trajectory,
+    second: Trajectory,
+    names: Sequence[str],
+    *,
+    title: str = "",
+    labels: tuple[str, str] = ("first", "second"),
+) -> Figure:
+    """Plot outputs of two runs over each other, and the second less the first beside them, a row each.
+
+    Where both are the same, or differ by no more than rounding, it is written in place of the difference.
+
+    Parameters
+    ----------
+    first, second : Trajectory
+        With the same samples, as far as both go.
+    names : sequence of str
+        Outputs.
+    title : str
+    labels : (str, str)
+        Names of the runs.
+    """
+    n = min(len(first), len(second))
+    time, table = first.time[:n], _variables(first)
+    with styled():
+        figure = Figure(figsize=(9.6, 0.9 + 1.8 * len(names)))
+        rows = figure.subplots(len(names), 2, sharex=True, squeeze=False, width_ratios=(3, 2))
+        for (both, beside), name in zip(rows, names):
+            unit, factor = _shown(table[name])
+            a, b = factor * first[name][:n], factor * second[name][:n]
+            for values, label, colour, line in zip((a, b), labels, COLOURS, LINES):
+                both.plot(time, values, line, color=colour, label=label)
+            both.set_ylabel(f"{name}\n[{unit}]")
+            _draw_difference(beside, time, a, b, unit)
+        legend_above(rows[0, 0])
+        rows[0, 1].set_title(f"{labels[1]} less {labels[0]}")
+        for axis in rows[-1]:
+            axis.set_xlabel("time [s]")
+        write_title(figure, title)
+        figure.align_ylabels()
+        return finish(figure)
+
+
+def _draw_difference(axis: Axes, time: FloatArray, a: FloatArray, b: FloatArray, unit: str) -> None:
+    largest = float(np.abs(b - a).max(initial=0.0))
+    if largest > _ROUNDING * float(np.abs(a).max(initial=0.0)):
+        axis.plot(time, b - a, color=MARKED)
+        axis.set_ylabel(f"difference\n[{unit}]")
+        return
+    words = f"identical but for rounding,\n{largest:.1g} {unit} at most" if largest else "identical"
+    axis.text(0.5, 0.5, words, transform=axis.transAxes, ha="center", va="center", color=MARKED)
+    axis.set_yticks([])
+    axis.grid(visible=False)
