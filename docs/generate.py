@@ -227,7 +227,7 @@ def slider_crank_pictures() -> Iterator[Picture]:
     allowed.append(Tolerance("guide.twist", half_width=radians(0.1)))
     found = monte_carlo(turn, allowed, samples=100_000)
     title = "Lengths within 0.25 mm and the twist within 0.1 deg, a4 = 20 in, S1 = 0"
-    yield "slider-crank-tolerances", plot_tolerances(found.scene(angle=radians(30.0)), title=title), 90
+    yield "slider-crank-tolerances", plot_tolerances(found, angle=radians(30.0), title=title), 90
 
 
 def main(arguments: list[str]) -> int:

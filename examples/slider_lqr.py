@@ -6,7 +6,7 @@ moved to other places by small and large steps; the free crank balanced where it
 
     python examples/slider_lqr.py
     python examples/slider_lqr.py --fmu build/FiveBarSlider.fmu
-    python examples/slider_lqr.py --figures docs        # linearisation-bode.png, -poles.png, -loop.png
+    python examples/slider_lqr.py --figures docs        # linearisation-bode.png, -margins.png, -poles.png, -loop.png
 """
 
 from __future__ import annotations
@@ -167,6 +167,12 @@ def draw(folder: Path, models: PeriodicModel, designs: list[Design], loop: LoopR
         frequencies=np.geomspace(1.0, 2e3, 800),
         title="Rig 2, spring C, 585 rpm: slider force to slider position, mean model",
     ).savefig(folder / "linearisation-bode.png", dpi=120)
+    figures.plot_bode(
+        {design.method: design.loop for design in designs},
+        frequencies=np.geomspace(1.0, 2e3, 800),
+        margins=True,
+        title="Rig 2, spring C, 585 rpm: open loops, mean model",
+    ).savefig(folder / "linearisation-margins.png", dpi=120)
     figures.plot_poles(
         {"slider alone": system, **closed},
         title="Rig 2, spring C, 585 rpm: poles and zeros, mean model",

@@ -104,7 +104,11 @@ class _Scene:
         self.sprung = k.k > 0.0
         self.damped = k.mu > 0.0
         self.wall = self.most + 8.0 * self.unit
-        end = self.wall + 1.0 * self.unit if self.sprung or self.damped else self.most + 3.5 * self.unit
+        held = self.sprung or self.damped
+        end = self.wall + 1.0 * self.unit if held else self.most + 3.5 * self.unit
+        rail = self.least - 3.0 * self.unit, self.wall if held else self.most + 3.0 * self.unit
+        #: The ends of the guide, below the slider.
+        self.rail = self.at(rail[0], -self.unit), self.at(rail[1], -self.unit)
         corners = [
             self.at(s, n) for s in (self.least - 3.5 * self.unit, end) for n in (-3.2 * self.unit, 1.7 * self.unit)
         ]
@@ -158,9 +162,8 @@ class _Scene:
         self._hatch(axis, *ends, count=6)
         # the guide, below the slider, and the wall at its end
         end = self.wall if self.sprung or self.damped else self.most + 3.0 * unit
-        rail = self.at(self.least - 3.0 * unit, -unit), self.at(end, -unit)
-        self._line(axis, rail, zorder=1)
-        self._hatch(axis, *rail, count=max(4, round((end - self.least) / unit * 1.6)))
+        self._line(axis, self.rail, zorder=1)
+        self._hatch(axis, *self.rail, count=max(4, round((end - self.least) / unit * 1.6)))
         if self.sprung or self.damped:
             wall = self.at(end, -unit), self.at(end, 1.5 * unit)
             self._line(axis, wall)
@@ -222,7 +225,8 @@ class _Scene:
         centre = (q.b + q.c + q.d) / 3.0
         a = np.zeros(2)
         foot = np.array([0.0, -2.0 * unit])
-        lines = MultiLineString([(a, q.b), (q.b, q.c), (q.c, q.d), (q.b, q.p), (q.c, q.p), (a, foot), (a, self.zero)])
+        links = [(a, q.b), (q.b, q.c), (q.c, q.d), (q.b, q.p), (q.c, q.p)]
+        lines = MultiLineString([*links, (a, foot), (a, self.zero), self.rail])
         taken = [theta]
         directions = np.radians(np.arange(0.0, 360.0, 15.0))
         pins = {"A": a, "B": q.b, "C": q.c} | ({"P": q.p} if self.parameters.coupler_point_distance else {})

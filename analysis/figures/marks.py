@@ -83,8 +83,9 @@ def _covered(axis: Axes, box: Bbox, others: Sequence[Bbox]) -> int:
             count += box.x0 < line.get_window_extent().x0 < box.x1
             continue
         path = line.get_transform().transform_path(line.get_path())
+        if line.get_marker() != "None":
+            # the size in points is a little more than half of it in pixels
+            count += box.padded(line.get_markersize()).count_contains(path.vertices) > 0
         if line.get_linestyle() != "None":
             count += path.intersects_bbox(box, filled=False)
-        else:
-            count += box.count_contains(path.vertices) > 0
     return int(count)

@@ -165,8 +165,10 @@ def _moving(panels: Sequence[_Rows]) -> tuple[list[_Rows], list[str]]:
     kept, still = [], []
     for panel in panels:
         curves = {name: values for name, values in panel.curves.items() if not _constant(values)}
+        # "pin force A" of the panel "pin forces"
+        names = {name: f"{panel.name.removesuffix('s')} {name}" if name else panel.name for name in panel.curves}
         still += [
-            f"{f'{panel.name[:-1]} {name}' if name else panel.name} {_value(values)} {panel.unit}"
+            f"{names[name]} {_value(values)} {panel.unit}"
             for name, values in panel.curves.items()
             if name not in curves
         ]
