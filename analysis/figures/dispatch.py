@@ -39,6 +39,8 @@ MODULES = (
 )
 #: Those that register the picture of a mechanism.
 MECHANISMS = ("linkage", "slider_crank_picture")
+#: Samples of a path.
+_TRACED = 20_000
 
 
 class DrawingError(LinkworkError, TypeError):
@@ -130,6 +132,13 @@ def draw_mechanism(parameters: Any, axis: Axes, run: Trajectory) -> str:
         If there is no picture of this mechanism: see `has_picture`.
     """
     raise DrawingError(type(parameters), "picture")
+
+
+def last_samples(run: Trajectory) -> tuple[slice, str]:
+    """The samples over which paths of a run are drawn, and in words: of a long run the last, as many as can be drawn."""
+    if len(run) <= _TRACED:
+        return slice(None), "over the run"
+    return slice(-_TRACED, None), f"over the last {run.time[-1] - run.time[-_TRACED]:.3g} s"
 
 
 def has_picture(parameters: object) -> bool:

@@ -21,7 +21,7 @@ from linkwork.five_bar.parameters import FiveBarParameters
 from ..run import Trajectory
 from ..units import CM_PER_METRE
 from .animation import gif
-from .dispatch import draw_mechanism, plot
+from .dispatch import draw_mechanism, last_samples, plot
 from .style import (
     BOLD,
     COUPLER,
@@ -318,8 +318,9 @@ def _draw_at_start(parameters: FiveBarParameters, axis: Axes, run: Trajectory) -
         name, path = "C", CM_PER_METRE * np.column_stack([x, y])
     scene = _Scene(parameters, configurations, SMALL)
     scene.prepare(axis)
-    scene.draw(axis, configurations[0], trace=path)
-    return f"at {run.time[0]:.4g} s, with the path of {name} over the run"
+    samples, when = last_samples(run)
+    scene.draw(axis, configurations[0], trace=path[samples])
+    return f"at {run.time[0]:.4g} s, with the path of {name} {when}"
 
 
 def animate_linkage(

@@ -34,7 +34,7 @@ from linkwork.slider_crank.vectors import Vector
 
 from ..run import Trajectory
 from ..slider_crank import PeriodicShift, Range, assembled_ranges, constant_shift, ranges
-from .dispatch import animate, draw_mechanism, plot
+from .dispatch import animate, draw_mechanism, last_samples, plot
 from .solids import ball, box, paint, tube
 from .style import (
     BOLD,
@@ -429,10 +429,11 @@ def _draw_at_start(parameters: SliderCrankParameters, axis: Axes, run: Trajector
     crank, slider = (
         factor * np.column_stack([run[f"{pin}.{x}"] for x in "xyz"]) for pin in ("crank_pin", "slider_pin")
     )
-    scene = _Scene(parameters, [_Track(poses, crank, slider)], poses, "mm", VIEW)
+    samples, when = last_samples(run)
+    scene = _Scene(parameters, [_Track(poses, crank[samples], slider[samples])], poses, "mm", VIEW)
     scene.prepare(axis)
     scene.draw(axis, poses[0], letters=False)
-    return f"at {run.time[0]:.4g} s, with the paths of the pins over the run"
+    return f"at {run.time[0]:.4g} s, with the paths of the pins {when}"
 
 
 def _sheet(scene: _Scene, wide: float, *, head: float, foot: float = 0.0) -> tuple[Figure, Axes]:

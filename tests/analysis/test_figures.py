@@ -54,6 +54,13 @@ def test_a_run_has_its_mechanism_beside_and_no_panel_for_a_constant(run) -> None
     assert any(np.allclose(one, path, rtol=1e-12) for one in paths)
 
 
+def test_of_a_long_run_the_path_is_that_of_its_end(run) -> None:
+    long = replace(run, time=np.arange(30_001) * 1e-3, values=np.resize(run.values, (30_001, len(run.names))))
+    mechanism = figures.plot(long).axes[-1]
+    assert mechanism.get_title() == "at 0 s, with the path of P over the last 20 s"
+    assert max(len(line.get_xdata()) for line in mechanism.lines) == 20_000
+
+
 def test_without_a_point_of_its_own_the_path_is_that_of_c() -> None:
     run = simulate(TABLE_3_1, Inputs(speed=44.0), stop_time=0.15, step=5e-3)
     mechanism = figures.plot(run).axes[-1]
