@@ -23,9 +23,11 @@ from ..units import CM_PER_METRE
 from .animation import gif
 from .dispatch import draw_mechanism, last_samples, plot
 from .style import (
+    BLOCK,
     BOLD,
     COUPLER,
     CRANK,
+    DOT,
     GROUND,
     HAIR,
     LETTER,
@@ -172,7 +174,7 @@ class _Scene:
     def _slider(self, axis: Axes, q: _Pins) -> None:
         unit = self.unit
         block = [self.at(q.u + s * 1.5 * unit, n * unit) for s, n in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
-        axis.add_patch(Polygon(block, facecolor="#C9D1D6", edgecolor=SLIDER, linewidth=LINE, zorder=4))
+        axis.add_patch(Polygon(block, facecolor=BLOCK, edgecolor=SLIDER, linewidth=LINE, zorder=4))
         start, end = q.u + 1.5 * unit, self.wall
         side = 0.55 * unit if self.sprung and self.damped else 0.0
         if self.sprung:
@@ -365,7 +367,7 @@ def animate_linkage(
         write_title(figure, title)
         below.plot(time, u, color="0.8")
         (done,) = below.plot([], [], color=SLIDER)
-        (dot,) = below.plot([], [], "o", color=SLIDER, markersize=5)
+        (dot,) = below.plot([], [], "o", color=SLIDER, markersize=DOT)
         below.set_xlabel("time [s]")
         below.set_ylabel("slider position [mm]")
         with gif(figure, path, frames=frames, frames_per_second=frames_per_second) as add_frame:

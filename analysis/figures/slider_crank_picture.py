@@ -41,6 +41,7 @@ from .style import (
     COLOURS,
     COUPLER,
     CRANK,
+    DOT,
     GROUND,
     HAIR,
     LINE,
@@ -291,7 +292,7 @@ class _Scene:
                         self._line(axis, joints, color=colour, linewidth=THIN, linestyle="--", zorder=2)
                     pins = self.page([place.crank_pin, place.slider_pin])
                     edge: dict[str, Any] = {"markeredgecolor": "white", "markeredgewidth": HAIR}
-                    axis.plot(*pins.T, marker, color=colour, markersize=5.0, zorder=6, **edge)
+                    axis.plot(*pins.T, marker, color=colour, markersize=DOT, zorder=6, **edge)
 
     def _dimensions(self, axis: Axes, pose: _Pose, letters: bool) -> None:
         u = self.size
@@ -506,7 +507,7 @@ def animate_mechanism(
         below = figure.add_axes((0.11, 0.45 / total, 0.86, (foot - 0.55) / total))
         write_title(figure, title)
         _slides(below, parts, unit)
-        (dot,) = below.plot([], [], "o", color=CRANK, markersize=5, zorder=7)
+        (dot,) = below.plot([], [], "o", color=CRANK, markersize=DOT, zorder=7)
         writer = PillowWriter(fps=frames_per_second, metadata={})
         with writer.saving(figure, str(path), dpi=80):
             for pose in poses:
@@ -527,7 +528,7 @@ def _slides(axis: Axes, parts: Sequence[_Part], unit: str) -> None:
                 low, turn = degrees(part.angles[0]), degrees(place.angle)
                 # a range may begin before zero and reach beyond a turn
                 shown = turn if turn >= low - 1e-6 else turn + 360.0 * ceil((low - 1e-6 - turn) / 360.0)
-                axis.plot(shown, place.slide, marker, color=colour, markersize=5.0, zorder=6)
+                axis.plot(shown, place.slide, marker, color=colour, markersize=DOT, zorder=6)
     axis.set_xlabel("crank angle [deg]")
     axis.set_ylabel(f"slider position [{unit}]")
 
@@ -594,13 +595,13 @@ def _circle(axis: Axes, parts: Sequence[_Part], radius: float, unit: str) -> Non
             for place in places:
                 x, y = place.crank_pin[:2]
                 axis.plot([0.0, x], [0.0, y], "--", color=colour, linewidth=THIN)
-                axis.plot(x, y, marker, color=colour, markersize=5.5, zorder=5)
+                axis.plot(x, y, marker, color=colour, markersize=DOT, zorder=5)
                 side = "left" if x > 0.3 * radius else "right" if x < -0.3 * radius else "center"
                 out = 10.0 * x / radius, 18.0 * y / radius
                 text = f"{name}\n{degrees(place.angle) % 360.0:.2f}°"
                 look: dict[str, Any] = {"color": colour, "fontsize": TINY, "ha": side, "va": "center"}
                 axis.annotate(text, (x, y), out, textcoords="offset points", **look)
-    axis.plot(0.0, 0.0, "o", color=CRANK, markersize=6)
+    axis.plot(0.0, 0.0, "o", color=CRANK, markersize=DOT)
     axis.set_aspect("equal")
     axis.set_xlim(-1.75 * radius, 1.75 * radius)
     axis.set_ylim(-1.4 * radius, 1.4 * radius)

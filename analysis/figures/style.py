@@ -23,6 +23,8 @@ COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#0
 LINES: tuple[Any, ...] = ("-", "--", "-.", ":")
 #: Colours of the links in drawings.
 CRANK, COUPLER, ROCKER, SLIDER, GROUND, TRACE = "#D55E00", "#0072B2", "#009E73", "#5B6770", "#333333", "#CC79A7"
+#: Colour of a block that slides, and size of a marked point in drawings.
+BLOCK, DOT = "#C9D1D6", 5.0
 #: Colour of what is asked for, of areas, of the text of marks.
 TARGET, SHADE, MARKED = "#E69F00", "#56B4E9", "0.25"
 

@@ -35,10 +35,12 @@ from ..synthesis import (
 )
 from .dispatch import animate, plot
 from .style import (
+    BLOCK,
     BOLD,
     COLOURS,
     COUPLER,
     CRANK,
+    DOT,
     GROUND,
     HAIR,
     LETTER,
@@ -169,7 +171,7 @@ def _draw_slider(axis: Axes, guide: FloatArray, d: FloatArray, unit: float) -> N
         rail = [guide[0] - 2.2 * unit * along + side * unit * left, guide[1] + 2.2 * unit * along + side * unit * left]
         _line(axis, rail, linewidth=THIN, zorder=3)
     block = [d + s * 1.3 * unit * along + n * 0.8 * unit * left for s, n in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
-    axis.add_patch(Polygon(block, facecolor="#C9D1D6", edgecolor=SLIDER, linewidth=LINE, zorder=4))
+    axis.add_patch(Polygon(block, facecolor=BLOCK, edgecolor=SLIDER, linewidth=LINE, zorder=4))
 
 
 def _write_letters(axis: Axes, scene: LinkageScene, at: Mapping[str, FloatArray], unit: float) -> None:
@@ -487,7 +489,7 @@ def animate_solution(
         else:
             _transmission(below, scene)
         x, y = np.degrees(scene.transmission if scene.function is None else scene.function)
-        (now,) = below.plot([], [], "o", color=CRANK, markersize=5, zorder=6)
+        (now,) = below.plot([], [], "o", color=CRANK, markersize=DOT, zorder=6)
         writer = PillowWriter(fps=frames_per_second, metadata={})
         trace: list[FloatArray] = []
         frame.prepare(above)

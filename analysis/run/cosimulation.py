@@ -105,7 +105,7 @@ def cosimulate(
         message=march.message,
         names=prepared.mechanism.output_names,
         source=Path(fmu).name + march.title,
-        parameters=parameters,
+        parameters=prepared.parameters,
         statistics={"steps": float(len(recorded) - 1), "seconds": clock.perf_counter() - begun},
     )
     if interrupted:
