@@ -8,8 +8,10 @@ from typing import Any
 
 from linkwork import five_bar, slider_crank
 from linkwork.errors import InputError, LinkworkError
+from linkwork.five_bar.parameters import FiveBarParameters as FiveBarParameters
 from linkwork.mechanism import Channel, Mechanism
 from linkwork.parameters import Rules, fmi_name
+from linkwork.slider_crank.parameters import SliderCrankParameters as SliderCrankParameters
 from linkwork.variables import UNITS, status_variables
 
 STATUS_NAMES = tuple(v.name for v in status_variables())
@@ -145,6 +147,9 @@ def _faults_of_equations(m: Mechanism) -> Iterator[str]:
 
 
 class _Published(Mapping[str, Any]):
+    def __repr__(self) -> str:
+        return f"<published sets: {', '.join(self)}>"
+
     def __getitem__(self, name: str) -> Any:
         for mechanism in MECHANISMS.values():
             if name in mechanism.published:
@@ -196,6 +201,11 @@ def output_units() -> dict[str, str]:
         for v in mechanism.variables
         if v.causality == "output" and v.kind == "Real"
     }
+
+
+def variable_units() -> dict[str, str]:
+    """Unit of every real variable of every mechanism, by its FMI name."""
+    return {v.name: v.unit for mechanism in MECHANISMS.values() for v in mechanism.variables if v.kind == "Real"}
 
 
 def require_five_bar(parameters: Parameters, what: str) -> None:

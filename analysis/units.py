@@ -3,13 +3,21 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
-from functools import lru_cache
+from collections.abc import Callable, Mapping
+from functools import lru_cache, wraps
+from inspect import signature
 from math import inf, isfinite, pi
 from types import MappingProxyType
-from typing import Any
+from typing import Any, TypeVar, cast
 
 from linkwork.errors import ParameterError
+
+#: A number in SI, or a text with its unit such as "420 rpm", of which `in_si` makes a float; also an array or a list of them.
+Amount = Any
+#: Unit of an argument, or of the entries of a mapping by their names, or a function that returns these.
+Units = str | Mapping[str, str] | Callable[[], Mapping[str, str]]
+
+_Callable = TypeVar("_Callable", bound=Callable[..., Any])
 
 RAD_S_PER_RPM = pi / 30.0
 CM_PER_METRE = 1e2
@@ -60,14 +68,14 @@ def quantity(value: Any, unit: str, name: str, *, bare: str | None = None) -> fl
         If it is neither, the unit is missing or has another dimension, or the number is not finite. Hertz is refused for
         a speed: a cycle is not a radian.
     """
-    si = _PINT.get(unit, unit)
+    spelled = _PINT.get(unit, unit)
     wanted = f"be a number in {unit}" if unit == "1" else f"be a number in {unit}, or a text with a unit of that kind"
     if isinstance(value, bool) or not isinstance(value, (int, float, str)):
         raise ParameterError(name, value, wanted)
     if isinstance(value, str):
         if unit == "rad/s" and "hz" in value.lower().replace("hertz", "hz"):
             raise ParameterError(name, value, "be in rad/s or rpm: in Hz it would be ambiguous by a factor of 2 pi")
-        number = _converted(value, unit, si, name, wanted)
+        number = _converted(value, unit, spelled, name, wanted)
     else:
         try:
             number = float(value)
@@ -78,6 +86,68 @@ def quantity(value: Any, unit: str, name: str, *, bare: str | None = None) -> fl
     if not isfinite(number):
         raise ParameterError(name, value, "be a finite number")
     return number
+
+
+def si(value: Any, unit: Units, name: str) -> Any:
+    """A value with its texts made numbers in SI, also those in lists, tuples and mappings; what is no text stays as it is.
+
+    Parameters
+    ----------
+    value : object
+    unit : str, mapping or function
+        See `Units`. Entries of a mapping that have no unit stay as they are, for what reads them to refuse.
+    name : str
+        What it is, for the error.
+
+    Raises
+    ------
+    ParameterError
+        As `quantity`.
+    """
+    if isinstance(value, str):
+        return quantity(value, unit, name) if isinstance(unit, str) else value
+    if isinstance(value, Mapping):
+        known = unit() if callable(unit) else unit
+        units = dict.fromkeys(value, known) if isinstance(known, str) else known
+        return {key: si(v, units[key], f"{name} {key}") if key in units else v for key, v in value.items()}
+    if isinstance(value, (list, tuple)):
+        parts = [si(part, unit, name) for part in value]
+        return value if all(a is b for a, b in zip(parts, value)) else type(value)(parts)
+    return value
+
+
+def in_si(**units: Units) -> Callable[[_Callable], _Callable]:
+    """Let arguments of a function, or fields of a dataclass, be texts with a unit: it gets them in SI, see `si`.
+
+    >>> @in_si(speed="rad/s")
+    ... def turns(speed: Amount, time: float) -> float:
+    ...     return speed * time / (2.0 * pi)
+    >>> round(turns("420 rpm", 1.0), 9)
+    7.0
+    """
+
+    def decorate(made: _Callable) -> _Callable:
+        if isinstance(made, type):
+            made.__init__ = decorate(made.__init__)  # type: ignore[misc]
+            return made
+        names = list(signature(made).parameters)
+        places = {names.index(name): name for name in units}
+
+        @wraps(made)
+        def converted(*arguments: Any, **options: Any) -> Any:
+            for name in units.keys() & options.keys():
+                options[name] = si(options[name], units[name], name)
+            if len(arguments) > least:
+                arguments = tuple(
+                    si(value, units[places[n]], places[n]) if n in places else value
+                    for n, value in enumerate(arguments)
+                )
+            return made(*arguments, **options)
+
+        least = min(places)
+        return cast(_Callable, converted)
+
+    return decorate
 
 
 #: A quantity in text: a number with a decimal point, then a product of units, each with one small exponent at most. Nothing
@@ -91,7 +161,7 @@ _LONGEST = 100
 _PLAIN = "it is read as a number with a decimal point, without spaces or separators in it, and a unit"
 
 
-def _converted(text: str, unit: str, si: str, name: str, wanted: str) -> float:
+def _converted(text: str, unit: str, spelled: str, name: str, wanted: str) -> float:
     """A text with a unit in SI, by pint."""
     match = _GRAMMAR.fullmatch(text) if len(text) <= _LONGEST else None
     if match is None:
@@ -101,12 +171,12 @@ def _converted(text: str, unit: str, si: str, name: str, wanted: str) -> float:
     if of is None:
         if unit == "1":
             return number
-        raise ParameterError(name, text, f"come with its unit, such as '{text} {si}', or be a number, which is in SI")
+        raise ParameterError(name, text, f"come with its unit, such as '{text} {spelled}', or be a number, which is in SI")
     import pint
 
     try:
         of = re.sub(r"(?<=[^\W\d_])(-?[0-9])", r"**\1", of.replace("·", "*"))  # m2 for m**2, as FMI has it
-        return float(_registry().Quantity(number, of).to(si).magnitude)
+        return float(_registry().Quantity(number, of).to(spelled).magnitude)
     except (pint.PintError, ValueError, TypeError, AttributeError, ArithmeticError, SyntaxError) as error:
         reason = (str(error) or type(error).__name__).splitlines()[0]
         raise ParameterError(name, text, f"{wanted} ({reason})") from error

@@ -21,6 +21,7 @@ from numpy.typing import ArrayLike, NDArray
 from linkwork.errors import InputError, LinkworkError, UnknownNameError
 
 from ..run import Function
+from ..units import Amount, in_si
 from .model import FloatArray, LinearModel, LinearModelError, by_magnitude, signal_name
 
 
@@ -258,6 +259,14 @@ def design_lqr(
         If a weight is for a state that the model does not have.
     DesignError
         If a weight is not usable, or the force cannot stabilise the model.
+
+    Examples
+    --------
+    >>> from analysis import design_lqr, find_equilibrium, linearise
+    >>> rest = find_equilibrium("table-3.1", held={"crank.angle": "90 deg"})
+    >>> law = design_lqr(linearise("table-3.1", rest.state, rest.inputs), {"slider.position": 1e6})
+    >>> bool((law.poles.real < 0.0).all())
+    True
     """
     names = model.state_names
     if isinstance(q, Mapping):
@@ -290,11 +299,12 @@ def design_lqr(
     return _design("LQR", model, plant.channel, gains[:n], float(gains[n]) if integral else 0.0)
 
 
+@in_si(bandwidth="rad/s")
 def design_pid(
     model: LinearModel,
     *,
     poles: Sequence[complex] | None = None,
-    bandwidth: float | None = None,
+    bandwidth: Amount = None,
     damping: float = 0.7,
     channel: str | None = None,
 ) -> Design:
@@ -315,6 +325,14 @@ def design_pid(
     ------
     DesignError
         If the model has more than one freedom, or the poles are not usable.
+
+    Examples
+    --------
+    >>> from analysis import design_pid, find_equilibrium, linearise
+    >>> rest = find_equilibrium("table-3.1", held={"crank.angle": "90 deg"})
+    >>> law = design_pid(linearise("table-3.1", rest.state, rest.inputs), bandwidth="60 rad/s")
+    >>> law.poles.round(2).tolist()
+    [(-42-42.85j), (-42+42.85j), (-60+0j)]
     """
     if len(model.layout.free) != 1:
         raise DesignError(
@@ -342,8 +360,9 @@ def design_pid(
     return _design("PID", model, plant.channel, np.array([m * a1 - k, m * a2 - c]) / f, m * a0 / f)
 
 
+@in_si(bandwidth="rad/s", phase_margin="rad")
 def design_pi(
-    model: LinearModel, *, bandwidth: float, phase_margin: float = pi / 3.0, channel: str | None = None
+    model: LinearModel, *, bandwidth: Amount, phase_margin: Amount = pi / 3.0, channel: str | None = None
 ) -> Design:
     """PI whose loop has the gain 1 at ``bandwidth``, and there at least the phase margin.
 
@@ -365,6 +384,14 @@ def design_pi(
     DesignError
         If a PI cannot: it has no phase lead to give, and so none where a sprung mass needs it, near its resonance and
         above.
+
+    Examples
+    --------
+    >>> from analysis import design_pi, find_equilibrium, linearise
+    >>> rest = find_equilibrium("table-3.1", held={"crank.angle": "90 deg"})
+    >>> law = design_pi(linearise("table-3.1", rest.state, rest.inputs), bandwidth="5 rad/s", phase_margin="60 deg")
+    >>> law.phase_margin > 1.04
+    True
     """
     _check_positive("bandwidth", bandwidth, "rad/s")
     if not 0.0 < phase_margin < pi:

@@ -21,9 +21,10 @@ from linkwork.limits import LIMIT_SINE
 from linkwork.mechanism import Mechanism
 from linkwork.parameters import fmi_name
 
-from ..mechanisms import InitialState, Parameters, mechanism_of
+from ..mechanisms import InitialState, Parameters, mechanism_of, variable_units
 from ..numerics import symbolic
-from ..run import Inputs, expressions, given
+from ..run import Inputs, expressions, given, takes_published
+from ..units import Amount, in_si
 from .model import FloatArray, Layout, Modes, channels_along, layout
 
 #: Points of the search for equilibria along a freedom that comes round again, over a turn, and along another, over its reach.
@@ -301,8 +302,10 @@ def _held(
     return _Balance.of(parameters, inputs), coordinates
 
 
+@takes_published()
+@in_si(held=variable_units)
 def find_equilibria(
-    parameters: Parameters, inputs: Inputs | None = None, *, held: Mapping[str, float] | None = None
+    parameters: Parameters, inputs: Inputs | None = None, *, held: Mapping[str, Amount] | None = None
 ) -> tuple[Equilibrium, ...]:
     """All equilibria that a search from a grid over the configurations finds, the one of least potential energy first.
 
@@ -313,7 +316,7 @@ def find_equilibria(
     inputs : Inputs, optional
         Constant forces; by default none. A freedom whose rate is commanded, which must be 0, is held.
     held : mapping, optional
-        Coordinates (rad, m) of freedoms that are held, such as ``{"crank.angle": 0.5}``; of one that is held by the inputs
+        Coordinates (rad, m) of freedoms that are held, such as ``{"crank.angle": "30 deg"}``; of one that is held by the inputs
         alone it is 0.
 
     Returns
@@ -345,11 +348,13 @@ def find_equilibria(
     return tuple(sorted(found, key=lambda one: one.potential))
 
 
+@takes_published()
+@in_si(held=variable_units)
 def find_equilibrium(
     parameters: Parameters,
     inputs: Inputs | None = None,
     *,
-    held: Mapping[str, float] | None = None,
+    held: Mapping[str, Amount] | None = None,
     guess: ArrayLike | None = None,
 ) -> Equilibrium:
     """An equilibrium of a mechanism at rest: hanging freely, or with some of its freedoms held.
@@ -370,6 +375,13 @@ def find_equilibrium(
         If the links cannot be joined at the guess.
     EquilibriumError
         If there is no equilibrium, or none is found from the guess; says what is left, and where.
+
+    Examples
+    --------
+    >>> from analysis import Inputs, find_equilibrium
+    >>> rest = find_equilibrium("table-3.1", Inputs(force="5 N"), held={"crank.angle": "90 deg"})
+    >>> f"{1e3 * rest['slider.position']:.3f} mm"
+    '5.557 mm'
     """
     if guess is not None:
         balance, coordinates = _held(parameters, inputs, held)

@@ -20,7 +20,20 @@ from linkwork.mechanism import Channel, Mechanism
 from linkwork.plant import Plant
 
 from ..mechanisms import InitialState, Parameters, mechanism_of
-from ..run import FmuRun, Inputs, Trajectory, align, encode, given, sample, sample_times
+from ..run import (
+    FmuRun,
+    Inputs,
+    Trajectory,
+    align,
+    driven,
+    encode,
+    given,
+    sample,
+    sample_times,
+    started,
+    takes_published,
+)
+from ..units import Amount, in_si
 from .design import Design, check_period
 from .model import FloatArray, LinearModel
 from .periodic import PeriodicModel
@@ -366,6 +379,8 @@ def _channel(mechanism: Mechanism, name: str) -> Channel:
     raise InputError(f"the controller acts by {name!r}, which is no force on a freedom of the {mechanism.name}")
 
 
+@takes_published(inputs=driven, initial=started)
+@in_si(stop_time="s")
 def control_loop(
     parameters: Parameters,
     controller: Controller,
@@ -373,7 +388,7 @@ def control_loop(
     inputs: Inputs | None = None,
     *,
     initial: InitialState,
-    stop_time: float,
+    stop_time: Amount,
     fmu: str | Path | None = None,
     tolerance: float = 1e-9,
 ) -> LoopResult:

@@ -27,7 +27,7 @@ from linkwork.mechanism import Mechanism
 from ..files import unknown_name
 from ..mechanisms import Parameters, mechanism_of
 from ..numerics import symbolic
-from ..run import Inputs, encode, expressions, given, sample
+from ..run import Inputs, encode, expressions, given, sample, takes_published
 
 FloatArray = NDArray[np.float64]
 #: Values of a mechanism's modes, in its order.
@@ -445,13 +445,14 @@ def channels_along(
     return tuple(encoded.modes.values()), values
 
 
+@takes_published()
 def linearise(parameters: Parameters, state: ArrayLike, inputs: Inputs | None = None) -> LinearModel:
     """The linear model at a state of a mechanism.
 
     Parameters
     ----------
     parameters
-        Of the mechanism.
+        Of the mechanism; or a published set or its name.
     state : array_like
         All coordinates, then all rates, such as `Equilibrium.state`: of a five-bar (th2, u, th2', u'). It need be no
         equilibrium: the deviations are then those from the motion through it, and the model holds at that instant.
@@ -464,6 +465,14 @@ def linearise(parameters: Parameters, state: ArrayLike, inputs: Inputs | None = 
         If state or inputs are not finite, of the wrong shape, or do not go together; or nothing is free.
     AssemblyError
         If the links cannot be joined there.
+
+    Examples
+    --------
+    >>> from analysis import find_equilibrium, linearise
+    >>> rest = find_equilibrium("table-3.1", held={"crank.angle": "90 deg"})
+    >>> model = linearise("table-3.1", rest.state, rest.inputs)
+    >>> model.K.shape
+    (1, 1)
     """
     mechanism = mechanism_of(parameters)
     states = whole_states(mechanism, np.atleast_2d(np.asarray(state, dtype=float)))

@@ -16,7 +16,7 @@ from linkwork.mechanism import Mechanism
 
 from ..mechanisms import InitialState, Parameters, mechanism_of
 from ..numerics.fourier import trigonometric
-from ..run import Inputs, given, simulate
+from ..run import Inputs, driven, given, simulate, started, takes_published
 from .model import (
     FloatArray,
     LinearModel,
@@ -279,6 +279,7 @@ def _in_time(mechanism: Mechanism, turn: Turn) -> tuple[FloatArray, FloatArray]:
     return whole_states(mechanism, found[:, : 2 * count]), found[:, 2 * count :]
 
 
+@takes_published(inputs=driven, initial=started)
 def settled_motion(
     parameters: Parameters,
     inputs: Inputs,

@@ -19,6 +19,7 @@ from linkwork.errors import InputError, Interrupted
 
 from ..numerics.fourier import FourierSeries
 from ..synthesis import (
+    UNITS,
     USUAL_SEARCH,
     Assembly,
     Constraint,
@@ -36,16 +37,18 @@ from ..synthesis import (
     improve,
     there_and_back,
 )
+from ..units import Amount, in_si
 
 FloatArray = NDArray[np.float64]
 
 
+@in_si(bounds=UNITS)
 def slider_motion(
     task: Task,
     linkage: Linkage | Solution,
     unknown: PivotUnknown,
     *,
-    bounds: Mapping[str, tuple[float, float]] | None = None,
+    bounds: Mapping[str, tuple[Amount, Amount]] | None = None,
     constraints: Sequence[Constraint] = (FullTurn(),),
     guesses: Sequence[Linkage | Solution] = (),
     search: Search = USUAL_SEARCH,
@@ -79,6 +82,18 @@ def slider_motion(
     ------
     InputError, InfeasibleError, SynthesisInterrupted
         As `synthesize`.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from analysis import slider_motion
+    >>> from analysis.synthesis import Linkage, Search, SliderUnknown, TimedPath, turn
+    >>> lengths = {"ground_length": "25 cm", "crank_length": "10 cm", "coupler_length": "20 cm", "rocker_length": "22 cm"}
+    >>> linkage = Linkage(**lengths, point_distance="15 cm")
+    >>> shifted = TimedPath(points=linkage.path(turn(24)) + [0.01, 0.0])
+    >>> moved = slider_motion(shifted, linkage, SliderUnknown(harmonics=1, stroke="3 cm"), search=Search(starts=2))
+    >>> moved.best.evaluation.worst < 0.01
+    True
     """
     given = linkage.linkage if isinstance(linkage, Solution) else linkage
     free = dict(bounds or {})

@@ -20,11 +20,11 @@ from ..files import write_csv
 from ..mechanisms import Parameters, mechanism_of
 from ..numerics.boundaries import Box, chart
 from ..numerics.continuation import ContinuationError, End, Reason
-from ..run import shown
-from ..units import RAD_S_PER_RPM
+from ..run import shown, takes_published
+from ..units import RAD_S_PER_RPM, Amount, si
 from .branches import Branch, Family, SpecialPoint, follow
 from .crossings import follow_crossing
-from .drives import Drive
+from .drives import Drive, published_drive
 from .floquet import Crossing
 from .grids import Grid, grid
 from .natural import first_freedom, natural_frequency
@@ -178,11 +178,12 @@ class StabilityChart:
         return write_csv(path, dict(zip(names, np.concatenate(rows).T)))
 
 
+@takes_published(drive=published_drive)
 def stability_chart(
     parameters: Parameters,
-    drive: Drive,
+    drive: Drive | None = None,
     names: tuple[str, str] | None = None,
-    ranges: tuple[tuple[float, float], tuple[float, float]] | None = None,
+    ranges: tuple[tuple[Amount, Amount], tuple[Amount, Amount]] | None = None,
     *,
     points: int = 80,
     start: ArrayLike | None = None,
@@ -195,13 +196,14 @@ def stability_chart(
     Parameters
     ----------
     parameters : parameters of a mechanism
-    drive : Drive
-        Speed, or torque, and constant forces, where they are no axes.
+        Or a published set or its name.
+    drive : Drive, optional
+        Speed, or torque, and constant forces, where they are no axes. A published set needs none: it is driven at its speed.
     names : (str, str), optional
         FMI names of the parameters along x and y; without it the crank speed and the damping of the first freedom beside the
         crank, of a five-bar ``drive.speed`` and ``slider.damping``.
     ranges : ((float, float), (float, float)), optional
-        Their ranges in SI; see `default_range`.
+        Their ranges, in SI or as text such as "420 rpm"; see `default_range`.
     points : int
         Of the grid, along each axis.
     start : array_like, shape (n,), optional
@@ -225,10 +227,22 @@ def stability_chart(
         If a name or a range is not usable.
     GridInterrupted
         On Ctrl-C; the same call goes on from the rows that are kept.
+
+    Examples
+    --------
+    >>> from analysis import stability_chart
+    >>> chart = stability_chart("rig-2-spring-c", ranges=(("550 rpm", "560 rpm"), ("50 N.s/m", "60 N.s/m")), points=3)
+    >>> float(chart.grid.largest.max()) < 1.0, chart.boundaries
+    (True, ())
     """
     mechanism = mechanism_of(parameters)
+    if drive is None:
+        raise InputError("nothing drives the mechanism: give a drive, such as Drive(speed=44.0)")
     names = names or (speed_name(mechanism) or "drive.speed", damping_name(mechanism))
-    spans = ranges or (default_range(parameters, drive, names[0]), default_range(parameters, drive, names[1]))
+    spans = tuple(
+        default_range(parameters, drive, name) if ranges is None else si(ranges[n], unit_of(mechanism, name), name)
+        for n, name in enumerate(names)
+    )
     box = Box(x=spans[0], y=spans[1])
     operation = plane(parameters, drive, *names)
     x, y = (np.linspace(low, high, points) for low, high in spans)

@@ -12,11 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from linkwork.errors import InputError, UnknownNameError
-from linkwork.mechanism import Channel, Mechanism, Mode
+from linkwork.mechanism import Channel, Mechanism, Mode, PublishedSet
 
-from ..mechanisms import InitialState, Parameters, mechanism_of
-from ..run import InductionMotor, Inputs
+from ..mechanisms import InitialState, Parameters, mechanism_of, variable_units
+from ..run import InductionMotor, Inputs, driven
 from ..run.inputs import given
+from ..units import Amount, in_si
 from .flows import Flow, crank_of, flow
 
 #: A torque on the crank: constant, a motor's, or both.
@@ -33,6 +34,7 @@ class VaryingInputError(InputError):
         )
 
 
+@in_si(speed="rad/s", torque="N.m", forces=variable_units, held=variable_units)
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Drive:
     """What drives a mechanism over an orbit: a speed of its cyclic freedom, the crank, or a torque on it; all else constant.
@@ -59,11 +61,11 @@ class Drive:
         If a value is not finite, the speed is not above zero, or there are both a speed and a torque.
     """
 
-    speed: float | None = None
-    torque: float = 0.0
+    speed: Amount = None
+    torque: Amount = 0.0
     motor: InductionMotor | None = None
-    forces: Mapping[str, float] = field(default_factory=dict)
-    held: Mapping[str, float] = field(default_factory=dict)
+    forces: Mapping[str, Amount] = field(default_factory=dict)
+    held: Mapping[str, Amount] = field(default_factory=dict)
     modes: Mapping[str, int] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -202,6 +204,11 @@ def require_acting(drive: Drive, mechanism: Mechanism, channel: Channel) -> None
 
 def _value(mode: Mode, argument: str) -> str:
     return mode.values[mode.arguments.index(argument)]
+
+
+def published_drive(known: PublishedSet, drive: Drive | None) -> Drive:
+    """A drive that is given, or else that of a published set: its crank speed, what is held as it is at the start."""
+    return drive or drive_of(known.parameters, driven(known, None), known.initial)
 
 
 def drive_of(

@@ -14,7 +14,7 @@ from linkwork.parameters import field_name
 
 from ..mechanisms import Parameters, mechanism_of
 from ..numerics import symbolic
-from ..run import constants, traced
+from ..run import constants, takes_published, traced
 from .flows import crank_of
 
 #: Crank angles over which the effective mass is averaged.
@@ -69,6 +69,7 @@ def _means(parameters: Parameters) -> tuple[float, float]:
     return float(mass.mean()), float(stiffness.mean())
 
 
+@takes_published()
 def mean_effective_mass(parameters: Parameters) -> float:
     """Mean over a turn of what moves with the first freedom beside the crank, at its zero (kg): a five-bar's m22 at u = 0.
 
@@ -80,6 +81,7 @@ def mean_effective_mass(parameters: Parameters) -> float:
     return _means(parameters)[0]
 
 
+@takes_published()
 def natural_frequency(parameters: Parameters) -> float:
     """Natural frequency of the first freedom beside the crank on its spring (rad/s), from the mean effective mass over a turn.
 
@@ -96,8 +98,8 @@ def natural_frequency(parameters: Parameters) -> float:
     Examples
     --------
     >>> from math import pi
-    >>> from linkwork.five_bar.published import SETS
-    >>> round(natural_frequency(SETS["rig-1-spring-a"].parameters) * 30.0 / pi, 1)
+    >>> from analysis import natural_frequency
+    >>> round(natural_frequency("rig-1-spring-a") * 30.0 / pi, 1)
     591.9
     """
     mechanism = mechanism_of(parameters)

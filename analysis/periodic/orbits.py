@@ -19,7 +19,8 @@ from linkwork.errors import AssemblyError, InputError, LinkworkError, ParameterE
 from linkwork.parameters import field_name
 
 from ..mechanisms import InitialState, Parameters, mechanism_of
-from ..run import Inputs, outputs_of
+from ..run import Inputs, driven, outputs_of, started, takes_published
+from ..units import Amount, in_si
 from . import orbit_kernels
 from .drives import Drive, Torque, drive_of
 from .floquet import TOLERANCE, StabilityVerdict, liouville, multipliers, verdict
@@ -234,12 +235,14 @@ def section_of(
     )
 
 
+@takes_published(inputs=driven, initial=started)
+@in_si(speed="rad/s", torque="N.m")
 def find_orbit(
     parameters: Parameters,
     inputs: Inputs | None = None,
     *,
-    speed: float | None = None,
-    torque: Torque | None = None,
+    speed: Amount = None,
+    torque: Torque | Amount = None,
     initial: InitialState | None = None,
     turns: int = 1,
     start: ArrayLike | None = None,
@@ -250,10 +253,11 @@ def find_orbit(
     Parameters
     ----------
     parameters : parameters of a mechanism
+        Or a published set or its name, which brings its crank speed, unless another drive is given.
     inputs : Inputs, optional
         What acts, all of it constant; a motor may drive the crank.
-    speed : float, optional
-        Prescribed crank speed (rad/s), in the place of what drives the crank in the inputs.
+    speed : float or str, optional
+        Prescribed crank speed (rad/s, or text such as "420 rpm"), in the place of what drives the crank in the inputs.
     torque : float, InductionMotor, or both in a sequence, optional
         Torque on the crank (N.m), in the place of a speed. The mean speed is then part of the solution.
     initial : state at the start, optional
@@ -281,9 +285,8 @@ def find_orbit(
 
     Examples
     --------
-    >>> from linkwork.five_bar.published import SETS
-    >>> table = SETS["table-3.1"]
-    >>> orbit = find_orbit(table.parameters, speed=table.crank_speed)
+    >>> from analysis import find_orbit
+    >>> orbit = find_orbit("table-3.1", speed="420 rpm")
     >>> round(100.0 * float(orbit.start[0]), 8), orbit.verdict().stability.value
     (-0.89553115, 'stable')
     """

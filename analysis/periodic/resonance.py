@@ -19,13 +19,15 @@ from scipy.signal import find_peaks
 from linkwork.errors import InputError, Interrupted
 
 from ..files import write_csv
-from ..mechanisms import Parameters
+from ..mechanisms import Parameters, mechanism_of
 from ..numerics.continuation import ContinuationError
-from ..run import interruptible, shown
+from ..run import interruptible, shown, takes_published
+from ..units import Amount, si
 from .branches import Branch, Family, SpecialPoint, follow, switch
-from .drives import Drive
+from .drives import Drive, published_drive
 from .floquet import Crossing, Stability
 from .orbits import OrbitError, PeriodicOrbit, orbit_of, scale_of
+from .planes import unit_of
 
 #: How far a maximum of the amplitude stands out, relative to its height, to count as one.
 PROMINENCE = 1e-3
@@ -116,10 +118,11 @@ class ResponseInterrupted(Interrupted):
         )
 
 
+@takes_published(drive=published_drive)
 def frequency_response(
     parameters: Parameters,
-    low: float,
-    high: float,
+    low: Amount,
+    high: Amount,
     *,
     drive: Drive | None = None,
     vary: str = "drive.speed",
@@ -134,10 +137,11 @@ def frequency_response(
     Parameters
     ----------
     parameters : parameters of a mechanism
-    low, high : float
-        Range of the parameter: speed in rad/s, torque in N.m, else in the unit of the FMI contract.
+        Or a published set or its name.
+    low, high : float or str
+        Range of the parameter: speed in rad/s, torque in N.m, else in the unit of the FMI contract; or text such as "420 rpm".
     drive : Drive, optional
-        What drives the plant; needed where another parameter than the speed varies.
+        What drives the plant; needed where another parameter than the speed varies. A published set is driven at its speed.
     vary : str
         ``drive.speed``, ``drive.torque`` (the mean speed is then part of the solution: ``start`` is needed), or whatever
         `Family` can vary.
@@ -166,7 +170,16 @@ def frequency_response(
         If the range is not one.
     ResponseInterrupted
         On Ctrl-C, with the branches that there are.
+
+    Examples
+    --------
+    >>> from analysis import frequency_response
+    >>> response = frequency_response("rig-2-spring-c", "500 rpm", "650 rpm", doubled=False)
+    >>> [f"{100.0 * peak.amplitude:.3f} cm" for peak in response.maxima()]
+    ['1.715 cm']
     """
+    unit = unit_of(mechanism_of(parameters), vary)
+    low, high = si(low, unit, "low"), si(high, unit, "high")
     if drive is None:
         if vary != "drive.speed":
             raise InputError(

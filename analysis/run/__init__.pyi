@@ -1,3 +1,8 @@
+from .arguments import driven as driven
+from .arguments import published_set as published_set
+from .arguments import started as started
+from .arguments import takes_published as takes_published
+from .arguments import variant as variant
 from .case import Case as Case
 from .case import published_case as published_case
 from .case_files import acting_on as acting_on

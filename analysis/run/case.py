@@ -5,9 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from math import pi
 
-from linkwork.errors import InputError
-
-from ..mechanisms import PUBLISHED, InitialState, Parameters, mechanism_of
+from ..mechanisms import InitialState, Parameters, mechanism_of
+from .arguments import published_set
 from .inputs import Inputs, given
 
 
@@ -46,12 +45,10 @@ def published_case(name: str, *, revolutions: float = 3.0, steps_per_revolution:
 
     Raises
     ------
-    InputError
+    UnknownNameError
         If there is no set of that name.
     """
-    if name not in PUBLISHED:
-        raise InputError(f"there is no published set {name!r}: the sets are {', '.join(PUBLISHED)}")
-    entry = PUBLISHED[name]
+    entry = published_set(name)
     turn = 2.0 * pi / entry.crank_speed
     return Case(
         title=entry.source,

@@ -17,11 +17,12 @@ from linkwork.mechanism import Mechanism
 from linkwork.parameters import field_name
 
 from .. import files
-from ..files import Choice, Kinds, Many, Quantity, Reader, Table, Whole, entry
+from ..files import Choice, Kinds, Many, Quantity, Reader, Table, entry
 from ..mechanisms import FIVE_BAR, MECHANISMS, PUBLISHED, Parameters, mechanism_of, name_in_files
 from ..units import with_unit
+from .arguments import driven, readers_of, turn_of
 from .case import Case
-from .inputs import Inputs
+from .inputs import Inputs, start_from
 from .signals import Harmonics, InductionMotor, Piecewise, TorsionBar, ramp, table
 
 # Parameters
@@ -49,14 +50,9 @@ def parameters_from(
     if data.get("mechanism", mechanism.name) != mechanism.name:
         raise ParameterError("mechanism", data["mechanism"], f"be {mechanism.name}")
     data = {name: value for name, value in data.items() if name != "mechanism"}
-    known = mechanism.mechanism_variables
-    readers = {
-        field_name(name): Whole() if variable.kind == "Integer" else Quantity(variable.unit)
-        for name, variable in known.items()
-    }
-    keys = {field_name(name): name for name in known}
+    keys = {field_name(name): name for name in mechanism.mechanism_variables}
     made: Parameters = files.read(
-        mechanism.parameters, files.flattened(data), "", readers=readers, keys=keys, base=base
+        mechanism.parameters, files.flattened(data), "", readers=readers_of(mechanism), keys=keys, base=base
     )
     return made
 
@@ -146,7 +142,7 @@ class RunTable:
 
     def times(self, inputs: Inputs, mechanism: Mechanism) -> tuple[float, float]:
         """End of the run and distance of the samples (s), by default three turns at a constant speed, in 360 steps each."""
-        turn = _turn(inputs, mechanism)
+        turn = turn_of(inputs, mechanism)
         step = self.step if self.step is not None else 1e-3 if turn is None else turn / 360.0
         if self.stop_time is not None:
             if self.revolutions is not None:
@@ -157,20 +153,6 @@ class RunTable:
         if self.revolutions is None:
             raise MissingParameterError("run.stop_time")
         raise ParameterError("run.revolutions", self.revolutions, "come with a constant speed; give run.stop_time")
-
-
-def _command(mechanism: Mechanism) -> str | None:
-    """Name among the inputs of the command of the first freedom, such as the crank's speed."""
-    return next((c.argument for c in mechanism.channels if c.kind == "command" and c.freedom == 0), None)
-
-
-def _turn(inputs: Inputs, mechanism: Mechanism) -> float | None:
-    """Duration of a turn of the first freedom (s) where it turns at a constant speed."""
-    command, period = _command(mechanism), mechanism.freedoms[0].period
-    parts = () if command is None else inputs.parts(command)
-    if len(parts) != 1 or not isinstance(parts[0], (int, float)) or parts[0] * period == 0.0:
-        return None
-    return period / abs(parts[0])
 
 
 def load_case(path: str | Path, overrides: Mapping[str, Any] | None = None) -> Case:
@@ -210,21 +192,14 @@ def case_from(
         None if published is None else published.parameters,
         mechanism,
     )
-    initial = files.read(
-        mechanism.initial,
-        data.get("initial", {}),
-        "initial",
-        readers={name: Quantity(v.unit) for name, v in mechanism.initial_variables.items()},
-        # a five-bar's published start is at rest but for the speed, which the drive gives
-        base=None if published is None or mechanism is FIVE_BAR else published.initial,
-    )
+    # a five-bar's published start is at rest but for the speed, which the drive gives
+    base = None if published is None or mechanism is FIVE_BAR else published.initial
+    initial = start_from(mechanism, data.get("initial", {}), base)
     readers = {name: _reader(unit, folder) for name, (_, unit) in acting.items()}
     found = _found(data, readers, driving)
-    given = {acting[name].argument: value for name, value in found.items()}
-    command, mode = _command(mechanism), mechanism.freedoms[0].mode
-    if published is not None and command is not None and mode is not None and not given.keys() & set(mode.arguments):
-        given[command] = published.crank_speed
-    inputs = Inputs(**given)
+    inputs = Inputs(**{acting[name].argument: value for name, value in found.items()})
+    if published is not None:
+        inputs = driven(published, inputs)
     _check_drives(mechanism, inputs, parameters, initial)
     run: RunTable = files.read(RunTable, data.get("run", {}), "run")
     stop_time, step = run.times(inputs, mechanism)

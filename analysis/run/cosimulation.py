@@ -16,6 +16,8 @@ from numpy.typing import NDArray
 from linkwork.errors import InputError
 
 from ..mechanisms import InitialState, Parameters, output_units
+from ..units import Amount, in_si
+from .arguments import driven, started, takes_published, usual_times
 from .events import RunInterrupted, interruptible, shown
 from .fmu import CosimulationError, FmuModel, FmuRun
 from .inputs import Inputs, release, sample
@@ -32,15 +34,17 @@ PRINCIPAL_ANGLES = ("coupler.angle", "rocker.angle")
 INTERFACES = ("co-simulation", "linear-co-simulation", "model-exchange")
 
 
+@takes_published(inputs=driven, initial=started)
+@in_si(stop_time="s", step="s", start_time="s")
 def cosimulate(
     fmu: str | Path,
     parameters: Parameters,
     inputs: Inputs | None = None,
     *,
     initial: InitialState | None = None,
-    stop_time: float,
-    step: float = 1e-3,
-    start_time: float = 0.0,
+    stop_time: Amount = None,
+    step: Amount = None,
+    start_time: Amount = 0.0,
     tolerance: float = 1e-9,
     interface: str = "co-simulation",
     progress: bool = False,
@@ -52,8 +56,8 @@ def cosimulate(
     fmu : path
     parameters, inputs, initial, stop_time, start_time, tolerance, progress
         As for `simulate`.
-    step : float
-        Communication step (s); every one is recorded.
+    step : float or str, optional
+        Communication step; every one is recorded.
     interface : str
         ``co-simulation``: the inputs are sampled at each communication point and held over the step, commanded speeds go along
         the secant; ``simulate(..., hold=step)`` does the same in process. ``linear-co-simulation``: over a step they go
@@ -72,10 +76,20 @@ def cosimulate(
         If the FMU cannot be loaded, has no such interface, or refuses to initialise.
     InputError
         If the times are not usable, or an input is not a finite number; the sentence names the input and the time.
+
+    Examples
+    --------
+    With an FMU of ``python build_fmu.py``:
+
+    >>> from analysis import compare, cosimulate, simulate
+    >>> run = cosimulate("build/FiveBarSlider.fmu", "table-3.1", stop_time="0.1 s", step="1 ms")
+    >>> compare(simulate("table-3.1", stop_time="0.1 s", step="1 ms", hold="1 ms"), run).agrees
+    True
     """
     if interface not in INTERFACES:
         raise InputError(f"interface is {interface!r}: it must be one of {', '.join(INTERFACES)}")
     begun = clock.perf_counter()
+    stop_time, step = usual_times(parameters, inputs, stop_time, step)
     times = sample_times(stop_time, step, start_time)
     # the FMU itself judges the tolerance
     prepared = Run(parameters, inputs, initial, Settings(times=times, hold=step, tolerance=tolerance, max_steps=1))
@@ -284,6 +298,13 @@ def compare(a: Trajectory, b: Trajectory, *, tolerance: float = 1e-6) -> Compari
     ------
     InputError
         If the runs have not the same times or outputs.
+
+    Examples
+    --------
+    >>> from analysis import compare, simulate
+    >>> one, other = simulate("table-3.1"), simulate("table-3.1", method="DOP853")
+    >>> compare(one, other).agrees
+    True
     """
     if a.names != b.names:
         raise InputError("the runs cannot be compared: they have not the same outputs, and are of different mechanisms")

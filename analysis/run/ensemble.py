@@ -13,6 +13,8 @@ from numpy.typing import NDArray
 from linkwork.errors import InputError, LinkworkError
 
 from ..mechanisms import MECHANISMS, InitialState, Parameters, mechanism_of
+from ..units import Amount, in_si
+from .arguments import driven, started, takes_published
 from .inputs import Inputs, compiled_source, given
 from .prepared import Run, outputs_of
 from .simulation import sample_times, settings_of
@@ -83,15 +85,17 @@ class Ensemble:
         return result
 
 
+@takes_published(inputs=driven, initial=started)
+@in_si(stop_time="s", step="s", start_time="s", hold="s")
 def simulate_many(
     parameters: Sequence[Parameters],
     inputs: Inputs | Sequence[Inputs] | None = None,
     *,
     initial: InitialState | Sequence[InitialState] | None = None,
-    stop_time: float,
-    step: float = 1e-3,
-    start_time: float = 0.0,
-    hold: float | None = None,
+    stop_time: Amount,
+    step: Amount = 1e-3,
+    start_time: Amount = 0.0,
+    hold: Amount = None,
     tolerance: float = 1e-9,
     max_steps: int = 100_000_000,
     batch: int = 64,
@@ -110,6 +114,14 @@ def simulate_many(
     InputError, ParameterError, AssemblyError
         As `simulate`; the sentence names the run. An input that turns out not to be finite in the course of a run ends
         that run alone.
+
+    Examples
+    --------
+    >>> from analysis import simulate_many, variant
+    >>> springs = [variant("table-3.1", slider_stiffness=f"{k} N/m") for k in (800, 1000, 1200)]
+    >>> runs = simulate_many(springs, stop_time="0.2 s")
+    >>> runs.output("slider.position").shape
+    (3, 201)
     """
     m = len(parameters)
     if m == 0:

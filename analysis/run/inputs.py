@@ -5,7 +5,7 @@ One object serves `simulate` and `cosimulate`, and every mechanism: which channe
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from itertools import chain
@@ -14,10 +14,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from linkwork.errors import InputError
+from linkwork.errors import InputError, ParameterError
 from linkwork.mechanism import Mechanism
 
-from ..mechanisms import MECHANISMS, InitialState
+from .. import files
+from ..mechanisms import MECHANISMS, InitialState, variable_units
+from ..units import Units, si
 from .signals import Function, Harmonics, InductionMotor, Piecewise, StateFunction, TorsionBar
 
 _NUMBER = (int, float, np.floating, np.integer)
@@ -25,7 +27,9 @@ _SIGNALS = (*_NUMBER, Piecewise, Harmonics, Function, TorsionBar, InductionMotor
 
 
 class Inputs:
-    """Everything that acts on a mechanism during a run. SI units; a plain number is a constant, a tuple of signals their sum.
+    """Everything that acts on a mechanism during a run.
+
+    A number is a constant in SI, a text such as "420 rpm" one in another unit, a tuple of signals their sum.
 
     Parameters
     ----------
@@ -40,11 +44,14 @@ class Inputs:
     ------
     InputError
         If no mechanism has such a channel, two ways of driving one freedom are given, or a value is not finite or of the
-        wrong kind.
+        wrong kind, or a text no quantity of the channel's kind.
 
     Examples
     --------
-    >>> Inputs(speed=44.0, force=(1.0, ramp(0.0, 2.0, 0.0, 0.5)))  # doctest: +SKIP
+    >>> from analysis import Inputs, ramp
+    >>> Inputs(speed=44.0, force="20 mN")
+    Inputs(speed=44.0, force=0.02)
+    >>> drive = Inputs(speed="420 rpm", force=(1.0, ramp(0.0, 2.0, 0.0, 0.5)))
     """
 
     __slots__ = ("_given",)
@@ -52,6 +59,10 @@ class Inputs:
 
     def __init__(self, **channels: Any) -> None:
         known, flags = _arguments()
+        try:
+            channels = {name: si(value, _units(name), name) for name, value in channels.items()}
+        except ParameterError as error:
+            raise InputError(str(error).removeprefix("parameter ")) from None
         for name, value in channels.items():
             if name not in known:
                 raise InputError(f"there is no input {name!r}: the inputs are {', '.join(known)}")
@@ -135,6 +146,12 @@ def _arguments() -> tuple[tuple[str, ...], tuple[str, ...]]:
     return tuple(channels | modes), tuple(name for name in modes if name not in channels)
 
 
+def _units(name: str) -> Units:
+    """Unit of a channel; of a flag, and of what is none, nothing has one."""
+    channels = (c for m in MECHANISMS.values() for c in m.channels if c.argument == name)
+    return next((variable_units()[channel.name] for channel in channels), {})
+
+
 def _parts(value: Any) -> tuple[Any, ...]:
     if value is None:
         return ()
@@ -163,8 +180,23 @@ def _turns(mechanism: Mechanism, freedom: int) -> bool:
     return freedom >= 0 and mechanism.freedoms[freedom].period > 0.0
 
 
+def start_from(mechanism: Mechanism, data: Any, base: InitialState | None = None) -> InitialState:
+    """State at the start from a mapping by its fields, quantities in SI or with their unit, such as {"crank_speed": "420 rpm"}.
+
+    Raises
+    ------
+    ParameterError
+        If a name is unknown or a value is wrong.
+    """
+    readers = {name: files.Quantity(variable.unit) for name, variable in mechanism.initial_variables.items()}
+    made: InitialState = files.read(mechanism.initial, data, "initial", readers=readers, base=base)
+    return made
+
+
 def given(mechanism: Mechanism, inputs: Inputs | None, initial: InitialState | None) -> tuple[Inputs, Any]:
     """Inputs and state at the start of a run, by default nothing and at rest; both must be of the mechanism.
+
+    The state may be a mapping, as `start_from` reads it.
 
     Raises
     ------
@@ -179,7 +211,8 @@ def given(mechanism: Mechanism, inputs: Inputs | None, initial: InitialState | N
     for name in inputs:
         if name not in known:
             raise InputError(f"a {mechanism.name} has no input {name!r}: its inputs are {', '.join(known)}")
-    initial = mechanism.initial() if initial is None else initial
+    if initial is None or isinstance(initial, Mapping):
+        initial = start_from(mechanism, initial or {})
     if not isinstance(initial, mechanism.initial):
         kind, wanted = type(initial), mechanism.initial
         raise InputError(

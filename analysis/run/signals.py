@@ -10,6 +10,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from linkwork.errors import InputError
 
+from ..units import Amount, in_si
+
 #: A function of time, all coordinates and all their rates, floats.
 StateFunction = Callable[..., float]
 
@@ -69,6 +71,7 @@ class Harmonics:
             raise InputError("harmonics must be finite numbers")
 
 
+@in_si(torque="N.m", release_angle="rad")
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TorsionBar:
     """Torque of a wound-up bar: torque (1 - angle / release_angle) until the crank reaches release_angle, then none.
@@ -76,8 +79,8 @@ class TorsionBar:
     The thesis's launch (section 3.2.2): torque T0 in N.m, released at 1 rad. The switch is located exactly.
     """
 
-    torque: float
-    release_angle: float = 1.0
+    torque: Amount
+    release_angle: Amount = 1.0
 
     def __post_init__(self) -> None:
         if not np.isfinite(self.torque):
@@ -86,6 +89,7 @@ class TorsionBar:
             raise InputError(f"release angle of the torsion bar is {self.release_angle}: it must be above 0 rad")
 
 
+@in_si(breakdown_torque="N.m", breakdown_slip="1", synchronous_speed="rad/s")
 @dataclass(frozen=True, slots=True, kw_only=True)
 class InductionMotor:
     """Torque of an induction motor by Kloss's formula, 2 Tb / (s / sb + sb / s) at the slip s = 1 - speed / synchronous_speed.
@@ -100,9 +104,9 @@ class InductionMotor:
         Speed of the field (rad/s).
     """
 
-    breakdown_torque: float
-    breakdown_slip: float
-    synchronous_speed: float
+    breakdown_torque: Amount
+    breakdown_slip: Amount
+    synchronous_speed: Amount
 
     def __post_init__(self) -> None:
         if not np.isfinite(self.breakdown_torque):

@@ -57,5 +57,6 @@ from .shifts import TimeShift as TimeShift
 from .tolerances import Estimate as Estimate
 from .tolerances import Tolerance as Tolerance
 from .tolerances import estimate as estimate
+from .tolerances import tolerance_effects as tolerance_effects
 from .two_rotations import Settled as Settled
 from .two_rotations import settle as settle

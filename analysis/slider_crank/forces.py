@@ -32,6 +32,8 @@ from linkwork.slider_crank.kinematics import Position
 from linkwork.slider_crank.parameters import Constants, SliderCrankParameters
 from linkwork.slider_crank.vectors import Vector
 
+from ..run import takes_published
+from ..units import Amount, in_si
 from . import mobility
 from .course import Course
 from .mobility import DeadCentre
@@ -339,15 +341,20 @@ class ForceTurn:
         }
 
 
+@takes_published(
+    crank_speed=lambda known, speed: known.crank_speed if speed is None else speed,
+    shift=lambda known, shift: ConstantShift(known.initial.shift_position) if shift is None else shift,
+)
+@in_si(crank_speed="rad/s", crank_acceleration="rad/s2", angles="rad", load="N", torque="N.m")
 def force_turn(
-    parameters: SliderCrankParameters,
+    parameters: Any,
     *,
-    crank_speed: ArrayLike,
+    crank_speed: ArrayLike | None = None,
     crank_acceleration: ArrayLike = 0.0,
     shift: ShiftLaw = _STILL,
     angles: ArrayLike | None = None,
-    load: ArrayLike | None = None,
-    torque: ArrayLike | None = None,
+    load: ArrayLike | Amount = None,
+    torque: ArrayLike | Amount = None,
     partial: bool = False,
 ) -> ForceTurn:
     """Forces and moments in all joints over the turn, for a prescribed motion of crank and shift.
@@ -355,8 +362,9 @@ def force_turn(
     Parameters
     ----------
     parameters : SliderCrankParameters
+        Or a published set or its name, which brings its crank speed and its shift.
     crank_speed, crank_acceleration : array_like, scalar or shape (n,)
-        theta1' (rad/s), theta1'' (rad/s2).
+        theta1' (rad/s), theta1'' (rad/s2); a number may be a text with its unit, such as "50 rpm", here and below.
     shift : ShiftLaw
         `ConstantShift`, `GrooveShift`, `AngleShift`, `TimeShift` or another. The parameters' own groove is not used.
     angles : array_like, shape (n,), optional
@@ -376,7 +384,16 @@ def force_turn(
     AssemblyError
         If the rod does not reach the guide at an angle, with the ranges in which it does; with ``partial`` only if it does at
         none.
+
+    Examples
+    --------
+    >>> from analysis import force_turn
+    >>> turn = force_turn("rahman-a4-10-s1-3.5", load="-20 lbf")
+    >>> f"{turn.torque.max():.2f} N.m"
+    '45.93 N.m'
     """
+    if crank_speed is None:
+        raise InputError("the crank speed is missing: only a published set brings its own")
     if load is not None and torque is not None:
         raise InputError("both load and torque are given: give the one, and the other is sought")
     if not isinstance(shift, ShiftLaw):

@@ -20,6 +20,7 @@ from linkwork.slider_crank import dynamics, kinematics, vectors
 from linkwork.slider_crank.parameters import Constants, SliderCrankParameters
 
 from ..numerics.tracing import Rebound, rebound
+from ..units import Amount, in_si
 from . import mobility
 from .quantities import FloatArray
 
@@ -50,6 +51,7 @@ class ShiftLaw(Protocol):
         """The law as `analysis.slider_crank.mobility` takes it; None if it is not known to repeat after whole turns."""
 
 
+@in_si(value="m")
 @dataclass(frozen=True, slots=True)
 class ConstantShift:
     """The crank held at a shift S1 (m).
@@ -60,7 +62,7 @@ class ConstantShift:
         If it is not finite.
     """
 
-    value: float = 0.0
+    value: Amount = 0.0
 
     def __post_init__(self) -> None:
         if not isfinite(self.value):
@@ -76,6 +78,7 @@ class ConstantShift:
         return mobility.constant_shift(self.value)
 
 
+@in_si(amplitude="m")
 @dataclass(frozen=True, slots=True)
 class GrooveShift:
     """S1 = SS1 sin(alpha theta1), eq 28 (eq 28a prints S1 for SS1).

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from linkwork.errors import InputError
 
 from ..numerics.dual import dual
+from ..units import Amount, si
 from .derivatives import ERRORS, FREE_OF_LOAD, check_names, error_variables, sensitivities, vary
 from .forces import SLIDER_FORCE, ForceTurn
 from .quantities import FloatArray, MaskedArray, masked_array
@@ -37,9 +38,9 @@ class Tolerance:
     ----------
     name : str
         One of `ERRORS`: a parameter of the mechanism by its FMI name, "shift.position" or "crank.angle".
-    half_width : float, optional
-        Half the width of the tolerance, in the unit of what is in error. A normal distribution has three standard deviations
-        in it and is not cut off there.
+    half_width : float or str, optional
+        Half the width of the tolerance, in the SI unit of what is in error or with its unit, such as "0.1 mm". A normal
+        distribution has three standard deviations in it and is not cut off there.
     standard_deviation : float, optional
         In place of the half width.
     distribution : str
@@ -55,12 +56,15 @@ class Tolerance:
     """
 
     name: str
-    half_width: float | None = None
-    standard_deviation: float | None = None
+    half_width: Amount = None
+    standard_deviation: Amount = None
     distribution: str = "normal"
 
     def __post_init__(self) -> None:
         check_names((self.name,), ERRORS, "error")
+        for field in ("half_width", "standard_deviation"):
+            what = f"{field.replace('_', ' ')} of {self.name}"
+            object.__setattr__(self, field, si(getattr(self, field), ERRORS[self.name], what))
         if self.distribution not in _DISTRIBUTIONS:
             raise InputError(
                 f"the distribution of {self.name} is {self.distribution!r}: it must be one of {', '.join(_DISTRIBUTIONS)}"
@@ -75,13 +79,15 @@ class Tolerance:
     def deviation(self) -> float:
         """Standard deviation."""
         if self.standard_deviation is not None:
-            return self.standard_deviation
-        return cast(float, self.half_width) / _DISTRIBUTIONS[self.distribution][0]
+            return float(self.standard_deviation)
+        return float(self.half_width) / _DISTRIBUTIONS[self.distribution][0]
 
     @property
     def extent(self) -> float:
         """Half width, of a normal distribution three standard deviations."""
-        return self.half_width if self.half_width is not None else self.deviation * _DISTRIBUTIONS[self.distribution][0]
+        if self.half_width is not None:
+            return float(self.half_width)
+        return self.deviation * _DISTRIBUTIONS[self.distribution][0]
 
     def draw(self, generator: np.random.Generator, samples: int) -> FloatArray:
         """Random errors (samples,)."""
@@ -135,6 +141,14 @@ def estimate(
         If there is no tolerance, or two of the same name.
     ParameterError
         If there is no such quantity.
+
+    Examples
+    --------
+    >>> from analysis import Tolerance, force_turn, tolerance_effects
+    >>> turn = force_turn("rahman-a4-10-s1-3.5", angles=["30 deg", "90 deg"])
+    >>> effect = tolerance_effects(turn, [Tolerance("rod.length", half_width="0.5 mm")])["slider.position"]
+    >>> [f"{1e3 * value:.3f} mm" for value in effect.worst]
+    ['0.549 mm', '0.512 mm']
     """
     names = check_tolerances(tolerances)
     first = sensitivities(turn, names, quantities)
@@ -171,6 +185,10 @@ def estimate(
             second_shares=_share(np.ma.MaskedArray(second), np.ma.MaskedArray(whole), still),
         )
     return result
+
+
+#: The name of `estimate` at the top of the package.
+tolerance_effects = estimate
 
 
 def check_tolerances(tolerances: Sequence[Tolerance]) -> tuple[str, ...]:

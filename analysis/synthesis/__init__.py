@@ -26,7 +26,7 @@ from .constraints import (
     Require,
 )
 from .drawing import drawing
-from .linkage import ANGLES, LENGTHS, LINKS, Linkage, SecondCrank, SliderMotion
+from .linkage import ANGLES, LENGTHS, LINKS, UNITS, Linkage, SecondCrank, SliderMotion
 from .report import (
     dimension_rows,
     error_unit,
@@ -61,6 +61,7 @@ __all__ = [
     "LENGTHS",
     "LINKS",
     "QUICK_SEARCH",
+    "UNITS",
     "USUAL",
     "USUAL_SEARCH",
     "Assembly",

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from linkwork.errors import InputError, LinkworkError, ParameterError
 
+from ..units import Amount, in_si
 from .kernels import PLACES
 from .linkage import ANGLES, LINKS
 from .tasks import Normal, RockerFunction, Task
@@ -33,6 +34,11 @@ class InfeasibleError(LinkworkError):
     """Bounds and constraints leave no linkage."""
 
 
+#: Least transmission angle by default (rad).
+_LEAST_TRANSMISSION = radians(40.0)
+
+
+@in_si(angle="rad")
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LeastTransmission:
     """The angle between coupler and rocker stays at least this far from 0 and pi.
@@ -45,7 +51,7 @@ class LeastTransmission:
         Over a full turn, which makes the crank able to turn fully, or at the task's stations only.
     """
 
-    angle: float = radians(40.0)
+    angle: Amount = _LEAST_TRANSMISSION
     over: Literal["turn", "task"] = "turn"
 
     def __post_init__(self) -> None:
@@ -71,11 +77,12 @@ class Grashof:
             raise ParameterError("Grashof type", self.type, f"be one of {', '.join(get_args(GrashofType))}")
 
 
+@in_si(length="m")
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LargestLink:
     """No link, nor the distance of the coupler point, is longer than this (m)."""
 
-    length: float
+    length: Amount
 
     def __post_init__(self) -> None:
         if not (isfinite(self.length) and self.length > 0.0):
@@ -93,6 +100,7 @@ class Assembly:
             raise ParameterError("branch", self.branch, "be +1 or -1")
 
 
+@in_si(polygon="m")
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class PivotRegion:
     """A pivot lies within a polygon, convex or not.

@@ -11,8 +11,10 @@ evaluated by `analysis.synthesis.kernels`.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from math import cos, hypot, isfinite, pi, sin
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -22,6 +24,7 @@ from linkwork.errors import AssemblyError, ParameterError
 from linkwork.five_bar.parameters import FiveBarParameters
 
 from ..numerics.fourier import FourierSeries
+from ..units import in_si
 from .kernels import PLACES, coupler_path, coupler_path_jacobian, link_directions, link_jacobian
 
 FloatArray = NDArray[np.float64]
@@ -30,6 +33,8 @@ FloatArray = NDArray[np.float64]
 LINKS = ("ground_length", "crank_length", "coupler_length", "rocker_length")
 LENGTHS = ("pivot_x", "pivot_y", *LINKS, "point_distance")
 ANGLES = ("ground_angle", "crank_phase", "point_angle", "output_angle")
+#: Their units.
+UNITS: Mapping[str, str] = MappingProxyType(dict.fromkeys(LENGTHS, "m") | dict.fromkeys(ANGLES, "rad"))
 #: Grashof's types of a four-bar of which a link turns fully, by the shortest link in the order of `LINKS`.
 BY_SHORTEST = ("drag-link", "crank-rocker", "double-rocker", "rocker-crank")
 #: Crank rotations at which a full turn is evaluated.
@@ -142,6 +147,7 @@ class SecondCrank:
         return replace(self, length=self.length * factor)
 
 
+@in_si(**UNITS)
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Linkage:
     """A four-bar with a coupler point, placed in the plane. Lengths in m, angles in rad.

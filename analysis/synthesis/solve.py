@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from linkwork.errors import InputError, Interrupted
 
 from ..files import write_csv
+from ..units import Amount, in_si
 from .black_box import by_differential_evolution, by_simplex
 from .constraints import (
     USUAL,
@@ -25,7 +26,7 @@ from .constraints import (
     Limits,
     limits_of,
 )
-from .linkage import ANGLES, Linkage
+from .linkage import ANGLES, UNITS, Linkage
 from .polish import Polished, distinct, polish
 from .scan import scan
 from .search import QUICK_SEARCH, USUAL_SEARCH, Search
@@ -87,9 +88,10 @@ class SynthesisInterrupted(Interrupted):
         super().__init__(f"stopped after {done} of {starts} searches")
 
 
+@in_si(bounds=UNITS)
 def synthesize(
     task: Task,
-    bounds: Mapping[str, tuple[float, float]] | None = None,
+    bounds: Mapping[str, tuple[Amount, Amount]] | None = None,
     constraints: Sequence[Constraint] = USUAL,
     weights: ArrayLike | None = None,
     *,
@@ -106,8 +108,9 @@ def synthesize(
     ----------
     task : TimedPath, UntimedPath, RockerFunction, Motion or PrecisionPoints
     bounds : mapping, optional
-        (least, greatest) of dimensions by their name in `Linkage` (m, rad); equal ones fix a dimension. Without, links up
-        to five times the target's size; of a rocker function, a ground link of 0.1 m and the others up to five times that.
+        (least, greatest) of dimensions by their name in `Linkage` (m, rad, or text such as "5 cm"); equal ones fix a
+        dimension. Without, links up to five times the target's size; of a rocker function, a ground link of 0.1 m and the
+        others up to five times that.
     constraints : sequence
         See `analysis.synthesis.constraints`; by default a transmission angle of at least 40 degrees over a full turn.
     weights : array_like, optional
@@ -127,6 +130,17 @@ def synthesize(
         If no linkage keeps all bounds and constraints; it names the one that the nearest linkage violates most.
     SynthesisInterrupted
         On Ctrl-C, with the best so far.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from analysis import synthesize
+    >>> from analysis.synthesis import Search, TimedPath, turn
+    >>> phi = turn(24)
+    >>> ellipse = np.column_stack([0.2 + 0.1 * np.cos(phi), 0.15 + 0.05 * np.sin(phi)])
+    >>> found = synthesize(TimedPath(points=ellipse), {"rocker_length": ("5 cm", "50 cm")}, search=Search(starts=2))
+    >>> found.best.verdicts.sound
+    True
     """
     if search.starts < 1:
         raise InputError(f"{search.starts} starts: there must be at least one")
@@ -155,6 +169,7 @@ def synthesize(
     return _result(task, found, done, total, search, begun)
 
 
+@in_si(bounds=UNITS)
 def improve(
     task: Task,
     linkage: Linkage | Solution,
@@ -354,6 +369,7 @@ class TradeOffInterrupted(Interrupted):
         super().__init__(f"stopped after {done} of {problems} problems of the trade-off")
 
 
+@in_si(bounds=UNITS)
 def trade_off(
     task: Task,
     over: Literal["size", "transmission"],

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from linkwork.errors import ParameterError
 
 from ..numerics.fourier import FourierSeries
+from ..units import Amount, in_si
 from .constraints import UNKNOWNS, Limits
 from .linkage import Linkage, SecondCrank, SliderMotion, wrapped
 from .tasks import Normal
@@ -24,6 +25,7 @@ Item = TypeVar("Item")
 AMPLITUDE = 0.1
 
 
+@in_si(guide_angle="rad", position="m", stroke="m", speed="m", acceleration="m")
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SliderUnknown:
     """A slider whose motion is sought: a Fourier series with this many harmonics.
@@ -46,11 +48,11 @@ class SliderUnknown:
     """
 
     harmonics: int
-    guide_angle: tuple[float, float] = (-pi, pi)
-    position: tuple[float, float] | None = None
-    stroke: float = inf
-    speed: float = inf
-    acceleration: float = inf
+    guide_angle: tuple[Amount, Amount] = (-pi, pi)
+    position: tuple[Amount, Amount] | None = None
+    stroke: Amount = inf
+    speed: Amount = inf
+    acceleration: Amount = inf
     smoothness: float = 0.0
 
     def __post_init__(self) -> None:
@@ -72,6 +74,7 @@ class SliderUnknown:
             raise ParameterError("smoothness", self.smoothness, "be a finite number, zero or greater")
 
 
+@in_si(length="m")
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CrankUnknown:
     """A second crank whose length, phase and, with ``harmonics``, independent rotation are sought.
@@ -89,7 +92,7 @@ class CrankUnknown:
     """
 
     ratio: int
-    length: tuple[float, float]
+    length: tuple[Amount, Amount]
     harmonics: int = 0
     speed: float = inf
 

@@ -20,6 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from linkwork.errors import InputError
 
+from ..units import in_si
 from .targets import TargetPath, halves
 
 FloatArray = NDArray[np.float64]
@@ -93,6 +94,7 @@ def turn(n: int) -> FloatArray:
     return np.linspace(0.0, 2.0 * pi, n, endpoint=False)
 
 
+@in_si(points="m", rotation="rad")
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class TimedPath:
     """The coupler point is to be at given points at given crank rotations.
@@ -188,6 +190,7 @@ class UntimedPath:
         _set(self, weights=_weights(self.weights, len(self.path.points)))
 
 
+@in_si(angle="rad", rotation="rad")
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class RockerFunction:
     """The rocker is to be at given angles at given crank rotations.
@@ -216,6 +219,7 @@ class RockerFunction:
         _set(self, angle=angle, rotation=_rotation(self.rotation, n), weights=_weights(self.weights, n))
 
 
+@in_si(points="m", angle="rad", rotation="rad", length="m")
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Motion:
     """The coupler is to carry a body through given poses.
@@ -252,6 +256,7 @@ class Motion:
         _set(self, weights=_weights(self.weights, n))
 
 
+@in_si(points="m", angle="rad", rotation="rad")
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class PrecisionPoints:
     """The coupler point is to pass exactly through a few points, in their order, at any crank rotations or at given ones.

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from analysis import simulate
-from analysis.mechanisms import FIVE_BAR, mechanism_of
+from analysis.mechanisms import FIVE_BAR, PUBLISHED, mechanism_of
 from analysis.run import (
     Harmonics,
     Piecewise,
@@ -21,7 +21,6 @@ from analysis.run import (
     parameters_to,
     save_parameters,
 )
-from analysis.run.case import PUBLISHED
 from linkwork.errors import InputError, MissingParameterError, ParameterError, UnknownNameError
 from linkwork.five_bar.published import TABLE_3_1
 

@@ -1,0 +1,182 @@
+"""What the public functions take in the place of numbers and objects: published sets, starts by name, quantities as text."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from functools import wraps
+from inspect import signature
+from typing import Any, TypeVar, cast
+
+from linkwork.errors import InputError
+from linkwork.mechanism import Mechanism, PublishedSet
+from linkwork.parameters import field_name
+
+from .. import files
+from ..files import Quantity, Whole
+from ..mechanisms import MECHANISMS, PUBLISHED, Parameters, mechanism_of
+from ..units import Amount
+from .inputs import Inputs, start_from
+
+_Function = TypeVar("_Function", bound=Callable[..., Any])
+#: What an argument is under a published set: a function of the set and of the argument as it was given, None where it was not.
+Fill = Callable[[PublishedSet, Any], Any]
+
+
+def published_set(known: str | PublishedSet) -> PublishedSet:
+    """A published set, by its name or as it is.
+
+    Raises
+    ------
+    UnknownNameError
+        If there is no set of that name.
+    """
+    if isinstance(known, PublishedSet):
+        return known
+    if known not in PUBLISHED:
+        raise files.unknown_name(known, PUBLISHED, f"published set {known!r}")
+    found: PublishedSet = PUBLISHED[known]
+    return found
+
+
+def takes_published(**fills: Fill) -> Callable[[_Function], _Function]:
+    """Let the argument ``parameters`` of a function be a published set or its name, or a list with some of them.
+
+    Parameters
+    ----------
+    **fills : function
+        What the set says of other arguments, such as ``initial=started``.
+    """
+
+    def decorate(function: _Function) -> _Function:
+        its = signature(function)
+        place = list(its.parameters).index("parameters")
+
+        @wraps(function)
+        def resolved(*arguments: Any, **options: Any) -> Any:
+            given: Any = options.get("parameters", arguments[place] if len(arguments) > place else None)
+            several = isinstance(given, (list, tuple)) and not isinstance(given, PublishedSet)
+            each = list(given) if several else [given]
+            if not any(isinstance(one, (str, PublishedSet)) for one in each):
+                return function(*arguments, **options)
+            sets = [published_set(one) if isinstance(one, (str, PublishedSet)) else None for one in each]
+            own = [one if known is None else known.parameters for one, known in zip(each, sets)]
+            bound = its.bind_partial(*arguments, **options).arguments
+            bound["parameters"] = own if several else own[0]
+            for name, fill in fills.items():
+                value = bound.get(name)
+                values = value if isinstance(value, (list, tuple)) and len(value) == len(sets) else [value] * len(sets)
+                filled = [v if known is None else fill(known, v) for known, v in zip(sets, values)]
+                bound[name] = filled if several else filled[0]
+            # `its` has no arguments that are positional only: all can go by their names, but for those of **options
+            others = bound.pop("options", {})
+            return function(**bound, **others)
+
+        return cast(_Function, resolved)
+
+    return decorate
+
+
+def command_of(mechanism: Mechanism) -> str | None:
+    """Name among the inputs of the command of the first freedom, such as the crank's speed."""
+    return next((c.argument for c in mechanism.channels if c.kind == "command" and c.freedom == 0), None)
+
+
+def driven(known: PublishedSet, inputs: Any) -> Any:
+    """Inputs that turn the crank at the set's speed, unless they drive it themselves."""
+    mechanism = mechanism_of(known.parameters)
+    command, mode = command_of(mechanism), mechanism.freedoms[0].mode
+    inputs = Inputs() if inputs is None else inputs
+    if command is None or mode is None or not isinstance(inputs, Inputs) or {*inputs} & {*mode.arguments}:
+        return inputs
+    return inputs.replace(**{command: known.crank_speed})
+
+
+def started(known: PublishedSet, initial: Any) -> Any:
+    """The state at the start that is given, or else the set's; what a mapping leaves out is the set's."""
+    if isinstance(initial, Mapping):
+        return start_from(mechanism_of(known.parameters), initial, known.initial)
+    return known.initial if initial is None else initial
+
+
+def turn_of(inputs: Inputs, mechanism: Mechanism) -> float | None:
+    """Duration of a turn of the first freedom (s) where it turns at a constant speed."""
+    command, period = command_of(mechanism), mechanism.freedoms[0].period
+    parts = () if command is None else inputs.parts(command)
+    if len(parts) != 1 or not isinstance(parts[0], (int, float)) or parts[0] * period == 0.0:
+        return None
+    return period / abs(parts[0])
+
+
+def usual_times(
+    parameters: Parameters, inputs: Inputs | None, stop_time: float | None, step: float | None
+) -> tuple[float, float]:
+    """End of a run and distance of its samples (s), by default three turns at a constant speed in 360 steps each.
+
+    With an end and no step it is 1 ms.
+
+    Raises
+    ------
+    InputError
+        If there is no end, and no constant speed.
+    """
+    if stop_time is not None:
+        return stop_time, 1e-3 if step is None else step
+    turn = turn_of(inputs, mechanism_of(parameters)) if isinstance(inputs, Inputs) else None
+    if turn is None:
+        raise InputError(
+            "stop_time is missing: a run has three turns by default only where the crank has a constant speed"
+        )
+    return 3.0 * turn, turn / 360.0 if step is None else step
+
+
+def variant(of: Any, /, **changes: Amount) -> Any:
+    """A published set or parameters with some values changed, which may be texts with units.
+
+    Parameters
+    ----------
+    of : str, PublishedSet, parameters of a mechanism, or their class
+        What is changed. A class, such as FiveBarParameters, makes new parameters.
+    **changes
+        By the names of the fields, such as ``slider_stiffness="1e6 dyn/cm"``. Numbers are in SI.
+
+    Returns
+    -------
+    PublishedSet or parameters
+        A set where one was given, so that its start and its crank speed go with it.
+
+    Raises
+    ------
+    ParameterError
+        If a name is unknown, a value is wrong, or a class is given and a value is missing.
+
+    Examples
+    --------
+    >>> from analysis import simulate, variant
+    >>> soft = variant("table-3.1", slider_stiffness="0.8e6 dyn/cm", slider_damping="20 N.s/m")
+    >>> soft.parameters.slider_stiffness, soft.parameters.slider_damping
+    (800.0, 20.0)
+    >>> simulate(soft).status
+    0
+    """
+    known = published_set(of) if isinstance(of, (str, PublishedSet)) else None
+    base = of if known is None else known.parameters
+    if isinstance(base, type):
+        mechanism = next((m for m in MECHANISMS.values() if m.parameters is base), None)
+        if mechanism is None:
+            kinds = ", ".join(m.parameters.__name__ for m in MECHANISMS.values())
+            raise InputError(f"{base.__name__} has no variants: it must be one of {kinds}")
+        base = None
+    else:
+        mechanism = mechanism_of(base)
+    made = files.read(mechanism.parameters, changes, "", readers=readers_of(mechanism), base=base)
+    if known is None:
+        return made
+    return known._replace(parameters=made, source=f"{known.source}, changed" if changes else known.source)
+
+
+def readers_of(mechanism: Mechanism) -> dict[str, files.Reader]:
+    """Readers of a mechanism's parameters by their fields."""
+    return {
+        field_name(name): Whole() if variable.kind == "Integer" else Quantity(variable.unit)
+        for name, variable in mechanism.mechanism_variables.items()
+    }
