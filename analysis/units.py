@@ -171,7 +171,9 @@ def _converted(text: str, unit: str, spelled: str, name: str, wanted: str) -> fl
     if of is None:
         if unit == "1":
             return number
-        raise ParameterError(name, text, f"come with its unit, such as '{text} {spelled}', or be a number, which is in SI")
+        raise ParameterError(
+            name, text, f"come with its unit, such as '{text} {spelled}', or be a number, which is in SI"
+        )
     import pint
 
     try:

@@ -29,6 +29,7 @@ from ..run import Trajectory
 MODULES = (
     "runs",
     "linkage",
+    "orbit",
     "response",
     "charts",
     "control",

@@ -8,7 +8,7 @@ motion of twice the period.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import reduce
 from pathlib import Path
@@ -20,6 +20,7 @@ from linkwork.errors import InputError
 
 from ..files import write_csv
 from ..mechanisms import Parameters, mechanism_of
+from ..notebook import Shown, format_count, format_range
 from ..numerics.continuation import ContinuationError, Curve, Evaluate, Evaluation, Follower, Point, Settings
 from .drives import Drive
 from .floquet import TOLERANCE, Crossing, Stability, crossing_test
@@ -147,7 +148,7 @@ class SpecialPoint:
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Branch:
+class Branch(Shown):
     """Orbits along a curve, in its order.
 
     Attributes
@@ -174,6 +175,11 @@ class Branch:
     reason: str
     # what `columns` has computed
     _table: dict[str, NDArray[np.float64]] = field(default_factory=dict, init=False, repr=False)
+
+    def __repr__(self) -> str:
+        special = "".join(f", {s.kind.value} at {self.family.format_value(s.parameter)}" for s in self.special)
+        ended = "" if self.reached else f", ended early: {self.reason}"
+        return f"<Branch: {describe((self,))}{special}{ended}>"
 
     def __len__(self) -> int:
         return len(self.orbits)
@@ -422,3 +428,17 @@ def _special_points(curve: Curve, follower: Follower) -> list[SpecialPoint]:
                 continue
             found.append((i, s, SpecialPoint(kind=kind, parameter=point.parameter, orbit=point.data, after=i)))
     return [special for _, _, special in sorted(found, key=lambda entry: entry[:2])]
+
+
+def describe(branches: Sequence[Branch]) -> str:
+    """One line on branches of a family: range, orbits, stability and greatest amplitude, and where."""
+    family, (name, unit) = branches[0].family, branches[0].orbits[0].flow.components[0]
+    span = format_range(np.concatenate([branch.parameter for branch in branches]), family.unit)
+    words = dict.fromkeys(word.value for branch in branches for word in branch.stability())
+    largest = max(branches, key=lambda branch: float(branch.amplitude.max()))
+    place = int(largest.amplitude.argmax())
+    return (
+        f"{family.name} {span}, {format_count(sum(len(branch) for branch in branches), 'orbit')}, {' and '.join(words)}; "
+        f"greatest amplitude of {name} {largest.amplitude[place]:.4g} {unit} at "
+        f"{family.format_value(float(largest.parameter[place]))}"
+    )

@@ -18,6 +18,7 @@ from linkwork.mechanism import Mechanism
 
 from ..files import write_csv
 from ..mechanisms import Parameters, mechanism_of
+from ..notebook import Shown, format_count, format_range
 from ..numerics.boundaries import Box, chart
 from ..numerics.continuation import ContinuationError, End, Reason
 from ..run import shown, takes_published
@@ -120,7 +121,7 @@ class Run:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class StabilityChart:
+class StabilityChart(Shown):
     """Where the periodic motion of one turn is unstable.
 
     Attributes
@@ -150,6 +151,19 @@ class StabilityChart:
     runs: tuple[Run, ...]
     elsewhere: int
     problems: tuple[str, ...]
+
+    def __repr__(self) -> str:
+        spans = [
+            f"{axis.name} {format_range((axis.factor * low, axis.factor * high), axis.unit)}"
+            for axis, (low, high) in zip(self.axes, (self.box.x, self.box.y))
+        ]
+        multipliers = self.grid.largest.compressed()
+        share = f", {np.mean(multipliers > 1.0):.1%} unstable" if len(multipliers) else ""
+        return (
+            f"<StabilityChart: {' by '.join(spans)}, {len(self.grid.x)} x {len(self.grid.y)} points{share}, largest Floquet "
+            f"multiplier {format_range(multipliers, '')}; {format_count(len(self.boundaries), 'boundary')}, "
+            f"{format_count(len(self.problems), 'problem')}>"
+        )
 
     def to_csv(self, path: str | Path) -> Path:
         """Write the grid as a table, a row a point."""

@@ -19,8 +19,9 @@ from linkwork.errors import AssemblyError, InputError, LinkworkError, ParameterE
 from linkwork.parameters import field_name
 
 from ..mechanisms import InitialState, Parameters, mechanism_of
+from ..notebook import Shown, format_count
 from ..run import Inputs, driven, outputs_of, started, takes_published
-from ..units import Amount, in_si
+from ..units import RAD_S_PER_RPM, Amount, in_si
 from . import orbit_kernels
 from .drives import Drive, Torque, drive_of
 from .floquet import TOLERANCE, StabilityVerdict, liouville, multipliers, verdict
@@ -84,7 +85,7 @@ class OrbitAssemblyError(OrbitError, AssemblyError):
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class PeriodicOrbit:
+class PeriodicOrbit(Shown):
     """A periodic motion of the full nonlinear plant.
 
     Attributes
@@ -117,6 +118,17 @@ class PeriodicOrbit:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "multipliers", multipliers(self.monodromy))
+
+    def __repr__(self) -> str:
+        try:
+            turn, unit = self.turn(), self.swing[1]
+            speed = self.flow.period * self.turns / turn.period
+            said = f" at {speed:.4g} rad/s ({speed / RAD_S_PER_RPM:.4g} rpm), {self.verdict().stability.value}"
+            swing = f"; amplitude of {turn.swing} {turn.amplitude:.4g} {unit}"
+        except LinkworkError as error:
+            said, swing = f" that cannot be followed ({error})", ""
+        turns = format_count(self.turns, "turn")
+        return f"<PeriodicOrbit: {turns}{said}, largest Floquet multiplier {self.largest:.4g}{swing}>"
 
     @property
     def flow(self) -> Flow:

@@ -20,10 +20,11 @@ from linkwork.errors import InputError, Interrupted
 
 from ..files import write_csv
 from ..mechanisms import Parameters, mechanism_of
+from ..notebook import Shown, format_count
 from ..numerics.continuation import ContinuationError
 from ..run import interruptible, shown, takes_published
 from ..units import Amount, si
-from .branches import Branch, Family, SpecialPoint, follow, switch
+from .branches import Branch, Family, SpecialPoint, describe, follow, switch
 from .drives import Drive, published_drive
 from .floquet import Crossing, Stability
 from .orbits import OrbitError, PeriodicOrbit, orbit_of, scale_of
@@ -55,7 +56,7 @@ class Extremum:
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Response:
+class Response(Shown):
     """The periodic motions over a range of one parameter.
 
     Attributes
@@ -73,6 +74,10 @@ class Response:
     low: float
     high: float
     problems: tuple[str, ...]
+
+    def __repr__(self) -> str:
+        parts = f"{format_count(len(self.branches), 'branch')}, {format_count(len(self.problems), 'problem')}"
+        return f"<Response: {describe(self.branches)}; {parts}>"
 
     @property
     def family(self) -> Family:

@@ -276,6 +276,13 @@ class Comparison:
         """Whether every output is within the tolerance."""
         return self.worst.relative <= self.tolerance
 
+    def __repr__(self) -> str:
+        worst, word = self.worst, "agree" if self.agrees else "differ"
+        return (
+            f"<Comparison: the runs {word} at a tolerance of {self.tolerance:g}; the largest relative difference is "
+            f"{worst.relative:.2g}, of {worst.name}>"
+        )
+
     def __getitem__(self, name: str) -> OutputDifference:
         for difference in self.differences:
             if difference.name == name:

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from linkwork.errors import InputError, LinkworkError
 
 from ..mechanisms import MECHANISMS, InitialState, Parameters, mechanism_of
+from ..notebook import format_count
 from ..units import Amount, in_si
 from .arguments import driven, started, takes_published
 from .inputs import Inputs, compiled_source, given
@@ -55,6 +56,12 @@ class Ensemble:
     parameters: tuple[Parameters, ...]
     modes: NDArray[np.float64]
     energies: NDArray[np.float64]
+
+    def __repr__(self) -> str:
+        early = int(np.count_nonzero(self.status))
+        over = f"{len(self.time)} samples from {self.time[0]:.4g} to {self.time[-1]:.4g} s"
+        ended = "all complete" if not early else f"{early} of them ended early, as messages says"
+        return f"<Ensemble: {format_count(len(self), 'run')} of {over}, {ended}>"
 
     def __len__(self) -> int:
         return len(self.parameters)

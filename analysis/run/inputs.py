@@ -169,6 +169,8 @@ def _check_channel(name: str, value: Any) -> None:
             raise InputError(
                 f"{name} is {part!r}: it must be a number, a signal of analysis.run.signals, or a Function"
             )
+        if isinstance(part, (Piecewise, Harmonics)) and part.unit not in ("", _units(name)):
+            raise InputError(f"{name} is a signal in {part.unit}: it must be in {_units(name)}")
         if isinstance(part, _NUMBER) and not np.isfinite(part):
             raise InputError(f"{name} is {part}: it must be a finite number")
     for kind in (TorsionBar, InductionMotor, Function):

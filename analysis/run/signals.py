@@ -4,16 +4,34 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from linkwork.errors import InputError
+from linkwork.errors import InputError, ParameterError
 
-from ..units import Amount, in_si
+from ..mechanisms import MECHANISMS, variable_units
+from ..units import Amount, in_si, si
 
 #: A function of time, all coordinates and all their rates, floats.
 StateFunction = Callable[..., float]
+
+
+def _in_si(values: Any, what: str) -> tuple[Any, str]:
+    """Values of a signal in SI and, where there are texts among them, the unit of the inputs that they fit."""
+    if not any(isinstance(value, str) for value in (values if isinstance(values, (list, tuple)) else (values,))):
+        return values, ""
+    known = variable_units()
+    units = dict.fromkeys(known[c.name] for m in MECHANISMS.values() for c in m.channels if c.kind != "rate")
+    for unit in units:
+        try:
+            return si(values, unit, what), unit
+        except ParameterError:
+            continue
+    raise InputError(
+        f"{what} of a signal: {values!r}: it must be numbers, or texts with a unit such as {', '.join(units)}"
+    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,6 +44,8 @@ class Piecewise:
         Times (s), increasing. Before the first and after the last the outer polynomials go on.
     coefficients : ndarray, shape (n, 4)
         Of the powers 0 to 3 of the time since the break on the left.
+    unit : str
+        SI unit, where it is known because texts made the signal: it then fits inputs of that unit alone.
 
     Notes
     -----
@@ -34,6 +54,7 @@ class Piecewise:
 
     breaks: NDArray[np.float64]
     coefficients: NDArray[np.float64]
+    unit: str = ""
 
     def __post_init__(self) -> None:
         for name in ("breaks", "coefficients"):
@@ -53,16 +74,27 @@ class Piecewise:
             raise InputError(f"a signal's times must increase: they are {self.breaks}")
 
 
+@in_si(frequencies="rad/s", phases="rad")
 @dataclass(frozen=True, slots=True)
 class Harmonics:
-    """mean + sum of amplitude cos(frequency t + phase); frequencies in rad/s, phases in rad, shapes (n,)."""
+    """mean + sum of amplitude cos(frequency t + phase); frequencies in rad/s, phases in rad, shapes (n,).
 
-    mean: float = 0.0
-    amplitudes: Sequence[float] = ()
-    frequencies: Sequence[float] = ()
-    phases: Sequence[float] = ()
+    All may be texts with a unit; ``unit`` is then that of mean and amplitudes, see `Piecewise`.
+    """
+
+    mean: Amount = 0.0
+    amplitudes: Sequence[Amount] = ()
+    frequencies: Sequence[Amount] = ()
+    phases: Sequence[Amount] = ()
+    unit: str = ""
 
     def __post_init__(self) -> None:
+        (mean, *amplitudes), unit = _in_si(
+            [self.mean, *np.ravel(np.array(self.amplitudes, object))], "mean and amplitudes"
+        )
+        if unit:
+            for name, value in (("mean", mean), ("amplitudes", amplitudes), ("unit", unit)):
+                object.__setattr__(self, name, value)
         if any(np.ndim(values) != 1 for values in (self.amplitudes, self.frequencies, self.phases)):
             raise InputError("amplitudes, frequencies and phases of harmonics must be lists of numbers")
         if not len(self.amplitudes) == len(self.frequencies) == len(self.phases):
@@ -144,22 +176,25 @@ Signal = float | Piecewise | Harmonics | Function
 Torque = Signal | TorsionBar | InductionMotor
 
 
-def ramp(start: float, end: float, from_time: float, to_time: float) -> Piecewise:
-    """A signal that goes from ``start`` to ``end`` along a straight line between two times (s)."""
+@in_si(from_time="s", to_time="s")
+def ramp(start: Amount, end: Amount, from_time: Amount, to_time: Amount) -> Piecewise:
+    """A signal that goes along a straight line between two times (s), such as ``ramp(0.0, "420 rpm", 0.0, "1 s")``."""
     if not to_time > from_time:
         raise InputError(f"a ramp from {from_time} s to {to_time} s: it must end after it begins")
     return table([from_time - 1.0, from_time, to_time, to_time + 1.0], [start, start, end, end])
 
 
+@in_si(times="s")
 def steps(times: ArrayLike, values: ArrayLike) -> Piecewise:
     """A signal with the value ``values[i]`` from ``times[i]`` on; shapes (n,) and (n,)."""
-    t, y = _points(times, values, least=1)
+    t, y, unit = _points(times, values, least=1)
     breaks = np.append(t, t[-1] + 1.0)
     coefficients = np.zeros((len(t), 4))
     coefficients[:, 0] = y
-    return Piecewise(breaks, coefficients)
+    return Piecewise(breaks, coefficients, unit)
 
 
+@in_si(times="s")
 def table(times: ArrayLike, values: ArrayLike, kind: str = "linear") -> Piecewise:
     """A signal through the points (times, values), shapes (n,): ``linear``, ``cubic`` (spline) or ``hold``.
 
@@ -167,7 +202,7 @@ def table(times: ArrayLike, values: ArrayLike, kind: str = "linear") -> Piecewis
     """
     if kind == "hold":
         return steps(times, values)
-    t, y = _points(times, values, least=2)
+    t, y, unit = _points(times, values, least=2)
     if kind == "linear":
         slopes = np.diff(y) / np.diff(t)
         inner = np.column_stack([y[:-1], slopes, np.zeros_like(slopes), np.zeros_like(slopes)])
@@ -181,11 +216,12 @@ def table(times: ArrayLike, values: ArrayLike, kind: str = "linear") -> Piecewis
     flat[0, 0] = y[0]
     end = np.zeros((1, 4))
     end[0, 0] = y[-1]
-    return Piecewise(np.concatenate([[t[0] - 1.0], t, [t[-1] + 1.0]]), np.vstack([flat, inner, end]))
+    return Piecewise(np.concatenate([[t[0] - 1.0], t, [t[-1] + 1.0]]), np.vstack([flat, inner, end]), unit)
 
 
-def _points(times: ArrayLike, values: ArrayLike, least: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _points(times: ArrayLike, values: ArrayLike, least: int) -> tuple[NDArray[np.float64], NDArray[np.float64], str]:
     t = np.asarray(times, dtype=float)
+    values, unit = _in_si(values, "values")
     y = np.asarray(values, dtype=float)
     if t.ndim != 1 or t.shape != y.shape:
         raise InputError(f"a table needs as many times as values in one dimension each, not {t.shape} and {y.shape}")
@@ -193,4 +229,4 @@ def _points(times: ArrayLike, values: ArrayLike, least: int) -> tuple[NDArray[np
         raise InputError(f"a table needs at least {least} points, not {len(t)}")
     if np.any(np.diff(t) <= 0.0):
         raise InputError(f"a table's times must increase: they are {t}")
-    return t, y
+    return t, y, unit

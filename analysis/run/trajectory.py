@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 
 from linkwork.errors import InputError
 
-from ..mechanisms import Parameters, output_units
+from ..mechanisms import MECHANISMS, Parameters, output_units
+from ..notebook import Shown, format_count, format_range
 
 if TYPE_CHECKING:
     import pandas
@@ -32,7 +33,7 @@ class Occurrence:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Trajectory:
+class Trajectory(Shown):
     """A run: times, outputs, how it ended, and how it was computed.
 
     Attributes
@@ -77,6 +78,14 @@ class Trajectory:
                 f"a run with {len(self.time)} times and {len(self.names)} outputs needs values of that shape, not "
                 f"{self.values.shape}"
             )
+
+    def __repr__(self) -> str:
+        over = f" from {self.time[0]:.4g} to {self.time[-1]:.4g} s" if len(self) else ""
+        ended = f"ended early, {self.message}" if self.status else "complete"
+        happened = f", {format_count(len(self.events), 'event')}" if self.events else ""
+        moving = dict.fromkeys(n for m in MECHANISMS.values() for f in m.freedoms for n in (f.coordinate, f.rate))
+        ranges = [f"{name} {format_range(self[name], self.units[name])}" for name in moving if name in self.names]
+        return f"<Trajectory: {len(self)} samples{over} by {self.source or 'hand'}, {ended}{happened}; {', '.join(ranges)}>"
 
     def __getitem__(self, name: str) -> NDArray[np.float64]:
         return self.values[:, self.column(name)]

@@ -15,6 +15,7 @@ from linkwork.errors import InputError
 from linkwork.five_bar.parameters import FiveBarParameters
 
 from ..files import write_csv
+from ..notebook import Shown
 from .areas import area_between, distance_to, straightness
 from .kernels import PLACES
 from .linkage import Linkage, SecondCrank, wrapped
@@ -259,7 +260,7 @@ class StraightPart:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Solution:
+class Solution(Shown):
     """A linkage for a task.
 
     Attributes
@@ -274,6 +275,18 @@ class Solution:
     linkage: Linkage
     evaluation: Evaluation
     verdicts: Verdicts
+
+    def __repr__(self) -> str:
+        return f"<Solution of a {type(self.task).__name__}: {self.describe()}>"
+
+    def describe(self) -> str:
+        """Error and verdicts in one line."""
+        unit = "rad" if isinstance(self.task, RockerFunction) else "m"
+        found = self.evaluation
+        return (
+            f"error {self.error:.4g} {unit}2, rms {found.rms:.4g} {unit}, worst {found.worst:.4g} {unit}; largest link "
+            f"{self.linkage.largest_link:.4g} m; {self.verdicts}"
+        )
 
     @classmethod
     def of(cls, task: Task, linkage: Linkage, rotation: FloatArray | None = None) -> Solution:

@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from linkwork.errors import InputError, Interrupted
 
 from ..files import write_csv
+from ..notebook import Shown, format_count
 from ..units import Amount, in_si
 from .black_box import by_differential_evolution, by_simplex
 from .constraints import (
@@ -39,7 +40,7 @@ STATIONS = 144
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Synthesis:
+class Synthesis(Shown):
     """Ranked solutions of a task.
 
     Attributes
@@ -65,6 +66,14 @@ class Synthesis:
     starts: int
     seconds: float
     complete: bool = True
+
+    def __repr__(self) -> str:
+        count, stopped = format_count(len(self.solutions), "solution"), "" if self.complete else ", stopped early"
+        best = f"; the best: {self.best.describe()}" if self.solutions else ""
+        return (
+            f"<Synthesis: {count} of a {type(self.task).__name__} by {self.method}, {format_count(self.starts, 'start')}, "
+            f"{self.seconds:.3g} s{stopped}{best}>"
+        )
 
     @property
     def best(self) -> Solution:

@@ -4,11 +4,46 @@ from __future__ import annotations
 
 import doctest
 import inspect
+import pickle
+import re
+from base64 import b64decode
+from collections.abc import Callable
+from dataclasses import asdict, replace
+from io import BytesIO
+from math import pi
 from pathlib import Path
 
+import numpy as np
 import pytest
+from PIL import Image
 
 import analysis
+from analysis import (
+    PUBLISHED,
+    Drive,
+    FiveBarParameters,
+    Harmonics,
+    Inputs,
+    Tolerance,
+    TorsionBar,
+    Trajectory,
+    figures,
+    find_orbit,
+    force_turn,
+    frequency_response,
+    ramp,
+    simulate,
+    simulate_many,
+    stability_chart,
+    steps,
+    synthesis,
+    synthesize,
+    table,
+    variant,
+)
+from analysis.notebook import format_count
+from analysis.run import published_case
+from linkwork.errors import InputError, MissingParameterError, ParameterError, UnknownNameError
 
 FUNCTIONS = [name for name in dir(analysis) if inspect.isfunction(getattr(analysis, name))]
 #: Constructors of signals, whose sentence is example enough.
@@ -34,3 +69,214 @@ def test_the_example_of_cosimulate_runs(fmu: Path, tmp_path: Path, monkeypatch: 
 
 def test_the_example_of_the_package_runs() -> None:
     assert doctest.testmod(analysis).failed == 0
+
+
+# Quantities as text and published sets
+
+
+def same(one: Trajectory, other: Trajectory) -> None:
+    np.testing.assert_array_equal(one.time, other.time)
+    np.testing.assert_array_equal(one.values, other.values)
+
+
+def test_a_published_set_brings_its_start_its_speed_and_three_turns() -> None:
+    table, case = PUBLISHED["table-3.1"], published_case("table-3.1")
+    run = simulate("table-3.1")
+    same(run, simulate(table))
+    same(run, simulate(case.parameters, case.inputs, initial=case.initial, stop_time=case.stop_time, step=case.step))
+    # what is given takes the place of the set's, and only of that
+    braked = simulate(table, Inputs(torque="-1 N.m"), stop_time="20 ms")
+    assert braked["crank.speed"][0] == pytest.approx(44.0, abs=0.1)
+    assert braked["crank.speed"][-1] < 43.9
+    pushed = simulate(table, Inputs(force="20 N"), initial={"slider_position": "1 mm"}, stop_time="20 ms")
+    assert np.ptp(pushed["crank.speed"]) < 1e-9
+    assert pushed["slider.position"][0] == pytest.approx(1e-3)
+
+
+def test_a_set_of_the_slider_crank_brings_its_shift() -> None:
+    name = "rahman-a4-10-s1-3.5"
+    shift = PUBLISHED[name].initial.shift_position
+    assert simulate(name, stop_time="10 ms")["shift.position"] == pytest.approx(shift)
+    assert find_orbit(name, Inputs(torque="100 N.m"), start=[50.0]).drive.held == {"shift.position": shift}
+    turn = force_turn(name, angles=["45 deg"], load="-20 lbf")
+    assert (turn.shift[0], turn.speed[0]) == pytest.approx((shift, PUBLISHED[name].crank_speed))
+
+
+def test_many_runs_of_sets_and_parameters() -> None:
+    soft = variant("table-3.1", slider_stiffness="0.8e6 dyn/cm")
+    runs = simulate_many([soft, "table-3.1"], stop_time="0.05 s", step="1 ms")
+    for run, name in zip((runs[0], runs[1]), (soft, "table-3.1")):
+        np.testing.assert_allclose(
+            run["slider.position"], simulate(name, stop_time=0.05)["slider.position"], rtol=1e-9, atol=1e-15
+        )
+
+
+@pytest.mark.parametrize(
+    ("text", "number"),
+    [
+        (lambda: Inputs(speed="420 rpm").speed, 14.0 * pi),
+        (lambda: Inputs(torque=(1.0, "10 lbf.in")).torque[1], 10 * 4.4482216152605 * 0.0254),
+        (lambda: Drive(speed="60 rpm", forces={"slider.force": "1 kN"}).forces["slider.force"], 1000.0),
+        (lambda: TorsionBar(torque="10 N.cm").torque, 0.1),
+        (lambda: ramp(0.0, 1.0, "1 ms", "3 ms").breaks[3], 0.003),
+        (lambda: ramp("0 rpm", "420 rpm", 0.0, "1 s").coefficients[-1, 0], 14.0 * pi),
+        (lambda: steps(["0 s", "1 ms"], [0.0, "2 lbf"]).coefficients[1, 0], 2 * 4.4482216152605),
+        (lambda: Harmonics("1 kN", ["2 N"], ["60 rpm"], ["180 deg"]).frequencies[0], 2.0 * pi),
+        (lambda: Harmonics("1 kN", ["2 N"], ["60 rpm"], ["180 deg"]).mean, 1000.0),
+        (lambda: variant("table-3.1", crank_inertia="12500 g.cm2").parameters.crank_inertia, 1.25e-3),
+        (lambda: find_orbit("table-3.1", speed="300 rpm").drive.speed, 10.0 * pi),
+        (lambda: Tolerance("guide.twist", half_width="0.5 deg").half_width, pi / 360.0),
+        (lambda: synthesis.LargestLink(length="5 in").length, 0.127),
+        (lambda: synthesis.SliderUnknown(harmonics=1, stroke="5 cm", position=("-1 cm", "2 cm")).position[0], -0.01),
+        (lambda: simulate("table-3.1", samples=["0 s", "5 ms"]).time[1], 0.005),
+    ],
+)
+def test_a_quantity_may_be_a_text_with_its_unit(text: Callable[[], float], number: float) -> None:
+    assert text() == pytest.approx(number, rel=1e-12)
+
+
+def test_a_range_is_in_the_unit_of_what_varies() -> None:
+    damped = frequency_response("table-3.1", "2e4 dyn.s/cm", "25 N.s/m", vary="slider.damping", doubled=False)
+    assert (damped.low, damped.high) == pytest.approx((20.0, 25.0))
+    assert damped.branches[0].orbits[0].drive.speed == pytest.approx(14.0 * pi)
+
+
+@pytest.mark.parametrize(
+    ("ask", "kind", "said"),
+    [
+        (
+            lambda: simulate("table-3.1", stop_time="5 kg"),
+            ParameterError,
+            "stop_time is '5 kg': it must be a number in s",
+        ),
+        (lambda: simulate("table-3.1", stop_time="0.5"), ParameterError, "such as '0.5 s'"),
+        (lambda: simulate("table-3.2"), UnknownNameError, "set 'table-3.2'; did you mean table-3.1"),
+        (lambda: simulate("table-3.1", Inputs(torque=1.0)), InputError, "stop_time is missing"),
+        (lambda: simulate(PUBLISHED["table-3.1"].parameters), InputError, "stop_time is missing"),
+        (lambda: simulate("table-3.1", initial={"sped": 1.0}), UnknownNameError, "did you mean initial.crank_speed"),
+        (lambda: Inputs(speed="420 N"), InputError, "speed is '420 N': it must be a number in rad/s"),
+        (lambda: Inputs(force=ramp("0 rpm", "9 rpm", 0, 1)), InputError, "force is a signal in rad/s: it must be in N"),
+        (lambda: Inputs(speed=Harmonics("1 N")), InputError, "speed is a signal in N: it must be in rad/s"),
+        (lambda: table([0.0, 1.0], ["1 kg", 2.0]), InputError, "values of a signal"),
+        (lambda: ramp(0.0, 1.0, "0 s", "1 m"), ParameterError, "to_time is '1 m'"),
+        (lambda: Inputs(speed="7 Hz"), InputError, "rad/s or rpm"),
+        (lambda: find_orbit("table-3.1", speed="1 m/s"), ParameterError, "speed is '1 m/s'"),
+        (lambda: frequency_response("table-3.1", "1 N", "2 rpm"), ParameterError, "low is '1 N'"),
+        (lambda: stability_chart("table-3.1", ranges=((1, "2 m"), (1, 2))), ParameterError, "drive.speed is '2 m'"),
+        (lambda: stability_chart(PUBLISHED["table-3.1"].parameters), InputError, "give a drive"),
+        (lambda: variant("table-3.1", slider_stifness=1.0), UnknownNameError, "did you mean slider_stiffness"),
+        (lambda: variant("table-3.1", slider_stiffness="3 kg"), ParameterError, "slider_stiffness is '3 kg'"),
+        (lambda: variant(FiveBarParameters, ground_length="1 m"), MissingParameterError, "is missing, and so are"),
+        (lambda: variant(dict), InputError, "dict has no variants"),
+        (lambda: force_turn("rahman-ideal", torque="3 N"), ParameterError, "torque is '3 N'"),
+        (lambda: Tolerance("rod.length", half_width="1 deg"), ParameterError, "half width of rod.length is '1 deg'"),
+    ],
+)
+def test_what_is_no_such_quantity_is_refused_by_its_name(
+    ask: Callable[[], object], kind: type[Exception], said: str
+) -> None:
+    with pytest.raises(kind, match=said):
+        ask()
+
+
+def test_a_variant_keeps_what_it_is_of() -> None:
+    table = PUBLISHED["table-3.1"]
+    assert variant("table-3.1") == table
+    changed = variant(table, slider_mass=0.6)
+    assert changed == table._replace(
+        parameters=replace(table.parameters, slider_mass=0.6), source=f"{table.source}, changed"
+    )
+    assert variant(table.parameters, slider_mass="600 g") == changed.parameters
+    assert variant(FiveBarParameters, **asdict(table.parameters)) == table.parameters
+
+
+def test_replace_and_pickle_of_what_takes_texts() -> None:
+    link = synthesis.LargestLink(length="5 cm")
+    assert pickle.loads(pickle.dumps(link)) == link
+    assert replace(link, length="6 cm").length == pytest.approx(0.06)
+
+
+# What a REPL and a notebook show
+
+
+def picture_in(html: str) -> tuple[int, int]:
+    """Size of the picture in an HTML text, in pixels."""
+    data = re.search(r'src="data:image/png;base64,([^"]+)"', html)
+    assert data
+    with Image.open(BytesIO(b64decode(data[1]))) as image:
+        assert len(np.unique(np.array(image.convert("L")))) > 10
+        return image.size
+
+
+def test_a_run_says_what_it_is_and_how_it_ended() -> None:
+    run = simulate("table-3.1")
+    assert repr(run).startswith(
+        "<Trajectory: 1081 samples from 0 to 0.4286 s by compiled DOP853, complete; crank.angle 0 to "
+    )
+    assert "slider.position -0.01071 to 0.005715 m" in repr(run)
+    lost = simulate("table-3.1", Inputs(force="-2 kN"), stop_time="1 s")
+    assert "ended early, limit of assembly at t = 0.0" in repr(lost)
+    assert "&lt;Trajectory: 1081" in run._repr_html_()
+    assert min(picture_in(run._repr_html_())) > 200
+    assert "complete" in repr(simulate("table-3.1", stop_time=1e-3, step=1e-3))
+
+
+def test_other_results_say_what_they_are() -> None:
+    orbit = find_orbit("table-3.1")
+    assert repr(orbit) == (
+        "<PeriodicOrbit: 1 turn at 43.98 rad/s (420 rpm), stable, largest Floquet multiplier "
+        f"{orbit.largest:.4g}; amplitude of slider.position {orbit.amplitude:.4g} m>"
+    )
+    response = frequency_response("rig-2-spring-c", "500 rpm", "650 rpm", doubled=False)
+    best = max(response.maxima(), key=lambda e: e.amplitude)
+    assert f"greatest amplitude of slider.position {best.amplitude:.4g} m" in repr(response)
+    assert repr(response).endswith(" rpm); 1 branch, no problems>")
+    chart = stability_chart("rig-2-spring-c", ranges=(("550 rpm", "560 rpm"), ("50 N.s/m", "60 N.s/m")), points=3)
+    assert repr(chart).startswith(
+        "<StabilityChart: drive.speed 550 to 560 rpm by slider.damping 50 to 60 N.s/m, 3 x 3 points, 0.0%"
+    )
+    for result in (orbit, response, response.branches[0], chart):
+        assert len(repr(result)) < 400
+        assert min(picture_in(result._repr_html_())) > 200
+    runs = simulate_many(["table-3.1"] * 2, Inputs(force=-2e3), stop_time="1 s")
+    assert repr(runs) == ("<Ensemble: 2 runs of 1001 samples from 0 to 1 s, 2 of them ended early, as messages says>")
+
+
+def test_solutions_say_what_they_are() -> None:
+    phi = synthesis.turn(24)
+    ellipse = np.column_stack([0.2 + 0.1 * np.cos(phi), 0.15 + 0.05 * np.sin(phi)])
+    found = synthesize(synthesis.TimedPath(points=ellipse), search=synthesis.Search(starts=2))
+    best = found.best
+    assert f"error {best.error:.4g} m2" in repr(best)
+    assert re.match(
+        r"<Synthesis: \d solutions? of a TimedPath by scan, \d+ starts, \S+ s; the best: error", repr(found)
+    )
+    for result in (found, best):
+        assert len(repr(result)) < 400
+        assert min(picture_in(result._repr_html_())) > 200
+
+
+def test_a_picture_of_a_periodic_motion() -> None:
+    fixed, free = find_orbit("table-3.1"), find_orbit("table-3.1", torque=0.5, start=[0.0, 0.0, 44.0])
+    labels = [axis.get_ylabel() for axis in figures.plot(fixed).axes]
+    assert labels == ["slider.position [mm]", "drive.applied_torque [N.m]", "slider.velocity [m/s]", "imaginary part"]
+    assert "crank.speed [rpm]" in [axis.get_ylabel() for axis in figures.plot(free).axes]
+    angle, plane, multipliers = (figures.plot(fixed, title="an orbit").axes[n] for n in (0, 2, 3))
+    x, y = angle.lines[0].get_data()
+    assert (x[0], x[-1], y[-1]) == (0.0, pytest.approx(360.0), y[0])
+    assert np.ptp(y) == pytest.approx(2e3 * fixed.amplitude, rel=1e-3)
+    assert plane.lines[1].get_xdata()[0] == pytest.approx(1e3 * fixed.start[0])
+    assert sorted(multipliers.lines[1].get_xdata()) == sorted(fixed.multipliers.real)
+
+
+@pytest.mark.parametrize(
+    ("count", "what", "words"),
+    [
+        (1, "branch", "1 branch"),
+        (2, "branch", "2 branches"),
+        (0, "problem", "no problems"),
+        (3, "boundary", "3 boundaries"),
+    ],
+)
+def test_counts_in_words(count: int, what: str, words: str) -> None:
+    assert format_count(count, what) == words

@@ -1,0 +1,86 @@
+"""A periodic motion: what moves over a period, the torque that it takes, and its Floquet multipliers."""
+
+from __future__ import annotations
+
+from math import degrees
+
+import numpy as np
+
+from ..mechanisms import mechanism_of
+from ..periodic import PeriodicOrbit
+from ..units import RAD_S_PER_RPM
+from .curves import Curve, Panel, plot_curves
+from .dispatch import plot
+from .style import Figure
+
+#: Samples of a period.
+_SAMPLES = 512
+#: Factor and name of the unit in which an output is drawn, by its unit in SI; the others are drawn in SI.
+_DRAWN = {"m": (1e3, "mm"), "rad": (degrees(1.0), "deg"), "rad/s": (1.0 / RAD_S_PER_RPM, "rpm")}
+
+
+@plot.register
+def plot_orbit(orbit: PeriodicOrbit, *, title: str = "") -> Figure:
+    """A periodic motion over the crank angle, in a plane of displacement and velocity, and its multipliers.
+
+    The curves over the angle are of the coordinates that are free beside the crank, the crank's speed where it varies, and
+    the torque that drives it.
+
+    Parameters
+    ----------
+    orbit : PeriodicOrbit
+    title : str
+        By default the speed, the period and the stability.
+    """
+    turn, mechanism = orbit.turn(_SAMPLES), mechanism_of(orbit.parameters)
+    units = {v.name: v.unit for v in mechanism.variables}
+    rates = {freedom.coordinate: freedom.rate for freedom in mechanism.freedoms}
+    free = [mechanism.freedoms[n] for n in orbit.flow.free]
+    crank = mechanism.freedoms[orbit.flow.crank]
+    names = [freedom.coordinate for freedom in free]
+    if not orbit.drive.speed_drive:
+        names.append(crank.rate)
+    if "drive.applied_torque" in turn.names:
+        names.append("drive.applied_torque")
+
+    def closed(name: str) -> tuple[np.ndarray, str]:
+        """An output over the period, its first value once more at the end, as it is drawn, and its label."""
+        factor, unit = _DRAWN.get(units[name], (1.0, units[name]))
+        return factor * np.append(turn[name], turn[name][0]), f"{name} [{unit}]"
+
+    angle = np.degrees(np.append(turn.angle, orbit.flow.period * orbit.turns))
+    ticks = np.linspace(0.0, angle[-1], 5).tolist()
+    panels = []
+    for name in names:
+        values, label = closed(name)
+        panels.append(
+            Panel(x_label="crank angle [deg]", y_label=label, curves=[Curve(x=angle, y=values)], x_ticks=ticks)
+        )
+    if free:
+        (x, x_label), (y, y_label) = closed(turn.swing), closed(rates[turn.swing])
+        begin = Curve(x=x[:1], y=y[:1], line="", marker="o")
+        caption = "point at the crank angle 0"
+        panels.append(Panel(x_label=x_label, y_label=y_label, curves=[Curve(x=x, y=y), begin], title=caption))
+    panels.append(_multipliers(orbit))
+    return plot_curves(panels, title=title or _title(orbit, turn.period), columns=2, size=(4.4, 2.9))
+
+
+def _multipliers(orbit: PeriodicOrbit) -> Panel:
+    """Floquet multipliers and the unit circle, outside of which deviations grow."""
+    circle = np.exp(1j * np.linspace(0.0, 2.0 * np.pi, 181))
+    return Panel(
+        x_label="real part",
+        y_label="imaginary part",
+        curves=[
+            Curve(x=circle.real, y=circle.imag, colour="0.5", line="--"),
+            Curve(x=orbit.multipliers.real, y=orbit.multipliers.imag, line="", marker="x"),
+        ],
+        title="Floquet multipliers, stable inside the circle",
+        equal=True,
+    )
+
+
+def _title(orbit: PeriodicOrbit, period: float) -> str:
+    speed = orbit.flow.period * orbit.turns / period
+    turns = "one turn" if orbit.turns == 1 else f"{orbit.turns} turns"
+    return f"Periodic motion of {turns} at {speed / RAD_S_PER_RPM:.5g} rpm, {orbit.verdict().stability.value}"
