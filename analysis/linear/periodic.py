@@ -17,6 +17,7 @@ from linkwork.mechanism import Mechanism
 from ..mechanisms import InitialState, Parameters, mechanism_of
 from ..numerics.fourier import trigonometric
 from ..run import Inputs, driven, given, simulate, started, takes_published
+from ..units import Amount, in_si
 from .model import (
     FloatArray,
     LinearModel,
@@ -187,12 +188,14 @@ class PeriodicModel(Matrices):
         return matrix
 
 
+@takes_published()
+@in_si(period="s")
 def linearise_along(
     parameters: Parameters,
     motion: ArrayLike | Orbit,
     inputs: Inputs | None = None,
     *,
-    period: float | None = None,
+    period: Amount = None,
     samples: int = 128,
 ) -> PeriodicModel:
     """Linear models along a periodic motion.

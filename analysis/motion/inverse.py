@@ -26,7 +26,8 @@ from linkwork.five_bar.variables import OUTPUT_NAMES
 
 from ..mechanisms import FIVE_BAR, output_units
 from ..numerics.fourier import FourierSeries
-from ..run import outputs_of
+from ..run import at_its_speed, outputs_of, takes_published
+from ..units import Amount, in_si
 
 FloatArray = NDArray[np.float64]
 #: Force at P (N, N): constant, or a function of the crank angle (rad).
@@ -215,10 +216,12 @@ def slider_force(
     return dynamics.inertia(g, k, p).m22 * acceleration + b2 - q2
 
 
+@takes_published(crank_speed=at_its_speed)
+@in_si(crank_speed="rad/s")
 def inverse_dynamics(
     parameters: FiveBarParameters,
     slider: FourierSeries,
-    crank_speed: float,
+    crank_speed: Amount,
     *,
     load: Load = (0.0, 0.0),
     samples: int = 720,
@@ -353,12 +356,14 @@ class BestSpring:
     rms_force_without: float
 
 
+@takes_published(crank_speed=at_its_speed)
+@in_si(crank_speed="rad/s", free_position="m")
 def best_spring(
     parameters: FiveBarParameters,
     slider: FourierSeries,
-    crank_speed: float,
+    crank_speed: Amount,
     *,
-    free_position: tuple[float, float] | None = None,
+    free_position: Amount = None,
     load: Load = (0.0, 0.0),
     samples: int = 720,
 ) -> BestSpring:

@@ -29,7 +29,8 @@ from linkwork.errors import InputError
 from linkwork.five_bar.parameters import FiveBarParameters, InitialState
 
 from ..numerics.fourier import FourierSeries
-from ..run import Inputs, simulate, table
+from ..run import Inputs, at_its_speed, simulate, table, takes_published
+from ..units import Amount, in_si
 from .collocation import Collocation, Effort, EffortError, Mesh, MotionLimits, Problem, Range, Transcribed
 from .inverse import FloatArray, Load, load_at
 
@@ -112,9 +113,11 @@ class LeastEffort:
         return InitialState(crank_speed=self.crank_speed, slider_position=float(u), slider_velocity=float(v))
 
 
+@takes_published(crank_speed=at_its_speed)
+@in_si(crank_speed="rad/s")
 def least_effort(
     parameters: FiveBarParameters,
-    crank_speed: float,
+    crank_speed: Amount,
     target: Target,
     bound: float,
     *,

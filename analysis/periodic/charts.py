@@ -453,6 +453,7 @@ def _passes(boundary: Traced, kind: Crossing, place: tuple[float, float], box: B
     return float(np.hypot(*(s[:-1] + along[:, None] * pieces).T).min()) < SAME
 
 
+@takes_published()
 def default_range(parameters: Parameters, drive: Drive, name: str) -> tuple[float, float]:
     """Range of an axis where none is given: speeds about the natural frequency, others about the value there is.
 

@@ -15,7 +15,7 @@ from linkwork.errors import InputError, UnknownNameError
 from linkwork.mechanism import Channel, Mechanism, Mode, PublishedSet
 
 from ..mechanisms import InitialState, Parameters, mechanism_of, variable_units
-from ..run import InductionMotor, Inputs, driven
+from ..run import InductionMotor, Inputs, driven, started, takes_published
 from ..run.inputs import given
 from ..units import Amount, in_si
 from .flows import Flow, crank_of, flow
@@ -211,13 +211,15 @@ def published_drive(known: PublishedSet, drive: Drive | None) -> Drive:
     return drive or drive_of(known.parameters, driven(known, None), known.initial)
 
 
+@takes_published(inputs=driven, initial=started)
+@in_si(speed="rad/s", torque="N.m")
 def drive_of(
     parameters: Parameters,
     inputs: Inputs | None = None,
     initial: InitialState | None = None,
     *,
-    speed: float | None = None,
-    torque: Torque | None = None,
+    speed: Amount = None,
+    torque: Amount = None,
 ) -> Drive:
     """The drive of an orbit under the inputs of a run, which must not vary in time.
 

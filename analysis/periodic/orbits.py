@@ -306,6 +306,7 @@ def find_orbit(
     return orbit_of(parameters, drive, turns=turns, start=start, settle=settle)
 
 
+@takes_published()
 def orbit_of(
     parameters: Parameters,
     drive: Drive,

@@ -12,6 +12,7 @@ from linkwork.mechanism import Mechanism
 from linkwork.parameters import field_name
 
 from ..mechanisms import Parameters, mechanism_of
+from ..run import takes_published
 from ..units import RAD_S_PER_RPM
 from .drives import Drive, forces_of, require_acting
 from .flows import crank_of
@@ -102,6 +103,7 @@ def with_values(parameters: Parameters, drive: Drive, values: Mapping[str, float
     )
 
 
+@takes_published()
 def plane(parameters: Parameters, drive: Drive, x: str, y: str) -> Plane:
     """The plane of two parameters; all else stays as it is.
 

@@ -23,7 +23,7 @@ from linkwork.errors import InputError, LinkworkError
 
 from ..mechanisms import Parameters, mechanism_of
 from ..numerics.boundaries import Test, lowest
-from ..run import simulate
+from ..run import simulate, takes_published
 from .drives import Drive
 from .floquet import TOLERANCE, Crossing, Stability, StabilityVerdict, crossing_test
 from .grids import Grid
@@ -256,6 +256,7 @@ FEWEST_TURNS, MOST_TURNS = 1000, 20_000
 NOTABLE = 3.0
 
 
+@takes_published()
 def confirm(
     parameters: Parameters,
     drive: Drive,

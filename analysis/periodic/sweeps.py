@@ -11,6 +11,8 @@ from numpy.typing import ArrayLike, NDArray
 from linkwork.errors import InputError
 
 from ..mechanisms import Parameters, mechanism_of
+from ..run import takes_published
+from ..units import Amount, in_si
 from .drives import Drive
 from .floquet import Stability
 from .orbit_kernels import REASONS, Status
@@ -77,9 +79,11 @@ class Sweep:
         return np.array([0 if orbit is None else orbit.turns for orbit in self.orbits])
 
 
+@takes_published()
+@in_si(speeds="rad/s")
 def sweep(
     parameters: Parameters,
-    speeds: ArrayLike,
+    speeds: Amount,
     *,
     drive: Drive | None = None,
     start: ArrayLike | None = None,

@@ -98,6 +98,11 @@ def started(known: PublishedSet, initial: Any) -> Any:
     return known.initial if initial is None else initial
 
 
+def at_its_speed(known: PublishedSet, speed: Any) -> Any:
+    """The crank speed that is given, or else the set's (rad/s)."""
+    return known.crank_speed if speed is None else speed
+
+
 def turn_of(inputs: Inputs, mechanism: Mechanism) -> float | None:
     """Duration of a turn of the first freedom (s) where it turns at a constant speed."""
     command, period = command_of(mechanism), mechanism.freedoms[0].period

@@ -27,6 +27,8 @@ from linkwork.errors import AssemblyError, InputError, LinkworkError
 from linkwork.slider_crank.parameters import SliderCrankParameters
 
 from ..numerics.dual import Array, Dual, about_i, about_k, axial, origin, skew, stack
+from ..run import takes_published
+from ..units import Amount, in_si
 from .quantities import FloatArray
 
 #: Largest residual of a closed loop: rotation in radians, and length as a share of the links' lengths together.
@@ -127,7 +129,11 @@ def estimate(p: SliderCrankParameters, th: Array, s1: Array) -> tuple[FloatArray
     return about_k(-th).real @ guide.real @ rod, np.swapaxes(rod, -1, -2), beyond - pin[:, 2]
 
 
-def close(parameters: SliderCrankParameters, crank_angle: Any, shift: Any, start: Closure | None = None) -> Closure:
+@takes_published()
+@in_si(crank_angle="rad", shift="m")
+def close(
+    parameters: SliderCrankParameters, crank_angle: Amount, shift: Amount, start: Closure | None = None
+) -> Closure:
     """Close the loop at the given crank angles and shifts, each for itself, by Newton's method.
 
     Parameters
@@ -199,7 +205,9 @@ def close(parameters: SliderCrankParameters, crank_angle: Any, shift: Any, start
     )
 
 
-def follow(parameters: SliderCrankParameters, crank_angle: Any, shift: Any) -> Closure:
+@takes_published()
+@in_si(crank_angle="rad", shift="m")
+def follow(parameters: SliderCrankParameters, crank_angle: Amount, shift: Amount) -> Closure:
     """Close the loop by continuation: the first point from the planar estimate, every other from the one before it.
 
     The rod then turns from point to point without spin. The points must be close to each other, by 20 degrees or less.

@@ -28,6 +28,8 @@ from linkwork.slider_crank import kinematics
 from linkwork.slider_crank.assembly import check_assembly
 from linkwork.slider_crank.parameters import Constants, SliderCrankParameters
 
+from ..run import takes_published
+
 #: Width (rad) of a piece of the turn that is not divided further. Two zeros of one piece go unseen.
 FINEST = 1e-3
 #: Share of its scale below which a function is taken as zero, of no sign: a slider that rests does not turn back by rounding.
@@ -97,6 +99,7 @@ def constant_shift(shift: float) -> PeriodicShift:
     return PeriodicShift(at=lambda _: (shift, 0.0), rate=0.0, curvature=0.0)
 
 
+@takes_published()
 def groove_shift(parameters: SliderCrankParameters) -> PeriodicShift:
     """The law of the parameters' groove, S1 = SS1 sin(alpha theta1) of eq 28.
 
@@ -318,6 +321,7 @@ def _extremes(law: PeriodicShift, p: Constants) -> list[float]:
     return [zero.angle for zero in zeros] or [0.0]
 
 
+@takes_published()
 def assembly_margin(parameters: SliderCrankParameters, law: PeriodicShift) -> Margin:
     """The least margin of assembly over the turn, negative where the crank cannot turn fully, and where it is.
 
@@ -327,6 +331,7 @@ def assembly_margin(parameters: SliderCrankParameters, law: PeriodicShift) -> Ma
     return _margin(min, law, parameters.constants())
 
 
+@takes_published()
 def greatest_margin(parameters: SliderCrankParameters, law: PeriodicShift) -> Margin:
     """The greatest margin of assembly over the turn, negative where it can be assembled nowhere, and where it is."""
     return _margin(max, law, parameters.constants())
@@ -338,6 +343,7 @@ def _margin(choose: Callable[..., float], law: PeriodicShift, p: Constants) -> M
     return Margin(p.a2 - sqrt(p.a2 * p.a2 - _square(place, law, p)), _wrapped(place, law))
 
 
+@takes_published()
 def greatest_shift(parameters: SliderCrankParameters) -> float | None:
     """The greatest constant shift |S1| (m) at which the crank turns fully; None if there is none.
 
@@ -419,6 +425,7 @@ def _assembled(law: PeriodicShift, p: Constants) -> list[tuple[float, float]]:
     return sorted(zip(starts, ends), key=lambda pair: _wrapped(pair[0], law))
 
 
+@takes_published()
 def ranges(parameters: SliderCrankParameters, law: PeriodicShift) -> tuple[Range, ...]:
     """The ranges of crank angles in which the rod reaches the guide, each with its dead centres and its stroke.
 
@@ -430,6 +437,7 @@ def ranges(parameters: SliderCrankParameters, law: PeriodicShift) -> tuple[Range
     return tuple(_range(low, high, law, p) for low, high in _assembled(law, p))
 
 
+@takes_published()
 def assembled_ranges(parameters: SliderCrankParameters, law: PeriodicShift) -> tuple[Range, ...]:
     """The `ranges` of a mechanism that can be assembled.
 
@@ -450,6 +458,7 @@ def assembled_ranges(parameters: SliderCrankParameters, law: PeriodicShift) -> t
     return found
 
 
+@takes_published()
 def dead_centres(parameters: SliderCrankParameters, law: PeriodicShift) -> tuple[DeadCentre, ...]:
     """All configurations in which the slider turns back, in the order of their angles: dS4/dtheta1 = 0 along the law.
 
@@ -462,6 +471,7 @@ def dead_centres(parameters: SliderCrankParameters, law: PeriodicShift) -> tuple
     return tuple(sorted(centre for part in ranges(parameters, law) for centre in part.dead_centres))
 
 
+@takes_published()
 def singularities(parameters: SliderCrankParameters, law: PeriodicShift) -> tuple[DeadCentre, ...]:
     """The configurations along the law in which the crank's torque and the slider's force do not balance: kth = 0.
 

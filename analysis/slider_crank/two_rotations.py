@@ -19,7 +19,6 @@ put; it is here where the planar mechanism closes with the angles of section 2.6
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,6 +27,8 @@ from linkwork.slider_crank.parameters import SliderCrankParameters
 from linkwork.slider_crank.published import INCH
 
 from ..numerics.dual import Array, Dual, about_i, about_j, about_k, skew, stack
+from ..run import takes_published
+from ..units import Amount, in_si
 from .closure import close, points_of, residuals
 from .quantities import FloatArray
 
@@ -75,10 +76,12 @@ def planar(p: SliderCrankParameters, th: Array) -> FloatArray:
     return np.stack([rod - th, zero, -rod, zero, p.crank_length * np.sin(th) + beyond], -1)
 
 
+@takes_published()
+@in_si(crank_angle="rad", shift="m")
 def settle(
     parameters: SliderCrankParameters,
-    crank_angle: Any,
-    shift: Any,
+    crank_angle: Amount,
+    shift: Amount,
     *,
     unit: float = INCH,
     step_tolerance: float = 1e-6,

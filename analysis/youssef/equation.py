@@ -29,7 +29,8 @@ from linkwork.limits import LIMIT_SINE
 from ..mechanisms import FIVE_BAR
 from ..numerics import symbolic
 from ..numerics.fourier import FourierSeries
-from ..run import constants, traced
+from ..run import constants, takes_published, traced
+from ..units import Amount, in_si
 
 #: Part of the largest amplitude that the harmonics left out of the exact coefficients have at most.
 NEGLIGIBLE = 1e-13
@@ -226,9 +227,11 @@ class SliderEquation:
         return self.mass, rate + self.damping, self.stiffness + self.spring
 
 
+@takes_published()
+@in_si(speed="rad/s")
 def slider_equation(
     parameters: FiveBarParameters,
-    speed: float,
+    speed: Amount,
     *,
     variant: Variant = Variant.EXACT,
     order: int | None = None,

@@ -19,6 +19,8 @@ from linkwork.errors import AssemblyError, InputError, LinkworkError
 from linkwork.five_bar.parameters import FiveBarParameters
 
 from ..numerics.fourier import FourierSeries
+from ..run import takes_published
+from ..units import Amount, in_si
 from .equation import NO_LOAD, Balance, Load, SliderEquation, Variant, balance, require_speed, slider_equation
 
 #: Orders that the nonlinear balance goes through where none is given.
@@ -156,6 +158,7 @@ def _operator(equation: SliderEquation, order: int) -> NDArray[np.complex128]:
     return matrix
 
 
+@takes_published()
 def resonance(
     parameters: FiveBarParameters,
     *,
@@ -237,9 +240,11 @@ def _basis(order: int) -> _Basis:
     )
 
 
+@takes_published()
+@in_si(speed="rad/s")
 def nonlinear_harmonic_balance(
     parameters: FiveBarParameters,
-    speed: float,
+    speed: Amount,
     order: int | None = None,
     *,
     start: FourierSeries | None = None,

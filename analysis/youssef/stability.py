@@ -14,6 +14,7 @@ from linkwork.five_bar.parameters import FiveBarParameters
 from ..mechanisms import require_five_bar
 from ..numerics.boundaries import Test
 from ..periodic import TOLERANCE, Drive, Monodromy, Plane, StabilityVerdict, multipliers, test_of, verdict
+from ..run import takes_published
 from .equation import Load, Variant, slider_equation
 from .hill import PeriodicEquation, monodromy
 
@@ -24,6 +25,7 @@ def load_of(drive: Drive) -> Load:
     return Load(x=x, y=y, slider=slider)
 
 
+@takes_published()
 def linear_equation(parameters: FiveBarParameters, drive: Drive, variant: Variant = Variant.EXACT) -> PeriodicEquation:
     """The slider's equation about u = 0, which is the motion only where nothing drives it: the thesis's.
 
@@ -39,6 +41,7 @@ def linear_equation(parameters: FiveBarParameters, drive: Drive, variant: Varian
     return PeriodicEquation(a=a, b=b, c=c)
 
 
+@takes_published()
 def linear_verdict(
     parameters: FiveBarParameters, drive: Drive, *, variant: Variant = Variant.EXACT, tolerance: float = TOLERANCE
 ) -> StabilityVerdict:
@@ -61,6 +64,7 @@ def linear_test(operation: Plane, multiplier: int, *, variant: Variant = Variant
     return test_of(linear_monodromy(operation, variant=variant), multiplier)
 
 
+@takes_published()
 def linear_motion(
     parameters: FiveBarParameters, drive: Drive, names: tuple[str, str]
 ) -> Mapping[str, Callable[[Plane], Monodromy]]:

@@ -18,7 +18,6 @@ come out by themselves.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from math import acos, atan2, hypot, isfinite, pi
 
@@ -30,6 +29,8 @@ from linkwork.five_bar import kinematics
 from linkwork.five_bar.parameters import Constants, FiveBarParameters
 
 from ..mechanisms import require_five_bar
+from ..run import takes_published
+from ..units import Amount, in_si
 
 #: Cells across the area in the first and in the finest grid.
 COARSEST, FINEST = 128, 4096
@@ -108,7 +109,9 @@ class AccessibleArea:
         return inside
 
 
-def coupler_curve(parameters: FiveBarParameters, slider_position: float, n: int = 720) -> CouplerCurve:
+@takes_published()
+@in_si(slider_position="m")
+def coupler_curve(parameters: FiveBarParameters, slider_position: Amount, n: int = 720) -> CouplerCurve:
     """Path of P over a turn of the crank with the slider held.
 
     Parameters
@@ -145,9 +148,9 @@ def coupler_curve(parameters: FiveBarParameters, slider_position: float, n: int 
     return CouplerCurve(slider_position=slider_position, arcs=tuple(arcs), closed=closed)
 
 
-def coupler_curves(
-    parameters: FiveBarParameters, slider_positions: Sequence[float], n: int = 720
-) -> tuple[CouplerCurve, ...]:
+@takes_published()
+@in_si(slider_positions="m")
+def coupler_curves(parameters: FiveBarParameters, slider_positions: Amount, n: int = 720) -> tuple[CouplerCurve, ...]:
     """The family of coupler curves at several slider positions (m); see `coupler_curve`."""
     return tuple(coupler_curve(parameters, float(u), n) for u in slider_positions)
 
@@ -196,9 +199,9 @@ def _coupler_point(th2: float, u: float, middle: float, p: Constants) -> tuple[f
             share *= 4.0
 
 
-def accessible(
-    parameters: FiveBarParameters, slider_range: tuple[float, float], x: ArrayLike, y: ArrayLike
-) -> NDArray[np.bool_]:
+@takes_published()
+@in_si(slider_range="m", x="m", y="m")
+def accessible(parameters: FiveBarParameters, slider_range: Amount, x: Amount, y: Amount) -> NDArray[np.bool_]:
     """Whether P can be at points with the slider in its range, in closed form.
 
     Parameters
@@ -244,9 +247,11 @@ def accessible(
     return result
 
 
+@takes_published()
+@in_si(slider_range="m")
 def accessible_area(
     parameters: FiveBarParameters,
-    slider_range: tuple[float, float],
+    slider_range: Amount,
     *,
     tolerance: float = 1e-4,
     finest: int = FINEST,

@@ -9,6 +9,7 @@ import re
 from base64 import b64decode
 from collections.abc import Callable
 from dataclasses import asdict, replace
+from importlib import import_module
 from io import BytesIO
 from math import pi
 from pathlib import Path
@@ -280,3 +281,28 @@ def test_a_picture_of_a_periodic_motion() -> None:
 )
 def test_counts_in_words(count: int, what: str, words: str) -> None:
     assert format_count(count, what) == words
+
+
+PACKAGES = ("run", "periodic", "linear", "youssef", "slider_crank", "motion")
+#: Functions that write parameters out.
+OF_PARAMETERS = {"parameters_to", "save_parameters"}
+
+
+@pytest.mark.parametrize("package", PACKAGES)
+def test_every_public_function_takes_a_published_set_as_parameters(package: str) -> None:
+    public = import_module(f"analysis.{package}")
+    functions = [(name, getattr(public, name)) for name in public.__all__ if inspect.isfunction(getattr(public, name))]
+    taking = {name: function for name, function in functions if "parameters" in inspect.signature(function).parameters}
+    without = {name for name, function in taking.items() if function.__code__ is not simulate.__code__}
+    assert without - OF_PARAMETERS == set()
+
+
+def test_the_top_offers_what_one_asks_for() -> None:
+    asked = (
+        "simulate simulate_many cosimulate compare find_orbit frequency_response stability_chart linearise synthesize"
+    )
+    assert {*asked.split(), "slider_motion", "force_turn", "Inputs", "figures", "PUBLISHED"} <= {*dir(analysis)}
+    # results and errors of a run are there, but not offered
+    assert not {"Trajectory", "RunInterrupted", "sample_times"} & {*dir(analysis)}
+    assert isinstance(simulate("table-3.1"), Trajectory)
+    assert len(dir(analysis)) < 50
