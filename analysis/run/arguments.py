@@ -64,7 +64,8 @@ def takes_published(**fills: Fill) -> Callable[[_Function], _Function]:
             bound["parameters"] = own if several else own[0]
             for name, fill in fills.items():
                 value = bound.get(name)
-                values = value if isinstance(value, (list, tuple)) and len(value) == len(sets) else [value] * len(sets)
+                own_each = several and isinstance(value, (list, tuple)) and len(value) == len(sets)
+                values = value if own_each else [value] * len(sets)
                 filled = [v if known is None else fill(known, v) for known, v in zip(sets, values)]
                 bound[name] = filled if several else filled[0]
             # `its` has no arguments that are positional only: all can go by their names, but for those of **options
