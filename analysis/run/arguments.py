@@ -63,7 +63,7 @@ def takes_published(**fills: Fill) -> Callable[[_Function], _Function]:
             bound = its.bind_partial(*arguments, **options).arguments
             bound["parameters"] = own if several else own[0]
             for name, fill in fills.items():
-                value = bound.get(name)
+                value: Any = bound.get(name)
                 own_each = several and isinstance(value, (list, tuple)) and len(value) == len(sets)
                 values = value if own_each else [value] * len(sets)
                 filled = [v if known is None else fill(known, v) for known, v in zip(sets, values)]
