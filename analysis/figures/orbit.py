@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from math import degrees
-
 import numpy as np
 
 from ..mechanisms import mechanism_of
@@ -11,12 +9,11 @@ from ..periodic import PeriodicOrbit
 from ..units import RAD_S_PER_RPM
 from .curves import Curve, Panel, plot_curves
 from .dispatch import plot
+from .runs import display_unit
 from .style import Figure
 
 #: Samples of a period.
 _SAMPLES = 512
-#: Factor and name of the unit in which an output is drawn, by its unit in SI; the others are drawn in SI.
-_DRAWN = {"m": (1e3, "mm"), "rad": (degrees(1.0), "deg"), "rad/s": (1.0 / RAD_S_PER_RPM, "rpm")}
 
 
 @plot.register
@@ -33,7 +30,7 @@ def plot_orbit(orbit: PeriodicOrbit, *, title: str = "") -> Figure:
         By default the speed, the period and the stability.
     """
     turn, mechanism = orbit.turn(_SAMPLES), mechanism_of(orbit.parameters)
-    units = {v.name: v.unit for v in mechanism.variables}
+    variables = {v.name: v for v in mechanism.variables}
     rates = {freedom.coordinate: freedom.rate for freedom in mechanism.freedoms}
     free = [mechanism.freedoms[n] for n in orbit.flow.free]
     crank = mechanism.freedoms[orbit.flow.crank]
@@ -45,7 +42,7 @@ def plot_orbit(orbit: PeriodicOrbit, *, title: str = "") -> Figure:
 
     def closed(name: str) -> tuple[np.ndarray, str]:
         """An output over the period, its first value once more at the end, as it is drawn, and its label."""
-        factor, unit = _DRAWN.get(units[name], (1.0, units[name]))
+        unit, factor = display_unit(variables[name])
         return factor * np.append(turn[name], turn[name][0]), f"{name} [{unit}]"
 
     angle = np.degrees(np.append(turn.angle, orbit.flow.period * orbit.turns))

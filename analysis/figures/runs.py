@@ -122,7 +122,7 @@ def _variables(run: Trajectory) -> dict[str, Variable]:
     return {v.name: v for m in mechanisms for v in m.variables if v.name in run.names}
 
 
-def _shown(variable: Variable) -> tuple[str, float]:
+def display_unit(variable: Variable) -> tuple[str, float]:
     """The unit that people think in, and what a value in SI is multiplied by."""
     displays = dict(UNITS[variable.unit].displays)
     unit = variable.display or next(iter(displays), variable.unit)
@@ -131,7 +131,7 @@ def _shown(variable: Variable) -> tuple[str, float]:
 
 def _output(run: Trajectory, table: Mapping[str, Variable], name: str) -> _Rows:
     values = run[name]  # an unknown name is refused there
-    unit, factor = _shown(table[name])
+    unit, factor = display_unit(table[name])
     return _Rows(name=name, unit=unit, curves={"": factor * values})
 
 
@@ -217,7 +217,7 @@ def plot_comparison(
         figure = Figure(figsize=(9.6, 0.9 + 1.8 * len(names)))
         rows = figure.subplots(len(names), 2, sharex=True, squeeze=False, width_ratios=(3, 2))
         for (both, beside), name in zip(rows, names):
-            unit, factor = _shown(table[name])
+            unit, factor = display_unit(table[name])
             a, b = factor * first[name][:n], factor * second[name][:n]
             for values, label, colour, line in zip((a, b), labels, COLOURS, LINES):
                 both.plot(time, values, line, color=colour, label=label)
