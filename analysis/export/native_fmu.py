@@ -168,8 +168,9 @@ def compile_library(
     if importlib.util.find_spec("ziglang") is None:
         raise BuildError("native FMUs are compiled by Zig, which is not installed: pip install 'linkwork[native]'")
     cache = code_folder("zig")
-    if not any(cache.iterdir()):
-        sys.stderr.write("linkwork: Zig compiles what it needs itself, once on this machine ...\n")
+    known = cache / f"{target}.known"
+    if not known.is_file():
+        sys.stderr.write(f"linkwork: Zig compiles what it needs itself for {target}, once on this machine ...\n")
     environment = {"ZIG_GLOBAL_CACHE_DIR": str(cache), "ZIG_LOCAL_CACHE_DIR": str(cache)}
     done = subprocess.run(
         [sys.executable, "-m", "ziglang", "cc", "-target", target, *options, "-o", library, *files, "-lm"],
@@ -181,6 +182,7 @@ def compile_library(
     )
     if done.returncode != 0:
         raise BuildError(f"{library} cannot be compiled for {target}:\n{done.stderr}")
+    known.touch()
 
 
 def _universal(parts: Sequence[bytes]) -> bytes:

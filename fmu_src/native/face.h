@@ -35,6 +35,15 @@
             return FMI(Error);                    \
     return FMI(OK);
 
+/* All of them, or none. */
+#define SET_EACH(kind)                                                         \
+    for (size_t i = 0; i < count; i++)                                         \
+        if (!instance_may_set(c, __func__, references[i], kind))               \
+            return FMI(Error);                                                 \
+    for (size_t i = 0; i < count; i++)                                         \
+        instance_set(c, references[i], values[i]);                             \
+    return FMI(OK);
+
 enum {
     ANY_STATE = INSTANTIATED | SETTLED,
     WITH_STATES = INITIALIZATION | EVENT | CONTINUOUS | TERMINATED,

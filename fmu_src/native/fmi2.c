@@ -72,30 +72,30 @@ fmi2Status fmi2GetString(fmi2Component component, const Reference references[], 
     EACH(instance_get_text(c, __func__, references[i], &values[i]))
 }
 
-/* Continuous states may be set by themselves, too. */
-static Status set_real(Instance *c, const char *function, Reference reference, double value)
-{
-    int state = c->s.phase == CONTINUOUS ? instance_state(reference) : -1;
-    if (state < 0)
-        return instance_set(c, function, reference, REAL, value);
-    double x[STATES];
-    memcpy(x, c->s.plant.x, sizeof x);
-    x[state] = value;
-    return instance_set_states(c, function, x, STATES);
-}
-
 fmi2Status fmi2SetReal(fmi2Component component, const Reference references[], size_t count, const fmi2Real values[])
 {
     ALLOW(SETTABLE | CONTINUOUS)
     NEED(ARRAYS)
-    EACH(set_real(c, __func__, references[i], values[i]))
+    bool free = c->s.phase == CONTINUOUS; /* states may be set by themselves */
+    double x[STATES];
+    memcpy(x, c->s.plant.x, sizeof x);
+    for (size_t i = 0; i < count; i++)
+        if (free && instance_state(references[i]) >= 0)
+            x[instance_state(references[i])] = values[i];
+        else if (!instance_may_set(c, __func__, references[i], REAL))
+            return fmi2Error;
+    Status status = free ? instance_set_states(c, __func__, x, STATES) : OK;
+    for (size_t i = 0; i < count && status == OK; i++)
+        if (!free || instance_state(references[i]) < 0)
+            instance_set(c, references[i], values[i]);
+    RETURN(status);
 }
 
 fmi2Status fmi2SetInteger(fmi2Component component, const Reference references[], size_t count, const fmi2Integer values[])
 {
     ALLOW(SETTABLE)
     NEED(ARRAYS)
-    EACH(instance_set(c, __func__, references[i], INTEGER, values[i]))
+    SET_EACH(INTEGER)
 }
 
 fmi2Status fmi2SetString(fmi2Component component, const Reference references[], size_t count, const fmi2String values[])
@@ -197,9 +197,9 @@ fmi2Status fmi2CancelStep(fmi2Component component)
         return fmi2OK;                                                                                     \
     }
 
-GET_STATUS(Status, fmi2Status, kind == fmi2DoStepStatus, c->s.reason == GOOD ? fmi2OK : fmi2Discard)
+GET_STATUS(Status, fmi2Status, kind == fmi2DoStepStatus, c->s.step == GOOD ? fmi2OK : fmi2Discard)
 GET_STATUS(RealStatus, fmi2Real, kind == fmi2LastSuccessfulTime, c->s.plant.time)
-GET_STATUS(BooleanStatus, fmi2Boolean, kind == fmi2Terminated, c->s.reason == LIMIT_OF_ASSEMBLY)
+GET_STATUS(BooleanStatus, fmi2Boolean, kind == fmi2Terminated, c->s.step == LIMIT_OF_ASSEMBLY)
 GET_STATUS(StringStatus, fmi2String, kind == fmi2DoStepStatus || kind == fmi2PendingStatus, c->s.message)
 
 fmi2Status fmi2GetIntegerStatus(fmi2Component component, const fmi2StatusKind kind, fmi2Integer *value)

@@ -54,7 +54,7 @@ fmi3Instance fmi3InstantiateScheduledExecution(
 {
     (void)name, (void)token, (void)resources, (void)visible, (void)logging, (void)clock_update, (void)lock, (void)unlock;
     if (log)
-        log(environment, fmi3Error, "Error", "this FMU has no scheduled execution");
+        log(environment, fmi3Error, "logStatusError", "this FMU has no scheduled execution");
     return NULL;
 }
 
@@ -82,21 +82,21 @@ fmi3Status fmi3EnterInitializationMode(fmi3Instance component, fmi3Boolean toler
         EACH(call)                                                                                                  \
     }
 
-#define SET(type, phases, call)                                                                                     \
+#define SET(type, phases, kind)                                                                                     \
     fmi3Status fmi3Set##type(fmi3Instance component, const Reference references[], size_t count,                    \
                              const fmi3##type values[], size_t value_count)                                         \
     {                                                                                                               \
         ALLOW(phases)                                                                                               \
         NEED(ARRAYS)                                                                                                \
         COUNTS(value_count, count)                                                                                  \
-        EACH(call)                                                                                                  \
+        SET_EACH(kind)                                                                                              \
     }
 
 GET(Float64, instance_get(c, __func__, references[i], REAL, &values[i]))
 GET(Int32, instance_get_integer(c, __func__, references[i], &values[i]))
 GET(String, instance_get_text(c, __func__, references[i], &values[i]))
-SET(Float64, SETTABLE | CONTINUOUS | INTERMEDIATE, instance_set(c, __func__, references[i], REAL, values[i]))
-SET(Int32, SETTABLE, instance_set(c, __func__, references[i], INTEGER, values[i]))
+SET(Float64, SETTABLE | CONTINUOUS | INTERMEDIATE, REAL)
+SET(Int32, SETTABLE, INTEGER)
 
 /* What there is none of: strings to set, other types, clocks, structural parameters, dependencies by element, scheduled execution */
 
@@ -115,7 +115,7 @@ SET(Int32, SETTABLE, instance_set(c, __func__, references[i], INTEGER, values[i]
     NONE(Get##type, n, fmi3Instance component, const Reference references[], size_t n, fmi3##type values[], size_t count)      \
     NONE(Set##type, n, fmi3Instance component, const Reference references[], size_t n, const fmi3##type values[], size_t count)
 
-#define NONE_OF_CLOCKS(name, ...) NONE(name, n, fmi3Instance component, const Reference references[], size_t n, __VA_ARGS__)
+#define NONE_FOR(name, ...) NONE(name, n, fmi3Instance component, const Reference references[], size_t n, __VA_ARGS__)
 
 NONE_OF(Float32)
 NONE_OF(Int8)
@@ -126,19 +126,19 @@ NONE_OF(UInt32)
 NONE_OF(Int64)
 NONE_OF(UInt64)
 NONE_OF(Boolean)
-NONE_OF_CLOCKS(SetString, const fmi3String values[], size_t count)
-NONE_OF_CLOCKS(GetBinary, size_t sizes[], fmi3Binary values[], size_t count)
-NONE_OF_CLOCKS(SetBinary, const size_t sizes[], const fmi3Binary values[], size_t count)
-NONE_OF_CLOCKS(GetClock, fmi3Clock values[])
-NONE_OF_CLOCKS(SetClock, const fmi3Clock values[])
-NONE_OF_CLOCKS(GetIntervalDecimal, fmi3Float64 intervals[], fmi3IntervalQualifier qualifiers[])
-NONE_OF_CLOCKS(GetIntervalFraction, fmi3UInt64 counters[], fmi3UInt64 resolutions[], fmi3IntervalQualifier qualifiers[])
-NONE_OF_CLOCKS(GetShiftDecimal, fmi3Float64 shifts[])
-NONE_OF_CLOCKS(GetShiftFraction, fmi3UInt64 counters[], fmi3UInt64 resolutions[])
-NONE_OF_CLOCKS(SetIntervalDecimal, const fmi3Float64 intervals[])
-NONE_OF_CLOCKS(SetIntervalFraction, const fmi3UInt64 counters[], const fmi3UInt64 resolutions[])
-NONE_OF_CLOCKS(SetShiftDecimal, const fmi3Float64 shifts[])
-NONE_OF_CLOCKS(SetShiftFraction, const fmi3UInt64 counters[], const fmi3UInt64 resolutions[])
+NONE_FOR(SetString, const fmi3String values[], size_t count)
+NONE_FOR(GetBinary, size_t sizes[], fmi3Binary values[], size_t count)
+NONE_FOR(SetBinary, const size_t sizes[], const fmi3Binary values[], size_t count)
+NONE_FOR(GetClock, fmi3Clock values[])
+NONE_FOR(SetClock, const fmi3Clock values[])
+NONE_FOR(GetIntervalDecimal, fmi3Float64 intervals[], fmi3IntervalQualifier qualifiers[])
+NONE_FOR(GetIntervalFraction, fmi3UInt64 counters[], fmi3UInt64 resolutions[], fmi3IntervalQualifier qualifiers[])
+NONE_FOR(GetShiftDecimal, fmi3Float64 shifts[])
+NONE_FOR(GetShiftFraction, fmi3UInt64 counters[], fmi3UInt64 resolutions[])
+NONE_FOR(SetIntervalDecimal, const fmi3Float64 intervals[])
+NONE_FOR(SetIntervalFraction, const fmi3UInt64 counters[], const fmi3UInt64 resolutions[])
+NONE_FOR(SetShiftDecimal, const fmi3Float64 shifts[])
+NONE_FOR(SetShiftFraction, const fmi3UInt64 counters[], const fmi3UInt64 resolutions[])
 NONE(EnterConfigurationMode, 1, fmi3Instance component)
 NONE(ExitConfigurationMode, 1, fmi3Instance component)
 NONE(EvaluateDiscreteStates, 1, fmi3Instance component)

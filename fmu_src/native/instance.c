@@ -58,7 +58,6 @@ void instance_reset(Instance *c)
     c->s = (Saved){.phase = INSTANTIATED};
     plant_reset(&c->s.plant);
     c->stale = true;
-    c->stopped = false;
 }
 
 static const char *phase_name(int phase)
@@ -84,18 +83,19 @@ bool instance_allows(Instance *c, const char *function, int phases)
     return false;
 }
 
-static const char *const categories[] = {"", "Warning", "Discard", "Error", "Fatal"};
+/* By their statuses; the first are all of them. */
+static const char *const categories[] = {"logAll", "logStatusWarning", "logStatusDiscard", "logStatusError", "logStatusFatal"};
 
 Status instance_log(Instance *c, const char *function, bool on, size_t count, const char *const names[])
 {
     int wanted = count == 0 ? ALL_CATEGORIES : 0;
     for (size_t i = 0; i < count; i++) {
-        int n = 1;
+        int n = 0;
         while (n <= FATAL && !(names[i] && strcmp(names[i], categories[n]) == 0))
             n++;
         if (n > FATAL)
             return instance_say(c, ERROR, "%s: there is no category %s", function, names[i] ? names[i] : "without a name");
-        wanted |= 1 << n;
+        wanted |= n == 0 ? ALL_CATEGORIES : 1 << n;
     }
     c->logging = on ? c->logging | wanted : c->logging & ~wanted;
     return OK;
@@ -193,10 +193,11 @@ static void read_outputs(Instance *c)
 {
     char sentence[SENTENCE];
     Reason reason = refresh(c, sentence);
-    bool refused = ((int)c->s.phase & RUNNING) && c->s.reason != GOOD; /* of which the reason stays, until a good step */
+    bool running = (int)c->s.phase & RUNNING, stepping = running && c->interface == CO_SIMULATION;
+    bool refused = running && c->s.reason != GOOD; /* of which the reason stays, until a good step */
     if (reason != GOOD && !refused)
         note(c, reason, sentence);
-    else if (reason == GOOD && c->s.reason != GOOD && c->interface == MODEL_EXCHANGE && plant_margin(&c->s.plant) >= 0.0)
+    else if (reason == GOOD && c->s.reason != GOOD && !stepping && plant_margin(&c->s.plant) >= 0.0)
         forget(c); /* but not what ended the run: the limit of assembly */
 }
 
@@ -211,10 +212,12 @@ static double computed(Instance *c, int row)
         return x[row - STATE_ROW];
     }
     if (row < MARGIN_ROW) {
-        plant_derivative(&c->s.plant, derivative);
-        return derivative[row - DERIVATIVE_ROW];
+        if (plant_derivative(&c->s.plant, derivative))
+            memcpy(c->s.plant.derivative, derivative, sizeof derivative);
+        return c->s.plant.derivative[row - DERIVATIVE_ROW];
     }
-    return row == MARGIN_ROW ? plant_margin(&c->s.plant) : c->s.plant.time;
+    double margin = plant_margin(&c->s.plant);
+    return row == TIME_ROW ? c->s.plant.time : isnan(margin) ? -LIMIT_CLEARANCE : margin;
 }
 
 Status instance_get(Instance *c, const char *function, unsigned reference, Kind kind, double *value)
@@ -252,19 +255,35 @@ Status instance_get_text(Instance *c, const char *function, unsigned reference, 
     return OK;
 }
 
-Status instance_set(Instance *c, const char *function, unsigned reference, Kind kind, double value)
+/* A guess of an output for the initialisation, which is solved without one. */
+static bool is_guess(const Instance *c, const Variable *v)
+{
+    return v->causality == COMPUTED && v->row >= 0 && v->row < STATE_ROW && c->s.phase == INSTANTIATED;
+}
+
+bool instance_may_set(Instance *c, const char *function, unsigned reference, Kind kind)
 {
     const Variable *v = variable(c, function, reference, kind);
-    Plant *a = &c->s.plant;
     int phase = (int)c->s.phase;
     if (!v)
-        return ERROR;
-    if (v->causality == COMPUTED && v->row >= 0 && v->row < STATE_ROW && phase == INSTANTIATED)
-        return OK; /* a guess of an output for the initialisation, which is solved without one */
-    if (v->causality == COMPUTED)
-        return instance_say(c, ERROR, "%s: %s is computed, it cannot be set", function, v->name);
-    if (v->causality == PARAMETER && !(phase & (INSTANTIATED | INITIALIZATION)))
-        return instance_say(c, ERROR, "%s: %s is a fixed parameter, it cannot be set %s", function, v->name, phase_name(phase));
+        return false;
+    if (v->causality == COMPUTED && !is_guess(c, v)) {
+        instance_say(c, ERROR, "%s: %s is computed, it cannot be set", function, v->name);
+        return false;
+    }
+    if (v->causality == PARAMETER && !(phase & (INSTANTIATED | INITIALIZATION))) {
+        instance_say(c, ERROR, "%s: %s is a fixed parameter, it cannot be set %s", function, v->name, phase_name(phase));
+        return false;
+    }
+    return true;
+}
+
+void instance_set(Instance *c, unsigned reference, double value)
+{
+    Plant *a = &c->s.plant;
+    int phase = (int)c->s.phase;
+    if (is_guess(c, &variables[reference]))
+        return;
     a->given[reference] = value;
     c->stale = true;
     if (!(phase & RUNNING))
@@ -273,7 +292,6 @@ Status instance_set(Instance *c, const char *function, unsigned reference, Kind 
         for (int k = 0; k < COMMANDS; k++)
             if (input_at[commands[k].input] == (int)reference)
                 a->fresh[k] = 1.0;
-    return OK;
 }
 
 Status instance_set_slope(Instance *c, const char *function, unsigned reference, int order, double slope)
@@ -311,8 +329,8 @@ Status instance_output_slopes(
     for (int i = 0; i < INPUTS; i++)
         given[input_at[i]] = a->last_slopes[i];
     for (int k = 0; k < COMMANDS; k++) {
-        /* a command that moves is an acceleration */
-        given[input_at[commands[k].acceleration]] = 0.0;
+        /* a command that moved over the step was an acceleration: the state has it, as it has all commands */
+        a->given[input_at[commands[k].acceleration]] += a->last_slopes[commands[k].input];
         given[input_at[commands[k].input]] = 0.0;
     }
     if (!plant_derivative(a, derivative))
@@ -345,15 +363,17 @@ Status instance_step(Instance *c, double time, double step, const Watch *watch)
     char sentence[SENTENCE];
     Digits end, stop;
     Reason ended;
+    c->stopped = false;
     /* beyond what rounding in the master's sum of steps can make */
     if (time + step > c->s.plant.stop_time + 1e-6 * step + 1e-12 * fabs(time))
         return instance_say(c, ERROR, "a step to t = %s s: the stop time is %s s", digits(end, time + step),
                             digits(stop, c->s.plant.stop_time));
     Reason reason = plant_step(&c->s.plant, time, step, watch, c->early_return, &ended, sentence);
-    c->stopped = reason == GOOD && ended != GOOD;
+    c->s.step = reason;
+    c->stale = true; /* also after a refused step: its updates may have read outputs */
     if (reason == GOOD) {
-        c->stale = true;
         forget(c);
+        c->stopped = ended != GOOD;
         if (ended != GOOD)
             note(c, ended, "the step ended early, at the limit of assembly");
         return OK;

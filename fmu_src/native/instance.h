@@ -27,7 +27,7 @@ enum {
     SETTLED = INITIALIZATION | RUNNING | TERMINATED
 };
 
-/* What there is of each state; and the event indicators. */
+/* The numbers of model exchange: one for each state, and one event indicator. */
 typedef enum { VALUES, DERIVATIVES, NOMINALS, INDICATORS } What;
 
 typedef struct Instance Instance;
@@ -36,6 +36,7 @@ typedef struct Instance Instance;
 typedef struct {
     Plant plant;
     double phase;
+    double step;           /* the reason of the last step */
     double reason, cause;  /* solver.status; the first reason since the last good step, other than steps out of order */
     char message[SENTENCE], cause_message[SENTENCE];
 } Saved;
@@ -81,12 +82,13 @@ Status instance_exit_initialization(Instance *c);
 Status instance_get(Instance *c, const char *function, unsigned reference, Kind kind, double *value);
 Status instance_get_integer(Instance *c, const char *function, unsigned reference, int *value);
 Status instance_get_text(Instance *c, const char *function, unsigned reference, const char **value);
-Status instance_set(Instance *c, const char *function, unsigned reference, Kind kind, double value);
+bool instance_may_set(Instance *c, const char *function, unsigned reference, Kind kind);
+void instance_set(Instance *c, unsigned reference, double value);
 Status instance_set_slope(Instance *c, const char *function, unsigned reference, int order, double slope);
 Status instance_output_slopes(
     Instance *c, const char *function, const unsigned references[], size_t count, const int orders[], double values[]);
 
-/* The status of a call for what this FMU has none of, for a number of them. */
+/* The status of a call about `count` things of a kind that this FMU does not have. */
 Status instance_none(Instance *c, const char *function, size_t count);
 
 Status instance_step(Instance *c, double time, double step, const Watch *watch);

@@ -378,7 +378,7 @@ static Reason integrate(
     for (int steps = 1;; steps++) {
         double remaining = *duration - done;
         bool last = proposal >= remaining * (1.0 - 1e-10);
-        double h = last ? remaining : fmin(proposal, proposal > 0.5 * remaining ? 0.5 * remaining : proposal);
+        double h = last ? remaining : fmin(proposal, 0.5 * remaining);
         if (steps > MAX_STEPS) {
             snprintf(cause, SENTENCE, "%d steps did not suffice: stopped %s s into an interval of %s s", MAX_STEPS,
                      digits(first, done), digits(second, *duration));

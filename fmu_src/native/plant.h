@@ -26,6 +26,7 @@ typedef struct {
     double x[STATES];
     double scale[STATES];           /* magnitudes below which the error of a component is absolute */
     double outputs[OUTPUTS];        /* the last that could be computed */
+    double derivative[STATES];      /* likewise */
     double begun;                   /* 1 where state and constants follow from what is given */
     double time, start_time, stop_time; /* infinite: none */
     double master_tolerance;        /* 0: none */
@@ -72,7 +73,7 @@ void plant_reverse(
     const Plant *a, bool start, const double rows[ROWS], const bool commanded[ROOM(COMMANDS)], double given[VARIABLES],
     double x[STATES]);
 
-/* A number in words, in any locale. */
+/* A number in words, with a decimal point where the host's locale has a comma. */
 typedef char Digits[32];
 const char *digits(Digits text, double value);
 

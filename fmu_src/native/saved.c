@@ -31,7 +31,6 @@ Status instance_restore(Instance *c, const void *state)
                             c->interface == CO_SIMULATION ? "co-simulation" : "model exchange");
     c->s = *saved;
     c->stale = true;
-    c->stopped = false;
     return OK;
 }
 
@@ -141,8 +140,13 @@ static bool sound(const Saved *s)
     for (int v = 0; v < VARIABLES; v++)
         if (variables[v].kind != REAL && variables[v].causality == PARAMETER && !whole(s->plant.given[v], -2147483648.0, 2147483647.0))
             return false;
-    return whole(s->phase, INSTANTIATED, TERMINATED) && ((int)s->phase & ((int)s->phase - 1)) == 0 && whole(s->reason, GOOD, INTERNAL) &&
-           whole(s->cause, GOOD, INTERNAL) && isfinite(s->plant.time) && isfinite(s->plant.start_time);
+    if (!whole(s->phase, INSTANTIATED, TERMINATED))
+        return false;
+    int phase = (int)s->phase, phases = INSTANTIATED | INITIALIZATION | EVENT | CONTINUOUS | STEP | TERMINATED;
+    bool begun = s->plant.begun == 1.0 && s->plant.tolerance > 0.0;
+    return (phase & phases) && !(phase & (phase - 1)) && (begun || phase & (INSTANTIATED | INITIALIZATION)) &&
+           whole(s->reason, GOOD, INTERNAL) && whole(s->cause, GOOD, INTERNAL) && whole(s->step, GOOD, INTERNAL) &&
+           isfinite(s->plant.time) && isfinite(s->plant.start_time);
 }
 
 Status instance_deserialize(Instance *c, const char *text, size_t size, void **state)

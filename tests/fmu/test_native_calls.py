@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterator
 from ctypes import byref, c_bool, c_char, c_char_p, c_double, c_int, c_int32, c_int64, c_size_t, c_uint32, c_void_p
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree
 
 import pytest
 
@@ -458,25 +459,31 @@ def test_messages_have_a_decimal_point_in_every_locale(library: Library) -> None
 
 
 def test_categories_of_the_log(library: Library) -> None:
+    root = ElementTree.parse(library.folder / "modelDescription.xml").getroot()
+    declared = [str(node.get("name")).encode() for node in root.findall("LogCategories/Category")]
+    assert len(declared) == 5
     c = library.instance().start()
 
     def ask(on: bool, *names: bytes | None) -> int:
         flag: Any = c_bool(on) if library.fmi == 3 else int(on)
         return c("SetDebugLogging", flag, c_size_t(len(names)), (c_char_p * max(len(names), 1))(*names))
 
+    def logged() -> int:
+        c.log.clear()
+        assert c.step(5.0, 1e-3) == DISCARD
+        return len(c.log)
+
     assert c("SetDebugLogging", c_bool(True) if library.fmi == 3 else 1, c_size_t(1), None) == ERROR
-    c.log.clear()
-    assert ask(True, b"Warning", b"Error") == OK
-    assert c.step(5.0, 1e-3) == DISCARD
-    assert c.log == []
-    assert ask(True, b"Discard") == OK
-    assert c.step(5.0, 1e-3) == DISCARD
-    assert len(c.log) == 1
-    assert ask(False, b"Discard") == OK
-    assert c.step(5.0, 1e-3) == DISCARD
-    assert len(c.log) == 1
-    for name, word in ((b"Dscard", "Dscard"), (None, "without a name")):
-        assert ask(True, b"Fatal", name) == ERROR
+    assert ask(True, b"logStatusWarning", b"logStatusError") == OK
+    assert logged() == 0
+    for name in (b"logStatusDiscard", b"logAll"):
+        assert ask(True, name) == OK
+        assert logged() == 1
+        assert ask(False, name) == OK
+        assert logged() == 0
+    assert ask(True, *declared) == OK
+    for name, word in ((b"logStatusDscard", "logStatusDscard"), (None, "without a name")):
+        assert ask(True, b"logStatusFatal", name) == ERROR
         assert f"there is no category {word}" in c.log[-1][1]
     c.free()
 
