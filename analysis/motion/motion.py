@@ -122,7 +122,7 @@ class SmoothnessCurve:
     Attributes
     ----------
     acceleration : ndarray, shape (n,)
-        Greatest |d2u/dphi2| that was allowed (m/rad2), increasing.
+        Greatest ``|d2u/dphi2|`` that was allowed (m/rad2), increasing.
     solutions : tuple of Solution or None
         The best at each; None where there is none.
     """
@@ -137,7 +137,7 @@ class SmoothnessCurve:
 
     @property
     def attained(self) -> np.ma.MaskedArray:
-        """Greatest |d2u/dphi2| of each motion (m/rad2)."""
+        """Greatest ``|d2u/dphi2|`` of each motion (m/rad2)."""
         return np.ma.masked_invalid(np.array([np.nan if s is None else greatest(s.linkage, 2) for s in self.solutions]))
 
 
@@ -197,7 +197,7 @@ def smoothness_curve(
     task, linkage, unknown, bounds, constraints, search
         As for `slider_motion`.
     accelerations : array_like, shape (n,)
-        Bounds of |d2u/dphi2| (m/rad2), above zero.
+        Bounds of ``|d2u/dphi2|`` (m/rad2), above zero.
 
     Raises
     ------

@@ -56,7 +56,7 @@ class StabilityVerdict:
     ----------
     stability : Stability
     margin : float
-        1 - max |multiplier|: positive where deviations die out, negative where they grow; dimensionless.
+        1 - ``max |multiplier|``: positive where deviations die out, negative where they grow; dimensionless.
     tolerance : float
         Size of the margin below which the verdict is MARGINAL. A system without damping is never better than that.
     largest_multiplier : complex

@@ -64,7 +64,7 @@ class OrbitError(LinkworkError):
     start : tuple of float
         y at crank angle 0 at which it ended: see `PeriodicOrbit`.
     residual : float
-        |y(T) - y(0)| relative to the scale there; infinite where not one period could be followed.
+        ``|y(T) - y(0)|`` relative to the scale there; infinite where not one period could be followed.
     iterations : int
     """
 
@@ -100,7 +100,7 @@ class PeriodicOrbit(Shown):
     monodromy : ndarray, shape (n, n)
         Derivative of the map over one period on the section at the crank angle 0.
     residual : float
-        |y(T) - y(0)| relative to `scale_of`, before the last correction.
+        ``|y(T) - y(0)|`` relative to `scale_of`, before the last correction.
     iterations : int
         Newton iterations taken.
     multipliers : ndarray of complex, shape (n,)

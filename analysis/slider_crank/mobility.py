@@ -345,7 +345,7 @@ def _margin(choose: Callable[..., float], law: PeriodicShift, p: Constants) -> M
 
 @takes_published()
 def greatest_shift(parameters: SliderCrankParameters) -> float | None:
-    """The greatest constant shift |S1| (m) at which the crank turns fully; None if there is none.
+    """The greatest constant shift ``|S1|`` (m) at which the crank turns fully; None if there is none.
 
     It turns fully at a shift of either sign up to this one. With the guide parallel to the crank axis any shift will do, and
     the value is infinite.

@@ -42,7 +42,7 @@ class SliderUnknown:
     stroke : float
         Greatest distance between the ends of its travel (m).
     speed, acceleration : float
-        Greatest |du/dphi| (m/rad) and |d2u/dphi2| (m/rad2).
+        Greatest ``|du/dphi|`` (m/rad) and ``|d2u/dphi2|`` (m/rad2).
     smoothness : float
         Weight of the mean of (d2u/dphi2)^2 (1/rad4) added to the quality: trades error for smoothness.
     """

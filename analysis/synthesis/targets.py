@@ -292,7 +292,7 @@ class TargetPath:
     def smoothed(self, n: int, *, deviation: float | None = None) -> TargetPath:
         """A cubic smoothing spline of a noisy curve, at n points of equal arc length.
 
-        The spline z(u) over the chord length u of the points z_k = x + i y minimises
+        The spline z(u) over the chord length u of the points z_k = x + i y minimises::
 
             sum |z_k - z(u_k)|^2 + lambda * integral |z''|^2 du,
 

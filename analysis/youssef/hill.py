@@ -485,7 +485,7 @@ def perturbed_region(
 ) -> Region | None:
     """Boundaries in lambda_k^2 of (M y')' + lambda_c y' + (lambda_k^2 + K) y = 0 for small harmonics of M and K.
 
-    To first order, eq (5.13),
+    To first order, eq (5.13)::
 
         lambda_k^2 = k0 N^2/4 - K0 -+ |N^2/4 M_N + K_N|,
 
