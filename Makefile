@@ -34,9 +34,10 @@ lint: $(DEV)
 	$(BIN)/lint-imports
 	$(BIN)/python docs/generate.py --check
 
-# what the documentation repeats of the code; FIGURES=1 computes the pages and pictures of the theses' figures too (an hour)
+# what the pages repeat of the code, then their site, in build/site; FIGURES=1 computes the theses' figures and pictures too (an hour)
 docs: $(DEV)
 	$(BIN)/python docs/generate.py $(if $(FIGURES),--figures)
+	$(BIN)/python -m sphinx --quiet --fail-on-warning --keep-going -d build/doctrees docs build/site
 
 figures: $(RUN)
 	$(BIN)/linkwork figures --out out/figures

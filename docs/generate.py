@@ -1,6 +1,6 @@
 """Write what the documentation repeats from the code, and draw its pictures.
 
-python docs/generate.py             fills the tables between the markers of README.md and docs/*.md
+python docs/generate.py             fills the tables between the markers of docs/*.md
 python docs/generate.py --check     writes nothing, and fails where a table is out of date
 python docs/generate.py --figures   fills the pages of the theses' figures too, and draws the pictures (about an hour)
 
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from analysis.figures import Figure
 
 HERE = Path(__file__).resolve().parent
-PAGES = (HERE.parent / "README.md", *sorted(HERE.glob("*.md")))
+PAGES = tuple(sorted(HERE.glob("*.md")))
 MARKED = re.compile(r"<!-- (\w+) ([\w-]+): begin -->\n.*?<!-- \1 \2: end -->", re.DOTALL)
 
 
@@ -43,15 +43,6 @@ def _markdown(headings: str, rows: Iterator[tuple[str, ...]]) -> str:
     return "\n".join([headings, re.sub(r"[^|]+", " --- ", headings), *(f"| {' | '.join(row)} |" for row in rows)])
 
 
-def variables(of: str, page: str) -> str:
-    """The FMI variables of a mechanism."""
-    table = MECHANISMS[of].variables
-    return _markdown(
-        "| variable | causality | unit | start | range | meaning |",
-        ((f"`{v.name}`", v.causality, v.unit or v.kind, _start(v), _range(v), v.description) for v in table),
-    )
-
-
 def symbols(of: str, page: str) -> str:
     """The FMI variables of a mechanism with their symbols in the thesis and their identifiers in Python."""
     mechanism = MECHANISMS[of]
@@ -67,12 +58,13 @@ def symbols(of: str, page: str) -> str:
 
     table = mechanism.variables
     return _markdown(
-        "| symbol | identifier | FMI variable | unit | start | range | meaning |",
+        "| symbol | identifier | FMI variable | causality | unit | start | range | meaning |",
         (
             (
                 f"${v.symbol}$" if v.symbol else "",
                 identifier(v),
                 f"`{v.name}`",
+                v.causality,
                 v.unit or v.kind,
                 _start(v),
                 _range(v),
@@ -126,12 +118,7 @@ def probe(of: str, page: str) -> str:
 
 
 #: What fills a table, from what it is of and the text of its page; `figures` takes long.
-TABLES: dict[str, Callable[[str, str], str]] = {
-    "variables": variables,
-    "symbols": symbols,
-    "figures": figures,
-    "probe": probe,
-}
+TABLES: dict[str, Callable[[str, str], str]] = {"symbols": symbols, "figures": figures, "probe": probe}
 
 
 def filled(page: str, *, with_figures: bool = False) -> str:

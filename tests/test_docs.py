@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
+import json
 import pkgutil
 import re
 import shlex
@@ -12,8 +13,10 @@ import sys
 from pathlib import Path
 
 import pytest
+import yaml
 
 from analysis.studies import RAHMAN, YOUSSEF
+from linkwork import __version__
 
 from .analysis.test_studies import REFUTED
 
@@ -85,12 +88,16 @@ def test_names_of_modules_in_the_documentation_are_right():
             assert pkgutil.resolve_name(name), page.name
 
 
+def test_the_readme_fits_on_two_screens():
+    assert len((ROOT / "README.md").read_text().splitlines()) <= 110
+
+
 def test_the_code_of_the_readme_runs(fmus, natives, tmp_path):
     (tmp_path / "build").mkdir()
     for fmu in (fmus["FiveBarSlider"], natives["FiveBarSlider-native"]):
         shutil.copy(fmu, tmp_path / "build")
     blocks = re.findall(r"```python\n(.*?)```", (ROOT / "README.md").read_text(), flags=re.DOTALL)
-    assert len(blocks) == 5
+    assert len(blocks) == 4
     for block in blocks:
         assert len(block.strip().splitlines()) <= 12
         done = subprocess.run(
@@ -193,3 +200,44 @@ def test_pictures_of_the_documentation_are_small():
     assert pictures
     for picture in pictures:
         assert picture.stat().st_size < 150_000, picture.name
+
+
+NOTEBOOKS = sorted((ROOT / "docs" / "notebooks").glob("*.ipynb"))
+
+
+def test_there_is_a_short_notebook_without_outputs_for_each_kind_of_user():
+    assert [path.stem for path in NOTEBOOKS] == ["designer", "fmu", "researcher"]
+    for path in NOTEBOOKS:
+        cells = json.loads(path.read_text())["cells"]
+        assert len(cells) <= 15, path.name
+        assert not any(cell.get("outputs") or cell.get("execution_count") for cell in cells), path.name
+
+
+@pytest.mark.slow
+@pytest.mark.fmu
+def test_the_site_builds_without_a_warning_and_needs_no_network(tmp_path):
+    """Its links lead somewhere, its notebooks run, every page is in its contents; all that it loads is its own."""
+    build = [sys.executable, "-m", "sphinx", "--quiet", "--fail-on-warning", "--keep-going"]
+    site = tmp_path / "site"
+    done = subprocess.run(
+        [*build, "-d", tmp_path / "doctrees", ROOT / "docs", site],
+        capture_output=True,
+        text=True,
+        timeout=500,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    pages = {path.relative_to(site).as_posix(): path.read_text(encoding="utf-8") for path in site.rglob("*.html")}
+    loaded = re.compile(r"""<(?:script|img|link)[^>]+(?:src|href)=["'](?:https?:)?//""")
+    assert [name for name, page in pages.items() if loaded.search(page)] == []
+    assert "<mover>" in pages["nomenclature.html"]  # a formula
+    assert "simulate" in pages["reference/analysis.run.html"]
+    assert "--published" in pages["reference/commands.html"]
+    for path in NOTEBOOKS:
+        assert "data:image" in (page := pages[f"notebooks/{path.stem}.html"]) or "_images/" in page
+
+
+def test_the_citation_is_of_this_version():
+    citation = yaml.safe_load((ROOT / "CITATION.cff").read_text())
+    assert (citation["title"], citation["version"]) == ("Linkwork", __version__)
+    assert {"cff-version", "message", "authors"} <= set(citation)

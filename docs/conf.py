@@ -1,0 +1,81 @@
+"""Settings of the documentation's site: ``make docs`` builds it with Sphinx into build/site, and it works without a network."""
+
+from __future__ import annotations
+
+import re
+from typing import Any
+
+from latex2mathml.converter import convert
+
+from analysis.cli import COMMANDS
+from linkwork import __version__
+
+project = "Linkwork"
+author = copyright = "The Linkwork developers"
+version = release = __version__
+
+extensions = ["myst_nb", "numpydoc", "sphinx.ext.autodoc", "sphinx_click"]
+exclude_patterns = ["**.ipynb_checkpoints"]
+html_theme = "furo"  # its fonts are those of the reader's machine
+html_title = f"Linkwork {__version__}"
+html_static_path = ["site.css"]
+html_css_files = ["site.css"]
+html_copy_source = False
+
+myst_enable_extensions = ["dollarmath"]
+myst_heading_anchors = 3
+smartquotes = False  # would make a dash of the two hyphens before an option
+
+# notebooks are stored without outputs, and run when the site is built; an error in a cell is an error of the build
+nb_execution_mode = "force"
+nb_execution_timeout = 300
+nb_execution_raise_on_error = True
+nb_merge_streams = True
+nb_output_stderr = "remove"  # what is compiled, once on a machine
+
+default_role = "py:obj"  # of a docstring's single backticks: a link where the name is known
+autodoc_member_order = "bysource"
+autodoc_typehints = "none"  # the signature would repeat what the sections of numpydoc state
+numpydoc_show_class_members = False
+add_module_names = False
+
+html_math_renderer = "mathml"
+
+#: Links between files of the repository, which are other pages or none on the site.
+LINKS = (
+    (r"\]\((?:\.\./)?(CONTRIBUTING|CHANGELOG)\.md", lambda match: f"]({match[1].lower()}.md"),
+    (r"\]\((?:\.\./)?docs/", lambda match: "]("),
+    (r"\]\((?=CITATION|examples/)", lambda match: "](../"),
+)
+
+
+def relink(text: list[str]) -> None:
+    """Let the links of a page that is read lead to the site's pages."""
+    for pattern, replacement in LINKS:
+        text[0] = re.sub(pattern, replacement, text[0])
+
+
+def write_formula(translator: Any, node: Any) -> None:
+    """MathML: every browser draws it, without a script."""
+    from docutils import nodes
+
+    display = "inline" if isinstance(node, nodes.math) else "block"
+    translator.body.append(convert(node.astext(), display=display))
+    raise nodes.SkipNode
+
+
+def list_commands(app: Any, name: str, text: list[str]) -> None:
+    """Put every command with its options on their page; the groups import theirs only when they are called."""
+    if name != "reference/commands":
+        return
+    for command, (module, _) in COMMANDS.items():
+        function = f"analysis.cli.{module}:{command.replace('-', '_')}"
+        text[0] += f"\n```{{eval-rst}}\n.. click:: {function}\n   :prog: linkwork {command}\n   :nested: full\n```\n"
+
+
+def setup(app: Any) -> None:
+    """Connect what this file adds to Sphinx."""
+    app.add_html_math_renderer("mathml", (write_formula, None), (write_formula, None))
+    app.connect("source-read", lambda app, name, text: relink(text))
+    app.connect("source-read", list_commands)
+    app.connect("include-read", lambda app, path, name, text: relink(text))
