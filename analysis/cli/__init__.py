@@ -6,6 +6,7 @@ are kept); 4 a check failed; 130 interrupted from the keyboard (what was compute
 
 from __future__ import annotations
 
+import sys
 from importlib import import_module
 from typing import Any
 
@@ -20,8 +21,9 @@ INTERRUPTED = 130
 
 #: Every command: the module of this package that has it, as a function of its name, and its line in ``linkwork --help``.
 COMMANDS = {
-    "build": ("runs", "Build and validate the FMUs."),
+    "build": ("making", "Build and validate the FMUs."),
     "check": ("runs", "Compare the FMU with the in-process solver, output by output."),
+    "examples": ("making", "Copy the examples to a folder."),
     "figures": ("runs", "Make the theses' figures, a still and an animation."),
     "info": ("runs", "Describe published sets, a parameter or case file, an FMU."),
     "probe": ("probe", "Probe an FMU of any make with legal and forbidden calls."),
@@ -32,6 +34,48 @@ COMMANDS = {
     "stability": ("vibration", "Judge the periodic motion and chart where it is unstable."),
     "synthesize": ("design", "Find linkages for a path, a function or a motion."),
 }
+
+
+class Commands(click.Group):
+    """A group whose errors are sentences like those of the commands, and which knows what was nearly meant."""
+
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        if not args[0].startswith("-") and self.get_command(ctx, args[0]) is None:
+            from ..files import unknown_name
+
+            raise click.UsageError(str(unknown_name(args[0], self.list_commands(ctx), f"command {args[0]!r}")), ctx)
+        return super().resolve_command(ctx, args)
+
+    def main(self, *arguments: Any, standalone_mode: bool = True, **extra: Any) -> Any:
+        """Run the command line; what is wrong with it is reported in the style of every other error."""
+        plain: Any = super().main
+        if not standalone_mode:
+            return plain(*arguments, standalone_mode=False, **extra)
+        try:
+            sys.exit(plain(*arguments, standalone_mode=False, **extra) or 0)
+        except click.exceptions.NoArgsIsHelpError as error:
+            error.show()
+            sys.exit(error.exit_code)
+        except click.ClickException as error:
+            from .common import print_error
+
+            print_error(f"error: {_sentence(error)}", "red")
+            sys.exit(error.exit_code)
+        except click.Abort:
+            click.echo("interrupted", err=True)
+            sys.exit(INTERRUPTED)
+
+
+def _sentence(error: click.ClickException) -> str:
+    """What click says, as one sentence in small letters, and where there is help."""
+    text = error.format_message().strip().removesuffix(".").replace(". Did you mean", "; did you mean")
+    # S1, a4 and the like stay as they are
+    if text[1:2].islower() or text[1:2] == " ":
+        text = text[0].lower() + text[1:]
+    context = error.ctx if isinstance(error, click.UsageError) else None
+    return text if context is None else f"{text} (see '{context.command_path} --help')"
 
 
 class LazyCommand(click.Command):
@@ -45,6 +89,7 @@ class LazyCommand(click.Command):
 
 
 @click.group(
+    cls=Commands,
     commands=[LazyCommand(name, short_help=line) for name, (_, line) in COMMANDS.items()],
     context_settings={"help_option_names": ["-h", "--help"]},
 )
@@ -54,6 +99,7 @@ def main() -> None:
 
     \b
     Examples:
+      linkwork examples
       linkwork build
       linkwork run --published table-3.1
       linkwork run examples/torsion-bar.toml --fmu build/FiveBarSlider.fmu

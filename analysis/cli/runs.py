@@ -1,4 +1,4 @@
-"""Commands that build, run and check FMUs and cases, describe them, and make the theses' figures."""
+"""Commands that run and check cases and FMUs, describe them, and make the theses' figures."""
 
 from __future__ import annotations
 
@@ -12,9 +12,8 @@ from zipfile import BadZipFile
 import click
 
 from linkwork import __version__
-from linkwork.errors import InputError
 
-from ..mechanisms import MECHANISMS, PUBLISHED
+from ..mechanisms import PUBLISHED
 from .common import (
     CHECK_FAILED,
     ENDED_EARLY,
@@ -36,33 +35,6 @@ from .common import (
 COMPARED = ("drive.applied_torque", "pin.C.fx", "pin.C.fy", "slider_pin.fx", "slider_pin.fy")
 #: Where the FMUs of the mechanisms are looked for.
 DEFAULT_FOLDER = Path("build")
-
-
-@click.command()
-@click.argument("models", nargs=-1)
-@click.option(
-    "--dest", default="build", show_default=True, type=click.Path(file_okay=False), help="Folder for the FMUs."
-)
-@handled
-def build(models: Sequence[str], dest: str) -> None:
-    """Build and validate the FMUs.
-
-    \b
-    Examples:
-      linkwork build
-      linkwork build FiveBarSlider --dest fmus
-    """
-    from ..export import build as build_one
-    from ..export import try_out
-
-    known = {mechanism.fmu: mechanism for mechanism in MECHANISMS.values()}
-    for name in models or known:
-        if name not in known:
-            raise InputError(f"there is no model {name!r}: the models are {', '.join(known)}")
-        with console.status(f"building {name}"):
-            path = build_one(known[name], dest)
-            try_out(path)
-        console.print(f"{path}: valid, {path.stat().st_size / 1024:.0f} KiB", highlight=False, soft_wrap=True)
 
 
 @click.command()

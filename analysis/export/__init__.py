@@ -2,6 +2,7 @@
 
 from .archive import SOURCES, BuildError, try_out
 from .compatibility import publish
+from .builds import Built, build_all, kinds_here
 from .description import KINDS, NATIVE, NATIVE_FMI3, PYTHON, Kind
 from .native_fmu import PLATFORMS, build_native, compile_library, source_files, this_platform
 from .python_fmu import build
@@ -14,12 +15,15 @@ __all__ = [
     "PYTHON",
     "SOURCES",
     "BuildError",
+    "Built",
     "Kind",
     "build",
+    "build_all",
     "build_native",
     "compile_library",
     "publish",
     "source_files",
+    "kinds_here",
     "this_platform",
     "try_out",
 ]

@@ -27,7 +27,11 @@ class ParameterError(LinkworkError, ValueError):
         super().__init__(f"parameter {name} is {value!r}: it must {requirement}")
 
 
-class UnknownNameError(ParameterError):
+class InputError(LinkworkError, ValueError):
+    """An input of a run is not usable: not finite, of a wrong shape, or out of order."""
+
+
+class UnknownNameError(ParameterError, InputError):
     """A name that nothing has; ``known`` are the names there are, ``near`` the one that was probably meant."""
 
     def __init__(self, name: str, known: tuple[str, ...], near: str | None) -> None:
@@ -49,10 +53,6 @@ class MissingParameterError(ParameterError):
 
 class AssemblyError(LinkworkError):
     """The links cannot be joined at the given configuration."""
-
-
-class InputError(LinkworkError, ValueError):
-    """An input of a run is not usable: not finite, of a wrong shape, or out of order."""
 
 
 class StepError(LinkworkError):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import shutil
+import importlib.util
 import subprocess
 import sys
 from pathlib import Path
@@ -16,6 +17,7 @@ from analysis import Inputs, cli, export
 from analysis.export.description import KINDS, description
 from analysis.mechanisms import FIVE_BAR
 from analysis.periodic import find_orbit
+from build_fmu import FMUS
 from linkwork.five_bar.published import SETS, TABLE_3_1
 
 ROOT = Path(__file__).parents[2]
@@ -33,7 +35,7 @@ def in_own_process(*arguments, cwd):
     )
 
 
-@pytest.mark.parametrize("command", [[], ["build"], ["run"], ["check"], ["info"], ["figures"]])
+@pytest.mark.parametrize("command", [[], *([name] for name in cli.COMMANDS)])
 def test_help_shows_examples(linkwork, command):
     result = linkwork(*command, "--help")
     assert result.exit_code == 0
@@ -266,17 +268,37 @@ def test_a_run_through_the_fmu_says_that_its_inputs_are_held(fmu, tmp_path):
 
 @pytest.mark.fmu
 def test_build_builds(linkwork, tmp_path):
-    result = linkwork("build", "--dest", tmp_path / "fmus")
+    result = linkwork("build", "--dest", tmp_path / "fmus", "--kinds", "python")
     assert result.exit_code == 0
-    assert (tmp_path / "fmus" / "FiveBarSlider.fmu").is_file()
-    assert "valid" in result.output
+    assert {path.name for path in (tmp_path / "fmus").iterdir()} == {f"{name}.fmu" for name in FMUS}
+    assert result.output.count("valid") == len(FMUS)
+
+
+def test_examples_are_copied_once(linkwork, tmp_path):
+    assert linkwork("examples", "--dest", "mine").exit_code == 0
+    (tmp_path / "mine" / "run-up.toml").write_text("changed")
+    result = linkwork("examples", "--dest", "mine")
+    assert result.exit_code == 2
+    assert "run-up.toml" in result.stderr
+    assert (tmp_path / "mine" / "run-up.toml").read_text() == "changed"
+    assert linkwork("examples", "--dest", "mine", "--force").exit_code == 0
+    for path in (ROOT / "examples").iterdir():
+        assert (tmp_path / "mine" / path.name).read_bytes() == path.read_bytes()
+
+
+def test_without_zig_what_can_be_built_is_and_a_note_says_what_is_missing(linkwork, monkeypatch):
+    monkeypatch.setattr(importlib.util, "find_spec", lambda name: None)
+    result = linkwork("build", "FiveBarSlider")
+    assert result.exit_code == 0
+    assert "FiveBarSlider.fmu: valid" in result.output
+    assert "pip install 'linkwork[native]'" in result.stderr
 
 
 def test_ctrl_c_is_clean(linkwork, monkeypatch):
     def interrupted(*arguments, **options):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(export, "build", interrupted)
+    monkeypatch.setattr(export, "build_all", interrupted)
     result = linkwork("build")
     assert result.exit_code == cli.INTERRUPTED
     assert "interrupted" in result.stderr

@@ -177,8 +177,8 @@ def test_failed_build_leaves_the_old_fmu(tmp_path: Path, fmu: Path, model: Model
     [
         (["FiveBarSlider"], 0, "FiveBarSlider.fmu: valid"),
         ([], 0, "SliderCrank.fmu: valid"),
-        (["SixBar"], 1, "error: there is no model 'SixBar': the models are FiveBarSlider, SliderCrank\n"),
-        (["--no-such-option"], 2, "usage:"),
+        (["SixBar"], 1, "error: there is no model 'SixBar' (the names are FiveBarSlider, SliderCrank)\n"),
+        (["--no-such-option"], 2, "error: no such option '--no-such-option' (see '"),
     ],
     ids=["one", "all", "unknown", "usage"],
 )

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import click
 
+from .. import Commands
 from .dual import dual
 from .forces import forces
 from .mechanism import info, picture
 from .tolerances import tolerances
 
 
-@click.group("slider-crank")
+@click.group("slider-crank", cls=Commands)
 def slider_crank() -> None:
     """The generalised slider-crank of Rahman's thesis: offset, shifted along its crank axis, twisted.
 

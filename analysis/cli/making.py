@@ -1,0 +1,86 @@
+"""Commands that make what one begins with: FMUs, examples, case files."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Sequence
+from pathlib import Path
+
+import click
+
+from .common import console, handled, print_error, say
+
+PACKAGE = Path(__file__).resolve().parents[1]
+#: The examples: beside the package in a checkout, inside it where Linkwork is installed as a wheel.
+EXAMPLES = (PACKAGE.parent / "examples", PACKAGE / "_examples")
+
+
+def _several(context: click.Context, parameter: click.Parameter, values: Sequence[str]) -> tuple[str, ...]:
+    """Callback of an option that can be given often, or once with commas."""
+    return tuple(name for value in values for name in value.split(",") if name)
+
+
+@click.command()
+@click.argument("models", nargs=-1, metavar="[MODEL]...")
+@click.option(
+    "--dest", default="build", show_default=True, type=click.Path(file_okay=False), help="Folder for the FMUs."
+)
+@click.option(
+    "--kinds",
+    multiple=True,
+    callback=_several,
+    metavar="KIND,...",
+    help="Kinds of FMU: python, native, native-fmi3; by default all that can be built here, the native ones with Zig.",
+)
+@click.option(
+    "--platforms",
+    multiple=True,
+    callback=_several,
+    metavar="PLATFORM,...",
+    help="What native FMUs are compiled for: all, or some of x86_64-linux, aarch64-linux, x86_64-windows, x86_64-darwin, "
+    "aarch64-darwin; by default this one.",
+)
+@handled
+def build(models: Sequence[str], dest: str, kinds: Sequence[str], platforms: Sequence[str]) -> None:
+    """Build and validate FMUs: of every mechanism, or those named, such as FiveBarSlider.
+
+    \b
+    Examples:
+      linkwork build
+      linkwork build FiveBarSlider --dest fmus --kinds python
+      linkwork build --kinds native,native-fmi3 --platforms all
+    """
+    from ..export import KINDS, build_all, kinds_here
+
+    with console.status("building"):
+        for fmu, for_platforms in build_all(models, dest, kinds, platforms):
+            made = f", {' '.join(for_platforms)}" if for_platforms else ""
+            say(f"{fmu}: valid, {fmu.stat().st_size / 1024:.0f} KiB{made}")
+    if not kinds and set(kinds_here()) != set(KINDS):
+        print_error("note: no native FMUs, which Zig compiles: it comes with pip install 'linkwork[native]'")
+
+
+@click.command()
+@click.option(
+    "--dest", default="examples", show_default=True, type=click.Path(file_okay=False), help="Folder for the examples."
+)
+@click.option("--force", is_flag=True, help="Write over files of the same name.")
+@handled
+def examples(dest: str, force: bool) -> None:
+    """Copy the examples to a folder: case files of every kind, a drawn curve, scripts.
+
+    \b
+    Examples:
+      linkwork examples
+      linkwork run examples/run-up.toml
+    """
+    source = next(folder for folder in EXAMPLES if folder.is_dir())
+    folder = Path(dest)
+    files = sorted(path for path in source.iterdir() if path.is_file())
+    there = [path.name for path in files if (folder / path.name).exists()]
+    if there and not force:
+        raise click.UsageError(f"{folder} has {', '.join(there)} already: give --force to write over them, or --dest")
+    folder.mkdir(parents=True, exist_ok=True)
+    for path in files:
+        shutil.copyfile(path, folder / path.name)
+    say(f"wrote {len(files)} files to {folder}: {', '.join(path.name for path in files)}")

@@ -1,0 +1,82 @@
+"""Building every kind of FMU of every mechanism: what ``linkwork build`` does."""
+
+from __future__ import annotations
+
+import importlib.util
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+from ..files import unknown_name
+from ..mechanisms import MECHANISMS
+from .archive import try_out
+from .description import KINDS, PYTHON
+from .native_fmu import PLATFORMS, build_native, this_platform
+from .python_fmu import build
+
+#: In place of names of platforms: all of them.
+ALL = "all"
+
+
+class Built(NamedTuple):
+    """An FMU that was built: its path, and the platforms that its native libraries are for."""
+
+    path: Path
+    platforms: tuple[str, ...]
+
+
+def kinds_here() -> tuple[str, ...]:
+    """The kinds of FMU that can be built here: without Zig only those in Python."""
+    zig = importlib.util.find_spec("ziglang") is not None
+    return tuple(name for name, kind in KINDS.items() if zig or kind is PYTHON)
+
+
+def build_all(
+    models: Sequence[str] = (),
+    dest: Path | str = "build",
+    kinds: Sequence[str] = (),
+    platforms: Sequence[str] = (),
+) -> Iterator[Built]:
+    """Build FMUs, one after the other, each valid and, where it can run here, tried out.
+
+    Parameters
+    ----------
+    models : sequence of str, optional
+        Names of FMUs, such as ``FiveBarSlider``; those of all mechanisms by default.
+    dest : path
+        Folder for the FMUs; made if it is not there.
+    kinds : sequence of str, optional
+        Of `KINDS`; by default all that can be built here.
+    platforms : sequence of str, optional
+        Of `PLATFORMS`, or ``all``: what native FMUs are compiled for; this one by default.
+
+    Yields
+    ------
+    Built
+
+    Raises
+    ------
+    UnknownNameError
+        If a model, kind or platform is none of those there are; before anything is built.
+    BuildError
+        If an FMU cannot be built, is not valid or does not run.
+    """
+    known = {mechanism.fmu: mechanism for mechanism in MECHANISMS.values()}
+    for what, names, there in (
+        ("model", models, known),
+        ("kind of FMU", kinds, KINDS),
+        ("platform", platforms, (ALL, *PLATFORMS)),
+    ):
+        for name in names:
+            if name not in there:
+                raise unknown_name(name, there, f"{what} {name!r}")
+    chosen = [KINDS[name] for name in kinds or kinds_here()]
+    here = this_platform() if any(kind is not PYTHON for kind in chosen) else ""
+    native = tuple(PLATFORMS) if ALL in platforms else tuple(platforms) or (here,)
+    for name in models or known:
+        for kind in chosen:
+            python = kind is PYTHON
+            made = build(known[name], dest) if python else build_native(known[name], kind, dest, native)
+            if python or here in native:
+                try_out(made)
+            yield Built(made, () if python else native)

@@ -1,0 +1,64 @@
+"""The wheel: what is in it, and that it works where there is no checkout."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import sysconfig
+from collections.abc import Callable
+from pathlib import Path
+from zipfile import ZipFile
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+
+pytestmark = pytest.mark.slow
+
+
+def called(*words: object, cwd: Path) -> str:
+    """Standard output of a command that ends well, without the checkout on its path."""
+    environment = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
+    done = subprocess.run(
+        [str(word) for word in words], cwd=cwd, env=environment, capture_output=True, text=True, timeout=300, check=False
+    )  # fmt: skip
+    assert done.returncode == 0, done.stdout + done.stderr
+    return done.stdout
+
+
+@pytest.fixture(scope="module")
+def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("wheel")
+    called(sys.executable, "-m", "hatchling", "build", "-t", "wheel", "-d", folder, cwd=ROOT)
+    (path,) = folder.glob("*.whl")
+    return path
+
+
+@pytest.fixture(scope="module")
+def installed(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Callable[..., str]:
+    """The command of an environment that has the wheel, and the libraries of this one, called in a folder of its own."""
+    folder = tmp_path_factory.mktemp("elsewhere")
+    called(sys.executable, "-m", "venv", "--without-pip", "venv", cwd=folder)
+    python = folder / "venv" / ("Scripts/python.exe" if os.name == "nt" else "bin/python")
+    called(sys.executable, "-m", "pip", "--python", python, "install", "--no-deps", "--no-index", wheel, cwd=folder)
+    # a folder in a .pth file is searched last, and its own .pth files, such as a checkout's, are not read
+    site = called(python, "-c", "import sysconfig; print(sysconfig.get_path('purelib'))", cwd=folder).strip()
+    Path(site, "libraries.pth").write_text(sysconfig.get_path("purelib"), encoding="utf-8")
+    return lambda *words: called(python.with_stem("linkwork"), *words, cwd=folder)
+
+
+def test_the_wheel_has_two_packages_that_are_typed_and_no_other_module(wheel: Path) -> None:
+    with ZipFile(wheel) as archive:
+        names = archive.namelist()
+    assert {name.partition("/")[0] for name in names if ".dist-info/" not in name} == {"analysis", "linkwork"}
+    assert {"analysis/py.typed", "linkwork/py.typed", "analysis/_examples/run-up.toml"} <= set(names)
+
+
+def test_the_installed_wheel_works_without_a_checkout(installed: Callable[..., str]) -> None:
+    assert installed("--version").startswith("linkwork, version")
+    assert "slider.position" in installed("run", "--published", "table-3.1", "--stop-time", "20 ms")
+    assert f"{len(list((ROOT / 'examples').iterdir()))} files" in installed("examples")
+    assert "torsion bar" in installed("run", "examples/torsion-bar.toml", "--stop-time", "20 ms", "--no-plot")
+    assert "FiveBarSlider.fmu: valid" in installed("build", "FiveBarSlider", "--kinds", "python")
+    assert "valid" in installed("info", "build/FiveBarSlider.fmu")
