@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Collection, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from functools import reduce, wraps
 from itertools import repeat
 from pathlib import Path
@@ -14,7 +14,7 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from linkwork.errors import Interrupted, LinkworkError
+from linkwork.errors import InputError, Interrupted, LinkworkError
 
 from . import CHECK_FAILED as CHECK_FAILED
 from . import ENDED_EARLY as ENDED_EARLY
@@ -114,6 +114,65 @@ def number_or_text(text: str) -> bool | int | float | str:
     return text
 
 
+def unknown(name: str, known: Iterable[str], words: str) -> click.UsageError:
+    """The error for a name on the command line that nothing has, with the one that was probably meant."""
+    from ..files import unknown_name
+
+    return click.UsageError(str(unknown_name(name, known, words)))
+
+
+#: What a file of tables may be about, and the command that takes it.
+RUN = "a case of a run", "linkwork run"
+PARAMETERS = "a file of parameters alone", "linkwork info"
+SYNTHESIS = "a synthesis case", "linkwork synthesize"
+SLIDER_MOTION = "a case of a slider's motion", "linkwork slider-motion"
+#: What no command takes for a case, by the ending of the file.
+_OTHERS = {
+    ".fmu": "an FMU: linkwork info {0} describes it, linkwork run CASE --fmu {0} runs it",
+    ".csv": "a table of numbers: a case names it as the file of an input or a task",
+    ".svg": "a drawing: a synthesis case names it as the file of its task",
+    ".dxf": "a drawing, written for CAD: a synthesis case takes SVG or CSV as the file of its task",
+    ".py": "a Python script: python {0} runs it",
+}
+
+
+def kind_of(tables: Mapping[str, Any]) -> tuple[str, str]:
+    """What tables are about, by the names that only one kind of file has."""
+    from ..mechanisms import MECHANISMS
+    from ..run import COMMON, acting_on
+
+    if "task" in tables:
+        return SLIDER_MOTION if {"slider", "strategy"} & set(tables) else SYNTHESIS
+    acting = {name.partition(".")[0] for mechanism in MECHANISMS.values() for name in acting_on(mechanism)}
+    return RUN if (acting | set(COMMON) - {"mechanism"}) & set(tables) else PARAMETERS
+
+
+def check_kind(path: str, *wanted: tuple[str, str], settings: Iterable[str] = ()) -> None:
+    """Make sure that a file is of a kind that the command takes.
+
+    Parameters
+    ----------
+    path : str
+    *wanted : kinds
+    settings : iterable of str
+        Dotted names that the command line sets besides.
+
+    Raises
+    ------
+    InputError
+        If it is of another kind, with the command that takes it, or cannot be read.
+    """
+    from ..files import read_tables
+
+    ending = Path(path).suffix.lower()
+    if ending in _OTHERS:
+        raise InputError(f"{path} is {_OTHERS[ending].format(path)}")
+    kind = kind_of(read_tables(path) | {name.partition(".")[0]: None for name in settings})
+    if kind not in wanted:
+        what, command = kind
+        raise InputError(f"{path} is {what}: {command} {path} (this command takes {wanted[0][0]})")
+
+
 def quantity(text: str, unit: str, option: str) -> float:
     """The value of an option in SI, from a text with its unit or a bare number."""
     from .. import units
@@ -140,6 +199,7 @@ def chosen_case(file: str | None, published: str | None, settings: Sequence[str]
         raise click.UsageError("give either a case file or --published NAME")
     overrides = changes(settings, number_or_text, "slider.stiffness='2e6 dyn/cm'")
     if file is not None:
+        check_kind(file, RUN, PARAMETERS)
         return load_case(file, overrides)
     assert published is not None
     if overrides:

@@ -14,7 +14,7 @@ from rich.table import Table
 
 from linkwork.errors import Interrupted
 
-from .common import INTERRUPTED, changes, console, errors, handled
+from .common import INTERRUPTED, SYNTHESIS, changes, check_kind, console, errors, handled
 
 if TYPE_CHECKING:
     from ..synthesis import Solution, TradeOff
@@ -194,6 +194,7 @@ def synthesize(
     from ..synthesis import SynthesisInterrupted, TradeOffInterrupted, load_synthesis_case
 
     overrides = overrides_of(settings, search__method=method, search__seed=seed, search__jobs=jobs)
+    check_kind(case, SYNTHESIS)
     chosen = load_synthesis_case(case, overrides)
     folder = Path(out)
     stopped: Interrupted | None = None

@@ -14,14 +14,21 @@ import click
 from linkwork import __version__
 
 from ..mechanisms import PUBLISHED
+from ..units import RAD_S_PER_RPM
 from .common import (
     CHECK_FAILED,
     ENDED_EARLY,
     INTERRUPTED,
+    PARAMETERS,
+    RUN,
     case_options,
+    changes,
+    check_kind,
     chosen_case,
     console,
     handled,
+    kind_of,
+    number_or_text,
     out_option,
     plot_option,
     print_error,
@@ -29,6 +36,7 @@ from .common import (
     quantity,
     show_table,
     tolerance_option,
+    unknown,
 )
 
 #: Outputs in the plot of a check beside the freedoms, of those that the mechanism has.
@@ -117,7 +125,28 @@ def run(
         sys.exit(INTERRUPTED)
     if result.status:
         print_error(f"the run ended early: {result.message}", "red")
+        for sentence in _bare_speeds(case, settings, chosen):
+            print_error(sentence)
         sys.exit(ENDED_EARLY)
+
+
+def _bare_speeds(file: str | None, settings: Sequence[str], case: Any) -> list[str]:
+    """For each speed of a turn that was given as a bare number: what it is taken for, and whether rpm was meant."""
+    from ..files import flattened, read_tables
+    from ..mechanisms import mechanism_of
+    from ..run import acting_on
+
+    given = {
+        **flattened(read_tables(file) if file else {}),
+        **changes(settings, number_or_text, "drive.speed='420 rpm'"),
+    }
+    speeds = [name for name, acting in acting_on(mechanism_of(case.parameters)).items() if acting.unit == "rad/s"]
+    return [
+        f"{name} = {given[name]:g} has no unit and is taken in rad/s, as {given[name] / RAD_S_PER_RPM:.6g} rpm: "
+        f"was '{given[name]:g} rpm' meant?"
+        for name in speeds
+        if isinstance(given.get(name), (int, float))
+    ]
 
 
 def _print_extremes(title: str, result: Any) -> None:
@@ -259,7 +288,7 @@ def _cases_to_check(names: Sequence[str], fmu: str | None, everything: bool) -> 
         elif Path(name).suffix in (".toml", ".json"):
             chosen.append((Path(name).stem, load_case(name)))
         else:
-            raise click.UsageError(f"{name!r} is neither a case file nor a standard case ({', '.join(CASES)})")
+            raise unknown(name, CASES, f"standard case or case file {name!r}")
     return chosen
 
 
@@ -324,11 +353,10 @@ def info(what: str | None) -> None:
       linkwork info table-3.1
       linkwork info build/FiveBarSlider.fmu
     """
-    from linkwork.five_bar.published import RAD_S_PER_RPM
-
+    from ..files import read_tables
     from ..mechanisms import MECHANISMS
     from ..numerics.codegen import cache_root
-    from ..run import load_case
+    from ..run import load_case, load_parameters
 
     if what is None:
         kinds = [(m.name, m.title, f"{m.fmu}.fmu") for m in MECHANISMS.values()]
@@ -344,11 +372,14 @@ def info(what: str | None) -> None:
     elif Path(what).suffix == ".fmu":
         _print_fmu(Path(what))
     elif Path(what).suffix in (".toml", ".json"):
-        case = load_case(what)
-        _print_parameters(case.title, case.parameters)
+        check_kind(what, RUN, PARAMETERS)
+        if kind_of(read_tables(what)) == PARAMETERS:
+            _print_parameters(Path(what).stem, load_parameters(what))
+        else:
+            case = load_case(what)
+            _print_parameters(case.title, case.parameters)
     else:
-        names = ", ".join((*MECHANISMS, *PUBLISHED))
-        raise click.UsageError(f"{what!r} is neither a mechanism or published set ({names}), a file, nor an FMU")
+        raise unknown(what, (*MECHANISMS, *PUBLISHED), f"mechanism, published set, case file or FMU {what!r}")
 
 
 def _print_mechanism(mechanism: Any) -> None:
@@ -438,9 +469,9 @@ def figures(numbers: Sequence[str], out: str, listing: bool) -> None:
         for number, study in STUDIES.items():
             console.print(f"{number:>8}  {study}", highlight=False)
         return
-    unknown = [number for number in numbers if number not in STUDIES]
-    if unknown:
-        raise click.UsageError(f"there is no figure {', '.join(unknown)}: the figures are {', '.join(STUDIES)}")
+    for number in numbers:
+        if number not in STUDIES:
+            raise unknown(number, STUDIES, f"figure {number}")
     for number in numbers or STUDIES:
         with console.status(f"figure {number}"):
             result, paths = make(number, Path(out))

@@ -13,7 +13,7 @@ from rich.table import Table
 
 from linkwork.errors import Interrupted
 
-from .common import console, handled
+from .common import SLIDER_MOTION, check_kind, console, handled
 from .design import leave_if_stopped, overrides_of, print_error, print_written, search_options, table, write_described
 
 if TYPE_CHECKING:
@@ -59,6 +59,7 @@ def slider_motion(
     from ..synthesis import SecondCrank, SliderMotion
 
     overrides = overrides_of(settings, slider__harmonics=harmonics, search__seed=seed, search__jobs=jobs)
+    check_kind(case, SLIDER_MOTION, settings=overrides)
     chosen = load_slider_case(case, overrides)
     folder = Path(out)
     solution, stopped = _moved(chosen) if chosen.strategy is None else _strategy(chosen)

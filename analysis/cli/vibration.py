@@ -14,7 +14,7 @@ import numpy as np
 from rich.markup import escape
 from rich.table import Table
 
-from linkwork.errors import InputError, ParameterError
+from linkwork.errors import InputError, LinkworkError, ParameterError
 from linkwork.parameters import field_name
 
 from ..mechanisms import FIVE_BAR, PUBLISHED, mechanism_of
@@ -218,8 +218,9 @@ def _ends(parameters: Any, vary: str, low: str | None, high: str | None, natural
 
 
 def _branches(title: str, response: Any, factor: float, unit: str) -> None:
-    grid = Table(title=f"{title}: periodic motions, {response.family.name} in {unit}", title_justify="left")
-    for heading in ("branch", "turns", "points", "from", "to", "motion", "what happens on it"):
+    grid = Table(title=f"{title}: periodic motions over {response.family.name}", title_justify="left")
+    events_heading = f"what happens on it, at [{unit}]"
+    for heading in ("branch", "turns", "points", f"from [{unit}]", f"to [{unit}]", "motion", events_heading):
         grid.add_column(escape(heading), justify="left" if heading.startswith("what") else "right")
     for number, branch in enumerate(response.branches, start=1):
         words = [s.value for s in branch.stability()]
@@ -313,22 +314,28 @@ def stability(
 
     parameters, drive = chosen.case.parameters, chosen.drive()
     start = chosen.start(drive)
-    names, ranges = ("", ""), ((0.0, 0.0), (0.0, 0.0))
+    mechanism = mechanism_of(parameters)
+    names = (x or speed_name(mechanism) or "drive.speed", y or damping_name(mechanism))
+    ranges, missing = [], None
     if charted:
-        mechanism = mechanism_of(parameters)
-        names = (x or speed_name(mechanism) or "drive.speed", y or damping_name(mechanism))
-        ranges = (
-            _axis_range(parameters, drive, names[0], x_range, "--x-range"),
-            _axis_range(parameters, drive, names[1], y_range, "--y-range"),
-        )
+        for name, own, texts, option in ((names[0], x, x_range, "--x"), (names[1], y, y_range, "--y")):
+            try:
+                ranges.append(_axis_range(parameters, drive, name, texts, f"{option}-range"))
+            except LinkworkError as error:
+                if own is not None or texts is not None:
+                    raise
+                # of an axis that nobody chose: the verdict does not need it
+                missing = InputError(f"no chart over {name}, as {option} is not given: {error}")
     _report_verdict(chosen.case.title, parameters, drive, start)
+    if missing is not None:
+        raise missing
     if not charted:
         return
     found = stability_chart(
         parameters,
         drive,
         names,
-        ranges,
+        (ranges[0], ranges[1]),
         points=points,
         start=start,
         beside=linear_motion(parameters, drive, names) if mechanism_of(parameters) is FIVE_BAR else None,

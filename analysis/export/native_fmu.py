@@ -17,9 +17,9 @@ from importlib import resources
 from pathlib import Path
 from typing import NamedTuple
 
-from linkwork.errors import InputError
 from linkwork.mechanism import Mechanism
 
+from ..files import unknown_name
 from ..mechanisms import check
 from ..numerics.codegen import code_folder
 from .archive import SOURCES, BuildError, documentation, write
@@ -112,7 +112,7 @@ def build_native(
     platforms = [this_platform()] if platforms is None else list(platforms)
     for name in platforms:
         if name not in PLATFORMS:
-            raise InputError(f"there is no platform {name!r}: the platforms are {', '.join(PLATFORMS)}")
+            raise unknown_name(name, PLATFORMS, f"platform {name!r}")
     dest = Path(dest)
     dest.mkdir(parents=True, exist_ok=True)
     sources = source_files(mechanism, kind)

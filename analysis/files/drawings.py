@@ -59,7 +59,7 @@ MARGIN = 0.05
 
 def _check(layer: str, *numbers: float) -> None:
     if layer not in LAYERS:
-        raise unknown_name(f"layer {layer!r}", LAYERS)
+        raise unknown_name(layer, LAYERS, f"layer {layer!r}")
     if not all(isfinite(number) for number in numbers):
         raise InputError(f"on layer {layer}: {numbers} must be finite numbers")
 

@@ -18,8 +18,9 @@ import control
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from linkwork.errors import InputError, LinkworkError, UnknownNameError
+from linkwork.errors import InputError, LinkworkError
 
+from ..files import unknown_name
 from ..run import Function
 from ..units import Amount, in_si
 from .model import FloatArray, LinearModel, LinearModelError, by_magnitude, signal_name
@@ -272,7 +273,7 @@ def design_lqr(
     if isinstance(q, Mapping):
         for name in q:
             if name not in names:
-                raise UnknownNameError(name, names, None)
+                raise unknown_name(name, names)
         q = [q.get(name, 0.0) for name in names]
     weights = np.array(q, dtype=float)
     if weights.ndim == 1:

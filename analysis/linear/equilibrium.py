@@ -21,6 +21,7 @@ from linkwork.limits import LIMIT_SINE
 from linkwork.mechanism import Mechanism
 from linkwork.parameters import fmi_name
 
+from ..files import unknown_name
 from ..mechanisms import InitialState, Parameters, mechanism_of, variable_units
 from ..numerics import symbolic
 from ..run import Inputs, expressions, given, takes_published
@@ -102,7 +103,7 @@ class Equilibrium:
     def __getitem__(self, name: str) -> float:
         mechanism, p = mechanism_of(self.parameters), self.parameters.constants()
         if name not in mechanism.output_names:
-            raise InputError(f"there is no output {name!r}: the outputs are {', '.join(mechanism.output_names)}")
+            raise unknown_name(name, mechanism.output_names, f"output {name!r}")
         modes, channels = channels_along(mechanism, self.inputs, np.zeros(1), np.array([self.state]))
         applied = mechanism.equations.applied(tuple(map(float, modes)), tuple(channels[0].tolist()), p)
         outputs = mechanism.equations.outputs(self.state, applied, 0.0, p)

@@ -11,9 +11,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from linkwork.errors import InputError, UnknownNameError
+from linkwork.errors import InputError
 from linkwork.mechanism import Channel, Mechanism, Mode, PublishedSet
 
+from ..files import unknown_name
 from ..mechanisms import InitialState, Parameters, mechanism_of, variable_units
 from ..run import InductionMotor, Inputs, driven, started, takes_published
 from ..run.inputs import given
@@ -149,7 +150,7 @@ class Drive:
         forces = forces_of(mechanism)
         for name, value in self.forces.items():
             if name not in forces:
-                raise UnknownNameError(name, tuple(forces), None)
+                raise unknown_name(name, forces)
             require_acting(self, mechanism, forces[name])
             u[numbers[name]] = value
         motor = (0.0, 1.0, 1.0)

@@ -7,10 +7,11 @@ from dataclasses import replace
 from functools import cache
 from typing import Any
 
-from linkwork.errors import InputError, UnknownNameError
+from linkwork.errors import InputError
 from linkwork.mechanism import Mechanism
 from linkwork.parameters import field_name
 
+from ..files import unknown_name
 from ..mechanisms import Parameters, mechanism_of
 from ..run import takes_published
 from ..units import RAD_S_PER_RPM
@@ -66,7 +67,7 @@ def unit_of(mechanism: Mechanism, name: str) -> str:
     of_mechanism = [v.name for v in mechanism.mechanism_variables.values() if v.kind == "Real"]
     names = (*_of_the_crank(mechanism), *forces_of(mechanism), *of_mechanism)
     if name not in names:
-        raise UnknownNameError(name, names, None)
+        raise unknown_name(name, names)
     return next(v.unit for v in mechanism.variables if v.name == name)
 
 

@@ -6,6 +6,7 @@ from .arguments import takes_published as takes_published
 from .arguments import variant as variant
 from .case import Case as Case
 from .case import published_case as published_case
+from .case_files import COMMON as COMMON
 from .case_files import acting_on as acting_on
 from .case_files import case_from as case_from
 from .case_files import load_case as load_case

@@ -12,6 +12,7 @@ from math import isfinite
 from linkwork.errors import InputError, Interrupted
 from linkwork.mechanism import Mechanism
 
+from ..files import unknown_name
 from ..mechanisms import output_units
 from .signals import StateFunction
 from .trajectory import Trajectory
@@ -74,7 +75,7 @@ class Event:
         return mechanism.output_names.index(self.output)
 
     def _no_output(self, names: tuple[str, ...]) -> InputError:
-        return InputError(f"event {self.name!r} is on {self.output!r}: the outputs are {', '.join(names)}")
+        return unknown_name(str(self.output), names, f"output {self.output!r} for event {self.name!r}")
 
 
 class RunInterrupted(Interrupted):

@@ -65,7 +65,7 @@ class Inputs:
             raise InputError(str(error).removeprefix("parameter ")) from None
         for name, value in channels.items():
             if name not in known:
-                raise InputError(f"there is no input {name!r}: the inputs are {', '.join(known)}")
+                raise files.unknown_name(name, known, f"input {name!r}")
             if name in flags and value is not None and not isinstance(value, bool):
                 raise InputError(f"{name} is {value!r}: it must be True or False")
             if name not in flags:
@@ -90,7 +90,7 @@ class Inputs:
     def __getattr__(self, name: str) -> Any:
         if not name.startswith("_") and name in _arguments()[0]:
             return self._given.get(name)
-        raise AttributeError(f"there is no input {name!r}: the inputs are {', '.join(_arguments()[0])}")
+        raise AttributeError(str(files.unknown_name(name, _arguments()[0], f"input {name!r}")))
 
     def __reduce__(self) -> Any:
         return _of, (self._given,)

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from linkwork.errors import InputError
 from linkwork.plant import check_tolerance
 
+from ..files import unknown_name
 from ..mechanisms import InitialState, Parameters
 from ..units import Amount, in_si
 from .arguments import driven, started, takes_published, usual_times
@@ -165,9 +166,7 @@ def _solver(method: str | type[OdeSolver]) -> str | type[OdeSolver]:
 
             return Hamming
         if method not in SCIPY_METHODS:
-            raise InputError(
-                f"method is {method!r}: it must be 'compiled', 'Hamming' or one of {', '.join(SCIPY_METHODS)}"
-            )
+            raise unknown_name(method, ("compiled", "Hamming", *SCIPY_METHODS), f"method {method!r}")
     return method
 
 

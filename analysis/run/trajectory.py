@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from linkwork.errors import InputError
 
+from ..files import unknown_name
 from ..mechanisms import MECHANISMS, Parameters, output_units
 from ..notebook import Shown, format_count, format_range
 
@@ -104,13 +105,13 @@ class Trajectory(Shown):
 
         Raises
         ------
-        InputError
+        UnknownNameError
             If there is no output of that name.
         """
         try:
             return self.names.index(name)
         except ValueError:
-            raise InputError(f"there is no output {name!r}: the outputs are {', '.join(self.names)}") from None
+            raise unknown_name(name, self.names, f"output {name!r}") from None
 
     def to_csv(self, path: str | Path) -> Path:
         """Write time and all outputs to a CSV file whose header has names and units."""

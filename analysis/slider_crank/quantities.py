@@ -13,6 +13,8 @@ from numpy.typing import ArrayLike, NDArray
 from linkwork.errors import InputError
 from linkwork.slider_crank.published import INCH, POUND_FORCE, POUND_INCH
 
+from ..files import unknown_name
+
 FloatArray: TypeAlias = NDArray[np.float64]
 MaskedArray: TypeAlias = "np.ma.MaskedArray[Any, np.dtype[np.float64]]"
 
@@ -79,7 +81,7 @@ def check_joint(name: str, frame: int) -> None:
         If there are not.
     """
     if name not in JOINTS:
-        raise InputError(f"there is no joint force or moment {name!r}: the names are {', '.join(JOINTS)}")
+        raise unknown_name(name, JOINTS, f"joint force or moment {name!r}")
     if frame not in FRAMES:
         frames = ", ".join(f"{number} ({body})" for number, body in FRAMES.items())
         raise InputError(f"there is no frame {frame!r}: the frames are {frames}")

@@ -11,6 +11,7 @@ import joblib
 
 from linkwork.errors import InputError
 
+from ..files import unknown_name
 from ..run import interruptible, shown
 
 Item = TypeVar("Item")
@@ -57,7 +58,7 @@ class Search:
         if self.n_jobs == 0:
             raise InputError("0 cores: it must be a number of them, or -1 for all")
         if self.method not in METHODS:
-            raise InputError(f"method {self.method!r}: it must be one of {', '.join(METHODS)}")
+            raise unknown_name(self.method, METHODS, f"method {self.method!r}")
         if self.seed < 0 or int(self.seed) != self.seed or int(self.solutions) != self.solutions:
             raise InputError(
                 f"seed {self.seed} and {self.solutions} solutions: both must be whole numbers, the seed not below zero"

@@ -7,7 +7,6 @@ size and areas are exact for the polyline.
 from __future__ import annotations
 
 import ast
-import difflib
 from collections.abc import Callable
 from dataclasses import dataclass
 from math import cos, e, pi, sin, tau
@@ -19,7 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from linkwork.errors import InputError
 
-from ..files import read_points
+from ..files import read_points, unknown_name
 from ..units import quantity
 
 FloatArray = NDArray[np.float64]
@@ -437,8 +436,8 @@ def formula(text: str, variable: str = "t") -> Callable[[ArrayLike], FloatArray]
         return InputError(f"in the formula {text!r}: {ast.unparse(node)!r} {reason}")
 
     def unknown(node: ast.AST, name: str, known: list[str]) -> InputError:
-        near = difflib.get_close_matches(name, known, n=1)
-        hint = f"; did you mean {near[0]}?" if near else ""
+        near = unknown_name(name, known).near
+        hint = f"; did you mean {near}?" if near else ""
         return refused(node, f"is not known{hint} (there are {', '.join(known)})")
 
     def value(node: ast.AST, t: FloatArray) -> Any:

@@ -17,10 +17,12 @@ from analysis import Inputs, cli, export
 from analysis.export.description import KINDS, description
 from analysis.mechanisms import FIVE_BAR
 from analysis.periodic import find_orbit
+from analysis.run import save_parameters
 from build_fmu import FMUS
 from linkwork.five_bar.published import SETS, TABLE_3_1
 
 ROOT = Path(__file__).parents[2]
+EXAMPLES = ROOT / "examples"
 
 
 def in_own_process(*arguments, cwd):
@@ -75,12 +77,24 @@ def test_a_run_that_ends_early_keeps_its_data_and_exits_with_3(linkwork, tmp_pat
 @pytest.mark.parametrize(
     ("arguments", "code", "said"),
     [
-        (["run", "--published", "table-3.2"], 1, "there is no published set"),
+        (["run", "--published", "table-3.2"], 1, "there is no published set 'table-3.2'; did you mean table-3.1?"),
         (["run", "--published", "table-3.1", "--set", "slider.stifness=1"], 1, "did you mean slider.stiffness"),
         (["run", "--published", "table-3.1", "--set", "crank.length=-1"], 1, "parameter crank.length is -1.0"),
         (["run", "--published", "table-3.1", "--set", "initial.slider_position=1"], 1, "cannot be joined"),
         (["run", "--published", "table-3.1", "--set", "slider.stiffness=nan"], 1, "parameter slider.stiffness is nan"),
-        (["run", "--published", "table-3.1", "--method", "Euler"], 1, "method is 'Euler'"),
+        (["run", "--published", "table-3.1", "--method", "Raduo"], 1, "no method 'Raduo'; did you mean Radau?"),
+        (["runn"], 2, "there is no command 'runn'; did you mean run?"),
+        (["slider-crank", "force"], 2, "there is no command 'force'; did you mean forces?"),
+        (["run", "--publishd", "table-3.1"], 2, "no such option '--publishd'; did you mean '--published'?"),
+        (["run", EXAMPLES / "ellipse.toml"], 1, "is a synthesis case: linkwork synthesize /"),
+        (["run", EXAMPLES / "slider-motion.toml"], 1, "is a case of a slider's motion: linkwork slider-motion /"),
+        (["run", EXAMPLES / "hand-drawn.svg"], 1, "is a drawing: a synthesis case names it as the file of its task"),
+        (["run", ROOT / "build_fmu.py"], 1, "is a Python script: python /"),
+        (["synthesize", EXAMPLES / "run-up.toml"], 1, "is a case of a run: linkwork run /"),
+        (["slider-motion", EXAMPLES / "ellipse.toml"], 1, "(this command takes a case of a slider's motion)"),
+        (["slider-crank", "info", EXAMPLES / "slider-crank.toml"], 1, "is a case of a run: linkwork run /"),
+        (["info", EXAMPLES / "ellipse.toml"], 1, "is a synthesis case: linkwork synthesize /"),
+        (["resonance", EXAMPLES / "ellipse.toml"], 1, "is a synthesis case: linkwork synthesize /"),
         (["run", "--published", "table-3.1", "--tolerance", "nan"], 2, "not between 0 and 1"),
         (
             ["run", "--published", "table-3.1", "--no-plot", "--out", "/proc/no"],
@@ -92,16 +106,22 @@ def test_a_run_that_ends_early_keeps_its_data_and_exits_with_3(linkwork, tmp_pat
         (["run", "--published", "table-3.1", "--set", "nonsense"], 2, "NAME=VALUE"),
         (["run", "nowhere.toml"], 2, "does not exist"),
         (["check", "--fmu", "nowhere.fmu"], 1, "there is no file nowhere.fmu"),
-        (["check", "no-such-case"], 2, "neither a case file nor a standard case"),
         (["check", "--interface", "both"], 2, "--interface both: it must be co-simulation or model-exchange"),
         (
             ["run", "--published", "table-3.1", "--interface", "model-exchange"],
             2,
             "--interface is for a run through an FMU",
         ),
+        (["check", "no-such-case"], 2, "there is no standard case or case file 'no-such-case'"),
+        (["check", "speed-jum"], 2, "did you mean speed-jump?"),
         (["figures", "9.9"], 2, "there is no figure 9.9"),
+        (["figures", "R55"], 2, "did you mean R5?"),
         (["build", "SixBar"], 1, "there is no model 'SixBar'"),
-        (["info", "nothing"], 2, "neither a mechanism or published set"),
+        (["build", "FiveBarSlidr"], 1, "did you mean FiveBarSlider?"),
+        (["build", "--kinds", "python,nativ"], 1, "there is no kind of FMU 'nativ'; did you mean native?"),
+        (["build", "--platforms", "x86_64-linx"], 1, "no platform 'x86_64-linx'; did you mean x86_64-linux?"),
+        (["info", "nothing"], 2, "there is no mechanism, published set, case file or FMU 'nothing'"),
+        (["info", "five-bars"], 2, "did you mean five-bar?"),
         (["resonance", "--published", "table-3.1", "--vary", "slider.mess"], 1, "there is no slider.mess"),
         (["resonance", "--published", "table-3.1", "--vary", "slider.damping"], 2, "--from and --to are needed"),
         (["resonance", "--published", "table-3.1", "--from", "100 rpm", "--to", "50 rpm"], 2, "must increase"),
@@ -126,6 +146,42 @@ def test_what_is_wrong_is_reported_in_a_sentence(linkwork, arguments, code, said
     assert result.exit_code == code
     assert said in " ".join((result.output + result.stderr).split())
     assert "Traceback" not in result.output + result.stderr
+
+
+@pytest.mark.parametrize("given", [["--set", "drive.speed=420"], ["case.toml"]])
+def test_a_bare_speed_under_which_a_run_ends_early_is_asked_about(linkwork, tmp_path, given):
+    (tmp_path / "case.toml").write_text('published = "table-3.1"\n[drive]\nspeed = 420\n')
+    run = linkwork("run", *([] if "case.toml" in given else ["--published", "table-3.1"]), *given, "--no-plot")
+    assert run.exit_code == cli.ENDED_EARLY
+    assert "drive.speed = 420 has no unit and is taken in rad/s, as 4010.7 rpm: was '420 rpm' meant?" in run.stderr
+    assert (
+        "meant" not in linkwork("run", "--published", "table-3.1", "--set", "drive.speed=4010 rpm", "--no-plot").stderr
+    )
+
+
+def test_info_on_a_file_of_parameters(linkwork, tmp_path):
+    save_parameters(tmp_path / "own.toml", TABLE_3_1)
+    result = linkwork("info", "own.toml")
+    assert result.exit_code == 0, result.stderr
+    assert "slider.stiffness" in result.output
+
+
+def test_stability_judges_before_it_asks_for_an_axis_that_nobody_chose(linkwork):
+    result = linkwork("stability", "--published", "table-3.1", "--set", "slider.damping=0")
+    assert result.exit_code == 1
+    assert "Floquet multipliers" in result.stdout
+    assert "no chart over slider.damping, as --y is not given: slider.damping is 0 here" in result.stderr
+    named = linkwork("stability", "--published", "table-3.1", "--y", "slider.mess")
+    assert named.exit_code == 1
+    assert named.stdout == ""
+    assert "there is no slider.mess; did you mean slider.mass?" in named.stderr
+
+
+def test_every_summary_is_a_sentence_that_is_not_cut(linkwork):
+    for group in ([], ["slider-crank"]):
+        listed = linkwork(*group, "--help").output.partition("Commands:")[2].split("\n  ")[1:]
+        assert len(listed) > 4
+        assert all(" ".join(line.split()).endswith(".") and "..." not in line for line in listed)
 
 
 def test_info_lists_the_published_sets_and_one_of_them(linkwork):

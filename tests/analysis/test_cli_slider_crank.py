@@ -462,7 +462,7 @@ class TestPicture:
         (["tolerances", "--offset", "70 in"], 1, "it can be assembled at no angle"),
         (["picture", "--offset", "20 in", "--set", "rod.length=30 in", "--angle", 0], 1, "0.055647265 m too short"),
         (["picture", "--offset", "70 in"], 1, "the rod does not reach the guide at crank angle"),
-        (["info", "--set", "crank.length=0 m"], 1, "crank.length is 0.0: it must be a finite number greater than zero"),
+        (["info", "--set", "crank.length=0 m"], 1, "crank.length is 0.0 m: it must be a finite number greater than zero"),
         (["info", "--set", "rod.length=-1"], 1, "rod.length is -1.0: it must be a finite number greater than zero"),
         (["info", "--set", "rod.length=nan"], 1, "parameter rod.length is nan"),
         (["info", "--set", "crank.inertia=0.001"], 1, "parameter crank.inertia is 0.001: it must be at least"),
@@ -505,6 +505,24 @@ def test_what_is_wrong_is_reported_in_a_sentence(linkwork, tmp_path, arguments, 
     assert said in " ".join((result.output + result.stderr).split())
     assert "Traceback" not in result.output + result.stderr
     assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    ("units", "said"),
+    [
+        (["--units", "inch"], "the rod is 50 in long, 138.033 in too short"),
+        (["-u", "inch"], "and shift 3.5 in: the crank pin is 188.033 in from the guide"),
+        ([], "the rod is 1.27 m long, 3.50602745 m too short"),
+    ],
+)
+def test_the_units_of_the_output_hold_in_errors(linkwork, units, said):
+    result = linkwork("info", "--offset", "200 in", *units)
+    assert result.exit_code == 1
+    assert said in result.stderr
+    wrong = linkwork("info", "--set", "rod.length=-2 in", *units)
+    assert f"parameter rod.length is {'-2 in' if units else '-0.0508 m'}: it must" in wrong.stderr
+    # what the user wrote stays as it is
+    assert "guide.offset is '3 N'" in linkwork("info", "--offset", "3 N", *units).stderr
 
 
 def test_a_file_and_a_published_case_exclude_each_other(linkwork, tmp_path):

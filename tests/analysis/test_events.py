@@ -313,7 +313,10 @@ def test_events_do_not_change_the_motion() -> None:
     [
         (lambda: Event(name="e"), "event 'e' needs either an output or a function"),
         (lambda: Event(name="e", output="crank.angle", function=max), "either an output or a function"),
-        (lambda: Event(name="e", output="crank.angel"), "'crank.angel': the outputs are crank.angle, "),
+        (
+            lambda: Event(name="e", output="crank.angel"),
+            "no output 'crank.angel' for event 'e'; did you mean crank.angle",
+        ),
         (lambda: Event(name="e", function=3), "it must be callable"),  # type: ignore[arg-type]
         (lambda: Event(name="e", output="crank.angle", direction=2), "direction 2"),
         (lambda: Event(name="e", output="crank.angle", level=nan), "level nan"),

@@ -670,7 +670,7 @@ def test_progress_is_shown_only_where_it_is_wanted(method: str, capfd: pytest.Ca
 @pytest.mark.parametrize(
     ("options", "error", "said"),
     [
-        ({"method": "Euler"}, InputError, "'Euler': it must be 'compiled', 'Hamming' or one of RK23"),
+        ({"method": "RK-45"}, InputError, "there is no method 'RK-45'; did you mean RK45"),
         ({"tolerance": 0.0}, ParameterError, "solver.tolerance"),
         ({"tolerance": nan}, ParameterError, "solver.tolerance"),
         ({"tolerance": 0.1}, ParameterError, "solver.tolerance"),

@@ -63,7 +63,7 @@ def test_counts_of_short_intervals() -> None:
 
 
 def test_output_that_does_not_exist(trajectory: Trajectory) -> None:
-    with pytest.raises(InputError, match=r"there is no output 'slider.postion': the outputs are crank.angle, "):
+    with pytest.raises(InputError, match=r"no output 'slider.postion'; did you mean slider.position"):
         trajectory["slider.postion"]
     with pytest.raises(InputError, match="no output 'time'"):
         figures.plot(trajectory, ["time"])

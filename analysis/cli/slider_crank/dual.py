@@ -17,7 +17,7 @@ from ..common import CHECK_FAILED, console, errors, print_written, say, show_tab
 from .options import Chosen, Problem, about_mechanism, out_option, with_problem
 
 
-@click.command()
+@click.command(short_help="Hold the thesis's dual-number method against vector mechanics.")
 @about_mechanism
 @with_problem(points=361)
 @tolerance_option(default=1e-9, help="Largest relative difference that passes.")

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from ...slider_crank import ForceTurn
 
 
-@click.command()
+@click.command(short_help="Find all joint forces over a turn.")
 @about_mechanism
 @with_problem(points=721)
 @click.option(

@@ -14,7 +14,7 @@ from ..common import console, print_written, quantity, say, show_table
 from .options import Chosen, about_mechanism, angle_text, out_option
 
 
-@click.command()
+@click.command(short_help="Report assembly, dead centres and stroke.")
 @about_mechanism
 def info(chosen: Chosen) -> None:
     """Report where the mechanism can be assembled, its dead centres, its stroke, and how far its crank may shift.
@@ -69,7 +69,7 @@ def info(chosen: Chosen) -> None:
     )
 
 
-@click.command()
+@click.command(short_help="Draw the mechanism in space.")
 @about_mechanism
 @click.option("--angle", default="30 deg", show_default=True, metavar="ANGLE", help="Crank angle of the picture.")
 @click.option("--view", nargs=2, metavar="ELEVATION AZIMUTH", help="Of the eye, such as '22 deg' '-112 deg'.")

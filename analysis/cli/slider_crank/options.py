@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields
 from functools import wraps
@@ -12,12 +13,13 @@ from typing import TYPE_CHECKING, Any
 import click
 import numpy as np
 
-from linkwork.errors import InputError
+from linkwork.errors import InputError, LinkworkError
 from linkwork.slider_crank.parameters import SliderCrankParameters
 from linkwork.slider_crank.published import RAD_S_PER_RPM, SETS
 
 from ... import slider_crank as sc
-from ..common import changes, errors, handled, number_or_text, quantity
+from ...mechanisms import SLIDER_CRANK
+from ..common import PARAMETERS, changes, check_kind, errors, handled, number_or_text, quantity
 
 if TYPE_CHECKING:
     from ...slider_crank import ForceTurn, PeriodicShift, ShiftLaw
@@ -26,6 +28,7 @@ if TYPE_CHECKING:
 DEFAULT = "rahman-a4-10-s1-3.5"
 
 Command = Callable[..., Any]
+_NUMBER = r"-?\d+(?:\.\d+)?(?:e[-+]?\d+)?"
 
 
 class Units:
@@ -45,6 +48,23 @@ class Units:
 
     def length(self, value: float) -> str:
         return f"{value * self.per('m'):.6g} {self.name('m')}"
+
+    def in_error(self, text: str) -> str:
+        """What an error says, its lengths, forces and torques in these units; texts in quotes are the user's own words."""
+        variables = SLIDER_CRANK.mechanism_variables
+
+        def parameter(found: re.Match[str]) -> str:
+            unit = variables[found[1]].unit if found[1] in variables else ""
+            return found[0][:-1] + f" {unit}:" if unit in ("m", "N", "N.m") else found[0]
+
+        def converted(found: re.Match[str]) -> str:
+            si, per = found[2], found[3] or ""
+            return f"{float(found[1]) * self.per(si):.6g} {self.name(si)}{per}"
+
+        text = re.sub(rf"^parameter ([\w.]+) is {_NUMBER}:", parameter, text)
+        if self.system == "SI":
+            return text
+        return re.sub(rf"(?<!['\w.])({_NUMBER}) (N\.m|N|m)(/rad)?(?![\w/.]\w)", converted, text)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -110,6 +130,7 @@ class _MechanismOptions:
         if self.file is not None:
             if self.published is not None:
                 raise click.UsageError("give either a file of parameters or --published NAME")
+            check_kind(self.file, PARAMETERS)
             loaded = load_parameters(self.file)
             if not isinstance(loaded, SliderCrankParameters):
                 raise InputError(
@@ -122,7 +143,7 @@ class _MechanismOptions:
             title, parameters = case.source, case.parameters
             start, speed = case.initial.shift_position, case.crank_speed
         else:
-            raise unknown_name(name, SETS)
+            raise unknown_name(name, SETS, f"published case {name!r}")
         values = changes(self.settings, number_or_text, "rod.length='45 in'")
         for key, text in (("guide.offset", self.offset), ("guide.twist", self.twist)):
             if text is not None:
@@ -225,11 +246,12 @@ _MECHANISM_OPTIONS = (
         help="Change a parameter by its name in the FMU, such as rod.length='45 in' or assembly.branch=-1.",
     ),
     click.option(
+        "-u",
         "--units",
         type=click.Choice(["SI", "inch"]),
         default="SI",
         show_default=True,
-        help="Of the output; inch: inches, pounds force and degrees.",
+        help="Units of the output and of errors; inch: inches, pounds force and degrees.",
     ),
 )
 speed_option = click.option("--speed", metavar="SPEED", help="Crank speed, such as '50 rpm'.")
@@ -247,7 +269,10 @@ def about_mechanism(command: Command) -> Command:
     def run(**options: Any) -> Any:
         own = {field.name: options.pop(field.name) for field in fields(_MechanismOptions) if field.name in options}
         paced = "torque" in options and not options.get("two_rotations")
-        return command(chosen=_MechanismOptions(**own).choose(paced=paced), **options)
+        try:
+            return command(chosen=_MechanismOptions(**own).choose(paced=paced), **options)
+        except LinkworkError as error:
+            raise LinkworkError(Units(own["units"]).in_error(str(error))) from error
 
     for option in reversed(_MECHANISM_OPTIONS):
         run = option(run)

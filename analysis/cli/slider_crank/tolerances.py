@@ -25,7 +25,7 @@ _TOLERANCES = ("crank.length", "rod.length", "guide.offset", "shift.position", "
 _WIDTHS = {"m": "0.25 mm", "rad": "0.1 deg"}
 
 
-@click.command()
+@click.command(short_help="Report what manufacturing tolerances do.")
 @about_mechanism
 @with_problem(points=73)
 @click.option(
@@ -145,7 +145,7 @@ def _tolerance(text: str, distribution: str) -> Tolerance:
     if not equals:
         raise click.UsageError(f"--tolerance {text!r}: it must be NAME=HALF_WIDTH, such as guide.offset='0.5 mm'")
     if name not in sc.ERRORS:
-        raise unknown_name(name, sc.ERRORS)
+        raise unknown_name(name, sc.ERRORS, f"tolerance of {name!r}")
     width = quantity(value, sc.ERRORS[name], name)
     return sc.Tolerance(name, half_width=width, distribution=distribution)
 
