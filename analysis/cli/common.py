@@ -136,15 +136,21 @@ _OTHERS = {
 }
 
 
-def kind_of(tables: Mapping[str, Any]) -> tuple[str, str]:
-    """What tables are about, by the names that only one kind of file has."""
+def kind_of(tables: Mapping[str, Any]) -> tuple[str, str] | None:
+    """What tables are about, by the names that only one kind of file has; None where they do not show it."""
     from ..mechanisms import MECHANISMS
     from ..run import COMMON, acting_on
 
-    if "task" in tables:
-        return SLIDER_MOTION if {"slider", "strategy"} & set(tables) else SYNTHESIS
-    acting = {name.partition(".")[0] for mechanism in MECHANISMS.values() for name in acting_on(mechanism)}
-    return RUN if (acting | set(COMMON) - {"mechanism"}) & set(tables) else PARAMETERS
+    names = set(tables)
+    if "task" in names:
+        return SLIDER_MOTION if names & {"slider", "strategy"} else SYNTHESIS
+    if names & {"bounds", "constraints", "search", "make", "trade_off", "linkage", "strategy", "tracking"}:
+        return None
+    acting = {name.partition(".")[0] for m in MECHANISMS.values() for name in acting_on(m)}
+    if names & (acting | set(COMMON) - {"mechanism", "title"}):
+        return RUN
+    parameters = {name.partition(".")[0] for m in MECHANISMS.values() for name in m.mechanism_variables}
+    return PARAMETERS if names & (parameters | {"mechanism"}) else None
 
 
 def check_kind(path: str, *wanted: tuple[str, str], settings: Iterable[str] = ()) -> None:
@@ -168,7 +174,7 @@ def check_kind(path: str, *wanted: tuple[str, str], settings: Iterable[str] = ()
     if ending in _OTHERS:
         raise InputError(f"{path} is {_OTHERS[ending].format(path)}")
     kind = kind_of(read_tables(path) | {name.partition(".")[0]: None for name in settings})
-    if kind not in wanted:
+    if kind is not None and kind not in wanted:
         what, command = kind
         raise InputError(f"{path} is {what}: {command} {path} (this command takes {wanted[0][0]})")
 
