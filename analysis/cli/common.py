@@ -82,6 +82,13 @@ def out_option(default: str = "out", help: str = "Folder for CSV and plots.") ->
     return click.option("--out", default=default, show_default=True, type=click.Path(file_okay=False), help=help)
 
 
+def folder_of(out: str | Path) -> Path:
+    """The folder that --out names, made where it is not there."""
+    folder = Path(out)
+    folder.mkdir(parents=True, exist_ok=True)
+    return folder
+
+
 def set_option(example: str) -> Callable[..., Any]:
     """The option --set, which can be given often; ``example`` ends the sentence "Change a value, such as"."""
     return click.option(

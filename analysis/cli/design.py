@@ -14,7 +14,7 @@ from rich.table import Table
 
 from linkwork.errors import Interrupted
 
-from .common import INTERRUPTED, SYNTHESIS, changes, check_kind, console, errors, handled
+from .common import INTERRUPTED, SYNTHESIS, changes, check_kind, console, errors, folder_of, handled
 
 if TYPE_CHECKING:
     from ..synthesis import Solution, TradeOff
@@ -196,7 +196,6 @@ def synthesize(
     overrides = overrides_of(settings, search__method=method, search__seed=seed, search__jobs=jobs)
     check_kind(case, SYNTHESIS)
     chosen = load_synthesis_case(case, overrides)
-    folder = Path(out)
     stopped: Interrupted | None = None
     try:
         result = chosen.solve(progress=console.is_terminal)
@@ -206,7 +205,7 @@ def synthesize(
         result, stopped = error.synthesis, error
     print_solutions(f"{chosen.title}: {len(result.solutions)} linkages, {result.seconds:.1f} s", result.solutions)
     print_best(result.best)
-    folder.mkdir(parents=True, exist_ok=True)
+    folder = folder_of(out)
     written = [result.to_csv(folder / "solutions.csv")]
     written += write_solution(result.best, folder, chosen.title, make=chosen.make, plots=plots, animate=animate)
     if plots:

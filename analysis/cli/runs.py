@@ -26,6 +26,7 @@ from .common import (
     check_kind,
     chosen_case,
     console,
+    folder_of,
     handled,
     kind_of,
     number_or_text,
@@ -109,7 +110,7 @@ def run(
             result = simulate(chosen.parameters, chosen.inputs, method=method, **common)
     except RunInterrupted as stopped:
         result, interrupted = stopped.trajectory, True
-    stem = Path(out) / ((Path(case).stem if case else str(published)) + ("-fmu" if fmu else ""))
+    stem = folder_of(out) / ((Path(case).stem if case else str(published)) + ("-fmu" if fmu else ""))
     written = [result.to_csv(f"{stem}.csv")]
     if plot and len(result) > 1:
         written.append(save_figure(figures.plot(result, title=chosen.title), f"{stem}.png"))
@@ -231,7 +232,7 @@ def check(
                     f"{case.title}: {path.name}, {words}, less in process ({in_process.source})", comparison
                 )
             if not good or path == runs[0][0]:
-                _write_comparison(Path(out) / label, case, in_process, through_fmu)
+                _write_comparison(folder_of(out) / label, case, in_process, through_fmu)
             worst = comparison.worst
             verdicts.append(good)
             lines.append(

@@ -13,7 +13,7 @@ from rich.table import Table
 
 from linkwork.errors import Interrupted
 
-from .common import SLIDER_MOTION, check_kind, console, handled
+from .common import SLIDER_MOTION, check_kind, console, folder_of, handled
 from .design import leave_if_stopped, overrides_of, print_error, print_written, search_options, table, write_described
 
 if TYPE_CHECKING:
@@ -61,9 +61,8 @@ def slider_motion(
     overrides = overrides_of(settings, slider__harmonics=harmonics, search__seed=seed, search__jobs=jobs)
     check_kind(case, SLIDER_MOTION, settings=overrides)
     chosen = load_slider_case(case, overrides)
-    folder = Path(out)
     solution, stopped = _moved(chosen) if chosen.strategy is None else _strategy(chosen)
-    folder.mkdir(parents=True, exist_ok=True)
+    folder = folder_of(out)
     written = _write_solution(solution, folder, chosen.synthesis.title, plots)
     pivot = solution.linkage.pivot
     if stopped is None and chosen.drive is not None:

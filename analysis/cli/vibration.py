@@ -19,7 +19,18 @@ from linkwork.parameters import field_name
 
 from ..mechanisms import FIVE_BAR, PUBLISHED, mechanism_of
 from ..units import RAD_S_PER_RPM
-from .common import ENDED_EARLY, INTERRUPTED, case_options, chosen_case, console, errors, handled, out_option, quantity
+from .common import (
+    ENDED_EARLY,
+    INTERRUPTED,
+    case_options,
+    chosen_case,
+    console,
+    errors,
+    folder_of,
+    handled,
+    out_option,
+    quantity,
+)
 
 #: Range of speeds where none is given, relative to the natural frequency.
 _RANGE = (0.15, 1.5)
@@ -178,7 +189,7 @@ def resonance(chosen: _Chosen, vary: str, low: str | None, high: str | None, dou
             highlight=False,
         )
     _branches(title, response, factor, unit)
-    stem = chosen.folder / f"{chosen.stem}-resonance"
+    stem = folder_of(chosen.folder) / f"{chosen.stem}-resonance"
     written = [response.to_csv(f"{stem}.csv")]
     table = approximations(response) if over_speed and mechanism is FIVE_BAR else None
     _extrema(response, factor, unit, table)
@@ -344,7 +355,7 @@ def stability(
     )
     _regions(found)
     _runs(found)
-    stem = chosen.folder / f"{chosen.stem}-stability"
+    stem = folder_of(chosen.folder) / f"{chosen.stem}-stability"
     figure = figures.plot(found, title=chosen.case.title)
     written = [
         found.to_csv(f"{stem}.csv"),

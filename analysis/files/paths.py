@@ -36,8 +36,11 @@ def ending_of(path: Path, known: Sequence[str]) -> str:
 def whole(path: Path) -> Iterator[Path]:
     """A path to write to instead, which takes the place of ``path`` at the end: the file is there complete, or not at all."""
     part = prepare(path).with_name(f"{path.name}.{os.getpid()}.part")
-    yield part
-    os.replace(part, path)
+    try:
+        yield part
+        os.replace(part, path)
+    finally:
+        part.unlink(missing_ok=True)
 
 
 def read_text(path: Path) -> str:

@@ -5,16 +5,24 @@ from __future__ import annotations
 import csv
 import hashlib
 import io
+import sys
 import warnings
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
+from typing import TextIO
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from linkwork.errors import InputError
+from linkwork.errors import InputError, Interrupted
 
 from .paths import first_line, read_text, whole
+
+#: Numbers that are formatted at a time; Ctrl-C waits for no more.
+_BLOCK = 50_000
+#: Bytes from which on a file is announced, with its size and, on a terminal, its progress.
+LARGE = 20_000_000
 
 
 def write_csv(path: str | Path, columns: Mapping[str, ArrayLike]) -> Path:
@@ -23,17 +31,56 @@ def write_csv(path: str | Path, columns: Mapping[str, ArrayLike]) -> Path:
     Raises
     ------
     InputError
-        If the columns differ in length.
+        If the columns differ in length, or there is no such folder.
+    Interrupted
+        If Ctrl-C was pressed; there is no half file then.
     """
     arrays = {name: np.asarray(values, dtype=float) for name, values in columns.items()}
     lengths = {name: len(values) for name, values in arrays.items()}
     if len(set(lengths.values())) > 1:
         raise InputError(f"the columns of a CSV file differ in length: {lengths}")
+    path = Path(path)
+    if not path.parent.is_dir():
+        raise InputError(f"there is no folder {path.parent} for {path.name}: make it first")
     # a name with a comma in it is one column all the same
     header = ",".join(f'"{name}"' if "," in name else name for name in arrays)
-    with whole(path := Path(path)) as part:
-        np.savetxt(part, np.column_stack(list(arrays.values())), delimiter=",", header=header, comments="", fmt="%.17g")
+    try:
+        with whole(path) as part, part.open("w", encoding="utf-8", newline="\n") as file:
+            file.write(header + "\n")
+            _write_rows(file, path, list(arrays.values()))
+    except KeyboardInterrupt:
+        raise Interrupted(f"interrupted: {path} is not written") from None
     return path
+
+
+def _write_rows(file: TextIO, path: Path, columns: Sequence[NDArray[np.float64]]) -> None:
+    """The rows, block by block."""
+    count, block = len(columns[0]), max(1, _BLOCK // len(columns))
+    row = ",".join(["%.17g"] * len(columns)) + "\n"
+    done: Callable[[int], None] | None = None
+    with ExitStack() as stack:
+        for first in range(0, count, block):
+            values = np.column_stack([column[first : first + block] for column in columns])
+            text = row * len(values) % tuple(values.ravel().tolist())
+            size = len(text) / len(values) * count
+            if first == 0 and size >= LARGE:
+                sys.stderr.write(f"linkwork: writing {path}, about {size / 1e6:.0f} MB; Ctrl-C stops it ...\n")
+                done = stack.enter_context(_bar(path.name, count))
+            file.write(text)
+            if done is not None:
+                done(first + len(values))
+
+
+@contextmanager
+def _bar(what: str, count: int) -> Iterator[Callable[[int], None]]:
+    """A progress bar on standard error where that is a terminal, as a function of the rows done."""
+    from rich.console import Console
+    from rich.progress import Progress
+
+    console = Console(stderr=True)
+    with Progress(console=console, transient=True, disable=not console.is_terminal) as bar:
+        task = bar.add_task(what, total=count)
+        yield lambda rows: bar.update(task, completed=rows)
 
 
 def read_csv(path: str | Path) -> NDArray[np.float64]:
@@ -42,11 +89,15 @@ def read_csv(path: str | Path) -> NDArray[np.float64]:
     Raises
     ------
     InputError
-        If it cannot be read.
+        If it cannot be read, or has no numbers.
     """
+    path = Path(path)
+    lines = [line.partition("#")[0] for line in read_text(path).splitlines()[1:]]
+    if not any(line.strip() for line in lines):
+        raise InputError(f"{path} has no numbers: it must have a header line and rows of numbers below it")
     try:
-        rows: NDArray[np.float64] = np.loadtxt(path, delimiter=",", skiprows=1, ndmin=2)
-    except (OSError, ValueError) as error:
+        rows: NDArray[np.float64] = np.loadtxt(lines, delimiter=",", ndmin=2)
+    except ValueError as error:
         raise InputError(f"{path} cannot be read as CSV: {first_line(error)}") from error
     return rows
 

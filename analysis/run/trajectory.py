@@ -114,7 +114,11 @@ class Trajectory(Shown):
             raise unknown_name(name, self.names, f"output {name!r}") from None
 
     def to_csv(self, path: str | Path) -> Path:
-        """Write time and all outputs to a CSV file whose header has names and units."""
+        """Write time and all outputs to a CSV file, in a folder that is there; its header has names and units.
+
+        A large one is announced with its size. Ctrl-C stops it within a second, as `linkwork.errors.Interrupted`, and leaves no
+        half file.
+        """
         from ..files import write_csv
 
         columns = {"time [s]": self.time} | {f"{name} [{unit}]": self[name] for name, unit in self.units.items()}

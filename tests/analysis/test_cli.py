@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import shutil
 import importlib.util
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -15,6 +16,7 @@ import pytest
 
 from analysis import Inputs, cli, export
 from analysis.export.description import KINDS, description
+from analysis.files import tables
 from analysis.mechanisms import FIVE_BAR
 from analysis.periodic import find_orbit
 from analysis.run import save_parameters
@@ -157,6 +159,30 @@ def test_a_bare_speed_under_which_a_run_ends_early_is_asked_about(linkwork, tmp_
     assert (
         "meant" not in linkwork("run", "--published", "table-3.1", "--set", "drive.speed=4010 rpm", "--no-plot").stderr
     )
+
+
+def test_an_empty_table_of_a_case_is_one_sentence(linkwork, tmp_path):
+    (tmp_path / "force.csv").write_text("t [s],F [N]\n")
+    (tmp_path / "case.toml").write_text('published = "table-3.1"\n[force]\nkind = "table"\nfile = "force.csv"\n')
+    result = linkwork("run", "case.toml")
+    assert result.exit_code == 1
+    assert result.stderr == "error: force.csv has no numbers: it must have a header line and rows of numbers below it\n"
+
+
+def test_a_large_result_is_announced_and_what_is_interrupted_is_not_written(linkwork, tmp_path, monkeypatch):
+    monkeypatch.setattr(tables, "LARGE", 100_000)
+    result = linkwork("run", "--published", "table-3.1", "--no-plot")
+    assert result.exit_code == 0
+    assert re.search(r"linkwork: writing out/table-3\.1\.csv, about \d MB; Ctrl-C stops it", result.stderr)
+
+    def interrupted(*words):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(tables, "_bar", interrupted)
+    result = linkwork("run", "--published", "table-3.1", "--no-plot", "--out", "other")
+    assert result.exit_code == cli.INTERRUPTED
+    assert "interrupted: other/table-3.1.csv is not written" in result.stderr
+    assert not list((tmp_path / "other").iterdir())
 
 
 def test_info_on_a_file_of_parameters(linkwork, tmp_path):

@@ -486,7 +486,7 @@ class TestPicture:
         (["dual", "--groove", "shaft", "--set", "groove.amplitude=1 in", "--torque", "1"], 2, "give --groove apart"),
         (["info", "--groove", "shaft", "--shift", "1"], 2, "give one of them"),
         (["info", "--groove", "shaft", "--set", "groove.amplitude=1 in", "--set", "groove.ratio=0.1234567"], 1, "groove.ratio"),
-        (["info", "--published", "rahman"], 1, "there is no rahman; did you mean rahman-"),
+        (["info", "--published", "rahman"], 1, "no published case 'rahman'; did you mean rahman-"),
         (["info", "--published", "rahman-ideal", "file.toml"], 2, "does not exist"),
         (["info", "--set", "rod.lenth=1"], 1, "did you mean rod.length"),
         (["info", "--set", "rod.length"], 2, "it must be NAME=VALUE"),

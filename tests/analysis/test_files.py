@@ -3,7 +3,11 @@
 from __future__ import annotations
 
 import doctest
+import os
 import re
+import signal
+import threading
+import time
 from dataclasses import dataclass
 from math import pi
 from typing import Any
@@ -31,11 +35,12 @@ from analysis.files import (
     read_rows,
     reader,
     save_array,
+    tables,
     text,
     write_csv,
 )
 from analysis.units import quantity, with_unit
-from linkwork.errors import InputError, MissingParameterError, ParameterError, UnknownNameError
+from linkwork.errors import InputError, Interrupted, MissingParameterError, ParameterError, UnknownNameError
 
 
 @pytest.mark.parametrize(
@@ -215,7 +220,7 @@ def test_values_are_replaced_at_any_depth():
 
 def test_csv_keeps_every_digit_and_its_header(tmp_path):
     values = np.array([0.1, 1 / 3, 1e-300])
-    path = write_csv(tmp_path / "deep" / "x.csv", {"a [m]": values, "b [N]": -values})
+    path = write_csv(tmp_path / "x.csv", {"a [m]": values, "b [N]": -values})
     assert path.read_text().splitlines()[0] == "a [m],b [N]"
     assert np.array_equal(np.loadtxt(path, delimiter=",", skiprows=1)[:, 0], values)
     assert not list(tmp_path.rglob("*.part"))
@@ -235,6 +240,59 @@ def test_a_damaged_array_is_not_there(tmp_path, harm):
         )
     with pytest.warns(RuntimeWarning, match=r"x\.npy is damaged: what was in it is computed again"):
         assert load_array(path) is None
+
+
+def test_a_large_csv_is_announced_and_ctrl_c_stops_it_within_a_second(tmp_path, capsys):
+    column = np.sin(np.arange(1_000_000))
+    size = write_csv(tmp_path / "x.csv", {"x": column[::1000]}).stat().st_size * 28_000
+    (tmp_path / "x.csv").unlink()
+    began = []
+
+    def interrupt():
+        began.append(time.perf_counter())
+        os.kill(os.getpid(), signal.SIGINT)
+
+    timer = threading.Timer(0.5, interrupt)
+    timer.start()
+    with pytest.raises(Interrupted, match=r"interrupted: .*x\.csv is not written"):
+        write_csv(tmp_path / "x.csv", {f"{k}": column for k in range(28)})
+    assert time.perf_counter() - began[0] < 1.0
+    assert not list(tmp_path.iterdir())
+    said = re.search(r"linkwork: writing .*x\.csv, about (\d+) MB; Ctrl-C stops it", capsys.readouterr().err)
+    assert said
+    assert int(said[1]) == pytest.approx(size / 1e6, rel=0.02)
+
+
+def test_a_file_that_was_there_stays_where_writing_is_interrupted(tmp_path, monkeypatch):
+    def interrupted(*words):
+        raise KeyboardInterrupt
+
+    write_csv(tmp_path / "x.csv", {"a": [1.0]})
+    monkeypatch.setattr(tables, "_BLOCK", 0)
+    monkeypatch.setattr(tables, "LARGE", 1)
+    monkeypatch.setattr(tables, "_bar", interrupted)
+    with pytest.raises(Interrupted):
+        write_csv(tmp_path / "x.csv", {"a": [1.0, 2.0]})
+    assert read_csv(tmp_path / "x.csv").tolist() == [[1.0]]
+    assert [path.name for path in tmp_path.iterdir()] == ["x.csv"]
+
+
+@pytest.mark.parametrize("text", ["", "t,x\n", "t,x\n\n# 1,2\n"])
+def test_an_empty_csv_is_refused_in_a_sentence(tmp_path, text):
+    (tmp_path / "x.csv").write_text(text)
+    with pytest.raises(InputError, match=r"x\.csv has no numbers: it must have a header line and rows"):
+        read_csv(tmp_path / "x.csv")
+
+
+def test_blocks_make_the_same_file_as_one(tmp_path, monkeypatch):
+    columns = {"a": np.arange(10) / 3.0, "b": [np.nan, np.inf, -np.inf, *range(7)]}
+    whole = write_csv(tmp_path / "x.csv", columns).read_bytes()
+    monkeypatch.setattr(tables, "_BLOCK", 7)
+    assert write_csv(tmp_path / "y.csv", columns).read_bytes() == whole
+    np.savetxt(
+        tmp_path / "z.csv", np.column_stack(list(columns.values())), delimiter=",", header="a,b", comments="", fmt="%.17g"
+    )  # fmt: skip
+    assert (tmp_path / "z.csv").read_bytes() == whole
 
 
 def test_csv_columns_of_different_length_are_refused(tmp_path):

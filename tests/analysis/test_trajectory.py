@@ -70,8 +70,11 @@ def test_output_that_does_not_exist(trajectory: Trajectory) -> None:
 
 
 def test_csv_has_names_and_units_and_every_digit(trajectory: Trajectory, tmp_path: Path) -> None:
-    path = trajectory.to_csv(tmp_path / "new" / "run.csv")
-    assert path == tmp_path / "new" / "run.csv"
+    with pytest.raises(InputError, match=r"there is no folder .*new for run.csv: make it first"):
+        trajectory.to_csv(tmp_path / "new" / "run.csv")
+    assert not (tmp_path / "new").exists()
+    path = trajectory.to_csv(tmp_path / "run.csv")
+    assert path == tmp_path / "run.csv"
     with path.open(newline="") as file:
         header, *rows = list(csv.reader(file))
     assert header[0] == "time [s]"

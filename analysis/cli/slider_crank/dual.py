@@ -13,7 +13,7 @@ from click.core import ParameterSource
 from linkwork.slider_crank.assembly import check_assembly
 
 from ... import slider_crank as sc
-from ..common import CHECK_FAILED, console, errors, print_written, say, show_table, tolerance_option
+from ..common import CHECK_FAILED, console, errors, folder_of, print_written, say, show_table, tolerance_option
 from .options import Chosen, Problem, about_mechanism, out_option, with_problem
 
 
@@ -112,4 +112,4 @@ def _show_two_rotations(chosen: Chosen, points: int, folder: Path) -> None:
         f"{chosen.units.length(float(end.position_error.max()))}; the steps become small at {int(end.settled.sum())} of "
         f"{len(end.settled)} crank angles"
     )
-    print_written([write_csv(folder / f"{chosen.name}-two-rotations.csv", columns)])
+    print_written([write_csv(folder_of(folder) / f"{chosen.name}-two-rotations.csv", columns)])

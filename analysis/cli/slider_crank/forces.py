@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from math import degrees
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -12,7 +11,7 @@ import numpy as np
 
 from ... import figures
 from ... import slider_crank as sc
-from ..common import print_written, say, show_table
+from ..common import folder_of, print_written, say, show_table
 from .options import Chosen, Problem, Units, about_mechanism, angle_text, out_option, plot_option, with_problem
 
 if TYPE_CHECKING:
@@ -58,7 +57,7 @@ def forces(chosen: Chosen, problem: Problem, frames: Sequence[int], out: str, pl
     )
     for sentence in _special_places(turn, units):
         say(sentence)
-    stem = str(Path(out) / f"{chosen.name}-forces")
+    stem = str(folder_of(out) / f"{chosen.name}-forces")
     written = [write_csv(f"{stem}.csv", turn.columns(units.system))]
     if plot:
         for frame in frames:

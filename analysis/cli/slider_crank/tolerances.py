@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from math import degrees, tau
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -14,7 +13,7 @@ from linkwork.errors import InputError
 
 from ... import figures
 from ... import slider_crank as sc
-from ..common import console, print_written, quantity, show_table
+from ..common import console, folder_of, print_written, quantity, show_table
 from .options import Chosen, Problem, Units, about_mechanism, note, out_option, plot_option, with_problem
 
 if TYPE_CHECKING:
@@ -102,7 +101,7 @@ def tolerances(
     show_table(f"{chosen.title}: sensitivities", headings, rows, words=("quantity", "to", "unit"))
     with console.status(f"{samples} samples at {len(turn)} crank angles"):
         found = sc.monte_carlo(turn, allowed, quantities=quantities, samples=samples, seed=seed)
-    stem = str(Path(out) / chosen.name)
+    stem = str(folder_of(out) / chosen.name)
     files = [write_csv(f"{stem}-sensitivities.csv", slopes)]
     files.append(write_csv(f"{stem}-tolerances.csv", _spread_columns(found, units)))
     _show_spread(found, place, f"{chosen.title}: spread at {here}, {samples} samples", units)
