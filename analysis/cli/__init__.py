@@ -26,6 +26,7 @@ COMMANDS = {
     "examples": ("making", "Copy the examples to a folder."),
     "figures": ("runs", "Make the theses' figures, a still and an animation."),
     "info": ("runs", "Describe published sets, a parameter or case file, an FMU."),
+    "new": ("new", "Write a case file to begin with, every entry explained."),
     "probe": ("probe", "Probe an FMU of any make with legal and forbidden calls."),
     "resonance": ("vibration", "Follow the periodic motion over speed or a parameter."),
     "run": ("runs", "Run a case file or a published set."),
@@ -100,6 +101,7 @@ def main() -> None:
     \b
     Examples:
       linkwork examples
+      linkwork new five-bar
       linkwork build
       linkwork run --published table-3.1
       linkwork run examples/torsion-bar.toml --fmu build/FiveBarSlider.fmu

@@ -34,3 +34,6 @@ from .tables import read_csv as read_csv
 from .tables import read_rows as read_rows
 from .tables import save_array as save_array
 from .tables import write_csv as write_csv
+from .template import entries as entries
+from .template import in_words as in_words
+from .template import line as line

@@ -8,7 +8,7 @@ bound (`least_effort`).
 
 from __future__ import annotations
 
-from .cases import SliderCase, linkage_from_csv, load_slider_case, run_case, slider_case_from
+from .cases import TABLES, SliderCase, linkage_from_csv, load_slider_case, run_case, slider_case_from
 from .collocation import Collocation, EffortError, MotionLimits, UnattainableError
 from .inverse import BestSpring, Load, SliderDrive, TurnBalance, best_spring, inverse_dynamics
 from .least_effort import LeastEffort, least_effort
@@ -18,6 +18,7 @@ from .tracking import TrackingController, TrackingMetrics, TrackingResult, track
 from .variational import VariationalMotion, variational_motion
 
 __all__ = [
+    "TABLES",
     "BestSpring",
     "Collocation",
     "EffortError",

@@ -375,6 +375,13 @@ def run_case(drive: SliderDrive, title: str, force_file: str) -> dict[str, Any]:
     }
 
 
+#: The tables of a case beside those of a synthesis, for `linkwork new`.
+TABLES: Mapping[str, type] = {
+    "slider": SliderTable, "strategy": StrategyWanted, "drive": DriveWanted, "load": Load, "tracking": TrackingWanted,
+    "least_effort": EffortWanted,
+}  # fmt: skip
+
+
 # Reading
 
 

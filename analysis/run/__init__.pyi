@@ -7,6 +7,7 @@ from .arguments import variant as variant
 from .case import Case as Case
 from .case import published_case as published_case
 from .case_files import COMMON as COMMON
+from .case_files import RunTable as RunTable
 from .case_files import acting_on as acting_on
 from .case_files import case_from as case_from
 from .case_files import load_case as load_case
@@ -14,6 +15,7 @@ from .case_files import load_parameters as load_parameters
 from .case_files import parameters_from as parameters_from
 from .case_files import parameters_to as parameters_to
 from .case_files import save_parameters as save_parameters
+from .case_files import signal_kinds as signal_kinds
 from .checks import CASES as CASES
 from .checks import CHECKED as CHECKED
 from .checks import check as check

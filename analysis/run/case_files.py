@@ -253,8 +253,22 @@ def _reader(unit: str, folder: Path) -> Reader:
     """Reader of what acts through one input: a truth value, a signal, or of torques a law or a list of which the sum acts."""
     if not unit:
         return files.flag
+    kinds, value = signal_kinds(unit, folder), Quantity(unit)
+
+    def signal(item: Any, name: str) -> Any:
+        if not isinstance(item, Mapping):
+            return value(item, name)
+        if "kind" not in item:
+            raise ParameterError(name, ", ".join(item), f"be a quantity, or a table with a kind, of {', '.join(kinds)}")
+        return Kinds(kinds)(item, name)
+
+    return Many(signal, single=True) if unit == "N.m" else signal
+
+
+def signal_kinds(unit: str, folder: Path) -> dict[str, Table]:
+    """Readers of what varies, by its kind: a ramp, a table and so on, of quantities in a unit."""
     value, values = Quantity(unit), Many(Quantity(unit))
-    kinds: dict[str, Reader] = {
+    kinds: dict[str, Table] = {
         "ramp": Table(ramp, {"start": value, "end": value, "from_time": Quantity("s"), "to_time": Quantity("s")}),
         "table": Table(
             partial(_tabulated, folder, unit),
@@ -274,15 +288,7 @@ def _reader(unit: str, folder: Path) -> Reader:
         kinds["torsion-bar"] = Table(TorsionBar, {"torque": value, "release_angle": Quantity("rad")})
         motor = {"breakdown_torque": value, "breakdown_slip": Quantity("1"), "synchronous_speed": Quantity("rad/s")}
         kinds["induction-motor"] = Table(InductionMotor, motor)
-
-    def signal(item: Any, name: str) -> Any:
-        if not isinstance(item, Mapping):
-            return value(item, name)
-        if "kind" not in item:
-            raise ParameterError(name, ", ".join(item), f"be a quantity, or a table with a kind, of {', '.join(kinds)}")
-        return Kinds(kinds)(item, name)
-
-    return Many(signal, single=True) if unit == "N.m" else signal
+    return kinds
 
 
 def _harmonics(

@@ -12,7 +12,8 @@
 from __future__ import annotations
 
 from .areas import Straightness, area_between, distance_to, hausdorff, straightest_part, straightness
-from .cases import SynthesisCase, direction, load_synthesis_case, synthesis_case_from
+from .case_tasks import KINDS
+from .cases import BOUNDS, TABLES, SynthesisCase, direction, load_synthesis_case, synthesis_case_from
 from .constraints import (
     USUAL,
     Assembly,
@@ -58,9 +59,12 @@ from .tasks import Motion, PrecisionPoints, RockerFunction, Straight, Task, Time
 
 __all__ = [
     "ANGLES",
+    "BOUNDS",
+    "KINDS",
     "LENGTHS",
     "LINKS",
     "QUICK_SEARCH",
+    "TABLES",
     "UNITS",
     "USUAL",
     "USUAL_SEARCH",

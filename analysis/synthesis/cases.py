@@ -215,6 +215,15 @@ class TradeOffTable:
 BOUNDS = Table(dict, {name: Range(Quantity("rad" if name in ANGLES else "m"), ordered=False) for name in UNKNOWNS})
 
 
+#: The tables of a case beside the task's, for `linkwork new`.
+TABLES: Mapping[str, type] = {
+    "constraints": Constraints,
+    "search": SearchTable,
+    "make": Make,
+    "trade_off": TradeOffTable,
+}
+
+
 def _constraints(value: Any, name: str) -> tuple[Constraint, ...]:
     return read(Constraints, value, name).constraints()
 

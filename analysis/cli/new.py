@@ -1,0 +1,200 @@
+"""`linkwork new`: case files to begin with, written from the tables that read them, so that they hold every entry there is."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+import click
+
+from linkwork.mechanism import Mechanism
+from linkwork.parameters import field_name
+
+from ..mechanisms import MECHANISMS
+from .common import handled, say, unknown
+
+SLIDER_MOTION = "slider-motion"
+_HEAD = """\
+# {title}: {command} {file}
+# Every quantity is a number in SI or a text with its unit, such as "5 cm" or "420 rpm". Entries behind a # may be left out:
+# they have their defaults, or examples of what may stand there.
+"""
+#: A task of each kind that is done within seconds; what else its table takes is written from the table.
+_TASKS: Mapping[str, Mapping[str, Any]] = {
+    "timed-path": {"x": "20 + 10*cos(t)", "y": "15 + 5*sin(t)", "unit": "cm", "n": 72},
+    "untimed-path": {"x": "20 + 10*cos(t)", "y": "15 + 5*sin(t)", "unit": "cm", "n": 72},
+    "rocker-function": {"angle": "70 + 100*abs(sin(t/2))", "angle_unit": "deg", "n": 24, "mounting": True},
+    "motion": {
+        "points": [[0, 0], [20, 15], [40, 20], [60, 15], [80, 0]],
+        "unit": "mm",
+        "angle": [0, 8, 15, 22, 30],
+        "angle_unit": "deg",
+    },
+    "precision-points": {"points": [[0, 0], [20, 15], [40, 20], [60, 15], [80, 0]], "unit": "mm"},
+}
+_CONSTRAINTS: Mapping[str, Any] = {"largest_link": "1 m", "least_transmission_angle": "30 deg"}
+#: What tables have to hold whose readers depend on the task.
+_REQUIRED: Mapping[str, Mapping[str, Any]] = {
+    "trade_off": {"over": "size", "limits": ["50 cm", "1 m"]},
+    "strategy": {"tolerance": "1 deg"},
+    "least_effort": {"bound": "0.2 deg"},
+    "drive": {"speed": "120 rpm"},
+    "slider": {"harmonics": [2], "stroke": "60 mm"},
+}
+
+
+def kinds() -> dict[str, str]:
+    """What `linkwork new` writes, and the command that takes it."""
+    runs = dict.fromkeys(MECHANISMS, "linkwork run")
+    return runs | dict.fromkeys(_TASKS, "linkwork synthesize") | {SLIDER_MOTION: "linkwork slider-motion"}
+
+
+def case_text(kind: str, file: str, *, parameters: bool = False) -> str:
+    """The text of a case file of a kind; of a mechanism, with ``parameters`` these alone."""
+    if kind in MECHANISMS:
+        mechanism = MECHANISMS[kind]
+        command = f"linkwork {kind if kind == 'slider-crank' else ''} info".replace("  ", " ")
+        title, lines = mechanism.title, _parameters(mechanism)
+        if not parameters:
+            command, title, lines = "linkwork run", f"A run of the {kind}", _run(mechanism, file)
+    else:
+        command, title = kinds()[kind], f"A synthesis, {kind}" if kind in _TASKS else "A motion of the slider"
+        lines = _synthesis(kind, file)
+    return _HEAD.format(title=title, command=command, file=file) + "\n".join(lines) + "\n"
+
+
+def _grouped(rows: Mapping[str, str]) -> Iterator[str]:
+    """Lines by dotted name in their tables, those of no table first."""
+    for group in dict.fromkeys(sorted((name.rpartition(".")[0] for name in rows), key=bool)):
+        if group:
+            yield f"\n[{group}]"
+        yield from (text for name, text in rows.items() if name.rpartition(".")[0] == group)
+
+
+def _value(variable: Any, value: Any) -> Any:
+    from ..files import in_words
+
+    if variable.kind == "Integer":
+        return int(value)
+    return float(value) if variable.unit == "1" else in_words(value, variable.unit)
+
+
+def _parameter_rows(mechanism: Mechanism) -> dict[str, str]:
+    """Parameters of the first published set."""
+    from ..files import line
+
+    made = next(iter(mechanism.published.values())).parameters
+    return {
+        name: line(name.rpartition(".")[2], _value(v, getattr(made, field_name(name))), v.description, active=True)
+        for name, v in mechanism.mechanism_variables.items()
+    }
+
+
+def _parameters(mechanism: Mechanism) -> Iterator[str]:
+    yield f'mechanism = "{mechanism.name}"'
+    yield from _grouped(_parameter_rows(mechanism))
+
+
+def _run(mechanism: Mechanism, file: str) -> Iterator[str]:
+    """A run of the first published set at its speed; without a prescribed speed, of a second with nothing acting on it."""
+    from ..files import entries, in_words, line
+    from ..run import RunTable, acting_on, signal_kinds
+
+    published = next(iter(mechanism.published.values()))
+    meaning = {v.name: v.description for v in mechanism.variables}
+    words = {c.argument: meaning[c.name] for c in mechanism.channels}
+    command = next((c.argument for c in mechanism.channels if c.kind == "command" and c.freedom == 0), None)
+    yield "# What acts may vary: then it is a table with a kind, such as speed = { kind = ..., ... }."
+    of_torques = set(signal_kinds("N.m", Path())) - set(signal_kinds("N", Path()))
+    for kind, table in signal_kinds("N.m", Path()).items():
+        yield f"#   {kind}{' (of torques)' if kind in of_torques else ''}: {', '.join(table.readers)}"
+    yield f'mechanism = "{mechanism.name}"'
+    yield line("title", Path(file).stem, "of tables and pictures", active=True)
+    rows = _parameter_rows(mechanism)
+    start = mechanism.initial()
+    for name, v in mechanism.initial_variables.items():
+        value = getattr(published.initial, name)
+        active = value != getattr(start, name)
+        rows[f"initial.{name}"] = line(name, _value(v, value), v.description, active=active)
+    for name, (argument, unit) in acting_on(mechanism).items():
+        leaf = name.rpartition(".")[2]
+        if not unit:
+            rows[name] = line(leaf, True, "true or false, in the place of the others of its table", active=False)
+            continue
+        driven = argument == command
+        value = published.crank_speed if driven else 1.0
+        rows[name] = line(leaf, in_words(value, unit), words[argument], active=driven)
+    given: dict[str, Any] = {"revolutions": 3.0} if command else {"stop_time": "1 s"}
+    yield from _grouped(rows)
+    yield "\n[run]"
+    yield from entries(RunTable, given)
+
+
+def _synthesis(kind: str, file: str) -> Iterator[str]:
+    """A task with its tables; of a slider's motion those of both."""
+    from ..files import Quantity, entries, line
+    from ..motion import TABLES as MOTION
+    from ..synthesis import ANGLES, BOUNDS, KINDS, LENGTHS, TABLES
+
+    moved = kind == SLIDER_MOTION
+    task = "rocker-function" if moved else kind
+    yield line("title", Path(file).stem, "of tables and pictures", active=True)
+    yield "\n[task]"
+    yield f'kind = "{task}"'
+    yield from entries(KINDS[task], _TASKS[task])
+    if moved:
+        yield "\n# The linkage whose pivot is moved; without this table it is found first."
+        yield "# [linkage]"
+        dimensions = {name: Quantity("rad" if name in ANGLES else "m") for name in (*LENGTHS, *ANGLES)}
+        yield from entries(dict, {}, readers=dimensions)
+    yield "\n# The dimensions: [least, greatest], or one value that fixes it."
+    yield "# [bounds]"
+    yield from entries(dict, {}, readers=BOUNDS.readers)
+    active = {"constraints": _CONSTRAINTS, "slider": _REQUIRED["slider"]}
+    for name, table in {**TABLES, **(MOTION if moved else {})}.items():
+        if moved and name == "trade_off":
+            continue
+        used = name in active
+        yield f"\n{'' if used else '# '}[{name}]"
+        given: Mapping[str, Any] = active.get(name) or _REQUIRED.get(name, {})
+        yield from entries(table, given, active=used)
+
+
+@click.command()
+@click.argument("kind", metavar="KIND", required=False)
+@click.argument("file", required=False, type=click.Path(dir_okay=False))
+@click.option(
+    "--parameters", is_flag=True, help="Of a mechanism: its parameters alone, as 'linkwork slider-crank' takes them."
+)
+@click.option("--force", is_flag=True, help="Write over a file of the same name.")
+@handled
+def new(kind: str | None, file: str | None, parameters: bool, force: bool) -> None:
+    """Write a case file to begin with, every entry explained, which runs as it is. Without a KIND they are listed.
+
+    KIND is a mechanism, for a run of it, or a task: of a synthesis, or of a slider's motion.
+
+    \b
+    Examples:
+      linkwork new
+      linkwork new five-bar
+      linkwork new rocker-function wiper.toml
+      linkwork new slider-crank mine.toml --parameters
+    """
+    known = kinds()
+    if kind is None:
+        for name, command in known.items():
+            say(f"{name:<18} for {command}")
+        return
+    if kind not in known:
+        raise unknown(kind, known, f"kind of case {kind!r}")
+    if parameters and kind not in MECHANISMS:
+        raise click.UsageError(f"--parameters is for a mechanism, {' or '.join(MECHANISMS)}: {kind} is a task")
+    path = Path(file or f"{kind}.toml")
+    if path.suffix != ".toml":
+        raise click.UsageError(f"{path} must end in .toml: JSON has no comments")
+    if path.exists() and not force:
+        raise click.UsageError(f"{path} is there already: give --force to write over it, or another name")
+    text = case_text(kind, str(path), parameters=parameters)
+    path.write_text(text, encoding="utf-8")
+    say(f"wrote {path}; next: {text.partition(': ')[2].splitlines()[0]}")

@@ -1,0 +1,161 @@
+"""Tables of files written out with every entry explained, from the readers and docstrings of `analysis.files.reader`."""
+
+from __future__ import annotations
+
+import inspect
+import re
+import sys
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import MISSING, fields, is_dataclass
+from functools import partial
+from math import degrees, isfinite, pi
+from typing import Any
+
+import tomli_w
+
+from ..units import with_unit
+from . import reader
+from .reader import Choice, Many, Quantity, Range, Reader, Table, Whole
+
+#: How a quantity is written where its unit is hard to read, by its SI unit: the unit, and how many of it one of SI is.
+_FRIENDLY = {"rad": ("deg", degrees(1.0)), "rad/s": ("rpm", 30.0 / pi)}
+#: Of examples (rad).
+_ANGLE = pi / 6.0
+#: Column of what explains an entry.
+_COLUMN = 46
+
+
+def in_words(value: float, unit: str) -> str:
+    """A quantity in SI as a text with a unit that is easy to read, to ten digits."""
+    name, factor = _FRIENDLY.get(unit, (with_unit(value, unit).partition(" ")[2], 1.0))
+    return f"{value * factor:.10g} {name}"
+
+
+def literal(value: Any) -> str:
+    """A value as TOML in one line."""
+    if isinstance(value, Mapping):
+        return f"{{ {', '.join(f'{key} = {literal(inner)}' for key, inner in value.items())} }}"
+    if isinstance(value, Sequence) and not isinstance(value, str):
+        return f"[{', '.join(map(literal, value))}]"
+    return tomli_w.dumps({"x": value}).partition("=")[2].strip()
+
+
+def requirement(read: Reader) -> str:
+    """What a reader takes, in a few words."""
+    match read:
+        case Quantity(unit=unit, above=above, least=least):
+            bounds = "above zero" if above == 0.0 else "not below zero" if least == 0.0 else ""
+            return ", ".join(filter(None, ("a number" if unit == "1" else "", bounds)))
+        case Whole(least=lower):
+            return "a whole number" + (f", at least {lower}" if lower is not None else "")
+        case Choice(names=names):
+            return f"one of {', '.join(names)}"
+        case Many(item=item, length=length):
+            inner = requirement(item)
+            return f"a list{f' of {length}' if length else ''}{f', each {inner}' if inner else ''}"
+        case Range(item=item):
+            return ", ".join(filter(None, ("[least, greatest], or one value", requirement(item))))
+        case Table(readers=readers):
+            return f"a table with {', '.join(readers)}" if readers else "a table"
+        case reader.flag:
+            return "true or false"
+        case reader.text:
+            return "a text"
+    return ""
+
+
+def example(read: Reader) -> Any:
+    """A value that a reader takes; None where that cannot be known."""
+    match read:
+        case Quantity(unit=unit, below=below):
+            value = _ANGLE if unit == "rad" else 1.0 if below > 1.0 else 0.5 * below
+            return 1 if unit == "1" else in_words(value, unit)
+        case Whole(least=lower):
+            return 1 if lower is None else max(lower, 1)
+        case Choice(names=names):
+            return next(iter(names))
+        case Many(item=item, least=least, length=length):
+            one = example(item)
+            return None if one is None else [one] * max(least, length or 1)
+        case Range(item=Quantity(unit=unit)):
+            return [in_words(share * (_ANGLE if unit == "rad" else 1.0), unit) for share in (0.1, 1.0)]
+        case reader.flag:
+            return True
+    return None
+
+
+def meanings(kind: Any, *, follow: bool = True) -> dict[str, str]:
+    """What the docstring of a class or function says of its entries, and those of the names in backticks in its first line."""
+    doc = inspect.getdoc(kind) or ""
+    found: dict[str, str] = {}
+    if follow:
+        module = sys.modules[kind.__module__]
+        for name in re.findall(r"`(\w+)(?:\.(\w+))?`", doc.partition("\n")[0]):
+            other = getattr(module, name[0], None)
+            other = getattr(other, name[1], None) if name[1] else other
+            if other is not None:
+                found |= meanings(other, follow=False)
+    heads = list(re.finditer(r"^([\w, ]+) : .*\n((?: {4}.*(?:\n|$))+)", doc, re.MULTILINE))
+    for head in heads:
+        words = " ".join(head[2].split()).removesuffix(".")
+        sentence = words if len(words) < 90 else re.split(r"[.;:] ", words)[0]
+        # a unit alone says what the value says
+        if not re.fullmatch(r"\S{1,6}", words):
+            sentence = re.sub(r" \([^)]*$", "", sentence.replace("`", ""))
+            found |= {name.strip(): sentence for name in head[1].split(",")}
+    return found
+
+
+def line(name: str, value: Any, comment: str, *, active: bool) -> str:
+    """An entry with what explains it; one that is not active, or has no value, is a comment."""
+    text = f"{name} = {literal(value)}" if value is not None else f"{name} = ..."
+    if value is None or not active:
+        text = f"# {text}"
+    return f"{text:<{_COLUMN}}  # {comment}" if comment else text
+
+
+def _default(of: Any, read: Reader) -> Any:
+    """A default as it stands in a file; None where it has none that a file could say."""
+    if isinstance(read, Quantity) and isinstance(of, (int, float)):
+        return (float(of) if read.unit == "1" else in_words(of, read.unit)) if isfinite(of) else None
+    if isinstance(read, Range) and isinstance(of, tuple):
+        ends = [_default(end, read.item) for end in of]
+        return None if None in ends else ends
+    if isinstance(of, tuple) and of and all(isinstance(item, (int, float, str)) for item in of):
+        return list(of)
+    return of if isinstance(of, (bool, int, str)) else None
+
+
+def entries(
+    kind: Any, given: Mapping[str, Any], *, readers: Mapping[str, Reader] | None = None, active: bool = True
+) -> Iterator[str]:
+    """Lines for the entries of a table: those that are ``given``, then all others as comments, with their defaults.
+
+    Parameters
+    ----------
+    kind : dataclass, or dict with ``readers``
+    given : mapping
+        Values by name in the file.
+    readers : mapping, optional
+        Readers by name, in the place of the dataclass's own.
+    active : bool
+        Whether the entries that are given are no comments.
+    """
+    about = {} if kind is dict else meanings(kind)
+    known: dict[str, tuple[Reader, Any, str]] = {name: (read, None, "") for name, read in (readers or {}).items()}
+    if is_dataclass(kind):
+        for field in fields(kind):
+            if "reader" in field.metadata:
+                default = None if field.default is MISSING else field.default
+                name = field.metadata["key"] or field.name
+                read = (readers or {}).get(name, field.metadata["reader"])
+                known[name] = (read, default, about.get(field.name) or about.get("n_" + field.name, ""))
+    for name, (read, default, meaning) in sorted(known.items(), key=lambda item: item[0] not in given):
+        said = [part for part in (meaning, requirement(read)) if part]
+        if not said:
+            function = read.func if isinstance(read, partial) else read
+            words = (inspect.getdoc(function) or "") if inspect.isfunction(function) else ""
+            said = [] if function is reader.as_it_is else [words.partition("\n")[0].removesuffix(".").replace("`", "")]
+        value = given.get(name, _default(default, read))
+        value = example(read) if value is None else value
+        yield line(name, value, "; ".join(said), active=active and name in given)

@@ -1,0 +1,142 @@
+"""`linkwork new`: what is written runs as it is, holds every entry there is, and its examples are taken."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+
+import pytest
+
+from analysis.cli.new import case_text, kinds
+from analysis.files import names_of
+from analysis.mechanisms import MECHANISMS
+from analysis.motion import TABLES as MOTION
+from analysis.motion import SliderCase, load_slider_case
+from analysis.run import RunTable, acting_on, load_case, load_parameters
+from analysis.synthesis import BOUNDS, KINDS, TABLES, SynthesisCase, load_synthesis_case
+from linkwork.errors import LinkworkError
+
+QUICK = ("--set", "search.candidates=2048", "--set", "search.starts=3", "--no-plots")
+SLIDER = "slider-motion"
+#: What is said of entries that are right by themselves, but exclude or need one another.
+TOGETHER = r"must (have only one of|not come together|come with|be given with)|parameter drive.speed is missing"
+
+
+def load(kind, path):
+    loader = load_case if kind in MECHANISMS else load_slider_case if kind == SLIDER else load_synthesis_case
+    return loader(path)
+
+
+def sections(text):
+    """Lines of entries, active or not, by table."""
+    found, table = {}, ""
+    for line in text.splitlines():
+        if head := re.fullmatch(r"(?:# )?\[(\w+)\]", line):
+            table = head[1]
+            found[table] = [line]
+        elif re.match(r"(?:# )?\w+ = ", line):
+            found.setdefault(table, [""]).append(line)
+    return found
+
+
+def names(lines):
+    return {line.removeprefix("# ").partition(" = ")[0] for line in lines[1:]}
+
+
+@pytest.mark.parametrize("kind", kinds())
+def test_it_holds_every_entry_there_is(kind):
+    found = sections(case_text(kind, "x.toml"))
+    if kind in MECHANISMS:
+        mechanism = MECHANISMS[kind]
+        assert names(found["run"]) == set(names_of(RunTable))
+        assert names(found["initial"]) == set(mechanism.initial_variables)
+        there = {f"{table}.{name}" if table else name for table, lines in found.items() for name in names(lines)}
+        assert {*mechanism.mechanism_variables, *acting_on(mechanism)} <= there
+        return
+    tables = TABLES | MOTION if kind == SLIDER else TABLES
+    assert names(found["task"]) == {"kind", *names_of(KINDS["rocker-function" if kind == SLIDER else kind])}
+    assert names(found["bounds"]) == set(BOUNDS.readers)
+    known = set(names_of(SliderCase if kind == SLIDER else SynthesisCase)) - {"synthesis", "title"}
+    assert set(found) - {"", "task", "bounds", "linkage"} == set(tables) - ({"trade_off"} if kind == SLIDER else set())
+    assert known <= set(found)
+    for table in set(tables) & set(found):
+        assert names(found[table]) == set(names_of(tables[table])), table
+
+
+@pytest.mark.parametrize("kind", kinds())
+def test_examples_behind_a_number_sign_are_taken(kind, tmp_path):
+    text = case_text(kind, "x.toml")
+    load(kind, write(tmp_path, text))
+    for lines in sections(text).values():
+        # a table that is not there comes in with all that it must have
+        together = [lines] if lines[0].startswith("#") else [[line] for line in lines if line.startswith("# ")]
+        for chosen in together:
+            shown = [line for line in chosen if " = ..." not in line]
+            changed = text
+            for line in shown:
+                changed = changed.replace(f"\n{line}\n", f"\n{line.removeprefix('# ')}\n", 1)
+            try:
+                load(kind, write(tmp_path, changed))
+            except LinkworkError as error:
+                if not re.search(TOGETHER, str(error)):
+                    raise AssertionError(f"{shown}: {error}") from error
+
+
+def write(folder, text):
+    path = folder / "x.toml"
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+@pytest.mark.parametrize("kind", MECHANISMS)
+def test_a_new_run_runs_as_it_is(linkwork, tmp_path, kind):
+    written = linkwork("new", kind)
+    assert written.output == f"wrote {kind}.toml; next: linkwork run {kind}.toml\n"
+    assert linkwork("run", f"{kind}.toml", "--no-plot").exit_code == 0
+    assert (tmp_path / "out" / f"{kind}.csv").is_file()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_new_synthesis_runs_as_it_is(linkwork, kind):
+    linkwork("new", kind)
+    result = linkwork("synthesize", f"{kind}.toml", *QUICK)
+    assert result.exit_code == 0, result.stderr
+    assert "defects" not in result.stderr
+
+
+@pytest.mark.slow
+def test_a_new_slider_motion_runs_as_it_is(linkwork):
+    linkwork("new", SLIDER)
+    result = linkwork("slider-motion", f"{SLIDER}.toml", *QUICK, "--set", "slider.starts=3")
+    assert result.exit_code == 0, result.stderr
+    assert "slider, 2 harmonics" in result.output
+
+
+@pytest.mark.parametrize("kind", MECHANISMS)
+def test_parameters_alone(linkwork, tmp_path, kind):
+    assert linkwork("new", kind, "p.toml", "--parameters").exit_code == 0
+    published = next(iter(MECHANISMS[kind].published.values())).parameters
+    made = load_parameters(tmp_path / "p.toml")
+    for name in published.__slots__:
+        assert getattr(made, name) == pytest.approx(getattr(published, name), rel=1e-9)
+    if kind == "slider-crank":
+        assert linkwork("slider-crank", "info", "p.toml").exit_code == 0
+
+
+def test_what_it_does_not_write(linkwork, tmp_path):
+    for words, said in (
+        (["five-bars"], "there is no kind of case 'five-bars'; did you mean five-bar?"),
+        (["motion", "--parameters"], "--parameters is for a mechanism, five-bar or slider-crank: motion is a task"),
+        (["motion", "x.json"], "x.json must end in .toml: JSON has no comments"),
+    ):
+        result = linkwork("new", *words)
+        assert result.exit_code == 2
+        assert said in result.stderr
+    (tmp_path / "motion.toml").write_text("mine")
+    result = linkwork("new", "motion")
+    assert "motion.toml is there already: give --force to write over it, or another name" in result.stderr
+    assert (tmp_path / "motion.toml").read_text() == "mine"
+    assert linkwork("new", "motion", "--force").exit_code == 0
+    assert tomllib.loads((tmp_path / "motion.toml").read_text())["task"]["kind"] == "motion"
+    assert [line.split()[0] for line in linkwork("new").output.splitlines()] == list(kinds())
