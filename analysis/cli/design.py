@@ -14,7 +14,7 @@ from rich.table import Table
 
 from linkwork.errors import Interrupted
 
-from .common import INTERRUPTED, SYNTHESIS, changes, check_kind, console, errors, folder_of, handled
+from .common import INTERRUPTED, SYNTHESIS, changes, check_kind, console, folder_of, handled, print_error, print_written
 
 if TYPE_CHECKING:
     from ..synthesis import Solution, TradeOff
@@ -32,22 +32,11 @@ def settings_of(settings: Sequence[str]) -> dict[str, Any]:
     return changes(settings, value, "constraints.largest_link='300 mm'")
 
 
-def print_error(sentence: str) -> None:
-    """Print a remark beside the results."""
-    errors.print(sentence, style="yellow", markup=False, highlight=False, soft_wrap=True)
-
-
 def leave_if_stopped(stopped: Interrupted | None, kept: str) -> None:
     """End with the exit code of a search that was stopped from the keyboard, saying what is kept of it."""
     if stopped is not None:
         print_error(f"{stopped}; {kept}")
         sys.exit(INTERRUPTED)
-
-
-def print_written(paths: Sequence[Path]) -> None:
-    """List the files that were written."""
-    for path in paths:
-        console.print(f"wrote {path}", highlight=False, soft_wrap=True)
 
 
 def table(title: str, headings: Sequence[str], left: Collection[str] = ()) -> Table:

@@ -13,8 +13,8 @@ from rich.table import Table
 
 from linkwork.errors import Interrupted
 
-from .common import SLIDER_MOTION, check_kind, console, folder_of, handled
-from .design import leave_if_stopped, overrides_of, print_error, print_written, search_options, table, write_described
+from .common import SLIDER_MOTION, check_kind, console, folder_of, handled, print_error, print_written
+from .design import leave_if_stopped, overrides_of, search_options, table, write_described
 
 if TYPE_CHECKING:
     from ..motion import SliderCase, SliderDrive

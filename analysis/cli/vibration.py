@@ -25,10 +25,11 @@ from .common import (
     case_options,
     chosen_case,
     console,
-    errors,
     folder_of,
     handled,
     out_option,
+    print_error,
+    print_written,
     quantity,
 )
 
@@ -72,7 +73,7 @@ class _Chosen:
         speed = speed or self.speed
         value = None if speed is None else quantity(speed, "rad/s", "--speed")
         if value is not None and self.case.inputs.torque is not None:
-            errors.print("note: the speed is prescribed; the case's torque is left out", style="yellow")
+            print_error("note: the speed is prescribed; the case's torque is left out")
         try:
             drive = drive_of(self.case.parameters, self.case.inputs, self.case.initial, speed=value)
             # that something is free is asked first
@@ -102,10 +103,9 @@ class _Chosen:
 
     def finish(self, written: Sequence[Path], problems: Sequence[str], *, interrupted: bool = False) -> None:
         """Report the files and what could not be computed, and exit with what that means."""
-        for path in written:
-            console.print(f"wrote {path}", highlight=False, soft_wrap=True)
+        print_written(written)
         for problem in problems:
-            errors.print(f"note: {problem}", style="yellow", markup=False, highlight=False, soft_wrap=True)
+            print_error(f"note: {problem}")
         if interrupted or problems:
             sys.exit(INTERRUPTED if interrupted else ENDED_EARLY)
 
@@ -394,12 +394,9 @@ def _report_verdict(title: str, parameters: Any, drive: Any, start: Any) -> None
         lines.append(f"by the linear equation about u = 0, as in the thesis: {linear_verdict(parameters, drive)}")
     console.print("\n".join(lines), highlight=False, soft_wrap=True)
     if friction:
-        errors.print(
+        print_error(
             "note: Coulomb friction is smoothed over 1 mm/s: where the slider would stick, the model creeps to one place, "
-            "and its multipliers are those of the creep",
-            style="yellow",
-            highlight=False,
-            soft_wrap=True,
+            "and its multipliers are those of the creep"
         )
 
 

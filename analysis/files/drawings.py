@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from linkwork.errors import InputError, ParameterError
 
 from ..units import LENGTHS
-from .paths import ending_of, prepare
+from .paths import ending_of, whole
 from .reader import unknown_name
 
 Point = tuple[float, float]
@@ -329,12 +329,13 @@ def save_drawing(path: str | Path, drawing: Drawing, *, unit: str = "mm") -> Pat
     """
     path = Path(path)
     text = to_dxf(drawing, unit) if ending_of(path, (".dxf", ".svg")) == ".dxf" else to_svg(drawing, unit)
-    prepare(path).write_bytes(text.encode())
+    with whole(path) as part:
+        part.write_bytes(text.encode())
     return path
 
 
 def save_figure(figure: Any, path: str | Path, *, dpi: int = 150) -> Path:
     """Write a Matplotlib figure, as the format that the path's ending names."""
-    path = prepare(path)
-    figure.savefig(path, dpi=dpi)
+    with whole(path := Path(path)) as part:
+        figure.savefig(part, dpi=dpi, format=path.suffix.removeprefix(".") or "png")
     return path

@@ -12,7 +12,7 @@ import tomli_w
 
 from linkwork.errors import InputError
 
-from .paths import ending_of, prepare, read_text
+from .paths import ending_of, read_text, whole
 from .reader import table_of
 
 ENDINGS = (".toml", ".json")
@@ -32,7 +32,8 @@ def write_tables(path: str | Path, data: Mapping[str, Any]) -> Path:
     else:
         # plain values before tables, as TOML asks
         text = tomli_w.dumps(dict(sorted(data.items(), key=lambda item: isinstance(item[1], dict))))
-    prepare(path).write_text(text, encoding="utf-8")
+    with whole(path) as part:
+        part.write_text(text, encoding="utf-8")
     return path
 
 

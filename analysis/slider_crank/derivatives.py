@@ -15,12 +15,12 @@ from typing import Any, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from linkwork.errors import ParameterError
 from linkwork.parameters import field_name
 from linkwork.slider_crank import parameters as parameters_module
 from linkwork.slider_crank import variables
 from linkwork.slider_crank.parameters import Constants, SliderCrankParameters
 
+from ..files import unknown_name
 from ..numerics.dual import Dual, dual
 from ..numerics.dual import variables as independent
 from .forces import SLIDER_FORCE, ForceTurn, solve
@@ -232,9 +232,9 @@ def check_names(names: Sequence[str], known: Collection[str], kind: str) -> None
 
     Raises
     ------
-    ParameterError
+    UnknownNameError
         If one is not among the known.
     """
     for name in names:
         if name not in known:
-            raise ParameterError(name, name, f"be the name of a known {kind}: {', '.join(known)}")
+            raise unknown_name(name, known, f"{kind} {name!r}")

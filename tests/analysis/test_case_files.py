@@ -188,7 +188,7 @@ step = "1 ms"
         ('published = "table-3.1"\n[load]\nfz = 1', r"load\.fz"),
         ('published = "table-3.1"\n[force]\nkind = "table"\ntimes = [0, 1]\nvalues = [1]', "as many times as values"),
         ('published = "table-3.1"\n[force]\nkind = "table"\ntimes = [1, 0]\nvalues = [1, 2]', "must increase"),
-        ('published = "table-3.1"\n[force]\nkind = "table"\nfile = "no.csv"', "cannot be read as CSV"),
+        ('published = "table-3.1"\n[force]\nkind = "table"\nfile = "no.csv"', "no.csv cannot be read: No such file"),
         ('mechanism = "slider_crank"', "did you mean slider-crank"),
         ('mechanism = "five-bar"\npublished = "rahman-ideal"', "be that of the published set rahman-ideal"),
         ('published = "rahman-ideal"\n[axial]\nshift = 1.0', "there is no axial.shift"),

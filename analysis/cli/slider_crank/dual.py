@@ -13,7 +13,7 @@ from click.core import ParameterSource
 from linkwork.slider_crank.assembly import check_assembly
 
 from ... import slider_crank as sc
-from ..common import CHECK_FAILED, console, errors, folder_of, print_written, say, show_table, tolerance_option
+from ..common import CHECK_FAILED, console, folder_of, print_error, print_written, say, show_table, tolerance_option
 from .options import Chosen, Problem, about_mechanism, out_option, with_problem
 
 
@@ -71,7 +71,7 @@ def dual(chosen: Chosen, problem: Problem, tolerance: float, two_rotations: bool
         f"{found.iterations} iterations; moment about the rod's line, which no equation asks for: {found.rod_moment:.1e} N.m"
     )
     if not all(passed):
-        errors.print("check failed: the two do not agree", style="red")
+        print_error("check failed: the two do not agree", "red")
         sys.exit(CHECK_FAILED)
     console.print("the two agree", style="green")
 

@@ -19,7 +19,7 @@ from linkwork.slider_crank.published import RAD_S_PER_RPM, SETS
 
 from ... import slider_crank as sc
 from ...mechanisms import SLIDER_CRANK
-from ..common import PARAMETERS, changes, check_kind, errors, handled, number_or_text, quantity
+from ..common import PARAMETERS, changes, check_kind, handled, number_or_text, print_error, quantity
 
 if TYPE_CHECKING:
     from ...slider_crank import ForceTurn, PeriodicShift, ShiftLaw
@@ -314,7 +314,7 @@ def with_problem(points: int) -> Callable[[Command], Command]:
 
 def note(text: str) -> None:
     """Write what a reader must know beside the results, to standard error."""
-    errors.print(f"note: {text}", style="yellow", markup=False, highlight=False, soft_wrap=True)
+    print_error(f"note: {text}")
 
 
 def angle_text(value: float) -> str:
