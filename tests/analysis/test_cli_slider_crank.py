@@ -494,7 +494,7 @@ class TestPicture:
         (["tolerances", "--tolerance", "guide.ofset=1 mm"], 1, "did you mean guide.offset"),
         (["tolerances", "--tolerance", "guide.offset"], 2, "it must be NAME=HALF_WIDTH"),
         (["tolerances", "--tolerance", "guide.offset=-1 mm"], 1, "the tolerance of guide.offset is -0.001"),
-        (["tolerances", "--quantity", "slider.postion"], 1, "there is no quantity 'slider.postion'; did you mean slider.position?"),
+        (["tolerances", "--quantity", "slider.postion"], 1, "no quantity 'slider.postion'; did you mean slider.position?"),
         (["dual", "--tolerance", "nan"], 2, "not between 0 and 1"),
         (["picture", "--out", "/proc/no"], 1, "/proc/no: No such file or directory"),
     ],
