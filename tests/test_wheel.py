@@ -12,6 +12,8 @@ from zipfile import ZipFile
 
 import pytest
 
+from analysis.export import SOURCES
+
 ROOT = Path(__file__).parents[1]
 
 pytestmark = pytest.mark.slow
@@ -53,6 +55,28 @@ def test_the_wheel_has_two_packages_that_are_typed_and_no_other_module(wheel: Pa
         names = archive.namelist()
     assert {name.partition("/")[0] for name in names if ".dist-info/" not in name} == {"analysis", "linkwork"}
     assert {"analysis/py.typed", "linkwork/py.typed", "analysis/_examples/run-up.toml"} <= set(names)
+
+
+def test_the_wheel_has_all_sources_of_fmus(wheel: Path) -> None:
+    with ZipFile(wheel) as archive:
+        inside = set(archive.namelist())
+    sources = {
+        f"analysis/_fmu_src/{path.relative_to(SOURCES).as_posix()}"
+        for path in SOURCES.rglob("*")
+        if path.is_file() and "__pycache__" not in path.parts
+    }
+    assert len([name for name in sources if "/native/" in name]) > 5
+    assert sources - inside == set()
+
+
+def test_the_installed_wheel_builds_native_fmus_and_what_is_published_with_them(
+    installed: Callable[..., str], tmp_path: Path
+) -> None:
+    said = installed("build", "--kinds", "native", "--dest", tmp_path, "--publish", tmp_path / "published")
+    for model in ("FiveBarSlider", "SliderCrank"):
+        assert f"{model}-native.fmu: valid" in said
+        assert (tmp_path / f"{model}-native.fmu").is_file()
+        assert (tmp_path / "published" / f"{model}-native" / f"{model}-native_ref.csv").is_file()
 
 
 def test_the_installed_wheel_works_without_a_checkout(installed: Callable[..., str]) -> None:

@@ -40,8 +40,16 @@ def _several(context: click.Context, parameter: click.Parameter, values: Sequenc
     help="What native FMUs are compiled for: all, or some of x86_64-linux, aarch64-linux, x86_64-windows, x86_64-darwin, "
     "aarch64-darwin; by default this one.",
 )
+@click.option(
+    "--publish",
+    metavar="FOLDER",
+    type=click.Path(file_okay=False),
+    help="Write each FMU there too, with inputs, reference results and who imports it.",
+)
 @handled
-def build(models: Sequence[str], dest: str, kinds: Sequence[str], platforms: Sequence[str]) -> None:
+def build(
+    models: Sequence[str], dest: str, kinds: Sequence[str], platforms: Sequence[str], publish: str | None
+) -> None:
     """Build and validate FMUs: of every mechanism, or those named, such as FiveBarSlider.
 
     \b
@@ -53,7 +61,7 @@ def build(models: Sequence[str], dest: str, kinds: Sequence[str], platforms: Seq
     from ..export import KINDS, build_all, kinds_here
 
     with console.status("building"):
-        for fmu, for_platforms in build_all(models, dest, kinds, platforms):
+        for fmu, for_platforms in build_all(models, dest, kinds, platforms, publish_to=publish):
             made = f", {' '.join(for_platforms)}" if for_platforms else ""
             say(f"{fmu}: valid, {fmu.stat().st_size / 1024:.0f} KiB{made}")
     if not kinds and set(kinds_here()) != set(KINDS):

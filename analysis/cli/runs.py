@@ -12,6 +12,7 @@ from zipfile import BadZipFile
 import click
 
 from linkwork import __version__
+from linkwork.errors import InputError
 
 from ..mechanisms import PUBLISHED
 from ..units import RAD_S_PER_RPM

@@ -1,8 +1,8 @@
 """Making FMUs of the mechanisms."""
 
 from .archive import SOURCES, BuildError, try_out
-from .compatibility import publish
 from .builds import Built, build_all, kinds_here
+from .compatibility import publish
 from .description import KINDS, NATIVE, NATIVE_FMI3, PYTHON, Kind
 from .native_fmu import PLATFORMS, build_native, compile_library, source_files, this_platform
 from .python_fmu import build
@@ -21,9 +21,9 @@ __all__ = [
     "build_all",
     "build_native",
     "compile_library",
+    "kinds_here",
     "publish",
     "source_files",
-    "kinds_here",
     "this_platform",
     "try_out",
 ]

@@ -10,6 +10,7 @@ from typing import NamedTuple
 from ..files import unknown_name
 from ..mechanisms import MECHANISMS
 from .archive import try_out
+from .compatibility import publish
 from .description import KINDS, PYTHON
 from .native_fmu import PLATFORMS, build_native, this_platform
 from .python_fmu import build
@@ -36,6 +37,8 @@ def build_all(
     dest: Path | str = "build",
     kinds: Sequence[str] = (),
     platforms: Sequence[str] = (),
+    *,
+    publish_to: Path | str | None = None,
 ) -> Iterator[Built]:
     """Build FMUs, one after the other, each valid and, where it can run here, tried out.
 
@@ -49,6 +52,8 @@ def build_all(
         Of `KINDS`; by default all that can be built here.
     platforms : sequence of str, optional
         Of `PLATFORMS`, or ``all``: what native FMUs are compiled for; this one by default.
+    publish_to : path, optional
+        Folder for what `publish` writes of each that runs here.
 
     Yields
     ------
@@ -79,4 +84,6 @@ def build_all(
             made = build(known[name], dest) if python else build_native(known[name], kind, dest, native)
             if python or here in native:
                 try_out(made)
+                if publish_to is not None:
+                    publish(known[name], kind, made, publish_to)
             yield Built(made, () if python else native)

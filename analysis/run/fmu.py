@@ -57,7 +57,7 @@ def unpacking_folder() -> str:
 def _description(fmu: str | Path) -> Any:
     """FMPy's model description."""
     if not Path(fmu).is_file():
-        raise CosimulationError(f"there is no file {fmu}: build it with 'python build_fmu.py'")
+        raise CosimulationError(f"there is no file {fmu}: build it with 'linkwork build'")
     try:
         return read_model_description(str(fmu))
     except Exception as error:

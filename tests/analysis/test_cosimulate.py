@@ -322,7 +322,7 @@ def _cosimulate(path: Path) -> Trajectory:
 
 
 def test_missing_file(tmp_path: Path) -> None:
-    with pytest.raises(CosimulationError, match=r"there is no file .*none\.fmu: build it with 'python build_fmu.py'"):
+    with pytest.raises(CosimulationError, match=r"there is no file .*none\.fmu: build it with 'linkwork build'"):
         _cosimulate(tmp_path / "none.fmu")
 
 
