@@ -179,6 +179,6 @@ def _converted(text: str, unit: str, spelled: str, name: str, wanted: str) -> fl
     try:
         of = re.sub(r"(?<=[^\W\d_])(-?[0-9])", r"**\1", of.replace("·", "*"))  # m2 for m**2, as FMI has it
         return float(_registry().Quantity(number, of).to(spelled).magnitude)
-    except (pint.PintError, ValueError, TypeError, AttributeError, ArithmeticError, SyntaxError) as error:
+    except (pint.PintError, ValueError, TypeError, AttributeError, ArithmeticError, LookupError, SyntaxError) as error:
         reason = (str(error) or type(error).__name__).splitlines()[0]
         raise ParameterError(name, text, f"{wanted} ({reason})") from error

@@ -82,6 +82,7 @@ def test_quantities_in_their_units(text, unit, value):
         ("1 furlongg", "m"),
         (None, "m"),
         ("inf m", "m"),
+        ("0N0", "N"),
     ],
 )
 def test_a_quantity_of_another_kind_is_refused_by_name(text, unit):
