@@ -257,7 +257,7 @@ def _fmus_to_check(model: str, fmu: str | None, only: str | None) -> list[tuple[
     from ..run import CHECKED, offered
 
     if only is not None and only not in CHECKED:
-        raise click.UsageError(f"--interface {only}: it must be {' or '.join(CHECKED)}")
+        raise unknown(only, CHECKED, f"interface {only!r} to check")
     kinds = sorted(DEFAULT_FOLDER.glob(f"{model}-*.fmu")) if fmu is None else []
     first = DEFAULT_FOLDER / f"{model}.fmu" if fmu is None else Path(fmu)
     paths = [path for path in (first, *kinds) if path.is_file()] or [first]

@@ -17,6 +17,7 @@ from zipfile import BadZipFile
 
 from linkwork.errors import InputError
 
+from ..files import unknown_name
 from . import journal
 from .context import AFTER_FATAL, FAILED
 from .findings import CRASH, WRONG, Finding, Outcome, Report
@@ -96,7 +97,7 @@ def probe(
 
     for check in checks:
         if check not in CHECKS:
-            raise InputError(f"there is no check {check!r}: the checks are {', '.join(CHECKS)}")
+            raise unknown_name(check, CHECKS, f"check {check!r}")
     with tempfile.TemporaryDirectory(prefix="probe-") as temporary:
         work = Path(temporary)
         description = _extract(Path(fmu), work / "fmu")

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from linkwork.errors import InputError
 
+from ..files import unknown_name
 from ..mechanisms import InitialState, Parameters, output_units
 from ..units import Amount, in_si
 from .arguments import driven, started, takes_published, usual_times
@@ -87,7 +88,7 @@ def cosimulate(
     True
     """
     if interface not in INTERFACES:
-        raise InputError(f"interface is {interface!r}: it must be one of {', '.join(INTERFACES)}")
+        raise unknown_name(interface, INTERFACES, f"interface {interface!r}")
     begun = clock.perf_counter()
     stop_time, step = usual_times(parameters, inputs, stop_time, step)
     times = sample_times(stop_time, step, start_time)
@@ -287,8 +288,7 @@ class Comparison:
         for difference in self.differences:
             if difference.name == name:
                 return difference
-        known = ", ".join(difference.name for difference in self.differences)
-        raise InputError(f"there is no output {name!r}: the outputs are {known}")
+        raise unknown_name(name, [difference.name for difference in self.differences], f"output {name!r}")
 
 
 def compare(a: Trajectory, b: Trajectory, *, tolerance: float = 1e-6) -> Comparison:

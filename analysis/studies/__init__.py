@@ -12,8 +12,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING
 
-from linkwork.errors import InputError
-
+from ..files import unknown_name
 from ._rahman import FIGURES as _RAHMAN
 
 if TYPE_CHECKING:
@@ -110,11 +109,11 @@ def load(number: str) -> Study:
 
     Raises
     ------
-    InputError
+    UnknownNameError
         If there is no study of that number.
     """
     if number not in STUDIES:
-        raise InputError(f"there is no study of figure {number!r}: there are {', '.join(STUDIES)}")
+        raise unknown_name(number, STUDIES, f"study of figure {number!r}")
     module = import_module(module_name(number))
     study: Study = module.study(number) if number in RAHMAN else module.STUDY
     return study

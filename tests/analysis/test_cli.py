@@ -108,7 +108,11 @@ def test_a_run_that_ends_early_keeps_its_data_and_exits_with_3(linkwork, tmp_pat
         (["run", "--published", "table-3.1", "--set", "nonsense"], 2, "NAME=VALUE"),
         (["run", "nowhere.toml"], 2, "does not exist"),
         (["check", "--fmu", "nowhere.fmu"], 1, "there is no file nowhere.fmu"),
-        (["check", "--interface", "both"], 2, "--interface both: it must be co-simulation or model-exchange"),
+        (
+            ["check", "--interface", "model-exchang"],
+            2,
+            "no interface 'model-exchang' to check; did you mean model-exchange?",
+        ),
         (
             ["run", "--published", "table-3.1", "--interface", "model-exchange"],
             2,
