@@ -561,7 +561,7 @@ class TestBadInput:
             (
                 {"search": {"method": "annealing"}},
                 InputError,
-                "method 'annealing': it must be one of scan, differential-evolution, simplex",
+                r"no method 'annealing' \(the names are scan, differential-evolution, simplex",
             ),
             ({"weights": [1.0, 2.0]}, InputError, r"weights have the shape \(2,\)"),
             ({"constraints": ["short"]}, InputError, "constraint 'short' is none: use LeastTransmission"),
