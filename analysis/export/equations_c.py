@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import json
+import re
 import sys
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import fields
@@ -52,7 +53,9 @@ def _equations(mechanism: Mechanism) -> str:
         generator.add(function)
     with TemporaryDirectory(prefix="linkwork-c-") as folder:
         generator.generate(f"{folder}/")
-        return (Path(folder) / "equations.c").read_text(encoding="utf-8")
+        text = (Path(folder) / "equations.c").read_text(encoding="utf-8")
+    # the shell leaves out no argument and no result: without these questions the code is smaller
+    return re.sub(r"arg\[(\d+)\]\? (arg\[\1\]\[\d+\]) : 0", r"\2", re.sub(r"if \(res\[\d+\]!=0\) ", "", text))
 
 
 def functions(mechanism: Mechanism) -> list[Any]:

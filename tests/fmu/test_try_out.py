@@ -17,5 +17,5 @@ def test_what_does_not_run_is_no_build(natives: dict[str, Path], tmp_path: Path)
     with zipfile.ZipFile(good) as source, zipfile.ZipFile(broken, "w") as target:
         for name in source.namelist():
             target.writestr(name, b"no library" if name.endswith((".so", ".dll", ".dylib")) else source.read(name))
-    with pytest.raises(BuildError, match=r"broken\.fmu was built but does not run:\n(.|\n)*Error"):
+    with pytest.raises(BuildError, match=r"broken\.fmu was built but does not run as it should:\n(.|\n)*Error"):
         try_out(broken)
