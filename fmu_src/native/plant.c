@@ -433,7 +433,6 @@ static Reason integrate(
         return reason;
     *ended = LIMIT_OF_ASSEMBLY;
     *duration = done;
-    a->step_size = 0.0;
     return GOOD;
 }
 

@@ -937,15 +937,20 @@ def test_inputs_set_in_an_intermediate_update_hold_from_there(fmi3: Library) -> 
     made: list[Instance] = []
     times: list[float] = []
 
+    seen: list[float] = []
+
     def update(_: Any, time: float, *rest: Any) -> None:
+        seen.append(made[0].get("slider.acceleration")[0])  # an output is that of the state now, each time
         if not times:
             times.append(time)
             made[0].set(slider__force=3.0, drive__speed=60.0)
 
     made.append(fmi3.instance(update=update))
-    c = made[0].start()
+    # with an acceleration: the command is applied once, not at every update that follows
+    c = made[0].start(drive__acceleration=200.0, solver__tolerance=1e-12)
     assert c.step(0.0, 0.05) == OK
-    two = fmi3.instance().start()
+    assert len(set(seen)) == len(seen) > 5
+    two = fmi3.instance().start(drive__acceleration=200.0, solver__tolerance=1e-12)
     assert two.step(0.0, times[0]) == OK
     two.set(slider__force=3.0, drive__speed=60.0)
     assert two.step(times[0], 0.05 - times[0]) == OK
