@@ -11,8 +11,8 @@ from typing import Any
 
 import click
 from rich.console import Console
-from rich.markup import escape
 from rich.table import Table
+from rich.text import Text
 
 from linkwork.errors import InputError, Interrupted, LinkworkError
 
@@ -22,26 +22,51 @@ from . import INTERRUPTED as INTERRUPTED
 from . import WRONG as WRONG
 
 #: Wide enough for the tables where the output goes to a file or a pipe.
-console = Console() if sys.stdout.isatty() else Console(width=120)
-errors = Console(stderr=True)
+console = Console(emoji=False) if sys.stdout.isatty() else Console(emoji=False, width=120)
+errors = Console(emoji=False, stderr=True)
+
+
+def visible(text: str) -> str:
+    """A text without characters that a terminal would act on: they are written as Python writes them, such as \\x1b."""
+    if text.isprintable():
+        return text
+    return "".join(c if c.isprintable() or c == "\n" else c.encode("unicode_escape").decode() for c in text)
+
+
+def plain(text: str) -> Text:
+    """A text for a table, as it was typed: neither markup nor emoji codes count."""
+    return Text(visible(text))
 
 
 def print_error(text: str, style: str = "yellow") -> None:
     """Print a sentence on standard error: a note in yellow, an error in red."""
-    errors.print(text, style=style, markup=False, highlight=False, soft_wrap=True)
+    errors.print(visible(text), style=style, markup=False, highlight=False, soft_wrap=True)
 
 
 def print_written(paths: Iterable[Path]) -> None:
     """Name the files that were written."""
     for path in paths:
-        console.print(f"wrote {path}", highlight=False, markup=False, soft_wrap=True)
+        say(f"wrote {path}")
 
 
 def handled(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Turn the project's errors into a sentence and an exit code."""
+    """Turn the project's errors into a sentence and an exit code, and keep files that the command did not write."""
 
     @wraps(command)
     def run(*arguments: Any, **options: Any) -> Any:
+        from ..files import written_by
+
+        context = click.get_current_context()
+        # without the name of the program, which may be that of Python
+        names = context.command_path.removeprefix(context.find_root().command_path)
+        with written_by(names.strip(), bool(context.meta.get(_FORCE))) as writing:
+            try:
+                return report(*arguments, **options)
+            finally:
+                for note in writing.notes:
+                    print_error(f"note: {note}")
+
+    def report(*arguments: Any, **options: Any) -> Any:
         try:
             return command(*arguments, **options)
         except Interrupted as error:
@@ -50,6 +75,8 @@ def handled(command: Callable[..., Any]) -> Callable[..., Any]:
             text, style, code = f"error: {error}", "red", WRONG
         except OSError as error:
             text, style, code = f"error: {error.filename or 'a file'}: {error.strerror or error}", "red", WRONG
+        except MemoryError as error:
+            text, style, code = f"error: not enough memory: {error or 'ask for less at a time'}", "red", WRONG
         except KeyboardInterrupt:
             text, style, code = "interrupted", "yellow", INTERRUPTED
         print_error(text, style)
@@ -78,8 +105,20 @@ def tolerance_option(*names: str, default: float | None = None, help: str) -> Ca
 
 
 def out_option(default: str = "out", help: str = "Folder for CSV and plots.") -> Callable[..., Any]:
-    """The option --out."""
-    return click.option("--out", default=default, show_default=True, type=click.Path(file_okay=False), help=help)
+    """The options --out and --force."""
+    out = click.option("--out", default=default, show_default=True, type=click.Path(file_okay=False), help=help)
+    return lambda command: out(force_option(command))
+
+
+#: Where the context of a command keeps the option --force.
+_FORCE = "linkwork.force"
+force_option = click.option(
+    "--force",
+    is_flag=True,
+    expose_value=False,
+    callback=lambda context, _, value: context.meta.update({_FORCE: value}),
+    help="Write over files that this command did not write, too.",
+)
 
 
 def folder_of(out: str | Path) -> Path:
@@ -222,7 +261,7 @@ def chosen_case(file: str | None, published: str | None, settings: Sequence[str]
 
 def say(text: str) -> None:
     """Print a sentence as it is, in one line."""
-    console.print(text, markup=False, highlight=False, soft_wrap=True)
+    console.print(visible(text), markup=False, highlight=False, soft_wrap=True)
 
 
 def show_table(
@@ -246,9 +285,9 @@ def show_table(
     styles : iterable of str, optional
         Of the rows, in rich's terms.
     """
-    grid = Table(title=escape(title), title_justify="left", show_header=bool(headings))
+    grid = Table(title=plain(title), title_justify="left", show_header=bool(headings))
     for heading in headings:
-        grid.add_column(escape(heading), justify="left" if heading in words else "right")
+        grid.add_column(plain(heading), justify="left" if heading in words else "right")
     for row, style in zip(rows, styles):
-        grid.add_row(*(escape(cell) for cell in row), style=style)
+        grid.add_row(*(plain(cell) for cell in row), style=style)
     console.print(grid)

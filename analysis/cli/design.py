@@ -14,7 +14,19 @@ from rich.table import Table
 
 from linkwork.errors import Interrupted
 
-from .common import INTERRUPTED, SYNTHESIS, changes, check_kind, console, folder_of, handled, print_error, print_written
+from .common import (
+    INTERRUPTED,
+    SYNTHESIS,
+    changes,
+    check_kind,
+    console,
+    folder_of,
+    force_option,
+    handled,
+    plain,
+    print_error,
+    print_written,
+)
 
 if TYPE_CHECKING:
     from ..synthesis import Solution, TradeOff
@@ -26,7 +38,7 @@ def settings_of(settings: Sequence[str]) -> dict[str, Any]:
     def value(text: str) -> Any:
         try:
             return tomllib.loads(f"value = {text}")["value"]
-        except tomllib.TOMLDecodeError:
+        except (ValueError, RecursionError):
             return text
 
     return changes(settings, value, "constraints.largest_link='300 mm'")
@@ -41,7 +53,7 @@ def leave_if_stopped(stopped: Interrupted | None, kept: str) -> None:
 
 def table(title: str, headings: Sequence[str], left: Collection[str] = ()) -> Table:
     """An empty table, its columns to the right but for those that are named."""
-    grid = Table(title=escape(title), title_justify="left")
+    grid = Table(title=plain(title), title_justify="left")
     for heading in headings:
         grid.add_column(escape(heading), justify="left" if heading in left else "right")
     return grid
@@ -53,6 +65,7 @@ def search_options(command: Callable[..., Any]) -> Callable[..., Any]:
     for option in (
         click.option("--plots/--no-plots", default=True, show_default=True, help="Whether to write plots."),
         click.option("--out", default="out", show_default=True, type=folder, help="Folder for the results."),
+        force_option,
         click.option("--jobs", type=int, help="Cores; -1 for all."),
         click.option("--seed", type=click.IntRange(0), help="Of the search: the same seed gives the same linkages."),
     ):
@@ -111,12 +124,11 @@ def print_best(solution: Solution) -> None:
 
 def write_described(solution: Solution, folder: Path, title: str, *, curve: str, text: str, drawn: str) -> list[Path]:
     """The curve of a solution, its report, and its drawing as DXF and SVG, under these names; what was written."""
-    from ..files import save_drawing
+    from ..files import save_drawing, write_text
     from ..synthesis import drawing, report
 
-    described = folder / f"{text}.txt"
+    described = write_text(folder / f"{text}.txt", f"{title}\n\n{report(solution)}")
     written = [solution.to_csv(folder / f"{curve}.csv"), described]
-    described.write_text(f"{title}\n\n{report(solution)}", encoding="utf-8")
     picture = drawing(solution, title=title)
     return written + [save_drawing(folder / f"{drawn}.{ending}", picture) for ending in ("dxf", "svg")]
 

@@ -8,10 +8,10 @@ from pathlib import Path
 
 import click
 
-from ..files import write_tables
+from ..files import write_tables, write_text
 from ..probe import CRASH, SEVERITIES, WRONG, Finding, Report, replay
 from ..probe import probe as probe_fmu
-from .common import CHECK_FAILED, console, handled, print_error, print_written, say, show_table
+from .common import CHECK_FAILED, console, force_option, handled, print_error, print_written, say, show_table
 
 
 @click.command()
@@ -36,6 +36,7 @@ from .common import CHECK_FAILED, console, handled, print_error, print_written, 
 )
 @click.option("--check", "checks", multiple=True, metavar="CHECK", help="Only this check; can be given often.")
 @click.option("--out", type=click.Path(dir_okay=False), help="File for the report: .md or .json.")
+@force_option
 @click.option("--strict", is_flag=True, help="Fail on what is questionable, too.")
 @click.option(
     "--replay",
@@ -99,9 +100,7 @@ def _write(report: Report, path: Path) -> Path:
     """Write the report, in the form that the ending of the file says."""
     if path.suffix != ".md":
         return write_tables(path, report.to_dict())
-    path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text(report.to_markdown(), encoding="utf-8")
-    return path
+    return write_text(path, report.to_markdown())
 
 
 def _show(findings: Sequence[Finding]) -> None:

@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
-from zipfile import BadZipFile
 
 import click
 
@@ -36,9 +35,11 @@ from .common import (
     print_error,
     print_written,
     quantity,
+    say,
     show_table,
     tolerance_option,
     unknown,
+    visible,
 )
 
 #: Outputs in the plot of a check beside the freedoms, of those that the mechanism has.
@@ -298,9 +299,12 @@ def _model_name(path: Path) -> str | None:
     """Name of the model in an FMU; None where there is none to read, which the check reports."""
     from fmpy import read_model_description
 
+    from ..files import check_fmu
+
     try:
+        check_fmu(path)
         return str(read_model_description(str(path), validate=False).modelName)
-    except (OSError, KeyError, ValueError, BadZipFile):
+    except Exception:  # FMPy raises plain ones
         return None
 
 
@@ -322,7 +326,7 @@ def _write_comparison(stem: Path, case: Any, in_process: Any, through_fmu: Any) 
         labels=(f"in process ({in_process.source})", "FMU"),
     )
     save_figure(figure, f"{stem}.png")
-    console.print(f"wrote {stem}.png, -in-process.csv and -fmu.csv", highlight=False, soft_wrap=True)
+    say(f"wrote {stem}.png, -in-process.csv and -fmu.csv")
     for which, result in (("in process", in_process), ("FMU", through_fmu)):
         if result.status:
             print_error(f"{which}: the run ended early: {result.message}")
@@ -366,7 +370,7 @@ def info(what: str | None) -> None:
         sets = [(name, entry.source, f"{entry.crank_speed / RAD_S_PER_RPM:g}") for name, entry in PUBLISHED.items()]
         show_table("published sets", ("name", "source", "speed [rpm]"), sets, words=("name", "source"))
         place = cache_root()
-        console.print(f"linkwork {__version__}; compiled code is kept in {place}", highlight=False, soft_wrap=True)
+        say(f"linkwork {__version__}; compiled code is kept in {place}")
     elif what in PUBLISHED:
         _print_parameters(PUBLISHED[what].source, PUBLISHED[what].parameters)
     elif what in MECHANISMS:
@@ -429,9 +433,15 @@ def _print_fmu(path: Path) -> None:
     from fmpy import read_model_description
     from fmpy.validation import validate_fmu
 
+    from ..files import check_fmu, first_line
+
     if not path.is_file():
         raise click.UsageError(f"there is no file {path}: build it with 'linkwork build'")
-    description = read_model_description(str(path))
+    check_fmu(path)
+    try:
+        description = read_model_description(str(path))
+    except Exception as error:  # FMPy raises plain ones
+        raise InputError(f"{path} is not an FMU: {first_line(error)}") from error
 
     def start(variable: Any) -> str:
         if variable.start is None or variable.causality == "output":
@@ -445,7 +455,7 @@ def _print_fmu(path: Path) -> None:
         words=("variable", "causality", "unit", "description"),
     )
     problems = validate_fmu(str(path))
-    console.print("; ".join(problems) or "valid", style="red" if problems else "green")
+    console.print(visible("; ".join(problems) or "valid"), style="red" if problems else "green", markup=False)
     if problems:
         sys.exit(CHECK_FAILED)
 

@@ -11,6 +11,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 from linkwork.errors import InputError
 
+from ..files import free, record
 from .style import Figure
 
 
@@ -29,7 +30,7 @@ def gif(
     """
     if frames < 2:
         raise InputError(f"an animation in {frames} frames: there must be at least 2")
-    path = Path(path)
+    path = free(path)
     path.parent.mkdir(parents=True, exist_ok=True)
     FigureCanvasAgg(figure)
     writer = PillowWriter(fps=frames_per_second, metadata={})
@@ -42,3 +43,4 @@ def gif(
             writer.grab_frame()
 
         yield add
+    record(path)

@@ -8,6 +8,15 @@ from .drawings import save_drawing as save_drawing
 from .drawings import save_figure as save_figure
 from .drawings import to_dxf as to_dxf
 from .drawings import to_svg as to_svg
+from .outputs import free as free
+from .outputs import output as output
+from .outputs import record as record
+from .outputs import write_text as write_text
+from .outputs import written_by as written_by
+from .paths import WritingError as WritingError
+from .paths import check_fmu as check_fmu
+from .paths import first_line as first_line
+from .paths import limit as limit
 from .reader import Choice as Choice
 from .reader import Kinds as Kinds
 from .reader import Many as Many

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from linkwork.errors import InputError
+from linkwork.errors import InputError, LinkworkError
 
 from ..units import INCH, LENGTHS, quantity
 from .paths import ending_of, first_line, read_text
@@ -20,6 +20,10 @@ from .reader import unknown_name
 _CSS = {**LENGTHS, "": INCH / 96, "px": INCH / 96, "pt": INCH / 72, "pc": INCH / 6}
 #: Deviation of the chords from a curve of an SVG file, as a share of the curve's extent.
 _CHORD_ERROR = 1e-4
+#: Widest curve of an SVG file (m): beyond it are slips of the pen.
+_WIDEST = 1e9
+#: Groups and uses inside each other, and elements with all uses replaced, that an SVG file may have.
+_DEPTH, _ELEMENTS = 100, 100_000
 
 
 def read_points(
@@ -66,7 +70,17 @@ def read_points(
     scale = None if unit is None else quantity(f"1 {unit}", "m", "unit")
     text = read_text(path)
     if ending == ".svg":
-        return _svg_points(path, text, scale, name)
+        try:
+            with np.errstate(all="ignore"):
+                points, closed = _svg_points(path, text, scale, name)
+        except LinkworkError:
+            raise
+        except (ValueError, TypeError, LookupError, AttributeError, ArithmeticError, RecursionError) as error:
+            # what svgelements, and numpy after it, make of a drawing that breaks the rules
+            raise InputError(f"{path} has a curve that cannot be read: {first_line(error)[:200]}") from error
+        if len(points) < 2 or not np.isfinite(points).all() or not 0.0 < np.ptp(points, axis=0).max() < _WIDEST:
+            raise InputError(f"{path} has a curve without an extent, or one beyond {_WIDEST:.0e} m")
+        return points, closed
     if name is not None:
         raise InputError(f"{path.name} has one curve without a name: {name!r} cannot be looked up in it")
     rows = _two_columns(path, text)
@@ -87,9 +101,9 @@ def _two_columns(path: Path, text: str) -> NDArray[np.float64]:
             if not rows and not header and not any(_is_number(cell) for cell in cells):
                 header = True
                 continue
-            raise InputError(f"{path}, line {number}: {line.strip()!r} is not two numbers, x and y") from None
+            raise InputError(f"{path}, line {number}: {line.strip()[:100]!r} is not two numbers, x and y") from None
         if not (isfinite(x) and isfinite(y)):
-            raise InputError(f"{path}, line {number}: {line.strip()!r} is not finite")
+            raise InputError(f"{path}, line {number}: {line.strip()[:100]!r} is not finite")
         rows.append((x, y))
     if not rows:
         raise InputError(f"{path} has no points: it must have two columns of numbers, x and y")
@@ -112,9 +126,12 @@ def _svg_points(path: Path, text: str, scale: float | None, name: str | None) ->
 
     try:
         root = ElementTree.fromstring(text)
+        _check_tree(path, root)
         drawing = svgelements.SVG.parse(StringIO(text))
-    except (ElementTree.ParseError, ValueError, TypeError, AttributeError, KeyError, IndexError) as error:
-        raise InputError(f"{path} is not valid SVG: {first_line(error)}") from error
+    except InputError:
+        raise
+    except (SyntaxError, ValueError, TypeError, AttributeError, LookupError, ArithmeticError, RecursionError) as error:
+        raise InputError(f"{path} is not valid SVG: {first_line(error)[:200]}") from error
     if not isinstance(drawing, svgelements.SVG):
         raise InputError(f"{path} is not valid SVG: its outermost element is {root.tag}")
     metre = _svg_scale(path, root) if scale is None else scale
@@ -124,7 +141,7 @@ def _svg_points(path: Path, text: str, scale: float | None, name: str | None) ->
         named = [element for element in drawing.elements() if isinstance(element, kinds) and element.id is not None]
         within = [element for element in named if element.id == name]
         if not within:
-            raise unknown_name(name, [str(element.id) for element in named])
+            raise unknown_name(name, [str(element.id)[:100] for element in named[:200]])
     shapes = [within[0]] if isinstance(within[0], svgelements.Shape) else within[0].select()
     shapes = [shape for shape in shapes if isinstance(shape, svgelements.Shape)]
     shapes.sort(key=lambda shape: not isinstance(shape, svgelements.Path))
@@ -143,6 +160,27 @@ def _svg_points(path: Path, text: str, scale: float | None, name: str | None) ->
     gap = float(np.hypot(*(points[-1] - points[0])))
     closed = gap <= 1e-9 * extent
     return (points[:-1] if closed else points) * np.array([metre, -metre]), closed
+
+
+def _check_tree(path: Path, root: Any) -> None:
+    """Make sure that a drawing can be expanded: each ``<use>`` stands for a copy of what it names, uses in it included."""
+    named = {element.get("id"): element for element in root.iter() if element.get("id") is not None}
+    sizes: dict[int, int] = {}
+
+    def size(element: Any, depth: int) -> int:
+        """Elements that one stands for."""
+        if depth > _DEPTH:
+            raise InputError(f"{path} has groups and uses inside each other, deeper than {_DEPTH}, or a use of itself")
+        if id(element) not in sizes:
+            inside = list(element)
+            if str(element.tag).rpartition("}")[2] == "use":
+                links = (value for key, value in element.items() if key.rpartition("}")[2] == "href")
+                inside += [named[link.strip()[1:]] for link in links if link.strip()[1:] in named]
+            sizes[id(element)] = 1 + sum(size(child, depth + 1) for child in inside)
+        return sizes[id(element)]
+
+    if size(root, 0) > _ELEMENTS:
+        raise InputError(f"{path} has more than {_ELEMENTS} elements with all its uses replaced")
 
 
 def _chords(segment: Any, allowed: float) -> NDArray[np.float64]:

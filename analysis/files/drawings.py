@@ -21,7 +21,8 @@ from numpy.typing import NDArray
 from linkwork.errors import InputError, ParameterError
 
 from ..units import LENGTHS
-from .paths import ending_of, whole
+from .outputs import output, write_text
+from .paths import ending_of
 from .reader import unknown_name
 
 Point = tuple[float, float]
@@ -329,13 +330,21 @@ def save_drawing(path: str | Path, drawing: Drawing, *, unit: str = "mm") -> Pat
     """
     path = Path(path)
     text = to_dxf(drawing, unit) if ending_of(path, (".dxf", ".svg")) == ".dxf" else to_svg(drawing, unit)
-    with whole(path) as part:
-        part.write_bytes(text.encode())
-    return path
+    return write_text(path, text)
 
 
 def save_figure(figure: Any, path: str | Path, *, dpi: int = 150) -> Path:
     """Write a Matplotlib figure, as the format that the path's ending names."""
-    with whole(path := Path(path)) as part:
-        figure.savefig(part, dpi=dpi, format=path.suffix.removeprefix(".") or "png")
+    with output(path) as (part, path):
+        kind = path.suffix[1:] or "png"
+        try:
+            figure.savefig(part, dpi=dpi, format=kind)
+        except ValueError:
+            # a title from a file may look like mathematics without being any: dollars then stand for themselves
+            texts = figure.findobj(lambda artist: hasattr(artist, "set_parse_math") and "$" in artist.get_text())
+            if not texts:
+                raise
+            for text in texts:
+                text.set_parse_math(False)
+            figure.savefig(part, dpi=dpi, format=kind)
     return path

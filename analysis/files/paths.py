@@ -2,12 +2,45 @@
 
 from __future__ import annotations
 
+import gzip
+import io
 import os
+import stat
+import zlib
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
+from zipfile import BadZipFile, LargeZipFile, ZipFile
 
-from linkwork.errors import InputError
+from linkwork.errors import InputError, LinkworkError
+
+#: Megabytes of a text file that are read at most, by its ending; ``""`` for all others.
+_TEXT = {".toml": 16, ".json": 16, ".svg": 8, "": 1024}
+#: Megabytes of an FMU, packed and unpacked, and its members.
+_FMU, _MEMBERS = 4096, 20_000
+_MB = 1_000_000
+#: Marks of the encodings that spreadsheets and editors write beside plain UTF-8.
+_UTF_16 = (b"\xff\xfe", b"\xfe\xff")
+
+
+class WritingError(LinkworkError, OSError):
+    """A file cannot be written: no space, no permission; the sentence names the file."""
+
+
+def limit(name: str, default: int) -> int:
+    """A limit on what is read: ``default``, unless the environment variable ``LINKWORK_MAX_<name>`` is another.
+
+    Raises
+    ------
+    InputError
+        If the variable is not a whole number above zero.
+    """
+    text = os.environ.get(f"LINKWORK_MAX_{name}", "").strip()
+    if not text:
+        return default
+    if not (text.isascii() and text.isdigit() and len(text) <= 15 and int(text) > 0):
+        raise InputError(f"LINKWORK_MAX_{name} is {text[:40]!r}: it must be a whole number greater than zero")
+    return int(text)
 
 
 def prepare(path: str | Path) -> Path:
@@ -39,24 +72,105 @@ def whole(path: Path) -> Iterator[Path]:
     try:
         yield part
         os.replace(part, path)
+    except OSError as error:
+        raise WritingError(f"{path} cannot be written: {error.strerror or error}") from error
     finally:
-        part.unlink(missing_ok=True)
+        with suppress(OSError):
+            part.unlink(missing_ok=True)
 
 
 def read_text(path: Path) -> str:
-    """The text of a file.
+    """The text of a file in UTF-8, or in UTF-16 with a byte order mark; of one that ends in ``.gz``, what is packed in it.
 
     Raises
     ------
     InputError
-        If it cannot be read.
+        If it cannot be read, is no plain file, or is larger than the limit for its kind (LINKWORK_MAX_FILE_MB).
     """
+    packed = path.suffix.lower() == ".gz"
+    most = limit("FILE_MB", _TEXT.get(Path(path.stem if packed else path).suffix.lower(), _TEXT[""]))
     try:
-        return path.read_text(encoding="utf-8-sig")
-    except OSError as error:
-        raise InputError(f"{path} cannot be read: {error.strerror or error}") from error
+        check_plain(path)
+        with gzip.open(path) if packed else path.open("rb") as file:
+            content = file.read(most * _MB + 1)
+    except InputError:
+        raise
+    except (EOFError, zlib.error, gzip.BadGzipFile) as error:
+        raise InputError(f"{path} cannot be read: it is not a whole gzip file ({first_line(error)})") from error
+    except (OSError, ValueError) as error:  # ValueError: a name with a null character in it
+        raise InputError(f"{_shown(path)} cannot be read: {getattr(error, 'strerror', None) or error}") from error
+    if len(content) > most * _MB:
+        raise InputError(
+            f"{path} has more than {most} MB of text: give LINKWORK_MAX_FILE_MB a greater number to read it all the same"
+        )
+    encoding = "utf-16" if content[:2] in _UTF_16 else "utf-8-sig"
+    try:
+        text = content.decode(encoding)
     except UnicodeDecodeError as error:
-        raise InputError(f"{path} cannot be read: it is not text in UTF-8") from error
+        raise InputError(f"{path} cannot be read: it is not text in {encoding[:6].upper()}") from error
+    return io.StringIO(text, newline=None).getvalue()
+
+
+def check_plain(path: Path) -> None:
+    """Make sure that a path leads to a file, where it leads to anything: devices and pipes may never end.
+
+    Raises
+    ------
+    InputError
+        If it is something else.
+    OSError
+        If it is not there.
+    """
+    mode = os.stat(path).st_mode
+    if not stat.S_ISREG(mode):
+        kinds = ((stat.S_ISDIR, "a folder"), (stat.S_ISFIFO, "a pipe"), (stat.S_ISSOCK, "a socket"))
+        what = next((words for is_it, words in kinds if is_it(mode)), "a device")
+        raise InputError(f"{path} is {what}: it must be a file")
+
+
+def check_fmu(path: str | Path) -> None:
+    """Make sure that an FMU can be unpacked: an archive of bounded size whose members stay in its folder.
+
+    Raises
+    ------
+    InputError
+        If it cannot; the sentence says how a limit is raised.
+    """
+    path, most, members = Path(path), limit("FMU_MB", _FMU), limit("FMU_MEMBERS", _MEMBERS)
+    try:
+        check_plain(path)
+        if path.stat().st_size > most * _MB:
+            raise InputError(f"{path} has more than {most} MB: LINKWORK_MAX_FMU_MB in the environment raises the limit")
+        with ZipFile(path) as archive:
+            found = archive.infolist()
+    except InputError:
+        raise
+    except (OSError, ValueError, BadZipFile, LargeZipFile, NotImplementedError, EOFError, zlib.error) as error:
+        raise InputError(f"{path} is not an FMU: {getattr(error, 'strerror', None) or first_line(error)}") from error
+    if len(found) > members:
+        raise InputError(
+            f"{path} has {len(found)} members: more than {members} are unpacked where LINKWORK_MAX_FMU_MEMBERS in the "
+            "environment is greater"
+        )
+    # an archive cannot give more of a member than it declares here
+    size = sum(member.file_size for member in found)
+    description = sum(member.file_size for member in found if member.filename == "modelDescription.xml")
+    for what, amount, allowed in (("unpacked", size, most), ("of modelDescription.xml", description, most // 16)):
+        if amount > allowed * _MB:
+            raise InputError(
+                f"{path} has {amount / _MB:.0f} MB {what}: more than {allowed} MB are read where LINKWORK_MAX_FMU_MB in the "
+                f"environment, which is {most}, is greater"
+            )
+    for member in found:
+        name = member.filename
+        if name.startswith("/") or "\\" in name or ":" in name or ".." in name.split("/"):
+            raise InputError(f"{path} has the member {name[:80]!r}, which would be unpacked outside of its folder")
+
+
+def _shown(path: Path) -> str:
+    """A path as an error names it: of bounded length, without what cannot be printed."""
+    text = str(path)
+    return text if text.isprintable() and len(text) <= 300 else repr(text[:300])
 
 
 def first_line(error: Exception) -> str:

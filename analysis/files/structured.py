@@ -12,10 +12,14 @@ import tomli_w
 
 from linkwork.errors import InputError
 
-from .paths import ending_of, read_text, whole
+from .outputs import write_text
+from .paths import ending_of, first_line, read_text
 from .reader import table_of
 
 ENDINGS = (".toml", ".json")
+#: What a file of tables may hold at most: tables and lists inside each other, characters of a text and of a name, bits of a
+#: whole number. More is no case file, and errors would repeat it.
+_DEPTH, _TEXT, _NAME, _BITS = 50, 10_000, 200, 1024
 
 
 def write_tables(path: str | Path, data: Mapping[str, Any]) -> Path:
@@ -32,9 +36,7 @@ def write_tables(path: str | Path, data: Mapping[str, Any]) -> Path:
     else:
         # plain values before tables, as TOML asks
         text = tomli_w.dumps(dict(sorted(data.items(), key=lambda item: isinstance(item[1], dict))))
-    with whole(path) as part:
-        part.write_text(text, encoding="utf-8")
-    return path
+    return write_text(path, text)
 
 
 def read_tables(path: str | Path) -> dict[str, Any]:
@@ -50,11 +52,42 @@ def read_tables(path: str | Path) -> dict[str, Any]:
     text = read_text(path)
     try:
         data = tomllib.loads(text) if ending == ".toml" else json.loads(text)
-    except (tomllib.TOMLDecodeError, json.JSONDecodeError) as error:
-        raise InputError(f"{path} is not valid {ending[1:].upper()}: {error}") from error
+    except RecursionError:
+        raise InputError(f"{path} has tables or lists inside each other, deeper than {_DEPTH}") from None
+    except ValueError as error:  # of the syntax, and of whole numbers with thousands of digits
+        raise InputError(f"{path} is not valid {ending[1:].upper()}: {first_line(error)[:300]}") from error
     if not isinstance(data, dict):
         raise InputError(f"{path} must hold tables, not {type(data).__name__}")
+    _check(path, data)
     return data
+
+
+def _check(path: Path, data: dict[str, Any]) -> None:
+    """Make sure that tables are of a size that can be worked with, and named in an error."""
+    level: list[tuple[str, Any]] = [("", data)]
+    for _ in range(_DEPTH):
+        inside: list[tuple[str, Any]] = []
+        for name, value in level:
+            if isinstance(value, dict):
+                for key in value:
+                    _check_text(path, f"a name in {name or 'it'}", key, _NAME)
+                inside += [(f"{name}.{key}" if name else key, entry) for key, entry in value.items()]
+            elif isinstance(value, list):
+                inside += [(f"{name}[{number}]", entry) for number, entry in enumerate(value)]
+            elif isinstance(value, str):
+                _check_text(path, name, value, _TEXT)
+            elif isinstance(value, int) and value.bit_length() > _BITS:
+                raise InputError(f"{path}: {name} is a whole number of more than {_BITS} bits")
+        level = inside
+    if level:
+        raise InputError(f"{path} has tables or lists inside each other, deeper than {_DEPTH}")
+
+
+def _check_text(path: Path, name: str, text: str, longest: int) -> None:
+    if len(text) > longest:
+        raise InputError(f"{path}: {name} has {len(text)} characters: {longest} are the most")
+    if any("\ud800" <= character <= "\udfff" for character in text):
+        raise InputError(f"{path}: {name} has half a character: \\ud800 to \\udfff come in pairs")
 
 
 def overridden(

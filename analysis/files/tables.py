@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from linkwork.errors import InputError, Interrupted
 
+from .outputs import output
 from .paths import first_line, read_text, whole
 
 #: Numbers that are formatted at a time; Ctrl-C waits for no more.
@@ -42,10 +43,9 @@ def write_csv(path: str | Path, columns: Mapping[str, ArrayLike]) -> Path:
     path = Path(path)
     if not path.parent.is_dir():
         raise InputError(f"there is no folder {path.parent} for {path.name}: make it first")
-    # a name with a comma in it is one column all the same
-    header = ",".join(f'"{name}"' if "," in name else name for name in arrays)
+    header = ",".join(map(cell, arrays))
     try:
-        with whole(path) as part, part.open("w", encoding="utf-8", newline="\n") as file:
+        with output(path) as (part, path), part.open("w", encoding="utf-8", newline="\n") as file:
             file.write(header + "\n")
             _write_rows(file, path, list(arrays.values()))
     except KeyboardInterrupt:
@@ -83,6 +83,29 @@ def _bar(what: str, count: int) -> Iterator[Callable[[int], None]]:
         yield lambda rows: bar.update(task, completed=rows)
 
 
+def cell(text: str) -> str:
+    """A text as a cell of a CSV file: quoted where it has to be, and harmless to a spreadsheet.
+
+    What begins like a formula gets an apostrophe before it, which spreadsheets take for the mark of a text; numbers stay.
+    """
+    if text.startswith(_FORMULA) and not _is_number(text):
+        text = f"'{text}"
+    text = " ".join(text.splitlines())
+    return '"{}"'.format(text.replace('"', '""')) if "," in text or '"' in text else text
+
+
+#: What a cell begins with that a spreadsheet executes.
+_FORMULA = tuple("=+-@\t\r")
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
+
+
 def read_csv(path: str | Path) -> NDArray[np.float64]:
     """The numbers of a CSV file below its header line, shape (rows, columns).
 
@@ -112,7 +135,11 @@ def read_rows(path: str | Path) -> list[dict[str, str]]:
     """
     path = Path(path)
     try:
-        return list(csv.DictReader(read_text(path).splitlines()))
+        return [
+            # of cells beyond the header, and names without a cell, nothing is kept
+            {name: text for name, text in row.items() if isinstance(name, str) and isinstance(text, str)}
+            for row in csv.DictReader(read_text(path).splitlines())
+        ]
     except csv.Error as error:
         raise InputError(f"{path} cannot be read: {error}") from error
 

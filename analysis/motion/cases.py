@@ -447,14 +447,14 @@ def linkage_from_csv(path: str | Path, rank: int = 1) -> Linkage:
         If the file cannot be read, is none of that kind, or has no linkage of that rank.
     """
     rows = read_rows(path)
-    if rank > len(rows):
+    if not 1 <= rank <= len(rows):
         raise InputError(f"{path} has {len(rows)} linkages: there is none of rank {rank}")
     row = rows[rank - 1]
     columns = {name: f"{name} [{'rad' if name in ANGLES else 'm'}]" for name in DIMENSIONS}
     try:
         values: dict[str, Any] = {name: float(row[column]) for name, column in columns.items()}
         values["branch"] = int(float(row["branch"]))
-    except (KeyError, TypeError, ValueError) as error:
+    except (KeyError, TypeError, ValueError, OverflowError) as error:
         raise InputError(
             f"{path} is no list of linkages as 'linkwork synthesize' writes it ({type(error).__name__}: {error})"
         ) from None

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import ctypes
 import ctypes.util
+import errno
 import hashlib
 import os
 import shutil
@@ -311,6 +312,10 @@ class Kernel:
                 try:
                     self._compiled = self._compile(folder)
                 except Exception as error:
+                    if isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EROFS):
+                        sys.stderr.write(f"linkwork: {folder}: {error.strerror}: compiled code is not kept\n")
+                        self._compiled = self._compile(None)
+                        return self._compiled
                     if not any(folder.glob("**/*.nb[ic]")):
                         raise
                     # Numba reads what is damaged as whatever it happens to be
@@ -324,12 +329,14 @@ class Kernel:
                     self._compiled = self._compile(folder)
         return self._compiled
 
-    def _compile(self, folder: Path) -> Any:
+    def _compile(self, folder: Path | None) -> Any:
+        """Compile, and keep the code in a folder if there is one."""
         before = numba.config.CACHE_DIR
-        numba.config.CACHE_DIR = str(folder)
+        if folder is not None:
+            numba.config.CACHE_DIR = str(folder)
         try:
             with _announced(self.purpose):
-                return njit(*self.signature, cache=True, error_model="numpy", nogil=True)(self.py_func)
+                return njit(*self.signature, cache=folder is not None, error_model="numpy", nogil=True)(self.py_func)
         finally:
             numba.config.CACHE_DIR = before
 
@@ -464,11 +471,17 @@ def _say_shared(folder: Path) -> None:
     )
 
 
+#: Bytes that must fit into a folder for code.
+_LEAST = 1_000_000
+
+
 def _usable(folder: Path) -> bool:
     try:
         for path in (folder.parent, folder):
             path.mkdir(mode=0o700, parents=True, exist_ok=True)
-        with tempfile.TemporaryFile(dir=folder):
+        with tempfile.TemporaryFile(dir=folder) as file:
+            file.write(bytes(_LEAST))  # on a full disk files can be made, but not filled
+            file.flush()
             return True
     except OSError:
         return False

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import hashlib
 import inspect
+import os
 import warnings
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -20,6 +22,7 @@ from linkwork.mechanism import Mechanism
 from ..files import load_array, save_array
 from ..mechanisms import MECHANISMS, mechanism_of
 from ..numerics.codegen import cache_root, fingerprint
+from ..numerics.workers import end_with
 from ..run import interruptible, shown
 from . import orbit_kernels, orbits
 from .floquet import TOLERANCE, Stability, multipliers
@@ -140,7 +143,8 @@ def grid(
     flow = drive.flow(mechanism)
     guess = orbits.guess_of(flow, drive, start)
     where = grid_folder() if folder is None else Path(folder)
-    where.mkdir(parents=True, exist_ok=True)
+    with suppress(OSError):  # said once the first row cannot be kept
+        where.mkdir(parents=True, exist_ok=True)
     # what computes the rows, beside their arguments
     code = (
         flow.fingerprint(VARIATIONAL, GAP),
@@ -161,13 +165,20 @@ def grid(
         if _read(path, len(xs), len(guess)) is None:
             missing.append((path, row))
     done = len(paths) - len(missing)
+    unkept: dict[Path, NDArray[np.float64]] = {}
     with interruptible() as interrupted, shown(progress, float(len(paths)), "stability") as show:
         show(float(done))
-        tasks = (joblib.delayed(_compute_row)(mechanism, path, row, guess, tolerance) for path, row in missing)
+        tasks = (
+            joblib.delayed(_compute_row)(mechanism, path, row, guess, tolerance, os.getpid()) for path, row in missing
+        )
         results = joblib.Parallel(n_jobs=n_jobs, return_as="generator_unordered")(tasks)
         try:
-            for _ in results:
+            for path, values, why in results:
                 done += 1
+                if values is not None:
+                    if not unkept:
+                        warnings.warn(f"rows of the grid are not kept: {why}", RuntimeWarning, stacklevel=2)
+                    unkept[path] = values
                 show(float(done))
                 if interrupted:
                     break
@@ -179,8 +190,8 @@ def grid(
                 warnings.filterwarnings("ignore", message=".*still being processed", category=UserWarning)
                 results.close()
         if interrupted and done < len(paths):
-            raise GridInterrupted(done, len(paths), where)
-    rows = [_read(path, len(xs), len(guess)) for path in paths]
+            raise GridInterrupted(done - len(unkept), len(paths), where)
+    rows = [unkept[path] if path in unkept else _read(path, len(xs), len(guess)) for path in paths]
     if any(row is None for row in rows):
         raise LinkworkError(f"a row of the grid cannot be read back from {where}")
     data = np.array(rows, dtype=float)
@@ -196,14 +207,25 @@ def grid(
 
 
 def _compute_row(
-    mechanism: Mechanism, path: Path, row: Sequence[Operation], guess: NDArray[np.float64], tolerance: float
-) -> None:
-    """Compute a row and write its file, which is there as a whole or not at all."""
+    mechanism: Mechanism,
+    path: Path,
+    row: Sequence[Operation],
+    guess: NDArray[np.float64],
+    tolerance: float,
+    caller: int,
+) -> tuple[Path, NDArray[np.float64] | None, str]:
+    """Compute a row and write its file, which is there as a whole or not at all; where it cannot be, return row and reason."""
+    end_with(caller)
     # one that was registered by the caller is not in another process
     MECHANISMS.setdefault(mechanism.name, mechanism)
     mechanisms, drives = [p for p, _ in row], [drive for _, drive in row]
     values, starts, status = orbits.largest_multipliers(mechanisms, drives, guess, tolerance=tolerance)
-    save_array(path, np.column_stack([values, starts, status]))
+    made = np.column_stack([values, starts, status])
+    try:
+        save_array(path, made)
+    except OSError as error:
+        return path, made, str(error)
+    return path, None, ""
 
 
 def _read(path: Path, count: int, size: int) -> NDArray[np.float64] | None:

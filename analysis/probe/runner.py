@@ -17,7 +17,7 @@ from zipfile import BadZipFile
 
 from linkwork.errors import InputError
 
-from ..files import unknown_name
+from ..files import check_fmu, unknown_name
 from . import journal
 from .context import AFTER_FATAL, FAILED
 from .findings import CRASH, WRONG, Finding, Outcome, Report
@@ -147,6 +147,7 @@ def _extract(fmu: Path, folder: Path) -> Any:
     """Extract an FMU; its description."""
     from fmpy import extract, read_model_description
 
+    check_fmu(fmu)
     try:
         extract(str(fmu), str(folder))
         description = read_model_description(str(folder), validate=False)

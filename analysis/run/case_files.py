@@ -6,13 +6,14 @@ dimension is checked. Names are those of the FMI contract: ``[slider] stiffness`
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from linkwork.errors import InputError, MissingParameterError, ParameterError
+from linkwork.errors import InputError, LinkworkError, MissingParameterError, ParameterError
 from linkwork.mechanism import Mechanism
 from linkwork.parameters import field_name
 
@@ -204,7 +205,7 @@ def case_from(
     run: RunTable = files.read(RunTable, data.get("run", {}), "run")
     stop_time, step = run.times(inputs, mechanism)
     return Case(
-        title=str(data.get("title", title)),
+        title=files.text(data.get("title", title), "title"),
         parameters=parameters,
         initial=initial,
         inputs=inputs,
@@ -260,7 +261,14 @@ def _reader(unit: str, folder: Path) -> Reader:
             return value(item, name)
         if "kind" not in item:
             raise ParameterError(name, ", ".join(item), f"be a quantity, or a table with a kind, of {', '.join(kinds)}")
-        return Kinds(kinds)(item, name)
+        try:
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore", RuntimeWarning)
+                return Kinds(kinds)(item, name)
+        except LinkworkError:
+            raise
+        except (ValueError, ArithmeticError) as error:  # of a spline through numbers near the end of the floats
+            raise InputError(f"{name} cannot be made a signal: {files.first_line(error)}") from error
 
     return Many(signal, single=True) if unit == "N.m" else signal
 

@@ -7,6 +7,7 @@ import re
 import shutil
 import tempfile
 from collections.abc import Mapping
+from contextlib import chdir
 from ctypes import byref
 from dataclasses import asdict
 from pathlib import Path
@@ -19,9 +20,10 @@ from fmpy.fmi2 import FMU2Model, FMU2Slave, fmi2CallbackFunctions, fmi2CallbackL
 from fmpy.fmi3 import FMU3Model, FMU3Slave
 from fmpy.logging import addLoggerProxy
 
-from linkwork.errors import LinkworkError
+from linkwork.errors import InputError, LinkworkError
 from linkwork.parameters import fmi_name
 
+from ..files import check_fmu
 from ..mechanisms import InitialState, Parameters, mechanism_of
 
 #: What FMPy's getters and setters of enumerations are called, by the version of FMI; those of other types as the type.
@@ -58,6 +60,10 @@ def _description(fmu: str | Path) -> Any:
     """FMPy's model description."""
     if not Path(fmu).is_file():
         raise CosimulationError(f"there is no file {fmu}: build it with 'linkwork build'")
+    try:
+        check_fmu(fmu)
+    except InputError as error:
+        raise CosimulationError(str(error)) from error
     try:
         return read_model_description(str(fmu))
     except Exception as error:
@@ -141,17 +147,20 @@ class _Instance:
             wrapped = str(self.description.generationTool).startswith("PythonFMU")
             self._folder = tempfile.mkdtemp(dir=unpacking_folder() if wrapped else None)
             extract(str(fmu), self._folder)
-            self._fmu = self._classes[self.description.fmiVersion[0]](
-                guid=self.description.guid,
-                unzipDirectory=self._folder,
-                modelIdentifier=described.modelIdentifier,
-                instanceName="linkwork",
-            )
+            with chdir("."):  # FMPy leaves the working folder changed where a library cannot be loaded
+                self._fmu = self._classes[self.description.fmiVersion[0]](
+                    guid=self.description.guid,
+                    unzipDirectory=self._folder,
+                    modelIdentifier=described.modelIdentifier,
+                    instanceName="linkwork",
+                )
             values = {fmi_name(name): value for name, value in asdict(parameters).items()}
             values |= {f"initial.{name}": value for name, value in asdict(initial).items()}
             self._initialise(values | {"solver.tolerance": tolerance} | modes | inputs, tolerance, start_time)
-        except Exception as error:  # FMPy raises plain ones, too
+        except BaseException as error:  # FMPy raises plain ones, too
             self.close()
+            if not isinstance(error, Exception):
+                raise
             reasons = [m for m in self.messages if not m.startswith("Fatal py exception")]
             raise CosimulationError("; ".join(reasons) or f"{fmu}: {error}") from error
         self._inputs = self._references(self.input_names)
@@ -229,10 +238,12 @@ class _Instance:
     def close(self) -> None:
         """Free the instance and remove the unpacked FMU."""
         fmu = self.__dict__.pop("_fmu", None)
-        if fmu is not None and fmu.component:
-            fmu.freeInstance()
-        if self._folder is not None:
-            shutil.rmtree(self._folder, ignore_errors=True)
+        try:
+            if fmu is not None and fmu.component:
+                fmu.freeInstance()
+        finally:
+            if self._folder is not None:
+                shutil.rmtree(self._folder, ignore_errors=True)
 
 
 class FmuRun(_Instance):

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from linkwork.errors import InputError
 from linkwork.plant import check_tolerance
 
-from ..files import unknown_name
+from ..files import limit, unknown_name
 from ..mechanisms import InitialState, Parameters
 from ..units import Amount, in_si
 from .arguments import driven, started, takes_published, usual_times
@@ -24,6 +24,8 @@ from .trajectory import Trajectory
 if TYPE_CHECKING:
     from scipy.integrate import OdeSolver
 
+#: Samples of a run at most, by default: more are a slip of the unit, and would not fit into memory.
+_SAMPLES = 20_000_000
 SCIPY_METHODS = ("RK23", "RK45", "DOP853", "Radau", "BDF", "LSODA")
 
 
@@ -43,6 +45,11 @@ def sample_times(stop_time: Amount, step: Amount, start_time: Amount = 0.0) -> N
     if not (isfinite(stop_time) and isfinite(start_time) and stop_time > start_time):
         raise InputError(f"a run from {start_time} s to {stop_time} s: it must end after it starts")
     ratio = (stop_time - start_time) / step
+    if not ratio <= (most := limit("SAMPLES", _SAMPLES)):
+        raise InputError(
+            f"a run from {start_time} s to {stop_time} s in steps of {step} s has {ratio:.3g} samples: more than {most} are "
+            "taken where LINKWORK_MAX_SAMPLES in the environment is greater"
+        )
     whole = round(ratio)
     # what is left over, but for rounding, makes a last, shorter step
     count = whole if whole > 0 and abs(ratio - whole) <= 1e-6 else int(ratio) + 1

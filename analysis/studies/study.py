@@ -175,7 +175,7 @@ class Study:
     def main(self, out: str | Path = "out") -> StudyResult:
         """Make it and show the verdicts."""
         result, paths = self.make(out)
-        console = Console()
+        console = Console(emoji=False, markup=False)
         console.print(result.table())
         console.print(f"wrote {', '.join(map(str, paths))}", highlight=False, soft_wrap=True)
         return result

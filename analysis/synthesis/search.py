@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -12,6 +13,7 @@ import joblib
 from linkwork.errors import InputError
 
 from ..files import unknown_name
+from ..numerics.workers import end_with
 from ..run import interruptible, shown
 
 Item = TypeVar("Item")
@@ -88,7 +90,7 @@ def over_cores(
                 if interrupted:
                     break
         else:
-            tasks = (joblib.delayed(_numbered)(work, number, item) for number, item in enumerate(items))
+            tasks = (joblib.delayed(_numbered)(work, number, item, os.getpid()) for number, item in enumerate(items))
             results = joblib.Parallel(n_jobs=search.cores, return_as="generator_unordered")(tasks)
             try:
                 for number, value in results:
@@ -105,5 +107,6 @@ def over_cores(
     return [made[number] for number in sorted(made)], bool(interrupted)
 
 
-def _numbered(work: Callable[[Item], Made], number: int, item: Item) -> tuple[int, Made]:
+def _numbered(work: Callable[[Item], Made], number: int, item: Item, caller: int) -> tuple[int, Made]:
+    end_with(caller)
     return number, work(item)

@@ -7,6 +7,15 @@ class LinkworkError(Exception):
     """Base of every error that Linkwork raises on purpose."""
 
 
+def _shown(value: object) -> str:
+    """A value as an error names it: of bounded length, whatever it is."""
+    try:
+        text = repr(value)
+    except (ValueError, RecursionError):  # a whole number of thousands of digits; lists inside each other without end
+        return f"a {type(value).__name__} that is too long to be shown"
+    return text if len(text) <= 500 else f"{text[:500]}..."
+
+
 class ParameterError(LinkworkError, ValueError):
     """A parameter is missing, unknown, of the wrong sign, or not finite.
 
@@ -24,7 +33,7 @@ class ParameterError(LinkworkError, ValueError):
         self.name = name
         self.value = value
         self.requirement = requirement
-        super().__init__(f"parameter {name} is {value!r}: it must {requirement}")
+        super().__init__(f"parameter {name} is {_shown(value)}: it must {requirement}")
 
 
 class InputError(LinkworkError, ValueError):

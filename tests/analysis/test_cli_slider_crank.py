@@ -166,7 +166,7 @@ class TestForces:
     def test_plots_in_the_frames_asked_for(self, linkwork, tmp_path):
         result = linkwork("forces", "--frame", 2, "--frame", 4, "--points", 37, "--torque", "1 N*m", "--out", "results")
         assert result.exit_code == 0
-        assert {p.name for p in (tmp_path / "results").iterdir()} == {
+        assert {p.name for p in (tmp_path / "results").glob("[!.]*")} == {
             "rahman-a4-10-s1-3.5-forces.csv",
             "rahman-a4-10-s1-3.5-forces-frame-2.png",
             "rahman-a4-10-s1-3.5-forces-frame-4.png",
@@ -433,7 +433,7 @@ class TestPicture:
         result = linkwork("picture", "--range", "--animate", "--frames", 2, "--view", "30 deg", "-60 deg")
         assert result.exit_code == 0, result.output
         name = "rahman-a4-10-s1-3.5"
-        assert {p.name for p in (tmp_path / "out").iterdir()} == {f"{name}.png", f"{name}-range.png", f"{name}.gif"}
+        assert {p.name for p in (tmp_path / "out").glob("[!.]*")} == {f"{name}.png", f"{name}-range.png", f"{name}.gif"}
         for ending in (".png", "-range.png", ".gif"):
             assert f"wrote out/{name}{ending}" in result.output
 

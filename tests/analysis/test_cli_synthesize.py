@@ -79,7 +79,7 @@ def test_help_shows_examples(linkwork) -> None:
 
 def test_it_reports_and_writes_what_it_found(run) -> None:
     result, folder = run
-    written = {path.name for path in (folder / "out").iterdir()}
+    written = {path.name for path in (folder / "out").glob("[!.]*")}
     assert written == {
         "solutions.csv", "best-curve.csv", "best-report.txt", "best.dxf", "best.svg", "five-bar-parameters.toml",
         "five-bar.toml", "best-linkage.png", "alternatives.png", "trade-off.csv", "trade-off.png",

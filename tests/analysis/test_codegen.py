@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import errno
+import io
 import math
 import os
 import stat
@@ -336,3 +338,35 @@ def test_temporary_folder_that_others_can_write_to_is_not_trusted(
     other = cache_folder("b" * 64)
     assert other.is_dir()
     assert not other.is_relative_to(shared)
+
+
+def test_on_a_full_disk_code_is_compiled_and_not_kept(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    plain = Kernel._compile
+
+    def full(self: Kernel, folder: Path | None) -> Any:
+        if folder is not None:
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        return plain(self, folder)
+
+    monkeypatch.setenv("LINKWORK_CACHE_DIR", str(tmp_path))
+    monkeypatch.setattr(Kernel, "_compile", full)
+    assert kernel(float64(float64), purpose="a test")(_doubled)(2.0) == 4.0
+    assert "No space left on device: compiled code is not kept" in capsys.readouterr().err
+
+
+def test_a_folder_on_a_full_disk_is_not_used(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    class Full(io.BytesIO):
+        def write(self, content: Any) -> int:
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    made = tempfile.TemporaryFile
+    monkeypatch.setenv("LINKWORK_CACHE_DIR", str(tmp_path / "full"))
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    monkeypatch.setattr(tempfile, "TemporaryFile", lambda dir: Full() if "full" in Path(dir).parts else made(dir=dir))
+    assert "full" not in code_folder("kept").relative_to(tmp_path).parts
+
+
+def _doubled(x):  # type: ignore[no-untyped-def]
+    return 2.0 * x

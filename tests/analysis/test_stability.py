@@ -3,16 +3,21 @@
 from __future__ import annotations
 
 import signal
+import subprocess
+import sys
+import time
 from collections.abc import Callable
 from dataclasses import replace
 from math import pi, sqrt
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from scipy.special import mathieu_a, mathieu_b
 
 from analysis.figures import Curve, HeatMap, Panel, plot_charts
+from analysis.files import WritingError
 from analysis.numerics.boundaries import Box, Reason, chart, lowest, scan, trace
 from analysis.periodic import (
     Drive,
@@ -401,15 +406,68 @@ def test_grid_is_each_point_alone(tmp_path: Path) -> None:
     assert {Stability.STABLE, Stability.UNSTABLE} == set(states.ravel())
 
 
+def test_a_grid_on_a_full_disk_is_computed_all_the_same(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(path: Path, values: object) -> None:
+        raise WritingError(f"{path} cannot be written: No space left on device")
+
+    monkeypatch.setattr(grids, "save_array", full)
+    with pytest.warns(RuntimeWarning, match=r"rows of the grid are not kept: .*row cannot be written: No space"):
+        found = grid(first_region_plane(), XS, YS, folder=tmp_path)
+    assert not list(tmp_path.iterdir())
+    monkeypatch.undo()
+    assert np.array_equal(found.starts, grid(first_region_plane(), XS, YS, folder=tmp_path).starts)
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(sys.platform != "linux", reason="which processes there are is read from /proc")
+def test_workers_of_a_grid_end_with_the_process_that_started_them(tmp_path: Path) -> None:
+    # the workers write their numbers, then compute for minutes
+    code = f"""
+import os, time, joblib
+from pathlib import Path
+from analysis.numerics.workers import end_with
+
+def work(caller):
+    end_with(caller)
+    Path({str(tmp_path)!r}, str(os.getpid())).touch()
+    time.sleep(120)
+
+joblib.Parallel(n_jobs=2)(joblib.delayed(work)(os.getpid()) for _ in range(2))
+"""
+    process = subprocess.Popen([sys.executable, "-c", code], start_new_session=True)
+
+    def until(reached: Callable[[], bool]) -> bool:
+        end = time.monotonic() + 60.0
+        while not (done := reached()) and time.monotonic() < end:
+            time.sleep(0.1)
+        return done
+
+    def runs(number: int) -> bool:
+        try:
+            return "State:\tZ" not in Path(f"/proc/{number}/status").read_text()
+        except OSError:
+            return False
+
+    try:
+        assert until(lambda: len(list(tmp_path.iterdir())) == 2)
+        workers = [int(path.name) for path in tmp_path.iterdir()]
+        assert all(map(runs, workers))
+    finally:
+        process.kill()
+        process.wait()
+    assert until(lambda: not any(map(runs, workers)))
+
+
 def test_grid_goes_on_from_what_is_there(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     compute = grids._compute_row
     calls = []
 
-    def interrupted(*arguments: object) -> None:
+    def interrupted(*arguments: object) -> Any:
         calls.append(arguments)
-        compute(*arguments)  # type: ignore[arg-type]
+        made = compute(*arguments)  # type: ignore[arg-type]
         if len(calls) == 2:
             signal.raise_signal(signal.SIGINT)
+        return made
 
     monkeypatch.setattr(grids, "_compute_row", interrupted)
     with pytest.raises(GridInterrupted, match="2 of 4 rows done") as caught:

@@ -19,6 +19,7 @@ from linkwork.slider_crank.published import RAD_S_PER_RPM, SETS
 
 from ... import slider_crank as sc
 from ...mechanisms import SLIDER_CRANK
+from .. import common
 from ..common import PARAMETERS, changes, check_kind, handled, number_or_text, print_error, quantity
 
 if TYPE_CHECKING:
@@ -255,9 +256,7 @@ _MECHANISM_OPTIONS = (
     ),
 )
 speed_option = click.option("--speed", metavar="SPEED", help="Crank speed, such as '50 rpm'.")
-out_option = click.option(
-    "--out", default="out", show_default=True, type=click.Path(file_okay=False), help="Folder for the results."
-)
+out_option = common.out_option(help="Folder for the results.")
 plot_option = click.option("--plot/--no-plot", default=True, show_default=True, help="Whether to write plots.")
 
 

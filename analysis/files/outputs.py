@@ -1,0 +1,116 @@
+"""Files that commands write: one is written over by the command that wrote it, or with --force, and by nothing else.
+
+A folder of results has a file ``.linkwork`` with a line for each: hash, command and name. Where a file is there that the
+command did not write, or that was changed since, it stays, and the new one is put beside it: no result is lost, old or new.
+Outside of commands, in Python, what is written to a path takes the place of what was there.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from contextvars import ContextVar
+from dataclasses import dataclass, field
+from itertools import count
+from pathlib import Path
+
+from .paths import whole
+
+RECORD = ".linkwork"
+
+
+@dataclass(slots=True)
+class Writing:
+    """Files that a command writes.
+
+    Attributes
+    ----------
+    command : str
+        Its name; the same command may write over its files.
+    force : bool
+        Whether it may write over all others.
+    notes : list of str
+        A sentence for each file that was put beside another one.
+    """
+
+    command: str
+    force: bool = False
+    notes: list[str] = field(default_factory=list)
+
+
+_CURRENT: ContextVar[Writing | None] = ContextVar("writing", default=None)
+
+
+@contextmanager
+def written_by(command: str, force: bool = False) -> Iterator[Writing]:
+    """Inside of it, files are written by a command."""
+    token = _CURRENT.set(writing := Writing(command, force))
+    try:
+        yield writing
+    finally:
+        _CURRENT.reset(token)
+
+
+@contextmanager
+def output(path: str | Path) -> Iterator[tuple[Path, Path]]:
+    """A path to write to, and the one where it will be: the file is there complete, or not at all."""
+    path = free(path)
+    with whole(path) as part:
+        yield part, path
+    record(path)
+
+
+def write_text(path: str | Path, text: str) -> Path:
+    """Write a text in UTF-8, its lines ended as they are; returns where it is."""
+    with output(path) as (part, path):
+        part.write_bytes(text.encode())
+    return path
+
+
+def free(path: str | Path) -> Path:
+    """The path, or one beside it where a file is there that the command may not write over."""
+    path, writing = Path(path), _CURRENT.get()
+    if writing is None or writing.force or _is_own(path, writing.command):
+        return path
+    beside = next(p for n in count(2) if _is_own(p := path.with_stem(f"{path.stem}-{n}"), writing.command))
+    writing.notes.append(
+        f"{path} is not as 'linkwork {writing.command}' wrote it and stays: the new file is {beside.name}; "
+        "--force writes over it"
+    )
+    return beside
+
+
+def record(path: Path) -> None:
+    """Keep in mind that the command wrote a file."""
+    writing = _CURRENT.get()
+    if writing is None:
+        return
+    line = _line(path, writing.command)
+    if _recorded(path) != line:
+        # one short line at a time, so that commands in one folder do not disturb each other; without it nothing is lost
+        with suppress(OSError), path.with_name(RECORD).open("a", encoding="utf-8") as file:
+            file.write(f"{line}\n")
+
+
+def _is_own(path: Path, command: str) -> bool:
+    """Whether nothing is there, or what the command wrote."""
+    if not os.path.lexists(path):
+        return True
+    return path.is_file() and _recorded(path) == _line(path, command)
+
+
+def _line(path: Path, command: str) -> str:
+    with path.open("rb") as file:
+        digest = hashlib.file_digest(file, "sha256").hexdigest()
+    return f"{digest} {command}: {path.name}"
+
+
+def _recorded(path: Path) -> str:
+    """The last line about a file."""
+    try:
+        lines = path.with_name(RECORD).read_text(encoding="utf-8").splitlines()
+    except (OSError, UnicodeDecodeError):
+        return ""
+    return next((line for line in reversed(lines) if line.partition(": ")[2] == path.name), "")
