@@ -200,6 +200,10 @@ class Quantity:
         return number
 
 
+#: Greatest whole number that is read: that of an Integer of FMI.
+_GREATEST = 2**31 - 1
+
+
 @dataclass(frozen=True, slots=True)
 class Whole:
     """A whole number, not less than ``least``."""
@@ -211,6 +215,8 @@ class Whole:
             raise ParameterError(name, value, "be a whole number")
         if self.least is not None and value < self.least:
             raise ParameterError(name, value, f"be at least {self.least}")
+        if abs(value) > _GREATEST:
+            raise ParameterError(name, value, f"be at most {_GREATEST}")
         return value
 
 

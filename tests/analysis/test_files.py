@@ -182,6 +182,7 @@ def test_a_table_becomes_a_dataclass():
         ({"holes": 1.5}, ParameterError, "be a whole number"),
         ({"holes": True}, ParameterError, "be a whole number"),
         ({"holes": 0}, ParameterError, "be at least 1"),
+        ({"holes": 10**300}, ParameterError, "be at most 2147483647"),
         ({"material": "stele"}, UnknownNameError, r"no bar\.material 'stele'; did you mean steel"),
         ({"material": 3}, ParameterError, "be one of steel, brass"),
         ({"tilt": [1, 2, 3]}, ParameterError, "one value, or two"),
