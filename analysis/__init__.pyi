@@ -22,6 +22,8 @@ from .periodic import stability_chart as stability_chart
 from .run import Comparison as Comparison
 from .run import CosimulationError as CosimulationError
 from .run import Ensemble as Ensemble
+from .run import EnsembleBroken as EnsembleBroken
+from .run import EnsembleInterrupted as EnsembleInterrupted
 from .run import Event as Event
 from .run import FmuRun as FmuRun
 from .run import Function as Function

@@ -25,6 +25,8 @@ from .cosimulation import OutputDifference as OutputDifference
 from .cosimulation import compare as compare
 from .cosimulation import cosimulate as cosimulate
 from .ensemble import Ensemble as Ensemble
+from .ensemble import EnsembleBroken as EnsembleBroken
+from .ensemble import EnsembleInterrupted as EnsembleInterrupted
 from .ensemble import simulate_many as simulate_many
 from .equations import constants as constants
 from .equations import expressions as expressions

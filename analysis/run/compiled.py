@@ -558,26 +558,50 @@ _BATCH = types.NamedTuple(
 )
 
 
+@part
+def _own(i, source, batch):  # type: ignore[no-untyped-def]
+    """The inputs of one run of a batch; ``source`` has what is common to all."""
+    pieces, waves = batch.sizes[i]
+    return Source(
+        batch.breaks[i, : pieces + 1],
+        batch.coefficients[i, :pieces],
+        batch.harmonics[i, :waves],
+        source.places,
+        batch.laws[i],
+        batch.law_places[i],
+        source.functions,
+    )
+
+
+@kernel(types.void(float64, SOURCE, _BATCH, MATRIX, MATRIX), purpose="the inputs of ensembles")
+def channels_of_many(t, source, batch, starts, u):  # type: ignore[no-untyped-def]
+    """Write the channels of each run of a batch at time t and at its state into the rows of u."""
+    for i in range(starts.shape[0]):
+        own = _own(i, source, batch)
+        channels_at(t, find(t, own.breaks), starts[i], own, u[i])
+
+
 @kernel(
-    types.void(_PROBLEM, SOURCE, _BATCH, _CARRIES, MATRIX, VECTOR, CUBE, CUBE, int64[::1], int64, int64),
+    types.void(_PROBLEM, SOURCE, _BATCH, _CARRIES, MATRIX, MATRIX, VECTOR, CUBE, CUBE, int64[::1], int64, int64, int64),
     purpose="the solver of ensembles",
 )
-def run_many(problem, source, batch, carries, starts, samples, states, forces, status, outputs, most):  # type: ignore[no-untyped-def]
-    """Many runs one after the other: `run` for each row, without events; ``problem`` and ``source`` hold for all unless
-    ``batch`` has its own."""
+def run_many(  # type: ignore[no-untyped-def]
+    problem, source, batch, carries, starts, held, samples, states, forces, status, outputs, most, budget
+):
+    """Many runs one after the other: `run` for each row whose status is RUNNING, without events; ``problem`` and ``source``
+    hold for all unless ``batch`` has its own.
+
+    After ``budget`` steps over all of them it returns; called again with what it left behind it goes on.
+    """
     watch = Watch(np.empty((0, 4)), np.empty(0, dtype=np.int64), np.empty(0), np.empty((0, 2 + starts.shape[1])))
     work = _work(starts.shape[1], outputs, forces.shape[2])
     for i in range(starts.shape[0]):
-        pieces, waves = batch.sizes[i]
-        own = Source(
-            batch.breaks[i, : pieces + 1],
-            batch.coefficients[i, :pieces],
-            batch.harmonics[i, :waves],
-            source.places,
-            batch.laws[i],
-            batch.law_places[i],
-            source.functions,
-        )
+        before = carries[i].steps
+        if status[i] != RUNNING or before >= most:
+            continue
+        if budget <= 0:
+            return
+        own = _own(i, source, batch)
         alike = Problem(
             problem.equations,
             problem.modes,
@@ -589,7 +613,11 @@ def run_many(problem, source, batch, carries, starts, samples, states, forces, s
             problem.end,
             batch.steady[i],
         )
-        status[i] = _run(alike, own, watch, work, carries[i], starts[i], samples, states[i], forces[i], most)
+        _copy(held[i], work.held)
+        until = min(most, before + budget)
+        status[i] = _run(alike, own, watch, work, carries[i], starts[i], samples, states[i], forces[i], until)
+        _copy(work.held, held[i])
+        budget -= carries[i].steps - before
 
 
 @kernel(types.void(int64, VECTOR, VECTOR, MATRIX, MATRIX, MATRIX), purpose="the outputs")

@@ -1,23 +1,32 @@
-"""Ensembles: many runs over the same times, in batches of one compiled call each."""
+"""Ensembles: many runs over the same times, in batches of compiled calls, over cores, kept on disk, gone on with."""
 
 from __future__ import annotations
 
+import inspect
 from collections.abc import Iterable, Sequence
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from itertools import chain
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from linkwork.errors import InputError, LinkworkError
+from linkwork.errors import InputError, Interrupted, LinkworkError
+from linkwork.mechanism import Mechanism
 
-from ..mechanisms import MECHANISMS, InitialState, Parameters, mechanism_of
+from ..files import unknown_name
+from ..mechanisms import InitialState, Parameters, mechanism_of
 from ..notebook import format_count
 from ..units import Amount, in_si
 from .arguments import driven, started, takes_published
-from .inputs import Inputs, compiled_source, given
-from .prepared import Run, outputs_of
+from .batches import NOT_RUN, Result, Task, solve
+from .equations import machine
+from .events import interruptible, shown
+from .inputs import Inputs, compiled_source, encode, given
+from .prepared import outputs_of
+from .signals import Function
 from .simulation import sample_times, settings_of
 from .trajectory import Trajectory
 
@@ -31,25 +40,33 @@ class Ensemble:
     time : ndarray, shape (n,)
     states : ndarray, shape (m, n, states)
         State of every run, dissipated and supplied work included; NaN after a run that ended early, as ``counts`` tells.
+        No samples where outputs were chosen.
     forces : ndarray, shape (m, n, inputs)
-        Channels at the samples, in the order of the FMI inputs.
+        Channels at the samples, in the order of the FMI inputs. No samples where outputs were chosen.
+    values : ndarray, shape (m, n, k), or None
+        The outputs ``names``, where they were chosen.
+    names : tuple of str
+        The outputs there are.
     status : ndarray of int, shape (m,)
-        solver.status of each run; 2 where an input was not finite.
+        solver.status of each run: 2 where an input was not usable, 3 where the links could not be joined, at the start or
+        later; -1 of a run that was interrupted or not begun.
     messages : tuple of str
-        Why a run ended early; empty if it did not.
+        Why a run ended early or did not start; empty if it reached its end.
     counts : ndarray of int, shape (m,)
-        Samples that each run reached.
+        Samples that each run reached; 0 of one that did not start.
     parameters : tuple
         Those of the mechanism, one for each run.
     modes : ndarray
         Values of the mechanism's modes, the same for all.
     energies : ndarray, shape (m,)
-        Mechanical energy of each at the start (J).
+        Mechanical energy of each at the start (J); NaN of one that did not start.
     """
 
     time: NDArray[np.float64]
     states: NDArray[np.float64]
     forces: NDArray[np.float64]
+    values: NDArray[np.float64] | None
+    names: tuple[str, ...]
     status: NDArray[np.int64]
     messages: tuple[str, ...]
     counts: NDArray[np.int64]
@@ -69,9 +86,12 @@ class Ensemble:
     def __getitem__(self, index: int) -> Trajectory:
         """One run as a `Trajectory`: its samples, without the last configuration of one that ended early."""
         n = int(self.counts[index])
-        mechanism = mechanism_of(self.parameters[index])
-        p = np.array([*self.parameters[index].constants(), self.energies[index]])
-        values = outputs_of(mechanism, self.modes, p, self.states[index, :n], self.forces[index, :n])
+        if self.values is not None:
+            values = self.values[index, :n]
+        else:
+            mechanism = mechanism_of(self.parameters[index])
+            p = np.array([*self.parameters[index].constants(), self.energies[index]])
+            values = outputs_of(mechanism, self.modes, p, self.states[index, :n], self.forces[index, :n])
         return Trajectory(
             time=self.time[:n],
             values=values,
@@ -79,17 +99,47 @@ class Ensemble:
             message=self.messages[index],
             source="compiled DOP853",
             parameters=self.parameters[index],
-            names=mechanism.output_names,
+            names=self.names,
         )
+
+    @property
+    def failures(self) -> dict[int, str]:
+        """Why a run did not reach its end, by the number of each that did not."""
+        return {i: self.messages[i] for i in np.flatnonzero(self.status != 0).tolist()}
 
     def output(self, name: str) -> np.ma.MaskedArray[Any, np.dtype[np.float64]]:
         """One output of all runs, shape (m, n), masked after the end of a run that ended early."""
         shape = (len(self), len(self.time))
+        if self.values is not None:
+            ended = np.arange(len(self.time)) >= self.counts[:, None]
+            return np.ma.MaskedArray(self.values[:, :, column_of(name, self.names)], mask=ended)
         result = np.ma.MaskedArray(np.full(shape, np.nan), mask=np.ones(shape, dtype=bool))
         for i in range(len(self)):
             run = self[i]
             result[i, : len(run)] = run[name]
         return result
+
+
+class EnsembleInterrupted(Interrupted):
+    """An ensemble was interrupted; ``ensemble`` holds what was done, the status of the other runs is -1."""
+
+    def __init__(self, ensemble: Ensemble, folder: Path | None) -> None:
+        self.ensemble = ensemble
+        super().__init__(f"interrupted with {_kept(ensemble, folder)}")
+
+
+class EnsembleBroken(LinkworkError):
+    """The workers of an ensemble failed, as where one was killed; ``ensemble`` holds what was done."""
+
+    def __init__(self, ensemble: Ensemble, folder: Path | None, error: Exception) -> None:
+        self.ensemble = ensemble
+        super().__init__(f"the workers failed ({type(error).__name__}) with {_kept(ensemble, folder)}")
+
+
+def _kept(ensemble: Ensemble, folder: Path | None) -> str:
+    done = np.count_nonzero(ensemble.status != NOT_RUN)
+    where = "" if folder is None else f"; whole batches are kept in {folder}: call again to go on"
+    return f"{done} of {len(ensemble)} runs done{where}"
 
 
 @takes_published(inputs=driven, initial=started)
@@ -105,22 +155,46 @@ def simulate_many(
     hold: Amount = None,
     tolerance: float = 1e-9,
     max_steps: int = 100_000_000,
+    outputs: Sequence[str] | None = None,
+    folder: str | Path | None = None,
     batch: int = 64,
     n_jobs: int | None = None,
     progress: bool = False,
 ) -> Ensemble:
-    """Run many mechanisms, or one under many inputs, in batches of one compiled call each.
+    """Run many mechanisms, or one under many inputs, in batches of compiled calls.
 
     ``inputs`` and ``initial`` are one for all or as many as ``parameters``; all inputs must drive the same way and share
-    their Python functions, if they have any. The batches go through joblib: ``n_jobs`` cores here, or, inside
-    ``joblib.parallel_config(backend="dask")``, the cores of a Dask cluster; or of a Ray cluster, with ``backend="ray"``
-    once ``ray.util.joblib.register_ray()`` has been called.
+    their Python functions, if they have any. The batches go through joblib: ``n_jobs`` threads here, which the compiled
+    solver keeps busy side by side; or, inside ``joblib.parallel_config(backend="dask")``, the cores of a Dask cluster; of a
+    Ray cluster, with ``backend="ray"`` once ``ray.util.joblib.register_ray()`` has been called; or processes, with
+    ``backend="loky"``.
+
+    Parameters
+    ----------
+    outputs : sequence of str, optional
+        Outputs of the FMI contract to keep; by default states and channels, from which `Ensemble` computes all outputs.
+    folder : path, optional
+        Where each batch is kept, once it is done, in a file under a name made from all it depends on: the same call goes on
+        from the batches that are there. Files that are damaged are computed again.
+    batch : int
+        Runs that are prepared and solved together.
+
+    Other parameters are those of `simulate`.
+
+    Returns
+    -------
+    Ensemble
+        A run that cannot start, ends early, or meets an input that is not finite has a status and a message, and leaves the
+        others as they are.
 
     Raises
     ------
-    InputError, ParameterError, AssemblyError
-        As `simulate`; the sentence names the run. An input that turns out not to be finite in the course of a run ends
-        that run alone.
+    InputError, ParameterError
+        If what concerns all runs is not usable.
+    EnsembleInterrupted
+        On Ctrl-C; carries what was computed.
+    EnsembleBroken
+        If a worker was killed; carries what was computed.
 
     Examples
     --------
@@ -130,62 +204,179 @@ def simulate_many(
     >>> runs.output("slider.position").shape
     (3, 201)
     """
-    m = len(parameters)
-    if m == 0:
+    if len(parameters) == 0:
         raise InputError("an ensemble needs at least one set of parameters")
     if batch < 1:
         raise InputError(f"batch is {batch}: it must be at least 1")
+    if n_jobs == 0:
+        raise InputError("0 cores: it must be a number of them, or -1 for all")
     mechanism = mechanism_of(parameters[0])
     if any(mechanism_of(p) is not mechanism for p in parameters):
         raise InputError("an ensemble's parameters must all be of one mechanism")
-    all_inputs, starts = _each(inputs, m, "inputs"), _each(initial, m, "initial states")
-    for i, s in zip(all_inputs, starts):
-        given(mechanism, i, s)
+    names = mechanism.output_names if outputs is None else tuple(outputs)
+    columns = tuple(column_of(name, mechanism.output_names) for name in names)
+    all_inputs, starts = _checked(mechanism, inputs, initial, len(parameters))
     settings = settings_of(sample_times(stop_time, step, start_time), hold, tolerance, max_steps)
-    runs: list[Run] = []
-    for number, (p, i, s) in enumerate(zip(parameters, all_inputs, starts)):
-        try:
-            run = Run(p, i, s, settings)
-            run.start()
-        except LinkworkError as error:
-            raise _of_run(number, error) from error
-        runs.append(run)
-    if len({run.modes for run in runs}) > 1:
-        raise InputError("an ensemble's inputs must all drive the mechanism in the same way")
-    if len({tuple(map(id, chain.from_iterable(run.encoded.functions))) for run in runs}) > 1:
-        raise InputError("an ensemble's inputs must share their Python functions")
+    where = None if folder is None else Path(folder)
     # what cannot be compiled is reported here, and not by a worker
-    compiled_source(runs[0].encoded)
-    batches = [runs[k : k + batch] for k in range(0, m, batch)]
+    encoded = encode(all_inputs[0], mechanism)
+    compiled_source(encoded)
+    code = "" if where is None else _code(mechanism, chain.from_iterable(encoded.functions))
+    tasks = (
+        Task(
+            mechanism=mechanism,
+            settings=settings,
+            parameters=parameters[k : k + batch],
+            inputs=all_inputs[k : k + batch],
+            initial=starts[k : k + batch],
+            first=k,
+            outputs=None if outputs is None else columns,
+            folder=where,
+            code=code,
+        )
+        for k in range(0, len(parameters), batch)
+    )
+    gathered = _Gathered(parameters, mechanism, settings.times, names, outputs is not None)
+    gathered.modes[:] = list(encoded.modes.values())
+    interrupted, broken = _run_all(tasks, gathered, n_jobs, progress)
+    if broken is not None:
+        raise EnsembleBroken(gathered.ensemble(), where, broken) from broken
+    if interrupted and np.any(gathered.status == NOT_RUN):
+        raise EnsembleInterrupted(gathered.ensemble(), where)
+    return gathered.ensemble()
+
+
+def _run_all(
+    tasks: Iterable[Task], gathered: _Gathered, n_jobs: int | None, progress: bool
+) -> tuple[bool, Exception | None]:
+    """Solve all tasks; whether they were interrupted, and what broke the workers."""
     import joblib
 
-    results: Iterable[Any] = joblib.Parallel(n_jobs=n_jobs, return_as="generator")(
-        joblib.delayed(_run_batch)(b) for b in batches
-    )
-    if progress:
-        from rich.progress import track
+    # threads hear an interrupt by the list that they share; other processes are stopped
+    backend = joblib.parallel.get_active_backend(prefer="threads")[0]
+    shared = joblib.effective_n_jobs(n_jobs) == 1 or getattr(backend, "supports_sharedmem", False)
+    hearing: AbstractContextManager[list[bool]] = interruptible() if shared else nullcontext([])
+    with (
+        hearing as heard,
+        shown(progress, float(len(gathered.status))) as show,
+    ):
+        results: Any = joblib.Parallel(n_jobs=n_jobs, prefer="threads", return_as="generator_unordered")(
+            joblib.delayed(solve)(task, heard) for task in tasks
+        )
+        try:
+            for result in results:
+                if result is not None:
+                    gathered.add(result)
+                    show(float(np.count_nonzero(gathered.status != NOT_RUN)))
+        except KeyboardInterrupt:
+            heard.append(True)
+        except LinkworkError:
+            raise
+        except Exception as error:
+            # of any backend: a worker was killed, a scheduler was lost
+            return bool(heard), error
+    return bool(heard), None
 
-        results = track(results, total=len(batches), description="simulate", transient=True)
-    states, forces, status, counts, energies, messages = (list(column) for column in zip(*results))
-    return Ensemble(
-        time=settings.times,
-        states=np.concatenate(states),
-        forces=np.concatenate(forces),
-        status=np.concatenate(status),
-        messages=tuple(chain.from_iterable(messages)),
-        counts=np.concatenate(counts),
-        parameters=tuple(parameters),
-        modes=np.array(runs[0].modes),
-        energies=np.concatenate(energies),
-    )
+
+class _Gathered:
+    """The arrays of an ensemble, made once and filled with the results as they come."""
+
+    def __init__(
+        self,
+        parameters: Sequence[Parameters],
+        mechanism: Mechanism,
+        times: NDArray[np.float64],
+        names: tuple[str, ...],
+        chosen: bool,
+    ) -> None:
+        m, n = len(parameters), len(times)
+        self.parameters, self.times, self.names, self.chosen = tuple(parameters), times, names, chosen
+        samples = 0 if chosen else n
+        self.states = np.full((m, samples, mechanism.size), np.nan)
+        self.forces = np.full((m, samples, len(mechanism.channels)), np.nan)
+        self.values = np.full((m, n, len(names)), np.nan) if chosen else None
+        self.status = np.full(m, NOT_RUN)
+        self.messages = ["not run: interrupted"] * m
+        self.counts = np.zeros(m, dtype=np.int64)
+        self.energies = np.full(m, np.nan)
+        self.modes = np.zeros(len(mechanism.modes))
+
+    def add(self, result: Result) -> None:
+        rows = slice(result.first, result.first + len(result.status))
+        if self.values is not None:
+            self.values[rows] = result.data
+        else:
+            size = self.states.shape[2]
+            self.states[rows], self.forces[rows] = result.data[..., :size], result.data[..., size:]
+        self.status[rows], self.counts[rows], self.energies[rows] = result.status, result.counts, result.energies
+        self.messages[rows] = result.messages
+
+    def ensemble(self) -> Ensemble:
+        return Ensemble(
+            time=self.times,
+            states=self.states,
+            forces=self.forces,
+            values=self.values,
+            names=self.names,
+            status=self.status,
+            messages=tuple(self.messages),
+            counts=self.counts,
+            parameters=self.parameters,
+            modes=self.modes,
+            energies=self.energies,
+        )
 
 
-def _of_run(number: int, error: LinkworkError) -> LinkworkError:
-    """The error with the number of its run before the sentence."""
-    named = type(error).__new__(type(error))
-    named.__dict__.update(error.__dict__)
-    named.args = (f"run {number}: {error}",)
-    return named
+def _code(mechanism: Mechanism, functions: Iterable[Any]) -> str:
+    """Hash of the code that runs depend on, beside their numbers: equations, solver, users' functions."""
+    from ..numerics.codegen import fingerprint
+    from . import batches, compiled
+
+    kernels = (compiled.run_many, compiled.channels_of_many, compiled.rows)
+    ours = [machine(mechanism).fingerprint, inspect.getsource(batches), *map(fingerprint, kernels)]
+    return " ".join([*ours, *(fingerprint(f) if f else "" for f in functions)])
+
+
+def _checked(mechanism: Mechanism, inputs: Any, initial: Any, count: int) -> tuple[list[Inputs], list[InitialState]]:
+    """Inputs and initial states of each run; the inputs have one way of driving and the same functions."""
+    all_inputs, starts = _each(inputs, count, "inputs"), _each(initial, count, "initial states")
+    nothing, rest = given(mechanism, None, None)
+    all_inputs = [nothing if i is None else i for i in all_inputs]
+    read = {
+        id(s): rest if s is None else s if isinstance(s, mechanism.initial) else given(mechanism, None, s)[1]
+        for s in {id(s): s for s in starts}.values()
+    }
+    starts = [read[id(s)] for s in starts]
+    accepted: set[tuple[str, ...]] = set()
+    ways: set[Any] = set()
+    for one in {id(i): i for i in all_inputs}.values():
+        names = tuple(one) if isinstance(one, Inputs) else ()
+        if not names or names not in accepted:
+            given(mechanism, one, None)
+            accepted.add(names)
+            ways.add(tuple(one.modes(mechanism).values()))
+    if len(ways) > 1:
+        raise InputError("an ensemble's inputs must all drive the mechanism in the same way")
+    functions = {
+        tuple((name, id(f.function), id(f.rate)) for name in i for f in i.parts(name) if isinstance(f, Function))
+        for i in {id(i): i for i in all_inputs}.values()
+    }
+    if len(functions) > 1:
+        raise InputError("an ensemble's inputs must share their Python functions")
+    return all_inputs, starts
+
+
+def column_of(name: str, names: tuple[str, ...]) -> int:
+    """Number of an output among ``names``.
+
+    Raises
+    ------
+    InputError
+        If it is not among them.
+    """
+    if name not in names:
+        raise unknown_name(name, names, f"output {name!r}")
+    return names.index(name)
 
 
 def _each(value: Any, count: int, what: str) -> list[Any]:
@@ -194,51 +385,3 @@ def _each(value: Any, count: int, what: str) -> list[Any]:
     if len(value) != count:
         raise InputError(f"{len(value)} {what} for {count} sets of parameters: give one, or as many")
     return list(value)
-
-
-def _run_batch(runs: Sequence[Run]) -> tuple[Any, ...]:
-    """One compiled call for a batch of prepared runs."""
-    from . import compiled as k
-
-    first, m, n = runs[0], len(runs), len(runs[0].settings.times)
-    # a worker does not know a mechanism that the caller has registered
-    MECHANISMS.setdefault(first.mechanism.name, first.mechanism)
-    mechanism, encoded = first.mechanism, [run.encoded for run in runs]
-    starts = [run.start() for run in runs]
-    sizes = np.array([(len(e.coefficients), len(e.harmonics)) for e in encoded])
-    pieces, waves = sizes.max(axis=0)
-    batch = k.Batch(
-        p=np.array([(*run.p, start.energy) for run, start in zip(runs, starts)]),
-        scales=np.array([start.scale for start in starts]),
-        steady=np.array([e.steady for e in encoded]),
-        sizes=sizes,
-        breaks=np.zeros((m, pieces + 1)),
-        coefficients=np.zeros((m, pieces, *encoded[0].coefficients.shape[1:])),
-        harmonics=np.zeros((m, waves, 4)),
-        laws=np.array([e.law for e in encoded]),
-        law_places=np.array([e.law_places for e in encoded]),
-    )
-    for i, e in enumerate(encoded):
-        batch.breaks[i, : len(e.breaks)] = e.breaks
-        batch.coefficients[i, : len(e.coefficients)] = e.coefficients
-        batch.harmonics[i, : len(e.harmonics)] = e.harmonics
-    # kept alive while their addresses are in use
-    source, _kept = compiled_source(encoded[0])
-    xs = np.array([start.x for start in starts])
-    states = np.full((m, n, mechanism.size), np.nan)
-    forces = np.full((m, n, len(mechanism.channels)), np.nan)
-    carries = np.zeros(m, dtype=k.CARRY)
-    carries["begin"] = first.settings.times[0]
-    status = np.empty(m, dtype=np.int64)
-    k.run_many(
-        first.problem(starts[0]), source, batch, carries, xs, first.settings.times, states, forces, status,
-        len(mechanism.output_names), first.settings.max_steps,
-    )  # fmt: skip
-    codes, messages = [], []
-    for run, code, x, carry in zip(runs, status.tolist(), xs, carries):
-        t = float(carry["begin"] + carry["elapsed"])
-        bad = code == k.BAD_INPUT
-        final, message = (code, str(run.lost(int(carry["lost"]), t, x))) if bad else run.verdict(code, t, x)
-        codes.append(final)
-        messages.append(message)
-    return states, forces, np.array(codes), carries["sample"].copy(), [start.energy for start in starts], messages

@@ -426,10 +426,10 @@ def sample(
     k.channels(t, ahead, left, x, source, encoded.commands, u, np.empty_like(u))
     here = np.zeros_like(u)
     if any(chain.from_iterable(encoded.functions)):
-        here = _of_functions(encoded, t, x)
+        here = of_functions(encoded, t, x)
         u += here
         if ahead > t and len(encoded.commands) and np.isfinite(here).all():
-            there = _of_functions(encoded, ahead, x)
+            there = of_functions(encoded, ahead, x)
             for value, _, rate in encoded.commands:
                 u[rate] += (there[value] - here[value]) / (ahead - t) - here[rate]
     for lost in np.flatnonzero(~np.isfinite(u)):
@@ -446,7 +446,7 @@ def release(encoded: Encoded, x: NDArray[np.float64], law: NDArray[np.float64]) 
         law[2] = 0.0
 
 
-def _of_functions(encoded: Encoded, t: float, x: NDArray[np.float64]) -> NDArray[np.float64]:
+def of_functions(encoded: Encoded, t: float, x: NDArray[np.float64]) -> NDArray[np.float64]:
     """What the user's functions add to the channels."""
     added = np.zeros(len(encoded.mechanism.channels))
     state = x[: 2 * len(encoded.mechanism.freedoms)].tolist()

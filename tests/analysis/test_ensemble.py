@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import os
+import signal
 import subprocess
 import sys
+import threading
 from collections.abc import Iterator
 from dataclasses import replace
 from math import nan
 from pathlib import Path
+from time import perf_counter, sleep
 from typing import Any
 
 import joblib
@@ -27,7 +30,8 @@ from analysis import (
     steps,
     table,
 )
-from linkwork.errors import AssemblyError, InputError, ParameterError
+from analysis.run import EnsembleBroken, EnsembleInterrupted, batches
+from linkwork.errors import InputError, ParameterError
 from linkwork.five_bar.parameters import FiveBarParameters, InitialState
 from linkwork.five_bar.published import SETS, TABLE_3_1
 
@@ -90,6 +94,11 @@ def test_functions_are_shared() -> None:
     many = simulate_many([TABLE_3_1] * 2, inputs, **OPTIONS)
     for i in range(2):
         assert_same(many, i, parameters=TABLE_3_1, inputs=inputs[i], **OPTIONS)
+    # one that commands a speed counts at the start already
+    speed = Inputs(speed=(1.0, Function(lambda t, th2, u, w2, v: 40.0 + t, lambda t, th2, u, w2, v: 1.0)))
+    many = simulate_many(SPRINGS[:2], speed, **OPTIONS)
+    for i in range(2):
+        assert_same(many, i, parameters=SPRINGS[i], inputs=speed, **OPTIONS)
     other = Inputs(torque=Function(lambda t, th2, u, w2, v: 0.0))
     with pytest.raises(InputError, match="share their Python functions"):
         simulate_many([TABLE_3_1] * 2, [inputs[0], other], **OPTIONS)
@@ -136,8 +145,137 @@ def test_two_jobs_give_what_one_does() -> None:
     inputs = [Inputs(torque=torque, force=brake) for torque in TORQUES]
     one = simulate_many(SPRINGS, inputs, batch=4, **OPTIONS)
     two = simulate_many(SPRINGS, inputs, batch=4, n_jobs=2, **OPTIONS)
-    for field in ("states", "forces", "status", "counts", "energies"):
-        assert np.array_equal(getattr(one, field), getattr(two, field), equal_nan=True)
+    assert same(one, two)
+
+
+def same(a: Ensemble, b: Ensemble) -> bool:
+    fields = ("states", "forces", "status", "counts", "energies")
+    return a.messages == b.messages and all(
+        np.array_equal(getattr(a, field), getattr(b, field), equal_nan=True) for field in fields
+    )
+
+
+@pytest.mark.parametrize("n_jobs", [None, 2])
+def test_runs_that_cannot_start_leave_the_others_as_they_are(n_jobs: int | None) -> None:
+    force = Function(lambda t, th2, u, w2, v: nan if th2 > 1.0 else 0.0)
+    starts = [InitialState(crank_angle=0.05 * i) for i in range(7)]
+    starts[2], starts[5] = InitialState(slider_position=1.0), InitialState(crank_angle=1.5)
+    many = simulate_many(
+        SPRINGS, Inputs(speed=SPEED, force=force), initial=starts, batch=3, n_jobs=n_jobs, stop_time=0.01, step=1e-3
+    )
+    assert many.status.tolist() == [0, 0, 3, 0, 0, 2, 0]
+    assert list(many.failures) == [2, 5]
+    assert many.messages[2].startswith(
+        "the links cannot be joined at crank angle 0 rad (0.0000 deg) and slider position 1 m"
+    )
+    assert many.messages[5].startswith("the input force is not a finite number at t = 0 s, crank angle 1.5 rad")
+    assert many.counts.tolist() == [11, 11, 0, 11, 11, 0, 11]
+    assert np.isnan(many.energies[[2, 5]]).all()
+    assert len(many[2]) == 0
+    assert many.output("crank.angle").mask[2].all()
+    for i in (0, 4, 6):
+        inputs = Inputs(speed=SPEED, force=force)
+        assert_same(many, i, parameters=SPRINGS[i], inputs=inputs, initial=starts[i], stop_time=0.01, step=1e-3)
+
+
+def test_chosen_outputs_are_those_of_all() -> None:
+    every = simulate_many(slipping(), Inputs(speed=SPEED), stop_time=1.0, step=0.01)
+    names = ("slider.position", "crank.angle")
+    some = simulate_many(slipping(), Inputs(speed=SPEED), outputs=names, stop_time=1.0, step=0.01)
+    assert some.names == names
+    assert some.states.size == some.forces.size == 0
+    assert some.values is not None
+    assert some.values.shape == (3, 101, 2)
+    for name in names:
+        assert np.ma.allequal(some.output(name), every.output(name))
+        assert np.array_equal(some.output(name).mask, every.output(name).mask)
+        assert np.array_equal(some[1][name], every[1][name])
+    with pytest.raises(InputError, match=r"no output 'crank.speed'.* \(the names are slider.position, crank.angle\)"):
+        some.output("crank.speed")
+
+
+@pytest.mark.parametrize("outputs", [None, ("slider.position",)])
+def test_batches_on_disk_are_gone_on_with(outputs: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    starts = [InitialState()] * 2 + [InitialState(slider_position=1.0)] + [InitialState()] * 4
+    inputs = [Inputs(torque=torque) for torque in TORQUES]
+    options = OPTIONS | {"initial": starts, "batch": 2, "folder": tmp_path, "outputs": outputs}
+    first = simulate_many(SPRINGS, inputs, **options)
+    files = sorted(tmp_path.iterdir())
+    assert len(files) == 4
+    computed = []
+    integrate = batches._integrate
+    monkeypatch.setattr(
+        batches, "_integrate", lambda task, *rest: computed.append(task.first) or integrate(task, *rest)
+    )
+    again = simulate_many(SPRINGS, inputs, **options)
+    assert same(first, again)
+    assert computed == []
+    assert again.failures[2].startswith("the links cannot be joined")
+    damaged = bytearray(files[1].read_bytes())
+    damaged[len(damaged) // 2] ^= 1
+    files[1].write_bytes(damaged)
+    files[2].unlink()
+    with pytest.warns(RuntimeWarning, match="is damaged"):
+        again = simulate_many(SPRINGS, inputs, **options)
+    assert same(first, again)
+    assert len(computed) == 2
+    # what differs is computed anew
+    simulate_many(SPRINGS, inputs, **options | {"tolerance": 1e-8})
+    simulate_many(SPRINGS, inputs, **options | {"outputs": ("crank.angle",)})
+    assert len(list(tmp_path.iterdir())) == 12
+
+
+@pytest.mark.parametrize("n_jobs", [None, 2])
+def test_an_interrupt_is_heard_and_keeps_what_was_done(n_jobs: int | None, tmp_path: Path) -> None:
+    # one short batch, and then runs of many seconds each
+    buzz = Inputs(speed=SPEED, force=Harmonics(0.0, [1.0], [1e6], [0.0]))
+    inputs = [Inputs(speed=SPEED)] * 2 + [buzz] * 6
+    options: dict[str, Any] = {"stop_time": 10.0, "step": 0.1, "batch": 2, "folder": tmp_path}
+    simulate_many([TABLE_3_1] * 2, inputs[1:3], **options | {"stop_time": 1e-3})
+    timer = threading.Timer(1.0, os.kill, (os.getpid(), signal.SIGINT))
+    begun = perf_counter()
+    timer.start()
+    with pytest.raises(
+        EnsembleInterrupted, match=r"interrupted with 2 of 8 runs done; whole batches are kept in "
+    ) as caught:
+        simulate_many([TABLE_3_1] * 8, inputs, n_jobs=n_jobs, **options)
+    assert perf_counter() - begun < 3.0
+    many = caught.value.ensemble
+    assert many.status.tolist() == [0, 0] + [-1] * 6
+    assert many.counts[:2].tolist() == [101, 101]
+    assert many.messages[2].startswith("interrupted at t = ")
+    assert many.messages[7] == "not run: interrupted"
+    assert many[2].status == -1
+    # the short one is there, what was cut off is not
+    assert len(list(tmp_path.iterdir())) == 2
+
+
+@pytest.mark.slow
+def test_a_killed_worker_leaves_what_was_done(tmp_path: Path) -> None:
+    from joblib.externals.loky import reusable_executor
+
+    def kill() -> None:
+        while len(list(tmp_path.glob("*.runs"))) < 20:
+            sleep(0.01)
+        # asked for an executor, loky might make another
+        os.kill(next(iter(reusable_executor._executor._processes)), signal.SIGKILL)
+
+    parameters = [replace(TABLE_3_1, slider_stiffness=500.0 + i) for i in range(400)]
+    options: dict[str, Any] = {"stop_time": 20.0, "step": 0.1, "batch": 4, "folder": tmp_path}
+    killer = threading.Thread(target=kill)
+    killer.start()
+    with joblib.parallel_config(backend="loky"), pytest.raises(EnsembleBroken, match="the workers failed") as caught:
+        simulate_many(parameters, Inputs(speed=SPEED), n_jobs=2, **options)
+    killer.join()
+    many = caught.value.ensemble
+    done = np.flatnonzero(many.status == 0)
+    assert 0 < len(done) < 400
+    assert_same(
+        many, int(done[0]), parameters=parameters[done[0]], inputs=Inputs(speed=SPEED), stop_time=20.0, step=0.1
+    )
+    kept = len(list(tmp_path.glob("*.runs")))
+    assert kept >= len(done) // 4
+    assert (simulate_many(parameters, Inputs(speed=SPEED), **options).status == 0).all()
 
 
 def test_progress_changes_nothing(capfd: pytest.CaptureFixture[str]) -> None:
@@ -154,19 +292,11 @@ def test_progress_changes_nothing(capfd: pytest.CaptureFixture[str]) -> None:
         ({"inputs": [Inputs()]}, InputError, "1 inputs for 3 sets of parameters"),
         ({"initial": [InitialState()] * 4}, InputError, "4 initial states for 3"),
         ({"inputs": [Inputs(), Inputs(speed=1.0), Inputs()]}, InputError, "all drive the mechanism in the same way"),
-        (
-            {"initial": [InitialState(), InitialState(), InitialState(slider_position=1.0)]},
-            AssemblyError,
-            "^run 2: the links cannot be joined at crank angle 0 rad",
-        ),
-        (
-            {"inputs": [Inputs(), Inputs(force=Function(lambda t, th2, u, w2, v: nan)), Inputs()]},
-            InputError,
-            "^run 1: the input force is not a finite number at t = 0 s",
-        ),
         ({"tolerance": 1.0}, ParameterError, "solver.tolerance"),
         ({"hold": 1e-3}, InputError, "held over 0.001 s"),
         ({"batch": 0}, InputError, "batch is 0"),
+        ({"n_jobs": 0}, InputError, "0 cores"),
+        ({"outputs": ["crank.angel"]}, InputError, "there is no output 'crank.angel'; did you mean crank.angle"),
         ({"step": -1.0}, InputError, "step is -1.0 s"),
     ],
 )

@@ -1,0 +1,337 @@
+"""Batches of an ensemble: many runs prepared together over arrays, solved by compiled calls, and kept in files."""
+
+from __future__ import annotations
+
+import hashlib
+import math
+import warnings
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cache, reduce
+from itertools import chain
+from operator import add
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from linkwork.errors import AssemblyError, InputError, LinkworkError
+from linkwork.limits import LIMIT_SINE
+from linkwork.mechanism import Mechanism
+
+from ..files import load_array, save_array
+from ..mechanisms import MECHANISMS, InitialState, Parameters
+from ..numerics.symbolic import ELEMENTARY
+from ..numerics.tracing import Rebound, rebound
+from .equations import machine
+from .inputs import Encoded, Inputs, align, compiled_source, encode, of_functions
+from .prepared import STEPS_PER_CALL, Run, Settings, outputs_of
+
+#: solver.status of a run that was not begun, or was interrupted.
+NOT_RUN = -1
+#: solver.status of a run that cannot start, by the error.
+_STATUS = {AssemblyError: 3, InputError: 2}
+#: In the place of the compiled code's status, of a run that cannot start.
+_NO_START = -2
+#: The same of a run that was interrupted.
+_PAUSED = -3
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Task:
+    """Runs to be solved together; parameters, inputs and initial states of each.
+
+    Attributes
+    ----------
+    first : int
+        Number of the first of them in the ensemble.
+    outputs : tuple of int or None
+        Columns of the outputs that are wanted; None for states and channels.
+    folder : path or None
+        Where the result is kept.
+    code : str
+        Hash of all code that the result depends on.
+    """
+
+    mechanism: Mechanism
+    settings: Settings
+    parameters: Sequence[Parameters]
+    inputs: Sequence[Inputs]
+    initial: Sequence[InitialState]
+    first: int
+    outputs: tuple[int, ...] | None
+    folder: Path | None
+    code: str
+
+    def run(self, i: int) -> Run:
+        """One of the runs, prepared by itself."""
+        return Run(self.parameters[i], self.inputs[i], self.initial[i], self.settings)
+
+    @property
+    def width(self) -> int:
+        """Numbers at a sample."""
+        chosen = self.outputs
+        return self.mechanism.size + len(self.mechanism.channels) if chosen is None else len(chosen)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Result:
+    """Solved runs, with the fields of `ensemble.Ensemble`; ``data`` has states and channels, or the outputs wanted."""
+
+    first: int
+    data: NDArray[np.float64]
+    counts: NDArray[np.int64]
+    energies: NDArray[np.float64]
+    status: list[int]
+    messages: list[str]
+
+
+class Prepared(NamedTuple):
+    """A batch ready for the compiled solver: states at the start, and the errors of the runs that cannot start."""
+
+    encoded: Encoded
+    batch: Any
+    x: NDArray[np.float64]
+    failures: dict[int, LinkworkError]
+
+    def digest(self, task: Task) -> str:
+        """Hash of all that the result depends on."""
+        settings, e = task.settings, self.encoded
+        numbers = [settings.hold, settings.tolerance, settings.max_steps, *e.modes.values()]
+        digest = hashlib.sha256(
+            f"{task.code} {task.mechanism.name} {task.outputs} {numbers} {sorted(self.failures)}".encode()
+        )
+        for array in (*self.batch, self.x, settings.times, e.places, e.commands):
+            digest.update(f"{array.shape}".encode() + array.tobytes())
+        return digest.hexdigest()[:32]
+
+
+def solve(task: Task, heard: Sequence[bool]) -> Result | None:
+    """Solve a batch, or read it from its file; None if it was interrupted before it began.
+
+    ``heard`` is looked at between compiled calls: once there is something in it, runs end where they are.
+    """
+    if heard:
+        return None
+    # a worker does not know a mechanism that the caller has registered
+    MECHANISMS.setdefault(task.mechanism.name, task.mechanism)
+    prepared = prepare(task)
+    m, n, size = len(task.parameters), len(task.settings.times), task.mechanism.size
+    path = None if task.folder is None else task.folder / f"{prepared.digest(task)}.runs"
+    kept = None if path is None else load_array(path)
+    energies = prepared.batch.p[:, -1]
+    if kept is None or kept.shape != (m, 4 + size + n * task.width):
+        kept, whole = _integrate(task, prepared, heard)
+        if path is not None and whole:
+            try:
+                save_array(path, kept)
+            except OSError as error:
+                warnings.warn(
+                    f"{path} cannot be written ({error}): its runs are in memory alone", RuntimeWarning, stacklevel=2
+                )
+    ends, data = kept[:, : 4 + size], kept[:, 4 + size :].reshape(m, n, task.width)
+    status, messages = _verdicts(task, prepared, ends)
+    return Result(
+        first=task.first,
+        data=data,
+        counts=ends[:, 1].astype(np.int64),
+        energies=energies,
+        status=status,
+        messages=messages,
+    )
+
+
+def _verdicts(task: Task, prepared: Prepared, ends: NDArray[np.float64]) -> tuple[list[int], list[str]]:
+    """solver.status and solver.message of each run."""
+    from . import compiled as k
+
+    status, messages = [k.FINISHED] * len(ends), [""] * len(ends)
+    for i in np.flatnonzero(ends[:, 0] != k.FINISHED).tolist():
+        (code, steps, lost), t, x = ends[i, [0, 1, 3]].astype(int).tolist(), float(ends[i, 2]), ends[i, 4:]
+        if i in prepared.failures:
+            error = prepared.failures[i]
+            status[i] = next(code for kind, code in _STATUS.items() if isinstance(error, kind))
+            messages[i] = str(error)
+        elif code == _PAUSED:
+            status[i], messages[i] = NOT_RUN, f"interrupted at t = {t:.6g} s" if steps else "not run: interrupted"
+        elif code == k.BAD_INPUT:
+            status[i], messages[i] = code, str(task.run(i).lost(lost, t, x))
+        else:
+            status[i], messages[i] = task.run(i).verdict(code, t, x)
+    return status, messages
+
+
+def _integrate(task: Task, prepared: Prepared, heard: Sequence[bool]) -> tuple[NDArray[np.float64], bool]:
+    """A row for each run, and whether all came to their ends.
+
+    A row has the compiled code's status, the number of samples, the time of the end (s), the number of the channel that was
+    not finite, the state at the end, and the numbers of all samples.
+    """
+    from . import compiled as k
+
+    mechanism, settings, encoded, batch = task.mechanism, task.settings, prepared.encoded, prepared.batch
+    m, n = prepared.x.shape[0], len(settings.times)
+    # kept alive while their addresses are in use
+    source, _kept = compiled_source(encoded)
+    modes = np.array([float(value) for value in encoded.modes.values()])
+    problem = k.Problem(
+        machine(mechanism).addresses, modes, batch.p[0], batch.scales[0], encoded.commands,
+        settings.tolerance, settings.hold, float(settings.times[-1]), True,
+    )  # fmt: skip
+    states = np.full((m, n, mechanism.size), np.nan)
+    forces = np.full((m, n, len(mechanism.channels)), np.nan)
+    held = np.zeros((m, len(mechanism.channels)))
+    carries = np.zeros(m, dtype=k.CARRY)
+    carries["begin"] = settings.times[0]
+    status = np.full(m, k.RUNNING)
+    status[list(prepared.failures)] = _NO_START
+    laws, x = batch.laws.copy(), prepared.x.copy()
+    own = batch._replace(laws=laws)
+    todo = status == k.RUNNING
+    while todo.any() and not heard:
+        k.run_many(
+            problem, source, own, carries, x, held, settings.times, states, forces, status,
+            len(mechanism.output_names), settings.max_steps, STEPS_PER_CALL,
+        )  # fmt: skip
+        todo = (status == k.RUNNING) & (carries["steps"] < settings.max_steps)
+    status[todo] = _PAUSED
+    if task.outputs is None:
+        data = np.concatenate([states, forces], axis=2)
+    else:
+        data = np.full((m, n, task.width), np.nan)
+        for i, count in enumerate(carries["sample"].tolist()):
+            values = outputs_of(mechanism, modes, batch.p[i], states[i, :count], forces[i, :count])
+            data[i, :count] = values[:, task.outputs]
+    ends = [status, carries["sample"], carries["begin"] + carries["elapsed"], carries["lost"], x, data.reshape(m, -1)]
+    return np.column_stack(ends), not todo.any()
+
+
+# What a run starts from
+
+
+def prepare(task: Task) -> Prepared:
+    """Prepare a batch: what `Run` and `Run.start` do, over arrays, with the same numbers to the last bit.
+
+    Runs that come near the limit of assembly or meet a number that is not finite go through `Run.start`, which says why
+    they cannot start.
+    """
+    from . import compiled as k
+
+    mechanism, t = task.mechanism, float(task.settings.times[0])
+    encoded, batch = _acting(task)
+    constants = {id(p): p.constants() for p in task.parameters}
+    rows = [constants[id(p)] for p in task.parameters]
+    starts = {id(s): mechanism.state(s) for s in task.initial}
+    x = np.array([starts[id(s)] for s in task.initial])
+    p = np.array(rows)
+    u = np.zeros((len(x), len(mechanism.channels)))
+    # users' functions are called as the Python they are, as in `sample`
+    source = compiled_source(replace(encoded, functions=((None, None),) * len(encoded.functions)))[0]
+    k.channels_of_many(t, source, batch, x, u)
+    doubtful: set[int] = set()
+    if any(chain.from_iterable(encoded.functions)):
+        for i in range(len(x)):
+            try:
+                u[i] += of_functions(encoded, t, x[i])
+            except InputError:
+                doubtful.add(i)
+    x[:, encoded.commands[:, 1]] = u[:, encoded.commands[:, 0]]
+    energy, scales = np.full(len(x), np.nan), np.zeros_like(x)
+    functions, equations = _over_arrays(mechanism), mechanism.equations
+    columns = type(rows[0])(*p.T)
+    try:
+        with np.errstate(all="ignore"):
+            applied = functions.of(equations.applied)(tuple(map(float, encoded.modes.values())), tuple(u.T), columns)
+            state = functions.of(equations.start)(tuple(x.T), applied, columns)
+            clearance = np.broadcast_to(functions.of(equations.clearance)(state, applied, columns), len(x))
+            energy[:] = functions.of(equations.energy)(state, columns)
+        for n, column in enumerate(state):
+            x[:, n] = column
+        # within the limit of assembly the error has a sentence of the mechanism's own
+        sound = (
+            np.isfinite(u).all(axis=1) & np.isfinite(x).all(axis=1) & np.isfinite(energy) & (clearance > 2 * LIMIT_SINE)
+        )
+        doubtful |= set(np.flatnonzero(~sound).tolist())
+        scale = mechanism.error_scale
+        for i, row in enumerate(x.tolist()):
+            if i not in doubtful:
+                scales[i] = scale(task.parameters[i], row)
+    except (ArithmeticError, ValueError):
+        # of a function of `math`: one by one shows which
+        doubtful = set(range(len(x)))
+    failures: dict[int, LinkworkError] = {}
+    for i in sorted(doubtful):
+        try:
+            start = task.run(i).start()
+        except (AssemblyError, InputError) as error:
+            failures[i] = error
+            energy[i], x[i] = np.nan, 0.0
+        else:
+            x[i], energy[i], scales[i] = start.x, start.energy, start.scale
+    return Prepared(encoded, batch._replace(p=np.column_stack([p, energy]), scales=scales), x, failures)
+
+
+@cache
+def _over_arrays(mechanism: Mechanism) -> Rebound:
+    """The equations over arrays: with the functions of `math` itself, element by element, those of NumPy differ in bits."""
+    elementwise = {name: np.vectorize(getattr(math, name), otypes=[float]) for name in ELEMENTARY}
+    return rebound(mechanism.modules, elementwise | {"sqrt": np.sqrt, "fabs": np.abs})
+
+
+def _acting(task: Task) -> tuple[Encoded, Any]:
+    """The inputs of a batch, those of the first run encoded; and of all, as `compiled.Batch` without constants and scales."""
+    from . import compiled as k
+
+    times, mechanism = task.settings.times, task.mechanism
+    signals = [channel.argument for channel in mechanism.channels if channel.kind != "rate"]
+    moved: dict[bytes, NDArray[np.float64]] = {}
+
+    def encode_one(inputs: Inputs) -> Encoded:
+        encoded = encode(inputs, mechanism)
+        key = encoded.breaks.tobytes()
+        if key not in moved:
+            moved[key] = align(encoded, times).breaks
+        return replace(encoded, breaks=moved[key])
+
+    numbers: dict[tuple[str, ...], Encoded] = {}
+    # by number: encoded inputs, and in their place for constants alone the values of the signals
+    known: dict[int, tuple[Encoded, list[float] | None]] = {}
+    for inputs in task.inputs:
+        if id(inputs) in known:
+            continue
+        if inputs.held_exactly:
+            names = tuple(inputs)
+            if names not in numbers:
+                numbers[names] = encode_one(inputs)
+            row = [reduce(add, map(float, inputs.parts(name)), 0.0) for name in signals]
+            known[id(inputs)] = numbers[names], row
+        else:
+            known[id(inputs)] = encode_one(inputs), None
+    distinct = list(known.values())
+    encoded = [e for e, _ in distinct]
+    order = {key: n for n, key in enumerate(known)}
+    which = np.array([order[id(inputs)] for inputs in task.inputs])
+    sizes = np.array([(len(e.coefficients), len(e.harmonics)) for e in encoded])
+    pieces, waves = sizes.max(axis=0)
+    breaks = np.zeros((len(encoded), pieces + 1))
+    coefficients = np.zeros((len(encoded), pieces, len(signals), 4))
+    harmonics = np.zeros((len(encoded), waves, 4))
+    for n, (e, values) in enumerate(distinct):
+        breaks[n, : len(e.breaks)] = e.breaks
+        if values is None:
+            coefficients[n, : len(e.coefficients)] = e.coefficients
+            harmonics[n, : len(e.harmonics)] = e.harmonics
+        else:
+            coefficients[n, 0, :, 0] = values
+    return known[id(task.inputs[0])][0], k.Batch(
+        p=np.empty((0, 0)),
+        scales=np.empty((0, 0)),
+        steady=np.array([values is not None or e.steady for e, values in distinct])[which],
+        sizes=sizes[which],
+        breaks=breaks[which],
+        coefficients=coefficients[which],
+        harmonics=harmonics[which],
+        laws=np.array([e.law for e in encoded])[which],
+        law_places=np.array([e.law_places for e in encoded])[which],
+    )

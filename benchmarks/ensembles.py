@@ -1,0 +1,96 @@
+"""Throughput of `simulate_many` over short runs, as ratios within this one process.
+
+    python -m benchmarks.ensembles --runs 3000
+
+Runs of 0.1 s of the five-bar slider of Table 3.1 with varying springs: at commanded speeds, and under torques. The ratio to
+`simulate` is by CPU time, so that it holds on a machine that is busy; that of two threads is by the clock, and needs two
+free cores.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable
+from dataclasses import replace
+from time import perf_counter, process_time
+
+from rich.console import Console
+from rich.table import Table
+
+from analysis import Inputs, simulate, simulate_many
+from analysis.run import compiled
+from linkwork.five_bar.published import TABLE_3_1
+
+REPEATS = 7
+#: Runs that are solved one by one.
+FEW = 300
+OPTIONS = {"stop_time": 0.1, "step": 1e-3}
+
+
+def best(run: Callable[[], object], timer: Callable[[], float]) -> float:
+    """Shortest of several runs (s)."""
+    times = []
+    for _ in range(REPEATS):
+        begun = timer()
+        run()
+        times.append(timer() - begun)
+    return min(times)
+
+
+def compiled_time(run: Callable[[], object]) -> float:
+    """CPU time inside the compiled solver (s)."""
+    kernel, spent = compiled.run_many, []
+
+    def timed(*arguments: object) -> None:
+        begun = process_time()
+        kernel(*arguments)
+        spent.append(process_time() - begun)
+
+    def whole() -> None:
+        spent.clear()
+        run()
+        totals.append(sum(spent))
+
+    totals: list[float] = []
+    compiled.run_many = timed
+    try:
+        for _ in range(REPEATS):
+            whole()
+    finally:
+        compiled.run_many = kernel
+    return min(totals)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--runs", type=int, default=3000, help="how many (default: %(default)s)")
+    n = parser.parse_args().runs
+    springs = [replace(TABLE_3_1, slider_stiffness=500.0 + 1000.0 * i / n) for i in range(n)]
+    kinds = {
+        "commanded speed": [Inputs(speed=20.0 + 10.0 * i / n) for i in range(n)],
+        "torque": [Inputs(torque=10.0 * i / n) for i in range(n)],
+    }
+    table = Table("runs", "CPU a run", "of it compiled", "times `simulate`", "two threads, by the clock")
+    for name, inputs in kinds.items():
+
+        def together(n_jobs: int | None = None, inputs: list[Inputs] = inputs) -> object:
+            return simulate_many(springs, inputs, n_jobs=n_jobs, **OPTIONS)
+
+        def one_by_one(inputs: list[Inputs] = inputs) -> object:
+            return [simulate(p, i, **OPTIONS) for p, i in zip(springs[:FEW], inputs)]
+
+        alone = best(one_by_one, process_time) / len(springs[:FEW])
+        cpu = best(together, process_time)
+        clock = [best(lambda jobs=jobs: together(jobs), perf_counter) for jobs in (1, 2)]
+        table.add_row(
+            name,
+            f"{1e6 * cpu / n:.0f} us",
+            f"{100 * compiled_time(together) / cpu:.0f} %",
+            f"{alone * n / cpu:.1f}",
+            f"{clock[0] / clock[1]:.2f}",
+        )
+    Console().print(table)
+
+
+if __name__ == "__main__":
+    main()
