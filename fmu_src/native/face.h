@@ -12,36 +12,31 @@
 #define SAY(...) RETURN(instance_say(c, ERROR, __VA_ARGS__))
 
 /* The call is allowed in these states. */
-#define ALLOW(phases)                             \
-    Instance *c = component;                      \
-    if (!instance_allows(c, __func__, phases))    \
-        return FMI(Error);
+#define ALLOW(phases)                                                                                                          \
+    Instance *c = component;                                                                                                   \
+    if (!instance_allows(c, __func__, phases)) return FMI(Error);
 
 /* A pointer that the standard wants: without it the call is an error, not a crash. */
-#define NEED(condition)                               \
-    if (!(condition))                                 \
-        SAY("%s: a pointer is missing", __func__);
+#define NEED(condition)                                                                                                        \
+    if (!(condition)) SAY("%s: a pointer is missing", __func__);
 
-#define ALLOW_IN(type, phases)                                                                                   \
-    ALLOW(phases)                                                                                                \
-    if (c->interface != (type))                                                                                  \
+#define ALLOW_IN(type, phases)                                                                                                 \
+    ALLOW(phases)                                                                                                              \
+    if (c->interface != (type))                                                                                                \
         SAY("%s: not allowed in %s", __func__, (type) == CO_SIMULATION ? "model exchange" : "co-simulation");
 
 #define ARRAYS (count == 0 || (references && values))
 
-#define EACH(call)                                \
-    for (size_t i = 0; i < count; i++)            \
-        if ((call) != OK)                         \
-            return FMI(Error);                    \
+#define EACH(call)                                                                                                             \
+    for (size_t i = 0; i < count; i++)                                                                                         \
+        if ((call) != OK) return FMI(Error);                                                                                   \
     return FMI(OK);
 
 /* All of them, or none. */
-#define SET_EACH(kind)                                                         \
-    for (size_t i = 0; i < count; i++)                                         \
-        if (!instance_may_set(c, __func__, references[i], kind))               \
-            return FMI(Error);                                                 \
-    for (size_t i = 0; i < count; i++)                                         \
-        instance_set(c, references[i], values[i]);                             \
+#define SET_EACH(kind)                                                                                                         \
+    for (size_t i = 0; i < count; i++)                                                                                         \
+        if (!instance_may_set(c, __func__, references[i], kind)) return FMI(Error);                                            \
+    for (size_t i = 0; i < count; i++) instance_set(c, references[i], values[i]);                                              \
     return FMI(OK);
 
 enum {
@@ -52,38 +47,32 @@ enum {
 
 /* Life */
 
-const char *FMI(GetVersion)(void)
-{
+const char *FMI(GetVersion)(void) {
     return FMI(Version);
 }
 
-void FMI(FreeInstance)(void *component)
-{
+void FMI(FreeInstance)(void *component) {
     instance_free(component);
 }
 
-FMI(Status) FMI(SetDebugLogging)(void *component, FMI(Boolean) logging, size_t count, const FMI(String) categories[])
-{
+FMI(Status) FMI(SetDebugLogging)(void *component, FMI(Boolean) logging, size_t count, const FMI(String) categories[]) {
     ALLOW(ANY_STATE)
     NEED(count == 0 || categories)
     RETURN(instance_log(c, __func__, logging, count, categories));
 }
 
-FMI(Status) FMI(ExitInitializationMode)(void *component)
-{
+FMI(Status) FMI(ExitInitializationMode)(void *component) {
     ALLOW(INITIALIZATION)
     RETURN(instance_exit_initialization(c));
 }
 
-FMI(Status) FMI(Terminate)(void *component)
-{
+FMI(Status) FMI(Terminate)(void *component) {
     ALLOW(EVENT | CONTINUOUS | STEP)
     c->s.phase = TERMINATED;
     return FMI(OK);
 }
 
-FMI(Status) FMI(Reset)(void *component)
-{
+FMI(Status) FMI(Reset)(void *component) {
     ALLOW(ANY_STATE & ~INTERMEDIATE)
     instance_reset(c);
     return FMI(OK);
@@ -91,44 +80,38 @@ FMI(Status) FMI(Reset)(void *component)
 
 /* Saved state */
 
-FMI(Status) STATE(Get, )(void *component, void **state)
-{
+FMI(Status) STATE(Get, )(void *component, void **state) {
     ALLOW(ANY_STATE & ~INTERMEDIATE)
     NEED(state)
     RETURN(instance_save(c, state));
 }
 
-FMI(Status) STATE(Set, )(void *component, void *state)
-{
+FMI(Status) STATE(Set, )(void *component, void *state) {
     ALLOW(ANY_STATE & ~INTERMEDIATE)
     NEED(state)
     RETURN(instance_restore(c, state));
 }
 
-FMI(Status) STATE(Free, )(void *component, void **state)
-{
+FMI(Status) STATE(Free, )(void *component, void **state) {
     ALLOW(ANY_STATE)
     instance_forget_saved(state);
     return FMI(OK);
 }
 
-FMI(Status) STATE(Serialized, Size)(void *component, void *state, size_t *size)
-{
+FMI(Status) STATE(Serialized, Size)(void *component, void *state, size_t *size) {
     ALLOW(ANY_STATE)
     NEED(state && size)
     *size = instance_serialized_size(state);
     return FMI(OK);
 }
 
-FMI(Status) STATE(Serialize, )(void *component, void *state, FMI(Byte) bytes[], size_t size)
-{
+FMI(Status) STATE(Serialize, )(void *component, void *state, FMI(Byte) bytes[], size_t size) {
     ALLOW(ANY_STATE)
     NEED(state && bytes)
     RETURN(instance_serialize(c, __func__, state, (char *)bytes, size));
 }
 
-FMI(Status) DESERIALIZE(void *component, const FMI(Byte) bytes[], size_t size, void **state)
-{
+FMI(Status) DESERIALIZE(void *component, const FMI(Byte) bytes[], size_t size, void **state) {
     ALLOW(ANY_STATE)
     NEED(bytes && state)
     RETURN(instance_deserialize(c, (const char *)bytes, size, state));
@@ -136,35 +119,31 @@ FMI(Status) DESERIALIZE(void *component, const FMI(Byte) bytes[], size_t size, v
 
 /* Model exchange */
 
-FMI(Status) FMI(EnterContinuousTimeMode)(void *component)
-{
+FMI(Status) FMI(EnterContinuousTimeMode)(void *component) {
     ALLOW(EVENT)
     c->s.phase = CONTINUOUS;
     return FMI(OK);
 }
 
-FMI(Status) FMI(CompletedIntegratorStep)(void *component, FMI(Boolean) final, FMI(Boolean) *event, FMI(Boolean) *terminate)
-{
-    (void)final;
+FMI(Status) FMI(CompletedIntegratorStep)(void *component, FMI(Boolean) final, FMI(Boolean) * event, FMI(Boolean) * terminate) {
+    (void) final;
     ALLOW(CONTINUOUS)
     NEED(event && terminate)
     *event = *terminate = false;
     return FMI(OK);
 }
 
-FMI(Status) FMI(SetContinuousStates)(void *component, const double x[], size_t count)
-{
+FMI(Status) FMI(SetContinuousStates)(void *component, const double x[], size_t count) {
     ALLOW(CONTINUOUS)
     NEED(x)
     RETURN(instance_set_states(c, __func__, x, count));
 }
 
-#define GET_STATES(name, what, phases)                                             \
-    FMI(Status) FMI(name)(void *component, double values[], size_t count)          \
-    {                                                                              \
-        ALLOW_IN(MODEL_EXCHANGE, phases)                                           \
-        NEED(values)                                                               \
-        RETURN(instance_get_states(c, __func__, what, values, count));             \
+#define GET_STATES(name, what, phases)                                                                                         \
+    FMI(Status) FMI(name)(void *component, double values[], size_t count) {                                                    \
+        ALLOW_IN(MODEL_EXCHANGE, phases)                                                                                       \
+        NEED(values)                                                                                                           \
+        RETURN(instance_get_states(c, __func__, what, values, count));                                                         \
     }
 
 GET_STATES(GetContinuousStates, VALUES, WITH_STATES)

@@ -11,24 +11,19 @@
 
 typedef fmi2ValueReference Reference;
 
-static void log_message(const Instance *c, Status status, const char *category, const char *message)
-{
-    if (c->logger)
-        ((fmi2CallbackLogger)c->logger)(c->environment, c->name, (fmi2Status)status, category, "%s", message);
+static void log_message(const Instance *c, Status status, const char *category, const char *message) {
+    if (c->logger) ((fmi2CallbackLogger)c->logger)(c->environment, c->name, (fmi2Status)status, category, "%s", message);
 }
 
-const char *fmi2GetTypesPlatform(void)
-{
+const char *fmi2GetTypesPlatform(void) {
     return fmi2TypesPlatform;
 }
 
 fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String guid, fmi2String resources,
-                              const fmi2CallbackFunctions *functions, fmi2Boolean visible, fmi2Boolean logging)
-{
+                              const fmi2CallbackFunctions *functions, fmi2Boolean visible, fmi2Boolean logging) {
     (void)resources; /* nothing is read: any folder will do */
     (void)visible;
-    if (!functions || (type != fmi2ModelExchange && type != fmi2CoSimulation))
-        return NULL;
+    if (!functions || (type != fmi2ModelExchange && type != fmi2CoSimulation)) return NULL;
     return instance_new(name, guid, type == fmi2CoSimulation ? CO_SIMULATION : MODEL_EXCHANGE, logging,
                         functions->componentEnvironment, log_message, (void (*)(void))functions->logger);
 }
@@ -36,14 +31,12 @@ fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String guid, f
 /* Life */
 
 fmi2Status fmi2SetupExperiment(fmi2Component component, fmi2Boolean tolerance_given, fmi2Real tolerance, fmi2Real start,
-                               fmi2Boolean stop_given, fmi2Real stop)
-{
+                               fmi2Boolean stop_given, fmi2Real stop) {
     ALLOW(INSTANTIATED)
     RETURN(instance_setup(c, tolerance_given, tolerance, start, stop_given, stop));
 }
 
-fmi2Status fmi2EnterInitializationMode(fmi2Component component)
-{
+fmi2Status fmi2EnterInitializationMode(fmi2Component component) {
     ALLOW(INSTANTIATED)
     c->s.phase = INITIALIZATION;
     return fmi2OK;
@@ -51,29 +44,25 @@ fmi2Status fmi2EnterInitializationMode(fmi2Component component)
 
 /* Values */
 
-fmi2Status fmi2GetReal(fmi2Component component, const Reference references[], size_t count, fmi2Real values[])
-{
+fmi2Status fmi2GetReal(fmi2Component component, const Reference references[], size_t count, fmi2Real values[]) {
     ALLOW(SETTLED)
     NEED(ARRAYS)
     EACH(instance_get(c, __func__, references[i], REAL, &values[i]))
 }
 
-fmi2Status fmi2GetInteger(fmi2Component component, const Reference references[], size_t count, fmi2Integer values[])
-{
+fmi2Status fmi2GetInteger(fmi2Component component, const Reference references[], size_t count, fmi2Integer values[]) {
     ALLOW(SETTLED)
     NEED(ARRAYS)
     EACH(instance_get_integer(c, __func__, references[i], &values[i]))
 }
 
-fmi2Status fmi2GetString(fmi2Component component, const Reference references[], size_t count, fmi2String values[])
-{
+fmi2Status fmi2GetString(fmi2Component component, const Reference references[], size_t count, fmi2String values[]) {
     ALLOW(SETTLED)
     NEED(ARRAYS)
     EACH(instance_get_text(c, __func__, references[i], &values[i]))
 }
 
-fmi2Status fmi2SetReal(fmi2Component component, const Reference references[], size_t count, const fmi2Real values[])
-{
+fmi2Status fmi2SetReal(fmi2Component component, const Reference references[], size_t count, const fmi2Real values[]) {
     ALLOW(SETTABLE | CONTINUOUS)
     NEED(ARRAYS)
     bool free = c->s.phase == CONTINUOUS; /* states may be set by themselves */
@@ -86,42 +75,37 @@ fmi2Status fmi2SetReal(fmi2Component component, const Reference references[], si
             return fmi2Error;
     Status status = free ? instance_set_states(c, __func__, x, STATES) : OK;
     for (size_t i = 0; i < count && status == OK; i++)
-        if (!free || instance_state(references[i]) < 0)
-            instance_set(c, references[i], values[i]);
+        if (!free || instance_state(references[i]) < 0) instance_set(c, references[i], values[i]);
     RETURN(status);
 }
 
-fmi2Status fmi2SetInteger(fmi2Component component, const Reference references[], size_t count, const fmi2Integer values[])
-{
+fmi2Status fmi2SetInteger(fmi2Component component, const Reference references[], size_t count, const fmi2Integer values[]) {
     ALLOW(SETTABLE)
     NEED(ARRAYS)
     SET_EACH(INTEGER)
 }
 
-fmi2Status fmi2SetString(fmi2Component component, const Reference references[], size_t count, const fmi2String values[])
-{
+fmi2Status fmi2SetString(fmi2Component component, const Reference references[], size_t count, const fmi2String values[]) {
     (void)references, (void)values;
     ALLOW(SETTABLE)
     RETURN(instance_none(c, __func__, count));
 }
 
-fmi2Status fmi2GetBoolean(fmi2Component component, const Reference references[], size_t count, fmi2Boolean values[])
-{
+fmi2Status fmi2GetBoolean(fmi2Component component, const Reference references[], size_t count, fmi2Boolean values[]) {
     (void)references, (void)values;
     ALLOW(ANY_STATE)
     RETURN(instance_none(c, __func__, count));
 }
 
-fmi2Status fmi2SetBoolean(fmi2Component component, const Reference references[], size_t count, const fmi2Boolean values[])
-{
+fmi2Status fmi2SetBoolean(fmi2Component component, const Reference references[], size_t count, const fmi2Boolean values[]) {
     (void)references, (void)values;
     ALLOW(ANY_STATE)
     RETURN(instance_none(c, __func__, count));
 }
 
 fmi2Status fmi2GetDirectionalDerivative(fmi2Component component, const Reference unknowns[], size_t unknown_count,
-                                        const Reference knowns[], size_t known_count, const fmi2Real change[], fmi2Real result[])
-{
+                                        const Reference knowns[], size_t known_count, const fmi2Real change[],
+                                        fmi2Real result[]) {
     ALLOW(SETTLED)
     NEED((unknown_count == 0 || (unknowns && result)) && (known_count == 0 || (knowns && change)))
     RETURN(instance_directional(c, __func__, false, unknowns, unknown_count, knowns, known_count, change, result));
@@ -129,15 +113,13 @@ fmi2Status fmi2GetDirectionalDerivative(fmi2Component component, const Reference
 
 /* Model exchange */
 
-fmi2Status fmi2EnterEventMode(fmi2Component component)
-{
+fmi2Status fmi2EnterEventMode(fmi2Component component) {
     ALLOW(EVENT | CONTINUOUS)
     c->s.phase = EVENT;
     return fmi2OK;
 }
 
-fmi2Status fmi2NewDiscreteStates(fmi2Component component, fmi2EventInfo *info)
-{
+fmi2Status fmi2NewDiscreteStates(fmi2Component component, fmi2EventInfo *info) {
     bool terminate, changed;
     ALLOW(EVENT)
     NEED(info)
@@ -146,8 +128,7 @@ fmi2Status fmi2NewDiscreteStates(fmi2Component component, fmi2EventInfo *info)
     return fmi2OK;
 }
 
-fmi2Status fmi2SetTime(fmi2Component component, fmi2Real time)
-{
+fmi2Status fmi2SetTime(fmi2Component component, fmi2Real time) {
     ALLOW(EVENT | CONTINUOUS)
     RETURN(instance_set_time(c, __func__, time));
 }
@@ -158,43 +139,37 @@ GET_STATES(GetNominalsOfContinuousStates, NOMINALS, INSTANTIATED | WITH_STATES)
 /* Co-simulation */
 
 fmi2Status fmi2SetRealInputDerivatives(fmi2Component component, const Reference references[], size_t count,
-                                       const fmi2Integer orders[], const fmi2Real values[])
-{
+                                       const fmi2Integer orders[], const fmi2Real values[]) {
     ALLOW_IN(CO_SIMULATION, INSTANTIATED | INITIALIZATION | STEP)
     NEED(ARRAYS && (count == 0 || orders))
     EACH(instance_set_slope(c, __func__, references[i], orders[i], values[i]))
 }
 
 fmi2Status fmi2GetRealOutputDerivatives(fmi2Component component, const Reference references[], size_t count,
-                                        const fmi2Integer orders[], fmi2Real values[])
-{
+                                        const fmi2Integer orders[], fmi2Real values[]) {
     ALLOW_IN(CO_SIMULATION, STEP | TERMINATED)
     NEED(ARRAYS && (count == 0 || orders))
     RETURN(instance_output_slopes(c, __func__, references, count, orders, values));
 }
 
-fmi2Status fmi2DoStep(fmi2Component component, fmi2Real time, fmi2Real step, fmi2Boolean no_going_back)
-{
+fmi2Status fmi2DoStep(fmi2Component component, fmi2Real time, fmi2Real step, fmi2Boolean no_going_back) {
     (void)no_going_back;
     ALLOW(STEP)
     RETURN(instance_step(c, time, step, NULL));
 }
 
-fmi2Status fmi2CancelStep(fmi2Component component)
-{
+fmi2Status fmi2CancelStep(fmi2Component component) {
     ALLOW_IN(CO_SIMULATION, ANY_STATE)
     SAY("%s: no step is ever pending", __func__);
 }
 
-#define GET_STATUS(name, type, wanted, found)                                                              \
-    fmi2Status fmi2Get##name(fmi2Component component, const fmi2StatusKind kind, type *value)              \
-    {                                                                                                      \
-        ALLOW_IN(CO_SIMULATION, STEP | TERMINATED)                                                         \
-        NEED(value)                                                                                        \
-        if (!(wanted))                                                                                     \
-            SAY("%s: there is no status of kind %d", __func__, (int)kind);                                 \
-        *value = found;                                                                                    \
-        return fmi2OK;                                                                                     \
+#define GET_STATUS(name, type, wanted, found)                                                                                  \
+    fmi2Status fmi2Get##name(fmi2Component component, const fmi2StatusKind kind, type *value) {                                \
+        ALLOW_IN(CO_SIMULATION, STEP | TERMINATED)                                                                             \
+        NEED(value)                                                                                                            \
+        if (!(wanted)) SAY("%s: there is no status of kind %d", __func__, (int)kind);                                          \
+        *value = found;                                                                                                        \
+        return fmi2OK;                                                                                                         \
     }
 
 GET_STATUS(Status, fmi2Status, kind == fmi2DoStepStatus, c->s.step == GOOD ? fmi2OK : fmi2Discard)
@@ -202,8 +177,7 @@ GET_STATUS(RealStatus, fmi2Real, kind == fmi2LastSuccessfulTime, c->s.plant.time
 GET_STATUS(BooleanStatus, fmi2Boolean, kind == fmi2Terminated, c->s.step == LIMIT_OF_ASSEMBLY)
 GET_STATUS(StringStatus, fmi2String, kind == fmi2DoStepStatus || kind == fmi2PendingStatus, c->s.message)
 
-fmi2Status fmi2GetIntegerStatus(fmi2Component component, const fmi2StatusKind kind, fmi2Integer *value)
-{
+fmi2Status fmi2GetIntegerStatus(fmi2Component component, const fmi2StatusKind kind, fmi2Integer *value) {
     (void)value;
     ALLOW_IN(CO_SIMULATION, STEP | TERMINATED)
     SAY("%s: there is no status of kind %d", __func__, (int)kind);

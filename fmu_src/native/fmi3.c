@@ -9,29 +9,26 @@
 
 typedef fmi3ValueReference Reference;
 
-#define COUNTS(count, right)                              \
-    if (!instance_counts(c, __func__, count, right))      \
-        return fmi3Error;
+#define COUNTS(count, right)                                                                                                   \
+    if (!instance_counts(c, __func__, count, right)) return fmi3Error;
 
-static void log_message(const Instance *c, Status status, const char *category, const char *message)
-{
-    if (c->logger)
-        ((fmi3LogMessageCallback)c->logger)(c->environment, (fmi3Status)status, category, message);
+static void log_message(const Instance *c, Status status, const char *category, const char *message) {
+    if (c->logger) ((fmi3LogMessageCallback)c->logger)(c->environment, (fmi3Status)status, category, message);
 }
 
 fmi3Instance fmi3InstantiateModelExchange(fmi3String name, fmi3String token, fmi3String resources, fmi3Boolean visible,
-                                          fmi3Boolean logging, fmi3InstanceEnvironment environment, fmi3LogMessageCallback log)
-{
+                                          fmi3Boolean logging, fmi3InstanceEnvironment environment,
+                                          fmi3LogMessageCallback log) {
     (void)resources; /* nothing is read: any folder will do */
     (void)visible;
     return instance_new(name, token, MODEL_EXCHANGE, logging, environment, log_message, (void (*)(void))log);
 }
 
-fmi3Instance fmi3InstantiateCoSimulation(
-    fmi3String name, fmi3String token, fmi3String resources, fmi3Boolean visible, fmi3Boolean logging, fmi3Boolean event_mode,
-    fmi3Boolean early_return, const Reference intermediate[], size_t intermediate_count, fmi3InstanceEnvironment environment,
-    fmi3LogMessageCallback log, fmi3IntermediateUpdateCallback update)
-{
+fmi3Instance fmi3InstantiateCoSimulation(fmi3String name, fmi3String token, fmi3String resources, fmi3Boolean visible,
+                                         fmi3Boolean logging, fmi3Boolean event_mode, fmi3Boolean early_return,
+                                         const Reference intermediate[], size_t intermediate_count,
+                                         fmi3InstanceEnvironment environment, fmi3LogMessageCallback log,
+                                         fmi3IntermediateUpdateCallback update) {
     (void)resources, (void)visible;
     (void)intermediate, (void)intermediate_count; /* all of them */
     Instance *c = instance_new(name, token, CO_SIMULATION, logging, environment, log_message, (void (*)(void))log);
@@ -47,49 +44,43 @@ fmi3Instance fmi3InstantiateCoSimulation(
     return c;
 }
 
-fmi3Instance fmi3InstantiateScheduledExecution(
-    fmi3String name, fmi3String token, fmi3String resources, fmi3Boolean visible, fmi3Boolean logging,
-    fmi3InstanceEnvironment environment, fmi3LogMessageCallback log, fmi3ClockUpdateCallback clock_update,
-    fmi3LockPreemptionCallback lock, fmi3UnlockPreemptionCallback unlock)
-{
+fmi3Instance fmi3InstantiateScheduledExecution(fmi3String name, fmi3String token, fmi3String resources, fmi3Boolean visible,
+                                               fmi3Boolean logging, fmi3InstanceEnvironment environment,
+                                               fmi3LogMessageCallback log, fmi3ClockUpdateCallback clock_update,
+                                               fmi3LockPreemptionCallback lock, fmi3UnlockPreemptionCallback unlock) {
     (void)name, (void)token, (void)resources, (void)visible, (void)logging, (void)clock_update, (void)lock, (void)unlock;
-    if (log)
-        log(environment, fmi3Error, "logStatusError", "this FMU has no scheduled execution");
+    if (log) log(environment, fmi3Error, "logStatusError", "this FMU has no scheduled execution");
     return NULL;
 }
 
 /* Life */
 
 fmi3Status fmi3EnterInitializationMode(fmi3Instance component, fmi3Boolean tolerance_given, fmi3Float64 tolerance,
-                                       fmi3Float64 start, fmi3Boolean stop_given, fmi3Float64 stop)
-{
+                                       fmi3Float64 start, fmi3Boolean stop_given, fmi3Float64 stop) {
     ALLOW(INSTANTIATED)
     Status status = instance_setup(c, tolerance_given, tolerance, start, stop_given, stop);
-    if (status == OK)
-        c->s.phase = INITIALIZATION;
+    if (status == OK) c->s.phase = INITIALIZATION;
     RETURN(status);
 }
 
 /* Values */
 
-#define GET(type, call)                                                                                             \
-    fmi3Status fmi3Get##type(fmi3Instance component, const Reference references[], size_t count,                    \
-                             fmi3##type values[], size_t value_count)                                               \
-    {                                                                                                               \
-        ALLOW(ANY_STATE)                                                                                            \
-        NEED(ARRAYS)                                                                                                \
-        COUNTS(value_count, count)                                                                                  \
-        EACH(call)                                                                                                  \
+#define GET(type, call)                                                                                                        \
+    fmi3Status fmi3Get##type(fmi3Instance component, const Reference references[], size_t count, fmi3##type values[],          \
+                             size_t value_count) {                                                                             \
+        ALLOW(ANY_STATE)                                                                                                       \
+        NEED(ARRAYS)                                                                                                           \
+        COUNTS(value_count, count)                                                                                             \
+        EACH(call)                                                                                                             \
     }
 
-#define SET(type, phases, kind)                                                                                     \
-    fmi3Status fmi3Set##type(fmi3Instance component, const Reference references[], size_t count,                    \
-                             const fmi3##type values[], size_t value_count)                                         \
-    {                                                                                                               \
-        ALLOW(phases)                                                                                               \
-        NEED(ARRAYS)                                                                                                \
-        COUNTS(value_count, count)                                                                                  \
-        SET_EACH(kind)                                                                                              \
+#define SET(type, phases, kind)                                                                                                \
+    fmi3Status fmi3Set##type(fmi3Instance component, const Reference references[], size_t count, const fmi3##type values[],    \
+                             size_t value_count) {                                                                             \
+        ALLOW(phases)                                                                                                          \
+        NEED(ARRAYS)                                                                                                           \
+        COUNTS(value_count, count)                                                                                             \
+        SET_EACH(kind)                                                                                                         \
     }
 
 GET(Float64, instance_get(c, __func__, references[i], REAL, &values[i]))
@@ -104,11 +95,10 @@ SET(Int32, SETTABLE, INTEGER)
 #pragma GCC diagnostic ignored "-Wunused-parameter"
 #endif
 
-#define NONE(name, count, ...)                            \
-    fmi3Status fmi3##name(__VA_ARGS__)                    \
-    {                                                     \
-        ALLOW(ANY_STATE)                                  \
-        RETURN(instance_none(c, __func__, count));        \
+#define NONE(name, count, ...)                                                                                                 \
+    fmi3Status fmi3##name(__VA_ARGS__) {                                                                                       \
+        ALLOW(ANY_STATE)                                                                                                       \
+        RETURN(instance_none(c, __func__, count));                                                                             \
     }
 
 #define NONE_OF(type)                                                                                                          \
@@ -150,17 +140,16 @@ NONE(GetVariableDependencies, 1, fmi3Instance component, Reference dependent, si
 
 /* Derivatives */
 
-#define GET_DERIVATIVE(name, adjoint, seeds, results)                                                                   \
-    fmi3Status fmi3Get##name(fmi3Instance component, const Reference unknowns[], size_t unknown_count,                  \
-                             const Reference knowns[], size_t known_count, const fmi3Float64 seed[], size_t seed_count, \
-                             fmi3Float64 result[], size_t result_count)                                                 \
-    {                                                                                                                   \
-        ALLOW(SETTLED & ~INTERMEDIATE)                                                                                  \
-        NEED((unknown_count == 0 || unknowns) && (known_count == 0 || knowns))                                          \
-        NEED((seed_count == 0 || seed) && (result_count == 0 || result))                                                \
-        COUNTS(seed_count, seeds)                                                                                       \
-        COUNTS(result_count, results)                                                                                   \
-        RETURN(instance_directional(c, __func__, adjoint, unknowns, unknown_count, knowns, known_count, seed, result)); \
+#define GET_DERIVATIVE(name, adjoint, seeds, results)                                                                          \
+    fmi3Status fmi3Get##name(fmi3Instance component, const Reference unknowns[], size_t unknown_count,                         \
+                             const Reference knowns[], size_t known_count, const fmi3Float64 seed[], size_t seed_count,        \
+                             fmi3Float64 result[], size_t result_count) {                                                      \
+        ALLOW(SETTLED & ~INTERMEDIATE)                                                                                         \
+        NEED((unknown_count == 0 || unknowns) && (known_count == 0 || knowns))                                                 \
+        NEED((seed_count == 0 || seed) && (result_count == 0 || result))                                                       \
+        COUNTS(seed_count, seeds)                                                                                              \
+        COUNTS(result_count, results)                                                                                          \
+        RETURN(instance_directional(c, __func__, adjoint, unknowns, unknown_count, knowns, known_count, seed, result));        \
     }
 
 GET_DERIVATIVE(DirectionalDerivative, false, known_count, unknown_count)
@@ -168,17 +157,15 @@ GET_DERIVATIVE(AdjointDerivative, true, unknown_count, known_count)
 
 /* Model exchange */
 
-fmi3Status fmi3EnterEventMode(fmi3Instance component)
-{
+fmi3Status fmi3EnterEventMode(fmi3Instance component) {
     ALLOW(CONTINUOUS)
     c->s.phase = EVENT;
     return fmi3OK;
 }
 
-fmi3Status fmi3UpdateDiscreteStates(
-    fmi3Instance component, fmi3Boolean *again, fmi3Boolean *terminate, fmi3Boolean *nominals_changed, fmi3Boolean *values_changed,
-    fmi3Boolean *next_event_given, fmi3Float64 *next_event)
-{
+fmi3Status fmi3UpdateDiscreteStates(fmi3Instance component, fmi3Boolean *again, fmi3Boolean *terminate,
+                                    fmi3Boolean *nominals_changed, fmi3Boolean *values_changed, fmi3Boolean *next_event_given,
+                                    fmi3Float64 *next_event) {
     ALLOW(EVENT)
     NEED(again && terminate && nominals_changed && values_changed && next_event_given && next_event)
     *again = *nominals_changed = *next_event_given = fmi3False;
@@ -187,8 +174,7 @@ fmi3Status fmi3UpdateDiscreteStates(
     return fmi3OK;
 }
 
-fmi3Status fmi3SetTime(fmi3Instance component, fmi3Float64 time)
-{
+fmi3Status fmi3SetTime(fmi3Instance component, fmi3Float64 time) {
     ALLOW(CONTINUOUS)
     RETURN(instance_set_time(c, __func__, time));
 }
@@ -196,13 +182,12 @@ fmi3Status fmi3SetTime(fmi3Instance component, fmi3Float64 time)
 GET_STATES(GetContinuousStateDerivatives, DERIVATIVES, WITH_STATES)
 GET_STATES(GetNominalsOfContinuousStates, NOMINALS, WITH_STATES)
 
-#define GET_NUMBER(name, number)                                          \
-    fmi3Status fmi3Get##name(fmi3Instance component, size_t *count)       \
-    {                                                                     \
-        ALLOW_IN(MODEL_EXCHANGE, ANY_STATE)                               \
-        NEED(count)                                                       \
-        *count = number;                                                  \
-        return fmi3OK;                                                    \
+#define GET_NUMBER(name, number)                                                                                               \
+    fmi3Status fmi3Get##name(fmi3Instance component, size_t *count) {                                                          \
+        ALLOW_IN(MODEL_EXCHANGE, ANY_STATE)                                                                                    \
+        NEED(count)                                                                                                            \
+        *count = number;                                                                                                       \
+        return fmi3OK;                                                                                                         \
     }
 
 GET_NUMBER(NumberOfContinuousStates, STATES)
@@ -210,9 +195,8 @@ GET_NUMBER(NumberOfEventIndicators, 1)
 
 /* Co-simulation */
 
-fmi3Status fmi3GetOutputDerivatives(fmi3Instance component, const Reference references[], size_t count, const fmi3Int32 orders[],
-                                    fmi3Float64 values[], size_t value_count)
-{
+fmi3Status fmi3GetOutputDerivatives(fmi3Instance component, const Reference references[], size_t count,
+                                    const fmi3Int32 orders[], fmi3Float64 values[], size_t value_count) {
     ALLOW_IN(CO_SIMULATION, STEP | INTERMEDIATE | TERMINATED)
     NEED(ARRAYS && (count == 0 || orders))
     COUNTS(value_count, count)
@@ -220,23 +204,21 @@ fmi3Status fmi3GetOutputDerivatives(fmi3Instance component, const Reference refe
 }
 
 /* The importer sees the state after a step of the integrator, and may set inputs or ask for the end of the step. */
-static void intermediate_update(void *context, Plant *plant, double *end)
-{
+static void intermediate_update(void *context, Plant *plant, double *end) {
     Instance *c = context;
     fmi3Boolean requested = fmi3False;
     fmi3Float64 time = plant->time;
     c->s.phase = INTERMEDIATE;
     c->stale = true;
-    ((fmi3IntermediateUpdateCallback)c->update)(
-        c->environment, plant->time, fmi3True, fmi3True, fmi3True, c->early_return, &requested, &time);
+    ((fmi3IntermediateUpdateCallback)c->update)(c->environment, plant->time, fmi3True, fmi3True, fmi3True, c->early_return,
+                                                &requested, &time);
     c->s.phase = STEP;
-    if (requested && c->early_return && time < *end)
-        *end = time;
+    if (requested && c->early_return && time < *end) *end = time;
 }
 
 fmi3Status fmi3DoStep(fmi3Instance component, fmi3Float64 time, fmi3Float64 step, fmi3Boolean no_going_back,
-                      fmi3Boolean *event_needed, fmi3Boolean *terminate, fmi3Boolean *early_return, fmi3Float64 *last_successful)
-{
+                      fmi3Boolean *event_needed, fmi3Boolean *terminate, fmi3Boolean *early_return,
+                      fmi3Float64 *last_successful) {
     ALLOW(STEP)
     NEED(event_needed && terminate && early_return && last_successful)
     Watch watch = {intermediate_update, c};

@@ -8,17 +8,15 @@
 
 /* Life */
 
-static char *copy(const char *text)
-{
+static char *copy(const char *text) {
     char *result = malloc(strlen(text) + 1);
     return result ? strcpy(result, text) : NULL; /* no memory */
 }
 
 Instance *instance_new(const char *name, const char *token, Interface interface, bool logging, void *environment,
-                       void (*log)(const Instance *, Status, const char *, const char *), void (*logger)(void))
-{
+                       void (*log)(const Instance *, Status, const char *, const char *), void (*logger)(void)) {
     Instance *c = calloc(1, sizeof *c);
-    if (!c) /* no memory */
+    if (!c)          /* no memory */
         return NULL; /* no memory */
     c->interface = interface;
     c->logging = logging ? ALL_CATEGORIES : 0;
@@ -28,7 +26,7 @@ Instance *instance_new(const char *name, const char *token, Interface interface,
     c->name = copy(name ? name : "");
     c->text = calloc(1, SENTENCE);
     bool good = c->name && c->text; /* no memory */
-    if (good && c->name[0] == 0) { /* no memory */
+    if (good && c->name[0] == 0) {  /* no memory */
         instance_say(c, ERROR, "an instance must have a name");
         good = false;
     }
@@ -44,24 +42,20 @@ Instance *instance_new(const char *name, const char *token, Interface interface,
     return c;
 }
 
-void instance_free(Instance *c)
-{
-    if (!c)
-        return;
+void instance_free(Instance *c) {
+    if (!c) return;
     free(c->name);
     free(c->text);
     free(c);
 }
 
-void instance_reset(Instance *c)
-{
+void instance_reset(Instance *c) {
     c->s = (Saved){.phase = INSTANTIATED};
     plant_reset(&c->s.plant);
     c->stale = true;
 }
 
-static const char *phase_name(int phase)
-{
+static const char *phase_name(int phase) {
     switch (phase) {
     case INSTANTIATED: return "before the initialisation";
     case INITIALIZATION: return "in initialisation mode";
@@ -73,12 +67,9 @@ static const char *phase_name(int phase)
     }
 }
 
-bool instance_allows(Instance *c, const char *function, int phases)
-{
-    if (!c)
-        return false;
-    if ((int)c->s.phase & phases)
-        return true;
+bool instance_allows(Instance *c, const char *function, int phases) {
+    if (!c) return false;
+    if ((int)c->s.phase & phases) return true;
     instance_say(c, ERROR, "%s: not allowed %s", function, phase_name((int)c->s.phase));
     return false;
 }
@@ -86,13 +77,11 @@ bool instance_allows(Instance *c, const char *function, int phases)
 /* By their statuses; the first are all of them. */
 static const char *const categories[] = {"logAll", "logStatusWarning", "logStatusDiscard", "logStatusError", "logStatusFatal"};
 
-Status instance_log(Instance *c, const char *function, bool on, size_t count, const char *const names[])
-{
+Status instance_log(Instance *c, const char *function, bool on, size_t count, const char *const names[]) {
     int wanted = count == 0 ? ALL_CATEGORIES : 0;
     for (size_t i = 0; i < count; i++) {
         int n = 0;
-        while (n <= FATAL && !(names[i] && strcmp(names[i], categories[n]) == 0))
-            n++;
+        while (n <= FATAL && !(names[i] && strcmp(names[i], categories[n]) == 0)) n++;
         if (n > FATAL)
             return instance_say(c, ERROR, "%s: there is no category %s", function, names[i] ? names[i] : "without a name");
         wanted |= n == 0 ? ALL_CATEGORIES : 1 << n;
@@ -101,35 +90,30 @@ Status instance_log(Instance *c, const char *function, bool on, size_t count, co
     return OK;
 }
 
-Status instance_say(const Instance *c, Status status, const char *format, ...)
-{
+Status instance_say(const Instance *c, Status status, const char *format, ...) {
     char sentence[2 * SENTENCE];
     va_list arguments;
     va_start(arguments, format);
     vsnprintf(sentence, sizeof sentence, format, arguments);
     va_end(arguments);
     /* an error is worth a sentence whether or not debugging was asked for */
-    if (c->logging >> status & 1 || status == ERROR)
-        c->log(c, status, categories[status], sentence);
+    if (c->logging >> status & 1 || status == ERROR) c->log(c, status, categories[status], sentence);
     return status;
 }
 
 /* Keep a reason for solver.status and solver.message. */
-static void note(Instance *c, Reason reason, const char *sentence)
-{
+static void note(Instance *c, Reason reason, const char *sentence) {
     c->s.reason = reason;
     snprintf(c->s.message, SENTENCE, "%s", sentence);
 }
 
-static void forget(Instance *c)
-{
+static void forget(Instance *c) {
     note(c, GOOD, "");
     c->s.cause = GOOD;
     c->s.cause_message[0] = 0;
 }
 
-Status instance_setup(Instance *c, bool tolerance_given, double tolerance, double start, bool stop_given, double stop)
-{
+Status instance_setup(Instance *c, bool tolerance_given, double tolerance, double start, bool stop_given, double stop) {
     Digits number;
     if (stop_given && !(stop > start))
         return instance_say(c, ERROR, "the stop time is %s s: it must be after the start time", digits(number, stop));
@@ -146,19 +130,15 @@ Status instance_setup(Instance *c, bool tolerance_given, double tolerance, doubl
     return OK;
 }
 
-static Reason refresh(Instance *c, char sentence[SENTENCE])
-{
+static Reason refresh(Instance *c, char sentence[SENTENCE]) {
     Reason reason = GOOD;
-    if (c->s.plant.begun == 0.0)
-        reason = plant_begin(&c->s.plant, sentence);
-    if (reason == GOOD)
-        reason = plant_outputs(&c->s.plant, sentence);
+    if (c->s.plant.begun == 0.0) reason = plant_begin(&c->s.plant, sentence);
+    if (reason == GOOD) reason = plant_outputs(&c->s.plant, sentence);
     c->stale = reason != GOOD;
     return reason;
 }
 
-Status instance_exit_initialization(Instance *c)
-{
+Status instance_exit_initialization(Instance *c) {
     char sentence[SENTENCE];
     c->stale = true;
     Reason reason = refresh(c, sentence);
@@ -173,8 +153,7 @@ Status instance_exit_initialization(Instance *c)
 
 /* Values */
 
-static const Variable *variable(Instance *c, const char *function, unsigned reference, Kind kind)
-{
+static const Variable *variable(Instance *c, const char *function, unsigned reference, Kind kind) {
     static const char *const names[] = {"Real or Float64", "Integer or Int32", "String"};
     if (reference >= VARIABLES) {
         instance_say(c, ERROR, "%s: there is no variable with the value reference %u", function, reference);
@@ -189,8 +168,7 @@ static const Variable *variable(Instance *c, const char *function, unsigned refe
 }
 
 /* Bring the outputs up to date. A read does not fail: the last good outputs stay, and the next step will be refused. */
-static void read_outputs(Instance *c)
-{
+static void read_outputs(Instance *c) {
     char sentence[SENTENCE];
     Reason reason = refresh(c, sentence);
     bool running = (int)c->s.phase & RUNNING, stepping = running && c->interface == CO_SIMULATION;
@@ -201,72 +179,58 @@ static void read_outputs(Instance *c)
         forget(c); /* but not what ended the run: the limit of assembly */
 }
 
-static double computed(Instance *c, int row)
-{
+static double computed(Instance *c, int row) {
     double derivative[STATES];
-    if (row < STATE_ROW)
-        return c->s.plant.outputs[row];
+    if (row < STATE_ROW) return c->s.plant.outputs[row];
     if (row < DERIVATIVE_ROW) {
         double x[STATES];
         plant_present(&c->s.plant, x);
         return x[row - STATE_ROW];
     }
     if (row < MARGIN_ROW) {
-        if (plant_derivative(&c->s.plant, derivative))
-            memcpy(c->s.plant.derivative, derivative, sizeof derivative);
+        if (plant_derivative(&c->s.plant, derivative)) memcpy(c->s.plant.derivative, derivative, sizeof derivative);
         return c->s.plant.derivative[row - DERIVATIVE_ROW];
     }
     double margin = plant_margin(&c->s.plant);
     return row == TIME_ROW ? c->s.plant.time : isnan(margin) ? -LIMIT_CLEARANCE : margin;
 }
 
-Status instance_get(Instance *c, const char *function, unsigned reference, Kind kind, double *value)
-{
+Status instance_get(Instance *c, const char *function, unsigned reference, Kind kind, double *value) {
     const Variable *v = variable(c, function, reference, kind);
-    if (!v)
-        return ERROR;
+    if (!v) return ERROR;
     if (v->causality != COMPUTED)
         *value = c->s.plant.given[reference];
     else {
-        if (c->stale)
-            read_outputs(c);
+        if (c->stale) read_outputs(c);
         *value = (int)reference == status_at ? c->s.reason : computed(c, v->row);
     }
     return OK;
 }
 
-Status instance_get_integer(Instance *c, const char *function, unsigned reference, int *value)
-{
+Status instance_get_integer(Instance *c, const char *function, unsigned reference, int *value) {
     double number;
-    if (instance_get(c, function, reference, INTEGER, &number) != OK)
-        return ERROR;
+    if (instance_get(c, function, reference, INTEGER, &number) != OK) return ERROR;
     *value = (int)number;
     return OK;
 }
 
-Status instance_get_text(Instance *c, const char *function, unsigned reference, const char **value)
-{
-    if (!variable(c, function, reference, STRING))
-        return ERROR;
-    if (c->stale)
-        read_outputs(c);
+Status instance_get_text(Instance *c, const char *function, unsigned reference, const char **value) {
+    if (!variable(c, function, reference, STRING)) return ERROR;
+    if (c->stale) read_outputs(c);
     memcpy(c->text, c->s.message, SENTENCE);
     *value = c->text;
     return OK;
 }
 
 /* A guess of an output for the initialisation, which is solved without one. */
-static bool is_guess(const Instance *c, const Variable *v)
-{
+static bool is_guess(const Instance *c, const Variable *v) {
     return v->causality == COMPUTED && v->row >= 0 && v->row < STATE_ROW && c->s.phase == INSTANTIATED;
 }
 
-bool instance_may_set(Instance *c, const char *function, unsigned reference, Kind kind)
-{
+bool instance_may_set(Instance *c, const char *function, unsigned reference, Kind kind) {
     const Variable *v = variable(c, function, reference, kind);
     int phase = (int)c->s.phase;
-    if (!v)
-        return false;
+    if (!v) return false;
     if (v->causality == COMPUTED && !is_guess(c, v)) {
         instance_say(c, ERROR, "%s: %s is computed, it cannot be set", function, v->name);
         return false;
@@ -278,31 +242,26 @@ bool instance_may_set(Instance *c, const char *function, unsigned reference, Kin
     return true;
 }
 
-void instance_set(Instance *c, unsigned reference, double value)
-{
+void instance_set(Instance *c, unsigned reference, double value) {
     Plant *a = &c->s.plant;
     int phase = (int)c->s.phase;
-    if (is_guess(c, &variables[reference]))
-        return;
+    if (is_guess(c, &variables[reference])) return;
     a->given[reference] = value;
     c->stale = true;
     if (!(phase & RUNNING))
         a->begun = 0.0;
     else if (c->interface == CO_SIMULATION)
         for (int k = 0; k < COMMANDS; k++)
-            if (input_at[commands[k].input] == (int)reference)
-                a->fresh[k] = 1.0;
+            if (input_at[commands[k].input] == (int)reference) a->fresh[k] = 1.0;
 }
 
-Status instance_set_slope(Instance *c, const char *function, unsigned reference, int order, double slope)
-{
+Status instance_set_slope(Instance *c, const char *function, unsigned reference, int order, double slope) {
     Digits number;
     const Variable *v = variable(c, function, reference, REAL);
-    if (!v)
-        return ERROR;
+    if (!v) return ERROR;
     if (v->causality != INPUT || order != 1)
-        return instance_say(c, ERROR, "%s: derivative %d of %s: the first derivatives of the inputs can be set", function, order,
-                            v->name);
+        return instance_say(c, ERROR, "%s: derivative %d of %s: the first derivatives of the inputs can be set", function,
+                            order, v->name);
     if (!isfinite(slope))
         return instance_say(c, ERROR, "%s: the derivative of %s is %s: it must be a finite number", function, v->name,
                             digits(number, slope));
@@ -310,9 +269,8 @@ Status instance_set_slope(Instance *c, const char *function, unsigned reference,
     return OK;
 }
 
-Status instance_output_slopes(
-    Instance *c, const char *function, const unsigned references[], size_t count, const int orders[], double values[])
-{
+Status instance_output_slopes(Instance *c, const char *function, const unsigned references[], size_t count, const int orders[],
+                              double values[]) {
     Plant here = c->s.plant, *a = &here;
     double given[VARIABLES] = {0}, rows[ROWS], derivative[STATES];
     /* the motion goes on from the state with the commands applied */
@@ -320,46 +278,38 @@ Status instance_output_slopes(
     memset(here.fresh, 0, sizeof here.fresh);
     for (size_t i = 0; i < count; i++) {
         const Variable *v = variable(c, function, references[i], REAL);
-        if (!v)
-            return ERROR;
+        if (!v) return ERROR;
         if (v->causality != COMPUTED || orders[i] != 1)
             return instance_say(c, ERROR, "%s: derivative %d of %s: the first derivatives of the outputs can be read", function,
                                 orders[i], v->name);
     }
-    for (int i = 0; i < INPUTS; i++)
-        given[input_at[i]] = a->last_slopes[i];
+    for (int i = 0; i < INPUTS; i++) given[input_at[i]] = a->last_slopes[i];
     for (int k = 0; k < COMMANDS; k++) {
         /* a command that moved over the step was an acceleration: the state has it, as it has all commands */
         a->given[input_at[commands[k].acceleration]] += a->last_slopes[commands[k].input];
         given[input_at[commands[k].input]] = 0.0;
     }
-    if (!plant_derivative(a, derivative))
-        return instance_say(c, DISCARD, "%s: the derivatives are not finite", function);
+    if (!plant_derivative(a, derivative)) return instance_say(c, DISCARD, "%s: the derivatives are not finite", function);
     plant_forward(a, false, false, given, derivative, rows);
     rows[TIME_ROW] = 1.0;
-    for (size_t i = 0; i < count; i++)
-        values[i] = rows[variables[references[i]].row];
+    for (size_t i = 0; i < count; i++) values[i] = rows[variables[references[i]].row];
     return OK;
 }
 
 /* What this FMU has none of is good where nothing is asked for. */
-Status instance_none(Instance *c, const char *function, size_t count)
-{
+Status instance_none(Instance *c, const char *function, size_t count) {
     return count == 0 ? OK : instance_say(c, ERROR, "%s: this FMU has nothing of the kind", function);
 }
 
-bool instance_counts(Instance *c, const char *function, size_t count, size_t right)
-{
-    if (count == right)
-        return true;
+bool instance_counts(Instance *c, const char *function, size_t count, size_t right) {
+    if (count == right) return true;
     instance_say(c, ERROR, "%s: %lu numbers: it must be %lu", function, (unsigned long)count, (unsigned long)right);
     return false;
 }
 
 /* Steps */
 
-Status instance_step(Instance *c, double time, double step, const Watch *watch)
-{
+Status instance_step(Instance *c, double time, double step, const Watch *watch) {
     char sentence[SENTENCE];
     Digits end, stop;
     Reason ended;
@@ -374,8 +324,7 @@ Status instance_step(Instance *c, double time, double step, const Watch *watch)
     if (reason == GOOD) {
         forget(c);
         c->stopped = ended != GOOD;
-        if (ended != GOOD)
-            note(c, ended, "the step ended early, at the limit of assembly");
+        if (ended != GOOD) note(c, ended, "the step ended early, at the limit of assembly");
         return OK;
     }
     if (reason == STEP_OUT_OF_ORDER && c->s.cause != GOOD) {
@@ -395,8 +344,7 @@ Status instance_step(Instance *c, double time, double step, const Watch *watch)
 
 /* Model exchange */
 
-void instance_new_discrete_states(Instance *c, bool *terminate, bool *values_changed)
-{
+void instance_new_discrete_states(Instance *c, bool *terminate, bool *values_changed) {
     *values_changed = plant_jump(&c->s.plant);
     *terminate = !(plant_margin(&c->s.plant) >= 0.0);
     c->stale = true;
@@ -406,8 +354,7 @@ void instance_new_discrete_states(Instance *c, bool *terminate, bool *values_cha
     }
 }
 
-Status instance_set_time(Instance *c, const char *function, double time)
-{
+Status instance_set_time(Instance *c, const char *function, double time) {
     Digits number;
     /* a solver tries steps that go past the stop time, to come back to it */
     if (!(c->s.plant.start_time <= time && isfinite(time)))
@@ -418,37 +365,29 @@ Status instance_set_time(Instance *c, const char *function, double time)
     return OK;
 }
 
-Status instance_set_states(Instance *c, const char *function, const double x[], size_t count)
-{
-    if (!instance_counts(c, function, count, STATES))
-        return ERROR;
+Status instance_set_states(Instance *c, const char *function, const double x[], size_t count) {
+    if (!instance_counts(c, function, count, STATES)) return ERROR;
     for (int i = 0; i < STATES; i++)
-        if (!isfinite(x[i]))
-            return instance_say(c, DISCARD, "%s: a state is not finite", function);
+        if (!isfinite(x[i])) return instance_say(c, DISCARD, "%s: a state is not finite", function);
     memcpy(c->s.plant.x, x, sizeof c->s.plant.x);
     c->stale = true;
     return OK;
 }
 
 /* Make sure that the state follows from what is given, for what is read in initialisation mode. */
-static Status begun(Instance *c, const char *function)
-{
+static Status begun(Instance *c, const char *function) {
     char sentence[SENTENCE];
-    if (c->s.plant.begun != 0.0)
-        return OK;
+    if (c->s.plant.begun != 0.0) return OK;
     Reason reason = plant_begin(&c->s.plant, sentence);
-    if (reason == GOOD)
-        return OK;
+    if (reason == GOOD) return OK;
     note(c, reason, sentence);
     return instance_say(c, ERROR, "%s: %s", function, sentence);
 }
 
-Status instance_get_states(Instance *c, const char *function, What what, double values[], size_t count)
-{
+Status instance_get_states(Instance *c, const char *function, What what, double values[], size_t count) {
     double derivative[STATES], margin;
     const double *found = what == VALUES ? c->s.plant.x : what == NOMINALS ? c->s.plant.scale : derivative;
-    if (!instance_counts(c, function, count, what == INDICATORS ? 1 : STATES) || begun(c, function) != OK)
-        return ERROR;
+    if (!instance_counts(c, function, count, what == INDICATORS ? 1 : STATES) || begun(c, function) != OK) return ERROR;
     if (what == INDICATORS) {
         margin = plant_margin(&c->s.plant);
         found = &margin;
@@ -461,53 +400,40 @@ Status instance_get_states(Instance *c, const char *function, What what, double 
 
 /* Derivatives */
 
-int instance_state(unsigned reference)
-{
+int instance_state(unsigned reference) {
     for (int i = 0; i < STATES; i++)
-        if (state_at[i] == (int)reference)
-            return i;
+        if (state_at[i] == (int)reference) return i;
     return -1;
 }
 
 /* Whether a variable can be changed in the present state: what is given, and the state itself in model exchange. */
-static bool known(Instance *c, const char *function, unsigned reference, bool start)
-{
+static bool known(Instance *c, const char *function, unsigned reference, bool start) {
     const Variable *v = variable(c, function, reference, REAL);
-    if (!v)
-        return false;
+    if (!v) return false;
     bool state = v->causality == COMPUTED && !start && c->interface == MODEL_EXCHANGE && instance_state(reference) >= 0;
-    if (state || v->causality == INPUT || (v->causality == PARAMETER && start))
-        return true;
+    if (state || v->causality == INPUT || (v->causality == PARAMETER && start)) return true;
     instance_say(c, ERROR, "%s: %s is no known of a derivative %s", function, v->name, phase_name((int)c->s.phase));
     return false;
 }
 
-static bool unknown(Instance *c, const char *function, unsigned reference)
-{
+static bool unknown(Instance *c, const char *function, unsigned reference) {
     const Variable *v = variable(c, function, reference, REAL);
-    if (v && v->causality != COMPUTED)
-        instance_say(c, ERROR, "%s: %s is no unknown of a derivative", function, v->name);
+    if (v && v->causality != COMPUTED) instance_say(c, ERROR, "%s: %s is no unknown of a derivative", function, v->name);
     return v && v->causality == COMPUTED;
 }
 
-Status instance_directional(
-    Instance *c, const char *function, bool adjoint, const unsigned unknowns[], size_t unknown_count, const unsigned knowns[],
-    size_t known_count, const double seed[], double result[])
-{
+Status instance_directional(Instance *c, const char *function, bool adjoint, const unsigned unknowns[], size_t unknown_count,
+                            const unsigned knowns[], size_t known_count, const double seed[], double result[]) {
     const Plant *a = &c->s.plant;
     bool start = (int)c->s.phase == INITIALIZATION, commanded[ROOM(COMMANDS)] = {false};
     double given[VARIABLES] = {0}, x[STATES] = {0}, rows[ROWS] = {0};
     for (size_t i = 0; i < known_count; i++)
-        if (!known(c, function, knowns[i], start))
-            return ERROR;
+        if (!known(c, function, knowns[i], start)) return ERROR;
     for (size_t i = 0; i < unknown_count; i++)
-        if (!unknown(c, function, unknowns[i]))
-            return ERROR;
-    if (begun(c, function) != OK)
-        return ERROR;
+        if (!unknown(c, function, unknowns[i])) return ERROR;
+    if (begun(c, function) != OK) return ERROR;
     if (adjoint) {
-        for (size_t i = 0; i < unknown_count; i++)
-            rows[variables[unknowns[i]].row] += seed[i];
+        for (size_t i = 0; i < unknown_count; i++) rows[variables[unknowns[i]].row] += seed[i];
         for (size_t i = 0; i < known_count; i++)
             for (int k = 0; k < COMMANDS; k++)
                 commanded[k] |= c->interface == CO_SIMULATION && input_at[commands[k].input] == (int)knowns[i];
@@ -525,8 +451,7 @@ Status instance_directional(
     for (size_t i = 0; i < (adjoint ? known_count : unknown_count); i++) {
         int state = adjoint && !start ? instance_state(knowns[i]) : -1;
         result[i] = !adjoint ? rows[variables[unknowns[i]].row] : state >= 0 ? x[state] : given[knowns[i]];
-        if (!isfinite(result[i]))
-            return instance_say(c, DISCARD, "%s: a derivative is not finite", function);
+        if (!isfinite(result[i])) return instance_say(c, DISCARD, "%s: a derivative is not finite", function);
     }
     return OK;
 }

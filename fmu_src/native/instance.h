@@ -36,8 +36,8 @@ typedef struct Instance Instance;
 typedef struct {
     Plant plant;
     double phase;
-    double step;           /* the reason of the last step */
-    double reason, cause;  /* solver.status; the first reason since the last good step, other than steps out of order */
+    double step;          /* the reason of the last step */
+    double reason, cause; /* solver.status; the first reason since the last good step, other than steps out of order */
     char message[SENTENCE], cause_message[SENTENCE];
 } Saved;
 
@@ -46,16 +46,16 @@ typedef struct {
 struct Instance {
     Saved s;
     Interface interface;
-    int logging;           /* categories that are logged */
-    bool stale;            /* the outputs are older than state and inputs */
-    bool stopped;          /* an early return at the limit of assembly */
+    int logging;  /* categories that are logged */
+    bool stale;   /* the outputs are older than state and inputs */
+    bool stopped; /* an early return at the limit of assembly */
     char *name;
     void (*log)(const Instance *c, Status status, const char *category, const char *message);
     void *environment;
-    void (*logger)(void);         /* of the face's own type */
+    void (*logger)(void); /* of the face's own type */
     void (*update)(void);
     bool early_return;
-    char *text;            /* what the last get of a string returned */
+    char *text; /* what the last get of a string returned */
 };
 
 Instance *instance_new(const char *name, const char *token, Interface interface, bool logging, void *environment,
@@ -85,8 +85,8 @@ Status instance_get_text(Instance *c, const char *function, unsigned reference, 
 bool instance_may_set(Instance *c, const char *function, unsigned reference, Kind kind);
 void instance_set(Instance *c, unsigned reference, double value);
 Status instance_set_slope(Instance *c, const char *function, unsigned reference, int order, double slope);
-Status instance_output_slopes(
-    Instance *c, const char *function, const unsigned references[], size_t count, const int orders[], double values[]);
+Status instance_output_slopes(Instance *c, const char *function, const unsigned references[], size_t count, const int orders[],
+                              double values[]);
 
 /* The status of a call about `count` things of a kind that this FMU does not have. */
 Status instance_none(Instance *c, const char *function, size_t count);
@@ -103,9 +103,8 @@ Status instance_set_states(Instance *c, const char *function, const double x[], 
 Status instance_get_states(Instance *c, const char *function, What what, double values[], size_t count);
 
 /* Derivatives of unknowns with respect to knowns, times a change of these, or the unknowns' weights times them. */
-Status instance_directional(
-    Instance *c, const char *function, bool adjoint, const unsigned unknowns[], size_t unknown_count, const unsigned knowns[],
-    size_t known_count, const double seed[], double result[]);
+Status instance_directional(Instance *c, const char *function, bool adjoint, const unsigned unknowns[], size_t unknown_count,
+                            const unsigned knowns[], size_t known_count, const double seed[], double result[]);
 
 /* Saved state */
 Status instance_save(Instance *c, void **state);

@@ -20,26 +20,20 @@ typedef struct {
     const char *unit;
     Kind kind;
     Causality causality;
-    double start;            /* of a parameter or an input */
-    int row;                 /* of what is computed: its place among the rows, see below; of an input: its number */
+    double start; /* of a parameter or an input */
+    int row;      /* of what is computed: its place among the rows, see below; of an input: its number */
     Rule rule;
     double least, most;
     const char *requirement; /* what would be right, as the end of the sentence "it must ..." */
 } Variable;
 
 /* Rows of what is computed: outputs, state, derivative of the state, the event indicator, time. */
-enum {
-    STATE_ROW = OUTPUTS,
-    DERIVATIVE_ROW = STATE_ROW + STATES,
-    MARGIN_ROW = DERIVATIVE_ROW + STATES,
-    TIME_ROW,
-    ROWS
-};
+enum { STATE_ROW = OUTPUTS, DERIVATIVE_ROW = STATE_ROW + STATES, MARGIN_ROW = DERIVATIVE_ROW + STATES, TIME_ROW, ROWS };
 
 /* An input that commands the rate of a freedom, where the mode (-1: always) has the value. */
 typedef struct {
     int input, rate, mode, value;
-    int acceleration;        /* the input that is the rate of the command */
+    int acceleration; /* the input that is the rate of the command */
 } Command;
 
 /* A least value of a parameter that depends on others, as equations_bounds computes it; %g in the text stands for it. */
@@ -65,17 +59,17 @@ extern const Least least[ROOM(BOUNDS)];
    d: of a change, g: of a gradient. */
 typedef int Equation(const double **arguments, double **results, int *iw, double *w, int memory);
 
-Equation equations_bounds;         /* parameters -> bounds */
-Equation equations_begin;          /* m, parameters, state as given, u -> p, x, scale */
-Equation equations_begin_forward;  /* ..., dparameters, dstate, du -> dp, dx */
-Equation equations_begin_reverse;  /* ..., gp, gx -> gparameters, gstate, gu */
-Equation equations_derivative;     /* x, m, u, p -> x' */
-Equation equations_outputs;        /* x, m, u, p -> y */
-Equation equations_clearance;      /* x, m, u, p -> clearance */
-Equation equations_jump;           /* x, m, u, p -> x */
-Equation equations_jump_forward;   /* x, m, u, p, dx, du, dp -> dx */
-Equation equations_jump_reverse;   /* x, m, u, p, gx -> gx, gu, gp */
-Equation equations_forward;        /* x, m, u, p, dx, du, dp -> dy, dx', dclearance */
-Equation equations_reverse;        /* x, m, u, p, gy, gx', gclearance -> gx, gu, gp */
+Equation equations_bounds;        /* parameters -> bounds */
+Equation equations_begin;         /* m, parameters, state as given, u -> p, x, scale */
+Equation equations_begin_forward; /* ..., dparameters, dstate, du -> dp, dx */
+Equation equations_begin_reverse; /* ..., gp, gx -> gparameters, gstate, gu */
+Equation equations_derivative;    /* x, m, u, p -> x' */
+Equation equations_outputs;       /* x, m, u, p -> y */
+Equation equations_clearance;     /* x, m, u, p -> clearance */
+Equation equations_jump;          /* x, m, u, p -> x */
+Equation equations_jump_forward;  /* x, m, u, p, dx, du, dp -> dx */
+Equation equations_jump_reverse;  /* x, m, u, p, gx -> gx, gu, gp */
+Equation equations_forward;       /* x, m, u, p, dx, du, dp -> dy, dx', dclearance */
+Equation equations_reverse;       /* x, m, u, p, gy, gx', gclearance -> gx, gu, gp */
 
 #endif

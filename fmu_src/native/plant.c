@@ -9,58 +9,46 @@
 /* The least part of a step that is worth an early return. */
 #define LEAST_ADVANCE 1e-9
 
-const char *digits(Digits text, double value)
-{
+const char *digits(Digits text, double value) {
     snprintf(text, sizeof(Digits), "%.9g", value);
     for (char *c = text; *c; c++) /* the host may have a locale with a decimal comma */
-        if (*c == ',')
-            *c = '.';
+        if (*c == ',') *c = '.';
     return text;
 }
 
-static bool all_finite(const double values[], int count)
-{
+static bool all_finite(const double values[], int count) {
     for (int i = 0; i < count; i++)
-        if (!isfinite(values[i]))
-            return false;
+        if (!isfinite(values[i])) return false;
     return true;
 }
 
-static void call(Equation *equation, const double **arguments, double **results)
-{
+static void call(Equation *equation, const double **arguments, double **results) {
     equation(arguments, results, NULL, NULL, 0);
 }
 
 /* Inputs */
 
-static void inputs(const Plant *a, double u[ROOM(INPUTS)])
-{
-    for (int i = 0; i < INPUTS; i++)
-        u[i] = a->given[input_at[i]];
+static void inputs(const Plant *a, double u[ROOM(INPUTS)]) {
+    for (int i = 0; i < INPUTS; i++) u[i] = a->given[input_at[i]];
 }
 
 /* The inputs at a time after the beginning of a step; the slope of a command is the acceleration that it demands. */
-static void inputs_after(const Plant *a, double t, double u[ROOM(INPUTS)])
-{
-    for (int i = 0; i < INPUTS; i++)
-        u[i] = a->given[input_at[i]] + a->slopes[i] * t;
-    for (int c = 0; c < COMMANDS; c++)
-        u[commands[c].acceleration] += a->slopes[commands[c].input];
+static void inputs_after(const Plant *a, double t, double u[ROOM(INPUTS)]) {
+    for (int i = 0; i < INPUTS; i++) u[i] = a->given[input_at[i]] + a->slopes[i] * t;
+    for (int c = 0; c < COMMANDS; c++) u[commands[c].acceleration] += a->slopes[commands[c].input];
 }
 
-bool plant_commanded(const Plant *a, const Command *command)
-{
+bool plant_commanded(const Plant *a, const Command *command) {
     return command->mode < 0 || a->given[mode_at[command->mode]] == command->value;
 }
 
-static Reason check_inputs(const Plant *a, char sentence[SENTENCE])
-{
+static Reason check_inputs(const Plant *a, char sentence[SENTENCE]) {
     for (int i = 0; i < INPUTS; i++) {
         double value = a->given[input_at[i]];
         Digits number, time;
         if (!isfinite(value)) {
-            snprintf(sentence, SENTENCE, "input %s is %s at t = %s s: it must be a finite number",
-                     variables[input_at[i]].name, digits(number, value), digits(time, a->time));
+            snprintf(sentence, SENTENCE, "input %s is %s at t = %s s: it must be a finite number", variables[input_at[i]].name,
+                     digits(number, value), digits(time, a->time));
             return INPUT_NOT_FINITE;
         }
     }
@@ -69,13 +57,11 @@ static Reason check_inputs(const Plant *a, char sentence[SENTENCE])
 
 /* The equations at a state */
 
-static void derivative_of(const Plant *a, const double x[STATES], const double u[], double result[STATES])
-{
+static void derivative_of(const Plant *a, const double x[STATES], const double u[], double result[STATES]) {
     call(equations_derivative, (const double *[]){x, a->modes, u, a->p}, (double *[]){result});
 }
 
-static double clearance_of(const Plant *a, const double x[STATES])
-{
+static double clearance_of(const Plant *a, const double x[STATES]) {
     double u[ROOM(INPUTS)], result;
     inputs(a, u);
     call(equations_clearance, (const double *[]){x, a->modes, u, a->p}, (double *[]){&result});
@@ -83,56 +69,46 @@ static double clearance_of(const Plant *a, const double x[STATES])
 }
 
 /* Apply the commands marked; one that is in force and not marked keeps its rate. */
-static bool apply(const Plant *a, const bool marked[ROOM(COMMANDS)], double x[STATES])
-{
+static bool apply(const Plant *a, const bool marked[ROOM(COMMANDS)], double x[STATES]) {
     double u[ROOM(INPUTS)], result[STATES];
     bool any = false;
     inputs(a, u);
     for (int c = 0; c < COMMANDS; c++)
         if (plant_commanded(a, &commands[c])) {
             any |= marked[c];
-            if (!marked[c])
-                u[commands[c].input] = x[commands[c].rate];
+            if (!marked[c]) u[commands[c].input] = x[commands[c].rate];
         }
-    if (!any)
-        return false;
+    if (!any) return false;
     call(equations_jump, (const double *[]){x, a->modes, u, a->p}, (double *[]){result});
     memcpy(x, result, sizeof result);
     return true;
 }
 
-void plant_present(const Plant *a, double x[STATES])
-{
+void plant_present(const Plant *a, double x[STATES]) {
     bool marked[ROOM(COMMANDS)];
     memcpy(x, a->x, sizeof a->x);
-    for (int c = 0; c < COMMANDS; c++)
-        marked[c] = a->fresh[c] != 0.0;
+    for (int c = 0; c < COMMANDS; c++) marked[c] = a->fresh[c] != 0.0;
     apply(a, marked, x);
 }
 
-bool plant_jump(Plant *a)
-{
+bool plant_jump(Plant *a) {
     bool marked[ROOM(COMMANDS)];
     for (int c = 0; c < COMMANDS; c++) {
         double value = a->given[input_at[commands[c].input]];
         marked[c] = isfinite(value) && value != a->applied[c]; /* the state stays good: solver.status tells of the input */
-        if (marked[c])
-            a->applied[c] = value;
+        if (marked[c]) a->applied[c] = value;
     }
     return apply(a, marked, a->x);
 }
 
 /* The beginning */
 
-void plant_reset(Plant *a)
-{
+void plant_reset(Plant *a) {
     *a = (Plant){.stop_time = INFINITY};
-    for (int v = 0; v < VARIABLES; v++)
-        a->given[v] = variables[v].start;
+    for (int v = 0; v < VARIABLES; v++) a->given[v] = variables[v].start;
 }
 
-static void configuration(const double x[STATES], char text[SENTENCE])
-{
+static void configuration(const double x[STATES], char text[SENTENCE]) {
     int end = 0;
     text[0] = 0;
     for (int i = 0; i < FREEDOMS && end < SENTENCE; i++) {
@@ -144,18 +120,15 @@ static void configuration(const double x[STATES], char text[SENTENCE])
     }
 }
 
-static Reason bad_parameter(int reference, double value, const char *requirement, char sentence[SENTENCE])
-{
+static Reason bad_parameter(int reference, double value, const char *requirement, char sentence[SENTENCE]) {
     Digits number;
     snprintf(sentence, SENTENCE, "parameter %s is %s: it must %s", variables[reference].name, digits(number, value),
              requirement);
     return BAD_PARAMETER;
 }
 
-static bool keeps(const Variable *v, double value)
-{
-    if (!isfinite(value))
-        return false;
+static bool keeps(const Variable *v, double value) {
+    if (!isfinite(value)) return false;
     switch (v->rule) {
     case NOT_NEGATIVE: return value >= 0.0;
     case POSITIVE: return value > 0.0;
@@ -165,14 +138,12 @@ static bool keeps(const Variable *v, double value)
     }
 }
 
-static Reason check_parameters(const Plant *a, char sentence[SENTENCE])
-{
+static Reason check_parameters(const Plant *a, char sentence[SENTENCE]) {
     double own[ROOM(PARAMETERS)], bounds[ROOM(BOUNDS)];
     for (int v = 0; v < VARIABLES; v++)
         if (variables[v].causality == PARAMETER && !keeps(&variables[v], a->given[v]))
             return bad_parameter(v, a->given[v], variables[v].requirement, sentence);
-    for (int i = 0; i < PARAMETERS; i++)
-        own[i] = a->given[parameter_at[i]];
+    for (int i = 0; i < PARAMETERS; i++) own[i] = a->given[parameter_at[i]];
     call(equations_bounds, (const double *[]){own}, (double *[]){bounds});
     for (int i = 0; i < BOUNDS; i++)
         if (own[least[i].parameter] < bounds[i]) {
@@ -188,8 +159,7 @@ static Reason check_parameters(const Plant *a, char sentence[SENTENCE])
 }
 
 /* The parameter of the most extreme order of magnitude is to blame for constants that are not finite. */
-static Reason blame_extreme(const Plant *a, char sentence[SENTENCE])
-{
+static Reason blame_extreme(const Plant *a, char sentence[SENTENCE]) {
     int extreme = parameter_at[0];
     double most = -1.0;
     for (int i = 0; i < PARAMETERS; i++) {
@@ -200,52 +170,40 @@ static Reason blame_extreme(const Plant *a, char sentence[SENTENCE])
         }
     }
     bool large = fabs(a->given[extreme]) > 1.0;
-    return bad_parameter(extreme, a->given[extreme],
-                         large ? "be small enough for finite moments of inertia" : "be large enough for finite moments of inertia",
-                         sentence);
+    return bad_parameter(
+        extreme, a->given[extreme],
+        large ? "be small enough for finite moments of inertia" : "be large enough for finite moments of inertia", sentence);
 }
 
-static Reason check_assembly(double clearance, const double x[STATES], char sentence[SENTENCE])
-{
+static Reason check_assembly(double clearance, const double x[STATES], char sentence[SENTENCE]) {
     char where[SENTENCE];
-    if (clearance >= LIMIT_CLEARANCE)
-        return GOOD;
+    if (clearance >= LIMIT_CLEARANCE) return GOOD;
     configuration(x, where);
     snprintf(sentence, SENTENCE, clearance >= 0.0 ? "limit of assembly at %s" : "the links cannot be joined at %s", where);
     return LIMIT_OF_ASSEMBLY;
 }
 
-static void what_begins(const Plant *a, double own[ROOM(PARAMETERS)], double state[2 * FREEDOMS], double u[ROOM(INPUTS)])
-{
-    for (int i = 0; i < PARAMETERS; i++)
-        own[i] = a->given[parameter_at[i]];
-    for (int i = 0; i < 2 * FREEDOMS; i++)
-        state[i] = a->given[initial_at[i]];
+static void what_begins(const Plant *a, double own[ROOM(PARAMETERS)], double state[2 * FREEDOMS], double u[ROOM(INPUTS)]) {
+    for (int i = 0; i < PARAMETERS; i++) own[i] = a->given[parameter_at[i]];
+    for (int i = 0; i < 2 * FREEDOMS; i++) state[i] = a->given[initial_at[i]];
     inputs(a, u);
     for (int c = 0; c < COMMANDS; c++)
-        if (plant_commanded(a, &commands[c]))
-            state[commands[c].rate] = u[commands[c].input];
+        if (plant_commanded(a, &commands[c])) state[commands[c].rate] = u[commands[c].input];
 }
 
-Reason plant_begin(Plant *a, char sentence[SENTENCE])
-{
+Reason plant_begin(Plant *a, char sentence[SENTENCE]) {
     double own[ROOM(PARAMETERS)], state[2 * FREEDOMS], u[ROOM(INPUTS)];
     a->begun = 0.0;
     a->time = a->start_time;
     Reason reason = check_parameters(a, sentence);
-    if (reason == GOOD)
-        reason = check_inputs(a, sentence);
-    if (reason != GOOD)
-        return reason;
-    for (int i = 0; i < MODES; i++)
-        a->modes[i] = a->given[mode_at[i]];
+    if (reason == GOOD) reason = check_inputs(a, sentence);
+    if (reason != GOOD) return reason;
+    for (int i = 0; i < MODES; i++) a->modes[i] = a->given[mode_at[i]];
     what_begins(a, own, state, u);
     call(equations_begin, (const double *[]){a->modes, own, state, u}, (double *[]){a->p, a->x, a->scale});
-    if (!all_finite(a->p, CONSTANTS - 1))
-        return blame_extreme(a, sentence);
+    if (!all_finite(a->p, CONSTANTS - 1)) return blame_extreme(a, sentence);
     reason = check_assembly(clearance_of(a, a->x), a->x, sentence);
-    if (reason != GOOD)
-        return reason;
+    if (reason != GOOD) return reason;
     if (!all_finite(a->p, CONSTANTS)) {
         char where[SENTENCE];
         configuration(a->x, where);
@@ -253,8 +211,7 @@ Reason plant_begin(Plant *a, char sentence[SENTENCE])
         return INPUT_NOT_FINITE;
     }
     a->tolerance = a->given[tolerance_at];
-    if (a->master_tolerance > 0.0)
-        a->tolerance = fmin(a->tolerance, fmax(a->master_tolerance, LEAST_TOLERANCE));
+    if (a->master_tolerance > 0.0) a->tolerance = fmin(a->tolerance, fmax(a->master_tolerance, LEAST_TOLERANCE));
     a->step_size = 0.0;
     for (int c = 0; c < COMMANDS; c++) {
         a->fresh[c] = 0.0;
@@ -270,16 +227,13 @@ typedef double Stages[STAGES][STATES];
 
 /* One step of size h from x at a time after the beginning, with k[0] its slope there: the new state, and the error relative to
    the scale, not a number where the equations are not defined. */
-static double attempt(const Plant *a, double t, const double x[STATES], double h, Stages k, double result[STATES])
-{
+static double attempt(const Plant *a, double t, const double x[STATES], double h, Stages k, double result[STATES]) {
     double u[ROOM(INPUTS)], sum5 = 0.0, sum3 = 0.0;
     for (int stage = 1; stage <= STAGES; stage++) {
         double sum[STATES] = {0.0};
         for (int w = A_ROW[stage]; w < A_ROW[stage + 1]; w++)
-            for (int i = 0; i < STATES; i++)
-                sum[i] += A_WEIGHT[w] * k[A_STAGE[w]][i];
-        for (int i = 0; i < STATES; i++)
-            result[i] = x[i] + h * sum[i];
+            for (int i = 0; i < STATES; i++) sum[i] += A_WEIGHT[w] * k[A_STAGE[w]][i];
+        for (int i = 0; i < STATES; i++) result[i] = x[i] + h * sum[i];
         if (stage < STAGES) {
             inputs_after(a, t + C[stage] * h, u);
             derivative_of(a, result, u, k[stage]);
@@ -297,26 +251,21 @@ static double attempt(const Plant *a, double t, const double x[STATES], double h
         sum5 += error5 * error5;
         sum3 += error3 * error3;
     }
-    if (!all_finite(result, STATES))
-        return NAN; /* an infinite component has no error relative to itself */
+    if (!all_finite(result, STATES)) return NAN; /* an infinite component has no error relative to itself */
     double denominator = sum5 + 0.01 * sum3;
-    if (denominator == 0.0)
-        return 0.0;
+    if (denominator == 0.0) return 0.0;
     return fabs(h) * sum5 / sqrt(denominator * STATES);
 }
 
 /* A cautious first step: one hundredth of the time in which the state would change by its own size. */
-static double first_step(const Plant *a, const double x[STATES], const double slope[STATES], double duration)
-{
+static double first_step(const Plant *a, const double x[STATES], const double slope[STATES], double duration) {
     double ratio = 0.0;
-    for (int i = 0; i < STATES; i++)
-        ratio = fmax(ratio, fabs(slope[i]) / (a->scale[i] + fabs(x[i])));
+    for (int i = 0; i < STATES; i++) ratio = fmax(ratio, fabs(slope[i]) / (a->scale[i] + fabs(x[i])));
     return ratio == 0.0 ? duration : fmin(duration, pow(a->tolerance, 1.0 / ORDER) / ratio);
 }
 
 /* The longest part of a step h from x that stays clear of the limit of assembly: it is written to x. */
-static double up_to_limit(const Plant *a, double t, double x[STATES], double h, Stages k)
-{
+static double up_to_limit(const Plant *a, double t, double x[STATES], double h, Stages k) {
     double low = 0.0, high = h, best[STATES], tried[STATES];
     memcpy(best, x, sizeof best);
     while (high - low > 1e-15 * h) {
@@ -333,8 +282,7 @@ static double up_to_limit(const Plant *a, double t, double x[STATES], double h, 
     return low;
 }
 
-static Reason not_met(const Plant *a, const double x[STATES], double time, const char *cause, char sentence[SENTENCE])
-{
+static Reason not_met(const Plant *a, const double x[STATES], double time, const char *cause, char sentence[SENTENCE]) {
     char where[SENTENCE];
     Digits number;
     configuration(x, where);
@@ -348,23 +296,19 @@ static Reason not_met(const Plant *a, const double x[STATES], double time, const
 }
 
 /* Let the watch see the state reached, and take what it changed: inputs, commands, the end of the step. */
-static void look(Plant *a, double x[STATES], double time, double done, double *duration, const Watch *watch)
-{
+static void look(Plant *a, double x[STATES], double time, double done, double *duration, const Watch *watch) {
     double end = time + *duration;
     memcpy(a->x, x, sizeof a->x);
     a->time = time + done;
     watch->call(watch->context, a, &end);
     plant_present(a, x);
     memset(a->fresh, 0, sizeof a->fresh);
-    if (end < time + *duration)
-        *duration = fmax(done, end - time);
+    if (end < time + *duration) *duration = fmax(done, end - time);
 }
 
 /* Integrate x over a duration, which watch and limit may shorten. */
-static Reason integrate(
-    Plant *a, double x[STATES], double time, double *duration, const Watch *watch, bool early, Reason *ended,
-    char sentence[SENTENCE])
-{
+static Reason integrate(Plant *a, double x[STATES], double time, double *duration, const Watch *watch, bool early,
+                        Reason *ended, char sentence[SENTENCE]) {
     Stages k;
     double u[ROOM(INPUTS)], result[STATES], slope[STATES], done = 0.0;
     char cause[SENTENCE];
@@ -372,8 +316,7 @@ static Reason integrate(
     Reason reason;
     inputs_after(a, 0.0, u);
     derivative_of(a, x, u, k[0]);
-    if (!all_finite(k[0], STATES))
-        return not_met(a, x, time, "the accelerations are not finite", sentence);
+    if (!all_finite(k[0], STATES)) return not_met(a, x, time, "the accelerations are not finite", sentence);
     double proposal = a->step_size > 0.0 ? a->step_size : first_step(a, x, k[0], *duration);
     for (int steps = 1;; steps++) {
         double remaining = *duration - done;
@@ -389,14 +332,12 @@ static Reason integrate(
         if (error <= 1.0 && !last) {
             inputs_after(a, done + h, u);
             derivative_of(a, result, u, slope);
-            if (!all_finite(slope, STATES))
-                error = NAN;
+            if (!all_finite(slope, STATES)) error = NAN;
         }
         if (error <= 1.0) {
             reason = check_assembly(clearance_of(a, result), result, cause);
             if (reason != GOOD) {
-                if (early)
-                    done += up_to_limit(a, done, x, h, k);
+                if (early) done += up_to_limit(a, done, x, h, k);
                 snprintf(sentence, SENTENCE, "in the step from t = %s s: %s", digits(first, time), cause);
                 break;
             }
@@ -405,45 +346,39 @@ static Reason integrate(
             proposal = h < proposal ? fmax(proposal, factor * h) : fmax(LEAST_FACTOR, factor) * h;
             memcpy(x, result, sizeof result);
             a->step_size = proposal;
-            if (last)
-                return GOOD;
+            if (last) return GOOD;
             done += h;
             memcpy(k[0], slope, sizeof slope);
             if (watch) {
                 look(a, x, time, done, duration, watch);
-                if (*duration <= done)
-                    return GOOD;
+                if (*duration <= done) return GOOD;
                 reason = check_inputs(a, sentence);
-                if (reason != GOOD)
-                    return reason;
+                if (reason != GOOD) return reason;
                 inputs_after(a, done, u);
                 derivative_of(a, x, u, k[0]);
             }
         } else {
             proposal = h * (isfinite(error) ? fmax(LEAST_FACTOR, SAFETY * pow(error, -1.0 / ORDER)) : 0.25);
             if (proposal < LEAST_STEP * *duration) {
-                snprintf(cause, SENTENCE, "the step size fell to %s s, %s s into an interval of %s s",
-                         digits(third, proposal), digits(first, done), digits(second, *duration));
+                snprintf(cause, SENTENCE, "the step size fell to %s s, %s s into an interval of %s s", digits(third, proposal),
+                         digits(first, done), digits(second, *duration));
                 reason = not_met(a, x, time, cause, sentence);
                 break;
             }
         }
     }
-    if (!early || reason != LIMIT_OF_ASSEMBLY || done < LEAST_ADVANCE * *duration)
-        return reason;
+    if (!early || reason != LIMIT_OF_ASSEMBLY || done < LEAST_ADVANCE * *duration) return reason;
     *ended = LIMIT_OF_ASSEMBLY;
     *duration = done;
     return GOOD;
 }
 
-static Reason check_step(const Plant *a, double time, double step, char sentence[SENTENCE])
-{
+static Reason check_step(const Plant *a, double time, double step, char sentence[SENTENCE]) {
     /* what rounding in the master's own sum of steps can make, and no more */
     double greater = fmax(fabs(time), fabs(a->time));
     double slack = fmin(1e-6 * step, 1e-9) + 8.0 * (nextafter(greater, INFINITY) - greater);
     bool numbers = isfinite(time) && isfinite(step);
-    if (numbers && step > 0.0 && fabs(time - a->time) <= slack)
-        return GOOD;
+    if (numbers && step > 0.0 && fabs(time - a->time) <= slack) return GOOD;
     Digits at, of, own;
     digits(at, time);
     digits(of, step);
@@ -457,17 +392,14 @@ static Reason check_step(const Plant *a, double time, double step, char sentence
     return STEP_OUT_OF_ORDER;
 }
 
-Reason plant_step(Plant *a, double time, double step, const Watch *watch, bool early, Reason *ended, char sentence[SENTENCE])
-{
+Reason plant_step(Plant *a, double time, double step, const Watch *watch, bool early, Reason *ended, char sentence[SENTENCE]) {
     Plant before = *a;
     double x[STATES], duration = step;
     bool all[ROOM(COMMANDS)];
     *ended = GOOD;
     Reason reason = check_step(a, time, step, sentence);
-    if (reason == GOOD)
-        reason = check_inputs(a, sentence);
-    if (reason != GOOD)
-        return reason;
+    if (reason == GOOD) reason = check_inputs(a, sentence);
+    if (reason != GOOD) return reason;
     for (int c = 0; c < COMMANDS; c++)
         all[c] = true; /* a command that was not set again: the step starts from it all the same, as the contract says */
     memcpy(x, a->x, sizeof x);
@@ -491,12 +423,10 @@ Reason plant_step(Plant *a, double time, double step, const Watch *watch, bool e
 
 /* What is computed */
 
-Reason plant_outputs(Plant *a, char sentence[SENTENCE])
-{
+Reason plant_outputs(Plant *a, char sentence[SENTENCE]) {
     double x[STATES], u[ROOM(INPUTS)], y[ROOM(OUTPUTS)];
     Reason reason = check_inputs(a, sentence);
-    if (reason != GOOD)
-        return reason;
+    if (reason != GOOD) return reason;
     plant_present(a, x);
     inputs(a, u);
     call(equations_outputs, (const double *[]){x, a->modes, u, a->p}, (double *[]){y});
@@ -504,11 +434,9 @@ Reason plant_outputs(Plant *a, char sentence[SENTENCE])
         int largest = 0;
         Digits time, number;
         reason = check_assembly(clearance_of(a, x), x, sentence);
-        if (reason != GOOD)
-            return reason;
+        if (reason != GOOD) return reason;
         for (int i = 1; i < INPUTS; i++)
-            if (fabs(u[i]) > fabs(u[largest]))
-                largest = i;
+            if (fabs(u[i]) > fabs(u[largest])) largest = i;
         snprintf(sentence, SENTENCE, "an output is not finite at t = %s s: input %s is %s, too large", digits(time, a->time),
                  variables[input_at[largest]].name, digits(number, u[largest]));
         return INPUT_NOT_FINITE;
@@ -517,8 +445,7 @@ Reason plant_outputs(Plant *a, char sentence[SENTENCE])
     return GOOD;
 }
 
-bool plant_derivative(const Plant *a, double derivative[STATES])
-{
+bool plant_derivative(const Plant *a, double derivative[STATES]) {
     double x[STATES], u[ROOM(INPUTS)];
     plant_present(a, x);
     inputs(a, u);
@@ -526,50 +453,42 @@ bool plant_derivative(const Plant *a, double derivative[STATES])
     return all_finite(derivative, STATES);
 }
 
-double plant_margin(const Plant *a)
-{
+double plant_margin(const Plant *a) {
     return clearance_of(a, a->x) - LIMIT_CLEARANCE;
 }
 
 /* Derivatives of what is computed */
 
 /* The commands that a change of the inputs applies: those set since the last step, and those that change. */
-static bool commanded_state(const Plant *a, const bool changed[ROOM(COMMANDS)], double u[ROOM(INPUTS)], bool marked[ROOM(COMMANDS)])
-{
+static bool commanded_state(const Plant *a, const bool changed[ROOM(COMMANDS)], double u[ROOM(INPUTS)],
+                            bool marked[ROOM(COMMANDS)]) {
     bool any = false;
     inputs(a, u);
     for (int c = 0; c < COMMANDS; c++) {
         marked[c] = plant_commanded(a, &commands[c]) && (changed[c] || a->fresh[c] != 0.0);
-        if (plant_commanded(a, &commands[c]) && !marked[c])
-            u[commands[c].input] = a->x[commands[c].rate];
+        if (plant_commanded(a, &commands[c]) && !marked[c]) u[commands[c].input] = a->x[commands[c].rate];
         any |= marked[c];
     }
     return any;
 }
 
-void plant_forward(
-    const Plant *a, bool start, bool commanding, const double given[VARIABLES], const double x[STATES], double rows[ROWS])
-{
+void plant_forward(const Plant *a, bool start, bool commanding, const double given[VARIABLES], const double x[STATES],
+                   double rows[ROWS]) {
     double u[ROOM(INPUTS)], du[ROOM(INPUTS)], dp[CONSTANTS] = {0}, dx[STATES], after[STATES], dafter[STATES];
     bool changed[ROOM(COMMANDS)], marked[ROOM(COMMANDS)];
-    for (int i = 0; i < INPUTS; i++)
-        du[i] = given[input_at[i]];
+    for (int i = 0; i < INPUTS; i++) du[i] = given[input_at[i]];
     memcpy(after, a->x, sizeof after);
     memcpy(dx, x, sizeof dx);
     if (start) {
         double own[ROOM(PARAMETERS)], state[2 * FREEDOMS], down[ROOM(PARAMETERS)], dstate[2 * FREEDOMS];
         what_begins(a, own, state, u);
-        for (int i = 0; i < PARAMETERS; i++)
-            down[i] = given[parameter_at[i]];
-        for (int i = 0; i < 2 * FREEDOMS; i++)
-            dstate[i] = given[initial_at[i]];
+        for (int i = 0; i < PARAMETERS; i++) down[i] = given[parameter_at[i]];
+        for (int i = 0; i < 2 * FREEDOMS; i++) dstate[i] = given[initial_at[i]];
         for (int c = 0; c < COMMANDS; c++)
-            if (plant_commanded(a, &commands[c]))
-                dstate[commands[c].rate] = du[commands[c].input];
+            if (plant_commanded(a, &commands[c])) dstate[commands[c].rate] = du[commands[c].input];
         call(equations_begin_forward, (const double *[]){a->modes, own, state, u, down, dstate, du}, (double *[]){dp, dx});
     } else {
-        for (int c = 0; c < COMMANDS; c++)
-            changed[c] = commanding && du[commands[c].input] != 0.0;
+        for (int c = 0; c < COMMANDS; c++) changed[c] = commanding && du[commands[c].input] != 0.0;
         if (commanded_state(a, changed, u, marked)) {
             /* no state is a known here: it is in model exchange alone, where events apply the commands */
             call(equations_jump, (const double *[]){a->x, a->modes, u, a->p}, (double *[]){after});
@@ -584,46 +503,37 @@ void plant_forward(
     rows[TIME_ROW] = 0.0;
 }
 
-void plant_reverse(
-    const Plant *a, bool start, const double rows[ROWS], const bool commanded[ROOM(COMMANDS)], double given[VARIABLES],
-    double x[STATES])
-{
+void plant_reverse(const Plant *a, bool start, const double rows[ROWS], const bool commanded[ROOM(COMMANDS)],
+                   double given[VARIABLES], double x[STATES]) {
     double u[ROOM(INPUTS)], gu[ROOM(INPUTS)], gp[CONSTANTS], after[STATES];
     bool marked[ROOM(COMMANDS)];
     bool jumps = !start && commanded_state(a, commanded, u, marked);
     memset(given, 0, VARIABLES * sizeof *given);
     memcpy(after, a->x, sizeof after);
-    if (jumps)
-        call(equations_jump, (const double *[]){a->x, a->modes, u, a->p}, (double *[]){after});
+    if (jumps) call(equations_jump, (const double *[]){a->x, a->modes, u, a->p}, (double *[]){after});
     inputs(a, u);
-    call(equations_reverse,
-         (const double *[]){after, a->modes, u, a->p, rows, rows + DERIVATIVE_ROW, rows + MARGIN_ROW}, (double *[]){x, gu, gp});
-    for (int i = 0; i < STATES; i++)
-        x[i] += rows[STATE_ROW + i];
-    for (int i = 0; i < INPUTS; i++)
-        given[input_at[i]] = gu[i];
+    call(equations_reverse, (const double *[]){after, a->modes, u, a->p, rows, rows + DERIVATIVE_ROW, rows + MARGIN_ROW},
+         (double *[]){x, gu, gp});
+    for (int i = 0; i < STATES; i++) x[i] += rows[STATE_ROW + i];
+    for (int i = 0; i < INPUTS; i++) given[input_at[i]] = gu[i];
     if (jumps) {
         double before[STATES], gjump[ROOM(INPUTS)], unused[CONSTANTS];
         commanded_state(a, commanded, u, marked);
         call(equations_jump_reverse, (const double *[]){a->x, a->modes, u, a->p, x}, (double *[]){before, gjump, unused});
         for (int c = 0; c < COMMANDS; c++)
-            if (marked[c])
-                given[input_at[commands[c].input]] += gjump[commands[c].input];
+            if (marked[c]) given[input_at[commands[c].input]] += gjump[commands[c].input];
     }
     if (start) {
         double own[ROOM(PARAMETERS)], state[2 * FREEDOMS], gown[ROOM(PARAMETERS)], gstate[2 * FREEDOMS];
         what_begins(a, own, state, u);
         call(equations_begin_reverse, (const double *[]){a->modes, own, state, u, gp, x}, (double *[]){gown, gstate, gu});
-        for (int i = 0; i < INPUTS; i++)
-            given[input_at[i]] += gu[i];
-        for (int i = 0; i < PARAMETERS; i++)
-            given[parameter_at[i]] += gown[i];
+        for (int i = 0; i < INPUTS; i++) given[input_at[i]] += gu[i];
+        for (int i = 0; i < PARAMETERS; i++) given[parameter_at[i]] += gown[i];
         for (int c = 0; c < COMMANDS; c++)
             if (plant_commanded(a, &commands[c])) {
                 given[input_at[commands[c].input]] += gstate[commands[c].rate];
                 gstate[commands[c].rate] = 0.0;
             }
-        for (int i = 0; i < 2 * FREEDOMS; i++)
-            given[initial_at[i]] += gstate[i];
+        for (int i = 0; i < 2 * FREEDOMS; i++) given[initial_at[i]] += gstate[i];
     }
 }

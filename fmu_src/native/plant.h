@@ -10,26 +10,32 @@ enum { SENTENCE = 400 };
 
 /* solver.status */
 typedef enum {
-    GOOD, STEP_OUT_OF_ORDER, INPUT_NOT_FINITE, LIMIT_OF_ASSEMBLY, TOLERANCE_NOT_MET, NOT_INITIALISED, BAD_PARAMETER,
+    GOOD,
+    STEP_OUT_OF_ORDER,
+    INPUT_NOT_FINITE,
+    LIMIT_OF_ASSEMBLY,
+    TOLERANCE_NOT_MET,
+    NOT_INITIALISED,
+    BAD_PARAMETER,
     INTERNAL = 9
 } Reason;
 
 /* Numbers alone: a saved state is a copy of it. */
 typedef struct {
-    double given[VARIABLES];        /* parameters and inputs, by value reference */
-    double slopes[ROOM(INPUTS)];    /* rates of change of the inputs over the next step */
+    double given[VARIABLES];     /* parameters and inputs, by value reference */
+    double slopes[ROOM(INPUTS)]; /* rates of change of the inputs over the next step */
     double last_slopes[ROOM(INPUTS)];
     double fresh[ROOM(COMMANDS)];   /* 1 where the command was set since the last step (co-simulation) */
     double applied[ROOM(COMMANDS)]; /* the commands as the state has them (model exchange) */
     double modes[ROOM(MODES)];
     double p[CONSTANTS];
     double x[STATES];
-    double scale[STATES];           /* magnitudes below which the error of a component is absolute */
-    double outputs[OUTPUTS];        /* the last that could be computed */
-    double derivative[STATES];      /* likewise */
-    double begun;                   /* 1 where state and constants follow from what is given */
+    double scale[STATES];               /* magnitudes below which the error of a component is absolute */
+    double outputs[OUTPUTS];            /* the last that could be computed */
+    double derivative[STATES];          /* likewise */
+    double begun;                       /* 1 where state and constants follow from what is given */
     double time, start_time, stop_time; /* infinite: none */
-    double master_tolerance;        /* 0: none */
+    double master_tolerance;            /* 0: none */
     double tolerance, step_size;
 } Plant;
 
@@ -65,13 +71,12 @@ double plant_margin(const Plant *a);
 
 /* Changes of all rows with those of what is given (by value reference) and of the state; `start`: at the start of a run, where
    state and constants follow from what is given; `commanding`: a change of a command that is in force applies it. */
-void plant_forward(
-    const Plant *a, bool start, bool commanding, const double given[VARIABLES], const double x[STATES], double rows[ROWS]);
+void plant_forward(const Plant *a, bool start, bool commanding, const double given[VARIABLES], const double x[STATES],
+                   double rows[ROWS]);
 
 /* The gradient of a weighted sum of rows; `commanded` as the commands whose inputs it is asked for. */
-void plant_reverse(
-    const Plant *a, bool start, const double rows[ROWS], const bool commanded[ROOM(COMMANDS)], double given[VARIABLES],
-    double x[STATES]);
+void plant_reverse(const Plant *a, bool start, const double rows[ROWS], const bool commanded[ROOM(COMMANDS)],
+                   double given[VARIABLES], double x[STATES]);
 
 /* A number in words, with a decimal point where the host's locale has a comma. */
 typedef char Digits[32];

@@ -13,18 +13,16 @@
 
 static const char hexadecimal[] = "0123456789abcdef";
 
-Status instance_save(Instance *c, void **state)
-{
+Status instance_save(Instance *c, void **state) {
     Saved *saved = *state ? *state : malloc(sizeof *saved);
-    if (!saved) /* no memory */
+    if (!saved)                                                                /* no memory */
         return instance_say(c, ERROR, "there is no memory for a saved state"); /* no memory */
     *saved = c->s;
     *state = saved;
     return OK;
 }
 
-Status instance_restore(Instance *c, const void *state)
-{
+Status instance_restore(Instance *c, const void *state) {
     const Saved *saved = state;
     if ((int)saved->phase & (c->interface == CO_SIMULATION ? EVENT | CONTINUOUS : STEP))
         return instance_say(c, ERROR, "the saved state is not one of %s",
@@ -40,21 +38,17 @@ typedef struct {
     size_t size;
 } Out;
 
-static void put(Out *out, const char *text)
-{
+static void put(Out *out, const char *text) {
     for (; *text; text++, out->size++)
-        if (out->text)
-            out->text[out->size] = *text;
+        if (out->text) out->text[out->size] = *text;
 }
 
-static void put_saved(Out *out, const Saved *saved)
-{
+static void put_saved(Out *out, const Saved *saved) {
     put(out, HEADER);
     for (size_t i = 0; i < NUMBERS; i++) {
         uint64_t bits;
         memcpy(&bits, (const char *)saved + i * sizeof bits, sizeof bits);
-        for (int shift = 60; shift >= 0; shift -= 4)
-            put(out, (char[]){hexadecimal[bits >> shift & 15], 0});
+        for (int shift = 60; shift >= 0; shift -= 4) put(out, (char[]){hexadecimal[bits >> shift & 15], 0});
     }
     put(out, "\",\"message\":\"");
     put(out, saved->message);
@@ -63,26 +57,22 @@ static void put_saved(Out *out, const Saved *saved)
     put(out, "\"}");
 }
 
-void instance_forget_saved(void **state)
-{
+void instance_forget_saved(void **state) {
     if (state) {
         free(*state);
         *state = NULL;
     }
 }
 
-size_t instance_serialized_size(const void *state)
-{
+size_t instance_serialized_size(const void *state) {
     Out out = {0};
     put_saved(&out, state);
     return out.size;
 }
 
-Status instance_serialize(Instance *c, const char *function, const void *state, char *text, size_t size)
-{
+Status instance_serialize(Instance *c, const char *function, const void *state, char *text, size_t size) {
     Out out = {.text = text};
-    if (!instance_counts(c, function, size, instance_serialized_size(state)))
-        return ERROR;
+    if (!instance_counts(c, function, size, instance_serialized_size(state))) return ERROR;
     put_saved(&out, state);
     return OK;
 }
@@ -91,57 +81,47 @@ typedef struct {
     const char *at, *end;
 } In;
 
-static bool take(In *in, const char *text)
-{
+static bool take(In *in, const char *text) {
     size_t length = strlen(text);
-    if ((size_t)(in->end - in->at) < length || memcmp(in->at, text, length) != 0)
-        return false;
+    if ((size_t)(in->end - in->at) < length || memcmp(in->at, text, length) != 0) return false;
     in->at += length;
     return true;
 }
 
-static bool take_text(In *in, const char *name, char text[SENTENCE])
-{
+static bool take_text(In *in, const char *name, char text[SENTENCE]) {
     int length = 0;
-    if (!take(in, name))
-        return false;
+    if (!take(in, name)) return false;
     for (; in->at < in->end && *in->at != '"'; in->at++) {
-        if (length == SENTENCE - 1 || (unsigned char)*in->at < ' ')
-            return false;
+        if (length == SENTENCE - 1 || (unsigned char)*in->at < ' ') return false;
         text[length++] = *in->at;
     }
     text[length] = 0;
     return true;
 }
 
-static bool take_number(In *in, char *number)
-{
+static bool take_number(In *in, char *number) {
     uint64_t bits = 0;
-    if (in->end - in->at < 16)
-        return false;
+    if (in->end - in->at < 16) return false;
     for (int i = 0; i < 16; i++, in->at++) {
         const char *digit = memchr(hexadecimal, *in->at, 16);
-        if (!digit)
-            return false;
+        if (!digit) return false;
         bits = bits << 4 | (uint64_t)(digit - hexadecimal);
     }
     memcpy(number, &bits, sizeof bits);
     return true;
 }
 
-static bool whole(double value, double least, double most)
-{
+static bool whole(double value, double least, double most) {
     return least <= value && value <= most && value == floor(value);
 }
 
 /* Whether what was read can be worked with: what is not a number in it shows in the next step. */
-static bool sound(const Saved *s)
-{
+static bool sound(const Saved *s) {
     for (int v = 0; v < VARIABLES; v++)
-        if (variables[v].kind != REAL && variables[v].causality == PARAMETER && !whole(s->plant.given[v], -2147483648.0, 2147483647.0))
+        if (variables[v].kind != REAL && variables[v].causality == PARAMETER &&
+            !whole(s->plant.given[v], -2147483648.0, 2147483647.0))
             return false;
-    if (!whole(s->phase, INSTANTIATED, TERMINATED))
-        return false;
+    if (!whole(s->phase, INSTANTIATED, TERMINATED)) return false;
     int phase = (int)s->phase, phases = INSTANTIATED | INITIALIZATION | EVENT | CONTINUOUS | STEP | TERMINATED;
     bool begun = s->plant.begun == 1.0 && s->plant.tolerance > 0.0;
     return (phase & phases) && !(phase & (phase - 1)) && (begun || phase & (INSTANTIATED | INITIALIZATION)) &&
@@ -149,17 +129,15 @@ static bool sound(const Saved *s)
            isfinite(s->plant.time) && isfinite(s->plant.start_time);
 }
 
-Status instance_deserialize(Instance *c, const char *text, size_t size, void **state)
-{
+Status instance_deserialize(Instance *c, const char *text, size_t size, void **state) {
     Saved *saved = calloc(1, sizeof *saved);
     In in = {text, text + size};
-    if (!saved) /* no memory */
+    if (!saved)                                                                /* no memory */
         return instance_say(c, ERROR, "there is no memory for a saved state"); /* no memory */
     bool good = take(&in, HEADER);
-    for (size_t i = 0; i < NUMBERS && good; i++)
-        good = take_number(&in, (char *)saved + i * sizeof(double));
-    good = good && take_text(&in, "\",\"message\":\"", saved->message) && take_text(&in, "\",\"cause\":\"", saved->cause_message) &&
-           take(&in, "\"}") && in.at == in.end && sound(saved);
+    for (size_t i = 0; i < NUMBERS && good; i++) good = take_number(&in, (char *)saved + i * sizeof(double));
+    good = good && take_text(&in, "\",\"message\":\"", saved->message) &&
+           take_text(&in, "\",\"cause\":\"", saved->cause_message) && take(&in, "\"}") && in.at == in.end && sound(saved);
     if (!good) {
         free(saved);
         return instance_say(c, ERROR, "the serialised state is damaged, or not one of a " MODEL_IDENTIFIER);

@@ -598,6 +598,7 @@ def test_damaged_states_are_refused(library: Library) -> None:
         text[: text.index(b'"message":"') + 11], half, number(branch, 1e10), number(branch, -1e10), number(branch, math.nan),
         # phase: two at once, none, a part, during an update, one that the start has not come to
         *(number(count - 4, phase) for phase in (3.0, 1000.0, 0.5, math.nan, 32.0, 0.0)),
+        number(count - 6, 0.0),  # tolerance
         number(count - 3, 9.5), number(count - 2, 77.0), number(count - 1, -1.0),
     ]  # fmt: skip
     for place, wrong in enumerate(damaged):
