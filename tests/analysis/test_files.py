@@ -244,7 +244,15 @@ def test_a_damaged_array_is_not_there(tmp_path, harm):
         assert load_array(path) is None
 
 
-def test_a_large_csv_is_announced_and_ctrl_c_stops_it_within_a_second(tmp_path, capsys):
+@pytest.fixture
+def ctrl_c():
+    """Python's own answer to Ctrl-C, also where the tests run in the background of a shell that ignores it."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
+def test_a_large_csv_is_announced_and_ctrl_c_stops_it_within_a_second(tmp_path, capsys, ctrl_c):
     column = np.sin(np.arange(1_000_000))
     size = write_csv(tmp_path / "x.csv", {"x": column[::1000]}).stat().st_size * 28_000
     (tmp_path / "x.csv").unlink()

@@ -468,12 +468,12 @@ class TestFiles:
         made = runner.invoke(main, ["figures", "R5", "--out", str(tmp_path)])
         assert made.exit_code == 0, made.output
         assert "DOES NOT HOLD" in made.output
-        assert sorted(path.name for path in tmp_path.iterdir()) == ["fig_R5.csv", "fig_R5.png"]
+        assert sorted(path.name for path in tmp_path.glob("[!.]*")) == ["fig_R5.csv", "fig_R5.png"]
 
     def test_runs_as_a_module(self, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
         assert rahman.main("R13", str(tmp_path)).number == "R13"
         assert "does not hold" in capsys.readouterr().out
-        assert sorted(path.name for path in tmp_path.iterdir()) == ["fig_R13.csv", "fig_R13.png"]
+        assert sorted(path.name for path in tmp_path.glob("[!.]*")) == ["fig_R13.csv", "fig_R13.png"]
 
     def test_symbols_in_print(self) -> None:
         assert rahman.printed_symbol("1F1k") == "$^1F_{1k}$"
