@@ -112,6 +112,7 @@ def files_of(fmu: str, fmus: dict[str, Path], natives: dict[str, Path]) -> dict[
     return ({"python": fmus[fmu]} if fmu in fmus else {}) | kinds
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("fmu", MECHANISMS)
 def test_random_mechanisms(fmu: str, fmus: dict[str, Path], natives: dict[str, Path]) -> None:
     files = {kind: str(path) for kind, path in files_of(fmu, fmus, natives).items()}
