@@ -28,8 +28,7 @@ from linkwork.errors import (
     StepError,
 )
 from linkwork.mechanism import Mechanism
-from linkwork.parameters import field_name
-from linkwork.plant import Plant
+from linkwork.plant import TOLERANCE_RANGE, Plant
 from linkwork.variables import Variable
 
 STATUS_GOOD = 0
@@ -146,17 +145,9 @@ class LinkworkSlave(Fmi2Slave):
     def _build(self) -> Plant:
         """The plant for the present parameters and inputs, at its start."""
         values = dict(zip(self._names, self._values))
-        m = self.mechanism
         own, master = values["solver.tolerance"], self._master_tolerance
-        return Plant(
-            m,
-            m.parameters(**{field_name(name): values[name] for name in m.mechanism_variables}),
-            m.initial(**{field: values[f"initial.{field}"] for field in m.initial_variables}),
-            tolerance=own if master is None else min(own, max(master, 1e-13)),
-            time=self._start_time,
-            inputs={name: values[name] for name in m.input_names},
-            **{field_name(mode.name): values[mode.name] for mode in m.modes},
-        )
+        tolerance = own if master is None else min(own, max(master, TOLERANCE_RANGE[0]))
+        return Plant.of_values(self.mechanism, values, tolerance=tolerance, time=self._start_time)
 
     # Lifecycle
 

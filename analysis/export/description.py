@@ -16,7 +16,6 @@ from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
 import linkwork
 from linkwork.mechanism import Mechanism
-from linkwork.parameters import field_name
 from linkwork.plant import Plant
 from linkwork.variables import UNITS, Variable
 
@@ -274,17 +273,8 @@ def _value(variable: Variable, start: float | int | str) -> dict[str, str]:
 
 def started(mechanism: Mechanism) -> Plant:
     """The mechanism at its start, where all parameters and inputs have their start values."""
-    m = mechanism
-    values: dict[str, Any] = {v.name: v.start for v in m.variables}
-    return Plant(
-        m,
-        m.parameters(**{field_name(name): values[name] for name in m.mechanism_variables}),
-        m.initial(**{field: values[f"initial.{field}"] for field in m.initial_variables}),
-        tolerance=values["solver.tolerance"],
-        time=m.experiment[0],
-        inputs={name: values[name] for name in m.input_names},
-        **{field_name(mode.name): values[mode.name] for mode in m.modes},
-    )
+    values = {v.name: v.start for v in mechanism.variables}
+    return Plant.of_values(mechanism, values, time=mechanism.experiment[0])
 
 
 # Structure

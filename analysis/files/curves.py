@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from linkwork.errors import InputError, LinkworkError
 
 from ..units import INCH, LENGTHS, quantity
-from .paths import ending_of, first_line, read_text
+from .paths import ending_of, first_line, is_number, read_text
 from .reader import unknown_name
 
 #: Lengths of SVG in m (CSS: an inch has 96 px, 72 pt, 6 pc).
@@ -98,7 +98,7 @@ def _two_columns(path: Path, text: str) -> NDArray[np.float64]:
         try:
             x, y = (float(cell) for cell in cells)
         except ValueError:
-            if not rows and not header and not any(_is_number(cell) for cell in cells):
+            if not rows and not header and not any(is_number(cell) for cell in cells):
                 header = True
                 continue
             raise InputError(f"{path}, line {number}: {line.strip()[:100]!r} is not two numbers, x and y") from None
@@ -108,14 +108,6 @@ def _two_columns(path: Path, text: str) -> NDArray[np.float64]:
     if not rows:
         raise InputError(f"{path} has no points: it must have two columns of numbers, x and y")
     return np.array(rows)
-
-
-def _is_number(text: str) -> bool:
-    try:
-        float(text)
-    except ValueError:
-        return False
-    return True
 
 
 def _svg_points(path: Path, text: str, scale: float | None, name: str | None) -> tuple[NDArray[np.float64], bool]:
@@ -208,7 +200,7 @@ def _svg_scale(path: Path, root: Any) -> float:
     if box is None or lengths == [None, None]:
         return _CSS["px"]
     numbers = re.split(r"[\s,]+", box.strip())
-    if len(numbers) != 4 or not all(_is_number(n) for n in numbers) or min(float(n) for n in numbers[2:]) <= 0.0:
+    if len(numbers) != 4 or not all(is_number(n) for n in numbers) or min(float(n) for n in numbers[2:]) <= 0.0:
         raise InputError(
             f"{path} has the viewBox {box!r}: it must be four numbers, the width and the height above zero"
         )

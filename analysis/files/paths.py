@@ -176,3 +176,12 @@ def _shown(path: Path) -> str:
 def first_line(error: Exception) -> str:
     """What an error of a library says, in one line."""
     return (str(error) or type(error).__name__).splitlines()[0]
+
+
+def is_number(text: str) -> bool:
+    """Whether a text is a number as Python reads one."""
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True

@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 from linkwork.errors import InputError, Interrupted
 
 from .outputs import output
-from .paths import first_line, read_text, whole
+from .paths import first_line, is_number, read_text, whole
 
 #: Numbers that are formatted at a time; Ctrl-C waits for no more.
 _BLOCK = 50_000
@@ -88,7 +88,7 @@ def cell(text: str) -> str:
 
     What begins like a formula gets an apostrophe before it, which spreadsheets take for the mark of a text; numbers stay.
     """
-    if text.startswith(_FORMULA) and not _is_number(text):
+    if text.startswith(_FORMULA) and not is_number(text):
         text = f"'{text}"
     text = " ".join(text.splitlines())
     return '"{}"'.format(text.replace('"', '""')) if "," in text or '"' in text else text
@@ -96,14 +96,6 @@ def cell(text: str) -> str:
 
 #: What a cell begins with that a spreadsheet executes.
 _FORMULA = tuple("=+-@\t\r")
-
-
-def _is_number(text: str) -> bool:
-    try:
-        float(text)
-    except ValueError:
-        return False
-    return True
 
 
 def read_csv(path: str | Path) -> NDArray[np.float64]:

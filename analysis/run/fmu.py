@@ -26,9 +26,6 @@ from linkwork.parameters import fmi_name
 from ..files import check_fmu
 from ..mechanisms import InitialState, Parameters, mechanism_of
 
-#: What FMPy's getters and setters of enumerations are called, by the version of FMI; those of other types as the type.
-_OF_ENUMERATIONS = MappingProxyType({"2": "Integer", "3": "Int64"})
-
 
 class CosimulationError(LinkworkError):
     """An FMU could not be loaded or initialised; the sentence is the FMU's own where it gave one."""
@@ -191,20 +188,15 @@ class _Instance:
         groups: dict[str, dict[int, float]] = {}
         for name, value in values.items():
             variable = self._variables[name]
-            groups.setdefault(self._access(variable), {})[variable.valueReference] = value
-        for access, group in groups.items():
-            kind = float if access == self._real else int
-            getattr(self._fmu, f"set{access}")(list(group), [kind(value) for value in group.values()])
+            groups.setdefault(variable.type, {})[variable.valueReference] = value
+        for kind_of, group in groups.items():
+            kind = float if kind_of == self._real else int
+            getattr(self._fmu, f"set{kind_of}")(list(group), [kind(value) for value in group.values()])
         if self._fmi3:
             self._fmu.enterInitializationMode(tolerance=tolerance, startTime=start_time)
         else:
             self._fmu.enterInitializationMode()
         self._fmu.exitInitializationMode()
-
-    def _access(self, variable: Any) -> str:
-        """What FMPy's getter and setter of a variable are called."""
-        kind = str(variable.type)
-        return _OF_ENUMERATIONS[self.description.fmiVersion[0]] if kind == "Enumeration" else kind
 
     def _log_fmi2(self, environment: Any, name: bytes, status: int, category: bytes, message: bytes) -> None:
         self.messages.append(message.decode("utf-8", errors="replace"))
@@ -231,7 +223,7 @@ class _Instance:
         found = []
         for name in ("solver.status", "solver.message"):
             variable = self._variables[name]
-            found.append(getattr(self._fmu, f"get{self._access(variable)}")([variable.valueReference])[0])
+            found.append(getattr(self._fmu, f"get{variable.type}")([variable.valueReference])[0])
         status, message = found
         return int(status), message.decode() if isinstance(message, bytes) else str(message)
 

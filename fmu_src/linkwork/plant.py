@@ -5,7 +5,7 @@ Inputs, steps, refused steps, commanded rates that jump, saved states: the same 
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from dataclasses import asdict
 from math import isfinite, ulp
 from typing import Any
@@ -14,7 +14,7 @@ from .errors import AssemblyError, InputError, IntegrationError, LinkworkError, 
 from .integrate import UNDEFINED, Vector, integrate
 from .limits import NEAR_LIMIT
 from .mechanism import Mechanism, Mode
-from .parameters import fmi_name
+from .parameters import field_name, fmi_name
 
 #: Loosest and tightest tolerance that a run accepts.
 TOLERANCE_RANGE = (1e-13, 1e-2)
@@ -103,6 +103,27 @@ class Plant:
         self.start_energy = mechanism.equations.energy(self.state, self._p)
         if not isfinite(self.start_energy):
             raise InputError(f"the energy at the start is not finite: {self._started_from(self.state)}")
+
+    @classmethod
+    def of_values(
+        cls, mechanism: Mechanism, values: Mapping[str, Any], *, tolerance: float | None = None, time: float = 0.0
+    ) -> Plant:
+        """The plant whose parameters, start and inputs are ``values``, by FMI name; ``tolerance`` takes the place of theirs.
+
+        Raises
+        ------
+        ParameterError, AssemblyError, InputError
+        """
+        m = mechanism
+        return cls(
+            m,
+            m.parameters(**{field_name(name): values[name] for name in m.mechanism_variables}),
+            m.initial(**{field: values[f"initial.{field}"] for field in m.initial_variables}),
+            tolerance=values["solver.tolerance"] if tolerance is None else tolerance,
+            time=time,
+            inputs={name: values[name] for name in m.input_names},
+            **{field_name(mode.name): values[mode.name] for mode in m.modes},
+        )
 
     def _derive(self) -> None:
         """What follows from parameters and modes once and for all."""

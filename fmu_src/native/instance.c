@@ -191,8 +191,9 @@ static double computed(Instance *c, int row) {
         if (plant_derivative(&c->s.plant, derivative)) memcpy(c->s.plant.derivative, derivative, sizeof derivative);
         return c->s.plant.derivative[row - DERIVATIVE_ROW];
     }
+    if (row == TIME_ROW) return c->s.plant.time;
     double margin = plant_margin(&c->s.plant);
-    return row == TIME_ROW ? c->s.plant.time : isnan(margin) ? -LIMIT_CLEARANCE : margin;
+    return isnan(margin) ? -LIMIT_CLEARANCE : margin;
 }
 
 Status instance_get(Instance *c, const char *function, unsigned reference, Kind kind, double *value) {

@@ -38,7 +38,8 @@ static void inputs_after(const Plant *a, double t, double u[ROOM(INPUTS)]) {
     for (int c = 0; c < COMMANDS; c++) u[commands[c].acceleration] += a->slopes[commands[c].input];
 }
 
-bool plant_commanded(const Plant *a, const Command *command) {
+/* Whether a command is in force under the modes. */
+static bool in_force(const Plant *a, const Command *command) {
     return command->mode < 0 || a->given[mode_at[command->mode]] == command->value;
 }
 
@@ -68,17 +69,22 @@ static double clearance_of(const Plant *a, const double x[STATES]) {
     return result;
 }
 
-/* Apply the commands marked; one that is in force and not marked keeps its rate. */
-static bool apply(const Plant *a, const bool marked[ROOM(COMMANDS)], double x[STATES]) {
-    double u[ROOM(INPUTS)], result[STATES];
+/* The inputs for a jump to the commands marked: one that is in force and not marked keeps its rate. Whether any is. */
+static bool inputs_of_jump(const Plant *a, const bool marked[ROOM(COMMANDS)], const double x[STATES], double u[ROOM(INPUTS)]) {
     bool any = false;
     inputs(a, u);
     for (int c = 0; c < COMMANDS; c++)
-        if (plant_commanded(a, &commands[c])) {
+        if (in_force(a, &commands[c])) {
             any |= marked[c];
             if (!marked[c]) u[commands[c].input] = x[commands[c].rate];
         }
-    if (!any) return false;
+    return any;
+}
+
+/* Apply the commands marked. */
+static bool apply(const Plant *a, const bool marked[ROOM(COMMANDS)], double x[STATES]) {
+    double u[ROOM(INPUTS)], result[STATES];
+    if (!inputs_of_jump(a, marked, x, u)) return false;
     call(equations_jump, (const double *[]){x, a->modes, u, a->p}, (double *[]){result});
     memcpy(x, result, sizeof result);
     return true;
@@ -188,7 +194,7 @@ static void what_begins(const Plant *a, double own[ROOM(PARAMETERS)], double sta
     for (int i = 0; i < 2 * FREEDOMS; i++) state[i] = a->given[initial_at[i]];
     inputs(a, u);
     for (int c = 0; c < COMMANDS; c++)
-        if (plant_commanded(a, &commands[c])) state[commands[c].rate] = u[commands[c].input];
+        if (in_force(a, &commands[c])) state[commands[c].rate] = u[commands[c].input];
 }
 
 Reason plant_begin(Plant *a, char sentence[SENTENCE]) {
@@ -462,14 +468,8 @@ double plant_margin(const Plant *a) {
 /* The commands that a change of the inputs applies: those set since the last step, and those that change. */
 static bool commanded_state(const Plant *a, const bool changed[ROOM(COMMANDS)], double u[ROOM(INPUTS)],
                             bool marked[ROOM(COMMANDS)]) {
-    bool any = false;
-    inputs(a, u);
-    for (int c = 0; c < COMMANDS; c++) {
-        marked[c] = plant_commanded(a, &commands[c]) && (changed[c] || a->fresh[c] != 0.0);
-        if (plant_commanded(a, &commands[c]) && !marked[c]) u[commands[c].input] = a->x[commands[c].rate];
-        any |= marked[c];
-    }
-    return any;
+    for (int c = 0; c < COMMANDS; c++) marked[c] = in_force(a, &commands[c]) && (changed[c] || a->fresh[c] != 0.0);
+    return inputs_of_jump(a, marked, a->x, u);
 }
 
 void plant_forward(const Plant *a, bool start, bool commanding, const double given[VARIABLES], const double x[STATES],
@@ -485,7 +485,7 @@ void plant_forward(const Plant *a, bool start, bool commanding, const double giv
         for (int i = 0; i < PARAMETERS; i++) down[i] = given[parameter_at[i]];
         for (int i = 0; i < 2 * FREEDOMS; i++) dstate[i] = given[initial_at[i]];
         for (int c = 0; c < COMMANDS; c++)
-            if (plant_commanded(a, &commands[c])) dstate[commands[c].rate] = du[commands[c].input];
+            if (in_force(a, &commands[c])) dstate[commands[c].rate] = du[commands[c].input];
         call(equations_begin_forward, (const double *[]){a->modes, own, state, u, down, dstate, du}, (double *[]){dp, dx});
     } else {
         for (int c = 0; c < COMMANDS; c++) changed[c] = commanding && du[commands[c].input] != 0.0;
@@ -505,12 +505,12 @@ void plant_forward(const Plant *a, bool start, bool commanding, const double giv
 
 void plant_reverse(const Plant *a, bool start, const double rows[ROWS], const bool commanded[ROOM(COMMANDS)],
                    double given[VARIABLES], double x[STATES]) {
-    double u[ROOM(INPUTS)], gu[ROOM(INPUTS)], gp[CONSTANTS], after[STATES];
+    double u[ROOM(INPUTS)], before_jump[ROOM(INPUTS)], gu[ROOM(INPUTS)], gp[CONSTANTS], after[STATES];
     bool marked[ROOM(COMMANDS)];
-    bool jumps = !start && commanded_state(a, commanded, u, marked);
+    bool jumps = !start && commanded_state(a, commanded, before_jump, marked);
     memset(given, 0, VARIABLES * sizeof *given);
     memcpy(after, a->x, sizeof after);
-    if (jumps) call(equations_jump, (const double *[]){a->x, a->modes, u, a->p}, (double *[]){after});
+    if (jumps) call(equations_jump, (const double *[]){a->x, a->modes, before_jump, a->p}, (double *[]){after});
     inputs(a, u);
     call(equations_reverse, (const double *[]){after, a->modes, u, a->p, rows, rows + DERIVATIVE_ROW, rows + MARGIN_ROW},
          (double *[]){x, gu, gp});
@@ -518,8 +518,8 @@ void plant_reverse(const Plant *a, bool start, const double rows[ROWS], const bo
     for (int i = 0; i < INPUTS; i++) given[input_at[i]] = gu[i];
     if (jumps) {
         double before[STATES], gjump[ROOM(INPUTS)], unused[CONSTANTS];
-        commanded_state(a, commanded, u, marked);
-        call(equations_jump_reverse, (const double *[]){a->x, a->modes, u, a->p, x}, (double *[]){before, gjump, unused});
+        call(equations_jump_reverse, (const double *[]){a->x, a->modes, before_jump, a->p, x},
+             (double *[]){before, gjump, unused});
         for (int c = 0; c < COMMANDS; c++)
             if (marked[c]) given[input_at[commands[c].input]] += gjump[commands[c].input];
     }
@@ -530,7 +530,7 @@ void plant_reverse(const Plant *a, bool start, const double rows[ROWS], const bo
         for (int i = 0; i < INPUTS; i++) given[input_at[i]] += gu[i];
         for (int i = 0; i < PARAMETERS; i++) given[parameter_at[i]] += gown[i];
         for (int c = 0; c < COMMANDS; c++)
-            if (plant_commanded(a, &commands[c])) {
+            if (in_force(a, &commands[c])) {
                 given[input_at[commands[c].input]] += gstate[commands[c].rate];
                 gstate[commands[c].rate] = 0.0;
             }

@@ -51,9 +51,6 @@ void plant_reset(Plant *a);
 /* Constants and state from what is given; on failure the reason, with the sentence. */
 Reason plant_begin(Plant *a, char sentence[SENTENCE]);
 
-/* Whether a command is in force under the modes. */
-bool plant_commanded(const Plant *a, const Command *command);
-
 /* Go forward by a step under the inputs in force. A step that fails leaves all as it was. Where `early`, a step into the limit
    of assembly ends there and is good, with the reason LIMIT_OF_ASSEMBLY in `ended`. */
 Reason plant_step(Plant *a, double time, double step, const Watch *watch, bool early, Reason *ended, char sentence[SENTENCE]);

@@ -1,6 +1,7 @@
 """The masters of the tests. Each of these functions runs in a process of its own, and imports what it needs inside itself.
 
-All run a case of 100 steps of 1 ms, in which one input changes after half of them. What they return has the outputs at the
+All run a case of 100 steps of 1 ms: values at the start of reals and integers, the input that changes after half of them, and
+to what. What they return has the outputs at the
 end and the time, if the master tells them, `solver.status` likewise, and in ``said`` whatever sentence reached the user.
 """
 
@@ -9,19 +10,13 @@ from __future__ import annotations
 from typing import Any
 
 
-def by_fmpy(
-    fmu: str,
-    reals: dict[str, float],
-    integers: dict[str, int],
-    changed: str,
-    later: float,
-    outputs: list[str],
-    kind: str,
-) -> Any:
+def by_fmpy(fmu: str, case: list[Any], outputs: list[str], kind: str) -> Any:
     """The case by FMPy's own simulate_fmu; model exchange by CVode."""
     import numpy as np
     from fmpy import read_model_description, simulate_fmu
     from fmpy.fmi1 import FMICallException
+
+    reals, integers, changed, later = case
 
     names = [v.name for v in read_model_description(fmu).modelVariables if v.causality == "input"]
     before = [reals.get(name, 0.0) for name in names]
@@ -58,15 +53,7 @@ def by_fmpy(
     }
 
 
-def by_libcosimpy(
-    fmu: str,
-    reals: dict[str, float],
-    integers: dict[str, int],
-    changed: str,
-    later: float,
-    outputs: list[str],
-    kind: str,
-) -> Any:
+def by_libcosimpy(fmu: str, case: list[Any], outputs: list[str], kind: str) -> Any:
     """The case by libcosim's fixed-step algorithm."""
     import zipfile
     from xml.etree import ElementTree
@@ -76,6 +63,8 @@ def by_libcosimpy(
     from libcosimpy.CosimManipulator import CosimManipulator
     from libcosimpy.CosimObserver import CosimObserver
     from libcosimpy.CosimSlave import CosimLocalSlave
+
+    reals, integers, changed, later = case
 
     log_output_level(CosimLogLevel.DEBUG)
     root = ElementTree.fromstring(zipfile.ZipFile(fmu).read("modelDescription.xml"))
@@ -101,17 +90,11 @@ def by_libcosimpy(
     }
 
 
-def by_ecospy(
-    fmu: str,
-    reals: dict[str, float],
-    integers: dict[str, int],
-    changed: str,
-    later: float,
-    outputs: list[str],
-    kind: str,
-) -> Any:
+def by_ecospy(fmu: str, case: list[Any], outputs: list[str], kind: str) -> Any:
     """The case by ecos."""
     from ecospy import EcosSimulation, EcosSimulationStructure
+
+    reals, integers, changed, later = case
 
     with EcosSimulationStructure() as structure:
         structure.add_model("slider", fmu)
@@ -131,17 +114,11 @@ def by_ecospy(
     return found
 
 
-def by_cofmupy(
-    fmu: str,
-    reals: dict[str, float],
-    integers: dict[str, int],
-    changed: str,
-    later: float,
-    outputs: list[str],
-    kind: str,
-) -> Any:
+def by_cofmupy(fmu: str, case: list[Any], outputs: list[str], kind: str) -> Any:
     """The case by CoFMUPy. It sets Reals alone, and all inputs: those that it is not given to zero."""
     import sys
+
+    reals, integers, changed, later = case
 
     sys.path.insert(0, f"{sys.prefix}/cofmupy")  # with the version of FMPy that it is for
     from cofmupy import Coordinator
@@ -168,21 +145,15 @@ def by_cofmupy(
     }
 
 
-def by_pathsim(
-    fmu: str,
-    reals: dict[str, float],
-    integers: dict[str, int],
-    changed: str,
-    later: float,
-    outputs: list[str],
-    kind: str,
-) -> Any:
+def by_pathsim(fmu: str, case: list[Any], outputs: list[str], kind: str) -> Any:
     """The case by PathSim; model exchange by its Runge-Kutta method of order 5."""
     from fmpy.fmi1 import FMICallException
     from pathsim import Connection, Simulation
     from pathsim.blocks import Source
     from pathsim.solvers import RKDP54
     from pathsim_fmi.blocks import CoSimulationFMU, ModelExchangeFMU
+
+    reals, integers, changed, later = case
 
     exchange = kind == "ModelExchange"
     start = reals | integers

@@ -185,7 +185,7 @@ def run(
         fmu = fmus[model.name] if row.kind == "python" else natives[f"{model.name}-{row.kind}"]
         if row.master != "host":
             by = getattr(masters, f"by_{row.master}")
-            return run_in_process(by, fmu, *case[:4], OUTPUTS[model.name], row.interface)
+            return run_in_process(by, fmu, list(case[:4]), OUTPUTS[model.name], row.interface)
         preload = {"LD_PRELOAD": libpython()} if row.kind == "python" else {}
         interface = "me" if row.interface == STATES else "cs"
         start, change = case.reals | case.integers, (case.changed, case.later, 50)
@@ -295,7 +295,7 @@ def test_libcosim_ends_its_process_on_fmi_3(natives: dict[str, Path], model: Mod
         run_in_process(
             masters.by_libcosimpy,
             natives[f"{model.name}-native-fmi3"],
-            *CASES[model.name][:4],
+            list(CASES[model.name][:4]),
             OUTPUTS[model.name],
             STEPS,
         )
