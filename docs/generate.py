@@ -2,7 +2,8 @@
 
 python docs/generate.py             fills the tables between the markers of docs/*.md
 python docs/generate.py --check     writes nothing, and fails where a table is out of date
-python docs/generate.py --figures   fills the pages of the theses' figures too, and draws the pictures (about an hour)
+python docs/generate.py --figures   fills the pages of the theses too, and draws the pictures (about an hour)
+python docs/generate.py --figures 3 R   fills only chapter III of Youssef's thesis, and Rahman's
 
 A table stands between the lines ``<!-- TABLE OF: begin -->`` and ``<!-- TABLE OF: end -->``; `TABLES` has them by name.
 """
@@ -11,7 +12,7 @@ from __future__ import annotations
 
 import re
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Container, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -76,21 +77,19 @@ def symbols(of: str, page: str) -> str:
 
 
 def figures(of: str, page: str) -> str:
-    """The studies of a thesis, computed, with their verdicts; an assignment that the page states is not repeated."""
-    from analysis import studies
+    """The studies of one of `CHAPTERS`, computed, with their verdicts."""
+    from analysis.studies import ENTRIES, is_figure
+    from analysis.studies.page import figures
 
-    lines = []
-    for number in getattr(studies, of):
-        result = studies.load(number).compute()
-        lines += [f"## {result.heading}", "", result.claim, ""]
-        if result.assignment and result.assignment not in " ".join(page.split()):
-            lines += [f"*{result.assignment}*", ""]
-        rows = (
-            (v.statement, v.source, v.expected, v.found, "holds" if v.holds else "**does not hold**")
-            for v in result.verdicts
-        )
-        lines += [_markdown("| statement | source | stated | computed | |", rows), ""]
-    return "\n".join(lines)
+    chapter = f"{of}." if of.isdigit() else of
+    return figures(n for n in ENTRIES if (n.startswith(chapter) if is_figure(n) else of == "ours"))
+
+
+def count(of: str, page: str) -> str:
+    """How many of the verdicts on the page hold."""
+    from analysis.studies.page import count
+
+    return count(page)
 
 
 def probe(of: str, page: str) -> str:
@@ -117,21 +116,22 @@ def probe(of: str, page: str) -> str:
     )
 
 
+#: The parts of the pages of the theses: chapters of Youssef's, Rahman's, and the studies of ours.
+CHAPTERS = (*"345678", "R", "ours")
 #: What fills a table, from what it is of and the text of its page; `figures` takes long.
-TABLES: dict[str, Callable[[str, str], str]] = {"symbols": symbols, "figures": figures, "probe": probe}
+TABLES: dict[str, Callable[[str, str], str]] = {"symbols": symbols, "figures": figures, "count": count, "probe": probe}
 
 
-def filled(page: str, *, with_figures: bool = False) -> str:
-    """The text of a page with its tables brought up to date."""
+def filled(page: str, *, chapters: Container[str] = ()) -> str:
+    """The text of a page with its tables brought up to date; the figures only of the ``chapters``, since they take long."""
 
     def fill(match: re.Match[str]) -> str:
         table, of = match.groups()
-        if table == "figures" and not with_figures:
-            return match[0]
-        head = page[: match.start()]
-        return f"<!-- {table} {of}: begin -->\n{TABLES[table](of, head)}\n<!-- {table} {of}: end -->"
+        return f"<!-- {table} {of}: begin -->\n{TABLES[table](of, page)}\n<!-- {table} {of}: end -->"
 
-    return MARKED.sub(fill, page)
+    # first the figures, which the count is of
+    page = MARKED.sub(lambda match: fill(match) if match[1] == "figures" and match[2] in chapters else match[0], page)
+    return MARKED.sub(lambda match: match[0] if match[1] == "figures" else fill(match), page)
 
 
 #: A picture: name of the file, figure, dots per inch.
@@ -219,8 +219,9 @@ def slider_crank_pictures() -> Iterator[Picture]:
 
 def main(arguments: list[str]) -> int:
     """Fill the pages, or check them."""
-    with_figures = "--figures" in arguments
-    if with_figures:
+    with_figures, *chosen = arguments if "--figures" in arguments else ("",)
+    chapters = chosen or CHAPTERS if with_figures else ()
+    if with_figures and not chosen:
         from analysis.files import save_figure
 
         for pictures in (study_pictures, hand_drawn_pictures, slider_crank_pictures):
@@ -229,7 +230,7 @@ def main(arguments: list[str]) -> int:
     stale = []
     for path in PAGES:
         text = path.read_text(encoding="utf-8")
-        new = filled(text, with_figures=with_figures)
+        new = filled(text, chapters=chapters)
         if new != text:
             stale.append(path.name)
             if "--check" not in arguments:

@@ -14,13 +14,9 @@ from build_fmu import FMUS
 
 from .mechanisms import pendulum, rotor_on_cart
 
-#: Tests of several files that share results which take long, by the unit of work they make; every other file is one.
-#: Pages of the documentation are one each.
+#: The units of work that tests are sent to workers in, by their names: a file, whose tests share results, and each page of the
+#: documentation.
 UNITS = (
-    (r".*/test_studies\.py::.*\[(\d+)\.\d+\]", r"studies of chapter \1"),
-    (r".*/test_studies\.py::.*\[R\d+\]|.*/test_rahman_studies\.py::.*", "studies of Rahman"),
-    (r".*/test_chapter_7\.py::.*", "studies of chapter 7"),
-    (r".*/test_rig_studies\.py::.*", "studies of chapter 8"),
     (r"(.*/test_docs\.py::test_the_page_.*)", r"\1"),
     (r"(.*?)::.*", r"\1"),
 )

@@ -8,7 +8,7 @@ and degrees, as printed; the factors to SI are at the top. Nothing here is the o
 
 from __future__ import annotations
 
-from analysis.studies._rahman import (  # noqa: F401
+from analysis.studies.rahman.table import (  # noqa: F401
     DEAD_CENTRES_DEG,
     GREATEST_SHIFTS_IN,
     SPOTS,

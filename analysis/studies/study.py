@@ -8,17 +8,15 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from rich.console import Console
-from rich.table import Table
 
 from ..figures import Curve, Figure
 from ..files import save_figure, write_csv
 from . import STUDIES, file_stem, is_figure
 
-#: Where a stated value comes from.
-THESIS = "thesis"
-REFERENCE = "reference"  # an independent derivation, cross-checked against two multibody engines
-BALANCE = "check"  # a property that the computation must have
+#: Where a statement comes from: the thesis's text, its program when it is run, or our own derivations and checks.
+TEXT, LISTING, OURS = "text", "listing", "ours"
+#: What a verdict may be.
+HOLDS, FAILS, UNJUDGED = "holds", "does not hold", "cannot be judged"
 
 ASSIGNED = (
     "The captions of the thesis's figures are lost; which quantity stands under which number is our assignment, chosen so "
@@ -35,79 +33,118 @@ class Verdict:
     statement : str
         What is said, as a sentence without its number.
     source : str
-        Who says so: `THESIS`, `REFERENCE` or `BALANCE`.
-    stated, computed : float
-        The two values in ``unit``.
+        Who says so: `TEXT`, `LISTING` or `OURS`.
+    place : str
+        Where: the section, and the lines (L) of the scanned text; empty for ours.
+    stated, computed : float or None
+        The two values in ``unit``; None where the statement cannot be judged.
     lower, upper : float
         Range that the source supports.
+    why : str
+        Why the statement cannot be judged, or, in a few words, why it fails.
     """
 
     statement: str
     source: str
-    stated: float
-    computed: float
-    lower: float
-    upper: float
+    place: str = ""
+    stated: float | None = None
+    computed: float | None = None
+    lower: float = -np.inf
+    upper: float = np.inf
     unit: str = ""
+    why: str = ""
 
     def __str__(self) -> str:
-        word = "holds" if self.holds else "DOES NOT HOLD"
-        return f"{self.statement}: {self.expected} ({self.source}), computed {self.found}: {word}"
+        source = f"{self.source}, {self.place}" if self.place else self.source
+        if self.computed is None:
+            return f"{self.statement} ({source}): {UNJUDGED}: {self.why}"
+        outcome = HOLDS if self.holds else FAILS.upper()
+        return f"{self.statement}: {self.expected} ({source}), computed {self.found}: {outcome}"
 
     @property
     def expected(self) -> str:
-        """The stated value with its unit, and whether it is a bound."""
+        """The stated value with its unit, and whether it is a bound; empty where there is none."""
+        if self.stated is None:
+            return ""
         bound = "at most " if np.isneginf(self.lower) else "at least " if np.isposinf(self.upper) else ""
         return f"{bound}{self.stated:.6g} {self.unit}".rstrip()
 
     @property
     def found(self) -> str:
-        """The computed value with its unit."""
-        return f"{self.computed:.6g} {self.unit}".rstrip()
+        """The computed value with its unit; empty where there is none."""
+        return "" if self.computed is None else f"{self.computed:.6g} {self.unit}".rstrip()
 
     @property
     def holds(self) -> bool:
         """Whether the computed value is in the range."""
-        return bool(self.lower <= self.computed <= self.upper)
+        return self.computed is not None and bool(self.lower <= self.computed <= self.upper)
+
+    @property
+    def outcome(self) -> str:
+        """`HOLDS`, `FAILS` or `UNJUDGED`."""
+        return UNJUDGED if self.computed is None else HOLDS if self.holds else FAILS
 
 
-def near(statement: str, source: str, stated: float, computed: float, tolerance: float, unit: str = "") -> Verdict:
+def near(
+    statement: str,
+    source: str,
+    stated: float,
+    computed: float,
+    tolerance: float,
+    unit: str = "",
+    *,
+    place: str = "",
+    why: str = "",
+) -> Verdict:
     """A verdict on a value that is stated to within a tolerance."""
     return Verdict(
         statement=statement,
         source=source,
+        place=place,
         stated=stated,
         computed=float(computed),
         lower=stated - tolerance,
         upper=stated + tolerance,
         unit=unit,
+        why=why,
     )
 
 
-def at_least(statement: str, source: str, stated: float, computed: float, unit: str = "") -> Verdict:
+def at_least(
+    statement: str, source: str, stated: float, computed: float, unit: str = "", *, place: str = "", why: str = ""
+) -> Verdict:
     """A verdict on a value that is stated to reach another."""
     return Verdict(
         statement=statement,
         source=source,
+        place=place,
         stated=stated,
         computed=float(computed),
         lower=stated,
-        upper=np.inf,
         unit=unit,
+        why=why,
     )
 
 
-def at_most(statement: str, source: str, stated: float, computed: float, unit: str = "") -> Verdict:
+def at_most(
+    statement: str, source: str, stated: float, computed: float, unit: str = "", *, place: str = "", why: str = ""
+) -> Verdict:
     """A verdict on a value that is stated not to exceed another."""
     return Verdict(
         statement=statement,
         source=source,
+        place=place,
         stated=stated,
         computed=float(computed),
-        lower=-np.inf,
         upper=stated,
         unit=unit,
+        why=why,
     )
+
+
+def unjudged(statement: str, source: str, why: str, *, place: str) -> Verdict:
+    """A statement that cannot be judged, with the reason."""
+    return Verdict(statement=statement, source=source, place=place, why=why)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -143,13 +180,6 @@ class StudyResult:
         """What stands above the plot: the figure's number and title."""
         return f"Fig {self.number}  {self.title}" if is_figure(self.number) else self.title
 
-    def table(self) -> Table:
-        """The verdicts for a terminal."""
-        table = Table("statement", "source", "stated", "computed", "", title=self.heading, title_justify="left")
-        for v in self.verdicts:
-            table.add_row(v.statement, v.source, v.expected, v.found, "holds" if v.holds else "does not hold")
-        return table
-
 
 @dataclass(frozen=True, slots=True)
 class Study:
@@ -171,14 +201,6 @@ class Study:
         if self.animate:
             paths.append(self.animate(result, stem.with_suffix(".gif")))
         return result, tuple(paths)
-
-    def main(self, out: str | Path = "out") -> StudyResult:
-        """Make it and show the verdicts."""
-        result, paths = self.make(out)
-        console = Console(emoji=False, markup=False)
-        console.print(result.table())
-        console.print(f"wrote {', '.join(map(str, paths))}", highlight=False, soft_wrap=True)
-        return result
 
 
 def padded(columns: Mapping[str, ArrayLike]) -> dict[str, NDArray[np.float64]]:

@@ -12,7 +12,7 @@ import pytest
 pytest.importorskip("casadi")
 
 from analysis.numerics.fourier import FourierSeries
-from analysis.studies._runs import rig_1, steady_turn
+from analysis.studies.youssef._runs import rig_1, steady_turn
 from analysis.youssef import (
     HarmonicBalanceError,
     HarmonicMotion,

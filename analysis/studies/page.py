@@ -1,0 +1,51 @@
+"""The page of a thesis: each figure with what it shows, each statement with its source and verdict, and a count at the head."""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Iterable
+
+from . import ENTRIES, STUDIES, load
+from .study import FAILS, HOLDS, LISTING, OURS, TEXT, UNJUDGED
+
+_HEADINGS = "| statement | source | where | stated | computed | verdict |\n| --- | --- | --- | --- | --- | --- |"
+#: A row of a table of verdicts: its source and its verdict.
+_ROW = re.compile(
+    rf"^\| .* \| ({TEXT}|{LISTING}|{OURS}) \| .* \| \**({HOLDS}|{FAILS}|{UNJUDGED})\** \|$", flags=re.MULTILINE
+)
+
+
+def figures(numbers: Iterable[str]) -> str:
+    """The figures of these numbers, computed, in Markdown; one that only shows a mechanism or an apparatus has its title."""
+    lines = []
+    for number in numbers:
+        entry = ENTRIES[number]
+        if number not in STUDIES:
+            lines += [f"### Fig {number}  {entry.title}", "", f"Nothing to compute ({entry.place}).", ""]
+            continue
+        result = load(number).compute()
+        where = f" ({entry.place})" if entry.place else ""
+        lines += [f"### {result.heading}", "", f"{result.claim}{where}", ""]
+        if result.assignment:
+            lines += [f"*{result.assignment}*", ""]
+        lines += [f"`linkwork figures {number}`", "", _HEADINGS]
+        for v in result.verdicts:
+            computed = " ".join(part for part in (v.found, v.why) if part)
+            outcome = v.outcome if v.holds else f"**{v.outcome}**"
+            lines.append(f"| {v.statement} | {v.source} | {v.place} | {v.expected} | {computed} | {outcome} |")
+        lines.append("")
+    return "\n".join(lines)
+
+
+def count(page: str) -> str:
+    """How many of the thesis's statements on a page hold, fail or cannot be judged, and how many checks of ours hold."""
+    found = Counter(_ROW.findall(page))
+    thesis = {outcome: found[TEXT, outcome] + found[LISTING, outcome] for outcome in (HOLDS, FAILS, UNJUDGED)}
+    listing = sum(number for (source, _), number in found.items() if source == LISTING)
+    ours = sum(number for (source, _), number in found.items() if source == OURS)
+    return (
+        f"Of {sum(thesis.values())} statements of the thesis {thesis[HOLDS]} hold, {thesis[FAILS]} do not, and "
+        f"{thesis[UNJUDGED]} cannot be judged, each with the reason. {listing} of them come from its program when it is run, "
+        f"the others from its text. Of {ours} checks of ours {found[OURS, HOLDS]} hold."
+    )

@@ -1,0 +1,77 @@
+"""The figures of Youssef's thesis: a module for each chapter, listed here."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from types import MappingProxyType
+
+from ..contents import Entry
+
+#: Each figure by its number in the thesis, and each study of ours by its name.
+FIGURES: Mapping[str, Entry] = MappingProxyType(
+    {
+        "3.2": Entry("Drift of the slider without a spring; Table 3.1, 420 rpm", "youssef.chapter_3"),
+        "3.3": Entry("Drift with and without gravity; Table 3.1, 420 rpm, k = 0", "youssef.chapter_3"),
+        "3.4": Entry("Steady motion of the slider, three springs; Table 3.1, 420 rpm", "youssef.chapter_3"),
+        "3.5": Entry("Torque that holds the speed, three springs; Table 3.1, 420 rpm", "youssef.chapter_3"),
+        "3.6": Entry("Launch with three torques: slider position; Table 3.1", "youssef.chapter_3"),
+        "3.7": Entry("Launch with three torques: crank speed; Table 3.1", "youssef.chapter_3"),
+        "3.8": Entry("Launch with three springs: slider position; Table 3.1", "youssef.chapter_3"),
+        "3.9": Entry("Launch with three springs: crank speed; Table 3.1", "youssef.chapter_3"),
+        "3.10": Entry("Torque of the launch against its time to 1 rad; Table 3.1", "youssef.chapter_3"),
+        "3.11": Entry("Free motion, k = 5e5 dyn/cm: slider position; Table 3.1", "youssef.chapter_3"),
+        "3.12": Entry("Free motion, k = 5e5 dyn/cm: crank speed; Table 3.1", "youssef.chapter_3"),
+        "3.13": Entry("Free motion, k = 2e6 dyn/cm: slider position; Table 3.1", "youssef.chapter_3"),
+        "3.14": Entry("Free motion, k = 2e6 dyn/cm: crank speed; Table 3.1", "youssef.chapter_3"),
+        "4.3": Entry("First harmonic over the speed without damping; chapter IV", "youssef.chapter_4"),
+        "4.4": Entry("First harmonic over the speed with dampers; chapter IV, I4 = 1", "youssef.chapter_4"),
+        "4.5": Entry("Harmonics near half the natural frequency; chapter IV, I4 = 1", "youssef.chapter_4"),
+        "4.6": Entry("Resonance over the inertia of the rocker; chapter IV", "youssef.chapter_4"),
+        "4.7": Entry("Linear equations against the plant; chapter IV, I4 = 1", "youssef.chapter_4"),
+        "5.1": Entry("First region of instability over the inertia ratio, without damping", "youssef.chapter_5"),
+        "5.2": Entry("First region of instability with damping, and the damping that removes it", "youssef.chapter_5"),
+        "5.3": Entry("First region of instability over the coupler's length", "youssef.chapter_5"),
+        "5.4": Entry("First region over the crank's length, and the widths of higher ones", "youssef.chapter_5"),
+        "6.4": Entry("Ellipse (a), timed", "youssef.chapter_6"),
+        "6.5": Entry("Ellipse (b), timed", "youssef.chapter_6"),
+        "6.6": Entry("Ellipse (a), timed, with bounds on the lengths", "youssef.chapter_6"),
+        "6.7": Entry("Rocker function, unweighted", "youssef.chapter_6"),
+        "6.8": Entry("Rocker function, weighted, and with a mounting angle", "youssef.chapter_6"),
+        "6.9": Entry("Path (a): least area between the curves", "youssef.chapter_6"),
+        "6.10": Entry("Path (b): least area between the curves", "youssef.chapter_6"),
+        "6.11": Entry("Packaging machine: a straight push and a return", "youssef.chapter_6"),
+        "7.2": Entry("Coupler curves and accessible area of P; Table 3.1", "youssef.chapter_7"),
+        "7.3": Entry(
+            "Error over the slider position at one crank angle; printed linkage of ellipse (a)", "youssef.chapter_7"
+        ),
+        "7.4": Entry("A curve traced by moving the slider while the crank turns; Table 3.1", "youssef.chapter_7"),
+        "7.5": Entry("Variational motion of the slider; weighted rocker function", "youssef.chapter_7"),
+        "7.6": Entry("Slider moved by one, two and three harmonics; weighted rocker function", "youssef.chapter_7"),
+        "7.7": Entry("Slider moved by two harmonics; path (b)", "youssef.chapter_7"),
+        "7.8": Entry("Slider moved by three and five harmonics; path (b)", "youssef.chapter_7"),
+        "7.9": Entry("Links and slider optimised together; path (b)", "youssef.chapter_7"),
+        "7.10": Entry("Smoothness of the slider's motion against error; weighted rocker function", "youssef.chapter_7"),
+        "7.11": Entry("The simplest mechanism that meets a tolerance; rocker function", "youssef.chapter_7"),
+        "7.12": Entry(
+            "Force, power and tracking of the slider's motion; weighted rocker function", "youssef.chapter_7"
+        ),
+        "8.7": Entry("Steady motion far below resonance; rig 1, spring A", "youssef.chapter_8"),
+        "8.8": Entry("Steady motion near half the natural frequency; rig 1, spring A", "youssef.chapter_8"),
+        "8.9": Entry("Four peaks a turn become two; rig 1, spring A", "youssef.chapter_8"),
+        "8.10": Entry("Steady motion through resonance; rig 1, spring A", "youssef.chapter_8"),
+        "8.11": Entry("Steady motion near a third of the natural frequency; rig 1, spring B", "youssef.chapter_8"),
+        "8.12": Entry("Steady motion near half the natural frequency; rig 1, spring B", "youssef.chapter_8"),
+        "8.13": Entry("Steady motion towards resonance; rig 1, spring B", "youssef.chapter_8"),
+        "8.14": Entry("Amplitude of the slider over the speed; rig 1, spring A", "youssef.chapter_8"),
+        "8.15": Entry("Amplitude of the slider over the speed; rig 1, spring B", "youssef.chapter_8"),
+        "8.16": Entry("Harmonics of the slider's motion over the speed; rig 1", "youssef.chapter_8"),
+        "8.17": Entry(
+            "Coulomb friction in the guide: amplitude, and whether it explains the misfit; rig 1", "youssef.chapter_8"
+        ),
+        "8.18": Entry("Amplitude of the slider over the speed; rig 2, spring C", "youssef.chapter_8"),
+        "8.19": Entry("Amplitude of the slider over the speed; rig 2, spring D", "youssef.chapter_8"),
+        "8.20": Entry("Harmonics of the slider's motion over the speed; rig 2", "youssef.chapter_8"),
+        "8.21": Entry("Crank torque and pin forces over the speed; rig 2", "youssef.chapter_8"),
+        "linkage": Entry("The five-bar slider of Table 3.1 at 420 rpm", "youssef.linkage"),
+    }
+)
