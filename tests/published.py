@@ -76,12 +76,16 @@ TORQUE_AT_0_25_S = MappingProxyType({"th2_rad": 17.8051227, "u_cm": -0.61160400,
 TURNS_TO_SINE_0_3: Mapping[float, float] = MappingProxyType({1e4: 3.0, 5e4: 4.9, 1e5: 8.0, 5e5: 36.0})
 # fig. 3.3: growth of the drift without gravity ("about 25 %")
 DRIFT_GROWTH_WITHOUT_GRAVITY = 1.25
+# and u after forty turns at mu = 1e6 dyn.s/cm, by gravity in m/s2; the thesis calls M "slightly reduced" without gravity
+U_AFTER_40_TURNS_CM: Mapping[float, float] = MappingProxyType({9.81: -1.93, 0.0: -2.38})
 # fig. 3.4: crank angle of the least steady u, and mean u, by k in dyn/cm ("220" in the scan is 22 deg)
 LEAST_STEADY_U_AT_DEG: Mapping[float, float] = MappingProxyType({5e5: 23.45, 1e6: 17.5, 2e6: 5.2})
 MEAN_STEADY_U_CM: Mapping[float, float] = MappingProxyType({5e5: -0.611, 1e6: -0.280, 2e6: -0.142})
 # fig. 3.5: the steady torque between k = 5e5 and 2e6 differs by this part of its peak, and reverses steeply
 TORQUE_DIFFERENCE_OF_PEAK = 0.096
 TORQUE_REVERSAL_DEG_DYN_CM = ((327.0, 1.46e7), (16.0, -2.00e7))
+# fig. 3.14, k = 2e6: half the natural frequency with the mean effective mass (rad/s); the thesis has "around 27"
+HALF_NATURAL_FREQUENCY_RAD_S = 25.55
 # section 3.2.2: the thesis calls T0 hyperbolic in the time to 1 rad; T0 t^2 is nearly constant, exponent of t on T0
 TORQUE_TIME_EXPONENT = -1.95
 

@@ -10,19 +10,50 @@ from ..contents import Entry
 #: Each figure by its number in the thesis, and each study of ours by its name.
 FIGURES: Mapping[str, Entry] = MappingProxyType(
     {
-        "3.2": Entry("Drift of the slider without a spring; Table 3.1, 420 rpm", "youssef.chapter_3"),
-        "3.3": Entry("Drift with and without gravity; Table 3.1, 420 rpm, k = 0", "youssef.chapter_3"),
-        "3.4": Entry("Steady motion of the slider, three springs; Table 3.1, 420 rpm", "youssef.chapter_3"),
-        "3.5": Entry("Torque that holds the speed, three springs; Table 3.1, 420 rpm", "youssef.chapter_3"),
-        "3.6": Entry("Launch with three torques: slider position; Table 3.1", "youssef.chapter_3"),
-        "3.7": Entry("Launch with three torques: crank speed; Table 3.1", "youssef.chapter_3"),
-        "3.8": Entry("Launch with three springs: slider position; Table 3.1", "youssef.chapter_3"),
-        "3.9": Entry("Launch with three springs: crank speed; Table 3.1", "youssef.chapter_3"),
-        "3.10": Entry("Torque of the launch against its time to 1 rad; Table 3.1", "youssef.chapter_3"),
-        "3.11": Entry("Free motion, k = 5e5 dyn/cm: slider position; Table 3.1", "youssef.chapter_3"),
-        "3.12": Entry("Free motion, k = 5e5 dyn/cm: crank speed; Table 3.1", "youssef.chapter_3"),
-        "3.13": Entry("Free motion, k = 2e6 dyn/cm: slider position; Table 3.1", "youssef.chapter_3"),
-        "3.14": Entry("Free motion, k = 2e6 dyn/cm: crank speed; Table 3.1", "youssef.chapter_3"),
+        "3.1": Entry("The linkage with its loads", place="3.2.1, L1804"),
+        "3.2": Entry(
+            "Slider without a spring over the crank angle, five dampers; Table 3.1, 420 rpm",
+            "youssef.chapter_3",
+            "3.2.1, L1871",
+        ),
+        "3.3": Entry("The same without gravity; Table 3.1, 420 rpm, k = 0", "youssef.chapter_3", "3.2.1, L1925"),
+        "3.4": Entry(
+            "Slider over the crank angle, three springs; Table 3.1, 420 rpm", "youssef.chapter_3", "3.2.1, L1936"
+        ),
+        "3.5": Entry(
+            "Torque that holds the speed, three springs; Table 3.1, 420 rpm", "youssef.chapter_3", "3.2.1, L1987"
+        ),
+        "3.6": Entry(
+            "Launch with three torques: crank speed; Table 3.1, k = 1e6 dyn/cm", "youssef.chapter_3", "3.2.2, L2116"
+        ),
+        "3.7": Entry(
+            "Torque of a launch over its time to 1 rad; Table 3.1, k = 1e6 dyn/cm", "youssef.chapter_3", "3.2.2, L2134"
+        ),
+        "3.8": Entry(
+            "Launch with three torques: slider; Table 3.1, k = 1e6 dyn/cm", "youssef.chapter_3", "3.2.2, L2153"
+        ),
+        "3.9": Entry(
+            "Launch with three springs: crank speed; Table 3.1, T0 = 1e8 dyn.cm", "youssef.chapter_3", "3.2.2, L2169"
+        ),
+        "3.10": Entry(
+            "Launch with three springs: slider; Table 3.1, T0 = 1e8 dyn.cm", "youssef.chapter_3", "3.2.2, L2191"
+        ),
+        "3.11": Entry(
+            "Free motion: crank speed over the crank angle; Table 3.1, k = 5e5 dyn/cm",
+            "youssef.chapter_3",
+            "3.3, L2228",
+        ),
+        "3.12": Entry(
+            "Free motion: crank speed over the crank angle; Table 3.1, k = 2e6 dyn/cm",
+            "youssef.chapter_3",
+            "3.3, L2228",
+        ),
+        "3.13": Entry(
+            "Free motion: phase plane of the slider; Table 3.1, k = 5e5 dyn/cm", "youssef.chapter_3", "3.3, L2260"
+        ),
+        "3.14": Entry(
+            "Free motion: phase plane of the slider; Table 3.1, k = 2e6 dyn/cm", "youssef.chapter_3", "3.3, L2260"
+        ),
         "4.3": Entry("First harmonic over the speed without damping; chapter IV", "youssef.chapter_4"),
         "4.4": Entry("First harmonic over the speed with dampers; chapter IV, I4 = 1", "youssef.chapter_4"),
         "4.5": Entry("Harmonics near half the natural frequency; chapter IV, I4 = 1", "youssef.chapter_4"),

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cache
-from math import asin, ceil, pi
+from math import ceil
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,32 +16,22 @@ from numpy.typing import NDArray
 from linkwork.five_bar.parameters import FiveBarParameters, InitialState
 from linkwork.five_bar.published import (
     CM_PER_METRE,
-    DYN_CM_PER_NEWTON_METRE,
     DYN_PER_CM_PER_NEWTON_PER_METRE,
     RAD_S_PER_RPM,
     SETS,
     TABLE_3_1,
 )
 
-from ...run import Event, Inputs, TorsionBar, Trajectory, simulate
+from ...run import Inputs, simulate
 
-#: Transmission at which the coupler and the rocker count as collinear: |sin(th4 - th3)|.
-COLLINEAR_SINE = 0.3
 #: Crank speed of chapter III (rpm).
 SPEED = 420.0
-#: Dampings of Fig 3.2 and 3.3 (dyn.s/cm).
-DAMPINGS = (1e4, 5e4, 1e5, 5e5, 1e6)
 #: Springs of Fig 3.4 to 3.14 (dyn/cm).
 STIFFNESSES = (5e5, 1e6, 2e6)
-#: Torques of Fig 3.6 to 3.10 (dyn.cm).
-TORQUES = (1e7, 1e8, 2e8)
-#: Turns over which the drift is followed.
-DRIFT_TURNS = 40
-SAMPLES_PER_DRIFT_TURN = 120
+#: Part of the scale of a graph that its reader no longer sees.
+ON_THE_GRAPH = 0.05
 #: How long a motion is given to become steady (s).
 SETTLING_TIME = 8.0
-#: How long the launch and the free motion are followed (s).
-LAUNCH_TIME, COAST_TIME = 0.5, 2.0
 
 
 def table_3_1(stiffness: float, damping: float = 3e4, gravity: float = 9.81) -> FiveBarParameters:
@@ -70,52 +60,6 @@ def scientific(value: float) -> str:
     digits, exponent = plain(value).split("e")
     power = "10" + exponent.translate(str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹"))
     return power if digits == "1" else f"{digits}\N{MULTIPLICATION SIGN}{power}"
-
-
-@dataclass(frozen=True, slots=True)
-class Drift:
-    """The slider without a spring: turns of the crank, slider position (cm), and the turn at which the links line up.
-
-    ``collinear_turn`` is NaN if they never do.
-    """
-
-    turns: NDArray[np.float64]
-    slider_cm: NDArray[np.float64]
-    collinear_turn: float
-
-    def per_turn(self, turn: int) -> float:
-        """Drift over a turn (cm), the first being turn 1."""
-        n = SAMPLES_PER_DRIFT_TURN
-        return float(self.slider_cm[turn * n] - self.slider_cm[(turn - 1) * n])
-
-    @property
-    def until_collinear(self) -> NDArray[np.float64]:
-        """Slider position until the links line up (cm), NaN from there on."""
-        return np.where(self.turns > self.collinear_turn, np.nan, self.slider_cm)
-
-    @property
-    def growth(self) -> float:
-        """Drift over the third turn relative to the first: 1 if it is linear."""
-        return self.per_turn(3) / self.per_turn(1)
-
-
-@cache
-def drift(damping: float, gravity: float = 9.81) -> Drift:
-    """Table 3.1 at 420 rpm without a spring; ends at the limit of assembly."""
-    period = 60.0 / SPEED
-    angle = asin(COLLINEAR_SINE)
-    run = simulate(
-        table_3_1(0.0, damping, gravity),
-        Inputs(speed=SPEED * RAD_S_PER_RPM),
-        stop_time=DRIFT_TURNS * period,
-        step=period / SAMPLES_PER_DRIFT_TURN,
-        events=(
-            Event(name="folded", output="transmission.angle", level=angle, direction=-1),
-            Event(name="stretched", output="transmission.angle", level=pi - angle, direction=1),
-        ),
-    )
-    first = run.events[0].time / period if run.events else np.nan
-    return Drift(run["crank.angle"] / (2.0 * pi), CM_PER_METRE * run["slider.position"], first)
 
 
 @dataclass(frozen=True, slots=True)
@@ -191,19 +135,6 @@ def greatest(x: NDArray[np.float64], y: NDArray[np.float64]) -> tuple[float, flo
     return place, -value
 
 
-@cache
-def launch(torque: float, stiffness: float) -> Trajectory:
-    """Table 3.1 from rest under T = T0 (1 - th2) up to 1 rad, then none; T0 in dyn.cm. Its event is the release."""
-    return simulate(
-        table_3_1(stiffness),
-        Inputs(torque=TorsionBar(torque=torque / DYN_CM_PER_NEWTON_METRE)),
-        stop_time=LAUNCH_TIME,
-        step=5e-4,
-        events=(Event(name="release", output="crank.angle", level=1.0, direction=1),),
-    )
-
-
-@cache
-def coast(stiffness: float) -> Trajectory:
-    """Table 3.1 left to itself at 420 rpm, th2 = u = u' = 0."""
-    return simulate(table_3_1(stiffness), initial=SETS["table-3.1"].initial, stop_time=COAST_TIME, step=5e-4)
+def greatest_ratio(values: NDArray[np.float64]) -> float:
+    """The greatest ratio of a value to the one before it."""
+    return float((values[1:] / values[:-1]).max())

@@ -1,12 +1,14 @@
 """The linkage itself: a still and an animation.
 
-Table 3.1 at 420 rpm from the thesis's start, th2 = u = u' = 0, with the coupler point of our Fig 7.2: the slider swings into
-its steady motion within a few turns, and the path of P with it, across the coupler curves.
+Table 3.1 at 420 rpm from the thesis's start, th2 = u = u' = 0, with a coupler point P of ours: the slider swings into its
+steady motion within a few turns, and the path of P with it.
 """
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
+from math import radians
 from pathlib import Path
 
 import numpy as np
@@ -16,11 +18,11 @@ from linkwork.five_bar.published import CM_PER_METRE, RAD_S_PER_RPM
 from ...figures import Figure, animate_linkage, draw_linkage
 from ...run import Inputs, Trajectory, simulate
 from ..study import OURS, Study, StudyResult, at_most
-from ._runs import SPEED
-from .fig_7_2 import mechanism
+from ._runs import SPEED, table_3_1
 
 NUMBER = "linkage"
-
+#: With P 12 cm from the crank pin and 30 degrees off the coupler.
+MECHANISM = replace(table_3_1(1e6), coupler_point_distance=0.12, coupler_point_angle=radians(30.0))
 TURNS = 3
 #: Crank angle of the still, in the last turn (rad).
 STILL = 2.0 * np.pi * (TURNS - 1) + 1.0
@@ -30,7 +32,7 @@ STILL = 2.0 * np.pi * (TURNS - 1) + 1.0
 def run() -> Trajectory:
     """Three turns from the thesis's start."""
     period = 60.0 / SPEED
-    return simulate(mechanism(1), Inputs(speed=SPEED * RAD_S_PER_RPM), stop_time=TURNS * period, step=period / 240)
+    return simulate(MECHANISM, Inputs(speed=SPEED * RAD_S_PER_RPM), stop_time=TURNS * period, step=period / 240)
 
 
 def compute() -> StudyResult:
@@ -39,7 +41,7 @@ def compute() -> StudyResult:
     return StudyResult(
         number=NUMBER,
         claim="A five-bar linkage whose rocker pin slides on a sprung and damped guide has two degrees of freedom.",
-        assignment="The coupler point is that of our Fig 7.2.",
+        assignment="A picture of ours, with a coupler point of ours.",
         columns={
             "time [s]": t.time,
             "crank angle [rad]": t["crank.angle"],
@@ -57,12 +59,12 @@ def draw(result: StudyResult) -> Figure:
     last = angle >= angle[-1] - 2.0 * np.pi - 1e-9
     trace = np.column_stack([result.columns[f"{axis} of P [cm]"][last] for axis in "xy"]) / CM_PER_METRE
     u = float(np.interp(STILL, angle, result.columns["slider position u [cm]"])) / CM_PER_METRE
-    return draw_linkage(mechanism(1), STILL, u, title=result.heading, trace=trace)
+    return draw_linkage(MECHANISM, STILL, u, title=result.heading, trace=trace)
 
 
 def animate(result: StudyResult, path: Path) -> Path:
     """All of the run."""
-    return animate_linkage(mechanism(1), run(), path, frames=72, title=result.heading)
+    return animate_linkage(MECHANISM, run(), path, frames=72, title=result.heading)
 
 
 STUDY = Study(NUMBER, compute, draw, animate)

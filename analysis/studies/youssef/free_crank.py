@@ -1,0 +1,504 @@
+"""Fig 3.6 to 3.14: the crank launched by a torque, and left to itself.
+
+In a launch T0 t^2 is nearly constant, not T0 t, and below a least T0 the crank falls back. In free motion the slider's second
+harmonic is that of a resonance near half the natural frequency, but the damper lowers the speed of it and makes it broad.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache, partial
+from math import pi
+
+import numpy as np
+from numpy.typing import NDArray
+
+from linkwork.five_bar import dynamics, kinematics
+from linkwork.five_bar.parameters import InitialState
+from linkwork.five_bar.published import CM_PER_METRE, DYN_CM_PER_NEWTON_METRE, RAD_S_PER_RPM
+
+from ...figures import COLOURS, Curve, Figure, Panel, plot_curves
+from ...periodic import natural_frequency
+from ...run import Event, Inputs, TorsionBar, Trajectory, simulate
+from ..study import OURS, TEXT, Study, StudyResult, Verdict, at_least, at_most, near, padded, unjudged
+from ._runs import ON_THE_GRAPH, SPEED, STIFFNESSES, greatest_ratio, plain, scientific, table_3_1
+
+#: Torques of Fig 3.6 to 3.8, and those of the curve of 3.7 (dyn.cm).
+TORQUES = (1e7, 1e8, 2e8)
+TORQUE_RANGE = np.geomspace(TORQUES[0], TORQUES[-1], 14)
+#: Springs of the free motion (dyn/cm).
+SOFT, STIFF = 5e5, 2e6
+#: Crank speed about which the thesis sees higher harmonics, and what counts as about it (rad/s).
+HARMONIC_SPEED, ABOUT = 27.0, 2.7
+#: Crank angles in a turn of a free crank.
+SAMPLES = 256
+#: Quantity of a plot: what the axis calls it, output, factor to its unit, unit.
+Quantity = tuple[str, str, float, str]
+SLIDER: Quantity = ("slider position u", "slider.position", CM_PER_METRE, "cm")
+CRANK_SPEED: Quantity = ("crank speed", "crank.speed", 1.0, "rad/s")
+TIME = "time [s]"
+#: What is ours in the launches.
+UNSAID = (
+    "The text gives neither the damper of the launches nor, with three torques, the spring: here the damper of Fig 3.4 and the "
+    "middle one of its springs."
+)
+
+
+@cache
+def launch(torque: float, stiffness: float = 1e6, stop_time: float = 1.0, samples: int = 2000) -> Trajectory:
+    """Table 3.1 from rest under T = T0 (1 - th2) up to 1 rad, then none; its event, if it gets there, is the release."""
+    return simulate(
+        table_3_1(stiffness),
+        Inputs(torque=TorsionBar(torque=torque / DYN_CM_PER_NEWTON_METRE)),
+        stop_time=stop_time,
+        step=stop_time / samples,
+        events=(Event(name="release", output="crank.angle", level=1.0, direction=1),),
+    )
+
+
+def release_time(torque: float, stiffness: float = 1e6, stop_time: float = 1.0) -> float:
+    """Time from rest to th2 = 1 rad (s); infinite if the crank falls back before."""
+    events = launch(torque, stiffness, stop_time).events
+    return events[0].time if events else np.inf
+
+
+def accelerated(torque: float, stiffness: float = 1e6) -> Trajectory:
+    """A launch up to the end of its torque."""
+    return launch(torque, stiffness, release_time(torque, stiffness), 1000)
+
+
+def least_torque() -> float:
+    """The least T0 (dyn.cm) that turns the crank by 1 rad, to half a per cent."""
+    low, high = 1e5, 1e7
+    while high / low > 1.01:
+        middle = float(np.sqrt(low * high))
+        low, high = (low, middle) if np.isfinite(release_time(middle, stop_time=3.0)) else (middle, high)
+    return float(np.sqrt(low * high))
+
+
+@cache
+def coast(stiffness: float) -> Trajectory:
+    """Table 3.1 left to itself in its steady motion at 420 rpm, at crank angle 0."""
+    period, speed = 60.0 / SPEED, SPEED * RAD_S_PER_RPM
+    steady = simulate(table_3_1(stiffness), Inputs(speed=speed), stop_time=20.0 * period, step=period)
+    u, v = (float(steady[name][-1]) for name in ("slider.position", "slider.velocity"))
+    initial = InitialState(crank_speed=speed, slider_position=u, slider_velocity=v)
+    return simulate(table_3_1(stiffness), initial=initial, stop_time=10.0, step=5e-4)
+
+
+@dataclass(frozen=True, slots=True)
+class Turns:
+    """A free crank over each of its whole turns, as samples at equal crank angles.
+
+    Attributes
+    ----------
+    ends : ndarray
+        Time at which each ends (s).
+    speed, speed_range : ndarray
+        Crank speed: 2 pi over the time of the turn, and its range (rad/s).
+    slider, slider_range : ndarray
+        Slider position: mean and range (cm).
+    first, second : ndarray
+        Harmonics of the crank's turn in the slider position (cm).
+    energy_share : ndarray
+        Relative range of the mechanical energy over that of the crank speed squared.
+    """
+
+    ends: NDArray[np.float64]
+    speed: NDArray[np.float64]
+    speed_range: NDArray[np.float64]
+    slider: NDArray[np.float64]
+    slider_range: NDArray[np.float64]
+    first: NDArray[np.float64]
+    second: NDArray[np.float64]
+    energy_share: NDArray[np.float64]
+
+    @classmethod
+    def of(cls, run: Trajectory, start: float = 0.0) -> Turns:
+        """The turns from a crank angle (rad) on."""
+        angle = run["crank.angle"]
+        marks = np.arange(start, angle[-1], 2.0 * pi)
+        times = np.interp(marks, angle, run.time)
+        grid = marks[:-1, None] + np.linspace(0.0, 2.0 * pi, SAMPLES, endpoint=False)
+        energy = run["energy.kinetic"] + run["energy.potential"]
+        u, w, e = (np.interp(grid, angle, x) for x in (run["slider.position"], run["crank.speed"], energy))
+        harmonics = 2.0 * CM_PER_METRE / SAMPLES * np.abs(np.fft.rfft(u, axis=1))
+        return cls(
+            ends=times[1:],
+            speed=2.0 * pi / np.diff(times),
+            speed_range=np.ptp(w, axis=1),
+            slider=CM_PER_METRE * u.mean(axis=1),
+            slider_range=CM_PER_METRE * np.ptp(u, axis=1),
+            first=harmonics[:, 1],
+            second=harmonics[:, 2],
+            energy_share=np.ptp(e, axis=1) / e.mean(axis=1) / np.ptp(w * w, axis=1) * (w * w).mean(axis=1),
+        )
+
+    @property
+    def transient(self) -> int:
+        """Turns until the mean slider position is furthest from its start, whereupon it decays."""
+        return int(np.abs(self.slider).argmax())
+
+    @property
+    def shown(self) -> int:
+        """Turns until the mean crank speed falls below `HARMONIC_SPEED`."""
+        return 1 + int(np.argmax(self.speed < HARMONIC_SPEED))
+
+
+def half_natural_frequencies(stiffness: float) -> NDArray[np.float64]:
+    """Half the natural frequency of the slider (rad/s) with the effective mass at each crank angle, at u = 0."""
+    parameters = table_3_1(stiffness)
+    p = parameters.constants()
+    places = (kinematics.position(angle, 0.0, p) for angle in np.linspace(0.0, 2.0 * pi, 721).tolist())
+    masses = [dynamics.inertia(g, kinematics.coefficients(g, p), p).m22 for g in places]
+    return 0.5 * np.sqrt(parameters.slider_stiffness / np.array(masses))
+
+
+def _energy_verdict(*runs: Trajectory) -> Verdict:
+    """That no energy is lost or made: the largest residual of the balance relative to the energy that is in play."""
+    worst = max(
+        float(np.abs(run["energy.residual"]).max() / max(run["energy.supplied"].max(), run["energy.kinetic"].max()))
+        for run in runs
+    )
+    return at_most("residual of the energy balance, relative to the energy in play", OURS, 1e-7, worst)
+
+
+# --- Launches: 3.6 to 3.10
+
+
+def _by_torque() -> dict[str, Trajectory]:
+    return {f"T0 = {plain(torque)} dyn.cm": launch(torque) for torque in TORQUES}
+
+
+def _by_spring() -> dict[str, Trajectory]:
+    return {f"k = {plain(k)} dyn/cm": launch(1e8, k) for k in STIFFNESSES}
+
+
+def _launch_result(
+    number: str, claim: str, runs: Mapping[str, Trajectory], quantity: Quantity, *verdicts: Verdict
+) -> StudyResult:
+    """A quantity of launches over time, with the times at which their torques end."""
+    name, output, factor, unit = quantity
+    columns = {TIME: next(iter(runs.values())).time}
+    columns |= {f"{name}; {label} [{unit}]": factor * run[output] for label, run in runs.items()}
+    columns |= {f"end of the torque; {label} [s]": np.array([run.events[0].time]) for label, run in runs.items()}
+    every = (*verdicts, _energy_verdict(*runs.values()))
+    return StudyResult(number=number, claim=claim, assignment=UNSAID, columns=padded(columns), verdicts=every)
+
+
+def draw_launches(values: Sequence[float], legend: str, result: StudyResult) -> Figure:
+    """A quantity over time, a circle where the crank has turned by 1 rad and the torque ends."""
+    time, *columns = result.columns.values()
+    name = list(result.columns)[1]
+    curves, circles = [], []
+    for colour, value, y, end in zip(COLOURS, values, columns[:3], columns[3:]):
+        curves.append(Curve(x=time, y=y, label=scientific(value), colour=colour))
+        circles.append(Curve(x=end[:1], y=np.interp(end[:1], time, y), colour=colour, line="", marker="o"))
+    panel = Panel(
+        x_label="time [s]",
+        y_label=f"{name.partition(';')[0]} [{name.rpartition('[')[2]}",
+        curves=[*curves, *circles, Curve(x=[], y=[], colour="0.3", line="", marker="o", label="1 rad")],
+        legend=legend,
+        legend_at="outside",
+        x_range=(0.0, float(time[-1])),
+    )
+    return plot_curves([panel], title=result.heading)
+
+
+def _rise_verdicts(runs: Mapping[str, Trajectory], place: str) -> list[Verdict]:
+    """Whether the crank speed rises along a line up to its peak, and peaks before the torque ends."""
+    verdicts, angles = [], []
+    for label, run in runs.items():
+        peak = int(run["crank.speed"].argmax())
+        w, t = run["crank.speed"][: peak + 1], run.time[: peak + 1]
+        angles.append(run["crank.angle"][peak])
+        statement = f"crank speed's distance from a line up to its peak, relative to the peak; {label}"
+        bow, why = np.abs(w / w[-1] - t / t[-1]).max(), "it levels off as the torque falls"
+        verdicts.append(at_most(statement, TEXT, ON_THE_GRAPH, bow, place=place, why=why))
+    statement = "crank angle at which the torque no longer accelerates, greatest"
+    return [*verdicts, at_most(statement, TEXT, 1.0, max(angles), "rad", place=place)]
+
+
+def _swing_verdicts(*turns: Turns, places: tuple[str, str]) -> list[Verdict]:
+    """Whether the crank speed swings within a turn, and its mean falls from turn to turn."""
+    swing = min((t.speed_range / t.speed).min() for t in turns)
+    fall = max(greatest_ratio(t.speed) for t in turns)
+    return [
+        at_least(
+            "range of the crank speed relative to its mean, least of all turns", TEXT, 0.1, swing, place=places[0]
+        ),
+        at_most("mean crank speed relative to the turn before, greatest", TEXT, 1.0, fall, place=places[1]),
+    ]
+
+
+def _after(runs: Mapping[str, Trajectory]) -> list[Turns]:
+    """The turns after the torque has ended."""
+    return [Turns.of(run, start=1.0) for run in runs.values()]
+
+
+def launch_speeds() -> StudyResult:
+    """The crank speed after launches with the three torques."""
+    return _launch_result(
+        "3.6",
+        "The speed rises linearly until the torque no longer accelerates the crank, then swings and decays.",
+        _by_torque(),
+        CRANK_SPEED,
+        *_rise_verdicts({f"T0 = {plain(torque)} dyn.cm": accelerated(torque) for torque in TORQUES}, "L2124 to L2134"),
+        *_swing_verdicts(*_after(_by_torque()), places=("L2147", "L2147")),
+        near("crank speed at 0.25 s; T0 = 1e8", OURS, 72.7805553, launch(1e8)["crank.speed"][500], 5e-8, "rad/s"),
+    )
+
+
+def torque_over_time() -> StudyResult:
+    """Time to 1 rad over the torque, the exponent, and where the torque is too small."""
+    time = np.array([release_time(float(torque)) for torque in TORQUE_RANGE])
+    slope = float(np.mean(np.diff(np.log(TORQUES)) / np.diff(np.log([release_time(torque) for torque in TORQUES]))))
+    fitted = np.polyfit(np.log(time), np.log(TORQUE_RANGE), 1)[0]
+    constant = TORQUE_RANGE * time**2
+    nearly, falls = "T0 t^2 is nearly constant", "below it the crank falls back"
+    return StudyResult(
+        number="3.7",
+        claim="T0 is hyperbolic in the time to 1 rad, with the axes as asymptotes.",
+        assignment=UNSAID,
+        columns={"T0 [dyn.cm]": TORQUE_RANGE, "time to 1 rad [s]": time, "T0 t^2 [dyn.cm.s2]": constant},
+        verdicts=(
+            near("exponent of T0 in the time to 1 rad", TEXT, -1.0, slope, 0.05, place="L2140", why=nearly),
+            near("T0 as the time grows", TEXT, 0.0, least_torque(), 5e5, "dyn.cm", place="L2142", why=falls),
+            near("time to 1 rad as T0 grows: 1e12 dyn.cm", TEXT, 0.0, release_time(1e12), 1e-3, "s", place="L2142"),
+            near("exponent, mean of the two between the three torques", OURS, -1.95, slope, 0.005),
+            near("exponent, fitted to all of the curve", OURS, -1.95, fitted, 0.02),
+            at_most("spread of T0 t^2 over a factor of 20 in T0", OURS, 0.15, np.ptp(constant) / constant.mean()),
+            near("time to 1 rad; T0 = 1e8 dyn.cm", OURS, 0.02137446194, release_time(1e8), 1e-10, "s"),
+        ),
+    )
+
+
+def draw_torque_over_time(result: StudyResult) -> Figure:
+    """Torque over time, and on logarithmic axes, with lines of exponent -1 and -2 through T0 = 1e8."""
+    torque, time = result.columns["T0 [dyn.cm]"], result.columns["time to 1 rad [s]"]
+    hinge, three = float(np.interp(1e8, torque, time)), np.interp(TORQUES, torque, time)
+    curves = [
+        Curve(x=time, y=torque, label="computed"),
+        Curve(x=three, y=TORQUES, line="", marker="o", colour=COLOURS[0], label="the thesis's torques"),
+        Curve(x=time, y=1e8 * (hinge / time) ** 2, label=r"$T_0\,t^2$ constant", line="--", colour="#333333"),
+        Curve(x=time, y=1e8 * hinge / time, label=r"$T_0\,t$ constant", line=":", colour="#333333"),
+    ]
+    x, y = "time to 1 rad [s]", r"$T_0$ [dyn cm]"
+    left = Panel(x_label=x, y_label=y, curves=curves, x_range=(0.0, 0.075), y_range=(0.0, 2.2e8))
+    right = Panel(x_label=x, y_label=y, curves=curves, logarithmic="xy", x_ticks=(0.015, 0.02, 0.03, 0.05, 0.07))
+    return plot_curves([left, right], title=result.heading, columns=2, size=(4.4, 3.6))
+
+
+def _reference_position() -> Verdict:
+    u = CM_PER_METRE * launch(1e8)["slider.position"][500]
+    return near("u at 0.25 s; T0 = 1e8 dyn.cm, k = 1e6 dyn/cm", OURS, -0.611604, u, 5e-8, "cm")
+
+
+def launch_positions() -> StudyResult:
+    """The slider after launches with the three torques."""
+    runs = _by_torque()
+    turns = _after(runs)
+    largest = max(float(np.abs(run["slider.position"]).max()) for run in runs.values())
+    later = turns[2].transient - max(t.transient for t in turns[:2])
+    shift = turns[2].slider.mean() / turns[1].slider.mean()
+    verdicts = [
+        at_least("turns until u decays, T0 = 2e8 less the lower ones", TEXT, 1.0, later, "turns", place="L2157"),
+        at_least("mean of u, T0 = 2e8 relative to T0 = 1e8 dyn.cm", TEXT, 1.0, shift, place="L2165"),
+    ]
+    for label, run in runs.items():
+        u, within = CM_PER_METRE * run["slider.position"].max(), CM_PER_METRE * ON_THE_GRAPH * largest
+        statement, why = f"greatest u, the start's; {label}", "" if u < within else "it swings to both sides"
+        verdicts.append(near(statement, TEXT, 0.0, u, within, "cm", place="L2161", why=why))
+    claim = "The harder the launch, the further the slider moves from its start, and the later it settles to a decay."
+    return _launch_result("3.8", claim, runs, SLIDER, *verdicts, _reference_position())
+
+
+def launch_speeds_by_spring() -> StudyResult:
+    """The crank speed after launches with the three springs."""
+    rises = {f"k = {plain(k)} dyn/cm": accelerated(1e8, k) for k in STIFFNESSES}
+    speeds = np.array([run["crank.speed"] for run in rises.values()])
+    apart, angle = np.ptp(speeds, axis=0).max() / speeds.max(), launch(1e8)["crank.angle"][500]
+    return _launch_result(
+        "3.9",
+        "The speed rises linearly, with all springs alike, until the torque no longer accelerates the crank.",
+        _by_spring(),
+        CRANK_SPEED,
+        *_rise_verdicts(rises, "L2175 to L2181"),
+        at_most("spread of the crank speed while the torque acts", TEXT, ON_THE_GRAPH, apart, place="L2187"),
+        *_swing_verdicts(*_after(_by_spring()), places=("L2181", "L2183")),
+        near("crank angle at 0.25 s; T0 = 1e8 dyn.cm, k = 1e6 dyn/cm", OURS, 17.8051227, angle, 5e-8, "rad"),
+    )
+
+
+def launch_positions_by_spring() -> StudyResult:
+    """The slider after launches with the three springs."""
+    runs = _by_spring()
+    apart = np.ptp([accelerated(1e8, k)["slider.position"] for k in STIFFNESSES], axis=0).max()
+    apart /= np.ptp([run["slider.position"] for run in runs.values()])
+    springs, torques = (np.ptp([t.transient for t in _after(each)]) for each in (runs, _by_torque()))
+    longer = "turns until u decays, longest less shortest of the three {}".format
+    return _launch_result(
+        "3.10",
+        "The slider moves alike with all springs while the torque acts; a transient follows, whose duration depends on spring "
+        "and torque, and then a steady decay.",
+        runs,
+        SLIDER,
+        at_most("spread of u while the torque acts, relative to the graph", TEXT, ON_THE_GRAPH, apart, place="L2191"),
+        at_least(longer("springs"), TEXT, 1.0, springs, "turns", place="L2195 to L2205"),
+        at_least(longer("torques"), TEXT, 1.0, torques, "turns", place="L2195 to L2205"),
+        _reference_position(),
+    )
+
+
+# --- Free motion: 3.11 to 3.14
+
+
+def _coast_result(
+    number: str, claim: str, run: Trajectory, columns: Mapping[str, NDArray[np.float64]], *verdicts: Verdict
+) -> StudyResult:
+    """Columns of a free motion up to where it is shown."""
+    turns = Turns.of(run)
+    last = int(np.searchsorted(run.time, turns.ends[turns.shown - 1]))
+    return StudyResult(
+        number=number,
+        claim=claim,
+        assignment=(
+            "The text does not say at which crank angle the torque is taken away, nor how long the motion is followed: here at "
+            f"0 from the steady motion, until the mean crank speed falls below {HARMONIC_SPEED:g} rad/s, which the text names."
+        ),
+        columns={name: values[: last + 1] for name, values in columns.items()},
+        verdicts=(*verdicts, _energy_verdict(run)),
+    )
+
+
+def free_speed(number: str, stiffness: float) -> StudyResult:
+    """The crank speed over the crank angle in free motion."""
+    run = coast(stiffness)
+    turns, label = Turns.of(run), f"k = {plain(stiffness)} dyn/cm"
+    energy, ratio, share = run["energy.kinetic"] + run["energy.potential"], greatest_ratio(turns.speed_range), 0.25
+    taken = np.ptp(run["energy.dissipated"]) / (energy[0] - energy[-1])
+    return _coast_result(
+        number,
+        "The speed of the crank that is left to itself swings; the swing and the mean decrease.",
+        run,
+        {
+            "turns of the crank [1]": run["crank.angle"] / (2.0 * pi),
+            f"crank speed; {label} [rad/s]": run["crank.speed"],
+        },
+        *_swing_verdicts(turns, places=("L2243", "L2249")),
+        at_most("range of the crank speed relative to the turn before, greatest", TEXT, 1.0, ratio, place="L2245"),
+        at_most(
+            "range of the energy in a turn relative to that of the crank speed squared, greatest",
+            *(TEXT, share, turns.energy_share.max()),
+            place="L2253",
+        ),
+        near("part of the energy's fall that the damper takes", TEXT, 1.0, taken, 1e-6, place="L2255"),
+        at_most("rise of the mechanical energy between two samples", OURS, 1e-8, np.diff(energy).max(), "J"),
+    )
+
+
+def draw_free_speed(result: StudyResult) -> Figure:
+    """Crank speed over crank angle."""
+    turns, speed = result.columns.values()
+    curve, across = Curve(x=turns, y=speed), (0.0, float(turns[-1]))
+    panel = Panel(x_label="turns of the crank", y_label="crank speed [rad/s]", curves=[curve], x_range=across)
+    return plot_curves([panel], title=result.heading)
+
+
+def _phase_plane(number: str, stiffness: float, *verdicts: Verdict) -> StudyResult:
+    """Velocity over position of the slider in free motion, and what is said of both springs."""
+    run = coast(stiffness)
+    turns, label = Turns.of(run), f"k = {plain(stiffness)} dyn/cm"
+    # the first turns are the transient of the release
+    swing, mean = (greatest_ratio(np.abs(x[2 : turns.shown])) for x in (turns.slider_range, turns.slider))
+    second, drawing = (turns.second / turns.first).min(), "it is said of the drawing, which we do not have"
+    return _coast_result(
+        number,
+        "The slider tends to u = 0 and u' = 0 with decreasing swings, a drift, and higher harmonics.",
+        run,
+        {
+            f"slider position u; {label} [cm]": CM_PER_METRE * run["slider.position"],
+            f"slider velocity; {label} [cm/s]": CM_PER_METRE * run["slider.velocity"],
+        },
+        at_most(
+            "range of u relative to the turn before, from the fourth on, greatest", TEXT, 1.0, swing, place="L2281"
+        ),
+        at_most("mean of u relative to the turn before, from the fourth on, greatest", TEXT, 1.0, mean, place="L2283"),
+        at_least("second harmonic of u relative to the first, least of all turns", TEXT, 0.1, second, place="L2293"),
+        *verdicts,
+        unjudged("the curves are smooth but for the sampling", TEXT, drawing, place="L2266 to L2276"),
+    )
+
+
+def soft_phase_plane() -> StudyResult:
+    """That with the soft spring, whose mean position lies further from u = 0."""
+    turns = [Turns.of(coast(k)) for k in (SOFT, STIFF)]
+    drift, distance = (a / b for a, b in zip(*((np.ptp(t.slider[: t.shown]), abs(t.slider[0])) for t in turns)))
+    words = "{} relative to that with k = 2e6 dyn/cm".format
+    return _phase_plane(
+        "3.13",
+        SOFT,
+        at_least(words("drift of the mean of u"), TEXT, 1.0, drift, place="L2289"),
+        at_least(words("distance of the mean of u from 0 at the start"), TEXT, 1.0, distance, place="L2291"),
+    )
+
+
+def stiff_phase_plane() -> StudyResult:
+    """That with the stiff spring, whose higher harmonics the thesis explains by a resonance."""
+    soft, stiff = (Turns.of(coast(k)) for k in (SOFT, STIFF))
+    # the mean speed falls from turn to turn
+    seen = [float(np.interp(-HARMONIC_SPEED, -t.speed, t.second / t.first)) for t in (stiff, soft)]
+    most, resonance = (stiff.speed[(stiff.second / by).argmax()] for by in (stiff.first, stiff.speed**2))
+    parameters, over_turn = table_3_1(STIFF), half_natural_frequencies(STIFF)
+    half = 0.5 * natural_frequency(parameters)
+    # an oscillator with this damping ratio swings most at sqrt(1 - 2 ratio^2) of its natural frequency
+    ratio = parameters.slider_damping * half / parameters.slider_stiffness
+    lowered, broad = 1.0 - np.sqrt(1.0 - 2.0 * ratio**2), "the damper lowers the speed and makes it broad"
+    compared = "second harmonic over the first at a mean crank speed of 27 rad/s, relative to that with k = 5e5 dyn/cm"
+    greatest, squared = (
+        "mean crank speed of the greatest second harmonic over the {}".format,
+        "speed squared, over half of the natural",
+    )
+    with_mass = "half the natural frequency, with the {} effective mass of a turn".format
+    return _phase_plane(
+        "3.14",
+        STIFF,
+        at_least(compared, TEXT, 1.0, seen[0] / seen[1], place="L2299"),
+        near(greatest("first"), TEXT, HARMONIC_SPEED, most, ABOUT, "rad/s", place="L2301", why=broad),
+        near(with_mass("mean"), TEXT, HARMONIC_SPEED, half, ABOUT, "rad/s", place="L2303"),
+        near(greatest(squared), TEXT, 1.0, resonance / half, lowered, place="L2305"),
+        at_least(with_mass("least"), TEXT, HARMONIC_SPEED, over_turn.max(), "rad/s", place="L2309 to L2317"),
+        at_most(with_mass("greatest"), TEXT, HARMONIC_SPEED, over_turn.min(), "rad/s", place="L2309 to L2317"),
+        near("half the natural frequency", OURS, 25.55, half, 0.005, "rad/s"),
+    )
+
+
+def draw_phase_plane(result: StudyResult) -> Figure:
+    """Velocity over position, with the start S and the finish F."""
+    u, v = result.columns.values()
+    start = Curve(x=u[:1], y=v[:1], colour="black", line="", marker="s", label="S, start")
+    finish = Curve(x=u[-1:], y=v[-1:], colour="black", line="", marker="o", label="F, finish")
+    panel = Panel(
+        x_label="slider position u [cm]",
+        y_label="slider velocity [cm/s]",
+        curves=[Curve(x=u, y=v, width=0.7), start, finish],
+        legend_at="outside",
+    )
+    return plot_curves([panel], title=result.heading, size=(6.4, 4.6))
+
+
+_by_torques = partial(draw_launches, TORQUES, r"$T_0$ [dyn cm]")
+_by_springs = partial(draw_launches, STIFFNESSES, "stiffness k [dyn/cm]")
+#: The studies of 3.6 to 3.14.
+STUDIES = (
+    Study("3.6", launch_speeds, _by_torques),
+    Study("3.7", torque_over_time, draw_torque_over_time),
+    Study("3.8", launch_positions, _by_torques),
+    Study("3.9", launch_speeds_by_spring, _by_springs),
+    Study("3.10", launch_positions_by_spring, _by_springs),
+    Study("3.11", partial(free_speed, "3.11", SOFT), draw_free_speed),
+    Study("3.12", partial(free_speed, "3.12", STIFF), draw_free_speed),
+    Study("3.13", soft_phase_plane, draw_phase_plane),
+    Study("3.14", stiff_phase_plane, draw_phase_plane),
+)
