@@ -86,7 +86,7 @@ TORQUE_DIFFERENCE_OF_PEAK = 0.096
 TORQUE_REVERSAL_DEG_DYN_CM = ((327.0, 1.46e7), (16.0, -2.00e7))
 # fig. 3.14, k = 2e6: half the natural frequency with the mean effective mass (rad/s); the thesis has "around 27"
 HALF_NATURAL_FREQUENCY_RAD_S = 25.55
-# section 3.2.2: the thesis calls T0 hyperbolic in the time to 1 rad; T0 t^2 is nearly constant, exponent of t on T0
+# fig. 3.7: the thesis calls T0 hyperbolic in the time to 1 rad; T0 t^2 is nearly constant, exponent of t on T0
 TORQUE_TIME_EXPONENT = -1.95
 
 # --- Errors of the source in chapters II and III

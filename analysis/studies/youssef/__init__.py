@@ -16,7 +16,9 @@ FIGURES: Mapping[str, Entry] = MappingProxyType(
             "youssef.chapter_3",
             "3.2.1, L1871",
         ),
-        "3.3": Entry("The same without gravity; Table 3.1, 420 rpm, k = 0", "youssef.chapter_3", "3.2.1, L1925"),
+        "3.3": Entry(
+            "Slider without a spring and gravity, five dampers; Table 3.1, 420 rpm", "youssef.chapter_3", "3.2.1, L1925"
+        ),
         "3.4": Entry(
             "Slider over the crank angle, three springs; Table 3.1, 420 rpm", "youssef.chapter_3", "3.2.1, L1936"
         ),
@@ -32,19 +34,15 @@ FIGURES: Mapping[str, Entry] = MappingProxyType(
         "3.8": Entry(
             "Launch with three torques: slider; Table 3.1, k = 1e6 dyn/cm", "youssef.chapter_3", "3.2.2, L2153"
         ),
-        "3.9": Entry(
-            "Launch with three springs: crank speed; Table 3.1, T0 = 1e8 dyn.cm", "youssef.chapter_3", "3.2.2, L2169"
-        ),
-        "3.10": Entry(
-            "Launch with three springs: slider; Table 3.1, T0 = 1e8 dyn.cm", "youssef.chapter_3", "3.2.2, L2191"
-        ),
+        "3.9": Entry("Launch with three springs: crank speed; T0 = 1e8 dyn.cm", "youssef.chapter_3", "3.2.2, L2169"),
+        "3.10": Entry("Launch with three springs: slider; T0 = 1e8 dyn.cm", "youssef.chapter_3", "3.2.2, L2191"),
         "3.11": Entry(
-            "Free motion: crank speed over the crank angle; Table 3.1, k = 5e5 dyn/cm",
+            "Free motion: crank speed; Table 3.1, k = 5e5 dyn/cm",
             "youssef.chapter_3",
             "3.3, L2228",
         ),
         "3.12": Entry(
-            "Free motion: crank speed over the crank angle; Table 3.1, k = 2e6 dyn/cm",
+            "Free motion: crank speed; Table 3.1, k = 2e6 dyn/cm",
             "youssef.chapter_3",
             "3.3, L2228",
         ),

@@ -30,6 +30,8 @@ SPEED = 420.0
 STIFFNESSES = (5e5, 1e6, 2e6)
 #: Part of the scale of a graph that its reader no longer sees.
 ON_THE_GRAPH = 0.05
+#: How far from linear, relative to itself, what counts as linear may be.
+LINEAR = 0.1
 #: How long a motion is given to become steady (s).
 SETTLING_TIME = 8.0
 

@@ -1,6 +1,7 @@
 """The figures of chapter III: the five-bar slider of Table 3.1 driven at 420 rpm, and those of `free_crank`.
 
-What the thesis reads from its graphs is judged to `ON_THE_GRAPH` of what the graph shows, unless it gives a number.
+What the thesis reads from its graphs is judged to `ON_THE_GRAPH` of what the graph shows, and what it calls linear to `LINEAR`,
+unless it gives a number.
 
 Without a spring (3.2, 3.3) the slider does not drift linearly: gravity and the mean of the inertia forces push it towards the
 crank, and the nearer it comes the harder they push. Only with the two strongest dampers is the drift near enough to a line over
@@ -26,6 +27,7 @@ from ...run import Event, Inputs, Trajectory, simulate
 from ..study import OURS, TEXT, Study, StudyResult, Verdict, at_least, at_most, curves_of, near, padded
 from . import free_crank
 from ._runs import (
+    LINEAR,
     ON_THE_GRAPH,
     SPEED,
     STIFFNESSES,
@@ -48,8 +50,6 @@ COLLINEAR_SINE = 0.3
 #: Turns over which the drift is followed.
 DRIFT_TURNS = 40
 SAMPLES_PER_DRIFT_TURN = 120
-#: What counts as linear in the drift: a turn's relative to another's.
-LINEAR = 0.1
 #: By damping (dyn.s/cm): turns at which coupler and rocker are collinear, and half a unit of the last figure given.
 COLLINEAR = {1e4: (3.0, 0.05), 5e4: (4.9, 0.05), 1e5: (8.0, 0.05), 5e5: (36.0, 0.5)}
 #: Dampers (dyn.s/cm) with which the drift has a rate.

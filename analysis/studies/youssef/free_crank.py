@@ -22,7 +22,7 @@ from ...figures import COLOURS, Curve, Figure, Panel, plot_curves
 from ...periodic import natural_frequency
 from ...run import Event, Inputs, TorsionBar, Trajectory, simulate
 from ..study import OURS, TEXT, Study, StudyResult, Verdict, at_least, at_most, near, padded, unjudged
-from ._runs import ON_THE_GRAPH, SPEED, STIFFNESSES, greatest_ratio, plain, scientific, table_3_1
+from ._runs import LINEAR, ON_THE_GRAPH, SPEED, STIFFNESSES, greatest_ratio, plain, scientific, table_3_1
 
 #: Torques of Fig 3.6 to 3.8, and those of the curve of 3.7 (dyn.cm).
 TORQUES = (1e7, 1e8, 2e8)
@@ -206,18 +206,19 @@ def draw_launches(values: Sequence[float], legend: str, result: StudyResult) -> 
     return plot_curves([panel], title=result.heading)
 
 
-def _rise_verdicts(runs: Mapping[str, Trajectory], place: str) -> list[Verdict]:
+def _rise_verdicts(runs: Sequence[Trajectory], place: str) -> list[Verdict]:
     """Whether the crank speed rises along a line up to its peak, and peaks before the torque ends."""
-    verdicts, angles = [], []
-    for label, run in runs.items():
+    bows, angles = [], []
+    for run in runs:
         peak = int(run["crank.speed"].argmax())
         w, t = run["crank.speed"][: peak + 1], run.time[: peak + 1]
+        bows.append(np.abs(w / w[-1] - t / t[-1]).max())
         angles.append(run["crank.angle"][peak])
-        statement = f"crank speed's distance from a line up to its peak, relative to the peak; {label}"
-        bow, why = np.abs(w / w[-1] - t / t[-1]).max(), "it levels off as the torque falls"
-        verdicts.append(at_most(statement, TEXT, ON_THE_GRAPH, bow, place=place, why=why))
-    statement = "crank angle at which the torque no longer accelerates, greatest"
-    return [*verdicts, at_most(statement, TEXT, 1.0, max(angles), "rad", place=place)]
+    line, end = "crank speed's distance from a line up to its peak, over the peak", "crank angle of the peak, greatest"
+    return [
+        at_most(line, TEXT, LINEAR, max(bows), place=place),
+        at_most(end, TEXT, 1.0, max(angles), "rad", place=place),
+    ]
 
 
 def _swing_verdicts(*turns: Turns, places: tuple[str, str]) -> list[Verdict]:
@@ -244,7 +245,7 @@ def launch_speeds() -> StudyResult:
         "The speed rises linearly until the torque no longer accelerates the crank, then swings and decays.",
         _by_torque(),
         CRANK_SPEED,
-        *_rise_verdicts({f"T0 = {plain(torque)} dyn.cm": accelerated(torque) for torque in TORQUES}, "L2124 to L2134"),
+        *_rise_verdicts([accelerated(torque) for torque in TORQUES], "L2124 to L2134"),
         *_swing_verdicts(*_after(_by_torque()), places=("L2147", "L2147")),
         near("crank speed at 0.25 s; T0 = 1e8", OURS, 72.7805553, launch(1e8)["crank.speed"][500], 5e-8, "rad/s"),
     )
@@ -316,8 +317,8 @@ def launch_positions() -> StudyResult:
 
 def launch_speeds_by_spring() -> StudyResult:
     """The crank speed after launches with the three springs."""
-    rises = {f"k = {plain(k)} dyn/cm": accelerated(1e8, k) for k in STIFFNESSES}
-    speeds = np.array([run["crank.speed"] for run in rises.values()])
+    rises = [accelerated(1e8, k) for k in STIFFNESSES]
+    speeds = np.array([run["crank.speed"] for run in rises])
     apart, angle = np.ptp(speeds, axis=0).max() / speeds.max(), launch(1e8)["crank.angle"][500]
     return _launch_result(
         "3.9",
