@@ -412,7 +412,7 @@ def torque_result() -> StudyResult:
                 place="L2001, L2023",
                 why="they differ most where the torque hardly does",
             ),
-            at_most("mean torque beyond the damper's, over the peak", TEXT, 1e-5, unpaid, place="L2007 to L2017"),
+            at_most("mean torque beyond the damper's, over the peak", TEXT, 1e-5, unpaid, place="L2007-2017"),
             near("difference between k = 5e5 and 2e6, relative to the peak", OURS, 0.096, spread.max(), 5e-4),
             near("greatest torque; k = 1e6 dyn/cm", OURS, 1.46e7, high, 0.005e7, "dyn.cm"),
             near("crank angle of the greatest torque", OURS, 327.0, high_at, 0.5, "deg"),

@@ -245,7 +245,7 @@ def launch_speeds() -> StudyResult:
         "The speed rises linearly until the torque no longer accelerates the crank, then swings and decays.",
         _by_torque(),
         CRANK_SPEED,
-        *_rise_verdicts([accelerated(torque) for torque in TORQUES], "L2124 to L2134"),
+        *_rise_verdicts([accelerated(torque) for torque in TORQUES], "L2124-2134"),
         *_swing_verdicts(*_after(_by_torque()), places=("L2147", "L2147")),
         near("crank speed at 0.25 s; T0 = 1e8", OURS, 72.7805553, launch(1e8)["crank.speed"][500], 5e-8, "rad/s"),
     )
@@ -325,7 +325,7 @@ def launch_speeds_by_spring() -> StudyResult:
         "The speed rises linearly, with all springs alike, until the torque no longer accelerates the crank.",
         _by_spring(),
         CRANK_SPEED,
-        *_rise_verdicts(rises, "L2175 to L2181"),
+        *_rise_verdicts(rises, "L2175-2181"),
         at_most("spread of the crank speed while the torque acts", TEXT, ON_THE_GRAPH, apart, place="L2187"),
         *_swing_verdicts(*_after(_by_spring()), places=("L2181", "L2183")),
         near("crank angle at 0.25 s; T0 = 1e8 dyn.cm, k = 1e6 dyn/cm", OURS, 17.8051227, angle, 5e-8, "rad"),
@@ -346,8 +346,8 @@ def launch_positions_by_spring() -> StudyResult:
         runs,
         SLIDER,
         at_most("spread of u while the torque acts, relative to the graph", TEXT, ON_THE_GRAPH, apart, place="L2191"),
-        at_least(longer("springs"), TEXT, 1.0, springs, "turns", place="L2195 to L2205"),
-        at_least(longer("torques"), TEXT, 1.0, torques, "turns", place="L2195 to L2205"),
+        at_least(longer("springs"), TEXT, 1.0, springs, "turns", place="L2195-2205"),
+        at_least(longer("torques"), TEXT, 1.0, torques, "turns", place="L2195-2205"),
         _reference_position(),
     )
 
@@ -428,7 +428,7 @@ def _phase_plane(number: str, stiffness: float, *verdicts: Verdict) -> StudyResu
         at_most("mean of u relative to the turn before, from the fourth on, greatest", TEXT, 1.0, mean, place="L2283"),
         at_least("second harmonic of u relative to the first, least of all turns", TEXT, 0.1, second, place="L2293"),
         *verdicts,
-        unjudged("the curves are smooth but for the sampling", TEXT, drawing, place="L2266 to L2276"),
+        unjudged("the curves are smooth but for the sampling", TEXT, drawing, place="L2266-2276"),
     )
 
 
@@ -469,8 +469,8 @@ def stiff_phase_plane() -> StudyResult:
         near(greatest("first"), TEXT, HARMONIC_SPEED, most, ABOUT, "rad/s", place="L2301", why=broad),
         near(with_mass("mean"), TEXT, HARMONIC_SPEED, half, ABOUT, "rad/s", place="L2303"),
         near(greatest(squared), TEXT, 1.0, resonance / half, lowered, place="L2305"),
-        at_least(with_mass("least"), TEXT, HARMONIC_SPEED, over_turn.max(), "rad/s", place="L2309 to L2317"),
-        at_most(with_mass("greatest"), TEXT, HARMONIC_SPEED, over_turn.min(), "rad/s", place="L2309 to L2317"),
+        at_least(with_mass("least"), TEXT, HARMONIC_SPEED, over_turn.max(), "rad/s", place="L2309-2317"),
+        at_most(with_mass("greatest"), TEXT, HARMONIC_SPEED, over_turn.min(), "rad/s", place="L2309-2317"),
         near("half the natural frequency", OURS, 25.55, half, 0.005, "rad/s"),
     )
 
