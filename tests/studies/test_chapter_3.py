@@ -37,7 +37,7 @@ REFUTED = {
     ("3.5", "angle from the greatest difference of the slider's acceleration to the nearer extreme of the torque"),
     ("3.7", "exponent of T0 in the time to 1 rad"),
     ("3.7", "T0 as the time grows"),
-    ("3.8", "greatest u, the start's; T0 = 1e7 dyn.cm"),
+    ("3.8", "greatest u; T0 = 1e7 dyn.cm"),
     ("3.14", "mean crank speed of the greatest second harmonic over the first"),
 }
 #: What is said of the drawings alone.

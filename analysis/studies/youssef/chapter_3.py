@@ -408,7 +408,11 @@ def torque_result() -> StudyResult:
             ),
             near(
                 nearest("slider's acceleration"),
-                *(TEXT, 0.0, away[2 + accelerations.argmax()], 10.0, "deg"),
+                TEXT,
+                0.0,
+                away[2 + accelerations.argmax()],
+                10.0,
+                "deg",
                 place="L2001, L2023",
                 why="they differ most where the torque hardly does",
             ),
