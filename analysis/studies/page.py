@@ -31,7 +31,7 @@ def figures(numbers: Iterable[str]) -> str:
             lines += [f"*{result.assignment}*", ""]
         lines += [f"`linkwork figures {number}`", "", _HEADINGS]
         for v in result.verdicts:
-            computed = " ".join(part for part in (v.found, v.why) if part)
+            computed = "; ".join(part for part in (v.found, v.why) if part)
             outcome = v.outcome if v.holds else f"**{v.outcome}**"
             lines.append(f"| {v.statement} | {v.source} | {v.place} | {v.expected} | {computed} | {outcome} |")
         lines.append("")

@@ -58,7 +58,7 @@ class Verdict:
         source = f"{self.source}, {self.place}" if self.place else self.source
         if self.computed is None:
             return f"{self.statement} ({source}): {UNJUDGED}: {self.why}"
-        outcome = HOLDS if self.holds else FAILS.upper()
+        outcome = HOLDS if self.holds else f"{FAILS.upper()}{self.why and f': {self.why}'}"
         return f"{self.statement}: {self.expected} ({source}), computed {self.found}: {outcome}"
 
     @property
