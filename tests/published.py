@@ -116,7 +116,8 @@ class ThesisAndRight(NamedTuple):
     right: float
 
 
-# undamped resonance (rad/s) by I4
+# undamped resonance (rad/s) by I4: the determinant vanishes at two speeds near each other, and this is the lower one, but the
+# upper one of the thesis's at I4 = 1.5
 RESONANCE: Mapping[float, ThesisAndRight] = MappingProxyType(
     {
         0.5: ThesisAndRight(31.0763, 31.0975),
@@ -124,14 +125,16 @@ RESONANCE: Mapping[float, ThesisAndRight] = MappingProxyType(
         1.5: ThesisAndRight(30.0645, 30.1220),
     }
 )
+# the same at I4 = 1 with the printed coefficients of (4.21) in the program's place
+RESONANCE_PRINTED = 30.6120
 # lower and upper end in lambda_k^2 of the first unstable region by I4: thesis's appendix 3, and about the periodic orbit
 FIRST_REGION_THESIS = MappingProxyType({0.5: (0.25786, 0.26031), 1.0: (0.26580, 0.27054), 1.5: (0.27382, 0.28069)})
 FIRST_REGION = MappingProxyType({0.5: (0.258298, 0.259203), 1.0: (0.266540, 0.268367), 1.5: (0.274727, 0.277501)})
-# nonlinear runs at I4 = 1 by lambda_k^2: whether they stay bounded
+# nonlinear runs at I4 = 1 by lambda_k^2: whether they stay bounded; the first lies just below the thesis's region
 BOUNDED_AT = MappingProxyType({0.2655: True, 0.26745: False, 0.2695: True})
-# omega_c (1/s) that removes the region everywhere up to I4 = 1.5: read off by the thesis, by its own equation, true
+# omega_c (1/s) that removes the region everywhere up to I4 = 1.5: stated by the thesis, by its appendix 4 when run, true
 REMOVING_DAMPING_READ_OFF, REMOVING_DAMPING_THESIS, REMOVING_DAMPING = 0.45, 0.459, 0.167
-# second harmonic near half the natural frequency: how many times too small the thesis's is, "about"
+# second harmonic near half the natural frequency: how many times too small that of appendix 2 is when run, "about"
 SECOND_HARMONIC_TOO_SMALL = 7.0
 
 # --- RIGS: chapter VIII, speeds in rpm by spring, stated or measured by the thesis and right. Its 580 and 1160 rpm are as 1 to

@@ -17,7 +17,6 @@ from .harmonics import two_harmonics as two_harmonics
 from .hill import PeriodicEquation as PeriodicEquation
 from .hill import Region as Region
 from .hill import SingularEquationError as SingularEquationError
-from .hill import Truncation as Truncation
 from .hill import boundary_stiffnesses as boundary_stiffnesses
 from .hill import determinant as determinant
 from .hill import hill_determinant as hill_determinant
@@ -25,7 +24,7 @@ from .hill import hill_multipliers as hill_multipliers
 from .hill import hill_regions as hill_regions
 from .hill import monodromies as monodromies
 from .hill import monodromy as monodromy
-from .hill import perturbed_operator as perturbed_operator
+from .hill import perturbed_boundary as perturbed_boundary
 from .hill import perturbed_region as perturbed_region
 from .hill import perturbed_removing_damping as perturbed_removing_damping
 from .stability import linear_equation as linear_equation
@@ -33,6 +32,7 @@ from .stability import linear_monodromy as linear_monodromy
 from .stability import linear_motion as linear_motion
 from .stability import linear_test as linear_test
 from .stability import linear_verdict as linear_verdict
+from .thesis import Form as Form
 from .workspace import AccessibleArea as AccessibleArea
 from .workspace import Arc as Arc
 from .workspace import CouplerCurve as CouplerCurve

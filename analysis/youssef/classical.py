@@ -48,7 +48,7 @@ class Approximations:
 
 
 def approximations(response: Response, points: int = 160) -> Approximations:
-    """The classical approximations over the range of a response: two harmonics as printed and put right, and ten harmonics.
+    """The classical approximations over the range of a response: two harmonics and ten of equation (4.21) put right.
 
     Raises
     ------
@@ -71,7 +71,6 @@ def approximations(response: Response, points: int = 160) -> Approximations:
 
 #: Approximations by name: variant of the linear equation and harmonics balanced.
 _APPROXIMATIONS = {
-    "two harmonics, printed (4.21)": (Variant.PRINTED, 2),
     "two harmonics": (Variant.SECOND_ORDER, 2),
     "ten harmonics": (Variant.EXACT, 10),
 }

@@ -6,16 +6,17 @@ With zeta = u/l4, ' = d/d(theta2), masses relative to m45 = m4 + m5 and forces t
 
 where lambda_k^2 = k/(m45 omega^2), lambda_c = mu/(m45 omega), and M, K, F have the period of the crank. They are
 the exact derivatives of the plant's own functions at u = u' = 0, so that any mechanism will do: coupler with mass, centres
-of mass anywhere, gravity, load, preloaded spring, inclined guide. The velocity terms bring M' zeta' with them.
+of mass anywhere, gravity, load, preloaded spring, inclined guide. The velocity terms bring M' zeta' with them. The thesis's own
+coefficients, which lack it, are variants.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import StrEnum
 from functools import cache, partial
-from math import isfinite, pi, sqrt
+from math import isfinite, pi, sin, sqrt
 from types import MappingProxyType
 from typing import NamedTuple
 
@@ -31,6 +32,9 @@ from ..numerics import symbolic
 from ..numerics.fourier import FourierSeries
 from ..run import constants, takes_published, traced
 from ..units import Amount, in_si
+from . import thesis
+from .hill import PeriodicEquation
+from .thesis import Form
 
 #: Part of the largest amplitude that the harmonics left out of the exact coefficients have at most.
 NEGLIGIBLE = 1e-13
@@ -48,16 +52,11 @@ class Variant(StrEnum):
     FIRST_ORDER, SECOND_ORDER
         Taylor polynomials in the crank's length (sigma2 = l2/l4), harmonics up to 1 and up to 2.
     PRINTED
-        Those of second order without M' zeta'. Of (4.21) as printed we know that it leaves this term out, an error; that the
-        rest of it is right is inferred.
+        Those of (4.21) as the thesis prints them; see `analysis.youssef.thesis`.
     FORTRAN
-        Those of ``PRINTED`` with every first-order term halved, as in the listings of appendices 2 to 4. The listings also
-        differ from the printed formulas in K, in a way that we have no record of and could not infer, so that this variant
-        does not reproduce what they give. For I4 = 0.5, 1, 1.5 it has the resonance at 31.0936, 30.5902, 30.1106 rad/s
-        (listings: 31.0763, 30.5572, 30.0645), the first unstable region at lambda_k^2 = 0.25786-0.25968, 0.26573-0.26937,
-        0.27359-0.27905 (0.25786-0.26031, 0.26580-0.27054, 0.27382-0.28069), which omega_c = 0.33 removes (0.459).
-        With the first harmonic of K halved and that of M not, 0.459 comes out, and widths of the regions that are those of
-        the listings to 2e-5 once divided by 4 lambda_k^2; but neither the middles nor the resonances. Nothing tried has all.
+        Those of the listings of appendices 2 and 4, which halve every term in the crank's length.
+    APPENDIX_3
+        Those of appendix 3: the same with a sine where a cosine belongs.
     """
 
     EXACT = "exact"
@@ -65,16 +64,17 @@ class Variant(StrEnum):
     SECOND_ORDER = "second order"
     PRINTED = "printed"
     FORTRAN = "FORTRAN"
+    APPENDIX_3 = "appendix 3"
 
 
-#: Weights of the orders in the crank's length.
-_WEIGHTS: Mapping[Variant, tuple[float, ...]] = MappingProxyType(
+#: Highest power of the crank's length in a variant's Taylor polynomial.
+_POWERS: Mapping[Variant, int] = MappingProxyType({Variant.FIRST_ORDER: 1, Variant.SECOND_ORDER: 2})
+#: Coefficients of the thesis.
+_THESIS: Mapping[Variant, Callable[[thesis.Linkage], thesis.Parts]] = MappingProxyType(
     {
-        Variant.FIRST_ORDER: (1.0, 1.0),
-        Variant.SECOND_ORDER: (1.0, 1.0, 1.0),
-        Variant.PRINTED: (1.0, 1.0, 1.0),
-        # appendices 2-4: every first-order term is half of what it should be
-        Variant.FORTRAN: (1.0, 0.5, 1.0),
+        Variant.PRINTED: thesis.printed,
+        Variant.FORTRAN: thesis.listed,
+        Variant.APPENDIX_3: partial(thesis.listed, function=sin),
     }
 )
 
@@ -188,6 +188,9 @@ def require_speed(speed: float) -> None:
         raise InputError(f"crank speed {speed!r} rad/s: it must be finite and greater than zero")
 
 
+_ONE = FourierSeries.constant(1.0)
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SliderEquation:
     """(M zeta')' + lambda_c zeta' + (lambda_k^2 + K) zeta = F, eq (4.21) put right; dimensionless.
@@ -198,8 +201,10 @@ class SliderEquation:
         M; K, without lambda_k^2; F.
     spring, damping : float
         lambda_k^2 and lambda_c.
+    spring_factor, damping_factor : FourierSeries
+        What multiplies them: 1, but periodic in the thesis's equation.
     mass_rate : bool
-        Whether M' zeta' is kept; (4.21) as printed leaves it out.
+        Whether M' zeta' is kept; the thesis's equation leaves it out.
     variant : Variant
         Where the coefficients come from.
 
@@ -214,6 +219,8 @@ class SliderEquation:
     force: FourierSeries
     spring: float
     damping: float
+    spring_factor: FourierSeries = field(default=_ONE)
+    damping_factor: FourierSeries = field(default=_ONE)
     mass_rate: bool = True
     variant: Variant = Variant.EXACT
 
@@ -221,10 +228,16 @@ class SliderEquation:
         if not (isfinite(self.spring) and isfinite(self.damping)):
             raise InputError(f"lambda_k^2 = {self.spring} and lambda_c = {self.damping} must be finite")
 
-    def coefficients(self) -> tuple[FourierSeries, FourierSeries, FourierSeries]:
-        """a, b, c of a zeta'' + b zeta' + c zeta = F: M, M' + lambda_c (or lambda_c alone), lambda_k^2 + K."""
+    def homogeneous(self) -> PeriodicEquation:
+        """The equation without F and without its spring: lambda_k^2 is the stiffness that its regions are over."""
         rate = self.mass.derivative() if self.mass_rate else FourierSeries.constant(0.0)
-        return self.mass, rate + self.damping, self.stiffness + self.spring
+        b = rate + self.damping * self.damping_factor
+        return PeriodicEquation(a=self.mass, b=b, c=self.stiffness, factor=self.spring_factor)
+
+    def coefficients(self) -> tuple[FourierSeries, FourierSeries, FourierSeries]:
+        """a, b, c of a zeta'' + b zeta' + c zeta = F: M, M' + lambda_c, lambda_k^2 + K, with the factors."""
+        whole = self.homogeneous().stiffened(self.spring)
+        return whole.a, whole.b, whole.c
 
 
 @takes_published()
@@ -235,6 +248,7 @@ def slider_equation(
     *,
     variant: Variant = Variant.EXACT,
     order: int | None = None,
+    form: Form = Form.STABILITY,
     load: Load = NO_LOAD,
 ) -> SliderEquation:
     """The slider's equation linearised about u = 0 at a crank speed.
@@ -248,13 +262,16 @@ def slider_equation(
     variant : Variant
     order : int, optional
         Highest harmonic kept of the exact coefficients; without it all down to rounding.
+    form : Form
+        What becomes of the thesis's own coefficients; the others have no forms.
     load : Load
 
     Raises
     ------
     InputError
         If the speed is not positive and finite, there is Coulomb friction, an order is asked for of a variant that has its
-        own, or the mechanism comes so near its limit of assembly that the harmonics do not die away.
+        own, or the mechanism comes so near its limit of assembly that the harmonics do not die away; of the thesis's own
+        coefficients also if there is a load, or what `analysis.youssef.thesis` leaves out.
     AssemblyError
         If at u = 0 the links cannot be joined over the whole turn.
     """
@@ -264,17 +281,32 @@ def slider_equation(
     if variant is not Variant.EXACT and order is not None:
         raise InputError(f"an order cannot be chosen with the variant {variant.value!r}: it has its own")
     p = parameters.constants()
+    spring, damping = p.k / (p.m45 * speed**2), p.mu / (p.m45 * speed)
+    if variant in _THESIS:
+        if load != NO_LOAD:
+            raise InputError(f"{load}: the thesis's equation has no load")
+        parts = thesis.formed(_THESIS[variant](thesis.linkage(parameters)), form)
+        return SliderEquation(
+            mass=parts.inertia,
+            stiffness=parts.stiffness,
+            force=parts.force,
+            spring=spring,
+            damping=damping,
+            spring_factor=parts.spring,
+            damping_factor=parts.damper,
+            mass_rate=False,
+            variant=variant,
+        )
     if variant is Variant.EXACT:
         mass, stiffness, force = _exact(p, speed, load, order)
     else:
-        mass, stiffness, force = _taylor(p, speed, load, np.array(_WEIGHTS[variant]))
+        mass, stiffness, force = _taylor(p, speed, load, _POWERS[variant])
     return SliderEquation(
         mass=mass * (1.0 / p.m45),
         stiffness=stiffness * (1.0 / (p.m45 * speed**2)),
         force=force * (1.0 / (p.m45 * speed**2 * p.l4)),
-        spring=p.k / (p.m45 * speed**2),
-        damping=p.mu / (p.m45 * speed),
-        mass_rate=variant not in (Variant.PRINTED, Variant.FORTRAN),
+        spring=spring,
+        damping=damping,
         variant=variant,
     )
 
@@ -317,17 +349,14 @@ def _tail(series: FourierSeries) -> int:
     return int(np.flatnonzero(size > NEGLIGIBLE * size.max())[-1]) if size.max() > 0.0 else 0
 
 
-def _taylor(
-    p: Constants, speed: float, load: Load, weights: NDArray[np.float64]
-) -> tuple[FourierSeries, FourierSeries, FourierSeries]:
-    """The same as Taylor polynomials in the crank's length, a weight per order; no harmonic is higher than that order."""
-    order = len(weights) - 1
+def _taylor(p: Constants, speed: float, load: Load, order: int) -> tuple[FourierSeries, FourierSeries, FourierSeries]:
+    """The same as Taylor polynomials in the crank's length; no harmonic is higher than their order."""
     bare, loaded = _without_spring(p, load)
     # the function expands about no crank at all
     bare = bare._replace(l2=0.0)
     angle = np.linspace(0.0, 2.0 * pi, 8, endpoint=False)
     _require_assembly(angle, np.zeros(8), bare)
     terms = np.array([np.broadcast_to(term, 8) for term in _traced()["taylor"](angle, speed, bare, loaded)])
-    values = np.tensordot(weights * p.l2 ** np.arange(order + 1), terms.reshape(3, 3, 8)[: order + 1], axes=1)
+    values = np.tensordot(p.l2 ** np.arange(order + 1), terms.reshape(3, 3, 8)[: order + 1], axes=1)
     mass, stiffness, force = (FourierSeries.from_samples(value, order) for value in values)
     return mass, stiffness, force

@@ -1,8 +1,8 @@
-"""Linear equations with periodic coefficients, a y'' + b y' + c y = 0 with period 2 pi (Youssef, chapter V).
+"""Linear equations with periodic coefficients, a y'' + b y' + (c + lambda s) y = 0 with period 2 pi (Youssef, chapter V).
 
 Three ways to their stability that share nothing but the coefficients: the monodromy matrix by integration (`monodromies`),
 Hill's infinite determinant cut off at an order (`hill_multipliers`, `hill_determinant`, `boundary_stiffnesses`), and
-perturbation for small harmonics (`perturbed_region`).
+perturbation for small harmonics (`perturbed_boundary`, `perturbed_region`).
 
 A region of parametric instability is numbered by N: it starts, as the harmonics vanish, from the stiffness at which the
 natural frequency is N/2 of the coefficients', and on its boundaries one Floquet multiplier is (-1)^N.
@@ -11,10 +11,9 @@ natural frequency is N/2 of the coefficients', and on its boundaries one Floquet
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from enum import StrEnum
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
-from math import ceil, isfinite, pi
+from math import ceil, pi
 
 import numpy as np
 import scipy.linalg
@@ -46,11 +45,14 @@ class PeriodicEquation:
     ----------
     a, b, c : FourierSeries
         ``a`` must not pass zero.
+    factor : FourierSeries
+        s, what multiplies the stiffness lambda that `stiffened` adds: 1, but periodic in the thesis's equation.
     """
 
     a: FourierSeries
     b: FourierSeries
     c: FourierSeries
+    factor: FourierSeries = field(default=FourierSeries.constant(1.0))
 
     @classmethod
     def mathieu(cls, p: float, q: float, damping: float = 0.0) -> PeriodicEquation:
@@ -64,11 +66,11 @@ class PeriodicEquation:
     @property
     def order(self) -> int:
         """Highest harmonic of the coefficients."""
-        return max(series.order for series in (self.a, self.b, self.c))
+        return max(series.order for series in (self.a, self.b, self.c, self.factor))
 
     def stiffened(self, stiffness: float) -> PeriodicEquation:
-        """The equation with a constant added to c."""
-        return PeriodicEquation(a=self.a, b=self.b, c=self.c + stiffness)
+        """The equation with a stiffness added: c + lambda s in the place of c."""
+        return replace(self, c=self.c + stiffness * self.factor)
 
 
 class SingularEquationError(InputError):
@@ -320,7 +322,7 @@ def hill_multipliers(equation: PeriodicEquation, *, order: int | None = None) ->
 def boundary_stiffnesses(
     equation: PeriodicEquation, multiplier: int, *, count: int, order: int | None = None
 ) -> NDArray[np.complex128]:
-    """Constants that, added to c, give the equation the multiplier +1 or -1: all boundaries at once, as eigenvalues.
+    """Stiffnesses that give the equation the multiplier +1 or -1: all boundaries at once, as eigenvalues; eq (5.35).
 
     Parameters
     ----------
@@ -350,15 +352,19 @@ def boundary_stiffnesses(
             f"{count} boundaries from {len(k)} harmonics: ask for no more than those, and for one at least"
         )
     matrix = -_operator(equation, k)
-    hermitian = np.abs(matrix - matrix.conj().T).max() <= 1e-13 * np.abs(matrix).max()
-    found = np.linalg.eigvalsh(matrix) if hermitian else np.linalg.eigvals(matrix)
+    if equation.factor.order:
+        found = scipy.linalg.eigvals(matrix, _toeplitz(equation.factor, len(k)))
+    else:
+        matrix = matrix / equation.factor.mean
+        hermitian = np.abs(matrix - matrix.conj().T).max() <= 1e-13 * np.abs(matrix).max()
+        found = np.linalg.eigvalsh(matrix) if hermitian else np.linalg.eigvals(matrix)
     values: NDArray[np.complex128] = found.astype(np.complex128)
     return values[np.argsort(values.real, kind="stable")][:count]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Region:
-    """A region of parametric instability on the axis of the stiffness added to c.
+    """A region of parametric instability on the axis of the stiffness lambda.
 
     Attributes
     ----------
@@ -405,105 +411,67 @@ def hill_regions(equation: PeriodicEquation, count: int, *, order: int | None = 
 # Perturbation
 
 
-class Truncation(StrEnum):
-    """Which perturbation formula is used.
+def _perturbed(equation: PeriodicEquation, number: int, order: int) -> NDArray[np.complex128]:
+    """Stiffnesses on the boundaries of the region N: one for N = 0, else two, a complex pair if damping has removed it.
 
-    Attributes
-    ----------
-    RIGHT
-        Ours, of the equation with M' y'.
-    PRINTED
-        Of the equation as (4.21) is printed, without M' y': an error of the thesis. It changes the sign with which the
-        harmonics of M enter the width.
-    APPENDIX_3
-        Ours without the factor 1/k0 in the terms of second order, as the listing of appendix 3 evaluates (5.16).
+    On the harmonics exp(i k x) the equation is (V - lambda S) y = 0. To first order only the harmonics k = +-N/2 count; the
+    others act on them through the sum over q of (V_jq - lambda S_jq) (V_qk - lambda S_qk) / (V_qq - lambda S_qq), at the
+    lambda without any harmonics, which is of second order.
     """
+    if order not in (1, 2):
+        raise InputError(f"region {number} to order {order}: the order is 1 or 2")
+    if not (equation.a.mean > 0.0 and equation.factor.mean > 0.0):
+        raise InputError(
+            f"the means of M and S are {equation.a.mean} and {equation.factor.mean}: they must be positive"
+        )
+    n, size = 0.5 * number, equation.order
+    k = np.arange(-(size + number), size + 1.0) + n
+    v, s = -_operator(equation, k), _toeplitz(equation.factor, len(k))
+    k0, s0 = equation.a.mean, equation.factor.mean
+    start = (k0 * n * n - equation.c.mean) / s0
+    inside = np.abs(k) == n
+    left = v - start * s
+    if order == 1:
+        # lambda where it multiplies a harmonic is the one without any
+        near = left[np.ix_(inside, inside)] / s0 + start * np.eye(inside.sum())
+        return np.linalg.eigvals(near)
+    others = ~inside
+    through = left[np.ix_(inside, others)] / (k0 * (k[others] ** 2 - n * n)) @ left[np.ix_(others, inside)]
+    near = v[np.ix_(inside, inside)] - through
+    found: NDArray[np.complex128] = scipy.linalg.eigvals(near, s[np.ix_(inside, inside)])
+    return found
 
-    RIGHT = "right"
-    PRINTED = "printed"
-    APPENDIX_3 = "appendix 3"
 
-
-def perturbed_operator(
-    mass: FourierSeries,
-    stiffness: FourierSeries,
-    number: int,
-    *,
-    order: int = 2,
-    truncation: Truncation = Truncation.RIGHT,
-) -> NDArray[np.complex128]:
-    """The 2 x 2 matrix on exp(i n x), exp(-i n x), n = N/2, whose eigenvalues are the boundaries without damping.
-
-    (M y')' + (lambda + K) y = 0 on exp(i k x) is lambda y_j = sum over k of V_jk y_k with V_jk = M_(j-k) j k - K_(j-k),
-    M and K by their coefficients in exponential form and k0 the mean of M. To first order only the two harmonics +-n count;
-    the others act on them through
-
-        sum over q != +-n of V_jq V_qk / (k0 (n^2 - q^2)),
-
-    which is of second order in the harmonics of M and K.
+def perturbed_boundary(equation: PeriodicEquation, *, order: int = 2) -> float:
+    """The zeroth boundary for small harmonics, eq (5.13) to second order: below it the motion falls away.
 
     Raises
     ------
     InputError
-        If the number is not positive, the order is neither 1 nor 2, or the mean of M is not positive.
+        If the order is neither 1 nor 2, or the mean of a or of the factor is not positive.
     """
-    if number < 1 or order not in (1, 2):
-        raise InputError(f"region {number} to order {order}: regions count from 1, and the order is 1 or 2")
-    if not mass.mean > 0.0:
-        raise InputError(f"the mean of M is {mass.mean}: it must be positive")
-    n, size = 0.5 * number, max(mass.order, stiffness.order)
-    reach = np.arange(-(size + number), size + 1.0) + n
-    k0 = mass.mean
-    m, k = (series.to_order(2 * len(reach)).exponential for series in (mass, stiffness))
-    middle = 2 * len(reach)
-
-    def coupling(j: float, q: float) -> complex:
-        difference = round(j - q) + middle
-        inertia = q * q if truncation is Truncation.PRINTED else j * q
-        own = k0 * inertia if j == q else 0.0
-        return complex(m[difference] * inertia - own - k[difference])
-
-    sides = (n, -n)
-    matrix = np.array([[coupling(j, q) + (k0 * n * n if j == q else 0.0) for q in sides] for j in sides])
-    if order == 2:
-        divisor = 1.0 if truncation is Truncation.APPENDIX_3 else k0
-        for q in reach.tolist():
-            if abs(q) != n:
-                through = np.array([[coupling(j, q) * coupling(q, i) for i in sides] for j in sides])
-                matrix = matrix + through / (divisor * (n * n - q * q))
-    return matrix
+    return float(_perturbed(equation, 0, order)[0].real)
 
 
-def perturbed_region(
-    mass: FourierSeries,
-    stiffness: FourierSeries,
-    number: int,
-    *,
-    damping: float = 0.0,
-    order: int = 2,
-    truncation: Truncation = Truncation.RIGHT,
-) -> Region | None:
-    """Boundaries in lambda_k^2 of (M y')' + lambda_c y' + (lambda_k^2 + K) y = 0 for small harmonics of M and K.
+def perturbed_region(equation: PeriodicEquation, number: int, *, order: int = 2) -> Region | None:
+    """Boundaries of the region N in the stiffness lambda for small harmonics.
 
-    To first order, eq (5.13)::
+    For (M y')' + lambda_c y' + (lambda + K) y = 0 to first order::
 
-        lambda_k^2 = k0 N^2/4 - K0 -+ |N^2/4 M_N + K_N|,
+        lambda = k0 N^2/4 - K0 -+ sqrt(|N^2/4 M_N + K_N|^2 - (N lambda_c/2)^2),
 
-    with M_N and K_N the complex coefficients of exp(i N x); to second order, eq (5.16), see `perturbed_operator`; with
-    damping, eq (5.26), the square of the half width falls by (N lambda_c / 2)^2. The thesis's derivation is by Lindstedt's
-    method; the formulas here are ours, by degenerate perturbation of Hill's matrix, which gives the same series.
+    k0 and K0 the means of M and K, M_N and K_N the complex coefficients of exp(i N x): eq (5.16) for N = 1, undamped. To second
+    order it is eq (5.26) for N = 2, undamped. The thesis's derivation is by Lindstedt's method; ours, by degenerate
+    perturbation of Hill's matrix, gives the same series.
 
     Parameters
     ----------
-    mass, stiffness : FourierSeries
-        M and K.
+    equation : PeriodicEquation
+        Damping counts as of the order of the half width.
     number : int
-        N.
-    damping : float
-        lambda_c, which counts as of the order of the half width.
+        N, from 1; for N = 0 see `perturbed_boundary`.
     order : int
         1 or 2.
-    truncation : Truncation
 
     Returns
     -------
@@ -513,27 +481,20 @@ def perturbed_region(
     Raises
     ------
     InputError
-        As `perturbed_operator`, or if the damping is negative or not finite.
+        As `perturbed_boundary`, or if the number is not positive.
     """
-    if not (isfinite(damping) and damping >= 0.0):
-        raise InputError(f"lambda_c is {damping}: it must be a finite number, zero or greater")
-    matrix = perturbed_operator(mass, stiffness, number, order=order, truncation=truncation)
-    middle = 0.5 * float((matrix[0, 0] + matrix[1, 1]).real)
-    square = float((matrix[0, 1] * matrix[1, 0]).real) - (0.5 * number * damping) ** 2
-    if square < 0.0:
+    if number < 1:
+        raise InputError(f"region {number}: regions count from 1")
+    ends = np.sort_complex(_perturbed(equation, number, order))
+    if np.abs(ends.imag).max() > REAL * max(1.0, float(np.abs(ends).max())):
         return None
-    half = float(np.sqrt(square))
-    return Region(number=number, low=middle - half, high=middle + half)
+    return Region(number=number, low=float(ends[0].real), high=float(ends[1].real))
 
 
-def perturbed_removing_damping(
-    mass: FourierSeries,
-    stiffness: FourierSeries,
-    number: int,
-    *,
-    order: int = 2,
-    truncation: Truncation = Truncation.RIGHT,
-) -> float:
-    """lambda_c at which the region N vanishes, after (5.26): twice the half width without damping, over N."""
-    matrix = perturbed_operator(mass, stiffness, number, order=order, truncation=truncation)
-    return 2.0 * float(np.sqrt(abs(matrix[0, 1] * matrix[1, 0]))) / number
+def perturbed_removing_damping(equation: PeriodicEquation, number: int, *, order: int = 2) -> float:
+    """lambda_c at which damping removes the region N of an undamped equation: twice the half width over N.
+
+    It multiplies a factor of the mean of s, as the stiffness does.
+    """
+    region = perturbed_region(equation, number, order=order)
+    return region.width / number if region else 0.0

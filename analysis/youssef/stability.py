@@ -37,8 +37,8 @@ def linear_equation(parameters: FiveBarParameters, drive: Drive, variant: Varian
     if drive.speed is None:
         raise InputError("the linear equation is at constant speed: the drive is by torque")
     require_five_bar(parameters, "the linear equation")
-    a, b, c = slider_equation(parameters, drive.speed, variant=variant, load=load_of(drive)).coefficients()
-    return PeriodicEquation(a=a, b=b, c=c)
+    equation = slider_equation(parameters, drive.speed, variant=variant, load=load_of(drive))
+    return equation.homogeneous().stiffened(equation.spring)
 
 
 @takes_published()

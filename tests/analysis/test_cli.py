@@ -400,7 +400,7 @@ def test_resonance_of_a_published_set(linkwork, tmp_path):
     assert header.startswith("branch,drive.speed [rad/s],turns in a period")
     assert (out / "rig-2-spring-c-resonance.png").read_bytes().startswith(b"\x89PNG")
     rows = np.loadtxt(out / "rig-2-spring-c-resonance-approximations.csv", delimiter=",", skiprows=1)
-    assert rows.shape[1] == 4
+    assert rows.shape[1] == 3
 
 
 def test_resonance_reports_a_fold(linkwork):

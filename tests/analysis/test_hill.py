@@ -28,8 +28,6 @@ from analysis.youssef import (
     PeriodicEquation,
     SingularEquationError,
     SliderEquation,
-    Truncation,
-    Variant,
     boundary_stiffnesses,
     determinant,
     hill_determinant,
@@ -37,6 +35,7 @@ from analysis.youssef import (
     hill_regions,
     monodromies,
     monodromy,
+    perturbed_boundary,
     perturbed_region,
     perturbed_removing_damping,
     slider_equation,
@@ -69,17 +68,16 @@ def integrated(equation: PeriodicEquation) -> np.ndarray:
     return end.reshape(2, 2)
 
 
-def slider(inertia_ratio: float, sigma2: float | None = None, variant: Variant = Variant.EXACT) -> SliderEquation:
+def slider(inertia_ratio: float, sigma2: float | None = None) -> SliderEquation:
     """The slider's equation of chapters IV and V, of which M and K do not depend on the speed."""
     mechanism = chapter_4(inertia_ratio)
     if sigma2 is not None:
         mechanism = replace(mechanism, crank_length=sigma2 * mechanism.rocker_length)
-    return slider_equation(mechanism, 60.0, variant=variant)
+    return slider_equation(mechanism, 60.0)
 
 
 def without_spring(equation: SliderEquation, damping: float = 0.0) -> PeriodicEquation:
-    a, b, _ = equation.coefficients()
-    return PeriodicEquation(a=a, b=b + damping, c=equation.stiffness)
+    return replace(equation, damping=damping).homogeneous()
 
 
 # Floquet
@@ -224,7 +222,7 @@ def test_perturbed_boundaries_approach_the_right_ones(order: int, rate: float) -
     for sigma2 in lengths:
         equation = slider(1.0, sigma2)
         right = hill_regions(without_spring(equation), 1)[1]
-        found = perturbed_region(equation.mass, equation.stiffness, 1, order=order)
+        found = perturbed_region(without_spring(equation), 1, order=order)
         assert found is not None
         errors.append((abs(found.low - right.low), abs(found.high - right.high)))
     rates = np.polyfit(np.log(lengths), np.log(errors), 1)[0]
@@ -235,7 +233,7 @@ def test_second_region_needs_the_second_order() -> None:
     """Its width is of second order, and the first harmonics make part of it."""
     equation = slider(1.0, 0.02)
     right = hill_regions(without_spring(equation), 2)[2]
-    first, second = (perturbed_region(equation.mass, equation.stiffness, 2, order=order) for order in (1, 2))
+    first, second = (perturbed_region(without_spring(equation), 2, order=order) for order in (1, 2))
     assert first is not None
     assert second is not None
     assert second.width == pytest.approx(right.width, rel=2e-5)
@@ -245,42 +243,56 @@ def test_second_region_needs_the_second_order() -> None:
 @pytest.mark.parametrize("factor", [0.0, 0.5, 0.9])
 def test_perturbed_boundaries_with_damping(factor: float) -> None:
     equation = slider(1.0)
-    damping = factor * perturbed_removing_damping(equation.mass, equation.stiffness, 1)
+    damping = factor * perturbed_removing_damping(without_spring(equation), 1)
     right = hill_regions(without_spring(equation, damping), 1)[1]
-    found = perturbed_region(equation.mass, equation.stiffness, 1, damping=damping)
+    found = perturbed_region(without_spring(equation, damping), 1)
     assert found is not None
     assert (found.low, found.high) == pytest.approx((right.low, right.high), abs=2e-7)
 
 
 def test_perturbed_removing_damping() -> None:
     equation = slider(1.0)
-    damping = perturbed_removing_damping(equation.mass, equation.stiffness, 1)
-    assert perturbed_region(equation.mass, equation.stiffness, 1, damping=1.001 * damping) is None
+    damping = perturbed_removing_damping(without_spring(equation), 1)
+    assert perturbed_region(without_spring(equation, 1.001 * damping), 1) is None
     assert 1 in hill_regions(without_spring(equation, 0.999 * damping), 1)
     assert hill_regions(without_spring(equation, 1.001 * damping), 1) == {}
 
 
-def test_equation_as_printed_has_far_too_wide_a_region() -> None:
-    """Without M' y' the harmonics of M enter the width with the wrong sign: four times too wide."""
-    right, printed = slider(1.0, variant=Variant.SECOND_ORDER), slider(1.0, variant=Variant.PRINTED)
-    exact = hill_regions(without_spring(printed), 1)[1]
-    formula = perturbed_region(right.mass, right.stiffness, 1, truncation=Truncation.PRINTED)
-    assert formula is not None
-    assert (formula.low, formula.high) == pytest.approx((exact.low, exact.high), abs=2e-6)
-    assert exact.width / hill_regions(without_spring(right), 1)[1].width == pytest.approx(3.78, abs=0.01)
+def periodic_factor(size: float) -> PeriodicEquation:
+    """Harmonics of that size in all coefficients, the stiffness's factor among them; undamped."""
+    waves = {"a": (1.3, 0.2, -0.1, 0.05), "c": (0.2, 0.3, 0.25, -0.1), "factor": (0.8, -0.3, 0.2, 0.15)}
+    made = {
+        name: series((mean, 0.0), (size * cosine, size * sine), (size**2 * second, 0.0))
+        for name, (mean, cosine, sine, second) in waves.items()
+    }
+    return PeriodicEquation(b=FourierSeries.constant(0.0), **made)
 
 
-def test_appendix_3_drops_a_factor() -> None:
-    equation = slider(1.0)
-    first, right, listed = (
-        perturbed_region(equation.mass, equation.stiffness, 1, order=order, truncation=truncation)
-        for order, truncation in ((1, Truncation.RIGHT), (2, Truncation.RIGHT), (2, Truncation.APPENDIX_3))
-    )
-    assert first is not None
-    assert right is not None
-    assert listed is not None
-    middle = [0.5 * (region.low + region.high) for region in (first, right, listed)]
-    assert (middle[2] - middle[0]) / (middle[1] - middle[0]) == pytest.approx(equation.mass.mean, rel=1e-9)
+@pytest.mark.parametrize("number", [0, 1, 2])
+@pytest.mark.parametrize(("order", "rate"), [(1, 2.0), (2, 3.0)])
+def test_perturbation_of_a_periodic_stiffness(number: int, order: int, rate: float) -> None:
+    """Zeroth boundary and two regions, against Hill's determinant."""
+    sizes = np.array([0.005, 0.01, 0.02])
+    errors = []
+    for size in sizes.tolist():
+        equation = periodic_factor(size)
+        if number == 0:
+            right = float(boundary_stiffnesses(equation, 1, count=1)[0].real)
+            errors.append([abs(perturbed_boundary(equation, order=order) - right)])
+        else:
+            region, found = hill_regions(equation, 2)[number], perturbed_region(equation, number, order=order)
+            assert found is not None
+            errors.append([abs(found.low - region.low), abs(found.high - region.high)])
+    rates = np.polyfit(np.log(sizes), np.log(errors), 1)[0]
+    assert (rates > rate - 0.2).all()
+
+
+@pytest.mark.parametrize("multiplier", [1, -1])
+def test_boundaries_of_a_periodic_stiffness_are_where_the_multiplier_is(multiplier: int) -> None:
+    equation = periodic_factor(0.3)
+    values = boundary_stiffnesses(equation, multiplier, count=4).real
+    matrices = monodromies([equation.stiffened(x) for x in values])
+    assert crossing_test(matrices, multiplier) == pytest.approx(np.zeros(4), abs=1e-9)
 
 
 # Verdicts
@@ -337,8 +349,8 @@ def test_bad_arguments_are_refused() -> None:
     with pytest.raises(SingularEquationError, match="passes zero in equation 1"):
         monodromies([GENERAL, replace(GENERAL, a=series((1.0, 0.0), (1.5, 0.0)))])
     with pytest.raises(InputError, match="count from 1"):
-        perturbed_region(GENERAL.a, GENERAL.c, 0)
-    with pytest.raises(InputError, match="lambda_c"):
-        perturbed_region(GENERAL.a, GENERAL.c, 1, damping=-1.0)
-    with pytest.raises(InputError, match="mean of M"):
-        perturbed_region(FourierSeries.constant(-1.0), GENERAL.c, 1)
+        perturbed_region(GENERAL, 0)
+    with pytest.raises(InputError, match="order is 1 or 2"):
+        perturbed_boundary(GENERAL, order=3)
+    with pytest.raises(InputError, match="means of M and S are -1"):
+        perturbed_region(replace(GENERAL, a=FourierSeries.constant(-1.0)), 1)

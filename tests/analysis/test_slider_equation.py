@@ -12,7 +12,19 @@ pytest.importorskip("casadi")
 
 from analysis.numerics.fourier import FourierSeries
 from analysis.periodic import mean_effective_mass
-from analysis.youssef import NO_LOAD, Load, SliderEquation, Variant, balance, slider_equation
+from analysis.youssef import (
+    NO_LOAD,
+    Form,
+    Load,
+    SliderEquation,
+    Variant,
+    balance,
+    monodromies,
+    perturbed_region,
+    resonance,
+    slider_equation,
+    two_harmonics,
+)
 from linkwork.errors import AssemblyError, InputError
 from linkwork.five_bar import dynamics, kinematics
 from linkwork.five_bar.parameters import FiveBarParameters
@@ -20,7 +32,7 @@ from linkwork.five_bar.published import SETS, TABLE_3_1, chapter_4
 from tests import published
 from tests.strategies import seeded
 
-ANGLES = np.linspace(0.0, 2.0 * pi, 24, endpoint=False)
+ANGLES, TURN = (np.linspace(0.0, 2.0 * pi, n, endpoint=False) for n in (24, 64))
 #: Chapter IV with everything that it leaves out.
 GENERAL = replace(
     chapter_4(1.0, 2.0),
@@ -106,47 +118,103 @@ class TestPublishedCoefficients:
         assert (one.spring, one.damping) == pytest.approx((1000.0 / 1600.0, 0.4 / 40.0), rel=1e-14)
 
 
-class TestVariants:
-    """The thesis's errors."""
+class TestThesis:
+    """The thesis's own coefficients against what its programs give, which the notes have from the listings."""
 
-    def test_the_printed_equation_leaves_the_rate_of_the_mass_out(self) -> None:
-        right, printed = (
-            slider_equation(chapter_4(1.0, 0.5), 40.0, variant=v) for v in (Variant.SECOND_ORDER, Variant.PRINTED)
-        )
-        _, b, _ = right.coefficients()
-        assert b(ANGLES) == pytest.approx(right.damping + right.mass.derivative()(ANGLES), abs=1e-15)
-        _, b, _ = printed.coefficients()
-        assert b(ANGLES) == pytest.approx(printed.damping, abs=1e-15)
-        for name in SERIES:
-            assert getattr(right, name)(ANGLES) == pytest.approx(getattr(printed, name)(ANGLES), abs=1e-15)
+    @pytest.mark.parametrize("inertia_ratio", published.RESONANCE)
+    def test_resonance_of_appendix_2(self, inertia_ratio: float) -> None:
+        pair = resonance(chapter_4(inertia_ratio), variant=Variant.FORTRAN)
+        # see the note on I4 = 1.5 there
+        found = pair[1 if inertia_ratio == 1.5 else 0]
+        assert found == pytest.approx(published.RESONANCE[inertia_ratio].thesis, abs=5.1e-5)
 
-    def test_the_fortran_halves_every_first_order_term(self) -> None:
-        printed, fortran = (
-            slider_equation(chapter_4(1.0), 40.0, variant=v) for v in (Variant.PRINTED, Variant.FORTRAN)
-        )
-        assert not fortran.mass_rate
-        for name in SERIES:
-            a, b = getattr(printed, name), getattr(fortran, name)
-            assert [b.cos[1], b.sin[1]] == pytest.approx([0.5 * a.cos[1], 0.5 * a.sin[1]], rel=1e-13)
-            assert [*b.cos[::2], b.sin[2]] == pytest.approx([*a.cos[::2], a.sin[2]], rel=1e-13)
+    def test_resonance_of_the_printed_coefficients(self) -> None:
+        lower, _ = resonance(chapter_4(1.0), variant=Variant.PRINTED)
+        assert lower == pytest.approx(published.RESONANCE_PRINTED, abs=5.1e-5)
 
     @pytest.mark.parametrize("inertia_ratio", published.FIRST_REGION_THESIS)
-    def test_and_yet_is_not_the_whole_of_appendix_3(self, inertia_ratio: float) -> None:
-        # first region from the balance of cos and sin of theta/2: its width is 2 |K1 - M1/4|. Halving alone gives three
-        # quarters of the thesis's; halving K and not M gives it but for a factor 4 lambda_k^2, near (m4 + m5)'s mean
-        lower, upper = published.FIRST_REGION_THESIS[inertia_ratio]
-        middle, width = 0.5 * (lower + upper), upper - lower
-        fortran = slider_equation(chapter_4(inertia_ratio), 60.0, variant=Variant.FORTRAN)
-        mass, stiffness = (s.cos[1] + 1j * s.sin[1] for s in (fortran.mass, fortran.stiffness))
-        assert abs(stiffness - 0.25 * mass) / width == pytest.approx(0.77, abs=0.03)
-        assert 0.25 * fortran.mass.mean - fortran.stiffness.mean - middle == pytest.approx(
-            -6.4e-4 * inertia_ratio, rel=0.06
+    def test_first_region_of_appendix_3(self, inertia_ratio: float) -> None:
+        e = slider_equation(chapter_4(inertia_ratio), 60.0, variant=Variant.APPENDIX_3, form=Form.SERIES)
+        region = perturbed_region(e.homogeneous(), 1, order=1)
+        # (5.16) without 1/k0 in the half width
+        middle, half = 0.5 * (region.low + region.high), 0.5 * region.width * e.spring_factor.mean
+        assert (middle - half, middle + half) == pytest.approx(published.FIRST_REGION_THESIS[inertia_ratio], abs=5.1e-6)
+
+    def test_removing_damping_of_appendix_4(self) -> None:
+        def greatest(omega_c: float) -> float:
+            """Growth of the worst motion over half a turn of 4 pi, less 1."""
+            equations = [
+                slider_equation(chapter_4(1.5, omega_c), (1000.0 / x) ** 0.5, variant=Variant.FORTRAN)
+                for x in np.linspace(0.274, 0.279, 26).tolist()
+            ]
+            matrices = monodromies([e.homogeneous().stiffened(e.spring) for e in equations])
+            return float(np.abs(np.linalg.eigvals(matrices)).max() - 1.0)
+
+        own = published.REMOVING_DAMPING_THESIS
+        assert greatest(own - 0.002) > 0.0 > greatest(own + 0.002)
+
+    def test_second_harmonic_of_appendix_2(self) -> None:
+        right, listed = (
+            max(
+                two_harmonics(slider_equation(chapter_4(1.0, 0.45), w, variant=v, form=Form.RESONANCE)).harmonic(2)
+                for w in np.arange(15.2, 15.4, 0.005).tolist()
+            )
+            for v in (Variant.EXACT, Variant.FORTRAN)
         )
-        unequal = abs(stiffness - 0.5 * mass)
-        assert unequal / (4.0 * middle) == pytest.approx(width, abs=2e-5)
-        if inertia_ratio == 1.5:
-            speed = (published.STIFFNESS_PER_MASS / middle) ** 0.5
-            assert unequal * speed == pytest.approx(published.REMOVING_DAMPING_THESIS, abs=5e-4)
+        assert right / listed == pytest.approx(published.SECOND_HARMONIC_TOO_SMALL, abs=0.5)
+
+    @pytest.mark.parametrize("variant", [Variant.PRINTED, Variant.FORTRAN, Variant.APPENDIX_3])
+    def test_without_a_rocker_it_is_a_mass_on_a_spring(self, variant: Variant) -> None:
+        e = slider_equation(chapter_4(0.0, 0.5), 40.0, variant=variant)
+        for got, value in zip(e.coefficients(), (1.0, e.damping, e.spring)):
+            assert got(ANGLES) == pytest.approx(np.full(24, value), abs=1e-15)
+        assert e.force(ANGLES) == pytest.approx(np.zeros(24), abs=1e-15)
+
+    def test_the_series_is_the_quotient_to_second_order_but_for_its_mean(self) -> None:
+        left = []
+        for scale in (1.0, 0.5):
+            p = replace(chapter_4(1.0, 0.5), crank_length=0.015 * scale)
+            one, other = (
+                slider_equation(p, 40.0, variant=Variant.PRINTED, form=f) for f in (Form.QUOTIENT, Form.SERIES)
+            )
+            a, b, c = (s(TURN) for s in one.coefficients())
+            for whole, part in zip((b / a, c / a, one.force(TURN) / a), (*other.coefficients()[1:], other.force)):
+                off = FourierSeries.from_samples(whole - part(TURN), 4).exponential[4:]
+                left.append(np.abs([off[0], off[1:].max()]))
+        means, waves = np.reshape(left, (2, 3, 2)).transpose(2, 0, 1)
+        assert np.log2(means[0] / means[1]) == pytest.approx(2.0, abs=0.2)
+        assert np.log2(waves[0] / waves[1]) == pytest.approx(3.0, abs=0.2)
+
+    def test_the_programs_lose_k0(self) -> None:
+        series, appendix_2, appendix_4 = (
+            slider_equation(chapter_4(1.0, 0.5), 40.0, variant=Variant.FORTRAN, form=f)
+            for f in (Form.SERIES, Form.RESONANCE, Form.STABILITY)
+        )
+        k0 = series.spring_factor.mean
+        assert k0 == pytest.approx(0.94, abs=0.01)
+        lost = series.spring_factor * (1.0 / k0)
+        for factor, mean in (
+            (appendix_2.spring_factor, k0),
+            (appendix_4.spring_factor, k0),
+            (appendix_2.damping_factor, 1.0),
+            (appendix_4.damping_factor, k0),
+        ):
+            assert factor.mean == pytest.approx(mean, rel=1e-14)
+            assert factor.exponential[3:] == pytest.approx(lost.exponential[3:], rel=1e-13)
+
+    @pytest.mark.parametrize(
+        ("change", "said"),
+        [
+            ({"coupler_mass": 0.2}, r"coupler\.mass is 0\.2"),
+            ({"rocker_cog_distance": 0.1}, r"rocker\.cog_distance is 0\.1"),
+            ({"gravity": 9.81}, "gravity is 9.81"),
+        ],
+    )
+    def test_what_it_leaves_out_is_refused(self, change: dict[str, float], said: str) -> None:
+        with pytest.raises(InputError, match=said):
+            slider_equation(replace(chapter_4(1.0), **change), 40.0, variant=Variant.PRINTED)
+        with pytest.raises(InputError, match="no load"):
+            slider_equation(chapter_4(1.0), 40.0, variant=Variant.PRINTED, load=Load(slider=1.0))
 
 
 class TestGeneralMechanism:
