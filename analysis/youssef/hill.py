@@ -433,12 +433,12 @@ def _perturbed(equation: PeriodicEquation, number: int, order: int) -> NDArray[n
     left = v - start * s
     if order == 1:
         # lambda where it multiplies a harmonic is the one without any
-        near = left[np.ix_(inside, inside)] / s0 + start * np.eye(inside.sum())
-        return np.linalg.eigvals(near)
-    others = ~inside
-    through = left[np.ix_(inside, others)] / (k0 * (k[others] ** 2 - n * n)) @ left[np.ix_(others, inside)]
-    near = v[np.ix_(inside, inside)] - through
-    found: NDArray[np.complex128] = scipy.linalg.eigvals(near, s[np.ix_(inside, inside)])
+        near, weight = left[np.ix_(inside, inside)] / s0 + start * np.eye(inside.sum()), None
+    else:
+        others = ~inside
+        through = left[np.ix_(inside, others)] / (k0 * (k[others] ** 2 - n * n)) @ left[np.ix_(others, inside)]
+        near, weight = v[np.ix_(inside, inside)] - through, s[np.ix_(inside, inside)]
+    found: NDArray[np.complex128] = scipy.linalg.eigvals(near, weight)
     return found
 
 

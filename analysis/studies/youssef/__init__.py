@@ -52,15 +52,33 @@ FIGURES: Mapping[str, Entry] = MappingProxyType(
         "3.14": Entry(
             "Free motion: phase plane of the slider; Table 3.1, k = 2e6 dyn/cm", "youssef.chapter_3", "3.3, L2260"
         ),
-        "4.3": Entry("First harmonic over the speed without damping; chapter IV", "youssef.chapter_4"),
-        "4.4": Entry("First harmonic over the speed with dampers; chapter IV, I4 = 1", "youssef.chapter_4"),
-        "4.5": Entry("Harmonics near half the natural frequency; chapter IV, I4 = 1", "youssef.chapter_4"),
-        "4.6": Entry("Resonance over the inertia of the rocker; chapter IV", "youssef.chapter_4"),
-        "4.7": Entry("Linear equations against the plant; chapter IV, I4 = 1", "youssef.chapter_4"),
-        "5.1": Entry("First region of instability over the inertia ratio, without damping", "youssef.chapter_5"),
-        "5.2": Entry("First region of instability with damping, and the damping that removes it", "youssef.chapter_5"),
-        "5.3": Entry("First region of instability over the coupler's length", "youssef.chapter_5"),
-        "5.4": Entry("First region over the crank's length, and the widths of higher ones", "youssef.chapter_5"),
+        "4.1": Entry("Datum and perturbed linkage (sketch)", place="4.1, L2395"),
+        "4.2": Entry("Linkage with spring and damper (sketch)", place="4.2, L2481"),
+        "4.3": Entry(
+            "First harmonic over the speed, undamped; three inertia ratios",
+            "youssef.chapter_4",
+            "4.5.1, L3128-3168",
+        ),
+        "4.4": Entry(
+            "Second harmonic over the speed, undamped; three inertia ratios",
+            "youssef.chapter_4",
+            "4.5.1, L3128-3168",
+        ),
+        "4.5": Entry("Deviation of the resonance over the inertia ratio", "youssef.chapter_4", "4.5.1, L3146-3156"),
+        "4.6": Entry("Amplitude over the speed with dampers; I4 = 1", "youssef.chapter_4", "4.5.2, L3172-3184"),
+        "4.7": Entry("Amplitude over the speed with dampers; I4 = 0.5", "youssef.chapter_4", "4.5.2, L3172-3184"),
+        "5.1": Entry(
+            "First region of instability over the inertia ratio, undamped", "youssef.chapter_5", "5.3.1, L3756-3770"
+        ),
+        "5.2": Entry(
+            "First region of instability over the crank's length, undamped", "youssef.chapter_5", "5.3.1, L3772-3884"
+        ),
+        "5.3": Entry(
+            "First region of instability over the coupler's length, undamped", "youssef.chapter_5", "5.3.1, L3886-3900"
+        ),
+        "5.4": Entry(
+            "First region of instability over the inertia ratio, damped", "youssef.chapter_5", "5.3.2, L3910-3921"
+        ),
         "6.4": Entry("Ellipse (a), timed", "youssef.chapter_6"),
         "6.5": Entry("Ellipse (b), timed", "youssef.chapter_6"),
         "6.6": Entry("Ellipse (a), timed, with bounds on the lengths", "youssef.chapter_6"),

@@ -1,21 +1,563 @@
-"""The figures of chapter V."""
+"""The figures of chapter V: the first region of instability, without damping and with it.
+
+The slider's motion doubles its period near lambda_k^2 = k/((m4 + m5) omega^2) = k0/4, where the crank runs at about twice the
+natural frequency. The thesis takes the stability about zeta = 0, which is no solution, by its equation (4.21), which lacks
+M' zeta'. Ours is that of the true periodic orbit; beside it are the linear equation put right, by Hill's determinant, and the
+thesis's own coefficients, as printed by (5.16) and as appendix 3 evaluates them. An axis A is that of omega = A omega_k.
+"""
 
 from __future__ import annotations
 
-from . import (
-    fig_5_1,
-    fig_5_2,
-    fig_5_3,
-    fig_5_4,
+from cmath import phase, rect
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cache, partial
+from math import pi
+
+import numpy as np
+from numpy.typing import NDArray
+
+from linkwork.five_bar.parameters import FiveBarParameters
+from linkwork.five_bar.published import chapter_4
+
+from ...figures import COLOURS, Curve, Figure, Panel, plot_curves
+from ...numerics.boundaries import Box, Chart, Test, chart
+from ...periodic import Drive, Operation, Plane, RemovingDamping, orbit_test, removing_damping
+from ...youssef import (
+    Region,
+    Variant,
+    boundary_stiffnesses,
+    linear_test,
+    perturbed_boundary,
+    perturbed_region,
+)
+from ..study import LISTING, OURS, TEXT, Study, StudyResult, Verdict, at_least, at_most, near, padded, unjudged
+from .regions import (
+    LOOKS,
+    WAYS,
+    appendix_3,
+    axis,
+    crank_speed,
+    equation,
+    first_order,
+    hill,
+    removing_estimate,
+    right,
+    run_verdicts,
 )
 
-#: The studies by number.
-STUDIES = {
-    study.number: study
-    for study in (
-        fig_5_1.STUDY,
-        fig_5_2.STUDY,
-        fig_5_3.STUDY,
-        fig_5_4.STUDY,
+#: First region in lambda_k^2 by I4: the right one, and by appendix 3 when run.
+RIGHT: Mapping[float, tuple[float, float]] = {
+    0.5: (0.258298, 0.259203),
+    1.0: (0.266540, 0.268367),
+    1.5: (0.274727, 0.277501),
+}
+APPENDIX_3: Mapping[float, tuple[float, float]] = {
+    0.5: (0.25786, 0.26031),
+    1.0: (0.26580, 0.27054),
+    1.5: (0.27382, 0.28069),
+}
+#: omega_c (1/s) that removes the region up to I4 = 1.5: as stated, by appendix 4 when run, and right.
+STATED, LISTED, REMOVING = 0.45, 0.459, 0.167
+#: What we take "narrow" and "negligible" to mean.
+NARROW, NEGLIGIBLE = 0.05, 0.1
+# Figures 5.1 to 5.3
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Sweep:
+    """The first region over a parameter: its symbol and values, the mechanism at one, and what the figure says of it."""
+
+    number: str
+    symbol: str
+    label: str
+    values: Sequence[float]
+    mechanism: Callable[[float], FiveBarParameters]
+    claim: str
+    judge: Callable[[Mapping[str, Sequence[Region]]], list[Verdict]]
+    assignment: str = ""
+    further: Mapping[str, Callable[[float], FiveBarParameters]] | None = None
+
+
+@cache
+def regions(name: str) -> dict[str, list[Region]]:
+    """The regions of a sweep by way; of its further mechanisms those of the true orbit, by name."""
+    sweep = SWEEPS[name]
+    found = {way: [of(sweep.mechanism(x)) for x in sweep.values] for way, of in WAYS.items()}
+    for way, mechanism in (sweep.further or {}).items():
+        found[way] = [right(mechanism(x)) for x in sweep.values]
+    return found
+
+
+def widths(found: Iterable[Region]) -> NDArray[np.float64]:
+    """Widths in lambda_k^2."""
+    return np.array([region.width for region in found])
+
+
+def axes(found: Iterable[Region]) -> NDArray[np.float64]:
+    """A of each."""
+    return np.array([axis(region) for region in found])
+
+
+def second_verdict(sweep: Sweep) -> Verdict:
+    """The second region, of which the text says in all three figures that it is negligible."""
+    ratios = [hill(p, 2).width / hill(p).width for p in map(sweep.mechanism, sweep.values)]
+    return at_most(
+        "width of the second region to that of the first, greatest",
+        TEXT,
+        NEGLIGIBLE,
+        max(ratios),
+        place="L3902-3906",
+        why="the terms of first order largely cancel in the width of the first",
     )
+
+
+def compute_sweep(number: str) -> StudyResult:
+    """The regions over a parameter."""
+    sweep, found = SWEEPS[number], regions(number)
+    columns = {f"{sweep.symbol} [1]": np.array(sweep.values)}
+    for way, these in found.items():
+        columns[f"lambda_k^2; {way}; low [1]"] = np.array([region.low for region in these])
+        columns[f"lambda_k^2; {way}; high [1]"] = np.array([region.high for region in these])
+    return StudyResult(
+        number=number,
+        claim=sweep.claim,
+        assignment=sweep.assignment,
+        columns=columns,
+        verdicts=(*sweep.judge(found), second_verdict(sweep)),
+    )
+
+
+def draw_sweep(result: StudyResult) -> Figure:
+    """The regions, and their widths."""
+    c, sweep = result.columns, SWEEPS[result.number]
+    values = c[f"{sweep.symbol} [1]"]
+    edges, sizes = [], []
+    for (way, line), colour in zip((LOOKS | dict.fromkeys(sweep.further or (), "-")).items(), COLOURS):
+        low, high = (c[f"lambda_k^2; {way}; {end} [1]"] for end in ("low", "high"))
+        edges.append(Curve(x=values, y=low, label=way, colour=colour, line=line))
+        edges.append(Curve(x=values, y=high, colour=colour, line=line))
+        sizes.append(Curve(x=values, y=1e3 * (high - low), label=way, colour=colour, line=line))
+    low, high = (c[f"lambda_k^2; true orbit; {end} [1]"] for end in ("low", "high"))
+    region = np.column_stack([np.append(values, values[::-1]), np.append(low, high[::-1])])
+    panels = [
+        Panel(
+            x_label=sweep.label,
+            y_label=y_label,
+            curves=curves,
+            filled=filled,
+            x_range=(values[0], values[-1]),
+            legend_at="best",
+        )
+        for y_label, curves, filled in (
+            ("lambda_k^2", edges, [[region]]),
+            ("width of the region in lambda_k^2 [1e-3]", sizes, []),
+        )
+    ]
+    return plot_curves(panels, title=result.heading, columns=2, size=(4.8, 4.0))
+
+
+def judge_inertia(found: Mapping[str, Sequence[Region]]) -> list[Verdict]:
+    """Fig 5.1, and the formulas it is by."""
+    true, ratios = found["true orbit"], np.array(SWEEPS["5.1"].values)
+    middles = np.array([0.5 * (region.low + region.high) for region in true]) - 0.25
+    slope = middles[-1] / ratios[-1]
+    verdicts = [
+        at_most(
+            "width of the region to its middle, greatest",
+            TEXT,
+            NARROW,
+            (widths(true) / (middles + 0.25)).max(),
+            place="L3762",
+        ),
+        at_least("growth of the width with I4, least", TEXT, 0.0, np.diff(widths(true)).min(), place="L3762, L3944"),
+        at_most(
+            "distance of its middle from a straight line through 1/4 at I4 = 0, of the line's rise",
+            TEXT,
+            NARROW,
+            np.abs(middles - slope * ratios).max() / middles[-1],
+            place="L3764-3766",
+        ),
+        near("axis A at I4 = 0", TEXT, 2.0, axis(hill(chapter_4(1e-6))), 1e-5, place="L3768"),
+        at_most("growth of the axis A with I4, greatest", TEXT, 0.0, np.diff(axes(true)).max(), place="L3768, L3946"),
+    ]
+    for ratio, stated in APPENDIX_3.items():
+        region = right(chapter_4(ratio))
+        for side, value, ours, listed in zip(("lower", "upper"), (region.low, region.high), RIGHT[ratio], stated):
+            name = f"{side} boundary in lambda_k^2; I4 = {ratio:g}"
+            # half a unit of the last digit printed
+            verdicts += [
+                near(name, LISTING, listed, value, 5.5e-6, place="appendix 3", why="M' zeta' is missing"),
+                near(name, OURS, ours, value, 5.5e-7),
+            ]
+    own = [appendix_3(chapter_4(ratio)) for ratio in APPENDIX_3]
+    off = max(np.abs(np.subtract((r.low, r.high), stated)).max() for r, stated in zip(own, APPENDIX_3.values()))
+    exact = equation(chapter_4(1.0))
+    zeroth, second = boundary_stiffnesses(exact, 1, count=1)[0].real, hill(chapter_4(1.0), 2)
+    formula = perturbed_region(exact, 2)
+    assert formula is not None, "there is no damping"
+    return [
+        *verdicts,
+        at_most("listing as transcribed less what it gives, boundaries", OURS, 5.5e-6, off),
+        at_most(
+            "zeroth boundary; (5.13) less Hill's determinant; I4 = 1",
+            OURS,
+            1e-6,
+            abs(perturbed_boundary(exact) - zeroth),
+        ),
+        at_most(
+            "second region; (5.26) less Hill's determinant; I4 = 1",
+            OURS,
+            1e-6,
+            max(abs(formula.low - second.low), abs(formula.high - second.high)),
+        ),
+        *run_verdicts("I4 = 1", chapter_4(1.0), (0.2662, 0.26745, 0.2695)),
+    ]
+
+
+def with_crank(sigma2: float, inertia_ratio: float = 1.0) -> FiveBarParameters:
+    """The mechanism with another crank, sigma2 = l2/l4."""
+    mechanism = chapter_4(inertia_ratio)
+    return replace(mechanism, crank_length=sigma2 * mechanism.rocker_length)
+
+
+def judge_crank(found: Mapping[str, Sequence[Region]]) -> list[Verdict]:
+    """Fig 5.2."""
+    true = found["true orbit"]
+    widest = widths(regions("5.1")["true orbit"]).max()
+    why = "it is that of I4 = 0.5, which the listing has (L8641)"
+    return [
+        at_least(
+            "growth of the width with sigma2, least", TEXT, 0.0, np.diff(widths(true)).min(), place="L3876, L3938"
+        ),
+        near("axis A at sigma2 = 0.01", TEXT, 1.968, axes(true)[0], 5e-4, place="L3880", why=why),
+        near("axis A at sigma2 = 0.01", OURS, 1.936, axes(true)[0], 5e-4),
+        near("axis A at sigma2 = 0.01; I4 = 0.5", OURS, 1.967, axis(right(with_crank(0.01, 0.5))), 5e-4),
+        at_least(
+            "growth of the axis A from sigma2 = 0.01 to 0.1",
+            TEXT,
+            0.0,
+            axes(true)[-1] - axes(true)[0],
+            place="L3880-3882",
+            why="it does in the listing",
+        ),
+        at_most("greatest width to that of Fig 5.1", TEXT, 1.0, widths(true).max() / widest, place="L3882-3884"),
+        at_most(
+            "omega_c that removes the region, up to sigma2 = 0.1",
+            TEXT,
+            STATED,
+            removing_estimate(with_crank(0.1)),
+            "1/s",
+            place="L3923-3927",
+        ),
+    ]
+
+
+def held(sigma3: float, inertia_ratio: float = 2.0) -> FiveBarParameters:
+    """The mechanism to which the thesis's angles belong at any coupler: its ground link and the guide's direction follow."""
+    mechanism = closed(sigma3, inertia_ratio)
+    ground = rect(mechanism.coupler_length, pi / 3.0) - rect(mechanism.rocker_length, 2.0 * pi / 3.0)
+    return replace(mechanism, ground_length=abs(ground), slider_guide_angle=-phase(ground))
+
+
+def closed(sigma3: float, inertia_ratio: float = 2.0) -> FiveBarParameters:
+    """The mechanism with another coupler, sigma3 = l3/l4, and the same ground link."""
+    mechanism = chapter_4(inertia_ratio)
+    return replace(mechanism, coupler_length=sigma3 * mechanism.rocker_length)
+
+
+#: The thesis's coupler on a ground link that stays.
+SAME_GROUND = "true orbit on the same ground link"
+
+
+def judge_coupler(found: Mapping[str, Sequence[Region]]) -> list[Verdict]:
+    """Fig 5.3: with the angles held, as the thesis has it, and with the ground link kept."""
+    others = min(widths(regions(number)["true orbit"]).max() for number in ("5.1", "5.2"))
+    verdicts = []
+    for way, mechanism, words, why in (
+        ("true orbit", held, "angles held", ""),
+        (SAME_GROUND, closed, "same ground link", "the angles follow the coupler"),
+    ):
+        true = found[way]
+        verdicts += [
+            at_most(
+                f"growth of the width with sigma3, greatest; {words}",
+                TEXT,
+                0.0,
+                np.diff(widths(true)).max(),
+                place="L3892, L3938",
+                why=why,
+            ),
+            near(
+                f"axis A at sigma3 = 0.8; {words}",
+                TEXT,
+                1.96,
+                axes(true)[0],
+                0.0051,
+                place="L3894-3896",
+                why="it is that of I4 = 0.5, which the listing has (L8641)",
+            ),
+            at_most(
+                f"change of the axis A over sigma3; {words}",
+                TEXT,
+                0.01,
+                np.ptp(axes(true)),
+                place="L3896-3898",
+                why=why,
+            ),
+            at_most(
+                f"omega_c that removes the region, sigma3 from 0.8 to 1.2; {words}",
+                TEXT,
+                STATED,
+                max(removing_estimate(mechanism(x)) for x in SWEEPS["5.3"].values),
+                "1/s",
+                place="L3923-3929",
+                why=why,
+            ),
+        ]
+    return [
+        *verdicts,
+        at_most(
+            "greatest width to that of Fig 5.1 and 5.2",
+            TEXT,
+            1.0,
+            widths(found["true orbit"]).max() / others,
+            place="L3898-3900",
+            why="it is so with the listing's I4 = 0.5",
+        ),
+        near("axis A at sigma3 = 0.8 by the listing as transcribed", OURS, 1.87, axis(appendix_3(held(0.8))), 0.005),
+        near(
+            "axis A at sigma3 = 0.8 by the listing as transcribed; I4 = 0.5",
+            OURS,
+            1.965,
+            axis(appendix_3(held(0.8, 0.5))),
+            0.001,
+        ),
+        at_least(
+            "ground link that the held angles need, less the one there is; sigma3 = 1.2, relative",
+            OURS,
+            0.05,
+            held(1.2).ground_length / closed(1.2).ground_length - 1.0,
+        ),
+    ]
+
+
+SWEEPS = {
+    sweep.number: sweep
+    for sweep in (
+        Sweep(
+            number="5.1",
+            symbol="I4",
+            label="inertia ratio I4",
+            values=np.linspace(0.25, 2.0, 8).tolist(),
+            mechanism=chapter_4,
+            claim="The first region of instability in lambda_k^2 over I4; sigma2 = 0.05.",
+            judge=judge_inertia,
+            assignment="The range of I4 is ours.",
+        ),
+        Sweep(
+            number="5.2",
+            symbol="sigma2",
+            label="crank's length sigma2 = l2/l4",
+            values=np.linspace(0.01, 0.1, 10).tolist(),
+            mechanism=with_crank,
+            claim="The first region of instability in lambda_k^2 over sigma2; I4 = 1.",
+            judge=judge_crank,
+        ),
+        Sweep(
+            number="5.3",
+            symbol="sigma3",
+            label="coupler's length sigma3 = l3/l4",
+            values=np.linspace(0.8, 1.2, 17).tolist(),
+            mechanism=held,
+            claim="The first region of instability in lambda_k^2 over sigma3; sigma2 = 0.05, I4 = 2.",
+            judge=judge_coupler,
+            assignment=(
+                "The thesis keeps the angles of coupler and rocker, to which another ground link and an inclined guide "
+                "belong at every sigma3; the mechanism with the same ground link is ours."
+            ),
+            further={SAME_GROUND: closed},
+        ),
+    )
+}
+
+
+# Figure 5.4
+
+#: Chart of lambda_k^2 and I4, dampers omega_c (1/s) of the regions, and the range in which the removing one is sought.
+BOX = Box(x=(0.25, 0.29), y=(0.25, 2.0))
+DAMPERS = (0.0, 0.05, 0.1, 0.15)
+RANGE = (0.0, 1.2)
+#: I4 at which the removing damper is computed.
+RATIOS = np.linspace(0.25, 2.0, 8)
+#: Test functions of the true orbit, and of the linear equations about zeta = 0.
+MOTIONS: Mapping[str, Callable[[Plane, int], Test]] = {
+    "true orbit": orbit_test,
+    "(4.21) as printed": partial(linear_test, variant=Variant.PRINTED),
+    "listing of appendix 4": partial(linear_test, variant=Variant.FORTRAN),
+}
+#: Long runs at I4 = 1.5: omega_c (1/s) and lambda_k^2.
+RUNS = ((0.1, 0.2761), (0.1, 0.2785), (0.2, 0.2761))
+
+
+def with_damping(omega_c: float) -> Plane:
+    """The plane of lambda_k^2 and I4 at a damper omega_c (1/s)."""
+
+    def operation(lambda_k2: float, inertia_ratio: float) -> Operation:
+        return chapter_4(inertia_ratio, omega_c), Drive(speed=crank_speed(lambda_k2))
+
+    return operation
+
+
+@cache
+def damped_region(omega_c: float) -> Chart:
+    """Boundaries of the first region in lambda_k^2 and I4."""
+    return chart(orbit_test(with_damping(omega_c), -1), BOX, lines=(0, 4), samples=100)
+
+
+@cache
+def removing(motion: str, inertia_ratio: float) -> RemovingDamping:
+    """Damper omega_c (1/s) that removes the first region, by (5.35)."""
+
+    def test(lambda_k2: float, omega_c: float) -> float:
+        return MOTIONS[motion](with_damping(omega_c), -1)(lambda_k2, inertia_ratio)
+
+    return removing_damping(test, BOX.x, RANGE, samples=12)
+
+
+def width_at(found: Chart, value: float) -> float:
+    """Width in lambda_k^2 at an I4, zero where there is no region."""
+    roots = found.across(value, samples=100).roots
+    return float(np.ptp(roots)) if len(roots) else 0.0
+
+
+def compute_damped() -> StudyResult:
+    """Boundaries at each damper, and the damper that removes the region."""
+    charts = {omega_c: damped_region(omega_c) for omega_c in DAMPERS}
+    columns = {"I4 [1]": RATIOS}
+    for motion in MOTIONS:
+        columns[f"removing omega_c; {motion} [1/s]"] = np.array([removing(motion, x).damping for x in RATIOS.tolist()])
+    for omega_c, found in charts.items():
+        for n, boundary in enumerate(found.boundaries, start=1):
+            name = f"omega_c = {omega_c:g} 1/s; boundary {n} [1]"
+            columns[f"lambda_k^2; {name}"], columns[f"I4; {name}"] = boundary.points.T
+    tips = {d: float(found.boundaries[0].points[:, 1].min()) for d, found in charts.items() if d > 0.0}
+    ratios = np.array([0.5, 1.0, 1.5])
+    worst = {motion: removing(motion, 1.5).damping for motion in MOTIONS}
+    mechanisms = [chapter_4(x) for x in ratios.tolist()]
+    apart = [abs(hill(p).low - first_order(p, Variant.EXACT).low) / hill(p).width for p in mechanisms]
+    nine = [boundary_stiffnesses(equation(p), -1, count=2, order=2).real for p in mechanisms]
+    cut = max(np.abs(ends - (hill(p).low, hill(p).high)).max() for ends, p in zip(nine, mechanisms))
+    at = [width_at(found, 1.5) for found in charts.values()]
+    verdicts = [
+        at_most(
+            "growth of the width with omega_c, greatest; I4 = 1.5", TEXT, 0.0, np.diff(at).max(), place="L3915, L3952"
+        ),
+        at_least(
+            "growth with omega_c of the I4 at which the region begins, least",
+            TEXT,
+            0.0,
+            np.diff(list(tips.values())).min(),
+            place="L3917",
+        ),
+        at_most(
+            "omega_c that removes the region, up to I4 = 1.5",
+            TEXT,
+            STATED,
+            worst["true orbit"],
+            "1/s",
+            place="L3919-3921",
+        ),
+        near(
+            "omega_c that removes the region, up to I4 = 1.5",
+            LISTING,
+            LISTED,
+            worst["true orbit"],
+            5e-4,
+            "1/s",
+            place="appendix 4",
+            why="its regions are too wide",
+        ),
+        near("omega_c that removes the region, up to I4 = 1.5", OURS, REMOVING, worst["true orbit"], 5e-4, "1/s"),
+        near("the same by the listing as transcribed", OURS, LISTED, worst["listing of appendix 4"], 5e-4, "1/s"),
+        at_most(
+            "omega_c that removes regions 1 to 4 as well, I4 = 1.5",
+            TEXT,
+            STATED,
+            max(removing_estimate(mechanisms[-1], n) for n in range(1, 5)),
+            "1/s",
+            place="L3952-3958",
+        ),
+        at_most(
+            "outer boundary; (5.35) less (5.16), of the width, right coefficients",
+            TEXT,
+            NEGLIGIBLE,
+            max(apart),
+            place="L3964-3968",
+        ),
+        at_most("(5.35) cut off after its ninth term, as the thesis has it, less Hill's determinant", OURS, 1e-6, cut),
+        unjudged("the computer-oriented method is fast", TEXT, "no times are given", place="L3960"),
+        # a tip is where that damping removes the region; the trace rounds it in short steps
+        *(
+            near(
+                f"removing omega_c at the tip of the boundary, I4 = {tip:.4f}",
+                OURS,
+                omega_c,
+                removing("true orbit", tip).damping,
+                1e-5,
+                "1/s",
+            )
+            for omega_c, tip in tips.items()
+        ),
+        *(
+            verdict
+            for omega_c, lambda_k2 in RUNS
+            for verdict in run_verdicts(f"I4 = 1.5, omega_c = {omega_c:g} 1/s", chapter_4(1.5, omega_c), [lambda_k2])
+        ),
+    ]
+    return StudyResult(
+        number="5.4",
+        claim="omega_c = mu/(m4 + m5) narrows the region, and 0.45 1/s removes it up to I4 = 1.5.",
+        assignment="The dampers below 0.45 1/s are ours.",
+        columns=padded(columns),
+        verdicts=tuple(verdicts),
+    )
+
+
+def draw_damped(result: StudyResult) -> Figure:
+    """The regions at each damper, and the removing one over I4."""
+    c = result.columns
+    boundaries = []
+    for colour, omega_c in zip(COLOURS, DAMPERS):
+        for n in (1, 2):
+            name = f"omega_c = {omega_c:g} 1/s; boundary {n} [1]"
+            if f"I4; {name}" in c:
+                label = f"{omega_c:g}" if n == 1 else ""
+                boundaries.append(Curve(x=c[f"I4; {name}"], y=c[f"lambda_k^2; {name}"], colour=colour, label=label))
+    removal = [
+        Curve(x=RATIOS, y=c[f"removing omega_c; {motion} [1/s]"][: len(RATIOS)], label=motion, line=line)
+        for motion, line in zip(MOTIONS, ("-", ":", "-."))
+    ]
+    removal.append(Curve(x=[0.0, 1.5], y=[STATED, STATED], colour="0.1", line="--", label="stated up to 1.5"))
+    panels = [
+        Panel(
+            x_label="inertia ratio I4",
+            y_label=y_label,
+            curves=curves,
+            legend=legend,
+            legend_at="upper left",
+            x_range=BOX.y,
+            y_range=y_range,
+        )
+        for y_label, curves, legend, y_range in (
+            ("lambda_k^2", boundaries, "omega_c [1/s], true orbit", BOX.x),
+            ("damper omega_c that removes the region [1/s]", removal, "", (0.0, 1.0)),
+        )
+    ]
+    return plot_curves(panels, title=result.heading, columns=2, size=(4.8, 4.0))
+
+
+#: The studies by number.
+STUDIES = {number: Study(number, partial(compute_sweep, number), draw_sweep) for number in SWEEPS} | {
+    "5.4": Study("5.4", compute_damped, draw_damped)
 }

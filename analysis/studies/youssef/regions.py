@@ -1,0 +1,117 @@
+"""The first region of instability of the mechanisms of chapters IV and V: by the true orbit, by the linear equation put right,
+and by the thesis's own coefficients.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import replace
+from functools import cache, partial
+from math import sqrt
+
+from linkwork.five_bar.parameters import FiveBarParameters
+from linkwork.five_bar.published import SQUARE_OF_OMEGA_K
+
+from ...numerics.boundaries import scan
+from ...periodic import Confirmation, Drive, Stability, confirm, orbit_test
+from ...youssef import (
+    Form,
+    PeriodicEquation,
+    Region,
+    Variant,
+    hill_regions,
+    perturbed_region,
+    perturbed_removing_damping,
+    slider_equation,
+)
+from ..study import OURS, Verdict, at_most, near
+
+#: Turns of a long run.
+TURNS = 2000
+
+
+def crank_speed(lambda_k2: float) -> float:
+    """Crank speed (rad/s) at a lambda_k^2."""
+    return sqrt(SQUARE_OF_OMEGA_K / lambda_k2)
+
+
+def axis(region: Region) -> float:
+    """A of omega = A omega_k in the middle of a region."""
+    return 1.0 / sqrt(0.5 * (region.low + region.high))
+
+
+@cache
+def equation(
+    parameters: FiveBarParameters, variant: Variant = Variant.EXACT, form: Form = Form.STABILITY
+) -> PeriodicEquation:
+    """The slider's equation without damping; without gravity it is the same at any speed."""
+    undamped = replace(parameters, slider_damping=0.0)
+    return slider_equation(undamped, crank_speed(0.25), variant=variant, form=form).homogeneous()
+
+
+def hill(parameters: FiveBarParameters, number: int = 1, variant: Variant = Variant.EXACT) -> Region:
+    """A region by Hill's determinant, eq (5.35)."""
+    return hill_regions(equation(parameters, variant), number)[number]
+
+
+@cache
+def right(parameters: FiveBarParameters) -> Region:
+    """The first region of the true periodic orbit, sought about that of the linear equation."""
+    test = orbit_test(lambda lambda_k2, _: (parameters, Drive(speed=crank_speed(lambda_k2))), -1)
+    linear = hill(parameters)
+    found = scan(lambda x: test(x, 0.0), linear.low - 0.5 * linear.width, linear.high + 0.5 * linear.width, samples=8)
+    low, high = found.roots.tolist()
+    return Region(number=1, low=low, high=high)
+
+
+def first_order(parameters: FiveBarParameters, variant: Variant) -> Region:
+    """Eq (5.16)."""
+    region = perturbed_region(equation(parameters, variant, Form.SERIES), 1, order=1)
+    assert region is not None, "there is no damping"
+    return region
+
+
+def appendix_3(parameters: FiveBarParameters) -> Region:
+    """Eq (5.16) by the listing: without 1/k0 in the half width, and a sine for a cosine."""
+    region = first_order(parameters, Variant.APPENDIX_3)
+    middle = 0.5 * (region.low + region.high)
+    half = 0.5 * region.width * equation(parameters, Variant.APPENDIX_3, Form.SERIES).factor.mean
+    return Region(number=1, low=middle - half, high=middle + half)
+
+
+#: How each is computed, by its name in columns and legends.
+WAYS: Mapping[str, Callable[[FiveBarParameters], Region]] = {
+    "true orbit": right,
+    "linear equation": hill,
+    "(4.21) as printed": partial(first_order, variant=Variant.PRINTED),
+    "listing of appendix 3": appendix_3,
+}
+LOOKS = {"true orbit": "-", "linear equation": "--", "(4.21) as printed": ":", "listing of appendix 3": "-."}
+
+
+def removing_estimate(parameters: FiveBarParameters, number: int = 1) -> float:
+    """The damper (1/s) that removes a region of the linear equation put right, from its width."""
+    found = equation(parameters)
+    return perturbed_removing_damping(found, number) * crank_speed(hill(parameters, number).low)
+
+
+# Long runs
+
+
+@cache
+def long_run(parameters: FiveBarParameters, lambda_k2: float) -> Confirmation:
+    """A long run of the nonlinear mechanism from close to its periodic orbit."""
+    return confirm(parameters, Drive(speed=crank_speed(lambda_k2)), turns=TURNS)
+
+
+def run_verdicts(name: str, parameters: FiveBarParameters, places: Iterable[float]) -> list[Verdict]:
+    """What long runs say: growth by the multiplier, or bounded."""
+    verdicts = []
+    for lambda_k2 in places:
+        run, where = long_run(parameters, lambda_k2), f"long run; {name}, lambda_k^2 = {lambda_k2:g}"
+        if run.verdict.stability is Stability.MARGINAL:
+            verdicts.append(at_most(f"{where}: greatest deviation, of the first", OURS, 2.0, run.deviations.max()))
+        else:
+            multiplier = 1.0 - run.verdict.margin
+            verdicts.append(near(f"{where}: factor a turn, by the multiplier", OURS, multiplier, run.growth, 1e-5))
+    return verdicts
