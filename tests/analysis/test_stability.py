@@ -42,13 +42,12 @@ from linkwork.errors import InputError, LinkworkError, ParameterError, UnknownNa
 from linkwork.five_bar.published import SETS, SQUARE_OF_OMEGA_K, TABLE_3_1, chapter_4
 
 # --- STABILITY: notes on Youssef, chapters IV and V; sigma2 = 0.05, p45 = 0.2, k/(m4 + m5) = 1000 1/s2
-# first unstable region in lambda_k^2 by I4, right to the digits given, and by the thesis's appendix 3
+# first unstable region in lambda_k^2 by I4, right to the digits given, and by appendix 3 when run
 FIRST_REGION = {0.5: (0.258298, 0.259203), 1.0: (0.266540, 0.268367), 1.5: (0.274727, 0.277501)}
 FIRST_REGION_APPENDIX_3 = {0.5: (0.25786, 0.26031), 1.0: (0.26580, 0.27054), 1.5: (0.27382, 0.28069)}
-# omega_c = mu/(m4 + m5) (1/s) that removes it up to I4 = 1.5: thesis, its own equation, right
+# omega_c = mu/(m4 + m5) (1/s) that removes it up to I4 = 1.5: stated, by appendix 4 when run, right
 REMOVING_OMEGA_C_THESIS, REMOVING_OMEGA_C_OWN, REMOVING_OMEGA_C = 0.45, 0.459, 0.167
-# long nonlinear runs at I4 = 1, lambda_k^2; the thesis is said to call the first unstable too, but that lies just below its
-# region; the second, inside it, is ours
+# long nonlinear runs at I4 = 1, lambda_k^2: the first lies just below appendix 3's region, the others in it; the second is ours
 LONG_RUNS = ((0.2655, "bounded"), (0.2662, "bounded"), (0.26745, "grows"), (0.2695, "bounded"))
 
 UNIT = Box(x=(0.0, 1.0), y=(0.0, 1.0))

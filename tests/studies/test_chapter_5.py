@@ -20,6 +20,7 @@ REFUTED = {
         for side in ("lower", "upper")
         for ratio in ("0.5", "1", "1.5")
     ),
+    ("5.1", "largest multiplier at half the zeroth boundary; I4 = 1"),
     ("5.2", "axis A at sigma2 = 0.01"),
     ("5.2", "growth of the axis A from sigma2 = 0.01 to 0.1"),
     ("5.3", "axis A at sigma3 = 0.8; angles held"),

@@ -157,7 +157,16 @@ def compute_first() -> StudyResult:
             near(f"resonance by the listing as transcribed; I4 = {ratio:g}", OURS, listed, own, 5.1e-5, "rad/s"),
         ]
     printed, _ = resonance(chapter_4(1.0), variant=Variant.PRINTED)
+    raw = slider_equation(chapter_4(1.0), 1.0, variant=Variant.PRINTED, form=Form.QUOTIENT)
+    waves = [one.exponential for one in (raw.mass, raw.spring_factor, raw.stiffness)]
     verdicts += [
+        at_least(
+            "A1 or D1 to the greatest first harmonic of (4.21), whose factor cannot be read; I4 = 1",
+            TEXT,
+            1.0,
+            min(raw.mass.mean, raw.spring_factor.mean) / max(2.0 * abs(wave[-1]) for wave in waves),
+            place="L2797-2801",
+        ),
         near("resonance by the printed coefficients; I4 = 1", OURS, PRINTED_RESONANCE, printed, 5.1e-5, "rad/s"),
         *growth_verdicts(columns, 1, "L3156-3162, L3197"),
     ]
