@@ -173,14 +173,14 @@ class TestThesis:
     def test_the_series_is_the_quotient_to_second_order_but_for_its_mean(self) -> None:
         left = []
         for scale in (1.0, 0.5):
-            p = replace(chapter_4(1.0, 0.5), crank_length=0.015 * scale)
+            p = replace(chapter_4(1.0, 0.5), crank_length=0.005 * scale)
             one, other = (
                 slider_equation(p, 40.0, variant=Variant.PRINTED, form=f) for f in (Form.QUOTIENT, Form.SERIES)
             )
             a, b, c = (s(TURN) for s in one.coefficients())
             for whole, part in zip((b / a, c / a, one.force(TURN) / a), (*other.coefficients()[1:], other.force)):
-                off = FourierSeries.from_samples(whole - part(TURN), 4).exponential[4:]
-                left.append(np.abs([off[0], off[1:].max()]))
+                off = np.abs(FourierSeries.from_samples(whole - part(TURN), 4).exponential[4:])
+                left.append([off[0], off[1:].max()])
         means, waves = np.reshape(left, (2, 3, 2)).transpose(2, 0, 1)
         assert np.log2(means[0] / means[1]) == pytest.approx(2.0, abs=0.2)
         assert np.log2(waves[0] / waves[1]) == pytest.approx(3.0, abs=0.2)
