@@ -14,6 +14,7 @@ REFUTED = {
     *(("4.3", f"resonance; I4 = {ratio}") for ratio in ("0.5", "1", "1.5")),
     *(("4.3", f"distance of the resonance below omega_k; I4 = {ratio}") for ratio in ("1", "1.5")),
     ("4.4", "range of speeds near omega_k / 2 in which the second harmonic is greater than the first, widest"),
+    ("4.4", "second harmonic at its resonance; I4 = 1, omega_c = 0.45 1/s"),
     *((number, "shift of the peak from omega_c = 0.2 to 1.2 1/s") for number in ("4.6", "4.7")),
 }
 #: Studies whose results take more than a second or two.
