@@ -44,9 +44,10 @@ class Form(StrEnum):
     SERIES
         Eq (4.29): divided by I and expanded, (4.23) to (4.28). Harmonics of second order are kept, means are not.
     RESONANCE
-        As appendix 2 solves it, and (4.34): harmonics of S have been divided by its mean k0, and the mean of the damper too.
+        As appendix 2 solves it: it divides the harmonics of S by its mean k0 once too often, and the damper's mean is 1, as
+        in (4.34).
     STABILITY
-        As appendix 4 solves it: the same, but the damper keeps its mean. Both lack a factor k0 = 0.93 (I4 = 1).
+        As appendix 4 solves it: the same, but the damper's mean is k0.
     """
 
     QUOTIENT = "(4.21)"
