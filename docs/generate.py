@@ -81,8 +81,10 @@ def figures(of: str, page: str) -> str:
     from analysis.studies import ENTRIES, is_figure
     from analysis.studies.page import figures
 
-    chapter = f"{of}." if of.isdigit() else of
-    return figures(n for n in ENTRIES if (n.startswith(chapter) if is_figure(n) else of == "ours"))
+    def part(number: str) -> str:
+        return "R" if number.startswith(("R", "rahman-")) else number[0] if is_figure(number) else "ours"
+
+    return figures(number for number in ENTRIES if part(number) == of)
 
 
 def count(of: str, page: str) -> str:

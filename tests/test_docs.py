@@ -48,7 +48,7 @@ def test_every_study_is_on_the_page_of_its_figures_with_what_does_not_hold(name,
     page = (ROOT / "docs" / name).read_text()
     for number, title in studies.items():
         assert title in page, f"{number}: run make docs FIGURES=1"
-    parts = re.split(r"^### Fig (\S+)  ", page, flags=re.MULTILINE)
+    parts = re.split(r"^`linkwork figures (\S+)`$", page, flags=re.MULTILINE)
     for table, outcome in (("REFUTED", FAILS), ("UNJUDGED", UNJUDGED)):
         stated = {
             (number, line.split(" | ")[0].removeprefix("| "))
@@ -60,16 +60,14 @@ def test_every_study_is_on_the_page_of_its_figures_with_what_does_not_hold(name,
 
 
 def test_every_erratum_has_its_test():
-    """Each row of the table ends with the tests that show it, as file::name."""
-    page = (ROOT / "docs" / "rahman-errata.md").read_text()
-    rows = [line for line in page.splitlines() if line.startswith("| ") and "---" not in line]
-    heads, rows = (
-        [row for row in rows if row.endswith("| test |")],
-        [row for row in rows if not row.endswith("| test |")],
-    )
-    assert len(heads) == 2
-    assert len(rows) == 9 + 9
-    for row in rows:
+    """Each row of the table ends with the tests that show it, as file::name; a verdict of a study fails because of it."""
+    page = (ROOT / "docs" / "rahman.md").read_text()
+    rows = re.findall(r"^\| ([1-9]) (\| .*`) \|$", page, flags=re.MULTILINE)
+    assert [number for number, _ in rows] == list("123456789")
+    for number, row in rows:
+        assert re.search(rf"(erratum|errata)[ \d,and]* {number}\b.* \*\*{FAILS}\*\* \|$", page, flags=re.MULTILINE), (
+            number
+        )
         tests = re.findall(r"`(tests/\S+\.py)::(\w+)(?:::(\w+))?`", row.split(" | ")[-1])
         assert tests, row
         for file, *names in tests:

@@ -8,7 +8,7 @@ Round the loop the displacements from joint to joint multiply to the identity, M
     M4 = Z(eps S4) X(alpha4 + eps a4)       guide -> ground
 
 where X and Z are screw displacements about and along i and k. B2 and B3 are the rotations in the ball joints. The thesis
-gives each two angles, with which the loop cannot close for a given theta1 and S1 (`two_rotations`, erratum 1 of the notes).
+gives each two angles, with which the loop cannot close for a given theta1 and S1 (`two_rotations`, erratum 1).
 Here each is a general rotation, corrected in every step by a small rotation about three axes. With S4 these are seven
 unknowns for six equations: the spin of the rod about its own line is idle. The convention that it has none, omega . u = 0,
 is the seventh equation, in each step of Newton's method (the correction turns the rod about no axis with a component along

@@ -12,13 +12,14 @@ That its steps become small, on which the thesis accepts a solution, says nothin
 small, the published limits of "convergence" come from, while the mechanism itself can be assembled. And since what is least
 is a sum of squares of angles and lengths, the result depends on the unit of length.
 
-The notes of the source give the angles, not where the constant twist of 90 deg between the last ball joint and the guide is
-put; it is here where the planar mechanism closes with the angles of section 2.6.2.
+The thesis itself solves six of the eighteen equations, those of entries 12, 13 and 23 (eqs 20 to 26), and adds to the three
+real ones what the diagonal lacks. Its steps become small where A'V = 0, which is no minimum of what is left of the loop.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,6 +32,11 @@ from ..run import takes_published
 from ..units import Amount, in_si
 from .closure import close, points_of, residuals
 from .quantities import FloatArray
+
+#: Which equations a step solves: all eighteen; the six of eqs 20 and 21; these with what eq 22 adds, as the thesis does.
+Rows = Literal["all", "upper", "printed"]
+#: Rows and columns of the entries 12, 13 and 23.
+_UPPER = np.array([[0, 0, 1], [1, 2, 2]])
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -83,11 +89,13 @@ def settle(
     crank_angle: Amount,
     shift: Amount,
     *,
+    rows: Rows = "all",
+    start: Array | None = None,
     unit: float = INCH,
     step_tolerance: float = 1e-6,
     max_steps: int = 100,
 ) -> Settled:
-    """Run the thesis's iteration: least-squares Newton steps from the planar estimate until a step is small.
+    """Run the thesis's iteration: least-squares Newton steps from an estimate until a step is small.
 
     Parameters
     ----------
@@ -95,6 +103,11 @@ def settle(
         The mechanism.
     crank_angle, shift : array_like
         theta1 (rad) and S1 (m), numbers or arrays of shape (n,).
+    rows : str
+        Which equations are solved: ``all`` eighteen, or of the upper triangle the six of eqs 20 and 21 (``upper``) or those
+        with eq 22 in the place of eq 20 (``printed``).
+    start : array_like, optional
+        Estimates of the unknowns (n, 5), such as those at the angle before; by default those of the planar mechanism.
     unit : float
         Unit of length (m) in which lengths are weighed against angles; the thesis's is the inch.
     step_tolerance : float
@@ -109,12 +122,13 @@ def settle(
     """
     th, s1 = points_of(crank_angle, shift)
     truth = close(parameters, th, s1)
-    q = planar(parameters, th)
+    q = planar(parameters, th) if start is None else np.array(start, dtype=float)
     steps = np.zeros(th.size, dtype=int)
     moving = np.ones(th.size, dtype=bool)
     while np.any(moving) and steps.max() < max_steps:
         product, screws = chain(parameters, th[moving], s1[moving], q[moving])
-        step = _least_squares_step(product, screws, unit)
+        columns, right = equations(product, screws, unit, rows)
+        step = (np.linalg.pinv(columns) @ right[..., None])[..., 0]
         q[moving] += step * [1.0, 1.0, 1.0, 1.0, unit]
         steps[moving] += 1
         moving[moving] = np.max(np.abs(step), -1) > step_tolerance
@@ -144,16 +158,25 @@ def freedoms(parameters: SliderCrankParameters, crank_angle: float, shift: float
     return 7 - int(np.linalg.matrix_rank(columns / np.linalg.norm(columns, axis=0), tol=1e-9))
 
 
-def _least_squares_step(product: Dual, screws: Dual, unit: float) -> FloatArray:
-    """Newton's step (n, 5) for all eighteen equations product = I, the slide and all lengths in ``unit``."""
-    n = product.real.shape[0]
-    # each screw's change of the product, as columns (n, 18, 5)
-    changes = [skew(screws[..., i]) @ product for i in range(5)]
+def equations(product: Dual, screws: Dual, unit: float, rows: Rows) -> tuple[FloatArray, FloatArray]:
+    """The m equations of a step: their matrix (n, m, 5) and right side (n, m), the slide and all lengths in ``unit``.
+
+    A joint's motion q along its screw s changes the loop B by [s]B q. All entries of this are to be those of I - B; the thesis
+    writes [s] q = B' - I (eq 11), its matrix A and its right side V (eqs 23 to 25).
+    """
+    changes = [skew(screws[..., i]) for i in range(5)]
+    if rows == "all":
+        real, dual = np.eye(3) - product.real, -product.dual
+        changes, places = [change @ product for change in changes], np.indices((3, 3)).reshape(2, 9)
+    else:
+        real, dual = (np.swapaxes(part, -1, -2) for part in (product.real - np.eye(3), product.dual))
+        places = _UPPER
+        if rows == "printed":
+            diagonal = np.diagonal(real, axis1=-2, axis2=-1)
+            real = real + diagonal[..., :, None] + diagonal[..., None, :]
+    row, column = places
     columns = np.stack(
-        [np.concatenate([x.real.reshape(n, 9), x.dual.reshape(n, 9) / unit], -1) for x in changes],
-        -1,
+        [np.concatenate([x.real[..., row, column], x.dual[..., row, column] / unit], -1) for x in changes], -1
     )
     columns[..., 4] *= unit
-    error = np.concatenate([(product.real - np.eye(3)).reshape(n, 9), product.dual.reshape(n, 9) / unit], -1)
-    step: FloatArray = -(np.linalg.pinv(columns) @ error[..., None])[..., 0]
-    return step
+    return columns, np.concatenate([real[..., row, column], dual[..., row, column] / unit], -1)

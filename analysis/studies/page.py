@@ -17,8 +17,11 @@ _ROW = re.compile(
 
 
 def figures(numbers: Iterable[str]) -> str:
-    """The figures of these numbers, computed, in Markdown; one that only shows a mechanism or an apparatus has its title."""
-    lines = []
+    """The figures of these numbers, computed, in Markdown; one that only shows a mechanism or an apparatus has its title.
+
+    What several of them say of an assignment is said at the first.
+    """
+    lines: list[str] = []
     for number in numbers:
         entry = ENTRIES[number]
         if number not in STUDIES:
@@ -27,7 +30,7 @@ def figures(numbers: Iterable[str]) -> str:
         result = load(number).compute()
         where = f" ({entry.place})" if entry.place else ""
         lines += [f"### {result.heading}", "", f"{result.claim}{where}", ""]
-        if result.assignment:
+        if result.assignment and f"*{result.assignment}*" not in lines:
             lines += [f"*{result.assignment}*", ""]
         lines += [f"`linkwork figures {number}`", "", _HEADINGS]
         for v in result.verdicts:

@@ -1,4 +1,5 @@
-"""The figures of Rahman's thesis, listed here: `table` says which shows what, `figures` computes them."""
+"""Rahman's thesis, listed here: `table` says which figure shows what and `figures` computes them; `printed` has the thesis's
+equations to the letter and `method` judges them."""
 
 from __future__ import annotations
 
@@ -8,7 +9,22 @@ from types import MappingProxyType
 from ..contents import Entry
 from . import table
 
-#: Each figure by its number in the thesis with an R before it.
+_DRAWINGS = (
+    ("Planar (ideal) slider-crank with no offset", "section 2.1, L153, L185"),
+    ("Planar slider-crank with offset a4 only", "section 2.1, L154, L189"),
+    ("Generalised slider-crank with all offsets", "section 2.1, L155, L191"),
+    ("Planar slider-crank when the crank angle is zero", "section 2.6.1, L156, L439"),
+)
+
+#: Each figure by its number in the thesis with an R before it, then the studies of what is in no figure.
 FIGURES: Mapping[str, Entry] = MappingProxyType(
-    {number: Entry(figure.title, "rahman.figures") for number, figure in table.FIGURES.items()}
+    {f"R{n}": Entry(title, place=place) for n, (title, place) in enumerate(_DRAWINGS, start=1)}
+    | {number: Entry(figure.title, "rahman.figures", figure.place) for number, figure in table.FIGURES.items()}
+    | {
+        "rahman-closure": Entry(
+            "Rahman's loop closure and its iteration", "rahman.method", "sections 2.2 to 2.6, 3.2, 3.3"
+        ),
+        "rahman-rates": Entry("Rahman's rates: velocities and accelerations", "rahman.method", "sections 2.7, 2.8"),
+        "rahman-forces": Entry("Rahman's force equations in the plane", "rahman.method", "sections 2.8, 3.1"),
+    }
 )

@@ -1,4 +1,4 @@
-"""Rahman's figures 5 to 38: displacement and all joint forces of the generalised slider-crank, one family of studies.
+"""Rahman's figures 5 to 38: displacement and joint forces of the generalised slider-crank, one family of studies.
 
 The mechanism of section 3.1 turns at 50 rpm under a crank torque of 100 lb.in, with the offset a4, the shift S1 or the twist
 alpha4 in three sizes, each beside the ideal slider-crank (a4 = 0, S1 = 0, alpha4 = 270 deg). What is sought is the force on
@@ -6,15 +6,14 @@ the slider, and with it every joint force and moment. It has no finite value at 
 the crank: the curves leave the plot there, and dotted lines of their colour mark the places. The greatest value of a curve
 is therefore told at whole degrees that are more than `CLEAR_DEG` from a dead centre.
 
-Our source tells which quantities and cases the figures show, but not which stands under which number: the numbering is our
-assignment (`table`). What section 3.2 states is held against the computation where the quantity concerned is shown. All
-forces are computed a second time by dual vectors, which share no equation with the plant.
+What sections 3.2 and 3.3 state is held against the right mechanism where the quantity concerned is shown. All forces are
+computed a second time by dual vectors, which share no equation with the plant.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from functools import cache, partial
 from itertools import pairwise
 
@@ -29,32 +28,28 @@ from ...slider_crank import (
     ConstantShift,
     ForceTurn,
     JointLoads,
-    assembly_margin,
     close,
     constant_shift,
     follow,
     force_turn,
-    greatest_shift,
     joint_loads,
     ranges,
 )
 from ..study import OURS, TEXT, Study, StudyResult, Verdict, at_least, at_most, near, padded
 from .table import (
-    ASSIGNED,
     AXIAL_LB,
+    COMPONENTS,
+    CONSTANT,
     DEAD_CENTRES_DEG,
     FAMILIES,
     FIGURES,
-    GREATEST_SHIFTS_IN,
     IDEAL,
-    QUANTITIES,
-    SHIFTS_REACHED_IN,
-    SLIDER_MOMENTS,
+    INFERRED,
+    SPIKES,
     SPIKES_DEG,
     SPOTS,
     STROKES_BY_TWIST_IN,
     STROKES_IN,
-    TWISTS_REACHED_DEG,
     Case,
     Component,
 )
@@ -70,13 +65,13 @@ FOLLOW_DEG = 20.0
 NOTHING, SAME = 1e-6, 1e-9
 #: Torque on the crank (lb.in) and its length (in).
 TORQUE, CRANK = 100.0, 12.0
-#: How far (deg) "near" is taken to reach in "spikes near 100 and 300 deg": ours, the source gives no range.
-SPIKES_TO = 25.0
+#: How far (deg) "near" is taken to reach in "spikes near 100 and 300 degrees", and by what share of half the stroke a curve may
+#: depart from a sine to be "almost" one: ours, the source gives no range.
+SPIKES_TO, ALMOST = 25.0, 0.2
+#: By how much the values on both sides of a spike exceed all that are clear of the dead centres.
+SPIKE = 2.0
 
 _UNITS = {"lb": POUND_FORCE, "lb.in": POUND_INCH}
-_RAISES = "The offset a4 raises the joint forces."
-#: Stands for a claim where the text, as far as our source tells, says nothing of a quantity in these cases.
-NO_CLAIM = "Nothing is stated of it in our source; it is computed in two ways."
 
 
 @cache
@@ -124,13 +119,13 @@ def greatest(case: Case, quantity: FloatArray) -> float:
 
 
 def spikes_deg(case: Case, component: Component) -> FloatArray:
-    """Crank angles (deg) of the two poles of a component: where its reciprocal, which is smooth there, goes through zero."""
+    """Crank angles (deg) of the poles of a component: where its reciprocal, which is smooth there, goes through zero."""
     value = values(case, component)
     (changes,) = np.nonzero(value[:-1] * value[1:] < 0.0)
     # a zero of the component changes its sign too, between small values
     size = np.minimum(np.abs(value[changes]), np.abs(value[changes + 1]))
     found = []
-    for at in np.sort(changes[np.argsort(size)[-2:]]).tolist():
+    for at in changes[size > SPIKE * greatest(case, value)].tolist():
         near_it = slice(at - 1, at + 3)
         reciprocal = value[at] / value[near_it]
         found.append(np.polyfit(reciprocal, ANGLES_DEG[near_it], 3)[-1])
@@ -162,69 +157,24 @@ def difference_from_dual(case: Case, component: Component) -> float:
     return float(np.abs(values(case, component)[clear(case)] - other).max()) / scale
 
 
-def _offsets_gain(component: Component, given: str) -> float:
-    """Least gain of a component's greatest magnitude from each case of family A to the next, the ideal one first."""
-    peaks = [greatest(case, values(case, component, given)) for case in (IDEAL, *FAMILIES["A"].cases)]
-    return min(after - before for before, after in pairwise(peaks))
-
-
-def _force_verdicts(family: str, component: Component) -> list[Verdict]:
-    """What is said of any component: the offset raises it, its spikes are the dead centres, it is computed twice."""
-    cases, symbol = FAMILIES[family].cases, component.symbol
+def _motion(family: str) -> list[Verdict]:
+    """Stroke, shape and dead centres of the slider's motion, and the power that it takes."""
+    cases, place = FAMILIES[family].cases, "section 3.3, L1125"
     verdicts = []
-    if family == "A" and "F" in symbol:
-        what = f"greatest magnitude of {symbol}, least gain from one a4 to the next"
-        # along the guide nothing acts without a load, and 2F2j is settled by the torque
-        if component.source != "slider_force":
-            verdicts.append(
-                at_least(f"{what}; slider load given", TEXT, 0.0, _offsets_gain(component, "load"), component.unit)
-            )
-        if symbol != "2F2j":
-            verdicts.append(
-                at_least(f"{what}; torque given", TEXT, 0.0, _offsets_gain(component, "torque"), component.unit)
-            )
-    spikes = [(case, spikes_deg(case, component)) for case in cases if _has_spikes(case, component)]
-    if spikes:
-        distance = max(float(np.abs(found - dead_centres_deg(case)).max()) for case, found in spikes)
-        verdicts.append(at_most(f"distance of the spikes of {symbol} from dead centres", OURS, 0.005, distance, "deg"))
-    difference = max(difference_from_dual(case, component) for case in (IDEAL, *cases))
-    scale = "T" if component.unit == "lb.in" else "T/a1"
-    verdicts.append(
-        at_most(f"difference of {symbol} from that by dual vectors, relative to {scale}", OURS, SAME, difference)
-    )
-    return verdicts
-
-
-def _has_spikes(case: Case, component: Component) -> bool:
-    """Whether the slider's force has a part in a component: then that differs between the two force problems."""
-    sought, given = (values(case, component, problem) for problem in ("torque", "load"))
-    # 1T1k and, at constant speed, 2F2j are settled by the torque
-    settled = np.ptp(sought[clear(case)]) < NOTHING
-    return not settled and greatest(case, sought - given) > NOTHING
-
-
-def _none(statement: str, source: str, case: Case, quantity: FloatArray, unit: str) -> Verdict:
-    """A verdict on what is stated to be zero, told by its greatest magnitude clear of the dead centres."""
-    return near(f"{statement}; {case.name}", source, 0.0, greatest(case, quantity), NOTHING, unit)
-
-
-def _stroke(case: Case) -> float:
-    """Stroke (in) of a mechanism of section 3.1 at its shift."""
-    mechanism = parameters(case.offset_in, case.twist_deg)
-    (whole,) = ranges(mechanism, constant_shift(case.shift_in * INCH))
-    return whole.stroke / INCH
-
-
-def _slider(family: str) -> tuple[str, list[Verdict]]:
-    """Stroke and dead centres, and how far the mechanism can be assembled."""
-    cases = FAMILIES[family].cases
-    verdicts = [
-        at_most(f"stroke relative to the ideal one's; {case.name}", TEXT, 1.0, _stroke(case) / _stroke(IDEAL))
-        for case in cases
-        if case.twist_deg == IDEAL.twist_deg
-    ]
-    claim = "The offset a4 reduces the stroke."
-    if family == "A":
+    for case in cases:
+        first = 2.0 * np.fft.rfft(position(case)[:-1])[1] / (ANGLES_DEG.size - 1)
+        sine = (first * np.exp(1j * np.radians(ANGLES_DEG))).real
+        away = np.abs(position(case) - np.mean(position(case)[:-1]) - sine).max() / (0.5 * _stroke(case))
+        statement = f"greatest departure of the displacement from a sine, relative to half the stroke; {case.name}"
+        verdicts.append(at_most(statement, TEXT, ALMOST, away, place=place))
+        if case.twist_deg == IDEAL.twist_deg:
+            longer, name = _stroke(case) / _stroke(IDEAL), f"stroke relative to the ideal one's; {case.name}"
+            verdicts.append(at_most(name, TEXT, 1.0, longer, place=place, why="a4 lengthens it"))
+    if family == "offset":
+        power = [float(np.mean(_torque(case)[:-1]) * CRANK_SPEED) for case in (IDEAL, *cases)]
+        saved, name = power[0] - min(power[1:]), "mean power that an offset saves at the same RPM without a load"
+        why = "a motion without friction takes none"
+        verdicts.append(at_least(name, TEXT, NOTHING, saved, "lb.in/s", place=place, why=why))
         for a4, stroke in STROKES_IN.items():
             planar = Case("", a4, 0.0, 270.0)
             verdicts.append(near(f"stroke; a4 = {a4:g} in with S1 = 0", OURS, stroke, _stroke(planar), 5e-4, "in"))
@@ -234,183 +184,151 @@ def _slider(family: str) -> tuple[str, list[Verdict]]:
                 near(f"{which} dead centre; a4 = {a4:g} in with S1 = 0", OURS, angle, at, 0.005, "deg")
                 for which, angle, at in zip(("first", "second"), stated, found)
             ]
-    elif family == "B":
-        reached = SHIFTS_REACHED_IN[-1]
-        claim += f" The iteration converges up to S1 = {', '.join(f'{shift:g}' for shift in SHIFTS_REACHED_IN)} in."
-        shifts = {a4: (greatest_shift(parameters(a4)) or 0.0) / INCH for a4 in GREATEST_SHIFTS_IN}
-        statement = "greatest S1 to which the iteration converges, beside the least to which the crank turns fully"
-        verdicts.append(near(statement, TEXT, reached, min(shifts.values()), 0.5, "in"))
-        verdicts += [
-            near(f"greatest S1 at which the crank turns fully; a4 = {a4:g} in", OURS, stated, shifts[a4], 5e-4, "in")
-            for a4, stated in GREATEST_SHIFTS_IN.items()
-        ]
-    else:
-        least, most = TWISTS_REACHED_DEG
-        claim += f" The iteration converges at twists alpha4 from {least:g} to {most:g} deg."
-        step = 5
-        margins = [_margin(float(twist)) for twist in range(0, 360, step)]
-        width = step * sum(margin > 0.0 for margin in margins)
-        statement = "range of alpha4 in which the iteration converges, beside that in which the crank turns fully"
-        verdicts.append(near(statement, TEXT, most - least, width, step, "deg"))
-        verdicts.append(
-            at_least(f"least margin of assembly at every {step} deg of alpha4", OURS, 0.0, min(margins), "in")
-        )
-        verdicts += [
-            near(f"stroke; {case.name}", OURS, STROKES_BY_TWIST_IN[case.twist_deg], _stroke(case), 0.005, "in")
-            for case in cases
-            if case.twist_deg in STROKES_BY_TWIST_IN
-        ]
-    return claim, verdicts
-
-
-def _margin(twist_deg: float) -> float:
-    """Least margin of assembly over the turn (in) at a4 = 20 in, S1 = 0."""
-    case = FAMILIES["C"].cases[0]
-    return assembly_margin(parameters(case.offset_in, twist_deg), constant_shift(case.shift_in * INCH)).length / INCH
-
-
-def _axial(family: str) -> tuple[str, list[Verdict]]:
-    """1F1k is not prescribed."""
-    verdicts = []
-    for case in FAMILIES[family].cases:
-        found = values(case, _COMPONENTS["1F1k"])
-        verdicts.append(_none("greatest magnitude of 1F1k", TEXT, case, found, "lb"))
-        balance = f"greatest magnitude of 1F1k + 2F2k, the shift at rest; {case.name}"
-        verdicts.append(at_most(balance, OURS, SAME, greatest(case, found + values(case, _COMPONENTS["2F2k"])), "lb"))
-    return "The axial force on the crank is m1 S1'', none at a constant shift.", verdicts
-
-
-def _bearing_moment(family: str, axis: str) -> tuple[str, list[Verdict]]:
-    """1T1i or 1T1j by the forces."""
-    angle = np.radians(ANGLES_DEG)
-    verdicts = []
-    for case in FAMILIES[family].cases:
-        fi, fj, fk, moment = (values(case, _COMPONENTS[name]) for name in ("1F1i", "1F1j", "1F1k", f"1T1{axis}"))
-        if axis == "i":
-            printed, formula = -fj * case.shift_in, "-1F1j S1"
-            whole, full = printed + fk * CRANK * np.sin(angle), "-1F1j S1 + 1F1k a1 sin(theta1)"
-        else:
-            printed, formula = fi * case.shift_in, "1F1i S1"
-            whole, full = printed - fk * CRANK * np.cos(angle), "1F1i S1 - 1F1k a1 cos(theta1)"
-        verdicts.append(_none(f"greatest magnitude of 1T1{axis} - ({formula})", TEXT, case, moment - printed, "lb.in"))
-        verdicts.append(_none(f"greatest magnitude of 1T1{axis} - ({full})", OURS, case, moment - whole, "lb.in"))
-    if axis == "j":
-        about = [values(case, _COMPONENTS["1T1k"]) for case in FAMILIES[family].cases]
-        verdicts += [
-            near(
-                f"{which} 1T1k, the torque that is given",
-                OURS,
-                TORQUE,
-                pick([pick(v) for v in about]),
-                NOTHING,
-                "lb.in",
-            )
-            for which, pick in (("least", np.nanmin), ("greatest", np.nanmax))
-        ]
-    return f"1T1{axis} = {formula}.", verdicts
-
-
-def _across_crank(family: str) -> tuple[str, list[Verdict]]:
-    """2F2j is settled by the torque."""
-    found = [values(case, _COMPONENTS["2F2j"]) for case in FAMILIES[family].cases]
-    return "At constant speed 2F2j = -T/a1 = -8.33 lb.", [
-        near(f"{which} 2F2j of all cases", TEXT, -8.33, pick([pick(v) for v in found]), 0.005, "lb")
-        for which, pick in (("least", np.nanmin), ("greatest", np.nanmax))
+    return verdicts + [
+        near(f"stroke; {case.name}", OURS, STROKES_BY_TWIST_IN[case.twist_deg], _stroke(case), 0.005, "in")
+        for case in cases
+        if case.twist_deg in STROKES_BY_TWIST_IN
     ]
 
 
-def _along_crank_axis(family: str) -> tuple[str, list[Verdict]]:
-    """2F2k is not zero."""
-    component = _COMPONENTS["2F2k"]
+def _stroke(case: Case) -> float:
+    """Stroke (in) of a mechanism of section 3.1 at its shift."""
+    mechanism = parameters(case.offset_in, case.twist_deg)
+    (whole,) = ranges(mechanism, constant_shift(case.shift_in * INCH))
+    return whole.stroke / INCH
+
+
+def _torque(case: Case) -> FloatArray:
+    """Crank torque (lb.in) that the motion takes without a load on the slider."""
+    return np.asarray(turn(case, "load").torque / POUND_INCH)
+
+
+def _force_verdicts(family: str, component: Component) -> list[Verdict]:
+    """What is said of any component: its spikes, that the offset raises it; and that it is computed twice."""
+    cases, symbol = FAMILIES[family].cases, component.symbol
     verdicts = []
-    for case in FAMILIES[family].cases:
-        found = values(case, component)
-        verdicts.append(_none("greatest magnitude of 2F2k", TEXT, case, found, "lb"))
-        if case[1:] in AXIAL_LB:
-            stated, tolerance = AXIAL_LB[case[1:]]
-            statement = f"greatest magnitude of 2F2k; {case.name}"
-            verdicts.append(near(statement, OURS, stated, greatest(case, found), tolerance, "lb"))
-    return "2F2k = 0.", verdicts
+    found = [spikes_deg(case, component) for case in cases]
+    if family != "all":
+        stated, counts = SPIKES.get(symbol, 2), [spikes.size for spikes in found]
+        count = max(counts, key=lambda n: abs(n - stated))
+        why = "3F3j, 3F3k have none, the others two" if count != stated else ""
+        verdicts.append(
+            near(f"spikes of {symbol} in a turn", TEXT, stated, count, 0.0, place="section 3.3, L1125", why=why)
+        )
+    if any(spikes.size for spikes in found):
+        distance = max(float(np.abs(spikes - SPIKES_DEG).max()) for spikes in found)
+        name = f"distance of the spikes of {symbol} from 100 and 300 deg"
+        verdicts.append(at_most(name, TEXT, SPIKES_TO, distance, "deg", place="sections 3.2, 3.3, L1115, L1125"))
+        distance = max(float(np.abs(spikes - dead_centres_deg(case)).max()) for case, spikes in zip(cases, found))
+        verdicts.append(at_most(f"distance of the spikes of {symbol} from dead centres", OURS, 0.005, distance, "deg"))
+    if family == "offset":
+        name = f"greatest magnitude of {symbol}, least gain from one a4 to the next"
+        gain, with_load = (_offsets_gain(component, given) for given in ("torque", "load"))
+        why = "nearer to a dead centre than the others" if gain < 0.0 else ""
+        verdicts.append(at_least(name, TEXT, 0.0, gain, component.unit, place="section 3.3, L1125", why=why))
+        # along the guide nothing acts without a load
+        if component.source != "slider_force":
+            verdicts.append(at_least(f"{name}, with the slider's load given", OURS, 0.0, with_load, component.unit))
+    if "T" in symbol:
+        verdicts += _bearing_moment(component, cases)
+    if component.source == "slider_force":
+        verdicts += _slider_force(component, cases)
+    difference = max(difference_from_dual(case, component) for case in (IDEAL, *cases))
+    scale = "T" if component.unit == "lb.in" else "T/a1"
+    name = f"difference of {symbol} from that by dual vectors, relative to {scale}"
+    return [*verdicts, at_most(name, OURS, SAME, difference)]
 
 
-def _raises(family: str) -> str:
-    """What is stated of a force: that the offset raises it, and nothing where the offset is the same in all cases."""
-    return _RAISES if family == "A" else NO_CLAIM
+def _offsets_gain(component: Component, given: str) -> float:
+    """Least gain of a component's greatest magnitude from each case of variable offset to the next, the ideal one first."""
+    peaks = [greatest(case, values(case, component, given)) for case in (IDEAL, *FAMILIES["offset"].cases)]
+    return min(after - before for before, after in pairwise(peaks))
 
 
-def _slider_pin(family: str) -> tuple[str, list[Verdict]]:
-    """Across the rod the slider's force has no part."""
-    found = max(
-        float(np.nanmax(np.abs(values(case, component) - values(case, component, "load"))))
-        for case in FAMILIES[family].cases
-        for component in (_COMPONENTS["3F3j"], _COMPONENTS["3F3k"])
-    )
-    statement = "greatest difference of 3F3j and 3F3k between torque given and load given"
-    return _raises(family), [at_most(statement, OURS, NOTHING, found, "lb")]
+def moment_by_forces(case: Case, axis: str) -> tuple[FloatArray, FloatArray]:
+    """1T1i or 1T1j (lb.in) by the forces on the crank: as section 3.2 has it, and with the axial force."""
+    angle = np.radians(ANGLES_DEG)
+    fi, fj, fk = (values(case, COMPONENTS[name]) for name in ("1F1i", "1F1j", "1F1k"))
+    if axis == "i":
+        return -fj * case.shift_in, -fj * case.shift_in + fk * CRANK * np.sin(angle)
+    return fi * case.shift_in, fi * case.shift_in - fk * CRANK * np.cos(angle)
 
 
-def _slider_force(family: str) -> tuple[str, list[Verdict]]:
-    """The spikes, and values from an independent derivation."""
-    component = _COMPONENTS["4F4k"]
+def _bearing_moment(component: Component, cases: Iterable[Case]) -> list[Verdict]:
+    """1T1i or 1T1j by the forces, and whether they are there."""
+    symbol, axis, place = component.symbol, component.symbol[-1], "section 3.2, L1119"
+    short, lacking = ("-1F1j S1", " + 1F1k a1 sin(theta1)") if axis == "i" else ("1F1i S1", " - 1F1k a1 cos(theta1)")
     verdicts = []
-    for case in FAMILIES[family].cases:
-        found = spikes_deg(case, component)
-        verdicts += [
-            near(f"{which} spike, to within {SPIKES_TO:g} deg; {case.name}", TEXT, stated, at, SPIKES_TO, "deg")
-            for which, stated, at in zip(("first", "second"), SPIKES_DEG, found)
-        ]
+    for case in cases:
+        moment = values(case, component)
+        printed, full = (greatest(case, moment - formula) for formula in moment_by_forces(case, axis))
+        name, why = f"greatest magnitude of {symbol} - ({short}); {case.name}", f"lacks{lacking}"
+        verdicts.append(near(name, TEXT, 0.0, printed, NOTHING, "lb.in", place=place, why=why))
+        name = f"greatest magnitude of {symbol} - ({short}{lacking}); {case.name}"
+        verdicts.append(near(name, OURS, 0.0, full, NOTHING, "lb.in"))
+    least = min(greatest(case, values(case, component)) for case in cases)
+    name = f"greatest magnitude of {symbol}, which S1 brings about, least of the cases"
+    return [*verdicts, at_least(name, TEXT, NOTHING, least, "lb.in", place="section 3.3, L1125-1127")]
+
+
+def _slider_force(component: Component, cases: Iterable[Case]) -> list[Verdict]:
+    """Values from an independent derivation."""
+    verdicts = []
+    for case in cases:
         if case.shift_in == 0.0 and case.twist_deg == IDEAL.twist_deg:
             verdicts += [
                 near(f"{which} spike; {case.name}", OURS, stated, at, 0.005, "deg")
-                for which, stated, at in zip(("first", "second"), DEAD_CENTRES_DEG[case.offset_in], found)
+                for which, stated, at in zip(
+                    ("first", "second"), DEAD_CENTRES_DEG[case.offset_in], spikes_deg(case, component)
+                )
             ]
         for spot in SPOTS:
             if case[1:] == spot[:3]:
                 (at_30,) = values(case, component)[ANGLES_DEG == 30.0]
-                statement = f"4F4k at theta1 = 30 deg; {case.name}"
-                # printed along -k4
-                verdicts.append(near(statement, OURS, -spot.slider_force_lb, at_30, 5e-7, "lb"))
-    return "There are spikes near 100 and 300 deg.", verdicts
+                name = f"4F4k at theta1 = 30 deg; {case.name}"
+                # the spot is along -k4
+                verdicts.append(near(name, OURS, -spot.slider_force_lb, at_30, 5e-7, "lb"))
+    return verdicts
 
 
-def _slider_moments(family: str) -> tuple[str, list[Verdict]]:
-    """4T4 is zero."""
-    cases = (IDEAL, *FAMILIES[family].cases)
-    return "The moments on the slider are zero.", [
-        near(
-            f"greatest magnitude of {component.symbol} in all cases",
-            TEXT,
-            0.0,
-            max(float(np.abs(values(case, component)).max()) for case in cases),
-            NOTHING,
-            "lb.in",
+def _constant() -> list[Verdict]:
+    """What section 3.2 finds to be constant or zero, and what the equations take for given."""
+    cases, place, verdicts = FAMILIES["all"].cases, "section 3.2, L1117", []
+    about = {name: [values(case, COMPONENTS[name]) for case in cases] for name in ("1F1k", "2F2j", "2F2k", "1T1k")}
+
+    def none(name: str, case: Case, size: float, unit: str, place: str, why: str) -> Verdict:
+        what = f"greatest magnitude of {name}; {case.name}"
+        return near(what, TEXT, 0.0, size, NOTHING, unit, place=place, why=why if size > NOTHING else "")
+
+    for case, axial, pin in zip(cases, about["1F1k"], about["2F2k"]):
+        size, given = greatest(case, pin), "section 2.8, after eq 64, L945-949"
+        verdicts.append(none("2F2k", case, size, "lb", place, "only in the plane"))
+        verdicts.append(
+            none("1F1k", case, greatest(case, axial), "lb", given, "erratum 7: an unknown, since S1 is given")
         )
-        for component in SLIDER_MOMENTS.components
-    ]
-
-
-def _joint_force(family: str) -> tuple[str, list[Verdict]]:
-    """Nothing more is said of this one."""
-    return _raises(family), []
-
-
-_COMPONENTS = {component.symbol: component for quantity in QUANTITIES for component in quantity.components}
-
-#: What is said of a figure's quantity, by its first component: the claim, and the verdicts that are this quantity's own.
-_ARGUMENTS: dict[str, Callable[[str], tuple[str, list[Verdict]]]] = {
-    "S4": _slider,
-    "1F1i": _joint_force,
-    "1F1j": _joint_force,
-    "1F1k": _axial,
-    "1T1i": partial(_bearing_moment, axis="i"),
-    "1T1j": partial(_bearing_moment, axis="j"),
-    "2F2i": _joint_force,
-    "2F2j": _across_crank,
-    "2F2k": _along_crank_axis,
-    "3F3i": _slider_pin,
-    "4F4i": _slider_force,
-    "4T4i": _slider_moments,
-}
+        if case[1:] in AXIAL_LB:
+            stated, tolerance = AXIAL_LB[case[1:]]
+            name = f"greatest magnitude of 2F2k, independent derivation; {case.name}"
+            verdicts.append(near(name, OURS, stated, size, tolerance, "lb"))
+        if case.shift_in == 0.0:
+            for symbol in ("1T1i", "1T1j"):
+                size, why = greatest(case, values(case, COMPONENTS[symbol])), "1F1k has a lever"
+                verdicts.append(none(f"{symbol}, where S1 = 0", case, size, "lb.in", "section 3.2, L1119", why))
+    balance = max(greatest(case, a + b) for case, a, b in zip(cases, about["1F1k"], about["2F2k"]))
+    verdicts.append(
+        at_most("greatest magnitude of 1F1k + 2F2k, the shift at rest, in all cases", OURS, SAME, balance, "lb")
+    )
+    for which, pick in (("least", np.nanmin), ("greatest", np.nanmax)):
+        pin, torque = (pick([pick(found) for found in about[name]]) for name in ("2F2j", "1T1k"))
+        verdicts.append(near(f"{which} 2F2j of all cases", TEXT, -8.33, pin, 0.005, "lb", place=place))
+        given = "section 3.1, L1079"
+        verdicts.append(near(f"{which} 1T1k of all cases", TEXT, TORQUE, torque, NOTHING, "lb.in", place=given))
+    for symbol in ("4T4i", "4T4j", "4T4k"):
+        size = max(float(np.abs(values(case, COMPONENTS[symbol])).max()) for case in (IDEAL, *cases))
+        verdicts.append(
+            near(f"greatest magnitude of {symbol} in all cases", TEXT, 0.0, size, NOTHING, "lb.in", place=place)
+        )
+    return verdicts
 
 
 def _curve_name(symbol: str, case: Case, unit: str) -> str:
@@ -423,20 +341,26 @@ def _dead_centre_name(case: Case) -> str:
 
 def compute(number: str) -> StudyResult:
     """Curves of all cases of a figure, their dead centres, and what is stated of them."""
-    family, quantity = FIGURES[number]
+    family, symbols, *_ = FIGURES[number]
+    components = [COMPONENTS[symbol] for symbol in symbols]
     cases = (IDEAL, *FAMILIES[family].cases)
     columns = {ANGLE: ANGLES_DEG}
-    if not quantity.components:
+    if not components:
         columns |= {_curve_name("S4", case, "in"): position(case) for case in cases}
-    for component in quantity.components:
+    for component in components:
         columns |= {_curve_name(component.symbol, case, component.unit): values(case, component) for case in cases}
     columns |= {_dead_centre_name(case): dead_centres_deg(case) for case in cases}
-    first = quantity.components[0].symbol if quantity.components else "S4"
-    claim, verdicts = _ARGUMENTS[first](family)
-    for component in quantity.components:
+    verdicts = _motion(family) if not components else _constant() if number == CONSTANT else []
+    for component in components:
         verdicts += _force_verdicts(family, component)
+    shown = ", ".join(symbols) or "displacement S4"
+    if number == CONSTANT:
+        claim = "1F1k and 2F2k are zero, 2F2j is -T/a1, the moments on the slider are zero, in every case and at every angle."
+    else:
+        claim = f"The {shown} over a turn of the crank for variable {family}, beside the ideal case."
+    assignment = "" if number == CONSTANT else INFERRED
     return StudyResult(
-        number=number, claim=claim, assignment=ASSIGNED, columns=padded(columns), verdicts=tuple(verdicts)
+        number=number, claim=claim, assignment=assignment, columns=padded(columns), verdicts=tuple(verdicts)
     )
 
 
@@ -469,13 +393,13 @@ def _y_range(curves: Iterable[FloatArray]) -> tuple[float, float]:
 
 def draw(result: StudyResult) -> Figure:
     """A panel a component; the ideal case dashed over the others, dead centres dotted."""
-    family, quantity = FIGURES[result.number]
+    family, symbols, *_ = FIGURES[result.number]
     looks = [
         (case, printed(case.name), colour, line)
         for case, colour, line in zip(FAMILIES[family].cases, COLOURS * 2, ["-"] * len(COLOURS) + ["-."] * len(COLOURS))
     ]
     looks.append((IDEAL, printed("ideal, a4 = S1 = 0"), "0.15", "--"))
-    shown = [(c.symbol, f"{printed_symbol(c.symbol)}, {c.meaning}", c.unit) for c in quantity.components]
+    shown = [(c.symbol, f"{printed_symbol(c.symbol)}, {c.meaning}", c.unit) for c in map(COMPONENTS.get, symbols) if c]
     panels: list[Panel] = []
     for symbol, label, unit in shown or [("S4", "slider position $S_4$", "in")]:
         names = {case: _curve_name(symbol, case, unit) for case, *_ in looks}

@@ -1,25 +1,24 @@
-"""Which of Rahman's figures shows what: figures 5 to 38 as three families of cases by eleven quantities, and one more.
+"""Which of Rahman's figures shows what: figures 5 to 38 as twelve quantities in two or three families of cases.
 
-Our source tells which quantities and which cases the figures show, but not which stands under which number: the numbering
-is our assignment. Figures 5 to 15 are family A, the offset; 16 to 26 family B, the shift; 27 to 37 family C, the twist; each
-family has the same eleven quantities in the same order, and 38 has the moments on the slider in all cases.
+Section 3.2 names the families by their figures: variable offset, variable axial shift, variable twist; the two torques have no
+figure of variable twist. The captions that are left, each above its number, say displacement, force or torque and what is held
+constant. Which force and which component stands under which number is our inference: in the order of section 3.2 the families
+leave one place for each component that it does not find to be constant.
 
-The symbols are the thesis's: nFni is the force in joint n along i of frame n, nTni the moment. By the signs of its
-statements 1F1 and 1T1 are those of the ground on the crank, and 2F2 is the force of the rod on the crank, since
-2F2j = -T/a1. Nothing is stated about the signs of 3F3 and 4F4: they are taken in the same sense from the next link, as the
-force of the slider on the rod and of the ground on the slider.
+The symbols are the thesis's: nFni is the force in joint n along i of frame n, nTni the moment. 1F1 and 1T1 are those of the
+ground on the crank and 2F2 is the force of the rod on the crank, since 2F2j = -T/a1; eq 63 then makes 3F3 that of the rod on
+the slider, and eq 64 makes 4F4 that of the ground on the slider.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from types import MappingProxyType
 from typing import NamedTuple
 
-ASSIGNED = (
-    "Our source tells which quantities and cases figures 5 to 38 show, but not which stands under which number: the "
-    "numbering is our assignment, 5 to 15 for the offset, 16 to 26 for the shift, 27 to 37 for the twist, 38 for the moments "
-    "on the slider, such that every component of every joint force and moment appears."
+INFERRED = (
+    "The thesis gives the family of each figure (section 3.2, L1111-1113) and, where a caption is left, whether it is of a "
+    "displacement, a force or a torque. Which component has which number is our inference, by the order of section 3.2."
 )
 
 
@@ -37,13 +36,16 @@ class Spot(NamedTuple):
     torque_lb_in: float
 
 
-# The thesis's figures are not legible in the copy there is. Reference numbers are from an independent derivation of the closed
-# form, to the digits shown; nothing here is the output of this program.
+# The curves of the thesis's figures are not in the copy there is. Reference numbers are from an independent derivation of the
+# closed form, to the digits shown; nothing here is the output of this program.
 
-#: Where section 3.2 sees spikes (deg).
+#: Where sections 3.2 and 3.3 see spikes (deg).
 SPIKES_DEG = (100.0, 300.0)
-#: Shifts (in) up to which, and twists (deg) between which the thesis's iteration converges.
-SHIFTS_REACHED_IN, TWISTS_REACHED_DEG = (1.5, 3.5, 9.0), (232.0, 310.0)
+#: How many spikes section 3.3 sees in a component (L1125); two in those not named here.
+SPIKES: Mapping[str, int] = MappingProxyType({"3F3j": 0, "3F3k": 1, "4F4k": 1})
+#: Shifts (in) up to which the thesis's iteration converges by a4 (in), and twists (deg) between which (L1121).
+SHIFTS_REACHED_IN: Mapping[float, float] = MappingProxyType({0.0: 1.5, 10.0: 3.5, 30.0: 9.0})
+TWISTS_REACHED_DEG = (232.0, 310.0)
 
 SPOTS = (
     Spot(10.0, 3.5, 270.0, 51.518171, 68.488429, -62.88695, -15.328251, -100.49853),
@@ -95,28 +97,43 @@ class Component(NamedTuple):
     meaning: str
     unit: str
     source: str
-    frame: int
-    axis: int
     sign: float = 1.0
 
+    @property
+    def frame(self) -> int:
+        return int(self.symbol[0])
 
-class Quantity(NamedTuple):
-    """What a figure shows, a panel for each component; none for the slider's position."""
+    @property
+    def axis(self) -> int:
+        return "ijk".index(self.symbol[-1])
 
-    title: str
-    components: tuple[Component, ...] = ()
+
+def _components() -> Iterator[Component]:
+    for symbol, what, unit, source, sign in (
+        ("1F1", "ground on crank", "lb", "bearing", 1.0),
+        ("1T1", "ground on crank", "lb.in", "bearing_moment", 1.0),
+        ("2F2", "rod on crank", "lb", "crank_pin", -1.0),
+        ("3F3", "rod on slider", "lb", "slider_pin", -1.0),
+        ("4F4", "ground on slider", "lb", "guide", 1.0),
+        ("4T4", "ground on slider", "lb.in", "guide_moment", 1.0),
+    ):
+        for axis in "ijk":
+            yield Component(symbol + axis, what, unit, source, sign)
+    yield Component("1F1k", "ground on crank", "lb", "axial_force")
+    # along the guide it is the slider force that is sought, counted against k4 where it is a load
+    yield Component("4F4k", "slider force sought", "lb", "slider_force", -1.0)
+
+
+COMPONENTS: Mapping[str, Component] = MappingProxyType({component.symbol: component for component in _components()})
 
 
 class Figure(NamedTuple):
-    """A figure: the family of its cases and its quantity."""
+    """A figure: the family of its cases, the components it shows (none for the slider's displacement), its place."""
 
     family: str
-    quantity: Quantity
-
-    @property
-    def title(self) -> str:
-        """Title in the list of studies."""
-        return f"{self.quantity.title}; {FAMILIES[self.family].title}"
+    symbols: tuple[str, ...]
+    title: str
+    place: str
 
 
 #: The case that stands beside the others in every figure.
@@ -128,59 +145,45 @@ _TWISTS = tuple(Case(f"alpha4 = {twist} deg", 20.0, 0.0, float(twist)) for twist
 
 FAMILIES: Mapping[str, Family] = MappingProxyType(
     {
-        "A": Family("a4 = 10, 20, 30 in, S1 = 3.5 in", "S1 = 3.5 in, alpha4 = 270 deg", _OFFSETS),
-        "B": Family("S1 = 3, 6, 9 in, a4 = 30 in", "a4 = 30 in, alpha4 = 270 deg", _SHIFTS),
-        "C": Family("alpha4 = 232, 270, 310 deg, a4 = 20 in", "a4 = 20 in, S1 = 0", _TWISTS),
+        "offset": Family("a4 = 10, 20, 30 in, S1 = 3.5 in", "S1 = 3.5 in, alpha4 = 270 deg", _OFFSETS),
+        "shift": Family("S1 = 3, 6, 9 in, a4 = 30 in", "a4 = 30 in, alpha4 = 270 deg", _SHIFTS),
+        "twist": Family("alpha4 = 232, 270, 310 deg, a4 = 20 in", "a4 = 20 in, S1 = 0", _TWISTS),
         "all": Family("all cases", "", _OFFSETS + _SHIFTS + _TWISTS),
     }
 )
-
-
-def _force(n: int, axis: str, meaning: str, source: str, sign: float = 1.0) -> Component:
-    return Component(f"{n}F{n}{axis}", meaning, "lb", source, n, "ijk".index(axis), sign)
-
-
-def _moment(n: int, axis: str, meaning: str, source: str) -> Component:
-    return Component(f"{n}T{n}{axis}", meaning, "lb.in", source, n, "ijk".index(axis))
-
-
-_ON_CRANK, _BY_ROD, _BY_SLIDER, _BY_GUIDE = "ground on crank", "rod on crank", "slider on rod", "ground on slider"
-
-#: What each family shows, in the order of its figures.
-QUANTITIES: tuple[Quantity, ...] = (
-    Quantity("Slider position S4"),
-    Quantity("Force 1F1i on the crank", (_force(1, "i", _ON_CRANK, "bearing"),)),
-    Quantity("Force 1F1j on the crank", (_force(1, "j", _ON_CRANK, "bearing"),)),
-    Quantity("Axial force 1F1k on the crank", (_force(1, "k", _ON_CRANK, "axial_force"),)),
-    Quantity("Moment 1T1i on the crank", (_moment(1, "i", _ON_CRANK, "bearing_moment"),)),
-    Quantity(
-        "Moments 1T1j, 1T1k on the crank",
-        tuple(_moment(1, axis, _ON_CRANK, "bearing_moment") for axis in "jk"),
-    ),
-    Quantity("Force 2F2i in the crank pin", (_force(2, "i", _BY_ROD, "crank_pin", -1.0),)),
-    Quantity("Force 2F2j in the crank pin", (_force(2, "j", _BY_ROD, "crank_pin", -1.0),)),
-    Quantity("Force 2F2k in the crank pin", (_force(2, "k", _BY_ROD, "crank_pin", -1.0),)),
-    Quantity("Force 3F3 in the slider pin", tuple(_force(3, axis, _BY_SLIDER, "slider_pin") for axis in "ijk")),
-    Quantity(
-        "Force 4F4 on the slider",
-        (
-            *(_force(4, axis, _BY_GUIDE, "guide") for axis in "ij"),
-            # along the guide it is the slider force that is sought, counted against k4 where it is a load
-            _force(4, "k", "slider force sought", "slider_force", -1.0),
-        ),
-    ),
+#: The quantities in the order of section 3.2; the torques are not shown for variable twist.
+QUANTITIES = ("S4", "1F1i", "1F1j", "1T1i", "1T1j", "2F2i", *(f"{n}F{n}{axis}" for n in (3, 4) for axis in "ijk"))
+#: Lines of the scanned text with the captions that are left.
+CAPTIONS: Mapping[int, int] = MappingProxyType(
+    {6: 1153, 9: 1164, 10: 1170, 13: 1181, 14: 1187, 16: 1196, 19: 1208, 20: 1214, 24: 1229, 25: 1235, 26: 1241}
+    | {28: 1249, 29: 1254, 31: 1262, 32: 1268, 33: 1273, 34: 1279, 35: 1284, 37: 1292, 38: 1298}
 )
-#: What figure 38 shows.
-SLIDER_MOMENTS = Quantity(
-    "Moments 4T4 on the slider", tuple(_moment(4, axis, _BY_GUIDE, "guide_moment") for axis in "ijk")
-)
+#: The study of what the thesis finds to be constant, and shows in no figure.
+CONSTANT = "rahman-constant"
 
-#: The figures by their number in the registry of studies: R and the thesis's.
+
+def _figures() -> Iterator[Figure]:
+    number = 5
+    for symbol in QUANTITIES:
+        kind = "displacement" if symbol == "S4" else "torque" if "T" in symbol else "force"
+        for family in ("offset", "shift", "twist")[: 2 if kind == "torque" else 3]:
+            caption = f"; caption, L{CAPTIONS[number]}" if number in CAPTIONS else "; caption lost"
+            what = "Slider displacement" if symbol == "S4" else f"Joint {kind}"
+            shown = () if symbol == "S4" else (symbol,)
+            title = f"{what} {symbol}; {FAMILIES[family].title}"
+            yield Figure(family, shown, title, f"section 3.2, L1111-1113{caption}")
+            number += 1
+
+
+#: The figures by their number in the registry of studies, R and the thesis's, and what no figure shows.
 FIGURES: Mapping[str, Figure] = MappingProxyType(
-    {
-        f"R{number}": Figure(family, quantity)
-        for number, (family, quantity) in enumerate(
-            [(family, quantity) for family in "ABC" for quantity in QUANTITIES] + [("all", SLIDER_MOMENTS)], start=5
+    {f"R{number}": figure for number, figure in enumerate(_figures(), start=5)}
+    | {
+        CONSTANT: Figure(
+            "all",
+            ("1F1k", "2F2j", "2F2k"),
+            "What Rahman finds to be constant: 1F1k, 2F2j, 2F2k, 4T4",
+            "sections 2.8, 3.2",
         )
     }
 )

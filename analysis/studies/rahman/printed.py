@@ -1,0 +1,253 @@
+"""Rahman's equations as printed, in pounds, inches and seconds: the iteration of section 2.6.1, and eqs 37 to 43, 46 to 69.
+
+They are kept to the letter, errors included, so that what they give can be set beside what is right; the erratum that a
+switch mends is that of docs/rahman.md. An angle's name with ``_t`` is its rate, with ``_tt`` its second rate.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from linkwork.slider_crank.parameters import SliderCrankParameters
+from linkwork.slider_crank.published import INCH, POUND_FORCE
+
+from ...numerics.dual import Dual, about_i, about_j, about_k, cross
+from ...slider_crank import settle
+from ...slider_crank.two_rotations import Rows, chain
+
+FloatArray = NDArray[np.float64]
+
+#: Step of the crank angle (deg) in the continuation, and how many corrections are made at an angle at most: ours.
+STEP_DEG, MAX_STEPS = 5.0, 200
+#: Crank angles of the continuation (deg).
+GRID_DEG = np.arange(0.0, 360.0, STEP_DEG)
+
+
+class Turn(NamedTuple):
+    """Where the iteration ends, at the angles `GRID_DEG` (m) for n shifts.
+
+    ``unknowns`` (m, n, 5) are theta2, eta2, theta3, eta3 (rad) and S4 (in); ``rotation_deg`` and ``error_in`` (m, n) say by how
+    much the loop is open and S4 off; ``steps`` (m, n) how many corrections were made; ``settled`` (n,) whether the last of them
+    was small at every angle. The turn ends, and the rest is NaN, where no shift settles.
+    """
+
+    unknowns: FloatArray
+    rotation_deg: FloatArray
+    error_in: FloatArray
+    steps: FloatArray
+    settled: NDArray[np.bool_]
+
+
+def turn(p: SliderCrankParameters, shift_in: ArrayLike, rows: Rows = "printed", *, from_before: bool = True) -> Turn:
+    """The iteration over a turn, from the planar estimate at theta1 = 0, then ``from_before`` or from it at every angle."""
+    shifts = np.atleast_1d(np.asarray(shift_in, dtype=float))
+    shape = (GRID_DEG.size, shifts.size)
+    blank = np.full(shape, np.nan)
+    found = Turn(np.full((*shape, 5), np.nan), blank, blank.copy(), blank.copy(), np.ones(shifts.size, dtype=bool))
+    going = np.arange(shifts.size)
+    start = None
+    for k, angle in enumerate(np.radians(GRID_DEG)):
+        ended = settle(p, np.full(going.size, angle), shifts[going] * INCH, rows=rows, start=start, max_steps=MAX_STEPS)
+        found.settled[going[~ended.settled]] = False
+        going = going[ended.settled]
+        if not going.size:
+            break
+        at = (k, going)
+        found.unknowns[at] = ended.unknowns[ended.settled] / [1.0, 1.0, 1.0, 1.0, INCH]
+        found.rotation_deg[at] = np.degrees(ended.rotation_residual[ended.settled])
+        found.error_in[at] = ended.position_error[ended.settled] / INCH
+        found.steps[at] = ended.steps[ended.settled]
+        start = ended.unknowns[ended.settled] if from_before else None
+    return found
+
+
+class Crank(NamedTuple):
+    """Lengths a1 and a2 (in), theta1' (rad/s) and S1' (in/s); at constant speed and rate of the shift."""
+
+    a1: float
+    a2: float
+    speed: float
+    shift_rate: float = 0.0
+
+
+class Joints(NamedTuple):
+    """Values of theta2, eta2, theta3, eta3 (rad) and S4 (in), or their rates."""
+
+    th2: FloatArray
+    eta2: FloatArray
+    th3: FloatArray
+    eta3: FloatArray
+    s4: FloatArray
+
+
+def joint_rates(c: Crank, q: Joints, *, erratum_4: bool = False) -> Joints:
+    """Eqs 39 to 43; ``erratum_4`` mends 39."""
+    (s2, se, s3), (c2, ce, c3) = (f([q.th2, q.eta2, q.th3]) for f in (np.sin, np.cos))
+    w, v = c.speed, c.shift_rate
+    factor = ce**2 if erratum_4 else 1.0
+    bracket = c.a1 * w * (c2 * s3 + s2 * c3 * ce) - v * se * c3
+    lever = c.a2 * s2 * s3
+    return Joints(
+        th2=(v * c3 * se * ce - c.a1 * w * (factor * s2 * c3 + c2 * s3 * ce) - c.a2 * w * s3) / (c.a2 * s3),
+        eta2=-se * bracket / lever,
+        th3=bracket / (c.a2 * s3),
+        eta3=c2 * se * bracket / lever,
+        s4=(v * se - w * c.a1 * s2 * ce) / s3,
+    )
+
+
+def joint_accelerations(c: Crank, q: Joints, r: Joints) -> Joints:
+    """Eqs 38a to 42a for constant theta1' and S1'; what they repeat, the bracket of 40 to 42 and its rate, has a name here."""
+    (s2, se, s3), (c2, ce, c3) = (f([q.th2, q.eta2, q.th3]) for f in (np.sin, np.cos))
+    w, v, a1, a2 = c.speed, c.shift_rate, c.a1, c.a2
+    bracket = a1 * w * (c2 * s3 + s2 * c3 * ce) - v * se * c3
+    bracket_t = (
+        a1
+        * w
+        * (-r.th2 * s2 * s3 + r.th3 * c2 * c3 + r.th2 * c2 * c3 * ce - r.th3 * s2 * s3 * ce - r.eta2 * s2 * c3 * se)
+        - v * r.eta2 * ce * c3
+        + v * r.th3 * se * s3
+    )
+    top = v * c3 * se * ce - a1 * w * (s2 * c3 + c2 * s3 * ce) - a2 * w * s3
+    top_t = (
+        -v * r.th3 * s3 * se * ce
+        + v * r.eta2 * c3 * (ce**2 - se**2)
+        - a1
+        * w
+        * (r.th2 * c2 * c3 - r.th3 * s2 * s3 - r.th2 * s2 * s3 * ce + r.th3 * c2 * c3 * ce - r.eta2 * c2 * s3 * se)
+        - a2 * w * r.th3 * c3
+    )
+    lever, lever_t = a2 * s2 * s3, a2 * (r.th2 * c2 * s3 + r.th3 * s2 * c3)
+    return Joints(
+        th2=(s3 * top_t - r.th3 * c3 * top) / (a2 * s3**2),
+        eta2=(lever * (-r.eta2 * ce * bracket - se * bracket_t) + se * bracket * lever_t) / lever**2,
+        th3=(s3 * bracket_t - r.th3 * c3 * bracket) / (a2 * s3**2),
+        eta3=(
+            lever * ((-r.th2 * s2 * se + r.eta2 * c2 * ce) * bracket + c2 * se * bracket_t)
+            - c2 * se * bracket * lever_t
+        )
+        / lever**2,
+        s4=(
+            s3 * (v * r.eta2 * ce - a1 * w * (r.th2 * c2 * ce - r.eta2 * s2 * se))
+            - (v * se - w * a1 * s2 * ce) * r.th3 * c3
+        )
+        / s3**2,
+    )
+
+
+def loop_rates(c: Crank, q: Joints, r: Joints) -> FloatArray:
+    """What rows 37a to 37f lack (6, ...): three in rad/s (a, c, e), three in in/s (b, d, f)."""
+    (s2, se, s3), (c2, ce, c3) = (f([q.th2, q.eta2, q.th3]) for f in (np.sin, np.cos))
+    w, v = c.speed, c.shift_rate
+    return np.array(
+        [
+            -(w + r.th2) * se + r.eta2 * s2 * ce,
+            w * c.a1 * s2 * ce - v * se + r.s4 * s3,
+            r.eta2 * c2 + r.eta3,
+            w * (c.a1 * c2 + c.a2 * ce) + r.th2 * c.a2 * ce + r.eta2 * c.a2 * s2 * se - r.s4 * c3,
+            (w + r.th2) * ce + r.eta2 * s2 * se + r.th3,
+            w * c.a1 * s2 * se - r.eta2 * c.a2 * c2 + v * ce,
+        ]
+    )
+
+
+def mended_row(p: SliderCrankParameters, angle: FloatArray, shift: FloatArray, q: Joints, speed: float) -> FloatArray:
+    """What the last of rows 37 lacks (in/s) with erratum 2 mended, when the others are solved: eta's rate is about the axis j
+    that theta has turned."""
+    _, screws = chain(p, angle, shift, np.stack([*q[:4], q.s4 * INCH], -1))
+    zero = np.zeros_like(angle)
+    pin = about_k(Dual(angle, shift)) @ about_i(Dual(zero, p.crank_length))
+    front = pin @ about_k(q.th2) @ about_j(q.eta2) @ about_i(Dual(zero, p.rod_length))
+    # of a dual rotation the inverse is the transpose
+    to_rod = Dual(np.swapaxes(front.real, -1, -2), np.swapaxes(front.dual, -1, -2))
+    local = to_rod @ screws
+    matrix = np.concatenate([local.real, local.dual / INCH], -2)
+    matrix[..., 4] *= INCH
+    known = np.concatenate([to_rod.real[..., 2], to_rod.dual[..., 2] / INCH], -1) * speed
+    solved = -np.linalg.solve(matrix[:, :5], known[:, :5, None])[..., 0]
+    return np.asarray(np.einsum("ni,ni->n", matrix[:, 5], solved) + known[:, 5])
+
+
+class Bodies(NamedTuple):
+    """Masses (lb.s2/in), distances g1 and g2 of the centres of mass from the distal joints (in), K1z2 and K2z2 (in2)."""
+
+    masses: tuple[float, ...]
+    g1: float
+    g2: float
+    crank_square: float
+    rod_square: float
+
+
+def bodies(p: SliderCrankParameters, *, erratum_6: bool = False) -> Bodies:
+    """The bodies of section 3.1, g3 = 0; ``erratum_6`` mends the signs of g1 and g2."""
+    side = -1.0 if erratum_6 else 1.0
+    a1, a2 = p.crank_length / INCH, p.rod_length / INCH
+    masses = [mass * INCH / POUND_FORCE for mass in (p.crank_mass, p.rod_mass, p.slider_mass)]
+    return Bodies(tuple(masses), side * a1 / 2.0, side * a2 / 2.0, 1.5**2 / 4.0 + a1**2 / 3.0, 1.0 / 4.0 + a2**2 / 3.0)
+
+
+def _dual(real: list[ArrayLike], dual: list[ArrayLike]) -> Dual:
+    """A dual vector (..., 3) of components that are numbers or arrays."""
+    joined = np.stack(np.broadcast_arrays(*real, *dual), -1).astype(float)
+    return Dual(joined[..., :3], joined[..., 3:])
+
+
+def joint_forces(
+    c: Crank, b: Bodies, q: Joints, r: Joints, a: Joints, torque: float, *, erratum_5: bool = False
+) -> dict[str, FloatArray]:
+    """Components of all joint forces (lb) and moments (lb.in) by eqs 49a, 52a, 53a, 54, 57 to 61 and 69a to 69q.
+
+    For a constant shift, in the plane, or but for the slip of 52a (g3 for g2), which is mended. ``erratum_5`` mends the signs
+    of f1 and f3 in eqs 62 and 64. 1F1k is 0, as the thesis has it.
+    """
+    (s2, se, s3, sh), (c2, ce, c3, ch) = (f([q.th2, q.eta2, q.th3, q.eta3]) for f in (np.sin, np.cos))
+    w = c.speed
+    m1, m2, m3 = b.masses
+    velocities = (
+        _dual([0.0, 0.0, w], [0.0, c.a1 * w, 0.0]),
+        _dual([0.0, -r.eta3, -r.th3], [-r.s4 * s3, r.s4 * c3, 0.0]),
+        _dual([0.0, 0.0, 0.0], [0.0, 0.0, -r.s4]),
+    )
+    momenta = (
+        _dual([0.0, m1 * w * (c.a1 + b.g1), 0.0], [0.0, 0.0, m1 * (b.crank_square + b.g1 * c.a1) * w]),
+        _dual(
+            [-m2 * r.s4 * s3, m2 * (r.s4 * c3 - b.g2 * r.th3), m2 * b.g2 * r.eta3],
+            [0.0, -m2 * b.rod_square * r.eta3, m2 * (b.g2 * r.s4 * c3 - b.rod_square * r.th3)],
+        ),
+        _dual([0.0, 0.0, -m3 * r.s4], [0.0, 0.0, 0.0]),
+    )
+    turned = a.s4 * c3 - r.s4 * s3 * r.th3
+    rates = (
+        _dual([0.0, 0.0, 0.0], [0.0, 0.0, 0.0]),
+        _dual(
+            [-m2 * (a.s4 * s3 + r.s4 * c3 * r.th3), m2 * (turned - b.g2 * a.th3), m2 * b.g2 * a.eta3],
+            [0.0, -m2 * b.rod_square * a.eta3, m2 * (b.g2 * turned - b.rod_square * a.th3)],
+        ),
+        _dual([0.0, 0.0, -m3 * a.s4], [0.0, 0.0, 0.0]),
+    )
+    f1, f2, f3 = (rate + cross(v, h) for rate, v, h in zip(rates, velocities, momenta))
+    if erratum_5:
+        f1, f3 = -f1, -f3
+    (f1x, f1y, f1z), (f2x, f2y, f2z), (f3x, f3y, f3z) = (np.moveaxis(f.real, -1, 0) for f in (f1, f2, f3))
+    (_, _, f1zd), (f2xd, f2yd, f2zd), slider_moments = (np.moveaxis(f.dual, -1, 0) for f in (f1, f2, f3))
+    f = {"f2xd": f2xd} | {f"4T4{axis}": -moment for axis, moment in zip("ijk", slider_moments)}
+    f["2F2k"] = -f1z + 0.0 * f2z
+    f["3F3j"] = -(f2y + f2zd / c.a2)
+    f["3F3k"] = f2yd / c.a2 - f2z
+    f["2F2j"] = -f1y - (f1zd + torque) / c.a1
+    f["2F2i"] = (f["2F2j"] * c.a2 * c2 - f2zd) / (c.a2 * s2)
+    f["along crank"], f["across crank"] = -(f["2F2i"] + f1x), (torque + f1zd) / c.a1
+    f["3F3i"] = -f["2F2i"] * c2 * ce - f["2F2j"] * s2 * ce + f["2F2k"] * se - f2x
+    f["4F4k"] = f["3F3j"] * c3 - f["3F3i"] * s3 - f3z
+    f["4F4j"] = -(f["3F3i"] * c3 * sh + f["3F3j"] * s3 * sh + f["3F3k"] * ch + f3y)
+    f["4F4i"] = -(f["3F3i"] * c3 * ch + f["3F3j"] * s3 * ch - f["3F3k"] * sh + f3x)
+    return f
+
+
+def on_crank(angle: FloatArray, f: dict[str, FloatArray]) -> tuple[FloatArray, FloatArray]:
+    """1F1i and 1F1j by eqs 69i and 69j."""
+    s, c = np.sin(angle), np.cos(angle)
+    return f["along crank"] * c - f["across crank"] * s, f["along crank"] * s + f["across crank"] * c
