@@ -37,6 +37,9 @@ from .results import check_plot_and_data, check_verdicts, result
 OFFSET_NAMES = tuple(f"a4 = {a4} in" for a4 in (10, 20, 30))
 SHIFT_NAMES = tuple(f"S1 = {s1} in" for s1 in (3, 6, 9))
 SPATIAL = (*OFFSET_NAMES, *SHIFT_NAMES, "alpha4 = 232 deg", "alpha4 = 310 deg")
+#: Cases in which the loop, and in which row 37f is looked at.
+OPEN = ("a4 = 10 in at S1 = 3.5 in", *SPATIAL[-2:])
+ROW_F = ("a4 = 30 in at S1 = 9 in", SPATIAL[-1])
 
 #: What Rahman states and the right physics does not bear out.
 REFUTED = {
@@ -72,44 +75,48 @@ REFUTED = {
         for symbol in ("1T1i", "1T1j")
         for case in SPATIAL[-2:]
     ),
-    ("rahman-closure", "freedoms of the chain, of which theta1 and S1 are given"),
     *(
-        ("rahman-closure", f"{what} where the iteration ends; {case}")
-        for what in ("loop open by a rotation", "error of S4")
-        for case in ("a4 = 10 in at S1 = 3.5 in", *SPATIAL[-2:])
-    ),
-    ("rahman-closure", "greatest entry of A Delta - V where the iteration ends"),
-    ("rahman-closure", "corrections at an angle, most of a turn; outside"),
-    *(("rahman-closure", f"greatest S1 at which the mechanism works; a4 = {a4} in") for a4 in (0, 10, 30)),
-    ("rahman-closure", "gain of the greatest S1 from one a4 to the next, least of all"),
-    ("rahman-closure", "range of alpha4 in which the mechanism works"),
-    ("rahman-rates", "rank of the coefficients of eq 38 with its right side"),
-    ("rahman-rates", "angular velocity by eqs 30, 31 less that of Z(theta) Y(eta)"),
-    ("rahman-rates", "right side of row 6 of eq 38 less that of 37f"),
-    ("rahman-rates", "S1' by eq 28a less the rate of eq 28"),
-    ("rahman-rates", "theta2' by eq 39 less the solution of 37a to 37e"),
-    *(
-        ("rahman-rates", f"{what}; {case}")
-        for what in (
-            "row 37f with the rates of eqs 39 to 43, where |sin theta2| > 0.15",
-            "velocity of point 3 by the forward path less the mixed path",
+        ("rahman-closure", statement)
+        for statement in (
+            "freedoms of the chain, of which theta1 and S1 are given",
+            *(f"loop open by a rotation where the iteration ends; {case}" for case in OPEN),
+            *(f"error of S4 where the iteration ends; {case}" for case in OPEN),
+            "greatest entry of A Delta - V where the iteration ends",
+            "most corrections at an angle, outside the plane",
+            "share of angles at which the iteration settles from estimates 120 deg off",
+            *(f"greatest S1 at which the mechanism works; a4 = {a4} in" for a4 in (0, 10, 30)),
+            "gain of the greatest S1 from one a4 to the next, least of all",
+            "range of alpha4 in which the mechanism works",
         )
-        for case in ("a4 = 30 in at S1 = 9 in", "alpha4 = 310 deg")
-    ),
-    ("rahman-rates", "theta2 at the second spike; a4 = 10 in, S1 = 0"),
-    (
-        "rahman-rates",
-        "greatest accelerations by eqs 38a, 39a, 42a within 10 deg of a spike relative to elsewhere, ten being abnormal",
     ),
     *(
-        ("rahman-forces", f"greatest difference of a joint force from the right one in the plane; {words}")
-        for words in ("as printed", "erratum 5 mended", "erratum 6 mended")
+        ("rahman-rates", statement)
+        for statement in (
+            "rank of the coefficients of eq 38 with its right side",
+            "angular velocity by eqs 30, 31 less that of Z(theta) Y(eta)",
+            "right side of row 6 of eq 38 less that of 37f",
+            "S1' by eq 28a less the rate of eq 28",
+            "theta2' by eq 39 less the solution of 37a to 37e",
+            *(f"row 37f with the rates of eqs 39 to 43, where |sin theta2| > 0.15; {case}" for case in ROW_F),
+            *(f"velocity of point 3 by the forward path less the mixed path; {case}" for case in ROW_F),
+            "theta2 at the second spike; a4 = 10 in, S1 = 0",
+            "greatest accelerations by eqs 38a, 39a, 42a within 10 deg of a spike relative to elsewhere, ten being abnormal",
+        )
     ),
-    ("rahman-forces", "error of 2F2i after ten passes of eqs 69i, 69j, 69k from 1 lb"),
-    ("rahman-forces", "slider's momentum along j by eq 51a less 51"),
-    ("rahman-forces", "rod's momentum along k by eq 52a less 52"),
-    ("rahman-forces", "left side of eq 62c with the right forces, in the plane"),
-    ("rahman-forces", "mass of the crank of specific gravity 0.28 less m1, relative to it"),
+    *(
+        ("rahman-forces", statement)
+        for statement in (
+            *(
+                f"greatest difference of a joint force from the right one in the plane; {words}"
+                for words in ("as printed", "erratum 5 mended", "erratum 6 mended")
+            ),
+            "error of 2F2i after ten passes of eqs 69i, 69j, 69k from 1 lb",
+            "slider's momentum along j by eq 51a less 51",
+            "rod's momentum along k by eq 52a less 52",
+            "left side of eq 62c with the right forces",
+            "mass of the crank of specific gravity 0.28 less m1, relative to it",
+        )
+    ),
 }
 
 #: What depends on rounding, on signs that the scan has lost, or on data that are not given.
