@@ -127,9 +127,9 @@ UNJUDGED = {
     ("rahman-forces", "with an offset fatigue failure is likely at high speed"),
 }
 
-EVERY = pytest.mark.parametrize(
-    "number", [pytest.param(n, marks=pytest.mark.slow) if n == "rahman-closure" else n for n in RAHMAN]
-)
+#: Studies that follow the thesis's iteration over turns.
+LONG = ("rahman-closure", "rahman-rates")
+EVERY = pytest.mark.parametrize("number", [pytest.param(n, marks=pytest.mark.slow) if n in LONG else n for n in RAHMAN])
 
 
 @EVERY

@@ -21,7 +21,7 @@ from ...slider_crank import CLEAR_DEG, Settled, assembly_margin, constant_shift,
 from ...slider_crank.closure import residuals
 from ...slider_crank.two_rotations import Rows, chain, equations, freedoms, planar
 from ..study import OURS, TEXT, Study, StudyResult, Verdict, at_least, at_most, near, padded, unjudged
-from .figures import ANGLE, ANGLES_DEG, CRANK, NOTHING, TORQUE, clear, dead_centres_deg, values
+from .figures import ANGLE, ANGLES_DEG, CRANK, NOTHING, TORQUE, clear, dead_centres_deg, printed, printed_symbol, values
 from .printed import (
     GRID_DEG,
     Crank,
@@ -262,12 +262,12 @@ def _printed_rates() -> list[Verdict]:
     right = loop_rates(crank, GENERAL, Joints(*np.zeros(5)))
     matrix = np.stack([loop_rates(crank, GENERAL, Joints(*unit)) - right for unit in np.eye(5)], -1)
     ranks = [int(np.linalg.matrix_rank(m)) for m in (matrix, np.column_stack([matrix, right]))]
-    solved, printed = Joints(*np.linalg.solve(matrix[:5], -right[:5])), joint_rates(crank, GENERAL)
+    solved, rates = Joints(*np.linalg.solve(matrix[:5], -right[:5])), joint_rates(crank, GENERAL)
     as_printed, mended = (float(joint_rates(still, GENERAL, erratum_4=erratum).th2) for erratum in (False, True))
     left = abs(float(joint_rates(crank, GENERAL, erratum_4=True).th2 - solved.th2))
     # the derivative along the motion by a step into the complex plane, which has no rounding
-    moved = Joints(*(q + 1e-20j * r for q, r in zip(GENERAL, printed)))
-    seconds = joint_accelerations(crank, GENERAL, printed)
+    moved = Joints(*(q + 1e-20j * r for q, r in zip(GENERAL, rates)))
+    seconds = joint_accelerations(crank, GENERAL, rates)
     rough = max(abs(float(a - b.imag / 1e-20)) for a, b in zip(seconds, joint_rates(crank, moved)))
     row_6 = CRANK_SPEED * CRANK * np.sin(GENERAL.th2) * (1.0 - np.sin(GENERAL.eta2))
     amplitude, ratio, angle = 2.0, 2.0, 0.9
@@ -288,10 +288,10 @@ def _printed_rates() -> list[Verdict]:
         ("right side of row 6 of eq 38 less that of 37f", row_6, "in/s", "eq 38, L561", "erratum 9: no sin eta2"),
         ("S1' by eq 28a less the rate of eq 28", slip, "in/rad", "eq 28a, L581", "erratum 9: S1 for its amplitude"),
         (f"theta2' by eq 39 {less}", as_printed - mended, "rad/s", "eq 39, L565", why),
-        (f"theta3' by eq 40 {less}", printed.th3 - solved.th3, "rad/s", "eq 40, L567"),
-        (f"eta2' by eq 41 {less}", printed.eta2 - solved.eta2, "rad/s", "eq 41, L569"),
-        (f"eta3' by eq 42 {less}", printed.eta3 - solved.eta3, "rad/s", "eq 42, L571"),
-        (f"S4' by eq 43 {less}", printed.s4 - solved.s4, "in/s", "eq 43, L573"),
+        (f"theta3' by eq 40 {less}", rates.th3 - solved.th3, "rad/s", "eq 40, L567"),
+        (f"eta2' by eq 41 {less}", rates.eta2 - solved.eta2, "rad/s", "eq 41, L569"),
+        (f"eta3' by eq 42 {less}", rates.eta3 - solved.eta3, "rad/s", "eq 42, L571"),
+        (f"S4' by eq 43 {less}", rates.s4 - solved.s4, "in/s", "eq 43, L573"),
         (accelerations, rough, "rad/s2", "eqs 38a to 42a, L1037-1045"),
     )
     name = "with erratum 4 mended"
@@ -456,7 +456,8 @@ def forces() -> StudyResult:
 # ---------------------------------------------------------------- plots
 
 
-_SHOWN = {"[deg]": "rotation left", "[in]": "error of $S_4$", "[in/s]": "row 37f", "[lb]": "$^4F_{4k}$"}
+#: What columns of a unit have in common, by which a panel's axis is called.
+_SHOWN = {"[deg]": "rotation left", "[in]": "error of S4", "[in/s]": "row 37f", "[lb]": "4F4k"}
 #: What columns are drawn dashed, over the others.
 _DASHED = ("37f mended", "both mended", "all eighteen")
 
@@ -473,7 +474,7 @@ def draw(result: StudyResult) -> Figure:
             Curve(
                 x=result.columns[ANGLE],
                 y=np.where(np.abs(column) < 2.0 * limit, column, np.nan),
-                label=name.removesuffix(f" {unit}"),
+                label=printed(name.removesuffix(f" {unit}").removeprefix(f"{label} ")),
                 line="--" if any(words in name for words in _DASHED) else "-",
             )
             for name, column in shown.items()
@@ -482,7 +483,7 @@ def draw(result: StudyResult) -> Figure:
             panels.append(
                 Panel(
                     x_label="crank angle $\\theta_1$ [deg]",
-                    y_label=f"{label} {unit}",
+                    y_label=f"{printed_symbol(label)} {unit}",
                     curves=curves,
                     legend_at="outside",
                     x_range=(0.0, 360.0),
@@ -490,7 +491,7 @@ def draw(result: StudyResult) -> Figure:
                     x_ticks=np.arange(0.0, 361.0, 60.0).tolist(),
                 )
             )
-    return plot_curves(panels, title=result.heading, size=(7.6, 3.2))
+    return plot_curves(panels, title=result.heading, size=(8.0, 3.2))
 
 
 _COMPUTE = {"rahman-closure": closure, "rahman-rates": velocities, "rahman-forces": forces}
