@@ -1,4 +1,4 @@
-"""Errors in Rahman's equations: the statements that fail because of each, with sizes that are derived here or in the notes."""
+"""Errors in Rahman's equations: the statements that fail because of each, with sizes that are derived here or independently."""
 
 from __future__ import annotations
 
