@@ -79,29 +79,31 @@ FIGURES: Mapping[str, Entry] = MappingProxyType(
         "5.4": Entry(
             "First region of instability over the inertia ratio, damped", "youssef.chapter_5", "5.3.2, L3910-3921"
         ),
-        "6.4": Entry("Ellipse (a), timed", "youssef.chapter_6"),
-        "6.5": Entry("Ellipse (b), timed", "youssef.chapter_6"),
-        "6.6": Entry("Ellipse (a), timed, with bounds on the lengths", "youssef.chapter_6"),
-        "6.7": Entry("Rocker function, unweighted", "youssef.chapter_6"),
-        "6.8": Entry("Rocker function, weighted, and with a mounting angle", "youssef.chapter_6"),
-        "6.9": Entry("Path (a): least area between the curves", "youssef.chapter_6"),
-        "6.10": Entry("Path (b): least area between the curves", "youssef.chapter_6"),
-        "6.11": Entry("Packaging machine: a straight push and a return", "youssef.chapter_6"),
-        "7.2": Entry("Coupler curves and accessible area of P; Table 3.1", "youssef.chapter_7"),
-        "7.3": Entry(
-            "Error over the slider position at one crank angle; printed linkage of ellipse (a)", "youssef.chapter_7"
+        "6.1": Entry("The four-bar with its coupler point", place="6.3.2, L4446"),
+        "6.2": Entry("Flow chart of the search", place="6.3.3, L4555"),
+        "6.3": Entry(
+            "Area between curves of many points (a); the two closures of a four-bar (b)", place="6.4.1, L4716, L4804"
         ),
-        "7.4": Entry("A curve traced by moving the slider while the crank turns; Table 3.1", "youssef.chapter_7"),
-        "7.5": Entry("Variational motion of the slider; weighted rocker function", "youssef.chapter_7"),
-        "7.6": Entry("Slider moved by one, two and three harmonics; weighted rocker function", "youssef.chapter_7"),
-        "7.7": Entry("Slider moved by two harmonics; path (b)", "youssef.chapter_7"),
-        "7.8": Entry("Slider moved by three and five harmonics; path (b)", "youssef.chapter_7"),
-        "7.9": Entry("Links and slider optimised together; path (b)", "youssef.chapter_7"),
-        "7.10": Entry("Smoothness of the slider's motion against error; weighted rocker function", "youssef.chapter_7"),
-        "7.11": Entry("The simplest mechanism that meets a tolerance; rocker function", "youssef.chapter_7"),
-        "7.12": Entry(
-            "Force, power and tracking of the slider's motion; weighted rocker function", "youssef.chapter_7"
-        ),
+        "6.4": Entry("Ellipse (a), timed", "youssef.chapter_6", "6.4.2 A, L4848"),
+        "6.5": Entry("Ellipse (b), timed", "youssef.chapter_6", "6.4.2 A, L4848"),
+        "6.6": Entry("Ellipse (a), timed, with bounds on the lengths", "youssef.chapter_6", "6.4.2 A, L4903"),
+        "6.7": Entry("Rocker function, unweighted", "youssef.chapter_6", "6.4.2 B, L4938"),
+        "6.8": Entry("Rocker function, weighted, and with a mounting angle", "youssef.chapter_6", "6.4.2 B, L4938"),
+        "6.9": Entry("Path (a): least area between the curves", "youssef.chapter_6", "6.4.3, L5022"),
+        "6.10": Entry("Path (b): least area between the curves", "youssef.chapter_6", "6.4.3, L5022"),
+        "6.11": Entry("Packaging machine: its region (a), its linkage (b)", "youssef.packaging", "6.4.3, L5095"),
+        "7.1": Entry("The five-bar slider: a four-bar whose rocker pivot moves", place="7.0, L5213"),
+        "7.2": Entry("Coupler curves at fixed U and isochronous curves", "youssef.chapter_7", "7.0, L5234"),
+        "7.3": Entry("The mechanism with an inclined guide", place="7.3, L5540"),
+        "7.4": Entry("Series 1: desired curve", "youssef.chapter_7", "7.3.1, L5567"),
+        "7.5": Entry("Series 1: the two positions of the rocker", "youssef.chapter_7", "7.3.1, L5656"),
+        "7.6": Entry("Series 1: motion U of the slider", "youssef.chapter_7", "7.3.1, L5726"),
+        "7.7": Entry("Series 1: error over a turn", "youssef.chapter_7", "7.3.1, L5728"),
+        "7.8": Entry("Series 1: paths", "youssef.chapter_7", "7.3.1, L5736"),
+        "7.9": Entry("Series 1: motion U of the slider, p1 p2 weighted", "youssef.chapter_7", "7.3.1, L5808"),
+        "7.10": Entry("Series 1: path, p1 p2 weighted", "youssef.chapter_7", "7.3.1, L5808"),
+        "7.11": Entry("Series 2: weighted rocker function, slider moved", "youssef.series_2", "7.3.2, L5940"),
+        "7.12": Entry("Series 2: path (b), slider moved", "youssef.series_2", "7.3.2, L5972"),
         "8.7": Entry("Steady motion far below resonance; rig 1, spring A", "youssef.chapter_8"),
         "8.8": Entry("Steady motion near half the natural frequency; rig 1, spring A", "youssef.chapter_8"),
         "8.9": Entry("Four peaks a turn become two; rig 1, spring A", "youssef.chapter_8"),
@@ -119,6 +121,8 @@ FIGURES: Mapping[str, Entry] = MappingProxyType(
         "8.19": Entry("Amplitude of the slider over the speed; rig 2, spring D", "youssef.chapter_8"),
         "8.20": Entry("Harmonics of the slider's motion over the speed; rig 2", "youssef.chapter_8"),
         "8.21": Entry("Crank torque and pin forces over the speed; rig 2", "youssef.chapter_8"),
+        "quality": Entry("Combined quality function; ellipse (a)", "youssef.quality", "6.2, 6.3"),
+        "control": Entry("Methods of controlling the slider; weighted rocker function", "youssef.control", "7.1, 7.4"),
         "linkage": Entry("The five-bar slider of Table 3.1 at 420 rpm", "youssef.linkage"),
     }
 )
