@@ -16,6 +16,7 @@ from .mechanisms import SliderCrankParameters as SliderCrankParameters
 from .motion import slider_motion as slider_motion
 from .periodic import Drive as Drive
 from .periodic import find_orbit as find_orbit
+from .periodic import find_orbits as find_orbits
 from .periodic import frequency_response as frequency_response
 from .periodic import natural_frequency as natural_frequency
 from .periodic import stability_chart as stability_chart

@@ -17,6 +17,10 @@ from .crossings import follow_crossing as follow_crossing
 from .drives import Drive as Drive
 from .drives import VaryingInputError as VaryingInputError
 from .drives import drive_of as drive_of
+from .finder import Orbits as Orbits
+from .finder import find_orbit as find_orbit
+from .finder import find_orbits as find_orbits
+from .finder import orbits_of as orbits_of
 from .floquet import TOLERANCE as TOLERANCE
 from .floquet import Crossing as Crossing
 from .floquet import Stability as Stability
@@ -39,7 +43,6 @@ from .orbits import ORBIT_TOLERANCE as ORBIT_TOLERANCE
 from .orbits import OrbitAssemblyError as OrbitAssemblyError
 from .orbits import OrbitError as OrbitError
 from .orbits import PeriodicOrbit as PeriodicOrbit
-from .orbits import find_orbit as find_orbit
 from .orbits import largest_multipliers as largest_multipliers
 from .orbits import orbit_of as orbit_of
 from .planes import Operation as Operation

@@ -25,8 +25,14 @@ from ..numerics.continuation import ContinuationError, Curve, Evaluate, Evaluati
 from .drives import Drive
 from .floquet import TOLERANCE, Crossing, Stability, crossing_test
 from .flows import label
-from .orbits import Direction, Period, PeriodicOrbit, period_from, scale_of
+from .orbits import (
+    Direction,
+    Period,
+    PeriodicOrbit,
+    period_from,
+)
 from .planes import Operation, format_value, require_variable, unit_of, with_values
+from .starts import scale_of
 from .turns import Turn
 
 #: Relative step of the difference by which the constants are differentiated with respect to the parameter. The constants

@@ -29,7 +29,11 @@ from .drives import Drive, published_drive
 from .floquet import Crossing
 from .grids import Grid, grid
 from .natural import first_freedom, natural_frequency
-from .orbits import OrbitError, PeriodicOrbit, orbit_of, scale_of
+from .orbits import (
+    OrbitError,
+    PeriodicOrbit,
+    orbit_of,
+)
 from .planes import Plane, format_value, plane, require_variable, speed_name, unit_of, value_of
 from .stability import (
     Confirmation,
@@ -40,6 +44,7 @@ from .stability import (
     removing_damping,
     test_of,
 )
+from .starts import scale_of
 
 #: Crank speeds of a chart where none are given, relative to the natural frequency; others, relative to the value there is.
 _SPEEDS, _OTHERS = (0.3, 2.5), (0.1, 2.0)

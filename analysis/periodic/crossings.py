@@ -15,8 +15,12 @@ from numpy.typing import NDArray
 from ..numerics.continuation import Curve, End, Evaluate, Evaluation, Follower, Settings
 from .branches import orbit_from, reason_to_leave
 from .floquet import Crossing, crossing_test
-from .orbits import PeriodicOrbit, period_from, scale_of
+from .orbits import (
+    PeriodicOrbit,
+    period_from,
+)
 from .planes import Plane
+from .starts import scale_of
 
 #: Steps of the differences, relative to the scales: the multipliers are good to about 1e-10. They steer Newton's method only.
 _DIFFERENCE = 1e-5

@@ -29,6 +29,7 @@ from .floquet import TOLERANCE, Stability, multipliers
 from .flows import GAP, VARIATIONAL
 from .orbit_kernels import Status
 from .planes import Operation, Plane
+from .starts import scale_of, starts_of
 
 
 class GridInterrupted(Interrupted):
@@ -113,7 +114,7 @@ def grid(
     x, y : array_like, shapes (nx,) and (ny,)
         Values of the axes.
     start : array_like, shape (n,), optional
-        Guess of the first orbit of each row; see `find_orbit`.
+        Guess of the first orbit of each row; see `find_orbit`. Where it leads to none, others are tried.
     tolerance : float
         Bound of the integrator's local error.
     folder : path, optional
@@ -142,6 +143,7 @@ def grid(
     mechanism = mechanism_of(parameters)
     flow = drive.flow(mechanism)
     guess = orbits.guess_of(flow, drive, start)
+    guesses = np.vstack([guess, starts_of(parameters, drive, guess, orbits.STARTS)])
     where = grid_folder() if folder is None else Path(folder)
     with suppress(OSError):  # said once the first row cannot be kept
         where.mkdir(parents=True, exist_ok=True)
@@ -156,10 +158,10 @@ def grid(
     for value in ys.tolist():
         row = [operation(first, value) for first in xs.tolist()]
         digest = hashlib.sha256(" ".join(code).encode())
-        scales = [orbits.scale_of(p, drive, guess) for p, drive in row]
+        scales = [scale_of(p, drive, guess) for p, drive in row]
         numbers = [(*p.constants(), *drive.vector(mechanism), *scale) for (p, drive), scale in zip(row, scales)]
         digest.update(np.array(numbers).tobytes())
-        digest.update(np.array([*guess, *flow.modes, flow.torque, flow.period, tolerance]).tobytes())
+        digest.update(np.array([*guesses.ravel(), *flow.modes, flow.torque, flow.period, tolerance]).tobytes())
         path = where / f"{digest.hexdigest()[:32]}.row"
         paths.append(path)
         if _read(path, len(xs), len(guess)) is None:
@@ -169,7 +171,7 @@ def grid(
     with interruptible() as interrupted, shown(progress, float(len(paths)), "stability") as show:
         show(float(done))
         tasks = (
-            joblib.delayed(_compute_row)(mechanism, path, row, guess, tolerance, os.getpid()) for path, row in missing
+            joblib.delayed(_compute_row)(mechanism, path, row, guesses, tolerance, os.getpid()) for path, row in missing
         )
         results = joblib.Parallel(n_jobs=n_jobs, return_as="generator_unordered")(tasks)
         try:
@@ -210,7 +212,7 @@ def _compute_row(
     mechanism: Mechanism,
     path: Path,
     row: Sequence[Operation],
-    guess: NDArray[np.float64],
+    guesses: NDArray[np.float64],
     tolerance: float,
     caller: int,
 ) -> tuple[Path, NDArray[np.float64] | None, str]:
@@ -219,7 +221,7 @@ def _compute_row(
     # one that was registered by the caller is not in another process
     MECHANISMS.setdefault(mechanism.name, mechanism)
     mechanisms, drives = [p for p, _ in row], [drive for _, drive in row]
-    values, starts, status = orbits.largest_multipliers(mechanisms, drives, guess, tolerance=tolerance)
+    values, starts, status = orbits.largest_multipliers(mechanisms, drives, guesses, tolerance=tolerance)
     made = np.column_stack([values, starts, status])
     try:
         save_array(path, made)

@@ -50,8 +50,8 @@ REASONS = {
 _LEAST_STEP = 1e-9
 #: Crank speed below which the crank counts as stalled, relative to that at the start.
 _STALL = 1e-3
-#: Least fraction of a Newton correction that is tried.
-_LEAST_FRACTION = 1.0 / 4096.0
+#: Least fraction of a Newton correction that is tried, and in the search for other motions.
+_LEAST_FRACTION, _LEAST_SEARCHED = 1.0 / 4096.0, 1.0 / 64.0
 
 
 class Section(NamedTuple):
@@ -313,6 +313,90 @@ def solve(section, source, end, most, start, z, report):  # type: ignore[no-unty
     return status
 
 
+@part
+def _search(section, source, end, most, reach, start, known, z, room, carry):  # type: ignore[no-untyped-def]
+    """See `search`."""
+    scale = section.scale
+    n = scale.shape[0]
+    trial = start.copy()
+    correction = np.zeros(n)
+    matrix = np.empty((n, n))
+    for iteration in range(most):
+        fraction = 1.0
+        while True:
+            _begin(n, trial, z)
+            status = _turn(section, source, 0.0, end, z, room, carry)
+            if status == DONE:
+                break
+            fraction *= 0.5
+            if iteration == 0 or fraction < _LEAST_SEARCHED:
+                return status
+            trial[:] = start + fraction * correction
+        start[:] = trial
+        correction[:] = z[:n] - trial
+        for i in range(n):
+            for j in range(n):
+                matrix[i, j] = (1.0 if i == j else 0.0) - z[n + j * n + i]
+        if not solve_small(matrix, correction):
+            return DIVERGED
+        size = _size(correction, scale)
+        if not isfinite(size):
+            return DIVERGED
+        # derivative of the logarithm of the factor along the correction
+        slope = 0.0
+        nearest = np.inf
+        for k in range(known.shape[0]):
+            square = along = 0.0
+            for i in range(n):
+                away = (start[i] - known[k, i]) / scale[i]
+                square += away * away
+                along += away * correction[i] / scale[i]
+            nearest = min(nearest, square)
+            if square > 0.0:
+                slope -= 2.0 * along / (square * (1.0 + square))
+        if size <= 100.0 * section.tolerance and nearest > 1e-6:
+            start[:] = start + correction
+            return DONE
+        if nearest == 0.0 or slope == 1.0:
+            return DIVERGED
+        correction[:] = correction / (1.0 - slope)
+        size = _size(correction, scale)
+        if size > reach:
+            correction[:] = correction * (reach / size)
+        trial[:] = start + correction
+    return DIVERGED
+
+
+@kernel(
+    int64(_SECTION, SOURCE, float64, int64, float64, VECTOR, MATRIX, VECTOR),
+    purpose="the search for coexisting motions",
+)
+def search(section, source, end, most, reach, start, known, z):  # type: ignore[no-untyped-def]
+    """Newton's method for a periodic orbit that is none of the known ones: each of these is divided out.
+
+    The residual is multiplied by 1 + 1/d^2 for each known orbit at the distance d, so that the known ones are no zeros any more
+    (deflation: Brown and Gearhart 1971; Farrell, Birkisson and Funke 2015). Its Newton correction is that of the residual
+    itself times a number.
+
+    Parameters
+    ----------
+    most : int
+        Iterations at most.
+    reach : float
+        Greatest correction relative to the scale.
+    start : ndarray, shape (n,)
+        Guess of y at crank angle 0; the solution, to the tolerance of the search, when it returns DONE.
+    known : ndarray, shape (m, n)
+        Starts of the known orbits; with none it is Newton's method.
+    z : ndarray, shape (n (1 + n),)
+        Room to work in.
+
+    The others as for `period`. Returns a `Status`.
+    """
+    room = _room(section, section.scale.shape[0])
+    return _search(section, source, end, most, reach, start, known, z, room, np.array([0.1, 0.0]))
+
+
 @kernel(int64(_SECTION, SOURCE, float64, float64, int64, VECTOR), purpose="the settling of motions")
 def settle(section, source, turn, change, most, start):  # type: ignore[no-untyped-def]
     """Follow the motion from ``start``, which is overwritten, turn by turn until one changes y by less than ``change``."""
@@ -348,10 +432,10 @@ def sample(section, source, start, angles, rows):  # type: ignore[no-untyped-def
 
 
 @kernel(
-    types.void(_SECTION, SOURCE, MATRIX, MATRIX, MATRIX, float64, int64, VECTOR, MATRIX, MATRIX, int64[::1]),
+    types.void(_SECTION, SOURCE, MATRIX, MATRIX, MATRIX, float64, int64, float64, MATRIX, MATRIX, MATRIX, int64[::1]),
     purpose="grids of periodic motions",
 )
-def solve_row(section, source, parameters, drives, scales, end, most, guess, starts, monodromies, status):  # type: ignore[no-untyped-def]
+def solve_row(section, source, parameters, drives, scales, end, most, loose, guesses, starts, monodromies, status):  # type: ignore[no-untyped-def]
     """Orbits of a row of mechanisms, each begun from the last: the rows of a chart.
 
     Parameters
@@ -359,18 +443,22 @@ def solve_row(section, source, parameters, drives, scales, end, most, guess, sta
     parameters, drives : ndarray, shapes (m, constants) and (m, drive)
         As in `Section`, which has the rest.
     scales : ndarray, shape (m, n)
-    guess : ndarray, shape (n,)
-        Start of the first.
+    loose : float
+        Tolerance of the search from further starts.
+    guesses : ndarray, shape (k, n)
+        Start of the first; where Newton's method fails from the neighbour it is begun anew from there, and after that the
+        orbit is sought from the others.
     starts, monodromies : ndarray, shapes (m, n) and (m, n n)
         y at crank angle 0, and the monodromy matrix by columns; written where the status is DONE.
     status : ndarray of int64, shape (m,)
-        `Status` of each; written. Where Newton's method fails from the neighbour it is begun anew from the guess.
+        `Status` of each; written.
     """
-    n = guess.shape[0]
+    n = guesses.shape[1]
     z = np.empty(n * (1 + n))
     report = np.zeros(3)
     carry = np.array([0.1, 0.0])
-    start = guess.copy()
+    none = np.empty((0, n))
+    start = guesses[0].copy()
     found = 0
     for row in range(parameters.shape[0]):
         own = Section(
@@ -382,8 +470,20 @@ def solve_row(section, source, parameters, drives, scales, end, most, guess, sta
             start[:] = 2.0 * starts[row - 1] - starts[row - 2]
         what = _solve(own, source, end, most, start, z, room, carry, report)
         if what != DONE:
-            start[:] = guess
+            start[:] = guesses[0]
             what = _solve(own, source, end, most, start, z, room, carry, report)
+        if what != DONE:
+            wide = Section(
+                section.equations, section.modes, drives[row], parameters[row], scales[row], 1.0, loose, section.torque
+            )  # fmt: skip
+            for guess in range(1, guesses.shape[0]):
+                start[:] = guesses[guess]
+                if (
+                    _search(wide, source, end, most, 1.0, start, none, z, room, carry) == DONE
+                    and _solve(own, source, end, most, start, z, room, carry, report) == DONE
+                ):
+                    what = DONE
+                    break
         status[row] = what
         if what == DONE:
             found += 1
@@ -391,4 +491,4 @@ def solve_row(section, source, parameters, drives, scales, end, most, guess, sta
             monodromies[row] = z[n:]
         else:
             found = 0
-            start[:] = guess
+            start[:] = guesses[0]

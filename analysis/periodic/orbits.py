@@ -1,7 +1,7 @@
 """Periodic motions of the full nonlinear plant, by shooting, with their Floquet multipliers.
 
 At prescribed speed a periodic motion repeats itself after one turn of the crank, or after several; under a torque the mean
-speed is part of the solution. `find_orbit` solves y(T) = y(0) by Newton's method with the exact monodromy matrix, which the
+speed is part of the solution. `orbit_of` solves y(T) = y(0) by Newton's method with the exact monodromy matrix, which the
 variational equations give on the way; that matrix's eigenvalues, the Floquet multipliers, go with every solution: an
 unstable motion is found as easily as a stable one.
 """
@@ -9,37 +9,39 @@ unstable motion is found as easily as a stable one.
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from linkwork.errors import AssemblyError, InputError, LinkworkError, ParameterError
-from linkwork.parameters import field_name
+from linkwork.errors import AssemblyError, InputError, LinkworkError
 
-from ..mechanisms import InitialState, Parameters, mechanism_of
+from ..mechanisms import Parameters, mechanism_of
 from ..notebook import Shown, format_count
-from ..run import Inputs, driven, outputs_of, started, takes_published
-from ..units import RAD_S_PER_RPM, Amount, in_si
+from ..run import outputs_of, takes_published
+from ..units import RAD_S_PER_RPM
 from . import orbit_kernels
-from .drives import Drive, Torque, drive_of
+from .drives import Drive
 from .floquet import TOLERANCE, StabilityVerdict, liouville, multipliers, verdict
 from .flows import DIRECTIONAL, GAP, PLAIN, STATE, VARIATIONAL, Flow
-from .natural import mean_effective_mass, stiffness_name
 from .orbit_kernels import NO_SOURCE, Section, Status
+from .starts import scale_of, starts_of
 from .turns import Turn, times_of
 
 #: Bound of the local error of a step; the solution is good to about a hundred times as much.
 INTEGRATOR_TOLERANCE = 1e-12
 #: Largest correction relative to the scale at which a solution counts as found.
 ORBIT_TOLERANCE = 100.0 * INTEGRATOR_TOLERANCE
+#: The same in the search for motions far from a guess, iterations at most there, and the greatest correction in the scale of
+#: y; what is found is solved again.
+SEARCH_TOLERANCE, SEARCH_ITERATIONS, REACH = 1e-6, 30, 1.0
+#: Starts of that search where Newton's method fails from the guess: a power of two.
+STARTS = 32
 #: Newton iterations at most.
 MOST_ITERATIONS = 40
 #: Turns for which a motion is followed where Newton's method fails from the guess, and the change a turn that ends it.
 SETTLING_TURNS, SETTLED = 200, 1e-4
-#: Steps at most by which the spring is brought down from where the slider hardly moves.
-SOFTENING_STEPS = 200
 #: Samples of a turn from which amplitudes and harmonics are taken.
 SAMPLES = 256
 
@@ -103,6 +105,8 @@ class PeriodicOrbit(Shown):
         ``|y(T) - y(0)|`` relative to `scale_of`, before the last correction.
     iterations : int
         Newton iterations taken.
+    others : int or None
+        How many other periodic motions of the same period there are, as far as was sought; None where it was not asked.
     multipliers : ndarray of complex, shape (n,)
         Floquet multipliers, the largest first.
     """
@@ -114,6 +118,7 @@ class PeriodicOrbit(Shown):
     monodromy: NDArray[np.float64]
     residual: float
     iterations: int
+    others: int | None = None
     multipliers: NDArray[np.complex128] = field(init=False)
 
     def __post_init__(self) -> None:
@@ -128,7 +133,8 @@ class PeriodicOrbit(Shown):
         except LinkworkError as error:
             said, swing = f" that cannot be followed ({error})", ""
         turns = format_count(self.turns, "turn")
-        return f"<PeriodicOrbit: {turns}{said}, largest Floquet multiplier {self.largest:.4g}{swing}>"
+        others = f"; {format_count(self.others, 'other motion')} there: find_orbits" if self.others else ""
+        return f"<PeriodicOrbit: {turns}{said}, largest Floquet multiplier {self.largest:.4g}{swing}{others}>"
 
     @property
     def flow(self) -> Flow:
@@ -202,14 +208,6 @@ class PeriodicOrbit(Shown):
         return liouville(np.asarray(traces).ravel(), flow.period * self.turns)
 
 
-def scale_of(parameters: Parameters, drive: Drive, start: ArrayLike) -> NDArray[np.float64]:
-    """Magnitudes of y: of a five-bar the crank's length, its speed at the pin, and the crank speed."""
-    mechanism = mechanism_of(parameters)
-    flow = drive.flow(mechanism)
-    scale = mechanism.error_scale(parameters, flow.state(np.asarray(start, dtype=float), drive.vector(mechanism)))
-    return np.array([scale[place] for place in flow.places])
-
-
 def section_of(
     parameters: Parameters,
     drive: Drive,
@@ -247,65 +245,6 @@ def section_of(
     )
 
 
-@takes_published(inputs=driven, initial=started)
-@in_si(speed="rad/s", torque="N.m")
-def find_orbit(
-    parameters: Parameters,
-    inputs: Inputs | None = None,
-    *,
-    speed: Amount = None,
-    torque: Torque | Amount = None,
-    initial: InitialState | None = None,
-    turns: int = 1,
-    start: ArrayLike | None = None,
-    settle: bool = True,
-) -> PeriodicOrbit:
-    """Find a periodic motion of the full nonlinear plant.
-
-    Parameters
-    ----------
-    parameters : parameters of a mechanism
-        Or a published set or its name, which brings its crank speed, unless another drive is given.
-    inputs : Inputs, optional
-        What acts, all of it constant; a motor may drive the crank.
-    speed : float or str, optional
-        Prescribed crank speed (rad/s, or text such as "420 rpm"), in the place of what drives the crank in the inputs.
-    torque : float, InductionMotor, or both in a sequence, optional
-        Torque on the crank (N.m), in the place of a speed. The mean speed is then part of the solution.
-    initial : state at the start, optional
-        Where freedoms are held that are neither free nor the crank's: see `Drive`.
-    turns : int
-        Turns of the crank in one period.
-    start : array_like, shape (n,), optional
-        Guess of y at crank angle 0: coordinates and rates of what is free beside the crank, of a five-bar u (m) and u' (m/s),
-        and under a torque the crank speed (rad/s), which is needed there unless it follows from a motor's synchronous speed.
-    settle : bool
-        Whether other ways are tried where Newton's method fails from the guess: from where the motion goes by itself, and,
-        at prescribed speed, by bringing down the spring of the first free freedom from where it hardly moves.
-
-    Returns
-    -------
-    PeriodicOrbit
-        Which of several is found depends on the guess; its stability is not asked for here: see ``verdict``.
-
-    Raises
-    ------
-    OrbitError
-        If none is found; `OrbitAssemblyError` if the links come to the limit of assembly on the way.
-    InputError
-        If what was given is not usable.
-
-    Examples
-    --------
-    >>> from analysis import find_orbit
-    >>> orbit = find_orbit("table-3.1", speed="420 rpm")
-    >>> round(100.0 * float(orbit.start[0]), 8), orbit.verdict().stability.value
-    (-0.89553115, 'stable')
-    """
-    drive = drive_of(parameters, inputs, initial, speed=speed, torque=torque)
-    return orbit_of(parameters, drive, turns=turns, start=start, settle=settle)
-
-
 @takes_published()
 def orbit_of(
     parameters: Parameters,
@@ -315,7 +254,26 @@ def orbit_of(
     start: ArrayLike | None = None,
     settle: bool = True,
 ) -> PeriodicOrbit:
-    """The same as `find_orbit`, from a `Drive`."""
+    """A periodic motion: the one that Newton's method leads to.
+
+    Parameters
+    ----------
+    parameters, drive
+    turns : int
+        Turns of the crank in one period.
+    start : array_like, shape (n,), optional
+        Guess of y at crank angle 0; without it all at zero.
+    settle : bool
+        Whether other starts are tried where Newton's method fails from the guess: where the motion goes by itself, and those
+        of `starts_of`.
+
+    Raises
+    ------
+    OrbitError
+        If none is found; `OrbitAssemblyError` if the links come to the limit of assembly on the way.
+    InputError
+        If what was given is not usable.
+    """
     if turns < 1 or turns != int(turns):
         raise InputError(f"turns is {turns}: a period has a whole number of them, at least one")
     guess = guess_of(drive.flow(mechanism_of(parameters)), drive, start)
@@ -333,10 +291,10 @@ def orbit_of(
             return _newton(parameters, drive, turns, settled)
         except OrbitError:
             pass
-    if drive.speed_drive:
-        softened = _soften(parameters, drive, turns)
-        if softened is not None:
-            return softened
+    for place in starts_of(parameters, drive, guess, STARTS):
+        found = search_from(parameters, drive, turns, place)
+        if found is not None:
+            return found
     raise first
 
 
@@ -352,39 +310,37 @@ def settle_from(
     return Status(status), settled
 
 
-def _soften(parameters: Parameters, drive: Drive, turns: int) -> PeriodicOrbit | None:
-    """The orbit met as an added stiffness goes down to nothing, from where what it springs hardly moves; None if it is lost.
+def search_from(
+    parameters: Parameters,
+    drive: Drive,
+    turns: int,
+    place: NDArray[np.float64],
+    known: NDArray[np.float64] | None = None,
+) -> PeriodicOrbit | None:
+    """The motion that Newton's method leads to from a place, those with a start in ``known`` divided out; None if to none.
 
-    That of the first free freedom, by its name; there is none of a mechanism that has no such parameter.
+    Parameters
+    ----------
+    place : ndarray, shape (n,)
+    known : ndarray, shape (m, n), optional
     """
-    assert drive.speed is not None
-    mechanism = mechanism_of(parameters)
+    flow, start = drive.flow(mechanism_of(parameters)), place.copy()
+    status = orbit_kernels.search(
+        section_of(parameters, drive, place, VARIATIONAL, tolerance=SEARCH_TOLERANCE),
+        NO_SOURCE,
+        flow.period * turns,
+        SEARCH_ITERATIONS,
+        REACH,
+        start,
+        np.empty((0, flow.size)) if known is None else known,
+        np.empty(flow.size * (1 + flow.size)),
+    )
+    if status != Status.DONE:
+        return None
     try:
-        spring, mass = field_name(stiffness_name(mechanism)), mean_effective_mass(parameters)
-    except (ParameterError, AssemblyError):
+        return _newton(parameters, drive, turns, start)
+    except OrbitError:
         return None
-    if not hasattr(parameters, spring):
-        return None
-    stiffness = getattr(parameters, spring)
-    added, guess, ratio = 400.0 * mass * drive.speed**2, guess_of(drive.flow(mechanism), drive, None), 0.5
-    least = 1e-4 * (stiffness + mass * drive.speed**2)
-    orbit = None
-    for _ in range(SOFTENING_STEPS):
-        stiffer = replace(parameters, **{spring: stiffness + added})
-        try:
-            orbit = _newton(stiffer, drive, turns, guess)
-        except OrbitError:
-            if orbit is None or ratio > 0.999:
-                return None
-            # back to the last one that was found, and on in a smaller step
-            added /= ratio
-            ratio = ratio**0.5
-        else:
-            if added == 0.0:
-                return orbit
-            guess = orbit.start
-        added = added * ratio if added * ratio > least else 0.0
-    return None
 
 
 def guess_of(flow: Flow, drive: Drive, start: ArrayLike | None) -> NDArray[np.float64]:
@@ -517,20 +473,20 @@ def failure(
 def largest_multipliers(
     rows: Sequence[Parameters],
     drives: Sequence[Drive],
-    guess: ArrayLike | None = None,
+    guesses: ArrayLike | None = None,
     *,
     turns: int = 1,
     tolerance: float = INTEGRATOR_TOLERANCE,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int64]]:
     """Largest Floquet multiplier of each of a row of mechanisms, every one on its own periodic orbit.
 
-    Each is sought from its neighbours' starts, so that they should be ordered along a line of a chart.
+    Each is sought from its neighbour's start, so that they should be ordered along a line of a chart, then from the guesses.
 
     Parameters
     ----------
     rows, drives : sequences of m
-    guess : array_like, shape (n,), optional
-        Start of the first; see `find_orbit`.
+    guesses : array_like, shape (n,) or (k, n), optional
+        Start of the first, and others where nothing is found from there; see `find_orbit`.
     turns : int
     tolerance : float
         Bound of the integrator's local error.
@@ -548,7 +504,9 @@ def largest_multipliers(
     flow = drives[0].flow(mechanism)
     if any(drive.flow(mechanism).modes != flow.modes for drive in drives):
         raise InputError("a row has both drives by speed and by torque, or other modes: it must have one kind")
-    n, first = flow.size, guess_of(flow, drives[0], guess)
+    given = (None,) if guesses is None else np.atleast_2d(np.asarray(guesses, dtype=float))
+    starting = np.array([guess_of(flow, drives[0], guess) for guess in given])
+    n, first = flow.size, starting[0]
     section = section_of(rows[0], drives[0], first, VARIATIONAL, tolerance=tolerance)
     numbers = np.array([(*parameters.constants(),) for parameters in rows])
     vectors = np.array([drive.vector(mechanism) for drive in drives])
@@ -562,7 +520,8 @@ def largest_multipliers(
         np.array([scale_of(parameters, drive, first) for parameters, drive in zip(rows, drives)]),
         flow.period * turns,
         MOST_ITERATIONS,
-        first,
+        SEARCH_TOLERANCE,
+        starting,
         starts,
         monodromies,
         status,

@@ -27,8 +27,13 @@ from ..units import Amount, si
 from .branches import Branch, Family, SpecialPoint, describe, follow, switch
 from .drives import Drive, published_drive
 from .floquet import Crossing, Stability
-from .orbits import OrbitError, PeriodicOrbit, orbit_of, scale_of
+from .orbits import (
+    OrbitError,
+    PeriodicOrbit,
+    orbit_of,
+)
 from .planes import unit_of
+from .starts import scale_of
 
 #: How far a maximum of the amplitude stands out, relative to its height, to count as one.
 PROMINENCE = 1e-3

@@ -27,8 +27,14 @@ from ..run import simulate, takes_published
 from .drives import Drive
 from .floquet import TOLERANCE, Crossing, Stability, StabilityVerdict, crossing_test
 from .grids import Grid
-from .orbits import OrbitError, PeriodicOrbit, orbit_of, period_from, scale_of
+from .orbits import (
+    OrbitError,
+    PeriodicOrbit,
+    orbit_of,
+    period_from,
+)
 from .planes import Plane
+from .starts import scale_of
 
 #: Monodromy matrix at a point of a plane, shape (n, n).
 Monodromy = Callable[[float, float], NDArray[np.float64]]
@@ -37,8 +43,8 @@ Monodromy = Callable[[float, float], NDArray[np.float64]]
 def orbit_monodromy(operation: Plane, *, start: ArrayLike | None = None) -> Monodromy:
     """Monodromy matrix of the mechanism's own periodic orbit of one turn over a plane; points are remembered.
 
-    Each orbit is sought from the one found last, so that neighbouring points stay on one branch, then from the first guess; the
-    first by all the ways of `find_orbit`.
+    Each orbit is sought from the one found last, so that neighbouring points stay on one branch, then by all the ways of
+    `orbit_of` from the first guess.
 
     Parameters
     ----------
@@ -46,19 +52,17 @@ def orbit_monodromy(operation: Plane, *, start: ArrayLike | None = None) -> Mono
         Guess of the first: see `find_orbit`.
     """
     first = None if start is None else np.array(start, dtype=float)
-    last, found = first, False
+    last = first
 
     @cache
     def matrix(x: float, y: float) -> NDArray[np.float64]:
-        nonlocal last, found
+        nonlocal last
         parameters, drive = operation(x, y)
         try:
-            orbit = orbit_of(parameters, drive, start=last, settle=not found)
+            orbit = orbit_of(parameters, drive, start=last, settle=False)
         except OrbitError:
-            if not found:
-                raise
-            orbit = orbit_of(parameters, drive, start=first, settle=False)
-        last, found = orbit.start, True
+            orbit = orbit_of(parameters, drive, start=first)
+        last = orbit.start
         return orbit.monodromy
 
     return matrix

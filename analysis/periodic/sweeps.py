@@ -16,7 +16,14 @@ from ..units import Amount, in_si
 from .drives import Drive
 from .floquet import Stability
 from .orbit_kernels import REASONS, Status
-from .orbits import OrbitError, PeriodicOrbit, guess_of, orbit_of, scale_of, settle_from
+from .orbits import (
+    OrbitError,
+    PeriodicOrbit,
+    guess_of,
+    orbit_of,
+    settle_from,
+)
+from .starts import scale_of
 
 #: Turns for which a motion that has lost its stability is followed to the next steady one, and the change a turn that ends it.
 JUMP_TURNS, SETTLED = 5000, 1e-9

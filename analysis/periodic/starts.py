@@ -1,0 +1,73 @@
+"""Starts from which periodic motions are sought: they fill the region in which the mechanism can be assembled."""
+
+from __future__ import annotations
+
+from math import pi
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.stats import qmc
+
+from linkwork.errors import AssemblyError
+
+from ..mechanisms import Parameters, mechanism_of
+from .drives import Drive
+
+#: How far starts reach where no limit of assembly is met, in the scale of y, and the step to it.
+_WIDEST, _WIDER = 16.0, 1.25
+#: Crank speeds of starts under a torque, relative to the guess.
+_SPEEDS = (0.25, 1.5)
+
+
+def scale_of(parameters: Parameters, drive: Drive, start: ArrayLike) -> NDArray[np.float64]:
+    """Magnitudes of y: of a five-bar the crank's length, its speed at the pin, and the crank speed."""
+    mechanism = mechanism_of(parameters)
+    flow = drive.flow(mechanism)
+    scale = mechanism.error_scale(parameters, flow.state(np.asarray(start, dtype=float), drive.vector(mechanism)))
+    return np.array([scale[place] for place in flow.places])
+
+
+def extent_of(parameters: Parameters, drive: Drive, guess: NDArray[np.float64]) -> NDArray[np.float64]:
+    """How far each free coordinate can go to both sides of zero at the crank angle 0; shape (free coordinates,)."""
+    mechanism = mechanism_of(parameters)
+    flow, vector, scale = drive.flow(mechanism), drive.vector(mechanism), scale_of(parameters, drive, guess)
+    found = scale[: flow.size // 2].copy()
+    for i in range(len(found)):
+        while found[i] < _WIDEST * scale[i]:
+            try:
+                for sign in (-1.0, 1.0):
+                    y = guess.copy()
+                    y[i] = sign * found[i]
+                    mechanism.check_assembly(parameters, flow.state(y, vector))
+            except AssemblyError:
+                break
+            found[i] *= _WIDER
+    return found
+
+
+def starts_of(
+    parameters: Parameters, drive: Drive, guess: NDArray[np.float64], count: int, number: int = 0
+) -> NDArray[np.float64]:
+    """Starts with all amplitudes up to the extent and all phases, by a scrambled Sobol sequence; shape (count, n).
+
+    Parameters
+    ----------
+    guess : ndarray, shape (n,)
+        Its crank speed is the one about which others are taken under a torque.
+    count : int
+        A power of two.
+    number : int
+        Of the set; sets of different numbers have different starts.
+    """
+    flow, scale = drive.flow(mechanism_of(parameters)), scale_of(parameters, drive, guess)
+    half = flow.size // 2
+    extent = extent_of(parameters, drive, guess)
+    sequence = qmc.Sobol(flow.size, scramble=True, rng=number).random(count)
+    amplitude, phase = sequence[:, :half], 2.0 * pi * sequence[:, half : 2 * half]
+    found = np.tile(guess, (count, 1))
+    found[:, :half] = extent * amplitude * np.cos(phase)
+    found[:, half : 2 * half] = extent * scale[half : 2 * half] / scale[:half] * amplitude * np.sin(phase)
+    if flow.torque:
+        low, high = _SPEEDS
+        found[:, -1] *= low + (high - low) * sequence[:, -1]
+    return found
