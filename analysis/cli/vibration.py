@@ -33,8 +33,8 @@ from .common import (
     quantity,
 )
 
-#: Range of speeds where none is given, relative to the natural frequency.
-_RANGE = (0.15, 1.5)
+#: Range of speeds where none is given, relative to the natural frequency: beyond twice, where parametric resonance begins.
+_RANGE = (0.15, 2.3)
 
 
 def _cores(context: click.Context, parameter: click.Parameter, value: int) -> int:
@@ -296,6 +296,7 @@ def _extrema(response: Any, factor: float, unit: str, table: Any) -> None:
 @click.option("--points", default=80, show_default=True, type=click.IntRange(2, 2000), help="Points along each axis.")
 @click.option("--cores", default=-1, show_default=True, callback=_cores, help="Cores; -1 for all.")
 @click.option("--chart/--no-chart", "charted", default=True, show_default=True, help="Chart, or the verdict alone.")
+@click.option("--coexisting", is_flag=True, help="Seek all motions of every point: how many are stable, and how large.")
 def stability(
     chosen: _Chosen,
     x: str | None,
@@ -305,6 +306,7 @@ def stability(
     points: int,
     cores: int,
     charted: bool,
+    coexisting: bool,
 ) -> None:
     """Report whether the periodic motion of a CASE file's or a published set's mechanism is stable, and chart where it is not.
 
@@ -320,13 +322,15 @@ def stability(
     """
     from .. import figures
     from ..files import save_figure
-    from ..periodic import damping_name, speed_name, stability_chart
+    from ..periodic import damping_name, require_variable, speed_name, stability_chart
     from ..youssef import linear_motion
 
     parameters, drive = chosen.case.parameters, chosen.drive()
     start = chosen.start(drive)
     mechanism = mechanism_of(parameters)
     names = (x or speed_name(mechanism) or "drive.speed", y or damping_name(mechanism))
+    for name in names:
+        require_variable(parameters, drive, name)
     ranges, missing = [], None
     if charted:
         for name, own, texts, option in ((names[0], x, x_range, "--x"), (names[1], y, y_range, "--y")):
@@ -350,19 +354,111 @@ def stability(
         points=points,
         start=start,
         beside=linear_motion(parameters, drive, names) if mechanism_of(parameters) is FIVE_BAR else None,
+        coexisting=coexisting,
         n_jobs=cores,
         progress=console.is_terminal,
     )
     _regions(found)
     _runs(found)
     stem = folder_of(chosen.folder) / f"{chosen.stem}-stability"
+    more = [] if found.beside is None else [found.beside.to_csv(f"{stem}-coexisting.csv")]
     figure = figures.plot(found, title=chosen.case.title)
     written = [
         found.to_csv(f"{stem}.csv"),
         found.boundaries_to_csv(f"{stem}-boundaries.csv"),
+        *more,
         save_figure(figure, f"{stem}.png"),
     ]
     chosen.finish(written, found.problems)
+
+
+@click.command()
+@_about_a_case
+@click.option("--points", default=200, show_default=True, type=click.IntRange(2, 4000), help="Starts along each axis.")
+@click.option(
+    "--position", nargs=2, metavar="FROM TO", help="Range of the first free coordinate, such as '-5 cm' '5 cm'."
+)
+@click.option("--rate", nargs=2, metavar="FROM TO", help="Range of its rate.")
+@click.option("--cores", default=-1, show_default=True, callback=_cores, help="Cores; -1 for all.")
+def basins(
+    chosen: _Chosen,
+    points: int,
+    position: tuple[str, str] | None,
+    rate: tuple[str, str] | None,
+    cores: int,
+) -> None:
+    """Report all periodic motions of a CASE file's or a published set's mechanism at one speed, and which start ends in which.
+
+    The picture is over the position and the rate of the first free coordinate, of a five-bar the slider, at crank angle 0.
+
+    \b
+    Examples:
+      linkwork basins --published rig-1-spring-b --speed '1000 rpm'
+      linkwork basins --published rig-1-spring-b --speed '1000 rpm' --position '-10 cm' '10 cm' --rate '-10 m/s' '10 m/s'
+    """
+    from .. import figures
+    from ..files import save_figure
+    from ..periodic import basins as find_basins
+    from ..periodic import orbits_of
+
+    parameters, drive = chosen.case.parameters, chosen.drive()
+    start = chosen.start(drive)
+    flow = drive.flow(mechanism_of(parameters))
+    units = (flow.components[0][1], flow.components[flow.size // 2][1])
+    spans: list[Any] = [
+        None if texts is None else tuple(quantity(text, unit, option) for text in texts)
+        for texts, unit, option in zip((position, rate), units, ("--position", "--rate"))
+    ]
+    found = orbits_of(parameters, drive, start=start)
+    _motions(chosen.case.title, found)
+    if not found.stable:
+        raise InputError("no stable motion of one turn was found: no start ends in one")
+    picture = find_basins(
+        parameters,
+        drive,
+        points=points,
+        position=spans[0],
+        rate=spans[1],
+        start=start,
+        n_jobs=cores,
+        progress=console.is_terminal,
+    )
+    shares = [f"{picture.share(n):.1%} in motion {n + 1}" for n in range(len(picture.motions))]
+    console.print(
+        f"of {picture.ends.size} starts end {', '.join(shares)}, {picture.share(-1):.1%} at the limit of assembly, "
+        f"{picture.share(-2):.1%} in none of them",
+        highlight=False,
+        soft_wrap=True,
+    )
+    stem = folder_of(chosen.folder) / f"{chosen.stem}-basins"
+    figure = figures.plot(picture, title=chosen.case.title)
+    chosen.finish([picture.to_csv(f"{stem}.csv"), save_figure(figure, f"{stem}.png")], ())
+
+
+def _motions(title: str, found: Any) -> None:
+    """All motions at one speed, and how sure it is that there are no others."""
+    grid = Table(title=f"{title}: periodic motions of one turn", title_justify="left")
+    for heading in ("motion", "amplitude", "stability", "largest multiplier"):
+        grid.add_column(heading, justify="left" if heading == "stability" else "right")
+    number = 0
+    for orbit in found.orbits:
+        what, size, unit = _swing(orbit)
+        stable = orbit in found.stable
+        number += stable
+        grid.add_row(
+            str(number) if stable else "",
+            f"{size * orbit.amplitude:.5g} {unit} of {what}",
+            orbit.verdict().stability.value,
+            f"{orbit.largest:.6g}",
+        )
+    console.print(grid)
+    sure = "two methods found the same motions" if found.agreed else "two methods differ: there may be more motions"
+    index = (
+        ""
+        if found.index == 1
+        else f"; their indices add up to {found.index}, not 1: one may be missing, or come to the limit of assembly"
+    )
+    console.print(sure + index, highlight=False, soft_wrap=True)
 
 
 def _axis_range(
@@ -401,9 +497,22 @@ def _report_verdict(title: str, parameters: Any, drive: Any, start: Any) -> None
 
 
 def _regions(found: Any) -> None:
+    from ..periodic import TRUE_ORBIT, Crossing
+
     x, y = found.axes
     count = int(np.ma.sum(found.grid.largest > 1.0))
-    console.print(f"{count} of {found.grid.largest.count()} points with an orbit are unstable", highlight=False)
+    folds = any(traced.kind is Crossing.FOLD and traced.motion == TRUE_ORBIT for traced in found.boundaries)
+    console.print(
+        f"at {count} of {found.grid.largest.count()} points where a motion was found it is unstable"
+        + ("; at a fold the motion jumps to another: see the boundaries" if folds else ""),
+        highlight=False,
+        soft_wrap=True,
+    )
+    if found.beside is not None:
+        several = int((found.beside.stable > 1).sum())
+        console.print(
+            f"at {several} of {found.beside.stable.size} points several stable motions were found", highlight=False
+        )
     grid = Table(title="boundaries of instability", title_justify="left")
     for heading in ("motion", "kind", f"{x.name} [{x.unit}]", f"{y.name} [{y.unit}]", "ends because"):
         grid.add_column(escape(heading))

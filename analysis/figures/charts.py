@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
-from ..periodic import TRUE_ORBIT, Crossing, Outcome, StabilityChart
+from ..periodic import TRUE_ORBIT, Basins, Coexistence, Crossing, Outcome, StabilityChart
 from .curves import Curve, Panel, draw_panel, lay_out
 from .dispatch import plot
 from .style import COLOURS
@@ -35,8 +35,8 @@ class HeatMap:
         Masked where there is none; drawn in grey.
     label : str
         What it is, with unit.
-    middle : float
-        Value that is white: below it blue, above it red.
+    middle : float or None
+        Value that is white: below it blue, above it red; None for one colour scale from the least to the greatest.
     missing : str
         What the legend calls masked points.
     """
@@ -46,7 +46,7 @@ class HeatMap:
     y: NDArray[np.float64]
     values: np.ma.MaskedArray[Any, np.dtype[np.float64]]
     label: str
-    middle: float = 1.0
+    middle: float | None = 1.0
     missing: str = "no value"
 
 
@@ -77,12 +77,15 @@ def _draw(figure: Figure, axis: Axes, chart: Panel | HeatMap) -> None:
 
 def _draw_map(figure: Figure, axis: Axes, chart: HeatMap) -> None:
     values = np.ma.masked_invalid(chart.values)
-    # both sides of the middle in colours, however one-sided the values are
-    low, high = (float(v) for v in (values.min(), values.max())) if values.count() else (chart.middle, chart.middle)
-    least = 1e-3 * max(abs(chart.middle), 1e-9)
-    norm = TwoSlopeNorm(chart.middle, min(low, chart.middle - least), max(high, chart.middle + least))
+    look: dict[str, Any] = {"cmap": "viridis"}
+    if chart.middle is not None:
+        # both sides of the middle in colours, however one-sided the values are
+        low, high = (float(v) for v in (values.min(), values.max())) if values.count() else (chart.middle, chart.middle)
+        least = 1e-3 * max(abs(chart.middle), 1e-9)
+        norm = TwoSlopeNorm(chart.middle, min(low, chart.middle - least), max(high, chart.middle + least))
+        look = {"cmap": "RdBu_r", "norm": norm}
     axis.set_facecolor(_NONE)
-    mesh = axis.pcolormesh(chart.x, chart.y, values, norm=norm, cmap="RdBu_r", shading="nearest", rasterized=True)
+    mesh = axis.pcolormesh(chart.x, chart.y, values, shading="nearest", rasterized=True, **look)
     axis.grid(False)
     draw_panel(axis, chart.panel)
     # the scale is part of the chart, and no axes of its own
@@ -149,12 +152,70 @@ def plot_stability_chart(chart: StabilityChart, *, title: str = "") -> Figure:
         x_range=(float(low[0]), float(high[0])),
         y_range=(float(low[1]), float(high[1])),
     )
+    if chart.beside is not None:
+        return _with_coexistence(chart, chart.beside, panel, title)
     map_ = HeatMap(
         panel=panel,
         x=x.factor * chart.grid.x,
         y=y.factor * chart.grid.y,
         values=chart.grid.largest,
         label="largest Floquet multiplier",
-        missing="no orbit",
+        missing="not found",
+    )
+    return plot_charts([map_], title=title, size=(7.2, 5.0))
+
+
+def _with_coexistence(chart: StabilityChart, beside: Coexistence, panel: Panel, title: str) -> Figure:
+    """How many stable motions there are, and how large the smallest and the largest are, with the boundaries over them."""
+    x, y = (axis.factor * values for axis, values in zip(chart.axes, (beside.x, beside.y)))
+    what, unit = beside.swing
+    factor, shown = (100.0, "cm") if unit == "m" else (1.0, unit)
+    bare = replace(panel, curves=[replace(curve, label="") for curve in panel.curves])
+    values: dict[str, np.ma.MaskedArray[Any, np.dtype[np.float64]]] = {
+        "stable motions found": np.ma.MaskedArray(beside.stable.astype(float), mask=beside.stable == 0),
+        f"amplitude of {what}, smallest stable motion [{shown}]": factor * beside.least,
+        f"the same, largest stable motion [{shown}]": factor * beside.greatest,
+    }
+    maps = [
+        HeatMap(panel=bare if n else panel, x=x, y=y, values=grid, label=label, middle=None, missing="none found")
+        for n, (label, grid) in enumerate(values.items())
+    ]
+    return plot_charts(maps, title=title, size=(7.2, 4.2))
+
+
+@plot.register
+def plot_basins(found: Basins, *, title: str = "") -> Figure:
+    """The motion that each start ends in by its colour, and the motions themselves at the crank angle 0."""
+    x_label, y_label = found.labels
+    half = len(found.motions[0].start) // 2
+    curves = [
+        Curve(
+            x=[orbit.start[0]],
+            y=[orbit.start[half]],
+            line="",
+            marker="o" if orbit in found.motions else "x",
+            colour="0.05",
+            label="" if n and (orbit in found.motions) == (found.found.orbits[n - 1] in found.motions) else label,
+        )
+        for n, orbit in enumerate(found.found.orbits)
+        for label in ["stable motion" if orbit in found.motions else "unstable motion"]
+    ]
+    panel = Panel(
+        x_label=x_label,
+        y_label=y_label,
+        curves=curves,
+        legend_at="upper right",
+        x_range=(float(found.position[0]), float(found.position[-1])),
+        y_range=(float(found.rate[0]), float(found.rate[-1])),
+    )
+    names = [f"motion {n + 1}" for n in range(len(found.motions))]
+    map_ = HeatMap(
+        panel=panel,
+        x=found.position,
+        y=found.rate,
+        values=np.ma.MaskedArray(found.ends + 1.0, mask=found.ends < 0),
+        label=f"{', '.join(names)}, by amplitude: where a start ends",
+        middle=None,
+        missing="limit of assembly, or none",
     )
     return plot_charts([map_], title=title, size=(7.2, 5.0))

@@ -12,6 +12,10 @@ from .charts import Traced as Traced
 from .charts import damping_name as damping_name
 from .charts import default_range as default_range
 from .charts import stability_chart as stability_chart
+from .coexistence import Basins as Basins
+from .coexistence import Coexistence as Coexistence
+from .coexistence import basins as basins
+from .coexistence import coexistence as coexistence
 from .crossings import CrossingCurve as CrossingCurve
 from .crossings import follow_crossing as follow_crossing
 from .drives import Drive as Drive
@@ -49,6 +53,7 @@ from .planes import Operation as Operation
 from .planes import Plane as Plane
 from .planes import format_value as format_value
 from .planes import plane as plane
+from .planes import require_variable as require_variable
 from .planes import speed_name as speed_name
 from .planes import unit_of as unit_of
 from .resonance import Extremum as Extremum

@@ -24,6 +24,7 @@ from ..numerics.continuation import ContinuationError, End, Reason
 from ..run import shown, takes_published
 from ..units import RAD_S_PER_RPM, Amount, si
 from .branches import Branch, Family, SpecialPoint, follow
+from .coexistence import Coexistence, coexistence
 from .crossings import follow_crossing
 from .drives import Drive, published_drive
 from .floquet import Crossing
@@ -144,6 +145,8 @@ class StabilityChart(Shown):
         Three points put to the test.
     elsewhere : int
         Folds and period doublings met that belong to other motions than the grid's; `follow_crossing` follows them.
+    beside : Coexistence or None
+        All motions at every point, where it was asked for them.
     problems : tuple of str
         What could not be computed, a sentence each; empty where everything was.
     """
@@ -155,6 +158,7 @@ class StabilityChart(Shown):
     removals: tuple[str, ...]
     runs: tuple[Run, ...]
     elsewhere: int
+    beside: Coexistence | None
     problems: tuple[str, ...]
 
     def __repr__(self) -> str:
@@ -207,6 +211,7 @@ def stability_chart(
     points: int = 80,
     start: ArrayLike | None = None,
     beside: Mapping[str, Callable[[Plane], Monodromy]] | None = None,
+    coexisting: bool = False,
     n_jobs: int | None = None,
     progress: bool = False,
 ) -> StabilityChart:
@@ -230,6 +235,8 @@ def stability_chart(
     beside : mapping, optional
         Other motions whose boundaries are traced too, such as `analysis.youssef.linear_motion`: name to their monodromy
         matrix over a plane.
+    coexisting : bool
+        Whether all motions of every point are sought, which takes some twenty times as long: see `coexistence`.
     n_jobs : int, optional
         Cores, as `joblib.Parallel`.
     progress : bool
@@ -287,6 +294,7 @@ def stability_chart(
         removals=survey.removals(true),
         runs=tuple(survey.runs),
         elsewhere=survey.elsewhere,
+        beside=coexistence(operation, x, y, start=start, n_jobs=n_jobs, progress=progress) if coexisting else None,
         problems=tuple(survey.problems),
     )
 

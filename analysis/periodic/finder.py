@@ -109,7 +109,7 @@ def find_orbit(
     initial : state at the start, optional
         Where freedoms are held that are neither free nor the crank's: see `Drive`.
     turns : int
-        Turns of the crank in one period.
+        Turns of the crank in one period; where no motion has it, one that repeats itself after fewer is found.
     start : array_like, shape (n,), optional
         Guess of y at crank angle 0: coordinates and rates of what is free beside the crank, of a five-bar u (m) and u' (m/s),
         and under a torque the crank speed (rad/s), which is needed there unless it follows from a motor's synchronous speed.
@@ -147,7 +147,10 @@ def find_orbit(
         failure, first = error, None
     found = orbits_of(parameters, drive, turns=turns, start=start, known=() if first is None else (first,))
     if not found.orbits:
-        raise failure
+        if first is None:
+            raise failure
+        # it repeats itself after fewer turns, and so after these
+        return replace(first, others=0)
     return replace(_met(parameters, drive, found, first, start), others=len(found) - 1)
 
 

@@ -31,6 +31,9 @@ from .orbit_kernels import Status
 from .planes import Operation, Plane
 from .starts import scale_of, starts_of
 
+#: Starts from which the orbit of a point is sought where it is not found from its neighbour: a power of two.
+STARTS = 32
+
 
 class GridInterrupted(Interrupted):
     """A grid was interrupted; the rows that were done are kept and the same call goes on from there.
@@ -143,7 +146,7 @@ def grid(
     mechanism = mechanism_of(parameters)
     flow = drive.flow(mechanism)
     guess = orbits.guess_of(flow, drive, start)
-    guesses = np.vstack([guess, starts_of(parameters, drive, guess, orbits.STARTS)])
+    guesses = np.vstack([guess, starts_of(parameters, drive, guess, STARTS)])
     where = grid_folder() if folder is None else Path(folder)
     with suppress(OSError):  # said once the first row cannot be kept
         where.mkdir(parents=True, exist_ok=True)

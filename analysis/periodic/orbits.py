@@ -37,7 +37,7 @@ ORBIT_TOLERANCE = 100.0 * INTEGRATOR_TOLERANCE
 #: y; what is found is solved again.
 SEARCH_TOLERANCE, SEARCH_ITERATIONS, REACH = 1e-6, 30, 1.0
 #: Starts of that search where Newton's method fails from the guess: a power of two.
-STARTS = 32
+STARTS = 64
 #: Newton iterations at most.
 MOST_ITERATIONS = 40
 #: Turns for which a motion is followed where Newton's method fails from the guess, and the change a turn that ends it.

@@ -353,22 +353,23 @@ def _passages(
 def points_to_confirm(found: Grid) -> list[tuple[int, int]]:
     """Three points of a grid that put it to the test: its most stable, its least stable, and the one nearest to a boundary.
 
-    The last is the point of the least margin, to either side, that a long run can still measure.
+    The last is the point of the least margin, to either side, that a long run can still measure, and none of the two others.
 
     Returns
     -------
     list of (int, int)
-        Rows and columns, without repetition; none where the grid has no orbit.
+        Rows and columns; as many as have an orbit where these are fewer than three, none where the grid has none.
     """
     margin = 1.0 - found.largest
     if margin.count() == 0:
         return []
+    places = list(dict.fromkeys((int(margin.argmax()), int(margin.argmin()))))
     size = np.ma.abs(margin)
+    size.ravel()[places] = np.ma.masked
     near = np.ma.masked_where(size < MEASURABLE, size)
-    places = [int(margin.argmax()), int(margin.argmin())]
     if near.count():
         places.append(int(near.argmin()))
-    row, column = np.unravel_index(list(dict.fromkeys(places)), margin.shape)
+    row, column = np.unravel_index(places, margin.shape)
     return list(zip(row.tolist(), column.tolist()))
 
 

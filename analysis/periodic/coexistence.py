@@ -1,0 +1,342 @@
+"""Motions beside each other: how many stable ones each point of a plane has, and which of them a start ends in."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import joblib
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from linkwork.errors import InputError
+from linkwork.mechanism import Mechanism
+
+from ..files import write_csv
+from ..mechanisms import MECHANISMS, Parameters, mechanism_of
+from ..notebook import Shown, format_count
+from ..numerics.workers import end_with
+from ..run import shown, takes_published
+from . import orbit_kernels
+from .drives import Drive
+from .finder import Orbits, orbits_of
+from .floquet import TOLERANCE, multipliers
+from .flows import PLAIN, VARIATIONAL
+from .orbit_kernels import LOST, MOST_ORBITS, NO_SOURCE, UNSETTLED
+from .orbits import INTEGRATOR_TOLERANCE, MOST_ITERATIONS, SEARCH_TOLERANCE, guess_of, section_of
+from .planes import Operation, Plane
+from .starts import extent_of, scale_of, starts_of
+
+#: Starts from which the motions of a point are sought beside those of its neighbour: a power of two.
+STARTS = 16
+#: Samples of a turn from which an amplitude is taken.
+SAMPLES = 64
+#: Bound of the integrator's local error of a basin, distance from a motion, relative to the scale, at which a start has
+#: arrived, and turns at most.
+_TOLERANCE, _NEAR, _TURNS = 1e-6, 1e-2, 3000
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Coexistence:
+    """The periodic motions of one turn at every point of a grid.
+
+    Attributes
+    ----------
+    x, y : ndarray, shapes (nx,) and (ny,)
+    largest : masked array, shape (ny, nx, k)
+        Largest modulus of the Floquet multipliers of each motion, by amplitude; masked where there is no further one.
+    amplitude : masked array, shape (ny, nx, k)
+        Half the range of the first free coordinate, of a slider position (m).
+    starts : ndarray, shape (ny, nx, k, n)
+        y at crank angle 0; NaN where there is none.
+    swing : (str, str)
+        What the amplitude is of, and its unit.
+    """
+
+    x: NDArray[np.float64]
+    y: NDArray[np.float64]
+    largest: np.ma.MaskedArray[Any, np.dtype[np.float64]]
+    amplitude: np.ma.MaskedArray[Any, np.dtype[np.float64]]
+    starts: NDArray[np.float64]
+    swing: tuple[str, str]
+
+    @property
+    def count(self) -> NDArray[np.int64]:
+        """Motions that were found at each point, shape (ny, nx)."""
+        return np.asarray(self.largest.count(axis=2))
+
+    @property
+    def stable(self) -> NDArray[np.int64]:
+        """Stable motions that were found at each point, shape (ny, nx)."""
+        return np.asarray(np.ma.filled(self.largest < 1.0 - TOLERANCE, False).sum(axis=2))
+
+    @property
+    def least(self) -> np.ma.MaskedArray[Any, np.dtype[np.float64]]:
+        """Amplitude of the smallest stable motion, shape (ny, nx)."""
+        return self._extreme(np.ma.min)
+
+    @property
+    def greatest(self) -> np.ma.MaskedArray[Any, np.dtype[np.float64]]:
+        """Amplitude of the largest stable motion, shape (ny, nx)."""
+        return self._extreme(np.ma.max)
+
+    def _extreme(self, of: Callable[..., Any]) -> np.ma.MaskedArray[Any, np.dtype[np.float64]]:
+        unstable = ~np.ma.filled(self.largest < 1.0 - TOLERANCE, False)
+        return np.ma.masked_invalid(of(np.ma.masked_where(unstable, self.amplitude), axis=2).filled(np.nan))
+
+    def to_csv(self, path: str | Path) -> Path:
+        """Write the grid as a table, a row a point, in SI."""
+        columns = {
+            "x": np.tile(self.x, len(self.y)),
+            "y": np.repeat(self.y, len(self.x)),
+            "motions found": self.count.ravel().astype(float),
+            "stable motions found": self.stable.ravel().astype(float),
+            "amplitude of the smallest stable motion": self.least.filled(np.nan).ravel(),
+            "amplitude of the largest stable motion": self.greatest.filled(np.nan).ravel(),
+        }
+        return write_csv(path, columns)
+
+
+def coexistence(
+    operation: Plane,
+    x: ArrayLike,
+    y: ArrayLike,
+    *,
+    start: ArrayLike | None = None,
+    n_jobs: int | None = None,
+    progress: bool = False,
+) -> Coexistence:
+    """All periodic motions of one turn that are found at every point of a grid.
+
+    Those of each point are sought from those of its neighbour in the row, then from `STARTS` starts with the known ones divided
+    out. A motion that is alone in its part of a row may be missed: `find_orbits` looks at one point more closely.
+
+    Parameters
+    ----------
+    operation : callable
+        See `plane`.
+    x, y : array_like, shapes (nx,) and (ny,)
+        Values of the axes.
+    start : array_like, shape (n,), optional
+        A further start; under a torque one is needed for the crank speed, unless it follows from a motor.
+    n_jobs : int, optional
+        Cores, as `joblib.Parallel`.
+    progress : bool
+        Show a progress bar.
+
+    Raises
+    ------
+    InputError
+        If an axis is empty or not finite.
+    """
+    xs, ys = (np.array(axis, dtype=float, ndmin=1) for axis in (x, y))
+    for name, axis in (("x", xs), ("y", ys)):
+        if axis.ndim != 1 or len(axis) == 0 or not np.isfinite(axis).all():
+            raise InputError(f"the axis {name} of a grid must be finite numbers, at least one")
+    parameters, drive = operation(float(xs[0]), float(ys[0]))
+    mechanism = mechanism_of(parameters)
+    guess = guess_of(drive.flow(mechanism), drive, start)
+    guesses = np.vstack([guess, starts_of(parameters, drive, guess, STARTS)])
+    rows: list[tuple[NDArray[np.float64], ...]] = []
+    with shown(progress, float(len(ys)), "motions") as show:
+        tasks = (
+            joblib.delayed(_row)(mechanism, [operation(first, value) for first in xs.tolist()], guesses, os.getpid())
+            for value in ys.tolist()
+        )
+        for row in joblib.Parallel(n_jobs=n_jobs, return_as="generator")(tasks):
+            rows.append(row)
+            show(float(len(rows)))
+    starts, largest, amplitude = (np.array(part) for part in zip(*rows))
+    return Coexistence(
+        x=xs,
+        y=ys,
+        largest=np.ma.masked_invalid(largest),
+        amplitude=np.ma.masked_invalid(amplitude),
+        starts=starts,
+        swing=drive.flow(mechanism).components[0],
+    )
+
+
+def _row(
+    mechanism: Mechanism, row: Sequence[Operation], guesses: NDArray[np.float64], caller: int
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Starts, largest multipliers and amplitudes of the motions of a row, by amplitude; NaN where there is no further one."""
+    end_with(caller)
+    # one that was registered by the caller is not in another process
+    MECHANISMS.setdefault(mechanism.name, mechanism)
+    parameters, drive = row[0]
+    flow, m, n = drive.flow(mechanism), len(row), guesses.shape[1]
+    numbers = np.array([(*p.constants(),) for p, _ in row])
+    vectors = np.array([d.vector(mechanism) for _, d in row])
+    starts, counts = np.full((m, MOST_ORBITS, n), np.nan), np.zeros(m, dtype=np.int64)
+    monodromies, swings = np.full((m, MOST_ORBITS, n * n), np.nan), np.full((m, MOST_ORBITS, SAMPLES), np.nan)
+    orbit_kernels.solve_all(
+        section_of(parameters, drive, guesses[0], VARIATIONAL, PLAIN, tolerance=INTEGRATOR_TOLERANCE),
+        NO_SOURCE,
+        np.hstack([numbers, np.zeros_like(numbers)]),
+        np.hstack([vectors, np.zeros_like(vectors)]),
+        np.array([scale_of(p, d, guesses[0]) for p, d in row]),
+        flow.period,
+        MOST_ITERATIONS,
+        SEARCH_TOLERANCE,
+        np.linspace(0.0, flow.period, SAMPLES, endpoint=False),
+        guesses,
+        starts,
+        monodromies,
+        swings,
+        counts,
+    )
+    largest = np.full((m, MOST_ORBITS), np.nan)
+    found = np.arange(MOST_ORBITS) < counts[:, None]
+    largest[found] = np.abs(multipliers(monodromies[found].reshape(-1, n, n)))[:, 0]
+    # the series of the samples on a finer grid, as `Turn.amplitude` takes it
+    fine = np.fft.irfft(np.fft.rfft(swings, axis=2), 8 * SAMPLES, axis=2) * 8.0
+    amplitude = 0.5 * np.ptp(fine, axis=2)
+    order = np.argsort(np.where(found, amplitude, np.inf), axis=1, kind="stable")
+    amplitude[~found] = np.nan
+    return (
+        np.take_along_axis(starts, order[:, :, None], axis=1),
+        np.take_along_axis(largest, order, axis=1),
+        np.take_along_axis(amplitude, order, axis=1),
+    )
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Basins(Shown):
+    """Which motion each start at crank angle 0 ends in.
+
+    Attributes
+    ----------
+    position, rate : ndarray, shapes (nx,) and (ny,)
+        Starts of the first free coordinate, of a slider (m), and of its rate (m/s); the rest of y is that of the first motion.
+    ends : ndarray of int, shape (ny, nx)
+        Number of the stable motion among ``motions``; -1 where the links come to the limit of assembly, -2 where no motion of
+        one turn is met within the turns that are followed.
+    motions : tuple of PeriodicOrbit
+        The stable motions, the smallest first.
+    found : Orbits
+        All motions of one turn, the unstable ones on the boundaries of the basins among them.
+    """
+
+    position: NDArray[np.float64]
+    rate: NDArray[np.float64]
+    ends: NDArray[np.int64]
+    motions: tuple[Any, ...]
+    found: Orbits
+
+    def __repr__(self) -> str:
+        shares = [f"{self.share(number):.1%} to motion {number + 1}" for number in range(len(self.motions))]
+        lost = f", {self.share(LOST):.1%} to the limit of assembly"
+        rest = f", {self.share(UNSETTLED):.1%} to none of them" if (self.ends == UNSETTLED).any() else ""
+        motions = format_count(len(self.motions), "stable motion")
+        return f"<Basins: {motions}, {len(self.position)} x {len(self.rate)} starts: {', '.join(shares)}{lost}{rest}>"
+
+    def share(self, end: int) -> float:
+        """Part of the starts that end so."""
+        return float(np.mean(self.ends == end))
+
+    def to_csv(self, path: str | Path) -> Path:
+        """Write the picture as a table, a row a start."""
+        (name, unit), (rate, rate_unit) = self._components()
+        columns = {
+            f"{name} [{unit}]": np.tile(self.position, len(self.rate)),
+            f"{rate} [{rate_unit}]": np.repeat(self.rate, len(self.position)),
+            "motion (1 and on; 0: limit of assembly; -1: none)": self.ends.ravel() + 1.0,
+        }
+        return write_csv(path, columns)
+
+    def _components(self) -> tuple[tuple[str, str], tuple[str, str]]:
+        flow = self.motions[0].flow
+        return flow.components[0], flow.components[flow.size // 2]
+
+    @property
+    def labels(self) -> tuple[str, str]:
+        """Names of the two axes with their units."""
+        (name, unit), (rate, rate_unit) = self._components()
+        return f"{name} [{unit}]", f"{rate} [{rate_unit}]"
+
+
+@takes_published()
+def basins(
+    parameters: Parameters,
+    drive: Drive,
+    *,
+    points: int = 200,
+    position: tuple[float, float] | None = None,
+    rate: tuple[float, float] | None = None,
+    start: ArrayLike | None = None,
+    n_jobs: int | None = None,
+    progress: bool = False,
+) -> Basins:
+    """Which of the stable periodic motions a start ends in, over a plane of starts.
+
+    Parameters
+    ----------
+    parameters : parameters of a mechanism
+    drive : Drive
+    points : int
+        Of the plane, along each axis.
+    position, rate : (float, float), optional
+        Ranges of the first free coordinate and of its rate at crank angle 0; as far as the mechanism can be assembled by
+        default.
+    start : array_like, shape (n,), optional
+        Under a torque a guess of y with the crank speed; see `find_orbits`.
+    n_jobs : int, optional
+        Cores, as `joblib.Parallel`.
+    progress : bool
+        Show a progress bar.
+
+    Raises
+    ------
+    InputError
+        If there is no stable motion of one turn, or a range is none.
+
+    Examples
+    --------
+    >>> from analysis.periodic import Drive, basins
+    >>> found = basins("rig-1-spring-b", Drive(speed="1000 rpm"), points=20)
+    >>> len(found.motions), found.share(0) > found.share(1) > 0.0
+    (2, True)
+    """
+    found = orbits_of(parameters, drive, start=start)
+    motions = found.stable
+    if not motions:
+        raise InputError("there is no stable motion of one turn here: no start ends in one")
+    first = motions[0].start
+    extent, scale, half = extent_of(parameters, drive, first)[0], scale_of(parameters, drive, first), len(first) // 2
+    spans = position or (-extent, extent), rate or tuple(scale[half] / scale[0] * extent * s for s in (-1.0, 1.0))
+    for name, (low, high) in zip(("position", "rate"), spans):
+        if not (np.isfinite(low) and np.isfinite(high) and low < high):
+            raise InputError(f"the range of the {name} is {low} to {high}: it must be finite and increasing")
+    across, up = (np.linspace(low, high, points) for low, high in spans)
+    known = np.array([orbit.start for orbit in motions])
+    rows: list[NDArray[np.int64]] = []
+    with shown(progress, float(points), "starts") as show:
+        tasks = (joblib.delayed(_ends)(parameters, drive, known, across, value, os.getpid()) for value in up.tolist())
+        for row in joblib.Parallel(n_jobs=n_jobs, return_as="generator")(tasks):
+            rows.append(row)
+            show(float(len(rows)))
+    return Basins(position=across, rate=up, ends=np.array(rows), motions=motions, found=found)
+
+
+def _ends(
+    parameters: Parameters,
+    drive: Drive,
+    known: NDArray[np.float64],
+    across: NDArray[np.float64],
+    rate: float,
+    caller: int,
+) -> NDArray[np.int64]:
+    """The ends of a row of starts."""
+    end_with(caller)
+    mechanism = mechanism_of(parameters)
+    flow = drive.flow(mechanism)
+    starts = np.tile(known[0], (len(across), 1))
+    starts[:, 0], starts[:, flow.size // 2] = across, rate
+    ends = np.zeros(len(across), dtype=np.int64)
+    section = section_of(parameters, drive, known[0], PLAIN, tolerance=_TOLERANCE)
+    orbit_kernels.basins_of(section, NO_SOURCE, flow.period, _NEAR, _TURNS, starts, known, ends)
+    return ends

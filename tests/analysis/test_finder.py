@@ -1,0 +1,89 @@
+"""All periodic motions at a point: what single guesses missed, and that two methods and the sum of indices agree."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from math import pi
+
+import numpy as np
+import pytest
+
+from analysis import find_orbit, find_orbits
+from analysis.periodic import Drive, OrbitError, Stability, confirm, orbit_of, sweep
+from linkwork.errors import InputError
+from linkwork.five_bar.published import RAD_S_PER_RPM, SETS
+
+RIG_1_B = SETS["rig-1-spring-b"].parameters
+TABLE_3_1 = SETS["table-3.1"].parameters
+
+
+def test_a_resonant_motion_that_newtons_method_misses() -> None:
+    """Harmonic balance and 120 turns of an independent run gave an amplitude of 13.8 cm and a multiplier of 0.93546."""
+    parameters, speed = replace(RIG_1_B, slider_damping=2.0), 1076.7 * RAD_S_PER_RPM
+    orbit = find_orbit(parameters, speed=speed)
+    assert orbit.amplitude == pytest.approx(0.138, abs=5e-4)
+    assert orbit.largest == pytest.approx(0.93546, abs=5e-6)
+    with pytest.raises(OrbitError):
+        orbit_of(parameters, Drive(speed=speed), settle=False)
+
+
+@pytest.mark.parametrize("rpm", [980.0, 1020.0])
+def test_three_motions_where_the_response_bends_over(rpm: float) -> None:
+    found = find_orbits(RIG_1_B, speed=rpm * RAD_S_PER_RPM)
+    words = [orbit.verdict().stability for orbit in found.orbits]
+    assert words == [Stability.STABLE, Stability.UNSTABLE, Stability.STABLE]
+    assert found.agreed
+    assert found.index == 1
+    amplitudes = [orbit.amplitude for orbit in found.orbits]
+    assert amplitudes == sorted(amplitudes)
+    assert "2 stable, 1 unstable" in repr(found)
+
+
+def test_of_several_the_one_is_found_that_a_machine_meets_from_rest() -> None:
+    speed = 1000.0 * RAD_S_PER_RPM
+    met = find_orbit(RIG_1_B, speed=speed)
+    # up slowly from below, step by step
+    up = sweep(RIG_1_B, np.linspace(300.0, 1000.0, 36) * RAD_S_PER_RPM).orbits[-1]
+    assert up is not None
+    assert met.start == pytest.approx(up.start, abs=1e-9)
+    assert met.others == 2
+    assert "2 other motions there: find_orbits" in repr(met)
+
+
+def test_motions_far_from_the_zero_of_the_slider() -> None:
+    """A mechanism whose crank cannot turn with the slider at zero turns with it elsewhere, as a long run confirms."""
+    parameters = replace(TABLE_3_1, coupler_length=0.06)
+    orbit = find_orbit(parameters, speed=40.0)
+    assert orbit.verdict().stability is Stability.STABLE
+    assert confirm(parameters, Drive(speed=40.0), start=orbit.start).agrees
+    with pytest.raises(OrbitError):
+        orbit_of(parameters, Drive(speed=40.0), settle=False)
+
+
+def test_no_motion_where_the_crank_is_longer_than_the_other_links() -> None:
+    impossible = replace(TABLE_3_1, crank_length=0.5)
+    assert len(find_orbits(impossible, speed=40.0)) == 0
+    with pytest.raises(OrbitError, match="cannot be joined"):
+        find_orbit(impossible, speed=40.0)
+
+
+def test_a_motion_of_two_turns_is_counted_once_and_one_of_a_single_turn_not_at_all() -> None:
+    parameters = replace(SETS["rig-2-spring-c"].parameters, slider_damping=0.5)
+    speed = 1170.0 * RAD_S_PER_RPM
+    simple, doubled = find_orbits(parameters, speed=speed), find_orbits(parameters, speed=speed, turns=2)
+    assert [orbit.verdict().stability for orbit in simple.orbits] == [Stability.UNSTABLE]
+    (orbit,) = doubled.orbits
+    assert orbit.verdict().stability is Stability.STABLE
+    assert orbit.turn().harmonic("slider.position", 0.5) > 1e-3
+    assert doubled.index == 1
+
+
+def test_under_a_motor_the_crank_speed_is_found_too() -> None:
+    speeds = [orbit.start[-1] for orbit in find_orbits(TABLE_3_1, torque=0.4, start=(0.0, 0.0, 44.0)).orbits]
+    direct = find_orbit(TABLE_3_1, torque=0.4, start=(0.0, 0.0, 44.0), settle=False)
+    assert any(speed == pytest.approx(direct.start[-1], rel=1e-9) for speed in speeds)
+
+
+def test_turns_must_be_a_whole_number() -> None:
+    with pytest.raises(InputError, match="whole number"):
+        find_orbits(TABLE_3_1, speed=14.0 * pi, turns=0)
