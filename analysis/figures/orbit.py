@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..mechanisms import mechanism_of
-from ..periodic import PeriodicOrbit
+from ..periodic import Orbits, PeriodicOrbit
 from ..units import RAD_S_PER_RPM
 from .curves import Curve, Panel, plot_curves
 from .dispatch import plot
@@ -81,3 +81,24 @@ def _title(orbit: PeriodicOrbit, period: float) -> str:
     speed = orbit.flow.period * orbit.turns / period
     turns = "one turn" if orbit.turns == 1 else f"{orbit.turns} turns"
     return f"Periodic motion of {turns} at {speed / RAD_S_PER_RPM:.5g} rpm, {orbit.verdict().stability.value}"
+
+
+@plot.register
+def plot_orbits(found: Orbits, *, title: str = "") -> Figure:
+    """All motions at a point: the first free coordinate of each over the period, unstable ones dashed."""
+    curves, label = [], "first free coordinate"
+    for orbit in found.orbits:
+        turn = orbit.turn(_SAMPLES)
+        variable = next(v for v in mechanism_of(orbit.parameters).variables if v.name == turn.swing)
+        unit, factor = display_unit(variable)
+        label = f"{turn.swing} [{unit}]"
+        stable = orbit in found.stable
+        curves.append(
+            Curve(
+                x=np.degrees(np.append(turn.angle, orbit.flow.period * orbit.turns)),
+                y=factor * np.append(turn[turn.swing], turn[turn.swing][0]),
+                line="-" if stable else "--",
+                label=f"{orbit.verdict().stability.value}, largest multiplier {orbit.largest:.3g}",
+            )
+        )
+    return plot_curves([Panel(x_label="crank angle [deg]", y_label=label, curves=curves)], title=title)

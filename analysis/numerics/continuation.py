@@ -258,6 +258,12 @@ class Follower:
             data=evaluation.data,
         )
 
+    def resume(self, y: ArrayLike, parameter: float, ahead: ArrayLike) -> Point:
+        """A point on the curve as the first of a curve that goes on in the direction of ``ahead`` (scaled, shape (n + 1,))."""
+        whole = np.append(np.asarray(y, dtype=float), parameter)
+        found = _Landing(whole / self.scale, self.evaluate(whole[:-1], parameter), 0)
+        return self._point(found, np.asarray(ahead, dtype=float))
+
     def step(self, point: Point, length: float) -> Point | None:
         """The point an arc length further along the tangent; None if there is none."""
         found = self._step(point, length)

@@ -21,16 +21,11 @@ from linkwork.errors import InputError
 from ..files import write_csv
 from ..mechanisms import Parameters, mechanism_of
 from ..notebook import Shown, format_count, format_range
-from ..numerics.continuation import ContinuationError, Curve, Evaluate, Evaluation, Follower, Point, Settings
+from ..numerics.continuation import ContinuationError, Curve, Evaluate, Evaluation, Follower, Point, Reason, Settings
 from .drives import Drive
 from .floquet import TOLERANCE, Crossing, Stability, crossing_test
 from .flows import label
-from .orbits import (
-    Direction,
-    Period,
-    PeriodicOrbit,
-    period_from,
-)
+from .orbits import Direction, OrbitError, Period, PeriodicOrbit, Stations, period_from, pieces_from
 from .planes import Operation, format_value, require_variable, unit_of, with_values
 from .starts import scale_of
 from .turns import Turn
@@ -44,8 +39,11 @@ _FIRST = 5e-3
 _SWITCH = 2e-3
 
 #: A branch is left where the links come this close to the limit of assembly (least sine, as `LIMIT_SINE`), or where its
-#: largest multiplier passes the greatest that single shooting follows with certainty.
-LEAST_SINE, GREATEST_MULTIPLIER = 0.02, 1e4
+#: largest multiplier passes this.
+LEAST_SINE, GREATEST_MULTIPLIER = 1e-3, 1e8
+#: Growth over a period, or over one of its pieces, from which a period is followed in (more) pieces; growth aimed at for each,
+#: pieces at least and at most a turn, and places of a turn from which their ends are chosen.
+_GROWTH, _AIM, _FEWEST, _PLACES = 1e3, 10.0, 8, 64
 
 
 #: What varies: an FMI name, or a function of one number.
@@ -106,8 +104,12 @@ class Family:
         vectors, numbers = zip(*((d.vector(mechanism), np.array(p.constants())) for p, d in (self.at(a), self.at(b))))
         return Direction((vectors[1] - vectors[0]) / (b - a), (numbers[1] - numbers[0]) / (b - a))
 
-    def evaluate(self, turns: int, low: float, high: float) -> Evaluate:
-        """y(T) - y(0) with its derivatives over a range, as `continuation` follows it; its data are the `PeriodicOrbit`."""
+    def evaluate(self, turns: int, low: float, high: float, angles: NDArray[np.float64] | None = None) -> Evaluate:
+        """y(T) - y(0) with its derivatives over a range, as `continuation` follows it; its data are the `PeriodicOrbit`.
+
+        With ``angles``, shape (k + 1,), the unknowns are y at the beginning of each piece between them, and what is to vanish
+        is the difference of each end from the next beginning: multiple shooting.
+        """
 
         def evaluation(y: NDArray[np.float64], value: float) -> Evaluation:
             parameters, drive = self.at(value)
@@ -115,7 +117,34 @@ class Family:
             orbit = orbit_from(parameters, drive, y, turns, period)
             return Evaluation(period.shift, period.monodromy - np.eye(len(y)), period.slope, orbit)
 
-        return evaluation
+        def in_pieces(y: NDArray[np.float64], value: float) -> Evaluation:
+            assert angles is not None
+            parameters, drive = self.at(value)
+            k = len(angles) - 1
+            starts = y.reshape(k, -1).copy()
+            n = starts.shape[1]
+            ends, matrices, slopes = pieces_from(
+                parameters, drive, angles, starts, self._direction(value, low, high), high - low
+            )
+            gaps = ends - np.roll(starts, -1, axis=0)
+            jacobian = np.zeros((k, n, k, n))
+            for piece in range(k):
+                jacobian[piece, :, piece] = matrices[piece]
+                jacobian[piece, :, (piece + 1) % k] -= np.eye(n)
+            scale = scale_of(parameters, drive, starts[0])
+            orbit = PeriodicOrbit(
+                parameters=parameters,
+                drive=drive,
+                turns=turns,
+                start=starts[0].copy(),
+                monodromy=reduce(lambda product, matrix: matrix @ product, matrices),
+                residual=float(np.abs(gaps / scale).max()),
+                iterations=1,
+                stations=Stations(angles, starts, _greatest_growth(matrices, scale)),
+            )
+            return Evaluation(gaps.ravel(), jacobian.reshape(k * n, k * n), slopes.ravel(), orbit)
+
+        return evaluation if angles is None else in_pieces
 
 
 def orbit_from(
@@ -362,10 +391,44 @@ def _settings(low: float, high: float, greatest: float, most_points: int) -> Set
     return Settings(low=low, high=high, first=min(_FIRST, greatest), greatest=greatest, most_points=most_points)
 
 
-def _follower(family: Family, orbit: PeriodicOrbit, settings: Settings) -> Follower:
+def _follower(
+    family: Family, orbit: PeriodicOrbit, settings: Settings, angles: NDArray[np.float64] | None = None
+) -> Follower:
     ends = [family.at(value) for value in (settings.low, settings.high)]
     scale = np.max([scale_of(parameters, drive, orbit.start) for parameters, drive in ends], axis=0)
-    return Follower(family.evaluate(orbit.turns, settings.low, settings.high), scale, settings)
+    if angles is not None:
+        # an arc has the length of the mean square over the pieces
+        scale = np.tile(scale * np.sqrt(len(angles) - 1), len(angles) - 1)
+    return Follower(family.evaluate(orbit.turns, settings.low, settings.high, angles), scale, settings)
+
+
+def _greatest_growth(matrices: NDArray[np.float64], scale: NDArray[np.float64]) -> float:
+    return float(np.linalg.norm(matrices * scale / scale[:, None], ord=2, axis=(1, 2)).max())
+
+
+def _growth(orbit: PeriodicOrbit) -> float:
+    """Growth of a deviation over a period, or over one of its pieces where it is followed in pieces."""
+    return orbit.largest if orbit.stations is None else orbit.stations.growth
+
+
+def _in_pieces(follower: Follower, family: Family, last: Point, settings: Settings) -> tuple[Follower, Point]:
+    """The same curve from its last point on, the period followed in pieces in each of which deviations grow alike."""
+    orbit: PeriodicOrbit = last.data
+    count = _PLACES * orbit.turns
+    places = orbit.turn(count).states[:, orbit.flow.places]
+    angles = np.linspace(0.0, orbit.flow.period * orbit.turns, count + 1)
+    matrices = pieces_from(orbit.parameters, orbit.drive, angles, places)[1]
+    scale = scale_of(orbit.parameters, orbit.drive, orbit.start)
+    growth = np.log(np.linalg.norm(matrices * scale / scale[:, None], ord=2, axis=(1, 2)).clip(1.0))
+    # half of the pieces by growth, half by angle
+    pieces = int(np.clip(np.ceil(2.0 * growth.sum() / np.log(_AIM)), _FEWEST * orbit.turns, count))
+    share = np.concatenate([[0.0], np.cumsum(growth / max(growth.sum(), 1e-9) + 1.0 / count)])
+    chosen = np.unique(np.searchsorted(share, np.linspace(0.0, share[-1], pieces + 1)).clip(0, count))
+    refined = _follower(family, orbit, settings, angles[chosen])
+    n, k = len(orbit.start), len(chosen) - 1
+    ahead = np.zeros(n * k + 1)
+    ahead[:n], ahead[-1] = last.tangent[:n], last.tangent[-1]
+    return refined, refined.resume(places[chosen[:-1]].ravel(), last.parameter, ahead)
 
 
 def reason_to_leave(point: Point) -> str:
@@ -387,17 +450,42 @@ def _branch(
     watch: Callable[[float], None] | None,
     stop: Callable[[], bool] | None,
 ) -> Branch:
-    curve = follower.follow(
-        first,
-        watch=None if watch is None else lambda point: watch(point.parameter),
-        leave=lambda point: "it was interrupted" if stop is not None and stop() else reason_to_leave(point),
-    )
-    special = _special_points(curve, follower)
+    pieces: list[tuple[Follower, Curve]] = []
+    settings = follower.settings
+    while True:
+        refine = False
+
+        def leave(point: Point) -> str:
+            nonlocal refine
+            if stop is not None and stop():
+                return "it was interrupted"
+            reason = reason_to_leave(point)
+            if not reason and _growth(point.data) > _GROWTH:
+                refine = True
+                return "deviations grow too fast to be followed over a whole period"
+            return reason
+
+        curve = follower.follow(
+            first, watch=None if watch is None else lambda point: watch(point.parameter), leave=leave
+        )
+        pieces.append((follower, curve))
+        last, left = curve.points[-1], settings.most_points - len(curve.points) + 1
+        lost = curve.end in (Reason.TIP, Reason.NO_VALUE) and _growth(last.data) > _AIM and last.data.stations is None
+        if not (refine or lost) or left < 2 or (len(curve.points) == 1 and len(pieces) > 1):
+            break
+        settings = replace(settings, most_points=left)
+        try:
+            follower, first = _in_pieces(follower, family, last, settings)
+        except OrbitError:
+            break
+    special = [s for part, (own, curve) in enumerate(pieces) for s in _special_points(curve, own, pieces[:part])]
+    # the first point of a piece is the last of the one before
+    points = [p for part, (_, curve) in enumerate(pieces) for p in curve.points[min(part, 1) :]]
     return Branch(
         family=family,
         turns=turns,
-        parameter=np.array([point.parameter for point in curve.points]),
-        orbits=tuple(point.data for point in curve.points),
+        parameter=np.array([point.parameter for point in points]),
+        orbits=tuple(point.data for point in points),
         special=tuple(special),
         reached=curve.reached,
         closed=curve.closed,
@@ -414,7 +502,11 @@ def _tests(point: Point) -> dict[Crossing, float]:
     }
 
 
-def _special_points(curve: Curve, follower: Follower) -> list[SpecialPoint]:
+def _special_points(
+    curve: Curve, follower: Follower, before: Sequence[tuple[Follower, Curve]] = ()
+) -> list[SpecialPoint]:
+    """The special points of a piece of a branch, numbered after the pieces before it."""
+    passed = sum(len(piece.points) - 1 for _, piece in before)
     found: list[tuple[int, float, SpecialPoint]] = []
     values = [_tests(point) for point in curve.points]
     for i, length in enumerate(curve.steps):
@@ -432,7 +524,7 @@ def _special_points(curve: Curve, follower: Follower) -> list[SpecialPoint]:
             # a real pair with the product 1 is no torus
             if kind is Crossing.TORUS and abs(point.data.multipliers[0].imag) < 1e-6:
                 continue
-            found.append((i, s, SpecialPoint(kind=kind, parameter=point.parameter, orbit=point.data, after=i)))
+            found.append((i, s, SpecialPoint(kind=kind, parameter=point.parameter, orbit=point.data, after=passed + i)))
     return [special for _, _, special in sorted(found, key=lambda entry: entry[:2])]
 
 

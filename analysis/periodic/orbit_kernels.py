@@ -84,6 +84,12 @@ NO_SOURCE = Source(
 )
 
 
+@part
+def _numbered(section, drive, p, scale, tolerance):  # type: ignore[no-untyped-def]
+    """The same flow with other numbers."""
+    return Section(section.equations, section.modes, drive, p, scale, 1.0, tolerance, section.torque)
+
+
 class Room(NamedTuple):
     """Room to work in: stages, state at their end, magnitudes of z, the rate of one component."""
 
@@ -416,20 +422,54 @@ def settle(section, source, turn, change, most, start):  # type: ignore[no-untyp
     return DONE
 
 
-@kernel(int64(_SECTION, SOURCE, VECTOR, VECTOR, MATRIX), purpose="the sampling of periodic motions")
-def sample(section, source, start, angles, rows):  # type: ignore[no-untyped-def]
-    """States of a run and channels, shape (m, states + inputs), at increasing crank angles, from ``start`` at 0."""
+@kernel(int64(_SECTION, SOURCE, VECTOR, MATRIX, VECTOR, MATRIX), purpose="the sampling of periodic motions")
+def sample(section, source, stations, starts, angles, rows):  # type: ignore[no-untyped-def]
+    """States of a run and channels, shape (m, states + inputs), at increasing crank angles.
+
+    Parameters
+    ----------
+    stations, starts : ndarray, shapes (k,) and (k, n)
+        Increasing crank angles, the first 0, at each of which y is begun anew, and y there.
+    """
     room = _room(section, 0)
-    z = start.copy()
+    z = starts[0].copy()
     carry = np.array([0.1, 0.0])
     angle = 0.0
+    passed = 0
     for i in range(angles.shape[0]):
+        while passed + 1 < stations.shape[0] and stations[passed + 1] <= angles[i]:
+            passed += 1
+            angle = stations[passed]
+            z[:] = starts[passed]
         if angles[i] > angle:
             status = _turn(section, source, angle, angles[i], z, room, carry)
             if status != DONE:
                 return status
             angle = angles[i]
         evaluate(section.equations[STATE], angle, z, section.modes, section.drive, section.p, rows[i])
+    return DONE
+
+
+@kernel(int64(_SECTION, SOURCE, VECTOR, MATRIX, MATRIX), purpose="multiple shooting")
+def segments(section, source, angles, starts, rows):  # type: ignore[no-untyped-def]
+    """Integrate y with its derivatives over each of the pieces of a period: see `period`.
+
+    Parameters
+    ----------
+    angles : ndarray, shape (k + 1,)
+        Crank angles at which the pieces begin, and the end of the last.
+    starts : ndarray, shape (k, n)
+        y at the beginning of each.
+    rows : ndarray, shape (k, n (2 + n))
+        y at the end of each, dy/dy there by columns, dy/dlambda; written.
+    """
+    room = _room(section, rows.shape[1] // starts.shape[1] - 1)
+    carry = np.array([0.1, 0.0])
+    for piece in range(starts.shape[0]):
+        _begin(starts.shape[1], starts[piece], rows[piece])
+        status = _turn(section, source, angles[piece], angles[piece + 1], rows[piece], room, carry)
+        if status != DONE:
+            return status
     return DONE
 
 
@@ -463,9 +503,7 @@ def solve_row(section, source, parameters, drives, scales, end, most, loose, gue
     start = guesses[0].copy()
     found = 0
     for row in range(parameters.shape[0]):
-        own = Section(
-            section.equations, section.modes, drives[row], parameters[row], scales[row], 1.0, section.tolerance, section.torque
-        )  # fmt: skip
+        own = _numbered(section, drives[row], parameters[row], scales[row], section.tolerance)
         room = _room(own, n)
         if found > 1:
             # the secant through the last two
@@ -475,9 +513,7 @@ def solve_row(section, source, parameters, drives, scales, end, most, loose, gue
             start[:] = guesses[0]
             what = _solve(own, source, end, most, start, z, room, carry, report)
         if what != DONE:
-            wide = Section(
-                section.equations, section.modes, drives[row], parameters[row], scales[row], 1.0, loose, section.torque
-            )  # fmt: skip
+            wide = _numbered(section, drives[row], parameters[row], scales[row], loose)
             for guess in range(1, guesses.shape[0]):
                 start[:] = guesses[guess]
                 if (
@@ -497,9 +533,7 @@ def solve_row(section, source, parameters, drives, scales, end, most, loose, gue
     # what was not found from the left may be found from the right
     for row in range(parameters.shape[0] - 2, -1, -1):
         if status[row] != DONE and status[row + 1] == DONE:
-            own = Section(
-                section.equations, section.modes, drives[row], parameters[row], scales[row], 1.0, section.tolerance, section.torque
-            )  # fmt: skip
+            own = _numbered(section, drives[row], parameters[row], scales[row], section.tolerance)
             start[:] = starts[row + 1]
             if _solve(own, source, end, most, start, z, _room(own, n), carry, report) == DONE:
                 status[row] = DONE
@@ -548,12 +582,8 @@ def solve_all(
     report, carry = np.zeros(3), np.array([0.1, 0.0])
     start = np.empty(n)
     for row in range(parameters.shape[0]):
-        own = Section(
-            section.equations, section.modes, drives[row], parameters[row], scales[row], 1.0, section.tolerance, section.torque
-        )  # fmt: skip
-        wide = Section(
-            section.equations, section.modes, drives[row], parameters[row], scales[row], 1.0, loose, section.torque
-        )  # fmt: skip
+        own = _numbered(section, drives[row], parameters[row], scales[row], section.tolerance)
+        wide = _numbered(section, drives[row], parameters[row], scales[row], loose)
         room, plain = _room(own, n), _room(own, 0)
         count = 0
         before = counts[row - 1] if row > 0 else 0

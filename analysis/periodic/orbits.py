@@ -56,6 +56,24 @@ class Direction(NamedTuple):
     constants: NDArray[np.float64]
 
 
+class Stations(NamedTuple):
+    """Places of a period at which the motion is begun anew: multiple shooting.
+
+    Attributes
+    ----------
+    angles : ndarray, shape (k + 1,)
+        Crank angles (rad): the first 0, the last the end of the period.
+    starts : ndarray, shape (k, n)
+        y at all but the last.
+    growth : float
+        Greatest norm of the derivatives of y over a piece with respect to y at its beginning, scaled.
+    """
+
+    angles: NDArray[np.float64]
+    starts: NDArray[np.float64]
+    growth: float
+
+
 class OrbitError(LinkworkError):
     """No periodic motion was found.
 
@@ -105,6 +123,8 @@ class PeriodicOrbit(Shown):
         ``|y(T) - y(0)|`` relative to `scale_of`, before the last correction.
     iterations : int
         Newton iterations taken.
+    stations : Stations or None
+        Where the motion was begun anew on the way, because it is too unstable to be followed over a whole period.
     others : int or None
         How many other periodic motions of the same period there are, as far as was sought; None where it was not asked.
     multipliers : ndarray of complex, shape (n,)
@@ -118,6 +138,7 @@ class PeriodicOrbit(Shown):
     monodromy: NDArray[np.float64]
     residual: float
     iterations: int
+    stations: Stations | None = None
     others: int | None = None
     multipliers: NDArray[np.complex128] = field(init=False)
 
@@ -161,7 +182,10 @@ class PeriodicOrbit(Shown):
         angles = np.linspace(0.0, flow.period * self.turns, samples, endpoint=False)
         rows = np.empty((samples, mechanism.size + flow.inputs))
         section = section_of(self.parameters, self.drive, self.start, PLAIN, STATE)
-        status = orbit_kernels.sample(section, NO_SOURCE, self.start.copy(), angles, rows)
+        stations, starts = (np.zeros(1), self.start[None, :].copy())
+        if self.stations is not None:
+            stations, starts = self.stations.angles[:-1].copy(), self.stations.starts
+        status = orbit_kernels.sample(section, NO_SOURCE, stations, starts, angles, rows)
         if status != Status.DONE:
             raise failure(status, flow, self.start)
         states, channels = rows[:, : mechanism.size], rows[:, mechanism.size :]
@@ -460,6 +484,45 @@ def period_from(
     if status != Status.DONE:
         raise failure(status, flow, start)
     return Period(z[:n] - start, z[n : n + n * n].reshape(n, n).T.copy(), z[n + n * n :].copy())
+
+
+def pieces_from(
+    parameters: Parameters,
+    drive: Drive,
+    angles: NDArray[np.float64],
+    starts: NDArray[np.float64],
+    direction: Direction | None = None,
+    along: float = 1.0,
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Follow the plant over the pieces of a period, each from its own start: see `period_from`.
+
+    Parameters
+    ----------
+    angles, starts
+        As in `Stations`.
+
+    Returns
+    -------
+    ends : ndarray, shape (k, n)
+        y at the end of each piece.
+    matrices : ndarray, shape (k, n, n)
+        Their derivatives with respect to the start.
+    slopes : ndarray, shape (k, n)
+        Their derivatives with respect to lambda.
+
+    Raises
+    ------
+    OrbitError
+        If a piece cannot be followed.
+    """
+    k, n = starts.shape
+    rows = np.zeros((k, n * (2 + n)))
+    section = section_of(parameters, drive, starts[0], DIRECTIONAL, direction=direction, along=along)
+    status = orbit_kernels.segments(section, NO_SOURCE, angles, np.ascontiguousarray(starts), rows)
+    if status != Status.DONE:
+        raise failure(status, drive.flow(mechanism_of(parameters)), starts[0])
+    matrices = rows[:, n : n + n * n].reshape(k, n, n).transpose(0, 2, 1)
+    return rows[:, :n], matrices, rows[:, n + n * n :]
 
 
 def failure(

@@ -1,0 +1,122 @@
+"""Coexisting motions over a plane, and which of them a start ends in."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from analysis import Inputs, simulate
+from analysis.cli import main
+from analysis.figures import plot
+from analysis.periodic import Basins, Drive, basins, coexistence, find_orbits, orbit_of, plane, stability_chart
+from linkwork.errors import InputError
+from linkwork.five_bar.parameters import InitialState
+from linkwork.five_bar.published import RAD_S_PER_RPM, SETS
+
+RIG_1_B = SETS["rig-1-spring-b"].parameters
+SPEED = 1000.0 * RAD_S_PER_RPM
+
+
+@pytest.fixture(scope="module")
+def picture() -> Basins:
+    return basins(RIG_1_B, Drive(speed=SPEED), points=9, position=(-0.06, 0.06), rate=(-6.0, 6.0))
+
+
+def test_every_point_has_the_motions_that_are_found_there_alone() -> None:
+    rpm = np.array([900.0, 1000.0, 1100.0])
+    found = coexistence(
+        plane(RIG_1_B, Drive(speed=SPEED), "drive.speed", "slider.damping"), rpm * RAD_S_PER_RPM, [11.0]
+    )
+    for column, speed in enumerate(rpm * RAD_S_PER_RPM):
+        alone = find_orbits(replace(RIG_1_B, slider_damping=11.0), speed=float(speed))
+        assert found.count[0, column] == len(alone)
+        assert found.stable[0, column] == len(alone.stable)
+        assert found.amplitude[0, column].compressed() == pytest.approx([o.amplitude for o in alone.orbits], rel=1e-4)
+        assert found.largest[0, column].compressed() == pytest.approx([o.largest for o in alone.orbits], rel=1e-6)
+    assert found.stable.tolist() == [[1, 2, 1]]
+    assert found.least[0, 1] < 0.03 < 0.1 < found.greatest[0, 1]
+
+
+def test_a_start_ends_where_a_long_run_does(picture: Basins) -> None:
+    """By the solver of runs, 300 turns from starts of each kind, but for those at the limit of assembly."""
+    period = 2.0 * np.pi / SPEED
+    for end in (0, 1):
+        row, column = np.argwhere(picture.ends == end)[3]
+        run = simulate(
+            RIG_1_B,
+            Inputs(speed=SPEED),
+            initial=InitialState(
+                slider_position=float(picture.position[column]), slider_velocity=float(picture.rate[row])
+            ),
+            stop_time=300 * period,
+            samples=[0.0, 300 * period],
+        )
+        last = run["slider.position"][-1], run["slider.velocity"][-1]
+        assert last == pytest.approx(picture.motions[end].start.tolist(), abs=1e-3)
+
+
+def test_ends_add_up(picture: Basins) -> None:
+    assert sum(picture.share(end) for end in (-2, -1, 0, 1)) == pytest.approx(1.0)
+    assert "2 stable motions, 9 x 9 starts" in repr(picture)
+    assert [orbit.amplitude for orbit in picture.motions] == sorted(orbit.amplitude for orbit in picture.motions)
+
+
+def test_what_is_written_and_drawn(picture: Basins, tmp_path: Path) -> None:
+    rows = np.loadtxt(picture.to_csv(tmp_path / "basins.csv"), delimiter=",", skiprows=1)
+    assert rows.shape == (81, 3)
+    assert set(rows[:, 2]) <= {-1.0, 0.0, 1.0, 2.0}
+    axis = plot(picture, title="basins").axes[0]
+    assert axis.get_xlabel() == "slider.position [m]"
+    assert [text.get_text() for text in axis.get_legend().get_texts()][:2] == ["stable motion", "unstable motion"]
+    assert plot(picture.found).axes
+
+
+def test_no_stable_motion_is_a_sentence() -> None:
+    doubled = replace(SETS["rig-2-spring-c"].parameters, slider_damping=0.5)
+    with pytest.raises(InputError, match="no stable motion"):
+        basins(doubled, Drive(speed=1170.0 * RAD_S_PER_RPM), points=2)
+    with pytest.raises(InputError, match=r"range of the rate is 1.* to 0"):
+        basins(RIG_1_B, Drive(speed=SPEED), points=2, rate=(1.0, 0.0))
+    with pytest.raises(InputError, match="axis x"):
+        coexistence(plane(RIG_1_B, Drive(speed=SPEED), "drive.speed", "slider.damping"), [], [1.0])
+
+
+def test_a_chart_with_the_motions_beside(tmp_path: Path) -> None:
+    chart = stability_chart(
+        "rig-1-spring-b", ranges=(("990 rpm", "1010 rpm"), ("10 N.s/m", "12 N.s/m")), points=3, coexisting=True
+    )
+    assert chart.beside is not None
+    assert (chart.beside.stable == 2).all()
+    assert [axis.get_ylabel() for axis in plot(chart).axes][:3] == ["slider.damping [N.s/m]"] * 3
+    assert len(np.loadtxt(chart.beside.to_csv(tmp_path / "motions.csv"), delimiter=",", skiprows=1)) == 9
+
+
+def test_a_chart_finds_the_motions_that_newtons_method_misses() -> None:
+    """At small damping near resonance: 37 of 900 such points had no motion, one of them stable with 13.8 cm."""
+    chart = stability_chart("rig-1-spring-b", ranges=(("1060 rpm", "1090 rpm"), ("2 N.s/m", "3 N.s/m")), points=4)
+    assert chart.grid.largest.count() == 16
+    orbit = orbit_of(replace(RIG_1_B, slider_damping=2.0), Drive(speed="1070 rpm"))
+    assert chart.grid.largest[0, 1] == pytest.approx(orbit.largest, rel=1e-8)
+
+
+def test_the_command(tmp_path: Path) -> None:
+    arguments = [
+        "basins",
+        "--published",
+        "rig-1-spring-b",
+        "--speed",
+        "1000 rpm",
+        "--points",
+        "4",
+        "--out",
+        str(tmp_path),
+    ]
+    done = CliRunner().invoke(main, arguments)
+    assert done.exit_code == 0, done.output
+    assert "two methods found the same motions" in done.output
+    assert "of 16 starts end" in done.output
+    assert sorted(p.name for p in tmp_path.glob("rig*")) == ["rig-1-spring-b-basins.csv", "rig-1-spring-b-basins.png"]
