@@ -236,7 +236,7 @@ def _branches(title: str, response: Any, factor: float, unit: str) -> None:
     for number, branch in enumerate(response.branches, start=1):
         words = [s.value for s in branch.stability()]
         shares = ", ".join(f"{words.count(word) / len(words):.0%} {word}" for word in dict.fromkeys(words))
-        events = [f"{s.kind.value} at {factor * s.parameter:.6g}" for s in branch.special]
+        events = [f"{s.kind.value} at {factor * s.parameter:.6g} ({_form(response.family, s)})" for s in branch.special]
         grid.add_row(
             str(number),
             str(branch.turns),
@@ -247,6 +247,16 @@ def _branches(title: str, response: Any, factor: float, unit: str) -> None:
             "; ".join(events),
         )
     console.print(grid)
+
+
+def _form(family: Any, special: Any) -> str:
+    """Whether stability is lost gently or with a jump."""
+    from ..periodic import OrbitError, normal_form
+
+    try:
+        return normal_form(family, special).words
+    except OrbitError as error:
+        return f"normal form not found: {error.reason}"
 
 
 def _swing(orbit: Any) -> tuple[str, float, str]:

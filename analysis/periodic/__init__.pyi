@@ -42,6 +42,10 @@ from .grids import grid as grid
 from .grids import grid_folder as grid_folder
 from .natural import mean_effective_mass as mean_effective_mass
 from .natural import natural_frequency as natural_frequency
+from .normal_forms import FormRun as FormRun
+from .normal_forms import NormalForm as NormalForm
+from .normal_forms import confirm_form as confirm_form
+from .normal_forms import normal_form as normal_form
 from .orbits import INTEGRATOR_TOLERANCE as INTEGRATOR_TOLERANCE
 from .orbits import ORBIT_TOLERANCE as ORBIT_TOLERANCE
 from .orbits import OrbitAssemblyError as OrbitAssemblyError

@@ -1,0 +1,109 @@
+"""Normal forms: of maps whose coefficients are known, and of branches against runs beside the special points."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from math import sqrt
+
+import numpy as np
+import pytest
+
+from analysis.periodic import (
+    Branch,
+    Crossing,
+    Drive,
+    Family,
+    confirm_form,
+    follow,
+    normal_form,
+    orbit_of,
+)
+from analysis.periodic.normal_forms import Forms, coefficient_of
+from linkwork.errors import InputError
+from linkwork.five_bar.published import RAD_S_PER_RPM, SETS
+
+RPM = RAD_S_PER_RPM
+
+
+def test_period_doubling_of_the_logistic_map() -> None:
+    """x -> r x (1 - x) at r = 3: f''^2/4 + f'''/6 = 9 (Kuznetsov, section 4.5)."""
+    forms = Forms(lambda x: 3.0 * (2.0 / 3.0 + x) * (1.0 / 3.0 - x) - 2.0 / 3.0, np.array([[-1.0]]))
+    assert coefficient_of(forms, Crossing.PERIOD_DOUBLING, -1.0, 1e-3) == pytest.approx(9.0, rel=1e-6)
+
+
+def test_fold_of_a_parabola() -> None:
+    forms = Forms(lambda x: x - 0.7 * x**2 + 3.0 * x**3, np.array([[1.0]]))
+    assert abs(coefficient_of(forms, Crossing.FOLD, 1.0, 1e-3)) == pytest.approx(0.7, rel=1e-6)
+
+
+def delayed(r: float, place: np.ndarray) -> np.ndarray:
+    """The delayed logistic map x -> r x (1 - y), y -> x, from its fixed point 1 - 1/r."""
+    fixed = 1.0 - 1.0 / r
+    x, y = place + fixed
+    return np.array([r * x * (1.0 - y), x]) - fixed
+
+
+def test_torus_of_the_delayed_logistic_map() -> None:
+    """At r = 2 it is supercritical, as the radius of the closed curve beyond it confirms."""
+    multiplier = 0.5 + 0.5j * sqrt(3.0)
+    forms = Forms(lambda x: delayed(2.0, x), np.array([[1.0, -1.0], [1.0, 0.0]]))
+    coefficient = coefficient_of(forms, Crossing.TORUS, multiplier, 1e-3)
+    assert coefficient < 0.0
+    r = 2.001
+    place = np.array([1e-3, 0.0])
+    for _ in range(60_000):
+        place = delayed(r, place)
+    circle = []
+    for _ in range(3000):
+        place = delayed(r, place)
+        circle.append(place)
+    matrix = np.array([[1.0, 1.0 - r], [1.0, 0.0]])
+    value, vectors = np.linalg.eig(matrix)
+    radius = sqrt((abs(value[0]) - 1.0) / -coefficient)
+    # along 2 Re(w q) with |w| the radius
+    q = vectors[:, 0] / np.linalg.norm(vectors[:, 0])
+    greatest = max(np.abs(2.0 * radius * (np.exp(1j * a) * q[1]).real) for a in np.linspace(0.0, 6.283, 400))
+    assert np.abs(np.array(circle)[:, 1]).max() == pytest.approx(greatest, rel=0.05)
+
+
+def branch_of(parameters: object, low: float, high: float) -> Branch:
+    orbit = orbit_of(parameters, Drive(speed=high * RPM))
+    family = Family(parameters=parameters, drive=orbit.drive)
+    return follow(family, orbit, high * RPM, low=low * RPM, high=high * RPM, direction=-1, most_points=700)
+
+
+@pytest.mark.parametrize(
+    ("parameters", "low", "high", "words"),
+    [
+        pytest.param(SETS["rig-1-spring-b"].parameters, 900.0, 1200.0, ["supercritical"], id="rig 1"),
+        pytest.param(
+            replace(SETS["rig-2-spring-c"].parameters, slider_damping=0.5),
+            1150.0,
+            1190.0,
+            ["supercritical", "subcritical"],
+            id="rig 2",
+        ),
+    ],
+)
+def test_a_run_beside_each_period_doubling_does_what_its_normal_form_says(
+    parameters: object, low: float, high: float, words: list[str]
+) -> None:
+    branch = branch_of(parameters, low, high)
+    forms = [normal_form(branch.family, special) for special in branch.special]
+    assert [form.words for form in forms] == words
+    for special, form in zip(branch.special, forms):
+        assert confirm_form(branch.family, special, form).agrees(form)
+
+
+def test_on_which_side_of_a_fold_the_motions_are() -> None:
+    parameters = SETS["rig-1-spring-b"].parameters
+    orbit = orbit_of(parameters, Drive(speed=900.0 * RPM))
+    family = Family(parameters=parameters, drive=orbit.drive)
+    branch = follow(family, orbit, 900.0 * RPM, low=850.0 * RPM, high=1100.0 * RPM, most_points=200)
+    fold = next(s for s in branch.special if s.kind is Crossing.FOLD)
+    form = normal_form(family, fold)
+    # the branch comes from lower speeds and turns back to them
+    assert form.words == "both motions at lower values"
+    assert form.uncertainty < 0.01 * abs(form.coefficient)
+    with pytest.raises(InputError, match="no old motion"):
+        confirm_form(family, fold, form)
