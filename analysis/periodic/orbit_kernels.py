@@ -138,7 +138,7 @@ def _turn(section, source, begin, end, z, room, carry):  # type: ignore[no-untyp
         last = angle + 1.001 * proposed >= end
         h = end - angle if last else proposed
         error = attempt(
-            equation, section.modes, section.p, room.sizes, angle, h, z, k, y, True, 0, source, section.drive
+            equation, section.modes, section.p, room.sizes, 0.0, angle, h, z, k, y, True, 0, source, section.drive
         )
         error /= section.tolerance
         carry[1] += 1.0

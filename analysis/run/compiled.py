@@ -36,6 +36,8 @@ EVENT = 10
 EVENTS_PER_STEP = 4
 #: Fraction of a step within which an event counts as simultaneous with the end of the run or the release.
 SAME = 1e-9
+#: Share of the kinetic energy up to which the residual of the energy balance is taken out of it: a mechanism at rest has none.
+GREATEST_SHARE = 1e-3
 
 # Columns of the events' table
 OUTPUT, LEVEL, DIRECTION, STOPS = range(4)
@@ -67,12 +69,14 @@ class Problem(NamedTuple):
 
 class Watch(NamedTuple):
     """Events: a row each of OUTPUT, LEVEL, DIRECTION, STOPS; address of the function in the place of an output, or 0; last
-    value; and rows of those found: number, time, state."""
+    value; and rows of those found: number, time, state. Where the energy balance is to be kept, the numbers of the outputs
+    that are its residual and the kinetic energy; else none."""
 
     table: NDArray[np.float64]
     addresses: NDArray[np.int64]
     gaps: NDArray[np.float64]
     found: NDArray[np.float64]
+    balance: NDArray[np.int64]
 
 
 class Work(NamedTuple):
@@ -111,7 +115,7 @@ CARRY = np.dtype(
 )
 
 _PROBLEM = types.NamedTuple((ADDRESSES, VECTOR, VECTOR, VECTOR, PLACES, float64, float64, float64, boolean), Problem)
-_WATCH = types.NamedTuple((MATRIX, ADDRESSES, VECTOR, MATRIX), Watch)
+_WATCH = types.NamedTuple((MATRIX, ADDRESSES, VECTOR, MATRIX, ADDRESSES), Watch)
 _CARRIES = from_dtype(CARRY)[::1]
 
 
@@ -160,24 +164,25 @@ def _record(carry, watch, e, t, x):  # type: ignore[no-untyped-def]
 
 
 @inner
-def _inside(s, t, h, x, constant, piece, source, work):  # type: ignore[no-untyped-def]
-    """Write state and inputs at the fraction s of a step from x at t into ``work.dense`` and ``work.inside``."""
+def _inside(s, h, x, constant, piece, source, work, carry):  # type: ignore[no-untyped-def]
+    """Write state and inputs at the fraction s of a step from x into ``work.dense`` and ``work.inside``."""
     interpolate(s, x, work.f, work.dense)
     if constant:
         _copy(work.held, work.inside)
     else:
-        channels_at(t + s * h, piece, work.dense, source, work.inside)
+        channels_at(carry.begin, carry.elapsed + s * h, piece, work.dense, source, work.inside)
 
 
 @inner
-def _locate(e, low, high, t, h, x, constant, piece, problem, source, watch, work):  # type: ignore[no-untyped-def]
+def _locate(e, low, high, h, x, constant, piece, problem, source, watch, work, carry):  # type: ignore[no-untyped-def]
     """Fraction of the step at which e happens, by bisection of the interpolant between two fractions."""
     positive = False
     for n in range(55):
         s = low if n == 0 else 0.5 * (low + high)
-        _inside(s, t, h, x, constant, piece, source, work)
+        _inside(s, h, x, constant, piece, source, work, carry)
         # a NaN, beyond the limit of assembly, compares as not positive
-        sign = _gap(e, t + s * h, work.dense, work.inside, problem, source, watch, work.outputs) > 0.0
+        t = carry.begin + (carry.elapsed + s * h)
+        sign = _gap(e, t, work.dense, work.inside, problem, source, watch, work.outputs) > 0.0
         if n == 0:
             positive = sign
         elif sign == positive:
@@ -189,7 +194,7 @@ def _locate(e, low, high, t, h, x, constant, piece, problem, source, watch, work
 
 
 @inner
-def _events_of_step(t, h, x, constant, piece, problem, source, watch, work, carry, cut):  # type: ignore[no-untyped-def]
+def _events_of_step(h, x, constant, piece, problem, source, watch, work, carry, cut):  # type: ignore[no-untyped-def]
     """Record the user's events inside a step, by fractions of it; returns what stops it first, and where.
 
     ``cut`` is what cuts the step short already, and where.
@@ -199,13 +204,14 @@ def _events_of_step(t, h, x, constant, piece, problem, source, watch, work, carr
         for quarter in range(EVENTS_PER_STEP):
             s0 = quarter / EVENTS_PER_STEP
             s1 = (quarter + 1) / EVENTS_PER_STEP
+            t = carry.begin + (carry.elapsed + s1 * h)
             if s1 == 1.0:
-                gap = _gap(e, t + h, work.y, work.held, problem, source, watch, work.outputs)
+                gap = _gap(e, t, work.y, work.held, problem, source, watch, work.outputs)
             else:
-                _inside(s1, t, h, x, constant, piece, source, work)
-                gap = _gap(e, t + s1 * h, work.dense, work.inside, problem, source, watch, work.outputs)
+                _inside(s1, h, x, constant, piece, source, work, carry)
+                gap = _gap(e, t, work.dense, work.inside, problem, source, watch, work.outputs)
             if _crosses(watch.gaps[e], gap, watch.table[e, DIRECTION]):
-                s = _locate(e, s0, s1, t, h, x, constant, piece, problem, source, watch, work)
+                s = _locate(e, s0, s1, h, x, constant, piece, problem, source, watch, work, carry)
                 interpolate(s, x, work.f, work.dense)
                 _record(carry, watch, e, s, work.dense)
                 if watch.table[e, STOPS] != 0.0 and s < first:
@@ -233,7 +239,7 @@ def _begin_interval(stop, piece, problem, source, watch, work, carry, x, samples
     law = source.law
     if law[2] != 0.0 and x[source.law_places[1]] >= law[1]:
         law[2] = 0.0
-    channels_at(t, piece, x, source, held)
+    channels_at(t, 0.0, piece, x, source, held)
     lost = _not_finite(held)
     if problem.hold > 0.0 and lost < 0:
         hold(t, stop if t < problem.end else t + problem.hold, x, source, problem.commands, held, work.ahead)
@@ -281,20 +287,31 @@ def _not_finite(u):  # type: ignore[no-untyped-def]
 
 
 @inner
-def _refused(t, h, piece, constant, problem, source, work, carry, x):  # type: ignore[no-untyped-def]
+def _refused(h, piece, constant, problem, source, work, carry, x):  # type: ignore[no-untyped-def]
     """Status of a run whose step has become impossibly short."""
     status = LIMIT if abs(_clearance(problem, x, work.held, work.outputs)) < NEAR_LIMIT else NO_STEP
     if not constant:
         # an input may be what stops it
         for i in range(x.shape[0]):
             work.z[i] = x[i] + h * work.k[0, i]
-        channels_at(t + h, piece, work.z, source, work.inside)
+        channels_at(carry.begin, carry.elapsed + h, piece, work.z, source, work.inside)
         lost = _not_finite(work.inside)
         if lost >= 0:
             carry.lost = lost
             status = BAD_INPUT
-        channels_at(t, piece, x, source, work.held)
+        channels_at(carry.begin, carry.elapsed, piece, x, source, work.held)
     return status
+
+
+@inner
+def _keep_balance(y, held, problem, watch, work):  # type: ignore[no-untyped-def]
+    """Scale the rates of a state so that the energy balance is closed, but where it is nearly at rest."""
+    evaluate(problem.equations[OUTPUTS], 0.0, y, problem.modes, held, problem.p, work.outputs)
+    share = work.outputs[watch.balance[0]] / work.outputs[watch.balance[1]]
+    if abs(share) < GREATEST_SHARE:
+        freedoms = y.shape[0] // 2 - 1
+        for i in range(freedoms, 2 * freedoms):
+            y[i] *= np.sqrt(1.0 - share)
 
 
 @inner
@@ -305,25 +322,26 @@ def _released(y, problem, source):  # type: ignore[no-untyped-def]
 
 
 @inner
-def _cut_of_step(clearance, t, h, x, constant, piece, problem, source, watch, work, carry):  # type: ignore[no-untyped-def]
+def _cut_of_step(clearance, h, x, constant, piece, problem, source, watch, work, carry):  # type: ignore[no-untyped-def]
     """What cuts a good step short, and at which fraction of it; makes the interpolant and records the events."""
     _copy(work.held, work.inside)
     for s in range(13, 16):
         stage(s, x, work.k, h, work.z)
         if not constant:
-            channels_at(t + NODES[s] * h, piece, work.z, source, work.inside)
+            channels_at(carry.begin, carry.elapsed + NODES[s] * h, piece, work.z, source, work.inside)
+        t = carry.begin + (carry.elapsed + NODES[s] * h)
         evaluate(problem.equations[DERIVATIVE], t, work.z, problem.modes, work.inside, problem.p, work.k[s])
     carry.evaluations += 3
     interpolant(x, work.y, work.k, h, work.f)
     what, cut = NOTHING, 2.0
     if clearance < LIMIT_SINE:
         what = ASSEMBLY
-        cut = _locate(ASSEMBLY, 0.0, 1.0, t, h, x, constant, piece, problem, source, watch, work)
+        cut = _locate(ASSEMBLY, 0.0, 1.0, h, x, constant, piece, problem, source, watch, work, carry)
     if _released(work.y, problem, source):
-        s = _locate(RELEASE, 0.0, 1.0, t, h, x, constant, piece, problem, source, watch, work)
+        s = _locate(RELEASE, 0.0, 1.0, h, x, constant, piece, problem, source, watch, work, carry)
         if s < cut:
             what, cut = RELEASE, s
-    return _events_of_step(t, h, x, constant, piece, problem, source, watch, work, carry, (what, cut))
+    return _events_of_step(h, x, constant, piece, problem, source, watch, work, carry, (what, cut))
 
 
 @inner
@@ -347,7 +365,7 @@ def _end_at(what, cut, t_new, h, x, constant, piece, problem, source, watch, wor
     if what == RELEASE:
         x[source.law_places[1]] = source.law[1]
     if not constant:
-        channels_at(t_new, piece, x, source, work.held)
+        channels_at(carry.begin, carry.elapsed + cut * h, piece, x, source, work.held)
     for e in range(watch.table.shape[0]):
         watch.gaps[e] = _gap(e, t_new, x, work.held, problem, source, watch, work.outputs)
     status = RUNNING if what == RELEASE else LIMIT if what == ASSEMBLY else EVENT
@@ -374,7 +392,7 @@ def _sample_step(t_new, h, x, constant, piece, source, work, carry, samples, sta
         if constant:
             _copy(work.held, forces[n])
         else:
-            channels_at(samples[n], piece, states[n], source, forces[n])
+            channels_at(carry.begin, samples[n] - carry.begin, piece, states[n], source, forces[n])
         carry.sample += 1
 
 
@@ -402,17 +420,17 @@ def _cross_interval(stop, piece, problem, source, watch, work, carry, x, samples
             carry.midway = 1
             if not constant:
                 # after a step that was refused they are those of one of its stages
-                channels_at(carry.begin + carry.elapsed, piece, x, source, held)
+                channels_at(carry.begin, carry.elapsed, piece, x, source, held)
             return RUNNING
-        t = carry.begin + carry.elapsed
         remaining = (stop - carry.begin) - carry.elapsed
         last = carry.step >= remaining * (1.0 - 1e-10)
         h = remaining if last else min(carry.step, 0.5 * remaining)
         carry.steps += 1
         carry.evaluations += STAGES - 1
         error = attempt(
-            derivative, problem.modes, problem.p, problem.scale, t, h, x, k, y, constant, piece, source, held
-        )
+            derivative, problem.modes, problem.p, problem.scale, carry.begin, carry.elapsed, h, x, k, y, constant, piece,
+            source, held,
+        )  # fmt: skip
         error /= problem.tolerance
         good = error <= 1.0
         t_new = stop if last else carry.begin + (carry.elapsed + h)
@@ -420,7 +438,9 @@ def _cross_interval(stop, piece, problem, source, watch, work, carry, x, samples
         clearance, inside = 0.0, False
         if good:
             if not constant:
-                channels_at(t_new, piece, y, source, held)
+                channels_at(carry.begin, carry.elapsed + h, piece, y, source, held)
+            if watch.balance.shape[0] > 0:
+                _keep_balance(y, held, problem, watch, work)
             clearance = _clearance(problem, y, held, work.outputs)
             inside = (
                 clearance < LIMIT_SINE
@@ -438,14 +458,14 @@ def _cross_interval(stop, piece, problem, source, watch, work, carry, x, samples
         if not good:
             carry.rejected += 1
             carry.step = shorter(h, error)
-            if not carry.step >= LEAST_STEP * max(abs(t), problem.end - samples[0]):
-                return _refused(t, h, piece, constant, problem, source, work, carry, x)
+            if not carry.step >= LEAST_STEP * (problem.end - samples[0]):
+                return _refused(h, piece, constant, problem, source, work, carry, x)
             continue
         carry.step = following(h, carry.step, error)
         before = carry.found
         what, cut = NOTHING, 2.0
         if inside:
-            what, cut = _cut_of_step(clearance, t, h, x, constant, piece, problem, source, watch, work, carry)
+            what, cut = _cut_of_step(clearance, h, x, constant, piece, problem, source, watch, work, carry)
         _settle_events(before, cut, carry.elapsed, h, watch, carry)
         if what != NOTHING:
             t_new = carry.begin + (carry.elapsed + cut * h)
@@ -578,7 +598,7 @@ def channels_of_many(t, source, batch, starts, u):  # type: ignore[no-untyped-de
     """Write the channels of each run of a batch at time t and at its state into the rows of u."""
     for i in range(starts.shape[0]):
         own = _own(i, source, batch)
-        channels_at(t, find(t, own.breaks), starts[i], own, u[i])
+        channels_at(t, 0.0, find(t, own.breaks), starts[i], own, u[i])
 
 
 @kernel(
@@ -593,7 +613,8 @@ def run_many(  # type: ignore[no-untyped-def]
 
     After ``budget`` steps over all of them it returns; called again with what it left behind it goes on.
     """
-    watch = Watch(np.empty((0, 4)), np.empty(0, dtype=np.int64), np.empty(0), np.empty((0, 2 + starts.shape[1])))
+    none = np.empty(0, dtype=np.int64)
+    watch = Watch(np.empty((0, 4)), none, np.empty(0), np.empty((0, 2 + starts.shape[1])), none)
     work = _work(starts.shape[1], outputs, forces.shape[2])
     for i in range(starts.shape[0]):
         before = carries[i].steps

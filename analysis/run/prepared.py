@@ -9,9 +9,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from linkwork.errors import InputError
 from linkwork.mechanism import Mechanism
 
 from ..mechanisms import InitialState, Parameters, mechanism_of
+from .angles import WholeTurns
 from .equations import OUTPUTS, machine
 from .events import Event, RunInterrupted, interruptible, shown
 from .inputs import Encoded, Inputs, NotFiniteError, align, compile_function, compiled_source, encode, given, sample
@@ -113,27 +115,36 @@ class Run:
         from . import compiled as k
 
         where = self.mechanism.where(x.tolist())
+        # a microsecond, at any time
+        at = f"{t:.9g}" if abs(t) < 1e3 else f"{t:.6f}"
         if status == k.LIMIT:
-            return 3, f"limit of assembly at t = {t:.9g} s, {where}"
+            return 3, f"limit of assembly at t = {at} s, {where}"
         if status == k.NO_STEP:
-            return 4, f"the step size fell below what t = {t:.9g} s can resolve, {where}"
+            return 4, f"the step size fell below what t = {at} s can resolve, {where}"
         if status == k.RUNNING:
-            return 4, f"{self.settings.max_steps} steps did not suffice: stopped at t = {t:.9g} s, {where}"
+            return 4, f"{self.settings.max_steps} steps did not suffice: stopped at t = {at} s, {where}"
         return 0, ""
 
     def lost(self, channel: int, t: float, x: NDArray[np.float64]) -> NotFiniteError:
         """The error of an input that is not finite, by the number of its channel."""
         return NotFiniteError(self.encoded, channel, t, x)
 
-    def compiled(self, progress: bool) -> Trajectory:
-        """Solve it with the compiled solver."""
+    def compiled(self, progress: bool, balanced: bool = False) -> Trajectory:
+        """Solve it with the compiled solver; ``balanced`` brings each step back to the balance of energy.
+
+        Raises
+        ------
+        InputError
+            As `start`; or if the balance cannot be kept.
+        """
         from . import compiled as k
 
         begun = clock.perf_counter()
-        start = self.start()
+        turns = WholeTurns(self)
+        start = turns.from_start(self.start())
         problem = self.problem(start)
         source, kept = compiled_source(self.encoded)
-        watch, watching = self._watch()
+        watch, watching = self._watch(self._balance() if balanced else ())
         kept += watching
         times, size = self.settings.times, self.mechanism.size
         inputs = len(self.mechanism.channels)
@@ -154,30 +165,34 @@ class Run:
                         len(self.mechanism.output_names), until,
                     )  # fmt: skip
                     integrating += clock.perf_counter() - entered
-                    occurrences += watch.found[: carry["found"]].tolist()
+                    found = watch.found[: carry["found"]]
+                    found[:, 2:] += turns.taken
+                    occurrences += found.tolist()
                     carry["found"] = 0
                     show(carry["begin"] + carry["elapsed"] - times[0])
+                    if status == k.RUNNING:
+                        turns.take(x, held, source.law, int(carry["sample"]), watch)
             except KeyboardInterrupt:  # raised by the caller's code
                 interrupted.append(True)
         t = float(carry["begin"] + carry["elapsed"])
         if status == k.BAD_INPUT:
-            raise self.lost(int(carry["lost"]), t, x)
+            raise self.lost(int(carry["lost"]), t, x + turns.taken)
         done = int(carry["sample"])
         times, states, forces = times[:done], states[:done], forces[:done]
         if carry["started"] and times[-1] < t:
             # the run ended between two samples: its last configuration is recorded too
             times, states, forces = np.append(times, t), np.vstack([states, x]), np.vstack([forces, held])
-        code, message = self.verdict(status, t, x)
+        code, message = self.verdict(status, t, x + turns.taken)
         trajectory = Trajectory(
             time=times,
-            values=outputs_of(self.mechanism, problem.modes, problem.p, states, forces),
+            values=turns.put_back(outputs_of(self.mechanism, problem.modes, problem.p, states, forces)),
             status=code,
             message=message,
             events=tuple(
                 Occurrence(self.events[int(row[0])].name, row[1], tuple(row[2:-2]))
                 for row in sorted(occurrences, key=lambda row: row[1])
             ),
-            source="compiled DOP853",
+            source="compiled DOP853" + balanced * ", energy balanced",
             parameters=self.parameters,
             names=self.mechanism.output_names,
             statistics={
@@ -192,8 +207,24 @@ class Run:
             raise RunInterrupted(trajectory)
         return trajectory
 
-    def _watch(self) -> tuple[Any, list[Any]]:
-        """The events as the compiled code reads them, and what has to stay alive meanwhile."""
+    def _balance(self) -> tuple[int, int]:
+        """Numbers of the outputs that are the residual of the energy balance and the kinetic energy."""
+        names, inputs = self.mechanism.output_names, self.inputs or Inputs()
+        commanded = [self.encoded.value_name(channel) for channel in self.encoded.commands[:, 0].tolist()]
+        moved = [name for name in commanded if inputs.parts(name)]
+        if moved:
+            raise InputError(
+                f"method 'balanced' changes the rates of all freedoms, but {', '.join(moved)} is commanded: choose 'compiled'"
+            )
+        for name in (wanted := ("energy.residual", "energy.kinetic")):
+            if name not in names:
+                raise InputError(
+                    f"method 'balanced' needs the output {name}, which a {self.mechanism.name} does not have"
+                )
+        return names.index(wanted[0]), names.index(wanted[1])
+
+    def _watch(self, balance: tuple[int, ...]) -> tuple[Any, list[Any]]:
+        """Events and balance as the compiled code reads them, and what has to stay alive meanwhile."""
         from .compiled import Watch
 
         n = len(self.events)
@@ -205,7 +236,8 @@ class Run:
             else:
                 kept.append(compile_function(event.function, len(self.mechanism.freedoms)))
                 addresses[i] = kept[-1].address
-        return Watch(table, addresses, np.zeros(n), np.empty((EVENTS_PER_CALL * n, 2 + self.mechanism.size))), kept
+        found = np.empty((EVENTS_PER_CALL * n, 2 + self.mechanism.size))
+        return Watch(table, addresses, np.zeros(n), found, np.array(balance, dtype=np.int64)), kept
 
 
 def outputs_of(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import isfinite
+from math import isfinite, ulp
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -44,6 +44,11 @@ def sample_times(stop_time: Amount, step: Amount, start_time: Amount = 0.0) -> N
         raise InputError(f"step is {step} s: it must be a finite number greater than zero")
     if not (isfinite(stop_time) and isfinite(start_time) and stop_time > start_time):
         raise InputError(f"a run from {start_time} s to {stop_time} s: it must end after it starts")
+    apart = ulp(max(abs(start_time), abs(stop_time)))
+    if step < apart:
+        raise InputError(
+            f"step is {step} s, but floating-point times near {stop_time:g} s are {apart:.3g} s apart: it must be greater"
+        )
     ratio = (stop_time - start_time) / step
     if not ratio <= (most := limit("SAMPLES", _SAMPLES)):
         raise InputError(
@@ -102,8 +107,9 @@ def simulate(
         Sample and hold the inputs at multiples of this step (s), as a co-simulation master does; the crank speed then
         goes along the secant between two samples. Must be the sampling step of the recorded times.
     method : str or OdeSolver class
-        ``compiled`` (DOP853 under Numba, the default), one of SciPy's (``RK23 RK45 DOP853 Radau BDF LSODA``), ``Hamming``
-        (the thesis's predictor-corrector), or a class of your own.
+        ``compiled`` (DOP853 under Numba, the default), ``balanced`` (the same, each step brought back to the balance of
+        energy by its rates, for long runs without commanded speeds), one of SciPy's (``RK23 RK45 DOP853 Radau BDF LSODA``),
+        ``Hamming`` (the thesis's predictor-corrector), or a class of your own.
     tolerance : float
         Bound of the local error relative to state and size of the mechanism.
     events : sequence of Event
@@ -141,10 +147,10 @@ def simulate(
         samples = sample_times(*usual_times(parameters, inputs, stop_time, step), start_time)
     times = np.asarray(samples, float)
     run = Run(parameters, inputs, initial, settings_of(times, hold, tolerance, max_steps), tuple(events))
-    if method == "compiled":
+    if method in ("compiled", "balanced"):
         if options:
-            raise InputError(f"the compiled method takes no options, but was given {', '.join(options)}")
-        return run.compiled(progress)
+            raise InputError(f"the {method} method takes no options, but was given {', '.join(options)}")
+        return run.compiled(progress, method == "balanced")
     from .march import solve
 
     return solve(run, _solver(method), options, progress)
@@ -173,7 +179,7 @@ def _solver(method: str | type[OdeSolver]) -> str | type[OdeSolver]:
 
             return Hamming
         if method not in SCIPY_METHODS:
-            raise unknown_name(method, ("compiled", "Hamming", *SCIPY_METHODS), f"method {method!r}")
+            raise unknown_name(method, ("compiled", "balanced", "Hamming", *SCIPY_METHODS), f"method {method!r}")
     return method
 
 

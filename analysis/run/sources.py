@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import cos, sin
+from math import cos, pi, sin
 from typing import NamedTuple
 
 import numpy as np
@@ -50,9 +50,13 @@ def _find_before(t, breaks):  # type: ignore[no-untyped-def]
 
 
 @inner
-def channels_at(t, piece, x, source, u):  # type: ignore[no-untyped-def]
-    """Write the channels at time t and state x, on a given piece of the polynomials, into u."""
-    s = t - source.breaks[piece]
+def channels_at(begin, elapsed, piece, x, source, u):  # type: ignore[no-untyped-def]
+    """Write the channels at state x, on a given piece of the polynomials, into u.
+
+    The time is the sum of ``begin`` and ``elapsed``, which is not formed: far from zero it would be rounded so much that an
+    integrator takes the steps of the rounding for those of the input.
+    """
+    s = (begin - source.breaks[piece]) + elapsed
     for n in range(source.places.shape[0]):
         c = source.coefficients[piece, n]
         value, rate = source.places[n]
@@ -62,7 +66,9 @@ def channels_at(t, piece, x, source, u):  # type: ignore[no-untyped-def]
     harmonics = source.harmonics
     for k in range(harmonics.shape[0]):
         value, rate = source.places[int(harmonics[k, 0])]
-        phase = harmonics[k, 2] * t + harmonics[k, 3]
+        phase = harmonics[k, 2] * begin + harmonics[k, 3]
+        phase -= 2.0 * pi * int(phase / (2.0 * pi))
+        phase += harmonics[k, 2] * elapsed
         u[value] += harmonics[k, 1] * cos(phase)
         if rate >= 0:
             u[rate] -= harmonics[k, 1] * harmonics[k, 2] * sin(phase)
@@ -77,9 +83,9 @@ def channels_at(t, piece, x, source, u):  # type: ignore[no-untyped-def]
     for n in range(source.functions.shape[0]):
         function, of_rate = source.functions[n]
         if function != 0:
-            u[source.places[n, 0]] += call_user(function, t, x)
+            u[source.places[n, 0]] += call_user(function, begin + elapsed, x)
         if of_rate != 0:
-            u[source.places[n, 1]] += call_user(of_rate, t, x)
+            u[source.places[n, 1]] += call_user(of_rate, begin + elapsed, x)
 
 
 @inner
@@ -99,7 +105,7 @@ def channels(t, ahead, left, x, source, commands, u, there):  # type: ignore[no-
 
     Where ``ahead`` is later than t they are held until then: `hold`; ``there`` is room for channels.
     """
-    channels_at(t, _find_before(t, source.breaks) if left else find(t, source.breaks), x, source, u)
+    channels_at(t, 0.0, _find_before(t, source.breaks) if left else find(t, source.breaks), x, source, u)
     if ahead > t:
         hold(t, ahead, x, source, commands, u, there)
 
@@ -115,7 +121,7 @@ def hold(t, ahead, x, source, commands, u, there):  # type: ignore[no-untyped-de
         channel, coordinate, speed = source.law_places
         u[channel] += _held_bar(source.law, x[coordinate], x[speed], ahead - t)
     if commands.shape[0] > 0:
-        channels_at(ahead, _find_before(ahead, source.breaks), x, source, there)
+        channels_at(ahead, 0.0, _find_before(ahead, source.breaks), x, source, there)
         for n in range(commands.shape[0]):
             value, rate = commands[n, 0], commands[n, 2]
             u[rate] = (there[value] - u[value]) / (ahead - t)

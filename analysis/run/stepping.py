@@ -40,8 +40,8 @@ def stage(s, x, k, h, y):  # type: ignore[no-untyped-def]
 
 
 @inner
-def attempt(equation, modes, p, scale, t, h, x, k, y, constant, piece, source, u):  # type: ignore[no-untyped-def]
-    """A step of size h from x at t, into y, whose rates at the start are k[0]; its error relative to ``scale``.
+def attempt(equation, modes, p, scale, begin, elapsed, h, x, k, y, constant, piece, source, u):  # type: ignore[no-untyped-def]
+    """A step of size h from x at ``begin + elapsed``, into y, its rates at the start k[0]; its error relative to ``scale``.
 
     ``equation`` is the address of the right-hand side, ``u`` what acts; where it is not ``constant`` it is sampled at each
     stage.
@@ -49,8 +49,8 @@ def attempt(equation, modes, p, scale, t, h, x, k, y, constant, piece, source, u
     for s in range(1, STAGES):
         stage(s, x, k, h, y)
         if not constant:
-            channels_at(t + NODES[s] * h, piece, y, source, u)
-        evaluate(equation, t + NODES[s] * h, y, modes, u, p, k[s])
+            channels_at(begin, elapsed + NODES[s] * h, piece, y, source, u)
+        evaluate(equation, begin + (elapsed + NODES[s] * h), y, modes, u, p, k[s])
     stage(STAGES, x, k, h, y)
     return _local_error(x, y, k, h, scale)
 

@@ -1,0 +1,90 @@
+"""Angles of long runs: whole turns are taken off the state, counted, and put back into what is reported.
+
+An angle of 1e9 turns is rounded to 1e-6 rad. An integrator that sees it takes the rounding for the motion, and its tolerance,
+which is relative to the state, for one of whole turns.
+"""
+
+from __future__ import annotations
+
+from itertools import chain
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .inputs import sample
+
+if TYPE_CHECKING:
+    from .prepared import Run, Start
+
+#: Turns that are taken off at a time. A power of two: the product with the period is exact, and so the count; a groove whose
+#: ratio is a fraction over a power of two is in the same place again.
+TURNS = 1024
+
+
+class WholeTurns:
+    """The turns taken off the angles of a run so far; none where an input or an event depends on the angle itself."""
+
+    def __init__(self, run: Run) -> None:
+        mechanism = run.mechanism
+        self.taken = np.zeros(mechanism.size)
+        self._run = run
+        self._way = np.zeros(mechanism.size)
+        self._way[: len(mechanism.freedoms)] = [TURNS * freedom.period for freedom in mechanism.freedoms]
+        #: the outputs that are the coordinates
+        self._columns = [mechanism.output_names.index(freedom.coordinate) for freedom in mechanism.freedoms]
+        functions = (*chain.from_iterable(run.encoded.functions), *(event.function for event in run.events))
+        self._never = any(functions) or not self._way.any()
+        #: from which sample on how much is taken off
+        self._since: list[tuple[int, NDArray[np.float64]]] = []
+
+    def from_start(self, start: Start) -> Start:
+        """The start of the run, with few turns."""
+        run, x = self._run, start.x.copy()
+        if not self._too_many(x):
+            return start
+        u = sample(run.encoded, float(run.settings.times[0]), x, run.encoded.law)
+        self.take(x, u, run.encoded.law, 0)
+        # the balance of energy begins with the angle as it is now
+        return type(start)(x, run.mechanism.equations.energy(tuple(x.tolist()), run.p), start.scale)
+
+    def take(
+        self, x: NDArray[np.float64], u: NDArray[np.float64], law: NDArray[np.float64], first: int, watch: Any = None
+    ) -> None:
+        """Take turns off the state x, if they are many; ``first`` is the number of the next sample."""
+        if not self._too_many(x) or law[2] != 0.0:
+            return
+        less = np.fmod(x, self._way, out=x.copy(), where=self._way > 0.0)
+        if not self._repeats(less, u):
+            self._never = True
+            return
+        off = x - less
+        x[:] = less
+        self.taken += off
+        self._since.append((first, off))
+        if watch is not None:
+            for column, angle in zip(self._columns, off):
+                # columns of the table of events: output, level
+                watch.table[(watch.table[:, 0] == column), 1] -= angle
+
+    def put_back(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """The outputs at the samples, with all turns."""
+        for first, off in self._since:
+            values[first:, self._columns] += off[: len(self._columns)]
+        return values
+
+    def _too_many(self, x: NDArray[np.float64]) -> bool:
+        return not self._never and bool(np.any((np.abs(x) > self._way) & (self._way > 0.0)))
+
+    def _repeats(self, x: NDArray[np.float64], u: NDArray[np.float64]) -> bool:
+        """Whether the mechanism does the same so many turns on: one with a groove may not."""
+        equations, p, acting = self._run.mechanism.equations, self._run.p, self._run.applied(u)
+
+        def seen(y: NDArray[np.float64]) -> NDArray[np.float64]:
+            state = tuple(y.tolist())
+            values = np.array(equations.outputs(state, acting, 0.0, p))
+            values[self._columns] = 0.0
+            return np.append(values, equations.derivative(state, acting, p))
+
+        here = seen(x)
+        return bool(np.allclose(seen(x + self._way), here, rtol=1e-7, atol=1e-9 * float(np.abs(here).max())))
