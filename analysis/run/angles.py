@@ -17,8 +17,8 @@ from .inputs import sample
 if TYPE_CHECKING:
     from .prepared import Run, Start
 
-#: Turns that are taken off at a time. A power of two: the product with the period is exact, and so the count; a groove whose
-#: ratio is a fraction over a power of two is in the same place again.
+#: Turns from which on they are taken off: all, or where a mechanism is not the same after any number of turns, such as one with
+#: a groove, multiples of these. A power of two, as the denominators of most ratios of a groove are.
 TURNS = 1024
 
 
@@ -30,7 +30,7 @@ class WholeTurns:
         self.taken = np.zeros(mechanism.size)
         self._run = run
         self._way = np.zeros(mechanism.size)
-        self._way[: len(mechanism.freedoms)] = [TURNS * freedom.period for freedom in mechanism.freedoms]
+        self._way[: len(mechanism.freedoms)] = [freedom.period for freedom in mechanism.freedoms]
         #: the outputs that are the coordinates
         self._columns = [mechanism.output_names.index(freedom.coordinate) for freedom in mechanism.freedoms]
         functions = (*chain.from_iterable(run.encoded.functions), *(event.function for event in run.events))
@@ -54,8 +54,11 @@ class WholeTurns:
         """Take turns off the state x, if they are many; ``first`` is the number of the next sample."""
         if not self._too_many(x) or law[2] != 0.0:
             return
-        less = np.fmod(x, self._way, out=x.copy(), where=self._way > 0.0)
-        if not self._repeats(less, u):
+        for way in (self._way, TURNS * self._way):
+            less = np.fmod(x, way, out=x.copy(), where=way > 0.0)
+            if self._repeats(less, u, way):
+                break
+        else:
             self._never = True
             return
         off = x - less
@@ -74,10 +77,10 @@ class WholeTurns:
         return values
 
     def _too_many(self, x: NDArray[np.float64]) -> bool:
-        return not self._never and bool(np.any((np.abs(x) > self._way) & (self._way > 0.0)))
+        return not self._never and bool(np.any((np.abs(x) > TURNS * self._way) & (self._way > 0.0)))
 
-    def _repeats(self, x: NDArray[np.float64], u: NDArray[np.float64]) -> bool:
-        """Whether the mechanism does the same so many turns on: one with a groove may not."""
+    def _repeats(self, x: NDArray[np.float64], u: NDArray[np.float64], way: NDArray[np.float64]) -> bool:
+        """Whether the mechanism does the same after the way as at x."""
         equations, p, acting = self._run.mechanism.equations, self._run.p, self._run.applied(u)
 
         def seen(y: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -87,4 +90,4 @@ class WholeTurns:
             return np.append(values, equations.derivative(state, acting, p))
 
         here = seen(x)
-        return bool(np.allclose(seen(x + self._way), here, rtol=1e-7, atol=1e-9 * float(np.abs(here).max())))
+        return bool(np.allclose(seen(x + way), here, rtol=1e-7, atol=1e-9 * float(np.abs(here).max())))

@@ -228,7 +228,7 @@ class Plant:
         Raises
         ------
         StepError
-            If ``step`` is not positive or ``time`` is not where the plant is.
+            If ``step`` is not positive or too short for ``time`` to move, or ``time`` is not where the plant is.
         InputError
             If an input is not finite.
         AssemblyError
@@ -240,6 +240,8 @@ class Plant:
             raise StepError(f"a step of {step} s from t = {time} s: both must be finite numbers")
         if step <= 0.0:
             raise StepError(f"a step of {step:.9g} s at t = {time:.9g} s: it must be greater than zero")
+        if time + step == time:
+            raise StepError(f"a step of {step:.9g} s at t = {time:.9g} s: it is lost in the rounding of the time")
         # what rounding in the master's own sum of steps can make, and no more: a repeated step of a microsecond is refused
         slack = min(1e-6 * step, 1e-9) + 8.0 * ulp(max(abs(time), abs(self.time)))
         if abs(time - self.time) > slack:

@@ -384,7 +384,7 @@ static Reason check_step(const Plant *a, double time, double step, char sentence
     double greater = fmax(fabs(time), fabs(a->time));
     double slack = fmin(1e-6 * step, 1e-9) + 8.0 * (nextafter(greater, INFINITY) - greater);
     bool numbers = isfinite(time) && isfinite(step);
-    if (numbers && step > 0.0 && fabs(time - a->time) <= slack) return GOOD;
+    if (numbers && step > 0.0 && time + step != time && fabs(time - a->time) <= slack) return GOOD;
     Digits at, of, own;
     digits(at, time);
     digits(of, step);
@@ -392,6 +392,8 @@ static Reason check_step(const Plant *a, double time, double step, char sentence
         snprintf(sentence, SENTENCE, "a step of %s s from t = %s s: both must be finite numbers", of, at);
     else if (step <= 0.0)
         snprintf(sentence, SENTENCE, "a step of %s s at t = %s s: it must be greater than zero", of, at);
+    else if (time + step == time)
+        snprintf(sentence, SENTENCE, "a step of %s s at t = %s s: it is lost in the rounding of the time", of, at);
     else
         snprintf(sentence, SENTENCE, "a step %s: it starts at t = %s s, but the state is at t = %s s",
                  time < a->time ? "backwards" : "over a gap", at, digits(own, a->time));

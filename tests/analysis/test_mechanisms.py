@@ -34,7 +34,7 @@ from analysis.linear import (
 )
 from analysis.mechanisms import FIVE_BAR, MECHANISMS, SLIDER_CRANK, MechanismError, check, register
 from analysis.run import InductionMotor, expressions, simulate_many
-from linkwork.errors import LinkworkError
+from linkwork.errors import InputError, LinkworkError
 from linkwork.five_bar.published import TABLE_3_1
 from linkwork.mechanism import Mechanism
 from linkwork.plant import Plant
@@ -185,8 +185,6 @@ def test_parameters_and_states_are_named_after_the_interface() -> None:
 
 
 def test_inputs_of_another_mechanism_are_refused() -> None:
-    from linkwork.errors import InputError
-
     with pytest.raises(InputError, match="a pendulum has no input 'force': its inputs are torque"):
         simulate(demo(PENDULUM).parameters, Inputs(force=1.0), stop_time=0.1)
 
@@ -455,3 +453,8 @@ def test_ensemble_of_inputs_that_differ_in_kind() -> None:
         found = simulate_many([p, p], [(driven, plain)[n] for n in order], stop_time=0.5, step=0.01)
         for run, n in zip(found, order):
             np.testing.assert_array_equal(run.values, alone[n].values)
+
+
+def test_a_balance_without_kinetic_energy_is_refused() -> None:
+    with pytest.raises(InputError, match=r"needs the output energy\.kinetic, which a pendulum does not have"):
+        simulate(demo(PENDULUM).parameters, initial=demo(PENDULUM).initial, stop_time=0.1, step=0.1, method="balanced")

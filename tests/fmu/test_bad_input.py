@@ -157,6 +157,7 @@ BAD_STEPS = {
     "not a number": (0.01, NAN, 1, "a step of nan s from t = 0.01 s: both must be finite numbers"),
     "infinite": (0.01, INF, 1, "a step of inf s from t = 0.01 s: both must be finite numbers"),
     "from nowhen": (NAN, 1e-3, 1, "a step of 0.001 s from t = nan s: both must be finite numbers"),
+    "lost": (0.01, 1e-19, 1, "a step of 1e-19 s at t = 0.01 s: it is lost in the rounding of the time"),
     "backwards": (0.009, 1e-3, 1, "a step backwards: it starts at t = 0.009 s, but the state is at t = 0.01 s"),
     "over a gap": (0.02, 1e-3, 1, "a step over a gap: it starts at t = 0.02 s, but the state is at t = 0.01 s"),
 }

@@ -176,6 +176,7 @@ def test_the_tighter_of_both_tolerances_holds(library: Library) -> None:
         (0.0, -1.0, "a step of -1 s at t = 0 s: it must be greater than zero"),
         (0.0, math.nan, "a step of nan s from t = 0 s: both must be finite numbers"),
         (math.inf, 1.0, "a step of 1 s from t = inf s: both must be finite numbers"),
+        (0.5, 1e-20, "a step of 1e-20 s at t = 0.5 s: it is lost in the rounding of the time"),
         (0.5, 1e-3, "a step over a gap: it starts at t = 0.5 s, but the state is at t = 0 s"),
         (-0.5, 1e-3, "a step backwards: it starts at t = -0.5 s, but the state is at t = 0 s"),
     ],

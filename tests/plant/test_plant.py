@@ -467,6 +467,11 @@ def test_step_that_is_not_positive(step: float, kind: Kind) -> None:
 
 
 @EVERY_KIND
+def test_step_too_short_for_the_time_to_move(kind: Kind) -> None:
+    assert_refused(running(kind), StepError, "a step of 1e-19 s .* it is lost in the rounding of the time", 0.01, 1e-19)
+
+
+@EVERY_KIND
 @pytest.mark.parametrize(("time", "step"), [(nan, 1e-3), (0.01, nan), (inf, 1e-3), (0.01, inf)])
 def test_step_that_is_not_finite(time: float, step: float, kind: Kind) -> None:
     assert_refused(running(kind), StepError, "both must be finite numbers", time, step)

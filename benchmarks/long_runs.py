@@ -1,0 +1,154 @@
+"""What holds in long runs: a million turns, a start at 1e9 s, an angle of 1e9 turns. The tables of docs/solvers.md.
+
+    python -m benchmarks.long_runs turns --turns 1e6
+    python -m benchmarks.long_runs times
+    python -m benchmarks.long_runs angles
+    python -m benchmarks.long_runs fmu
+
+Both mechanisms without damping, drive and load, set going: what they have of energy they keep. Residuals are relative to the
+kinetic energy at the start.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from math import fmod, pi
+from typing import Any
+
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+
+from analysis import Inputs, simulate
+from analysis.mechanisms import MECHANISMS
+from analysis.run import Harmonics, ramp, table
+from linkwork.five_bar.published import TABLE_3_1, InitialState
+from linkwork.plant import Plant
+from linkwork.slider_crank.published import OFFSET_CASE
+
+#: By name: parameters, start, crank speed there (rad/s).
+FREE: Mapping[str, tuple[Any, Any, float]] = {
+    "five-bar": (replace(TABLE_3_1, slider_damping=0.0), InitialState(crank_speed=44.0), 44.0),
+    "slider-crank": (*OFFSET_CASE, OFFSET_CASE[1].crank_speed),
+}
+LATE = 1e9
+MANY = 1e9
+#: Frequency (rad/s) and amplitude (N) of a force.
+_WAVE = (30.0, 5.0)
+
+#: What acts on the five-bar from a time on.
+ACTING: Mapping[str, Callable[[float], Inputs]] = {
+    "constant speed": lambda t0: Inputs(speed=44.0),
+    "ramp of the speed": lambda t0: Inputs(speed=ramp(0.0, 44.0, t0, t0 + 0.25)),
+    "cubic table of a force": lambda t0: Inputs(
+        speed=44.0, force=table(t0 + 0.125 * np.arange(6), [0.0, 1.0, 2.0, -1.0, 4.0, 0.0], "cubic")
+    ),
+    "harmonic force": lambda t0: Inputs(
+        speed=44.0, force=Harmonics(1.0, [_WAVE[1]], [_WAVE[0]], [0.3 - fmod(_WAVE[0] * t0, 2.0 * pi)])
+    ),
+}
+
+
+def free_run(mechanism: str, turns: float, *, begun: float = 0.0, **options: Any) -> tuple[float, float, float]:
+    """A run of so many turns at the speed of the start, from an angle of ``begun`` turns on.
+
+    Returns
+    -------
+    residual, angle, seconds : float
+        Largest residual of the energy, turned angle (rad), time of the integration (s).
+    """
+    parameters, start, speed = FREE[mechanism]
+    start = replace(start, crank_angle=2.0 * pi * begun)
+    run = simulate(parameters, initial=start, samples=np.linspace(0.0, turns * 2.0 * pi / speed, 101), **options)
+    if run.status:
+        raise RuntimeError(run.message)
+    residual = float(np.abs(run["energy.residual"]).max() / run["energy.kinetic"][0])
+    return residual, float(run["crank.angle"][-1] - run["crank.angle"][0]), run.statistics["seconds_integrating"]
+
+
+def shifted(what: str, late: float = LATE, **options: Any) -> tuple[float, float]:
+    """A run of half a second that begins at ``late`` beside the one at zero: largest difference of the slider's position
+    relative to its largest, and how many times as many steps."""
+    # samples that are exact at both times
+    samples = np.arange(513) * 2.0**-10
+    runs = [simulate(TABLE_3_1, ACTING[what](t0), samples=t0 + samples, **options) for t0 in (0.0, late)]
+    u = [run["slider.position"] for run in runs]
+    return float(np.abs(u[1] - u[0]).max() / np.abs(u[0]).max()), runs[1].statistics["steps"] / runs[0].statistics[
+        "steps"
+    ]
+
+
+def plant_run(mechanism: str, *, time: float = 0.0, begun: float = 0.0, tolerance: float = 1e-9) -> tuple[float, float]:
+    """300 steps of 1 ms of the plant that the Python FMU holds: the residual of the energy, and the turned angle (rad)."""
+    parameters, start, _ = FREE[mechanism]
+    start = replace(start, crank_angle=2.0 * pi * begun)
+    plant = Plant(MECHANISMS[mechanism], parameters, start, tolerance=tolerance, time=time)
+    names = plant.mechanism.output_names
+    kinetic = plant.outputs()[names.index("energy.kinetic")]
+    for k in range(300):
+        plant.step(time + 1e-3 * k, 1e-3)
+    return plant.outputs()[names.index("energy.residual")] / kinetic, plant.state[0] - start.crank_angle
+
+
+def turns_table(turns: float) -> Table:
+    """Energy and angle after many turns; the angle beside that of the balanced method at the tightest tolerance."""
+    out = Table(
+        "mechanism", "method", "tolerance", "energy residual", "angle, error (rad)", "s", title=f"{turns:g} turns"
+    )
+    for mechanism in FREE:
+        _, reference, _ = free_run(mechanism, turns, method="balanced", tolerance=1e-13)
+        for method in ("compiled", "balanced"):
+            for tolerance in (1e-9, 1e-12):
+                residual, angle, seconds = free_run(mechanism, turns, method=method, tolerance=tolerance)
+                error = abs(angle - reference)
+                out.add_row(mechanism, method, f"{tolerance:g}", f"{residual:.1e}", f"{error:.1e}", f"{seconds:.0f}")
+    return out
+
+
+def times_table(turns: float) -> Table:
+    """A start at 1e9 s."""
+    out = Table("what acts", "tolerance", "difference", "times the steps", title=f"from {LATE:g} s on, beside from 0")
+    for what in ACTING:
+        for tolerance in (1e-9, 1e-12):
+            difference, steps = shifted(what, tolerance=tolerance)
+            out.add_row(what, f"{tolerance:g}", f"{difference:.1e}", f"{steps:.2f}")
+    return out
+
+
+def angles_table(turns: float) -> Table:
+    """Runs of 1000 turns that begin with many turns behind them."""
+    out = Table("mechanism", "begun after", "tolerance", "energy residual", title="1000 turns")
+    for mechanism in FREE:
+        for tolerance in (1e-9, 1e-12):
+            for begun in (0.0, MANY):
+                residual, _, _ = free_run(mechanism, 1000.0, begun=begun, tolerance=tolerance)
+                out.add_row(mechanism, f"{begun:g} turns", f"{tolerance:g}", f"{residual:.1e}")
+    return out
+
+
+def fmu_table(turns: float) -> Table:
+    """The same of the FMU's plant."""
+    out = Table(
+        "mechanism", "from", "energy residual", "angle, difference (rad)", title="300 steps of 1 ms of the plant"
+    )
+    for mechanism in FREE:
+        _, reference = plant_run(mechanism)
+        rows = {f"{LATE:g} s": {"time": LATE}} | {f"{n:g} turns": {"begun": n} for n in (0.0, 1e3, 1e6, MANY)}
+        for name, where in rows.items():
+            residual, angle = plant_run(mechanism, **where)
+            out.add_row(mechanism, name, f"{abs(residual):.1e}", f"{abs(angle - reference):.1e}")
+    return out
+
+
+TABLES = {"turns": turns_table, "times": times_table, "angles": angles_table, "fmu": fmu_table}
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("tables", nargs="*", choices=[[], *TABLES], help="by default all")
+    parser.add_argument("--turns", type=float, default=1e6)
+    given = parser.parse_args()
+    for name in given.tables or TABLES:
+        Console(width=120).print(TABLES[name](given.turns))
