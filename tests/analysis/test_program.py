@@ -420,6 +420,58 @@ class TestMovedPivot:
             assert again.start.quality * normal.unit**2 == pytest.approx(solution.error, rel=1e-3)
 
 
+def violations(program: Program, start: Start) -> dict[str, float]:
+    """How far a start is outside the constraints, the worst of each name."""
+    z = np.concatenate([start.q, start.pivot, np.zeros(program._extra)])
+    parameters = np.zeros(program._nlp["p"].numel())
+    parameters[[0, 1, 3]] = start.branch, 1.0, 1.0
+    g = np.asarray(program._value(z, parameters)[1]).ravel()
+    over = np.maximum(program._g_low - g, g - program._g_high)
+    return {name: max(v for v, label in zip(over, program._labels) if label == name) for name in program._labels}
+
+
+class TestBetween:
+    """What is held at places only is held in between: the extremes are put where they are farthest from any place."""
+
+    @pytest.mark.parametrize(
+        ("bound", "order", "name"),
+        [("stroke", 0, "stroke"), ("speed", 1, "slider speed"), ("acceleration", 2, "slider acceleration")],
+    )
+    def test_bounds_of_the_slider(self, bound: str, order: int, name: str) -> None:
+        harmonics, most = 2, 0.01
+        apart = harmonics * 0.5 * (2.0 * math.pi / 96)
+        # cos(2 x - apart) has its peak in the middle between two of 96 places; so has what it is the derivative of
+        size = most * (0.5 if order == 0 else 1.0) / harmonics**order
+        turned = apart + 0.5 * math.pi * order
+        for factor in (1.0 - 1e-5, 1.0 + 1e-5):
+            cosines, sines = np.zeros(3), np.zeros(3)
+            cosines[2], sines[2] = factor * size * math.cos(turned), factor * size * math.sin(turned)
+            linkage = Linkage(
+                ground_length=0.4, crank_length=0.1, coupler_length=0.35, rocker_length=0.3,
+                pivot=SliderMotion(FourierSeries(cosines, sines), 0.3),
+            )  # fmt: skip
+            unknown = SliderUnknown(harmonics=harmonics, **{bound: most})
+            normal = normal_form(TASK)
+            program = Program(normal, limits_of(TASK, normal, None, USUAL), unknown)
+            over = violations(program, start_of(linkage, normal, unknown))[name]
+            assert (over > 0.0) == (factor > 1.0)
+
+    def test_transmission_angle_on_the_way(self) -> None:
+        gap = 0.4
+        task = TimedPath(points=ellipse(24)[:3], rotation=[0.0, gap, 2.0 * gap])
+        # the crank lies along the ground link in the middle between two of the quarters of a gap
+        linkage = Linkage(
+            ground_length=0.4, crank_length=0.1, coupler_length=0.35, rocker_length=0.3,
+            crank_phase=math.pi - 0.625 * gap,
+        )  # fmt: skip
+        least = math.asin(math.sqrt(1.0 - ((0.35**2 + 0.3**2 - 0.5**2) / (2.0 * 0.35 * 0.3)) ** 2))
+        normal = normal_form(task)
+        for off in (-1e-5, 1e-5):
+            limits = limits_of(task, normal, None, (LeastTransmission(angle=least + off, over="task"),))
+            over = violations(Program(normal, limits), start_of(linkage, normal))["transmission angle"]
+            assert (over > 0.0) == (off > 0.0)
+
+
 class TestUntimed:
     def test_area_and_distance_come_to_nothing_on_a_known_curve(self) -> None:
         known = drawn(np.random.default_rng(8), least=0.9)
