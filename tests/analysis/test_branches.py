@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from matplotlib.axes import Axes
 
 from analysis import figures
 from analysis.numerics.continuation import ContinuationError
@@ -230,6 +231,59 @@ def test_columns_are_those_of_the_orbits(softened: Branch, tmp_path: pytest.Temp
     rows = np.loadtxt(path, delimiter=",", skiprows=1)
     assert rows.shape == (len(softened), len(columns))
     assert figures.plot(softened, title="softened").axes[0].get_ylabel() == "amplitude of u [cm]"
+
+
+def _drawn(axis: Axes, count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """x and y of the curve of a branch, put together of its stable and its unstable line, and where it is solid."""
+    solid, dashed = (line for line in axis.lines if len(line.get_xdata()) == count and line.get_linestyle() in "--")
+    assert (solid.get_linestyle(), dashed.get_linestyle()) == ("-", "--")
+    y = solid.get_ydata()
+    return solid.get_xdata(), np.where(np.isnan(y), dashed.get_ydata(), y), ~np.isnan(y)
+
+
+def test_picture_has_the_columns_in_the_units_of_its_axes(softened: Branch) -> None:
+    orbit = find_orbit(TABLE_3_1, speed=SPEED)
+    family = Family(parameters=TABLE_3_1, drive=orbit.drive)
+    over_speed = follow(family, orbit, SPEED, low=0.95 * SPEED, high=1.05 * SPEED)
+    forces = [f"greatest force in pin {pin} [N]" for pin in "ABCD"]
+    for branch, label, factor in (
+        (softened, "slider.stiffness [N/m]", 1.0),
+        (over_speed, "drive.speed [rpm]", 1.0 / RPM),
+    ):
+        columns = branch.columns()
+        figure = figures.plot(branch)
+        expected = {
+            "amplitude of u [cm]": 100.0 * branch.amplitude,
+            "greatest crank\ntorque [N.m]": columns["greatest crank torque [N.m]"],
+            "greatest\npin force [N]": np.max([columns[name] for name in forces], axis=0),
+        }
+        assert figure.axes[-1].get_xlabel() == label
+        assert [axis.get_ylabel() for axis in figure.axes] == list(expected)
+        for axis, values in zip(figure.axes, expected.values()):
+            x, y, solid = _drawn(axis, len(branch))
+            assert x == pytest.approx(factor * branch.parameter)
+            assert y == pytest.approx(values)
+            assert (solid == (branch.columns()["stable (1), marginal (0), unstable (-1)"] > 0.0)).all()
+    (fold,) = softened.special
+    (mark,) = (line for line in figures.plot(softened).axes[0].lines if line.get_marker() == "s")
+    assert mark.get_xydata()[0] == pytest.approx((fold.parameter, 100.0 * fold.orbit.amplitude))
+
+
+def test_approximations_beside_are_in_the_same_units(softened: Branch) -> None:
+    orbit = find_orbit(TABLE_3_1, speed=SPEED)
+    branch = follow(Family(parameters=TABLE_3_1, drive=orbit.drive), orbit, SPEED, low=0.95 * SPEED, high=1.05 * SPEED)
+    order = np.argsort(branch.parameter)
+
+    def beside(speed: float) -> dict[str, float]:
+        return {"a tenth more": 1.1 * float(np.interp(speed, branch.parameter[order], branch.amplitude[order]))}
+
+    main, errors, *_ = figures.plot_branches([branch], beside=beside).axes
+    (line,) = (line for line in main.lines if line.get_label() == "a tenth more")
+    x, y = line.get_data()
+    assert y == pytest.approx(110.0 * np.interp(x * RPM, branch.parameter[order], branch.amplitude[order]))
+    assert errors.get_ylabel() == "relative error of\nthe amplitude [%]"
+    assert errors.lines[0].get_ydata() == pytest.approx(10.0)
+    assert main.get_ylim()[1] == pytest.approx(115.0 * branch.amplitude.max())
 
 
 def test_watch_receives_every_point() -> None:

@@ -18,7 +18,7 @@ from analysis import Inputs, cli, export
 from analysis.export.description import KINDS, description
 from analysis.files import tables
 from analysis.mechanisms import FIVE_BAR
-from analysis.periodic import find_orbit
+from analysis.periodic import charts, find_orbit, grids
 from analysis.run import save_parameters
 from build_fmu import FMUS
 from linkwork.five_bar.published import SETS, TABLE_3_1
@@ -447,6 +447,21 @@ def test_stability_verdict_and_chart(linkwork, tmp_path, monkeypatch):
     assert result.output.count("agrees") == 3
     for name in (".csv", "-boundaries.csv", ".png"):
         assert (tmp_path / "out" / f"rig-2-spring-c-stability{name}").exists()
+
+
+def test_a_chart_with_points_missing_is_written_and_ends_early(linkwork, tmp_path, monkeypatch):
+    monkeypatch.setattr(grids, "grid_folder", lambda: tmp_path)
+    monkeypatch.setattr(charts, "LINES", (2, 2))
+    monkeypatch.setattr(charts, "SAMPLES", 12)
+    # with so soft a spring the links come to the limit of assembly
+    result = linkwork(
+        "stability", "--published", "table-3.1", "--x", "slider.stiffness", "--x-range", "150", "400",
+        "--y-range", "20", "40", "--points", "3", "--cores", "1",
+    )  # fmt: skip
+    assert result.exit_code == cli.ENDED_EARLY
+    assert "no orbit was found at" in " ".join(result.stderr.split()), result.stderr
+    for name in (".csv", "-boundaries.csv", ".png"):
+        assert (tmp_path / "out" / f"table-3.1-stability{name}").exists()
 
 
 CASE = """

@@ -593,5 +593,15 @@ def test_chart_in_colours() -> None:
     assert [text.get_text() for text in figure.axes[0].get_legend().get_texts()] == ["boundary", "no orbit"]
     assert figure.axes[0].child_axes[0].get_ylabel() == "largest multiplier"
     assert len(figure.axes) == 2
+    # white is 1 and blue below it, red above, on however many sides there are values
+    for shift in (0.0, 0.2, -0.4):
+        mesh = plot_charts([replace(chart_, values=values + shift)], title="").axes[0].collections[0]
+        below, middle, above = (mesh.to_rgba(value)[:3] for value in (0.9999, 1.0, 1.0001))
+        assert middle == pytest.approx((1.0, 1.0, 1.0), abs=0.05)
+        assert below[2] > below[0]
+        assert above[0] > above[2]
+    # another value where that is what parts them
+    mesh = plot_charts([replace(chart_, middle=1.1)], title="").axes[0].collections[0]
+    assert mesh.to_rgba(1.1)[:3] == pytest.approx((1.0, 1.0, 1.0), abs=0.05)
     nothing = replace(chart_, values=np.ma.masked_all((3, 4)))
     assert plot_charts([nothing], title="Nothing").axes
