@@ -9,7 +9,7 @@ PYTEST := $(BIN)/python -m pytest
 # every file of tests on one core, so that its fixtures are made once; the file that takes longest goes first
 PARALLEL := --numprocesses auto --dist loadfile tests/test_docs.py tests
 
-.PHONY: demo quick test test-all lint docs figures bench release clean
+.PHONY: demo quick test test-all lint docs figures bench mutate release clean
 
 demo: $(RUN)
 	$(BIN)/python build_fmu.py
@@ -46,6 +46,11 @@ figures: $(RUN)
 bench: $(DEV)
 	$(BIN)/pip install --quiet --editable '.[dev,bench]'
 	for part in solvers fmu stability synthesis slider_crank; do $(BIN)/python -m benchmarks.$$part || exit; done
+
+# does a test fail for every small change of the code? make mutate OF=analysis/files/tables.py; without OF it takes days
+mutate: $(DEV)
+	$(BIN)/pip install --quiet --editable '.[dev,mutation]'
+	nice $(BIN)/python -m tests.mutate $(OF)
 
 # wheel, FMUs of every kind for all platforms, and what fmi-standard.org asks to be published with them
 release: $(DEV)
