@@ -44,16 +44,16 @@ def sample_times(stop_time: Amount, step: Amount, start_time: Amount = 0.0) -> N
         raise InputError(f"step is {step} s: it must be a finite number greater than zero")
     if not (isfinite(stop_time) and isfinite(start_time) and stop_time > start_time):
         raise InputError(f"a run from {start_time} s to {stop_time} s: it must end after it starts")
-    apart = ulp(max(abs(start_time), abs(stop_time)))
-    if step < apart:
-        raise InputError(
-            f"step is {step} s, but floating-point times near {stop_time:g} s are {apart:.3g} s apart: it must be greater"
-        )
     ratio = (stop_time - start_time) / step
     if not ratio <= (most := limit("SAMPLES", _SAMPLES)):
         raise InputError(
             f"a run from {start_time} s to {stop_time} s in steps of {step} s has {ratio:.3g} samples: more than {most} are "
             "taken where LINKWORK_MAX_SAMPLES in the environment is greater"
+        )
+    apart = ulp(max(abs(start_time), abs(stop_time)))
+    if step < apart:
+        raise InputError(
+            f"step is {step} s, but floating-point times near {stop_time:g} s are {apart:.3g} s apart: it must be greater"
         )
     whole = round(ratio)
     # what is left over, but for rounding, makes a last, shorter step
