@@ -50,8 +50,8 @@ def test_a_message_names_a_late_time_to_the_microsecond() -> None:
 @pytest.mark.parametrize("mechanism", FREE)
 @pytest.mark.parametrize("tolerance", [1e-9, 1e-12])
 def test_a_billion_turns_behind_it_do_not_change_a_run(mechanism: str, tolerance: float) -> None:
-    fresh, angle, _ = free_run(mechanism, 20.0, tolerance=tolerance)
-    late, late_angle, _ = free_run(mechanism, 20.0, begun=1e9, tolerance=tolerance)
+    fresh, angle = free_run(mechanism, 20.0, tolerance=tolerance)
+    late, late_angle = free_run(mechanism, 20.0, begun=1e9, tolerance=tolerance)
     assert late < 3.0 * fresh
     # an angle of 1e9 turns is rounded to 1e-6 rad, where it is given and where it is reported
     assert late_angle == pytest.approx(angle, abs=2e-5)
@@ -119,9 +119,9 @@ def test_a_wound_bar_keeps_its_angle(often: None) -> None:
 
 @pytest.mark.parametrize("mechanism", FREE)
 def test_the_balanced_method_keeps_energy_and_angle(mechanism: str) -> None:
-    _, reference, _ = free_run(mechanism, 200.0, method="compiled", tolerance=1e-13)
-    residual, angle, _ = free_run(mechanism, 200.0, tolerance=1e-9)
-    kept, kept_angle, _ = free_run(mechanism, 200.0, method="balanced", tolerance=1e-9)
+    _, reference = free_run(mechanism, 200.0, method="compiled", tolerance=1e-13)
+    residual, angle = free_run(mechanism, 200.0, tolerance=1e-9)
+    kept, kept_angle = free_run(mechanism, 200.0, method="balanced", tolerance=1e-9)
     assert kept < 0.1 * residual
     assert abs(kept_angle - reference) < 0.5 * abs(angle - reference)
     assert kept_angle == pytest.approx(reference, abs=1e-3)
@@ -137,7 +137,10 @@ def test_the_balanced_method_with_damping_and_torque() -> None:
     assert ours["energy.dissipated"][-1] > 0.1
 
 
-def test_the_balanced_method_where_a_mechanism_comes_to_rest() -> None:
+def test_the_balanced_method_at_rest() -> None:
+    # without gravity nothing moves it: neither residual nor kinetic energy
+    still = simulate(replace(TABLE_3_1, gravity=0.0), stop_time=1.0, step=0.1, method="balanced")
+    assert (still.status, np.abs(still["slider.position"]).max()) == (0, 0.0)
     # swings about its rest, with the kinetic energy going through zero
     start = InitialState(slider_position=0.02)
     ours, reference = (
@@ -183,10 +186,10 @@ def test_tables_of_the_page(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("mechanism", FREE)
-def test_a_hundred_thousand_turns(mechanism: str) -> None:
-    residual, angle, _ = free_run(mechanism, 1e5, method="balanced", tolerance=1e-9)
-    _, reference, _ = free_run(mechanism, 1e5, method="balanced", tolerance=1e-12)
-    assert residual < 1e-6
-    assert angle == pytest.approx(reference, abs=5.0)
-    drift, _, _ = free_run(mechanism, 1e5, tolerance=1e-12)
-    assert 1e-8 < drift < 1e-6
+def test_twenty_thousand_turns(mechanism: str) -> None:
+    _, reference = free_run(mechanism, 2e4, method="balanced", tolerance=1e-12)
+    drift, angle = free_run(mechanism, 2e4, tolerance=1e-9)
+    kept, kept_angle = free_run(mechanism, 2e4, method="balanced", tolerance=1e-9)
+    assert 1e-5 < drift < 1e-3
+    assert kept < 1e-6
+    assert abs(kept_angle - reference) < 0.3 * abs(angle - reference)
