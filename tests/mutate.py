@@ -95,7 +95,7 @@ def main() -> None:
             totals = [totals[0] + killed, totals[1] + len(found)]
             for dead, difference in found:
                 if not dead:
-                    console.print(escape(difference), highlight=False)
+                    console.print(escape(difference), highlight=False, soft_wrap=True)
             console.print(f"{module}: {killed} of {len(found)} killed")
     console.print(f"{totals[0]} of {totals[1]} mutants killed")
 

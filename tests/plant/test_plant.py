@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import json
 from dataclasses import dataclass, replace
-from math import cos, hypot, inf, isfinite, nan, pi, radians, sin, sqrt
+from math import asin, cos, hypot, inf, isfinite, nan, pi, radians, sin, sqrt
 from types import ModuleType
 from typing import Any
 
@@ -569,6 +569,25 @@ def test_step_that_cannot_meet_its_tolerance(kind: Kind, drive: str, name: str, 
     plant = kind.start(drive, inputs={name: 1e200})
     match = rf"in the step from t = 0 s: .*, at crank angle 0 rad .* and {where}"
     assert_refused(plant, IntegrationError, match, 0.0, 1.0)
+
+
+@pytest.mark.parametrize(("sine", "error"), [(0.03, AssemblyError), (0.1, IntegrationError)])
+def test_an_integration_that_fails_near_the_limit_fails_for_it(
+    sine: float, error: type[LinkworkError], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fails(*arguments: Any, **options: Any) -> None:
+        raise IntegrationError("the step size fell")
+
+    # coupler and rocker of 0.15 m, nearly stretched out, and the angle between them
+    stretch = 0.3 * cos(0.5 * asin(sine))
+    p = TABLE_3_1
+    plant = Plant(FIVE_BAR.mechanism, p, InitialState(slider_position=stretch - p.ground_length + p.crank_length))
+    monkeypatch.setattr("linkwork.plant.integrate", fails)
+    with pytest.raises(
+        LinkworkError, match="limit of assembly near" if sine < 0.05 else "the step size fell"
+    ) as caught:
+        plant.step(0.0, 1e-3)
+    assert type(caught.value) is error
 
 
 def falling(**options: Any) -> Plant:
