@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 
-from linkwork.errors import LinkworkError, ParameterError
+from linkwork.errors import LinkworkError, MissingParameterError, ParameterError
 from linkwork.five_bar.parameters import InitialState, reach
 from linkwork.five_bar.published import SETS, TABLE_3_1
 from linkwork.parameters import field_name, fmi_name
@@ -423,3 +423,19 @@ def test_a_rod_too_short_for_finite_moments_is_named(length: float) -> None:
         ParameterError, match=r"parameter rod\.length is 1e-\d+: it must be large enough for finite moments"
     ):
         replace(sets_3_1.parameters(), rod_length=length)
+
+
+@pytest.mark.parametrize(("length", "cut"), [(498, False), (499, True)])
+def test_a_value_is_shown_up_to_500_characters(length: int, cut: bool) -> None:
+    # with its quotation marks
+    value = "a" * length
+    shown = repr(value)[:500] + "..." if cut else repr(value)
+    assert str(ParameterError("x", value, "be short")) == f"parameter x is {shown}: it must be short"
+
+
+@pytest.mark.parametrize(
+    ("others", "said"),
+    [((), ""), (("b",), ", and so is b"), (("b", "c"), ", and so are b, c"), (("b",) * 3, ", and so are b, b, b")],
+)
+def test_what_is_missing_is_named_with_the_others(others: tuple[str, ...], said: str) -> None:
+    assert str(MissingParameterError("a", others)) == f"parameter a is missing{said}"
