@@ -45,7 +45,7 @@ from analysis.synthesis import (
 )
 from analysis.synthesis.constraints import limits_of
 from analysis.synthesis.polish import fit_least_squares, polish, quality_of, residuals
-from analysis.synthesis.program import Program
+from analysis.synthesis.program import BETWEEN, Program
 from analysis.synthesis.scan import scan
 from analysis.synthesis.starts import Start, linkage_of, start_of
 from analysis.synthesis.tasks import Normal
@@ -470,6 +470,20 @@ class TestBetween:
             limits = limits_of(task, normal, None, (LeastTransmission(angle=least + off, over="task"),))
             over = violations(Program(normal, limits), start_of(linkage, normal))["transmission angle"]
             assert (over > 0.0) == (off > 0.0)
+
+    def test_transmission_angle_over_a_turn_with_a_moved_pivot(self) -> None:
+        linkage = Linkage(
+            ground_length=0.4, crank_length=0.1, coupler_length=0.35, rocker_length=0.3,
+            pivot=SliderMotion(FourierSeries(np.array([0.0, 0.02]), np.zeros(2)), 0.3),
+        )  # fmt: skip
+        normal, unknown = normal_form(TASK), SliderUnknown(harmonics=1)
+        # what is held at 96 places is held with 2.5e-3 rad to spare
+        for spare in (1e-3, 4e-3):
+            limits = limits_of(TASK, normal, None, (LeastTransmission(angle=linkage.least_transmission - spare),))
+            over = violations(Program(normal, limits, unknown), start_of(linkage, normal, unknown))[
+                "transmission angle"
+            ]
+            assert (over > 0.0) == (spare < BETWEEN)
 
 
 class TestUntimed:
