@@ -26,15 +26,11 @@ class WholeTurns:
     """The turns taken off the angles of a run so far; none where an input or an event depends on the angle itself."""
 
     def __init__(self, run: Run) -> None:
-        mechanism = run.mechanism
-        self.taken = np.zeros(mechanism.size)
         self._run = run
-        self._way = np.zeros(mechanism.size)
-        self._way[: len(mechanism.freedoms)] = [freedom.period for freedom in mechanism.freedoms]
-        #: the outputs that are the coordinates
-        self._columns = [mechanism.output_names.index(freedom.coordinate) for freedom in mechanism.freedoms]
-        functions = (*chain.from_iterable(run.encoded.functions), *(event.function for event in run.events))
-        self._never = any(functions) or not self._way.any()
+        self._periods = [freedom.period for freedom in run.mechanism.freedoms]
+        self.taken = np.zeros(run.mechanism.size)
+        functions = chain(chain.from_iterable(run.encoded.functions), (event.function for event in run.events))
+        self._never = any(functions)
         #: from which sample on how much is taken off
         self._since: list[tuple[int, NDArray[np.float64]]] = []
 
@@ -54,7 +50,9 @@ class WholeTurns:
         """Take turns off the state x, if they are many; ``first`` is the number of the next sample."""
         if not self._too_many(x) or law[2] != 0.0:
             return
-        for way in (self._way, TURNS * self._way):
+        period = np.zeros(len(x))
+        period[: len(self._periods)] = self._periods
+        for way in (period, TURNS * period):
             less = np.fmod(x, way, out=x.copy(), where=way > 0.0)
             if self._repeats(less, u, way):
                 break
@@ -77,7 +75,13 @@ class WholeTurns:
         return values
 
     def _too_many(self, x: NDArray[np.float64]) -> bool:
-        return not self._never and bool(np.any((np.abs(x) > TURNS * self._way) & (self._way > 0.0)))
+        return not self._never and any(0.0 < TURNS * way < abs(angle) for way, angle in zip(self._periods, x.tolist()))
+
+    @property
+    def _columns(self) -> list[int]:
+        """The outputs that are the coordinates."""
+        mechanism = self._run.mechanism
+        return [mechanism.output_names.index(freedom.coordinate) for freedom in mechanism.freedoms]
 
     def _repeats(self, x: NDArray[np.float64], u: NDArray[np.float64], way: NDArray[np.float64]) -> bool:
         """Whether the mechanism does the same after the way as at x."""

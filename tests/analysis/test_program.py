@@ -456,6 +456,15 @@ class TestBetween:
             over = violations(program, start_of(linkage, normal, unknown))[name]
             assert (over > 0.0) == (factor > 1.0)
 
+    @pytest.mark.parametrize("u", [0.39, 0.41, -0.39, -0.41])
+    def test_a_slider_stays_within_the_ground_link_of_its_middle(self, u: float) -> None:
+        pivot = SliderMotion(FourierSeries(np.array([u, 0.0]), np.zeros(2)), 0.3)
+        linkage = Linkage(ground_length=0.4, crank_length=0.1, coupler_length=0.35, rocker_length=0.3, pivot=pivot)
+        normal, unknown = normal_form(TASK), SliderUnknown(harmonics=1)
+        program = Program(normal, limits_of(TASK, normal, None, USUAL), unknown)
+        over = violations(program, start_of(linkage, normal, unknown))["slider position"]
+        assert (over > 0.0) == (abs(u) > linkage.ground_length)
+
     def test_transmission_angle_on_the_way(self) -> None:
         gap = 0.4
         task = TimedPath(points=ellipse(24)[:3], rotation=[0.0, gap, 2.0 * gap])
