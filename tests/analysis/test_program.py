@@ -422,7 +422,8 @@ class TestMovedPivot:
 
 def violations(program: Program, start: Start) -> dict[str, float]:
     """How far a start is outside the constraints, the worst of each name."""
-    z = np.concatenate([start.q, start.pivot, np.zeros(program._extra)])
+    rotation = np.empty(0) if start.rotation is None else start.rotation
+    z = np.concatenate([start.q, start.pivot, rotation, np.zeros(program._extra)])
     parameters = np.zeros(program._nlp["p"].numel())
     parameters[[0, 1, 3]] = start.branch, 1.0, 1.0
     g = np.asarray(program._value(z, parameters)[1]).ravel()
@@ -464,6 +465,27 @@ class TestBetween:
         program = Program(normal, limits_of(TASK, normal, None, USUAL), unknown)
         over = violations(program, start_of(linkage, normal, unknown))["slider position"]
         assert (over > 0.0) == (abs(u) > linkage.ground_length)
+
+    @pytest.mark.parametrize("rate", [0.4999, 0.5001, -0.4999, -0.5001])
+    def test_speed_of_the_second_crank(self, rate: float) -> None:
+        pivot = SecondCrank(0.02, 1, 0.3, FourierSeries(np.zeros(2), np.array([0.0, rate])))
+        linkage = Linkage(ground_length=0.4, crank_length=0.1, coupler_length=0.35, rocker_length=0.3, pivot=pivot)
+        unknown = CrankUnknown(ratio=1, length=(0.001, 0.05), harmonics=1, speed=0.5)
+        normal = normal_form(TASK)
+        program = Program(normal, limits_of(TASK, normal, None, USUAL), unknown)
+        over = violations(program, start_of(linkage, normal, unknown))["speed of the second crank"]
+        assert (over > 0.0) == (abs(rate) > 0.5)
+
+    @pytest.mark.parametrize(("share", "refused"), [(1.1e-3, False), (0.9e-3, True), (7.9, False), (8.1, True)])
+    def test_rotation_from_one_untimed_station_to_the_next(self, share: float, refused: bool) -> None:
+        task = UntimedPath(path=TargetPath(points=ellipse(24), closed=True), measure="distance", samples=36)
+        linkage = Linkage(ground_length=0.4, crank_length=0.1, coupler_length=0.35, rocker_length=0.3)
+        normal = normal_form(task)
+        gaps = np.full(normal.n, (normal.n - share) / (normal.n - 1.0)) * 2.0 * math.pi / normal.n
+        gaps[3] = share * 2.0 * math.pi / normal.n
+        start = replace(start_of(linkage, normal), rotation=np.append(0.0, np.cumsum(gaps[:-1])))
+        over = violations(Program(normal, limits_of(task, normal, None, USUAL)), start)["order of the stations"]
+        assert (over > 0.0) == refused
 
     def test_transmission_angle_on_the_way(self) -> None:
         gap = 0.4
