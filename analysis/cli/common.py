@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from functools import reduce, wraps
 from itertools import repeat
 from pathlib import Path
@@ -110,6 +111,8 @@ def out_option(default: str = "out", help: str = "Folder for CSV and plots.") ->
     return lambda command: out(force_option(command))
 
 
+#: Seconds within which the scheduler of a cluster must answer.
+_PATIENCE = 10
 #: Where the context of a command keeps the option --force.
 _FORCE = "linkwork.force"
 force_option = click.option(
@@ -119,6 +122,56 @@ force_option = click.option(
     callback=lambda context, _, value: context.meta.update({_FORCE: value}),
     help="Write over files that this command did not write, too.",
 )
+
+
+def _number_of_jobs(context: click.Context, parameter: click.Parameter, value: int | None) -> int | None:
+    if value is not None and (value == 0 or value < -1):
+        raise click.BadParameter(f"{value} is neither -1, for all, nor a number of cores")
+    return value
+
+
+def _join(context: click.Context, parameter: click.Parameter, address: str | None) -> None:
+    if address is not None:
+        context.with_resource(_cluster(address))
+
+
+@contextmanager
+def _cluster(address: str) -> Iterator[None]:
+    """Inside, work goes over the workers of a Dask cluster."""
+    import joblib
+
+    try:
+        from distributed import Client
+    except ImportError:
+        raise click.BadParameter("Dask is not installed: python -m pip install 'linkwork[dask]'") from None
+    try:
+        client: Any = Client(address, timeout=_PATIENCE)  # type: ignore[no-untyped-call]
+    except (OSError, ValueError) as error:
+        raise click.BadParameter(f"no scheduler of Dask answers at {address}: {error}") from None
+    with client, joblib.parallel_config("dask", client=client):
+        yield
+
+
+def workers_options(default: int | None = None) -> Callable[..., Any]:
+    """The options --jobs and --scheduler: over which cores and machines work goes."""
+    jobs = click.option(
+        "--jobs",
+        "--cores",
+        "jobs",
+        type=int,
+        default=default,
+        show_default=default is not None,
+        callback=_number_of_jobs,
+        help="Processes on this machine; -1 for one a core.",
+    )
+    scheduler = click.option(
+        "--scheduler",
+        metavar="ADDRESS",
+        expose_value=False,
+        callback=_join,
+        help="Of a Dask cluster, such as tcp://10.0.0.5:8786, over all of whose cores work goes instead.",
+    )
+    return lambda command: jobs(scheduler(command))
 
 
 def folder_of(out: str | Path) -> Path:

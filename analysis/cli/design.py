@@ -26,6 +26,7 @@ from .common import (
     plain,
     print_error,
     print_written,
+    workers_options,
 )
 
 if TYPE_CHECKING:
@@ -66,7 +67,7 @@ def search_options(command: Callable[..., Any]) -> Callable[..., Any]:
         click.option("--plots/--no-plots", default=True, show_default=True, help="Whether to write plots."),
         click.option("--out", default="out", show_default=True, type=folder, help="Folder for the results."),
         force_option,
-        click.option("--jobs", type=int, help="Cores; -1 for all."),
+        workers_options(),
         click.option("--seed", type=click.IntRange(0), help="Of the search: the same seed gives the same linkages."),
     ):
         command = option(command)

@@ -31,16 +31,11 @@ from .common import (
     print_error,
     print_written,
     quantity,
+    workers_options,
 )
 
 #: Range of speeds where none is given, relative to the natural frequency: beyond twice, where parametric resonance begins.
 _RANGE = (0.15, 2.3)
-
-
-def _cores(context: click.Context, parameter: click.Parameter, value: int) -> int:
-    if value == 0 or value < -1:
-        raise click.BadParameter(f"{value} is neither -1, for all, nor a number of cores")
-    return value
 
 
 def _require_range(parameters: Any, low: float, high: float, name: str, first: str, last: str) -> None:
@@ -304,7 +299,7 @@ def _extrema(response: Any, factor: float, unit: str, table: Any) -> None:
 )
 @click.option("--y-range", nargs=2, metavar="FROM TO", help="Its range, such as 0 '2e4 dyn.s/cm'.")
 @click.option("--points", default=80, show_default=True, type=click.IntRange(2, 2000), help="Points along each axis.")
-@click.option("--cores", default=-1, show_default=True, callback=_cores, help="Cores; -1 for all.")
+@workers_options(default=-1)
 @click.option("--chart/--no-chart", "charted", default=True, show_default=True, help="Chart, or the verdict alone.")
 @click.option("--coexisting", is_flag=True, help="Seek all motions of every point: how many are stable, and how large.")
 def stability(
@@ -314,7 +309,7 @@ def stability(
     y: str | None,
     y_range: tuple[str, str] | None,
     points: int,
-    cores: int,
+    jobs: int,
     charted: bool,
     coexisting: bool,
 ) -> None:
@@ -365,7 +360,7 @@ def stability(
         start=start,
         beside=linear_motion(parameters, drive, names) if mechanism_of(parameters) is FIVE_BAR else None,
         coexisting=coexisting,
-        n_jobs=cores,
+        n_jobs=jobs,
         progress=console.is_terminal,
     )
     _regions(found)

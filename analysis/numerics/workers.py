@@ -1,14 +1,188 @@
-"""Processes that compute for another one."""
+"""Work over cores and machines: by joblib, in the threads, processes or cluster that the caller has chosen."""
 
 from __future__ import annotations
 
 import os
+import signal
 import threading
 import time
+import warnings
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import BrokenExecutor
+from contextlib import contextmanager
+from typing import Any, TypeVar
+
+from linkwork.errors import InputError, LinkworkError
+
+Item = TypeVar("Item")
+Made = TypeVar("Made")
+
+#: How often workers are started anew after one was killed; as often does Dask give an item to another worker.
+RETRIES = 3
 
 _WATCHED: set[int] = set()
 #: Seconds between two looks at who the caller is.
 _INTERVAL = 0.5
+
+
+class WorkersLost(LinkworkError):
+    """The workers failed, as where they are killed again and again, or the scheduler of a cluster is gone."""
+
+
+class Heard(list[bool]):
+    """Has an entry for each Ctrl-C; ``waiting`` while others compute, and Ctrl-C may end the wait by an exception."""
+
+    waiting = False
+
+
+@contextmanager
+def interruptible() -> Iterator[Heard]:
+    """Hear Ctrl-C as an entry in a list, to be looked at between two steps or calls.
+
+    An exception would strike wherever it finds the interpreter: inside an FMU, whose interpreter this is, or inside Numba,
+    which may drop it.
+    """
+    heard = Heard()
+    if threading.current_thread() is not threading.main_thread():
+        yield heard
+        return
+
+    def hear(*_: object) -> None:
+        heard.append(True)
+        if heard.waiting:
+            raise KeyboardInterrupt
+
+    before = signal.getsignal(signal.SIGINT)
+    signal.signal(signal.SIGINT, hear)
+    try:
+        yield heard
+    finally:
+        # None stands for a handler that was not set from Python
+        signal.signal(signal.SIGINT, signal.SIG_DFL if before is None else before)
+
+
+def check_jobs(n_jobs: int | None) -> None:
+    """Refuse no workers at all.
+
+    Raises
+    ------
+    InputError
+        If ``n_jobs`` is 0.
+    """
+    if n_jobs == 0:
+        raise InputError("0 cores: it must be a number of them, or -1 for all")
+
+
+def cores_of(n_jobs: int | None, *, threads: bool = False) -> int:
+    """How many workers `over_workers` has: as `joblib.Parallel` counts them, on a cluster all of its cores."""
+    return _workers(n_jobs, threads)[0]
+
+
+def _workers(n_jobs: int | None, threads: bool) -> tuple[int, bool]:
+    """Number of workers, and whether they are other processes."""
+    import joblib
+
+    check_jobs(n_jobs)
+    backend, default = joblib.parallel.get_active_backend(prefer="threads" if threads else None)
+    count = int(backend.effective_n_jobs((default or 1) if n_jobs is None else n_jobs))
+    return count, count > 1 and not getattr(backend, "supports_sharedmem", False)
+
+
+def over_workers(
+    work: Callable[[Item], Made],
+    items: Sequence[Item],
+    heard: Heard | None = None,
+    *,
+    n_jobs: int | None = None,
+    threads: bool = False,
+) -> Iterator[tuple[int, Made]]:
+    """Number and result of each item, in the order in which they are done.
+
+    The workers are ``n_jobs`` processes of this machine, threads if ``threads`` are preferred, or those of the backend that
+    `joblib.parallel_config` has set: "dask", "loky", "threading" or another. One job is this process itself. An item whose
+    worker was killed goes to another worker. Processes that were started here end with this one.
+
+    Parameters
+    ----------
+    work : callable
+        What it raises is raised here.
+    items : sequence
+    heard : Heard, optional
+        Of `interruptible`. A Ctrl-C while others compute ends the iteration; without it, it is a KeyboardInterrupt.
+
+    Raises
+    ------
+    WorkersLost
+        If workers were killed more than `RETRIES` times, or fail otherwise.
+    """
+    import joblib
+
+    _, elsewhere = _workers(n_jobs, threads)
+    listening = Heard() if heard is None else heard
+    todo = dict(enumerate(items))
+    for attempt in range(RETRIES + 1):
+        results: Any = joblib.Parallel(
+            n_jobs=n_jobs, prefer="threads" if threads else None, return_as="generator_unordered"
+        )(
+            # in a tuple: Dask would keep a larger argument on one worker alone, and lose it with that
+            joblib.delayed(_one)((work, number, item, os.getpid()))
+            for number, item in tuple(todo.items())
+        )
+        try:
+            while todo:
+                listening.waiting = elsewhere
+                try:
+                    number, made, error = next(results)
+                finally:
+                    listening.waiting = False
+                if error is not None:
+                    raise _OfWork(error)
+                del todo[number]
+                yield number, made
+            return
+        except KeyboardInterrupt:  # of this process, or of a worker
+            if heard is None:
+                raise
+            if not heard:
+                heard.append(True)
+            return
+        except _OfWork as caught:
+            raise caught.error from None
+        except LinkworkError:  # of what cannot be sent
+            raise
+        except BrokenExecutor as error:
+            if attempt == RETRIES:
+                raise WorkersLost(f"workers were killed {attempt + 1} times, as where memory runs out") from error
+            warnings.warn(
+                f"a worker was killed: {len(todo)} of {len(items)} parts are given out again",
+                RuntimeWarning,
+                stacklevel=2,
+            )
+        except Exception as error:  # of any backend
+            raise WorkersLost(f"the workers failed: {type(error).__name__}: {error}") from error
+        finally:
+            with warnings.catch_warnings():
+                # that items were cancelled is what was asked for
+                warnings.filterwarnings("ignore", message=".*still being processed", category=UserWarning)
+                results.close()
+
+
+class _OfWork(Exception):
+    """An error of the work, in contrast to one of the workers."""
+
+    def __init__(self, error: Exception) -> None:
+        self.error = error
+        super().__init__()
+
+
+def _one(packed: tuple[Callable[[Item], Made], int, Item, int]) -> tuple[int, Made | None, Exception | None]:
+    """Number of an item, and its result or error."""
+    work, number, item, caller = packed
+    end_with(caller)
+    try:
+        return number, work(item), None
+    except Exception as error:  # to be told from those of the workers
+        return number, None, error
 
 
 def end_with(caller: int) -> None:

@@ -4,26 +4,25 @@ from __future__ import annotations
 
 import hashlib
 import inspect
-import os
 import warnings
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
-import joblib
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from linkwork.errors import InputError, Interrupted, LinkworkError
+from linkwork.errors import InputError, Interrupted
 from linkwork.mechanism import Mechanism
 
 from ..files import load_array, save_array
 from ..mechanisms import MECHANISMS, mechanism_of
 from ..numerics.codegen import cache_root, fingerprint
-from ..numerics.workers import end_with
-from ..run import interruptible, shown
+from ..numerics.workers import check_jobs, interruptible, over_workers
+from ..run import shown
 from . import orbit_kernels, orbits
 from .floquet import TOLERANCE, Stability, multipliers
 from .flows import GAP, VARIATIONAL
@@ -107,7 +106,7 @@ def grid(
 ) -> Grid:
     """The largest Floquet multiplier of the true orbit at every point of a grid.
 
-    Each row is a task of joblib and, once done, a file in the cache, under a name made from all it depends on: mechanisms,
+    The rows go over workers; each is, once done, a file in the cache, under a name made from all it depends on: mechanisms,
     drives, guess, tolerance and the machine code. An interrupted grid goes on from the rows that are there.
 
     Parameters
@@ -123,7 +122,7 @@ def grid(
     folder : path, optional
         Of the cache; `grid_folder` by default.
     n_jobs : int, optional
-        Cores, as `joblib.Parallel`.
+        Processes, -1 for one a core; of a cluster, inside `joblib.parallel_config`, all of its cores.
     progress : bool
         Show a progress bar.
 
@@ -140,8 +139,7 @@ def grid(
     for name, axis in (("x", xs), ("y", ys)):
         if axis.ndim != 1 or len(axis) == 0 or not np.isfinite(axis).all():
             raise InputError(f"the axis {name} of a grid must be finite numbers, at least one")
-    if n_jobs == 0:
-        raise InputError("0 cores: it must be a number of them, or -1 for all")
+    check_jobs(n_jobs)
     parameters, drive = operation(float(xs[0]), float(ys[0]))
     mechanism = mechanism_of(parameters)
     flow = drive.flow(mechanism)
@@ -157,7 +155,9 @@ def grid(
         fingerprint(multipliers),
         inspect.getsource(orbits),
     )
-    paths, missing = [], []
+    paths = []
+    rows: dict[Path, NDArray[np.float64]] = {}
+    missing: dict[Path, list[Operation]] = {}
     for value in ys.tolist():
         row = [operation(first, value) for first in xs.tolist()]
         digest = hashlib.sha256(" ".join(code).encode())
@@ -167,39 +167,30 @@ def grid(
         digest.update(np.array([*guesses.ravel(), *flow.modes, flow.torque, flow.period, tolerance]).tobytes())
         path = where / f"{digest.hexdigest()[:32]}.row"
         paths.append(path)
-        if _read(path, len(xs), len(guess)) is None:
-            missing.append((path, row))
-    done = len(paths) - len(missing)
-    unkept: dict[Path, NDArray[np.float64]] = {}
+        kept = load_array(path)
+        if kept is not None and kept.shape == (len(xs), len(guess) + 2):
+            rows[path] = kept
+        else:
+            missing[path] = row
+    unkept = 0
     with interruptible() as interrupted, shown(progress, float(len(paths)), "stability") as show:
-        show(float(done))
-        tasks = (
-            joblib.delayed(_compute_row)(mechanism, path, row, guesses, tolerance, os.getpid()) for path, row in missing
-        )
-        results = joblib.Parallel(n_jobs=n_jobs, return_as="generator_unordered")(tasks)
-        try:
-            for path, values, why in results:
-                done += 1
-                if values is not None:
-                    if not unkept:
-                        warnings.warn(f"rows of the grid are not kept: {why}", RuntimeWarning, stacklevel=2)
-                    unkept[path] = values
-                show(float(done))
-                if interrupted:
-                    break
-        except KeyboardInterrupt:  # of a worker, or raised by the caller's code
-            interrupted.append(True)
-        finally:
-            with warnings.catch_warnings():
-                # that rows were cancelled is what was asked for
-                warnings.filterwarnings("ignore", message=".*still being processed", category=UserWarning)
-                results.close()
-        if interrupted and done < len(paths):
-            raise GridInterrupted(done - len(unkept), len(paths), where)
-    rows = [unkept[path] if path in unkept else _read(path, len(xs), len(guess)) for path in paths]
-    if any(row is None for row in rows):
-        raise LinkworkError(f"a row of the grid cannot be read back from {where}")
-    data = np.array(rows, dtype=float)
+        show(float(len(rows)))
+        compute, places = partial(_compute_row, mechanism, guesses, tolerance), list(missing)
+        for number, made in over_workers(compute, list(missing.values()), interrupted, n_jobs=n_jobs):
+            path = places[number]
+            rows[path] = made
+            try:
+                save_array(path, made)
+            except OSError as error:
+                if not unkept:
+                    warnings.warn(f"rows of the grid are not kept: {error}", RuntimeWarning, stacklevel=2)
+                unkept += 1
+            show(float(len(rows)))
+            if interrupted:
+                break
+        if interrupted and len(rows) < len(set(paths)):
+            raise GridInterrupted(len(rows) - unkept, len(paths), where)
+    data = np.array([rows[path] for path in paths])
     status = data[..., -1].astype(np.int64)
     return Grid(
         x=xs,
@@ -212,28 +203,11 @@ def grid(
 
 
 def _compute_row(
-    mechanism: Mechanism,
-    path: Path,
-    row: Sequence[Operation],
-    guesses: NDArray[np.float64],
-    tolerance: float,
-    caller: int,
-) -> tuple[Path, NDArray[np.float64] | None, str]:
-    """Compute a row and write its file, which is there as a whole or not at all; where it cannot be, return row and reason."""
-    end_with(caller)
+    mechanism: Mechanism, guesses: NDArray[np.float64], tolerance: float, row: Sequence[Operation]
+) -> NDArray[np.float64]:
+    """A row, with the columns multiplier, start and status."""
     # one that was registered by the caller is not in another process
     MECHANISMS.setdefault(mechanism.name, mechanism)
     mechanisms, drives = [p for p, _ in row], [drive for _, drive in row]
     values, starts, status = orbits.largest_multipliers(mechanisms, drives, guesses, tolerance=tolerance)
-    made = np.column_stack([values, starts, status])
-    try:
-        save_array(path, made)
-    except OSError as error:
-        return path, made, str(error)
-    return path, None, ""
-
-
-def _read(path: Path, count: int, size: int) -> NDArray[np.float64] | None:
-    """A row from its file, columns multiplier, start (of ``size`` components) and status; None if it is not there."""
-    row = load_array(path)
-    return row if row is not None and row.shape == (count, size + 2) else None
+    return np.column_stack([values, starts, status])

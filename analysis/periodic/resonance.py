@@ -22,7 +22,8 @@ from ..files import write_csv
 from ..mechanisms import Parameters, mechanism_of
 from ..notebook import Shown, format_count
 from ..numerics.continuation import ContinuationError
-from ..run import interruptible, shown, takes_published
+from ..numerics.workers import interruptible
+from ..run import shown, takes_published
 from ..units import Amount, si
 from .branches import Branch, Family, SpecialPoint, describe, follow, switch
 from .drives import Drive, published_drive

@@ -34,7 +34,6 @@ from .equations import machine as machine
 from .equations import traced as traced
 from .events import Event as Event
 from .events import RunInterrupted as RunInterrupted
-from .events import interruptible as interruptible
 from .events import shown as shown
 from .fmu import CosimulationError as CosimulationError
 from .fmu import FmuModel as FmuModel

@@ -5,11 +5,11 @@ from __future__ import annotations
 import hashlib
 import math
 import warnings
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import cache, reduce
+from functools import cache
 from itertools import chain
-from operator import add
+from math import prod
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -26,7 +26,7 @@ from ..numerics.symbolic import ELEMENTARY
 from ..numerics.tracing import Rebound, rebound
 from .equations import machine
 from .inputs import Encoded, Inputs, align, compiled_source, encode, of_functions
-from .prepared import STEPS_PER_CALL, Run, Settings, outputs_of
+from .prepared import STEPS_PER_CALL, Run, Settings, outputs_of, verdict
 
 #: solver.status of a run that was not begun, or was interrupted.
 NOT_RUN = -1
@@ -69,18 +69,24 @@ class Task:
         return Run(self.parameters[i], self.inputs[i], self.initial[i], self.settings)
 
     @property
-    def width(self) -> int:
-        """Numbers at a sample."""
-        chosen = self.outputs
-        return self.mechanism.size + len(self.mechanism.channels) if chosen is None else len(chosen)
+    def shapes(self) -> list[tuple[int, ...]]:
+        """Shapes of what is computed: see `_integrate`."""
+        m, n, size = len(self.parameters), len(self.settings.times), self.mechanism.size
+        samples = (size, len(self.mechanism.channels)) if self.outputs is None else (len(self.outputs),)
+        return [(m, 4 + size), *((m, n, numbers) for numbers in samples)]
+
+    def parts(self, flat: NDArray[np.float64]) -> list[NDArray[np.float64]]:
+        """Views of these shapes into one array."""
+        ends = np.cumsum([prod(shape) for shape in self.shapes])
+        return [part.reshape(shape) for part, shape in zip(np.split(flat, ends[:-1]), self.shapes)]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Result:
-    """Solved runs, with the fields of `ensemble.Ensemble`; ``data`` has states and channels, or the outputs wanted."""
+    """Solved runs, with the fields of `ensemble.Ensemble`; ``samples`` are states and channels, or the outputs wanted."""
 
     first: int
-    data: NDArray[np.float64]
+    samples: list[NDArray[np.float64]]
     counts: NDArray[np.int64]
     energies: NDArray[np.float64]
     status: list[int]
@@ -117,11 +123,10 @@ def solve(task: Task, heard: Sequence[bool]) -> Result | None:
     # a worker does not know a mechanism that the caller has registered
     MECHANISMS.setdefault(task.mechanism.name, task.mechanism)
     prepared = prepare(task)
-    m, n, size = len(task.parameters), len(task.settings.times), task.mechanism.size
     path = None if task.folder is None else task.folder / f"{prepared.digest(task)}.runs"
     kept = None if path is None else load_array(path)
     energies = prepared.batch.p[:, -1]
-    if kept is None or kept.shape != (m, 4 + size + n * task.width):
+    if kept is None or kept.shape != (sum(map(prod, task.shapes)),):
         kept, whole = _integrate(task, prepared, heard)
         if path is not None and whole:
             try:
@@ -130,11 +135,11 @@ def solve(task: Task, heard: Sequence[bool]) -> Result | None:
                 warnings.warn(
                     f"{path} cannot be written ({error}): its runs are in memory alone", RuntimeWarning, stacklevel=2
                 )
-    ends, data = kept[:, : 4 + size], kept[:, 4 + size :].reshape(m, n, task.width)
+    ends, *samples = task.parts(kept)
     status, messages = _verdicts(task, prepared, ends)
     return Result(
         first=task.first,
-        data=data,
+        samples=samples,
         counts=ends[:, 1].astype(np.int64),
         energies=energies,
         status=status,
@@ -158,20 +163,27 @@ def _verdicts(task: Task, prepared: Prepared, ends: NDArray[np.float64]) -> tupl
         elif code == k.BAD_INPUT:
             status[i], messages[i] = code, str(task.run(i).lost(lost, t, x))
         else:
-            status[i], messages[i] = task.run(i).verdict(code, t, x)
+            status[i], messages[i] = verdict(task.mechanism, task.settings, code, t, x)
     return status, messages
 
 
 def _integrate(task: Task, prepared: Prepared, heard: Sequence[bool]) -> tuple[NDArray[np.float64], bool]:
-    """A row for each run, and whether all came to their ends.
+    """`Task.parts` in one array, and whether all runs came to their ends.
 
-    A row has the compiled code's status, the number of samples, the time of the end (s), the number of the channel that was
-    not finite, the state at the end, and the numbers of all samples.
+    The first part has a row for each run: the compiled code's status, the number of samples, the time of the end (s), the
+    number of the channel that was not finite, the state at the end. The others are the samples, NaN after the end of a run.
     """
     from . import compiled as k
 
     mechanism, settings, encoded, batch = task.mechanism, task.settings, prepared.encoded, prepared.batch
     m, n = prepared.x.shape[0], len(settings.times)
+    flat = np.empty(sum(map(prod, task.shapes)))
+    ends, *samples = task.parts(flat)
+    states, forces = (
+        samples
+        if task.outputs is None
+        else (np.empty((m, n, mechanism.size)), np.empty((m, n, len(mechanism.channels))))
+    )
     # kept alive while their addresses are in use
     source, _kept = compiled_source(encoded)
     modes = np.array([float(value) for value in encoded.modes.values()])
@@ -179,8 +191,6 @@ def _integrate(task: Task, prepared: Prepared, heard: Sequence[bool]) -> tuple[N
         machine(mechanism).addresses, modes, batch.p[0], batch.scales[0], encoded.commands,
         settings.tolerance, settings.hold, float(settings.times[-1]), True,
     )  # fmt: skip
-    states = np.full((m, n, mechanism.size), np.nan)
-    forces = np.full((m, n, len(mechanism.channels)), np.nan)
     held = np.zeros((m, len(mechanism.channels)))
     carries = np.zeros(m, dtype=k.CARRY)
     carries["begin"] = settings.times[0]
@@ -196,15 +206,22 @@ def _integrate(task: Task, prepared: Prepared, heard: Sequence[bool]) -> tuple[N
         )  # fmt: skip
         todo = (status == k.RUNNING) & (carries["steps"] < settings.max_steps)
     status[todo] = _PAUSED
-    if task.outputs is None:
-        data = np.concatenate([states, forces], axis=2)
-    else:
-        data = np.full((m, n, task.width), np.nan)
-        for i, count in enumerate(carries["sample"].tolist()):
+    counts = carries["sample"]
+    if task.outputs is not None:
+        for i, count in enumerate(counts.tolist()):
             values = outputs_of(mechanism, modes, batch.p[i], states[i, :count], forces[i, :count])
-            data[i, :count] = values[:, task.outputs]
-    ends = [status, carries["sample"], carries["begin"] + carries["elapsed"], carries["lost"], x, data.reshape(m, -1)]
-    return np.column_stack(ends), not todo.any()
+            samples[0][i, :count] = values[:, task.outputs]
+    for i in np.flatnonzero(counts < n).tolist():
+        for part in samples:
+            part[i, counts[i] :] = np.nan
+    ends[:, 0], ends[:, 1], ends[:, 2], ends[:, 3] = (
+        status,
+        counts,
+        carries["begin"] + carries["elapsed"],
+        carries["lost"],
+    )
+    ends[:, 4:] = x
+    return flat, not todo.any()
 
 
 # What a run starts from
@@ -220,11 +237,9 @@ def prepare(task: Task) -> Prepared:
 
     mechanism, t = task.mechanism, float(task.settings.times[0])
     encoded, batch = _acting(task)
-    constants = {id(p): p.constants() for p in task.parameters}
-    rows = [constants[id(p)] for p in task.parameters]
-    starts = {id(s): mechanism.state(s) for s in task.initial}
-    x = np.array([starts[id(s)] for s in task.initial])
-    p = np.array(rows)
+    rows = _once(lambda p: p.constants(), task.parameters)
+    x = np.array(_once(mechanism.state, task.initial))
+    p = np.fromiter(chain.from_iterable(rows), float).reshape(len(rows), -1)
     u = np.zeros((len(x), len(mechanism.channels)))
     # users' functions are called as the Python they are, as in `sample`
     source = compiled_source(replace(encoded, functions=((None, None),) * len(encoded.functions)))[0]
@@ -253,10 +268,9 @@ def prepare(task: Task) -> Prepared:
             np.isfinite(u).all(axis=1) & np.isfinite(x).all(axis=1) & np.isfinite(energy) & (clearance > 2 * LIMIT_SINE)
         )
         doubtful |= set(np.flatnonzero(~sound).tolist())
-        scale = mechanism.error_scale
-        for i, row in enumerate(x.tolist()):
-            if i not in doubtful:
-                scales[i] = scale(task.parameters[i], row)
+        sure = [i for i in range(len(x)) if i not in doubtful]
+        if sure:
+            scales[sure] = [mechanism.error_scale(task.parameters[i], row) for i, row in zip(sure, x[sure].tolist())]
     except (ArithmeticError, ValueError):
         # of a function of `math`: one by one shows which
         doubtful = set(range(len(x)))
@@ -272,11 +286,28 @@ def prepare(task: Task) -> Prepared:
     return Prepared(encoded, batch._replace(p=np.column_stack([p, energy]), scales=scales), x, failures)
 
 
+def _once(make: Callable[[Any], Any], items: Sequence[Any]) -> list[Any]:
+    """What is made of each item, of the same object once."""
+    made = {key: make(item) for key, item in {id(item): item for item in items}.items()}
+    return [made[id(item)] for item in items]
+
+
 @cache
 def _over_arrays(mechanism: Mechanism) -> Rebound:
     """The equations over arrays: with the functions of `math` itself, element by element, those of NumPy differ in bits."""
-    elementwise = {name: np.vectorize(getattr(math, name), otypes=[float]) for name in ELEMENTARY}
+    elementwise = {name: _elementwise(getattr(math, name)) for name in ELEMENTARY}
     return rebound(mechanism.modules, elementwise | {"sqrt": np.sqrt, "fabs": np.abs})
+
+
+def _elementwise(function: Callable[..., float]) -> Callable[..., NDArray[np.float64]]:
+    """A function of floats over arrays."""
+
+    def applied(*values: Any) -> NDArray[np.float64]:
+        arrays = np.broadcast_arrays(*values) if len(values) > 1 else [np.asarray(values[0])]
+        columns = [array.ravel().tolist() for array in arrays]
+        return np.fromiter(map(function, *columns), float, arrays[0].size).reshape(arrays[0].shape)
+
+    return applied
 
 
 def _acting(task: Task) -> tuple[Encoded, Any]:
@@ -294,44 +325,42 @@ def _acting(task: Task) -> tuple[Encoded, Any]:
             moved[key] = align(encoded, times).breaks
         return replace(encoded, breaks=moved[key])
 
-    numbers: dict[tuple[str, ...], Encoded] = {}
-    # by number: encoded inputs, and in their place for constants alone the values of the signals
-    known: dict[int, tuple[Encoded, list[float] | None]] = {}
-    for inputs in task.inputs:
-        if id(inputs) in known:
-            continue
-        if inputs.held_exactly:
-            names = tuple(inputs)
-            if names not in numbers:
-                numbers[names] = encode_one(inputs)
-            row = [reduce(add, map(float, inputs.parts(name)), 0.0) for name in signals]
-            known[id(inputs)] = numbers[names], row
-        else:
-            known[id(inputs)] = encode_one(inputs), None
-    distinct = list(known.values())
-    encoded = [e for e, _ in distinct]
-    order = {key: n for n, key in enumerate(known)}
-    which = np.array([order[id(inputs)] for inputs in task.inputs])
-    sizes = np.array([(len(e.coefficients), len(e.harmonics)) for e in encoded])
-    pieces, waves = sizes.max(axis=0)
-    breaks = np.zeros((len(encoded), pieces + 1))
-    coefficients = np.zeros((len(encoded), pieces, len(signals), 4))
-    harmonics = np.zeros((len(encoded), waves, 4))
-    for n, (e, values) in enumerate(distinct):
-        breaks[n, : len(e.breaks)] = e.breaks
+    kinds: list[Encoded] = []
+    constant = -1
+
+    def kind_of(inputs: Inputs) -> tuple[int, list[float] | None]:
+        """Number among the kinds, which constants share, and their values."""
+        nonlocal constant
+        values = inputs.constants(signals)
+        if values is None or constant < 0:
+            kinds.append(encode_one(inputs))
         if values is None:
-            coefficients[n, : len(e.coefficients)] = e.coefficients
-            harmonics[n, : len(e.harmonics)] = e.harmonics
-        else:
-            coefficients[n, 0, :, 0] = values
-    return known[id(task.inputs[0])][0], k.Batch(
+            return len(kinds) - 1, None
+        constant = len(kinds) - 1 if constant < 0 else constant
+        return constant, values
+
+    found = _once(kind_of, task.inputs)
+    which = np.array([kind for kind, _ in found])
+    sizes = np.array([(len(e.coefficients), len(e.harmonics)) for e in kinds])
+    pieces, waves = sizes.max(axis=0)
+    breaks = np.zeros((len(kinds), pieces + 1))
+    coefficients = np.zeros((len(kinds), pieces, len(signals), 4))
+    harmonics = np.zeros((len(kinds), waves, 4))
+    for n, e in enumerate(kinds):
+        breaks[n, : len(e.breaks)] = e.breaks
+        coefficients[n, : len(e.coefficients)] = e.coefficients
+        harmonics[n, : len(e.harmonics)] = e.harmonics
+    coefficients = coefficients[which]
+    if constant >= 0:
+        coefficients[which == constant, 0, :, 0] = [values for _, values in found if values is not None]
+    return kinds[which[0]], k.Batch(
         p=np.empty((0, 0)),
         scales=np.empty((0, 0)),
-        steady=np.array([values is not None or e.steady for e, values in distinct])[which],
+        steady=np.array([e.steady for e in kinds])[which],
         sizes=sizes[which],
         breaks=breaks[which],
-        coefficients=coefficients[which],
+        coefficients=coefficients,
         harmonics=harmonics[which],
-        laws=np.array([e.law for e in encoded])[which],
-        law_places=np.array([e.law_places for e in encoded])[which],
+        laws=np.array([e.law for e in kinds])[which],
+        law_places=np.array([e.law_places for e in kinds])[which],
     )

@@ -17,9 +17,10 @@ from linkwork.errors import InputError
 
 from ..files import unknown_name
 from ..mechanisms import InitialState, Parameters, output_units
+from ..numerics.workers import interruptible
 from ..units import Amount, in_si
 from .arguments import driven, started, takes_published, usual_times
-from .events import RunInterrupted, interruptible, shown
+from .events import RunInterrupted, shown
 from .fmu import CosimulationError, FmuModel, FmuRun
 from .inputs import Inputs, release, sample
 from .prepared import Run, Settings

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Iterable, Sequence
-from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
+from functools import partial
 from itertools import chain
 from pathlib import Path
 from typing import Any
@@ -19,11 +19,12 @@ from linkwork.mechanism import Mechanism
 from ..files import unknown_name
 from ..mechanisms import InitialState, Parameters, mechanism_of
 from ..notebook import format_count
+from ..numerics.workers import WorkersLost, check_jobs, interruptible, over_workers
 from ..units import Amount, in_si
 from .arguments import driven, started, takes_published
 from .batches import NOT_RUN, Result, Task, solve
 from .equations import machine
-from .events import interruptible, shown
+from .events import shown
 from .inputs import Inputs, compiled_source, encode, given
 from .prepared import outputs_of
 from .signals import Function
@@ -131,9 +132,9 @@ class EnsembleInterrupted(Interrupted):
 class EnsembleBroken(LinkworkError):
     """The workers of an ensemble failed, as where one was killed; ``ensemble`` holds what was done."""
 
-    def __init__(self, ensemble: Ensemble, folder: Path | None, error: Exception) -> None:
+    def __init__(self, ensemble: Ensemble, folder: Path | None, error: WorkersLost) -> None:
         self.ensemble = ensemble
-        super().__init__(f"the workers failed ({type(error).__name__}) with {_kept(ensemble, folder)}")
+        super().__init__(f"{error}, with {_kept(ensemble, folder)}")
 
 
 def _kept(ensemble: Ensemble, folder: Path | None) -> str:
@@ -164,10 +165,9 @@ def simulate_many(
     """Run many mechanisms, or one under many inputs, in batches of compiled calls.
 
     ``inputs`` and ``initial`` are one for all or as many as ``parameters``; all inputs must drive the same way and share
-    their Python functions, if they have any. The batches go through joblib: ``n_jobs`` threads here, which the compiled
-    solver keeps busy side by side; or, inside ``joblib.parallel_config(backend="dask")``, the cores of a Dask cluster; of a
-    Ray cluster, with ``backend="ray"`` once ``ray.util.joblib.register_ray()`` has been called; or processes, with
-    ``backend="loky"``.
+    their Python functions, if they have any. The batches go over ``n_jobs`` threads here, which the compiled solver keeps busy
+    side by side; or over the workers of the backend that `joblib.parallel_config` has set: "dask" for a Dask cluster, "loky"
+    for processes.
 
     Parameters
     ----------
@@ -194,7 +194,7 @@ def simulate_many(
     EnsembleInterrupted
         On Ctrl-C; carries what was computed.
     EnsembleBroken
-        If a worker was killed; carries what was computed.
+        If workers are killed again and again, or a cluster is gone; carries what was computed.
 
     Examples
     --------
@@ -208,8 +208,7 @@ def simulate_many(
         raise InputError("an ensemble needs at least one set of parameters")
     if batch < 1:
         raise InputError(f"batch is {batch}: it must be at least 1")
-    if n_jobs == 0:
-        raise InputError("0 cores: it must be a number of them, or -1 for all")
+    check_jobs(n_jobs)
     mechanism = mechanism_of(parameters[0])
     if any(mechanism_of(p) is not mechanism for p in parameters):
         raise InputError("an ensemble's parameters must all be of one mechanism")
@@ -222,7 +221,7 @@ def simulate_many(
     encoded = encode(all_inputs[0], mechanism)
     compiled_source(encoded)
     code = "" if where is None else _code(mechanism, chain.from_iterable(encoded.functions))
-    tasks = (
+    tasks = [
         Task(
             mechanism=mechanism,
             settings=settings,
@@ -235,47 +234,20 @@ def simulate_many(
             code=code,
         )
         for k in range(0, len(parameters), batch)
-    )
+    ]
     gathered = _Gathered(parameters, mechanism, settings.times, names, outputs is not None)
     gathered.modes[:] = list(encoded.modes.values())
-    interrupted, broken = _run_all(tasks, gathered, n_jobs, progress)
-    if broken is not None:
-        raise EnsembleBroken(gathered.ensemble(), where, broken) from broken
-    if interrupted and np.any(gathered.status == NOT_RUN):
-        raise EnsembleInterrupted(gathered.ensemble(), where)
-    return gathered.ensemble()
-
-
-def _run_all(
-    tasks: Iterable[Task], gathered: _Gathered, n_jobs: int | None, progress: bool
-) -> tuple[bool, Exception | None]:
-    """Solve all tasks; whether they were interrupted, and what broke the workers."""
-    import joblib
-
-    # threads hear an interrupt by the list that they share; other processes are stopped
-    backend = joblib.parallel.get_active_backend(prefer="threads")[0]
-    shared = joblib.effective_n_jobs(n_jobs) == 1 or getattr(backend, "supports_sharedmem", False)
-    hearing: AbstractContextManager[list[bool]] = interruptible() if shared else nullcontext([])
-    with (
-        hearing as heard,
-        shown(progress, float(len(gathered.status))) as show,
-    ):
-        results: Any = joblib.Parallel(n_jobs=n_jobs, prefer="threads", return_as="generator_unordered")(
-            joblib.delayed(solve)(task, heard) for task in tasks
-        )
+    with interruptible() as heard, shown(progress, float(len(parameters))) as show:
         try:
-            for result in results:
+            for _, result in over_workers(partial(solve, heard=heard), tasks, heard, n_jobs=n_jobs, threads=True):
                 if result is not None:
                     gathered.add(result)
                     show(float(np.count_nonzero(gathered.status != NOT_RUN)))
-        except KeyboardInterrupt:
-            heard.append(True)
-        except LinkworkError:
-            raise
-        except Exception as error:
-            # of any backend: a worker was killed, a scheduler was lost
-            return bool(heard), error
-    return bool(heard), None
+        except WorkersLost as error:
+            raise EnsembleBroken(gathered.ensemble(), where, error) from error
+    if heard and np.any(gathered.status == NOT_RUN):
+        raise EnsembleInterrupted(gathered.ensemble(), where)
+    return gathered.ensemble()
 
 
 class _Gathered:
@@ -292,9 +264,9 @@ class _Gathered:
         m, n = len(parameters), len(times)
         self.parameters, self.times, self.names, self.chosen = tuple(parameters), times, names, chosen
         samples = 0 if chosen else n
-        self.states = np.full((m, samples, mechanism.size), np.nan)
-        self.forces = np.full((m, samples, len(mechanism.channels)), np.nan)
-        self.values = np.full((m, n, len(names)), np.nan) if chosen else None
+        self.states = np.empty((m, samples, mechanism.size))
+        self.forces = np.empty((m, samples, len(mechanism.channels)))
+        self.values = np.empty((m, n, len(names))) if chosen else None
         self.status = np.full(m, NOT_RUN)
         self.messages = ["not run: interrupted"] * m
         self.counts = np.zeros(m, dtype=np.int64)
@@ -303,15 +275,17 @@ class _Gathered:
 
     def add(self, result: Result) -> None:
         rows = slice(result.first, result.first + len(result.status))
-        if self.values is not None:
-            self.values[rows] = result.data
-        else:
-            size = self.states.shape[2]
-            self.states[rows], self.forces[rows] = result.data[..., :size], result.data[..., size:]
+        for array, samples in zip(self._samples(), result.samples):
+            array[rows] = samples
         self.status[rows], self.counts[rows], self.energies[rows] = result.status, result.counts, result.energies
         self.messages[rows] = result.messages
 
+    def _samples(self) -> list[NDArray[np.float64]]:
+        return [self.states, self.forces] if self.values is None else [self.values]
+
     def ensemble(self) -> Ensemble:
+        for array in self._samples():
+            array[self.counts == 0] = np.nan
         return Ensemble(
             time=self.times,
             states=self.states,

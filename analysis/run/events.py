@@ -1,9 +1,7 @@
-"""Events: what to look out for in a run, and how a run that is interrupted tells what it has."""
+"""Events: what to look out for in a run, how a run that is interrupted tells what it has, and its progress."""
 
 from __future__ import annotations
 
-import signal
-import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -84,26 +82,6 @@ class RunInterrupted(Interrupted):
     def __init__(self, trajectory: Trajectory) -> None:
         self.trajectory = trajectory
         super().__init__(f"interrupted at t = {trajectory.time[-1]:.6g} s" if len(trajectory) else "interrupted")
-
-
-@contextmanager
-def interruptible() -> Iterator[list[bool]]:
-    """Hear Ctrl-C as an entry in a list, to be looked at between two steps or calls.
-
-    An exception would strike wherever it finds the interpreter: inside an FMU, whose interpreter this is, or inside Numba,
-    which may drop it.
-    """
-    heard: list[bool] = []
-    if threading.current_thread() is not threading.main_thread():
-        yield heard
-        return
-    before = signal.getsignal(signal.SIGINT)
-    signal.signal(signal.SIGINT, lambda *_: heard.append(True))
-    try:
-        yield heard
-    finally:
-        # None stands for a handler that was not set from Python
-        signal.signal(signal.SIGINT, signal.SIG_DFL if before is None else before)
 
 
 @contextmanager

@@ -5,7 +5,7 @@ One object serves `simulate` and `cosimulate`, and every mechanism: which channe
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from itertools import chain
@@ -121,6 +121,18 @@ class Inputs:
             mode.name: next((n for n, name in enumerate(mode.arguments) if name in self._given), mode.default)
             for mode in mechanism.modes
         }
+
+    def constants(self, names: Sequence[str]) -> list[float] | None:
+        """Values of channels that are constant all; None where one of them is not."""
+        values = []
+        for name in names:
+            total, value = 0.0, self._given.get(name)
+            for part in (value,) if type(value) is float else _parts(value):
+                if not isinstance(part, _NUMBER):
+                    return None
+                total += float(part)
+            values.append(total)
+        return values
 
     @property
     def held_exactly(self) -> bool:

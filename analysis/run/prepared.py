@@ -13,9 +13,10 @@ from linkwork.errors import InputError
 from linkwork.mechanism import Mechanism
 
 from ..mechanisms import InitialState, Parameters, mechanism_of
+from ..numerics.workers import interruptible
 from .angles import WholeTurns
 from .equations import OUTPUTS, machine
-from .events import Event, RunInterrupted, interruptible, shown
+from .events import Event, RunInterrupted, shown
 from .inputs import Encoded, Inputs, NotFiniteError, align, compile_function, compiled_source, encode, given, sample
 from .trajectory import Occurrence, Trajectory
 
@@ -110,21 +111,6 @@ class Run:
             self.encoded.steady,
         )
 
-    def verdict(self, status: int, t: float, x: NDArray[np.float64]) -> tuple[int, str]:
-        """solver.status and solver.message of a run that ended with a status of the compiled code."""
-        from . import compiled as k
-
-        where = self.mechanism.where(x.tolist())
-        # a microsecond, at any time
-        at = f"{t:.9g}" if abs(t) < 1e3 else f"{t:.6f}"
-        if status == k.LIMIT:
-            return 3, f"limit of assembly at t = {at} s, {where}"
-        if status == k.NO_STEP:
-            return 4, f"the step size fell below what t = {at} s can resolve, {where}"
-        if status == k.RUNNING:
-            return 4, f"{self.settings.max_steps} steps did not suffice: stopped at t = {at} s, {where}"
-        return 0, ""
-
     def lost(self, channel: int, t: float, x: NDArray[np.float64]) -> NotFiniteError:
         """The error of an input that is not finite, by the number of its channel."""
         return NotFiniteError(self.encoded, channel, t, x)
@@ -182,7 +168,7 @@ class Run:
         if carry["started"] and times[-1] < t:
             # the run ended between two samples: its last configuration is recorded too
             times, states, forces = np.append(times, t), np.vstack([states, x]), np.vstack([forces, held])
-        code, message = self.verdict(status, t, x + turns.taken)
+        code, message = verdict(self.mechanism, self.settings, status, t, x + turns.taken)
         trajectory = Trajectory(
             time=times,
             values=turns.put_back(outputs_of(self.mechanism, problem.modes, problem.p, states, forces)),
@@ -238,6 +224,21 @@ class Run:
                 addresses[i] = kept[-1].address
         found = np.empty((EVENTS_PER_CALL * n, 2 + self.mechanism.size))
         return Watch(table, addresses, np.zeros(n), found, np.array(balance, dtype=np.int64)), kept
+
+
+def verdict(mechanism: Mechanism, settings: Settings, status: int, t: float, x: NDArray[np.float64]) -> tuple[int, str]:
+    """solver.status and solver.message of a run that ended with a status of the compiled code."""
+    from . import compiled as k
+
+    # a microsecond, at any time
+    at = f"t = {t:.9g} s" if abs(t) < 1e3 else f"t = {t:.6f} s"
+    if status == k.LIMIT:
+        return 3, f"limit of assembly at {at}, {mechanism.where(x.tolist())}"
+    if status == k.NO_STEP:
+        return 4, f"the step size fell below what {at} can resolve, {mechanism.where(x.tolist())}"
+    if status == k.RUNNING:
+        return 4, f"{settings.max_steps} steps did not suffice: stopped at {at}, {mechanism.where(x.tolist())}"
+    return 0, ""
 
 
 def outputs_of(

@@ -6,11 +6,12 @@ stations among the unknowns, and then by the area itself, whose absolute value i
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import product
 from math import inf, pi
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,6 +39,8 @@ AREAS = 6
 FINISHED, LONG = 4, 1500
 #: How many triangles of a region that is not convex are tried at a time.
 PIECES = 3
+#: Starts of one part of the work of several cores, at most: what is lost where it is interrupted.
+MOST = 32
 #: Linkages that differ by less than this, in shares of the longest link and in rad, count as one.
 DIFFERENT = 1e-3
 #: Share of the quality below which points count as met exactly (units squared).
@@ -74,12 +77,15 @@ def polish(
 ) -> Polished:
     """Go from every start to an optimum. On Ctrl-C what was done is returned, marked as interrupted."""
     cores = search.cores
-    size = 1 if cores == 1 else max(1, -(-len(starts) // (3 * cores)))
+    size = 1 if cores == 1 else min(MOST, max(1, -(-len(starts) // (3 * cores))))
     batches = [starts[k : k + size] for k in range(0, len(starts), size)]
     worker = Polisher(normal, limits, pivot)
-    # a polisher holds compiled solvers, which do not travel: each batch makes its own
-    fitted = worker.fit_all if cores == 1 else partial(_batch, normal, limits, pivot)
-    parts, interrupted = over_cores(fitted, batches, search, "polish")
+
+    def step(name: str) -> Callable[[Any], Any]:
+        # a polisher holds compiled solvers, which do not travel: each part of the work makes its own
+        return getattr(worker, name) if cores == 1 else partial(_apart, name, normal, limits, pivot)
+
+    parts, interrupted = over_cores(step("fit_all"), batches, search, "polish")
     found = [answer for part in parts for answer in part]
     # an interruption after the last search has nothing to stop
     interrupted = interrupted and len(found) < len(starts)
@@ -87,7 +93,7 @@ def polish(
     if not interrupted:
         if normal.normals is not None:
             best = distinct(kept, AREAS, pivot)
-            kept, interrupted = over_cores(worker.area, best, replace(search, n_jobs=1), "area")
+            kept, interrupted = over_cores(step("area"), best, search, "area")
         elif pivot is None:
             kept = [*map(worker.finish, kept[:FINISHED]), *kept[FINISHED:]]
         kept = kept_of(kept)
@@ -99,8 +105,9 @@ def kept_of(answers: Sequence[Answer]) -> list[Answer]:
     return sorted((a for a in answers if a.feasible), key=lambda a: a.start.quality)
 
 
-def _batch(normal: Normal, limits: Limits, pivot: PivotUnknown | None, starts: Sequence[Start]) -> list[Answer]:
-    return Polisher(normal, limits, pivot).fit_all(starts)
+def _apart(name: str, normal: Normal, limits: Limits, pivot: PivotUnknown | None, item: Any) -> Any:
+    """A method of a `Polisher`, by its name, in another process or thread."""
+    return getattr(Polisher(normal, limits, pivot), name)(item)
 
 
 def distinct(answers: Sequence[Answer], count: int, pivot: PivotUnknown | None = None) -> list[Answer]:

@@ -136,9 +136,12 @@ def test_options_and_settings_reach_the_search(linkwork, tmp_path) -> None:
     assert first == second
     assert not list(Path("a").glob("*.png"))
     assert len(np.genfromtxt("a/best-curve.csv", delimiter=",", skip_header=1)) == 36
-    for option, value, said in (("--method", "simplx", "did you mean simplex?"), ("--jobs", 0, "search.jobs is 0")):
+    for option, value, code, said in (
+        ("--method", "simplx", cli.WRONG, "did you mean simplex?"),
+        ("--jobs", 0, 2, "0 is neither -1, for all, nor a number of cores"),
+    ):
         result = linkwork("synthesize", "case.toml", option, value)
-        assert result.exit_code == cli.WRONG
+        assert result.exit_code == code
         assert said in " ".join(result.stderr.split())
     values = np.genfromtxt("a/solutions.csv", delimiter=",", names=True, deletechars="")
     assert np.max(values["ground_length_[m]"]) <= 0.45 + 1e-6

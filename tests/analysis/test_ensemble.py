@@ -7,7 +7,7 @@ import signal
 import subprocess
 import sys
 import threading
-from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import replace
 from math import nan
 from pathlib import Path
@@ -251,25 +251,44 @@ def test_an_interrupt_is_heard_and_keeps_what_was_done(n_jobs: int | None, tmp_p
 
 
 @pytest.mark.slow
-def test_a_killed_worker_leaves_what_was_done(tmp_path: Path) -> None:
+@pytest.mark.filterwarnings("ignore:a worker was killed")
+@pytest.mark.parametrize("times", [1, 1000])
+def test_killed_workers_leave_what_was_done(times: int, tmp_path: Path) -> None:
     from joblib.externals.loky import reusable_executor
 
     def kill() -> None:
         while len(list(tmp_path.glob("*.runs"))) < 20:
             sleep(0.01)
-        # asked for an executor, loky might make another
-        os.kill(next(iter(reusable_executor._executor._processes)), signal.SIGKILL)
+        for _ in range(times):
+            # asked for an executor, loky might make another
+            processes = list(getattr(reusable_executor._executor, "_processes", None) or ())
+            if over.is_set():
+                return
+            for process in processes[:1]:
+                with suppress(ProcessLookupError):
+                    os.kill(process, signal.SIGKILL)
+            sleep(0.01)
 
+    over = threading.Event()
     parameters = [replace(TABLE_3_1, slider_stiffness=500.0 + i) for i in range(400)]
     options: dict[str, Any] = {"stop_time": 20.0, "step": 0.1, "batch": 4, "folder": tmp_path}
     killer = threading.Thread(target=kill)
     killer.start()
-    with joblib.parallel_config(backend="loky"), pytest.raises(EnsembleBroken, match="the workers failed") as caught:
-        simulate_many(parameters, Inputs(speed=SPEED), n_jobs=2, **options)
+    with joblib.parallel_config(backend="loky"):
+        if times == 1:
+            many = simulate_many(parameters, Inputs(speed=SPEED), n_jobs=2, **options)
+            assert (many.status == 0).all()
+        else:
+            with pytest.raises(
+                EnsembleBroken, match=r"workers were killed 4 times, .*, with \d+ of 400 runs done"
+            ) as caught:
+                simulate_many(parameters, Inputs(speed=SPEED), n_jobs=2, **options)
+            many = caught.value.ensemble
+    over.set()
     killer.join()
-    many = caught.value.ensemble
     done = np.flatnonzero(many.status == 0)
-    assert 0 < len(done) < 400
+    assert 0 < len(done) < 400 or times == 1
+    assert np.isnan(many.states[many.status != 0]).all()
     assert_same(
         many, int(done[0]), parameters=parameters[done[0]], inputs=Inputs(speed=SPEED), stop_time=20.0, step=0.1
     )
@@ -303,31 +322,6 @@ def test_progress_changes_nothing(capfd: pytest.CaptureFixture[str]) -> None:
 def test_what_is_not_usable_is_refused_and_names_its_run(change: dict[str, Any], error: type, said: str) -> None:
     with pytest.raises(error, match=said):
         simulate_many(**{"parameters": SPRINGS[:3]} | OPTIONS | change)
-
-
-@pytest.fixture(scope="module")
-def cluster() -> Iterator[Any]:
-    distributed = pytest.importorskip("distributed")
-    with (
-        distributed.LocalCluster(n_workers=1, threads_per_worker=2, processes=False, dashboard_address=":0") as local,
-        distributed.Client(local) as client,
-    ):
-        yield client
-
-
-def test_batches_go_over_a_dask_cluster(cluster: Any) -> None:
-    inputs = [Inputs(torque=torque) for torque in TORQUES]
-    here = simulate_many(SPRINGS, inputs, batch=2, **OPTIONS)
-    before = cluster.run_on_scheduler(_transitions)
-    with joblib.parallel_config(backend="dask"):
-        there = simulate_many(SPRINGS, inputs, batch=2, **OPTIONS)
-    assert np.array_equal(here.states, there.states)
-    # each of the four batches was a task of the cluster: it waited, was processed, was in memory, was released
-    assert cluster.run_on_scheduler(_transitions) - before >= 3 * 4
-
-
-def _transitions(dask_scheduler: Any) -> int:
-    return int(dask_scheduler.transition_counter)
 
 
 def test_example_with_dask() -> None:

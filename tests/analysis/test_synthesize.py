@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import signal
 import threading
+from collections.abc import Iterator
 from dataclasses import replace
 from math import radians
 from typing import Any
@@ -13,6 +14,7 @@ import pytest
 from numpy.typing import NDArray
 
 from analysis.numerics.fourier import FourierSeries
+from analysis.numerics.workers import over_workers
 from analysis.synthesis import (
     ANGLES,
     LENGTHS,
@@ -105,13 +107,19 @@ class TestResult:
 
     @pytest.mark.parametrize("n_jobs", [1, 2])
     def test_interrupted_it_hands_over_the_best_so_far(self, monkeypatch: pytest.MonkeyPatch, n_jobs: int) -> None:
-        timer = threading.Timer(0.5 if n_jobs == 1 else 2.0, signal.raise_signal, [signal.SIGINT])
+        timer = threading.Timer(0.5, signal.raise_signal, [signal.SIGINT])
 
         def long(normal: Any, limits: Any, starts: Any, **more: Any) -> Polished:
-            timer.start()
             return polish(normal, limits, list(starts) * 200, **more)
 
+        def interrupted(*arguments: Any, **more: Any) -> Iterator[Any]:
+            for found in over_workers(*arguments, **more):
+                if not timer.ident:
+                    timer.start()
+                yield found
+
         monkeypatch.setattr("analysis.synthesis.solve.polish", long)
+        monkeypatch.setattr("analysis.synthesis.search.over_workers", interrupted)
         with pytest.raises(SynthesisInterrupted, match=r"stopped after \d+ of \d+ searches") as caught:
             synthesize(TASK, search=replace(QUICK, n_jobs=n_jobs))
         timer.join()

@@ -13,7 +13,7 @@ from linkwork.errors import InputError
 
 from ... import figures
 from ... import slider_crank as sc
-from ..common import console, folder_of, print_written, quantity, show_table
+from ..common import console, folder_of, print_written, quantity, show_table, workers_options
 from .options import Chosen, Problem, Units, about_mechanism, note, out_option, plot_option, with_problem
 
 if TYPE_CHECKING:
@@ -56,6 +56,7 @@ _WIDTHS = {"m": "0.25 mm", "rad": "0.1 deg"}
 @click.option(
     "--seed", type=click.IntRange(0), default=0, show_default=True, help="The same seed gives the same samples."
 )
+@workers_options()
 @out_option
 @plot_option
 def tolerances(
@@ -67,6 +68,7 @@ def tolerances(
     angle: str,
     samples: int,
     seed: int,
+    jobs: int | None,
     out: str,
     plot: bool,
 ) -> None:
@@ -100,7 +102,7 @@ def tolerances(
     headings = ("quantity", "to", "unit", f"at {here}", "greatest", "at [deg]")
     show_table(f"{chosen.title}: sensitivities", headings, rows, words=("quantity", "to", "unit"))
     with console.status(f"{samples} samples at {len(turn)} crank angles"):
-        found = sc.monte_carlo(turn, allowed, quantities=quantities, samples=samples, seed=seed)
+        found = sc.monte_carlo(turn, allowed, quantities=quantities, samples=samples, seed=seed, n_jobs=jobs)
     stem = str(folder_of(out) / chosen.name)
     files = [write_csv(f"{stem}-sensitivities.csv", slopes)]
     files.append(write_csv(f"{stem}-tolerances.csv", _spread_columns(found, units)))

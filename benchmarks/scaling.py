@@ -1,0 +1,112 @@
+"""How work goes over cores: each kind of it on one worker and on two, as processes and as a Dask cluster on this machine.
+
+    python -m benchmarks.scaling
+
+A worker is a process. Each time is the best of several, taken in turn, by the clock: the ratios need as many free cores as
+there are workers. The results are compared bit by bit.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable
+from dataclasses import replace
+from tempfile import TemporaryDirectory
+from time import perf_counter
+from typing import Any
+
+import joblib
+import numpy as np
+from distributed import Client, LocalCluster
+from rich.console import Console
+from rich.table import Table
+
+from analysis import Inputs, Tolerance, force_turn, monte_carlo, simulate_many
+from analysis.numerics.workers import over_workers
+from analysis.periodic import Drive, grid, plane
+from analysis.synthesis import Search, TimedPath, synthesize
+from linkwork.five_bar.published import SETS, TABLE_3_1
+
+SPEED = SETS["table-3.1"].crank_speed
+
+
+def ensemble() -> Any:
+    springs = [replace(TABLE_3_1, slider_stiffness=500.0 + n) for n in range(1000)]
+    return simulate_many(springs, Inputs(speed=SPEED), stop_time=10.0, step=0.1).states
+
+
+def chart() -> Any:
+    operation = plane(TABLE_3_1, Drive(speed=SPEED), "drive.speed", "slider.damping")
+    with TemporaryDirectory() as folder:
+        return grid(operation, np.linspace(20.0, 60.0, 120), np.linspace(10.0, 60.0, 60), folder=folder).starts
+
+
+def synthesis() -> Any:
+    angle = np.linspace(0.0, 2.0 * np.pi, 24, endpoint=False)
+    ellipse = np.column_stack([0.2 * np.cos(angle), 0.1 * np.sin(angle)])
+    found = synthesize(TimedPath(points=ellipse), search=Search(starts=96, candidates=1 << 12))
+    return np.array([list(s.linkage.values().values()) for s in found.solutions])
+
+
+def samples() -> Any:
+    turn = force_turn("rahman-a4-10-s1-3.5", angles=np.linspace(0.0, 6.2, 48))
+    tolerances = [Tolerance("rod.length", 5e-4), Tolerance("guide.offset", 5e-4)]
+    found = monte_carlo(turn, tolerances, quantities=("slider.position", "crank_pin.fz"), samples=200_000)
+    return found.spreads["crank_pin.fz"].percentiles.filled()
+
+
+WORK: dict[str, Callable[[], Any]] = {
+    "ensemble, 1000 runs of 10 s": ensemble,
+    "chart, 120 x 60 orbits": chart,
+    "synthesis, 96 starts": synthesis,
+    "Monte Carlo, 48 x 200,000 samples": samples,
+}
+
+
+def timed(work: Callable[[], Any], backend: str | None) -> tuple[float, Any]:
+    """Time by the clock (s), and the result, on one worker or on two of a backend."""
+    if backend is None:
+        begun = perf_counter()
+        result = work()
+        return perf_counter() - begun, result
+    with joblib.parallel_config(backend, n_jobs=2):
+        begun = perf_counter()
+        result = work()
+        return perf_counter() - begun, result
+
+
+def nothing(_: int) -> None:
+    """Work that makes the workers import what they need."""
+    import analysis.periodic.grids
+    import analysis.run.compiled
+    import analysis.slider_crank
+    import analysis.synthesis  # noqa: F401
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--repeats", type=int, default=3, help="of each time (default: %(default)s)")
+    repeats = parser.parse_args().repeats
+    backends = (None, "loky", "dask")
+    table = Table(
+        "work", "one worker", "two processes", "ratio", "two workers of Dask", "ratio", "bits",
+        title=f"{joblib.cpu_count()} cores",
+    )  # fmt: skip
+    with LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=":0") as cluster, Client(cluster):
+        for backend in backends[1:]:
+            with joblib.parallel_config(backend, n_jobs=2):
+                list(over_workers(nothing, range(8)))
+        for name, work in WORK.items():
+            found = [[timed(work, backend) for backend in backends] for _ in range(repeats + 1)]
+            # the first compiles
+            one, processes, dask = (min(row[n][0] for row in found[1:]) for n in range(len(backends)))
+            alike = all(np.array_equal(result, found[0][0][1], equal_nan=True) for row in found for _, result in row)
+            table.add_row(
+                name, f"{one:.2f} s", f"{processes:.2f} s", f"{one / processes:.2f}", f"{dask:.2f} s",
+                f"{one / dask:.2f}", "the same" if alike else "DIFFERENT",
+            )  # fmt: skip
+    Console(width=120).print(table)
+
+
+if __name__ == "__main__":
+    main()
