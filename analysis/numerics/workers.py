@@ -114,6 +114,11 @@ def over_workers(
     ------
     WorkersLost
         If workers were killed more than `RETRIES` times, or fail otherwise.
+
+    Notes
+    -----
+    A process of this machine that is killed just while it hands over a result larger than a pipe holds, 64 KiB, is not noticed
+    by joblib's own processes: the iteration waits until Ctrl-C. A Dask cluster notices.
     """
     import joblib
 

@@ -3,11 +3,16 @@
 from __future__ import annotations
 
 import inspect
+import mmap
+import os
+import warnings
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from itertools import chain
+from math import prod
 from pathlib import Path
+from tempfile import TemporaryFile
 from typing import Any
 
 import numpy as np
@@ -175,7 +180,8 @@ def simulate_many(
         Outputs of the FMI contract to keep; by default states and channels, from which `Ensemble` computes all outputs.
     folder : path, optional
         Where each batch is kept, once it is done, in a file under a name made from all it depends on: the same call goes on
-        from the batches that are there. Files that are damaged are computed again.
+        from the batches that are there. Files that are damaged are computed again. The arrays of the ensemble are on that
+        disk too, as long as it is in use, and take little memory.
     batch : int
         Runs that are prepared and solved together.
 
@@ -235,7 +241,7 @@ def simulate_many(
         )
         for k in range(0, len(parameters), batch)
     ]
-    gathered = _Gathered(parameters, mechanism, settings.times, names, outputs is not None)
+    gathered = _Gathered(parameters, mechanism, settings.times, names, outputs is not None, where)
     gathered.modes[:] = list(encoded.modes.values())
     with interruptible() as heard, shown(progress, float(len(parameters))) as show:
         try:
@@ -260,23 +266,50 @@ class _Gathered:
         times: NDArray[np.float64],
         names: tuple[str, ...],
         chosen: bool,
+        folder: Path | None,
     ) -> None:
         m, n = len(parameters), len(times)
         self.parameters, self.times, self.names, self.chosen = tuple(parameters), times, names, chosen
         samples = 0 if chosen else n
-        self.states = np.empty((m, samples, mechanism.size))
-        self.forces = np.empty((m, samples, len(mechanism.channels)))
-        self.values = np.empty((m, n, len(names))) if chosen else None
+        self.maps: list[mmap.mmap] = []
+        self.states = self._room((m, samples, mechanism.size), folder)
+        self.forces = self._room((m, samples, len(mechanism.channels)), folder)
+        self.values = self._room((m, n, len(names)), folder) if chosen else None
         self.status = np.full(m, NOT_RUN)
         self.messages = ["not run: interrupted"] * m
         self.counts = np.zeros(m, dtype=np.int64)
         self.energies = np.full(m, np.nan)
         self.modes = np.zeros(len(mechanism.modes))
 
+    def _room(self, shape: tuple[int, ...], folder: Path | None) -> NDArray[np.float64]:
+        """An array; with a folder in a file there that has no name, so that of it only what is looked at takes memory."""
+        size = 8 * prod(shape)
+        if folder is None or not size:
+            return np.empty(shape)
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            with TemporaryFile(dir=folder) as file:
+                file.truncate(size)
+                if hasattr(os, "posix_fallocate"):
+                    # a full disk is found out now, and not by a signal
+                    os.posix_fallocate(file.fileno(), 0, size)
+                self.maps.append(mmap.mmap(file.fileno(), size))
+        except OSError as error:
+            warnings.warn(
+                f"{folder} has no room for {size / 1e6:.3g} MB ({error.strerror}): they are in memory",
+                RuntimeWarning,
+                stacklevel=3,
+            )
+            return np.empty(shape)
+        return np.frombuffer(self.maps[-1]).reshape(shape)
+
     def add(self, result: Result) -> None:
         rows = slice(result.first, result.first + len(result.status))
         for array, samples in zip(self._samples(), result.samples):
             array[rows] = samples
+        for mapped in self.maps:
+            if hasattr(mmap, "MADV_DONTNEED"):
+                mapped.madvise(mmap.MADV_DONTNEED)
         self.status[rows], self.counts[rows], self.energies[rows] = result.status, result.counts, result.energies
         self.messages[rows] = result.messages
 

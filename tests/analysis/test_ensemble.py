@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import signal
 import subprocess
@@ -49,6 +50,9 @@ TORQUES = [
     InductionMotor(breakdown_torque=5.0, breakdown_slip=0.2, synchronous_speed=50.0),
     steps([0.0, 0.2], [1.0, 5.0]),
 ]
+#: Runs that are killed; a batch of them is less than 16 KiB, which a process hands over at once or not at all.
+MANY = [replace(TABLE_3_1, slider_stiffness=500.0 + i) for i in range(400)]
+LONG: dict[str, Any] = {"stop_time": 20.0, "step": 1.0, "batch": 4}
 SPRINGS = [replace(TABLE_3_1, slider_stiffness=500.0 + 200.0 * i) for i in range(len(TORQUES))]
 
 
@@ -225,6 +229,59 @@ def test_batches_on_disk_are_gone_on_with(outputs: Any, tmp_path: Path, monkeypa
     assert len(list(tmp_path.iterdir())) == 12
 
 
+def resident() -> int:
+    """Memory of this process (bytes)."""
+    return int(Path("/proc/self/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE")
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="memory is read from /proc")
+def test_an_ensemble_on_disk_takes_little_memory(tmp_path: Path) -> None:
+    options: dict[str, Any] = {"stop_time": 2.0, "step": 1e-3, "batch": 4}
+    parameters = [replace(TABLE_3_1, slider_stiffness=500.0 + i) for i in range(400)]
+    simulate_many(parameters[:8], Inputs(speed=SPEED), **options)
+    before = resident()
+    kept = simulate_many(parameters, Inputs(speed=SPEED), folder=tmp_path, **options)
+    size = kept.states.nbytes + kept.forces.nbytes
+    assert size > 60e6
+    assert resident() - before < 0.2 * size
+    # none but the batches has a name
+    assert {path.suffix for path in tmp_path.iterdir()} == {".runs"}
+    held = simulate_many(parameters, Inputs(speed=SPEED), **options)
+    assert same(kept, held)
+
+
+def test_where_the_disk_has_no_room_the_results_are_in_memory(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(*_: int) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(os, "posix_fallocate", full, raising=False)
+    with pytest.warns(RuntimeWarning, match=r"has no room for .* MB \(No space left on device\): they are in memory"):
+        there = simulate_many(SPRINGS, Inputs(speed=SPEED), folder=tmp_path, **OPTIONS)
+    assert same(there, simulate_many(SPRINGS, Inputs(speed=SPEED), **OPTIONS))
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(sys.platform == "win32", reason="SIGKILL")
+def test_an_ensemble_that_is_killed_is_gone_on_with(tmp_path: Path) -> None:
+    code = f"""
+from tests.analysis.test_ensemble import *
+simulate_many(MANY, Inputs(speed=SPEED), folder={str(tmp_path)!r}, **LONG)
+"""
+    process = subprocess.Popen([sys.executable, "-c", code], cwd=Path(__file__).parents[2])
+    try:
+        while process.poll() is None and len(list(tmp_path.glob("*.runs"))) < 5:
+            sleep(0.01)
+    finally:
+        process.kill()
+    assert process.wait() == -signal.SIGKILL
+    done = {path: path.stat().st_mtime_ns for path in tmp_path.glob("*.runs")}
+    assert 5 <= len(done) < 100
+    again = simulate_many(MANY, Inputs(speed=SPEED), folder=tmp_path, **LONG)
+    assert len(list(tmp_path.glob("*.runs"))) == 100
+    assert {path: path.stat().st_mtime_ns for path in done} == done
+    assert same(again, simulate_many(MANY, Inputs(speed=SPEED), **LONG))
+
+
 @pytest.mark.parametrize("n_jobs", [None, 2])
 def test_an_interrupt_is_heard_and_keeps_what_was_done(n_jobs: int | None, tmp_path: Path) -> None:
     # one short batch, and then runs of many seconds each
@@ -270,8 +327,8 @@ def test_killed_workers_leave_what_was_done(times: int, tmp_path: Path) -> None:
             sleep(0.01)
 
     over = threading.Event()
-    parameters = [replace(TABLE_3_1, slider_stiffness=500.0 + i) for i in range(400)]
-    options: dict[str, Any] = {"stop_time": 20.0, "step": 0.1, "batch": 4, "folder": tmp_path}
+    parameters = MANY
+    options: dict[str, Any] = {**LONG, "folder": tmp_path}
     killer = threading.Thread(target=kill)
     killer.start()
     with joblib.parallel_config(backend="loky"):
@@ -290,7 +347,7 @@ def test_killed_workers_leave_what_was_done(times: int, tmp_path: Path) -> None:
     assert 0 < len(done) < 400 or times == 1
     assert np.isnan(many.states[many.status != 0]).all()
     assert_same(
-        many, int(done[0]), parameters=parameters[done[0]], inputs=Inputs(speed=SPEED), stop_time=20.0, step=0.1
+        many, int(done[0]), parameters=parameters[done[0]], inputs=Inputs(speed=SPEED), stop_time=20.0, step=1.0
     )
     kept = len(list(tmp_path.glob("*.runs")))
     assert kept >= len(done) // 4
