@@ -45,7 +45,7 @@ figures: $(RUN)
 
 bench: $(DEV)
 	$(BIN)/pip install --quiet --editable '.[dev,bench]'
-	for part in solvers fmu stability synthesis slider_crank; do $(BIN)/python -m benchmarks.$$part || exit; done
+	for part in solvers fmu stability synthesis slider_crank ensembles scaling; do $(BIN)/python -m benchmarks.$$part || exit; done
 
 # does a test fail for every small change of the code? make mutate OF=analysis/files/tables.py; without OF it takes days
 mutate: $(DEV)

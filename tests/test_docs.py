@@ -195,6 +195,13 @@ def test_the_page_of_the_slider_crank_runs_and_says_what_is_so(tmp_path):
         assert (tmp_path / name).exists()
 
 
+@pytest.mark.slow
+def test_the_page_of_several_machines_runs_and_says_what_is_so(tmp_path):
+    pytest.importorskip("distributed")
+    commands, checked, _ = run_page("workers.md", tmp_path)
+    assert (commands, checked) == (1, 1)
+
+
 def test_pictures_of_the_documentation_are_small():
     pictures = [picture for name in ("hand-drawn", "slider-crank") for picture in (ROOT / "docs").glob(f"{name}*.png")]
     assert pictures
