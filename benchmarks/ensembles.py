@@ -1,6 +1,7 @@
 """Throughput of `simulate_many` over short runs, as ratios within this one process.
 
     python -m benchmarks.ensembles --runs 3000
+    python -m benchmarks.ensembles --runs 100000 --disk
 
 Runs of 0.1 s of the five-bar slider of Table 3.1 with varying springs: at commanded speeds, and under torques. The ratio to
 `simulate` is by CPU time, so that it holds on a machine that is busy; that of two threads is by the clock, and needs two
@@ -10,8 +11,10 @@ free cores.
 from __future__ import annotations
 
 import argparse
+import resource
 from collections.abc import Callable
 from dataclasses import replace
+from tempfile import TemporaryDirectory
 from time import perf_counter, process_time
 
 from rich.console import Console
@@ -19,6 +22,7 @@ from rich.table import Table
 
 from analysis import Inputs, simulate, simulate_many
 from analysis.run import compiled
+from linkwork.five_bar.parameters import FiveBarParameters
 from linkwork.five_bar.published import TABLE_3_1
 
 REPEATS = 7
@@ -67,13 +71,32 @@ def compiled_time(run: Callable[[], object]) -> float:
     return min(totals)
 
 
+def report_memory(springs: list[FiveBarParameters]) -> None:
+    """Print the peak of memory of an ensemble with a folder, and of this process before it."""
+
+    def peak() -> float:
+        return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0
+
+    with TemporaryDirectory(dir=".") as folder:
+        before = peak()
+        runs = simulate_many(springs, Inputs(speed=30.0), folder=folder, **OPTIONS)
+        size = (runs.states.nbytes + runs.forces.nbytes) / 2.0**20
+        print(f"{len(runs)} runs, {size:.0f} MiB of results: peak {peak():.0f} MiB, {before:.0f} MiB before them")
+        del runs
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--runs", type=int, default=3000, help="how many (default: %(default)s)")
-    n = parser.parse_args().runs
+    parser.add_argument("--disk", action="store_true", help="instead the peak of memory of runs that are kept on disk")
+    options = parser.parse_args()
+    n = options.runs
     # evenly over all, which differ in their cost
     some = range(0, n, max(1, n // FEW))
     springs = [replace(TABLE_3_1, slider_stiffness=500.0 + 1000.0 * i / n) for i in range(n)]
+    if options.disk:
+        report_memory(springs)
+        return
     kinds = {
         "commanded speed": [Inputs(speed=20.0 + 10.0 * i / n) for i in range(n)],
         "torque": [Inputs(torque=10.0 * i / n) for i in range(n)],

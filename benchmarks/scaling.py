@@ -2,14 +2,16 @@
 
     python -m benchmarks.scaling
 
-A worker is a process. Each time is the best of several, taken in turn, by the clock: the ratios need as many free cores as
-there are workers. The results are compared bit by bit.
+A worker is a process. Times are by the clock, and of the processors in all processes together: what two workers need more than
+one is what it costs to spread the work, and holds on a machine that is busy; the clock needs as many free cores as there are
+workers. Each is the best of several, taken in turn. The results are compared bit by bit.
 """
 
 from __future__ import annotations
 
 import argparse
 from collections.abc import Callable
+from contextlib import nullcontext
 from dataclasses import replace
 from tempfile import TemporaryDirectory
 from time import perf_counter
@@ -17,6 +19,7 @@ from typing import Any
 
 import joblib
 import numpy as np
+import psutil
 from distributed import Client, LocalCluster
 from rich.console import Console
 from rich.table import Table
@@ -31,7 +34,7 @@ SPEED = SETS["table-3.1"].crank_speed
 
 
 def ensemble() -> Any:
-    springs = [replace(TABLE_3_1, slider_stiffness=500.0 + n) for n in range(1000)]
+    springs = [replace(TABLE_3_1, slider_stiffness=500.0 + n) for n in range(300)]
     return simulate_many(springs, Inputs(speed=SPEED), stop_time=10.0, step=0.1).states
 
 
@@ -56,23 +59,25 @@ def samples() -> Any:
 
 
 WORK: dict[str, Callable[[], Any]] = {
-    "ensemble, 1000 runs of 10 s": ensemble,
+    "ensemble, 300 runs of 10 s": ensemble,
     "chart, 120 x 60 orbits": chart,
     "synthesis, 96 starts": synthesis,
     "Monte Carlo, 48 x 200,000 samples": samples,
 }
 
 
-def timed(work: Callable[[], Any], backend: str | None) -> tuple[float, Any]:
-    """Time by the clock (s), and the result, on one worker or on two of a backend."""
-    if backend is None:
-        begun = perf_counter()
+def processor_time() -> float:
+    """Of this process and of those that it started (s)."""
+    own = psutil.Process()
+    return sum(sum(process.cpu_times()[:2]) for process in [own, *own.children(recursive=True)])
+
+
+def timed(work: Callable[[], Any], backend: str | None) -> tuple[float, float, Any]:
+    """Times by the clock and of the processors (s), and the result, on one worker or on two of a backend."""
+    with joblib.parallel_config(backend, n_jobs=2) if backend else nullcontext():
+        begun, spent = perf_counter(), processor_time()
         result = work()
-        return perf_counter() - begun, result
-    with joblib.parallel_config(backend, n_jobs=2):
-        begun = perf_counter()
-        result = work()
-        return perf_counter() - begun, result
+        return perf_counter() - begun, processor_time() - spent, result
 
 
 def nothing(_: int) -> None:
@@ -88,10 +93,9 @@ def main() -> None:
     parser.add_argument("--repeats", type=int, default=3, help="of each time (default: %(default)s)")
     repeats = parser.parse_args().repeats
     backends = (None, "loky", "dask")
-    table = Table(
-        "work", "one worker", "two processes", "ratio", "two workers of Dask", "ratio", "bits",
-        title=f"{joblib.cpu_count()} cores",
-    )  # fmt: skip
+    places = ("one worker", "two processes", "two workers of Dask")
+    headings = [f"{place}: {what}" for place in places for what in ("clock", "CPU")]
+    table = Table("work", *headings, "bits", title=f"{joblib.cpu_count()} cores")
     with LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=":0") as cluster, Client(cluster):
         for backend in backends[1:]:
             with joblib.parallel_config(backend, n_jobs=2):
@@ -99,12 +103,9 @@ def main() -> None:
         for name, work in WORK.items():
             found = [[timed(work, backend) for backend in backends] for _ in range(repeats + 1)]
             # the first compiles
-            one, processes, dask = (min(row[n][0] for row in found[1:]) for n in range(len(backends)))
-            alike = all(np.array_equal(result, found[0][0][1], equal_nan=True) for row in found for _, result in row)
-            table.add_row(
-                name, f"{one:.2f} s", f"{processes:.2f} s", f"{one / processes:.2f}", f"{dask:.2f} s",
-                f"{one / dask:.2f}", "the same" if alike else "DIFFERENT",
-            )  # fmt: skip
+            times = [min(row[n][what] for row in found[1:]) for n in range(len(backends)) for what in (0, 1)]
+            alike = all(np.array_equal(result, found[0][0][2], equal_nan=True) for row in found for *_, result in row)
+            table.add_row(name, *(f"{t:.2f} s" for t in times), "the same" if alike else "DIFFERENT")
     Console(width=120).print(table)
 
 
