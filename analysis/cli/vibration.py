@@ -384,13 +384,13 @@ def stability(
     "--position", nargs=2, metavar="FROM TO", help="Range of the first free coordinate, such as '-5 cm' '5 cm'."
 )
 @click.option("--rate", nargs=2, metavar="FROM TO", help="Range of its rate.")
-@click.option("--cores", default=-1, show_default=True, callback=_cores, help="Cores; -1 for all.")
+@workers_options(default=-1)
 def basins(
     chosen: _Chosen,
     points: int,
     position: tuple[str, str] | None,
     rate: tuple[str, str] | None,
-    cores: int,
+    jobs: int,
 ) -> None:
     """Report all periodic motions of a CASE file's or a published set's mechanism at one speed, and which start ends in which.
 
@@ -425,7 +425,7 @@ def basins(
         position=spans[0],
         rate=spans[1],
         start=start,
-        n_jobs=cores,
+        n_jobs=jobs,
         progress=console.is_terminal,
     )
     shares = [f"{picture.share(n):.1%} in motion {n + 1}" for n in range(len(picture.motions))]

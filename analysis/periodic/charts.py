@@ -238,7 +238,7 @@ def stability_chart(
     coexisting : bool
         Whether all motions of every point are sought, which takes some twenty times as long: see `coexistence`.
     n_jobs : int, optional
-        Cores, as `joblib.Parallel`.
+        Processes, -1 for one a core; of a cluster, inside `joblib.parallel_config`, all of its cores.
     progress : bool
         Show a progress bar.
 

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
-import joblib
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -18,7 +17,7 @@ from linkwork.mechanism import Mechanism
 from ..files import write_csv
 from ..mechanisms import MECHANISMS, Parameters, mechanism_of
 from ..notebook import Shown, format_count
-from ..numerics.workers import end_with
+from ..numerics.workers import over_workers
 from ..run import shown, takes_published
 from . import orbit_kernels
 from .drives import Drive
@@ -123,7 +122,7 @@ def coexistence(
     start : array_like, shape (n,), optional
         A further start; under a torque one is needed for the crank speed, unless it follows from a motor.
     n_jobs : int, optional
-        Cores, as `joblib.Parallel`.
+        Processes, -1 for one a core; of a cluster, inside `joblib.parallel_config`, all of its cores.
     progress : bool
         Show a progress bar.
 
@@ -140,16 +139,13 @@ def coexistence(
     mechanism = mechanism_of(parameters)
     guess = guess_of(drive.flow(mechanism), drive, start)
     guesses = np.vstack([guess, starts_of(parameters, drive, guess, STARTS)])
-    rows: list[tuple[NDArray[np.float64], ...]] = []
+    rows: dict[int, tuple[NDArray[np.float64], ...]] = {}
+    todo = [[operation(first, value) for first in xs.tolist()] for value in ys.tolist()]
     with shown(progress, float(len(ys)), "motions") as show:
-        tasks = (
-            joblib.delayed(_row)(mechanism, [operation(first, value) for first in xs.tolist()], guesses, os.getpid())
-            for value in ys.tolist()
-        )
-        for row in joblib.Parallel(n_jobs=n_jobs, return_as="generator")(tasks):
-            rows.append(row)
+        for number, row in over_workers(partial(_row, mechanism, guesses), todo, n_jobs=n_jobs):
+            rows[number] = row
             show(float(len(rows)))
-    starts, largest, amplitude = (np.array(part) for part in zip(*rows))
+    starts, largest, amplitude = (np.array(part) for part in zip(*(rows[n] for n in range(len(ys)))))
     return Coexistence(
         x=xs,
         y=ys,
@@ -161,10 +157,9 @@ def coexistence(
 
 
 def _row(
-    mechanism: Mechanism, row: Sequence[Operation], guesses: NDArray[np.float64], caller: int
+    mechanism: Mechanism, guesses: NDArray[np.float64], row: Sequence[Operation]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
     """Starts, largest multipliers and amplitudes of the motions of a row, by amplitude; NaN where there is no further one."""
-    end_with(caller)
     # one that was registered by the caller is not in another process
     MECHANISMS.setdefault(mechanism.name, mechanism)
     parameters, drive = row[0]
@@ -285,7 +280,7 @@ def basins(
     start : array_like, shape (n,), optional
         Under a torque a guess of y with the crank speed; see `find_orbits`.
     n_jobs : int, optional
-        Cores, as `joblib.Parallel`.
+        Processes, -1 for one a core; of a cluster, inside `joblib.parallel_config`, all of its cores.
     progress : bool
         Show a progress bar.
 
@@ -313,13 +308,13 @@ def basins(
             raise InputError(f"the range of the {name} is {low} to {high}: it must be finite and increasing")
     across, up = (np.linspace(low, high, points) for low, high in spans)
     known = np.array([orbit.start for orbit in motions])
-    rows: list[NDArray[np.int64]] = []
+    ends = np.zeros((points, points), dtype=np.int64)
     with shown(progress, float(points), "starts") as show:
-        tasks = (joblib.delayed(_ends)(parameters, drive, known, across, value, os.getpid()) for value in up.tolist())
-        for row in joblib.Parallel(n_jobs=n_jobs, return_as="generator")(tasks):
-            rows.append(row)
-            show(float(len(rows)))
-    return Basins(position=across, rate=up, ends=np.array(rows), motions=motions, found=found)
+        work = partial(_ends, parameters, drive, known, across)
+        for done, (number, row) in enumerate(over_workers(work, up.tolist(), n_jobs=n_jobs), start=1):
+            ends[number] = row
+            show(float(done))
+    return Basins(position=across, rate=up, ends=ends, motions=motions, found=found)
 
 
 def _ends(
@@ -328,10 +323,8 @@ def _ends(
     known: NDArray[np.float64],
     across: NDArray[np.float64],
     rate: float,
-    caller: int,
 ) -> NDArray[np.int64]:
     """The ends of a row of starts."""
-    end_with(caller)
     mechanism = mechanism_of(parameters)
     flow = drive.flow(mechanism)
     starts = np.tile(known[0], (len(across), 1))
