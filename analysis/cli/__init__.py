@@ -21,7 +21,7 @@ INTERRUPTED = 130
 
 #: Every command: the module of this package that has it, as a function of its name, and its line in ``linkwork --help``.
 COMMANDS = {
-    "basins": ("vibration", "Report all periodic motions at a speed, and which start ends in which."),
+    "basins": ("vibration", "Find all periodic motions, and which start ends in which."),
     "build": ("making", "Build and validate the FMUs."),
     "check": ("runs", "Compare the FMU with the in-process solver, output by output."),
     "examples": ("making", "Copy the examples to a folder."),

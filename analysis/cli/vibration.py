@@ -250,8 +250,8 @@ def _form(family: Any, special: Any) -> str:
 
     try:
         return normal_form(family, special).words
-    except OrbitError as error:
-        return f"normal form not found: {error.reason}"
+    except OrbitError:
+        return "normal form not found"
 
 
 def _swing(orbit: Any) -> tuple[str, float, str]:
@@ -334,8 +334,9 @@ def stability(
     start = chosen.start(drive)
     mechanism = mechanism_of(parameters)
     names = (x or speed_name(mechanism) or "drive.speed", y or damping_name(mechanism))
-    for name in names:
-        require_variable(parameters, drive, name)
+    for name in (x, y):
+        if name is not None:
+            require_variable(parameters, drive, name)
     ranges, missing = [], None
     if charted:
         for name, own, texts, option in ((names[0], x, x_range, "--x"), (names[1], y, y_range, "--y")):
