@@ -337,7 +337,7 @@ def traced_dependencies(mechanism: Mechanism) -> dict[int, References]:
     On the states, and on the inputs: directly, and through the jump of a commanded rate.
     """
     casadi = symbolic.library()
-    traced = expressions(mechanism)
+    traced = expressions(mechanism, bool(mechanism.switch))
     x, u = traced.symbols.x, traced.symbols.u
     reference = {entry.variable.name: entry.reference for entry in interface(mechanism)}
     known = [(x, states(mechanism)), (u, [reference[name] for name in mechanism.input_names])]

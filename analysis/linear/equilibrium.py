@@ -44,7 +44,8 @@ def _statics(mechanism: Mechanism, modes: Modes) -> tuple[Any, Any]:
     """Two functions of coordinates, channels and constants.
 
     Of both the first result is the generalised forces at rest on the freedoms that are free; the others are the clearance,
-    and less the forces' derivatives by those freedoms and the generalised forces of unit forces of the channels.
+    and less the forces' derivatives by those freedoms and the generalised forces of unit forces of the channels. Nothing that a
+    mechanism's switch is for acts at rest: friction.
     """
     casadi, traces, its = symbolic.library(), expressions(mechanism), layout(mechanism, modes)
     x, mode_symbols, u, p = traces.symbols

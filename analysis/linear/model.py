@@ -131,9 +131,9 @@ def linear_outputs(mechanism: Mechanism) -> tuple[str, ...]:
 
 
 @cache
-def _derivatives(mechanism: Mechanism, modes: Modes) -> Any:
+def _derivatives(mechanism: Mechanism, modes: Modes, switched: bool) -> Any:
     """State, channels, constants -> outputs, accelerations, M, C, K, F and the outputs' derivatives by state and inputs."""
-    casadi, traces, its = symbolic.library(), expressions(mechanism), layout(mechanism, modes)
+    casadi, traces, its = symbolic.library(), expressions(mechanism, switched), layout(mechanism, modes)
     x, mode_symbols, u, p = traces.symbols
     n = len(mechanism.freedoms)
     coordinates, rates = [x[k] for k in its.free], [x[n + k] for k in its.free]
@@ -384,9 +384,9 @@ def evaluate(parameters: Parameters, modes: Modes, states: FloatArray, channels:
         if not np.all(np.isfinite(row)):
             raise InputError(f"the state {row} is not finite")
         applied = mechanism.equations.applied(tuple(map(float, modes)), tuple(u.tolist()), p)
-        mechanism.check_assembly(parameters, mechanism.equations.start(tuple(row.tolist()), applied, p))
+        mechanism.check_state(parameters, mechanism.equations.start(tuple(row.tolist()), applied, p), applied, p)
     constants = np.tile(np.array([*p, 0.0])[:, None], n)
-    raw = _derivatives(mechanism, modes).map(n)(states.T, channels.T, constants)
+    raw = _derivatives(mechanism, modes, mechanism.switched(p)).map(n)(states.T, channels.T, constants)
 
     def stack(value: Any, columns: int) -> FloatArray:
         array = np.asarray(value)

@@ -111,28 +111,29 @@ class Flow:
         #: numbers of the channels of the drive, and of motor and held coordinates after them
         self.inputs = len(mechanism.channels)
         self.drive_size = self.inputs + len(MOTOR) + len(mechanism.freedoms)
-        self._code: dict[int, MachineCode] = {}
-        self._addresses: NDArray[np.int64] = np.zeros(len(_NAMES), dtype=np.int64)
+        self._code: dict[tuple[bool, int], MachineCode] = {}
+        self._addresses: NDArray[np.int64] = np.zeros((2, len(_NAMES)), dtype=np.int64)
 
     @property
     def period(self) -> float:
         """Angle of one turn (rad)."""
         return self.mechanism.freedoms[self.crank].period
 
-    def addresses(self, *which: int) -> NDArray[np.int64]:
-        """Addresses of the machine code, of the functions of those numbers at least."""
+    def addresses(self, *which: int, switched: bool = False) -> NDArray[np.int64]:
+        """Addresses of the machine code, of the functions of those numbers at least, with the mechanism's switch on or off."""
         with MAKING:
             for n in which:
-                if n not in self._code:
-                    code = MachineCode([self.function(n)])
-                    self._addresses[n] = code.addresses[_NAMES[n]]
-                    self._code[n] = code
-        return self._addresses
+                if (switched, n) not in self._code:
+                    code = MachineCode([self.function(n, switched)])
+                    self._addresses[int(switched), n] = code.addresses[_NAMES[n]]
+                    self._code[switched, n] = code
+        addresses: NDArray[np.int64] = self._addresses[int(switched)]
+        return addresses
 
-    def fingerprint(self, *which: int) -> str:
+    def fingerprint(self, *which: int, switched: bool = False) -> str:
         """Of the machine code of the functions of those numbers."""
-        self.addresses(*which)
-        return " ".join(self._code[n].fingerprint for n in which)
+        self.addresses(*which, switched=switched)
+        return " ".join(self._code[switched, n].fingerprint for n in which)
 
     def state(self, y: NDArray[np.float64], drive: NDArray[np.float64]) -> tuple[float, ...]:
         """State of a run at the crank angle 0, from y and the numbers of the drive."""
@@ -146,7 +147,7 @@ class Flow:
         return tuple(x)
 
     @cache  # noqa: B019 - flows are kept for good themselves
-    def function(self, which: int) -> Any:
+    def function(self, which: int, switched: bool = False) -> Any:
         """A function as a ``casadi.Function`` of angle, z, modes, drive with its direction, constants with theirs.
 
         ``plain``: dy/dangle. ``variational``: with the columns of dy/dy0. ``directional``: with that of dy/dlambda after
@@ -157,7 +158,7 @@ class Flow:
         angle, modes = casadi.SX.sym("angle"), casadi.SX.sym("modes", len(m.modes))
         y, columns = casadi.SX.sym("y", n), casadi.SX.sym("columns", n, n + 1)
         drive, d_drive = (casadi.SX.sym(name, self.drive_size) for name in ("drive", "d_drive"))
-        p, k = constants(m)
+        p, k = constants(m, switched)
         d_p = casadi.SX.sym("d_p", p.numel())
         arguments = [
             angle,
@@ -189,10 +190,10 @@ class Flow:
                 results.append(jacobian @ columns[:, n] + along)
         return casadi.Function(_NAMES[which], arguments, [casadi.densify(r) for r in results], {"cse": True})
 
-    def jacobian_trace(self) -> Any:
+    def jacobian_trace(self, switched: bool = False) -> Any:
         """Trace of the rates' Jacobian as a ``casadi.Function`` of angle, y, modes, drive and constants."""
         casadi = symbolic.library()
-        plain = self.function(PLAIN)
+        plain = self.function(PLAIN, switched)
         shapes = [plain.size1_in(i) for i in range(plain.n_in())]
         angle, y, modes, drive, p = (
             casadi.SX.sym(name, size)

@@ -150,7 +150,6 @@ def grid(
         where.mkdir(parents=True, exist_ok=True)
     # what computes the rows, beside their arguments
     code = (
-        flow.fingerprint(VARIATIONAL, GAP),
         fingerprint(orbit_kernels.solve_row),
         fingerprint(multipliers),
         inspect.getsource(orbits),
@@ -160,7 +159,9 @@ def grid(
     missing: dict[Path, list[Operation]] = {}
     for value in ys.tolist():
         row = [operation(first, value) for first in xs.tolist()]
-        digest = hashlib.sha256(" ".join(code).encode())
+        switched = any(mechanism.switched(p.constants()) for p, _ in row)
+        functions = flow.fingerprint(VARIATIONAL, GAP, switched=switched)
+        digest = hashlib.sha256(" ".join((functions, *code)).encode())
         scales = [scale_of(p, drive, guess) for p, drive in row]
         numbers = [(*p.constants(), *drive.vector(mechanism), *scale) for (p, drive), scale in zip(row, scales)]
         digest.update(np.array(numbers).tobytes())

@@ -225,10 +225,12 @@ class PeriodicOrbit(Shown):
         It does not use the variational equations, and so checks them. With Coulomb friction the trace peaks sharply where the
         slider turns round: it then takes some ten thousand samples.
         """
-        flow, turn = self.flow, self.turn(samples)
-        drive, p = self.drive.vector(mechanism_of(self.parameters)), list(self.parameters.constants())
+        flow, turn, mechanism = self.flow, self.turn(samples), mechanism_of(self.parameters)
+        drive, p = self.drive.vector(mechanism), list(self.parameters.constants())
         y = turn.states[:, flow.places].T
-        traces = flow.jacobian_trace().map(samples)(turn.angle[None, :], y, list(flow.modes), drive, p)
+        traces = flow.jacobian_trace(mechanism.switched(p)).map(samples)(
+            turn.angle[None, :], y, list(flow.modes), drive, p
+        )
         return liouville(np.asarray(traces).ravel(), flow.period * self.turns)
 
 
@@ -257,8 +259,10 @@ def section_of(
     mechanism = mechanism_of(parameters)
     flow, vector, p = drive.flow(mechanism), drive.vector(mechanism), np.array(parameters.constants())
     d_drive, d_p = direction or (np.zeros_like(vector), np.zeros_like(p))
+    # lambda may be what switches on
+    switched = mechanism.switched(p.tolist()) or mechanism.switched(d_p.tolist())
     return Section(
-        flow.addresses(GAP, *functions),
+        flow.addresses(GAP, *functions, switched=switched),
         np.array(flow.modes, dtype=float),
         np.concatenate([vector, d_drive]),
         np.concatenate([p, d_p]),
@@ -399,7 +403,10 @@ def _check_period(parameters: Parameters, drive: Drive, start: NDArray[np.float6
     if set(drive.arguments(mechanism).values()) <= {channel.argument for channel in mechanism.channels}:
         return
     flow = drive.flow(mechanism)
-    section, plain = section_of(parameters, drive, start, PLAIN), flow.function(PLAIN)
+    section, plain = (
+        section_of(parameters, drive, start, PLAIN),
+        flow.function(PLAIN, mechanism.switched(parameters.constants())),
+    )
     z = np.append(start, np.zeros(flow.size * (flow.size + 1)))
     rates = [
         np.asarray(plain(angle + way, z, section.modes, section.drive, section.p)).ravel()
@@ -419,7 +426,7 @@ def _check_assembly(parameters: Parameters, drive: Drive, start: NDArray[np.floa
     applied = mechanism.equations.applied(modes, tuple(vector[: flow.inputs].tolist()), p)
     x = mechanism.equations.start(flow.state(start, vector), applied, p)
     try:
-        mechanism.check_assembly(parameters, x)
+        mechanism.check_state(parameters, x, applied, p)
     except AssemblyError as error:
         raise OrbitAssemblyError(str(error), flow, start, np.inf, 0) from None
 
@@ -570,7 +577,9 @@ def largest_multipliers(
     given = (None,) if guesses is None else np.atleast_2d(np.asarray(guesses, dtype=float))
     starting = np.array([guess_of(flow, drives[0], guess) for guess in given])
     n, first = flow.size, starting[0]
-    section = section_of(rows[0], drives[0], first, VARIATIONAL, tolerance=tolerance)
+    # where one has what others have not, it is computed for all
+    richest = next((parameters for parameters in rows if mechanism.switched(parameters.constants())), rows[0])
+    section = section_of(richest, drives[0], first, VARIATIONAL, tolerance=tolerance)
     numbers = np.array([(*parameters.constants(),) for parameters in rows])
     vectors = np.array([drive.vector(mechanism) for drive in drives])
     monodromies, starts = np.full((len(rows), n * n), np.nan), np.full((len(rows), n), np.nan)

@@ -163,7 +163,9 @@ def _verdicts(task: Task, prepared: Prepared, ends: NDArray[np.float64]) -> tupl
         elif code == k.BAD_INPUT:
             status[i], messages[i] = code, str(task.run(i).lost(lost, t, x))
         else:
-            status[i], messages[i] = verdict(task.mechanism, task.settings, code, t, x)
+            switched = task.mechanism.switched(prepared.batch.p[i])
+            limit = task.run(i).limit if switched else None
+            status[i], messages[i] = verdict(task.mechanism, task.settings, code, t, x, limit)
     return status, messages
 
 
@@ -187,8 +189,9 @@ def _integrate(task: Task, prepared: Prepared, heard: Sequence[bool]) -> tuple[N
     # kept alive while their addresses are in use
     source, _kept = compiled_source(encoded)
     modes = np.array([float(value) for value in encoded.modes.values()])
+    switched = any(map(mechanism.switched, batch.p.tolist()))
     problem = k.Problem(
-        machine(mechanism).addresses, modes, batch.p[0], batch.scales[0], encoded.commands,
+        machine(mechanism, switched).addresses, modes, batch.p[0], batch.scales[0], encoded.commands,
         settings.tolerance, settings.hold, float(settings.times[-1]), True,
     )  # fmt: skip
     held = np.zeros((m, len(mechanism.channels)))
@@ -255,6 +258,8 @@ def prepare(task: Task) -> Prepared:
     energy, scales = np.full(len(x), np.nan), np.zeros_like(x)
     functions, equations = _over_arrays(mechanism), mechanism.equations
     columns = type(rows[0])(*p.T)
+    if mechanism.switch:
+        columns = columns._replace(**{mechanism.switch: float(any(map(mechanism.switched, rows)))})
     try:
         with np.errstate(all="ignore"):
             applied = functions.of(equations.applied)(tuple(map(float, encoded.modes.values())), tuple(u.T), columns)

@@ -238,7 +238,8 @@ class _Continuous:
                     return
                 if ended:
                     where = self.prepared.mechanism.where(solver.state.tolist())
-                    self.status, self.message = 3, f"limit of assembly at t = {solver.time:.9g} s, {where}"
+                    limit = self.prepared.limit(np.asarray(solver.state))
+                    self.status, self.message = 3, f"{limit} at t = {solver.time:.9g} s, {where}"
                     break
             yield solver.time, model.outputs()
             if self.status:

@@ -226,7 +226,7 @@ def simulate_many(
     # what cannot be compiled is reported here, and not by a worker
     encoded = encode(all_inputs[0], mechanism)
     compiled_source(encoded)
-    code = "" if where is None else _code(mechanism, chain.from_iterable(encoded.functions))
+    code = "" if where is None else _code(mechanism, parameters, chain.from_iterable(encoded.functions))
     tasks = [
         Task(
             mechanism=mechanism,
@@ -334,13 +334,14 @@ class _Gathered:
         )
 
 
-def _code(mechanism: Mechanism, functions: Iterable[Any]) -> str:
+def _code(mechanism: Mechanism, parameters: Sequence[Parameters], functions: Iterable[Any]) -> str:
     """Hash of the code that runs depend on, beside their numbers: equations, solver, users' functions."""
     from ..numerics.codegen import fingerprint
     from . import batches, compiled
 
     kernels = (compiled.run_many, compiled.channels_of_many, compiled.rows)
-    ours = [machine(mechanism).fingerprint, inspect.getsource(batches), *map(fingerprint, kernels)]
+    switched = any(mechanism.switched(p.constants()) for p in parameters)
+    ours = [machine(mechanism, switched).fingerprint, inspect.getsource(batches), *map(fingerprint, kernels)]
     return " ".join([*ours, *(fingerprint(f) if f else "" for f in functions)])
 
 

@@ -30,16 +30,14 @@ def traced(mechanism: Mechanism) -> Rebound:
     return symbolic.traced(mechanism.modules)
 
 
-def constants(mechanism: Mechanism, name: str = "p") -> tuple[Any, Any]:
-    """A column of symbols for the constants of the equations, and the same as the NamedTuple that they take."""
-    kind = _constants(mechanism)
-    p = symbolic.library().SX.sym(name, len(kind._fields))
-    return p, kind(*symbolic.library().vertsplit(p))
+def constants(mechanism: Mechanism, switched: bool = False) -> tuple[Any, Any]:
+    """A column of symbols for the constants of the equations, and the same as the NamedTuple that they take.
 
-
-@cache
-def _constants(mechanism: Mechanism) -> Any:
-    return type(next(iter(mechanism.published.values())).parameters.constants())
+    The mechanism's switch is a number there, so that the equations can branch on it.
+    """
+    p = symbolic.library().SX.sym("p", len(mechanism.constants._fields))
+    k = mechanism.constants(*symbolic.library().vertsplit(p))
+    return p, k._replace(**{mechanism.switch: float(switched)}) if mechanism.switch else k
 
 
 class Symbols(NamedTuple):
@@ -63,8 +61,8 @@ class Traced(NamedTuple):
 
 
 @cache
-def expressions(mechanism: Mechanism) -> Traced:
-    """The equations as expressions in the channels and modes that a run knows.
+def expressions(mechanism: Mechanism, switched: bool = False) -> Traced:
+    """The equations, with the mechanism's switch on or off, as expressions in the channels and modes that a run knows.
 
     Raises
     ------
@@ -76,7 +74,7 @@ def expressions(mechanism: Mechanism) -> Traced:
     x = casadi.SX.sym("x", mechanism.size)
     modes = casadi.SX.sym("modes", len(mechanism.modes))
     u = casadi.SX.sym("u", len(mechanism.channels))
-    p, k = constants(mechanism)
+    p, k = constants(mechanism, switched)
     energy = casadi.SX.sym("start_energy")
     values, channels = tuple(casadi.vertsplit(x)), tuple(casadi.vertsplit(u)) if mechanism.channels else ()
 
@@ -123,11 +121,11 @@ class Machine:
         Of the functions, by DERIVATIVE and its kin.
     """
 
-    def __init__(self, mechanism: Mechanism) -> None:
+    def __init__(self, mechanism: Mechanism, switched: bool) -> None:
         from ..numerics.codegen import MachineCode
 
         casadi = symbolic.library()
-        traces = expressions(mechanism)
+        traces = expressions(mechanism, switched)
         t = casadi.SX.sym("t")
         arguments = [t, *traces.symbols]
         self._code = MachineCode(
@@ -137,15 +135,16 @@ class Machine:
         self.fingerprint = self._code.fingerprint
 
 
-_MACHINES: dict[Mechanism, Machine] = {}
+_MACHINES: dict[tuple[Mechanism, bool], Machine] = {}
 
 
-def machine(mechanism: Mechanism) -> Machine:
+def machine(mechanism: Mechanism, switched: bool = False) -> Machine:
     """The machine code of a mechanism's equations, made when it is first asked for, by one thread."""
-    if mechanism not in _MACHINES:
+    key = mechanism, switched
+    if key not in _MACHINES:
         from ..numerics.codegen import MAKING
 
         with MAKING:
-            if mechanism not in _MACHINES:
-                _MACHINES[mechanism] = Machine(mechanism)
-    return _MACHINES[mechanism]
+            if key not in _MACHINES:
+                _MACHINES[key] = Machine(mechanism, switched)
+    return _MACHINES[key]

@@ -37,7 +37,7 @@ def solve(run: Run, method: str | type[OdeSolver], options: dict[str, Any], prog
     if rows and rows[-1][0] < march.t:
         rows = [*rows, (march.t, march.x, march.held)]
     values = [run.mechanism.equations.outputs(tuple(x), held, march.energy, run.p) for _, x, held in rows]
-    code, message = verdict(run.mechanism, run.settings, march.status, march.t, march.x)
+    code, message = verdict(run.mechanism, run.settings, march.status, march.t, march.x, run.limit)
     trajectory = Trajectory(
         time=np.array([t for t, _, _ in rows]),
         values=np.array(values).reshape(-1, len(names)),

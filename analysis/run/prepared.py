@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time as clock
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -10,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from linkwork.errors import InputError
+from linkwork.limits import ASSEMBLY
 from linkwork.mechanism import Mechanism
 
 from ..mechanisms import InitialState, Parameters, mechanism_of
@@ -87,7 +89,7 @@ class Run:
         for channel, place, _ in self.encoded.commands:
             x[place] = u[channel]
         state = self.mechanism.equations.start(tuple(x.tolist()), self.applied(u), self.p)
-        self.mechanism.check_assembly(self.parameters, state)
+        self.mechanism.check_state(self.parameters, state, self.applied(u), self.p)
         scale = np.array(self.mechanism.error_scale(self.parameters, state))
         return Start(np.array(state), self.mechanism.equations.energy(state, self.p), scale)
 
@@ -100,7 +102,7 @@ class Run:
         from .compiled import Problem
 
         return Problem(
-            machine(self.mechanism).addresses,
+            machine(self.mechanism, self.mechanism.switched(self.p)).addresses,
             np.array(self.modes),
             np.array([*self.p, start.energy]),
             start.scale,
@@ -110,6 +112,11 @@ class Run:
             float(self.settings.times[-1]),
             self.encoded.steady,
         )
+
+    def limit(self, x: NDArray[np.float64]) -> str:
+        """What a motion has come to that ended at its limit, in words."""
+        idle = np.zeros(len(self.mechanism.channels))
+        return self.mechanism.limit(x.tolist(), self.applied(idle), self.p)
 
     def lost(self, channel: int, t: float, x: NDArray[np.float64]) -> NotFiniteError:
         """The error of an input that is not finite, by the number of its channel."""
@@ -168,7 +175,7 @@ class Run:
         if carry["started"] and times[-1] < t:
             # the run ended between two samples: its last configuration is recorded too
             times, states, forces = np.append(times, t), np.vstack([states, x]), np.vstack([forces, held])
-        code, message = verdict(self.mechanism, self.settings, status, t, x + turns.taken)
+        code, message = verdict(self.mechanism, self.settings, status, t, x + turns.taken, self.limit)
         trajectory = Trajectory(
             time=times,
             values=turns.put_back(outputs_of(self.mechanism, problem.modes, problem.p, states, forces)),
@@ -226,14 +233,24 @@ class Run:
         return Watch(table, addresses, np.zeros(n), found, np.array(balance, dtype=np.int64)), kept
 
 
-def verdict(mechanism: Mechanism, settings: Settings, status: int, t: float, x: NDArray[np.float64]) -> tuple[int, str]:
-    """solver.status and solver.message of a run that ended with a status of the compiled code."""
+def verdict(
+    mechanism: Mechanism,
+    settings: Settings,
+    status: int,
+    t: float,
+    x: NDArray[np.float64],
+    limit: Callable[[NDArray[np.float64]], str] | None = None,
+) -> tuple[int, str]:
+    """solver.status and solver.message of a run that ended with a status of the compiled code.
+
+    ``limit`` says what a limit is; without it, it is that of assembly.
+    """
     from . import compiled as k
 
     # a microsecond, at any time
     at = f"t = {t:.9g} s" if abs(t) < 1e3 else f"t = {t:.6f} s"
     if status == k.LIMIT:
-        return 3, f"limit of assembly at {at}, {mechanism.where(x.tolist())}"
+        return 3, f"{limit(x) if limit else ASSEMBLY} at {at}, {mechanism.where(x.tolist())}"
     if status == k.NO_STEP:
         return 4, f"the step size fell below what {at} can resolve, {mechanism.where(x.tolist())}"
     if status == k.RUNNING:
@@ -261,7 +278,6 @@ def outputs_of(
     from . import compiled as k
 
     values = np.empty((len(states), len(mechanism.output_names)))
-    k.rows(
-        machine(mechanism).addresses[OUTPUTS], modes, p, np.ascontiguousarray(states), np.ascontiguousarray(inputs), values
-    )  # fmt: skip
+    outputs = machine(mechanism, mechanism.switched(p.tolist())).addresses[OUTPUTS]
+    k.rows(outputs, modes, p, np.ascontiguousarray(states), np.ascontiguousarray(inputs), values)
     return values

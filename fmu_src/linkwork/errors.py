@@ -64,6 +64,10 @@ class AssemblyError(LinkworkError):
     """The links cannot be joined at the given configuration."""
 
 
+class JammingError(AssemblyError):
+    """Friction would jam the links, or nearly so, at the given configuration."""
+
+
 class StepError(LinkworkError):
     """A communication step was asked for that cannot be taken (time, order, state)."""
 

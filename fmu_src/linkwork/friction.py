@@ -1,13 +1,67 @@
-"""Friction of a straight guide: viscous, and Coulomb's smooth about rest."""
+"""Friction, smooth about rest: of a guide, viscous and of a given level; of contacts, proportional to their forces."""
 
 from __future__ import annotations
 
-from math import tanh
+from math import fabs, sqrt, tanh
 
 #: Slider speed (m/s) at which the regularised Coulomb friction F tanh(u'/v0) has reached 76 % of its level.
 FRICTION_SPEED = 1e-3
+#: The same of a pin: relative rate of its links (rad/s).
+FRICTION_RATE = 0.1
+#: What rounds off the magnitude of a force F where it passes zero (N): it is taken as sqrt(F^2 + F0^2).
+FRICTION_FORCE = 1e-2
+#: Sweeps of Newton's method for the forces of contacts with friction.
+SWEEPS = 5
+
+Vector = tuple[float, float]
+
+
+def lesser(a: float, b: float) -> float:
+    """The lesser of two numbers."""
+    return 0.5 * (a + b - fabs(a - b))
 
 
 def resistance(v: float, mu: float, fc: float) -> float:
     """Force against a motion at speed v (N): damper mu v and Coulomb friction of the level fc; odd in v."""
     return mu * v + fc * tanh(v / FRICTION_SPEED)
+
+
+def contact_forces(smooth: tuple[Vector, ...], response: tuple[tuple[Vector, ...], ...]) -> tuple[float, ...]:
+    """Magnitudes s of the forces in contacts (N) whose friction grows with them: s_j = sqrt(|F_j|^2 + F0^2).
+
+    ``smooth`` are the forces without friction; ``response[k]`` is by how much all of them change with the magnitude of the
+    k-th, so that F_j = smooth_j + sum_k response[k]_j s_k. Newton's method from the forces without friction.
+    """
+    n = range(len(smooth))
+    least = FRICTION_FORCE * FRICTION_FORCE
+    s = tuple(sqrt(x * x + y * y + least) for x, y in smooth)
+    for _ in range(SWEEPS):
+        forces = tuple(tuple(smooth[j][c] + sum(response[k][j][c] * s[k] for k in n) for c in (0, 1)) for j in n)
+        size = tuple(sqrt(x * x + y * y + least) for x, y in forces)
+        # of the tangent of sqrt(|F|^2 + F0^2): size_j s_j = F_j . (smooth_j + sum_k response[k]_j s_k) + F0^2
+        matrix = tuple(
+            tuple(
+                (1.0 if j == k else 0.0)
+                - (forces[j][0] * response[k][j][0] + forces[j][1] * response[k][j][1]) / size[j]
+                for k in n
+            )
+            for j in n
+        )
+        right = tuple((forces[j][0] * smooth[j][0] + forces[j][1] * smooth[j][1] + least) / size[j] for j in n)
+        s = _solved(matrix, right)
+    return s
+
+
+def _solved(matrix: tuple[tuple[float, ...], ...], right: tuple[float, ...]) -> tuple[float, ...]:
+    """Solution of linear equations by elimination without a search for pivots: the diagonal must prevail."""
+    if not right:
+        return ()
+    first, *rows = matrix
+    reduced = []
+    values = []
+    for row, value in zip(rows, right[1:]):
+        factor = row[0] / first[0]
+        reduced.append(tuple(a - factor * b for a, b in zip(row[1:], first[1:])))
+        values.append(value - factor * right[0])
+    rest = _solved(tuple(reduced), tuple(values))
+    return ((right[0] - sum(a * b for a, b in zip(first[1:], rest))) / first[0], *rest)

@@ -7,3 +7,7 @@ from __future__ import annotations
 LIMIT_SINE = 1e-3
 #: Sine of the transmission angle below which a failing integration has failed for the nearness of that limit.
 NEAR_LIMIT = 0.05
+
+#: What ends a motion there: the links, or friction in them.
+ASSEMBLY = "limit of assembly"
+JAMMING = "friction comes near to jamming the links"

@@ -10,7 +10,8 @@ from math import degrees
 from types import ModuleType
 from typing import Any, NamedTuple
 
-from .errors import LinkworkError
+from .errors import JammingError, LinkworkError
+from .limits import ASSEMBLY, JAMMING, LIMIT_SINE, NEAR_LIMIT
 from .parameters import Rules
 from .variables import Variable
 
@@ -100,7 +101,8 @@ class Equations(NamedTuple):
     outputs : callable
         ``outputs(x, i, start_energy, p)``: all real outputs, in the order of the interface.
     clearance : callable
-        ``clearance(x, i, p)``: how far the links are from the limit of assembly, in the measure of `limits.LIMIT_SINE`.
+        ``clearance(x, i, p)``: how far the links are from the limit of assembly, in the measure of `limits.LIMIT_SINE`; where
+        friction is switched on, from where it may jam them, if that is less.
     jump : callable
         ``jump(x, i, u, p)``: the state after the commanded rates, where they are in force, have jumped to those in u.
     start : callable
@@ -164,6 +166,9 @@ class Mechanism:
     error_scale : callable
         ``error_scale(parameters, x)``: magnitudes of the state's components below which the integrator's error is absolute; a
         straight line of arithmetic like the equations.
+    switch : str
+        Name of the one constant, zero or greater, on which the equations may branch: on whether it is zero. They are traced
+        once for either, so that what is switched off costs nothing. Empty where there is none.
     """
 
     name: str
@@ -183,6 +188,7 @@ class Mechanism:
     equations: Equations
     check_assembly: Callable[[Any, Sequence[float]], None]
     error_scale: Callable[[Any, Sequence[float]], tuple[float, ...]]
+    switch: str = ""
 
     def __reduce__(self) -> Any:
         # by its package: a copy would be another mechanism
@@ -195,6 +201,38 @@ class Mechanism:
     def size(self) -> int:
         """Number of components of the state."""
         return 2 * len(self.freedoms) + 2
+
+    @cached_property
+    def constants(self) -> Any:
+        """The type of the equations' constants."""
+        return type(next(iter(self.published.values())).parameters.constants())
+
+    @cached_property
+    def switch_place(self) -> int:
+        """Place of the switch among the constants; -1 where there is none."""
+        return int(self.constants._fields.index(self.switch)) if self.switch else -1
+
+    def switched(self, p: Sequence[float]) -> bool:
+        """Whether the switch is on in constants, or in numbers that begin with them."""
+        return self.switch_place >= 0 and p[self.switch_place] != 0.0
+
+    def limit(self, x: Sequence[float], i: Any, p: Any) -> str:
+        """What the motion comes to where the clearance is small, in words."""
+        if self.switched(p) and abs(self.equations.clearance(x, i, p._replace(**{self.switch: 0.0}))) >= NEAR_LIMIT:
+            return JAMMING
+        return ASSEMBLY
+
+    def check_state(self, parameters: Any, x: Sequence[float], i: Any, p: Any) -> None:
+        """Make sure that the links can be joined and do not jam, clear of the limit of either.
+
+        Raises
+        ------
+        AssemblyError
+            If they cannot be joined; `JammingError` if friction may jam them.
+        """
+        self.check_assembly(parameters, x)
+        if self.switched(p) and not self.equations.clearance(x, i, p) >= LIMIT_SINE:
+            raise JammingError(f"{JAMMING} at {self.where(x)}: the coefficients of friction must be smaller")
 
     @cached_property
     def rules(self) -> Rules:

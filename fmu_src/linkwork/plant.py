@@ -154,7 +154,7 @@ class Plant:
         return settled
 
     def _check_state(self, x: Vector) -> None:
-        self.mechanism.check_assembly(self.parameters, self._settled(x))
+        self.mechanism.check_state(self.parameters, self._settled(x), self._applied(), self._p)
 
     def _jumped(self, x: Vector, applied: Any, commanded: Collection[str]) -> Vector:
         """The state with the commanded rates applied, of those inputs that are in ``commanded``."""
@@ -282,9 +282,8 @@ class Plant:
         """The error with the time of the step and, where the cause is the limit of assembly, with that said."""
         if isinstance(error, IntegrationError):
             if self._near_limit(last):
-                return AssemblyError(
-                    f"in the step from t = {time:.9g} s: limit of assembly near {self.mechanism.where(last)}"
-                )
+                limit = self.mechanism.limit(last, self._applied(), self._p)
+                return AssemblyError(f"in the step from t = {time:.9g} s: {limit} near {self.mechanism.where(last)}")
             return IntegrationError(f"in the step from t = {time:.9g} s: {error}, at {self.mechanism.where(last)}")
         return type(error)(f"in the step from t = {time:.9g} s: {error}")
 

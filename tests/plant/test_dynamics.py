@@ -495,8 +495,8 @@ FACTORS = {
     ("_stiffness",): MASS / TIME**2,
     ("_damping",): MASS / TIME,
     ("gravity", "gravity_x", "gravity_y", "gravity_z"): LENGTH / TIME**2,
-    ("_length", "_distance", "_position", "_offset", "_amplitude", "cog_x", "cog_y", "cog_z"): LENGTH,
-    ("_angle", "_inclination", "_ratio", "_twist", "_branch", "_friction"): 1.0,
+    ("_length", "_distance", "_radius", "_position", "_offset", "_amplitude", "cog_x", "cog_y", "cog_z"): LENGTH,
+    ("_angle", "_inclination", "_ratio", "_twist", "_branch", "_friction", "_coefficient"): 1.0,
 }
 #: Factor of each input.
 INPUT_FACTORS = {

@@ -14,9 +14,10 @@ The functions are straight lines of arithmetic on floats, like those of `kinemat
 
 from __future__ import annotations
 
+from math import sqrt, tanh
 from typing import NamedTuple
 
-from ..friction import resistance
+from ..friction import FRICTION_RATE, FRICTION_SPEED, contact_forces, lesser, resistance
 from .kinematics import (
     Coefficients,
     Position,
@@ -31,6 +32,9 @@ from .kinematics import (
     transmission_angle,
 )
 from .parameters import Constants
+
+#: Norm of the response of the contacts' forces to friction up to which they are solved for: at 1 friction may jam the guide.
+MOST_RESPONSE = 0.8
 
 State = tuple[float, float, float, float, float, float]
 
@@ -58,8 +62,12 @@ class Inertia(NamedTuple):
     m22: float
 
 
+AT_REST: State = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+NO_INPUTS = Inputs(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+
+
 class Motion(NamedTuple):
-    """Rates and accelerations that follow from the state and the inputs."""
+    """Rates and accelerations that follow from the state and the inputs, and the moments of pin friction on two links (N.m)."""
 
     w3: float
     w4: float
@@ -70,6 +78,18 @@ class Motion(NamedTuple):
     torque: float
     power_dissipated: float
     power_supplied: float
+    coupler_friction: float
+    rocker_friction: float
+
+
+class Friction(NamedTuple):
+    """Generalised forces of friction in pins and guide (N.m, N), moments on coupler and rocker (N.m), power lost (W)."""
+
+    q1: float
+    q2: float
+    coupler: float
+    rocker: float
+    power: float
 
 
 class Reactions(NamedTuple):
@@ -174,6 +194,13 @@ def applied_forces(
     )
 
 
+def accelerations(m: Inertia, r1: float, r2: float, speed_drive: float, acceleration: float) -> tuple[float, float]:
+    """Accelerations of crank and slider from the forces r1 (N.m) and r2 (N) on them, or with that of the crank given."""
+    free = 1.0 - speed_drive
+    e2 = speed_drive * acceleration + free * (m.m22 * r1 - m.m12 * r2) / (m.m11 * m.m22 - m.m12 * m.m12)
+    return e2, (r2 - m.m12 * e2) / m.m22
+
+
 def motion(g: Position, k: Coefficients, x: State, i: Inputs, p: Constants) -> Motion:
     """Accelerations, crank torque and powers at state ``x`` under the inputs ``i``, from either drive."""
     _, u, w2, v, _, _ = x
@@ -183,12 +210,12 @@ def motion(g: Position, k: Coefficients, x: State, i: Inputs, p: Constants) -> M
     g3, g4 = centripetal(g, w2, w3, w4, p)
     b1, b2 = velocity_terms(g, k, w2, w3, w4, g3, g4, p)
     q1, q2 = applied_forces(g, k, u, v, i.load_x, i.load_y, p)
-    r1 = q1 - b1 + i.torque
-    r2 = q2 - b2 + i.force
-    free = 1.0 - i.speed_drive
-    e2 = i.speed_drive * i.acceleration + free * (m.m22 * r1 - m.m12 * r2) / (m.m11 * m.m22 - m.m12 * m.m12)
-    a = (r2 - m.m12 * e2) / m.m22
-    torque = free * i.torque + i.speed_drive * (m.m11 * e2 + m.m12 * a + b1 - q1)
+    lost, on_coupler, on_rocker = friction(v, p) * v, 0.0, 0.0
+    if p.rough:
+        f = contact_friction(g, k, m, x, i, p)
+        q1, q2, lost, on_coupler, on_rocker = q1 + f.q1, q2 + f.q2, lost + f.power, f.coupler, f.rocker
+    e2, a = accelerations(m, q1 - b1 + i.torque, q2 - b2 + i.force, i.speed_drive, i.acceleration)
+    torque = (1.0 - i.speed_drive) * i.torque + i.speed_drive * (m.m11 * e2 + m.m12 * a + b1 - q1)
     px, py = coupler_point_velocity(g, w2, w3, p)
     return Motion(
         w3,
@@ -198,9 +225,66 @@ def motion(g: Position, k: Coefficients, x: State, i: Inputs, p: Constants) -> M
         k.k32 * e2 + k.k3u * a + g3,
         k.k42 * e2 + k.k4u * a + g4,
         torque,
-        friction(v, p) * v,
+        lost,
         torque * w2 + i.force * v + i.load_x * px + i.load_y * py,
+        on_coupler,
+        on_rocker,
     )
+
+
+class Rubbing(NamedTuple):
+    """Friction of one contact for a force of 1 N in it, and by how much that changes the forces in all contacts."""
+
+    friction: Friction
+    response: Reactions
+
+
+def unit_friction(
+    g: Position, k: Coefficients, m: Inertia, w2: float, v: float, speed_drive: float, p: Constants
+) -> tuple[Rubbing, ...]:
+    """Friction in the pins A to D and in the guide."""
+    w3 = k.k32 * w2 + k.k3u * v
+    w4 = k.k42 * w2 + k.k4u * v
+    ra = p.ra * tanh(w2 / FRICTION_RATE)
+    rb = p.rb * tanh((w3 - w2) / FRICTION_RATE)
+    rc = p.rc * tanh((w3 - w4) / FRICTION_RATE)
+    rd = p.rd * tanh(w4 / FRICTION_RATE)
+    mug = p.mug * tanh(v / FRICTION_SPEED)
+    weightless = p._replace(gx=0.0, gy=0.0)
+
+    def rubbing(f: Friction) -> Rubbing:
+        e2, a = accelerations(m, f.q1, f.q2, speed_drive, 0.0)
+        e3, e4 = k.k32 * e2 + k.k3u * a, k.k42 * e2 + k.k4u * a
+        change = Motion(0.0, 0.0, e2, a, e3, e4, 0.0, 0.0, 0.0, f.coupler, f.rocker)
+        return Rubbing(f, reactions(g, AT_REST, change, NO_INPUTS, weightless))
+
+    # the moment on the coupler at B and C, on the rocker at C (turned round) and D: on the other link it is the opposite
+    return (
+        rubbing(Friction(-ra, 0.0, 0.0, 0.0, ra * w2)),
+        rubbing(Friction(-rb * (k.k32 - 1.0), -rb * k.k3u, -rb, 0.0, rb * (w3 - w2))),
+        rubbing(Friction(-rc * (k.k32 - k.k42), -rc * (k.k3u - k.k4u), -rc, rc, rc * (w3 - w4))),
+        rubbing(Friction(-rd * k.k42, -rd * k.k4u, 0.0, -rd, rd * w4)),
+        rubbing(Friction(0.0, -mug, 0.0, 0.0, mug * v)),
+    )
+
+
+def contacts(f: Reactions) -> tuple[tuple[float, float], ...]:
+    """The forces in the contacts, in the order of `unit_friction`."""
+    return (f.ax, f.ay), (f.bx, f.by), (f.cx, f.cy), (f.dx, f.dy), (f.guide, 0.0)
+
+
+def contact_friction(g: Position, k: Coefficients, m: Inertia, x: State, i: Inputs, p: Constants) -> Friction:
+    """Friction in pins and guide, consistent with the forces there, which are linear in it."""
+    smooth = p._replace(rough=0.0)
+    without = contacts(reactions(g, x, motion(g, k, x, i, smooth), i, smooth))
+    units = unit_friction(g, k, m, x[2], x[3], i.speed_drive, p)
+    sizes = contact_forces(without, tuple(contacts(unit.response) for unit in units))
+    return Friction(*(sum(size * unit.friction[n] for size, unit in zip(sizes, units)) for n in range(5)))
+
+
+def response_norm(units: tuple[Rubbing, ...]) -> float:
+    """Norm of the change of the contacts' forces with their magnitudes; below 1 these have one solution."""
+    return sqrt(sum(x * x + y * y for unit in units for x, y in contacts(unit.response)))
 
 
 def derivative(x: State, i: Inputs, p: Constants) -> State:
@@ -239,8 +323,9 @@ def reactions(g: Position, x: State, m: Motion, i: Inputs, p: Constants) -> Reac
         - ry3 * bx
         - i.load_y * (p.xp * g.c3 - p.yp * g.s3)
         + i.load_x * (p.xp * g.s3 + p.yp * g.c3)
+        - m.coupler_friction
     ) / p.l3
-    t4 = -(p.i4d * m.e4 + rx4 * dy - ry4 * dx) / p.l4
+    t4 = -(p.i4d * m.e4 + rx4 * dy - ry4 * dx - m.rocker_friction) / p.l4
     cx = (t3 * g.c4 - t4 * g.c3) / g.s43
     cy = (t3 * g.s4 - t4 * g.s3) / g.s43
     bpx = fx3 - cx - i.load_x
@@ -330,8 +415,14 @@ def started(x: State, i: Inputs, p: Constants) -> State:
 
 
 def clearance(x: State, i: Inputs, p: Constants) -> float:
-    """Sine of the transmission angle; negative beyond the limit of assembly."""
-    return p.branch * position(x[0], x[1], p).s43
+    """Sine of the transmission angle, negative beyond the limit of assembly; if less, what is left until friction jams."""
+    g = position(x[0], x[1], p)
+    sine = p.branch * g.s43
+    if not p.rough:
+        return sine
+    k = coefficients(g, p)
+    units = unit_friction(g, k, inertia(g, k, p), x[2], x[3], i.speed_drive, p)
+    return lesser(sine, 1.0 - response_norm(units) / MOST_RESPONSE)
 
 
 def outputs(x: State, i: Inputs, start_energy: float, p: Constants) -> Outputs:

@@ -14,7 +14,7 @@ class Constants(NamedTuple):
 
     ``mx3, my3`` are m3 times the components of the centre of mass along and across the coupler, and so on; ``i2b`` is
     I_A + m3 l2^2, ``i3b`` the coupler's moment of inertia about B, ``i4d`` the rocker's about D; ``gx, gy`` gravity;
-    ``ca, sa`` the guide's direction.
+    ``ca, sa`` the guide's direction; ``rough`` is zero where ``mug`` and ``ra`` to ``rd`` are, the friction by contact forces.
     """
 
     l1: float
@@ -42,6 +42,12 @@ class Constants(NamedTuple):
     u0: float
     mu: float
     fc: float
+    mug: float
+    ra: float
+    rb: float
+    rc: float
+    rd: float
+    rough: float
     xp: float
     yp: float
     gx: float
@@ -124,6 +130,11 @@ class FiveBarParameters:
     slider_spring_free_position: float = 0.0
     slider_damping: float = 0.0
     slider_coulomb_friction: float = 0.0
+    slider_friction_coefficient: float = 0.0
+    pin_A_friction_radius: float = 0.0
+    pin_B_friction_radius: float = 0.0
+    pin_C_friction_radius: float = 0.0
+    pin_D_friction_radius: float = 0.0
     coupler_point_distance: float = 0.0
     coupler_point_angle: float = 0.0
     gravity: float = 9.81
@@ -169,6 +180,16 @@ class FiveBarParameters:
             u0=float(self.slider_spring_free_position),
             mu=float(self.slider_damping),
             fc=float(self.slider_coulomb_friction),
+            mug=float(self.slider_friction_coefficient),
+            ra=float(self.pin_A_friction_radius),
+            rb=float(self.pin_B_friction_radius),
+            rc=float(self.pin_C_friction_radius),
+            rd=float(self.pin_D_friction_radius),
+            rough=self.slider_friction_coefficient
+            + self.pin_A_friction_radius
+            + self.pin_B_friction_radius
+            + self.pin_C_friction_radius
+            + self.pin_D_friction_radius,
             xp=xp,
             yp=yp,
             gx=-self.gravity * sin(self.ground_inclination),

@@ -70,6 +70,23 @@ PARAMETERS = (
     _parameter(
         "slider.coulomb_friction", "N", "Level of Coulomb friction in the guide, smooth about rest", "F_c", minimum=0.0
     ),
+    _parameter(
+        "slider.friction_coefficient",
+        "1",
+        "Friction of the guide relative to its force, smooth about rest",
+        "\\mu_g",
+        minimum=0.0,
+    ),
+    *(
+        _parameter(
+            f"pin.{pin}_friction_radius",
+            "m",
+            f"Moment of friction in pin {pin} relative to its force: coefficient of friction times radius",
+            f"\\rho_{pin}",
+            minimum=0.0,
+        )
+        for pin in "ABCD"
+    ),
     _parameter("coupler.point_distance", "m", "Coupler point P, distance from the crank pin B", "r"),
     _parameter("coupler.point_angle", "rad", "Direction of the coupler point P from B to C", "a_2", display="deg"),
     _parameter("gravity", "m/s2", "Acceleration of gravity", "g", minimum=0.0),
@@ -203,7 +220,7 @@ OUTPUTS = (
         "",
         "state",
     ),
-    output("energy.dissipated", "J", "Work lost in damper and guide since the start", "", "state"),
+    output("energy.dissipated", "J", "Work lost in damper, guide and pins since the start", "", "state"),
     output("energy.supplied", "J", "Work of crank torque, slider force and load since the start", "", "speed"),
     output(
         "energy.residual", "J", "Energy balance: gained plus dissipated less supplied; zero but for error", "", "speed"
