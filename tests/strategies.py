@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import random
 from collections.abc import Callable
+from dataclasses import replace
 from math import asin, cos, hypot, pi, sin, sqrt
 from typing import Any, NamedTuple, TypeVar
 
@@ -155,6 +156,22 @@ def suppliers(draw: Draw[T]) -> tuple[Callable[[int], T], Callable[[], st.Search
 
 
 seeded, cases, mechanisms = suppliers(draw)
+
+#: Parameters of friction by contact forces.
+PINS = tuple(f"pin_{pin}_friction_radius" for pin in "ABCD")
+FRICTION = ("slider_friction_coefficient", *PINS)
+
+
+def rough(seed: int, drive: str, *only: str) -> Case:
+    """The case of a seed with friction, in what is named alone or everywhere, as strong as the mechanism bears it."""
+    case, source = seeded(seed), random.Random(seed)
+    most = dict.fromkeys(PINS, 0.3 * case.parameters.crank_length) | {"slider_friction_coefficient": 0.8}
+    values = {name: source.uniform(0.3, 1.0) * most[name] for name in only or FRICTION}
+    while True:
+        case = case._replace(parameters=replace(case.parameters, **values))
+        if dynamics.clearance(case.state, case.inputs(drive), case.p) > 0.01:
+            return case
+        values = {name: 0.5 * value for name, value in values.items()}
 
 
 def sine(case: Case, th2: float, u: float) -> float:

@@ -55,14 +55,54 @@ def _equations(mechanism: Mechanism) -> str:
         generator.generate(f"{folder}/")
         text = (Path(folder) / "equations.c").read_text(encoding="utf-8")
     # the shell leaves out no argument and no result: without these questions the code is smaller
-    return re.sub(r"arg\[(\d+)\]\? (arg\[\1\]\[\d+\]) : 0", r"\2", re.sub(r"if \(res\[\d+\]!=0\) ", "", text))
+    text = re.sub(r"arg\[(\d+)\]\? (arg\[\1\]\[\d+\]) : 0", r"\2", re.sub(r"if \(res\[\d+\]!=0\) ", "", text))
+    return text + _choices(mechanism) if mechanism.switch else text
+
+
+def _choices(mechanism: Mechanism) -> str:
+    """Of the functions traced with the mechanism's switch on and off: which is called, by the constants and their change."""
+    on = f"arg[3][{mechanism.switch_place}] != 0.0"
+    sides = "const double** arg, double** res, int* iw, double* w, int mem"
+    changed = f"""
+static int changed(const double* dp) {{
+  for (int i = 0; i < {len(mechanism.constants._fields)}; i++) if (dp[i] != 0.0) return 1;
+  return 0;
+}}
+"""
+    return changed + "".join(
+        f"\nint equations_{name}({sides}) {{\n"
+        f"  return ({on}{further} ? equations_{name}_on : equations_{name}_off)(arg, res, iw, w, mem);\n}}\n"
+        for name, further in _CHOSEN.items()
+    )
+
+
+#: Functions traced for either state of a switch, and what else than that decides which is called.
+_CHOSEN = {"derivative": "", "outputs": "", "clearance": "", "forward": " || changed(arg[6])"}
 
 
 def functions(mechanism: Mechanism) -> list[Any]:
     """The equations that the C shell calls, as functions of CasADi; see model.h for their arguments."""
     casadi = symbolic.library()
+    tables = [_table(mechanism, switched) for switched in ((False, True) if mechanism.switch else (False,))]
+    named = dict(tables[0])
+    if mechanism.switch:
+        off, on = tables
+        # a gradient, that of the constants too, is the one with all there is
+        named = off | {"reverse": on["reverse"]}
+        for name in _CHOSEN:
+            named |= {f"{name}_off": named.pop(name), f"{name}_on": on[name]}
+    _check_start(mechanism, casadi.Function("begin", *named["begin"]))
+    return [
+        casadi.Function(f"equations_{name}", arguments, [casadi.densify(r) for r in results], {"cse": True})
+        for name, (arguments, results) in named.items()
+    ]
+
+
+def _table(mechanism: Mechanism, switched: bool) -> dict[str, tuple[list[Any], list[Any]]]:
+    """Arguments and results of the functions, with the mechanism's switch on or off."""
+    casadi = symbolic.library()
     sx, join = casadi.SX, casadi.vertcat
-    trace = equations.expressions(mechanism)
+    trace = equations.expressions(mechanism, switched)
     s = trace.symbols
     try:
         own, state, p, x, scale, bounds = _beginning(mechanism, s.modes, s.u)
@@ -70,7 +110,7 @@ def functions(mechanism: Mechanism) -> list[Any]:
         raise LinkworkError(f"the start of {mechanism.name} cannot be traced: {_START}") from error
     dx, du, dp = (sx.sym(f"d{n}", *v.shape) for n, v in (("x", s.x), ("u", s.u), ("p", s.p)))
     at, change = join(s.x, s.u, s.p), join(dx, du, dp)
-    values = [_smooth_outputs(mechanism, s), trace.derivative, trace.clearance]
+    values = [_smooth_outputs(mechanism, s, switched), trace.derivative, trace.clearance]
     given = join(own, state, s.u)
     dgiven = [sx.sym(f"d{n}", *v.shape) for n, v in (("own", own), ("state", state), ("u", s.u))]
 
@@ -90,7 +130,7 @@ def functions(mechanism: Mechanism) -> list[Any]:
     weights, gradient = reverse(values, at, [s.x, s.u, s.p])
     jump_weights, jump_gradient = reverse([trace.jump], at, [s.x, s.u, s.p])
     begin_weights, begin_gradient = reverse([p, x], given, [own, state, s.u])
-    table = {
+    return {
         "bounds": ([own], [bounds]),
         "begin": (begin, [p, x, scale]),
         "begin_forward": ([*begin, *dgiven], forward([p, x], given, join(*dgiven))),
@@ -104,19 +144,16 @@ def functions(mechanism: Mechanism) -> list[Any]:
         "forward": ([*run, dx, du, dp], forward(values, at, change)),
         "reverse": ([*run, *weights], gradient),
     }
-    _check_start(mechanism, casadi.Function("begin", *table["begin"]))
-    return [
-        casadi.Function(f"equations_{name}", arguments, [casadi.densify(r) for r in results], {"cse": True})
-        for name, (arguments, results) in table.items()
-    ]
 
 
-def _smooth_outputs(mechanism: Mechanism, s: equations.Symbols) -> Any:
+def _smooth_outputs(mechanism: Mechanism, s: equations.Symbols, switched: bool) -> Any:
     """The outputs as they are differentiated: a length, the root of squares, changes by 0 where it is 0, not by 0/0."""
     casadi = symbolic.library()
     functions = symbolic.traced(mechanism.modules, sqrt=lambda value: casadi.sqrt(value + TINY))
     *p, energy = casadi.vertsplit(s.p)
-    k = type(next(iter(mechanism.published.values())).parameters.constants())(*p)
+    k = mechanism.constants(*p)
+    if mechanism.switch:
+        k = k._replace(**{mechanism.switch: float(switched)})
     modes, channels = (tuple(casadi.vertsplit(v)) if v.numel() else () for v in (s.modes, s.u))
     acting = functions.of(mechanism.equations.applied)(modes, channels, k)
     x = tuple(casadi.vertsplit(s.x))
@@ -199,7 +236,9 @@ def _sizes(mechanism: Mechanism, kind: Kind) -> str:
         "OUTPUTS": len(mechanism.output_names),
         "STATES": mechanism.size,
         # and the energy at the start
-        "CONSTANTS": len(next(iter(mechanism.published.values())).parameters.constants()) + 1,
+        "CONSTANTS": len(mechanism.constants._fields) + 1,
+        # the constant that says which functions are called; -1: there is no choice
+        "SWITCH": mechanism.switch_place,
     }
     constants = {
         "LIMIT_CLEARANCE": limits.LIMIT_SINE,
@@ -213,6 +252,8 @@ def _sizes(mechanism: Mechanism, kind: Kind) -> str:
             f"#define TOKEN {_text(token(mechanism, kind))}",
             f"enum {{ {', '.join(f'{name} = {size}' for name, size in sizes.items())} }};",
             *(f"#define {name} {_number(value)}" for name, value in constants.items()),
+            f"#define ASSEMBLY {_text(limits.ASSEMBLY)}",
+            f"#define JAMMING {_text(limits.JAMMING)}",
             "",
         ]
     )

@@ -40,7 +40,7 @@ DONE, LIMIT, NO_STEP, STALLED, DIVERGED = (int(status) for status in Status)
 
 #: Each in words.
 REASONS = {
-    Status.LIMIT: "the links come to the limit of assembly, or friction near to jamming them, within the period",
+    Status.LIMIT: "the links come to the limit of assembly, or to where friction may jam them, within the period",
     Status.NO_STEP: "the integrator cannot meet its tolerance",
     Status.STALLED: "the crank comes to rest within the period",
     Status.DIVERGED: "Newton's method does not converge",

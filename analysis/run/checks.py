@@ -89,6 +89,15 @@ CASES: Mapping[str, Case] = MappingProxyType(
         "coulomb-friction": _case(
             "Coulomb friction of 5 N in the guide", Inputs(speed=_SPEED), slider_coulomb_friction=5.0
         ),
+        "contact-friction": _case(
+            "friction in guide and pins by their forces",
+            Inputs(speed=_SPEED),
+            slider_friction_coefficient=0.2,
+            pin_A_friction_radius=1e-3,
+            pin_B_friction_radius=1e-3,
+            pin_C_friction_radius=1e-3,
+            pin_D_friction_radius=1e-3,
+        ),
         "slider-crank-constant-speed": _slider_crank("50 rpm, the shift held", Inputs(speed=_RPM_50)),
         "slider-crank-torque": _slider_crank(
             "a torque of 10 N.m against a load", Inputs(torque=10.0, load=table([0.0, 1.2], [0.0, -20.0]))

@@ -11,7 +11,7 @@ FRICTION_RATE = 0.1
 #: What rounds off the magnitude of a force F where it passes zero (N): it is taken as sqrt(F^2 + F0^2).
 FRICTION_FORCE = 1e-2
 #: Sweeps of Newton's method for the forces of contacts with friction.
-SWEEPS = 5
+SWEEPS = 4
 
 Vector = tuple[float, float]
 

@@ -10,4 +10,4 @@ NEAR_LIMIT = 0.05
 
 #: What ends a motion there: the links, or friction in them.
 ASSEMBLY = "limit of assembly"
-JAMMING = "friction comes near to jamming the links"
+JAMMING = "friction so strong that it may jam the links"

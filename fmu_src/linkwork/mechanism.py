@@ -232,7 +232,7 @@ class Mechanism:
         """
         self.check_assembly(parameters, x)
         if self.switched(p) and not self.equations.clearance(x, i, p) >= LIMIT_SINE:
-            raise JammingError(f"{JAMMING} at {self.where(x)}: the coefficients of friction must be smaller")
+            raise JammingError(f"{JAMMING} at {self.where(x)}")
 
     @cached_property
     def rules(self) -> Rules:

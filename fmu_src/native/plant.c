@@ -181,11 +181,20 @@ static Reason blame_extreme(const Plant *a, char sentence[SENTENCE]) {
         large ? "be small enough for finite moments of inertia" : "be large enough for finite moments of inertia", sentence);
 }
 
-static Reason check_assembly(double clearance, const double x[STATES], char sentence[SENTENCE]) {
+bool plant_jams(const Plant *a, const double x[STATES]) {
+    Plant smooth = *a;
+    if (SWITCH < 0 || a->p[SWITCH] == 0.0) return false;
+    smooth.p[SWITCH] = 0.0;
+    return fabs(clearance_of(&smooth, x)) >= NEAR_CLEARANCE;
+}
+
+static Reason check_assembly(const Plant *a, const double x[STATES], char sentence[SENTENCE]) {
     char where[SENTENCE];
+    double clearance = clearance_of(a, x);
     if (clearance >= LIMIT_CLEARANCE) return GOOD;
     configuration(x, where);
-    snprintf(sentence, SENTENCE, clearance >= 0.0 ? "limit of assembly at %s" : "the links cannot be joined at %s", where);
+    const char *limit = plant_jams(a, x) ? JAMMING : clearance >= 0.0 ? ASSEMBLY : "the links cannot be joined";
+    snprintf(sentence, SENTENCE, "%s at %s", limit, where);
     return LIMIT_OF_ASSEMBLY;
 }
 
@@ -208,7 +217,7 @@ Reason plant_begin(Plant *a, char sentence[SENTENCE]) {
     what_begins(a, own, state, u);
     call(equations_begin, (const double *[]){a->modes, own, state, u}, (double *[]){a->p, a->x, a->scale});
     if (!all_finite(a->p, CONSTANTS - 1)) return blame_extreme(a, sentence);
-    reason = check_assembly(clearance_of(a, a->x), a->x, sentence);
+    reason = check_assembly(a, a->x, sentence);
     if (reason != GOOD) return reason;
     if (!all_finite(a->p, CONSTANTS)) {
         char where[SENTENCE];
@@ -294,7 +303,7 @@ static Reason not_met(const Plant *a, const double x[STATES], double time, const
     configuration(x, where);
     digits(number, time);
     if (!(fabs(clearance_of(a, x)) >= NEAR_CLEARANCE)) {
-        snprintf(sentence, SENTENCE, "in the step from t = %s s: limit of assembly near %s", number, where);
+        snprintf(sentence, SENTENCE, "in the step from t = %s s: %s near %s", number, plant_jams(a, x) ? JAMMING : ASSEMBLY, where);
         return LIMIT_OF_ASSEMBLY;
     }
     snprintf(sentence, SENTENCE, "in the step from t = %s s: %s, at %s", number, cause, where);
@@ -341,7 +350,7 @@ static Reason integrate(Plant *a, double x[STATES], double time, double *duratio
             if (!all_finite(slope, STATES)) error = NAN;
         }
         if (error <= 1.0) {
-            reason = check_assembly(clearance_of(a, result), result, cause);
+            reason = check_assembly(a, result, cause);
             if (reason != GOOD) {
                 if (early) done += up_to_limit(a, done, x, h, k);
                 snprintf(sentence, SENTENCE, "in the step from t = %s s: %s", digits(first, time), cause);
@@ -441,7 +450,7 @@ Reason plant_outputs(Plant *a, char sentence[SENTENCE]) {
     if (!all_finite(y, OUTPUTS)) {
         int largest = 0;
         Digits time, number;
-        reason = check_assembly(clearance_of(a, x), x, sentence);
+        reason = check_assembly(a, x, sentence);
         if (reason != GOOD) return reason;
         for (int i = 1; i < INPUTS; i++)
             if (fabs(u[i]) > fabs(u[largest])) largest = i;
@@ -462,7 +471,9 @@ bool plant_derivative(const Plant *a, double derivative[STATES]) {
 }
 
 double plant_margin(const Plant *a) {
-    return clearance_of(a, a->x) - LIMIT_CLEARANCE;
+    double x[STATES];
+    plant_present(a, x);
+    return clearance_of(a, x) - LIMIT_CLEARANCE;
 }
 
 /* Derivatives of what is computed */

@@ -55,6 +55,9 @@ Reason plant_begin(Plant *a, char sentence[SENTENCE]);
    of assembly ends there and is good, with the reason LIMIT_OF_ASSEMBLY in `ended`. */
 Reason plant_step(Plant *a, double time, double step, const Watch *watch, bool early, Reason *ended, char sentence[SENTENCE]);
 
+/* Where the clearance is small: whether friction may jam the links there, and they are clear of the limit of assembly. */
+bool plant_jams(const Plant *a, const double x[STATES]);
+
 /* The state with the commands that were set since the last step applied. */
 void plant_present(const Plant *a, double x[STATES]);
 

@@ -103,6 +103,7 @@ CASE_NAMES = [
     "table-3.1",
     "other-assembly",
     "coulomb-friction",
+    "contact-friction",
     "bar-and-load",
     "ramp-and-jump",
     "functions-of-the-state",

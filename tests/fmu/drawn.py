@@ -46,6 +46,8 @@ def drawn(fmu: str, seed: int) -> Drawn:
         mechanism = MECHANISMS[fmu]
         case = (strategies if mechanism is FIVE_BAR else slider_cranks).seeded(seed)
         modes = {"drive.mode": seed % 2}
+        if mechanism is FIVE_BAR and seed % 6 < 3:
+            case = strategies.rough(seed, ("torque", "speed")[seed % 2])
         if mechanism is SLIDER_CRANK:
             modes["axial.mode"] = seed // 2 % 3
         inputs = case.fmi_inputs()

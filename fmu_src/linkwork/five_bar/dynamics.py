@@ -284,7 +284,8 @@ def contact_friction(g: Position, k: Coefficients, m: Inertia, x: State, i: Inpu
 
 def response_norm(units: tuple[Rubbing, ...]) -> float:
     """Norm of the change of the contacts' forces with their magnitudes; below 1 these have one solution."""
-    return sqrt(sum(x * x + y * y for unit in units for x, y in contacts(unit.response)))
+    # what is added, lost in any other sum, gives the root a derivative at rest
+    return sqrt(1e-24 + sum(x * x + y * y for unit in units for x, y in contacts(unit.response)))
 
 
 def derivative(x: State, i: Inputs, p: Constants) -> State:
