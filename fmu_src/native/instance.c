@@ -310,6 +310,11 @@ bool instance_counts(Instance *c, const char *function, size_t count, size_t rig
 
 /* Steps */
 
+/* Whether it is friction that ends the motion, and not the limit of assembly. */
+static bool jams(const Instance *c) {
+    return plant_jams(&c->s.plant, c->s.plant.x);
+}
+
 Status instance_step(Instance *c, double time, double step, const Watch *watch) {
     char sentence[SENTENCE];
     Digits end, stop;
@@ -325,7 +330,8 @@ Status instance_step(Instance *c, double time, double step, const Watch *watch) 
     if (reason == GOOD) {
         forget(c);
         c->stopped = ended != GOOD;
-        if (ended != GOOD) note(c, ended, "the step ended early, at the limit of assembly");
+        if (ended != GOOD)
+            note(c, ended, jams(c) ? "the step ended early: " JAMMING : "the step ended early, at the " ASSEMBLY);
         return OK;
     }
     if (reason == STEP_OUT_OF_ORDER && c->s.cause != GOOD) {
@@ -350,7 +356,7 @@ void instance_new_discrete_states(Instance *c, bool *terminate, bool *values_cha
     *terminate = !(plant_margin(&c->s.plant) >= 0.0);
     c->stale = true;
     if (*terminate) {
-        note(c, LIMIT_OF_ASSEMBLY, "the motion has reached the limit of assembly");
+        note(c, LIMIT_OF_ASSEMBLY, jams(c) ? "the motion has ended: " JAMMING : "the motion has reached the " ASSEMBLY);
         instance_say(c, WARNING, "%s", c->s.message);
     }
 }

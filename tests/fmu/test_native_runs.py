@@ -12,7 +12,10 @@ from typing import Any
 
 import pytest
 
-from linkwork.limits import LIMIT_SINE
+from linkwork.five_bar import MECHANISM as FIVE_BAR
+from linkwork.five_bar.parameters import InitialState
+from linkwork.five_bar.published import TABLE_3_1
+from linkwork.limits import JAMMING, LIMIT_SINE
 
 from .native import DISCARD, ERROR, OK, WARNING, Instance, Library
 
@@ -266,6 +269,75 @@ def test_a_step_ends_early_at_the_limit(libraries: dict[str, Library]) -> None:
         assert (c.status(), c.early, c.terminate) == (3, False, False)
         assert c.reached.value - reached < 1e-6
         c.free()
+
+
+#: A start from which friction comes near to jamming the links within a turn and a half.
+TOO_ROUGH = {"slider__friction_coefficient": 4.0, "drive__speed": 10.0 * math.pi}
+
+
+def rough(clearance: float, mode: int) -> dict[str, float]:
+    """Start of a five-bar, its slider in motion, with so much friction in the guide that it has this clearance from jamming."""
+    initial, p = InitialState(crank_speed=40.0, slider_velocity=0.1), TABLE_3_1.constants()
+    x, acting = FIVE_BAR.state(initial), FIVE_BAR.equations.applied((float(mode),), (0.0,) * 6, p)
+    low, high = 0.0, 100.0
+    for _ in range(60):
+        middle = 0.5 * (low + high)
+        enough = FIVE_BAR.equations.clearance(x, acting, p._replace(mug=middle, rough=1.0)) > clearance
+        low, high = (middle, high) if enough else (low, middle)
+    return {
+        "slider__friction_coefficient": low,
+        "initial__slider_velocity": 0.1,
+        "drive__speed": 40.0,
+        "initial__crank_speed": 40.0,
+        "drive__mode": mode,
+    }
+
+
+def test_friction_that_may_jam_the_links_is_refused(five_bar: Library) -> None:
+    # at the start; in a step; next to the limit, where a step fails for another reason
+    c = five_bar.instance()
+    c.set(**rough(-0.1, 1))
+    assert c.enter() == OK
+    assert c("ExitInitializationMode") == ERROR
+    assert c.status() == 3
+    assert c.text().startswith(f"{JAMMING} at crank angle 0 rad (0 deg) and slider position 0 m")
+    c.free()
+    c = five_bar.instance().start(**TOO_ROUGH)
+    before = c.get("slider.guide_force", "assembly.margin_to_limit")
+    assert c.step(0.0, 0.3) == DISCARD
+    assert c.status() == 3
+    assert c.text().startswith(f"in the step from t = 0 s: {JAMMING} at crank angle ")
+    assert c.get("slider.guide_force", "assembly.margin_to_limit") == before
+    c.free()
+    c = five_bar.instance().start(**rough(0.01, 0))
+    c.set(drive__torque=1e200)
+    assert c.step(0.0, 1.0) == DISCARD
+    assert c.status() == 3
+    assert c.text().startswith(f"in the step from t = 0 s: {JAMMING} near crank angle ")
+    c.free()
+
+
+def test_a_step_ends_early_where_friction_may_jam_the_links(fmi3: Library) -> None:
+    c = fmi3.instance(early=True).start(**TOO_ROUGH)
+    assert c.step(0.0, 0.3) == OK
+    assert 0.0 <= c.get("assembly.margin_to_limit")[0] < 1e-6
+    assert (c.early, c.terminate, c.status()) == (True, True, 3)
+    assert c.text() == f"the step ended early: {JAMMING}"
+    c.free()
+
+
+def test_model_exchange_to_where_friction_may_jam_the_links(five_bar: Library) -> None:
+    values = rough(-0.1, 1)
+    c = five_bar.instance("me").start(**values | {"initial__slider_velocity": 0.0})
+    assert c("EnterContinuousTimeMode") == OK
+    assert c.get("assembly.margin_to_limit")[0] > 0.0
+    x = c.states()
+    assert c("SetContinuousStates", (c_double * 6)(*x[:3], 0.1, *x[4:]), c_size_t(6)) == OK
+    assert c.get("assembly.margin_to_limit")[0] == pytest.approx(-0.1 - LIMIT_SINE, abs=1e-12)
+    assert c("EnterEventMode") == OK
+    assert c.discrete()[0]
+    assert (c.status(), c.text()) == (3, f"the motion has ended: {JAMMING}")
+    c.free()
 
 
 def test_steps_that_cannot_meet_the_tolerance(five_bar: Library) -> None:
