@@ -222,5 +222,17 @@ def require_five_bar(parameters: Parameters, what: str) -> None:
         )
 
 
+def require_no_contact_friction(p: Any, what: str) -> None:
+    """Make sure that a five-bar has no friction by contact forces, for an analysis that cannot hold it; by its constants.
+
+    Raises
+    ------
+    InputError
+        If it has, with ``what`` the analysis is.
+    """
+    if FIVE_BAR.switched(p):
+        raise InputError(f"slider.friction_coefficient and pin.*_friction_radius must be 0: {what} cannot hold them")
+
+
 for _mechanism in (FIVE_BAR, SLIDER_CRANK):
     register(_mechanism)

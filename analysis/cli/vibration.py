@@ -261,9 +261,9 @@ def _swing(orbit: Any) -> tuple[str, float, str]:
 
 
 def _friction(parameters: Any) -> bool:
-    """Whether there is Coulomb friction."""
+    """Whether there is friction that is not viscous."""
     names = mechanism_of(parameters).mechanism_variables
-    return any(getattr(parameters, field_name(name)) for name in names if name.endswith(".coulomb_friction"))
+    return any(getattr(parameters, field_name(name)) for name in names if "friction" in name)
 
 
 def _extrema(response: Any, factor: float, unit: str, table: Any) -> None:

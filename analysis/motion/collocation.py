@@ -16,7 +16,7 @@ from linkwork.errors import InputError, LinkworkError
 from linkwork.five_bar.kinematics import assembly_square
 from linkwork.five_bar.parameters import FiveBarParameters
 
-from ..mechanisms import FIVE_BAR
+from ..mechanisms import FIVE_BAR, require_no_contact_friction
 from ..numerics import symbolic
 from ..numerics.fourier import FourierSeries
 from ..run import Piecewise, traced
@@ -289,6 +289,7 @@ class Problem:
         spring, load, aim = casadi.SX.sym("spring", 2), casadi.SX.sym("load", 2), casadi.SX.sym("aim", 2)
         own = self.parameters if self.spring is None else replace(self.parameters, slider_stiffness=0.0)
         p = own.constants()
+        require_no_contact_friction(p, "an optimal motion of the slider")
         w, length, scale = self.crank_speed, self.length, self.force_scale
         u, v = s * length, r * length * w
         g = plant.position(th2, u, p)

@@ -24,7 +24,7 @@ from linkwork.five_bar.assembly import check_assembly
 from linkwork.five_bar.parameters import Constants, FiveBarParameters
 from linkwork.five_bar.variables import OUTPUT_NAMES
 
-from ..mechanisms import FIVE_BAR, output_units
+from ..mechanisms import FIVE_BAR, output_units, require_no_contact_friction
 from ..numerics.fourier import FourierSeries
 from ..run import at_its_speed, outputs_of, takes_published
 from ..units import Amount, in_si
@@ -207,7 +207,10 @@ def slider_force(
     ------
     ValueError, ZeroDivisionError
         If the links cannot be joined there.
+    InputError
+        If there is friction by contact forces.
     """
+    require_no_contact_friction(p, "a prescribed motion of the slider")
     g = kinematics.position(th2, u, p)
     k = kinematics.coefficients(g, p)
     w3, w4 = k.k32 * w2 + k.k3u * v, k.k42 * w2 + k.k4u * v

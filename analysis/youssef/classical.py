@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from linkwork.errors import InputError
-from linkwork.five_bar.parameters import FiveBarParameters
+from linkwork.five_bar.parameters import FiveBarParameters, without_friction
 
 from ..periodic import Response
 from .equation import Load, Variant, slider_equation
@@ -57,7 +57,7 @@ def approximations(response: Response, points: int = 160) -> Approximations:
     """
     if response.family.vary != "drive.speed":
         raise InputError(f"{response.family.name} varies: the approximations are over the speed")
-    parameters = replace(response.family.parameters, slider_coulomb_friction=0.0)
+    parameters = without_friction(response.family.parameters)
     load = load_of(response.family.drive)
     speeds = np.linspace(response.low, response.high, points)
     rows = [_approximate(parameters, speed, load) for speed in speeds.tolist()]

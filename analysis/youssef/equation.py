@@ -27,7 +27,7 @@ from linkwork.errors import AssemblyError, InputError
 from linkwork.five_bar.parameters import Constants, FiveBarParameters
 from linkwork.limits import LIMIT_SINE
 
-from ..mechanisms import FIVE_BAR
+from ..mechanisms import FIVE_BAR, require_no_contact_friction
 from ..numerics import symbolic
 from ..numerics.fourier import FourierSeries
 from ..run import constants, takes_published, traced
@@ -159,7 +159,10 @@ def balance(
     ------
     AssemblyError
         If the links cannot be joined at one of them, or coupler and rocker are collinear.
+    InputError
+        If there is friction by contact forces.
     """
+    require_no_contact_friction(p, "the balance of harmonics")
     arrays = np.broadcast_arrays(*(np.asarray(x, dtype=float) for x in (angle, position, velocity, acceleration)))
     _require_assembly(arrays[0], arrays[1], p)
     values = _traced()["balance"](*arrays, speed, p, load)
@@ -269,8 +272,8 @@ def slider_equation(
     Raises
     ------
     InputError
-        If the speed is not positive and finite, there is Coulomb friction, an order is asked for of a variant that has its
-        own, or the mechanism comes so near its limit of assembly that the harmonics do not die away; of the thesis's own
+        If the speed is not positive and finite, there is friction that is not viscous, an order is asked for of a variant that
+        has its own, or the mechanism comes so near its limit of assembly that the harmonics do not die away; of the thesis's own
         coefficients also if there is a load, or what `analysis.youssef.thesis` leaves out.
     AssemblyError
         If at u = 0 the links cannot be joined over the whole turn.
@@ -278,6 +281,7 @@ def slider_equation(
     require_speed(speed)
     if parameters.slider_coulomb_friction:
         raise InputError("slider.coulomb_friction must be 0: a linear equation cannot hold it")
+    require_no_contact_friction(parameters.constants(), "a linear equation")
     if variant is not Variant.EXACT and order is not None:
         raise InputError(f"an order cannot be chosen with the variant {variant.value!r}: it has its own")
     p = parameters.constants()

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from linkwork.errors import InputError
-from linkwork.five_bar.parameters import FiveBarParameters
+from linkwork.five_bar.parameters import FiveBarParameters, without_friction
 
 from ..mechanisms import require_five_bar
 from ..numerics.boundaries import Test
@@ -70,7 +70,7 @@ def linear_motion(
 ) -> Mapping[str, Callable[[Plane], Monodromy]]:
     """The linear equation as a motion beside the true one, for `stability_chart` over parameters of these names.
 
-    Empty where there is none: under a torque, and with Coulomb friction.
+    Empty where there is none: under a torque, and with friction that is not viscous.
     """
-    friction = parameters.slider_coulomb_friction or "slider.coulomb_friction" in names
+    friction = parameters != without_friction(parameters) or any("friction" in name for name in names)
     return {"linear equation": linear_monodromy} if drive.speed_drive and not friction else {}

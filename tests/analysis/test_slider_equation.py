@@ -301,6 +301,11 @@ class TestErrors:
         with pytest.raises(InputError, match="coulomb_friction"):
             slider_equation(replace(TABLE_3_1, slider_coulomb_friction=0.1), 44.0)
 
+    @pytest.mark.parametrize("name", ["slider_friction_coefficient", "pin_C_friction_radius"])
+    def test_friction_by_contact_forces(self, name: str) -> None:
+        with pytest.raises(InputError, match=r"pin\.\*_friction_radius must be 0: a linear equation cannot hold them"):
+            slider_equation(replace(TABLE_3_1, **{name: 0.01}), 44.0)
+
     def test_order_of_a_taylor_variant(self) -> None:
         with pytest.raises(InputError, match="first order"):
             slider_equation(TABLE_3_1, 44.0, variant=Variant.FIRST_ORDER, order=2)

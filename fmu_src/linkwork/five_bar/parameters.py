@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import cos, hypot, sin
 from typing import ClassVar, NamedTuple
 
@@ -216,6 +216,19 @@ class InitialState:
 
     def __post_init__(self) -> None:
         check_initial(self)
+
+
+def without_friction(parameters: FiveBarParameters) -> FiveBarParameters:
+    """The same with neither Coulomb friction nor friction by contact forces."""
+    return replace(
+        parameters,
+        slider_coulomb_friction=0.0,
+        slider_friction_coefficient=0.0,
+        pin_A_friction_radius=0.0,
+        pin_B_friction_radius=0.0,
+        pin_C_friction_radius=0.0,
+        pin_D_friction_radius=0.0,
+    )
 
 
 def reach(parameters: FiveBarParameters, crank_angle: float, slider_position: float) -> float:
