@@ -144,6 +144,22 @@ def test_a_function_can_vary_what_it_likes() -> None:
     assert branch.orbits[-1].start == pytest.approx(end.start, abs=1e-9)
 
 
+def test_friction_by_contact_forces_can_be_added_to_a_motion_without() -> None:
+    orbit = find_orbit(TABLE_3_1, speed=SPEED)
+    family = Family(parameters=TABLE_3_1, drive=orbit.drive, vary="slider.friction_coefficient")
+    # with its derivative from zero on
+    first = family.evaluate(1, 0.0, 0.2)(orbit.start, 0.0)
+    step = 1e-4
+    moved = [find_orbit(replace(TABLE_3_1, slider_friction_coefficient=n * step), speed=SPEED).start for n in (1, 2)]
+    slope = (4.0 * moved[0] - moved[1] - 3.0 * orbit.start) / (2.0 * step)
+    assert np.linalg.solve(first.jacobian, -first.slope) == pytest.approx(slope, rel=1e-4)
+    branch = follow(family, orbit, 0.0, low=0.0, high=0.2)
+    assert branch.reached
+    end = find_orbit(replace(TABLE_3_1, slider_friction_coefficient=0.2), speed=SPEED)
+    assert branch.orbits[-1].start == pytest.approx(end.start, abs=1e-9)
+    assert end.amplitude < 0.7 * orbit.amplitude
+
+
 @pytest.mark.parametrize("name", ["slider.damping", "slider.coulomb_friction", "slider.guide_angle", "crank.length"])
 def test_any_parameter_can_vary(name: str) -> None:
     orbit = find_orbit(replace(TABLE_3_1, slider_coulomb_friction=0.2), speed=SPEED)

@@ -36,7 +36,7 @@ from linkwork.errors import AssemblyError, InputError, UnknownNameError
 from linkwork.five_bar import dynamics, kinematics
 from linkwork.five_bar.published import SETS, TABLE_3_1
 from linkwork.five_bar.variables import OUTPUT_NAMES
-from tests.strategies import seeded
+from tests.strategies import rough, seeded
 
 pytest.importorskip("casadi")
 
@@ -146,7 +146,7 @@ FUNCTIONS = {
 
 @pytest.mark.parametrize("seed", range(25))
 def test_first_order_form_and_outputs_are_those_of_complex_steps_in_torque_drive(seed: int) -> None:
-    case = seeded(seed)
+    case = rough(seed, "torque") if seed % 2 else seeded(seed)
     p, x, i = case.parameters.constants(), case.state, case.torque_inputs
     model = linearise(case.parameters, x, as_inputs(x, i))
     for f, state, inputs in (("derivative", model.A, model.B), ("outputs", model.H, model.D)):
@@ -158,7 +158,7 @@ def test_first_order_form_and_outputs_are_those_of_complex_steps_in_torque_drive
 
 @pytest.mark.parametrize("seed", range(25))
 def test_first_order_form_and_outputs_are_those_of_complex_steps_in_speed_drive(seed: int) -> None:
-    case = seeded(seed)
+    case = rough(seed, "speed") if seed % 2 else seeded(seed)
     p, x, i = case.parameters.constants(), case.state, case.speed_inputs
     model = linearise(case.parameters, x, as_inputs(x, i))
     assert (model.M.shape, model.input_names) == ((1, 1), SPEED_INPUTS)
