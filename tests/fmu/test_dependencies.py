@@ -25,6 +25,8 @@ MECHANISMS = {
         "rocker.cog_angle": -0.2,
         "slider.guide_angle": 0.25,
         "slider.coulomb_friction": 0.5,
+        "slider.friction_coefficient": 0.07,
+        **{f"pin.{pin}_friction_radius": 1e-3 for pin in "ABCD"},
         "slider.spring_free_position": 0.001,
         "coupler.point_distance": 0.08,
         "coupler.point_angle": 0.5,

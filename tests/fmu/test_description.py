@@ -57,6 +57,11 @@ slider.stiffness            parameter Real    N/m    1000
 slider.spring_free_position parameter Real    m      0
 slider.damping              parameter Real    N.s/m  30
 slider.coulomb_friction     parameter Real    N      0
+slider.friction_coefficient parameter Real    1      0
+pin.A_friction_radius       parameter Real    m      0
+pin.B_friction_radius       parameter Real    m      0
+pin.C_friction_radius       parameter Real    m      0
+pin.D_friction_radius       parameter Real    m      0
 coupler.point_distance      parameter Real    m      0
 coupler.point_angle         parameter Real    rad    0
 gravity                     parameter Real    m/s2   9.81
@@ -244,6 +249,8 @@ COMMON_BOUNDS = {
 BOUNDS = {
     "FiveBarSlider": {
         "gravity": (0.0, None),
+        "slider.friction_coefficient": (0.0, None),
+        **{f"pin.{pin}_friction_radius": (0.0, None) for pin in "ABCD"},
         "coupler.angle": (-pi, pi),
         "rocker.angle": (-pi, pi),
         "transmission.angle": (0.0, pi),
