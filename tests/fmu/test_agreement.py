@@ -28,6 +28,8 @@ ROOT = Path(__file__).parents[2]
 
 #: The same algorithm; and CVode against it, both to 1e-11.
 SAME, OTHER = 1e-9, 1e-6
+#: The same where friction turns round within a step: rounding may decide whether that step is refused, and all that follow.
+TURNED = 1e-7
 
 
 def run_cases(root: str, files: dict[str, str], names: list[str]) -> list[Any]:
@@ -121,7 +123,9 @@ def test_random_mechanisms(fmu: str, fmus: dict[str, Path], natives: dict[str, P
     for seed, kind, interface, name, relative, status, status_fmu, end in found:
         exchange = interface == "model-exchange"
         assert status == status_fmu, (seed, kind, interface)
-        assert relative <= (OTHER if exchange else SAME), (seed, kind, interface, name, relative)
+        case = drawn(fmu, seed)
+        same = TURNED if case.mechanism.switched(case.parameters.constants()) else SAME
+        assert relative <= (OTHER if exchange else same), (seed, kind, interface, name, relative)
         # in process the last configuration is recorded, through co-simulation the last communication point
         assert abs(end) <= (1e-9 if exchange else 1e-3 * (status != 0)), (seed, kind, interface, end)
     if fmu == "FiveBarSlider":
