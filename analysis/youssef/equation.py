@@ -273,8 +273,8 @@ def slider_equation(
     ------
     InputError
         If the speed is not positive and finite, there is friction that is not viscous, an order is asked for of a variant that
-        has its own, or the mechanism comes so near its limit of assembly that the harmonics do not die away; of the thesis's own
-        coefficients also if there is a load, or what `analysis.youssef.thesis` leaves out.
+        has its own, or the mechanism comes so near its limit of assembly that the harmonics do not die away; of the
+        thesis's own coefficients also if there is a load, or what `analysis.youssef.thesis` leaves out.
     AssemblyError
         If at u = 0 the links cannot be joined over the whole turn.
     """
