@@ -303,7 +303,8 @@ static Reason not_met(const Plant *a, const double x[STATES], double time, const
     configuration(x, where);
     digits(number, time);
     if (!(fabs(clearance_of(a, x)) >= NEAR_CLEARANCE)) {
-        snprintf(sentence, SENTENCE, "in the step from t = %s s: %s near %s", number, plant_jams(a, x) ? JAMMING : ASSEMBLY, where);
+        snprintf(sentence, SENTENCE, "in the step from t = %s s: %s near %s", number, plant_jams(a, x) ? JAMMING : ASSEMBLY,
+                 where);
         return LIMIT_OF_ASSEMBLY;
     }
     snprintf(sentence, SENTENCE, "in the step from t = %s s: %s, at %s", number, cause, where);

@@ -37,6 +37,12 @@ def test_a_run_settles_on_the_periodic_motion(spring: str, rpm: float) -> None:
     assert orbit.amplitude < 0.85 * find_orbit(RIG[spring], speed=speed).amplitude
 
 
+@pytest.mark.parametrize(("spring", "rpm"), [("a", 240.0), ("a", 500.0), ("b", 500.0), ("b", 800.0)])
+def test_rig_1_does_not_jam_with_a_coefficient_of_a_half(spring: str, rpm: float) -> None:
+    orbit = find_orbit(replace(RIG[spring], slider_friction_coefficient=0.5), speed=rpm * RAD_S_PER_RPM)
+    assert orbit.clearance() > 0.5
+
+
 def test_an_ensemble_may_have_runs_with_and_without() -> None:
     both = [RIG["a"], replace(RIG["a"], **ROUGH), replace(RIG["a"], slider_friction_coefficient=0.1)]
     found = simulate_many(both, Inputs(speed=30.0), stop_time=0.3, step=0.01)
