@@ -169,7 +169,15 @@ def _row(
     starts, counts = np.full((m, MOST_ORBITS, n), np.nan), np.zeros(m, dtype=np.int64)
     monodromies, swings = np.full((m, MOST_ORBITS, n * n), np.nan), np.full((m, MOST_ORBITS, SAMPLES), np.nan)
     orbit_kernels.solve_all(
-        section_of(parameters, drive, guesses[0], VARIATIONAL, PLAIN, tolerance=INTEGRATOR_TOLERANCE),
+        section_of(
+            parameters,
+            drive,
+            guesses[0],
+            VARIATIONAL,
+            PLAIN,
+            tolerance=INTEGRATOR_TOLERANCE,
+            beside=[p for p, _ in row],
+        ),
         NO_SOURCE,
         np.hstack([numbers, np.zeros_like(numbers)]),
         np.hstack([vectors, np.zeros_like(vectors)]),

@@ -242,6 +242,7 @@ def section_of(
     tolerance: float = INTEGRATOR_TOLERANCE,
     direction: Direction | None = None,
     along: float = 1.0,
+    beside: Sequence[Parameters] = (),
 ) -> Section:
     """What the kernels need of a mechanism and its drive.
 
@@ -255,12 +256,14 @@ def section_of(
         With respect to a parameter lambda; zero without it.
     along : float
         Magnitude of lambda.
+    beside : sequence of parameters
+        Whose constants are to take the place of these: what is switched on in one is computed for all.
     """
     mechanism = mechanism_of(parameters)
     flow, vector, p = drive.flow(mechanism), drive.vector(mechanism), np.array(parameters.constants())
     d_drive, d_p = direction or (np.zeros_like(vector), np.zeros_like(p))
     # lambda may be what switches on
-    switched = mechanism.switched(p.tolist()) or mechanism.switched(d_p.tolist())
+    switched = any(map(mechanism.switched, (p.tolist(), d_p.tolist(), *(other.constants() for other in beside))))
     return Section(
         flow.addresses(GAP, *functions, switched=switched),
         np.array(flow.modes, dtype=float),
@@ -577,9 +580,7 @@ def largest_multipliers(
     given = (None,) if guesses is None else np.atleast_2d(np.asarray(guesses, dtype=float))
     starting = np.array([guess_of(flow, drives[0], guess) for guess in given])
     n, first = flow.size, starting[0]
-    # where one has what others have not, it is computed for all
-    richest = next((parameters for parameters in rows if mechanism.switched(parameters.constants())), rows[0])
-    section = section_of(richest, drives[0], first, VARIATIONAL, tolerance=tolerance)
+    section = section_of(rows[0], drives[0], first, VARIATIONAL, tolerance=tolerance, beside=rows)
     numbers = np.array([(*parameters.constants(),) for parameters in rows])
     vectors = np.array([drive.vector(mechanism) for drive in drives])
     monodromies, starts = np.full((len(rows), n * n), np.nan), np.full((len(rows), n), np.nan)

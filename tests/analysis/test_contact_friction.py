@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from analysis import Inputs, find_orbit, simulate, simulate_many
-from analysis.periodic import OrbitError, Stability
+from analysis.periodic import Drive, OrbitError, Stability
+from analysis.periodic.orbits import largest_multipliers
 from linkwork.errors import AssemblyError
 from linkwork.five_bar.parameters import InitialState
 from linkwork.five_bar.published import RAD_S_PER_RPM, SETS, TABLE_3_1
@@ -50,6 +51,17 @@ def test_an_ensemble_may_have_runs_with_and_without() -> None:
         alone = simulate(parameters, Inputs(speed=30.0), stop_time=0.3, step=0.01)
         scale = np.abs(alone.values).max(axis=0)
         assert np.all(np.abs(run.values - alone.values) <= 1e-7 * scale + 1e-9)
+
+
+def test_a_row_of_orbits_may_begin_without() -> None:
+    rows = [replace(RIG["a"], slider_friction_coefficient=value) for value in (0.0, 0.1, 0.2)]
+    drive = Drive(speed=300.0 * RAD_S_PER_RPM)
+    largest, starts, status = largest_multipliers(rows, [drive] * 3)
+    assert not status.any()
+    for parameters, value, start in zip(rows, largest, starts):
+        orbit = find_orbit(parameters, speed=drive.speed, start=start)
+        assert orbit.start == pytest.approx(start, abs=1e-9)
+        assert orbit.largest == pytest.approx(value, rel=1e-6)
 
 
 @pytest.mark.parametrize("method", ["compiled", "DOP853"])
