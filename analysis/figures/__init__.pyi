@@ -5,6 +5,7 @@ from .control import plot_poles as plot_poles
 from .curves import Curve as Curve
 from .curves import Panel as Panel
 from .curves import plot_curves as plot_curves
+from .decay import plot_decay as plot_decay
 from .dispatch import DrawingError as DrawingError
 from .dispatch import animate as animate
 from .dispatch import plot as plot

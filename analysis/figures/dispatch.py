@@ -32,6 +32,7 @@ MODULES = (
     "orbit",
     "response",
     "charts",
+    "decay",
     "control",
     "synthesis",
     "motion",

@@ -19,6 +19,7 @@ from linkwork.errors import InputError, Interrupted
 
 from .outputs import output
 from .paths import first_line, is_number, read_text, whole
+from .reader import unknown_name
 
 #: Numbers that are formatted at a time; Ctrl-C waits for no more.
 _BLOCK = 50_000
@@ -115,6 +116,47 @@ def read_csv(path: str | Path) -> NDArray[np.float64]:
     except ValueError as error:
         raise InputError(f"{path} cannot be read as CSV: {first_line(error)}") from error
     return rows
+
+
+def read_columns(path: str | Path, names: Sequence[str | None]) -> list[NDArray[np.float64]]:
+    """Columns of numbers from a CSV file, between commas, semicolons or tabs.
+
+    Parameters
+    ----------
+    path : str or Path
+    names : sequence of str or None
+        What each is called in the header line, with or without a unit in brackets behind it; None is the column at its own
+        place in the file. A file without a header has columns by their places alone.
+
+    Raises
+    ------
+    InputError
+        If it cannot be read, or what stands in a column is not a number, with the line.
+    UnknownNameError
+        If there is no such column.
+    """
+    path = Path(path)
+    lines = [(i, line) for i, line in enumerate(read_text(path).splitlines(), 1) if line.partition("#")[0].strip()]
+    first = lines[0][1] if lines else ""
+    separator = next((mark for mark in ";\t" if mark in first), ",")
+    rows = [(number, next(csv.reader([line], delimiter=separator))) for number, line in lines]
+    if not rows or (len(rows) == 1 and not is_number(rows[0][1][0])):
+        raise InputError(f"{path} has no numbers: it must have rows of numbers, and may have a header line above them")
+    header = [] if is_number(rows[0][1][0]) else [name.strip() for name in rows.pop(0)[1]]
+    places = []
+    for place, name in enumerate(names):
+        short = [known.partition("[")[0].strip() for known in header]
+        if name is not None and name not in header and short.count(name) != 1:
+            raise unknown_name(name, header, f"column {name!r} in {path.name}")
+        places.append(place if name is None else header.index(name) if name in header else short.index(name))
+    columns = np.empty((len(places), len(rows)))
+    for i, (number, cells) in enumerate(rows):
+        for column, place in zip(columns, places):
+            text = cells[place].strip() if place < len(cells) else ""
+            if not is_number(text):
+                raise InputError(f"{path}, line {number}, column {place + 1}: {text[:40]!r} is not a number")
+            column[i] = float(text)
+    return list(columns)
 
 
 def read_rows(path: str | Path) -> list[dict[str, str]]:

@@ -1,0 +1,56 @@
+"""A free decay: the record, its turning points and the envelope that fits them."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..linear import Decay
+from .curves import Curve, Panel, plot_curves
+from .dispatch import plot
+from .style import COLOURS, Figure
+
+
+@plot.register
+def plot_decay(
+    decay: Decay, record: tuple[ArrayLike, ArrayLike] | None = None, *, unit: str = "", title: str = ""
+) -> Figure:
+    """The turning points of a free decay with their envelope, and the decrement of each cycle.
+
+    Parameters
+    ----------
+    decay : Decay
+    record : (array_like, array_like), optional
+        Times (s) and positions that it was found from.
+    unit : str
+        Of the positions.
+    title : str
+    """
+    curves = [] if record is None else [Curve(x=record[0], y=record[1], label="record", colour=COLOURS[0])]
+    curves.append(Curve(x=decay.time, y=decay.position, label="turning points", line="", marker="o", colour=COLOURS[1]))
+    curves += [
+        Curve(x=decay.time[side::2], y=decay.fitted[side::2], label="" if side else "fit", line="--", colour="0.35")
+        for side in (0, 1)
+    ]
+    cycles = np.arange(1, len(decay.cycle_decrements) + 1)
+    panels = [
+        Panel(x_label="time [s]", y_label=f"position [{unit}]" if unit else "position", curves=curves),
+        Panel(
+            x_label="swing",
+            y_label="logarithmic decrement of a cycle",
+            curves=[
+                Curve(
+                    x=cycles, y=decay.cycle_decrements, label="from two swings", line="", marker="o", colour=COLOURS[1]
+                ),
+                Curve(
+                    x=cycles[[0, -1]],
+                    y=[decay.decrement] * 2,
+                    label="of the damper, by the fit",
+                    colour="0.35",
+                    line="--",
+                ),
+            ],
+            y_range=(0.0, 1.3 * max(decay.decrement, float(decay.cycle_decrements.max()))),
+        ),
+    ]
+    return plot_curves(panels, title=title, columns=2, size=(5.0, 3.6))

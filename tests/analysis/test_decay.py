@@ -1,0 +1,208 @@
+"""Damping and natural frequency from a decaying record, against the exact motion of a mass on a spring."""
+
+from __future__ import annotations
+
+from math import exp, pi, sqrt
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+from numpy.typing import NDArray
+
+from analysis.cli import main
+from analysis.linear import fit_decay
+from linkwork.errors import InputError, LinkworkError
+
+MASS, STIFFNESS, DAMPING = 0.6, 3000.0, 9.0
+
+
+def free(t: NDArray[np.float64], damping: float = DAMPING, friction: float = 0.0) -> NDArray[np.float64]:
+    """The mass let go 2 cm from rest, half swing by half swing about rest -+ friction / stiffness."""
+    decay = damping / (2.0 * MASS)
+    frequency = sqrt(STIFFNESS / MASS - decay**2)
+    x = np.zeros(len(t))
+    start = 0.02
+    for n in range(int(t[-1] * frequency / pi) + 1):
+        centre = np.sign(start) * friction / STIFFNESS
+        if abs(start) < abs(centre):
+            x[t >= n * pi / frequency] = start
+            break
+        s = t - n * pi / frequency
+        swing = (
+            (start - centre) * np.exp(-decay * s) * (np.cos(frequency * s) + decay / frequency * np.sin(frequency * s))
+        )
+        x = np.where(s >= 0.0, centre + swing, x)
+        start = centre - (start - centre) * exp(-decay * pi / frequency)
+    return x
+
+
+def noisy(size: float, seed: int = 1) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    t = np.linspace(0.0, 0.8, 4001)
+    return t, free(t) + size * 0.02 * np.random.default_rng(seed).standard_normal(len(t))
+
+
+@pytest.mark.parametrize("offset", [0.0, 0.3, -7.0])
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_clean_record(offset: float, sign: float) -> None:
+    t = np.linspace(0.0, 0.8, 2001)
+    found = fit_decay(t, sign * free(t) + offset)
+    assert found.damping(MASS)[0] == pytest.approx(DAMPING, rel=1e-4)
+    assert found.stiffness(MASS)[0] == pytest.approx(STIFFNESS, rel=1e-4)
+    assert found.damping_ratio == pytest.approx(DAMPING / (2.0 * sqrt(STIFFNESS * MASS)), rel=1e-4)
+    assert found.offset == pytest.approx(offset, abs=2e-6)
+    assert found.cycle_decrements == pytest.approx(found.decrement, rel=1e-3)
+    assert found.residual < 1e-4
+
+
+def test_uneven_times() -> None:
+    t = np.sort(np.random.default_rng(2).uniform(0.0, 0.8, 3000))
+    assert fit_decay(t, free(t)).damping(MASS)[0] == pytest.approx(DAMPING, rel=1e-3)
+
+
+@pytest.mark.parametrize("size", [0.003, 0.01])
+def test_noise_is_within_the_standard_errors(size: float) -> None:
+    """Over forty records the errors divided by their standard errors have about the spread of one."""
+    scatter = []
+    for seed in range(40):
+        found = fit_decay(*noisy(size, seed))
+        damping, error = found.damping(MASS)
+        stiffness, width = found.stiffness(MASS)
+        assert damping == pytest.approx(DAMPING, rel=10.0 * size)
+        scatter.append(((damping - DAMPING) / error, (stiffness - STIFFNESS) / width))
+    assert np.abs(np.mean(scatter, axis=0)).max() < 0.6
+    spread = np.std(scatter, axis=0)
+    assert spread.min() > 0.6
+    assert spread.max() < 2.5
+
+
+@pytest.mark.parametrize("friction", [0.5, 1.5])
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_dry_friction(friction: float, sign: float) -> None:
+    t = np.linspace(0.0, 0.8, 4001)
+    x = sign * free(t, 4.0, friction)
+    found = fit_decay(t, x, friction=True)
+    assert found.friction * STIFFNESS == pytest.approx(friction, rel=0.01)
+    assert found.damping(MASS)[0] == pytest.approx(4.0, rel=0.02)
+    # taken for a damper alone, the friction adds to it, and the decrement grows from cycle to cycle
+    alone = fit_decay(t, x)
+    assert alone.damping(MASS)[0] > 4.4
+    assert alone.residual > 10.0 * found.residual
+    assert (np.diff(alone.cycle_decrements) > 0.0).all()
+
+
+def test_no_friction_is_found_where_there_is_none() -> None:
+    found = fit_decay(*noisy(0.005), friction=True)
+    assert abs(found.friction) < 3.0 * found.friction_error
+
+
+T = np.linspace(0.0, 0.8, 401)
+
+
+@pytest.mark.parametrize(
+    ("time", "position", "words"),
+    [
+        (T, T[:-1], "lists of one length"),
+        (T, np.where(T > 0.4, np.nan, free(T)), "not finite"),
+        (free(T), T, "time does not increase"),
+        (T, ["high"] * len(T), "must be numbers"),
+        (T[:60], free(T[:60]), "turning points"),
+        (T, np.zeros(len(T)), "0 turning points"),
+        (T, T, "0 turning points"),
+        (T, free(T)[::-1], "do not decay"),
+        (T, np.random.default_rng(0).standard_normal(len(T)), "s apart"),
+        ([], [], "no times"),
+    ],
+)
+def test_what_is_no_decay(time: object, position: object, words: str) -> None:
+    with pytest.raises(InputError, match=words):
+        fit_decay(time, position)
+
+
+@pytest.mark.parametrize("least", [0.0, 1.0, -0.1, float("nan")])
+def test_least_swing(least: float) -> None:
+    with pytest.raises(LinkworkError, match="least swing"):
+        fit_decay(T, free(T), least_swing=least)
+
+
+class TestCommand:
+    """linkwork decrement."""
+
+    @pytest.fixture(autouse=True)
+    def _here(self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+        monkeypatch.chdir(tmp_path)
+
+    def write(self, text: str, header: str, separator: str = ",", columns: tuple[int, ...] = (0, 1)) -> None:
+        t = np.linspace(0.0, 0.8, 2001)
+        table = np.column_stack([1e3 * t, 1e3 * free(t) + 5.0, np.zeros(len(t))])
+        np.savetxt(text, table[:, columns], delimiter=separator, header=header, comments="")
+
+    def run(self, *arguments: str) -> tuple[int, str]:
+        done = CliRunner().invoke(main, ["decrement", *arguments])
+        assert done.exception is None or isinstance(done.exception, SystemExit)
+        return done.exit_code, done.output
+
+    @pytest.mark.parametrize(
+        ("header", "separator", "columns", "options"),
+        [
+            ("t,u", ",", (0, 1), ()),
+            ("u [mm];nothing;t [ms]", ";", (1, 2, 0), ("--time", "t", "--position", "u [mm]")),
+            ("", "\t", (0, 1), ()),
+        ],
+    )
+    def test_numbers_and_files(
+        self, header: str, separator: str, columns: tuple[int, ...], options: tuple[str, ...]
+    ) -> None:
+        self.write("record.csv", header, separator, columns)
+        code, output = self.run("record.csv", "--time-unit", "ms", "--unit", "mm", "--mass", "600 g", *options)
+        assert code == 0, output
+        rows = {c[0].strip(): c[1:] for line in output.splitlines() if len(c := line.strip("│ ").split("│")) == 4}
+        assert float(rows["damping coefficient"][0]) == pytest.approx(DAMPING, rel=1e-3)
+        assert float(rows["stiffness"][0]) == pytest.approx(STIFFNESS, rel=1e-3)
+        assert float(rows["natural frequency"][0]) == pytest.approx(sqrt(STIFFNESS / MASS), rel=1e-3)
+        assert Path("out/record-decrement.csv").read_text().startswith("time [s],position [mm],fit [mm]\n")
+        assert Path("out/record-decrement.png").exists()
+
+    def test_friction_in_newtons(self) -> None:
+        t = np.linspace(0.0, 0.8, 4001)
+        np.savetxt("record.csv", np.column_stack([t, 1e3 * free(t, 4.0, 1.0)]), delimiter=",")
+        code, output = self.run("record.csv", "--unit", "mm", "--mass", "0.6", "--friction", "--no-plot")
+        assert code == 0, output
+        (line,) = (line for line in output.splitlines() if "dry friction  " in line)
+        assert float(line.split("│")[2]) == pytest.approx(1.0, rel=0.02)
+
+    @pytest.mark.parametrize(
+        ("options", "words"),
+        [
+            (("--position", "v"), "there is no column 'v' in record.csv"),
+            (("--time", "u", "--position", "t"), "time does not increase"),
+            (("--from", "700 s"), "turning points"),
+            (("--from", "9000 s"), "no times"),
+            (("--unit", "kg"), "--unit"),
+            (("--mass", "600 mm"), "--mass"),
+            (("--mass", "0"), "above zero"),
+            (("--least-swing", "0"), "least swing"),
+        ],
+    )
+    def test_what_is_wrong_is_said(self, options: tuple[str, ...], words: str) -> None:
+        self.write("record.csv", "t,u")
+        code, output = self.run("record.csv", *options)
+        assert code in (1, 2)
+        assert words in " ".join(output.split())
+        assert not Path("out").exists()
+
+    @pytest.mark.parametrize(
+        ("content", "words"),
+        [
+            ("", "has no numbers"),
+            ("t,u\n", "has no numbers"),
+            ("t,u\n0,1\n0.1,high\n", "line 3, column 2: 'high' is not a number"),
+            ("t,u\n0,1\n0.1\n", "line 3, column 2: '' is not a number"),
+            ("t\n0\n1\n", "line 2, column 2: '' is not a number"),
+        ],
+    )
+    def test_files_that_are_no_record(self, content: str, words: str) -> None:
+        Path("record.csv").write_text(content)
+        code, output = self.run("record.csv")
+        assert code == 1
+        assert words in " ".join(output.split())
