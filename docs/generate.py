@@ -148,8 +148,12 @@ def study_pictures() -> Iterator[Picture]:
     from analysis.youssef import approximations
     from linkwork.five_bar.published import RAD_S_PER_RPM, SETS
 
-    numbers = {"linkage": "linkage", "rig-2-approximations": "8.18", "rig-2-harmonics": "8.20", "rig-2-forces": "8.21"}
-    for name, number in numbers.items():
+    for name, number in (
+        ("linkage", "linkage"),
+        ("rig-2-approximations", "8.19"),
+        ("rig-2-harmonics", "8.21"),
+        ("rig-2-forces", "rig-2-forces"),
+    ):
         study = load(number)
         yield name, study.draw(study.compute()), 150
     rig = SETS["rig-2-spring-c"]

@@ -104,25 +104,74 @@ FIGURES: Mapping[str, Entry] = MappingProxyType(
         "7.10": Entry("Series 1: path, p1 p2 weighted", "youssef.chapter_7", "7.3.1, L5808"),
         "7.11": Entry("Series 2: weighted rocker function, slider moved", "youssef.series_2", "7.3.2, L5940"),
         "7.12": Entry("Series 2: path (b), slider moved", "youssef.series_2", "7.3.2, L5972"),
-        "8.7": Entry("Steady motion far below resonance; rig 1, spring A", "youssef.chapter_8"),
-        "8.8": Entry("Steady motion near half the natural frequency; rig 1, spring A", "youssef.chapter_8"),
-        "8.9": Entry("Four peaks a turn become two; rig 1, spring A", "youssef.chapter_8"),
-        "8.10": Entry("Steady motion through resonance; rig 1, spring A", "youssef.chapter_8"),
-        "8.11": Entry("Steady motion near a third of the natural frequency; rig 1, spring B", "youssef.chapter_8"),
-        "8.12": Entry("Steady motion near half the natural frequency; rig 1, spring B", "youssef.chapter_8"),
-        "8.13": Entry("Steady motion towards resonance; rig 1, spring B", "youssef.chapter_8"),
-        "8.14": Entry("Amplitude of the slider over the speed; rig 1, spring A", "youssef.chapter_8"),
-        "8.15": Entry("Amplitude of the slider over the speed; rig 1, spring B", "youssef.chapter_8"),
-        "8.16": Entry("Harmonics of the slider's motion over the speed; rig 1", "youssef.chapter_8"),
-        "8.17": Entry(
-            "Coulomb friction in the guide: amplitude, and whether it explains the misfit; rig 1", "youssef.chapter_8"
+        "8.1": Entry("Rig 1, a side plate of the guide removed", "", "8.2.1.1, L6118"),
+        "8.2": Entry("Rig 1 from above: coupling to the motor, slider and guide", "", "8.2.1.1, L6124"),
+        "8.3": Entry("Rig 1: exploded views of linkage (a) and guide (b)", "", "8.2.1.1, L6126"),
+        "8.4": Entry("Circuits of photocell (a) and displacement transducer (b)", "", "8.2.1.2, L6248, L6281"),
+        "8.5": Entry("Rig 2", "", "8.2.2, L6291"),
+        "8.6": Entry(
+            "Impulse response of the disconnected slider: the logarithmic decrement",
+            "youssef.chapter_8",
+            "8.3.3, L6393",
         ),
-        "8.18": Entry("Amplitude of the slider over the speed; rig 2, spring C", "youssef.chapter_8"),
-        "8.19": Entry("Amplitude of the slider over the speed; rig 2, spring D", "youssef.chapter_8"),
-        "8.20": Entry("Harmonics of the slider's motion over the speed; rig 2", "youssef.chapter_8"),
-        "8.21": Entry("Crank torque and pin forces over the speed; rig 2", "youssef.chapter_8"),
+        "8.7": Entry("Steady motion of the slider; rig 1, spring A, 360 rpm", "youssef.chapter_8", "8.4.1.1, L6441"),
+        "8.8": Entry(
+            "Motion of the slider, theory and experiment; rig 1, spring A, 390 rpm",
+            "youssef.chapter_8",
+            "8.4.1.1, L6463",
+        ),
+        "8.9": Entry(
+            "Motion of the slider, theory and experiment; rig 1, spring A, 420 rpm",
+            "youssef.chapter_8",
+            "8.4.1.1, L6463",
+        ),
+        "8.10": Entry(
+            "Motion of the slider, theory and experiment; rig 1, spring A, 450 rpm",
+            "youssef.chapter_8",
+            "8.4.1.1, L6463",
+        ),
+        "8.11": Entry(
+            "Motion of the slider, theory and experiment; rig 1, spring B, 600 rpm",
+            "youssef.chapter_8",
+            "8.4.1.1, L6516",
+        ),
+        "8.12": Entry(
+            "Motion of the slider, theory and experiment; rig 1, spring B, 660 rpm",
+            "youssef.chapter_8",
+            "8.4.1.1, L6516",
+        ),
+        "8.13": Entry(
+            "Motion of the slider, theory and experiment; rig 1, spring B, 720 rpm",
+            "youssef.chapter_8",
+            "8.4.1.1, L6516",
+        ),
+        "8.14": Entry(
+            "Motion of the slider; rig 1, spring A, 240, 260, 280 rpm", "youssef.chapter_8", "8.4.1.2, L6569"
+        ),
+        "8.15": Entry(
+            "Motion of the slider; rig 1, spring A, 300, 360, 500 rpm", "youssef.chapter_8", "8.4.1.2, L6569"
+        ),
+        "8.16": Entry(
+            "Motion of the slider; rig 1, spring B, 500, 540, 580 rpm", "youssef.chapter_8", "8.4.1.2, L6744"
+        ),
+        "8.17": Entry(
+            "Motion of the slider; rig 1, spring B, 620, 680, 780 rpm", "youssef.chapter_8", "8.4.1.2, L6744"
+        ),
+        "8.18": Entry("Oscillations of the slider; rig 2", "youssef.chapter_8", "8.4.2.1, L6804"),
+        "8.19": Entry("Resonance curve of the slider; rig 2, spring C", "youssef.chapter_8", "8.4.2.2, L6830"),
+        "8.20": Entry("Resonance curve of the slider; rig 2, spring D", "youssef.chapter_8", "8.4.2.2, L6830"),
+        "8.21": Entry(
+            "Resonance curves of the second harmonic; rig 2, springs C and D", "youssef.chapter_8", "8.4.2.2, L6877"
+        ),
         "quality": Entry("Combined quality function; ellipse (a)", "youssef.quality", "6.2, 6.3"),
         "control": Entry("Methods of controlling the slider; weighted rocker function", "youssef.control", "7.1, 7.4"),
+        "rig-1-resonance": Entry(
+            "Rig 1 about resonance: amplitude over the speed, springs A and B", "youssef.chapter_8"
+        ),
+        "rig-1-friction": Entry(
+            "What friction explains of the amplitudes; rig 1, springs A and B", "youssef.chapter_8"
+        ),
+        "rig-2-forces": Entry("Crank torque and pin forces over the speed; rig 2", "youssef.chapter_8"),
         "linkage": Entry("The five-bar slider of Table 3.1 at 420 rpm", "youssef.linkage"),
     }
 )

@@ -1,0 +1,205 @@
+"""What the figures of chapter VIII share: the two rigs and their periodic motions over the speed, in rpm and cm.
+
+Rig 1 lies in a vertical plane, with spring A or B; rig 2, whose crank is a twentieth of the other links, in a horizontal one,
+with spring C or D. The amplitude is half the distance between the least and the greatest slider position over a period.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from linkwork.five_bar.parameters import FiveBarParameters
+from linkwork.five_bar.published import CM_PER_METRE, RAD_S_PER_RPM, SETS
+
+from ...figures import Curve
+from ...periodic import (
+    Branch,
+    Extremum,
+    PeriodicOrbit,
+    Response,
+    Stability,
+    Turn,
+    find_orbit,
+    frequency_response,
+    natural_frequency,
+)
+from ..study import OURS, StudyResult, Verdict, at_most
+from ._runs import SETTLING_TIME, steady_turn
+
+LOST = "the measured curve is lost with the figure"
+#: A rise of the amplitude up to which the thesis would hardly have noticed it, and departures from a sine, relative.
+NOTICED = 0.05
+#: Coefficient of friction in the guide that lowers the amplitude slightly.
+SLIGHT = 0.05
+#: The rig of each spring.
+RIG = {"A": 1, "B": 1, "C": 2, "D": 2}
+#: Speeds of the curves (rpm). With spring B the curve is followed in two parts: up to `SPLIT`, and about resonance from there
+#: on; below it the branches that come down from resonance run into the limit of assembly.
+SLOWEST, SPLIT = 100.0, 900.0
+FASTEST = {"A": 1200.0, "B": 1300.0, "C": 1300.0, "D": 1300.0}
+#: Difference (cm) up to which a run and an orbit, two turns of a run, or two sweeps, count as the same motion.
+SAME = 1e-4
+#: Samples of a turn.
+SAMPLES = 1440
+#: Greatest steps of the continuation: a two hundredth of the range of speeds, so that the resonance of the third harmonic
+#: is not stepped over; and a fiftieth, where resonance itself makes for shorter steps.
+FINE, COARSE = 5e-3, 2e-2
+
+
+@cache
+def rig(spring: str, **changes: float) -> FiveBarParameters:
+    """The rig of a spring, with changes of its parameters."""
+    parameters: FiveBarParameters = replace(SETS[f"rig-{RIG[spring]}-spring-{spring.lower()}"].parameters, **changes)
+    return parameters
+
+
+def natural_speed(spring: str) -> float:
+    """Crank speed at the slider's natural frequency with the mean effective mass (rpm)."""
+    return natural_frequency(rig(spring)) / RAD_S_PER_RPM
+
+
+@cache
+def response(spring: str, low: float, high: float, greatest_step: float = FINE) -> Response:
+    """The periodic motions over a range of speeds (rpm), no branch of it lost."""
+    found = frequency_response(rig(spring), low * RAD_S_PER_RPM, high * RAD_S_PER_RPM, greatest_step=greatest_step)
+    assert not found.problems, found.problems
+    return found
+
+
+def motions(spring: str) -> Response:
+    """The periodic motions over all speeds, with spring B up to `SPLIT`."""
+    return response(spring, SLOWEST, SPLIT if spring == "B" else FASTEST[spring])
+
+
+def resonant_b() -> Response:
+    """Periodic motions with spring B about resonance: the lower branch first, then the upper one."""
+    return response("B", SPLIT, FASTEST["B"], COARSE)
+
+
+def orbit(parameters: FiveBarParameters, speed: float, start: NDArray[np.float64] | None = None) -> PeriodicOrbit:
+    """The periodic motion at a speed (rpm), the one near a start if one is given."""
+    return find_orbit(parameters, speed=speed * RAD_S_PER_RPM, start=start)
+
+
+@cache
+def turn(spring: str, speed: float, **changes: float) -> Turn:
+    """One turn of the steady motion at a speed (rpm), with changes of the rig's parameters."""
+    return orbit(rig(spring, **changes), speed).turn(SAMPLES)
+
+
+def slider(of: Turn) -> NDArray[np.float64]:
+    """Slider position over a turn, its first value once more at the end (cm)."""
+    u = CM_PER_METRE * of["slider.position"]
+    return np.append(u, u[0])
+
+
+def amplitude(of: Turn) -> float:
+    """Half the distance between the least and the greatest slider position (cm)."""
+    return 0.5 * float(np.ptp(slider(of)))
+
+
+def turns_of_sign(x: NDArray[np.float64]) -> int:
+    """How often a periodic sequence changes its sign."""
+    return int(np.sum(np.sign(x) != np.sign(np.roll(x, 1))))
+
+
+def peaks(of: Turn) -> int:
+    """Highest and lowest points of the slider position over a turn, together, as the thesis counts them."""
+    return turns_of_sign(np.diff(slider(of)))
+
+
+def harmonic(of: Turn, order: int) -> float:
+    """Amplitude of a harmonic of the crank's turn in the slider position (cm)."""
+    return CM_PER_METRE * float(of.harmonic("slider.position", order))
+
+
+@cache
+def speed_of_fewer_peaks(spring: str, low: float, high: float) -> float:
+    """Speed above which the slider has two peaks a turn instead of four (rpm), to 0.1 rpm."""
+    while high - low > 0.1:
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if peaks(turn(spring, middle)) > 2 else (low, middle)
+    return 0.5 * (low + high)
+
+
+def rpm(branch: Branch) -> NDArray[np.float64]:
+    """Speeds along a branch (rpm)."""
+    return branch.parameter / RAD_S_PER_RPM
+
+
+def between(extrema: Sequence[Extremum], low: float, high: float) -> tuple[float, float]:
+    """Speed (rpm) and amplitude (cm) of the one extremum between two speeds (rpm)."""
+    (found,) = (e for e in extrema if low < e.parameter / RAD_S_PER_RPM < high)
+    return found.parameter / RAD_S_PER_RPM, CM_PER_METRE * found.amplitude
+
+
+def near_fraction(spring: str, order: int) -> tuple[float, float]:
+    """Speed (rpm) and amplitude (cm) of the greatest amplitude near 1/order of the natural frequency."""
+    place = natural_speed(spring) / order
+    return between(motions(spring).maxima(), 0.9 * place, 1.1 * place)
+
+
+def rise_at(spring: str, order: int) -> float:
+    """By what part the amplitude at its maximum near 1/order of the natural frequency exceeds the next minimum above."""
+    tops = [
+        e
+        for e in motions(spring).maxima()
+        if abs(e.parameter / RAD_S_PER_RPM * order / natural_speed(spring) - 1.0) < 0.1
+    ]
+    lows = [e for e in motions(spring).minima() if tops and e.parameter > tops[0].parameter]
+    return tops[0].amplitude / lows[0].amplitude - 1.0 if lows else 0.0
+
+
+def columns_of(branch: Branch, name: str) -> dict[str, NDArray[np.float64]]:
+    """Amplitude along a branch as columns, its stable and, if it has one, its unstable part; see `curves_over_speed`."""
+    amplitude = CM_PER_METRE * branch.amplitude
+    stable = np.array([verdict is Stability.STABLE for verdict in branch.stability()])
+    # a dashed part begins and ends on the solid one
+    beside = np.append(stable[1:], True) & np.append(True, stable[:-1])
+    columns = {f"speed; {name} [rpm]": rpm(branch), f"stable; {name} [cm]": np.where(stable, amplitude, np.nan)}
+    if not stable.all():
+        columns[f"unstable; {name} [cm]"] = np.where(~stable | ~beside, amplitude, np.nan)
+    return columns
+
+
+def curves_over_speed(result: StudyResult, name: str, colour: str, label: str = "") -> list[Curve]:
+    """Amplitude along a branch, its stable part solid and its unstable one dashed."""
+    speed = result.columns[f"speed; {name} [rpm]"]
+    curves = [Curve(x=speed, y=result.columns[f"stable; {name} [cm]"], label=label, colour=colour)]
+    if f"unstable; {name} [cm]" in result.columns:
+        curves.append(Curve(x=speed, y=result.columns[f"unstable; {name} [cm]"], line="--", colour=colour))
+    return curves
+
+
+def marks(spring: str, *orders: int) -> Mapping[str, float]:
+    """The natural frequency of a spring, or parts of it, as marks of a panel."""
+    words = {1: "natural", 2: "half", 3: "a third", 4: "a quarter"}
+    return {f"{words[n]}, {natural_speed(spring) / n:.0f}": natural_speed(spring) / n for n in orders}
+
+
+def runs_verdict(spring: str, speeds: Sequence[float]) -> Verdict:
+    """That runs from rest at u = 0 end in the orbits, at a few speeds (rpm)."""
+    worst = 0.0
+    for speed in speeds:
+        run = steady_turn(rig(spring), speed)
+        worst = max(worst, run.change, float(np.abs(run.slider_cm - slider(turn(spring, speed))).max()))
+    return at_most(
+        f"difference between orbits and runs of {SETTLING_TIME:g} s from rest at "
+        f"{', '.join(f'{speed:g}' for speed in speeds)} rpm",
+        OURS,
+        SAME,
+        worst,
+        "cm",
+    )
+
+
+def largest_multiplier(spring: str, low: float, high: float) -> float:
+    """The largest Floquet multiplier over a range of speeds (rpm)."""
+    (branch,) = motions(spring).branches
+    within = (rpm(branch) >= low) & (rpm(branch) <= high)
+    return float(branch.largest_multiplier[within].max())
