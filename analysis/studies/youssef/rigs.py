@@ -42,6 +42,11 @@ RIG = {"A": 1, "B": 1, "C": 2, "D": 2}
 #: on; below it the branches that come down from resonance run into the limit of assembly.
 SLOWEST, SPLIT = 100.0, 900.0
 FASTEST = {"A": 1200.0, "B": 1300.0, "C": 1300.0, "D": 1300.0}
+#: Speeds (rpm) at which friction in the guide is tried, of rig 2 about half the natural frequency.
+GRID = {
+    spring: np.arange(first, last + 1.0, 5.0)
+    for spring, first, last in (("A", 150, 520), ("B", 250, 820), ("C", 250, 350), ("D", 360, 500))
+}
 #: Difference (cm) up to which a run and an orbit, two turns of a run, or two sweeps, count as the same motion.
 SAME = 1e-4
 #: Samples of a turn.
@@ -153,6 +158,27 @@ def rise_at(spring: str, order: int) -> float:
     ]
     lows = [e for e in motions(spring).minima() if tops and e.parameter > tops[0].parameter]
     return tops[0].amplitude / lows[0].amplitude - 1.0 if lows else 0.0
+
+
+@cache
+def over_speed(spring: str, coefficient: float) -> NDArray[np.float64]:
+    """Amplitude (cm) at the speeds of `GRID` with friction in the guide by a part of its force."""
+    parameters, start, found = rig(spring, slider_friction_coefficient=coefficient), None, []
+    for speed in GRID[spring].tolist():
+        motion = orbit(parameters, speed, start)
+        start = motion.start
+        found.append(CM_PER_METRE * motion.amplitude)
+    return np.array(found)
+
+
+def rise(spring: str, coefficient: float, order: int) -> float:
+    """By what part a maximum near 1/order of the natural frequency exceeds the next minimum above; 0 without one."""
+    size, speeds = over_speed(spring, coefficient), GRID[spring]
+    tops = np.flatnonzero((size[1:-1] > size[:-2]) & (size[1:-1] > size[2:])) + 1
+    lows = np.flatnonzero((size[1:-1] < size[:-2]) & (size[1:-1] < size[2:])) + 1
+    for top in tops[np.abs(speeds[tops] * order / natural_speed(spring) - 1.0) < 0.1]:
+        return float(size[top] / size[lows[lows > top][0]]) - 1.0
+    return 0.0
 
 
 def columns_of(branch: Branch, name: str) -> dict[str, NDArray[np.float64]]:
