@@ -296,7 +296,7 @@ class TestPage:
 
     def test_its_python_prints_what_it_says(self) -> None:
         blocks = re.findall(r"```python\n(.*?)```(?:\n\n```text\n(.*?)```)?", PAGE.read_text(), flags=re.DOTALL)
-        assert len(blocks) == 6
+        assert len(blocks) == 7
         space: dict[str, object] = {}
         for block, expected in blocks:
             output = io.StringIO()
