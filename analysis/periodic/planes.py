@@ -37,6 +37,7 @@ def speed_name(mechanism: Mechanism) -> str | None:
     return next((name for name, what in _of_the_crank(mechanism).items() if what == "speed"), None)
 
 
+@takes_published()
 def require_variable(parameters: Parameters, drive: Drive, name: str) -> None:
     """Check that a parameter of this name can vary in this drive.
 
