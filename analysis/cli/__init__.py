@@ -21,10 +21,10 @@ INTERRUPTED = 130
 
 #: Every command: the module of this package that has it, as a function of its name, and its line in ``linkwork --help``.
 COMMANDS = {
-    "basins": ("vibration", "Find all periodic motions, and which start ends in which."),
+    "basins": ("motions", "Find all periodic motions, and which start ends in which."),
     "build": ("making", "Build and validate the FMUs."),
     "check": ("runs", "Compare the FMU with the in-process solver, output by output."),
-    "decrement": ("vibration", "Damping and natural frequency from a decaying record."),
+    "decrement": ("record", "Damping and natural frequency from a decaying record."),
     "examples": ("making", "Copy the examples to a folder."),
     "figures": ("runs", "Make the theses' figures, a still and an animation."),
     "info": ("runs", "Describe published sets, a parameter or case file, an FMU."),

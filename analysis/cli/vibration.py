@@ -2,11 +2,6 @@
 
 from __future__ import annotations
 
-import sys
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from functools import wraps
-from pathlib import Path
 from typing import Any
 
 import click
@@ -17,24 +12,16 @@ from rich.table import Table
 from linkwork.errors import InputError, LinkworkError, ParameterError
 from linkwork.parameters import field_name
 
-from ..mechanisms import FIVE_BAR, PUBLISHED, mechanism_of
+from ..mechanisms import FIVE_BAR, mechanism_of
 from ..units import RAD_S_PER_RPM
 from .common import (
-    ENDED_EARLY,
-    INTERRUPTED,
-    case_options,
-    chosen_case,
     console,
     folder_of,
-    handled,
-    out_option,
-    plot_option,
     print_error,
-    print_written,
     quantity,
-    show_table,
     workers_options,
 )
+from .driven import Chosen, about_a_case, swing_of
 
 #: Range of speeds where none is given, relative to the natural frequency: beyond twice, where parametric resonance begins.
 _RANGE = (0.15, 2.3)
@@ -53,90 +40,8 @@ def _require_range(parameters: Any, low: float, high: float, name: str, first: s
         raise click.UsageError(f"{options}: it begins at {format_value(name, low, unit)}: speeds must be above zero")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Chosen:
-    """The case that a command is about, and how it is driven there."""
-
-    case: Any
-    stem: str
-    speed: str | None
-    guess_speed: str | None
-    folder: Path
-
-    def drive(self, speed: str | None = None) -> Any:
-        """What drives the case, its constant forces with it; a speed given takes the place of its drive."""
-        from ..periodic import VaryingInputError, drive_of
-
-        speed = speed or self.speed
-        value = None if speed is None else quantity(speed, "rad/s", "--speed")
-        if value is not None and self.case.inputs.torque is not None:
-            print_error("note: the speed is prescribed; the case's torque is left out")
-        try:
-            drive = drive_of(self.case.parameters, self.case.inputs, self.case.initial, speed=value)
-            # that something is free is asked first
-            drive.flow(mechanism_of(self.case.parameters))
-            return drive
-        except InputError as error:
-            torque = isinstance(error, VaryingInputError) and error.channel == "torque"
-            hint = "; --speed prescribes the speed instead" if torque else ""
-            raise InputError(f"{self.case.title}: {error}{hint}") from None
-
-    def start(self, drive: Any) -> list[float] | None:
-        """Guess of the orbit's start: none at prescribed speed, else all at zero with a crank speed."""
-        if drive.speed_drive:
-            if self.guess_speed is not None:
-                raise click.UsageError("--guess-speed is for a case driven by a torque: here the speed is prescribed")
-            return None
-        mechanism = mechanism_of(self.case.parameters)
-        flow = drive.flow(mechanism)
-        speed = float(getattr(self.case.initial, mechanism.freedoms[flow.crank].initial[1]))
-        if self.guess_speed is not None:
-            speed = quantity(self.guess_speed, "rad/s", "--guess-speed")
-        elif speed <= 0.0:
-            if drive.motor is None:
-                raise click.UsageError("under a torque a guess of the crank speed is needed: --guess-speed '300 rpm'")
-            return None
-        return [*[0.0] * (flow.size - 1), speed]
-
-    def finish(self, written: Sequence[Path], problems: Sequence[str], *, interrupted: bool = False) -> None:
-        """Report the files and what could not be computed, and exit with what that means."""
-        print_written(written)
-        for problem in problems:
-            print_error(f"note: {problem}")
-        if interrupted or problems:
-            sys.exit(INTERRUPTED if interrupted else ENDED_EARLY)
-
-
-def _about_a_case(command: Callable[..., None]) -> Callable[..., None]:
-    """Options of a command about a case, which it receives as one `_Chosen`."""
-
-    @handled
-    @wraps(command)
-    def with_case(
-        case: str | None,
-        published: str | None,
-        settings: Sequence[str],
-        speed: str | None,
-        guess_speed: str | None,
-        out: str,
-        **options: Any,
-    ) -> None:
-        chosen = chosen_case(case, published, settings)
-        stem = Path(case).stem if case else str(published)
-        command(_Chosen(case=chosen, stem=stem, speed=speed, guess_speed=guess_speed, folder=Path(out)), **options)
-
-    for option in (
-        out_option(help="Folder."),
-        click.option("--guess-speed", metavar="SPEED", help="Guess of the crank speed, for a case driven by a torque."),
-        click.option("--speed", metavar="SPEED", help="Prescribe this crank speed in the place of the case's drive."),
-        case_options(PUBLISHED),
-    ):
-        with_case = option(with_case)
-    return with_case
-
-
 @click.command()
-@_about_a_case
+@about_a_case
 @click.option("--vary", default="drive.speed", show_default=True, metavar="NAME", help="What varies, by its FMI name.")
 @click.option(
     "--from", "low", metavar="VALUE", help="Beginning of the range, such as '100 rpm'; bare numbers are in SI."
@@ -144,7 +49,7 @@ def _about_a_case(command: Callable[..., None]) -> Callable[..., None]:
 @click.option("--to", "high", metavar="VALUE", help="End of the range.")
 @click.option("--doubled/--no-doubled", default=True, show_default=True, help="Follow motions of twice the period.")
 @click.option("--plot/--no-plot", default=True, show_default=True, help="Whether to write a plot.")
-def resonance(chosen: _Chosen, vary: str, low: str | None, high: str | None, doubled: bool, plot: bool) -> None:
+def resonance(chosen: Chosen, vary: str, low: str | None, high: str | None, doubled: bool, plot: bool) -> None:
     """Follow the periodic motion of a CASE file's or a published set's mechanism over the speed, or another parameter.
 
     Writes amplitude, harmonics, crank torque and pin forces along the curve, and reports natural frequency, maxima, folds,
@@ -256,12 +161,6 @@ def _form(family: Any, special: Any) -> str:
         return "normal form not found"
 
 
-def _swing(orbit: Any) -> tuple[str, float, str]:
-    """What the amplitude is of, and the factor and unit in which it is printed: centimetres of lengths."""
-    what, unit = orbit.swing
-    return (what, 100.0, "cm") if unit == "m" else (what, 1.0, unit)
-
-
 def _friction(parameters: Any) -> bool:
     """Whether there is friction that is not viscous."""
     names = mechanism_of(parameters).mechanism_variables
@@ -273,7 +172,7 @@ def _extrema(response: Any, factor: float, unit: str, table: Any) -> None:
     if not entries:
         console.print("the amplitude has neither a maximum nor a minimum inside the range", highlight=False)
         return
-    what, size, cm = _swing(response.branches[0].orbits[0])
+    what, size, cm = swing_of(response.branches[0].orbits[0])
     grid = Table(title=f"where the amplitude of {what} is largest and least", title_justify="left")
     names = () if table is None else tuple(table.amplitudes)
     for heading in ("", f"at [{unit}]", f"amplitude [{cm}]", "motion", *(f"{name} [{cm}]" for name in names)):
@@ -293,7 +192,7 @@ def _extrema(response: Any, factor: float, unit: str, table: Any) -> None:
 
 
 @click.command()
-@_about_a_case
+@about_a_case
 @click.option("--x", "x", metavar="NAME", help="Parameter along x, by its FMI name; by default the crank speed.")
 @click.option("--x-range", nargs=2, metavar="FROM TO", help="Its range, such as '100 rpm' '1500 rpm'.")
 @click.option(
@@ -305,7 +204,7 @@ def _extrema(response: Any, factor: float, unit: str, table: Any) -> None:
 @click.option("--chart/--no-chart", "charted", default=True, show_default=True, help="Chart, or the verdict alone.")
 @click.option("--coexisting", is_flag=True, help="Seek all motions of every point: how many are stable, and how large.")
 def stability(
-    chosen: _Chosen,
+    chosen: Chosen,
     x: str | None,
     x_range: tuple[str, str] | None,
     y: str | None,
@@ -380,95 +279,6 @@ def stability(
     chosen.finish(written, found.problems)
 
 
-@click.command()
-@_about_a_case
-@click.option("--points", default=200, show_default=True, type=click.IntRange(2, 4000), help="Starts along each axis.")
-@click.option(
-    "--position", nargs=2, metavar="FROM TO", help="Range of the first free coordinate, such as '-5 cm' '5 cm'."
-)
-@click.option("--rate", nargs=2, metavar="FROM TO", help="Range of its rate.")
-@workers_options(default=-1)
-def basins(
-    chosen: _Chosen,
-    points: int,
-    position: tuple[str, str] | None,
-    rate: tuple[str, str] | None,
-    jobs: int,
-) -> None:
-    """Report all periodic motions of a CASE file's or a published set's mechanism at one speed, and which start ends in which.
-
-    The picture is over the position and the rate of the first free coordinate, of a five-bar the slider, at crank angle 0.
-
-    \b
-    Examples:
-      linkwork basins --published rig-1-spring-b --speed '1000 rpm'
-      linkwork basins --published rig-1-spring-b --speed '1000 rpm' --position '-10 cm' '10 cm' --rate '-10 m/s' '10 m/s'
-    """
-    from .. import figures
-    from ..files import save_figure
-    from ..periodic import basins as find_basins
-    from ..periodic import orbits_of
-
-    parameters, drive = chosen.case.parameters, chosen.drive()
-    start = chosen.start(drive)
-    flow = drive.flow(mechanism_of(parameters))
-    units = (flow.components[0][1], flow.components[flow.size // 2][1])
-    spans: list[Any] = [
-        None if texts is None else tuple(quantity(text, unit, option) for text in texts)
-        for texts, unit, option in zip((position, rate), units, ("--position", "--rate"))
-    ]
-    found = orbits_of(parameters, drive, start=start)
-    _motions(chosen.case.title, found)
-    if not found.stable:
-        raise InputError("no stable motion of one turn was found: no start ends in one")
-    picture = find_basins(
-        parameters,
-        drive,
-        points=points,
-        position=spans[0],
-        rate=spans[1],
-        start=start,
-        n_jobs=jobs,
-        progress=console.is_terminal,
-    )
-    shares = [f"{picture.share(n):.1%} in motion {n + 1}" for n in range(len(picture.motions))]
-    console.print(
-        f"of {picture.ends.size} starts end {', '.join(shares)}, {picture.share(-1):.1%} at the limit of assembly, "
-        f"{picture.share(-2):.1%} in none of them",
-        highlight=False,
-        soft_wrap=True,
-    )
-    stem = folder_of(chosen.folder) / f"{chosen.stem}-basins"
-    figure = figures.plot(picture, title=chosen.case.title)
-    chosen.finish([picture.to_csv(f"{stem}.csv"), save_figure(figure, f"{stem}.png")], ())
-
-
-def _motions(title: str, found: Any) -> None:
-    """All motions at one speed, and how sure it is that there are no others."""
-    grid = Table(title=f"{title}: periodic motions of one turn", title_justify="left")
-    for heading in ("motion", "amplitude", "stability", "largest multiplier"):
-        grid.add_column(heading, justify="left" if heading == "stability" else "right")
-    number = 0
-    for orbit in found.orbits:
-        what, size, unit = _swing(orbit)
-        stable = orbit in found.stable
-        number += stable
-        grid.add_row(
-            str(number) if stable else "",
-            f"{size * orbit.amplitude:.5g} {unit} of {what}",
-            orbit.verdict().stability.value,
-            f"{orbit.largest:.6g}",
-        )
-    console.print(grid)
-    sure = "two methods found the same motions" if found.agreed else "two methods differ: there may be more motions"
-    index = (
-        ""
-        if found.index == 1
-        else f"; their indices add up to {found.index}, not 1: one may be missing, or come to the limit of assembly"
-    )
-    console.print(sure + index, highlight=False, soft_wrap=True)
-
-
 def _axis_range(
     parameters: Any, drive: Any, name: str, texts: tuple[str, str] | None, option: str
 ) -> tuple[float, float]:
@@ -487,7 +297,7 @@ def _report_verdict(title: str, parameters: Any, drive: Any, start: Any) -> None
     from ..youssef import linear_verdict
 
     orbit = orbit_of(parameters, drive, start=start)
-    turn, (_, size, unit) = orbit.turn(), _swing(orbit)
+    turn, (_, size, unit) = orbit.turn(), swing_of(orbit)
     values = ", ".join(f"{m.real:.6g}{m.imag:+.6g}i" if m.imag else f"{m.real:.6g}" for m in orbit.multipliers)
     lines = [
         f"{title} at {60.0 * turn.turns / turn.period:.6g} rpm: {orbit.verdict()}",
@@ -570,96 +380,3 @@ def _runs(found: Any) -> None:
             "agrees" if c.agrees else "DOES NOT AGREE",
         )
     console.print(grid)
-
-
-@click.command()
-@click.argument("record", type=click.Path(exists=True, dir_okay=False))
-@click.option("--time", "time", metavar="NAME", help="Column of the times; by default the first.")
-@click.option("--position", metavar="NAME", help="Column of the positions; by default the second.")
-@click.option("--time-unit", default="s", show_default=True, help="Unit of the times.")
-@click.option("--unit", default="m", show_default=True, help="Unit of the positions: for a force of friction.")
-@click.option("--from", "first", metavar="TIME", help="Leave out what is before, such as '0.2 s': the impulse.")
-@click.option("--to", "last", metavar="TIME", help="Leave out what is after.")
-@click.option(
-    "--mass", metavar="MASS", help="Moving mass, such as '600 g': gives the damping coefficient and the stiffness."
-)
-@click.option("--friction", is_flag=True, help="Fit dry friction beside the damper.")
-@click.option("--least-swing", type=float, help="Smallest swing that counts, as a part of the range; 0.1 by default.")
-@plot_option
-@out_option()
-@handled
-def decrement(
-    record: str, time: str | None, position: str | None, mass: str | None, out: str, plot: bool, **options: Any
-) -> None:
-    """Damping and natural frequency from the decaying record of a freedom on its spring: the logarithmic decrement.
-
-    RECORD is a CSV file of times and positions after an impulse, or after a release. The turning points are fitted by least
-    squares, with the offset of the record; +- is the standard error. Dry friction shows by a decrement that grows from cycle to
-    cycle.
-
-    \b
-    Examples:
-      linkwork decrement record.csv --mass '600 g'
-      linkwork decrement record.csv --time 't [s]' --position 'u [mm]' --unit mm --from '0.1 s' --friction
-    """
-    from .. import figures
-    from ..files import read_columns, save_figure, write_csv
-    from ..linear import LEAST_SWING, fit_decay
-
-    units = (("time_unit", "s", "--time-unit"), ("unit", "m", "--unit"))
-    second, metre = (quantity(f"1 {options[name]}", si, option) for name, si, option in units)
-    t, x = read_columns(record, (time, position))
-    t = t * second
-    first = quantity(options["first"], "s", "--from") if options["first"] else -np.inf
-    last = quantity(options["last"], "s", "--to") if options["last"] else np.inf
-    kept = ~((t < first) | (t > last))
-    decay = fit_decay(
-        t[kept],
-        x[kept],
-        friction=options["friction"],
-        least_swing=LEAST_SWING if options["least_swing"] is None else options["least_swing"],
-    )
-    kg = None if mass is None else quantity(mass, "kg", "--mass")
-    if kg is not None and kg <= 0.0:
-        raise click.UsageError(f"--mass {mass}: it must be above zero")
-    show_table(
-        f"{Path(record).name}: {len(decay.time)} turning points from {decay.time[0]:.6g} to {decay.time[-1]:.6g} s",
-        ("", "value", "+-", "unit"),
-        [
-            (name, f"{value:.6g}", f"{error:.2g}", unit)
-            for name, value, error, unit in _found(decay, kg, metre if options["friction"] else None, options["unit"])
-        ],
-        words=("", "unit"),
-    )
-    console.print(f"the fit is within {decay.residual:.2g} of the first amplitude (root mean square)", highlight=False)
-    stem = folder_of(out) / f"{Path(record).stem}-decrement"
-    columns = {
-        "time [s]": decay.time,
-        f"position [{options['unit']}]": decay.position,
-        f"fit [{options['unit']}]": decay.fitted,
-    }
-    written = [write_csv(f"{stem}.csv", columns)]
-    if plot:
-        drawn = figures.plot(decay, (t[kept], x[kept]), unit=options["unit"], title=Path(record).name)
-        written.append(save_figure(drawn, f"{stem}.png"))
-    print_written(written)
-
-
-def _found(decay: Any, kg: float | None, metre: float | None, unit: str) -> list[tuple[str, float, float, str]]:
-    """What a decay shows: names, values, standard errors and units; friction where ``metre``, the record's unit, is given."""
-    natural, error = decay.natural_frequency, decay.natural_frequency_error
-    rows = [
-        ("logarithmic decrement", decay.decrement, decay.decrement_error, ""),
-        ("damping ratio", decay.damping_ratio, decay.damping_ratio_error, ""),
-        ("natural frequency", natural, error, "rad/s"),
-        ("", natural / RAD_S_PER_RPM, error / RAD_S_PER_RPM, "rpm"),
-    ]
-    if metre is not None:
-        rows.append(("dry friction over the stiffness", decay.friction, decay.friction_error, unit))
-    if kg is not None:
-        stiffness = decay.stiffness(kg)
-        rows += [("damping coefficient", *decay.damping(kg), "N.s/m"), ("stiffness", *stiffness, "N/m")]
-        if metre is not None:
-            newton = stiffness[0] * metre
-            rows.append(("dry friction", newton * decay.friction, newton * decay.friction_error, "N"))
-    return rows

@@ -19,12 +19,13 @@ from ..mechanisms import MECHANISMS, Parameters, mechanism_of
 from ..notebook import Shown, format_count
 from ..numerics.workers import over_workers
 from ..run import shown, takes_published
-from . import orbit_kernels
+from . import coexistence_kernels
+from .coexistence_kernels import LOST, MOST_ORBITS, UNSETTLED
 from .drives import Drive
 from .finder import Orbits, orbits_of
 from .floquet import TOLERANCE, multipliers
 from .flows import PLAIN, VARIATIONAL
-from .orbit_kernels import LOST, MOST_ORBITS, NO_SOURCE, UNSETTLED
+from .orbit_kernels import NO_SOURCE
 from .orbits import INTEGRATOR_TOLERANCE, MOST_ITERATIONS, SEARCH_TOLERANCE, guess_of, section_of
 from .planes import Operation, Plane
 from .starts import extent_of, scale_of, starts_of
@@ -168,7 +169,7 @@ def _row(
     vectors = np.array([d.vector(mechanism) for _, d in row])
     starts, counts = np.full((m, MOST_ORBITS, n), np.nan), np.zeros(m, dtype=np.int64)
     monodromies, swings = np.full((m, MOST_ORBITS, n * n), np.nan), np.full((m, MOST_ORBITS, SAMPLES), np.nan)
-    orbit_kernels.solve_all(
+    coexistence_kernels.solve_all(
         section_of(
             parameters,
             drive,
@@ -339,5 +340,5 @@ def _ends(
     starts[:, 0], starts[:, flow.size // 2] = across, rate
     ends = np.zeros(len(across), dtype=np.int64)
     section = section_of(parameters, drive, known[0], PLAIN, tolerance=_TOLERANCE)
-    orbit_kernels.basins_of(section, NO_SOURCE, flow.period, _NEAR, _TURNS, starts, known, ends)
+    coexistence_kernels.basins_of(section, NO_SOURCE, flow.period, _NEAR, _TURNS, starts, known, ends)
     return ends

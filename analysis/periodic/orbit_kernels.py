@@ -48,8 +48,6 @@ REASONS = {
 
 #: Least fraction of a radian that a step may have.
 _LEAST_STEP = 1e-9
-#: Distance of two starts, relative to the scale, below which they are of one motion.
-_SAME = 1e-6
 #: Crank speed below which the crank counts as stalled, relative to that at the start.
 _STALL = 1e-3
 #: Least fraction of a Newton correction that is tried, and in the search for other motions.
@@ -70,7 +68,7 @@ class Section(NamedTuple):
     torque: bool
 
 
-_SECTION = types.NamedTuple((int64[::1], VECTOR, VECTOR, VECTOR, VECTOR, float64, float64, boolean), Section)
+SECTION = types.NamedTuple((int64[::1], VECTOR, VECTOR, VECTOR, VECTOR, float64, float64, boolean), Section)
 
 #: Inputs of a run that are not asked for: what drives an orbit is constant.
 NO_SOURCE = Source(
@@ -85,7 +83,7 @@ NO_SOURCE = Source(
 
 
 @part
-def _numbered(section, drive, p, scale, tolerance):  # type: ignore[no-untyped-def]
+def numbered(section, drive, p, scale, tolerance):  # type: ignore[no-untyped-def]
     """The same flow with other numbers."""
     return Section(section.equations, section.modes, drive, p, scale, 1.0, tolerance, section.torque)
 
@@ -100,7 +98,7 @@ class Room(NamedTuple):
 
 
 @part
-def _room(section, columns):  # type: ignore[no-untyped-def]
+def make_room(section, columns):  # type: ignore[no-untyped-def]
     """Room for y and so many columns: magnitudes of y, of dy_i/dy0_j and of dy_i/dlambda."""
     n = section.scale.shape[0]
     sizes = np.empty(n * (1 + columns))
@@ -118,7 +116,7 @@ def _clearance(section, angle, z, room):  # type: ignore[no-untyped-def]
 
 
 @inner
-def _turn(section, source, begin, end, z, room, carry):  # type: ignore[no-untyped-def]
+def advance(section, source, begin, end, z, room, carry):  # type: ignore[no-untyped-def]
     """Integrate z over a range of crank angles; carry[0] is the step to begin with and to go on with, carry[1] counts."""
     n = section.scale.shape[0]
     size = z.shape[0]
@@ -173,7 +171,7 @@ def _begin(n, start, z):  # type: ignore[no-untyped-def]
             z[n + i * n + i] = 1.0
 
 
-@kernel(int64(_SECTION, SOURCE, float64, VECTOR, VECTOR), purpose="the integrator of periodic motions")
+@kernel(int64(SECTION, SOURCE, float64, VECTOR, VECTOR), purpose="the integrator of periodic motions")
 def period(section, source, end, z, carry):  # type: ignore[no-untyped-def]
     """Integrate y and as many columns of derivatives as ``z`` has room for from crank angle 0 to ``end``.
 
@@ -195,13 +193,13 @@ def period(section, source, end, z, carry):  # type: ignore[no-untyped-def]
         A `Status` but DIVERGED.
     """
     n = section.scale.shape[0]
-    room = _room(section, z.shape[0] // n - 1)
+    room = make_room(section, z.shape[0] // n - 1)
     _begin(n, z.copy(), z)
-    return _turn(section, source, 0.0, end, z, room, carry)
+    return advance(section, source, 0.0, end, z, room, carry)
 
 
 @part
-def _size(correction, scale):  # type: ignore[no-untyped-def]
+def magnitude(correction, scale):  # type: ignore[no-untyped-def]
     """Largest component relative to the scale."""
     size = 0.0
     for i in range(scale.shape[0]):
@@ -213,7 +211,7 @@ def _size(correction, scale):  # type: ignore[no-untyped-def]
 
 
 @part
-def _solve(section, source, end, most, start, z, room, carry, report):  # type: ignore[no-untyped-def]
+def newton(section, source, end, most, start, z, room, carry, report):  # type: ignore[no-untyped-def]
     """Newton's method for y(end) = y(0); see `solve`.
 
     A correction is taken in part where the next one, found with the same matrix, would not be smaller (Deuflhard's natural
@@ -232,7 +230,7 @@ def _solve(section, source, end, most, start, z, room, carry, report):  # type: 
     for iteration in range(most):
         while True:
             _begin(n, trial, z)
-            status = _turn(section, source, 0.0, end, z, room, carry)
+            status = advance(section, source, 0.0, end, z, room, carry)
             if iteration == 0 and status != DONE:
                 return status
             if status == DONE:
@@ -240,7 +238,7 @@ def _solve(section, source, end, most, start, z, room, carry, report):  # type: 
                     break
                 following[:] = z[:n] - trial
                 solve_small(matrix.copy(), following)
-                next_size = _size(following, scale)
+                next_size = magnitude(following, scale)
                 # near the solution corrections stop falling at the integrator's error
                 if next_size <= (1.0 - 0.25 * fraction) * size or next_size <= 100.0 * tolerance:
                     break
@@ -251,13 +249,13 @@ def _solve(section, source, end, most, start, z, room, carry, report):  # type: 
         report[1] = iteration + 1.0
         start[:] = trial
         correction[:] = z[:n] - trial
-        report[0] = _size(correction, scale)
+        report[0] = magnitude(correction, scale)
         for i in range(n):
             for j in range(n):
                 matrix[i, j] = (1.0 if i == j else 0.0) - z[n + j * n + i]
         if not solve_small(matrix.copy(), correction):
             return DIVERGED
-        size = _size(correction, scale)
+        size = magnitude(correction, scale)
         if not isfinite(size):
             return DIVERGED
         # what was taken in part is tried less cautiously the next time
@@ -297,7 +295,7 @@ def solve_small(a, b):  # type: ignore[no-untyped-def]
     return True
 
 
-@kernel(int64(_SECTION, SOURCE, float64, int64, VECTOR, VECTOR, VECTOR), purpose="the search for periodic motions")
+@kernel(int64(SECTION, SOURCE, float64, int64, VECTOR, VECTOR, VECTOR), purpose="the search for periodic motions")
 def solve(section, source, end, most, start, z, report):  # type: ignore[no-untyped-def]
     """Periodic orbit by Newton's method with step control on the map over a period.
 
@@ -314,15 +312,15 @@ def solve(section, source, end, most, start, z, report):  # type: ignore[no-unty
 
     The others as for `period`. Returns a `Status`.
     """
-    room = _room(section, section.scale.shape[0])
+    room = make_room(section, section.scale.shape[0])
     carry = np.array([0.1, 0.0])
-    status = _solve(section, source, end, most, start, z, room, carry, report)
+    status = newton(section, source, end, most, start, z, room, carry, report)
     report[2] = carry[1]
     return status
 
 
 @part
-def _search(section, source, end, most, reach, start, known, z, room, carry):  # type: ignore[no-untyped-def]
+def deflated(section, source, end, most, reach, start, known, z, room, carry):  # type: ignore[no-untyped-def]
     """See `search`."""
     scale = section.scale
     n = scale.shape[0]
@@ -333,7 +331,7 @@ def _search(section, source, end, most, reach, start, known, z, room, carry):  #
         fraction = 1.0
         while True:
             _begin(n, trial, z)
-            status = _turn(section, source, 0.0, end, z, room, carry)
+            status = advance(section, source, 0.0, end, z, room, carry)
             if status == DONE:
                 break
             fraction *= 0.5
@@ -347,7 +345,7 @@ def _search(section, source, end, most, reach, start, known, z, room, carry):  #
                 matrix[i, j] = (1.0 if i == j else 0.0) - z[n + j * n + i]
         if not solve_small(matrix, correction):
             return DIVERGED
-        size = _size(correction, scale)
+        size = magnitude(correction, scale)
         if not isfinite(size):
             return DIVERGED
         # derivative of the logarithm of the factor along the correction
@@ -368,7 +366,7 @@ def _search(section, source, end, most, reach, start, known, z, room, carry):  #
         if nearest == 0.0 or slope == 1.0:
             return DIVERGED
         correction[:] = correction / (1.0 - slope)
-        size = _size(correction, scale)
+        size = magnitude(correction, scale)
         if size > reach:
             correction[:] = correction * (reach / size)
         trial[:] = start + correction
@@ -376,7 +374,7 @@ def _search(section, source, end, most, reach, start, known, z, room, carry):  #
 
 
 @kernel(
-    int64(_SECTION, SOURCE, float64, int64, float64, VECTOR, MATRIX, VECTOR),
+    int64(SECTION, SOURCE, float64, int64, float64, VECTOR, MATRIX, VECTOR),
     purpose="the search for coexisting motions",
 )
 def search(section, source, end, most, reach, start, known, z):  # type: ignore[no-untyped-def]
@@ -401,28 +399,28 @@ def search(section, source, end, most, reach, start, known, z):  # type: ignore[
 
     The others as for `period`. Returns a `Status`.
     """
-    room = _room(section, section.scale.shape[0])
-    return _search(section, source, end, most, reach, start, known, z, room, np.array([0.1, 0.0]))
+    room = make_room(section, section.scale.shape[0])
+    return deflated(section, source, end, most, reach, start, known, z, room, np.array([0.1, 0.0]))
 
 
-@kernel(int64(_SECTION, SOURCE, float64, float64, int64, VECTOR), purpose="the settling of motions")
+@kernel(int64(SECTION, SOURCE, float64, float64, int64, VECTOR), purpose="the settling of motions")
 def settle(section, source, turn, change, most, start):  # type: ignore[no-untyped-def]
     """Follow the motion from ``start``, which is overwritten, turn by turn until one changes y by less than ``change``."""
-    room = _room(section, 0)
+    room = make_room(section, 0)
     z = start.copy()
     carry = np.array([0.1, 0.0])
     for _ in range(most):
-        status = _turn(section, source, 0.0, turn, z, room, carry)
+        status = advance(section, source, 0.0, turn, z, room, carry)
         if status != DONE:
             return status
-        size = _size(z - start, section.scale)
+        size = magnitude(z - start, section.scale)
         start[:] = z
         if size < change:
             return DONE
     return DONE
 
 
-@kernel(int64(_SECTION, SOURCE, VECTOR, MATRIX, VECTOR, MATRIX), purpose="the sampling of periodic motions")
+@kernel(int64(SECTION, SOURCE, VECTOR, MATRIX, VECTOR, MATRIX), purpose="the sampling of periodic motions")
 def sample(section, source, stations, starts, angles, rows):  # type: ignore[no-untyped-def]
     """States of a run and channels, shape (m, states + inputs), at increasing crank angles.
 
@@ -431,7 +429,7 @@ def sample(section, source, stations, starts, angles, rows):  # type: ignore[no-
     stations, starts : ndarray, shapes (k,) and (k, n)
         Increasing crank angles, the first 0, at each of which y is begun anew, and y there.
     """
-    room = _room(section, 0)
+    room = make_room(section, 0)
     z = starts[0].copy()
     carry = np.array([0.1, 0.0])
     angle = 0.0
@@ -442,7 +440,7 @@ def sample(section, source, stations, starts, angles, rows):  # type: ignore[no-
             angle = stations[passed]
             z[:] = starts[passed]
         if angles[i] > angle:
-            status = _turn(section, source, angle, angles[i], z, room, carry)
+            status = advance(section, source, angle, angles[i], z, room, carry)
             if status != DONE:
                 return status
             angle = angles[i]
@@ -450,7 +448,7 @@ def sample(section, source, stations, starts, angles, rows):  # type: ignore[no-
     return DONE
 
 
-@kernel(int64(_SECTION, SOURCE, VECTOR, MATRIX, MATRIX), purpose="multiple shooting")
+@kernel(int64(SECTION, SOURCE, VECTOR, MATRIX, MATRIX), purpose="multiple shooting")
 def segments(section, source, angles, starts, rows):  # type: ignore[no-untyped-def]
     """Integrate y with its derivatives over each of the pieces of a period: see `period`.
 
@@ -463,18 +461,18 @@ def segments(section, source, angles, starts, rows):  # type: ignore[no-untyped-
     rows : ndarray, shape (k, n (2 + n))
         y at the end of each, dy/dy there by columns, dy/dlambda; written.
     """
-    room = _room(section, rows.shape[1] // starts.shape[1] - 1)
+    room = make_room(section, rows.shape[1] // starts.shape[1] - 1)
     carry = np.array([0.1, 0.0])
     for piece in range(starts.shape[0]):
         _begin(starts.shape[1], starts[piece], rows[piece])
-        status = _turn(section, source, angles[piece], angles[piece + 1], rows[piece], room, carry)
+        status = advance(section, source, angles[piece], angles[piece + 1], rows[piece], room, carry)
         if status != DONE:
             return status
     return DONE
 
 
 @kernel(
-    types.void(_SECTION, SOURCE, MATRIX, MATRIX, MATRIX, float64, int64, float64, MATRIX, MATRIX, MATRIX, int64[::1]),
+    types.void(SECTION, SOURCE, MATRIX, MATRIX, MATRIX, float64, int64, float64, MATRIX, MATRIX, MATRIX, int64[::1]),
     purpose="grids of periodic motions",
 )
 def solve_row(section, source, parameters, drives, scales, end, most, loose, guesses, starts, monodromies, status):  # type: ignore[no-untyped-def]
@@ -503,22 +501,22 @@ def solve_row(section, source, parameters, drives, scales, end, most, loose, gue
     start = guesses[0].copy()
     found = 0
     for row in range(parameters.shape[0]):
-        own = _numbered(section, drives[row], parameters[row], scales[row], section.tolerance)
-        room = _room(own, n)
+        own = numbered(section, drives[row], parameters[row], scales[row], section.tolerance)
+        room = make_room(own, n)
         if found > 1:
             # the secant through the last two
             start[:] = 2.0 * starts[row - 1] - starts[row - 2]
-        what = _solve(own, source, end, most, start, z, room, carry, report)
+        what = newton(own, source, end, most, start, z, room, carry, report)
         if what != DONE:
             start[:] = guesses[0]
-            what = _solve(own, source, end, most, start, z, room, carry, report)
+            what = newton(own, source, end, most, start, z, room, carry, report)
         if what != DONE:
-            wide = _numbered(section, drives[row], parameters[row], scales[row], loose)
+            wide = numbered(section, drives[row], parameters[row], scales[row], loose)
             for guess in range(1, guesses.shape[0]):
                 start[:] = guesses[guess]
                 if (
-                    _search(wide, source, end, most, 1.0, start, none, z, room, carry) == DONE
-                    and _solve(own, source, end, most, start, z, room, carry, report) == DONE
+                    deflated(wide, source, end, most, 1.0, start, none, z, room, carry) == DONE
+                    and newton(own, source, end, most, start, z, room, carry, report) == DONE
                 ):
                     what = DONE
                     break
@@ -533,122 +531,9 @@ def solve_row(section, source, parameters, drives, scales, end, most, loose, gue
     # what was not found from the left may be found from the right
     for row in range(parameters.shape[0] - 2, -1, -1):
         if status[row] != DONE and status[row + 1] == DONE:
-            own = _numbered(section, drives[row], parameters[row], scales[row], section.tolerance)
+            own = numbered(section, drives[row], parameters[row], scales[row], section.tolerance)
             start[:] = starts[row + 1]
-            if _solve(own, source, end, most, start, z, _room(own, n), carry, report) == DONE:
+            if newton(own, source, end, most, start, z, make_room(own, n), carry, report) == DONE:
                 status[row] = DONE
                 starts[row] = start
                 monodromies[row] = z[n:]
-
-
-#: Periodic motions of a point at most that are kept.
-MOST_ORBITS = 8
-
-
-@part
-def _is_known(start, known, scale):  # type: ignore[no-untyped-def]
-    """Whether a start is among the known ones."""
-    found = False
-    for k in range(known.shape[0]):
-        found = found or _size(start - known[k], scale) < _SAME
-    return found
-
-
-@kernel(
-    types.void(
-        _SECTION, SOURCE, MATRIX, MATRIX, MATRIX, float64, int64, float64, VECTOR, MATRIX, float64[:, :, ::1],
-        float64[:, :, ::1], float64[:, :, ::1], int64[::1],
-    ),
-    purpose="grids of coexisting motions",
-)  # fmt: skip
-def solve_all(
-    section, source, parameters, drives, scales, end, most, loose, angles, guesses, starts, monodromies, swings, counts
-):  # type: ignore[no-untyped-def]
-    """All orbits of each of a row of mechanisms, as far as they are found: see `solve_row` for what is not said here.
-
-    Each point's orbits are sought from those of the point before, then from every guess with the known ones divided out.
-
-    Parameters
-    ----------
-    angles : ndarray, shape (samples,)
-        Crank angles at which the first component of y is taken.
-    starts, monodromies, swings : ndarray, shapes (m, MOST_ORBITS, n), (m, MOST_ORBITS, n n) and (m, MOST_ORBITS, samples)
-        Written.
-    counts : ndarray of int64, shape (m,)
-        Orbits of each; written.
-    """
-    n = guesses.shape[1]
-    z, single = np.empty(n * (1 + n)), np.empty(n)
-    report, carry = np.zeros(3), np.array([0.1, 0.0])
-    start = np.empty(n)
-    for row in range(parameters.shape[0]):
-        own = _numbered(section, drives[row], parameters[row], scales[row], section.tolerance)
-        wide = _numbered(section, drives[row], parameters[row], scales[row], loose)
-        room, plain = _room(own, n), _room(own, 0)
-        count = 0
-        before = counts[row - 1] if row > 0 else 0
-        for place in range(before + guesses.shape[0]):
-            while count < MOST_ORBITS:
-                if place < before:
-                    start[:] = starts[row - 1, place]
-                else:
-                    start[:] = guesses[place - before]
-                    if _search(wide, source, end, most, 1.0, start, starts[row, :count], z, room, carry) != DONE:
-                        break
-                if _solve(own, source, end, most, start, z, room, carry, report) != DONE:
-                    break
-                if _is_known(start, starts[row, :count], own.scale):
-                    break
-                starts[row, count] = start
-                monodromies[row, count] = z[n:]
-                single[:] = start
-                angle, carry[0] = 0.0, 0.1
-                for i in range(angles.shape[0]):
-                    if angles[i] > angle:
-                        _turn(own, source, angle, angles[i], single, plain, carry)
-                        angle = angles[i]
-                    swings[row, count, i] = single[0]
-                count += 1
-                if place < before:
-                    break
-        counts[row] = count
-
-
-#: How a start ended that was followed until it stays with a motion: at the limit of assembly, or not within the turns.
-LOST, UNSETTLED = -1, -2
-
-
-@kernel(
-    types.void(_SECTION, SOURCE, float64, float64, int64, MATRIX, MATRIX, int64[::1]),
-    purpose="basins of attraction",
-)
-def basins_of(section, source, turn, near, most, starts, known, ends):  # type: ignore[no-untyped-def]
-    """Which of the known motions each start ends in, followed turn by turn.
-
-    Parameters
-    ----------
-    turn : float
-        Crank angle of a turn (rad).
-    near : float
-        Distance from a known start, relative to the scale, at which the motion counts as arrived.
-    most : int
-        Turns at most.
-    starts, known : ndarray, shapes (m, n) and (k, n)
-    ends : ndarray of int64, shape (m,)
-        Number of the known motion, `LOST` where the links come to the limit of assembly, `UNSETTLED`; written.
-    """
-    room = _room(section, 0)
-    z, carry = np.empty(starts.shape[1]), np.array([0.1, 0.0])
-    for row in range(starts.shape[0]):
-        z[:] = starts[row]
-        carry[0] = 0.1
-        ends[row] = UNSETTLED
-        for _ in range(most):
-            for k in range(known.shape[0]):
-                if _size(z - known[k], section.scale) < near:
-                    ends[row] = k
-            if ends[row] >= 0:
-                break
-            if _turn(section, source, 0.0, turn, z, room, carry) != DONE:
-                ends[row] = LOST
-                break

@@ -18,11 +18,6 @@ TEXT, LISTING, OURS = "text", "listing", "ours"
 #: What a verdict may be.
 HOLDS, FAILS, UNJUDGED = "holds", "does not hold", "cannot be judged"
 
-ASSIGNED = (
-    "The captions of the thesis's figures are lost; which quantity stands under which number is our assignment, chosen so "
-    "that the figures of the series together show all that its text discusses."
-)
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Verdict:

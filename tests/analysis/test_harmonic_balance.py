@@ -12,7 +12,7 @@ import pytest
 pytest.importorskip("casadi")
 
 from analysis.numerics.fourier import FourierSeries
-from analysis.studies.youssef._runs import rig_1, steady_turn
+from analysis.studies.youssef.runs import steady_turn
 from analysis.youssef import (
     HarmonicBalanceError,
     HarmonicMotion,
@@ -29,8 +29,10 @@ from analysis.youssef import (
 from analysis.youssef import harmonics as hb
 from linkwork.errors import AssemblyError, InputError
 from linkwork.five_bar.parameters import FiveBarParameters
-from linkwork.five_bar.published import CM_PER_METRE, RAD_S_PER_RPM, TABLE_3_1, chapter_4
+from linkwork.five_bar.published import CM_PER_METRE, RAD_S_PER_RPM, SETS, TABLE_3_1, chapter_4
 from tests import published
+
+RIG_1_A, RIG_1_B = (SETS[f"rig-1-spring-{spring}"].parameters for spring in "ab")
 
 ANGLES = np.linspace(0.0, 2.0 * pi, 60, endpoint=False)
 
@@ -144,7 +146,12 @@ class TestNonlinear:
 
     @pytest.mark.parametrize(
         ("parameters", "rpm"),
-        [(TABLE_3_1, 420.0), (rig_1("a"), 300.0), (rig_1("a"), 450.0), (rig_1("b"), 560.0)],
+        [
+            (TABLE_3_1, 420.0),
+            (RIG_1_A, 300.0),
+            (RIG_1_A, 450.0),
+            (RIG_1_B, 560.0),
+        ],
         ids=["table-3.1", "rig-1-a-300", "rig-1-a-450", "rig-1-b-560"],
     )
     def test_it_is_what_a_long_run_ends_in(self, parameters: FiveBarParameters, rpm: float) -> None:
@@ -204,9 +211,9 @@ class TestNonlinear:
 
     def test_friction_in_the_guide_makes_it_smaller(self) -> None:
         # the friction's tanh(u'/v0) is a step to so few harmonics, and yet
-        p = replace(rig_1("a"), slider_coulomb_friction=0.5)
+        p = replace(RIG_1_A, slider_coulomb_friction=0.5)
         motion = nonlinear_harmonic_balance(p, 560.0 * RAD_S_PER_RPM, 12)
-        free = nonlinear_harmonic_balance(rig_1("a"), 560.0 * RAD_S_PER_RPM, 12)
+        free = nonlinear_harmonic_balance(RIG_1_A, 560.0 * RAD_S_PER_RPM, 12)
         assert 0.5 < motion.amplitude / free.amplitude < 0.99
 
 

@@ -7,7 +7,7 @@ import pytest
 
 from analysis.run import Inputs, simulate
 from analysis.studies.study import TEXT
-from analysis.studies.youssef import _runs, chapter_3, free_crank
+from analysis.studies.youssef import chapter_3, free_crank, runs
 from linkwork.five_bar.parameters import InitialState
 from tests import published
 
@@ -94,8 +94,8 @@ class TestSteadyMotion:
 
     @pytest.mark.parametrize("k", published.MEAN_STEADY_U_CM)
     def test_least_position_and_mean(self, k: float) -> None:
-        turn = _runs.steady_turn(_runs.table_3_1(k), 420.0)
-        least, _ = _runs.least(turn.angle_deg, turn.slider_cm)
+        turn = runs.steady_turn(runs.table_3_1(k), 420.0)
+        least, _ = runs.least(turn.angle_deg, turn.slider_cm)
         assert least == pytest.approx(published.LEAST_STEADY_U_AT_DEG[k], abs=0.05)
         assert turn.slider_cm[:-1].mean() == pytest.approx(published.MEAN_STEADY_U_CM[k], abs=5e-4)
 
@@ -166,7 +166,7 @@ class TestFreeMotion:
 
     @pytest.mark.parametrize("degrees", [0, 60, 200])
     def test_natural_frequency_with_the_crank_held(self, degrees: int) -> None:
-        parameters = _runs.table_3_1(2e6, 0.0, 0.0)
+        parameters = runs.table_3_1(2e6, 0.0, 0.0)
         start = InitialState(crank_angle=np.radians(degrees), slider_position=1e-5)
         run = simulate(parameters, Inputs(speed=0.0), initial=start, stop_time=0.5, step=1e-4)
         u = run["slider.position"]
@@ -191,10 +191,10 @@ class Recorded(dict[str, np.ndarray]):
 
 def test_parabola_through_samples() -> None:
     x = np.linspace(-1.0, 2.0, 31)
-    place, value = _runs.least(x, 3.0 * (x - 0.123) ** 2 - 4.0)
+    place, value = runs.least(x, 3.0 * (x - 0.123) ** 2 - 4.0)
     assert place == pytest.approx(0.123, abs=1e-12)
     assert value == pytest.approx(-4.0, abs=1e-12)
-    place, value = _runs.greatest(x, 5.0 - (x - 0.77) ** 2)
+    place, value = runs.greatest(x, 5.0 - (x - 0.77) ** 2)
     assert (place, value) == (pytest.approx(0.77, abs=1e-12), pytest.approx(5.0, abs=1e-12))
 
 
@@ -202,5 +202,5 @@ def test_parabola_through_samples() -> None:
     ("value", "plain", "printed"), [(1e6, "1e6", "10⁶"), (5e5, "5e5", "5\N{MULTIPLICATION SIGN}10⁵")]
 )
 def test_values_in_words(value: float, plain: str, printed: str) -> None:
-    assert _runs.plain(value) == plain
-    assert _runs.scientific(value) == printed
+    assert runs.plain(value) == plain
+    assert runs.scientific(value) == printed

@@ -18,7 +18,7 @@ from analysis import Inputs, simulate
 from analysis.cli import main
 from analysis.periodic import Crossing, natural_frequency
 from analysis.studies.youssef import chapter_8, rig_1, rig_2, rigs
-from analysis.studies.youssef._runs import SteadyTurn, steady_turn
+from analysis.studies.youssef.runs import SteadyTurn, steady_turn
 from linkwork.five_bar.parameters import InitialState
 from linkwork.five_bar.published import SETS
 from tests import published

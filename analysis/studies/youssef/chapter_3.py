@@ -26,7 +26,7 @@ from ...periodic import mean_effective_mass
 from ...run import Event, Inputs, Trajectory, simulate
 from ..study import OURS, TEXT, Study, StudyResult, Verdict, at_least, at_most, curves_of, near, padded
 from . import free_crank
-from ._runs import (
+from .runs import (
     LINEAR,
     ON_THE_GRAPH,
     SPEED,

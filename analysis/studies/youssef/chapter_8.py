@@ -21,7 +21,6 @@ from ...linear import fit_decay
 from ...periodic import mean_effective_mass
 from ..study import OURS, TEXT, Study, StudyResult, Verdict, at_least, at_most, curves_of, near, unjudged
 from . import rig_1, rig_2
-from ._runs import steady_turn
 from .rigs import (
     LOST,
     NOTICED,
@@ -45,6 +44,7 @@ from .rigs import (
     turn,
     turns_of_sign,
 )
+from .runs import steady_turn
 
 # --- 8.6: the damping coefficient from the slider's impulse response
 

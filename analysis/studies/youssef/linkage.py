@@ -18,7 +18,7 @@ from linkwork.five_bar.published import CM_PER_METRE, RAD_S_PER_RPM
 from ...figures import Figure, animate_linkage, draw_linkage
 from ...run import Inputs, Trajectory, simulate
 from ..study import OURS, Study, StudyResult, at_most
-from ._runs import SPEED, table_3_1
+from .runs import SPEED, table_3_1
 
 NUMBER = "linkage"
 #: With P 12 cm from the crank pin and 30 degrees off the coupler.

@@ -12,7 +12,6 @@ from linkwork.five_bar.published import CM_PER_METRE, RAD_S_PER_RPM
 from ...figures import COLOURS, Curve, Figure, Panel, plot_curves
 from ...periodic import Crossing, PeriodicOrbit, SpecialPoint, Sweep, sweep
 from ..study import OURS, TEXT, Study, StudyResult, Verdict, at_least, at_most, curves_of, near, padded, unjudged
-from ._runs import steady_turn
 from .rigs import (
     FASTEST,
     GRID,
@@ -36,6 +35,7 @@ from .rigs import (
     slider,
     turn,
 )
+from .runs import steady_turn
 
 # --- rig-1-resonance: what the thesis could not reach
 

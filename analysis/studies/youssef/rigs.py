@@ -29,7 +29,7 @@ from ...periodic import (
     natural_frequency,
 )
 from ..study import OURS, StudyResult, Verdict, at_most
-from ._runs import SETTLING_TIME, steady_turn
+from .runs import SETTLING_TIME, steady_turn
 
 LOST = "the measured curve is lost with the figure"
 #: A rise of the amplitude up to which the thesis would hardly have noticed it, and departures from a sine, relative.

@@ -18,7 +18,6 @@ from linkwork.five_bar.published import (
     CM_PER_METRE,
     DYN_PER_CM_PER_NEWTON_PER_METRE,
     RAD_S_PER_RPM,
-    SETS,
     TABLE_3_1,
 )
 
@@ -44,12 +43,6 @@ def table_3_1(stiffness: float, damping: float = 3e4, gravity: float = 9.81) -> 
         slider_damping=damping / DYN_PER_CM_PER_NEWTON_PER_METRE,
         gravity=gravity,
     )
-
-
-def rig_1(spring: str, friction: float = 0.0) -> FiveBarParameters:
-    """Rig 1 with spring ``a`` or ``b``, and Coulomb friction in the guide (N)."""
-    parameters: FiveBarParameters = SETS[f"rig-1-spring-{spring}"].parameters
-    return replace(parameters, slider_coulomb_friction=friction)
 
 
 def plain(value: float) -> str:

@@ -1,0 +1,115 @@
+"""What commands about a driven case share: how it is driven, and what they say of its motions."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import wraps
+from pathlib import Path
+from typing import Any
+
+import click
+
+from linkwork.errors import InputError
+
+from ..mechanisms import PUBLISHED, mechanism_of
+from .common import (
+    ENDED_EARLY,
+    INTERRUPTED,
+    case_options,
+    chosen_case,
+    handled,
+    out_option,
+    print_error,
+    print_written,
+    quantity,
+)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Chosen:
+    """The case that a command is about, and how it is driven there."""
+
+    case: Any
+    stem: str
+    speed: str | None
+    guess_speed: str | None
+    folder: Path
+
+    def drive(self, speed: str | None = None) -> Any:
+        """What drives the case, its constant forces with it; a speed given takes the place of its drive."""
+        from ..periodic import VaryingInputError, drive_of
+
+        speed = speed or self.speed
+        value = None if speed is None else quantity(speed, "rad/s", "--speed")
+        if value is not None and self.case.inputs.torque is not None:
+            print_error("note: the speed is prescribed; the case's torque is left out")
+        try:
+            drive = drive_of(self.case.parameters, self.case.inputs, self.case.initial, speed=value)
+            # that something is free is asked first
+            drive.flow(mechanism_of(self.case.parameters))
+            return drive
+        except InputError as error:
+            torque = isinstance(error, VaryingInputError) and error.channel == "torque"
+            hint = "; --speed prescribes the speed instead" if torque else ""
+            raise InputError(f"{self.case.title}: {error}{hint}") from None
+
+    def start(self, drive: Any) -> list[float] | None:
+        """Guess of the orbit's start: none at prescribed speed, else all at zero with a crank speed."""
+        if drive.speed_drive:
+            if self.guess_speed is not None:
+                raise click.UsageError("--guess-speed is for a case driven by a torque: here the speed is prescribed")
+            return None
+        mechanism = mechanism_of(self.case.parameters)
+        flow = drive.flow(mechanism)
+        speed = float(getattr(self.case.initial, mechanism.freedoms[flow.crank].initial[1]))
+        if self.guess_speed is not None:
+            speed = quantity(self.guess_speed, "rad/s", "--guess-speed")
+        elif speed <= 0.0:
+            if drive.motor is None:
+                raise click.UsageError("under a torque a guess of the crank speed is needed: --guess-speed '300 rpm'")
+            return None
+        return [*[0.0] * (flow.size - 1), speed]
+
+    def finish(self, written: Sequence[Path], problems: Sequence[str], *, interrupted: bool = False) -> None:
+        """Report the files and what could not be computed, and exit with what that means."""
+        print_written(written)
+        for problem in problems:
+            print_error(f"note: {problem}")
+        if interrupted or problems:
+            sys.exit(INTERRUPTED if interrupted else ENDED_EARLY)
+
+
+def about_a_case(command: Callable[..., None]) -> Callable[..., None]:
+    """Options of a command about a case, which it receives as one `Chosen`."""
+
+    @handled
+    @wraps(command)
+    def with_case(
+        case: str | None,
+        published: str | None,
+        settings: Sequence[str],
+        speed: str | None,
+        guess_speed: str | None,
+        out: str,
+        **options: Any,
+    ) -> None:
+        chosen = chosen_case(case, published, settings)
+        stem = Path(case).stem if case else str(published)
+        command(Chosen(case=chosen, stem=stem, speed=speed, guess_speed=guess_speed, folder=Path(out)), **options)
+
+    for option in (
+        out_option(help="Folder."),
+        click.option("--guess-speed", metavar="SPEED", help="Guess of the crank speed, for a case driven by a torque."),
+        click.option("--speed", metavar="SPEED", help="Prescribe this crank speed in the place of the case's drive."),
+        case_options(PUBLISHED),
+    ):
+        with_case = option(with_case)
+    return with_case
+
+
+def swing_of(orbit: Any) -> tuple[str, float, str]:
+    """What the amplitude is of, and the factor and unit in which it is printed: centimetres of lengths."""
+    what, unit = orbit.swing
+    return (what, 100.0, "cm") if unit == "m" else (what, 1.0, unit)

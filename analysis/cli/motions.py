@@ -1,0 +1,103 @@
+"""The command about all periodic motions at one speed."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import click
+from rich.table import Table
+
+from linkwork.errors import InputError
+
+from ..mechanisms import mechanism_of
+from .common import console, folder_of, quantity, workers_options
+from .driven import Chosen, about_a_case, swing_of
+
+
+@click.command()
+@about_a_case
+@click.option("--points", default=200, show_default=True, type=click.IntRange(2, 4000), help="Starts along each axis.")
+@click.option(
+    "--position", nargs=2, metavar="FROM TO", help="Range of the first free coordinate, such as '-5 cm' '5 cm'."
+)
+@click.option("--rate", nargs=2, metavar="FROM TO", help="Range of its rate.")
+@workers_options(default=-1)
+def basins(
+    chosen: Chosen,
+    points: int,
+    position: tuple[str, str] | None,
+    rate: tuple[str, str] | None,
+    jobs: int,
+) -> None:
+    """Report all periodic motions of a CASE file's or a published set's mechanism at one speed, and which start ends in which.
+
+    The picture is over the position and the rate of the first free coordinate, of a five-bar the slider, at crank angle 0.
+
+    \b
+    Examples:
+      linkwork basins --published rig-1-spring-b --speed '1000 rpm'
+      linkwork basins --published rig-1-spring-b --speed '1000 rpm' --position '-10 cm' '10 cm' --rate '-10 m/s' '10 m/s'
+    """
+    from .. import figures
+    from ..files import save_figure
+    from ..periodic import basins as find_basins
+    from ..periodic import orbits_of
+
+    parameters, drive = chosen.case.parameters, chosen.drive()
+    start = chosen.start(drive)
+    flow = drive.flow(mechanism_of(parameters))
+    units = (flow.components[0][1], flow.components[flow.size // 2][1])
+    spans: list[Any] = [
+        None if texts is None else tuple(quantity(text, unit, option) for text in texts)
+        for texts, unit, option in zip((position, rate), units, ("--position", "--rate"))
+    ]
+    found = orbits_of(parameters, drive, start=start)
+    _motions(chosen.case.title, found)
+    if not found.stable:
+        raise InputError("no stable motion of one turn was found: no start ends in one")
+    picture = find_basins(
+        parameters,
+        drive,
+        points=points,
+        position=spans[0],
+        rate=spans[1],
+        start=start,
+        n_jobs=jobs,
+        progress=console.is_terminal,
+    )
+    shares = [f"{picture.share(n):.1%} in motion {n + 1}" for n in range(len(picture.motions))]
+    console.print(
+        f"of {picture.ends.size} starts end {', '.join(shares)}, {picture.share(-1):.1%} at the limit of assembly, "
+        f"{picture.share(-2):.1%} in none of them",
+        highlight=False,
+        soft_wrap=True,
+    )
+    stem = folder_of(chosen.folder) / f"{chosen.stem}-basins"
+    figure = figures.plot(picture, title=chosen.case.title)
+    chosen.finish([picture.to_csv(f"{stem}.csv"), save_figure(figure, f"{stem}.png")], ())
+
+
+def _motions(title: str, found: Any) -> None:
+    """All motions at one speed, and how sure it is that there are no others."""
+    grid = Table(title=f"{title}: periodic motions of one turn", title_justify="left")
+    for heading in ("motion", "amplitude", "stability", "largest multiplier"):
+        grid.add_column(heading, justify="left" if heading == "stability" else "right")
+    number = 0
+    for orbit in found.orbits:
+        what, size, unit = swing_of(orbit)
+        stable = orbit in found.stable
+        number += stable
+        grid.add_row(
+            str(number) if stable else "",
+            f"{size * orbit.amplitude:.5g} {unit} of {what}",
+            orbit.verdict().stability.value,
+            f"{orbit.largest:.6g}",
+        )
+    console.print(grid)
+    sure = "two methods found the same motions" if found.agreed else "two methods differ: there may be more motions"
+    index = (
+        ""
+        if found.index == 1
+        else f"; their indices add up to {found.index}, not 1: one may be missing, or come to the limit of assembly"
+    )
+    console.print(sure + index, highlight=False, soft_wrap=True)
