@@ -450,25 +450,16 @@ def width_at(found: Chart, value: float) -> float:
     return float(np.ptp(roots)) if len(roots) else 0.0
 
 
-def compute_damped() -> StudyResult:
-    """Boundaries at each damper, and the damper that removes the region."""
-    charts = {omega_c: damped_region(omega_c) for omega_c in DAMPERS}
-    columns = {"I4 [1]": RATIOS}
-    for motion in MOTIONS:
-        columns[f"removing omega_c; {motion} [1/s]"] = np.array([removing(motion, x).damping for x in RATIOS.tolist()])
-    for omega_c, found in charts.items():
-        for n, boundary in enumerate(found.boundaries, start=1):
-            name = f"omega_c = {omega_c:g} 1/s; boundary {n} [1]"
-            columns[f"lambda_k^2; {name}"], columns[f"I4; {name}"] = boundary.points.T
+def damped_verdicts(charts: Mapping[float, Chart]) -> list[Verdict]:
+    """What is stated of the regions, by their dampers (1/s)."""
     tips = {d: float(found.boundaries[0].points[:, 1].min()) for d, found in charts.items() if d > 0.0}
-    ratios = np.array([0.5, 1.0, 1.5])
     worst = {motion: removing(motion, 1.5).damping for motion in MOTIONS}
-    mechanisms = [chapter_4(x) for x in ratios.tolist()]
+    mechanisms = [chapter_4(x) for x in (0.5, 1.0, 1.5)]
     apart = [abs(hill(p).low - first_order(p, Variant.EXACT).low) / hill(p).width for p in mechanisms]
     nine = [boundary_stiffnesses(equation(p), -1, count=2, order=2).real for p in mechanisms]
     cut = max(np.abs(ends - (hill(p).low, hill(p).high)).max() for ends, p in zip(nine, mechanisms))
     at = [width_at(found, 1.5) for found in charts.values()]
-    verdicts = [
+    return [
         at_most(
             "growth of the width with omega_c, greatest; I4 = 1.5", TEXT, 0.0, np.diff(at).max(), place="L3915, L3952"
         ),
@@ -541,12 +532,24 @@ def compute_damped() -> StudyResult:
             for verdict in run_verdicts(f"I4 = 1.5, omega_c = {omega_c:g} 1/s", chapter_4(1.5, omega_c), [lambda_k2])
         ),
     ]
+
+
+def compute_damped() -> StudyResult:
+    """Boundaries at each damper, and the damper that removes the region."""
+    charts = {omega_c: damped_region(omega_c) for omega_c in DAMPERS}
+    columns = {"I4 [1]": RATIOS}
+    for motion in MOTIONS:
+        columns[f"removing omega_c; {motion} [1/s]"] = np.array([removing(motion, x).damping for x in RATIOS.tolist()])
+    for omega_c, found in charts.items():
+        for n, boundary in enumerate(found.boundaries, start=1):
+            name = f"omega_c = {omega_c:g} 1/s; boundary {n} [1]"
+            columns[f"lambda_k^2; {name}"], columns[f"I4; {name}"] = boundary.points.T
     return StudyResult(
         number="5.4",
         claim="omega_c = mu/(m4 + m5) narrows the region, and 0.45 1/s removes it up to I4 = 1.5.",
         assignment="The dampers below 0.45 1/s are ours.",
         columns=padded(columns),
-        verdicts=tuple(verdicts),
+        verdicts=tuple(damped_verdicts(charts)),
     )
 
 
