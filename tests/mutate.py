@@ -1,9 +1,11 @@
 """Mutation of one module or folder: does some test fail for every small change of the code?
 
     python -m tests.mutate fmu_src/linkwork/integrate.py analysis/files
+    python -m tests.mutate --sample 40 fmu_src/linkwork analysis/files analysis/run
 
 Cosmic Ray changes one operator or number at a time in a copy of the tree, and runs the tests that `tool.mutation.tests` of
 pyproject.toml names for the module or its folder. Printed are the share of mutants that a test killed, and the survivors.
+With ``--sample`` so many mutants of all modules together are drawn, always the same ones.
 """
 
 from __future__ import annotations
@@ -15,11 +17,15 @@ import subprocess
 import sys
 import tempfile
 import tomllib
+from argparse import ArgumentParser
 from collections.abc import Iterator
 from pathlib import Path
+from random import Random
 from typing import Any
 
 import tomli_w
+from cosmic_ray.work_db import use_db
+from cosmic_ray.work_item import WorkerOutcome, WorkResult
 from rich.console import Console
 from rich.markup import escape
 
@@ -47,8 +53,8 @@ def copied(folder: Path) -> Path:
     return folder
 
 
-def mutate(tree: Path, module: Path) -> Iterator[tuple[bool, str]]:
-    """Of each mutant whether a test killed it, and its difference from the code."""
+def prepared(tree: Path, module: Path) -> Path:
+    """The session of a module: its mutants, none of them tried."""
     command = f'"{sys.executable}" -m pytest -q -x -p no:cacheprovider -m "not slow and not fmu" {tests_of(module)}'
     settings = {
         "module-path": module.as_posix(),
@@ -58,30 +64,60 @@ def mutate(tree: Path, module: Path) -> Iterator[tuple[bool, str]]:
         "distributor": {"name": "local"},
         "filters": {"operators-filter": {"exclude-operators": SETTINGS["exclude-operators"]}},
     }
-    (tree / "mutation.toml").write_text(tomli_w.dumps({"cosmic-ray": settings}), encoding="utf-8")
-    session = tree / "mutation.sqlite"
-    session.unlink(missing_ok=True)
+    session = tree / f"{module.as_posix().replace('/', '-')}.sqlite"
+    session.with_suffix(".toml").write_text(tomli_w.dumps({"cosmic-ray": settings}), encoding="utf-8")
+    run(tree, "cosmic_ray.cli", "init", session.with_suffix(".toml").name, session.name)
+    run(tree, "cosmic_ray.tools.filters.operators_filter", session.name, session.with_suffix(".toml").name)
+    return session
+
+
+def run(tree: Path, tool: str, *words: str) -> str:
+    """What a tool of the environment that runs this prints, on the tree."""
     paths = os.pathsep.join([str(tree / "fmu_src"), str(tree)])
-    options: dict[str, Any] = {"cwd": tree, "env": {**os.environ, "PYTHONPATH": paths}, "text": True, "check": True}
+    return subprocess.run(
+        [sys.executable, "-m", tool, *words],
+        cwd=tree,
+        env={**os.environ, "PYTHONPATH": paths},
+        text=True,
+        check=True,
+        stdout=subprocess.PIPE,
+    ).stdout
 
-    def run(tool: str, *words: str) -> str:
-        # the tools of the environment that runs this
-        line = [sys.executable, "-m", tool, *words]
-        return subprocess.run(line, **options, stdout=subprocess.PIPE).stdout
 
-    run("cosmic_ray.cli", "baseline", "mutation.toml")
-    run("cosmic_ray.cli", "init", "mutation.toml", session.name)
-    run("cosmic_ray.tools.filters.operators_filter", session.name, "mutation.toml")
-    run("cosmic_ray.cli", "exec", "mutation.toml", session.name)
-    for line in run("cosmic_ray.cli", "dump", session.name).splitlines():
+def draw(sessions: list[Path], count: int) -> None:
+    """Skip all mutants of the sessions but ``count``."""
+    pending = []
+    for session in sessions:
+        with use_db(str(session)) as db:
+            pending += [(session, item.job_id) for item in db.pending_work_items]
+    kept = set(Random(1).sample(range(len(pending)), min(count, len(pending))))
+    for number, (session, job) in enumerate(pending):
+        if number not in kept:
+            with use_db(str(session)) as db:
+                db.set_result(job, WorkResult(worker_outcome=WorkerOutcome.SKIPPED))
+
+
+def tried(tree: Path, session: Path) -> Iterator[tuple[bool, str]]:
+    """Of each mutant of a session whether a test killed it, and its difference from the code."""
+    settings = session.with_suffix(".toml").name
+    with use_db(str(session)) as db:
+        if not list(db.pending_work_items):
+            return
+    run(tree, "cosmic_ray.cli", "baseline", settings)
+    run(tree, "cosmic_ray.cli", "exec", settings, session.name)
+    for line in run(tree, "cosmic_ray.cli", "dump", session.name).splitlines():
         _, result = json.loads(line)
         if result and result["worker_outcome"] == "normal":
             yield result["test_outcome"] == "killed", result["diff"]
 
 
 def main() -> None:
+    parser = ArgumentParser(description="Mutation of modules or folders.")
+    parser.add_argument("places", nargs="*")
+    parser.add_argument("--sample", type=int)
+    arguments = parser.parse_args()
     console, totals = Console(), [0, 0]
-    given = [Path(name) for name in sys.argv[1:]] or [Path(name) for name in SETTINGS["default"]]
+    given = [Path(name) for name in arguments.places] or [Path(name) for name in SETTINGS["default"]]
     modules = [
         module.relative_to(ROOT)
         for place in given
@@ -89,8 +125,13 @@ def main() -> None:
     ]
     with tempfile.TemporaryDirectory() as folder:
         tree = copied(Path(folder))
-        for module in modules:
-            found = list(mutate(tree, module))
+        sessions = [prepared(tree, module) for module in modules]
+        if arguments.sample is not None:
+            draw(sessions, arguments.sample)
+        for module, session in zip(modules, sessions):
+            found = list(tried(tree, session))
+            if not found:
+                continue
             killed = sum(dead for dead, _ in found)
             totals = [totals[0] + killed, totals[1] + len(found)]
             for dead, difference in found:
