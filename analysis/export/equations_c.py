@@ -60,37 +60,51 @@ def _equations(mechanism: Mechanism) -> str:
 
 
 def _choices(mechanism: Mechanism) -> str:
-    """Of the functions traced with the mechanism's switch on and off: which is called, by the constants and their change."""
+    """Of the functions traced with the mechanism's switch on and off: which is called, by the constants.
+
+    With the switch on the solution that the equations contain is computed once, and given to the function that needs it. What
+    is differentiated is always all there is: the constants may change too.
+    """
     on = f"arg[3][{mechanism.switch_place}] != 0.0"
-    sides = "const double** arg, double** res, int* iw, double* w, int mem"
-    changed = f"""
-static int changed(const double* dp) {{
-  for (int i = 0; i < {len(mechanism.constants._fields)}; i++) if (dp[i] != 0.0) return 1;
-  return 0;
+    sides = "(const double** arg, double** res, int* iw, double* w, int mem)"
+    pair = f"return ({on} ? equations_clearance_on : equations_clearance_off)(arg, res, iw, w, mem);"
+    text = f'#include "sizes.h"\n\nint equations_clearance{sides} {{\n  {pair}\n}}\n'
+    for name, (called, count, results) in _CHOSEN.items():
+        given = ", ".join(f"arg[{n}]" for n in range(count))
+        off = f"  if (!({on})) return equations_{name}_off(arg, res, iw, w, mem);\n" if called == "values" else ""
+        text += f"""
+int equations_{name}{sides} {{
+{off}  double z[{_solution_size(mechanism)}], unused[OUTPUTS + STATES];
+  (void)unused;
+  equations_solution(arg, (double*[]){{z}}, iw, w, mem);
+  return equations_{called}_on((const double*[]){{{given}, z}}, (double*[]){{{results}}}, iw, w, mem);
 }}
 """
-    return changed + "".join(
-        f"\nint equations_{name}({sides}) {{\n"
-        f"  return ({on}{further} ? equations_{name}_on : equations_{name}_off)(arg, res, iw, w, mem);\n}}\n"
-        for name, further in _CHOSEN.items()
-    )
+    return text
 
 
-#: Functions traced for either state of a switch, and what else than that decides which is called.
-_CHOSEN = {"derivative": "", "outputs": "", "clearance": "", "forward": " || changed(arg[6])"}
+#: Functions that contain a solution with a switch on: which is called then, its arguments, and where its results go.
+_CHOSEN = {
+    "derivative": ("values", 4, "unused, res[0]"),
+    "outputs": ("values", 4, "res[0], unused"),
+    "forward": ("forward", 7, "res[0], res[1], res[2]"),
+    "reverse": ("reverse", 7, "res[0], res[1], res[2]"),
+}
 
 
 def functions(mechanism: Mechanism) -> list[Any]:
     """The equations that the C shell calls, as functions of CasADi; see model.h for their arguments."""
     casadi = symbolic.library()
-    tables = [_table(mechanism, switched) for switched in ((False, True) if mechanism.switch else (False,))]
-    named = dict(tables[0])
+    named = _table(mechanism, False)
+    del named["solution"], named["values"]
     if mechanism.switch:
-        off, on = tables
-        # a gradient, that of the constants too, is the one with all there is
-        named = off | {"reverse": on["reverse"]}
-        for name in _CHOSEN:
-            named |= {f"{name}_off": named.pop(name), f"{name}_on": on[name]}
+        on = _table(mechanism, True)
+        for name in ("forward", "reverse"):
+            del named[name]
+        for name in ("derivative", "outputs", "clearance"):
+            named[f"{name}_off"] = named.pop(name)
+        named |= {f"{name}_on": on[name] for name in ("values", "forward", "reverse", "clearance")}
+        named["solution"] = on["solution"]
     _check_start(mechanism, casadi.Function("begin", *named["begin"]))
     return [
         casadi.Function(f"equations_{name}", arguments, [casadi.densify(r) for r in results], {"cse": True})
@@ -110,7 +124,10 @@ def _table(mechanism: Mechanism, switched: bool) -> dict[str, tuple[list[Any], l
         raise LinkworkError(f"the start of {mechanism.name} cannot be traced: {_START}") from error
     dx, du, dp = (sx.sym(f"d{n}", *v.shape) for n, v in (("x", s.x), ("u", s.u), ("p", s.p)))
     at, change = join(s.x, s.u, s.p), join(dx, du, dp)
-    values = [_smooth_outputs(mechanism, s, switched), trace.derivative, trace.clearance]
+    values, z, _ = _in_solution(mechanism, s, switched, smooth=True)
+    plain, given_z, solution = _in_solution(mechanism, s, switched, smooth=False)
+    # what is given beside the arguments of a run
+    beside, beside_plain = ([z], [given_z]) if solution.numel() else ([], [])
     given = join(own, state, s.u)
     dgiven = [sx.sym(f"d{n}", *v.shape) for n, v in (("own", own), ("state", state), ("u", s.u))]
 
@@ -137,27 +154,62 @@ def _table(mechanism: Mechanism, switched: bool) -> dict[str, tuple[list[Any], l
         "begin_reverse": ([*begin, *begin_weights], begin_gradient),
         "derivative": (run, [trace.derivative]),
         "outputs": (run, [trace.outputs]),
+        "solution": (run, [solution]),
+        "values": ([*run, *beside_plain], plain[:2]),
         "clearance": (run, [trace.clearance]),
         "jump": (run, [trace.jump]),
         "jump_forward": ([*run, dx, du, dp], forward([trace.jump], at, change)),
         "jump_reverse": ([*run, *jump_weights], jump_gradient),
-        "forward": ([*run, dx, du, dp], forward(values, at, change)),
-        "reverse": ([*run, *weights], gradient),
+        "forward": ([*run, dx, du, dp, *beside], forward(values, at, change)),
+        "reverse": ([*run, *weights, *beside], gradient),
     }
 
 
-def _smooth_outputs(mechanism: Mechanism, s: equations.Symbols, switched: bool) -> Any:
-    """The outputs as they are differentiated: a length, the root of squares, changes by 0 where it is 0, not by 0/0."""
+def _in_solution(
+    mechanism: Mechanism, s: equations.Symbols, switched: bool, *, smooth: bool
+) -> tuple[list[Any], Any, Any]:
+    """Outputs, derivative and clearance in symbols for the solution that they contain, these, and what they stand for.
+
+    A last sweep of Newton's method begins from the solution, so that the derivatives of that sweep are those of the solution.
+    As they are differentiated (``smooth``) a length, the root of squares, changes by 0 where it is 0, not by 0/0.
+    """
     casadi = symbolic.library()
-    functions = symbolic.traced(mechanism.modules, sqrt=lambda value: casadi.sqrt(value + TINY))
+    found: dict[str, tuple[Any, Any]] = {}
+
+    def settled(solution: tuple[Any, ...]) -> tuple[Any, ...]:
+        expressions = casadi.vertcat(*solution)
+        # outputs and derivative have the same solution: it gets the same symbols
+        graph = str(casadi.Function("solution", [s.x, s.modes, s.u, s.p], [expressions], {"cse": True}).serialize())
+        symbols, _ = found.setdefault(graph, (casadi.SX.sym(f"z{len(found)}", len(solution)), expressions))
+        return tuple(casadi.vertsplit(symbols))
+
     *p, energy = casadi.vertsplit(s.p)
     k = mechanism.constants(*p)
     if mechanism.switch:
         k = k._replace(**{mechanism.switch: float(switched)})
     modes, channels = (tuple(casadi.vertsplit(v)) if v.numel() else () for v in (s.modes, s.u))
-    acting = functions.of(mechanism.equations.applied)(modes, channels, k)
+    others = {"sqrt": lambda value: casadi.sqrt(value + TINY)} if smooth else {}
+    functions = symbolic.traced(mechanism.modules, settled=settled, **others)
     x = tuple(casadi.vertsplit(s.x))
-    return casadi.densify(casadi.vertcat(*functions.of(mechanism.equations.outputs)(x, acting, energy, k)))
+
+    def traced(what: str, *further: Any) -> Any:
+        acting = functions.of(mechanism.equations.applied)(modes, channels, k)
+        result = functions.of(getattr(mechanism.equations, what))(x, acting, *further, k)
+        return casadi.densify(casadi.vertcat(*result) if isinstance(result, tuple) else casadi.SX(result))
+
+    values = [traced("outputs", energy), traced("derivative"), traced("clearance")]
+    # what they have in common is differentiated once
+    joined = casadi.cse(casadi.vertcat(*values))
+    parts = casadi.vertsplit(joined, np.cumsum([0, *(value.numel() for value in values)]).tolist())
+    symbols, expressions = (
+        (casadi.vertcat(*column) for column in zip(*found.values())) if found else (casadi.SX(), casadi.SX())
+    )
+    return parts, symbols, expressions
+
+
+def _solution_size(mechanism: Mechanism) -> int:
+    """Numbers of the solution that the equations contain with the switch on."""
+    return int(_table(mechanism, True)["solution"][1][0].numel())
 
 
 def _beginning(mechanism: Mechanism, modes: Any, u: Any) -> tuple[Any, ...]:

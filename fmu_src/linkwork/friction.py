@@ -10,7 +10,7 @@ FRICTION_SPEED = 1e-3
 FRICTION_RATE = 0.1
 #: What rounds off the magnitude of a force F where it passes zero (N): it is taken as sqrt(F^2 + F0^2).
 FRICTION_FORCE = 1e-2
-#: Sweeps of Newton's method for the forces of contacts with friction.
+#: Sweeps of Newton's method for the forces of contacts with friction, before the last.
 SWEEPS = 4
 
 Vector = tuple[float, float]
@@ -32,24 +32,40 @@ def contact_forces(smooth: tuple[Vector, ...], response: tuple[tuple[Vector, ...
     ``smooth`` are the forces without friction; ``response[k]`` is by how much all of them change with the magnitude of the
     k-th, so that F_j = smooth_j + sum_k response[k]_j s_k. Newton's method from the forces without friction.
     """
-    n = range(len(smooth))
     least = FRICTION_FORCE * FRICTION_FORCE
     s = tuple(sqrt(x * x + y * y + least) for x, y in smooth)
     for _ in range(SWEEPS):
-        forces = tuple(tuple(smooth[j][c] + sum(response[k][j][c] * s[k] for k in n) for c in (0, 1)) for j in n)
-        size = tuple(sqrt(x * x + y * y + least) for x, y in forces)
-        # of the tangent of sqrt(|F|^2 + F0^2): size_j s_j = F_j . (smooth_j + sum_k response[k]_j s_k) + F0^2
-        matrix = tuple(
-            tuple(
-                (1.0 if j == k else 0.0)
-                - (forces[j][0] * response[k][j][0] + forces[j][1] * response[k][j][1]) / size[j]
-                for k in n
-            )
-            for j in n
-        )
-        right = tuple((forces[j][0] * smooth[j][0] + forces[j][1] * smooth[j][1] + least) / size[j] for j in n)
-        s = _solved(matrix, right)
+        s = _swept(smooth, response, s)
+    return _swept(smooth, response, settled(s))
+
+
+def settled(s: tuple[float, ...]) -> tuple[float, ...]:
+    """The same: a solution to rounding.
+
+    A sweep of Newton's method from there has the derivatives of the solution whatever those of ``s``, so that what
+    differentiates these equations need not differentiate the sweeps before.
+    """
     return s
+
+
+def _swept(
+    smooth: tuple[Vector, ...], response: tuple[tuple[Vector, ...], ...], s: tuple[float, ...]
+) -> tuple[float, ...]:
+    """A sweep of Newton's method for the magnitudes."""
+    n = range(len(smooth))
+    least = FRICTION_FORCE * FRICTION_FORCE
+    forces = tuple(tuple(smooth[j][c] + sum(response[k][j][c] * s[k] for k in n) for c in (0, 1)) for j in n)
+    size = tuple(sqrt(x * x + y * y + least) for x, y in forces)
+    # of the tangent of sqrt(|F|^2 + F0^2): size_j s_j = F_j . (smooth_j + sum_k response[k]_j s_k) + F0^2
+    matrix = tuple(
+        tuple(
+            (1.0 if j == k else 0.0) - (forces[j][0] * response[k][j][0] + forces[j][1] * response[k][j][1]) / size[j]
+            for k in n
+        )
+        for j in n
+    )
+    right = tuple((forces[j][0] * smooth[j][0] + forces[j][1] * smooth[j][1] + least) / size[j] for j in n)
+    return _solved(matrix, right)
 
 
 def _solved(matrix: tuple[tuple[float, ...], ...], right: tuple[float, ...]) -> tuple[float, ...]:
