@@ -233,8 +233,9 @@ def _variables(mechanism: Mechanism, kind: Kind, entries: Iterable[Entry]) -> El
         value = _value(variable, starts.get(variable.name, variable.start))
         if kind.native and entry.derivative_of is not None:
             value["derivative"] = _number(kind, entry.derivative_of)
-        if entry.reference in scale:
-            value["nominal"] = repr(scale[entry.reference])
+        nominal = scale.get(entry.reference, variable.nominal)
+        if nominal is not None:
+            value["nominal"] = repr(nominal)
         if entry.reference in reinitialised:
             value["reinit"] = "true"
         tag = _TYPES[kind.fmi][variable.kind]

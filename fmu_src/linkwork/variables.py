@@ -67,6 +67,8 @@ class Variable(NamedTuple):
         Of an output at the start: what it depends on, ``position``, ``velocity`` or ``all``.
     rate_of : str
         Of an output, the output that it is the time derivative of; empty where it is of none.
+    nominal : float or None
+        A usual magnitude, where the start value is 0 and 1 would be none.
     """
 
     name: str
@@ -82,6 +84,7 @@ class Variable(NamedTuple):
     depends: str = "all"
     level: str = "all"
     rate_of: str = ""
+    nominal: float | None = None
 
 
 def output(

@@ -76,7 +76,7 @@ PARAMETERS = (
         "Friction of the guide relative to its force, smooth about rest",
         "\\mu_g",
         minimum=0.0,
-    ),
+    )._replace(nominal=0.1),
     *(
         _parameter(
             f"pin.{pin}_friction_radius",
@@ -84,7 +84,7 @@ PARAMETERS = (
             f"Moment of friction in pin {pin} relative to its force: coefficient of friction times radius",
             f"\\rho_{pin}",
             minimum=0.0,
-        )
+        )._replace(nominal=1e-3)
         for pin in "ABCD"
     ),
     _parameter("coupler.point_distance", "m", "Coupler point P, distance from the crank pin B", "r"),
