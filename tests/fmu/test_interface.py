@@ -283,7 +283,8 @@ def test_nominals_are_the_magnitudes_that_errors_are_measured_by(mechanism: Mech
         **{field_name(v.name): v.start for v in mechanism.variables if v.name.endswith(".mode")},
     )
     entries = interface(mechanism)
-    expected = dict(zip((entries[r].variable.name for r in states(mechanism)), plant._scale))
+    expected = {v.name: v.nominal for v in mechanism.variables if v.nominal is not None}
+    expected |= dict(zip((entries[r].variable.name for r in states(mechanism)), plant._scale))
     for kind in (NATIVE, NATIVE_FMI3):
         scalars = read_scalars(description(mechanism, kind))
         assert {s.name: float(s.attributes["nominal"]) for s in scalars if "nominal" in s.attributes} == expected
