@@ -49,20 +49,21 @@ def _equations(mechanism: Mechanism) -> str:
     casadi = symbolic.library()
     options = {"with_header": False, "main": False, "casadi_int": "int", "with_export": False, "with_mem": False}
     generator = casadi.CodeGenerator("equations.c", options)
-    for function in functions(mechanism):
+    made = {function.name(): function for function in functions(mechanism)}
+    for function in made.values():
         generator.add(function)
     with TemporaryDirectory(prefix="linkwork-c-") as folder:
         generator.generate(f"{folder}/")
         text = (Path(folder) / "equations.c").read_text(encoding="utf-8")
     # the shell leaves out no argument and no result: without these questions the code is smaller
     text = re.sub(r"arg\[(\d+)\]\? (arg\[\1\]\[\d+\]) : 0", r"\2", re.sub(r"if \(res\[\d+\]!=0\) ", "", text))
-    return text + _choices(mechanism) if mechanism.switch else text
+    return text + _choices(mechanism, made["equations_solution"].numel_out(0)) if mechanism.switch else text
 
 
-def _choices(mechanism: Mechanism) -> str:
+def _choices(mechanism: Mechanism, numbers: int) -> str:
     """Of the functions traced with the mechanism's switch on and off: which is called, by the constants.
 
-    With the switch on the solution that the equations contain is computed once, and given to the function that needs it. What
+    With the switch on the solution that the equations contain, of so many numbers, is computed once, and given to the function that needs it. What
     is differentiated is always all there is: the constants may change too.
     """
     on = f"arg[3][{mechanism.switch_place}] != 0.0"
@@ -74,7 +75,7 @@ def _choices(mechanism: Mechanism) -> str:
         off = f"  if (!({on})) return equations_{name}_off(arg, res, iw, w, mem);\n" if called == "values" else ""
         text += f"""
 int equations_{name}{sides} {{
-{off}  double z[{_solution_size(mechanism)}], unused[OUTPUTS + STATES];
+{off}  double z[{numbers}], unused[OUTPUTS + STATES];
   (void)unused;
   equations_solution(arg, (double*[]){{z}}, iw, w, mem);
   return equations_{called}_on((const double*[]){{{given}, z}}, (double*[]){{{results}}}, iw, w, mem);
@@ -207,11 +208,6 @@ def _in_solution(
     return parts, symbols, expressions
 
 
-def _solution_size(mechanism: Mechanism) -> int:
-    """Numbers of the solution that the equations contain with the switch on."""
-    return int(_table(mechanism, True)["solution"][1][0].numel())
-
-
 def _beginning(mechanism: Mechanism, modes: Any, u: Any) -> tuple[Any, ...]:
     """Parameters and given state as symbols; constants with the energy, state, its scale and the least parameters of these."""
     casadi = symbolic.library()
@@ -300,12 +296,15 @@ def _sizes(mechanism: Mechanism, kind: Kind) -> str:
     return "\n".join(
         [
             f"/* Sizes of a {mechanism.name}, and its names. Generated. */",
+            "#ifndef SIZES_H",
+            "#define SIZES_H",
             f"#define MODEL_IDENTIFIER {_text(kind.identifier(mechanism))}",
             f"#define TOKEN {_text(token(mechanism, kind))}",
             f"enum {{ {', '.join(f'{name} = {size}' for name, size in sizes.items())} }};",
             *(f"#define {name} {_number(value)}" for name, value in constants.items()),
             f"#define ASSEMBLY {_text(limits.ASSEMBLY)}",
             f"#define JAMMING {_text(limits.JAMMING)}",
+            "#endif",
             "",
         ]
     )
