@@ -63,8 +63,8 @@ def _equations(mechanism: Mechanism) -> str:
 def _choices(mechanism: Mechanism, numbers: int) -> str:
     """Of the functions traced with the mechanism's switch on and off: which is called, by the constants.
 
-    With the switch on the solution that the equations contain, of so many numbers, is computed once, and given to the function that needs it. What
-    is differentiated is always all there is: the constants may change too.
+    With the switch on the solution that the equations contain, of so many numbers, is computed once, and given to the function
+    that needs it. What is differentiated is always all there is: the constants may change too.
     """
     on = f"arg[3][{mechanism.switch_place}] != 0.0"
     sides = "(const double** arg, double** res, int* iw, double* w, int mem)"
