@@ -2,31 +2,34 @@
 
 from __future__ import annotations
 
+import inspect
+import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from linkwork.errors import InputError
-from linkwork.mechanism import Mechanism
 
 from ..files import write_csv
-from ..mechanisms import MECHANISMS, Parameters, mechanism_of
+from ..mechanisms import Parameters, mechanism_of
 from ..notebook import Shown, format_count
-from ..numerics.workers import over_workers
-from ..run import shown, takes_published
-from . import coexistence_kernels
+from ..numerics.codegen import fingerprint
+from ..run import takes_published
+from . import coexistence_kernels, floquet, orbits
 from .coexistence_kernels import LOST, MOST_ORBITS, UNSETTLED
 from .drives import Drive
 from .finder import Orbits, orbits_of
 from .floquet import TOLERANCE, multipliers
-from .flows import PLAIN, VARIATIONAL
+from .flows import GAP, PLAIN, VARIATIONAL
+from .grids import axes_of, kept_rows, name_of
 from .orbit_kernels import NO_SOURCE
-from .orbits import INTEGRATOR_TOLERANCE, MOST_ITERATIONS, SEARCH_TOLERANCE, guess_of, section_of
+from .orbits import MOST_ITERATIONS, SEARCH_TOLERANCE, PeriodicOrbit, guess_of, row_of, section_of
 from .planes import Operation, Plane
 from .starts import extent_of, scale_of, starts_of
 
@@ -54,6 +57,8 @@ class Coexistence:
         y at crank angle 0; NaN where there is none.
     swing : (str, str)
         What the amplitude is of, and its unit.
+    computed : int
+        Rows that were not in the cache.
     """
 
     x: NDArray[np.float64]
@@ -62,6 +67,7 @@ class Coexistence:
     amplitude: np.ma.MaskedArray[Any, np.dtype[np.float64]]
     starts: NDArray[np.float64]
     swing: tuple[str, str]
+    computed: int
 
     @property
     def count(self) -> NDArray[np.int64]:
@@ -71,7 +77,12 @@ class Coexistence:
     @property
     def stable(self) -> NDArray[np.int64]:
         """Stable motions that were found at each point, shape (ny, nx)."""
-        return np.asarray(np.ma.filled(self.largest < 1.0 - TOLERANCE, False).sum(axis=2))
+        return np.asarray(self._is_stable.sum(axis=2))
+
+    @property
+    def _is_stable(self) -> NDArray[np.bool_]:
+        """Of each motion, shape (ny, nx, k)."""
+        return np.asarray(np.ma.filled(self.largest < 1.0 - TOLERANCE, False))
 
     @property
     def least(self) -> np.ma.MaskedArray[Any, np.dtype[np.float64]]:
@@ -84,8 +95,8 @@ class Coexistence:
         return self._extreme(np.ma.max)
 
     def _extreme(self, of: Callable[..., Any]) -> np.ma.MaskedArray[Any, np.dtype[np.float64]]:
-        unstable = ~np.ma.filled(self.largest < 1.0 - TOLERANCE, False)
-        return np.ma.masked_invalid(of(np.ma.masked_where(unstable, self.amplitude), axis=2).filled(np.nan))
+        stable = np.ma.masked_where(~self._is_stable, self.amplitude)
+        return np.ma.masked_invalid(of(stable, axis=2).filled(np.nan))
 
     def to_csv(self, path: str | Path) -> Path:
         """Write the grid as a table, a row a point, in SI."""
@@ -106,13 +117,15 @@ def coexistence(
     y: ArrayLike,
     *,
     start: ArrayLike | None = None,
+    folder: str | Path | None = None,
     n_jobs: int | None = None,
     progress: bool = False,
 ) -> Coexistence:
     """All periodic motions of one turn that are found at every point of a grid.
 
     Those of each point are sought from those of its neighbour in the row, then from `STARTS` starts with the known ones divided
-    out. A motion that is alone in its part of a row may be missed: `find_orbits` looks at one point more closely.
+    out. A motion that is alone in its part of a row may be missed: `find_orbits` looks at one point more closely. The rows go
+    over workers and are kept, as those of `grid` are.
 
     Parameters
     ----------
@@ -122,6 +135,8 @@ def coexistence(
         Values of the axes.
     start : array_like, shape (n,), optional
         A further start; under a torque one is needed for the crank speed, unless it follows from a motor.
+    folder : path, optional
+        Of the cache; see `grid`.
     n_jobs : int, optional
         Processes, -1 for one a core; of a cluster, inside `joblib.parallel_config`, all of its cores.
     progress : bool
@@ -130,63 +145,65 @@ def coexistence(
     Raises
     ------
     InputError
-        If an axis is empty or not finite.
+        If an axis is empty or not finite, or there are no cores.
+    GridInterrupted
+        On Ctrl-C.
     """
-    xs, ys = (np.array(axis, dtype=float, ndmin=1) for axis in (x, y))
-    for name, axis in (("x", xs), ("y", ys)):
-        if axis.ndim != 1 or len(axis) == 0 or not np.isfinite(axis).all():
-            raise InputError(f"the axis {name} of a grid must be finite numbers, at least one")
+    xs, ys = axes_of(x, y)
     parameters, drive = operation(float(xs[0]), float(ys[0]))
     mechanism = mechanism_of(parameters)
-    guess = guess_of(drive.flow(mechanism), drive, start)
+    flow = drive.flow(mechanism)
+    guess = guess_of(flow, drive, start)
     guesses = np.vstack([guess, starts_of(parameters, drive, guess, STARTS)])
-    rows: dict[int, tuple[NDArray[np.float64], ...]] = {}
-    todo = [[operation(first, value) for first in xs.tolist()] for value in ys.tolist()]
-    with shown(progress, float(len(ys)), "motions") as show:
-        for number, row in over_workers(partial(_row, mechanism, guesses), todo, n_jobs=n_jobs):
-            rows[number] = row
-            show(float(len(rows)))
-    starts, largest, amplitude = (np.array(part) for part in zip(*(rows[n] for n in range(len(ys)))))
+    rows = [[operation(first, value) for first in xs.tolist()] for value in ys.tolist()]
+    code = _code(coexistence_kernels.solve_all, orbits, floquet)
+    data, computed = kept_rows(
+        partial(_motions_of, guesses),
+        rows,
+        [name_of(row, guesses, (VARIATIONAL, PLAIN, GAP), code) for row in rows],
+        (len(xs), MOST_ORBITS, flow.size + 2),
+        mechanism=mechanism,
+        folder=folder,
+        n_jobs=n_jobs,
+        progress=progress,
+        what="motions",
+    )
     return Coexistence(
         x=xs,
         y=ys,
-        largest=np.ma.masked_invalid(largest),
-        amplitude=np.ma.masked_invalid(amplitude),
-        starts=starts,
-        swing=drive.flow(mechanism).components[0],
+        largest=np.ma.masked_invalid(data[..., 0]),
+        amplitude=np.ma.masked_invalid(data[..., 1]),
+        starts=data[..., 2:],
+        swing=flow.components[0],
+        computed=computed,
     )
 
 
-def _row(
-    mechanism: Mechanism, guesses: NDArray[np.float64], row: Sequence[Operation]
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Starts, largest multipliers and amplitudes of the motions of a row, by amplitude; NaN where there is no further one."""
-    # one that was registered by the caller is not in another process
-    MECHANISMS.setdefault(mechanism.name, mechanism)
-    parameters, drive = row[0]
-    flow, m, n = drive.flow(mechanism), len(row), guesses.shape[1]
-    numbers = np.array([(*p.constants(),) for p, _ in row])
-    vectors = np.array([d.vector(mechanism) for _, d in row])
+def _code(kernel: Any, *modules: ModuleType) -> tuple[str, ...]:
+    """What computes a row, this module included: for its name in the cache."""
+    return fingerprint(kernel), *(inspect.getsource(module) for module in (sys.modules[__name__], *modules))
+
+
+def _motions_of(guesses: NDArray[np.float64], row: Sequence[Operation]) -> NDArray[np.float64]:
+    """Largest multiplier, amplitude and start of each motion of the points of a row, by amplitude; NaN where there is none.
+
+    The shape is (m, MOST_ORBITS, n + 2).
+    """
+    parameters, drives = [p for p, _ in row], [drive for _, drive in row]
+    period, m, n = drives[0].flow(mechanism_of(parameters[0])).period, len(row), guesses.shape[1]
     starts, counts = np.full((m, MOST_ORBITS, n), np.nan), np.zeros(m, dtype=np.int64)
     monodromies, swings = np.full((m, MOST_ORBITS, n * n), np.nan), np.full((m, MOST_ORBITS, SAMPLES), np.nan)
+    section, numbers, vectors, scales = row_of(parameters, drives, guesses[0], VARIATIONAL, PLAIN)
     coexistence_kernels.solve_all(
-        section_of(
-            parameters,
-            drive,
-            guesses[0],
-            VARIATIONAL,
-            PLAIN,
-            tolerance=INTEGRATOR_TOLERANCE,
-            beside=[p for p, _ in row],
-        ),
+        section,
         NO_SOURCE,
-        np.hstack([numbers, np.zeros_like(numbers)]),
-        np.hstack([vectors, np.zeros_like(vectors)]),
-        np.array([scale_of(p, d, guesses[0]) for p, d in row]),
-        flow.period,
+        numbers,
+        vectors,
+        scales,
+        period,
         MOST_ITERATIONS,
         SEARCH_TOLERANCE,
-        np.linspace(0.0, flow.period, SAMPLES, endpoint=False),
+        np.linspace(0.0, period, SAMPLES, endpoint=False),
         guesses,
         starts,
         monodromies,
@@ -201,11 +218,8 @@ def _row(
     amplitude = 0.5 * np.ptp(fine, axis=2)
     order = np.argsort(np.where(found, amplitude, np.inf), axis=1, kind="stable")
     amplitude[~found] = np.nan
-    return (
-        np.take_along_axis(starts, order[:, :, None], axis=1),
-        np.take_along_axis(largest, order, axis=1),
-        np.take_along_axis(amplitude, order, axis=1),
-    )
+    whole = np.concatenate([largest[..., None], amplitude[..., None], starts], axis=2)
+    return np.take_along_axis(whole, order[:, :, None], axis=1)
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -219,17 +233,17 @@ class Basins(Shown):
     ends : ndarray of int, shape (ny, nx)
         Number of the stable motion among ``motions``; -1 where the links come to the limit of assembly, -2 where no motion of
         one turn is met within the turns that are followed.
-    motions : tuple of PeriodicOrbit
-        The stable motions, the smallest first.
     found : Orbits
         All motions of one turn, the unstable ones on the boundaries of the basins among them.
+    computed : int
+        Rows that were not in the cache.
     """
 
     position: NDArray[np.float64]
     rate: NDArray[np.float64]
     ends: NDArray[np.int64]
-    motions: tuple[Any, ...]
     found: Orbits
+    computed: int
 
     def __repr__(self) -> str:
         shares = [f"{self.share(number):.1%} to motion {number + 1}" for number in range(len(self.motions))]
@@ -237,6 +251,11 @@ class Basins(Shown):
         rest = f", {self.share(UNSETTLED):.1%} to none of them" if (self.ends == UNSETTLED).any() else ""
         motions = format_count(len(self.motions), "stable motion")
         return f"<Basins: {motions}, {len(self.position)} x {len(self.rate)} starts: {', '.join(shares)}{lost}{rest}>"
+
+    @property
+    def motions(self) -> tuple[PeriodicOrbit, ...]:
+        """The stable motions, the smallest first."""
+        return self.found.stable
 
     def share(self, end: int) -> float:
         """Part of the starts that end so."""
@@ -272,10 +291,11 @@ def basins(
     position: tuple[float, float] | None = None,
     rate: tuple[float, float] | None = None,
     start: ArrayLike | None = None,
+    folder: str | Path | None = None,
     n_jobs: int | None = None,
     progress: bool = False,
 ) -> Basins:
-    """Which of the stable periodic motions a start ends in, over a plane of starts.
+    """Which of the stable periodic motions a start ends in, over a plane of starts; its rows are kept as those of `grid` are.
 
     Parameters
     ----------
@@ -288,6 +308,8 @@ def basins(
         default.
     start : array_like, shape (n,), optional
         Under a torque a guess of y with the crank speed; see `find_orbits`.
+    folder : path, optional
+        Of the cache; see `grid`.
     n_jobs : int, optional
         Processes, -1 for one a core; of a cluster, inside `joblib.parallel_config`, all of its cores.
     progress : bool
@@ -296,7 +318,9 @@ def basins(
     Raises
     ------
     InputError
-        If there is no stable motion of one turn, or a range is none.
+        If there is no stable motion of one turn, a range is none, or there are no cores.
+    GridInterrupted
+        On Ctrl-C; the same call goes on from the rows that are kept.
 
     Examples
     --------
@@ -317,13 +341,19 @@ def basins(
             raise InputError(f"the range of the {name} is {low} to {high}: it must be finite and increasing")
     across, up = (np.linspace(low, high, points) for low, high in spans)
     known = np.array([orbit.start for orbit in motions])
-    ends = np.zeros((points, points), dtype=np.int64)
-    with shown(progress, float(points), "starts") as show:
-        work = partial(_ends, parameters, drive, known, across)
-        for done, (number, row) in enumerate(over_workers(work, up.tolist(), n_jobs=n_jobs), start=1):
-            ends[number] = row
-            show(float(done))
-    return Basins(position=across, rate=up, ends=ends, motions=motions, found=found)
+    code = _code(coexistence_kernels.basins_of, orbits)
+    ends, computed = kept_rows(
+        partial(_ends, parameters, drive, known, across),
+        up.tolist(),
+        [name_of([(parameters, drive)], known, (PLAIN, GAP), code, *across, value) for value in up.tolist()],
+        (points,),
+        mechanism=mechanism_of(parameters),
+        folder=folder,
+        n_jobs=n_jobs,
+        progress=progress,
+        what="starts",
+    )
+    return Basins(position=across, rate=up, ends=ends.astype(np.int64), found=found, computed=computed)
 
 
 def _ends(
@@ -332,13 +362,12 @@ def _ends(
     known: NDArray[np.float64],
     across: NDArray[np.float64],
     rate: float,
-) -> NDArray[np.int64]:
+) -> NDArray[np.float64]:
     """The ends of a row of starts."""
-    mechanism = mechanism_of(parameters)
-    flow = drive.flow(mechanism)
+    flow = drive.flow(mechanism_of(parameters))
     starts = np.tile(known[0], (len(across), 1))
     starts[:, 0], starts[:, flow.size // 2] = across, rate
     ends = np.zeros(len(across), dtype=np.int64)
     section = section_of(parameters, drive, known[0], PLAIN, tolerance=_TOLERANCE)
     coexistence_kernels.basins_of(section, NO_SOURCE, flow.period, _NEAR, _TURNS, starts, known, ends)
-    return ends
+    return ends.astype(float)

@@ -8,9 +8,8 @@ from numba import float64, int64, types
 from ..numerics.codegen import MATRIX, VECTOR, kernel, part
 from ..run.sources import SOURCE
 from .orbit_kernels import DONE, SECTION, advance, deflated, magnitude, make_room, newton, numbered
+from .starts import SAME
 
-#: Distance of two starts, relative to the scale, below which they are of one motion.
-_SAME = 1e-6
 #: Periodic motions of a point at most that are kept.
 MOST_ORBITS = 8
 
@@ -20,7 +19,7 @@ def _is_known(start, known, scale):  # type: ignore[no-untyped-def]
     """Whether a start is among the known ones."""
     found = False
     for k in range(known.shape[0]):
-        found = found or magnitude(start - known[k], scale) < _SAME
+        found = found or magnitude(start - known[k], scale) < SAME
     return found
 
 

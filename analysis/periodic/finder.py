@@ -35,13 +35,11 @@ from .orbits import (
     search_from,
     settle_from,
 )
-from .starts import scale_of, starts_of
+from .starts import SAME, scale_of, starts_of
 from .sweeps import sweep
 
 #: Starts of the two methods in a round, and rounds at most.
 MANY, DEFLATED, ROUNDS = 64, 16, 2
-#: Distance of two starts, relative to the scale, below which they are of one motion.
-SAME = 1e-6
 #: Speeds of a slow run up from rest: the first relative to the last, and their number.
 _FIRST_SPEED, _SPEEDS = 0.2, 80
 

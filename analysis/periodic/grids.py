@@ -5,12 +5,12 @@ from __future__ import annotations
 import hashlib
 import inspect
 import warnings
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -29,6 +29,8 @@ from .flows import GAP, VARIATIONAL
 from .orbit_kernels import Status
 from .planes import Operation, Plane
 from .starts import scale_of, starts_of
+
+Item = TypeVar("Item")
 
 #: Starts from which the orbit of a point is sought where it is not found from its neighbour: a power of two.
 STARTS = 32
@@ -135,63 +137,25 @@ def grid(
     GridInterrupted
         On Ctrl-C.
     """
-    xs, ys = (np.array(axis, dtype=float, ndmin=1) for axis in (x, y))
-    for name, axis in (("x", xs), ("y", ys)):
-        if axis.ndim != 1 or len(axis) == 0 or not np.isfinite(axis).all():
-            raise InputError(f"the axis {name} of a grid must be finite numbers, at least one")
-    check_jobs(n_jobs)
+    xs, ys = axes_of(x, y)
     parameters, drive = operation(float(xs[0]), float(ys[0]))
     mechanism = mechanism_of(parameters)
-    flow = drive.flow(mechanism)
-    guess = orbits.guess_of(flow, drive, start)
+    guess = orbits.guess_of(drive.flow(mechanism), drive, start)
     guesses = np.vstack([guess, starts_of(parameters, drive, guess, STARTS)])
-    where = grid_folder() if folder is None else Path(folder)
-    with suppress(OSError):  # said once the first row cannot be kept
-        where.mkdir(parents=True, exist_ok=True)
     # what computes the rows, beside their arguments
-    code = (
-        fingerprint(orbit_kernels.solve_row),
-        fingerprint(multipliers),
-        inspect.getsource(orbits),
+    code = fingerprint(orbit_kernels.solve_row), fingerprint(multipliers), inspect.getsource(orbits)
+    rows = [[operation(first, value) for first in xs.tolist()] for value in ys.tolist()]
+    data, computed = kept_rows(
+        partial(_compute_row, guesses, tolerance),
+        rows,
+        [name_of(row, guesses, (VARIATIONAL, GAP), code, tolerance) for row in rows],
+        (len(xs), len(guess) + 2),
+        mechanism=mechanism,
+        folder=folder,
+        n_jobs=n_jobs,
+        progress=progress,
+        what="stability",
     )
-    paths = []
-    rows: dict[Path, NDArray[np.float64]] = {}
-    missing: dict[Path, list[Operation]] = {}
-    for value in ys.tolist():
-        row = [operation(first, value) for first in xs.tolist()]
-        switched = any(mechanism.switched(p.constants()) for p, _ in row)
-        functions = flow.fingerprint(VARIATIONAL, GAP, switched=switched)
-        digest = hashlib.sha256(" ".join((functions, *code)).encode())
-        scales = [scale_of(p, drive, guess) for p, drive in row]
-        numbers = [(*p.constants(), *drive.vector(mechanism), *scale) for (p, drive), scale in zip(row, scales)]
-        digest.update(np.array(numbers).tobytes())
-        digest.update(np.array([*guesses.ravel(), *flow.modes, flow.torque, flow.period, tolerance]).tobytes())
-        path = where / f"{digest.hexdigest()[:32]}.row"
-        paths.append(path)
-        kept = load_array(path)
-        if kept is not None and kept.shape == (len(xs), len(guess) + 2):
-            rows[path] = kept
-        else:
-            missing[path] = row
-    unkept = 0
-    with interruptible() as interrupted, shown(progress, float(len(paths)), "stability") as show:
-        show(float(len(rows)))
-        compute, places = partial(_compute_row, mechanism, guesses, tolerance), list(missing)
-        for number, made in over_workers(compute, list(missing.values()), interrupted, n_jobs=n_jobs):
-            path = places[number]
-            rows[path] = made
-            try:
-                save_array(path, made)
-            except OSError as error:
-                if not unkept:
-                    warnings.warn(f"rows of the grid are not kept: {error}", RuntimeWarning, stacklevel=2)
-                unkept += 1
-            show(float(len(rows)))
-            if interrupted:
-                break
-        if interrupted and len(rows) < len(set(paths)):
-            raise GridInterrupted(len(rows) - unkept, len(paths), where)
-    data = np.array([rows[path] for path in paths])
     status = data[..., -1].astype(np.int64)
     return Grid(
         x=xs,
@@ -199,16 +163,139 @@ def grid(
         largest=np.ma.MaskedArray(data[..., 0], mask=status != Status.DONE),
         starts=data[..., 1:-1],
         status=status,
-        computed=len(missing),
+        computed=computed,
     )
 
 
-def _compute_row(
-    mechanism: Mechanism, guesses: NDArray[np.float64], tolerance: float, row: Sequence[Operation]
-) -> NDArray[np.float64]:
+def _compute_row(guesses: NDArray[np.float64], tolerance: float, row: Sequence[Operation]) -> NDArray[np.float64]:
     """A row, with the columns multiplier, start and status."""
-    # one that was registered by the caller is not in another process
-    MECHANISMS.setdefault(mechanism.name, mechanism)
     mechanisms, drives = [p for p, _ in row], [drive for _, drive in row]
     values, starts, status = orbits.largest_multipliers(mechanisms, drives, guesses, tolerance=tolerance)
     return np.column_stack([values, starts, status])
+
+
+# Rows over workers, kept on disk
+
+
+def axes_of(x: ArrayLike, y: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Values of the axes of a grid.
+
+    Raises
+    ------
+    InputError
+        If an axis is empty or not finite.
+    """
+    xs, ys = (np.array(axis, dtype=float, ndmin=1) for axis in (x, y))
+    for name, axis in (("x", xs), ("y", ys)):
+        if axis.ndim != 1 or len(axis) == 0 or not np.isfinite(axis).all():
+            raise InputError(f"the axis {name} of a grid must be finite numbers, at least one")
+    return xs, ys
+
+
+def name_of(
+    row: Sequence[Operation],
+    guesses: NDArray[np.float64],
+    functions: Sequence[int],
+    code: Sequence[str],
+    *numbers: float,
+) -> str:
+    """Name under which a row is kept: a hash of all it depends on.
+
+    Parameters
+    ----------
+    row : sequence of (parameters, Drive)
+    guesses : ndarray, shape (k, n)
+        Starts; from the first the magnitudes of y are taken.
+    functions : sequence of int
+        Numbers of the flow's functions that are called.
+    code : sequence of str
+        Of what computes the row.
+    *numbers : float
+        What else goes in.
+    """
+    mechanism, drive = mechanism_of(row[0][0]), row[0][1]
+    flow = drive.flow(mechanism)
+    switched = any(mechanism.switched(p.constants()) for p, _ in row)
+    digest = hashlib.sha256(" ".join((flow.fingerprint(*functions, switched=switched), *code)).encode())
+    columns = [(*p.constants(), *d.vector(mechanism), *scale_of(p, d, guesses[0])) for p, d in row]
+    digest.update(np.array(columns).tobytes())
+    digest.update(np.array([*guesses.ravel(), *flow.modes, flow.torque, flow.period, *numbers]).tobytes())
+    return digest.hexdigest()[:32]
+
+
+def kept_rows(
+    work: Callable[[Item], NDArray[np.float64]],
+    items: Sequence[Item],
+    names: Sequence[str],
+    shape: tuple[int, ...],
+    *,
+    mechanism: Mechanism,
+    folder: str | Path | None,
+    n_jobs: int | None,
+    progress: bool,
+    what: str,
+) -> tuple[NDArray[np.float64], int]:
+    """The array that ``work`` makes of each item: from the cache, or over workers and then kept there.
+
+    Parameters
+    ----------
+    names : sequence of str
+        Of the items in the cache: see `name_of`.
+    shape : tuple of int
+        Of each array.
+    mechanism : Mechanism
+        Which the workers are to know.
+    what : str
+        Is written before the progress bar.
+
+    Returns
+    -------
+    rows : ndarray, shape (items, *shape)
+    computed : int
+        Rows that were not in the cache.
+
+    Raises
+    ------
+    InputError
+        If there are no cores.
+    GridInterrupted
+        On Ctrl-C.
+    """
+    check_jobs(n_jobs)
+    where = grid_folder() if folder is None else Path(folder)
+    with suppress(OSError):  # said once the first row cannot be kept
+        where.mkdir(parents=True, exist_ok=True)
+    paths = [where / f"{name}.row" for name in names]
+    rows: dict[Path, NDArray[np.float64]] = {}
+    missing: dict[Path, Item] = {}
+    for path, item in zip(paths, items):
+        kept = load_array(path)
+        if kept is not None and kept.shape == shape:
+            rows[path] = kept
+        else:
+            missing[path] = item
+    unkept = 0
+    with interruptible() as interrupted, shown(progress, float(len(paths)), what) as show:
+        show(float(len(rows)))
+        compute, places = partial(_knowing, mechanism, work), list(missing)
+        for number, made in over_workers(compute, list(missing.values()), interrupted, n_jobs=n_jobs):
+            path = places[number]
+            rows[path] = made
+            try:
+                save_array(path, made)
+            except OSError as error:
+                if not unkept:
+                    warnings.warn(f"rows of the grid are not kept: {error}", RuntimeWarning, stacklevel=3)
+                unkept += 1
+            show(float(len(rows)))
+            if interrupted:
+                break
+        if interrupted and len(rows) < len(set(paths)):
+            raise GridInterrupted(len(rows) - unkept, len(paths), where)
+    return np.array([rows[path] for path in paths]), len(missing)
+
+
+def _knowing(mechanism: Mechanism, work: Callable[[Item], NDArray[np.float64]], item: Item) -> NDArray[np.float64]:
+    """The work on an item, in a process in which a mechanism that the caller has registered may be unknown."""
+    MECHANISMS.setdefault(mechanism.name, mechanism)
+    return work(item)

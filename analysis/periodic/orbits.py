@@ -276,6 +276,34 @@ def section_of(
     )
 
 
+class Row(NamedTuple):
+    """A row of mechanisms as the kernels take it: what they share; constants, drives and magnitudes of y, each by rows."""
+
+    section: Section
+    constants: NDArray[np.float64]
+    drives: NDArray[np.float64]
+    scales: NDArray[np.float64]
+
+
+def row_of(
+    rows: Sequence[Parameters],
+    drives: Sequence[Drive],
+    start: NDArray[np.float64],
+    *functions: int,
+    tolerance: float = INTEGRATOR_TOLERANCE,
+) -> Row:
+    """What the kernels need of a row of mechanisms and their drives: see `section_of`."""
+    mechanism = mechanism_of(rows[0])
+    numbers = np.array([(*parameters.constants(),) for parameters in rows])
+    vectors = np.array([drive.vector(mechanism) for drive in drives])
+    return Row(
+        section_of(rows[0], drives[0], start, *functions, tolerance=tolerance, beside=rows),
+        np.hstack([numbers, np.zeros_like(numbers)]),
+        np.hstack([vectors, np.zeros_like(vectors)]),
+        np.array([scale_of(parameters, drive, start) for parameters, drive in zip(rows, drives)]),
+    )
+
+
 @takes_published()
 def orbit_of(
     parameters: Parameters,
@@ -580,17 +608,15 @@ def largest_multipliers(
     given = (None,) if guesses is None else np.atleast_2d(np.asarray(guesses, dtype=float))
     starting = np.array([guess_of(flow, drives[0], guess) for guess in given])
     n, first = flow.size, starting[0]
-    section = section_of(rows[0], drives[0], first, VARIATIONAL, tolerance=tolerance, beside=rows)
-    numbers = np.array([(*parameters.constants(),) for parameters in rows])
-    vectors = np.array([drive.vector(mechanism) for drive in drives])
+    section, numbers, vectors, scales = row_of(rows, drives, first, VARIATIONAL, tolerance=tolerance)
     monodromies, starts = np.full((len(rows), n * n), np.nan), np.full((len(rows), n), np.nan)
     status = np.zeros(len(rows), dtype=np.int64)
     orbit_kernels.solve_row(
         section,
         NO_SOURCE,
-        np.hstack([numbers, np.zeros_like(numbers)]),
-        np.hstack([vectors, np.zeros_like(vectors)]),
-        np.array([scale_of(parameters, drive, first) for parameters, drive in zip(rows, drives)]),
+        numbers,
+        vectors,
+        scales,
         flow.period * turns,
         MOST_ITERATIONS,
         SEARCH_TOLERANCE,

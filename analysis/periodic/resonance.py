@@ -34,12 +34,10 @@ from .orbits import (
     orbit_of,
 )
 from .planes import unit_of
-from .starts import scale_of
+from .starts import SAME, scale_of
 
 #: How far a maximum of the amplitude stands out, relative to its height, to count as one.
 PROMINENCE = 1e-3
-#: Distance of two orbits' starts, relative to crank length and speed, below which they are the same.
-SAME = 1e-6
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -27,12 +27,7 @@ from ..run import simulate, takes_published
 from .drives import Drive
 from .floquet import TOLERANCE, Crossing, Stability, StabilityVerdict, crossing_test
 from .grids import Grid
-from .orbits import (
-    OrbitError,
-    PeriodicOrbit,
-    orbit_of,
-    period_from,
-)
+from .orbits import OrbitError, PeriodicOrbit, orbit_of, period_from
 from .planes import Plane
 from .starts import scale_of
 

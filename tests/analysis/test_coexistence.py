@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import signal
+from collections.abc import Callable
 from dataclasses import replace
+from importlib import import_module
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,11 +16,24 @@ from click.testing import CliRunner
 from analysis import Inputs, simulate
 from analysis.cli import main
 from analysis.figures import plot
-from analysis.periodic import Basins, Drive, basins, coexistence, find_orbits, orbit_of, plane, stability_chart
+from analysis.periodic import (
+    Basins,
+    Coexistence,
+    Drive,
+    GridInterrupted,
+    basins,
+    coexistence,
+    find_orbits,
+    orbit_of,
+    plane,
+    stability_chart,
+)
 from linkwork.errors import InputError
 from linkwork.five_bar.parameters import InitialState
 from linkwork.five_bar.published import RAD_S_PER_RPM, SETS
 
+#: The module, whose name in the package is that of its function.
+coexistences = import_module("analysis.periodic.coexistence")
 RIG_1_B = SETS["rig-1-spring-b"].parameters
 SPEED = 1000.0 * RAD_S_PER_RPM
 
@@ -73,6 +90,43 @@ def test_what_is_written_and_drawn(picture: Basins, tmp_path: Path) -> None:
     assert axis.get_xlabel() == "slider.position [m]"
     assert [text.get_text() for text in axis.get_legend().get_texts()][:2] == ["stable motion", "unstable motion"]
     assert plot(picture.found).axes
+
+
+def motions(folder: Path, damping: float = 11.0) -> Coexistence:
+    operation = plane(RIG_1_B, Drive(speed=SPEED), "drive.speed", "slider.damping")
+    return coexistence(operation, [SPEED], [damping, 12.0, 13.0], folder=folder)
+
+
+def ends(folder: Path, damping: float = 11.0) -> Basins:
+    rig = replace(RIG_1_B, slider_damping=damping)
+    return basins(rig, Drive(speed=SPEED), points=3, position=(-0.02, 0.02), rate=(-1.0, 1.0), folder=folder)
+
+
+@pytest.mark.parametrize(("of", "work", "others"), [(motions, "_motions_of", 1), (ends, "_ends", 3)])
+def test_rows_are_kept_and_an_interrupted_picture_goes_on(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, of: Callable[..., Any], work: str, others: int
+) -> None:
+    compute = getattr(coexistences, work)
+    calls = []
+
+    def interrupted(*arguments: Any) -> Any:
+        calls.append(arguments)
+        if len(calls) == 2:
+            signal.raise_signal(signal.SIGINT)
+        return compute(*arguments)
+
+    monkeypatch.setattr(coexistences, work, interrupted)
+    with pytest.raises(GridInterrupted, match=r"2 of 3 rows done, which are kept in .*: call again to go on"):
+        of(tmp_path)
+    monkeypatch.setattr(coexistences, work, compute)
+    assert [of(tmp_path).computed for _ in range(2)] == [1, 0]
+    # of another mechanism there are as many rows anew as it is in
+    assert of(tmp_path, 11.5).computed == others
+    last = of(tmp_path)
+    (whole := tmp_path / "alone").mkdir()
+    alone = of(whole)
+    for name in ("largest", "starts", "ends"):
+        np.testing.assert_array_equal(*(np.ma.filled(getattr(found, name, 0), np.nan) for found in (last, alone)))
 
 
 def test_no_stable_motion_is_a_sentence() -> None:
