@@ -5,12 +5,10 @@ from __future__ import annotations
 import itertools
 import json
 import re
-import sys
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import fields
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from types import FunctionType, ModuleType, SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -211,14 +209,7 @@ def _in_solution(
 def _beginning(mechanism: Mechanism, modes: Any, u: Any) -> tuple[Any, ...]:
     """Parameters and given state as symbols; constants with the energy, state, its scale and the least parameters of these."""
     casadi = symbolic.library()
-    kind = mechanism.parameters
-    names = [field.name for field in fields(kind)]
-    functions = symbolic.traced(_modules(mechanism), max=casadi.fmax, min=casadi.fmin, float=lambda value: value)
-    methods = {
-        name: functions.of(f) for name, f in vars(kind).items() if isinstance(f, FunctionType) and name[:2] != "__"
-    }
-    own = casadi.SX.sym("own", len(names))
-    parameters = type("Traced", (SimpleNamespace,), methods)(**dict(zip(names, casadi.vertsplit(own))))
+    own, parameters, functions = equations.of_parameters(mechanism)
     state = casadi.SX.sym("state", 2 * len(mechanism.freedoms))
     k = parameters.constants()
     channels = tuple(casadi.vertsplit(u)) if mechanism.channels else ()
@@ -245,13 +236,6 @@ def _check_start(mechanism: Mechanism, begin: Any) -> None:
         ]
         if not np.allclose(found, wanted, rtol=1e-12, atol=0.0):
             raise LinkworkError(f"the start of {mechanism.name}, traced, is another with the set {name}: {_START}")
-
-
-def _modules(mechanism: Mechanism) -> tuple[ModuleType, ...]:
-    """The modules of the equations, and of what constants and scales are computed by."""
-    of: Iterable[Callable[..., Any]] = (mechanism.parameters, mechanism.error_scale)
-    further = {sys.modules[f.__module__]: None for f in of} | {sys.modules[Mechanism.__module__]: None}
-    return tuple(dict.fromkeys((*further, *mechanism.modules)))
 
 
 # Tables

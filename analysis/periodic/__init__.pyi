@@ -36,6 +36,15 @@ from .floquet import liouville as liouville
 from .floquet import multipliers as multipliers
 from .floquet import require_sign as require_sign
 from .floquet import verdict as verdict
+from .gradients import Gradient as Gradient
+from .gradients import MotionGradient as MotionGradient
+from .gradients import PointGradient as PointGradient
+from .gradients import boundary_gradient as boundary_gradient
+from .gradients import crossing_gradient as crossing_gradient
+from .gradients import extremum_gradient as extremum_gradient
+from .gradients import gradient_names as gradient_names
+from .gradients import motion_gradient as motion_gradient
+from .gradients import special_gradient as special_gradient
 from .grids import Grid as Grid
 from .grids import GridInterrupted as GridInterrupted
 from .grids import grid as grid

@@ -57,6 +57,12 @@ def require_variable(parameters: Parameters, drive: Drive, name: str) -> None:
         require_acting(drive, mechanism, forces_of(mechanism)[name])
 
 
+def variable_names(mechanism: Mechanism) -> tuple[str, ...]:
+    """FMI names of what can vary of a mechanism and its drive: the crank's speed and torque, forces, parameters."""
+    of_mechanism = [v.name for v in mechanism.mechanism_variables.values() if v.kind == "Real"]
+    return (*_of_the_crank(mechanism), *forces_of(mechanism), *of_mechanism)
+
+
 def unit_of(mechanism: Mechanism, name: str) -> str:
     """Unit of what can vary of a mechanism and its drive, by its FMI name.
 
@@ -65,8 +71,7 @@ def unit_of(mechanism: Mechanism, name: str) -> str:
     UnknownNameError
         If there is no such thing.
     """
-    of_mechanism = [v.name for v in mechanism.mechanism_variables.values() if v.kind == "Real"]
-    names = (*_of_the_crank(mechanism), *forces_of(mechanism), *of_mechanism)
+    names = variable_names(mechanism)
     if name not in names:
         raise unknown_name(name, names)
     return next(v.unit for v in mechanism.variables if v.name == name)

@@ -52,11 +52,14 @@ class Extremum:
         m.
     stability : Stability
         Of the motion there.
+    orbit : PeriodicOrbit
+        That motion.
     """
 
     parameter: float
     amplitude: float
     stability: Stability
+    orbit: PeriodicOrbit
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -335,7 +338,9 @@ def extrema(branch: Branch, sign: int = 1) -> tuple[Extremum, ...]:
         except OrbitError:
             # next to the limit of assembly a neighbour at a fixed parameter may not be found: the point itself stands
             place, orbit = float(branch.parameter[i]), near
-        found.append(Extremum(parameter=place, amplitude=orbit.amplitude, stability=orbit.verdict().stability))
+        found.append(
+            Extremum(parameter=place, amplitude=orbit.amplitude, stability=orbit.verdict().stability, orbit=orbit)
+        )
     return tuple(found)
 
 

@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import sys
+from collections.abc import Callable, Iterable
+from dataclasses import fields
 from functools import cache
+from types import FunctionType, ModuleType, SimpleNamespace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -38,6 +42,34 @@ def constants(mechanism: Mechanism, switched: bool = False) -> tuple[Any, Any]:
     p = symbolic.library().SX.sym("p", len(mechanism.constants._fields))
     k = mechanism.constants(*symbolic.library().vertsplit(p))
     return p, k._replace(**{mechanism.switch: float(switched)}) if mechanism.switch else k
+
+
+class OfParameters(NamedTuple):
+    """The parameters of a mechanism traced: a column of symbols for their fields, an object with these, and functions."""
+
+    own: Any
+    parameters: Any
+    functions: Rebound
+
+
+def of_parameters(mechanism: Mechanism) -> OfParameters:
+    """The parameters with symbols in the place of their fields: their ``constants`` and ``error_scale`` can be traced."""
+    casadi, kind = symbolic.library(), mechanism.parameters
+    functions = symbolic.traced(_modules(mechanism), max=casadi.fmax, min=casadi.fmin, float=lambda value: value)
+    methods = {
+        name: functions.of(f) for name, f in vars(kind).items() if isinstance(f, FunctionType) and name[:2] != "__"
+    }
+    names = [field.name for field in fields(kind)]
+    own = casadi.SX.sym("own", len(names))
+    parameters = type("Traced", (SimpleNamespace,), methods)(**dict(zip(names, casadi.vertsplit(own))))
+    return OfParameters(own, parameters, functions)
+
+
+def _modules(mechanism: Mechanism) -> tuple[ModuleType, ...]:
+    """The modules of the equations, and of what constants and scales are computed by."""
+    of: Iterable[Callable[..., Any]] = (mechanism.parameters, mechanism.error_scale)
+    further = {sys.modules[f.__module__]: None for f in of} | {sys.modules[Mechanism.__module__]: None}
+    return tuple(dict.fromkeys((*further, *mechanism.modules)))
 
 
 class Symbols(NamedTuple):

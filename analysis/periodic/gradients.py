@@ -1,0 +1,590 @@
+"""How periodic motions, and the speeds at which they resonate or lose their stability, change with every parameter.
+
+By the implicit function theorem on the variational equations (`variations`): a motion moves so that it stays periodic, the
+place of a fold, a period doubling or a torus point so that the multiplier stays on the unit circle, that of a resonance so
+that the amplitude stays stationary. For the conditions see Y. A. Kuznetsov, Elements of Applied Bifurcation Theory, 3rd ed.,
+Springer 2004, chapter 10. All derivatives are exact, up to the resolution of the collocation; none is a difference.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+from functools import cache, cached_property
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from linkwork.errors import InputError, LinkworkError
+from linkwork.mechanism import Mechanism
+from linkwork.parameters import fmi_name
+
+from ..files import unknown_name
+from ..mechanisms import Parameters, mechanism_of
+from ..numerics import symbolic
+from ..run.equations import of_parameters
+from .branches import Family, SpecialPoint
+from .drives import Drive
+from .floquet import Crossing
+from .orbits import PeriodicOrbit, orbit_of
+from .planes import require_variable, value_of, variable_names, with_values
+from .resonance import Extremum
+from .variations import Place, Variations
+
+FloatArray = NDArray[np.float64]
+
+#: Newton's steps to a resonance at most, and the step, relative to the parameter, that is the last.
+_STEPS, _LAST = 12, 1e-9
+#: Product of unit eigenvectors below which a multiplier is a double one, and has no derivative.
+_DOUBLE = 1e-6
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Gradient:
+    """A quantity with its derivatives with respect to parameters.
+
+    Attributes
+    ----------
+    value : float
+    names : tuple of str
+        FMI names of the parameters.
+    by : ndarray, shape (m,)
+        The derivatives, in SI units.
+    at : ndarray, shape (m,)
+        Values of the parameters.
+
+    Notes
+    -----
+    ``gradient["slider.damping"]`` is one derivative.
+    """
+
+    value: float
+    names: tuple[str, ...]
+    by: FloatArray
+    at: FloatArray
+
+    def __getitem__(self, name: str) -> float:
+        if name not in self.names:
+            raise unknown_name(name, self.names)
+        return float(self.by[self.names.index(name)])
+
+    @property
+    def elasticities(self) -> dict[str, float]:
+        """Percent by which the quantity changes for a percent of each parameter; 0 for a parameter that is 0.
+
+        Raises
+        ------
+        InputError
+            If the quantity is 0.
+        """
+        if self.value == 0.0:
+            raise InputError("a quantity that is 0 has no elasticities")
+        return dict(zip(self.names, (self.by * self.at / self.value).tolist()))
+
+    def movers(self, count: int = 3) -> tuple[str, ...]:
+        """The parameters that move the quantity most, by their elasticities, the strongest first."""
+        shares = {name: abs(value) for name, value in self.elasticities.items() if value != 0.0}
+        return tuple(sorted(shares, key=lambda name: -shares[name])[:count])
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class PointGradient:
+    """How a special point of a branch moves: a resonance, a fold, a period doubling or a torus point.
+
+    Attributes
+    ----------
+    along : str
+        FMI name of the parameter of the branch, such as ``drive.speed``.
+    place : Gradient
+        Its value there, by the other parameters.
+    amplitude : Gradient
+        Of the motion there, which moves with the point.
+    orbit : PeriodicOrbit
+        The motion.
+    """
+
+    along: str
+    place: Gradient
+    amplitude: Gradient
+    orbit: PeriodicOrbit
+
+
+def gradient_names(parameters: Parameters, drive: Drive) -> tuple[str, ...]:
+    """All parameters that motions have derivatives by: what acts of the drive, and those of the mechanism, by FMI name.
+
+    A parameter that would switch on what is switched off, friction by contact forces, is left out: it can be named all the
+    same.
+    """
+    mechanism, found = mechanism_of(parameters), []
+    for name in variable_names(mechanism):
+        try:
+            require_variable(parameters, drive, name)
+        except InputError:
+            continue
+        if mechanism.switched(parameters.constants()) or not mechanism.switched(
+            _along(parameters, (name,)).p[:, 0].tolist()
+        ):
+            found.append(name)
+    return tuple(found)
+
+
+class MotionGradient:
+    """How a periodic motion changes with parameters; see `motion_gradient`. Each quantity is computed when it is asked for.
+
+    Attributes
+    ----------
+    orbit : PeriodicOrbit
+    names : tuple of str
+        FMI names of the m parameters.
+    values : ndarray, shape (m,)
+        What they are.
+    along : ndarray, shape (c, m)
+        Derivatives of the numbers of the drive and, after them, of the constants of the equations.
+    """
+
+    def __init__(self, orbit: PeriodicOrbit, names: Sequence[str] | None = None) -> None:
+        parameters, drive = orbit.parameters, orbit.drive
+        self.orbit = orbit
+        self.names = gradient_names(parameters, drive) if names is None else tuple(names)
+        for name in self.names:
+            require_variable(parameters, drive, name)
+        self.values = np.array([value_of(parameters, drive, name) for name in self.names])
+        own = _along(parameters, self.names)
+        self.along = _stacked(orbit, self.names, own.p)
+        mechanism = mechanism_of(parameters)
+        place = mechanism.switch_place
+        self._switched = mechanism.switched(parameters.constants()) or (place >= 0 and bool(np.any(own.p[place])))
+
+    @cached_property
+    def variations(self) -> Variations:
+        """The variational equations of the motion."""
+        return Variations(self.orbit, self._switched)
+
+    @cached_property
+    def forcing(self) -> FloatArray:
+        """Derivatives of the rates with respect to the parameters, the motion held; shape (k, s, n, m)."""
+        forcing: FloatArray = self.variations.by_constant @ self.along
+        return forcing
+
+    @cached_property
+    def _solution(self) -> tuple[FloatArray, FloatArray]:
+        return self.variations.periodic(self.forcing)
+
+    def _gradient(self, value: float, by: FloatArray) -> Gradient:
+        return Gradient(value=float(value), names=self.names, by=by, at=self.values)
+
+    # The motion
+
+    @property
+    def start(self) -> FloatArray:
+        """Derivatives of y at the crank angle 0, shape (n, m)."""
+        return self._solution[1]
+
+    @cached_property
+    def period(self) -> Gradient:
+        """Of the period (s)."""
+        v, flow = self.variations, self.orbit.flow
+        if flow.command is not None:
+            speed, by = np.full(v.angles.shape, float(self.orbit.drive.speed or 0.0)), self.along[flow.command]
+        else:
+            speed, by = v.y[..., -1], self._solution[0][..., -1, :]
+        return self._gradient(float(v.integral(1.0 / speed)), v.integral(-by / speed[..., None] ** 2))
+
+    @property
+    def speed(self) -> Gradient:
+        """Of the mean speed of the crank (rad/s), which is part of the motion under a torque."""
+        way = self.orbit.flow.period * self.orbit.turns
+        return self._gradient(way / self.period.value, -way / self.period.value**2 * self.period.by)
+
+    @cached_property
+    def _swing(self) -> tuple[tuple[float, float, Place], ...]:
+        """Sign, value and place of the greatest and the least of the first component of y."""
+        found = []
+        for sign in (1.0, -1.0):
+            value, place = self.variations.greatest(sign * self.variations.y[..., 0])
+            found.append((sign, sign * value, place))
+        return tuple(found)
+
+    @cached_property
+    def amplitude(self) -> Gradient:
+        """Of half the range of the first free coordinate over the period, as `PeriodicOrbit.amplitude`."""
+        return self.amplitude_along(self._solution[0])
+
+    def amplitude_along(self, solution: FloatArray) -> Gradient:
+        """The same, the derivatives of the motion given, shape (k, s, n, m)."""
+        # where a value is greatest its place does not count
+        by = [0.5 * sign * place.weights @ solution[place.panel, :, 0, :] for sign, _, place in self._swing]
+        return self._gradient(0.5 * (self._swing[0][1] - self._swing[1][1]), by[0] + by[1])
+
+    def amplitude_curvature(self, along: str) -> Gradient:
+        """Of the derivative of the amplitude with respect to one of the parameters."""
+        v, solution = self.variations, self._solution[0]
+        number = self.names.index(along)
+        by_y, by_constant = v.second(solution[..., number], self.along[:, number])
+        twice = _along(self.orbit.parameters, self.names, along).p_along
+        forcing = (
+            by_y @ solution
+            + by_constant @ self.along
+            + v.by_constant @ _stacked(self.orbit, (), twice, len(self.names))
+        )
+        second, rates = v.periodic(forcing)[0], v.by_y @ solution + self.forcing
+        total = np.zeros(len(self.names))
+        for sign, _, place in self._swing:
+            # the place moves so that the rate there stays zero
+            curvature = v.slope(place.panel, v.rates[place.panel, :, 0], place.position)
+            rate = place.weights @ rates[place.panel, :, 0, :]
+            total += 0.5 * sign * (place.weights @ second[place.panel, :, 0, :] - rate[number] * rate / curvature)
+        return self._gradient(self.amplitude[along], total)
+
+    # Outputs
+
+    def greatest(self, name: str) -> Gradient:
+        """Of the greatest value of an output over the period, by its FMI name."""
+        return self._extreme(self._numbers(name, False), 1.0)
+
+    def least(self, name: str) -> Gradient:
+        """Of the least value of an output."""
+        return self._extreme(self._numbers(name, False), -1.0)
+
+    def peak(self, name: str) -> Gradient:
+        """Of the greatest modulus of an output, or of the force in a joint, such as ``drive.applied_torque`` or ``pin.A``."""
+        return self._extreme(self._numbers(name, True), 0.0)
+
+    def _numbers(self, name: str, joints: bool) -> list[int]:
+        outputs = self.orbit.flow.mechanism.output_names
+        if name in outputs:
+            return [outputs.index(name)]
+        parts = [outputs.index(part) for axis in "xyz" if (part := f"{name}.f{axis}") in outputs]
+        if joints and parts:
+            return parts
+        own = [output.removesuffix(".fx") for output in outputs if output.endswith(".fx")] if joints else []
+        raise unknown_name(name, (*outputs, *own))
+
+    @cached_property
+    def _outputs(self) -> FloatArray:
+        return self.variations.outputs()
+
+    def _extreme(self, numbers: list[int], sign: float) -> Gradient:
+        """Of the greatest (sign 1) or least (-1) of an output, or of the greatest modulus (0) of one or several together."""
+        v, values = self.variations, self._outputs[..., numbers]
+        size = sign * values[..., 0] if sign else np.sqrt((values**2).sum(axis=-1))
+        if sign == 0.0 and len(numbers) == 1:
+            # a modulus has a corner where its output is zero
+            chosen = max((1.0, -1.0), key=lambda s: v.greatest(s * values[..., 0])[0])
+            size = chosen * values[..., 0]
+        value, place = v.greatest(size)
+        by = np.zeros((len(place.weights), len(self.names)))
+        for column, number in enumerate(numbers):
+            by_y, by_constant = v.output_derivatives(place.panel, number)
+            change = np.einsum("sn,snm->sm", by_y, self._solution[0][place.panel]) + by_constant @ self.along
+            # the modulus of one output is the output itself, with its sign
+            share = values[place.panel, :, column] / size[place.panel]
+            by += share[:, None] * change if len(numbers) > 1 else np.sign(share)[:, None] * change
+        one = sign or 1.0
+        return self._gradient(one * value, one * (place.weights @ by))
+
+    # Stability
+
+    @cached_property
+    def monodromy(self) -> FloatArray:
+        """Derivatives of the monodromy matrix, shape (n, n, m)."""
+        v, solution = self.variations, self._solution[0]
+        columns = []
+        for column in range(self.orbit.flow.size):
+            by_y, by_constant = v.second(v.fundamental[..., column])
+            columns.append(v.after(by_y @ solution + by_constant @ self.along))
+        return np.stack(columns, axis=1)
+
+    @cached_property
+    def multipliers(self) -> NDArray[np.complex128]:
+        """Derivatives of the Floquet multipliers in the order of the orbit's, shape (n, m).
+
+        Raises
+        ------
+        LinkworkError
+            If two multipliers coincide: they have no derivatives there.
+        """
+        scale, matrix = self.variations.scale, self.orbit.monodromy
+        values, right = np.linalg.eig((matrix * scale / scale[:, None]).astype(complex))
+        left = np.linalg.inv(right)
+        if not _DOUBLE * np.linalg.norm(left, axis=1).max() < 1.0:
+            raise LinkworkError(f"two of the multipliers {values} coincide: they have no derivatives")
+        scaled = self.monodromy * scale[:, None] / scale[:, None, None]
+        found = np.einsum("ia,abm,bi->im", left, scaled, right)
+        order = [int(np.abs(values - value).argmin()) for value in self.orbit.multipliers]
+        return np.asarray(found[order])
+
+    @property
+    def largest(self) -> Gradient:
+        """Of the modulus of the largest multiplier."""
+        return self.modulus(0)
+
+    def modulus(self, number: int) -> Gradient:
+        """Of the modulus of a multiplier, by its number among the orbit's."""
+        value = self.orbit.multipliers[number]
+        return self._gradient(abs(value), np.real(np.conj(value) * self.multipliers[number]) / abs(value))
+
+
+def motion_gradient(orbit: PeriodicOrbit, names: Sequence[str] | None = None) -> MotionGradient:
+    """How a periodic motion changes with parameters.
+
+    Parameters
+    ----------
+    orbit : PeriodicOrbit
+    names : sequence of str, optional
+        FMI names of the parameters; by default all, see `gradient_names`.
+
+    Raises
+    ------
+    UnknownNameError
+        If there is no parameter of a name.
+    InputError
+        If one does not act in this drive.
+    LinkworkError
+        If the variational equations cannot be resolved.
+
+    Examples
+    --------
+    >>> from math import pi
+    >>> from analysis import find_orbit
+    >>> from analysis.periodic import motion_gradient
+    >>> motion = motion_gradient(find_orbit("rig-2-spring-c", speed=500 * pi / 30))
+    >>> motion.amplitude.movers()
+    ('drive.speed', 'slider.stiffness', 'coupler.length')
+    """
+    return MotionGradient(orbit, names)
+
+
+def special_gradient(
+    family: Family, point: SpecialPoint | Extremum, names: Sequence[str] | None = None
+) -> PointGradient:
+    """How a special point of a branch, or a maximum or minimum of its amplitude, moves with the other parameters.
+
+    Parameters
+    ----------
+    family : Family
+        Over a parameter with an FMI name.
+    point : SpecialPoint or Extremum
+    names : sequence of str, optional
+        Of the other parameters; by default all, see `gradient_names`.
+
+    Raises
+    ------
+    InputError
+        If the family's parameter is a function.
+    LinkworkError
+        If the place has no derivative, as where two folds meet.
+    """
+    if not isinstance(family.vary, str):
+        raise InputError(f"{family.name} is a function: gradients are along a parameter with an FMI name")
+    if isinstance(point, SpecialPoint):
+        return crossing_gradient(point.orbit, point.kind, family.vary, names)
+    return extremum_gradient(point.orbit, family.vary, names)
+
+
+def extremum_gradient(orbit: PeriodicOrbit, along: str, names: Sequence[str] | None = None) -> PointGradient:
+    """How a resonance, or another extremum of the amplitude over a parameter, moves with the other parameters.
+
+    Parameters
+    ----------
+    orbit : PeriodicOrbit
+        A motion near to it: Newton's method leads from it to where the derivative of the amplitude is zero.
+    along : str
+        FMI name of the parameter, such as ``drive.speed``.
+    names : sequence of str, optional
+
+    Raises
+    ------
+    LinkworkError
+        If there is no extremum near the motion.
+    """
+    for _ in range(_STEPS):
+        motion = MotionGradient(orbit, (along,))
+        value, second = float(motion.values[0]), motion.amplitude_curvature(along)
+        step = -motion.amplitude[along] / second[along]
+        if not abs(step) < 0.1 * abs(value):
+            break
+        if abs(step) <= _LAST * abs(value):
+            return _extremum(orbit, along, names)
+        orbit = _near(orbit, along, value + step, motion.start[:, 0] * step)
+    raise LinkworkError(f"no extremum of the amplitude over {along} was found near {value:.9g}")
+
+
+def crossing_gradient(
+    orbit: PeriodicOrbit, kind: Crossing, along: str, names: Sequence[str] | None = None
+) -> PointGradient:
+    """How a fold, a period doubling or a torus point, a point of a boundary of a chart, moves along one parameter with others.
+
+    Parameters
+    ----------
+    orbit : PeriodicOrbit
+        The motion with a multiplier on the unit circle.
+    kind : Crossing
+    along : str
+        FMI name of the parameter along which it moves.
+    names : sequence of str, optional
+
+    Raises
+    ------
+    LinkworkError
+        If the place has no derivative: the boundary is parallel to the parameter, two folds meet, or a branch is crossed.
+    """
+    others = _others(orbit, along, names)
+    motion = MotionGradient(orbit, (*others, along))
+    test = _test(motion, kind)
+    if not abs(test[-1]) * abs(motion.values[-1]) > 1e-9 * float(np.abs(test * motion.values).max()):
+        raise LinkworkError(f"the {kind.value} does not move along {along}: its place there has no derivative")
+    shift = -test[:-1] / test[-1]
+    amplitude = motion.amplitude_along(_fold_motion(motion, shift)) if kind is Crossing.FOLD else motion.amplitude
+    by = amplitude.by[:-1] + amplitude.by[-1] * shift
+    at = motion.values[:-1]
+    return PointGradient(
+        along=along,
+        place=Gradient(value=float(motion.values[-1]), names=others, by=shift, at=at),
+        amplitude=Gradient(value=amplitude.value, names=others, by=by, at=at),
+        orbit=orbit,
+    )
+
+
+def boundary_gradient(orbit: PeriodicOrbit, kind: Crossing, names: Sequence[str]) -> Gradient:
+    """Normal of the boundary on which a multiplier stays on the unit circle, in the space of parameters, at one of its points.
+
+    Parameters
+    ----------
+    orbit : PeriodicOrbit
+        The motion with a multiplier on the unit circle, as a `CrossingCurve` has them.
+    kind : Crossing
+    names : sequence of str
+        The parameters, such as both of a chart's axes.
+
+    Returns
+    -------
+    Gradient
+        Of a function that is zero on the boundary: of a period doubling or torus point the multiplier's modulus less one; of a
+        fold the shift of the map over a period along the left eigenvector.
+    """
+    motion = MotionGradient(orbit, names)
+    return Gradient(value=0.0, names=motion.names, by=_test(motion, kind), at=motion.values)
+
+
+def _others(orbit: PeriodicOrbit, along: str, names: Sequence[str] | None) -> tuple[str, ...]:
+    require_variable(orbit.parameters, orbit.drive, along)
+    names = gradient_names(orbit.parameters, orbit.drive) if names is None else names
+    return tuple(name for name in names if name != along)
+
+
+def _near(orbit: PeriodicOrbit, along: str, value: float, step: FloatArray) -> PeriodicOrbit:
+    parameters, drive = with_values(orbit.parameters, orbit.drive, {along: value})
+    return orbit_of(parameters, drive, turns=orbit.turns, start=orbit.start + step, settle=False)
+
+
+def _extremum(orbit: PeriodicOrbit, along: str, names: Sequence[str] | None) -> PointGradient:
+    others = _others(orbit, along, names)
+    motion = MotionGradient(orbit, (*others, along))
+    slopes = motion.amplitude_curvature(along).by
+    # at the extremum the amplitude does not change with its place
+    amplitude, at = motion.amplitude, motion.values[:-1]
+    return PointGradient(
+        along=along,
+        place=Gradient(value=float(motion.values[-1]), names=others, by=-slopes[:-1] / slopes[-1], at=at),
+        amplitude=Gradient(value=amplitude.value, names=others, by=amplitude.by[:-1], at=at),
+        orbit=orbit,
+    )
+
+
+def _test(motion: MotionGradient, kind: Crossing) -> FloatArray:
+    """Derivatives, shape (m,), of a function that is zero where the multiplier is on the unit circle."""
+    if kind is Crossing.FOLD:
+        left, _ = _null_vectors(motion.variations)
+        return left @ motion.variations.after(motion.forcing)
+    values = motion.orbit.multipliers
+    if kind is Crossing.PERIOD_DOUBLING:
+        return motion.modulus(int(np.abs(values + 1.0).argmin())).by
+    off = np.where(values.imag == 0.0, np.inf, np.abs(np.abs(values) - 1.0))
+    if not np.isfinite(off).any():
+        raise LinkworkError(f"the multipliers {values} are real: there is no torus point")
+    return motion.modulus(int(off.argmin())).by
+
+
+def _null_vectors(v: Variations) -> tuple[FloatArray, FloatArray]:
+    """Left and right eigenvectors of the monodromy matrix for the multiplier +1."""
+    left, _, right = np.linalg.svd(v.monodromy * v.scale / v.scale[:, None] - np.eye(len(v.scale)))
+    return left[:, -1] / v.scale, right[-1] * v.scale
+
+
+def _fold_motion(motion: MotionGradient, shift: FloatArray) -> FloatArray:
+    """Derivatives of the motion at a fold that moves with the parameters by ``shift`` along the last; shape (k, s, n, m).
+
+    The equations of the first order leave a multiple of the eigenvector open, which those of the second settle: the multiplier
+    stays +1. The last column is zero.
+    """
+    v, n, m = motion.variations, len(motion.variations.scale), len(shift)
+    left, right = _null_vectors(v)
+    moved = np.vstack([np.eye(m), shift]) if m else np.zeros((1, 0))
+    forcing, along = motion.forcing @ moved, motion.along @ moved
+    # bordered by both vectors the matrix is regular
+    matrix = np.block(
+        [[v.monodromy - np.eye(n), (left * v.scale**2)[:, None]], [(right / v.scale**2)[None, :], np.zeros((1, 1))]]
+    )
+    start = np.linalg.solve(matrix, np.vstack([-v.after(forcing), np.zeros(m)]))[:n]
+    particular = v.from_start(start, forcing)
+    free = v.fundamental @ right
+    by_y, by_constant = v.second(free)
+    open_ = left @ v.after(by_y @ free[..., None])
+    if open_[0] == 0.0:
+        raise LinkworkError("two folds meet: the motion there has no derivatives")
+    share = -(left @ v.after(by_y @ particular + by_constant @ along)) / open_
+    found = particular + free[..., None] * share
+    return np.concatenate([found, np.zeros_like(free[..., None])], axis=-1)
+
+
+class _Along(NamedTuple):
+    """Derivatives of the constants with respect to parameters, and of these with respect to one more; shape (P, m)."""
+
+    p: FloatArray
+    p_along: FloatArray
+
+
+def _along(parameters: Parameters, names: Sequence[str], along: str = "") -> _Along:
+    mechanism = mechanism_of(parameters)
+    names_of_fields = _fields(mechanism)
+    own = [float(getattr(parameters, field)) for field in names_of_fields]
+    known = {fmi_name(field): number for number, field in enumerate(names_of_fields)}
+    direction = np.zeros(len(own))
+    if along in known:
+        direction[known[along]] = 1.0
+    found = [np.asarray(part) for part in _constants(mechanism)(own, direction)]
+    chosen = [np.zeros((len(found[0]), len(names))) for _ in found]
+    for part, columns in zip(found, chosen):
+        for column, name in enumerate(names):
+            if name in known:
+                columns[:, column] = part[:, known[name]]
+    return _Along(*chosen)
+
+
+def _stacked(orbit: PeriodicOrbit, names: Sequence[str], p: FloatArray, width: int | None = None) -> FloatArray:
+    """Derivatives of the numbers of the drive, and after them of the constants; shape (c, m)."""
+    mechanism = mechanism_of(orbit.parameters)
+    drive = np.zeros((orbit.flow.drive_size, len(names) if width is None else width))
+    for column, name in enumerate(names):
+        if name in mechanism.input_names:
+            drive[mechanism.input_names.index(name), column] = 1.0
+    return np.vstack([drive, p])
+
+
+@cache
+def _fields(mechanism: Mechanism) -> tuple[str, ...]:
+    return tuple(field.name for field in fields(mechanism.parameters))
+
+
+@cache
+def _constants(mechanism: Mechanism) -> Any:
+    """(parameters, direction) -> derivatives of the constants, and of these along the direction."""
+    casadi = symbolic.library()
+    traced = of_parameters(mechanism)
+    k = casadi.vertcat(*traced.parameters.constants())
+    direction = casadi.SX.sym("direction", *traced.own.shape)
+    jacobian = casadi.jacobian(k, traced.own)
+    along = casadi.reshape(casadi.jtimes(casadi.vec(jacobian), traced.own, direction), *jacobian.shape)
+    return casadi.Function("constants", [traced.own, direction], [casadi.densify(jacobian), casadi.densify(along)])
