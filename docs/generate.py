@@ -198,6 +198,16 @@ def hand_drawn_pictures() -> Iterator[Picture]:
     yield "hand-drawn-motion", draw.plot(small.driven(moved[-1]), title="The slider's drive at 60 rpm"), 90
 
 
+def closed_form_pictures() -> Iterator[Picture]:
+    """The pictures of docs/closed-form.md, from the examples."""
+    from analysis.figures import plot
+    from analysis.synthesis import guidance, load_synthesis_case
+
+    for name, count in (("five-poses", 6), ("four-poses", 1)):
+        case = load_synthesis_case(HERE.parent / "examples" / f"{name}.toml")
+        yield name, plot(guidance(case.task, count), title=case.title), 80
+
+
 def slider_crank_pictures() -> Iterator[Picture]:
     """The pictures of docs/slider-crank.md."""
     from dataclasses import replace
@@ -230,7 +240,7 @@ def main(arguments: list[str]) -> int:
     if with_figures and not chosen:
         from analysis.files import save_figure
 
-        for pictures in (study_pictures, hand_drawn_pictures, slider_crank_pictures):
+        for pictures in (study_pictures, hand_drawn_pictures, closed_form_pictures, slider_crank_pictures):
             for name, figure, dpi in pictures():
                 save_figure(figure, HERE / f"{name}.png", dpi=dpi)
     stale = []

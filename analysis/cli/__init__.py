@@ -25,6 +25,7 @@ COMMANDS = {
     "build": ("making", "Build and validate the FMUs."),
     "check": ("runs", "Compare the FMU with the in-process solver, output by output."),
     "decrement": ("record", "Damping and natural frequency from a decaying record."),
+    "exact": ("exact", "Find all linkages through a few poses or points, exactly."),
     "examples": ("making", "Copy the examples to a folder."),
     "figures": ("runs", "Make the theses' figures, a still and an animation."),
     "info": ("runs", "Describe published sets, a parameter or case file, an FMU."),

@@ -192,8 +192,15 @@ def synthesize(
       linkwork synthesize examples/ellipse.toml --set constraints.largest_link='300 mm' --set task.n=36
     """
     from .. import figures
-    from ..files import save_figure
-    from ..synthesis import SynthesisInterrupted, TradeOffInterrupted, load_synthesis_case
+    from ..files import save_figure, write_csv
+    from ..synthesis import (
+        SynthesisInterrupted,
+        TradeOffInterrupted,
+        alternatives,
+        columns_of,
+        has_cognates,
+        load_synthesis_case,
+    )
 
     overrides = overrides_of(settings, search__method=method, search__seed=seed, search__jobs=jobs)
     check_kind(case, SYNTHESIS)
@@ -209,6 +216,10 @@ def synthesize(
     print_best(result.best)
     folder = folder_of(out)
     written = [result.to_csv(folder / "solutions.csv")]
+    if has_cognates(result.best):
+        others = alternatives(result.best)
+        print_solutions("the same curve from other pivots: the first one's cognates", others)
+        written.append(write_csv(folder / "cognates.csv", columns_of(others)))
     written += write_solution(result.best, folder, chosen.title, make=chosen.make, plots=plots, animate=animate)
     if plots:
         written.append(save_figure(figures.plot(result, title=chosen.title), folder / "alternatives.png"))

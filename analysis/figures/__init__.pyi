@@ -9,6 +9,8 @@ from .decay import plot_decay as plot_decay
 from .dispatch import DrawingError as DrawingError
 from .dispatch import animate as animate
 from .dispatch import plot as plot
+from .guidance import plot_guidance as plot_guidance
+from .guidance import plot_guidance_map as plot_guidance_map
 from .linkage import animate_linkage as animate_linkage
 from .linkage import draw_linkage as draw_linkage
 from .motion import plot_drive as plot_drive

@@ -35,6 +35,7 @@ MODULES = (
     "decay",
     "control",
     "synthesis",
+    "guidance",
     "motion",
     "slider_crank",
     "slider_crank_picture",

@@ -12,8 +12,10 @@
 from __future__ import annotations
 
 from .areas import Straightness, area_between, distance_to, hausdorff, straightest_part, straightness
+from .burmester import Dyad, Guidance, GuidanceMap, guidance
 from .case_tasks import KINDS
 from .cases import BOUNDS, TABLES, SynthesisCase, direction, load_synthesis_case, synthesis_case_from
+from .cognates import alternatives, cognates, has_cognates
 from .constraints import (
     USUAL,
     Assembly,
@@ -27,6 +29,7 @@ from .constraints import (
     Require,
 )
 from .drawing import drawing
+from .functions import Generators, function_generators
 from .linkage import ANGLES, LENGTHS, LINKS, UNITS, Linkage, SecondCrank, SliderMotion
 from .report import (
     dimension_rows,
@@ -48,13 +51,14 @@ from .solve import (
     SynthesisInterrupted,
     TradeOff,
     TradeOffInterrupted,
+    columns_of,
     improve,
     synthesize,
     there_and_back,
     trade_off,
 )
 from .starts import CrankUnknown, PivotUnknown, SliderUnknown
-from .targets import TargetPath, function_from_formula, path_from_formula
+from .targets import TargetPath, chebyshev_spacing, function_from_formula, path_from_formula
 from .tasks import Motion, PrecisionPoints, RockerFunction, Straight, Task, TimedPath, UntimedPath, normal_form, turn
 
 __all__ = [
@@ -71,9 +75,13 @@ __all__ = [
     "Assembly",
     "Constraint",
     "CrankUnknown",
+    "Dyad",
     "Evaluation",
     "FullTurn",
+    "Generators",
     "Grashof",
+    "Guidance",
+    "GuidanceMap",
     "InfeasibleError",
     "LargestLink",
     "LeastTransmission",
@@ -104,7 +112,11 @@ __all__ = [
     "TradeOffInterrupted",
     "UntimedPath",
     "Verdicts",
+    "alternatives",
     "area_between",
+    "chebyshev_spacing",
+    "cognates",
+    "columns_of",
     "costs",
     "dimension_rows",
     "direction",
@@ -115,6 +127,9 @@ __all__ = [
     "format_limit",
     "format_transmission",
     "function_from_formula",
+    "function_generators",
+    "guidance",
+    "has_cognates",
     "hausdorff",
     "headline",
     "improve",

@@ -301,6 +301,7 @@ class RockerFunctionTable(_Formula):
     rotation: Any = entry(_steps_or_list, None)
     weights: Any = entry(as_it_is, None)
     mounting: bool = entry(flag, False)
+    spacing: Any = entry(Choice(("even", "chebyshev")), "even")
 
     def task(self, folder: Path) -> Task:
         written = isinstance(self.angle, str)
@@ -311,7 +312,7 @@ class RockerFunctionTable(_Formula):
         unit = self.angle_unit or "rad"
         rotation: FloatArray | None
         if written:
-            rotation, angle = function_from_formula(self.angle, unit=unit, **self._range())
+            rotation, angle = function_from_formula(self.angle, unit=unit, spacing=self.spacing, **self._range())
         elif self.file is not None:
             columns, _ = read_points(folder / self.file)
             rotation, angle = (quantity(f"1 {unit}", "rad", "task.angle_unit") * columns).T

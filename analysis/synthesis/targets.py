@@ -11,7 +11,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from math import cos, e, pi, sin, tau
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -22,6 +22,7 @@ from ..files import read_points, unknown_name
 from ..units import quantity
 
 FloatArray = NDArray[np.float64]
+Spacing = Literal["even", "chebyshev"]
 
 #: Share of a curve's extent below which two points are the same one, and of its length squared below which it has no area.
 COINCIDENT = 1e-12
@@ -552,6 +553,7 @@ def function_from_formula(
     start: float | str = 0.0,
     end: float | str = 2.0 * pi,
     variable: str = "t",
+    spacing: Spacing = "even",
 ) -> tuple[FloatArray, FloatArray]:
     """Angles at n equal steps of the crank angle from a formula; for example ``"70 + 100*abs(sin(t/2))"`` in ``"deg"``.
 
@@ -565,6 +567,8 @@ def function_from_formula(
         Unit of what the formula gives.
     start, end : float or str
         Range of the crank angle; one of whole turns leaves out its end, which is its start again.
+    spacing : "even" or "chebyshev"
+        The second for precision points: see `chebyshev_spacing`.
 
     Returns
     -------
@@ -579,7 +583,28 @@ def function_from_formula(
         If the unit is not one of angle.
     """
     factor = quantity(f"1 {unit}", "rad", "unit")
+    if spacing == "chebyshev":
+        places = chebyshev_spacing(_number(start), _number(end), n)
+        return places, factor * formula(text, variable)(places)
     turns = (_number(end) - _number(start)) / tau
     whole = bool(np.isfinite(turns) and abs(turns - round(turns)) < 1e-9)
     crank_angle = _parameter(start, end, n, whole)
     return crank_angle, factor * formula(text, variable)(crank_angle)
+
+
+def chebyshev_spacing(low: float, high: float, n: int) -> FloatArray:
+    """Places of n precision points between two limits, at which the error between them is about the least.
+
+    The roots of Chebyshev's polynomial of degree n, as Freudenstein recommends.
+
+    Raises
+    ------
+    InputError
+        If there is no point, or the limits are not in order.
+    """
+    if n < 1 or not (np.isfinite([low, high]).all() and low < high):
+        raise InputError(f"{n} precision points from {low:g} to {high:g}: at least one, between finite limits in order")
+    places: FloatArray = 0.5 * (low + high) - 0.5 * (high - low) * np.cos(
+        (2.0 * np.arange(1, n + 1) - 1.0) * pi / (2 * n)
+    )
+    return places

@@ -1,0 +1,80 @@
+"""The command about linkages in closed form: all of them, or that there is none."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+
+import click
+
+from . import ENDED_EARLY
+from .common import SYNTHESIS, check_kind, console, folder_of, force_option, handled, print_error, print_written
+from .design import overrides_of, print_best, print_solutions, write_described
+
+
+@click.command()
+@click.argument("case", type=click.Path(exists=True, dir_okay=False))
+@click.option(
+    "--set", "settings", multiple=True, metavar="NAME=VALUE", help="Change a value of the case, such as task.n=4."
+)
+@click.option(
+    "--crank-phase", metavar="ANGLE", help="Of a function: the crank's angle from the ground link at rotation 0."
+)
+@click.option("--count", type=click.IntRange(1), default=6, show_default=True, help="Linkages of four poses to report.")
+@click.option("--plots/--no-plots", default=True, show_default=True, help="Whether to write plots.")
+@click.option(
+    "--out", default="out", show_default=True, type=click.Path(file_okay=False), help="Folder for the results."
+)
+@force_option
+@handled
+def exact(case: str, settings: Sequence[str], crank_phase: str | None, count: int, plots: bool, out: str) -> None:
+    """Find every four-bar that does exactly what a CASE file (TOML or JSON) asks for at a few points.
+
+    Five poses of a body have up to six four-bars, four a curve of dyads (Burmester); three to five points of a function of the
+    rocker have up to four (Freudenstein). Each is judged; where none is sound, none exists. Bounds and constraints of
+    the case are not applied. Ends with 3 where no linkage is sound.
+
+    \b
+    Examples:
+      linkwork exact examples/five-poses.toml
+      linkwork exact examples/sine-function.toml --set task.n=5
+    """
+    from .. import figures
+    from ..files import save_figure, write_csv
+    from ..synthesis import (
+        Generators,
+        Guidance,
+        GuidanceMap,
+        RockerFunction,
+        columns_of,
+        function_generators,
+        guidance,
+        load_synthesis_case,
+    )
+
+    check_kind(case, SYNTHESIS)
+    chosen = load_synthesis_case(case, overrides_of(settings))
+    found: Generators | Guidance | GuidanceMap
+    if isinstance(chosen.task, RockerFunction):
+        found = function_generators(chosen.task, crank_phase=crank_phase)
+    else:
+        found = guidance(chosen.task, count)
+    console.print(f"{chosen.title}: {found.describe()}", highlight=False, soft_wrap=True)
+    folder = folder_of(out)
+    written = []
+    if found.solutions:
+        print_solutions(f"{chosen.title}: in closed form", found.solutions)
+        best = found.solutions[0]
+        written.append(write_csv(folder / "solutions.csv", columns_of(found.solutions)))
+        if best.verdicts.sound:
+            print_best(best)
+            written += write_described(best, folder, chosen.title, curve="best-curve", text="best-report", drawn="best")
+    if plots and not isinstance(found, Generators):
+        written.append(save_figure(figures.plot(found, title=chosen.title), folder / "poses.png"))
+    if plots and found.solutions:
+        picture = figures.plot(found.solutions[0], title=chosen.title)
+        written.append(save_figure(picture, folder / "best-linkage.png"))
+    print_written(written)
+    if not any(s.verdicts.sound for s in found.solutions):
+        print_error(f"note: {found.describe()}")
+        sys.exit(ENDED_EARLY)

@@ -1,0 +1,353 @@
+"""Synthesis in closed form: guidance through poses, precision points of a function, cognates."""
+
+from __future__ import annotations
+
+from math import pi, radians, sqrt
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+from scipy.optimize import root
+
+from analysis.synthesis import (
+    Guidance,
+    GuidanceMap,
+    Linkage,
+    Motion,
+    PrecisionPoints,
+    RockerFunction,
+    Solution,
+    TargetPath,
+    TimedPath,
+    UntimedPath,
+    alternatives,
+    chebyshev_spacing,
+    cognates,
+    function_from_formula,
+    function_generators,
+    guidance,
+)
+from linkwork.errors import InputError, ParameterError
+
+FloatArray = NDArray[np.float64]
+
+
+def random_poses(seed: int, n: int) -> PrecisionPoints:
+    random = np.random.default_rng(seed)
+    return PrecisionPoints(points=random.uniform(-1.0, 1.0, (n, 2)), angle=random.uniform(-1.5, 1.5, n))
+
+
+def kept_distance(task: PrecisionPoints, pivot: complex, point: complex) -> float:
+    """How much the distance from a pivot to a point of the body varies over the poses, relative."""
+    p = np.asarray(task.points) @ np.array([1.0, 1j])
+    angle = np.asarray(task.angle)
+    distance = np.abs(p + np.exp(1j * (angle - angle[0])) * (point - p[0]) - pivot)
+    return float(np.ptp(distance) / distance.max())
+
+
+def poses_of(linkage: Linkage, rotation: FloatArray) -> PrecisionPoints:
+    return PrecisionPoints(points=linkage.path(rotation), angle=linkage.coupler_angle(rotation))
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_dyads_of_five_poses_keep_their_length(seed: int) -> None:
+    found = guidance(random_poses(seed, 5))
+    assert isinstance(found, Guidance)
+    assert len(found.dyads) + found.complex_dyads == 4
+    assert found.complex_dyads % 2 == 0
+    for dyad in found.dyads:
+        assert kept_distance(found.task, dyad.pivot, dyad.point) < 1e-11  # type: ignore[arg-type]
+    n = len(found.dyads)
+    assert len(found.solutions) == n * (n - 1)
+
+
+@pytest.mark.parametrize("seed", [0, 3, 5, 8])
+def test_no_dyad_is_missed(seed: int) -> None:
+    """SciPy's root finder from 300 places, on the distances themselves, finds the same real dyads."""
+    task = random_poses(seed, 5)
+    p, angle = np.asarray(task.points) @ np.array([1.0, 1j]), np.asarray(task.angle)
+
+    def lengths(x: FloatArray) -> FloatArray:
+        moved = p + np.exp(1j * (angle - angle[0])) * (complex(x[0], x[1]) - p[0])
+        squared = np.abs(moved - complex(x[2], x[3])) ** 2
+        return np.diff(squared)
+
+    random = np.random.default_rng(seed)
+    met = [root(lengths, random.uniform(-3.0, 3.0, 4), tol=1e-13) for _ in range(300)]
+    there = {tuple(np.round(m.x, 5)) for m in met if m.success and np.abs(m.fun).max() < 1e-11}
+    found = guidance(task)
+    assert isinstance(found, Guidance)
+    mine = {tuple(np.round([d.point.real, d.point.imag, d.pivot.real, d.pivot.imag], 5)) for d in found.dyads}
+    assert there <= mine
+    # those far away are not hit from these places
+    assert {m for m in mine if np.abs(m).max() < 3.0} <= there
+
+
+FOUR_BAR = Linkage(
+    pivot_x=0.1, pivot_y=-0.2, ground_length=0.4, crank_length=0.12, coupler_length=0.35, rocker_length=0.25,
+    point_distance=0.3, point_angle=0.6, ground_angle=0.3, crank_phase=0.5, output_angle=0.2,
+)  # fmt: skip
+
+
+def test_a_four_bar_is_found_again_from_its_own_poses() -> None:
+    found = guidance(poses_of(FOUR_BAR, np.array([0.0, 0.4, 0.9, 1.5, 2.2])))
+    assert isinstance(found, Guidance)
+    near = min(found.sound, key=lambda s: abs(s.linkage.ground_length - 0.4) + abs(s.linkage.crank_length - 0.12))
+    for name, value in FOUR_BAR.values().items():
+        assert near.linkage.values()[name] == pytest.approx(value, abs=1e-10), name
+    assert near.error < 1e-24
+    assert np.allclose(near.evaluation.rotation, [0.0, 0.4, 0.9, 1.5, 2.2], atol=1e-10)
+
+
+def test_poses_on_both_assemblies_are_a_circuit_defect() -> None:
+    """Three poses of one circuit of a crank-rocker and two of the other cannot be joined by any motion of its crank."""
+    other = Linkage(**FOUR_BAR.values() | {"branch": -1})
+    one, two = np.array([0.0, 0.4, 0.9]), np.array([1.5, 2.2])
+    points = np.vstack([FOUR_BAR.path(one), other.path(two)])
+    angle = np.concatenate([FOUR_BAR.coupler_angle(one), other.coupler_angle(two)])
+    found = guidance(PrecisionPoints(points=points, angle=angle))
+    assert isinstance(found, Guidance)
+    near = min(found.solutions, key=lambda s: abs(s.linkage.ground_length - 0.4) + abs(s.linkage.crank_length - 0.12))
+    assert near.linkage.coupler_length == pytest.approx(0.35, abs=1e-9)
+    assert set(near.verdicts.defects) >= {"circuit defect", "branch defect"}
+    assert near not in found.sound
+
+
+def test_none_is_sound_is_said_as_a_proof() -> None:
+    found = guidance(random_poses(0, 5))
+    assert isinstance(found, Guidance)
+    assert found.solutions
+    assert not found.sound
+    assert "no sound four-bar exists" in found.describe()
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_curve_of_four_poses(seed: int) -> None:
+    found = guidance(random_poses(seed, 4))
+    assert isinstance(found, GuidanceMap)
+    for pivot, point in zip(found.pivots, found.points):
+        assert kept_distance(found.task, complex(pivot), complex(point)) < 1e-10  # type: ignore[arg-type]
+
+
+def test_map_of_four_poses_is_what_each_linkage_is_judged() -> None:
+    from analysis.synthesis.burmester import Dyad, four_bar
+
+    found = guidance(random_poses(3, 4))
+    assert isinstance(found, GuidanceMap)
+    dyads = [Dyad(pivot=complex(m), point=complex(z)) for m, z in zip(found.pivots, found.points)]
+    random = np.random.default_rng(0)
+    places = np.argwhere(found.sound)
+    assert len(places) > 100
+    chosen = [*random.permutation(places)[:40], *random.integers(0, len(dyads), (40, 2))]
+    for i, k in chosen:
+        if i == k:
+            continue
+        solution = four_bar(found.task, dyads[i], dyads[k])
+        if solution.linkage.largest_link < 4.9 * np.hypot(*np.ptp(np.asarray(found.task.points), axis=0)):
+            assert solution.verdicts.sound == found.sound[i, k]
+            v = solution.verdicts
+            if v.sound:
+                least = min(v.least_transmission, pi - v.greatest_transmission)
+                assert found.transmission[i, k] == pytest.approx(least, abs=2e-5)
+
+
+def test_curve_of_four_poses_contains_the_dyads_of_five() -> None:
+    """Pose by pose left out, the dyads of five poses lie on the curve of the other four."""
+    task = random_poses(0, 5)
+    five = guidance(task)
+    assert isinstance(five, Guidance)
+    assert five.dyads
+    for out in range(1, 5):
+        kept = [k for k in range(5) if k != out]
+        four = guidance(PrecisionPoints(points=np.asarray(task.points)[kept], angle=np.asarray(task.angle)[kept]))
+        assert isinstance(four, GuidanceMap)
+        for dyad in five.dyads:
+            if abs(dyad.point) < 2.0:
+                assert np.abs(four.points - dyad.point).min() < 0.15
+
+
+@pytest.mark.parametrize(
+    ("points", "angle", "rotation", "said"),
+    [
+        ([[0, 0], [1, 0], [2, 1], [3, 1], [4, 0], [5, 0]], [0.0] * 6, None, "6 poses"),
+        ([[0, 0], [1, 0], [2, 1]], [0.0, 0.1, 0.2], None, "3 poses"),
+        ([[0, 0], [1, 0], [2, 1], [3, 1], [4, 0]], None, None, "poses are wanted"),
+        ([[0, 0], [1, 0], [2, 1], [3, 1], [4, 0]], [0.1] * 5, None, "does not turn"),
+        ([[0, 0], [1, 0], [0, 0], [3, 1], [4, 0]], [0.1, 0.2, 0.1, 0.4, 0.5], None, "the same"),
+        ([[0, 0], [1, 0], [2, 1], [3, 1]], [0.1, 0.2, 0.3, 0.4], [0.0, 0.1, 0.2, 0.3], "leave them out"),
+    ],
+)
+def test_poses_that_cannot_be_taken(points: object, angle: object, rotation: object, said: str) -> None:
+    with pytest.raises(InputError, match=said):
+        guidance(PrecisionPoints(points=points, angle=angle, rotation=rotation))  # type: ignore[arg-type]
+
+
+def test_a_motion_is_poses_too() -> None:
+    task = random_poses(5, 5)
+    assert guidance(Motion(points=task.points, angle=np.asarray(task.angle))).describe() == guidance(task).describe()
+
+
+def exact_at(solution: Solution) -> float:
+    return float(np.abs(solution.evaluation.errors).max())
+
+
+@pytest.mark.parametrize(
+    ("n", "mounting", "crank_phase", "most"),
+    [(5, True, None, 3), (4, False, None, 4), (4, True, 0.4, 4), (3, False, 0.4, 1)],
+)
+@pytest.mark.parametrize("seed", range(5))
+def test_function_at_its_points(n: int, mounting: bool, crank_phase: float | None, most: int, seed: int) -> None:
+    random = np.random.default_rng(seed)
+    rotation = np.append(0.0, np.cumsum(random.uniform(0.2, 0.6, n - 1)))
+    angle = 1.5 + 0.6 * np.sin(rotation + random.uniform(-1.0, 1.0))
+    found = function_generators(
+        RockerFunction(angle=angle, rotation=rotation, mounting=mounting), crank_phase=crank_phase
+    )
+    assert len(found.solutions) <= most
+    for solution in found.solutions:
+        l = solution.linkage  # noqa: E741
+        if crank_phase is not None:
+            assert np.sin(l.crank_phase - crank_phase) == pytest.approx(0.0, abs=1e-12)
+        if not mounting:
+            assert np.sin(l.output_angle) == pytest.approx(0.0, abs=1e-12)
+        # loop closure by the distance of B and C, whatever the assembly
+        th2, th4 = rotation + l.crank_phase, angle - l.output_angle
+        b = l.crank_length * np.exp(1j * th2)
+        c = l.ground_length + l.rocker_length * np.exp(1j * th4)
+        assert np.abs(c - b) == pytest.approx(np.full(n, l.coupler_length), rel=1e-9)
+        if solution.verdicts.branch:
+            assert exact_at(solution) < 1e-8
+
+
+@pytest.mark.parametrize("n", [4, 5])
+def test_a_function_generator_is_found_again(n: int) -> None:
+    made = Linkage(ground_length=0.1, crank_length=0.04, coupler_length=0.12, rocker_length=0.07, crank_phase=0.7)
+    rotation = np.linspace(0.0, 1.8, n)
+    task = RockerFunction(angle=made.rocker_angle(rotation), rotation=rotation, mounting=n == 5)
+    found = function_generators(task)
+    assert any(np.allclose(s.linkage.vector, made.vector, rtol=0.0, atol=1e-9) for s in found.sound)
+
+
+def test_freudenstein_by_hand() -> None:
+    """Three points with the linkage's own angles: R1, R2 and R3 are those of the lengths."""
+    made = Linkage(ground_length=0.1, crank_length=0.04, coupler_length=0.12, rocker_length=0.07, crank_phase=0.7)
+    rotation = np.array([0.0, 0.7, 1.6])
+    (one,) = function_generators(
+        RockerFunction(angle=made.rocker_angle(rotation), rotation=rotation), crank_phase="0.7 rad"
+    ).solutions
+    assert one.linkage.vector == pytest.approx(made.vector, abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("n", "mounting", "crank_phase", "said"),
+    [
+        (6, True, None, "Leave points out"),
+        (4, True, None, "the output's mounting.*Add points"),
+        (3, False, None, "the crank's phase"),
+    ],
+)
+def test_points_and_unknowns_are_counted(n: int, mounting: bool, crank_phase: float | None, said: str) -> None:
+    task = RockerFunction(angle=np.linspace(1.0, 2.0, n) ** 2, rotation=np.linspace(0.0, 1.0, n), mounting=mounting)
+    with pytest.raises(InputError, match=said):
+        function_generators(task, crank_phase=crank_phase)
+
+
+def test_a_constant_function_has_no_generator() -> None:
+    with pytest.raises(InputError, match="not independent"):
+        function_generators(RockerFunction(angle=[1.0, 1.0, 1.0], rotation=[0.0, 0.0001, 0.0002]), crank_phase=0.0)
+
+
+def test_chebyshev_spacing() -> None:
+    """The cosines of 30, 90 and 150 degrees; between the points an error that the polynomial through them levels."""
+    assert chebyshev_spacing(0.0, 2.0, 3) == pytest.approx([1.0 - sqrt(0.75), 1.0, 1.0 + sqrt(0.75)])
+    rotation, angle = function_from_formula("10*t", unit="deg", n=4, start=0.0, end="pi/2", spacing="chebyshev")
+    assert rotation == pytest.approx(chebyshev_spacing(0.0, 0.5 * pi, 4))
+    assert angle == pytest.approx(radians(10.0) * rotation)
+    with pytest.raises(InputError, match="in order"):
+        chebyshev_spacing(1.0, 0.0, 3)
+
+
+@st.composite
+def turning(draw: st.DrawFn) -> Linkage:
+    """Crank-rockers and drag-links with a coupler point, placed anywhere."""
+    lengths = [draw(st.floats(0.2, 1.0)) for _ in range(3)]
+    shortest = draw(st.floats(0.05, 0.15))
+    rest = sorted(lengths)
+    if shortest + rest[2] >= rest[0] + rest[1] - 1e-3:
+        rest[2] = 0.9 * (rest[0] + rest[1] - shortest)
+    crank = draw(st.booleans())
+    ground, crank_length = (rest[2], shortest) if crank else (shortest, rest[2])
+    return Linkage(
+        pivot_x=draw(st.floats(-1.0, 1.0)),
+        pivot_y=draw(st.floats(-1.0, 1.0)),
+        ground_length=ground,
+        crank_length=crank_length,
+        coupler_length=rest[0],
+        rocker_length=rest[1],
+        point_distance=draw(st.floats(0.1, 1.0)),
+        point_angle=draw(st.floats(0.2, 6.0)),
+        ground_angle=draw(st.floats(-3.0, 3.0)),
+        crank_phase=draw(st.floats(-3.0, 3.0)),
+        branch=draw(st.sampled_from([1, -1])),
+    )
+
+
+@settings(max_examples=60, deadline=None)
+@given(turning())
+def test_cognates_trace_the_same_curve(linkage: Linkage) -> None:
+    phi = np.linspace(0.0, 2.0 * pi, 49)
+    path = linkage.path(phi)
+    if not np.isfinite(path).all() or linkage.least_transmission < 0.02:
+        return
+    same, at_a, at_g = cognates(linkage)
+    assert same.path(phi) == pytest.approx(path, abs=1e-9)
+    turned = {id(at_a): linkage.coupler_angle(phi), id(at_g): linkage.rocker_angle(phi)}
+    for cognate in (at_a, at_g):
+        angle = turned[id(cognate)]
+        if cognate.turns_fully and np.abs(np.diff(angle)).min() > 0.0:
+            assert cognate.path(angle - angle[0]) == pytest.approx(path, abs=1e-7)
+    # the three stand on three pivots, of which each has two
+    assert (at_a.pivot_x, at_a.pivot_y) == pytest.approx((linkage.pivot_x, linkage.pivot_y), abs=1e-12)
+    assert (at_g.pivot_x, at_g.pivot_y) == pytest.approx((same.pivot_x, same.pivot_y), abs=1e-9)
+
+
+def test_alternatives_of_a_timed_path() -> None:
+    phi = np.linspace(0.0, 2.0 * pi, 24, endpoint=False)
+    task = TimedPath(points=FOUR_BAR.path(phi), rotation=phi)
+    (other,) = alternatives(Solution.of(task, FOUR_BAR))
+    assert other.error < 1e-25
+    assert other.verdicts.sound
+    assert other.linkage.pivot_x != pytest.approx(FOUR_BAR.pivot_x, abs=1e-3)
+
+
+def test_alternatives_of_an_open_path() -> None:
+    """Each is judged as it is driven; one that is sound runs through the points in their order."""
+    rotation = np.linspace(0.2, 1.4, 15)
+    task = UntimedPath(path=TargetPath(points=FOUR_BAR.path(rotation), closed=False))
+    found = alternatives(Solution.of(task, FOUR_BAR, rotation))
+    assert len(found) == 3
+    for one in found:
+        if one.verdicts.sound:
+            assert exact_at(one) < 1e-5
+    assert sum(one.verdicts.sound for one in found) >= 2
+
+
+def test_alternatives_of_a_closed_path_turn_fully() -> None:
+    points = FOUR_BAR.path(np.linspace(0.0, 2.0 * pi, 72, endpoint=False))
+    task = UntimedPath(path=TargetPath(points=points, closed=True))
+    own = Solution.of(task, FOUR_BAR)
+    found = alternatives(own)
+    assert found
+    for one in found:
+        assert one.linkage.turns_fully
+        assert one.error == pytest.approx(own.error, rel=1e-6)
+
+
+def test_what_has_no_cognates() -> None:
+    task = RockerFunction(angle=[1.0, 1.2, 1.3], rotation=[0.0, 0.2, 0.4])
+    with pytest.raises(InputError, match="share the coupler's curve"):
+        alternatives(Solution.of(task, FOUR_BAR))
+    with pytest.raises(ParameterError, match="point_distance"):
+        cognates(Linkage(**FOUR_BAR.values() | {"point_distance": 0.0}))
