@@ -205,7 +205,7 @@ def closed_form_pictures() -> Iterator[Picture]:
 
     for name, count in (("five-poses", 6), ("four-poses", 1)):
         case = load_synthesis_case(HERE.parent / "examples" / f"{name}.toml")
-        yield name, plot(guidance(case.task, count), title=case.title), 80
+        yield name, plot(guidance(case.task, count), title=case.title), 72
 
 
 def slider_crank_pictures() -> Iterator[Picture]:

@@ -195,6 +195,12 @@ def test_the_page_of_the_slider_crank_runs_and_says_what_is_so(tmp_path):
         assert (tmp_path / name).exists()
 
 
+def test_the_page_of_linkages_in_closed_form_runs_and_says_what_is_so(tmp_path):
+    commands, checked, _ = run_page("closed-form.md", tmp_path)
+    assert (commands, checked) == (4, 2)
+    assert (tmp_path / "out/poses.png").exists()
+
+
 @pytest.mark.slow
 def test_the_page_of_several_machines_runs_and_says_what_is_so(tmp_path):
     pytest.importorskip("distributed")
@@ -203,7 +209,11 @@ def test_the_page_of_several_machines_runs_and_says_what_is_so(tmp_path):
 
 
 def test_pictures_of_the_documentation_are_small():
-    pictures = [picture for name in ("hand-drawn", "slider-crank") for picture in (ROOT / "docs").glob(f"{name}*.png")]
+    pictures = [
+        picture
+        for name in ("hand-drawn", "slider-crank", "four-poses", "five-poses")
+        for picture in (ROOT / "docs").glob(f"{name}*.png")
+    ]
     assert pictures
     for picture in pictures:
         assert picture.stat().st_size < 150_000, picture.name

@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from math import pi, radians, sqrt
+from pathlib import Path
 
 import numpy as np
 import pytest
+from click.testing import CliRunner, Result
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy.optimize import root
 
+from analysis import cli, figures
 from analysis.synthesis import (
     Guidance,
     GuidanceMap,
@@ -32,6 +36,7 @@ from analysis.synthesis import (
 from linkwork.errors import InputError, ParameterError
 
 FloatArray = NDArray[np.float64]
+EXAMPLES = Path(__file__).parents[2] / "examples"
 
 
 def random_poses(seed: int, n: int) -> PrecisionPoints:
@@ -351,3 +356,71 @@ def test_what_has_no_cognates() -> None:
         alternatives(Solution.of(task, FOUR_BAR))
     with pytest.raises(ParameterError, match="point_distance"):
         cognates(Linkage(**FOUR_BAR.values() | {"point_distance": 0.0}))
+
+
+# The command
+
+POSES = '[task]\nkind = "precision-points"\nunit = "mm"\npoints = {points}\nangle = {angle}\n'
+
+
+@pytest.fixture
+def linkwork(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., Result]:
+    monkeypatch.chdir(tmp_path)
+    return lambda *arguments: CliRunner().invoke(cli.main, ["exact", *map(str, arguments)], catch_exceptions=False)
+
+
+def test_command_of_five_poses(linkwork: Callable[..., Result], tmp_path: Path) -> None:
+    result = linkwork(EXAMPLES / "five-poses.toml", "--no-plots")
+    assert result.exit_code == 0
+    assert "6 four-bars, driven from either side: 7 of 12 sound" in result.output
+    assert {p.name for p in (tmp_path / "out").iterdir()} - {".linkwork"} == {
+        "solutions.csv", "best-curve.csv", "best-report.txt", "best.dxf", "best.svg"
+    }  # fmt: skip
+    rows = (tmp_path / "out" / "solutions.csv").read_text().splitlines()
+    assert len(rows) == 13
+
+
+def test_command_where_none_is_sound(linkwork: Callable[..., Result], tmp_path: Path) -> None:
+    task = random_poses(0, 5)
+    text = POSES.format(points=np.asarray(task.points).tolist(), angle=np.asarray(task.angle).tolist())
+    (tmp_path / "case.toml").write_text(text)
+    result = linkwork("case.toml", "--no-plots")
+    assert result.exit_code == cli.ENDED_EARLY
+    assert "no sound four-bar exists" in result.output
+    assert not (tmp_path / "out" / "best.dxf").exists()
+
+
+def test_command_of_a_function(linkwork: Callable[..., Result]) -> None:
+    result = linkwork(EXAMPLES / "sine-function.toml", "--no-plots")
+    assert result.exit_code == 0
+    assert "1 four-bar through the 5 points: 1 sound" in result.output
+    result = linkwork(EXAMPLES / "sine-function.toml", "--set", "task.n=4", "--crank-phase", "100 deg", "--no-plots")
+    assert "through the 4 points" in result.output
+    result = linkwork(EXAMPLES / "sine-function.toml", "--set", "task.n=6")
+    assert result.exit_code == cli.WRONG
+    assert "Leave points out" in result.output
+
+
+def test_pictures_show_every_dyad_and_linkage() -> None:
+    found = guidance(random_poses(1, 5))
+    assert isinstance(found, Guidance)
+    figure = figures.plot(found, title="five")
+    assert len(figure.axes) >= 1 + len(found.solutions)
+    titles = [axis.get_title() for axis in figure.axes]
+    for number, solution in enumerate(found.solutions, start=1):
+        (title,) = (t for t in titles if t.startswith(f"{number}: "))
+        for defect in solution.verdicts.defects:
+            assert defect.removesuffix(" defect") in title
+    dyads = [line for line in figure.axes[0].lines if str(line.get_label()).startswith("dyad")]
+    for dyad, line in zip(found.dyads, dyads, strict=True):
+        ends = line.get_xydata() @ np.array([1.0, 1j])  # type: ignore[operator]
+        assert ends == pytest.approx(1e3 * np.array([dyad.pivot, dyad.point]))
+
+
+def test_picture_of_four_poses_shows_which_pairs_are_sound() -> None:
+    found = guidance(random_poses(3, 4), count=1)
+    assert isinstance(found, GuidanceMap)
+    figure = figures.plot(found)
+    shown = figure.axes[1].images[0].get_array()
+    assert shown is not None
+    assert (np.ma.getmaskarray(shown) == ~found.sound).all()
