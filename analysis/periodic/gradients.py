@@ -8,9 +8,9 @@ Springer 2004, chapter 10. All derivatives are exact, up to the resolution of th
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields
-from functools import cache, cached_property
+from functools import cache, cached_property, partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -24,18 +24,18 @@ from ..files import unknown_name
 from ..mechanisms import Parameters, mechanism_of
 from ..numerics import symbolic
 from ..run.equations import of_parameters
-from .branches import Family, SpecialPoint
+from .branches import Family, SpecialPoint, orbit_from
 from .drives import Drive
 from .floquet import Crossing
-from .orbits import PeriodicOrbit, orbit_of
+from .orbits import PeriodicOrbit, orbit_of, period_from
 from .planes import require_variable, value_of, variable_names, with_values
 from .resonance import Extremum
 from .variations import Place, Variations
 
 FloatArray = NDArray[np.float64]
 
-#: Newton's steps to a resonance at most, and the step, relative to the parameter, that is the last.
-_STEPS, _LAST = 12, 1e-9
+#: Newton's steps to a special point at most, the step that is the last, and how far it may be, relative to the parameter.
+_STEPS, _LAST, _FAR = 12, 1e-7, 0.25
 #: Product of unit eigenvectors below which a multiplier is a double one, and has no derivative.
 _DOUBLE = 1e-6
 
@@ -267,22 +267,16 @@ class MotionGradient:
 
     def _extreme(self, numbers: list[int], sign: float) -> Gradient:
         """Of the greatest (sign 1) or least (-1) of an output, or of the greatest modulus (0) of one or several together."""
-        v, values = self.variations, self._outputs[..., numbers]
-        size = sign * values[..., 0] if sign else np.sqrt((values**2).sum(axis=-1))
-        if sign == 0.0 and len(numbers) == 1:
-            # a modulus has a corner where its output is zero
-            chosen = max((1.0, -1.0), key=lambda s: v.greatest(s * values[..., 0])[0])
-            size = chosen * values[..., 0]
-        value, place = v.greatest(size)
-        by = np.zeros((len(place.weights), len(self.names)))
+        values = self._outputs[..., numbers]
+        value, place = self.variations.greatest(sign * values[..., 0] if sign else values)
+        by = np.zeros(len(self.names))
         for column, number in enumerate(numbers):
-            by_y, by_constant = v.output_derivatives(place.panel, number)
+            by_y, by_constant = self.variations.output_derivatives(place.panel, number)
             change = np.einsum("sn,snm->sm", by_y, self._solution[0][place.panel]) + by_constant @ self.along
-            # the modulus of one output is the output itself, with its sign
-            share = values[place.panel, :, column] / size[place.panel]
-            by += share[:, None] * change if len(numbers) > 1 else np.sign(share)[:, None] * change
-        one = sign or 1.0
-        return self._gradient(one * value, one * (place.weights @ by))
+            # where a value is greatest its place does not count
+            share = sign or place.weights @ values[place.panel, :, column] / value
+            by += share * (place.weights @ change)
+        return self._gradient(value, by) if sign == 0.0 else self._gradient(sign * value, sign * by)
 
     # Stability
 
@@ -315,15 +309,25 @@ class MotionGradient:
         order = [int(np.abs(values - value).argmin()) for value in self.orbit.multipliers]
         return np.asarray(found[order])
 
+    def test(self, kind: Crossing) -> Gradient:
+        """Of a function that is zero where a multiplier crosses the unit circle in this way: see `crossing_test`.
+
+        It is smooth where two multipliers meet too, as their moduli are not.
+        """
+        matrix, by = _singular(self.orbit.monodromy, self.monodromy, kind)
+        total = np.zeros(len(self.names))
+        for column in range(len(matrix)):
+            # the determinant is linear in each column
+            replaced = np.repeat(matrix[None], len(self.names), axis=0)
+            replaced[:, :, column] = by[:, column].T
+            total += np.linalg.det(replaced)
+        return self._gradient(float(np.linalg.det(matrix)), total)
+
     @property
     def largest(self) -> Gradient:
         """Of the modulus of the largest multiplier."""
-        return self.modulus(0)
-
-    def modulus(self, number: int) -> Gradient:
-        """Of the modulus of a multiplier, by its number among the orbit's."""
-        value = self.orbit.multipliers[number]
-        return self._gradient(abs(value), np.real(np.conj(value) * self.multipliers[number]) / abs(value))
+        value = self.orbit.multipliers[0]
+        return self._gradient(abs(value), np.real(np.conj(value) * self.multipliers[0]) / abs(value))
 
 
 def motion_gradient(orbit: PeriodicOrbit, names: Sequence[str] | None = None) -> MotionGradient:
@@ -399,16 +403,7 @@ def extremum_gradient(orbit: PeriodicOrbit, along: str, names: Sequence[str] | N
     LinkworkError
         If there is no extremum near the motion.
     """
-    for _ in range(_STEPS):
-        motion = MotionGradient(orbit, (along,))
-        value, second = float(motion.values[0]), motion.amplitude_curvature(along)
-        step = -motion.amplitude[along] / second[along]
-        if not abs(step) < 0.1 * abs(value):
-            break
-        if abs(step) <= _LAST * abs(value):
-            return _extremum(orbit, along, names)
-        orbit = _near(orbit, along, value + step, motion.start[:, 0] * step)
-    raise LinkworkError(f"no extremum of the amplitude over {along} was found near {value:.9g}")
+    return _extremum(_located(orbit, along, _to_extremum, "extremum of the amplitude"), along, names)
 
 
 def crossing_gradient(
@@ -419,7 +414,7 @@ def crossing_gradient(
     Parameters
     ----------
     orbit : PeriodicOrbit
-        The motion with a multiplier on the unit circle.
+        A motion near to it: Newton's method leads from it to where a multiplier is on the unit circle.
     kind : Crossing
     along : str
         FMI name of the parameter along which it moves.
@@ -428,9 +423,11 @@ def crossing_gradient(
     Raises
     ------
     LinkworkError
-        If the place has no derivative: the boundary is parallel to the parameter, two folds meet, or a branch is crossed.
+        If there is no such point near the motion, or its place has no derivative: the boundary is parallel to the parameter,
+        two folds meet, or a branch is crossed.
     """
     others = _others(orbit, along, names)
+    orbit = _located(orbit, along, _to_fold if kind is Crossing.FOLD else partial(_to_crossing, kind=kind), kind.value)
     motion = MotionGradient(orbit, (*others, along))
     test = _test(motion, kind)
     if not abs(test[-1]) * abs(motion.values[-1]) > 1e-9 * float(np.abs(test * motion.values).max()):
@@ -461,8 +458,8 @@ def boundary_gradient(orbit: PeriodicOrbit, kind: Crossing, names: Sequence[str]
     Returns
     -------
     Gradient
-        Of a function that is zero on the boundary: of a period doubling or torus point the multiplier's modulus less one; of a
-        fold the shift of the map over a period along the left eigenvector.
+        Of a function that is zero on the boundary: of a period doubling or torus point `MotionGradient.test`; of a fold the
+        shift of the map over a period along the left eigenvector.
     """
     motion = MotionGradient(orbit, names)
     return Gradient(value=0.0, names=motion.names, by=_test(motion, kind), at=motion.values)
@@ -474,9 +471,68 @@ def _others(orbit: PeriodicOrbit, along: str, names: Sequence[str] | None) -> tu
     return tuple(name for name in names if name != along)
 
 
-def _near(orbit: PeriodicOrbit, along: str, value: float, step: FloatArray) -> PeriodicOrbit:
-    parameters, drive = with_values(orbit.parameters, orbit.drive, {along: value})
-    return orbit_of(parameters, drive, turns=orbit.turns, start=orbit.start + step, settle=False)
+#: One of Newton's steps from a motion to a special point along a parameter: of the start and of the parameter.
+_Step = Callable[[MotionGradient], tuple[FloatArray, float]]
+
+
+def _located(orbit: PeriodicOrbit, along: str, step_of: _Step, what: str) -> PeriodicOrbit:
+    """The motion at the special point near a motion, by Newton's method.
+
+    Raises
+    ------
+    LinkworkError
+        If Newton's method goes elsewhere.
+    """
+    begun = value_of(orbit.parameters, orbit.drive, along)
+    for _ in range(_STEPS):
+        motion = MotionGradient(orbit, (along,))
+        change, step = step_of(motion)
+        value = float(motion.values[0]) + step
+        if not abs(value - begun) < _FAR * abs(begun):
+            break
+        parameters, drive = with_values(orbit.parameters, orbit.drive, {along: value})
+        start = orbit.start + change
+        if step_of is _to_fold:
+            orbit = orbit_from(
+                parameters, drive, start, orbit.turns, period_from(parameters, drive, start, orbit.turns)
+            )
+        else:
+            orbit = orbit_of(parameters, drive, turns=orbit.turns, start=start, settle=False)
+        if abs(step) <= _LAST * abs(value):
+            return orbit
+    raise LinkworkError(f"no {what} along {along} was found near {begun:.9g}")
+
+
+def _to_extremum(motion: MotionGradient) -> tuple[FloatArray, float]:
+    (along,) = motion.names
+    step = -motion.amplitude[along] / motion.amplitude_curvature(along)[along]
+    return motion.start[:, 0] * step, step
+
+
+def _to_crossing(motion: MotionGradient, kind: Crossing) -> tuple[FloatArray, float]:
+    test = motion.test(kind)
+    step = -test.value / float(test.by[0])
+    return motion.start[:, 0] * step, step
+
+
+def _to_fold(motion: MotionGradient) -> tuple[FloatArray, float]:
+    """To where the map over a period has a fixed point and the least singular value of its derivative less one is zero."""
+    v, n, orbit = motion.variations, len(motion.orbit.start), motion.orbit
+    left, right = _null_vectors(v)
+    by_y, by_constant = v.second(v.fundamental @ right)
+    # of the motion, by its start and by the parameter
+    columns = np.concatenate([v.fundamental, v.from_start(np.zeros((n, 1)), motion.forcing)], axis=-1)
+    along = np.hstack([np.zeros((len(motion.along), n)), motion.along])
+    matrix = np.vstack(
+        [
+            np.hstack([v.monodromy - np.eye(n), v.after(motion.forcing)]),
+            left @ v.after(by_y @ columns + by_constant @ along),
+        ]
+    )
+    shift = period_from(orbit.parameters, orbit.drive, orbit.start, orbit.turns).shift
+    test = left @ (v.monodromy - np.eye(n)) @ right
+    step = np.linalg.solve(matrix, -np.append(shift, test))
+    return step[:n], float(step[n])
 
 
 def _extremum(orbit: PeriodicOrbit, along: str, names: Sequence[str] | None) -> PointGradient:
@@ -498,13 +554,22 @@ def _test(motion: MotionGradient, kind: Crossing) -> FloatArray:
     if kind is Crossing.FOLD:
         left, _ = _null_vectors(motion.variations)
         return left @ motion.variations.after(motion.forcing)
-    values = motion.orbit.multipliers
-    if kind is Crossing.PERIOD_DOUBLING:
-        return motion.modulus(int(np.abs(values + 1.0).argmin())).by
-    off = np.where(values.imag == 0.0, np.inf, np.abs(np.abs(values) - 1.0))
-    if not np.isfinite(off).any():
-        raise LinkworkError(f"the multipliers {values} are real: there is no torus point")
-    return motion.modulus(int(off.argmin())).by
+    return motion.test(kind).by
+
+
+def _singular(matrix: FloatArray, by: FloatArray, kind: Crossing) -> tuple[FloatArray, FloatArray]:
+    """A matrix that is singular at a crossing, and its derivatives, from the monodromy matrix and its: (n, n), (n, n, m)."""
+    if kind is not Crossing.TORUS:
+        sign = 1.0 if kind is Crossing.FOLD else -1.0
+        return np.eye(len(matrix)) - sign * matrix, -sign * by
+    # the second compound matrix has the products of two multipliers as eigenvalues
+    i, j = np.triu_indices(len(matrix), 1)
+
+    def minors(a: FloatArray, b: FloatArray) -> FloatArray:
+        return a[np.ix_(i, i)] * b[np.ix_(j, j)] - a[np.ix_(i, j)] * b[np.ix_(j, i)]
+
+    whole = matrix[:, :, None]
+    return minors(matrix, matrix) - np.eye(len(i)), minors(by, whole) + minors(whole, by)
 
 
 def _null_vectors(v: Variations) -> tuple[FloatArray, FloatArray]:

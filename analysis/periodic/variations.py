@@ -11,6 +11,7 @@ traced from the equations.
 from __future__ import annotations
 
 from functools import cache
+from math import sqrt
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -37,18 +38,21 @@ FloatArray = NDArray[np.float64]
 #: Gauss's points of a panel; panels of a turn to begin with; how often a panel is halved at most; size of the last
 #: coefficients of the rates and their derivatives over a panel, in the scale of y, above which it is.
 _POINTS, _PANELS, _HALVINGS, _RESOLVED = 8, 32, 16, 1e-10
+#: Imaginary part below which a root is a real one.
+_REAL = 1e-9
 #: Difference of the monodromy matrix from that of the orbit, relative to its greatest entry, above which something is wrong.
 _AGREES = 1e-6
 
 
 class _Gauss(NamedTuple):
     """Gauss's points on a panel of length 1: nodes, weights, the integrals from 0 to the nodes, and from values at the
-    nodes to the coefficients of Legendre's polynomials on -1 to 1."""
+    nodes to the coefficients of Legendre's polynomials on -1 to 1; these polynomials on a grid with both ends."""
 
     nodes: FloatArray
     weights: FloatArray
     integrals: FloatArray
     coefficients: FloatArray
+    grid: FloatArray
 
 
 @cache
@@ -57,7 +61,8 @@ def _gauss() -> _Gauss:
     coefficients: FloatArray = np.linalg.inv(legendre.legvander(nodes, _POINTS - 1)).astype(float)
     antiderivative = legendre.legint(np.eye(_POINTS), lbnd=-1.0, axis=0)
     integrals = 0.5 * legendre.legvander(nodes, _POINTS) @ antiderivative @ coefficients
-    return _Gauss(0.5 * (nodes + 1.0), 0.5 * weights, integrals, coefficients)
+    grid: FloatArray = legendre.legvander(np.linspace(-1.0, 1.0, 4 * _POINTS + 1), _POINTS - 1).astype(float)
+    return _Gauss(0.5 * (nodes + 1.0), 0.5 * weights, integrals, coefficients, grid)
 
 
 class Place(NamedTuple):
@@ -268,19 +273,28 @@ class Variations:
         return float(legendre.legval(position, series) * 2.0 / self.h[panel])
 
     def greatest(self, values: FloatArray) -> tuple[float, Place]:
-        """The greatest value over the period of what has the values (k, s) at the nodes, and its place."""
-        coefficients = values @ _gauss().coefficients.T
-        grid = np.linspace(-1.0, 1.0, 4 * _POINTS + 1)
-        panel, near = np.unravel_index(
-            int((coefficients @ legendre.legvander(grid, _POINTS - 1).T).argmax()), (len(self.h), len(grid))
-        )
-        series = coefficients[panel]
-        roots = legendre.legroots(legendre.legder(series)) if np.any(series[1:]) else np.zeros(0)
-        real = roots[np.abs(roots.imag) < 1e-9].real if len(roots) else np.zeros(0)
-        places = np.append(np.clip(real[np.abs(real) < 1.0 + 1e-3], -1.0, 1.0), grid[near])
-        position = float(places[legendre.legval(places, series).argmax()])
-        weights = legendre.legvander(np.array([position]), _POINTS - 1)[0] @ _gauss().coefficients
-        return float(legendre.legval(position, series)), Place(int(panel), position, weights)
+        """The greatest value over the period of what has the values (k, s) at the nodes, and its place.
+
+        Of vectors, shape (k, s, c), the greatest modulus.
+        """
+        gauss, vectors = _gauss(), values.ndim == 3
+        coefficients = np.einsum("is,ks...->ki...", gauss.coefficients, values)
+        on_grid = np.einsum("gi,ki...->kg...", gauss.grid, coefficients)
+        first = int(((on_grid**2).sum(axis=-1) if vectors else on_grid).max(axis=1).argmax())
+        found = []
+        # next to an end of a panel the rounding decides which one it is
+        for panel in (first - 1, first, (first + 1) % len(self.h)):
+            series = coefficients[panel]
+            if vectors:
+                series = sum(legendre.legmul(part, part) for part in series.T)
+            turning = legendre.legroots(legendre.legder(series)) if np.any(series[1:]) else np.zeros(0)
+            real = turning[np.abs(turning.imag) < _REAL].real
+            places = np.append(real[np.abs(real) < 1.0], [-1.0, 1.0])
+            there = legendre.legval(places, series)
+            found.append((float(there.max()), panel % len(self.h), float(places[there.argmax()])))
+        value, panel, position = max(found)
+        weights = legendre.legvander(np.array([position]), _POINTS - 1)[0] @ gauss.coefficients
+        return sqrt(value) if vectors else value, Place(panel, position, weights)
 
     def outputs(self) -> FloatArray:
         """All outputs at the nodes, shape (k, s, outputs)."""
