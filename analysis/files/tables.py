@@ -85,18 +85,21 @@ def _bar(what: str, count: int) -> Iterator[Callable[[int], None]]:
 
 
 def cell(text: str) -> str:
-    """A text as a cell of a CSV file: quoted where it has to be, and harmless to a spreadsheet.
+    """A text as a cell of a CSV file: in one line, quoted where it has to be, and harmless to a spreadsheet.
 
-    What begins like a formula gets an apostrophe before it, which spreadsheets take for the mark of a text; numbers stay.
+    What begins like a formula, blanks before it left aside, gets an apostrophe before it, which spreadsheets take for the mark
+    of a text; numbers stay.
     """
-    if text.startswith(_FORMULA) and not is_number(text):
-        text = f"'{text}"
     text = " ".join(text.splitlines())
-    return '"{}"'.format(text.replace('"', '""')) if "," in text or '"' in text else text
+    if text.lstrip().startswith(_FORMULA) and not is_number(text):
+        text = f"'{text}"
+    return '"{}"'.format(text.replace('"', '""')) if any(mark in text for mark in _SPLITTING) else text
 
 
 #: What a cell begins with that a spreadsheet executes.
-_FORMULA = tuple("=+-@\t\r")
+_FORMULA = tuple("=+-@")
+#: What ends a cell, here or in a spreadsheet of another country.
+_SPLITTING = ',;\t"'
 
 
 def read_csv(path: str | Path) -> NDArray[np.float64]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import doctest
 import os
 import re
@@ -292,6 +293,48 @@ def test_an_empty_csv_is_refused_in_a_sentence(tmp_path, text):
     (tmp_path / "x.csv").write_text(text)
     with pytest.raises(InputError, match=r"x\.csv has no numbers: it must have a header line and rows"):
         read_csv(tmp_path / "x.csv")
+
+
+@pytest.mark.parametrize(
+    ("text", "written"),
+    [
+        ("crank.angle [rad]", "crank.angle [rad]"),
+        ("=1+1", "'=1+1"),
+        ("+1+1", "'+1+1"),
+        ("-1+1", "'-1+1"),
+        ("@SUM(A1)", "'@SUM(A1)"),
+        ("\t=1+1", '"\'\t=1+1"'),
+        ("\r=1+1", "' =1+1"),
+        ("\n =1+1", "'  =1+1"),
+        ("=", "'="),
+        ("-1.5e3", "-1.5e3"),
+        ("+2", "+2"),
+        (" -2", " -2"),
+        ("a=1-b", "a=1-b"),
+        ("fx, fy", '"fx, fy"'),
+        ("x;=1+1", '"x;=1+1"'),
+        ("x\t=1+1", '"x\t=1+1"'),
+        ('the "best"', '"the ""best"""'),
+        ('=HYPERLINK("x","y")', '"\'=HYPERLINK(""x"",""y"")"'),
+        ("two\nlines\rof\r\ntext", "two lines of text"),
+    ],
+)
+def test_a_cell_is_harmless_in_a_spreadsheet(text, written):
+    assert tables.cell(text) == written
+
+
+@given(st.text())
+def test_no_text_becomes_a_formula_or_more_than_a_cell(content):
+    rows = list(csv.reader([tables.cell(content), tables.cell("=" + content)]))
+    for (cell,) in [row or [""] for row in rows]:
+        assert not cell.lstrip().startswith(tuple("=+-@")) or float(cell) is not None
+    assert rows[1][0].startswith("'=")
+
+
+def test_headers_are_harmless_and_read_back(tmp_path):
+    path = write_csv(tmp_path / "x.csv", {"=cmd|'/c calc'!A1": [1.0], "a, b": [2.0], "-3": [4.0]})
+    assert path.read_text().splitlines()[0] == "'=cmd|'/c calc'!A1,\"a, b\",-3"
+    assert list(read_rows(path)[0]) == ["'=cmd|'/c calc'!A1", "a, b", "-3"]
 
 
 def test_blocks_make_the_same_file_as_one(tmp_path, monkeypatch):
