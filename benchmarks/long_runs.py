@@ -5,6 +5,7 @@
     python -m benchmarks.long_runs times
     python -m benchmarks.long_runs angles
     python -m benchmarks.long_runs fmu
+    python -m benchmarks.long_runs built
 
 Both mechanisms without damping, drive and load, set going: what they have of energy they keep. Residuals are relative to the
 kinetic energy at the start.
@@ -13,16 +14,21 @@ kinetic energy at the start.
 from __future__ import annotations
 
 import argparse
+import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from itertools import product
 from math import fmod, pi
+from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from analysis import Inputs, simulate
+from analysis import Inputs, cosimulate, simulate
+from analysis.export import NATIVE, NATIVE_FMI3, build, build_native
 from analysis.mechanisms import MECHANISMS
 from analysis.run import Harmonics, ramp, table
 from linkwork.five_bar.published import TABLE_3_1, InitialState
@@ -63,7 +69,8 @@ def free_run(mechanism: str, turns: float, *, begun: float = 0.0, **options: Any
     """
     parameters, start, speed = FREE[mechanism]
     start = replace(start, crank_angle=2.0 * pi * begun)
-    run = simulate(parameters, initial=start, samples=np.linspace(0.0, turns * 2.0 * pi / speed, 101), **options)
+    samples = np.linspace(0.0, turns * 2.0 * pi / speed, 101)
+    run = simulate(parameters, initial=start, samples=samples, max_steps=10**10, **options)
     if run.status:
         raise RuntimeError(run.message)
     residual = float(np.abs(run["energy.residual"]).max() / run["energy.kinetic"][0])
@@ -94,6 +101,28 @@ def plant_run(mechanism: str, *, time: float = 0.0, begun: float = 0.0, toleranc
     return plant.outputs()[names.index("energy.residual")] / kinetic, plant.state[0] - start.crank_angle
 
 
+def late_fmu(
+    file: str | Path, mechanism: str, step: float, interface: str = "co-simulation", late: float = LATE
+) -> tuple[float, float]:
+    """512 steps of a built FMU from ``late`` on beside those from zero.
+
+    Returns
+    -------
+    angle, position : float
+        Largest differences of the crank's angle (rad) and of the slider's position (m).
+    """
+    parameters, start, _ = FREE[mechanism]
+    options = {"initial": start, "step": step, "interface": interface}
+    runs = [cosimulate(file, parameters, start_time=t0, stop_time=t0 + 512 * step, **options) for t0 in (0.0, late)]
+    for run in runs:
+        if run.status:
+            raise RuntimeError(run.message)
+    angle, position = (
+        float(np.abs(runs[1][name] - runs[0][name]).max()) for name in ("crank.angle", "slider.position")
+    )
+    return angle, position
+
+
 def turns_table(turns: float, tolerances: Sequence[float] = TOLERANCES) -> Table:
     """Energy and angle after many turns; the angle beside that of the balanced method at the tightest tolerance."""
     out = Table("mechanism", "tolerance", "method", "energy residual", "angle, off (rad)", title=f"{turns:g} turns")
@@ -104,7 +133,9 @@ def turns_table(turns: float, tolerances: Sequence[float] = TOLERANCES) -> Table
                 residual, angle = free_run(mechanism, turns, method=method, tolerance=tolerance)
                 off = "" if reference is None else f"{abs(angle - reference):.1e}"
                 reference = angle if reference is None else reference
-                out.add_row(mechanism, f"{tolerance:g}", method, f"{residual:.1e}", off)
+                row = (mechanism, f"{tolerance:g}", method, f"{residual:.1e}", off)
+                print(*row, file=sys.stderr)  # a million turns take minutes a row
+                out.add_row(*row)
     return out
 
 
@@ -143,7 +174,24 @@ def fmu_table() -> Table:
     return out
 
 
-TABLES = {"turns": turns_table, "times": times_table, "angles": angles_table, "fmu": fmu_table}
+def built_table() -> Table:
+    """Every kind of FMU, built and run through FMPy, from 1e9 s on."""
+    out = Table(
+        "FMU", "interface", "step", "angle, difference (rad)", "slider (m)", title=f"512 steps from {LATE:g} s on"
+    )
+    with TemporaryDirectory() as folder:
+        for mechanism, made in MECHANISMS.items():
+            files = [build(made, folder), *(build_native(made, kind, folder) for kind in (NATIVE, NATIVE_FMI3))]
+            for file, interface in product(files, ("co-simulation", "model-exchange")):
+                if file is files[0] and interface == "model-exchange":
+                    continue  # the Python FMU has none
+                for step in (2.0**-10, 1e-3):
+                    angle, position = late_fmu(file, mechanism, step, interface)
+                    out.add_row(file.name, interface, f"{step:g} s", f"{angle:.1e}", f"{position:.1e}")
+    return out
+
+
+TABLES = {"turns": turns_table, "times": times_table, "angles": angles_table, "fmu": fmu_table, "built": built_table}
 
 
 def main() -> None:

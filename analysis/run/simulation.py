@@ -51,13 +51,14 @@ def sample_times(stop_time: Amount, step: Amount, start_time: Amount = 0.0) -> N
             "taken where LINKWORK_MAX_SAMPLES in the environment is greater"
         )
     apart = ulp(max(abs(start_time), abs(stop_time)))
-    if step < apart:
+    if step < 2.0 * apart:
         raise InputError(
-            f"step is {step} s, but floating-point times near {stop_time:g} s are {apart:.3g} s apart: it must be greater"
+            f"step is {step} s, but floating-point times near {stop_time:g} s are {apart:.3g} s apart: it must be at least "
+            "twice that"
         )
     whole = round(ratio)
-    # what is left over, but for rounding, makes a last, shorter step
-    count = whole if whole > 0 and abs(ratio - whole) <= 1e-6 else int(ratio) + 1
+    # what is left over, but for rounding, at a late time that of the times, makes a last, shorter step
+    count = whole if whole > 0 and abs(ratio - whole) <= max(1e-6, apart / step) else int(ratio) + 1
     times: NDArray[np.float64] = start_time + step * np.arange(count + 1, dtype=float)
     times[-1] = stop_time
     return times
