@@ -84,7 +84,7 @@ def main() -> None:
     parser.add_argument("places", nargs="*", default=SETTINGS["default"])
     parser.add_argument("--sample", type=int)
     arguments = parser.parse_args()
-    console, sound = Console(), set[str]()
+    console, sound = Console(emoji=False), set[str]()
     modules = [
         module.relative_to(ROOT)
         for place in map(ROOT.joinpath, arguments.places)

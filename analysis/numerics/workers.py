@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import os
+import pickle
 import signal
+import tempfile
 import threading
 import time
 import warnings
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import BrokenExecutor
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
+from pathlib import Path
 from typing import Any, TypeVar
 
 from linkwork.errors import InputError, LinkworkError
@@ -19,6 +22,9 @@ Made = TypeVar("Made")
 
 #: How often workers are started anew after one was killed; as often does Dask give an item to another worker.
 RETRIES = 3
+
+#: Bytes of a pickled result that go through the pipe itself: with what joblib adds, less than POSIX has a pipe take in one piece.
+_PIECE = 2048
 
 _WATCHED: set[int] = set()
 #: Seconds between two looks at who the caller is.
@@ -117,59 +123,63 @@ def over_workers(
 
     Notes
     -----
-    A process of this machine that is killed just while it hands over a result larger than a pipe holds, 64 KiB, is not noticed
-    by joblib's own processes: the iteration waits until Ctrl-C. A Dask cluster notices.
+    Processes of this machine hand over what is large in files: joblib would wait for ever for the end of a message whose sender
+    was killed within it.
     """
     import joblib
 
     _, elsewhere = _workers(n_jobs, threads)
     listening = Heard() if heard is None else heard
     todo = dict(enumerate(items))
-    for attempt in range(RETRIES + 1):
-        results: Any = joblib.Parallel(
-            n_jobs=n_jobs, prefer="threads" if threads else None, return_as="generator_unordered"
-        )(
-            # in a tuple: Dask would keep a larger argument on one worker alone, and lose it with that
-            joblib.delayed(_one)((work, number, item, os.getpid()))
-            for number, item in tuple(todo.items())
-        )
-        try:
-            while todo:
-                listening.waiting = elsewhere
-                try:
-                    number, made, error = next(results)
-                finally:
-                    listening.waiting = False
-                if error is not None:
-                    raise _OfWork(error)
-                del todo[number]
-                yield number, made
-            return
-        except KeyboardInterrupt:  # of this process, or of a worker
-            if heard is None:
-                raise
-            if not heard:
-                heard.append(True)
-            return
-        except _OfWork as caught:
-            raise caught.error from None
-        except LinkworkError:  # of what cannot be sent
-            raise
-        except BrokenExecutor as error:
-            if attempt == RETRIES:
-                raise WorkersLost(f"workers were killed {attempt + 1} times, as where memory runs out") from error
-            warnings.warn(
-                f"a worker was killed: {len(todo)} of {len(items)} parts are given out again",
-                RuntimeWarning,
-                stacklevel=2,
+    with tempfile.TemporaryDirectory(prefix="linkwork-", ignore_cleanup_errors=True) as folder:
+        for attempt in range(RETRIES + 1):
+            results: Any = joblib.Parallel(
+                n_jobs=n_jobs,
+                prefer="threads" if threads else None,
+                return_as="generator_unordered",
+                batch_size=1,  # many small results together would be a large message
+            )(
+                # in a tuple: Dask would keep a larger argument on one worker alone, and lose it with that
+                joblib.delayed(_one)((work, number, item, os.getpid(), folder))
+                for number, item in tuple(todo.items())
             )
-        except Exception as error:  # of any backend
-            raise WorkersLost(f"the workers failed: {type(error).__name__}: {error}") from error
-        finally:
-            with warnings.catch_warnings():
-                # that items were cancelled is what was asked for
-                warnings.filterwarnings("ignore", message=".*still being processed", category=UserWarning)
-                results.close()
+            try:
+                while todo:
+                    listening.waiting = elsewhere
+                    try:
+                        number, made, error = _taken(next(results))
+                    finally:
+                        listening.waiting = False
+                    if error is not None:
+                        raise _OfWork(error)
+                    del todo[number]
+                    yield number, made
+                return
+            except KeyboardInterrupt:  # of this process, or of a worker
+                if heard is None:
+                    raise
+                if not heard:
+                    heard.append(True)
+                return
+            except _OfWork as caught:
+                raise caught.error from None
+            except LinkworkError:  # of what cannot be sent
+                raise
+            except BrokenExecutor as error:
+                if attempt == RETRIES:
+                    raise WorkersLost(f"workers were killed {attempt + 1} times, as where memory runs out") from error
+                warnings.warn(
+                    f"a worker was killed: {len(todo)} of {len(items)} parts are given out again",
+                    RuntimeWarning,
+                    stacklevel=2,
+                )
+            except Exception as error:  # of any backend
+                raise WorkersLost(f"the workers failed: {type(error).__name__}: {error}") from error
+            finally:
+                with warnings.catch_warnings():
+                    # that items were cancelled is what was asked for
+                    warnings.filterwarnings("ignore", message=".*still being processed", category=UserWarning)
+                    results.close()
 
 
 class _OfWork(Exception):
@@ -180,14 +190,42 @@ class _OfWork(Exception):
         super().__init__()
 
 
-def _one(packed: tuple[Callable[[Item], Made], int, Item, int]) -> tuple[int, Made | None, Exception | None]:
-    """Number of an item, and its result or error."""
-    work, number, item, caller = packed
+#: Number of an item, and its result or error.
+_Found = tuple[int, Any, Exception | None]
+
+
+def _one(packed: tuple[Callable[[Item], Made], int, Item, int, str]) -> _Found | Path:
+    """What is found of an item, or the file that it is in."""
+    work, number, item, caller, folder = packed
     end_with(caller)
+    found: _Found
     try:
-        return number, work(item), None
+        found = number, work(item), None
     except Exception as error:  # to be told from those of the workers
-        return number, None, error
+        found = number, None, error
+    return _handed_over(found, Path(folder, str(number))) if os.getppid() == caller else found
+
+
+def _handed_over(found: _Found, path: Path) -> _Found | Path:
+    """What a process of this machine sends: a message that a pipe takes in one piece, as far as that can be had."""
+    try:
+        content = pickle.dumps(found)
+        if len(content) <= _PIECE:
+            return found
+        path.write_bytes(content)
+    except Exception:  # what cannot be pickled or written goes as joblib sends it
+        return found
+    return path
+
+
+def _taken(sent: _Found | Path) -> _Found:
+    """What was found, out of its file where it is in one."""
+    if not isinstance(sent, Path):
+        return sent
+    found: _Found = pickle.loads(sent.read_bytes())
+    with suppress(OSError):  # the folder goes with it at the end
+        sent.unlink()
+    return found
 
 
 def end_with(caller: int) -> None:

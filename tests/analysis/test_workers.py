@@ -13,6 +13,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import replace
 from functools import partial
+from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +22,7 @@ import numpy as np
 import pytest
 
 from analysis import Inputs, simulate_many
-from analysis.numerics.workers import WorkersLost, cores_of, interruptible, over_workers
+from analysis.numerics.workers import WorkersLost, _handed_over, cores_of, interruptible, over_workers
 from analysis.periodic import Drive, grid, plane
 from analysis.slider_crank import Tolerance, force_turn, monte_carlo
 from analysis.synthesis import Search, TargetPath, TimedPath, UntimedPath, synthesize
@@ -110,6 +111,62 @@ def test_what_a_killed_worker_had_is_done_again(tmp_path: Path) -> None:
     with pytest.warns(RuntimeWarning, match=r"a worker was killed: \d of 8 parts are given out again"):
         found = dict(over_workers(work, range(8), n_jobs=2))
     assert found == {n: n * n for n in range(8)}
+
+
+def large_in_pieces(value: int, caller: int, mark: Path) -> np.ndarray[Any, Any]:
+    """A large result; a worker that sends more than a pipe takes in one piece is killed half way, once."""
+    send = Connection._send  # type: ignore[attr-defined]
+
+    def halves(self: Connection, content: Any, *rest: Any) -> None:
+        if len(content) > 4096 and not mark.exists():
+            mark.touch()
+            send(self, bytes(content)[: len(content) // 2], *rest)
+            os.kill(os.getpid(), signal.SIGKILL)
+        send(self, content, *rest)
+
+    if os.getpid() != caller:
+        Connection._send = halves  # type: ignore[attr-defined]
+    return np.full(200_000, float(value))
+
+
+@pytest.mark.timeout(120)
+@pytest.mark.skipif(sys.platform == "win32", reason="pipes there send otherwise")
+def test_large_results_do_not_go_through_a_pipe_that_a_killed_worker_stops(tmp_path: Path) -> None:
+    work = partial(large_in_pieces, caller=os.getpid(), mark=tmp_path / "killed")
+    found = dict(over_workers(work, range(4), n_jobs=2))
+    assert {n: (made.size, made[0], made[-1]) for n, made in found.items()} == {n: (200_000, n, n) for n in range(4)}
+    assert not (tmp_path / "killed").exists()
+
+
+class KilledOnce:
+    """A result whose worker is killed while it is pickled."""
+
+    def __init__(self, caller: int, mark: Path) -> None:
+        self.caller, self.mark = caller, mark
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        if os.getpid() != self.caller and not self.mark.exists():
+            self.mark.touch()
+            os.kill(os.getpid(), signal.SIGKILL)
+        return KilledOnce, (self.caller, self.mark)
+
+
+def hand_over(_: int, caller: int, mark: Path) -> KilledOnce:
+    return KilledOnce(caller, mark)
+
+
+def test_a_worker_killed_as_it_hands_over_is_noticed(tmp_path: Path) -> None:
+    work = partial(hand_over, caller=os.getpid(), mark=tmp_path / "killed")
+    with pytest.warns(RuntimeWarning, match=r"a worker was killed: \d of 3 parts are given out again"):
+        found = dict(over_workers(work, range(3), n_jobs=2))
+    assert sorted(found) == [0, 1, 2]
+
+
+@pytest.mark.parametrize("content", [b"x" * 100_000, "lambda"])
+def test_what_cannot_be_written_is_sent_as_before(content: Any, tmp_path: Path) -> None:
+    found = (1, (lambda: 3) if content == "lambda" else content, None)
+    assert _handed_over(found, tmp_path / "none" / "1") is found
+    assert not list(tmp_path.iterdir())
 
 
 @pytest.mark.slow
