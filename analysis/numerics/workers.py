@@ -23,7 +23,7 @@ Made = TypeVar("Made")
 #: How often workers are started anew after one was killed; as often does Dask give an item to another worker.
 RETRIES = 3
 
-#: Bytes of a pickled result that go through the pipe itself: with what joblib adds, less than POSIX has a pipe take in one piece.
+#: Bytes of a pickled result that go through the pipe itself: with what joblib adds, less than a pipe takes in one piece.
 _PIECE = 2048
 
 _WATCHED: set[int] = set()
