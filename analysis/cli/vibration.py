@@ -19,6 +19,7 @@ from .common import (
     folder_of,
     print_error,
     quantity,
+    say,
     workers_options,
 )
 from .driven import Chosen, about_a_case, swing_of
@@ -318,19 +319,19 @@ def _regions(found: Any) -> None:
     from ..periodic import TRUE_ORBIT, Crossing
 
     x, y = found.axes
+    own = {traced.kind for traced in found.boundaries if traced.motion == TRUE_ORBIT}
     count = int(np.ma.sum(found.grid.largest > 1.0))
-    folds = any(traced.kind is Crossing.FOLD and traced.motion == TRUE_ORBIT for traced in found.boundaries)
-    console.print(
-        f"at {count} of {found.grid.largest.count()} points where a motion was found it is unstable"
-        + ("; at a fold the motion jumps to another: see the boundaries" if folds else ""),
-        highlight=False,
-        soft_wrap=True,
-    )
+    sentences = [f"at {count} of {found.grid.largest.count()} points the motion that was found is unstable"]
+    if Crossing.FOLD in own:
+        sentences.append("where it crosses a fold it jumps to another motion, however stable both are")
     if found.beside is not None:
         several = int((found.beside.stable > 1).sum())
-        console.print(
-            f"at {several} of {found.beside.stable.size} points several stable motions were found", highlight=False
+        sentences.append(f"at {several} of {found.beside.stable.size} points several stable motions were found")
+    elif found.most > 1:
+        sentences.append(
+            f"up to {found.most} stable motions were found at one point of the lines searched: --coexisting shows where"
         )
+    say("; ".join(sentences))
     grid = Table(title="boundaries of instability", title_justify="left")
     for heading in ("motion", "kind", f"{x.name} [{x.unit}]", f"{y.name} [{y.unit}]", "ends because"):
         grid.add_column(escape(heading))
@@ -347,12 +348,6 @@ def _regions(found: Any) -> None:
         console.print(grid)
     for removal in found.removals:
         console.print(removal, highlight=False, soft_wrap=True)
-    if found.elsewhere:
-        console.print(
-            f"{found.elsewhere} folds and period doublings on the lines searched belong to other, larger motions: not traced",
-            highlight=False,
-            soft_wrap=True,
-        )
 
 
 def _runs(found: Any) -> None:

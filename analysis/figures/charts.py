@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
-from ..periodic import TRUE_ORBIT, Basins, Coexistence, Crossing, Outcome, StabilityChart
+from ..periodic import OTHER_ORBIT, TRUE_ORBIT, Basins, Coexistence, Crossing, Outcome, StabilityChart
 from .curves import Curve, Panel, draw_panel, lay_out
 from .dispatch import plot
 from .style import COLOURS
@@ -116,8 +116,10 @@ def plot_stability_chart(chart: StabilityChart, *, title: str = "") -> Figure:
     marks = {Crossing.PERIOD_DOUBLING: (COLOURS[2], "-1"), Crossing.FOLD: (COLOURS[4], "+1")}
     curves, named = [], set()
     for traced in chart.boundaries:
-        if traced.motion == TRUE_ORBIT:
+        if traced.motion in (TRUE_ORBIT, OTHER_ORBIT):
             colour, line, label = looks[traced.kind]
+            if traced.motion == OTHER_ORBIT:
+                line, label = ":", f"{label}, another motion"
         else:
             colour, multiplier = marks[traced.kind]
             line, label = "--", f"{traced.motion}, multiplier {multiplier}"

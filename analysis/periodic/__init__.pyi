@@ -4,6 +4,7 @@ from .branches import Family as Family
 from .branches import SpecialPoint as SpecialPoint
 from .branches import follow as follow
 from .branches import switch as switch
+from .charts import OTHER_ORBIT as OTHER_ORBIT
 from .charts import TRUE_ORBIT as TRUE_ORBIT
 from .charts import Axis as Axis
 from .charts import Run as Run

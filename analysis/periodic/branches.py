@@ -306,7 +306,7 @@ def follow(
     greatest: float = 2e-2,
     most_points: int = 5000,
     watch: Callable[[float], None] | None = None,
-    stop: Callable[[], bool] | None = None,
+    stop: Callable[[PeriodicOrbit], bool] | None = None,
 ) -> Branch:
     """Follow the branch through an orbit to an end of the range of the parameter.
 
@@ -327,7 +327,7 @@ def follow(
     watch : callable, optional
         Called with the parameter of every point.
     stop : callable, optional
-        Asked at every point whether to leave it at that.
+        Asked with the orbit of every point whether to leave it at that.
 
     Returns
     -------
@@ -353,7 +353,7 @@ def switch(
     greatest: float = 2e-2,
     most_points: int = 5000,
     watch: Callable[[float], None] | None = None,
-    stop: Callable[[], bool] | None = None,
+    stop: Callable[[PeriodicOrbit], bool] | None = None,
 ) -> Branch:
     """The branch of twice the period that leaves a branch at a period doubling.
 
@@ -448,7 +448,7 @@ def _branch(
     follower: Follower,
     first: Point,
     watch: Callable[[float], None] | None,
-    stop: Callable[[], bool] | None,
+    stop: Callable[[PeriodicOrbit], bool] | None,
 ) -> Branch:
     pieces: list[tuple[Follower, Curve]] = []
     settings = follower.settings
@@ -457,7 +457,7 @@ def _branch(
 
         def leave(point: Point) -> str:
             nonlocal refine
-            if stop is not None and stop():
+            if stop is not None and stop(point.data):
                 return "it was interrupted"
             reason = reason_to_leave(point)
             if not reason and _growth(point.data) > _GROWTH:

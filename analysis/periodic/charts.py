@@ -6,12 +6,13 @@ their FMI names, the crank speed among them.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy import ndimage
 
 from linkwork.errors import InputError, LinkworkError, ParameterError
 from linkwork.mechanism import Mechanism
@@ -23,18 +24,15 @@ from ..numerics.boundaries import Box, chart
 from ..numerics.continuation import ContinuationError, End, Reason
 from ..run import shown, takes_published
 from ..units import RAD_S_PER_RPM, Amount, si
-from .branches import Branch, Family, SpecialPoint, follow
+from .branches import SpecialPoint
 from .coexistence import Coexistence, coexistence
 from .crossings import follow_crossing
 from .drives import Drive, published_drive
 from .floquet import Crossing
 from .grids import Grid, grid
+from .lines import branches_on, distance
 from .natural import first_freedom, natural_frequency
-from .orbits import (
-    OrbitError,
-    PeriodicOrbit,
-    orbit_of,
-)
+from .orbits import PeriodicOrbit
 from .planes import Plane, format_value, plane, require_variable, speed_name, unit_of, value_of
 from .stability import (
     Confirmation,
@@ -51,15 +49,14 @@ from .starts import scale_of
 _SPEEDS, _OTHERS = (0.3, 2.5), (0.1, 2.0)
 #: Lines of a chart on which boundaries are sought, of either kind, and samples on each.
 LINES, SAMPLES = (2, 5), 120
-#: Points of a branch at most on which folds are sought.
-BRANCH_POINTS = 600
 #: Distance of two starts, relative to crank length and speed, up to which neighbours on a grid are of one motion.
 SAME_MOTION = 0.4
 #: Distance, with the box scaled to 1 by 1, at which a point lies on a boundary.
 SAME = 5e-3
-#: What the boundaries of the mechanism's own periodic motion are called.
-TRUE_ORBIT = "true orbit"
-#: Multiplier on a boundary, as it is written to files.
+#: What the boundaries of the periodic motion that the grid has are called, and those of others.
+TRUE_ORBIT, OTHER_ORBIT = "true orbit", "another motion"
+#: How a boundary is written to files: whose it is, other names being of the linear equation, and its multiplier.
+_MOTION = {TRUE_ORBIT: 1.0, OTHER_ORBIT: 2.0}
 _MULTIPLIER = {Crossing.FOLD: 1.0, Crossing.PERIOD_DOUBLING: -1.0, Crossing.TORUS: 0.0}
 
 
@@ -103,18 +100,21 @@ class Traced:
     points : ndarray, shape (n, 2)
         In SI.
     motion : str
-        `TRUE_ORBIT`, or the name of a motion beside it.
+        `TRUE_ORBIT`, the one that the grid has; `OTHER_ORBIT`; or the name of a motion asked for beside them.
     kind : Crossing
         What the multipliers do there: at -1 a period doubling, at +1 a fold, beyond which the orbit is no more; under a torque
         a complex pair may pass the unit circle, at a torus.
     ends : (End, End)
         At the first and at the last point.
+    starts : ndarray, shape (n, m), or None
+        y at crank angle 0 of the motions on it, where they were followed.
     """
 
     points: NDArray[np.float64]
     motion: str
     kind: Crossing
     ends: tuple[End, End]
+    starts: NDArray[np.float64] | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -138,13 +138,13 @@ class StabilityChart(Shown):
     grid : Grid
         Largest Floquet multiplier of the true orbit.
     boundaries : tuple of Traced
-        Of the true orbit, and of the motions asked for beside it.
+        Of the true orbit, of other motions, and of those asked for beside them.
     removals : tuple of str
         The damping that removes the regions between the ends of the other axis, in words; none unless damping is an axis.
     runs : tuple of Run
         Three points put to the test.
-    elsewhere : int
-        Folds and period doublings met that belong to other motions than the grid's; `follow_crossing` follows them.
+    most : int
+        Most stable motions that were found at a point of the lines searched, or of ``beside``.
     beside : Coexistence or None
         All motions at every point, where it was asked for them.
     problems : tuple of str
@@ -157,7 +157,7 @@ class StabilityChart(Shown):
     boundaries: tuple[Traced, ...]
     removals: tuple[str, ...]
     runs: tuple[Run, ...]
-    elsewhere: int
+    most: int
     beside: Coexistence | None
     problems: tuple[str, ...]
 
@@ -168,6 +168,8 @@ class StabilityChart(Shown):
         ]
         multipliers = self.grid.largest.compressed()
         share = f", {np.mean(multipliers > 1.0):.1%} unstable" if len(multipliers) else ""
+        if any(traced.kind is Crossing.FOLD and traced.motion == TRUE_ORBIT for traced in self.boundaries):
+            share += " but with jumps at a fold"
         return (
             f"<StabilityChart: {' by '.join(spans)}, {len(self.grid.x)} x {len(self.grid.y)} points{share}, largest Floquet "
             f"multiplier {format_range(multipliers, '')}; {format_count(len(self.boundaries), 'boundary')}, "
@@ -190,11 +192,11 @@ class StabilityChart(Shown):
         rows = [np.empty((0, 5))]
         for number, traced in enumerate(self.boundaries, start=1):
             points = traced.points * [axis.factor for axis in self.axes]
-            head = [number, float(traced.motion == TRUE_ORBIT), _MULTIPLIER[traced.kind]]
+            head = [number, _MOTION.get(traced.motion, 0.0), _MULTIPLIER[traced.kind]]
             rows.append(np.column_stack([np.tile(head, (len(points), 1)), points]))
         names = (
             "boundary",
-            "true orbit (1) or linear equation (0)",
+            "true orbit (1), another motion (2) or linear equation (0)",
             "multiplier (+1; -1; 0: a complex pair)",
             *(a.label for a in self.axes),
         )
@@ -277,14 +279,17 @@ def stability_chart(
         operation, (_axis(mechanism, names[0]), _axis(mechanism, names[1])), box, found, start, damping_name(mechanism)
     )
     survey.note_missing_orbits()
-    true = orbit_monodromy(operation, start=start)
+    around = coexistence(operation, x, y, start=start, n_jobs=n_jobs, progress=progress) if coexisting else None
+    true = orbit_monodromy(operation, start=start, near=found)
     # where the true orbit folds it ends, and a test function with it: its folds are found on its branches
     survey.trace(TRUE_ORBIT, true, Crossing.PERIOD_DOUBLING)
     for motion, of in (beside or {}).items():
         matrix = of(operation)
         for kind in (Crossing.PERIOD_DOUBLING, Crossing.FOLD):
             survey.trace(motion, matrix, kind)
-    survey.follow_branches(progress)
+    survey.follow_lines(np.linspace(*box.y, LINES[1]).tolist(), progress)
+    if around is not None:
+        survey.follow_lines(survey.unmet(around), progress)
     survey.run_three_points()
     return StabilityChart(
         axes=survey.axes,
@@ -293,8 +298,8 @@ def stability_chart(
         boundaries=tuple(survey.traced),
         removals=survey.removals(true),
         runs=tuple(survey.runs),
-        elsewhere=survey.elsewhere,
-        beside=coexistence(operation, x, y, start=start, n_jobs=n_jobs, progress=progress) if coexisting else None,
+        most=survey.most,
+        beside=around,
         problems=tuple(survey.problems),
     )
 
@@ -311,7 +316,9 @@ class _Survey:
     damping: str
     traced: list[Traced] = field(default_factory=list)
     runs: list[Run] = field(default_factory=list)
-    elsewhere: int = 0
+    most: int = 0
+    #: Lines y = const that were searched.
+    lines: list[float] = field(default_factory=list)
     problems: list[str] = field(default_factory=list)
 
     def place(self, x: float, y: float) -> str:
@@ -339,51 +346,49 @@ class _Survey:
                 f"{self.place(*first.point)}: {first.message}"
             )
 
-    def follow_branches(self, progress: bool) -> None:
-        """The boundaries that the branches along lines y = const lead to, folds above all.
-
-        Those of other motions than the grid's are not traced but counted in ``elsewhere``.
-        """
+    def follow_lines(self, ys: Sequence[float], progress: bool) -> None:
+        """The boundaries that the branches of all motions on the lines y = const lead to, folds above all."""
         lost: list[str] = []
-        low, high = self.box.x
-        with shown(progress, float(LINES[1]), "branches") as show:
-            for number, y in enumerate(np.linspace(*self.box.y, LINES[1]).tolist()):
-                for x, direction in ((low, 1), (high, -1)):
-                    try:
-                        branch = self._branch(x, y, direction)
-                    except (OrbitError, ContinuationError) as error:
-                        lost.append(f"{self.place(x, y)}: {error}")
-                        continue
+        with shown(progress and bool(ys), float(len(ys)), "branches") as show:
+            for number, y in enumerate(ys, start=1):
+                branches, found, failed = branches_on(
+                    self.operation, self.box.x, y, name=self.axes[0].name, unit=self.axes[0].si, start=self.start
+                )
+                self.lines.append(y)
+                self.most = max(self.most, int(found.stable.max()))
+                lost += [f"{self.axes[1].format_value(y)}, {failure}" for failure in failed]
+                for branch in branches:
                     for special in branch.special:
                         self._follow_special(special, (special.parameter, y))
-                    # the branch that goes through needs not be followed backwards
-                    if branch.reached and not branch.special:
-                        break
-                show(number + 1.0)
+                show(float(number))
         if lost:
-            self.problems.append(
-                f"no branch to seek folds on from {len(lost)} of {2 * LINES[1]} ends of lines, the first {lost[0]}"
-            )
+            self.problems.append(f"{len(lost)} motions on the lines searched are not followed, the first at {lost[0]}")
 
-    def _branch(self, x: float, y: float, direction: int) -> Branch:
-        mechanism, drive = self.operation(x, y)
-        family = Family(
-            parameters=mechanism,
-            drive=drive,
-            vary=lambda value: self.operation(value, y),
-            name=self.axes[0].name,
-            unit=self.axes[0].si,
-        )
-        low, high = self.box.x
-        orbit = orbit_of(mechanism, drive, start=self.start)
-        return follow(family, orbit, x, low=low, high=high, direction=direction, most_points=BRANCH_POINTS)
+    def unmet(self, beside: Coexistence) -> list[float]:
+        """A line through each part of the plane with a number of stable motions that no line and no boundary has met."""
+        self.most = max(self.most, int(beside.stable.max()))
+        half = 0.5 * self.box.size / [len(beside.x) - 1, len(beside.y) - 1]
+        found: list[float] = []
+        for number in np.unique(beside.stable):
+            labels, regions = ndimage.label(beside.stable == number)
+            for region in range(1, regions + 1):
+                rows, columns = np.nonzero(labels == region)
+                low, high = beside.y[rows.min()], beside.y[rows.max()]
+                if any(low <= y <= high for y in (*self.lines, *found)):
+                    continue
+                cells = np.column_stack([beside.x[columns], beside.y[rows]])
+                if any(
+                    (np.abs(t.points[:, None] - cells) <= 2.0 * half).all(axis=2).any()
+                    for t in self.traced
+                    if t.motion in _MOTION
+                ):
+                    continue
+                found.append(float(beside.y[np.bincount(rows).argmax()]))
+        return found
 
     def _follow_special(self, special: SpecialPoint, place: tuple[float, float]) -> None:
-        """Follow a fold, period doubling or torus through the chart, unless it is known or of another motion."""
-        if any(_passes(boundary, special.kind, place, self.box) for boundary in self.traced):
-            return
-        if not _is_of(self.grid, special.orbit, place):
-            self.elsewhere += 1
+        """Follow a fold, period doubling or torus through the chart, unless it is known."""
+        if self._is_known(special, place):
             return
         what = f"the {special.kind.value} at {self.place(*place)}"
         try:
@@ -391,10 +396,37 @@ class _Survey:
         except ContinuationError as error:
             self.problems.append(f"{what} is not followed: {error}")
             return
-        self.traced.append(Traced(points=curve.points, motion=TRUE_ORBIT, kind=curve.kind, ends=curve.ends))
+        own = any(_is_of(self.grid, orbit, point) for orbit, point in zip(curve.orbits, curve.points.tolist()))
+        self.traced.append(
+            Traced(
+                points=curve.points,
+                motion=TRUE_ORBIT if own else OTHER_ORBIT,
+                kind=curve.kind,
+                ends=curve.ends,
+                starts=np.array([orbit.start for orbit in curve.orbits]),
+            )
+        )
         for end in curve.ends:
             if end.reason not in (Reason.BOX, Reason.CLOSED):
                 self.problems.append(f"{what} is followed to {self.place(*end.point)} only: {end.message}")
+
+    def _is_known(self, special: SpecialPoint, place: tuple[float, float]) -> bool:
+        """Whether a boundary of the same kind and of the same motion passes a special point, nearly."""
+        orbit = special.orbit
+        scale = scale_of(orbit.parameters, orbit.drive, orbit.start)
+        for boundary in self.traced:
+            if boundary.kind is not special.kind or boundary.motion not in _MOTION:
+                continue
+            if distance(boundary.points / self.box.size, place / self.box.size) > SAME:
+                continue
+            if boundary.starts is None:
+                same = _is_of(self.grid, orbit, place)
+            else:
+                near = int(np.linalg.norm((boundary.points - place) / self.box.size, axis=1).argmin())
+                same = float(np.linalg.norm((boundary.starts[near] - orbit.start) / scale)) < SAME_MOTION
+            if same:
+                return True
+        return False
 
     def run_three_points(self) -> None:
         """Long runs at the points that put the grid to the test."""
@@ -408,7 +440,7 @@ class _Survey:
                 self.runs.append(Run(x=x, y=y, confirmation=check))
 
     def removals(self, matrix: Monodromy) -> tuple[str, ...]:
-        """The damping that removes each region, where damping is one of the axes; a sentence a boundary of the true orbit."""
+        """The damping that removes each region, where damping is one of the axes; a sentence a boundary of a true motion."""
         names = [axis.name for axis in self.axes]
         if self.damping not in names:
             return ()
@@ -416,7 +448,7 @@ class _Survey:
         return tuple(
             self._removal(matrix, boundary, which)
             for boundary in self.traced
-            if boundary.motion == TRUE_ORBIT and boundary.kind is not Crossing.TORUS and len(boundary.points) > 1
+            if boundary.motion in _MOTION and boundary.kind is not Crossing.TORUS and len(boundary.points) > 1
         )
 
     def _removal(self, matrix: Monodromy, boundary: Traced, which: int) -> str:
@@ -426,9 +458,13 @@ class _Survey:
         across, dampings = boundary.points[:, 1 - which], boundary.points[:, which]
         low, high, top = float(across.min()), float(across.max()), float(dampings.max())
         greatest, size = spans[which][1], spans[which][1] - spans[which][0]
-        region = f"{boundary.kind.value} from {other.format_value(low)} to {other.format_value(high)}"
+        whose = "" if boundary.motion == TRUE_ORBIT else f" of {boundary.motion}"
+        region = f"{boundary.kind.value}{whose} from {other.format_value(low)} to {other.format_value(high)}"
         if top > greatest - 1e-6 * size:
             return f"{region}: still there at {up.format_value(greatest)}"
+        by_points = f"{region}: goes up to {self.damping} = {top:.4g} {up.si}, by its points"
+        if boundary.motion != TRUE_ORBIT:
+            return by_points
         # this region and no other
         margin = 0.25 * (high - low)
         x = (max(spans[1 - which][0], low - margin), min(spans[1 - which][1], high + margin))
@@ -441,29 +477,15 @@ class _Survey:
             )
         except LinkworkError:
             # the test function ends at folds: take what the traced boundary says
-            return f"{region}: goes up to {self.damping} = {top:.4g} {up.si}, by its points"
+            return by_points
         return f"{region}: gone from {self.damping} = {found.damping:.8g} {up.si} on, last at {other.format_value(found.x)}"
 
 
-def _is_of(found: Grid, orbit: PeriodicOrbit, place: tuple[float, float]) -> bool:
+def _is_of(found: Grid, orbit: PeriodicOrbit, place: Sequence[float]) -> bool:
     """Whether an orbit is of the motion whose multipliers a grid has, by the points of the grid around its place."""
-    column, row = (int(np.abs(axis - value).argmin()) for axis, value in zip((found.x, found.y), place))
-    around = found.starts[max(row - 1, 0) : row + 2, max(column - 1, 0) : column + 2].reshape(-1, len(orbit.start))
     scale = scale_of(orbit.parameters, orbit.drive, orbit.start)
-    distance = np.linalg.norm((around - orbit.start) / scale, axis=1)
+    distance = np.linalg.norm((found.around(*place) - orbit.start) / scale, axis=1)
     return bool(np.any(distance < SAME_MOTION))
-
-
-def _passes(boundary: Traced, kind: Crossing, place: tuple[float, float], box: Box) -> bool:
-    """Whether a boundary of the true orbit passes through a point, nearly."""
-    if boundary.kind is not kind or boundary.motion != TRUE_ORBIT or len(boundary.points) < 2:
-        return False
-    s = (boundary.points - np.array(place)) / box.size
-    # distance of the point, now the origin, from each piece
-    pieces = np.diff(s, axis=0)
-    squares = np.maximum((pieces**2).sum(axis=1), 1e-300)
-    along = np.clip(-(s[:-1] * pieces).sum(axis=1) / squares, 0.0, 1.0)
-    return float(np.hypot(*(s[:-1] + along[:, None] * pieces).T).min()) < SAME
 
 
 @takes_published()

@@ -80,6 +80,13 @@ class Grid:
         """Why a point has no orbit; empty if it has one."""
         return orbit_kernels.REASONS.get(Status(self.status[row, column]), "")
 
+    def around(self, x: float, y: float) -> NDArray[np.float64]:
+        """Starts of the orbits at the points around a place, the nearest first; shape (k, n)."""
+        across, up = (np.argsort(np.abs(axis - value))[:3] for axis, value in ((self.x, x), (self.y, y)))
+        starts = self.starts[np.ix_(up, across)].reshape(-1, self.starts.shape[-1])
+        kept: NDArray[np.float64] = starts[~np.isnan(starts).any(axis=1)]
+        return kept
+
     def stability(self, tolerance: float = TOLERANCE) -> NDArray[Any]:
         """`Stability` of each point, None where no orbit was found; an array of objects of shape (ny, nx)."""
         margin = 1.0 - self.largest.filled(np.nan)

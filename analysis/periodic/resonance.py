@@ -260,7 +260,7 @@ class _Search:
                     greatest=self.greatest,
                     most_points=most_points,
                     watch=watch,
-                    stop=self.stop,
+                    stop=lambda _: self.stop(),
                 )
             )
             if self.stop():
@@ -283,7 +283,12 @@ class _Search:
                 continue
             try:
                 branch = switch(
-                    self.family, special, low=self.low, high=self.high, greatest=self.greatest, stop=self.stop
+                    self.family,
+                    special,
+                    low=self.low,
+                    high=self.high,
+                    greatest=self.greatest,
+                    stop=lambda _: self.stop(),
                 )
             except (OrbitError, ContinuationError) as error:
                 place = self.family.format_value(special.parameter)

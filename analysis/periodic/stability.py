@@ -35,16 +35,18 @@ from .starts import scale_of
 Monodromy = Callable[[float, float], NDArray[np.float64]]
 
 
-def orbit_monodromy(operation: Plane, *, start: ArrayLike | None = None) -> Monodromy:
+def orbit_monodromy(operation: Plane, *, start: ArrayLike | None = None, near: Grid | None = None) -> Monodromy:
     """Monodromy matrix of the mechanism's own periodic orbit of one turn over a plane; points are remembered.
 
-    Each orbit is sought from the one found last, so that neighbouring points stay on one branch, then by all the ways of
-    `orbit_of` from the first guess.
+    Each orbit is sought from the one found last, so that neighbouring points stay on one branch, then from those around it
+    on a grid, then by all the ways of `orbit_of` from the first guess.
 
     Parameters
     ----------
     start : array_like, shape (n,), optional
         Guess of the first: see `find_orbit`.
+    near : Grid, optional
+        Of the same plane.
     """
     first = None if start is None else np.array(start, dtype=float)
     last = first
@@ -53,9 +55,13 @@ def orbit_monodromy(operation: Plane, *, start: ArrayLike | None = None) -> Mono
     def matrix(x: float, y: float) -> NDArray[np.float64]:
         nonlocal last
         parameters, drive = operation(x, y)
-        try:
-            orbit = orbit_of(parameters, drive, start=last, settle=False)
-        except OrbitError:
+        for place in (last, *(() if near is None else near.around(x, y))):
+            try:
+                orbit = orbit_of(parameters, drive, start=place, settle=False)
+                break
+            except OrbitError:
+                continue
+        else:
             orbit = orbit_of(parameters, drive, start=first)
         last = orbit.start
         return orbit.monodromy

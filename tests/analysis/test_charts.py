@@ -10,6 +10,7 @@ import pytest
 
 from analysis import figures
 from analysis.periodic import (
+    OTHER_ORBIT,
     Crossing,
     Drive,
     Family,
@@ -21,6 +22,7 @@ from analysis.periodic import (
     follow,
     grids,
     natural_frequency,
+    orbit_of,
     points_to_confirm,
     stability_chart,
 )
@@ -115,13 +117,20 @@ def test_files_and_plot(found: StabilityChart, tmp_path: Path) -> None:
 
 
 @pytest.mark.usefixtures("coarse")
-def test_crossings_of_other_motions_are_counted_not_traced() -> None:
+def test_crossings_of_other_motions_are_traced_under_their_own_name() -> None:
     rig = SETS["rig-1-spring-a"].parameters
     # the period doubling at 379 to 527 rpm belongs to a motion of some 8 cm, beside the small one that the grid has
     chart = stability_chart(rig, DRIVE, ranges=((350.0 * RPM, 620.0 * RPM), (5.0, 12.0)), points=9)
-    assert chart.elsewhere > 0
-    assert Crossing.PERIOD_DOUBLING not in {traced.kind for traced in chart.boundaries}
+    doublings = [traced for traced in chart.boundaries if traced.kind is Crossing.PERIOD_DOUBLING]
+    assert {traced.motion for traced in doublings} == {OTHER_ORBIT}
     assert (chart.grid.largest < 1.0).all()
+    for traced in doublings:
+        assert traced.starts is not None
+        speed, damping = traced.points[len(traced.points) // 2]
+        there = replace(rig, slider_damping=damping)
+        orbit = orbit_of(there, Drive(speed=speed), start=traced.starts[len(traced.points) // 2])
+        assert np.abs(orbit.multipliers + 1.0).min() < 1e-6
+        assert orbit.amplitude > 3.0 * find_orbit(there, speed=speed).amplitude
 
 
 @pytest.mark.usefixtures("coarse")

@@ -22,6 +22,7 @@ from analysis.periodic import (
     Drive,
     GridInterrupted,
     basins,
+    charts,
     coexistence,
     find_orbits,
     orbit_of,
@@ -139,6 +140,14 @@ def test_no_stable_motion_is_a_sentence() -> None:
         coexistence(plane(RIG_1_B, Drive(speed=SPEED), "drive.speed", "slider.damping"), [], [1.0])
 
 
+@pytest.fixture
+def coarse(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Few lines and samples of a chart."""
+    monkeypatch.setattr(charts, "LINES", (2, 2))
+    monkeypatch.setattr(charts, "SAMPLES", 6)
+
+
+@pytest.mark.usefixtures("coarse")
 def test_a_chart_with_the_motions_beside(tmp_path: Path) -> None:
     chart = stability_chart(
         "rig-1-spring-b", ranges=(("990 rpm", "1010 rpm"), ("10 N.s/m", "12 N.s/m")), points=3, coexisting=True
@@ -149,6 +158,7 @@ def test_a_chart_with_the_motions_beside(tmp_path: Path) -> None:
     assert len(np.loadtxt(chart.beside.to_csv(tmp_path / "motions.csv"), delimiter=",", skiprows=1)) == 9
 
 
+@pytest.mark.usefixtures("coarse")
 def test_a_chart_finds_the_motions_that_newtons_method_misses() -> None:
     """At small damping near resonance: 37 of 900 such points had no motion, one of them stable with 13.8 cm."""
     chart = stability_chart("rig-1-spring-b", ranges=(("1060 rpm", "1090 rpm"), ("2 N.s/m", "3 N.s/m")), points=4)
