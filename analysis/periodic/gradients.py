@@ -159,17 +159,11 @@ class MotionGradient:
     @cached_property
     def variations(self) -> Variations:
         """The variational equations of the motion."""
-        return Variations(self.orbit, self._switched)
-
-    @cached_property
-    def forcing(self) -> FloatArray:
-        """Derivatives of the rates with respect to the parameters, the motion held; shape (k, s, n, m)."""
-        forcing: FloatArray = self.variations.by_constant @ self.along
-        return forcing
+        return Variations(self.orbit, self._switched, self.along)
 
     @cached_property
     def _solution(self) -> tuple[FloatArray, FloatArray]:
-        return self.variations.periodic(self.forcing)
+        return self.variations.periodic(self.variations.forcing)
 
     def _gradient(self, value: float, by: FloatArray) -> Gradient:
         return Gradient(value=float(value), names=self.names, by=by, at=self.values)
@@ -228,7 +222,7 @@ class MotionGradient:
             + by_constant @ self.along
             + v.by_constant @ _stacked(self.orbit, (), twice, len(self.names))
         )
-        second, rates = v.periodic(forcing)[0], v.by_y @ solution + self.forcing
+        second, rates = v.periodic(forcing)[0], v.by_y @ solution + v.forcing
         total = np.zeros(len(self.names))
         for sign, _, place in self._swing:
             # the place moves so that the rate there stays zero
@@ -505,7 +499,10 @@ def _located(orbit: PeriodicOrbit, along: str, step_of: _Step, what: str) -> Per
 
 def _to_extremum(motion: MotionGradient) -> tuple[FloatArray, float]:
     (along,) = motion.names
-    step = -motion.amplitude[along] / motion.amplitude_curvature(along)[along]
+    size, slope, curvature = motion.amplitude.value, motion.amplitude[along], motion.amplitude_curvature(along)[along]
+    # on the flanks of a resonance 1 / amplitude^2 is nearly a parabola, about a minimum amplitude^2 is
+    peaked = 3.0 * slope**2 - size * curvature
+    step = slope * size / (peaked if peaked > 0.0 else -(slope**2) - size * curvature)
     return motion.start[:, 0] * step, step
 
 
@@ -521,11 +518,11 @@ def _to_fold(motion: MotionGradient) -> tuple[FloatArray, float]:
     left, right = _null_vectors(v)
     by_y, by_constant = v.second(v.fundamental @ right)
     # of the motion, by its start and by the parameter
-    columns = np.concatenate([v.fundamental, v.from_start(np.zeros((n, 1)), motion.forcing)], axis=-1)
+    columns = np.concatenate([v.fundamental, v.from_start(np.zeros((n, 1)), v.forcing)], axis=-1)
     along = np.hstack([np.zeros((len(motion.along), n)), motion.along])
     matrix = np.vstack(
         [
-            np.hstack([v.monodromy - np.eye(n), v.after(motion.forcing)]),
+            np.hstack([v.monodromy - np.eye(n), v.after(v.forcing)]),
             left @ v.after(by_y @ columns + by_constant @ along),
         ]
     )
@@ -553,7 +550,7 @@ def _test(motion: MotionGradient, kind: Crossing) -> FloatArray:
     """Derivatives, shape (m,), of a function that is zero where the multiplier is on the unit circle."""
     if kind is Crossing.FOLD:
         left, _ = _null_vectors(motion.variations)
-        return left @ motion.variations.after(motion.forcing)
+        return left @ motion.variations.after(motion.variations.forcing)
     return motion.test(kind).by
 
 
@@ -587,7 +584,7 @@ def _fold_motion(motion: MotionGradient, shift: FloatArray) -> FloatArray:
     v, n, m = motion.variations, len(motion.variations.scale), len(shift)
     left, right = _null_vectors(v)
     moved = np.vstack([np.eye(m), shift]) if m else np.zeros((1, 0))
-    forcing, along = motion.forcing @ moved, motion.along @ moved
+    forcing, along = v.forcing @ moved, motion.along @ moved
     # bordered by both vectors the matrix is regular
     matrix = np.block(
         [[v.monodromy - np.eye(n), (left * v.scale**2)[:, None]], [(right / v.scale**2)[None, :], np.zeros((1, 1))]]

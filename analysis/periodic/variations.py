@@ -35,9 +35,11 @@ from .starts import scale_of
 
 FloatArray = NDArray[np.float64]
 
-#: Gauss's points of a panel; panels of a turn to begin with; how often a panel is halved at most; size of the last
-#: coefficients of the rates and their derivatives over a panel, in the scale of y, above which it is.
-_POINTS, _PANELS, _HALVINGS, _RESOLVED = 8, 32, 16, 1e-10
+#: Gauss's points of a panel; panels of a turn to begin with; how often a panel is halved at most.
+_POINTS, _PANELS, _HALVINGS = 8, 32, 16
+#: Size of the last coefficients over a panel above which it is halved: of the rates and their derivatives, in the scale of y,
+#: and of the effect of a parameter, relative to its greatest.
+_RESOLVED, _EFFECT = 1e-10, 1e-8
 #: Imaginary part below which a root is a real one.
 _REAL = 1e-9
 #: Difference of the monodromy matrix from that of the orbit, relative to its greatest entry, above which something is wrong.
@@ -81,6 +83,9 @@ class Variations:
     orbit : PeriodicOrbit
     switched : bool
         Whether the mechanism's switch is taken as on: as it is, or because a derivative with respect to it is wanted.
+    along : ndarray, shape (c, m)
+        Derivatives of the numbers of the drive and, after them, of the constants with respect to parameters: what is to be
+        resolved beside the motion.
 
     Attributes
     ----------
@@ -94,15 +99,17 @@ class Variations:
         Derivatives of the rates.
     by_constant : ndarray, shape (k, s, n, c)
         The same with respect to the numbers of the drive and, after them, the constants.
+    forcing : ndarray, shape (k, s, n, m)
+        Derivatives of the rates with respect to the parameters, the motion held.
     monodromy : ndarray, shape (n, n)
     """
 
-    def __init__(self, orbit: PeriodicOrbit, switched: bool) -> None:
+    def __init__(self, orbit: PeriodicOrbit, switched: bool, along: FloatArray) -> None:
         self.orbit, self.switched, self.flow = orbit, switched, orbit.flow
         mechanism = mechanism_of(orbit.parameters)
         self._drive, self._p = orbit.drive.vector(mechanism), np.array(orbit.parameters.constants())
         self.scale = scale_of(orbit.parameters, orbit.drive, orbit.start)
-        self._divide()
+        self._divide(along)
         self._solve_panels()
         wrong = float(np.abs(self.monodromy - orbit.monodromy).max() / max(1.0, np.abs(orbit.monodromy).max()))
         if not wrong < _AGREES * max(1.0, *(self.scale[:, None] / self.scale).ravel()):
@@ -110,7 +117,7 @@ class Variations:
                 f"variational equations on {len(self.h)} panels: the monodromy matrix differs from the orbit's by {wrong:.2g}"
             )
 
-    def _divide(self) -> None:
+    def _divide(self, along: FloatArray) -> None:
         """Choose the panels."""
         flow, gauss = self.flow, _gauss()
         edges = np.linspace(0.0, flow.period * self.orbit.turns, _PANELS * self.orbit.turns + 1)
@@ -123,12 +130,17 @@ class Variations:
             self.y = self._sampled()
             self.rates, first = self._first()
             self.by_y, self.by_constant = first[..., : flow.size], first[..., flow.size :]
-            last = [
-                self.h[:, None]
-                * np.abs(np.einsum("is,ks...->ki...", gauss.coefficients[-2:], values) / size).reshape(len(self.h), -1)
-                for values, size in ((self.rates, self.scale), (self.by_y, relative))
-            ]
-            rough = np.max([part.max(axis=1) for part in last], axis=0) > _RESOLVED
+            self.forcing = self.by_constant @ along
+            # a parameter counts by its greatest effect
+            effect = np.abs(self.forcing / self.scale[:, None]).max(axis=(0, 1, 2), initial=1e-300)
+            rough = np.zeros(len(self.h), dtype=bool)
+            for values, size in (
+                (self.rates, self.scale),
+                (self.by_y, relative),
+                (self.forcing, self.scale[:, None] * effect * (_EFFECT / _RESOLVED)),
+            ):
+                last = np.abs(np.einsum("is,ks...->k...i", gauss.coefficients[-2:], values / size))
+                rough |= self.h * last.reshape(len(self.h), -1).max(axis=1, initial=0.0) > _RESOLVED
             if not rough.any():
                 break
             edges = np.sort(np.append(edges, 0.5 * (edges[:-1] + edges[1:])[rough]))
@@ -152,7 +164,7 @@ class Variations:
         drive = np.concatenate([self._drive, along[:d]])
         values = np.empty((count, size))
         rows(
-            _code(self.flow, self.switched).addresses[name],
+            _code(self.flow, self.switched, name).addresses[name],
             np.array(self.flow.modes, dtype=float),
             np.concatenate([self._p, along[d:]]),
             np.ascontiguousarray(rows_of_arguments),
@@ -352,8 +364,8 @@ def _symbols(flow: Flow, switched: bool) -> _Symbols:
 
 
 @cache
-def _code(flow: Flow, switched: bool) -> MachineCode:
-    """Machine code of the rates with their first derivatives, of these along a direction, and of the outputs.
+def _code(flow: Flow, switched: bool, name: str) -> MachineCode:
+    """Machine code of the rates with their first derivatives, of these along a direction, or of the outputs.
 
     All are functions of (y, a direction of it, the angle), modes, drive and constants with their directions.
     """
@@ -362,7 +374,13 @@ def _code(flow: Flow, switched: bool) -> MachineCode:
         s = _symbols(flow, switched)
         of = casadi.vertcat(s.y, s.drive, s.p)
         jacobian = casadi.jacobian(s.rates, of)
-        along = casadi.jtimes(casadi.vec(jacobian), of, casadi.vertcat(s.dy, s.d_drive, s.d_p))
+        if name == "first":
+            results = [s.rates, jacobian]
+        elif name == "second":
+            along = casadi.jtimes(casadi.vec(jacobian), of, casadi.vertcat(s.dy, s.d_drive, s.d_p))
+            results = [casadi.reshape(along, *jacobian.shape)]
+        else:
+            results = [s.outputs]
         arguments = [
             casadi.SX.sym("t"),
             casadi.vertcat(s.y, s.dy, s.angle),
@@ -370,17 +388,7 @@ def _code(flow: Flow, switched: bool) -> MachineCode:
             casadi.vertcat(s.drive, s.d_drive),
             casadi.vertcat(s.p, s.d_p),
         ]
-        results = {
-            "first": [s.rates, jacobian],
-            "second": [casadi.reshape(along, *jacobian.shape)],
-            "outputs": [s.outputs],
-        }
-        return MachineCode(
-            [
-                casadi.Function(name, arguments, [casadi.densify(part) for part in parts], {"cse": True})
-                for name, parts in results.items()
-            ]
-        )
+        return MachineCode([casadi.Function(name, arguments, [casadi.densify(r) for r in results], {"cse": True})])
 
 
 @cache

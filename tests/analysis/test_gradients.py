@@ -1,0 +1,417 @@
+"""Gradients of motions and of their special points against differences of what is found anew at other parameters."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from itertools import pairwise
+from math import pi
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy.optimize import root
+
+from analysis import InductionMotor, Inputs
+from analysis.mechanisms import MECHANISMS, register
+from analysis.periodic import (
+    Crossing,
+    Drive,
+    Extremum,
+    Family,
+    Gradient,
+    MotionGradient,
+    PeriodicOrbit,
+    Stability,
+    boundary_gradient,
+    crossing_gradient,
+    crossing_test,
+    extremum_gradient,
+    find_orbit,
+    follow,
+    frequency_response,
+    gradient_names,
+    motion_gradient,
+    orbit_of,
+    special_gradient,
+)
+from analysis.periodic.orbits import period_from, pieces_from
+from analysis.periodic.planes import value_of, with_values
+from analysis.periodic.starts import scale_of
+from linkwork.errors import InputError, LinkworkError, UnknownNameError
+from linkwork.five_bar.published import RAD_S_PER_RPM, SETS, TABLE_3_1
+from linkwork.slider_crank import published as rahman
+from tests.mechanisms import rotor_on_cart
+from tests.strategies import seeded
+
+FloatArray = NDArray[np.float64]
+RPM = RAD_S_PER_RPM
+RIG_1_B, RIG_2_C = (SETS[f"rig-{name}"].parameters for name in ("1-spring-b", "2-spring-c"))
+ROTOR = next(iter(rotor_on_cart.MECHANISM.published.values())).parameters
+#: The slider-crank of section 3.1 with a spring on the axial shift.
+SPRUNG = replace(rahman.parameters(20.0, 232.0), shift_stiffness=8000.0, shift_damping=60.0)
+MOTOR = InductionMotor(breakdown_torque=2.0, breakdown_slip=0.3, synchronous_speed=50.0)
+#: Where the steps of a parameter that is zero come from.
+SIZES = {"m": 0.1, "rad": 1.0, "kg": 0.1, "N": 1.0, "N.m": 0.1, "m/s2": 10.0, "kg.m2": 1e-3}
+
+
+@pytest.fixture(autouse=True, scope="module")
+def registered() -> Iterator[None]:
+    register(rotor_on_cart.MECHANISM)
+    yield
+    del MECHANISMS[rotor_on_cart.MECHANISM.name]
+
+
+def difference(of: Callable[[float], FloatArray], at: float, step: float, levels: int = 2) -> FloatArray:
+    """The derivative by central differences, extrapolated (Richardson)."""
+    steps = [step * 0.5**level for level in range(levels)]
+    values = [(of(at + h) - of(at - h)) / (2.0 * h) for h in steps]
+    for order in range(1, levels):
+        values = [(4.0**order * fine - coarse) / (4.0**order - 1.0) for coarse, fine in pairwise(values)]
+    return values[0]
+
+
+def greatest(*parts: FloatArray) -> float:
+    """The root of the greatest sum of squares of periodic functions, from their Fourier series."""
+    square = np.sum(np.square(parts), axis=0)
+    c = np.fft.rfft(square) / len(square)
+    k = np.arange(len(c))
+    weights = np.where(k == 0, 1.0, 2.0) * c
+
+    def at(angle: float, order: int) -> float:
+        return float(np.real(np.sum(weights * (1j * k) ** order * np.exp(1j * k * angle))))
+
+    angle = 2.0 * pi * float(square.argmax()) / len(square)
+    for _ in range(8):
+        angle -= at(angle, 1) / at(angle, 2)
+    return float(np.sqrt(at(angle, 0)))
+
+
+def amplitude(orbit: PeriodicOrbit) -> float:
+    """Half the range of the first free coordinate: both extremes as those of a function above zero."""
+    turn = orbit.turn(512 * orbit.turns)
+    values = turn[turn.swing]
+    low, high = values.min(), values.max()
+    far = 3.0 * (high - low)
+    return 0.5 * (greatest(values - low + far) + greatest(high + far - values) - 2.0 * far - (high - low))
+
+
+def step_of(orbit: PeriodicOrbit, name: str, relative: float) -> float:
+    unit = next(v.unit for v in orbit.flow.mechanism.variables if v.name == name)
+    value = abs(value_of(orbit.parameters, orbit.drive, name))
+    return relative * (value if value > 0.0 else SIZES[unit])
+
+
+def changed(orbit: PeriodicOrbit, name: str, value: float) -> PeriodicOrbit:
+    parameters, drive = with_values(orbit.parameters, orbit.drive, {name: value})
+    return orbit_of(parameters, drive, turns=orbit.turns, start=orbit.start, settle=False)
+
+
+def close(found: FloatArray, exact: FloatArray, size: FloatArray | float, step: float) -> bool:
+    """To a millionth, or to what the error of what is found, relative to its size, leaves of the difference."""
+    return bool(np.all(np.abs(found - exact) <= 1e-6 * np.abs(exact) + 2e-10 * np.abs(size) / step))
+
+
+def random_orbit(seed: int) -> PeriodicOrbit:
+    parameters = seeded(seed).parameters
+    smooth = replace(
+        parameters, slider_coulomb_friction=0.0, slider_damping=20.0, slider_stiffness=2000.0, gravity=9.81
+    )
+    short = replace(smooth, crank_length=0.4 * smooth.crank_length, slider_spring_free_position=0.0)
+    return orbit_of(short, Drive(speed=25.0))
+
+
+#: Motions, and outputs whose peaks are checked.
+MOTIONS: dict[str, tuple[Callable[[], PeriodicOrbit], tuple[str, ...]]] = {
+    "rig 2 C": (lambda: orbit_of(RIG_2_C, Drive(speed=500.0 * RPM)), ("drive.applied_torque", "pin.B")),
+    "rig 1 B": (lambda: orbit_of(RIG_1_B, Drive(speed=1000.0 * RPM)), ("drive.applied_torque", "pin.C")),
+    "motor, force": (lambda: find_orbit(RIG_2_C, Inputs(torque=MOTOR, force=1.0)), ("drive.applied_torque", "pin.A")),
+    "torque": (lambda: orbit_of(TABLE_3_1, Drive(torque=0.2), start=(0.0, 0.0, 45.0)), ("slider.guide_force",)),
+    "two turns": (lambda: orbit_of(RIG_2_C, Drive(speed=480.0 * RPM), turns=2), ("pin.D",)),
+    # the Fourier series of the check cannot hold what friction does
+    "friction": (lambda: orbit_of(replace(RIG_2_C, slider_coulomb_friction=0.3), Drive(speed=500.0 * RPM)), ()),
+    "slider-crank": (
+        lambda: orbit_of(SPRUNG, Drive(speed=rahman.CRANK_SPEED, forces={"axial.force": 0.0})),
+        ("drive.applied_torque",),
+    ),
+    "rotor, motor": (lambda: find_orbit(ROTOR, Inputs(torque=(MOTOR, -0.1))), ("cart.acceleration",)),
+    "random 0": (lambda: random_orbit(0), ("pin.A",)),
+    "random 7": (lambda: random_orbit(7), ("pin.B",)),
+}
+#: Those that every change is checked with.
+FAST = ("rig 2 C", "slider-crank", "rotor, motor")
+
+
+@pytest.mark.parametrize("name", [n if n in FAST else pytest.param(n, marks=pytest.mark.slow) for n in MOTIONS])
+def test_a_motion_changes_with_every_parameter_as_its_differences_say(name: str) -> None:
+    make, outputs = MOTIONS[name]
+    orbit = make()
+    motion = motion_gradient(orbit)
+
+    def quantities(at: PeriodicOrbit) -> FloatArray:
+        turn = at.turn(512 * at.turns)
+        parts = [[p for p in (o, f"{o}.fx", f"{o}.fy") if p in turn.names] for o in outputs]
+        peaks = [amplitude(at), *(greatest(*(turn[p] for p in part)) for part in parts)] if outputs else []
+        return np.array([*at.start, at.largest, at.flow.period * at.turns / turn.period, *peaks])
+
+    peaks = [motion.amplitude, *(motion.peak(output) for output in outputs)] if outputs else []
+    gradients = [motion.largest, motion.speed, *peaks]
+    exact = np.vstack([motion.start, *(g.by for g in gradients)])
+    size = np.abs(quantities(orbit))
+    size[: len(orbit.start)] = scale_of(orbit.parameters, orbit.drive, orbit.start)
+    assert [g.value for g in gradients] == pytest.approx(size[len(orbit.start) :].tolist(), rel=1e-9)
+    for column, parameter in enumerate(motion.names):
+        value = motion.values[column]
+        if value == 0.0 and _not_negative(orbit, parameter):
+            continue
+        step = step_of(orbit, parameter, 2e-3)
+        found = difference(lambda v, p=parameter: quantities(changed(orbit, p, v)), value, step)  # type: ignore[misc]
+        assert close(found, exact[:, column], size, step), (parameter, found, exact[:, column])
+
+
+def _not_negative(orbit: PeriodicOrbit, name: str) -> bool:
+    variable = orbit.flow.mechanism.mechanism_variables.get(name)
+    return variable is not None and variable.minimum == 0.0
+
+
+def test_the_cart_of_a_rotor_has_its_closed_form() -> None:
+    """At a constant speed it is a linear oscillator: amplitude m r w^2 / |k - M w^2 + i c w|, multipliers by its roots."""
+    speed = 35.0
+    motion = motion_gradient(orbit_of(ROTOR, Drive(speed=speed)))
+    m, r, k, c = ROTOR.rotor_mass, ROTOR.rotor_radius, ROTOR.cart_stiffness, ROTOR.cart_damping
+    mass = ROTOR.cart_mass + m
+    a, b = k - mass * speed**2, c * speed
+    size = m * r * speed**2 / np.hypot(a, b)
+    assert motion.amplitude.value == pytest.approx(size, rel=1e-10)
+    expected = {
+        "rotor.radius": size / r,
+        "cart.stiffness": -size * a / (a * a + b * b),
+        "cart.damping": -size * b * speed / (a * a + b * b),
+        "rotor.mass": size / m + size * a * speed**2 / (a * a + b * b),
+        "gravity": 0.0,
+    }
+    for name, value in expected.items():
+        assert motion.amplitude[name] == pytest.approx(value, rel=1e-8, abs=1e-13)
+    # |multiplier| = exp(-c T / (2 M))
+    largest = np.exp(-c * pi / (speed * mass))
+    assert motion.largest["cart.damping"] == pytest.approx(-largest * pi / (speed * mass), rel=1e-8)
+    assert motion.largest["drive.speed"] == pytest.approx(largest * c * pi / (mass * speed**2), rel=1e-8)
+
+
+def test_resonance_of_the_rotor_has_its_closed_form() -> None:
+    """The amplitude over the speed is greatest at w^2 = k^2 / (k M - c^2 / 2), M with the rotor."""
+    m, r, k, c = ROTOR.rotor_mass, ROTOR.rotor_radius, ROTOR.cart_stiffness, ROTOR.cart_damping
+    mass = ROTOR.cart_mass + m
+    resonance = k / np.sqrt(k * mass - 0.5 * c * c)
+    found = extremum_gradient(orbit_of(ROTOR, Drive(speed=1.03 * resonance)), "drive.speed")
+    assert found.place.value == pytest.approx(resonance, rel=1e-9)
+    assert found.amplitude.value == pytest.approx(m * r / (c * np.sqrt(mass / k - (0.5 * c / k) ** 2)), rel=1e-9)
+    inner = k * mass - 0.5 * c * c
+    expected = {
+        "cart.stiffness": resonance / k - 0.5 * resonance * mass / inner,
+        "cart.damping": 0.5 * resonance * c / inner,
+        "cart.mass": -0.5 * resonance * k / inner,
+        "rotor.radius": 0.0,
+    }
+    for name, value in expected.items():
+        assert found.place[name] == pytest.approx(value, rel=1e-6, abs=1e-7)
+    assert found.amplitude["rotor.radius"] == pytest.approx(found.amplitude.value / r, rel=1e-8)
+    assert set(found.amplitude.movers(2)) == {"cart.damping", "rotor.radius"}
+
+
+def relocated(orbit: PeriodicOrbit, kind: Crossing, along: str, name: str, value: float) -> FloatArray:
+    """Place and amplitude of a crossing at another parameter: SciPy's solution of y(T) = y(0) and the test."""
+    parameters, drive = with_values(orbit.parameters, orbit.drive, {name: value})
+    here = value_of(parameters, drive, along)
+    scale = np.append(scale_of(parameters, drive, orbit.start), abs(here))
+
+    def operation(z: FloatArray) -> tuple[Any, Drive]:
+        return with_values(parameters, drive, {along: float(z[-1] * scale[-1])})
+
+    def residual(z: FloatArray) -> FloatArray:
+        period = period_from(*operation(z), z[:-1] * scale[:-1], orbit.turns)
+        return np.append(period.shift / scale[:-1], crossing_test(period.monodromy, kind))
+
+    found = root(residual, np.append(orbit.start, here) / scale, tol=1e-13, options={"eps": 1e-7}).x
+    there = replace(orbit, parameters=operation(found)[0], drive=operation(found)[1], start=found[:-1] * scale[:-1])
+    return np.array([found[-1] * scale[-1], amplitude(there)])
+
+
+#: Parameters, drive, along, range of the branch with its beginning first, direction, guess, kind.
+POINTS: dict[str, tuple[Any, Drive, str, tuple[float, float, float], int, Any, Crossing]] = {
+    "fold": (
+        RIG_1_B, Drive(speed=1000.0 * RPM), "drive.speed",
+        (1000.0 * RPM, 990.0 * RPM, 1100.0 * RPM), 1, None, Crossing.FOLD,
+    ),
+    "fold, torque": (
+        RIG_2_C, Drive(torque=0.04), "drive.torque", (0.04, 0.03, 0.06), 1, (0.0, 0.0, 60.0), Crossing.FOLD,
+    ),
+    "doubling": (
+        replace(RIG_2_C, slider_damping=0.5), Drive(speed=1180.0 * RPM), "drive.speed",
+        (1180.0 * RPM, 1170.0 * RPM, 1185.0 * RPM), -1, None, Crossing.PERIOD_DOUBLING,
+    ),
+    "torus": (
+        TABLE_3_1, Drive(torque=0.12), "drive.torque", (0.12, 0.1, 0.13), -1, (0.0, 0.0, 90.0), Crossing.TORUS,
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", [n if n == "fold" else pytest.param(n, marks=pytest.mark.slow) for n in POINTS])
+def test_a_special_point_moves_as_its_differences_say(name: str) -> None:
+    parameters, drive, along, (begin, low, high), direction, guess, kind = POINTS[name]
+    family = Family(parameters=parameters, drive=drive, vary=along)
+    branch = follow(family, orbit_of(parameters, drive, start=guess), begin, low=low, high=high, direction=direction)
+    point = next(s for s in branch.special if s.kind is kind)
+    chosen = ("slider.damping", "slider.stiffness", "crank.length", "rocker.mass", "coupler.cog_angle", "slider.force")
+    found = special_gradient(family, point, chosen)
+    assert found.place.value == pytest.approx(point.parameter, rel=1e-8)
+    size = np.array([found.place.value, found.amplitude.value])
+    for column, parameter in enumerate(chosen):
+        step = step_of(found.orbit, parameter, 2e-3)
+        differences = difference(
+            lambda v, p=parameter: relocated(found.orbit, kind, along, p, v),  # type: ignore[misc]
+            found.place.at[column],
+            step,
+            levels=3,
+        )
+        exact = np.array([found.place.by[column], found.amplitude.by[column]])
+        assert close(differences, exact, size, step), (parameter, differences, exact)
+    # the normal of the boundary over two parameters is across the direction in which it goes
+    normal = boundary_gradient(found.orbit, kind, (along, "slider.damping"))
+    assert normal["slider.damping"] / normal[along] == pytest.approx(-found.place["slider.damping"], rel=1e-8)
+    # from a motion beside it the same point is found
+    beside = changed(found.orbit, along, found.place.value * (0.998 if kind is Crossing.FOLD else 1.001))
+    again = crossing_gradient(beside, kind, along, ("slider.damping",))
+    assert again.place.value == pytest.approx(found.place.value, rel=1e-9)
+    assert again.place.by == pytest.approx(found.place.by[:1], rel=1e-6)
+
+
+@pytest.mark.slow
+def test_a_resonance_moves_as_its_differences_say() -> None:
+    """Where the derivative of the amplitude, which is checked above, is zero at other parameters, by the secant method."""
+
+    def resonance(orbit: PeriodicOrbit, name: str, value: float) -> FloatArray:
+        parameters, drive = with_values(orbit.parameters, orbit.drive, {name: value})
+        speeds, slopes = [drive.speed or 0.0, 1.0001 * (drive.speed or 0.0)], []
+        for _ in range(8):
+            there = orbit_of(parameters, replace(drive, speed=speeds[len(slopes)]), start=orbit.start, settle=False)
+            slopes.append(motion_gradient(there, ("drive.speed",)).amplitude["drive.speed"])
+            if len(slopes) > 1:
+                step = slopes[-1] * (speeds[-1] - speeds[-2]) / (slopes[-1] - slopes[-2])
+                speeds.append(speeds[-1] - step)
+                if abs(step) < 1e-10 * speeds[-1]:
+                    break
+        return np.array([speeds[-1], amplitude(there)])
+
+    response = frequency_response(RIG_2_C, 560.0 * RPM, 620.0 * RPM, doubled=False)
+    (peak,) = response.maxima()
+    found = special_gradient(response.family, peak)
+    assert found.place.value == pytest.approx(peak.parameter, rel=1e-4)
+    assert found.amplitude.value == pytest.approx(peak.amplitude, rel=1e-5)
+    size = np.array([found.place.value, found.amplitude.value])
+    for name in ("slider.damping", "slider.stiffness", "crank.length", "rocker.inertia", "slider.guide_angle"):
+        column = found.place.names.index(name)
+        step = step_of(found.orbit, name, 4e-3)
+        differences = difference(
+            lambda v, p=name: resonance(found.orbit, p, v),  # type: ignore[misc]
+            found.place.at[column],
+            step,
+        )
+        exact = np.array([found.place.by[column], found.amplitude.by[column]])
+        assert close(differences, exact, size, step), (name, differences, exact)
+    # a stiffer spring by 1 % resonates half a percent higher: w^2 = k / m
+    assert found.place.elasticities["slider.stiffness"] == pytest.approx(0.5, abs=0.02)
+
+
+def test_tests_of_crossings_are_those_of_the_monodromy_matrix() -> None:
+    orbit = orbit_of(TABLE_3_1, Drive(torque=0.2), start=(0.0, 0.0, 45.0))
+    motion = motion_gradient(orbit, ("slider.damping", "drive.torque"))
+    for kind in Crossing:
+        test = motion.test(kind)
+        assert test.value == pytest.approx(float(crossing_test(orbit.monodromy, kind)), rel=1e-10)
+        for column, name in enumerate(motion.names):
+            step = step_of(orbit, name, 2e-3)
+            found = difference(
+                lambda v, p=name, k=kind: crossing_test(changed(orbit, p, v).monodromy, k),  # type: ignore[misc]
+                motion.values[column],
+                step,
+            )
+            assert close(found, test.by[column], 1.0, step)
+
+
+def in_pieces(orbit: PeriodicOrbit, name: str, value: float) -> PeriodicOrbit:
+    """The motion at another parameter by Newton's method on y at the stations."""
+    parameters, drive = with_values(orbit.parameters, orbit.drive, {name: value})
+    assert orbit.stations is not None
+    angles, starts = orbit.stations.angles, orbit.stations.starts.copy()
+    k, n = starts.shape
+    for _ in range(6):
+        ends, matrices, _ = pieces_from(parameters, drive, angles, starts)
+        jacobian = np.zeros((k, n, k, n))
+        for piece in range(k):
+            jacobian[piece, :, piece] = matrices[piece]
+            jacobian[piece, :, (piece + 1) % k] -= np.eye(n)
+        gaps = ends - np.roll(starts, -1, axis=0)
+        starts -= np.linalg.solve(jacobian.reshape(k * n, k * n), gaps.ravel()).reshape(k, n)
+    stations = orbit.stations._replace(starts=starts)
+    return replace(orbit, parameters=parameters, drive=drive, start=starts[0].copy(), stations=stations)
+
+
+@pytest.mark.slow
+def test_an_unstable_motion_that_is_followed_in_pieces() -> None:
+    """A multiplier of thousands: the derivatives of the motion are as good as those of a stable one."""
+    orbit = orbit_of(RIG_1_B, Drive(speed=1200.0 * RPM))
+    family = Family(parameters=RIG_1_B, drive=orbit.drive)
+    branch = follow(family, orbit, 1200.0 * RPM, low=500.0 * RPM, high=1300.0 * RPM, direction=-1)
+    grown = [o for o in branch.orbits if o.stations is not None and o.largest > 1e3]
+    orbit = grown[len(grown) // 2]
+    motion = motion_gradient(orbit, ("drive.speed", "slider.damping", "crank.length"))
+    for column, name in enumerate(motion.names):
+        step = step_of(orbit, name, 1e-4)
+
+        def size(value: float, name: str = name) -> FloatArray:
+            return np.array([amplitude(in_pieces(orbit, name, value))])
+
+        found = difference(size, motion.values[column], step)
+        assert close(found, motion.amplitude.by[column : column + 1], motion.amplitude.value, step), name
+
+
+@pytest.mark.slow
+def test_friction_by_contact_forces_can_be_added_to_a_motion_without() -> None:
+    """The derivative at none, from the side on which there is some."""
+    orbit = orbit_of(RIG_2_C, Drive(speed=500.0 * RPM))
+    assert "slider.friction_coefficient" not in gradient_names(orbit.parameters, orbit.drive)
+    (slope,) = motion_gradient(orbit, ("slider.friction_coefficient",)).amplitude.by
+
+    def size(coefficient: float) -> float:
+        return amplitude(changed(orbit, "slider.friction_coefficient", coefficient))
+
+    h = 1e-3
+    forward = (-3.0 * size(0.0) + 4.0 * size(h) - size(2.0 * h)) / (2.0 * h)
+    assert slope == pytest.approx(forward, rel=1e-3)
+
+
+def test_what_has_no_gradient_says_so() -> None:
+    orbit = orbit_of(RIG_2_C, Drive(speed=500.0 * RPM))
+    with pytest.raises(UnknownNameError, match=r"slider.dampin"):
+        motion_gradient(orbit, ("slider.dampin",))
+    with pytest.raises(InputError, match=r"drive.torque cannot vary"):
+        motion_gradient(orbit, ("drive.torque",))
+    motion = motion_gradient(orbit, ("slider.damping",))
+    with pytest.raises(UnknownNameError, match=r"slider.mass"):
+        motion.amplitude["slider.mass"]
+    with pytest.raises(UnknownNameError, match=r"pin.Z"):
+        motion.peak("pin.Z")
+    with pytest.raises(LinkworkError, match="no extremum"):
+        extremum_gradient(orbit_of(RIG_2_C, Drive(speed=200.0 * RPM)), "drive.speed")
+    with pytest.raises(LinkworkError, match="no period doubling"):
+        crossing_gradient(orbit, Crossing.PERIOD_DOUBLING, "drive.speed")
+    family = Family(parameters=RIG_2_C, drive=orbit.drive, vary=lambda value: (RIG_2_C, Drive(speed=value)))
+    peak = Extremum(parameter=1.0, amplitude=1.0, stability=Stability.STABLE, orbit=orbit)
+    with pytest.raises(InputError, match="is a function"):
+        special_gradient(family, peak)
+    nothing = Gradient(value=0.0, names=("a",), by=np.ones(1), at=np.ones(1))
+    with pytest.raises(InputError, match="no elasticities"):
+        nothing.movers()
+    assert isinstance(motion, MotionGradient)
