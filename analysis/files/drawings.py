@@ -1,16 +1,16 @@
 """A linkage and its curves drawn to scale, as plain lines, circles, polylines and texts on named layers, for CAD.
 
-A `Drawing` is in m with y upwards and knows no mechanics; `to_dxf` and `to_svg` write it in a unit of length. The same
-drawing gives the same text, byte for byte.
+A `Drawing` is in m with y upwards and knows no mechanics; it may have dimensions. `to_dxf` and `to_svg` write it in a unit of
+length; the same drawing gives the same text, byte for byte.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from io import StringIO
-from math import isfinite
+from math import atan2, cos, degrees, hypot, isfinite, radians, sin
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -30,15 +30,20 @@ Point = tuple[float, float]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Layer:
-    """How what is on a layer looks: its colour as 0xRRGGBB and the width of its lines (m)."""
+    """How what is on a layer looks: its colour as 0xRRGGBB and the width of its lines (m).
+
+    Where the reader is to see it at any rate it is in the ``foreground``: in DXF black on white and white on black.
+    """
 
     colour: int
     width: float
+    foreground: bool = False
 
 
-#: The layers there are, drawn in this order.
+#: The layers there are, drawn in this order; their colours are seen on white and on black.
 LAYERS = {
-    "ground": Layer(colour=0x404040, width=0.35e-3),
+    "poses": Layer(colour=0x808080, width=0.13e-3),
+    "ground": Layer(colour=0x404040, width=0.35e-3, foreground=True),
     "guide": Layer(colour=0x808080, width=0.25e-3),
     "crank": Layer(colour=0xC0392B, width=0.5e-3),
     "coupler": Layer(colour=0x1F6FB4, width=0.5e-3),
@@ -46,7 +51,10 @@ LAYERS = {
     "slider": Layer(colour=0x8E44AD, width=0.35e-3),
     "coupler-curve": Layer(colour=0x1F6FB4, width=0.25e-3),
     "target": Layer(colour=0xD35400, width=0.25e-3),
-    "text": Layer(colour=0x202020, width=0.18e-3),
+    "plate": Layer(colour=0x202020, width=0.5e-3, foreground=True),
+    "hole": Layer(colour=0xC0392B, width=0.35e-3),
+    "dimension": Layer(colour=0x1F6FB4, width=0.18e-3),
+    "text": Layer(colour=0x202020, width=0.18e-3, foreground=True),
 }
 
 #: Units of length, by their code in the DXF variable $INSUNITS.
@@ -54,6 +62,8 @@ UNITS = {"mm": 4, "cm": 5, "m": 6, "in": 1}
 #: Those that SVG has.
 SVG_UNITS = ("mm", "cm", "in")
 _NO_GUID = "{00000000-0000-0000-0000-000000000000}"
+#: AutoCAD's colour that is the opposite of the background.
+_FOREGROUND = 7
 #: Margin of an SVG around the drawing, as a share of its larger extent.
 MARGIN = 0.05
 
@@ -95,11 +105,16 @@ class Circle:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Polyline:
-    """Points joined by straight lines, shape (n, 2) in m; the last one to the first if closed."""
+    """Points joined by straight lines, shape (n, 2) in m; the last one to the first if closed.
+
+    Where ``bulges`` are given, one a point, the way from it to the next is an arc: the tangent of a quarter of its angle,
+    above zero counter-clockwise, as in DXF; at most 1, a half circle.
+    """
 
     layer: str
     points: NDArray[np.float64]
     closed: bool = False
+    bulges: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
         points = np.array(self.points, dtype=float)
@@ -113,8 +128,21 @@ class Polyline:
             raise InputError(
                 f"on layer {self.layer}: point {bad[0]} of a polyline is {points[bad[0]]}: it must be finite"
             )
+        if self.bulges and (len(self.bulges) != len(points) or not all(abs(b) <= 1.0 for b in self.bulges)):
+            raise InputError(
+                f"on layer {self.layer}: bulges {self.bulges} of a polyline of {len(points)} points: one a point, from -1 to 1"
+            )
         points.setflags(write=False)
         object.__setattr__(self, "points", points)
+
+    @property
+    def around(self) -> NDArray[np.float64]:
+        """Points between which all of it lies, shape (n, 2): of an arc, its ends and the corners of a box about it."""
+        ways = np.roll(self.points, -1, axis=0) - self.points
+        bulges = np.array(self.bulges or np.zeros(len(ways)))[:, None]
+        # the height of an arc over its chord
+        out = 0.5 * bulges * np.column_stack([ways[:, 1], -ways[:, 0]])
+        return np.vstack([self.points, self.points + out, self.points + ways + out])
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -134,6 +162,33 @@ class Text:
             raise InputError(f"a text is {self.text!r}: it must be one line of printable characters")
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Dimension:
+    """The distance between two points (m), written over a line beside them; ``offset`` to the left of the way (m)."""
+
+    layer: str
+    start: Point
+    end: Point
+    offset: float
+    height: float
+
+    def __post_init__(self) -> None:
+        _check(self.layer, *self.start, *self.end, self.offset, self.height)
+        if self.start == self.end or self.height <= 0.0:
+            raise InputError(
+                f"a dimension from {self.start} to {self.end} m in letters of {self.height} m: "
+                "it must have a length and a height"
+            )
+
+    @property
+    def line(self) -> tuple[Point, Point]:
+        """Ends of the line that carries the number (m)."""
+        (x1, y1), (x2, y2) = self.start, self.end
+        share = self.offset / hypot(x2 - x1, y2 - y1)
+        dx, dy = share * (y1 - y2), share * (x2 - x1)
+        return (x1 + dx, y1 + dy), (x2 + dx, y2 + dy)
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Drawing:
     """What is drawn, in m with y upwards.
@@ -142,7 +197,7 @@ class Drawing:
     ----------
     title : str
         One line.
-    lines, circles, polylines, texts
+    lines, circles, polylines, dimensions, texts
         In any order; they are drawn by layer.
 
     Raises
@@ -155,6 +210,7 @@ class Drawing:
     lines: tuple[Line, ...] = ()
     circles: tuple[Circle, ...] = ()
     polylines: tuple[Polyline, ...] = ()
+    dimensions: tuple[Dimension, ...] = ()
     texts: tuple[Text, ...] = ()
 
     def __post_init__(self) -> None:
@@ -172,7 +228,8 @@ class Drawing:
         points = np.vstack(
             [np.array([p for line in self.lines for p in (line.start, line.end)]).reshape(-1, 2)]
             + [np.array(c.centre) + side * c.radius for c in self.circles for side in (-1.0, 1.0)]
-            + [p.points for p in self.polylines]
+            + [p.around for p in self.polylines]
+            + [np.array(d.line) for d in self.dimensions]
             + [np.array([t.position for t in self.texts]).reshape(-1, 2)]
         )
         (left, bottom), (right, top) = points.min(axis=0).tolist(), points.max(axis=0).tolist()
@@ -184,6 +241,11 @@ def _metres(unit: str, known: Iterable[str]) -> float:
     if unit not in names:
         raise ParameterError("unit", unit, f"be one of {', '.join(names)}")
     return LENGTHS[unit]
+
+
+def _number(dimension: Dimension, metre: float) -> str:
+    """The distance in a unit, to its hundredths at the finest."""
+    return f"{round(hypot(*np.subtract(dimension.end, dimension.start)) / metre, 2):g}"
 
 
 def to_dxf(drawing: Drawing, unit: str = "mm") -> str:
@@ -209,12 +271,15 @@ def to_dxf(drawing: Drawing, unit: str = "mm") -> str:
     from ezdxf.version import __version__
 
     metre = _metres(unit, UNITS)
-    document = new("R2010")
+    document = new("R2010", setup=["styles", "dimstyles"])
     document.units = UNITS[unit]
     document.header["$MEASUREMENT"] = 0 if unit == "in" else 1
     for name, layer in LAYERS.items():
         entry = document.layers.add(name, lineweight=round(layer.width * 1e5))
-        entry.rgb = (layer.colour >> 16, layer.colour >> 8 & 255, layer.colour & 255)
+        if layer.foreground:
+            entry.color = _FOREGROUND
+        else:
+            entry.rgb = (layer.colour >> 16, layer.colour >> 8 & 255, layer.colour & 255)
     space = document.modelspace()
 
     def at(point: Point) -> Point:
@@ -225,8 +290,27 @@ def to_dxf(drawing: Drawing, unit: str = "mm") -> str:
     for circle in drawing.circles:
         space.add_circle(at(circle.centre), circle.radius / metre, dxfattribs={"layer": circle.layer})
     for polyline in drawing.polylines:
-        points = (polyline.points / metre).tolist()
-        space.add_lwpolyline(points, close=polyline.closed, dxfattribs={"layer": polyline.layer})
+        bulges = polyline.bulges or [0.0] * len(polyline.points)
+        points = [(x, y, bulge) for (x, y), bulge in zip((polyline.points / metre).tolist(), bulges)]
+        space.add_lwpolyline(points, format="xyb", close=polyline.closed, dxfattribs={"layer": polyline.layer})
+    for dimension in drawing.dimensions:
+        height = dimension.height / metre
+        look = {
+            "dimtxt": height,
+            "dimasz": height,
+            "dimexo": 0.5 * height,
+            "dimexe": 0.5 * height,
+            "dimgap": 0.3 * height,
+        }
+        drawn = space.add_aligned_dim(
+            at(dimension.start),
+            at(dimension.end),
+            dimension.offset / metre,
+            text=_number(dimension, metre),
+            override=look | {"dimtad": 1, "dimblk": ""},
+            dxfattribs={"layer": dimension.layer},
+        )
+        drawn.render()
     for text in drawing.texts:
         space.add_text(
             text.text,
@@ -305,8 +389,14 @@ def to_svg(drawing: Drawing, unit: str = "mm") -> str:
     for circle in drawing.circles:
         put(circle.layer, "circle", cx=circle.centre[0], cy=-circle.centre[1], r=circle.radius)
     for polyline in drawing.polylines:
-        points = " L ".join(f"{number(px)},{number(-py)}" for px, py in polyline.points.tolist())
-        put(polyline.layer, "path", d=f"M {points}{' Z' if polyline.closed else ''}")
+        put(polyline.layer, "path", d=_path(polyline, number))
+    for dimension in drawing.dimensions:
+        ends = dimension.line
+        for (x1, y1), (x2, y2) in (ends, *zip((dimension.start, dimension.end), ends)):
+            put(dimension.layer, "line", x1=x1, y1=-y1, x2=x2, y2=-y2)
+        for here, there in (ends, ends[::-1]):
+            put(dimension.layer, "path", d=_arrow(here, there, dimension.height, number))
+        _write(put, dimension, metre, number)
     for text in drawing.texts:
         element = put(text.layer, "text", x=text.position[0], y=-text.position[1], **{"font-size": text.height})
         element.set("font-family", "sans-serif")
@@ -316,6 +406,46 @@ def to_svg(drawing: Drawing, unit: str = "mm") -> str:
     root.extend(group for group in groups.values() if len(group))
     ElementTree.indent(root)
     return ElementTree.tostring(root, encoding="unicode") + "\n"
+
+
+def _path(polyline: Polyline, number: Callable[[float], str]) -> str:
+    """The data of an SVG path along a polyline; its y points down, so that a left turn stays one."""
+    points = polyline.points.tolist()
+    bulges = polyline.bulges or [0.0] * len(points)
+    parts = [f"M {number(points[0][0])},{number(-points[0][1])}"]
+    following = [*points[1:], *(points[:1] if polyline.closed and polyline.bulges else [])]
+    for (x1, y1), bulge, (x2, y2) in zip(points, bulges, following):
+        if bulge:
+            radius = number(hypot(x2 - x1, y2 - y1) * (1.0 + bulge * bulge) / (4.0 * abs(bulge)))
+            parts.append(f"A {radius} {radius} 0 0 {0 if bulge > 0.0 else 1} {number(x2)},{number(-y2)}")
+        else:
+            parts.append(f"L {number(x2)},{number(-y2)}")
+    return " ".join(parts) + (" Z" if polyline.closed else "")
+
+
+def _arrow(tip: Point, towards: Point, height: float, number: Callable[[float], str]) -> str:
+    """The data of an SVG path: the two barbs of an arrow with its tip at the end of a line."""
+    way = np.subtract(towards, tip)
+    along = height * way / hypot(*way)
+    barbs = [tip + along + side * np.array([-along[1], along[0]]) for side in (0.2, -0.2)]
+    (ax, ay), (bx, by) = barbs
+    return f"M {number(ax)},{number(-ay)} L {number(tip[0])},{number(-tip[1])} L {number(bx)},{number(-by)}"
+
+
+def _write(put: Callable[..., Any], dimension: Dimension, metre: float, number: Callable[[float], str]) -> None:
+    """The number of a dimension over the middle of its line, readable from below or from the right."""
+    (x1, y1), (x2, y2) = dimension.line
+    turned = degrees(atan2(y2 - y1, x2 - x1))
+    turned -= 180.0 * round(turned / 180.0 - 1e-9)
+    up = 0.3 * dimension.height
+    x = 0.5 * (x1 + x2) - up * sin(radians(turned))
+    y = 0.5 * (y1 + y2) + up * cos(radians(turned))
+    text = put(dimension.layer, "text", x=x, y=-y, **{"font-size": dimension.height, "text-anchor": "middle"})
+    text.set("transform", f"rotate({-turned + 0.0:.6g} {number(x)} {number(-y)})")
+    text.set("font-family", "sans-serif")
+    text.set("fill", f"#{LAYERS[dimension.layer].colour:06x}")
+    text.set("stroke", "none")
+    text.text = _number(dimension, metre)
 
 
 def save_drawing(path: str | Path, drawing: Drawing, *, unit: str = "mm") -> Path:

@@ -28,7 +28,7 @@ from .constraints import (
     PivotRegion,
     Require,
 )
-from .drawing import drawing
+from .drawing import drawing, plates
 from .functions import Generators, function_generators
 from .linkage import ANGLES, LENGTHS, LINKS, UNITS, Linkage, SecondCrank, SliderMotion
 from .report import (
@@ -138,6 +138,7 @@ __all__ = [
     "load_synthesis_case",
     "normal_form",
     "path_from_formula",
+    "plates",
     "quality_name",
     "quality_unit",
     "ranked",

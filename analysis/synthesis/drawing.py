@@ -1,25 +1,29 @@
-"""A linkage that was found as a drawing at real size, for CAD."""
+"""A linkage that was found as drawings at real size, for CAD: the whole of it, and its links as plates."""
 
 from __future__ import annotations
 
-from math import hypot
+from collections.abc import Iterator
+from itertools import combinations
+from math import hypot, isfinite, pi
 
 import numpy as np
 from numpy.typing import NDArray
 
-from linkwork.errors import AssemblyError
+from linkwork.errors import AssemblyError, ParameterError
 
-from ..files import Circle, Drawing, Line, Polyline, Text
+from ..files import Circle, Dimension, Drawing, Line, Polyline, Text
+from .linkage import SecondCrank, SliderMotion
 from .scene import LinkageScene
-from .solution import Solution
+from .solution import Solution, target_points
 
 FloatArray = NDArray[np.float64]
+Point = tuple[float, float]
 
 #: Radius of a pin and height of a letter, as shares of the drawing's extent.
 PIN, LETTER = 0.008, 0.022
 
 
-def drawing(solution: Solution, rotation: float | None = None, *, title: str = "") -> Drawing:
+def drawing(solution: Solution, rotation: float | None = None, *, poses: int = 0, title: str = "") -> Drawing:
     """Links, pins, guide, coupler curve and target in the plane's own coordinates (m), for `files.save_drawing`.
 
     Parameters
@@ -27,6 +31,8 @@ def drawing(solution: Solution, rotation: float | None = None, *, title: str = "
     solution : Solution
     rotation : float, optional
         Of the crank (rad); the first at which the links are joined by default.
+    poses : int
+        Further positions, at even steps over the task, thin.
     title : str
 
     Raises
@@ -52,7 +58,13 @@ def drawing(solution: Solution, rotation: float | None = None, *, title: str = "
         Circle(layer=layer, centre=pin, radius=radius)
         for layer, pin in (("ground", a), ("crank", b), ("rocker", c), (held, d))
     ]
-    polylines = []
+    further = np.linspace(scene.way[0], scene.way[-1], poses, endpoint=scene.way is not scene.turn)
+    polylines = [
+        Polyline(layer="poses", points=np.array([there[name] for name in names]))
+        for phi in further
+        if (there := scene.pins(float(phi))) is not None
+        for names in (("ABCDE" if scene.second_crank else "ABCD"), *(["BPC"] if "P" in there else []))
+    ]
     if scene.second_crank:
         lines.append(Line(layer="crank", start=e, end=d))
         circles.append(Circle(layer="ground", centre=e, radius=radius))
@@ -85,6 +97,106 @@ def drawing(solution: Solution, rotation: float | None = None, *, title: str = "
         polylines=tuple(polylines),
         texts=tuple(texts),
     )
+
+
+def plates(solution: Solution, *, width: float, thickness: float, pin: float, title: str = "") -> Drawing:
+    """The links as plates with round ends and holes for the pins, one above the other, dimensioned.
+
+    The ground link is among them where both its ends are pivots; a slider's guide is not. The coupler reaches to the coupler
+    point where the task has one.
+
+    Parameters
+    ----------
+    width, thickness : float
+        Of each plate about its holes (m).
+    pin : float
+        Diameter of the holes (m), below the width.
+    title : str
+
+    Raises
+    ------
+    ParameterError
+        If the holes are not narrower than the plates, or a size is not greater than zero.
+    """
+    for name, value in (("width", width), ("thickness", thickness), ("pin", pin)):
+        if not (isfinite(value) and value > 0.0):
+            raise ParameterError(name, value, "be a finite number greater than zero (m)")
+    if pin >= width:
+        raise ParameterError("pin", pin, f"be below the width of the plates, {width:g} m")
+    linkage = solution.linkage
+    coupler = {"B": 0j, "C": complex(linkage.coupler_length)}
+    if target_points(solution.task) is not None and linkage.point_distance > 0.0:
+        coupler["P"] = linkage.point_distance * np.exp(1j * linkage.point_angle)
+    made: dict[str, dict[str, complex]] = {
+        "crank": {"A": 0j, "B": complex(linkage.crank_length)},
+        "coupler": coupler,
+        "rocker": {"D": 0j, "C": complex(linkage.rocker_length)},
+    }
+    if not isinstance(linkage.pivot, SliderMotion):
+        made = {"ground": {"A": 0j, "E" if linkage.pivot else "D": complex(linkage.ground_length)}} | made
+    if isinstance(linkage.pivot, SecondCrank):
+        made["second crank"] = {"E": 0j, "D": complex(linkage.pivot.length)}
+    height = 0.2 * width
+    polylines, circles, dimensions, texts = [], [], [], []
+    top = 0.0
+    for name, holes in made.items():
+        places = np.array(list(holes.values()))
+        places = places + 1j * (top - places.imag.max() - 0.5 * width)
+        outline, bulges = rounded_hull(places, 0.5 * width)
+        polylines.append(Polyline(layer="plate", points=outline, closed=True, bulges=bulges))
+        at = [(float(z.real), float(z.imag)) for z in places]
+        circles += [Circle(layer="hole", centre=place, radius=0.5 * pin) for place in at]
+        texts += [
+            Text(layer="text", position=(x - 0.3 * height, y - 0.8 * width), height=height, text=letter)
+            for letter, (x, y) in zip(holes, at)
+        ]
+        dimensions += [
+            Dimension(layer="dimension", start=here, end=there, offset=offset, height=height)
+            for here, there, offset in _beside(places, width)
+        ]
+        label = f"{name}: {1e3 * width:g} x {1e3 * thickness:g} mm, holes {1e3 * pin:g} mm"
+        right = float(places.real.max()) + 1.2 * width
+        texts.append(Text(layer="text", position=(right, float(places.imag.max())), height=height, text=label))
+        top = float(places.imag.min()) - 2.6 * width
+    return Drawing(
+        title=title,
+        circles=tuple(circles),
+        polylines=tuple(polylines),
+        dimensions=tuple(dimensions),
+        texts=tuple(texts),
+    )
+
+
+def _beside(places: NDArray[np.complex128], width: float) -> Iterator[tuple[Point, Point, float]]:
+    """Each pair of holes that are apart, with the offset of its dimension: outside the plate, none over another."""
+    for number, (i, k) in enumerate(combinations(range(len(places)), 2)):
+        way = places[k] - places[i]
+        if abs(way) <= 1e-9:
+            continue
+        sides = [float(((z - places[i]) * way.conjugate()).imag) / abs(way) for z in places]
+        flat = max(map(abs, sides)) < 0.5 * width
+        offset = (0.8 + (0.35 * number if flat else 0.0)) * width
+        (x1, y1), (x2, y2) = ((float(z.real), float(z.imag)) for z in (places[i], places[k]))
+        yield (x1, y1), (x2, y2), -offset if max(sides, key=abs) > 0.0 and not flat else offset
+
+
+def rounded_hull(places: NDArray[np.complex128], radius: float) -> tuple[FloatArray, tuple[float, ...]]:
+    """Outline about two or three points at a distance, of edges and arcs: points, and bulges as of `files.Polyline`."""
+    farthest = max(combinations(range(len(places)), 2), key=lambda pair: float(abs(places[pair[0]] - places[pair[1]])))
+    ends = places[list(farthest)]
+    if len(places) == 3:
+        a, b, c = places
+        turned = ((b - a).conjugate() * (c - a)).imag
+        if abs(turned) > 1e-9 * abs(ends[1] - ends[0]) ** 2:
+            ends = places if turned > 0.0 else places[::-1]
+    edges = np.roll(ends, -1) - ends
+    normals = -1j * edges / np.abs(edges)
+    before = np.roll(normals, 1)
+    # about each corner an arc from the edge before to the edge after, then that edge
+    points = np.column_stack([ends + radius * before, ends + radius * normals]).ravel()
+    turns = np.angle(normals / before) % (2.0 * pi)
+    bulges = np.column_stack([np.minimum(np.tan(0.25 * turns), 1.0), np.zeros(len(ends))]).ravel()
+    return np.column_stack([points.real, points.imag]), tuple(bulges.tolist())
 
 
 def _curve(layer: str, points: FloatArray) -> Polyline:
