@@ -30,7 +30,11 @@ from .common import (
 )
 
 if TYPE_CHECKING:
+    from ..motion import SliderDrive
     from ..synthesis import Solution, TradeOff
+
+#: Further positions in a drawing.
+POSES = 6
 
 
 def settings_of(settings: Sequence[str]) -> dict[str, Any]:
@@ -130,7 +134,7 @@ def write_described(solution: Solution, folder: Path, title: str, *, curve: str,
 
     described = write_text(folder / f"{text}.txt", f"{title}\n\n{report(solution)}")
     written = [solution.to_csv(folder / f"{curve}.csv"), described]
-    picture = drawing(solution, title=title)
+    picture = drawing(solution, poses=POSES, title=title)
     return written + [save_drawing(folder / f"{drawn}.{ending}", picture) for ending in ("dxf", "svg")]
 
 
@@ -139,9 +143,9 @@ def write_solution(
 ) -> list[Path]:
     """Everything about one solution: drawing, curve, report, parameters and a case that runs; what was written."""
     from .. import figures
-    from ..files import save_figure, write_tables
+    from ..files import save_drawing, save_figure, write_tables
     from ..run import save_parameters
-    from ..synthesis import SecondCrank
+    from ..synthesis import SecondCrank, plates
 
     written = write_described(solution, folder, title, curve="best-curve", text="best-report", drawn="best")
     pivot = solution.linkage.pivot
@@ -149,12 +153,28 @@ def write_solution(
         written.append(save_parameters(folder / "five-bar-parameters.toml", make.five_bar(solution)))
     if pivot is None:
         written.append(write_tables(folder / "five-bar.toml", make.run_case(solution, title)))
+    cut = plates(solution, width=make.width, thickness=make.thickness, pin=make.hole, title=title)
+    written += [save_drawing(folder / f"best-plates.{ending}", cut) for ending in ("dxf", "svg")]
     if plots:
         written.append(save_figure(figures.plot(solution, title=title), folder / "best-linkage.png"))
+        sheet = figures.plot_sheet(solution, _turn(solution, make), title=title, made=make.describe())
+        written.append(save_figure(sheet, folder / "best-sheet.pdf"))
     if animate:
         with console.status("animating"):
             written.append(figures.animate(solution, folder / "best.gif", title=title))
     return written
+
+
+def _turn(solution: Solution, make: Any) -> SliderDrive | None:
+    """A turn at constant speed, the slider where it is to be; None where the crank cannot turn fully, or for a second crank."""
+    from ..motion import inverse_dynamics, motion_of_plant
+    from ..synthesis import SecondCrank, direction
+
+    linkage = solution.linkage
+    if isinstance(linkage.pivot, SecondCrank) or not linkage.turns_fully:
+        return None
+    speed = direction(solution) * make.speed
+    return inverse_dynamics(make.moving(linkage), motion_of_plant(linkage), speed, samples=360)
 
 
 @click.command()
@@ -182,8 +202,8 @@ def synthesize(
 ) -> None:
     """Find linkages that do what a CASE file (TOML or JSON) asks for: a path, a function of the rocker, a motion.
 
-    Writes the ranked linkages, and of the first its drawing (DXF, SVG), curve, report, plots, the parameters of the FMU, and a
-    case that 'linkwork run' runs.
+    Writes the ranked linkages, and of the first its drawing and its plates (DXF, SVG), a sheet (PDF), curve, report, plots, the
+    parameters of the FMU, and a case that 'linkwork run' runs.
 
     \b
     Examples:

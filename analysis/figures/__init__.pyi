@@ -29,5 +29,6 @@ from .style import STYLE as STYLE
 from .style import Figure as Figure
 from .synthesis import animate_solution as animate_solution
 from .synthesis import plot_alternatives as plot_alternatives
+from .synthesis import plot_sheet as plot_sheet
 from .synthesis import plot_solution as plot_solution
 from .synthesis import plot_trade_off as plot_trade_off

@@ -22,16 +22,19 @@ from numpy.typing import NDArray
 
 from linkwork.errors import InputError
 
+from ..motion import SliderDrive
 from ..synthesis import (
     InfeasibleError,
     LinkageScene,
     Solution,
     Synthesis,
     TradeOff,
+    dimension_rows,
     error_unit,
     headline,
     quality_name,
     quality_unit,
+    rounding_line,
 )
 from .dispatch import animate, plot
 from .style import (
@@ -49,15 +52,19 @@ from .style import (
     SLIDER,
     TARGET,
     THIN,
+    TINY,
     TRACE,
     finish,
     styled,
+    write_notes,
     write_title,
 )
 
 FloatArray = NDArray[np.float64]
 
 MM_PER_METRE = 1e3
+#: A sheet of paper, across (in).
+A4 = (297.0 / 25.4, 210.0 / 25.4)
 #: Length of the longest error vector, as a share of the target's extent.
 LONGEST = 0.12
 #: Rotations whose positions the frame of a picture must hold.
@@ -378,6 +385,72 @@ def plot_solution(solution: Solution, *, title: str = "") -> Figure:
         write_title(figure, scene.title)
         figure.align_ylabels([panels[name] for name in right])
         return finish(figure)
+
+
+def plot_sheet(solution: Solution, drive: SliderDrive | None = None, *, title: str = "", made: str = "") -> Figure:
+    """A page for the workshop, A4: the linkage, its curve against the target, transmission angle, pin forces, dimensions.
+
+    Parameters
+    ----------
+    solution : Solution
+    drive : SliderDrive, optional
+        A turn at constant speed: the forces on the pins are its. Without it there is no panel of them.
+    title : str
+    made : str
+        What it is made of, and what its forces are for, in a line.
+
+    Raises
+    ------
+    InputError
+        If the links cannot be joined anywhere.
+    """
+    scene = LinkageScene(solution, title)
+    _, pins = _start(scene)
+    with styled():
+        figure = Figure(figsize=A4)
+        right = ["task", "transmission", *(["forces"] if drive is not None else [])]
+        rows: list[Any] = [*(["linkage", name] for name in right), ["table", "table"]]
+        panels = figure.subplot_mosaic(
+            rows,
+            width_ratios=(1.2, 1.0),
+            height_ratios=(*(1.6 if name == "task" else 1.0 for name in right), 1.3),
+        )
+        _Frame(scene, _around(scene)).prepare(panels["linkage"])
+        _draw_target(panels["linkage"], scene, size=2.0)
+        _draw_curves(panels["linkage"], scene)
+        _draw_linkage(panels["linkage"], scene, _Frame(scene, _around(scene)), pins)
+        if scene.function is not None:
+            _rocker(panels["task"], scene)
+        else:
+            _enlarged(panels["task"], scene)
+        _transmission(panels["transmission"], scene)
+        if drive is not None:
+            _forces(panels["forces"], drive)
+        head, *dimensions = dimension_rows(solution)
+        panels["table"].axis("off")
+        grid = panels["table"].table(
+            dimensions, colLabels=head, cellLoc="right", loc="upper center", edges="horizontal"
+        )
+        grid.auto_set_font_size(False)
+        grid.set_fontsize(TINY)
+        grid.auto_set_column_width(range(len(head)))
+        write_title(figure, scene.title)
+        write_notes(
+            figure, [line for line in (headline(solution).replace("\n", "; "), rounding_line(solution), made) if line]
+        )
+        return finish(figure)
+
+
+def _forces(axis: Axes, drive: SliderDrive) -> None:
+    """The resultant force on each pin over a turn of the crank."""
+    turned = np.degrees(np.abs(drive.crank_angle))
+    for pin, colour in zip("ABCD", COLOURS):
+        force = np.hypot(drive[f"pin.{pin}.fx"], drive[f"pin.{pin}.fy"])
+        axis.plot(turned, force, color=colour, label=f"{pin}: {force.max():.3g} N at most")
+    _quarters(axis, np.array([0.0, 360.0]))
+    axis.set_xlabel("crank angle from the ground link [deg]")
+    axis.set_ylabel("pin force [N]")
+    axis.legend(loc="lower center", bbox_to_anchor=(0.5, 0.97), ncols=4, borderpad=0.2, columnspacing=1.0)
 
 
 @plot.register

@@ -94,6 +94,8 @@ class Make:
         kg/m3.
     width, thickness : float
         Of every bar (m).
+    pin : float, optional
+        Diameter of the holes in the drawing of the plates (m); four tenths of the width by default.
     slider_mass, slider_stiffness, slider_damping : float, optional
         Of the slider that carries D (kg, N/m, N.s/m); by default of a block, held so stiffly that it stands for a fixed pivot.
     slider_coulomb_friction : float
@@ -107,12 +109,25 @@ class Make:
     density: float = entry(Quantity("kg/m**3", above=0.0), 7850.0)
     width: float = entry(Quantity("m", above=0.0), 0.02)
     thickness: float = entry(Quantity("m", above=0.0), 0.005)
+    pin: float | None = entry(Quantity("m", above=0.0), None)
     slider_mass: float | None = entry(Quantity("kg", least=0.0), None)
     slider_stiffness: float | None = entry(Quantity("N/m", least=0.0), None)
     slider_damping: float | None = entry(Quantity("N.s/m", least=0.0), None)
     slider_coulomb_friction: float = entry(Quantity("N", least=0.0), 0.0)
     gravity: float = entry(Quantity("m/s2", least=0.0), 9.81)
     speed: float = entry(Quantity("rad/s", above=0.0), 2.0 * pi)
+
+    @property
+    def hole(self) -> float:
+        """Diameter of the pins' holes (m)."""
+        return 0.4 * self.width if self.pin is None else self.pin
+
+    def describe(self) -> str:
+        """Bars and speed in a line, for a sheet."""
+        return (
+            f"bars {1e3 * self.width:g} x {1e3 * self.thickness:g} mm of {self.density:g} kg/m³, "
+            f"pins {1e3 * self.hole:g} mm; forces at {self.speed * 30.0 / pi:g} rpm, gravity {self.gravity:g} m/s²"
+        )
 
     def moving(self, linkage: Linkage) -> FiveBarParameters:
         """Parameters of the plant for a linkage, its slider free to be moved."""

@@ -15,7 +15,7 @@ import pytest
 import svgelements
 from ezdxf import bbox
 
-from analysis.files import Circle, Drawing, Line, Polyline, Text, read_points, save_drawing, to_dxf, to_svg
+from analysis.files import Circle, Dimension, Drawing, Line, Polyline, Text, read_points, save_drawing, to_dxf, to_svg
 from analysis.files.drawings import LAYERS, UNITS
 from linkwork.errors import InputError, LinkworkError, ParameterError, UnknownNameError
 
@@ -186,6 +186,12 @@ def test_file_endings(tmp_path: Path) -> None:
         (lambda: Circle(layer="crank", centre=(0.0, 0.0), radius=float("inf")), "finite"),
         (lambda: Polyline(layer="target", points=np.zeros((1, 2))), r"shape \(1, 2\)"),
         (lambda: Polyline(layer="target", points=np.zeros((4, 3))), r"shape \(4, 3\)"),
+        (lambda: Polyline(layer="plate", points=np.eye(2), bulges=(0.5,)), "one a point"),
+        (lambda: Polyline(layer="plate", points=np.eye(2), bulges=(0.5, 1.5)), "from -1 to 1"),
+        (
+            lambda: Dimension(layer="dimension", start=(0.0, 0.0), end=(0.0, 0.0), offset=0.1, height=0.1),
+            "a length and a height",
+        ),
         (lambda: Polyline(layer="target", points=np.array([[0, 0], [np.inf, 0]])), "point 1 of a polyline"),
         (lambda: Text(layer="text", position=(0.0, 0.0), height=-1.0, text="a"), "height is -1.0"),
         (lambda: Text(layer="text", position=(0.0, 0.0), height=1.0, text="a\nb"), "one line"),

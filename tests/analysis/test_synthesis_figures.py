@@ -11,10 +11,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from PIL import Image
+from shapely.geometry import Point, Polygon
 
 from analysis import figures
 from analysis.figures.synthesis import LONGEST, magnification
-from analysis.files import read_points, save_drawing
+from analysis.files import read_points, save_drawing, save_figure
+from analysis.files.drawings import LAYERS
+from analysis.motion import inverse_dynamics
 from analysis.numerics.fourier import FourierSeries
 from analysis.synthesis import (
     InfeasibleError,
@@ -33,10 +36,11 @@ from analysis.synthesis import (
     costs,
     drawing,
     length_step,
+    plates,
     report,
     turn,
 )
-from linkwork.errors import AssemblyError, InputError
+from linkwork.errors import AssemblyError, InputError, ParameterError
 from tests.linkages import ellipse
 
 PHI = turn(24)
@@ -269,6 +273,98 @@ def test_the_drawing_of_moved_pivots_and_of_curves() -> None:
         assert target.closed is closed
     flat = Solution.of(TimedPath(points=ELLIPSE), replace(LINKAGE, point_angle=0.0))
     assert not any(p.layer == "coupler" for p in drawing(flat).polylines)
+
+
+def test_further_positions_are_those_of_the_linkage() -> None:
+    solution = timed()
+    thin = [p.points for p in drawing(solution, poses=4).polylines if p.layer == "poses"]
+    assert len(thin) == 8
+    first = solution.rotation[0]
+    for number, points in enumerate(thin[::2]):
+        pins = LINKAGE.pins(float(first + 0.5 * np.pi * number))
+        np.testing.assert_allclose(points, [pins[name] for name in "ABCD"], atol=1e-12)
+
+
+def test_every_layer_is_seen_on_white_and_on_black(tmp_path) -> None:
+    """A contrast of three at least, by the formula of the WCAG, or the foreground's colour."""
+    document = ezdxf.readfile(save_drawing(tmp_path / "a.dxf", drawing(timed(), poses=2)))
+    for name, layer in LAYERS.items():
+        if layer.foreground:
+            assert document.layers.get(name).color == 7
+            continue
+        channels = np.array([layer.colour >> 16, layer.colour >> 8 & 255, layer.colour & 255]) / 255.0
+        linear = np.where(channels <= 0.04045, channels / 12.92, ((channels + 0.055) / 1.055) ** 2.4)
+        light = float(linear @ [0.2126, 0.7152, 0.0722])
+        assert min(1.05 / (light + 0.05), (light + 0.05) / 0.05) > 3.0, name
+
+
+def test_plates_have_holes_at_the_pins_and_their_distances(tmp_path) -> None:
+    cut = plates(timed(), width=0.02, thickness=0.005, pin=0.008, title="plates")
+    document = ezdxf.readfile(save_drawing(tmp_path / "p.dxf", cut))
+    assert not document.audit().errors
+    space = document.modelspace()
+    measured = sorted(round(e.get_measurement(), 6) for e in space.query("DIMENSION"))
+    side = abs(0.215 - 0.21 * np.exp(1j * radians(-178.0)))
+    assert measured == pytest.approx(sorted([300.0, 50.0, 215.0, 215.0, 210.0, 1e3 * side]))
+    assert [e.dxf.radius for e in space.query("CIRCLE")] == pytest.approx([4.0] * 9)
+    outlines = [p for p in cut.polylines if p.layer == "plate"]
+    assert len(outlines) == 4
+    # a plate with two holes: a rectangle between half circles
+    crank = Polygon(flattened(outlines[1]))
+    assert crank.area == pytest.approx(0.05 * 0.02 + np.pi * 0.01**2, rel=1e-3)
+    for outline in outlines:
+        plate = Polygon(flattened(outline))
+        inside = [Point(c.centre) for c in cut.circles if plate.contains(Point(c.centre))]
+        assert inside
+        for hole in inside:
+            assert plate.exterior.distance(hole) == pytest.approx(0.01, rel=2e-3) or len(inside) == 3
+            assert plate.exterior.distance(hole) > 0.0099
+
+
+def flattened(outline) -> np.ndarray:
+    """Points along a polyline with arcs, by their centres."""
+    points = outline.points @ np.array([1.0, 1j])
+    out = []
+    for start, bulge, end in zip(points, outline.bulges, np.roll(points, -1)):
+        out.append([start])
+        if bulge:
+            turned = 4.0 * np.arctan(bulge)
+            centre = 0.5 * (start + end) + 0.5j * (end - start) / np.tan(0.5 * turned)
+            out.append(centre + (start - centre) * np.exp(1j * turned * np.linspace(0.0, 1.0, 40)[1:-1]))
+    z = np.concatenate(out)
+    return np.column_stack([z.real, z.imag])
+
+
+def test_plates_of_other_kinds() -> None:
+    names = {t.text.split(":")[0] for t in plates(timed(GEARED), width=0.02, thickness=0.005, pin=0.008).texts}
+    assert {"ground", "second crank", "crank", "coupler", "rocker"} <= names
+    assert not any("ground" in t.text for t in plates(timed(SLIDING), width=0.02, thickness=0.005, pin=0.008).texts)
+    two = plates(rocker(), width=0.02, thickness=0.005, pin=0.008)
+    assert len(two.circles) == 8
+    with pytest.raises(ParameterError, match="below the width"):
+        plates(timed(), width=0.02, thickness=0.005, pin=0.02)
+
+
+def test_svg_of_plates_has_arcs_and_numbers(tmp_path) -> None:
+    text = save_drawing(tmp_path / "p.svg", plates(timed(), width=0.02, thickness=0.005, pin=0.008)).read_text()
+    # half circles, to the left in a drawing whose y points down
+    assert "A 10 10 0 0 0" in text
+    assert ">50</text>" in text
+    assert ">300</text>" in text
+
+
+def test_the_sheet_shows_the_largest_pin_forces(tmp_path) -> None:
+    solution = timed()
+    drive = inverse_dynamics(solution.to_five_bar(), FourierSeries.constant(0.0), 6.0, samples=72)
+    figure = figures.plot_sheet(solution, drive, title="sheet", made="bars")
+    assert tuple(figure.get_size_inches() * 25.4) == pytest.approx((297.0, 210.0))
+    panel = axis_of(figure, "pin force")
+    for pin, line in zip("ABCD", panel.lines, strict=True):
+        force = np.hypot(drive[f"pin.{pin}.fx"], drive[f"pin.{pin}.fy"])
+        np.testing.assert_allclose(line.get_ydata(), force)
+        assert line.get_label() == f"{pin}: {force.max():.3g} N at most"
+    assert save_figure(figure, tmp_path / "sheet.pdf").read_bytes().startswith(b"%PDF")
+    assert not any("pin force" in a.get_ylabel() for a in figures.plot_sheet(solution).axes)
 
 
 # Tables and report
