@@ -198,3 +198,26 @@ ELLIPSE_A_OVER_ROUNDING = (4.86, 6.54)
 WINDOW_SUM, WINDOW_SUM_MOUNTED = 104.9, 3.1
 # packaging machine: travel, flatness (cm), area (cm2), least transmission angle (deg)
 PACKAGING = (175.8, 6.99, 1444.0, 10.5)
+
+# --- Characteristic values of Mathieu's equation y'' + (a - 2 q cos 2t) y = 0: M. Abramowitz, I. A. Stegun, Handbook of
+# --- Mathematical Functions, National Bureau of Standards 1964, Table 20.1: by q, a_r and b_r by r, as printed
+MATHIEU_A: Mapping[float, Mapping[int, float]] = MappingProxyType(
+    {
+        5.0: {0: -5.80004602, 1: 1.85818754, 2: 7.44910974, 5: 25.54997175},
+        10.0: {0: -13.93697996, 1: -2.39914240, 2: 7.71736985, 5: 27.70376873},
+        25.0: {0: -40.25677955, 1: -21.31489969, 2: -3.52216473},
+    }
+)
+MATHIEU_B: Mapping[float, Mapping[int, float]] = MappingProxyType(
+    {
+        5.0: {1: -5.79008060, 2: 2.09946045, 5: 25.51081605},
+        10.0: {1: -13.93655248, 2: -2.38215824, 5: 26.76642636},
+        25.0: {1: -40.25677898, 2: -21.31486062},
+    }
+)
+
+# --- Driven damped pendulum ph'' + 2 b ph' + w0^2 sin(ph) = g w0^2 cos(w t), w = 2 pi, w0 = 3 pi, b = w0 / 4: J. R. Taylor,
+# --- Classical Mechanics, University Science Books 2005, Table 12.1: g at which the period doubles for the nth time
+PENDULUM_DOUBLINGS = (1.0663, 1.0793, 1.0821, 1.0827)
+# Ratio of successive intervals in the limit: M. J. Feigenbaum, J. Stat. Phys. 19 (1978) 25
+FEIGENBAUM = 4.6692016

@@ -140,7 +140,7 @@ class Family:
                 monodromy=reduce(lambda product, matrix: matrix @ product, matrices),
                 residual=float(np.abs(gaps / scale).max()),
                 iterations=1,
-                stations=Stations(angles, starts, _greatest_growth(matrices, scale)),
+                stations=Stations(angles, starts, float(_growths(matrices, scale).max())),
             )
             return Evaluation(gaps.ravel(), jacobian.reshape(k * n, k * n), slopes.ravel(), orbit)
 
@@ -402,8 +402,10 @@ def _follower(
     return Follower(family.evaluate(orbit.turns, settings.low, settings.high, angles), scale, settings)
 
 
-def _greatest_growth(matrices: NDArray[np.float64], scale: NDArray[np.float64]) -> float:
-    return float(np.linalg.norm(matrices * scale / scale[:, None], ord=2, axis=(1, 2)).max())
+def _growths(matrices: NDArray[np.float64], scale: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Greatest growth of a deviation, scaled, over each piece of a period; shape (k,)."""
+    growths: NDArray[np.float64] = np.linalg.norm(matrices * scale / scale[:, None], ord=2, axis=(1, 2))
+    return growths
 
 
 def _growth(orbit: PeriodicOrbit) -> float:
@@ -411,7 +413,7 @@ def _growth(orbit: PeriodicOrbit) -> float:
     return orbit.largest if orbit.stations is None else orbit.stations.growth
 
 
-def _in_pieces(follower: Follower, family: Family, last: Point, settings: Settings) -> tuple[Follower, Point]:
+def _in_pieces(family: Family, last: Point, settings: Settings) -> tuple[Follower, Point]:
     """The same curve from its last point on, the period followed in pieces in each of which deviations grow alike."""
     orbit: PeriodicOrbit = last.data
     count = _PLACES * orbit.turns
@@ -419,7 +421,7 @@ def _in_pieces(follower: Follower, family: Family, last: Point, settings: Settin
     angles = np.linspace(0.0, orbit.flow.period * orbit.turns, count + 1)
     matrices = pieces_from(orbit.parameters, orbit.drive, angles, places)[1]
     scale = scale_of(orbit.parameters, orbit.drive, orbit.start)
-    growth = np.log(np.linalg.norm(matrices * scale / scale[:, None], ord=2, axis=(1, 2)).clip(1.0))
+    growth = np.log(_growths(matrices, scale).clip(1.0))
     # half of the pieces by growth, half by angle
     pieces = int(np.clip(np.ceil(2.0 * growth.sum() / np.log(_AIM)), _FEWEST * orbit.turns, count))
     share = np.concatenate([[0.0], np.cumsum(growth / max(growth.sum(), 1e-9) + 1.0 / count)])
@@ -475,7 +477,7 @@ def _branch(
             break
         settings = replace(settings, most_points=left)
         try:
-            follower, first = _in_pieces(follower, family, last, settings)
+            follower, first = _in_pieces(family, last, settings)
         except OrbitError:
             break
     special = [s for part, (own, curve) in enumerate(pieces) for s in _special_points(curve, own, pieces[:part])]

@@ -22,8 +22,9 @@ from .floquet import Crossing
 from .orbits import PeriodicOrbit, orbit_of, period_from
 from .starts import scale_of
 
-#: Step of the differences, relative to the scale of y; the extrapolation takes half of it too.
-_STEP = 8e-3
+#: Step of the differences, relative to the scale of y, the relative uncertainty down to which it is halved, and how often at
+#: most: the map over many turns bends within a thousandth of the scale.
+_STEP, _CERTAIN, _HALVINGS = 8e-3, 1e-2, 8
 #: Relative difference of the coefficients with the whole and the half step above which its sign is not settled.
 UNSETTLED = 0.5
 #: Distance of the multiplier from the unit circle at which a run confirms a normal form, at least and at most, the square of
@@ -142,9 +143,7 @@ def normal_form(family: Family, special: SpecialPoint) -> NormalForm:
     """
     of = _forms(special.orbit)
     multiplier = complex(special.orbit.multipliers[0])
-    whole, half = (coefficient_of(of, special.kind, multiplier, h) for h in (_STEP, 0.5 * _STEP))
-    # the differences are of second order
-    coefficient, uncertainty = (4.0 * half - whole) / 3.0, abs(half - whole)
+    coefficient, uncertainty = _extrapolated(lambda h: coefficient_of(of, special.kind, multiplier, h))
     settled = uncertainty < UNSETTLED * abs(coefficient)
     if not settled:
         words = "not settled"
@@ -154,6 +153,21 @@ def normal_form(family: Family, special: SpecialPoint) -> NormalForm:
         gentle = coefficient > 0.0 if special.kind is Crossing.PERIOD_DOUBLING else coefficient < 0.0
         words = "supercritical" if gentle else "subcritical"
     return NormalForm(kind=special.kind, coefficient=coefficient, uncertainty=uncertainty, words=words)
+
+
+def _extrapolated(at: Callable[[float], float]) -> tuple[float, float]:
+    """A coefficient at the step zero and its uncertainty, from that at a step and half of it: the most certain of them."""
+    found: list[tuple[float, float]] = []
+    step, whole = _STEP, at(_STEP)
+    for _ in range(_HALVINGS):
+        step *= 0.5
+        half = at(step)
+        # the differences are of second order
+        found.append(((4.0 * half - whole) / 3.0, abs(half - whole)))
+        if found[-1][1] < _CERTAIN * abs(found[-1][0]):
+            break
+        whole = half
+    return min(found, key=lambda pair: pair[1] / max(abs(pair[0]), 1e-300))
 
 
 def coefficient_of(of: Forms, kind: Crossing, multiplier: complex, h: float) -> float:

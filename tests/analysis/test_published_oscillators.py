@@ -1,0 +1,214 @@
+"""Periodic motions of the textbooks' oscillators: Mathieu, Duffing, the driven pendulum, against tables and other methods."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from math import pi
+
+import numpy as np
+import pytest
+from scipy.special import mathieu_a, mathieu_b
+
+from analysis.mechanisms import MECHANISMS, register
+from analysis.numerics.boundaries import scan
+from analysis.periodic import (
+    Branch,
+    Crossing,
+    Drive,
+    Family,
+    SpecialPoint,
+    Stability,
+    find_orbit,
+    find_orbits,
+    follow,
+    follow_crossing,
+    normal_form,
+    orbit_of,
+    orbit_test,
+    plane,
+    switch,
+)
+from analysis.periodic.starts import scale_of
+from tests.mechanisms import torsion
+from tests.oracles import oscillator
+from tests.published import FEIGENBAUM, MATHIEU_A, MATHIEU_B, PENDULUM_DOUBLINGS
+
+
+@pytest.fixture(autouse=True, scope="module")
+def registered() -> Iterator[None]:
+    register(torsion.MECHANISM)
+    yield
+    del MECHANISMS[torsion.MECHANISM.name]
+
+
+# Mathieu: y'' + (a - 2 q cos 2t) y = 0, a turn of the crank for half a period of the solutions, 2t its angle
+
+MATHIEU = Drive(speed=2.0)
+
+
+def mathieu(a: float, q: float) -> torsion.Parameters:
+    return torsion.Parameters(rotor_stiffness=a, rotor_modulation=-2.0 * q)
+
+
+@pytest.mark.parametrize("q", MATHIEU_A)
+def test_multipliers_pass_the_unit_circle_at_the_characteristic_values_of_mathieu(q: float) -> None:
+    operation, (low, high) = plane(mathieu(0.0, q), MATHIEU, "rotor.stiffness", "rotor.modulation"), (-2.0 * q, 30.0)
+    for multiplier, orders in ((1, (0, 2, 4)), (-1, (1, 3, 5))):
+        test = orbit_test(operation, multiplier)
+        roots = scan(lambda a, test=test: test(a, -2.0 * q), low, high).roots  # type: ignore[misc]
+        expected = [mathieu_a(r, q) for r in orders] + [mathieu_b(r, q) for r in orders if r]
+        assert roots == pytest.approx(sorted(a for a in expected if low < a < high), abs=1e-9)
+        for table in (MATHIEU_A[q], MATHIEU_B[q]):
+            for r, printed in table.items():
+                if r in orders and low < printed < high:
+                    assert np.abs(roots - printed).min() < 0.6e-8
+
+
+def test_branches_and_boundaries_find_the_odd_characteristic_values_of_mathieu() -> None:
+    family = Family(parameters=mathieu(0.0, 1.0), drive=MATHIEU, vary="rotor.stiffness")
+    branch = follow(family, orbit_of(mathieu(-1.0, 1.0), MATHIEU), -1.0, low=-1.0, high=10.0)
+    assert {special.kind for special in branch.special} == {Crossing.PERIOD_DOUBLING}
+    expected = [mathieu_b(1, 1.0), mathieu_a(1, 1.0), mathieu_b(3, 1.0), mathieu_a(3, 1.0)]
+    assert [special.parameter for special in branch.special] == pytest.approx(expected, abs=1e-9)
+    # between b_r and a_r the equation has solutions that grow
+    words = [branch.stability()[special.after + 1] for special in branch.special]
+    assert words == [Stability.UNSTABLE, Stability.MARGINAL] * 2
+
+    curve = follow_crossing(
+        plane(mathieu(0.0, 1.0), MATHIEU, "rotor.modulation", "rotor.stiffness"),
+        branch.special[1].orbit,
+        Crossing.PERIOD_DOUBLING,
+        (-2.0, branch.special[1].parameter),
+        x=(-6.0, -1.0),
+        y=(-5.0, 5.0),
+    )
+    q, a = -0.5 * curve.points[:, 0], curve.points[:, 1]
+    assert np.ptp(q) > 2.4
+    assert a == pytest.approx(mathieu_a(1, q), abs=1e-8)
+
+
+# Duffing, hardening: x'' + 0.1 x' + x + 0.04 x^3 = cos w t
+
+DUFFING = torsion.Parameters(rotor_damping=0.1, rotor_stiffness=1.0, rotor_cubic_stiffness=0.04, rotor_excitation=1.0)
+
+
+@pytest.fixture(scope="module")
+def hardening() -> Branch:
+    orbit = find_orbit(DUFFING, speed=0.5)
+    return follow(Family(parameters=DUFFING, drive=orbit.drive), orbit, 0.5, low=0.5, high=3.0)
+
+
+def collocated(family: Family, special: SpecialPoint, samples: int) -> oscillator.Found:
+    """The special point by Fourier collocation, begun at ours."""
+
+    def law(value: float) -> tuple[float, torsion.Constants]:
+        parameters, drive = family.at(value)
+        assert drive.speed is not None
+        return drive.speed, parameters.constants()
+
+    orbit = special.orbit
+    return oscillator.special_point(
+        law,
+        orbit.turn(samples * orbit.turns)["rotor.angle"],
+        special.parameter,
+        orbit.turns,
+        antiperiodic=special.kind is Crossing.PERIOD_DOUBLING,
+    )
+
+
+def test_folds_of_duffing_are_those_of_fourier_collocation(hardening: Branch) -> None:
+    assert hardening.reached
+    assert [special.kind for special in hardening.special] == [Crossing.FOLD, Crossing.FOLD]
+    for special in hardening.special:
+        found = collocated(hardening.family, special, 128)
+        assert found.residual < 1e-9
+        assert special.parameter == pytest.approx(found.parameter, rel=1e-9)
+    # the first harmonic alone: a^2 ((1 - w^2 + 3/4 0.04 a^2)^2 + 0.01 w^2) = 1, to the size of the third
+    squares = np.linspace(0.5, 60.0, 400_000)
+    middle = 1.0 + 0.03 * squares - 0.005
+    inner = middle**2 - (1.0 + 0.03 * squares) ** 2 + 1.0 / squares
+    speeds = np.sqrt((middle + np.sqrt(inner.clip(0.0)))[inner > 0.0])
+    least = int(speeds.argmin())
+    found = [special.parameter for special in hardening.special]
+    assert found == pytest.approx([speeds[least:].max(), speeds[least]], rel=5e-3)
+
+
+def test_between_the_folds_of_duffing_there_are_three_motions(hardening: Branch) -> None:
+    upper, lower = (special.parameter for special in hardening.special)
+    for speed, count in ((lower - 0.01, 1), (0.5 * (lower + upper), 3), (upper + 0.01, 1)):
+        found = find_orbits(DUFFING, speed=speed)
+        assert (len(found), found.agreed, found.index) == (count, True, 1)
+
+
+def test_curvature_at_the_folds_of_duffing_is_that_of_the_series_of_the_map(hardening: Branch) -> None:
+    words = ["both motions at lower values", "both motions at higher values"]
+    for special, expected in zip(hardening.special, words):
+        form = normal_form(hardening.family, special)
+        exact = oscillator.curvature_at_fold(*of_a_map(special))
+        assert form.words == expected
+        assert abs(form.coefficient) == pytest.approx(abs(exact), rel=1e-6)
+
+
+def of_a_map(special: SpecialPoint) -> tuple[torsion.Constants, float, np.ndarray, int, np.ndarray]:
+    orbit = special.orbit
+    assert orbit.drive.speed is not None
+    scale = scale_of(orbit.parameters, orbit.drive, orbit.start)
+    return orbit.parameters.constants(), orbit.drive.speed, orbit.start, orbit.turns, scale
+
+
+# The driven damped pendulum of Taylor's chapter 12
+
+DRIVEN, NATURAL = 2.0 * pi, 3.0 * pi
+
+
+def pendulum(strength: float) -> tuple[torsion.Parameters, Drive]:
+    weight = NATURAL**2
+    parameters = torsion.Parameters(
+        rotor_damping=0.5 * NATURAL, rotor_weight=weight, rotor_excitation=strength * weight
+    )
+    return parameters, Drive(speed=DRIVEN)
+
+
+@pytest.fixture(scope="module")
+def cascade() -> list[Branch]:
+    """Motions of 1, 2, 4 and 8 turns, each switched to from the one before."""
+    parameters, drive = pendulum(1.06)
+    family = Family(parameters=parameters, drive=drive, vary=pendulum, name="strength")
+    found = find_orbits(parameters, speed=DRIVEN)
+    # there is one in every well, and its mirror image
+    orbit = min(found.stable, key=lambda orbit: abs(orbit.start[0] + 0.5 * pi))
+    branches = [follow(family, orbit, 1.06, low=1.06, high=1.083)]
+    for _ in range(3):
+        branches.append(switch(family, branches[-1].special[0], low=1.06, high=1.083, greatest=5e-3))
+    return branches
+
+
+def test_the_pendulum_doubles_its_period_where_others_found(cascade: list[Branch]) -> None:
+    assert [branch.turns for branch in cascade] == [1, 2, 4, 8]
+    doublings = [branch.special[0] for branch in cascade]
+    assert {special.kind for special in doublings} == {Crossing.PERIOD_DOUBLING}
+    values = np.array([special.parameter for special in doublings])
+    # to one in the last digit printed: the first is 1.06637
+    assert values == pytest.approx(PENDULUM_DOUBLINGS, abs=1e-4)
+    for special in doublings[:3]:
+        found = collocated(cascade[0].family, special, 128)
+        assert found.residual < 1e-8
+        assert special.parameter == pytest.approx(found.parameter, rel=1e-9)
+    steps = np.diff(values)
+    assert steps[:-1] / steps[1:] == pytest.approx(FEIGENBAUM, rel=2e-3)
+
+
+def test_the_pendulum_doubles_gently_by_the_series_of_the_map(cascade: list[Branch]) -> None:
+    for branch in cascade:
+        form = normal_form(branch.family, branch.special[0])
+        exact = oscillator.cubic_coefficient(*of_a_map(branch.special[0]))
+        assert form.words == "supercritical"
+        assert form.coefficient == pytest.approx(exact, rel=3e-3)
+        assert abs(form.coefficient - exact) < 2.0 * form.uncertainty + 1e-6 * exact
+
+
+def test_each_doubled_motion_of_the_pendulum_is_stable_until_it_doubles(cascade: list[Branch]) -> None:
+    for branch in cascade:
+        after = branch.special[0].after
+        assert set(branch.stability()[1 : after + 1]) == {Stability.STABLE}
+        assert set(branch.stability()[after + 1 :]) == {Stability.UNSTABLE}

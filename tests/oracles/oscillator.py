@@ -1,0 +1,162 @@
+"""Special points of a driven oscillator by Fourier collocation, and its map over a period as a Taylor series.
+
+Nothing here integrates over a period as the analyses do to find where a multiplier passes the unit circle: a motion of n turns
+is its values at equal steps of the crank angle th, its derivatives are those of the trigonometric polynomial through them, and
+
+    J W^2 x'' + c W x' + g(x, th) = 0
+
+holds at every one of them. At a fold the linearised equation has a periodic solution v, at a period doubling one that is
+antiperiodic; motion, v and parameter are solved for together. The series of the map, for the normal forms, are those of the
+equation itself with x a polynomial in the deviations at the start.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from math import pi
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.integrate import solve_ivp
+
+from tests.mechanisms.torsion.equations import Constants
+
+Vector = NDArray[np.float64]
+#: Speed of the crank and constants at a value of the parameter.
+Law = Callable[[float], tuple[float, Constants]]
+
+
+class Found(NamedTuple):
+    """A special point: parameter, motion at equal steps of the angle, residual."""
+
+    parameter: float
+    motion: Vector
+    residual: float
+
+
+def special_point(law: Law, motion: Vector, value: float, turns: int, *, antiperiodic: bool) -> Found:
+    """The fold, or with ``antiperiodic`` the period doubling, next to a motion given at equal steps of its period."""
+    n = len(motion)
+    angle = 2.0 * pi * turns * np.arange(n) / n
+    first, second = (_derivative(n, turns, order, 0.0) for order in (1, 2))
+    across = [_derivative(n, turns, order, 0.5 if antiperiodic else 0.0) for order in (1, 2)]
+
+    def equation(x: Vector, value: float) -> Vector:
+        w, p = law(value)
+        spring = (p.stiffness + p.modulation * np.cos(angle)) * x + p.cubic * x**3 + p.weight * np.sin(x)
+        return p.inertia * w * w * second @ x + p.damping * w * first @ x + spring - p.excitation * np.cos(angle)
+
+    def linear(x: Vector, value: float, first: Vector, second: Vector) -> Vector:
+        w, p = law(value)
+        slope = p.stiffness + p.modulation * np.cos(angle) + 3.0 * p.cubic * x**2 + p.weight * np.cos(x)
+        return p.inertia * w * w * second + p.damping * w * first + np.diag(slope)
+
+    def bend(x: Vector, value: float) -> Vector:
+        p = law(value)[1]
+        return 6.0 * p.cubic * x - p.weight * np.sin(x)
+
+    x, step = motion.copy(), 1e-6 * abs(value)
+    v = np.linalg.svd(linear(x, value, *across))[2][-1]
+    residual = np.inf
+    for _ in range(12):
+        matrix = np.zeros((2 * n + 1, 2 * n + 1))
+        matrix[:n, :n] = linear(x, value, first, second)
+        matrix[:n, -1] = (equation(x, value + step) - equation(x, value - step)) / (2.0 * step)
+        matrix[n:-1, :n] = np.diag(bend(x, value) * v)
+        matrix[n:-1, n:-1] = linear(x, value, *across)
+        beside = [linear(x, value + s, *across) @ v for s in (step, -step)]
+        matrix[n:-1, -1] = (beside[0] - beside[1]) / (2.0 * step)
+        matrix[-1, n:-1] = 2.0 * v
+        right = np.concatenate([equation(x, value), linear(x, value, *across) @ v, [v @ v - 1.0]])
+        change = np.linalg.solve(matrix, -right)
+        x, v, value = x + change[:n], v + change[n:-1], value + float(change[-1])
+        if abs(float(change[-1])) < 1e-13 * abs(value):
+            residual = float(np.abs(change).max())
+            break
+    return Found(value, x, residual)
+
+
+def _derivative(n: int, turns: int, order: int, shift: float) -> Vector:
+    """Derivative over the crank angle of what is given at n steps of a period; antiperiodic with a shift of a half."""
+    wave = (np.fft.fftfreq(n, 1.0 / n) + shift) / turns
+    twist = np.exp(2j * pi * shift * np.arange(n) / n)[:, None]
+    spectrum = np.fft.fft(np.eye(n) * twist.conj(), axis=0)
+    return (twist * np.fft.ifft((1j * wave[:, None]) ** order * spectrum, axis=0)).real
+
+
+#: Powers (i, j) of the two deviations of which the series are kept.
+POWERS = tuple((i, j) for i in range(4) for j in range(4 - i))
+
+
+#: Which products of two terms add to which term: shape (terms, terms, terms).
+_TIMES = np.array([[[(a + c, b + d) == e for c, d in POWERS] for a, b in POWERS] for e in POWERS], dtype=float)
+
+
+def _product(a: Vector, b: Vector) -> Vector:
+    """Product of two series."""
+    result: Vector = _TIMES @ b @ a
+    return result
+
+
+def series(p: Constants, w: float, start: Vector, directions: Vector, turns: int) -> Vector:
+    """x and x' after a period as series in two deviations of the start; shape (2, number of `POWERS`).
+
+    Parameters
+    ----------
+    start : ndarray, shape (2,)
+    directions : ndarray, shape (2, 2)
+        The two deviations are of these columns.
+    """
+    size = len(POWERS)
+    initial = np.zeros((2, size))
+    initial[:, POWERS.index((0, 0))] = start
+    initial[:, POWERS.index((1, 0))], initial[:, POWERS.index((0, 1))] = directions.T
+    zero = POWERS.index((0, 0))
+
+    def rates(t: float, z: Vector) -> Vector:
+        x, v = z.reshape(2, size)
+        away = x.copy()
+        away[zero] = 0.0
+        square = _product(away, away)
+        cube = _product(square, away)
+        sine = np.sin(x[zero]) * (np.eye(size)[zero] - square / 2.0) + np.cos(x[zero]) * (away - cube / 6.0)
+        force = -p.damping * v - (p.stiffness + p.modulation * np.cos(w * t)) * x - p.weight * sine
+        force -= p.cubic * _product(_product(x, x), x)
+        force[zero] += p.excitation * np.cos(w * t)
+        return np.concatenate([v, force / p.inertia])
+
+    span = (0.0, 2.0 * pi * turns / w)
+    run = solve_ivp(rates, span, initial.ravel(), method="DOP853", rtol=1e-11, atol=1e-13)
+    return run.y[:, -1].reshape(2, size)
+
+
+def cubic_coefficient(p: Constants, w: float, start: Vector, turns: int, scale: Vector) -> float:
+    """Coefficient c of the normal form -s + c s^3 of the map on the centre manifold of a period doubling, s scaled.
+
+    The centre manifold is the graph s -> s q + h s^2 r over the eigenvectors q of -1 and r of the other multiplier; h and c
+    follow from that the map takes it to itself.
+    """
+    linear = series(p, w, start, np.diag(scale), turns)[:, [POWERS.index(k) for k in ((1, 0), (0, 1))]] / scale[:, None]
+    values, vectors = np.linalg.eig(linear)
+    order = np.argsort(np.abs(values.real + 1.0))
+    basis = vectors.real[:, order]
+    after = np.linalg.solve(basis, series(p, w, start, scale[:, None] * basis, turns) / scale[:, None])
+
+    def part(row: int, i: int, j: int) -> float:
+        return float(after[row, POWERS.index((i, j))])
+
+    # r' = mu r + a s^2, s' = -s + ...: h (s')^2 = h s^2 = mu h s^2 + a s^2
+    h = part(1, 2, 0) / (1.0 - part(1, 0, 1))
+    # s' = -s + b s^2 + (C + d h) s^3; the square is removed by s -> s + e s^2 with e = b / 2
+    b = part(0, 2, 0)
+    return part(0, 3, 0) + part(0, 1, 1) * h + b * b
+
+
+def curvature_at_fold(p: Constants, w: float, start: Vector, turns: int, scale: Vector) -> float:
+    """Half the second derivative of the map along the eigenvector of 1, seen along the other; its sign is the vector's."""
+    linear = series(p, w, start, np.diag(scale), turns)[:, [POWERS.index(k) for k in ((1, 0), (0, 1))]] / scale[:, None]
+    values, vectors = np.linalg.eig(linear)
+    basis = vectors.real[:, np.argsort(np.abs(values.real - 1.0))]
+    after = np.linalg.solve(basis, series(p, w, start, scale[:, None] * basis, turns) / scale[:, None])
+    return float(after[0, POWERS.index((2, 0))])
