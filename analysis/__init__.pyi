@@ -20,6 +20,7 @@ from .periodic import find_orbits as find_orbits
 from .periodic import frequency_response as frequency_response
 from .periodic import natural_frequency as natural_frequency
 from .periodic import stability_chart as stability_chart
+from .periodic import with_isolas as with_isolas
 from .run import Comparison as Comparison
 from .run import CosimulationError as CosimulationError
 from .run import Ensemble as Ensemble

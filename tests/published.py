@@ -221,3 +221,24 @@ MATHIEU_B: Mapping[float, Mapping[int, float]] = MappingProxyType(
 PENDULUM_DOUBLINGS = (1.0663, 1.0793, 1.0821, 1.0827)
 # Ratio of successive intervals in the limit: M. J. Feigenbaum, J. Stat. Phys. 19 (1978) 25
 FEIGENBAUM = 4.6692016
+
+# --- What other continuation codes gave for the branches of tests/oracles/continued.py: fold or period doubling, and the
+# --- parameter there: `python -m tests.oracles.continued`. Units: as there; the five-bar, rig 1 with spring B, in rad/s
+CONTINUED: Mapping[str, Mapping[str, list[tuple[str, float]]]] = MappingProxyType(
+    {
+        # AUTO-07p as it is in bifpy 0.3.0, printed to 11 digits
+        "AUTO-07p": {
+            "duffing": [("fold", 1.522448029), ("fold", 1.2520149591)],
+            "pendulum": [("period doubling", 1.0663728625)],
+            "pendulum, 2 turns": [("period doubling", 1.0793139059)],
+            "pendulum, 4 turns": [("period doubling", 1.0820843843)],
+            "five-bar, small motion": [("fold", 108.48612255)],
+            "five-bar, large motion": [("period doubling", 97.675574991)],
+        },
+        # its period doublings are bisected to 1e-6
+        "jaxcont 0.4.0": {
+            "duffing": [("fold", 1.5224480289), ("fold", 1.2520149591)],
+            "pendulum": [("period doubling", 1.066373004)],
+        },
+    }
+)

@@ -48,9 +48,24 @@ def _require_range(parameters: Any, low: float, high: float, name: str, first: s
     "--from", "low", metavar="VALUE", help="Beginning of the range, such as '100 rpm'; bare numbers are in SI."
 )
 @click.option("--to", "high", metavar="VALUE", help="End of the range.")
-@click.option("--doubled/--no-doubled", default=True, show_default=True, help="Follow motions of twice the period.")
+@click.option(
+    "--doublings",
+    default=3,
+    show_default=True,
+    type=click.IntRange(0, 6),
+    help="How often in a row motions of twice the period are followed.",
+)
+@click.option(
+    "--places",
+    default=3,
+    show_default=True,
+    type=click.IntRange(min=0),
+    help="Values of the range at which all motions are sought, to find those that no branch leads to.",
+)
 @click.option("--plot/--no-plot", default=True, show_default=True, help="Whether to write a plot.")
-def resonance(chosen: Chosen, vary: str, low: str | None, high: str | None, doubled: bool, plot: bool) -> None:
+def resonance(
+    chosen: Chosen, vary: str, low: str | None, high: str | None, doublings: int, places: int, plot: bool
+) -> None:
     """Follow the periodic motion of a CASE file's or a published set's mechanism over the speed, or another parameter.
 
     Writes amplitude, harmonics, crank torque and pin forces along the curve, and reports natural frequency, maxima, folds,
@@ -64,7 +79,7 @@ def resonance(chosen: Chosen, vary: str, low: str | None, high: str | None, doub
     """
     from .. import figures
     from ..files import save_figure, write_csv
-    from ..periodic import ResponseInterrupted, frequency_response, speed_name, unit_of
+    from ..periodic import ResponseInterrupted, frequency_response, speed_name, unit_of, with_isolas
     from ..youssef import approximations
 
     parameters, title = chosen.case.parameters, chosen.case.title
@@ -81,8 +96,10 @@ def resonance(chosen: Chosen, vary: str, low: str | None, high: str | None, doub
     interrupted = False
     try:
         response = frequency_response(
-            parameters, *ends, drive=drive, vary=vary, start=start, doubled=doubled, progress=console.is_terminal
+            parameters, *ends, drive=drive, vary=vary, start=start, doublings=doublings, progress=console.is_terminal
         )
+        if places:
+            response = with_isolas(response, places=places, progress=console.is_terminal)
     except ResponseInterrupted as stopped:
         response, interrupted = stopped.response, True
     factor, unit = (1.0 / RAD_S_PER_RPM, "rpm") if over_speed else (1.0, unit_of(mechanism, vary))
@@ -145,7 +162,7 @@ def _branches(title: str, response: Any, factor: float, unit: str) -> None:
             str(branch.turns),
             str(len(branch)),
             f"{factor * branch.parameter[0]:.6g}",
-            f"{factor * branch.parameter[-1]:.6g}",
+            "closed" if branch.closed else f"{factor * branch.parameter[-1]:.6g}",
             shares,
             "; ".join(events),
         )

@@ -50,6 +50,7 @@ from .grids import Grid as Grid
 from .grids import GridInterrupted as GridInterrupted
 from .grids import grid as grid
 from .grids import grid_folder as grid_folder
+from .isolas import with_isolas as with_isolas
 from .natural import mean_effective_mass as mean_effective_mass
 from .natural import natural_frequency as natural_frequency
 from .normal_forms import FormRun as FormRun

@@ -12,6 +12,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import reduce
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -351,11 +352,20 @@ def switch(
     low: float,
     high: float,
     greatest: float = 2e-2,
+    largest: float = GREATEST_MULTIPLIER,
     most_points: int = 5000,
     watch: Callable[[float], None] | None = None,
     stop: Callable[[PeriodicOrbit], bool] | None = None,
 ) -> Branch:
     """The branch of twice the period that leaves a branch at a period doubling.
+
+    Parameters
+    ----------
+    family, low, high, greatest, most_points, watch, stop
+        See `follow`.
+    doubling : SpecialPoint
+    largest : float
+        The branch is left where its largest multiplier passes this.
 
     Raises
     ------
@@ -381,9 +391,29 @@ def switch(
         taken = follower.step(base, length)
         # back on the undoubled branch the start repeats itself after half the period
         if taken is not None and abs(float((taken.y / scale - orbit.start / scale) @ (vector / scale))) > 0.5 * length:
-            return _branch(family, doubled.turns, follower, taken, watch, stop)
+            return _branch(family, doubled.turns, follower, taken, watch, stop, largest)
     raise ContinuationError(
         f"the motion of twice the period is not met next to {family.format_value(doubling.parameter)}"
+    )
+
+
+def follow_both(family: Family, orbit: PeriodicOrbit, value: float, *, low: float, high: float, **how: Any) -> Branch:
+    """The whole branch through an orbit, to both sides of it: see `follow`."""
+    up = follow(family, orbit, value, low=low, high=high, **how)
+    if up.closed:
+        return up
+    down = follow(family, orbit, value, low=low, high=high, direction=-1, **how)
+    before = len(down) - 1
+    turned = [replace(special, after=before - 1 - special.after) for special in reversed(down.special)]
+    return Branch(
+        family=family,
+        turns=orbit.turns,
+        parameter=np.concatenate([down.parameter[:0:-1], up.parameter]),
+        orbits=(*down.orbits[:0:-1], *up.orbits),
+        special=(*turned, *(replace(special, after=special.after + before) for special in up.special)),
+        reached=down.reached and up.reached,
+        closed=False,
+        reason=up.reason if down.reached else down.reason,
     )
 
 
@@ -433,11 +463,11 @@ def _in_pieces(family: Family, last: Point, settings: Settings) -> tuple[Followe
     return refined, refined.resume(places[chosen[:-1]].ravel(), last.parameter, ahead)
 
 
-def reason_to_leave(point: Point) -> str:
+def reason_to_leave(point: Point, largest: float = GREATEST_MULTIPLIER) -> str:
     """Why a branch is not followed beyond a point; empty where it is."""
     orbit = point.data
-    if orbit.largest > GREATEST_MULTIPLIER:
-        return f"its largest multiplier passes {GREATEST_MULTIPLIER:g}"
+    if orbit.largest > largest:
+        return f"its largest multiplier passes {largest:g}"
     sine = orbit.clearance(64)
     if sine < LEAST_SINE:
         return f"the links come near to the limit of assembly (sine of the angle to it {sine:.3g})"
@@ -451,6 +481,7 @@ def _branch(
     first: Point,
     watch: Callable[[float], None] | None,
     stop: Callable[[PeriodicOrbit], bool] | None,
+    largest: float = GREATEST_MULTIPLIER,
 ) -> Branch:
     pieces: list[tuple[Follower, Curve]] = []
     settings = follower.settings
@@ -461,7 +492,7 @@ def _branch(
             nonlocal refine
             if stop is not None and stop(point.data):
                 return "it was interrupted"
-            reason = reason_to_leave(point)
+            reason = reason_to_leave(point, largest)
             if not reason and _growth(point.data) > _GROWTH:
                 refine = True
                 return "deviations grow too fast to be followed over a whole period"

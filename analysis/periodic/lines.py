@@ -57,7 +57,7 @@ def branches_on(
         parameters, drive = operation(value, y)
         family = Family(parameters=parameters, drive=drive, vary=lambda v: operation(v, y), name=name, unit=unit)
         for motion in starts[largest < GREATEST]:
-            if any(_passes(branch, value, motion, x[1] - x[0]) for branch in branches):
+            if any(passes(branch, value, motion, x[1] - x[0]) for branch in branches):
                 continue
             try:
                 orbit = orbit_of(parameters, drive, start=motion, settle=False)
@@ -91,7 +91,7 @@ def distance(points: NDArray[np.float64], place: NDArray[np.float64]) -> float:
     return float(np.linalg.norm(np.vstack([s[:1], feet]), axis=1).min())
 
 
-def _passes(branch: Branch, value: float, motion: NDArray[np.float64], width: float) -> bool:
+def passes(branch: Branch, value: float, motion: NDArray[np.float64], width: float) -> bool:
     """Whether a branch passes a motion, given by its start."""
     first = branch.orbits[0]
     scale = np.append(scale_of(first.parameters, first.drive, first.start), width)

@@ -1,8 +1,8 @@
 """Where the slider resonates, how large, and which harmonics: the true periodic motion over the speed.
 
 `frequency_response` follows the periodic motions of the full nonlinear plant over a range of speeds, past folds, from both
-ends of the range, and switches to the motions of twice the period. `natural_frequency` is the classical estimate, from the
-mean effective mass.
+ends of the range, and switches to the motions of twice the period, and from those again. `natural_frequency` is the classical
+estimate, from the mean effective mass.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from ..numerics.continuation import ContinuationError
 from ..numerics.workers import interruptible
 from ..run import shown, takes_published
 from ..units import Amount, si
-from .branches import Branch, Family, SpecialPoint, describe, follow, switch
+from .branches import GREATEST_MULTIPLIER, Branch, Family, SpecialPoint, describe, follow, switch
 from .drives import Drive, published_drive
 from .floquet import Crossing, Stability
 from .orbits import (
@@ -38,6 +38,9 @@ from .starts import SAME, scale_of
 
 #: How far a maximum of the amplitude stands out, relative to its height, to count as one.
 PROMINENCE = 1e-3
+#: A branch of four times the period and more is left where its largest multiplier passes this: it has doubled once more, or
+#: folded, and will not be met by a machine again before another motion has been.
+STRAYED = 4.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -70,7 +73,7 @@ class Response(Shown):
     ----------
     branches : tuple of Branch
         The one from the low end first, then, where it is another, the one from the high end, then those of twice the
-        period.
+        period, of four times and so on, then those that are connected with none of these; each says whether it is ``closed``.
     low, high : float
         The range asked for.
     problems : tuple of str
@@ -139,7 +142,7 @@ def frequency_response(
     drive: Drive | None = None,
     vary: str = "drive.speed",
     start: ArrayLike | None = None,
-    doubled: bool = True,
+    doublings: int = 1,
     most_points: int = 5000,
     greatest_step: float = 5e-3,
     progress: bool = False,
@@ -159,8 +162,9 @@ def frequency_response(
         `Family` can vary.
     start : array_like, optional
         Guess of the orbit's start at the low end; see `find_orbit`.
-    doubled : bool
-        Whether the motions of twice the period are followed from each period doubling.
+    doublings : int
+        How often in a row the period is doubled: 1 for the motions of twice the period from each period doubling, 2 for those
+        of four times as well, and so on. From the second on a branch is left where its multiplier passes `STRAYED`.
     most_points : int
         Points of a branch at most.
     greatest_step : float
@@ -186,7 +190,7 @@ def frequency_response(
     Examples
     --------
     >>> from analysis import frequency_response
-    >>> response = frequency_response("rig-2-spring-c", "500 rpm", "650 rpm", doubled=False)
+    >>> response = frequency_response("rig-2-spring-c", "500 rpm", "650 rpm", doublings=0)
     >>> [f"{100.0 * peak.amplitude:.3f} cm" for peak in response.maxima()]
     ['1.715 cm']
     """
@@ -204,8 +208,8 @@ def frequency_response(
     with interruptible() as interrupted, shown(progress, high - low, "follow") as show:
         search = _Search(family, low, high, greatest_step, lambda: bool(interrupted))
         search.follow_from_both_ends(start, most_points, show)
-        if doubled and not interrupted:
-            search.follow_doublings()
+        if not interrupted:
+            search.follow_doublings(doublings)
     if not search.branches:
         raise search.failures[0]
     response = Response(branches=tuple(search.branches), low=low, high=high, problems=tuple(search.problems))
@@ -266,45 +270,59 @@ class _Search:
             if self.stop():
                 break
 
-    def follow_doublings(self) -> None:
-        """The branches of twice the period; one that ends at another doubling is not followed back from there."""
-        ends: list[tuple[float, NDArray[np.float64]]] = []
+    def follow_doublings(self, times: int) -> None:
+        """The branches of twice the period, so often in a row; one that ends at another doubling is not followed back."""
+        ends: list[tuple[int, float, NDArray[np.float64]]] = []
 
         def is_end(special: SpecialPoint) -> bool:
             orbit, reach = special.orbit, 1e-3 * (self.high - self.low)
             scale = scale_of(orbit.parameters, orbit.drive, orbit.start)
             return any(
-                abs(value - special.parameter) < reach and np.abs((y - orbit.start) / scale).max() < 0.1
-                for value, y in ends
+                turns == 2 * orbit.turns
+                and abs(value - special.parameter) < reach
+                and np.abs((y - orbit.start) / scale).max() < 0.1
+                for turns, value, y in ends
             )
 
-        for special in [s for branch in self.branches for s in branch.special if s.kind is Crossing.PERIOD_DOUBLING]:
-            if is_end(special):
-                continue
-            try:
-                branch = switch(
-                    self.family,
-                    special,
-                    low=self.low,
-                    high=self.high,
-                    greatest=self.greatest,
-                    stop=lambda _: self.stop(),
-                )
-            except (OrbitError, ContinuationError) as error:
-                place = self.family.format_value(special.parameter)
-                self.problems.append(f"the branch of twice the period at {place} is not followed: {error}")
-                continue
-            self._keep(branch)
-            ends.append((float(branch.parameter[-1]), branch.orbits[-1].start))
-            if self.stop():
-                return
+        doubled = self.branches
+        for largest in (GREATEST_MULTIPLIER, *[STRAYED] * (times - 1))[:times]:
+            points = [s for branch in doubled for s in branch.special if s.kind is Crossing.PERIOD_DOUBLING]
+            doubled = []
+            for special in points:
+                if is_end(special):
+                    continue
+                try:
+                    branch = switch(
+                        self.family,
+                        special,
+                        low=self.low,
+                        high=self.high,
+                        greatest=self.greatest,
+                        largest=largest,
+                        stop=lambda _: self.stop(),
+                    )
+                except (OrbitError, ContinuationError) as error:
+                    place = self.family.format_value(special.parameter)
+                    self.problems.append(f"the branch of twice the period at {place} is not followed: {error}")
+                    continue
+                self._keep(branch, largest)
+                doubled.append(branch)
+                ends.append((branch.turns, float(branch.parameter[-1]), branch.orbits[-1].start))
+                if self.stop():
+                    return
 
-    def _keep(self, branch: Branch) -> None:
+    def _keep(self, branch: Branch, largest: float = GREATEST_MULTIPLIER) -> None:
         self.branches.append(branch)
-        if not branch.reached:
-            first, last = (self.family.format_value(float(branch.parameter[i])) for i in (0, -1))
-            period = "" if branch.turns == 1 else f"with a period of {branch.turns} turns "
-            self.problems.append(f"the branch {period}from {first} is followed to {last} only: {branch.reason}")
+        left = largest < GREATEST_MULTIPLIER and branch.orbits[-1].largest > largest
+        if not (branch.reached or left):
+            self.problems.append(ended(branch))
+
+
+def ended(branch: Branch) -> str:
+    """That a branch was not followed to its end, and why."""
+    first, last = (branch.family.format_value(float(branch.parameter[i])) for i in (0, -1))
+    period = "" if branch.turns == 1 else f"with a period of {branch.turns} turns "
+    return f"the branch {period}from {first} is followed to {last} only: {branch.reason}"
 
 
 def _passes(branch: Branch, value: float, orbit: PeriodicOrbit) -> bool:

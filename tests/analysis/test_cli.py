@@ -414,7 +414,7 @@ def test_resonance_reports_a_fold(linkwork):
 def test_resonance_reports_what_could_not_be_followed(linkwork, tmp_path):
     result = linkwork(
         "resonance", "--published", "table-3.1", "--vary", "slider.stiffness", "--from", "10 N/m", "--to", "350 N/m",
-        "--no-plot", "--no-doubled",
+        "--no-plot", "--doublings", "0",
     )  # fmt: skip
     assert result.exit_code == cli.ENDED_EARLY
     assert "is followed to slider.stiffness = 305." in result.output
@@ -511,7 +511,7 @@ def test_resonance_over_the_torque(linkwork):
     result = linkwork(
         "resonance", "--published", "rig-2-spring-c", "--set", "drive.torque=0.01 N*m",
         "--set", "run.stop_time=1 s", "--vary", "drive.torque",
-        "--from", "0.005", "--to", "0.06", "--guess-speed", "540 rpm", "--no-plot", "--no-doubled",
+        "--from", "0.005", "--to", "0.06", "--guess-speed", "540 rpm", "--no-plot", "--doublings", "0",
     )  # fmt: skip
     assert "fold at 0.04949" in result.output, result.output
 

@@ -137,7 +137,7 @@ def test_a_quantity_may_be_a_text_with_its_unit(text: Callable[[], float], numbe
 
 
 def test_a_range_is_in_the_unit_of_what_varies() -> None:
-    damped = frequency_response("table-3.1", "2e4 dyn.s/cm", "25 N.s/m", vary="slider.damping", doubled=False)
+    damped = frequency_response("table-3.1", "2e4 dyn.s/cm", "25 N.s/m", vary="slider.damping", doublings=0)
     assert (damped.low, damped.high) == pytest.approx((20.0, 25.0))
     assert damped.branches[0].orbits[0].drive.speed == pytest.approx(14.0 * pi)
 
@@ -228,7 +228,7 @@ def test_other_results_say_what_they_are() -> None:
         "<PeriodicOrbit: 1 turn at 43.98 rad/s (420 rpm), stable, largest Floquet multiplier "
         f"{orbit.largest:.4g}; amplitude of slider.position {orbit.amplitude:.4g} m>"
     )
-    response = frequency_response("rig-2-spring-c", "500 rpm", "650 rpm", doubled=False)
+    response = frequency_response("rig-2-spring-c", "500 rpm", "650 rpm", doublings=0)
     best = max(response.maxima(), key=lambda e: e.amplitude)
     assert f"greatest amplitude of slider.position {best.amplitude:.4g} m" in repr(response)
     assert repr(response).endswith(" rpm); 1 branch, no problems>")

@@ -22,13 +22,16 @@ from analysis.periodic import (
     find_orbits,
     follow,
     follow_crossing,
+    frequency_response,
     normal_form,
     orbit_of,
     orbit_test,
     plane,
     switch,
+    with_isolas,
 )
 from analysis.periodic.starts import scale_of
+from linkwork.errors import InputError
 from tests.mechanisms import torsion
 from tests.oracles import oscillator
 from tests.published import FEIGENBAUM, MATHIEU_A, MATHIEU_B, PENDULUM_DOUBLINGS
@@ -191,7 +194,7 @@ def test_the_pendulum_doubles_its_period_where_others_found(cascade: list[Branch
     # to one in the last digit printed: the first is 1.06637
     assert values == pytest.approx(PENDULUM_DOUBLINGS, abs=1e-4)
     for special in doublings[:3]:
-        found = collocated(cascade[0].family, special, 128)
+        found = collocated(cascade[0].family, special, 96)
         assert found.residual < 1e-8
         assert special.parameter == pytest.approx(found.parameter, rel=1e-9)
     steps = np.diff(values)
@@ -212,3 +215,46 @@ def test_each_doubled_motion_of_the_pendulum_is_stable_until_it_doubles(cascade:
         after = branch.special[0].after
         assert set(branch.stability()[1 : after + 1]) == {Stability.STABLE}
         assert set(branch.stability()[after + 1 :]) == {Stability.UNSTABLE}
+
+
+def test_frequency_response_doubles_again_as_often_as_asked() -> None:
+    parameters, drive = pendulum(1.06)
+    # the strength of the excitation by its FMI name
+    low, high = 1.06 * NATURAL**2, 1.083 * NATURAL**2
+    start = min(find_orbits(parameters, speed=DRIVEN).stable, key=lambda orbit: abs(orbit.start[0] + 0.5 * pi)).start
+    response = frequency_response(
+        parameters, low, high, drive=drive, vary="rotor.excitation", start=start, doublings=3, greatest_step=2e-2
+    )
+    own = [branch for branch in response.branches if branch.orbits[0].start[0] < 0.0][:1]
+    own += [branch for branch in response.branches if branch.turns > 1]
+    assert [branch.turns for branch in own] == [1, 2, 4, 8]
+    assert not response.problems
+    values = [branch.special[0].parameter / NATURAL**2 for branch in own]
+    assert values == pytest.approx(PENDULUM_DOUBLINGS, abs=1e-4)
+
+
+# An isola: parametric resonance of a hardening spring, k + m cos w t, that a small torque T cos w t takes apart. Without the
+# torque a motion and its mirror image leave the rest between two pitchforks and meet again; with it one of them is closed
+
+TONGUE = torsion.Parameters(
+    rotor_stiffness=1.0, rotor_damping=0.05, rotor_cubic_stiffness=0.2, rotor_modulation=0.8, rotor_excitation=0.02
+)
+
+
+def test_the_motions_of_an_isola_are_found_and_followed_until_they_close() -> None:
+    response = frequency_response(TONGUE, 0.8, 1.5, greatest_step=2e-2)
+    assert not any(branch.closed for branch in response.branches)
+    whole = with_isolas(response, places=1, greatest_step=2e-2)
+    assert whole.branches[:-1] == response.branches
+    isola = whole.branches[-1]
+    assert isola.closed
+    assert [special.kind for special in isola.special] == [Crossing.FOLD, Crossing.FOLD]
+    for special in isola.special:
+        found = collocated(isola.family, special, 128)
+        assert special.parameter == pytest.approx(found.parameter, rel=1e-9)
+    ends = sorted(special.parameter for special in isola.special)
+    assert [isola.parameter.min(), isola.parameter.max()] == pytest.approx(ends, rel=1e-3)
+    # nothing is left to be found, and what was there is not found twice
+    assert len(with_isolas(whole, places=2, greatest_step=2e-2).branches) == len(whole.branches)
+    with pytest.raises(InputError, match="places is 0"):
+        with_isolas(response, places=0)

@@ -219,7 +219,7 @@ def test_an_interrupt_keeps_what_was_followed(monkeypatch: pytest.MonkeyPatch) -
 
 def test_one_end_without_an_orbit_is_a_problem_that_is_reported() -> None:
     drive = Drive(speed=SETS["table-3.1"].crank_speed)
-    response = frequency_response(TABLE_3_1, 0.04, 0.5, vary="crank.length", drive=drive, doubled=False)
+    response = frequency_response(TABLE_3_1, 0.04, 0.5, vary="crank.length", drive=drive, doublings=0)
     assert any("at crank.length = 0.5 m: no periodic motion found" in problem for problem in response.problems)
     assert response.branches[0].parameter[0] == 0.04
 
