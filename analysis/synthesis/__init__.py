@@ -27,9 +27,11 @@ from .constraints import (
     LeastTransmission,
     PivotRegion,
     Require,
+    TimeRatio,
 )
 from .drawing import drawing, plates
 from .functions import Generators, function_generators
+from .limit_positions import dead_centres, mechanical_advantage, time_ratio, toggles
 from .linkage import ANGLES, LENGTHS, LINKS, UNITS, Linkage, SecondCrank, SliderMotion
 from .report import (
     dimension_rows,
@@ -107,6 +109,7 @@ __all__ = [
     "SynthesisInterrupted",
     "TargetPath",
     "Task",
+    "TimeRatio",
     "TimedPath",
     "TradeOff",
     "TradeOffInterrupted",
@@ -118,6 +121,7 @@ __all__ = [
     "cognates",
     "columns_of",
     "costs",
+    "dead_centres",
     "dimension_rows",
     "direction",
     "distance_to",
@@ -136,6 +140,7 @@ __all__ = [
     "judge",
     "length_step",
     "load_synthesis_case",
+    "mechanical_advantage",
     "normal_form",
     "path_from_formula",
     "plates",
@@ -151,6 +156,8 @@ __all__ = [
     "synthesis_case_from",
     "synthesize",
     "there_and_back",
+    "time_ratio",
+    "toggles",
     "trade_off",
     "turn",
 ]

@@ -45,6 +45,7 @@ from .constraints import (
     LargestLink,
     LeastTransmission,
     PivotRegion,
+    TimeRatio,
     limits_of,
 )
 from .linkage import ANGLES, Linkage
@@ -189,6 +190,7 @@ class Constraints:
     over: str | None = entry(Choice(("turn", "task")), None)
     full_turn: bool = entry(flag, False)
     grashof: GrashofType | None = entry(Choice(get_args(GrashofType)), None)
+    time_ratio: tuple[float, float] | None = entry(Range(Quantity("1", least=1.0)), None)
     largest_link: float | None = entry(Quantity("m"), None)
     assembly: int | None = entry(Whole(), None)
     pivot_A: FloatArray | None = entry(points_of, None)
@@ -206,6 +208,9 @@ class Constraints:
             found.append(FullTurn())
         if self.grashof is not None:
             found.append(Grashof(type=self.grashof))
+        if self.time_ratio is not None:
+            low, high = self.time_ratio
+            found.append(TimeRatio(least=low, greatest=high))
         if self.largest_link is not None:
             found.append(LargestLink(length=self.largest_link))
         if self.assembly is not None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from math import isfinite, pi, radians
+from math import inf, isfinite, pi, radians
 from typing import Any, Literal, get_args
 
 import numpy as np
@@ -177,7 +177,47 @@ class Require:
             raise ParameterError(f"scale of {self.name}", self.scale, "be a finite number greater than zero")
 
 
-Constraint = LeastTransmission | FullTurn | Grashof | LargestLink | Assembly | PivotRegion | Require
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TimeRatio:
+    """The four-bar is a crank-rocker whose slow swing takes this many times as long as its quick one.
+
+    Attributes
+    ----------
+    least, greatest : float
+        Bounds; 1 at least.
+    """
+
+    least: float = 1.0
+    greatest: float = inf
+
+    def __post_init__(self) -> None:
+        if not 1.0 <= self.least <= self.greatest:
+            raise ParameterError("time ratio", (self.least, self.greatest), "be two numbers in order, 1 or greater")
+
+    def requires(self) -> tuple[Require, ...]:
+        """The same as functions of the dimensions: of how much the crank's way between the dead centres is off half a turn."""
+
+        def differs(d: Any) -> Any:
+            # directions of C from A with crank and coupler in line, by the law of cosines
+            l1, l2, l3, l4 = d.ground_length, d.crank_length, d.coupler_length, d.rocker_length
+            stretched, folded = ((l1**2 + r**2 - l4**2) / (2.0 * l1 * r) for r in (l3 + l2, l3 - l2))
+            angles = [np.arctan2(np.sqrt(np.maximum(1.0 - c**2, 1e-12)), c) for c in (stretched, folded)]
+            return angles[1] - angles[0]
+
+        def advance(ratio: float) -> float:
+            return pi * (ratio - 1.0) / (ratio + 1.0)
+
+        found = []
+        if self.least > 1.0:
+            low = advance(self.least)
+            found.append(Require(function=lambda d: low**2 - differs(d) ** 2, name="least time ratio"))
+        if isfinite(self.greatest):
+            high = advance(self.greatest)
+            found.append(Require(function=lambda d: differs(d) ** 2 - high**2, name="greatest time ratio"))
+        return tuple(found)
+
+
+Constraint = TimeRatio | LeastTransmission | FullTurn | Grashof | LargestLink | Assembly | PivotRegion | Require
 #: A least transmission angle of 40 degrees over a full turn.
 USUAL: tuple[Constraint, ...] = (LeastTransmission(),)
 
@@ -265,7 +305,7 @@ def limits_of(
             for c in constraints
             if isinstance(c, PivotRegion)
         ),
-        requires=tuple(c for c in constraints if isinstance(c, Require)),
+        requires=tuple(r for c in constraints for r in _required(c)),
     )
 
 
@@ -304,13 +344,21 @@ def _ends(
     return ends
 
 
+def _required(constraint: Constraint) -> tuple[Require, ...]:
+    if isinstance(constraint, TimeRatio):
+        return constraint.requires()
+    return (constraint,) if isinstance(constraint, Require) else ()
+
+
 def _turning(constraints: Sequence[Constraint]) -> tuple[float | None, float | None, str | None]:
     """Least transmission angles over a turn and over the way of the task, and Grashof's type; see `Limits`."""
     turn, way = (
         max((c.angle for c in constraints if isinstance(c, LeastTransmission) and c.over == over), default=None)
         for over in ("turn", "task")
     )
-    types = {c.type for c in constraints if isinstance(c, Grashof)}
+    types: set[str] = {c.type for c in constraints if isinstance(c, Grashof)}
+    if any(isinstance(c, TimeRatio) for c in constraints):
+        types.add("crank-rocker")
     if len(types) > 1:
         raise InfeasibleError(f"Grashof types {', '.join(sorted(types))} are asked for at once: a four-bar has one")
     type_ = types.pop() if types else None

@@ -6,8 +6,10 @@ from collections.abc import Sequence
 from math import degrees, isfinite, pi
 
 import numpy as np
+from numpy.typing import NDArray
 
-from .linkage import ANGLES, SecondCrank, SliderMotion
+from .limit_positions import dead_centres, mechanical_advantage, time_ratio, toggles
+from .linkage import ANGLES, Linkage, SecondCrank, SliderMotion
 from .sensitivity import ANGLE_STEP, PIVOT_ANGLES, costs, length_step, rounded, sensitivities
 from .solution import Solution, Verdicts
 from .tasks import RockerFunction, Task, UntimedPath
@@ -76,7 +78,9 @@ def report(solution: Solution) -> str:
         f"assembly: C lies to the {'left' if linkage.branch > 0 else 'right'} of B -> D; "
         f"largest link {1e3 * linkage.largest_link:.6g} mm"
     ]
-    if isinstance(linkage.pivot, SliderMotion):
+    if linkage.pivot is None:
+        parts[0] += _limits(linkage, solution.rotation)
+    elif isinstance(linkage.pivot, SliderMotion):
         parts[0] += f"\nslider at D: stroke {1e3 * linkage.pivot.stroke:.6g} mm"
     elif isinstance(linkage.pivot, SecondCrank):
         parts[0] += f"\nsecond crank at D: {linkage.pivot.ratio:g} turns for one of the first"
@@ -85,6 +89,21 @@ def report(solution: Solution) -> str:
     parts += [table(dimension_rows(solution)), rounding_line(solution)]
     parts.append(table(_stations(solution)))
     return "\n\n".join(parts) + "\n"
+
+
+def _limits(linkage: Linkage, rotation: NDArray[np.float64]) -> str:
+    """Dead centres, toggles, time ratio and mechanical advantage of a four-bar, a line each."""
+    lines = ""
+    for what, places in (("rocker at rest", dead_centres(linkage)), ("toggles", toggles(linkage))):
+        if places:
+            lines += f"\n{what} at crank rotations of {', '.join(f'{degrees(at):.2f}' for at in places)} deg"
+    ratio = time_ratio(linkage)
+    if ratio is not None:
+        lines += f"\ntime ratio of the rocker's swings {ratio:.4g}"
+    gained = np.abs(mechanical_advantage(linkage, rotation))
+    if np.isfinite(gained).any():
+        lines += f"\ntorque of the rocker for one of the crank: {np.nanmin(gained):.3g} at least on the way"
+    return lines
 
 
 def dimension_rows(solution: Solution) -> list[tuple[str, str, str, str, str]]:
