@@ -77,6 +77,8 @@ def example(read: Reader) -> Any:
         case Many(item=item, least=least, length=length):
             one = example(item)
             return None if one is None else [one] * max(least, length or 1)
+        case Range(item=Quantity(unit="1")):
+            return [1, 2]
         case Range(item=Quantity(unit=unit)):
             return [in_words(share * (_ANGLE if unit == "rad" else 1.0), unit) for share in (0.1, 1.0)]
         case reader.flag:

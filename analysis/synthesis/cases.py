@@ -190,7 +190,7 @@ class Constraints:
     over: str | None = entry(Choice(("turn", "task")), None)
     full_turn: bool = entry(flag, False)
     grashof: GrashofType | None = entry(Choice(get_args(GrashofType)), None)
-    time_ratio: tuple[float, float] | None = entry(Range(Quantity("1", least=1.0)), None)
+    time_ratio: tuple[float, float] | None = entry(Range(Quantity("1", least=1.0, requirement="be 1 or greater")), None)
     largest_link: float | None = entry(Quantity("m"), None)
     assembly: int | None = entry(Whole(), None)
     pivot_A: FloatArray | None = entry(points_of, None)
