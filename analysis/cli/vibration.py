@@ -23,6 +23,7 @@ from .common import (
     workers_options,
 )
 from .driven import Chosen, about_a_case, swing_of
+from .sensitivity import report_sensitivity
 
 #: Range of speeds where none is given, relative to the natural frequency: beyond twice, where parametric resonance begins.
 _RANGE = (0.15, 2.3)
@@ -63,8 +64,16 @@ def _require_range(parameters: Any, low: float, high: float, name: str, first: s
     help="Values of the range at which all motions are sought, to find those that no branch leads to.",
 )
 @click.option("--plot/--no-plot", default=True, show_default=True, help="Whether to write a plot.")
+@click.option("--sensitivity", is_flag=True, help="Report which parameters move each maximum, fold and the like most.")
 def resonance(
-    chosen: Chosen, vary: str, low: str | None, high: str | None, doublings: int, places: int, plot: bool
+    chosen: Chosen,
+    vary: str,
+    low: str | None,
+    high: str | None,
+    doublings: int,
+    places: int,
+    plot: bool,
+    sensitivity: bool,
 ) -> None:
     """Follow the periodic motion of a CASE file's or a published set's mechanism over the speed, or another parameter.
 
@@ -73,7 +82,7 @@ def resonance(
 
     \b
     Examples:
-      linkwork resonance --published rig-2-spring-c
+      linkwork resonance --published rig-2-spring-c --sensitivity
       linkwork resonance --published rig-1-spring-b --from '100 rpm' --to '1300 rpm'
       linkwork resonance --published table-3.1 --vary slider.stiffness --from '1e5 dyn/cm' --to '2e6 dyn/cm'
     """
@@ -115,6 +124,8 @@ def resonance(
     _extrema(response, factor, unit, table)
     if table is not None:
         written.append(write_csv(f"{stem}-approximations.csv", table.columns()))
+    if sensitivity:
+        written += report_sensitivity(response, factor, unit, f"{stem}-sensitivity.csv")
     if plot:
         figure = figures.plot(response, title=title, rpm=over_speed, beside=table)
         written.append(save_figure(figure, f"{stem}.png"))

@@ -71,6 +71,7 @@ from .planes import plane as plane
 from .planes import require_variable as require_variable
 from .planes import speed_name as speed_name
 from .planes import unit_of as unit_of
+from .planes import value_of as value_of
 from .resonance import Extremum as Extremum
 from .resonance import Response as Response
 from .resonance import ResponseInterrupted as ResponseInterrupted

@@ -161,9 +161,14 @@ class MotionGradient:
         """The variational equations of the motion."""
         return Variations(self.orbit, self._switched, self.along)
 
+    @property
+    def forcing(self) -> FloatArray:
+        """Derivatives of the rates with respect to the parameters, the motion held; shape (k, s, n, m)."""
+        return self.variations.forcing
+
     @cached_property
     def _solution(self) -> tuple[FloatArray, FloatArray]:
-        return self.variations.periodic(self.variations.forcing)
+        return self.variations.periodic(self.forcing)
 
     def _gradient(self, value: float, by: FloatArray) -> Gradient:
         return Gradient(value=float(value), names=self.names, by=by, at=self.values)
@@ -222,7 +227,7 @@ class MotionGradient:
             + by_constant @ self.along
             + v.by_constant @ _stacked(self.orbit, (), twice, len(self.names))
         )
-        second, rates = v.periodic(forcing)[0], v.by_y @ solution + v.forcing
+        second, rates = v.periodic(forcing)[0], v.by_y @ solution + self.forcing
         total = np.zeros(len(self.names))
         for sign, _, place in self._swing:
             # the place moves so that the rate there stays zero
@@ -550,7 +555,7 @@ def _test(motion: MotionGradient, kind: Crossing) -> FloatArray:
     """Derivatives, shape (m,), of a function that is zero where the multiplier is on the unit circle."""
     if kind is Crossing.FOLD:
         left, _ = _null_vectors(motion.variations)
-        return left @ motion.variations.after(motion.variations.forcing)
+        return left @ motion.variations.after(motion.forcing)
     return motion.test(kind).by
 
 

@@ -403,6 +403,43 @@ def test_resonance_of_a_published_set(linkwork, tmp_path):
     assert rows.shape[1] == 3
 
 
+def test_resonance_says_what_moves_it(linkwork, tmp_path):
+    result = linkwork(
+        "resonance",
+        "--published",
+        "rig-2-spring-c",
+        "--from",
+        "560 rpm",
+        "--to",
+        "610 rpm",
+        "--no-plot",
+        "--sensitivity",
+    )
+    assert result.exit_code == 0, result.output
+    # half a percent for a percent of the stiffness: w^2 = k / m; an amplitude that the damper alone limits
+    assert re.search(r"maximum │ +586\.1\d │ slider\.stiffness \+0\.49\d* +│ +1\.7153 ", result.output), result.output
+    path = tmp_path / "out" / "rig-2-spring-c-resonance-sensitivity.csv"
+    columns = dict(zip(*(row.split(",") for row in path.read_text(encoding="utf-8").splitlines())))
+    assert float(columns["amplitude by slider.damping [%/%]"]) == pytest.approx(-1.0, abs=0.02)
+    assert float(columns["place by slider.damping [%/%]"]) == pytest.approx(0.0, abs=0.01)
+
+
+def test_resonance_says_where_nothing_can_be_said_of_what_moves_it(linkwork):
+    result = linkwork(
+        "resonance",
+        "--published",
+        "rig-2-spring-c",
+        "--from",
+        "620 rpm",
+        "--to",
+        "640 rpm",
+        "--no-plot",
+        "--sensitivity",
+    )
+    assert result.exit_code == 0, result.output
+    assert "no special point" in result.output
+
+
 def test_resonance_reports_a_fold(linkwork):
     result = linkwork(
         "resonance", "--published", "rig-1-spring-b", "--from", "1030 rpm", "--to", "1060 rpm", "--no-plot"

@@ -296,7 +296,7 @@ class TestPage:
 
     def test_its_python_prints_what_it_says(self) -> None:
         blocks = re.findall(r"```python\n(.*?)```(?:\n\n```text\n(.*?)```)?", PAGE.read_text(), flags=re.DOTALL)
-        assert len(blocks) == 7
+        assert len(blocks) == 8
         space: dict[str, object] = {}
         for block, expected in blocks:
             output = io.StringIO()
@@ -307,7 +307,7 @@ class TestPage:
     def test_its_commands_run(self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.chdir(tmp_path)
         commands = re.findall(r"```sh\nlinkwork (.*?)\n```", PAGE.read_text())
-        assert len(commands) == 7
+        assert len(commands) == 8
         for command in commands:
             done = CliRunner().invoke(main, shlex.split(command), catch_exceptions=False)
             assert done.exit_code == 0, command

@@ -1,0 +1,76 @@
+"""Which parameters move the special points of a response, for the command line."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from rich.markup import escape
+from rich.table import Table
+
+from linkwork.errors import LinkworkError
+
+from .common import console, print_error
+from .driven import swing_of
+
+#: Parameters that are named of a point.
+_NAMED = 4
+
+
+def report_sensitivity(response: Any, factor: float, unit: str, path: str) -> list[Path]:
+    """Print what moves each special point and its amplitude most, and write all elasticities as a table.
+
+    Parameters
+    ----------
+    response : Response
+    factor, unit
+        In which values of the parameter of the response are printed.
+    path : str
+        Of the table: a row a point, in the order printed.
+    """
+    from ..files import write_csv
+    from ..periodic import gradient_names, special_gradient, value_of
+
+    family = response.family
+    operation = family.parameters, family.drive
+    # a percent of nothing is nothing
+    names = [name for name in gradient_names(*operation) if name != family.vary and value_of(*operation, name) != 0.0]
+    grid = Table(title="what moves it most: percent for a percent of a parameter", title_justify="left")
+    what, size, cm = swing_of(response.branches[0].orbits[0])
+    for heading in ("", f"at [{unit}]", f"its place: {family.name}", f"amplitude [{cm}]", f"amplitude of {what} there"):
+        grid.add_column(escape(heading), justify="right" if heading.endswith("]") else "left")
+    rows = []
+    for word, point in _points(response):
+        try:
+            found = special_gradient(family, point, names)
+        except LinkworkError as error:
+            print_error(f"note: the {word} at {family.format_value(point.parameter)} has no gradient: {error}")
+            continue
+        place, amplitude = found.place, found.amplitude
+        rows.append([factor * place.value, size * amplitude.value, *_shares(place), *_shares(amplitude)])
+        shown = f"{rows[-1][0]:.2f}", _named(place), f"{rows[-1][1]:.4f}", _named(amplitude)
+        grid.add_row(word, *shown)
+    if not rows:
+        console.print("no special point of which one could say what moves it", highlight=False)
+        return []
+    console.print(grid)
+    headings = [f"at [{unit}]", f"amplitude of {what} [{cm}]"]
+    headings += [f"{of} by {name} [%/%]" for of in ("place", "amplitude") for name in names]
+    return [write_csv(path, dict(zip(headings, np.array(rows).T)))]
+
+
+def _points(response: Any) -> Iterator[tuple[str, Any]]:
+    extrema = [("maximum", e) for e in response.maxima()] + [("minimum", e) for e in response.minima()]
+    special = [(s.kind.value, s) for branch in response.branches for s in branch.special]
+    yield from sorted(extrema + special, key=lambda entry: entry[1].parameter)
+
+
+def _shares(gradient: Any) -> list[float]:
+    return list(gradient.elasticities.values())
+
+
+def _named(gradient: Any) -> str:
+    shares = gradient.elasticities
+    return "\n".join(f"{name} {shares[name]:+.3g}" for name in gradient.movers(_NAMED))
