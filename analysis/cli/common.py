@@ -188,6 +188,36 @@ def set_option(example: str) -> Callable[..., Any]:
     )
 
 
+def _require_plotly(context: click.Context, parameter: click.Parameter, value: bool) -> bool:
+    from ..figures import PlotlyMissingError, require_plotly
+
+    try:
+        if value:
+            require_plotly()
+    except PlotlyMissingError as error:
+        raise click.BadParameter(str(error)) from None
+    return value
+
+
+html_option = click.option(
+    "--html",
+    is_flag=True,
+    callback=_require_plotly,
+    help="Write the plot as a page with values under the pointer, too; needs Plotly.",
+)
+
+
+def save_picture(picture: Any, path: str | Path, *, html: bool) -> list[Path]:
+    """Write a picture as PNG, and as a page beside it if that is asked for; ``path`` is without the ending."""
+    from .. import figures
+    from ..files import save_figure, write_text
+
+    written = [save_figure(figures.draw(picture), f"{path}.png")]
+    if html:
+        written.append(write_text(f"{path}.html", figures.to_html(picture)))
+    return written
+
+
 plot_option = click.option("--plot/--no-plot", default=True, show_default=True, help="Whether to write a plot.")
 
 

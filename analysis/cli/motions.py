@@ -10,7 +10,7 @@ from rich.table import Table
 from linkwork.errors import InputError
 
 from ..mechanisms import mechanism_of
-from .common import console, folder_of, quantity, workers_options
+from .common import console, folder_of, html_option, quantity, save_picture, workers_options
 from .driven import Chosen, about_a_case, swing_of
 
 
@@ -22,12 +22,14 @@ from .driven import Chosen, about_a_case, swing_of
 )
 @click.option("--rate", nargs=2, metavar="FROM TO", help="Range of its rate.")
 @workers_options(default=-1)
+@html_option
 def basins(
     chosen: Chosen,
     points: int,
     position: tuple[str, str] | None,
     rate: tuple[str, str] | None,
     jobs: int,
+    html: bool,
 ) -> None:
     """Report all periodic motions of a CASE file's or a published set's mechanism at one speed, and which start ends in which.
 
@@ -39,7 +41,6 @@ def basins(
       linkwork basins --published rig-1-spring-b --speed '1000 rpm' --position '-10 cm' '10 cm' --rate '-10 m/s' '10 m/s'
     """
     from .. import figures
-    from ..files import save_figure
     from ..periodic import basins as find_basins
     from ..periodic import orbits_of
 
@@ -73,8 +74,8 @@ def basins(
         soft_wrap=True,
     )
     stem = folder_of(chosen.folder) / f"{chosen.stem}-basins"
-    figure = figures.plot(picture, title=chosen.case.title)
-    chosen.finish([picture.to_csv(f"{stem}.csv"), save_figure(figure, f"{stem}.png")], ())
+    drawn = figures.picture(picture, title=chosen.case.title)
+    chosen.finish([picture.to_csv(f"{stem}.csv"), *save_picture(drawn, stem, html=html)], ())
 
 
 def _motions(title: str, found: Any) -> None:

@@ -17,9 +17,13 @@ from ..units import RAD_S_PER_RPM
 from .common import (
     console,
     folder_of,
+    html_option,
+    plot_option,
     print_error,
     quantity,
+    save_picture,
     say,
+    show_table,
     workers_options,
 )
 from .driven import Chosen, about_a_case, swing_of
@@ -63,7 +67,8 @@ def _require_range(parameters: Any, low: float, high: float, name: str, first: s
     type=click.IntRange(min=0),
     help="Values of the range at which all motions are sought, to find those that no branch leads to.",
 )
-@click.option("--plot/--no-plot", default=True, show_default=True, help="Whether to write a plot.")
+@plot_option
+@html_option
 @click.option("--sensitivity", is_flag=True, help="Report which parameters move each maximum, fold and the like most.")
 def resonance(
     chosen: Chosen,
@@ -73,21 +78,22 @@ def resonance(
     doublings: int,
     places: int,
     plot: bool,
+    html: bool,
     sensitivity: bool,
 ) -> None:
     """Follow the periodic motion of a CASE file's or a published set's mechanism over the speed, or another parameter.
 
     Writes amplitude, harmonics, crank torque and pin forces along the curve, and reports natural frequency, maxima, folds,
-    period doublings, and the classical approximations beside the true motion.
+    period doublings, the speeds to avoid, and the classical approximations beside the true motion.
 
     \b
     Examples:
       linkwork resonance --published rig-2-spring-c --sensitivity
-      linkwork resonance --published rig-1-spring-b --from '100 rpm' --to '1300 rpm'
+      linkwork resonance --published rig-1-spring-b --from '100 rpm' --to '1300 rpm' --html
       linkwork resonance --published table-3.1 --vary slider.stiffness --from '1e5 dyn/cm' --to '2e6 dyn/cm'
     """
     from .. import figures
-    from ..files import save_figure, write_csv
+    from ..files import write_csv
     from ..periodic import ResponseInterrupted, frequency_response, speed_name, unit_of, with_isolas
     from ..youssef import approximations
 
@@ -122,13 +128,14 @@ def resonance(
     written = [response.to_csv(f"{stem}.csv")]
     table = approximations(response) if over_speed and mechanism is FIVE_BAR else None
     _extrema(response, factor, unit, table)
+    _avoid(response, factor, unit)
     if table is not None:
         written.append(write_csv(f"{stem}-approximations.csv", table.columns()))
     if sensitivity:
         written += report_sensitivity(response, factor, unit, f"{stem}-sensitivity.csv")
     if plot:
-        figure = figures.plot(response, title=title, rpm=over_speed, beside=table)
-        written.append(save_figure(figure, f"{stem}.png"))
+        picture = figures.picture(response, title=title, rpm=over_speed, beside=table)
+        written += save_picture(picture, stem, html=html)
     chosen.finish(written, response.problems, interrupted=interrupted)
 
 
@@ -220,6 +227,26 @@ def _extrema(response: Any, factor: float, unit: str, table: Any) -> None:
     console.print(grid)
 
 
+def _avoid(response: Any, factor: float, unit: str) -> None:
+    """The ranges to avoid, and what happens at the folds, in words."""
+    ranges = response.speeds_to_avoid
+    words = "speeds" if response.family.unit == "rad/s" else f"values of {response.family.name}"
+    if not ranges:
+        say(f"no {words} to avoid: no resonance inside the range, one stable motion throughout")
+    else:
+        rows = [(f"{factor * a.low:.6g}", f"{factor * a.high:.6g}", a.risk.value) for a in ranges]
+        show_table(f"{words} to avoid", (f"from [{unit}]", f"to [{unit}]", "because"), rows, words=("because",))
+    what, size, cm = swing_of(response.branches[0].orbits[0])
+    for jump in response.jumps:
+        side, way = ("below", "rises") if jump.direction > 0 else ("above", "falls")
+        after = " or ".join(f"{size * amplitude:.4g}" for amplitude in jump.after)
+        then = f"it jumps to {after} {cm}" if after else "it ends, and no other stable motion was followed"
+        say(
+            f"the stable motion of {size * jump.before:.4g} {cm} of {what} is there only {side} "
+            f"{factor * jump.parameter:.6g} {unit}: where {response.family.name} {way} past it, {then}"
+        )
+
+
 @click.command()
 @about_a_case
 @click.option("--x", "x", metavar="NAME", help="Parameter along x, by its FMI name; by default the crank speed.")
@@ -232,6 +259,7 @@ def _extrema(response: Any, factor: float, unit: str, table: Any) -> None:
 @workers_options(default=-1)
 @click.option("--chart/--no-chart", "charted", default=True, show_default=True, help="Chart, or the verdict alone.")
 @click.option("--coexisting", is_flag=True, help="Seek all motions of every point: how many are stable, and how large.")
+@html_option
 def stability(
     chosen: Chosen,
     x: str | None,
@@ -242,6 +270,7 @@ def stability(
     jobs: int,
     charted: bool,
     coexisting: bool,
+    html: bool,
 ) -> None:
     """Report whether the periodic motion of a CASE file's or a published set's mechanism is stable, and chart where it is not.
 
@@ -256,7 +285,6 @@ def stability(
       linkwork stability --published rig-1-spring-a --y slider.stiffness --y-range '1e6 dyn/cm' '5e6 dyn/cm'
     """
     from .. import figures
-    from ..files import save_figure
     from ..periodic import damping_name, require_variable, speed_name, stability_chart
     from ..youssef import linear_motion
 
@@ -298,12 +326,12 @@ def stability(
     _runs(found)
     stem = folder_of(chosen.folder) / f"{chosen.stem}-stability"
     more = [] if found.beside is None else [found.beside.to_csv(f"{stem}-coexisting.csv")]
-    figure = figures.plot(found, title=chosen.case.title)
+    picture = figures.picture(found, title=chosen.case.title)
     written = [
         found.to_csv(f"{stem}.csv"),
         found.boundaries_to_csv(f"{stem}-boundaries.csv"),
         *more,
-        save_figure(figure, f"{stem}.png"),
+        *save_picture(picture, stem, html=html),
     ]
     chosen.finish(written, found.problems)
 

@@ -2,24 +2,38 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from itertools import cycle
 from typing import Any
 
 import numpy as np
+from matplotlib import colormaps
 from matplotlib.axes import Axes
-from matplotlib.colors import TwoSlopeNorm
+from matplotlib.colors import Colormap, ListedColormap, Normalize, TwoSlopeNorm
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from ..periodic import OTHER_ORBIT, TRUE_ORBIT, Basins, Coexistence, Crossing, Outcome, StabilityChart
-from .curves import Curve, Panel, draw_panel, lay_out
-from .dispatch import plot
-from .style import COLOURS
+from ..periodic import OTHER_ORBIT, TOLERANCE, TRUE_ORBIT, Basins, Coexistence, Crossing, Outcome, StabilityChart
+from .curves import Curve, Panel, Picture, draw, draw_panel, draw_part, pictured
+from .style import COLOURS, LIGHT, legend_above
 
 #: Colour of points that have no value.
-_NONE = "0.82"
+EMPTY = "0.82"
+#: Hatching of classes, one after another, so that they are told apart without colours, and of what is unstable.
+_HATCHES, _UNSTABLE = ("", "//", "xx", "..", "--", "||"), "////"
+#: Size of a chart of a result (inches).
+_SIZE = 7.2, 4.6
+#: Classes of points by how many stable motions they have, with their colours; and those of none, one and more.
+_SEVERAL = {"one stable motion": "#C6DFF0", "several stable motions": "#F6C99F", "unstable motions only": "#E58267"}
+_BY_COUNT = np.array([2.0, 0.0, 1.0])
+#: Where starts end that end in no motion.
+_LOST = {-1: "comes to the limit of assembly", -2: "ends in none of them, as far as it was followed"}
+#: Colours of the two sides of a value.
+_BELOW, _ABOVE = "#6AACD0", "#E58267"
+
+_Masked = np.ma.MaskedArray[Any, np.dtype[np.float64]]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -39,15 +53,25 @@ class HeatMap:
         Value that is white: below it blue, above it red; None for one colour scale from the least to the greatest.
     missing : str
         What the legend calls masked points.
+    classes : mapping
+        Where ``values`` are numbers of classes, from 0: what the legend calls each, and its colour. There is no colour scale
+        then.
+    sides : (str, str), optional
+        What the legend calls values below and above the middle; those above are hatched.
+    hover : mapping
+        What is beside x and y under the pointer, by its name with unit, each of shape (ny, nx); without any the value is.
     """
 
     panel: Panel
     x: NDArray[np.float64]
     y: NDArray[np.float64]
-    values: np.ma.MaskedArray[Any, np.dtype[np.float64]]
+    values: _Masked
     label: str
     middle: float | None = 1.0
     missing: str = "no value"
+    classes: Mapping[str, str] = field(default_factory=dict)
+    sides: tuple[str, str] | None = None
+    hover: Mapping[str, ArrayLike] = field(default_factory=dict)
 
 
 def plot_charts(
@@ -65,48 +89,77 @@ def plot_charts(
     size : (float, float)
         Width and height of a chart (inches).
     """
-    return lay_out(charts, _draw, title=title, columns=columns, size=size)
+    return draw(Picture(parts=charts, title=title, columns=columns, size=size))
 
 
-def _draw(figure: Figure, axis: Axes, chart: Panel | HeatMap) -> None:
-    if isinstance(chart, HeatMap):
-        _draw_map(figure, axis, chart)
-    else:
-        draw_panel(axis, chart)
-
-
-def _draw_map(figure: Figure, axis: Axes, chart: HeatMap) -> None:
+def colours_of(chart: HeatMap) -> tuple[Normalize, Colormap]:
+    """The scale of a map's values and its colours."""
     values = np.ma.masked_invalid(chart.values)
-    look: dict[str, Any] = {"cmap": "viridis"}
-    if chart.middle is not None:
-        # both sides of the middle in colours, however one-sided the values are
-        low, high = (float(v) for v in (values.min(), values.max())) if values.count() else (chart.middle, chart.middle)
-        least = 1e-3 * max(abs(chart.middle), 1e-9)
-        norm = TwoSlopeNorm(chart.middle, min(low, chart.middle - least), max(high, chart.middle + least))
-        look = {"cmap": "RdBu_r", "norm": norm}
-    axis.set_facecolor(_NONE)
-    mesh = axis.pcolormesh(chart.x, chart.y, values, shading="nearest", rasterized=True, **look)
+    if chart.classes:
+        n = len(chart.classes)
+        return Normalize(-0.5, n - 0.5), ListedColormap(list(chart.classes.values()))
+    low, high = (float(v) for v in (values.min(), values.max())) if values.count() else (0.0, 1.0)
+    if chart.middle is None:
+        return Normalize(low, high), colormaps["viridis"]
+    # both sides of the middle in colours, however one-sided the values are
+    least = 1e-3 * max(abs(chart.middle), 1e-9)
+    low, high = (low, high) if values.count() else (chart.middle, chart.middle)
+    norm = TwoSlopeNorm(chart.middle, min(low, chart.middle - least), max(high, chart.middle + least))
+    return norm, colormaps["RdBu_r"]
+
+
+def keys_of(chart: HeatMap) -> list[tuple[str, str, str]]:
+    """Colour, hatching and name of what the legend has of a map besides its curves."""
+    keys = [(colour, hatch, name) for (name, colour), hatch in zip(chart.classes.items(), cycle(_HATCHES))]
+    if chart.sides is not None:
+        keys += [(_BELOW, "", chart.sides[0]), (_ABOVE, _UNSTABLE, chart.sides[1])]
+    if np.ma.getmaskarray(np.ma.masked_invalid(chart.values)).any():
+        keys.append((EMPTY, "", chart.missing))
+    return keys
+
+
+@draw_part.register
+def _(chart: HeatMap, figure: Figure, axis: Axes) -> None:
+    values = np.ma.masked_invalid(chart.values)
+    norm, colours = colours_of(chart)
+    axis.set_facecolor(EMPTY)
+    mesh = axis.pcolormesh(chart.x, chart.y, values, shading="nearest", rasterized=True, norm=norm, cmap=colours)
+    for of, hatch in _hatched(chart, values):
+        if of.any() and min(of.shape) > 1:
+            # a boundary half a cell inside of its own points
+            axis.contourf(chart.x, chart.y, of, levels=[0.5, 1.5], colors="none", hatches=[hatch])
     axis.grid(False)
     draw_panel(axis, chart.panel)
-    # the scale is part of the chart, and no axes of its own
-    scale = axis.inset_axes((1.03, 0.0, 0.05, 1.0))
-    figure.colorbar(mesh, cax=scale, label=chart.label)
-    scale.grid(False)
-    legend = axis.get_legend()
-    if np.ma.getmaskarray(values).any():
-        handles, labels = axis.get_legend_handles_labels()
-        handles.append(Patch(facecolor=_NONE))
-        where: Any = chart.panel.legend_at if chart.panel.legend_at != "outside" else "best"
-        axis.legend(handles, [*labels, chart.missing], loc=where, frameon=True, framealpha=0.9)
-    elif legend is not None:
+    if not chart.classes:
+        # the scale is part of the chart, and no axes of its own
+        scale = axis.inset_axes((1.03, 0.0, 0.05, 1.0))
+        figure.colorbar(mesh, cax=scale, label=chart.label)
+        scale.grid(False)
+    handles, labels = axis.get_legend_handles_labels()
+    for colour, hatch, name in keys_of(chart):
+        handles.append(Patch(facecolor=colour, hatch=hatch, edgecolor="0.35", linewidth=0.0))
+        labels.append(name)
+    if not handles:
+        return
+    if chart.panel.legend_at == "above":
+        legend_above(axis, handles=handles, labels=labels, ncols=2)
+    else:
         # over the colours a legend needs a ground
-        legend.set_frame_on(True)
-        legend.get_frame().set_alpha(0.9)
+        where: Any = chart.panel.legend_at if chart.panel.legend_at != "outside" else "best"
+        axis.legend(handles, labels, loc=where, frameon=True, framealpha=0.9)
 
 
-@plot.register
-def plot_stability_chart(chart: StabilityChart, *, title: str = "") -> Figure:
-    """The largest multiplier in colours, the boundaries, and the points of the long runs."""
+def _hatched(chart: HeatMap, values: _Masked) -> list[tuple[NDArray[np.float64], str]]:
+    """What is hatched, as ones among zeros, and how."""
+    if chart.sides is not None and chart.middle is not None:
+        return [(np.asarray(values.filled(-np.inf) > chart.middle + TOLERANCE, dtype=float), _UNSTABLE)]
+    hatches = [_HATCHES[i % len(_HATCHES)] for i in range(len(chart.classes))]
+    return [(np.asarray(values.filled(-1.0) == i, dtype=float), hatch) for i, hatch in enumerate(hatches) if hatch]
+
+
+@pictured
+def plot_stability_chart(chart: StabilityChart, *, title: str = "") -> Picture:
+    """What is stable, unstable or not found, the largest multiplier in colours, the boundaries, and the long runs."""
     x, y = chart.axes
     looks = {
         Crossing.PERIOD_DOUBLING: ("0.1", "-", "period doubling"),
@@ -150,12 +203,13 @@ def plot_stability_chart(chart: StabilityChart, *, title: str = "") -> Figure:
         x_label=x.label,
         y_label=y.label,
         curves=curves,
-        legend_at="upper right",
+        legend_at="above",
         x_range=(float(low[0]), float(high[0])),
         y_range=(float(low[1]), float(high[1])),
     )
     if chart.beside is not None:
         return _with_coexistence(chart, chart.beside, panel, title)
+    words = [["not found" if word is None else word.value for word in row] for row in chart.grid.stability().tolist()]
     map_ = HeatMap(
         panel=panel,
         x=x.factor * chart.grid.x,
@@ -163,61 +217,92 @@ def plot_stability_chart(chart: StabilityChart, *, title: str = "") -> Figure:
         values=chart.grid.largest,
         label="largest Floquet multiplier",
         missing="not found",
+        sides=("stable", "unstable"),
+        hover={"motion": np.array(words), "largest multiplier": chart.grid.largest.filled(np.nan)},
     )
-    return plot_charts([map_], title=title, size=(7.2, 5.0))
+    return Picture(parts=[map_], title=title, size=_SIZE)
 
 
-def _with_coexistence(chart: StabilityChart, beside: Coexistence, panel: Panel, title: str) -> Figure:
+def _with_coexistence(chart: StabilityChart, beside: Coexistence, panel: Panel, title: str) -> Picture:
     """How many stable motions there are, and how large the smallest and the largest are, with the boundaries over them."""
     x, y = (axis.factor * values for axis, values in zip(chart.axes, (beside.x, beside.y)))
     what, unit = beside.swing
     factor, shown = (100.0, "cm") if unit == "m" else (1.0, unit)
-    bare = replace(panel, curves=[replace(curve, label="") for curve in panel.curves])
-    values: dict[str, np.ma.MaskedArray[Any, np.dtype[np.float64]]] = {
-        "stable motions found": np.ma.MaskedArray(beside.stable.astype(float), mask=beside.stable == 0),
-        f"amplitude of {what}, smallest stable motion [{shown}]": factor * beside.least,
-        f"the same, largest stable motion [{shown}]": factor * beside.greatest,
+    sizes = {
+        f"amplitude of {what}, {word} stable motion [{shown}]": factor * amplitude
+        for word, amplitude in (("smallest", beside.least), ("largest", beside.greatest))
     }
+    hover: dict[str, ArrayLike] = {"motions found": beside.count, "stable motions": beside.stable}
+    hover |= {name: values.filled(np.nan) for name, values in sizes.items()}
+    bare = replace(panel, curves=[replace(curve, label="") for curve in panel.curves])
+    several = HeatMap(
+        panel=panel,
+        x=x,
+        y=y,
+        values=np.ma.MaskedArray(_BY_COUNT[np.minimum(beside.stable, 2)], mask=beside.count == 0),
+        label="stable motions found",
+        middle=None,
+        missing="no motion found",
+        classes=_SEVERAL,
+        hover=hover,
+    )
     maps = [
-        HeatMap(panel=bare if n else panel, x=x, y=y, values=grid, label=label, middle=None, missing="none found")
-        for n, (label, grid) in enumerate(values.items())
+        replace(several, panel=bare, values=values, label=label, classes={}, missing="no stable motion found")
+        for label, values in sizes.items()
     ]
-    return plot_charts(maps, title=title, size=(7.2, 4.2))
+    return Picture(parts=[several, *maps], title=title, size=_SIZE)
 
 
-@plot.register
-def plot_basins(found: Basins, *, title: str = "") -> Figure:
+@pictured
+def plot_basins(found: Basins, *, title: str = "") -> Picture:
     """The motion that each start ends in by its colour, and the motions themselves at the crank angle 0."""
     x_label, y_label = found.labels
     half = len(found.motions[0].start) // 2
-    curves = [
-        Curve(
-            x=[orbit.start[0]],
-            y=[orbit.start[half]],
-            line="",
-            marker="o" if orbit in found.motions else "x",
-            colour="0.05",
-            label="" if n and (orbit in found.motions) == (found.found.orbits[n - 1] in found.motions) else label,
-        )
-        for n, orbit in enumerate(found.found.orbits)
-        for label in ["stable motion" if orbit in found.motions else "unstable motion"]
-    ]
+    what, unit = found.motions[0].swing
+    factor, shown = (100.0, "cm") if unit == "m" else (1.0, unit)
+    curves = []
+    for stable, marker in ((True, "o"), (False, "x")):
+        those = [orbit for orbit in found.found.orbits if (orbit in found.motions) == stable]
+        if those:
+            curves.append(
+                Curve(
+                    x=[orbit.start[0] for orbit in those],
+                    y=[orbit.start[half] for orbit in those],
+                    line="",
+                    marker=marker,
+                    colour="0.05",
+                    label="stable motion" if stable else "unstable motion",
+                    hover={
+                        f"amplitude of {what} [{shown}]": [factor * orbit.amplitude for orbit in those],
+                        "largest multiplier": [orbit.largest for orbit in those],
+                    },
+                )
+            )
     panel = Panel(
         x_label=x_label,
         y_label=y_label,
         curves=curves,
-        legend_at="upper right",
+        legend_at="above",
         x_range=(float(found.position[0]), float(found.position[-1])),
         y_range=(float(found.rate[0]), float(found.rate[-1])),
     )
-    names = [f"motion {n + 1}" for n in range(len(found.motions))]
+    names = [
+        f"ends in motion {n}, amplitude of {what} {factor * orbit.amplitude:.3g} {shown}"
+        for n, orbit in enumerate(found.motions, start=1)
+    ]
+    numbers = found.ends.copy()
+    for end, words in _LOST.items():
+        if (found.ends == end).any():
+            numbers[found.ends == end] = len(names)
+            names.append(words)
     map_ = HeatMap(
         panel=panel,
         x=found.position,
         y=found.rate,
-        values=np.ma.MaskedArray(found.ends + 1.0, mask=found.ends < 0),
-        label=f"{', '.join(names)}, by amplitude: where a start ends",
+        values=np.ma.MaskedArray(numbers.astype(float)),
+        label="where a start ends",
         middle=None,
-        missing="limit of assembly, or none",
+        classes=dict(zip(names, cycle(LIGHT))),
+        hover={"it": np.array(names)[numbers]},
     )
-    return plot_charts([map_], title=title, size=(7.2, 5.0))
+    return Picture(parts=[map_], title=title, size=_SIZE)

@@ -1,35 +1,90 @@
-"""Curves over time, speed or anything else, in panels."""
+"""Curves over time, speed or anything else, in panels: what a picture has, and how Matplotlib draws it.
+
+A `Picture` is a description: `draw` makes a figure of it, `html.to_page` a page with values under the pointer.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import singledispatch, wraps
 from math import ceil
-from typing import Any, TypeVar
+from typing import Any, ParamSpec
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.patches import PathPatch
 from matplotlib.path import Path as Outline
+from matplotlib.patheffects import withStroke
 from numpy.typing import ArrayLike, NDArray
 
-from .marks import mark_place, place_marks
-from .style import COLOURS, LINE, MARK, SHADE, Figure, finish, styled, write_notes, write_title
+from .dispatch import picture, plot
+from .marks import label_place, mark_place, place_marks
+from .style import (
+    COLOURS,
+    LINE,
+    MARK,
+    MARKED,
+    SHADE,
+    SHADES,
+    THIN,
+    Figure,
+    finish,
+    legend_above,
+    styled,
+    write_notes,
+    write_title,
+)
 
-_Part = TypeVar("_Part")
+_Arguments = ParamSpec("_Arguments")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Curve:
-    """One line of a panel: points (n,), what the legend calls it, and how it looks where that is not left to the panel."""
+    """One line of a panel: points (n,), what the legend calls it, and how it looks where that is not left to the panel.
+
+    A marker between dollars, such as "$2$", is the letters themselves. What ``hover`` has by its name with unit, each of
+    length n, is beside x and y under the pointer.
+    """
 
     x: ArrayLike
     y: ArrayLike
     label: str = ""
     colour: str | None = None
-    line: str = "-"
+    line: Any = "-"
     marker: str = ""
+    hollow: bool = False
     width: float | None = None
+    order: float | None = None
+    hover: Mapping[str, ArrayLike] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Shade:
+    """A range along x, shaded over the whole height; ranges with one label look alike, by their number in `style.SHADES`."""
+
+    low: float
+    high: float
+    label: str
+    number: int = 0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Label:
+    """A text at a point, put where it covers nothing."""
+
+    x: float
+    y: float
+    text: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Arrow:
+    """An arrow along y."""
+
+    x: float
+    begin: float
+    end: float
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -49,7 +104,7 @@ class Panel:
     legend : str, optional
         Heading of the legend; there is one if any curve has a label.
     legend_at : str
-        Where it goes, in Matplotlib's words, or "outside", to the right of the axes.
+        Where it goes, in Matplotlib's words, or "outside", to the right of the axes, or "above" them.
     x_range, y_range : (float, float), optional
     logarithmic : str
         Axes on a logarithmic scale: "", "x", "y" or "xy".
@@ -58,6 +113,9 @@ class Panel:
     filled : sequence of sequence of ndarray, shape (n, 2)
         Areas to shade, each the closed boundaries it has; holes are kept free.
     x_ticks : sequence of float, optional
+    shades : sequence of Shade
+    labels : sequence of Label
+    arrows : sequence of Arrow
     """
 
     x_label: str
@@ -74,6 +132,36 @@ class Panel:
     equal: bool = False
     filled: Sequence[Sequence[NDArray[np.float64]]] = ()
     x_ticks: Sequence[float] | None = None
+    shades: Sequence[Shade] = ()
+    labels: Sequence[Label] = ()
+    arrows: Sequence[Arrow] = ()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Picture:
+    """What a picture has: `draw` makes a figure of it.
+
+    Attributes
+    ----------
+    parts : sequence of Panel or HeatMap
+    title : str
+        Above all of it; a figure of the thesis by its number.
+    columns : int
+        Parts side by side.
+    size : (float, float)
+        Width and height of a part (inches).
+    notes : sequence of str
+        Sentences at the foot.
+    heights : sequence of float
+        Of the rows, relative to the height of a part; none for rows of one height. They have one x axis then.
+    """
+
+    parts: Sequence[Any]
+    title: str
+    columns: int = 1
+    size: tuple[float, float] = (6.4, 3.7)
+    notes: Sequence[str] = ()
+    heights: Sequence[float] = ()
 
 
 def plot_curves(
@@ -98,34 +186,53 @@ def plot_curves(
     notes : sequence of str
         Sentences at the foot.
     """
-
-    def draw(figure: Figure, axis: Axes, panel: Panel) -> None:
-        draw_panel(axis, panel)
-
-    return lay_out(panels, draw, title=title, columns=columns, size=size, notes=notes)
+    return draw(Picture(parts=panels, title=title, columns=columns, size=size, notes=notes))
 
 
-def lay_out(
-    parts: Sequence[_Part],
-    draw: Callable[[Figure, Axes, _Part], None],
-    *,
-    title: str,
-    columns: int,
-    size: tuple[float, float],
-    notes: Sequence[str] = (),
-) -> Figure:
-    """A figure with a pair of axes per part, drawn by ``draw``; see `plot_curves`."""
+def pictured(of: Callable[_Arguments, Picture]) -> Callable[_Arguments, Figure]:
+    """Register what describes the picture of a kind of result, by its first argument, and return what plots it."""
+
+    @wraps(of)
+    def plotted(*arguments: _Arguments.args, **options: _Arguments.kwargs) -> Figure:
+        return draw(of(*arguments, **options))
+
+    picture.register(of)
+    plot.register(plotted)
+    return plotted
+
+
+def draw(picture: Picture) -> Figure:
+    """A figure of a picture, one pair of axes per part."""
+    parts, columns, size = picture.parts, picture.columns, picture.size
     rows = ceil(len(parts) / columns)
+    heights = picture.heights or [1.0] * rows
     with styled():
-        figure = Figure(figsize=(size[0] * columns, 0.35 + size[1] * rows))
-        axes = figure.subplots(rows, columns, squeeze=False)
+        figure = Figure(figsize=(size[0] * columns, 0.35 + size[1] * sum(heights)))
+        axes = figure.subplots(
+            rows, columns, squeeze=False, height_ratios=heights, sharex="col" if picture.heights else False
+        )
         for axis, part in zip(axes.flat, parts):
-            draw(figure, axis, part)
+            draw_part(part, figure, axis)
+            if picture.heights:
+                axis.label_outer(remove_inner_ticks=False)
         for axis in list(axes.flat)[len(parts) :]:
             axis.remove()
-        write_title(figure, title)
-        write_notes(figure, notes)
+        if picture.heights:
+            figure.align_ylabels()
+        write_title(figure, picture.title)
+        write_notes(figure, picture.notes)
         return place_marks(finish(figure))
+
+
+@singledispatch
+def draw_part(part: Any, figure: Figure, axis: Axes) -> None:
+    """Draw a part of a picture on axes of its own; each kind of part registers how."""
+    raise TypeError(f"a part of a picture is a Panel or a HeatMap, not a {type(part).__name__}")
+
+
+@draw_part.register
+def _(panel: Panel, figure: Figure, axis: Axes) -> None:
+    draw_panel(axis, panel)
 
 
 def draw_panel(axis: Axes, panel: Panel) -> None:
@@ -136,17 +243,17 @@ def draw_panel(axis: Axes, panel: Panel) -> None:
         )
         axis.add_patch(PathPatch(outline, facecolor=SHADE, alpha=0.22, edgecolor="none", zorder=0))
     for number, curve in enumerate(panel.curves):
-        axis.plot(
-            curve.x,
-            curve.y,
-            linestyle=curve.line or "none",
-            color=curve.colour or COLOURS[number % len(COLOURS)],
-            marker=curve.marker or None,
-            label=curve.label or None,
-            linewidth=curve.width,
-            markeredgewidth=LINE,
-            zorder=3 if curve.marker else 2,
-        )
+        _draw_curve(axis, curve, curve.colour or COLOURS[number % len(COLOURS)])
+    for entry, number, those in shades_by_label(panel):
+        colour, hatch, _ = SHADES[number]
+        for shade, name in zip(those, (entry or None, *[None] * len(those))):
+            look: dict[str, Any] = {"facecolor": (colour, 0.16), "edgecolor": (colour, 0.45), "linewidth": 0.0}
+            axis.axvspan(shade.low, shade.high, hatch=hatch, label=name, zorder=0.5, **look)
+    for arrow in panel.arrows:
+        look = {"arrowstyle": "-|>,head_width=0.25,head_length=0.5", "color": MARKED, "linewidth": LINE, "shrinkB": 0.0}
+        axis.annotate("", (arrow.x, arrow.end), (arrow.x, arrow.begin), arrowprops=look, zorder=3.5)
+    for label in panel.labels:
+        label_place(axis, (label.x, label.y), label.text)
     axis.set(xlabel=panel.x_label, ylabel=panel.y_label)
     axis.set_title(panel.title)
     if "x" in panel.logarithmic:
@@ -166,7 +273,34 @@ def draw_panel(axis: Axes, panel: Panel) -> None:
         axis.axvline(place, **MARK | {"linestyle": (0, (5, 4))})
     for text, place in (panel.verticals or {}).items():
         mark_place(axis, place, text)
-    if any(curve.label for curve in panel.curves):
+    if panel.legend_at == "above" and axis.get_legend_handles_labels()[0]:
+        legend_above(axis, title=panel.legend or None, ncols=3)
+    elif any(curve.label for curve in panel.curves):
         outside: dict[str, Any] = {"loc": "upper left", "bbox_to_anchor": (1.0, 1.0)}
         where = outside if panel.legend_at == "outside" else {"loc": panel.legend_at}
         axis.legend(title=panel.legend or None, alignment="left", **where)
+
+
+def shades_by_label(panel: Panel) -> list[tuple[str, int, list[Shade]]]:
+    """The shades of a panel that are one entry of the legend each: label, look, ranges."""
+    kinds = dict.fromkeys((shade.label, shade.number) for shade in panel.shades)
+    return [(*kind, [shade for shade in panel.shades if (shade.label, shade.number) == kind]) for kind in kinds]
+
+
+def _draw_curve(axis: Axes, curve: Curve, colour: str) -> None:
+    letters = curve.marker.startswith("$")
+    axis.plot(
+        curve.x,
+        curve.y,
+        linestyle=curve.line or "none",
+        color=colour,
+        marker=curve.marker or None,
+        markerfacecolor="white" if curve.hollow else colour,
+        markersize=6.0 if letters else None,
+        label=curve.label or None,
+        linewidth=curve.width,
+        markeredgewidth=0.3 if letters else THIN if curve.hollow else LINE,
+        zorder=curve.order or (3 if curve.marker else 2),
+        # letters on a line are read on a ground of their own
+        path_effects=[withStroke(linewidth=3.0, foreground="white")] if letters else None,
+    )

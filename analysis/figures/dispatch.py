@@ -99,6 +99,29 @@ def plot(result: Any, *details: Any, **options: Any) -> Figure:
 
 
 @singledispatch
+def picture(result: Any, *details: Any, **options: Any) -> Any:
+    """Describe the picture of a result: the panels, curves and marks that `plot` draws and `to_html` writes.
+
+    Parameters
+    ----------
+    result : object
+        A response, a branch, a chart, basins.
+    *details, **options
+        Those of `plot`.
+
+    Returns
+    -------
+    Picture
+
+    Raises
+    ------
+    DrawingError
+        If the picture of this type has no description, or there is none.
+    """
+    return _registered(picture, result, "picture to be described")(result, *details, **options)
+
+
+@singledispatch
 def animate(result: Any, path: str | Path, *details: Any, **options: Any) -> Path:
     """Write an animation (GIF) of a result and return its path.
 

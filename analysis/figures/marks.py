@@ -1,24 +1,29 @@
-"""Places marked along x, with their names where no curve runs."""
+"""Places marked along x, and points with a text, their letters where no curve runs."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
 from itertools import product
-from typing import Literal, TypeAlias
+from typing import Any, Literal, TypeAlias
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.text import Annotation
+from matplotlib.path import Path
+from matplotlib.text import Annotation, Text
 from matplotlib.transforms import Bbox
 
-from .style import MARK, MARKED, TINY, Figure
+from .style import HAIR, MARK, MARKED, TINY, Figure
 
-#: How marks are known among other texts, and their lines among others.
-_GID = "mark"
+#: How marks are known among other texts, and their lines among others; likewise texts of points.
+_GID, _LABEL = "mark", "label"
 #: Heights in a panel at which the top of a name may be, the first the best; points that it keeps from its line and the rest.
 _TOPS, _GAP = np.linspace(1.0, 0.2, 17), 2.0
 _Side: TypeAlias = Literal["left", "right"]
 _SIDES: tuple[_Side, _Side] = ("right", "left")
+#: Distances (points) from its point at which a text may be, the first the best, and directions there.
+_DISTANCES = (10.0, 20.0, 34.0, 52.0, 74.0, 100.0, 130.0)
+_DIRECTIONS = np.radians([30.0, -30.0, 150.0, -150.0, 0.0, 180.0, 70.0, 110.0, -70.0, -110.0])
 
 
 def mark_place(axis: Axes, place: float, text: str) -> None:
@@ -39,30 +44,104 @@ def mark_place(axis: Axes, place: float, text: str) -> None:
     )
 
 
+def label_place(axis: Axes, place: tuple[float, float], text: str) -> None:
+    """A text about a point, with a line to it; `place_marks` puts it where there is room."""
+    axis.annotate(
+        text,
+        place,
+        xytext=(_DISTANCES[0], _DISTANCES[0]),
+        textcoords="offset points",
+        va="center",
+        fontsize=TINY,
+        color=MARKED,
+        gid=_LABEL,
+        arrowprops={"arrowstyle": "-", "color": MARKED, "linewidth": HAIR, "shrinkA": 1.0, "shrinkB": 3.0},
+        zorder=5,
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class _Scene:
+    """What is on axes that letters must not cover, in pixels: edges, legend, lines of marks, curves; it is laid out.
+
+    A curve is its path, the size of its markers and whether it has a line.
+    """
+
+    inside: Bbox
+    legend: Bbox | None
+    marks: Sequence[float]
+    curves: Sequence[tuple[Path, float, bool]]
+
+    @classmethod
+    def of(cls, axis: Axes) -> _Scene:
+        legend = axis.get_legend()
+        marks = [line for line in axis.lines if line.get_gid() == _GID]
+        curves = [
+            (
+                line.get_transform().transform_path(line.get_path()),
+                line.get_markersize() if line.get_marker() != "None" else 0.0,
+                line.get_linestyle() != "None",
+            )
+            for line in axis.lines
+            if line.get_gid() != _GID
+        ]
+        return cls(
+            axis.get_window_extent(),
+            None if legend is None else legend.get_window_extent(),
+            [line.get_window_extent().x0 for line in marks],
+            curves,
+        )
+
+    def covered(self, box: Bbox, others: Sequence[Bbox]) -> int:
+        """How many curves, markers, names, and edges of the axes a box covers."""
+        inside = self.inside
+        count = sum(box.overlaps(other) for other in others)
+        count += 10 * (box.x0 < inside.x0 or box.x1 > inside.x1 or box.y0 < inside.y0 or box.y1 > inside.y1 + _GAP)
+        if self.legend is not None:
+            count += box.overlaps(self.legend)
+        count += sum(box.x0 < place < box.x1 for place in self.marks)
+        for path, marker, line in self.curves:
+            if marker:
+                # the size in points is a little more than half of it in pixels
+                count += box.padded(marker).count_contains(path.vertices) > 0
+            if line:
+                count += path.intersects_bbox(box, filled=False)
+        return int(count)
+
+
 def place_marks(figure: Figure) -> Figure:
-    """Move the names of marks along their lines to where they cover nothing, or least; the figure must be laid out."""
+    """Move the letters of marks and of points to where they cover nothing, or least; the figure must be laid out."""
     for axis in figure.axes:
-        marks = [text for text in axis.texts if isinstance(text, Annotation) and text.get_gid() == _GID]
+        texts = [text for text in axis.texts if isinstance(text, Annotation)]
+        scene = _Scene.of(axis) if any(text.get_gid() in _MOVES for text in texts) else None
         placed: list[Bbox] = []
-        for mark in marks:
-            placed.append(_place(axis, mark, placed))
+        for gid, (move, first, second) in _MOVES.items():
+            for text in (text for text in texts if text.get_gid() == gid):
+                assert scene is not None
+                placed.append(_place(text, move, product(first, second), scene, placed))
     return figure
 
 
-def _place(axis: Axes, mark: Annotation, others: Sequence[Bbox]) -> Bbox:
-    """Put a name at the first of the places where it covers least, and return the box that it takes."""
-    least: tuple[int, float, _Side] | None = None
-    for top, side in product(_TOPS.tolist(), _SIDES):
-        covered = _covered(axis, _move(mark, top, side).padded(_GAP), others)
+def _place(
+    text: Annotation,
+    move: Callable[[Annotation, float, Any], Bbox],
+    places: Iterable[tuple[float, Any]],
+    scene: _Scene,
+    others: Sequence[Bbox],
+) -> Bbox:
+    """Put letters at the first of the places where they cover least, and return the box that they take."""
+    least: tuple[int, tuple[float, Any]] | None = None
+    for place in places:
+        covered = scene.covered(move(text, *place).padded(_GAP), others)
         if least is None or covered < least[0]:
-            least = covered, top, side
+            least = covered, place
         if covered == 0:
             break
     assert least is not None
-    return _move(mark, *least[1:])
+    return move(text, *least[1])
 
 
-def _move(mark: Annotation, top: float, side: _Side) -> Bbox:
+def _slide(mark: Annotation, top: float, side: _Side) -> Bbox:
     """Move a name to a height and a side of its line, and return the box that it takes there."""
     mark.xy = (mark.xy[0], top)
     mark.set_horizontalalignment(side)
@@ -70,22 +149,17 @@ def _move(mark: Annotation, top: float, side: _Side) -> Bbox:
     return mark.get_window_extent()
 
 
-def _covered(axis: Axes, box: Bbox, others: Sequence[Bbox]) -> int:
-    """How many curves, markers, names, and edges of the axes a box covers."""
-    count = sum(box.overlaps(other) for other in others)
-    inside = axis.get_window_extent()
-    count += 10 * (box.x0 < inside.x0 or box.x1 > inside.x1 or box.y0 < inside.y0)
-    legend = axis.get_legend()
-    if legend is not None:
-        count += box.overlaps(legend.get_window_extent())
-    for line in axis.lines:
-        if line.get_gid() == _GID:
-            count += box.x0 < line.get_window_extent().x0 < box.x1
-            continue
-        path = line.get_transform().transform_path(line.get_path())
-        if line.get_marker() != "None":
-            # the size in points is a little more than half of it in pixels
-            count += box.padded(line.get_markersize()).count_contains(path.vertices) > 0
-        if line.get_linestyle() != "None":
-            count += path.intersects_bbox(box, filled=False)
-    return int(count)
+def _turn(label: Annotation, distance: float, direction: float) -> Bbox:
+    """Move the text of a point to a distance and direction from it, and return the box that it takes there."""
+    label.set_position((distance * np.cos(direction), distance * np.sin(direction)))
+    label.set_horizontalalignment("left" if np.cos(direction) > 0.0 else "right")
+    label.get_window_extent()
+    # without the line to the point, which may cross what it likes
+    return Text.get_window_extent(label)
+
+
+#: How letters of each kind move, and over which places, those nearest first.
+_MOVES: dict[str | None, tuple[Callable[[Annotation, float, Any], Bbox], Sequence[float], Sequence[Any]]] = {
+    _GID: (_slide, _TOPS.tolist(), _SIDES),
+    _LABEL: (_turn, _DISTANCES, _DIRECTIONS.tolist()),
+}

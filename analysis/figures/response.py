@@ -1,4 +1,4 @@
-"""Branches of periodic motions over a parameter."""
+"""Branches of periodic motions over a parameter: amplitude, harmonics, errors of approximations, torque and forces."""
 
 from __future__ import annotations
 
@@ -7,35 +7,77 @@ from dataclasses import dataclass
 from typing import Any, TypeAlias
 
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 from shapely import LineString, distance
 from shapely import points as make_points
 
 from linkwork.five_bar.published import CM_PER_METRE, RAD_S_PER_RPM
 
-from ..periodic import FORCE, Branch, Response
+from ..periodic import (
+    FORCE,
+    TOLERANCE,
+    Avoided,
+    Branch,
+    Crossing,
+    Family,
+    FoldJump,
+    Response,
+    Risk,
+    SpecialPoint,
+    Stability,
+    fold_jumps,
+    ranges_to_avoid,
+)
 from ..youssef import Approximations
-from .dispatch import plot
-from .style import COLOURS, LINE, finish, legend_above, styled, write_title
+from .curves import Arrow, Curve, Label, Panel, Picture, Shade, draw, pictured
+from .style import COLOURS, LINE, THIN
 
-#: Lines of the approximations beside.
+#: Lines of the approximations beside, of motions by their stability, and of the reader's figure that has all panels.
 _LINES: tuple[Any, ...] = ("-.", ":", (0, (5, 1)))
+_STABLE = {Stability.STABLE: "-", Stability.MARGINAL: ":", Stability.UNSTABLE: "--"}
+#: Width of a figure and height of its least panel (inches); of the first panel and of the second, relative to it.
+_SIZE, _MAIN, _HARMONICS = (7.6, 1.75), 2.4, 1.15
 
-#: Points of a branch at which approximations are compared with it.
-_COMPARED = 360
+#: Points of a branch at which approximations are compared with it, and places over the range at which they are drawn besides.
+_COMPARED, _BESIDE = 240, 60
 #: Distance (points) within which a curve is hidden under another.
 _HIDDEN = 1.5 * LINE
-#: Relative error (%) that counts as none.
-_NONE = 1e-3
+#: Relative error (%) that counts as none; harmonic, relative to the greatest, that does.
+_NONE, _SMALL = 1e-3, 2e-5
+#: Letters along a branch.
+_LETTERS = 7
 
 FloatArray: TypeAlias = NDArray[np.float64]
 
-#: Signs of the points at which a multiplier crosses the unit circle, by the kind's value.
-_MARKERS = {"fold": "s", "period doubling": "D", "torus": "^"}
-_SPECIAL: dict[str, Any] = {"linestyle": "none", "color": "black", "markerfacecolor": "white", "zorder": 4}
+#: Signs of the points at which a multiplier crosses the unit circle, and what they are called in the picture.
+_MARKERS = {Crossing.FOLD: ("s", "fold"), Crossing.PERIOD_DOUBLING: ("D", "doubling"), Crossing.TORUS: ("^", "torus")}
+_RISKS = tuple(Risk)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Scale:
+    """How a parameter and the amplitude are drawn: factors from SI, units, names."""
+
+    family: Family
+    factor: float
+    unit: str
+    scale: float
+    shown: str
+    what: str
+
+    @property
+    def axis(self) -> str:
+        return f"{self.family.name} [{self.unit}]" if self.unit else self.family.name
+
+    def place(self, value: float) -> str:
+        """A value of the parameter as it is drawn, to four figures and more where they differ."""
+        number = self.factor * value
+        return f"{number:.0f} {self.unit}" if abs(number) >= 1e3 else f"{number:.4g} {self.unit}".rstrip()
+
+    def size(self, value: float) -> str:
+        """An amplitude as it is drawn, without its unit."""
+        return f"{self.scale * value:.3g}"
 
 
 def plot_branches(
@@ -44,10 +86,12 @@ def plot_branches(
     title: str = "",
     rpm: bool = True,
     beside: Callable[[float], Mapping[str, float]] | None = None,
+    avoid: Sequence[Avoided] = (),
 ) -> Figure:
-    """Amplitude, crank torque and pin force along branches: stable parts solid, unstable ones dashed.
+    """Amplitude, harmonics, crank torque and pin force along branches: stable parts solid, unstable ones dashed.
 
-    Of approximations there is a panel of the relative error; those that the true motion covers are drawn only there.
+    At folds an arrow goes to the motion that the machine jumps to. Of approximations there is a panel of the relative error;
+    those that the true motion covers are drawn only there.
 
     Parameters
     ----------
@@ -57,168 +101,380 @@ def plot_branches(
     rpm : bool
         Whether a speed in rad/s is drawn in rpm.
     beside : callable, optional
-        ``beside(parameter)``: amplitudes (m) by approximations, by their names.
+        ``beside(parameter)``: amplitudes (m) by approximations, by their names. Their errors are against the stable motions of
+        one turn.
+    avoid : sequence of Avoided
+        Ranges to shade.
     """
-    family = branches[0].family
+    return draw(describe_branches(branches, title=title, rpm=rpm, beside=beside, avoid=avoid))
+
+
+def describe_branches(
+    branches: Sequence[Branch],
+    *,
+    title: str = "",
+    rpm: bool = True,
+    beside: Callable[[float], Mapping[str, float]] | None = None,
+    avoid: Sequence[Avoided] = (),
+) -> Picture:
+    """What `plot_branches` draws."""
+    family, (what, si) = branches[0].family, branches[0].orbits[0].swing
     rpm &= family.unit == "rad/s"
     factor, unit = (1.0 / RAD_S_PER_RPM, "rpm") if rpm else (1.0, family.unit)
-    what, si = branches[0].orbits[0].swing
     scale, shown = (CM_PER_METRE, "cm") if si == "m" else (1.0, si)
-    rows = _rows(branches[0], f"amplitude of {what} [{shown}]", scale)
-    others = [] if beside is None else [_approximated(branch, beside) for branch in branches if branch.turns == 1]
-    with styled():
-        size = 7.2, 3.4 + 2.1 * (len(rows) - 1 + bool(others))
-        figure = Figure(figsize=size)
-        heights = (2.2, *[1.0] * (len(rows) - 1 + bool(others)))
-        axes = figure.subplots(len(heights), 1, sharex=True, height_ratios=heights, squeeze=False)[:, 0]
-        main, rest = axes[0], axes[2:] if others else axes[1:]
-        for number, branch in enumerate(branches):
-            x = factor * branch.parameter
-            for axis, (label, y) in zip((main, *rest), rows):
-                axis.set_ylabel(label)
-                _draw_branch(axis, x, y(branch), _stable(branch), color=COLOURS[number % len(COLOURS)])
-            for special in branch.special:
-                place = factor * special.parameter, scale * special.orbit.amplitude
-                main.plot(*place, _MARKERS[special.kind.value], **_SPECIAL)
-        # what is linear has resonances without bound; the true motion sets the scale
-        top = 1.15 * max(scale * float(branch.amplitude.max()) for branch in branches)
-        main.set_ylim(0.0, top)
-        seen = _draw_approximations(main, others, factor, scale, size) if others else []
-        if others:
-            _draw_errors(axes[1], others, factor)
-        for axis in rest:
-            axis.set_yscale("log")
-        axes[-1].set_xlabel(f"{family.name} [{unit}]" if unit else family.name)
-        handles = _legend(branches, seen)
-        if handles:
-            main.legend(handles=handles)
-        figure.align_ylabels()
-        write_title(figure, title)
-        return finish(figure)
+    look = _Scale(family=family, factor=factor, unit=unit, scale=scale, shown=shown, what=what)
+    others = [] if beside is None else _approximated(branches, beside)
+    shades = [
+        Shade(low=factor * a.low, high=factor * a.high, label=f"avoid: {a.risk.value}", number=_RISKS.index(a.risk))
+        for a in avoid
+    ]
+    bare = [Shade(low=shade.low, high=shade.high, label="", number=shade.number) for shade in shades]
+    panels = [_amplitudes(branches, look, others, shades), _harmonics(branches, look, bare)]
+    if others:
+        panels.append(_errors(others, look, bare))
+    panels += _loads(branches, look, bare)
+    heights = [_MAIN, _HARMONICS, *[1.0] * (len(panels) - 2)]
+    return Picture(parts=panels, title=title, size=_SIZE, heights=heights)
 
 
-@dataclass(frozen=True, slots=True)
-class _Approximated:
-    """Some of a branch's parameters and amplitudes (n,), and the latter by approximations."""
-
-    parameter: FloatArray
-    true: FloatArray
-    amplitudes: Mapping[str, FloatArray]
-
-
-def _approximated(branch: Branch, beside: Callable[[float], Mapping[str, float]]) -> _Approximated:
-    # evenly along the curve as it is seen
-    steps = [np.diff(v, prepend=v[0]) / (float(np.ptp(v)) or 1.0) for v in (branch.parameter, branch.amplitude)]
-    way = np.cumsum(np.hypot(*steps))
-    chosen = np.unique(np.searchsorted(way, np.linspace(0.0, way[-1], _COMPARED)))
-    parameter = branch.parameter[chosen]
-    found = [beside(value) for value in parameter.tolist()]
-    return _Approximated(
-        parameter, branch.amplitude[chosen], {name: np.array([row[name] for row in found]) for name in found[0]}
+def _amplitudes(
+    branches: Sequence[Branch], look: _Scale, others: Sequence[_Approximated], shades: Sequence[Shade]
+) -> Panel:
+    """The amplitude along all branches, special points, jumps, and the approximations that can be told from it."""
+    # what is linear has resonances without bound; the true motion sets the scale
+    top = 1.15 * max(look.scale * float(branch.amplitude.max()) for branch in branches)
+    found = fold_jumps(branches)
+    curves = [
+        curve
+        for n, branch in enumerate(branches)
+        for curve in _along(branch, n, look, look.scale * branch.amplitude, hover=_told(branch, n))
+    ]
+    for branch in branches:
+        if branch.turns > 1:
+            colour = COLOURS[(branch.turns.bit_length() - 1) % len(COLOURS)]
+            x, y = look.factor * branch.parameter, look.scale * branch.amplitude
+            curves.append(_letters(x, y, str(branch.turns), colour=colour))
+    curves += _visible(others, branches, look, top)
+    curves += _specials(branches, look, found)
+    labels = [
+        Label(x=look.factor * jump.parameter, y=look.scale * jump.before, text=_jump(jump, look)) for jump in found
+    ]
+    # one that is on two branches, or is passed twice, is named once
+    met = {
+        f"{_MARKERS[special.kind][1]}, {look.place(special.parameter)}": special
+        for branch in branches
+        for special in branch.special
+        if special.kind is not Crossing.FOLD and _is_met(branch, special)
+    }
+    labels += [
+        Label(x=look.factor * special.parameter, y=look.scale * special.orbit.amplitude, text=text)
+        for text, special in met.items()
+    ]
+    return Panel(
+        x_label=look.axis,
+        y_label=f"amplitude of {look.what} [{look.shown}]",
+        curves=[*_keys(branches), *curves],
+        y_range=(0.0, top),
+        legend_at="above",
+        shades=shades,
+        labels=labels,
+        arrows=[
+            Arrow(x=look.factor * jump.parameter, begin=look.scale * jump.before, end=look.scale * after)
+            for jump in found
+            for after in jump.after
+        ],
     )
 
 
-def _stable(branch: Branch) -> NDArray[np.bool_]:
-    return np.asarray(branch.columns()["stable (1), marginal (0), unstable (-1)"] > 0.0)
+def _jump(jump: FoldJump, look: _Scale) -> str:
+    """Which motion lies on which side of a fold, and where the machine goes."""
+    side, change = ("below", "rising") if jump.direction > 0 else ("above", "falling")
+    there = f"{look.size(jump.before)} {look.shown} only {side} {look.place(jump.parameter)};\n{change}, it "
+    if not jump.after:
+        return there + "ends here"
+    sizes = " or ".join(look.size(after) for after in jump.after)
+    return f"{there}jumps to {sizes} {look.shown}"
 
 
-def _draw_branch(axis: Axes, x: FloatArray, y: FloatArray, stable: NDArray[np.bool_], **look: Any) -> None:
-    for part, line in ((stable, "-"), (~stable, "--")):
-        # a part reaches to the first point of the next, so that there is no gap between them
-        wide = part | np.append(part[1:], False) & ~part if line == "--" else part
-        axis.plot(x, np.where(wide, y, np.nan), line, **look)
+def _is_met(branch: Branch, special: SpecialPoint) -> bool:
+    """Whether a motion beside a special point is stable: a machine comes there."""
+    return any(orbit.largest <= 1.0 + TOLERANCE for orbit in branch.orbits[special.after : special.after + 2])
 
 
-def _look(number: int) -> dict[str, Any]:
-    """How the approximation of a number is drawn."""
-    return {"color": COLOURS[(number + 1) % len(COLOURS)], "linestyle": _LINES[number % len(_LINES)], "linewidth": LINE}
+def _along(branch: Branch, number: int, look: _Scale, y: FloatArray, **options: Any) -> list[Curve]:
+    """A quantity along a branch, a curve for each stability that it has; colours are by the turns of a period."""
+    words = _words(branch)
+    order = branch.turns.bit_length() - 1
+    style: dict[str, Any] = {"colour": COLOURS[order % len(COLOURS)], "order": 2.0 + 0.1 * order}
+    style["hover"] = {"branch": np.full(len(branch), number + 1), "stability": words}
+    curves = []
+    for stability, line in _STABLE.items():
+        part = words == stability.value
+        if not part.any() and stability is Stability.MARGINAL:
+            continue
+        if stability is not Stability.STABLE:
+            # a part reaches to the first point of the next, so that there is no gap between them
+            part = part | np.append(part[1:], False) | np.insert(part[:-1], 0, False)
+        x = look.factor * branch.parameter
+        curves.append(Curve(x=x, y=np.where(part, y, np.nan), line=line, **style | options))
+    return curves
 
 
-def _draw_approximations(
-    axis: Axes, others: Sequence[_Approximated], factor: float, scale: float, size: tuple[float, float]
-) -> list[Line2D]:
-    """Draw the approximations that can be told from the true motion, and return them for the legend."""
-    seen = []
-    low, high = axis.get_xlim()
-    points = 72.0 * np.multiply(axis.get_position().size, size)
-    unit = points / (high - low, axis.get_ylim()[1])
-    for number, name in enumerate(others[0].amplitudes):
-        shown = [np.column_stack([factor * o.parameter, scale * o.amplitudes[name]]) for o in others]
-        true = [np.column_stack([factor * o.parameter, scale * o.true]) for o in others]
-        apart = max(_apart(unit * a, unit * b, float(points[1])) for a, b in zip(shown, true))
-        if apart > _HIDDEN:
-            for curve in shown:
-                (line,) = axis.plot(*curve.T, label=name, zorder=1.5, **_look(number))
-            seen.append(line)
-    return seen
+def _told(branch: Branch, number: int) -> Mapping[str, ArrayLike]:
+    """What is said of the points of a branch under the pointer."""
+    table, torque = branch.columns(), "greatest crank torque [N.m]"
+    return {
+        "branch": np.full(len(branch), number + 1),
+        "turns in a period": np.full(len(branch), branch.turns),
+        "stability": _words(branch),
+        "largest multiplier": branch.largest_multiplier,
+    } | ({torque: table[torque]} if torque in table else {})
 
 
-def _apart(curve: FloatArray, other: FloatArray, top: float) -> float:
-    """Greatest distance of the points of a curve, below ``top``, from another curve."""
-    inside = curve[curve[:, 1] < top]
-    return float(distance(LineString(other), make_points(inside)).max()) if len(inside) and len(other) > 1 else 0.0
+def _letters(x: FloatArray, y: FloatArray, text: str, **options: Any) -> Curve:
+    """Letters at a few places of a curve, evenly along x."""
+    finite = np.flatnonzero(np.isfinite(y))
+    if len(finite):
+        places = np.linspace(x[finite].min(), x[finite].max(), 2 * _LETTERS + 1)[1::2]
+        finite = np.unique([finite[np.abs(x[finite] - place).argmin()] for place in places])
+    return Curve(x=x[finite], y=y[finite], line="", marker=f"${text}$", order=3.0, **options)
 
 
-def _draw_errors(axis: Axes, others: Sequence[_Approximated], factor: float) -> None:
-    """Relative errors of the approximations against the true motion, in per cent."""
-    for number, name in enumerate(others[0].amplitudes):
-        for first, o in zip((True, *[False] * len(others)), others):
-            error = 100.0 * np.abs(o.amplitudes[name] / o.true - 1.0)
-            axis.plot(factor * o.parameter, error, label=name if first else None, **_look(number))
-    axis.set_yscale("log")
-    axis.set_ylim(bottom=_NONE)
-    axis.set_ylabel("relative error of\nthe amplitude [%]")
-    legend_above(axis)
+def _specials(branches: Sequence[Branch], look: _Scale, found: Sequence[FoldJump]) -> list[Curve]:
+    """The special points, by their kinds."""
+    curves = []
+    says = {jump.parameter: _jump(jump, look).replace("\n", " ") for jump in found}
+    for kind, (marker, _) in _MARKERS.items():
+        those = [(n, b, s) for n, b in enumerate(branches, start=1) for s in b.special if s.kind is kind]
+        if those:
+            hover: dict[str, ArrayLike] = {
+                "branch": [n for n, _, _ in those],
+                "turns in a period": [b.turns for _, b, _ in those],
+                "largest multiplier": [s.orbit.largest for _, _, s in those],
+                "here": [says.get(s.parameter, "") if kind is Crossing.FOLD else "" for _, _, s in those],
+            }
+            curves.append(
+                Curve(
+                    x=[look.factor * s.parameter for _, _, s in those],
+                    y=[look.scale * s.orbit.amplitude for _, _, s in those],
+                    label=kind.value,
+                    colour="black",
+                    line="",
+                    marker=marker,
+                    hollow=True,
+                    order=4.0,
+                    hover=hover,
+                )
+            )
+    return curves
 
 
-def _rows(branch: Branch, label: str, scale: float) -> list[tuple[str, Callable[[Branch], NDArray[np.float64]]]]:
-    """Labels of what is drawn, and its values along a branch: amplitude, and crank torque and joint forces if there are any."""
-    names = list(branch.columns())
+def _keys(branches: Sequence[Branch]) -> list[Curve]:
+    """Entries of the legend for what has to be told apart: nothing of a single branch that is stable throughout."""
+    turns = sorted({branch.turns for branch in branches})
+    words = {str(word) for branch in branches for word in _words(branch)}
+    keys = []
+    if len(turns) > 1:
+        keys += [
+            Curve(
+                x=[],
+                y=[],
+                colour=COLOURS[(n.bit_length() - 1) % len(COLOURS)],
+                label="period of one turn" if n == 1 else f"period of {n} turns",
+                marker="" if n == 1 else f"${n}$",
+            )
+            for n in turns
+        ]
+    if words != {Stability.STABLE.value}:
+        keys += [
+            Curve(x=[], y=[], colour="0.3", line=line, label=word.value)
+            for word, line in _STABLE.items()
+            if word.value in words
+        ]
+    return keys
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Approximated:
+    """An approximation over the parameter (m,), and its errors against the motion along each branch of one turn.
+
+    These have the parameter, the relative error (%) and the true amplitude as rows, (3, n), NaN where there is a gap.
+    """
+
+    name: str
+    number: int
+    parameter: FloatArray
+    amplitude: FloatArray
+    errors: Sequence[FloatArray]
+
+    @property
+    def look(self) -> dict[str, Any]:
+        """How it is drawn."""
+        return {"colour": COLOURS[(self.number + 1) % len(COLOURS)], "line": _LINES[self.number % len(_LINES)]}
+
+
+def _approximated(branches: Sequence[Branch], beside: Callable[[float], Mapping[str, float]]) -> list[_Approximated]:
+    """The approximations where a machine may be: at stable motions, and evenly over the range besides."""
+    chosen = [(branch, _chosen(branch)) for branch in branches if branch.turns == 1]
+    every = np.concatenate([branch.parameter for branch, _ in chosen])
+    spread = np.linspace(every.min(), every.max(), _BESIDE)
+    places = np.unique(np.concatenate([spread, *(branch.parameter[i] for branch, i in chosen)]))
+    found = [beside(value) for value in places.tolist()]
+    approximations = []
+    for number, name in enumerate(found[0]):
+        values = np.array([row[name] for row in found])
+        errors = []
+        for branch, i in chosen:
+            own, true = values[np.searchsorted(places, branch.parameter[i])], branch.amplitude[i]
+            # no line over where the motion is unstable
+            gaps = np.flatnonzero(np.diff(np.cumsum(_unstable(branch))[i])) + 1
+            error = 100.0 * np.abs(own / true - 1.0)
+            errors.append(np.insert(np.array([branch.parameter[i], error, true]), gaps, np.nan, axis=1))
+        approximations.append(
+            _Approximated(name=name, number=number, parameter=places, amplitude=values, errors=errors)
+        )
+    return approximations
+
+
+def _words(branch: Branch) -> NDArray[np.str_]:
+    """What `Branch.stability` says at each point."""
+    margin = 1.0 - branch.largest_multiplier
+    return np.select(
+        [margin > TOLERANCE, margin < -TOLERANCE],
+        [Stability.STABLE.value, Stability.UNSTABLE.value],
+        Stability.MARGINAL.value,
+    )
+
+
+def _unstable(branch: Branch) -> NDArray[np.bool_]:
+    return np.asarray(branch.largest_multiplier > 1.0 + TOLERANCE)
+
+
+def _chosen(branch: Branch) -> NDArray[np.int64]:
+    """Numbers of points of a branch that are not unstable, evenly along the curve as it is seen."""
+    steps = [np.diff(v, prepend=v[0]) / (float(np.ptp(v)) or 1.0) for v in (branch.parameter, branch.amplitude)]
+    way = np.cumsum(np.hypot(*steps))
+    chosen = np.unique(np.searchsorted(way, np.linspace(0.0, way[-1], _COMPARED)))
+    return chosen[~_unstable(branch)[chosen]]
+
+
+def _visible(others: Sequence[_Approximated], branches: Sequence[Branch], look: _Scale, top: float) -> list[Curve]:
+    """The approximations that can be told from the true motion, as a figure of the usual size has them."""
+    if not others:
+        return []
+    x = look.factor * others[0].parameter
+    points = 72.0 * 0.85 * np.array([_SIZE[0], _MAIN * _SIZE[1]]) / (float(np.ptp(x)) or 1.0, top)
+    true = [
+        points * np.column_stack([look.factor * b.parameter, look.scale * b.amplitude])
+        for b in branches
+        if b.turns == 1
+    ]
+    curves = []
+    for other in others:
+        y = look.scale * other.amplitude
+        seen = points * np.column_stack([x, y])[y < top]
+        apart = [distance(LineString(line), make_points(seen)) for line in true if len(line) > 1]
+        if len(seen) and apart and np.min(apart, axis=0).max() > _HIDDEN:
+            curves.append(Curve(x=x, y=y, label=other.name, order=1.5, **other.look))
+    return curves
+
+
+def _harmonics(branches: Sequence[Branch], look: _Scale, shades: Sequence[Shade]) -> Panel:
+    """The first harmonics of the motions of one turn, each with its number on it."""
+    single = [(n, branch) for n, branch in enumerate(branches) if branch.turns == 1] or list(enumerate(branches))
+    names = [name for name in branches[0].columns() if name.startswith("harmonic ")]
+    curves, top = [], 0.0
+    for order, name in enumerate(names):
+        options: dict[str, Any] = {"colour": COLOURS[order % len(COLOURS)], "width": THIN}
+        label = f"harmonic {order + 1}"
+        for n, branch in single:
+            y = look.scale * branch.columns()[name]
+            y = np.where(y > 0.0, y, np.nan)
+            top = max(top, float(np.nanmax(y, initial=0.0)))
+            curves += _along(branch, n, look, y, **options)
+            x = look.factor * branch.parameter
+            letters = _letters(x, np.where(_unstable(branch), np.nan, y), str(order + 1), label=label, **options)
+            if len(np.atleast_1d(letters.x)):
+                curves.append(letters)
+                label = ""
+    one = f",\none turn [{look.shown}]" if len(single) < len(branches) else f"\n[{look.shown}]"
+    return Panel(
+        x_label=look.axis,
+        y_label=f"harmonics of {look.what}{one}",
+        curves=curves,
+        logarithmic="y",
+        y_range=(_SMALL * top, 2.0 * top) if top > 0.0 else None,
+        legend_at="above",
+        shades=shades,
+    )
+
+
+def _errors(others: Sequence[_Approximated], look: _Scale, shades: Sequence[Shade]) -> Panel:
+    """Relative errors of the approximations against the stable motions of one turn, in per cent."""
+    curves = [
+        Curve(
+            x=look.factor * parameter,
+            y=error,
+            label="" if n else other.name,
+            hover={f"amplitude of the true motion [{look.shown}]": look.scale * true},
+            **other.look,
+        )
+        for other in others
+        for n, (parameter, error, true) in enumerate(other.errors)
+    ]
+    worst = max((float(np.nanmax(error, initial=0.0)) for o in others for _, error, _ in o.errors), default=0.0)
+    return Panel(
+        x_label=look.axis,
+        y_label="relative error of\nthe amplitude [%]",
+        curves=curves,
+        logarithmic="y",
+        y_range=(_NONE, max(2.0 * worst, 10.0 * _NONE)),
+        legend_at="above",
+        shades=shades,
+    )
+
+
+def _loads(branches: Sequence[Branch], look: _Scale, shades: Sequence[Shade]) -> list[Panel]:
+    """Crank torque and forces in joints along the branches, of what the mechanism has."""
+    names = list(branches[0].columns())
     torque, forces = "greatest crank torque [N.m]", [name for name in names if name.startswith(FORCE)]
-    rows: list[tuple[str, Callable[[Branch], NDArray[np.float64]]]] = [(label, lambda b: scale * b.amplitude)]
+    rows: dict[str, Callable[[Branch], FloatArray]] = {}
     if torque in names:
-        rows.append(("greatest crank\ntorque [N.m]", lambda b: b.columns()[torque]))
+        rows["greatest crank\ntorque [N.m]"] = lambda b: b.columns()[torque]
     if forces:
         kind = "pin" if all(name.startswith(f"{FORCE}pin ") for name in forces) else "joint"
-        rows.append((f"greatest\n{kind} force [N]", lambda b: np.max([b.columns()[n] for n in forces], axis=0)))
-    return rows
+        rows[f"greatest\n{kind} force [N]"] = lambda b: np.max([b.columns()[n] for n in forces], axis=0)
+    return [
+        Panel(
+            x_label=look.axis,
+            y_label=label,
+            curves=[curve for n, branch in enumerate(branches) for curve in _along(branch, n, look, of(branch))],
+            logarithmic="y",
+            shades=shades,
+        )
+        for label, of in rows.items()
+    ]
 
 
-@plot.register
-def plot_branch(branch: Branch, *, title: str = "") -> Figure:
-    """One branch: amplitude, crank torque and pin force over its parameter, with its special points."""
-    return plot_branches([branch], title=title)
+@pictured
+def plot_branch(branch: Branch, *, title: str = "") -> Picture:
+    """One branch: amplitude, harmonics, crank torque and pin force over its parameter, with its special points.
+
+    Ranges to avoid are shaded.
+    """
+    low, high = float(branch.parameter.min()), float(branch.parameter.max())
+    return describe_branches([branch], title=title, avoid=ranges_to_avoid([branch], low, high))
 
 
-@plot.register
+@pictured
 def plot_response(
     response: Response, *, title: str = "", rpm: bool = True, beside: Approximations | None = None
-) -> Figure:
-    """All branches of a response, with the classical approximations of the amplitude beside them; see `plot_branches`."""
-    return plot_branches(response.branches, title=title, rpm=rpm, beside=None if beside is None else beside.at)
-
-
-def _legend(branches: Sequence[Branch], seen: Sequence[Line2D]) -> list[Line2D]:
-    """What has to be told apart: nothing of a single branch that is stable throughout."""
-    handles = [
-        Line2D([], [], color=COLOURS[i % len(COLOURS)], label=_name(branch, len(branches)))
-        for i, branch in enumerate(branches)
-    ]
-    words = {word.value for branch in branches for word in branch.stability()}
-    looks: dict[str, Any] = {"stable": "-", "unstable": "--", "marginal": "--"}
-    lines = [Line2D([], [], color="0.3", linestyle=line, label=word) for word, line in looks.items() if word in words]
-    handles += lines if len(lines) > 1 or "stable" not in words else []
-    handles += seen
-    kinds = {special.kind.value for branch in branches for special in branch.special}
-    handles += [
-        Line2D([], [], marker=marker, label=kind, **_SPECIAL) for kind, marker in _MARKERS.items() if kind in kinds
-    ]
-    return handles if len(handles) > 1 else []
-
-
-def _name(branch: Branch, branches: int) -> str:
-    if branches == 1:
-        return "periodic motion"
-    if branch.turns > 1:
-        return f"period of {branch.turns} turns"
-    return f"period of one turn, from the {'low' if branch.parameter[0] < branch.parameter[-1] else 'high'} end"
+) -> Picture:
+    """All branches of a response, the speeds to avoid shaded, with the classical approximations beside; see `plot_branches`."""
+    return describe_branches(
+        response.branches,
+        title=title,
+        rpm=rpm,
+        beside=None if beside is None else beside.at,
+        avoid=response.speeds_to_avoid,
+    )

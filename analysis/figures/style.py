@@ -28,6 +28,11 @@ BLOCK, DOT = "#C9D1D6", 5.0
 #: Colour of what is asked for, of areas, of the text of marks.
 TARGET, SHADE, MARKED = "#E69F00", "#56B4E9", "0.25"
 
+#: Light colours of classes of points.
+LIGHT = ("#C6DFF0", "#F6C99F", "#A8DDB5", "#E7B9D6", "#F2E394", "#E0E0E0")
+#: Ranges that are shaded, one kind after another: colour, hatching, and the name of it in pages.
+SHADES = (("#E69F00", "", ""), ("#56B4E9", "//", "/"), ("#009E73", "..", "."), ("#D55E00", "xx", "x"))
+
 #: Letters: of the figure's title, of drawings, of titles of panels and axes, of legends and notes, of marks in a panel.
 TITLE, LETTER, PLAIN, SMALL, TINY = 10.5, 10.5, 9.0, 8.0, 7.5
 #: Widths of lines: of a curve that counts more than others, of curves, of those beside, of lines of reference.
@@ -49,6 +54,8 @@ STYLE: dict[Any, Any] = {
     "legend.frameon": False,
     "legend.fontsize": SMALL,
     "legend.title_fontsize": SMALL,
+    "hatch.color": "0.45",
+    "hatch.linewidth": 0.6,
     "lines.linewidth": LINE,
     "lines.markersize": 4.5,
 }

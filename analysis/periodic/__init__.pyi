@@ -1,3 +1,10 @@
+from .arcs import Arc as Arc
+from .arcs import Avoided as Avoided
+from .arcs import FoldJump as FoldJump
+from .arcs import Risk as Risk
+from .arcs import arcs as arcs
+from .arcs import fold_jumps as fold_jumps
+from .arcs import ranges_to_avoid as ranges_to_avoid
 from .branches import FORCE as FORCE
 from .branches import Branch as Branch
 from .branches import Family as Family

@@ -247,11 +247,13 @@ class Branch(Shown):
             values = _of_a_turn(self.orbits[0], turns[0])
             self._table.update({name: np.array([value(turn) for turn in turns]) for name, value in values.items()})
         unit = f" [{self.family.unit}]" if self.family.unit else ""
+        largest = self.largest_multiplier
+        signs = np.select([1.0 - largest > TOLERANCE, 1.0 - largest < -TOLERANCE], [1.0, -1.0], 0.0)
         first = {
             f"{self.family.name}{unit}": self.parameter,
             "turns in a period [1]": np.full(len(self), float(self.turns)),
-            "largest multiplier [1]": self.largest_multiplier,
-            "stable (1), marginal (0), unstable (-1)": np.array([_SIGN[s] for s in self.stability()]),
+            "largest multiplier [1]": largest,
+            "stable (1), marginal (0), unstable (-1)": signs,
         }
         return first | self._table
 
@@ -291,9 +293,6 @@ def _of_a_turn(orbit: PeriodicOrbit, first: Turn) -> dict[str, Callable[[Turn], 
             np.abs(np.sin(turn["transmission.angle"])).min()
         )
     return columns
-
-
-_SIGN = {Stability.STABLE: 1.0, Stability.MARGINAL: 0.0, Stability.UNSTABLE: -1.0}
 
 
 def follow(

@@ -25,6 +25,7 @@ from ..numerics.continuation import ContinuationError
 from ..numerics.workers import interruptible
 from ..run import shown, takes_published
 from ..units import Amount, si
+from .arcs import Avoided, FoldJump, fold_jumps, ranges_to_avoid
 from .branches import GREATEST_MULTIPLIER, Branch, Family, SpecialPoint, describe, follow, switch
 from .drives import Drive, published_drive
 from .floquet import Crossing, Stability
@@ -93,6 +94,16 @@ class Response(Shown):
     def family(self) -> Family:
         """What varies."""
         return self.branches[0].family
+
+    @property
+    def speeds_to_avoid(self) -> tuple[Avoided, ...]:
+        """Ranges of the speed, or of what else varies, that a machine had better not stay in, each with its reason."""
+        return ranges_to_avoid(self.branches, self.low, self.high)
+
+    @property
+    def jumps(self) -> tuple[FoldJump, ...]:
+        """What happens at the folds at which a stable motion ends."""
+        return fold_jumps(self.branches)
 
     def maxima(self) -> tuple[Extremum, ...]:
         """Local maxima of the amplitude on the branches of the simple period, by parameter."""

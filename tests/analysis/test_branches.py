@@ -274,8 +274,14 @@ def test_picture_has_the_columns_in_the_units_of_its_axes(softened: Branch) -> N
             "greatest\npin force [N]": np.max([columns[name] for name in forces], axis=0),
         }
         assert figure.axes[-1].get_xlabel() == label
-        assert [axis.get_ylabel() for axis in figure.axes] == list(expected)
-        for axis, values in zip(figure.axes, expected.values()):
+        main, harmonics, *loads = figure.axes
+        assert [axis.get_ylabel() for axis in (main, *loads)] == list(expected)
+        assert harmonics.get_ylabel() == "harmonics of u\n[cm]"
+        drawn = [line.get_ydata() for line in harmonics.lines if len(line.get_xdata()) == len(branch)]
+        for order in (1, 2, 3):
+            pair = np.array(drawn[2 * order - 2 : 2 * order])
+            assert np.nanmax(pair, axis=0) == pytest.approx(100.0 * columns[f"harmonic {order} of u [m]"])
+        for axis, values in zip((main, *loads), expected.values()):
             x, y, solid = _drawn(axis, len(branch))
             assert x == pytest.approx(factor * branch.parameter)
             assert y == pytest.approx(values)
@@ -293,7 +299,7 @@ def test_approximations_beside_are_in_the_same_units(softened: Branch) -> None:
     def beside(speed: float) -> dict[str, float]:
         return {"a tenth more": 1.1 * float(np.interp(speed, branch.parameter[order], branch.amplitude[order]))}
 
-    main, errors, *_ = figures.plot_branches([branch], beside=beside).axes
+    main, _, errors, *_ = figures.plot_branches([branch], beside=beside).axes
     (line,) = (line for line in main.lines if line.get_label() == "a tenth more")
     x, y = line.get_data()
     assert y == pytest.approx(110.0 * np.interp(x * RPM, branch.parameter[order], branch.amplitude[order]))

@@ -1,0 +1,323 @@
+"""Pictures as pages of HTML with values under the pointer, by Plotly, from the descriptions that Matplotlib draws.
+
+A page holds all that it needs, Plotly's script too: it loads nothing, and opens without a network.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Mapping, Sequence
+from functools import singledispatch
+from html import escape
+from importlib.util import find_spec
+from math import ceil, isfinite, log10
+from typing import Any
+
+import numpy as np
+from matplotlib.colors import to_hex
+from numpy.typing import ArrayLike
+
+from linkwork.errors import LinkworkError
+
+from .charts import HeatMap, colours_of, keys_of
+from .curves import Curve, Panel, Picture, shades_by_label
+from .dispatch import picture
+from .style import COLOURS, LINE, MARKED, SHADE, SHADES
+
+#: Pixels to the inch, height of the title, margins left and right of a panel, width of the legend, and gap below a panel.
+_PIXELS, _TITLE, _LEFT, _RIGHT, _LEGEND, _GAP = 105, 50, 85, 85, 300, 55
+#: Samples of a scale of colours.
+_COLOURS = 65
+#: Plotly's names of Matplotlib's lines and markers.
+_DASHES = {"-": "solid", "--": "dash", "-.": "dashdot", ":": "dot"}
+_SYMBOLS = {"o": "circle", "s": "square", "D": "diamond", "^": "triangle-up", "x": "x-thin-open", ".": "circle"}
+
+_PAGE = """<!DOCTYPE html>
+<html lang="en">
+<head><meta charset="utf-8"><title>{title}</title>
+<script>{script}</script></head>
+<body><div id="picture"></div>
+<script>Plotly.newPlot("picture", {figure});</script></body>
+</html>
+"""
+
+
+class PlotlyMissingError(LinkworkError, ImportError):
+    """Pages with values under the pointer need Plotly, which is not installed."""
+
+    def __init__(self) -> None:
+        super().__init__("Plotly is not installed: python -m pip install 'linkwork[html]'")
+
+
+def require_plotly() -> None:
+    """Raise `PlotlyMissingError` unless `to_html` can write pages."""
+    if find_spec("plotly") is None:
+        raise PlotlyMissingError
+
+
+def to_html(result: Any, *details: Any, **options: Any) -> str:
+    """The picture of a result as a page of HTML with values under the pointer.
+
+    Parameters
+    ----------
+    result : object
+        A response, a branch, a stability chart, basins; or a `Picture`.
+    *details, **options
+        Those of `plot`.
+
+    Returns
+    -------
+    str
+        A page of some 5 MB that loads nothing from anywhere.
+
+    Raises
+    ------
+    PlotlyMissingError
+        If Plotly is not installed.
+    DrawingError
+        If the picture of this type has no description, or there is none.
+    """
+    require_plotly()
+    from plotly.offline import get_plotlyjs
+
+    described = result if isinstance(result, Picture) else picture(result, *details, **options)
+    # within a script "</" would end it
+    figure = json.dumps(to_plotly(described), allow_nan=False).replace("</", "<\\/")
+    return _PAGE.format(title=escape(described.title), script=get_plotlyjs(), figure=figure)
+
+
+def to_plotly(picture: Picture) -> dict[str, Any]:
+    """A picture as Plotly takes it: the traces with their values, and the layout."""
+    columns = picture.columns
+    heights = list(picture.heights) or [1.0] * ceil(len(picture.parts) / columns)
+    figure = _Figure(picture, heights)
+    for number, part in enumerate(picture.parts):
+        axes = _Axes(figure, number)
+        _add_part(part, axes)
+        if not picture.heights or number + columns >= len(picture.parts):
+            axes.x["title"] = {"text": _line(_panel(part).x_label)}
+    return {"data": figure.traces, "layout": figure.layout, "config": {"displaylogo": False}}
+
+
+class _Figure:
+    """Traces and layout as they are put together."""
+
+    def __init__(self, picture: Picture, heights: Sequence[float]) -> None:
+        self.columns, self.shared = picture.columns, bool(picture.heights)
+        self.rows = [_PIXELS * picture.size[1] * height + _GAP for height in heights]
+        self.width = _PIXELS * picture.size[0] + _LEFT + _RIGHT
+        self.height = sum(self.rows)
+        self.traces: list[dict[str, Any]] = []
+        self.layout: dict[str, Any] = {
+            "title": {"text": escape(picture.title)},
+            "height": self.height + _TITLE + 20 * len(picture.notes),
+            "width": self.width * self.columns + _LEGEND,
+            "margin": {"t": _TITLE, "l": 0, "r": _LEGEND, "b": 20 * len(picture.notes)},
+            "hovermode": "closest",
+            "plot_bgcolor": "white",
+            "font": {"size": 11},
+            "legend": {"groupclick": "toggleitem", "tracegroupgap": 14},
+            "shapes": [],
+            "annotations": [
+                {
+                    "text": escape(note),
+                    "xref": "paper",
+                    "yref": "paper",
+                    "x": 0,
+                    "y": 0,
+                    "yshift": -20 * n,
+                    "showarrow": False,
+                }
+                | {"xanchor": "left", "yanchor": "top"}
+                for n, note in enumerate(picture.notes)
+            ],
+        }
+
+
+class _Axes:
+    """A pair of axes: what is added to them."""
+
+    def __init__(self, figure: _Figure, number: int) -> None:
+        row, column = divmod(number, figure.columns)
+        self.figure, self.number = figure, number
+        self.suffix = str(number + 1) if number else ""
+        top = figure.height - sum(figure.rows[:row])
+        # in parts of the whole
+        self.bottom, self.top = (top - figure.rows[row] + _GAP) / figure.height, top / figure.height
+        whole = figure.width * figure.columns
+        across = [(column * figure.width + _LEFT) / whole, ((column + 1) * figure.width - _RIGHT) / whole]
+        look = {"showline": True, "linecolor": "black", "ticks": "outside", "gridcolor": "#e5e5e5", "zeroline": False}
+        self.x: dict[str, Any] = look | {"domain": across, "anchor": f"y{self.suffix}"}
+        self.y: dict[str, Any] = look | {"domain": [self.bottom, self.top], "anchor": f"x{self.suffix}"}
+        if figure.shared and number:
+            self.x["matches"] = "x"
+        figure.layout |= {f"xaxis{self.suffix}": self.x, f"yaxis{self.suffix}": self.y}
+
+    def trace(self, **trace: Any) -> None:
+        """Add a trace."""
+        self.figure.traces.append(trace | {"xaxis": f"x{self.suffix}", "yaxis": f"y{self.suffix}"})
+
+    def legend(self, title: str) -> dict[str, Any]:
+        """What puts entries of the legend together under a title."""
+        return {"legendgroup": str(self.number), "legendgrouptitle": {"text": _line(title)}}
+
+    def over(self, low: float, high: float, **shape: Any) -> None:
+        """Add a shape over the whole height, between two places."""
+        box = {"x0": low, "x1": high, "y0": 0, "y1": 1, "xref": f"x{self.suffix}", "yref": f"y{self.suffix} domain"}
+        self.figure.layout["shapes"].append(box | shape)
+
+    def note(self, x: float, y: float, text: str = "", **look: Any) -> None:
+        """Add an arrow to a point, from a text or from another place along y."""
+        references = {"xref": f"x{self.suffix}", "yref": f"y{self.suffix}"}
+        if "ayref" in look:
+            look |= {"axref": references["xref"], "ayref": references["yref"]}
+        words = {"text": escape(text).replace("\n", "<br>"), "font": {"size": 11, "color": _hex(MARKED)}}
+        self.figure.layout["annotations"].append(
+            {"x": x, "y": y, "arrowcolor": _hex(MARKED)} | words | references | look
+        )
+
+
+def _panel(part: Any) -> Panel:
+    panel: Panel = part if isinstance(part, Panel) else part.panel
+    return panel
+
+
+def _line(text: str) -> str:
+    """A label of more than one line, on one."""
+    return escape(text.replace("\n", " "))
+
+
+def _hex(colour: Any) -> str:
+    return str(to_hex(colour))
+
+
+def _values(values: ArrayLike) -> list[Any]:
+    """Values to full precision, None in the place of those that are no numbers."""
+    listed = np.atleast_1d(np.asarray(values)).tolist()
+    return [None if isinstance(value, float) and not isfinite(value) else value for value in listed]
+
+
+def _template(title: str, names: Iterable[str], hover: Mapping[str, Any]) -> str:
+    """What stands under the pointer."""
+    lines = [f"{_line(name)}: %{{{axis}:.10g}}" for name, axis in zip(names, "xy")]
+    lines += [f"{_line(name)}: %{{customdata[{n}]}}" for n, name in enumerate(hover)]
+    head = [f"<b>{_line(title)}</b>"] if title else []
+    return "<br>".join([*head, *lines]) + "<extra></extra>"
+
+
+@singledispatch
+def _add_part(part: Any, axes: _Axes) -> None:
+    """Add a part of a picture to a figure; each kind of part registers how."""
+    raise TypeError(f"a part of a picture is a Panel or a HeatMap, not a {type(part).__name__}")
+
+
+@_add_part.register
+def _(panel: Panel, axes: _Axes) -> None:
+    legend = axes.legend(panel.legend or panel.title or panel.y_label)
+    for boundaries in panel.filled:
+        ring = np.vstack([np.vstack([r, r[:1], [[np.nan] * 2]]) for r in boundaries])
+        look = {"fill": "toself", "fillcolor": SHADE, "opacity": 0.22, "mode": "none", "hoverinfo": "skip"}
+        axes.trace(type="scatter", x=_values(ring[:, 0]), y=_values(ring[:, 1]), showlegend=False, **look)
+    for number, curve in enumerate(panel.curves):
+        axes.trace(**_trace(curve, _hex(curve.colour or COLOURS[number % len(COLOURS)]), panel), **legend)
+    for name, number, those in shades_by_label(panel):
+        for n, shade in enumerate(those):
+            look = {
+                "type": "rect",
+                "fillcolor": SHADES[number][0],
+                "opacity": 0.18,
+                "line": {"width": 0},
+                "layer": "below",
+            }
+            entry = {"showlegend": True, "name": escape(name)} | legend if name and not n else {}
+            axes.over(shade.low, shade.high, **look, **entry)
+    logarithmic = {axis: axis in panel.logarithmic for axis in "xy"}
+
+    def at(axis: str, value: float) -> float:
+        """A place on an axis as annotations and ranges have it."""
+        return log10(value) if logarithmic[axis] else value
+
+    for arrow in panel.arrows:
+        x, begin, end = at("x", arrow.x), at("y", arrow.begin), at("y", arrow.end)
+        axes.note(x, end, ax=x, ay=begin, ayref="y", arrowhead=2, arrowwidth=1.5)
+    for label in panel.labels:
+        axes.note(at("x", label.x), at("y", label.y), label.text, ax=45, ay=-35, arrowhead=0, arrowwidth=1)
+    for text, place in (panel.verticals or {}).items():
+        axes.over(place, place, type="line", line={"dash": "dot", "width": 1}, label={"text": escape(text)})
+    for place in panel.dashed:
+        axes.over(place, place, type="line", line={"dash": "dash", "width": 1})
+    for axis, of, span in (("x", axes.x, panel.x_range), ("y", axes.y, panel.y_range)):
+        of |= {"type": "log", "exponentformat": "power", "dtick": 1} if logarithmic[axis] else {}
+        of |= {"range": [at(axis, v) for v in span]} if span is not None else {}
+    axes.y["title"] = {"text": _line(panel.y_label)}
+    if panel.x_ticks is not None:
+        axes.x["tickvals"] = list(panel.x_ticks)
+    if panel.equal:
+        axes.y |= {"scaleanchor": f"x{axes.suffix}", "scaleratio": 1}
+
+
+def _trace(curve: Curve, colour: str, panel: Panel) -> dict[str, Any]:
+    """A curve in Plotly's terms; one without points is an entry of the legend."""
+    x, y = (np.atleast_1d(np.asarray(v, dtype=float)) for v in (curve.x, curve.y))
+    # of what is left out one point is enough for the gap
+    finite = np.isfinite(y)
+    kept = finite | np.insert(finite[:-1], 0, False) if len(y) else finite
+    letters = curve.marker.strip("$") if curve.marker.startswith("$") else ""
+    has = {"lines": curve.line, "text": letters, "markers": curve.marker and not letters}
+    trace: dict[str, Any] = {
+        "type": "scatter",
+        "x": _values(x[kept]) or [None],
+        "y": _values(y[kept]) or [None],
+        "mode": "+".join(word for word, there in has.items() if there),
+        "name": escape(curve.label),
+        "showlegend": bool(curve.label),
+        "line": {"color": colour, "width": 1.5 * (curve.width or LINE), "dash": _DASHES.get(curve.line, "longdash")},
+        "hovertemplate": _template(curve.label, (panel.x_label, panel.y_label), curve.hover),
+    }
+    if curve.hover and kept.any():
+        trace["customdata"] = list(zip(*(_values(np.asarray(v)[kept]) for v in curve.hover.values())))
+    if letters:
+        trace |= {"text": [letters] * len(trace["x"]), "textfont": {"color": colour, "size": 13}}
+    elif curve.marker:
+        look = {"symbol": _SYMBOLS.get(curve.marker, "circle"), "size": 8, "color": "white" if curve.hollow else colour}
+        trace["marker"] = look | {"line": {"color": colour, "width": 1.5}}
+    return trace
+
+
+@_add_part.register
+def _(part: HeatMap, axes: _Axes) -> None:
+    values = np.ma.filled(np.ma.masked_invalid(part.values), np.nan)
+    hover = part.hover or {part.label: values}
+    columns = [[_values(row) for row in np.asarray(v)] for v in hover.values()]
+    place = {"x": axes.x["domain"][1] + 0.005, "y": axes.bottom, "yanchor": "bottom", "len": axes.top - axes.bottom}
+    axes.trace(
+        type="heatmap",
+        x=_values(part.x),
+        y=_values(part.y),
+        z=[_values(row) for row in values],
+        customdata=[list(zip(*rows)) for rows in zip(*columns)],
+        hovertemplate=_template("", (part.panel.x_label, part.panel.y_label), hover),
+        showscale=not part.classes,
+        # within the margin of its own chart
+        colorbar=place | {"thickness": 12, "title": {"text": escape(part.label), "side": "right"}},
+        **_scale(part),
+    )
+    for colour, _, name in keys_of(part):
+        key = {"symbol": "square", "size": 12, "color": _hex(colour), "line": {"width": 1, "color": _hex(MARKED)}}
+        legend = axes.legend(part.panel.title or part.label)
+        axes.trace(type="scatter", x=[None], y=[None], mode="markers", marker=key, name=escape(name), **legend)
+    _add_part(part.panel, axes)
+    axes.x["showgrid"] = axes.y["showgrid"] = False
+
+
+def _scale(part: HeatMap) -> dict[str, Any]:
+    """The colours of a map as Matplotlib has them, with the range of its values."""
+    norm, colours = colours_of(part)
+    low, high = float(norm.vmin or 0.0), float(norm.vmax or 0.0)
+    if part.classes:
+        n = len(part.classes)
+        steps = [(end, _hex(colours(i))) for i in range(n) for end in (i / n, (i + 1) / n)]
+    else:
+        places = np.linspace(0.0, 1.0, _COLOURS).tolist()
+        steps = [(place, _hex(colours(norm(low + place * (high - low))))) for place in places]
+    return {"colorscale": steps, "zmin": low, "zmax": high}

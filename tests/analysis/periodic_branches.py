@@ -1,0 +1,71 @@
+"""Branches made of formulas, for tests of what is read from branches and drawn of them: no motion is computed."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from analysis.periodic import Branch, Crossing, Drive, Family, Response, SpecialPoint
+from linkwork.five_bar.published import TABLE_3_1
+
+#: Over a parameter without a unit.
+FAMILY = Family(
+    parameters=TABLE_3_1, drive=Drive(speed=30.0), vary=lambda value: (TABLE_3_1, Drive(speed=30.0)), name="p"
+)
+
+
+def orbit(amplitude: float, largest: float, start: float | None = None) -> Any:
+    """What is read of an orbit."""
+    return SimpleNamespace(
+        amplitude=amplitude,
+        largest=largest,
+        start=np.array([amplitude if start is None else start, 0.0]),
+        swing=("u", "m"),
+    )
+
+
+def branch(
+    parameter: ArrayLike,
+    amplitude: ArrayLike,
+    largest: ArrayLike,
+    special: Sequence[tuple[Crossing, float, float, int]] = (),
+    *,
+    turns: int = 1,
+) -> Branch:
+    """A branch of amplitudes (m); special points by kind, parameter, amplitude and the point that they come after."""
+    x, a = np.asarray(parameter, dtype=float), np.asarray(amplitude, dtype=float)
+    rho = np.broadcast_to(np.asarray(largest, dtype=float), x.shape)
+    made = Branch(
+        family=FAMILY,
+        turns=turns,
+        parameter=x,
+        orbits=tuple(orbit(*values) for values in zip(a.tolist(), rho.tolist())),
+        special=tuple(
+            SpecialPoint(kind=kind, parameter=value, orbit=orbit(size, 1.0), after=after)
+            for kind, value, size, after in special
+        ),
+        reached=True,
+        closed=False,
+        reason="",
+    )
+    table = {"amplitude of u [m]": a, "harmonic 1 of u [m]": 0.9 * a, "harmonic 2 of u [m]": 0.1 * a}
+    made._table.update(table | {"greatest crank torque [N.m]": 2.0 * a, "greatest force in pin A [N]": 3.0 * a})
+    return made
+
+
+def hysteresis(points: int = 400) -> Branch:
+    """The curve p = 100 + (a - 2)^3 - 3 (a - 2), with its folds at a = 1, p = 102 and a = 3, p = 98; amplitudes in metres."""
+    a = np.linspace(-0.3, 4.3, points)
+    x = 100.0 + (a - 2.0) ** 3 - 3.0 * (a - 2.0)
+    folds = [(Crossing.FOLD, x_, a_, int(np.searchsorted(a, a_)) - 1) for x_, a_ in ((102.0, 1.0), (98.0, 3.0))]
+    return branch(x, a, np.where(abs(a - 2.0) < 1.0, 1.5, 0.5), folds)
+
+
+def response(*branches: Branch) -> Response:
+    """The response that has these branches."""
+    every = np.concatenate([b.parameter for b in branches])
+    return Response(branches=branches, low=float(every.min()), high=float(every.max()), problems=())
