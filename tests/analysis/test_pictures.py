@@ -306,8 +306,8 @@ def test_basins_name_the_motion_that_a_start_ends_in() -> None:
         position=np.array([0.0, 1.0]),
         rate=np.array([0.0, 1.0]),
         ends=np.array([[0, 1], [-1, 0]]),
-        motions=(motions[0], motions[2]),
-        found=SimpleNamespace(orbits=tuple(motions)),  # type: ignore[arg-type]
+        found=SimpleNamespace(orbits=tuple(motions), stable=(motions[0], motions[2])),  # type: ignore[arg-type]
+        computed=0,
     )
     (part,) = figures.picture(found).parts
     said = part.hover["it"]
