@@ -18,7 +18,7 @@ from analysis import Inputs, cli, export
 from analysis.export.description import KINDS, description
 from analysis.files import tables
 from analysis.mechanisms import FIVE_BAR
-from analysis.periodic import charts, find_orbit, grids
+from analysis.periodic import charts, find_orbit, find_orbits, grids
 from analysis.run import save_parameters
 from build_fmu import FMUS
 from linkwork.five_bar.published import SETS, TABLE_3_1
@@ -391,11 +391,14 @@ def test_ctrl_c_is_clean(linkwork, monkeypatch):
 
 
 def test_resonance_of_a_published_set(linkwork, tmp_path):
-    result = linkwork("resonance", "--published", "rig-2-spring-c", "--from", "300 rpm", "--to", "700 rpm")
+    result = linkwork("resonance", "--published", "rig-2-spring-c", "--from", "300 rpm", "--to", "700 rpm", "--html")
     assert result.exit_code == 0, result.output
     assert "585.47 rpm" in result.output
     assert "586.12" in result.output
+    assert "speeds to avoid" in result.output
+    assert "resonance, above 0.71 of the peak" in result.output
     out = tmp_path / "out"
+    assert "amplitude of u [cm]" in (out / "rig-2-spring-c-resonance.html").read_text(encoding="utf-8")
     header = (out / "rig-2-spring-c-resonance.csv").read_text(encoding="utf-8").splitlines()[0]
     assert header.startswith("branch,drive.speed [rad/s],turns in a period")
     assert (out / "rig-2-spring-c-resonance.png").read_bytes().startswith(b"\x89PNG")
@@ -446,6 +449,22 @@ def test_resonance_reports_a_fold(linkwork):
     )
     assert result.exit_code == 0, result.output
     assert "fold at 1035.97" in result.output
+    sentence = next(line for line in result.output.splitlines() if "it jumps to" in line)
+    assert sentence.startswith(
+        "the stable motion of 3.791 cm of u is there only below 1035.97 rpm: where drive.speed rises"
+    )
+    # the large motion at the fold, found by itself
+    rig = SETS["rig-1-spring-b"].parameters
+    large = [100.0 * orbit.amplitude for orbit in find_orbits(rig, speed="1035.97 rpm").stable][-1]
+    assert float(sentence.split()[-2]) == pytest.approx(large, rel=2e-3)
+
+
+@pytest.mark.parametrize("command", ["resonance", "stability", "basins"])
+def test_pages_without_plotly_are_refused_before_anything_is_computed(linkwork, monkeypatch, command):
+    monkeypatch.setattr("analysis.figures.html.find_spec", lambda name: None)
+    result = linkwork(command, "--published", "rig-2-spring-c", "--html")
+    assert result.exit_code == 2
+    assert "python -m pip install 'linkwork[html]'" in " ".join(result.stderr.split())
 
 
 def test_resonance_reports_what_could_not_be_followed(linkwork, tmp_path):

@@ -176,6 +176,7 @@ def test_the_command(tmp_path: Path) -> None:
         "1000 rpm",
         "--points",
         "4",
+        "--html",
         "--out",
         str(tmp_path),
     ]
@@ -183,4 +184,7 @@ def test_the_command(tmp_path: Path) -> None:
     assert done.exit_code == 0, done.output
     assert "two methods found the same motions" in done.output
     assert "of 16 starts end" in done.output
-    assert sorted(p.name for p in tmp_path.glob("rig*")) == ["rig-1-spring-b-basins.csv", "rig-1-spring-b-basins.png"]
+    assert sorted(p.name for p in tmp_path.glob("rig*")) == [
+        f"rig-1-spring-b-basins.{kind}" for kind in ("csv", "html", "png")
+    ]
+    assert "ends in motion 1" in (tmp_path / "rig-1-spring-b-basins.html").read_text(encoding="utf-8")
