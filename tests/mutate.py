@@ -43,7 +43,9 @@ def tests_of(module: Path) -> str:
     for place in (module, *module.parents):
         if (tests := SETTINGS["tests"].get(place.as_posix())) is not None:
             python = shlex.quote(sys.executable)
-            return f"{python} -m pytest -q -x -p no:cacheprovider -m 'not slow and not fmu' {tests}"
+            return (
+                f"{python} -m pytest -q -x -p no:cacheprovider -m 'not slow and not fmu' {tests} {SETTINGS['always']}"
+            )
     raise SystemExit(f"tool.mutation.tests of pyproject.toml names no tests for {module}")
 
 

@@ -83,6 +83,13 @@ def test_dxf_reads_back(unit: str, metre: float, code: int) -> None:
     assert dict(document.header.custom_vars.properties)["Title"] == DRAWING.title
 
 
+def test_a_wide_drawing_is_seen_whole() -> None:
+    wide = Drawing(title="wide", lines=(Line(layer="crank", start=(1.0, 0.0), end=(3.0, 0.1)),))
+    (view,) = read_dxf(to_dxf(wide)).viewports.get("*Active")
+    # a view twice as wide as high, and a little more
+    assert view.dxf.height == pytest.approx(1100.0)
+
+
 def test_extents() -> None:
     (left, bottom), (right, top) = DRAWING.extents
     assert (left, bottom, right, top) == pytest.approx((-0.4, -0.79, 1.2, 0.81))

@@ -331,12 +331,6 @@ def test_no_text_becomes_a_formula_or_more_than_a_cell(content):
     assert rows[1][0].startswith("'=")
 
 
-def test_headers_are_harmless_and_read_back(tmp_path):
-    path = write_csv(tmp_path / "x.csv", {"=cmd|'/c calc'!A1": [1.0], "a, b": [2.0], "-3": [4.0]})
-    assert path.read_text().splitlines()[0] == "'=cmd|'/c calc'!A1,\"a, b\",-3"
-    assert list(read_rows(path)[0]) == ["'=cmd|'/c calc'!A1", "a, b", "-3"]
-
-
 def test_blocks_make_the_same_file_as_one(tmp_path, monkeypatch):
     columns = {"a": np.arange(10) / 3.0, "b": [np.nan, np.inf, -np.inf, *range(7)]}
     whole = write_csv(tmp_path / "x.csv", columns).read_bytes()
