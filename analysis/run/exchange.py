@@ -53,7 +53,8 @@ class Exchange(CVodeSolver):  # type: ignore[misc]
     def __init__(self, model: FmuModel, encoded: Encoded, times: NDArray[np.float64], tolerance: float) -> None:
         self.model, self.encoded = model, encoded
         self.names = encoded.mechanism.input_names
-        self.time = float(times[0])
+        # CVode's time counts from there: at a late time its first steps would be lost in the rounding
+        self.origin = self.time = float(times[0])
         self.law = encoded.law.copy()
         inside = encoded.breaks[(encoded.breaks > times[0]) & (encoded.breaks <= times[-1])]
         self.ends = [*inside.tolist(), np.inf]
@@ -69,7 +70,7 @@ class Exchange(CVodeSolver):  # type: ignore[misc]
             get_nominals=lambda x, n: model.get_nominals(x),
             set_time=None,
             input=None,
-            startTime=self.time,
+            startTime=0.0,
             relativeTolerance=tolerance,
             maxNumSteps=MOST_STEPS,
         )
@@ -95,9 +96,9 @@ class Exchange(CVodeSolver):  # type: ignore[misc]
         self.ends = [end for end in self.ends if end > self.time]
         self.still = self.encoded.steady and self.law[2] == 0.0
         ended = self.model.event(self.inputs(self.time, self.state))
-        self.reset(self.time)
+        self.reset(self.time - self.origin)
         if np.isfinite(self.ends[0]):
-            _set_stop_time(self.cvode_mem, self.ends[0])
+            _set_stop_time(self.cvode_mem, self.ends[0] - self.origin)
         return ended
 
     def advance(self, goal: float) -> bool:
@@ -113,13 +114,14 @@ class Exchange(CVodeSolver):  # type: ignore[misc]
         goal = min(goal, self.ends[0])
         self.failure = None
         roots = np.zeros(self.nz)
-        if goal - self.time > 16.0 * np.spacing(max(abs(goal), abs(self.time))):
+        here, there = self.time - self.origin, goal - self.origin
+        reached = there
+        if there - here > 16.0 * np.spacing(there):
             try:
-                _, roots, self.time = self.step(self.time, goal)
+                _, roots, reached = self.step(here, there)
             except (RuntimeError, TypeError) as error:
                 raise self._reason(error) from error
-        else:
-            self.time = goal
+        self.time = goal if reached == there else self.origin + reached
         self.put(self.time, self.px)
         return self.begin(released=bool(roots[-1])) if roots.any() or self.time >= self.ends[0] else False
 
@@ -152,7 +154,7 @@ class Exchange(CVodeSolver):  # type: ignore[misc]
         """Time derivative of the state."""
 
         def work() -> None:
-            self.put(t, NV_DATA_S(y))
+            self.put(self.origin + t, NV_DATA_S(y))
             self.model.get_derivatives(NV_DATA_S(ydot))
 
         return self._tried(work)
@@ -162,7 +164,7 @@ class Exchange(CVodeSolver):  # type: ignore[misc]
 
         def work() -> None:
             x = NV_DATA_S(y)
-            self.put(t, x)
+            self.put(self.origin + t, x)
             self.model.get_indicators(gout)
             gout[self.nz - 1] = self._array(x)[self.encoded.law_places[1]] - self.law[1] if self.law[2] else 1.0
 

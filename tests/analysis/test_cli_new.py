@@ -9,6 +9,7 @@ import pytest
 
 from analysis.cli.new import case_text, kinds
 from analysis.files import names_of
+from analysis.files.template import meanings
 from analysis.mechanisms import MECHANISMS
 from analysis.motion import TABLES as MOTION
 from analysis.motion import SliderCase, load_slider_case
@@ -140,3 +141,25 @@ def test_what_it_does_not_write(linkwork, tmp_path):
     assert linkwork("new", "motion", "--force").exit_code == 0
     assert tomllib.loads((tmp_path / "motion.toml").read_text())["task"]["kind"] == "motion"
     assert [line.split()[0] for line in linkwork("new").output.splitlines()] == list(kinds())
+
+
+class _Described:
+    """What entries mean.
+
+    Attributes
+    ----------
+    short : float
+        A length; within `bounds` (m).
+    long, other : float
+        The first sentence says what it is (a length; not a time). The second one, which is not needed in a file, says why it is so; a third.
+    unit : float
+        m
+    """
+
+
+def test_of_a_long_meaning_the_first_sentence_stays():
+    assert meanings(_Described) == {
+        "short": "A length; within bounds (m)",
+        "long": "The first sentence says what it is",
+        "other": "The first sentence says what it is",
+    }

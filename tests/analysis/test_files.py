@@ -32,6 +32,7 @@ from analysis.files import (
     names_of,
     overridden,
     read,
+    read_columns,
     read_csv,
     read_rows,
     reader,
@@ -340,6 +341,13 @@ def test_blocks_make_the_same_file_as_one(tmp_path, monkeypatch):
         tmp_path / "z.csv", np.column_stack(list(columns.values())), delimiter=",", header="a,b", comments="", fmt="%.17g"
     )  # fmt: skip
     assert (tmp_path / "z.csv").read_bytes() == whole
+
+
+@pytest.mark.parametrize("mark", [",", ";", "\t"])
+def test_columns_are_between_what_the_first_line_has(tmp_path, mark):
+    (tmp_path / "x.csv").write_text(f't{mark}u [m]{mark}note\n0{mark}1{mark}a\n2{mark}3{mark}"b;c,d\te"\n')
+    assert np.column_stack(read_columns(tmp_path / "x.csv", ["u", None])).tolist() == [[1.0, 1.0], [3.0, 3.0]]
+    assert read_columns(tmp_path / "x.csv", ["t"])[0].tolist() == [0.0, 2.0]
 
 
 def test_csv_columns_of_different_length_are_refused(tmp_path):
