@@ -151,7 +151,8 @@ class _Described:
     short : float
         A length; within `bounds` (m).
     long, other : float
-        The first sentence says what it is (a length; not a time). The second one, which is not needed in a file, says why it is so; a third.
+        The first sentence says what it is (a length; not a time). The second one, which is not needed in a file, says
+        why it is so; a third.
     unit : float
         m
     """
