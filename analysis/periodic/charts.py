@@ -289,7 +289,9 @@ def stability_chart(
             survey.trace(motion, matrix, kind)
     survey.follow_lines(np.linspace(*box.y, LINES[1]).tolist(), progress)
     if around is not None:
-        survey.follow_lines(survey.unmet(around), progress)
+        true_ones = [traced.points for traced in survey.traced if traced.motion in _MOTION]
+        survey.follow_lines(unmet(around, survey.lines, true_ones), progress)
+        survey.most = max(survey.most, int(around.stable.max()))
     survey.run_three_points()
     return StabilityChart(
         axes=survey.axes,
@@ -363,28 +365,6 @@ class _Survey:
                 show(float(number))
         if lost:
             self.problems.append(f"{len(lost)} motions on the lines searched are not followed, the first at {lost[0]}")
-
-    def unmet(self, beside: Coexistence) -> list[float]:
-        """A line through each part of the plane with a number of stable motions that no line and no boundary has met."""
-        self.most = max(self.most, int(beside.stable.max()))
-        half = 0.5 * self.box.size / [len(beside.x) - 1, len(beside.y) - 1]
-        found: list[float] = []
-        for number in np.unique(beside.stable):
-            labels, regions = ndimage.label(beside.stable == number)
-            for region in range(1, regions + 1):
-                rows, columns = np.nonzero(labels == region)
-                low, high = beside.y[rows.min()], beside.y[rows.max()]
-                if any(low <= y <= high for y in (*self.lines, *found)):
-                    continue
-                cells = np.column_stack([beside.x[columns], beside.y[rows]])
-                if any(
-                    (np.abs(t.points[:, None] - cells) <= 2.0 * half).all(axis=2).any()
-                    for t in self.traced
-                    if t.motion in _MOTION
-                ):
-                    continue
-                found.append(float(beside.y[np.bincount(rows).argmax()]))
-        return found
 
     def _follow_special(self, special: SpecialPoint, place: tuple[float, float]) -> None:
         """Follow a fold, period doubling or torus through the chart, unless it is known."""
@@ -479,6 +459,31 @@ class _Survey:
             # the test function ends at folds: take what the traced boundary says
             return by_points
         return f"{region}: gone from {self.damping} = {found.damping:.8g} {up.si} on, last at {other.format_value(found.x)}"
+
+
+def unmet(beside: Coexistence, lines: Sequence[float], boundaries: Sequence[NDArray[np.float64]]) -> list[float]:
+    """A line y = const through each part of a plane with a number of stable motions that no line and no boundary has met.
+
+    Parameters
+    ----------
+    beside : Coexistence
+    lines : sequence of float
+        Lines that were searched.
+    boundaries : sequence of ndarray, shape (n, 2)
+        A part that one of them passes within a cell is known.
+    """
+    cell = [np.diff(axis[:2]).sum() for axis in (beside.x, beside.y)]
+    found: list[float] = []
+    for number in np.unique(beside.stable):
+        labels, count = ndimage.label(beside.stable == number)
+        for label in range(1, count + 1):
+            rows, columns = np.nonzero(labels == label)
+            if any(beside.y[rows.min()] <= y <= beside.y[rows.max()] for y in (*lines, *found)):
+                continue
+            cells = np.column_stack([beside.x[columns], beside.y[rows]])
+            if not any((np.abs(points[:, None] - cells) <= cell).all(axis=2).any() for points in boundaries):
+                found.append(float(beside.y[np.bincount(rows).argmax()]))
+    return found
 
 
 def _is_of(found: Grid, orbit: PeriodicOrbit, place: Sequence[float]) -> bool:

@@ -16,8 +16,8 @@ from .orbits import OrbitError, orbit_of
 from .planes import Plane
 from .starts import scale_of
 
-#: Points of a line at which all motions are sought, and points of a branch at most.
-POINTS, BRANCH_POINTS = 17, 600
+#: Points of a line at which all motions are sought; points of a branch at most, and its greatest step: see `follow`.
+POINTS, BRANCH_POINTS, STEP = 17, 600, 5e-2
 #: Largest multiplier with which a motion is followed.
 GREATEST = 1e3
 #: Distance in scaled arc length at which a motion lies on a branch: the straight pieces are as near to it.
@@ -70,6 +70,7 @@ def branches_on(
                             low=x[0],
                             high=x[1],
                             direction=direction,
+                            greatest=STEP,
                             most_points=BRANCH_POINTS,
                             stop=lambda orbit: orbit.largest > GREATEST,
                         )

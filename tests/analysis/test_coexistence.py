@@ -19,8 +19,10 @@ from analysis.figures import plot
 from analysis.periodic import (
     Basins,
     Coexistence,
+    Crossing,
     Drive,
     GridInterrupted,
+    Stability,
     basins,
     charts,
     coexistence,
@@ -29,6 +31,7 @@ from analysis.periodic import (
     plane,
     stability_chart,
 )
+from analysis.periodic.lines import branches_on
 from linkwork.errors import InputError
 from linkwork.five_bar.parameters import InitialState
 from linkwork.five_bar.published import RAD_S_PER_RPM, SETS
@@ -120,10 +123,10 @@ def test_rows_are_kept_and_an_interrupted_picture_goes_on(
     with pytest.raises(GridInterrupted, match=r"2 of 3 rows done, which are kept in .*: call again to go on"):
         of(tmp_path)
     monkeypatch.setattr(coexistences, work, compute)
-    assert [of(tmp_path).computed for _ in range(2)] == [1, 0]
+    last = of(tmp_path)
+    assert last.computed == 1
     # of another mechanism there are as many rows anew as it is in
     assert of(tmp_path, 11.5).computed == others
-    last = of(tmp_path)
     (whole := tmp_path / "alone").mkdir()
     alone = of(whole)
     for name in ("largest", "starts", "ends"):
@@ -138,6 +141,63 @@ def test_no_stable_motion_is_a_sentence() -> None:
         basins(RIG_1_B, Drive(speed=SPEED), points=2, rate=(1.0, 0.0))
     with pytest.raises(InputError, match="axis x"):
         coexistence(plane(RIG_1_B, Drive(speed=SPEED), "drive.speed", "slider.damping"), [], [1.0])
+
+
+def test_an_isola_is_found_that_the_branch_from_the_ends_does_not_pass() -> None:
+    """Rig 2 with spring C and 1 N.s/m: some 20 cm beside a motion of a few, at no speed connected with it."""
+    rig = replace(SETS["rig-2-spring-c"].parameters, slider_damping=1.0)
+    low, high = 470.0 * RAD_S_PER_RPM, 600.0 * RAD_S_PER_RPM
+    operation = plane(rig, Drive(speed=low), "drive.speed", "slider.damping")
+    branches, found, lost = branches_on(operation, (low, high), 1.0, name="drive.speed", unit="rad/s")
+    assert lost == []
+    (isola,) = (branch for branch in branches if branch.closed)
+    through = next(branch for branch in branches if branch.parameter[0] == low and branch.parameter[-1] == high)
+    assert through.special == ()
+    # the motions of a line's ends are all on the branch that passes
+    assert found.count[0, [0, -1]].tolist() == [1, 1]
+    folds = sorted(special.parameter for special in isola.special if special.kind is Crossing.FOLD)
+    assert len(folds) == 2
+    assert low < folds[0] < folds[1] < high
+    # what is stable on it stays there in a run by the solver of runs; from rest the mechanism settles on the other branch
+    stable = next(o for o in isola.orbits if o.verdict().stability is Stability.STABLE and o.amplitude > 0.1)
+    assert stable.drive.speed is not None
+    period = 2.0 * np.pi / stable.drive.speed
+    turn = 300 * period + np.linspace(0.0, period, 200)
+    swings = []
+    for position, velocity in (stable.start.tolist(), (0.0, 0.0)):
+        run = simulate(
+            rig,
+            Inputs(speed=stable.drive.speed),
+            initial=InitialState(slider_position=position, slider_velocity=velocity),
+            stop_time=301 * period,
+            samples=[0.0, *turn],
+        )
+        swings.append(0.5 * np.ptp(run["slider.position"][1:]))
+    assert swings[0] == pytest.approx(stable.amplitude, rel=1e-3)
+    assert swings[1] < 0.5 * swings[0]
+
+
+def test_a_part_with_stable_motions_that_no_line_meets_gets_a_line() -> None:
+    """Two motions in the cells (3..4, 3..5) of a plane of 8 x 8 points, one elsewhere."""
+    axis = np.arange(8.0)
+    largest = np.full((8, 8, 2), 0.5)
+    largest[..., 1] = np.nan
+    largest[3:5, 3:6, 1] = 0.9
+    masked = np.ma.masked_invalid(largest)
+    beside = Coexistence(
+        x=axis,
+        y=axis,
+        largest=masked,
+        amplitude=masked,
+        starts=np.zeros((8, 8, 2, 2)),
+        swing=("slider.position", "m"),
+        computed=0,
+    )
+    assert charts.unmet(beside, [0.0, 7.0], []) == [3.0]
+    assert charts.unmet(beside, [0.0, 3.5, 7.0], []) == []
+    around, away = np.array([[2.5, 3.5], [5.5, 3.5]]), np.array([[0.5, 6.5], [0.5, 0.5]])
+    assert charts.unmet(beside, [0.0, 7.0], [around]) == []
+    assert charts.unmet(beside, [0.0, 7.0], [away]) == [3.0]
 
 
 @pytest.fixture
