@@ -30,7 +30,7 @@ from .crossings import follow_crossing
 from .drives import Drive, published_drive
 from .floquet import Crossing
 from .grids import Grid, grid
-from .lines import branches_on, distance
+from .lines import BRANCH_POINTS, branches_on, distance
 from .natural import first_freedom, natural_frequency
 from .orbits import PeriodicOrbit
 from .planes import Plane, format_value, plane, require_variable, speed_name, unit_of, value_of
@@ -372,7 +372,15 @@ class _Survey:
             return
         what = f"the {special.kind.value} at {self.place(*place)}"
         try:
-            curve = follow_crossing(self.operation, special.orbit, special.kind, place, x=self.box.x, y=self.box.y)
+            curve = follow_crossing(
+                self.operation,
+                special.orbit,
+                special.kind,
+                place,
+                x=self.box.x,
+                y=self.box.y,
+                most_points=BRANCH_POINTS,
+            )
         except ContinuationError as error:
             self.problems.append(f"{what} is not followed: {error}")
             return

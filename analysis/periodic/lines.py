@@ -16,7 +16,7 @@ from .orbits import OrbitError, orbit_of
 from .planes import Plane
 from .starts import scale_of
 
-#: Points of a line at which all motions are sought; points of a branch at most, and its greatest step: see `follow`.
+#: Points of a line at which all motions are sought; points of a branch at most to either side, and its greatest step.
 POINTS, BRANCH_POINTS, STEP = 17, 600, 5e-2
 #: Largest multiplier with which a motion is followed.
 GREATEST = 1e3
