@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..numerics.continuation import ContinuationError
-from .branches import Branch, Family, follow
+from .branches import Branch, Family, follow_both
 from .coexistence import Coexistence, coexistence
 from .orbits import OrbitError, orbit_of
 from .planes import Plane
@@ -61,24 +61,20 @@ def branches_on(
                 continue
             try:
                 orbit = orbit_of(parameters, drive, start=motion, settle=False)
-                for direction in (1, -1):
-                    branches.append(
-                        follow(
-                            family,
-                            orbit,
-                            value,
-                            low=x[0],
-                            high=x[1],
-                            direction=direction,
-                            greatest=STEP,
-                            most_points=BRANCH_POINTS,
-                            stop=lambda orbit: orbit.largest > GREATEST,
-                        )
-                    )
-                    if branches[-1].closed:
-                        break
+                branch = follow_both(
+                    family,
+                    orbit,
+                    value,
+                    low=x[0],
+                    high=x[1],
+                    greatest=STEP,
+                    most_points=BRANCH_POINTS,
+                    stop=lambda orbit: orbit.largest > GREATEST,
+                )
             except (OrbitError, ContinuationError) as error:
                 lost.append(f"{family.format_value(value)}: {error}")
+            else:
+                branches.append(branch)
     return branches, found, lost
 
 
