@@ -354,7 +354,7 @@ def motion_gradient(orbit: PeriodicOrbit, names: Sequence[str] | None = None) ->
     >>> from analysis.periodic import motion_gradient
     >>> motion = motion_gradient(find_orbit("rig-2-spring-c", speed=500 * pi / 30))
     >>> motion.amplitude.movers()
-    ('drive.speed', 'slider.stiffness', 'coupler.length')
+    ('drive.speed', 'slider.stiffness', 'rocker.length')
     """
     return MotionGradient(orbit, names)
 

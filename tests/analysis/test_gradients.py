@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import doctest
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from itertools import pairwise
@@ -32,6 +33,7 @@ from analysis.periodic import (
     follow,
     frequency_response,
     gradient_names,
+    gradients,
     motion_gradient,
     orbit_of,
     special_gradient,
@@ -193,6 +195,12 @@ def test_the_cart_of_a_rotor_has_its_closed_form() -> None:
     }
     for name, value in expected.items():
         assert motion.amplitude[name] == pytest.approx(value, rel=1e-8, abs=1e-13)
+    # the amplitude is proportional to the radius, and m r is a constant of the equations
+    curvature = motion.amplitude_curvature("rotor.radius")
+    assert curvature.value == pytest.approx(size / r, rel=1e-8)
+    assert curvature["rotor.mass"] == pytest.approx(expected["rotor.mass"] / r, rel=1e-8)
+    assert curvature["cart.damping"] == pytest.approx(expected["cart.damping"] / r, rel=1e-8)
+    assert curvature["rotor.radius"] == pytest.approx(0.0, abs=1e-8 * size / r**2)
     # |multiplier| = exp(-c T / (2 M))
     largest = np.exp(-c * pi / (speed * mass))
     assert motion.largest["cart.damping"] == pytest.approx(-largest * pi / (speed * mass), rel=1e-8)
@@ -390,6 +398,10 @@ def test_friction_by_contact_forces_can_be_added_to_a_motion_without() -> None:
     h = 1e-3
     forward = (-3.0 * size(0.0) + 4.0 * size(h) - size(2.0 * h)) / (2.0 * h)
     assert slope == pytest.approx(forward, rel=1e-3)
+
+
+def test_the_example_says_what_is_so() -> None:
+    assert doctest.testmod(gradients).failed == 0
 
 
 def test_what_has_no_gradient_says_so() -> None:
