@@ -23,6 +23,7 @@ from linkwork.parameters import fmi_name
 from ..files import unknown_name
 from ..mechanisms import Parameters, mechanism_of
 from ..numerics import symbolic
+from ..run import takes_published
 from ..run.equations import of_parameters
 from .branches import Family, SpecialPoint, orbit_from
 from .drives import Drive
@@ -110,6 +111,7 @@ class PointGradient:
     orbit: PeriodicOrbit
 
 
+@takes_published()
 def gradient_names(parameters: Parameters, drive: Drive) -> tuple[str, ...]:
     """All parameters that motions have derivatives by: what acts of the drive, and those of the mechanism, by FMI name.
 

@@ -77,6 +77,7 @@ def unit_of(mechanism: Mechanism, name: str) -> str:
     return next(v.unit for v in mechanism.variables if v.name == name)
 
 
+@takes_published()
 def value_of(parameters: Parameters, drive: Drive, name: str) -> float:
     """The value there is of what can vary; NaN of a speed under a torque."""
     mechanism = mechanism_of(parameters)

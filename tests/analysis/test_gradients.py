@@ -312,7 +312,7 @@ def test_a_resonance_moves_as_its_differences_say() -> None:
                     break
         return np.array([speeds[-1], amplitude(there)])
 
-    response = frequency_response(RIG_2_C, 560.0 * RPM, 620.0 * RPM, doubled=False)
+    response = frequency_response(RIG_2_C, 560.0 * RPM, 620.0 * RPM, doublings=0)
     (peak,) = response.maxima()
     found = special_gradient(response.family, peak)
     assert found.place.value == pytest.approx(peak.parameter, rel=1e-4)
