@@ -234,6 +234,7 @@ CONTINUED: Mapping[str, Mapping[str, list[tuple[str, float]]]] = MappingProxyTyp
             "pendulum, 4 turns": [("period doubling", 1.0820843843)],
             "five-bar, small motion": [("fold", 108.48612255)],
             "five-bar, large motion": [("period doubling", 97.675574991)],
+            "five-bar, 2 turns": [("period doubling", 95.991846905)],
         },
         # its period doublings are bisected to 1e-6
         "jaxcont 0.4.0": {

@@ -81,7 +81,9 @@ def resonance(
     html: bool,
     sensitivity: bool,
 ) -> None:
-    """Follow the periodic motion of a CASE file's or a published set's mechanism over the speed, or another parameter.
+    """Follow the periodic motions of a CASE file's or a published set's mechanism over the speed, or another parameter.
+
+    A branch that is connected with no other and closes is an isola: "closed" stands in the place of its end.
 
     Writes amplitude, harmonics, crank torque and pin forces along the curve, and reports natural frequency, maxima, folds,
     period doublings, the speeds to avoid, and the classical approximations beside the true motion.
@@ -90,6 +92,7 @@ def resonance(
     Examples:
       linkwork resonance --published rig-2-spring-c --sensitivity
       linkwork resonance --published rig-1-spring-b --from '100 rpm' --to '1300 rpm' --html
+      linkwork resonance --published rig-1-spring-b --from '900 rpm' --to '1100 rpm' --doublings 4
       linkwork resonance --published table-3.1 --vary slider.stiffness --from '1e5 dyn/cm' --to '2e6 dyn/cm'
     """
     from .. import figures

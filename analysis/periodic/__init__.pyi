@@ -10,6 +10,7 @@ from .branches import Branch as Branch
 from .branches import Family as Family
 from .branches import SpecialPoint as SpecialPoint
 from .branches import follow as follow
+from .branches import follow_both as follow_both
 from .branches import switch as switch
 from .charts import OTHER_ORBIT as OTHER_ORBIT
 from .charts import TRUE_ORBIT as TRUE_ORBIT

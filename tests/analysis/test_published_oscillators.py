@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from math import pi
 
 import numpy as np
 import pytest
+from click.testing import Result
 from scipy.special import mathieu_a, mathieu_b
 
 from analysis.mechanisms import MECHANISMS, register
@@ -21,6 +22,7 @@ from analysis.periodic import (
     find_orbit,
     find_orbits,
     follow,
+    follow_both,
     follow_crossing,
     frequency_response,
     normal_form,
@@ -143,6 +145,19 @@ def test_between_the_folds_of_duffing_there_are_three_motions(hardening: Branch)
         assert (len(found), found.agreed, found.index) == (count, True, 1)
 
 
+def test_a_branch_followed_to_both_sides_is_the_same_branch(hardening: Branch) -> None:
+    middle = find_orbits(DUFFING, speed=1.4).orbits[1]
+    both = follow_both(hardening.family, middle, 1.4, low=0.5, high=3.0)
+    assert both.reached
+    assert sorted([both.parameter[0], both.parameter[-1]]) == [0.5, 3.0]
+    found = {special.parameter for special in both.special}
+    assert sorted(found) == pytest.approx(sorted(special.parameter for special in hardening.special), rel=1e-10)
+    for special in both.special:
+        # the multiplier passes 1 after the point that it names
+        before, after = both.largest_multiplier[special.after : special.after + 2]
+        assert min(before, after) < 1.0 < max(before, after)
+
+
 def test_curvature_at_the_folds_of_duffing_is_that_of_the_series_of_the_map(hardening: Branch) -> None:
     words = ["both motions at lower values", "both motions at higher values"]
     for special, expected in zip(hardening.special, words):
@@ -258,3 +273,14 @@ def test_the_motions_of_an_isola_are_found_and_followed_until_they_close() -> No
     assert len(with_isolas(whole, places=2, greatest_step=2e-2).branches) == len(whole.branches)
     with pytest.raises(InputError, match="places is 0"):
         with_isolas(response, places=0)
+
+
+@pytest.mark.slow
+def test_the_command_line_says_which_motions_are_closed(linkwork: Callable[..., Result]) -> None:
+    settings = [("damping", 0.05), ("cubic_stiffness", 0.2), ("modulation", 0.8), ("excitation", 0.02)]
+    about = ["--published", "torsion-demo", *(word for name, v in settings for word in ("--set", f"rotor.{name}={v}"))]
+    about += ["--set", "run.stop_time=1"]
+    ends = ["--from", "0.9 rad/s", "--to", "1.4 rad/s", "--doublings", "0", "--places", "1", "--no-plot"]
+    result = linkwork("resonance", *about, *ends)
+    assert result.exit_code == 0, result.output
+    assert result.output.count("closed") == 1

@@ -93,9 +93,9 @@ def five_bar(library: Any, u: Sequence[Any], speed: Any) -> Sequence[Any]:
 RPM = RAD_S_PER_RPM
 CASES: dict[str, Case] = {
     "duffing": Case(duffing, 1, 1.0, 0.9, 1.8, (0.0, 0.0), 60, 20),
-    "pendulum": Case(pendulum, 1, 1.064, 1.06, 1.068, (-2.27, 2.0), 200, 40),
-    "pendulum, 2 turns": Case(pendulum, 2, 1.078, 1.075, 1.080, (-2.27, 2.0), 200, 40),
-    "pendulum, 4 turns": Case(pendulum, 4, 1.0818, 1.081, 1.0823, (-2.27, 2.0), 400, 40),
+    "pendulum": Case(pendulum, 1, 1.064, 1.063, 1.068, (-2.27, 2.0), 200, 40),
+    "pendulum, 2 turns": Case(pendulum, 2, 1.078, 1.077, 1.080, (-2.27, 2.0), 200, 40),
+    "pendulum, 4 turns": Case(pendulum, 4, 1.0818, 1.0816, 1.0823, (-2.27, 2.0), 400, 40),
     "five-bar, small motion": Case(five_bar, 1, 1020.0 * RPM, 1000.0 * RPM, 1060.0 * RPM, (0.0, 0.0), 60, 30),
     "five-bar, large motion": Case(five_bar, 1, 940.0 * RPM, 928.0 * RPM, 945.0 * RPM, (1.143, -3.238), 60, 30),
     "five-bar, 2 turns": Case(five_bar, 2, 920.0 * RPM, 914.0 * RPM, 925.0 * RPM, (1.592, -3.005), 60, 30),
@@ -115,11 +115,10 @@ def by_auto(case: Case) -> Iterator[tuple[str, float]]:
         for n, value in enumerate(motion(period * place)):
             state[n] = float(value)
 
-    size = case.high - case.low
     settings = {
         **{"ips": auto.IPS_PERIODIC_ORBIT, "ndim": 4, "npar": 1, "nmx": 300, "ntst": case.mesh * case.turns, "ncol": 5},
         **{"iad": 3, "ilp": 1, "isp": 2, "mxbf": 0, "iads": 1, "itmx": 12, "itnw": 7, "nwtn": 3, "jac": 0},
-        **{"ds": case.direction * 0.01 * size, "dsmin": 1e-7 * size, "dsmax": 0.1, "rl0": case.low, "rl1": case.high},
+        **{"ds": case.direction * 0.01, "dsmin": 1e-6, "dsmax": 0.1, "rl0": case.low, "rl1": case.high},
         **{"a0": -1e300, "a1": 1e300, "epsl": 1e-10, "epsu": 1e-10, "epss": 1e-9},
     }
     found = auto.run(lambda u, p: case.full(math, u, p[0]), begin, settings, icu=[1, auto.PERIOD_INDEX])
@@ -147,7 +146,7 @@ def by_jaxcont(case: Case) -> Iterator[tuple[str, float]]:
     motion = jnp.asarray(case.settled()(angles).T)
     problem = periodic_orbit_problem(right, motion, jnp.asarray(angles), period, case.begin, mesh)
     settings = jaxcont.ContinuationPar(
-        ds=0.05, ds_max=1.0, ds_min=1e-6, max_steps=200, newton_tol=1e-9, compute_stability=False
+        ds=0.05, ds_max=1.0, ds_min=1e-6, max_steps=100, newton_tol=1e-9, compute_stability=False
     )
     events = [jaxcont.Fold(), jaxcont.PeriodDoubling(raw_f=right, mesh=mesh)]
     span = (case.begin, case.high if case.direction > 0 else case.low)
