@@ -62,7 +62,7 @@ def _require_range(parameters: Any, low: float, high: float, name: str, first: s
 )
 @click.option(
     "--places",
-    default=3,
+    default=5,
     show_default=True,
     type=click.IntRange(min=0),
     help="Values of the range at which all motions are sought, to find those that no branch leads to.",

@@ -118,7 +118,7 @@ def by_auto(case: Case) -> Iterator[tuple[str, float]]:
     settings = {
         **{"ips": auto.IPS_PERIODIC_ORBIT, "ndim": 4, "npar": 1, "nmx": 300, "ntst": case.mesh * case.turns, "ncol": 5},
         **{"iad": 3, "ilp": 1, "isp": 2, "mxbf": 0, "iads": 1, "itmx": 12, "itnw": 7, "nwtn": 3, "jac": 0},
-        **{"ds": case.direction * 0.01, "dsmin": 1e-6, "dsmax": 0.1, "rl0": case.low, "rl1": case.high},
+        **{"ds": case.direction * 1e-3, "dsmin": 1e-6, "dsmax": 0.1, "rl0": case.low, "rl1": case.high},
         **{"a0": -1e300, "a1": 1e300, "epsl": 1e-10, "epsu": 1e-10, "epss": 1e-9},
     }
     found = auto.run(lambda u, p: case.full(math, u, p[0]), begin, settings, icu=[1, auto.PERIOD_INDEX])
