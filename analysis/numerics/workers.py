@@ -9,9 +9,9 @@ import tempfile
 import threading
 import time
 import warnings
-from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import BrokenExecutor
-from contextlib import contextmanager, suppress
+from collections.abc import Callable, Generator, Iterator, Sequence
+from concurrent.futures import BrokenExecutor, ThreadPoolExecutor, as_completed
+from contextlib import contextmanager, nullcontext, suppress
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -25,6 +25,10 @@ RETRIES = 3
 
 #: Bytes of a pickled result that go through the pipe itself: with what joblib adds, less than a pipe takes in one piece.
 _PIECE = 2048
+
+#: Work, number of an item, the item, the caller's process and a folder for results; number of an item, its result or error.
+_Task = tuple[Callable[[Any], Any], int, Any, int, str]
+_Found = tuple[int, Any, Exception | None]
 
 _WATCHED: set[int] = set()
 #: Seconds between two looks at who the caller is.
@@ -126,23 +130,15 @@ def over_workers(
     Processes of this machine hand over what is large in files: joblib would wait for ever for the end of a message whose sender
     was killed within it.
     """
-    import joblib
-
-    _, elsewhere = _workers(n_jobs, threads)
+    count, elsewhere = _workers(n_jobs, threads)
     listening = Heard() if heard is None else heard
     todo = dict(enumerate(items))
-    with tempfile.TemporaryDirectory(prefix="linkwork-", ignore_cleanup_errors=True) as folder:
+    with (
+        tempfile.TemporaryDirectory(prefix="linkwork-", ignore_cleanup_errors=True) if elsewhere else nullcontext("")
+    ) as folder:
         for attempt in range(RETRIES + 1):
-            results: Any = joblib.Parallel(
-                n_jobs=n_jobs,
-                prefer="threads" if threads else None,
-                return_as="generator_unordered",
-                batch_size=1,  # many small results together would be a large message
-            )(
-                # in a tuple: Dask would keep a larger argument on one worker alone, and lose it with that
-                joblib.delayed(_one)((work, number, item, os.getpid(), folder))
-                for number, item in tuple(todo.items())
-            )
+            tasks = [(work, number, item, os.getpid(), folder) for number, item in todo.items()]
+            results = _in_processes(tasks, n_jobs) if elsewhere else _here(tasks, count)
             try:
                 while todo:
                     listening.waiting = elsewhere
@@ -182,6 +178,29 @@ def over_workers(
                     results.close()
 
 
+def _in_processes(tasks: Sequence[_Task], n_jobs: int | None) -> Any:
+    """What other processes send, as it comes: a generator."""
+    import joblib
+
+    # many small results together would be a large message
+    parallel = joblib.Parallel(n_jobs=n_jobs, return_as="generator_unordered", batch_size=1)
+    # in a tuple: Dask would keep a larger argument on one worker alone, and lose it with that
+    return parallel(joblib.delayed(_one)(task) for task in tasks)
+
+
+def _here(tasks: Sequence[_Task], count: int) -> Generator[Any, None, None]:
+    """What is found in this process, or in threads of it: joblib would look for it a hundred times a second only."""
+    if count == 1:
+        yield from map(_one, tasks)
+        return
+    pool = ThreadPoolExecutor(count)
+    try:
+        for future in as_completed([pool.submit(_one, task) for task in tasks]):
+            yield future.result()
+    finally:
+        pool.shutdown(cancel_futures=True)
+
+
 class _OfWork(Exception):
     """An error of the work, in contrast to one of the workers."""
 
@@ -190,20 +209,16 @@ class _OfWork(Exception):
         super().__init__()
 
 
-#: Number of an item, and its result or error.
-_Found = tuple[int, Any, Exception | None]
-
-
-def _one(packed: tuple[Callable[[Item], Made], int, Item, int, str]) -> _Found | Path:
+def _one(task: _Task) -> _Found | Path:
     """What is found of an item, or the file that it is in."""
-    work, number, item, caller, folder = packed
+    work, number, item, caller, folder = task
     end_with(caller)
     found: _Found
     try:
         found = number, work(item), None
     except Exception as error:  # to be told from those of the workers
         found = number, None, error
-    return _handed_over(found, Path(folder, str(number))) if os.getppid() == caller else found
+    return _handed_over(found, Path(folder, str(number))) if folder and os.getppid() == caller else found
 
 
 def _handed_over(found: _Found, path: Path) -> _Found | Path:
