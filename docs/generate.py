@@ -141,7 +141,7 @@ Picture = tuple[str, "Figure", int]
 
 
 def study_pictures() -> Iterator[Picture]:
-    """The still of README.md, and the pictures of docs/rig-2.md, some of which are figures of the thesis."""
+    """The still of README.md, and the pictures of rig-2.md and coexisting-motions.md, some of which are figures of the thesis."""
     from analysis import figures as draw
     from analysis.periodic import frequency_response
     from analysis.studies import load
@@ -156,9 +156,13 @@ def study_pictures() -> Iterator[Picture]:
     ):
         study = load(number)
         yield name, study.draw(study.compute()), 150
-    rig = SETS["rig-2-spring-c"]
-    response = frequency_response(rig.parameters, 100.0 * RAD_S_PER_RPM, 1300.0 * RAD_S_PER_RPM)
-    yield "rig-2-response", draw.plot(response, title=rig.source, beside=approximations(response)), 150
+    for name, of, low, high in (
+        ("rig-2-response", "rig-2-spring-c", 100.0, 1300.0),
+        ("rig-1-response", "rig-1-spring-b", 850.0, 1250.0),
+    ):
+        rig = SETS[of]
+        response = frequency_response(rig.parameters, low * RAD_S_PER_RPM, high * RAD_S_PER_RPM, doublings=3)
+        yield name, draw.plot(response, title=rig.source, beside=approximations(response)), 100
 
 
 def hand_drawn_pictures() -> Iterator[Picture]:

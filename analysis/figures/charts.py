@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from itertools import cycle
+from itertools import cycle, islice
 from typing import Any
 
 import numpy as np
@@ -127,7 +127,9 @@ def _(chart: HeatMap, figure: Figure, axis: Axes) -> None:
     for of, hatch in _hatched(chart, values):
         if of.any() and min(of.shape) > 1:
             # a boundary half a cell inside of its own points
-            axis.contourf(chart.x, chart.y, of, levels=[0.5, 1.5], colors="none", hatches=[hatch])
+            area = axis.contourf(chart.x, chart.y, of, levels=[0.5, 1.5], colors="none", hatches=[hatch])
+            # the hatching has the colour of the edge, which is not drawn
+            area.set(edgecolor="0.45", linewidth=0.0)
     axis.grid(False)
     draw_panel(axis, chart.panel)
     if not chart.classes:
@@ -137,7 +139,7 @@ def _(chart: HeatMap, figure: Figure, axis: Axes) -> None:
         scale.grid(False)
     handles, labels = axis.get_legend_handles_labels()
     for colour, hatch, name in keys_of(chart):
-        handles.append(Patch(facecolor=colour, hatch=hatch, edgecolor="0.35", linewidth=0.0))
+        handles.append(Patch(facecolor=colour, hatch=hatch, edgecolor="0.45", linewidth=0.0))
         labels.append(name)
     if not handles:
         return
@@ -295,6 +297,7 @@ def plot_basins(found: Basins, *, title: str = "") -> Picture:
         if (found.ends == end).any():
             numbers[found.ends == end] = len(names)
             names.append(words)
+    colours = [*islice(cycle(LIGHT), len(found.motions)), EMPTY, "0.95"]
     map_ = HeatMap(
         panel=panel,
         x=found.position,
@@ -302,7 +305,7 @@ def plot_basins(found: Basins, *, title: str = "") -> Picture:
         values=np.ma.MaskedArray(numbers.astype(float)),
         label="where a start ends",
         middle=None,
-        classes=dict(zip(names, cycle(LIGHT))),
+        classes=dict(zip(names, colours)),
         hover={"it": np.array(names)[numbers]},
     )
     return Picture(parts=[map_], title=title, size=_SIZE)

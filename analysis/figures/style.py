@@ -54,7 +54,6 @@ STYLE: dict[Any, Any] = {
     "legend.frameon": False,
     "legend.fontsize": SMALL,
     "legend.title_fontsize": SMALL,
-    "hatch.color": "0.45",
     "hatch.linewidth": 0.6,
     "lines.linewidth": LINE,
     "lines.markersize": 4.5,

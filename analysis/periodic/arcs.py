@@ -25,8 +25,9 @@ HALF_POWER = 1.0 / sqrt(2.0)
 _PROMINENCE = 1e-3
 #: Relative difference up to which two arcs are one curve, followed twice.
 _SAME = 1e-2
-#: Part of the range below which an interval is a rounding error.
-_SLIVER = 1e-6
+#: Relative difference of values of the parameter that is a rounding error; part of the range below which an interval is none:
+#: a doubled branch begins a step beyond its doubling.
+_ROUNDING, _SLIVER = 1e-6, 1e-4
 
 FloatArray = NDArray[np.float64]
 Interval = tuple[float, float]
@@ -166,7 +167,7 @@ def fold_jumps(branches: Sequence[Branch]) -> tuple[FoldJump, ...]:
     # a motion of twice the period begins at a doubling, where its branch turns back on itself: no motion ends there
     born = [s.parameter for branch in branches for s in branch.special if s.kind is Crossing.PERIOD_DOUBLING]
     for branch, special in ((b, s) for b in branches for s in b.special if s.kind is Crossing.FOLD):
-        if branch.turns > 1 and any(abs(special.parameter / value - 1.0) < _SLIVER for value in born):
+        if branch.turns > 1 and any(abs(special.parameter / value - 1.0) < _ROUNDING for value in born):
             continue
         value, amplitude = special.parameter, special.orbit.amplitude
         for arc, (end, direction) in product(stable, ((-1, 1), (0, -1))):
@@ -180,7 +181,7 @@ def fold_jumps(branches: Sequence[Branch]) -> tuple[FoldJump, ...]:
             after = sorted(float(np.interp(value, other.parameter, other.amplitude)) for other in beyond)
             # and so is a fold that was met from both sides
             if not any(
-                abs(value - other.parameter) < _SLIVER * abs(value)
+                abs(value - other.parameter) < _ROUNDING * abs(value)
                 and abs(amplitude - other.before) < _SAME * amplitude
                 for other in found
             ):
