@@ -27,6 +27,7 @@ from .coexistence import basins as basins
 from .coexistence import coexistence as coexistence
 from .crossings import CrossingCurve as CrossingCurve
 from .crossings import follow_crossing as follow_crossing
+from .directions import gradient_names as gradient_names
 from .drives import Drive as Drive
 from .drives import VaryingInputError as VaryingInputError
 from .drives import drive_of as drive_of
@@ -51,7 +52,6 @@ from .gradients import PointGradient as PointGradient
 from .gradients import boundary_gradient as boundary_gradient
 from .gradients import crossing_gradient as crossing_gradient
 from .gradients import extremum_gradient as extremum_gradient
-from .gradients import gradient_names as gradient_names
 from .gradients import motion_gradient as motion_gradient
 from .gradients import special_gradient as special_gradient
 from .grids import Grid as Grid

@@ -9,27 +9,21 @@ Springer 2004, chapter 10. All derivatives are exact, up to the resolution of th
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, fields
-from functools import cache, cached_property, partial
-from typing import Any, NamedTuple
+from dataclasses import dataclass
+from functools import cached_property, partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from linkwork.errors import InputError, LinkworkError
-from linkwork.mechanism import Mechanism
-from linkwork.parameters import fmi_name
 
 from ..files import unknown_name
-from ..mechanisms import Parameters, mechanism_of
-from ..numerics import symbolic
-from ..run import takes_published
-from ..run.equations import of_parameters
+from ..mechanisms import mechanism_of
 from .branches import Family, SpecialPoint, orbit_from
-from .drives import Drive
+from .directions import along_parameters, gradient_names, stacked
 from .floquet import Crossing
 from .orbits import PeriodicOrbit, orbit_of, period_from
-from .planes import require_variable, value_of, variable_names, with_values
+from .planes import require_variable, value_of, with_values
 from .resonance import Extremum
 from .variations import Place, Variations
 
@@ -111,26 +105,6 @@ class PointGradient:
     orbit: PeriodicOrbit
 
 
-@takes_published()
-def gradient_names(parameters: Parameters, drive: Drive) -> tuple[str, ...]:
-    """All parameters that motions have derivatives by: what acts of the drive, and those of the mechanism, by FMI name.
-
-    A parameter that would switch on what is switched off, friction by contact forces, is left out: it can be named all the
-    same.
-    """
-    mechanism, found = mechanism_of(parameters), []
-    for name in variable_names(mechanism):
-        try:
-            require_variable(parameters, drive, name)
-        except InputError:
-            continue
-        if mechanism.switched(parameters.constants()) or not mechanism.switched(
-            _along(parameters, (name,)).p[:, 0].tolist()
-        ):
-            found.append(name)
-    return tuple(found)
-
-
 class MotionGradient:
     """How a periodic motion changes with parameters; see `motion_gradient`. Each quantity is computed when it is asked for.
 
@@ -152,8 +126,8 @@ class MotionGradient:
         for name in self.names:
             require_variable(parameters, drive, name)
         self.values = np.array([value_of(parameters, drive, name) for name in self.names])
-        own = _along(parameters, self.names)
-        self.along = _stacked(orbit, self.names, own.p)
+        own = along_parameters(parameters, self.names)
+        self.along = stacked(orbit, self.names, own.p)
         mechanism = mechanism_of(parameters)
         place = mechanism.switch_place
         self._switched = mechanism.switched(parameters.constants()) or (place >= 0 and bool(np.any(own.p[place])))
@@ -223,12 +197,8 @@ class MotionGradient:
         v, solution = self.variations, self._solution[0]
         number = self.names.index(along)
         by_y, by_constant = v.second(solution[..., number], self.along[:, number])
-        twice = _along(self.orbit.parameters, self.names, along).p_along
-        forcing = (
-            by_y @ solution
-            + by_constant @ self.along
-            + v.by_constant @ _stacked(self.orbit, (), twice, len(self.names))
-        )
+        twice = along_parameters(self.orbit.parameters, self.names, along).p_along
+        forcing = by_y @ solution + by_constant @ self.along + v.by_constant @ stacked(self.orbit, (), twice)
         second, rates = v.periodic(forcing)[0], v.by_y @ solution + self.forcing
         total = np.zeros(len(self.names))
         for sign, _, place in self._swing:
@@ -606,54 +576,3 @@ def _fold_motion(motion: MotionGradient, shift: FloatArray) -> FloatArray:
     share = -(left @ v.after(by_y @ particular + by_constant @ along)) / open_
     found = particular + free[..., None] * share
     return np.concatenate([found, np.zeros_like(free[..., None])], axis=-1)
-
-
-class _Along(NamedTuple):
-    """Derivatives of the constants with respect to parameters, and of these with respect to one more; shape (P, m)."""
-
-    p: FloatArray
-    p_along: FloatArray
-
-
-def _along(parameters: Parameters, names: Sequence[str], along: str = "") -> _Along:
-    mechanism = mechanism_of(parameters)
-    names_of_fields = _fields(mechanism)
-    own = [float(getattr(parameters, field)) for field in names_of_fields]
-    known = {fmi_name(field): number for number, field in enumerate(names_of_fields)}
-    direction = np.zeros(len(own))
-    if along in known:
-        direction[known[along]] = 1.0
-    found = [np.asarray(part) for part in _constants(mechanism)(own, direction)]
-    chosen = [np.zeros((len(found[0]), len(names))) for _ in found]
-    for part, columns in zip(found, chosen):
-        for column, name in enumerate(names):
-            if name in known:
-                columns[:, column] = part[:, known[name]]
-    return _Along(*chosen)
-
-
-def _stacked(orbit: PeriodicOrbit, names: Sequence[str], p: FloatArray, width: int | None = None) -> FloatArray:
-    """Derivatives of the numbers of the drive, and after them of the constants; shape (c, m)."""
-    mechanism = mechanism_of(orbit.parameters)
-    drive = np.zeros((orbit.flow.drive_size, len(names) if width is None else width))
-    for column, name in enumerate(names):
-        if name in mechanism.input_names:
-            drive[mechanism.input_names.index(name), column] = 1.0
-    return np.vstack([drive, p])
-
-
-@cache
-def _fields(mechanism: Mechanism) -> tuple[str, ...]:
-    return tuple(field.name for field in fields(mechanism.parameters))
-
-
-@cache
-def _constants(mechanism: Mechanism) -> Any:
-    """(parameters, direction) -> derivatives of the constants, and of these along the direction."""
-    casadi = symbolic.library()
-    traced = of_parameters(mechanism)
-    k = casadi.vertcat(*traced.parameters.constants())
-    direction = casadi.SX.sym("direction", *traced.own.shape)
-    jacobian = casadi.jacobian(k, traced.own)
-    along = casadi.reshape(casadi.jtimes(casadi.vec(jacobian), traced.own, direction), *jacobian.shape)
-    return casadi.Function("constants", [traced.own, direction], [casadi.densify(jacobian), casadi.densify(along)])
