@@ -457,7 +457,11 @@ def _located(orbit: PeriodicOrbit, along: str, step_of: _Step, what: str) -> Per
     begun = value_of(orbit.parameters, orbit.drive, along)
     for _ in range(_STEPS):
         motion = MotionGradient(orbit, (along,))
-        change, step = step_of(motion)
+        try:
+            change, step = step_of(motion)
+        except (np.linalg.LinAlgError, ZeroDivisionError):
+            # what is sought does not depend on the parameter
+            break
         value = float(motion.values[0]) + step
         if not abs(value - begun) < _FAR * abs(begun):
             break

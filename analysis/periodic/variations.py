@@ -259,7 +259,13 @@ class Variations:
         return self._at_nodes(starts, forcing)
 
     def periodic(self, forcing: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """The periodic solution of d' = A d + r: at the nodes, shape (k, s, n, m), and at the crank angle 0, (n, m)."""
+        """The periodic solution of d' = A d + r: at the nodes, shape (k, s, n, m), and at the crank angle 0, (n, m).
+
+        Raises
+        ------
+        LinkworkError
+            If there is none, exactly at a fold.
+        """
         gains = self._gains(forcing)
         k, n, m = gains.shape
         # d at the end of each panel is d at the beginning of the next
@@ -269,7 +275,10 @@ class Variations:
         column = np.concatenate([np.roll(places, -1, axis=0).ravel(), at[1].ravel()])
         value = np.concatenate([np.ones(k * n), -self.steps.ravel()])
         matrix = coo_array((value, (row, column)), shape=(k * n, k * n)).tocsc()
-        starts = splu(matrix).solve(gains.reshape(k * n, m)).reshape(k, n, m)
+        try:
+            starts = splu(matrix).solve(gains.reshape(k * n, m)).reshape(k, n, m)
+        except RuntimeError as error:
+            raise LinkworkError("the motion is at a fold: it has no derivatives by the parameters") from error
         return self._at_nodes(starts, forcing), starts[0]
 
     # What is read off

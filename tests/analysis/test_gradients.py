@@ -419,6 +419,14 @@ def test_what_has_no_gradient_says_so() -> None:
         extremum_gradient(orbit_of(RIG_2_C, Drive(speed=200.0 * RPM)), "drive.speed")
     with pytest.raises(LinkworkError, match="no period doubling"):
         crossing_gradient(orbit, Crossing.PERIOD_DOUBLING, "drive.speed")
+    # without gravity nothing moves the cart of a rotor without unbalance
+    still = orbit_of(replace(ROTOR, rotor_mass=1e-300, gravity=0.0), Drive(speed=20.0))
+    with pytest.raises(LinkworkError, match="no extremum"):
+        extremum_gradient(still, "drive.speed")
+    # what two multipliers of an undamped motion are multiplied to is 1 at any speed
+    undamped = orbit_of(replace(RIG_2_C, slider_damping=0.0), Drive(speed=500.0 * RPM))
+    with pytest.raises(LinkworkError):
+        crossing_gradient(undamped, Crossing.TORUS, "drive.speed")
     family = Family(parameters=RIG_2_C, drive=orbit.drive, vary=lambda value: (RIG_2_C, Drive(speed=value)))
     peak = Extremum(parameter=1.0, amplitude=1.0, stability=Stability.STABLE, orbit=orbit)
     with pytest.raises(InputError, match="is a function"):
