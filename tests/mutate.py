@@ -6,7 +6,8 @@
 Cosmic Ray changes one operator or number at a time in a copy of the tree, and the tests run that `tool.mutation.tests` of
 pyproject.toml names for the module or its folder. Printed are the survivors, the mutants whose tests did not end, which count
 as killed, and the share of mutants that a test killed. With ``--sample`` so many mutants of all modules together are drawn,
-always the same ones while the code stays as it is, and the share has its Wilson interval of 95 %.
+always the same ones while the code stays as it is, and the share has its Wilson interval of 95 %. They are tried as they are
+drawn, so that those up to a Ctrl-C, which ends with the share so far, are a sample too.
 """
 
 from __future__ import annotations
@@ -21,6 +22,7 @@ import tempfile
 import tomllib
 from argparse import ArgumentParser
 from collections.abc import Iterator
+from contextlib import suppress
 from math import sqrt
 from pathlib import Path
 from random import Random
@@ -98,21 +100,21 @@ def main() -> None:
         os.environ["PYTHONPATH"] = os.pathsep.join([f"{folder}/fmu_src", folder])
         found = [mutant for module in modules for mutant in mutants(module)]
         if arguments.sample is not None:
-            drawn = sorted(Random(1).sample(range(len(found)), min(arguments.sample, len(found))))
-            found = [found[number] for number in drawn]
-        for mutant in found:
-            tests = tests_of(mutant.module_path)
-            if tests not in sound:  # they must pass on the code as it is
-                subprocess.run(shlex.split(tests), check=True, stdout=subprocess.DEVNULL)
-                sound.add(tests)
-            result = mutate_and_test([mutant], tests, SETTINGS["timeout"])
-            if result.worker_outcome != WorkerOutcome.NORMAL:
-                raise SystemExit(f"{mutant} could not be tried: {result.output}")
-            dead, endless = result.test_outcome != TestOutcome.SURVIVED, result.output == "timeout"
-            killed, count = killed + dead, count + 1
-            if endless or not dead:
-                text = f"{'without end' if endless else 'survived'}, {count} of {len(found)}\n{result.diff}"
-                console.print(escape(text), highlight=False, soft_wrap=True)
+            found = Random(1).sample(found, min(arguments.sample, len(found)))
+        with suppress(KeyboardInterrupt):
+            for mutant in found:
+                tests = tests_of(mutant.module_path)
+                if tests not in sound:  # they must pass on the code as it is
+                    subprocess.run(shlex.split(tests), check=True, stdout=subprocess.DEVNULL)
+                    sound.add(tests)
+                result = mutate_and_test([mutant], tests, SETTINGS["timeout"])
+                if result.worker_outcome != WorkerOutcome.NORMAL:
+                    raise SystemExit(f"{mutant} could not be tried: {result.output}")
+                dead, endless = result.test_outcome != TestOutcome.SURVIVED, result.output == "timeout"
+                killed, count = killed + dead, count + 1
+                if endless or not dead:
+                    text = f"{'without end' if endless else 'survived'}, {count} of {len(found)}\n{result.diff}"
+                    console.print(escape(text), highlight=False, soft_wrap=True)
         os.chdir(ROOT)
     share = f", {interval(killed, count)}" if arguments.sample is not None and count else ""
     console.print(f"{killed} of {count} mutants killed{share}")
