@@ -34,6 +34,7 @@ def basins(
     """Report all periodic motions of a CASE file's or a published set's mechanism at one speed, and which start ends in which.
 
     The picture is over the position and the rate of the first free coordinate, of a five-bar the slider, at crank angle 0.
+    Computed rows are kept: a picture that was interrupted goes on.
 
     \b
     Examples:

@@ -236,7 +236,10 @@ def _with_coexistence(chart: StabilityChart, beside: Coexistence, panel: Panel, 
     }
     hover: dict[str, ArrayLike] = {"motions found": beside.count, "stable motions": beside.stable}
     hover |= {name: values.filled(np.nan) for name, values in sizes.items()}
-    bare = replace(panel, curves=[replace(curve, label="") for curve in panel.curves])
+    # over amplitudes, which are dark where they are small, black is not seen
+    light = {"0.1": "0.85"}
+    curves = [replace(curve, label="", colour=light.get(str(curve.colour), curve.colour)) for curve in panel.curves]
+    bare = replace(panel, curves=curves)
     several = HeatMap(
         panel=panel,
         x=x,
