@@ -384,11 +384,13 @@ class _Survey:
         except ContinuationError as error:
             self.problems.append(f"{what} is not followed: {error}")
             return
-        own = any(_is_of(self.grid, orbit, point) for orbit, point in zip(curve.orbits, curve.points.tolist()))
+        own = np.mean([_is_of(self.grid, orbit, at) for orbit, at in zip(curve.orbits, curve.points.tolist())])
+        # of two folds that meet in a cusp the grid's motion ends at one; next to a jump it is the other motion on a coarse grid
+        true = own > 0.0 if curve.kind is Crossing.FOLD else own > 0.5
         self.traced.append(
             Traced(
                 points=curve.points,
-                motion=TRUE_ORBIT if own else OTHER_ORBIT,
+                motion=TRUE_ORBIT if true else OTHER_ORBIT,
                 kind=curve.kind,
                 ends=curve.ends,
                 starts=np.array([orbit.start for orbit in curve.orbits]),
