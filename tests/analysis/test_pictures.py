@@ -281,6 +281,10 @@ def test_classes_have_colours_and_hatches_of_their_own() -> None:
     assert [t.get_text() for t in axis.get_legend().get_texts()] == ["a", "b", "c", "no value"]
     assert len({patch.get_hatch() for patch in axis.get_legend().get_patches()[:3]}) == 3
     assert not axis.child_axes
+    # what is hatched is where the class is
+    areas = {area.hatches[0]: area.get_paths()[0] for area in axis.collections[1:]}
+    assert [area.contains_point((2.5, 0.1)) for area in areas.values()] == [True, False]
+    assert [area.contains_point((1.3, 0.95)) for area in areas.values()] == [False, True]
     heat = html.to_plotly(Picture(parts=[chart], title=""))["data"][0]
     low, high = heat["zmin"], heat["zmax"]
     for n, colour in enumerate(("#ff0000", "#00ff00", "#0000ff")):
