@@ -35,13 +35,8 @@ GUESS_ORDERS = (4, 8, 16, 32)
 ROUNDING = 1e-3
 #: Weight of the mean square force, in its scale, beside a mean power: alone that leaves the force free where u' = 0.
 FORCE_WEIGHT = 1e-4
-#: Without output of its own: where nothing is found, an error says so.
-IPOPT = {
-    "print_time": False,
-    "error_on_fail": False,
-    "show_eval_warnings": False,
-    "ipopt": {"print_level": 0, "sb": "yes", "tol": 1e-9, "max_iter": 500},
-}
+#: Tolerance of IPOPT, and its iterations at most.
+_TOLERANCE, _ITERATIONS = 1e-9, 500
 #: Polynomials of the force that `Piecewise` can carry.
 HIGHEST_DEGREE = 4
 
@@ -470,7 +465,7 @@ class Problem:
     def solve(self, start: Mesh, n: int) -> Transcribed:
         """The solution on n intervals that IPOPT comes to from ``start``."""
         programme, lower, upper = self.transcribe(n)
-        solver = symbolic.library().nlpsol("least_effort", "ipopt", programme, IPOPT)
+        solver = symbolic.ipopt("least_effort", programme, tol=_TOLERANCE, max_iter=_ITERATIONS)
         found = solver(x0=self.pack(start, n), lbx=self.box(n, -1), ubx=self.box(n, 1), lbg=lower, ubg=upper)
         self._check(solver.stats(), found, lower, upper)
         mesh = self.unpack(np.array(found["x"]).ravel(), n)

@@ -307,24 +307,17 @@ class Program:
         """IPOPT with this many iterations at most."""
         if iterations in self._solvers:
             return self._solvers[iterations]
-        options = {
-            "ipopt": {
-                "print_level": 0,
-                "sb": "yes",
-                "max_iter": iterations,
-                "tol": 1e-9,
-                "constr_viol_tol": 1e-9,
-                "acceptable_tol": 1e-7,
-                "acceptable_iter": 8,
-                "bound_relax_factor": 0.0,
-                **FOLLOWING[self.objective],
-            },
-            "print_time": False,
-            "error_on_fail": False,
-            "show_eval_warnings": False,
-            "calc_lam_p": False,
-        }
-        self._solvers[iterations] = self._casadi.nlpsol("synthesis", "ipopt", self._nlp, options)
+        self._solvers[iterations] = symbolic.ipopt(
+            "synthesis",
+            self._nlp,
+            max_iter=iterations,
+            tol=1e-9,
+            constr_viol_tol=1e-9,
+            acceptable_tol=1e-7,
+            acceptable_iter=8,
+            bound_relax_factor=0.0,
+            **FOLLOWING[self.objective],
+        )
         return self._solvers[iterations]
 
     def nearest_pieces(self, q: FloatArray) -> list[list[int]]:
