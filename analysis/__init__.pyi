@@ -4,6 +4,7 @@ from . import motion as motion
 from . import periodic as periodic
 from . import slider_crank as slider_crank
 from . import synthesis as synthesis
+from . import tuning as tuning
 from . import youssef as youssef
 from .linear import design_lqr as design_lqr
 from .linear import design_pi as design_pi
@@ -52,3 +53,6 @@ from .slider_crank import force_turn as force_turn
 from .slider_crank import monte_carlo as monte_carlo
 from .slider_crank import tolerance_effects as tolerance_effects
 from .synthesis import synthesize as synthesize
+from .tuning import Limit as Limit
+from .tuning import Wish as Wish
+from .tuning import tune as tune

@@ -37,6 +37,7 @@ COMMANDS = {
     "slider-motion": ("slider", "Let the slider move, so that a linkage does its task better."),
     "stability": ("vibration", "Judge the periodic motion and chart where it is unstable."),
     "synthesize": ("design", "Find linkages for a path, a function or a motion."),
+    "tune": ("tuning", "Change parameters least so that a range of speeds is clear."),
 }
 
 

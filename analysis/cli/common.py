@@ -255,6 +255,7 @@ RUN = "a case of a run", "linkwork run"
 PARAMETERS = "a file of parameters alone", "linkwork info"
 SYNTHESIS = "a synthesis case", "linkwork synthesize"
 SLIDER_MOTION = "a case of a slider's motion", "linkwork slider-motion"
+TUNING = "a case of a tuning", "linkwork tune"
 #: What no command takes for a case, by the ending of the file.
 _OTHERS = {
     ".fmu": "an FMU: linkwork info {0} describes it, linkwork run CASE --fmu {0} runs it",
@@ -271,6 +272,8 @@ def kind_of(tables: Mapping[str, Any]) -> tuple[str, str] | None:
     from ..run import COMMON, acting_on
 
     names = set(tables)
+    if "tune" in names:
+        return TUNING
     if "task" in names:
         return SLIDER_MOTION if names & {"slider", "strategy"} else SYNTHESIS
     if names & {"bounds", "constraints", "search", "make", "trade_off", "linkage", "strategy", "tracking"}:

@@ -38,3 +38,4 @@ from .synthesis import plot_alternatives as plot_alternatives
 from .synthesis import plot_sheet as plot_sheet
 from .synthesis import plot_solution as plot_solution
 from .synthesis import plot_trade_off as plot_trade_off
+from .tuning import plot_tuned as plot_tuned

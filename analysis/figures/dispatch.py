@@ -39,6 +39,7 @@ MODULES = (
     "motion",
     "slider_crank",
     "slider_crank_picture",
+    "tuning",
 )
 #: Those that register the picture of a mechanism.
 MECHANISMS = ("linkage", "slider_crank_picture")

@@ -59,6 +59,7 @@ from .grids import GridInterrupted as GridInterrupted
 from .grids import grid as grid
 from .grids import grid_folder as grid_folder
 from .isolas import with_isolas as with_isolas
+from .lines import passes as passes
 from .natural import mean_effective_mass as mean_effective_mass
 from .natural import natural_frequency as natural_frequency
 from .normal_forms import FormRun as FormRun
@@ -98,7 +99,9 @@ from .stability import points_to_confirm as points_to_confirm
 from .stability import removing_damping as removing_damping
 from .stability import removing_damping_over as removing_damping_over
 from .stability import test_of as test_of
+from .starts import scale_of as scale_of
 from .sweeps import Jump as Jump
 from .sweeps import Sweep as Sweep
 from .sweeps import sweep as sweep
 from .turns import Turn as Turn
+from .variations import Variations as Variations

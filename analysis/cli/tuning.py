@@ -1,0 +1,102 @@
+"""The command that tunes parameters to a range of speeds."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import click
+
+from .common import (
+    CHECK_FAILED,
+    TUNING,
+    check_kind,
+    console,
+    folder_of,
+    handled,
+    out_option,
+    plot_option,
+    print_error,
+    print_written,
+    say,
+    show_table,
+)
+from .design import settings_of
+
+
+@click.command()
+@click.argument("case", type=click.Path(exists=True, dir_okay=False))
+@click.option(
+    "--set",
+    "settings",
+    multiple=True,
+    metavar="NAME=VALUE",
+    help="Change a value, such as slider.damping='2 N*s/m' or tune.least_margin=0.1; lists as in TOML.",
+)
+@click.option("--json", "as_json", is_flag=True, help="Print the result as JSON instead of tables.")
+@plot_option
+@out_option()
+@handled
+def tune(case: str, settings: Sequence[str], as_json: bool, plot: bool, out: str) -> None:
+    """Change parameters of a CASE file (TOML or JSON) least, so that a range of speeds is as its table [tune] wishes.
+
+    No resonance, jump or unstable motion in the range, outputs below their limits, or the least damping with which this is
+    so. What is found is verified: the response is followed anew, a row of a chart computed, and all motions are sought.
+    Writes a case with the changed parameters, the result as JSON, and a picture. A wish that cannot be met is answered with
+    the nearest to it, and exit code 4.
+
+    \b
+    Examples:
+      linkwork tune examples/tuning.toml
+      linkwork tune examples/tuning.toml --set tune.speeds='["1150 rpm", "1190 rpm"]'
+    """
+    import json
+
+    from .. import figures
+    from ..files import save_figure, write_tables
+    from ..tuning import load_tuning_case
+    from ..tuning import tune as find
+
+    overrides = settings_of(settings)
+    check_kind(case, TUNING, settings=overrides)
+    chosen = load_tuning_case(case, overrides)
+    tuned = find(chosen.wish, progress=console.is_terminal)
+    tables = tuned.tables()
+    if as_json:
+        click.echo(json.dumps(tables, indent=2))
+    else:
+        _print(chosen.title, tuned)
+    stem = folder_of(out) / f"{Path(case).stem}-tuned"
+    written = [
+        write_tables(f"{stem}.toml", chosen.tuned_tables(tuned)),
+        write_tables(f"{stem}.json", tables),
+    ]
+    if plot:
+        written.append(save_figure(figures.plot(tuned, title=chosen.title), f"{stem}.png"))
+    if not as_json:
+        print_written(written)
+    for sentence in tuned.missed:
+        print_error(f"note: {sentence}")
+    if not tuned.met:
+        sys.exit(CHECK_FAILED)
+
+
+def _print(title: str, tuned: Any) -> None:
+    from ..mechanisms import mechanism_of
+    from ..periodic import unit_of
+
+    wish = tuned.wish
+    columns = (a.tolist() for a in (wish.present, tuned.values, tuned.x))
+    rows = [
+        (name, unit_of(mechanism_of(wish.parameters), name), f"{before:.7g}", f"{after:.7g}", f"{x:+.4g}")
+        for name, before, after, x in zip(wish.names, *columns)
+    ]
+    headings = ("parameter", "unit", "before", "after", "change in tolerances")
+    show_table(f"{title}: the least change", headings, rows, words=headings[:2])
+    headings = ("requirement", "wished", "before", "after", "")
+    rows = [(r.name, r.wished, r.before.text, r.after.text, "met" if r.met else "not met") for r in tuned.requirements]
+    styles = [None if r.met else "yellow" for r in tuned.requirements]
+    show_table("what was wished", headings, rows, words=headings, styles=styles)
+    say(f"verified: {tuned.verification}" if tuned.met else f"computed anew: {tuned.verification}")

@@ -1,0 +1,13 @@
+from .cases import TuneTable as TuneTable
+from .cases import TuningCase as TuningCase
+from .cases import load_tuning_case as load_tuning_case
+from .cases import tuning_case_from as tuning_case_from
+from .requirements import Reading as Reading
+from .requirements import Requirement as Requirement
+from .solve import tune as tune
+from .survey import Survey as Survey
+from .tuned import Tuned as Tuned
+from .tuned import Verification as Verification
+from .wish import Change as Change
+from .wish import Limit as Limit
+from .wish import Wish as Wish

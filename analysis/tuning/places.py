@@ -1,0 +1,292 @@
+"""Places on the response that go with the parameters: motions at a speed or across the branch, and where stability is lost.
+
+A place is a periodic motion, y at crank angle 0 and the speed, that one further equation picks from the branch. As the
+parameters change it is found again from where it was, and so keeps to its branch.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property, partial
+from itertools import combinations
+from typing import NamedTuple, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from linkwork.errors import LinkworkError
+
+from ..periodic import Crossing, Family, PeriodicOrbit, Variations, motion_gradient, scale_of, speed_name
+from .wish import Wish
+
+FloatArray = NDArray[np.float64]
+
+#: Newton's method: iterations at most, and the correction relative to the scale at which a place is found.
+ITERATIONS, FOUND = 12, 1e-9
+#: Change of a parameter, relative to it and to its tolerance, that is made in one step; and the correction that a step may
+#: take, relative to the scale.
+STRIDE, REACH = 0.05, 0.3
+#: Halvings of a step, over all steps, after which a place counts as lost.
+_HALVINGS = 3
+
+
+class LostError(LinkworkError):
+    """A place was not found again."""
+
+
+class Expansion(NamedTuple):
+    """y(T) - y(0) at a place and the monodromy matrix, with their derivatives by y, the speed and the k changes.
+
+    Attributes
+    ----------
+    gaps : ndarray, shape (n, n + 1 + k)
+        Derivatives of y(T) - y(0).
+    monodromy : ndarray, shape (n, n)
+    monodromies : ndarray, shape (n + 1 + k, n, n)
+        Its derivatives.
+    variations : Variations
+        The variational equations they come from.
+    ways : ndarray, shape (panels, nodes, n, n + 1 + k)
+        Derivatives of the motion over the turn.
+    constants : ndarray, shape (c, n + 1 + k)
+        Derivatives of the numbers of the drive and the constants of the equations.
+    """
+
+    gaps: FloatArray
+    monodromy: FloatArray
+    monodromies: FloatArray
+    variations: Variations
+    ways: FloatArray
+    constants: FloatArray
+
+
+def family_at(wish: Wish, x: FloatArray) -> Family:
+    """The periodic motions over the speed, with changes in their tolerances."""
+    parameters, drive = wish.operation(x, wish.speeds[0])
+    return Family(parameters=parameters, drive=drive, vary=str(speed_name(wish.mechanism)))
+
+
+def motion(wish: Wish, x: FloatArray, y: FloatArray, speed: float, turns: int) -> PeriodicOrbit:
+    """The motion that begins at y, as far as it closes."""
+    orbit: PeriodicOrbit = family_at(wish, x).evaluate(turns, *wish.speeds)(y, speed).data
+    return orbit
+
+
+def expansion(wish: Wish, x: FloatArray, y: FloatArray, speed: float, turns: int) -> Expansion:
+    """The derivatives at a place, by the variational equations to second order; y need not be on a motion that closes."""
+    along = motion_gradient(motion(wish, x, y, speed, turns), (str(speed_name(wish.mechanism)), *wish.names))
+    v, n = along.variations, len(y)
+    unit = np.append(1.0, wish.tolerance)
+    forcing, constants = v.forcing * unit, along.along * unit
+    gaps = np.column_stack([v.monodromy - np.eye(n), v.after(forcing)])
+    ways = np.concatenate([v.fundamental, v.from_start(np.zeros((n, len(unit))), forcing)], axis=-1)
+    constants = np.column_stack([np.zeros((len(constants), n)), constants])
+    monodromies = np.empty((n + len(unit), n, n))
+    for column in range(n):
+        by_y, by_constant = v.second(v.fundamental[..., column])
+        monodromies[:, :, column] = v.after(by_y @ ways + by_constant @ constants).T
+    return Expansion(gaps, v.monodromy, monodromies, v, ways, constants)
+
+
+def margin_matrix(monodromy: FloatArray, kind: Crossing, radius: float = 1.0) -> FloatArray:
+    """The matrix A of which det(I - A) is zero where a multiplier crosses a circle in this way, and positive within."""
+    if kind is not Crossing.TORUS:
+        return monodromy / radius if kind is Crossing.FOLD else -monodromy / radius
+    # the minors of order 2, whose eigenvalues are the products of two multipliers
+    pairs = list(combinations(range(len(monodromy)), 2))
+    minors = [
+        [monodromy[a, c] * monodromy[b, d] - monodromy[a, d] * monodromy[b, c] for c, d in pairs] for a, b in pairs
+    ]
+    return np.array(minors) / radius**2
+
+
+def margin_of(monodromy: FloatArray, kind: Crossing, radius: float = 1.0) -> float:
+    """det(I - A) of `margin_matrix`."""
+    matrix = margin_matrix(monodromy, kind, radius)
+    return float(np.linalg.det(np.eye(len(matrix)) - matrix))
+
+
+def margin_slopes(found: Expansion, kind: Crossing, radius: float = 1.0) -> FloatArray:
+    """Derivatives of `margin_of` by y, the speed and the parameters, exact for those of the matrix: a step along i."""
+    step = 1e-30
+    matrices = [margin_matrix(found.monodromy + 1j * step * m, kind, radius) for m in found.monodromies]
+    return np.array([np.linalg.det(np.eye(len(m)) - m).imag / step for m in matrices])
+
+
+class Row(Protocol):
+    """The equation that picks a place from its branch."""
+
+    def value(self, y: FloatArray, speed: float, monodromy: FloatArray) -> float:
+        """What is zero at the place."""
+
+    def slopes(self, found: Expansion) -> FloatArray:
+        """Its derivatives by y, the speed and the changes."""
+
+    def across(self, found: Callable[[], Expansion]) -> FloatArray:
+        """Those by y and the speed alone."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Across:
+    """In a plane across the branch: normal . (y, speed) = offset; at a fixed speed where the normal is along it."""
+
+    normal: FloatArray
+    offset: float
+
+    @classmethod
+    def at_speed(cls, size: int, speed: float) -> Across:
+        """At a speed, of y with so many components."""
+        return cls(np.append(np.zeros(size), 1.0 / speed), 1.0)
+
+    def value(self, y: FloatArray, speed: float, monodromy: FloatArray) -> float:
+        return float(self.normal[:-1] @ y + self.normal[-1] * speed - self.offset)
+
+    def slopes(self, found: Expansion) -> FloatArray:
+        return np.append(self.normal, np.zeros(len(found.monodromies) - len(self.normal)))
+
+    def across(self, found: Callable[[], Expansion]) -> FloatArray:
+        return self.normal
+
+
+@dataclass(frozen=True, slots=True)
+class Lost:
+    """Where a multiplier crosses the unit circle."""
+
+    kind: Crossing
+
+    def value(self, y: FloatArray, speed: float, monodromy: FloatArray) -> float:
+        return margin_of(monodromy, self.kind)
+
+    def slopes(self, found: Expansion) -> FloatArray:
+        return margin_slopes(found, self.kind)
+
+    def across(self, found: Callable[[], Expansion]) -> FloatArray:
+        there = found()
+        return self.slopes(there)[: len(there.monodromy) + 1]
+
+
+class Spot(NamedTuple):
+    """A place found: the changes, y and the speed."""
+
+    x: FloatArray
+    y: FloatArray
+    speed: float
+
+
+class Found:
+    """A place at some parameters, and how it moves with them."""
+
+    def __init__(self, wish: Wish, row: Row, turns: int, spot: Spot) -> None:
+        self.spot = spot
+        self._wish, self._row, self._turns = wish, row, turns
+
+    @cached_property
+    def expansion(self) -> Expansion:
+        """The derivatives there."""
+        return expansion(self._wish, *self.spot, self._turns)
+
+    @cached_property
+    def orbit(self) -> PeriodicOrbit:
+        """The motion."""
+        return motion(self._wish, *self.spot, self._turns)
+
+    @cached_property
+    def slopes(self) -> FloatArray:
+        """Derivatives of y and the speed by the changes, shape (n + 1, k)."""
+        gaps, n = self.expansion.gaps, len(self.spot.y) + 1
+        rows = np.vstack([gaps, self._row.slopes(self.expansion)])
+        return -np.linalg.solve(rows[:, :n], rows[:, n:])
+
+    def along(self, slopes: FloatArray) -> FloatArray:
+        """Derivatives by the changes of what has these by y, the speed and the changes, shape (..., n + 1 + k)."""
+        n = len(self.spot.y) + 1
+        found: FloatArray = slopes[..., n:] + slopes[..., :n] @ self.slopes
+        return found
+
+    def output_slopes(self, number: int, angle: float) -> FloatArray:
+        """Derivatives by the changes of an output, by its number, at a crank angle; shape (k,)."""
+        found = self.expansion
+        v = found.variations
+        angle = float(angle % (self._turns * v.flow.period))
+        panel = int(np.searchsorted(np.cumsum(v.h), angle).clip(0, len(v.h) - 1))
+        by_y, by_constant = v.output_derivatives(panel, number)
+        nodes = self.along(np.einsum("sn,snm->sm", by_y, found.ways[panel]) + by_constant @ found.constants)
+        # the polynomial through the panel's nodes, by Lagrange
+        away = v.angles[panel] - v.angles[panel][:, None]
+        np.fill_diagonal(away, 1.0)
+        ahead = np.tile(v.angles[panel] - angle, (len(away), 1))
+        np.fill_diagonal(ahead, 1.0)
+        weights: FloatArray = np.prod(ahead / away, axis=1)
+        return weights @ nodes
+
+
+class Place:
+    """A place that is found again wherever the parameters go.
+
+    Parameters
+    ----------
+    wish : Wish
+    row : Row
+    turns : int
+        Of the motion's period.
+    spot : Spot
+        Where it is known.
+    """
+
+    def __init__(self, wish: Wish, row: Row, turns: int, spot: Spot) -> None:
+        self.wish, self.row, self.turns = wish, row, turns
+        self._last = spot
+        self._scale = np.append(scale_of(*wish.operation(spot.x, spot.speed), spot.y), spot.speed)
+
+    def at(self, x: FloatArray) -> Found:
+        """The place with changes in their tolerances.
+
+        Raises
+        ------
+        LostError
+            If it is not found again.
+        """
+        last = self._last
+        moved = np.abs(x - last.x) * self.wish.tolerance
+        size = np.maximum(np.abs(self.wish.present), self.wish.tolerance)
+        steps = max(1, int(np.ceil(float((moved / size).max()) / STRIDE)))
+        done, step, way, halvings = 0.0, 1.0 / steps, x - last.x, 0
+        spot, slope = last, None
+        while done < 1.0:
+            share = min(done + step, 1.0)
+            target = x if share == 1.0 else last.x + share * way
+            try:
+                there = self._newton(target, spot, slope, share - done)
+            except LinkworkError as error:
+                step, halvings = 0.5 * step, halvings + 1
+                if halvings > _HALVINGS:
+                    raise LostError(f"a motion near {spot.speed:.6g} rad/s is not found again: {error}") from error
+                continue
+            slope = np.append(there.y - spot.y, there.speed - spot.speed) / (share - done)
+            spot, done = there, share
+        self._last = spot
+        return Found(self.wish, self.row, self.turns, spot)
+
+    def _newton(self, x: FloatArray, begin: Spot, slope: FloatArray | None, ahead: float) -> Spot:
+        z = np.append(begin.y, begin.speed)
+        first = z = z if slope is None else z + ahead * slope
+        n = len(begin.y)
+        evaluate = family_at(self.wish, x).evaluate(self.turns, *self.wish.speeds)
+        size = np.inf
+        for count in range(ITERATIONS):
+            here = evaluate(z[:n], float(z[n]))
+            top = np.column_stack([here.jacobian, here.slope])
+            below = self.row.across(partial(expansion, self.wish, x, z[:n], float(z[n]), self.turns))
+            value = self.row.value(z[:n], float(z[n]), here.jacobian + np.eye(n))
+            try:
+                step = np.linalg.solve(np.vstack([top, below]), np.append(here.residual, value))
+            except np.linalg.LinAlgError:
+                raise LostError("its equations are singular there") from None
+            z, before, size = z - step, size, float(np.abs(step / self._scale).max())
+            # the second correction may still be the greater one
+            if not np.abs((z - first) / self._scale).max() < REACH or (count > 2 and size > 0.5 * before > FOUND):
+                break
+            if size < FOUND:
+                return Spot(x, z[:n], float(z[n]))
+        raise LostError(f"Newton's method does not settle: last correction {size:.1e}")

@@ -1,0 +1,262 @@
+"""`tune`: the least change of given parameters after which a range of speeds is as it was wished."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from itertools import product
+from math import isfinite
+
+import numpy as np
+
+from linkwork.errors import LinkworkError
+
+from ..periodic import Crossing, PeriodicOrbit, SpecialPoint
+from ..run import shown
+from .conditions import Below, Beyond, Condition, Inside, PeakBeyond
+from .places import Across, FloatArray, Lost, LostError, Place, Spot
+from .program import Answer, nearest, objective
+from .requirements import JUMP, RESONANCE, STABLE, readings, requirements
+from .survey import MARGINAL, SOUGHT, Region, Survey, charted, others, survey
+from .tuned import Tuned, Verification
+from .wish import Wish
+
+#: Rounds of the exchange at most, and ways that are tried.
+_ROUNDS, _WAYS = 12, 8
+#: Value of a condition that is far from being active.
+_FAR = 0.05
+#: Ways round a region of lost stability, or a resonance: it goes below the range, above it, or vanishes.
+_BELOW, _ABOVE, _REMOVED = -1, 1, 0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Way:
+    """The way round what lies at a speed: a region of a kind, or a resonance (kind None)."""
+
+    kind: Crossing | None
+    speed: float
+    side: int
+
+
+@dataclass(slots=True, eq=False)
+class _Search:
+    """What is known while a wish is tuned."""
+
+    wish: Wish
+    rounds: int = 0
+    #: Motions on branches that the response does not meet.
+    more: list[PeriodicOrbit] = field(default_factory=list)
+
+    def look(self, x: FloatArray) -> Survey:
+        """Follow the response with some changes."""
+        own = []
+        for orbit in self.more:
+            speed = float(orbit.drive.speed or 0.0)
+            place = Place(self.wish, Across.at_speed(len(orbit.start), speed), 1, Spot(x, orbit.start, speed))
+            try:
+                own.append(place.at(x).orbit)
+            except LostError:
+                continue  # its branch is gone there
+        return survey(self.wish, x, own)
+
+
+def tune(wish: Wish, *, progress: bool = False) -> Tuned:
+    """Change parameters least so that a range of speeds is as it is wished.
+
+    What lies in the range is held out of it by conditions at places of the response, whose derivatives are known; IPOPT finds
+    the least change that keeps them. The response is then followed anew, and what still lies in the range becomes a further
+    condition, until there is nothing. Regions of lost stability and resonances are led below the range, above it, or away, and
+    the least change of all ways is taken.
+
+    Parameters
+    ----------
+    wish : Wish
+    progress : bool
+        Show a progress bar.
+
+    Returns
+    -------
+    Tuned
+        Verified; where the wish cannot be met, the nearest to it: the least sum of what is missing.
+
+    Raises
+    ------
+    OrbitError
+        If there is no periodic motion to begin with at either end of the range.
+
+    Examples
+    --------
+    >>> from analysis import Limit, Wish, tune
+    >>> pin = Limit(output="pin.C", below="9 N")
+    >>> change = {"slider.stiffness": "5 %"}
+    >>> wish = Wish(parameters="rig-2-spring-c", speeds=("500 rpm", "510 rpm"), change=change, limits=[pin])
+    >>> tuned = tune(wish)
+    >>> tuned.met, f"{tuned.values[0]:.1f} N/m"
+    (True, '4153.3 N/m')
+    """
+    search = _Search(wish)
+    zero = np.zeros(len(wish.names))
+    start = np.clip(zero, wish.scaled(wish.low), wish.scaled(wish.high))
+    before = search.look(zero)
+    first = before if (start == zero).all() else search.look(start)
+    search.more += others(first)[0]
+    if search.more:
+        first = search.look(start)
+        before = first if (start == zero).all() else search.look(zero)
+    best: tuple[tuple[bool, float, float], Survey, tuple[float, ...]] | None = None
+    ways = _ways(first)
+    with shown(progress, len(ways), "tune") as show:
+        for number, way in enumerate(ways):
+            least = best[0][2] if best is not None and not best[0][0] else np.inf
+            found = _exchange(search, first, list(way), least)
+            show(number + 1)
+            if found is None:
+                continue
+            last, several = found
+            excess = sum(reading.excess for reading in readings(last, several).values())
+            rank = excess > 0.0, excess, float(objective(wish, last.x))
+            if best is None or rank < best[0]:
+                best = rank, last, several
+    if best is None:
+        raise LinkworkError("the motions of the range could not be followed while the parameters were changed")
+    return _tuned(search, before, best[1], best[2])
+
+
+def _tuned(search: _Search, before: Survey, after: Survey, several: tuple[float, ...]) -> Tuned:
+    wish = search.wish
+    largest, speed, count = charted(wish, after.x)
+    problems = list(after.response.problems)
+    if wish.judged and not largest <= wish.radius + MARGINAL and all(r.excess == 0.0 for r in readings(after).values()):
+        problems.append(f"a chart has a multiplier of {largest:.6g}, which the response does not have")
+    return Tuned(
+        wish=wish,
+        x=after.x,
+        requirements=requirements(before, after, several),
+        before=before,
+        after=after,
+        verification=Verification(
+            orbits=sum(len(branch) for branch in after.response.branches),
+            charted=count,
+            largest=largest,
+            speed=speed,
+            sought=SOUGHT,
+            several=several,
+            problems=tuple(problems),
+        ),
+        rounds=search.rounds,
+    )
+
+
+# Ways
+
+
+def _end(region: Region, side: int) -> SpecialPoint | None:
+    """The special point at the upper end of a region (side -1, to go below the range) or at its lower end."""
+    ends = [s for s in (region.first, region.last) if s is not None]
+    return next((s for s in ends if s.parameter == (region.high if side == _BELOW else region.low)), None)
+
+
+def _ways(found: Survey) -> list[tuple[_Way, ...]]:
+    """Combinations of ways round all that lies in the range, the nearest first."""
+    wish = found.wish
+    low, high = wish.speeds
+    choices: list[list[tuple[float, _Way]]] = []
+    for region in _unwanted(found):
+        middle, sides = 0.5 * (region.low + region.high), [(0.5 * (region.high - region.low), _REMOVED)]
+        sides += [
+            (d, s) for d, s in ((region.high - low, _BELOW), (high - region.low, _ABOVE)) if _end(region, s) is not None
+        ]
+        choices.append([(d, _Way(kind=region.kind, speed=middle, side=s)) for d, s in sides])
+    for spot in found.peaks:
+        sides = [(spot.speed - low, _BELOW), (high - spot.speed, _ABOVE)]
+        choices.append([(d, _Way(kind=None, speed=spot.speed, side=s)) for d, s in sides])
+    combined = sorted(product(*choices), key=lambda way: sum(d for d, _ in way))
+    return [tuple(w for _, w in way) for way in combined[:_WAYS]]
+
+
+def _unwanted(found: Survey) -> list[Region]:
+    """The regions that the wish does not want in the range."""
+    wish = found.wish
+    return [r for r in found.regions if wish.judged or (wish.no_jump and r.kind is Crossing.FOLD)]
+
+
+def _side(ways: Sequence[_Way], kind: Crossing | None, speed: float) -> int | None:
+    same = [way for way in ways if way.kind is kind]
+    return min(same, key=lambda way: abs(way.speed - speed)).side if same else None
+
+
+# Exchange
+
+
+def _exchange(
+    search: _Search, first: Survey, ways: list[_Way], least: float
+) -> tuple[Survey, tuple[float, ...]] | None:
+    """The least change by these ways, or the nearest that can be had, and speeds with two stable motions.
+
+    None where a place is lost, or another way has found a change as small.
+    """
+    wish, found = search.wish, first
+    conditions: list[Condition] = []
+    several: tuple[float, ...] = ()
+    answer = Answer(x=first.x, objective=0.0, violations={})
+    for number in range(_ROUNDS):
+        new = [c for c in _conditions(found, ways) if _counts(c, answer)]
+        if not new:
+            own, several = others(found)
+            if not own and (number > 0 or not wish.least):
+                return found, several
+            search.more += own
+        # what is far from being active is found again where it matters
+        conditions = [c for c in conditions if _value(c, answer) < _FAR] + new
+        try:
+            answer = nearest(wish, conditions, answer.x)
+            search.rounds += 1
+            if not isfinite(answer.total) or (answer.met and answer.objective >= least):
+                return None
+            found = search.look(answer.x)
+        except LinkworkError:
+            return None
+    return found, several
+
+
+def _counts(condition: Condition, answer: Answer) -> bool:
+    """Whether a condition is violated by more than its requirement is already."""
+    return _value(condition, answer) < -answer.violations.get(condition.group, 0.0) - condition.slack
+
+
+def _value(condition: Condition, answer: Answer) -> float:
+    """A condition's value, infinite where its place is gone."""
+    try:
+        return condition.value(answer.x)
+    except LinkworkError:
+        return np.inf
+
+
+def _conditions(found: Survey, ways: list[_Way]) -> Iterator[Condition]:
+    """The conditions that what lies in the range violates; ways round what is new are added."""
+    wish, x = found.wish, found.x
+    low, high = wish.speeds
+    gone: list[Region] = []
+    for region in _unwanted(found):
+        side = _side(ways, region.kind, 0.5 * (region.low + region.high))
+        if side is None:
+            nearer = _BELOW if region.high - low < high - region.low else _ABOVE
+            side = next((s for s in (nearer, -nearer) if _end(region, s) is not None), _REMOVED)
+            ways.append(_Way(kind=region.kind, speed=0.5 * (region.low + region.high), side=side))
+        end = _end(region, side) if side else None
+        group = JUMP if wish.no_jump and region.kind is Crossing.FOLD else STABLE
+        if end is not None:
+            gone.append(region)
+            place = Place(wish, Lost(region.kind), 1, Spot(x, end.orbit.start, end.parameter))
+            yield Beyond(group, place, high if side == _ABOVE else low, side)
+        elif region.kind is Crossing.FOLD:
+            yield Inside(group, Place(wish, region.across, 1, region.worst), region.kind, 1.0)
+    for lost in found.least:
+        if not any(r.kind is lost.kind and r.low <= lost.spot.speed <= r.high for r in gone):
+            place = Place(wish, Across.at_speed(len(lost.spot.y), lost.spot.speed), 1, lost.spot)
+            yield Inside(STABLE, place, lost.kind, wish.radius)
+    for spot in found.peaks:
+        side = _side(ways, None, spot.speed) or (_BELOW if spot.speed - low < high - spot.speed else _ABOVE)
+        yield PeakBeyond(RESONANCE, wish, spot, high if side == _ABOVE else low, side)
+    for top in found.greatest:
+        yield Below(str(top.limit), wish, top.spot, top.limit, top.angles)

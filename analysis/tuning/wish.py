@@ -1,0 +1,287 @@
+"""What is wished of a mechanism over a range of speeds, and what may be changed for it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from math import isfinite
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from linkwork.errors import InputError, ParameterError
+from linkwork.mechanism import Mechanism, PublishedSet
+from linkwork.parameters import field_name
+
+from ..files import Quantity, Range, check_names, unknown_name
+from ..mechanisms import Parameters, mechanism_of
+from ..periodic import Drive, Operation, drive_of, speed_name
+from ..run import published_set
+from ..units import Amount, quantity, si
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Change:
+    """A parameter that may be changed.
+
+    Attributes
+    ----------
+    name : str
+        In the FMI contract, such as ``slider.stiffness``.
+    low, high : float
+        Between which it must lie (SI).
+    tolerance : float
+        In which its change is measured (SI).
+    """
+
+    name: str
+    low: float
+    high: float
+    tolerance: float
+
+    def __post_init__(self) -> None:
+        if not (isfinite(self.low) and isfinite(self.high) and self.low < self.high):
+            raise ParameterError(f"change.{self.name}", [self.low, self.high], "be a range: [least, greatest]")
+        if not (isfinite(self.tolerance) and self.tolerance > 0.0):
+            raise ParameterError(f"change.{self.name}", self.tolerance, "have a tolerance above zero")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Limit:
+    """A bound of what an output reaches over a turn, either way.
+
+    Attributes
+    ----------
+    output : str
+        An output of the plant, such as ``drive.applied_torque``; a joint, such as ``pin.C``, for the magnitude of the force in
+        it; or ``amplitude of`` an output, for half its range.
+    below : float
+        SI.
+    """
+
+    output: str
+    below: Amount
+
+    def __str__(self) -> str:
+        return self.output if self.output.startswith(AMPLITUDE) else f"greatest {self.output}"
+
+
+#: How a limit of half the range of an output begins.
+AMPLITUDE = "amplitude of "
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Wish:
+    """What is wished of a mechanism over a range of speeds.
+
+    Attributes
+    ----------
+    parameters : parameters of a mechanism
+        As they are now; or a published set or its name.
+    speeds : (float, float)
+        rad/s, or texts such as "900 rpm".
+    change : mapping or sequence of Change
+        What may be changed, by FMI name or by field. To each the tolerance, such as "5 %" or "10 N/m": how far it may be
+        changed either way, in which its change is measured too; or (least, greatest), half of which it is measured in; or
+        both, as a mapping with ``tolerance`` and ``between``.
+    drive : Drive, optional
+        What acts beside the speed.
+    no_resonance : bool
+        No maximum of the amplitude over the speed lies in the range.
+    no_jump : bool
+        No fold lies in the range, and no speed of it has a second stable motion.
+    no_unstable : bool
+        No unstable motion lies in the range.
+    least_margin : float
+        The largest Floquet multiplier is at most one less this.
+    limits : sequence of Limit
+    least : str
+        The parameter that is made least; without it the changes are: the sum of their squares, each in its tolerance.
+
+    Raises
+    ------
+    InputError, ParameterError
+        If what is wished is not usable.
+    """
+
+    parameters: Parameters
+    speeds: tuple[Amount, Amount]
+    change: Any
+    drive: Drive | None = None
+    no_resonance: bool = False
+    no_jump: bool = False
+    no_unstable: bool = False
+    least_margin: float = 0.0
+    limits: Sequence[Limit] = ()
+    least: str = ""
+
+    def __post_init__(self) -> None:
+        def put(name: str, value: Any) -> None:
+            object.__setattr__(self, name, value)
+
+        given: Any = self.parameters
+        if isinstance(given, (str, PublishedSet)):
+            put("parameters", published_set(given).parameters)
+        mechanism = self.mechanism
+        if speed_name(mechanism) is None:
+            raise InputError(f"the crank of a {mechanism.name} has no prescribed speed: there is no range of speeds")
+        low, high = (si(value, "rad/s", "speeds") for value in self.speeds)
+        if not (isfinite(low) and isfinite(high) and 0.0 < low < high):
+            raise ParameterError("speeds", list(self.speeds), "be a range above zero: [least, greatest]")
+        put("speeds", (float(low), float(high)))
+        drive = self.drive or drive_of(given, speed=low)
+        put("drive", replace(drive, speed=low, torque=0.0, motor=None))
+        put("change", _changes(self.parameters, self.change))
+        put("limits", tuple(replace(x, below=_bound(mechanism, x)) for x in self.limits))
+        if not 0.0 <= self.least_margin < 1.0:
+            raise ParameterError("least_margin", self.least_margin, "be at least zero and less than one")
+        if not (self.no_resonance or self.no_jump or self.judged or self.limits):
+            raise InputError(
+                "nothing is wished: say no_resonance, no_jump, no_unstable or least_margin, or give a limit of an output"
+            )
+        if self.least:
+            put("least", _parameter(mechanism, self.least))
+            if self.least not in self.names:
+                raise InputError(f"{self.least} is to be least, but may not be changed: name it in change")
+        for x in (self.scaled(self.low), self.scaled(self.high)):
+            self.at(x)  # checks the bounds
+
+    @property
+    def mechanism(self) -> Mechanism:
+        """The mechanism whose parameters they are."""
+        return mechanism_of(self.parameters)
+
+    @property
+    def judged(self) -> bool:
+        """Whether the motions' stability is part of the wish."""
+        return self.no_unstable or self.least_margin > 0.0
+
+    @property
+    def radius(self) -> float:
+        """What the largest multiplier may be."""
+        return 1.0 - self.least_margin
+
+    @property
+    def middle(self) -> float:
+        """The middle of the range (rad/s), relative to which it is measured how far something reaches into it."""
+        return 0.5 * float(self.speeds[0] + self.speeds[1])
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """What may be changed."""
+        return tuple(change.name for change in self.change)
+
+    @property
+    def present(self) -> FloatArray:
+        """Its values now, shape (k,)."""
+        return np.array([float(getattr(self.parameters, field_name(name))) for name in self.names])
+
+    @property
+    def low(self) -> FloatArray:
+        """Least values, shape (k,)."""
+        return np.array([change.low for change in self.change])
+
+    @property
+    def high(self) -> FloatArray:
+        """Greatest values, shape (k,)."""
+        return np.array([change.high for change in self.change])
+
+    @property
+    def tolerance(self) -> FloatArray:
+        """What the changes are measured in, shape (k,)."""
+        return np.array([change.tolerance for change in self.change])
+
+    def scaled(self, values: FloatArray) -> FloatArray:
+        """Values as changes in their tolerances."""
+        return (values - self.present) / self.tolerance
+
+    def at(self, x: FloatArray) -> Parameters:
+        """The parameters with changes in their tolerances."""
+        values = np.clip(self.present + x * self.tolerance, self.low, self.high).tolist()
+        made: Parameters = replace(self.parameters, **{field_name(n): v for n, v in zip(self.names, values)})
+        return made
+
+    def operation(self, x: FloatArray, speed: float) -> Operation:
+        """Mechanism and drive with changes in their tolerances, at a speed."""
+        assert self.drive is not None
+        return self.at(x), replace(self.drive, speed=speed)
+
+
+def _parameter(mechanism: Mechanism, name: str) -> str:
+    """The FMI name of a parameter that is a number, by itself or by its field."""
+    known = {field_name(n): n for n, v in mechanism.mechanism_variables.items() if v.kind == "Real"}
+    found = known.get(field_name(name))
+    if found is None:
+        raise unknown_name(name, known.values())
+    return found
+
+
+def _changes(parameters: Parameters, given: Any) -> tuple[Change, ...]:
+    if not isinstance(given, Mapping):
+        changes = tuple(given)
+    else:
+        changes = tuple(_change(parameters, name, value) for name, value in _named(given, parameters).items())
+    if not changes:
+        raise InputError("nothing may be changed: name at least one parameter in change")
+    return changes
+
+
+def _named(given: Mapping[str, Any], parameters: Parameters, prefix: str = "") -> dict[str, Any]:
+    """What is said of each parameter, by FMI name, from nested tables or dotted names."""
+    groups = {name.rpartition(".")[0] for name in mechanism_of(parameters).mechanism_variables}
+    found: dict[str, Any] = {}
+    for name, value in given.items():
+        if prefix + name in groups and isinstance(value, Mapping):
+            found |= _named(value, parameters, f"{prefix}{name}.")
+        else:
+            found[_parameter(mechanism_of(parameters), prefix + name)] = value
+    return found
+
+
+def _change(parameters: Parameters, name: str, value: Any) -> Change:
+    variable = mechanism_of(parameters).mechanism_variables[name]
+    now, what = float(getattr(parameters, field_name(name))), f"change.{name}"
+    given: Mapping[str, Any]
+    if isinstance(value, Mapping):
+        check_names(value, what, ("tolerance", "between"))
+        given = value
+    else:
+        given = {"between": value} if isinstance(value, (list, tuple)) else {"tolerance": value}
+    tolerance = None
+    if "tolerance" in given:
+        tolerance = _tolerance(given["tolerance"], variable.unit, now, what)
+    if "between" in given:
+        low, high = Range(Quantity(variable.unit))(list(given["between"]), what)
+        return Change(name=name, low=low, high=high, tolerance=tolerance or 0.5 * (high - low))
+    if tolerance is None:
+        raise ParameterError(what, dict(given), "have a tolerance, or a range between [least, greatest]")
+    return Change(name=name, low=now - tolerance, high=now + tolerance, tolerance=tolerance)
+
+
+def _tolerance(value: Any, unit: str, now: float, name: str) -> float:
+    """A tolerance in SI: a share of the present value where it is in per cent."""
+    if isinstance(value, str) and value.rstrip().endswith("%"):
+        found = quantity(value, "1", name) * abs(now)
+        if now == 0.0:
+            raise ParameterError(name, value, f"be a quantity in {unit}: it is zero now")
+    else:
+        found = quantity(value, unit, name)
+    if not found > 0.0:
+        raise ParameterError(name, value, "be above zero")
+    return found
+
+
+def _bound(mechanism: Mechanism, limit: Limit) -> float:
+    name = limit.output.removeprefix(AMPLITUDE)
+    units = {v.name: v.unit for v in mechanism.variables if v.name in mechanism.output_names}
+    joints = {n.removesuffix(".fx"): units[n] for n in units if n.endswith(".fx")}
+    known = units if name != limit.output else joints | units
+    if name not in known:
+        raise unknown_name(name, known, f"output {name!r}")
+    value = si(limit.below, known[name], f"limit of {limit.output}")
+    if not (isinstance(value, (int, float)) and isfinite(value) and value > 0.0):
+        raise ParameterError(f"limit of {limit.output}", limit.below, "be above zero")
+    return float(value)

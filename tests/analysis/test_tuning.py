@@ -1,0 +1,290 @@
+"""Tuning: the least change after which a range of speeds is as it was wished, against independent searches for it."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from math import pi
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+from scipy.interpolate import CubicSpline
+from scipy.optimize import brentq, minimize
+
+from analysis import Limit, Wish, cli, figures, tune
+from analysis.periodic import Drive, find_orbit, frequency_response, orbit_of, orbit_test, plane, removing_damping
+from analysis.run import load_case
+from analysis.tuning import load_tuning_case
+from analysis.tuning.solve import _conditions, _ways
+from analysis.tuning.survey import survey
+from linkwork.errors import InputError, LinkworkError, ParameterError, UnknownNameError
+from linkwork.five_bar.published import SETS
+
+RPM = pi / 30.0
+EXAMPLES = Path(__file__).parents[2] / "examples"
+RIG_2 = SETS["rig-2-spring-c"].parameters
+#: With so little damping the principal parametric region is there, from 1162 to 1177 rpm.
+LIGHT = replace(RIG_2, slider_damping=0.5)
+PIN = Limit(output="pin.C", below="14 N")
+AMPLITUDE = Limit(output="amplitude of slider.position", below="1.6 cm")
+BOTH = {"slider.damping": "20 %", "slider.stiffness": "5 %"}
+
+
+def wish(**of):
+    return Wish(**{"parameters": RIG_2, "speeds": ("570 rpm", "600 rpm"), "change": BOTH} | of)
+
+
+# Derivatives
+
+
+@pytest.mark.parametrize(
+    "of",
+    [
+        {"no_resonance": True},
+        {"limits": [PIN, AMPLITUDE]},
+        {"limits": [Limit(output="drive.applied_torque", below=0.3)]},
+        {"parameters": LIGHT, "speeds": ("1150 rpm", "1185 rpm"), "least_margin": 0.01},
+        pytest.param(
+            {"parameters": "rig-1-spring-b", "speeds": ("980 rpm", "1150 rpm"), "no_jump": True}, marks=pytest.mark.slow
+        ),
+    ],
+)
+def test_derivatives_of_the_conditions_are_those_of_differences(of):
+    asked = wish(**of)
+    x, step = np.zeros(2), 2e-3
+    found = survey(asked, x)
+    conditions = {
+        (type(c).__name__, round(c.value(x), 6)): c for way in _ways(found) for c in _conditions(found, list(way))
+    }
+    assert conditions
+    for condition in conditions.values():
+        slopes = condition.slopes(x)
+        differences = [
+            (
+                8.0 * (condition.value(step * e) - condition.value(-step * e))
+                - (condition.value(2.0 * step * e) - condition.value(-2.0 * step * e))
+            )
+            / (12.0 * step)
+            for e in np.eye(2)
+        ]
+        assert slopes == pytest.approx(differences, rel=2e-4, abs=2e-5 * float(np.abs(slopes).max()))
+
+
+# Against independent searches
+
+
+def test_least_damping_is_that_which_removes_the_region():
+    """Section 5 of the thesis in one line: where the region vanishes, by a root search without any of the tuning's parts."""
+    asked = wish(
+        parameters=LIGHT,
+        speeds=("1155 rpm", "1185 rpm"),
+        change={"slider.damping": ["0.1 N*s/m", "6 N*s/m"]},
+        no_unstable=True,
+        least="slider.damping",
+    )
+    tuned = tune(asked)
+    test = orbit_test(plane(LIGHT, Drive(speed=1170 * RPM), "drive.speed", "slider.damping"), -1)
+    removed = removing_damping(test, asked.speeds, (0.5, 2.0))
+    assert tuned.met
+    assert tuned.values[0] == pytest.approx(removed.damping, rel=1e-6)
+    assert find_orbit(replace(LIGHT, slider_damping=0.99 * removed.damping), speed=removed.x).largest > 1.0
+    assert tuned.requirements[0].before.excess > 0.0
+    assert figures.plot(tuned).axes
+
+
+def test_resonance_is_led_to_the_nearer_end():
+    tuned = tune(wish(change={"slider.stiffness": "10 %"}, no_resonance=True))
+
+    def away(stiffness):
+        response = frequency_response(
+            replace(RIG_2, slider_stiffness=stiffness), 560 * RPM, 640 * RPM, doublings=0, greatest_step=5e-2
+        )
+        return response.maxima()[0].parameter - 600 * RPM
+
+    assert tuned.met
+    assert tuned.values[0] == pytest.approx(brentq(away, 4100.0, 4300.0, rtol=1e-7), rel=3e-4)
+
+
+@pytest.mark.slow
+def test_least_change_for_a_pin_force_is_that_of_slsqp():
+    asked = wish(speeds=("550 rpm", "620 rpm"), limits=[PIN])
+    speeds = np.linspace(*asked.speeds, 25)
+
+    def room(x):
+        start, force = None, []
+        for speed in speeds.tolist():
+            orbit = orbit_of(asked.at(np.asarray(x)), Drive(speed=speed), start=start)
+            start, turn = orbit.start, orbit.turn(512)
+            force.append(float(np.hypot(turn["pin.C.fx"], turn["pin.C.fy"]).max()))
+        # the top of a curve through the speeds
+        return 1.0 - float(CubicSpline(speeds, force)(np.linspace(*asked.speeds, 5000)).max()) / 14.0
+
+    tuned = tune(asked)
+    box = list(zip(asked.scaled(asked.low), asked.scaled(asked.high)))
+    found = minimize(
+        lambda x: float(x @ x),
+        tuned.x + np.array([-0.2, 0.2]),
+        bounds=box,
+        constraints={"type": "ineq", "fun": room},
+        method="SLSQP",
+        options={"eps": 1e-4, "ftol": 1e-8},
+    )
+    assert tuned.met
+    assert room(tuned.x) == pytest.approx(0.0, abs=3e-4)
+    assert float(tuned.x @ tuned.x) == pytest.approx(found.fun, rel=5e-3)
+
+
+@pytest.mark.slow
+def test_a_jump_is_led_out_of_the_range():
+    tuned = tune(load_tuning_case(EXAMPLES / "tuning-jump.toml").wish)
+    assert tuned.met
+    folds = [
+        special.parameter
+        for branch in frequency_response(tuned.parameters, "900 rpm", "1200 rpm", doublings=0).branches
+        for special in branch.special
+        if special.kind.value == "fold" and special.parameter > 950 * RPM
+    ]
+    assert folds == pytest.approx([980 * RPM], rel=1e-5)
+
+
+# What cannot be had
+
+
+def test_a_wish_that_cannot_be_met_is_answered_by_the_nearest():
+    tuned = tune(wish(change={"slider.damping": [5.5, 6.0]}, least_margin=0.3))
+    assert not tuned.met
+    assert tuned.values == pytest.approx([6.0], rel=1e-6)
+    (said,) = tuned.missed
+    assert "stable motion cannot be met: largest multiplier 0.754" in said
+    missing = max(find_orbit(tuned.parameters, speed=s).largest for s in tuned.wish.speeds) - 0.7
+    assert tuned.requirements[0].after.excess == pytest.approx(missing, rel=1e-3)
+
+
+def test_what_is_met_already_is_not_changed():
+    tuned = tune(wish(speeds=("300 rpm", "310 rpm"), no_jump=True, no_unstable=True))
+    assert tuned.met
+    assert tuned.x.tolist() == [0.0, 0.0]
+
+
+# What is wished
+
+
+@pytest.mark.parametrize(
+    ("of", "kind", "words"),
+    [
+        ({}, InputError, "nothing is wished"),
+        ({"no_jump": True, "change": {}}, InputError, "nothing may be changed"),
+        ({"no_jump": True, "change": {"slider.stifness": "5 %"}}, UnknownNameError, r"slider\.stiffness"),
+        ({"no_jump": True, "change": {"gravity": "5 %"}}, ParameterError, "it is zero now"),
+        ({"no_jump": True, "change": {"slider.stiffness": [5e3, 4e3]}}, ParameterError, "in order"),
+        ({"no_jump": True, "change": {"slider.stiffness": {"tolerance": "0 %"}}}, ParameterError, "above zero"),
+        ({"no_jump": True, "change": {"slider.damping": "150 %"}}, ParameterError, "zero or greater"),
+        ({"no_jump": True, "speeds": ("600 rpm", "570 rpm")}, ParameterError, "be a range above zero"),
+        ({"least_margin": 1.5}, ParameterError, "less than one"),
+        ({"no_jump": True, "least": "gravity"}, InputError, "may not be changed"),
+        ({"limits": [Limit(output="pin.E", below=1.0)]}, UnknownNameError, r"pin\.[A-D]"),
+        ({"limits": [Limit(output="pin.C", below="-1 N")]}, ParameterError, "above zero"),
+        ({"limits": [Limit(output="pin.C", below="1 m")]}, ParameterError, "unit of that kind"),
+    ],
+)
+def test_errors_in_words(of, kind, words):
+    with pytest.raises(kind, match=words):
+        wish(**of)
+
+
+def test_what_may_be_changed_is_measured_in_its_tolerance():
+    asked = wish(
+        no_jump=True,
+        change={
+            "slider_mass": ["0.8 kg", "0.9 kg"],
+            "slider": {"stiffness": {"tolerance": "100 N/m", "between": [3e3, 5e3]}, "damping": "10 %"},
+        },
+    )
+    assert [(c.name, c.low, c.high, c.tolerance) for c in asked.change] == [
+        ("slider.mass", 0.8, 0.9, pytest.approx(0.05)),
+        ("slider.stiffness", 3e3, 5e3, 100.0),
+        ("slider.damping", pytest.approx(4.95), pytest.approx(6.05), pytest.approx(0.55)),
+    ]
+    made = asked.at(np.array([0.0, 2.0, -1.0]))
+    assert (made.slider_stiffness, made.slider_damping) == (4200.0, pytest.approx(4.95))
+
+
+# The command
+
+CASE = """
+published = "rig-2-spring-c"
+[slider]
+damping = "5.5 N*s/m"
+[tune]
+speeds = ["590 rpm", "600 rpm"]
+least_margin = {margin}
+peak = {{ output = "pin.C", below = "100 N" }}
+change = {{ slider = {{ damping = ["5 N*s/m", "9 N*s/m"] }} }}
+objective = "{objective}"
+"""
+
+
+@pytest.fixture
+def run(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+
+    def of(*options, margin=0.25, objective="least change"):
+        Path("case.toml").write_text(CASE.format(margin=margin, objective=objective))
+        return CliRunner().invoke(cli.main, ["tune", "case.toml", *options])
+
+    return of
+
+
+def test_command_writes_the_changed_case(run):
+    result = run()
+    assert result.exit_code == 0, result.output
+    assert "slider.damping" in result.output
+    assert "verified: response followed anew" in result.output
+    made = load_case("out/case-tuned.toml")
+    assert find_orbit(made.parameters, speed="600 rpm").largest == pytest.approx(0.75, abs=1e-3)
+    assert made.parameters == replace(RIG_2, slider_damping=made.parameters.slider_damping)
+    assert json.loads(Path("out/case-tuned.json").read_text())["met"]
+    assert Path("out/case-tuned.png").exists()
+
+
+def test_command_reports_what_cannot_be_met(run):
+    result = run("--no-plot", "--json", "--set", 'tune.peak.below="10 N"', margin=0.25)
+    assert result.exit_code == cli.CHECK_FAILED, result.output
+    found = json.loads(result.stdout)
+    assert not found["met"]
+    assert found["requirements"]["stable motion"]["met"]
+    assert not found["requirements"]["greatest pin.C"]["met"]
+    assert "note: greatest pin.C cannot be met" in result.stderr
+    assert not Path("out/case-tuned.png").exists()
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (["--set", "tune.objective=most"], "least slider.damping"),
+        (["--set", "tune.speds=1"], "tune.speeds"),
+        (["--set", "drive.torque=1 N*m"], "the speed is prescribed"),
+        (["--set", 'tune.speeds=["600 rpm"]'], "a list of 2"),
+    ],
+)
+def test_command_says_what_is_wrong(run, options, words):
+    result = run(*options)
+    assert result.exit_code == cli.WRONG
+    assert words in result.stderr
+
+
+def test_a_case_of_a_tuning_is_taken_for_one(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    result = CliRunner().invoke(cli.main, ["run", str(EXAMPLES / "tuning.toml")])
+    assert result.exit_code == cli.WRONG
+    assert "linkwork tune" in result.stderr
+
+
+def test_the_example_loads():
+    case = load_tuning_case(EXAMPLES / "tuning.toml")
+    assert (case.wish.least, case.wish.names) == ("slider.damping", ("slider.damping",))
+    assert case.wish.parameters == LIGHT
+    with pytest.raises(LinkworkError, match="tune"):
+        load_tuning_case(EXAMPLES / "run-up.toml")
