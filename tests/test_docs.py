@@ -202,6 +202,13 @@ def test_the_page_of_linkages_in_closed_form_runs_and_says_what_is_so(tmp_path):
 
 
 @pytest.mark.slow
+def test_the_page_of_tuning_runs_and_says_what_is_so(tmp_path):
+    commands, checked, _ = run_page("tuning.md", tmp_path)
+    assert (commands, checked) == (3, 7)
+    assert (tmp_path / "out/tuning-jump-tuned.png").exists()
+
+
+@pytest.mark.slow
 def test_the_page_of_several_machines_runs_and_says_what_is_so(tmp_path):
     pytest.importorskip("distributed")
     commands, checked, _ = run_page("workers.md", tmp_path)
