@@ -23,9 +23,9 @@ from ..mechanisms import MECHANISMS, mechanism_of
 from ..numerics.codegen import cache_root, fingerprint
 from ..numerics.workers import check_jobs, interruptible, over_workers
 from ..run import shown
-from . import orbit_kernels, orbits
+from . import collocation, orbit_kernels, orbits
 from .floquet import TOLERANCE, Stability, multipliers
-from .flows import GAP, VARIATIONAL
+from .flows import GAP, PLAIN, VARIATIONAL
 from .orbit_kernels import Status
 from .planes import Operation, Plane
 from .starts import scale_of, starts_of
@@ -150,12 +150,12 @@ def grid(
     guess = orbits.guess_of(drive.flow(mechanism), drive, start)
     guesses = np.vstack([guess, starts_of(parameters, drive, guess, STARTS)])
     # what computes the rows, beside their arguments
-    code = fingerprint(orbit_kernels.solve_row), fingerprint(multipliers), inspect.getsource(orbits)
+    code = fingerprint(collocation.solve_row), fingerprint(multipliers), inspect.getsource(orbits)
     rows = [[operation(first, value) for first in xs.tolist()] for value in ys.tolist()]
     data, computed = kept_rows(
         partial(_compute_row, guesses, tolerance),
         rows,
-        [name_of(row, guesses, (VARIATIONAL, GAP), code, tolerance) for row in rows],
+        [name_of(row, guesses, (PLAIN, VARIATIONAL, GAP), code, tolerance) for row in rows],
         (len(xs), len(guess) + 2),
         mechanism=mechanism,
         folder=folder,

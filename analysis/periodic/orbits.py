@@ -21,7 +21,7 @@ from ..mechanisms import Parameters, mechanism_of
 from ..notebook import Shown, format_count
 from ..run import outputs_of, takes_published
 from ..units import RAD_S_PER_RPM
-from . import orbit_kernels
+from . import collocation, orbit_kernels
 from .drives import Drive
 from .floquet import TOLERANCE, StabilityVerdict, liouville, multipliers, verdict
 from .flows import DIRECTIONAL, GAP, PLAIN, STATE, VARIATIONAL, Flow
@@ -608,16 +608,17 @@ def largest_multipliers(
     given = (None,) if guesses is None else np.atleast_2d(np.asarray(guesses, dtype=float))
     starting = np.array([guess_of(flow, drives[0], guess) for guess in given])
     n, first = flow.size, starting[0]
-    section, numbers, vectors, scales = row_of(rows, drives, first, VARIATIONAL, tolerance=tolerance)
+    section, numbers, vectors, scales = row_of(rows, drives, first, PLAIN, VARIATIONAL, tolerance=tolerance)
     monodromies, starts = np.full((len(rows), n * n), np.nan), np.full((len(rows), n), np.nan)
     status = np.zeros(len(rows), dtype=np.int64)
-    orbit_kernels.solve_row(
+    collocation.solve_row(
         section,
         NO_SOURCE,
         numbers,
         vectors,
         scales,
         flow.period * turns,
+        turns,
         MOST_ITERATIONS,
         SEARCH_TOLERANCE,
         starting,

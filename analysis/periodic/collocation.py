@@ -1,0 +1,594 @@
+"""Compiled: a period by Gauss collocation, from what is known of it from a neighbour.
+
+At prescribed speed the coordinates follow from the rates, and these from their slopes over the crank angle: the unknowns are
+the slopes w at the Gauss nodes of each element of a period, and y at its beginning. All of them are corrected together
+(Newton's method), the slopes of an element being eliminated first, so that the elements are joined by small matrices, whose
+product is the monodromy matrix. With NODES nodes the ends of the elements are of order 2 NODES (E. Hairer, S. P. Norsett, G.
+Wanner, Solving Ordinary Differential Equations I, section II.7). From a good guess, which neighbours give at every node, two
+or three corrections do, each with a sixth of the right-hand sides that an integrator of order 8 needs for a period; and the
+decay of the Legendre coefficients over each element says how good it is.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import float64, int64, types
+from numpy.polynomial import legendre
+from numpy.typing import NDArray
+
+from linkwork.limits import LIMIT_SINE
+
+from ..numerics.codegen import MATRIX, evaluate, inner, kernel, part
+from ..run.sources import SOURCE
+from .flows import DIRECTIONAL, GAP, PLAIN, VARIATIONAL
+from .orbit_kernels import (
+    DIVERGED,
+    DONE,
+    LIMIT,
+    NO_STEP,
+    SECTION,
+    advance,
+    deflated,
+    make_room,
+    newton,
+    numbered,
+)
+
+#: Nodes of an element.
+NODES = 12
+_ROOTS, _WEIGHTS = legendre.leggauss(NODES)
+#: Places and weights on an element of length 1, integrals of the Lagrange polynomials up to each place, the same twice.
+C, B = 0.5 * (_ROOTS + 1.0), 0.5 * _WEIGHTS
+_VALUES = legendre.legvander(_ROOTS, NODES)
+_TO_LEGENDRE = (2.0 * np.arange(NODES)[:, None] + 1.0) * (_VALUES[:, :NODES] * B[:, None]).T
+_INTEGRALS = 0.5 * np.array(
+    [legendre.legval(_ROOTS, legendre.legint(np.eye(NODES)[k], lbnd=-1.0)) for k in range(NODES)]
+)
+A = np.ascontiguousarray(_INTEGRALS.T @ _TO_LEGENDRE)
+AA = np.ascontiguousarray(A @ A)
+BA = B @ A
+#: The two highest Legendre coefficients.
+TAIL = np.ascontiguousarray(_TO_LEGENDRE[-2:])
+#: Elements of a turn; and `tail_of` at most, relative to the root of the integrator's tolerance: the ends of the elements are
+#: good to about its square.
+COUNTS = np.array([6, 8, 12, 16, 24, 32, 48])
+_DECAY = 200.0
+#: Elements of a turn are taken fewer where the tail is below this part of what it may be.
+_IDLE = 1.0 / 300.0
+#: Corrections at most, and the greatest first one, relative to the scale: what is farther is no neighbour.
+_CORRECTIONS, _FAR = 8, 1.0
+#: Orbits of a row without a look whether elements suffice, after one where they did not.
+_PAUSE = 8
+#: Binomial coefficients with signs: the next of so many equally spaced values of a polynomial, from the last on.
+_NEXT = np.array([[1.0, 0.0, 0.0, 0.0], [2.0, -1.0, 0.0, 0.0], [3.0, -3.0, 1.0, 0.0], [4.0, -6.0, 4.0, -1.0]])
+PASSED = len(_NEXT)
+
+
+class Bench(NamedTuple):
+    """Room to work in: what a flow takes and gives; derivatives of the rates' slopes by coordinates and by rates at the
+    nodes, and along lambda those of coordinates' slopes; the equations of an element."""
+
+    z: NDArray[np.float64]
+    out: NDArray[np.float64]
+    by_q: NDArray[np.float64]
+    by_v: NDArray[np.float64]
+    along: NDArray[np.float64]
+    equations: NDArray[np.float64]
+
+
+@part
+def make_bench(n, directional):  # type: ignore[no-untyped-def]
+    """Room for y of n components."""
+    f = n // 2
+    size = NODES * f
+    columns = n + 1 if directional else n
+    return Bench(
+        np.zeros(n * (1 + columns)),
+        np.zeros(n * (1 + columns)),
+        np.zeros((NODES, f, f)),
+        np.zeros((NODES, f, f)),
+        np.zeros((NODES, f)),
+        np.zeros((size, size + 1 + columns)),
+    )
+
+
+@inner
+def eliminate(matrix, size):  # type: ignore[no-untyped-def]
+    """Solve a system with its right-hand sides in the columns after the first ``size``, in place; whether it could be."""
+    width = matrix.shape[1]
+    for c in range(size):
+        pivot = c
+        for r in range(c + 1, size):
+            if abs(matrix[r, c]) > abs(matrix[pivot, c]):
+                pivot = r
+        # a NaN is no pivot either
+        if not abs(matrix[pivot, c]) > 0.0:
+            return False
+        if pivot != c:
+            for j in range(c, width):
+                matrix[c, j], matrix[pivot, j] = matrix[pivot, j], matrix[c, j]
+        inverse = 1.0 / matrix[c, c]
+        for r in range(c + 1, size):
+            factor = matrix[r, c] * inverse
+            if factor != 0.0:
+                for j in range(c + 1, width):
+                    matrix[r, j] -= factor * matrix[c, j]
+    for c in range(size - 1, -1, -1):
+        inverse = 1.0 / matrix[c, c]
+        for j in range(size, width):
+            matrix[c, j] *= inverse
+        for r in range(c):
+            factor = matrix[r, c]
+            for j in range(size, width):
+                matrix[r, j] -= factor * matrix[c, j]
+    return True
+
+
+@inner
+def pace_of(section, y, bench):  # type: ignore[no-untyped-def]
+    """The time that a radian takes: the derivative of a coordinate's slope by its rate."""
+    n = y.shape[0]
+    bench.z[:] = 0.0
+    for i in range(n):
+        bench.z[i] = y[i]
+        bench.z[n + i * n + i] = 1.0
+    evaluate(section.equations[VARIATIONAL], 0.0, bench.z, section.modes, section.drive, section.p, bench.out)
+    return bench.out[n + n // 2 * n]
+
+
+@inner
+def at_node(s, h, pace, y, w, z):  # type: ignore[no-untyped-def]
+    """y at a node of an element, into z."""
+    f = w.shape[1]
+    for i in range(f):
+        q, v = C[s] * y[f + i], y[f + i]
+        for j in range(NODES):
+            q += h * AA[s, j] * w[j, i]
+            v += h * A[s, j] * w[j, i]
+        z[i] = y[i] + h * pace * q
+        z[f + i] = v
+
+
+@inner
+def condense(section, angle, h, pace, y, w, bench, end, matrix, slope, moves):  # type: ignore[no-untyped-def]
+    """Linearise an element about the slopes w, shape (NODES, f), and eliminate them; whether it could be.
+
+    Written are y at its end with the slopes corrected for this beginning, shape (n,), its derivatives by the beginning, (n, n),
+    and by lambda, (n,), and the corrections and derivatives of the slopes, (NODES f, 1 + n (+ 1)).
+    """
+    n = y.shape[0]
+    f = n // 2
+    size = NODES * f
+    z, out, system = bench.z, bench.out, bench.equations
+    directional = z.shape[0] > n * (1 + n)
+    equation = section.equations[DIRECTIONAL if directional else VARIATIONAL]
+    z[:] = 0.0
+    for i in range(n):
+        z[n + i * n + i] = 1.0
+    for s in range(NODES):
+        at_node(s, h, pace, y, w, z)
+        evaluate(equation, angle + C[s] * h, z, section.modes, section.drive, section.p, out)
+        for i in range(f):
+            system[s * f + i, size] = out[f + i] - w[s, i]
+            for j in range(f):
+                bench.by_q[s, i, j] = out[n + j * n + f + i]
+                bench.by_v[s, i, j] = out[n + (f + j) * n + f + i]
+            if directional:
+                bench.along[s, i] = out[n + n * n + i]
+                system[s * f + i, size + 1 + n] = out[n + n * n + f + i]
+    for s in range(NODES):
+        for i in range(f):
+            row = s * f + i
+            for j in range(f):
+                by_q, by_v = h * pace * bench.by_q[s, i, j], bench.by_v[s, i, j]
+                for t in range(NODES):
+                    system[row, t * f + j] = -h * (A[s, t] * by_v + AA[s, t] * by_q)
+                system[row, size + 1 + j] = bench.by_q[s, i, j]
+                system[row, size + 1 + f + j] = by_v + C[s] * by_q
+                if directional:
+                    for t in range(NODES):
+                        system[row, size + 1 + n] += h * A[s, t] * bench.by_q[s, i, j] * bench.along[t, j]
+            system[row, row] += 1.0
+    if not eliminate(system, size):
+        return False
+    for row in range(size):
+        for j in range(moves.shape[1]):
+            moves[row, j] = system[row, size + j]
+    for i in range(f):
+        end[i] = y[i] + h * pace * y[f + i]
+        end[f + i] = y[f + i]
+        for j in range(n):
+            matrix[i, j] = 0.0
+            matrix[f + i, j] = 0.0
+        matrix[i, i] = 1.0
+        matrix[i, f + i] = h * pace
+        matrix[f + i, f + i] = 1.0
+        slope[i] = 0.0
+        slope[f + i] = 0.0
+        for s in range(NODES):
+            row = s * f + i
+            far, near = h * h * pace * BA[s], h * B[s]
+            value = w[s, i] + moves[row, 0]
+            end[i] += far * value
+            end[f + i] += near * value
+            for j in range(n):
+                matrix[i, j] += far * moves[row, 1 + j]
+                matrix[f + i, j] += near * moves[row, 1 + j]
+            if directional:
+                slope[i] += far * moves[row, 1 + n] + near * bench.along[s, i]
+                slope[f + i] += near * moves[row, 1 + n]
+    return True
+
+
+@inner
+def tail_of(h, scale, w, moves):  # type: ignore[no-untyped-def]
+    """How far the Legendre coefficients of the slopes, and of their derivatives by the beginning, have decayed."""
+    f = w.shape[1]
+    n = 2 * f
+    worst = 0.0
+    for i in range(f):
+        for k in range(2):
+            total = 0.0
+            for s in range(NODES):
+                total += TAIL[k, s] * w[s, i]
+            worst = max(worst, abs(h * total) / scale[f + i])
+            for j in range(n):
+                total = 0.0
+                for s in range(NODES):
+                    total += TAIL[k, s] * moves[s * f + i, 1 + j]
+                worst = max(worst, abs(h * total) * scale[j] / scale[f + i])
+    return worst
+
+
+@inner
+def correct(section, angles, y, w, bench, ends, matrices, slopes, moves, monodromy, report):  # type: ignore[no-untyped-def]
+    """One correction of beginnings y, shape (m, n), and slopes w, (m, NODES, f), of a period; its size relative to the scale.
+
+    Written are what `condense` gives of each element, the monodromy matrix before the correction, and the decay of the Legendre
+    coefficients into ``report[0]``. Returns NaN where there is no correction.
+    """
+    m, n = y.shape
+    f = n // 2
+    scale = section.scale
+    shift, column = bench.z, bench.out
+    report[0] = 0.0
+    pace = pace_of(section, y[0], bench)
+    for i in range(n):
+        for j in range(n):
+            monodromy[i, j] = 1.0 if i == j else 0.0
+    for e in range(m):
+        h = angles[e + 1] - angles[e]
+        if not condense(section, angles[e], h, pace, y[e], w[e], bench, ends[e], matrices[e], slopes[e], moves[e]):
+            return np.nan
+        report[0] = max(report[0], tail_of(h, scale, w[e], moves[e]))
+        after = y[(e + 1) % m]
+        for i in range(n):
+            ends[e, i] -= after[i]
+        for j in range(n):
+            for i in range(n):
+                column[i] = 0.0
+                for k in range(n):
+                    column[i] += matrices[e, i, k] * monodromy[k, j]
+            for i in range(n):
+                monodromy[i, j] = column[i]
+    # the gaps between the elements, carried to the end of the period
+    for i in range(n):
+        shift[i] = 0.0
+    for e in range(m):
+        _carry(matrices[e], ends[e], shift, column)
+    system = bench.equations
+    for i in range(n):
+        for j in range(n):
+            system[i, j] = (1.0 if i == j else 0.0) - monodromy[i, j]
+        for j in range(n, system.shape[1]):
+            system[i, j] = shift[i]
+    if not eliminate(system, n):
+        return np.nan
+    for i in range(n):
+        shift[i] = system[i, n]
+    size = 0.0
+    for e in range(m):
+        h = angles[e + 1] - angles[e]
+        for row in range(moves.shape[1]):
+            change = moves[e, row, 0]
+            for j in range(n):
+                change += moves[e, row, 1 + j] * shift[j]
+            w[e, row // f, row % f] += change
+            size = max(size, abs(h * change) / scale[f + row % f])
+        for i in range(n):
+            y[e, i] += shift[i]
+            size = max(size, abs(shift[i]) / scale[i])
+            if not np.isfinite(shift[i]):
+                return np.nan
+        _carry(matrices[e], ends[e], shift, column)
+    return size
+
+
+@inner
+def _carry(matrix, gap, shift, column):  # type: ignore[no-untyped-def]
+    """A deviation at the beginning of an element becomes that at the beginning of the next."""
+    n = gap.shape[0]
+    for i in range(n):
+        column[i] = gap[i]
+        for k in range(n):
+            column[i] += matrix[i, k] * shift[k]
+    for i in range(n):
+        shift[i] = column[i]
+
+
+@inner
+def clear(section, angles, y, w, bench, gap):  # type: ignore[no-untyped-def]
+    """Whether the links stay clear of the limit of assembly at all nodes."""
+    pace = pace_of(section, y[0], bench)
+    for e in range(y.shape[0]):
+        h = angles[e + 1] - angles[e]
+        for s in range(NODES):
+            at_node(s, h, pace, y[e], w[e], bench.z)
+            evaluate(
+                section.equations[GAP], angles[e] + C[s] * h, bench.z, section.modes, section.drive, section.p, gap
+            )
+            if not gap[0] > LIMIT_SINE:
+                return False
+    return True
+
+
+class Desk(NamedTuple):
+    """Room to work in for a period: that of an element, what `condense` writes of each, the decay of the coefficients."""
+
+    bench: Bench
+    ends: NDArray[np.float64]
+    matrices: NDArray[np.float64]
+    slopes: NDArray[np.float64]
+    moves: NDArray[np.float64]
+    report: NDArray[np.float64]
+
+
+@part
+def make_desk(n, most):  # type: ignore[no-untyped-def]
+    """Room for y of n components and so many elements."""
+    return Desk(
+        make_bench(n, False),
+        np.zeros((most, n)),
+        np.zeros((most, n, n)),
+        np.zeros((most, n)),
+        np.zeros((most, NODES * (n // 2), 1 + n)),
+        np.zeros(1),
+    )
+
+
+@part
+def close(section, angles, y, w, desk, monodromy, room):  # type: ignore[no-untyped-def]
+    """Newton's method for beginnings y and slopes w of a period that closes; how it ended.
+
+    NO_STEP says that the elements are too few.
+    """
+    before = 0.0
+    for count in range(_CORRECTIONS):
+        size = correct(
+            section,
+            angles,
+            y,
+            w,
+            desk.bench,
+            desk.ends,
+            desk.matrices,
+            desk.slopes,
+            desk.moves,
+            monodromy,
+            desk.report,
+        )
+        if not size <= (0.5 * before if count else _FAR):
+            return DIVERGED
+        if size <= 100.0 * section.tolerance:
+            if desk.report[0] > _DECAY * np.sqrt(section.tolerance):
+                return NO_STEP
+            return DONE if clear(section, angles, y, w, desk.bench, room.gap) else LIMIT
+        before = size
+    return DIVERGED
+
+
+@part
+def spread(section, source, angles, start, y, w, room):  # type: ignore[no-untyped-def]
+    """Beginnings y and slopes w of the elements of a period from its start, by the integrator."""
+    n = start.shape[0]
+    z, out = start.copy(), np.empty(n)
+    carry = np.array([0.1, 0.0])
+    for e in range(y.shape[0]):
+        angle, h = angles[e], angles[e + 1] - angles[e]
+        y[e] = z
+        for s in range(NODES + 1):
+            following = angles[e] + C[s] * h if s < NODES else angles[e + 1]
+            status = advance(section, source, angle, following, z, room, carry)
+            if status != DONE:
+                return status
+            angle = following
+            if s < NODES:
+                evaluate(section.equations[PLAIN], angle, z, section.modes, section.drive, section.p, out)
+                w[e, s] = out[n // 2 :]
+    return DONE
+
+
+@part
+def settle_on(section, source, end, turns, level, start, angles, y, w, desk, monodromy, room):  # type: ignore[no-untyped-def]
+    """Begin with the fewest elements that suffice, from the given level of `COUNTS` on; the level, -1 if there is none."""
+    while level < len(COUNTS):
+        m = COUNTS[level] * turns
+        for e in range(m + 1):
+            angles[e] = end * e / m
+        if spread(section, source, angles, start, y[:m], w[:m], room) != DONE:
+            return -1
+        status = close(section, angles, y[:m], w[:m], desk, monodromy, room)
+        if status == DONE:
+            return level
+        if status != NO_STEP:
+            return -1
+        level += 1
+    return -1
+
+
+@part
+def from_guess(own, wide, source, end, most, start, z, room, carry, report):  # type: ignore[no-untyped-def]
+    """Newton's method from far, at first to the tolerance of a search."""
+    status = newton(wide, source, end, most, start, z, room, carry, report)
+    return newton(own, source, end, most, start, z, room, carry, report) if status == DONE else status
+
+
+@part
+def from_left(section, source, parameters, drives, scales, end, turns, most, loose, guess, found):  # type: ignore[no-untyped-def]
+    """Orbits of a row from the left to the right: by collocation as far as it goes, else by shooting."""
+    starts, monodromies, status = found
+    n = guess.shape[0]
+    z = np.empty(n * (1 + n))
+    carry = np.array([0.1, 0.0])
+    report = np.zeros(3)
+    start = np.empty(n)
+    most_elements = COUNTS[-1] * turns
+    angles = np.zeros(most_elements + 1)
+    # of this orbit and of those before it, the last first
+    y, w = np.zeros((1 + PASSED, most_elements, n)), np.zeros((1 + PASSED, most_elements, NODES, n // 2))
+    desk, monodromy = make_desk(n, most_elements), np.zeros((n, n))
+    level, known, pause = 0, 0, 0
+    passed = 0
+    for row in range(parameters.shape[0]):
+        own = numbered(section, drives[row], parameters[row], scales[row], section.tolerance)
+        room = make_room(own, n)
+        what = DIVERGED
+        if known:
+            m = COUNTS[level] * turns
+            y[0, :m] = 0.0
+            w[0, :m] = 0.0
+            for old in range(known):
+                y[0, :m] += _NEXT[known - 1, old] * y[1 + old, :m]
+                w[0, :m] += _NEXT[known - 1, old] * w[1 + old, :m]
+            what = close(own, angles[: m + 1], y[0, :m], w[0, :m], desk, monodromy, room)
+            if what == NO_STEP:
+                # more elements; the start is good enough to go on from
+                start[:] = y[0, 0]
+                more = settle_on(own, source, end, turns, level + 1, start, angles, y[0], w[0], desk, monodromy, room)
+                level, known = max(more, 0), 0
+                what = DONE if more >= 0 else NO_STEP
+        by_collocation = what == DONE
+        if not by_collocation:
+            known = 0
+            if passed > 1:
+                # the secant through the last two
+                start[:] = 2.0 * starts[row - 1] - starts[row - 2]
+            elif passed == 1:
+                start[:] = starts[row - 1]
+            if passed:
+                what = newton(own, source, end, most, start, z, room, carry, report)
+            if what != DONE:
+                start[:] = guess
+                wide = numbered(section, drives[row], parameters[row], scales[row], loose)
+                what = from_guess(own, wide, source, end, most, start, z, room, carry, report)
+        status[row] = what
+        if what != DONE:
+            passed = 0
+            continue
+        passed += 1
+        if by_collocation:
+            starts[row] = y[0, 0]
+            for j in range(n):
+                for i in range(n):
+                    monodromies[row, j * n + i] = monodromy[i, j]
+        else:
+            starts[row] = start
+            monodromies[row] = z[n:]
+            pause -= 1
+            if not section.torque and pause < 0:
+                more = settle_on(own, source, end, turns, level, start, angles, y[0], w[0], desk, monodromy, room)
+                level, by_collocation = max(more, 0), more >= 0
+                if not by_collocation:
+                    pause = _PAUSE
+        if by_collocation:
+            m = COUNTS[level] * turns
+            for old in range(PASSED, 0, -1):
+                y[old, :m] = y[old - 1, :m]
+                w[old, :m] = w[old - 1, :m]
+            known = min(known + 1, PASSED)
+            if level > 0 and desk.report[0] < _IDLE * _DECAY * np.sqrt(section.tolerance):
+                # fewer elements the next time, which is begun by shooting
+                start[:] = y[0, 0]
+                level -= 1
+                known = 0
+
+
+@part
+def from_right(section, source, parameters, drives, scales, end, most, found):  # type: ignore[no-untyped-def]
+    """What was not found from the left may be found from the right."""
+    starts, monodromies, status = found
+    n = starts.shape[1]
+    z, carry, report = np.empty(n * (1 + n)), np.array([0.1, 0.0]), np.zeros(3)
+    for row in range(parameters.shape[0] - 2, -1, -1):
+        if status[row] != DONE and status[row + 1] == DONE:
+            own = numbered(section, drives[row], parameters[row], scales[row], section.tolerance)
+            start = starts[row + 1].copy()
+            if newton(own, source, end, most, start, z, make_room(own, n), carry, report) == DONE:
+                status[row] = DONE
+                starts[row] = start
+                monodromies[row] = z[n:]
+
+
+@part
+def from_others(section, source, parameters, drives, scales, end, most, loose, guesses, found):  # type: ignore[no-untyped-def]
+    """What was not found from a neighbour is sought from the guesses but the first, once it is found from the left again."""
+    starts, monodromies, status = found
+    n = starts.shape[1]
+    z, carry, report = np.empty(n * (1 + n)), np.array([0.1, 0.0]), np.zeros(3)
+    none = np.empty((0, n))
+    for row in range(parameters.shape[0]):
+        if status[row] == DONE:
+            continue
+        own = numbered(section, drives[row], parameters[row], scales[row], section.tolerance)
+        wide = numbered(section, drives[row], parameters[row], scales[row], loose)
+        room = make_room(own, n)
+        for guess in range(0 if row > 0 and status[row - 1] == DONE else 1, guesses.shape[0]):
+            start = guesses[guess].copy() if guess else starts[row - 1].copy()
+            if (
+                deflated(wide, source, end, most, 1.0, start, none, z, room, carry) == DONE
+                and newton(own, source, end, most, start, z, room, carry, report) == DONE
+            ):
+                status[row] = DONE
+                starts[row] = start
+                monodromies[row] = z[n:]
+                break
+
+
+@kernel(
+    types.void(
+        SECTION, SOURCE, MATRIX, MATRIX, MATRIX, float64, int64, int64, float64, MATRIX, MATRIX, MATRIX, int64[::1]
+    ),
+    purpose="grids of periodic motions",
+)
+def solve_row(  # type: ignore[no-untyped-def]
+    section, source, parameters, drives, scales, end, turns, most, loose, guesses, starts, monodromies, status
+):
+    """Orbits of a row of mechanisms, each begun from the last: the rows of a chart.
+
+    By collocation from the PASSED orbits before, as far as it goes; where it does not, by shooting.
+
+    Parameters
+    ----------
+    parameters, drives : ndarray, shapes (m, constants) and (m, drive)
+        As in `Section`, which has the rest.
+    scales : ndarray, shape (m, n)
+    turns : int
+        In a period.
+    loose : float
+        Tolerance of the search from further starts.
+    guesses : ndarray, shape (k, n)
+        Start of the first; where Newton's method fails from the neighbour it is begun anew from there. An orbit that is not
+        found from a neighbour on either side is sought from the others.
+    starts, monodromies : ndarray, shapes (m, n) and (m, n n)
+        y at crank angle 0, and the monodromy matrix by columns; written where the status is DONE.
+    status : ndarray of int64, shape (m,)
+        `Status` of each; written.
+    """
+    found = (starts, monodromies, status)
+    from_left(section, source, parameters, drives, scales, end, turns, most, loose, guesses[0].copy(), found)
+    from_right(section, source, parameters, drives, scales, end, most, found)
+    if (status != DONE).any():
+        from_others(section, source, parameters, drives, scales, end, most, loose, guesses, found)
+        from_right(section, source, parameters, drives, scales, end, most, found)
