@@ -205,7 +205,18 @@ def output_units() -> dict[str, str]:
 
 def variable_units() -> dict[str, str]:
     """Unit of every real variable of every mechanism, by its FMI name."""
-    return {v.name: v.unit for mechanism in MECHANISMS.values() for v in mechanism.variables if v.kind == "Real"}
+    # every `Drive` that is made asks for them
+    here = list(map(id, MECHANISMS.values()))
+    if here != list(map(id, _units_of)):
+        _units_of[:] = MECHANISMS.values()
+        _units.clear()
+        _units.update((v.name, v.unit) for mechanism in _units_of for v in mechanism.variables if v.kind == "Real")
+    return _units
+
+
+#: What `variable_units` has computed, and of which mechanisms.
+_units: dict[str, str] = {}
+_units_of: list[Mechanism] = []
 
 
 def require_five_bar(parameters: Parameters, what: str) -> None:

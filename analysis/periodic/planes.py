@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
-from functools import cache
+from functools import cache, lru_cache
 from typing import Any
 
 from linkwork.errors import InputError
@@ -96,6 +96,12 @@ def format_value(name: str, value: float, unit: str) -> str:
     return f"{name} = {value:.6g} {unit}".rstrip() + rpm
 
 
+@lru_cache(maxsize=64)
+def _replaced(parameters: Parameters, *values: tuple[str, float]) -> Parameters:
+    """Parameters with others of these values; a row of a chart over the speed has one mechanism."""
+    return replace(parameters, **dict(values))
+
+
 def with_values(parameters: Parameters, drive: Drive, values: Mapping[str, float]) -> Operation:
     """Mechanism and drive with other values of parameters by their FMI names."""
     mechanism = mechanism_of(parameters)
@@ -106,7 +112,7 @@ def with_values(parameters: Parameters, drive: Drive, values: Mapping[str, float
     if acting:
         of_drive["forces"] = {**drive.forces, **acting}
     return (
-        replace(parameters, **of_mechanism) if of_mechanism else parameters,
+        _replaced(parameters, *of_mechanism.items()) if of_mechanism else parameters,
         replace(drive, **of_drive) if of_drive else drive,
     )
 
