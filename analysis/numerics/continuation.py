@@ -25,6 +25,8 @@ TOLERANCE = 1e-10
 MOST_CORRECTIONS, HARD = 10, 5
 #: Distance of a point from the end of the tangent, relative to the step, beyond which it may be of another curve.
 REACH = 0.5
+#: Inverse of the cosine between a tangent and the one before it from which on the latter does not serve to compute it.
+_OBLIQUE = 1e3
 #: A step grows and shrinks by these.
 GROWTH, SHRINKAGE = 1.4, 0.5
 
@@ -195,6 +197,20 @@ class _Landing(NamedTuple):
     z: Vector
     evaluation: Evaluation
     corrections: int
+
+
+def _null_vector(derivatives: Vector, ahead: Vector) -> Vector:
+    """The vector of length 1 that the derivatives, (n, n + 1), take to zero, in the direction of ``ahead``: at folds too."""
+    try:
+        vector = np.linalg.solve(np.vstack([derivatives, ahead]), np.append(np.zeros(len(derivatives)), 1.0))
+        length = float(np.linalg.norm(vector))
+    except np.linalg.LinAlgError:
+        length = np.inf
+    if length * float(np.linalg.norm(ahead)) < _OBLIQUE:
+        return np.asarray(vector / length)
+    # nearly at a right angle to it: by the singular value decomposition, which costs more
+    tangent: Vector = np.linalg.svd(derivatives)[2][-1]
+    return -tangent if tangent @ ahead < 0.0 else tangent
 
 
 class Follower:
@@ -411,10 +427,7 @@ class Follower:
 
     def _point(self, found: _Landing, ahead: Vector) -> Point:
         derivatives = self._scaled_evaluation(found.evaluation)[1]
-        # the null vector, by the singular value decomposition: defined at folds too
-        tangent = np.linalg.svd(derivatives)[2][-1]
-        if tangent @ ahead < 0.0:
-            tangent = -tangent
+        tangent = _null_vector(derivatives, ahead)
         unscaled = found.z * self.scale
         return Point(
             y=unscaled[:-1],

@@ -26,7 +26,8 @@ from ..numerics.continuation import ContinuationError, Curve, Evaluate, Evaluati
 from .drives import Drive
 from .floquet import TOLERANCE, Crossing, Stability, crossing_test
 from .flows import label
-from .orbits import Direction, OrbitError, Period, PeriodicOrbit, Stations, period_from, pieces_from
+from .orbits import Direction, OrbitError, Period, PeriodicOrbit, Stations, pieces_from
+from .paths import PeriodPath
 from .planes import Operation, format_value, require_variable, unit_of, with_values
 from .starts import scale_of
 from .turns import Turn
@@ -112,10 +113,18 @@ class Family:
         is the difference of each end from the next beginning: multiple shooting.
         """
 
+        (mechanism, drive), (other, _) = self.at(low), self.at(high)
+        whole = np.array([0.0, drive.flow(mechanism_of(mechanism)).period * turns])
+        path = PeriodPath(whole if angles is None else angles)
+        # what varies is a number of the drive: all of them are linear in it
+        same = self._direction(high, low, high) if mechanism is other else None
+
         def evaluation(y: NDArray[np.float64], value: float) -> Evaluation:
             parameters, drive = self.at(value)
-            period = period_from(parameters, drive, y, turns, self._direction(value, low, high), high - low)
-            orbit = orbit_from(parameters, drive, y, turns, period)
+            direction = same or self._direction(value, low, high)
+            ends = path.follow(parameters, drive, y[None, :], value, direction, high - low)
+            period = Period(ends.y[0] - y, ends.matrices[0].copy(), ends.slopes[0])
+            orbit = orbit_from(parameters, drive, y, turns, period, ends.clearance)
             return Evaluation(period.shift, period.monodromy - np.eye(len(y)), period.slope, orbit)
 
         def in_pieces(y: NDArray[np.float64], value: float) -> Evaluation:
@@ -124,9 +133,8 @@ class Family:
             k = len(angles) - 1
             starts = y.reshape(k, -1).copy()
             n = starts.shape[1]
-            ends, matrices, slopes = pieces_from(
-                parameters, drive, angles, starts, self._direction(value, low, high), high - low
-            )
+            direction = same or self._direction(value, low, high)
+            ends, matrices, slopes, clearance = path.follow(parameters, drive, starts, value, direction, high - low)
             gaps = ends - np.roll(starts, -1, axis=0)
             jacobian = np.zeros((k, n, k, n))
             for piece in range(k):
@@ -142,6 +150,7 @@ class Family:
                 residual=float(np.abs(gaps / scale).max()),
                 iterations=1,
                 stations=Stations(angles, starts, float(_growths(matrices, scale).max())),
+                nearest=clearance,
             )
             return Evaluation(gaps.ravel(), jacobian.reshape(k * n, k * n), slopes.ravel(), orbit)
 
@@ -149,7 +158,12 @@ class Family:
 
 
 def orbit_from(
-    parameters: Parameters, drive: Drive, start: NDArray[np.float64], turns: int, period: Period
+    parameters: Parameters,
+    drive: Drive,
+    start: NDArray[np.float64],
+    turns: int,
+    period: Period,
+    nearest: float | None = None,
 ) -> PeriodicOrbit:
     """The orbit that one period from its start is, as far as it closes."""
     return PeriodicOrbit(
@@ -160,6 +174,7 @@ def orbit_from(
         monodromy=period.monodromy,
         residual=float(np.abs(period.shift / scale_of(parameters, drive, start)).max()),
         iterations=1,
+        nearest=nearest,
     )
 
 
@@ -467,7 +482,7 @@ def reason_to_leave(point: Point, largest: float = GREATEST_MULTIPLIER) -> str:
     orbit = point.data
     if orbit.largest > largest:
         return f"its largest multiplier passes {largest:g}"
-    sine = orbit.clearance(64)
+    sine = orbit.clearance(64) if orbit.nearest is None else orbit.nearest
     if sine < LEAST_SINE:
         return f"the links come near to the limit of assembly (sine of the angle to it {sine:.3g})"
     return ""

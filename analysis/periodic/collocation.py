@@ -14,13 +14,13 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import float64, int64, types
+from numba import boolean, float64, int64, types
 from numpy.polynomial import legendre
 from numpy.typing import NDArray
 
 from linkwork.limits import LIMIT_SINE
 
-from ..numerics.codegen import MATRIX, evaluate, inner, kernel, part
+from ..numerics.codegen import MATRIX, VECTOR, evaluate, inner, kernel, part
 from ..run.sources import SOURCE
 from .flows import DIRECTIONAL, GAP, PLAIN, VARIATIONAL
 from .orbit_kernels import (
@@ -55,8 +55,8 @@ TAIL = np.ascontiguousarray(_TO_LEGENDRE[-2:])
 #: good to about its square.
 COUNTS = np.array([6, 8, 12, 16, 24, 32, 48])
 _DECAY = 200.0
-#: Elements of a turn are taken fewer where the tail is below this part of what it may be.
-_IDLE = 1.0 / 300.0
+#: The same below which fewer elements of a turn are taken.
+IDLE = 0.7
 #: Corrections at most, and the greatest first one, relative to the scale: what is farther is no neighbour.
 _CORRECTIONS, _FAR = 8, 1.0
 #: Orbits of a row without a look whether elements suffice, after one where they did not.
@@ -319,8 +319,9 @@ def _carry(matrix, gap, shift, column):  # type: ignore[no-untyped-def]
 
 
 @inner
-def clear(section, angles, y, w, bench, gap):  # type: ignore[no-untyped-def]
-    """Whether the links stay clear of the limit of assembly at all nodes."""
+def least_gap(section, angles, y, w, bench, gap):  # type: ignore[no-untyped-def]
+    """How near the links come to the limit of assembly at the nodes; NaN beyond it."""
+    least = np.inf
     pace = pace_of(section, y[0], bench)
     for e in range(y.shape[0]):
         h = angles[e + 1] - angles[e]
@@ -329,9 +330,9 @@ def clear(section, angles, y, w, bench, gap):  # type: ignore[no-untyped-def]
             evaluate(
                 section.equations[GAP], angles[e] + C[s] * h, bench.z, section.modes, section.drive, section.p, gap
             )
-            if not gap[0] > LIMIT_SINE:
-                return False
-    return True
+            if not gap[0] >= least:
+                least = gap[0]
+    return least
 
 
 class Desk(NamedTuple):
@@ -384,7 +385,7 @@ def close(section, angles, y, w, desk, monodromy, room):  # type: ignore[no-unty
         if size <= 100.0 * section.tolerance:
             if desk.report[0] > _DECAY * np.sqrt(section.tolerance):
                 return NO_STEP
-            return DONE if clear(section, angles, y, w, desk.bench, room.gap) else LIMIT
+            return DONE if least_gap(section, angles, y, w, desk.bench, room.gap) > LIMIT_SINE else LIMIT
         before = size
     return DIVERGED
 
@@ -508,7 +509,7 @@ def from_left(section, source, parameters, drives, scales, end, turns, most, loo
                 y[old, :m] = y[old - 1, :m]
                 w[old, :m] = w[old - 1, :m]
             known = min(known + 1, PASSED)
-            if level > 0 and desk.report[0] < _IDLE * _DECAY * np.sqrt(section.tolerance):
+            if level > 0 and desk.report[0] < IDLE * np.sqrt(section.tolerance):
                 # fewer elements the next time, which is begun by shooting
                 start[:] = y[0, 0]
                 level -= 1
@@ -592,3 +593,108 @@ def solve_row(  # type: ignore[no-untyped-def]
     if (status != DONE).any():
         from_others(section, source, parameters, drives, scales, end, most, loose, guesses, found)
         from_right(section, source, parameters, drives, scales, end, most, found)
+
+
+@kernel(
+    int64(
+        SECTION,
+        SOURCE,
+        VECTOR,
+        int64[::1],
+        MATRIX,
+        float64,
+        boolean,
+        MATRIX,
+        float64[:, :, ::1],
+        float64[:, :, ::1],
+        MATRIX,
+        VECTOR,
+    ),
+    purpose="the collocation of periodic motions",
+)
+def walk(section, source, angles, firsts, starts, change, known, y, w, moves, rows, report):  # type: ignore[no-untyped-def]
+    """Follow y with its derivatives over each of the pieces of a period, from what is known of a neighbour.
+
+    Parameters
+    ----------
+    angles : ndarray, shape (m + 1,)
+        Crank angles at which the elements begin, and the end of the last.
+    firsts : ndarray of int64, shape (k + 1,)
+        Number of the first element of each piece, and m.
+    starts : ndarray, shape (k, n)
+        y at the beginning of each piece.
+    change : float
+        Of lambda from the neighbour.
+    known : bool
+        Whether there is one; without it the integrator gives the first guess.
+    y, w, moves : ndarray, shapes (m, n), (m, NODES, f) and (m, NODES f, 2 + n)
+        The neighbour's beginnings, slopes and their derivatives; overwritten.
+    rows : ndarray, shape (k, n (2 + n))
+        y at the end of each piece, dy/dy there by columns, dy/dlambda; written.
+    report : ndarray, shape (2,)
+        Decay of the Legendre coefficients, and how near the links come to the limit of assembly; written.
+
+    Returns
+    -------
+    int
+        A `Status`; NO_STEP where the elements are too few.
+    """
+    n = starts.shape[1]
+    f = n // 2
+    scale = section.scale
+    bench, room = make_bench(n, True), make_room(section, 0)
+    start, end, column = np.empty(n), np.empty(n), np.empty(n)
+    matrix, whole, slope, along = np.empty((n, n)), np.empty((n, n)), np.empty(n), np.empty(n)
+    report[0], report[1] = 0.0, np.inf
+    pace = pace_of(section, starts[0], bench)
+    for piece in range(starts.shape[0]):
+        first, last = firsts[piece], firsts[piece + 1]
+        start[:] = starts[piece]
+        whole[:] = np.eye(n)
+        along[:] = 0.0
+        if not known:
+            status = spread(section, source, angles[first : last + 1], start, y[first:last], w[first:last], room)
+            if status != DONE:
+                return status
+            moves[first:last] = 0.0
+        for e in range(first, last):
+            h = angles[e + 1] - angles[e]
+            for row in range(moves.shape[1]):
+                ahead = moves[e, row, 1 + n] * change
+                for i in range(n):
+                    ahead += moves[e, row, 1 + i] * (start[i] - y[e, i])
+                w[e, row // f, row % f] += ahead
+            y[e] = start
+            before = 0.0
+            for count in range(_CORRECTIONS):
+                if not condense(section, angles[e], h, pace, y[e], w[e], bench, end, matrix, slope, moves[e]):
+                    return DIVERGED
+                size = 0.0
+                for row in range(moves.shape[1]):
+                    w[e, row // f, row % f] += moves[e, row, 0]
+                    size = max(size, abs(h * moves[e, row, 0]) / scale[f + row % f])
+                if not size <= (0.5 * before if count else _FAR):
+                    return DIVERGED
+                before = size
+                if size <= 100.0 * section.tolerance:
+                    break
+            else:
+                return DIVERGED
+            report[0] = max(report[0], tail_of(h, scale, w[e], moves[e]))
+            for j in range(n):
+                for i in range(n):
+                    column[i] = 0.0
+                    for k in range(n):
+                        column[i] += matrix[i, k] * whole[k, j]
+                whole[:, j] = column
+            _carry(matrix, slope, along, column)
+            start[:] = end
+        for i in range(n):
+            rows[piece, i] = start[i]
+            rows[piece, n + n * n + i] = along[i]
+            for j in range(n):
+                rows[piece, n + j * n + i] = whole[i, j]
+    if report[0] > _DECAY * np.sqrt(section.tolerance):
+        return NO_STEP
+    report[1] = least_gap(section, angles, y, w, bench, room.gap)
+    return DONE if report[1] > LIMIT_SINE else LIMIT

@@ -127,6 +127,8 @@ class PeriodicOrbit(Shown):
         Where the motion was begun anew on the way, because it is too unstable to be followed over a whole period.
     others : int or None
         How many other periodic motions of the same period there are, as far as was sought; None where it was not asked.
+    nearest : float or None
+        How near the links come to the limit of assembly, as `clearance` has it, where that was computed on the way.
     multipliers : ndarray of complex, shape (n,)
         Floquet multipliers, the largest first.
     """
@@ -140,6 +142,7 @@ class PeriodicOrbit(Shown):
     iterations: int
     stations: Stations | None = None
     others: int | None = None
+    nearest: float | None = None
     multipliers: NDArray[np.complex128] = field(init=False)
 
     def __post_init__(self) -> None:
