@@ -26,7 +26,7 @@ from ..numerics.continuation import ContinuationError, Curve, Evaluate, Evaluati
 from .drives import Drive
 from .floquet import TOLERANCE, Crossing, Stability, crossing_test
 from .flows import label
-from .orbits import Direction, OrbitError, Period, PeriodicOrbit, Stations, pieces_from
+from .orbits import Direction, OrbitError, Period, PeriodicOrbit, Stations, period_from, pieces_from
 from .paths import PeriodPath
 from .planes import Operation, format_value, require_variable, unit_of, with_values
 from .starts import scale_of
@@ -211,7 +211,7 @@ class Branch(Shown):
     orbits : tuple of PeriodicOrbit
     special : tuple of SpecialPoint
     reached, closed : bool
-        Whether it ended at an end of the range or where it began; where it began.
+        Whether it ended at an end of the range, where it began, or at a branch of half its period; where it began.
     reason : str
         Why it ended. Where the branch was lost, its last point is the last good one.
     """
@@ -499,11 +499,16 @@ def _branch(
 ) -> Branch:
     pieces: list[tuple[Follower, Curve]] = []
     settings = follower.settings
+    before, merged = first, False
     while True:
         refine = False
 
         def leave(point: Point) -> str:
-            nonlocal refine
+            nonlocal refine, before, merged
+            merged = _meets_half(before, point)
+            if merged:
+                return "it meets the branch of half the period"
+            before = point
             if stop is not None and stop(point.data):
                 return "it was interrupted"
             reason = reason_to_leave(point, largest)
@@ -515,6 +520,9 @@ def _branch(
         curve = follower.follow(
             first, watch=None if watch is None else lambda point: watch(point.parameter), leave=leave
         )
+        if merged:
+            # beyond it are the same motions, begun half a period later
+            curve = replace(curve, points=curve.points[:-1], steps=curve.steps[:-1])
         pieces.append((follower, curve))
         last, left = curve.points[-1], settings.most_points - len(curve.points) + 1
         lost = curve.end in (Reason.TIP, Reason.NO_VALUE) and _growth(last.data) > _AIM and last.data.stations is None
@@ -534,10 +542,25 @@ def _branch(
         parameter=np.array([point.parameter for point in points]),
         orbits=tuple(point.data for point in points),
         special=tuple(special),
-        reached=curve.reached,
+        reached=curve.reached or merged,
         closed=curve.closed,
         reason=curve.reason,
     )
+
+
+def _meets_half(before: Point, after: Point) -> bool:
+    """Whether a branch meets one of half the period between two points: there it turns back, and the halves change places."""
+    turns = after.data.turns
+    if turns % 2 or not before.tangent[-1] * after.tangent[-1] < 0.0:
+        return False
+    try:
+        halves = [
+            period_from(o.parameters, o.drive, o.start, turns // 2).shift / scale_of(o.parameters, o.drive, o.start)
+            for o in (before.data, after.data)
+        ]
+    except OrbitError:
+        return False
+    return bool(halves[0] @ halves[1] < 0.0)
 
 
 def _tests(point: Point) -> dict[Crossing, float]:

@@ -54,7 +54,7 @@ TAIL = np.ascontiguousarray(_TO_LEGENDRE[-2:])
 #: Elements of a turn; and `tail_of` at most, relative to the root of the integrator's tolerance: the ends of the elements are
 #: good to about its square.
 COUNTS = np.array([6, 8, 12, 16, 24, 32, 48])
-_DECAY = 200.0
+DECAY = 200.0
 #: The same below which fewer elements of a turn are taken.
 IDLE = 0.7
 #: Corrections at most, and the greatest first one, relative to the scale: what is farther is no neighbour.
@@ -229,16 +229,15 @@ def tail_of(h, scale, w, moves):  # type: ignore[no-untyped-def]
     n = 2 * f
     worst = 0.0
     for i in range(f):
-        for k in range(2):
-            total = 0.0
+        for j in range(-1, n):
+            weight = scale[f + i] / (scale[j] if j >= 0 else 1.0)
+            last = before = greatest = 0.0
             for s in range(NODES):
-                total += TAIL[k, s] * w[s, i]
-            worst = max(worst, abs(h * total) / scale[f + i])
-            for j in range(n):
-                total = 0.0
-                for s in range(NODES):
-                    total += TAIL[k, s] * moves[s * f + i, 1 + j]
-                worst = max(worst, abs(h * total) * scale[j] / scale[f + i])
+                value = h * (moves[s * f + i, 1 + j] if j >= 0 else w[s, i])
+                greatest = max(greatest, abs(value))
+                before += TAIL[0, s] * value
+                last += TAIL[1, s] * value
+            worst = max(worst, max(abs(before), abs(last)) / (weight + greatest))
     return worst
 
 
@@ -383,7 +382,7 @@ def close(section, angles, y, w, desk, monodromy, room):  # type: ignore[no-unty
         if not size <= (0.5 * before if count else _FAR):
             return DIVERGED
         if size <= 100.0 * section.tolerance:
-            if desk.report[0] > _DECAY * np.sqrt(section.tolerance):
+            if desk.report[0] > DECAY * np.sqrt(section.tolerance):
                 return NO_STEP
             return DONE if least_gap(section, angles, y, w, desk.bench, room.gap) > LIMIT_SINE else LIMIT
         before = size
@@ -609,10 +608,11 @@ def solve_row(  # type: ignore[no-untyped-def]
         float64[:, :, ::1],
         MATRIX,
         VECTOR,
+        VECTOR,
     ),
     purpose="the collocation of periodic motions",
 )
-def walk(section, source, angles, firsts, starts, change, known, y, w, moves, rows, report):  # type: ignore[no-untyped-def]
+def walk(section, source, angles, firsts, starts, change, known, y, w, moves, rows, tails, report):  # type: ignore[no-untyped-def]
     """Follow y with its derivatives over each of the pieces of a period, from what is known of a neighbour.
 
     Parameters
@@ -631,13 +631,15 @@ def walk(section, source, angles, firsts, starts, change, known, y, w, moves, ro
         The neighbour's beginnings, slopes and their derivatives; overwritten.
     rows : ndarray, shape (k, n (2 + n))
         y at the end of each piece, dy/dy there by columns, dy/dlambda; written.
-    report : ndarray, shape (2,)
-        Decay of the Legendre coefficients, and how near the links come to the limit of assembly; written.
+    tails : ndarray, shape (m,)
+        Decay of the Legendre coefficients of each element; written.
+    report : ndarray, shape (1,)
+        How near the links come to the limit of assembly; written.
 
     Returns
     -------
     int
-        A `Status`; NO_STEP where the elements are too few.
+        A `Status`; NO_STEP where elements are too long, DIVERGED if the slopes were not found.
     """
     n = starts.shape[1]
     f = n // 2
@@ -645,7 +647,7 @@ def walk(section, source, angles, firsts, starts, change, known, y, w, moves, ro
     bench, room = make_bench(n, True), make_room(section, 0)
     start, end, column = np.empty(n), np.empty(n), np.empty(n)
     matrix, whole, slope, along = np.empty((n, n)), np.empty((n, n)), np.empty(n), np.empty(n)
-    report[0], report[1] = 0.0, np.inf
+    report[0] = np.inf
     pace = pace_of(section, starts[0], bench)
     for piece in range(starts.shape[0]):
         first, last = firsts[piece], firsts[piece + 1]
@@ -680,7 +682,7 @@ def walk(section, source, angles, firsts, starts, change, known, y, w, moves, ro
                     break
             else:
                 return DIVERGED
-            report[0] = max(report[0], tail_of(h, scale, w[e], moves[e]))
+            tails[e] = tail_of(h, scale, w[e], moves[e])
             for j in range(n):
                 for i in range(n):
                     column[i] = 0.0
@@ -694,7 +696,7 @@ def walk(section, source, angles, firsts, starts, change, known, y, w, moves, ro
             rows[piece, n + n * n + i] = along[i]
             for j in range(n):
                 rows[piece, n + j * n + i] = whole[i, j]
-    if report[0] > _DECAY * np.sqrt(section.tolerance):
+    if tails.max() > DECAY * np.sqrt(section.tolerance):
         return NO_STEP
-    report[1] = least_gap(section, angles, y, w, bench, room.gap)
-    return DONE if report[1] > LIMIT_SINE else LIMIT
+    report[0] = least_gap(section, angles, y, w, bench, room.gap)
+    return DONE if report[0] > LIMIT_SINE else LIMIT

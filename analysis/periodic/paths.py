@@ -10,12 +10,15 @@ from numpy.typing import NDArray
 from ..mechanisms import Parameters, mechanism_of
 from . import collocation
 from .drives import Drive
-from .flows import DIRECTIONAL, PLAIN, VARIATIONAL
-from .orbit_kernels import NO_SOURCE, Status
+from .flows import DIRECTIONAL, PLAIN, VARIATIONAL, Flow
+from .orbit_kernels import NO_SOURCE, Section, Status
 from .orbits import Direction, failure, pieces_from, section_of
 
 #: Calls without collocation after one in which no number of elements sufficed.
 _PAUSE = 16
+#: Elements of a turn to begin with; elements at most, for each piece and beside eight times as many as that; calls after which
+#: they are chosen anew.
+_ELEMENTS, _MOST, _RENEWED = 6, 8, 64
 #: How near to the limit of assembly collocation is left.
 _NEAR = 1e-2
 
@@ -41,7 +44,7 @@ class PeriodPath:
 
     def __init__(self, angles: NDArray[np.float64]) -> None:
         self.angles = angles
-        self._level = self._pause = 0
+        self._calls = self._pause = 0
         self._value: float | None = None
         self._mesh = self._firsts = self._y = self._w = self._moves = np.empty(0)
 
@@ -61,18 +64,29 @@ class PeriodPath:
         OrbitError
             If a piece cannot be followed.
         """
-        if not drive.speed_drive or self._pause > 0:
-            self._pause -= 1
-            return Ends(*pieces_from(parameters, drive, self.angles, starts, direction, along), None)
+        self._pause -= 1
+        if drive.speed_drive and self._pause < 0:
+            section = section_of(
+                parameters, drive, starts[0], PLAIN, VARIATIONAL, DIRECTIONAL, direction=direction, along=along
+            )
+            ends = self._collocated(section, drive.flow(mechanism_of(parameters)), starts, value)
+            if ends is not None:
+                return ends
+        return Ends(*pieces_from(parameters, drive, self.angles, starts, direction, along), None)
+
+    def _collocated(self, section: Section, flow: Flow, starts: NDArray[np.float64], value: float) -> Ends | None:
         k, n = starts.shape
-        section = section_of(
-            parameters, drive, starts[0], PLAIN, VARIATIONAL, DIRECTIONAL, direction=direction, along=along
-        )
-        rows, report = np.zeros((k, n * (2 + n))), np.zeros(2)
-        while self._level < len(collocation.COUNTS):
+        rows, nearest = np.zeros((k, n * (2 + n))), np.zeros(1)
+        self._calls += 1
+        if self._calls % _RENEWED == 1:
+            lengths = np.diff(self.angles)
+            counts = np.ceil(lengths * _ELEMENTS / flow.period - 1e-9).astype(np.int64)
+            parts = [a + h * np.arange(count) / count for a, h, count in zip(self.angles, lengths, counts)]
+            self._divide(np.concatenate([*parts, self.angles[-1:]]), n)
+        most = _MOST * len(self.angles) + 8 * _ELEMENTS * (self.angles[-1] / flow.period)
+        while len(self._mesh) <= most:
             known = self._value is not None
-            if not known:
-                self._divide(drive.flow(mechanism_of(parameters)).period, n)
+            tails = np.zeros(len(self._mesh) - 1)
             status = collocation.walk(
                 section,
                 NO_SOURCE,
@@ -85,34 +99,37 @@ class PeriodPath:
                 self._w,
                 self._moves,
                 rows,
-                report,
+                tails,
+                nearest,
             )
-            if status == Status.DONE and report[1] < _NEAR:
-                # between the nodes they may come nearer: the integrator looks at every step
-                break
-            if status == Status.DONE:
-                self._value = value
-                if self._level > 0 and report[0] < collocation.IDLE * section.tolerance**0.5:
-                    self._level, self._value = self._level - 1, None
-                matrices = rows[:, n : n + n * n].reshape(k, n, n).transpose(0, 2, 1)
-                return Ends(rows[:, :n], matrices, rows[:, n + n * n :], float(report[1]))
             self._value = None
             if status == Status.LIMIT:
-                raise failure(status, drive.flow(mechanism_of(parameters)), starts[0])
-            # where it is not found from the neighbour, without it, and then with more elements
-            self._level += status == Status.NO_STEP or not known
-        else:
-            self._level, self._pause = 0, _PAUSE
-        return Ends(*pieces_from(parameters, drive, self.angles, starts, direction, along), None)
+                raise failure(status, flow, starts[0])
+            if status == Status.DONE:
+                if nearest[0] < _NEAR:
+                    # between the nodes they may come nearer: the integrator looks at every step
+                    return None
+                self._value = value
+                matrices = rows[:, n : n + n * n].reshape(k, n, n).transpose(0, 2, 1)
+                return Ends(rows[:, :n], matrices, rows[:, n + n * n :], float(nearest[0]))
+            if status == Status.NO_STEP:
+                long = tails > collocation.DECAY * np.sqrt(section.tolerance)
+            elif known:
+                # not found from the neighbour: without it
+                continue
+            else:
+                long = np.ones(len(tails), dtype=bool)
+            halves = 0.5 * (self._mesh[:-1] + self._mesh[1:])
+            self._divide(np.sort(np.concatenate([self._mesh, halves[long]])), n)
+        self._calls, self._pause = 0, _PAUSE
+        return None
 
-    def _divide(self, period: float, n: int) -> None:
-        """Elements of about equal lengths, as many as the level says, each within a piece."""
-        lengths = np.diff(self.angles)
-        counts = np.ceil(lengths * collocation.COUNTS[self._level] / period - 1e-9).astype(np.int64)
-        self._firsts = np.concatenate([[0], np.cumsum(counts)])
-        parts = [a + h * np.arange(count) / count for a, h, count in zip(self.angles, lengths, counts)]
-        self._mesh = np.concatenate([*parts, self.angles[-1:]])
-        m = int(self._firsts[-1])
+    def _divide(self, mesh: NDArray[np.float64], n: int) -> None:
+        """Take other elements, of which nothing is known."""
+        self._value = None
+        self._mesh = mesh
+        self._firsts = np.searchsorted(mesh, self.angles).astype(np.int64)
+        m = len(mesh) - 1
         self._y = np.zeros((m, n))
         self._w = np.zeros((m, collocation.NODES, n // 2))
         self._moves = np.zeros((m, collocation.NODES * (n // 2), 2 + n))
