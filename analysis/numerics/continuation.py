@@ -301,7 +301,8 @@ class Follower:
         length = settings.first
         while len(points) < settings.most_points:
             last = points[-1]
-            taken = self._attempt(last, length)
+            bend = (last.tangent - points[-2].tangent) / steps[-1] if steps else None
+            taken = self._attempt(last, length, bend)
             if isinstance(taken, _Failure):
                 length *= SHRINKAGE
                 if length < settings.least:
@@ -349,9 +350,9 @@ class Follower:
         s = float(brentq(lambda s: test(at(s)), 0.0, length, xtol=1e-13, rtol=1e-14))
         return at(s), s
 
-    def _attempt(self, last: Point, length: float) -> tuple[Point, int] | _Failure:
-        """A step, if its end is on the same curve for certain, and the corrections it took."""
-        found = self._step(last, length)
+    def _attempt(self, last: Point, length: float, bend: Vector | None) -> tuple[Point, int] | _Failure:
+        """A step, if its end is on the same curve for certain, and the corrections it took; see `_step`."""
+        found = self._step(last, length, bend)
         if isinstance(found, _Failure):
             return found
         point = self._point(found, last.tangent)
@@ -364,12 +365,17 @@ class Follower:
             return _Failure(Reason.TIP, "the corrections are many")
         return point, found.corrections
 
-    def _step(self, point: Point, length: float) -> _Landing | _Failure:
-        return self._correct(self._scaled(point) + length * point.tangent, point.tangent, point)
+    def _step(self, point: Point, length: float, bend: Vector | None = None) -> _Landing | _Failure:
+        """A step along the tangent, which turns by ``bend`` an arc length, as far as that is known."""
+        aside = np.zeros(len(point.tangent)) if bend is None else 0.5 * length**2 * bend
+        aside = aside - (aside @ point.tangent) * point.tangent
+        return self._correct(self._scaled(point) + length * point.tangent, point.tangent, point, aside)
 
-    def _correct(self, plane: Vector, normal: Vector, last: Point | None) -> _Landing | _Failure:
-        """Newton's or Broyden's method for G = 0 from a point in the plane through it across ``normal``; all scaled."""
-        n, z, before = len(plane) - 1, plane, np.inf
+    def _correct(
+        self, plane: Vector, normal: Vector, last: Point | None, aside: Vector | float = 0.0
+    ) -> _Landing | _Failure:
+        """Newton's or Broyden's method for G = 0 from a point in the plane through another across ``normal``; all scaled."""
+        n, z, before = len(plane) - 1, plane + aside, np.inf
         matrix = np.vstack([np.zeros((n, n + 1)), normal])
         secant = self.residual is not None and last is not None
         value = change = np.zeros(0)

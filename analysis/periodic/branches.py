@@ -137,9 +137,9 @@ class Family:
             ends, matrices, slopes, clearance = path.follow(parameters, drive, starts, value, direction, high - low)
             gaps = ends - np.roll(starts, -1, axis=0)
             jacobian = np.zeros((k, n, k, n))
-            for piece in range(k):
-                jacobian[piece, :, piece] = matrices[piece]
-                jacobian[piece, :, (piece + 1) % k] -= np.eye(n)
+            pieces = np.arange(k)
+            jacobian[pieces, :, pieces] = matrices
+            jacobian[pieces, :, (pieces + 1) % k] -= np.eye(n)
             scale = scale_of(parameters, drive, starts[0])
             orbit = PeriodicOrbit(
                 parameters=parameters,

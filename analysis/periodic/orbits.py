@@ -26,7 +26,7 @@ from .drives import Drive
 from .floquet import TOLERANCE, StabilityVerdict, liouville, multipliers, verdict
 from .flows import DIRECTIONAL, GAP, PLAIN, STATE, VARIATIONAL, Flow
 from .orbit_kernels import NO_SOURCE, Section, Status
-from .starts import scale_of, starts_of
+from .starts import scale_in, scale_of, starts_of
 from .turns import Turn, times_of
 
 #: Bound of the local error of a step; the solution is good to about a hundred times as much.
@@ -272,7 +272,7 @@ def section_of(
         np.array(flow.modes, dtype=float),
         np.concatenate([vector, d_drive]),
         np.concatenate([p, d_p]),
-        scale_of(parameters, drive, start),
+        scale_in(flow, parameters, vector, start),
         along,
         tolerance,
         flow.torque,

@@ -12,6 +12,7 @@ from linkwork.errors import AssemblyError
 
 from ..mechanisms import Parameters, mechanism_of
 from .drives import Drive
+from .flows import Flow
 
 #: Distance of two starts, relative to the scale, below which they are of one motion.
 SAME = 1e-6
@@ -24,8 +25,14 @@ _SPEEDS = (0.25, 1.5)
 def scale_of(parameters: Parameters, drive: Drive, start: ArrayLike) -> NDArray[np.float64]:
     """Magnitudes of y: of a five-bar the crank's length, its speed at the pin, and the crank speed."""
     mechanism = mechanism_of(parameters)
-    flow = drive.flow(mechanism)
-    scale = mechanism.error_scale(parameters, flow.state(np.asarray(start, dtype=float), drive.vector(mechanism)))
+    return scale_in(drive.flow(mechanism), parameters, drive.vector(mechanism), np.asarray(start, dtype=float))
+
+
+def scale_in(
+    flow: Flow, parameters: Parameters, vector: NDArray[np.float64], start: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """The same, where the flow and the numbers of the drive are at hand."""
+    scale = flow.mechanism.error_scale(parameters, flow.state(start, vector))
     return np.array([scale[place] for place in flow.places])
 
 
