@@ -29,7 +29,7 @@ from .flows import label
 from .orbits import Direction, OrbitError, Period, PeriodicOrbit, Stations, period_from, pieces_from
 from .paths import PeriodPath
 from .planes import Operation, format_value, require_variable, unit_of, with_values
-from .starts import scale_of
+from .starts import is_smooth, scale_of
 from .turns import Turn
 
 #: Relative step of the difference by which the constants are differentiated with respect to the parameter. The constants
@@ -115,7 +115,7 @@ class Family:
 
         (mechanism, drive), (other, _) = self.at(low), self.at(high)
         whole = np.array([0.0, drive.flow(mechanism_of(mechanism)).period * turns])
-        path = PeriodPath(whole if angles is None else angles)
+        path = PeriodPath(whole if angles is None else angles, is_smooth(mechanism) and is_smooth(other))
         # what varies is a number of the drive: all of them are linear in it
         same = self._direction(high, low, high) if mechanism is other else None
 

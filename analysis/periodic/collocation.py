@@ -223,14 +223,14 @@ def condense(section, angle, h, pace, y, w, bench, end, matrix, slope, moves):  
 
 
 @inner
-def tail_of(h, scale, w, moves):  # type: ignore[no-untyped-def]
-    """How far the Legendre coefficients of the slopes, and of their derivatives by the beginning, have decayed."""
+def tail_of(h, scale, along, w, moves):  # type: ignore[no-untyped-def]
+    """How far the Legendre coefficients of the slopes, and of their derivatives by the beginning and lambda, have decayed."""
     f = w.shape[1]
     n = 2 * f
     worst = 0.0
     for i in range(f):
-        for j in range(-1, n):
-            weight = scale[f + i] / (scale[j] if j >= 0 else 1.0)
+        for j in range(-1, moves.shape[1] - 1):
+            weight = scale[f + i] / (1.0 if j < 0 else scale[j] if j < n else along)
             last = before = greatest = 0.0
             for s in range(NODES):
                 value = h * (moves[s * f + i, 1 + j] if j >= 0 else w[s, i])
@@ -261,7 +261,7 @@ def correct(section, angles, y, w, bench, ends, matrices, slopes, moves, monodro
         h = angles[e + 1] - angles[e]
         if not condense(section, angles[e], h, pace, y[e], w[e], bench, ends[e], matrices[e], slopes[e], moves[e]):
             return np.nan
-        report[0] = max(report[0], tail_of(h, scale, w[e], moves[e]))
+        report[0] = max(report[0], tail_of(h, scale, section.along, w[e], moves[e]))
         after = y[(e + 1) % m]
         for i in range(n):
             ends[e, i] -= after[i]
@@ -436,7 +436,7 @@ def from_guess(own, wide, source, end, most, start, z, room, carry, report):  # 
 
 
 @part
-def from_left(section, source, parameters, drives, scales, end, turns, most, loose, guess, found):  # type: ignore[no-untyped-def]
+def from_left(section, source, parameters, drives, scales, end, turns, most, loose, smooth, guess, found):  # type: ignore[no-untyped-def]
     """Orbits of a row from the left to the right: by collocation as far as it goes, else by shooting."""
     starts, monodromies, status = found
     n = guess.shape[0]
@@ -497,7 +497,7 @@ def from_left(section, source, parameters, drives, scales, end, turns, most, loo
             starts[row] = start
             monodromies[row] = z[n:]
             pause -= 1
-            if not section.torque and pause < 0:
+            if smooth and not section.torque and pause < 0:
                 more = settle_on(own, source, end, turns, level, start, angles, y[0], w[0], desk, monodromy, room)
                 level, by_collocation = max(more, 0), more >= 0
                 if not by_collocation:
@@ -558,12 +558,25 @@ def from_others(section, source, parameters, drives, scales, end, most, loose, g
 
 @kernel(
     types.void(
-        SECTION, SOURCE, MATRIX, MATRIX, MATRIX, float64, int64, int64, float64, MATRIX, MATRIX, MATRIX, int64[::1]
+        SECTION,
+        SOURCE,
+        MATRIX,
+        MATRIX,
+        MATRIX,
+        float64,
+        int64,
+        int64,
+        float64,
+        boolean,
+        MATRIX,
+        MATRIX,
+        MATRIX,
+        int64[::1],
     ),
     purpose="grids of periodic motions",
 )
 def solve_row(  # type: ignore[no-untyped-def]
-    section, source, parameters, drives, scales, end, turns, most, loose, guesses, starts, monodromies, status
+    section, source, parameters, drives, scales, end, turns, most, loose, smooth, guesses, starts, monodromies, status
 ):
     """Orbits of a row of mechanisms, each begun from the last: the rows of a chart.
 
@@ -578,6 +591,8 @@ def solve_row(  # type: ignore[no-untyped-def]
         In a period.
     loose : float
         Tolerance of the search from further starts.
+    smooth : bool
+        Whether collocation serves.
     guesses : ndarray, shape (k, n)
         Start of the first; where Newton's method fails from the neighbour it is begun anew from there. An orbit that is not
         found from a neighbour on either side is sought from the others.
@@ -587,7 +602,7 @@ def solve_row(  # type: ignore[no-untyped-def]
         `Status` of each; written.
     """
     found = (starts, monodromies, status)
-    from_left(section, source, parameters, drives, scales, end, turns, most, loose, guesses[0].copy(), found)
+    from_left(section, source, parameters, drives, scales, end, turns, most, loose, smooth, guesses[0].copy(), found)
     from_right(section, source, parameters, drives, scales, end, most, found)
     if (status != DONE).any():
         from_others(section, source, parameters, drives, scales, end, most, loose, guesses, found)
@@ -682,7 +697,7 @@ def walk(section, source, angles, firsts, starts, change, known, y, w, moves, ro
                     break
             else:
                 return DIVERGED
-            tails[e] = tail_of(h, scale, w[e], moves[e])
+            tails[e] = tail_of(h, scale, section.along, w[e], moves[e])
             for j in range(n):
                 for i in range(n):
                     column[i] = 0.0

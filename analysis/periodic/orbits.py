@@ -26,7 +26,7 @@ from .drives import Drive
 from .floquet import TOLERANCE, StabilityVerdict, liouville, multipliers, verdict
 from .flows import DIRECTIONAL, GAP, PLAIN, STATE, VARIATIONAL, Flow
 from .orbit_kernels import NO_SOURCE, Section, Status
-from .starts import scale_in, scale_of, starts_of
+from .starts import is_smooth, scale_in, scale_of, starts_of
 from .turns import Turn, times_of
 
 #: Bound of the local error of a step; the solution is good to about a hundred times as much.
@@ -624,6 +624,7 @@ def largest_multipliers(
         turns,
         MOST_ITERATIONS,
         SEARCH_TOLERANCE,
+        all(map(is_smooth, dict.fromkeys(rows))),
         starting,
         starts,
         monodromies,

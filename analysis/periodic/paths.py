@@ -40,10 +40,12 @@ class PeriodPath:
     ----------
     angles : ndarray, shape (k + 1,)
         As in `Stations`.
+    smooth : bool
+        Whether all mechanisms are, see `is_smooth`; others are left to the integrator.
     """
 
-    def __init__(self, angles: NDArray[np.float64]) -> None:
-        self.angles = angles
+    def __init__(self, angles: NDArray[np.float64], smooth: bool) -> None:
+        self.angles, self.smooth = angles, smooth
         self._calls = self._pause = 0
         self._value: float | None = None
         self._mesh = self._firsts = self._y = self._w = self._moves = np.empty(0)
@@ -65,7 +67,7 @@ class PeriodPath:
             If a piece cannot be followed.
         """
         self._pause -= 1
-        if drive.speed_drive and self._pause < 0:
+        if drive.speed_drive and self.smooth and self._pause < 0:
             section = section_of(
                 parameters, drive, starts[0], PLAIN, VARIATIONAL, DIRECTIONAL, direction=direction, along=along
             )

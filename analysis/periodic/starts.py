@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.stats import qmc
 
 from linkwork.errors import AssemblyError
+from linkwork.parameters import field_name
 
 from ..mechanisms import Parameters, mechanism_of
 from .drives import Drive
@@ -34,6 +35,16 @@ def scale_in(
     """The same, where the flow and the numbers of the drive are at hand."""
     scale = flow.mechanism.error_scale(parameters, flow.state(start, vector))
     return np.array([scale[place] for place in flow.places])
+
+
+def is_smooth(parameters: Parameters) -> bool:
+    """Whether the rates are smooth over a turn: friction changes fast where a motion turns round, which only an integrator with
+    steps of its own is sure to meet."""
+    mechanism = mechanism_of(parameters)
+    rough = [name for name in mechanism.mechanism_variables if "friction" in name]
+    return not any(getattr(parameters, field_name(name)) for name in rough) and not mechanism.switched(
+        parameters.constants()
+    )
 
 
 def extent_of(parameters: Parameters, drive: Drive, guess: NDArray[np.float64]) -> NDArray[np.float64]:
