@@ -73,6 +73,11 @@ def search_options(command: Callable[..., Any]) -> Callable[..., Any]:
         force_option,
         workers_options(),
         click.option("--seed", type=click.IntRange(0), help="Of the search: the same seed gives the same linkages."),
+        click.option(
+            "--objective",
+            type=click.Choice(("error", "worst")),
+            help="What is made small: the quality function of the task, or the greatest error; in place of the case's.",
+        ),
     ):
         command = option(command)
     return command
@@ -194,6 +199,7 @@ def synthesize(
     case: str,
     settings: Sequence[str],
     method: str | None,
+    objective: str | None,
     seed: int | None,
     jobs: int | None,
     out: str,
@@ -222,7 +228,9 @@ def synthesize(
         load_synthesis_case,
     )
 
-    overrides = overrides_of(settings, search__method=method, search__seed=seed, search__jobs=jobs)
+    overrides = overrides_of(
+        settings, search__method=method, task__objective=objective, search__seed=seed, search__jobs=jobs
+    )
     check_kind(case, SYNTHESIS)
     chosen = load_synthesis_case(case, overrides)
     stopped: Interrupted | None = None

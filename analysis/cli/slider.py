@@ -38,6 +38,7 @@ def slider_motion(
     case: str,
     settings: Sequence[str],
     harmonics: int | None,
+    objective: str | None,
     seed: int | None,
     jobs: int | None,
     out: str,
@@ -53,12 +54,15 @@ def slider_motion(
     Examples:
       linkwork slider-motion examples/slider-motion.toml
       linkwork slider-motion examples/slider-motion.toml --set slider.stroke='20 mm' --harmonics 3
+      linkwork slider-motion examples/slider-motion.toml --objective worst
     """
     from ..files import write_csv
     from ..motion import load_slider_case
     from ..synthesis import SecondCrank, SliderMotion
 
-    overrides = overrides_of(settings, slider__harmonics=harmonics, search__seed=seed, search__jobs=jobs)
+    overrides = overrides_of(
+        settings, slider__harmonics=harmonics, task__objective=objective, search__seed=seed, search__jobs=jobs
+    )
     check_kind(case, SLIDER_MOTION, settings=overrides)
     chosen = load_slider_case(case, overrides)
     solution, stopped = _moved(chosen) if chosen.strategy is None else _strategy(chosen)
@@ -117,7 +121,7 @@ def _moved(chosen: SliderCase) -> tuple[Any, Interrupted | None]:
         if stopped:
             break
     _print_motions(chosen.synthesis.title, found)
-    return min(found[1:] or found, key=lambda s: s.error), stopped
+    return min(found[1:] or found, key=lambda s: s.value), stopped
 
 
 def _print_motions(title: str, solutions: Sequence[Solution]) -> None:

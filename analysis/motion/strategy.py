@@ -117,7 +117,7 @@ def simplest_mechanism(
         Of the quality function (m2; of a rocker function rad2), or of the worst error (m, of a motion with its errors of angle
         times its length; rad).
     criterion : "error" or "worst"
-        Which of them.
+        Which of them; with ``"worst"`` it is also what is made small, whatever the task's objective.
     bounds, constraints
         Of the links, as for `synthesize`: they hold for every mechanism.
     stroke : float, optional
@@ -157,6 +157,9 @@ def simplest_mechanism(
     for ratio in ratios:
         if not (isfinite(ratio) and ratio == int(ratio)):
             raise InputError(f"ratio {ratio} of the gears: it must be a whole number, or the path does not close")
+    if criterion == "worst":
+        # what is judged is what is made small
+        task = replace(task, objective="worst")
     tried = _Trials(task, tolerance, criterion, bounds, constraints, search)
     four_bar = tried.four_bar()
     if tried.met():
@@ -181,7 +184,7 @@ def simplest_mechanism(
         if found:
             geared[ratio] = found
     # from the best gears on, the second crank is turned by itself
-    ratio = min(geared, key=lambda r: geared[r].error, default=1)
+    ratio = min(geared, key=lambda r: geared[r].value, default=1)
     guesses = [geared.get(ratio, four_bar)]
     for count in numbers:
         crank = CrankUnknown(ratio=ratio, length=between, harmonics=count)

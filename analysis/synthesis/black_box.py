@@ -252,6 +252,7 @@ class BlackBox:
             converged=bool(result.success),
             violation=max(0.0, violation),
             worst=worst if violation > 0.0 else "",
+            excess="",
             status=str(result.message),
             iterations=int(result.nit),
         )
@@ -292,7 +293,8 @@ class BlackBox:
             squares = np.abs(self._traced(q, rotation, coupler) - normal.points) ** 2
         if normal.angle is not None:
             squares = squares + self._turned(q, rotation, coupler, rocker, normal.angle) ** 2
-        errors: FloatArray = squares @ normal.weights
+        weighted = squares * normal.weights
+        errors: FloatArray = np.sqrt(weighted.max(axis=1)) if normal.quality == "worst" else weighted.sum(axis=1)
         return errors
 
     def _turned(

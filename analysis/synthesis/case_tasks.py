@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from functools import partial
 from math import cos, sin, tau
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,7 +31,7 @@ from ..files import (
 )
 from ..units import quantity
 from .targets import TargetPath, function_from_formula, path_from_formula
-from .tasks import Motion, PrecisionPoints, RockerFunction, Straight, Task, TimedPath, UntimedPath, turn
+from .tasks import Motion, Objective, PrecisionPoints, RockerFunction, Straight, Task, TimedPath, UntimedPath, turn
 
 FloatArray = NDArray[np.float64]
 
@@ -165,8 +165,9 @@ def _only_with(table: Any, names: tuple[str, ...], source: str) -> None:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Formula:
-    """Range of the parameter of a formula: how many points of it, from where to where."""
+    """What is made small, and the range of the parameter of a formula: how many points of it, from where to where."""
 
+    objective: Objective = entry(Choice(get_args(Objective)), "error")
     n: int | None = entry(Whole(3), None)
     start: float | str | None = entry(_end, None)
     end: float | str | None = entry(_end, None)
@@ -228,7 +229,7 @@ class TimedPathTable(_Curve):
         points, _ = self._placed(folder)
         rotation = _rotation(self.rotation, len(points))
         at = turn(len(points)) if rotation is None else rotation
-        return TimedPath(points=points, rotation=rotation, weights=_weights(self.weights, at))
+        return TimedPath(points=points, rotation=rotation, weights=_weights(self.weights, at), objective=self.objective)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -251,7 +252,12 @@ class UntimedPathTable(_Curve):
             path = path.smoothed(self.smoothing.points, deviation=self.smoothing.deviation)
         weights = _weights(self.weights, None, len(path.points))
         return UntimedPath(
-            path=path, weights=weights, measure=self.measure, samples=self.samples, straight=self.straight
+            path=path,
+            weights=weights,
+            measure=self.measure,
+            samples=self.samples,
+            straight=self.straight,
+            objective=self.objective,
         )
 
 
@@ -272,7 +278,9 @@ class PrecisionPointsTable(_Curve):
         if self.angle is not None:
             angles = Many(Quantity("rad", bare=self.angle_unit))(self.angle, "task.angle")
             angle = np.array(angles) + (self.turn or 0.0)
-        return {"points": points, "angle": angle, "rotation": rotation, "length": self.length}
+        return {
+            "points": points, "angle": angle, "rotation": rotation, "length": self.length, "objective": self.objective,
+        }  # fmt: skip
 
     def task(self, folder: Path) -> Task:
         return PrecisionPoints(**self._body(folder))
@@ -321,7 +329,9 @@ class RockerFunctionTable(_Formula):
             rotation = _rotation(self.rotation, len(angle))
         at = turn(len(angle)) if rotation is None else rotation
         weights = _weights(self.weights, at)
-        return RockerFunction(angle=angle, rotation=rotation, weights=weights, mounting=self.mounting)
+        return RockerFunction(
+            angle=angle, rotation=rotation, weights=weights, mounting=self.mounting, objective=self.objective
+        )
 
 
 #: The table ``[task]`` of each kind.

@@ -126,7 +126,7 @@ class PivotRegion:
 
         shape = Polygon(corners)
         if not shape.is_valid or not shape.area > 0.0:
-            raise InputError(f"the region of pivot {self.pivot} crosses itself or has no area: {corners.tolist()}")
+            raise InputError(f"the region of pivot {self.pivot} crosses itself or has no area: {corners.tolist()} m")
         object.__setattr__(self, "polygon", corners)
 
     def pieces(self) -> list[FloatArray]:
@@ -285,6 +285,7 @@ def limits_of(
             )
     given = _ends(task, normal, bounds, constraints)
     _check_links(given, constraints)
+    _check_reach(given, normal)
     lows, highs = (np.array([given[name][end] for name in UNKNOWNS]) for end in (0, 1))
     shift, scale = np.zeros(len(UNKNOWNS)), np.ones(len(UNKNOWNS))
     shift[:2] = normal.origin.real, normal.origin.imag
@@ -332,7 +333,7 @@ def _ends(
     for name in (*LINKS, "point_distance"):
         low, high = ends[name]
         if name in LINKS and high <= 0.0:
-            raise ParameterError(f"bound of {name}", high, "be above zero: a link has a length")
+            raise ParameterError(f"bound of {name}", high, "be above zero (m): a link has a length")
         if caps and low > cap:
             raise InfeasibleError(
                 f"{name} is to be at least {low:g} m, and no link longer than {cap:g} m: no linkage has both"
@@ -381,7 +382,8 @@ def _ordered(name: str, ends: tuple[float | None, float | None], usual: tuple[fl
     if not np.isfinite([low, high]).all():
         raise ParameterError(f"bounds of {name}", ends, "be numbers, or None for an open end")
     if low > high:
-        raise InfeasibleError(f"{name} is to be at least {low:g} and at most {high:g}: no value is")
+        unit = "rad" if name in ANGLES else "m"
+        raise InfeasibleError(f"{name} is to be at least {low:g} {unit} and at most {high:g} {unit}: no value is")
     return low, high
 
 
@@ -395,4 +397,20 @@ def _check_links(given: Mapping[str, tuple[float, float]], constraints: Sequence
         raise InfeasibleError(
             f"the crank cannot turn fully: ground link and crank are at least {l1[0] + l2[0]:g} m together, coupler and rocker "
             f"at most {l3[1] + l4[1]:g} m"
+        )
+
+
+def _check_reach(given: Mapping[str, tuple[float, float]], normal: Normal) -> None:
+    """Make sure that the coupler point, which stays within crank and point distance of the shaft, can span the target."""
+    points = normal.points if normal.outline is None else normal.outline
+    if points is None:
+        return
+    x, y = points.real, points.imag
+    across = normal.unit * float(max(np.ptp(x), np.ptp(y)))
+    reach = 2.0 * (given["crank_length"][1] + given["point_distance"][1])
+    if reach < across:
+        raise InfeasibleError(
+            f"the coupler point cannot span the target, {1e3 * across:.4g} mm across: crank and point distance, of at most "
+            f"{1e3 * given['crank_length'][1]:.4g} mm and {1e3 * given['point_distance'][1]:.4g} mm, keep it within "
+            f"{1e3 * reach:.4g} mm"
         )

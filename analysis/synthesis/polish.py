@@ -1,7 +1,7 @@
 """From starts to optima: SciPy's least squares where bounds are all that is asked, IPOPT where there are inequalities.
 
-Both have exact Jacobians. An untimed path whose quality is an area is first fitted by least squares, the crank rotations of its
-stations among the unknowns, and then by the area itself, whose absolute value is sharpened step by step.
+Both have exact Jacobians. What is not a sum of squares is fitted by least squares first: an area, or the greatest distance of a
+path, then goes on in `analysis.synthesis.refine`, the greatest error at given stations as the least bound of all by IPOPT.
 """
 
 from __future__ import annotations
@@ -22,19 +22,18 @@ from linkwork.errors import InputError
 from .constraints import Limits
 from .kernels import coupler_path_jacobian, link_jacobian
 from .linkage import wrapped
-from .program import Objective, Program
+from .program import KEPT, Objective, Program
+from .refine import Refinement
 from .search import USUAL_SEARCH, Search, over_cores
-from .starts import Answer, PivotUnknown, SliderUnknown, Start, apart, inside
+from .starts import Answer, PivotUnknown, SliderUnknown, Start, apart, inside, outside
 from .tasks import Normal
 
 FloatArray = NDArray[np.float64]
 
-#: Sharpness of the area's absolute value, as shares of the root mean square distance that least squares left.
-BLURS = (0.3, 0.03)
 #: Untimed stations up to which least squares keeps up with IPOPT, whose Jacobian is sparse.
 FEW = 20
-#: How many of the fitted paths go on to the area.
-AREAS = 6
+#: How many of the fits go on to a measure that is no sum of squares.
+ONWARDS = 6
 #: How many of the best are followed to the end, by so many iterations more, where they were cut off.
 FINISHED, LONG = 4, 1500
 #: How many triangles of a region that is not convex are tried at a time.
@@ -49,18 +48,21 @@ EXACT = 1e-14
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Polished:
-    """The answers of all starts: those that keep every constraint, best first, and the others."""
+    """The answers of all starts: those that keep every constraint, best first, and the others; the starts that keep them."""
 
     kept: tuple[Answer, ...]
     others: tuple[Answer, ...]
     done: int
     interrupted: bool
+    begun: tuple[Answer, ...] = ()
 
     @classmethod
-    def of(cls, found: Sequence[Answer], kept: Sequence[Answer], interrupted: bool) -> Polished:
-        """What came of all searches, and those that are kept, perhaps polished further."""
+    def of(
+        cls, found: Sequence[Answer], kept: Sequence[Answer], interrupted: bool, begun: Sequence[Answer] = ()
+    ) -> Polished:
+        """What came of all searches, those that are kept, perhaps polished further, and the starts that keep them all."""
         others = tuple(a for a in found if not a.feasible)
-        return cls(kept=tuple(kept), others=others, done=len(found), interrupted=interrupted)
+        return cls(kept=tuple(kept), others=others, done=len(found), interrupted=interrupted, begun=tuple(begun))
 
     def reaching(self, quality: float, within: float = 0.01) -> int:
         """How many searches reached a quality, but for this share of it: "40 of 40 starts converge"."""
@@ -90,14 +92,14 @@ def polish(
     # an interruption after the last search has nothing to stop
     interrupted = interrupted and len(found) < len(starts)
     kept = kept_of(found)
-    if not interrupted:
-        if normal.normals is not None:
-            best = distinct(kept, AREAS, pivot)
-            kept, interrupted = over_cores(step("area"), best, search, "area")
-        elif pivot is None:
-            kept = [*map(worker.finish, kept[:FINISHED]), *kept[FINISHED:]]
-        kept = kept_of(kept)
-    return Polished.of(found, kept, interrupted)
+    begun = kept_of([worker.kept(start) for start in starts])
+    if not interrupted and normal.quality != "squares":
+        given = [answer for answer in begun if answer.start.given]
+        best = [*given, *distinct(kept, ONWARDS, pivot)]
+        kept, interrupted = over_cores(step("onwards"), best, search, normal.quality)
+    elif not interrupted:
+        kept = [*map(worker.finish, kept[:FINISHED]), *kept[FINISHED:]]
+    return Polished.of(found, kept_of(kept), interrupted, begun)
 
 
 def kept_of(answers: Sequence[Answer]) -> list[Answer]:
@@ -135,6 +137,7 @@ class Polisher:
         self.normal, self.limits, self.pivot = normal, limits, pivot
         few = normal.timed or normal.n <= FEW
         self.by_least_squares = limits.bounds_only and pivot is None and normal.straight is None and few
+        self._refinement: Refinement | None = None
         self._programs: dict[str, Program] = {}
 
     def program(self, objective: Objective) -> Program:
@@ -181,22 +184,56 @@ class Polisher:
 
     def finish(self, answer: Answer) -> Answer:
         """Go on where a search was cut off on a flat slope: else what is found there would depend on the last digits."""
-        if answer.converged or self.by_least_squares or self.normal.exact:
+        program = None if self.by_least_squares or self.normal.exact else self.program("squares")
+        if program is None:
             return answer
-        longer = self.program("squares").solve(answer.start, iterations=LONG)
-        return longer if longer.feasible and longer.start.quality < answer.start.quality else answer
+        if not answer.converged and self.pivot is None:
+            longer = program.solve(answer.start, iterations=LONG)
+            if longer.feasible and longer.start.quality < answer.start.quality:
+                answer = longer
+        return program.exact(answer, lambda start, places: program.solve(start, places=places))
 
-    def area(self, answer: Answer) -> Answer:
-        """From the least squares of an untimed path to its least area."""
-        program = self.program("area")
-        distance = max((answer.start.quality / self.normal.n) ** 0.5, 1e-9)
-        now = answer
-        for blur in BLURS:
-            following = program.solve(now.start, blur=blur * distance, gain=1.0 / distance)
-            if not following.feasible:
-                break
-            now = following
-        return replace(now, start=replace(now.start, quality=program.value(now.start)))
+    def onwards(self, answer: Answer) -> Answer:
+        """From least squares to the area, or to the greatest error."""
+        if self.normal.outline is not None:
+            refinement = self.refinement
+            found = refinement.refined(answer)
+            return refinement.program.exact(
+                found, lambda start, places: refinement.refined(replace(answer, start=start), places=places)
+            )
+        program = self.program("worst")
+        size = max(program.value(answer.start), 1e-9)
+
+        def solve(start: Start, places: Sequence[FloatArray] | None = None) -> Answer:
+            return program.solve(start, size=size, places=places)
+
+        as_it_is = replace(answer, start=replace(answer.start, quality=size))
+        if self.normal.exact and size**2 < EXACT:
+            return as_it_is
+        found = solve(answer.start)
+        if not (found.feasible and found.start.quality < size):
+            return as_it_is
+        return program.exact(found, solve)
+
+    @property
+    def refinement(self) -> Refinement:
+        """Of a path whose timing is free; made when it is first needed."""
+        if self._refinement is None:
+            self._refinement = Refinement(self.program("curve"))
+        return self._refinement
+
+    def kept(self, start: Start) -> Answer:
+        """A start as it is, whether it keeps every constraint and bound."""
+        if self.by_least_squares:
+            within = outside(self.normal, self.limits.low, self.limits.high, start) <= KEPT
+            quality = quality_of(self.normal, start)
+            return replace(
+                Answer.unjoined(start),
+                start=replace(start, q=inside(start.q, self.limits.low, self.limits.high), quality=quality),
+                feasible=within and np.isfinite(quality),
+            )
+        path = self.normal.outline is not None
+        return self.program("curve" if path else "squares").kept(start)
 
 
 # Least squares
@@ -306,6 +343,7 @@ def fit_least_squares(normal: Normal, limits: Limits, start: Start) -> Answer:
         converged=bool(result.success),
         violation=0.0 if ordered else inf,
         worst="" if ordered else "order of the stations",
+        excess="",
         status=str(result.message),
         iterations=int(result.nfev),
     )

@@ -7,11 +7,13 @@ shortest - comes as parameters, so that one program serves all starts.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 from functools import cached_property
-from math import cos, inf, isfinite, pi
+from itertools import product
+from math import acos, cos, degrees, inf, isfinite, pi
 from types import SimpleNamespace
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,12 +25,12 @@ from ..numerics import symbolic
 from ..run import traced as equations
 from .constraints import TURNING, UNKNOWNS, Limits, half_planes
 from .linkage import BY_SHORTEST, transmission_excess
-from .starts import Answer, CrankUnknown, PivotUnknown, SliderUnknown, Start, inside, pivot_bounds, pivot_size
-from .tasks import Normal
+from .starts import Answer, CrankUnknown, PivotUnknown, SliderUnknown, Start, inside, outside, pivot_bounds, pivot_size
+from .tasks import Normal, turn
 from .user_functions import physical, traced
 
 FloatArray = NDArray[np.float64]
-Objective = Literal["squares", "area", "transmission"]
+Objective = Literal["squares", "worst", "transmission", "curve"]
 
 #: Crank rotations at which a moving pivot's assembly, speed and acceleration are held within their limits, and what is added
 #: to the least transmission angle for what is between them (rad).
@@ -39,14 +41,36 @@ MARGIN = 1e-4
 FOLLOWING: dict[str, dict[str, Any]] = {
     "squares": {"mu_strategy": "adaptive"},
     "transmission": {"mu_strategy": "adaptive"},
-    "area": {"mu_strategy": "monotone", "mu_init": 1e-5, "bound_push": 1e-8, "bound_frac": 1e-8},
+    "worst": {"mu_strategy": "monotone", "mu_init": 1e-5, "bound_push": 1e-8, "bound_frac": 1e-8},
 }
 #: Iterations of IPOPT: most optima are reached in a hundred, or in many.
 ITERATIONS = 250
 #: Least rotation of the crank from one untimed station to the next, as a share of an even one.
 ADVANCE = 1e-3
+#: Least rotation over which an open path is traced (rad).
+LEAST_WAY = 1e-3
 #: Greatest, in even ones: in a wider gap the coupler point could wander off unseen between two stations.
 GAP = 8.0
+#: How far a constraint may be exceeded and yet be kept: units, rad, or a share of the bound.
+KEPT = 1e-7
+#: Share of the bounds of the pivot's motion that is left free at its extremes, and how often these are looked for again.
+HELD, ROUNDS = 2e-7, 6
+
+
+class Label(NamedTuple):
+    """Name of a constraint, and the factor and the unit in which it is written by how much it is violated."""
+
+    name: str
+    factor: float
+    unit: str
+
+    def measured(self, violation: float, q: FloatArray) -> str:
+        """By how much, with its unit; of a transmission angle, from what it does to the angle at the limit."""
+        if self.unit == "transmission":
+            least = self.factor
+            cosine = cos(least) + violation / (2.0 * float(q[4] * q[5]))
+            return f"{degrees(least - acos(min(1.0, cosine))):.3g} deg"
+        return f"{self.factor * violation:.3g} {self.unit}".strip()
 
 
 class Program:
@@ -58,9 +82,10 @@ class Program:
     limits : Limits
     pivot : PivotUnknown, optional
         Lengths in m, as the task; None of a fixed pivot.
-    objective : "squares", "area" or "transmission"
-        Weighted squared errors; the area between the curves, smoothed by ``blur`` of `solve`; or the least transmission angle,
-        greatest, with the stations met exactly.
+    objective : "squares", "worst", "transmission" or "curve"
+        Weighted squared errors; the greatest weighted error, as the least bound of all; the least transmission angle, greatest,
+        with the stations met exactly; or nothing but the constraints of a path, for `analysis.synthesis.refine`, whose measure
+        needs no stations: of their rotations only the ends of an open path and of its straight part are unknown.
     """
 
     def __init__(
@@ -70,26 +95,38 @@ class Program:
         casadi = self._casadi = symbolic.library()
         SX = casadi.SX
         self._unknowns: list[tuple[Any, FloatArray, FloatArray]] = []
-        self._constraints: list[tuple[Any, float, float, str]] = []
+        self._initial: list[Any] = []
+        #: Order of a derivative of the pivot's motion that is bounded, where its extremes are, and how they are curved; its
+        #: own first two derivatives there.
+        self._peaks: list[tuple[int, Any, Any]] = []
+        self._bent: list[Any] = []
+        self._constraints: list[tuple[Any, float, float, Label]] = []
+        self.knots: list[int] = list(range(normal.n))
         self._solvers: dict[int, Any] = {}
-        # parameters: branch, direction, blur, factor of the objective, rows of Grashof's type, half-planes of the regions
-        branch, direction, blur, gain = (SX.sym(name) for name in ("branch", "direction", "blur", "gain"))
+        self._share = SX.sym("share")
+        # parameters: branch, direction, magnitude of the errors, rows of Grashof's type, half-planes of the regions
+        branch, direction, size = (SX.sym(name) for name in ("branch", "direction", "size"))
         grashof = SX.sym("grashof", 6, 4)
         planes = [SX.sym(f"plane{k}", 3, 3) for k in range(len(limits.regions))]
         # unknowns: dimensions, motion of the pivot, crank rotations
         q = self._unknown("q", limits.low, limits.high)
         v = self._unknown("v", *pivot_bounds(pivot, normal.unit))
-        if normal.timed:
-            phi: Any = casadi.DM(normal.rotation)
-        else:
+        phi: Any = casadi.DM(normal.rotation) if normal.timed else None
+        knots: Any = None
+        if not normal.timed and objective != "curve":
             phi = self._unknown("phi", np.full(normal.n, -inf), np.full(normal.n, inf))
             self._ordered(phi, direction)
+        elif not normal.timed:
+            phi, knots = self._way_of_path(direction)
         p = SimpleNamespace(**{name: q[k] for k, name in enumerate(UNKNOWNS)})
-        quality = self._quality(p, v, phi, branch, blur)
+        self._phi = phi
+        self._point_at: Callable[[Any], Any] = lambda at: self._closed(p, v, at, branch)[1]
+        self._ends = (0.0, 2.0 * pi) if normal.closed or knots is None else (knots[0], knots[-1])
+        quality = self._quality(p, v, phi, branch, size)
         tilt: Any = None
         if objective == "transmission":
             # the largest |cos mu| of all, which is made small
-            tilt = self._unknown("tilt", np.zeros(1), np.array([cos(TURNING)]))
+            tilt = self._extra("tilt", 0.0, 0.0, cos(TURNING))
             quality = tilt + 1e-3 * casadi.sumsqr(q[2:6])
         self._assembled(p, v, phi, tilt)
         if limits.grashof:
@@ -103,28 +140,35 @@ class Program:
             self._at_most(casadi.mtimes(plane, casadi.vertcat(x, y, 1.0)), f"region of pivot {name}")
         for require in limits.requires:
             value = traced(require, physical(p, normal.unit, normal.origin)) / require.scale
-            self._within(value, 0.0 if require.equal else -inf, 0.0, require.name)
+            self._within(value, 0.0 if require.equal else -inf, 0.0, require.name, "", require.scale)
         if isinstance(pivot, SliderUnknown):
             quality = quality + self._slider(pivot, p.ground_length, v)
         if isinstance(pivot, CrankUnknown) and isfinite(pivot.speed):
-            x = casadi.DM(np.linspace(0.0, 2.0 * pi, GRID, endpoint=False))
-            rate = _series(casadi, v[2:], x, mean=False, order=1)
-            self._within(rate, -pivot.speed, pivot.speed, "speed of the second crank")
-        parameters = casadi.vertcat(branch, direction, blur, gain, *(casadi.vec(x) for x in (grashof, *planes)))
+            self._bounded(
+                lambda x: _series(casadi, v[2:], x, mean=False, order=1) / pivot.speed, 1, "speed of the second crank"
+            )
+        peaks = [symbol for _, *both in self._peaks for symbol in both]
+        parameters = casadi.vertcat(
+            branch, direction, size, self._share, *peaks, *(casadi.vec(x) for x in (grashof, *planes))
+        )
         z, lows, highs = zip(*self._unknowns)
         self.low, self.high = np.concatenate(lows), np.concatenate(highs)
-        self._g_low = np.concatenate([np.empty(0), *(np.full(e.numel(), a) for e, a, _, _ in self._constraints)])
-        self._g_high = np.concatenate([np.empty(0), *(np.full(e.numel(), b) for e, _, b, _ in self._constraints)])
-        self._labels = [name for e, _, _, name in self._constraints for _ in range(e.numel())]
+        self.g_low = np.concatenate([np.empty(0), *(np.full(e.numel(), a) for e, a, _, _ in self._constraints)])
+        self.g_high = np.concatenate([np.empty(0), *(np.full(e.numel(), b) for e, _, b, _ in self._constraints)])
+        self.labels = [name for e, _, _, name in self._constraints for _ in range(e.numel())]
         g = casadi.vertcat(SX(0, 1), *(casadi.vec(e) for e, _, _, _ in self._constraints))
-        self._nlp = {"x": casadi.vertcat(*z), "f": gain * quality, "g": g, "p": parameters}
-        self._extra = len(self.low) - len(UNKNOWNS) - v.numel() - (0 if normal.timed else normal.n)
+        self._nlp = {"x": casadi.vertcat(*z), "f": quality, "g": g, "p": parameters}
 
     def _unknown(self, name: str, low: FloatArray, high: FloatArray) -> Any:
         """A new column of unknowns between bounds."""
         symbol = self._casadi.SX.sym(name, len(low))
         self._unknowns.append((symbol, low, high))
         return symbol
+
+    def _extra(self, name: str, initial: Any, low: float = -inf, high: float = inf) -> Any:
+        """A new unknown that stands for a greatest value or the middle of a range, with what it is at a start."""
+        self._initial.append(initial)
+        return self._unknown(name, np.array([low]), np.array([high]))
 
     # Objective
 
@@ -159,12 +203,10 @@ class Program:
         psi = self.pivot.ratio * phi + v[1] + _series(casadi, v[2:], phi, mean=False)
         return v[0] * casadi.cos(psi), v[0] * casadi.sin(psi)
 
-    def _quality(self, p: Any, v: Any, phi: Any, branch: Any, blur: Any) -> Any:
+    def _quality(self, p: Any, v: Any, phi: Any, branch: Any, size: Any) -> Any:
         """The quality function; with it the constraints that belong to it."""
         casadi, normal = self._casadi, self.normal
         g, point = self._closed(p, v, phi, branch)
-        weights = casadi.DM(normal.weights)
-        quality: Any = 0.0
         ex: Any = None
         ey: Any = None
         if normal.points is not None:
@@ -176,51 +218,62 @@ class Program:
             ct, st = casadi.cos(wanted), casadi.sin(wanted)
             # the difference of the angles, without a jump at half a turn
             turned = casadi.atan2(s * ct - c * st, c * ct + s * st)
+        quality: Any = 0.0
         if self.objective == "transmission":
-            for value in (ex, ey, turned):
+            for value, unit in ((ex, "mm"), (ey, "mm"), (turned, "deg")):
                 if value is not None:
-                    self._within(value, 0.0, 0.0, "the stations")
+                    self._within(value, 0.0, 0.0, "the stations", unit)
             return quality
-        normals = normal.normals
-        if normals is not None:
-            across = ex * casadi.DM(normals.real) + ey * casadi.DM(normals.imag)
-            along = ex * casadi.DM(normals.imag) - ey * casadi.DM(normals.real)
-        if self.objective == "area":
-            # the strip between the curves, station by station along the target's normals
-            self._within(along, 0.0, 0.0, "stations on their normals")
-            quality = casadi.sum1(weights * casadi.DM(normal.arc) * (casadi.sqrt(across**2 + blur**2) - blur))
-        else:
-            if ex is not None:
-                quality = casadi.sum1(weights * (ex**2 + ey**2))
+        if self.objective != "curve":
+            squares: Any = 0.0 if ex is None else ex**2 + ey**2
             if turned is not None:
-                quality = quality + normal.leverage**2 * casadi.sum1(weights * turned**2)
-        straight, points = normal.straight, normal.points
-        if straight is not None and points is not None:
-            part = slice(straight.start, straight.end + 1)
-            line = points[straight.end] - points[straight.start]
-            line /= abs(line)
+                squares = squares + (normal.leverage * turned) ** 2
+            squares = casadi.DM(normal.weights) * squares
+            quality = casadi.sum1(squares)
+        if self.objective == "worst":
+            greatest = self._extra("greatest", casadi.sqrt(casadi.mmax(squares)) / size, 0.0)
+            self._at_most(squares / size**2 - greatest**2, "greatest error", "")
+            return greatest
+        return quality + self._straight_part(p, v, phi, branch, ex, ey)
+
+    def _straight_part(self, p: Any, v: Any, phi: Any, branch: Any, ex: Any, ey: Any) -> Any:
+        """Constraints of a straight part, and what is added to the quality where its flatness is only favoured."""
+        casadi, straight, points = self._casadi, self.normal.straight, self.normal.points
+        if straight is None or points is None:
+            return 0.0
+        part = slice(straight.start, straight.end + 1)
+        line = points[straight.end] - points[straight.start]
+        line /= abs(line)
+        spent = phi[straight.end] - phi[straight.start]
+        self._within(spent, -straight.rotation, straight.rotation, "crank rotation of the straight part", "deg")
+        if self.objective == "curve":
+            # its ends lie across from where the target's are
+            for k in (straight.start, straight.end):
+                self._within(ex[k] * line.real + ey[k] * line.imag, 0.0, 0.0, "ends of the straight part")
+        if straight.flatness is None:
             off = (ey * line.real - ex * line.imag)[part]
-            spent = phi[straight.end] - phi[straight.start]
-            self._within(spent, -straight.rotation, straight.rotation, "crank rotation of the straight part")
-            if straight.flatness is None:
-                quality = quality + (straight.weight - 1.0) * casadi.sumsqr(off)
-            else:
-                level = self._unknown("level", np.array([-inf]), np.array([inf]))
-                half = 0.5 * straight.flatness
-                # along the straight line through the part's ends, at the stations and in between
-                x, y = self._closed(p, v, self._way(phi[part])[0], branch)[1]
-                begin = points[straight.start]
-                away = (y - begin.imag) * line.real - (x - begin.real) * line.imag
-                self._within(away - level, -half, half, "flatness of the straight part")
-        return quality
+            return (straight.weight - 1.0) * casadi.sumsqr(off)
+        # along the straight line through the part's ends, at the stations and in between
+        x, y = self._closed(p, v, self._way(phi[part])[0], branch)[1]
+        begin = points[straight.start]
+        away = (y - begin.imag) * line.real - (x - begin.real) * line.imag
+        level = self._extra("level", 0.5 * (casadi.mmin(away) + casadi.mmax(away)))
+        half = 0.5 * straight.flatness
+        self._within(away - level, -half, half, "flatness of the straight part")
+        return 0.0
 
     # Constraints
 
-    def _within(self, value: Any, low: float, high: float, name: str) -> None:
-        self._constraints.append((value, low, high, name))
+    def _within(
+        self, value: Any, low: float, high: float, name: str, unit: str = "mm", factor: float | None = None
+    ) -> None:
+        """Keep a value between bounds; ``factor`` makes its unit of it, by default from units of length or rad."""
+        usual = {"mm": 1e3 * self.normal.unit, "deg": degrees(1.0)}
+        label = Label(name, usual.get(unit, 1.0) if factor is None else factor, unit)
+        self._constraints.append((value, low, high, label))
 
-    def _at_most(self, value: Any, name: str) -> None:
-        self._within(value, -inf, 0.0, name)
+    def _at_most(self, value: Any, name: str, unit: str = "mm", factor: float | None = None) -> None:
+        self._within(value, -inf, 0.0, name, unit, factor)
 
     def _ordered(self, phi: Any, direction: Any) -> None:
         """The stations come one after the other, within a turn."""
@@ -228,10 +281,35 @@ class Program:
         least = ADVANCE * 2.0 * pi / n
         steps = direction * (phi[1:] - phi[:-1])
         most = GAP * 2.0 * pi / n
-        self._within(steps, least, most, "order of the stations")
+        self._within(steps, least, most, "order of the stations", "deg")
         total = direction * (phi[n - 1] - phi[0])
         closing = (2.0 * pi - most, 2.0 * pi - least) if self.normal.closed else (-inf, 2.0 * pi)
-        self._within(total, *closing, "stations within a turn")
+        self._within(total, *closing, "stations within a turn", "deg")
+
+    def _way_of_path(self, direction: Any) -> tuple[Any, Any]:
+        """Stations of a path on even steps between the few whose rotations matter, and the rotations of these."""
+        casadi, normal = self._casadi, self.normal
+        ends = set() if normal.closed else {0, normal.n - 1}
+        part = () if normal.straight is None else (normal.straight.start, normal.straight.end)
+        fixed = self.knots = sorted(ends.union(part))
+        if not fixed:
+            return casadi.DM(turn(normal.n)), None
+        knots = self._unknown("knots", np.full(len(fixed), -inf), np.full(len(fixed), inf))
+        steps = direction * (knots[1:] - knots[:-1])
+        self._within(steps, LEAST_WAY, 2.0 * pi, "order of the stations", "deg")
+        most = 2.0 * pi - (LEAST_WAY if normal.closed else 0.0)
+        self._within(direction * (knots[-1] - knots[0]), LEAST_WAY, most, "stations within a turn", "deg")
+        # hat functions, and a turn after the first knot the first one again
+        at = [*fixed, fixed[0] + normal.n] if normal.closed else fixed
+        where = np.arange(fixed[0], fixed[0] + normal.n)
+        hats = np.array([np.interp(where, at, row) for row in np.eye(len(at))])
+        hats = np.roll(hats, fixed[0], axis=1)
+        lap = np.roll(where // normal.n, fixed[0])
+        phi = casadi.mtimes(casadi.DM(hats[: len(fixed)].T), knots)
+        if normal.closed:
+            again = casadi.DM(hats[-1])
+            phi = phi + again * (knots[0] + 2.0 * pi * direction) - 2.0 * pi * direction * casadi.DM(lap)
+        return phi, knots
 
     def _assembled(self, p: Any, v: Any, phi: Any, tilt: Any) -> None:
         """The transmission angle keeps its distance over the turn, over the way of the task, or both."""
@@ -254,7 +332,9 @@ class Program:
         """|cos mu| is at most cos(least), and at most the tilt: for squares of the distance BD, written without division."""
         for cosine in (cos(max(least, TURNING)), *([] if tilt is None else [tilt])):
             for excess in transmission_excess(p.coupler_length, p.rocker_length, nearest, farthest, cosine):
-                self._at_most(excess, "transmission angle")
+                self._at_most(
+                    excess, "transmission angle", "transmission", acos(cosine) if isinstance(cosine, float) else 0.0
+                )
 
     def _reach(self, p: Any, v: Any, x: Any) -> Any:
         """Square of the distance from crank pin to rocker pivot at rotations."""
@@ -274,27 +354,55 @@ class Program:
     def _slider(self, pivot: SliderUnknown, ground: Any, v: Any) -> Any:
         """Bounds of the slider's motion; what its smoothness adds to the quality."""
         casadi, unit = self._casadi, self.normal.unit
-        count = max(GRID, 16 * pivot.harmonics)
-        x = casadi.DM(np.linspace(0.0, 2.0 * pi, count, endpoint=False))
-        u = _series(casadi, v[1:], x)
-        # a trigonometric polynomial is nowhere larger than at these points but for this factor (Ehlich and Zeller 1964)
-        share = cos(pi * pivot.harmonics / count)
+
+        def position(x: Any) -> Any:
+            return _series(casadi, v[1:], x)
+
         if pivot.position is None:
-            self._at_most(u - ground, "slider position")
-            self._at_most(-u - ground, "slider position")
+            self._bounded(lambda x: position(x) / ground, 0, "slider position", "ground links")
         else:
-            self._within(u, pivot.position[0] / unit, pivot.position[1] / unit, "slider position")
+            low, high = (end / unit for end in pivot.position)
+            middle, half = 0.5 * (low + high), 0.5 * (high - low)
+            self._bounded(lambda x: (position(x) - middle) / half, 0, "slider position", "mm", 1e3 * unit * half)
         if isfinite(pivot.stroke):
-            middle = self._unknown("middle", np.array([-inf]), np.array([inf]))
-            half = 0.5 * share * pivot.stroke / unit
-            self._within(u - middle, -half, half, "stroke")
-        for order, bound, name in ((1, pivot.speed, "slider speed"), (2, pivot.acceleration, "slider acceleration")):
-            if isfinite(bound):
-                most = share * bound / unit
-                self._within(_series(casadi, v[1:], x, order=order), -most, most, name)
+            centre = self._extra("middle", 0.0)
+            reach = 0.5 * pivot.stroke / unit
+            # of both ends: the stroke is off by twice as much
+            self._bounded(lambda x: (position(x) - centre) / reach, 0, "stroke", "mm", 1e3 * pivot.stroke)
+            u = position(casadi.vertcat(casadi.DM(turn(max(GRID, 16 * pivot.harmonics))), self._peaks[-1][1]))
+            self._initial[-1] = 0.5 * (casadi.mmin(u) + casadi.mmax(u))
+        self._rate(v, 1, pivot.speed, "slider speed", "mm/rad")
+        self._rate(v, 2, pivot.acceleration, "slider acceleration", "mm/rad2")
         if not pivot.smoothness:
             return 0.0
-        return pivot.smoothness * casadi.sumsqr(_series(casadi, v[1:], x, order=2)) / count
+        x = casadi.DM(turn(max(GRID, 16 * pivot.harmonics)))
+        return pivot.smoothness * casadi.sumsqr(_series(casadi, v[1:], x, order=2)) / x.numel()
+
+    def _rate(self, v: Any, order: int, bound: float, name: str, unit: str) -> None:
+        """A derivative of the slider's position within a bound (m)."""
+        if isfinite(bound):
+            scale = self.normal.unit / bound
+            self._bounded(
+                lambda x: scale * _series(self._casadi, v[1:], x, order=order), order, name, unit, 1e3 * bound
+            )
+
+    def _bounded(self, value: Callable[[Any], Any], order: int, name: str, unit: str = "", factor: float = 1.0) -> None:
+        """A trigonometric polynomial of the crank's rotation stays within -1 and 1.
+
+        It is held at places all round and where the parameters say, less a share: of a first solution that which makes sure of
+        what is between the places, a trigonometric polynomial being nowhere larger than at these but for the cosine (Ehlich and
+        Zeller 1964); then none, the extremes of the solution before being among the places (`exact`).
+        """
+        casadi, harmonics = self._casadi, self.pivot.harmonics if self.pivot else 0
+        number = len(self._peaks)
+        places, bends = (casadi.SX.sym(f"{what}{number}", 2 * harmonics) for what in ("places", "bends"))
+        self._peaks.append((order, places, bends))
+        held, ones = value(places), casadi.DM.ones(2 * harmonics)
+        slope = casadi.jtimes(held, places, ones)
+        self._bent.append(casadi.horzcat(slope, casadi.jtimes(slope, places, ones)))
+        # to second order the height of the peak next to each place, wherever it moves
+        every = casadi.vertcat(value(casadi.DM(turn(max(GRID, 16 * harmonics)))), held + bends * slope**2)
+        self._within(every / self._share, -1.0, 1.0, name, unit, factor)
 
     # Solution
 
@@ -302,6 +410,55 @@ class Program:
     def _value(self) -> Any:
         """Objective and constraints as a function, to see whether a start can be evaluated at all."""
         return self._casadi.Function("value", [self._nlp["x"], self._nlp["p"]], [self._nlp["f"], self._nlp["g"]])
+
+    @cached_property
+    def _begin(self) -> Any:
+        """What the unknowns that stand for a greatest value or a middle are at a start."""
+        casadi = self._casadi
+        return casadi.Function(
+            "begin", [self._nlp["x"], self._nlp["p"]], [casadi.vertcat(casadi.SX(0, 1), *self._initial)]
+        )
+
+    @cached_property
+    def _curvature(self) -> Any:
+        """The first two derivatives, by the crank's rotation, of what is bounded of the pivot's motion, at the places held."""
+        function = self._casadi.Function("curvature", [self._nlp["x"], self._nlp["p"]], self._bent)
+        return lambda z, parameters: function.call([z, parameters])
+
+    @cached_property
+    def _slopes(self) -> Any:
+        """Gradient of the objective and Jacobian of the constraints, dense, as a function."""
+        casadi, (x, p, f, g) = self._casadi, (self._nlp[name] for name in "xpfg")
+        both = [casadi.densify(casadi.jacobian(e, x)) for e in (casadi.SX(f), g)]
+        return casadi.Function("slopes", [x, p], both)
+
+    def stated(self, z: FloatArray, parameters: FloatArray) -> tuple[float, FloatArray]:
+        """The objective at unknowns and parameters of `at`, and the constraints, kept between `g_low` and `g_high`."""
+        objective, constraints = self._value(z, parameters)
+        return float(objective), np.asarray(constraints).ravel()
+
+    def slopes_at(self, z: FloatArray, parameters: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Gradient of the objective, shape (k,), and Jacobian of the constraints, shape (m, k), there."""
+        gradient, jacobian = (np.asarray(value) for value in self._slopes(z, parameters))
+        return gradient.ravel(), jacobian
+
+    def stations(self, z: FloatArray, parameters: FloatArray) -> FloatArray:
+        """Crank rotations of the stations there."""
+        return np.asarray(self._stations(z, parameters)).ravel()
+
+    @cached_property
+    def _stations(self) -> Any:
+        x, p = self._nlp["x"], self._nlp["p"]
+        return self._casadi.Function("stations", [x, p], [self._casadi.SX(self._phi)])
+
+    @cached_property
+    def trace(self) -> Any:
+        """The coupler point, shape (2, 1), at a share of the way of a path, and its derivatives, as a function."""
+        casadi, x, p = self._casadi, self._nlp["x"], self._nlp["p"]
+        share = casadi.SX.sym("share")
+        first, last = self._ends
+        place = casadi.vertcat(*self._point_at(first + share * (last - first)))
+        return casadi.Function("point", [x, p, share], [place, casadi.densify(casadi.jacobian(place, x))])
 
     def _solver(self, iterations: int) -> Any:
         """IPOPT with this many iterations at most."""
@@ -332,90 +489,165 @@ class Program:
         return order
 
     def value(self, start: Start) -> float:
-        """The objective of a start, the area not smoothed; infinite where the links cannot be joined."""
-        parts = [start.q, start.pivot if len(start.pivot) else np.zeros(pivot_size(self.pivot))]
-        if start.rotation is not None:
-            parts.append(start.rotation)
-        parameters = np.zeros(self._nlp["p"].numel())
-        parameters[[0, 1, 3]] = start.branch, 1.0, 1.0
-        f = float(self._value(np.concatenate([*parts, np.zeros(self._extra)]), parameters)[0])
+        """The objective of a start; infinite where the links cannot be joined."""
+        f = self.stated(*self.at(start))[0]
         return f if isfinite(f) else inf
+
+    def at(
+        self,
+        start: Start,
+        *,
+        size: float = 1.0,
+        pieces: Sequence[int] | None = None,
+        places: Sequence[FloatArray] | None = None,
+        share: float | None = None,
+    ) -> tuple[FloatArray, FloatArray]:
+        """Unknowns and parameters of a start; see `solve`."""
+        count = pivot_size(self.pivot)
+        pivot = np.zeros(count) if len(start.pivot) == 0 else start.pivot
+        if len(pivot) != count:
+            raise InputError(f"a start with {len(pivot)} unknowns of the pivot: there must be {count}")
+        known = [inside(start.q, self.low[: len(UNKNOWNS)], self.high[: len(UNKNOWNS)]), pivot]
+        direction = 1.0
+        if not self.normal.timed:
+            if start.rotation is None:
+                raise InputError("the start of an untimed task needs the crank rotations of its stations")
+            known.append(start.rotation[self.knots])
+            direction = float(np.sign(start.rotation[-1] - start.rotation[0]) or 1.0)
+        z = np.concatenate([*known, np.zeros(len(self._initial))])
+        harmonics = 0 if self.pivot is None else self.pivot.harmonics
+        if share is None:
+            share = cos(pi * harmonics / max(GRID, 16 * harmonics)) if places is None else 1.0 - HELD
+        held = [np.zeros(2 * harmonics)] * len(self._peaks) if places is None else places
+        chosen = [nearest[0] for nearest in self.nearest_pieces(z)] if pieces is None else pieces
+        parameters = np.concatenate(
+            [
+                [float(start.branch), direction, size, share],
+                *(part for own in held for part in (own, np.zeros(2 * harmonics))),
+                _grashof_rows(self.limits.grashof, z[2:6]).ravel(order="F"),
+                *(half_planes(triangles[k]).ravel(order="F") for (_, triangles), k in zip(self.limits.regions, chosen)),
+            ]
+        )
+        z = np.clip(z, self.low, self.high)
+        if self._initial:
+            z[-len(self._initial) :] = np.asarray(self._begin(z, parameters)).ravel()
+        if self._peaks and places is not None:
+            for number, derivatives in enumerate(self._curvature(z, parameters)):
+                slope, bend = np.asarray(derivatives).reshape(-1, 2).T
+                true = (np.abs(slope) < 1e-6) & (np.abs(bend) > 1e-3)
+                begin = 4 + (2 * number + 1) * 2 * harmonics
+                parameters[begin : begin + 2 * harmonics] = np.where(true, -0.5 / np.where(true, bend, 1.0), 0.0)
+        return np.clip(z, self.low, self.high), parameters
 
     def solve(
         self,
         start: Start,
         *,
-        blur: float = 1e-3,
-        gain: float = 1.0,
+        size: float = 1.0,
         iterations: int = ITERATIONS,
         pieces: Sequence[int] | None = None,
+        places: Sequence[FloatArray] | None = None,
     ) -> Answer:
         """Solve from a start.
 
         Parameters
         ----------
         start : Start
-        blur : float
-            Distance below which an area's absolute value is smooth (units).
-        gain : float
-            Factor on the objective, one over its magnitude.
+        size : float
+            Magnitude of the greatest error (units), where that is made small.
         iterations : int
             At most.
         pieces : sequence of int, optional
             Which triangle of each region; the nearest by default.
+        places : sequence of ndarray, optional
+            Where the extremes of the bounded motions of the pivot are, of `extremes`; without, the bounds are held with what
+            makes sure of them everywhere.
         """
-        limits = self.limits
-        lower, upper = self.low, self.high
-        size = pivot_size(self.pivot)
-        pivot = np.zeros(size) if len(start.pivot) == 0 else start.pivot
-        if len(pivot) != size:
-            raise InputError(f"a start with {len(pivot)} unknowns of the pivot: there must be {size}")
-        guess = [start.q, pivot]
-        direction = 1.0
-        if not self.normal.timed:
-            if start.rotation is None:
-                raise InputError("the start of an untimed task needs the crank rotations of its stations")
-            guess.append(start.rotation)
-            direction = float(np.sign(start.rotation[-1] - start.rotation[0]) or 1.0)
-        guess[0] = inside(start.q, lower[: len(UNKNOWNS)], upper[: len(UNKNOWNS)])
-        z0 = np.clip(np.concatenate([*guess, np.zeros(self._extra)]), lower, upper)
-        parameters = [
-            float(start.branch),
-            direction,
-            blur,
-            gain,
-            *_grashof_rows(limits.grashof, z0[2:6]).ravel(order="F"),
-        ]
-        chosen = [nearest[0] for nearest in self.nearest_pieces(z0)] if pieces is None else pieces
-        for (_, triangles), k in zip(limits.regions, chosen):
-            parameters += half_planes(triangles[k]).ravel(order="F").tolist()
-        if not all(np.isfinite(np.asarray(value)).all() for value in self._value(z0, parameters)):
+        z0, parameters = self.at(start, size=size, pieces=pieces, places=places)
+        if not all(np.isfinite(value).all() for value in self.stated(z0, parameters)):
             return Answer.unjoined(start)
         solver = self._solver(iterations)
-        result = solver(x0=z0, lbx=lower, ubx=upper, lbg=self._g_low, ubg=self._g_high, p=parameters)
+        result = solver(x0=z0, lbx=self.low, ubx=self.high, lbg=self.g_low, ubg=self.g_high, p=parameters)
         stats = solver.stats()
-        z = np.asarray(result["x"]).ravel()
-        # evaluated anew: where IPOPT ends at a number that is not one, CasADi returns zeros
-        f, g = (np.asarray(value).ravel() for value in self._value(z, parameters))
-        over = np.maximum(self._g_low - g, g - self._g_high) if np.isfinite(g).all() else np.full(len(g), inf)
-        violation = float(over.max(initial=0.0))
-        end = len(UNKNOWNS) + size
-        answer = Start(
-            q=z[: len(UNKNOWNS)],
-            branch=start.branch,
-            pivot=z[len(UNKNOWNS) : end],
-            rotation=None if self.normal.timed else z[end : end + self.normal.n],
-            quality=float(f[0]) / gain,
-        )
-        return Answer(
-            start=answer,
-            feasible=violation <= 1e-7 and bool(np.isfinite(z).all()) and isfinite(answer.quality),
+        answer = self.judged(np.asarray(result["x"]).ravel(), parameters, start)
+        return replace(
+            answer,
             converged=bool(stats["success"]),
-            violation=violation,
-            worst=self._labels[int(np.argmax(over))] if len(over) else "",
             status=str(stats["return_status"]),
             iterations=int(stats["iter_count"]),
         )
+
+    def judged(self, z: FloatArray, parameters: FloatArray, start: Start) -> Answer:
+        """What unknowns are as an answer: evaluated anew, since where IPOPT ends at no number, CasADi returns zeros."""
+        f, g = self.stated(z, parameters)
+        over = np.maximum(self.g_low - g, g - self.g_high) if np.isfinite(g).all() else np.full(len(g), inf)
+        violation = float(over.max(initial=0.0))
+        worst = self.labels[int(np.argmax(over))] if len(over) else None
+        ended = self.start_at(z, start, f * (float(parameters[2]) if self.objective == "worst" else 1.0))
+        return Answer(
+            start=ended,
+            feasible=violation <= KEPT and bool(np.isfinite(z).all()) and isfinite(ended.quality),
+            converged=True,
+            violation=violation,
+            worst=worst.name if worst else "",
+            excess=worst.measured(violation, z) if worst else "",
+            status="",
+            iterations=0,
+        )
+
+    def start_at(self, z: FloatArray, start: Start, quality: float) -> Start:
+        """Unknowns as a start; of stations whose rotations are not unknown they are left as they were."""
+        end = len(UNKNOWNS) + pivot_size(self.pivot)
+        rotation = None if self.normal.timed else start.rotation
+        if not self.normal.timed and len(self.knots) == self.normal.n:
+            rotation = z[end : end + self.normal.n]
+        return Start(
+            q=z[: len(UNKNOWNS)], branch=start.branch, pivot=z[len(UNKNOWNS) : end], rotation=rotation, quality=quality
+        )
+
+    def kept(self, start: Start) -> Answer:
+        """A start as it is: whether it keeps every constraint, its bounds too, and how far it is from that."""
+        places = self.extremes(start)
+        ways = product(*(range(len(triangles)) for _, triangles in self.limits.regions))
+        best: Answer | None = None
+        for way in ways:
+            z, parameters = self.at(start, pieces=way, places=places, share=1.0)
+            answer = self.judged(z, parameters, start)
+            if best is None or answer.violation < best.violation:
+                best = answer
+        assert best is not None
+        pivot = float(np.abs(best.start.pivot - start.pivot).max(initial=0.0))
+        within = max(outside(self.normal, self.low, self.high, start), pivot) <= KEPT
+        return replace(best, feasible=best.feasible and within)
+
+    def exact(self, answer: Answer, solve: Callable[[Start, Sequence[FloatArray]], Answer]) -> Answer:
+        """Solve again and again with the bounds of the pivot's motion held at its extremes, until these stay where they are."""
+        if not self._peaks:
+            return answer
+        now = answer
+        for _ in range(ROUNDS):
+            following = solve(now.start, self.extremes(now.start))
+            if not following.feasible:
+                return answer
+            now = following
+            if self.kept(now.start).feasible:
+                return now
+        return answer
+
+    def extremes(self, start: Start) -> list[FloatArray]:
+        """Where the pivot's motion, or a derivative of it, has its extremes: the angles of the roots of the next one."""
+        if not self._peaks:
+            return []
+        harmonics = np.arange(1, self.pivot.harmonics + 1) if self.pivot else np.empty(0)
+        waves = 0.5 * (start.pivot[2::2] - 1j * start.pivot[3::2])
+        found = []
+        for order, *_ in self._peaks:
+            half = (1j * harmonics) ** (order + 1) * waves
+            roots = np.roots(np.concatenate([half[::-1], [0.0], half.conj()]))
+            places = np.zeros(2 * len(harmonics))
+            places[: len(roots)] = np.angle(roots)
+            found.append(places)
+        return found
 
 
 def _series(casadi: Any, coefficients: Any, x: Any, *, mean: bool = True, order: int = 0) -> Any:

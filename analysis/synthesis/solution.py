@@ -16,7 +16,7 @@ from linkwork.five_bar.parameters import FiveBarParameters
 
 from ..files import write_csv
 from ..notebook import Shown
-from .areas import area_between, distance_to, straightness
+from .areas import area_between, distance_to, hausdorff, straightness
 from .kernels import PLACES
 from .linkage import Linkage, SecondCrank, wrapped
 from .targets import halves
@@ -38,6 +38,8 @@ class Evaluation:
     ----------
     error : float
         The task's quality function: m2, of a rocker function rad2.
+    value : float
+        What the task's objective makes small: the quality function, or the greatest error (m, of a rocker function rad).
     errors : ndarray, shape (n,)
         At each target: distance (m), of an untimed path from the target's point to the curve; of a rocker function, angle
         (rad).
@@ -50,6 +52,7 @@ class Evaluation:
     """
 
     error: float
+    value: float
     errors: FloatArray
     angle_errors: FloatArray | None
     rotation: FloatArray | None
@@ -99,8 +102,8 @@ def evaluate(task: Task, linkage: Linkage, rotation: FloatArray | None = None) -
     at = np.asarray(given, dtype=float)
     if isinstance(task, RockerFunction):
         left = wrapped(linkage.rocker_angle(at) - np.asarray(task.angle))
-        error = float(np.asarray(task.weights) @ left**2)
-        return Evaluation(error=error if np.isfinite(error) else inf, errors=left, angle_errors=None, rotation=at)
+        error, value = _of_stations(task, np.asarray(task.weights) * left**2)
+        return Evaluation(error=error, value=value, errors=left, angle_errors=None, rotation=at)
     points = np.asarray(task.points)
     distance = np.hypot(*(linkage.path(at) - points).T)
     weights = np.ones(len(points)) if isinstance(task, PrecisionPoints) else np.asarray(task.weights)
@@ -109,10 +112,16 @@ def evaluate(task: Task, linkage: Linkage, rotation: FloatArray | None = None) -
     if not isinstance(task, TimedPath) and task.angle is not None:
         turned, length = wrapped(linkage.coupler_angle(at) - np.asarray(task.angle)), float(task.length or 0.0)
         squares = squares + (length * turned) ** 2
-    error = float(weights @ squares)
-    return Evaluation(
-        error=error if np.isfinite(error) else inf, errors=distance, angle_errors=turned, rotation=at, length=length
-    )
+    error, value = _of_stations(task, weights * squares)
+    return Evaluation(error=error, value=value, errors=distance, angle_errors=turned, rotation=at, length=length)
+
+
+def _of_stations(task: Task, squares: FloatArray) -> tuple[float, float]:
+    """Quality function, and what the objective makes small, from the weighted squared errors."""
+    error = float(squares.sum())
+    if not np.isfinite(error):
+        return inf, inf
+    return error, error if task.objective == "error" else float(squares.max()) ** 0.5
 
 
 def _of_path(task: UntimedPath, linkage: Linkage, rotation: FloatArray | None) -> Evaluation:
@@ -126,7 +135,7 @@ def _of_path(task: UntimedPath, linkage: Linkage, rotation: FloatArray | None) -
     curve = linkage.path(phi)
     points = np.asarray(path.points)
     if not np.isfinite(curve).all():
-        return Evaluation(error=inf, errors=np.full(len(points), inf), angle_errors=None, rotation=rotation)
+        return Evaluation(error=inf, value=inf, errors=np.full(len(points), inf), angle_errors=None, rotation=rotation)
     distance = distance_to(curve, points, closed=path.closed)
     weights = np.asarray(task.weights)
     normal = normal_form(task)
@@ -143,7 +152,8 @@ def _of_path(task: UntimedPath, linkage: Linkage, rotation: FloatArray | None) -
         nearest = np.abs(traced[:, None] - stations[None, :]).argmin(axis=1)
         back = halves(steps, path.closed) * distance_to(points, curve, closed=path.closed)
         error = 0.5 * float(normal.weights @ (normal.unit * normal.arc * apart) + normal.weights[nearest] @ back)
-    return Evaluation(error=error, errors=distance, angle_errors=None, rotation=rotation)
+    value = error if task.objective == "error" else hausdorff(curve, path, closed=path.closed)
+    return Evaluation(error=error, value=value, errors=distance, angle_errors=None, rotation=rotation)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -303,6 +313,11 @@ class Solution(Shown):
         return self.evaluation.error
 
     @property
+    def value(self) -> float:
+        """What the task's objective makes small: `error`, or the greatest error (m; of a rocker function, rad)."""
+        return self.evaluation.value
+
+    @property
     def rotation(self) -> FloatArray:
         """Crank rotations over which the task is done: its stations, or a turn."""
         if self.evaluation.rotation is not None and not (isinstance(self.task, UntimedPath) and self.task.path.closed):
@@ -428,10 +443,13 @@ def nearest_rotations(
 
 
 def ranked(solutions: Sequence[Solution]) -> tuple[Solution, ...]:
-    """Sound ones first, then by error; those that are exact but for rounding by their transmission angle."""
+    """Sound ones first, then by what the objective makes small.
+
+    Those that are exact but for rounding come in the order of their transmission angles.
+    """
 
     def place(solution: Solution) -> tuple[bool, float, float]:
         exact = solution.error <= EXACT * normal_form(solution.task).unit ** 2
-        return not solution.verdicts.sound, 0.0 if exact else solution.error, -solution.linkage.least_transmission
+        return not solution.verdicts.sound, 0.0 if exact else solution.value, -solution.linkage.least_transmission
 
     return tuple(sorted(solutions, key=place))

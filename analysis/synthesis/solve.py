@@ -277,12 +277,22 @@ def solutions_of(
     task: Task, normal: Normal, limits: Limits, done: Polished, pivot: PivotUnknown | None, count: int
 ) -> tuple[Solution, ...]:
     """Answers as solutions, each evaluated afresh, ranked, and at most so many."""
-    chosen = distinct(done.kept, 4 * count, pivot)
-    made = [
-        Solution.of(task, linkage_of(a.start, normal, pivot, limits), _stations(task, normal, a.start.rotation))
-        for a in chosen
-    ]
-    return ranked([s for s in made if isfinite(s.error)])[:count]
+
+    def made(answers: Sequence[Answer]) -> tuple[Solution, ...]:
+        found = (
+            Solution.of(task, linkage_of(a.start, normal, pivot, limits), _stations(task, normal, a.start.rotation))
+            for a in answers
+        )
+        return ranked([s for s in found if isfinite(s.error)])
+
+    solutions = made(distinct(done.kept, 4 * count, pivot))
+    # what a search began with counts by itself where it is better than all that came of it
+    first = made(done.begun)[:1]
+    return (
+        ranked([*first, *solutions])[:count]
+        if first and ranked([*solutions[:1], *first])[0] is first[0]
+        else solutions[:count]
+    )
 
 
 def _stations(task: Task, normal: Normal, rotation: NDArray[np.float64] | None) -> NDArray[np.float64] | None:
@@ -305,8 +315,8 @@ def infeasible(done: Polished) -> InfeasibleError:
     nearest: Answer = min(done.others, key=lambda a: a.violation)
     return InfeasibleError(
         f"no linkage keeps all bounds and constraints: of {len(done.others)} searches the nearest violates "
-        f"the {nearest.worst or 'quality'} by {nearest.violation:.3g} (in units of the target's size, or rad; "
-        f"{nearest.status.replace('_', ' ').lower()})"
+        f"the {nearest.worst or 'quality'}{f' by {nearest.excess}' if nearest.excess else ''} "
+        f"({nearest.status.replace('_', ' ').lower()})"
     )
 
 

@@ -123,25 +123,32 @@ class Start:
     rotation : ndarray, shape (n,), or None
         Crank rotations of the stations where they are unknown.
     quality : float
-        In units squared.
+        In units squared; of a greatest error, in units.
+    given : bool
+        Whether it is a guess.
     """
 
     q: FloatArray
     branch: int
     quality: float = inf
+    given: bool = False
     pivot: FloatArray = field(default_factory=lambda: np.empty(0))
     rotation: FloatArray | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Answer:
-    """Where an optimiser ended, whether every constraint is satisfied there, which is violated most, and its status."""
+    """Where an optimiser ended, whether every constraint is satisfied there, which is violated most, and its status.
+
+    By how much it is, ``violation`` is in units, rad or shares of a bound, ``excess`` a text with its unit.
+    """
 
     start: Start
     feasible: bool
     converged: bool
     violation: float
     worst: str
+    excess: str
     status: str
     iterations: int
 
@@ -154,6 +161,7 @@ class Answer:
             converged=False,
             violation=inf,
             worst="loop closure",
+            excess="",
             status="the links cannot be joined at the start",
             iterations=0,
         )
@@ -210,6 +218,18 @@ def inside(q: FloatArray, low: FloatArray, high: FloatArray) -> FloatArray:
     return np.clip(q, low, high)
 
 
+def outside(normal: Normal, low: FloatArray, high: FloatArray, start: Start) -> float:
+    """How far a start is from its bounds (units, rad), in the dimensions that the task sees."""
+    q = inside(start.q, low[: len(UNKNOWNS)], high[: len(UNKNOWNS)])
+    off = np.abs(wrapped(q - start.q))
+    off[:7] = np.abs(q - start.q)[:7]
+    idle: tuple[str, ...] = () if normal.angle is not None else ("output_angle",)
+    if normal.of_rocker:
+        idle = ("pivot_x", "pivot_y", "point_distance", "ground_angle", "point_angle")
+    off[[UNKNOWNS.index(name) for name in idle]] = 0.0
+    return float(off.max())
+
+
 def linkage_of(
     start: Start, normal: Normal, pivot: PivotUnknown | None = None, limits: Limits | None = None
 ) -> Linkage:
@@ -254,7 +274,7 @@ def start_of(
             series = linkage.pivot.series.to_order(pivot.harmonics)
             v[0], v[1] = linkage.pivot.length / normal.unit, linkage.pivot.phase
             v[2::2], v[3::2] = series.cos[1:], series.sin[1:]
-    return Start(q=q, branch=linkage.branch, pivot=v, rotation=rotation)
+    return Start(q=q, branch=linkage.branch, pivot=v, rotation=rotation, given=True)
 
 
 def apart(items: Iterable[Item], mark: Callable[[Item], FloatArray], distance: float, count: int) -> list[Item]:

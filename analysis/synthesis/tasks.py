@@ -13,7 +13,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from math import hypot, isfinite, pi
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -24,7 +24,12 @@ from ..units import in_si
 from .targets import TargetPath, halves
 
 FloatArray = NDArray[np.float64]
+#: Size of a body that only turns, where none is given (m).
+TURNED = 0.1
+
 Measure = Literal["area", "distance"]
+Objective = Literal["error", "worst"]
+Quality = Literal["squares", "area", "worst"]
 
 
 def _points(values: ArrayLike, what: str, least: int) -> FloatArray:
@@ -34,12 +39,25 @@ def _points(values: ArrayLike, what: str, least: int) -> FloatArray:
     _finite(points, what)
     if len(points) < least:
         raise InputError(f"{what}: {len(points)} are too few, there must be at least {least}")
-    same = np.nonzero((np.diff(points, axis=0) == 0.0).all(axis=1))[0]
-    if len(same):
-        raise InputError(
-            f"{what}: points {same[0]} and {same[0] + 1} are the same, {points[same[0]].tolist()}; leave one out"
-        )
     return points
+
+
+def _different(points: FloatArray, what: str, rotation: ArrayLike | None, angle: FloatArray | None = None) -> None:
+    """Without crank rotations a target cannot follow itself: there is no time in which to dwell."""
+    same = (np.diff(points, axis=0) == 0.0).all(axis=1)
+    if angle is not None:
+        same &= np.diff(angle) == 0.0
+    if rotation is None and same.any():
+        k = int(np.argmax(same))
+        place = f"{points[k].tolist()} m" + ("" if angle is None else f" at {angle[k]:.6g} rad")
+        raise InputError(
+            f"{what}: numbers {k} and {k + 1} are the same, {place}; leave one out, or give crank rotations for a dwell"
+        )
+
+
+def _extended(points: FloatArray, what: str) -> None:
+    if not _extent(points) > 0.0:
+        raise InputError(f"all {what} are the same, {points[0].tolist()} m: a path has an extent")
 
 
 def _finite(values: FloatArray, what: str) -> None:
@@ -83,6 +101,11 @@ def _weights(values: ArrayLike | None, n: int) -> FloatArray:
     return weights
 
 
+def _check_objective(objective: str) -> None:
+    if objective not in get_args(Objective):
+        raise InputError(f"objective is {objective!r}: it must be 'error' or 'worst'")
+
+
 def _set(task: Any, **values: Any) -> None:
     """Set fields of a frozen task as it is made."""
     for name, value in values.items():
@@ -102,19 +125,25 @@ class TimedPath:
     Attributes
     ----------
     points : ndarray, shape (n, 2)
-        m.
+        m, at least three; the same one over successive rotations is a dwell.
     rotation : ndarray, shape (n,)
         Crank rotation from the start (rad), within a turn; equal steps over one turn by default.
     weights : ndarray, shape (n,)
         Of the squared distances.
+    objective : "error" or "worst"
+        What is made small: the quality function, or the greatest error, times the root of its weight.
     """
 
     points: ArrayLike
     rotation: ArrayLike | None = None
     weights: ArrayLike | None = None
+    objective: Objective = "error"
 
     def __post_init__(self) -> None:
-        points = _points(self.points, "target points", 2)
+        _check_objective(self.objective)
+        # two are met exactly by any number of linkages
+        points = _points(self.points, "target points", 3)
+        _extended(points, "target points")
         n = len(points)
         _set(self, points=points, rotation=_rotation(self.rotation, n), weights=_weights(self.weights, n))
 
@@ -170,6 +199,9 @@ class UntimedPath:
         A straight part run through within a crank rotation; its points are those of ``path``.
     weights : ndarray, shape (number of the path's points,), optional
         Per point of ``path``; in between they are interpolated along it.
+    objective : "error" or "worst"
+        What is made small: the quality function, or the Hausdorff distance between curve and path, in which weights do not
+        count.
     """
 
     path: TargetPath
@@ -177,8 +209,10 @@ class UntimedPath:
     samples: int = 72
     straight: Straight | None = None
     weights: ArrayLike | None = None
+    objective: Objective = "error"
 
     def __post_init__(self) -> None:
+        _check_objective(self.objective)
         if self.measure not in ("area", "distance"):
             raise InputError(f"measure is {self.measure!r}: it must be 'area' or 'distance'")
         if self.samples < 8:
@@ -203,18 +237,26 @@ class RockerFunction:
         As in `TimedPath`; the weights are of the squared errors of angle.
     mounting : bool
         Whether the output may be mounted on the rocker at any angle.
+    objective : "error" or "worst"
+        What is made small: the quality function, or the greatest error, as in `TimedPath`.
     """
 
     angle: ArrayLike
     rotation: ArrayLike | None = None
     weights: ArrayLike | None = None
     mounting: bool = False
+    objective: Objective = "error"
 
     def __post_init__(self) -> None:
+        _check_objective(self.objective)
         angle = np.array(self.angle, dtype=float)
         if angle.ndim != 1 or len(angle) < 3:
             raise InputError(f"target angles have the shape {angle.shape}: they must be a list of at least 3")
         _finite(angle, "target angles")
+        if not np.ptp(angle) > 0.0:
+            raise InputError(
+                f"all target angles are the same, {angle[0]:.6g} rad: a rocker that stands still needs no linkage"
+            )
         n = len(angle)
         _set(self, angle=angle, rotation=_rotation(self.rotation, n), weights=_weights(self.weights, n))
 
@@ -227,14 +269,18 @@ class Motion:
     Attributes
     ----------
     points : ndarray, shape (n, 2)
-        Places of the coupler point (m).
+        Places of the coupler point (m); one place in several directions is a body that turns there, one pose over successive
+        crank rotations a dwell.
     angle : ndarray, shape (n,)
         Direction of the body at each (rad); how it is mounted on the coupler is free.
     rotation : ndarray, shape (n,), optional
         Crank rotations; without them only the order is asked.
     length : float, optional
-        Length by which an error of angle counts as one of place (m/rad); half the target's extent by default.
+        Length by which an error of angle counts as one of place (m/rad); half the target's extent by default, of a body that
+        only turns 50 mm.
     weights : ndarray, shape (n,)
+    objective : "error" or "worst"
+        What is made small: the quality function, or the greatest error, place and angle together.
     """
 
     points: ArrayLike
@@ -242,17 +288,17 @@ class Motion:
     rotation: ArrayLike | None = None
     length: float | None = None
     weights: ArrayLike | None = None
+    objective: Objective = "error"
 
     def __post_init__(self) -> None:
+        _check_objective(self.objective)
         points = _points(self.points, "target points", 2)
         n = len(points)
-        _set(self, points=points, angle=_numbers(self.angle, "target angles", n))
+        angle = _numbers(self.angle, "target angles", n)
+        _different(points, "target poses", self.rotation, angle)
+        _set(self, points=points, angle=angle, length=_leverage(self.length, points))
         if self.rotation is not None:
             _set(self, rotation=_rotation(self.rotation, n))
-        if self.length is None:
-            _set(self, length=0.5 * _extent(points))
-        elif not (isfinite(self.length) and self.length > 0.0):
-            raise InputError(f"length is {self.length}: it must be a finite number greater than zero (m/rad)")
         _set(self, weights=_weights(self.weights, n))
 
 
@@ -272,21 +318,28 @@ class PrecisionPoints:
         Directions of the carried body, crank rotations (rad).
     length : float, optional
         As in `Motion`.
+    objective : "error" or "worst"
+        What is made small: the quality function, or the greatest error, where the points cannot be met.
     """
 
     points: ArrayLike
     angle: ArrayLike | None = None
     rotation: ArrayLike | None = None
     length: float | None = None
+    objective: Objective = "error"
 
     def __post_init__(self) -> None:
+        _check_objective(self.objective)
         points = _points(self.points, "precision points", 2)
+        angle = None if self.angle is None else _numbers(self.angle, "target angles", len(points))
+        _different(points, "precision points", self.rotation, angle)
         _set(self, points=points)
         if self.rotation is not None:
             _set(self, rotation=_rotation(self.rotation, len(points)))
-        if self.angle is not None:
-            length = 0.5 * _extent(points) if self.length is None else self.length
-            _set(self, angle=_numbers(self.angle, "target angles", len(points)), length=length)
+        if angle is None:
+            _extended(points, "precision points")
+        else:
+            _set(self, angle=angle, length=_leverage(self.length, points))
 
 
 Task = TimedPath | UntimedPath | RockerFunction | Motion | PrecisionPoints
@@ -294,6 +347,15 @@ Task = TimedPath | UntimedPath | RockerFunction | Motion | PrecisionPoints
 
 def _extent(points: FloatArray) -> float:
     return float(hypot(*np.ptp(points, axis=0)))
+
+
+def _leverage(length: float | None, points: FloatArray) -> float:
+    """Length by which an error of angle counts as one of place: as given, or what is usual."""
+    if length is None:
+        return 0.5 * (_extent(points) or TURNED)
+    if not (isfinite(length) and length > 0.0):
+        raise InputError(f"length is {length}: it must be a finite number greater than zero (m/rad)")
+    return length
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -322,14 +384,18 @@ class Normal:
         Crank rotations, None where only their order is given.
     closed : bool
         Whether the stations close upon themselves.
-    normals : ndarray of complex, shape (n,), or None
-        Unit normals of the target: where the quality is an area.
     arc : ndarray, shape (n,)
         Length of the target that each station stands for.
+    outline : ndarray of complex, shape (m,), or None
+        The own points of a path whose timing is free.
+    outline_weights : ndarray, shape (m,)
+        Of the errors there.
     straight : Straight or None
         Its ends counted in stations, its flatness in units.
     exact : bool
         Whether the points are to be met exactly.
+    quality : "squares", "area" or "worst"
+        Sum of squared errors, area between the curves, or greatest error.
     """
 
     origin: complex
@@ -342,10 +408,12 @@ class Normal:
     weights: FloatArray
     rotation: FloatArray | None
     closed: bool = False
-    normals: NDArray[np.complex128] | None = None
     arc: FloatArray = field(default_factory=lambda: np.empty(0))
+    outline: NDArray[np.complex128] | None = None
+    outline_weights: FloatArray = field(default_factory=lambda: np.empty(0))
     straight: Straight | None = None
     exact: bool = False
+    quality: Quality = "squares"
 
     @property
     def n(self) -> int:
@@ -394,10 +462,11 @@ def normal_form(task: Task) -> Normal:
     Raises
     ------
     InputError
-        If it is no task, or all its points coincide.
+        If it is no task.
     """
     if not isinstance(task, TimedPath | UntimedPath | RockerFunction | Motion | PrecisionPoints):
         raise InputError(f"{task!r} is no task: use TimedPath, UntimedPath, RockerFunction, Motion or PrecisionPoints")
+    quality: Quality = "worst" if task.objective == "worst" else "squares"
     if isinstance(task, RockerFunction):
         return Normal(
             origin=0.0,
@@ -408,14 +477,13 @@ def normal_form(task: Task) -> Normal:
             mounting=task.mounting,
             weights=np.asarray(task.weights),
             rotation=np.asarray(task.rotation),
-            closed=False,
+            quality=quality,
         )
     if isinstance(task, UntimedPath):
         return _of_path(task)
     points = np.asarray(task.points)
-    unit = _extent(points)
-    if not unit > 0.0:
-        raise InputError(f"all target points are the same, {points[0].tolist()}: a path has an extent")
+    # of a body that only turns: what its angles count for
+    unit = _extent(points) or 2.0 * float(task.length)  # type: ignore[union-attr, arg-type]
     low, high = points.min(axis=0), points.max(axis=0)
     origin = complex(*(0.5 * (low + high)))
     angle = None if isinstance(task, TimedPath) else task.angle
@@ -429,6 +497,7 @@ def normal_form(task: Task) -> Normal:
         weights=np.ones(len(points)) if isinstance(task, PrecisionPoints) else np.asarray(task.weights),
         rotation=None if task.rotation is None else np.asarray(task.rotation),
         exact=isinstance(task, PrecisionPoints),
+        quality=quality,
     )
 
 
@@ -436,6 +505,7 @@ def _of_path(task: UntimedPath) -> Normal:
     points = np.asarray(task.path.points) @ np.array([1.0, 1j])
     closed = task.path.closed
     weights = np.asarray(task.weights)
+    outline, outline_weights = points, weights
     if closed:
         points, weights = np.append(points, points[0]), np.append(weights, weights[0])
     low, high = complex(points.real.min(), points.imag.min()), complex(points.real.max(), points.imag.max())
@@ -453,20 +523,6 @@ def _of_path(task: UntimedPath) -> Normal:
         pieces.append(np.array([length[-1]]))
     s = np.concatenate(pieces)
 
-    def at(place: FloatArray) -> NDArray[np.complex128]:
-        where = place % length[-1] if closed else np.clip(place, 0.0, length[-1])
-        places: NDArray[np.complex128] = np.interp(where, length, points.real) + 1j * np.interp(
-            where, length, points.imag
-        )
-        return places
-
-    step = 0.25 * length[-1] / task.samples
-    tangent = at(s + step) - at(s - step)
-    # where the path runs back on itself: along what follows
-    back = np.abs(tangent) < 1e-9 * step
-    tangent = np.where(back, at(s + step) - at(s), tangent)
-    tangent = np.where(np.abs(tangent) < 1e-9 * step, at(s) - at(s - step), tangent)
-    tangent /= np.abs(tangent)
     edges = np.diff(np.append(s, length[-1])) if closed else np.diff(s)
     if straight is not None:
         first, last = (int(np.argmin(np.abs(s - length[k]))) for k in (straight.start, straight.end))
@@ -478,12 +534,14 @@ def _of_path(task: UntimedPath) -> Normal:
     return Normal(
         origin=origin,
         unit=unit,
-        points=(at(s) - origin) / unit,
+        points=(np.interp(s, length, points) - origin) / unit,
         angle=None,
         weights=station_weights,
         rotation=None,
         closed=closed,
-        normals=1j * tangent if task.measure == "area" else None,
         arc=halves(edges, closed) / unit,
+        outline=(outline - origin) / unit,
+        outline_weights=outline_weights,
         straight=straight,
+        quality="worst" if task.objective == "worst" else "area" if task.measure == "area" else "squares",
     )

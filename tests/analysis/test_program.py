@@ -422,13 +422,10 @@ class TestMovedPivot:
 
 def violations(program: Program, start: Start) -> dict[str, float]:
     """How far a start is outside the constraints, the worst of each name."""
-    rotation = np.empty(0) if start.rotation is None else start.rotation
-    z = np.concatenate([start.q, start.pivot, rotation, np.zeros(program._extra)])
-    parameters = np.zeros(program._nlp["p"].numel())
-    parameters[[0, 1, 3]] = start.branch, 1.0, 1.0
-    g = np.asarray(program._value(z, parameters)[1]).ravel()
-    over = np.maximum(program._g_low - g, g - program._g_high)
-    return {name: max(v for v, label in zip(over, program._labels) if label == name) for name in program._labels}
+    _, g = program.stated(*program.at(start, places=program.extremes(start), share=1.0))
+    over = np.maximum(program.g_low - g, g - program.g_high)
+    names = [label.name for label in program.labels]
+    return {name: max(v for v, own in zip(over, names) if own == name) for name in names}
 
 
 class TestBetween:
@@ -498,7 +495,8 @@ class TestBetween:
         least = math.asin(math.sqrt(1.0 - ((0.35**2 + 0.3**2 - 0.5**2) / (2.0 * 0.35 * 0.3)) ** 2))
         normal = normal_form(task)
         for off in (-1e-5, 1e-5):
-            limits = limits_of(task, normal, None, (LeastTransmission(angle=least + off, over="task"),))
+            asked = (LeastTransmission(angle=least + off, over="task"), LargestLink(length=1.0))
+            limits = limits_of(task, normal, None, asked)
             over = violations(Program(normal, limits), start_of(linkage, normal))["transmission angle"]
             assert (over > 0.0) == (off > 0.0)
 

@@ -519,10 +519,9 @@ class TestBadInput:
     @pytest.mark.parametrize(
         ("points", "message"),
         [
-            ([[0, 0]], "target points: 1 are too few, there must be at least 2"),
+            ([[0, 0]], "target points: 1 are too few, there must be at least [23]"),
             ([[0, 0, 0], [1, 1, 1]], r"target points have the shape \(2, 3\)"),
             ([[0, 0], [1, np.nan]], "target points: number 1 is nan: it must be finite"),
-            ([[0, 0], [1, 1], [1, 1]], r"points 1 and 2 are the same, \[1.0, 1.0\]; leave one out"),
         ],
     )
     def test_points(self, points: list[list[float]], message: str) -> None:
@@ -534,6 +533,25 @@ class TestBadInput:
     @pytest.mark.parametrize(
         ("make", "message"),
         [
+            (
+                lambda: PrecisionPoints(points=[[0, 0], [1, 1], [1, 1]]),
+                r"numbers 1 and 2 are the same, \[1.0, 1.0\] m; leave one out, or give crank rotations for a dwell",
+            ),
+            (
+                lambda: Motion(points=[[0, 0], [1, 1], [1, 1]], angle=[0, 1, 1]),
+                r"numbers 1 and 2 are the same, \[1.0, 1.0\] m at 1 rad; leave one out",
+            ),
+            (lambda: TimedPath(points=[[0, 0], [1, 1]]), "2 are too few, there must be at least 3"),
+            (lambda: TimedPath(points=[[1, 2]] * 4), r"all target points are the same, \[1.0, 2.0\] m"),
+            (lambda: PrecisionPoints(points=[[1, 2]] * 3, rotation=[0, 1, 2]), "all precision points are the same"),
+            (
+                lambda: RockerFunction(angle=np.full(8, 1.2)),
+                "all target angles are the same, 1.2 rad: a rocker that stands still needs no linkage",
+            ),
+            (
+                lambda: TimedPath(points=ELLIPSE, objective="least"),
+                "objective is 'least': it must be 'error' or 'worst'",
+            ),
             (lambda: TimedPath(points=ELLIPSE, rotation=turn(5)), "there must be one for each of the 24 targets"),
             (
                 lambda: TimedPath(points=ELLIPSE[:3], rotation=[0, 2, 1]),
@@ -577,7 +595,12 @@ class TestBadInput:
             (
                 {"bounds": {"crank_length": (0.2, 0.1)}},
                 InfeasibleError,
-                "crank_length is to be at least 0.2 and at most 0.1",
+                "crank_length is to be at least 0.2 m and at most 0.1 m: no value is",
+            ),
+            (
+                {"constraints": [LargestLink(length="5 mm")]},
+                InfeasibleError,
+                "the coupler point cannot span the target, 200 mm across: .* keep it within 20 mm",
             ),
             ({"bounds": {"crank_length": (0.2, np.nan)}}, ParameterError, "bounds of crank_length"),
             ({"bounds": {"crank_length": 1.0}}, ParameterError, "be two numbers, the least and the greatest value"),
@@ -628,6 +651,15 @@ class TestBadInput:
             return
         with refused(message, error):
             called()
+
+    def test_an_infeasible_region_is_off_by_a_length(self) -> None:
+        """The shaft far away, the links too short to reach from there: by how much is said in mm."""
+        far = PivotRegion(pivot="A", polygon=[[9.0, 9.0], [9.1, 9.0], [9.0, 9.1]])
+        near = Require(function=lambda p: p.pivot_x - 0.5, name="near")
+        with refused(r"violates the (near|region of pivot A) by [\d.e+]+( mm)? \(", InfeasibleError):
+            synthesize(TASK, constraints=[*USUAL, far, near], search=QUICK)
+        with refused(r"violates the region of pivot A by [\d.e+]+ mm \(", InfeasibleError):
+            synthesize(TASK, {"pivot_x": (0.0, 0.5)}, constraints=[*USUAL, far], search=QUICK)
 
     def test_precision_points_have_no_weights(self) -> None:
         with refused("they have no weights"):
