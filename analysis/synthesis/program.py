@@ -359,7 +359,9 @@ class Program:
             return _series(casadi, v[1:], x)
 
         if pivot.position is None:
-            self._bounded(lambda x: position(x) / ground, 0, "slider position", "ground links")
+            u = position(casadi.DM(turn(max(GRID, 16 * pivot.harmonics))))
+            self._at_most(u - ground, "slider position")
+            self._at_most(-u - ground, "slider position")
         else:
             low, high = (end / unit for end in pivot.position)
             middle, half = 0.5 * (low + high), 0.5 * (high - low)

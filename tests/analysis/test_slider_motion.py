@@ -223,8 +223,6 @@ def test_the_program_has_the_gradient_of_the_kernels(
     kind: str, unknown: SliderUnknown | CrankUnknown, seed: int
 ) -> None:
     """And its value; both differ from the plant's closure by nothing but how they are written."""
-    import casadi
-
     random = np.random.default_rng(seed)
     shape = drawn(random, least=0.6)
     if kind == "rocker":
@@ -244,13 +242,10 @@ def test_the_program_has_the_gradient_of_the_kernels(
     start = replace(start, pivot=0.1 * random_pivot(unknown, start.q[2], normal.unit, random))
     linkage = linkage_of(start, normal, unknown)
     program = Program(normal, limits, unknown)
-    x, p = program._nlp["x"], program._nlp["p"]
-    own = casadi.Function("own", [x, p], [program._nlp["f"], casadi.gradient(program._nlp["f"], x)])
-    z = np.concatenate([start.q, start.pivot])
-    parameters = [float(start.branch), 1.0, 1e-3, 1.0, *np.zeros(24)]
-    value, gradient = (np.array(v).ravel() for v in own(z, parameters))
+    at = np.concatenate([start.q, start.pivot]), program.at(start)[1]
+    value, gradient = program.stated(*at)[0], program.slopes_at(*at)[0]
     size = normal.unit**2
-    assert size * value[0] == pytest.approx(evaluate(task, linkage).error, rel=1e-11)
+    assert size * value == pytest.approx(evaluate(task, linkage).error, rel=1e-11)
     units = np.full(len(start.pivot), normal.unit)
     units[0 if isinstance(unknown, SliderUnknown) else slice(1, None)] = 1.0
     by_kernels = gradient_by_kernels(task, linkage, unknown)
@@ -430,7 +425,7 @@ def test_a_worse_polish_on_the_way_back_does_not_spoil_the_curve(monkeypatch: py
             # without a bound and with the tightest one: as it is
             return found
         worse = tuple(
-            replace(s, linkage=replace(s.linkage, pivot=None), evaluation=replace(s.evaluation, error=10.0))
+            replace(s, linkage=replace(s.linkage, pivot=None), evaluation=replace(s.evaluation, error=10.0, value=10.0))
             for s in found.solutions
         )
         return replace(found, solutions=worse)
