@@ -365,12 +365,12 @@ class Program:
         else:
             low, high = (end / unit for end in pivot.position)
             middle, half = 0.5 * (low + high), 0.5 * (high - low)
-            self._bounded(lambda x: (position(x) - middle) / half, 0, "slider position", "mm", 1e3 * unit * half)
+            self._bounded(lambda x: (position(x) - middle) / half, 0, "slider position", "mm", 1e3 * unit * half, half)
         if isfinite(pivot.stroke):
             centre = self._extra("middle", 0.0)
             reach = 0.5 * pivot.stroke / unit
             # of both ends: the stroke is off by twice as much
-            self._bounded(lambda x: (position(x) - centre) / reach, 0, "stroke", "mm", 1e3 * pivot.stroke)
+            self._bounded(lambda x: (position(x) - centre) / reach, 0, "stroke", "mm", 1e3 * pivot.stroke, reach)
             u = position(casadi.vertcat(casadi.DM(turn(max(GRID, 16 * pivot.harmonics))), self._peaks[-1][1]))
             self._initial[-1] = 0.5 * (casadi.mmin(u) + casadi.mmax(u))
         self._rate(v, 1, pivot.speed, "slider speed", "mm/rad")
@@ -385,11 +385,18 @@ class Program:
         if isfinite(bound):
             scale = self.normal.unit / bound
             self._bounded(
-                lambda x: scale * _series(self._casadi, v[1:], x, order=order), order, name, unit, 1e3 * bound
+                lambda x: scale * _series(self._casadi, v[1:], x, order=order),
+                order,
+                name,
+                unit,
+                1e3 * bound,
+                1.0 / scale,
             )
 
-    def _bounded(self, value: Callable[[Any], Any], order: int, name: str, unit: str = "", factor: float = 1.0) -> None:
-        """A trigonometric polynomial of the crank's rotation stays within -1 and 1.
+    def _bounded(
+        self, value: Callable[[Any], Any], order: int, name: str, unit: str = "", factor: float = 1.0, size: float = 1.0
+    ) -> None:
+        """A trigonometric polynomial of the crank's rotation stays within -1 and 1; what IPOPT sees is ``size`` times that.
 
         It is held at places all round and where the parameters say, less a share: of a first solution that which makes sure of
         what is between the places, a trigonometric polynomial being nowhere larger than at these but for the cosine (Ehlich and
@@ -404,7 +411,7 @@ class Program:
         self._bent.append(casadi.horzcat(slope, casadi.jtimes(slope, places, ones)))
         # to second order the height of the peak next to each place, wherever it moves
         every = casadi.vertcat(value(casadi.DM(turn(max(GRID, 16 * harmonics)))), held + bends * slope**2)
-        self._within(every / self._share, -1.0, 1.0, name, unit, factor)
+        self._within(size * every / self._share, -size, size, name, unit, factor / size)
 
     # Solution
 
@@ -631,10 +638,11 @@ class Program:
             following = solve(now.start, self.extremes(now.start))
             if not following.feasible:
                 return answer
-            now = following
-            if self.kept(now.start).feasible:
+            now, before = following, now
+            kept = self.kept(now.start)
+            if kept.feasible and np.abs(now.start.pivot - before.start.pivot).max() <= KEPT:
                 return now
-        return answer
+        return now if kept.feasible else answer
 
     def extremes(self, start: Start) -> list[FloatArray]:
         """Where the pivot's motion, or a derivative of it, has its extremes: the angles of the roots of the next one."""
