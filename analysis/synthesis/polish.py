@@ -138,13 +138,14 @@ class Polisher:
         few = normal.timed or normal.n <= FEW
         self.by_least_squares = limits.bounds_only and pivot is None and normal.straight is None and few
         self._refinement: Refinement | None = None
-        self._programs: dict[str, Program] = {}
+        self._programs: dict[tuple[str, bool], Program] = {}
 
-    def program(self, objective: Objective) -> Program:
-        """The program with this objective."""
-        if objective not in self._programs:
-            self._programs[objective] = Program(self.normal, self.limits, self.pivot, objective)
-        return self._programs[objective]
+    def program(self, objective: Objective, *, exact: bool = False) -> Program:
+        """The program with this objective; where the pivot is fixed all are exact."""
+        key = objective, exact and self.pivot is not None
+        if key not in self._programs:
+            self._programs[key] = Program(self.normal, self.limits, self.pivot, objective, exact=key[1])
+        return self._programs[key]
 
     def fit(self, start: Start) -> Answer:
         """The optimum of the squared errors from a start; where points are met exactly, of the transmission angle."""
@@ -191,7 +192,8 @@ class Polisher:
             longer = program.solve(answer.start, iterations=LONG)
             if longer.feasible and longer.start.quality < answer.start.quality:
                 answer = longer
-        return program.exact(answer, lambda start, places: program.solve(start, places=places))
+        last = self.program("squares", exact=True)
+        return last.exact(answer, lambda start, places: last.solve(start, places=places))
 
     def onwards(self, answer: Answer) -> Answer:
         """From least squares to the area, or to the greatest error."""
@@ -201,7 +203,7 @@ class Polisher:
             return refinement.program.exact(
                 found, lambda start, places: refinement.refined(replace(answer, start=start), places=places)
             )
-        program = self.program("worst")
+        program = self.program("worst", exact=True)
         size = max(program.value(answer.start), 1e-9)
 
         def solve(start: Start, places: Sequence[FloatArray] | None = None) -> Answer:
@@ -219,7 +221,7 @@ class Polisher:
     def refinement(self) -> Refinement:
         """Of a path whose timing is free; made when it is first needed."""
         if self._refinement is None:
-            self._refinement = Refinement(self.program("curve"))
+            self._refinement = Refinement(self.program("curve", exact=True))
         return self._refinement
 
     def kept(self, start: Start) -> Answer:
@@ -233,7 +235,7 @@ class Polisher:
                 feasible=within and np.isfinite(quality),
             )
         path = self.normal.outline is not None
-        return self.program("curve" if path else "squares").kept(start)
+        return self.program("curve" if path else "squares", exact=True).kept(start)
 
 
 # Least squares

@@ -86,10 +86,18 @@ class Program:
         Weighted squared errors; the greatest weighted error, as the least bound of all; the least transmission angle, greatest,
         with the stations met exactly; or nothing but the constraints of a path, for `analysis.synthesis.refine`, whose measure
         needs no stations: of their rotations only the ends of an open path and of its straight part are unknown.
+    exact : bool
+        Whether bounds of the pivot's motion can be held at its extremes, see `exact`; without, a first search is quicker.
     """
 
     def __init__(
-        self, normal: Normal, limits: Limits, pivot: PivotUnknown | None = None, objective: Objective = "squares"
+        self,
+        normal: Normal,
+        limits: Limits,
+        pivot: PivotUnknown | None = None,
+        objective: Objective = "squares",
+        *,
+        exact: bool = True,
     ) -> None:
         self.normal, self.limits, self.pivot, self.objective = normal, limits, pivot, objective
         casadi = self._casadi = symbolic.library()
@@ -99,10 +107,11 @@ class Program:
         #: Order of a derivative of the pivot's motion that is bounded, where its extremes are, and how they are curved; its
         #: own first two derivatives there.
         self._peaks: list[tuple[int, Any, Any]] = []
+        self._held = 2 * pivot.harmonics if pivot is not None and exact else 0
         self._bent: list[Any] = []
         self._constraints: list[tuple[Any, float, float, Label]] = []
         self.knots: list[int] = list(range(normal.n))
-        self._solvers: dict[int, Any] = {}
+        self._solvers: dict[tuple[int, bool], Any] = {}
         self._share = SX.sym("share")
         # parameters: branch, direction, magnitude of the errors, rows of Grashof's type, half-planes of the regions
         branch, direction, size = (SX.sym(name) for name in ("branch", "direction", "size"))
@@ -404,13 +413,17 @@ class Program:
         """
         casadi, harmonics = self._casadi, self.pivot.harmonics if self.pivot else 0
         number = len(self._peaks)
-        places, bends = (casadi.SX.sym(f"{what}{number}", 2 * harmonics) for what in ("places", "bends"))
+        places, bends = (casadi.SX.sym(f"{what}{number}", self._held) for what in ("places", "bends"))
         self._peaks.append((order, places, bends))
-        held, ones = value(places), casadi.DM.ones(2 * harmonics)
+        grid = value(casadi.DM(turn(max(GRID, 16 * harmonics))))
+        if not self._held:
+            self._within(size * grid / self._share, -size, size, name, unit, factor / size)
+            return
+        held, ones = value(places), casadi.DM.ones(self._held)
         slope = casadi.jtimes(held, places, ones)
         self._bent.append(casadi.horzcat(slope, casadi.jtimes(slope, places, ones)))
         # to second order the height of the peak next to each place, wherever it moves
-        every = casadi.vertcat(value(casadi.DM(turn(max(GRID, 16 * harmonics)))), held + bends * slope**2)
+        every = casadi.vertcat(grid, held + bends * slope**2)
         self._within(size * every / self._share, -size, size, name, unit, factor / size)
 
     # Solution
@@ -469,11 +482,11 @@ class Program:
         place = casadi.vertcat(*self._point_at(first + share * (last - first)))
         return casadi.Function("point", [x, p, share], [place, casadi.densify(casadi.jacobian(place, x))])
 
-    def _solver(self, iterations: int) -> Any:
-        """IPOPT with this many iterations at most."""
-        if iterations in self._solvers:
-            return self._solvers[iterations]
-        self._solvers[iterations] = symbolic.ipopt(
+    def _solver(self, iterations: int, near: bool) -> Any:
+        """IPOPT with this many iterations at most, from a start that is near or not."""
+        if (iterations, near) in self._solvers:
+            return self._solvers[iterations, near]
+        self._solvers[iterations, near] = symbolic.ipopt(
             "synthesis",
             self._nlp,
             max_iter=iterations,
@@ -482,9 +495,9 @@ class Program:
             acceptable_tol=1e-7,
             acceptable_iter=8,
             bound_relax_factor=0.0,
-            **FOLLOWING[self.objective],
+            **FOLLOWING["worst" if near else self.objective],
         )
-        return self._solvers[iterations]
+        return self._solvers[iterations, near]
 
     def nearest_pieces(self, q: FloatArray) -> list[list[int]]:
         """For each region its triangles, the one that the pivot is in, or least far outside of, first."""
@@ -527,18 +540,19 @@ class Program:
         harmonics = 0 if self.pivot is None else self.pivot.harmonics
         if share is None:
             share = cos(pi * harmonics / max(GRID, 16 * harmonics)) if places is None else 1.0 - HELD
-        held = [np.zeros(2 * harmonics)] * len(self._peaks) if places is None else places
+        held = [np.zeros(self._held)] * len(self._peaks) if places is None else places
         chosen = [nearest[0] for nearest in self.nearest_pieces(z)] if pieces is None else pieces
         parameters = np.concatenate(
             [
                 [float(start.branch), direction, size, share],
-                *(part for own in held for part in (own, np.zeros(2 * harmonics))),
+                *(part for own in held for part in (own, np.zeros(self._held))),
                 _grashof_rows(self.limits.grashof, z[2:6]).ravel(order="F"),
                 *(half_planes(triangles[k]).ravel(order="F") for (_, triangles), k in zip(self.limits.regions, chosen)),
             ]
         )
         z = np.clip(z, self.low, self.high)
-        if self._initial:
+        if self._initial and (places is not None or self.objective != "squares"):
+            # least squares come from farther away, and find their own middles
             z[-len(self._initial) :] = np.asarray(self._begin(z, parameters)).ravel()
         if self._peaks and places is not None:
             for number, derivatives in enumerate(self._curvature(z, parameters)):
@@ -575,7 +589,7 @@ class Program:
         z0, parameters = self.at(start, size=size, pieces=pieces, places=places)
         if not all(np.isfinite(value).all() for value in self.stated(z0, parameters)):
             return Answer.unjoined(start)
-        solver = self._solver(iterations)
+        solver = self._solver(iterations, places is not None)
         result = solver(x0=z0, lbx=self.low, ubx=self.high, lbg=self.g_low, ubg=self.g_high, p=parameters)
         stats = solver.stats()
         answer = self.judged(np.asarray(result["x"]).ravel(), parameters, start)
@@ -633,6 +647,10 @@ class Program:
         """Solve again and again with the bounds of the pivot's motion held at its extremes, until these stay where they are."""
         if not self._peaks:
             return answer
+
+        def better(found: Answer) -> Answer:
+            return found if found.start.quality <= answer.start.quality else answer
+
         now = answer
         for _ in range(ROUNDS):
             following = solve(now.start, self.extremes(now.start))
@@ -641,8 +659,8 @@ class Program:
             now, before = following, now
             kept = self.kept(now.start)
             if kept.feasible and np.abs(now.start.pivot - before.start.pivot).max() <= KEPT:
-                return now
-        return now if kept.feasible else answer
+                return better(now)
+        return better(now) if kept.feasible else answer
 
     def extremes(self, start: Start) -> list[FloatArray]:
         """Where the pivot's motion, or a derivative of it, has its extremes: the angles of the roots of the next one."""
