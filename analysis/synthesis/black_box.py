@@ -19,7 +19,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
-from math import cos, pi, sqrt
+from math import cos, degrees, pi, sqrt
 from types import SimpleNamespace
 
 import numpy as np
@@ -252,10 +252,19 @@ class BlackBox:
             converged=bool(result.success),
             violation=max(0.0, violation),
             worst=worst if violation > 0.0 else "",
-            excess="",
+            excess=self._excess(worst, violation),
             status=str(result.message),
             iterations=int(result.nit),
         )
+
+    def _excess(self, name: str, violation: float) -> str:
+        """By how much an inequality is violated, with its unit."""
+        scale = next((require.scale for require in self.limits.requires if require.name == name), None)
+        if scale is not None:
+            return f"{scale * violation:.3g}"
+        if name == "crank rotation of the straight part":
+            return f"{degrees(violation):.3g} deg"
+        return f"{1e3 * self.normal.unit * violation:.3g} mm"
 
     # Linkages and their curves
 

@@ -397,7 +397,7 @@ def test_ctrl_c_in_the_strategy_keeps_its_steps(linkwork, tmp_path, monkeypatch)
         ({"strategy": {"tolerance": "0 mm"}}, "strategy.tolerance"),
         ({"strategy": {"tolerance": "1 mm", "ratios": [1.5]}}, "strategy.ratios"),
         ({"task": {"kind": "timed-path", "points": [[0, 0]]}}, "too few"),
-        ({"constraints": {"largest_link": "10 mm"}}, "no linkage has both"),
+        ({"constraints": {"largest_link": "10 mm"}}, "cannot span the target, 143.5 mm across"),
     ],
 )
 def test_bad_input_is_one_sentence(linkwork, tmp_path, change: dict[str, Any], words: str) -> None:
