@@ -14,7 +14,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import boolean, float64, int64, types
+from numba import boolean, float64, int64
 from numpy.polynomial import legendre
 from numpy.typing import NDArray
 
@@ -30,10 +30,7 @@ from .orbit_kernels import (
     NO_STEP,
     SECTION,
     advance,
-    deflated,
     make_room,
-    newton,
-    numbered,
 )
 
 #: Nodes of an element.
@@ -51,19 +48,10 @@ AA = np.ascontiguousarray(A @ A)
 BA = B @ A
 #: The two highest Legendre coefficients.
 TAIL = np.ascontiguousarray(_TO_LEGENDRE[-2:])
-#: Elements of a turn; and `tail_of` at most, relative to the root of the integrator's tolerance: the ends of the elements are
-#: good to about its square.
-COUNTS = np.array([6, 8, 12, 16, 24, 32, 48])
+#: `tail_of` at most, relative to the root of the integrator's tolerance: the ends of the elements are good to about its square.
 DECAY = 200.0
-#: The same below which fewer elements of a turn are taken.
-IDLE = 0.7
 #: Corrections at most, and the greatest first one, relative to the scale: what is farther is no neighbour.
 _CORRECTIONS, _FAR = 8, 1.0
-#: Orbits of a row without a look whether elements suffice, after one where they did not.
-_PAUSE = 8
-#: Binomial coefficients with signs: the next of so many equally spaced values of a polynomial, from the last on.
-_NEXT = np.array([[1.0, 0.0, 0.0, 0.0], [2.0, -1.0, 0.0, 0.0], [3.0, -3.0, 1.0, 0.0], [4.0, -6.0, 4.0, -1.0]])
-PASSED = len(_NEXT)
 
 
 class Bench(NamedTuple):
@@ -408,205 +396,6 @@ def spread(section, source, angles, start, y, w, room):  # type: ignore[no-untyp
                 evaluate(section.equations[PLAIN], angle, z, section.modes, section.drive, section.p, out)
                 w[e, s] = out[n // 2 :]
     return DONE
-
-
-@part
-def settle_on(section, source, end, turns, level, start, angles, y, w, desk, monodromy, room):  # type: ignore[no-untyped-def]
-    """Begin with the fewest elements that suffice, from the given level of `COUNTS` on; the level, -1 if there is none."""
-    while level < len(COUNTS):
-        m = COUNTS[level] * turns
-        for e in range(m + 1):
-            angles[e] = end * e / m
-        if spread(section, source, angles, start, y[:m], w[:m], room) != DONE:
-            return -1
-        status = close(section, angles, y[:m], w[:m], desk, monodromy, room)
-        if status == DONE:
-            return level
-        if status != NO_STEP:
-            return -1
-        level += 1
-    return -1
-
-
-@part
-def from_guess(own, wide, source, end, most, start, z, room, carry, report):  # type: ignore[no-untyped-def]
-    """Newton's method from far, at first to the tolerance of a search."""
-    status = newton(wide, source, end, most, start, z, room, carry, report)
-    return newton(own, source, end, most, start, z, room, carry, report) if status == DONE else status
-
-
-@part
-def from_left(section, source, parameters, drives, scales, end, turns, most, loose, smooth, guess, found):  # type: ignore[no-untyped-def]
-    """Orbits of a row from the left to the right: by collocation as far as it goes, else by shooting."""
-    starts, monodromies, status = found
-    n = guess.shape[0]
-    z = np.empty(n * (1 + n))
-    carry = np.array([0.1, 0.0])
-    report = np.zeros(3)
-    start = np.empty(n)
-    most_elements = COUNTS[-1] * turns
-    angles = np.zeros(most_elements + 1)
-    # of this orbit and of those before it, the last first
-    y, w = np.zeros((1 + PASSED, most_elements, n)), np.zeros((1 + PASSED, most_elements, NODES, n // 2))
-    desk, monodromy = make_desk(n, most_elements), np.zeros((n, n))
-    level, known, pause = 0, 0, 0
-    passed = 0
-    for row in range(parameters.shape[0]):
-        own = numbered(section, drives[row], parameters[row], scales[row], section.tolerance)
-        room = make_room(own, n)
-        what = DIVERGED
-        if known:
-            m = COUNTS[level] * turns
-            y[0, :m] = 0.0
-            w[0, :m] = 0.0
-            for old in range(known):
-                y[0, :m] += _NEXT[known - 1, old] * y[1 + old, :m]
-                w[0, :m] += _NEXT[known - 1, old] * w[1 + old, :m]
-            what = close(own, angles[: m + 1], y[0, :m], w[0, :m], desk, monodromy, room)
-            if what == NO_STEP:
-                # more elements; the start is good enough to go on from
-                start[:] = y[0, 0]
-                more = settle_on(own, source, end, turns, level + 1, start, angles, y[0], w[0], desk, monodromy, room)
-                level, known = max(more, 0), 0
-                what = DONE if more >= 0 else NO_STEP
-        by_collocation = what == DONE
-        if not by_collocation:
-            known = 0
-            if passed > 1:
-                # the secant through the last two
-                start[:] = 2.0 * starts[row - 1] - starts[row - 2]
-            elif passed == 1:
-                start[:] = starts[row - 1]
-            if passed:
-                what = newton(own, source, end, most, start, z, room, carry, report)
-            if what != DONE:
-                start[:] = guess
-                wide = numbered(section, drives[row], parameters[row], scales[row], loose)
-                what = from_guess(own, wide, source, end, most, start, z, room, carry, report)
-        status[row] = what
-        if what != DONE:
-            passed = 0
-            continue
-        passed += 1
-        if by_collocation:
-            starts[row] = y[0, 0]
-            for j in range(n):
-                for i in range(n):
-                    monodromies[row, j * n + i] = monodromy[i, j]
-        else:
-            starts[row] = start
-            monodromies[row] = z[n:]
-            pause -= 1
-            if smooth and not section.torque and pause < 0:
-                more = settle_on(own, source, end, turns, level, start, angles, y[0], w[0], desk, monodromy, room)
-                level, by_collocation = max(more, 0), more >= 0
-                if not by_collocation:
-                    pause = _PAUSE
-        if by_collocation:
-            m = COUNTS[level] * turns
-            for old in range(PASSED, 0, -1):
-                y[old, :m] = y[old - 1, :m]
-                w[old, :m] = w[old - 1, :m]
-            known = min(known + 1, PASSED)
-            if level > 0 and desk.report[0] < IDLE * np.sqrt(section.tolerance):
-                # fewer elements the next time, which is begun by shooting
-                start[:] = y[0, 0]
-                level -= 1
-                known = 0
-
-
-@part
-def from_right(section, source, parameters, drives, scales, end, most, found):  # type: ignore[no-untyped-def]
-    """What was not found from the left may be found from the right."""
-    starts, monodromies, status = found
-    n = starts.shape[1]
-    z, carry, report = np.empty(n * (1 + n)), np.array([0.1, 0.0]), np.zeros(3)
-    for row in range(parameters.shape[0] - 2, -1, -1):
-        if status[row] != DONE and status[row + 1] == DONE:
-            own = numbered(section, drives[row], parameters[row], scales[row], section.tolerance)
-            start = starts[row + 1].copy()
-            if newton(own, source, end, most, start, z, make_room(own, n), carry, report) == DONE:
-                status[row] = DONE
-                starts[row] = start
-                monodromies[row] = z[n:]
-
-
-@part
-def from_others(section, source, parameters, drives, scales, end, most, loose, guesses, found):  # type: ignore[no-untyped-def]
-    """What was not found from a neighbour is sought from the guesses but the first, once it is found from the left again."""
-    starts, monodromies, status = found
-    n = starts.shape[1]
-    z, carry, report = np.empty(n * (1 + n)), np.array([0.1, 0.0]), np.zeros(3)
-    none = np.empty((0, n))
-    for row in range(parameters.shape[0]):
-        if status[row] == DONE:
-            continue
-        own = numbered(section, drives[row], parameters[row], scales[row], section.tolerance)
-        wide = numbered(section, drives[row], parameters[row], scales[row], loose)
-        room = make_room(own, n)
-        for guess in range(0 if row > 0 and status[row - 1] == DONE else 1, guesses.shape[0]):
-            start = guesses[guess].copy() if guess else starts[row - 1].copy()
-            if (
-                deflated(wide, source, end, most, 1.0, start, none, z, room, carry) == DONE
-                and newton(own, source, end, most, start, z, room, carry, report) == DONE
-            ):
-                status[row] = DONE
-                starts[row] = start
-                monodromies[row] = z[n:]
-                break
-
-
-@kernel(
-    types.void(
-        SECTION,
-        SOURCE,
-        MATRIX,
-        MATRIX,
-        MATRIX,
-        float64,
-        int64,
-        int64,
-        float64,
-        boolean,
-        MATRIX,
-        MATRIX,
-        MATRIX,
-        int64[::1],
-    ),
-    purpose="grids of periodic motions",
-)
-def solve_row(  # type: ignore[no-untyped-def]
-    section, source, parameters, drives, scales, end, turns, most, loose, smooth, guesses, starts, monodromies, status
-):
-    """Orbits of a row of mechanisms, each begun from the last: the rows of a chart.
-
-    By collocation from the PASSED orbits before, as far as it goes; where it does not, by shooting.
-
-    Parameters
-    ----------
-    parameters, drives : ndarray, shapes (m, constants) and (m, drive)
-        As in `Section`, which has the rest.
-    scales : ndarray, shape (m, n)
-    turns : int
-        In a period.
-    loose : float
-        Tolerance of the search from further starts.
-    smooth : bool
-        Whether collocation serves.
-    guesses : ndarray, shape (k, n)
-        Start of the first; where Newton's method fails from the neighbour it is begun anew from there. An orbit that is not
-        found from a neighbour on either side is sought from the others.
-    starts, monodromies : ndarray, shapes (m, n) and (m, n n)
-        y at crank angle 0, and the monodromy matrix by columns; written where the status is DONE.
-    status : ndarray of int64, shape (m,)
-        `Status` of each; written.
-    """
-    found = (starts, monodromies, status)
-    from_left(section, source, parameters, drives, scales, end, turns, most, loose, smooth, guesses[0].copy(), found)
-    from_right(section, source, parameters, drives, scales, end, most, found)
-    if (status != DONE).any():
-        from_others(section, source, parameters, drives, scales, end, most, loose, guesses, found)
-        from_right(section, source, parameters, drives, scales, end, most, found)
 
 
 @kernel(

@@ -23,7 +23,7 @@ from ..mechanisms import MECHANISMS, mechanism_of
 from ..numerics.codegen import cache_root, fingerprint
 from ..numerics.workers import check_jobs, interruptible, over_workers
 from ..run import shown
-from . import collocation, orbit_kernels, orbits
+from . import orbit_kernels, orbits, row_kernels
 from .floquet import TOLERANCE, Stability, multipliers
 from .flows import GAP, PLAIN, VARIATIONAL
 from .orbit_kernels import Status
@@ -150,7 +150,7 @@ def grid(
     guess = orbits.guess_of(drive.flow(mechanism), drive, start)
     guesses = np.vstack([guess, starts_of(parameters, drive, guess, STARTS)])
     # what computes the rows, beside their arguments
-    code = fingerprint(collocation.solve_row), fingerprint(multipliers), inspect.getsource(orbits)
+    code = fingerprint(row_kernels.solve_row), fingerprint(multipliers), inspect.getsource(orbits)
     rows = [[operation(first, value) for first in xs.tolist()] for value in ys.tolist()]
     data, computed = kept_rows(
         partial(_compute_row, guesses, tolerance),

@@ -21,7 +21,7 @@ from ..mechanisms import Parameters, mechanism_of
 from ..notebook import Shown, format_count
 from ..run import outputs_of, takes_published
 from ..units import RAD_S_PER_RPM
-from . import collocation, orbit_kernels
+from . import orbit_kernels, row_kernels
 from .drives import Drive
 from .floquet import TOLERANCE, StabilityVerdict, liouville, multipliers, verdict
 from .flows import DIRECTIONAL, GAP, PLAIN, STATE, VARIATIONAL, Flow
@@ -614,7 +614,7 @@ def largest_multipliers(
     section, numbers, vectors, scales = row_of(rows, drives, first, PLAIN, VARIATIONAL, tolerance=tolerance)
     monodromies, starts = np.full((len(rows), n * n), np.nan), np.full((len(rows), n), np.nan)
     status = np.zeros(len(rows), dtype=np.int64)
-    collocation.solve_row(
+    row_kernels.solve_row(
         section,
         NO_SOURCE,
         numbers,

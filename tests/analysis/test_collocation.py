@@ -1,0 +1,70 @@
+"""Periods by Gauss collocation against the integrator: neighbours along a branch, and rows of orbits."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from math import pi
+
+import numpy as np
+import pytest
+
+from analysis import find_orbit
+from analysis.periodic import Drive, orbit_of
+from analysis.periodic.branches import Family
+from analysis.periodic.orbits import largest_multipliers, pieces_from
+from analysis.periodic.paths import PeriodPath
+from linkwork.five_bar.published import SETS
+
+SMOOTH = SETS["rig-2-spring-c"].parameters
+
+
+def test_a_neighbour_followed_by_collocation_is_the_integrator_s() -> None:
+    """Ends, their derivatives by the beginnings and by the speed, from one speed to the next, in two pieces."""
+    family = Family(parameters=SMOOTH, drive=Drive(speed=30.0))
+    angles = np.array([0.0, pi, 2.0 * pi])
+    path = PeriodPath(angles, True)
+    used = 0
+    for speed in np.linspace(30.0, 31.0, 6):
+        parameters, drive = family.at(float(speed))
+        orbit = orbit_of(parameters, drive)
+        starts = np.vstack([orbit.start, pieces_from(parameters, drive, angles[:2], orbit.start[None, :])[0]])
+        direction = family._direction(float(speed), 30.0, 31.0)
+        found = path.follow(parameters, drive, starts, float(speed), direction, 1.0)
+        used += found.clearance is not None
+        ends, matrices, slopes = pieces_from(parameters, drive, angles, starts, direction, 1.0)
+        scale = np.abs(matrices).max(axis=(0, 1))
+        assert found.y == pytest.approx(ends, abs=1e-9)
+        assert np.abs(found.matrices - matrices).max() < 1e-8 * scale.max()
+        assert np.abs(found.slopes - slopes).max() < 1e-8 * np.abs(slopes).max()
+    assert used == 6
+
+
+def test_collocation_knows_how_near_the_links_come_to_the_limit_of_assembly() -> None:
+    orbit = find_orbit(SMOOTH, speed=30.0)
+    family = Family(parameters=SMOOTH, drive=Drive(speed=30.0))
+    path = PeriodPath(np.array([0.0, 2.0 * pi]), True)
+    direction = family._direction(30.0, 30.0, 31.0)
+    found = path.follow(orbit.parameters, orbit.drive, orbit.start[None, :], 30.0, direction, 1.0)
+    assert found.clearance == pytest.approx(orbit.clearance(), rel=1e-2)
+
+
+def test_friction_is_left_to_the_integrator() -> None:
+    """The kink of Coulomb friction has no polynomial."""
+    rough = replace(SMOOTH, slider_coulomb_friction=0.2)
+    family = Family(parameters=rough, drive=Drive(speed=30.0))
+    orbit = orbit_of(rough, Drive(speed=30.0))
+    path = PeriodPath(np.array([0.0, 2.0 * pi]), False)
+    direction = family._direction(30.0, 30.0, 31.0)
+    assert path.follow(rough, orbit.drive, orbit.start[None, :], 30.0, direction, 1.0).clearance is None
+
+
+def test_a_row_by_collocation_is_its_orbits_one_by_one() -> None:
+    """Through a resonance, with the multipliers of shooting."""
+    speeds = np.linspace(25.0, 45.0, 41)
+    drives = [Drive(speed=float(speed)) for speed in speeds]
+    values, starts, status = largest_multipliers([SMOOTH] * len(drives), drives)
+    assert (status == 0).all()
+    for k in range(0, 41, 5):
+        alone = orbit_of(SMOOTH, drives[k], start=starts[k])
+        assert values[k] == pytest.approx(alone.largest, abs=1e-8)
+        assert starts[k] == pytest.approx(alone.start, abs=1e-9)
