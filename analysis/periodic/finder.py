@@ -16,8 +16,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from linkwork.errors import InputError
-
 from ..mechanisms import InitialState, Parameters, mechanism_of
 from ..notebook import Shown, format_count
 from ..run import Inputs, driven, started, takes_published
@@ -32,6 +30,7 @@ from .orbits import (
     guess_of,
     orbit_of,
     period_from,
+    require_turns,
     search_from,
     settle_from,
 )
@@ -207,8 +206,7 @@ def orbits_of(
     known: Iterable[PeriodicOrbit] = (),
 ) -> Orbits:
     """The same as `find_orbits`, from a `Drive`; the ``known`` motions are among them."""
-    if turns < 1 or turns != int(turns):
-        raise InputError(f"turns is {turns}: a period has a whole number of them, at least one")
+    require_turns(turns)
     guess = guess_of(drive.flow(mechanism_of(parameters)), drive, start)
     search = _Search(parameters, drive, turns, guess)
     many, deflated = _Found(search), _Found(search)

@@ -336,8 +336,7 @@ def orbit_of(
     InputError
         If what was given is not usable.
     """
-    if turns < 1 or turns != int(turns):
-        raise InputError(f"turns is {turns}: a period has a whole number of them, at least one")
+    require_turns(turns)
     guess = guess_of(drive.flow(mechanism_of(parameters)), drive, start)
     _check_period(parameters, drive, guess, turns)
     _check_assembly(parameters, drive, guess)
@@ -429,6 +428,18 @@ def guess_of(flow: Flow, drive: Drive, start: ArrayLike | None) -> NDArray[np.fl
     if flow.torque and not guess[-1] > 0.0:
         raise InputError(f"{flow.labels[-1]} at the start is {guess[-1]} rad/s: it must be above zero")
     return guess
+
+
+def require_turns(turns: int) -> None:
+    """Make sure that a period can have so many turns.
+
+    Raises
+    ------
+    InputError
+        If it cannot.
+    """
+    if turns < 1 or turns != int(turns):
+        raise InputError(f"turns is {turns}: a period has a whole number of them, at least one")
 
 
 def _check_period(parameters: Parameters, drive: Drive, start: NDArray[np.float64], turns: int) -> None:
