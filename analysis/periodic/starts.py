@@ -12,6 +12,7 @@ from linkwork.errors import AssemblyError
 from linkwork.parameters import field_name
 
 from ..mechanisms import Parameters, mechanism_of
+from ..run import takes_published
 from .drives import Drive
 from .flows import Flow
 
@@ -23,6 +24,7 @@ _WIDEST, _WIDER = 16.0, 1.25
 _SPEEDS = (0.25, 1.5)
 
 
+@takes_published()
 def scale_of(parameters: Parameters, drive: Drive, start: ArrayLike) -> NDArray[np.float64]:
     """Magnitudes of y: of a five-bar the crank's length, its speed at the pin, and the crank speed."""
     mechanism = mechanism_of(parameters)

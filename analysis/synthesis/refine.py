@@ -12,6 +12,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from math import copysign, inf, pi
+from threading import Lock
 from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
@@ -41,6 +42,31 @@ STRIDE, GREAT = 3, 0.5
 WINDOW, APART = 0.6, 1e-10
 #: Where the crank begins to turn says nothing of a closed curve.
 PHASE = UNKNOWNS.index("crank_phase")
+
+
+class _OneThread:
+    """Inside, linear algebra is on one thread, for as long as any of our own threads is inside.
+
+    The last digits of a sum depend on how many threads share it, and where a slope is flat the end depends on these.
+    """
+
+    def __init__(self) -> None:
+        self._lock, self._inside = Lock(), 0
+
+    def __enter__(self) -> None:
+        with self._lock:
+            if self._inside == 0:
+                self._limits = threadpool_limits(1, user_api="blas")
+            self._inside += 1
+
+    def __exit__(self, *_: object) -> None:
+        with self._lock:
+            self._inside -= 1
+            if self._inside == 0:
+                self._limits.restore_original_limits()
+
+
+_ONE_THREAD = _OneThread()
 
 
 class Near(NamedTuple):
@@ -154,8 +180,7 @@ class Refinement:
             if value < best[0][0] and program.judged(z, parameters, answer.start).feasible:
                 best[0] = (value, z)
 
-        # the last digits of a sum depend on how many threads share it, and where a slope is flat the end depends on these
-        with threadpool_limits(1, user_api="blas"):
+        with _ONE_THREAD:
             for some in self._rounds():
                 z = best[0][1]
                 curve, slopes = self.traced(z, parameters)

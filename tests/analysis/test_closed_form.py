@@ -260,8 +260,11 @@ def test_points_and_unknowns_are_counted(n: int, mounting: bool, crank_phase: fl
 
 
 def test_a_constant_function_has_no_generator() -> None:
+    with pytest.raises(InputError, match="stands still"):
+        function_generators(RockerFunction(angle=[1.0, 1.0, 1.0], rotation=[0.0, 0.5, 1.0]), crank_phase=0.0)
+    # an output that turns with the crank: the coupler is as long as the ground link, the others as long as one likes
     with pytest.raises(InputError, match="not independent"):
-        function_generators(RockerFunction(angle=[1.0, 1.0, 1.0], rotation=[0.0, 0.0001, 0.0002]), crank_phase=0.0)
+        function_generators(RockerFunction(angle=[0.5, 1.0, 1.5], rotation=[0.0, 0.5, 1.0]), crank_phase=0.5)
 
 
 def test_chebyshev_spacing() -> None:
