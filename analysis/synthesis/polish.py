@@ -7,15 +7,18 @@ path, then goes on in `analysis.synthesis.refine`, the greatest error at given s
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from contextlib import ContextDecorator
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import product
 from math import inf, pi
+from threading import Lock
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
+from threadpoolctl import threadpool_limits
 
 from linkwork.errors import InputError
 
@@ -46,6 +49,31 @@ DIFFERENT = 1e-3
 EXACT = 1e-14
 
 
+class _OneThread(ContextDecorator):
+    """Inside, linear algebra is on one thread, for as long as any of our own threads is inside.
+
+    The last digits of a sum depend on how many threads share it, and where a slope is flat a search ends by these.
+    """
+
+    def __init__(self) -> None:
+        self._lock, self._inside = Lock(), 0
+
+    def __enter__(self) -> None:
+        with self._lock:
+            if self._inside == 0:
+                self._limits = threadpool_limits(1, user_api="blas")
+            self._inside += 1
+
+    def __exit__(self, *_: object) -> None:
+        with self._lock:
+            self._inside -= 1
+            if self._inside == 0:
+                self._limits.restore_original_limits()
+
+
+ONE_THREAD = _OneThread()
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Polished:
     """The answers of all starts: those that keep every constraint, best first, and the others; the starts that keep them."""
@@ -69,6 +97,7 @@ class Polished:
         return sum(a.start.quality <= quality * (1.0 + within) for a in self.kept)
 
 
+@ONE_THREAD
 def polish(
     normal: Normal,
     limits: Limits,
@@ -107,6 +136,7 @@ def kept_of(answers: Sequence[Answer]) -> list[Answer]:
     return sorted((a for a in answers if a.feasible), key=lambda a: a.start.quality)
 
 
+@ONE_THREAD
 def _apart(name: str, normal: Normal, limits: Limits, pivot: PivotUnknown | None, item: Any) -> Any:
     """A method of a `Polisher`, by its name, in another process or thread."""
     return getattr(Polisher(normal, limits, pivot), name)(item)

@@ -12,13 +12,11 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from math import copysign, inf, pi
-from threading import Lock
 from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import isotonic_regression, minimize
-from threadpoolctl import threadpool_limits
 
 from .constraints import UNKNOWNS
 from .overlap import nearest, symmetric_difference
@@ -42,31 +40,6 @@ STRIDE, GREAT = 3, 0.5
 WINDOW, APART = 0.6, 1e-10
 #: Where the crank begins to turn says nothing of a closed curve.
 PHASE = UNKNOWNS.index("crank_phase")
-
-
-class _OneThread:
-    """Inside, linear algebra is on one thread, for as long as any of our own threads is inside.
-
-    The last digits of a sum depend on how many threads share it, and where a slope is flat the end depends on these.
-    """
-
-    def __init__(self) -> None:
-        self._lock, self._inside = Lock(), 0
-
-    def __enter__(self) -> None:
-        with self._lock:
-            if self._inside == 0:
-                self._limits = threadpool_limits(1, user_api="blas")
-            self._inside += 1
-
-    def __exit__(self, *_: object) -> None:
-        with self._lock:
-            self._inside -= 1
-            if self._inside == 0:
-                self._limits.restore_original_limits()
-
-
-_ONE_THREAD = _OneThread()
 
 
 class Near(NamedTuple):
@@ -180,18 +153,17 @@ class Refinement:
             if value < best[0][0] and program.judged(z, parameters, answer.start).feasible:
                 best[0] = (value, z)
 
-        with _ONE_THREAD:
-            for some in self._rounds():
-                z = best[0][1]
-                curve, slopes = self.traced(z, parameters)
-                size = max(self.measure(curve), 1e-9)
-                down = _Descent(self, z, parameters, self._stretched(curve, slopes), size, some(curve))
-                found = minimize(
-                    down.value, down.begin(), jac=True, method="SLSQP", constraints=down.constraints(),
-                    callback=lambda y, down=down: seen(down.unknowns(y)),
-                    options={"maxiter": iterations, "ftol": CHANGE},
-                )  # fmt: skip
-                seen(down.unknowns(found.x))
+        for some in self._rounds():
+            z = best[0][1]
+            curve, slopes = self.traced(z, parameters)
+            size = max(self.measure(curve), 1e-9)
+            down = _Descent(self, z, parameters, self._stretched(curve, slopes), size, some(curve))
+            found = minimize(
+                down.value, down.begin(), jac=True, method="SLSQP", constraints=down.constraints(),
+                callback=lambda y, down=down: seen(down.unknowns(y)),
+                options={"maxiter": iterations, "ftol": CHANGE},
+            )  # fmt: skip
+            seen(down.unknowns(found.x))
         value, z = best[0]
         if not np.isfinite(value):
             return replace(as_it_is, start=replace(answer.start, quality=first))
