@@ -26,6 +26,7 @@ from .common import (
     plain,
     print_error,
     print_written,
+    set_option,
     workers_options,
 )
 
@@ -184,13 +185,7 @@ def _turn(solution: Solution, make: Any) -> SliderDrive | None:
 
 @click.command()
 @click.argument("case", type=click.Path(exists=True, dir_okay=False))
-@click.option(
-    "--set",
-    "settings",
-    multiple=True,
-    metavar="NAME=VALUE",
-    help="Change a value, such as constraints.largest_link='300 mm' or task.n=36; lists as in TOML.",
-)
+@set_option("constraints.largest_link='300 mm' or task.n=36; lists as in TOML")
 @click.option("--method", help="scan, differential-evolution or simplex; the last two for comparison.")
 @search_options
 @click.option("--animate", is_flag=True, help="Write a GIF of the first linkage over a turn, too.")

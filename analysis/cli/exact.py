@@ -8,15 +8,23 @@ from collections.abc import Sequence
 import click
 
 from . import ENDED_EARLY
-from .common import SYNTHESIS, check_kind, console, folder_of, force_option, handled, print_error, print_written
+from .common import (
+    SYNTHESIS,
+    check_kind,
+    console,
+    folder_of,
+    force_option,
+    handled,
+    print_error,
+    print_written,
+    set_option,
+)
 from .design import overrides_of, print_best, print_solutions, write_described
 
 
 @click.command()
 @click.argument("case", type=click.Path(exists=True, dir_okay=False))
-@click.option(
-    "--set", "settings", multiple=True, metavar="NAME=VALUE", help="Change a value of the case, such as task.n=4."
-)
+@set_option("task.n=4")
 @click.option(
     "--crank-phase", metavar="ANGLE", help="Of a function: the crank's angle from the ground link at rotation 0."
 )

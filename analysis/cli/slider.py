@@ -13,7 +13,16 @@ from rich.table import Table
 
 from linkwork.errors import Interrupted
 
-from .common import SLIDER_MOTION, check_kind, console, folder_of, handled, print_error, print_written
+from .common import (
+    SLIDER_MOTION,
+    check_kind,
+    console,
+    folder_of,
+    handled,
+    print_error,
+    print_written,
+    set_option,
+)
 from .design import leave_if_stopped, overrides_of, search_options, table, write_described
 
 if TYPE_CHECKING:
@@ -24,13 +33,7 @@ if TYPE_CHECKING:
 
 @click.command("slider-motion")
 @click.argument("case", type=click.Path(exists=True, dir_okay=False))
-@click.option(
-    "--set",
-    "settings",
-    multiple=True,
-    metavar="NAME=VALUE",
-    help="Change a value, such as slider.stroke='30 mm' or slider.harmonics='[1, 2, 3]'.",
-)
+@set_option("slider.stroke='30 mm' or slider.harmonics='[1, 2, 3]'")
 @click.option("--harmonics", type=click.IntRange(0), help="Of the slider's motion, in place of the case's.")
 @search_options
 @handled

@@ -21,6 +21,7 @@ from .common import (
     print_error,
     print_written,
     say,
+    set_option,
     show_table,
 )
 from .design import settings_of
@@ -28,13 +29,7 @@ from .design import settings_of
 
 @click.command()
 @click.argument("case", type=click.Path(exists=True, dir_okay=False))
-@click.option(
-    "--set",
-    "settings",
-    multiple=True,
-    metavar="NAME=VALUE",
-    help="Change a value, such as slider.damping='2 N*s/m' or tune.least_margin=0.1; lists as in TOML.",
-)
+@set_option("slider.damping='2 N*s/m' or tune.least_margin=0.1; lists as in TOML")
 @click.option("--json", "as_json", is_flag=True, help="Print the result as JSON instead of tables.")
 @plot_option
 @out_option()

@@ -406,6 +406,7 @@ def plot_sheet(solution: Solution, drive: SliderDrive | None = None, *, title: s
     """
     scene = LinkageScene(solution, title)
     _, pins = _start(scene)
+    frame = _Frame(scene, _around(scene))
     with styled():
         figure = Figure(figsize=A4)
         right = ["task", "transmission", *(["forces"] if drive is not None else [])]
@@ -415,10 +416,10 @@ def plot_sheet(solution: Solution, drive: SliderDrive | None = None, *, title: s
             width_ratios=(1.2, 1.0),
             height_ratios=(*(1.6 if name == "task" else 1.0 for name in right), 1.3),
         )
-        _Frame(scene, _around(scene)).prepare(panels["linkage"])
+        frame.prepare(panels["linkage"])
         _draw_target(panels["linkage"], scene, size=2.0)
         _draw_curves(panels["linkage"], scene)
-        _draw_linkage(panels["linkage"], scene, _Frame(scene, _around(scene)), pins)
+        _draw_linkage(panels["linkage"], scene, frame, pins)
         if scene.function is not None:
             _rocker(panels["task"], scene)
         else:

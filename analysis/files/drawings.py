@@ -399,10 +399,7 @@ def to_svg(drawing: Drawing, unit: str = "mm") -> str:
         _write(put, dimension, metre, number)
     for text in drawing.texts:
         element = put(text.layer, "text", x=text.position[0], y=-text.position[1], **{"font-size": text.height})
-        element.set("font-family", "sans-serif")
-        element.set("fill", f"#{LAYERS[text.layer].colour:06x}")
-        element.set("stroke", "none")
-        element.text = text.text
+        _letter(element, text.layer, text.text)
     root.extend(group for group in groups.values() if len(group))
     ElementTree.indent(root)
     return ElementTree.tostring(root, encoding="unicode") + "\n"
@@ -442,10 +439,15 @@ def _write(put: Callable[..., Any], dimension: Dimension, metre: float, number: 
     y = 0.5 * (y1 + y2) + up * cos(radians(turned))
     text = put(dimension.layer, "text", x=x, y=-y, **{"font-size": dimension.height, "text-anchor": "middle"})
     text.set("transform", f"rotate({-turned + 0.0:.6g} {number(x)} {number(-y)})")
-    text.set("font-family", "sans-serif")
-    text.set("fill", f"#{LAYERS[dimension.layer].colour:06x}")
-    text.set("stroke", "none")
-    text.text = _number(dimension, metre)
+    _letter(text, dimension.layer, _number(dimension, metre))
+
+
+def _letter(element: ElementTree.Element, layer: str, text: str) -> None:
+    """Letters in the colour of a layer, filled."""
+    element.set("font-family", "sans-serif")
+    element.set("fill", f"#{LAYERS[layer].colour:06x}")
+    element.set("stroke", "none")
+    element.text = text
 
 
 def save_drawing(path: str | Path, drawing: Drawing, *, unit: str = "mm") -> Path:

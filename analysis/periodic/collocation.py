@@ -15,12 +15,12 @@ from typing import NamedTuple
 
 import numpy as np
 from numba import boolean, float64, int64
-from numpy.polynomial import legendre
 from numpy.typing import NDArray
 
 from linkwork.limits import LIMIT_SINE
 
 from ..numerics.codegen import MATRIX, VECTOR, evaluate, inner, kernel, part
+from ..numerics.gauss import gauss
 from ..run.sources import SOURCE
 from .flows import DIRECTIONAL, GAP, PLAIN, VARIATIONAL
 from .orbit_kernels import (
@@ -35,19 +35,12 @@ from .orbit_kernels import (
 
 #: Nodes of an element.
 NODES = 12
-_ROOTS, _WEIGHTS = legendre.leggauss(NODES)
 #: Places and weights on an element of length 1, integrals of the Lagrange polynomials up to each place, the same twice.
-C, B = 0.5 * (_ROOTS + 1.0), 0.5 * _WEIGHTS
-_VALUES = legendre.legvander(_ROOTS, NODES)
-_TO_LEGENDRE = (2.0 * np.arange(NODES)[:, None] + 1.0) * (_VALUES[:, :NODES] * B[:, None]).T
-_INTEGRALS = 0.5 * np.array(
-    [legendre.legval(_ROOTS, legendre.legint(np.eye(NODES)[k], lbnd=-1.0)) for k in range(NODES)]
-)
-A = np.ascontiguousarray(_INTEGRALS.T @ _TO_LEGENDRE)
+C, B, A, _COEFFICIENTS = gauss(NODES)
 AA = np.ascontiguousarray(A @ A)
 BA = B @ A
 #: The two highest Legendre coefficients.
-TAIL = np.ascontiguousarray(_TO_LEGENDRE[-2:])
+TAIL = np.ascontiguousarray(_COEFFICIENTS[-2:])
 #: `tail_of` at most, relative to the root of the integrator's tolerance: the ends of the elements are good to about its square.
 DECAY = 200.0
 #: Corrections at most, and the greatest first one, relative to the scale: what is farther is no neighbour.

@@ -25,6 +25,7 @@ from linkwork.errors import LinkworkError
 from ..mechanisms import mechanism_of
 from ..numerics import symbolic
 from ..numerics.codegen import MAKING, MachineCode
+from ..numerics.gauss import gauss
 from ..run.compiled import rows
 from ..run.equations import expressions
 from . import orbit_kernels
@@ -46,25 +47,9 @@ _REAL = 1e-9
 _AGREES = 1e-6
 
 
-class _Gauss(NamedTuple):
-    """Gauss's points on a panel of length 1: nodes, weights, the integrals from 0 to the nodes, and from values at the
-    nodes to the coefficients of Legendre's polynomials on -1 to 1; these polynomials on a grid with both ends."""
-
-    nodes: FloatArray
-    weights: FloatArray
-    integrals: FloatArray
-    coefficients: FloatArray
-    grid: FloatArray
-
-
-@cache
-def _gauss() -> _Gauss:
-    nodes, weights = legendre.leggauss(_POINTS)
-    coefficients: FloatArray = np.linalg.inv(legendre.legvander(nodes, _POINTS - 1)).astype(float)
-    antiderivative = legendre.legint(np.eye(_POINTS), lbnd=-1.0, axis=0)
-    integrals = 0.5 * legendre.legvander(nodes, _POINTS) @ antiderivative @ coefficients
-    grid: FloatArray = legendre.legvander(np.linspace(-1.0, 1.0, 4 * _POINTS + 1), _POINTS - 1).astype(float)
-    return _Gauss(0.5 * (nodes + 1.0), 0.5 * weights, integrals, coefficients, grid)
+_GAUSS = gauss(_POINTS)
+#: Legendre's polynomials on a grid of a panel with both ends.
+_GRID = legendre.legvander(np.linspace(-1.0, 1.0, 4 * _POINTS + 1), _POINTS - 1)
 
 
 class Place(NamedTuple):
@@ -119,14 +104,14 @@ class Variations:
 
     def _divide(self, along: FloatArray) -> None:
         """Choose the panels."""
-        flow, gauss = self.flow, _gauss()
+        flow = self.flow
         edges = np.linspace(0.0, flow.period * self.orbit.turns, _PANELS * self.orbit.turns + 1)
         if self.orbit.stations is not None:
             edges = np.union1d(edges, self.orbit.stations.angles)
         relative = self.scale[:, None] / self.scale
         for _ in range(_HALVINGS):
             self.h = np.diff(edges)
-            self.angles = edges[:-1, None] + self.h[:, None] * gauss.nodes
+            self.angles = edges[:-1, None] + self.h[:, None] * _GAUSS.nodes
             self.y = self._sampled()
             self.rates, first = self._first()
             self.by_y, self.by_constant = first[..., : flow.size], first[..., flow.size :]
@@ -139,7 +124,7 @@ class Variations:
                 (self.by_y, relative),
                 (self.forcing, self.scale[:, None] * effect * (_EFFECT / _RESOLVED)),
             ):
-                last = np.abs(np.einsum("is,ks...->k...i", gauss.coefficients[-2:], values / size))
+                last = np.abs(np.einsum("is,ks...->k...i", _GAUSS.coefficients[-2:], values / size))
                 rough |= self.h * last.reshape(len(self.h), -1).max(axis=1, initial=0.0) > _RESOLVED
             if not rough.any():
                 break
@@ -206,9 +191,9 @@ class Variations:
 
     def _solve_panels(self) -> None:
         """Solve d' = A d + r on each panel, for what d is at its beginning and for r."""
-        gauss, n, k = _gauss(), self.flow.size, len(self.h)
+        n, k = self.flow.size, len(self.h)
         size = _POINTS * n
-        integrals = self.h[:, None, None] * gauss.integrals
+        integrals = self.h[:, None, None] * _GAUSS.integrals
         matrix = np.eye(size) - np.einsum("kij,kjab->kiajb", integrals, self.by_y).reshape(k, size, size)
         inverse = np.linalg.inv(matrix)
         #: from r, and from d at the beginning, to d at the nodes
@@ -216,7 +201,7 @@ class Variations:
             k, size, size
         )
         self._from_start = inverse.reshape(k, size, _POINTS, n).sum(axis=2)
-        weights = self.h[:, None] * gauss.weights
+        weights = self.h[:, None] * _GAUSS.weights
         weighted = np.einsum("ki,kiab->kaib", weights, self.by_y).reshape(k, n, size)
         #: from r, and from d at the beginning, to d at the end
         self._to_end = weighted @ self._to_nodes + np.einsum("ki,ab->kaib", weights, np.eye(n)).reshape(k, n, size)
@@ -285,12 +270,12 @@ class Variations:
 
     def integral(self, values: FloatArray) -> FloatArray:
         """Integral over the period of what has the shape (k, s, ...)."""
-        found: FloatArray = np.einsum("k,s,ks...->...", self.h, _gauss().weights, values)
+        found: FloatArray = np.einsum("k,s,ks...->...", self.h, _GAUSS.weights, values)
         return found
 
     def slope(self, panel: int, values: FloatArray, position: float) -> float:
         """Derivative by the angle of values at the nodes of a panel, shape (s,)."""
-        series = legendre.legder(_gauss().coefficients @ values)
+        series = legendre.legder(_GAUSS.coefficients @ values)
         return float(legendre.legval(position, series) * 2.0 / self.h[panel])
 
     def greatest(self, values: FloatArray) -> tuple[float, Place]:
@@ -298,9 +283,9 @@ class Variations:
 
         Of vectors, shape (k, s, c), the greatest modulus.
         """
-        gauss, vectors = _gauss(), values.ndim == 3
-        coefficients = np.einsum("is,ks...->ki...", gauss.coefficients, values)
-        on_grid = np.einsum("gi,ki...->kg...", gauss.grid, coefficients)
+        vectors = values.ndim == 3
+        coefficients = np.einsum("is,ks...->ki...", _GAUSS.coefficients, values)
+        on_grid = np.einsum("gi,ki...->kg...", _GRID, coefficients)
         first = int(((on_grid**2).sum(axis=-1) if vectors else on_grid).max(axis=1).argmax())
         found = []
         # next to an end of a panel the rounding decides which one it is
@@ -314,7 +299,7 @@ class Variations:
             there = legendre.legval(places, series)
             found.append((float(there.max()), panel % len(self.h), float(places[there.argmax()])))
         value, panel, position = max(found)
-        weights = legendre.legvander(np.array([position]), _POINTS - 1)[0] @ gauss.coefficients
+        weights = legendre.legvander(np.array([position]), _POINTS - 1)[0] @ _GAUSS.coefficients
         return sqrt(value) if vectors else value, Place(panel, position, weights)
 
     def outputs(self) -> FloatArray:

@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from linkwork.errors import InputError
 
 from ..numerics.fourier import FourierSeries
+from ..numerics.gauss import gauss
 from ..periodic import liouville, require_sign
 
 #: Gauss points of a step: the method is of order 12.
@@ -78,21 +79,6 @@ class SingularEquationError(InputError):
 
 
 # Floquet
-
-
-@lru_cache(maxsize=1)
-def _gauss() -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Nodes (s,), weights (s,) and matrix (s, s) of Gauss-Legendre collocation on [0, 1]."""
-    points, weights = np.polynomial.legendre.leggauss(STAGES)
-    nodes, weights = 0.5 * (1.0 + points), 0.5 * weights
-    # a[i, j] is the integral of the j-th Lagrange polynomial from 0 to node i, by the same rule
-    inside = np.multiply.outer(nodes, nodes)
-    matrix = np.empty((STAGES, STAGES))
-    for j in range(STAGES):
-        others = np.delete(nodes, j)
-        values = np.prod((inside[..., None] - others) / (nodes[j] - others), axis=-1)
-        matrix[:, j] = nodes * (values @ weights)
-    return nodes, weights, matrix
 
 
 @lru_cache(maxsize=32)
@@ -181,7 +167,7 @@ def monodromies(equations: Sequence[PeriodicEquation], *, steps: int | None = No
     tables = _tables(equations)
     least = _steps(tables)
     count = least if steps is None else steps
-    nodes, weights, matrix = _gauss()
+    nodes, weights, matrix, _ = gauss(STAGES)
     h = 2.0 * pi / count
     points = tuple((h * np.add.outer(np.arange(count), nodes)).ravel().tolist())
     shape = (len(equations), count, STAGES)
