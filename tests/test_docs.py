@@ -195,6 +195,7 @@ def test_the_page_of_the_slider_crank_runs_and_says_what_is_so(tmp_path):
         assert (tmp_path / name).exists()
 
 
+@pytest.mark.slow
 def test_the_page_of_linkages_in_closed_form_runs_and_says_what_is_so(tmp_path):
     commands, checked, _ = run_page("closed-form.md", tmp_path)
     assert (commands, checked) == (4, 2)

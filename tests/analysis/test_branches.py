@@ -144,6 +144,7 @@ def test_a_function_can_vary_what_it_likes() -> None:
     assert branch.orbits[-1].start == pytest.approx(end.start, abs=1e-9)
 
 
+@pytest.mark.slow
 def test_friction_by_contact_forces_can_be_added_to_a_motion_without() -> None:
     orbit = find_orbit(TABLE_3_1, speed=SPEED)
     family = Family(parameters=TABLE_3_1, drive=orbit.drive, vary="slider.friction_coefficient")

@@ -116,6 +116,7 @@ def test_files_and_plot(found: StabilityChart, tmp_path: Path) -> None:
     assert figure.axes[0].get_xlabel() == "drive.speed [rpm]"
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("coarse")
 def test_crossings_of_other_motions_are_traced_under_their_own_name() -> None:
     rig = SETS["rig-1-spring-a"].parameters

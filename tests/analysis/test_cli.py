@@ -567,6 +567,7 @@ def test_what_varies_in_time_is_refused_and_a_motor_is_not(linkwork):
     assert "at 499.502 rpm: stable" in result.output
 
 
+@pytest.mark.slow
 def test_resonance_over_the_torque(linkwork):
     result = linkwork(
         "resonance", "--published", "rig-2-spring-c", "--set", "drive.torque=0.01 N*m",

@@ -163,7 +163,7 @@ def test_mathieu_below_all_regions() -> None:
 
 
 @given(st.integers(0, 10_000))
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=15, deadline=None)
 def test_hills_multipliers_are_those_of_the_monodromy(seed: int) -> None:
     random = np.random.default_rng(seed)
     a, b, c = random.uniform(-0.25, 0.25, (3, 2, 4))
