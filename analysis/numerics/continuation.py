@@ -311,6 +311,7 @@ class Follower:
                     return Curve(tuple(points), tuple(steps), taken.reason, stalled, message)
                 continue
             point, count = taken
+            point, length = self._turned_beyond(last, point, length)
             end = None
             if self.is_beyond(point):
                 point, length = self._to_bound(last, point, length)
@@ -447,6 +448,18 @@ class Follower:
         scaled: Vector = np.append(point.y, point.parameter) / self.scale
         return scaled
 
+    def _turned_beyond(self, last: Point, point: Point, length: float) -> tuple[Point, float]:
+        """Where the curve turns back beyond a bound within a step that comes in again; otherwise the step as it is."""
+        for axis in np.flatnonzero(last.tangent * point.tangent < 0.0).tolist():
+            ahead, behind = abs(last.tangent[axis]), abs(point.tangent[axis])
+            bound = (self.high if last.tangent[axis] > 0.0 else self.low)[axis] / self.scale[axis]
+            # twice the height of the parabola with these slopes
+            if abs(bound - self._scaled(last)[axis]) < length * ahead**2 / (ahead + behind):
+                turn, s = self.locate(last, length, lambda p, axis=axis: float(p.tangent[axis]))  # type: ignore[misc]
+                if self.is_beyond(turn):
+                    return turn, s
+        return point, length
+
     def _to_bound(self, last: Point, beyond: Point, length: float) -> tuple[Point, float]:
         """Where a step leaves the bounds, exactly on one of them, and its distance along the step."""
         here, there = self._scaled(last), self._scaled(beyond)
@@ -462,8 +475,11 @@ class Follower:
         # the guess lies on the bound, and the corrections stay there
         guess, fixed = here + parts[axis] * way, np.eye(len(here))[axis]
         found = self._correct(guess, fixed, last)
-        if isinstance(found, _Landing) and np.linalg.norm(found.z - guess) < REACH * length:
-            point = self._point(found, last.tangent)
+        point = self._point(found, last.tangent) if isinstance(found, _Landing) else last
+        # next to a fold the corrections may lead to its other side, where the curve comes in
+        if isinstance(found, _Landing) and (
+            np.linalg.norm(found.z - guess) < REACH * length and point.tangent[axis] * way[axis] > 0.0
+        ):
             s = float((found.z - here) @ last.tangent)
         else:
             point, s = self.locate(last, length, lambda p: float(np.append(p.y, p.parameter)[axis]) - bound)

@@ -221,8 +221,7 @@ def _regions(wish: Wish, x: FloatArray, branch: Branch) -> Iterator[Region]:
     """Where the test functions are negative along a branch."""
     for kind in _kinds(branch):
         tests = _tests(branch, kind)
-        # the tangent at an end of what is followed is cut off there
-        special = [s for s in branch.special if s.kind is kind and 0 < s.after < len(branch) - 2]
+        special = [s for s in branch.special if s.kind is kind]
         # the ends of the parts without a point where the test changes its sign
         ends = [-1, *(s.after for s in special), len(branch) - 1]
         points: list[SpecialPoint | None] = [None, *special, None]

@@ -56,6 +56,18 @@ def test_a_fold_is_located_where_the_tangent_turns_back(scale: float) -> None:
     assert folds == [pytest.approx((exact[0], -exact[1]), abs=1e-7), pytest.approx((-exact[0], exact[1]), abs=1e-7)]
 
 
+@pytest.mark.parametrize("below", [1e-9, 1e-6, 1e-3, 3e-3])
+@pytest.mark.parametrize("greatest", [2e-2, 0.1, 0.3])
+def test_a_fold_beyond_the_end_of_the_range_is_none_of_the_curve(below: float, greatest: float) -> None:
+    """A step over it would come in again on the other side."""
+    high = 2.0 / np.sqrt(27.0) - below
+    f = follower(CUBIC, -1.0, high, greatest=greatest)
+    points = f.follow(f.start([-1.3], -1.0, 1)).points
+    assert points[-1].parameter == high
+    assert points[-1].y[0] < -1.0 / np.sqrt(3.0)
+    assert min(point.tangent[-1] for point in points) > 0.0
+
+
 def test_a_closed_curve_closes() -> None:
     f = follower(CIRCLE, -2.0, 2.0)
     result = f.follow(f.start([1.0], 0.0, 1))
