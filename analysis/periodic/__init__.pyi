@@ -31,6 +31,9 @@ from .directions import gradient_names as gradient_names
 from .drives import Drive as Drive
 from .drives import VaryingInputError as VaryingInputError
 from .drives import drive_of as drive_of
+from .extrema import Extremum as Extremum
+from .extrema import extrema as extrema
+from .extrema import special_gradient as special_gradient
 from .finder import Orbits as Orbits
 from .finder import find_orbit as find_orbit
 from .finder import find_orbits as find_orbits
@@ -53,7 +56,6 @@ from .gradients import boundary_gradient as boundary_gradient
 from .gradients import crossing_gradient as crossing_gradient
 from .gradients import extremum_gradient as extremum_gradient
 from .gradients import motion_gradient as motion_gradient
-from .gradients import special_gradient as special_gradient
 from .grids import Grid as Grid
 from .grids import GridInterrupted as GridInterrupted
 from .grids import grid as grid
@@ -81,10 +83,8 @@ from .planes import require_variable as require_variable
 from .planes import speed_name as speed_name
 from .planes import unit_of as unit_of
 from .planes import value_of as value_of
-from .resonance import Extremum as Extremum
 from .resonance import Response as Response
 from .resonance import ResponseInterrupted as ResponseInterrupted
-from .resonance import extrema as extrema
 from .resonance import frequency_response as frequency_response
 from .stability import Confirmation as Confirmation
 from .stability import Monodromy as Monodromy

@@ -19,12 +19,11 @@ from linkwork.errors import InputError, LinkworkError
 
 from ..files import unknown_name
 from ..mechanisms import mechanism_of
-from .branches import Family, SpecialPoint, orbit_from
+from .branches import orbit_from
 from .directions import along_parameters, gradient_names, stacked
 from .floquet import Crossing
 from .orbits import PeriodicOrbit, orbit_of, period_from
 from .planes import require_variable, value_of, with_values
-from .resonance import Extremum
 from .variations import Place, Variations
 
 FloatArray = NDArray[np.float64]
@@ -331,31 +330,9 @@ def motion_gradient(orbit: PeriodicOrbit, names: Sequence[str] | None = None) ->
     return MotionGradient(orbit, names)
 
 
-def special_gradient(
-    family: Family, point: SpecialPoint | Extremum, names: Sequence[str] | None = None
-) -> PointGradient:
-    """How a special point of a branch, or a maximum or minimum of its amplitude, moves with the other parameters.
-
-    Parameters
-    ----------
-    family : Family
-        Over a parameter with an FMI name.
-    point : SpecialPoint or Extremum
-    names : sequence of str, optional
-        Of the other parameters; by default all, see `gradient_names`.
-
-    Raises
-    ------
-    InputError
-        If the family's parameter is a function.
-    LinkworkError
-        If the place has no derivative, as where two folds meet.
-    """
-    if not isinstance(family.vary, str):
-        raise InputError(f"{family.name} is a function: gradients are along a parameter with an FMI name")
-    if isinstance(point, SpecialPoint):
-        return crossing_gradient(point.orbit, point.kind, family.vary, names)
-    return extremum_gradient(point.orbit, family.vary, names)
+def extremum_orbit(orbit: PeriodicOrbit, along: str) -> PeriodicOrbit:
+    """The motion at an extremum of the amplitude over a parameter, from one near to it; see `extremum_gradient`."""
+    return _located(orbit, along, _to_extremum, "extremum of the amplitude")
 
 
 def extremum_gradient(orbit: PeriodicOrbit, along: str, names: Sequence[str] | None = None) -> PointGradient:
@@ -374,7 +351,17 @@ def extremum_gradient(orbit: PeriodicOrbit, along: str, names: Sequence[str] | N
     LinkworkError
         If there is no extremum near the motion.
     """
-    return _extremum(_located(orbit, along, _to_extremum, "extremum of the amplitude"), along, names)
+    others = _others(orbit, along, names)
+    motion = MotionGradient(extremum_orbit(orbit, along), (*others, along))
+    slopes = motion.amplitude_curvature(along).by
+    # at the extremum the amplitude does not change with its place
+    amplitude, at = motion.amplitude, motion.values[:-1]
+    return PointGradient(
+        along=along,
+        place=Gradient(value=float(motion.values[-1]), names=others, by=-slopes[:-1] / slopes[-1], at=at),
+        amplitude=Gradient(value=amplitude.value, names=others, by=amplitude.by[:-1], at=at),
+        orbit=motion.orbit,
+    )
 
 
 def crossing_gradient(
@@ -511,20 +498,6 @@ def _to_fold(motion: MotionGradient) -> tuple[FloatArray, float]:
     test = left @ (v.monodromy - np.eye(n)) @ right
     step = np.linalg.solve(matrix, -np.append(shift, test))
     return step[:n], float(step[n])
-
-
-def _extremum(orbit: PeriodicOrbit, along: str, names: Sequence[str] | None) -> PointGradient:
-    others = _others(orbit, along, names)
-    motion = MotionGradient(orbit, (*others, along))
-    slopes = motion.amplitude_curvature(along).by
-    # at the extremum the amplitude does not change with its place
-    amplitude, at = motion.amplitude, motion.values[:-1]
-    return PointGradient(
-        along=along,
-        place=Gradient(value=float(motion.values[-1]), names=others, by=-slopes[:-1] / slopes[-1], at=at),
-        amplitude=Gradient(value=amplitude.value, names=others, by=amplitude.by[:-1], at=at),
-        orbit=orbit,
-    )
 
 
 def _test(motion: MotionGradient, kind: Crossing) -> FloatArray:

@@ -13,8 +13,6 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.optimize import minimize_scalar
-from scipy.signal import find_peaks
 
 from linkwork.errors import InputError, Interrupted
 
@@ -28,7 +26,8 @@ from ..units import Amount, si
 from .arcs import Avoided, FoldJump, fold_jumps, ranges_to_avoid
 from .branches import GREATEST_MULTIPLIER, Branch, Family, SpecialPoint, describe, follow, switch
 from .drives import Drive, published_drive
-from .floquet import Crossing, Stability
+from .extrema import Extremum, extrema
+from .floquet import Crossing
 from .orbits import (
     OrbitError,
     PeriodicOrbit,
@@ -37,33 +36,9 @@ from .orbits import (
 from .planes import unit_of
 from .starts import SAME, scale_of
 
-#: How far a maximum of the amplitude stands out, relative to its height, to count as one.
-PROMINENCE = 1e-3
 #: A branch of four times the period and more is left where its largest multiplier passes this: it has doubled once more, or
 #: folded, and will not be met by a machine again before another motion has been.
 STRAYED = 4.0
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Extremum:
-    """A local maximum or minimum of the amplitude over the parameter.
-
-    Attributes
-    ----------
-    parameter : float
-        Speed (rad/s), or what else varies.
-    amplitude : float
-        m.
-    stability : Stability
-        Of the motion there.
-    orbit : PeriodicOrbit
-        That motion.
-    """
-
-    parameter: float
-    amplitude: float
-    stability: Stability
-    orbit: PeriodicOrbit
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -344,40 +319,3 @@ def _passes(branch: Branch, value: float, orbit: PeriodicOrbit) -> bool:
         and float(np.abs((branch.orbits[i].start - orbit.start) / scale).max()) < SAME
         for i in (0, -1)
     )
-
-
-def extrema(branch: Branch, sign: int = 1) -> tuple[Extremum, ...]:
-    """Local maxima (sign +1) or minima (-1) of the amplitude along a branch, each brought to rest on the orbits between.
-
-    The place is found by Brent's method on the orbits at fixed parameters, to 1e-6 of the parameter.
-    """
-    amplitude = sign * branch.amplitude
-    peaks, properties = find_peaks(amplitude, prominence=0.0)
-    found = []
-    for i, prominence in zip(peaks.tolist(), properties["prominences"].tolist()):
-        if prominence < PROMINENCE * abs(amplitude[i]):
-            continue
-        a, c = sorted((float(branch.parameter[i - 1]), float(branch.parameter[i + 1])))
-        # at a fold the parameter turns back, and the greatest amplitude of the neighbours stands
-        if not a < branch.parameter[i] < c:
-            continue
-        near = branch.orbits[i]
-
-        def less(value: float, near: PeriodicOrbit = near) -> float:
-            return -sign * _near(branch.family, value, near).amplitude
-
-        try:
-            best = minimize_scalar(less, bounds=(a, c), method="bounded", options={"xatol": 1e-6 * (c - a)})
-            place, orbit = float(best.x), _near(branch.family, float(best.x), near)
-        except OrbitError:
-            # next to the limit of assembly a neighbour at a fixed parameter may not be found: the point itself stands
-            place, orbit = float(branch.parameter[i]), near
-        found.append(
-            Extremum(parameter=place, amplitude=orbit.amplitude, stability=orbit.verdict().stability, orbit=orbit)
-        )
-    return tuple(found)
-
-
-def _near(family: Family, value: float, orbit: PeriodicOrbit) -> PeriodicOrbit:
-    parameters, drive = family.at(value)
-    return orbit_of(parameters, drive, turns=orbit.turns, start=orbit.start, settle=False)

@@ -29,7 +29,7 @@ from ..periodic import (
     passes,
     scale_of,
 )
-from .conditions import greatest, peak
+from .conditions import greatest
 from .places import Across, FloatArray, LostError, Place, Spot, margin_of, motion
 from .wish import Limit, Wish
 
@@ -308,18 +308,10 @@ def _least(wish: Wish, x: FloatArray, branch: Branch) -> Iterator[Least]:
 
 
 def _peaks(wish: Wish, x: FloatArray, response: Response) -> Iterator[Spot]:
-    """The resonances in the range and next to it, brought to rest."""
-    slack = 1e-3 * wish.speeds[1]
+    """The resonances in the range."""
     for top in response.maxima():
-        if not (wish.speeds[0] - slack < top.parameter < wish.speeds[1] + slack):
-            continue
-        begin = Spot(x, top.orbit.start, top.parameter)
-        try:
-            spot = peak(wish, x, begin)[1]
-        except LinkworkError:
-            spot = begin
-        if reaches(wish, spot.speed, spot.speed):
-            yield spot
+        if reaches(wish, top.parameter, top.parameter):
+            yield Spot(x, top.orbit.start, top.parameter)
 
 
 def _greatest(

@@ -28,6 +28,7 @@ from analysis.periodic import (
     boundary_gradient,
     crossing_gradient,
     crossing_test,
+    extrema,
     extremum_gradient,
     find_orbit,
     follow,
@@ -214,6 +215,14 @@ def test_resonance_of_the_rotor_has_its_closed_form() -> None:
     resonance = k / np.sqrt(k * mass - 0.5 * c * c)
     found = extremum_gradient(orbit_of(ROTOR, Drive(speed=1.03 * resonance)), "drive.speed")
     assert found.place.value == pytest.approx(resonance, rel=1e-9)
+    # along a branch too, where an amplitude alone would leave it open to the root of its error
+    low, high = 0.9 * resonance, 1.1 * resonance
+    (top,) = frequency_response(ROTOR, low, high, doublings=0, greatest_step=5e-2).maxima()
+    assert top.parameter == pytest.approx(resonance, rel=1e-9)
+    # so does a branch over what a function says, to what that leaves
+    family = Family(parameters=ROTOR, drive=Drive(speed=low), vary=lambda speed: (ROTOR, Drive(speed=speed)))
+    (top,) = extrema(follow(family, orbit_of(ROTOR, Drive(speed=low)), low, low=low, high=high))
+    assert top.parameter == pytest.approx(resonance, rel=1e-4)
     assert found.amplitude.value == pytest.approx(m * r / (c * np.sqrt(mass / k - (0.5 * c / k) ** 2)), rel=1e-9)
     inner = k * mass - 0.5 * c * c
     expected = {
@@ -315,8 +324,8 @@ def test_a_resonance_moves_as_its_differences_say() -> None:
     response = frequency_response(RIG_2_C, 560.0 * RPM, 620.0 * RPM, doublings=0)
     (peak,) = response.maxima()
     found = special_gradient(response.family, peak)
-    assert found.place.value == pytest.approx(peak.parameter, rel=1e-4)
-    assert found.amplitude.value == pytest.approx(peak.amplitude, rel=1e-5)
+    assert found.place.value == pytest.approx(peak.parameter, rel=1e-9)
+    assert found.amplitude.value == pytest.approx(peak.amplitude, rel=1e-6)
     size = np.array([found.place.value, found.amplitude.value])
     for name in ("slider.damping", "slider.stiffness", "crank.length", "rocker.inertia", "slider.guide_angle"):
         column = found.place.names.index(name)
