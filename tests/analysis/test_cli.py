@@ -394,7 +394,7 @@ def test_resonance_of_a_published_set(linkwork, tmp_path):
     result = linkwork("resonance", "--published", "rig-2-spring-c", "--from", "300 rpm", "--to", "700 rpm", "--html")
     assert result.exit_code == 0, result.output
     assert "585.47 rpm" in result.output
-    assert "586.12" in result.output
+    assert "586.13" in result.output
     assert "speeds to avoid" in result.output
     assert "resonance, above 0.71 of the peak" in result.output
     out = tmp_path / "out"
