@@ -75,14 +75,17 @@ from .orbits import OrbitError as OrbitError
 from .orbits import PeriodicOrbit as PeriodicOrbit
 from .orbits import largest_multipliers as largest_multipliers
 from .orbits import orbit_of as orbit_of
+from .orbits import period_from as period_from
 from .planes import Operation as Operation
 from .planes import Plane as Plane
+from .planes import driving_names as driving_names
 from .planes import format_value as format_value
 from .planes import plane as plane
 from .planes import require_variable as require_variable
 from .planes import speed_name as speed_name
 from .planes import unit_of as unit_of
 from .planes import value_of as value_of
+from .planes import with_values as with_values
 from .resonance import Response as Response
 from .resonance import ResponseInterrupted as ResponseInterrupted
 from .resonance import frequency_response as frequency_response

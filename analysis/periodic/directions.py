@@ -20,7 +20,7 @@ from ..run import takes_published
 from ..run.equations import of_parameters
 from .drives import Drive
 from .orbits import PeriodicOrbit
-from .planes import require_variable, variable_names
+from .planes import of_the_motor, require_variable, variable_names
 
 FloatArray = NDArray[np.float64]
 
@@ -73,9 +73,11 @@ def stacked(orbit: PeriodicOrbit, names: Sequence[str], p: FloatArray) -> FloatA
     """Derivatives of the numbers of the drive, and after them of the constants, ``p``; shape (c, m)."""
     mechanism = mechanism_of(orbit.parameters)
     drive = np.zeros((orbit.flow.drive_size, p.shape[1]))
+    # in the order of `Drive.vector`
+    places = (*mechanism.input_names, *of_the_motor(mechanism))
     for column, name in enumerate(names):
-        if name in mechanism.input_names:
-            drive[mechanism.input_names.index(name), column] = 1.0
+        if name in places:
+            drive[places.index(name), column] = 1.0
     return np.vstack([drive, p])
 
 

@@ -7,12 +7,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from linkwork.errors import InputError, MissingParameterError, ParameterError
 
-from ..files import Many, Quantity, Table, as_it_is, entry, flag, overridden, read, read_tables, table_of, text
+from ..files import Many, Quantity, Table, Whole, as_it_is, entry, flag, overridden, read, read_tables, table_of, text
 from ..mechanisms import mechanism_of
-from ..periodic import drive_of, speed_name, unit_of
-from ..run import case_from
+from ..periodic import Drive, drive_of, unit_of
+from ..run import Case, case_from
 from ..units import with_unit
 from .tuned import Tuned
 from .wish import Limit, Wish
@@ -37,8 +39,11 @@ def _objective(value: Any, name: str) -> str:
 class TuneTable:
     """The table ``[tune]``; see `Wish`."""
 
-    speeds: tuple[float, float] = entry(Many(Quantity("rad/s", above=0.0), length=2))
     change: Mapping[str, Any] = entry(table_of)
+    speeds: tuple[float, float] | None = entry(Many(Quantity("rad/s", above=0.0), length=2), None)
+    over: str = entry(text, "")
+    between: tuple[Any, Any] | None = entry(Many(as_it_is, length=2), None)
+    turns: int = entry(Whole(least=1), 1)
     no_resonance: bool = entry(flag, False)
     no_jump: bool = entry(flag, False)
     no_unstable: bool = entry(flag, False)
@@ -70,6 +75,19 @@ class TuningCase:
         return overridden(self.tables, changes)
 
 
+def _start(case: Case, drive: Drive) -> list[float] | None:
+    """At rest but for the crank's speed at the start, where it is needed and given: see `find_orbit`."""
+    mechanism = mechanism_of(case.parameters)
+    flow, state = drive.flow(mechanism), mechanism.state(case.initial)
+    if not (flow.torque and drive.motor is None):
+        return None
+    speed = state[flow.places[-1]]
+    if not speed > 0.0:
+        name = mechanism.freedoms[flow.crank].initial[1]
+        raise InputError(f"under a torque the speed of the crank must be guessed: give initial.{name}, above zero")
+    return [*np.zeros(flow.size - 1).tolist(), speed]
+
+
 def load_tuning_case(path: str | Path, overrides: Mapping[str, Any] | None = None) -> TuningCase:
     """Read a case from a TOML or JSON file; see `docs/tuning.md`.
 
@@ -90,16 +108,24 @@ def tuning_case_from(
     if "tune" not in tables:
         raise MissingParameterError("tune")
     wanted = read(TuneTable, tables.pop("tune"), "tune")
-    if isinstance(tables.get("drive"), Mapping) and "torque" in tables["drive"]:
-        raise InputError("drive.torque drives the crank: over a range of speeds the speed is prescribed; leave it out")
-    speed = with_unit(wanted.speeds[0], "rad/s")
-    case = case_from(tables, folder=folder, title=title, overrides={"drive.speed": speed, "run.revolutions": 1})
-    if speed_name(mechanism_of(case.parameters)) is None:
-        raise InputError("the crank has no prescribed speed: there is no range of speeds")
+    overrides = {"run": {"stop_time": 1.0}}
+    if wanted.speeds is not None:
+        if isinstance(tables.get("drive"), Mapping) and "torque" in tables["drive"]:
+            raise InputError(
+                "drive.torque drives the crank, so that its speed follows: leave out tune.speeds and give what "
+                "is set, such as over = 'drive.torque' and between = ['0.1 N*m', '0.2 N*m']; or leave out drive.torque"
+            )
+        overrides["drive.speed"] = with_unit(wanted.speeds[0], "rad/s")
+    case = case_from(tables, folder=folder, title=title, overrides=overrides)
+    drive = drive_of(case.parameters, case.inputs, case.initial)
     wish = Wish(
         parameters=case.parameters,
-        drive=drive_of(case.parameters, case.inputs, case.initial),
+        drive=drive,
+        start=_start(case, drive),
         speeds=wanted.speeds,
+        over=wanted.over,
+        between=wanted.between,
+        turns=wanted.turns,
         change=wanted.change,
         no_resonance=wanted.no_resonance,
         no_jump=wanted.no_jump,

@@ -9,11 +9,11 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from ..periodic import Crossing, Gradient, Turn, extremum_gradient, speed_name
-from .places import Across, FloatArray, Found, LostError, Place, Spot, margin_of, margin_slopes
+from ..periodic import Crossing, Gradient, Turn, extremum_gradient
+from .places import Across, FloatArray, Found, LostError, Place, Spot, margin_of, margin_slopes, sampled, spot_of
 from .wish import AMPLITUDE, Limit, Wish
 
-#: Step in which the speed is sought at which an output is greatest (relative to the speed), and steps at most.
+#: Step in which the level is sought at which an output is greatest, relative to the range's size, and steps at most.
 _STEP, _CLIMB = 1e-3, 12
 #: Samples that the crank angle of a greatest value may be away from where it was.
 _UPHILL = 256
@@ -59,15 +59,15 @@ class Inside:
 
 
 class Beyond:
-    """A point where stability is lost is above a speed (side +1) or below it (-1)."""
+    """A point where stability is lost is above a level (side +1) or below it (-1)."""
 
     slack = 1e-9
 
-    def __init__(self, group: str, place: Place, speed: float, side: int) -> None:
-        self.group, self.place, self.speed, self._share = group, place, speed, side / place.wish.middle
+    def __init__(self, group: str, place: Place, level: float, side: int) -> None:
+        self.group, self.place, self.level, self._share = group, place, level, side / place.wish.size
 
     def value(self, x: FloatArray) -> float:
-        return self._share * (self.place.at(x).spot.speed - self.speed)
+        return self._share * (self.place.at(x).spot.level - self.level)
 
     def slopes(self, x: FloatArray) -> FloatArray:
         slopes: FloatArray = self._share * self.place.at(x).slopes[-1]
@@ -75,12 +75,12 @@ class Beyond:
 
 
 class PeakBeyond:
-    """A resonance, a maximum of the amplitude over the speed, is above a speed (side +1) or below it (-1)."""
+    """A resonance, a maximum of the amplitude over the level, is above a level (side +1) or below it (-1)."""
 
     slack = 1e-8
 
-    def __init__(self, group: str, wish: Wish, spot: Spot, speed: float, side: int) -> None:
-        self.group, self.speed, self._share = group, speed, side / wish.middle
+    def __init__(self, group: str, wish: Wish, spot: Spot, level: float, side: int) -> None:
+        self.group, self.level, self._share = group, level, side / wish.size
         self._wish, self._last = wish, spot
 
     def _at(self, x: FloatArray) -> Gradient:
@@ -89,27 +89,27 @@ class PeakBeyond:
         return place
 
     def value(self, x: FloatArray) -> float:
-        return self._share * (self._at(x).value - self.speed)
+        return self._share * (self._at(x).value - self.level)
 
     def slopes(self, x: FloatArray) -> FloatArray:
         return self._share * self._at(x).by * self._wish.tolerance
 
 
 def peak(wish: Wish, x: FloatArray, near: Spot) -> tuple[Gradient, Spot]:
-    """The speed of a resonance, with its derivatives by the parameters that may be changed, and the motion there.
+    """The level of a resonance, with its derivatives by the parameters that may be changed, and the motion there.
 
     Raises
     ------
     LinkworkError
         If there is none near.
     """
-    orbit = Place(wish, Across.at_speed(len(near.y), near.speed), 1, near).at(x).orbit
-    found = extremum_gradient(orbit, str(speed_name(wish.mechanism)), wish.names)
-    return found.place, Spot(x, found.orbit.start, found.place.value)
+    orbit = Place(wish, Across.at_level(wish, near, near.level), near).at(x).orbit
+    found = extremum_gradient(orbit, wish.over, wish.names)
+    return found.place, spot_of(wish, x, found.orbit)
 
 
 class Below:
-    """An output is below its limit where it is greatest: at a speed of the range and crank angles that go with the changes."""
+    """An output is below its limit where it is greatest: at a level of the range and crank angles that go with the changes."""
 
     slack = 1e-7
 
@@ -119,21 +119,21 @@ class Below:
         self._known: tuple[bytes, Found, Turn] | None = None
 
     def _at(self, x: FloatArray) -> tuple[Found, Turn]:
-        """The motion there, found by parabolas through the output at three speeds."""
+        """The motion there, found by parabolas through the output at three levels."""
         if self._known is not None and self._known[0] == x.tobytes():
             return self._known[1:]
-        (low, high), speed = self._wish.speeds, self._last.speed
-        step = _STEP * speed
-        found, value = self._reading(x, speed)
+        (low, high), level = self._wish.span, self._last.level
+        step = _STEP * self._wish.size
+        found, value = self._reading(x, level)
         for _ in range(_CLIMB):
             try:
-                before, after = (self._reading(x, speed + way * step)[1] for way in (-1, 1))
+                before, after = (self._reading(x, level + way * step)[1] for way in (-1, 1))
             except LostError:
                 break  # next to a fold
             bend = before - 2.0 * value + after
             move = np.sign(after - before) if bend >= 0.0 else np.clip(0.5 * (before - after) / bend, -10.0, 10.0)
-            moved = float(np.clip(speed + move * step, low, high))
-            if abs(moved - speed) < 1e-3 * step:
+            moved = float(np.clip(level + move * step, low, high))
+            if abs(moved - level) < 1e-3 * step:
                 break
             try:
                 there, higher = self._reading(x, moved)
@@ -141,15 +141,15 @@ class Below:
                 break
             if higher < value:
                 break
-            found, value, speed = there, higher, moved
-        turn = found.orbit.turn()
+            found, value, level = there, higher, moved
+        turn = sampled(found.orbit)
         self._last, self.angles = found.spot, climbed(turn, self.limit, self.angles)
         self._known = x.tobytes(), found, turn
         return found, turn
 
-    def _reading(self, x: FloatArray, speed: float) -> tuple[Found, float]:
-        found = Place(self._wish, Across.at_speed(len(self._last.y), speed), 1, self._last).at(x)
-        turn = found.orbit.turn()
+    def _reading(self, x: FloatArray, level: float) -> tuple[Found, float]:
+        found = Place(self._wish, Across.at_level(self._wish, self._last, level), self._last).at(x)
+        turn = sampled(found.orbit)
         return found, reading(turn, self.limit, climbed(turn, self.limit, self.angles))
 
     def value(self, x: FloatArray) -> float:

@@ -1,7 +1,8 @@
-"""Places on the response that go with the parameters: motions at a speed or across the branch, and where stability is lost.
+"""Places on the response that go with the parameters: motions at a level or across the branch, and where stability is lost.
 
-A place is a periodic motion, y at crank angle 0 and the speed, that one further equation picks from the branch. As the
-parameters change it is found again from where it was, and so keeps to its branch.
+A place is a periodic motion, y at crank angle 0 and the level, which is the speed or what else the range is of, that one
+further equation picks from the branch. As the parameters change it is found again from where it was, and so keeps to its
+branch.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ from numpy.typing import NDArray
 
 from linkwork.errors import LinkworkError
 
-from ..periodic import Crossing, Family, PeriodicOrbit, Variations, motion_gradient, scale_of, speed_name
+from ..periodic import Crossing, Family, PeriodicOrbit, Turn, Variations, motion_gradient, scale_of
 from .wish import Wish
 
 FloatArray = NDArray[np.float64]
@@ -29,6 +30,8 @@ ITERATIONS, FOUND = 12, 1e-9
 STRIDE, REACH = 0.05, 0.3
 #: Halvings of a step, over all steps, after which a place counts as lost.
 _HALVINGS = 3
+#: Samples of a turn.
+_SAMPLES = 256
 
 
 class LostError(LinkworkError):
@@ -36,7 +39,7 @@ class LostError(LinkworkError):
 
 
 class Expansion(NamedTuple):
-    """y(T) - y(0) at a place and the monodromy matrix, with their derivatives by y, the speed and the k changes.
+    """y(T) - y(0) at a place and the monodromy matrix, with their derivatives by y, the level and the k changes.
 
     Attributes
     ----------
@@ -62,21 +65,40 @@ class Expansion(NamedTuple):
 
 
 def family_at(wish: Wish, x: FloatArray) -> Family:
-    """The periodic motions over the speed, with changes in their tolerances."""
-    parameters, drive = wish.operation(x, wish.speeds[0])
-    return Family(parameters=parameters, drive=drive, vary=str(speed_name(wish.mechanism)))
+    """The periodic motions over the level, with changes in their tolerances."""
+    parameters, drive = wish.operation(x, wish.span[0])
+    return Family(parameters=parameters, drive=drive, vary=wish.over)
 
 
-def motion(wish: Wish, x: FloatArray, y: FloatArray, speed: float, turns: int) -> PeriodicOrbit:
-    """The motion that begins at y, as far as it closes."""
-    orbit: PeriodicOrbit = family_at(wish, x).evaluate(turns, *wish.speeds)(y, speed).data
+class Spot(NamedTuple):
+    """A place found: the changes, y, the level, and the turns of the period."""
+
+    x: FloatArray
+    y: FloatArray
+    level: float
+    turns: int = 1
+
+
+def spot_of(wish: Wish, x: FloatArray, orbit: PeriodicOrbit) -> Spot:
+    """Where a motion is."""
+    return Spot(x, orbit.start, wish.level_of(orbit), orbit.turns)
+
+
+def motion(wish: Wish, spot: Spot) -> PeriodicOrbit:
+    """The motion that begins there, as far as it closes."""
+    orbit: PeriodicOrbit = family_at(wish, spot.x).evaluate(spot.turns, *wish.span)(spot.y, spot.level).data
     return orbit
 
 
-def expansion(wish: Wish, x: FloatArray, y: FloatArray, speed: float, turns: int) -> Expansion:
-    """The derivatives at a place, by the variational equations to second order; y need not be on a motion that closes."""
-    along = motion_gradient(motion(wish, x, y, speed, turns), (str(speed_name(wish.mechanism)), *wish.names))
-    v, n = along.variations, len(y)
+def sampled(orbit: PeriodicOrbit) -> Turn:
+    """Its outputs over the period, each turn in as many samples."""
+    return orbit.turn(_SAMPLES * orbit.turns)
+
+
+def expansion(wish: Wish, spot: Spot) -> Expansion:
+    """The derivatives at a place, by the variational equations to second order; it need not be on a motion that closes."""
+    along = motion_gradient(motion(wish, spot), (wish.over, *wish.names))
+    v, n = along.variations, len(spot.y)
     unit = np.append(1.0, wish.tolerance)
     forcing, constants = v.forcing * unit, along.along * unit
     gaps = np.column_stack([v.monodromy - np.eye(n), v.after(forcing)])
@@ -108,7 +130,7 @@ def margin_of(monodromy: FloatArray, kind: Crossing, radius: float = 1.0) -> flo
 
 
 def margin_slopes(found: Expansion, kind: Crossing, radius: float = 1.0) -> FloatArray:
-    """Derivatives of `margin_of` by y, the speed and the parameters, exact for those of the matrix: a step along i."""
+    """Derivatives of `margin_of` by y, the level and the parameters, exact for those of the matrix: a step along i."""
     step = 1e-30
     matrices = [margin_matrix(found.monodromy + 1j * step * m, kind, radius) for m in found.monodromies]
     return np.array([np.linalg.det(np.eye(len(m)) - m).imag / step for m in matrices])
@@ -117,30 +139,30 @@ def margin_slopes(found: Expansion, kind: Crossing, radius: float = 1.0) -> Floa
 class Row(Protocol):
     """The equation that picks a place from its branch."""
 
-    def value(self, y: FloatArray, speed: float, monodromy: FloatArray) -> float:
+    def value(self, y: FloatArray, level: float, monodromy: FloatArray) -> float:
         """What is zero at the place."""
 
     def slopes(self, found: Expansion) -> FloatArray:
-        """Its derivatives by y, the speed and the changes."""
+        """Its derivatives by y, the level and the changes."""
 
     def across(self, found: Callable[[], Expansion]) -> FloatArray:
-        """Those by y and the speed alone."""
+        """Those by y and the level alone."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Across:
-    """In a plane across the branch: normal . (y, speed) = offset; at a fixed speed where the normal is along it."""
+    """In a plane across the branch: normal . (y, level) = offset; at a fixed level where the normal is along it."""
 
     normal: FloatArray
     offset: float
 
     @classmethod
-    def at_speed(cls, size: int, speed: float) -> Across:
-        """At a speed, of y with so many components."""
-        return cls(np.append(np.zeros(size), 1.0 / speed), 1.0)
+    def at_level(cls, wish: Wish, spot: Spot, level: float) -> Across:
+        """At a level, of motions like the one at a place."""
+        return cls(np.append(np.zeros(len(spot.y)), 1.0 / wish.size), level / wish.size)
 
-    def value(self, y: FloatArray, speed: float, monodromy: FloatArray) -> float:
-        return float(self.normal[:-1] @ y + self.normal[-1] * speed - self.offset)
+    def value(self, y: FloatArray, level: float, monodromy: FloatArray) -> float:
+        return float(self.normal[:-1] @ y + self.normal[-1] * level - self.offset)
 
     def slopes(self, found: Expansion) -> FloatArray:
         return np.append(self.normal, np.zeros(len(found.monodromies) - len(self.normal)))
@@ -155,7 +177,7 @@ class Lost:
 
     kind: Crossing
 
-    def value(self, y: FloatArray, speed: float, monodromy: FloatArray) -> float:
+    def value(self, y: FloatArray, level: float, monodromy: FloatArray) -> float:
         return margin_of(monodromy, self.kind)
 
     def slopes(self, found: Expansion) -> FloatArray:
@@ -166,40 +188,32 @@ class Lost:
         return self.slopes(there)[: len(there.monodromy) + 1]
 
 
-class Spot(NamedTuple):
-    """A place found: the changes, y and the speed."""
-
-    x: FloatArray
-    y: FloatArray
-    speed: float
-
-
 class Found:
     """A place at some parameters, and how it moves with them."""
 
-    def __init__(self, wish: Wish, row: Row, turns: int, spot: Spot) -> None:
+    def __init__(self, wish: Wish, row: Row, spot: Spot) -> None:
         self.spot = spot
-        self._wish, self._row, self._turns = wish, row, turns
+        self._wish, self._row = wish, row
 
     @cached_property
     def expansion(self) -> Expansion:
         """The derivatives there."""
-        return expansion(self._wish, *self.spot, self._turns)
+        return expansion(self._wish, self.spot)
 
     @cached_property
     def orbit(self) -> PeriodicOrbit:
         """The motion."""
-        return motion(self._wish, *self.spot, self._turns)
+        return motion(self._wish, self.spot)
 
     @cached_property
     def slopes(self) -> FloatArray:
-        """Derivatives of y and the speed by the changes, shape (n + 1, k)."""
+        """Derivatives of y and the level by the changes, shape (n + 1, k)."""
         gaps, n = self.expansion.gaps, len(self.spot.y) + 1
         rows = np.vstack([gaps, self._row.slopes(self.expansion)])
         return -np.linalg.solve(rows[:, :n], rows[:, n:])
 
     def along(self, slopes: FloatArray) -> FloatArray:
-        """Derivatives by the changes of what has these by y, the speed and the changes, shape (..., n + 1 + k)."""
+        """Derivatives by the changes of what has these by y, the level and the changes, shape (..., n + 1 + k)."""
         n = len(self.spot.y) + 1
         found: FloatArray = slopes[..., n:] + slopes[..., :n] @ self.slopes
         return found
@@ -208,7 +222,7 @@ class Found:
         """Derivatives by the changes of an output, by its number, at a crank angle; shape (k,)."""
         found = self.expansion
         v = found.variations
-        angle = float(angle % (self._turns * v.flow.period))
+        angle = float(angle % (self.spot.turns * v.flow.period))
         panel = int(np.searchsorted(np.cumsum(v.h), angle).clip(0, len(v.h) - 1))
         by_y, by_constant = v.output_derivatives(panel, number)
         nodes = self.along(np.einsum("sn,snm->sm", by_y, found.ways[panel]) + by_constant @ found.constants)
@@ -228,16 +242,14 @@ class Place:
     ----------
     wish : Wish
     row : Row
-    turns : int
-        Of the motion's period.
     spot : Spot
         Where it is known.
     """
 
-    def __init__(self, wish: Wish, row: Row, turns: int, spot: Spot) -> None:
-        self.wish, self.row, self.turns = wish, row, turns
+    def __init__(self, wish: Wish, row: Row, spot: Spot) -> None:
+        self.wish, self.row = wish, row
         self._last = spot
-        self._scale = np.append(scale_of(*wish.operation(spot.x, spot.speed), spot.y), spot.speed)
+        self._scale = np.append(scale_of(*wish.operation(spot.x, spot.level), spot.y), wish.size)
 
     def at(self, x: FloatArray) -> Found:
         """The place with changes in their tolerances.
@@ -261,23 +273,23 @@ class Place:
             except LinkworkError as error:
                 step, halvings = 0.5 * step, halvings + 1
                 if halvings > _HALVINGS:
-                    raise LostError(f"a motion near {spot.speed:.6g} rad/s is not found again: {error}") from error
+                    raise LostError(f"a motion near {self.wish.say(spot.level)} is not found again: {error}") from error
                 continue
-            slope = np.append(there.y - spot.y, there.speed - spot.speed) / (share - done)
+            slope = np.append(there.y - spot.y, there.level - spot.level) / (share - done)
             spot, done = there, share
         self._last = spot
-        return Found(self.wish, self.row, self.turns, spot)
+        return Found(self.wish, self.row, spot)
 
     def _newton(self, x: FloatArray, begin: Spot, slope: FloatArray | None, ahead: float) -> Spot:
-        z = np.append(begin.y, begin.speed)
+        z = np.append(begin.y, begin.level)
         first = z = z if slope is None else z + ahead * slope
         n = len(begin.y)
-        evaluate = family_at(self.wish, x).evaluate(self.turns, *self.wish.speeds)
+        evaluate = family_at(self.wish, x).evaluate(begin.turns, *self.wish.span)
         size = np.inf
         for count in range(ITERATIONS):
             here = evaluate(z[:n], float(z[n]))
             top = np.column_stack([here.jacobian, here.slope])
-            below = self.row.across(partial(expansion, self.wish, x, z[:n], float(z[n]), self.turns))
+            below = self.row.across(partial(expansion, self.wish, begin._replace(x=x, y=z[:n], level=float(z[n]))))
             value = self.row.value(z[:n], float(z[n]), here.jacobian + np.eye(n))
             try:
                 step = np.linalg.solve(np.vstack([top, below]), np.append(here.residual, value))
@@ -288,5 +300,5 @@ class Place:
             if not np.abs((z - first) / self._scale).max() < REACH or (count > 2 and size > 0.5 * before > FOUND):
                 break
             if size < FOUND:
-                return Spot(x, z[:n], float(z[n]))
+                return begin._replace(x=x, y=z[:n], level=float(z[n]))
         raise LostError(f"Newton's method does not settle: last correction {size:.1e}")

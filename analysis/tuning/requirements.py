@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from ..mechanisms import mechanism_of
-from ..units import RAD_S_PER_RPM
 from .survey import MARGINAL, Survey
 from .wish import AMPLITUDE, Limit, Wish
 
@@ -25,7 +24,7 @@ class Reading:
     text : str
         In words, with units.
     excess : float
-        By how much it is missed: of speeds how far they are from the nearer end, relative to the range's middle, of the largest
+        By how much it is missed: of places how far they are from the nearer end, relative to the range's middle, of the largest
         multiplier as it is, of a limit relative to it. Zero where it is met.
     missed : str
         The same in words; empty where it is met.
@@ -71,50 +70,44 @@ def unit(wish: Wish, limit: Limit) -> str:
 
 
 def readings(found: Survey, several: Sequence[float] = ()) -> dict[str, Reading]:
-    """What there is of each requirement; ``several`` are speeds at which two stable motions were found."""
+    """What there is of each requirement; ``several`` are places at which two stable motions were found."""
     wish, result = found.wish, {}
     if wish.no_resonance:
-        result[RESONANCE] = _of_speeds(wish, [(s.speed, s.speed) for s in found.peaks], "at {}")
+        result[RESONANCE] = _of_levels(wish, [(s.level, s.level) for s in found.peaks], "at {}")
     if wish.no_jump:
         jumps = [(region.low, region.high) for region in found.folds]
-        text = _of_speeds(wish, jumps, "between {}")
+        text = _of_levels(wish, jumps, "between {}")
         if not jumps and several:
             text = Reading(
-                text=f"two stable motions at {_rpm(*several)}",
-                excess=(wish.speeds[1] - wish.speeds[0]) / wish.middle,
-                missed=f"at {_rpm(*several)} there is a second stable motion",
+                text=f"two stable motions at {wish.say(*several)}",
+                excess=(wish.span[1] - wish.span[0]) / wish.size,
+                missed=f"at {wish.say(*several)} there is a second stable motion",
             )
         result[JUMP] = text
     if wish.judged:
-        value, speed = found.largest
+        value, level = found.largest
         over = value - wish.radius if value > wish.radius + MARGINAL else 0.0
-        text_of = f"largest multiplier {value:.7g} at {_rpm(speed)}"
+        text_of = f"largest multiplier {value:.7g} at {wish.say(level)}"
         result[STABLE] = Reading(text=text_of, excess=over, missed=f"{text_of}, {over:.3g} too much" if over else "")
     for limit in wish.limits:
         greatest = max((top for top in found.greatest if top.limit is limit), key=lambda top: top.value)
         what = unit(wish, limit)
         over = greatest.value / limit.below - 1.0
         over = over if over > NO_EXCESS else 0.0
-        text_of = f"{greatest.value:.6g} {what} at {_rpm(greatest.spot.speed)}"
+        text_of = f"{greatest.value:.6g} {what} at {wish.say(greatest.spot.level)}"
         missed = f"{text_of}, {greatest.value - limit.below:.3g} {what} too much" if over else ""
         result[str(limit)] = Reading(text=text_of, excess=over, missed=missed)
     return result
 
 
-def _of_speeds(wish: Wish, intervals: Sequence[tuple[float, float]], words: str) -> Reading:
-    """Of what should not lie in the range, by its intervals of speeds (rad/s)."""
+def _of_levels(wish: Wish, intervals: Sequence[tuple[float, float]], words: str) -> Reading:
+    """Of what should not lie in the range, by its intervals."""
     if not intervals:
         return Reading(text="none")
-    low, high = wish.speeds
-    text = ", ".join(words.format(_rpm(a) if a == b else f"{_rpm(a)} and {_rpm(b)}") for a, b in intervals)
+    low, high = wish.span
+    text = ", ".join(words.format(wish.say(a) if a == b else f"{wish.say(a)} and {wish.say(b)}") for a, b in intervals)
     away = max(min(b - low, high - a) for a, b in intervals)
-    return Reading(
-        text=text, excess=away / wish.middle, missed=f"{text}, {away / RAD_S_PER_RPM:.4g} rpm from the nearer end"
-    )
-
-
-def _rpm(*speeds: float) -> str:
-    return f"{', '.join(f'{speed / RAD_S_PER_RPM:.6g}' for speed in speeds)} rpm"
+    return Reading(text=text, excess=away / wish.size, missed=f"{text}, {wish.say(away)} from the nearer end")
 
 
 def requirements(before: Survey, after: Survey, several: Sequence[float]) -> tuple[Requirement, ...]:

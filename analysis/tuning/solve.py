@@ -14,7 +14,7 @@ from linkwork.errors import LinkworkError
 from ..periodic import Crossing, PeriodicOrbit, SpecialPoint
 from ..run import shown
 from .conditions import Below, Beyond, Condition, Inside, PeakBeyond
-from .places import Across, FloatArray, Lost, LostError, Place, Spot
+from .places import Across, FloatArray, Lost, LostError, Place, spot_of
 from .program import Answer, nearest, objective
 from .requirements import JUMP, RESONANCE, STABLE, readings, requirements
 from .survey import MARGINAL, SOUGHT, Region, Survey, charted, others, survey
@@ -31,10 +31,10 @@ _BELOW, _ABOVE, _REMOVED = -1, 1, 0
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Way:
-    """The way round what lies at a speed: a region of a kind, or a resonance (kind None)."""
+    """The way round what lies at a level: a region of a kind, or a resonance (kind None)."""
 
     kind: Crossing | None
-    speed: float
+    level: float
     side: int
 
 
@@ -51,8 +51,8 @@ class _Search:
         """Follow the response with some changes."""
         own = []
         for orbit in self.more:
-            speed = float(orbit.drive.speed or 0.0)
-            place = Place(self.wish, Across.at_speed(len(orbit.start), speed), 1, Spot(x, orbit.start, speed))
+            spot = spot_of(self.wish, x, orbit)
+            place = Place(self.wish, Across.at_level(self.wish, spot, spot.level), spot)
             try:
                 own.append(place.at(x).orbit)
             except LostError:
@@ -124,7 +124,7 @@ def tune(wish: Wish, *, progress: bool = False) -> Tuned:
 
 def _tuned(search: _Search, before: Survey, after: Survey, several: tuple[float, ...]) -> Tuned:
     wish = search.wish
-    largest, speed, count = charted(wish, after.x)
+    largest, level, count = charted(after)
     problems = list(after.response.problems)
     if wish.judged and not largest <= wish.radius + MARGINAL and all(r.excess == 0.0 for r in readings(after).values()):
         problems.append(f"a chart has a multiplier of {largest:.6g}, which the response does not have")
@@ -138,9 +138,9 @@ def _tuned(search: _Search, before: Survey, after: Survey, several: tuple[float,
             orbits=sum(len(branch) for branch in after.response.branches),
             charted=count,
             largest=largest,
-            speed=speed,
+            place=wish.say(level),
             sought=SOUGHT,
-            several=several,
+            several=wish.say(*several) if several else "",
             problems=tuple(problems),
         ),
         rounds=search.rounds,
@@ -159,17 +159,17 @@ def _end(region: Region, side: int) -> SpecialPoint | None:
 def _ways(found: Survey) -> list[tuple[_Way, ...]]:
     """Combinations of ways round all that lies in the range, the nearest first."""
     wish = found.wish
-    low, high = wish.speeds
+    low, high = wish.span
     choices: list[list[tuple[float, _Way]]] = []
     for region in _unwanted(found):
         middle, sides = 0.5 * (region.low + region.high), [(0.5 * (region.high - region.low), _REMOVED)]
         sides += [
             (d, s) for d, s in ((region.high - low, _BELOW), (high - region.low, _ABOVE)) if _end(region, s) is not None
         ]
-        choices.append([(d, _Way(kind=region.kind, speed=middle, side=s)) for d, s in sides])
+        choices.append([(d, _Way(kind=region.kind, level=middle, side=s)) for d, s in sides])
     for spot in found.peaks:
-        sides = [(spot.speed - low, _BELOW), (high - spot.speed, _ABOVE)]
-        choices.append([(d, _Way(kind=None, speed=spot.speed, side=s)) for d, s in sides])
+        sides = [(spot.level - low, _BELOW), (high - spot.level, _ABOVE)]
+        choices.append([(d, _Way(kind=None, level=spot.level, side=s)) for d, s in sides])
     combined = sorted(product(*choices), key=lambda way: sum(d for d, _ in way))
     return [tuple(w for _, w in way) for way in combined[:_WAYS]]
 
@@ -180,9 +180,9 @@ def _unwanted(found: Survey) -> list[Region]:
     return [r for r in found.regions if wish.judged or (wish.no_jump and r.kind is Crossing.FOLD)]
 
 
-def _side(ways: Sequence[_Way], kind: Crossing | None, speed: float) -> int | None:
+def _side(ways: Sequence[_Way], kind: Crossing | None, level: float) -> int | None:
     same = [way for way in ways if way.kind is kind]
-    return min(same, key=lambda way: abs(way.speed - speed)).side if same else None
+    return min(same, key=lambda way: abs(way.level - level)).side if same else None
 
 
 # Exchange
@@ -191,7 +191,7 @@ def _side(ways: Sequence[_Way], kind: Crossing | None, speed: float) -> int | No
 def _exchange(
     search: _Search, first: Survey, ways: list[_Way], least: float
 ) -> tuple[Survey, tuple[float, ...]] | None:
-    """The least change by these ways, or the nearest that can be had, and speeds with two stable motions.
+    """The least change by these ways, or the nearest that can be had, and levels with two stable motions.
 
     None where a place is lost, or another way has found a change as small.
     """
@@ -235,28 +235,28 @@ def _value(condition: Condition, answer: Answer) -> float:
 def _conditions(found: Survey, ways: list[_Way]) -> Iterator[Condition]:
     """The conditions that what lies in the range violates; ways round what is new are added."""
     wish, x = found.wish, found.x
-    low, high = wish.speeds
+    low, high = wish.span
     gone: list[Region] = []
     for region in _unwanted(found):
         side = _side(ways, region.kind, 0.5 * (region.low + region.high))
         if side is None:
             nearer = _BELOW if region.high - low < high - region.low else _ABOVE
             side = next((s for s in (nearer, -nearer) if _end(region, s) is not None), _REMOVED)
-            ways.append(_Way(kind=region.kind, speed=0.5 * (region.low + region.high), side=side))
+            ways.append(_Way(kind=region.kind, level=0.5 * (region.low + region.high), side=side))
         end = _end(region, side) if side else None
         group = JUMP if wish.no_jump and region.kind is Crossing.FOLD else STABLE
         if end is not None:
             gone.append(region)
-            place = Place(wish, Lost(region.kind), 1, Spot(x, end.orbit.start, end.parameter))
+            place = Place(wish, Lost(end.kind), spot_of(wish, x, end.orbit))
             yield Beyond(group, place, high if side == _ABOVE else low, side)
         elif region.kind is Crossing.FOLD:
-            yield Inside(group, Place(wish, region.across, 1, region.worst), region.kind, 1.0)
+            yield Inside(group, Place(wish, region.across, region.worst), region.kind, 1.0)
     for lost in found.least:
-        if not any(r.kind is lost.kind and r.low <= lost.spot.speed <= r.high for r in gone):
-            place = Place(wish, Across.at_speed(len(lost.spot.y), lost.spot.speed), 1, lost.spot)
+        if not any(r.kind is lost.kind and r.low <= lost.spot.level <= r.high for r in gone):
+            place = Place(wish, Across.at_level(wish, lost.spot, lost.spot.level), lost.spot)
             yield Inside(STABLE, place, lost.kind, wish.radius)
     for spot in found.peaks:
-        side = _side(ways, None, spot.speed) or (_BELOW if spot.speed - low < high - spot.speed else _ABOVE)
+        side = _side(ways, None, spot.level) or (_BELOW if spot.level - low < high - spot.level else _ABOVE)
         yield PeakBeyond(RESONANCE, wish, spot, high if side == _ABOVE else low, side)
     for top in found.greatest:
         yield Below(str(top.limit), wish, top.spot, top.limit, top.angles)

@@ -21,16 +21,17 @@ from ..periodic import (
     PeriodicOrbit,
     Response,
     SpecialPoint,
-    Stability,
     follow_both,
     frequency_response,
     largest_multipliers,
     orbits_of,
     passes,
+    period_from,
     scale_of,
+    speed_name,
 )
 from .conditions import greatest
-from .places import Across, FloatArray, LostError, Place, Spot, margin_of, motion
+from .places import Across, FloatArray, LostError, Place, Spot, margin_of, motion, sampled, spot_of
 from .wish import Limit, Wish
 
 #: Greatest step along the response, in scaled arc length, and how far it is followed beside the range, relative to its width.
@@ -39,10 +40,12 @@ STEP, BESIDE = 2e-2, 0.4
 _LEAST, _MOST = 3, 4
 #: Test function above which no multiplier is near to its circle.
 _NEAR = 0.5
-#: Distance in speed and in multipliers that counts as none: of the range's ends, and of the unit circle.
+#: Distance in level and in multipliers that counts as none: of the range's ends, and of the unit circle.
 AT_THE_END, MARGINAL = 1e-7, 1e-6
 #: Speeds of the range at which all motions are sought, and those of the chart.
 SOUGHT, _CHARTED = 5, 201
+#: Distance of the first point of a doubled branch from its doubling, relative to the range and to the scale.
+NEXT = 0.05
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -53,7 +56,7 @@ class Region:
     ----------
     kind : Crossing
     low, high : float
-        Least and greatest speed of it (rad/s), as far as it was followed.
+        Least and greatest level of it, as far as it was followed.
     first, last : SpecialPoint or None
         At these, where they were met.
     worst : Spot
@@ -76,7 +79,7 @@ class Region:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Least:
-    """Where a test function is least along a branch inside the range, at a fixed speed; see `places.margin_of`."""
+    """Where a test function is least along a branch inside the range, at a fixed level; see `places.margin_of`."""
 
     kind: Crossing
     spot: Spot
@@ -85,7 +88,7 @@ class Least:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Greatest:
-    """The greatest value of an output in the range, at a speed (rad/s) and crank angles."""
+    """The greatest value of an output in the range, at a level and crank angles."""
 
     limit: Limit
     value: float
@@ -112,7 +115,7 @@ class Survey:
     greatest : tuple of Greatest
         For each limit the greatest ones, and where.
     largest : (float, float)
-        The largest Floquet multiplier in the range, and its speed (rad/s).
+        The largest Floquet multiplier in the range, and its level.
     """
 
     wish: Wish
@@ -146,21 +149,29 @@ def survey(wish: Wish, x: FloatArray, more: Sequence[PeriodicOrbit] = ()) -> Sur
     OrbitError
         If there is no motion to begin with.
     """
-    low, high = wish.speeds
+    low, high = wish.span
     wide = BESIDE * (high - low)
-    ends = max(low - wide, 0.5 * low), high + wide
+    ends = tuple(max(end, 0.5 * low) if low > 0.0 else min(end, 0.5 * high) for end in (low - wide, high + wide))
     parameters, drive = wish.operation(x, low)
-    response = frequency_response(parameters, *ends, drive=drive, doublings=0, greatest_step=STEP)
+    response = frequency_response(
+        parameters,
+        *ends,
+        drive=drive,
+        vary=wish.over,
+        start=wish.start,
+        doublings=wish.turns.bit_length() - 1,
+        greatest_step=STEP,
+    )
     for orbit in more:
-        response = _with(response, orbit, ends)
-    branches = [branch for branch in response.branches if branch.turns == 1]
-    regions = [region for branch in branches for region in _regions(wish, x, branch)]
+        response = _with(wish, response, orbit)
+    branches = response.branches
+    regions = [region for branch in branches for region in _regions(wish, x, branch, response)]
     inside = [(branch, np.flatnonzero(_in(wish, branch.parameter))) for branch in branches]
     motions = [[(float(b.parameter[i]), b.orbits[i]) for i in places] for b, places in inside]
     least = tuple(found for branch in branches for found in _least(wish, x, branch)) if wish.judged else ()
     # that at the least test functions is there to the last digit
-    brought = [(found.spot.speed, motion(wish, *found.spot, 1)) for found in least]
-    largest = max((orbit.largest, speed) for branch in [*motions, brought] for speed, orbit in branch)
+    brought = [(found.spot.level, motion(wish, found.spot)) for found in least]
+    largest = max((orbit.largest, level) for branch in [*motions, brought] for level, orbit in branch)
     return Survey(
         wish=wish,
         x=x,
@@ -173,34 +184,38 @@ def survey(wish: Wish, x: FloatArray, more: Sequence[PeriodicOrbit] = ()) -> Sur
     )
 
 
-def _in(wish: Wish, speed: Any) -> Any:
-    low, high = wish.speeds
-    return (speed >= low) & (speed <= high)
+def _in(wish: Wish, level: Any) -> Any:
+    low, high = wish.span
+    return (level >= low) & (level <= high)
 
 
 def reaches(wish: Wish, low: float, high: float) -> bool:
-    """Whether an interval of speeds has more than a point in common with the inside of the range."""
-    slack = AT_THE_END * wish.speeds[1]
-    return bool(high > wish.speeds[0] + slack and low < wish.speeds[1] - slack)
+    """Whether an interval of levels has more than a point in common with the inside of the range."""
+    slack = AT_THE_END * wish.size
+    return bool(high > wish.span[0] + slack and low < wish.span[1] - slack)
 
 
-def _with(response: Response, orbit: PeriodicOrbit, ends: tuple[float, float]) -> Response:
+def _with(wish: Wish, response: Response, orbit: PeriodicOrbit) -> Response:
     """The response with the branch of a motion that it does not meet, followed both ways."""
-    speed = float(orbit.drive.speed or 0.0)
-    if _meets(response, orbit):
+    if _meets(wish, response, orbit):
         return response
+    level, low, high = wish.level_of(orbit), response.low, response.high
     try:
-        branch = follow_both(response.family, orbit, speed, low=ends[0], high=ends[1], greatest=STEP)
+        branch = follow_both(response.family, orbit, level, low=low, high=high, greatest=STEP)
     except ContinuationError:
         return response
     branches = (*response.branches, branch)
     return Response(branches=branches, low=response.low, high=response.high, problems=response.problems)
 
 
-def _meets(response: Response, orbit: PeriodicOrbit) -> bool:
-    """Whether a motion is on one of the branches."""
-    speed, width = float(orbit.drive.speed or 0.0), response.high - response.low
-    return any(passes(branch, speed, orbit.start, width) for branch in response.branches if branch.turns == 1)
+def _meets(wish: Wish, response: Response, orbit: PeriodicOrbit) -> bool:
+    """Whether a motion is on one of the branches; one of several turns may have begun at any of them."""
+    level, width = wish.level_of(orbit), response.high - response.low
+    starts = [orbit.start]
+    for _ in range(orbit.turns - 1):
+        starts.append(starts[-1] + period_from(orbit.parameters, orbit.drive, starts[-1], 1).shift)
+    own = [branch for branch in response.branches if branch.turns == orbit.turns]
+    return any(passes(branch, level, start, width) for branch in own for start in starts)
 
 
 # Lost stability
@@ -217,26 +232,51 @@ def _kinds(branch: Branch) -> Iterator[Crossing]:
             yield kind
 
 
-def _regions(wish: Wish, x: FloatArray, branch: Branch) -> Iterator[Region]:
+def _parts(
+    wish: Wish, branch: Branch, kind: Crossing, response: Response
+) -> Iterator[tuple[SpecialPoint | None, Any, SpecialPoint | None]]:
+    """The parts of a branch without a point where a test function changes its sign, each with the points at its ends."""
+    special = [s for s in branch.special if s.kind is kind]
+    ends = [-1, *(s.after for s in special), len(branch) - 1]
+    points: list[SpecialPoint | None] = [None, *special, None]
+    if kind is Crossing.FOLD and branch.turns > 1:
+        # it begins, and may end, where a motion of half the period has the multiplier -1
+        points[0], points[-1] = (_doubling(wish, branch.orbits[i], response) for i in (0, -1))
+    parts = [np.arange(begin + 1, end + 1) for begin, end in pairwise(ends)]
+    if branch.closed and special:
+        # the last point is the first
+        parts = [*parts[1:-1], np.concatenate([parts[-1], parts[0][1:]])]
+        points = [*special, special[0]]
+    for number, part in enumerate(parts):
+        yield points[number], part, points[number + 1]
+
+
+def _doubling(wish: Wish, orbit: PeriodicOrbit, response: Response) -> SpecialPoint | None:
+    """The period doubling next to a motion at which its branch begins; None where it is none."""
+    for branch in response.branches:
+        for point in branch.special if 2 * branch.turns == orbit.turns else ():
+            there = point.orbit
+            away = np.abs((there.start - orbit.start) / scale_of(there.parameters, there.drive, there.start)).max()
+            near = abs(wish.level_of(there) - wish.level_of(orbit)) < NEXT * (response.high - response.low)
+            if point.kind is Crossing.PERIOD_DOUBLING and near and away < NEXT:
+                return point
+    return None
+
+
+def _regions(wish: Wish, x: FloatArray, branch: Branch, response: Response) -> Iterator[Region]:
     """Where the test functions are negative along a branch."""
     for kind in _kinds(branch):
         tests = _tests(branch, kind)
-        special = [s for s in branch.special if s.kind is kind]
-        # the ends of the parts without a point where the test changes its sign
-        ends = [-1, *(s.after for s in special), len(branch) - 1]
-        points: list[SpecialPoint | None] = [None, *special, None]
-        for number, (begin, end) in enumerate(pairwise(ends)):
-            part = np.arange(begin + 1, end + 1)
-            first, last = points[number], points[number + 1]
+        for first, part, last in _parts(wish, branch, kind, response):
             if not len(part) or tests[part].min() >= 0.0:
                 continue
-            speeds = [*branch.parameter[part], *(s.parameter for s in (first, last) if s is not None)]
-            place, at_speed = int(part[tests[part].argmin()]), kind is not Crossing.FOLD
-            worst, across, value = _lowest(wish, x, branch, kind, place, 1.0, at_speed=at_speed)
+            levels = [*branch.parameter[part], *(s.parameter for s in (first, last) if s is not None)]
+            place, at_level = int(part[tests[part].argmin()]), kind is not Crossing.FOLD
+            worst, across, value = _lowest(wish, x, branch, kind, place, 1.0, at_level=at_level)
             yield Region(
                 kind=kind,
-                low=min(speeds),
-                high=max(speeds),
+                low=min(levels),
+                high=max(levels),
                 first=first,
                 last=last,
                 worst=worst,
@@ -246,29 +286,29 @@ def _regions(wish: Wish, x: FloatArray, branch: Branch) -> Iterator[Region]:
 
 
 def _lowest(
-    wish: Wish, x: FloatArray, branch: Branch, kind: Crossing, i: int, radius: float, *, at_speed: bool
+    wish: Wish, x: FloatArray, branch: Branch, kind: Crossing, i: int, radius: float, *, at_level: bool
 ) -> tuple[Spot, Across, float]:
-    """The least value of a test function about a point of a branch: at fixed speeds of the range, or across it."""
+    """The least value of a test function about a point of a branch: at fixed levels of the range, or across it."""
     orbit, before, after = branch.orbits[i], max(i - 1, 0), min(i + 1, len(branch) - 1)
-    spot = Spot(x, orbit.start, float(branch.parameter[i]))
-    scale = np.append(scale_of(orbit.parameters, orbit.drive, orbit.start), spot.speed)
+    spot = spot_of(wish, x, orbit)
+    scale = np.append(scale_of(orbit.parameters, orbit.drive, orbit.start), wish.size)
     ends = [np.append(branch.orbits[j].start, branch.parameter[j]) / scale for j in (before, after)]
     normal = np.append(np.zeros(len(orbit.start)), 1.0)
-    if not at_speed:
+    if not at_level:
         normal = (ends[1] - ends[0]) / np.linalg.norm(ends[1] - ends[0])
     low, high = sorted(float(normal @ end) for end in ends)
-    if at_speed:
-        low, high = max(low, wish.speeds[0] / spot.speed), min(high, wish.speeds[1] / spot.speed)
+    if at_level:
+        low, high = max(low, wish.span[0] / wish.size), min(high, wish.span[1] / wish.size)
     normal = normal / scale
 
     def across(offset: float) -> Across:
         return Across(normal, offset)
 
     def test(offset: float) -> float:
-        place = Place(wish, across(offset), 1, spot)
+        place = Place(wish, across(offset), spot)
         return margin_of(place.at(x).orbit.monodromy, kind, radius)
 
-    offset = float(normal @ np.append(spot.y, spot.speed))
+    offset = float(normal @ np.append(spot.y, spot.level))
     value = margin_of(orbit.monodromy, kind, radius)
     if low < high:
         try:
@@ -278,11 +318,11 @@ def _lowest(
         except LinkworkError:
             pass  # next to the limit of assembly a neighbour may not be found: the point itself stands
     row = across(offset)
-    return Place(wish, row, 1, spot).at(x).spot, row, value
+    return Place(wish, row, spot).at(x).spot, row, value
 
 
 def _least(wish: Wish, x: FloatArray, branch: Branch) -> Iterator[Least]:
-    """The least values of the test functions along a branch in the range, at fixed speeds."""
+    """The least values of the test functions along a branch in the range, at fixed levels."""
     inside = np.flatnonzero(_in(wish, branch.parameter))
     if not len(inside):
         return
@@ -298,9 +338,9 @@ def _least(wish: Wish, x: FloatArray, branch: Branch) -> Iterator[Least]:
             if tests[i] < _NEAR and tests[i] <= within[around].min():
                 found.append((float(tests[i]), np.isfinite(tests[around]).all(), i))
         for value, smooth, i in sorted(found)[:_LEAST]:
-            spot = Spot(x, branch.orbits[i].start, float(branch.parameter[i]))
+            spot = spot_of(wish, x, branch.orbits[i])
             if smooth:
-                spot, _, value = _lowest(wish, x, branch, kind, i, wish.radius, at_speed=True)
+                spot, _, value = _lowest(wish, x, branch, kind, i, wish.radius, at_level=True)
             yield Least(kind=kind, spot=spot, value=value)
 
 
@@ -311,7 +351,7 @@ def _peaks(wish: Wish, x: FloatArray, response: Response) -> Iterator[Spot]:
     """The resonances in the range."""
     for top in response.maxima():
         if reaches(wish, top.parameter, top.parameter):
-            yield Spot(x, top.orbit.start, top.parameter)
+            yield spot_of(wish, x, top.orbit)
 
 
 def _greatest(
@@ -320,33 +360,33 @@ def _greatest(
     """The greatest values of an output in the range: of each branch those that are greatest about them, brought to rest."""
     found = []
     for branch in motions:
-        values = [greatest(orbit.turn(), limit)[0] for _, orbit in branch]
+        values = [greatest(sampled(orbit), limit)[0] for _, orbit in branch]
         for i, value in enumerate(values):
             if value >= max(values[max(i - 1, 0) : i + 2]):
-                found.append((value, *branch[i]))
+                found.append((value, branch[i][1]))
     found.sort(key=lambda entry: -entry[0])
-    for _, speed, orbit in found[:_MOST]:
-        yield _at_rest(wish, limit, Spot(x, orbit.start, speed))
+    for _, orbit in found[:_MOST]:
+        yield _at_rest(wish, limit, spot_of(wish, x, orbit))
 
 
 def _at_rest(wish: Wish, limit: Limit, near: Spot) -> Greatest:
-    """The greatest value of an output next to a motion, over the speed."""
-    step = 2.0 * STEP * (wish.speeds[1] - wish.speeds[0])
-    low, high = max(wish.speeds[0], near.speed - step), min(wish.speeds[1], near.speed + step)
+    """The greatest value of an output next to a motion, over the level."""
+    step = 2.0 * STEP * (wish.span[1] - wish.span[0])
+    low, high = max(wish.span[0], near.level - step), min(wish.span[1], near.level + step)
     found: list[Greatest] = []
 
-    def value(speed: float) -> float:
+    def value(level: float) -> float:
         try:
-            there = Place(wish, Across.at_speed(len(near.y), speed), 1, near).at(near.x)
+            there = Place(wish, Across.at_level(wish, near, level), near).at(near.x)
         except LostError:
             return 0.0  # beyond a fold
-        size, angles = greatest(there.orbit.turn(), limit)
+        size, angles = greatest(sampled(there.orbit), limit)
         found.append(Greatest(limit=limit, value=size, spot=there.spot, angles=angles))
         return -size
 
-    for speed in (near.speed, low, high):
-        value(speed)
-    minimize_scalar(value, bounds=(low, high), method="bounded", options={"xatol": 1e-7 * near.speed})
+    for level in (near.level, low, high):
+        value(level)
+    minimize_scalar(value, bounds=(low, high), method="bounded", options={"xatol": 1e-7 * wish.size})
     return max(found, key=lambda entry: entry.value)
 
 
@@ -354,28 +394,41 @@ def _at_rest(wish: Wish, limit: Limit, near: Spot) -> Greatest:
 
 
 def others(found: Survey) -> tuple[tuple[PeriodicOrbit, ...], tuple[float, ...]]:
-    """Of all motions at `SOUGHT` speeds of the range those on no branch, and the speeds with two stable ones."""
+    """Of all motions at `SOUGHT` levels of the range those on no branch, and the levels with two stable ones."""
     wish = found.wish
     new: list[PeriodicOrbit] = []
     several: list[float] = []
-    for speed in np.linspace(*wish.speeds, SOUGHT).tolist():
-        parameters, drive = wish.operation(found.x, speed)
-        there: Orbits = orbits_of(parameters, drive)
-        new += [o for o in there.orbits if not _meets(found.response, o)]
-        if sum(o.verdict().stability is not Stability.UNSTABLE for o in there.orbits) > 1:
-            several.append(speed)
+    for level in np.linspace(*wish.span, SOUGHT).tolist():
+        parameters, drive = wish.operation(found.x, level)
+        start, stable = _start_near(wish, found.response, level), 0
+        for turns in range(1, wish.turns + 1):
+            there: Orbits = orbits_of(parameters, drive, turns=turns, start=start)
+            new += [o for o in there.orbits if not _meets(wish, found.response, o)]
+            stable += len(there.stable)
+        if stable > 1:
+            several.append(level)
     return tuple(new), tuple(several)
 
 
-def charted(wish: Wish, x: FloatArray) -> tuple[float, float, int]:
-    """The largest multiplier in a row of a chart over the range, infinite where no motion is found, its speed, and how many."""
-    speeds = np.linspace(*wish.speeds, _CHARTED)
+def _start_near(wish: Wish, response: Response, level: float) -> FloatArray | None:
+    """The start of the motion of one turn next to a level: under a torque the crank speed has to be guessed."""
+    if wish.over == speed_name(wish.mechanism):
+        return None
+    known = [orbit for branch in response.branches if branch.turns == 1 for orbit in branch.orbits]
+    return min(known, key=lambda orbit: abs(wish.level_of(orbit) - level)).start
+
+
+def charted(found: Survey) -> tuple[float, float, int]:
+    """The largest multiplier in a row of a chart over the range, infinite where no motion is found, its level, and how many."""
+    wish = found.wish
+    levels = np.linspace(*wish.span, _CHARTED)
     rows: list[Any] = []
     drives: list[Drive] = []
-    for speed in speeds.tolist():
-        parameters, drive = wish.operation(x, speed)
+    for level in levels.tolist():
+        parameters, drive = wish.operation(found.x, level)
         rows.append(parameters)
         drives.append(drive)
-    values = np.nan_to_num(largest_multipliers(rows, drives)[0], nan=np.inf)
+    guess = _start_near(wish, found.response, wish.span[0])
+    values = np.nan_to_num(largest_multipliers(rows, drives, guess)[0], nan=np.inf)
     i = int(values.argmax())
-    return float(values[i]), float(speeds[i]), len(speeds)
+    return float(values[i]), float(levels[i]), len(levels)

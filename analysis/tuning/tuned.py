@@ -8,7 +8,6 @@ from typing import Any
 from ..mechanisms import Parameters
 from ..notebook import Shown, format_count
 from ..run import parameters_to
-from ..units import RAD_S_PER_RPM
 from .places import FloatArray
 from .requirements import Requirement
 from .survey import Survey
@@ -23,12 +22,12 @@ class Verification:
     ----------
     orbits : int
         Of the response that was followed over the range.
-    charted, largest, speed : int, float, float
-        Speeds of a chart's row over the range, the largest multiplier there, and where (rad/s).
+    charted, largest, place : int, float, str
+        Points of a chart's row over the range, the largest multiplier there, and where.
     sought : int
-        Speeds at which all motions were sought.
-    several : tuple of float
-        Those with more than one stable motion (rad/s).
+        Places at which all motions were sought.
+    several : str
+        Those with more than one stable motion.
     problems : tuple of str
         What could not be followed or verified; empty where everything was.
     """
@@ -36,20 +35,19 @@ class Verification:
     orbits: int
     charted: int
     largest: float
-    speed: float
+    place: str
     sought: int
-    several: tuple[float, ...]
+    several: str
     problems: tuple[str, ...]
 
     def __str__(self) -> str:
-        chart = f"largest multiplier {self.largest:.6g} at {self.speed / RAD_S_PER_RPM:.6g} rpm"
+        chart = f"largest multiplier {self.largest:.6g} at {self.place}"
         several = "one stable motion at most at each"
         if self.several:
-            places = ", ".join(f"{speed / RAD_S_PER_RPM:.6g}" for speed in self.several)
-            several = f"two stable ones at {places} rpm"
+            several = f"two stable ones at {self.several}"
         return (
-            f"response followed anew over {format_count(self.orbits, 'motion')}; row of a chart at {self.charted} speeds: "
-            f"{chart}; all motions sought at {self.sought} speeds: {several}"
+            f"response followed anew over {format_count(self.orbits, 'motion')}; row of a chart at {self.charted} points: "
+            f"{chart}; all motions sought at {self.sought}: {several}"
         )
 
 
@@ -112,7 +110,8 @@ class Tuned(Shown):
         return {
             "met": self.met,
             "missed": list(self.missed),
-            "speeds": list(wish.speeds),
+            "over": wish.over,
+            "between": list(wish.span),
             "changes": {
                 name: {"before": before, "after": after, "tolerance": tolerance, "in tolerances": x}
                 for name, before, after, tolerance, x in zip(
@@ -127,9 +126,9 @@ class Tuned(Shown):
                 "orbits": v.orbits,
                 "charted": v.charted,
                 "largest multiplier": v.largest,
-                "its speed": v.speed,
+                "its place": v.place,
                 "sought": v.sought,
-                "several": list(v.several),
+                "several": v.several,
             },
             "parameters": parameters_to(self.parameters),
         }

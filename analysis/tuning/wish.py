@@ -16,9 +16,20 @@ from linkwork.parameters import field_name
 
 from ..files import Quantity, Range, check_names, unknown_name
 from ..mechanisms import Parameters, mechanism_of
-from ..periodic import Drive, Operation, drive_of, speed_name
+from ..periodic import (
+    Drive,
+    Operation,
+    PeriodicOrbit,
+    drive_of,
+    driving_names,
+    require_variable,
+    speed_name,
+    unit_of,
+    value_of,
+    with_values,
+)
 from ..run import published_set
-from ..units import Amount, quantity, si
+from ..units import RAD_S_PER_RPM, Amount, quantity, si
 
 FloatArray = NDArray[np.float64]
 
@@ -75,24 +86,33 @@ AMPLITUDE = "amplitude of "
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Wish:
-    """What is wished of a mechanism over a range of speeds.
+    """What is wished of a mechanism over a range of speeds, or of what else drives it.
 
     Attributes
     ----------
     parameters : parameters of a mechanism
         As they are now; or a published set or its name.
-    speeds : (float, float)
-        rad/s, or texts such as "900 rpm".
     change : mapping or sequence of Change
         What may be changed, by FMI name or by field. To each the tolerance, such as "5 %" or "10 N/m": how far it may be
         changed either way, in which its change is measured too; or (least, greatest), half of which it is measured in; or
         both, as a mapping with ``tolerance`` and ``between``.
+    speeds : (float, float), optional
+        The range, if it is of the crank's prescribed speed: rad/s, or texts such as "900 rpm".
+    over : str
+        FMI name of what else of the drive the range is of, such as ``drive.torque`` or ``slider.force``, or of a motor's
+        numbers, such as ``drive.torque.synchronous_speed``.
+    between : (float, float), optional
+        The range, if it is of this: in SI, or texts.
     drive : Drive, optional
-        What acts beside the speed.
+        What acts beside that; without a range of speeds it is needed.
+    start : array_like, optional
+        Guess of the motion at the low end of the range, as `find_orbit` has it: needed under a torque without a motor.
+    turns : int
+        Motions of up to so many turns of the crank are looked at.
     no_resonance : bool
-        No maximum of the amplitude over the speed lies in the range.
+        No maximum of the amplitude of a motion of one turn lies in the range.
     no_jump : bool
-        No fold lies in the range, and no speed of it has a second stable motion.
+        No fold lies in the range, and nowhere in it there is a second stable motion.
     no_unstable : bool
         No unstable motion lies in the range.
     least_margin : float
@@ -108,9 +128,13 @@ class Wish:
     """
 
     parameters: Parameters
-    speeds: tuple[Amount, Amount]
     change: Any
+    speeds: tuple[Amount, Amount] | None = None
+    over: str = ""
+    between: tuple[Amount, Amount] | None = None
     drive: Drive | None = None
+    start: Any = None
+    turns: int = 1
     no_resonance: bool = False
     no_jump: bool = False
     no_unstable: bool = False
@@ -126,14 +150,13 @@ class Wish:
         if isinstance(given, (str, PublishedSet)):
             put("parameters", published_set(given).parameters)
         mechanism = self.mechanism
-        if speed_name(mechanism) is None:
-            raise InputError(f"the crank of a {mechanism.name} has no prescribed speed: there is no range of speeds")
-        low, high = (si(value, "rad/s", "speeds") for value in self.speeds)
-        if not (isfinite(low) and isfinite(high) and 0.0 < low < high):
-            raise ParameterError("speeds", list(self.speeds), "be a range above zero: [least, greatest]")
-        put("speeds", (float(low), float(high)))
-        drive = self.drive or drive_of(given, speed=low)
-        put("drive", replace(drive, speed=low, torque=0.0, motor=None))
+        put("over", self._required_over())
+        put("between", _span(mechanism, self.over, self.speeds or self.between))
+        drive = self.drive or drive_of(given, speed=self.span[0])
+        require_variable(self.parameters, drive, self.over)
+        put("drive", with_values(self.parameters, drive, {self.over: self.span[0]})[1])
+        if not (isinstance(self.turns, int) and self.turns >= 1):
+            raise ParameterError("turns", self.turns, "be a whole number, at least one")
         put("change", _changes(self.parameters, self.change))
         put("limits", tuple(replace(x, below=_bound(mechanism, x)) for x in self.limits))
         if not 0.0 <= self.least_margin < 1.0:
@@ -148,6 +171,43 @@ class Wish:
                 raise InputError(f"{self.least} is to be least, but may not be changed: name it in change")
         for x in (self.scaled(self.low), self.scaled(self.high)):
             self.at(x)  # checks the bounds
+
+    def _required_over(self) -> str:
+        """What the range is of, where what is given of it fits together."""
+        speed = speed_name(self.mechanism)
+        if (self.speeds is None) == (self.between is None) or (self.between is None) == bool(self.over):
+            raise InputError("give the range: speeds of the crank, or over what else and between which values of it")
+        driven = self.drive is not None and not self.drive.speed_drive
+        if self.between is None and (speed is None or driven):
+            why = (
+                "the drive is by torque, so that the speed follows from it"
+                if driven
+                else "its speed cannot be prescribed"
+            )
+            names = ", ".join(name for name in driving_names(self.mechanism) if name != speed)
+            raise InputError(f"the crank has no range of speeds: {why}; give over what it drives, one of {names}")
+        known = driving_names(self.mechanism)
+        if self.over and self.over not in known:
+            raise unknown_name(self.over, known)
+        if self.between is not None and self.drive is None and self.over != speed:
+            raise InputError(f"the range is of {self.over}: say what drives the crank with drive=Drive(...)")
+        return self.over or str(speed)
+
+    @property
+    def span(self) -> tuple[float, float]:
+        """The range, in SI."""
+        low, high = self.between or (0.0, 0.0)
+        return float(low), float(high)
+
+    def level_of(self, orbit: PeriodicOrbit) -> float:
+        """Where in the range a motion is."""
+        return value_of(orbit.parameters, orbit.drive, self.over)
+
+    def say(self, *levels: float, joint: str = ", ") -> str:
+        """Values of what the range is of, with their unit; speeds in rpm."""
+        unit = unit_of(self.mechanism, self.over)
+        factor, unit = (RAD_S_PER_RPM, "rpm") if unit == "rad/s" else (1.0, unit)
+        return f"{joint.join(f'{level / factor:.6g}' for level in levels)} {unit}"
 
     @property
     def mechanism(self) -> Mechanism:
@@ -165,9 +225,10 @@ class Wish:
         return 1.0 - self.least_margin
 
     @property
-    def middle(self) -> float:
-        """The middle of the range (rad/s), relative to which it is measured how far something reaches into it."""
-        return 0.5 * float(self.speeds[0] + self.speeds[1])
+    def size(self) -> float:
+        """Of the middle of the range, relative to which it is measured how far something reaches into it."""
+        low, high = self.span
+        return 0.5 * (abs(low) + abs(high))
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -204,10 +265,20 @@ class Wish:
         made: Parameters = replace(self.parameters, **{field_name(n): v for n, v in zip(self.names, values)})
         return made
 
-    def operation(self, x: FloatArray, speed: float) -> Operation:
-        """Mechanism and drive with changes in their tolerances, at a speed."""
+    def operation(self, x: FloatArray, level: float) -> Operation:
+        """Mechanism and drive with changes in their tolerances, at a place of the range."""
         assert self.drive is not None
-        return self.at(x), replace(self.drive, speed=speed)
+        return with_values(self.at(x), self.drive, {self.over: level})
+
+
+def _span(mechanism: Mechanism, over: str, given: Any) -> tuple[float, float]:
+    name = "speeds" if over == speed_name(mechanism) else over
+    low, high = (float(si(value, unit_of(mechanism, over), name)) for value in given)
+    if not (isfinite(low) and isfinite(high) and low < high):
+        raise ParameterError(name, list(given), "be a range: [least, greatest]")
+    if name == "speeds" and not low > 0.0:
+        raise ParameterError(name, list(given), "be a range above zero: [least, greatest]")
+    return low, high
 
 
 def _parameter(mechanism: Mechanism, name: str) -> str:
