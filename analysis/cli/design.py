@@ -155,9 +155,10 @@ def write_solution(
 
     written = write_described(solution, folder, title, curve="best-curve", text="best-report", drawn="best")
     pivot = solution.linkage.pivot
-    if not isinstance(pivot, SecondCrank):
+    slides = solution.linkage.slides
+    if not (slides or isinstance(pivot, SecondCrank)):
         written.append(save_parameters(folder / "five-bar-parameters.toml", make.five_bar(solution)))
-    if pivot is None:
+    if pivot is None and not slides:
         written.append(write_tables(folder / "five-bar.toml", make.run_case(solution, title)))
     cut = plates(solution, width=make.width, thickness=make.thickness, pin=make.hole, title=title)
     written += [save_drawing(folder / f"best-plates.{ending}", cut) for ending in ("dxf", "svg")]
@@ -172,12 +173,12 @@ def write_solution(
 
 
 def _turn(solution: Solution, make: Any) -> SliderDrive | None:
-    """A turn at constant speed, the slider where it is to be; None where the crank cannot turn fully, or for a second crank."""
+    """A turn at constant speed, the slider where it is to be; None if the plant has no such linkage or it cannot turn."""
     from ..motion import inverse_dynamics, motion_of_plant
     from ..synthesis import SecondCrank, direction
 
     linkage = solution.linkage
-    if isinstance(linkage.pivot, SecondCrank) or not linkage.turns_fully:
+    if isinstance(linkage.pivot, SecondCrank) or linkage.slides or not linkage.turns_fully:
         return None
     speed = direction(solution) * make.speed
     return inverse_dynamics(make.moving(linkage), motion_of_plant(linkage), speed, samples=360)

@@ -25,6 +25,8 @@ _TASKS: Mapping[str, Mapping[str, Any]] = {
     "timed-path": {"x": "20 + 10*cos(t)", "y": "15 + 5*sin(t)", "unit": "cm", "n": 72},
     "untimed-path": {"x": "20 + 10*cos(t)", "y": "15 + 5*sin(t)", "unit": "cm", "n": 72},
     "rocker-function": {"angle": "70 + 100*abs(sin(t/2))", "angle_unit": "deg", "n": 24, "mounting": True},
+    "slider-function": {"position": "40*cos(t) + 5*cos(2*t)", "unit": "mm", "n": 36},
+    "quick-return": {"stroke": "80 mm", "time_ratio": 1.2},
     "motion": {
         "points": [[0, 0], [20, 15], [40, 20], [60, 15], [80, 0]],
         "unit": "mm",

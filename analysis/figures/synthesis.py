@@ -158,7 +158,8 @@ def _draw_linkage(
     if p is not None:
         axis.add_patch(Polygon([b, c, p], facecolor=COUPLER, alpha=0.14, edgecolor="none", zorder=5))
         _line(axis, [b, p, c], color=COUPLER, linewidth=LINE, zorder=6)
-    _line(axis, [d, c], color=ROCKER, zorder=6, **link)
+    if not scene.linkage.slides:
+        _line(axis, [d, c], color=ROCKER, zorder=6, **link)
     _line(axis, [b, c], color=COUPLER, zorder=7, **link)
     _line(axis, [a, b], color=CRANK, zorder=8, **link)
     for pin in (a, b, c, d, *([e] if scene.second_crank else [])):
@@ -183,7 +184,7 @@ def _draw_slider(axis: Axes, guide: FloatArray, d: FloatArray, unit: float) -> N
 
 def _write_letters(axis: Axes, scene: LinkageScene, at: Mapping[str, FloatArray], unit: float) -> None:
     """Each pin's letter where it has most room: from the links, the supports, the curve and the letters before."""
-    names = [n for n in "ABCDEP" if n in at and (n != "E" or scene.second_crank)]
+    names = [n for n in scene.lettered if n in at]
     lines = [(at["A"], at["B"]), (at["B"], at["C"]), (at["C"], at["D"]), (at["A"], at["E"])]
     if "P" in at:
         lines += [(at["B"], at["P"]), (at["C"], at["P"])]

@@ -217,7 +217,7 @@ class SliderCase:
 
     @property
     def _constraints(self) -> tuple[Constraint, ...]:
-        constraints = self.synthesis.constraints
+        constraints: tuple[Any, ...] = self.synthesis.constraints
         if self.linkage is not None and not any(isinstance(c, Assembly) for c in constraints):
             constraints = (*constraints, Assembly(branch=self.linkage.branch))
         return constraints

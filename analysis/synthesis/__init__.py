@@ -31,8 +31,10 @@ from .constraints import (
 )
 from .drawing import drawing, plates
 from .functions import Generators, function_generators
+from .kinds import GEARS, Kind, Stroke, kind_of
 from .limit_positions import dead_centres, mechanical_advantage, time_ratio, toggles
 from .linkage import ANGLES, LENGTHS, LINKS, UNITS, Linkage, SecondCrank, SliderMotion
+from .quick_return import QuickReturn
 from .report import (
     dimension_rows,
     error_unit,
@@ -61,11 +63,23 @@ from .solve import (
 )
 from .starts import CrankUnknown, PivotUnknown, SliderUnknown
 from .targets import TargetPath, chebyshev_spacing, function_from_formula, path_from_formula
-from .tasks import Motion, PrecisionPoints, RockerFunction, Straight, Task, TimedPath, UntimedPath, normal_form, turn
+from .tasks import (
+    Motion,
+    PrecisionPoints,
+    RockerFunction,
+    SliderFunction,
+    Straight,
+    Task,
+    TimedPath,
+    UntimedPath,
+    normal_form,
+    turn,
+)
 
 __all__ = [
     "ANGLES",
     "BOUNDS",
+    "GEARS",
     "KINDS",
     "LENGTHS",
     "LINKS",
@@ -85,6 +99,7 @@ __all__ = [
     "Guidance",
     "GuidanceMap",
     "InfeasibleError",
+    "Kind",
     "LargestLink",
     "LeastTransmission",
     "Linkage",
@@ -93,17 +108,20 @@ __all__ = [
     "PivotRegion",
     "PivotUnknown",
     "PrecisionPoints",
+    "QuickReturn",
     "Require",
     "RockerFunction",
     "Rounding",
     "Search",
     "SecondCrank",
     "Sensitivity",
+    "SliderFunction",
     "SliderMotion",
     "SliderUnknown",
     "Solution",
     "Straight",
     "Straightness",
+    "Stroke",
     "Synthesis",
     "SynthesisCase",
     "SynthesisInterrupted",
@@ -138,6 +156,7 @@ __all__ = [
     "headline",
     "improve",
     "judge",
+    "kind_of",
     "length_step",
     "load_synthesis_case",
     "mechanical_advantage",

@@ -30,8 +30,20 @@ from ..files import (
     text,
 )
 from ..units import quantity
+from .quick_return import QuickReturn
 from .targets import TargetPath, function_from_formula, path_from_formula
-from .tasks import Motion, Objective, PrecisionPoints, RockerFunction, Straight, Task, TimedPath, UntimedPath, turn
+from .tasks import (
+    Motion,
+    Objective,
+    PrecisionPoints,
+    RockerFunction,
+    SliderFunction,
+    Straight,
+    Task,
+    TimedPath,
+    UntimedPath,
+    turn,
+)
 
 FloatArray = NDArray[np.float64]
 
@@ -334,11 +346,47 @@ class RockerFunctionTable(_Formula):
         )
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SliderFunctionTable(_Formula):
+    """The table of a `SliderFunction`."""
+
+    position: Any = entry(as_it_is)
+    unit: str | None = entry(_length_unit, None)
+    rotation: Any = entry(_steps_or_list, None)
+    weights: Any = entry(as_it_is, None)
+
+    def task(self, folder: Path) -> Task:
+        if isinstance(self.position, str):
+            _only_with(self, ("rotation",), "position as a list")
+            rotation, numbers = function_from_formula(self.position, **self._range())
+            position = quantity(f"1 {self.unit or 'm'}", "m", "task.unit") * numbers
+        else:
+            _only_with(self, ("n", "start", "end"), "position as a formula")
+            position = np.array(Many(Quantity("m", bare=self.unit))(self.position, "task.position"))
+            given = _rotation(self.rotation, len(position))
+            rotation = turn(len(position)) if given is None else given
+        weights = _weights(self.weights, rotation)
+        return SliderFunction(position=position, rotation=rotation, weights=weights, objective=self.objective)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class QuickReturnTable:
+    """The table of a `QuickReturn`."""
+
+    stroke: float = entry(Quantity("m", above=0.0))
+    time_ratio: float = entry(Quantity("1", least=1.0), 1.0)
+
+    def task(self, folder: Path) -> Task:
+        return QuickReturn(stroke=self.stroke, time_ratio=self.time_ratio)
+
+
 #: The table ``[task]`` of each kind.
 KINDS: Mapping[str, type] = {
     "timed-path": TimedPathTable,
     "untimed-path": UntimedPathTable,
     "rocker-function": RockerFunctionTable,
+    "slider-function": SliderFunctionTable,
+    "quick-return": QuickReturnTable,
     "motion": MotionTable,
     "precision-points": PrecisionPointsTable,
 }

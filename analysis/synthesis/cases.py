@@ -35,6 +35,7 @@ from ..run import parameters_to
 from ..units import with_unit
 from .case_tasks import points_of, task_from
 from .constraints import (
+    SECOND_LENGTH,
     UNKNOWNS,
     USUAL,
     Assembly,
@@ -46,9 +47,10 @@ from .constraints import (
     LeastTransmission,
     PivotRegion,
     TimeRatio,
-    limits_of,
 )
+from .kinds import GEARS, Kind, Stroke, limits_of_kinds
 from .linkage import ANGLES, Linkage
+from .quick_return import QuickReturn
 from .requirements import requirement
 from .search import METHODS, Method, Search
 from .solution import Solution
@@ -70,18 +72,20 @@ def _cores(value: Any, name: str) -> int:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SearchTable:
-    """How it is searched; see `Search`."""
+    """How it is searched, and among what; see `Search` and `synthesize`."""
 
     method: Method = entry(Choice(METHODS), "scan")
     seed: int = entry(Whole(0), 0)
     candidates: int = entry(Whole(1), 1 << 16)
     starts: int = entry(Whole(1), 24)
     solutions: int = entry(Whole(1), 6)
+    kinds: tuple[Kind, ...] | None = entry(Many(Choice(get_args(Kind)), least=1), None)
+    gears: tuple[float, ...] = entry(Many(Quantity("1"), least=1), GEARS)
     jobs: int = entry(_cores, 1)
 
     def search(self, **changes: Any) -> Search:
         """The same as the argument of `synthesize`, with some of it changed."""
-        own = asdict(self)
+        own = {name: value for name, value in asdict(self).items() if name not in ("kinds", "gears")}
         return Search(**({"n_jobs": own.pop("jobs")} | own | changes))
 
 
@@ -191,15 +195,16 @@ class Constraints:
     full_turn: bool = entry(flag, False)
     grashof: GrashofType | None = entry(Choice(get_args(GrashofType)), None)
     time_ratio: tuple[float, float] | None = entry(Range(Quantity("1", least=1.0, requirement="be 1 or greater")), None)
+    stroke: tuple[float, float] | None = entry(Range(Quantity("m", least=0.0)), None)
     largest_link: float | None = entry(Quantity("m"), None)
     assembly: int | None = entry(Whole(), None)
     pivot_A: FloatArray | None = entry(points_of, None)
     pivot_D: FloatArray | None = entry(points_of, None)
     require: tuple[Constraint, ...] = entry(Many(requirement), ())
 
-    def constraints(self) -> tuple[Constraint, ...]:
+    def constraints(self) -> tuple[Constraint | Stroke, ...]:
         """The constraints; a crank that cannot turn fully is looked at where it works."""
-        found: list[Constraint] = []
+        found: list[Constraint | Stroke] = []
         if self.least_transmission_angle is not None:
             swings = self.grashof in ("double-rocker", "rocker-crank", "triple-rocker")
             over: Any = self.over or ("task" if swings else "turn")
@@ -211,6 +216,8 @@ class Constraints:
         if self.time_ratio is not None:
             low, high = self.time_ratio
             found.append(TimeRatio(least=low, greatest=high))
+        if self.stroke is not None:
+            found.append(Stroke(least=self.stroke[0], greatest=self.stroke[1]))
         if self.largest_link is not None:
             found.append(LargestLink(length=self.largest_link))
         if self.assembly is not None:
@@ -232,7 +239,10 @@ class TradeOffTable:
 
 
 #: The table ``[bounds]``: [least, greatest], or one value that fixes the dimension.
-BOUNDS = Table(dict, {name: Range(Quantity("rad" if name in ANGLES else "m"), ordered=False) for name in UNKNOWNS})
+BOUNDS = Table(
+    dict,
+    {name: Range(Quantity("rad" if name in ANGLES else "m"), ordered=False) for name in (*UNKNOWNS, SECOND_LENGTH)},
+)
 
 
 #: The tables of a case beside the task's, for `linkwork new`.
@@ -244,7 +254,7 @@ TABLES: Mapping[str, type] = {
 }
 
 
-def _constraints(value: Any, name: str) -> tuple[Constraint, ...]:
+def _constraints(value: Any, name: str) -> tuple[Constraint | Stroke, ...]:
     return read(Constraints, value, name).constraints()
 
 
@@ -260,18 +270,22 @@ class SynthesisCase:
     title: str = entry(text)
     task: Task = entry(as_it_is)
     bounds: Mapping[str, tuple[float, float]] = entry(BOUNDS, factory=dict)
-    constraints: tuple[Constraint, ...] = entry(_constraints, USUAL)
+    constraints: tuple[Constraint | Stroke, ...] = entry(_constraints, USUAL)
     search: SearchTable = entry(Table(SearchTable), SearchTable())
     make: Make = entry(Table(Make), Make())
     trade_off: TradeOffTable | None = entry(_trade_off, None)
 
     def __post_init__(self) -> None:
         # contradictions are reported before anything is searched
-        limits_of(self.task, normal_form(self.task), self.bounds, self.constraints)
+        if not isinstance(self.task, QuickReturn):
+            limits_of_kinds(
+                self.task, normal_form(self.task), self.bounds, self.constraints, self.search.kinds, self.search.gears
+            )
 
     def solve(self, *, progress: bool = False) -> Synthesis:
         """Search; see `synthesize`."""
-        return synthesize(self.task, self.bounds, self.constraints, search=self.search.search(progress=progress))
+        search, (kinds, gears) = self.search.search(progress=progress), (self.search.kinds, self.search.gears)
+        return synthesize(self.task, self.bounds, self.constraints, search=search, kinds=kinds, gears=gears)
 
     def trade(self, *, progress: bool = False) -> TradeOff | None:
         """The trade-off that is asked for, if any; see `trade_off`."""
@@ -285,6 +299,8 @@ class SynthesisCase:
             self.bounds,
             self.constraints,
             search=Search(seed=self.search.seed, starts=wanted.starts, n_jobs=self.search.jobs, progress=progress),
+            kinds=self.search.kinds,
+            gears=self.search.gears,
         )
 
 

@@ -123,7 +123,8 @@ def _sides(linkage: Linkage, rotation: FloatArray) -> tuple[FloatArray, FloatArr
 
 def has_cognates(solution: Solution) -> bool:
     """Whether `alternatives` has any: of a path, traced by a four-bar whose coupler point is neither B nor C."""
-    return _of_path(solution.task) and solution.linkage.pivot is None and _off_pins(solution.linkage)
+    linkage = solution.linkage
+    return _of_path(solution.task) and linkage.pivot is None and not linkage.slides and _off_pins(linkage)
 
 
 def _of_path(task: Task) -> bool:
@@ -147,7 +148,7 @@ def _place_on_coupler(linkage: Linkage) -> complex:
     ParameterError
         As `cognates`.
     """
-    if linkage.pivot is not None:
+    if linkage.pivot is not None or linkage.slides:
         raise ParameterError("pivot", linkage.pivot, "be fixed: only a four-bar has cognates")
     if not _off_pins(linkage):
         raise ParameterError(

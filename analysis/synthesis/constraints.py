@@ -14,7 +14,7 @@ from linkwork.errors import InputError, LinkworkError, ParameterError
 
 from ..units import Amount, in_si
 from .kernels import PLACES
-from .linkage import ANGLES, LINKS
+from .linkage import ANGLES, LINKS, geared
 from .tasks import Normal, RockerFunction, Task
 
 FloatArray = NDArray[np.float64]
@@ -22,6 +22,8 @@ GrashofType = Literal["crank-rocker", "drag-link", "double-rocker", "rocker-cran
 
 #: The unknowns of every linkage, in their order: `kernels.PLACES` and the output angle.
 UNKNOWNS = (*PLACES, "output_angle")
+#: What only a geared five-bar has, besides.
+SECOND_LENGTH = "second_crank_length"
 #: Largest link by default, in sizes of the target; and, of a rocker function, in ground links.
 LARGEST = 5.0
 #: Least transmission angle at which a crank still counts as turning fully (rad).
@@ -239,6 +241,12 @@ class Limits:
     regions : tuple
         (pivot, triangles of complex corners), in units.
     requires : tuple of Require
+    sliding : bool
+        Whether it is of a slider-crank.
+    second : (float, float), optional
+        Bounds of a second crank's length, in units, of a geared five-bar.
+    ratio : float
+        Of its gears.
     """
 
     low: FloatArray
@@ -249,6 +257,19 @@ class Limits:
     branches: tuple[int, ...]
     regions: tuple[tuple[str, tuple[FloatArray, ...]], ...]
     requires: tuple[Require, ...]
+    sliding: bool = False
+    second: tuple[float, float] | None = None
+    ratio: float = 1.0
+
+    @property
+    def kind(self) -> str:
+        """What it is of."""
+        return "slider-crank" if self.sliding else "four-bar" if self.second is None else "geared five-bar"
+
+    @property
+    def turns(self) -> int:
+        """Turns of the crank for one of the shaft whose rotation is searched."""
+        return 1 if self.second is None else geared(self.ratio)[0]
 
     @property
     def bounds_only(self) -> bool:
@@ -274,7 +295,8 @@ def limits_of(
         raise InputError(f"bounds are {bounds!r}: they must be a mapping from a dimension's name to its two ends")
     if not isinstance(constraints, Sequence):
         raise InputError(f"constraints are {constraints!r}: they must be a sequence, even of one")
-    bounds = dict(bounds or {})
+    # kinds of linkages without a second crank leave it out
+    bounds = {name: ends for name, ends in (bounds or {}).items() if name != SECOND_LENGTH}
     for name in bounds:
         if name not in UNKNOWNS:
             raise ParameterError(name, bounds[name], f"have the name of a dimension: {', '.join(sorted(UNKNOWNS))}")

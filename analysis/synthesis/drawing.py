@@ -51,12 +51,17 @@ def drawing(solution: Solution, rotation: float | None = None, *, poses: int = 0
     drawn = [np.array(list(pins.values())), *(q for q in (*scene.curves, scene.target) if q is not None)]
     size = float(np.ptp(np.vstack(drawn), axis=0).max())
     radius, height = PIN * size, LETTER * size
-    bar = {"ground": (a, e), "crank": (a, b), "rocker": (d, c)}
+    bar = {"ground": (a, e), "crank": (a, b)} | ({} if solution.linkage.slides else {"rocker": (d, c)})
     lines = [Line(layer=layer, start=start, end=end) for layer, (start, end) in bar.items()]
     held = "ground" if scene.guide is None else "slider"
     circles = [
         Circle(layer=layer, centre=pin, radius=radius)
-        for layer, pin in (("ground", a), ("crank", b), ("rocker", c), (held, d))
+        for layer, pin in (
+            ("ground", a),
+            ("crank", b),
+            *([] if solution.linkage.slides else [("rocker", c)]),
+            (held, d),
+        )
     ]
     further = np.linspace(scene.way[0], scene.way[-1], poses, endpoint=scene.way is not scene.turn)
     polylines = [
@@ -88,7 +93,7 @@ def drawing(solution: Solution, rotation: float | None = None, *, poses: int = 0
     texts = [
         Text(layer="text", position=(x + 1.5 * radius, y + 1.5 * radius), height=height, text=name)
         for name, (x, y) in pins.items()
-        if name != "E" or scene.second_crank
+        if name in scene.lettered
     ]
     return Drawing(
         title=scene.title,
@@ -125,14 +130,15 @@ def plates(solution: Solution, *, width: float, thickness: float, pin: float, ti
         raise ParameterError("pin", pin, f"be below the width of the plates, {width:g} m")
     linkage = solution.linkage
     coupler = {"B": 0j, "C": complex(linkage.coupler_length)}
-    if target_points(solution.task) is not None and linkage.point_distance > 0.0:
+    if target_points(solution.task) is not None and linkage.point_distance > 0.0 and not linkage.slider_is_point:
         coupler["P"] = linkage.point_distance * np.exp(1j * linkage.point_angle)
     made: dict[str, dict[str, complex]] = {
         "crank": {"A": 0j, "B": complex(linkage.crank_length)},
         "coupler": coupler,
-        "rocker": {"D": 0j, "C": complex(linkage.rocker_length)},
     }
-    if not isinstance(linkage.pivot, SliderMotion):
+    if not linkage.slides:
+        made["rocker"] = {"D": 0j, "C": complex(linkage.rocker_length)}
+    if not (linkage.slides or isinstance(linkage.pivot, SliderMotion)):
         made = {"ground": {"A": 0j, "E" if linkage.pivot else "D": complex(linkage.ground_length)}} | made
     if isinstance(linkage.pivot, SecondCrank):
         made["second crank"] = {"E": 0j, "D": complex(linkage.pivot.length)}

@@ -7,7 +7,8 @@ leaves a NaN, which the callers look for.
 
 A linkage is the vector ``q`` of `PLACES`: the thesis's ten parameters in its order. Crank directions come as cosines and
 sines of the crank's rotation, which a timed task knows beforehand; the rocker pivot D may be moved by (dx, dy) in the frame
-of the ground link, which is how a slider or a second crank enters.
+of the ground link, which is how a slider or a second crank enters. With a rocker of length zero there is none: C is on a
+guide at right angles to the ground link at its end, which is a rocker whose pivot lies at infinity.
 """
 
 from __future__ import annotations
@@ -21,8 +22,28 @@ from linkwork.five_bar import kinematics
 
 from ..numerics.codegen import CUBE, MATRIX, VECTOR, inner, kernel
 
-#: The plant's own loop closure.
-joined = inner(kinematics.joined)
+
+def guided(c2, s2, dx, dy, l3, l4, branch):
+    """C on a guide at right angles to the ground link, dx beyond B, as of a rocker from a pivot at infinity; as `joined`.
+
+    Of CasADi's symbols too. For branch +1 C lies to the left of the way from B to the guide.
+    """
+    c3 = dx / l3
+    s3 = branch * (1.0 - c3 * c3) ** 0.5
+    return kinematics.Position(c2, s2, c3, s3, -1.0, 0.0, -c3, s3)
+
+
+#: The plant's own loop closure, and that of a slider-crank.
+joined, _guided = inner(kinematics.joined), inner(guided)
+
+
+@inner
+def closed(c2, s2, dx, dy, l3, l4, branch):
+    """Loop closure of a four-bar, or of a slider-crank, which has no rocker."""
+    if l4 > 0.0:
+        return joined(c2, s2, dx, dy, l3, l4, branch)
+    return _guided(c2, s2, dx, dy, l3, l4, branch)
+
 
 #: The vector q: fields of `analysis.synthesis.Linkage`.
 PLACES = (
@@ -55,7 +76,7 @@ def coupler_path(c, s, dx, dy, q, branch, out):
     for j in range(c.shape[0]):
         c2 = ct * c[j] - st * s[j]
         s2 = st * c[j] + ct * s[j]
-        g = joined(c2, s2, l1 + dx[j] - l2 * c2, dy[j] - l2 * s2, l3, l4, branch)
+        g = closed(c2, s2, l1 + dx[j] - l2 * c2, dy[j] - l2 * s2, l3, l4, branch)
         x[j] = x0 + ax * c2 - ay * s2 + px * g.c3 - py * g.s3
         y[j] = y0 + ay * c2 + ax * s2 + py * g.c3 + px * g.s3
 
@@ -72,7 +93,7 @@ def coupler_path_jacobian(c, s, dx, dy, q, branch, out, jac):
     for j in range(c.shape[0]):
         c2 = ct * c[j] - st * s[j]
         s2 = st * c[j] + ct * s[j]
-        g = joined(c2, s2, l1 + dx[j] - l2 * c2, dy[j] - l2 * s2, l3, l4, branch)
+        g = closed(c2, s2, l1 + dx[j] - l2 * c2, dy[j] - l2 * s2, l3, l4, branch)
         # directions of crank and BP in the plane
         ex, ey = ca * c2 - sa * s2, sa * c2 + ca * s2
         fx, fy = ux * g.c3 - uy * g.s3, uy * g.c3 + ux * g.s3
@@ -118,7 +139,7 @@ def link_directions(c, s, dx, dy, q, branch, out):
     for j in range(c.shape[0]):
         c2 = ct * c[j] - st * s[j]
         s2 = st * c[j] + ct * s[j]
-        g = joined(c2, s2, l1 + dx[j] - l2 * c2, dy[j] - l2 * s2, l3, l4, branch)
+        g = closed(c2, s2, l1 + dx[j] - l2 * c2, dy[j] - l2 * s2, l3, l4, branch)
         out[0, j] = g.c3
         out[1, j] = g.s3
         out[2, j] = g.c4
@@ -140,7 +161,7 @@ def link_jacobian(c, s, dx, dy, q, branch, out, jac):
     for j in range(c.shape[0]):
         c2 = ct * c[j] - st * s[j]
         s2 = st * c[j] + ct * s[j]
-        g = joined(c2, s2, l1 + dx[j] - l2 * c2, dy[j] - l2 * s2, l3, l4, branch)
+        g = closed(c2, s2, l1 + dx[j] - l2 * c2, dy[j] - l2 * s2, l3, l4, branch)
         out[0, j] = atan2(g.s3, g.c3)
         out[1, j] = atan2(g.s4, g.c4)
         w3 = 1.0 / (l3 * g.s43)
@@ -161,20 +182,27 @@ def link_jacobian(c, s, dx, dy, q, branch, out, jac):
         jac[11, 1, j] = g.s3 * w4
 
 
-@kernel(void(VECTOR, VECTOR, MATRIX, float64, complex128[:, ::1], complex128[:, ::1]), purpose="the curves of linkages")
-def many_directions(c, s, shapes, branch, coupler, rocker):
-    """Directions of coupler and rocker, from the ground link, of many four-bars at the same crank rotations.
+@kernel(
+    void(VECTOR, VECTOR, VECTOR, VECTOR, MATRIX, float64, complex128[:, ::1], complex128[:, ::1]),
+    purpose="the curves of linkages",
+)
+def many_directions(c, s, cg, sg, shapes, branch, coupler, rocker):
+    """Directions of coupler and rocker, from the ground link, of many linkages at the same crank rotations.
 
-    ``shapes`` has the rows (l2/l1, l3/l1, l4/l1, crank phase), shape (m, 4); the directions come as complex numbers, shape
-    (m, n), NaN where the links cannot be joined.
+    ``shapes`` has the rows (l1, l2, l3, l4, crank phase, l5, second crank's phase), shape (m, 7), with l5 = 0 where there is
+    no second crank; ``c, s`` are of the crank's rotations, ``cg, sg`` of the second crank's. The directions come as complex
+    numbers, shape (m, n), NaN where the links cannot be joined.
     """
     for i in range(shapes.shape[0]):
-        l2, l3, l4 = shapes[i, 0], shapes[i, 1], shapes[i, 2]
-        ct, st = cos(shapes[i, 3]), sin(shapes[i, 3])
+        l1, l2, l3, l4, l5 = shapes[i, 0], shapes[i, 1], shapes[i, 2], shapes[i, 3], shapes[i, 5]
+        ct, st = cos(shapes[i, 4]), sin(shapes[i, 4])
+        cp, sp = l5 * cos(shapes[i, 6]), l5 * sin(shapes[i, 6])
         for j in range(c.shape[0]):
             c2 = ct * c[j] - st * s[j]
             s2 = st * c[j] + ct * s[j]
-            g = joined(c2, s2, 1.0 - l2 * c2, -l2 * s2, l3, l4, branch)
+            dx = cp * cg[j] - sp * sg[j]
+            dy = sp * cg[j] + cp * sg[j]
+            g = closed(c2, s2, l1 + dx - l2 * c2, dy - l2 * s2, l3, l4, branch)
             coupler[i, j] = complex(g.c3, g.s3)
             rocker[i, j] = complex(g.c4, g.s4)
 

@@ -1,4 +1,5 @@
-"""A linkage in the plane: the four-bar of the thesis's chapter VI, its rocker pivot fixed, sliding, or on a second crank.
+"""A linkage in the plane: the four-bar of the thesis's chapter VI, its rocker pivot fixed, sliding, on a second crank, or at
+infinity, which is a slider-crank.
 
 The coupler point is, with the thesis's symbols (appendix 5),
 
@@ -6,13 +7,15 @@ The coupler point is, with the thesis's symbols (appendix 5),
 
 where phi is the crank's rotation from the start of the motion. Equation (6.17) as printed drops a1 in the second term.
 Angles th2, th3, th4 are those of the plant, from the ground link; a1 turns the whole linkage. Loop closure and derivatives are
-evaluated by `analysis.synthesis.kernels`.
+evaluated by `analysis.synthesis.kernels`. Of a slider-crank the ground link is the perpendicular from the crank shaft to the
+guide of C, l1 the offset, and there is no rocker.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from fractions import Fraction
 from math import cos, hypot, isfinite, pi, sin
 from types import MappingProxyType
 from typing import Any
@@ -33,12 +36,16 @@ FloatArray = NDArray[np.float64]
 LINKS = ("ground_length", "crank_length", "coupler_length", "rocker_length")
 LENGTHS = ("pivot_x", "pivot_y", *LINKS, "point_distance")
 ANGLES = ("ground_angle", "crank_phase", "point_angle", "output_angle")
+#: Links that need not be longer than zero of a slider-crank: its rocker, which it has not, and the offset, of either sign.
+ABSENT = ("rocker_length", "ground_length")
 #: Their units.
 UNITS: Mapping[str, str] = MappingProxyType(dict.fromkeys(LENGTHS, "m") | dict.fromkeys(ANGLES, "rad"))
 #: Grashof's types of a four-bar of which a link turns fully, by the shortest link in the order of `LINKS`.
 BY_SHORTEST = ("drag-link", "crank-rocker", "double-rocker", "rocker-crank")
 #: Crank rotations at which a full turn is evaluated.
 TURN = 360
+#: Greatest number of turns of either crank until a geared five-bar is as it was.
+TEETH = 6
 
 
 def wrapped(angle: FloatArray) -> FloatArray:
@@ -47,11 +54,14 @@ def wrapped(angle: FloatArray) -> FloatArray:
     return value
 
 
-def transmission_excess(l3: Any, l4: Any, nearest: Any, farthest: Any, cosine: Any) -> tuple[Any, Any]:
+def transmission_excess(l3: Any, l4: Any, nearest: Any, farthest: Any, cosine: Any) -> tuple[Any, ...]:
     """Left sides of g <= 0 by which |cos mu| at C is at most a cosine, without division; of numbers, arrays and symbols.
 
-    ``nearest`` and ``farthest`` are the squares of the least and the greatest distance from B to D.
+    ``nearest`` and ``farthest`` are the squares of the least and the greatest distance from B to D; of a slider-crank, whose l4
+    is None, to the guide.
     """
+    if l4 is None:
+        return (farthest - (l3 * cosine) ** 2,)
     joint, product = l3 * l3 + l4 * l4, 2.0 * l3 * l4 * cosine
     return joint - nearest - product, farthest - joint - product
 
@@ -95,18 +105,39 @@ class SliderMotion:
         return replace(self, series=self.series * factor)
 
 
+def geared(ratio: float) -> tuple[int, int]:
+    """Turns k of the first crank and m of the second until both are where they were: the ratio is m/k.
+
+    Raises
+    ------
+    ParameterError
+        If it is not zero and no ratio of whole numbers up to six.
+    """
+    if isfinite(ratio):
+        near = Fraction(ratio).limit_denominator(TEETH)
+        if abs(near - Fraction(ratio)) <= 1e-9 and abs(near.numerator) <= TEETH:
+            return near.denominator, near.numerator
+    raise ParameterError("ratio of the second crank", ratio, f"be a ratio of whole numbers up to {TEETH}")
+
+
+def format_ratio(ratio: float) -> str:
+    """A ratio of gears, such as "2", "-1" or "1/2"."""
+    return str(Fraction(ratio).limit_denominator(TEETH))
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class SecondCrank:
     """The rocker pivot D sits on a second crank, geared to the first or turned independently: a five-bar.
 
-    D = E + l5 exp(i psi) about the end E of the ground link, with psi = ratio phi + phase + series(phi).
+    D = E + l5 exp(i psi) about the end E of the ground link, with psi = m phi + phase + series(phi), where m/k is the ratio and
+    the first crank turns k times as fast as phi: phi is the rotation of the shaft that turns once until all is as it was.
 
     Attributes
     ----------
     length : float
         l5 (m).
     ratio : float
-        Turns of the second crank for one of the first: a whole number, or the path does not close.
+        Turns of the second crank for one of the first: a ratio of whole numbers up to six.
     phase : float
         psi at the start (rad).
     series : FourierSeries
@@ -115,7 +146,7 @@ class SecondCrank:
     Raises
     ------
     ParameterError
-        If the length is not greater than zero, the ratio not whole, or the phase not finite.
+        If the length is not greater than zero, the ratio none of small whole numbers, or the phase not finite.
     """
 
     length: float
@@ -126,15 +157,14 @@ class SecondCrank:
     def __post_init__(self) -> None:
         if not (isfinite(self.length) and self.length > 0.0):
             raise ParameterError("second_crank_length", self.length, "be a finite number greater than zero")
-        if not float(self.ratio).is_integer():
-            raise ParameterError("ratio of the second crank", self.ratio, "be a whole number")
+        geared(self.ratio)
         if not isfinite(self.phase):
             raise ParameterError("second_crank_phase", self.phase, "be a finite number")
 
     def angle(self, rotation: ArrayLike) -> FloatArray:
         """psi (rad)."""
         phi = np.asarray(rotation, dtype=float)
-        value: FloatArray = self.ratio * phi + self.phase + self.series(phi)
+        value: FloatArray = geared(self.ratio)[1] * phi + self.phase + self.series(phi)
         return value
 
     def displacement(self, rotation: ArrayLike) -> tuple[FloatArray, FloatArray]:
@@ -157,11 +187,11 @@ class Linkage:
     pivot_x, pivot_y : float
         X0, Y0: the crank shaft A.
     ground_length, crank_length, coupler_length, rocker_length : float
-        l1 ... l4.
+        l1 ... l4. A slider-crank has a rocker of length 0, and l1 is its offset: the distance of the guide of C from A.
     point_distance, point_angle : float
         r and a2: the coupler point from the crank pin B, and its direction from the coupler's.
     ground_angle : float
-        a1: direction of the ground link, from A to the rocker pivot.
+        a1: direction of the ground link, from A to the rocker pivot; of a slider-crank from A to the guide, at right angles.
     crank_phase : float
         th20: crank angle from the ground link at the start of the motion.
     output_angle : float
@@ -174,7 +204,7 @@ class Linkage:
     Raises
     ------
     ParameterError
-        If a value is not finite, a link not longer than zero, or the branch neither +1 nor -1.
+        If a value is not finite, a link not longer than zero, the branch neither +1 nor -1, or a slider-crank's pivot moved.
     """
 
     pivot_x: float = 0.0
@@ -196,11 +226,33 @@ class Linkage:
             value = float(getattr(self, name))
             if not isfinite(value):
                 raise ParameterError(name, value, "be a finite number")
-            if name in LINKS and value <= 0.0:
+            if name in LINKS and value <= 0.0 and not (self.slides and name in ABSENT):
                 raise ParameterError(name, value, "be greater than zero")
             object.__setattr__(self, name, value)
+        if self.slides and self.pivot is not None:
+            raise ParameterError("pivot", self.pivot, "be fixed: a slider-crank, whose rocker has no length, has none")
         if self.branch not in (1, -1):
             raise ParameterError("branch", self.branch, "be +1 or -1")
+
+    @property
+    def slides(self) -> bool:
+        """Whether it is a slider-crank: C is on a guide instead of a rocker."""
+        return self.rocker_length == 0.0
+
+    @property
+    def slider_is_point(self) -> bool:
+        """Whether the coupler point is the slider's pin C of a slider-crank."""
+        return self.slides and self.point_angle == 0.0 and self.point_distance == self.coupler_length
+
+    @property
+    def turns(self) -> int:
+        """Turns of the crank for one of the shaft whose rotation is given: 1, but with gears of a ratio such as 1/2."""
+        return geared(self.pivot.ratio)[0] if isinstance(self.pivot, SecondCrank) else 1
+
+    def crank_angle(self, rotation: ArrayLike) -> FloatArray:
+        """th2 from the ground link (rad)."""
+        value: FloatArray = self.turns * np.asarray(rotation, dtype=float) + self.crank_phase
+        return value
 
     @classmethod
     def from_vector(cls, q: ArrayLike, branch: int = 1, **more: Any) -> Linkage:
@@ -234,7 +286,8 @@ class Linkage:
     ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray, float]:
         phi = np.ascontiguousarray(rotation, dtype=float)
         dx, dy = (np.ascontiguousarray(d, dtype=float) for d in displacement or self.displacement(phi))
-        return np.cos(phi), np.sin(phi), dx, dy, self.vector, float(self.branch)
+        turned = self.turns * phi
+        return np.cos(turned), np.sin(turned), dx, dy, self.vector, float(self.branch)
 
     def path(self, rotation: ArrayLike, displacement: tuple[ArrayLike, ArrayLike] | None = None) -> FloatArray:
         """Coupler point at rotations of the crank, shape (n, 2) in m; NaN where the links cannot be joined.
@@ -277,6 +330,12 @@ class Linkage:
         turned: FloatArray = np.unwrap(np.arctan2(g[3], g[2])) + self.output_angle
         return turned
 
+    def slider_position(self, rotation: ArrayLike) -> FloatArray:
+        """Place of C along the guide of a slider-crank from the foot E of the offset, to the left of A -> E (m)."""
+        of_b = self.crank_length * np.sin(self.crank_angle(rotation))
+        value: FloatArray = of_b + self.coupler_length * self.directions(rotation)[1]
+        return value
+
     def transmission(self, rotation: ArrayLike) -> FloatArray:
         """Acute angle between coupler and rocker (rad), 0 at the limit of assembly; NaN where there is no joining."""
         g = self.directions(rotation)
@@ -285,6 +344,8 @@ class Linkage:
 
     def pins(self, rotation: float) -> dict[str, tuple[float, float]]:
         """A, B, C, D, the end E of the ground link, and P in the plane (m) at one rotation of the crank.
+
+        Of a slider-crank D, the slider, is where C is.
 
         Raises
         ------
@@ -297,7 +358,7 @@ class Linkage:
         turn = np.exp(1j * self.ground_angle)
         a = complex(self.pivot_x, self.pivot_y)
         dx, dy = (float(d[0]) for d in self.displacement([rotation]))
-        b = a + turn * self.crank_length * np.exp(1j * (rotation + self.crank_phase))
+        b = a + turn * self.crank_length * np.exp(1j * self.crank_angle(rotation))
         coupler = turn * complex(g[0], g[1])
         places = {
             "A": a,
@@ -307,6 +368,8 @@ class Linkage:
             "E": a + turn * self.ground_length,
             "P": b + self.point_distance * np.exp(1j * self.point_angle) * coupler,
         }
+        if self.slides:
+            places["D"] = places["C"]
         return {name: (float(z.real), float(z.imag)) for name, z in places.items()}
 
     def moved(self, x: float, y: float) -> Linkage:
@@ -320,16 +383,36 @@ class Linkage:
 
     @property
     def grashof(self) -> str:
-        """Type of the four-bar by Grashof's criterion, the rocker pivot at the end of the ground link.
+        """Type of the four-bar by Grashof's criterion, the rocker pivot at the end of the ground link; or slider-crank.
 
         One of crank-rocker, drag-link (both turn), double-rocker (the coupler turns), rocker-crank (the rocker turns, the crank
         does not), triple-rocker, change-point.
         """
+        if self.slides:
+            return "slider-crank"
         lengths = [getattr(self, name) for name in LINKS]
         excess = 2.0 * (min(lengths) + max(lengths)) - sum(lengths)
         if abs(excess) <= 1e-12 * sum(lengths):
             return "change-point"
         return "triple-rocker" if excess > 0.0 else BY_SHORTEST[lengths.index(min(lengths))]
+
+    def reach(self, rotation: ArrayLike) -> FloatArray:
+        """Distance from B to D, or along the ground link from B to the guide of a slider-crank (m)."""
+        dx, dy = self.displacement(rotation)
+        th2 = self.crank_angle(rotation)
+        distance: FloatArray = self.ground_length + dx - self.crank_length * np.cos(th2)
+        if not self.slides:
+            distance = np.hypot(distance, dy - self.crank_length * np.sin(th2))
+        return distance
+
+    def cosine_at_c(self, reach: FloatArray) -> FloatArray:
+        """Cosine of the angle between coupler and rocker, or the normal of the guide, for what `reach` is.
+
+        It is beyond -1 and 1 where the links cannot be joined.
+        """
+        l3, l4 = self.coupler_length, self.rocker_length
+        cosine: FloatArray = -reach / l3 if self.slides else (l3 * l3 + l4 * l4 - reach * reach) / (2.0 * l3 * l4)
+        return cosine
 
     def transmission_range(self) -> tuple[float, float]:
         """Least and greatest angle between coupler and rocker at C over a turn (rad), in [0, pi].
@@ -337,17 +420,11 @@ class Linkage:
         With a fixed pivot it is at its extremes with the crank along the ground link; with a moving one it is found over `TURN`
         rotations. Where the crank cannot turn fully the extremes are 0 or pi.
         """
-        l3, l4 = self.coupler_length, self.rocker_length
         if self.pivot is None:
-            d = np.array([abs(self.ground_length - self.crank_length), self.ground_length + self.crank_length])
+            d = np.array([self.ground_length - self.crank_length, self.ground_length + self.crank_length])
         else:
-            phi = np.linspace(0.0, 2.0 * pi, TURN, endpoint=False)
-            dx, dy = self.displacement(phi)
-            th2 = phi + self.crank_phase
-            d = np.hypot(
-                self.ground_length + dx - self.crank_length * np.cos(th2), dy - self.crank_length * np.sin(th2)
-            )
-        cosine = np.clip((l3 * l3 + l4 * l4 - d * d) / (2.0 * l3 * l4), -1.0, 1.0)
+            d = self.reach(np.linspace(0.0, 2.0 * pi, TURN, endpoint=False))
+        cosine = np.clip(self.cosine_at_c(d), -1.0, 1.0)
         angle = np.arccos(cosine)
         return float(angle.min()), float(angle.max())
 
@@ -393,12 +470,14 @@ class Linkage:
         Raises
         ------
         ParameterError
-            If density or section are not greater than zero, or the pivot is on a second crank.
+            If density or section are not greater than zero, it is a slider-crank, or the pivot is on a second crank.
         """
         width, thickness = section
         for name, value in (("density", density), ("section width", width), ("section thickness", thickness)):
             if not (isfinite(value) and value > 0.0):
                 raise ParameterError(name, value, "be a finite number greater than zero")
+        if self.slides:
+            raise ParameterError("rocker_length", 0.0, "be greater than zero: the five-bar slider is no slider-crank")
         if isinstance(self.pivot, SecondCrank):
             raise ParameterError("pivot", self.pivot, "be fixed or a slider: the plant has no second crank")
         line = density * width * thickness

@@ -24,11 +24,11 @@ from linkwork.errors import InputError
 
 from .constraints import Limits
 from .kernels import coupler_path_jacobian, link_jacobian
-from .linkage import wrapped
+from .linkage import geared, wrapped
 from .program import KEPT, Objective, Program
 from .refine import Refinement
 from .search import USUAL_SEARCH, Search, over_cores
-from .starts import Answer, PivotUnknown, SliderUnknown, Start, apart, inside, outside
+from .starts import Answer, CrankUnknown, PivotUnknown, SliderUnknown, Start, apart, inside, outside
 from .tasks import Normal
 
 FloatArray = NDArray[np.float64]
@@ -92,6 +92,16 @@ class Polished:
         others = tuple(a for a in found if not a.feasible)
         return cls(kept=tuple(kept), others=others, done=len(found), interrupted=interrupted, begun=tuple(begun))
 
+    def joined(self, other: Polished) -> Polished:
+        """Both, of searches of different kinds of linkages."""
+        return Polished(
+            kept=self.kept + other.kept,
+            others=self.others + other.others,
+            done=self.done + other.done,
+            interrupted=self.interrupted or other.interrupted,
+            begun=self.begun + other.begun,
+        )
+
     def reaching(self, quality: float, within: float = 0.01) -> int:
         """How many searches reached a quality, but for this share of it: "40 of 40 starts converge"."""
         return sum(a.start.quality <= quality * (1.0 + within) for a in self.kept)
@@ -151,11 +161,24 @@ def distinct(answers: Sequence[Answer], count: int, pivot: PivotUnknown | None =
         if isinstance(pivot, SliderUnknown):
             # as vectors: a guide is the same one from its other end
             v = np.concatenate([np.cos(v[0]) * v[1:], np.sin(v[0]) * v[1:]])
+        if isinstance(pivot, CrankUnknown):
+            # seen from where the first crank lies along the ground link, however often either has turned since
+            turned = geared(pivot.ratio)
+            relative = turned[0] * v[1] - turned[1] * q[8]
+            v = np.array([v[0], largest * np.cos(relative), largest * np.sin(relative), *v[2:]])
+        side = 3.0 * answer.start.branch
+        if q[5] == 0.0:
+            # a slider-crank without an offset is the same one seen from the other side of its guide
+            turned = np.exp(1j * q[7])
+            v = np.array(
+                [q[2] * turned.real, q[2] * turned.imag, *(side * largest * np.array([turned.real, turned.imag]))]
+            )
+            q, side = np.array([*q[:2], 0.0, *q[3:7], 0.0, q[7] + q[8], *q[9:]]), 0.0
         mark = np.concatenate([q[:7] / largest, np.cos(q[7:]), np.sin(q[7:]), v / largest])
         # the start of an untimed path's rotation is no dimension
         if answer.start.rotation is not None:
             mark[[8, 12]] = 0.0
-        return np.append(mark, 3.0 * answer.start.branch)
+        return np.append(mark, side)
 
     return apart(answers, mark, DIFFERENT, count)
 

@@ -24,7 +24,8 @@ from ..mechanisms import FIVE_BAR
 from ..numerics import symbolic
 from ..run import traced as equations
 from .constraints import TURNING, UNKNOWNS, Limits, half_planes
-from .linkage import BY_SHORTEST, transmission_excess
+from .kernels import guided
+from .linkage import BY_SHORTEST, geared, transmission_excess
 from .starts import Answer, CrankUnknown, PivotUnknown, SliderUnknown, Start, inside, outside, pivot_bounds, pivot_size
 from .tasks import Normal, turn
 from .user_functions import physical, traced
@@ -68,7 +69,9 @@ class Label(NamedTuple):
         """By how much, with its unit; of a transmission angle, from what it does to the angle at the limit."""
         if self.unit == "transmission":
             least = self.factor
-            cosine = cos(least) + violation / (2.0 * float(q[4] * q[5]))
+            # of a slider-crank, which has no rocker, of its square
+            sliding = q[5] == 0.0
+            cosine = cos(least) + violation / (2.0 * float(q[4] * q[4] * cos(least) if sliding else q[4] * q[5]))
             return f"{degrees(least - acos(min(1.0, cosine))):.3g} deg"
         return f"{self.factor * violation:.3g} {self.unit}".strip()
 
@@ -100,6 +103,8 @@ class Program:
         exact: bool = True,
     ) -> None:
         self.normal, self.limits, self.pivot, self.objective = normal, limits, pivot, objective
+        #: Turns of the crank, and of a second one, while the rotation searched makes one.
+        self._turns = geared(pivot.ratio) if isinstance(pivot, CrankUnknown) else (1, 0)
         casadi = self._casadi = symbolic.library()
         SX = casadi.SX
         self._unknowns: list[tuple[Any, FloatArray, FloatArray]] = []
@@ -184,9 +189,11 @@ class Program:
     def _closed(self, p: Any, v: Any, phi: Any, branch: Any) -> tuple[Any, Any]:
         """Directions of the links and the coupler point (x, y) at rotations, by the plant's own loop closure."""
         casadi = self._casadi
-        c2, s2 = casadi.cos(phi + p.crank_phase), casadi.sin(phi + p.crank_phase)
+        th2 = self._turns[0] * phi + p.crank_phase
+        c2, s2 = casadi.cos(th2), casadi.sin(th2)
         dx, dy = self._displacement(v, phi)
-        g = equations(FIVE_BAR).joined(
+        closed = guided if self.limits.sliding else equations(FIVE_BAR).joined
+        g = closed(
             c2,
             s2,
             p.ground_length + dx - p.crank_length * c2,
@@ -209,7 +216,7 @@ class Program:
         if isinstance(self.pivot, SliderUnknown):
             u = _series(casadi, v[1:], phi)
             return u * casadi.cos(v[0]), u * casadi.sin(v[0])
-        psi = self.pivot.ratio * phi + v[1] + _series(casadi, v[2:], phi, mean=False)
+        psi = self._turns[1] * phi + v[1] + _series(casadi, v[2:], phi, mean=False)
         return v[0] * casadi.cos(psi), v[0] * casadi.sin(psi)
 
     def _quality(self, p: Any, v: Any, phi: Any, branch: Any, size: Any) -> Any:
@@ -334,24 +341,26 @@ class Program:
             x, step = self._way(phi)
             d2 = self._reach(p, v, x)
             # an extreme between two of these rotations is where the crank lies along the ground link: no more than this off
-            slack = 2.0 * l1 * l2 * (1.0 - casadi.cos(0.5 * step))
+            slack = 2.0 * (l1 + l2 * limits.sliding) * l2 * (1.0 - casadi.cos(0.5 * step))
             self._transmitting(p, d2 - slack, d2 + slack, limits.way or 0.0, tilt)
 
     def _transmitting(self, p: Any, nearest: Any, farthest: Any, least: float, tilt: Any) -> None:
         """|cos mu| is at most cos(least), and at most the tilt: for squares of the distance BD, written without division."""
         for cosine in (cos(max(least, TURNING)), *([] if tilt is None else [tilt])):
-            for excess in transmission_excess(p.coupler_length, p.rocker_length, nearest, farthest, cosine):
+            rocker = None if self.limits.sliding else p.rocker_length
+            for excess in transmission_excess(p.coupler_length, rocker, nearest, farthest, cosine):
                 self._at_most(
                     excess, "transmission angle", "transmission", acos(cosine) if isinstance(cosine, float) else 0.0
                 )
 
     def _reach(self, p: Any, v: Any, x: Any) -> Any:
-        """Square of the distance from crank pin to rocker pivot at rotations."""
+        """Square of the distance from crank pin to rocker pivot, or to the guide, at rotations."""
         casadi = self._casadi
         dx, dy = self._displacement(v, x)
-        bx = p.ground_length + dx - p.crank_length * casadi.cos(x + p.crank_phase)
-        by = dy - p.crank_length * casadi.sin(x + p.crank_phase)
-        return bx * bx + by * by
+        th2 = self._turns[0] * x + p.crank_phase
+        bx = p.ground_length + dx - p.crank_length * casadi.cos(th2)
+        by = dy - p.crank_length * casadi.sin(th2)
+        return bx * bx if self.limits.sliding else bx * bx + by * by
 
     def _way(self, phi: Any) -> tuple[Any, Any]:
         """The stations' rotations and some in between, and how far from each the next one is."""

@@ -8,8 +8,9 @@ from math import degrees, isfinite, pi
 import numpy as np
 from numpy.typing import NDArray
 
+from .kinds import advance, stroke
 from .limit_positions import dead_centres, mechanical_advantage, time_ratio, toggles
-from .linkage import ANGLES, Linkage, SecondCrank, SliderMotion
+from .linkage import ANGLES, Linkage, SecondCrank, SliderMotion, format_ratio
 from .sensitivity import ANGLE_STEP, PIVOT_ANGLES, costs, length_step, rounded, sensitivities
 from .solution import Solution, Verdicts
 from .tasks import RockerFunction, Task, UntimedPath
@@ -78,17 +79,28 @@ def report(solution: Solution) -> str:
         f"assembly: C lies to the {'left' if linkage.branch > 0 else 'right'} of B -> D; "
         f"largest link {1e3 * linkage.largest_link:.6g} mm"
     ]
-    if linkage.pivot is None:
+    if linkage.slides:
+        parts[0] += f"\n{slider_line(linkage)}"
+    elif linkage.pivot is None:
         parts[0] += _limits(linkage, solution.rotation)
     elif isinstance(linkage.pivot, SliderMotion):
         parts[0] += f"\nslider at D: stroke {1e3 * linkage.pivot.stroke:.6g} mm"
     elif isinstance(linkage.pivot, SecondCrank):
-        parts[0] += f"\nsecond crank at D: {linkage.pivot.ratio:g} turns for one of the first"
+        parts[0] += f"\nsecond crank at D: {format_ratio(linkage.pivot.ratio)} turns for one of the first"
     if straight := solution.straight():
         parts[0] += f"\n{straight}"
     parts += [table(dimension_rows(solution)), rounding_line(solution)]
     parts.append(table(_stations(solution)))
     return "\n\n".join(parts) + "\n"
+
+
+def slider_line(linkage: Linkage) -> str:
+    """Offset, stroke and time ratio of a slider-crank."""
+    line = f"slider at C on a guide {1e3 * abs(linkage.ground_length):.6g} mm from A"
+    if linkage.turns_fully:
+        slow = pi + abs(float(advance(linkage)))
+        line += f": stroke {1e3 * float(stroke(linkage)):.6g} mm, time ratio {slow / (2.0 * pi - slow):.4g}"
+    return line
 
 
 def _limits(linkage: Linkage, rotation: NDArray[np.float64]) -> str:

@@ -1,6 +1,7 @@
-"""The global scan: many thousand four-bars, each placed as well as it can be in closed form.
+"""The global scan: many thousand linkages, each placed as well as it can be in closed form.
 
-Variable projection: with the shape of the four-bar (its links as shares of the ground link) and the crank's phase given, the
+Variable projection: with the shape of the linkage (its links as shares of the ground link, of a slider-crank of the coupler, of
+a geared five-bar the second crank and its phase as well) and the crank's phase given, the
 coupler point is z0 + c1 exp(i th2) + c2 exp(i th3), linear in three complex unknowns: place, size and direction, and the
 coupler point. What is left is searched by a Sobol sequence, which a seed scrambles.
 
@@ -16,7 +17,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from math import cos, degrees, inf, pi, sin
+from math import cos, degrees, inf, log, pi, sin
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,7 +25,7 @@ from scipy.stats import qmc
 
 from .constraints import TURNING, InfeasibleError, Limits
 from .kernels import many_directions, match_windows
-from .linkage import BY_SHORTEST, transmission_excess
+from .linkage import BY_SHORTEST, geared, transmission_excess
 from .starts import Start, apart
 from .tasks import Normal
 
@@ -33,6 +34,8 @@ ComplexArray = NDArray[np.complex128]
 
 #: Ranges of l2/l1, l3/l1, l4/l1 that are searched, evenly in the logarithm.
 SHAPES = ((0.01, 3.0), (0.05, 6.0), (0.05, 6.0))
+#: Of a slider-crank of l1/l3 and l2/l3; of l5/l1, of a second crank; crank rotations at which a five-bar is looked at.
+GUIDED, SECOND, AROUND = ((1e-3, 2.0), (0.01, 3.0)), (0.01, 3.0), 48
 #: Candidates in one piece of work.
 CHUNK = 4096
 #: Steps of a coupler curve and points of it at even arc length.
@@ -47,12 +50,16 @@ APART = 0.08
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Candidates:
-    """Rows of candidates: quality (m,), vectors of the eleven unknowns (m, 11), rotations (m, n) or None, their branch."""
+    """Rows of candidates: quality (m,), vectors of the eleven unknowns (m, 11), rotations (m, n) or None, their branch.
+
+    With a second crank its length and phase, ``pivot`` (m, 2).
+    """
 
     quality: FloatArray
     q: FloatArray
     rotation: FloatArray | None
     branch: int
+    pivot: FloatArray | None = None
 
 
 def scan(normal: Normal, limits: Limits, *, seed: int, candidates: int, starts: int) -> list[Start]:
@@ -76,19 +83,21 @@ def scan(normal: Normal, limits: Limits, *, seed: int, candidates: int, starts: 
         for chunk, shapes in enumerate(chunks):
             found.append(_placed(normal, limits, shapes, branch, np.random.default_rng([seed, chunk, branch + 1])))
     if not found:
-        raise InfeasibleError(f"no shape of four-bar {_why(limits, seed)}")
-    return _apart(found, starts)
+        raise InfeasibleError(f"no shape of {limits.kind} {_why(limits, seed)}")
+    return _apart(found, starts, limits)
 
 
 def _shapes(limits: Limits, seed: int, count: int) -> Iterator[FloatArray]:
-    """Allowed shapes with the other searched numbers in [0, 1), rows of (l2/l1, l3/l1, l4/l1, six numbers), in chunks."""
+    """Allowed shapes with the other searched numbers in [0, 1), in chunks.
+
+    Rows of (l2/l1, l3/l1, l4/l1), of a slider-crank (l1/l3, l2/l3, 1), and six numbers.
+    """
     sequence = qmc.Sobol(9, seed=seed)
-    low, high = np.log(_ratios(limits)).T
     kept, tried = 0, 0
     while kept < count and tried < 64 * count:
         unit = sequence.random(CHUNK)
         tried += CHUNK
-        shapes = np.hstack([np.exp(low + (high - low) * unit[:, :3]), unit[:, 3:]])
+        shapes = _stretched(unit, limits)
         shapes = shapes[_allowed(shapes, limits)][: count - kept]
         kept += len(shapes)
         if len(shapes):
@@ -106,27 +115,53 @@ def _why(limits: Limits, seed: int) -> str:
         alone[f"is a {limits.grashof}"] = replace(free, turn=None)
     unit = qmc.Sobol(9, seed=seed).random(CHUNK)
     for words, one in alone.items():
-        low, high = np.log(_ratios(one)).T
-        if not _allowed(np.hstack([np.exp(low + (high - low) * unit[:, :3]), unit[:, 3:]]), one).any():
+        if not _allowed(_stretched(unit, one), one).any():
             return words
     return " and ".join(alone)
 
 
+def _stretched(unit: FloatArray, limits: Limits) -> FloatArray:
+    """Rows of `_shapes`, from numbers in [0, 1)."""
+    low, high = np.log(_ratios(limits)).T
+    return np.hstack([np.exp(low + (high - low) * unit[:, :3]), unit[:, 3:]])
+
+
 def _ratios(limits: Limits) -> FloatArray:
-    """Least and greatest l2/l1, l3/l1, l4/l1, shape (3, 2): what the bounds of the links leave of `SHAPES`, or without it."""
-    given = np.column_stack([limits.low[3:6] / limits.high[2], limits.high[3:6] / limits.low[2]])
-    usual = np.array(SHAPES)
-    both = np.column_stack([np.maximum(given[:, 0], usual[:, 0]), np.minimum(given[:, 1], usual[:, 1])])
-    return np.where(both[:, :1] <= both[:, 1:], both, given)
+    """Least and greatest ratios of `_shapes`, shape (3, 2): what the bounds of the links leave of `SHAPES`, or without it."""
+    base, of, usual = (4, slice(2, 5), (*GUIDED, (1.0, 1.0))) if limits.sliding else (2, slice(3, 6), SHAPES)
+    given = np.column_stack([limits.low[of] / limits.high[base], limits.high[of] / limits.low[base]])
+    ranges = np.array(usual)
+    both = np.column_stack([np.maximum(given[:, 0], ranges[:, 0]), np.minimum(given[:, 1], ranges[:, 1])])
+    # an offset may be none
+    return np.maximum(np.where(both[:, :1] <= both[:, 1:], both, given), 1e-12)
+
+
+def _links(shapes: FloatArray, limits: Limits) -> FloatArray:
+    """Rows (l1, l2, l3, l4, l5) of shapes, l4 = 0 without a rocker, l5 = 0 without a second crank."""
+    one, none = np.ones(len(shapes)), np.zeros(len(shapes))
+    if limits.sliding:
+        offset = shapes[:, 0] if limits.high[2] > 0.0 else none
+        return np.column_stack([offset, shapes[:, 1], one, none, none])
+    low, high = np.log(SECOND)
+    second = none if limits.second is None else np.exp(low + (high - low) * shapes[:, 6])
+    return np.column_stack([one, shapes[:, :3], second])
 
 
 def _allowed(shapes: FloatArray, limits: Limits) -> NDArray[np.bool_]:
     """Whether shapes keep the transmission angle and the Grashof type, and can be within the bounds of their links."""
-    links = np.column_stack([np.ones(len(shapes)), shapes[:, :3]])
+    sized = _links(shapes, limits)
+    links = sized[:, :4]
     l1, l2, l3, l4 = links.T
     allowed = np.ones(len(shapes), dtype=bool)
     if limits.turn is not None:
-        for excess in transmission_excess(l3, l4, (l1 - l2) ** 2, (l1 + l2) ** 2, cos(max(limits.turn, TURNING))):
+        nearest, farthest = (l1 - l2) ** 2, (l1 + l2) ** 2
+        if limits.second is not None:
+            turned, phi = geared(limits.ratio), 2.0 * pi * np.arange(AROUND)[:, None] / AROUND
+            second = sized[:, 4] * np.exp(1j * (turned[1] * phi + _second(shapes, 0.0, limits)))
+            d2 = np.abs(l1 + second - l2 * np.exp(1j * turned[0] * phi)) ** 2
+            nearest, farthest = d2.min(axis=0), d2.max(axis=0)
+        rocker = None if limits.sliding else l4
+        for excess in transmission_excess(l3, rocker, nearest, farthest, cos(max(limits.turn, TURNING))):
             allowed &= excess <= 0.0
     if limits.grashof is not None:
         order = np.sort(links, axis=1)
@@ -136,30 +171,60 @@ def _allowed(shapes: FloatArray, limits: Limits) -> NDArray[np.bool_]:
         else:
             shortest = BY_SHORTEST.index(limits.grashof)
             allowed &= (excess < 0.0) & (links.argmin(axis=1) == shortest)
-    least, most = _sizes(links, limits)
+    least, most = _sizes(sized, limits)
     # links that are fixed leave one size but for rounding
     return allowed & (least <= most * (1.0 + 1e-9))
 
 
+def _second(shapes: FloatArray, phase: FloatArray | float, limits: Limits) -> FloatArray:
+    """Phase of the second crank, so that the curve does not depend on the first one's."""
+    turned: FloatArray = 2.0 * pi * shapes[:, 7] + limits.ratio * phase
+    return turned
+
+
 def _sizes(links: FloatArray, limits: Limits) -> tuple[FloatArray, FloatArray]:
-    """Least and greatest ground link with which every link keeps its bounds."""
-    return (limits.low[2:6] / links).max(axis=1), (limits.high[2:6] / links).min(axis=1)
+    """Least and greatest factors of links with which every one keeps its bounds."""
+    second = limits.second or (0.0, inf)
+    there = links > 0.0
+    low, high = (
+        np.append(ends[2:6], end) / np.where(there, links, 1.0) for ends, end in zip((limits.low, limits.high), second)
+    )
+    return np.where(there, low, 0.0).max(axis=1), np.where(there, high, inf).min(axis=1)
 
 
 def _placed(normal: Normal, limits: Limits, shapes: FloatArray, branch: int, random: np.random.Generator) -> Candidates:
     if normal.of_rocker:
-        return _functions(normal, limits, shapes, branch)
-    if normal.timed:
-        return _timed(normal, limits, shapes, branch, None)
-    if normal.angle is not None or normal.exact:
-        return _timed(normal, limits, shapes, branch, random)
-    return _paths(normal, limits, shapes, branch)
+        found = _functions(normal, limits, shapes, branch)
+    elif normal.of_slider:
+        found = _slides(normal, limits, shapes, branch)
+    elif normal.timed or normal.angle is not None or normal.exact:
+        found = _timed(normal, limits, shapes, branch, None if normal.timed else random)
+    else:
+        found = _paths(normal, limits, shapes, branch)
+    if limits.second is None:
+        return found
+    links = _links(shapes, limits)
+    second = links[:, 4] * found.q[:, 4] / links[:, 2]
+    return replace(found, pivot=np.column_stack([second, _second(shapes, found.q[:, 8], limits)]))
 
 
-def _directions(shapes: FloatArray, rotation: FloatArray, branch: int) -> tuple[ComplexArray, ComplexArray]:
+def _directions(
+    shapes: FloatArray,
+    phase: FloatArray,
+    rotation: FloatArray,
+    branch: int,
+    limits: Limits,
+    turned: FloatArray | float = 0.0,
+) -> tuple[ComplexArray, ComplexArray]:
+    """Directions of coupler and rocker of shapes at crank rotations, after those by which each shape has turned already."""
+    first, second = (1, 0) if limits.second is None else geared(limits.ratio)
+    links = _links(shapes, limits)
+    phases = [phase + first * turned, links[:, 4], _second(shapes, phase, limits) + second * turned]
+    rows = np.column_stack([links[:, :4], *phases])
     coupler = np.empty((len(shapes), len(rotation)), dtype=complex)
     rocker = np.empty_like(coupler)
-    many_directions(np.cos(rotation), np.sin(rotation), np.ascontiguousarray(shapes), float(branch), coupler, rocker)
+    waves = [wave(turns * rotation) for turns in (first, second) for wave in (np.cos, np.sin)]
+    many_directions(*waves, np.ascontiguousarray(rows), float(branch), coupler, rocker)
     return coupler, rocker
 
 
@@ -168,18 +233,43 @@ def _functions(normal: Normal, limits: Limits, shapes: FloatArray, branch: int) 
     assert normal.rotation is not None
     assert normal.angle is not None
     phase = 2.0 * pi * shapes[:, 3]
-    _, rocker = _directions(np.column_stack([shapes[:, :3], phase]), normal.rotation, branch)
+    _, rocker = _directions(shapes, phase, normal.rotation, branch, limits)
     left: ComplexArray = np.exp(1j * normal.angle) * rocker.conj()
     offset = np.zeros(len(shapes))
     if normal.mounting:
         offset = np.angle((normal.weights * left).sum(axis=1))
         left *= np.exp(-1j * offset)[:, None]
     quality = (normal.weights * np.angle(left) ** 2).sum(axis=1)
-    least, most = _sizes(np.column_stack([np.ones(len(shapes)), shapes[:, :3]]), limits)
+    links = _links(shapes, limits)
+    least, most = _sizes(links, limits)
     size = np.sqrt(np.maximum(least, 1e-12) * most)
     q = np.zeros((len(shapes), 11))
-    q[:, 2:6] = size[:, None] * np.column_stack([np.ones(len(shapes)), shapes[:, :3]])
+    q[:, 2:6] = size[:, None] * links[:, :4]
     q[:, 8], q[:, 10] = phase, offset
+    return Candidates(quality=np.nan_to_num(quality, nan=inf), q=q, rotation=None, branch=branch)
+
+
+def _slides(normal: Normal, limits: Limits, shapes: FloatArray, branch: int) -> Candidates:
+    """Slider functions: shape and phase are searched; the size, and where the shaft is, above the guide or below, follow."""
+    assert normal.rotation is not None
+    assert normal.points is not None
+    phase = 2.0 * pi * shapes[:, 3]
+    links, w, x = _links(shapes, limits), normal.weights, normal.points.real
+    coupler, _ = _directions(shapes, phase, normal.rotation, branch, limits)
+    travelled = links[:, 1:2] * np.sin(phase[:, None] + normal.rotation) + coupler.imag
+    mean, wanted = travelled @ w / w.sum(), float(x @ w / w.sum())
+    off = travelled - mean[:, None]
+    factor = off @ (w * (x - wanted)) / (off**2 @ w)
+    least, most = _sizes(links, limits)
+    size = np.clip(np.abs(factor), least, most)
+    # seen from the shaft the slider's position grows to the left
+    side = -np.sign(factor)
+    quality = (x - wanted + (side * size)[:, None] * off) ** 2 @ w
+    q = np.zeros((len(shapes), 11))
+    q[:, 0] = wanted + side * size * mean
+    q[:, 1] = -normal.origin.imag / normal.unit - side * size * links[:, 0]
+    q[:, 2:6] = size[:, None] * links[:, :4]
+    q[:, 6], q[:, 7], q[:, 8] = size * links[:, 2], 0.5 * pi * side, phase
     return Candidates(quality=np.nan_to_num(quality, nan=inf), q=q, rotation=None, branch=branch)
 
 
@@ -188,27 +278,26 @@ def _timed(
 ) -> Candidates:
     """Timed paths and motions by variable projection; without given rotations, over random ones in order."""
     phase = 2.0 * pi * shapes[:, 3]
-    links = np.column_stack([np.ones(len(shapes)), shapes[:, :3]])
+    links = _links(shapes, limits)
     n = normal.n
     if random is None:
         assert normal.rotation is not None
         rotation = np.broadcast_to(normal.rotation, (len(shapes), n))
-        coupler, _ = _directions(np.column_stack([shapes[:, :3], phase]), normal.rotation, branch)
+        coupler, _ = _directions(shapes, phase, normal.rotation, branch, limits)
     else:
         gaps = random.dirichlet(np.ones(n + 1), len(shapes))[:, :n]
         rotation = 2.0 * pi * np.cumsum(gaps, axis=1) * random.choice([1.0, -1.0], (len(shapes), 1))
         coupler = np.empty((len(shapes), n), dtype=complex)
         for k in range(n):
-            turned = np.column_stack([shapes[:, :3], phase + rotation[:, k]])
-            coupler[:, k] = _directions(turned, np.zeros(1), branch)[0][:, 0]
+            coupler[:, k] = _directions(shapes, phase, np.zeros(1), branch, limits, rotation[:, k])[0][:, 0]
     assert normal.points is not None
-    crank = np.exp(1j * (phase[:, None] + rotation))
+    crank = np.exp(1j * (phase[:, None] + limits.turns * rotation))
     basis = np.stack([np.ones_like(crank), crank, coupler], axis=1)
     w, p = normal.weights, normal.points
     z = _projected(basis, p, w)
     # the size that the links' bounds allow; the rest follows once more
     least, most = _sizes(links, limits)
-    size = np.abs(z[:, 1]) / shapes[:, 0]
+    size = np.abs(z[:, 1]) / links[:, 1]
     bounded = np.clip(size, np.maximum(least, 1e-9), most)
     outside = bounded != size
     if outside.any():
@@ -228,7 +317,7 @@ def _timed(
         [
             z[:, 0].real,
             z[:, 0].imag,
-            bounded[:, None] * links,
+            bounded[:, None] * links[:, :4],
             np.abs(z[:, 2]),
             turn,
             phase,
@@ -255,14 +344,14 @@ def _projected(basis: ComplexArray, p: ComplexArray, w: FloatArray) -> ComplexAr
 
 def _paths(normal: Normal, limits: Limits, shapes: FloatArray, branch: int) -> Candidates:
     """Untimed paths: coupler curves laid over the target by a similarity."""
-    links = np.column_stack([np.ones(len(shapes)), shapes[:, :3]])
+    links = _links(shapes, limits)
     rotation = np.linspace(0.0, 2.0 * pi, CURVE, endpoint=False)
-    coupler, _ = _directions(np.column_stack([shapes[:, :3], np.zeros(len(shapes))]), rotation, branch)
+    coupler, _ = _directions(shapes, np.zeros(len(shapes)), rotation, branch, limits)
     # the coupler point anywhere about the coupler, evenly in the logarithm of its distance
     longest = links.max(axis=1)
     distance = longest * np.exp(np.log(0.1) + np.log(30.0) * shapes[:, 4])
     point = distance * np.exp(2j * pi * shapes[:, 5])
-    curves = shapes[:, :1] * np.exp(1j * rotation) + point[:, None] * coupler
+    curves = links[:, 1:2] * np.exp(1j * limits.turns * rotation) + point[:, None] * coupler
     return (_closed_paths if normal.closed else _open_paths)(normal, limits, links, curves, point, branch)
 
 
@@ -372,7 +461,16 @@ def _vectors(
 ) -> FloatArray:
     turn = np.angle(scale)
     zero = np.zeros(len(links))
-    columns = [place.real, place.imag, size[:, None] * links, size * np.abs(point), turn, zero, np.angle(point), zero]
+    columns = [
+        place.real,
+        place.imag,
+        size[:, None] * links[:, :4],
+        size * np.abs(point),
+        turn,
+        zero,
+        np.angle(point),
+        zero,
+    ]
     return np.column_stack(columns)
 
 
@@ -394,7 +492,7 @@ def _even(curves: ComplexArray, k: int) -> tuple[ComplexArray, FloatArray]:
     return points, 2.0 * pi * (index + share) / n
 
 
-def _apart(found: list[Candidates], starts: int) -> list[Start]:
+def _apart(found: list[Candidates], starts: int, limits: Limits) -> list[Start]:
     """The best candidates of all, none within `APART` of a better one."""
     best = [
         Start(
@@ -402,6 +500,7 @@ def _apart(found: list[Candidates], starts: int) -> list[Start]:
             branch=c.branch,
             quality=float(c.quality[i]),
             rotation=None if c.rotation is None else c.rotation[i],
+            pivot=np.empty(0) if c.pivot is None else c.pivot[i],
         )
         for c in found
         for i in np.argsort(c.quality)[: 20 * starts]
@@ -410,6 +509,13 @@ def _apart(found: list[Candidates], starts: int) -> list[Start]:
 
     def mark(start: Start) -> FloatArray:
         begin = start.q[8] if start.rotation is None else start.rotation[0]
-        return np.array([*np.log(start.q[3:6] / start.q[2]), cos(begin), sin(begin), 5.0 * start.branch])
+        # shares of the ground link, or of the coupler
+        links = (
+            [start.q[3] / start.q[4], 1.0 + start.q[2] / start.q[4]] if limits.sliding else start.q[3:6] / start.q[2]
+        )
+        second = (
+            [log(start.pivot[0] / start.q[2]), cos(start.pivot[1]), sin(start.pivot[1])] if len(start.pivot) else []
+        )
+        return np.array([*np.log(links), cos(begin), sin(begin), 5.0 * start.branch, *second])
 
     return apart(sorted(best, key=lambda start: start.quality), mark, APART, starts)

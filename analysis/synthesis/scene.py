@@ -108,13 +108,16 @@ class LinkageScene:
 
     @cached_property
     def guide(self) -> FloatArray | None:
-        """Ends of the travel of the slider that carries D, shape (2, 2); None without a slider."""
+        """Ends of the travel of the slider that carries D, or C of a slider-crank, shape (2, 2); None without a slider."""
         linkage, pivot = self.linkage, self.linkage.pivot
-        if not isinstance(pivot, SliderMotion):
+        if linkage.slides:
+            u, direction = linkage.slider_position(self.turn), 1j
+        elif isinstance(pivot, SliderMotion):
+            u, direction = pivot.series(self.turn), np.exp(1j * pivot.guide_angle)
+        else:
             return None
-        u = pivot.series(self.turn)
         ends = complex(linkage.pivot_x, linkage.pivot_y) + np.exp(1j * linkage.ground_angle) * (
-            linkage.ground_length + np.array([u.min(), u.max()]) * np.exp(1j * pivot.guide_angle)
+            linkage.ground_length + np.array([np.nanmin(u), np.nanmax(u)]) * direction
         )
         return np.column_stack([ends.real, ends.imag])
 
@@ -123,6 +126,12 @@ class LinkageScene:
         """Whether D is on a second crank about E."""
         return isinstance(self.linkage.pivot, SecondCrank)
 
+    @property
+    def lettered(self) -> str:
+        """Pins that are drawn with their letters: E only of a second crank, D and P not where they are C."""
+        own = ("" if self.linkage.slides else "D") + ("E" if self.second_crank else "")
+        return "ABC" + own + ("" if self.linkage.slider_is_point else "P")
+
     @cached_property
     def transmission(self) -> FloatArray:
         """Crank rotation over a turn and the angle between coupler and rocker, NaN where they are not joined, (2, n)."""
@@ -130,8 +139,13 @@ class LinkageScene:
 
     @property
     def motion(self) -> tuple[str, FloatArray] | None:
-        """How the rocker pivot moves over a turn: ``slider position [m]`` or ``second crank [rad]``; None if it is fixed."""
+        """How the rocker pivot moves over a turn: ``slider position [m]`` or ``second crank [rad]``; None if it is fixed.
+
+        Of a slider-crank the slider's position.
+        """
         pivot = self.linkage.pivot
+        if self.linkage.slides:
+            return "slider position [m]", self.linkage.slider_position(self.turn)
         if isinstance(pivot, SliderMotion):
             return "slider position [m]", pivot.series(self.turn)
         return None if pivot is None else ("second crank [rad]", pivot.angle(self.turn))

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from linkwork.errors import InputError
 
 from .kernels import PLACES
-from .linkage import ANGLES, LENGTHS, LINKS, Linkage, SecondCrank, SliderMotion, wrapped
+from .linkage import ABSENT, ANGLES, LENGTHS, LINKS, Linkage, SecondCrank, SliderMotion, wrapped
 from .solution import CURVE, Solution, evaluate, nearest_rotations, path_rate
 from .tasks import Normal, RockerFunction, UntimedPath, normal_form
 
@@ -75,7 +75,7 @@ class Rounding:
 
 def length_step(linkage: Linkage) -> float:
     """Step to which lengths are rounded (m): 0.1 mm; of a linkage with a link below 1 mm a power of ten below a tenth of it."""
-    least = min(getattr(linkage, name) for name in LINKS)
+    least = min(getattr(linkage, name) for name in LINKS if _is_link(linkage, name))
     return min(LENGTH_STEP, float(10.0 ** np.floor(log10(0.1 * least) + 1e-9)))
 
 
@@ -108,6 +108,9 @@ def _residuals(linkage: Linkage, normal: Normal, at: FloatArray, across: bool) -
         both = jacobian[:, 0] + 1j * jacobian[:, 1]
         still = [np.zeros(len(at), dtype=complex)] if angular else []
         whole = np.vstack([both[: len(PLACES)], *still, *[bx * both[10] + by * both[11] for bx, by in columns]]).T
+        if linkage.slider_is_point:
+            # the pin and the point are one
+            whole[:, PLACES.index("coupler_length")] += whole[:, PLACES.index("point_distance")]
         if across:
             rate = path_rate(linkage, at, both)
             normals = 1j * rate / np.abs(rate)
@@ -145,7 +148,11 @@ def sensitivities(solution: Solution) -> tuple[Sensitivity, ...]:
     shifts = np.sqrt((jacobian**2).sum(axis=0) / stations)
     values = _values(solution.linkage)
     # a rocker's angle has nothing to do with where the linkage stands, nor with its coupler point
-    idle = set(PLACES) - {*LINKS, "crank_phase"} if isinstance(solution.task, RockerFunction) else set()
+    idle = (
+        set(PLACES) - {*LINKS, "crank_phase"}
+        if isinstance(solution.task, RockerFunction)
+        else _absent(solution.linkage)
+    )
     return tuple(
         Sensitivity(name=name, value=float(values[name]), slope=float(slope), shift=float(shift))
         for name, slope, shift in zip(names, slopes, shifts)
@@ -176,7 +183,7 @@ def rounded(solution: Solution, length: float | None = None, angle: float = ANGL
     for name, value in _made(linkage).items():
         whole = round(value / steps[name])
         # a link is not rounded away
-        rounded_to = _with(rounded_to, name, steps[name] * (max(whole, 1) if name in (*LINKS, SECOND) else whole))
+        rounded_to = _with(rounded_to, name, steps[name] * (max(whole, 1) if _is_link(linkage, name) else whole))
     error = evaluate(solution.task, rounded_to, solution.evaluation.rotation).error
     return Rounding(linkage=rounded_to, error=error, expected=_expected(solution, steps))
 
@@ -213,7 +220,7 @@ def _expected(solution: Solution, steps: Mapping[str, float]) -> float:
             continue
         small = DIFFERENCE * (1.0 if name in (*ANGLES, *PIVOT_ANGLES) else linkage.largest_link)
         value = _made(linkage)[name]
-        if name in (*LINKS, SECOND):
+        if _is_link(linkage, name):
             small = min(small, 0.1 * value)
         ahead, behind = (residuals(_with(linkage, name, value + side * small))[0][:, k] for side in (1.0, -1.0))
         shift += 0.5 * variance * (ahead - behind) / (2.0 * small)
@@ -244,14 +251,28 @@ def costs(solution: Solution, length: float, angle: float) -> dict[str, float]:
     grown: dict[str, float] = {}
     for names, step in ((LENGTHS, length), (ANGLES, angle)):
         for name in names:
+            if name in _absent(solution.linkage):
+                continue
             value = getattr(solution.linkage, name)
             # a link cannot be shorter than nothing
-            ends = [value + side * step for side in (-1.0, 1.0) if name not in LINKS or value + side * step > 0.0]
+            link = _is_link(solution.linkage, name)
+            ends = [value + side * step for side in (-1.0, 1.0) if not link or value + side * step > 0.0]
             grown[name] = max(
-                evaluate(solution.task, replace(solution.linkage, **{name: end}), solution.evaluation.rotation).error
+                evaluate(solution.task, _with(solution.linkage, name, end), solution.evaluation.rotation).error
                 for end in ends
             )
     return {name: error - solution.error for name, error in grown.items()}
+
+
+def _is_link(linkage: Linkage, name: str) -> bool:
+    """Whether a dimension is a length above zero; an offset may be none."""
+    return name in (*LINKS, SECOND) and not (linkage.slides and name in ABSENT)
+
+
+def _absent(linkage: Linkage) -> set[str]:
+    """Dimensions that a slider-crank does not have: a rocker, and where the slider is the coupler point, another point."""
+    point = {"point_distance", "point_angle"} if linkage.slider_is_point else set()
+    return {"rocker_length", *point} if linkage.slides else set()
 
 
 def _mean_absolute(mean: FloatArray, spread: FloatArray) -> FloatArray:
@@ -298,13 +319,16 @@ def _values(linkage: Linkage) -> dict[str, float]:
 def _made(linkage: Linkage) -> dict[str, float]:
     """Dimensions that are made, and so are off by something: a commanded motion is not among them."""
     values = _values(linkage)
-    return {name: values[name] for name in (*LENGTHS, *ANGLES, SECOND, *PIVOT_ANGLES) if name in values}
+    made = (*LENGTHS, *ANGLES, SECOND, *PIVOT_ANGLES)
+    return {name: values[name] for name in made if name in values and name not in _absent(linkage)}
 
 
 def _with(linkage: Linkage, name: str, value: float) -> Linkage:
     """The linkage with another value of one of the dimensions that are made."""
     if name in (*LENGTHS, *ANGLES):
-        changed: Mapping[str, Any] = {name: value}
+        changed: dict[str, Any] = {name: value}
+        if name == "coupler_length" and linkage.slider_is_point:
+            changed["point_distance"] = value
         return replace(linkage, **changed)
     assert linkage.pivot is not None
     own: Mapping[str, Any] = {{SECOND: "length", "second_crank_phase": "phase"}.get(name, name): value}

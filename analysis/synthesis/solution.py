@@ -18,7 +18,7 @@ from ..files import write_csv
 from ..notebook import Shown
 from .areas import area_between, distance_to, hausdorff, straightness
 from .kernels import PLACES
-from .linkage import Linkage, SecondCrank, wrapped
+from .linkage import Linkage, SecondCrank, format_ratio, wrapped
 from .targets import halves
 from .tasks import PrecisionPoints, RockerFunction, Task, TimedPath, UntimedPath, normal_form
 
@@ -163,7 +163,7 @@ class Verdicts:
     Attributes
     ----------
     grashof : str
-        Type of the four-bar, see `Linkage.grashof`; where the rocker pivot moves, which has none, what moves it.
+        Type of the four-bar, or slider-crank, see `Linkage.grashof`; where the rocker pivot moves, what moves it.
     full_turn : bool
         The crank can turn fully.
     circuit : bool
@@ -215,13 +215,7 @@ def judge(linkage: Linkage, rotation: FloatArray, *, closed: bool) -> Verdicts:
         first = np.ceil((begin + linkage.crank_phase) / pi)
         last = np.floor((end + linkage.crank_phase) / pi)
         way = np.concatenate([way, np.arange(first, last + 1) * pi - linkage.crank_phase])
-    dx, dy = linkage.displacement(way)
-    th2 = way + linkage.crank_phase
-    d = np.hypot(
-        linkage.ground_length + dx - linkage.crank_length * np.cos(th2), dy - linkage.crank_length * np.sin(th2)
-    )
-    l3, l4 = linkage.coupler_length, linkage.rocker_length
-    cosine = (l3 * l3 + l4 * l4 - d * d) / (2.0 * l3 * l4)
+    cosine = linkage.cosine_at_c(linkage.reach(way))
     joined = bool((np.abs(cosine) <= 1.0).all())
     angle = np.arccos(np.clip(cosine, -1.0, 1.0))
     return Verdicts(
@@ -239,7 +233,9 @@ def _kind(linkage: Linkage) -> str:
     """Grashof's type, or what moves the pivot: the four lengths then say nothing of who can turn."""
     if linkage.pivot is None:
         return linkage.grashof
-    return "five-bar" if isinstance(linkage.pivot, SecondCrank) else "four-bar with a moved pivot"
+    if not isinstance(linkage.pivot, SecondCrank):
+        return "four-bar with a moved pivot"
+    return "five-bar" if linkage.pivot.series.order else f"five-bar, gears {format_ratio(linkage.pivot.ratio)}"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -414,7 +410,7 @@ def path_rate(linkage: Linkage, at: FloatArray, both: NDArray[np.complex128]) ->
     step = 1e-6
     ahead, behind = linkage.displacement(at + step), linkage.displacement(at - step)
     vx, vy = ((a - b) / (2.0 * step) for a, b in zip(ahead, behind))
-    rate: NDArray[np.complex128] = both[PLACES.index("crank_phase")] + vx * both[10] + vy * both[11]
+    rate: NDArray[np.complex128] = linkage.turns * both[PLACES.index("crank_phase")] + vx * both[10] + vy * both[11]
     return rate
 
 

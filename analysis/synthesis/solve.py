@@ -27,8 +27,10 @@ from .constraints import (
     Limits,
     limits_of,
 )
+from .kinds import GEARS, Kind, Stroke, as_asked, is_of, kind_of, limits_of_kinds, second_crank, usual_kinds
 from .linkage import ANGLES, UNITS, Linkage
 from .polish import Polished, distinct, polish
+from .quick_return import QuickReturn, quick_returns
 from .scan import scan
 from .search import QUICK_SEARCH, USUAL_SEARCH, Search
 from .solution import Solution, nearest_rotations, ranked
@@ -101,25 +103,27 @@ class SynthesisInterrupted(Interrupted):
 def synthesize(
     task: Task,
     bounds: Mapping[str, tuple[Amount, Amount]] | None = None,
-    constraints: Sequence[Constraint] = USUAL,
+    constraints: Sequence[Constraint | Stroke] = USUAL,
     weights: ArrayLike | None = None,
     *,
     pivot: PivotUnknown | None = None,
     guesses: Sequence[Solution] = (),
     search: Search = USUAL_SEARCH,
+    kinds: Sequence[Kind] | None = None,
+    gears: Sequence[float] = GEARS,
 ) -> Synthesis:
     """Find linkages that do a task.
 
-    A scan over many thousand four-bars, each placed in closed form, gives the starts; each is polished to an optimum with exact
-    derivatives. What cannot be done exactly is answered with the best there is, its error stated.
+    A scan over many thousand linkages of each kind, each placed in closed form, gives the starts; each is polished to an
+    optimum with exact derivatives. What cannot be done exactly is answered with the best there is, its error stated.
 
     Parameters
     ----------
-    task : TimedPath, UntimedPath, RockerFunction, Motion or PrecisionPoints
+    task : TimedPath, UntimedPath, RockerFunction, SliderFunction, QuickReturn, Motion or PrecisionPoints
     bounds : mapping, optional
-        (least, greatest) of dimensions by their name in `Linkage` (m, rad, or text such as "5 cm"); equal ones fix a
-        dimension. Without, links up to five times the target's size; of a rocker function, a ground link of 0.1 m and the
-        others up to five times that.
+        (least, greatest) of dimensions by their name in `Linkage` (m, rad, or text such as "5 cm"), or of a five-bar's
+        ``second_crank_length``; equal ones fix a dimension, kinds that do not have it leave it out. Without, links up to five
+        times the target's size; of a rocker function, a ground link of 0.1 m and the others up to five times that.
     constraints : sequence
         See `analysis.synthesis.constraints`; by default a transmission angle of at least 40 degrees over a full turn.
     weights : array_like, optional
@@ -130,11 +134,16 @@ def synthesize(
         Searched from as well.
     search : Search
         Method, starts, seed, cores.
+    kinds : sequence of "four-bar", "slider-crank", "geared-five-bar", optional
+        Mechanisms that are tried, all ranked together, the best of each among the solutions; by default four-bars, for a
+        function of a slider slider-cranks.
+    gears : sequence of float
+        Ratios of the gears of five-bars: turns of the second crank for one of the first.
 
     Raises
     ------
     InputError
-        If the task, the weights or a number here is not usable.
+        If the task, the weights or a number here is not usable, or one of the kinds cannot do the task or keep a constraint.
     InfeasibleError
         If no linkage keeps all bounds and constraints; it names the one that the nearest linkage violates most.
     SynthesisInterrupted
@@ -155,27 +164,80 @@ def synthesize(
         raise InputError(f"{search.starts} starts: there must be at least one")
     begun = perf_counter()
     task = reweighted(task, weights)
+    kinds = usual_kinds(task) if kinds is None else kinds
+    if isinstance(task, QuickReturn):
+        return _in_closed_form(task, bounds, constraints, kinds, search, begun)
     normal = fitted_form(task, pivot)
-    limits = limits_of(task, normal, bounds, constraints)
-    if search.method == "scan":
-        begin = [_start(guess, normal, pivot) for guess in guesses]
-        total = len(begin) + search.starts
-        random = np.random.default_rng(search.seed)
+    every = limits_of_kinds(task, normal, bounds, constraints, kinds, gears)
+    if tuple(kinds) != ("four-bar",) and (pivot is not None or search.method != "scan"):
+        raise InputError("a moved pivot, and methods for comparison, are of four-bars alone: leave the other kinds out")
+    for number, guess in enumerate(guesses):
+        if not any(is_of(guess.linkage, limits) for limits in every):
+            raise InputError(
+                f"guess {number} is a {guess.verdicts.grashof}: it must be of the kinds that are asked for"
+            )
+    found: list[tuple[Solution, ...]] = []
+    done, refused, total = Polished.of((), (), False), None, 0
+    for limits in every:
+        own = pivot or second_crank(limits, normal.unit)
+        given = [guess for guess in guesses if is_of(guess.linkage, limits)]
+        # the ratios of gears share the starts of a kind
+        share = 1 if limits.second is None else len(gears)
+        how = replace(search, starts=-(-search.starts // share))
+        total += len(given) + how.starts
         try:
-            scanned = scan(normal, limits, seed=search.seed, candidates=search.candidates, starts=search.starts)
+            part = _searched(normal, limits, given, own, how)
+        except InfeasibleError as error:
+            refused = refused or error
+            continue
         except KeyboardInterrupt:
-            raise SynthesisInterrupted(None, 0, total) from None
-        for start in scanned:
-            motion = start.pivot if pivot is None else random_pivot(pivot, start.q[2], normal.unit, random)
-            begin.append(replace(start, pivot=motion))
-        done, total = polish(normal, limits, begin, pivot=pivot, search=search), len(begin)
-    else:
+            done = replace(done, interrupted=True)
+            break
+        done = done.joined(part)
+        found.append(solutions_of(task, normal, limits, part, own, search.solutions))
+        if done.interrupted:
+            break
+    if refused is not None and not found:
+        raise refused
+    return _result(task, _together(found, search.solutions), done, total, search, begun)
+
+
+def _in_closed_form(
+    task: QuickReturn, bounds: Any, constraints: Sequence[Any], kinds: Sequence[Kind], search: Search, begun: float
+) -> Synthesis:
+    if tuple(kinds) != ("slider-crank",):
+        raise InputError("a QuickReturn is of the slider of a slider-crank: kinds must be ('slider-crank',)")
+    found = quick_returns(task, bounds, constraints)[: search.solutions]
+    seconds = perf_counter() - begun
+    return Synthesis(
+        task=task, solutions=found, method="closed form", seed=search.seed, starts=len(found), seconds=seconds
+    )
+
+
+def _searched(
+    normal: Normal, limits: Limits, guesses: Sequence[Solution], pivot: PivotUnknown | None, search: Search
+) -> Polished:
+    """What came of the starts of a scan, and of guesses, of one kind of linkage."""
+    if search.method != "scan":
         if pivot is not None:
             raise InputError(f"method {search.method!r} searches linkages with a fixed pivot: use 'scan'")
         black_box = by_differential_evolution if search.method == "differential-evolution" else by_simplex
-        done, total = black_box(normal, limits, search), search.starts
-    found = solutions_of(task, normal, limits, done, pivot, search.solutions)
-    return _result(task, found, done, total, search, begun)
+        return black_box(normal, limits, search)
+    begin = [_start(guess, normal, pivot) for guess in guesses]
+    random = np.random.default_rng(search.seed)
+    scanned = scan(normal, limits, seed=search.seed, candidates=search.candidates, starts=search.starts)
+    if pivot is not None and limits.second is None:
+        scanned = [replace(s, pivot=random_pivot(pivot, s.q[2], normal.unit, random)) for s in scanned]
+    begin += scanned
+    return polish(normal, limits, begin, pivot=pivot, search=search)
+
+
+def _together(found: Sequence[Sequence[Solution]], count: int) -> tuple[Solution, ...]:
+    """The first of all solutions, at most so many, with the best of each kind among them."""
+    every = ranked([s for part in found for s in part])
+    first = {kind_of(s.linkage): s for s in reversed(every)}.values()
+    rest = [s for s in every if not any(s is best for best in first)]
+    return ranked([*ranked(list(first))[:count], *rest[: max(0, count - len(first))]])
 
 
 @in_si(bounds=UNITS)
@@ -280,7 +342,11 @@ def solutions_of(
 
     def made(answers: Sequence[Answer]) -> tuple[Solution, ...]:
         found = (
-            Solution.of(task, linkage_of(a.start, normal, pivot, limits), _stations(task, normal, a.start.rotation))
+            Solution.of(
+                task,
+                as_asked(task, linkage_of(a.start, normal, pivot, limits)),
+                _stations(task, normal, a.start.rotation),
+            )
             for a in answers
         )
         return ranked([s for s in found if isfinite(s.error)])
@@ -394,11 +460,13 @@ def trade_off(
     over: Literal["size", "transmission"],
     limits: ArrayLike,
     bounds: Mapping[str, tuple[float, float]] | None = None,
-    constraints: Sequence[Constraint] = USUAL,
+    constraints: Sequence[Constraint | Stroke] = USUAL,
     weights: ArrayLike | None = None,
     *,
     pivot: PivotUnknown | None = None,
     search: Search = QUICK_SEARCH,
+    kinds: Sequence[Kind] | None = None,
+    gears: Sequence[float] = GEARS,
 ) -> TradeOff:
     """Error against size or transmission angle, by the epsilon-constraint method with warm starts.
 
@@ -412,7 +480,7 @@ def trade_off(
     over : "size" or "transmission"
     limits : array_like, shape (n,)
         Largest links (m), or least transmission angles (rad).
-    bounds, constraints, weights, pivot
+    bounds, constraints, weights, pivot, kinds, gears
         As for `synthesize`; the limit takes the place of a constraint of its own kind.
     search : Search
         As for `synthesize`, but for the candidates, at most 16384, and the solutions.
@@ -437,7 +505,8 @@ def trade_off(
     def best(k: int, guesses: Sequence[Solution], back: bool) -> tuple[Solution, ...]:
         limit: Constraint = LargestLink(length=values[k]) if over == "size" else LeastTransmission(angle=values[k])
         how = replace(first, starts=1, candidates=1 << 8) if back else first
-        return synthesize(task, bounds, (*rest, limit), weights, pivot=pivot, guesses=guesses, search=how).solutions
+        which: dict[str, Any] = {"pivot": pivot, "kinds": kinds, "gears": gears}
+        return synthesize(task, bounds, (*rest, limit), weights, guesses=guesses, search=how, **which).solutions
 
     found, done = there_and_back(order.tolist(), best)
     result = TradeOff(over=over, limit=values, solutions=tuple(found.get(k) for k in range(len(values))))

@@ -15,7 +15,7 @@ from linkwork.errors import ParameterError
 from ..numerics.fourier import FourierSeries
 from ..units import Amount, in_si
 from .constraints import UNKNOWNS, Limits
-from .linkage import Linkage, SecondCrank, SliderMotion, wrapped
+from .linkage import Linkage, SecondCrank, SliderMotion, geared, wrapped
 from .tasks import Normal
 
 FloatArray = NDArray[np.float64]
@@ -81,8 +81,8 @@ class CrankUnknown:
 
     Attributes
     ----------
-    ratio : int
-        Turns for one of the first crank.
+    ratio : float
+        Turns for one of the first crank: see `SecondCrank`.
     length : (float, float)
         Bounds (m).
     harmonics : int
@@ -91,7 +91,7 @@ class CrankUnknown:
         Greatest deviation of d psi/d phi from the ratio.
     """
 
-    ratio: int
+    ratio: float
     length: tuple[Amount, Amount]
     harmonics: int = 0
     speed: float = inf
@@ -100,10 +100,9 @@ class CrankUnknown:
         low, high = self.length
         if not (isfinite(low) and isfinite(high) and 0.0 < low <= high):
             raise ParameterError("bounds of the second crank", self.length, "be two lengths above zero, in order (m)")
-        if self.harmonics < 0 or self.ratio != int(self.ratio):
-            raise ParameterError(
-                "second crank", (self.ratio, self.harmonics), "have whole numbers of turns and harmonics"
-            )
+        geared(self.ratio)
+        if self.harmonics < 0:
+            raise ParameterError("harmonics", self.harmonics, "be zero or greater")
 
 
 PivotUnknown = SliderUnknown | CrankUnknown

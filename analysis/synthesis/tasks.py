@@ -148,6 +148,33 @@ class TimedPath:
         _set(self, points=points, rotation=_rotation(self.rotation, n), weights=_weights(self.weights, n))
 
 
+@in_si(position="m", rotation="rad")
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class SliderFunction(TimedPath):
+    """The slider of a slider-crank is to be at given positions at given crank rotations.
+
+    It is a path of the slider's pin C along the x axis: its points follow from the positions, and where the crank shaft lies is
+    found.
+
+    Attributes
+    ----------
+    position : ndarray, shape (n,)
+        x of the slider (m).
+    rotation, weights, objective
+        As of `TimedPath`.
+    """
+
+    position: ArrayLike
+    points: ArrayLike = field(init=False)
+
+    def __post_init__(self) -> None:
+        position = np.array(self.position, dtype=float)
+        if position.ndim != 1:
+            raise InputError(f"target positions have the shape {position.shape}: they must be a list")
+        _set(self, position=position, points=np.column_stack([position, np.zeros(len(position))]))
+        TimedPath.__post_init__(self)
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Straight:
     """A part of an untimed path that must be straight, and quick.
@@ -374,6 +401,8 @@ class Normal:
         Target of the coupler's or the rocker's angle (rad).
     of_rocker : bool
         Whether the angle is the rocker's, from the ground link, or the coupler's, in the plane.
+    of_slider : bool
+        Whether the points are of the slider of a slider-crank.
     mounting : bool
         Whether the output angle is free.
     leverage : float
@@ -403,6 +432,7 @@ class Normal:
     points: NDArray[np.complex128] | None
     angle: FloatArray | None
     of_rocker: bool = False
+    of_slider: bool = False
     mounting: bool = False
     leverage: float = 1.0
     weights: FloatArray
@@ -497,6 +527,7 @@ def normal_form(task: Task) -> Normal:
         weights=np.ones(len(points)) if isinstance(task, PrecisionPoints) else np.asarray(task.weights),
         rotation=None if task.rotation is None else np.asarray(task.rotation),
         exact=isinstance(task, PrecisionPoints),
+        of_slider=isinstance(task, SliderFunction),
         quality=quality,
     )
 

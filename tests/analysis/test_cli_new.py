@@ -20,7 +20,10 @@ from linkwork.errors import LinkworkError
 QUICK = ("--set", "search.candidates=2048", "--set", "search.starts=3", "--no-plots")
 SLIDER = "slider-motion"
 #: What is said of entries that are right by themselves, but exclude or need one another.
-TOGETHER = r"must (have only one of|not come together|come with|be given with)|parameter drive.speed is missing"
+TOGETHER = (
+    r"must (have only one of|not come together|come with|be given with)|parameter drive.speed is missing"
+    r"|a (four-bar|slider-crank) cannot keep (Stroke|Grashof)|kinds must be"
+)
 
 
 def load(kind, path):

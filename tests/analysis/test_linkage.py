@@ -410,7 +410,10 @@ class TestMovedPivots:
             ({"length": -0.1}, "second_crank_length is -0.1"),
             ({"length": 0.0}, "second_crank_length is 0.0"),
             ({"length": np.inf}, "second_crank_length is inf"),
-            ({"length": 0.1, "ratio": 1.5}, "ratio of the second crank is 1.5: it must be a whole number"),
+            (
+                {"length": 0.1, "ratio": 1.51},
+                "ratio of the second crank is 1.51: it must be a ratio of whole numbers up to 6",
+            ),
             ({"length": 0.1, "ratio": np.nan}, "ratio of the second crank is nan"),
             ({"length": 0.1, "phase": np.nan}, "second_crank_phase is nan"),
         ],
@@ -424,7 +427,7 @@ class TestMovedPivots:
         linkage = four_bar(1.0, 0.5, 0.73, 0.73)
         assert linkage.grashof == "triple-rocker"
         follows = SliderMotion(FourierSeries(np.array([0.0, 0.3]), np.zeros(2)))
-        for pivot, words in ((follows, "four-bar with a moved pivot"), (SecondCrank(0.3), "five-bar")):
+        for pivot, words in ((follows, "four-bar with a moved pivot"), (SecondCrank(0.3), "five-bar, gears 1")):
             verdicts = judge(replace(linkage, pivot=pivot), np.array([0.0, 2.0 * pi]), closed=True)
             assert verdicts.full_turn
             assert str(verdicts).startswith(f"{words}, full turn")

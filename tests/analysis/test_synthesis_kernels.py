@@ -145,16 +145,15 @@ def test_many_linkages_at_once_are_one_after_the_other() -> None:
     drawings = [drawn(random) for _ in range(5)]
     phi = np.linspace(0.0, 6.0, 11)
     for branch in (1.0, -1.0):
-        shapes = np.array(
-            [[x.crank_length, x.coupler_length, x.rocker_length, x.ground_length * x.crank_phase] for x in drawings]
-        ) / np.array([[x.ground_length] for x in drawings])
+        shapes = np.array([[*x.vector[2:6], x.crank_phase, 0.03, 0.4] for x in drawings])
         coupler = np.empty((5, 11), dtype=complex)
         rocker = np.empty((5, 11), dtype=complex)
-        many_directions(np.cos(phi), np.sin(phi), shapes, branch, coupler, rocker)
+        waves = np.cos(phi), np.sin(phi), np.cos(2.0 * phi), np.sin(2.0 * phi)
+        many_directions(*waves, shapes, branch, coupler, rocker)
         for row, linkage in enumerate(drawings):
             g = np.empty((6, 11))
-            zero = np.zeros(11)
-            link_directions(np.cos(phi), np.sin(phi), zero, zero, linkage.vector, branch, g)
+            second = 0.03 * np.exp(1j * (2.0 * phi + 0.4))
+            link_directions(*waves[:2], second.real.copy(), second.imag.copy(), linkage.vector, branch, g)
             np.testing.assert_allclose(coupler[row], g[0] + 1j * g[1], atol=1e-13)
             np.testing.assert_allclose(rocker[row], g[2] + 1j * g[3], atol=1e-13)
 

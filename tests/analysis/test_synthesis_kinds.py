@@ -1,0 +1,322 @@
+"""Slider-cranks and geared five-bars beside four-bars: their kinematics by complex numbers, what is known of them in closed
+form, and searches that find again what is known.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from math import acos, pi, radians, sqrt
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy.optimize import brentq, differential_evolution
+
+from analysis.mechanisms import SLIDER_CRANK
+from analysis.synthesis import (
+    Grashof,
+    InfeasibleError,
+    LargestLink,
+    LeastTransmission,
+    Linkage,
+    LinkageScene,
+    Motion,
+    PivotRegion,
+    QuickReturn,
+    RockerFunction,
+    Search,
+    SecondCrank,
+    SliderFunction,
+    Solution,
+    Stroke,
+    TargetPath,
+    TimedPath,
+    TimeRatio,
+    UntimedPath,
+    drawing,
+    judge,
+    plates,
+    rounded,
+    sensitivities,
+    synthesize,
+    turn,
+)
+from analysis.synthesis.kernels import COLUMNS, coupler_path_jacobian
+from analysis.synthesis.report import report
+from linkwork.errors import InputError, ParameterError
+from linkwork.slider_crank import kinematics as plant
+
+FloatArray = NDArray[np.float64]
+
+SLIDER = Linkage(
+    pivot_x=0.3, pivot_y=-0.1, ground_length=0.04, crank_length=0.05, coupler_length=0.16, rocker_length=0.0,
+    point_distance=0.09, point_angle=0.7, ground_angle=0.4, crank_phase=1.1, output_angle=0.0,
+)  # fmt: skip
+QUICK = Search(starts=6, candidates=1 << 13, solutions=3)
+
+
+def by_bisection(linkage: Linkage, phi: float) -> dict[str, complex]:
+    """Pins of a slider-crank in the plane: C where a point that goes along the guide is a coupler's length from B."""
+    a, turned = complex(linkage.pivot_x, linkage.pivot_y), np.exp(1j * linkage.ground_angle)
+    b = a + linkage.crank_length * np.exp(1j * (linkage.ground_angle + linkage.crank_phase + phi))
+    foot = a + linkage.ground_length * turned
+    beside = ((b - foot) * np.conj(1j * turned)).real
+    far = beside + linkage.branch * 2.0 * linkage.coupler_length
+
+    def off(s: float) -> float:
+        return abs(foot + 1j * turned * s - b) - linkage.coupler_length
+
+    c = foot + 1j * turned * brentq(off, beside, far, xtol=1e-15)
+    p = b + (c - b) / linkage.coupler_length * linkage.point_distance * np.exp(1j * linkage.point_angle)
+    return {"A": a, "B": b, "C": c, "D": c, "E": foot, "P": p}
+
+
+@pytest.mark.parametrize("branch", [1, -1])
+def test_a_slider_crank_is_where_bisection_finds_it(branch: int) -> None:
+    linkage = replace(SLIDER, branch=branch)
+    assert linkage.grashof == "slider-crank"
+    for phi in (0.0, 0.9, 2.5, 4.4):
+        wanted = by_bisection(linkage, phi)
+        assert {n: complex(*z) for n, z in linkage.pins(phi).items()} == pytest.approx(wanted, abs=1e-13)
+        assert complex(*linkage.path([phi])[0]) == pytest.approx(wanted["P"], abs=1e-13)
+        along = (wanted["C"] - wanted["E"]) / np.exp(1j * linkage.ground_angle)
+        assert linkage.slider_position([phi])[0] == pytest.approx(along.imag, abs=1e-13)
+        angle = np.angle((wanted["C"] - wanted["B"]) * np.exp(-1j * linkage.ground_angle))
+        assert np.exp(1j * linkage.coupler_angle([phi])[0]) == pytest.approx(np.exp(1j * (angle + 0.4)), abs=1e-12)
+
+
+@pytest.mark.parametrize("branch", [1, -1])
+def test_the_slider_goes_as_that_of_the_plant(branch: int) -> None:
+    """Rahman's slider-crank with the guide at right angles to the crank shaft's axis is the planar one."""
+    linkage = replace(SLIDER, branch=branch, ground_angle=0.0, crank_phase=0.0)
+    constants = next(iter(SLIDER_CRANK.published.values())).parameters.constants()
+    known = {"a1": linkage.crank_length, "a2": linkage.coupler_length, "a4": -linkage.ground_length}
+    p = constants._replace(**known, ca=0.0, sa=1.0, branch=-float(branch))
+    for phi in np.linspace(0.0, 6.0, 13):
+        q = plant.position(float(phi), 0.0, p)
+        assert plant.slider_pin(q, p).y == pytest.approx(linkage.slider_position([phi])[0], abs=1e-14)
+        angle = linkage.transmission([phi])[0]
+        assert plant.transmission_angle(q, p) == pytest.approx(angle, abs=1e-12)
+
+
+def test_derivatives_of_the_coupler_point_are_limits_of_differences() -> None:
+    phi, h = np.linspace(0.0, 6.0, 7), 1e-6
+    zero = np.zeros(7)
+    q, out, jacobian = SLIDER.vector, np.empty((2, 7)), np.empty((12, 2, 7))
+    coupler_path_jacobian(np.cos(phi), np.sin(phi), zero, zero, q, 1.0, out, jacobian)
+    for k, name in enumerate(COLUMNS[:10]):
+        if name == "rocker_length":
+            continue
+        ends = [Linkage.from_vector(q + side * h * (np.arange(10) == k)).path(phi).T for side in (1.0, -1.0)]
+        np.testing.assert_allclose(jacobian[k], (ends[0] - ends[1]) / (2.0 * h), rtol=1e-7, atol=1e-8, err_msg=name)
+
+
+@pytest.mark.parametrize(("offset", "crank", "coupler"), [(0.0, 0.05, 0.16), (0.04, 0.05, 0.16), (0.10, 0.05, 0.17)])
+def test_transmission_angle_and_turning_by_the_textbook(offset: float, crank: float, coupler: float) -> None:
+    """cos mu = (e + r)/l at its extreme; the crank turns if e + r < l (R. L. Norton, Design of Machinery, chapter 3)."""
+    linkage = replace(SLIDER, ground_length=offset, crank_length=crank, coupler_length=coupler)
+    assert linkage.least_transmission == pytest.approx(acos((offset + crank) / coupler))
+    verdicts = judge(linkage, np.array([0.0, 2.0 * pi]), closed=True)
+    assert verdicts.sound
+    assert verdicts.full_turn
+    assert pi - verdicts.greatest_transmission == pytest.approx(acos((offset + crank) / coupler), abs=1e-12)
+    short = replace(linkage, coupler_length=0.999 * (offset + crank))
+    assert not short.turns_fully
+    assert judge(short, np.array([0.0, 2.0 * pi]), closed=True).defects == ("circuit defect", "branch defect")
+
+
+def textbook(linkage: Linkage) -> tuple[float, float]:
+    """Stroke and time ratio of a slider-crank, from its positions."""
+    phi = np.linspace(0.0, 2.0 * pi, 200001)
+    s = linkage.slider_position(phi)
+    way = abs(phi[int(s.argmax())] - phi[int(s.argmin())])
+    return float(np.ptp(s)), max(way, 2.0 * pi - way) / min(way, 2.0 * pi - way)
+
+
+class TestQuickReturn:
+    @pytest.mark.parametrize(("ratio", "least"), [(1.0, 40.0), (1.1, 40.0), (1.25, 40.0), (1.5, 20.0)])
+    def test_stroke_and_time_ratio_are_those_asked_for(self, ratio: float, least: float) -> None:
+        task = QuickReturn(stroke="80 mm", time_ratio=ratio)
+        found = synthesize(task, constraints=[LeastTransmission(angle=radians(least))])
+        assert len(found.solutions) == 2
+        for s in found.solutions:
+            stroke, time = textbook(s.linkage)
+            assert stroke == pytest.approx(0.08, rel=1e-8)
+            assert time == pytest.approx(ratio, rel=1e-4)
+            # out slowly, and to the last digit at the ends
+            assert s.evaluation.worst < 1e-15
+            assert s.verdicts.sound
+
+    def test_no_other_transmits_better(self) -> None:
+        """Against SciPy's differential evolution over all slider-cranks of that stroke and ratio, by other formulas."""
+        task = QuickReturn(stroke=0.1, time_ratio=1.2)
+        best = synthesize(task).best.linkage
+
+        def places(offset: float, crank: float, coupler: float) -> tuple[float, float]:
+            return sqrt((coupler + crank) ** 2 - offset**2), sqrt((coupler - crank) ** 2 - offset**2)
+
+        def worst(x: FloatArray) -> float:
+            """The stroke gives the offset, if there is one; the time ratio is held by a penalty."""
+            crank, coupler = x
+            if coupler <= crank or np.subtract(*places(0.0, crank, coupler)) > 0.1:
+                return 10.0
+
+            def off(offset: float) -> float:
+                return float(np.subtract(*places(offset, crank, coupler))) - 0.1
+
+            if off(coupler - crank) < 0.0:
+                return 10.0
+            offset = brentq(off, 0.0, coupler - crank)
+            far, near = places(offset, crank, coupler)
+            angle = abs(np.angle(complex(far, offset) / complex(near, offset)))
+            return (offset + crank) / coupler + 10.0 * abs((pi + angle) / (pi - angle) - 1.2)
+
+        found = differential_evolution(worst, [(0.01, 0.05), (0.05, 0.5)], seed=1, maxiter=200, tol=1e-10)
+        assert np.cos(best.least_transmission) == pytest.approx(found.fun, rel=1e-4)
+
+    def test_what_cannot_be_had_is_said(self) -> None:
+        with pytest.raises(InfeasibleError, match=r"time ratio of 1.5 the best slider-crank has 27.46 deg"):
+            synthesize(QuickReturn(stroke=0.1, time_ratio=1.5))
+        with pytest.raises(InfeasibleError, match="the coupler is to be"):
+            synthesize(QuickReturn(stroke=0.1, time_ratio=1.2), constraints=[LargestLink(length=0.04)])
+        with pytest.raises(InputError, match="cannot keep TimeRatio"):
+            synthesize(QuickReturn(stroke=0.1), constraints=[TimeRatio(least=1.1)])
+        with pytest.raises(ParameterError, match="time ratio is"):
+            QuickReturn(stroke=0.1, time_ratio=0.9)
+
+
+class TestSearch:
+    """Targets that a known slider-crank makes: found again to rounding."""
+
+    @pytest.mark.parametrize("branch", [1, -1])
+    def test_a_timed_path(self, branch: int) -> None:
+        task = TimedPath(points=replace(SLIDER, branch=branch).path(turn(24)))
+        found = synthesize(task, kinds=("slider-crank",), search=QUICK)
+        assert found.best.error < 1e-16
+        assert found.best.linkage.slides
+        assert found.best.linkage.crank_length == pytest.approx(0.05, rel=1e-5)
+
+    def test_an_untimed_path(self) -> None:
+        task = UntimedPath(path=TargetPath(points=SLIDER.path(turn(120)), closed=True))
+        found = synthesize(task, kinds=("slider-crank",), search=QUICK)
+        assert found.best.evaluation.rms < 2e-5
+
+    def test_a_motion(self) -> None:
+        at = np.linspace(0.0, 3.0, 8)
+        task = Motion(points=SLIDER.path(at), angle=SLIDER.coupler_angle(at) + 0.3, rotation=at)
+        found = synthesize(task, kinds=("slider-crank",), search=QUICK)
+        assert found.best.error < 1e-14
+
+    @pytest.mark.parametrize("side", [1.0, -1.0])
+    def test_a_function_of_the_slider(self, side: float) -> None:
+        x = 0.2 + side * SLIDER.slider_position(turn(24))
+        found = synthesize(SliderFunction(position=x), search=QUICK)
+        assert found.best.error < 1e-16
+        linkage = found.best.linkage
+        assert linkage.slider_is_point
+        np.testing.assert_allclose(linkage.path(turn(24)), np.column_stack([x, np.zeros(24)]), atol=1e-8)
+        np.testing.assert_allclose([*linkage.vector[2:5]], [0.04, 0.05, 0.16], rtol=1e-4)
+
+    def test_stroke_and_time_ratio_are_kept(self) -> None:
+        phi = turn(36)
+        task = TimedPath(points=np.column_stack([0.2 + 0.1 * np.cos(phi), 0.15 + 0.05 * np.sin(phi)]))
+        limits = [LeastTransmission(angle=radians(20)), TimeRatio(least=1.2), Stroke(least="115 mm", greatest=0.15)]
+        found = synthesize(task, None, limits, kinds=("slider-crank",), search=QUICK)
+        stroke, ratio = textbook(found.best.linkage)
+        assert ratio >= 1.2 - 1e-3
+        assert 0.115 - 1e-6 <= stroke <= 0.15 + 1e-6
+        free = synthesize(task, kinds=("slider-crank",), search=QUICK)
+        assert textbook(free.best.linkage)[1] < 1.1
+        assert free.best.error < found.best.error
+
+    def test_the_kinds_are_ranked_together(self) -> None:
+        phi = turn(24)
+        task = TimedPath(points=np.column_stack([0.2 + 0.1 * np.cos(phi), 0.15 + 0.05 * np.sin(phi)]))
+        both = synthesize(task, kinds=("four-bar", "slider-crank"), search=QUICK)
+        assert len(both.solutions) == 3
+        assert {s.linkage.slides for s in both.solutions} == {True, False}
+        errors = [s.error for s in both.solutions]
+        assert errors == sorted(errors)
+        alone = [synthesize(task, kinds=(kind,), search=QUICK).best.error for kind in ("four-bar", "slider-crank")]
+        assert errors[0] == pytest.approx(min(alone), rel=1e-6)
+        again = synthesize(task, kinds=("slider-crank",), guesses=[s for s in both.solutions if s.linkage.slides][:1])
+        assert again.best.error <= min(s.error for s in both.solutions if s.linkage.slides) * (1.0 + 1e-9)
+
+
+@pytest.mark.parametrize(
+    ("task", "more", "message"),
+    [
+        (RockerFunction(angle=[0.1, 0.2, 0.4]), {"kinds": ("slider-crank",)}, "RockerFunction is of a rocker"),
+        (SliderFunction(position=[0.0, 0.1, 0.2]), {"kinds": ("four-bar",)}, "SliderFunction is of a slider"),
+        (QuickReturn(stroke=0.1), {"kinds": ("four-bar",)}, "QuickReturn is of the slider of a slider-crank"),
+        (None, {"kinds": ("slider-crank",), "constraints": [Grashof(type="crank-rocker")]}, "cannot keep Grashof"),
+        (None, {"constraints": [Stroke(least=0.1)]}, "a four-bar cannot keep Stroke"),
+        (
+            None,
+            {"kinds": ("slider-crank",), "constraints": [PivotRegion(pivot="D", polygon=[[0, 0], [1, 0], [0, 1]])]},
+            "cannot keep a region of pivot D",
+        ),
+        (None, {"kinds": ("six-bar",)}, "six-bar"),
+        (None, {"kinds": "slider-crank"}, "must be a sequence"),
+        (None, {"kinds": ("geared-five-bar",), "gears": (1.234,)}, "be a ratio of whole numbers"),
+    ],
+)
+def test_what_a_kind_cannot_do_is_refused(task: Any, more: dict[str, Any], message: str) -> None:
+    points = [[0.0, 0.0], [0.1, 0.0], [0.1, 0.1]]
+    with pytest.raises((InputError, ParameterError), match=message):
+        synthesize(task or TimedPath(points=points), search=QUICK, **more)
+
+
+class TestWhatIsMadeOfIt:
+    SOLUTION = Solution.of(TimedPath(points=SLIDER.path(turn(12)) + 1e-3), SLIDER)
+
+    def test_report_names_offset_stroke_and_time_ratio(self) -> None:
+        text = report(self.SOLUTION)
+        stroke, ratio = textbook(SLIDER)
+        assert f"slider at C on a guide 40 mm from A: stroke {1e3 * stroke:.6g} mm, time ratio {ratio:.4g}" in text
+        assert "rocker" not in text.partition("assembly")[2]
+        assert "slider-crank, full turn" in text
+
+    def test_slopes_are_limits_of_differences(self) -> None:
+        for s in sensitivities(self.SOLUTION):
+            h = 1e-6
+            ends = [
+                Solution.of(self.SOLUTION.task, replace(SLIDER, **{s.name: s.value + side * h})).error
+                for side in (1, -1)
+            ]
+            assert s.slope == pytest.approx((ends[0] - ends[1]) / (2.0 * h), rel=1e-5, abs=1e-9), s.name
+
+    def test_a_slider_that_is_the_point_stays_it(self) -> None:
+        found = synthesize(QuickReturn(stroke=0.0823)).best
+        names = {s.name for s in sensitivities(found)}
+        assert names == {
+            "pivot_x",
+            "pivot_y",
+            "ground_length",
+            "crank_length",
+            "coupler_length",
+            "ground_angle",
+            "crank_phase",
+        }
+        made = rounded(found).linkage
+        assert made.slider_is_point
+        assert made.coupler_length == pytest.approx(round(1e4 * found.linkage.coupler_length) / 1e4)
+
+    def test_drawings_have_a_guide_and_no_rocker(self) -> None:
+        layers = {
+            item.layer for part in (drawing(self.SOLUTION),) for item in (*part.lines, *part.circles, *part.polylines)
+        }
+        assert {"guide", "slider", "crank", "coupler"} <= layers
+        assert "rocker" not in layers
+        labels = " ".join(t.text for t in plates(self.SOLUTION, width=0.02, thickness=0.005, pin=0.008).texts)
+        assert [name in labels for name in ("crank", "coupler", "rocker", "ground")] == [True, True, False, False]
+        guide = LinkageScene(self.SOLUTION).guide
+        assert guide is not None
+        assert np.hypot(*(guide[1] - guide[0])) == pytest.approx(textbook(SLIDER)[0], rel=1e-4)
+
+    def test_the_five_bar_plant_has_none(self) -> None:
+        with pytest.raises(ParameterError, match="the five-bar slider is no slider-crank"):
+            SLIDER.to_five_bar()
+        with pytest.raises(ParameterError, match="a slider-crank, whose rocker has no length, has none"):
+            replace(SLIDER, pivot=SecondCrank(0.02))
