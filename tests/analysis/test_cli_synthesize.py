@@ -153,14 +153,16 @@ def test_what_the_tables_say_is_what_is_searched(tmp_path, monkeypatch) -> None:
     monkeypatch.setattr(cases, "synthesize", lambda *arguments, **more: given.update(more))
     monkeypatch.setattr(cases, "trade_off", lambda *arguments, **more: given.update(limits=arguments[2], **more))
     search = '[search]\nmethod = "simplex"\nseed = 5\ncandidates = 99\nstarts = 7\nsolutions = 2\njobs = 2\n'
+    search += 'kinds = ["slider-crank", "geared-five-bar"]\ngears = [2]\n'
     found = case(ELLIPSE + search + '[trade_off]\nover = "size"\nlimits = [1, 2]\nstarts = 3\n', tmp_path)
     found.solve(progress=True)
     search = Search(seed=5, method="simplex", candidates=99, starts=7, solutions=2, n_jobs=2, progress=True)
-    assert given == {"search": search}
+    which = {"kinds": ("slider-crank", "geared-five-bar"), "gears": (2.0,)}
+    assert given == {"search": search, **which}
     given.clear()
     found.trade()
     assert given.pop("limits").tolist() == [1.0, 2.0]
-    assert given == {"search": Search(seed=5, starts=3, n_jobs=2)}
+    assert given == {"search": Search(seed=5, starts=3, n_jobs=2), **which}
 
 
 def test_a_crank_that_swings_backwards_is_run_over_its_task_alone(tmp_path) -> None:
