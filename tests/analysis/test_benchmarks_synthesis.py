@@ -14,7 +14,7 @@ from analysis.synthesis import Linkage, Search, evaluate, turn
 from analysis.synthesis.black_box import PENALTY
 from analysis.synthesis.published import PROBLEMS
 from analysis.synthesis.starts import start_of
-from benchmarks.synthesis import (
+from benchmarks.contest import (
     SEARCHES,
     Contest,
     PlacedFourBar,
@@ -22,11 +22,10 @@ from benchmarks.synthesis import (
     TimeUp,
     Trace,
     by_freudenstein,
-    curve_by_numpy,
-    kernel_times,
     packs,
     searched,
 )
+from benchmarks.synthesis import curve_by_numpy, kernel_times
 
 pytest.importorskip("pylinkage")
 

@@ -1,0 +1,470 @@
+"""A problem of synthesis in the form that all searches share, and the searches other than `synthesize`, over their time.
+
+All have the same unknowns, bounds and constraints, and all are measured alike: where one improves, its clock is stopped, the
+linkage evaluated by the task's own measure, and left out if it violates a constraint.
+
+pylinkage (extra ``bench``) counts link lengths alone as dimensions: `PlacedFourBar` opens the others to its optimisers. They
+see the coupler curve by its own compiled solver; the constraints as charges in proportion, as our simplex does; and infinity,
+as is its custom, where the links cannot be joined. Its population methods are followed by its Nelder-Mead, as its manual
+advises. Its swarm takes no seed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from functools import partial
+from itertools import count
+from math import degrees, inf, log, pi, tau
+from time import perf_counter
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.synthesis import Linkage, RockerFunction, evaluate, normal_form, turn
+from analysis.synthesis.black_box import DRAWS, PENALTY, BlackBox, descend, descend_from, evolve
+from analysis.synthesis.constraints import Limits, limits_of
+from analysis.synthesis.overlap import symmetric_difference
+from analysis.synthesis.published import (
+    AREA_N,
+    PACKAGING_FLATNESS,
+    PACKAGING_ROTATION,
+    PACKAGING_TRAVEL,
+    N,
+    PublishedProblem,
+)
+from analysis.synthesis.starts import linkage_of
+from analysis.synthesis.tasks import Normal
+
+FloatArray = NDArray[np.float64]
+ComplexArray = NDArray[np.complex128]
+Score = Callable[[FloatArray], float]
+
+#: Phases over which pylinkage's function generation is tried.
+PHASES = 360
+#: Share by which a score must improve on the last that was measured to be measured, too: measuring takes long.
+SLIGHT = 1e-4
+#: Runs of the evolution strategy, each of twice the population, before it is begun afresh.
+RESTARTS = 6
+
+# A problem, and what is found of it over time
+
+
+class TimeUp(Exception):
+    """A search has used its time, or found enough."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Contest:
+    """A problem in the form that all searches share.
+
+    It has a `BlackBox` for each assembly, and a plain one that asks nothing of a straight part: a `BlackBox` has its stations
+    at equal shares of the length, and asks there for more than the task does.
+    """
+
+    problem: PublishedProblem
+    normal: Normal
+    limits: Limits
+    boxes: tuple[BlackBox, ...]
+    plain: Mapping[int, BlackBox]
+
+    @classmethod
+    def of(cls, problem: PublishedProblem) -> Contest:
+        """The contest on a published problem."""
+        normal = normal_form(problem.task)
+        limits = limits_of(problem.task, normal, problem.bounds, problem.constraints)
+        boxes = tuple(BlackBox(normal, limits, branch) for branch in limits.branches)
+        plain = {branch: BlackBox(replace(normal, straight=None), limits, branch) for branch in limits.branches}
+        return cls(problem=problem, normal=normal, limits=limits, boxes=boxes, plain=plain)
+
+    @property
+    def by_area(self) -> bool:
+        """Whether the task's own measure is the area itself, which stations at equal shares of the length only stand for."""
+        normal = self.normal
+        return normal.quality == "area" and normal.straight is None and bool(np.ptp(normal.outline_weights) == 0.0)
+
+    def area(self, curve: ComplexArray) -> float:
+        """The area between a closed curve and the target, in units squared."""
+        assert self.normal.outline is not None
+        place, target = (np.ascontiguousarray([z.real, z.imag]) for z in (curve, self.normal.outline))
+        return float(symmetric_difference(place, target, np.empty_like(place)))
+
+    def charged_area(self, box: BlackBox, x: FloatArray) -> float:
+        """The area and, in proportion, every violated constraint: the task's own measure as a score."""
+        if (x < box.low).any() or (x > box.high).any():
+            return inf
+        q = np.where(self.limits.high > self.limits.low, 0.0, self.limits.low)
+        q[self.limits.high > self.limits.low] = x
+        curve = Linkage.from_vector(q[:10], box.branch).path(turn(AREA_N)) @ np.array([1.0, 1j])
+        return self.area(curve) + self.charge(box, x) if np.isfinite(curve).all() else inf
+
+    def charge(self, box: BlackBox, x: FloatArray) -> float:
+        """Of every violated constraint, in proportion, beside an area."""
+        return PENALTY * float(np.maximum(self.plain[box.branch].violations(x[None, :]), 0.0).sum())
+
+    def error(self, box: BlackBox, x: FloatArray) -> float:
+        """Error by the task's own measure, in the unit of print; infinite where a constraint is violated."""
+        plain = self.plain[box.branch]
+        answer = plain.answer(SimpleNamespace(x=x, success=True, message="", nit=0))
+        linkage = linkage_of(answer.start, self.normal)
+        if not answer.feasible or (self.normal.straight is not None and not packs(linkage)):
+            return inf
+        return self.problem.convert(evaluate(self.problem.task, linkage).error)
+
+
+def packs(linkage: Linkage) -> bool:
+    """Whether somewhere within the crank rotation asked the coupler point has the travel and flatness asked, to a degree."""
+    x, y = linkage.path(turn(360)).T
+    window = (np.arange(360)[:, None] + np.arange(round(degrees(PACKAGING_ROTATION)) + 1)) % 360
+    across, travel = y[window], np.abs(x[window] - x[:, None])
+    flatness = np.maximum.accumulate(across, axis=1) - np.minimum.accumulate(across, axis=1)
+    return bool(((flatness <= PACKAGING_FLATNESS) & (travel >= PACKAGING_TRAVEL)).any())
+
+
+class Trace:
+    """The best so far over the time of a search, its clock stopped while that is measured.
+
+    Parameters
+    ----------
+    contest : Contest
+    budget : float
+        Time after which the search ends (s).
+    enough : float
+        Error at which it ends, in the unit of print.
+    clock : callable
+        Of the time (s): of the wall, or of the processor.
+    """
+
+    def __init__(
+        self, contest: Contest, budget: float, enough: float = -inf, clock: Callable[[], float] = perf_counter
+    ) -> None:
+        self.contest, self.budget, self.enough, self.clock = contest, budget, enough, clock
+        self.points: list[tuple[float, float]] = []
+        self._begun, self._measuring = clock(), 0.0
+
+    @property
+    def best(self) -> float:
+        """Least error so far, in the unit of print."""
+        return self.points[-1][1] if self.points else inf
+
+    def tick(self) -> float:
+        """Time that the search has taken (s).
+
+        Raises
+        ------
+        TimeUp
+            If that is all it has.
+        """
+        seconds = self.clock() - self._begun - self._measuring
+        if seconds > self.budget:
+            raise TimeUp
+        return seconds
+
+    def offer(self, box: BlackBox, x: FloatArray) -> None:
+        """Measure a linkage, and take it down if it is the best.
+
+        Raises
+        ------
+        TimeUp
+            If it is good enough, or the time is over.
+        """
+        seconds, begun = self.tick(), self.clock()
+        value = self.contest.error(box, x)
+        if value < self.best:
+            self.points.append((seconds, value))
+        self._measuring += self.clock() - begun
+        if value <= self.enough:
+            raise TimeUp
+
+    def watched(self, box: BlackBox, score: Score) -> Score:
+        """A function to be minimised, each improvement of it by `SLIGHT` offered."""
+        least = inf
+
+        def value(x: FloatArray) -> float:
+            nonlocal least
+            found = score(x)
+            if found < (1.0 - SLIGHT) * least:
+                least = found
+                self.offer(box, x)
+            else:
+                self.tick()
+            return found
+
+        return value
+
+    def at(self, seconds: float) -> float:
+        """Least error when so much time had passed, in the unit of print; infinite if there was none."""
+        return min((value for passed, value in self.points if passed <= seconds), default=inf)
+
+    def time_to(self, error: float) -> float:
+        """When an error was reached (s); infinite if it was not."""
+        return next((seconds for seconds, value in self.points if value <= error), inf)
+
+
+# The other searches: one run each, from a box, with random numbers; `TimeUp` ends them
+
+
+def by_scipy(trace: Trace, box: BlackBox, random: np.random.Generator) -> None:
+    """SciPy's differential evolution over whole generations, as `synthesize` does by the method of that name."""
+    found = evolve(box, random, lambda intermediate_result: trace.offer(box, intermediate_result.x))
+    if trace.contest.by_area:
+        descend_from(box, found.x, trace.watched(box, partial(trace.contest.charged_area, box)))
+
+
+def by_cma(trace: Trace, box: BlackBox, random: np.random.Generator) -> None:
+    """Hansen's evolution strategy by its own package as it comes, with twice the population from restart to restart."""
+    import cma
+
+    contest = trace.contest
+
+    def run(first: FloatArray, step: float, members: int, score: Callable[[FloatArray], FloatArray]) -> FloatArray:
+        settings = {"popsize": members, "seed": int(random.integers(1, 1 << 31)), "verbose": -9, "bounds": [0.0, 1.0]}
+        strategy, least, width = cma.CMAEvolutionStrategy(first, step, settings), inf, box.high - box.low
+        while not strategy.stop():
+            drawn = strategy.ask()
+            rows = box.low + np.array(drawn) * width
+            scores = score(rows)
+            strategy.tell(drawn, scores.tolist())
+            if scores.min() < (1.0 - SLIGHT) * least:
+                least = scores.min()
+                trace.offer(box, rows[scores.argmin()])
+            trace.tick()
+        return np.asarray(strategy.result.xbest)
+
+    n = len(box.low)
+    members = int(4 + 3 * log(n))
+    for restart in range(RESTARTS):
+        best = run(random.uniform(size=n), 0.3, members << restart, box.charged)
+        if contest.by_area:
+            run(best, 0.01, members, lambda rows: np.array([contest.charged_area(box, x) for x in rows]))
+
+
+def by_simplex(trace: Trace, box: BlackBox, random: np.random.Generator) -> None:
+    """The thesis's simplex, from the best of some random linkages."""
+    descend(box, random, trace.watched(box, box.charge))
+
+
+# pylinkage
+
+
+class PlacedFourBar:
+    """pylinkage's four-bar whose dimensions are all unknowns of a problem: place, phase and direction as well.
+
+    pylinkage's optimisers take any container that has its linkage's methods; they count and set what it gives as constraints.
+
+    Parameters
+    ----------
+    fixed : ndarray, shape (11,)
+        Of `constraints.UNKNOWNS`; those that are free are set by `set_constraints`.
+    free : ndarray of int
+        Their places.
+    branch : int
+        Assembly: pylinkage goes on from where C is put.
+    n : int
+        Steps in a turn.
+    """
+
+    def __init__(self, fixed: FloatArray, free: NDArray[np.intp], branch: int, n: int) -> None:
+        from pylinkage.actuators import Crank
+        from pylinkage.components import Ground
+        from pylinkage.dyads import FixedDyad, RRRDyad
+        from pylinkage.simulation import Linkage as Simulated
+
+        self.q, self.free, self.branch, self.n = fixed.copy(), free, branch, n
+        a, d = Ground(0.0, 0.0), Ground(1.0, 0.0)
+        crank = Crank(a, 0.5, angular_velocity=tau / n)
+        rocker = RRRDyad(crank.output, d, 1.0, 1.0)
+        self.linkage = Simulated([a, d, crank, rocker, FixedDyad(crank.output, rocker, 1.0, 0.0)])
+        self.set_constraints(self.get_constraints())
+
+    @classmethod
+    def of(cls, linkage: Linkage, n: int) -> PlacedFourBar:
+        """A given linkage."""
+        return cls(np.append(linkage.vector, 0.0), np.arange(10), linkage.branch, n)
+
+    def get_constraints(self) -> list[float]:
+        """The free unknowns."""
+        values: list[float] = self.q[self.free].tolist()
+        return values
+
+    def get_coords(self) -> list[tuple[float | None, float | None]]:
+        """Places of A, D, B, C, P."""
+        coords: list[tuple[float | None, float | None]] = self.linkage.get_coords()
+        return coords
+
+    def set_constraints(self, values: Sequence[float]) -> None:
+        """Set the free unknowns, and put the joints a step before the start."""
+        self.q[self.free] = values
+        x, y, l1, l2, l3, l4, r, a1, th20, a2 = self.q[:10].tolist()
+        self.linkage.set_constraints([l2, l3, l4, r, a2])
+        a = complex(x, y)
+        d = a + l1 * np.exp(1j * a1)
+        b = a + l2 * np.exp(1j * (a1 + th20 - tau / self.n))
+        # C on its side of BD; where the links cannot be joined, pylinkage finds out
+        bd = abs(d - b)
+        along = 0.5 * (bd * bd + l3 * l3 - l4 * l4) / bd
+        c = b + (along + 1j * self.branch * max(l3 * l3 - along * along, 0.0) ** 0.5) * (d - b) / bd
+        self.linkage.set_coords([(z.real, z.imag) for z in (a, d, b, c, b)])
+
+    def track(self) -> ComplexArray:
+        """Joints A, D, B, C, P over the turn, shape (n, 5), by pylinkage's compiled solver; NaN where it cannot join them."""
+        track: ComplexArray = self.linkage.step_fast(self.n) @ np.array([1.0, 1j])
+        return track
+
+
+class PylinkageScore:
+    """A problem's quality function and charges on pylinkage's own curve, in the form in which its optimisers take them."""
+
+    def __init__(self, contest: Contest, box: BlackBox) -> None:
+        self.contest, self.normal, self.box = contest, contest.normal, box
+        low, high = contest.limits.low, contest.limits.high
+        # in longer steps pylinkage goes over to the other assembly: it takes the nearer place of C
+        steps = AREA_N
+        if self.normal.rotation is not None:
+            own = round(tau / float(np.abs(np.diff(self.normal.rotation)).min()))
+            steps = own * -(-N // own)
+            self.at = np.rint(self.normal.rotation * steps / tau).astype(int) % steps
+        self.four_bar = PlacedFourBar(0.5 * (low + high), np.nonzero(high > low)[0], box.branch, steps)
+        # what is asked of the straight part is taken from pylinkage's curve
+        self.plain = contest.plain[box.branch]
+
+    def __call__(self, linkage: PlacedFourBar, values: Sequence[float], coords: object = None) -> float:
+        """Score to be minimised."""
+        x = np.asarray(values, dtype=float)
+        if (x < self.box.low).any() or (x > self.box.high).any():
+            return inf
+        linkage.set_constraints(values)
+        track = linkage.track()
+        if not np.isfinite(track).all():
+            return inf
+        at = track[self.at] if self.normal.timed else track
+        quality, excess = self.measured(at, linkage.q[10])
+        excess += float(np.maximum(self.plain.violations(x[None, :]), 0.0).sum())
+        return quality + PENALTY * float(self.normal.weights.sum()) * excess
+
+    def charged_area(self, linkage: PlacedFourBar, values: Sequence[float], coords: object = None) -> float:
+        """`Contest.charged_area` on pylinkage's own curve."""
+        x = np.asarray(values, dtype=float)
+        if (x < self.box.low).any() or (x > self.box.high).any():
+            return inf
+        linkage.set_constraints(values)
+        curve = linkage.track()[:, 4]
+        return self.contest.area(curve) + self.contest.charge(self.box, x) if np.isfinite(curve).all() else inf
+
+    def measured(self, track: ComplexArray, mounting: float) -> tuple[float, float]:
+        """Weighted squared errors, and by how much the straight part misses what is asked of it."""
+        normal = self.normal
+        if normal.angle is not None:
+            left = np.angle((track[:, 3] - track[:, 1]) * np.exp(1j * (mounting - normal.angle)))
+            return float(normal.weights @ left**2), 0.0
+        assert normal.points is not None
+        if normal.timed:
+            return float(normal.weights @ np.abs(track[:, 4] - normal.points) ** 2), 0.0
+        return min(self._paired(track[:, 4], way) for way in (1, -1))
+
+    def _paired(self, curve: ComplexArray, way: int) -> tuple[float, float]:
+        """The same at equal shares of the lengths of curve and target, as `BlackBox` compares closed paths."""
+        normal = self.normal
+        points = normal.points
+        assert points is not None
+        shares = np.cumsum(np.abs(np.diff(np.append(points, points[0]))))
+        curve = np.append(curve, curve[0])[::way]
+        length = np.append(0.0, np.cumsum(np.abs(np.diff(curve))))
+        at = np.append(0.0, shares[:-1]) / shares[-1] * length[-1]
+        met = np.interp(at, length, curve)
+        excess = 0.0
+        straight = normal.straight
+        if straight is not None:
+            spent = np.diff(np.interp(at[[straight.start, straight.end]], length, np.linspace(0.0, tau, len(curve))))
+            excess += max(0.0, float(spent[0]) - straight.rotation)
+            line = points[straight.end] - points[straight.start]
+            off = (met[straight.start : straight.end + 1] * line.conjugate()).imag / abs(line)
+            excess += max(0.0, float(np.ptp(off)) - (straight.flatness or inf))
+        return float(normal.weights @ np.abs(met - points) ** 2), excess
+
+
+def _by_pylinkage(trace: Trace, box: BlackBox, *stages: tuple[Callable[..., Any], dict[str, Any]]) -> None:
+    """Optimisers of pylinkage one after another; where the measure is an area, its Nelder-Mead on that at last."""
+    from pylinkage.optimization import chain_optimizers, minimize_linkage
+
+    score = PylinkageScore(trace.contest, box)
+
+    def watched(of: Callable[..., float]) -> Callable[..., float]:
+        value = trace.watched(box, lambda x: of(score.four_bar, x.tolist()))
+        return lambda linkage, values, coords: value(np.asarray(values))
+
+    if trace.contest.by_area:
+        stages = (*stages, (minimize_linkage, {"eval_func": watched(score.charged_area)}))
+    chain_optimizers(watched(score), score.four_bar, stages, order_relation=min, verbose=False)
+
+
+def by_swarm(trace: Trace, box: BlackBox, random: np.random.Generator) -> None:
+    """pylinkage's particle swarm and, from its best, Nelder-Mead; settings as they come."""
+    from pylinkage.optimization import minimize_linkage, particle_swarm_optimization
+
+    bounds = (box.low, box.high)
+    _by_pylinkage(trace, box, (particle_swarm_optimization, {"bounds": bounds}), (minimize_linkage, {}))
+
+
+def by_pylinkage_evolution(trace: Trace, box: BlackBox, random: np.random.Generator) -> None:
+    """pylinkage's differential evolution and, from its best, Nelder-Mead; settings as they come."""
+    from pylinkage.optimization import differential_evolution_optimization, minimize_linkage
+
+    settings = {"bounds": (box.low, box.high), "seed": int(random.integers(1 << 31))}
+    _by_pylinkage(trace, box, (differential_evolution_optimization, settings), (minimize_linkage, {}))
+
+
+def by_pylinkage_simplex(trace: Trace, box: BlackBox, random: np.random.Generator) -> None:
+    """pylinkage's Nelder-Mead, from the best of as many random linkages as our simplex; settings as they come."""
+    from pylinkage.optimization import minimize_linkage
+
+    score = PylinkageScore(trace.contest, box)
+    draws = random.uniform(box.low, box.high, (DRAWS, len(box.low)))
+    first = min(draws.tolist(), key=lambda x: score(score.four_bar, x))
+    _by_pylinkage(trace, box, (minimize_linkage, {"x0": first}))
+
+
+def by_freudenstein(trace: Trace, box: BlackBox, random: np.random.Generator) -> None:
+    """pylinkage's function generation, which solves Freudenstein's equation by least squares, at every phase; once."""
+    from pylinkage.synthesis import function_generation
+
+    task = trace.contest.problem.task
+    assert isinstance(task, RockerFunction)
+    angle, rotation = np.asarray(task.angle), np.asarray(task.rotation)
+    low, high = trace.contest.limits.low, trace.contest.limits.high
+    free = np.nonzero(high > low)[0]
+    for phase in np.linspace(-pi, pi, PHASES, endpoint=False).tolist():
+        pairs = list(zip((rotation + phase).tolist(), angle.tolist()))
+        for found in function_generation(pairs, ground_length=float(low[2])).raw_solutions:
+            q = 0.5 * (low + high)
+            q[3:6] = found.crank_length, found.coupler_length, found.rocker_length
+            q[8] = phase
+            for other in trace.contest.boxes:
+                trace.offer(other, q[free])
+    raise TimeUp
+
+
+BlackBoxSearch = Callable[[Trace, BlackBox, np.random.Generator], None]
+
+SEARCHES: dict[str, BlackBoxSearch] = {
+    "SciPy's differential evolution": by_scipy,
+    "CMA-ES": by_cma,
+    "simplex, many starts (the thesis)": by_simplex,
+    "pylinkage, particle swarm": by_swarm,
+    "pylinkage, differential evolution": by_pylinkage_evolution,
+    "pylinkage, Nelder-Mead, many starts": by_pylinkage_simplex,
+}
+
+
+def searched(
+    search: BlackBoxSearch, contest: Contest, budget: float, enough: float, clock: Callable[[], float] = perf_counter
+) -> Trace:
+    """Runs of a search, in turn of either assembly, until its time is over or it has found enough."""
+    trace = Trace(contest, budget, enough, clock)
+    with suppress(TimeUp):
+        for number in count():
+            search(trace, contest.boxes[number % len(contest.boxes)], np.random.default_rng([0, number]))
+    return trace

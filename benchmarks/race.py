@@ -1,0 +1,298 @@
+"""`synthesize` beside pylinkage's optimisers, SciPy's differential evolution and CMA-ES on fifty targets, at equal time.
+
+    python -m benchmarks.race                              # runs what is not in the results yet, then prints the tables
+    python -m benchmarks.race --again Linkwork             # runs a search afresh on all targets
+    python -m benchmarks.race --budget 1 --target square --results out/few.csv
+
+Every search has the same unknowns, bounds, constraints and measure (`benchmarks.contest`), and the same time of the processor
+on one thread: a machine that does other work as well takes longer, and decides nothing. What is compiled once on a machine is
+compiled before. No search knows when to stop: each is begun afresh until its time is over. `synthesize` is called with `FIRST`,
+then with other seeds and twice the candidates and starts each time; the answer of a call counts from its end on, and not at
+all where that comes too late.
+
+The results are a row for each target and search: the least error when `TIMES` have passed, infinite while there is no linkage
+that keeps the constraints. The file is replaced as a whole after every row: a run that is stopped keeps what it had, and goes
+on with what is missing.
+"""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import os
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from itertools import count
+from math import inf
+from pathlib import Path
+from time import process_time
+from typing import Any, NamedTuple
+
+import numpy as np
+from rich.console import Console
+from threadpoolctl import threadpool_limits
+
+from analysis.synthesis import Search, synthesize
+from analysis.synthesis.black_box import BlackBox
+from analysis.synthesis.starts import start_of
+
+from .contest import SEARCHES, BlackBoxSearch, Contest, Trace, searched
+from .targets import TARGETS, Target
+
+OURS = "Linkwork"
+RESULTS = Path(__file__).with_suffix(".csv")
+#: When the error is taken down (s), and the time given to each search.
+TIMES = (0.05, 0.07, 0.1, 0.15, 0.2, 0.3, 0.5, 0.7, 1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 7.0, 10.0)
+BUDGET = 5.0
+#: The first call of `synthesize`, and how often its effort is doubled.
+FIRST, DOUBLED = Search(candidates=1 << 11, starts=1), 5
+#: Share by which errors may differ and still be level; error per target, in sizes, below which one is as good as exact.
+LEVEL, EXACT = 1e-3, 1e-6
+#: "Found": within so much of the least error that any search had at the end.
+FOUND = 0.05
+
+
+class Row(NamedTuple):
+    """What a search had of a target over the time; errors in m2, of a function rad2."""
+
+    kind: str
+    target: str
+    search: str
+    exact: float
+    errors: tuple[float, ...]
+
+    def at(self, seconds: float) -> float:
+        """Least error when so much time has passed; what is as good as exact is all the same."""
+        return max(self.exact, self.errors[TIMES.index(seconds)])
+
+
+# Running
+
+
+def by_linkwork(trace: Trace, box: BlackBox, random: np.random.Generator) -> None:
+    """Calls of `synthesize`, each of more effort; what they return is measured as what the others find."""
+    contest = trace.contest
+    problem, limits = contest.problem, contest.limits
+    for k in count():
+        more = 1 << min(k, DOUBLED)
+        search = Search(candidates=more * FIRST.candidates, starts=more * FIRST.starts, seed=k)
+        linkage = synthesize(problem.task, problem.bounds, problem.constraints, search=search).best.linkage
+        q = start_of(linkage, contest.normal).q
+        kept = ((q >= limits.low - EXACT) & (q <= limits.high + EXACT)).all()
+        if kept:
+            trace.offer(contest.plain[linkage.branch], q[limits.high > limits.low])
+        trace.tick()
+
+
+RACERS: Mapping[str, BlackBoxSearch] = {
+    OURS: by_linkwork,
+    **{name: search for name, search in SEARCHES.items() if not name.startswith("simplex")},
+}
+
+
+def run(target: Target, search: str, budget: float) -> Row:
+    """One search on a target."""
+    contest = Contest.of(target)
+    normal = contest.normal
+    with threadpool_limits(1):
+        trace = searched(RACERS[search], contest, budget, -inf, process_time)
+    exact = (EXACT * normal.unit) ** 2 * (1.0 if contest.by_area else float(normal.weights.sum()))
+    errors = tuple(trace.at(seconds) if seconds <= budget else np.nan for seconds in TIMES)
+    return Row(target.kind, target.name, search, exact, errors)
+
+
+def prepared() -> None:
+    """Compile and load what every search needs, once."""
+    for target in {target.kind: target for target in TARGETS}.values():
+        for search in RACERS:
+            run(target, search, 0.2)
+
+
+# Results
+
+
+def read(path: Path) -> list[Row]:
+    """The rows of a file; none where there is no file."""
+    if not path.exists():
+        return []
+    with path.open(newline="", encoding="utf-8") as file:
+        _, *rows = csv.reader(file)
+    return [Row(*row[:3], float(row[3]), tuple(map(float, row[4:]))) for row in rows]
+
+
+def write(path: Path, rows: Iterable[Row]) -> None:
+    """Put a file in the place of the old one."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    beside = path.with_name(f"{path.name}.new")
+    with beside.open("w", newline="", encoding="utf-8") as file:
+        table = csv.writer(file, lineterminator="\n")
+        table.writerow(["kind", "target", "search", "exact", *(f"{seconds:g} s" for seconds in TIMES)])
+        table.writerows([*row[:3], *(f"{value:.6g}" for value in (row.exact, *row.errors))] for row in rows)
+    os.replace(beside, path)
+
+
+def ordered(rows: Iterable[Row]) -> list[Row]:
+    """Rows in the order of targets and searches."""
+    targets = [(target.kind, target.name) for target in TARGETS]
+    return sorted(rows, key=lambda row: (targets.index(row[:2]), list(RACERS).index(row.search)))
+
+
+def completed(
+    path: Path, targets: Sequence[Target], searches: Sequence[str], budget: float, say: Callable[..., Any]
+) -> None:
+    """Run what is missing of a file."""
+    rows = {row[:3]: row for row in read(path)}
+    wanted = [(target, search) for target in targets for search in searches]
+    missing = [(t, s) for t, s in wanted if (t.kind, t.name, s) not in rows]
+    if missing:
+        prepared()
+    for target, search in missing:
+        row = run(target, search, budget)
+        rows[row[:3]] = row
+        write(path, ordered(rows.values()))
+        say(f"{target.kind}, {target.name}: {search} {row.at(last([row])):.4g}")
+
+
+# Tables
+
+
+def last(rows: Iterable[Row]) -> float:
+    """The last time at which all rows have an error."""
+    return max(seconds for k, seconds in enumerate(TIMES) if not any(np.isnan(row.errors[k]) for row in rows))
+
+
+def by_target(rows: Iterable[Row]) -> dict[tuple[str, str], dict[str, Row]]:
+    """Rows of each target, by search, where all searches have run."""
+    found: dict[tuple[str, str], dict[str, Row]] = {}
+    for row in rows:
+        found.setdefault(row[:2], {})[row.search] = row
+    return {target: of for target, of in found.items() if set(of) == set(RACERS)}
+
+
+def rival(of: Mapping[str, Row], seconds: float) -> float:
+    """The least error of the other searches."""
+    return min(row.at(seconds) for search, row in of.items() if search != OURS)
+
+
+def ahead(of: Mapping[str, Row], seconds: float) -> bool:
+    """Whether no other search has less than our error, but for `LEVEL`."""
+    return of[OURS].at(seconds) <= (1.0 + LEVEL) * rival(of, seconds) < inf or of[OURS].at(seconds) < inf == rival(
+        of, seconds
+    )
+
+
+def found(of: Mapping[str, Row], search: str, seconds: float, end: float) -> bool:
+    """Whether a search is within `FOUND` of the least error of all at the end."""
+    return of[search].at(seconds) <= (1.0 + FOUND) * min(row.at(end) for row in of.values())
+
+
+def standings(rows: Sequence[Row]) -> list[list[str]]:
+    """By time: on how many targets Linkwork is ahead, and how many each search has found."""
+    targets, end = by_target(rows).values(), last(rows)
+    return [
+        [
+            f"{seconds:g}",
+            f"{sum(ahead(of, seconds) for of in targets)} of {len(targets)}",
+            *(str(sum(found(of, search, seconds, end) for of in targets)) for search in RACERS),
+        ]
+        for seconds in TIMES
+        if seconds <= end
+    ]
+
+
+def finals(rows: Sequence[Row]) -> list[list[str]]:
+    """By target: the error of each search at the end, the least in bold."""
+    end = last(rows)
+    lines = []
+    for (kind, name), of in by_target(rows).items():
+        least = min(row.at(end) for row in of.values())
+
+        def cell(row: Row, least: float = least) -> str:
+            value = row.at(end)
+            text = "exact" if value <= row.exact else f"{value:.4g}" if value < inf else "none"
+            return f"**{text}**" if value <= (1.0 + LEVEL) * least else text
+
+        lines.append([kind, name, *(cell(of[search]) for search in RACERS)])
+    return lines
+
+
+def lost(rows: Sequence[Row]) -> list[str]:
+    """The targets on which another search has less than our error, and how much more ours is."""
+    end = last(rows)
+    return [
+        f"{kind}, {name}: {of[OURS].at(end) / rival(of, end) - 1.0:.2%} above "
+        f"{min(of.values(), key=lambda row: row.at(end)).search}"
+        for (kind, name), of in by_target(rows).items()
+        if not ahead(of, end)
+    ]
+
+
+def markdown(rows: Sequence[Row], table: str) -> str:
+    """One of the tables for a page: "standings" or "targets"."""
+    headings, lines = {
+        "standings": (["s", "Linkwork ahead", *RACERS], standings),
+        "targets": (["kind", "target", *RACERS], finals),
+    }[table]
+    return "\n".join(f"| {' | '.join(line)} |" for line in (headings, ["---"] * len(headings), *lines(rows)))
+
+
+def picture(rows: Sequence[Row]) -> Any:
+    """Quality over time: how many targets each search has found, and how near it is to the best at the end."""
+    from analysis.figures import Curve, Panel, plot_curves
+
+    targets, end = by_target(rows).values(), last(rows)
+    times = [seconds for seconds in TIMES if seconds <= end]
+    over_time, profile = [], []
+    for search in RACERS:
+        width = 2.2 if search == OURS else 1.0
+        shares = [sum(found(of, search, seconds, end) for of in targets) for seconds in times]
+        ratios = np.sort([of[search].at(end) / min(row.at(end) for row in of.values()) for of in targets])
+        over_time.append(Curve(x=times, y=shares, label=search, width=width))
+        profile.append(Curve(x=ratios[np.isfinite(ratios)], y=1 + np.flatnonzero(np.isfinite(ratios)), width=width))
+    panels = [
+        Panel(
+            x_label="time of the processor [s]",
+            y_label=f"targets within {FOUND:.0%} of the best",
+            curves=over_time,
+            logarithmic="x",
+            y_range=(0.0, len(targets)),
+            legend_at="outside",
+        ),
+        Panel(
+            x_label=f"error after {end:g} s, in those of the best",
+            y_label="targets",
+            curves=profile,
+            logarithmic="x",
+            x_range=(0.95, 100.0),
+            y_range=(0.0, len(targets)),
+        ),
+    ]
+    return plot_curves(panels, title=f"Quality over time on {len(targets)} targets")
+
+
+def main(path: Path, targets: Sequence[Target], searches: Sequence[str], budget: float, again: Sequence[str]) -> None:
+    """Run what is missing, and print."""
+    console = Console(width=200)
+    write(path, [row for row in read(path) if row.search not in again])
+    completed(path, targets, searches, budget, lambda text: console.print(text, highlight=False))
+    rows = read(path)
+    for line in (markdown(rows, "targets"), markdown(rows, "standings"), "Lost:", *lost(rows)):
+        console.print(line, highlight=False, markup=False)
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument(
+        "--budget", type=float, default=BUDGET, help="time of the processor for each search and target (s)"
+    )
+    parser.add_argument("--target", action="append", help="this target alone (repeatable)")
+    parser.add_argument("--search", choices=tuple(RACERS), action="append", help="this search alone (repeatable)")
+    parser.add_argument("--again", choices=tuple(RACERS), action="append", default=[], help="run this search afresh")
+    parser.add_argument("--results", type=Path, default=RESULTS, help="CSV file with the results")
+    given = parser.parse_args()
+    main(
+        given.results,
+        [target for target in TARGETS if not given.target or target.name in given.target],
+        given.search or tuple(RACERS),
+        given.budget,
+        given.again,
+    )

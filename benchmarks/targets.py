@@ -1,0 +1,185 @@
+"""Fifty targets of five kinds, ten of each: what `benchmarks.race` lets the searches run for.
+
+The published ones are Youssef's (chapter VI), the 18 points of Acharyya and Mandal, Mech. Mach. Theory 44 (2009), and the six
+points of a vertical line of the same literature. Youssef's and the vertical line keep the bounds and constraints under which
+they are posed; all others have the defaults of `synthesize`: a least transmission angle of 40 degrees over a full turn, no
+link longer than five sizes of the target. The drawn ones are the example's drawing and nine curves from the seeds 1 to 9; the
+last two functions come from the seeds 1 and 2. None was left out or changed for what a search made of it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from math import pi, radians, tau
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from analysis.synthesis import FullTurn, LargestLink, RockerFunction, TargetPath, Task, TimedPath, UntimedPath, turn
+from analysis.synthesis.constraints import USUAL, Constraint
+from analysis.synthesis.published import PACKAGING_POINTS_CM, PROBLEMS
+from analysis.synthesis.targets import along, ring
+
+FloatArray = NDArray[np.float64]
+Points = Sequence[tuple[float, float]]
+
+#: Points of a timed path, and of an untimed one; noise of a hand that draws, in sizes.
+TIMED, CURVE, TREMOR = 36, 72, 0.01
+HAND_DRAWN = Path(__file__).parents[1] / "examples" / "hand-drawn.svg"
+#: Of Acharyya and Mandal: a closed curve, 20 degrees of the crank apart.
+EIGHTEEN: Points = (
+    (0.5, 1.1), (0.4, 1.1), (0.3, 1.1), (0.2, 1.0), (0.1, 0.9), (0.05, 0.75), (0.02, 0.6), (0.0, 0.5), (0.0, 0.4),
+    (0.03, 0.3), (0.1, 0.25), (0.15, 0.2), (0.2, 0.3), (0.3, 0.4), (0.4, 0.5), (0.5, 0.7), (0.6, 0.9), (0.6, 1.0),
+)  # fmt: skip
+POLYGONS: Mapping[str, Points] = {
+    "square": ((0, 0), (1, 0), (1, 1), (0, 1)),
+    "rectangle": ((0, 0), (2, 0), (2, 1), (0, 1)),
+    "equilateral triangle": ((0, 0), (1, 0), (0.5, 0.75**0.5)),
+    "right triangle": ((0, 0), (4, 0), (0, 3)),
+    "trapezium": ((0, 0), (3, 0), (2, 1), (1, 1)),
+    "kite": ((0, -2), (1, 0), (0, 1), (-1, 0)),
+    "hexagon": tuple((np.cos(k * pi / 3), np.sin(k * pi / 3)) for k in range(6)),
+    "L": ((0, 0), (2, 0), (2, 1), (1, 1), (1, 2), (0, 2)),
+    "star": tuple(
+        ((1 - 0.5 * (k % 2)) * np.sin(k * pi / 5), (1 - 0.5 * (k % 2)) * np.cos(k * pi / 5)) for k in range(10)
+    ),
+    "packaging": PACKAGING_POINTS_CM,
+}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Target:
+    """A task with its bounds and constraints; errors in SI."""
+
+    kind: str
+    name: str
+    task: Task
+    bounds: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    constraints: tuple[Constraint, ...] = USUAL
+
+    def convert(self, error: float) -> float:
+        """An error in the unit in which it is reported: as it is."""
+        return error
+
+
+def curves(n: int) -> dict[str, FloatArray]:
+    """Simple closed curves at n even steps of their parameter, each shape (n, 2)."""
+    t = turn(n)
+    c, s = np.cos(t), np.sin(t)
+    bean = 1.0 + 0.5 * c**3 + 0.5 * s**3
+    return {
+        "bean": np.column_stack([bean * c, bean * s]),
+        "teardrop": np.column_stack([c, 0.8 * s * np.sin(0.5 * t) ** 2]),
+        "eight": np.column_stack([s, 0.5 * np.sin(2.0 * t)]),
+        "circle": np.column_stack([c, s]),
+        "egg": np.column_stack([c, (0.7 + 0.15 * c) * s]),
+        "superellipse": np.column_stack([np.sign(c) * np.abs(c) ** 0.5, 0.6 * np.sign(s) * np.abs(s) ** 0.5]),
+        "crescent": np.column_stack([c, 0.4 * s + 0.35 * c**2]),
+    }
+
+
+def outlined(corners: ArrayLike, n: int = CURVE) -> FloatArray:
+    """n points at even steps along a closed line."""
+    line = ring(np.asarray(corners, dtype=float), True)
+    length = float(np.hypot(*np.diff(line, axis=0).T).sum())
+    return along(line, np.linspace(0.0, length, n, endpoint=False))
+
+
+def drawn(seed: int) -> TargetPath:
+    """A closed curve of random harmonics, drawn with a tremor and smoothed."""
+    random = np.random.default_rng(seed)
+    t, order = turn(120), np.array([-3, -2, -1, 2, 3])
+    wave = random.normal(size=(5, 2)) @ [1.0, 1j] * 0.5 / np.abs(order) ** 1.5
+    z = np.exp(1j * t) + wave @ np.exp(1j * np.outer(order, t)) + TREMOR * (random.normal(size=(120, 2)) @ [1.0, 1j])
+    return TargetPath(points=np.column_stack([z.real, z.imag]), closed=True).smoothed(CURVE)
+
+
+def waves(seed: int) -> RockerFunction:
+    """A periodic function of two random harmonics, 40 degrees from its least to its greatest."""
+    random = np.random.default_rng(seed)
+    t = turn(TIMED)
+    # the second harmonic a quarter of the first, but for chance
+    a, b = random.normal(size=(2, 2)) / np.array([1.0, 4.0])
+    both = np.outer([1.0, 2.0], t)
+    angle = a @ np.cos(both) + b @ np.sin(both)
+    return RockerFunction(angle=radians(40.0) * angle / np.ptp(angle), mounting=True)
+
+
+def over(function: Any, low: float, high: float, output_deg: float = 60.0) -> RockerFunction:
+    """y = f(x) from low to high: 90 degrees of the crank, so many of the rocker, both scales even, zeros free."""
+    x = np.linspace(low, high, 31)
+    y = function(x)
+    return RockerFunction(
+        angle=radians(output_deg) * (y - y[0]) / np.ptp(y), rotation=np.linspace(0.0, 0.5 * pi, 31), mounting=True
+    )
+
+
+def dwelling() -> RockerFunction:
+    """Rise by 40 degrees over 120, dwell over 60, return over 120, dwell over 60: cycloids."""
+    t = np.degrees(turn(72))
+    up = np.clip(t / 120.0, 0.0, 1.0) - np.clip((t - 180.0) / 120.0, 0.0, 1.0)
+    return RockerFunction(angle=radians(40.0) * (up - np.sin(tau * up) / tau), mounting=True)
+
+
+def _all() -> list[Target]:
+    def published(kind: str, *names: str) -> list[Target]:
+        chosen = ((name, PROBLEMS[name]) for name in names)
+        return [
+            Target(kind=kind, name=name, task=p.task, bounds=p.bounds, constraints=p.constraints) for name, p in chosen
+        ]
+
+    def usual(kind: str, tasks: Mapping[str, Task]) -> list[Target]:
+        return [Target(kind=kind, name=name, task=task) for name, task in tasks.items()]
+
+    def traced(points: ArrayLike) -> UntimedPath:
+        return UntimedPath(path=TargetPath(points=np.asarray(points, dtype=float), closed=True))
+
+    timed, smooth = curves(TIMED), curves(CURVE)
+    third = np.linspace(0.0, radians(120.0), 21)
+    vertical = TimedPath(points=[(20.0, 20.0 + 5.0 * k) for k in range(6)], rotation=pi / 6.0 * np.arange(1, 7))
+    half = np.linspace(0.0, pi, 37)
+    foot = np.column_stack([np.cos(half), 0.5 * np.sin(half)])
+    return [
+        *published("timed", "ellipse-a", "ellipse-b", "ellipse-a-bounded"),
+        Target(kind="timed", name="vertical line", task=vertical, constraints=(FullTurn(), LargestLink(length=60.0))),
+        *usual(
+            "timed",
+            {
+                "18 points": TimedPath(points=EIGHTEEN, rotation=radians(20.0) * np.arange(18)),
+                "line in a third of a turn": TimedPath(points=np.column_stack([third, 0.0 * third]), rotation=third),
+                "line and return": TimedPath(points=np.column_stack([np.cos(turn(TIMED)), np.zeros(TIMED)])),
+                **{name: TimedPath(points=timed[name]) for name in ("bean", "teardrop", "eight")},
+            },
+        ),
+        *published("untimed", "path-a", "path-b"),
+        *usual("untimed", {name: traced(smooth[name]) for name in smooth}),
+        Target(kind="untimed", name="foot", task=traced(outlined(foot))),
+        *usual("polygonal", {name: traced(points) for name, points in POLYGONS.items()}),
+        Target(
+            kind="drawn",
+            name="example",
+            task=UntimedPath(path=TargetPath.from_file(HAND_DRAWN).smoothed(CURVE)),
+            constraints=(LargestLink(length=0.3), *USUAL),
+        ),
+        *usual("drawn", {f"seed {seed}": UntimedPath(path=drawn(seed)) for seed in range(1, 10)}),
+        *published("function", "rocker", "rocker-weighted"),
+        *usual(
+            "function",
+            {
+                "sine": over(np.sin, 0.0, 0.5 * pi),
+                "square": over(np.square, 0.0, 1.0),
+                "exponential": over(np.exp, 0.0, 1.0),
+                "reciprocal": over(np.reciprocal, 1.0, 2.0),
+                "logarithm": over(np.log, 1.0, 2.0),
+                "rise and dwell": dwelling(),
+                "waves 1": waves(1),
+                "waves 2": waves(2),
+            },
+        ),
+    ]
+
+
+TARGETS: tuple[Target, ...] = tuple(_all())
