@@ -9,7 +9,7 @@ PYTEST := $(BIN)/python -m pytest
 # every file of tests on one core, so that its fixtures are made once; the file that takes longest goes first
 PARALLEL := --numprocesses auto --dist loadfile tests/test_docs.py tests
 
-.PHONY: demo quick test test-all lint docs figures bench mutate release clean
+.PHONY: demo quick test test-all lint docs figures bench bench-targets mutate release clean
 
 demo: $(RUN)
 	$(BIN)/python build_fmu.py
@@ -46,6 +46,11 @@ figures: $(RUN)
 bench: $(DEV)
 	$(BIN)/pip install --quiet --editable '.[dev,bench]'
 	for part in solvers fmu stability synthesis slider_crank ensembles scaling; do $(BIN)/python -m benchmarks.$$part || exit; done
+
+# searches side by side on fifty targets, half an hour and more; it goes on with what is missing of out/race.csv
+bench-targets: $(DEV)
+	$(BIN)/pip install --quiet --editable '.[dev,bench]'
+	$(BIN)/python -m benchmarks.race
 
 # does a test fail for every small change of the code? make mutate OF=analysis/files/tables.py; without OF it takes days
 mutate: $(DEV)

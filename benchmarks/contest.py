@@ -19,14 +19,14 @@ from itertools import count
 from math import degrees, inf, log, pi, tau
 from time import perf_counter
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from analysis.synthesis import Linkage, RockerFunction, evaluate, normal_form, turn
 from analysis.synthesis.black_box import DRAWS, PENALTY, BlackBox, descend, descend_from, evolve
-from analysis.synthesis.constraints import Limits, limits_of
+from analysis.synthesis.constraints import Constraint, Limits, limits_of
 from analysis.synthesis.overlap import symmetric_difference
 from analysis.synthesis.published import (
     AREA_N,
@@ -34,10 +34,9 @@ from analysis.synthesis.published import (
     PACKAGING_ROTATION,
     PACKAGING_TRAVEL,
     N,
-    PublishedProblem,
 )
 from analysis.synthesis.starts import linkage_of
-from analysis.synthesis.tasks import Normal
+from analysis.synthesis.tasks import Normal, Task
 
 FloatArray = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
@@ -47,10 +46,24 @@ Score = Callable[[FloatArray], float]
 PHASES = 360
 #: Share by which a score must improve on the last that was measured to be measured, too: measuring takes long.
 SLIGHT = 1e-4
-#: Runs of the evolution strategy, each of twice the population, before it is begun afresh.
-RESTARTS = 6
+#: Populations of the evolution strategy, each twice the last, before it is begun afresh.
+DOUBLED = 8
 
 # A problem, and what is found of it over time
+
+
+class Problem(Protocol):
+    """What is asked: of chapter VI, or one of `targets.TARGETS`."""
+
+    @property
+    def task(self) -> Task: ...
+    @property
+    def bounds(self) -> Mapping[str, tuple[float, float]]: ...
+    @property
+    def constraints(self) -> tuple[Constraint, ...]: ...
+    def convert(self, error: float) -> float:
+        """An error from SI to the unit in which it is reported."""
+        ...
 
 
 class TimeUp(Exception):
@@ -63,28 +76,28 @@ class Contest:
 
     It has a `BlackBox` for each assembly, and a plain one that asks nothing of a straight part: a `BlackBox` has its stations
     at equal shares of the length, and asks there for more than the task does.
+
+    With ``on_area`` the searches of a path whose measure is the area end on that: stations at equal shares of the length, which
+    they begin with, only stand for it.
     """
 
-    problem: PublishedProblem
+    problem: Problem
     normal: Normal
     limits: Limits
     boxes: tuple[BlackBox, ...]
     plain: Mapping[int, BlackBox]
+    on_area: bool
 
     @classmethod
-    def of(cls, problem: PublishedProblem) -> Contest:
-        """The contest on a published problem."""
+    def of(cls, problem: Problem, *, on_area: bool = False) -> Contest:
+        """The contest on a problem."""
         normal = normal_form(problem.task)
         limits = limits_of(problem.task, normal, problem.bounds, problem.constraints)
         boxes = tuple(BlackBox(normal, limits, branch) for branch in limits.branches)
         plain = {branch: BlackBox(replace(normal, straight=None), limits, branch) for branch in limits.branches}
-        return cls(problem=problem, normal=normal, limits=limits, boxes=boxes, plain=plain)
-
-    @property
-    def by_area(self) -> bool:
-        """Whether the task's own measure is the area itself, which stations at equal shares of the length only stand for."""
-        normal = self.normal
-        return normal.quality == "area" and normal.straight is None and bool(np.ptp(normal.outline_weights) == 0.0)
+        whole = normal.quality == "area" and normal.straight is None and not np.ptp(normal.outline_weights)
+        on_area = on_area and whole
+        return cls(problem=problem, normal=normal, limits=limits, boxes=boxes, plain=plain, on_area=on_area)
 
     def area(self, curve: ComplexArray) -> float:
         """The area between a closed curve and the target, in units squared."""
@@ -92,13 +105,17 @@ class Contest:
         place, target = (np.ascontiguousarray([z.real, z.imag]) for z in (curve, self.normal.outline))
         return float(symmetric_difference(place, target, np.empty_like(place)))
 
+    def unknowns(self, x: FloatArray) -> FloatArray:
+        """All of `constraints.UNKNOWNS`, from those that are free."""
+        q = self.limits.low.copy()
+        q[self.limits.high > self.limits.low] = x
+        return q
+
     def charged_area(self, box: BlackBox, x: FloatArray) -> float:
         """The area and, in proportion, every violated constraint: the task's own measure as a score."""
         if (x < box.low).any() or (x > box.high).any():
             return inf
-        q = np.where(self.limits.high > self.limits.low, 0.0, self.limits.low)
-        q[self.limits.high > self.limits.low] = x
-        curve = Linkage.from_vector(q[:10], box.branch).path(turn(AREA_N)) @ np.array([1.0, 1j])
+        curve = Linkage.from_vector(self.unknowns(x)[:10], box.branch).path(turn(AREA_N)) @ np.array([1.0, 1j])
         return self.area(curve) + self.charge(box, x) if np.isfinite(curve).all() else inf
 
     def charge(self, box: BlackBox, x: FloatArray) -> float:
@@ -210,17 +227,20 @@ class Trace:
 def by_scipy(trace: Trace, box: BlackBox, random: np.random.Generator) -> None:
     """SciPy's differential evolution over whole generations, as `synthesize` does by the method of that name."""
     found = evolve(box, random, lambda intermediate_result: trace.offer(box, intermediate_result.x))
-    if trace.contest.by_area:
+    if trace.contest.on_area:
         descend_from(box, found.x, trace.watched(box, partial(trace.contest.charged_area, box)))
 
 
 def by_cma(trace: Trace, box: BlackBox, random: np.random.Generator) -> None:
-    """Hansen's evolution strategy by its own package as it comes, with twice the population from restart to restart."""
+    """Hansen's evolution strategy by its own package; in turn of the assemblies, then with twice as many members."""
     import cma
 
     contest = trace.contest
+    n = len(box.low)
 
-    def run(first: FloatArray, step: float, members: int, score: Callable[[FloatArray], FloatArray]) -> FloatArray:
+    def run(
+        box: BlackBox, first: FloatArray, step: float, members: int, score: Callable[[FloatArray], FloatArray]
+    ) -> FloatArray:
         settings = {"popsize": members, "seed": int(random.integers(1, 1 << 31)), "verbose": -9, "bounds": [0.0, 1.0]}
         strategy, least, width = cma.CMAEvolutionStrategy(first, step, settings), inf, box.high - box.low
         while not strategy.stop():
@@ -234,12 +254,13 @@ def by_cma(trace: Trace, box: BlackBox, random: np.random.Generator) -> None:
             trace.tick()
         return np.asarray(strategy.result.xbest)
 
-    n = len(box.low)
     members = int(4 + 3 * log(n))
-    for restart in range(RESTARTS):
-        best = run(random.uniform(size=n), 0.3, members << restart, box.charged)
-        if contest.by_area:
-            run(best, 0.01, members, lambda rows: np.array([contest.charged_area(box, x) for x in rows]))
+    for doubled in range(DOUBLED):
+        for own in contest.boxes:
+            best = run(own, random.uniform(size=n), 0.3, members << doubled, own.charged)
+            if contest.on_area:
+                charged = partial(contest.charged_area, own)
+                run(own, best, 0.01, members, lambda rows, charged=charged: np.array([charged(x) for x in rows]))
 
 
 def by_simplex(trace: Trace, box: BlackBox, random: np.random.Generator) -> None:
@@ -396,7 +417,7 @@ def _by_pylinkage(trace: Trace, box: BlackBox, *stages: tuple[Callable[..., Any]
         value = trace.watched(box, lambda x: of(score.four_bar, x.tolist()))
         return lambda linkage, values, coords: value(np.asarray(values))
 
-    if trace.contest.by_area:
+    if trace.contest.on_area:
         stages = (*stages, (minimize_linkage, {"eval_func": watched(score.charged_area)}))
     chain_optimizers(watched(score), score.four_bar, stages, order_relation=min, verbose=False)
 
@@ -451,7 +472,6 @@ BlackBoxSearch = Callable[[Trace, BlackBox, np.random.Generator], None]
 
 SEARCHES: dict[str, BlackBoxSearch] = {
     "SciPy's differential evolution": by_scipy,
-    "CMA-ES": by_cma,
     "simplex, many starts (the thesis)": by_simplex,
     "pylinkage, particle swarm": by_swarm,
     "pylinkage, differential evolution": by_pylinkage_evolution,

@@ -21,8 +21,9 @@ import argparse
 import csv
 import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import suppress
 from itertools import count
-from math import inf
+from math import inf, isfinite
 from pathlib import Path
 from time import process_time
 from typing import Any, NamedTuple
@@ -31,15 +32,25 @@ import numpy as np
 from rich.console import Console
 from threadpoolctl import threadpool_limits
 
-from analysis.synthesis import Search, synthesize
+from analysis.synthesis import InfeasibleError, Search, synthesize
 from analysis.synthesis.black_box import BlackBox
 from analysis.synthesis.starts import start_of
 
-from .contest import SEARCHES, BlackBoxSearch, Contest, Trace, searched
+from .contest import (
+    BlackBoxSearch,
+    Contest,
+    Trace,
+    by_cma,
+    by_pylinkage_evolution,
+    by_pylinkage_simplex,
+    by_scipy,
+    by_swarm,
+    searched,
+)
 from .targets import TARGETS, Target
 
 OURS = "Linkwork"
-RESULTS = Path(__file__).with_suffix(".csv")
+RESULTS = Path("out/race.csv")
 #: When the error is taken down (s), and the time given to each search.
 TIMES = (0.05, 0.07, 0.1, 0.15, 0.2, 0.3, 0.5, 0.7, 1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 7.0, 10.0)
 BUDGET = 5.0
@@ -75,27 +86,31 @@ def by_linkwork(trace: Trace, box: BlackBox, random: np.random.Generator) -> Non
     for k in count():
         more = 1 << min(k, DOUBLED)
         search = Search(candidates=more * FIRST.candidates, starts=more * FIRST.starts, seed=k)
-        linkage = synthesize(problem.task, problem.bounds, problem.constraints, search=search).best.linkage
-        q = start_of(linkage, contest.normal).q
-        kept = ((q >= limits.low - EXACT) & (q <= limits.high + EXACT)).all()
-        if kept:
-            trace.offer(contest.plain[linkage.branch], q[limits.high > limits.low])
+        with suppress(InfeasibleError):
+            linkage = synthesize(problem.task, problem.bounds, problem.constraints, search=search).best.linkage
+            q = start_of(linkage, contest.normal).q
+            if ((q >= limits.low - EXACT) & (q <= limits.high + EXACT)).all():
+                trace.offer(contest.plain[linkage.branch], q[limits.high > limits.low])
         trace.tick()
 
 
 RACERS: Mapping[str, BlackBoxSearch] = {
     OURS: by_linkwork,
-    **{name: search for name, search in SEARCHES.items() if not name.startswith("simplex")},
+    "SciPy DE": by_scipy,
+    "CMA-ES": by_cma,
+    "pylinkage swarm": by_swarm,
+    "pylinkage DE": by_pylinkage_evolution,
+    "pylinkage Nelder-Mead": by_pylinkage_simplex,
 }
 
 
 def run(target: Target, search: str, budget: float) -> Row:
     """One search on a target."""
-    contest = Contest.of(target)
+    contest = Contest.of(target, on_area=True)
     normal = contest.normal
     with threadpool_limits(1):
         trace = searched(RACERS[search], contest, budget, -inf, process_time)
-    exact = (EXACT * normal.unit) ** 2 * (1.0 if contest.by_area else float(normal.weights.sum()))
+    exact = (EXACT * normal.unit) ** 2 * (1.0 if contest.on_area else float(normal.weights.sum()))
     errors = tuple(trace.at(seconds) if seconds <= budget else np.nan for seconds in TIMES)
     return Row(target.kind, target.name, search, exact, errors)
 
@@ -174,10 +189,9 @@ def rival(of: Mapping[str, Row], seconds: float) -> float:
 
 
 def ahead(of: Mapping[str, Row], seconds: float) -> bool:
-    """Whether no other search has less than our error, but for `LEVEL`."""
-    return of[OURS].at(seconds) <= (1.0 + LEVEL) * rival(of, seconds) < inf or of[OURS].at(seconds) < inf == rival(
-        of, seconds
-    )
+    """Whether we have a linkage, and no other search has less than its error, but for `LEVEL`."""
+    ours = of[OURS].at(seconds)
+    return isfinite(ours) and ours <= (1.0 + LEVEL) * rival(of, seconds)
 
 
 def found(of: Mapping[str, Row], search: str, seconds: float, end: float) -> bool:
@@ -216,22 +230,24 @@ def finals(rows: Sequence[Row]) -> list[list[str]]:
 
 
 def lost(rows: Sequence[Row]) -> list[str]:
-    """The targets on which another search has less than our error, and how much more ours is."""
+    """The targets on which another search has less than our error at the end, and by how much ours is above it."""
     end = last(rows)
     return [
-        f"{kind}, {name}: {of[OURS].at(end) / rival(of, end) - 1.0:.2%} above "
+        f"- {kind}, {name}: {of[OURS].at(end) / rival(of, end) - 1.0:.2%} above "
         f"{min(of.values(), key=lambda row: row.at(end)).search}"
         for (kind, name), of in by_target(rows).items()
         if not ahead(of, end)
     ]
 
 
-def markdown(rows: Sequence[Row], table: str) -> str:
-    """One of the tables for a page: "standings" or "targets"."""
+def markdown(rows: Sequence[Row], of: str) -> str:
+    """A part of a page: the tables "standings" and "targets", or the list "lost"."""
+    if of == "lost":
+        return "\n".join(lost(rows) or ["None."])
     headings, lines = {
         "standings": (["s", "Linkwork ahead", *RACERS], standings),
         "targets": (["kind", "target", *RACERS], finals),
-    }[table]
+    }[of]
     return "\n".join(f"| {' | '.join(line)} |" for line in (headings, ["---"] * len(headings), *lines(rows)))
 
 
@@ -275,8 +291,8 @@ def main(path: Path, targets: Sequence[Target], searches: Sequence[str], budget:
     write(path, [row for row in read(path) if row.search not in again])
     completed(path, targets, searches, budget, lambda text: console.print(text, highlight=False))
     rows = read(path)
-    for line in (markdown(rows, "targets"), markdown(rows, "standings"), "Lost:", *lost(rows)):
-        console.print(line, highlight=False, markup=False)
+    for part in ("targets", "standings", "lost"):
+        console.print(f"{part}\n{markdown(rows, part)}\n", highlight=False, markup=False)
 
 
 if __name__ == "__main__":

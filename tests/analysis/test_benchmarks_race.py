@@ -1,0 +1,155 @@
+"""The race of `benchmarks.race`: its targets, what the searches are scored by, its results, and how they are counted."""
+
+from __future__ import annotations
+
+from collections import Counter
+from math import inf, nan, radians
+from pathlib import Path
+from time import process_time
+
+import numpy as np
+import pytest
+
+from analysis.synthesis import Linkage
+from benchmarks import race
+from benchmarks.contest import Contest, PylinkageScore, searched
+from benchmarks.race import OURS, RACERS, TIMES, Row
+from benchmarks.targets import TARGETS, Target
+
+pytest.importorskip("pylinkage")
+pytest.importorskip("cma")
+
+
+def target(kind: str, name: str) -> Target:
+    return next(t for t in TARGETS if (t.kind, t.name) == (kind, name))
+
+
+def row(search: str, *errors: float, name: str = "square", exact: float = 0.0) -> Row:
+    """A row whose last error goes on until the end."""
+    return Row("polygonal", name, search, exact, (*errors, *[errors[-1]] * (len(TIMES) - len(errors))))
+
+
+def rows(ours: float, least: float, other: float = 9.0, name: str = "square", exact: float = 0.0) -> list[Row]:
+    searches = [search for search in RACERS if search != OURS]
+    errors = dict.fromkeys(searches, other) | {OURS: ours, searches[1]: least}
+    return [row(search, error, name=name, exact=exact) for search, error in errors.items()]
+
+
+def test_ten_targets_of_each_kind() -> None:
+    assert Counter(t.kind for t in TARGETS) == dict.fromkeys(("timed", "untimed", "polygonal", "drawn", "function"), 10)
+    assert len({(t.kind, t.name) for t in TARGETS}) == 50
+
+
+def test_the_same_targets_every_time() -> None:
+    from benchmarks.targets import drawn, waves
+
+    np.testing.assert_array_equal(drawn(3).points, target("drawn", "seed 3").task.path.points)
+    np.testing.assert_array_equal(waves(2).angle, target("function", "waves 2").task.angle)
+
+
+@pytest.mark.parametrize(
+    ("kind", "name"),
+    [("timed", "line in a third of a turn"), ("timed", "18 points"), ("function", "sine"), ("function", "waves 1")],
+)
+def test_pylinkage_is_scored_as_the_others_over_any_rotation(kind: str, name: str) -> None:
+    contest = Contest.of(target(kind, name))
+    random = np.random.default_rng(1)
+    compared = 0
+    for box in contest.boxes:
+        score = PylinkageScore(contest, box)
+        for x in random.uniform(box.low, box.high, (200, len(box.low))):
+            value = score(score.four_bar, x.tolist())
+            # nearer to the limit of assembly pylinkage may go over to the other one
+            if Linkage.from_vector(score.four_bar.q[:10], box.branch).least_transmission > radians(25.0):
+                compared += 1
+                assert value == pytest.approx(box.charge(x), rel=1e-9)
+    assert compared > 20
+
+
+def test_an_area_is_scored_by_the_measure_of_the_task() -> None:
+    contest = Contest.of(target("polygonal", "L"), on_area=True)
+    assert contest.on_area
+    random = np.random.default_rng(1)
+    measured = charged = 0
+    for box in contest.boxes:
+        score = PylinkageScore(contest, box)
+        for x in random.uniform(box.low, box.high, (300, len(box.low))):
+            value, error = contest.charged_area(box, x), contest.error(box, x)
+            if not np.isfinite(value):
+                continue
+            if np.isfinite(error):
+                measured += 1
+                assert value * contest.normal.unit**2 == pytest.approx(error, rel=1e-9)
+            if Linkage.from_vector(contest.unknowns(x)[:10], box.branch).least_transmission > radians(25.0):
+                charged += 1
+                assert score.charged_area(score.four_bar, x.tolist()) == pytest.approx(value, rel=1e-9)
+        assert contest.charged_area(box, box.high + 1.0) == inf
+    assert measured > 10
+    assert charged > 10
+
+
+def test_linkwork_races_as_the_others_do() -> None:
+    contest = Contest.of(target("function", "sine"))
+    # a search of any kind ends as soon as it has enough; least squares leave 0.0059 rad2
+    trace = searched(race.by_linkwork, contest, 60.0, 0.006, process_time)
+    assert 0.0058 < trace.best <= 0.006
+    assert trace.at(inf) == trace.best
+    assert trace.at(0.0) == inf
+
+
+def test_results_are_kept_when_a_run_is_stopped(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path, ran = tmp_path / "race.csv", []
+
+    def run(target: Target, search: str, budget: float) -> Row:
+        if len(ran) == 3:
+            raise KeyboardInterrupt
+        ran.append((target.name, search))
+        return Row(target.kind, target.name, search, 1e-12, tuple(0.5 if t <= budget else nan for t in TIMES))
+
+    monkeypatch.setattr(race, "run", run)
+    monkeypatch.setattr(race, "prepared", lambda: None)
+    two, searches = [target("polygonal", "square"), target("timed", "eight")], [OURS, "CMA-ES"]
+    with pytest.raises(KeyboardInterrupt):
+        race.completed(path, two, searches, 1.0, lambda text: None)
+    kept = race.read(path)
+    assert len(kept) == 3
+    assert race.last(kept) == 1.0
+    race_on = ran.copy()
+    ran.clear()
+    race.completed(path, two, searches, 1.0, lambda text: None)
+    assert ran == [("eight", "CMA-ES")]
+    assert race_on + ran == [(t.name, s) for t in two for s in searches]
+    # in the order of the targets, whatever the order of the runs
+    assert [r.target for r in race.read(path)] == ["eight", "eight", "square", "square"]
+    assert not list(tmp_path.glob("*.new"))
+
+
+@pytest.mark.parametrize(
+    ("ours", "least", "exact", "is_ahead"),
+    [
+        (1.0, 2.0, 0.0, True),
+        (1.0005, 1.0, 0.0, True),
+        (1.002, 1.0, 0.0, False),
+        (1e-13, 1e-20, 1e-12, True),
+        (inf, inf, 0.0, False),
+        (1.0, inf, 0.0, True),
+    ],
+)
+def test_who_is_ahead(ours: float, least: float, exact: float, is_ahead: bool) -> None:
+    of = race.by_target(rows(ours, least, other=inf, exact=exact))["polygonal", "square"]
+    assert race.ahead(of, TIMES[-1]) is is_ahead
+
+
+def test_the_tables_count() -> None:
+    both = rows(1.0, 2.0) + rows(3.0, 2.0, name="L")
+    # a target that not all have run for does not count
+    both.append(row(OURS, 1.0, name="star"))
+    *_, final = race.standings(both)
+    assert final == ["10", "1 of 2", "1", "0", "1", "0", "0", "0"]
+    assert race.lost(both) == ["- polygonal, L: 50.00% above CMA-ES"]
+    page = race.markdown(both, "targets").splitlines()
+    assert page[2] == "| polygonal | square | **1** | 9 | 2 | 9 | 9 | 9 |"
+    assert page[3] == "| polygonal | L | 3 | 9 | **2** | 9 | 9 | 9 |"
+    assert race.markdown(rows(1.0, 2.0), "lost") == "None."
+    assert race.last([row(OURS, 1.0), row("CMA-ES", 1.0, 1.0, *[nan] * (len(TIMES) - 2))]) == TIMES[1]
+    assert race.picture(both).axes
