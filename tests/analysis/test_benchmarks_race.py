@@ -125,19 +125,22 @@ def test_results_are_kept_when_a_run_is_stopped(tmp_path: Path, monkeypatch: pyt
 
 
 @pytest.mark.parametrize(
-    ("ours", "least", "exact", "is_ahead"),
+    ("ours", "least", "exact", "is_ahead", "is_level"),
     [
-        (1.0, 2.0, 0.0, True),
-        (1.0005, 1.0, 0.0, True),
-        (1.002, 1.0, 0.0, False),
-        (1e-13, 1e-20, 1e-12, True),
-        (inf, inf, 0.0, False),
-        (1.0, inf, 0.0, True),
+        (1.0, 2.0, 0.0, True, False),
+        (1.0, 1.002, 0.0, True, False),
+        (1.0, 1.0005, 0.0, True, True),
+        (1.0005, 1.0, 0.0, True, True),
+        (1.002, 1.0, 0.0, False, False),
+        (1e-13, 1e-20, 1e-12, True, True),
+        (inf, inf, 0.0, False, False),
+        (1.0, inf, 0.0, True, False),
     ],
 )
-def test_who_is_ahead(ours: float, least: float, exact: float, is_ahead: bool) -> None:
+def test_who_is_ahead(ours: float, least: float, exact: float, is_ahead: bool, is_level: bool) -> None:
     of = race.by_target(rows(ours, least, other=inf, exact=exact))["polygonal", "square"]
     assert race.ahead(of, TIMES[-1]) is is_ahead
+    assert race.level(of, TIMES[-1]) is is_level
 
 
 def test_the_tables_count() -> None:
@@ -145,11 +148,18 @@ def test_the_tables_count() -> None:
     # a target that not all have run for does not count
     both.append(row(OURS, 1.0, name="star"))
     *_, final = race.standings(both)
-    assert final == ["10", "1 of 2", "1", "0", "1", "0", "0", "0"]
+    assert final == ["10", "1 of 2", "0", "1", "0", "1", "0", "0"]
     assert race.lost(both) == ["- polygonal, L: 50.00% above CMA-ES"]
     page = race.markdown(both, "targets").splitlines()
-    assert page[2] == "| polygonal | square | **1** | 9 | 2 | 9 | 9 | 9 |"
-    assert page[3] == "| polygonal | L | 3 | 9 | **2** | 9 | 9 | 9 |"
+    assert page[2] == "| polygonal | square | **1** | 9 | 2 | 9 | 9 |"
+    assert page[3] == "| polygonal | L | 3 | 9 | **2** | 9 | 9 |"
     assert race.markdown(rows(1.0, 2.0), "lost") == "None."
     assert race.last([row(OURS, 1.0), row("CMA-ES", 1.0, 1.0, *[nan] * (len(TIMES) - 2))]) == TIMES[1]
     assert race.picture(both).axes
+
+
+@pytest.mark.parametrize("search", ["CMA-ES", "pylinkage Nelder-Mead"])
+def test_the_searches_end_on_the_area(search: str) -> None:
+    # of 1 m2 inside; at equal shares of the length the best is a circle with 0.182
+    contest = Contest.of(target("polygonal", "square"), on_area=True)
+    assert searched(RACERS[search], contest, 60.0, 0.9, process_time).best <= 0.9
