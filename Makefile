@@ -9,7 +9,7 @@ PYTEST := $(BIN)/python -m pytest
 # every file of tests on one core, so that its fixtures are made once; the file that takes longest goes first
 PARALLEL := --numprocesses auto --dist loadfile tests/test_docs.py tests
 
-.PHONY: demo quick test test-all lint docs figures bench bench-targets mutate release clean
+.PHONY: demo quick test test-all lint docs figures bench bench-targets mutate studio release clean
 
 demo: $(RUN)
 	$(BIN)/python build_fmu.py
@@ -56,6 +56,11 @@ bench-targets: $(DEV)
 mutate: $(DEV)
 	$(BIN)/pip install --quiet --editable '.[dev,mutation]'
 	nice $(BIN)/python -m tests.mutate $(OF)
+
+# the page of the studio, from its sources in studio/; takes node and npm, which nothing else does
+studio: $(DEV)
+	cd studio && npm ci --no-audit --no-fund --ignore-scripts && npm run --silent check && npm run --silent build
+	$(BIN)/python -m analysis.studio
 
 # wheel, FMUs of every kind for all platforms, and what fmi-standard.org asks to be published with them
 release: $(DEV)

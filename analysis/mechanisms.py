@@ -9,7 +9,7 @@ from typing import Any
 from linkwork import five_bar, slider_crank
 from linkwork.errors import InputError, LinkworkError
 from linkwork.five_bar.parameters import FiveBarParameters as FiveBarParameters
-from linkwork.mechanism import Channel, Mechanism
+from linkwork.mechanism import PARTS, Channel, Mechanism
 from linkwork.parameters import Rules, fmi_name
 from linkwork.slider_crank.parameters import SliderCrankParameters as SliderCrankParameters
 from linkwork.variables import UNITS, status_variables
@@ -36,7 +36,7 @@ def check(mechanism: Mechanism) -> None:
         With the first of what does not.
     """
     # the later take for granted what the earlier look at
-    for faults in (_faults_of_interface, _faults_of_drives, _faults_of_equations):
+    for faults in (_faults_of_interface, _faults_of_drives, _faults_of_equations, _faults_of_drawing):
         for fault in faults(mechanism):
             raise MechanismError(f"mechanism {mechanism.name}: {fault}")
 
@@ -144,6 +144,31 @@ def _faults_of_equations(m: Mechanism) -> Iterator[str]:
         ):
             if len(found) != size:
                 yield f"{what} gives {len(found)} numbers with {name}: it must give {size}"
+
+
+def _faults_of_drawing(m: Mechanism) -> Iterator[str]:
+    if m.drawing is None:
+        return
+    known = next(iter(m.published.values()))
+    p, x = known.parameters.constants(), m.state(known.initial)
+    acting = m.equations.applied(tuple(float(mode.default) for mode in m.modes), (0.0,) * len(m.channels), p)
+    names = [joint.name for joint in m.drawing.joints]
+    found = m.drawing.positions(x, acting, p)
+    if len(found) != 3 * len(names):
+        yield f"its picture has {len(found)} coordinates of {len(names)} joints: it must have three of each"
+    parameters = {v.name for v in m.variables if v.causality == "parameter" and v.kind == "Real"}
+    for joint in m.drawing.joints:
+        if len(joint.moves) > 2 or not parameters >= set(joint.moves):
+            yield f"joint {joint.name} moves {', '.join(joint.moves)}: it must move two real parameters at most"
+    for part in m.drawing.parts:
+        least = PARTS.get(part.kind)
+        if least is None or len(part.joints) < least or (part.kind != "link" and len(part.joints) > least):
+            yield f"the {part.text} is a {part.kind!r} of {len(part.joints)} joints: it must be one of {PARTS}"
+        if part.where and part.where not in parameters:
+            yield f"the {part.text} is drawn where {part.where!r} is not zero: it must be a real parameter"
+    for name in (*m.drawing.paths, *(name for part in m.drawing.parts for name in part.joints)):
+        if name not in names:
+            yield f"its picture has no joint {name!r}"
 
 
 class _Published(Mapping[str, Any]):

@@ -36,6 +36,7 @@ COMMANDS = {
     "slider-crank": ("slider_crank", "Analyse the generalised slider-crank of Rahman's thesis."),
     "slider-motion": ("slider", "Let the slider move, so that a linkage does its task better."),
     "stability": ("vibration", "Judge the periodic motion and chart where it is unstable."),
+    "studio": ("studio", "Open a page on which a mechanism moves and can be dragged."),
     "synthesize": ("design", "Find linkages for a path, a function or a motion."),
     "tune": ("tuning", "Change parameters least so that a range of speeds is clear."),
 }

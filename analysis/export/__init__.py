@@ -4,8 +4,10 @@ from .archive import SOURCES, BuildError, try_out
 from .builds import Built, build_all, kinds_here
 from .compatibility import publish
 from .description import KINDS, NATIVE, NATIVE_FMI3, PYTHON, Kind
+from .interface import interface
 from .native_fmu import PLATFORMS, build_native, compile_library, source_files, this_platform
 from .python_fmu import build
+from .web import build_web
 
 __all__ = [
     "KINDS",
@@ -20,7 +22,9 @@ __all__ = [
     "build",
     "build_all",
     "build_native",
+    "build_web",
     "compile_library",
+    "interface",
     "kinds_here",
     "publish",
     "source_files",

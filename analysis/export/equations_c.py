@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import json
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import fields
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -44,18 +44,22 @@ _START = "constants, RULES and error_scale must be arithmetic without branches, 
 
 
 def _equations(mechanism: Mechanism) -> str:
-    casadi = symbolic.library()
-    options = {"with_header": False, "main": False, "casadi_int": "int", "with_export": False, "with_mem": False}
-    generator = casadi.CodeGenerator("equations.c", options)
     made = {function.name(): function for function in functions(mechanism)}
-    for function in made.values():
+    text = c_of(made.values(), "equations")
+    return text + _choices(mechanism, made["equations_solution"].numel_out(0)) if mechanism.switch else text
+
+
+def c_of(functions: Iterable[Any], file: str) -> str:
+    """Functions of CasADi as C, for the shell; ``file`` is the name that what they share begins with."""
+    options = {"with_header": False, "main": False, "casadi_int": "int", "with_export": False, "with_mem": False}
+    generator = symbolic.library().CodeGenerator(f"{file}.c", options)
+    for function in functions:
         generator.add(function)
     with TemporaryDirectory(prefix="linkwork-c-") as folder:
         generator.generate(f"{folder}/")
-        text = (Path(folder) / "equations.c").read_text(encoding="utf-8")
+        text = (Path(folder) / f"{file}.c").read_text(encoding="utf-8")
     # the shell leaves out no argument and no result: without these questions the code is smaller
-    text = re.sub(r"arg\[(\d+)\]\? (arg\[\1\]\[\d+\]) : 0", r"\2", re.sub(r"if \(res\[\d+\]!=0\) ", "", text))
-    return text + _choices(mechanism, made["equations_solution"].numel_out(0)) if mechanism.switch else text
+    return re.sub(r"arg\[(\d+)\]\? (arg\[\1\]\[\d+\]) : 0", r"\2", re.sub(r"if \(res\[\d+\]!=0\) ", "", text))
 
 
 def _choices(mechanism: Mechanism, numbers: int) -> str:
@@ -118,7 +122,7 @@ def _table(mechanism: Mechanism, switched: bool) -> dict[str, tuple[list[Any], l
     trace = equations.expressions(mechanism, switched)
     s = trace.symbols
     try:
-        own, state, p, x, scale, bounds = _beginning(mechanism, s.modes, s.u)
+        own, state, p, x, scale, bounds = beginning(mechanism, s.modes, s.u)
     except RuntimeError as error:
         raise LinkworkError(f"the start of {mechanism.name} cannot be traced: {_START}") from error
     dx, du, dp = (sx.sym(f"d{n}", *v.shape) for n, v in (("x", s.x), ("u", s.u), ("p", s.p)))
@@ -206,7 +210,7 @@ def _in_solution(
     return parts, symbols, expressions
 
 
-def _beginning(mechanism: Mechanism, modes: Any, u: Any) -> tuple[Any, ...]:
+def beginning(mechanism: Mechanism, modes: Any, u: Any) -> tuple[Any, ...]:
     """Parameters and given state as symbols; constants with the energy, state, its scale and the least parameters of these."""
     casadi = symbolic.library()
     own, parameters, functions = equations.of_parameters(mechanism)

@@ -120,6 +120,73 @@ class Equations(NamedTuple):
     energy: Callable[..., float]
 
 
+class Joint(NamedTuple):
+    """A point of the picture of a mechanism.
+
+    Attributes
+    ----------
+    name : str
+        Its letter.
+    text : str
+        What it is.
+    moves : tuple of str
+        FMI parameters, one or two, that change so that the point goes where it is dragged; none where it stays.
+    """
+
+    name: str
+    text: str
+    moves: tuple[str, ...] = ()
+
+
+class Part(NamedTuple):
+    """Something that is drawn through points.
+
+    Attributes
+    ----------
+    kind : str
+        ``pivot`` (a bearing of the ground at a point), ``link`` (through two points or more), ``guide`` (a line through two
+        points), ``slider`` (a block at the first point, in the direction of the next two), ``spring``, ``damper`` (from a
+        slider to the ground, with the slider's points) or ``axis`` (a centre line through two points).
+    joints : tuple of str
+    text : str
+        What it is.
+    where : str
+        FMI parameter that is not zero where there is such a part; empty where there always is.
+    """
+
+    kind: str
+    joints: tuple[str, ...]
+    text: str
+    where: str = ""
+
+
+#: Points by kind of part: as many, or at least as many as a link has.
+PARTS = {"pivot": 1, "link": 2, "guide": 2, "slider": 3, "spring": 3, "damper": 3, "axis": 2}
+
+
+class Drawing(NamedTuple):
+    """How a mechanism is drawn.
+
+    Attributes
+    ----------
+    joints : tuple of Joint
+    positions : callable
+        ``positions(x, i, p)``: x, y and z of every joint (m); a straight line of arithmetic like the equations.
+    parts : tuple of Part
+        From the back to the front.
+    paths : tuple of str
+        Joints whose paths are drawn.
+    planar : bool
+        Whether all moves in the plane z = 0.
+    """
+
+    joints: tuple[Joint, ...]
+    positions: Callable[..., Any]
+    parts: tuple[Part, ...]
+    paths: tuple[str, ...]
+    planar: bool = True
+
+
 class PublishedSet(NamedTuple):
     """A mechanism as printed: parameters, state at the start, the rate of the first freedom that it is run at, source."""
 
@@ -169,6 +236,8 @@ class Mechanism:
     switch : str
         Name of the one constant, zero or greater, on which the equations may branch: on whether it is zero. They are traced
         once for either, so that what is switched off costs nothing. Empty where there is none.
+    drawing : Drawing or None
+        How it is drawn; None where there is no picture of it.
     """
 
     name: str
@@ -189,6 +258,7 @@ class Mechanism:
     check_assembly: Callable[[Any, Sequence[float]], None]
     error_scale: Callable[[Any, Sequence[float]], tuple[float, ...]]
     switch: str = ""
+    drawing: Drawing | None = None
 
     def __reduce__(self) -> Any:
         # by its package: a copy would be another mechanism

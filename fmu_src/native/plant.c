@@ -188,7 +188,7 @@ bool plant_jams(const Plant *a, const double x[STATES]) {
     return fabs(clearance_of(&smooth, x)) >= NEAR_CLEARANCE;
 }
 
-static Reason check_assembly(const Plant *a, const double x[STATES], char sentence[SENTENCE]) {
+Reason plant_check_assembly(const Plant *a, const double x[STATES], char sentence[SENTENCE]) {
     char where[SENTENCE];
     double clearance = clearance_of(a, x);
     if (clearance >= LIMIT_CLEARANCE) return GOOD;
@@ -217,7 +217,7 @@ Reason plant_begin(Plant *a, char sentence[SENTENCE]) {
     what_begins(a, own, state, u);
     call(equations_begin, (const double *[]){a->modes, own, state, u}, (double *[]){a->p, a->x, a->scale});
     if (!all_finite(a->p, CONSTANTS - 1)) return blame_extreme(a, sentence);
-    reason = check_assembly(a, a->x, sentence);
+    reason = plant_check_assembly(a, a->x, sentence);
     if (reason != GOOD) return reason;
     if (!all_finite(a->p, CONSTANTS)) {
         char where[SENTENCE];
@@ -351,7 +351,7 @@ static Reason integrate(Plant *a, double x[STATES], double time, double *duratio
             if (!all_finite(slope, STATES)) error = NAN;
         }
         if (error <= 1.0) {
-            reason = check_assembly(a, result, cause);
+            reason = plant_check_assembly(a, result, cause);
             if (reason != GOOD) {
                 if (early) done += up_to_limit(a, done, x, h, k);
                 snprintf(sentence, SENTENCE, "in the step from t = %s s: %s", digits(first, time), cause);
@@ -451,7 +451,7 @@ Reason plant_outputs(Plant *a, char sentence[SENTENCE]) {
     if (!all_finite(y, OUTPUTS)) {
         int largest = 0;
         Digits time, number;
-        reason = check_assembly(a, x, sentence);
+        reason = plant_check_assembly(a, x, sentence);
         if (reason != GOOD) return reason;
         for (int i = 1; i < INPUTS; i++)
             if (fabs(u[i]) > fabs(u[largest])) largest = i;

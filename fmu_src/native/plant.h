@@ -55,6 +55,9 @@ Reason plant_begin(Plant *a, char sentence[SENTENCE]);
    of assembly ends there and is good, with the reason LIMIT_OF_ASSEMBLY in `ended`. */
 Reason plant_step(Plant *a, double time, double step, const Watch *watch, bool early, Reason *ended, char sentence[SENTENCE]);
 
+/* Whether the links can be joined at a state, clear of the limit of assembly; if not, the sentence. */
+Reason plant_check_assembly(const Plant *a, const double x[STATES], char sentence[SENTENCE]);
+
 /* Where the clearance is small: whether friction may jam the links there, and they are clear of the limit of assembly. */
 bool plant_jams(const Plant *a, const double x[STATES]);
 

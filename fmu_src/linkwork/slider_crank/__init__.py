@@ -6,7 +6,7 @@ from math import pi
 
 from .. import friction
 from ..mechanism import Channel, Equations, Freedom, Mechanism, Mode
-from . import assembly, dynamics, kinematics, published, variables, vectors
+from . import assembly, drawing, dynamics, kinematics, published, variables, vectors
 from .parameters import InitialState, SliderCrankParameters
 
 MECHANISM = Mechanism(
@@ -76,4 +76,5 @@ MECHANISM = Mechanism(
     ),
     check_assembly=lambda parameters, x: assembly.check_assembly(parameters, x[0], x[1]),
     error_scale=assembly.error_scale,
+    drawing=drawing.DRAWING,
 )

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from math import pi
 from typing import ClassVar
 
-from linkwork.mechanism import Channel, Equations, Freedom, Mechanism, PublishedSet
+from linkwork.mechanism import Channel, Drawing, Equations, Freedom, Joint, Mechanism, Part, PublishedSet
 from linkwork.parameters import Rules, check_initial, check_parameters
 from linkwork.variables import Variable, output, status_variables, tolerance_parameter
 
@@ -91,4 +91,10 @@ MECHANISM = Mechanism(
     ),
     check_assembly=lambda parameters, x: None,
     error_scale=equations.error_scale,
+    drawing=Drawing(
+        joints=(Joint("A", "pivot"), Joint("B", "end", ("initial.pendulum_angle",))),
+        positions=equations.places,
+        parts=(Part("pivot", ("A",), "bearing"), Part("link", ("A", "B"), "rod")),
+        paths=("B",),
+    ),
 )

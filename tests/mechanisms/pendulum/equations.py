@@ -41,6 +41,11 @@ def outputs(x: State, torque: float, start_energy: float, p: Constants) -> tuple
     return (x[0], x[1], acceleration(x, torque, p), energy(x, p) - start_energy + x[2] - x[3])
 
 
+def places(x: State, torque: float, p: Constants) -> tuple[float, ...]:
+    """Pivot and end of a rod of 1 m."""
+    return (0.0, 0.0, 0.0, cos(x[0]), sin(x[0]), 0.0)
+
+
 def clearance(x: State, torque: float, p: Constants) -> float:
     """There is no limit of assembly."""
     return 1.0

@@ -1,0 +1,115 @@
+"""A mechanism for a browser: the C of a native FMU behind a face of its own, as WebAssembly that imports nothing.
+
+The sizes of the arrays are those of the mechanism, so that each has a module of its own.
+"""
+
+from __future__ import annotations
+
+import sys
+import tempfile
+from pathlib import Path
+from typing import Any
+
+from linkwork.mechanism import Mechanism
+
+from ..mechanisms import check
+from ..numerics import symbolic
+from .archive import SOURCES
+from .description import NATIVE
+from .equations_c import beginning, c_of, generated
+from .native_fmu import OPTIONS, compile_library
+
+TARGET = "wasm32-wasi"
+_SHELL = ("model.h", "plant.h", "plant.c", "studio.c")
+_OPTIONS = (
+    *(option for option in OPTIONS if option not in ("-shared", "-fPIC", "-fvisibility=hidden")),
+    "-mexec-model=reactor", "-Wl,-z,stack-size=262144",
+)  # fmt: skip
+
+
+def build_web(mechanism: Mechanism) -> bytes:
+    """The WebAssembly of a mechanism; see `fmu_src/native/studio.c` for what it exports.
+
+    Raises
+    ------
+    BuildError
+        If Zig is not installed, or a file does not compile.
+    MechanismError
+        If the parts of the mechanism do not fit together.
+    """
+    check(mechanism)
+    with tempfile.TemporaryDirectory(prefix="linkwork-web-") as folder:
+        for name, text in web_sources(mechanism).items():
+            (Path(folder) / name).write_text(text, encoding="utf-8")
+        files = ["plant.c", "studio.c", "equations.c", "tables.c", "drawing.c"]
+        compile_library(folder, files, "module.wasm", TARGET, _OPTIONS)
+        return (Path(folder) / "module.wasm").read_bytes()
+
+
+def web_sources(mechanism: Mechanism) -> dict[str, str]:
+    """All C files of a mechanism's module by name."""
+    files = {name: (SOURCES / "native" / name).read_text(encoding="utf-8") for name in _SHELL}
+    return files | generated(mechanism, NATIVE) | {"drawing.h": _header(mechanism), "drawing.c": _drawing(mechanism)}
+
+
+def _header(mechanism: Mechanism) -> str:
+    """drawing.h: what the module has beside a native FMU."""
+    joints = mechanism.drawing.joints if mechanism.drawing else ()
+    freedoms = mechanism.freedoms
+    crank = next((n for n, freedom in enumerate(freedoms) if freedom.period > 0.0), -1)
+    forces = {c.argument for c in mechanism.channels if c.kind == "force"}
+    modes = [-1 if freedom.mode is None else mechanism.modes.index(freedom.mode) for freedom in freedoms]
+    freeing = [
+        sum(1 << n for n, argument in enumerate(freedom.mode.arguments) if argument in forces) if freedom.mode else 0
+        for freedom in freedoms
+    ]
+    return "\n".join(
+        [
+            f"/* The picture of a {mechanism.name}, and what leaves its freedoms free. Generated. */",
+            '#include "model.h"',
+            f"enum {{ JOINTS = {len(joints)}, CRANK = {crank} }};",
+            f"#define PERIOD {freedoms[crank].period if crank >= 0 else 0.0!r}",
+            "/* of each freedom: its mode, -1 without; a bit for each value of the mode that leaves it to a force */",
+            f"static const int mode_of[FREEDOMS] = {{{', '.join(map(str, modes))}}};",
+            f"static const int freeing[FREEDOMS] = {{{', '.join(map(str, freeing))}}};",
+            "Equation equations_joints;         /* x, m, u, p -> places */",
+            "Equation equations_joints_forward; /* m, parameters, state as given, u, dparameters, dstate -> dplaces */",
+            "",
+        ]
+    )
+
+
+def _drawing(mechanism: Mechanism) -> str:
+    """drawing.c: where the joints are, and how that changes with what is given."""
+    casadi = symbolic.library()
+    join, sx = casadi.vertcat, casadi.SX
+    modes, u = sx.sym("modes", len(mechanism.modes)), sx.sym("u", len(mechanism.channels))
+    x, p = sx.sym("x", mechanism.size), sx.sym("p", len(mechanism.constants._fields) + 1)
+    own, state, p_begun, x_begun, _, _ = beginning(mechanism, modes, u)
+    at = casadi.Function("at", [x, modes, u, p], [_places(mechanism, x, modes, u, p)])
+    given = join(own, state)
+    d_own, d_state = sx.sym("d_own", *own.shape), sx.sym("d_state", *state.shape)
+    change = casadi.jtimes(at(x_begun, modes, u, p_begun), given, join(d_own, d_state))
+    made = (
+        casadi.Function(f"equations_{name}", arguments, [casadi.densify(result)], {"cse": True})
+        for name, arguments, result in (
+            ("joints", [x, modes, u, p], at(x, modes, u, p)),
+            ("joints_forward", [modes, own, state, u, d_own, d_state], change),
+        )
+    )
+    return c_of(made, "drawing")
+
+
+def _places(mechanism: Mechanism, x: Any, modes: Any, u: Any, p: Any) -> Any:
+    casadi = symbolic.library()
+    drawing = mechanism.drawing
+    if drawing is None:
+        return casadi.SX.zeros(1)
+    functions = symbolic.traced((*mechanism.modules, sys.modules[drawing.positions.__module__]))
+    *constants, _ = casadi.vertsplit(p)
+    k = mechanism.constants(*constants)
+    if mechanism.switch:  # where the joints are, friction does not say
+        k = k._replace(**{mechanism.switch: 0.0})
+    modes, channels = (tuple(casadi.vertsplit(v)) if v.numel() else () for v in (modes, u))
+    acting = functions.of(mechanism.equations.applied)(modes, channels, k)
+    return casadi.vertcat(*functions.of(drawing.positions)(tuple(casadi.vertsplit(x)), acting, k))

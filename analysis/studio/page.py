@@ -1,0 +1,106 @@
+"""The page in one file: built from `studio/` and the registry, kept beside this module, and opened with a state."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import re
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+from linkwork import __version__
+from linkwork.errors import InputError
+from linkwork.mechanism import Mechanism
+
+from ..export import SOURCES
+from ..files import write_text
+from ..mechanisms import MECHANISMS
+from ..periodic import TOLERANCE
+from .state import opening_state
+from .tables import tables_of
+
+#: The built page.
+PAGE = Path(__file__).with_name("page.html")
+#: Of a checkout, and in it the page without its mechanisms, as `npm run build` writes it.
+ROOT = SOURCES.parent
+TEMPLATE = ROOT / "studio" / "build" / "page.html"
+#: What the page is made of, by patterns of files of a checkout.
+_MADE_OF = (
+    "analysis/export/equations_c.py",
+    "analysis/export/web.py",
+    "analysis/studio/*.py",
+    "fmu_src/linkwork/**/*.py",
+    "fmu_src/native/model.h",
+    "fmu_src/native/plant.*",
+    "fmu_src/native/studio.c",
+    "studio/*.*",
+    "studio/src/*",
+)
+_HASH = '<meta name="sources" content="{}">'
+
+
+def hash_of_sources() -> str:
+    """Hash of all files of the checkout that the page is made of."""
+    found = hashlib.sha256()
+    for path in sorted({path for pattern in _MADE_OF for path in ROOT.glob(pattern) if path.is_file()}):
+        found.update(f"{path.relative_to(ROOT).as_posix()}\n".encode())
+        found.update(path.read_bytes())
+    return found.hexdigest()
+
+
+def fresh() -> bool:
+    """Whether the built page is of the sources of this checkout."""
+    return _HASH.format(hash_of_sources()) in PAGE.read_text(encoding="utf-8")
+
+
+def build_page(template: str | None = None, mechanisms: Iterable[Mechanism] | None = None) -> str:
+    """The page with mechanisms, which Zig compiles.
+
+    Parameters
+    ----------
+    template : str, optional
+        A page, by default as `npm run build` wrote it: what mechanisms it has are replaced.
+    mechanisms : iterable of Mechanism, optional
+        All registered ones by default.
+
+    Raises
+    ------
+    InputError
+        If `npm run build` has written nothing.
+    """
+    if template is None:
+        if not TEMPLATE.is_file():
+            raise InputError(f"{TEMPLATE} is not there: npm run build in {TEMPLATE.parents[1]} writes it")
+        template = TEMPLATE.read_text(encoding="utf-8").replace(
+            "<title>", f"{_HASH.format(hash_of_sources())}\n<title>", 1
+        )
+    made = MECHANISMS.values() if mechanisms is None else mechanisms
+    tables = {"version": __version__, "tolerance": TOLERANCE, "mechanisms": [tables_of(m) for m in made]}
+    return _with(_with(template, "tables", tables), "state", opening_state())
+
+
+def page_of(state: Mapping[str, Any]) -> str:
+    """The built page, which opens with a state; with the state's mechanism alone where it is not one of Linkwork's own.
+
+    Raises
+    ------
+    BuildError
+        If that one has to be compiled, and cannot be.
+    """
+    page = PAGE.read_text(encoding="utf-8")
+    if f'"name":"{state["mechanism"]}"' not in page:
+        page = build_page(page, [MECHANISMS[state["mechanism"]]])
+    return _with(page, "state", state)
+
+
+def main() -> None:
+    """Build the page anew."""
+    write_text(PAGE, build_page())
+
+
+def _with(page: str, script: str, data: Any) -> str:
+    """A page with other data in one of its scripts."""
+    text = json.dumps(data, separators=(",", ":")).replace("<", "\\u003c")
+    pattern = rf'(<script type="application/json" id="{script}">).*?(</script>)'
+    return re.sub(pattern, lambda found: found[1] + text + found[2], page, count=1, flags=re.DOTALL)

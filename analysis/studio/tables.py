@@ -1,0 +1,179 @@
+"""What the page knows of a mechanism: tables from the registry, so that the page itself names none."""
+
+from __future__ import annotations
+
+import base64
+import gzip
+from typing import Any
+
+from linkwork.mechanism import Mechanism, PublishedSet
+from linkwork.parameters import field_name
+from linkwork.variables import UNITS, Variable
+
+from ..export import build_web, interface
+from ..mechanisms import name_in_files
+
+#: Parameters by what they are about, by a word in the name or by the unit; the first that fits.
+_SECTIONS = (
+    ("Start", ("initial.",), ()),
+    ("Gravity", ("gravity", "inclination"), ()),
+    ("Spring, damper, friction", ("stiffness", "spring", "damping", "friction"), ()),
+    ("Masses", ("cog", "product"), ("kg", "kg.m2")),
+    ("Dimensions", ("",), ()),
+)
+DRIVE = "Drive and loads"
+#: Tolerance of a run on the page: its numbers are good to more digits than those of a run by default.
+TOLERANCE = 1e-12
+
+
+def tables_of(mechanism: Mechanism) -> dict[str, Any]:
+    """All that the page needs of a mechanism, with its module."""
+    entries = interface(mechanism)
+    reference = {entry.variable.name: entry.reference for entry in entries}
+    outputs = {v.name: v for v in mechanism.variables if v.name in mechanism.output_names}
+    names = list(mechanism.output_names)
+    crank = next((n for n, freedom in enumerate(mechanism.freedoms) if freedom.period > 0.0), -1)
+    return {
+        "name": mechanism.name,
+        "title": mechanism.title,
+        "module": base64.b64encode(gzip.compress(build_web(mechanism), 9, mtime=0)).decode(),
+        "given": [
+            _given(mechanism, entry.variable, entry.reference)
+            for entry in entries
+            if entry.role in ("parameter", "mode", "initial", "input")
+            and entry.variable.name not in (c.name for c in mechanism.channels if c.kind == "rate")
+        ],
+        "outputs": [{"name": name, "text": v.description, **_unit(v)} for name, v in outputs.items()],
+        "freedoms": [
+            {
+                "coordinate": names.index(freedom.coordinate),
+                "rate": names.index(freedom.rate),
+                "initial": [reference[f"initial.{name}"] for name in freedom.initial],
+                "mode": -1 if freedom.mode is None else reference[freedom.mode.name],
+                "period": freedom.period,
+            }
+            for freedom in mechanism.freedoms
+        ],
+        "crank": crank,
+        "states": mechanism.size,
+        "tolerance": [reference["solver.tolerance"], TOLERANCE],
+        "picture": _picture(mechanism, reference),
+        "moving": [names.index(name) for name in _moving(mechanism)],
+        "charts": _charts(mechanism),
+        "transmission": names.index("transmission.angle") if "transmission.angle" in names else -1,
+        "sets": [
+            {"name": name, "source": known.source, "values": published_values(mechanism, known)}
+            for name, known in mechanism.published.items()
+        ],
+    }
+
+
+def published_values(mechanism: Mechanism, known: PublishedSet) -> dict[str, float]:
+    """What is given in a published set that is run at its speed, by FMI name."""
+    return values_of(mechanism, known.parameters, known.initial) | {
+        channel.name: known.crank_speed
+        for channel in mechanism.channels
+        if channel.kind == "command" and mechanism.freedoms[channel.freedom].period > 0.0
+    }
+
+
+def values_of(mechanism: Mechanism, parameters: Any, initial: Any) -> dict[str, float]:
+    """Parameters and state at the start by FMI name."""
+    own = {name: getattr(parameters, field_name(name)) for name in mechanism.mechanism_variables}
+    start = {variable.name: getattr(initial, name) for name, variable in mechanism.initial_variables.items()}
+    return {name: float(value) for name, value in (own | start).items()}
+
+
+def _unit(variable: Variable) -> dict[str, Any]:
+    """The unit that people think in, and the factor to it."""
+    displays = dict(UNITS[variable.unit].displays) if variable.kind == "Real" else {}
+    shown = variable.display or ("" if variable.unit == "rad/s" else next(iter(displays), ""))
+    unit = shown or variable.unit
+    return {"unit": "" if unit == "1" else unit, "factor": displays.get(unit, 1.0)}
+
+
+def _given(mechanism: Mechanism, variable: Variable, reference: int) -> dict[str, Any]:
+    mode = next((mode for mode in mechanism.modes if mode.name == variable.name), None)
+    channel = next((channel for channel in mechanism.channels if channel.name == variable.name), None)
+    row: dict[str, Any] = {
+        "name": variable.name,
+        "reference": reference,
+        "text": variable.description,
+        "start": float(variable.start),
+        "section": DRIVE if mode or channel else _section(variable),
+        **_unit(variable),
+    }
+    if variable.minimum is not None:
+        row["least"] = float(variable.minimum)
+    if variable.nominal is not None:
+        row["nominal"] = variable.nominal
+    if mode is not None:
+        row["choices"] = {str(value): words for value, words in enumerate(mode.values)}
+        row["arguments"] = list(mode.arguments)
+        row["default"] = mode.default
+    elif variable.kind == "Integer":
+        row["choices"] = {"1": "+1", "-1": "-1"}
+    if channel is not None:
+        row["file"] = name_in_files(mechanism, channel)
+        row["argument"] = channel.argument
+        row["freedom"] = channel.freedom
+    return row
+
+
+def _section(variable: Variable) -> str:
+    return next(
+        name
+        for name, words, units in _SECTIONS
+        if variable.unit in units or any(word in variable.name for word in words)
+    )
+
+
+def _picture(mechanism: Mechanism, reference: dict[str, int]) -> dict[str, Any]:
+    drawing = mechanism.drawing
+    if drawing is None:
+        return {"joints": [], "parts": [], "paths": [], "planar": True}
+    number = {joint.name: n for n, joint in enumerate(drawing.joints)}
+    return {
+        "joints": [
+            {"name": joint.name, "text": joint.text, "moves": [reference[name] for name in joint.moves]}
+            for joint in drawing.joints
+        ],
+        "parts": [
+            {
+                "kind": part.kind,
+                "joints": [number[name] for name in part.joints],
+                "text": part.text,
+                "where": reference[part.where] if part.where else -1,
+            }
+            for part in drawing.parts
+        ],
+        "paths": [number[name] for name in drawing.paths],
+        "planar": drawing.planar,
+    }
+
+
+def _moving(mechanism: Mechanism) -> list[str]:
+    """Outputs with a rate and an acceleration, but for the crank's angle."""
+    rate_of = {v.rate_of: v.name for v in mechanism.variables if v.rate_of}
+    crank = [freedom.coordinate for freedom in mechanism.freedoms if freedom.period > 0.0]
+    return [n for n in mechanism.output_names if n in rate_of and rate_of[n] in rate_of and n not in crank]
+
+
+def _charts(mechanism: Mechanism) -> list[dict[str, Any]]:
+    """Charts: each curve the outputs whose root of squares it is; of one output, the output itself."""
+    names = list(mechanism.output_names)
+    found = [{"title": "Motion", "curves": [{"name": n, "of": [names.index(n)]} for n in _moving(mechanism)]}]
+    torque = [name for name in names if name == "drive.applied_torque"]
+    found.append(
+        {"title": "Torque of the drive", "curves": [{"name": name, "of": [names.index(name)]} for name in torque]}
+    )
+    joints = [name.removesuffix("fx") for name in names if name.endswith(".fx")]
+    forces = [
+        {
+            "name": joint.rstrip("."),
+            "of": [names.index(joint + leaf) for leaf in ("fx", "fy", "fz") if joint + leaf in names],
+        }
+        for joint in joints
+    ]
+    found.append({"title": "Forces in the joints", "curves": forces})
+    return [chart for chart in found if chart["curves"]]

@@ -1,0 +1,116 @@
+/** What the page is told of a mechanism: made by Python from the registry (analysis/studio/tables.py). */
+
+export interface Given {
+  name: string;
+  reference: number;
+  text: string;
+  start: number;
+  section: string;
+  unit: string;
+  factor: number;
+  least?: number;
+  nominal?: number;
+  /** Words by value, where only some values are allowed. */
+  choices?: Record<string, string>;
+  /** Of a mode: what chooses each value in a case file, and the value without any. */
+  arguments?: string[];
+  default?: number;
+  /** Of an input: its name in a case file, among the inputs of a run, and the freedom that it drives. */
+  file?: string;
+  argument?: string;
+  freedom?: number;
+}
+
+export interface Output {
+  name: string;
+  text: string;
+  unit: string;
+  factor: number;
+}
+
+export interface Joint {
+  name: string;
+  text: string;
+  moves: number[];
+}
+
+export interface Part {
+  kind: "pivot" | "link" | "guide" | "slider" | "spring" | "damper" | "axis";
+  joints: number[];
+  text: string;
+  where: number;
+}
+
+export interface Picture {
+  joints: Joint[];
+  parts: Part[];
+  paths: number[];
+  planar: boolean;
+}
+
+export interface Curve {
+  name: string;
+  of: number[];
+}
+
+export interface Freedom {
+  coordinate: number;
+  rate: number;
+  initial: [number, number];
+  mode: number;
+  period: number;
+}
+
+export interface Mechanism {
+  name: string;
+  title: string;
+  module: string;
+  given: Given[];
+  outputs: Output[];
+  freedoms: Freedom[];
+  crank: number;
+  states: number;
+  /** Value reference of the tolerance of a run, and its value. */
+  tolerance: [number, number];
+  picture: Picture;
+  charts: { title: string; curves: Curve[] }[];
+  /** Outputs that swing with the motion. */
+  moving: number[];
+  transmission: number;
+  sets: { name: string; source: string; values: Values }[];
+}
+
+export interface Tables {
+  version: string;
+  /** Margin of the largest multiplier from which on a verdict is given. */
+  tolerance: number;
+  mechanisms: Mechanism[];
+}
+
+/** What is given, by FMI name, in SI. */
+export type Values = Record<string, number>;
+
+export type Source = "steady" | "run";
+
+export interface State {
+  mechanism: string;
+  title: string;
+  values: Values;
+  source?: Source;
+  /** Of a run from the start (s). */
+  duration?: number;
+  /** Names of dimensions that a drag leaves as they are. */
+  locks?: string[];
+}
+
+export const rowLength = (m: Mechanism): number =>
+  1 + m.states + m.outputs.length + 3 * m.picture.joints.length;
+
+/** Places in a row: of an output, and of a joint. */
+export const outputAt = (m: Mechanism, output: number): number => 1 + m.states + output;
+export const jointAt = (m: Mechanism, joint: number): number => 1 + m.states + m.outputs.length + 3 * joint;
+
+/** All that is given, by value reference, with the start values of what a state leaves out. */
+export function givenOf(m: Mechanism, values: Values): [number, number][] {
+  return [m.tolerance, ...m.given.map((g): [number, number] => [g.reference, values[g.name] ?? g.start])];
+}
