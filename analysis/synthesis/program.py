@@ -335,7 +335,8 @@ class Program:
             # with a fixed pivot its extremes are where the crank lies along the ground link
             self._transmitting(p, (l1 - l2) ** 2, (l1 + l2) ** 2, limits.turn, tilt)
         elif limits.turn is not None:
-            d2 = self._reach(p, v, casadi.DM(np.linspace(0.0, 2.0 * pi, GRID, endpoint=False)))
+            # of gears closer, since the cranks turn as often
+            d2 = self._reach(p, v, casadi.DM(turn(GRID * max(1, max(map(abs, self._turns)) // 2))))
             self._transmitting(p, d2, d2, limits.turn + BETWEEN, tilt)
         if limits.way is not None or (tilt is not None and limits.turn is None):
             x, step = self._way(phi)

@@ -153,15 +153,11 @@ def _allowed(shapes: FloatArray, limits: Limits) -> NDArray[np.bool_]:
     links = sized[:, :4]
     l1, l2, l3, l4 = links.T
     allowed = np.ones(len(shapes), dtype=bool)
-    if limits.turn is not None:
-        nearest, farthest = (l1 - l2) ** 2, (l1 + l2) ** 2
-        if limits.second is not None:
-            turned, phi = geared(limits.ratio), 2.0 * pi * np.arange(AROUND)[:, None] / AROUND
-            second = sized[:, 4] * np.exp(1j * (turned[1] * phi + _second(shapes, 0.0, limits)))
-            d2 = np.abs(l1 + second - l2 * np.exp(1j * turned[0] * phi)) ** 2
-            nearest, farthest = d2.min(axis=0), d2.max(axis=0)
-        rocker = None if limits.sliding else l4
-        for excess in transmission_excess(l3, rocker, nearest, farthest, cos(max(limits.turn, TURNING))):
+    if limits.turn is not None and limits.second is not None:
+        allowed = _turning(shapes, sized, limits, limits.turn)
+    elif limits.turn is not None:
+        rocker, ends = None if limits.sliding else l4, ((l1 - l2) ** 2, (l1 + l2) ** 2)
+        for excess in transmission_excess(l3, rocker, *ends, cos(max(limits.turn, TURNING))):
             allowed &= excess <= 0.0
     if limits.grashof is not None:
         order = np.sort(links, axis=1)
@@ -174,6 +170,22 @@ def _allowed(shapes: FloatArray, limits: Limits) -> NDArray[np.bool_]:
     least, most = _sizes(sized, limits)
     # links that are fixed leave one size but for rounding
     return allowed & (least <= most * (1.0 + 1e-9))
+
+
+def _turning(shapes: FloatArray, links: FloatArray, limits: Limits, least: float) -> NDArray[np.bool_]:
+    """Whether geared five-bars keep the transmission angle at `AROUND` rotations, most of which few come to."""
+    turned = geared(limits.ratio)
+    allowed = np.ones(len(shapes), dtype=bool)
+    for begin, step in ((0, 12), (6, 12), (3, 6), (1, 3), (2, 3)):
+        rows = np.flatnonzero(allowed)
+        l1, l2, l3, l4, l5 = links[rows].T
+        phi = 2.0 * pi * np.arange(begin, AROUND, step)[:, None] / AROUND
+        second = np.exp(1j * _second(shapes[rows], 0.0, limits)) * l5 * np.exp(1j * turned[1] * phi)
+        off = l1 + second - l2 * np.exp(1j * turned[0] * phi)
+        d2 = off.real**2 + off.imag**2
+        for excess in transmission_excess(l3, l4, d2.min(axis=0), d2.max(axis=0), cos(max(least, TURNING))):
+            allowed[rows] &= excess <= 0.0
+    return allowed
 
 
 def _second(shapes: FloatArray, phase: FloatArray | float, limits: Limits) -> FloatArray:

@@ -181,9 +181,9 @@ def synthesize(
     for limits in every:
         own = pivot or second_crank(limits, normal.unit)
         given = [guess for guess in guesses if is_of(guess.linkage, limits)]
-        # the ratios of gears share the starts of a kind
+        # the ratios of gears share the starts and the candidates of a kind
         share = 1 if limits.second is None else len(gears)
-        how = replace(search, starts=-(-search.starts // share))
+        how = replace(search, starts=-(-search.starts // share), candidates=-(-search.candidates // share))
         total += len(given) + how.starts
         try:
             part = _searched(normal, limits, given, own, how)

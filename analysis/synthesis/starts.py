@@ -250,7 +250,7 @@ def linkage_of(
         moved = SliderMotion(FourierSeries(normal.unit * cosines, normal.unit * sines), float(v[0]))
     elif isinstance(pivot, CrankUnknown) and len(v):
         series = FourierSeries(np.append(0.0, v[2::2]), np.append(0.0, v[3::2]))
-        moved = SecondCrank(normal.unit * float(v[0]), pivot.ratio, float(v[1]), series)
+        moved = SecondCrank(normal.unit * float(v[0]), pivot.ratio, float(wrapped(v[1])), series)
     return Linkage.from_vector(q, start.branch, pivot=moved)
 
 

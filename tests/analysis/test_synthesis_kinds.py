@@ -320,3 +320,114 @@ class TestWhatIsMadeOfIt:
             SLIDER.to_five_bar()
         with pytest.raises(ParameterError, match="a slider-crank, whose rocker has no length, has none"):
             replace(SLIDER, pivot=SecondCrank(0.02))
+
+
+def four_bar_and_its_five_bar() -> tuple[Linkage, Linkage]:
+    """A four-bar, and the five-bar with equally turning cranks that traces its curve with the joint C (Roberts, Chebyshev).
+
+    With k = (P - B)/(C - B) loop closure gives P = G + (1 - k) l2 exp(i th2) + k l4 exp(i th4), G = A + k l1.
+    """
+    four = Linkage(
+        ground_length=0.4, crank_length=0.1, coupler_length=0.3, rocker_length=0.35, point_distance=0.2, point_angle=0.7,
+        ground_angle=0.3, crank_phase=0.5,
+    )  # fmt: skip
+    k = four.point_distance / four.coupler_length * np.exp(1j * four.point_angle)
+    turned = float(np.angle(k))
+    second = SecondCrank(abs(1.0 - k) * 0.1, 1.0, 0.5 + float(np.angle(1.0 - k)) - turned)
+    five = Linkage(
+        ground_length=abs(k) * 0.4, crank_length=0.1, coupler_length=abs(k) * 0.3, rocker_length=abs(k) * 0.35,
+        point_distance=abs(k) * 0.3, ground_angle=0.3 + turned, crank_phase=0.5 - turned, pivot=second,
+    )  # fmt: skip
+    return four, five
+
+
+def five_bar(ratio: float) -> Linkage:
+    return Linkage(
+        pivot_x=0.1, pivot_y=0.2, ground_length=0.2, crank_length=0.06, coupler_length=0.19, rocker_length=0.16,
+        point_distance=0.08, point_angle=0.6, ground_angle=0.4, crank_phase=0.8, pivot=SecondCrank(0.04, ratio, 1.3),
+    )  # fmt: skip
+
+
+class TestGearedFiveBar:
+    @pytest.mark.parametrize(("ratio", "turns"), [(1.0, (1, 1)), (-2.0, (1, -2)), (0.5, (2, 1)), (-1.5, (2, -3))])
+    def test_it_is_where_the_law_of_cosines_puts_it(self, ratio: float, turns: tuple[int, int]) -> None:
+        linkage = five_bar(ratio)
+        turned = np.exp(0.4j)
+        for phi in (0.0, 1.0, 2.9, 5.5):
+            b = 0.1 + 0.2j + turned * 0.06 * np.exp(1j * (turns[0] * phi + 0.8))
+            d = 0.1 + 0.2j + turned * (0.2 + 0.04 * np.exp(1j * (turns[1] * phi + 1.3)))
+            inner = acos((0.19**2 + abs(d - b) ** 2 - 0.16**2) / (2.0 * 0.19 * abs(d - b)))
+            coupler = (d - b) / abs(d - b) * np.exp(1j * inner)
+            p = b + 0.08 * np.exp(0.6j) * coupler
+            assert complex(*linkage.path([phi])[0]) == pytest.approx(p, abs=1e-13)
+            assert complex(*linkage.pins(phi)["C"]) == pytest.approx(b + 0.19 * coupler, abs=1e-13)
+        np.testing.assert_allclose(linkage.path([0.3]), linkage.path([0.3 + 2.0 * pi]), atol=1e-13)
+        low, high = linkage.transmission_range()
+        bare = np.arccos(linkage.cosine_at_c(linkage.reach(np.linspace(0.0, 2.0 * pi, 20001))))
+        assert (low, high) == pytest.approx((bare.min(), bare.max()), abs=1e-3)
+        verdicts = judge(linkage, np.array([0.0, 2.0 * pi]), closed=True)
+        assert (verdicts.least_transmission, verdicts.greatest_transmission) == pytest.approx((low, high), abs=1e-3)
+
+    def test_with_equal_gears_its_joint_traces_the_curve_of_a_four_bar(self) -> None:
+        four, five = four_bar_and_its_five_bar()
+        np.testing.assert_allclose(five.path(turn(90)), four.path(turn(90)), atol=1e-14)
+
+    def test_with_opposite_gears_a_symmetric_one_draws_a_straight_line(self) -> None:
+        """By symmetry: exact, with turning joints alone; no four-bar comes as near as what is found."""
+        linkage = Linkage(
+            ground_length=0.3, crank_length=0.04, coupler_length=0.3, rocker_length=0.3, point_distance=0.3, crank_phase=0.4,
+            pivot=SecondCrank(0.04, -1.0, pi - 0.4),
+        )  # fmt: skip
+        path = linkage.path(turn(90))
+        np.testing.assert_allclose(path[:, 0], 0.15, atol=1e-15)
+        assert np.ptp(path[:, 1]) > 0.05
+        task = TimedPath(points=linkage.path(turn(18)))
+        found, alone = (
+            synthesize(task, kinds=(kind,), gears=(-1,), search=QUICK).best for kind in ("geared-five-bar", "four-bar")
+        )
+        assert 10.0 * found.error < alone.error
+
+    @pytest.mark.parametrize("ratio", [1.0, 2.0, -0.5])
+    def test_a_known_one_is_found_again(self, ratio: float) -> None:
+        task = TimedPath(points=five_bar(ratio).path(turn(24)))
+        search = Search(starts=8, candidates=1 << 13, solutions=2)
+        found = synthesize(task, kinds=("geared-five-bar",), gears=(ratio,), search=search)
+        best = found.best
+        assert best.error < 1e-12
+        assert best.verdicts.grashof == f"five-bar, gears {'-1/2' if ratio < 0 else int(ratio)}"
+        if ratio == 1.0:
+            # a four-bar's closure with a crank of its own: the same curve from other cranks
+            return
+        assert isinstance(best.linkage.pivot, SecondCrank)
+        assert best.linkage.pivot.length == pytest.approx(0.04, rel=1e-3)
+
+    @pytest.mark.parametrize("kind", ["motion", "rocker", pytest.param("untimed", marks=pytest.mark.slow)])
+    def test_other_tasks(self, kind: str) -> None:
+        known, at = five_bar(2.0), turn(16)
+        task: Any = UntimedPath(path=TargetPath(points=known.path(turn(120)), closed=True))
+        if kind == "motion":
+            task = Motion(points=known.path(at), angle=known.coupler_angle(at), rotation=at)
+        if kind == "rocker":
+            task = RockerFunction(angle=known.rocker_angle(at), rotation=at)
+        found = synthesize(task, kinds=("geared-five-bar",), gears=(2.0,), search=QUICK)
+        assert found.best.verdicts.sound
+        assert found.best.evaluation.rms < {"motion": 2e-4, "rocker": 2e-3, "untimed": 1e-3}[kind]
+
+    def test_bounds_of_the_second_crank_hold(self) -> None:
+        task = TimedPath(points=five_bar(2.0).path(turn(24)))
+        more: dict[str, Any] = {"kinds": ("geared-five-bar",), "gears": (2,), "search": QUICK}
+        found = synthesize(task, {"second_crank_length": ("1 cm", "2 cm")}, **more)
+        for s in found.solutions:
+            assert isinstance(s.linkage.pivot, SecondCrank)
+            assert 0.01 - 1e-9 <= s.linkage.pivot.length <= 0.02 + 1e-9
+        assert found.best.error > 1e-8
+
+    def test_report_and_slopes(self) -> None:
+        made = Solution.of(TimedPath(points=five_bar(0.5).path(turn(12)) + 1e-3), five_bar(0.5))
+        assert "second crank at D: 1/2 turns for one of the first" in report(made)
+        slopes = {s.name: s.slope for s in sensitivities(made)}
+        h = 1e-6
+        for name in ("crank_phase", "crank_length", "coupler_length"):
+            value = getattr(made.linkage, name)
+            ends = [Solution.of(made.task, replace(made.linkage, **{name: value + side * h})).error for side in (1, -1)]
+            assert slopes[name] == pytest.approx((ends[0] - ends[1]) / (2.0 * h), rel=1e-5, abs=1e-9), name
