@@ -271,8 +271,9 @@ class Linkage:
 
     @property
     def largest_link(self) -> float:
-        """The longest of the four links (m)."""
-        return max(self.ground_length, self.crank_length, self.coupler_length, self.rocker_length)
+        """The longest of the four links, and of a second crank (m)."""
+        second = self.pivot.length if isinstance(self.pivot, SecondCrank) else 0.0
+        return max(abs(self.ground_length), self.crank_length, self.coupler_length, self.rocker_length, second)
 
     def displacement(self, rotation: ArrayLike) -> tuple[FloatArray, FloatArray]:
         """Displacement of the rocker pivot from the end of the ground link, in the frame of that link (m)."""

@@ -133,7 +133,7 @@ def dimension_rows(solution: Solution) -> list[tuple[str, str, str, str, str]]:
         if s.name not in dear:
             rows.append((s.name, format_dimension(s.name, s.value), "", "", ""))
             continue
-        off = ANGLE_STEP if s.name in ANGLES else step
+        off = ANGLE_STEP if s.name in (*ANGLES, *PIVOT_ANGLES) else step
         cost = factor * max(dear[s.name], 0.0)
         grown = f"{cost:.3g} {unit}" if isfinite(cost) else "no assembly"
         moved = f"{scale * off * s.shift:.3g} {length}"

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from linkwork.errors import InputError
 
+from .constraints import SECOND_LENGTH
 from .kernels import PLACES
 from .linkage import ABSENT, ANGLES, LENGTHS, LINKS, Linkage, SecondCrank, SliderMotion, wrapped
 from .solution import CURVE, Solution, evaluate, nearest_rotations, path_rate
@@ -21,8 +22,7 @@ FloatArray = NDArray[np.float64]
 
 #: Steps to which dimensions are rounded (m, rad): 0.1 mm, or a tenth of a small link, and 0.1 degrees.
 LENGTH_STEP, ANGLE_STEP = 1e-4, radians(0.1)
-#: Dimensions of a moved pivot, besides the coefficients of its motion: the length, and the angles.
-SECOND = "second_crank_length"
+#: Angles of a moved pivot, besides the coefficients of its motion.
 PIVOT_ANGLES = ("guide_angle", "second_crank_phase")
 #: Step of the differences of exact derivatives, in rad or as a share of the longest link.
 DIFFERENCE = 1e-5
@@ -246,27 +246,25 @@ def costs(solution: Solution, length: float, angle: float) -> dict[str, float]:
     Returns
     -------
     dict
-        By the name of the dimension, without those of a moved pivot.
+        By the name of the dimension, without those of a slider's motion.
     """
-    grown: dict[str, float] = {}
-    for names, step in ((LENGTHS, length), (ANGLES, angle)):
-        for name in names:
-            if name in _absent(solution.linkage):
-                continue
-            value = getattr(solution.linkage, name)
-            # a link cannot be shorter than nothing
-            link = _is_link(solution.linkage, name)
-            ends = [value + side * step for side in (-1.0, 1.0) if not link or value + side * step > 0.0]
-            grown[name] = max(
-                evaluate(solution.task, _with(solution.linkage, name, end), solution.evaluation.rotation).error
-                for end in ends
-            )
+    linkage, grown = solution.linkage, {}
+    for name, value in _made(linkage).items():
+        if name == "guide_angle":
+            continue
+        step = angle if name in (*ANGLES, *PIVOT_ANGLES) else length
+        # a link cannot be shorter than nothing
+        link = _is_link(linkage, name)
+        ends = [value + side * step for side in (-1.0, 1.0) if not link or value + side * step > 0.0]
+        grown[name] = max(
+            evaluate(solution.task, _with(linkage, name, end), solution.evaluation.rotation).error for end in ends
+        )
     return {name: error - solution.error for name, error in grown.items()}
 
 
 def _is_link(linkage: Linkage, name: str) -> bool:
     """Whether a dimension is a length above zero; an offset may be none."""
-    return name in (*LINKS, SECOND) and not (linkage.slides and name in ABSENT)
+    return name in (*LINKS, SECOND_LENGTH) and not (linkage.slides and name in ABSENT)
 
 
 def _absent(linkage: Linkage) -> set[str]:
@@ -302,7 +300,7 @@ def _pivot(linkage: Linkage, at: FloatArray) -> list[tuple[str, float, tuple[Flo
         c, s = np.cos(pivot.angle(at)), np.sin(pivot.angle(at))
         # the mean of the series is the phase's
         own, first, along = "second_crank", 1, (-pivot.length * s, pivot.length * c)
-        found = [(SECOND, pivot.length, (c, s)), ("second_crank_phase", pivot.phase, along)]
+        found = [(SECOND_LENGTH, pivot.length, (c, s)), ("second_crank_phase", pivot.phase, along)]
     else:
         return []
     for k in range(first, pivot.series.order + 1):
@@ -319,7 +317,7 @@ def _values(linkage: Linkage) -> dict[str, float]:
 def _made(linkage: Linkage) -> dict[str, float]:
     """Dimensions that are made, and so are off by something: a commanded motion is not among them."""
     values = _values(linkage)
-    made = (*LENGTHS, *ANGLES, SECOND, *PIVOT_ANGLES)
+    made = (*LENGTHS, *ANGLES, SECOND_LENGTH, *PIVOT_ANGLES)
     return {name: values[name] for name in made if name in values and name not in _absent(linkage)}
 
 
@@ -331,5 +329,5 @@ def _with(linkage: Linkage, name: str, value: float) -> Linkage:
             changed["point_distance"] = value
         return replace(linkage, **changed)
     assert linkage.pivot is not None
-    own: Mapping[str, Any] = {{SECOND: "length", "second_crank_phase": "phase"}.get(name, name): value}
+    own: Mapping[str, Any] = {{SECOND_LENGTH: "length", "second_crank_phase": "phase"}.get(name, name): value}
     return replace(linkage, pivot=replace(linkage.pivot, **own))

@@ -19,6 +19,7 @@ from ..notebook import Shown, format_count
 from ..units import Amount, in_si
 from .black_box import by_differential_evolution, by_simplex
 from .constraints import (
+    SECOND_LENGTH,
     USUAL,
     Constraint,
     InfeasibleError,
@@ -28,7 +29,7 @@ from .constraints import (
     limits_of,
 )
 from .kinds import GEARS, Kind, Stroke, as_asked, is_of, kind_of, limits_of_kinds, second_crank, usual_kinds
-from .linkage import ANGLES, UNITS, Linkage
+from .linkage import ANGLES, UNITS, Linkage, SecondCrank
 from .polish import Polished, distinct, polish
 from .quick_return import QuickReturn, quick_returns
 from .scan import scan
@@ -387,7 +388,7 @@ def infeasible(done: Polished) -> InfeasibleError:
 
 
 def columns_of(solutions: Sequence[Solution]) -> dict[str, list[float]]:
-    """What `Synthesis.columns` tells, of any solutions."""
+    """What `Synthesis.columns` tells, of any solutions; a linkage has no rocker, or no second crank, where its length is 0."""
     columns: dict[str, list[float]] = {}
 
     def put(name: str, value: float) -> None:
@@ -406,6 +407,11 @@ def columns_of(solutions: Sequence[Solution]) -> dict[str, list[float]]:
         put("greatest transmission angle [rad]", s.verdicts.greatest_transmission)
         for name, value in s.linkage.values().items():
             put(name if name == "branch" else f"{name} [{'rad' if name in ANGLES else 'm'}]", value)
+        if any(isinstance(other.linkage.pivot, SecondCrank) for other in solutions):
+            second = s.linkage.pivot if isinstance(s.linkage.pivot, SecondCrank) else None
+            put(f"{SECOND_LENGTH} [m]", 0.0 if second is None else second.length)
+            put("second_crank_phase [rad]", 0.0 if second is None else second.phase)
+            put("second_crank_ratio", 0.0 if second is None else second.ratio)
     return columns
 
 
