@@ -15,8 +15,10 @@ from scipy.optimize import brentq, differential_evolution
 
 from analysis.mechanisms import SLIDER_CRANK
 from analysis.synthesis import (
+    USUAL,
     Grashof,
     InfeasibleError,
+    Kind,
     LargestLink,
     LeastTransmission,
     Linkage,
@@ -36,6 +38,8 @@ from analysis.synthesis import (
     UntimedPath,
     drawing,
     judge,
+    kind_of,
+    normal_form,
     plates,
     rounded,
     sensitivities,
@@ -43,7 +47,10 @@ from analysis.synthesis import (
     turn,
 )
 from analysis.synthesis.kernels import COLUMNS, coupler_path_jacobian
+from analysis.synthesis.kinds import limits_of_kinds, second_crank
 from analysis.synthesis.report import report
+from analysis.synthesis.scan import scan
+from analysis.synthesis.starts import linkage_of
 from linkwork.errors import InputError, ParameterError
 from linkwork.slider_crank import kinematics as plant
 
@@ -431,3 +438,20 @@ class TestGearedFiveBar:
             value = getattr(made.linkage, name)
             ends = [Solution.of(made.task, replace(made.linkage, **{name: value + side * h})).error for side in (1, -1)]
             assert slopes[name] == pytest.approx((ends[0] - ends[1]) / (2.0 * h), rel=1e-5, abs=1e-9), name
+
+
+@pytest.mark.parametrize(
+    ("kind", "gears", "slider"),
+    [("slider-crank", (1,), 0), ("slider-crank", (1,), 1), ("geared-five-bar", (2, -0.5), 0)],
+)
+def test_starts_of_the_scan_are_what_their_quality_says(kind: Kind, gears: tuple[float, ...], slider: int) -> None:
+    task = TimedPath(points=SLIDER.path(turn(18)) + 0.01 * np.random.default_rng(0).normal(size=(18, 2)))
+    if slider:
+        task = SliderFunction(position=task.points[:, 0])
+    normal = normal_form(task)
+    for limits in limits_of_kinds(task, normal, None, USUAL, (kind,), gears):
+        for start in scan(normal, limits, seed=1, candidates=2048, starts=4):
+            linkage = linkage_of(start, normal, second_crank(limits, normal.unit))
+            assert kind_of(linkage) == kind
+            assert linkage.least_transmission > radians(38.0)
+            assert Solution.of(task, linkage).error == pytest.approx(start.quality * normal.unit**2, rel=1e-6)
