@@ -218,14 +218,15 @@ def _extrema(response: Any, factor: float, unit: str, table: Any) -> None:
         grid.add_column(escape(heading), justify="left" if heading in ("", "motion") else "right")
     if table is not None and _friction(response.family.parameters):
         console.print("the approximations are of the mechanism without its Coulomb friction", highlight=False)
-    for word, extremum in sorted(entries, key=lambda entry: entry[1].parameter):
-        others = [] if table is None else [f"{size * v:.4f}" for v in table.at(extremum.parameter).values()]
+    entries.sort(key=lambda entry: entry[1].parameter)
+    beside = [] if table is None else list(table.at([extremum.parameter for _, extremum in entries]).values())
+    for number, (word, extremum) in enumerate(entries):
         grid.add_row(
             word,
             f"{factor * extremum.parameter:.2f}",
             f"{size * extremum.amplitude:.4f}",
             extremum.stability.value,
-            *others,
+            *(f"{size * values[number]:.4f}" for values in beside),
         )
     console.print(grid)
 

@@ -85,7 +85,7 @@ def plot_branches(
     *,
     title: str = "",
     rpm: bool = True,
-    beside: Callable[[float], Mapping[str, float]] | None = None,
+    beside: Callable[[FloatArray], Mapping[str, FloatArray]] | None = None,
     avoid: Sequence[Avoided] = (),
 ) -> Figure:
     """Amplitude, harmonics, crank torque and pin force along branches: stable parts solid, unstable ones dashed.
@@ -101,8 +101,8 @@ def plot_branches(
     rpm : bool
         Whether a speed in rad/s is drawn in rpm.
     beside : callable, optional
-        ``beside(parameter)``: amplitudes (m) by approximations, by their names. Their errors are against the stable motions of
-        one turn.
+        ``beside(values)``: amplitudes (m) by approximations, by their names, at values of the parameter, of their shape. Their
+        errors are against the stable motions of one turn.
     avoid : sequence of Avoided
         Ranges to shade.
     """
@@ -114,7 +114,7 @@ def describe_branches(
     *,
     title: str = "",
     rpm: bool = True,
-    beside: Callable[[float], Mapping[str, float]] | None = None,
+    beside: Callable[[FloatArray], Mapping[str, FloatArray]] | None = None,
     avoid: Sequence[Avoided] = (),
 ) -> Picture:
     """What `plot_branches` draws."""
@@ -313,16 +313,14 @@ class _Approximated:
         return {"colour": COLOURS[(self.number + 1) % len(COLOURS)], "line": _LINES[self.number % len(_LINES)]}
 
 
-def _approximated(branches: Sequence[Branch], beside: Callable[[float], Mapping[str, float]]) -> list[_Approximated]:
+def _approximated(branches: Sequence[Branch], beside: Callable[[FloatArray], Mapping[str, FloatArray]]) -> list[_Approximated]:
     """The approximations where a machine may be: at stable motions, and evenly over the range besides."""
     chosen = [(branch, _chosen(branch)) for branch in branches if branch.turns == 1]
     every = np.concatenate([branch.parameter for branch, _ in chosen])
     spread = np.linspace(every.min(), every.max(), _BESIDE)
     places = np.unique(np.concatenate([spread, *(branch.parameter[i] for branch, i in chosen)]))
-    found = [beside(value) for value in places.tolist()]
     approximations = []
-    for number, name in enumerate(found[0]):
-        values = np.array([row[name] for row in found])
+    for number, (name, values) in enumerate(beside(places).items()):
         errors = []
         for branch, i in chosen:
             own, true = values[np.searchsorted(places, branch.parameter[i])], branch.amplitude[i]

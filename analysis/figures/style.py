@@ -94,6 +94,7 @@ def legend_above(axis: Axes, **options: Any) -> None:
 
 
 def finish(figure: Figure) -> Figure:
-    """Lay the figure out while the style is in force: ticks are made, and take their look, only then."""
+    """Lay the figure out, once for all, while the style is in force: ticks are made, and take their look, only then."""
     figure.draw_without_rendering()
+    figure.set_layout_engine("none")
     return figure

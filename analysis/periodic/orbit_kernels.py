@@ -21,7 +21,7 @@ from linkwork.limits import LIMIT_SINE, NEAR_LIMIT
 
 from ..numerics.codegen import MATRIX, VECTOR, evaluate, inner, kernel, part
 from ..run.sources import SOURCE, Source
-from ..run.stepping import attempt, following, shorter
+from ..run.stepping import STAGES, NODES, attempt, following, interpolant, interpolate, shorter, stage
 from .flows import DIRECTIONAL, GAP, PLAIN, STATE, VARIATIONAL
 
 
@@ -106,7 +106,7 @@ def make_room(section, columns):  # type: ignore[no-untyped-def]
         sizes[i] = section.scale[i]
         for j in range(columns):
             sizes[n + j * n + i] = section.scale[i] / (section.scale[j] if j < n else section.along)
-    return Room(np.zeros((13, sizes.shape[0])), np.empty(sizes.shape[0]), sizes, np.empty(1))
+    return Room(np.zeros((16, sizes.shape[0])), np.empty(sizes.shape[0]), sizes, np.empty(1))
 
 
 @inner
@@ -116,22 +116,12 @@ def _clearance(section, angle, z, room):  # type: ignore[no-untyped-def]
 
 
 @inner
-def advance(section, source, begin, end, z, room, carry):  # type: ignore[no-untyped-def]
-    """Integrate z over a range of crank angles; carry[0] is the step to begin with and to go on with, carry[1] counts."""
+def _take(section, source, equation, angle, end, slowest, z, room, carry):  # type: ignore[no-untyped-def]
+    """A good step from z, its rates in room.k[0], as far as to ``end``: the status and the angle there; z there is room.y."""
     n = section.scale.shape[0]
-    size = z.shape[0]
-    equation = section.equations[PLAIN if size == n else VARIATIONAL if size == n * (1 + n) else DIRECTIONAL]
     k, y = room.k, room.y
-    angle = begin
-    slowest = _STALL * z[n - 1] if section.torque else 0.0
-    if section.torque and not slowest > 0.0:
-        return STALLED
-    # a NaN, beyond the limit of assembly, compares as not positive
-    if not _clearance(section, angle, z, room) > LIMIT_SINE:
-        return LIMIT
-    evaluate(equation, angle, z, section.modes, section.drive, section.p, k[0])
     proposed = carry[0]
-    while angle < end:
+    while True:
         # no sliver of a step before the end
         last = angle + 1.001 * proposed >= end
         h = end - angle if last else proposed
@@ -140,24 +130,51 @@ def advance(section, source, begin, end, z, room, carry):  # type: ignore[no-unt
         )
         error /= section.tolerance
         carry[1] += 1.0
-        if not error <= 1.0:
-            # beyond the limit of assembly the error is NaN
-            proposed = shorter(h, error)
-            if proposed < _LEAST_STEP:
-                return LIMIT if _clearance(section, angle, z, room) < NEAR_LIMIT else NO_STEP
-            continue
-        proposed = following(h, proposed, error)
-        angle = end if last else angle + h
-        if not _clearance(section, angle, y, room) > LIMIT_SINE:
-            return LIMIT
-        if section.torque and not y[n - 1] > slowest:
-            return STALLED
-        for i in range(size):
-            z[i] = y[i]
-        if not last:
-            evaluate(equation, angle, z, section.modes, section.drive, section.p, k[0])
-    carry[0] = proposed
-    return DONE
+        if error <= 1.0:
+            break
+        # beyond the limit of assembly the error is NaN
+        proposed = shorter(h, error)
+        if proposed < _LEAST_STEP:
+            return (LIMIT if _clearance(section, angle, z, room) < NEAR_LIMIT else NO_STEP), angle
+    carry[0] = following(h, proposed, error)
+    angle = end if last else angle + h
+    if not _clearance(section, angle, y, room) > LIMIT_SINE:
+        return LIMIT, angle
+    if section.torque and not y[n - 1] > slowest:
+        return STALLED, angle
+    return DONE, angle
+
+
+@inner
+def _enter(section, equation, angle, z, room):  # type: ignore[no-untyped-def]
+    """Rates of z at the beginning of a range of crank angles, into room.k[0]; the status, and the speed of a stalled crank."""
+    n = section.scale.shape[0]
+    slowest = _STALL * z[n - 1] if section.torque else 0.0
+    if section.torque and not slowest > 0.0:
+        return STALLED, slowest
+    # a NaN, beyond the limit of assembly, compares as not positive
+    if not _clearance(section, angle, z, room) > LIMIT_SINE:
+        return LIMIT, slowest
+    evaluate(equation, angle, z, section.modes, section.drive, section.p, room.k[0])
+    return DONE, slowest
+
+
+@inner
+def advance(section, source, begin, end, z, room, carry):  # type: ignore[no-untyped-def]
+    """Integrate z over a range of crank angles; carry[0] is the step to begin with and to go on with, carry[1] counts."""
+    n = section.scale.shape[0]
+    size = z.shape[0]
+    equation = section.equations[PLAIN if size == n else VARIATIONAL if size == n * (1 + n) else DIRECTIONAL]
+    angle = begin
+    status, slowest = _enter(section, equation, angle, z, room)
+    while status == DONE and angle < end:
+        status, angle = _take(section, source, equation, angle, end, slowest, z, room, carry)
+        if status == DONE:
+            for i in range(size):
+                z[i] = room.y[i]
+            if angle < end:
+                evaluate(equation, angle, z, section.modes, section.drive, section.p, room.k[0])
+    return status
 
 
 @inner
@@ -422,29 +439,48 @@ def settle(section, source, turn, change, most, start):  # type: ignore[no-untyp
 
 @kernel(int64(SECTION, SOURCE, VECTOR, MATRIX, VECTOR, MATRIX), purpose="the sampling of periodic motions")
 def sample(section, source, stations, starts, angles, rows):  # type: ignore[no-untyped-def]
-    """States of a run and channels, shape (m, states + inputs), at increasing crank angles.
+    """States of a run and channels, shape (m, states + inputs), at increasing crank angles, by the integrator's interpolant.
 
     Parameters
     ----------
     stations, starts : ndarray, shapes (k,) and (k, n)
         Increasing crank angles, the first 0, at each of which y is begun anew, and y there.
     """
+    n = starts.shape[1]
     room = make_room(section, 0)
-    z = starts[0].copy()
+    z, f, inside = starts[0].copy(), np.empty((7, n)), np.empty(n)
     carry = np.array([0.1, 0.0])
-    angle = 0.0
-    passed = 0
-    for i in range(angles.shape[0]):
-        while passed + 1 < stations.shape[0] and stations[passed + 1] <= angles[i]:
-            passed += 1
-            angle = stations[passed]
-            z[:] = starts[passed]
-        if angles[i] > angle:
-            status = advance(section, source, angle, angles[i], z, room, carry)
-            if status != DONE:
-                return status
-            angle = angles[i]
-        evaluate(section.equations[STATE], angle, z, section.modes, section.drive, section.p, rows[i])
+    k, equation, done = room.k, section.equations[PLAIN], 0
+    for piece in range(stations.shape[0]):
+        angle, end = stations[piece], angles[-1]
+        if piece + 1 < stations.shape[0]:
+            end = min(end, stations[piece + 1])
+        z[:] = starts[piece]
+        status, slowest = _enter(section, equation, angle, z, room)
+        if status == DONE and done < angles.shape[0] and angles[done] <= angle:
+            evaluate(section.equations[STATE], angle, z, section.modes, section.drive, section.p, rows[done])
+            done += 1
+        while status == DONE and angle < end:
+            before = angle
+            status, angle = _take(section, source, equation, angle, end, slowest, z, room, carry)
+            h = angle - before
+            evaluate(equation, angle, room.y, section.modes, section.drive, section.p, k[STAGES])
+            if angles[done] <= angle:
+                for s in range(STAGES + 1, k.shape[0]):
+                    stage(s, z, k, h, inside)
+                    evaluate(equation, before + NODES[s] * h, inside, section.modes, section.drive, section.p, k[s])
+                interpolant(z, room.y, k, h, f)
+            while done < angles.shape[0] and angles[done] <= angle:
+                interpolate((angles[done] - before) / h, z, f, inside)
+                evaluate(
+                    section.equations[STATE], angles[done], inside, section.modes, section.drive, section.p, rows[done]
+                )
+                done += 1
+            for i in range(n):
+                z[i] = room.y[i]
+                k[0, i] = k[STAGES, i]
+        if status != DONE:
+            return status
     return DONE
 
 

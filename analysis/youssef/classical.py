@@ -6,14 +6,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from linkwork.errors import InputError
 from linkwork.five_bar.parameters import FiveBarParameters, without_friction
 
 from ..periodic import Response
-from .equation import Load, Variant, slider_equation
-from .harmonics import harmonic_balance
+from .equation import Load, Variant
+from .harmonics import amplitudes_over
 from .stability import load_of
 
 
@@ -38,8 +38,8 @@ class Approximations:
     speed: NDArray[np.float64]
     amplitudes: Mapping[str, NDArray[np.float64]]
 
-    def at(self, speed: float) -> dict[str, float]:
-        """The approximations at a speed (rad/s), not interpolated."""
+    def at(self, speed: ArrayLike) -> dict[str, NDArray[np.float64]]:
+        """The approximations at speeds (rad/s), of their shape, not interpolated."""
         return _approximate(self.parameters, speed, self.load)
 
     def columns(self) -> dict[str, NDArray[np.float64]]:
@@ -60,12 +60,11 @@ def approximations(response: Response, points: int = 160) -> Approximations:
     parameters = without_friction(response.family.parameters)
     load = load_of(response.family.drive)
     speeds = np.linspace(response.low, response.high, points)
-    rows = [_approximate(parameters, speed, load) for speed in speeds.tolist()]
     return Approximations(
         parameters=parameters,
         load=load,
         speed=speeds,
-        amplitudes={name: np.array([row[name] for row in rows]) for name in rows[0]},
+        amplitudes=_approximate(parameters, speeds, load),
     )
 
 
@@ -76,9 +75,8 @@ _APPROXIMATIONS = {
 }
 
 
-def _approximate(parameters: FiveBarParameters, speed: float, load: Load) -> dict[str, float]:
+def _approximate(parameters: FiveBarParameters, speed: ArrayLike, load: Load) -> dict[str, NDArray[np.float64]]:
     return {
-        name: parameters.rocker_length
-        * harmonic_balance(slider_equation(parameters, speed, variant=variant, load=load), order).amplitude
+        name: amplitudes_over(parameters, speed, order, variant=variant, load=load)
         for name, (variant, order) in _APPROXIMATIONS.items()
     }

@@ -58,16 +58,7 @@ class HarmonicMotion:
     @property
     def amplitude(self) -> float:
         """Half the distance between the least and the greatest position."""
-        angle = np.linspace(0.0, 2.0 * pi, 32 * (self.order + 1), endpoint=False)
-        position = self.series(angle)
-        ends = angle[[np.argmin(position), np.argmax(position)]]
-        rate = self.series.derivative()
-        curvature = rate.derivative()
-        # the samples are close enough for Newton steps to the places where the slider rests
-        for _ in range(4):
-            bend = curvature(ends)
-            ends = ends - np.divide(rate(ends), bend, out=np.zeros(2), where=bend != 0.0)
-        return 0.5 * float(np.ptp(np.append(self.series(ends), position)))
+        return float(_swings(self.series.cos[None, :], self.series.sin[None, :])[0])
 
     def harmonic(self, n: int) -> float:
         """Amplitude of the n-th harmonic; 0 beyond the order; the mean, with its sign, for n = 0."""
@@ -132,16 +123,77 @@ def harmonic_balance(equation: SliderEquation, order: int) -> HarmonicMotion:
             f"the linear balance of order {order} is singular at lambda_k^2 = {equation.spring:.6g}, "
             f"lambda_c = {equation.damping:.6g}: a resonance without damping"
         ) from None
-    half = z[order:]
-    cos = 2.0 * np.real(half)
-    cos[0] *= 0.5
-    zeta = FourierSeries(cos, -2.0 * np.imag(half))
+    zeta = FourierSeries(*_coefficients(z))
     a, b, c = equation.coefficients()
     rate = zeta.derivative()
     reach = order + max(a.order, c.order, equation.force.order)
     angle = np.linspace(0.0, 2.0 * pi, 4 * (reach + 1), endpoint=False)
     left = a(angle) * rate.derivative()(angle) + b(angle) * rate(angle) + c(angle) * zeta(angle)
     return HarmonicMotion(series=zeta, residual=float(np.abs(left - equation.force(angle)).max()))
+
+
+def amplitudes_over(
+    parameters: FiveBarParameters, speeds: ArrayLike, order: int, *, variant: Variant = Variant.EXACT, load: Load = NO_LOAD
+) -> NDArray[np.float64]:
+    """Amplitudes (m) of `harmonic_balance` at many crank speeds (rad/s), of their shape.
+
+    All parts of a linear slider equation but its damping are constants and multiples of the inverse square of the speed, so
+    that two speeds give them at all others.
+
+    Raises
+    ------
+    InputError
+        As `slider_equation` does; it takes the equation from samples, or in powers of the crank's length.
+    HarmonicBalanceError
+        If the equations are singular at one of the speeds.
+    """
+    _require_order(order)
+    w = np.atleast_1d(np.asarray(speeds, dtype=float))[:, None]
+    reference = float(w.max())
+    bare = replace(parameters, slider_damping=0.0)
+    (once, one), (twice, two) = (
+        (_operator(equation, order), equation.force.to_order(order).exponential)
+        for equation in (slider_equation(bare, n * reference, variant=variant, load=load) for n in (1.0, 2.0))
+    )
+    damping = slider_equation(parameters, reference, variant=variant, load=load).damping
+    share = (reference / w) ** 2 - 1.0
+    matrix = once + share[..., None] * (once - twice) * 4.0 / 3.0
+    matrix += np.diag(1j * np.arange(-order, order + 1)) * damping * (reference / w)[..., None]
+    force = one + share * (one - two) * 4.0 / 3.0
+    try:
+        z = np.linalg.solve(matrix, force[..., None])[..., 0]
+    except np.linalg.LinAlgError:
+        raise HarmonicBalanceError(
+            f"the linear balance of order {order} is singular at a speed from {w.min():.6g} to {w.max():.6g} rad/s: "
+            "a resonance without damping"
+        ) from None
+    return (parameters.rocker_length * _swings(*_coefficients(z))).reshape(np.shape(speeds))
+
+
+def _coefficients(z: NDArray[np.complex128]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Cosines and sines, shape (..., n + 1), of the coefficients of exp(i n theta), (..., 2 n + 1)."""
+    half = z[..., z.shape[-1] // 2 :]
+    cos = 2.0 * np.real(half)
+    cos[..., 0] *= 0.5
+    return cos, -2.0 * np.imag(half)
+
+
+def _swings(cos: NDArray[np.float64], sin: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Half the distance between the least and the greatest value of each of some Fourier series, shape (m, n + 1)."""
+    n = np.arange(cos.shape[-1])
+    angle = np.linspace(0.0, 2.0 * pi, 32 * len(n), endpoint=False)
+    phase = np.multiply.outer(n, angle)
+    samples = cos @ np.cos(phase) + sin @ np.sin(phase)
+    ends = angle[np.stack([samples.argmin(axis=1), samples.argmax(axis=1)], axis=1)]
+    cos, sin = cos[:, None], sin[:, None]
+    # the samples are close enough for Newton steps to the places where the slider rests
+    for _ in range(4):
+        c, s = np.cos(ends[..., None] * n), np.sin(ends[..., None] * n)
+        rate, bend = (n * (sin * c - cos * s)).sum(axis=2), (-(n**2) * (cos * c + sin * s)).sum(axis=2)
+        ends = ends - np.divide(rate, bend, out=np.zeros_like(rate), where=bend != 0.0)
+    c, s = np.cos(ends[..., None] * n), np.sin(ends[..., None] * n)
+    swings: NDArray[np.float64] = 0.5 * np.ptp(np.hstack([(cos * c + sin * s).sum(axis=2), samples]), axis=1)
+    return swings
 
 
 def _require_order(order: int) -> None:

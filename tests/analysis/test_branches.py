@@ -297,8 +297,8 @@ def test_approximations_beside_are_in_the_same_units(softened: Branch) -> None:
     branch = follow(Family(parameters=TABLE_3_1, drive=orbit.drive), orbit, SPEED, low=0.95 * SPEED, high=1.05 * SPEED)
     order = np.argsort(branch.parameter)
 
-    def beside(speed: float) -> dict[str, float]:
-        return {"a tenth more": 1.1 * float(np.interp(speed, branch.parameter[order], branch.amplitude[order]))}
+    def beside(speed: NDArray[np.float64]) -> dict[str, NDArray[np.float64]]:
+        return {"a tenth more": 1.1 * np.interp(speed, branch.parameter[order], branch.amplitude[order])}
 
     main, _, errors, *_ = figures.plot_branches([branch], beside=beside).axes
     (line,) = (line for line in main.lines if line.get_label() == "a tenth more")

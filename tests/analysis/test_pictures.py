@@ -109,7 +109,7 @@ def test_harmonics_have_their_numbers(folded: Response, axes: list[Axes]) -> Non
 
 def test_errors_have_gaps_where_no_motion_is_stable(folded: Response) -> None:
     lower = folded.branches[0]
-    _, _, errors, *_ = figures.plot_branches([lower], beside=lambda p: {"a": 1.02 * float(p)}).axes
+    _, _, errors, *_ = figures.plot_branches([lower], beside=lambda p: {"a": 1.02 * p}).axes
     (line,) = errors.lines
     x, y = line.get_data()
     gap = int(np.flatnonzero(np.isnan(x)).item())
