@@ -313,7 +313,9 @@ class _Approximated:
         return {"colour": COLOURS[(self.number + 1) % len(COLOURS)], "line": _LINES[self.number % len(_LINES)]}
 
 
-def _approximated(branches: Sequence[Branch], beside: Callable[[FloatArray], Mapping[str, FloatArray]]) -> list[_Approximated]:
+def _approximated(
+    branches: Sequence[Branch], beside: Callable[[FloatArray], Mapping[str, FloatArray]]
+) -> list[_Approximated]:
     """The approximations where a machine may be: at stable motions, and evenly over the range besides."""
     chosen = [(branch, _chosen(branch)) for branch in branches if branch.turns == 1]
     every = np.concatenate([branch.parameter for branch, _ in chosen])

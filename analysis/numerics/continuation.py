@@ -152,6 +152,8 @@ class Settings:
         Ranges (low, high) of unknowns, by their number.
     first, least, greatest : float
         Steps in scaled arc length, in which the range of the parameter has length 1.
+    widest : float
+        Greatest step of the parameter itself, in its range.
     most_points : int
     greatest_turn, growing_turn : float
         Greatest angle between the tangents at two neighbouring points (rad), and that up to which the step grows.
@@ -170,6 +172,7 @@ class Settings:
     first: float = 5e-3
     least: float = 1e-8
     greatest: float = 2e-2
+    widest: float = np.inf
     most_points: int = 5000
     greatest_turn: float = 0.25
     growing_turn: float = 0.25
@@ -331,6 +334,9 @@ class Follower:
                 return Curve(tuple(points), tuple(steps), *end)
             if count < HARD and float(point.tangent @ last.tangent) > np.cos(settings.growing_turn):
                 length = min(length * GROWTH, settings.greatest)
+            length = min(
+                length, max(settings.widest / max(abs(float(point.tangent[-1])), settings.least), settings.least)
+            )
         return Curve(
             tuple(points), tuple(steps), Reason.LENGTH, f"{settings.most_points} points, the most allowed, are reached"
         )

@@ -14,6 +14,7 @@ from math import inf, isfinite, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.interpolate import KroghInterpolator
 from scipy.signal import find_peaks
 
 from .branches import Branch
@@ -233,7 +234,10 @@ def _band_end(arc: Arc, top: int, way: int) -> float:
         if a[i] > a[top]:
             return inf
         if a[i] < level:
-            return float(x[i - way] + (x[i] - x[i - way]) * (a[i - way] - level) / (a[i - way] - a[i]))
+            # by the cubic through the points about it, as far as it is between these two
+            about = slice(max(min(i, i - way) - 1, 0), max(i, i - way) + 2)
+            cubic = KroghInterpolator(a[about], x[about])(level)
+            return float(np.clip(cubic, *sorted((x[i - way], x[i]))))
     return float(x[i])
 
 

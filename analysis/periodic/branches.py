@@ -35,8 +35,9 @@ from .turns import Turn
 #: Relative step of the difference by which the constants are differentiated with respect to the parameter. The constants
 #: are smooth functions of it, most of them linear, and the derivative steers Newton's method only.
 _DIFFERENCE = 1e-6
-#: First step along a branch, in scaled arc length.
-_FIRST = 5e-3
+#: First step along a branch, in scaled arc length, the greatest where the parameter hardly changes, and the angle between the
+#: tangents of two points (rad) up to which steps grow: where a curve is round, 150 points a turn are enough to draw it.
+_FIRST, _LONGEST, _ROUND = 5e-3, 2e-2, 0.04
 #: Distance from a period doubling at which the doubled branch is begun, relative to the crank's length.
 _SWITCH = 2e-3
 
@@ -337,7 +338,7 @@ def follow(
     direction : int
         +1 to higher values at first, -1 to lower.
     greatest : float
-        Greatest step in scaled arc length: the range has length 1, and the crank's length counts as 1.
+        Greatest step of the parameter, relative to its range; narrow resonances need small ones.
     most_points : int
     watch : callable, optional
         Called with the parameter of every point.
@@ -432,7 +433,15 @@ def follow_both(family: Family, orbit: PeriodicOrbit, value: float, *, low: floa
 
 
 def _settings(low: float, high: float, greatest: float, most_points: int) -> Settings:
-    return Settings(low=low, high=high, first=min(_FIRST, greatest), greatest=greatest, most_points=most_points)
+    return Settings(
+        low=low,
+        high=high,
+        first=min(_FIRST, greatest),
+        greatest=max(_LONGEST, greatest),
+        widest=greatest,
+        most_points=most_points,
+        growing_turn=_ROUND,
+    )
 
 
 def _follower(

@@ -90,7 +90,7 @@ def distance(points: NDArray[np.float64], place: NDArray[np.float64]) -> float:
 
 def passes(branch: Branch, value: float, motion: NDArray[np.float64], width: float) -> bool:
     """Whether a branch passes a motion, given by its start."""
-    first = branch.orbits[0]
-    scale = np.append(scale_of(first.parameters, first.drive, first.start), width)
+    ends = [branch.orbits[i] for i in (branch.parameter.argmin(), branch.parameter.argmax())]
+    scale = np.append(np.max([scale_of(o.parameters, o.drive, o.start) for o in ends], axis=0), width)
     points = np.column_stack([[orbit.start for orbit in branch.orbits], branch.parameter])
     return distance(points / scale, np.append(motion, value) / scale) < _ON

@@ -21,7 +21,7 @@ from linkwork.limits import LIMIT_SINE, NEAR_LIMIT
 
 from ..numerics.codegen import MATRIX, VECTOR, evaluate, inner, kernel, part
 from ..run.sources import SOURCE, Source
-from ..run.stepping import STAGES, NODES, attempt, following, interpolant, interpolate, shorter, stage
+from ..run.stepping import NODES, STAGES, attempt, following, interpolant, interpolate, shorter, stage
 from .flows import DIRECTIONAL, GAP, PLAIN, STATE, VARIATIONAL
 
 

@@ -154,8 +154,7 @@ def frequency_response(
     most_points : int
         Points of a branch at most.
     greatest_step : float
-        Greatest step in scaled arc length: the range has length 1, and the crank's length counts as 1. Narrow resonances need
-        small ones.
+        Greatest step of the parameter, relative to the range. Narrow resonances need small ones.
     progress : bool
         Show a progress bar.
 

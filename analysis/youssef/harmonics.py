@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from math import pi, sqrt
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -133,7 +133,12 @@ def harmonic_balance(equation: SliderEquation, order: int) -> HarmonicMotion:
 
 
 def amplitudes_over(
-    parameters: FiveBarParameters, speeds: ArrayLike, order: int, *, variant: Variant = Variant.EXACT, load: Load = NO_LOAD
+    parameters: FiveBarParameters,
+    speeds: ArrayLike,
+    order: int,
+    *,
+    variant: Variant = Variant.EXACT,
+    load: Load = NO_LOAD,
 ) -> NDArray[np.float64]:
     """Amplitudes (m) of `harmonic_balance` at many crank speeds (rad/s), of their shape.
 
@@ -148,7 +153,8 @@ def amplitudes_over(
         If the equations are singular at one of the speeds.
     """
     _require_order(order)
-    w = np.atleast_1d(np.asarray(speeds, dtype=float))[:, None]
+    w = np.ravel(np.asarray(speeds, dtype=float))[:, None]
+    require_speed(float(w.min()))
     reference = float(w.max())
     bare = replace(parameters, slider_damping=0.0)
     (once, one), (twice, two) = (
@@ -170,7 +176,7 @@ def amplitudes_over(
     return (parameters.rocker_length * _swings(*_coefficients(z))).reshape(np.shape(speeds))
 
 
-def _coefficients(z: NDArray[np.complex128]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _coefficients(z: NDArray[Any]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Cosines and sines, shape (..., n + 1), of the coefficients of exp(i n theta), (..., 2 n + 1)."""
     half = z[..., z.shape[-1] // 2 :]
     cos = 2.0 * np.real(half)

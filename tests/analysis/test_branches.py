@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from matplotlib.axes import Axes
+from numpy.typing import NDArray
 
 from analysis import figures
 from analysis.numerics.continuation import ContinuationError

@@ -128,6 +128,17 @@ class TestLinear:
         with pytest.raises(HarmonicBalanceError, match=r"singular at lambda_k\^2 = 1"):
             harmonic_balance(e, 2)
 
+    @pytest.mark.parametrize("variant", [Variant.EXACT, Variant.SECOND_ORDER])
+    def test_amplitudes_at_many_speeds_are_those_of_each(self, variant: Variant) -> None:
+        p = replace(RIG_1_B, ground_inclination=0.7, slider_damping=7.0)
+        load, speeds = Load(x=3.0, slider=20.0), np.array([[20.0, 60.0], [90.0, 140.0]])
+        many = hb.amplitudes_over(p, speeds, 5, variant=variant, load=load)
+        each = [
+            p.rocker_length * harmonic_balance(slider_equation(p, w, variant=variant, load=load), 5).amplitude
+            for w in speeds.ravel()
+        ]
+        assert many == pytest.approx(np.reshape(each, (2, 2)), rel=1e-9)
+
     def test_a_negative_order(self) -> None:
         with pytest.raises(InputError, match="order -1"):
             harmonic_balance(slider_equation(TABLE_3_1, 44.0), -1)
