@@ -341,18 +341,22 @@ class Follower:
             tuple(points), tuple(steps), Reason.LENGTH, f"{settings.most_points} points, the most allowed, are reached"
         )
 
-    def locate(self, point: Point, length: float, test: Callable[[Point], float]) -> tuple[Point, float]:
+    def locate(
+        self, point: Point, length: float, beyond: Point, test: Callable[[Point], float]
+    ) -> tuple[Point, float]:
         """The point within a step at which a test, of opposite signs at its ends, is zero, and its distance along the step."""
+        # the parabola through the end of the step
+        bend = 2.0 * (self._scaled(beyond) - self._scaled(point) - length * point.tangent) / length**2
 
         def at(s: float) -> Point:
             if s == 0.0:
                 return point
-            found = self.step(point, s)
-            if found is None:
+            found = self._step(point, s, bend)
+            if isinstance(found, _Failure):
                 raise ContinuationError(
-                    f"no point {s:.3g} beyond the parameter {point.parameter:.9g} within a step taken"
+                    f"no point {s:.3g} beyond the parameter {point.parameter:.9g} within a step taken: {found.text}"
                 )
-            return found
+            return self._point(found, point.tangent)
 
         s = float(brentq(lambda s: test(at(s)), 0.0, length, xtol=1e-13, rtol=1e-14))
         return at(s), s
@@ -488,7 +492,7 @@ class Follower:
         ):
             s = float((found.z - here) @ last.tangent)
         else:
-            point, s = self.locate(last, length, lambda p: float(np.append(p.y, p.parameter)[axis]) - bound)
+            point, s = self.locate(last, length, beyond, lambda p: float(np.append(p.y, p.parameter)[axis]) - bound)
         whole = np.append(point.y, point.parameter)
         whole[axis] = bound
         point = replace(point, y=whole[:-1], parameter=float(whole[-1]))

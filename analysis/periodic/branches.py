@@ -582,10 +582,10 @@ def _tests(point: Point) -> dict[Crossing, float]:
 
 
 def _special_points(
-    curve: Curve, follower: Follower, before: Sequence[tuple[Follower, Curve]] = ()
+    curve: Curve, follower: Follower, pieces: Sequence[tuple[Follower, Curve]] = ()
 ) -> list[SpecialPoint]:
     """The special points of a piece of a branch, numbered after the pieces before it."""
-    passed = sum(len(piece.points) - 1 for _, piece in before)
+    passed = sum(len(piece.points) - 1 for _, piece in pieces)
     found: list[tuple[int, float, SpecialPoint]] = []
     values = [_tests(point) for point in curve.points]
     for i, length in enumerate(curve.steps):
@@ -599,7 +599,8 @@ def _special_points(
                 continue
             if not values[i][kind] * values[i + 1][kind] < 0.0:
                 continue
-            point, s = follower.locate(curve.points[i], length, lambda p, kind=kind: _tests(p)[kind])  # type: ignore[misc]
+            before, after = curve.points[i : i + 2]
+            point, s = follower.locate(before, length, after, lambda p, kind=kind: _tests(p)[kind])  # type: ignore[misc]
             # a real pair with the product 1 is no torus
             if kind is Crossing.TORUS and abs(point.data.multipliers[0].imag) < 1e-6:
                 continue

@@ -27,11 +27,11 @@ from .orbits import (
     SEARCH_TOLERANCE,
     OrbitError,
     PeriodicOrbit,
+    approach,
     guess_of,
     orbit_of,
     period_from,
     require_turns,
-    search_from,
     settle_from,
 )
 from .starts import SAME, scale_of, starts_of
@@ -39,6 +39,8 @@ from .sweeps import sweep
 
 #: Starts of the two methods in a round, and rounds at most.
 MANY, DEFLATED, ROUNDS = 64, 16, 2
+#: Distance, relative to the scale, at which what a search that divides nothing out comes to is taken for a known motion.
+_NEAR = 1e-4
 #: Speeds of a slow run up from rest: the first relative to the last, and their number.
 _FIRST_SPEED, _SPEEDS = 0.2, 80
 
@@ -208,11 +210,10 @@ def orbits_of(
     """The same as `find_orbits`, from a `Drive`; the ``known`` motions are among them."""
     require_turns(turns)
     guess = guess_of(drive.flow(mechanism_of(parameters)), drive, start)
-    search = _Search(parameters, drive, turns, guess)
-    many, deflated = _Found(search), _Found(search)
+    many, deflated = (_Found(parameters, drive, turns, guess) for _ in range(2))
     for orbit in known:
         many.add(orbit)
-    places = [guess, *search.places(MANY, 0)]
+    places = [guess, *many.places(MANY, 0)]
     settled = settle_from(parameters, drive, guess, tolerance=SEARCH_TOLERANCE, change=1e-4, turns=50)
     if settled[0] is Status.DONE:
         places.append(settled[1])
@@ -220,7 +221,7 @@ def orbits_of(
         for place in places:
             many.seek(place, divide=False)
         # other starts than those of the first method
-        for place in (guess, *search.places(DEFLATED, ROUNDS + number), *deflated.between()):
+        for place in (guess, *many.places(DEFLATED, ROUNDS + number), *deflated.between()):
             while deflated.seek(place, divide=True):
                 pass
         agreed = many.same_as(deflated)
@@ -229,44 +230,41 @@ def orbits_of(
         for orbit in (*deflated.orbits, *many.orbits):
             many.add(orbit)
             deflated.add(orbit)
-        places = [*search.places(MANY, number + 1), *many.between()]
+        places = [*many.places(MANY, number + 1), *many.between()]
     orbits = sorted(many.orbits, key=lambda orbit: orbit.amplitude)
     return Orbits(orbits=tuple(orbits), agreed=agreed, index=many.index)
 
 
-class _Search:
-    """What is sought, and where."""
+class _Found:
+    """The motions that one method has found at a point, from its starts."""
 
     def __init__(self, parameters: Parameters, drive: Drive, turns: int, guess: NDArray[np.float64]) -> None:
         self.parameters, self.drive, self.turns, self.guess = parameters, drive, turns, guess
         self.scale = scale_of(parameters, drive, guess)
+        self.orbits: list[PeriodicOrbit] = []
+        #: Starts of all of them: of a motion of several turns one for each, those of shorter periods too.
+        self.known = np.empty((0, len(guess)))
+        #: See `Orbits`.
+        self.index = 0
 
     def places(self, count: int, number: int) -> list[NDArray[np.float64]]:
         """Starts of a set: see `starts_of`."""
         return list(starts_of(self.parameters, self.drive, self.guess, count, number))
 
-
-class _Found:
-    """The motions that one method has found."""
-
-    def __init__(self, search: _Search) -> None:
-        self.search = search
-        self.orbits: list[PeriodicOrbit] = []
-        #: Starts of all of them: of a motion of several turns one for each, those of shorter periods too.
-        self.known = np.empty((0, len(search.guess)))
-        #: See `Orbits`.
-        self.index = 0
-
-    def knows(self, start: NDArray[np.float64]) -> bool:
+    def knows(self, start: NDArray[np.float64], near: float = SAME) -> bool:
         """Whether a start is of a known motion."""
-        away = np.abs(self.known - start) / self.search.scale
-        return bool((away.max(axis=1) < SAME).any()) if len(away) else False
+        away = np.abs(self.known - start) / self.scale
+        return bool((away.max(axis=1) < near).any()) if len(away) else False
 
     def seek(self, place: NDArray[np.float64], *, divide: bool) -> bool:
         """Search from a place; whether a new motion was found."""
-        s, known = self.search, self.known if divide else None
-        orbit = search_from(s.parameters, s.drive, s.turns, place, known)
-        return orbit is not None and self.add(orbit)
+        start = approach(self.parameters, self.drive, self.turns, place, self.known if divide else None)
+        if start is None or (not divide and self.knows(start, _NEAR)):
+            return False
+        try:
+            return self.add(orbit_of(self.parameters, self.drive, turns=self.turns, start=start, settle=False))
+        except OrbitError:
+            return False
 
     def add(self, orbit: PeriodicOrbit) -> bool:
         """Add a motion; whether it is new."""
@@ -276,7 +274,7 @@ class _Found:
         for _ in range(orbit.turns - 1):
             passed.append(passed[-1] + period_from(orbit.parameters, orbit.drive, passed[-1], 1).shift)
         # back at the start before its last turn, it is of a shorter period
-        away = np.abs(np.array(passed) - orbit.start) / self.search.scale
+        away = np.abs(np.array(passed) - orbit.start) / self.scale
         period = next((n for n in range(1, orbit.turns) if away[n].max() < SAME), orbit.turns)
         self.known = np.vstack([self.known, *passed[:period]])
         self.index += period * int(np.sign(np.linalg.det(np.eye(len(orbit.start)) - orbit.monodromy)))
@@ -295,7 +293,7 @@ class _Found:
         places = [
             a + share * (b - a) for n, a in enumerate(self.known) for b in self.known[:n] for share in (0.25, 0.5, 0.75)
         ]
-        around = self.search.places(8, 2 * ROUNDS)
+        around = self.places(8, 2 * ROUNDS)
         return places + [a + share * (b - a) for a in self.known for b in around for share in (0.1, 0.3)]
 
 

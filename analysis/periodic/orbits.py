@@ -36,8 +36,9 @@ ORBIT_TOLERANCE = 100.0 * INTEGRATOR_TOLERANCE
 #: The same in the search for motions far from a guess, iterations at most there, and the greatest correction in the scale of
 #: y; what is found is solved again.
 SEARCH_TOLERANCE, SEARCH_ITERATIONS, REACH = 1e-6, 30, 1.0
-#: Starts of that search where Newton's method fails from the guess: a power of two.
-STARTS = 64
+#: Sets of starts of that search where Newton's method fails from the guess, and starts of each: a power of two. Near a resonance
+#: of small damping one in thirty leads to the motion.
+SETS, STARTS = 4, 64
 #: Newton iterations at most.
 MOST_ITERATIONS = 40
 #: Turns for which a motion is followed where Newton's method fails from the guess, and the change a turn that ends it.
@@ -144,6 +145,8 @@ class PeriodicOrbit(Shown):
     others: int | None = None
     nearest: float | None = None
     multipliers: NDArray[np.complex128] = field(init=False)
+    # `amplitude`, once it has been asked for
+    _amplitude: list[float] = field(default_factory=list, init=False)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "multipliers", multipliers(self.monodromy))
@@ -211,7 +214,9 @@ class PeriodicOrbit(Shown):
     @property
     def amplitude(self) -> float:
         """Half the range of the first free coordinate over a period, of a slider position (m); see `Turn.amplitude`."""
-        return self.turn().amplitude
+        if not self._amplitude:
+            self._amplitude.append(self.turn().amplitude)
+        return self._amplitude[0]
 
     def clearance(self, samples: int = SAMPLES) -> float:
         """How near the links come to the limit of assembly over a period, in the measure of `linkwork.limits.LIMIT_SINE`."""
@@ -352,10 +357,15 @@ def orbit_of(
             return _newton(parameters, drive, turns, settled)
         except OrbitError:
             pass
-    for place in starts_of(parameters, drive, guess, STARTS):
-        found = search_from(parameters, drive, turns, place)
-        if found is not None:
-            return found
+    for number in range(SETS):
+        for place in starts_of(parameters, drive, guess, STARTS, number):
+            found = approach(parameters, drive, turns, place)
+            if found is None:
+                continue
+            try:
+                return _newton(parameters, drive, turns, found)
+            except OrbitError:
+                pass
     raise first
 
 
@@ -371,19 +381,20 @@ def settle_from(
     return Status(status), settled
 
 
-def search_from(
+def approach(
     parameters: Parameters,
     drive: Drive,
     turns: int,
     place: NDArray[np.float64],
     known: NDArray[np.float64] | None = None,
-) -> PeriodicOrbit | None:
-    """The motion that Newton's method leads to from a place, those with a start in ``known`` divided out; None if to none.
+) -> NDArray[np.float64] | None:
+    """Start of the motion that Newton's method leads to from a place, to the tolerance of a search; None if to none.
 
     Parameters
     ----------
     place : ndarray, shape (n,)
     known : ndarray, shape (m, n), optional
+        Starts of motions that are divided out.
     """
     flow, start = drive.flow(mechanism_of(parameters)), place.copy()
     status = orbit_kernels.search(
@@ -396,12 +407,7 @@ def search_from(
         np.empty((0, flow.size)) if known is None else known,
         np.empty(flow.size * (1 + flow.size)),
     )
-    if status != Status.DONE:
-        return None
-    try:
-        return _newton(parameters, drive, turns, start)
-    except OrbitError:
-        return None
+    return start if status == Status.DONE else None
 
 
 def guess_of(flow: Flow, drive: Drive, start: ArrayLike | None) -> NDArray[np.float64]:

@@ -49,7 +49,7 @@ def test_a_fold_is_located_where_the_tangent_turns_back(scale: float) -> None:
     folds = []
     for before, after, length in zip(points, points[1:], steps):
         if before.tangent[-1] * after.tangent[-1] < 0.0:
-            point, s = f.locate(before, length, lambda p: float(p.tangent[-1]))
+            point, s = f.locate(before, length, after, lambda p: float(p.tangent[-1]))
             folds.append((point.parameter, point.y[0]))
             assert 0.0 <= s <= length
     exact = 2.0 / np.sqrt(27.0), 1.0 / np.sqrt(3.0)
