@@ -341,9 +341,7 @@ class Follower:
             tuple(points), tuple(steps), Reason.LENGTH, f"{settings.most_points} points, the most allowed, are reached"
         )
 
-    def locate(
-        self, point: Point, length: float, beyond: Point, test: Callable[[Point], float]
-    ) -> tuple[Point, float]:
+    def locate(self, point: Point, length: float, beyond: Point, test: Callable[[Point], float]) -> tuple[Point, float]:
         """The point within a step at which a test, of opposite signs at its ends, is zero, and its distance along the step."""
         # the parabola through the end of the step
         bend = 2.0 * (self._scaled(beyond) - self._scaled(point) - length * point.tangent) / length**2

@@ -7,7 +7,6 @@ from .arcs import fold_jumps as fold_jumps
 from .arcs import ranges_to_avoid as ranges_to_avoid
 from .branches import FORCE as FORCE
 from .branches import Branch as Branch
-from .branches import Family as Family
 from .branches import SpecialPoint as SpecialPoint
 from .branches import follow as follow
 from .branches import follow_both as follow_both
@@ -34,6 +33,7 @@ from .drives import drive_of as drive_of
 from .extrema import Extremum as Extremum
 from .extrema import extrema as extrema
 from .extrema import special_gradient as special_gradient
+from .families import Family as Family
 from .finder import Orbits as Orbits
 from .finder import find_orbit as find_orbit
 from .finder import find_orbits as find_orbits
@@ -73,7 +73,6 @@ from .orbits import ORBIT_TOLERANCE as ORBIT_TOLERANCE
 from .orbits import OrbitAssemblyError as OrbitAssemblyError
 from .orbits import OrbitError as OrbitError
 from .orbits import PeriodicOrbit as PeriodicOrbit
-from .orbits import largest_multipliers as largest_multipliers
 from .orbits import orbit_of as orbit_of
 from .orbits import period_from as period_from
 from .planes import Operation as Operation
@@ -89,6 +88,7 @@ from .planes import with_values as with_values
 from .resonance import Response as Response
 from .resonance import ResponseInterrupted as ResponseInterrupted
 from .resonance import frequency_response as frequency_response
+from .rows import largest_multipliers as largest_multipliers
 from .stability import Confirmation as Confirmation
 from .stability import Monodromy as Monodromy
 from .stability import Outcome as Outcome

@@ -29,8 +29,9 @@ from .floquet import TOLERANCE, multipliers
 from .flows import GAP, PLAIN, VARIATIONAL
 from .grids import axes_of, kept_rows, name_of
 from .orbit_kernels import NO_SOURCE
-from .orbits import MOST_ITERATIONS, SEARCH_TOLERANCE, PeriodicOrbit, guess_of, row_of, section_of
+from .orbits import MOST_ITERATIONS, SEARCH_TOLERANCE, PeriodicOrbit, guess_of, section_of
 from .planes import Operation, Plane
+from .rows import row_of
 from .starts import extent_of, scale_of, starts_of
 
 #: Starts from which the motions of a point are sought beside those of its neighbour: a power of two.

@@ -13,7 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..numerics.continuation import Curve, End, Evaluate, Evaluation, Follower, Settings
-from .branches import orbit_from, reason_to_leave
+from .branches import reason_to_leave
+from .families import orbit_from
 from .floquet import Crossing, crossing_test
 from .orbits import (
     PeriodicOrbit,

@@ -10,7 +10,8 @@ from scipy.signal import find_peaks
 
 from linkwork.errors import InputError, LinkworkError
 
-from .branches import Branch, Family, SpecialPoint
+from .branches import Branch, SpecialPoint
+from .families import Family
 from .floquet import Stability
 from .gradients import PointGradient, crossing_gradient, extremum_gradient, extremum_orbit
 from .orbits import OrbitError, PeriodicOrbit, orbit_of

@@ -19,8 +19,8 @@ from linkwork.errors import InputError, LinkworkError
 
 from ..files import unknown_name
 from ..mechanisms import mechanism_of
-from .branches import orbit_from
 from .directions import along_parameters, gradient_names, stacked
+from .families import orbit_from
 from .floquet import Crossing
 from .orbits import PeriodicOrbit, orbit_of, period_from
 from .planes import require_variable, value_of, with_values

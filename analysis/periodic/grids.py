@@ -23,7 +23,7 @@ from ..mechanisms import MECHANISMS, mechanism_of
 from ..numerics.codegen import cache_root, fingerprint
 from ..numerics.workers import check_jobs, interruptible, over_workers
 from ..run import shown
-from . import orbit_kernels, orbits, row_kernels
+from . import orbit_kernels, orbits, row_kernels, rows
 from .floquet import TOLERANCE, Stability, multipliers
 from .flows import GAP, PLAIN, VARIATIONAL
 from .orbit_kernels import Status
@@ -150,12 +150,17 @@ def grid(
     guess = orbits.guess_of(drive.flow(mechanism), drive, start)
     guesses = np.vstack([guess, starts_of(parameters, drive, guess, STARTS)])
     # what computes the rows, beside their arguments
-    code = fingerprint(row_kernels.solve_row), fingerprint(multipliers), inspect.getsource(orbits)
-    rows = [[operation(first, value) for first in xs.tolist()] for value in ys.tolist()]
+    code = (
+        fingerprint(row_kernels.solve_row),
+        fingerprint(multipliers),
+        inspect.getsource(orbits),
+        inspect.getsource(rows),
+    )
+    points = [[operation(first, value) for first in xs.tolist()] for value in ys.tolist()]
     data, computed = kept_rows(
         partial(_compute_row, guesses, tolerance),
-        rows,
-        [name_of(row, guesses, (PLAIN, VARIATIONAL, GAP), code, tolerance) for row in rows],
+        points,
+        [name_of(row, guesses, (PLAIN, VARIATIONAL, GAP), code, tolerance) for row in points],
         (len(xs), len(guess) + 2),
         mechanism=mechanism,
         folder=folder,
@@ -177,7 +182,7 @@ def grid(
 def _compute_row(guesses: NDArray[np.float64], tolerance: float, row: Sequence[Operation]) -> NDArray[np.float64]:
     """A row, with the columns multiplier, start and status."""
     mechanisms, drives = [p for p, _ in row], [drive for _, drive in row]
-    values, starts, status = orbits.largest_multipliers(mechanisms, drives, guesses, tolerance=tolerance)
+    values, starts, status = rows.largest_multipliers(mechanisms, drives, guesses, tolerance=tolerance)
     return np.column_stack([values, starts, status])
 
 

@@ -10,8 +10,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..numerics.continuation import ContinuationError
-from .branches import Branch, Family, follow_both
+from .branches import Branch, follow_both
 from .coexistence import Coexistence, coexistence
+from .families import Family
 from .orbits import OrbitError, orbit_of
 from .planes import Plane
 from .starts import scale_of

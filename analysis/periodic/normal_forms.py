@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 
 from linkwork.errors import InputError, LinkworkError
 
-from .branches import Family, SpecialPoint
+from .branches import SpecialPoint
+from .families import Family
 from .floquet import Crossing
 from .orbits import PeriodicOrbit, orbit_of, period_from
 from .starts import scale_of

@@ -21,12 +21,12 @@ from ..mechanisms import Parameters, mechanism_of
 from ..notebook import Shown, format_count
 from ..run import outputs_of, takes_published
 from ..units import RAD_S_PER_RPM
-from . import orbit_kernels, row_kernels
+from . import orbit_kernels
 from .drives import Drive
 from .floquet import TOLERANCE, StabilityVerdict, liouville, multipliers, verdict
 from .flows import DIRECTIONAL, GAP, PLAIN, STATE, VARIATIONAL, Flow
 from .orbit_kernels import NO_SOURCE, Section, Status
-from .starts import is_smooth, scale_in, scale_of, starts_of
+from .starts import scale_in, starts_of
 from .turns import Turn, times_of
 
 #: Bound of the local error of a step; the solution is good to about a hundred times as much.
@@ -36,8 +36,8 @@ ORBIT_TOLERANCE = 100.0 * INTEGRATOR_TOLERANCE
 #: The same in the search for motions far from a guess, iterations at most there, and the greatest correction in the scale of
 #: y; what is found is solved again.
 SEARCH_TOLERANCE, SEARCH_ITERATIONS, REACH = 1e-6, 30, 1.0
-#: Sets of starts of that search where Newton's method fails from the guess, and starts of each: a power of two. Near a resonance
-#: of small damping one in thirty leads to the motion.
+#: Sets of starts of that search where Newton's method fails from the guess, and starts of each, a power of two:
+#: near a resonance of small damping one in some forty leads to the motion.
 SETS, STARTS = 4, 64
 #: Newton iterations at most.
 MOST_ITERATIONS = 40
@@ -281,34 +281,6 @@ def section_of(
         along,
         tolerance,
         flow.torque,
-    )
-
-
-class Row(NamedTuple):
-    """A row of mechanisms as the kernels take it: what they share; constants, drives and magnitudes of y, each by rows."""
-
-    section: Section
-    constants: NDArray[np.float64]
-    drives: NDArray[np.float64]
-    scales: NDArray[np.float64]
-
-
-def row_of(
-    rows: Sequence[Parameters],
-    drives: Sequence[Drive],
-    start: NDArray[np.float64],
-    *functions: int,
-    tolerance: float = INTEGRATOR_TOLERANCE,
-) -> Row:
-    """What the kernels need of a row of mechanisms and their drives: see `section_of`."""
-    mechanism = mechanism_of(rows[0])
-    numbers = np.array([(*parameters.constants(),) for parameters in rows])
-    vectors = np.array([drive.vector(mechanism) for drive in drives])
-    return Row(
-        section_of(rows[0], drives[0], start, *functions, tolerance=tolerance, beside=rows),
-        np.hstack([numbers, np.zeros_like(numbers)]),
-        np.hstack([vectors, np.zeros_like(vectors)]),
-        np.array([scale_of(parameters, drive, start) for parameters, drive in zip(rows, drives)]),
     )
 
 
@@ -589,66 +561,3 @@ def failure(
     """The error that says what a status of `orbit_kernels` means."""
     kind = OrbitAssemblyError if status == Status.LIMIT else OrbitError
     return kind(orbit_kernels.REASONS[Status(status)], flow, start, float(residual), iterations)
-
-
-def largest_multipliers(
-    rows: Sequence[Parameters],
-    drives: Sequence[Drive],
-    guesses: ArrayLike | None = None,
-    *,
-    turns: int = 1,
-    tolerance: float = INTEGRATOR_TOLERANCE,
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int64]]:
-    """Largest Floquet multiplier of each of a row of mechanisms, every one on its own periodic orbit.
-
-    Each is sought from its neighbour's start, so that they should be ordered along a line of a chart, then from the guesses.
-
-    Parameters
-    ----------
-    rows, drives : sequences of m
-    guesses : array_like, shape (n,) or (k, n), optional
-        Start of the first, and others where nothing is found from there; see `find_orbit`.
-    turns : int
-    tolerance : float
-        Bound of the integrator's local error.
-
-    Returns
-    -------
-    values : ndarray, shape (m,)
-        Largest modulus of the multipliers; NaN where there is none.
-    starts : ndarray, shape (m, n)
-        y at crank angle 0; NaN where there is none.
-    status : ndarray of int, shape (m,)
-        `orbit_kernels.Status`: 0 where an orbit was found.
-    """
-    mechanism = mechanism_of(rows[0])
-    flow = drives[0].flow(mechanism)
-    if any(drive.flow(mechanism).modes != flow.modes for drive in drives):
-        raise InputError("a row has both drives by speed and by torque, or other modes: it must have one kind")
-    given = (None,) if guesses is None else np.atleast_2d(np.asarray(guesses, dtype=float))
-    starting = np.array([guess_of(flow, drives[0], guess) for guess in given])
-    n, first = flow.size, starting[0]
-    section, numbers, vectors, scales = row_of(rows, drives, first, PLAIN, VARIATIONAL, tolerance=tolerance)
-    monodromies, starts = np.full((len(rows), n * n), np.nan), np.full((len(rows), n), np.nan)
-    status = np.zeros(len(rows), dtype=np.int64)
-    row_kernels.solve_row(
-        section,
-        NO_SOURCE,
-        numbers,
-        vectors,
-        scales,
-        flow.period * turns,
-        turns,
-        MOST_ITERATIONS,
-        SEARCH_TOLERANCE,
-        all(map(is_smooth, dict.fromkeys(rows))),
-        starting,
-        starts,
-        monodromies,
-        status,
-    )
-    values = np.full(len(rows), np.nan)
-    good = status == Status.DONE
-    if good.any():
-        values[good] = np.abs(multipliers(monodromies[good].reshape(-1, n, n)))[:, 0]
-    return values, starts, status

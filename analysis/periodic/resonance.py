@@ -24,9 +24,10 @@ from ..numerics.workers import interruptible
 from ..run import shown, takes_published
 from ..units import Amount, si
 from .arcs import Avoided, FoldJump, fold_jumps, ranges_to_avoid
-from .branches import GREATEST_MULTIPLIER, Branch, Family, SpecialPoint, describe, follow, switch
+from .branches import GREATEST_MULTIPLIER, Branch, SpecialPoint, describe, follow, switch
 from .drives import Drive, published_drive
 from .extrema import Extremum, extrema
+from .families import Family
 from .floquet import Crossing
 from .orbits import (
     OrbitError,

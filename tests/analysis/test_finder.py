@@ -27,6 +27,13 @@ def test_a_resonant_motion_that_newtons_method_misses() -> None:
         orbit_of(parameters, Drive(speed=speed), settle=False)
 
 
+def test_one_motion_is_found_where_all_of_them_are() -> None:
+    """None of the first 64 starts leads to the only motion there is."""
+    parameters, drive = replace(RIG_1_B, slider_damping=2.0), Drive(speed=1031.5 * RAD_S_PER_RPM)
+    (only,) = find_orbits(parameters, speed=drive.speed).orbits
+    assert orbit_of(parameters, drive).start == pytest.approx(only.start, rel=1e-8)
+
+
 @pytest.mark.parametrize("rpm", [980.0, 1020.0])
 def test_three_motions_where_the_response_bends_over(rpm: float) -> None:
     found = find_orbits(RIG_1_B, speed=rpm * RAD_S_PER_RPM)

@@ -1,0 +1,92 @@
+"""Processor time of `linkwork resonance`, as a whole and by its parts, with everything compiled.
+
+    python -m benchmarks.resonance
+    python -m benchmarks.resonance rig-1-spring-b
+
+The whole is a process of its own, started once before it counts, so that the machine code is in the cache; the parts are
+what the command does, in this process, one after the other. Both are times of the processor, which others on the machine hardly
+change.
+"""
+
+from __future__ import annotations
+
+import argparse
+import resource
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console
+from rich.table import Table
+
+#: Range of speeds relative to the natural frequency, and how often the period is doubled, as the command has them.
+RANGE, DOUBLINGS = (0.15, 2.3), 3
+
+
+def command(name: str, folder: str) -> float:
+    """Processor time of the command (s)."""
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+    arguments = [sys.executable, "-m", "analysis.cli", "resonance", "--published", name, "--out", folder]
+    subprocess.run(arguments, capture_output=True, check=False)
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+
+
+def parts(name: str, folder: str) -> dict[str, float]:
+    """Processor time (s) of each of the things that the command does."""
+    times: dict[str, float] = {}
+
+    def timed(what: str, does: Callable[[], Any]) -> Any:
+        begin = time.process_time()
+        result = does()
+        times[what] = time.process_time() - begin
+        return result
+
+    def imports() -> None:
+        import numba  # noqa: F401 - with what it brings
+
+        from analysis import figures, periodic, youssef
+
+        _ = figures.plot, periodic.frequency_response, youssef.approximations
+
+    timed("imports", imports)
+    from analysis import figures
+    from analysis.files import save_figure
+    from analysis.periodic import frequency_response, natural_frequency, with_isolas
+    from analysis.youssef import approximations
+    from linkwork.five_bar.published import SETS
+
+    rig = SETS[name].parameters
+    low, high = (factor * natural_frequency(rig) for factor in RANGE)
+    response = timed("motions followed", lambda: frequency_response(rig, low, high, doublings=DOUBLINGS))
+    response = timed("all motions sought at five speeds", lambda: with_isolas(response))
+    points = sum(map(len, response.branches))
+    timed(f"outputs over a turn of {points} points", lambda: response.to_csv(Path(folder) / "response.csv"))
+    timed("maxima and minima", lambda: (response.maxima(), response.minima(), response.speeds_to_avoid))
+    beside = timed("classical approximations", lambda: approximations(response))
+    picture = timed("figure", lambda: figures.plot(response, title=name, beside=beside))
+    timed("picture written", lambda: save_figure(picture, Path(folder) / "response.png"))
+    return times
+
+
+def main(name: str) -> None:
+    """Measure and print."""
+    table = Table(title=f"linkwork resonance --published {name}, processor time")
+    table.add_column("")
+    table.add_column("s", justify="right")
+    with tempfile.TemporaryDirectory() as folder:
+        command(name, folder)
+        table.add_row("the command, warm", f"{command(name, folder):.2f}")
+        for part, seconds in parts(name, folder).items():
+            table.add_row(f"  {part}", f"{seconds:.2f}")
+    Console(width=100).print(table)
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("name", nargs="?", default="rig-2-spring-c", help="published set")
+    main(parser.parse_args().name)
