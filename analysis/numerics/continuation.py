@@ -463,7 +463,7 @@ class Follower:
             bound = (self.high if last.tangent[axis] > 0.0 else self.low)[axis] / self.scale[axis]
             # twice the height of the parabola with these slopes
             if abs(bound - self._scaled(last)[axis]) < length * ahead**2 / (ahead + behind):
-                turn, s = self.locate(last, length, lambda p, axis=axis: float(p.tangent[axis]))  # type: ignore[misc]
+                turn, s = self.locate(last, length, point, lambda p, axis=axis: float(p.tangent[axis]))  # type: ignore[misc]
                 if self.is_beyond(turn):
                     return turn, s
         return point, length
