@@ -9,8 +9,22 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from linkwork.errors import LinkworkError
+
 from ..periodic import Crossing, Gradient, Turn, extremum_gradient
-from .places import Across, FloatArray, Found, LostError, Place, Spot, margin_of, margin_slopes, sampled, spot_of
+from .places import (
+    Across,
+    FloatArray,
+    Found,
+    LostError,
+    Place,
+    Spot,
+    centre_of,
+    margin_of,
+    margin_slopes,
+    sampled,
+    spot_of,
+)
 from .wish import AMPLITUDE, Limit, Wish
 
 #: Step in which the level is sought at which an output is greatest, relative to the range's size, and steps at most.
@@ -71,6 +85,32 @@ class Beyond:
 
     def slopes(self, x: FloatArray) -> FloatArray:
         slopes: FloatArray = self._share * self.place.at(x).slopes[-1]
+        return slopes
+
+
+class Gone:
+    """A closed branch has shrunk to a point, and vanished."""
+
+    slack = 1e-9
+
+    def __init__(self, group: str, wish: Wish, folds: Sequence[Spot]) -> None:
+        self.group, self.centre = group, centre_of(wish, folds)
+        #: Changes at which the centre is known.
+        self.begin, self._there = self.centre.found.x, folds[0].x
+        self._sign = -np.sign(self.centre.miss(self.centre.found))
+
+    def value(self, x: FloatArray) -> float:
+        try:
+            spot = self.centre.at(x).spot
+        except LinkworkError:
+            if np.array_equal(x, self._there):
+                return -1.0  # where the branch is, and too large to have a centre
+            raise
+        # to be gone for certain it has to be a little beyond the point
+        return float(self._sign * self.centre.miss(spot)) - 2.0 * self.slack
+
+    def slopes(self, x: FloatArray) -> FloatArray:
+        slopes: FloatArray = self._sign * self.centre.miss_slopes(self.centre.at(x))
         return slopes
 
 

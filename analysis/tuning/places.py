@@ -7,7 +7,7 @@ branch.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
 from itertools import combinations
@@ -32,6 +32,8 @@ STRIDE, REACH = 0.05, 0.3
 _HALVINGS = 3
 #: Samples of a turn.
 _SAMPLES = 256
+#: Times that a closed branch is shrunk at most, and the share of its width each time, to first order.
+_SHRINKINGS, _SHRINKAGE = 40, 0.2
 
 
 class LostError(LinkworkError):
@@ -302,3 +304,130 @@ class Place:
             if size < FOUND:
                 return begin._replace(x=x, y=z[:n], level=float(z[n]))
         raise LostError(f"Newton's method does not settle: last correction {size:.1e}")
+
+
+class Centre(Place):
+    """Where a closed branch shrinks to a point and vanishes, found again wherever the parameters go, before that and after it.
+
+    With G = y(T) - y(0), a vector b and a number e, the motions that miss their start by e b have a critical point: G = e b,
+    and a vector across G's derivatives by y and by the level. Where e is zero there the branch is a point (an isola centre: M.
+    Golubitsky and D. G. Schaeffer, Singularities and Groups in Bifurcation Theory I, Springer 1985, chapter III); e is a smooth
+    function of the parameters on both sides of it.
+
+    Parameters
+    ----------
+    wish : Wish
+    spot : Spot
+        Inside the branch.
+
+    Raises
+    ------
+    LostError
+        If there is no such point near it.
+    """
+
+    def __init__(self, wish: Wish, spot: Spot) -> None:
+        super().__init__(wish, Across.at_level(wish, spot, spot.level), spot)
+        n = len(spot.y)
+        self._b = np.linalg.svd(self._derivatives(expansion(wish, spot))[:, :n])[0][:, -1]
+        self._last = self.found = self._newton(spot.x, spot, None, 0.0)
+        found = expansion(wish, self._last)
+        first, across = self._derivatives(found), self._across(found)
+        free = np.linalg.svd(first)[2][n - 1 :]
+        bends = np.linalg.eigvalsh(free @ self._second(found, across) @ free.T)
+        miss = self.miss(self.found)
+        # a bowl is cut in a closed curve, a saddle is not
+        if not (bends[0] * bends[1] > 0.0 and miss * bends[0] < 0.0):
+            raise LostError(f"no closed branch lies about {wish.say(spot.level)}")
+
+    def miss(self, spot: Spot) -> float:
+        """e, relative to the scale of y."""
+        return float(self._b @ self._gap(spot))
+
+    def miss_slopes(self, found: Found) -> FloatArray:
+        """Its derivatives by the changes, shape (k,)."""
+        n = len(found.spot.y)
+        slopes: FloatArray = self._across(found.expansion) @ (found.expansion.gaps[:, n + 1 :] / self._scale[:n, None])
+        return slopes
+
+    def _gap(self, spot: Spot) -> FloatArray:
+        evaluate = family_at(self.wish, spot.x).evaluate(spot.turns, *self.wish.span)
+        return np.asarray(evaluate(spot.y, spot.level).residual / self._scale[:-1])
+
+    def _derivatives(self, found: Expansion) -> FloatArray:
+        """Of G by y and the level, scaled; shape (n, n + 1)."""
+        n = len(found.monodromy)
+        return np.asarray(found.gaps[:, : n + 1] * self._scale / self._scale[:n, None])
+
+    def _across(self, found: Expansion) -> FloatArray:
+        """The vector across the derivatives, of which the product with b is 1."""
+        vector = np.linalg.svd(self._derivatives(found))[0][:, -1]
+        return np.asarray(vector / (vector @ self._b))
+
+    def _second(self, found: Expansion, across: FloatArray) -> FloatArray:
+        """Second derivatives of the product of a vector with G, scaled; shape (n + 1, n + 1)."""
+        v, n = found.variations, len(found.monodromy)
+        by_y, by_constant = v.second(found.ways[..., n], found.constants[:, n])
+        level = v.after(by_y @ found.ways[..., n : n + 1] + by_constant @ found.constants[:, n : n + 1])
+        second = np.empty((n, n + 1, n + 1))
+        second[:, :n, :] = found.monodromies[: n + 1].transpose(1, 2, 0)
+        second[:, n, :n] = second[:, :n, n]
+        second[:, n, n] = level[:, 0]
+        return np.asarray(np.einsum("a,aij->ij", across / self._scale[:n], second) * np.outer(self._scale, self._scale))
+
+    def _newton(self, x: FloatArray, begin: Spot, slope: FloatArray | None, ahead: float) -> Spot:
+        n = len(begin.y)
+        z = np.append(begin.y, begin.level) / self._scale
+        first = z = z if slope is None else z + ahead * slope / self._scale
+        across, miss = np.empty(0), 0.0
+        for _ in range(ITERATIONS):
+            spot = begin._replace(x=x, y=z[:n] * self._scale[:n], level=float(z[n] * self._scale[n]))
+            found = expansion(self.wish, spot)
+            gap, derivatives = self._gap(spot), self._derivatives(found)
+            if not len(across):
+                across, miss = self._across(found), float(self._b @ gap)
+            matrix = np.zeros((2 * n + 2, 2 * n + 2))
+            matrix[:n, : n + 1], matrix[:n, n + 1] = derivatives, -self._b
+            matrix[n:-1, : n + 1], matrix[n:-1, n + 2 :] = self._second(found, across), derivatives.T
+            matrix[-1, n + 2 :] = self._b
+            value = np.concatenate([gap - miss * self._b, derivatives.T @ across, [across @ self._b - 1.0]])
+            try:
+                step = np.linalg.solve(matrix, value)
+            except np.linalg.LinAlgError:
+                break
+            z, miss, across = z - step[: n + 1], miss - float(step[n + 1]), across - step[n + 2 :]
+            if not np.abs(z - first).max() < REACH:
+                break
+            if np.abs(step[: n + 1]).max() < FOUND:
+                return begin._replace(x=x, y=z[:n] * self._scale[:n], level=float(z[n] * self._scale[n]))
+        raise LostError(f"no closed branch near {self.wish.say(begin.level)} shrinks to a point")
+
+
+def centre_of(wish: Wish, folds: Sequence[Spot]) -> Centre:
+    """The centre of the closed branch with two folds; a large one is shrunk first, by the least changes that do.
+
+    Raises
+    ------
+    LostError
+        If it cannot be shrunk so far within the bounds of the changes.
+    """
+    x, places = folds[0].x, [Place(wish, Lost(Crossing.FOLD), fold) for fold in folds]
+    low, high = wish.scaled(wish.low), wish.scaled(wish.high)
+    for _ in range(_SHRINKINGS):
+        first, last = (place.at(x) for place in places)
+        try:
+            return Centre(
+                wish,
+                first.spot._replace(
+                    y=0.5 * (first.spot.y + last.spot.y), level=0.5 * (first.spot.level + last.spot.level)
+                ),
+            )
+        except LinkworkError:
+            pass
+        # the square of the width goes to zero evenly
+        width, slopes = last.spot.level - first.spot.level, last.slopes[-1] - first.slopes[-1]
+        moved = np.clip(x - _SHRINKAGE * width * slopes / (slopes @ slopes), low, high)
+        if np.abs(moved - x).max() < FOUND:
+            break
+        x = moved
+    raise LostError(f"the closed branch about {wish.say(folds[0].level)} does not shrink to a point within the bounds")

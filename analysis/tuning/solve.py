@@ -8,13 +8,14 @@ from itertools import product
 from math import isfinite
 
 import numpy as np
+from scipy.stats import qmc
 
 from linkwork.errors import LinkworkError
 
-from ..periodic import Crossing, PeriodicOrbit, SpecialPoint
+from ..periodic import Crossing, SpecialPoint
 from ..run import shown
-from .conditions import Below, Beyond, Condition, Inside, PeakBeyond
-from .places import Across, FloatArray, Lost, LostError, Place, spot_of
+from .conditions import Below, Beyond, Condition, Gone, Inside, PeakBeyond
+from .places import Across, FloatArray, Lost, LostError, Place, Spot, spot_of
 from .program import Answer, nearest, objective
 from .requirements import JUMP, RESONANCE, STABLE, readings, requirements
 from .survey import MARGINAL, SOUGHT, Region, Survey, charted, others, survey
@@ -25,6 +26,9 @@ from .wish import Wish
 _ROUNDS, _WAYS = 12, 8
 #: Value of a condition that is far from being active.
 _FAR = 0.05
+#: Changes, spread over their bounds, with which the range is looked at where no way leads to what is wished, a power of two;
+#: and halvings of the way to one with which nothing is missing.
+_SPREAD, _BISECTIONS = 8, 6
 #: Ways round a region of lost stability, or a resonance: it goes below the range, above it, or vanishes.
 _BELOW, _ABOVE, _REMOVED = -1, 1, 0
 
@@ -44,20 +48,43 @@ class _Search:
 
     wish: Wish
     rounds: int = 0
-    #: Motions on branches that the response does not meet.
-    more: list[PeriodicOrbit] = field(default_factory=list)
+    #: Places on branches that the response does not meet.
+    more: list[Spot] = field(default_factory=list)
+    #: The best that was found: whether something is missing, how much, the objective; what lies in the range; second motions.
+    best: tuple[tuple[bool, float, float], Survey, tuple[float, ...]] | None = None
 
     def look(self, x: FloatArray) -> Survey:
         """Follow the response with some changes."""
         own = []
-        for orbit in self.more:
-            spot = spot_of(self.wish, x, orbit)
+        for spot in self.more:
             place = Place(self.wish, Across.at_level(self.wish, spot, spot.level), spot)
             try:
                 own.append(place.at(x).orbit)
             except LostError:
                 continue  # its branch is gone there
         return survey(self.wish, x, own)
+
+    def look_beside(self, found: Survey) -> tuple[bool, tuple[float, ...]]:
+        """Seek motions beside a response: whether there are new ones, and the levels with two stable ones."""
+        new, several = others(found)
+        self.more += [spot_of(self.wish, found.x, orbit) for orbit in new]
+        return bool(new), several
+
+    def excess(self, found: Survey, several: tuple[float, ...]) -> float:
+        """Sum of what is missing."""
+        return sum(reading.excess for reading in readings(found, several).values())
+
+    def keep(self, found: Survey, several: tuple[float, ...]) -> None:
+        """Remember what was found, if it is better."""
+        excess = self.excess(found, several)
+        rank = excess > 0.0, excess, float(objective(self.wish, found.x))
+        if self.best is None or rank < self.best[0]:
+            self.best = rank, found, several
+
+    @property
+    def least(self) -> float:
+        """The least objective with which nothing is missing."""
+        return np.inf if self.best is None or self.best[0][0] else self.best[0][2]
 
 
 def tune(wish: Wish, *, progress: bool = False) -> Tuned:
@@ -99,27 +126,68 @@ def tune(wish: Wish, *, progress: bool = False) -> Tuned:
     start = np.clip(zero, wish.scaled(wish.low), wish.scaled(wish.high))
     before = search.look(zero)
     first = before if (start == zero).all() else search.look(start)
-    search.more += others(first)[0]
-    if search.more:
+    if search.look_beside(first)[0]:
         first = search.look(start)
         before = first if (start == zero).all() else search.look(zero)
-    best: tuple[tuple[bool, float, float], Survey, tuple[float, ...]] | None = None
+    _try_ways(search, first, progress)
+    if search.least == np.inf:
+        nearer = _next_to_a_clean_one(search, first)
+        if nearer is not None:
+            _try_ways(search, nearer, progress)
+    if search.best is None:
+        raise LinkworkError("the motions of the range could not be followed while the parameters were changed")
+    return _tuned(search, before, *search.best[1:])
+
+
+def _try_ways(search: _Search, first: Survey, progress: bool) -> None:
+    """Try all ways from some changes."""
     ways = _ways(first)
     with shown(progress, len(ways), "tune") as show:
         for number, way in enumerate(ways):
-            least = best[0][2] if best is not None and not best[0][0] else np.inf
-            found = _exchange(search, first, list(way), least)
+            found = _exchange(search, first, list(way))
             show(number + 1)
-            if found is None:
-                continue
-            last, several = found
-            excess = sum(reading.excess for reading in readings(last, several).values())
-            rank = excess > 0.0, excess, float(objective(wish, last.x))
-            if best is None or rank < best[0]:
-                best = rank, last, several
-    if best is None:
-        raise LinkworkError("the motions of the range could not be followed while the parameters were changed")
-    return _tuned(search, before, best[1], best[2])
+            if found is not None:
+                search.keep(*found)
+
+
+def _next_to_a_clean_one(search: _Search, first: Survey) -> Survey | None:
+    """What lies in the range just before nothing unwanted does, on the way from the first changes to others within the bounds.
+
+    Where no way leads from the first changes to such as are wished, because places are lost on it, one may lead from there.
+    None where none of some changes, spread over the bounds, leaves nothing unwanted.
+    """
+    wish = search.wish
+    low, high = wish.scaled(wish.low), wish.scaled(wish.high)
+    spread = low + (high - low) * qmc.Sobol(len(low), rng=0).random(_SPREAD)
+    for x in sorted([low, high, *spread], key=lambda x: float(objective(wish, x))):
+        if _looked(search, x)[0]:
+            break
+    else:
+        return None
+    dirty, clean, found = first.x, x, None
+    for _ in range(_BISECTIONS):
+        middle = 0.5 * (dirty + clean)
+        is_clean, there = _looked(search, middle)
+        if is_clean:
+            clean = middle
+        else:
+            dirty, found = middle, there or found
+    return found
+
+
+def _looked(search: _Search, x: FloatArray) -> tuple[bool, Survey | None]:
+    """Whether nothing is missing with some changes, and what lies in the range."""
+    try:
+        found = search.look(x)
+        new, several = search.look_beside(found)
+        if new:
+            found = search.look(x)
+    except LinkworkError:
+        return False, None
+    if search.excess(found, several) > 0.0:
+        return False, found
+    search.keep(found, several)
+    return True, found
 
 
 def _tuned(search: _Search, before: Survey, after: Survey, several: tuple[float, ...]) -> Tuned:
@@ -188,9 +256,7 @@ def _side(ways: Sequence[_Way], kind: Crossing | None, level: float) -> int | No
 # Exchange
 
 
-def _exchange(
-    search: _Search, first: Survey, ways: list[_Way], least: float
-) -> tuple[Survey, tuple[float, ...]] | None:
+def _exchange(search: _Search, first: Survey, ways: list[_Way]) -> tuple[Survey, tuple[float, ...]] | None:
     """The least change by these ways, or the nearest that can be had, and levels with two stable motions.
 
     None where a place is lost, or another way has found a change as small.
@@ -200,18 +266,18 @@ def _exchange(
     several: tuple[float, ...] = ()
     answer = Answer(x=first.x, objective=0.0, violations={})
     for number in range(_ROUNDS):
-        new = [c for c in _conditions(found, ways) if _counts(c, answer)]
-        if not new:
-            own, several = others(found)
-            if not own and (number > 0 or not wish.least):
-                return found, several
-            search.more += own
-        # what is far from being active is found again where it matters
-        conditions = [c for c in conditions if _value(c, answer) < _FAR] + new
         try:
-            answer = nearest(wish, conditions, answer.x)
+            new = [c for c in _conditions(found, ways) if _counts(c, answer)]
+            if not new:
+                own, several = search.look_beside(found)
+                if not own and (number > 0 or not wish.least):
+                    return found, several
+            # what is far from being active is found again where it matters
+            conditions = [c for c in conditions if _value(c, answer) < _FAR] + new
+            begin = next((c.begin for c in new if isinstance(c, Gone)), answer.x)
+            answer = nearest(wish, conditions, begin)
             search.rounds += 1
-            if not isfinite(answer.total) or (answer.met and answer.objective >= least):
+            if not isfinite(answer.total) or (answer.met and answer.objective >= search.least):
                 return None
             found = search.look(answer.x)
         except LinkworkError:
@@ -249,6 +315,9 @@ def _conditions(found: Survey, ways: list[_Way]) -> Iterator[Condition]:
             gone.append(region)
             place = Place(wish, Lost(end.kind), spot_of(wish, x, end.orbit))
             yield Beyond(group, place, high if side == _ABOVE else low, side)
+        elif region.closed and region.kind is Crossing.FOLD and region.first and region.last:
+            gone.append(region)
+            yield Gone(group, wish, [spot_of(wish, x, end.orbit) for end in (region.first, region.last)])
         elif region.kind is Crossing.FOLD:
             yield Inside(group, Place(wish, region.across, region.worst), region.kind, 1.0)
     for lost in found.least:

@@ -36,6 +36,8 @@ from .wish import Limit, Wish
 
 #: Greatest step along the response, in scaled arc length, and how far it is followed beside the range, relative to its width.
 STEP, BESIDE = 2e-2, 0.4
+#: The same of a branch that the response does not meet: whether it is closed decides what can be done with it.
+FAR = 4.0
 #: Least values of a test function along a branch, and greatest ones of an output, that are looked at more closely, at most.
 _LEAST, _MOST = 3, 4
 #: Test function above which no multiplier is near to its circle.
@@ -65,6 +67,8 @@ class Region:
         What picks that place.
     value : float
         The test function there.
+    closed : bool
+        Whether the branch is: then it can shrink to a point.
     """
 
     kind: Crossing
@@ -75,6 +79,7 @@ class Region:
     worst: Spot
     across: Across
     value: float
+    closed: bool
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -149,13 +154,10 @@ def survey(wish: Wish, x: FloatArray, more: Sequence[PeriodicOrbit] = ()) -> Sur
     OrbitError
         If there is no motion to begin with.
     """
-    low, high = wish.span
-    wide = BESIDE * (high - low)
-    ends = tuple(max(end, 0.5 * low) if low > 0.0 else min(end, 0.5 * high) for end in (low - wide, high + wide))
-    parameters, drive = wish.operation(x, low)
+    parameters, drive = wish.operation(x, wish.span[0])
     response = frequency_response(
         parameters,
-        *ends,
+        *_ends(wish, BESIDE),
         drive=drive,
         vary=wish.over,
         start=wish.start,
@@ -189,6 +191,15 @@ def _in(wish: Wish, level: Any) -> Any:
     return (level >= low) & (level <= high)
 
 
+def _ends(wish: Wish, beside: float) -> tuple[float, float]:
+    """The range with so much beside it, relative to its width, on the same side of zero."""
+    low, high = wish.span
+    wide = beside * (high - low)
+    return max(low - wide, 0.5 * low) if low > 0.0 else low - wide, min(
+        high + wide, 0.5 * high
+    ) if high < 0.0 else high + wide
+
+
 def reaches(wish: Wish, low: float, high: float) -> bool:
     """Whether an interval of levels has more than a point in common with the inside of the range."""
     slack = AT_THE_END * wish.size
@@ -199,7 +210,7 @@ def _with(wish: Wish, response: Response, orbit: PeriodicOrbit) -> Response:
     """The response with the branch of a motion that it does not meet, followed both ways."""
     if _meets(wish, response, orbit):
         return response
-    level, low, high = wish.level_of(orbit), response.low, response.high
+    level, (low, high) = wish.level_of(orbit), _ends(wish, FAR)
     try:
         branch = follow_both(response.family, orbit, level, low=low, high=high, greatest=STEP)
     except ContinuationError:
@@ -282,6 +293,7 @@ def _regions(wish: Wish, x: FloatArray, branch: Branch, response: Response) -> I
                 worst=worst,
                 across=across,
                 value=value,
+                closed=branch.closed,
             )
 
 

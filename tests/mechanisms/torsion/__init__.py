@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import astuple, dataclass
+from dataclasses import dataclass
 from math import pi
 from typing import ClassVar
 
@@ -36,7 +36,15 @@ class Parameters:
 
     def constants(self) -> Constants:
         """What the equations use."""
-        return Constants(*astuple(self))
+        return Constants(
+            self.rotor_inertia,
+            self.rotor_damping,
+            self.rotor_stiffness,
+            self.rotor_cubic_stiffness,
+            self.rotor_modulation,
+            self.rotor_weight,
+            self.rotor_excitation,
+        )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
