@@ -15,6 +15,7 @@ from ..mechanisms import MECHANISMS
 from .common import handled, say, unknown
 
 SLIDER_MOTION = "slider-motion"
+TUNING = "tuning"
 _HEAD = """\
 # {title}: {command} {file}
 # Every quantity is a number in SI or a text with its unit, such as "5 cm" or "420 rpm". Entries behind a # may be left out:
@@ -46,10 +47,25 @@ _REQUIRED: Mapping[str, Mapping[str, Any]] = {
 }
 
 
+#: A wish that is met within seconds.
+_WISH: Mapping[str, Any] = {
+    "speeds": ["570 rpm", "600 rpm"],
+    "change": {"slider.stiffness": "10 %"},
+    "no_resonance": True,
+}
+
+
 def kinds() -> dict[str, str]:
     """What `linkwork new` writes, and the command that takes it."""
     runs = dict.fromkeys(MECHANISMS, "linkwork run")
-    return runs | dict.fromkeys(_TASKS, "linkwork synthesize") | {SLIDER_MOTION: "linkwork slider-motion"}
+    return (
+        runs
+        | dict.fromkeys(_TASKS, "linkwork synthesize")
+        | {
+            SLIDER_MOTION: "linkwork slider-motion",
+            TUNING: "linkwork tune",
+        }
+    )
 
 
 def case_text(kind: str, file: str, *, parameters: bool = False) -> str:
@@ -61,8 +77,9 @@ def case_text(kind: str, file: str, *, parameters: bool = False) -> str:
         if not parameters:
             command, title, lines = "linkwork run", f"A run of the {kind}", _run(mechanism, file)
     else:
-        command, title = kinds()[kind], f"A synthesis, {kind}" if kind in _TASKS else "A motion of the slider"
-        lines = _synthesis(kind, file)
+        titles = {SLIDER_MOTION: "A motion of the slider", TUNING: "A tuning"}
+        command, title = kinds()[kind], titles.get(kind, f"A synthesis, {kind}")
+        lines = _tuning(file) if kind == TUNING else _synthesis(kind, file)
     return _HEAD.format(title=title, command=command, file=file) + "\n".join(lines) + "\n"
 
 
@@ -133,6 +150,17 @@ def _run(mechanism: Mechanism, file: str) -> Iterator[str]:
     yield from entries(RunTable, given)
 
 
+def _tuning(file: str) -> Iterator[str]:
+    from ..files import entries, line
+    from ..tuning import TuneTable
+
+    yield "# The mechanism and what acts on it are those of a run: linkwork new five-bar."
+    yield 'published = "rig-2-spring-c"'
+    yield line("title", Path(file).stem, "of tables and pictures", active=True)
+    yield "\n[tune]"
+    yield from entries(TuneTable, _WISH)
+
+
 def _synthesis(kind: str, file: str) -> Iterator[str]:
     """A task with its tables; of a slider's motion those of both."""
     from ..files import Quantity, entries, line
@@ -174,7 +202,7 @@ def _synthesis(kind: str, file: str) -> Iterator[str]:
 def new(kind: str | None, file: str | None, parameters: bool, force: bool) -> None:
     """Write a case file to begin with, every entry explained, which runs as it is. Without a KIND they are listed.
 
-    KIND is a mechanism, for a run of it, or a task: of a synthesis, or of a slider's motion.
+    KIND is a mechanism, for a run of it, or a task: of a synthesis, of a slider's motion, or a tuning.
 
     \b
     Examples:

@@ -10,7 +10,7 @@ traced from the equations.
 
 from __future__ import annotations
 
-from functools import cache
+from functools import cache, reduce
 from math import sqrt
 from typing import Any, NamedTuple
 
@@ -292,7 +292,7 @@ class Variations:
         for panel in (first - 1, first, (first + 1) % len(self.h)):
             series = coefficients[panel]
             if vectors:
-                series = sum(legendre.legmul(part, part) for part in series.T)
+                series = reduce(legendre.legadd, (legendre.legmul(part, part) for part in series.T))
             turning = legendre.legroots(legendre.legder(series)) if np.any(series[1:]) else np.zeros(0)
             real = turning[np.abs(turning.imag) < _REAL].real
             places = np.append(real[np.abs(real) < 1.0], [-1.0, 1.0])

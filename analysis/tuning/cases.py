@@ -24,20 +24,28 @@ _LEAST_CHANGE, _LEAST = "least change", "least "
 
 
 def _objective(value: Any, name: str) -> str:
-    """The parameter that is made least; empty for the least change."""
+    """What is made least."""
     words = text(value, name)
-    if words == _LEAST_CHANGE:
-        return ""
-    if not words.startswith(_LEAST):
+    if words != _LEAST_CHANGE and not words.startswith(_LEAST):
         raise ParameterError(
             name, value, f"be {_LEAST_CHANGE!r}, or {_LEAST!r} and a parameter, as 'least slider.damping'"
         )
-    return words.removeprefix(_LEAST).strip()
+    return words
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TuneTable:
-    """The table ``[tune]``; see `Wish`."""
+    """The table ``[tune]``; see `Wish`.
+
+    Attributes
+    ----------
+    change : mapping
+        What may be changed, and how far: "5 %", "10 N/m", or ["1 kg", "3 kg"]
+    peak : tuple of Limit
+        Limits of outputs: { output = "pin.C", below = "14 N" }
+    objective : str
+        What is made least: the changes, or a parameter, as in "least slider.damping"
+    """
 
     change: Mapping[str, Any] = entry(table_of)
     speeds: tuple[float, float] | None = entry(Many(Quantity("rad/s", above=0.0), length=2), None)
@@ -49,7 +57,7 @@ class TuneTable:
     no_unstable: bool = entry(flag, False)
     least_margin: float = entry(Quantity("1", least=0.0), 0.0)
     peak: tuple[Limit, ...] = entry(Many(Table(Limit, {"output": text, "below": as_it_is}), single=True), ())
-    objective: str = entry(_objective, "")
+    objective: str = entry(_objective, _LEAST_CHANGE)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -132,6 +140,6 @@ def tuning_case_from(
         no_unstable=wanted.no_unstable,
         least_margin=wanted.least_margin,
         limits=wanted.peak,
-        least=wanted.objective,
+        least="" if wanted.objective == _LEAST_CHANGE else wanted.objective.removeprefix(_LEAST).strip(),
     )
     return TuningCase(title=case.title, wish=wish, tables=tables)

@@ -162,30 +162,33 @@ class Below:
         """The motion there, found by parabolas through the output at three levels."""
         if self._known is not None and self._known[0] == x.tobytes():
             return self._known[1:]
-        (low, high), level = self._wish.span, self._last.level
-        step = _STEP * self._wish.size
-        found, value = self._reading(x, level)
-        for _ in range(_CLIMB):
-            try:
-                before, after = (self._reading(x, level + way * step)[1] for way in (-1, 1))
-            except LostError:
-                break  # next to a fold
-            bend = before - 2.0 * value + after
-            move = np.sign(after - before) if bend >= 0.0 else np.clip(0.5 * (before - after) / bend, -10.0, 10.0)
-            moved = float(np.clip(level + move * step, low, high))
-            if abs(moved - level) < 1e-3 * step:
-                break
-            try:
-                there, higher = self._reading(x, moved)
-            except LostError:
-                break
-            if higher < value:
-                break
-            found, value, level = there, higher, moved
+        found, value = self._reading(x, self._last.level)
+        # the top of a parabola is off by the square of its width
+        for step in (_STEP, 0.1 * _STEP):
+            found, value = self._uphill(x, found, value, step * self._wish.size)
         turn = sampled(found.orbit)
         self._last, self.angles = found.spot, climbed(turn, self.limit, self.angles)
         self._known = x.tobytes(), found, turn
         return found, turn
+
+    def _uphill(self, x: FloatArray, found: Found, value: float, step: float) -> tuple[Found, float]:
+        """The motion from which no parabola leads to a greater output."""
+        for _ in range(_CLIMB):
+            level = found.spot.level
+            try:
+                before, after = (self._reading(x, level + way * step)[1] for way in (-1, 1))
+                bend = before - 2.0 * value + after
+                move = np.sign(after - before) if bend >= 0.0 else np.clip(0.5 * (before - after) / bend, -10.0, 10.0)
+                moved = float(np.clip(level + move * step, *self._wish.span))
+                if abs(moved - level) < 1e-3 * step:
+                    break
+                there, higher = self._reading(x, moved)
+            except LostError:
+                break  # next to a fold
+            if higher < value:
+                break
+            found, value = there, higher
+        return found, value
 
     def _reading(self, x: FloatArray, level: float) -> tuple[Found, float]:
         found = Place(self._wish, Across.at_level(self._wish, self._last, level), self._last).at(x)

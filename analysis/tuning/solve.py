@@ -28,7 +28,7 @@ _ROUNDS, _WAYS = 12, 8
 _FAR = 0.05
 #: Changes, spread over their bounds, with which the range is looked at where no way leads to what is wished, a power of two;
 #: and halvings of the way to one with which nothing is missing.
-_SPREAD, _BISECTIONS = 8, 6
+_SPREAD, _BISECTIONS = 4, 6
 #: Ways round a region of lost stability, or a resonance: it goes below the range, above it, or vanishes.
 _BELOW, _ABOVE, _REMOVED = -1, 1, 0
 
@@ -178,10 +178,10 @@ def _next_to_a_clean_one(search: _Search, first: Survey) -> Survey | None:
 def _looked(search: _Search, x: FloatArray) -> tuple[bool, Survey | None]:
     """Whether nothing is missing with some changes, and what lies in the range."""
     try:
-        found = search.look(x)
-        new, several = search.look_beside(found)
-        if new:
-            found = search.look(x)
+        found, several = search.look(x), ()
+        if search.excess(found, several) == 0.0:
+            new, several = search.look_beside(found)
+            found = search.look(x) if new else found
     except LinkworkError:
         return False, None
     if search.excess(found, several) > 0.0:

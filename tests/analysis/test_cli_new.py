@@ -15,10 +15,11 @@ from analysis.motion import TABLES as MOTION
 from analysis.motion import SliderCase, load_slider_case
 from analysis.run import RunTable, acting_on, load_case, load_parameters
 from analysis.synthesis import BOUNDS, KINDS, TABLES, SynthesisCase, load_synthesis_case
+from analysis.tuning import TuneTable, load_tuning_case
 from linkwork.errors import LinkworkError
 
 QUICK = ("--set", "search.candidates=2048", "--set", "search.starts=3", "--no-plots")
-SLIDER = "slider-motion"
+SLIDER, TUNING = "slider-motion", "tuning"
 #: What is said of entries that are right by themselves, but exclude or need one another.
 TOGETHER = (
     r"must (have only one of|not come together|come with|be given with)|parameter drive.speed is missing"
@@ -27,7 +28,8 @@ TOGETHER = (
 
 
 def load(kind, path):
-    loader = load_case if kind in MECHANISMS else load_slider_case if kind == SLIDER else load_synthesis_case
+    others = {SLIDER: load_slider_case, TUNING: load_tuning_case}
+    loader = load_case if kind in MECHANISMS else others.get(kind, load_synthesis_case)
     return loader(path)
 
 
@@ -56,6 +58,9 @@ def test_it_holds_every_entry_there_is(kind):
         assert names(found["initial"]) == set(mechanism.initial_variables)
         there = {f"{table}.{name}" if table else name for table, lines in found.items() for name in names(lines)}
         assert {*mechanism.mechanism_variables, *acting_on(mechanism)} <= there
+        return
+    if kind == TUNING:
+        assert names(found["tune"]) == set(names_of(TuneTable))
         return
     tables = TABLES | MOTION if kind == SLIDER else TABLES
     assert names(found["task"]) == {"kind", *names_of(KINDS["rocker-function" if kind == SLIDER else kind])}
@@ -107,6 +112,14 @@ def test_a_new_synthesis_runs_as_it_is(linkwork, kind):
     result = linkwork("synthesize", f"{kind}.toml", *QUICK)
     assert result.exit_code == 0, result.stderr
     assert "defects" not in result.stderr
+
+
+@pytest.mark.slow
+def test_a_new_tuning_runs_as_it_is(linkwork):
+    linkwork("new", TUNING)
+    result = linkwork("tune", f"{TUNING}.toml", "--no-plot")
+    assert result.exit_code == 0, result.stderr
+    assert "slider.stiffness" in result.output
 
 
 @pytest.mark.slow

@@ -13,14 +13,30 @@ from click.testing import CliRunner
 from scipy.interpolate import CubicSpline
 from scipy.optimize import brentq, minimize
 
-from analysis import Limit, Wish, cli, figures, tune
-from analysis.periodic import Drive, find_orbit, frequency_response, orbit_of, orbit_test, plane, removing_damping
+from analysis import InductionMotor, Limit, Wish, cli, figures, tune
+from analysis.mechanisms import MECHANISMS, register
+from analysis.periodic import (
+    Crossing,
+    Drive,
+    Family,
+    find_orbit,
+    find_orbits,
+    follow_both,
+    follow_crossing,
+    frequency_response,
+    orbit_of,
+    orbit_test,
+    plane,
+    removing_damping,
+)
 from analysis.run import load_case
 from analysis.tuning import load_tuning_case
 from analysis.tuning.solve import _conditions, _ways
-from analysis.tuning.survey import survey
+from analysis.tuning.survey import others, survey
 from linkwork.errors import InputError, LinkworkError, ParameterError, UnknownNameError
 from linkwork.five_bar.published import SETS
+from linkwork.slider_crank import published as rahman
+from tests.mechanisms import rotor_on_cart, torsion
 
 RPM = pi / 30.0
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -30,6 +46,32 @@ LIGHT = replace(RIG_2, slider_damping=0.5)
 PIN = Limit(output="pin.C", below="14 N")
 AMPLITUDE = Limit(output="amplitude of slider.position", below="1.6 cm")
 BOTH = {"slider.damping": "20 %", "slider.stiffness": "5 %"}
+
+
+ROTOR = next(iter(rotor_on_cart.MECHANISM.published.values())).parameters
+MOTOR = InductionMotor(breakdown_torque=2.0, breakdown_slip=0.3, synchronous_speed=25.0)
+FIELD = "drive.torque.synchronous_speed"
+#: The slider-crank of section 3.1 with a spring on the axial shift.
+SPRUNG = replace(rahman.parameters(20.0, 232.0), shift_stiffness=8000.0, shift_damping=60.0)
+#: Parametric resonance of a hardening spring: a closed branch from 0.92 to 1.35 rad/s, and a jump from 1.03 to 1.42 rad/s.
+TONGUE = torsion.Parameters(
+    rotor_stiffness=1.0, rotor_damping=0.05, rotor_cubic_stiffness=0.2, rotor_modulation=0.8, rotor_excitation=0.02
+)
+OF_TONGUE = {
+    "parameters": TONGUE,
+    "change": {"rotor.damping": [0.01, 0.6]},
+    "no_jump": True,
+    "least": "rotor.damping",
+}
+
+
+@pytest.fixture(autouse=True, scope="module")
+def registered():
+    for mechanism in (rotor_on_cart.MECHANISM, torsion.MECHANISM):
+        register(mechanism)
+    yield
+    for mechanism in (rotor_on_cart.MECHANISM, torsion.MECHANISM):
+        del MECHANISMS[mechanism.name]
 
 
 def wish(**of):
@@ -49,12 +91,45 @@ def wish(**of):
         pytest.param(
             {"parameters": "rig-1-spring-b", "speeds": ("980 rpm", "1150 rpm"), "no_jump": True}, marks=pytest.mark.slow
         ),
+        {
+            "parameters": ROTOR,
+            "drive": Drive(motor=MOTOR),
+            "speeds": None,
+            "over": FIELD,
+            "between": (25.5, 29.0),
+            "change": {"cart.stiffness": "30 %", "cart.damping": "30 %"},
+            "no_resonance": True,
+            "limits": [Limit(output="drive.applied_torque", below=0.1)],
+        },
+        pytest.param(
+            {
+                "drive": Drive(torque=0.04),
+                "speeds": None,
+                "over": "drive.torque",
+                "between": ("0.03 N*m", "0.05 N*m"),
+                "start": (0.0, 0.0, 60.0),
+                "no_jump": True,
+            },
+            marks=pytest.mark.slow,
+        ),
+        pytest.param(
+            {"parameters": LIGHT, "speeds": ("1150 rpm", "1160 rpm"), "turns": 2, "no_unstable": True},
+            marks=pytest.mark.slow,
+        ),
+        # next to where the closed branch vanishes
+        {
+            **OF_TONGUE,
+            "parameters": replace(TONGUE, rotor_damping=0.11),
+            "speeds": (0.85, 1.0),
+            "change": {"rotor.damping": 0.05, "rotor.modulation": 0.3},
+        },
     ],
 )
 def test_derivatives_of_the_conditions_are_those_of_differences(of):
     asked = wish(**of)
     x, step = np.zeros(2), 2e-3
     found = survey(asked, x)
+    found = survey(asked, x, others(found)[0])
     conditions = {
         (type(c).__name__, round(c.value(x), 6)): c for way in _ways(found) for c in _conditions(found, list(way))
     }
@@ -105,6 +180,83 @@ def test_resonance_is_led_to_the_nearer_end():
 
     assert tuned.met
     assert tuned.values[0] == pytest.approx(brentq(away, 4100.0, 4300.0, rtol=1e-7), rel=3e-4)
+
+
+def test_a_closed_branch_vanishes_where_its_two_folds_meet():
+    """The greatest damping on the curve of its folds, a boundary that is followed in the plane of both."""
+    tuned = tune(wish(**OF_TONGUE, speeds=(0.85, 1.0)))
+    assert tuned.met
+    new = others(survey(tuned.wish, np.zeros(1)))[0][0]
+    isola = follow_both(Family(parameters=TONGUE, drive=new.drive), new, new.drive.speed, low=0.6, high=1.8)
+    fold = next(special for special in isola.special if special.kind is Crossing.FOLD)
+    at = plane(TONGUE, new.drive, "drive.speed", "rotor.damping")
+    place = fold.parameter, TONGUE.rotor_damping
+    curve = follow_crossing(at, fold.orbit, fold.kind, place, x=(0.6, 2.0), y=(0.02, 0.3), greatest=2e-2)
+    top = int(curve.points[:, 1].argmax())
+    near = curve.points[top - 2 : top + 3]
+    along = np.cumsum(np.append(0.0, np.linalg.norm(np.diff(near, axis=0), axis=1)))
+    damping = np.polynomial.Polynomial.fit(along, near[:, 1], 4)
+    turning = next(r.real for r in damping.deriv().roots() if 0.0 < r.real < along[-1] and abs(r.imag) < 1e-9)
+    assert tuned.values[0] == pytest.approx(float(damping(turning)), rel=1e-5)
+
+
+@pytest.mark.slow
+def test_where_no_way_leads_to_what_is_wished_one_is_begun_next_to_it():
+    """The jump of a tongue and its closed branch are both gone where the curve of the jump's folds has its cusp."""
+    tuned = tune(wish(**OF_TONGUE, speeds=(0.8, 1.5)))
+    assert tuned.met
+    for share, jumps in ((0.99, True), (1.01, False)):
+        damped = replace(TONGUE, rotor_damping=share * tuned.values[0])
+        branches = frequency_response(damped, 0.8, 1.5, doublings=0, greatest_step=5e-3).branches
+        assert any(special.kind is Crossing.FOLD for branch in branches for special in branch.special) == jumps
+
+
+def test_resonance_under_a_motor_is_led_out_of_a_range_of_its_frequency():
+    drive, span = Drive(motor=MOTOR), (25.5, 29.0)
+    tuned = tune(
+        wish(
+            parameters=ROTOR, drive=drive, speeds=None, over=FIELD, between=span, change={"cart.stiffness": "30 %"},
+            no_resonance=True,
+        )
+    )  # fmt: skip
+    assert tuned.met
+    assert tuned.requirements[0].before.excess > 0.0
+    (top,) = frequency_response(
+        tuned.parameters, 20.0, 29.0, drive=drive, vary=FIELD, doublings=0, greatest_step=5e-2
+    ).maxima()
+    assert top.parameter == pytest.approx(span[0], rel=1e-7)
+    assert figures.plot(tuned).axes[0].get_xlabel() == "crank speed [rpm]"
+
+
+def test_swing_of_the_axial_shift_of_a_slider_crank_stays_below_its_limit():
+    drive, bound = Drive(speed=rahman.CRANK_SPEED, forces={"axial.force": 0.0}), 0.014
+    span = 0.9 * rahman.CRANK_SPEED, 1.1 * rahman.CRANK_SPEED
+    limit = Limit(output="amplitude of shift.position", below=bound)
+    change = {"shift.stiffness": "30 %", "shift.damping": "30 %"}
+    tuned = tune(wish(parameters=SPRUNG, drive=drive, speeds=span, change=change, limits=[limit]))
+    assert tuned.met
+    response = frequency_response(tuned.parameters, *span, drive=drive, doublings=0)
+    assert max(branch.amplitude.max() for branch in response.branches) == pytest.approx(bound, rel=1e-5)
+
+
+@pytest.mark.slow
+def test_a_motion_of_two_turns_beside_a_stable_one_is_seen_and_removed():
+    """Below the doubling a motion of 20 cm repeats itself after two turns, beside a stable one of 2 mm."""
+    asked = {
+        "parameters": LIGHT,
+        "speeds": ("1150 rpm", "1160 rpm"),
+        "change": {"slider.damping": ["0.1 N*s/m", "6 N*s/m"]},
+        "no_unstable": True,
+        "least": "slider.damping",
+    }
+    one, two = tune(wish(**asked)), tune(wish(**asked, turns=2))
+    assert one.values[0] < LIGHT.slider_damping
+    assert two.met
+    assert two.values[0] == pytest.approx(1.41, abs=5e-3)
+    for share, there in ((0.98, True), (1.001, False)):
+        damped = replace(LIGHT, slider_damping=share * two.values[0])
+        found = [find_orbits(damped, speed=speed, turns=2).orbits for speed in np.linspace(*two.wish.span, 3).tolist()]
+        assert any(found) == there
 
 
 @pytest.mark.slow
@@ -175,6 +327,22 @@ def test_what_is_met_already_is_not_changed():
     ("of", "kind", "words"),
     [
         ({}, InputError, "nothing is wished"),
+        ({"no_jump": True, "speeds": None}, InputError, "give the range"),
+        ({"no_jump": True, "speeds": None, "over": "drive.speed"}, InputError, "give the range"),
+        ({"no_jump": True, "between": (1.0, 2.0), "over": "drive.torque"}, InputError, "give the range"),
+        ({"no_jump": True, "drive": Drive(torque=0.1)}, InputError, "speed follows from it; give over what it drives"),
+        (
+            {"no_jump": True, "speeds": None, "over": "drive.torqe", "between": (1, 2)},
+            UnknownNameError,
+            r"drive\.torque",
+        ),
+        ({"no_jump": True, "speeds": None, "over": "drive.torque", "between": (1, 2)}, InputError, "drives the crank"),
+        (
+            {"no_jump": True, "speeds": None, "over": FIELD, "between": (1, 2), "drive": Drive(torque=0.1)},
+            InputError,
+            "no motor drives",
+        ),
+        ({"no_jump": True, "turns": 0}, ParameterError, "at least one"),
         ({"no_jump": True, "change": {}}, InputError, "nothing may be changed"),
         ({"no_jump": True, "change": {"slider.stifness": "5 %"}}, UnknownNameError, r"slider\.stiffness"),
         ({"no_jump": True, "change": {"gravity": "5 %"}}, ParameterError, "it is zero now"),
@@ -267,6 +435,8 @@ def test_command_reports_what_cannot_be_met(run):
         (["--set", "tune.speds=1"], "tune.speeds"),
         (["--set", "drive.torque=1 N*m"], "so that its speed follows"),
         (["--set", 'tune.speeds=["600 rpm"]'], "a list of 2"),
+        (["--set", "tune.turns=0"], "at least 1"),
+        (["--set", 'tune.speeds=["1 m", "2 m"]'], "rad/s"),
     ],
 )
 def test_command_says_what_is_wrong(run, options, words):
