@@ -177,8 +177,9 @@ def _next_to_a_clean_one(search: _Search, first: Survey) -> Survey | None:
 
 def _looked(search: _Search, x: FloatArray) -> tuple[bool, Survey | None]:
     """Whether nothing is missing with some changes, and what lies in the range."""
+    several: tuple[float, ...] = ()
     try:
-        found, several = search.look(x), ()
+        found = search.look(x)
         if search.excess(found, several) == 0.0:
             new, several = search.look_beside(found)
             found = search.look(x) if new else found
