@@ -88,6 +88,11 @@ def cores_of(n_jobs: int | None, *, threads: bool = False) -> int:
     return _workers(n_jobs, threads)[0]
 
 
+def share_memory(n_jobs: int | None, *, threads: bool = False) -> bool:
+    """Whether the workers that `over_workers` has are this process and its threads."""
+    return not _workers(n_jobs, threads)[1]
+
+
 def _workers(n_jobs: int | None, threads: bool) -> tuple[int, bool]:
     """Number of workers, and whether they are other processes."""
     import joblib

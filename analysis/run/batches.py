@@ -6,11 +6,13 @@ import hashlib
 import math
 import warnings
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from functools import cache
 from itertools import chain
 from math import prod
+from operator import attrgetter
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -24,7 +26,7 @@ from ..files import load_array, save_array
 from ..mechanisms import MECHANISMS, InitialState, Parameters
 from ..numerics.symbolic import ELEMENTARY
 from ..numerics.tracing import Rebound, rebound
-from .equations import machine
+from .equations import like_parameters, machine, modules_of
 from .inputs import Encoded, Inputs, align, compiled_source, encode, of_functions
 from .prepared import STEPS_PER_CALL, Run, Settings, outputs_of, verdict
 
@@ -83,7 +85,8 @@ class Task:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Result:
-    """Solved runs, with the fields of `ensemble.Ensemble`; ``samples`` are states and channels, or the outputs wanted."""
+    """Solved runs, with the fields of `ensemble.Ensemble`; ``samples`` are states and channels, or the outputs wanted, and none
+    where they are already in their place."""
 
     first: int
     samples: list[NDArray[np.float64]]
@@ -113,38 +116,50 @@ class Prepared(NamedTuple):
         return digest.hexdigest()[:32]
 
 
-def solve(task: Task, heard: Sequence[bool]) -> Result | None:
+def solve(task: Task, heard: Sequence[bool], into: Sequence[NDArray[np.float64]] | None = None) -> Result | None:
     """Solve a batch, or read it from its file; None if it was interrupted before it began.
 
-    ``heard`` is looked at between compiled calls: once there is something in it, runs end where they are.
+    ``heard`` is looked at between compiled calls: once there is something in it, runs end where they are. ``into`` are the
+    arrays of the whole ensemble, where this process has them and the task no folder: samples are written there at once.
     """
     if heard:
         return None
     # a worker does not know a mechanism that the caller has registered
     MECHANISMS.setdefault(task.mechanism.name, task.mechanism)
     prepared = prepare(task)
-    path = None if task.folder is None else task.folder / f"{prepared.digest(task)}.runs"
-    kept = None if path is None else load_array(path)
-    energies = prepared.batch.p[:, -1]
-    if kept is None or kept.shape != (sum(map(prod, task.shapes)),):
-        kept, whole = _integrate(task, prepared, heard)
-        if path is not None and whole:
-            try:
-                save_array(path, kept)
-            except OSError as error:
-                warnings.warn(
-                    f"{path} cannot be written ({error}): its runs are in memory alone", RuntimeWarning, stacklevel=2
-                )
-    ends, *samples = task.parts(kept)
+    samples: list[NDArray[np.float64]] = []
+    if into is None:
+        ends, *samples = task.parts(_kept(task, prepared, heard))
+    else:
+        ends, rows = np.empty(task.shapes[0]), slice(task.first, task.first + len(prepared.x))
+        _integrate(task, prepared, heard, ends, [array[rows] for array in into])
     status, messages = _verdicts(task, prepared, ends)
     return Result(
         first=task.first,
         samples=samples,
         counts=ends[:, 1].astype(np.int64),
-        energies=energies,
+        energies=prepared.batch.p[:, -1],
         status=status,
         messages=messages,
     )
+
+
+def _kept(task: Task, prepared: Prepared, heard: Sequence[bool]) -> NDArray[np.float64]:
+    """`Task.parts` in one array, from the file of the batch, or computed and kept there."""
+    path = None if task.folder is None else task.folder / f"{prepared.digest(task)}.runs"
+    kept = None if path is None else load_array(path)
+    if kept is None or kept.shape != (sum(map(prod, task.shapes)),):
+        kept = np.empty(sum(map(prod, task.shapes)))
+        ends, *samples = task.parts(kept)
+        whole = _integrate(task, prepared, heard, ends, samples)
+        if path is not None and whole:
+            try:
+                save_array(path, kept)
+            except OSError as error:
+                warnings.warn(
+                    f"{path} cannot be written ({error}): its runs are in memory alone", RuntimeWarning, stacklevel=3
+                )
+    return kept
 
 
 def _verdicts(task: Task, prepared: Prepared, ends: NDArray[np.float64]) -> tuple[list[int], list[str]]:
@@ -169,18 +184,22 @@ def _verdicts(task: Task, prepared: Prepared, ends: NDArray[np.float64]) -> tupl
     return status, messages
 
 
-def _integrate(task: Task, prepared: Prepared, heard: Sequence[bool]) -> tuple[NDArray[np.float64], bool]:
-    """`Task.parts` in one array, and whether all runs came to their ends.
+def _integrate(
+    task: Task,
+    prepared: Prepared,
+    heard: Sequence[bool],
+    ends: NDArray[np.float64],
+    samples: Sequence[NDArray[np.float64]],
+) -> bool:
+    """Solve the runs; whether all came to their ends.
 
-    The first part has a row for each run: the compiled code's status, the number of samples, the time of the end (s), the
-    number of the channel that was not finite, the state at the end. The others are the samples, NaN after the end of a run.
+    ``ends`` gets a row for each run: the compiled code's status, the number of samples, the time of the end (s), the number
+    of the channel that was not finite, the state at the end. ``samples`` get the samples, NaN after the end of a run.
     """
     from . import compiled as k
 
     mechanism, settings, encoded, batch = task.mechanism, task.settings, prepared.encoded, prepared.batch
     m, n = prepared.x.shape[0], len(settings.times)
-    flat = np.empty(sum(map(prod, task.shapes)))
-    ends, *samples = task.parts(flat)
     states, forces = (
         samples
         if task.outputs is None
@@ -189,7 +208,7 @@ def _integrate(task: Task, prepared: Prepared, heard: Sequence[bool]) -> tuple[N
     # kept alive while their addresses are in use
     source, _kept = compiled_source(encoded)
     modes = np.array([float(value) for value in encoded.modes.values()])
-    switched = any(map(mechanism.switched, batch.p.tolist()))
+    switched = _switched(mechanism, batch.p)
     problem = k.Problem(
         machine(mechanism, switched).addresses, modes, batch.p[0], batch.scales[0], encoded.commands,
         settings.tolerance, settings.hold, float(settings.times[-1]), True,
@@ -224,7 +243,7 @@ def _integrate(task: Task, prepared: Prepared, heard: Sequence[bool]) -> tuple[N
         carries["lost"],
     )
     ends[:, 4:] = x
-    return flat, not todo.any()
+    return not todo.any()
 
 
 # What a run starts from
@@ -240,9 +259,9 @@ def prepare(task: Task) -> Prepared:
 
     mechanism, t = task.mechanism, float(task.settings.times[0])
     encoded, batch = _acting(task)
-    rows = _once(lambda p: p.constants(), task.parameters)
     x = np.array(_once(mechanism.state, task.initial))
-    p = np.fromiter(chain.from_iterable(rows), float).reshape(len(rows), -1)
+    # the energy at the start after the constants
+    p = np.full((len(x), len(mechanism.constants._fields) + 1), np.nan)
     u = np.zeros((len(x), len(mechanism.channels)))
     # users' functions are called as the Python they are, as in `sample`
     source = compiled_source(replace(encoded, functions=((None, None),) * len(encoded.functions)))[0]
@@ -255,40 +274,47 @@ def prepare(task: Task) -> Prepared:
             except InputError:
                 doubtful.add(i)
     x[:, encoded.commands[:, 1]] = u[:, encoded.commands[:, 0]]
-    energy, scales = np.full(len(x), np.nan), np.zeros_like(x)
-    functions, equations = _over_arrays(mechanism), mechanism.equations
-    columns = type(rows[0])(*p.T)
-    if mechanism.switch:
-        columns = columns._replace(**{mechanism.switch: float(any(map(mechanism.switched, rows)))})
+    scales = np.zeros_like(x)
+    (functions, like), equations = _over_arrays(mechanism), mechanism.equations
+    names = [field.name for field in fields(mechanism.parameters)]
+    own = np.array(list(map(attrgetter(*names), task.parameters)), float).reshape(len(x), -1)
     try:
         with np.errstate(all="ignore"):
+            parameters = like(**dict(zip(names, own.T)))
+            columns = parameters.constants()
+            for n, column in enumerate(columns):
+                p[:, n] = column
+            if mechanism.switch:
+                columns = columns._replace(**{mechanism.switch: float(_switched(mechanism, p))})
             applied = functions.of(equations.applied)(tuple(map(float, encoded.modes.values())), tuple(u.T), columns)
             state = functions.of(equations.start)(tuple(x.T), applied, columns)
             clearance = np.broadcast_to(functions.of(equations.clearance)(state, applied, columns), len(x))
-            energy[:] = functions.of(equations.energy)(state, columns)
-        for n, column in enumerate(state):
-            x[:, n] = column
+            p[:, -1] = functions.of(equations.energy)(state, columns)
+            for n, (column, scale) in enumerate(zip(state, functions.of(mechanism.error_scale)(parameters, state))):
+                x[:, n], scales[:, n] = column, scale
         # within the limit of assembly the error has a sentence of the mechanism's own
-        sound = (
-            np.isfinite(u).all(axis=1) & np.isfinite(x).all(axis=1) & np.isfinite(energy) & (clearance > 2 * LIMIT_SINE)
-        )
+        sound = np.isfinite(np.column_stack([u, x, scales, p[:, -1]])).all(axis=1) & (clearance > 2 * LIMIT_SINE)
         doubtful |= set(np.flatnonzero(~sound).tolist())
-        sure = [i for i in range(len(x)) if i not in doubtful]
-        if sure:
-            scales[sure] = [mechanism.error_scale(task.parameters[i], row) for i, row in zip(sure, x[sure].tolist())]
     except (ArithmeticError, ValueError):
         # of a function of `math`: one by one shows which
         doubtful = set(range(len(x)))
     failures: dict[int, LinkworkError] = {}
     for i in sorted(doubtful):
+        run = task.run(i)
+        p[i, :-1] = run.p
         try:
-            start = task.run(i).start()
+            start = run.start()
         except (AssemblyError, InputError) as error:
             failures[i] = error
-            energy[i], x[i] = np.nan, 0.0
+            x[i], p[i, -1], scales[i] = 0.0, np.nan, 0.0
         else:
-            x[i], energy[i], scales[i] = start.x, start.energy, start.scale
-    return Prepared(encoded, batch._replace(p=np.column_stack([p, energy]), scales=scales), x, failures)
+            x[i], p[i, -1], scales[i] = start.x, start.energy, start.scale
+    return Prepared(encoded, batch._replace(p=p, scales=scales), x, failures)
+
+
+def _switched(mechanism: Mechanism, p: NDArray[np.float64]) -> bool:
+    """Whether the switch is on in some row of constants."""
+    return mechanism.switch_place >= 0 and bool(p[:, mechanism.switch_place].any())
 
 
 def _once(make: Callable[[Any], Any], items: Sequence[Any]) -> list[Any]:
@@ -298,10 +324,15 @@ def _once(make: Callable[[Any], Any], items: Sequence[Any]) -> list[Any]:
 
 
 @cache
-def _over_arrays(mechanism: Mechanism) -> Rebound:
-    """The equations over arrays: with the functions of `math` itself, element by element, those of NumPy differ in bits."""
+def _over_arrays(mechanism: Mechanism) -> tuple[Rebound, type[SimpleNamespace]]:
+    """The equations over arrays, and the type of the parameters for them.
+
+    The functions are those of `math` itself, element by element, as those of NumPy differ in bits.
+    """
     elementwise = {name: _elementwise(getattr(math, name)) for name in ELEMENTARY}
-    return rebound(mechanism.modules, elementwise | {"sqrt": np.sqrt, "fabs": np.abs})
+    ours = {"sqrt": np.sqrt, "fabs": np.abs, "max": np.maximum, "min": np.minimum, "float": lambda value: value}
+    functions = rebound(modules_of(mechanism), elementwise | ours)
+    return functions, like_parameters(mechanism, functions)
 
 
 def _elementwise(function: Callable[..., float]) -> Callable[..., NDArray[np.float64]]:

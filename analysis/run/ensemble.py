@@ -24,7 +24,7 @@ from linkwork.mechanism import Mechanism
 from ..files import unknown_name
 from ..mechanisms import InitialState, Parameters, mechanism_of
 from ..notebook import format_count
-from ..numerics.workers import WorkersLost, check_jobs, interruptible, over_workers
+from ..numerics.workers import WorkersLost, check_jobs, interruptible, over_workers, share_memory
 from ..units import Amount, in_si
 from .arguments import driven, started, takes_published
 from .batches import NOT_RUN, Result, Task, solve
@@ -35,6 +35,9 @@ from .prepared import outputs_of
 from .signals import Function
 from .simulation import sample_times, settings_of
 from .trajectory import Trajectory
+
+#: Samples of a batch at most, where its size is ours to choose.
+_SAMPLES_OF_BATCH = 1 << 16
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -163,7 +166,7 @@ def simulate_many(
     max_steps: int = 100_000_000,
     outputs: Sequence[str] | None = None,
     folder: str | Path | None = None,
-    batch: int = 64,
+    batch: int | None = None,
     n_jobs: int | None = None,
     progress: bool = False,
 ) -> Ensemble:
@@ -182,8 +185,9 @@ def simulate_many(
         Where each batch is kept, once it is done, in a file under a name made from all it depends on: the same call goes on
         from the batches that are there. Files that are damaged are computed again. The arrays of the ensemble are on that
         disk too, as long as it is in use, and take little memory.
-    batch : int
-        Runs that are prepared and solved together.
+    batch : int, optional
+        Runs that are prepared and solved together: by default a sixteenth of all, between 16 and 256, fewer where they have
+        many samples.
 
     Other parameters are those of `simulate`.
 
@@ -212,7 +216,7 @@ def simulate_many(
     """
     if len(parameters) == 0:
         raise InputError("an ensemble needs at least one set of parameters")
-    if batch < 1:
+    if batch is not None and batch < 1:
         raise InputError(f"batch is {batch}: it must be at least 1")
     check_jobs(n_jobs)
     mechanism = mechanism_of(parameters[0])
@@ -226,6 +230,7 @@ def simulate_many(
     # what cannot be compiled is reported here, and not by a worker
     encoded = encode(all_inputs[0], mechanism)
     compiled_source(encoded)
+    batch = batch or max(16, min(256, len(parameters) // 16, _SAMPLES_OF_BATCH // len(settings.times)))
     code = "" if where is None else _code(mechanism, parameters, chain.from_iterable(encoded.functions))
     tasks = [
         Task(
@@ -243,9 +248,11 @@ def simulate_many(
     ]
     gathered = _Gathered(parameters, mechanism, settings.times, names, outputs is not None, where)
     gathered.modes[:] = list(encoded.modes.values())
+    into = gathered.samples() if where is None and share_memory(n_jobs, threads=True) else None
     with interruptible() as heard, shown(progress, float(len(parameters))) as show:
         try:
-            for _, result in over_workers(partial(solve, heard=heard), tasks, heard, n_jobs=n_jobs, threads=True):
+            work = partial(solve, heard=heard, into=into)
+            for _, result in over_workers(work, tasks, heard, n_jobs=n_jobs, threads=True):
                 if result is not None:
                     gathered.add(result)
                     show(float(np.count_nonzero(gathered.status != NOT_RUN)))
@@ -305,7 +312,7 @@ class _Gathered:
 
     def add(self, result: Result) -> None:
         rows = slice(result.first, result.first + len(result.status))
-        for array, samples in zip(self._samples(), result.samples):
+        for array, samples in zip(self.samples(), result.samples):
             array[rows] = samples
         for mapped in self.maps:
             if hasattr(mmap, "MADV_DONTNEED"):
@@ -313,11 +320,12 @@ class _Gathered:
         self.status[rows], self.counts[rows], self.energies[rows] = result.status, result.counts, result.energies
         self.messages[rows] = result.messages
 
-    def _samples(self) -> list[NDArray[np.float64]]:
+    def samples(self) -> list[NDArray[np.float64]]:
+        """States and channels, or the outputs that were chosen: what a batch fills its rows of."""
         return [self.states, self.forces] if self.values is None else [self.values]
 
     def ensemble(self) -> Ensemble:
-        for array in self._samples():
+        for array in self.samples():
             array[self.counts == 0] = np.nan
         return Ensemble(
             time=self.times,

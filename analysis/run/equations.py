@@ -54,18 +54,22 @@ class OfParameters(NamedTuple):
 
 def of_parameters(mechanism: Mechanism) -> OfParameters:
     """The parameters with symbols in the place of their fields: their ``constants`` and ``error_scale`` can be traced."""
-    casadi, kind = symbolic.library(), mechanism.parameters
-    functions = symbolic.traced(_modules(mechanism), max=casadi.fmax, min=casadi.fmin, float=lambda value: value)
-    methods = {
-        name: functions.of(f) for name, f in vars(kind).items() if isinstance(f, FunctionType) and name[:2] != "__"
-    }
-    names = [field.name for field in fields(kind)]
+    casadi = symbolic.library()
+    functions = symbolic.traced(modules_of(mechanism), max=casadi.fmax, min=casadi.fmin, float=lambda value: value)
+    names = [field.name for field in fields(mechanism.parameters)]
     own = casadi.SX.sym("own", len(names))
-    parameters = type("Traced", (SimpleNamespace,), methods)(**dict(zip(names, casadi.vertsplit(own))))
+    parameters = like_parameters(mechanism, functions)(**dict(zip(names, casadi.vertsplit(own))))
     return OfParameters(own, parameters, functions)
 
 
-def _modules(mechanism: Mechanism) -> tuple[ModuleType, ...]:
+def like_parameters(mechanism: Mechanism, functions: Rebound) -> type[SimpleNamespace]:
+    """A type with the methods of a mechanism's parameters, as they are among ``functions``, for fields of another kind."""
+    own = vars(mechanism.parameters).items()
+    methods = {name: functions.of(f) for name, f in own if isinstance(f, FunctionType) and name[:2] != "__"}
+    return type("LikeParameters", (SimpleNamespace,), methods)
+
+
+def modules_of(mechanism: Mechanism) -> tuple[ModuleType, ...]:
     """The modules of the equations, and of what constants and scales are computed by."""
     of: Iterable[Callable[..., Any]] = (mechanism.parameters, mechanism.error_scale)
     further = {sys.modules[f.__module__]: None for f in of} | {sys.modules[Mechanism.__module__]: None}

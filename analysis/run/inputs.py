@@ -126,11 +126,13 @@ class Inputs:
         """Values of channels that are constant all; None where one of them is not."""
         values = []
         for name in names:
-            total, value = 0.0, self._given.get(name)
-            for part in (value,) if type(value) is float else _parts(value):
-                if not isinstance(part, _NUMBER):
-                    return None
-                total += float(part)
+            value = self._given.get(name)
+            total = 0.0 + value if type(value) is float else 0.0
+            if value is not None and type(value) is not float:
+                for part in _parts(value):
+                    if not isinstance(part, _NUMBER):
+                        return None
+                    total += float(part)
             values.append(total)
         return values
 
