@@ -4,18 +4,20 @@ from __future__ import annotations
 
 import re
 import tomllib
+from math import pi
 
 import pytest
 
 from analysis.cli.new import case_text, kinds
-from analysis.files import names_of
-from analysis.files.template import meanings
+from analysis.files import Many, Quantity, Whole, names_of
+from analysis.files.template import example, meanings
 from analysis.mechanisms import MECHANISMS
 from analysis.motion import TABLES as MOTION
 from analysis.motion import SliderCase, load_slider_case
 from analysis.run import RunTable, acting_on, load_case, load_parameters
 from analysis.synthesis import BOUNDS, KINDS, TABLES, SynthesisCase, load_synthesis_case
 from analysis.tuning import TuneTable, load_tuning_case
+from analysis.units import quantity
 from linkwork.errors import LinkworkError
 
 QUICK = ("--set", "search.candidates=2048", "--set", "search.starts=3", "--no-plots")
@@ -172,6 +174,12 @@ class _Described:
     unit : float
         m
     """
+
+
+def test_examples_are_the_quantities_that_they_stand_for():
+    assert quantity(example(Quantity("rad/s")), "rad/s", "speed") == pytest.approx(1.0)
+    assert quantity(example(Quantity("rad")), "rad", "angle") == pytest.approx(pi / 6.0)
+    assert example(Many(Whole(least=2))) == [2]
 
 
 def test_of_a_long_meaning_the_first_sentence_stays():

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import subprocess
 import sys
 from io import StringIO
@@ -90,14 +91,43 @@ def test_a_wide_drawing_is_seen_whole() -> None:
     assert view.dxf.height == pytest.approx(1100.0)
 
 
+@pytest.mark.parametrize("turned", [0.0, 30.0, 90.0, 150.0, 180.0, 270.0])
+def test_a_dimension_is_written_beside_its_way(turned: float) -> None:
+    """By hand for a way along x, turned about the origin; the number is read from below or from the right."""
+    turn = np.exp(1j * np.radians(turned))
+    end = 0.4 * turn
+    dimension = Dimension(layer="dimension", start=(0.0, 0.0), end=(end.real, end.imag), offset=0.1, height=0.01)
+    crank = Line(layer="crank", start=dimension.start, end=dimension.end)
+    root = ElementTree.fromstring(to_svg(Drawing(title="a way", lines=(crank,), dimensions=(dimension,))))
+    (group,) = (e for e in root if e.get("id") == "dimension")
+
+    def along(shape: Any) -> list[complex]:
+        """Its numbers as points, in the frame of the way."""
+        numbers = re.findall(r"-?[\d.]+(?:e-\d+)?", shape)
+        return [1e-3 * complex(float(x), -float(y)) / turn for x, y in zip(numbers[::2], numbers[1::2])]
+
+    lines = [along(" ".join(e.attrib[key] for key in ("x1", "y1", "x2", "y2"))) for e in group if "x1" in e.attrib]
+    assert lines == [pytest.approx(ends, abs=1e-9) for ends in ([0.1j, 0.4 + 0.1j], [0.0, 0.1j], [0.4, 0.4 + 0.1j])]
+    arrows = [along(e.attrib["d"]) for e in group if "d" in e.attrib]
+    ends = ([0.01 + 0.102j, 0.1j, 0.01 + 0.098j], [0.39 + 0.098j, 0.4 + 0.1j, 0.39 + 0.102j])
+    assert arrows == [pytest.approx(points, abs=1e-9) for points in ends]
+    (text,) = (e for e in group if e.text and e.text.strip())
+    way = (turned + 89.0) % 180.0 - 89.0
+    above = 0.003j if abs(way - turned) < 1.0 else -0.003j
+    assert along(f"{text.attrib['x']} {text.attrib['y']}") == pytest.approx([0.2 + 0.1j + above], abs=1e-9)
+    rotation = re.match(r"rotate\((\S+)", text.attrib["transform"])
+    assert rotation is not None
+    assert rotation[1] == f"{0.0 - way:.6g}"
+
+
 def test_extents() -> None:
     (left, bottom), (right, top) = DRAWING.extents
     assert (left, bottom, right, top) == pytest.approx((-0.4, -0.79, 1.2, 0.81))
     document = read_dxf(to_dxf(DRAWING))
     box = bbox.extents(document.modelspace().query("LINE CIRCLE LWPOLYLINE"), fast=False)
     assert np.array([box.extmin, box.extmax])[:, :2] / 1e3 == pytest.approx(np.array(DRAWING.extents), abs=1e-3)
-    assert np.array(document.header["$EXTMIN"])[:2] / 1e3 == pytest.approx([left, bottom])
-    assert np.array(document.header["$EXTMAX"])[:2] / 1e3 == pytest.approx([right, top])
+    assert np.array(document.header["$EXTMIN"]) / 1e3 == pytest.approx([left, bottom, 0.0])
+    assert np.array(document.header["$EXTMAX"]) / 1e3 == pytest.approx([right, top, 0.0])
 
 
 @pytest.mark.parametrize("unit", ["mm", "cm", "in"])

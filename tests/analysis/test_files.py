@@ -289,11 +289,13 @@ def test_a_file_that_was_there_stays_where_writing_is_interrupted(tmp_path, monk
     assert [path.name for path in tmp_path.iterdir()] == ["x.csv"]
 
 
-@pytest.mark.parametrize("text", ["", "t,x\n", "t,x\n\n# 1,2\n"])
+@pytest.mark.parametrize("text", ["", "t\n", "t,x\n", "t,x\n\n# 1,2\n"])
 def test_an_empty_csv_is_refused_in_a_sentence(tmp_path, text):
     (tmp_path / "x.csv").write_text(text)
     with pytest.raises(InputError, match=r"x\.csv has no numbers: it must have a header line and rows"):
         read_csv(tmp_path / "x.csv")
+    with pytest.raises(InputError, match=r"x\.csv has no numbers: it must have rows of numbers"):
+        read_columns(tmp_path / "x.csv", ("t",))
 
 
 @pytest.mark.parametrize(

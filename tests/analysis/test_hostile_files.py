@@ -198,6 +198,14 @@ def test_errors_do_not_repeat_megabytes(tmp_path, value):
     assert len(str(error.value)) < 1000
 
 
+def test_a_whole_number_of_1024_bits_is_read(tmp_path):
+    (tmp_path / "x.toml").write_text(f"a = {2**1024 - 1}")
+    assert read_tables(tmp_path / "x.toml") == {"a": 2**1024 - 1}
+    (tmp_path / "x.toml").write_text(f"a = {2**1024}")
+    with pytest.raises(InputError, match="more than 1024 bits"):
+        read_tables(tmp_path / "x.toml")
+
+
 # FMUs
 
 
@@ -224,6 +232,17 @@ def test_an_fmu_is_unpacked_up_to_a_limit_and_leaves_no_folder(tmp_path, monkeyp
     with pytest.raises(InputError, match=r"has 2 members: more than 1 .* LINKWORK_MAX_FMU_MEMBERS"):
         check_fmu(path)
     assert not list((tmp_path / "unpacked").iterdir())
+
+
+def test_a_description_is_a_sixteenth_of_an_fmu_at_most(tmp_path, monkeypatch):
+    path = tmp_path / "wordy.fmu"
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr("modelDescription.xml", bytes(15_500_000))
+    monkeypatch.setenv("LINKWORK_MAX_FMU_MB", "256")
+    check_fmu(path)
+    monkeypatch.setenv("LINKWORK_MAX_FMU_MB", "240")
+    with pytest.raises(InputError, match=r"has 16 MB of modelDescription\.xml: more than 15 MB"):
+        check_fmu(path)
 
 
 @pytest.mark.parametrize("name", ["../x", "a/../../x", "/x", "C:x", "a\\..\\x"])

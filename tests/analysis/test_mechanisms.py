@@ -303,6 +303,12 @@ def test_shift_of_the_slider_crank_is_that_of_differences(speed: float | None) -
     )
 
 
+def test_the_shift_of_the_slider_crank_is_held_where_nothing_acts_on_it() -> None:
+    pushed = replace(SPRUNG, shift_spring_free_position=0.5)
+    run = simulate(pushed, initial={"shift_position": 0.06}, stop_time=0.02, step=0.01)
+    assert run["shift.position"].tolist() == [0.06] * 3
+
+
 def test_a_groove_leaves_one_freedom() -> None:
     """The shift goes with the crank: its inertia is that of both, seen from the crank."""
     grooved = replace(SPRUNG, groove_amplitude=0.05, groove_ratio=2.0)

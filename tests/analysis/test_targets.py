@@ -440,6 +440,8 @@ def test_a_csv_that_ends_where_it_began_is_closed(tmp_path: Path) -> None:
     assert target.closed
     assert target.enclosed_area == pytest.approx(0.5)
     assert not TargetPath.from_file(path, closed=False).closed
+    points, closed = read_points(save(tmp_path, "b.csv", "1,2\n1,2\n"))
+    assert (points.tolist(), closed) == ([[1.0, 2.0]] * 2, False)
 
 
 @pytest.mark.parametrize(
@@ -482,6 +484,7 @@ WEDGE = np.array([[10.0, -5.0], [30.0, -5.0], [30.0, 5.0]])
         ('width="6pc" viewBox="0 0 100 50"', None, 0.254e-3),
         ('width="100%" height="100%" viewBox="0 0 100 50"', None, 0.0254 / 96),
         ('width=".5in" height="1.2.3in" viewBox="0 0 100 50"', None, 0.0254 / 200),
+        ('width="100mm" height="50mm" viewBox="0 0 100 50" preserveAspectRatio="none"', None, 1e-3),
         ('width="100mm" height="50mm"', None, 0.0254 / 96),
         ("", None, 0.0254 / 96),
         ('width="100mm" height="50mm" viewBox="5 5 50 25"', "cm", 1e-2),

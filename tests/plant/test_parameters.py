@@ -419,6 +419,8 @@ def test_speed_torque_and_start_of_section_3_1() -> None:
     start = sets_3_1.initial(3.5)
     assert start == SliderCrankStart(crank_speed=sets_3_1.CRANK_SPEED, shift_position=3.5 * INCH)
     assert (sets_3_1.parameters(10.0), start) == sets_3_1.OFFSET_CASE
+    twisted = sets_3_1.SETS["rahman-a4-20-alpha4-232"]
+    assert (twisted.parameters, twisted.initial) == (sets_3_1.parameters(20.0, 232.0), sets_3_1.initial())
     assert hypot(sets_3_1.INCH - INCH, sets_3_1.POUND_FORCE - POUND_FORCE, sets_3_1.POUND_INCH - POUND_INCH) == 0.0
 
 
