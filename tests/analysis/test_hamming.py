@@ -220,10 +220,18 @@ def test_steps_are_powers_of_two_of_each_other() -> None:
 
 
 def test_jump_of_the_right_hand_side_starts_anew() -> None:
-    solver = Hamming(lambda t, y: [1.0 if t < pi else -50.0 * y[0]], 0.0, [0.0], 4.0, rtol=1e-7, atol=1e-9)
+    def jumping(t: float, y: np.ndarray) -> list[float]:
+        return [1.0 if t < pi else -50.0 * y[0]]
+
+    solver = Hamming(jumping, 0.0, [0.0], 4.0, rtol=1e-7, atol=1e-9, first_step=2.0**-6)
+    steps = []
     while solver.status == "running":
         assert solver.step() is None
+        steps.append(solver.step_size)
     assert solver.starts > 1
+    # halved there too, from the step before
+    exponents = np.log2(steps[:-1])
+    assert exponents == pytest.approx(np.round(exponents), abs=1e-9)
     assert solver.y[0] == pytest.approx(pi * np.exp(-50.0 * (4.0 - pi)), abs=1e-6)
 
 

@@ -11,7 +11,7 @@ from scipy.interpolate import CubicSpline
 
 from analysis.mechanisms import FIVE_BAR
 from analysis.run import Function, Harmonics, InductionMotor, Inputs, Piecewise, TorsionBar, ramp, steps, table
-from analysis.run.inputs import align, encode, sample
+from analysis.run.inputs import align, encode, release, sample
 from linkwork.errors import InputError
 
 REST = np.zeros(4)
@@ -105,6 +105,15 @@ def test_harmonics_of_every_channel_go_where_they_belong(channel: str) -> None:
 def test_torsion_bar(th2: float, expected: float) -> None:
     bar = Inputs(torque=TorsionBar(torque=10.0, release_angle=2.0))
     assert value(bar, 3.0, x=[th2, 0, 0, 0])["torque"] == pytest.approx(expected)
+
+
+def test_a_torsion_bar_is_released_where_it_has_turned_as_far_as_it_was_wound() -> None:
+    encoded = encode(Inputs(torque=TorsionBar(torque=10.0, release_angle=2.0)), FIVE_BAR)
+    law = encoded.law.copy()
+    release(encoded, np.array([1.999, 0, 0, 0]), law)
+    assert law.tolist() == encoded.law.tolist()
+    release(encoded, np.array([2.0, 0, 0, 0]), law)
+    assert law.tolist() == [*encoded.law[:2], 0.0, *encoded.law[3:]]
 
 
 @pytest.mark.parametrize("speed", [-20.0, 0.0, 30.0, 49.9, 50.0, 80.0])

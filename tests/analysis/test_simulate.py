@@ -6,7 +6,8 @@ import os
 import random
 import signal
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from math import nan, pi, radians
 from typing import Any
@@ -31,7 +32,7 @@ from analysis import (
     table,
 )
 from analysis.mechanisms import FIVE_BAR
-from analysis.run import Event, compiled
+from analysis.run import Event, compiled, prepared
 from analysis.run.inputs import encode, sample
 from analysis.run.simulation import SCIPY_METHODS
 from linkwork.errors import AssemblyError, InputError, ParameterError
@@ -662,6 +663,19 @@ def test_progress_is_shown_only_where_it_is_wanted(method: str, capfd: pytest.Ca
     assert capfd.readouterr() == ("", "")
     shown = table_3_1(method=method, progress=True)
     assert np.array_equal(shown.values, silent.values)
+
+
+def test_progress_is_the_time_since_the_start(monkeypatch: pytest.MonkeyPatch) -> None:
+    told: list[float] = []
+
+    @contextmanager
+    def shown(progress: bool, duration: float) -> Iterator[Callable[[float], None]]:
+        told.append(duration)
+        yield told.append
+
+    monkeypatch.setattr(prepared, "shown", shown)
+    simulate(TABLE_3_1, Inputs(speed=20.0), start_time=5.0, stop_time=5.2, step=0.05, progress=True)
+    assert told == pytest.approx([0.2, 0.2])
 
 
 # --- What is refused
