@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 import tomllib
 from collections.abc import Callable, Collection, Sequence
+from math import cos, sin
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -32,7 +33,7 @@ from .common import (
 
 if TYPE_CHECKING:
     from ..motion import SliderDrive
-    from ..synthesis import Solution, TradeOff
+    from ..synthesis import PinForces, Solution, TradeOff
 
 #: Further positions in a drawing.
 POSES = 6
@@ -90,8 +91,8 @@ def overrides_of(settings: Sequence[str], **options: Any) -> dict[str, Any]:
     return settings_of(settings) | given
 
 
-def print_solutions(title: str, solutions: Sequence[Solution]) -> None:
-    """Ranked solutions as a table, in mm and degrees."""
+def print_solutions(title: str, solutions: Sequence[Solution], forces: Sequence[PinForces] | None = None) -> None:
+    """Ranked solutions as a table, in mm and degrees, with the greatest force on their pins where that is known."""
     from ..synthesis import error_unit, format_transmission, quality_name, quality_unit
 
     task = solutions[0].task
@@ -103,6 +104,7 @@ def print_solutions(title: str, solutions: Sequence[Solution]) -> None:
         f"worst [{length}]",
         "largest link [mm]",
         "transmission angle [deg]",
+        *(["pin force [N]"] if forces else []),
         "verdict",
     )
     grid = table(title, headings, left=("verdict",))
@@ -115,6 +117,7 @@ def print_solutions(title: str, solutions: Sequence[Solution]) -> None:
             f"{scale * s.evaluation.worst:.4g}",
             f"{1e3 * s.linkage.largest_link:.6g}",
             format_transmission(v),
+            *([f"{forces[rank - 1].greatest:.4g} on {forces[rank - 1].pin}"] if forces else []),
             ", ".join([v.grashof, *([] if v.full_turn else ["no full turn"]), *v.defects]),
             style=None if v.sound else "yellow",
         )
@@ -181,7 +184,8 @@ def _turn(solution: Solution, make: Any) -> SliderDrive | None:
     if isinstance(linkage.pivot, SecondCrank) or linkage.slides or not linkage.turns_fully:
         return None
     speed = direction(solution) * make.speed
-    return inverse_dynamics(make.moving(linkage), motion_of_plant(linkage), speed, samples=360)
+    load = make.load_along(cos(linkage.ground_angle), sin(linkage.ground_angle))
+    return inverse_dynamics(make.moving(linkage), motion_of_plant(linkage), speed, load=load, samples=360)
 
 
 @click.command()
@@ -236,10 +240,13 @@ def synthesize(
         if error.synthesis is None:
             raise
         result, stopped = error.synthesis, error
-    print_solutions(f"{chosen.title}: {len(result.solutions)} linkages, {result.seconds:.1f} s", result.solutions)
+    forces = chosen.forces(result.solutions)
+    title = f"{chosen.title}: {len(result.solutions)} linkages, {result.seconds:.1f} s"
+    print_solutions(title, result.solutions, forces)
     print_best(result.best)
     folder = folder_of(out)
-    written = [result.to_csv(folder / "solutions.csv")]
+    carried = {"greatest pin force [N]": [force.greatest for force in forces]} if forces else {}
+    written = [write_csv(folder / "solutions.csv", result.columns() | carried)]
     if has_cognates(result.best):
         others = alternatives(result.best)
         print_solutions("the same curve from other pivots: the first one's cognates", others)
@@ -263,10 +270,10 @@ def synthesize(
 def _trade_off(traded: TradeOff, title: str, folder: Path, plots: bool) -> list[Path]:
     from .. import figures
     from ..files import save_figure
-    from ..synthesis import error_unit, format_limit, quality_name, quality_unit
+    from ..synthesis import OVER, error_unit, format_limit, quality_name, quality_unit
 
     task = next((s.task for s in traded.solutions if s is not None), None)
-    what = "largest link" if traded.over == "size" else "least transmission angle"
+    what = OVER[traded.over].name
     if task is None:
         print_error(f"note: no linkage keeps any of the limits of the {what}")
         return []

@@ -24,6 +24,8 @@ from linkwork.errors import InputError
 
 from ..motion import SliderDrive
 from ..synthesis import (
+    OVER,
+    SHOWN,
     InfeasibleError,
     LinkageScene,
     Solution,
@@ -504,9 +506,10 @@ def plot_trade_off(traded: TradeOff, *, title: str = "") -> Figure:
         f"{fill(quality_name(task), 26)} [{unit}]": factor * traded.error.filled(np.nan),
         f"worst error [{length}]": scale * worst,
     }
-    limit, limit_label = 1e3 * traded.limit, "limit of the largest link [mm]"
-    if traded.over == "transmission":
-        limit, limit_label = np.degrees(traded.limit), "least transmission angle asked for [deg]"
+    shown, unit = SHOWN[OVER[traded.over].unit]
+    over = OVER[traded.over]
+    label = f"limit of the {over.name}" if over.small else f"{over.name} asked for"
+    limit, limit_label = shown * traded.limit, f"{label} [{unit}]"
     order = np.argsort(limit)
     with styled():
         figure = Figure(figsize=(6.4, 2.6 * len(errors) + 0.4))

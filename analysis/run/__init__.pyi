@@ -31,6 +31,7 @@ from .ensemble import simulate_many as simulate_many
 from .equations import constants as constants
 from .equations import expressions as expressions
 from .equations import machine as machine
+from .equations import of_parameters as of_parameters
 from .equations import traced as traced
 from .events import Event as Event
 from .events import RunInterrupted as RunInterrupted

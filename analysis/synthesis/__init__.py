@@ -14,7 +14,7 @@ from __future__ import annotations
 from .areas import Straightness, area_between, distance_to, hausdorff, straightest_part, straightness
 from .burmester import Dyad, Guidance, GuidanceMap, guidance
 from .case_tasks import KINDS
-from .cases import BOUNDS, TABLES, SynthesisCase, direction, load_synthesis_case, synthesis_case_from
+from .cases import BOUNDS, TABLES, SynthesisCase, load_synthesis_case, synthesis_case_from
 from .cognates import alternatives, cognates, has_cognates
 from .constraints import (
     USUAL,
@@ -30,12 +30,24 @@ from .constraints import (
     TimeRatio,
 )
 from .drawing import drawing, plates
+from .forces import LeastPinForce, MaxPinForce, PinForces, pin_forces
 from .functions import Generators, function_generators
 from .kinds import GEARS, Kind, Stroke, kind_of
-from .limit_positions import dead_centres, mechanical_advantage, time_ratio, toggles
+from .limit_positions import (
+    DeadCentre,
+    MechanicalAdvantage,
+    NoToggle,
+    Toggle,
+    dead_centres,
+    mechanical_advantage,
+    time_ratio,
+    toggles,
+)
 from .linkage import ANGLES, LENGTHS, LINKS, UNITS, Linkage, SecondCrank, SliderMotion
+from .making import Make, direction
 from .quick_return import QuickReturn
 from .report import (
+    SHOWN,
     dimension_rows,
     error_unit,
     format_limit,
@@ -51,6 +63,7 @@ from .search import QUICK_SEARCH, USUAL_SEARCH, Search
 from .sensitivity import Rounding, Sensitivity, costs, length_step, rounded, sensitivities
 from .solution import Evaluation, Solution, Verdicts, evaluate, judge, ranked
 from .solve import (
+    OVER,
     Synthesis,
     SynthesisInterrupted,
     TradeOff,
@@ -83,7 +96,9 @@ __all__ = [
     "KINDS",
     "LENGTHS",
     "LINKS",
+    "OVER",
     "QUICK_SEARCH",
+    "SHOWN",
     "TABLES",
     "UNITS",
     "USUAL",
@@ -91,6 +106,7 @@ __all__ = [
     "Assembly",
     "Constraint",
     "CrankUnknown",
+    "DeadCentre",
     "Dyad",
     "Evaluation",
     "FullTurn",
@@ -101,10 +117,16 @@ __all__ = [
     "InfeasibleError",
     "Kind",
     "LargestLink",
+    "LeastPinForce",
     "LeastTransmission",
     "Linkage",
     "LinkageScene",
+    "Make",
+    "MaxPinForce",
+    "MechanicalAdvantage",
     "Motion",
+    "NoToggle",
+    "PinForces",
     "PivotRegion",
     "PivotUnknown",
     "PrecisionPoints",
@@ -129,6 +151,7 @@ __all__ = [
     "Task",
     "TimeRatio",
     "TimedPath",
+    "Toggle",
     "TradeOff",
     "TradeOffInterrupted",
     "UntimedPath",
@@ -162,6 +185,7 @@ __all__ = [
     "mechanical_advantage",
     "normal_form",
     "path_from_formula",
+    "pin_forces",
     "plates",
     "quality_name",
     "quality_unit",

@@ -28,8 +28,9 @@ from scipy.optimize import Bounds, NonlinearConstraint, OptimizeResult, differen
 
 from linkwork.five_bar import kinematics
 
+from ..numerics import symbolic
 from ..numerics.tracing import rebound
-from .constraints import TURNING, UNKNOWNS, Limits, Require, half_planes
+from .constraints import TURNING, UNKNOWNS, Along, Limits, Require, half_planes
 from .linkage import BY_SHORTEST, transmission_excess
 from .polish import Polished, kept_of, quality_of
 from .search import USUAL_SEARCH, Search, over_cores
@@ -126,7 +127,11 @@ def _value(require: Require, p: SimpleNamespace) -> float:
     """Left side of a requirement; where it has no value, as the root of something negative, it is violated by `NO_VALUE`."""
     try:
         with np.errstate(all="ignore"):
-            value = require.function(p)
+            if require.symbolic:
+                rotation = (require.rotation,) if isinstance(require, Along) else ()
+                value = float(np.max(require.function(p, *map(symbolic.library().DM, rotation))))
+            else:
+                value = require.function(p)
     except (ValueError, ZeroDivisionError, OverflowError):
         return NO_VALUE * require.scale
     # a power of something negative is complex
@@ -259,9 +264,9 @@ class BlackBox:
 
     def _excess(self, name: str, violation: float) -> str:
         """By how much an inequality is violated, with its unit."""
-        scale = next((require.scale for require in self.limits.requires if require.name == name), None)
-        if scale is not None:
-            return f"{scale * violation:.3g}"
+        required = next((require for require in self.limits.requires if require.name == name), None)
+        if required is not None:
+            return f"{required.scale * violation:.3g} {required.unit}".strip()
         if name == "crank rotation of the straight part":
             return f"{degrees(violation):.3g} deg"
         return f"{1e3 * self.normal.unit * violation:.3g} mm"
@@ -413,7 +418,10 @@ class BlackBox:
             found.append((f"region of pivot {pivot}", outside))
         for require in limits.requires:
             columns = [
-                physical(SimpleNamespace(**dict(zip(UNKNOWNS, row.tolist()))), normal.unit, normal.origin) for row in q
+                physical(
+                    SimpleNamespace(**dict(zip(UNKNOWNS, row.tolist())), branch=self.branch), normal.unit, normal.origin
+                )
+                for row in q
             ]
             value = np.array([_value(require, p) for p in columns]) / require.scale
             found.append((require.name, np.abs(value) - EQUAL if require.equal else value))

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import partial
-from math import pi, remainder, tau
+from math import pi
 from pathlib import Path
 from typing import Any, get_args
 
@@ -13,7 +13,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from linkwork.errors import ParameterError
-from linkwork.five_bar.parameters import FiveBarParameters
 
 from ..files import (
     Choice,
@@ -31,8 +30,7 @@ from ..files import (
     table_of,
     text,
 )
-from ..run import parameters_to
-from ..units import with_unit
+from ..units import quantity
 from .case_tasks import points_of, task_from
 from .constraints import (
     SECOND_LENGTH,
@@ -48,19 +46,19 @@ from .constraints import (
     PivotRegion,
     TimeRatio,
 )
+from .forces import FORCES, PINS, LeastPinForce, MaxPinForce, PinForces, pin_forces
 from .kinds import GEARS, Kind, Stroke, limits_of_kinds
-from .linkage import ANGLES, Linkage
+from .limit_positions import DeadCentre, MechanicalAdvantage, NoToggle, Toggle
+from .linkage import ANGLES
+from .making import Make
 from .quick_return import QuickReturn
 from .requirements import requirement
 from .search import METHODS, Method, Search
 from .solution import Solution
-from .solve import Synthesis, TradeOff, synthesize, trade_off
+from .solve import OVER, Synthesis, TradeOff, synthesize, trade_off
 from .tasks import Task, normal_form
 
 FloatArray = NDArray[np.float64]
-
-#: Stiffness of the slider that stands for a fixed pivot: natural frequency (rad/s), or multiples of the crank's speed.
-STIFF, STIFF_TURNS = 1000.0, 50.0
 
 
 def _cores(value: Any, name: str) -> int:
@@ -89,96 +87,6 @@ class SearchTable:
         return Search(**({"n_jobs": own.pop("jobs")} | own | changes))
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Make:
-    """What the linkage is made of, and how fast it runs; see `Linkage.to_five_bar`.
-
-    Attributes
-    ----------
-    density : float
-        kg/m3.
-    width, thickness : float
-        Of every bar (m).
-    pin : float, optional
-        Diameter of the holes in the drawing of the plates (m); four tenths of the width by default.
-    slider_mass, slider_stiffness, slider_damping : float, optional
-        Of the slider that carries D (kg, N/m, N.s/m); by default of a block, held so stiffly that it stands for a fixed pivot.
-    slider_coulomb_friction : float
-        N.
-    gravity : float
-        m/s2.
-    speed : float
-        Of the crank (rad/s).
-    """
-
-    density: float = entry(Quantity("kg/m**3", above=0.0), 7850.0)
-    width: float = entry(Quantity("m", above=0.0), 0.02)
-    thickness: float = entry(Quantity("m", above=0.0), 0.005)
-    pin: float | None = entry(Quantity("m", above=0.0), None)
-    slider_mass: float | None = entry(Quantity("kg", least=0.0), None)
-    slider_stiffness: float | None = entry(Quantity("N/m", least=0.0), None)
-    slider_damping: float | None = entry(Quantity("N.s/m", least=0.0), None)
-    slider_coulomb_friction: float = entry(Quantity("N", least=0.0), 0.0)
-    gravity: float = entry(Quantity("m/s2", least=0.0), 9.81)
-    speed: float = entry(Quantity("rad/s", above=0.0), 2.0 * pi)
-
-    @property
-    def hole(self) -> float:
-        """Diameter of the pins' holes (m)."""
-        return 0.4 * self.width if self.pin is None else self.pin
-
-    def describe(self) -> str:
-        """Bars and speed in a line, for a sheet."""
-        return (
-            f"bars {1e3 * self.width:g} x {1e3 * self.thickness:g} mm of {self.density:g} kg/m³, "
-            f"pins {1e3 * self.hole:g} mm; forces at {self.speed * 30.0 / pi:g} rpm, gravity {self.gravity:g} m/s²"
-        )
-
-    def moving(self, linkage: Linkage) -> FiveBarParameters:
-        """Parameters of the plant for a linkage, its slider free to be moved."""
-        return linkage.to_five_bar(
-            density=self.density,
-            section=(self.width, self.thickness),
-            slider_mass=self.slider_mass,
-            slider_stiffness=self.slider_stiffness or 0.0,
-            slider_damping=self.slider_damping or 0.0,
-            slider_coulomb_friction=self.slider_coulomb_friction,
-            gravity=self.gravity,
-        )
-
-    def five_bar(self, solution: Solution) -> FiveBarParameters:
-        """Parameters of the plant for a solution, its slider held."""
-        free = self.moving(solution.linkage)
-        mass = free.slider_mass + free.rocker_mass + free.coupler_mass
-        frequency = max(STIFF, STIFF_TURNS * abs(self.speed))
-        stiffness = mass * frequency**2 if self.slider_stiffness is None else self.slider_stiffness
-        # seven tenths of critical
-        damping = 1.4 * (stiffness * mass) ** 0.5 if self.slider_damping is None else self.slider_damping
-        return replace(free, slider_stiffness=stiffness, slider_damping=damping)
-
-    def run_case(self, solution: Solution, title: str) -> dict[str, Any]:
-        """Tables of a case file that runs the linkage through its task at constant speed; see `docs/case-files.md`."""
-        at = solution.evaluation.rotation
-        start = (0.0 if at is None else float(at[0])) + solution.linkage.crank_phase
-        run: dict[str, Any] = {"revolutions": 2.0}
-        if not solution.verdicts.full_turn and at is not None:
-            # a crank that cannot turn fully: from the first target to the last
-            run = {"stop_time": with_unit(float(np.ptp(at)) / self.speed, "s")}
-        return {
-            "title": title,
-            **parameters_to(self.five_bar(solution)),
-            "initial": {"crank_angle": with_unit(remainder(start, tau), "rad")},
-            "drive": {"speed": with_unit(direction(solution) * self.speed, "rad/s")},
-            "run": run,
-        }
-
-
-def direction(solution: Solution) -> float:
-    """The way in which the crank turns over the task: 1 counter-clockwise, -1 clockwise."""
-    at = solution.evaluation.rotation
-    return -1.0 if at is not None and len(at) > 1 and at[-1] < at[0] else 1.0
-
-
 def _transmission(value: Any, name: str) -> float | None:
     if value is False:
         return None
@@ -186,9 +94,39 @@ def _transmission(value: Any, name: str) -> float | None:
     return Quantity("rad", least=0.0, below=0.5 * pi, requirement=requirement)(value, name)
 
 
+def _error(value: Any, name: str) -> Any:
+    """The pins are to carry least, with no greater error than this."""
+    try:
+        quantity(value, "m", name)
+    except ParameterError:
+        # of a function of the rocker
+        quantity(value, "rad", name)
+    return value
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Constraints:
-    """The table ``[constraints]``; a least transmission angle of None asks nothing."""
+    """The table ``[constraints]``; a least transmission angle of None asks nothing.
+
+    Attributes
+    ----------
+    time_ratio : (float, float)
+        Of a crank-rocker's slow swing to its quick one.
+    least_mechanical_advantage, greatest_mechanical_advantage : float
+        Torque of the rocker for one of the crank.
+    mechanical_advantage_at : list
+        Crank rotations where that is asked; by default all the way.
+    dead_centre_stretched, dead_centre_folded : (float, float)
+        Crank rotation, or range of it, at which crank and coupler are in line.
+    toggle_stretched, toggle_folded : (float, float)
+        The same of coupler and rocker.
+    no_toggle : (float, float)
+        Crank rotations between which there is none.
+    max_pin_force : float
+        No pin carries more, at the speed and under the load of make.
+    pins : str
+        Those that this is about.
+    """
 
     least_transmission_angle: float | None = entry(_transmission, LeastTransmission().angle)
     over: str | None = entry(Choice(("turn", "task")), None)
@@ -200,40 +138,60 @@ class Constraints:
     assembly: int | None = entry(Whole(), None)
     pivot_A: FloatArray | None = entry(points_of, None)
     pivot_D: FloatArray | None = entry(points_of, None)
+    least_mechanical_advantage: float | None = entry(Quantity("1", least=0.0), None)
+    greatest_mechanical_advantage: float | None = entry(Quantity("1", above=0.0), None)
+    mechanical_advantage_at: tuple[float, ...] | None = entry(Many(Quantity("rad"), single=True), None)
+    dead_centre_stretched: tuple[float, float] | None = entry(Range(Quantity("rad")), None)
+    dead_centre_folded: tuple[float, float] | None = entry(Range(Quantity("rad")), None)
+    toggle_stretched: tuple[float, float] | None = entry(Range(Quantity("rad")), None)
+    toggle_folded: tuple[float, float] | None = entry(Range(Quantity("rad")), None)
+    no_toggle: tuple[float, float] | None = entry(Range(Quantity("rad")), None)
+    max_pin_force: float | None = entry(Quantity("N", above=0.0), None)
+    least_pin_force_within: Any = entry(_error, None)
+    pins: str = entry(text, PINS)
     require: tuple[Constraint, ...] = entry(Many(requirement), ())
 
     def constraints(self) -> tuple[Constraint | Stroke, ...]:
         """The constraints; a crank that cannot turn fully is looked at where it works."""
-        found: list[Constraint | Stroke] = []
-        if self.least_transmission_angle is not None:
-            swings = self.grashof in ("double-rocker", "rocker-crank", "triple-rocker")
-            over: Any = self.over or ("task" if swings else "turn")
-            found.append(LeastTransmission(angle=self.least_transmission_angle, over=over))
-        if self.full_turn:
-            found.append(FullTurn())
-        if self.grashof is not None:
-            found.append(Grashof(type=self.grashof))
-        if self.time_ratio is not None:
-            low, high = self.time_ratio
-            found.append(TimeRatio(least=low, greatest=high))
-        if self.stroke is not None:
-            found.append(Stroke(least=self.stroke[0], greatest=self.stroke[1]))
-        if self.largest_link is not None:
-            found.append(LargestLink(length=self.largest_link))
-        if self.assembly is not None:
-            found.append(Assembly(branch=self.assembly))
-        if self.pivot_A is not None:
-            found.append(PivotRegion(pivot="A", polygon=self.pivot_A))
-        if self.pivot_D is not None:
-            found.append(PivotRegion(pivot="D", polygon=self.pivot_D))
-        return (*found, *self.require)
+        swings = self.grashof in ("double-rocker", "rocker-crank", "triple-rocker")
+        over: Any = self.over or ("task" if swings else "turn")
+        made: tuple[tuple[Any, Callable[[Any], Constraint | Stroke]], ...] = (
+            (self.least_transmission_angle, lambda angle: LeastTransmission(angle=angle, over=over)),
+            (self.full_turn or None, lambda _: FullTurn()),
+            (self.grashof, lambda kind: Grashof(type=kind)),
+            (self.time_ratio, lambda ends: TimeRatio(least=ends[0], greatest=ends[1])),
+            (self.stroke, lambda ends: Stroke(least=ends[0], greatest=ends[1])),
+            (self.largest_link, lambda length: LargestLink(length=length)),
+            (self.assembly, lambda branch: Assembly(branch=branch)),
+            (self.pivot_A, lambda corners: PivotRegion(pivot="A", polygon=corners)),
+            (self.pivot_D, lambda corners: PivotRegion(pivot="D", polygon=corners)),
+            (self._advantage(), lambda bounds: MechanicalAdvantage(**bounds)),
+            (self.dead_centre_stretched, lambda at: DeadCentre(at=at)),
+            (self.dead_centre_folded, lambda at: DeadCentre(at=at, position="folded")),
+            (self.toggle_stretched, lambda at: Toggle(at=at)),
+            (self.toggle_folded, lambda at: Toggle(at=at, position="folded")),
+            (self.no_toggle, lambda ends: NoToggle(between=ends)),
+            (self.max_pin_force, lambda force: MaxPinForce(force=force, pins=self.pins)),
+            (self.least_pin_force_within, lambda error: LeastPinForce(error=error, pins=self.pins)),
+        )
+        return (*(make(value) for value, make in made if value is not None), *self.require)
+
+    def _advantage(self) -> dict[str, Any] | None:
+        """Arguments of `MechanicalAdvantage`, if it is asked for."""
+        ends = {"least": self.least_mechanical_advantage, "greatest": self.greatest_mechanical_advantage}
+        given = {name: end for name, end in ends.items() if end is not None}
+        if self.mechanical_advantage_at is not None and not given:
+            raise ParameterError(
+                "constraints.mechanical_advantage_at", self.mechanical_advantage_at, "come with a least or greatest one"
+            )
+        return {**given, "at": self.mechanical_advantage_at} if given else None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class TradeOffTable:
     """The table ``[trade_off]``: arguments of `trade_off`."""
 
-    over: Any = entry(Choice(("size", "transmission")))
+    over: Any = entry(Choice(OVER))
     limits: tuple[float, ...] = entry(Many(as_it_is, least=2))
     starts: int = entry(Whole(1), 12)
 
@@ -259,7 +217,8 @@ def _constraints(value: Any, name: str) -> tuple[Constraint | Stroke, ...]:
 
 
 def _trade_off(value: Any, name: str) -> TradeOffTable:
-    limit = Quantity("m" if table_of(value, name).get("over") == "size" else "rad")
+    over = table_of(value, name).get("over")
+    limit = Quantity(OVER[over].unit if isinstance(over, str) and over in OVER else "m")
     return read(TradeOffTable, value, name, readers={"limits": Many(limit, least=2)})
 
 
@@ -276,6 +235,8 @@ class SynthesisCase:
     trade_off: TradeOffTable | None = entry(_trade_off, None)
 
     def __post_init__(self) -> None:
+        made = (replace(c, make=self.make) if isinstance(c, FORCES) else c for c in self.constraints)
+        object.__setattr__(self, "constraints", tuple(made))
         # contradictions are reported before anything is searched
         if not isinstance(self.task, QuickReturn):
             limits_of_kinds(
@@ -287,17 +248,29 @@ class SynthesisCase:
         search, (kinds, gears) = self.search.search(progress=progress), (self.search.kinds, self.search.gears)
         return synthesize(self.task, self.bounds, self.constraints, search=search, kinds=kinds, gears=gears)
 
+    def forces(self, solutions: Sequence[Solution]) -> list[PinForces] | None:
+        """The forces on the pins of solutions, by runs of the plant; None where no constraint is about them."""
+        if not any(isinstance(c, FORCES) for c in self.constraints):
+            return None
+        return [
+            pin_forces(s.linkage, self.make, None if s.verdicts.full_turn else (s.rotation.min(), s.rotation.max()))
+            for s in solutions
+        ]
+
     def trade(self, *, progress: bool = False) -> TradeOff | None:
         """The trade-off that is asked for, if any; see `trade_off`."""
         wanted = self.trade_off
         if wanted is None:
             return None
+        constraints = self.constraints
+        if wanted.over == "pin-force" and not any(isinstance(c, MaxPinForce) for c in constraints):
+            constraints = (*constraints, MaxPinForce(force=max(wanted.limits), make=self.make))
         return trade_off(
             self.task,
             wanted.over,
             np.array(wanted.limits),
             self.bounds,
-            self.constraints,
+            constraints,
             search=Search(seed=self.search.seed, starts=wanted.starts, n_jobs=self.search.jobs, progress=progress),
             kinds=self.search.kinds,
             gears=self.search.gears,

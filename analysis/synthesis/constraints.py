@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from math import inf, isfinite, pi, radians
-from typing import Any, Literal, get_args
+from typing import Any, ClassVar, Literal, NamedTuple, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -165,12 +165,18 @@ class Require:
         For messages.
     scale : float
         Magnitude of its values.
+    unit : str
+        Theirs, for messages.
+    symbolic : bool
+        Whether it takes CasADi's symbols and numbers as it stands, and may have several values.
     """
 
-    function: Callable[[Any], Any]
+    function: Callable[..., Any]
     equal: bool = False
     name: str = "required function"
     scale: float = 1.0
+    unit: str = ""
+    symbolic: bool = False
 
     def __post_init__(self) -> None:
         if not callable(self.function):
@@ -179,8 +185,94 @@ class Require:
             raise ParameterError(f"scale of {self.name}", self.scale, "be a finite number greater than zero")
 
 
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Along(Require):
+    """A function of the dimensions and of the crank's rotation is below zero at rotations, or all the way between two.
+
+    Attributes
+    ----------
+    rotation : ndarray, shape (n,)
+        Where it is held from the beginning (rad); ``function(d, rotation)`` has rows of n values each.
+    ends : (float, float) or None
+        Between which its greatest values are looked for, and held too; None where the rotations are all.
+    """
+
+    rotation: FloatArray
+    ends: tuple[float, float] | None = None
+
+
+class Way(NamedTuple):
+    """Over what a constraint holds that is about the crank's rotation.
+
+    Attributes
+    ----------
+    turn : bool
+        Whether the crank turns fully.
+    rotation : ndarray or None
+        The task's crank rotations, where it gives any.
+    straight : bool
+        Whether the bounds hold the coupler point on the line of B and C.
+    """
+
+    turn: bool
+    rotation: FloatArray | None
+    straight: bool = False
+
+    def ends(self, what: str) -> tuple[float, float]:
+        """First and last crank angle of a turn, or crank rotation of the task.
+
+        Raises
+        ------
+        InputError
+            If neither is known.
+        """
+        if self.turn:
+            return 0.0, 2.0 * pi
+        rotation = self.timed(f"{what}, where the crank need not turn fully,")
+        return float(rotation.min()), float(rotation.max())
+
+    def timed(self, what: str) -> FloatArray:
+        """The task's crank rotations.
+
+        Raises
+        ------
+        InputError
+            If it gives none.
+        """
+        if self.rotation is None:
+            raise InputError(f"{what} needs crank rotations, and the task gives none")
+        return self.rotation
+
+
+class Least(NamedTuple):
+    """What is made small in the place of an error: the greatest value of a function, the greatest error bounded (units)."""
+
+    along: Along
+    error: float
+
+
+class Demand:
+    """A constraint that is functions of the dimensions kept below zero; `limit_positions` and `forces` have such."""
+
+    __slots__ = ()
+    #: Type of four-bar that it is about.
+    grashof: ClassVar[GrashofType | None] = None
+    #: Whether the crank then cannot turn fully.
+    stops: ClassVar[bool] = False
+    #: Whether something is made small in the place of an error.
+    seeks: ClassVar[bool] = False
+
+    def requires(self, way: Way) -> tuple[Require, ...]:
+        """The functions."""
+        raise NotImplementedError
+
+    def sought(self, way: Way, normal: Normal) -> Least | None:
+        """What it makes small in the place of an error."""
+        return None
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
-class TimeRatio:
+class TimeRatio(Demand):
     """The four-bar is a crank-rocker whose slow swing takes this many times as long as its quick one.
 
     Attributes
@@ -189,6 +281,8 @@ class TimeRatio:
         Bounds; 1 at least.
     """
 
+    grashof: ClassVar[GrashofType | None] = "crank-rocker"
+
     least: float = 1.0
     greatest: float = inf
 
@@ -196,8 +290,8 @@ class TimeRatio:
         if not 1.0 <= self.least <= self.greatest:
             raise ParameterError("time ratio", (self.least, self.greatest), "be two numbers in order, 1 or greater")
 
-    def requires(self) -> tuple[Require, ...]:
-        """The same as functions of the dimensions: of how much the crank's way between the dead centres is off half a turn."""
+    def requires(self, way: Way) -> tuple[Require, ...]:
+        """Functions of how much the crank's way between the dead centres is off half a turn."""
 
         def differs(d: Any) -> Any:
             # directions of C from A with crank and coupler in line, by the law of cosines
@@ -219,7 +313,7 @@ class TimeRatio:
         return tuple(found)
 
 
-Constraint = TimeRatio | LeastTransmission | FullTurn | Grashof | LargestLink | Assembly | PivotRegion | Require
+Constraint = Demand | LeastTransmission | FullTurn | Grashof | LargestLink | Assembly | PivotRegion | Require
 #: A least transmission angle of 40 degrees over a full turn.
 USUAL: tuple[Constraint, ...] = (LeastTransmission(),)
 
@@ -247,6 +341,8 @@ class Limits:
         Bounds of a second crank's length, in units, of a geared five-bar.
     ratio : float
         Of its gears.
+    least : Least, optional
+        What is made small in the place of an error.
     """
 
     low: FloatArray
@@ -260,6 +356,7 @@ class Limits:
     sliding: bool = False
     second: tuple[float, float] | None = None
     ratio: float = 1.0
+    least: Least | None = None
 
     @property
     def kind(self) -> str:
@@ -272,10 +369,19 @@ class Limits:
         return 1 if self.second is None else geared(self.ratio)[0]
 
     @property
+    def along(self) -> bool:
+        """Whether something holds along the crank's rotation."""
+        return any(isinstance(require, Along) for require in self.requires)
+
+    @property
     def bounds_only(self) -> bool:
         """Whether nothing but bounds is asked, so that a least squares method can do it."""
         return (
-            self.turn is None and self.way is None and self.grashof is None and not self.regions and not self.requires
+            self.turn is None
+            and self.way is None
+            and self.grashof is None
+            and self.least is None
+            and not (self.regions or self.requires)
         )
 
 
@@ -302,9 +408,7 @@ def limits_of(
             raise ParameterError(name, bounds[name], f"have the name of a dimension: {', '.join(sorted(UNKNOWNS))}")
     for c in constraints:
         if not isinstance(c, Constraint):
-            raise InputError(
-                f"constraint {c!r} is none: use {', '.join(kind.__name__ for kind in get_args(Constraint))}"
-            )
+            raise InputError(f"constraint {c!r} is none: use {', '.join(_kinds())}")
     given = _ends(task, normal, bounds, constraints)
     _check_links(given, constraints)
     _check_reach(given, normal)
@@ -313,6 +417,11 @@ def limits_of(
     shift[:2] = normal.origin.real, normal.origin.imag
     scale[:7] = normal.unit
     turn, way, grashof = _turning(constraints)
+    straight = given["point_distance"][1] == 0.0 or given["point_angle"] in ((0.0, 0.0), (pi, pi), (-pi, -pi))
+    over = Way(turn is not None, normal.rotation, straight)
+    least = [found for c in constraints if isinstance(c, Demand) and (found := c.sought(over, normal))]
+    if len(least) > 1:
+        raise InputError("more than one thing is to be made small: a search has one objective")
     branches = {c.branch for c in constraints if isinstance(c, Assembly)}
     if len(branches) > 1:
         raise InfeasibleError("both assemblies are asked for at once")
@@ -328,8 +437,18 @@ def limits_of(
             for c in constraints
             if isinstance(c, PivotRegion)
         ),
-        requires=tuple(r for c in constraints for r in _required(c)),
+        requires=tuple(r for c in constraints for r in _required(c, over)),
+        least=least[0] if least else None,
     )
+
+
+def _kinds() -> list[str]:
+    """Names of the constraints."""
+    found, below = [kind.__name__ for kind in get_args(Constraint)[1:]], [Demand]
+    while below:
+        below = [kind for one in below for kind in one.__subclasses__()]
+        found += [kind.__name__ for kind in below if not kind.__name__.startswith("_")]
+    return list(dict.fromkeys(found))
 
 
 def _ends(
@@ -367,9 +486,9 @@ def _ends(
     return ends
 
 
-def _required(constraint: Constraint) -> tuple[Require, ...]:
-    if isinstance(constraint, TimeRatio):
-        return constraint.requires()
+def _required(constraint: Constraint, way: Way) -> tuple[Require, ...]:
+    if isinstance(constraint, Demand):
+        return constraint.requires(way)
     return (constraint,) if isinstance(constraint, Require) else ()
 
 
@@ -380,8 +499,8 @@ def _turning(constraints: Sequence[Constraint]) -> tuple[float | None, float | N
         for over in ("turn", "task")
     )
     types: set[str] = {c.type for c in constraints if isinstance(c, Grashof)}
-    if any(isinstance(c, TimeRatio) for c in constraints):
-        types.add("crank-rocker")
+    demands = [c for c in constraints if isinstance(c, Demand)]
+    types |= {c.grashof for c in demands if c.grashof is not None}
     if len(types) > 1:
         raise InfeasibleError(f"Grashof types {', '.join(sorted(types))} are asked for at once: a four-bar has one")
     type_ = types.pop() if types else None
@@ -392,6 +511,10 @@ def _turning(constraints: Sequence[Constraint]) -> tuple[float | None, float | N
             raise InfeasibleError(f"the crank of a {type_} does not turn fully, which another constraint asks for")
         # on its way it must stay joined all the same
         way = way or 0.0
+    if turn is not None and any(c.stops for c in demands):
+        raise InfeasibleError(
+            "a crank that is to come to a toggle cannot turn fully, which another constraint asks for"
+        )
     return turn, way, type_
 
 

@@ -6,16 +6,32 @@ do, and the crank can go no farther. See R. L. Norton, Design of Machinery, 6th 
 
 from __future__ import annotations
 
-from math import acos, inf, pi
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+from math import acos, cos, inf, isfinite, pi
+from types import SimpleNamespace
+from typing import Any, ClassVar, Literal, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from linkwork.errors import ParameterError
 
-from .linkage import Linkage
+from ..mechanisms import FIVE_BAR
+from ..numerics import symbolic
+from ..run import traced
+from ..units import Amount, in_si
+from .constraints import TURNING, Along, Demand, Require, Way
+from .linkage import Linkage, transmission_excess
 
 FloatArray = NDArray[np.float64]
+#: Two links in one line: one beyond the other, or one over the other.
+InLine = Literal["stretched", "folded"]
+#: Rotations at which what holds along the crank's rotation is held from the beginning.
+GRID = 48
+#: Rotation by which more than a turn is looked at (rad).
+BEYOND = 0.02
 
 
 def dead_centres(linkage: Linkage) -> tuple[float, ...]:
@@ -107,3 +123,232 @@ def _lengths(linkage: Linkage) -> tuple[float, float, float, float]:
     if linkage.pivot is not None:
         raise ParameterError("pivot", linkage.pivot, "be fixed: dead centres, toggles and time ratio are a four-bar's")
     return linkage.ground_length, linkage.crank_length, linkage.coupler_length, linkage.rocker_length
+
+
+# As constraints
+
+
+def grid(ends: tuple[float, float]) -> FloatArray:
+    """Rotations between two, evenly."""
+    return np.linspace(*ends, GRID, endpoint=ends[1] - ends[0] < 2.0 * pi)
+
+
+def looked(ends: tuple[float, float]) -> tuple[float, float]:
+    """The rotations between which peaks are looked for: of a turn a little more, so that one at its end is seen."""
+    over = BEYOND if ends[1] - ends[0] >= 2.0 * pi else 0.0
+    return ends[0] - over, ends[1] + over
+
+
+def _ends(value: Any, name: str, longest: float = 2.0 * pi) -> tuple[float, float]:
+    """A range of crank rotations (rad), shorter than the longest, from its two ends or from one value."""
+    try:
+        low, high = (float(end) for end in (value if isinstance(value, tuple | list) else (value, value)))
+    except (TypeError, ValueError):
+        raise ParameterError(name, value, "be a crank rotation, or the two ends of a range (rad)") from None
+    if not (isfinite(low) and isfinite(high) and low <= high < low + longest):
+        raise ParameterError(name, value, f"be crank rotations in order, less than {longest:.4g} rad apart")
+    return low, high
+
+
+@in_si(at="rad")
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class MechanicalAdvantage(Demand):
+    """The rocker's torque for one of the crank's is within bounds, either way; see `mechanical_advantage`.
+
+    Attributes
+    ----------
+    least, greatest : float
+        Bounds.
+    at : array_like, optional
+        Crank rotations where they are asked (rad). Without them they hold all the way: over the turn, or where the crank need
+        not turn fully from the first to the last of the task's rotations.
+    """
+
+    least: float = 0.0
+    greatest: float = inf
+    at: Any = None
+
+    def __post_init__(self) -> None:
+        if not (0.0 <= self.least <= self.greatest and isfinite(self.least) and self.greatest > 0.0):
+            raise ParameterError(
+                "mechanical advantage", (self.least, self.greatest), "be two numbers in order, 0 or above"
+            )
+        if self.at is not None:
+            at = np.atleast_1d(np.asarray(self.at, dtype=float))
+            if at.ndim != 1 or not len(at) or not np.isfinite(at).all():
+                raise ParameterError("rotations of the mechanical advantage", self.at, "be finite numbers (rad)")
+            object.__setattr__(self, "at", at)
+
+    def requires(self, way: Way) -> tuple[Require, ...]:
+        """Functions of the speed of the rocker for that of the crank, which is finite in a dead centre."""
+        all_the_way = self.at is None
+        ends = way.ends("mechanical advantage") if all_the_way else None
+        if ends is None:
+            way.timed("mechanical advantage at crank rotations")
+        rotation, turn = self.at if ends is None else grid(ends), way.turn and all_the_way
+
+        def speed(d: Any, rotation: Any) -> Any:
+            casadi, plant = symbolic.library(), traced(FIVE_BAR)
+            th2 = rotation if turn else rotation + d.crank_phase
+            c2, s2 = casadi.cos(th2), casadi.sin(th2)
+            l2, l3, l4 = d.crank_length, d.coupler_length, d.rocker_length
+            g = plant.joined(c2, s2, d.ground_length - l2 * c2, -l2 * s2, l3, l4, d.branch)
+            return plant.coefficients(g, SimpleNamespace(l2=l2, l3=l3, l4=l4, ca=1.0, sa=0.0)).k42
+
+        def slow(d: Any, rotation: Any) -> Any:
+            both = self.least * speed(d, rotation)
+            return symbolic.library().horzcat(both - 1.0, -both - 1.0)
+
+        def fast(d: Any, rotation: Any) -> Any:
+            return 1.0 - (self.greatest * speed(d, rotation)) ** 2
+
+        asked = {"least": (slow, self.least > 0.0), "greatest": (fast, isfinite(self.greatest))}
+        return tuple(
+            Along(
+                function=f,
+                name=f"{which} mechanical advantage",
+                rotation=rotation,
+                ends=ends and looked(ends),
+                symbolic=True,
+            )
+            for which, (f, wanted) in asked.items()
+            if wanted
+        )
+
+
+@in_si(at="rad")
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Place(Demand):
+    """Two links come to lie in one line at a crank rotation, or somewhere within a range of rotations.
+
+    Attributes
+    ----------
+    at : float or (float, float)
+        From the start of the task's rotations (rad).
+    position : "stretched" or "folded"
+        One link beyond the other, or one over the other.
+    """
+
+    at: Amount
+    position: InLine = "stretched"
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "at", _ends(self.at, f"rotation of a {self._name()}", pi))
+        if self.position not in get_args(InLine):
+            raise ParameterError("position", self.position, f"be one of {', '.join(get_args(InLine))}")
+
+    @classmethod
+    def _name(cls) -> str:
+        raise NotImplementedError
+
+    def _require(self, function: Callable[[Any], Any], *, equal: bool = False) -> Require:
+        return Require(function=function, equal=equal, name=f"{self.position} {self._name()}", symbolic=True)
+
+    def _between(self, way: Way, distance: Callable[[Any, float], Any]) -> tuple[Require, ...]:
+        """Something that is zero in the place changes its sign from one end of the range to the other."""
+        way.timed(f"a {self._name()} at crank rotations")
+        low, high = self.at
+        if low == high:
+            return (self._require(lambda d: distance(d, low), equal=True),)
+        return (self._require(lambda d: distance(d, low) * distance(d, high)),)
+
+
+class DeadCentre(_Place):
+    """Crank and coupler come to lie in one line, the rocker at the end of its swing, at a crank rotation or in a range.
+
+    Attributes
+    ----------
+    at : float or (float, float)
+        From the start of the task's rotations (rad).
+    position : "stretched" or "folded"
+        The coupler beyond the crank, or over it.
+    """
+
+    __slots__ = ()
+
+    @classmethod
+    def _name(cls) -> str:
+        return "dead centre"
+
+    def requires(self, way: Way) -> tuple[Require, ...]:
+        """The triangle of A, C and D closes there, on the side of the assembly."""
+        stretched = self.position == "stretched"
+
+        def closes(d: Any, rotation: float) -> Any:
+            l1, l2, l3, l4 = d.ground_length, d.crank_length, d.coupler_length, d.rocker_length
+            reach = l3 + l2 if stretched else l3 - l2
+            # C from A is along the crank, or against it
+            c = symbolic.library().cos(rotation + d.crank_phase) * (1.0 if stretched else -1.0)
+            return (l1**2 + reach**2 - l4**2 - 2.0 * l1 * reach * c) / (l1**2 + l3**2)
+
+        def aside(d: Any, rotation: float) -> Any:
+            s = symbolic.library().sin(rotation + d.crank_phase)
+            return -d.branch * s if stretched else d.branch * s
+
+        sides = [self._require(partial(aside, rotation=end)) for end in dict.fromkeys(self.at)]
+        return (*self._between(way, closes), *sides)
+
+
+class Toggle(_Place):
+    """Coupler and rocker come to lie in one line, where the crank can go no farther, at a crank rotation or in a range.
+
+    Attributes
+    ----------
+    at : float or (float, float)
+        From the start of the task's rotations (rad).
+    position : "stretched" or "folded"
+        The coupler beyond the rocker, or over it.
+    """
+
+    __slots__ = ()
+    stops: ClassVar[bool] = True
+
+    @classmethod
+    def _name(cls) -> str:
+        return "toggle"
+
+    def requires(self, way: Way) -> tuple[Require, ...]:
+        """The triangle of A, B and D closes there."""
+
+        def closes(d: Any, rotation: float) -> Any:
+            l1, l2, l3, l4 = d.ground_length, d.crank_length, d.coupler_length, d.rocker_length
+            reach = l3 + l4 if self.position == "stretched" else l3 - l4
+            c = symbolic.library().cos(rotation + d.crank_phase)
+            return (l1**2 + l2**2 - 2.0 * l1 * l2 * c - reach**2) / (l1**2 + l3**2)
+
+        return self._between(way, closes)
+
+
+@in_si(between="rad")
+@dataclass(frozen=True, slots=True, kw_only=True)
+class NoToggle(Demand):
+    """The links stay joined, coupler and rocker out of line, from one crank rotation to another.
+
+    Attributes
+    ----------
+    between : (float, float)
+        From the start of the task's rotations (rad).
+    """
+
+    between: tuple[Amount, Amount]
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "between", _ends(self.between, "rotations without a toggle"))
+
+    def requires(self, way: Way) -> tuple[Require, ...]:
+        """The cosine of the transmission angle stays short of -1 and 1."""
+        way.timed("a range of crank rotations without a toggle")
+
+        def excess(d: Any, rotation: Any) -> Any:
+            casadi, l3, l4 = symbolic.library(), d.coupler_length, d.rocker_length
+            c = casadi.cos(rotation + d.crank_phase)
+            square = d.ground_length**2 + d.crank_length**2 - 2.0 * d.ground_length * d.crank_length * c
+            both = transmission_excess(l3, l4, square, square, cos(TURNING))
+            return casadi.horzcat(*both) / (2.0 * l3 * l4)
+
+        ends = self.between
+        return (
+            Along(
+                function=excess, name="range without a toggle", rotation=grid(ends), ends=looked(ends), symbolic=True
+            ),
+        )

@@ -16,7 +16,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
-from math import cos, hypot, isfinite, pi, sin
+from math import cos, isfinite, pi, sin
 from types import MappingProxyType
 from typing import Any
 
@@ -29,6 +29,7 @@ from linkwork.five_bar.parameters import FiveBarParameters
 from ..numerics.fourier import FourierSeries
 from ..units import in_si
 from .kernels import PLACES, coupler_path, coupler_path_jacobian, link_directions, link_jacobian
+from .masses import bodies, on_line
 
 FloatArray = NDArray[np.float64]
 
@@ -481,53 +482,31 @@ class Linkage:
             raise ParameterError("rocker_length", 0.0, "be greater than zero: the five-bar slider is no slider-crank")
         if isinstance(self.pivot, SecondCrank):
             raise ParameterError("pivot", self.pivot, "be fixed or a slider: the plant has no second crank")
-        line = density * width * thickness
-
-        def bar(length: float) -> tuple[float, float]:
-            """Mass, and moment of inertia about the centre."""
-            mass = line * length
-            return mass, mass * (length * length + width * width) / 12.0
-
-        m2, i2 = bar(self.crank_length)
-        m4, i4 = bar(self.rocker_length)
-        m3, i3 = bar(self.coupler_length)
-        x, y = 0.5 * self.coupler_length, 0.0
-        r = self.point_distance
-        if r > 0.0 and abs(sin(self.point_angle)) * r > 1e-9 * self.coupler_length:
-            extra, inertia = bar(r)
-            px, py = 0.5 * r * cos(self.point_angle), 0.5 * r * sin(self.point_angle)
-            total = m3 + extra
-            gx, gy = (m3 * x + extra * px) / total, (m3 * y + extra * py) / total
-            i3 = i3 + m3 * ((x - gx) ** 2 + (y - gy) ** 2) + inertia + extra * ((px - gx) ** 2 + (py - gy) ** 2)
-            m3, x, y = total, gx, gy
-        elif r > 0.0:
-            # along the coupler: one bar over all of it
-            end = r * cos(self.point_angle)
-            low, high = min(0.0, end), max(self.coupler_length, end)
-            m3, i3 = bar(high - low)
-            x = 0.5 * (low + high)
+        r, a2 = self.point_distance, self.point_angle
+        straight = on_line(self.coupler_length, r, a2)
+        made = bodies(
+            self.crank_length,
+            self.coupler_length,
+            self.rocker_length,
+            r,
+            a2,
+            density * width * thickness,
+            width,
+            straight,
+        )
         return FiveBarParameters(
             ground_length=self.ground_length,
             crank_length=self.crank_length,
             coupler_length=self.coupler_length,
             rocker_length=self.rocker_length,
-            crank_mass=m2,
-            coupler_mass=m3,
-            rocker_mass=m4,
             slider_mass=density * 32.0 * width * width * thickness if slider_mass is None else slider_mass,
-            crank_inertia=i2 + m2 * (0.5 * self.crank_length) ** 2,
-            coupler_inertia=i3,
-            rocker_inertia=i4,
-            crank_cog_distance=0.5 * self.crank_length,
-            coupler_cog_distance=hypot(x, y),
-            coupler_cog_angle=float(np.arctan2(y, x)),
-            rocker_cog_distance=0.5 * self.rocker_length,
+            **made,
             slider_guide_angle=0.0 if self.pivot is None else self.pivot.guide_angle,
             slider_stiffness=slider_stiffness,
             slider_damping=slider_damping,
             slider_coulomb_friction=slider_coulomb_friction,
             coupler_point_distance=r,
-            coupler_point_angle=self.point_angle,
+            coupler_point_angle=a2,
             gravity=gravity,
             ground_inclination=self.ground_angle,
             assembly_branch=self.branch,

@@ -137,7 +137,15 @@ def polish(
         best = [*given, *distinct(kept, ONWARDS, pivot)]
         kept, interrupted = over_cores(step("onwards"), best, search, normal.quality)
     elif not interrupted:
+        if limits.along:
+            kept = distinct(kept, ONWARDS, pivot)
         kept = [*map(worker.finish, kept[:FINISHED]), *kept[FINISHED:]]
+    if limits.least is not None and not interrupted:
+        best = distinct(kept_of(kept) or kept_of(found), ONWARDS, pivot)
+        kept, interrupted = over_cores(step("least"), best, search, limits.least.along.name)
+        found = [*(answer for answer in found if not answer.feasible), *kept] if kept else found
+    elif limits.along:
+        kept = [answer for answer in kept if worker.kept(answer.start).feasible]
     return Polished.of(found, kept_of(kept), interrupted, begun)
 
 
@@ -247,6 +255,26 @@ class Polisher:
                 answer = longer
         last = self.program("squares", exact=True)
         return last.exact(answer, lambda start, places: last.solve(start, places=places))
+
+    def least(self, answer: Answer) -> Answer:
+        """From a small error to what is made small in its place."""
+        program = self.program("least", exact=True)
+        size = program.greatest(answer.start)
+        found = program.solve(answer.start, size=size)
+        solve: Callable[..., Answer] = partial(program.solve, size=size)
+        if self.normal.outline is not None:
+            # at stations first, then of the whole curves
+            refinement = Refinement(self.program("least curve", exact=True))
+            program = refinement.program
+
+            def solve(start: Start, *, places: Sequence[FloatArray] | None = None) -> Answer:
+                return refinement.refined(replace(answer, start=start), places=places, size=size)
+
+            for begin in [found.start, answer.start] if found.feasible else [answer.start]:
+                found = solve(begin)
+                if found.feasible:
+                    break
+        return program.exact(found, lambda start, places: solve(start, places=places)) if found.feasible else found
 
     def onwards(self, answer: Answer) -> Answer:
         """From least squares to the area, or to the greatest error."""

@@ -11,7 +11,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import cached_property
 from itertools import product
-from math import acos, cos, degrees, inf, isfinite, pi
+from math import acos, cos, degrees, hypot, inf, isfinite, pi
 from types import SimpleNamespace
 from typing import Any, Literal, NamedTuple
 
@@ -23,15 +23,15 @@ from linkwork.errors import InputError
 from ..mechanisms import FIVE_BAR
 from ..numerics import symbolic
 from ..run import traced as equations
-from .constraints import TURNING, UNKNOWNS, Limits, half_planes
+from .constraints import TURNING, UNKNOWNS, Along, Least, Limits, Require, half_planes
 from .kernels import guided
 from .linkage import BY_SHORTEST, geared, transmission_excess
 from .starts import Answer, CrankUnknown, PivotUnknown, SliderUnknown, Start, inside, outside, pivot_bounds, pivot_size
 from .tasks import Normal, turn
-from .user_functions import physical, traced
+from .user_functions import peaks_of, physical, traced
 
 FloatArray = NDArray[np.float64]
-Objective = Literal["squares", "worst", "transmission", "curve"]
+Objective = Literal["squares", "worst", "transmission", "curve", "least", "least curve"]
 
 #: Crank rotations at which a moving pivot's assembly, speed and acceleration are held within their limits, and what is added
 #: to the least transmission angle for what is between them (rad).
@@ -42,6 +42,7 @@ MARGIN = 1e-4
 FOLLOWING: dict[str, dict[str, Any]] = {
     "squares": {"mu_strategy": "adaptive"},
     "transmission": {"mu_strategy": "adaptive"},
+    "least": {"mu_strategy": "adaptive"},
     "worst": {"mu_strategy": "monotone", "mu_init": 1e-5, "bound_push": 1e-8, "bound_frac": 1e-8},
 }
 #: Iterations of IPOPT: most optima are reached in a hundred, or in many.
@@ -52,10 +53,16 @@ ADVANCE = 1e-3
 LEAST_WAY = 1e-3
 #: Greatest, in even ones: in a wider gap the coupler point could wander off unseen between two stations.
 GAP = 8.0
+#: Objectives in the place of an error.
+SOUGHT = ("least", "least curve")
+#: What the bound of the greatest error is called; share of it by which an error of zero has a slope.
+ERROR, SMOOTH = "bound of the greatest error", 1e-3
 #: How far a constraint may be exceeded and yet be kept: units, rad, or a share of the bound.
 KEPT = 1e-7
 #: Share of the bounds of the pivot's motion that is left free at its extremes, and how often these are looked for again.
 HELD, ROUNDS = 2e-7, 6
+#: Rotations beside the given ones at which what holds all along is held: its greatest values in the solution before.
+FURTHER = 8
 
 
 class Label(NamedTuple):
@@ -85,10 +92,11 @@ class Program:
     limits : Limits
     pivot : PivotUnknown, optional
         Lengths in m, as the task; None of a fixed pivot.
-    objective : "squares", "worst", "transmission" or "curve"
+    objective : "squares", "worst", "transmission", "curve", "least" or "least curve"
         Weighted squared errors; the greatest weighted error, as the least bound of all; the least transmission angle, greatest,
         with the stations met exactly; or nothing but the constraints of a path, for `analysis.synthesis.refine`, whose measure
-        needs no stations: of their rotations only the ends of an open path and of its straight part are unknown.
+        needs no stations: of their rotations only the ends of an open path and of its straight part are unknown. The
+        last two are what the limits make small in the place of an error, with stations and without.
     exact : bool
         Whether bounds of the pivot's motion can be held at its extremes, see `exact`; without, a first search is quicker.
     """
@@ -114,6 +122,8 @@ class Program:
         self._peaks: list[tuple[int, Any, Any]] = []
         self._held = 2 * pivot.harmonics if pivot is not None and exact else 0
         self._bent: list[Any] = []
+        #: What holds all along the crank's rotation, and the further rotations at which it is held.
+        self._along: list[tuple[Along, Any]] = []
         self._constraints: list[tuple[Any, float, float, Label]] = []
         self.knots: list[int] = list(range(normal.n))
         self._solvers: dict[tuple[int, bool], Any] = {}
@@ -127,12 +137,13 @@ class Program:
         v = self._unknown("v", *pivot_bounds(pivot, normal.unit))
         phi: Any = casadi.DM(normal.rotation) if normal.timed else None
         knots: Any = None
-        if not normal.timed and objective != "curve":
+        self._whole = objective in ("curve", "least curve")
+        if not normal.timed and not self._whole:
             phi = self._unknown("phi", np.full(normal.n, -inf), np.full(normal.n, inf))
             self._ordered(phi, direction)
         elif not normal.timed:
             phi, knots = self._way_of_path(direction)
-        p = SimpleNamespace(**{name: q[k] for k, name in enumerate(UNKNOWNS)})
+        p = SimpleNamespace(**{name: q[k] for k, name in enumerate(UNKNOWNS)}, branch=branch)
         self._phi = phi
         self._point_at: Callable[[Any], Any] = lambda at: self._closed(p, v, at, branch)[1]
         self._ends = (0.0, 2.0 * pi) if normal.closed or knots is None else (knots[0], knots[-1])
@@ -153,15 +164,18 @@ class Program:
                 y = y + p.ground_length * casadi.sin(p.ground_angle)
             self._at_most(casadi.mtimes(plane, casadi.vertcat(x, y, 1.0)), f"region of pivot {name}")
         for require in limits.requires:
-            value = traced(require, physical(p, normal.unit, normal.origin)) / require.scale
-            self._within(value, 0.0 if require.equal else -inf, 0.0, require.name, "", require.scale)
+            value = self._traced(require, p) / require.scale
+            self._within(value, 0.0 if require.equal else -inf, 0.0, require.name, require.unit, require.scale)
         if isinstance(pivot, SliderUnknown):
             quality = quality + self._slider(pivot, p.ground_length, v)
         if isinstance(pivot, CrankUnknown) and isfinite(pivot.speed):
             self._bounded(
                 lambda x: _series(casadi, v[2:], x, mean=False, order=1) / pivot.speed, 1, "speed of the second crank"
             )
-        peaks = [symbol for _, *both in self._peaks for symbol in both]
+        peaks = [
+            *(symbol for _, *both in self._peaks for symbol in both),
+            *(casadi.vec(further) for _, further in self._along),
+        ]
         parameters = casadi.vertcat(
             branch, direction, size, self._share, *peaks, *(casadi.vec(x) for x in (grashof, *planes))
         )
@@ -183,6 +197,29 @@ class Program:
         """A new unknown that stands for a greatest value or the middle of a range, with what it is at a start."""
         self._initial.append(initial)
         return self._unknown(name, np.array([low]), np.array([high]))
+
+    @property
+    def least(self) -> Least:
+        """What is made small in the place of an error."""
+        assert self.limits.least is not None
+        return self.limits.least
+
+    def _traced(self, require: Require, p: Any) -> Any:
+        """The values of a required function; of one along the crank's rotation also at the rotations that parameters say."""
+        casadi, values = self._casadi, physical(p, self.normal.unit, self.normal.origin)
+        if not isinstance(require, Along):
+            return traced(require, values)
+        held = traced(require, values, casadi.DM(require.rotation))
+        if require.ends is None:
+            return casadi.vec(held)
+        places = casadi.SX.sym(f"places{len(self._along)}", FURTHER)
+        further = traced(require, values, places)
+        bends = casadi.SX.sym(f"bends{len(self._along)}", *further.shape)
+        self._along.append((require, casadi.horzcat(places, bends)))
+        # to second order the height of the peak next to each place, wherever it moves
+        ones = casadi.DM.ones(FURTHER)
+        slope = casadi.horzcat(*(casadi.jtimes(column, places, ones) for column in casadi.horzsplit(further)))
+        return casadi.vertcat(casadi.vec(held), casadi.vec(further + bends * slope**2))
 
     # Objective
 
@@ -240,7 +277,7 @@ class Program:
                 if value is not None:
                     self._within(value, 0.0, 0.0, "the stations", unit)
             return quality
-        if self.objective != "curve":
+        if not self._whole:
             squares: Any = 0.0 if ex is None else ex**2 + ey**2
             if turned is not None:
                 squares = squares + (normal.leverage * turned) ** 2
@@ -250,6 +287,15 @@ class Program:
             greatest = self._extra("greatest", casadi.sqrt(casadi.mmax(squares)) / size, 0.0)
             self._at_most(squares / size**2 - greatest**2, "greatest error", "")
             return greatest
+        if self.objective in SOUGHT:
+            if not self._whole:
+                most = self.least.error
+                smooth = casadi.sqrt(squares + (SMOOTH * most) ** 2) - most * hypot(1.0, SMOOTH)
+                self._at_most(smooth / most, ERROR, "deg" if normal.of_rocker else "mm", self._in_words(most))
+            values = self._traced(self.least.along, p)
+            greatest = self._extra("greatest", casadi.mmax(values) / size, 0.0)
+            self._at_most(values / size - greatest, self.least.along.name, "")
+            return greatest + (self._straight_part(p, v, phi, branch, ex, ey) if self._whole else 0.0)
         return quality + self._straight_part(p, v, phi, branch, ex, ey)
 
     def _straight_part(self, p: Any, v: Any, phi: Any, branch: Any, ex: Any, ey: Any) -> Any:
@@ -262,7 +308,7 @@ class Program:
         line /= abs(line)
         spent = phi[straight.end] - phi[straight.start]
         self._within(spent, -straight.rotation, straight.rotation, "crank rotation of the straight part", "deg")
-        if self.objective == "curve":
+        if self._whole:
             # its ends lie across from where the target's are
             for k in (straight.start, straight.end):
                 self._within(ex[k] * line.real + ey[k] * line.imag, 0.0, 0.0, "ends of the straight part")
@@ -279,6 +325,15 @@ class Program:
         return 0.0
 
     # Constraints
+
+    def _in_words(self, share: float) -> float:
+        """Factor of an error in shares of something in units, to mm or degrees."""
+        return share * (degrees(1.0) if self.normal.of_rocker else 1e3 * self.normal.unit)
+
+    def excess(self, violation: float) -> dict[str, Any]:
+        """What an `Answer` says whose greatest error is too large by that (units)."""
+        label = Label(ERROR, self._in_words(1.0), "deg" if self.normal.of_rocker else "mm")
+        return {"violation": violation, "worst": ERROR, "excess": label.measured(violation, np.empty(0))}
 
     def _within(
         self, value: Any, low: float, high: float, name: str, unit: str = "mm", factor: float | None = None
@@ -525,6 +580,15 @@ class Program:
         f = self.stated(*self.at(start))[0]
         return f if isfinite(f) else inf
 
+    @property
+    def own(self) -> int:
+        """Place of the unknown that stands for the greatest value of what is made small in the place of an error."""
+        return len(self.low) - len(self._initial)
+
+    def greatest(self, start: Start) -> float:
+        """What is made small in the place of an error, at a start."""
+        return float(np.asarray(self._begin(*self.at(start))).ravel()[0])
+
     def at(
         self,
         start: Start,
@@ -548,14 +612,17 @@ class Program:
             direction = float(np.sign(start.rotation[-1] - start.rotation[0]) or 1.0)
         z = np.concatenate([*known, np.zeros(len(self._initial))])
         harmonics = 0 if self.pivot is None else self.pivot.harmonics
+        count = len(self._peaks)
+        along = [np.zeros(further.shape) for _, further in self._along] if places is None else places[count:]
         if share is None:
             share = cos(pi * harmonics / max(GRID, 16 * harmonics)) if places is None else 1.0 - HELD
-        held = [np.zeros(self._held)] * len(self._peaks) if places is None else places
+        held = [np.zeros(self._held)] * count if places is None else places[:count]
         chosen = [nearest[0] for nearest in self.nearest_pieces(z)] if pieces is None else pieces
         parameters = np.concatenate(
             [
                 [float(start.branch), direction, size, share],
                 *(part for own in held for part in (own, np.zeros(self._held))),
+                *(own.ravel(order="F") for own in along),
                 _grashof_rows(self.limits.grashof, z[2:6]).ravel(order="F"),
                 *(half_planes(triangles[k]).ravel(order="F") for (_, triangles), k in zip(self.limits.regions, chosen)),
             ]
@@ -616,7 +683,7 @@ class Program:
         over = np.maximum(self.g_low - g, g - self.g_high) if np.isfinite(g).all() else np.full(len(g), inf)
         violation = float(over.max(initial=0.0))
         worst = self.labels[int(np.argmax(over))] if len(over) else None
-        ended = self.start_at(z, start, f * (float(parameters[2]) if self.objective == "worst" else 1.0))
+        ended = self.start_at(z, start, f * (float(parameters[2]) if self.objective in ("worst", *SOUGHT) else 1.0))
         return Answer(
             start=ended,
             feasible=violation <= KEPT and bool(np.isfinite(z).all()) and isfinite(ended.quality),
@@ -655,27 +722,32 @@ class Program:
 
     def exact(self, answer: Answer, solve: Callable[[Start, Sequence[FloatArray]], Answer]) -> Answer:
         """Solve again and again with the bounds of the pivot's motion held at its extremes, until these stay where they are."""
-        if not self._peaks:
+        if not (self._peaks or self._along):
             return answer
+        first = self.kept(answer.start) if self._along else answer
+        least = first if self.objective in SOUGHT else answer
 
         def better(found: Answer) -> Answer:
-            return found if found.start.quality <= answer.start.quality else answer
+            return found if not first.feasible or found.start.quality <= least.start.quality else answer
 
         now = answer
         for _ in range(ROUNDS):
             following = solve(now.start, self.extremes(now.start))
             if not following.feasible:
-                return answer
+                return replace(answer, feasible=first.feasible)
             now, before = following, now
             kept = self.kept(now.start)
-            if kept.feasible and np.abs(now.start.pivot - before.start.pivot).max() <= KEPT:
+            if kept.feasible and np.abs(now.start.pivot - before.start.pivot).max(initial=0.0) <= KEPT:
                 return better(now)
-        return better(now) if kept.feasible else answer
+        return better(now) if kept.feasible else replace(answer, feasible=first.feasible)
 
     def extremes(self, start: Start) -> list[FloatArray]:
-        """Where the pivot's motion, or a derivative of it, has its extremes: the angles of the roots of the next one."""
+        """Where the pivot's motion, or a derivative of it, has its extremes: the angles of the roots of the next one.
+
+        Then where what holds along the crank's rotation has its greatest values.
+        """
         if not self._peaks:
-            return []
+            return self._greatest(start)
         harmonics = np.arange(1, self.pivot.harmonics + 1) if self.pivot else np.empty(0)
         waves = 0.5 * (start.pivot[2::2] - 1j * start.pivot[3::2])
         found = []
@@ -685,7 +757,13 @@ class Program:
             places = np.zeros(2 * len(harmonics))
             places[: len(roots)] = np.angle(roots)
             found.append(places)
-        return found
+        return found + self._greatest(start)
+
+    def _greatest(self, start: Start) -> list[FloatArray]:
+        """The rotations at which each function that holds along them has its greatest values; see `peaks_of`."""
+        values = dict(zip(UNKNOWNS, start.q.tolist())) | {"branch": float(start.branch)}
+        p = physical(SimpleNamespace(**values), self.normal.unit, self.normal.origin)
+        return [peaks_of(along, p, FURTHER) for along, _ in self._along]
 
 
 def _series(casadi: Any, coefficients: Any, x: Any, *, mean: bool = True, order: int = 0) -> Any:

@@ -18,12 +18,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import isotonic_regression, minimize
 
+from .areas import hausdorff
 from .constraints import UNKNOWNS
 from .overlap import nearest, symmetric_difference
 from .program import Program
 from .solution import CURVE
 from .starts import Answer, Start
-from .targets import ring
+from .targets import TargetPath, ring
 
 FloatArray = NDArray[np.float64]
 Made = TypeVar("Made")
@@ -38,6 +39,8 @@ PIECES = 360
 STRIDE, GREAT = 3, 0.5
 #: Way of the first station from where it was, and rotation by which successive stations are kept apart (rad).
 WINDOW, APART = 0.6, 1e-10
+#: Share of the bound of the greatest distance by which it may be exceeded: its places on the curve change from step to step.
+WITHIN = 1e-5
 #: Where the crank begins to turn says nothing of a closed curve.
 PHASE = UNKNOWNS.index("crank_phase")
 
@@ -68,6 +71,9 @@ class Refinement:
         self.program, normal = program, program.normal
         self.normal = normal
         assert normal.outline is not None
+        #: Bound of the greatest distance, where what the program makes small is something else.
+        self.limit = program.least.error if program.objective == "least curve" else None
+        self._target = TargetPath(points=_rows(normal.outline).T, closed=normal.closed)
         self._shares = np.linspace(0.0, 1.0, CURVE, endpoint=not normal.closed)
         self._trace = program.trace.map(CURVE)
         weights = normal.outline_weights
@@ -79,6 +85,8 @@ class Refinement:
         self.free = np.nonzero(program.high > program.low)[0]
         if normal.closed and program.pivot is None:
             self.free = self.free[self.free != PHASE]
+        if self.limit is not None:
+            self.free = self.free[self.free != program.own]
 
     # The measure
 
@@ -135,29 +143,49 @@ class Refinement:
 
     # The way down
 
+    def value(self, z: FloatArray, parameters: FloatArray, curve: FloatArray) -> float:
+        """What is made small: the measure, or within its bound what the program has instead."""
+        if self.limit is None:
+            return self.measure(curve)
+        return self.program.stated(z, parameters)[0] if self.over(curve) <= WITHIN * self.limit else inf
+
+    def over(self, curve: FloatArray) -> float:
+        """By how much the greatest distance, as a path is judged by it, is over its bound (units)."""
+        if self.limit is None or not np.isfinite(curve).all():
+            return inf
+        return hausdorff(curve.T, self._target, closed=self.normal.closed) - self.limit
+
     def refined(
-        self, answer: Answer, *, iterations: int = ITERATIONS, places: Sequence[FloatArray] | None = None
+        self,
+        answer: Answer,
+        *,
+        iterations: int = ITERATIONS,
+        places: Sequence[FloatArray] | None = None,
+        size: float = 1.0,
     ) -> Answer:
         """The path with the least measure near an answer; the answer itself where nothing better keeps the constraints."""
         program = self.program
-        z0, parameters = program.at(answer.start, places=places)
+        z0, parameters = program.at(answer.start, places=places, size=size)
         curve, slopes = self.traced(z0, parameters)
-        first = self.measure(curve)
-        if not (np.isfinite(first) and np.isfinite(slopes).all()):
+        first = self.value(z0, parameters, curve)
+        if not (np.isfinite(self.measure(curve)) and np.isfinite(slopes).all()):
             return replace(answer, feasible=False)
         as_it_is = program.judged(z0, parameters, answer.start)
         best = [(first if as_it_is.feasible else inf, z0)]
 
         def seen(z: FloatArray) -> None:
-            value = self.measure(down.curve(z)[0])
+            value = self.value(z, parameters, down.curve(z)[0])
             if value < best[0][0] and program.judged(z, parameters, answer.start).feasible:
                 best[0] = (value, z)
 
         for some in self._rounds():
             z = best[0][1]
             curve, slopes = self.traced(z, parameters)
-            size = max(self.measure(curve), 1e-9)
-            down = _Descent(self, z, parameters, self._stretched(curve, slopes), size, some(curve))
+            scale = max(self.measure(curve), 1e-9)
+            if self.limit is not None:
+                # a path is judged at other places of the curves
+                scale *= self.limit / (self.limit + self.over(curve))
+            down = _Descent(self, z, parameters, self._stretched(curve, slopes), scale, some(curve))
             found = minimize(
                 down.value, down.begin(), jac=True, method="SLSQP", constraints=down.constraints(),
                 callback=lambda y, down=down: seen(down.unknowns(y)),
@@ -166,9 +194,11 @@ class Refinement:
             seen(down.unknowns(found.x))
         value, z = best[0]
         if not np.isfinite(value):
-            return replace(as_it_is, start=replace(answer.start, quality=first))
+            more = {} if self.limit is None or not as_it_is.feasible else program.excess(self.over(curve))
+            return replace(as_it_is, feasible=False, start=replace(answer.start, quality=first), **more)
         ended = program.judged(z, parameters, answer.start)
-        start = replace(ended.start, rotation=self.met(ended.start, z, parameters), quality=value)
+        quality = value if self.limit is None else ended.start.quality
+        start = replace(ended.start, rotation=self.met(ended.start, z, parameters), quality=quality)
         return replace(ended, start=start, converged=bool(found.success), iterations=int(found.nit))
 
     def _rounds(self) -> Sequence[Callable[[FloatArray], Sequence[Any]]]:
@@ -253,8 +283,12 @@ class _Descent:
     ) -> None:
         self._of, self._program = refinement, refinement.program
         self._z0, self._stretch, self._size = z0, size * stretch, size
+        if refinement.limit is not None:
+            # what is made small is a direction of its own
+            self._stretch = np.column_stack([self._stretch, np.eye(len(z0))[refinement.program.own]])
         self._some = some
-        self._bound = refinement.normal.quality == "worst"
+        self._held = refinement.normal.quality == "worst"
+        self._bound = self._held and refinement.limit is None
         # each is asked for again with the same unknowns, by the measure and by the constraints
         self.curve = _remembered(lambda z: refinement.traced(z, parameters))
         self._stated = _remembered(lambda z: refinement.program.stated(z, parameters))
@@ -278,8 +312,10 @@ class _Descent:
         curve, slopes = self.curve(z)
         if not (np.isfinite(curve).all() and np.isfinite(slopes).all()):
             return 1e3, np.zeros(len(y))
-        area, gradient = self._of.area(curve)
         added, _ = self._stated(z)
+        if self._of.limit is not None:
+            return added, self._steep(z)[0] @ self._stretch
+        area, gradient = self._of.area(curve)
         whole = np.einsum("an,ank->k", gradient, slopes) + self._steep(z)[0]
         return (area + added) / self._size, whole @ self._stretch / self._size
 
@@ -305,8 +341,10 @@ class _Descent:
             z = self._z0 + self._stretch @ y[: self._stretch.shape[1]]
             g = self._stated(z)[1]
             parts = [(g - low)[above], (high - g)[below], (z - program.low)[lower], (program.high - z)[upper]]
-            if self._bound:
-                parts += [y[-1] - near.distance[k] / self._size for near, k in self._near(z)]
+            if self._held:
+                # without a bound of its own among the unknowns the distances are within the size
+                bound = y[-1] if self._bound else 1.0
+                parts += [bound - near.distance[k] / self._size for near, k in self._near(z)]
             kept: FloatArray = np.nan_to_num(np.concatenate(parts), nan=-1e3, neginf=-1e3)
             return kept
 
@@ -315,7 +353,7 @@ class _Descent:
             j = self._steep(z)[1]
             eye = np.eye(len(z))
             rows = padded(np.vstack([j[above], -j[below], eye[lower], -eye[upper]]))
-            if not self._bound:
+            if not self._held:
                 return rows
             jacobian = self.curve(z)[1]
             parts = []
@@ -323,7 +361,7 @@ class _Descent:
                 grown = np.einsum("ak,akz->kz", near.early[:, k], jacobian[:, near.before[k]])
                 grown += np.einsum("ak,akz->kz", near.late[:, k], jacobian[:, near.after[k]])
                 part = padded(-grown / self._size)
-                part[:, -1] = 1.0
+                part[:, -1] = 1.0 if self._bound else part[:, -1]
                 parts.append(part)
             every: FloatArray = np.nan_to_num(np.vstack([rows, *parts]))
             return every

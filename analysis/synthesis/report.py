@@ -13,7 +13,11 @@ from .limit_positions import dead_centres, mechanical_advantage, time_ratio, tog
 from .linkage import ANGLES, Linkage, SecondCrank, SliderMotion, format_ratio
 from .sensitivity import ANGLE_STEP, PIVOT_ANGLES, costs, length_step, rounded, sensitivities
 from .solution import Solution, Verdicts
+from .solve import OVER
 from .tasks import RockerFunction, Task, UntimedPath
+
+#: Factor and unit in which a limit of a trade-off is written, by its SI unit.
+SHOWN = {"m": (1e3, "mm"), "rad": (degrees(1.0), "deg"), "N": (1.0, "N")}
 
 
 def quality_unit(task: Task) -> tuple[float, str]:
@@ -159,7 +163,8 @@ def format_transmission(verdicts: Verdicts) -> str:
 
 def format_limit(over: str, limit: float) -> str:
     """A limit of a trade-off with its unit."""
-    return f"{1e3 * limit:.6g} mm" if over == "size" else f"{degrees(limit):.4g} deg"
+    factor, unit = SHOWN[OVER[over].unit]
+    return f"{factor * limit:.6g} {unit}"
 
 
 def _stations(solution: Solution) -> list[list[str]]:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from math import isfinite
 from pathlib import Path
 from time import perf_counter
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -22,12 +22,14 @@ from .constraints import (
     SECOND_LENGTH,
     USUAL,
     Constraint,
+    Demand,
     InfeasibleError,
     LargestLink,
     LeastTransmission,
     Limits,
     limits_of,
 )
+from .forces import MaxPinForce
 from .kinds import GEARS, Kind, Stroke, as_asked, is_of, kind_of, limits_of_kinds, second_crank, usual_kinds
 from .linkage import ANGLES, UNITS, Linkage, SecondCrank
 from .polish import Polished, distinct, polish
@@ -168,6 +170,7 @@ def synthesize(
     kinds = usual_kinds(task) if kinds is None else kinds
     if isinstance(task, QuickReturn):
         return _in_closed_form(task, bounds, constraints, kinds, search, begun)
+    task = _as_sought(task, constraints, pivot, search)
     normal = fitted_form(task, pivot)
     every = limits_of_kinds(task, normal, bounds, constraints, kinds, gears)
     if tuple(kinds) != ("four-bar",) and (pivot is not None or search.method != "scan"):
@@ -200,7 +203,8 @@ def synthesize(
             break
     if refused is not None and not found:
         raise refused
-    return _result(task, _together(found, search.solutions), done, total, search, begun)
+    together = found[0] if len(found) == 1 else _together(found, search.solutions)
+    return _result(task, together, done, total, search, begun)
 
 
 def _in_closed_form(
@@ -273,6 +277,7 @@ def improve(
     if search.starts < 1 and not guesses:
         raise InputError(f"{search.starts} starts and no guess: there must be at least one of either")
     begun = perf_counter()
+    task = _as_sought(task, constraints, pivot, search)
     normal = fitted_form(task, pivot)
     limits = limits_of(task, normal, bounds, constraints)
     base, *begin = (_start(of, normal, pivot) for of in (linkage, *guesses))
@@ -286,6 +291,24 @@ def improve(
         for s in solutions_of(task, normal, limits, done, pivot, search.solutions)
     )
     return _result(task, found, done, len(begin), search, begun)
+
+
+def _as_sought(task: Task, constraints: Sequence[Any], pivot: PivotUnknown | None, search: Search) -> Task:
+    """The task as it is searched for: of the greatest error, where that is bounded and something else made small.
+
+    Raises
+    ------
+    InputError
+        If what is asked is about a four-bar, and the pivot moved, or the method can make nothing but errors small.
+    """
+    demands = [c for c in constraints if isinstance(c, Demand)] if isinstance(constraints, Sequence) else []
+    if demands and pivot is not None:
+        raise InputError(f"{type(demands[0]).__name__} is about a four-bar: its rocker pivot must be fixed")
+    if not any(c.seeks for c in demands):
+        return task
+    if search.method != "scan":
+        raise InputError(f"method {search.method!r} makes errors small and nothing else: use 'scan'")
+    return replace(task, objective="worst")
 
 
 def _result(
@@ -350,9 +373,15 @@ def solutions_of(
             )
             for a in answers
         )
-        return ranked([s for s in found if isfinite(s.error)])
+        there = [s for s in found if isfinite(s.error)]
+        if limits.least is not None:
+            # in the order of what is made small in the place of an error
+            return tuple(sorted(there, key=lambda s: not s.verdicts.sound))
+        return ranked(there)
 
     solutions = made(distinct(done.kept, 4 * count, pivot))
+    if limits.least is not None:
+        return solutions[:count]
     # what a search began with counts by itself where it is better than all that came of it
     first = made(done.begun)[:1]
     return (
@@ -422,9 +451,9 @@ class TradeOff:
     Attributes
     ----------
     over : str
-        ``size`` or ``transmission``.
+        What it is over, of `OVER`.
     limit : ndarray, shape (n,)
-        Largest link (m), or least transmission angle (rad).
+        Largest link (m), least transmission angle (rad), or greatest force on a pin (N).
     solutions : tuple of Solution or None
         The best at each; None where there is no linkage.
     """
@@ -442,14 +471,29 @@ class TradeOff:
     def columns(self) -> dict[str, list[float]]:
         """Each limit with the columns of its best linkage, as in `Synthesis.columns`; limits without one are left out."""
         there = [(float(limit), s) for limit, s in zip(self.limit, self.solutions) if s is not None]
-        unit = "largest link [m]" if self.over == "size" else "least transmission angle [rad]"
+        over = OVER[self.over]
         columns = columns_of([s for _, s in there])
         columns.pop("rank", None)
-        return {f"limit of {unit}": [limit for limit, _ in there], **columns}
+        return {f"limit of {over.name} [{over.unit}]": [limit for limit, _ in there], **columns}
 
     def to_csv(self, path: str | Path) -> Path:
         """Write `columns` to a CSV file."""
         return write_csv(path, self.columns())
+
+
+class Over(NamedTuple):
+    """What an error is traded for: what its limit is, SI unit, and whether a small limit is the tight one."""
+
+    name: str
+    unit: str
+    small: bool
+
+
+OVER: Mapping[str, Over] = {
+    "size": Over("largest link", "m", True),
+    "transmission": Over("least transmission angle", "rad", False),
+    "pin-force": Over("greatest pin force", "N", True),
+}
 
 
 class TradeOffInterrupted(Interrupted):
@@ -463,7 +507,7 @@ class TradeOffInterrupted(Interrupted):
 @in_si(bounds=UNITS)
 def trade_off(
     task: Task,
-    over: Literal["size", "transmission"],
+    over: Literal["size", "transmission", "pin-force"],
     limits: ArrayLike,
     bounds: Mapping[str, tuple[float, float]] | None = None,
     constraints: Sequence[Constraint | Stroke] = USUAL,
@@ -483,11 +527,12 @@ def trade_off(
     Parameters
     ----------
     task : Task
-    over : "size" or "transmission"
+    over : "size", "transmission" or "pin-force"
     limits : array_like, shape (n,)
-        Largest links (m), or least transmission angles (rad).
+        Largest links (m), least transmission angles (rad), or greatest forces on the pins (N).
     bounds, constraints, weights, pivot, kinds, gears
-        As for `synthesize`; the limit takes the place of a constraint of its own kind.
+        As for `synthesize`; the limit takes the place of a constraint of its own kind. Of pin forces a `MaxPinForce` among the
+        constraints says what is made and how it runs.
     search : Search
         As for `synthesize`, but for the candidates, at most 16384, and the solutions.
 
@@ -498,21 +543,26 @@ def trade_off(
     TradeOffInterrupted
         On Ctrl-C, with the best so far at each limit.
     """
-    kind = {"size": LargestLink, "transmission": LeastTransmission}.get(over)
+    if over not in OVER:
+        raise InputError(f"a trade-off over {over!r}: it must be one of {', '.join(OVER)}")
     values = np.array(limits, dtype=float)
-    if kind is None:
-        raise InputError(f"a trade-off over {over!r}: it must be 'size' or 'transmission'")
+    kind = {"size": LargestLink, "transmission": LeastTransmission, "pin-force": MaxPinForce}[over]
+    running = next((c for c in constraints if isinstance(c, MaxPinForce)), MaxPinForce(force=1.0))
     if values.ndim != 1 or len(values) < 2 or not np.isfinite(values).all():
         raise InputError("the limits of a trade-off must be finite numbers, at least two")
     rest = tuple(c for c in constraints if not isinstance(c, kind))
     first = replace(search, candidates=min(search.candidates, 1 << 14), solutions=3)
-    order = np.argsort(-values if over == "size" else values)
+    order = np.argsort(-values if OVER[over].small else values)
+
+    def limit(k: int) -> Constraint:
+        if over == "pin-force":
+            return replace(running, force=values[k])
+        return LargestLink(length=values[k]) if over == "size" else LeastTransmission(angle=values[k])
 
     def best(k: int, guesses: Sequence[Solution], back: bool) -> tuple[Solution, ...]:
-        limit: Constraint = LargestLink(length=values[k]) if over == "size" else LeastTransmission(angle=values[k])
         how = replace(first, starts=1, candidates=1 << 8) if back else first
         which: dict[str, Any] = {"pivot": pivot, "kinds": kinds, "gears": gears}
-        return synthesize(task, bounds, (*rest, limit), weights, guesses=guesses, search=how, **which).solutions
+        return synthesize(task, bounds, (*rest, limit(k)), weights, guesses=guesses, search=how, **which).solutions
 
     found, done = there_and_back(order.tolist(), best)
     result = TradeOff(over=over, limit=values, solutions=tuple(found.get(k) for k in range(len(values))))

@@ -14,8 +14,10 @@ import numpy as np
 from linkwork.errors import InputError
 
 from ..numerics import symbolic
-from .constraints import UNKNOWNS, Require
+from .constraints import UNKNOWNS, Along, FloatArray, Require
 
+#: Rotations among which the greatest values of a function are looked for.
+DENSE = 721
 #: What a function of the user's may take from `math` or NumPy.
 TRACED = (
     "sin", "cos", "tan", "asin", "acos", "atan", "atan2", "arcsin", "arccos", "arctan", "arctan2", "sinh", "cosh", "tanh",
@@ -41,8 +43,8 @@ def physical(p: SimpleNamespace, unit: float, origin: complex) -> SimpleNamespac
     return SimpleNamespace(**values)
 
 
-def traced(require: Require, values: SimpleNamespace) -> Any:
-    """Value of a function of the user's for CasADi symbols, what it takes from `math` or NumPy replaced by CasADi's.
+def traced(require: Require, values: SimpleNamespace, *rotation: Any) -> Any:
+    """Value of a function for CasADi symbols; what one of the user's takes from `math` or NumPy is replaced by CasADi's.
 
     Raises
     ------
@@ -50,6 +52,8 @@ def traced(require: Require, values: SimpleNamespace) -> Any:
         If it branches on its argument, or calls what CasADi cannot.
     """
     casadi = symbolic.library()
+    if require.symbolic:
+        return casadi.SX(require.function(values, *rotation))
     try:
         value = casadi.SX(_rebound(require.function, {})(values))
     except Exception as error:
@@ -64,6 +68,34 @@ def traced(require: Require, values: SimpleNamespace) -> Any:
             "math from the dimensions"
         )
     return value
+
+
+def peaks_of(along: Along, values: SimpleNamespace, count: int) -> FloatArray:
+    """Where a function along the crank's rotation has its greatest values, and how they are curved.
+
+    Returns
+    -------
+    ndarray, shape (count, 1 + n)
+        A rotation (rad), the greatest value first and again where there are fewer, and for each of the n values -1/2 over their
+        second derivative there, by which the height of a peak follows from a slope; 0 of what has no peak there.
+    """
+    assert along.ends is not None
+    rotation = np.linspace(*along.ends, DENSE)
+    columns = np.asarray(along.function(values, symbolic.library().DM(rotation))).reshape(DENSE, -1)
+    step, none = rotation[1] - rotation[0], [0.0] * columns.shape[1]
+    found: list[tuple[float, list[float]]] = []
+    for n, row in enumerate(np.nan_to_num(columns, nan=-np.inf).T):
+        inner = row[1:-1]
+        for k in np.nonzero((inner >= row[:-2]) & (inner > row[2:]) & np.isfinite(row[:-2] + row[2:]))[0]:
+            before, now, after = row[k : k + 3]
+            # the top of the parabola through three
+            curved = 2.0 * now - before - after
+            off = 0.5 * (after - before) / curved
+            bends = [*none[:n], 0.5 * step**2 / curved, *none[n + 1 :]]
+            found.append((now + 0.25 * off * (after - before), [rotation[k + 1] + off * step, *bends]))
+        found += [(row[end], [rotation[end], *none]) for end in (0, -1)]
+    places = [place for _, place in sorted(found, reverse=True)[:count]]
+    return np.array(places + places[:1] * (count - len(places)))
 
 
 def _rebound(value: Any, seen: dict[int, Any]) -> Any:

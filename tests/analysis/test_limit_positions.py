@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from math import acos, cos, pi, sqrt
+from math import acos, cos, pi, radians, sqrt
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,18 +13,29 @@ from hypothesis import strategies as st
 from analysis.numerics.fourier import FourierSeries
 from analysis.synthesis import (
     QUICK_SEARCH,
+    DeadCentre,
+    FullTurn,
+    InfeasibleError,
+    LargestLink,
     LeastTransmission,
     Linkage,
+    MechanicalAdvantage,
+    NoToggle,
     RockerFunction,
+    Search,
     SliderMotion,
+    Solution,
+    TargetPath,
     TimeRatio,
+    Toggle,
+    UntimedPath,
     dead_centres,
     mechanical_advantage,
     synthesize,
     time_ratio,
     toggles,
 )
-from linkwork.errors import ParameterError
+from linkwork.errors import InputError, ParameterError
 
 links = st.floats(0.05, 1.0)
 
@@ -127,3 +139,128 @@ def test_a_time_ratio_is_kept_by_the_search() -> None:
     assert ratio is not None
     assert 1.25 - 1e-6 <= ratio <= 1.4 + 1e-6
     assert held.error > free.error
+
+
+PHI = np.linspace(0.0, 2.0 * pi, 24, endpoint=False)
+SWING = RockerFunction(angle=1.6 + 0.6 * np.cos(PHI), rotation=PHI, mounting=True)
+WAY = np.linspace(0.0, radians(100.0), 11)
+PART = RockerFunction(angle=1.0 + 0.3 * WAY**2, rotation=WAY, mounting=True)
+CLEAR, ANY = LeastTransmission(angle=0.5), LeastTransmission(angle=0.0, over="task")
+FEW = Search(starts=4, candidates=1 << 12, solutions=3)
+
+
+def advantage(linkage: Linkage, rotation: Any) -> np.ndarray:
+    """By differences of the rocker's angle, which know nothing of velocity coefficients."""
+    phi = np.atleast_1d(np.asarray(rotation, dtype=float))
+    ahead, behind = (np.array([linkage.rocker_angle([at + step])[0] for at in phi]) for step in (1e-5, -1e-5))
+    with np.errstate(divide="ignore"):
+        found: np.ndarray = 2e-5 / np.abs((ahead - behind + pi) % (2.0 * pi) - pi)
+    return found
+
+
+def solutions(task: Any, *constraints: Any) -> tuple[Solution, ...]:
+    return synthesize(task, constraints=constraints, search=FEW).solutions
+
+
+@pytest.mark.parametrize(
+    "task", [SWING, UntimedPath(path=TargetPath(points=np.column_stack([np.cos(PHI), 0.5 * np.sin(PHI)]), closed=True))]
+)
+def test_a_least_advantage_holds_all_the_way(task: Any) -> None:
+    turn = np.linspace(0.0, 2.0 * pi, 2881)
+    constraints = (CLEAR, LargestLink(length=4.0)) if isinstance(task, UntimedPath) else (CLEAR,)
+    free = solutions(task, *constraints)[0]
+    bound = 1.2 * float(advantage(free.linkage, turn).min())
+    for s in solutions(task, *constraints, MechanicalAdvantage(least=bound)):
+        assert advantage(s.linkage, turn).min() >= bound * (1.0 - 1e-6)
+    best = solutions(task, *constraints, MechanicalAdvantage(least=bound))[0]
+    # between two of the rotations where it is held, too, and no more than asked
+    assert advantage(best.linkage, turn).min() == pytest.approx(bound, rel=1e-4)
+    assert best.error > free.error
+
+
+def test_an_advantage_at_crank_rotations() -> None:
+    at = np.radians([30.0, 200.0])
+    (best, *_) = solutions(SWING, CLEAR, MechanicalAdvantage(least=10.0, at=["30 deg", "200 deg"]))
+    assert advantage(best.linkage, at).min() == pytest.approx(10.0, rel=1e-3)
+    (best, *_) = solutions(SWING, CLEAR, MechanicalAdvantage(greatest=1.5, at="90 deg"))
+    assert float(advantage(best.linkage, 0.5 * pi)[0]) == pytest.approx(1.5, rel=1e-3)
+
+
+@pytest.mark.parametrize(("position", "at"), [("stretched", 20.0), ("folded", 160.0), ("stretched", (5.0, 12.0))])
+def test_a_dead_centre_is_where_it_is_asked(position: Any, at: Any) -> None:
+    asked = DeadCentre(at=tuple(np.radians(at)) if isinstance(at, tuple) else f"{at} deg", position=position)
+    for s in solutions(SWING, CLEAR, asked):
+        linkage, (low, high) = s.linkage, np.radians(at if isinstance(at, tuple) else (at, at))
+        found = []
+        for rest in dead_centres(linkage):
+            pins = {name: complex(*place) for name, place in linkage.pins(rest).items()}
+            along = ((pins["C"] - pins["B"]) / (pins["B"] - pins["A"])).real
+            if (along > 0.0) == (position == "stretched"):
+                found.append(rest)
+        assert any(low - 1e-6 <= rest + k * 2.0 * pi <= high + 1e-6 for rest in found for k in (-1, 0))
+
+
+@pytest.mark.parametrize(("position", "at"), [("stretched", 110.0), ("folded", (105.0, 115.0))])
+def test_a_toggle_is_where_it_is_asked(position: Any, at: Any) -> None:
+    low, high = np.radians(at if isinstance(at, tuple) else (at, at))
+    for s in solutions(PART, ANY, Toggle(at=(low, high), position=position)):
+        l3, l4 = s.linkage.coupler_length, s.linkage.rocker_length
+        reach = l3 + l4 if position == "stretched" else abs(l3 - l4)
+        found = []
+        for place in toggles(s.linkage):
+            th2 = place + s.linkage.crank_phase
+            distance = abs(s.linkage.ground_length - s.linkage.crank_length * np.exp(1j * th2))
+            if distance == pytest.approx(reach, rel=1e-6):
+                found.append(place)
+        assert any(low - 1e-6 <= place + k * 2.0 * pi <= high + 1e-6 for place in found for k in (-1, 0))
+
+
+def test_no_toggle_in_a_range() -> None:
+    begin, end = radians(-40.0), radians(150.0)
+    free, held = solutions(PART, ANY), solutions(PART, ANY, NoToggle(between=(begin, end)))
+
+    def inside(s: Solution) -> bool:
+        return any(begin <= at + k * 2.0 * pi <= end for at in toggles(s.linkage) for k in (-1, 0))
+
+    assert any(inside(s) for s in free)
+    assert not any(inside(s) for s in held)
+
+
+@pytest.mark.parametrize(
+    ("made", "message"),
+    [
+        (lambda: MechanicalAdvantage(least=2.0, greatest=1.0), "two numbers in order"),
+        (lambda: MechanicalAdvantage(least=2.0, at=[]), "finite numbers"),
+        (lambda: DeadCentre(at="3 mm"), "at is"),
+        (lambda: DeadCentre(at=(2.0, 1.0)), "in order"),
+        (lambda: DeadCentre(at=(0.0, 4.0)), "less than 3.142 rad apart"),
+        (lambda: Toggle(at=1.0, position="bent"), "stretched, folded"),
+        (lambda: NoToggle(between="a while"), "between is"),
+    ],
+)
+def test_what_is_not_usable_is_refused(made: Any, message: str) -> None:
+    with pytest.raises(ParameterError, match=message):
+        made()
+
+
+@pytest.mark.parametrize(
+    ("task", "constraint", "error", "message"),
+    [
+        (SWING, Toggle(at=1.0), InfeasibleError, "cannot turn fully"),
+        (
+            UntimedPath(path=TargetPath(points=[[0, 0], [1, 0], [1, 1]], closed=True)),
+            DeadCentre(at=1.0),
+            InputError,
+            "gives none",
+        ),
+        (
+            UntimedPath(path=TargetPath(points=[[0, 0], [1, 0], [1, 1]], closed=True)),
+            MechanicalAdvantage(least=1.0, at=[0.3]),
+            InputError,
+            "gives none",
+        ),
+    ],
+)
+def test_what_contradicts_the_task_is_refused(task: Any, constraint: Any, error: Any, message: str) -> None:
+    with pytest.raises(error, match=message):
+        solutions(task, FullTurn(), constraint)

@@ -1,0 +1,295 @@
+"""Pin forces in the synthesis: the traced plant and its compiled run against Lagrange multipliers, bounds and objective."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from math import cos, hypot, pi, radians, sin
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from analysis.numerics import symbolic
+from analysis.numerics.fourier import FourierSeries
+from analysis.synthesis import (
+    LargestLink,
+    LeastPinForce,
+    LeastTransmission,
+    Linkage,
+    Make,
+    MaxPinForce,
+    RockerFunction,
+    Search,
+    SliderMotion,
+    SliderUnknown,
+    Solution,
+    TargetPath,
+    TimedPath,
+    UntimedPath,
+    pin_forces,
+    synthesize,
+    trade_off,
+    turn,
+)
+from analysis.synthesis.constraints import InfeasibleError, Way
+from analysis.synthesis.forces import pin_functions
+from linkwork.errors import InputError, ParameterError
+from linkwork.five_bar.parameters import FiveBarParameters
+from tests.oracles import multipliers
+
+LINKAGE = Linkage(
+    pivot_x=0.1,
+    pivot_y=-0.2,
+    ground_length=0.25,
+    crank_length=0.07,
+    coupler_length=0.2,
+    rocker_length=0.18,
+    point_distance=0.15,
+    point_angle=0.7,
+    ground_angle=2.1,
+    crank_phase=0.4,
+    branch=-1,
+)
+MAKE = Make(speed="240 rpm", load=("3 N", "-15 N"), width="30 mm", thickness="8 mm", density=2700.0, rocker_mass=0.4)
+PHI = turn(24)
+ELLIPSE = np.column_stack([0.20 + 0.06 * np.cos(PHI), 0.15 + 0.03 * np.sin(PHI)])
+TASK = TimedPath(points=ELLIPSE)
+USUAL = (LargestLink(length=0.3), LeastTransmission())
+FEW = Search(starts=3, candidates=1 << 12)
+
+
+def particles(bars: list[tuple[complex, float]], line: float, width: float) -> tuple[float, complex, float]:
+    """Mass, centre and moment of inertia about it of bars from the origin, each cut into small pieces."""
+    n, m = 400, 40
+    masses, places = [], []
+    for end, length in bars:
+        along, across = np.meshgrid((np.arange(n) + 0.5) / n, ((np.arange(m) + 0.5) / m - 0.5) * width)
+        places.append((end * along + 1j * end / abs(end) * across).ravel())
+        masses.append(np.full(n * m, line * length / (n * m)))
+    mass, place = np.concatenate(masses), np.concatenate(places)
+    centre = complex(mass @ place / mass.sum())
+    return float(mass.sum()), centre, float(mass @ np.abs(place - centre) ** 2)
+
+
+def plant(linkage: Linkage, make: Make) -> FiveBarParameters:
+    """The plant with masses of the oracle's own, its slider so heavy that it stands still."""
+    line = make.density * make.width * make.thickness
+
+    def bar(length: float) -> tuple[float, complex, float]:
+        return particles([(complex(length), length)], line, make.width)
+
+    m2, g2, i2 = bar(linkage.crank_length)
+    m4, g4, i4 = bar(linkage.rocker_length)
+    if make.rocker_mass is not None:
+        m4, i4 = make.rocker_mass, i4 * make.rocker_mass / m4
+    r = linkage.point_distance
+    aside = [(r * np.exp(1j * linkage.point_angle), r)] if r else []
+    m3, g3, i3 = particles([(complex(linkage.coupler_length), linkage.coupler_length), *aside], line, make.width)
+    return FiveBarParameters(
+        ground_length=linkage.ground_length,
+        crank_length=linkage.crank_length,
+        coupler_length=linkage.coupler_length,
+        rocker_length=linkage.rocker_length,
+        crank_mass=m2,
+        coupler_mass=m3,
+        rocker_mass=m4,
+        slider_mass=1e7,
+        crank_inertia=i2 + m2 * abs(g2) ** 2,
+        coupler_inertia=i3,
+        rocker_inertia=i4,
+        crank_cog_distance=abs(g2),
+        coupler_cog_distance=abs(g3),
+        coupler_cog_angle=float(np.angle(g3)),
+        rocker_cog_distance=abs(g4),
+        coupler_point_distance=r,
+        coupler_point_angle=linkage.point_angle,
+        gravity=make.gravity,
+        ground_inclination=linkage.ground_angle,
+        assembly_branch=linkage.branch,
+    )
+
+
+def by_multipliers(linkage: Linkage, make: Make, rotation: float) -> np.ndarray:
+    """Magnitudes of the forces on the pins A to D."""
+    p = plant(linkage, make)
+    q = multipliers.assemble(p, rotation + linkage.crank_phase, 0.0)
+    qd = multipliers.rates(p, q, make.speed, 0.0)
+    c, s = cos(linkage.ground_angle), sin(linkage.ground_angle)
+    x, y = make.load
+    load = c * x + s * y, c * y - s * x
+    held = p.slider_mass * p.gravity * s
+    found = multipliers.solve_multipliers(p, q, qd, slider_force=held, load=load, crank_acceleration=0.0)
+    return np.array([hypot(found.forces[f"pin.{pin}.fx"], found.forces[f"pin.{pin}.fy"]) for pin in "ABCD"])
+
+
+def traced(linkage: Linkage, make: Make, rotation: float, **other: Any) -> np.ndarray:
+    d = SimpleNamespace(**linkage.values() | other)
+    found = pin_functions(d, make, symbolic.library().DM(rotation + linkage.crank_phase))
+    return np.array([hypot(float(x), float(y)) for x, y in found.values()])
+
+
+@pytest.mark.parametrize("change", [{}, {"branch": 1, "ground_angle": -0.6}, {"point_distance": 0.0}])
+def test_the_run_of_the_plant_and_its_trace_have_the_forces_of_multipliers(change: dict[str, Any]) -> None:
+    linkage = replace(LINKAGE, **change)
+    run = pin_forces(linkage, MAKE)
+    assert run.moved < 1e-6
+    for k in (0, 100, 333, 600):
+        wanted = by_multipliers(linkage, MAKE, float(run.rotation[k]))
+        # the particles of the oracle's bars are cut to a 400th
+        assert run.force[k] == pytest.approx(wanted, rel=2e-5)
+        assert traced(linkage, MAKE, float(run.rotation[k])) == pytest.approx(run.force[k], rel=1e-6)
+    assert run.greatest == run.force.max() == run.of("ABCD")
+    assert run.force[np.argmin(np.abs(run.rotation - run.at)), "ABCD".index(run.pin)] == run.greatest
+    assert run.of("C") == run.force[:, 2].max()
+
+
+@pytest.mark.parametrize("name", ["ground_length", "crank_length", "coupler_length", "rocker_length", "point_distance"])
+def test_derivatives_by_dimensions_are_those_of_the_oracle(name: str) -> None:
+    casadi = symbolic.library()
+    x = casadi.SX.sym("x")
+    d = SimpleNamespace(**LINKAGE.values() | {name: x})
+    found = pin_functions(d, MAKE, casadi.DM(1.3 + LINKAGE.crank_phase))
+    force = casadi.vertcat(*(casadi.sqrt(fx**2 + fy**2) for fx, fy in found.values()))
+    slope = casadi.Function("slope", [x], [casadi.jacobian(force, x)])(getattr(LINKAGE, name))
+    ahead, behind = (
+        by_multipliers(replace(LINKAGE, **{name: getattr(LINKAGE, name) + step}), MAKE, 1.3) for step in (1e-5, -1e-5)
+    )
+    assert np.asarray(slope).ravel() == pytest.approx((ahead - behind) / 2e-5, rel=2e-4, abs=1e-2)
+
+
+def test_a_point_on_the_line_of_the_coupler_makes_one_bar() -> None:
+    """As `Linkage.to_five_bar`: the bar from B over all of the coupler."""
+    linkage = replace(LINKAGE, point_angle=pi, point_distance=0.05)
+    run = pin_forces(linkage, MAKE)
+    d = SimpleNamespace(**linkage.values())
+    found = pin_functions(d, MAKE, symbolic.library().DM(linkage.crank_phase + float(run.rotation[50])), straight=True)
+    assert [hypot(float(x), float(y)) for x, y in found.values()] == pytest.approx(run.force[50], rel=1e-6)
+
+
+@pytest.fixture(scope="module", name="free")
+def make_free() -> Solution:
+    return synthesize(TASK, constraints=USUAL, search=FEW).best
+
+
+class TestBound:
+    @pytest.mark.parametrize("objective", ["error", "worst"])
+    def test_no_pin_carries_more(self, free: Solution, objective: Any) -> None:
+        bound = 0.8 * pin_forces(free.linkage, MAKE).greatest
+        task = replace(TASK, objective=objective)
+        found = synthesize(task, constraints=[*USUAL, MaxPinForce(force=bound, make=MAKE)], search=FEW)
+        for s in found.solutions:
+            assert pin_forces(s.linkage, MAKE).greatest <= bound * (1.0 + 1e-6)
+        # the bound is used, and paid for
+        assert pin_forces(found.best.linkage, MAKE).greatest == pytest.approx(bound, rel=1e-4)
+        assert found.best.error > 1.01 * free.error
+
+    def test_of_a_path(self) -> None:
+        path = UntimedPath(path=TargetPath(points=ELLIPSE, closed=True))
+        free = synthesize(path, constraints=USUAL, search=FEW).best
+        bound = 0.8 * pin_forces(free.linkage, MAKE).of("AD")
+        asked = MaxPinForce(force=bound, make=MAKE, pins="AD")
+        found = synthesize(path, constraints=[*USUAL, asked], search=FEW).best
+        assert pin_forces(found.linkage, MAKE).of("AD") == pytest.approx(bound, rel=1e-3)
+        assert pin_forces(found.linkage, MAKE).of("AD") <= bound * (1.0 + 1e-6)
+
+    def test_one_that_cannot_be_kept_is_named_with_its_unit(self) -> None:
+        with pytest.raises(InfeasibleError, match=r"the force on the pins by [0-9.]+ N"):
+            synthesize(TASK, constraints=[*USUAL, MaxPinForce(force="1 N", make=MAKE)], search=replace(FEW, starts=1))
+
+    def test_a_swinging_crank_over_the_way_of_the_task(self) -> None:
+        at = np.linspace(0.0, radians(80.0), 9)
+        task = RockerFunction(angle=1.0 + 0.3 * at**2, rotation=at, mounting=True)
+        constraints = [LeastTransmission(angle=0.6, over="task")]
+        free = synthesize(task, constraints=constraints, search=FEW).best
+        over = (0.0, float(at[-1]))
+        bound = 0.9 * pin_forces(free.linkage, MAKE, over).greatest
+        best = synthesize(task, constraints=[*constraints, MaxPinForce(force=bound, make=MAKE)], search=FEW).best
+        assert pin_forces(best.linkage, MAKE, over).greatest <= bound * (1.0 + 1e-6)
+
+    @pytest.mark.slow
+    def test_a_trade_off_of_the_error(self, free: Solution) -> None:
+        greatest = pin_forces(free.linkage, MAKE).greatest
+        limits = np.array([0.7, 0.9]) * greatest
+        constraints = [*USUAL, MaxPinForce(force=greatest, make=MAKE)]
+        traded = trade_off(TASK, "pin-force", limits, constraints=constraints, search=FEW)
+        assert traded.error[0] > traded.error[1] > free.error
+        assert "limit of greatest pin force [N]" in traded.columns()
+
+
+def test_the_least_force_within_an_error() -> None:
+    """Whoever asks the other way round, for the least error within that force, comes to the same linkage."""
+    error = 0.004
+    found = synthesize(TASK, constraints=[*USUAL, LeastPinForce(error="4 mm", make=MAKE)], search=FEW)
+    best = found.best
+    least = pin_forces(best.linkage, MAKE).greatest
+    assert best.value <= error * (1.0 + 1e-5)
+    assert all(pin_forces(s.linkage, MAKE).greatest >= least * (1.0 - 1e-6) for s in found.solutions)
+    back = synthesize(
+        replace(TASK, objective="worst"),
+        constraints=[*USUAL, MaxPinForce(force=least * (1.0 + 1e-5), make=MAKE)],
+        guesses=[best],
+        search=replace(FEW, starts=1),
+    ).best
+    assert back.value == pytest.approx(error, rel=2e-3)
+
+
+@pytest.mark.slow
+def test_the_least_force_of_a_path() -> None:
+    task = UntimedPath(path=TargetPath(points=ELLIPSE, closed=True), objective="worst")
+    one = replace(FEW, starts=1)
+    free = synthesize(task, constraints=USUAL, search=one).best
+    assert free.value < 0.0025
+    found = synthesize(task, constraints=[*USUAL, LeastPinForce(error=0.003, make=MAKE)], search=one).best
+    # the bound is used, and what it buys is much
+    assert found.value == pytest.approx(0.003, rel=1e-3)
+    assert found.value <= 0.003 * (1.0 + 1e-4)
+    assert pin_forces(found.linkage, MAKE).greatest < 0.8 * pin_forces(free.linkage, MAKE).greatest
+
+
+class TestRefused:
+    @pytest.mark.parametrize(
+        ("made", "message"),
+        [
+            (lambda: MaxPinForce(force=0.0), "greatest pin force"),
+            (lambda: MaxPinForce(force=1.0, pins="AX"), "letters ABCD"),
+            (lambda: MaxPinForce(force="3 mm"), "force"),
+            (lambda: Make(speed="3 mm"), "speed"),
+            (lambda: pin_forces(replace(LINKAGE, pivot=SliderMotion(FourierSeries.constant(0.0))), MAKE), "pivot"),
+        ],
+    )
+    def test_what_is_not_usable(self, made: Any, message: str) -> None:
+        with pytest.raises(ParameterError, match=message):
+            made()
+
+    @pytest.mark.parametrize(
+        ("constraint", "more", "error", "message"),
+        [
+            (
+                MaxPinForce(force=1.0),
+                {"pivot": SliderUnknown(harmonics=1)},
+                InputError,
+                "its rocker pivot must be fixed",
+            ),
+            (LeastPinForce(error=0.0), {}, ParameterError, "greatest error"),
+            (LeastPinForce(error="1 deg"), {}, ParameterError, "greatest error"),
+            (LeastPinForce(error=1.0), {"search": Search(method="simplex")}, InputError, "use 'scan'"),
+            (
+                LeastPinForce(error="0.01 mm"),
+                {"search": replace(FEW, starts=1)},
+                InfeasibleError,
+                "greatest error by .* mm",
+            ),
+        ],
+    )
+    def test_what_cannot_be_searched(self, constraint: Any, more: dict[str, Any], error: Any, message: str) -> None:
+        with pytest.raises(error, match=message):
+            synthesize(TASK, constraints=[*USUAL, constraint], **more)
+
+    def test_two_objectives(self) -> None:
+        with pytest.raises(InputError, match="one objective"):
+            synthesize(TASK, constraints=[LeastPinForce(error=1.0), LeastPinForce(error=2.0)])
+
+    def test_forces_need_to_know_where_the_crank_goes(self) -> None:
+        with pytest.raises(InputError, match="needs crank rotations"):
+            MaxPinForce(force=1.0).requires(Way(False, None))
