@@ -203,6 +203,15 @@ def test_the_page_of_linkages_in_closed_form_runs_and_says_what_is_so(tmp_path):
 
 
 @pytest.mark.slow
+def test_the_page_of_synthesis_cases_runs_and_says_what_is_so(tmp_path):
+    commands, checked, printed = run_page("synthesis-cases.md", tmp_path)
+    assert (commands, checked) == (2, 2)
+    # the force on the pins of the first linkage, by the run
+    assert any(words[:1] == ["1"] and words[-3:-1] == ["on", "A"] for words in printed)
+    assert (tmp_path / "calm/solutions.csv").exists()
+
+
+@pytest.mark.slow
 def test_the_page_of_tuning_runs_and_says_what_is_so(tmp_path):
     commands, checked, _ = run_page("tuning.md", tmp_path)
     assert (commands, checked) == (3, 7)

@@ -25,7 +25,8 @@ SLIDER, TUNING = "slider-motion", "tuning"
 #: What is said of entries that are right by themselves, but exclude or need one another.
 TOGETHER = (
     r"must (have only one of|not come together|come with|be given with)|parameter drive.speed is missing"
-    r"|a (four-bar|slider-crank) cannot keep (Stroke|Grashof)|kinds must be"
+    r"|a (four-bar|slider-crank) cannot keep (Stroke|Grashof|MechanicalAdvantage|DeadCentre|(No)?Toggle|MaxPinForce)"
+    r"|kinds must be|come to a toggle cannot turn fully|needs crank rotations, and the task gives none"
 )
 
 

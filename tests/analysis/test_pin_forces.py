@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from math import cos, hypot, pi, radians, sin
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
@@ -12,13 +13,17 @@ import pytest
 
 from analysis.numerics import symbolic
 from analysis.numerics.fourier import FourierSeries
+from analysis.run import case_from, simulate
 from analysis.synthesis import (
+    DeadCentre,
     LargestLink,
     LeastPinForce,
     LeastTransmission,
     Linkage,
     Make,
     MaxPinForce,
+    MechanicalAdvantage,
+    NoToggle,
     RockerFunction,
     Search,
     SliderMotion,
@@ -26,8 +31,10 @@ from analysis.synthesis import (
     Solution,
     TargetPath,
     TimedPath,
+    Toggle,
     UntimedPath,
     pin_forces,
+    synthesis_case_from,
     synthesize,
     trade_off,
     turn,
@@ -293,3 +300,50 @@ class TestRefused:
     def test_forces_need_to_know_where_the_crank_goes(self) -> None:
         with pytest.raises(InputError, match="needs crank rotations"):
             MaxPinForce(force=1.0).requires(Way(False, None))
+
+
+def test_a_case_file_asks_for_all_of_it(tmp_path: Path) -> None:
+    tables = {
+        "task": {"kind": "rocker-function", "angle": "30 + 10*sin(t)", "angle_unit": "deg", "n": 12},
+        "constraints": {
+            "least_mechanical_advantage": 1.5,
+            "mechanical_advantage_at": ["30 deg"],
+            "dead_centre_stretched": "80 deg",
+            "dead_centre_folded": ["200 deg", "250 deg"],
+            "no_toggle": ["0 deg", "90 deg"],
+            "max_pin_force": "40 N",
+            "least_pin_force_within": "2 deg",
+            "pins": "BC",
+        },
+        "make": {"speed": "300 rpm", "load": ["0 N", "-20 N"], "crank_mass": "200 g"},
+    }
+    case = synthesis_case_from(tables, folder=tmp_path)
+    _, advantage, stretched, folded, clear, most, least = case.constraints
+    assert isinstance(advantage, MechanicalAdvantage)
+    assert (advantage.least, list(advantage.at)) == (1.5, [radians(30.0)])
+    assert isinstance(stretched, DeadCentre)
+    assert isinstance(folded, DeadCentre)
+    assert stretched.at == (radians(80.0), radians(80.0))
+    assert (folded.at, folded.position) == ((radians(200.0), radians(250.0)), "folded")
+    assert isinstance(clear, NoToggle)
+    assert isinstance(most, MaxPinForce)
+    assert isinstance(least, LeastPinForce)
+    assert (most.force, most.pins, least.error, least.pins) == (40.0, "BC", "2 deg", "BC")
+    assert most.make == least.make == case.make == Make(speed=10.0 * pi, load=(0.0, -20.0), crank_mass=0.2)
+    with pytest.raises(ParameterError, match="come with a least or greatest one"):
+        synthesis_case_from(tables | {"constraints": {"mechanical_advantage_at": ["30 deg"]}}, folder=tmp_path)
+    swing = {"least_transmission_angle": False, "toggle_stretched": "200 deg", "toggle_folded": ["30 deg", "40 deg"]}
+    *_, toggle, other = synthesis_case_from(tables | {"constraints": swing}, folder=tmp_path).constraints
+    assert isinstance(toggle, Toggle)
+    assert isinstance(other, Toggle)
+    assert (toggle.position, other.position) == ("stretched", "folded")
+
+
+def test_a_case_that_runs_has_the_load(free: Solution, tmp_path: Path) -> None:
+    """In the frame of the ground link, as the plant has it; its pins carry what they are said to, but for its spring."""
+    made = replace(MAKE, gravity=0.0)
+    case = case_from(made.run_case(free, "loaded"), folder=tmp_path)
+    run = simulate(case.parameters, case.inputs, initial=case.initial, stop_time=4.0 * pi / made.speed)
+    last = run.time > 2.0 * pi / made.speed
+    greatest = max(float(np.hypot(run[f"pin.{pin}.fx"], run[f"pin.{pin}.fy"])[last].max()) for pin in "ABC")
+    assert greatest == pytest.approx(pin_forces(free.linkage, made).of("ABC"), rel=5e-3)
