@@ -118,10 +118,19 @@ def probe(of: str, page: str) -> str:
     )
 
 
+def race(of: str, page: str) -> str:
+    """A table of the searches' results that docs/race.csv has."""
+    from benchmarks.race import markdown, read
+
+    return markdown(read(HERE / "race.csv"), of)
+
+
 #: The parts of the pages of the theses: chapters of Youssef's, Rahman's, and the studies of ours.
 CHAPTERS = (*"345678", "R", "ours")
 #: What fills a table, from what it is of and the text of its page; `figures` takes long.
-TABLES: dict[str, Callable[[str, str], str]] = {"symbols": symbols, "figures": figures, "count": count, "probe": probe}
+TABLES: dict[str, Callable[[str, str], str]] = {
+    "symbols": symbols, "figures": figures, "count": count, "probe": probe, "race": race,
+}  # fmt: skip
 
 
 def filled(page: str, *, chapters: Container[str] = ()) -> str:
@@ -212,6 +221,13 @@ def closed_form_pictures() -> Iterator[Picture]:
         yield name, plot(guidance(case.task, count), title=case.title), 72
 
 
+def race_pictures() -> Iterator[Picture]:
+    """The picture of docs/synthesis-race.md."""
+    from benchmarks.race import picture, read
+
+    yield "race", picture(read(HERE / "race.csv")), 100
+
+
 def slider_crank_pictures() -> Iterator[Picture]:
     """The pictures of docs/slider-crank.md."""
     from dataclasses import replace
@@ -244,7 +260,13 @@ def main(arguments: list[str]) -> int:
     if with_figures and not chosen:
         from analysis.files import save_figure
 
-        for pictures in (study_pictures, hand_drawn_pictures, closed_form_pictures, slider_crank_pictures):
+        for pictures in (
+            study_pictures,
+            hand_drawn_pictures,
+            closed_form_pictures,
+            race_pictures,
+            slider_crank_pictures,
+        ):
             for name, figure, dpi in pictures():
                 save_figure(figure, HERE / f"{name}.png", dpi=dpi)
     stale = []
