@@ -116,6 +116,7 @@ def _given(mechanism: Mechanism, variable: Variable, reference: int) -> dict[str
     if channel is not None:
         row["file"] = name_in_files(mechanism, channel)
         row["argument"] = channel.argument
+        row["kind"] = channel.kind
         row["freedom"] = channel.freedom
     return row
 

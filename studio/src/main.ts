@@ -2,6 +2,7 @@
 
 import { Charts } from "./charts";
 import { bytesOf, Core, type Rows } from "./core";
+import { caseText, linkOf, pixels, pythonText, save, stateIn, tableText } from "./exports";
 import { History } from "./history";
 import { Panel } from "./panel";
 import { Picture } from "./picture";
@@ -30,7 +31,7 @@ const stored = <T>(id: string): T => JSON.parse(by<HTMLElement>(id).textContent 
 
 class Studio {
   readonly tables = stored<Tables>("tables");
-  state: State = stored<State>("state");
+  state: State = stateIn(location.href) ?? stored<State>("state");
   private mechanism!: Mechanism;
   private core!: Core;
   /** What the worker answered last, and which row of it is drawn. */
@@ -403,6 +404,11 @@ class Studio {
       theme: () => this.theme(document.documentElement.dataset.theme !== "dark"),
     };
     for (const [id, action] of Object.entries(actions)) by(id).addEventListener("click", action);
+    const choice = by<HTMLSelectElement>("save");
+    choice.addEventListener("change", () => {
+      void this.save(choice.value);
+      choice.value = "";
+    });
     by("scrub").addEventListener("input", () => {
       this.play(false);
       this.go(Number(by<HTMLInputElement>("scrub").value));
@@ -412,6 +418,28 @@ class Studio {
     );
     by("panel").addEventListener("toggle", () => this.seek(this.row), true);
     addEventListener("keydown", (event) => this.key(event, actions));
+  }
+
+  /** Save what is shown, in one of the forms of the list. */
+  private async save(form: string): Promise<void> {
+    const m = this.mechanism;
+    const rows = this.answer?.rows;
+    const text = (content: string, type: string): Blob => new Blob([content], { type });
+    if (form === "case")
+      save("case.toml", text(caseText(m, this.state, this.duration()), "application/toml"));
+    else if (form === "python")
+      save("case.py", text(pythonText(m, this.state, this.duration()), "text/x-python"));
+    else if (form === "table" && rows) save("motion.csv", text(tableText(m, rows), "text/csv"));
+    else if (form === "svg") save("drawing.svg", text(this.picture.svgText(), "image/svg+xml"));
+    else if (form === "png") {
+      const { width, height } = by<SVGSVGElement>("picture").getBoundingClientRect();
+      const back = getComputedStyle(document.body).getPropertyValue("--card");
+      save("drawing.png", await pixels(this.picture.svgText(), width, height, back));
+    } else if (form === "link") {
+      history.replaceState(null, "", linkOf(this.state));
+      this.fault("");
+      by("words").textContent = "The address of this page now holds its state: copy it.";
+    }
   }
 
   /** Go to a row, and on from there. */

@@ -148,7 +148,10 @@ export class Picture {
   /** The picture as a file of its own. */
   svgText(): string {
     const copy = this.svg.cloneNode(true) as SVGSVGElement;
+    const { width, height } = this.svg.getBoundingClientRect();
     copy.setAttribute("xmlns", SPACE);
+    copy.setAttribute("width", String(width));
+    copy.setAttribute("height", String(height));
     const originals = this.svg.querySelectorAll<SVGElement>("polyline, polygon, circle, text");
     copy.querySelectorAll<SVGElement>("polyline, polygon, circle, text").forEach((one, n) => {
       const style = getComputedStyle(originals[n]);

@@ -18,6 +18,7 @@ export interface Given {
   /** Of an input: its name in a case file, among the inputs of a run, and the freedom that it drives. */
   file?: string;
   argument?: string;
+  kind?: string;
   freedom?: number;
 }
 

@@ -5,10 +5,13 @@ from __future__ import annotations
 import json
 import shutil
 import subprocess
+import sys
+import tomllib
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
@@ -16,7 +19,7 @@ from click.testing import Result
 
 from analysis.mechanisms import MECHANISMS, PUBLISHED, MechanismError, check, mechanism_of, register
 from analysis.periodic import Drive, orbit_of
-from analysis.run import Case, Inputs, simulate
+from analysis.run import Case, Inputs, case_from, simulate
 from analysis.studio import PAGE, fresh, opening_state, page_of, state_of
 from tests import slider_cranks, strategies
 from tests.mechanisms import pendulum
@@ -339,6 +342,64 @@ def test_a_locked_dimension_stays(page: Page) -> None:
     _drag(page, "C", 10.0, 0.0)
     assert _given(page, "coupler.length") == state["values"]["coupler.length"]
     assert _given(page, "rocker.length") != state["values"]["rocker.length"]
+
+
+def _saved(page: Page, form: str) -> Path:
+    with page.expect_download() as download:
+        page.select_option("#save", form)
+    return Path(download.value.path())
+
+
+@in_browser
+@pytest.mark.parametrize(
+    "case",
+    [_random_five_bar(0), _random_five_bar(1), *map(_random_slider_crank, range(3))],
+    ids=["speed", "torque", "pushed", "shifted", "grooved"],
+)
+def test_a_case_that_is_saved_is_the_case(page: Page, case: Case) -> None:
+    _load(page, state_of(case) | {"source": "run"})
+    read = case_from(tomllib.loads(_saved(page, "case").read_text(encoding="utf-8")), folder=Path())
+    mechanism = mechanism_of(case.parameters)
+    assert read.parameters == case.parameters
+    assert read.inputs.modes(mechanism) == case.inputs.modes(mechanism)
+    wanted, found = state_of(case), state_of(read)
+    idle = {"initial." + freedom.initial[1] for freedom in mechanism.freedoms}
+    for name, value in wanted["values"].items():
+        assert found["values"][name] == value or name in idle, name
+    end = {"stop_time": 0.005, "tolerance": 1e-12}
+    again = simulate(read.parameters, read.inputs, initial=read.initial, **end)
+    before = simulate(case.parameters, case.inputs, initial=case.initial, **end)
+    for name in mechanism.output_names:
+        _near(again[name], before[name])
+
+
+@in_browser
+def test_motion_drawing_and_lines_are_saved(page: Page, tmp_path: Path) -> None:
+    found = _load(page, opening_state())
+    table = np.genfromtxt(_saved(page, "table"), delimiter=",", names=True, deletechars="")
+    np.testing.assert_array_equal(table["time"], found["columns"]["time"])
+    np.testing.assert_array_equal(table["slider.position"], found["columns"]["slider.position"])
+    drawing = ElementTree.parse(_saved(page, "svg")).getroot()
+    assert len([one for one in drawing.iter() if one.tag.endswith("circle")]) == 7
+    assert _saved(page, "png").read_bytes()[:8] == b"\x89PNG\r\n\x1a\n"
+    done = subprocess.run(
+        [sys.executable, _saved(page, "python")], cwd=tmp_path, capture_output=True, text=True, timeout=600, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    assert "stable" in done.stdout
+
+
+@in_browser
+def test_a_link_holds_the_state(page: Page, browser: Browser) -> None:
+    state = opening_state()
+    state["values"] |= {"crank.length": 0.0421}
+    _load(page, state)
+    page.select_option("#save", "link")
+    other = browser.new_page()
+    other.goto(page.url)
+    other.wait_for_function("document.documentElement.dataset.ready")
+    assert other.evaluate("window.studio.state.values") == state["values"]
+    other.close()
 
 
 @in_browser

@@ -1,0 +1,113 @@
+/** What is taken out of the page: files, and a link that holds the state. */
+
+import type { Rows } from "./core";
+import { type Given, type Mechanism, rowLength, type State } from "./tables";
+
+const value = (given: Given, state: State): number => state.values[given.name] ?? given.start;
+
+/** A number as TOML and Python read it, with every digit. */
+function written(number: number): string {
+  const text = String(number);
+  return /^-?\d+$/.test(text) ? `${text}.0` : text;
+}
+
+/** The case as `linkwork run` reads it. */
+export function caseText(m: Mechanism, state: State, duration: number): string {
+  const lines = [`mechanism = ${JSON.stringify(m.name)}`, `title = ${JSON.stringify(state.title)}`];
+  const modes = m.given.filter((g) => g.arguments);
+  const chosen = modes.map((mode) => mode.arguments![value(mode, state)]);
+  const inputs = m.given.filter((g) => g.argument !== undefined);
+  const forced = new Set(inputs.filter((g) => g.kind === "force").map((g) => g.argument!));
+  // a rate at the start is that of a freedom that a force drives
+  const free = m.freedoms.map((freedom) => {
+    const number = modes.findIndex((mode) => mode.reference === freedom.mode);
+    return number < 0 || forced.has(chosen[number]);
+  });
+  const idle = new Set(m.freedoms.flatMap(({ initial }, n) => (free[n] ? [] : [initial[1]])));
+  for (const given of m.given) {
+    const now = value(given, state);
+    if (given.arguments) {
+      const flag = chosen[modes.indexOf(given)];
+      if (!inputs.some((g) => g.argument === flag)) lines.push(`${given.name.split(".")[0]}.${flag} = true`);
+    } else if (given.argument === undefined) {
+      if (!idle.has(given.reference))
+        lines.push(`${given.name} = ${given.choices ? String(now) : written(now)}`);
+    } else if (chosen.includes(given.argument)) lines.push(`${given.file!} = ${written(now)}`);
+    else if (now !== 0 && !modes.some((mode) => mode.arguments!.includes(given.argument!)))
+      lines.push(`${given.file!} = ${written(now)}`);
+  }
+  lines.push(`run.stop_time = ${written(duration)}`, `run.step = ${written(duration / 1440)}`);
+  return `${lines.join("\n")}\n`;
+}
+
+/** Lines of Python that compute what the page shows. */
+export function pythonText(m: Mechanism, state: State, duration: number): string {
+  return `import tomllib
+from pathlib import Path
+
+from analysis.periodic import drive_of, orbit_of
+from analysis.run import case_from, simulate
+
+case = case_from(tomllib.loads(r"""
+${caseText(m, state, duration)}"""), folder=Path())
+run = simulate(case.parameters, case.inputs, initial=case.initial, stop_time=case.stop_time, step=case.step)
+print(run)
+orbit = orbit_of(case.parameters, drive_of(case.parameters, case.inputs, case.initial))
+print(orbit, orbit.multipliers)
+`;
+}
+
+/** Time and all outputs of the motion that is shown, in SI. */
+export function tableText(m: Mechanism, rows: Rows): string {
+  const length = rowLength(m);
+  const lines = [["time", ...m.outputs.map((output) => output.name)].join(",")];
+  for (let row = 0; row < rows.count; row++) {
+    const start = row * length;
+    const outputs = rows.values.subarray(start + 1 + m.states, start + 1 + m.states + m.outputs.length);
+    lines.push([rows.values[start], ...outputs].join(","));
+  }
+  return `${lines.join("\n")}\n`;
+}
+
+/** The state in the address of the page. */
+export function linkOf(state: State): string {
+  const bytes = new TextEncoder().encode(JSON.stringify(state));
+  const text = btoa(String.fromCharCode(...bytes))
+    .replaceAll("+", "-")
+    .replaceAll("/", "_")
+    .replaceAll("=", "");
+  return `${location.href.split("#")[0]}#state=${text}`;
+}
+
+/** The state that an address holds, if it holds one. */
+export function stateIn(address: string): State | undefined {
+  const text = /#state=([\w-]+)$/.exec(address)?.[1];
+  if (!text) return undefined;
+  const bytes = Uint8Array.from(atob(text.replaceAll("-", "+").replaceAll("_", "/")), (c) => c.charCodeAt(0));
+  return JSON.parse(new TextDecoder().decode(bytes)) as State;
+}
+
+/** Let the browser save a file. */
+export function save(name: string, content: Blob): void {
+  const link = document.createElement("a");
+  link.href = URL.createObjectURL(content);
+  link.download = name;
+  link.click();
+  setTimeout(() => URL.revokeObjectURL(link.href), 10_000);
+}
+
+/** A drawing as a picture of pixels, on the colour of the page. */
+export async function pixels(svg: string, width: number, height: number, back: string): Promise<Blob> {
+  const image = new Image();
+  image.src = `data:image/svg+xml;charset=utf-8,${encodeURIComponent(svg)}`;
+  await image.decode();
+  const canvas = document.createElement("canvas");
+  [canvas.width, canvas.height] = [2 * width, 2 * height];
+  const context = canvas.getContext("2d")!;
+  context.fillStyle = back;
+  context.fillRect(0, 0, canvas.width, canvas.height);
+  context.drawImage(image, 0, 0, canvas.width, canvas.height);
+  return new Promise((resolve, reject) =>
+    canvas.toBlob((blob) => (blob ? resolve(blob) : reject(new Error("no picture was made"))), "image/png"),
+  );
+}
