@@ -66,7 +66,9 @@ def parts(name: str, folder: str) -> dict[str, float]:
     response = timed("all motions sought at five speeds", lambda: with_isolas(response))
     points = sum(map(len, response.branches))
     timed(f"outputs over a turn of {points} points", lambda: response.to_csv(Path(folder) / "response.csv"))
-    timed("maxima and minima, speeds to avoid", lambda: (response.maxima(), response.minima(), response.speeds_to_avoid))
+    timed(
+        "maxima and minima, speeds to avoid", lambda: (response.maxima(), response.minima(), response.speeds_to_avoid)
+    )
     beside = timed("classical approximations", lambda: approximations(response))
     picture = timed("figure", lambda: figures.plot(response, title=name, beside=beside))
     timed("picture written", lambda: save_figure(picture, Path(folder) / "response.png"))
