@@ -154,6 +154,13 @@ class Wish:
         put("between", _span(mechanism, self.over, self.speeds or self.between))
         drive = self.drive or drive_of(given, speed=self.span[0])
         require_variable(self.parameters, drive, self.over)
+        alone = (
+            not drive.speed_drive
+            and drive.motor is None
+            and value_of(self.parameters, drive, self.over) == drive.torque
+        )
+        if alone and self.span[0] <= 0.0 <= self.span[1]:
+            raise ParameterError(self.over, list(self.span), "not contain zero: nothing would drive the crank there")
         put("drive", with_values(self.parameters, drive, {self.over: self.span[0]})[1])
         if not (isinstance(self.turns, int) and self.turns >= 1):
             raise ParameterError("turns", self.turns, "be a whole number, at least one")

@@ -342,6 +342,11 @@ def test_what_is_met_already_is_not_changed():
             InputError,
             "no motor drives",
         ),
+        (
+            {"no_jump": True, "speeds": None, "over": "drive.torque", "between": (-1, 1), "drive": Drive(torque=0.1)},
+            ParameterError,
+            "not contain zero",
+        ),
         ({"no_jump": True, "turns": 0}, ParameterError, "at least one"),
         ({"no_jump": True, "change": {}}, InputError, "nothing may be changed"),
         ({"no_jump": True, "change": {"slider.stifness": "5 %"}}, UnknownNameError, r"slider\.stiffness"),
