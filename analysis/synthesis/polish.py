@@ -6,7 +6,7 @@ path, then goes on in `analysis.synthesis.refine`, the greatest error at given s
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from contextlib import ContextDecorator
 from dataclasses import dataclass, replace
 from functools import partial
@@ -26,7 +26,7 @@ from .constraints import Limits
 from .kernels import coupler_path_jacobian, link_jacobian
 from .linkage import geared, wrapped
 from .program import KEPT, Objective, Program
-from .refine import Refinement
+from .refine import ITERATIONS, Refinement
 from .search import USUAL_SEARCH, Search, over_cores
 from .starts import Answer, CrankUnknown, PivotUnknown, SliderUnknown, Start, apart, inside, outside
 from .tasks import Normal
@@ -35,8 +35,12 @@ FloatArray = NDArray[np.float64]
 
 #: Untimed stations up to which least squares keeps up with IPOPT, whose Jacobian is sparse.
 FEW = 20
-#: How many of the fits go on to a measure that is no sum of squares.
+#: How many of the fits go on to the greatest error.
 ONWARDS = 6
+#: How many paths go on to the measure between the curves, and by how many iterations: many by a few, the best of them further.
+RACE = {"area": ((40, 12), (6, 60), (2, 100), (1, 100), (1, 200)), "worst": ((ONWARDS, ITERATIONS),)}
+#: Fits of squares that a path's race begins with besides the starts themselves: most end at the same few optima.
+FITTED = 8
 #: How many of the best are followed to the end, by so many iterations more, where they were cut off.
 FINISHED, LONG = 4, 1500
 #: How many triangles of a region that is not convex are tried at a time.
@@ -45,6 +49,8 @@ PIECES = 3
 MOST = 32
 #: Linkages that differ by less than this, in shares of the longest link and in rad, count as one.
 DIFFERENT = 1e-3
+#: The same for paths that race: less than this would end at the same optimum.
+RACED = 0.02
 #: Share of the quality below which points count as met exactly (units squared).
 EXACT = 1e-14
 
@@ -117,36 +123,52 @@ def polish(
     search: Search = USUAL_SEARCH,
 ) -> Polished:
     """Go from every start to an optimum. On Ctrl-C what was done is returned, marked as interrupted."""
-    cores = search.cores
-    size = 1 if cores == 1 else min(MOST, max(1, -(-len(starts) // (3 * cores))))
-    batches = [starts[k : k + size] for k in range(0, len(starts), size)]
     worker = Polisher(normal, limits, pivot)
 
-    def step(name: str) -> Callable[[Any], Any]:
+    def spread(name: str, items: Sequence[Any], what: str = "polish") -> tuple[list[Answer], bool]:
+        cores = search.cores
+        size = 1 if cores == 1 else min(MOST, max(1, -(-len(items) // (3 * cores))))
         # a polisher holds compiled solvers, which do not travel: each part of the work makes its own
-        return getattr(worker, name) if cores == 1 else partial(_apart, name, normal, limits, pivot)
+        step = getattr(worker, name) if cores == 1 else partial(_apart, name, normal, limits, pivot)
+        parts, interrupted = over_cores(step, [items[k : k + size] for k in range(0, len(items), size)], search, what)
+        return [answer for part in parts for answer in part], interrupted
 
-    parts, interrupted = over_cores(step("fit_all"), batches, search, "polish")
-    found = [answer for part in parts for answer in part]
-    # an interruption after the last search has nothing to stop
-    interrupted = interrupted and len(found) < len(starts)
-    kept = kept_of(found)
     begun = kept_of([worker.kept(start) for start in starts])
-    if not interrupted and normal.quality != "squares":
-        given = [answer for answer in begun if answer.start.given]
-        best = [*given, *distinct(kept, ONWARDS, pivot)]
-        kept, interrupted = over_cores(step("onwards"), best, search, normal.quality)
-    elif not interrupted:
+    given = [answer for answer in begun if answer.start.given]
+    # where enough of the starts themselves can race, few are fitted by squares
+    races = normal.outline is not None and normal.quality != "squares" and pivot is None
+    enough = races and normal.straight is None and len(begun) >= FITTED
+    fitted = starts[: sum(start.given for start in starts) + FITTED] if enough else starts
+    found, interrupted = spread("fit_all", fitted)
+    kept = kept_of(found)
+    # an interruption after the last search has nothing to stop
+    if interrupted and len(found) < len(fitted):
+        return Polished.of(found, kept, True, begun)
+    interrupted = False
+    if normal.quality == "squares":
         if limits.along:
             kept = distinct(kept, ONWARDS, pivot)
         kept = [*map(worker.finish, kept[:FINISHED]), *kept[FINISHED:]]
+    elif not races:
+        best = [*given, *distinct(kept, ONWARDS, pivot)]
+        kept, interrupted = spread("onwards", [(answer, ITERATIONS) for answer in best], normal.quality)
+    else:
+        kept, raced = kept_of([worker.measured(answer) for answer in [*kept, *begun]]), False
+        for count, iterations in RACE[normal.quality]:
+            best = distinct([*given, *kept], count + len(given), distance=RACED)
+            done, interrupted = spread("onwards", [(answer, iterations) for answer in best], normal.quality)
+            if interrupted:
+                kept = [*done, *kept]
+                break
+            rest = [answer for answer in kept if answer not in best] if raced else []
+            kept, given, raced = kept_of([*done, *rest]), [], True
     if limits.least is not None and not interrupted:
         best = distinct(kept_of(kept) or kept_of(found), ONWARDS, pivot)
-        kept, interrupted = over_cores(step("least"), best, search, limits.least.along.name)
+        kept, interrupted = spread("least", best, limits.least.along.name)
         found = [*(answer for answer in found if not answer.feasible), *kept] if kept else found
     elif limits.along:
         kept = [answer for answer in kept if worker.kept(answer.start).feasible]
-    return Polished.of(found, kept_of(kept), interrupted, begun)
+    return replace(Polished.of(found, kept_of(kept), interrupted, begun), done=len(starts))
 
 
 def kept_of(answers: Sequence[Answer]) -> list[Answer]:
@@ -160,7 +182,9 @@ def _apart(name: str, normal: Normal, limits: Limits, pivot: PivotUnknown | None
     return getattr(Polisher(normal, limits, pivot), name)(item)
 
 
-def distinct(answers: Sequence[Answer], count: int, pivot: PivotUnknown | None = None) -> list[Answer]:
+def distinct(
+    answers: Sequence[Answer], count: int, pivot: PivotUnknown | None = None, *, distance: float = DIFFERENT
+) -> list[Answer]:
     """The first answers that are different linkages: in their links, as shares of the longest, and their point and pivot."""
 
     def mark(answer: Answer) -> FloatArray:
@@ -188,7 +212,7 @@ def distinct(answers: Sequence[Answer], count: int, pivot: PivotUnknown | None =
             mark[[8, 12]] = 0.0
         return np.append(mark, side)
 
-    return apart(answers, mark, DIFFERENT, count)
+    return apart(answers, mark, distance, count)
 
 
 class Polisher:
@@ -256,8 +280,11 @@ class Polisher:
         last = self.program("squares", exact=True)
         return last.exact(answer, lambda start, places: last.solve(start, places=places))
 
-    def least(self, answer: Answer) -> Answer:
-        """From a small error to what is made small in its place."""
+    def least(self, answers: Sequence[Answer]) -> list[Answer]:
+        """From small errors to what is made small in their place."""
+        return [self._least(answer) for answer in answers]
+
+    def _least(self, answer: Answer) -> Answer:
         program = self.program("least", exact=True)
         size = program.greatest(answer.start)
         found = program.solve(answer.start, size=size)
@@ -276,11 +303,19 @@ class Polisher:
                     break
         return program.exact(found, lambda start, places: solve(start, places=places)) if found.feasible else found
 
-    def onwards(self, answer: Answer) -> Answer:
-        """From least squares to the area, or to the greatest error."""
+    def measured(self, answer: Answer) -> Answer:
+        """The answer with the measure of its path in the place of its quality."""
+        curve, _ = self.refinement.traced(*self.refinement.program.at(answer.start))
+        return replace(answer, start=replace(answer.start, quality=self.refinement.measure(curve)))
+
+    def onwards(self, items: Sequence[tuple[Answer, int]]) -> list[Answer]:
+        """From least squares to the area, or to the greatest error, each by so many iterations at most."""
+        return [self._onwards(*item) for item in items]
+
+    def _onwards(self, answer: Answer, iterations: int) -> Answer:
         if self.normal.outline is not None:
             refinement = self.refinement
-            found = refinement.refined(answer)
+            found = refinement.refined(answer, iterations=iterations)
             return refinement.program.exact(
                 found, lambda start, places: refinement.refined(replace(answer, start=start), places=places)
             )

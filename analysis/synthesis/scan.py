@@ -38,6 +38,8 @@ SHAPES = ((0.01, 3.0), (0.05, 6.0), (0.05, 6.0))
 GUIDED, SECOND, AROUND = ((1e-3, 2.0), (0.01, 3.0)), (0.01, 3.0), 48
 #: Candidates in one piece of work.
 CHUNK = 4096
+#: Of a chunk of coupler curves, how many are placed over the target: the most alike.
+PLACED = 400
 #: Steps of a coupler curve and points of it at even arc length.
 CURVE, EVEN = 128, 64
 #: Pieces of a coupler curve that an open target is laid over: points at even arc length, first steps, lengths in steps.
@@ -80,6 +82,8 @@ def scan(normal: Normal, limits: Limits, *, seed: int, candidates: int, starts: 
     found: list[Candidates] = []
     for number, branch in enumerate(limits.branches):
         chunks = _shapes(limits, seed + 7919 * number, max(1, candidates // len(limits.branches)))
+        if normal.outline is not None:
+            chunks = _filled(chunks)
         for chunk, shapes in enumerate(chunks):
             found.append(_placed(normal, limits, shapes, branch, np.random.default_rng([seed, chunk, branch + 1])))
     if not found:
@@ -102,6 +106,18 @@ def _shapes(limits: Limits, seed: int, count: int) -> Iterator[FloatArray]:
         kept += len(shapes)
         if len(shapes):
             yield shapes
+
+
+def _filled(chunks: Iterator[FloatArray]) -> Iterator[FloatArray]:
+    """The same rows, about `CHUNK` at a time: of each chunk only the best are placed."""
+    rows: list[FloatArray] = []
+    for chunk in chunks:
+        rows.append(chunk)
+        if sum(map(len, rows)) >= CHUNK:
+            yield np.vstack(rows)
+            rows = []
+    if rows:
+        yield np.vstack(rows)
 
 
 def _why(limits: Limits, seed: int) -> str:
@@ -405,7 +421,7 @@ def _closed_paths(
     # crank rotation of each station: its share of the target's length, from where the target starts on the curve
     stations = normal.shares * EVEN
     rotations = np.empty((len(curves), normal.n))
-    chosen = np.argsort(misfit)[: min(len(misfit), 400)]
+    chosen = np.argsort(misfit)[:PLACED]
     chosen = chosen[np.isfinite(misfit[chosen])]
     for i in chosen:
         index = way[i] * (stations - shift[i])
@@ -434,7 +450,7 @@ def _open_paths(
     first = np.where(gaps.any(axis=1), CURVE - np.argmax(gaps[:, ::-1], axis=1), 0)
     curves = np.take_along_axis(curves, (np.arange(CURVE) + first[:, None]) % CURVE, axis=1)
     match_windows(np.ascontiguousarray(curves), goal, STARTS, SPANS, best)
-    chosen = np.argsort(best[:, 0])[: min(len(best), 400)]
+    chosen = np.argsort(best[:, 0])[:PLACED]
     chosen = chosen[np.isfinite(best[chosen, 0])]
     quality = np.full(len(curves), inf)
     q = np.zeros((len(curves), 11))
