@@ -6,7 +6,7 @@ path, then goes on in `analysis.synthesis.refine`, the greatest error at given s
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import ContextDecorator
 from dataclasses import dataclass, replace
 from functools import partial
@@ -161,7 +161,9 @@ def polish(
                 kept = [*done, *kept]
                 break
             rest = [answer for answer in kept if answer not in best] if raced else []
-            kept, given, raced = kept_of([*done, *rest]), [], True
+            # those that have come to the same optimum count as one
+            kept = distinct(kept_of([*done, *rest]), len(starts) + len(done), distance=RACED)
+            given, raced = [], True
     if limits.least is not None and not interrupted:
         best = distinct(kept_of(kept) or kept_of(found), ONWARDS, pivot)
         kept, interrupted = spread("least", best, limits.least.along.name)
