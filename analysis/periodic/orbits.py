@@ -481,6 +481,7 @@ class Period(NamedTuple):
     slope: NDArray[np.float64]
 
 
+@takes_published()
 def period_from(
     parameters: Parameters,
     drive: Drive,

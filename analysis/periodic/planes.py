@@ -123,6 +123,7 @@ def _replaced(parameters: Parameters, *values: tuple[str, float]) -> Parameters:
     return replace(parameters, **dict(values))
 
 
+@takes_published()
 def with_values(parameters: Parameters, drive: Drive, values: Mapping[str, float]) -> Operation:
     """Mechanism and drive with other values of parameters by their FMI names."""
     mechanism = mechanism_of(parameters)
