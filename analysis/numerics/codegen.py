@@ -222,10 +222,10 @@ def _casadi() -> Any:
 
 
 @intrinsic
-def evaluate(typing_context, address, t, a, b, c, d, out):  # type: ignore[no-untyped-def]
+def evaluate(typing_context, address, t, a, b, c, d, out):
     """Call a function of `MachineCode` by its address."""
 
-    def generate(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
+    def generate(context, builder, signature, arguments):
         pointers = [
             context.make_array(kind)(context, builder, array).data
             for kind, array in zip(signature.args[2:], arguments[2:])
@@ -238,10 +238,10 @@ def evaluate(typing_context, address, t, a, b, c, d, out):  # type: ignore[no-un
 
 
 @intrinsic
-def call_user(typing_context, address, t, x):  # type: ignore[no-untyped-def]
+def call_user(typing_context, address, t, x):
     """Value of a user's C function f(t, x) of a float and an array of floats, by its address."""
 
-    def generate(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
+    def generate(context, builder, signature, arguments):
         kind = ir.FunctionType(_DOUBLE, _ARGUMENTS[:2]).as_pointer()
         data = context.make_array(signature.args[2])(context, builder, arguments[2]).data
         return builder.call(builder.inttoptr(arguments[0], kind), [arguments[1], data])
@@ -254,11 +254,11 @@ def user_function(function: Any, size: int) -> Any:
     own = njit(error_model="numpy")(getattr(function, "py_func", function))
 
     @njit(error_model="numpy")
-    def spread(t, x):  # type: ignore[no-untyped-def]
+    def spread(t, x):
         return own(t, *to_fixed_tuple(numba.carray(x, (size,)), size))
 
     @numba.cfunc(float64(float64, types.CPointer(float64)), error_model="numpy")
-    def guarded(t, x):  # type: ignore[no-untyped-def]
+    def guarded(t, x):
         try:
             return spread(t, x)
         except Exception:

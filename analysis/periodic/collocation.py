@@ -60,7 +60,7 @@ class Bench(NamedTuple):
 
 
 @part
-def make_bench(n, directional):  # type: ignore[no-untyped-def]
+def make_bench(n, directional):
     """Room for y of n components."""
     f = n // 2
     size = NODES * f
@@ -76,7 +76,7 @@ def make_bench(n, directional):  # type: ignore[no-untyped-def]
 
 
 @inner
-def eliminate(matrix, size):  # type: ignore[no-untyped-def]
+def eliminate(matrix, size):
     """Solve a system with its right-hand sides in the columns after the first ``size``, in place; whether it could be."""
     width = matrix.shape[1]
     for c in range(size):
@@ -108,7 +108,7 @@ def eliminate(matrix, size):  # type: ignore[no-untyped-def]
 
 
 @inner
-def pace_of(section, y, bench):  # type: ignore[no-untyped-def]
+def pace_of(section, y, bench):
     """The time that a radian takes: the derivative of a coordinate's slope by its rate."""
     n = y.shape[0]
     bench.z[:] = 0.0
@@ -120,7 +120,7 @@ def pace_of(section, y, bench):  # type: ignore[no-untyped-def]
 
 
 @inner
-def at_node(s, h, pace, y, w, z):  # type: ignore[no-untyped-def]
+def at_node(s, h, pace, y, w, z):
     """y at a node of an element, into z."""
     f = w.shape[1]
     for i in range(f):
@@ -133,7 +133,7 @@ def at_node(s, h, pace, y, w, z):  # type: ignore[no-untyped-def]
 
 
 @inner
-def condense(section, angle, h, pace, y, w, bench, end, matrix, slope, moves):  # type: ignore[no-untyped-def]
+def condense(section, angle, h, pace, y, w, bench, end, matrix, slope, moves):
     """Linearise an element about the slopes w, shape (NODES, f), and eliminate them; whether it could be.
 
     Written are y at its end with the slopes corrected for this beginning, shape (n,), its derivatives by the beginning, (n, n),
@@ -204,7 +204,7 @@ def condense(section, angle, h, pace, y, w, bench, end, matrix, slope, moves):  
 
 
 @inner
-def tail_of(h, scale, along, w, moves):  # type: ignore[no-untyped-def]
+def tail_of(h, scale, along, w, moves):
     """How far the Legendre coefficients of the slopes, and of their derivatives by the beginning and lambda, have decayed."""
     f = w.shape[1]
     n = 2 * f
@@ -223,7 +223,7 @@ def tail_of(h, scale, along, w, moves):  # type: ignore[no-untyped-def]
 
 
 @inner
-def correct(section, angles, y, w, bench, ends, matrices, slopes, moves, monodromy, report):  # type: ignore[no-untyped-def]
+def correct(section, angles, y, w, bench, ends, matrices, slopes, moves, monodromy, report):
     """One correction of beginnings y, shape (m, n), and slopes w, (m, NODES, f), of a period; its size relative to the scale.
 
     Written are what `condense` gives of each element, the monodromy matrix before the correction, and the decay of the Legendre
@@ -287,7 +287,7 @@ def correct(section, angles, y, w, bench, ends, matrices, slopes, moves, monodro
 
 
 @inner
-def _carry(matrix, gap, shift, column):  # type: ignore[no-untyped-def]
+def _carry(matrix, gap, shift, column):
     """A deviation at the beginning of an element becomes that at the beginning of the next."""
     n = gap.shape[0]
     for i in range(n):
@@ -299,7 +299,7 @@ def _carry(matrix, gap, shift, column):  # type: ignore[no-untyped-def]
 
 
 @inner
-def least_gap(section, angles, y, w, bench, gap):  # type: ignore[no-untyped-def]
+def least_gap(section, angles, y, w, bench, gap):
     """How near the links come to the limit of assembly at the nodes; NaN beyond it."""
     least = np.inf
     pace = pace_of(section, y[0], bench)
@@ -327,7 +327,7 @@ class Desk(NamedTuple):
 
 
 @part
-def make_desk(n, most):  # type: ignore[no-untyped-def]
+def make_desk(n, most):
     """Room for y of n components and so many elements."""
     return Desk(
         make_bench(n, False),
@@ -340,7 +340,7 @@ def make_desk(n, most):  # type: ignore[no-untyped-def]
 
 
 @part
-def close(section, angles, y, w, desk, monodromy, room):  # type: ignore[no-untyped-def]
+def close(section, angles, y, w, desk, monodromy, room):
     """Newton's method for beginnings y and slopes w of a period that closes; how it ended.
 
     NO_STEP says that the elements are too few.
@@ -371,7 +371,7 @@ def close(section, angles, y, w, desk, monodromy, room):  # type: ignore[no-unty
 
 
 @part
-def spread(section, source, angles, start, y, w, room):  # type: ignore[no-untyped-def]
+def spread(section, source, angles, start, y, w, room):
     """Beginnings y and slopes w of the elements of a period from its start, by the integrator."""
     n = start.shape[0]
     z, out = start.copy(), np.empty(n)
@@ -409,7 +409,7 @@ def spread(section, source, angles, start, y, w, room):  # type: ignore[no-untyp
     ),
     purpose="the collocation of periodic motions",
 )
-def walk(section, source, angles, firsts, starts, change, known, y, w, moves, rows, tails, report):  # type: ignore[no-untyped-def]
+def walk(section, source, angles, firsts, starts, change, known, y, w, moves, rows, tails, report):
     """Follow y with its derivatives over each of the pieces of a period, from what is known of a neighbour.
 
     Parameters

@@ -83,7 +83,7 @@ NO_SOURCE = Source(
 
 
 @part
-def numbered(section, drive, p, scale, tolerance):  # type: ignore[no-untyped-def]
+def numbered(section, drive, p, scale, tolerance):
     """The same flow with other numbers."""
     return Section(section.equations, section.modes, drive, p, scale, 1.0, tolerance, section.torque)
 
@@ -98,7 +98,7 @@ class Room(NamedTuple):
 
 
 @part
-def make_room(section, columns):  # type: ignore[no-untyped-def]
+def make_room(section, columns):
     """Room for y and so many columns: magnitudes of y, of dy_i/dy0_j and of dy_i/dlambda."""
     n = section.scale.shape[0]
     sizes = np.empty(n * (1 + columns))
@@ -110,13 +110,13 @@ def make_room(section, columns):  # type: ignore[no-untyped-def]
 
 
 @inner
-def _clearance(section, angle, z, room):  # type: ignore[no-untyped-def]
+def _clearance(section, angle, z, room):
     evaluate(section.equations[GAP], angle, z, section.modes, section.drive, section.p, room.gap)
     return room.gap[0]
 
 
 @inner
-def _take(section, source, equation, angle, end, slowest, z, room, carry):  # type: ignore[no-untyped-def]
+def _take(section, source, equation, angle, end, slowest, z, room, carry):
     """A good step from z, its rates in room.k[0], as far as to ``end``: the status and the angle there; z there is room.y."""
     n = section.scale.shape[0]
     k, y = room.k, room.y
@@ -146,7 +146,7 @@ def _take(section, source, equation, angle, end, slowest, z, room, carry):  # ty
 
 
 @inner
-def _enter(section, equation, angle, z, room):  # type: ignore[no-untyped-def]
+def _enter(section, equation, angle, z, room):
     """Rates of z at the beginning of a range of crank angles, into room.k[0]; the status, and the speed of a stalled crank."""
     n = section.scale.shape[0]
     slowest = _STALL * z[n - 1] if section.torque else 0.0
@@ -160,7 +160,7 @@ def _enter(section, equation, angle, z, room):  # type: ignore[no-untyped-def]
 
 
 @inner
-def advance(section, source, begin, end, z, room, carry):  # type: ignore[no-untyped-def]
+def advance(section, source, begin, end, z, room, carry):
     """Integrate z over a range of crank angles; carry[0] is the step to begin with and to go on with, carry[1] counts."""
     n = section.scale.shape[0]
     size = z.shape[0]
@@ -178,7 +178,7 @@ def advance(section, source, begin, end, z, room, carry):  # type: ignore[no-unt
 
 
 @inner
-def _begin(n, start, z):  # type: ignore[no-untyped-def]
+def _begin(n, start, z):
     """z at the beginning of a period: the start, the identity, zeros along lambda."""
     for i in range(z.shape[0]):
         z[i] = 0.0
@@ -189,7 +189,7 @@ def _begin(n, start, z):  # type: ignore[no-untyped-def]
 
 
 @kernel(int64(SECTION, SOURCE, float64, VECTOR, VECTOR), purpose="the integrator of periodic motions")
-def period(section, source, end, z, carry):  # type: ignore[no-untyped-def]
+def period(section, source, end, z, carry):
     """Integrate y and as many columns of derivatives as ``z`` has room for from crank angle 0 to ``end``.
 
     Parameters
@@ -216,7 +216,7 @@ def period(section, source, end, z, carry):  # type: ignore[no-untyped-def]
 
 
 @part
-def magnitude(correction, scale):  # type: ignore[no-untyped-def]
+def magnitude(correction, scale):
     """Largest component relative to the scale."""
     size = 0.0
     for i in range(scale.shape[0]):
@@ -228,7 +228,7 @@ def magnitude(correction, scale):  # type: ignore[no-untyped-def]
 
 
 @part
-def newton(section, source, end, most, start, z, room, carry, report):  # type: ignore[no-untyped-def]
+def newton(section, source, end, most, start, z, room, carry, report):
     """Newton's method for y(end) = y(0); see `solve`.
 
     A correction is taken in part where the next one, found with the same matrix, would not be smaller (Deuflhard's natural
@@ -287,7 +287,7 @@ def newton(section, source, end, most, start, z, room, carry, report):  # type: 
 
 
 @inner
-def solve_small(a, b):  # type: ignore[no-untyped-def]
+def solve_small(a, b):
     """Solve a x = b in place by elimination with pivots; whether it could be."""
     n = b.shape[0]
     for c in range(n):
@@ -313,7 +313,7 @@ def solve_small(a, b):  # type: ignore[no-untyped-def]
 
 
 @kernel(int64(SECTION, SOURCE, float64, int64, VECTOR, VECTOR, VECTOR), purpose="the search for periodic motions")
-def solve(section, source, end, most, start, z, report):  # type: ignore[no-untyped-def]
+def solve(section, source, end, most, start, z, report):
     """Periodic orbit by Newton's method with step control on the map over a period.
 
     Parameters
@@ -337,7 +337,7 @@ def solve(section, source, end, most, start, z, report):  # type: ignore[no-unty
 
 
 @part
-def deflated(section, source, end, most, reach, start, known, z, room, carry):  # type: ignore[no-untyped-def]
+def deflated(section, source, end, most, reach, start, known, z, room, carry):
     """See `search`."""
     scale = section.scale
     n = scale.shape[0]
@@ -394,7 +394,7 @@ def deflated(section, source, end, most, reach, start, known, z, room, carry):  
     int64(SECTION, SOURCE, float64, int64, float64, VECTOR, MATRIX, VECTOR),
     purpose="the search for coexisting motions",
 )
-def search(section, source, end, most, reach, start, known, z):  # type: ignore[no-untyped-def]
+def search(section, source, end, most, reach, start, known, z):
     """Newton's method for a periodic orbit that is none of the known ones: each of these is divided out.
 
     The residual is multiplied by 1 + 1/d^2 for each known orbit at the distance d, so that the known ones are no zeros any more
@@ -421,7 +421,7 @@ def search(section, source, end, most, reach, start, known, z):  # type: ignore[
 
 
 @kernel(int64(SECTION, SOURCE, float64, float64, int64, VECTOR), purpose="the settling of motions")
-def settle(section, source, turn, change, most, start):  # type: ignore[no-untyped-def]
+def settle(section, source, turn, change, most, start):
     """Follow the motion from ``start``, which is overwritten, turn by turn until one changes y by less than ``change``."""
     room = make_room(section, 0)
     z = start.copy()
@@ -438,7 +438,7 @@ def settle(section, source, turn, change, most, start):  # type: ignore[no-untyp
 
 
 @kernel(int64(SECTION, SOURCE, VECTOR, MATRIX, VECTOR, MATRIX), purpose="the sampling of periodic motions")
-def sample(section, source, stations, starts, angles, rows):  # type: ignore[no-untyped-def]
+def sample(section, source, stations, starts, angles, rows):
     """States of a run and channels, shape (m, states + inputs), at increasing crank angles, by the integrator's interpolant.
 
     Parameters
@@ -485,7 +485,7 @@ def sample(section, source, stations, starts, angles, rows):  # type: ignore[no-
 
 
 @kernel(int64(SECTION, SOURCE, VECTOR, MATRIX, MATRIX), purpose="multiple shooting")
-def segments(section, source, angles, starts, rows):  # type: ignore[no-untyped-def]
+def segments(section, source, angles, starts, rows):
     """Integrate y with its derivatives over each of the pieces of a period: see `period`.
 
     Parameters

@@ -27,7 +27,7 @@ PASSED = len(_NEXT)
 
 
 @part
-def settle_on(section, source, end, turns, level, start, angles, y, w, desk, monodromy, room):  # type: ignore[no-untyped-def]
+def settle_on(section, source, end, turns, level, start, angles, y, w, desk, monodromy, room):
     """Begin with the fewest elements that suffice, from the given level of `COUNTS` on; the level, -1 if there is none."""
     while level < len(COUNTS):
         m = COUNTS[level] * turns
@@ -45,14 +45,14 @@ def settle_on(section, source, end, turns, level, start, angles, y, w, desk, mon
 
 
 @part
-def from_guess(own, wide, source, end, most, start, z, room, carry, report):  # type: ignore[no-untyped-def]
+def from_guess(own, wide, source, end, most, start, z, room, carry, report):
     """Newton's method from far, at first to the tolerance of a search."""
     status = newton(wide, source, end, most, start, z, room, carry, report)
     return newton(own, source, end, most, start, z, room, carry, report) if status == DONE else status
 
 
 @part
-def predict(known, y, w):  # type: ignore[no-untyped-def]
+def predict(known, y, w):
     """The next beginnings and slopes, into the first place, from so many before them."""
     y[0] = 0.0
     w[0] = 0.0
@@ -62,7 +62,7 @@ def predict(known, y, w):  # type: ignore[no-untyped-def]
 
 
 @part
-def from_left(section, source, parameters, drives, scales, end, turns, most, loose, smooth, guess, found):  # type: ignore[no-untyped-def]
+def from_left(section, source, parameters, drives, scales, end, turns, most, loose, smooth, guess, found):
     """Orbits of a row from the left to the right: by collocation as far as it goes, else by shooting."""
     starts, monodromies, status = found
     n = guess.shape[0]
@@ -138,7 +138,7 @@ def from_left(section, source, parameters, drives, scales, end, turns, most, loo
 
 
 @part
-def from_right(section, source, parameters, drives, scales, end, most, found):  # type: ignore[no-untyped-def]
+def from_right(section, source, parameters, drives, scales, end, most, found):
     """What was not found from the left may be found from the right."""
     starts, monodromies, status = found
     n = starts.shape[1]
@@ -154,7 +154,7 @@ def from_right(section, source, parameters, drives, scales, end, most, found):  
 
 
 @part
-def from_others(section, source, parameters, drives, scales, end, most, loose, guesses, found):  # type: ignore[no-untyped-def]
+def from_others(section, source, parameters, drives, scales, end, most, loose, guesses, found):
     """What was not found from a neighbour is sought from the guesses but the first, once it is found from the left again."""
     starts, monodromies, status = found
     n = starts.shape[1]
@@ -197,7 +197,7 @@ def from_others(section, source, parameters, drives, scales, end, most, loose, g
     ),
     purpose="grids of periodic motions",
 )
-def solve_row(  # type: ignore[no-untyped-def]
+def solve_row(
     section, source, parameters, drives, scales, end, turns, most, loose, smooth, guesses, starts, monodromies, status
 ):
     """Orbits of a row of mechanisms, each begun from the last: the rows of a chart.

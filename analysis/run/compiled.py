@@ -120,7 +120,7 @@ _CARRIES = from_dtype(CARRY)[::1]
 
 
 @inner
-def _copy(source, target):  # type: ignore[no-untyped-def]
+def _copy(source, target):
     for i in range(target.shape[0]):
         target[i] = source[i]
 
@@ -129,13 +129,13 @@ def _copy(source, target):  # type: ignore[no-untyped-def]
 
 
 @inner
-def _clearance(problem, x, u, out):  # type: ignore[no-untyped-def]
+def _clearance(problem, x, u, out):
     evaluate(problem.equations[CLEARANCE], 0.0, x, problem.modes, u, problem.p, out)
     return out[0]
 
 
 @inner
-def _gap(e, t, x, u, problem, source, watch, out):  # type: ignore[no-untyped-def]
+def _gap(e, t, x, u, problem, source, watch, out):
     """What is zero where something happens: the limit of assembly, the release, event e of the user."""
     if e == ASSEMBLY:
         return _clearance(problem, x, u, out) - LIMIT_SINE
@@ -148,13 +148,13 @@ def _gap(e, t, x, u, problem, source, watch, out):  # type: ignore[no-untyped-de
 
 
 @inner
-def _crosses(before, after, direction):  # type: ignore[no-untyped-def]
+def _crosses(before, after, direction):
     """Whether an event happens between two values; one that starts at zero does not."""
     return (before < 0.0 <= after and direction >= 0.0) or (before > 0.0 >= after and direction <= 0.0)
 
 
 @inner
-def _record(carry, watch, e, t, x):  # type: ignore[no-untyped-def]
+def _record(carry, watch, e, t, x):
     row = watch.found[carry.found]
     row[0] = e
     row[1] = t
@@ -164,7 +164,7 @@ def _record(carry, watch, e, t, x):  # type: ignore[no-untyped-def]
 
 
 @inner
-def _inside(s, h, x, constant, piece, source, work, carry):  # type: ignore[no-untyped-def]
+def _inside(s, h, x, constant, piece, source, work, carry):
     """Write state and inputs at the fraction s of a step from x into ``work.dense`` and ``work.inside``."""
     interpolate(s, x, work.f, work.dense)
     if constant:
@@ -174,7 +174,7 @@ def _inside(s, h, x, constant, piece, source, work, carry):  # type: ignore[no-u
 
 
 @inner
-def _locate(e, low, high, h, x, constant, piece, problem, source, watch, work, carry):  # type: ignore[no-untyped-def]
+def _locate(e, low, high, h, x, constant, piece, problem, source, watch, work, carry):
     """Fraction of the step at which e happens, by bisection of the interpolant between two fractions."""
     positive = False
     for n in range(55):
@@ -194,7 +194,7 @@ def _locate(e, low, high, h, x, constant, piece, problem, source, watch, work, c
 
 
 @inner
-def _events_of_step(h, x, constant, piece, problem, source, watch, work, carry, cut):  # type: ignore[no-untyped-def]
+def _events_of_step(h, x, constant, piece, problem, source, watch, work, carry, cut):
     """Record the user's events inside a step, by fractions of it; returns what stops it first, and where.
 
     ``cut`` is what cuts the step short already, and where.
@@ -224,7 +224,7 @@ def _events_of_step(h, x, constant, piece, problem, source, watch, work, carry, 
 
 
 @inner
-def _end_of_interval(problem, source, samples, carry, piece):  # type: ignore[no-untyped-def]
+def _end_of_interval(problem, source, samples, carry, piece):
     """Time up to which the inputs are smooth, or held."""
     if problem.hold > 0.0:
         return samples[carry.interval + 1] if carry.interval + 1 < samples.shape[0] else problem.end
@@ -233,7 +233,7 @@ def _end_of_interval(problem, source, samples, carry, piece):  # type: ignore[no
 
 
 @inner
-def _begin_interval(stop, piece, problem, source, watch, work, carry, x, samples, states, forces):  # type: ignore[no-untyped-def]
+def _begin_interval(stop, piece, problem, source, watch, work, carry, x, samples, states, forces):
     """Sample the inputs, let commanded rates jump, record samples and what the jumps made happen; the status."""
     t, held = carry.begin, work.held
     law = source.law
@@ -278,7 +278,7 @@ def _begin_interval(stop, piece, problem, source, watch, work, carry, x, samples
 
 
 @inner
-def _not_finite(u):  # type: ignore[no-untyped-def]
+def _not_finite(u):
     """Number of a channel, or of another component, that is not finite; -1 if there is none."""
     for i in range(u.shape[0]):
         if not isfinite(u[i]):
@@ -287,7 +287,7 @@ def _not_finite(u):  # type: ignore[no-untyped-def]
 
 
 @inner
-def _refused(h, piece, constant, problem, source, work, carry, x):  # type: ignore[no-untyped-def]
+def _refused(h, piece, constant, problem, source, work, carry, x):
     """Status of a run whose step has become impossibly short."""
     status = LIMIT if abs(_clearance(problem, x, work.held, work.outputs)) < NEAR_LIMIT else NO_STEP
     if not constant:
@@ -304,7 +304,7 @@ def _refused(h, piece, constant, problem, source, work, carry, x):  # type: igno
 
 
 @inner
-def _keep_balance(y, held, problem, watch, work):  # type: ignore[no-untyped-def]
+def _keep_balance(y, held, problem, watch, work):
     """Scale the rates of a state so that the energy balance is closed, but where it is nearly at rest."""
     evaluate(problem.equations[OUTPUTS], 0.0, y, problem.modes, held, problem.p, work.outputs)
     share = work.outputs[watch.balance[0]] / work.outputs[watch.balance[1]]
@@ -315,14 +315,14 @@ def _keep_balance(y, held, problem, watch, work):  # type: ignore[no-untyped-def
 
 
 @inner
-def _released(y, problem, source):  # type: ignore[no-untyped-def]
+def _released(y, problem, source):
     """Whether the torsion bar is released in a step that ends at y."""
     law = source.law
     return law[2] != 0.0 and problem.hold == 0.0 and y[source.law_places[1]] >= law[1]
 
 
 @inner
-def _cut_of_step(clearance, h, x, constant, piece, problem, source, watch, work, carry):  # type: ignore[no-untyped-def]
+def _cut_of_step(clearance, h, x, constant, piece, problem, source, watch, work, carry):
     """What cuts a good step short, and at which fraction of it; makes the interpolant and records the events."""
     _copy(work.held, work.inside)
     for s in range(13, 16):
@@ -345,7 +345,7 @@ def _cut_of_step(clearance, h, x, constant, piece, problem, source, watch, work,
 
 
 @inner
-def _settle_events(before, cut, elapsed, h, watch, carry):  # type: ignore[no-untyped-def]
+def _settle_events(before, cut, elapsed, h, watch, carry):
     """Make times of the fractions of a step; events after the cut did not happen."""
     kept = before
     for n in range(before, carry.found):
@@ -358,7 +358,7 @@ def _settle_events(before, cut, elapsed, h, watch, carry):  # type: ignore[no-un
 
 
 @inner
-def _end_at(what, cut, t_new, h, x, constant, piece, problem, source, watch, work, carry, before):  # type: ignore[no-untyped-def]
+def _end_at(what, cut, t_new, h, x, constant, piece, problem, source, watch, work, carry, before):
     """End a step at the fraction where something cuts it short; the status."""
     interpolate(cut, x, work.f, work.dense)
     _copy(work.dense, x)
@@ -384,7 +384,7 @@ def _end_at(what, cut, t_new, h, x, constant, piece, problem, source, watch, wor
 
 
 @inner
-def _sample_step(t_new, h, x, constant, piece, source, work, carry, samples, states, forces):  # type: ignore[no-untyped-def]
+def _sample_step(t_new, h, x, constant, piece, source, work, carry, samples, states, forces):
     """Record the samples inside a step; one at its end waits for the next, or for the next interval's inputs."""
     while carry.sample < samples.shape[0] and samples[carry.sample] < t_new:
         n = carry.sample
@@ -397,7 +397,7 @@ def _sample_step(t_new, h, x, constant, piece, source, work, carry, samples, sta
 
 
 @inner
-def _cross_interval(stop, piece, problem, source, watch, work, carry, x, samples, states, forces, most):  # type: ignore[no-untyped-def]
+def _cross_interval(stop, piece, problem, source, watch, work, carry, x, samples, states, forces, most):
     """Steps, until the interval is over or cut short, or ``most`` steps or a full table of events make a pause; the status.
 
     Where it pauses it leaves ``carry.midway`` set.
@@ -483,7 +483,7 @@ def _cross_interval(stop, piece, problem, source, watch, work, carry, x, samples
 
 
 @part
-def _work(states, outputs, inputs):  # type: ignore[no-untyped-def]
+def _work(states, outputs, inputs):
     """Room for so many states, outputs and inputs."""
     return Work(
         np.zeros((16, states)),
@@ -499,7 +499,7 @@ def _work(states, outputs, inputs):  # type: ignore[no-untyped-def]
 
 
 @part
-def _run(problem, source, watch, work, carry, x, samples, states, forces, most):  # type: ignore[no-untyped-def]
+def _run(problem, source, watch, work, carry, x, samples, states, forces, most):
     events = watch.table.shape[0]
     while True:
         piece = find(carry.begin, source.breaks)
@@ -519,7 +519,7 @@ _RUN = (_PROBLEM, SOURCE, _WATCH, VECTOR, _CARRIES, VECTOR, VECTOR, MATRIX, MATR
 
 
 @kernel(int64(*_RUN), purpose="the solver")
-def run(problem, source, watch, held, carries, x, samples, states, forces, outputs, most):  # type: ignore[no-untyped-def]
+def run(problem, source, watch, held, carries, x, samples, states, forces, outputs, most):
     """Integrate one run until its end, a stopping event, ``most`` steps in all, or a full table of events.
 
     Called again with what it left behind it goes on, with the same result as in one call.
@@ -579,7 +579,7 @@ _BATCH = types.NamedTuple(
 
 
 @part
-def _own(i, source, batch):  # type: ignore[no-untyped-def]
+def _own(i, source, batch):
     """The inputs of one run of a batch; ``source`` has what is common to all."""
     pieces, waves = batch.sizes[i]
     return Source(
@@ -594,7 +594,7 @@ def _own(i, source, batch):  # type: ignore[no-untyped-def]
 
 
 @kernel(types.void(float64, SOURCE, _BATCH, MATRIX, MATRIX), purpose="the inputs of ensembles")
-def channels_of_many(t, source, batch, starts, u):  # type: ignore[no-untyped-def]
+def channels_of_many(t, source, batch, starts, u):
     """Write the channels of each run of a batch at time t and at its state into the rows of u."""
     for i in range(starts.shape[0]):
         own = _own(i, source, batch)
@@ -605,9 +605,7 @@ def channels_of_many(t, source, batch, starts, u):  # type: ignore[no-untyped-de
     types.void(_PROBLEM, SOURCE, _BATCH, _CARRIES, MATRIX, MATRIX, VECTOR, CUBE, CUBE, int64[::1], int64, int64, int64),
     purpose="the solver of ensembles",
 )
-def run_many(  # type: ignore[no-untyped-def]
-    problem, source, batch, carries, starts, held, samples, states, forces, status, outputs, most, budget
-):
+def run_many(problem, source, batch, carries, starts, held, samples, states, forces, status, outputs, most, budget):
     """Many runs one after the other: `run` for each row whose status is RUNNING, without events; ``problem`` and ``source``
     hold for all unless ``batch`` has its own.
 
@@ -642,7 +640,7 @@ def run_many(  # type: ignore[no-untyped-def]
 
 
 @kernel(types.void(int64, VECTOR, VECTOR, MATRIX, MATRIX, MATRIX), purpose="the outputs")
-def rows(equation, modes, p, states, forces, out):  # type: ignore[no-untyped-def]
+def rows(equation, modes, p, states, forces, out):
     """A function of the equations for rows of states and inputs, shapes (n, states), (n, inputs); out has its values."""
     for i in range(states.shape[0]):
         evaluate(equation, 0.0, states[i], modes, forces[i], p, out[i])

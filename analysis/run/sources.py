@@ -35,7 +35,7 @@ SOURCE = types.NamedTuple((VECTOR, CUBE, MATRIX, PLACES, VECTOR, ADDRESSES, PLAC
 
 
 @inner
-def find(t, breaks):  # type: ignore[no-untyped-def]
+def find(t, breaks):
     """Piece of the polynomials in force from t on; the outer ones go on beyond the ends."""
     n = breaks.shape[0] - 1
     i = np.searchsorted(breaks, t, side="right") - 1
@@ -43,14 +43,14 @@ def find(t, breaks):  # type: ignore[no-untyped-def]
 
 
 @inner
-def _find_before(t, breaks):  # type: ignore[no-untyped-def]
+def _find_before(t, breaks):
     """Piece of the polynomials in force up to t."""
     piece = find(t, breaks)
     return piece - 1 if piece > 0 and t == breaks[piece] else piece
 
 
 @inner
-def channels_at(begin, elapsed, piece, x, source, u):  # type: ignore[no-untyped-def]
+def channels_at(begin, elapsed, piece, x, source, u):
     """Write the channels at state x, on a given piece of the polynomials, into u.
 
     The time is the sum of ``begin`` and ``elapsed``, which is not formed: far from zero it would be rounded so much that an
@@ -89,7 +89,7 @@ def channels_at(begin, elapsed, piece, x, source, u):  # type: ignore[no-untyped
 
 
 @inner
-def _held_bar(law, angle, speed, step):  # type: ignore[no-untyped-def]
+def _held_bar(law, angle, speed, step):
     """What to add to the torsion bar's torque at an angle where it is held over a step, at a speed.
 
     The torque at the angle predicted for the middle of the step makes the impulse right to second order; that at the
@@ -100,7 +100,7 @@ def _held_bar(law, angle, speed, step):  # type: ignore[no-untyped-def]
 
 
 @kernel(types.void(float64, float64, boolean, VECTOR, SOURCE, PLACES, VECTOR, VECTOR), purpose="the sampling of inputs")
-def channels(t, ahead, left, x, source, commands, u, there):  # type: ignore[no-untyped-def]
+def channels(t, ahead, left, x, source, commands, u, there):
     """Write the channels at time t and state x into u: the limit from the left or the right where an input jumps.
 
     Where ``ahead`` is later than t they are held until then: `hold`; ``there`` is room for channels.
@@ -111,7 +111,7 @@ def channels(t, ahead, left, x, source, commands, u, there):  # type: ignore[no-
 
 
 @inner
-def hold(t, ahead, x, source, commands, u, there):  # type: ignore[no-untyped-def]
+def hold(t, ahead, x, source, commands, u, there):
     """Turn the channels at time t into those of a master that holds them until ``ahead``.
 
     A torsion bar acts with the torque of the middle of the step; a commanded rate goes along the secant, so that it meets

@@ -25,7 +25,7 @@ EXPONENT = -1.0 / tableau.ORDER
 
 
 @inner
-def stage(s, x, k, h, y):  # type: ignore[no-untyped-def]
+def stage(s, x, k, h, y):
     """State at stage s of a step of size h from x; stage 12 is its end."""
     n = x.shape[0]
     for i in range(n):
@@ -40,7 +40,7 @@ def stage(s, x, k, h, y):  # type: ignore[no-untyped-def]
 
 
 @inner
-def attempt(equation, modes, p, scale, begin, elapsed, h, x, k, y, constant, piece, source, u):  # type: ignore[no-untyped-def]
+def attempt(equation, modes, p, scale, begin, elapsed, h, x, k, y, constant, piece, source, u):
     """A step of size h from x at ``begin + elapsed``, into y, its rates at the start k[0]; its error relative to ``scale``.
 
     ``equation`` is the address of the right-hand side, ``u`` what acts; where it is not ``constant`` it is sampled at each
@@ -56,7 +56,7 @@ def attempt(equation, modes, p, scale, begin, elapsed, h, x, k, y, constant, pie
 
 
 @inner
-def _local_error(x, y, k, h, scale):  # type: ignore[no-untyped-def]
+def _local_error(x, y, k, h, scale):
     """Hairer's estimate of the error of a step from x to y relative to the scale, of order 8 in h; NaN if y is not finite."""
     sum3 = sum5 = 0.0
     for i in range(x.shape[0]):
@@ -74,20 +74,20 @@ def _local_error(x, y, k, h, scale):  # type: ignore[no-untyped-def]
 
 
 @inner
-def shorter(h, error):  # type: ignore[no-untyped-def]
+def shorter(h, error):
     """The step to try after one of size h was refused for its error, relative to the tolerance."""
     return h * (max(LEAST_FACTOR, SAFETY * error**EXPONENT) if 1.0 < error < 1e30 else 0.25)
 
 
 @inner
-def following(h, proposed, error):  # type: ignore[no-untyped-def]
+def following(h, proposed, error):
     """The step to try after one of size h, where ``proposed`` was, went well; one cut short does not shorten it."""
     factor = GREATEST_FACTOR if error == 0.0 else min(GREATEST_FACTOR, SAFETY * error**EXPONENT)
     return max(proposed, factor * h) if h < proposed else max(LEAST_FACTOR, factor) * h
 
 
 @inner
-def interpolant(x, y, k, h, f):  # type: ignore[no-untyped-def]
+def interpolant(x, y, k, h, f):
     """Coefficients of the interpolant between x and y (Hairer's contd8); k holds all sixteen stages."""
     for i in range(x.shape[0]):
         delta = y[i] - x[i]
@@ -102,7 +102,7 @@ def interpolant(x, y, k, h, f):  # type: ignore[no-untyped-def]
 
 
 @inner
-def interpolate(s, x, f, out):  # type: ignore[no-untyped-def]
+def interpolate(s, x, f, out):
     """State at the fraction s of the step."""
     for i in range(x.shape[0]):
         y = 0.0
