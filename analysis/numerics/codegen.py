@@ -26,7 +26,7 @@ from functools import cache
 from pathlib import Path
 from threading import RLock
 from types import CodeType, ModuleType
-from typing import Any
+from typing import Any, ClassVar
 
 import llvmlite
 import numba
@@ -345,13 +345,17 @@ class Kernel:
 
 
 class _Announcer(event.Listener):
+    """Says what is compiled; what several functions are for, of the first of them."""
+
+    said: ClassVar[set[str]] = set()
+
     def __init__(self, purpose: str) -> None:
-        self.purpose: str | None = purpose
+        self.purpose = purpose
 
     def on_start(self, event: Any) -> None:
-        if self.purpose is not None:
+        if self.purpose not in self.said:
             sys.stderr.write(f"linkwork: compiling {self.purpose}, once on this machine ...\n")
-            self.purpose = None
+            self.said.add(self.purpose)
 
     def on_end(self, event: Any) -> None:
         pass

@@ -16,6 +16,7 @@ import pytest
 from numba import float64, int64
 
 from analysis.mechanisms import FIVE_BAR, MECHANISMS, SLIDER_CRANK
+from analysis.numerics import codegen
 from analysis.numerics.codegen import (
     VECTOR,
     Kernel,
@@ -200,6 +201,7 @@ def test_each_compilation_says_once_what_it_is_for(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setenv("LINKWORK_CACHE_DIR", str(tmp_path / "cache"))
+    monkeypatch.setattr(codegen._Announcer, "said", set())
 
     @inner
     def helper(x: Any) -> Any:
@@ -209,8 +211,13 @@ def test_each_compilation_says_once_what_it_is_for(
     def example(x: Any) -> Any:
         return helper(x) + 1.0
 
+    @kernel(float64(float64), purpose="an example")
+    def another(x: Any) -> Any:
+        return helper(x) + 2.0
+
     assert example(2.0) == 5.0
     assert example(3.0) == 7.0
+    assert another(2.0) == 6.0
     assert capsys.readouterr().err == "linkwork: compiling an example, once on this machine ...\n"
 
 
