@@ -24,6 +24,11 @@ _CHORD_ERROR = 1e-4
 _WIDEST = 1e9
 #: Groups and uses inside each other, and elements with all uses replaced, that an SVG file may have.
 _DEPTH, _ELEMENTS = 100, 100_000
+#: Words of SVG's transformations, and the units that svgelements knows in them; what else stands there it would leave out.
+_TRANSFORMS = {
+    "matrix", "translate", "translateX", "translateY", "scale", "scaleX", "scaleY", "rotate", "skew", "skewX", "skewY",
+    "px", "pt", "pc", "mm", "cm", "in", "deg", "rad", "grad", "turn", "e", "E",
+}  # fmt: skip
 
 
 def read_points(
@@ -171,6 +176,13 @@ def _check_tree(path: Path, root: Any) -> None:
             sizes[id(element)] = 1 + sum(size(child, depth + 1) for child in inside)
         return sizes[id(element)]
 
+    for transform in filter(None, (element.get("transform") for element in root.iter())):
+        other = set(re.findall(r"[^\W\d_]+", transform)) - _TRANSFORMS
+        if other:
+            raise InputError(
+                f"{path} has the transform {transform[:100]!r}: {min(other)[:50]!r} is neither a transformation, such as "
+                "translate(10, 20), nor a number"
+            )
     if size(root, 0) > _ELEMENTS:
         raise InputError(f"{path} has more than {_ELEMENTS} elements with all its uses replaced")
 

@@ -139,17 +139,25 @@ _USES = "".join(f'<g id="a{k + 1}">{f"""<use href="#a{k}"/>""" * 10}</g>' for k 
         ('viewBox="0 0 1e400 1" width="1mm" height="1mm"', '<path d="M0 0L1 1"/>', "cannot be read|viewBox"),
         ('viewBox="0 0 1 1" width="0mm" height="0mm"', '<path d="M0 0L1 1"/>', "cannot be read"),
         ("", '<path transform="scale(0)" d="M0 0L1 1"/>', "without an extent"),
+        ("", '<g transform="scale(nan)"><path d="M0 0L1 1"/></g>', "'nan' is neither a transformation"),
         ("", '<path transform="scale(1e308) scale(1e308)" d="M0 0L1 1"/>', "without an extent"),
         ("", '<path d="M0 0L0 0"/>', "without an extent"),
         ("", '<path d="M0 0L1e308 -1e308"/>', "beyond 1e"),
     ],
-    ids=range(13),
+    ids=range(14),
 )
 def test_drawings_that_explode_or_vanish(tmp_path, attributes, inside, said):
     path = tmp_path / "x.svg"
     path.write_text(f'<svg xmlns="http://www.w3.org/2000/svg" {attributes}>{inside}</svg>')
     with pytest.raises(InputError, match=said):
         read_points(path)
+
+
+@pytest.mark.parametrize("transform", ["translate(1e2,-3.5e-1)rotate(30deg)", "matrix(1 0 0 1 5 5) skewX(1)", ""])
+def test_transformations_of_the_standard_are_read(tmp_path, transform):
+    path = tmp_path / "x.svg"
+    path.write_text(f'<svg xmlns="http://www.w3.org/2000/svg"><path transform="{transform}" d="M0 0L96 48"/></svg>')
+    assert len(read_points(path)[0]) == 2
 
 
 def test_a_use_of_a_use_is_drawn(tmp_path):
