@@ -135,9 +135,10 @@ def polish(
 
     begun = kept_of([worker.kept(start) for start in starts])
     given = [answer for answer in begun if answer.start.given]
-    # where enough of the starts themselves can race, few are fitted by squares
-    races = normal.outline is not None and normal.quality != "squares" and pivot is None
-    enough = races and normal.straight is None and len(begun) >= FITTED
+    # where enough of the starts themselves can race, few are fitted by squares; the ends of a straight part are not met by few
+    # iterations
+    races = normal.outline is not None and normal.quality != "squares" and pivot is None and normal.straight is None
+    enough = races and len(begun) >= FITTED
     fitted = starts[: sum(start.given for start in starts) + FITTED] if enough else starts
     found, interrupted = spread("fit_all", fitted)
     kept = kept_of(found)

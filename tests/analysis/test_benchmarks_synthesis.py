@@ -43,7 +43,7 @@ def good(name: str) -> Linkage:
 
     problem = PROBLEMS[name]
     return synthesize(
-        problem.task, problem.bounds, problem.constraints, search=Search(candidates=1 << 10, starts=2)
+        problem.task, problem.bounds, problem.constraints, search=Search(candidates=1 << 10, starts=4)
     ).best.linkage
 
 
