@@ -29,7 +29,7 @@ from .program import KEPT, Objective, Program
 from .refine import ITERATIONS, Refinement
 from .search import USUAL_SEARCH, Search, over_cores
 from .starts import Answer, CrankUnknown, PivotUnknown, SliderUnknown, Start, apart, inside, outside
-from .tasks import Normal
+from .tasks import Normal, Quality
 
 FloatArray = NDArray[np.float64]
 
@@ -154,17 +154,8 @@ def polish(
         best = [*given, *distinct(kept, ONWARDS, pivot)]
         kept, interrupted = spread("onwards", [(answer, ITERATIONS) for answer in best], normal.quality)
     else:
-        kept, raced = kept_of([worker.measured(answer) for answer in [*kept, *begun]]), False
-        for count, iterations in RACE[normal.quality]:
-            best = distinct([*given, *kept], count + len(given), distance=RACED)
-            done, interrupted = spread("onwards", [(answer, iterations) for answer in best], normal.quality)
-            if interrupted:
-                kept = [*done, *kept]
-                break
-            rest = [answer for answer in kept if answer not in best] if raced else []
-            # those that have come to the same optimum count as one
-            kept = distinct(kept_of([*done, *rest]), len(starts) + len(done), distance=RACED)
-            given, raced = [], True
+        begin = kept_of([worker.measured(answer) for answer in [*kept, *begun]])
+        kept, interrupted = _raced(spread, begin, given, normal.quality)
     if limits.least is not None and not interrupted:
         best = distinct(kept_of(kept) or kept_of(found), ONWARDS, pivot)
         kept, interrupted = spread("least", best, limits.least.along.name)
@@ -172,6 +163,25 @@ def polish(
     elif limits.along:
         kept = [answer for answer in kept if worker.kept(answer.start).feasible]
     return replace(Polished.of(found, kept_of(kept), interrupted, begun), done=len(starts))
+
+
+def _raced(
+    spread: Callable[[str, Sequence[Any], str], tuple[list[Answer], bool]],
+    kept: Sequence[Answer],
+    given: Sequence[Answer],
+    quality: Quality,
+) -> tuple[list[Answer], bool]:
+    """From many answers by few iterations each, from the best of these by more; whether that was interrupted."""
+    for lap, (count, iterations) in enumerate(RACE[quality]):
+        # guesses run in the first lap whatever they are worth; what does not run in it is left behind
+        best = distinct([*given, *kept], count + len(given), distance=RACED)
+        done, interrupted = spread("onwards", [(answer, iterations) for answer in best], quality)
+        if interrupted:
+            return [*done, *kept], True
+        rest = [answer for answer in kept if answer not in best] if lap else []
+        # those that have come to the same optimum count as one
+        kept, given = distinct(kept_of([*done, *rest]), len(done) + len(rest), distance=RACED), []
+    return list(kept), False
 
 
 def kept_of(answers: Sequence[Answer]) -> list[Answer]:
