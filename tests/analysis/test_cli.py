@@ -493,7 +493,7 @@ def test_resonance_over_another_parameter(linkwork, tmp_path):
 
 
 def test_stability_verdict_and_chart(linkwork, tmp_path, monkeypatch):
-    monkeypatch.setenv("LINKWORK_CACHE_DIR", str(tmp_path / "cache"))
+    monkeypatch.setattr(grids, "grid_folder", lambda: tmp_path / "grids")
     result = linkwork("stability", "--published", "table-3.1", "--no-chart")
     assert result.exit_code == 0, result.output
     assert "stable, margin 0.94" in result.output
