@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from io import StringIO
 from math import atan2, cos, degrees, hypot, isfinite, radians, sin
 from pathlib import Path
@@ -56,6 +56,8 @@ LAYERS = {
     "dimension": Layer(colour=0x1F6FB4, width=0.18e-3),
     "text": Layer(colour=0x202020, width=0.18e-3, foreground=True),
 }
+
+_ORDER = list(LAYERS)
 
 #: Units of length, by their code in the DXF variable $INSUNITS.
 UNITS = {"mm": 4, "cm": 5, "m": 6, "in": 1}
@@ -188,6 +190,14 @@ class Dimension:
         dx, dy = share * (y1 - y2), share * (x2 - x1)
         return (x1 + dx, y1 + dy), (x2 + dx, y2 + dy)
 
+    @property
+    def readable(self) -> Dimension:
+        """The same, from left to right or upwards: its number is read from below or from the right."""
+        (x1, y1), (x2, y2) = self.start, self.end
+        slight = 1e-9 * abs(y2 - y1)
+        forward = x2 - x1 > slight or (abs(x2 - x1) <= slight and y2 > y1)
+        return self if forward else replace(self, start=self.end, end=self.start, offset=-self.offset)
+
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Drawing:
@@ -285,14 +295,16 @@ def to_dxf(drawing: Drawing, unit: str = "mm") -> str:
     def at(point: Point) -> Point:
         return point[0] / metre, point[1] / metre
 
-    for line in drawing.lines:
-        space.add_line(at(line.start), at(line.end), dxfattribs={"layer": line.layer})
-    for circle in drawing.circles:
-        space.add_circle(at(circle.centre), circle.radius / metre, dxfattribs={"layer": circle.layer})
-    for polyline in drawing.polylines:
-        bulges = polyline.bulges or [0.0] * len(polyline.points)
-        points = [(x, y, bulge) for (x, y), bulge in zip((polyline.points / metre).tolist(), bulges)]
-        space.add_lwpolyline(points, format="xyb", close=polyline.closed, dxfattribs={"layer": polyline.layer})
+    for shape in sorted((*drawing.lines, *drawing.circles, *drawing.polylines), key=lambda s: _ORDER.index(s.layer)):
+        own = {"layer": shape.layer}
+        if isinstance(shape, Line):
+            space.add_line(at(shape.start), at(shape.end), dxfattribs=own)
+        elif isinstance(shape, Circle):
+            space.add_circle(at(shape.centre), shape.radius / metre, dxfattribs=own)
+        else:
+            bulges = shape.bulges or [0.0] * len(shape.points)
+            points = [(x, y, bulge) for (x, y), bulge in zip((shape.points / metre).tolist(), bulges)]
+            space.add_lwpolyline(points, format="xyb", close=shape.closed, dxfattribs=own)
     for dimension in drawing.dimensions:
         height = dimension.height / metre
         look = {
@@ -302,10 +314,11 @@ def to_dxf(drawing: Drawing, unit: str = "mm") -> str:
             "dimexe": 0.5 * height,
             "dimgap": 0.3 * height,
         }
+        readable = dimension.readable
         drawn = space.add_aligned_dim(
-            at(dimension.start),
-            at(dimension.end),
-            dimension.offset / metre,
+            at(readable.start),
+            at(readable.end),
+            readable.offset / metre,
             text=_number(dimension, metre),
             override=look | {"dimtad": 1, "dimblk": ""},
             dxfattribs={"layer": dimension.layer},
@@ -431,9 +444,8 @@ def _arrow(tip: Point, towards: Point, height: float, number: Callable[[float], 
 
 def _write(put: Callable[..., Any], dimension: Dimension, metre: float, number: Callable[[float], str]) -> None:
     """The number of a dimension over the middle of its line, readable from below or from the right."""
-    (x1, y1), (x2, y2) = dimension.line
-    turned = degrees(atan2(y2 - y1, x2 - x1))
-    turned -= 180.0 * round(turned / 180.0 - 1e-9)
+    (x1, y1), (x2, y2) = dimension.readable.line
+    turned = round(degrees(atan2(y2 - y1, x2 - x1)), 9)
     up = 0.3 * dimension.height
     x = 0.5 * (x1 + x2) - up * sin(radians(turned))
     y = 0.5 * (y1 + y2) + up * cos(radians(turned))

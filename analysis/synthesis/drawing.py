@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from itertools import combinations
 from math import hypot, isfinite, pi
 
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from linkwork.errors import AssemblyError, ParameterError
 
 from ..files import Circle, Dimension, Drawing, Line, Polyline, Text
-from .linkage import SecondCrank, SliderMotion
+from .linkage import Linkage, SecondCrank, SliderMotion, format_ratio
 from .scene import LinkageScene
 from .solution import Solution, target_points
 
@@ -24,7 +24,7 @@ PIN, LETTER = 0.008, 0.022
 
 
 def drawing(solution: Solution, rotation: float | None = None, *, poses: int = 0, title: str = "") -> Drawing:
-    """Links, pins, guide, coupler curve and target in the plane's own coordinates (m), for `files.save_drawing`.
+    """Links with their lengths, pins, guide, coupler curve and target in the plane's own coordinates (m).
 
     Parameters
     ----------
@@ -100,8 +100,21 @@ def drawing(solution: Solution, rotation: float | None = None, *, poses: int = 0
         lines=tuple(lines),
         circles=tuple(circles),
         polylines=tuple(polylines),
+        dimensions=tuple(_links(pins, solution.linkage, height)),
         texts=tuple(texts),
     )
+
+
+def _links(pins: Mapping[str, Point], linkage: Linkage, height: float) -> Iterator[Dimension]:
+    """The lengths of the links, each beside its own; of a slider-crank the offset of its guide."""
+    names = ["AE", "AB", "BC", *(["ED"] if isinstance(linkage.pivot, SecondCrank) else [])]
+    names += [] if linkage.slides else ["DC"]
+    names += ["BP"] if "P" in pins and not linkage.slider_is_point else []
+    for start, end in names:
+        if hypot(pins[end][0] - pins[start][0], pins[end][1] - pins[start][1]) > height:
+            # the ground link's on the other side: crank or second crank may lie over it
+            offset = -1.5 * height if start + end == "AE" else 1.5 * height
+            yield Dimension(layer="dimension", start=pins[start], end=pins[end], offset=offset, height=0.7 * height)
 
 
 def plates(solution: Solution, *, width: float, thickness: float, pin: float, title: str = "") -> Drawing:
@@ -153,7 +166,7 @@ def plates(solution: Solution, *, width: float, thickness: float, pin: float, ti
         at = [(float(z.real), float(z.imag)) for z in places]
         circles += [Circle(layer="hole", centre=place, radius=0.5 * pin) for place in at]
         texts += [
-            Text(layer="text", position=(x - 0.3 * height, y - 0.8 * width), height=height, text=letter)
+            Text(layer="text", position=(x + 0.5 * pin + 0.05 * width, y - 0.5 * height), height=height, text=letter)
             for letter, (x, y) in zip(holes, at)
         ]
         dimensions += [
@@ -161,6 +174,8 @@ def plates(solution: Solution, *, width: float, thickness: float, pin: float, ti
             for here, there, offset in _beside(places, width)
         ]
         label = f"{name}: {1e3 * width:g} x {1e3 * thickness:g} mm, holes {1e3 * pin:g} mm"
+        if name == "second crank" and isinstance(linkage.pivot, SecondCrank):
+            label += f", geared {format_ratio(linkage.pivot.ratio)} : 1 to the first"
         right = float(places.real.max()) + 1.2 * width
         texts.append(Text(layer="text", position=(right, float(places.imag.max())), height=height, text=label))
         top = float(places.imag.min()) - 2.6 * width

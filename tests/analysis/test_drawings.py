@@ -64,8 +64,11 @@ def test_dxf_reads_back(unit: str, metre: float, code: int) -> None:
     assert document.layers.get("crank").dxf.lineweight == 50
     space = document.modelspace()
     assert len(space) == 7
-    crank, ground = space.query("LINE")
-    assert crank.dxf.layer == "crank"
+    # by layer, whatever is drawn later over it
+    ground, crank = space.query("LINE")
+    assert (ground.dxf.layer, crank.dxf.layer) == ("ground", "crank")
+    order = [list(LAYERS).index(e.dxf.layer) for e in space if e.dxftype() != "TEXT"]
+    assert order == sorted(order)
     assert np.array(crank.dxf.end)[:2] * metre == pytest.approx([0.05, 0.02], abs=1e-9)
     assert np.array(ground.dxf.end)[:2] * metre == pytest.approx([0.4, 0.0], abs=1e-9)
     pin, slider = space.query("CIRCLE")
@@ -118,6 +121,13 @@ def test_a_dimension_is_written_beside_its_way(turned: float) -> None:
     rotation = re.match(r"rotate\((\S+)", text.attrib["transform"])
     assert rotation is not None
     assert rotation[1] == f"{0.0 - way:.6g}"
+    # in DXF, too
+    (drawn,) = read_dxf(to_dxf(Drawing(title="a way", lines=(crank,), dimensions=(dimension,)))).query("DIMENSION")
+    (number,) = (e for e in drawn.virtual_entities() if e.dxftype() == "MTEXT")
+    assert (number.get_rotation() + 89.0) % 360.0 - 89.0 == pytest.approx(way)
+    assert np.exp(1j * np.radians(-turned)) * complex(number.dxf.insert.x, number.dxf.insert.y) == pytest.approx(
+        200.0 + 100.0j, abs=12.0
+    )
 
 
 def test_extents() -> None:

@@ -260,6 +260,8 @@ def test_the_drawing_is_at_real_size(tmp_path) -> None:
     crank = next(e for e in document.modelspace() if e.dxf.layer == "crank" and e.dxftype() == "LINE")
     assert (crank.dxf.end - crank.dxf.start).magnitude == pytest.approx(50.0)
     assert sum(e.dxf.layer == "target" for e in document.modelspace()) == len(ELLIPSE)
+    measured = sorted(e.get_measurement() for e in document.modelspace().query("DIMENSION"))
+    assert measured == pytest.approx(sorted([300.0, 50.0, 215.0, 215.0, 210.0]))
 
 
 def test_the_drawing_of_moved_pivots_and_of_curves() -> None:
@@ -338,6 +340,10 @@ def flattened(outline) -> np.ndarray:
 def test_plates_of_other_kinds() -> None:
     names = {t.text.split(":")[0] for t in plates(timed(GEARED), width=0.02, thickness=0.005, pin=0.008).texts}
     assert {"ground", "second crank", "crank", "coupler", "rocker"} <= names
+    assert any(
+        "geared 2 : 1 to the first" in t.text
+        for t in plates(timed(GEARED), width=0.02, thickness=0.005, pin=0.008).texts
+    )
     assert not any("ground" in t.text for t in plates(timed(SLIDING), width=0.02, thickness=0.005, pin=0.008).texts)
     two = plates(rocker(), width=0.02, thickness=0.005, pin=0.008)
     assert len(two.circles) == 8
