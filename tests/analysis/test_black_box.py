@@ -279,6 +279,7 @@ class TestSearch:
         assert found(two) == found(one)
         assert found(other) != found(one)
 
+    @pytest.mark.slow
     @pytest.mark.parametrize("method", METHODS)
     @pytest.mark.parametrize(
         "task",

@@ -54,6 +54,7 @@ def coarse(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(charts, "SAMPLES", 12)
 
 
+@pytest.mark.slow
 def test_region_is_traced_and_is_where_the_multipliers_are_great(found: StabilityChart) -> None:
     (region,) = [t for t in found.boundaries if t.motion == "true orbit"]
     assert region.kind is Crossing.PERIOD_DOUBLING
@@ -84,6 +85,7 @@ def pieces(points: np.ndarray, above: np.ndarray) -> list[tuple[list[float], lis
     return found
 
 
+@pytest.mark.slow
 def test_removing_damping_is_the_top_of_the_region(found: StabilityChart) -> None:
     (doubling,) = found.removals
     (region,) = [t for t in found.boundaries if t.motion == "true orbit"]
@@ -96,6 +98,7 @@ def test_removing_damping_is_the_top_of_the_region(found: StabilityChart) -> Non
         assert (worst > 1.0) == (word is Stability.UNSTABLE)
 
 
+@pytest.mark.slow
 def test_long_runs_confirm_three_points(found: StabilityChart) -> None:
     assert len(found.runs) == 3
     assert all(run.confirmation.agrees for run in found.runs)
@@ -106,6 +109,7 @@ def test_long_runs_confirm_three_points(found: StabilityChart) -> None:
     assert float(margins[rows[1]]) == margins.min()
 
 
+@pytest.mark.slow
 def test_files_and_plot(found: StabilityChart, tmp_path: Path) -> None:
     rows = np.loadtxt(found.to_csv(tmp_path / "chart.csv"), delimiter=",", skiprows=1)
     assert rows.shape == (41 * 41, 4)

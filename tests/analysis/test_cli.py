@@ -471,6 +471,7 @@ def test_pages_without_plotly_are_refused_before_anything_is_computed(linkwork, 
     assert "python -m pip install 'linkwork[html]'" in " ".join(result.stderr.split())
 
 
+@pytest.mark.slow
 def test_resonance_reports_what_could_not_be_followed(linkwork, tmp_path):
     result = linkwork(
         "resonance", "--published", "table-3.1", "--vary", "slider.stiffness", "--from", "10 N/m", "--to", "350 N/m",

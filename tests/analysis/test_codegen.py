@@ -183,6 +183,7 @@ def _compile_and_run() -> dict[str, Any]:
     }
 
 
+@pytest.mark.slow
 def test_second_process_finds_the_code_of_the_first(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:

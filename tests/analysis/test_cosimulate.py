@@ -170,6 +170,7 @@ def _check_random_mechanisms(fmu: str, root: str, count: int) -> dict[str, Any]:
     return {"worst": sorted(worst)[-5:], "ended": ended}
 
 
+@pytest.mark.slow
 def test_fmu_and_in_process_solver_agree_on_random_mechanisms(fmu: Path) -> None:
     found = run_in_process(_check_random_mechanisms, fmu, Path(__file__).parents[2], 100, timeout=240.0)
     assert found["worst"][-1][0] <= 1e-6, found["worst"]

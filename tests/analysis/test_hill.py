@@ -162,6 +162,7 @@ def test_mathieu_below_all_regions() -> None:
 # Hill
 
 
+@pytest.mark.slow
 @given(st.integers(0, 10_000))
 @settings(max_examples=15, deadline=None)
 def test_hills_multipliers_are_those_of_the_monodromy(seed: int) -> None:

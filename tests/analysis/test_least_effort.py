@@ -217,6 +217,7 @@ def test_a_spring_designed_along_saves_effort(within) -> None:
         assert found.effort < 0.99 * held.effort
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("cost", ["power", "positive power"])
 def test_least_power(cost, within) -> None:
     found = least_effort(RIG, SPEED, TARGET, 1e-3, cost=cost, limits=MotionLimits(force=20.0))

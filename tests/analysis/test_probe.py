@@ -114,6 +114,7 @@ def names(calls: list[str]) -> list[str]:
     return [call.split("(")[0] for call in calls]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("fault", "interface", "check", "severity", "key"), PLANTED)
 def test_a_planted_fault_is_found(fmu, fault, interface, check, severity, key, monkeypatch):
     monkeypatch.setenv("PROBE_FAULT", fault)
@@ -146,6 +147,7 @@ PLANTED_IN_3 = [
 ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("fault", "interface", "check", "severity", "key"), PLANTED_IN_3)
 def test_a_planted_fault_is_found_in_fmi_3(fmus, fault, interface, check, severity, key, monkeypatch):
     test_a_planted_fault_is_found(fmus[3], fault, interface, check, severity, key, monkeypatch)

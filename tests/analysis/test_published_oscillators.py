@@ -201,6 +201,7 @@ def cascade() -> list[Branch]:
     return branches
 
 
+@pytest.mark.slow
 def test_the_pendulum_doubles_its_period_where_others_found(cascade: list[Branch]) -> None:
     assert [branch.turns for branch in cascade] == [1, 2, 4, 8]
     doublings = [branch.special[0] for branch in cascade]

@@ -65,6 +65,7 @@ def test_rig_1_spring_a_has_its_maximum_and_minimum_where_the_reference_has_them
     assert set(response.branches[0].stability()) == {Stability.STABLE}
 
 
+@pytest.mark.slow
 def test_rig_1_spring_b_folds_and_doubles(response_b) -> None:  # type: ignore[no-untyped-def]
     low, high, doubled = response_b.branches
     assert min(abs(e.parameter / RPM - MAXIMUM_B) for e in response_b.maxima()) < 0.5
@@ -150,6 +151,7 @@ def test_approximations_hidden_under_the_true_motion_are_drawn_by_their_errors()
     assert error[place] == pytest.approx(100.0 * abs(linear / orbit.amplitude - 1.0), rel=1e-3)
 
 
+@pytest.mark.slow
 def test_approximations_that_can_be_seen_are_in_the_legend() -> None:
     far = frequency_response(RIG["b"], 900.0 * RPM, 1100.0 * RPM)
     main = figures.plot(far, beside=approximations(far, points=5)).axes[0]

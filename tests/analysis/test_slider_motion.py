@@ -401,6 +401,7 @@ def test_a_solution_of_an_open_path_brings_its_rotations() -> None:
 # Smoothness
 
 
+@pytest.mark.slow
 def test_smoothness_costs_error_and_never_the_other_way() -> None:
     accelerations = np.array([0.02, 0.005, 0.05, 0.01])
     curve = smoothness_curve(WEIGHTED.task, PRINTED, SliderUnknown(harmonics=2), accelerations)

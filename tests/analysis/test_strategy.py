@@ -125,6 +125,7 @@ def test_a_second_crank_that_turns_by_itself_is_the_last_resort() -> None:
     assert pivot.series.amplitudes[1] == pytest.approx(psi.amplitudes[1], rel=1e-4)
 
 
+@pytest.mark.slow
 def test_what_none_can_do_is_answered_with_the_nearest() -> None:
     """A square, whose corners no series of two harmonics makes."""
     corners = np.array([[0.0, 0.0], [0.1, 0.0], [0.1, 0.1], [0.0, 0.1], [0.0, 0.0]])

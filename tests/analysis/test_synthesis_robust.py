@@ -148,6 +148,7 @@ class TestSimilarity:
 
     CURVE = np.column_stack([np.cos(turn(24)), 0.5 * np.sin(turn(24)) + 0.1 * np.cos(2.0 * turn(24))])
 
+    @pytest.mark.slow
     @pytest.mark.parametrize(
         ("scale", "turned", "moved"),
         [

@@ -105,6 +105,7 @@ class TestResult:
         assert plant == best.linkage.to_five_bar(density=2700.0, section=(0.03, 0.01), slider_stiffness=1e6)
         assert plant.crank_mass == pytest.approx(2700.0 * 0.03 * 0.01 * best.linkage.crank_length)
 
+    @pytest.mark.slow
     @pytest.mark.parametrize("n_jobs", [1, 2])
     def test_interrupted_it_hands_over_the_best_so_far(self, monkeypatch: pytest.MonkeyPatch, n_jobs: int) -> None:
         timer = threading.Timer(0.5, signal.raise_signal, [signal.SIGINT])
@@ -374,6 +375,7 @@ class TestTradeOff:
             else:
                 assert solution.linkage.least_transmission >= limit - 1e-6
 
+    @pytest.mark.slow
     def test_an_area_only_grows_as_the_size_is_limited(self) -> None:
         task = UntimedPath(path=TargetPath(points=ELLIPSE, closed=True), samples=24)
         errors = trade_off(task, "size", [0.2, 0.3, 1.0, 2.0], search=Search(starts=4)).error

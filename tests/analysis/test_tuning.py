@@ -150,6 +150,7 @@ def test_derivatives_of_the_conditions_are_those_of_differences(of):
 # Against independent searches
 
 
+@pytest.mark.slow
 def test_least_damping_is_that_which_removes_the_region():
     """Section 5 of the thesis in one line: where the region vanishes, by a root search without any of the tuning's parts."""
     asked = wish(
@@ -182,6 +183,7 @@ def test_resonance_is_led_to_the_nearer_end():
     assert tuned.values[0] == pytest.approx(brentq(away, 4100.0, 4300.0, rtol=1e-7), rel=3e-4)
 
 
+@pytest.mark.slow
 def test_a_closed_branch_vanishes_where_its_two_folds_meet():
     """The greatest damping on the curve of its folds, a boundary that is followed in the plane of both."""
     tuned = tune(wish(**OF_TONGUE, speeds=(0.85, 1.0)))

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import pytest
+
 import benchmarks.fmu
 
 from .runner import run_in_process
@@ -24,6 +26,7 @@ def short_benchmark(root: str) -> str:
     return output.getvalue()
 
 
+@pytest.mark.slow
 def test_benchmark() -> None:
     root = Path(benchmarks.fmu.__file__).resolve().parents[1]
     output = run_in_process(short_benchmark, root, options=(), timeout=300.0)

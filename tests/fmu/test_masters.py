@@ -148,7 +148,13 @@ TABLE = [
     *(Row("host", kind, refused=(0.051, None, SENTENCE)) for kind in ALL),
     *(Row("host", kind, STATES, refused=(None, None, "the equations are not defined")) for kind in NATIVE),
 ]
-each_row = pytest.mark.parametrize("row", TABLE, ids=lambda row: "-".join((row.master, row.kind, row.interface)))
+#: Masters that take seconds to start.
+SLOW = ("cofmupy", "pathsim")
+each_row = pytest.mark.parametrize(
+    "row",
+    [pytest.param(row, marks=pytest.mark.slow if row.master in SLOW else ()) for row in TABLE],
+    ids=lambda row: "-".join((row.master, row.kind, row.interface)),
+)
 
 
 def need(master: str) -> None:

@@ -99,7 +99,7 @@ UNJUDGED = {
     ("rig-1-friction", "friction in the pins contributes"),
 }
 #: Studies whose results take more than a second or two.
-LONG = {"8.7", *(f"8.{n}" for n in range(14, 22)), "rig-1-resonance", "rig-1-friction", "rig-2-forces"}
+LONG = {*(f"8.{n}" for n in (*range(7, 12), *range(13, 22))), "rig-1-resonance", "rig-1-friction", "rig-2-forces"}
 
 
 @every("8.", LONG)
