@@ -5,7 +5,6 @@ from __future__ import annotations
 import sys
 import tomllib
 from collections.abc import Callable, Collection, Sequence
-from math import cos, sin
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -27,12 +26,12 @@ from .common import (
     plain,
     print_error,
     print_written,
+    say,
     set_option,
     workers_options,
 )
 
 if TYPE_CHECKING:
-    from ..motion import SliderDrive
     from ..synthesis import PinForces, Solution, TradeOff
 
 #: Further positions in a drawing.
@@ -161,13 +160,20 @@ def write_solution(
     slides = solution.linkage.slides
     if not (slides or isinstance(pivot, SecondCrank)):
         written.append(save_parameters(folder / "five-bar-parameters.toml", make.five_bar(solution)))
-    if pivot is None and not slides:
-        written.append(write_tables(folder / "five-bar.toml", make.run_case(solution, title)))
+    if pivot is None:
+        case = folder / ("slider-crank.toml" if slides else "five-bar.toml")
+        written.append(write_tables(case, make.run_case(solution, title)))
+    if isinstance(pivot, SecondCrank):
+        say(
+            "no case to run: the house has no mechanism with two geared cranks; its drawings, sheet and curve are written"
+        )
     cut = plates(solution, width=make.width, thickness=make.thickness, pin=make.hole, title=title)
     written += [save_drawing(folder / f"best-plates.{ending}", cut) for ending in ("dxf", "svg")]
     if plots:
         written.append(save_figure(figures.plot(solution, title=title), folder / "best-linkage.png"))
-        sheet = figures.plot_sheet(solution, _turn(solution, make), title=title, made=make.describe())
+        forces = _forces(solution, make)
+        made = make.describe(forces=forces is not None)
+        sheet = figures.plot_sheet(solution, forces, title=title, made=made)
         written.append(save_figure(sheet, folder / "best-sheet.pdf"))
     if animate:
         with console.status("animating"):
@@ -175,17 +181,14 @@ def write_solution(
     return written
 
 
-def _turn(solution: Solution, make: Any) -> SliderDrive | None:
-    """A turn at constant speed, the slider where it is to be; None if the plant has no such linkage or it cannot turn."""
-    from ..motion import inverse_dynamics, motion_of_plant
-    from ..synthesis import SecondCrank, direction
+def _forces(solution: Solution, make: Any) -> PinForces | None:
+    """The forces on the pins at constant speed; None if the plant has no such linkage, or it is not joined on its way."""
+    from ..synthesis import pin_forces
 
-    linkage = solution.linkage
-    if isinstance(linkage.pivot, SecondCrank) or linkage.slides or not linkage.turns_fully:
+    if solution.linkage.pivot is not None or not solution.verdicts.circuit:
         return None
-    speed = direction(solution) * make.speed
-    load = make.load_along(cos(linkage.ground_angle), sin(linkage.ground_angle))
-    return inverse_dynamics(make.moving(linkage), motion_of_plant(linkage), speed, load=load, samples=360)
+    way = None if solution.verdicts.full_turn else (float(solution.rotation.min()), float(solution.rotation.max()))
+    return pin_forces(solution.linkage, make, way, run=False)
 
 
 @click.command()

@@ -22,12 +22,12 @@ from numpy.typing import NDArray
 
 from linkwork.errors import InputError
 
-from ..motion import SliderDrive
 from ..synthesis import (
     OVER,
     SHOWN,
     InfeasibleError,
     LinkageScene,
+    PinForces,
     Solution,
     Synthesis,
     TradeOff,
@@ -390,14 +390,14 @@ def plot_solution(solution: Solution, *, title: str = "") -> Figure:
         return finish(figure)
 
 
-def plot_sheet(solution: Solution, drive: SliderDrive | None = None, *, title: str = "", made: str = "") -> Figure:
+def plot_sheet(solution: Solution, forces: PinForces | None = None, *, title: str = "", made: str = "") -> Figure:
     """A page for the workshop, A4: the linkage, its curve against the target, transmission angle, pin forces, dimensions.
 
     Parameters
     ----------
     solution : Solution
-    drive : SliderDrive, optional
-        A turn at constant speed: the forces on the pins are its. Without it there is no panel of them.
+    forces : PinForces, optional
+        Without them there is no panel of them.
     title : str
     made : str
         What it is made of, and what its forces are for, in a line.
@@ -412,7 +412,7 @@ def plot_sheet(solution: Solution, drive: SliderDrive | None = None, *, title: s
     frame = _Frame(scene, _around(scene))
     with styled():
         figure = Figure(figsize=A4)
-        right = ["task", "transmission", *(["forces"] if drive is not None else [])]
+        right = ["task", "transmission", *(["forces"] if forces is not None else [])]
         rows: list[Any] = [*(["linkage", name] for name in right), ["table", "table"]]
         panels = figure.subplot_mosaic(
             rows,
@@ -428,8 +428,8 @@ def plot_sheet(solution: Solution, drive: SliderDrive | None = None, *, title: s
         else:
             _enlarged(panels["task"], scene)
         _transmission(panels["transmission"], scene)
-        if drive is not None:
-            _forces(panels["forces"], drive)
+        if forces is not None:
+            _forces(panels["forces"], forces, "guide" if solution.linkage.slides else "D")
         head, *dimensions = dimension_rows(solution)
         panels["table"].axis("off")
         grid = panels["table"].table(
@@ -440,19 +440,25 @@ def plot_sheet(solution: Solution, drive: SliderDrive | None = None, *, title: s
         grid.auto_set_column_width(range(len(head)))
         write_title(figure, scene.title)
         write_notes(
-            figure, [line for line in (headline(solution).replace("\n", "; "), rounding_line(solution), made) if line]
+            figure,
+            [
+                line
+                for line in (
+                    f"{solution.verdicts.grashof}; " + headline(solution).replace("\n", "; "),
+                    rounding_line(solution),
+                    made,
+                )
+                if line
+            ],
         )
         return finish(figure)
 
 
-def _forces(axis: Axes, drive: SliderDrive) -> None:
-    """The resultant force on each pin over a turn of the crank."""
-    turned = np.degrees(np.abs(drive.crank_angle))
-    for pin, colour in zip("ABCD", COLOURS):
-        force = np.hypot(drive[f"pin.{pin}.fx"], drive[f"pin.{pin}.fy"])
-        axis.plot(turned, force, color=colour, label=f"{pin}: {force.max():.3g} N at most")
-    _quarters(axis, np.array([0.0, 360.0]))
-    axis.set_xlabel("crank angle from the ground link [deg]")
+def _forces(axis: Axes, forces: PinForces, last: str) -> None:
+    """The resultant force on each pin over the rotation of the crank, the last of them by another name."""
+    for pin, force, colour in zip(("A", "B", "C", last), forces.force.T, COLOURS):
+        axis.plot(np.degrees(forces.rotation), force, color=colour, label=f"{pin}: {force.max():.3g} N at most")
+    _quarters(axis, np.degrees(forces.rotation))
     axis.set_ylabel("pin force [N]")
     axis.legend(loc="lower center", bbox_to_anchor=(0.5, 0.97), ncols=4, borderpad=0.2, columnspacing=1.0)
 

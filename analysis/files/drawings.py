@@ -295,7 +295,8 @@ def to_dxf(drawing: Drawing, unit: str = "mm") -> str:
     def at(point: Point) -> Point:
         return point[0] / metre, point[1] / metre
 
-    for shape in sorted((*drawing.lines, *drawing.circles, *drawing.polylines), key=lambda s: _ORDER.index(s.layer)):
+    shapes: list[Line | Circle | Polyline] = [*drawing.lines, *drawing.circles, *drawing.polylines]
+    for shape in sorted(shapes, key=lambda one: _ORDER.index(one.layer)):
         own = {"layer": shape.layer}
         if isinstance(shape, Line):
             space.add_line(at(shape.start), at(shape.end), dxfattribs=own)

@@ -212,11 +212,14 @@ class Way(NamedTuple):
         The task's crank rotations, where it gives any.
     straight : bool
         Whether the bounds hold the coupler point on the line of B and C.
+    sliding : bool
+        Whether it is about a slider-crank.
     """
 
     turn: bool
     rotation: FloatArray | None
     straight: bool = False
+    sliding: bool = False
 
     def ends(self, what: str) -> tuple[float, float]:
         """First and last crank angle of a turn, or crank rotation of the task.
@@ -386,9 +389,14 @@ class Limits:
 
 
 def limits_of(
-    task: Task, normal: Normal, bounds: Mapping[str, tuple[float, float]] | None, constraints: Sequence[Constraint]
+    task: Task,
+    normal: Normal,
+    bounds: Mapping[str, tuple[float, float]] | None,
+    constraints: Sequence[Constraint],
+    *,
+    sliding: bool = False,
 ) -> Limits:
-    """Bounds and constraints of a task in normal form.
+    """Bounds and constraints of a task in normal form, of a four-bar or a slider-crank.
 
     Raises
     ------
@@ -410,7 +418,7 @@ def limits_of(
         if not isinstance(c, Constraint):
             raise InputError(f"constraint {c!r} is none: use {', '.join(_kinds())}")
     given = _ends(task, normal, bounds, constraints)
-    _check_links(given, constraints)
+    _check_links(given, constraints, sliding)
     _check_reach(given, normal)
     lows, highs = (np.array([given[name][end] for name in UNKNOWNS]) for end in (0, 1))
     shift, scale = np.zeros(len(UNKNOWNS)), np.ones(len(UNKNOWNS))
@@ -418,7 +426,7 @@ def limits_of(
     scale[:7] = normal.unit
     turn, way, grashof = _turning(constraints)
     straight = given["point_distance"][1] == 0.0 or given["point_angle"] in ((0.0, 0.0), (pi, pi), (-pi, -pi))
-    over = Way(turn is not None, normal.rotation, straight)
+    over = Way(turn is not None, normal.rotation, straight, sliding)
     least = [found for c in constraints if isinstance(c, Demand) and (found := c.sought(over, normal))]
     if len(least) > 1:
         raise InputError("more than one thing is to be made small: a search has one objective")
@@ -438,6 +446,7 @@ def limits_of(
             if isinstance(c, PivotRegion)
         ),
         requires=tuple(r for c in constraints for r in _required(c, over)),
+        sliding=sliding,
         least=least[0] if least else None,
     )
 
@@ -532,16 +541,17 @@ def _ordered(name: str, ends: tuple[float | None, float | None], usual: tuple[fl
     return low, high
 
 
-def _check_links(given: Mapping[str, tuple[float, float]], constraints: Sequence[Constraint]) -> None:
+def _check_links(given: Mapping[str, tuple[float, float]], constraints: Sequence[Constraint], sliding: bool) -> None:
     """Make sure that bounds alone leave a linkage whose crank turns, where that is asked."""
     if not any(isinstance(c, FullTurn) or (isinstance(c, LeastTransmission) and c.over == "turn") for c in constraints):
         return
     l1, l2, l3, l4 = (given[name] for name in LINKS)
-    # l1 + l2 <= l3 + l4 is needed for a full turn
-    if l1[0] + l2[0] > l3[1] + l4[1]:
+    # l1 + l2 <= l3 + l4 is needed for a full turn, of a slider-crank l1 + l2 <= l3
+    least, most = l1[0] + l2[0], l3[1] + (0.0 if sliding else l4[1])
+    if least > most:
         raise InfeasibleError(
-            f"the crank cannot turn fully: ground link and crank are at least {l1[0] + l2[0]:g} m together, coupler and rocker "
-            f"at most {l3[1] + l4[1]:g} m"
+            f"the crank cannot turn fully: {'offset' if sliding else 'ground link'} and crank are at least "
+            f"{1e3 * least:.4g} mm together, {'the coupler' if sliding else 'coupler and rocker'} at most {1e3 * most:.4g} mm"
         )
 
 

@@ -110,10 +110,11 @@ def _links(pins: Mapping[str, Point], linkage: Linkage, height: float) -> Iterat
     names = ["AE", "AB", "BC", *(["ED"] if isinstance(linkage.pivot, SecondCrank) else [])]
     names += [] if linkage.slides else ["DC"]
     names += ["BP"] if "P" in pins and not linkage.slider_is_point else []
-    for start, end in names:
+    for name in names:
+        start, end = name[0], name[1]
         if hypot(pins[end][0] - pins[start][0], pins[end][1] - pins[start][1]) > height:
             # the ground link's on the other side: crank or second crank may lie over it
-            offset = -1.5 * height if start + end == "AE" else 1.5 * height
+            offset = -1.5 * height if name == "AE" else 1.5 * height
             yield Dimension(layer="dimension", start=pins[start], end=pins[end], offset=offset, height=0.7 * height)
 
 

@@ -1,4 +1,4 @@
-"""Forces on the pins of a four-bar that runs at a constant speed, as a bound and as what is made small.
+"""Forces on the pins of a four-bar or a slider-crank that runs at a constant speed, as a bound and as what is made small.
 
 They are those of the plant with its slider held, traced for exact derivatives by the dimensions; masses follow from the
 dimensions by one law (`masses`, `making.Make`). What is found is run in the compiled plant itself (`pin_forces`).
@@ -9,12 +9,13 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from functools import cache
 from math import isfinite, pi
+from types import SimpleNamespace
 from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from linkwork.errors import InputError, ParameterError
+from linkwork.errors import AssemblyError, InputError, ParameterError
 from linkwork.five_bar.dynamics import Inputs as Acting
 from linkwork.five_bar.dynamics import Motion
 from linkwork.five_bar.parameters import FiveBarParameters, InitialState
@@ -27,7 +28,8 @@ from . import masses
 from .constraints import Along, Demand, Least, Require, Way
 from .limit_positions import grid, looked
 from .linkage import Linkage
-from .making import USUAL_MAKE, Make
+from .making import FAR, USUAL_MAKE, Make
+from .masses import on_line
 from .tasks import Normal
 
 FloatArray = NDArray[np.float64]
@@ -38,7 +40,9 @@ TURN = 720
 HEAVY = 1e8
 
 
-def pin_functions(d: Any, make: Make, crank_angle: Any, *, straight: bool = False) -> dict[str, tuple[Any, Any]]:
+def pin_functions(
+    d: Any, make: Make, crank_angle: Any, *, straight: bool = False, sliding: bool = False
+) -> dict[str, tuple[Any, Any]]:
     """Components of the force in each pin along and across the ground link (N), of CasADi's symbols and numbers.
 
     Parameters
@@ -50,18 +54,32 @@ def pin_functions(d: Any, make: Make, crank_angle: Any, *, straight: bool = Fals
         th2 (rad).
     straight : bool
         Whether the coupler point is on the line of B and C, see `masses.bodies`.
+    sliding : bool
+        Whether it is a slider-crank: D is then the force of the guide on its slider.
     """
     casadi = symbolic.library()
     kind, plant, law = _traced()
     line = make.density * make.width * make.thickness
+    links = {name: getattr(d, name) for name in ("ground_length", "crank_length", "coupler_length", "rocker_length")}
+    far = FAR * d.coupler_length
+    if sliding:
+        links |= {"ground_length": d.ground_length + far, "rocker_length": far}
     made = law(
-        d.crank_length, d.coupler_length, d.rocker_length, d.point_distance, d.point_angle, line, make.width, straight
+        d.crank_length,
+        d.coupler_length,
+        links["rocker_length"],
+        d.point_distance,
+        d.point_angle,
+        line,
+        make.width,
+        straight,
     )
     parameters = kind(
         **_DEFAULTS
-        | {name: getattr(d, name) for name in ("ground_length", "crank_length", "coupler_length", "rocker_length")}
+        | links
         | made
         | make.weighed(made)
+        | (make.sliding(far) if sliding else {})
         | {
             "slider_mass": 1.0,
             "coupler_point_distance": d.point_distance,
@@ -102,7 +120,7 @@ _DEFAULTS: dict[str, Any] = {
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class PinForces:
-    """The forces on the pins over a turn at constant speed, or over the way of a task: a run of the compiled plant.
+    """The forces on the pins over a turn at constant speed, or over the way of a task.
 
     Attributes
     ----------
@@ -138,18 +156,23 @@ class PinForces:
         return float(self.force[:, [PINS.index(pin) for pin in pins]].max())
 
 
-def pin_forces(linkage: Linkage, make: Make, rotation: tuple[float, float] | None = None) -> PinForces:
-    """Run the plant with a linkage at constant speed.
+def pin_forces(
+    linkage: Linkage, make: Make, rotation: tuple[float, float] | None = None, *, run: bool = True
+) -> PinForces:
+    """Forces on the pins of a linkage at constant speed.
 
-    The slider is so heavy that it stays where it is, its weight carried by the control force.
+    They are of a run of the compiled plant, its slider so heavy that it stays where it is, its weight carried by the control
+    force; or of the plant's equations alone.
 
     Parameters
     ----------
     linkage : Linkage
-        With a fixed pivot.
+        With a fixed pivot, or a slider-crank: D is then the force of the guide on its slider.
     make : Make
     rotation : (float, float), optional
         From which rotation of the crank to which one (rad); a turn by default.
+    run : bool
+        Whether the plant is run.
 
     Raises
     ------
@@ -161,6 +184,8 @@ def pin_forces(linkage: Linkage, make: Make, rotation: tuple[float, float] | Non
     if linkage.pivot is not None:
         raise ParameterError("pivot", linkage.pivot, "be fixed: of a moved one see motion.inverse_dynamics")
     begin, end = (0.0, 2.0 * pi) if rotation is None else rotation
+    if not run:
+        return _held(linkage, make, np.linspace(begin, end, TURN + 1))
     made = make.moving(linkage)
     heavy = HEAVY * (made.crank_mass + made.coupler_mass + made.rocker_mass)
     parameters = replace(made, slider_mass=heavy, slider_stiffness=0.0, slider_damping=0.0, slider_coulomb_friction=0.0)
@@ -169,14 +194,27 @@ def pin_forces(linkage: Linkage, make: Make, rotation: tuple[float, float] | Non
     acting = Inputs(speed=make.speed, force=weight, load_x=float(x), load_y=float(y))
     start = InitialState(crank_angle=begin + linkage.crank_phase)
     samples = np.linspace(0.0, (end - begin) / make.speed, TURN + 1)
-    run = simulate(parameters, acting, initial=start, samples=samples)
-    if run.time[-1] < samples[-1]:
+    done = simulate(parameters, acting, initial=start, samples=samples)
+    if done.time[-1] < samples[-1]:
         raise InputError(
-            f"the plant did not run from a crank rotation of {begin:.6g} rad to {end:.6g} rad: {run.message}"
+            f"the plant did not run from a crank rotation of {begin:.6g} rad to {end:.6g} rad: {done.message}"
         )
-    force = np.column_stack([np.hypot(run[f"pin.{pin}.fx"], run[f"pin.{pin}.fy"]) for pin in PINS])
-    moved = float(np.abs(run["slider.position"]).max())
-    return PinForces(rotation=begin + make.speed * run.time, force=force, moved=moved)
+    force = np.column_stack([np.hypot(done[f"pin.{pin}.fx"], done[f"pin.{pin}.fy"]) for pin in PINS])
+    moved = float(np.abs(done["slider.position"]).max())
+    return PinForces(rotation=begin + make.speed * done.time, force=force, moved=moved)
+
+
+def _held(linkage: Linkage, make: Make, rotation: FloatArray) -> PinForces:
+    """By the plant's equations, its slider held."""
+    casadi, d = symbolic.library(), SimpleNamespace(**linkage.values())
+    straight = on_line(linkage.coupler_length, linkage.point_distance, linkage.point_angle)
+    th2 = casadi.DM(linkage.crank_angle(rotation))
+    found = pin_functions(d, make, th2, straight=straight, sliding=linkage.slides)
+    force = np.column_stack([np.hypot(*(np.array(f).ravel() for f in found[pin])) for pin in PINS])
+    if not np.isfinite(force).all():
+        at = float(rotation[np.argmin(np.isfinite(force).all(axis=1))])
+        raise AssemblyError(f"the links cannot be joined at a crank rotation of {at:.6g} rad")
+    return PinForces(rotation=rotation, force=force, moved=0.0)
 
 
 def _check_pins(pins: str) -> None:
@@ -197,7 +235,8 @@ class _Forces(Demand):
 
         def magnitudes(d: Any, rotation: Any) -> Any:
             casadi = symbolic.library()
-            found = pin_functions(d, self.make, rotation if turn else rotation + d.crank_phase, straight=way.straight)
+            th2 = rotation if turn else rotation + d.crank_phase
+            found = pin_functions(d, self.make, th2, straight=way.straight, sliding=way.sliding)
             # a force of zero has a slope, too
             chosen = [found[pin] for pin in self.pins]
             return casadi.horzcat(*(casadi.sqrt(x * x + y * y + 1e-18) for x, y in chosen))

@@ -21,6 +21,7 @@ from .constraints import (
     UNKNOWNS,
     Assembly,
     Constraint,
+    Demand,
     FullTurn,
     LargestLink,
     LeastTransmission,
@@ -98,9 +99,13 @@ def _time_ratio(asked: TimeRatio) -> tuple[Require, ...]:
 _ANY: tuple[type, ...] = (LeastTransmission, FullTurn, LargestLink, Assembly, PivotRegion, Require)
 _KEPT: Mapping[Kind, tuple[type, ...]] = {
     "four-bar": get_args(Constraint),
-    "slider-crank": (*_ANY, TimeRatio, Stroke),
+    "slider-crank": (*_ANY, Demand, Stroke),
     "geared-five-bar": _ANY,
 }
+
+
+#: Why a five-bar can keep none of the demands.
+_NO_DEMANDS = "both its cranks turn, so that nothing of it rests, and the plant of the pin forces has no second crank"
 
 
 def usual_kinds(task: Task) -> tuple[Kind, ...]:
@@ -164,7 +169,8 @@ def _check_constraints(kind: Kind, constraints: Sequence[Any]) -> None:
         if (known and not isinstance(c, _KEPT[kind])) or (kind == "slider-crank" and getattr(c, "pivot", None) == "D"):
             name = "a region of pivot D" if isinstance(c, PivotRegion) else type(c).__name__
             able = [other for other, kept in _KEPT.items() if isinstance(c, kept) and other != kind]
-            raise InputError(f"a {kind} cannot keep {name}: leave it out, or ask for {' or '.join(able)} alone")
+            why = "" if kind == "slider-crank" or not isinstance(c, Demand) else f" ({_NO_DEMANDS})"
+            raise InputError(f"a {kind} cannot keep {name}{why}: leave it out, or ask for {' or '.join(able)} alone")
 
 
 def _of_slider_crank(task: Task, normal: Normal, bounds: Any, constraints: Sequence[Any]) -> Limits:
@@ -188,13 +194,13 @@ def _of_slider_crank(task: Task, normal: Normal, bounds: Any, constraints: Seque
         )
         bounds = {"point_angle": (0.0, 0.0)} | dict(bounds or {})
     given = {"ground_length": (0.0, None)} | {n: ends for n, ends in dict(bounds or {}).items() if n != "rocker_length"}
-    limits = limits_of(task, normal, given, own)
+    limits = limits_of(task, normal, given, own, sliding=True)
     low, high = limits.low.copy(), limits.high.copy()
     low[UNKNOWNS.index("rocker_length")] = high[UNKNOWNS.index("rocker_length")] = 0.0
     offset = UNKNOWNS.index("ground_length")
     asked = given["ground_length"][0]
     low[offset] = (asked or 0.0) / normal.unit
-    return replace(limits, low=low, high=high, sliding=True)
+    return replace(limits, low=low, high=high)
 
 
 def _of_five_bars(

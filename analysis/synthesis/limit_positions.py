@@ -1,7 +1,8 @@
-"""Where a four-bar stands still or cannot go on, and what its crank gains: dead centres, toggles, time ratio, advantage.
+"""Where a four-bar or a slider-crank stands still or cannot go on, and what its crank gains.
 
-In a dead centre crank and coupler lie in one line, and the rocker rests at the end of its swing; in a toggle coupler and rocker
-do, and the crank can go no farther. See R. L. Norton, Design of Machinery, 6th ed., 2020, chapters 2, 3 and 6.
+In a dead centre crank and coupler lie in one line, and rocker or slider rest at the end of their travel; in a toggle coupler
+and rocker do, or the coupler is square to the guide, and the crank can go no farther. See R. L. Norton, Design of Machinery,
+6th ed., 2020, chapters 2, 3 and 6.
 """
 
 from __future__ import annotations
@@ -23,6 +24,7 @@ from ..numerics import symbolic
 from ..run import traced
 from ..units import Amount, in_si
 from .constraints import TURNING, Along, Demand, Require, Way
+from .kernels import guided
 from .linkage import Linkage, transmission_excess
 
 FloatArray = NDArray[np.float64]
@@ -35,7 +37,7 @@ BEYOND = 0.02
 
 
 def dead_centres(linkage: Linkage) -> tuple[float, ...]:
-    """Crank rotations at which the rocker rests, within a turn from 0 (rad), increasing; none where the rocker never rests.
+    """Crank rotations at which rocker or slider rest, within a turn from 0 (rad), increasing; none where they never rest.
 
     Raises
     ------
@@ -48,17 +50,19 @@ def dead_centres(linkage: Linkage) -> tuple[float, ...]:
     for reach in (l3 + l2, l3 - l2):
         if reach == 0.0:
             continue
-        cosine = (l1 * l1 + reach * reach - l4 * l4) / (2.0 * l1 * abs(reach))
+        # of the direction of the coupler, which points to the side of the assembly
+        cosine = l1 / reach if linkage.slides else (l1 * l1 + reach * reach - l4 * l4) / (2.0 * l1 * reach)
         if abs(cosine) > 1.0:
             continue
-        # the coupler points to the side of the assembly
-        th3 = linkage.branch * (acos(cosine) if reach > 0.0 else pi - acos(cosine))
+        th3 = linkage.branch * acos(cosine)
         found.append(th3 if reach == l3 + l2 else th3 + pi)
     return tuple(sorted((th2 - linkage.crank_phase) % (2.0 * pi) for th2 in found))
 
 
 def toggles(linkage: Linkage) -> tuple[float, ...]:
     """Crank rotations at which coupler and rocker lie in one line, within a turn from 0 (rad); none if the crank turns fully.
+
+    Of a slider-crank where the coupler is square to the guide.
 
     Raises
     ------
@@ -67,15 +71,18 @@ def toggles(linkage: Linkage) -> tuple[float, ...]:
     """
     l1, l2, l3, l4 = _lengths(linkage)
     found = []
-    for reach in (l3 + l4, abs(l3 - l4)):
-        cosine = (l1 * l1 + l2 * l2 - reach * reach) / (2.0 * l1 * l2)
+    if linkage.slides:
+        cosines = [(l1 - l3) / l2, (l1 + l3) / l2]
+    else:
+        cosines = [(l1 * l1 + l2 * l2 - reach * reach) / (2.0 * l1 * l2) for reach in (l3 + l4, l3 - l4)]
+    for cosine in cosines:
         if abs(cosine) <= 1.0:
             found += [acos(cosine), -acos(cosine)]
     return tuple(sorted((th2 - linkage.crank_phase) % (2.0 * pi) for th2 in found))
 
 
 def time_ratio(linkage: Linkage) -> float | None:
-    """Time of the rocker's slow swing over that of its quick one, the crank turning evenly: 1 at least.
+    """Time of the slow swing or stroke over that of the quick one, the crank turning evenly: 1 at least.
 
     None where the crank cannot turn fully, or the rocker turns with it.
 
@@ -94,6 +101,7 @@ def time_ratio(linkage: Linkage) -> float | None:
 def mechanical_advantage(linkage: Linkage, rotation: ArrayLike) -> FloatArray:
     """Torque on the rocker for a torque on the crank, without friction and masses: the crank's speed over the rocker's.
 
+    Of a slider-crank the force on the slider for a force on the crank pin across the crank: the pin's speed over the slider's.
     Infinite in a dead centre, zero in a toggle; NaN where the links cannot be joined. Shape of the rotations.
 
     Raises
@@ -105,15 +113,15 @@ def mechanical_advantage(linkage: Linkage, rotation: ArrayLike) -> FloatArray:
     phi = np.atleast_1d(np.asarray(rotation, dtype=float))
     c3, s3, c4, s4, _, _ = linkage.directions(phi)
     th2 = phi + linkage.crank_phase
-    gained = linkage.rocker_length * (s3 * c4 - c3 * s4)
-    given = linkage.crank_length * (s3 * np.cos(th2) - c3 * np.sin(th2))
+    gained = s3 if linkage.slides else linkage.rocker_length * (s3 * c4 - c3 * s4) / linkage.crank_length
+    given = s3 * np.cos(th2) - c3 * np.sin(th2)
     with np.errstate(divide="ignore"):
         ratio = np.where(given == 0.0, inf, gained / np.where(given == 0.0, 1.0, given))
     return np.where(np.isfinite(gained), ratio, np.nan).reshape(np.shape(rotation))
 
 
 def _lengths(linkage: Linkage) -> tuple[float, float, float, float]:
-    """l1 ... l4 of a four-bar.
+    """l1 ... l4 of a four-bar or a slider-crank.
 
     Raises
     ------
@@ -121,7 +129,7 @@ def _lengths(linkage: Linkage) -> tuple[float, float, float, float]:
         If the rocker pivot moves.
     """
     if linkage.pivot is not None:
-        raise ParameterError("pivot", linkage.pivot, "be fixed: dead centres, toggles and time ratio are a four-bar's")
+        raise ParameterError("pivot", linkage.pivot, "be fixed: where it moves, nothing rests in a dead centre")
     return linkage.ground_length, linkage.crank_length, linkage.coupler_length, linkage.rocker_length
 
 
@@ -153,7 +161,9 @@ def _ends(value: Any, name: str, longest: float = 2.0 * pi) -> tuple[float, floa
 @in_si(at="rad")
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class MechanicalAdvantage(Demand):
-    """The rocker's torque for one of the crank's is within bounds, either way; see `mechanical_advantage`.
+    """The rocker's torque for one of the crank's, or the slider's force for one at the crank pin, is within bounds.
+
+    Either way round; see `mechanical_advantage`.
 
     Attributes
     ----------
@@ -180,7 +190,7 @@ class MechanicalAdvantage(Demand):
             object.__setattr__(self, "at", at)
 
     def requires(self, way: Way) -> tuple[Require, ...]:
-        """Functions of the speed of the rocker for that of the crank, which is finite in a dead centre."""
+        """Functions of the speed of rocker or slider for that of crank or crank pin, which is finite in a dead centre."""
         all_the_way = self.at is None
         ends = way.ends("mechanical advantage") if all_the_way else None
         if ends is None:
@@ -192,7 +202,10 @@ class MechanicalAdvantage(Demand):
             th2 = rotation if turn else rotation + d.crank_phase
             c2, s2 = casadi.cos(th2), casadi.sin(th2)
             l2, l3, l4 = d.crank_length, d.coupler_length, d.rocker_length
-            g = plant.joined(c2, s2, d.ground_length - l2 * c2, -l2 * s2, l3, l4, d.branch)
+            closed = guided if way.sliding else plant.joined
+            g = closed(c2, s2, d.ground_length - l2 * c2, -l2 * s2, l3, l4, d.branch)
+            if way.sliding:
+                return (g.s3 * c2 - g.c3 * s2) / g.s3
             return plant.coefficients(g, SimpleNamespace(l2=l2, l3=l3, l4=l4, ca=1.0, sa=0.0)).k42
 
         def slow(d: Any, rotation: Any) -> Any:
@@ -254,7 +267,7 @@ class _Place(Demand):
 
 
 class DeadCentre(_Place):
-    """Crank and coupler come to lie in one line, the rocker at the end of its swing, at a crank rotation or in a range.
+    """Crank and coupler come to lie in one line, rocker or slider at the end of their travel, at a rotation or in a range.
 
     Attributes
     ----------
@@ -271,7 +284,7 @@ class DeadCentre(_Place):
         return "dead centre"
 
     def requires(self, way: Way) -> tuple[Require, ...]:
-        """The triangle of A, C and D closes there, on the side of the assembly."""
+        """The triangle of A, C and D closes there, or C is on the guide, on the side of the assembly."""
         stretched = self.position == "stretched"
 
         def closes(d: Any, rotation: float) -> Any:
@@ -279,6 +292,8 @@ class DeadCentre(_Place):
             reach = l3 + l2 if stretched else l3 - l2
             # C from A is along the crank, or against it
             c = symbolic.library().cos(rotation + d.crank_phase) * (1.0 if stretched else -1.0)
+            if way.sliding:
+                return (l1 - reach * c) / l3
             return (l1**2 + reach**2 - l4**2 - 2.0 * l1 * reach * c) / (l1**2 + l3**2)
 
         def aside(d: Any, rotation: float) -> Any:
@@ -291,6 +306,8 @@ class DeadCentre(_Place):
 
 class Toggle(_Place):
     """Coupler and rocker come to lie in one line, where the crank can go no farther, at a crank rotation or in a range.
+
+    Of a slider-crank the coupler comes to be square to its guide, pointing away from the ground link's start or back to it.
 
     Attributes
     ----------
@@ -308,12 +325,15 @@ class Toggle(_Place):
         return "toggle"
 
     def requires(self, way: Way) -> tuple[Require, ...]:
-        """The triangle of A, B and D closes there."""
+        """The triangle of A, B and D closes there, or the coupler spans the distance of B from the guide."""
 
         def closes(d: Any, rotation: float) -> Any:
             l1, l2, l3, l4 = d.ground_length, d.crank_length, d.coupler_length, d.rocker_length
-            reach = l3 + l4 if self.position == "stretched" else l3 - l4
+            stretched = self.position == "stretched"
+            reach = l3 + l4 if stretched else l3 - l4
             c = symbolic.library().cos(rotation + d.crank_phase)
+            if way.sliding:
+                return (l1 - l2 * c) / l3 - (1.0 if stretched else -1.0)
             return (l1**2 + l2**2 - 2.0 * l1 * l2 * c - reach**2) / (l1**2 + l3**2)
 
         return self._between(way, closes)
@@ -342,6 +362,9 @@ class NoToggle(Demand):
         def excess(d: Any, rotation: Any) -> Any:
             casadi, l3, l4 = symbolic.library(), d.coupler_length, d.rocker_length
             c = casadi.cos(rotation + d.crank_phase)
+            if way.sliding:
+                apart = (d.ground_length - d.crank_length * c) / l3
+                return apart * apart - cos(TURNING) ** 2
             square = d.ground_length**2 + d.crank_length**2 - 2.0 * d.ground_length * d.crank_length * c
             both = transmission_excess(l3, l4, square, square, cos(TURNING))
             return casadi.horzcat(*both) / (2.0 * l3 * l4)

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from linkwork.five_bar.parameters import FiveBarParameters
+from linkwork.slider_crank.parameters import SliderCrankParameters
 
 from ..files import Many, Quantity, entry
 from ..run import parameters_to
@@ -21,6 +22,8 @@ if TYPE_CHECKING:
 
 #: Links that have a mass.
 LINKS = ("crank", "coupler", "rocker")
+#: Distance of the rocker pivot that stands for one at infinity, in couplers.
+FAR = 1e7
 #: Stiffness of the slider that stands for a fixed pivot: natural frequency (rad/s), or multiples of the crank's speed.
 STIFF, STIFF_TURNS = 1000.0, 50.0
 
@@ -79,12 +82,13 @@ class Make:
         """Diameter of the pins' holes (m)."""
         return 0.4 * self.width if self.pin is None else self.pin
 
-    def describe(self) -> str:
-        """Bars and speed in a line, for a sheet."""
-        return (
-            f"bars {1e3 * self.width:g} x {1e3 * self.thickness:g} mm of {self.density:g} kg/m³, "
-            f"pins {1e3 * self.hole:g} mm; forces at {self.speed * 30.0 / pi:g} rpm, gravity {self.gravity:g} m/s²"
-            + (f", {self.load[0]:g} and {self.load[1]:g} N at P" if any(self.load) else "")
+    def describe(self, *, forces: bool = True) -> str:
+        """Bars and, of forces, the speed in a line, for a sheet."""
+        bars = f"bars {1e3 * self.width:g} x {1e3 * self.thickness:g} mm of {self.density:g} kg/m³, pins {1e3 * self.hole:g} mm"
+        if not forces:
+            return bars
+        return f"{bars}; forces at {self.speed * 30.0 / pi:g} rpm, gravity {self.gravity:g} m/s²" + (
+            f", {self.load[0]:g} and {self.load[1]:g} N at P" if any(self.load) else ""
         )
 
     def weighed(self, made: Mapping[str, Any]) -> dict[str, Any]:
@@ -101,18 +105,62 @@ class Make:
         x, y = self.load
         return c * x + s * y, c * y - s * x
 
+    @property
+    def block(self) -> float:
+        """Mass of a slider (kg): as given, or of a block of four widths by two widths by four thicknesses."""
+        return 32.0 * self.density * self.width**2 * self.thickness if self.slider_mass is None else self.slider_mass
+
+    def slider_crank(self, linkage: Linkage) -> SliderCrankParameters:
+        """Parameters of the slider-crank's plant, its guide at right angles to the crank shaft.
+
+        Its rod has its mass on the line of its joints: an arm to a coupler point off that line counts where it projects to.
+        """
+        made = self.moving(linkage)
+        a1 = linkage.ground_angle
+        return SliderCrankParameters(
+            crank_length=linkage.crank_length,
+            rod_length=linkage.coupler_length,
+            # the common normal is from the guide to the shaft
+            guide_offset=-linkage.ground_length,
+            guide_twist=-0.5 * pi,
+            crank_mass=made.crank_mass,
+            crank_inertia=made.crank_inertia,
+            crank_cog_x=made.crank_cog_distance,
+            rod_mass=made.coupler_mass,
+            rod_inertia=made.coupler_inertia,
+            rod_cog_distance=made.coupler_cog_distance * cos(made.coupler_cog_angle),
+            slider_mass=self.block,
+            slider_stiffness=self.slider_stiffness or 0.0,
+            slider_damping=self.slider_damping or 0.0,
+            slider_coulomb_friction=self.slider_coulomb_friction,
+            gravity_x=-self.gravity * sin(a1),
+            gravity_y=-self.gravity * cos(a1),
+            assembly_branch=linkage.branch,
+        )
+
     def moving(self, linkage: Linkage) -> FiveBarParameters:
-        """Parameters of the plant for a linkage, its slider free to be moved."""
-        made = linkage.to_five_bar(
+        """Parameters of the plant for a linkage, its slider free to be moved.
+
+        A slider-crank is a four-bar whose rocker pivot is `FAR` away, its slider the mass at the rocker's end.
+        """
+        far = FAR * linkage.coupler_length
+        four_bar = linkage
+        if linkage.slides:
+            four_bar = replace(linkage, rocker_length=far, ground_length=linkage.ground_length + far)
+        made = four_bar.to_five_bar(
             density=self.density,
             section=(self.width, self.thickness),
-            slider_mass=self.slider_mass,
+            slider_mass=self.block,
             slider_stiffness=self.slider_stiffness or 0.0,
             slider_damping=self.slider_damping or 0.0,
             slider_coulomb_friction=self.slider_coulomb_friction,
             gravity=self.gravity,
         )
-        return replace(made, **self.weighed(asdict(made)))
+        return replace(made, **self.weighed(asdict(made)) | (self.sliding(far) if linkage.slides else {}))
+
+    def sliding(self, far: Any) -> dict[str, Any]:
+        """What stands for the rocker of a slider-crank in the plant, its pivot so far away (m): the slider at its end."""
+        return {"rocker_mass": self.block, "rocker_inertia": 0.0, "rocker_cog_distance": far}
 
     def five_bar(self, solution: Solution) -> FiveBarParameters:
         """Parameters of the plant for a solution, its slider held."""
@@ -125,18 +173,25 @@ class Make:
         return replace(free, slider_stiffness=stiffness, slider_damping=damping)
 
     def run_case(self, solution: Solution, title: str) -> dict[str, Any]:
-        """Tables of a case file that runs the linkage through its task at constant speed; see `docs/case-files.md`."""
+        """Tables of a case file that runs the linkage through its task at constant speed; see `docs/case-files.md`.
+
+        Of a slider-crank one of the slider-crank's plant, see `slider_crank`.
+        """
         at = solution.evaluation.rotation
         start = (0.0 if at is None else float(at[0])) + solution.linkage.crank_phase
         run: dict[str, Any] = {"revolutions": 2.0}
         if not solution.verdicts.full_turn and at is not None:
             # a crank that cannot turn fully: from the first target to the last
             run = {"stop_time": with_unit(float(np.ptp(at)) / self.speed, "s")}
-        angle = solution.linkage.ground_angle
-        load = {name: with_unit(f, "N") for name, f in zip(("fx", "fy"), self.load_along(cos(angle), sin(angle)))}
+        linkage = solution.linkage
+        across, along = self.load_along(cos(linkage.ground_angle), sin(linkage.ground_angle))
+        load: Any = {"fx": with_unit(across, "N"), "fy": with_unit(along, "N")}
+        if linkage.slides:
+            # at the slider alone, which the plant loads along its guide
+            load = with_unit(along if linkage.slider_is_point else 0.0, "N")
         return {
             "title": title,
-            **parameters_to(self.five_bar(solution)),
+            **parameters_to(self.slider_crank(linkage) if linkage.slides else self.five_bar(solution)),
             "initial": {"crank_angle": with_unit(remainder(start, tau), "rad")},
             "drive": {"speed": with_unit(direction(solution) * self.speed, "rad/s")},
             **({"load": load} if any(self.load) else {}),

@@ -8,7 +8,7 @@ from math import degrees, isfinite, pi
 import numpy as np
 from numpy.typing import NDArray
 
-from .kinds import advance, stroke
+from .kinds import stroke
 from .limit_positions import dead_centres, mechanical_advantage, time_ratio, toggles
 from .linkage import ANGLES, Linkage, SecondCrank, SliderMotion, format_ratio
 from .sensitivity import ANGLE_STEP, PIVOT_ANGLES, costs, length_step, rounded, sensitivities
@@ -83,10 +83,8 @@ def report(solution: Solution) -> str:
         f"assembly: C lies to the {'left' if linkage.branch > 0 else 'right'} of B -> D; "
         f"largest link {1e3 * linkage.largest_link:.6g} mm"
     ]
-    if linkage.slides:
-        parts[0] += f"\n{slider_line(linkage)}"
-    elif linkage.pivot is None:
-        parts[0] += _limits(linkage, solution.rotation)
+    if linkage.pivot is None:
+        parts[0] += (f"\n{slider_line(linkage)}" if linkage.slides else "") + _limits(linkage, solution.rotation)
     elif isinstance(linkage.pivot, SliderMotion):
         parts[0] += f"\nslider at D: stroke {1e3 * linkage.pivot.stroke:.6g} mm"
     elif isinstance(linkage.pivot, SecondCrank):
@@ -99,26 +97,28 @@ def report(solution: Solution) -> str:
 
 
 def slider_line(linkage: Linkage) -> str:
-    """Offset, stroke and time ratio of a slider-crank."""
+    """Offset and stroke of a slider-crank."""
     line = f"slider at C on a guide {1e3 * abs(linkage.ground_length):.6g} mm from A"
-    if linkage.turns_fully:
-        slow = pi + abs(float(advance(linkage)))
-        line += f": stroke {1e3 * float(stroke(linkage)):.6g} mm, time ratio {slow / (2.0 * pi - slow):.4g}"
-    return line
+    return line + (f": stroke {1e3 * float(stroke(linkage)):.6g} mm" if linkage.turns_fully else "")
 
 
 def _limits(linkage: Linkage, rotation: NDArray[np.float64]) -> str:
-    """Dead centres, toggles, time ratio and mechanical advantage of a four-bar, a line each."""
-    lines = ""
-    for what, places in (("rocker at rest", dead_centres(linkage)), ("toggles", toggles(linkage))):
+    """Dead centres, toggles, time ratio and mechanical advantage of a four-bar or a slider-crank, a line each."""
+    lines, last = "", "slider" if linkage.slides else "rocker"
+    for what, places in ((f"{last} at rest", dead_centres(linkage)), ("toggles", toggles(linkage))):
         if places:
             lines += f"\n{what} at crank rotations of {', '.join(f'{degrees(at):.2f}' for at in places)} deg"
     ratio = time_ratio(linkage)
     if ratio is not None:
-        lines += f"\ntime ratio of the rocker's swings {ratio:.4g}"
+        lines += f"\ntime ratio of the {last}'s {'strokes' if linkage.slides else 'swings'} {ratio:.4g}"
     gained = np.abs(mechanical_advantage(linkage, rotation))
     if np.isfinite(gained).any():
-        lines += f"\ntorque of the rocker for one of the crank: {np.nanmin(gained):.3g} at least on the way"
+        what = (
+            "force of the slider for one at the crank pin"
+            if linkage.slides
+            else "torque of the rocker for one of the crank"
+        )
+        lines += f"\n{what}: {np.nanmin(gained):.3g} at least on the way"
     return lines
 
 

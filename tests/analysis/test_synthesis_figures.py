@@ -17,12 +17,12 @@ from analysis import figures
 from analysis.figures.synthesis import LONGEST, magnification
 from analysis.files import read_points, save_drawing, save_figure
 from analysis.files.drawings import LAYERS
-from analysis.motion import inverse_dynamics
 from analysis.numerics.fourier import FourierSeries
 from analysis.synthesis import (
     InfeasibleError,
     Linkage,
     LinkageScene,
+    Make,
     Motion,
     RockerFunction,
     SecondCrank,
@@ -36,6 +36,7 @@ from analysis.synthesis import (
     costs,
     drawing,
     length_step,
+    pin_forces,
     plates,
     report,
     turn,
@@ -361,12 +362,11 @@ def test_svg_of_plates_has_arcs_and_numbers(tmp_path) -> None:
 
 def test_the_sheet_shows_the_largest_pin_forces(tmp_path) -> None:
     solution = timed()
-    drive = inverse_dynamics(solution.to_five_bar(), FourierSeries.constant(0.0), 6.0, samples=72)
-    figure = figures.plot_sheet(solution, drive, title="sheet", made="bars")
+    forces = pin_forces(solution.linkage, Make(speed=6.0), run=False)
+    figure = figures.plot_sheet(solution, forces, title="sheet", made="bars")
     assert tuple(figure.get_size_inches() * 25.4) == pytest.approx((297.0, 210.0))
     panel = axis_of(figure, "pin force")
-    for pin, line in zip("ABCD", panel.lines, strict=True):
-        force = np.hypot(drive[f"pin.{pin}.fx"], drive[f"pin.{pin}.fy"])
+    for pin, force, line in zip("ABCD", forces.force.T, panel.lines, strict=True):
         np.testing.assert_allclose(line.get_ydata(), force)
         assert line.get_label() == f"{pin}: {force.max():.3g} N at most"
     assert save_figure(figure, tmp_path / "sheet.pdf").read_bytes().startswith(b"%PDF")

@@ -281,7 +281,8 @@ class TestWhatIsMadeOfIt:
     def test_report_names_offset_stroke_and_time_ratio(self) -> None:
         text = report(self.SOLUTION)
         stroke, ratio = textbook(SLIDER)
-        assert f"slider at C on a guide 40 mm from A: stroke {1e3 * stroke:.6g} mm, time ratio {ratio:.4g}" in text
+        assert f"slider at C on a guide 40 mm from A: stroke {1e3 * stroke:.6g} mm\n" in text
+        assert f"time ratio of the slider's strokes {ratio:.4g}\n" in text
         assert "rocker" not in text.partition("assembly")[2]
         assert "slider-crank, full turn" in text
 

@@ -1,0 +1,195 @@
+"""Limit positions and pin forces of slider-cranks: against positions by differences, and the equations of the spatial plant."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from math import pi, radians
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+
+from analysis.run import Inputs, case_from, simulate
+from analysis.synthesis import (
+    DeadCentre,
+    InfeasibleError,
+    LeastPinForce,
+    LeastTransmission,
+    Linkage,
+    Make,
+    MaxPinForce,
+    MechanicalAdvantage,
+    NoToggle,
+    Search,
+    SecondCrank,
+    SliderFunction,
+    Solution,
+    TimedPath,
+    Toggle,
+    dead_centres,
+    mechanical_advantage,
+    pin_forces,
+    synthesize,
+    time_ratio,
+    toggles,
+)
+from analysis.synthesis.report import report
+from linkwork.errors import InputError, ParameterError
+from linkwork.slider_crank.parameters import InitialState
+
+FloatArray = np.ndarray[Any, np.dtype[np.float64]]
+PHI = np.linspace(0.0, 2.0 * pi, 24, endpoint=False)
+TASK = SliderFunction(position=0.04 * np.cos(PHI) + 0.005 * np.cos(2.0 * PHI))
+QUICK = Search(starts=3, candidates=1 << 10, solutions=2)
+MAKE = Make(speed="600 rpm", load=("-20 N", "5 N"), slider_mass="0.4 kg")
+CLEAR = LeastTransmission(angle=radians(20.0))
+
+
+@st.composite
+def slider_cranks(draw: st.DrawFn) -> Linkage:
+    offset, crank, coupler = draw(st.floats(-0.6, 0.6)), draw(st.floats(0.1, 1.0)), draw(st.floats(0.1, 1.0))
+    # joined somewhere, and not next to where the crank just comes to turn
+    assume(abs(offset) < 0.95 * (crank + coupler))
+    assume(min(abs(abs(offset) + crank - coupler), abs(abs(abs(offset) - crank) - coupler)) > 0.02)
+    return Linkage(
+        ground_length=offset,
+        crank_length=crank,
+        coupler_length=coupler,
+        rocker_length=0.0,
+        crank_phase=draw(st.floats(-3.0, 3.0)),
+        branch=draw(st.sampled_from([1, -1])),
+    )
+
+
+def slider(linkage: Linkage, rotation: Any) -> FloatArray:
+    """Place of C along the guide, by the pins' own places."""
+    here = [linkage.pins(float(at)) for at in np.atleast_1d(rotation)]
+    return np.array([pins["C"][1] for pins in here])
+
+
+def advantage(linkage: Linkage, rotation: Any) -> FloatArray:
+    """Way of the crank pin for the slider's, by differences."""
+    phi = np.atleast_1d(np.asarray(rotation, dtype=float))
+    turned: FloatArray = replace(linkage, ground_angle=0.0).slider_position(phi + 1e-6)
+    with np.errstate(divide="ignore"):
+        found: FloatArray = 2e-6 * linkage.crank_length / (turned - linkage.slider_position(phi - 1e-6))
+    return found
+
+
+@settings(max_examples=100, deadline=None)
+@given(slider_cranks())
+def test_the_slider_rests_in_its_dead_centres_and_the_crank_goes_to_its_toggles(linkage: Linkage) -> None:
+    phi = np.linspace(0.0, 2.0 * pi, 2881)
+    rests, stops = dead_centres(linkage), toggles(linkage)
+    assert (len(stops) == 0) == linkage.turns_fully
+    for at in rests:
+        if np.isfinite(linkage.path([at])).all() and linkage.transmission([at])[0] > 0.05:
+            assert np.ptp(slider(linkage, [at - 1e-4, at, at + 1e-4])) < 1e-5
+    joined = np.isfinite(linkage.path(phi)).all(axis=1)
+    for end in phi[1:][joined[1:] != joined[:-1]]:
+        assert min(abs((end - at + pi) % (2.0 * pi) - pi) for at in stops) < 0.01
+    u = np.where(joined, linkage.slider_position(phi), np.nan)
+    step = np.diff(u)
+    turned = phi[1:-1][np.isfinite(step[1:] * step[:-1]) & (step[1:] * step[:-1] < 0.0)]
+    for at in turned:
+        assert min(abs((at - rest + pi) % (2.0 * pi) - pi) for rest in rests) < 0.01
+    if linkage.turns_fully:
+        first, second = rests
+        ratio = (second - first) / (2.0 * pi - second + first)
+        assert time_ratio(linkage) == pytest.approx(max(ratio, 1.0 / ratio))
+
+
+@settings(max_examples=50, deadline=None)
+@given(slider_cranks(), st.floats(0.0, 6.0))
+def test_the_advantage_is_the_ratio_of_speeds(linkage: Linkage, rotation: float) -> None:
+    assume(np.isfinite(linkage.path([rotation - 1e-3, rotation + 1e-3])).all())
+    assume(linkage.transmission([rotation])[0] > 0.1)
+    by_ways = float(advantage(linkage, rotation)[0])
+    assume(abs(by_ways) < 1e3)
+    assert float(mechanical_advantage(linkage, rotation)) == pytest.approx(by_ways, rel=1e-3)
+
+
+def best(*constraints: Any, task: Any = TASK) -> Solution:
+    return synthesize(task, constraints=constraints, search=QUICK).best
+
+
+def test_an_advantage_and_a_dead_centre_are_kept() -> None:
+    turn = np.linspace(0.0, 2.0 * pi, 1441)
+    bound = 1.03 * float(np.abs(mechanical_advantage(best(CLEAR).linkage, turn)).min())
+    held = best(CLEAR, MechanicalAdvantage(least=bound)).linkage
+    assert np.abs(advantage(held, turn)).min() == pytest.approx(bound, rel=1e-4)
+    for position, at in (("stretched", 10.0), ("folded", 185.0)):
+        made = best(CLEAR, DeadCentre(at=f"{at} deg", position=position)).linkage
+        away = [abs((radians(at) - rest + pi) % (2.0 * pi) - pi) for rest in dead_centres(made)]
+        assert min(away) < 1e-6
+        pins = {name: complex(*place) for name, place in made.pins(radians(at)).items()}
+        along = ((pins["C"] - pins["B"]) / (pins["B"] - pins["A"])).real
+        assert (along > 0.0) == (position == "stretched")
+
+
+def test_toggles_are_where_they_are_asked_or_not() -> None:
+    way = np.linspace(0.0, radians(80.0), 9)
+    part = SliderFunction(position=0.1 * np.cos(way + 0.4), rotation=way)
+    joined = LeastTransmission(angle=0.0, over="task")
+    made = best(joined, Toggle(at="110 deg"), task=part).linkage
+    assert min(abs(at - radians(110.0)) for at in toggles(made)) < 1e-6
+    kept = best(joined, Toggle(at="110 deg"), NoToggle(between=("-100 deg", "90 deg")), task=part).linkage
+    assert not any(-radians(100.0) <= at - k * 2.0 * pi <= radians(90.0) for at in toggles(kept) for k in (0, 1))
+    with pytest.raises(InfeasibleError, match="cannot turn fully"):
+        best(CLEAR, Toggle(at="110 deg"), task=part)
+    with pytest.raises(ParameterError, match="nothing rests"):
+        dead_centres(Linkage(**made.values() | {"rocker_length": 0.2, "pivot": SecondCrank(0.1)}))
+
+
+@pytest.mark.parametrize(("branch", "offset", "angle"), [(1, 0.03, -0.5 * pi), (-1, 0.02, 0.4), (1, -0.01, 2.0)])
+def test_the_forces_are_those_of_the_spatial_plant(branch: int, offset: float, angle: float) -> None:
+    """The five-bar with its rocker pivot far away, run and by its equations, against the slider-crank's own equations."""
+    linkage = Linkage(
+        pivot_x=0.1, ground_length=offset, crank_length=0.05, coupler_length=0.16, rocker_length=0.0,
+        point_distance=0.16, ground_angle=angle, crank_phase=0.3, branch=branch,
+    )  # fmt: skip
+    make = replace(MAKE, load=(0.0, 0.0))
+    ran = pin_forces(linkage, make)
+    held = pin_forces(linkage, make, run=False)
+    np.testing.assert_allclose(held.force, ran.force, atol=1e-6 * ran.greatest)
+    start = InitialState(crank_angle=linkage.crank_phase)
+    run = simulate(
+        make.slider_crank(linkage), Inputs(speed=make.speed), initial=start, samples=ran.rotation / make.speed
+    )
+    np.testing.assert_allclose(run["slider.position"], linkage.slider_position(ran.rotation), atol=1e-9)
+    for pin, name in zip("ABCD", ("bearing", "crank_pin", "slider_pin", "guide"), strict=True):
+        wanted = np.hypot(run[f"{name}.fx"], run[f"{name}.fy"])
+        np.testing.assert_allclose(ran.force[:, "ABCD".index(pin)], wanted, atol=1e-5 * ran.greatest)
+
+
+def test_a_force_is_kept_and_the_case_runs_with_it(tmp_path: Path) -> None:
+    free = best(CLEAR)
+    loads = pin_forces(free.linkage, MAKE)
+    bound = 0.9 * loads.greatest
+    held = best(CLEAR, MaxPinForce(force=bound, make=MAKE))
+    assert pin_forces(held.linkage, MAKE).greatest == pytest.approx(bound, rel=1e-4)
+    assert held.error > free.error
+    calm = best(CLEAR, LeastPinForce(error=1.001 * held.evaluation.worst, make=MAKE))
+    assert calm.evaluation.worst <= 1.0011 * held.evaluation.worst
+    assert pin_forces(calm.linkage, MAKE).greatest <= 1.001 * bound
+    case = case_from(MAKE.run_case(held, "runs"), folder=tmp_path)
+    run = simulate(case.parameters, case.inputs, initial=case.initial, stop_time=2.0 * pi / MAKE.speed, step=1e-4)
+    # the load along the guide acts in the plant, that across it is carried by the guide alone
+    assert np.hypot(run["crank_pin.fx"], run["crank_pin.fy"]).max() == pytest.approx(
+        pin_forces(held.linkage, MAKE).of("B"), rel=1e-3
+    )
+    text = report(held)
+    assert "slider at rest at crank rotations of" in text
+    assert "force of the slider for one at the crank pin" in text
+
+
+def test_a_five_bar_says_why_it_keeps_none_of_it() -> None:
+    task = TimedPath(points=np.column_stack([0.2 + 0.1 * np.cos(PHI), 0.15 + 0.05 * np.sin(PHI)]))
+    for constraint in (DeadCentre(at=0.3), MaxPinForce(force=10.0)):
+        with pytest.raises(
+            InputError, match="nothing of it rests, and the plant of the pin forces has no second crank"
+        ):
+            synthesize(task, constraints=[constraint], kinds=("geared-five-bar",), search=QUICK)
