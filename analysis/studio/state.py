@@ -37,8 +37,8 @@ def state_of(case: Case) -> dict[str, Any]:
     mechanism = mechanism_of(case.parameters)
     values = values_of(mechanism, case.parameters, case.initial)
     values |= {name: float(value) for name, value in case.inputs.modes(mechanism).items()}
-    for channel in mechanism.channels:
-        parts = case.inputs.parts(channel.argument) if channel.kind != "rate" else ()
+    for channel in (channel for channel in mechanism.channels if channel.kind != "rate"):
+        parts = case.inputs.parts(channel.argument)
         for part in parts:
             if not isinstance(part, (int, float, np.number)):
                 raise InputError(

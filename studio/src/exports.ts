@@ -1,7 +1,7 @@
 /** What is taken out of the page: files, and a link that holds the state. */
 
 import type { Rows } from "./core";
-import { type Given, type Mechanism, rowLength, type State } from "./tables";
+import { type Given, type Mechanism, rowLength, type State, stateFrom, type Tables } from "./tables";
 
 const value = (given: Given, state: State): number => state.values[given.name] ?? given.start;
 
@@ -57,6 +57,27 @@ print(orbit, orbit.multipliers)
 `;
 }
 
+const escaped = (text: string): string =>
+  text.replace(/[&<>"]/g, (c) => ({ "&": "&amp;", "<": "&lt;", ">": "&gt;", '"': "&quot;" })[c]!);
+
+/** All that is given, in the units of the FMU, as parameter values of SSP 1.0: `.ssv`, to be used beside the FMU. */
+export function parameterText(m: Mechanism, state: State): string {
+  // a motor of the page has no value reference: it is none of the FMU's
+  const known = m.given.filter((given) => given.reference >= 0);
+  const lines = known.map((given) => {
+    const now = value(given, state);
+    const written = given.choices ? `<ssv:Integer value="${now}"/>` : `<ssv:Real value="${now}"/>`;
+    return `    <ssv:Parameter name="${escaped(given.name)}">${written}</ssv:Parameter>`;
+  });
+  return `<?xml version="1.0" encoding="UTF-8"?>
+<ssv:ParameterSet xmlns:ssv="http://ssp-standard.org/SSP1/SystemStructureParameterValues" version="1.0" name="${escaped(state.title || m.name)}">
+  <ssv:Parameters>
+${lines.join("\n")}
+  </ssv:Parameters>
+</ssv:ParameterSet>
+`;
+}
+
 /** Time and all outputs of the motion that is shown, in SI. */
 export function tableText(m: Mechanism, rows: Rows): string {
   const length = rowLength(m);
@@ -79,12 +100,20 @@ export function linkOf(state: State): string {
   return `${location.href.split("#")[0]}#state=${text}`;
 }
 
-/** The state that an address holds, if it holds one. */
-export function stateIn(address: string): State | undefined {
-  const text = /#state=([\w-]+)$/.exec(address)?.[1];
+/** The state that an address holds, if it holds one; an Error says what is wrong with it. */
+export function stateIn(address: string, tables: Tables): State | undefined {
+  const text = /#state=([^&]+)$/.exec(address)?.[1];
   if (!text) return undefined;
-  const bytes = Uint8Array.from(atob(text.replaceAll("-", "+").replaceAll("_", "/")), (c) => c.charCodeAt(0));
-  return JSON.parse(new TextDecoder().decode(bytes)) as State;
+  let data: unknown;
+  try {
+    const bytes = Uint8Array.from(atob(text.replaceAll("-", "+").replaceAll("_", "/")), (c) =>
+      c.charCodeAt(0),
+    );
+    data = JSON.parse(new TextDecoder().decode(bytes));
+  } catch {
+    throw new Error("the state in the address is damaged: a part of the link may be missing");
+  }
+  return stateFrom(data, tables);
 }
 
 /** Let the browser save a file. */

@@ -1,8 +1,10 @@
 /** The studio: a state, what follows from it, and the parts of the page that show both. */
 
+import { Backdrop } from "./backdrop";
 import { Charts } from "./charts";
 import { bytesOf, Core, type Rows } from "./core";
-import { caseText, linkOf, pixels, pythonText, save, stateIn, tableText } from "./exports";
+import { dxfText } from "./dxf";
+import { caseText, linkOf, parameterText, pixels, pythonText, save, stateIn, tableText } from "./exports";
 import { History } from "./history";
 import { Panel } from "./panel";
 import { Picture } from "./picture";
@@ -26,12 +28,23 @@ const RUN_STEPS = 1440;
 const TURNS_OF_A_RUN = 6;
 const RATES = [1, 1 / 2, 1 / 5, 1 / 10, 1 / 20, 1 / 50, 1 / 100];
 
+/** Views by their keys. */
+const LOOKS: Record<string, string> = {
+  "-": "smaller",
+  "+": "larger",
+  "0": "all",
+  "1": "front",
+  "2": "top",
+  "3": "side",
+  "4": "isometric",
+};
+
 const by = <T extends Element>(id: string): T => document.getElementById(id) as unknown as T;
 const stored = <T>(id: string): T => JSON.parse(by<HTMLElement>(id).textContent ?? "") as T;
 
 class Studio {
   readonly tables = stored<Tables>("tables");
-  state: State = stateIn(location.href) ?? stored<State>("state");
+  state: State = stored<State>("state");
   private mechanism!: Mechanism;
   private core!: Core;
   /** What the worker answered last, and which row of it is drawn. */
@@ -41,8 +54,19 @@ class Studio {
   private moving = true;
   /** The configuration of a drag, which stays as it is while the motion about it changes. */
   private held: Float64Array | undefined;
-  private readonly history = new History<State>(JSON.stringify(this.state));
-  private readonly picture = new Picture(by<SVGSVGElement>("picture"));
+  private history!: History<State>;
+  private readonly picture = new Picture(by<SVGSVGElement>("picture"), by("behind"), by("markers"));
+  private readonly view = this.picture.view;
+  private readonly backdrop = new Backdrop(
+    by<HTMLElement>("backdrop"),
+    by<SVGGElement>("behind"),
+    by<SVGGElement>("markers"),
+    this.view,
+    {
+      change: (behind, done) => this.put({ ...this.state, behind }, done, false),
+      fault: (sentence) => this.fault(sentence),
+    },
+  );
   private readonly charts = new Charts(by<HTMLElement>("charts"));
   private readonly panel = new Panel(by<HTMLElement>("panel"), {
     change: (name, value, done) => this.change({ [name]: value }, done),
@@ -56,7 +80,15 @@ class Studio {
 
   async start(): Promise<void> {
     this.wire();
+    let wrong = "";
+    try {
+      this.state = stateIn(location.href, this.tables) ?? this.state;
+    } catch (error) {
+      wrong = (error as Error).message;
+    }
+    this.history = new History<State>(JSON.stringify(this.state));
     await this.open(this.state);
+    if (wrong) this.fault(wrong);
     let last = performance.now();
     const frame = (now: number): void => {
       this.advance((now - last) / 1000);
@@ -70,7 +102,8 @@ class Studio {
   private async open(state: State): Promise<void> {
     const mechanism = this.tables.mechanisms.find((m) => m.name === state.mechanism);
     if (!mechanism) throw new Error(`there is no mechanism ${state.mechanism}`);
-    this.state = state;
+    const { view, ...kept } = state;
+    this.state = kept;
     if (mechanism !== this.mechanism) {
       const bytes = await bytesOf(mechanism);
       this.core = await Core.make(mechanism, bytes);
@@ -80,9 +113,12 @@ class Studio {
       this.row = 0;
       this.time = 0;
       this.picture.show(mechanism);
+      by("views").classList.toggle("planar", mechanism.picture.planar);
       this.charts.show(mechanism, state.source ?? "steady");
     }
+    if (view) this.view.show(mechanism.picture.planar, view);
     this.panel.show(mechanism, state.values, state.locks ?? []);
+    this.backdrop.show(state.behind);
     this.listNumbers();
     const { values, count, sentence } = this.begin();
     if (!this.answer && count > 0) {
@@ -140,7 +176,10 @@ class Studio {
     if (answer.rows.count > 0) {
       if (!this.held) {
         this.time = kept * this.length();
-        if (newest) this.picture.fit(answer.rows.values);
+        if (newest) {
+          this.picture.fit(answer.rows.values);
+          this.backdrop.draw();
+        }
       }
       this.picture.drawPaths(answer.rows.values);
       this.charts.data(answer.rows, answer.source);
@@ -253,12 +292,12 @@ class Studio {
   // Changes
 
   /** Put another state; `done` when it is to be undone as one step. */
-  private put(state: State, done: boolean): void {
+  private put(state: State, done: boolean, computed = true): void {
     this.state = state;
     this.panel.update(state.values);
     if (done) this.history.keep(state);
     this.name();
-    this.compute();
+    if (computed) this.compute();
   }
 
   /** Change what is given, where the links can be joined then; else all stays, and the page says why. */
@@ -295,7 +334,7 @@ class Studio {
     ]);
     this.core.give([...givenOf(m, this.state.values), ...start]);
     const { values: row, sentence } = free.length
-      ? this.core.drag(joint, free, this.picture.view, target)
+      ? this.core.drag(joint, free, this.view.matrix.slice(0, 6), target)
       : { values: this.held, sentence: `${moves.map((r) => names.get(r)).join(" and ")} locked` };
     this.fault(sentence);
     this.held = row;
@@ -367,7 +406,8 @@ class Studio {
     this.theme(matchMedia("(prefers-color-scheme: dark)").matches);
     this.picture.onGrab = () => this.hold();
     this.picture.onDrag = (joint, target, done) => this.drag(joint, target, done);
-    this.picture.onTurn = () => {
+    this.view.onChange = () => {
+      this.backdrop.draw();
       if (!this.answer) return;
       this.picture.drawPaths(this.answer.rows.values);
       this.seek(this.row);
@@ -375,7 +415,7 @@ class Studio {
     new ResizeObserver(() => {
       if (!this.answer) return;
       this.picture.fit(this.answer.rows.values);
-      this.picture.onTurn();
+      this.view.onChange();
     }).observe(by("picture"));
     const rate = by<HTMLSelectElement>("rate");
     for (const value of RATES) rate.add(new Option(value === 1 ? "1" : `1/${1 / value}`, String(value)));
@@ -404,6 +444,17 @@ class Studio {
       theme: () => this.theme(document.documentElement.dataset.theme !== "dark"),
     };
     for (const [id, action] of Object.entries(actions)) by(id).addEventListener("click", action);
+    for (const button of document.querySelectorAll<HTMLElement>("[data-look]"))
+      button.addEventListener("click", () => this.look(button.dataset.look!));
+    addEventListener("hashchange", () => {
+      try {
+        const state = stateIn(location.href, this.tables);
+        if (state) this.history.keep(state);
+        void this.restore(state);
+      } catch (error) {
+        this.fault((error as Error).message);
+      }
+    });
     const choice = by<HTMLSelectElement>("save");
     choice.addEventListener("change", () => {
       void this.save(choice.value);
@@ -420,6 +471,16 @@ class Studio {
     addEventListener("keydown", (event) => this.key(event, actions));
   }
 
+  private look(name: string): void {
+    if (name === "larger") this.view.larger();
+    else if (name === "smaller") this.view.smaller();
+    else {
+      this.view.look(name);
+      if (this.answer) this.picture.fit(this.answer.rows.values);
+      this.view.onChange();
+    }
+  }
+
   /** Save what is shown, in one of the forms of the list. */
   private async save(form: string): Promise<void> {
     const m = this.mechanism;
@@ -429,6 +490,8 @@ class Studio {
       save("case.toml", text(caseText(m, this.state, this.duration()), "application/toml"));
     else if (form === "python")
       save("case.py", text(pythonText(m, this.state, this.duration()), "text/x-python"));
+    else if (form === "ssv") save("parameters.ssv", text(parameterText(m, this.state), "application/xml"));
+    else if (form === "dxf") save("drawing.dxf", text(dxfText(this.picture.drawn()), "image/vnd.dxf"));
     else if (form === "table" && rows) save("motion.csv", text(tableText(m, rows), "text/csv"));
     else if (form === "svg") save("drawing.svg", text(this.picture.svgText(), "image/svg+xml"));
     else if (form === "png") {
@@ -436,7 +499,7 @@ class Studio {
       const back = getComputedStyle(document.body).getPropertyValue("--card");
       save("drawing.png", await pixels(this.picture.svgText(), width, height, back));
     } else if (form === "link") {
-      history.replaceState(null, "", linkOf(this.state));
+      history.replaceState(null, "", linkOf({ ...this.state, view: this.view.kept }));
       this.fault("");
       by("words").textContent = "The address of this page now holds its state: copy it.";
     }
@@ -462,6 +525,7 @@ class Studio {
         l: actions.theme,
         ",": () => this.step(-1),
         ".": () => this.step(1),
+        ...Object.fromEntries(Object.entries(LOOKS).map(([key, name]) => [key, () => this.look(name)])),
       }[event.key];
     if (!action) return;
     event.preventDefault();

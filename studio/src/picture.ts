@@ -1,14 +1,15 @@
 /** The drawing of a mechanism, by its table of parts; joints are places in a row. */
 
 import { jointAt, type Mechanism, type Part, rowLength } from "./tables";
+import { type Point, View } from "./view";
 
-type Point = [number, number];
 type Attributes = Record<string, string | number>;
 
 const SPACE = "http://www.w3.org/2000/svg";
-/** Elevation and azimuth (rad) from which a spatial mechanism is seen first, its x axis upright. */
-const VIEW: Point = [0.38, -0.55];
-const MARGIN = 70;
+/** What a drawing that is saved is made of. */
+const KEPT = ["polyline", "polygon", "circle", "text"]
+  .map((kind) => `${kind}:not(#behind *, #markers *)`)
+  .join();
 /** Where the letters stand beside their joints, one after another: joints at one place can be read. */
 const LETTERS: Point[] = [
   [-10, -8],
@@ -17,7 +18,7 @@ const LETTERS: Point[] = [
   [-10, 20],
 ];
 
-function element<K extends keyof SVGElementTagNameMap>(
+export function element<K extends keyof SVGElementTagNameMap>(
   kind: K,
   parent: Element,
   attributes: Attributes = {},
@@ -40,44 +41,58 @@ function beside(from: Point, a: Point, b: Point, along: number, left: number): P
 
 interface Shape {
   part: Part;
+  group: SVGGElement;
   drawn: SVGElement[];
 }
 
+/** A line, a circle or a letter of the drawing, as it is seen (m). */
+export interface Drawn {
+  layer: string;
+  points: Point[];
+  closed?: boolean;
+  /** Of a circle about its point. */
+  radius?: number;
+  /** Of a letter that begins or ends at its point, with its height. */
+  text?: string;
+  height?: number;
+  ends?: boolean;
+}
+
 export class Picture {
-  /** Rows of the matrix from places to what is seen, both in m. */
-  view: number[] = [1, 0, 0, 0, 1, 0];
+  readonly view: View;
   onDrag: (joint: number, target: Point, done: boolean) => void = () => {};
   onGrab: () => void = () => {};
-  onTurn: () => void = () => {};
   private mechanism!: Mechanism;
   private shapes: Shape[] = [];
   private handles: SVGGElement[] = [];
   private paths: SVGPolylineElement[] = [];
-  private angles: Point = [...VIEW];
-  private scale = 1;
-  private centre: Point = [0, 0];
   private row: Float64Array = new Float64Array();
   /** The joint that is dragged, and how far it is from where it was taken (m). */
   private held = -1;
   private grip: Point = [0, 0];
 
-  constructor(private readonly svg: SVGSVGElement) {
-    svg.addEventListener("pointerdown", (event) => this.turn(event));
+  /** What is `behind` every mechanism stays there, and what is `above` it. */
+  constructor(
+    private readonly svg: SVGSVGElement,
+    private readonly behind: SVGGElement,
+    private readonly above: SVGGElement,
+  ) {
+    this.view = new View(svg);
+    this.view.free = () => this.held < 0;
   }
 
   /** Draw another mechanism. */
   show(mechanism: Mechanism): void {
     this.mechanism = mechanism;
-    this.angles = [...VIEW];
-    this.look();
-    this.svg.replaceChildren();
+    this.view.show(mechanism.picture.planar);
+    this.svg.replaceChildren(this.behind);
     const { parts, joints, paths } = mechanism.picture;
     this.shapes = [];
-    const behind = element("g", this.svg);
+    const low = element("g", this.svg);
     this.paths = paths.map((_, n) => element("polyline", this.svg, { class: `path path${n}` }));
     let links = parts.filter((part) => part.kind === "link").length;
     for (const part of parts) {
-      const under = ["link", "slider"].includes(part.kind) ? this.svg : behind;
+      const under = ["link", "slider"].includes(part.kind) ? this.svg : low;
       const kind = part.kind === "link" ? `link link${--links % 3}` : part.kind;
       const group = element("g", under, { class: kind });
       element("title", group).textContent = part.text;
@@ -87,14 +102,14 @@ export class Picture {
       for (let i = 0; i < lines; i++) drawn.push(element("polyline", group));
       if (part.kind === "link") drawn.push(element("polyline", group));
       if (part.kind === "slider") drawn.push(element("polygon", group));
-      this.shapes.push({ part, drawn });
+      this.shapes.push({ part, group, drawn });
     }
     this.handles = joints.map((joint, number) => this.handle(joint.name, joint.text, joint.moves, number));
+    this.svg.append(this.above);
   }
 
   /** Choose the scale so that all these rows are seen. */
   fit(rows: Float64Array): void {
-    const { width, height } = this.svg.getBoundingClientRect();
     const length = rowLength(this.mechanism);
     let [low, high]: Point[] = [
       [Infinity, Infinity],
@@ -106,11 +121,7 @@ export class Picture {
         low = [Math.min(low[0], seen[0]), Math.min(low[1], seen[1])];
         high = [Math.max(high[0], seen[0]), Math.max(high[1], seen[1])];
       }
-    if (!(high[0] > low[0]) || width === 0) return;
-    const room = [Math.max(50, width - 2 * MARGIN), Math.max(50, height - 2 * MARGIN)];
-    this.scale = Math.min(room[0] / (high[0] - low[0]), room[1] / Math.max(high[1] - low[1], 1e-9));
-    this.centre = [(low[0] + high[0]) / 2, (low[1] + high[1]) / 2];
-    this.svg.setAttribute("viewBox", `${-width / 2} ${-height / 2} ${width} ${height}`);
+    this.view.fit(low, high);
   }
 
   /** Draw the paths of the joints over all these rows. */
@@ -126,6 +137,7 @@ export class Picture {
   /** Draw one configuration; `has` says of a part's parameter whether it is not zero. */
   draw(row: Float64Array, has: (reference: number) => boolean): void {
     this.row = row;
+    if (!this.view.planar && this.handles.length > 0) this.stack(row);
     const places = this.handles.map((_, joint) => this.place(row, 0, joint));
     for (const { part, drawn } of this.shapes) {
       const visible = part.where < 0 || has(part.where);
@@ -145,15 +157,40 @@ export class Picture {
     });
   }
 
-  /** The picture as a file of its own. */
+  /** All lines, circles and letters that are seen, each on a layer of its part's name. */
+  drawn(): Drawn[] {
+    const found: Drawn[] = [];
+    const point = ({ x, y }: { x: number; y: number }): Point => this.view.back([x, y]);
+    const lines = (one: SVGElement, layer: string): void => {
+      if (one.style.display === "none") return;
+      const { points } = one as SVGPolylineElement;
+      found.push({ layer, points: Array.from(points, point), closed: one.tagName === "polygon" });
+    };
+    for (const path of this.paths) lines(path, "path");
+    for (const { part, drawn } of this.shapes) for (const one of drawn) lines(one, part.text);
+    this.handles.forEach((handle, number) => {
+      const at = this.seen(this.row, 0, number);
+      const pin = handle.querySelector<SVGCircleElement>(".pin")!;
+      const radius = pin.r.baseVal.value / this.view.scale;
+      found.push({ layer: "joints", points: [at], radius });
+      const [x, y] = LETTERS[number % LETTERS.length];
+      const beside: Point = [at[0] + x / this.view.scale, at[1] - y / this.view.scale];
+      const text = this.mechanism.picture.joints[number].name;
+      found.push({ layer: "letters", points: [beside], text, height: 10 / this.view.scale, ends: x < 0 });
+    });
+    return found;
+  }
+
+  /** The picture as a file of its own, without what is behind it. */
   svgText(): string {
     const copy = this.svg.cloneNode(true) as SVGSVGElement;
     const { width, height } = this.svg.getBoundingClientRect();
     copy.setAttribute("xmlns", SPACE);
     copy.setAttribute("width", String(width));
     copy.setAttribute("height", String(height));
-    const originals = this.svg.querySelectorAll<SVGElement>("polyline, polygon, circle, text");
-    copy.querySelectorAll<SVGElement>("polyline, polygon, circle, text").forEach((one, n) => {
+    for (const name of ["behind", "markers"]) copy.querySelector(`#${name}`)?.remove();
+    const originals = this.svg.querySelectorAll<SVGElement>(KEPT);
+    copy.querySelectorAll<SVGElement>(KEPT).forEach((one, n) => {
       const style = getComputedStyle(originals[n]);
       for (const name of [
         "fill",
@@ -210,20 +247,29 @@ export class Picture {
 
   private seen(rows: Float64Array, start: number, joint: number): Point {
     const at = start + jointAt(this.mechanism, joint);
-    const [x, y, z] = [rows[at], rows[at + 1], rows[at + 2]];
-    const v = this.view;
-    return [v[0] * x + v[1] * y + v[2] * z, v[3] * x + v[4] * y + v[5] * z];
+    return this.view.seen(rows[at], rows[at + 1], rows[at + 2]);
   }
 
   private place(rows: Float64Array, start: number, joint: number): Point {
-    const [x, y] = this.seen(rows, start, joint);
-    return [(x - this.centre[0]) * this.scale, (this.centre[1] - y) * this.scale];
+    return this.view.place(this.seen(rows, start, joint));
   }
 
-  private look(): void {
-    const [up, round] = this.angles;
-    const [s, c, t, d] = [Math.sin(up), Math.cos(up), Math.sin(round), Math.cos(round)];
-    this.view = this.mechanism.picture.planar ? [1, 0, 0, 0, 1, 0] : [0, d, t, c, s * t, -s * d];
+  /** Of a spatial mechanism, what is nearer covers what is behind it. */
+  private stack(row: Float64Array): void {
+    const near = ({ part }: Shape): number => {
+      const all = part.joints.map((joint) => {
+        const at = jointAt(this.mechanism, joint);
+        return this.view.nearness(row[at], row[at + 1], row[at + 2]);
+      });
+      return all.reduce((sum, one) => sum + one, 0) / all.length;
+    };
+    const order = this.shapes.map((shape): [number, SVGGElement] => [near(shape), shape.group]);
+    order.sort((a, b) => a[0] - b[0]);
+    let next: Element = this.handles[0];
+    for (const [, group] of order.reverse()) {
+      if (group.nextElementSibling !== next) this.svg.insertBefore(group, next);
+      next = group;
+    }
   }
 
   private handle(name: string, text: string, moves: number[], number: number): SVGGElement {
@@ -265,7 +311,7 @@ export class Picture {
       event.preventDefault();
       event.stopPropagation();
       const [x, y] = this.seen(this.row, 0, number);
-      const step = (event.shiftKey ? 20 : 2) / this.scale;
+      const step = (event.shiftKey ? 20 : 2) / this.view.scale;
       this.onDrag(number, [x + step * way[0], y + step * way[1]], true);
     });
     return handle;
@@ -273,26 +319,7 @@ export class Picture {
 
   /** Where a pointer is, as the joints are seen (m). */
   private target(event: PointerEvent): Point {
-    const box = this.svg.getBoundingClientRect();
-    const [x, y] = [event.clientX - box.left - box.width / 2, event.clientY - box.top - box.height / 2];
-    return [this.centre[0] + x / this.scale + this.grip[0], this.centre[1] - y / this.scale + this.grip[1]];
-  }
-
-  /** Turn a spatial mechanism by a drag beside its joints. */
-  private turn(event: PointerEvent): void {
-    if (this.mechanism.picture.planar) return;
-    this.svg.setPointerCapture(event.pointerId);
-    let last: Point = [event.clientX, event.clientY];
-    const move = (now: PointerEvent): void => {
-      this.angles[1] += (now.clientX - last[0]) / 150;
-      this.angles[0] = Math.max(-1.5, Math.min(1.5, this.angles[0] + (now.clientY - last[1]) / 150));
-      last = [now.clientX, now.clientY];
-      this.look();
-      this.onTurn();
-    };
-    const stop = new AbortController();
-    this.svg.addEventListener("pointermove", move, { signal: stop.signal });
-    for (const name of ["pointerup", "pointercancel"] as const)
-      this.svg.addEventListener(name, () => stop.abort(), { signal: stop.signal });
+    const [x, y] = this.view.at(event);
+    return [x + this.grip[0], y + this.grip[1]];
   }
 }

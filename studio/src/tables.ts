@@ -102,6 +102,20 @@ export interface State {
   duration?: number;
   /** Names of dimensions that a drag leaves as they are. */
   locks?: string[];
+  /** Where the photo or drawing behind the mechanism lies. */
+  behind?: Placement;
+  /** How it is seen, in a link. */
+  view?: number[];
+}
+
+/** Of a photo or a drawing behind the mechanism: its middle and width (m), its angle (rad). */
+export interface Placement {
+  x: number;
+  y: number;
+  width: number;
+  angle: number;
+  opacity: number;
+  locked: boolean;
 }
 
 export const rowLength = (m: Mechanism): number =>
@@ -114,4 +128,41 @@ export const jointAt = (m: Mechanism, joint: number): number => 1 + m.states + m
 /** All that is given, by value reference, with the start values of what a state leaves out. */
 export function givenOf(m: Mechanism, values: Values): [number, number][] {
   return [m.tolerance, ...m.given.map((g): [number, number] => [g.reference, values[g.name] ?? g.start])];
+}
+
+const isNumber = (value: unknown): value is number => typeof value === "number" && Number.isFinite(value);
+
+/** A state as it came from elsewhere, held against the tables; an Error says what is wrong with it. */
+export function stateFrom(data: unknown, tables: Tables): State {
+  const state = data as Partial<State> | null;
+  if (typeof state !== "object" || state === null) throw new Error("the state is no object");
+  const mechanism = tables.mechanisms.find((m) => m.name === state.mechanism);
+  if (!mechanism) throw new Error(`the page has no mechanism ${JSON.stringify(state.mechanism)}`);
+  const { title = "", values = {}, source = "steady", duration, locks = [], behind, view } = state;
+  const fail = (name: string, value: unknown): never => {
+    throw new Error(`${name} is ${JSON.stringify(value)} in the state`);
+  };
+  if (typeof title !== "string") fail("the title", title);
+  if (typeof values !== "object" || values === null) fail("values", values);
+  const names = new Set(mechanism.given.map((given) => given.name));
+  for (const [name, value] of Object.entries(values)) {
+    if (!names.has(name)) throw new Error(`${mechanism.name} has no ${JSON.stringify(name)}`);
+    if (!isNumber(value)) fail(name, value);
+  }
+  if (source !== "steady" && source !== "run") fail("the source", source);
+  if (duration !== undefined && !(isNumber(duration) && duration > 0)) fail("the duration", duration);
+  if (!Array.isArray(locks) || !locks.every((name) => names.has(name))) fail("locks", locks);
+  const found: State = { mechanism: mechanism.name, title, values: { ...values }, source, locks };
+  if (duration !== undefined) found.duration = duration;
+  if (behind !== undefined) {
+    const { x, y, width, angle, opacity, locked } = behind;
+    if (![x, y, width, angle, opacity].every(isNumber) || !(width > 0)) fail("what is behind", behind);
+    found.behind = { x, y, width, angle, opacity, locked: locked === true };
+  }
+  if (view !== undefined) {
+    if (!Array.isArray(view) || view.length !== 5 || !view.every(isNumber) || !(view[2] > 0))
+      fail("the view", view);
+    found.view = view;
+  }
+  return found;
 }

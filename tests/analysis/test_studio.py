@@ -420,27 +420,3 @@ def test_a_mechanism_of_ones_own_opens_in_the_page(browser: Browser, tmp_path: P
         page.close()
     finally:
         del MECHANISMS[pendulum.MECHANISM.name]
-
-
-# Its sources
-
-
-@pytest.mark.slow
-def test_the_sources_of_the_page_are_typed_and_tidy(tmp_path: Path) -> None:
-    if shutil.which("npm") is None:
-        pytest.skip("there is no npm here: the sources of the page are not checked")
-    folder = tmp_path / "studio"
-    shutil.copytree(ROOT / "studio", folder, ignore=shutil.ignore_patterns("node_modules", "build"))
-
-    def npm(*words: str) -> subprocess.CompletedProcess[str]:
-        return subprocess.run(["npm", *words], cwd=folder, capture_output=True, text=True, timeout=600, check=False)
-
-    if npm("view", "esbuild", "version").returncode != 0:
-        pytest.skip("npm reaches no registry from here: the sources of the page are not checked")
-    for words in (("ci", "--no-audit", "--no-fund", "--ignore-scripts"), ("run", "check"), ("run", "build")):
-        done = npm(*words)
-        assert done.returncode == 0, done.stdout + done.stderr
-    made = (folder / "build" / "page.html").read_text(encoding="utf-8")
-    # but for the hash, the mechanisms and the state the built page is this one
-    script = made.split('id="state"></script>')[1]
-    assert script in PAGE.read_text(encoding="utf-8")

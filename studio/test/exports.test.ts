@@ -1,0 +1,49 @@
+import assert from "node:assert/strict";
+import { test } from "node:test";
+import { caseText, linkOf, parameterText, stateIn, tableText } from "../src/exports";
+import { STATE, TABLES, WHEEL } from "./wheel";
+
+Object.assign(globalThis, { location: { href: "https://example.org/page.html#old" } });
+
+test("a case has what acts, and no more", () => {
+  const driven = caseText(WHEEL, STATE, 2).split("\n");
+  assert.ok(driven.includes("wheel.radius = 0.25"));
+  assert.ok(driven.includes("drive.speed = 3.0"));
+  assert.ok(driven.includes("run.stop_time = 2.0"));
+  assert.ok(!driven.some((line) => line.startsWith("initial.speed") || line.startsWith("drive.torque")));
+  assert.ok(driven.includes('title = "Räder & \\"Rollen\\""'));
+  const pushed = caseText(WHEEL, { ...STATE, values: { "drive.mode": 0, "drive.torque": 0.5 } }, 2).split(
+    "\n",
+  );
+  assert.ok(pushed.includes("drive.torque = 0.5"));
+  assert.ok(pushed.includes("initial.speed = 2.0"));
+  assert.ok(!pushed.some((line) => line.startsWith("drive.speed")));
+});
+
+test("parameter values are XML, with numbers of their kind and every digit", () => {
+  const text = parameterText(WHEEL, { ...STATE, values: { "wheel.radius": 0.1 + 0.2 } });
+  assert.match(text, /name="wheel.radius"><ssv:Real value="0.30000000000000004"/);
+  assert.match(text, /name="drive.mode"><ssv:Integer value="1"/);
+  assert.match(text, /name="Räder &amp; &quot;Rollen&quot;"/);
+});
+
+test("a table has a line of names and one for each row", () => {
+  const rows = {
+    values: Float64Array.of(0, 9, 1, 2, 0, 0, 0, 0.5, 9, 3, 4, 0, 0, 0),
+    count: 2,
+    sentence: "",
+  };
+  assert.equal(tableText(WHEEL, rows), "time,wheel.angle,rim.position\n0,1,2\n0.5,3,4\n");
+});
+
+test("a link holds the whole state", () => {
+  const link = linkOf(STATE);
+  assert.match(link, /^https:\/\/example\.org\/page\.html#state=[\w-]+$/);
+  assert.deepEqual(stateIn(link, TABLES), STATE);
+  assert.equal(stateIn("page.html#elsewhere", TABLES), undefined);
+});
+
+test("a damaged link is refused in a sentence", () => {
+  for (const text of ["%00", "AAAA", linkOf(STATE).split("=")[1].slice(0, -9)])
+    assert.throws(() => stateIn(`page.html#state=${text}`, TABLES), /damaged/);
+});
