@@ -59,7 +59,7 @@ mutate: $(DEV)
 
 # the page of the studio, from its sources in studio/; takes node and npm, which nothing else does
 studio: $(DEV)
-	cd studio && npm ci --no-audit --no-fund --ignore-scripts && npm run --silent check && npm run --silent build
+	cd studio && npm ci --no-audit --no-fund --ignore-scripts && npm run --silent check && npm test --silent && npm run --silent build
 	$(BIN)/python -m analysis.studio
 
 # wheel, FMUs of every kind for all platforms, and what fmi-standard.org asks to be published with them
