@@ -2,20 +2,31 @@
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
 
 import click
-from rich.table import Table
 
 from linkwork.errors import InputError
 
 from ..mechanisms import mechanism_of
-from .common import console, folder_of, html_option, quantity, save_picture, workers_options
+from ..notebook import format_count
+from .common import console, folder_of, html_option, quantity, save_picture, say, show_table, workers_options
 from .driven import Chosen, about_a_case, swing_of
+
+if TYPE_CHECKING:
+    from ..periodic import Orbits
 
 
 @click.command()
 @about_a_case
+@click.option(
+    "--turns",
+    default=4,
+    show_default=True,
+    type=click.IntRange(1, 16),
+    help="Motions of up to so many turns are sought.",
+)
 @click.option("--points", default=200, show_default=True, type=click.IntRange(2, 4000), help="Starts along each axis.")
 @click.option(
     "--position", nargs=2, metavar="FROM TO", help="Range of the first free coordinate, such as '-5 cm' '5 cm'."
@@ -25,6 +36,7 @@ from .driven import Chosen, about_a_case, swing_of
 @html_option
 def basins(
     chosen: Chosen,
+    turns: int,
     points: int,
     position: tuple[str, str] | None,
     rate: tuple[str, str] | None,
@@ -43,7 +55,7 @@ def basins(
     """
     from .. import figures
     from ..periodic import basins as find_basins
-    from ..periodic import orbits_of
+    from ..periodic import of_turns, orbits_of
 
     parameters, drive = chosen.case.parameters, chosen.drive()
     start = chosen.start(drive)
@@ -53,13 +65,14 @@ def basins(
         None if texts is None else tuple(quantity(text, unit, option) for text in texts)
         for texts, unit, option in zip((position, rate), units, ("--position", "--rate"))
     ]
-    found = orbits_of(parameters, drive, start=start)
-    _motions(chosen.case.title, found)
-    if not found.stable:
-        raise InputError("no stable motion of one turn was found: no start ends in one")
+    found = [orbits_of(parameters, drive, turns=number, start=start) for number in range(1, turns + 1)]
+    _motions(f"{chosen.case.title}: periodic motions of {of_turns(turns)}", found)
+    if not any(part.stable for part in found):
+        raise InputError(f"no stable motion of {of_turns(turns)} was found: no start ends in one")
     picture = find_basins(
         parameters,
         drive,
+        turns=turns,
         points=points,
         position=spans[0],
         rate=spans[1],
@@ -79,27 +92,26 @@ def basins(
     chosen.finish([picture.to_csv(f"{stem}.csv"), *save_picture(drawn, stem, html=html)], ())
 
 
-def _motions(title: str, found: Any) -> None:
-    """All motions at one speed, and how sure it is that there are no others."""
-    grid = Table(title=f"{title}: periodic motions of one turn", title_justify="left")
-    for heading in ("motion", "amplitude", "stability", "largest multiplier"):
-        grid.add_column(heading, justify="left" if heading == "stability" else "right")
-    number = 0
-    for orbit in found.orbits:
+def _motions(title: str, found: Sequence[Orbits]) -> None:
+    """All motions at one speed, by the turns of their periods, and how sure it is that there are no others."""
+    from ..periodic import Stability
+
+    headings = ("motion", "turns", "amplitude", "stability", "largest multiplier")
+    rows, number = [], 0
+    for orbit in sorted((orbit for part in found for orbit in part.orbits), key=lambda orbit: orbit.amplitude):
         what, size, unit = swing_of(orbit)
-        stable = orbit in found.stable
-        number += stable
-        grid.add_row(
-            str(number) if stable else "",
-            f"{size * orbit.amplitude:.5g} {unit} of {what}",
-            orbit.verdict().stability.value,
-            f"{orbit.largest:.6g}",
+        word = orbit.verdict().stability
+        stays = word is not Stability.UNSTABLE
+        number += stays
+        size_of_it = f"{size * orbit.amplitude:.5g} {unit} of {what}"
+        rows.append((str(number) if stays else "", str(orbit.turns), size_of_it, word.value, f"{orbit.largest:.6g}"))
+    show_table(title, headings, rows, words=("stability",))
+    for turns, part in enumerate(found, start=1):
+        sure = "two methods found the same motions" if part.agreed else "two methods differ: there may be more motions"
+        index = (
+            ""
+            if part.index == 1
+            else f"; their indices add up to {part.index}, not 1: one may be missing, or come to the limit of assembly"
         )
-    console.print(grid)
-    sure = "two methods found the same motions" if found.agreed else "two methods differ: there may be more motions"
-    index = (
-        ""
-        if found.index == 1
-        else f"; their indices add up to {found.index}, not 1: one may be missing, or come to the limit of assembly"
-    )
-    console.print(sure + index, highlight=False, soft_wrap=True)
+        of = "" if len(found) == 1 else f"of {format_count(turns, 'turn')}: "
+        say(of + sure + index)

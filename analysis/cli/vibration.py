@@ -67,6 +67,13 @@ def _require_range(parameters: Any, low: float, high: float, name: str, first: s
     type=click.IntRange(min=0),
     help="Values of the range at which all motions are sought, to find those that no branch leads to.",
 )
+@click.option(
+    "--turns",
+    default=1,
+    show_default=True,
+    type=click.IntRange(1, 16),
+    help="Motions of up to so many turns are sought there; for more than one take some 24 places.",
+)
 @plot_option
 @html_option
 @click.option("--sensitivity", is_flag=True, help="Report which parameters move each maximum, fold and the like most.")
@@ -77,6 +84,7 @@ def resonance(
     high: str | None,
     doublings: int,
     places: int,
+    turns: int,
     plot: bool,
     html: bool,
     sensitivity: bool,
@@ -93,6 +101,7 @@ def resonance(
       linkwork resonance --published rig-2-spring-c --sensitivity
       linkwork resonance --published rig-1-spring-b --from '100 rpm' --to '1300 rpm' --html
       linkwork resonance --published rig-1-spring-b --from '900 rpm' --to '1100 rpm' --doublings 4
+      linkwork resonance --published rig-1-spring-b --set slider.damping='2 N*s/m' --turns 4 --places 24
       linkwork resonance --published table-3.1 --vary slider.stiffness --from '1e5 dyn/cm' --to '2e6 dyn/cm'
     """
     from .. import figures
@@ -117,7 +126,7 @@ def resonance(
             parameters, *ends, drive=drive, vary=vary, start=start, doublings=doublings, progress=console.is_terminal
         )
         if places:
-            response = with_isolas(response, places=places, progress=console.is_terminal)
+            response = with_isolas(response, places=places, turns=turns, progress=console.is_terminal)
     except ResponseInterrupted as stopped:
         response, interrupted = stopped.response, True
     factor, unit = (1.0 / RAD_S_PER_RPM, "rpm") if over_speed else (1.0, unit_of(mechanism, vary))

@@ -24,6 +24,7 @@ from .coexistence import Basins as Basins
 from .coexistence import Coexistence as Coexistence
 from .coexistence import basins as basins
 from .coexistence import coexistence as coexistence
+from .coexistence import of_turns as of_turns
 from .crossings import CrossingCurve as CrossingCurve
 from .crossings import follow_crossing as follow_crossing
 from .directions import gradient_names as gradient_names

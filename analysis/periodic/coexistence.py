@@ -24,12 +24,12 @@ from ..run import takes_published
 from . import coexistence_kernels, floquet, orbits
 from .coexistence_kernels import LOST, MOST_ORBITS, UNSETTLED
 from .drives import Drive
-from .finder import Orbits, orbits_of
+from .finder import Orbits, orbits_of, passages
 from .floquet import TOLERANCE, multipliers
 from .flows import GAP, PLAIN, VARIATIONAL
 from .grids import axes_of, kept_rows, name_of
 from .orbit_kernels import NO_SOURCE
-from .orbits import MOST_ITERATIONS, SEARCH_TOLERANCE, PeriodicOrbit, guess_of, section_of
+from .orbits import MOST_ITERATIONS, SEARCH_TOLERANCE, PeriodicOrbit, guess_of, require_turns, section_of
 from .planes import Operation, Plane
 from .rows import row_of
 from .starts import extent_of, scale_of, starts_of
@@ -232,10 +232,10 @@ class Basins(Shown):
     position, rate : ndarray, shapes (nx,) and (ny,)
         Starts of the first free coordinate, of a slider (m), and of its rate (m/s); the rest of y is that of the first motion.
     ends : ndarray of int, shape (ny, nx)
-        Number of the stable motion among ``motions``; -1 where the links come to the limit of assembly, -2 where no motion of
-        one turn is met within the turns that are followed.
+        Number of the stable motion among ``motions``; -1 where the links come to the limit of assembly, -2 where none of them
+        is met within the turns that are followed.
     found : Orbits
-        All motions of one turn, the unstable ones on the boundaries of the basins among them.
+        All motions that were sought, the unstable ones on the boundaries of the basins among them.
     computed : int
         Rows that were not in the cache.
     """
@@ -288,6 +288,7 @@ def basins(
     parameters: Parameters,
     drive: Drive,
     *,
+    turns: int = 1,
     points: int = 200,
     position: tuple[float, float] | None = None,
     rate: tuple[float, float] | None = None,
@@ -302,6 +303,8 @@ def basins(
     ----------
     parameters : parameters of a mechanism
     drive : Drive
+    turns : int
+        Motions of up to so many turns of the crank are sought.
     points : int
         Of the plane, along each axis.
     position, rate : (float, float), optional
@@ -319,7 +322,7 @@ def basins(
     Raises
     ------
     InputError
-        If there is no stable motion of one turn, a range is none, or there are no cores.
+        If there is no stable motion, a range is none, or there are no cores.
     GridInterrupted
         On Ctrl-C; the same call goes on from the rows that are kept.
 
@@ -330,10 +333,11 @@ def basins(
     >>> len(found.motions), found.share(0) > found.share(1) > 0.0
     (2, True)
     """
-    found = orbits_of(parameters, drive, start=start)
+    require_turns(turns)
+    found = orbits_of(parameters, drive, turns=range(1, turns + 1), start=start)
     motions = found.stable
     if not motions:
-        raise InputError("there is no stable motion of one turn here: no start ends in one")
+        raise InputError(f"there is no stable motion of {of_turns(turns)} here: no start ends in one")
     first = motions[0].start
     extent, scale, half = extent_of(parameters, drive, first)[0], scale_of(parameters, drive, first), len(first) // 2
     spans = position or (-extent, extent), rate or tuple(scale[half] / scale[0] * extent * s for s in (-1.0, 1.0))
@@ -341,7 +345,9 @@ def basins(
         if not (np.isfinite(low) and np.isfinite(high) and low < high):
             raise InputError(f"the range of the {name} is {low} to {high}: it must be finite and increasing")
     across, up = (np.linspace(low, high, points) for low, high in spans)
-    known = np.array([orbit.start for orbit in motions])
+    # a motion of several turns is met at the beginning of any of them
+    passed = [passages(orbit) for orbit in motions]
+    known, owner = np.vstack(passed), np.repeat(np.arange(len(motions)), [len(starts) for starts in passed])
     code = _code(coexistence_kernels.basins_of, orbits)
     ends, computed = kept_rows(
         partial(_ends, parameters, drive, known, across),
@@ -354,7 +360,14 @@ def basins(
         progress=progress,
         what="starts",
     )
-    return Basins(position=across, rate=up, ends=ends.astype(np.int64), found=found, computed=computed)
+    met = ends.astype(np.int64)
+    met[met >= 0] = owner[met[met >= 0]]
+    return Basins(position=across, rate=up, ends=met, found=found, computed=computed)
+
+
+def of_turns(turns: int) -> str:
+    """Up to so many turns, in words."""
+    return "one turn" if turns == 1 else f"up to {turns} turns"
 
 
 def _ends(

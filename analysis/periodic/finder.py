@@ -10,7 +10,7 @@ the indices of the motions add up, none was missed as far as can be said.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -58,7 +58,8 @@ class Orbits(Shown):
     index : int
         Sum of the signs of det(I - monodromy matrix) over these motions and those of a period that goes into theirs, each as
         often as it has turns. It is 1 where every motion stays clear of the limit of assembly, since motions come and go in
-        pairs of opposite signs: another sum says that one was missed, or lost at that limit.
+        pairs of opposite signs: another sum says that one was missed, or lost at that limit. Where motions of several numbers
+        of turns were sought, it is the first that is not 1.
     """
 
     orbits: tuple[PeriodicOrbit, ...]
@@ -162,15 +163,22 @@ def find_orbits(
     speed: Amount = None,
     torque: Torque | Amount = None,
     initial: InitialState | None = None,
-    turns: int = 1,
+    turns: int | Sequence[int] = 1,
     start: ArrayLike | None = None,
 ) -> Orbits:
     """Find all periodic motions of a period of so many turns.
 
+    Motions of several turns need not branch off those of one: beside a weakly damped motion there may be some of three or four
+    turns that appear by a fold, in a range of speeds of some rpm (subharmonic resonance). They are found only where ``turns``
+    asks for them.
+
     Parameters
     ----------
-    parameters, inputs, speed, torque, initial, turns
-        See `find_orbit`. A motion that repeats itself after fewer turns is none of these ``turns``.
+    parameters, inputs, speed, torque, initial
+        See `find_orbit`.
+    turns : int or sequence of int
+        Turns of the crank in one period, or several numbers, such as (1, 2, 3, 4). A motion that repeats itself after fewer
+        turns is none of these.
     start : array_like, shape (n,), optional
         A further start; under a torque one is needed for the crank speed, unless it follows from a motor.
 
@@ -203,11 +211,18 @@ def orbits_of(
     parameters: Parameters,
     drive: Drive,
     *,
-    turns: int = 1,
+    turns: int | Sequence[int] = 1,
     start: ArrayLike | None = None,
     known: Iterable[PeriodicOrbit] = (),
 ) -> Orbits:
     """The same as `find_orbits`, from a `Drive`; the ``known`` motions are among them."""
+    if not isinstance(turns, int):
+        parts = [orbits_of(parameters, drive, turns=number, start=start) for number in sorted(set(turns))]
+        return Orbits(
+            orbits=tuple(sorted((o for part in parts for o in part.orbits), key=lambda orbit: orbit.amplitude)),
+            agreed=all(part.agreed for part in parts),
+            index=next((part.index for part in parts if part.index != 1), 1),
+        )
     require_turns(turns)
     guess = guess_of(drive.flow(mechanism_of(parameters)), drive, start)
     many, deflated = (_Found(parameters, drive, turns, guess) for _ in range(2))
@@ -233,6 +248,14 @@ def orbits_of(
         places = [*many.places(MANY, number + 1), *many.between()]
     orbits = sorted(many.orbits, key=lambda orbit: orbit.amplitude)
     return Orbits(orbits=tuple(orbits), agreed=agreed, index=many.index)
+
+
+def passages(orbit: PeriodicOrbit) -> NDArray[np.float64]:
+    """y at the beginning of each turn of a period, any of which may be its start; shape (turns, n)."""
+    passed = [orbit.start]
+    for _ in range(orbit.turns - 1):
+        passed.append(passed[-1] + period_from(orbit.parameters, orbit.drive, passed[-1], 1).shift)
+    return np.array(passed)
 
 
 class _Found:
@@ -270,13 +293,11 @@ class _Found:
         """Add a motion; whether it is new."""
         if self.knows(orbit.start):
             return False
-        passed = [orbit.start]
-        for _ in range(orbit.turns - 1):
-            passed.append(passed[-1] + period_from(orbit.parameters, orbit.drive, passed[-1], 1).shift)
+        passed = passages(orbit)
         # back at the start before its last turn, it is of a shorter period
-        away = np.abs(np.array(passed) - orbit.start) / self.scale
+        away = np.abs(passed - orbit.start) / self.scale
         period = next((n for n in range(1, orbit.turns) if away[n].max() < SAME), orbit.turns)
-        self.known = np.vstack([self.known, *passed[:period]])
+        self.known = np.vstack([self.known, passed[:period]])
         self.index += period * int(np.sign(np.linalg.det(np.eye(len(orbit.start)) - orbit.monodromy)))
         if period == orbit.turns:
             self.orbits.append(orbit)

@@ -27,9 +27,11 @@ from analysis.periodic import (
     charts,
     coexistence,
     find_orbits,
+    frequency_response,
     orbit_of,
     plane,
     stability_chart,
+    with_isolas,
 )
 from analysis.periodic.lines import branches_on
 from linkwork.errors import InputError
@@ -141,6 +143,48 @@ def test_no_stable_motion_is_a_sentence() -> None:
         basins(RIG_1_B, Drive(speed=SPEED), points=2, rate=(1.0, 0.0))
     with pytest.raises(InputError, match="axis x"):
         coexistence(plane(RIG_1_B, Drive(speed=SPEED), "drive.speed", "slider.damping"), [], [1.0])
+
+
+LIGHT = replace(RIG_1_B, slider_damping=2.0)
+SUBHARMONIC = 1380.0 * RAD_S_PER_RPM
+
+
+def test_a_start_ends_in_a_motion_of_four_turns() -> None:
+    """By the solver of runs it repeats itself after four turns, and after no fewer."""
+    (simple,), (large,) = (find_orbits(LIGHT, speed=SUBHARMONIC, turns=turns).stable for turns in (1, 4))
+    beside = [(float(value) - d, float(value) + d) for value, d in zip(large.start, (1e-4, 1e-2))]
+    near = basins(LIGHT, Drive(speed=SUBHARMONIC), turns=4, points=2, position=beside[0], rate=beside[1])
+    assert [orbit.turns for orbit in near.motions] == [1, 4]
+    assert near.motions[0].start == pytest.approx(simple.start, rel=1e-8)
+    assert (near.ends == 1).all()
+    period = 2.0 * np.pi / SUBHARMONIC
+    run = simulate(
+        LIGHT,
+        Inputs(speed=SUBHARMONIC),
+        initial=InitialState(slider_position=beside[0][0], slider_velocity=beside[1][0]),
+        stop_time=204 * period,
+        samples=np.append(0.0, np.arange(200, 205)) * period,
+    )
+    last = run["slider.position"][1:]
+    assert last[4] == pytest.approx(last[0], abs=1e-5)
+    assert np.abs(last[1:4] - last[0]).min() > 1e-3
+
+
+def test_motions_of_four_turns_are_met_in_a_range_far_wider_than_that_in_which_they_are_stable() -> None:
+    """The range is 12 rpm; the branch is begun from an unstable motion some 80 rpm below it."""
+    low, high = 1200.0 * RAD_S_PER_RPM, 1400.0 * RAD_S_PER_RPM
+    response = frequency_response(LIGHT, low, high, doublings=0, greatest_step=2e-2)
+    whole = with_isolas(response, places=1, turns=4, greatest_step=2e-2)
+    (branch,) = (branch for branch in whole.branches if branch.turns == 4)
+    stable = branch.parameter[[word is Stability.STABLE for word in branch.stability()]]
+    assert [special.kind for special in branch.special] == [Crossing.FOLD, Crossing.PERIOD_DOUBLING]
+    fold, doubling = (special.parameter for special in branch.special)
+    assert doubling < stable.min() < SUBHARMONIC < stable.max() < fold < doubling + 13.0 * RAD_S_PER_RPM
+    # beyond the fold there is none, within it there is
+    words = [len(find_orbits(LIGHT, speed=fold * (1.0 + away), turns=4)) for away in (-1e-4, 1e-4)]
+    assert words == [2, 0]
+    with pytest.raises(InputError, match="turns is 0"):
+        with_isolas(response, turns=0)
 
 
 def test_an_isola_is_found_that_the_branch_from_the_ends_does_not_pass() -> None:
