@@ -209,15 +209,16 @@ def synthesize(
     plots: bool,
     animate: bool,
 ) -> None:
-    """Find linkages that do what a CASE file (TOML or JSON) asks for: a path, a function of the rocker, a motion.
+    """Find linkages that do what a CASE file (TOML or JSON) asks for: a path, a function, a quick return, a motion.
 
-    Writes the ranked linkages, and of the first its drawing and its plates (DXF, SVG), a sheet (PDF), curve, report, plots, the
-    parameters of the FMU, and a case that 'linkwork run' runs.
+    Four-bars, slider-cranks and geared five-bars, as search.kinds says. Writes the ranked linkages, and of the first its drawing
+    and plates (DXF, SVG), a sheet (PDF), curve, report, plots, the FMU's parameters, and a case that 'linkwork run' runs.
 
     \b
     Examples:
       linkwork synthesize examples/ellipse.toml
       linkwork synthesize examples/hand-drawn.toml --out hand-drawn --animate
+      linkwork synthesize examples/kinds.toml --set search.kinds='["slider-crank"]'
       linkwork synthesize examples/ellipse.toml --set constraints.largest_link='300 mm' --set task.n=36
     """
     from .. import figures

@@ -45,7 +45,7 @@ from .limit_positions import (
 )
 from .linkage import ANGLES, LENGTHS, LINKS, UNITS, Linkage, SecondCrank, SliderMotion
 from .making import Make, direction
-from .quick_return import QuickReturn
+from .quick_return import QuickReturn, QuickSwing
 from .report import (
     SHOWN,
     dimension_rows,
@@ -131,6 +131,7 @@ __all__ = [
     "PivotUnknown",
     "PrecisionPoints",
     "QuickReturn",
+    "QuickSwing",
     "Require",
     "RockerFunction",
     "Rounding",

@@ -30,7 +30,7 @@ from ..files import (
     text,
 )
 from ..units import quantity
-from .quick_return import QuickReturn
+from .quick_return import QuickReturn, QuickSwing
 from .targets import TargetPath, function_from_formula, path_from_formula
 from .tasks import (
     Motion,
@@ -371,13 +371,16 @@ class SliderFunctionTable(_Formula):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class QuickReturnTable:
-    """The table of a `QuickReturn`."""
+    """The table of a `QuickReturn`, or of a `QuickSwing`."""
 
-    stroke: float = entry(Quantity("m", above=0.0))
+    stroke: float | None = entry(Quantity("m", above=0.0), None)
+    swing: float | None = entry(Quantity("rad"), None)
     time_ratio: float = entry(Quantity("1", least=1.0), 1.0)
 
     def task(self, folder: Path) -> Task:
-        return QuickReturn(stroke=self.stroke, time_ratio=self.time_ratio)
+        if _source(self, ("stroke", "swing")) == "swing":
+            return QuickSwing(swing=float(self.swing or 0.0), time_ratio=self.time_ratio)
+        return QuickReturn(stroke=float(self.stroke or 0.0), time_ratio=self.time_ratio)
 
 
 #: The table ``[task]`` of each kind.

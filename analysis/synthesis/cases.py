@@ -51,7 +51,7 @@ from .kinds import GEARS, Kind, Stroke, limits_of_kinds
 from .limit_positions import DeadCentre, MechanicalAdvantage, NoToggle, Toggle
 from .linkage import ANGLES
 from .making import Make
-from .quick_return import QuickReturn
+from .quick_return import QuickReturn, QuickSwing
 from .requirements import requirement
 from .search import METHODS, Method, Search
 from .solution import Solution
@@ -238,7 +238,7 @@ class SynthesisCase:
         made = (replace(c, make=self.make) if isinstance(c, FORCES) else c for c in self.constraints)
         object.__setattr__(self, "constraints", tuple(made))
         # contradictions are reported before anything is searched
-        if not isinstance(self.task, QuickReturn):
+        if not isinstance(self.task, QuickReturn | QuickSwing):
             limits_of_kinds(
                 self.task, normal_form(self.task), self.bounds, self.constraints, self.search.kinds, self.search.gears
             )

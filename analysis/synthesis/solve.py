@@ -33,7 +33,7 @@ from .forces import MaxPinForce
 from .kinds import GEARS, Kind, Stroke, as_asked, is_of, kind_of, limits_of_kinds, second_crank, usual_kinds
 from .linkage import ANGLES, UNITS, Linkage, SecondCrank
 from .polish import Polished, distinct, polish
-from .quick_return import QuickReturn, quick_returns
+from .quick_return import QuickReturn, QuickSwing, quick_returns
 from .scan import scan
 from .search import QUICK_SEARCH, USUAL_SEARCH, Search
 from .solution import Solution, nearest_rotations, ranked
@@ -122,7 +122,7 @@ def synthesize(
 
     Parameters
     ----------
-    task : TimedPath, UntimedPath, RockerFunction, SliderFunction, QuickReturn, Motion or PrecisionPoints
+    task : TimedPath, UntimedPath, RockerFunction, SliderFunction, QuickReturn, QuickSwing, Motion or PrecisionPoints
     bounds : mapping, optional
         (least, greatest) of dimensions by their name in `Linkage` (m, rad, or text such as "5 cm"), or of a five-bar's
         ``second_crank_length``; equal ones fix a dimension, kinds that do not have it leave it out. Without, links up to five
@@ -168,7 +168,7 @@ def synthesize(
     begun = perf_counter()
     task = reweighted(task, weights)
     kinds = usual_kinds(task) if kinds is None else kinds
-    if isinstance(task, QuickReturn):
+    if isinstance(task, QuickReturn | QuickSwing):
         return _in_closed_form(task, bounds, constraints, kinds, search, begun)
     task = _as_sought(task, constraints, pivot, search)
     normal = fitted_form(task, pivot)
@@ -208,10 +208,16 @@ def synthesize(
 
 
 def _in_closed_form(
-    task: QuickReturn, bounds: Any, constraints: Sequence[Any], kinds: Sequence[Kind], search: Search, begun: float
+    task: QuickReturn | QuickSwing,
+    bounds: Any,
+    constraints: Sequence[Any],
+    kinds: Sequence[Kind],
+    search: Search,
+    begun: float,
 ) -> Synthesis:
-    if tuple(kinds) != ("slider-crank",):
-        raise InputError("a QuickReturn is of the slider of a slider-crank: kinds must be ('slider-crank',)")
+    if tuple(kinds) != usual_kinds(task):
+        of = "slider of a slider-crank" if isinstance(task, QuickReturn) else "rocker of a four-bar"
+        raise InputError(f"a {type(task).__name__} is of the {of}: kinds must be {usual_kinds(task)}")
     found = quick_returns(task, bounds, constraints)[: search.solutions]
     seconds = perf_counter() - begun
     return Synthesis(

@@ -10,7 +10,7 @@ squared distance to the curve.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from itertools import pairwise
 from math import hypot, isfinite, pi
 from typing import Any, Literal, get_args
@@ -483,6 +483,8 @@ def reweighted(task: Task, weights: ArrayLike | None) -> Task:
         return task
     if isinstance(task, PrecisionPoints):
         raise InputError("precision points are met exactly: they have no weights")
+    if not next(f.init for f in fields(task) if f.name == "weights"):
+        raise InputError(f"a {type(task).__name__} is met exactly: it has no weights")
     return replace(task, weights=weights)
 
 

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from scipy.optimize import brentq, differential_evolution
+from scipy.optimize import brentq, differential_evolution, fsolve
 
 from analysis.mechanisms import SLIDER_CRANK
 from analysis.synthesis import (
@@ -26,6 +26,7 @@ from analysis.synthesis import (
     Motion,
     PivotRegion,
     QuickReturn,
+    QuickSwing,
     RockerFunction,
     Search,
     SecondCrank,
@@ -193,6 +194,73 @@ class TestQuickReturn:
             QuickReturn(stroke=0.1, time_ratio=0.9)
 
 
+class TestQuickSwing:
+    @pytest.mark.parametrize(("swing", "ratio"), [(40.0, 1.0), (60.0, 1.1), (-60.0, 1.1), (-80.0, 1.3), (100.0, 1.5)])
+    def test_the_rocker_swings_as_it_is_asked(self, swing: float, ratio: float) -> None:
+        found = synthesize(QuickSwing(swing=f"{swing} deg", time_ratio=ratio), constraints=[])
+        assert {s.linkage.branch for s in found.solutions} == {1, -1}
+        for s in found.solutions:
+            phi = np.linspace(0.0, 2.0 * pi, 20001)
+            angle = s.linkage.rocker_angle(phi)
+            slow = phi[np.argmax(angle * np.sign(swing))]
+            assert slow / (2.0 * pi - slow) == pytest.approx(ratio, rel=1e-3)
+            assert np.ptp(angle) == pytest.approx(radians(abs(swing)), rel=1e-6)
+            assert s.evaluation.worst < 1e-9
+            assert s.verdicts.grashof == "crank-rocker"
+
+    @pytest.mark.parametrize("swing", [50.0, -50.0])
+    def test_no_other_transmits_better(self, swing: float) -> None:
+        """Crank-rockers with the same swing and ratio and another coupler, by roots of the laws of cosines."""
+        best = synthesize(QuickSwing(swing=f"{swing} deg", time_ratio=1.15), constraints=[]).best.linkage
+        l3, advance = best.coupler_length / best.rocker_length, pi * 0.15 / 2.15
+
+        def ends(ground: float, crank: float, coupler: float) -> tuple[list[float], list[float]]:
+            """Directions of C from A, and angles of the rocker at D, in the dead centres; by the law of cosines."""
+            reach = np.array([coupler + crank, coupler - crank])
+            cosines = (
+                (ground**2 + reach**2 - 1.0) / (2.0 * ground * reach),
+                (ground**2 + 1.0 - reach**2) / (2.0 * ground),
+            )
+            at_a, at_d = (np.arccos(np.clip(c, -1.0, 1.0)).tolist() for c in cosines)
+            return at_a, at_d
+
+        def off(x: FloatArray, coupler: float) -> FloatArray:
+            at_a, at_d = ends(*x, coupler)
+            return np.array([np.sign(swing) * (at_a[1] - at_a[0]) - advance, at_d[0] - at_d[1] - radians(50.0)])
+
+        start = np.array([best.ground_length, best.crank_length]) / best.rocker_length
+        assert np.abs(off(start, l3)).max() < 1e-9
+        for other in (0.9 * l3, 0.99 * l3, 1.01 * l3, 1.1 * l3):
+            (ground, crank), _, good, _ = fsolve(off, start, args=(other,), full_output=True)
+            assert good == 1
+            made = Linkage(ground_length=ground, crank_length=crank, coupler_length=other, rocker_length=1.0)
+            assert 0.9 * best.least_transmission < made.least_transmission < best.least_transmission
+
+    def test_size_and_what_cannot_be_had(self) -> None:
+        task = QuickSwing(swing="-60 deg", time_ratio=1.1)
+        assert synthesize(task, constraints=[]).best.linkage.ground_length == pytest.approx(0.1)
+        fixed = synthesize(task, {"rocker_length": ("50 mm", "50 mm")}, [LargestLink(length=0.1)]).best.linkage
+        assert fixed.rocker_length == pytest.approx(0.05)
+        assert synthesize(task, constraints=[LargestLink(length="40 mm")]).best.linkage.largest_link == pytest.approx(
+            0.04
+        )
+        with pytest.raises(
+            InfeasibleError, match=r"a swing of 100 deg and a time ratio of 1.5 the best crank-rocker has 20.35 deg"
+        ):
+            synthesize(QuickSwing(swing="100 deg", time_ratio=1.5))
+        with pytest.raises(InfeasibleError, match="no crank-rocker with a swing of -60 deg"):
+            synthesize(task, {"crank_length": (0.02, 0.02), "rocker_length": ("1 cm", "2 cm")})
+        with pytest.raises(ParameterError, match="be one of ground_length"):
+            synthesize(task, {"pivot_x": (0.0, 0.0)})
+        with pytest.raises(InputError, match="cannot keep TimeRatio: leave it out, or ask for a RockerFunction"):
+            synthesize(task, constraints=[TimeRatio(least=1.1)])
+        with pytest.raises(InputError, match="has no weights"):
+            synthesize(task, weights=[1.0, 1.0, 1.0])
+        for wrong in ({"swing": "180 deg"}, {"swing": 0.0}, {"swing": 1.0, "time_ratio": 0.5}):
+            with pytest.raises(ParameterError):
+                QuickSwing(**wrong)  # type: ignore[arg-type]
+
+
 class TestSearch:
     """Targets that a known slider-crank makes: found again to rounding."""
 
@@ -257,6 +325,7 @@ class TestSearch:
         (RockerFunction(angle=[0.1, 0.2, 0.4]), {"kinds": ("slider-crank",)}, "RockerFunction is of a rocker"),
         (SliderFunction(position=[0.0, 0.1, 0.2]), {"kinds": ("four-bar",)}, "SliderFunction is of a slider"),
         (QuickReturn(stroke=0.1), {"kinds": ("four-bar",)}, "QuickReturn is of the slider of a slider-crank"),
+        (QuickSwing(swing=1.0), {"kinds": ("slider-crank",)}, "QuickSwing is of the rocker of a four-bar"),
         (None, {"kinds": ("slider-crank",), "constraints": [Grashof(type="crank-rocker")]}, "cannot keep Grashof"),
         (None, {"constraints": [Stroke(least=0.1)]}, "a four-bar cannot keep Stroke"),
         (
