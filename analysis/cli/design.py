@@ -211,8 +211,9 @@ def synthesize(
 ) -> None:
     """Find linkages that do what a CASE file (TOML or JSON) asks for: a path, a function, a quick return, a motion.
 
-    Four-bars, slider-cranks and geared five-bars, as search.kinds says. Writes the ranked linkages, and of the first its drawing
-    and plates (DXF, SVG), a sheet (PDF), curve, report, plots, the FMU's parameters, and a case that 'linkwork run' runs.
+    Four-bars, slider-cranks and geared five-bars, as search.kinds says. Writes the ranked linkages, and of the first its
+    drawing and plates (DXF, SVG), a sheet (PDF), curve, report, plots, the FMU's parameters, and a case that
+    'linkwork run' runs.
 
     \b
     Examples:
