@@ -12,8 +12,8 @@ from math import isfinite
 from typing import Any
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.optimize import brentq, minimize_scalar
 
 from linkwork.errors import InputError, LinkworkError
 
@@ -86,7 +86,7 @@ def scan(
         around, sign = values[first : last + 1], np.sign(values[i])
         if np.isfinite(around).all() and (np.sign(around) == sign).all() and first + np.argmin(sign * around) == i:
             try:
-                found = minimize_scalar(
+                found = scipy.optimize.minimize_scalar(
                     lambda x, sign=sign: sign * function(x),
                     bounds=(points[first], points[last]),
                     method="bounded",
@@ -117,7 +117,11 @@ def scan(
             continue
         # a function value of zero counts as positive: the same root is not found from both sides
         try:
-            root = here if right == 0.0 else float(brentq(function, points[i - 1], here, xtol=tolerance * (high - low)))
+            root = (
+                here
+                if right == 0.0
+                else float(scipy.optimize.brentq(function, points[i - 1], here, xtol=tolerance * (high - low)))
+            )
         except LinkworkError as error:
             gaps.append((here, f"just before: {error}"))
             # the boundary is somewhere between the samples, and so is the end of the interval
@@ -152,7 +156,9 @@ def lowest(
     values = [function(x) for x in points.tolist()]
     i = int(np.argmin(values))
     bounds = points[max(i - 1, 0)], points[min(i + 1, samples - 1)]
-    found = minimize_scalar(function, bounds=bounds, method="bounded", options={"xatol": tolerance * (high - low)})
+    found = scipy.optimize.minimize_scalar(
+        function, bounds=bounds, method="bounded", options={"xatol": tolerance * (high - low)}
+    )
     return (float(found.x), float(found.fun)) if found.fun < values[i] else (float(points[i]), float(values[i]))
 
 
@@ -235,7 +241,13 @@ class Boundary:
                     - u * u * (1.0 - u) * t
                 )
 
-            u = 0.0 if p[axis] == level else 1.0 if q[axis] == level else brentq(lambda u: curve(u)[axis] - level, 0, 1)
+            u = (
+                0.0
+                if p[axis] == level
+                else 1.0
+                if q[axis] == level
+                else scipy.optimize.brentq(lambda u: curve(u)[axis] - level, 0, 1)
+            )
             found.append(curve(u)[1 - axis] * box.size[1 - axis] + box.corner[1 - axis])
         return np.array(found)
 

@@ -14,8 +14,8 @@ from enum import Enum
 from typing import Any, NamedTuple
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike, NDArray
-from scipy.optimize import brentq
 
 from linkwork.errors import InputError, LinkworkError
 
@@ -356,7 +356,7 @@ class Follower:
                 )
             return self._point(found, point.tangent)
 
-        s = float(brentq(lambda s: test(at(s)), 0.0, length, xtol=1e-13, rtol=1e-14))
+        s = float(scipy.optimize.brentq(lambda s: test(at(s)), 0.0, length, xtol=1e-13, rtol=1e-14))
         return at(s), s
 
     def _attempt(self, last: Point, length: float, bend: Vector | None) -> tuple[Point, int] | _Failure:

@@ -10,13 +10,12 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from enum import Enum
 from itertools import combinations, pairwise, product
-from math import inf, isfinite, sqrt
+from math import inf, isfinite, prod, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import KroghInterpolator
-from scipy.signal import find_peaks
 
+from ..numerics.peaks import peaks
 from .branches import Branch
 from .floquet import TOLERANCE, Crossing
 
@@ -215,8 +214,7 @@ def _overlap(a: Arc, b: Arc) -> Interval:
 def _resonances(arc: Arc) -> list[Interval]:
     """The half-power bands of the peaks of an arc, and of where it is largest at its end and loses its stability."""
     a = arc.amplitude
-    peaks, properties = find_peaks(a, prominence=0.0)
-    tops = peaks[properties["prominences"] > _PROMINENCE * a[peaks]].tolist()
+    tops = [top for top, prominence in peaks(a) if prominence > _PROMINENCE * a[top]]
     bands = [tuple(_band_end(arc, top, way) for way in (-1, 1)) for top in tops]
     # at an end the amplitude must have fallen for it to be more than a place on a slope
     for end, cut, way in ((0, arc.cut[0], 1), (len(a) - 1, arc.cut[1], -1)):
@@ -236,8 +234,9 @@ def _band_end(arc: Arc, top: int, way: int) -> float:
         if a[i] < level:
             # by the cubic through the points about it, as far as it is between these two
             about = slice(max(min(i, i - way) - 1, 0), max(i, i - way) + 2)
-            cubic = KroghInterpolator(a[about], x[about])(level)
-            return float(np.clip(cubic, *sorted((x[i - way], x[i]))))
+            places = a[about].tolist()
+            weights = [prod((level - b) / (c - b) for b in places if b != c) for c in places]
+            return float(np.clip(np.dot(weights, x[about]), *sorted((x[i - way], x[i]))))
     return float(x[i])
 
 

@@ -11,8 +11,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike, NDArray
-from scipy import ndimage
 
 from linkwork.errors import InputError, LinkworkError, ParameterError
 from linkwork.mechanism import Mechanism
@@ -485,7 +485,7 @@ def unmet(beside: Coexistence, lines: Sequence[float], boundaries: Sequence[NDAr
     cell = [np.diff(axis[:2]).sum() for axis in (beside.x, beside.y)]
     found: list[float] = []
     for number in np.unique(beside.stable):
-        labels, count = ndimage.label(beside.stable == number)
+        labels, count = scipy.ndimage.label(beside.stable == number)
         for label in range(1, count + 1):
             rows, columns = np.nonzero(labels == label)
             if any(beside.y[rows.min()] <= y <= beside.y[rows.max()] for y in (*lines, *found)):

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from scipy.optimize import minimize_scalar
-from scipy.signal import find_peaks
+import scipy
 
 from linkwork.errors import InputError, LinkworkError
 
+from ..numerics.peaks import peaks
 from .branches import Branch, SpecialPoint
 from .families import Family
 from .floquet import Stability
@@ -53,9 +53,8 @@ def extrema(branch: Branch, sign: int = 1) -> tuple[Extremum, ...]:
     parameters: since the amplitude hardly changes there, the place is then good to 1e-4 of the parameter.
     """
     amplitude = sign * branch.amplitude
-    peaks, properties = find_peaks(amplitude, prominence=0.0)
     found = []
-    for i, prominence in zip(peaks.tolist(), properties["prominences"].tolist()):
+    for i, prominence in peaks(amplitude):
         if prominence < PROMINENCE * abs(amplitude[i]):
             continue
         a, c = sorted((float(branch.parameter[i - 1]), float(branch.parameter[i + 1])))
@@ -88,7 +87,7 @@ def _at_rest(
         return orbit_of(parameters, drive, turns=orbit.turns, start=orbit.start, settle=False)
 
     try:
-        best = minimize_scalar(
+        best = scipy.optimize.minimize_scalar(
             lambda value: -sign * near(value).amplitude,
             bounds=(a, c),
             method="bounded",

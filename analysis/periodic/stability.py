@@ -15,9 +15,8 @@ from functools import cache
 from math import exp, log
 
 import numpy as np
-import scipy.linalg
+import scipy
 from numpy.typing import ArrayLike, NDArray
-from scipy.optimize import brentq
 
 from linkwork.errors import InputError, LinkworkError
 
@@ -144,7 +143,7 @@ def removing_damping(
         raise RemovalError(f"there is no region between {x[0]:g} and {x[1]:g} at the damping {damping[0]:g}")
     if not high > 0.0:
         raise RemovalError(f"the region between {x[0]:g} and {x[1]:g} is still there at the damping {damping[1]:g}")
-    found = float(brentq(least, *damping, xtol=0.1 * tolerance * damping[1], rtol=1e-14))
+    found = float(scipy.optimize.brentq(least, *damping, xtol=0.1 * tolerance * damping[1], rtol=1e-14))
     place, value = lowest(lambda s: test(s, found), *x, samples=samples)
     return RemovingDamping(damping=found, x=place, residual=value)
 

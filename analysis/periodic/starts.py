@@ -6,12 +6,12 @@ from math import pi
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.stats import qmc
 
 from linkwork.errors import AssemblyError
 from linkwork.parameters import field_name
 
 from ..mechanisms import Parameters, mechanism_of
+from ..numerics.sobol import sobol
 from ..run import takes_published
 from .drives import Drive
 from .flows import Flow
@@ -84,7 +84,7 @@ def starts_of(
     flow, scale = drive.flow(mechanism_of(parameters)), scale_of(parameters, drive, guess)
     half = flow.size // 2
     extent = extent_of(parameters, drive, guess)
-    sequence = qmc.Sobol(flow.size, scramble=True, rng=number).random(count)
+    sequence = sobol(flow.size, count, number)
     amplitude, phase = sequence[:, :half], 2.0 * pi * sequence[:, half : 2 * half]
     found = np.tile(guess, (count, 1))
     found[:, :half] = extent * amplitude * np.cos(phase)

@@ -17,8 +17,6 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.polynomial import legendre
 from numpy.typing import NDArray
-from scipy.sparse import coo_array
-from scipy.sparse.linalg import splu
 
 from linkwork.errors import LinkworkError
 
@@ -45,6 +43,8 @@ _RESOLVED, _EFFECT = 1e-10, 1e-8
 _REAL = 1e-9
 #: Difference of the monodromy matrix from that of the orbit, relative to its greatest entry, above which something is wrong.
 _AGREES = 1e-6
+#: Least singular value, relative to the norm, up to which a matrix has none but of rounding.
+_ROUNDING = 1e-15
 
 
 _GAUSS = gauss(_POINTS)
@@ -251,19 +251,7 @@ class Variations:
         LinkworkError
             If there is none, exactly at a fold.
         """
-        gains = self._gains(forcing)
-        k, n, m = gains.shape
-        # d at the end of each panel is d at the beginning of the next
-        places = np.arange(k * n).reshape(k, n)
-        at = [np.broadcast_to(places[:, :, None], (k, n, n)), np.broadcast_to(places[:, None, :], (k, n, n))]
-        row = np.concatenate([places.ravel(), at[0].ravel()])
-        column = np.concatenate([np.roll(places, -1, axis=0).ravel(), at[1].ravel()])
-        value = np.concatenate([np.ones(k * n), -self.steps.ravel()])
-        matrix = coo_array((value, (row, column)), shape=(k * n, k * n)).tocsc()
-        try:
-            starts = splu(matrix).solve(gains.reshape(k * n, m)).reshape(k, n, m)
-        except RuntimeError as error:
-            raise LinkworkError("the motion is at a fold: it has no derivatives by the parameters") from error
+        starts = _round(self.steps, self._gains(forcing))
         return self._at_nodes(starts, forcing), starts[0]
 
     # What is read off
@@ -318,6 +306,37 @@ class Variations:
             for angle, y in zip(self.angles[panel], self.y[panel])
         ]
         return np.array(found)[:, :n], np.array(found)[:, n:]
+
+
+def _round(steps: FloatArray, gains: FloatArray) -> FloatArray:
+    """What d is at the beginning of each panel, shape (k, n, m), if it is at the end of each what it is at the next, and round.
+
+    Two panels at a time become one: rotations take what is between them out of their equations, so that neither what grows
+    nor what decays is multiplied up.
+    """
+    count, n, _ = gains.shape
+    # panels on which nothing happens make their number a power of two
+    more = (1 << (count - 1).bit_length()) - count
+    whole = np.broadcast_to(np.eye(n), (count + more, n, n))
+    # a d + b (d at the next) = right
+    a, b = np.concatenate([-steps, -whole[:more]]), whole
+    right = np.pad(gains, ((0, more), (0, 0), (0, 0)))
+    levels = []
+    while len(a) > 1:
+        none = np.zeros_like(a[::2])
+        turned, triangle = np.linalg.qr(np.concatenate([b[::2], a[1::2]], axis=1), mode="complete")
+        rows = [np.concatenate(row, axis=2) for row in ((a[::2], none, right[::2]), (none, b[1::2], right[1::2]))]
+        outer = turned.swapaxes(1, 2) @ np.concatenate(rows, axis=1)
+        levels.append((triangle[:, :n], outer[:, :n]))
+        a, b, right = np.split(outer[:, n:], (n, 2 * n), axis=2)
+    if np.linalg.norm(a[0] + b[0], -2) <= _ROUNDING * np.linalg.norm(np.hstack([a[0], b[0]])):
+        raise LinkworkError("the motion is at a fold: it has no derivatives by the parameters")
+    found = np.linalg.solve(a + b, right)
+    for triangle, outer in reversed(levels):
+        beside = np.concatenate([found, np.roll(found, -1, axis=0)], axis=1)
+        between = np.linalg.solve(triangle, outer[:, :, 2 * n :] - outer[:, :, : 2 * n] @ beside)
+        found = np.stack([found, between], axis=1).reshape(-1, *gains.shape[1:])
+    return np.asarray(found[:count])
 
 
 class _Symbols(NamedTuple):

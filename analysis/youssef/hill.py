@@ -16,7 +16,7 @@ from functools import lru_cache
 from math import ceil, pi
 
 import numpy as np
-import scipy.linalg
+import scipy
 from numpy.typing import NDArray
 
 from linkwork.errors import InputError
