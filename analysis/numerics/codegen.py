@@ -1,7 +1,8 @@
 """Functions traced with CasADi as machine code in this process, and Numba kernels that call them by address.
 
 A ``casadi.Function`` of symbols is a list of elementary instructions. They are written out as LLVM's and compiled in some
-hundredths of a second: nothing is kept on disk, so that nothing can be out of date. Every function has the one form
+hundredths of a second; the machine code is kept on disk by a hash of the instructions, of the processor and of what writes
+them, so that it cannot be out of date. Every function has the one form
 
     f(t, a, b, c, d, out)        t a float, the others arrays of floats
 
@@ -21,7 +22,7 @@ import sys
 import tempfile
 import warnings
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from functools import cache
 from pathlib import Path
 from threading import RLock
@@ -68,7 +69,7 @@ class MachineCode:
     addresses : dict of str to int
         Address of each function by its name.
     fingerprint : str
-        Hash of the instructions.
+        Hash of the instructions, of the processor and of what writes them.
 
     Raises
     ------
@@ -78,25 +79,57 @@ class MachineCode:
 
     def __init__(self, functions: Sequence[Any]) -> None:
         _prepare()
-        module = ir.Module("linkwork")
-        module.triple = binding.get_default_triple()
-        for function in functions:
-            _Writer(module, function).write()
-        text = str(module)
-        self.fingerprint = hashlib.sha256(text.encode()).hexdigest()
-        parsed = binding.parse_assembly(text)
+        triple, cpu = binding.get_default_triple(), binding.get_host_cpu_name()
+        features = binding.get_host_cpu_features().flatten()
+        digest = hashlib.sha256(f"{llvmlite.__version__} {triple} {cpu} {features}".encode() + _own_source())
+        digest.update(" ".join(function.serialize() for function in functions).encode())
+        self.fingerprint = digest.hexdigest()
         machine = binding.Target.from_default_triple().create_target_machine(
-            opt=3,
-            jit=True,
-            cpu=binding.get_host_cpu_name(),
-            features=binding.get_host_cpu_features().flatten(),
+            opt=3, jit=True, cpu=cpu, features=features
         )
-        passes = binding.create_pass_builder(machine, binding.create_pipeline_tuning_options(speed_level=2))
-        passes.getModulePassManager().run(parsed, passes)
-        engine = binding.create_mcjit_compiler(parsed, machine)
+        code = _kept(self.fingerprint, lambda: _compile(functions, triple, machine))
+        engine = binding.create_mcjit_compiler(binding.parse_assembly(f'target triple = "{triple}"'), machine)
+        engine.add_object_file(binding.ObjectFileRef.from_data(code))
         engine.finalize_object()
         _ALIVE.append(engine)
         self.addresses = {f.name(): engine.get_function_address(f.name()) for f in functions}
+
+
+def _compile(functions: Sequence[Any], triple: str, machine: Any) -> bytes:
+    """An object file of functions."""
+    module = ir.Module("linkwork")
+    module.triple = triple
+    for function in functions:
+        _Writer(module, function).write()
+    parsed = binding.parse_assembly(str(module))
+    passes = binding.create_pass_builder(machine, binding.create_pipeline_tuning_options(speed_level=2))
+    passes.getModulePassManager().run(parsed, passes)
+    code: bytes = machine.emit_object(parsed)
+    return code
+
+
+@cache
+def _own_source() -> bytes:
+    return Path(__file__).read_bytes()
+
+
+def _kept(key: str, make: Callable[[], bytes]) -> bytes:
+    """The object file of a key from disk, or a new one, with a hash: LLVM ends the process over one that is damaged."""
+    path = code_folder("llvm") / key
+    with suppress(OSError):
+        digest, code = (text := path.read_bytes())[:32], text[32:]
+        if hashlib.sha256(code).digest() == digest:
+            return code
+    code = make()
+    # where the disk is full or cannot be written to it is made again the next time
+    part = path.with_suffix(f".{os.getpid()}")
+    with suppress(OSError):
+        try:
+            part.write_bytes(hashlib.sha256(code).digest() + code)
+            os.replace(part, path)
+        finally:
+            part.unlink(missing_ok=True)
+    return code
 
 
 #: Functions of the C library by CasADi's operations.

@@ -194,7 +194,7 @@ def test_second_process_finds_the_code_of_the_first(
     assert (second["hits"], second["misses"]) == (5, 0)
     assert second["seconds"] < 0.5 * first["seconds"]
     assert second["position"] == first["position"]
-    assert len(list((tmp_path / "cache").iterdir())) == 5
+    assert len(list((tmp_path / "cache").glob("numba-*"))) == 5
     assert any((tmp_path / "cache").rglob("*.nbi"))
 
 
@@ -266,6 +266,28 @@ def test_damaged_machine_code_is_compiled_again(
     with pytest.warns(RuntimeWarning, match="is damaged .* it is compiled again"):
         assert made()(2.0) == 4.0
     assert made()(3.0) == 6.0  # from the cache, without a warning
+
+
+def test_machine_code_of_functions_is_kept_and_checked(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("LINKWORK_CACHE_DIR", str(tmp_path))
+    written: list[str] = []
+
+    def noted(self: Any, *arguments: Any) -> None:
+        written.append("")
+        original(self, *arguments)
+
+    original = codegen._Writer.__init__
+    monkeypatch.setattr(codegen._Writer, "__init__", noted)
+
+    def value(factor: float) -> float:
+        code = MachineCode([function_of(lambda t, a, *_: factor * a[0])])
+        return float(value_at(code.addresses["f"], 0.0, np.array([0.5, 0.0])))
+
+    assert (value(3.0), value(3.0), len(written)) == (1.5, 1.5, 1)
+    assert (value(4.0), len(written)) == (2.0, 2)
+    for path in (tmp_path / "llvm").iterdir():
+        path.write_bytes(path.read_bytes()[:-9] + b"some junk")
+    assert (value(3.0), value(4.0), value(3.0), len(written)) == (1.5, 2.0, 1.5, 4)
 
 
 def _doubled(x):  # type: ignore[no-untyped-def]
