@@ -174,6 +174,8 @@ def _converted(text: str, unit: str, spelled: str, name: str, wanted: str) -> fl
         raise ParameterError(
             name, text, f"come with its unit, such as '{text} {spelled}', or be a number, which is in SI"
         )
+    if of in (unit, spelled):
+        return number
     import pint
 
     try:

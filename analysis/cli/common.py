@@ -189,13 +189,13 @@ def set_option(example: str) -> Callable[..., Any]:
 
 
 def _require_plotly(context: click.Context, parameter: click.Parameter, value: bool) -> bool:
-    from ..figures import PlotlyMissingError, require_plotly
+    if value:
+        from ..figures import PlotlyMissingError, require_plotly
 
-    try:
-        if value:
+        try:
             require_plotly()
-    except PlotlyMissingError as error:
-        raise click.BadParameter(str(error)) from None
+        except PlotlyMissingError as error:
+            raise click.BadParameter(str(error)) from None
     return value
 
 
