@@ -29,6 +29,7 @@ from .style import (
     SHADES,
     THIN,
     Figure,
+    align_labels,
     finish,
     legend_above,
     styled,
@@ -218,7 +219,7 @@ def draw(picture: Picture) -> Figure:
         for axis in list(axes.flat)[len(parts) :]:
             axis.remove()
         if picture.heights:
-            figure.align_ylabels()
+            align_labels(list(axes.flat))
         write_title(figure, picture.title)
         write_notes(figure, picture.notes)
         return place_marks(finish(figure))

@@ -12,8 +12,10 @@ from typing import Any
 
 import matplotlib.style
 from cycler import cycler
+from matplotlib import rc_context
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.transforms import ScaledTranslation
 
 __all__ = ["COLOURS", "STYLE", "Figure", "finish", "styled"]
 
@@ -95,6 +97,30 @@ def legend_above(axis: Axes, **options: Any) -> None:
 
 def finish(figure: Figure) -> Figure:
     """Lay the figure out, once for all, while the style is in force: ticks are made, and take their look, only then."""
-    figure.draw_without_rendering()
-    figure.set_layout_engine("none")
+    engine = figure.get_layout_engine()
+    if engine is None:
+        figure.draw_without_rendering()
+    else:
+        engine.execute(figure)
+        # with any engine, be it "none", a figure is drawn twice when it is saved
+        with rc_context({"figure.constrained_layout.use": False}):
+            figure.set_layout_engine(None)
     return figure
+
+
+def align_labels(axes: Sequence[Axes]) -> None:
+    """Put the y labels of axes above each other at one distance from them, as wide as their ticks are now.
+
+    `Figure.align_ylabels` looks at the ticks of all of them for each of them, whenever one is drawn or laid out.
+    """
+    reach = 0.0
+    for axis in axes:
+        axis.yaxis.set_label_coords(0.0, 0.5)
+        axis.yaxis.label.set_visible(False)
+        box = axis.yaxis.get_tightbbox()
+        reach = reach if box is None else max(reach, axis.bbox.x0 - box.x0)
+        axis.yaxis.label.set_visible(True)
+    for axis in axes:
+        points = 72.0 * reach / axis.figure.dpi + axis.yaxis.labelpad
+        away = ScaledTranslation(-points / 72.0, 0.0, axis.figure.dpi_scale_trans)
+        axis.yaxis.set_label_coords(0.0, 0.5, axis.transAxes + away)
