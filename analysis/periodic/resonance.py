@@ -181,7 +181,7 @@ def frequency_response(
     ['1.715 cm']
     """
     unit = unit_of(mechanism_of(parameters), vary)
-    low, high = si(low, unit, "low"), si(high, unit, "high")
+    low, high = float(si(low, unit, "low")), float(si(high, unit, "high"))
     if drive is None:
         if vary != "drive.speed":
             raise InputError(
