@@ -71,7 +71,7 @@ class Family:
         """A value of the parameter with its name and unit; speeds in rpm too."""
         return format_value(self.name, value, self.unit)
 
-    def _direction(self, value: float, low: float, high: float) -> Direction:
+    def direction(self, value: float, low: float, high: float) -> Direction:
         """By differences inside the parameter's range."""
         step = _DIFFERENCE * max(abs(value), 1e-3 * (high - low))
         a, b = max(value - step, low), min(value + step, high)
@@ -90,11 +90,11 @@ class Family:
         whole = np.array([0.0, drive.flow(mechanism_of(mechanism)).period * turns])
         path = PeriodPath(whole if angles is None else angles, is_smooth(mechanism) and is_smooth(other))
         # what varies is a number of the drive: all of them are linear in it
-        same = self._direction(high, low, high) if mechanism is other else None
+        same = self.direction(high, low, high) if mechanism is other else None
 
         def evaluation(y: NDArray[np.float64], value: float) -> Evaluation:
             parameters, drive = self.at(value)
-            direction = same or self._direction(value, low, high)
+            direction = same or self.direction(value, low, high)
             ends = path.follow(parameters, drive, y[None, :], value, direction, high - low)
             period = Period(ends.y[0] - y, ends.matrices[0].copy(), ends.slopes[0])
             orbit = orbit_from(parameters, drive, y, turns, period, ends.clearance)
@@ -106,7 +106,7 @@ class Family:
             k = len(angles) - 1
             starts = y.reshape(k, -1).copy()
             n = starts.shape[1]
-            direction = same or self._direction(value, low, high)
+            direction = same or self.direction(value, low, high)
             ends, matrices, slopes, clearance = path.follow(parameters, drive, starts, value, direction, high - low)
             gaps = ends - np.roll(starts, -1, axis=0)
             jacobian = np.zeros((k, n, k, n))

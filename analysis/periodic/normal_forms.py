@@ -20,12 +20,15 @@ from linkwork.errors import InputError, LinkworkError
 from .branches import SpecialPoint
 from .families import Family
 from .floquet import Crossing
-from .orbits import PeriodicOrbit, orbit_of, period_from
+from .orbits import OrbitError, PeriodicOrbit, orbit_of, period_from
 from .starts import scale_of
 
 #: Step of the differences, relative to the scale of y, the relative uncertainty down to which it is halved, and how often at
-#: most: the map over many turns bends within a thousandth of the scale.
-_STEP, _CERTAIN, _HALVINGS = 8e-3, 1e-2, 8
+#: most: the map over many turns bends within a thousandth of the scale, that next to the limit of assembly within a millionth.
+_STEP, _CERTAIN, _HALVINGS = 8e-3, 1e-2, 16
+#: Distance of the multiplier from where it crosses the unit circle up to which the point counts as located: next to the limit
+#: of assembly it crosses from -1 to 1 within the rounding of the parameter.
+_LOCATED = 1e-2
 #: Relative difference of the coefficients with the whole and the half step above which its sign is not settled.
 UNSETTLED = 0.5
 #: Distance of the multiplier from the unit circle at which a run confirms a normal form, at least and at most, the square of
@@ -49,7 +52,8 @@ class NormalForm:
     uncertainty : float
         Change of the coefficient when the step of the differences is halved.
     words : str
-        "supercritical", "subcritical", or "not settled"; of a fold on which side of it the two motions are.
+        "supercritical", "subcritical", or "not settled", where the coefficient is not certain or the multiplier crosses the
+        circle too fast for the point to be located; of a fold on which side of it the two motions are.
     """
 
     kind: Crossing
@@ -145,7 +149,9 @@ def normal_form(family: Family, special: SpecialPoint) -> NormalForm:
     of = _forms(special.orbit)
     multiplier = complex(special.orbit.multipliers[0])
     coefficient, uncertainty = _extrapolated(lambda h: coefficient_of(of, special.kind, multiplier, h))
-    settled = uncertainty < UNSETTLED * abs(coefficient)
+    crossing = {Crossing.FOLD: 1.0, Crossing.PERIOD_DOUBLING: -1.0}.get(special.kind, multiplier / abs(multiplier))
+    located = np.abs(special.orbit.multipliers - crossing).min() < _LOCATED
+    settled = located and uncertainty < UNSETTLED * abs(coefficient)
     if not settled:
         words = "not settled"
     elif special.kind is Crossing.FOLD:
@@ -159,15 +165,24 @@ def normal_form(family: Family, special: SpecialPoint) -> NormalForm:
 def _extrapolated(at: Callable[[float], float]) -> tuple[float, float]:
     """A coefficient at the step zero and its uncertainty, from that at a step and half of it: the most certain of them."""
     found: list[tuple[float, float]] = []
-    step, whole = _STEP, at(_STEP)
-    for _ in range(_HALVINGS):
-        step *= 0.5
-        half = at(step)
-        # the differences are of second order
-        found.append(((4.0 * half - whole) / 3.0, abs(half - whole)))
-        if found[-1][1] < _CERTAIN * abs(found[-1][0]):
-            break
-        whole = half
+    values: list[float] = []
+    change = 0.0
+    for number in range(_HALVINGS + 1):
+        try:
+            values.append(at(_STEP * 0.5**number))
+        except OrbitError as error:
+            # so far from the motion the links come to the limit of assembly; just within, two values may agree by chance
+            failure, change = error, np.inf
+            continue
+        if len(values) > 1:
+            whole, half = values[-2:]
+            # the differences are of second order: each change is a quarter of the one before
+            before, change = change, abs(half - whole)
+            found.append(((4.0 * half - whole) / 3.0, max(change, 0.25 * before)))
+            if found[-1][1] < _CERTAIN * abs(found[-1][0]):
+                break
+    if not found:
+        raise failure
     return min(found, key=lambda pair: pair[1] / max(abs(pair[0]), 1e-300))
 
 
@@ -200,23 +215,21 @@ def coefficient_of(of: Forms, kind: Crossing, multiplier: complex, h: float) -> 
     second = of.second(q, h)
     if kind is Crossing.FOLD:
         return float(0.5 * p @ second)
-    # B(q, v) by polarisation
+    # B(q, w) by polarisation, with steps of one length
     w = np.linalg.solve(unit - matrix, second)
-    mixed = (of.second(q + w, h) - of.second(q - w, h)) / 4.0
+    length = float(np.linalg.norm(w)) or 1.0
+    mixed = length * (of.second(q + w / length, h) - of.second(q - w / length, h)) / 4.0
     return float(p @ (of.third(q, h) + 3.0 * mixed)) / 6.0
 
 
 def _slope(family: Family, of: Forms, special: SpecialPoint) -> float:
     """Derivative of the map with respect to the parameter along the left eigenvector of a fold."""
     _, p, _ = _eigenvectors(of.matrix, 1.0)
-    step = 1e-5 * max(abs(special.parameter), 1e-9)
-    shifts = [
-        period_from(*family.at(special.parameter + s), special.orbit.start, special.orbit.turns).shift
-        for s in (-step, step)
-    ]
-    return float(
-        p.real @ ((shifts[1] - shifts[0]) / (2.0 * step) / scale_of(*family.at(special.parameter), special.orbit.start))
-    )
+    parameters, drive = family.at(special.parameter)
+    reach = 1e-3 * max(abs(special.parameter), 1e-9)
+    direction = family.direction(special.parameter, special.parameter - reach, special.parameter + reach)
+    slope = period_from(parameters, drive, special.orbit.start, special.orbit.turns, direction).slope
+    return float(p.real @ (slope / scale_of(parameters, drive, special.orbit.start)))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -15,6 +15,7 @@ from analysis.periodic import (
     Family,
     confirm_form,
     follow,
+    frequency_response,
     normal_form,
     orbit_of,
 )
@@ -107,3 +108,28 @@ def test_on_which_side_of_a_fold_the_motions_are() -> None:
     assert form.uncertainty < 0.01 * abs(form.coefficient)
     with pytest.raises(InputError, match="no old motion"):
         confirm_form(family, fold, form)
+
+
+def test_next_to_the_limit_of_assembly_the_map_is_henons() -> None:
+    """Folds and doublings lie within 1e-6 rpm of each other, and the map bends within a millionth of the crank's length.
+
+    Of Henon's map, whose determinant is -b, the cubic coefficient of the doubling over the square of that of the fold is
+    (1 + b) / (1 - b) for normed eigenvectors, which nearly agree here.
+    """
+    response = frequency_response("rig-1-spring-b", "670 rpm", "1100 rpm", doublings=0)
+    found = [(s, normal_form(response.family, s)) for branch in response.branches for s in branch.special]
+    beside = [(s, form) for s, form in found if s.parameter < 720.0 * RPM]
+    assert len(beside) == 4
+    for fold, doubling in (beside[:2], beside[2:]):
+        if fold[1].kind is not Crossing.FOLD:
+            fold, doubling = doubling, fold
+        assert fold[0].parameter == pytest.approx(doubling[0].parameter, rel=1e-8)
+        b = float(doubling[0].orbit.multipliers[1].real)
+        ratio = doubling[1].coefficient / fold[1].coefficient ** 2
+        assert ratio == pytest.approx((1.0 + b) / (1.0 - b), rel=3e-2)
+        assert doubling[1].words == "supercritical"
+    # the branch comes down, turns back at the first, and down again at the second
+    assert [form.words for _, form in beside if form.kind is Crossing.FOLD] == [
+        "both motions at higher values",
+        "both motions at lower values",
+    ]
