@@ -263,33 +263,38 @@ def relocated(orbit: PeriodicOrbit, kind: Crossing, along: str, name: str, value
     return np.array([found[-1] * scale[-1], amplitude(there)])
 
 
-#: Parameters, drive, along, range of the branch with its beginning first, direction, guess, kind.
-POINTS: dict[str, tuple[Any, Drive, str, tuple[float, float, float], int, Any, Crossing]] = {
+#: Parameters, drive, along, range of the branch with its beginning first, direction, turns and guess, kind.
+POINTS: dict[str, tuple[Any, Drive, str, tuple[float, float, float], int, tuple[int, Any], Crossing]] = {
     "fold": (
         RIG_1_B, Drive(speed=1000.0 * RPM), "drive.speed",
-        (1000.0 * RPM, 990.0 * RPM, 1100.0 * RPM), 1, None, Crossing.FOLD,
+        (1000.0 * RPM, 990.0 * RPM, 1100.0 * RPM), 1, (1, None), Crossing.FOLD,
     ),
     "fold, torque": (
-        RIG_2_C, Drive(torque=0.04), "drive.torque", (0.04, 0.03, 0.06), 1, (0.0, 0.0, 60.0), Crossing.FOLD,
+        RIG_2_C, Drive(torque=0.04), "drive.torque", (0.04, 0.03, 0.06), 1, (1, (0.0, 0.0, 60.0)), Crossing.FOLD,
     ),
     "doubling": (
         LIGHT, Drive(speed=1180.0 * RPM), "drive.speed",
-        (1180.0 * RPM, 1170.0 * RPM, 1185.0 * RPM), -1, None, Crossing.PERIOD_DOUBLING,
+        (1180.0 * RPM, 1170.0 * RPM, 1185.0 * RPM), -1, (1, None), Crossing.PERIOD_DOUBLING,
+    ),
+    "doubling of a doubled motion": (
+        RIG_1_B, Drive(speed=920.0 * RPM), "drive.speed",
+        (920.0 * RPM, 914.0 * RPM, 925.0 * RPM), -1, (2, (0.0185, -16.449)), Crossing.PERIOD_DOUBLING,
     ),
     "fold, motor": (
-        RIG_2_C, Drive(motor=WEAK), FIELD, (60.0, 55.0, 80.0), 1, None, Crossing.FOLD,
+        RIG_2_C, Drive(motor=WEAK), FIELD, (60.0, 55.0, 80.0), 1, (1, None), Crossing.FOLD,
     ),
     "torus": (
-        TABLE_3_1, Drive(torque=0.12), "drive.torque", (0.12, 0.1, 0.13), -1, (0.0, 0.0, 90.0), Crossing.TORUS,
+        TABLE_3_1, Drive(torque=0.12), "drive.torque", (0.12, 0.1, 0.13), -1, (1, (0.0, 0.0, 90.0)), Crossing.TORUS,
     ),
 }  # fmt: skip
 
 
 @pytest.mark.parametrize("name", [n if n == "fold" else pytest.param(n, marks=pytest.mark.slow) for n in POINTS])
 def test_a_special_point_moves_as_its_differences_say(name: str) -> None:
-    parameters, drive, along, (begin, low, high), direction, guess, kind = POINTS[name]
+    parameters, drive, along, (begin, low, high), direction, (turns, guess), kind = POINTS[name]
     family = Family(parameters=parameters, drive=drive, vary=along)
-    branch = follow(family, orbit_of(parameters, drive, start=guess), begin, low=low, high=high, direction=direction)
+    orbit = orbit_of(parameters, drive, turns=turns, start=guess)
+    branch = follow(family, orbit, begin, low=low, high=high, direction=direction)
     point = next(s for s in branch.special if s.kind is kind)
     chosen = ("slider.damping", "slider.stiffness", "crank.length", "rocker.mass", "coupler.cog_angle", "slider.force")
     found = special_gradient(family, point, chosen)
