@@ -85,6 +85,7 @@ from .planes import require_variable as require_variable
 from .planes import speed_name as speed_name
 from .planes import unit_of as unit_of
 from .planes import value_of as value_of
+from .planes import variable_names as variable_names
 from .planes import with_values as with_values
 from .resonance import Response as Response
 from .resonance import ResponseInterrupted as ResponseInterrupted

@@ -12,7 +12,7 @@ import numpy as np
 from linkwork.errors import InputError, MissingParameterError, ParameterError
 
 from ..files import Many, Quantity, Table, Whole, as_it_is, entry, flag, overridden, read, read_tables, table_of, text
-from ..mechanisms import mechanism_of
+from ..mechanisms import mechanism_of, name_in_files
 from ..periodic import Drive, drive_of, unit_of
 from ..run import Case, case_from
 from ..units import with_unit
@@ -77,9 +77,11 @@ class TuningCase:
     tables: Mapping[str, Any]
 
     def tuned_tables(self, tuned: Tuned) -> dict[str, Any]:
-        """The tables of a case with the changed parameters."""
+        """The tables of a case with what was changed."""
         mechanism = mechanism_of(self.wish.parameters)
-        changes = {n: with_unit(v, unit_of(mechanism, n)) for n, v in zip(self.wish.names, tuned.values.tolist())}
+        inputs = {channel.name: name_in_files(mechanism, channel) for channel in mechanism.channels}
+        values = zip(self.wish.names, tuned.values.tolist())
+        changes = {inputs.get(name, name): with_unit(value, unit_of(mechanism, name)) for name, value in values}
         return overridden(self.tables, changes)
 
 

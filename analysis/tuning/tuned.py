@@ -84,7 +84,7 @@ class Tuned(Shown):
     @property
     def parameters(self) -> Parameters:
         """After the change."""
-        return self.wish.at(self.x)
+        return self.wish.operation(self.x, self.wish.span[0])[0]
 
     @property
     def values(self) -> FloatArray:

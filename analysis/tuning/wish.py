@@ -26,6 +26,7 @@ from ..periodic import (
     speed_name,
     unit_of,
     value_of,
+    variable_names,
     with_values,
 )
 from ..run import published_set
@@ -36,12 +37,12 @@ FloatArray = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Change:
-    """A parameter that may be changed.
+    """A parameter of the mechanism, or a number of its drive, that may be changed.
 
     Attributes
     ----------
     name : str
-        In the FMI contract, such as ``slider.stiffness``.
+        In the FMI contract, such as ``slider.stiffness``, ``slider.force`` or ``drive.torque.breakdown_torque``.
     low, high : float
         Between which it must lie (SI).
     tolerance : float
@@ -93,9 +94,10 @@ class Wish:
     parameters : parameters of a mechanism
         As they are now; or a published set or its name.
     change : mapping or sequence of Change
-        What may be changed, by FMI name or by field. To each the tolerance, such as "5 %" or "10 N/m": how far it may be
-        changed either way, in which its change is measured too; or (least, greatest), half of which it is measured in; or
-        both, as a mapping with ``tolerance`` and ``between``.
+        What may be changed, by FMI name or by field: parameters of the mechanism, and what acts of the drive, such as a force
+        on the slider, a torque on the crank, or a motor's numbers. To each the tolerance, such as "5 %" or "10 N/m": how far it
+        may be changed either way, in which its change is measured too; or (least, greatest), half of which it is measured in;
+        or both, as a mapping with ``tolerance`` and ``between``.
     speeds : (float, float), optional
         The range, if it is of the crank's prescribed speed: rad/s, or texts such as "900 rpm".
     over : str
@@ -164,7 +166,7 @@ class Wish:
         put("drive", with_values(self.parameters, drive, {self.over: self.span[0]})[1])
         if not (isinstance(self.turns, int) and self.turns >= 1):
             raise ParameterError("turns", self.turns, "be a whole number, at least one")
-        put("change", _changes(self.parameters, self.change))
+        put("change", _changes((self.parameters, drive), self.over, self.change))
         put("limits", tuple(replace(x, below=_bound(mechanism, x)) for x in self.limits))
         if not 0.0 <= self.least_margin < 1.0:
             raise ParameterError("least_margin", self.least_margin, "be at least zero and less than one")
@@ -173,11 +175,11 @@ class Wish:
                 "nothing is wished: say no_resonance, no_jump, no_unstable or least_margin, or give a limit of an output"
             )
         if self.least:
-            put("least", _parameter(mechanism, self.least))
+            put("least", _changeable(mechanism, self.least))
             if self.least not in self.names:
                 raise InputError(f"{self.least} is to be least, but may not be changed: name it in change")
         for x in (self.scaled(self.low), self.scaled(self.high)):
-            self.at(x)  # checks the bounds
+            self.operation(x, self.span[0])  # checks the bounds
 
     def _required_over(self) -> str:
         """What the range is of, where what is given of it fits together."""
@@ -245,7 +247,8 @@ class Wish:
     @property
     def present(self) -> FloatArray:
         """Its values now, shape (k,)."""
-        return np.array([float(getattr(self.parameters, field_name(name))) for name in self.names])
+        assert self.drive is not None
+        return np.array([value_of(self.parameters, self.drive, name) for name in self.names])
 
     @property
     def low(self) -> FloatArray:
@@ -266,16 +269,11 @@ class Wish:
         """Values as changes in their tolerances."""
         return (values - self.present) / self.tolerance
 
-    def at(self, x: FloatArray) -> Parameters:
-        """The parameters with changes in their tolerances."""
-        values = np.clip(self.present + x * self.tolerance, self.low, self.high).tolist()
-        made: Parameters = replace(self.parameters, **{field_name(n): v for n, v in zip(self.names, values)})
-        return made
-
     def operation(self, x: FloatArray, level: float) -> Operation:
         """Mechanism and drive with changes in their tolerances, at a place of the range."""
         assert self.drive is not None
-        return with_values(self.at(x), self.drive, {self.over: level})
+        values = np.clip(self.present + x * self.tolerance, self.low, self.high).tolist()
+        return with_values(self.parameters, self.drive, {**dict(zip(self.names, values)), self.over: level})
 
 
 def _span(mechanism: Mechanism, over: str, given: Any) -> tuple[float, float]:
@@ -288,40 +286,46 @@ def _span(mechanism: Mechanism, over: str, given: Any) -> tuple[float, float]:
     return low, high
 
 
-def _parameter(mechanism: Mechanism, name: str) -> str:
-    """The FMI name of a parameter that is a number, by itself or by its field."""
-    known = {field_name(n): n for n, v in mechanism.mechanism_variables.items() if v.kind == "Real"}
+def _changeable(mechanism: Mechanism, name: str) -> str:
+    """The FMI name of a parameter or of a number of the drive, by itself or by its field."""
+    known = {field_name(n): n for n in variable_names(mechanism)}
     found = known.get(field_name(name))
     if found is None:
         raise unknown_name(name, known.values())
     return found
 
 
-def _changes(parameters: Parameters, given: Any) -> tuple[Change, ...]:
+def _changes(operation: Operation, over: str, given: Any) -> tuple[Change, ...]:
     if not isinstance(given, Mapping):
         changes = tuple(given)
     else:
-        changes = tuple(_change(parameters, name, value) for name, value in _named(given, parameters).items())
+        changes = tuple(_change(operation, n, value) for n, value in _named(given, mechanism_of(operation[0])).items())
     if not changes:
         raise InputError("nothing may be changed: name at least one parameter in change")
+    for change in changes:
+        require_variable(*operation, change.name)
+        if change.name == over:
+            raise ParameterError(f"change.{over}", over, "be something else: the range is of it")
     return changes
 
 
-def _named(given: Mapping[str, Any], parameters: Parameters, prefix: str = "") -> dict[str, Any]:
+def _named(given: Mapping[str, Any], mechanism: Mechanism, prefix: str = "") -> dict[str, Any]:
     """What is said of each parameter, by FMI name, from nested tables or dotted names."""
-    groups = {name.rpartition(".")[0] for name in mechanism_of(parameters).mechanism_variables}
+    parts = [name.split(".") for name in variable_names(mechanism)]
+    groups = {".".join(part[:n]) for part in parts for n in range(1, len(part))}
     found: dict[str, Any] = {}
     for name, value in given.items():
-        if prefix + name in groups and isinstance(value, Mapping):
-            found |= _named(value, parameters, f"{prefix}{name}.")
+        if prefix + name in groups and isinstance(value, Mapping) and not {"tolerance", "between"} & set(value):
+            found |= _named(value, mechanism, f"{prefix}{name}.")
         else:
-            found[_parameter(mechanism_of(parameters), prefix + name)] = value
+            found[_changeable(mechanism, prefix + name)] = value
     return found
 
 
-def _change(parameters: Parameters, name: str, value: Any) -> Change:
-    variable = mechanism_of(parameters).mechanism_variables[name]
-    now, what = float(getattr(parameters, field_name(name))), f"change.{name}"
+def _change(operation: Operation, name: str, value: Any) -> Change:
+    require_variable(*operation, name)
+    unit = unit_of(mechanism_of(operation[0]), name)
+    now, what = value_of(*operation, name), f"change.{name}"
     given: Mapping[str, Any]
     if isinstance(value, Mapping):
         check_names(value, what, ("tolerance", "between"))
@@ -330,9 +334,9 @@ def _change(parameters: Parameters, name: str, value: Any) -> Change:
         given = {"between": value} if isinstance(value, (list, tuple)) else {"tolerance": value}
     tolerance = None
     if "tolerance" in given:
-        tolerance = _tolerance(given["tolerance"], variable.unit, now, what)
+        tolerance = _tolerance(given["tolerance"], unit, now, what)
     if "between" in given:
-        low, high = Range(Quantity(variable.unit))(list(given["between"]), what)
+        low, high = Range(Quantity(unit))(list(given["between"]), what)
         return Change(name=name, low=low, high=high, tolerance=tolerance or 0.5 * (high - low))
     if tolerance is None:
         raise ParameterError(what, dict(given), "have a tolerance, or a range between [least, greatest]")

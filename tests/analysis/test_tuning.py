@@ -6,6 +6,7 @@ import json
 from dataclasses import replace
 from math import pi
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -19,6 +20,7 @@ from analysis.periodic import (
     Crossing,
     Drive,
     Family,
+    drive_of,
     find_orbit,
     find_orbits,
     follow_both,
@@ -29,8 +31,9 @@ from analysis.periodic import (
     plane,
     removing_damping,
 )
-from analysis.run import load_case
+from analysis.run import case_from, load_case
 from analysis.tuning import load_tuning_case
+from analysis.tuning.cases import tuning_case_from
 from analysis.tuning.solve import _conditions, _ways
 from analysis.tuning.survey import others, survey
 from linkwork.errors import InputError, LinkworkError, ParameterError, UnknownNameError
@@ -86,7 +89,10 @@ def wish(**of):
     [
         {"no_resonance": True},
         {"limits": [PIN, AMPLITUDE]},
-        {"limits": [Limit(output="drive.applied_torque", below=0.3)]},
+        {
+            "limits": [Limit(output="drive.applied_torque", below=0.3)],
+            "change": {"slider.force": "1 N", "slider.stiffness": "5 %"},
+        },
         {"parameters": LIGHT, "speeds": ("1150 rpm", "1185 rpm"), "least_margin": 0.01},
         pytest.param(
             {"parameters": "rig-1-spring-b", "speeds": ("980 rpm", "1150 rpm"), "no_jump": True}, marks=pytest.mark.slow
@@ -97,7 +103,7 @@ def wish(**of):
             "speeds": None,
             "over": FIELD,
             "between": (25.5, 29.0),
-            "change": {"cart.stiffness": "30 %", "cart.damping": "30 %"},
+            "change": {"cart.stiffness": "30 %", "drive.torque.breakdown_torque": "30 %"},
             "no_resonance": True,
             "limits": [Limit(output="drive.applied_torque", below=0.1)],
         },
@@ -353,6 +359,8 @@ def test_what_is_met_already_is_not_changed():
         ({"no_jump": True, "change": {}}, InputError, "nothing may be changed"),
         ({"no_jump": True, "change": {"slider.stifness": "5 %"}}, UnknownNameError, r"slider\.stiffness"),
         ({"no_jump": True, "change": {"gravity": "5 %"}}, ParameterError, "it is zero now"),
+        ({"no_jump": True, "change": {"drive.speed": "5 %"}}, ParameterError, "the range is of it"),
+        ({"no_jump": True, "change": {"drive.torque": "0.1 N*m"}}, InputError, "the drive is by speed"),
         ({"no_jump": True, "change": {"slider.stiffness": [5e3, 4e3]}}, ParameterError, "in order"),
         ({"no_jump": True, "change": {"slider.stiffness": {"tolerance": "0 %"}}}, ParameterError, "above zero"),
         ({"no_jump": True, "change": {"slider.damping": "150 %"}}, ParameterError, "zero or greater"),
@@ -382,8 +390,34 @@ def test_what_may_be_changed_is_measured_in_its_tolerance():
         ("slider.stiffness", 3e3, 5e3, 100.0),
         ("slider.damping", pytest.approx(4.95), pytest.approx(6.05), pytest.approx(0.55)),
     ]
-    made = asked.at(np.array([0.0, 2.0, -1.0]))
+    made, _ = asked.operation(np.array([0.0, 2.0, -1.0]), asked.span[0])
     assert (made.slider_stiffness, made.slider_damping) == (4200.0, pytest.approx(4.95))
+
+
+def test_numbers_of_the_drive_are_changed_in_the_case_too():
+    tables = {
+        "published": "rig-2-spring-c",
+        "drive": {"torque": {"kind": "induction-motor", "breakdown_torque": 2.0, "breakdown_slip": 0.3}},
+        "force": "1 N",
+    }
+    tables["drive"]["torque"]["synchronous_speed"] = "600 rpm"
+    change = {"drive": {"torque": {"breakdown_torque": "10 %"}}, "slider.force": {"tolerance": "2 N"}}
+    asked = {"over": FIELD, "between": ["500 rpm", "600 rpm"], "no_jump": True, "change": change}
+    case = tuning_case_from(tables | {"tune": asked}, folder=Path())
+    assert [(c.name, c.low, c.high) for c in case.wish.change] == [
+        ("drive.torque.breakdown_torque", pytest.approx(1.8), pytest.approx(2.2)),
+        ("slider.force", -1.0, 3.0),
+    ]
+    values = np.array([1.9, 2.5])
+    _, drive = case.wish.operation(case.wish.scaled(values), 55.0)
+    assert (drive.motor.breakdown_torque, drive.motor.synchronous_speed) == (pytest.approx(1.9), 55.0)
+    assert drive.forces["slider.force"] == pytest.approx(2.5)
+    written = case_from(
+        case.tuned_tables(SimpleNamespace(values=values)), folder=Path(), overrides={"run.stop_time": 1.0}
+    )
+    again = drive_of(written.parameters, written.inputs, written.initial)
+    assert again.motor.breakdown_torque == pytest.approx(1.9)
+    assert again.forces["slider.force"] == pytest.approx(2.5)
 
 
 # The command
