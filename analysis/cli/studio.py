@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-import tempfile
+import signal
+import sys
 import webbrowser
 from collections.abc import Sequence
 from pathlib import Path
@@ -11,20 +12,37 @@ from typing import Any
 import click
 
 from ..mechanisms import PUBLISHED
-from .common import PARAMETERS, RUN, changes, check_kind, force_option, handled, number_or_text, say, set_option
+from .common import (
+    PARAMETERS,
+    RUN,
+    changes,
+    check_kind,
+    force_option,
+    handled,
+    number_or_text,
+    print_error,
+    say,
+    set_option,
+)
 
 
 @click.command()
 @click.argument("what", required=False)
-@click.option("--out", type=click.Path(dir_okay=False), help="Write the page here, and open no browser.")
+@click.option("--out", type=click.Path(dir_okay=False), help="Write the page here as a file, and serve nothing.")
+@click.option("--browser/--no-browser", default=True, show_default=True, help="Whether to open a browser.")
+@click.option(
+    "--port", type=click.IntRange(0, 65535), default=0, help="On which the page is served; by default one that is free."
+)
 @set_option("slider.stiffness='2e6 dyn/cm' or drive.speed='300 rpm'; bare numbers are in SI")
 @force_option
 @handled
-def studio(what: str | None, out: str | None, settings: Sequence[str]) -> None:
+def studio(what: str | None, out: str | None, browser: bool, port: int, settings: Sequence[str]) -> None:
     """Open the page on which a mechanism moves and can be dragged.
 
     WHAT is a case file, a file of parameters such as linkwork synthesize writes, or the name of a published set; without it the
-    page opens with a five-bar. The page is one file that needs no network and no Python.
+    page opens with a five-bar. It is served to this machine alone until Ctrl-C, with Python behind it: linkages for a path that
+    is drawn, the slider's motion, tuning, runs of the FMU and its export. With --out it is one file that needs no network and
+    no Python, and has all but those.
 
     \b
     Examples:
@@ -39,11 +57,17 @@ def studio(what: str | None, out: str | None, settings: Sequence[str]) -> None:
     if out is not None:
         say(f"wrote {write_text(out, page)}")
         return
-    path = Path(tempfile.mkdtemp(prefix="linkwork-studio-")) / "studio.html"
-    path.write_text(page, encoding="utf-8")
-    say(f"opening {path}")
-    if not webbrowser.open(path.as_uri()):
-        say("there is no browser here: open the file in one, or write it elsewhere with --out")
+    from ..server import Server
+
+    server = Server(page, port)
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(0))
+    server.worker.start()
+    say(f"the studio is at {server.address}")
+    print_error("it is served to this machine alone; Ctrl-C stops it")
+    if browser and not webbrowser.open(server.address):
+        print_error("note: there is no browser here: open the address in one, or write the page as a file with --out")
+    server.run()
+    print_error("the studio is closed")
 
 
 def _state(what: str | None, overrides: dict[str, Any]) -> dict[str, Any]:

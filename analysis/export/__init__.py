@@ -4,7 +4,7 @@ from .archive import SOURCES, BuildError, try_out
 from .builds import Built, build_all, kinds_here
 from .compatibility import publish
 from .description import KINDS, NATIVE, NATIVE_FMI3, PYTHON, Kind
-from .interface import interface
+from .interface import interface, with_starts
 from .native_fmu import PLATFORMS, build_native, compile_library, source_files, this_platform
 from .python_fmu import build
 from .web import build_web
@@ -30,4 +30,5 @@ __all__ = [
     "source_files",
     "this_platform",
     "try_out",
+    "with_starts",
 ]

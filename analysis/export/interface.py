@@ -5,6 +5,8 @@ The mechanism's variables come first, in their order, so that the value referenc
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import replace
 from functools import cache
 from typing import NamedTuple
 
@@ -12,6 +14,8 @@ from linkwork.errors import LinkworkError
 from linkwork.limits import LIMIT_SINE
 from linkwork.mechanism import Mechanism
 from linkwork.variables import UNITS, Variable
+
+from ..files import unknown_name
 
 #: The event indicator.
 MARGIN = "assembly.margin_to_limit"
@@ -44,6 +48,26 @@ class Entry(NamedTuple):
     reference: int
     derivative_of: int | None
     role: str
+
+
+def with_starts(mechanism: Mechanism, values: Mapping[str, float]) -> Mechanism:
+    """A mechanism with other start values of parameters and inputs, by FMI name: `build_native` makes an FMU with these.
+
+    Raises
+    ------
+    UnknownNameError
+        If it has no such parameter or input.
+    """
+    known = [v.name for v in mechanism.variables if v.causality in ("parameter", "input")]
+    for name in values:
+        if name not in known:
+            raise unknown_name(name, known)
+    return replace(
+        mechanism,
+        variables=tuple(
+            v._replace(start=type(v.start)(values[v.name])) if v.name in values else v for v in mechanism.variables
+        ),
+    )
 
 
 @cache

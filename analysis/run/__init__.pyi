@@ -35,6 +35,7 @@ from .equations import of_parameters as of_parameters
 from .equations import traced as traced
 from .events import Event as Event
 from .events import RunInterrupted as RunInterrupted
+from .events import heard_by as heard_by
 from .events import shown as shown
 from .fmu import CosimulationError as CosimulationError
 from .fmu import FmuModel as FmuModel

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from contextvars import ContextVar
 from dataclasses import dataclass
 from math import isfinite
 
@@ -84,9 +85,27 @@ class RunInterrupted(Interrupted):
         super().__init__(f"interrupted at t = {trajectory.time[-1]:.6g} s" if len(trajectory) else "interrupted")
 
 
+#: Who hears of progress in the place of a bar on the terminal.
+_LISTENER: ContextVar[Callable[[str, float], None] | None] = ContextVar("listener", default=None)
+
+
+@contextmanager
+def heard_by(listener: Callable[[str, float], None]) -> Iterator[None]:
+    """Inside, ``listener(what, share)`` is called with the progress of whatever shows it, in the place of a bar."""
+    token = _LISTENER.set(listener)
+    try:
+        yield
+    finally:
+        _LISTENER.reset(token)
+
+
 @contextmanager
 def shown(progress: bool, duration: float, what: str = "simulate") -> Iterator[Callable[[float], None]]:
     """A progress bar over the time of a run, as a function of the time done; nothing at all where it is not wanted."""
+    listener = _LISTENER.get()
+    if listener is not None:
+        yield lambda done: listener(what, done / duration if duration else 1.0)
+        return
     if not progress:
         yield lambda done: None
         return

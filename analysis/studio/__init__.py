@@ -1,6 +1,6 @@
 """The studio: a page on which mechanisms move, can be dragged, and tell the truth, by the same equations as WebAssembly."""
 
 from .page import PAGE, build_page, fresh, page_of
-from .state import OPENING, opening_state, state_of
+from .state import OPENING, case_of, given_values, opening_state, state_of
 
-__all__ = ["OPENING", "PAGE", "build_page", "fresh", "opening_state", "page_of", "state_of"]
+__all__ = ["OPENING", "PAGE", "build_page", "case_of", "fresh", "given_values", "opening_state", "page_of", "state_of"]

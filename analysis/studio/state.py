@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from math import isfinite
 from typing import Any
 
 import numpy as np
 
-from linkwork.errors import InputError
+from linkwork.errors import InputError, ParameterError
+from linkwork.mechanism import Mechanism
+from linkwork.parameters import field_name
 
-from ..mechanisms import FIVE_BAR, mechanism_of
-from ..run import Case
+from ..files import unknown_name
+from ..mechanisms import FIVE_BAR, MECHANISMS, mechanism_of
+from ..run import Case, Inputs
 from .tables import published_values, values_of
 
 #: What is changed in the first published set of the mechanism that the page opens with: a coupler point.
@@ -47,3 +52,57 @@ def state_of(case: Case) -> dict[str, Any]:
                 )
         values[channel.name] = float(sum(parts))
     return {"mechanism": mechanism.name, "title": case.title, "values": values, "duration": case.stop_time}
+
+
+def case_of(state: Mapping[str, Any]) -> Case:
+    """The case that a state of the page is; of numbers and names alone, so that a page can name no file.
+
+    Raises
+    ------
+    UnknownNameError, ParameterError, InputError
+        If there is no such mechanism, it has no such value, or a value is not one that it can have.
+    """
+    name = str(state.get("mechanism"))
+    if name not in MECHANISMS:
+        raise unknown_name(name, MECHANISMS, f"mechanism {name!r}")
+    mechanism = MECHANISMS[name]
+    values = given_values(mechanism, state.get("values"))
+    of = {name: int(values[name]) if v.kind == "Integer" else values[name] for name, v in _given(mechanism).items()}
+    chosen = [mode.arguments[min(max(int(of[mode.name]), 0), len(mode.arguments) - 1)] for mode in mechanism.modes]
+    others = {name for mode in mechanism.modes for name in mode.arguments} - set(chosen)
+    channels = {c.argument: of[c.name] for c in mechanism.channels if c.kind != "rate" and c.argument not in others}
+    return Case(
+        title=str(state.get("title", "")),
+        parameters=mechanism.parameters(**{field_name(n): of[n] for n in mechanism.mechanism_variables}),
+        initial=mechanism.initial(**{n: of[v.name] for n, v in mechanism.initial_variables.items()}),
+        inputs=Inputs(**dict.fromkeys(chosen, True) | channels),
+        stop_time=_number(state.get("duration", 1.0), "duration"),
+    )
+
+
+def given_values(mechanism: Mechanism, values: Any) -> dict[str, float]:
+    """All that the page gives a mechanism, by FMI name, with the start values of what it leaves out.
+
+    Raises
+    ------
+    UnknownNameError, ParameterError, InputError
+        If the mechanism has no such value, or it is no finite number.
+    """
+    known = _given(mechanism)
+    if not isinstance(values, Mapping):
+        raise InputError("a state has no values: it must have numbers by the names of the FMU's variables")
+    for name in values:
+        if name not in known:
+            raise unknown_name(str(name), known)
+    return {name: _number(values.get(name, v.start), name) for name, v in known.items()}
+
+
+def _given(mechanism: Mechanism) -> dict[str, Any]:
+    rates = {c.name for c in mechanism.channels if c.kind == "rate"} | {"solver.tolerance"}
+    return {v.name: v for v in mechanism.variables if v.causality in ("parameter", "input") and v.name not in rates}
+
+
+def _number(value: Any, name: str) -> float:
+    if isinstance(value, bool) or not isinstance(value, (int, float)) or not isfinite(value):
+        raise ParameterError(name, value, "be a finite number")
+    return float(value)

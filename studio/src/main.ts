@@ -8,6 +8,7 @@ import { caseText, linkOf, parameterText, pixels, pythonText, save, stateIn, tab
 import { History } from "./history";
 import { Panel } from "./panel";
 import { Picture } from "./picture";
+import { WithPython } from "./python";
 import { Solver } from "./solver";
 import {
   type Given,
@@ -76,6 +77,14 @@ class Studio {
     },
   });
   private readonly solver = new Solver((answer, newest) => this.answered(answer, newest));
+  private readonly python = new WithPython(by<HTMLElement>("python"), this.view, {
+    state: () => ({ ...this.state, duration: this.duration() }),
+    take: (state) => {
+      this.history.keep(state);
+      void this.restore(state);
+    },
+    rows: () => this.answer?.rows,
+  });
   private numbers: HTMLTableCellElement[] = [];
 
   async start(): Promise<void> {
@@ -115,6 +124,7 @@ class Studio {
       this.picture.show(mechanism);
       by("views").classList.toggle("planar", mechanism.picture.planar);
       this.charts.show(mechanism, state.source ?? "steady");
+      this.python.show(mechanism, state);
     }
     if (view) this.view.show(mechanism.picture.planar, view);
     this.panel.show(mechanism, state.values, state.locks ?? []);
@@ -179,6 +189,7 @@ class Studio {
         if (newest) {
           this.picture.fit(answer.rows.values);
           this.backdrop.draw();
+          this.python.draw();
         }
       }
       this.picture.drawPaths(answer.rows.values);
@@ -408,6 +419,7 @@ class Studio {
     this.picture.onDrag = (joint, target, done) => this.drag(joint, target, done);
     this.view.onChange = () => {
       this.backdrop.draw();
+      this.python.draw();
       if (!this.answer) return;
       this.picture.drawPaths(this.answer.rows.values);
       this.seek(this.row);

@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import shutil
+from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
 from click.testing import CliRunner, Result
 
 from analysis import cli
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Browser
 
 
 @pytest.fixture
@@ -27,6 +32,38 @@ def linkwork(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., R
         return CliRunner().invoke(cli.main, [str(word) for word in words], catch_exceptions=False)
 
     return call
+
+
+@pytest.fixture(scope="session")
+def launched() -> Iterator[Callable[..., Browser]]:
+    """Starts the system's Chromium, with these arguments besides."""
+    path = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
+    try:
+        from playwright.sync_api import sync_playwright
+    except ImportError:
+        path = None
+    if path is None:
+        pytest.skip(
+            "there is no Chromium here, or Playwright is not installed: apt install chromium, pip install playwright"
+        )
+    with sync_playwright() as playwright:
+        made: list[Any] = []
+
+        def launch(*arguments: str) -> Browser:
+            made.append(playwright.chromium.launch(executable_path=path, args=["--no-sandbox", *arguments]))
+            return made[-1]
+
+        yield launch
+        for one in made:
+            one.close()
+
+
+@pytest.fixture(scope="module")
+def browser(launched: Callable[..., Browser]) -> Iterator[Browser]:
+    """Chromium."""
+    made = launched()
+    yield made
+    made.close()
 
 
 def csv(path: Path) -> dict[str, np.ndarray]:

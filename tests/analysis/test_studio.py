@@ -10,7 +10,7 @@ import tomllib
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 from xml.etree import ElementTree
 
 import numpy as np
@@ -30,25 +30,10 @@ BYTES, CLOSE = 500_000, 1e-9
 #: A run of 0.02 s in Python as the page makes it: a step ends at each of its 1440 rows.
 _HELD: Any = {"step": 0.02 / 1440, "hold": 0.02 / 1440, "tolerance": 1e-12}
 
-try:
-    from playwright.sync_api import Browser, Page, sync_playwright
-except ImportError:
-    sync_playwright = None  # type: ignore[assignment]
+if TYPE_CHECKING:
+    from playwright.sync_api import Browser, Page
 
 in_browser = pytest.mark.slow
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Browser]:
-    path = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
-    if path is None or sync_playwright is None:
-        pytest.skip(
-            "there is no Chromium here, or Playwright is not installed: apt install chromium, pip install playwright"
-        )
-    with sync_playwright() as playwright:
-        made = playwright.chromium.launch(executable_path=path, args=["--no-sandbox"])
-        yield made
-        made.close()
 
 
 @pytest.fixture(scope="module")

@@ -1,0 +1,164 @@
+"""A process that does one job after another, and is ended within one, with all that it started, if that is cancelled."""
+
+from __future__ import annotations
+
+import json
+import multiprocessing
+import os
+import shutil
+import signal
+import sys
+import tempfile
+import threading
+import time
+import traceback
+from collections.abc import Mapping
+from contextlib import suppress
+from typing import Any
+
+from linkwork.errors import InputError, LinkworkError
+
+from ..numerics.workers import end_with
+from ..run import heard_by
+
+#: Seconds between two words of progress, and that an idle process is given to end.
+_INTERVAL, _PATIENCE = 0.1, 5.0
+_LOST = "the process that worked on it ended, as where memory runs out"
+
+
+class Busy(InputError):
+    """A job is being done already."""
+
+
+class Worker:
+    """One job at a time, in a process of its own. It may be called from several threads.
+
+    The process is started with the first job, or by `start`; what it puts in files for the time of a job is in a folder that
+    goes with it.
+    """
+
+    def __init__(self) -> None:
+        self._lock = threading.RLock()
+        self._process: Any = None
+        self._pipe: Any = None
+        self._folder = ""
+        self._job: dict[str, Any] = {"state": "idle"}
+        self._number = 0
+
+    def start(self) -> None:
+        """Start the process, if there is none: the next job need not wait for its imports."""
+        with self._lock:
+            if self._process is not None and self._process.is_alive():
+                return
+            self._end()
+            spawn = multiprocessing.get_context("spawn")
+            self._folder = tempfile.mkdtemp(prefix="linkwork-studio-")
+            self._pipe, other = spawn.Pipe()
+            self._process = spawn.Process(target=_work, args=(other, os.getpid(), self._folder), daemon=True)
+            self._process.start()
+            other.close()
+
+    def give(self, kind: str, request: Mapping[str, Any]) -> dict[str, Any]:
+        """Begin a job.
+
+        Raises
+        ------
+        Busy
+            If there is one already.
+        """
+        with self._lock:
+            if self.look()["state"] == "running":
+                raise Busy("a job is being done already: wait for it, or cancel it")
+            self.start()
+            self._number += 1
+            self._job = {"state": "running", "job": self._number, "kind": kind, "what": "begins", "share": 0.0}
+            try:
+                self._pipe.send((self._number, kind, dict(request)))
+            except OSError:
+                self._lost()
+            return self._job
+
+    def look(self) -> dict[str, Any]:
+        """How the last job stands: its ``state`` is idle, running, done, failed or cancelled; ``answer`` is a text of JSON."""
+        with self._lock:
+            try:
+                while self._job["state"] == "running" and self._pipe.poll():
+                    number, news = self._pipe.recv()
+                    if number == self._number:
+                        self._job = self._job | news
+            except (EOFError, OSError):
+                self._lost()
+            return self._job
+
+    def cancel(self) -> dict[str, Any]:
+        """End the job that is being done, in the middle of whatever it does."""
+        with self._lock:
+            if self.look()["state"] == "running":
+                self._end()
+                self._job = {"state": "cancelled", "job": self._number, "kind": self._job["kind"]}
+                self.start()
+            return self._job
+
+    def stop(self) -> None:
+        """End the process, with what it does."""
+        with self._lock:
+            self._end()
+
+    def _lost(self) -> None:
+        self._job = {"state": "failed", "job": self._number, "kind": self._job["kind"], "sentence": _LOST}
+        self._end()
+
+    def _end(self) -> None:
+        if self._process is not None:
+            if os.name == "posix":
+                # the group is its own, with the compilers that it started; before it has made that there is none
+                with suppress(ProcessLookupError, PermissionError):
+                    os.killpg(self._process.pid, signal.SIGKILL)
+            self._process.kill()
+            self._process.join(_PATIENCE)
+            self._pipe.close()
+            self._process = self._pipe = None
+        if self._folder:
+            shutil.rmtree(self._folder, ignore_errors=True)
+            self._folder = ""
+
+
+def _work(pipe: Any, caller: int, folder: str) -> None:
+    """What the process does: job after job, until it is ended."""
+    end_with(caller)
+    if os.name == "posix":
+        os.setsid()
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    os.environ |= dict.fromkeys(("TMPDIR", "TEMP", "TMP"), folder)
+    tempfile.tempdir = folder
+    from .jobs import do
+
+    with suppress(EOFError, OSError):
+        while True:
+            number, kind, request = pipe.recv()
+            pipe.send((number, _answer(do, kind, request, _Teller(pipe, number))))
+
+
+class _Teller:
+    """Sends the progress of a job, not too often."""
+
+    def __init__(self, pipe: Any, number: int) -> None:
+        self.pipe, self.number, self.last = pipe, number, -1.0
+
+    def __call__(self, what: str, share: float) -> None:
+        now = time.monotonic()
+        if now - self.last > _INTERVAL:
+            self.last = now
+            self.pipe.send((self.number, {"what": what, "share": min(max(share, 0.0), 1.0)}))
+
+
+def _answer(do: Any, kind: str, request: Mapping[str, Any], teller: _Teller) -> dict[str, Any]:
+    """What came of a job."""
+    try:
+        with heard_by(teller):
+            return {"state": "done", "answer": json.dumps(do(kind, request), allow_nan=False)}
+    except LinkworkError as error:
+        return {"state": "failed", "sentence": str(error)}
+    except Exception as error:  # nothing that is wrong with one job may end the process
+        traceback.print_exc(file=sys.stderr)
+        return {"state": "failed", "sentence": f"the job failed: {type(error).__name__}: {error}"}

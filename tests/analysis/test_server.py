@@ -1,0 +1,506 @@
+"""The studio's server over real sockets: whom it refuses, and jobs that are done, fail and are cancelled."""
+
+from __future__ import annotations
+
+import base64
+import http.client
+import json
+import os
+import re
+import signal
+import socket
+import subprocess
+import sys
+import threading
+import time
+import xml.etree.ElementTree as ElementTree
+import zipfile
+from collections.abc import Callable, Iterator
+from http.server import BaseHTTPRequestHandler, HTTPServer
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+from urllib.parse import urlsplit
+
+import numpy as np
+import pytest
+
+from analysis.mechanisms import MECHANISMS, PUBLISHED
+from analysis.run import case_from, simulate
+from analysis.server import BODY, TOKEN, Server
+from analysis.server.jobs import do
+from analysis.studio import PAGE, case_of, opening_state, page_of, state_of
+from linkwork.errors import LinkworkError
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Browser, Page
+
+PAGE_TEXT = "<html><head><title>a page</title></head><body><script>let a = 1;</script></body></html>"
+ELLIPSE = [[0.2 + 0.1 * np.cos(t), 0.15 + 0.05 * np.sin(t)] for t in np.linspace(0.0, 6.0, 30)]
+
+
+def _running(page: str) -> Iterator[Server]:
+    server = Server(page)
+    thread = threading.Thread(target=server.run, daemon=True)
+    thread.start()
+    yield server
+    server.stop()
+    thread.join(30.0)
+    assert not thread.is_alive()
+
+
+@pytest.fixture(scope="module")
+def server() -> Iterator[Server]:
+    """One that listens."""
+    yield from _running(PAGE_TEXT)
+
+
+def _ask(server: Server, method: str, path: str, headers: dict[str, str | None], body: bytes | None = None) -> Any:
+    """Status, headers and body of an answer; a header of None is left out."""
+    connection = http.client.HTTPConnection("127.0.0.1", server.port, timeout=60)
+    usual: dict[str, str | None] = {"Host": f"127.0.0.1:{server.port}", TOKEN: server.application.token}
+    try:
+        connection.putrequest(method, path, skip_host=True, skip_accept_encoding=True)
+        for name, value in (usual | headers).items():
+            if value is not None:
+                connection.putheader(name, value)
+        if body is not None:
+            connection.putheader("Content-Length", str(len(body)))
+        connection.endheaders(body)
+        answer = connection.getresponse()
+        return answer.status, dict(answer.getheaders()), answer.read()
+    finally:
+        connection.close()
+
+
+def _job(server: Server, method: str = "GET", **request: Any) -> tuple[int, dict[str, Any]]:
+    body = json.dumps(request).encode() if request else None
+    status, _, text = _ask(server, method, "/job", {"Content-Type": "application/json"} if request else {}, body)
+    return status, json.loads(text)
+
+
+def _until(server: Server, state: str) -> dict[str, Any]:
+    """The job, once it is in a state."""
+    end = time.monotonic() + 600.0
+    while time.monotonic() < end:
+        _, job = _job(server)
+        if job["state"] == state:
+            return job
+        assert job["state"] == "running", job
+        time.sleep(0.05)
+    raise AssertionError(f"the job is not {state}")
+
+
+def test_the_page_is_served_with_its_token_and_loads_nothing_from_elsewhere(server: Server) -> None:
+    address = urlsplit(server.address)
+    assert address.hostname == "127.0.0.1"
+    status, headers, body = _ask(server, "GET", f"/?{address.query}", {TOKEN: None})
+    assert (status, headers["Content-Type"]) == (200, "text/html; charset=utf-8")
+    assert b'name="linkwork-server"' in body
+    policy = headers["Content-Security-Policy"]
+    assert "default-src 'none'" in policy
+    # printf 'let a = 1;' | openssl dgst -sha256 -binary | base64
+    assert "'sha256-xY6QKfH9PRsQnLz56nj6MBwiK5oHg+im1Jkpdp1x/Ck='" in policy
+    assert headers["X-Content-Type-Options"] == "nosniff"
+    assert headers["Referrer-Policy"] == "no-referrer"
+    assert "Access-Control-Allow-Origin" not in headers
+    assert "Server" not in headers
+
+
+JSON = {"Content-Type": "application/json"}
+
+
+@pytest.mark.parametrize(
+    ("method", "path", "headers", "body", "status", "said"),
+    [
+        pytest.param("GET", "/job", {"Origin": "http://evil.example"}, None, 403, "another origin", id="origin"),
+        pytest.param("POST", "/job", {"Origin": "null"} | JSON, b"{}", 403, "another origin", id="sandboxed origin"),
+        pytest.param("GET", "/job", {"Origin": "http://127.0.0.1:1"}, None, 403, "another origin", id="other port"),
+        pytest.param("GET", "/job", {"Sec-Fetch-Site": "cross-site"}, None, 403, "another origin", id="fetched"),
+        pytest.param("GET", "/job", {"Sec-Fetch-Site": "same-site"}, None, 403, "another origin", id="same site"),
+        pytest.param("GET", "/job", {"Host": "evil.example:{port}"}, None, 421, "its own address", id="rebinding"),
+        pytest.param("GET", "/?token={token}", {"Host": "evil.example:{port}"}, None, 421, "own", id="page rebound"),
+        pytest.param("GET", "/job", {"Host": "127.0.0.1"}, None, 421, "its own address", id="host without port"),
+        pytest.param("GET", "/job", {"Host": None}, None, 421, "its own address", id="no host"),
+        pytest.param("GET", "/job", {TOKEN: None}, None, 401, "token", id="no token"),
+        pytest.param("DELETE", "/job", {TOKEN: "guessed"}, None, 401, "token", id="wrong token"),
+        pytest.param("POST", "/job", {TOKEN: "\xe4"} | JSON, b"{}", 401, "token", id="token of other letters"),
+        pytest.param("GET", "/job?token={token}", {TOKEN: None}, None, 401, "token", id="token at the wrong place"),
+        pytest.param("GET", "/", {}, None, 401, "token", id="page without token"),
+        pytest.param("GET", "/?token=guessed", {}, None, 401, "token", id="page with a wrong token"),
+        pytest.param("GET", "/jobs", {}, None, 404, "nothing here", id="unknown"),
+        pytest.param("GET", "/../../etc/passwd", {}, None, 404, "nothing here", id="traversal"),
+        pytest.param("GET", "/%2e%2e/%2e%2e/etc/passwd", {}, None, 404, "nothing here", id="hidden traversal"),
+        pytest.param("GET", "//etc/passwd", {}, None, 404, "nothing here", id="two slashes"),
+        pytest.param("PUT", "/job", {}, b"{}", 405, "GET, POST, DELETE", id="method"),
+        pytest.param("POST", "/?token={token}", JSON, b"{}", 405, "GET", id="method of the page"),
+        pytest.param("OPTIONS", "/job", {}, None, 405, "GET, POST, DELETE", id="preflight"),
+        pytest.param("POST", "/job", {"Content-Type": "text/plain"}, b"{}", 415, "JSON", id="form"),
+        pytest.param("POST", "/job", JSON, b"{", 400, "no JSON", id="half"),
+        pytest.param("POST", "/job", JSON, b"\xff\xfe", 400, "no JSON", id="no text"),
+        pytest.param("POST", "/job", JSON, b"[" * 100_000, 400, "no JSON", id="deep"),
+        pytest.param("POST", "/job", JSON, b"[1]", 400, "no kind", id="list"),
+        pytest.param("POST", "/job", JSON, b'{"kind": 3}', 400, "no kind", id="number"),
+        pytest.param("POST", "/job", JSON, b"1" * (BODY + 1), 413, "", id="large"),
+        pytest.param("GET", "/job", {"X-Long": "a" * 20_000}, None, 431, "", id="large head"),
+    ],
+)
+def test_what_is_not_the_page_is_refused(
+    server: Server, method: str, path: str, headers: dict[str, Any], body: bytes | None, status: int, said: str
+) -> None:
+    def filled(text: str | None) -> str | None:
+        known = {"port": str(server.port), "token": server.application.token}
+        return None if text is None else re.sub(r"\{(\w+)\}", lambda match: known[match[1]], text)
+
+    found, sent, text = _ask(
+        server, method, filled(path) or "", {name: filled(value) for name, value in headers.items()}, body
+    )
+    assert found == status
+    assert said in text.decode()
+    assert not [name for name in sent if name.startswith("Access-Control")]
+    assert server.application.token not in text.decode()
+    assert server.worker.look() == {"state": "idle"}
+
+
+def test_a_connection_that_says_nothing_holds_up_nobody(server: Server) -> None:
+    with socket.create_connection(("127.0.0.1", server.port)) as slow:
+        slow.sendall(b"POST /job HTTP/1.1\r\nContent-Length: 400000\r\n\r\n{")
+        assert _job(server) == (200, {"state": "idle"})
+
+
+def test_a_port_that_is_taken_is_said(server: Server) -> None:
+    with pytest.raises(LinkworkError, match=f"port {server.port} of 127.0.0.1 cannot be listened at"):
+        Server(PAGE_TEXT, server.port)
+
+
+def _alive(process: int) -> bool:
+    try:
+        os.kill(process, 0)
+    except ProcessLookupError:
+        return False
+    return True
+
+
+@pytest.mark.slow
+def test_jobs_fail_in_a_sentence_come_one_at_a_time_and_stop_where_they_are_cancelled() -> None:
+    for server in _running(PAGE_TEXT):
+        wrong = opening_state() | {"mechanism": "../../etc/passwd"}
+        assert _job(server, "POST", kind="run", state=wrong)[0] == 202
+        assert "there is no mechanism '../../etc/passwd'" in _until(server, "failed")["sentence"]
+        first = server.worker._process
+        endless = {"points": ELLIPSE, "starts": 1_000_000}
+        status, job = _job(server, "POST", kind="linkages", state=opening_state(), wanted=endless)
+        assert (status, job["state"]) == (202, "running")
+        status, job = _job(server, "POST", kind="export", state=opening_state())
+        assert status == 409
+        assert "already" in job["sentence"]
+        folder = server.worker._folder
+        assert Path(folder).is_dir()
+        status, job = _job(server, "DELETE")
+        assert (status, job["state"]) == (200, "cancelled")
+        assert not first.is_alive()
+        assert not Path(folder).exists()
+        assert _job(server)[1]["state"] == "cancelled"
+        # and the next is done, by another process, which ends with the server
+        assert _job(server, "POST", kind="nothing", state=opening_state())[0] == 202
+        assert "there is no job 'nothing'" in _until(server, "failed")["sentence"]
+        last = server.worker._process
+        assert last.is_alive()
+    assert not last.is_alive()
+
+
+@pytest.mark.parametrize(
+    ("kind", "state", "wanted", "said"),
+    [
+        ("run", None, {}, "no state"),
+        ("run", {"mechanism": "five-bar"}, {"rows": 3}, "no values"),
+        ("run", {"values": {"crank.lenght": 1.0}}, {"rows": 3}, "crank.length"),
+        ("run", {"values": {"crank.length": "/etc/passwd"}}, {"rows": 3}, "be a finite number"),
+        ("run", {"values": {"crank.length": float("nan")}}, {"rows": 3}, "be a finite number"),
+        ("run", {}, {"rows": 1_000_000}, "more than"),
+        ("run", {}, {"rows": 3, "file": "/etc/passwd"}, "there is no file"),
+        ("export", {}, {"kind": "../x"}, "kind '../x'"),
+        ("linkages", {}, {"points": [[0.0, 0.0], [1.0, 1.0]]}, "at least 3"),
+        ("linkages", {}, {"points": "/etc/passwd"}, "be a list"),
+        ("linkages", {}, {"points": ELLIPSE, "longest": 0.001}, "cannot span the target"),
+        ("slider", {"mechanism": "slider-crank"}, {"points": ELLIPSE}, "of five-bars"),
+        ("tune", {}, {"speeds": [40.0, 41.0], "change": [], "share": 0.1}, "at least 1"),
+        ("tune", {}, {"speeds": [41.0, 40.0], "change": ["slider.stiffness"], "share": 0.1}, "least, greatest"),
+    ],
+)
+def test_a_job_that_cannot_be_done_is_a_sentence(
+    kind: str, state: dict[str, Any] | None, wanted: dict[str, Any], said: str
+) -> None:
+    given = opening_state()
+    if state is not None and "mechanism" in state:
+        known = next(iter(MECHANISMS[state["mechanism"]].published))
+        given = state_of(case_from({"published": known}, folder=Path())) | {"values": state.get("values")}
+        if state["mechanism"] == "slider-crank":
+            given["values"] = {}
+    elif state is not None:
+        given["values"] = given["values"] | state.get("values", {})
+    with pytest.raises(LinkworkError, match=re.escape(said)):
+        do(kind, {"state": None if state is None else given, "wanted": wanted})
+
+
+@pytest.mark.parametrize("name", PUBLISHED)
+def test_a_state_is_the_case_that_it_was_made_of(name: str) -> None:
+    case = case_from({"published": name}, folder=Path())
+    again = case_of(state_of(case))
+    assert (again.parameters, again.initial, again.stop_time) == (case.parameters, case.initial, case.stop_time)
+    assert state_of(again) == state_of(case)
+
+
+@pytest.mark.slow
+def test_the_command_serves_until_ctrl_c(tmp_path: Path) -> None:
+    with subprocess.Popen(
+        [sys.executable, "-m", "analysis.cli", "studio", "table-3.1", "--no-browser"],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        env=os.environ | {"COLUMNS": "200"},
+    ) as process:
+        assert process.stdout is not None
+        address = urlsplit(process.stdout.readline().split()[-1])
+        connection = http.client.HTTPConnection("127.0.0.1", address.port or 0, timeout=60)
+        connection.request("GET", f"/?{address.query}")
+        page = connection.getresponse().read().decode()
+        assert PUBLISHED["table-3.1"].source in page
+        process.send_signal(signal.SIGINT)
+        _, said = process.communicate(timeout=60)
+    assert process.returncode == 0
+    assert "Ctrl-C stops it" in said
+    assert "the studio is closed" in said
+    assert "Traceback" not in said
+
+
+@pytest.mark.slow
+@pytest.mark.fmu
+@pytest.mark.parametrize("kind", ["native", "native-fmi3"])
+def test_an_fmu_starts_with_the_values_of_the_page(tmp_path: Path, kind: str) -> None:
+    from fmpy import simulate_fmu
+
+    pytest.importorskip("ziglang", reason="there is no Zig here: pip install 'linkwork[native]'")
+    state = opening_state()
+    state["values"] = state["values"] | {"crank.length": 0.047, "drive.speed": 31.0, "initial.crank_angle": 0.4}
+    file = do("export", {"state": state, "wanted": {"kind": kind}})["files"][0]
+    path = tmp_path / file["name"]
+    path.write_bytes(base64.b64decode(file["base64"]))
+    root = ElementTree.fromstring(zipfile.ZipFile(path).read("modelDescription.xml"))
+    starts = {node.get("name"): node.get("start") for node in root.iter() if node.get("name") and node.get("start")}
+    for node in root.iter("ScalarVariable"):
+        starts |= {node.get("name"): child.get("start") for child in node if child.get("start")}
+    for name in ("crank.length", "drive.speed", "initial.crank_angle", "coupler.point_distance"):
+        assert float(starts[name] or "nan") == state["values"][name]
+    # and without a value being set it runs as the case does
+    found = simulate_fmu(str(path), stop_time=0.1, step_size=0.01, output_interval=0.01, output=["slider.position"])
+    case = case_of(state)
+    wanted = simulate(case.parameters, case.inputs, initial=case.initial, stop_time=0.1, step=0.01)
+    np.testing.assert_allclose(found["slider.position"], wanted["slider.position"], atol=1e-9)
+
+
+# In the browser
+
+
+@pytest.fixture(scope="module")
+def studio() -> Iterator[Server]:
+    """The built page, served."""
+    yield from _running(page_of(opening_state()))
+
+
+@pytest.fixture
+def page(browser: Browser, studio: Server) -> Iterator[Page]:
+    """The page as the server's address opens it."""
+    made = browser.new_page(viewport={"width": 1400, "height": 1000})
+    made.set_default_timeout(600_000)
+    made.on("pageerror", lambda error: pytest.fail(f"the page: {error}"))
+    made.on("console", lambda said: pytest.fail(f"the page: {said.text}") if "Security" in said.text else None)
+    made.goto(studio.address)
+    made.wait_for_function("document.documentElement.dataset.ready")
+    made.click("#play")
+    yield made
+    made.close()
+
+
+def _part(page: Page, title: str) -> None:
+    page.click(f"#python summary:has-text('{title}')")
+
+
+def _values(page: Page) -> dict[str, float]:
+    values: dict[str, float] = page.evaluate("window.studio.state.values")
+    return values
+
+
+@pytest.mark.slow
+def test_a_page_of_another_origin_reaches_nothing(launched: Callable[..., Browser], studio: Server) -> None:
+    class Evil(BaseHTTPRequestHandler):
+        def do_GET(self) -> None:
+            self.send_response(200)
+            self.send_header("Content-Type", "text/html")
+            self.end_headers()
+
+        def log_message(self, format: str, *arguments: Any) -> None:
+            pass
+
+    with HTTPServer(("127.0.0.1", 0), Evil) as evil:
+        thread = threading.Thread(target=evil.serve_forever, daemon=True)
+        thread.start()
+        browser = launched("--host-resolver-rules=MAP evil.example 127.0.0.1")
+        page = browser.new_page()
+        token, job = studio.application.token, f"http://127.0.0.1:{studio.port}/job"
+        for host in ("127.0.0.1", "evil.example"):
+            page.goto(f"http://{host}:{evil.server_port}/")
+            reached = page.evaluate(
+                """async ([job, token]) => {
+                    const body = JSON.stringify({kind: "export"});
+                    const tries = {
+                        plain: () => fetch(job),
+                        token: () => fetch(job, {headers: {"X-Linkwork-Token": token}}),
+                        post: () => fetch(job, {method: "POST", body}),
+                        json: () => fetch(job, {method: "POST", body, headers: {"Content-Type": "application/json"}}),
+                        remove: () => fetch(job, {method: "DELETE"}),
+                        page: () => fetch(job.replace("job", "?token=" + token)),
+                        blind: () => fetch(job, {method: "POST", body, mode: "no-cors"}).then((a) => a.text()),
+                    };
+                    const found = {};
+                    for (const [name, attempt] of Object.entries(tries))
+                        found[name] = await attempt().then((a) => a.status ?? a, (error) => error.name);
+                    return found;
+                }""",
+                [job, token],
+            )
+            assert reached.pop("blind") in ("", "TypeError")
+            assert set(reached.values()) == {"TypeError"}, reached
+        # a name of its own that leads here, with the token
+        answer = page.goto(f"http://evil.example:{studio.port}/?token={token}")
+        assert answer is not None
+        assert answer.status == 421
+        page.close()
+        evil.shutdown()
+    assert studio.worker.look()["state"] == "idle"
+
+
+@pytest.mark.slow
+def test_a_page_that_is_a_file_says_how_to_have_python(browser: Browser) -> None:
+    page = browser.new_page()
+    page.goto(PAGE.as_uri())
+    page.wait_for_function("document.documentElement.dataset.ready")
+    assert "linkwork studio" in page.inner_text("#python")
+    assert page.locator("#python button").count() == 0
+    page.close()
+
+
+@pytest.mark.slow
+def test_a_path_that_is_drawn_gives_linkages_and_a_motion_of_the_slider(page: Page) -> None:
+    _part(page, "A path")
+    page.click("text=Draw a path on the picture")
+    box = page.locator("#picture").bounding_box()
+    assert box is not None
+    x, y = box["x"] + 0.55 * box["width"], box["y"] + 0.4 * box["height"]
+    page.mouse.move(x + 90.0, y)
+    page.mouse.down()
+    for angle in np.linspace(0.0, 2.0 * np.pi, 25):
+        page.mouse.move(x + 90.0 * np.cos(angle), y - 40.0 * np.sin(angle))
+    page.mouse.up()
+    points = page.eval_on_selector("#python textarea", "field => field.value").splitlines()
+    drawn = np.array([[float(value) for value in line.split()] for line in points])
+    assert len(drawn) == 72
+    width, height = np.ptp(drawn, axis=0)
+    assert height / width == pytest.approx(40.0 / 90.0, rel=0.02)
+    before = _values(page)
+    page.click("text=Move the slider for it")
+    page.wait_for_selector("#python table")
+    area = [float(t) for t in page.locator("#python tbody td:nth-child(2)").all_inner_texts()]
+    assert area == sorted(area, reverse=True)
+    assert len(area) == 3
+    assert page.locator("#python figure").count() == 2
+    with page.expect_download() as download:
+        page.click("text=Save slider-motion.csv")
+    table = np.genfromtxt(download.value.path(), delimiter=",", names=True)
+    assert len(table) == 720
+    assert _values(page) == before
+    page.click("text=Find linkages")
+    page.wait_for_selector("button:has-text('Show')")
+    rows = page.locator("#python tbody tr").all_inner_texts()
+    assert len(rows) >= 2
+    page.click("button:has-text('Show') >> nth=0")
+    page.wait_for_function("window.studio.state.title.startsWith('Linkage 1')")
+    page.wait_for_function("document.documentElement.dataset.settled === 'true'")
+    # the coupler point goes along the path that was drawn, in the frame of the linkage
+    points = page.eval_on_selector("#python textarea", "field => field.value").splitlines()
+    target = np.array([[float(value) for value in line.split()] for line in points]) / 1e3
+    values = _values(page)
+    assert before["ground.length"] != values["ground.length"]
+    path = page.get_attribute("#picture .path0", "points") or ""
+    curve = np.array([[float(v) for v in pair.split(",")] for pair in path.split()])
+    seen = np.array(
+        [[float(v) for v in p.split(",")] for p in (page.get_attribute("#picture .wanted", "points") or "").split()]
+    )
+    apart = np.hypot(*(seen[:, None] - curve[None]).transpose(2, 0, 1)).min(axis=1)
+    assert apart.max() < 0.1 * np.ptp(seen, axis=0).max()
+    assert np.ptp(target, axis=0).max() > 0.0
+    page.keyboard.press("Control+z")
+    page.wait_for_function("!window.studio.state.title.startsWith('Linkage 1')")
+    assert _values(page) == before
+
+
+@pytest.mark.slow
+def test_what_is_wrong_with_a_path_is_said_and_a_job_is_cancelled(page: Page) -> None:
+    _part(page, "A path")
+    page.click("text=Find linkages")
+    page.wait_for_selector("#python .fault:has-text('at least 3')")
+    page.click("text=Take the path of the mechanism")
+    page.locator('label:has-text("transmission angle") input').fill("89")
+    page.keyboard.press("Tab")
+    page.click("text=Find linkages")
+    page.click("text=Cancel")
+    page.wait_for_selector("#python .fault:has-text('Cancelled')")
+    assert page.is_enabled("text=Find linkages")
+
+
+@pytest.mark.slow
+def test_the_fmu_runs_beside_the_page_and_is_saved_with_its_values(page: Page) -> None:
+    pytest.importorskip("ziglang", reason="there is no Zig here: pip install 'linkwork[native]'")
+    _part(page, "The FMU")
+    page.click("text=Run it beside the page")
+    page.wait_for_selector("#python [data-relative]")
+    assert float(page.get_attribute("#python [data-relative]", "data-relative") or "nan") < 1e-6
+    assert page.locator("#python select option").count() == len(MECHANISMS["five-bar"].output_names)
+    with page.expect_download() as download:
+        page.click("text=Save it with these values")
+    assert download.value.suggested_filename == "FiveBarSlider-native.fmu"
+    assert zipfile.is_zipfile(download.value.path())
+
+
+@pytest.mark.slow
+def test_a_range_of_speeds_is_tuned_and_the_change_taken_over(page: Page) -> None:
+    # a resonance of rig 2 with spring C lies in the range
+    state = state_of(case_from({"published": "rig-2-spring-c", "slider": {"damping": 1.0}}, folder=Path()))
+    page.evaluate("state => window.studio.restore(state)", state)
+    _part(page, "A range of speeds")
+    page.locator('label:has-text("speeds from") input').fill("585")
+    page.locator('#python label:has-text("to") input >> nth=0').focus()
+    ranges = page.locator("#python details[open] .line >> nth=0").locator('input[type="number"]')
+    ranges.nth(1).fill("600")
+    page.click("text=Change least")
+    page.wait_for_selector("text=Take it over")
+    before = _values(page)["slider.stiffness"]
+    page.click("text=Take it over")
+    page.wait_for_function("window.studio.state.title.endsWith('tuned')")
+    assert _values(page)["slider.stiffness"] != before
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("theme", ["light", "dark"])
+def test_the_part_with_python_is_named_and_fits_a_phone(page: Page, theme: str) -> None:
+    page.emulate_media(color_scheme=theme)  # type: ignore[arg-type]
+    page.set_viewport_size({"width": 390, "height": 844})
+    for title in ("A path", "A range of speeds", "The FMU"):
+        page.locator(f"#python summary:has-text('{title}')").focus()
+        page.keyboard.press("Enter")
+        assert page.evaluate("document.documentElement.scrollWidth") <= 390
+        unnamed = page.eval_on_selector_all(
+            "#python button, #python input, #python select, #python textarea, #python progress",
+            "all => all.filter((one) => !(one.getAttribute('aria-label') || one.textContent.trim() || one.labels?.length))"
+            ".map((one) => one.outerHTML)",
+        )
+        assert unnamed == []
