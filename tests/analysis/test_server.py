@@ -16,6 +16,7 @@ import time
 import xml.etree.ElementTree as ElementTree
 import zipfile
 from collections.abc import Callable, Iterator
+from contextlib import closing
 from http.server import BaseHTTPRequestHandler, HTTPServer
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -56,9 +57,8 @@ def server() -> Iterator[Server]:
 
 def _ask(server: Server, method: str, path: str, headers: dict[str, str | None], body: bytes | None = None) -> Any:
     """Status, headers and body of an answer; a header of None is left out."""
-    connection = http.client.HTTPConnection("127.0.0.1", server.port, timeout=60)
     usual: dict[str, str | None] = {"Host": f"127.0.0.1:{server.port}", TOKEN: server.application.token}
-    try:
+    with closing(http.client.HTTPConnection("127.0.0.1", server.port, timeout=60)) as connection:
         connection.putrequest(method, path, skip_host=True, skip_accept_encoding=True)
         for name, value in (usual | headers).items():
             if value is not None:
@@ -68,8 +68,6 @@ def _ask(server: Server, method: str, path: str, headers: dict[str, str | None],
         connection.endheaders(body)
         answer = connection.getresponse()
         return answer.status, dict(answer.getheaders()), answer.read()
-    finally:
-        connection.close()
 
 
 def _job(server: Server, method: str = "GET", **request: Any) -> tuple[int, dict[str, Any]]:
@@ -261,9 +259,9 @@ def test_the_command_serves_until_ctrl_c(tmp_path: Path) -> None:
     ) as process:
         assert process.stdout is not None
         address = urlsplit(process.stdout.readline().split()[-1])
-        connection = http.client.HTTPConnection("127.0.0.1", address.port or 0, timeout=60)
-        connection.request("GET", f"/?{address.query}")
-        page = connection.getresponse().read().decode()
+        with closing(http.client.HTTPConnection("127.0.0.1", address.port or 0, timeout=60)) as connection:
+            connection.request("GET", f"/?{address.query}")
+            page = connection.getresponse().read().decode()
         assert PUBLISHED["table-3.1"].source in page
         process.send_signal(signal.SIGINT)
         _, said = process.communicate(timeout=60)
@@ -312,13 +310,23 @@ def page(browser: Browser, studio: Server) -> Iterator[Page]:
     """The page as the server's address opens it."""
     made = browser.new_page(viewport={"width": 1400, "height": 1000})
     made.set_default_timeout(600_000)
-    made.on("pageerror", lambda error: pytest.fail(f"the page: {error}"))
-    made.on("console", lambda said: pytest.fail(f"the page: {said.text}") if "Security" in said.text else None)
+    wrong: list[str] = []
+    made.on("pageerror", lambda error: wrong.append(str(error)))
+    made.on("console", lambda said: wrong.append(said.text) if said.type == "error" else None)
     made.goto(studio.address)
-    made.wait_for_function("document.documentElement.dataset.ready")
+    _wait(made, "document.documentElement.dataset.ready")
     made.click("#play")
     yield made
     made.close()
+    assert wrong == []
+
+
+def _wait(page: Page, expression: str) -> None:
+    """Until an expression is true; Playwright's own wait evaluates a text in the page, which its policy forbids."""
+    end = time.monotonic() + 600.0
+    while not page.evaluate(expression):
+        assert time.monotonic() < end, expression
+        page.wait_for_timeout(50)
 
 
 def _part(page: Page, title: str) -> None:
@@ -383,14 +391,14 @@ def test_a_page_of_another_origin_reaches_nothing(launched: Callable[..., Browse
 def test_a_page_that_is_a_file_says_how_to_have_python(browser: Browser) -> None:
     page = browser.new_page()
     page.goto(PAGE.as_uri())
-    page.wait_for_function("document.documentElement.dataset.ready")
+    _wait(page, "document.documentElement.dataset.ready")
     assert "linkwork studio" in page.inner_text("#python")
     assert page.locator("#python button").count() == 0
     page.close()
 
 
 @pytest.mark.slow
-def test_a_path_that_is_drawn_gives_linkages_and_a_motion_of_the_slider(page: Page) -> None:
+def test_a_path_that_is_drawn_gives_linkages(page: Page) -> None:
     _part(page, "A path")
     page.click("text=Draw a path on the picture")
     box = page.locator("#picture").bounding_box()
@@ -407,27 +415,15 @@ def test_a_path_that_is_drawn_gives_linkages_and_a_motion_of_the_slider(page: Pa
     width, height = np.ptp(drawn, axis=0)
     assert height / width == pytest.approx(40.0 / 90.0, rel=0.02)
     before = _values(page)
-    page.click("text=Move the slider for it")
-    page.wait_for_selector("#python table")
-    area = [float(t) for t in page.locator("#python tbody td:nth-child(2)").all_inner_texts()]
-    assert area == sorted(area, reverse=True)
-    assert len(area) == 3
-    assert page.locator("#python figure").count() == 2
-    with page.expect_download() as download:
-        page.click("text=Save slider-motion.csv")
-    table = np.genfromtxt(download.value.path(), delimiter=",", names=True)
-    assert len(table) == 720
-    assert _values(page) == before
     page.click("text=Find linkages")
     page.wait_for_selector("button:has-text('Show')")
     rows = page.locator("#python tbody tr").all_inner_texts()
     assert len(rows) >= 2
+    answered = page.evaluate("Number(document.documentElement.dataset.answer)")
     page.click("button:has-text('Show') >> nth=0")
-    page.wait_for_function("window.studio.state.title.startsWith('Linkage 1')")
-    page.wait_for_function("document.documentElement.dataset.settled === 'true'")
+    _wait(page, "window.studio.state.title.startsWith('Linkage 1')")
+    _wait(page, f"Number(document.documentElement.dataset.answer) > {answered}")
     # the coupler point goes along the path that was drawn, in the frame of the linkage
-    points = page.eval_on_selector("#python textarea", "field => field.value").splitlines()
-    target = np.array([[float(value) for value in line.split()] for line in points]) / 1e3
     values = _values(page)
     assert before["ground.length"] != values["ground.length"]
     path = page.get_attribute("#picture .path0", "points") or ""
@@ -437,9 +433,31 @@ def test_a_path_that_is_drawn_gives_linkages_and_a_motion_of_the_slider(page: Pa
     )
     apart = np.hypot(*(seen[:, None] - curve[None]).transpose(2, 0, 1)).min(axis=1)
     assert apart.max() < 0.1 * np.ptp(seen, axis=0).max()
-    assert np.ptp(target, axis=0).max() > 0.0
     page.keyboard.press("Control+z")
-    page.wait_for_function("!window.studio.state.title.startsWith('Linkage 1')")
+    _wait(page, "!window.studio.state.title.startsWith('Linkage 1')")
+    assert _values(page) == before
+
+
+@pytest.mark.slow
+def test_the_slider_is_moved_for_a_path_near_the_mechanisms_own(page: Page) -> None:
+    _part(page, "A path")
+    page.click("text=Take the path of the mechanism")
+    page.click("#python summary:has-text('Its points')")
+    field = page.locator("#python textarea")
+    own = np.array([[float(value) for value in line.split()] for line in field.input_value().splitlines()])
+    field.fill("\n".join(f"{1.02 * x} {y}" for x, y in own))
+    page.locator('#python label:has-text("harmonics") input').fill("1")
+    before = _values(page)
+    page.click("text=Move the slider for it")
+    page.wait_for_selector("#python table")
+    at_rest, moved = (float(t) for t in page.locator("#python tbody td:nth-child(2)").all_inner_texts())
+    assert moved < at_rest
+    assert page.locator("#python figure").count() == 2
+    assert page.locator("#picture .beside").count() == 1
+    with page.expect_download() as download:
+        page.click("text=Save slider-motion.csv")
+    table = np.genfromtxt(download.value.path(), delimiter=",", names=True)
+    assert len(table) == 720
     assert _values(page) == before
 
 
@@ -485,7 +503,7 @@ def test_a_range_of_speeds_is_tuned_and_the_change_taken_over(page: Page) -> Non
     page.wait_for_selector("text=Take it over")
     before = _values(page)["slider.stiffness"]
     page.click("text=Take it over")
-    page.wait_for_function("window.studio.state.title.endsWith('tuned')")
+    _wait(page, "window.studio.state.title.endsWith('tuned')")
     assert _values(page)["slider.stiffness"] != before
 
 
