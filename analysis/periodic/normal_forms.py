@@ -31,6 +31,7 @@ _STEP, _CERTAIN, _HALVINGS = 8e-3, 1e-2, 16
 _LOCATED = 1e-2
 #: Relative difference of the coefficients with the whole and the half step above which its sign is not settled.
 UNSETTLED = 0.5
+_UNSETTLED = "not settled"
 #: Distance of the multiplier from the unit circle at which a run confirms a normal form, at least and at most, the square of
 #: the distance from the old motion that it is chosen for, and turns.
 _BEYOND, _SMALL, _TURNS = (2e-3, 2e-2), 0.04, 6000
@@ -50,7 +51,7 @@ class NormalForm:
         In the scale of y: of a fold half the second derivative along the eigenvector, of a period doubling the cubic
         coefficient, positive where it is supercritical, of a torus the first Lyapunov coefficient, negative where it is.
     uncertainty : float
-        Change of the coefficient when the step of the differences is halved.
+        Change of the coefficient when the step of the differences is halved; infinite where the point is not located.
     words : str
         "supercritical", "subcritical", or "not settled", where the coefficient is not certain or the multiplier crosses the
         circle too fast for the point to be located; of a fold on which side of it the two motions are.
@@ -148,12 +149,12 @@ def normal_form(family: Family, special: SpecialPoint) -> NormalForm:
     """
     of = _forms(special.orbit)
     multiplier = complex(special.orbit.multipliers[0])
-    coefficient, uncertainty = _extrapolated(lambda h: coefficient_of(of, special.kind, multiplier, h))
     crossing = {Crossing.FOLD: 1.0, Crossing.PERIOD_DOUBLING: -1.0}.get(special.kind, multiplier / abs(multiplier))
-    located = np.abs(special.orbit.multipliers - crossing).min() < _LOCATED
-    settled = located and uncertainty < UNSETTLED * abs(coefficient)
-    if not settled:
-        words = "not settled"
+    if np.abs(special.orbit.multipliers - crossing).min() > _LOCATED:
+        return NormalForm(kind=special.kind, coefficient=0.0, uncertainty=np.inf, words=_UNSETTLED)
+    coefficient, uncertainty = _extrapolated(lambda h: coefficient_of(of, special.kind, multiplier, h))
+    if not uncertainty < UNSETTLED * abs(coefficient):
+        words = _UNSETTLED
     elif special.kind is Crossing.FOLD:
         words = f"both motions at {'lower' if coefficient * _slope(family, of, special) > 0.0 else 'higher'} values"
     else:
