@@ -214,8 +214,8 @@ export class WithPython {
     const wishes = [tick("no resonance", true), tick("no jump", false), tick("no unstable motion", false)];
     const sections = ["Dimensions", "Spring, damper, friction", "Masses"];
     const may = this.mechanism.given
-      .filter((given) => sections.includes(given.section) && !given.choices && value(given) !== 0)
-      .map((given) => ({ given, box: tick(given.name, given.section === sections[1]) }));
+      .filter((given) => sections.includes(given.section) && !given.choices)
+      .map((given) => ({ given, box: tick(given.name, given.name.endsWith("stiffness")) }));
     return part(
       "A range of speeds without resonance",
       line(from, to, ...wishes.map(([label]) => label)),

@@ -491,20 +491,23 @@ def test_the_fmu_runs_beside_the_page_and_is_saved_with_its_values(page: Page) -
 
 @pytest.mark.slow
 def test_a_range_of_speeds_is_tuned_and_the_change_taken_over(page: Page) -> None:
-    # a resonance of rig 2 with spring C lies in the range
-    state = state_of(case_from({"published": "rig-2-spring-c", "slider": {"damping": 1.0}}, folder=Path()))
+    # a resonance of rig 2 with spring C lies in the range; a stiffer spring leads it to the upper end
+    state = state_of(case_from({"published": "rig-2-spring-c"}, folder=Path()))
     page.evaluate("state => window.studio.restore(state)", state)
     _part(page, "A range of speeds")
-    page.locator('label:has-text("speeds from") input').fill("585")
-    page.locator('#python label:has-text("to") input >> nth=0').focus()
-    ranges = page.locator("#python details[open] .line >> nth=0").locator('input[type="number"]')
-    ranges.nth(1).fill("600")
+    fields = page.locator("#python details[open] > .line").nth(0).locator('input[type="number"]')
+    fields.nth(0).fill("560")
+    fields.nth(1).fill("600")
     page.click("text=Change least")
     page.wait_for_selector("text=Take it over")
     before = _values(page)["slider.stiffness"]
     page.click("text=Take it over")
     _wait(page, "window.studio.state.title.endsWith('tuned')")
-    assert _values(page)["slider.stiffness"] != before
+    # as a search for the stiffness at which the maximum is there finds it, in the tests of the tuning
+    assert before == 4000.0
+    assert 4100.0 < _values(page)["slider.stiffness"] < 4300.0
+    changed = {name for name, value in _values(page).items() if value != state["values"][name]}
+    assert changed == {"slider.stiffness"}
 
 
 @pytest.mark.slow
