@@ -14,13 +14,16 @@ from linkwork.mechanism import Mechanism
 
 from ..mechanisms import check
 from ..numerics import symbolic
+from ..run import MOTOR, at_rest, expressions, kloss
 from .archive import SOURCES
 from .description import NATIVE
 from .equations_c import beginning, c_of, generated
 from .native_fmu import OPTIONS, compile_library
 
 TARGET = "wasm32-wasi"
-_SHELL = ("model.h", "plant.h", "plant.c", "studio.c")
+_SHELL = ("model.h", "plant.h", "plant.c", "studio.h", "studio.c", "orbits.c", "numbers.c", "driven.c")
+#: The equations to which the page adds a motor's torque: the shell calls them by other names.
+_DRIVEN = ("derivative", "outputs", "clearance", "forward")
 _OPTIONS = (
     *(option for option in OPTIONS if option not in ("-shared", "-fPIC", "-fvisibility=hidden")),
     "-mexec-model=reactor", "-Wl,-z,stack-size=262144",
@@ -41,7 +44,7 @@ def build_web(mechanism: Mechanism) -> bytes:
     with tempfile.TemporaryDirectory(prefix="linkwork-web-") as folder:
         for name, text in web_sources(mechanism).items():
             (Path(folder) / name).write_text(text, encoding="utf-8")
-        files = ["plant.c", "studio.c", "equations.c", "tables.c", "drawing.c"]
+        files = ["plant.c", "studio.c", "orbits.c", "numbers.c", "driven.c", "equations.c", "tables.c", "drawing.c"]
         compile_library(folder, files, "module.wasm", TARGET, _OPTIONS)
         return (Path(folder) / "module.wasm").read_bytes()
 
@@ -49,6 +52,8 @@ def build_web(mechanism: Mechanism) -> bytes:
 def web_sources(mechanism: Mechanism) -> dict[str, str]:
     """All C files of a mechanism's module by name."""
     files = {name: (SOURCES / "native" / name).read_text(encoding="utf-8") for name in _SHELL}
+    others = [f"Equation driven_{name};\n#define equations_{name} driven_{name}\n" for name in _DRIVEN]
+    files["model.h"] += f"#ifndef DRIVEN_C\n{''.join(others)}#endif\n"
     return files | generated(mechanism, NATIVE) | {"drawing.h": _header(mechanism), "drawing.c": _drawing(mechanism)}
 
 
@@ -66,17 +71,31 @@ def _header(mechanism: Mechanism) -> str:
     return "\n".join(
         [
             f"/* The picture of a {mechanism.name}, and what leaves its freedoms free. Generated. */",
+            "#include <stdbool.h>",
             '#include "model.h"',
-            f"enum {{ JOINTS = {len(joints)}, CRANK = {crank} }};",
+            "/* TORQUE: the input that is the torque on the crank, -1 without */",
+            f"enum {{ JOINTS = {len(joints)}, CRANK = {crank}, TORQUE = {_torque_of(mechanism, crank)} }};",
+            f"enum {{ MOTOR = {len(MOTOR)} }};",
+            "extern double motor[MOTOR], motor_change[MOTOR];",
             f"#define PERIOD {freedoms[crank].period if crank >= 0 else 0.0!r}",
             "/* of each freedom: its mode, -1 without; a bit for each value of the mode that leaves it to a force */",
             f"static const int mode_of[FREEDOMS] = {{{', '.join(map(str, modes))}}};",
             f"static const int freeing[FREEDOMS] = {{{', '.join(map(str, freeing))}}};",
             "Equation equations_joints;         /* x, m, u, p -> places */",
             "Equation equations_joints_forward; /* m, parameters, state as given, u, dparameters, dstate -> dplaces */",
+            "Equation equations_motor;          /* motor, crank's speed -> torque */",
+            "Equation equations_motor_forward;  /* ..., dmotor, dspeed -> dtorque */",
+            "Equation equations_slopes;         /* x, m, u, p, motor -> x', accelerations by coordinates and rates */",
+            "Equation equations_along;          /* ..., dx, du, dp, dmotor -> accelerations; both without a switch */",
+            "Equation equations_at_rest;        /* crank angle, p -> mass, stiffness of the freedom beside the crank */",
             "",
         ]
     )
+
+
+def _torque_of(mechanism: Mechanism, crank: int) -> int:
+    """Number of the input that is the torque on the crank; -1 without."""
+    return next((n for n, c in enumerate(mechanism.channels) if c.kind == "force" and c.freedom == crank >= 0), -1)
 
 
 def _drawing(mechanism: Mechanism) -> str:
@@ -91,13 +110,42 @@ def _drawing(mechanism: Mechanism) -> str:
     d_own, d_state = sx.sym("d_own", *own.shape), sx.sym("d_state", *state.shape)
     change = casadi.jtimes(at(x_begun, modes, u, p_begun), given, join(d_own, d_state))
     made = (
-        casadi.Function(f"equations_{name}", arguments, [casadi.densify(result)], {"cse": True})
-        for name, arguments, result in (
+        casadi.Function(f"equations_{name}", arguments, [casadi.densify(r) for r in results], {"cse": True})
+        for name, arguments, *results in (
             ("joints", [x, modes, u, p], at(x, modes, u, p)),
             ("joints_forward", [modes, own, state, u, d_own, d_state], change),
+            *_driven(mechanism),
         )
     )
     return c_of(made, "drawing")
+
+
+def _driven(mechanism: Mechanism) -> list[tuple[Any, ...]]:
+    """The torque of a motor, slopes with it, how these change, and what is at rest: names, arguments and results."""
+    casadi = symbolic.library()
+    join, sx, freedoms = casadi.vertcat, casadi.SX, len(mechanism.freedoms)
+    motor, speed, d_motor, d_speed = (sx.sym(n, size) for n, size in zip("mvde", (len(MOTOR), 1, len(MOTOR), 1)))
+    torque = kloss(motor, speed)
+    crank = next((n for n, freedom in enumerate(mechanism.freedoms) if freedom.period > 0.0), -1)
+    other = next((n for n in range(freedoms) if n != crank), -1)
+    trace, place = expressions(mechanism), _torque_of(mechanism, crank)
+    run = trace.symbols
+    acting = join(run.u)
+    if place >= 0:
+        acting[place] += casadi.substitute(torque, speed, run.x[freedoms + crank])
+    slopes = casadi.substitute(trace.derivative, run.u, acting)
+    accelerations, of = slopes[freedoms : 2 * freedoms], [run.x, run.u, run.p, motor]
+    changes = [sx.sym(f"d{n}", *v.shape) for n, v in enumerate(of)]
+    angle, k = sx.sym("angle"), sx.sym("k", len(mechanism.constants._fields))
+    resting = at_rest(mechanism, crank, other)(angle, k) if min(crank, other) >= 0 else (sx(0.0), sx(0.0))
+    d_torque = casadi.jtimes(torque, join(motor, speed), join(d_motor, d_speed))
+    return [
+        ("motor", [motor, speed], torque),
+        ("motor_forward", [motor, speed, d_motor, d_speed], d_torque),
+        ("slopes", [*run, motor], slopes, casadi.jacobian(accelerations, run.x)[:, : 2 * freedoms]),
+        ("along", [*run, motor, *changes], casadi.jtimes(accelerations, join(*of), join(*changes))),
+        ("at_rest", [angle, k], join(*resting)),
+    ]
 
 
 def _places(mechanism: Mechanism, x: Any, modes: Any, u: Any, p: Any) -> Any:

@@ -50,6 +50,7 @@ from .floquet import liouville as liouville
 from .floquet import multipliers as multipliers
 from .floquet import require_sign as require_sign
 from .floquet import verdict as verdict
+from .flows import crank_of as crank_of
 from .gradients import Gradient as Gradient
 from .gradients import MotionGradient as MotionGradient
 from .gradients import PointGradient as PointGradient
@@ -65,6 +66,7 @@ from .isolas import with_isolas as with_isolas
 from .lines import passes as passes
 from .natural import mean_effective_mass as mean_effective_mass
 from .natural import natural_frequency as natural_frequency
+from .natural import stiffness_name as stiffness_name
 from .normal_forms import FormRun as FormRun
 from .normal_forms import NormalForm as NormalForm
 from .normal_forms import confirm_form as confirm_form
@@ -80,6 +82,7 @@ from .planes import Operation as Operation
 from .planes import Plane as Plane
 from .planes import driving_names as driving_names
 from .planes import format_value as format_value
+from .planes import of_the_motor as of_the_motor
 from .planes import plane as plane
 from .planes import require_variable as require_variable
 from .planes import speed_name as speed_name

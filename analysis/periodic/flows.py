@@ -14,10 +14,7 @@ from linkwork.variables import Variable
 
 from ..numerics import symbolic
 from ..numerics.codegen import MAKING, MachineCode
-from ..run import constants, traced
-
-#: Parameters of an induction motor among those of a drive.
-MOTOR = ("breakdown_torque", "breakdown_slip", "synchronous_speed")
+from ..run import MOTOR, constants, kloss, traced
 
 # Functions of a flow, by their numbers among its addresses
 PLAIN, VARIATIONAL, DIRECTIONAL, GAP, STATE = range(5)
@@ -225,7 +222,7 @@ class Flow:
         else:
             channel = crank_of(m).torque
             u = casadi.vertcat(u)
-            u[channel] += _kloss(drive[self.inputs : self.inputs + len(MOTOR)], x[freedoms + self.crank])
+            u[channel] += kloss(drive[self.inputs : self.inputs + len(MOTOR)], x[freedoms + self.crank])
         return tuple(x), u
 
 
@@ -233,12 +230,6 @@ def label(variable: Variable) -> str:
     """What messages and tables call a variable: its symbol if that is a short one, else its name with spaces."""
     symbol = variable.symbol
     return symbol if symbol and "\\" not in symbol else variable.name.replace(".", " ")
-
-
-def _kloss(motor: Any, speed: Any) -> Any:
-    """Torque of an induction motor (Kloss's formula, as in a run) at a crank speed."""
-    slip = 1.0 - speed / motor[2]
-    return 2.0 * motor[0] * slip * motor[1] / (slip * slip + motor[1] * motor[1])
 
 
 @cache

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from functools import cache
 from math import sqrt
-from typing import Any
 
 import numpy as np
 
@@ -14,7 +12,7 @@ from linkwork.parameters import field_name
 
 from ..mechanisms import Parameters, mechanism_of
 from ..numerics import symbolic
-from ..run import constants, takes_published, traced
+from ..run import at_rest, takes_published
 from .flows import crank_of
 
 #: Crank angles over which the effective mass is averaged.
@@ -41,21 +39,6 @@ def stiffness_name(mechanism: Mechanism) -> str:
     return mechanism.freedoms[first_freedom(mechanism)].coordinate.partition(".")[0] + ".stiffness"
 
 
-@cache
-def _hessians(mechanism: Mechanism) -> Any:
-    """(crank angle, constants) -> second derivatives of the energy by rate and by coordinate of the first freedom, at rest."""
-    casadi = symbolic.library()
-    n, freedoms = first_freedom(mechanism), len(mechanism.freedoms)
-    angle, s, v = (casadi.SX.sym(name) for name in ("angle", "s", "v"))
-    p, k = constants(mechanism)
-    x = [casadi.SX(0.0)] * mechanism.size
-    x[crank_of(mechanism).freedom], x[n], x[freedoms + n] = angle, s, v
-    energy = traced(mechanism).of(mechanism.equations.energy)(tuple(x), k)
-    seconds = [casadi.densify(casadi.jacobian(casadi.jacobian(energy, z), z)) for z in (v, s)]
-    at_rest = casadi.substitute(seconds, [s, v], [casadi.SX(0.0)] * 2)
-    return casadi.Function("hessians", [angle, p], at_rest)
-
-
 def _means(parameters: Parameters) -> tuple[float, float]:
     """Effective mass (kg) and stiffness (N/m) of the first freedom at its zero, as means over a turn."""
     mechanism = mechanism_of(parameters)
@@ -65,7 +48,9 @@ def _means(parameters: Parameters) -> tuple[float, float]:
         x = [0.0] * mechanism.size
         x[crank] = angle
         mechanism.check_assembly(parameters, x)
-    mass, stiffness = symbolic.over(_hessians(mechanism), angles, list(parameters.constants()))
+    mass, stiffness = symbolic.over(
+        at_rest(mechanism, crank, first_freedom(mechanism)), angles, list(parameters.constants())
+    )
     return float(mass.mean()), float(stiffness.mean())
 
 

@@ -28,6 +28,7 @@ from .ensemble import Ensemble as Ensemble
 from .ensemble import EnsembleBroken as EnsembleBroken
 from .ensemble import EnsembleInterrupted as EnsembleInterrupted
 from .ensemble import simulate_many as simulate_many
+from .equations import at_rest as at_rest
 from .equations import constants as constants
 from .equations import expressions as expressions
 from .equations import machine as machine
@@ -49,6 +50,7 @@ from .inputs import encode as encode
 from .inputs import given as given
 from .inputs import sample as sample
 from .prepared import outputs_of as outputs_of
+from .signals import MOTOR as MOTOR
 from .signals import Function as Function
 from .signals import Harmonics as Harmonics
 from .signals import InductionMotor as InductionMotor
@@ -56,6 +58,7 @@ from .signals import Piecewise as Piecewise
 from .signals import Signal as Signal
 from .signals import Torque as Torque
 from .signals import TorsionBar as TorsionBar
+from .signals import kloss as kloss
 from .signals import ramp as ramp
 from .signals import steps as steps
 from .signals import table as table

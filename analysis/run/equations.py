@@ -44,6 +44,20 @@ def constants(mechanism: Mechanism, switched: bool = False) -> tuple[Any, Any]:
     return p, k._replace(**{mechanism.switch: float(switched)}) if mechanism.switch else k
 
 
+@cache
+def at_rest(mechanism: Mechanism, crank: int, freedom: int) -> Any:
+    """(crank angle, constants) -> second derivatives of the energy by rate and by coordinate of a freedom, all at rest."""
+    casadi = symbolic.library()
+    angle, s, v = (casadi.SX.sym(name) for name in ("angle", "s", "v"))
+    p, k = constants(mechanism)
+    x = [casadi.SX(0.0)] * mechanism.size
+    x[crank], x[freedom], x[len(mechanism.freedoms) + freedom] = angle, s, v
+    energy = traced(mechanism).of(mechanism.equations.energy)(tuple(x), k)
+    seconds = [casadi.densify(casadi.jacobian(casadi.jacobian(energy, z), z)) for z in (v, s)]
+    resting = casadi.substitute(seconds, [s, v], [casadi.SX(0.0)] * 2)
+    return casadi.Function("at_rest", [angle, p], resting)
+
+
 class OfParameters(NamedTuple):
     """The parameters of a mechanism traced: a column of symbols for their fields, an object with these, and functions."""
 

@@ -149,6 +149,16 @@ class InductionMotor:
             raise InputError(f"synchronous speed is {self.synchronous_speed}: it must be finite and not 0 rad/s")
 
 
+#: What an induction motor has, in the order of `kloss`.
+MOTOR = ("breakdown_torque", "breakdown_slip", "synchronous_speed")
+
+
+def kloss(motor: Any, speed: Any) -> Any:
+    """Torque of an `InductionMotor`, its `MOTOR`, at a crank speed, so that it holds at synchronous speed; also of symbols."""
+    slip = 1.0 - speed / motor[2]
+    return 2.0 * motor[0] * slip * motor[1] / (slip * slip + motor[1] * motor[1])
+
+
 @dataclass(frozen=True, slots=True)
 class Function:
     """Any channel as a Python function of time, of all coordinates of the mechanism and of all their rates, all floats.

@@ -24,7 +24,7 @@ from ..export import KINDS, NATIVE, PYTHON, build, build_native, kinds_here, wit
 from ..files import Choice, Many, Quantity, Whole, entry, flag, read, text, unknown_name, write_csv
 from ..mechanisms import mechanism_of, require_five_bar
 from ..motion import inverse_dynamics, motion_of_plant, slider_motion
-from ..periodic import drive_of, unit_of
+from ..periodic import drive_of, of_the_motor, unit_of
 from ..run import Case, case_from, cosimulate
 from ..studio import case_of, given_values, state_of
 from ..synthesis import (
@@ -297,6 +297,12 @@ def _exported(case: Case, wanted: _Export) -> Answer:
     """A native FMU for this platform with the values of the page as its start values."""
     mechanism = mechanism_of(case.parameters)
     values = given_values(mechanism, state_of(case)["values"])
+    motor = of_the_motor(mechanism)
+    if any(values[name] != 0.0 for name, (field, _) in motor.items() if field == "breakdown_torque"):
+        raise InputError(
+            "an FMU has no motor: take it out here, and connect one to the FMU's torque in the system that it goes into"
+        )
+    values = {name: value for name, value in values.items() if name not in motor}
     with _folder() as folder:
         made = build_native(with_starts(mechanism, values), KINDS[wanted.kind], folder)
         return {"words": f"{made.name} starts with the values of the page.", "files": [_file(made)]}

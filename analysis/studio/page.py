@@ -33,7 +33,10 @@ _MADE_OF = (
     "fmu_src/linkwork/**/*.py",
     "fmu_src/native/model.h",
     "fmu_src/native/plant.*",
-    "fmu_src/native/studio.c",
+    "fmu_src/native/studio.*",
+    "fmu_src/native/orbits.c",
+    "fmu_src/native/numbers.c",
+    "fmu_src/native/driven.c",
     "studio/*.*",
     "studio/src/*",
 )

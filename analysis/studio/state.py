@@ -14,8 +14,9 @@ from linkwork.parameters import field_name
 
 from ..files import unknown_name
 from ..mechanisms import FIVE_BAR, MECHANISMS, mechanism_of
-from ..run import Case, Inputs
-from .tables import published_values, values_of
+from ..periodic import of_the_motor
+from ..run import Case, InductionMotor, Inputs
+from .tables import NO_MOTOR, published_values, values_of
 
 #: What is changed in the first published set of the mechanism that the page opens with: a coupler point.
 OPENING = {"coupler.point_distance": 0.105, "coupler.point_angle": 0.55}
@@ -37,20 +38,24 @@ def state_of(case: Case) -> dict[str, Any]:
     Raises
     ------
     InputError
-        If an input varies: the page has constant ones.
+        If an input varies: the page has constant ones, and a motor.
     """
     mechanism = mechanism_of(case.parameters)
     values = values_of(mechanism, case.parameters, case.initial)
     values |= {name: float(value) for name, value in case.inputs.modes(mechanism).items()}
     for channel in (channel for channel in mechanism.channels if channel.kind != "rate"):
         parts = case.inputs.parts(channel.argument)
-        for part in parts:
+        motors = [part for part in parts if isinstance(part, InductionMotor)]
+        others = [part for part in parts if part not in motors[:1]]
+        for part in others:
             if not isinstance(part, (int, float, np.number)):
                 raise InputError(
-                    f"{channel.argument} is a {type(part).__name__}: the studio has inputs that are constant; linkwork run "
-                    "takes the case as it is"
+                    f"{channel.argument} is a {type(part).__name__}: the studio has inputs that are constant, and one motor on "
+                    "the crank; linkwork run takes the case as it is"
                 )
-        values[channel.name] = float(sum(parts))
+        values[channel.name] = float(sum(others))
+        if motors:
+            values |= {name: getattr(motors[0], field) for name, (field, _) in of_the_motor(mechanism).items()}
     return {"mechanism": mechanism.name, "title": case.title, "values": values, "duration": case.stop_time}
 
 
@@ -67,10 +72,17 @@ def case_of(state: Mapping[str, Any]) -> Case:
         raise unknown_name(name, MECHANISMS, f"mechanism {name!r}")
     mechanism = MECHANISMS[name]
     values = given_values(mechanism, state.get("values"))
-    of = {name: int(values[name]) if v.kind == "Integer" else values[name] for name, v in _given(mechanism).items()}
+    whole = {v.name for v in mechanism.variables if v.kind == "Integer"}
+    of = {name: int(value) if name in whole else value for name, value in values.items()}
     chosen = [mode.arguments[min(max(int(of[mode.name]), 0), len(mode.arguments) - 1)] for mode in mechanism.modes]
     others = {name for mode in mechanism.modes for name in mode.arguments} - set(chosen)
-    channels = {c.argument: of[c.name] for c in mechanism.channels if c.kind != "rate" and c.argument not in others}
+    channels: dict[str, Any] = {
+        c.argument: of[c.name] for c in mechanism.channels if c.kind != "rate" and c.argument not in others
+    }
+    motor = {field: values[name] for name, (field, _) in of_the_motor(mechanism).items()}
+    torque = next((c.argument for c in mechanism.channels if f"{c.name}.breakdown_torque" in values), None)
+    if torque in channels and motor["breakdown_torque"] != 0.0:
+        channels[torque] = (channels[torque], InductionMotor(**motor))
     return Case(
         title=str(state.get("title", "")),
         parameters=mechanism.parameters(**{field_name(n): of[n] for n in mechanism.mechanism_variables}),
@@ -94,12 +106,15 @@ def given_values(mechanism: Mechanism, values: Any) -> dict[str, float]:
     for name in values:
         if name not in known:
             raise unknown_name(str(name), known)
-    return {name: _number(values.get(name, v.start), name) for name, v in known.items()}
+    return {name: _number(values.get(name, start), name) for name, start in known.items()}
 
 
-def _given(mechanism: Mechanism) -> dict[str, Any]:
+def _given(mechanism: Mechanism) -> dict[str, float]:
+    """Start values of all that the page gives a mechanism, a motor included."""
     rates = {c.name for c in mechanism.channels if c.kind == "rate"} | {"solver.tolerance"}
-    return {v.name: v for v in mechanism.variables if v.causality in ("parameter", "input") and v.name not in rates}
+    given = (v for v in mechanism.variables if v.causality in ("parameter", "input") and v.name not in rates)
+    motor = {name: NO_MOTOR[field] for name, (field, _) in of_the_motor(mechanism).items()}
+    return {v.name: float(v.start) for v in given} | motor
 
 
 def _number(value: Any, name: str) -> float:

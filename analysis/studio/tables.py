@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import gzip
+import math
 from typing import Any
 
 from linkwork.mechanism import Mechanism, PublishedSet
@@ -12,6 +13,7 @@ from linkwork.variables import UNITS, Variable
 
 from ..export import build_web, interface
 from ..mechanisms import name_in_files
+from ..periodic import crank_of, damping_name, of_the_motor, stiffness_name
 
 #: Parameters by what they are about, by a word in the name or by the unit; the first that fits.
 _SECTIONS = (
@@ -22,6 +24,8 @@ _SECTIONS = (
     ("Dimensions", ("",), ()),
 )
 DRIVE = "Drive and loads"
+#: Of a motor that nobody has given, by the field: no torque, a usual slip, and four poles at 50 Hz (rad/s).
+NO_MOTOR = {"breakdown_torque": 0.0, "breakdown_slip": 0.2, "synchronous_speed": 50.0 * math.pi}
 #: Tolerance of a run on the page: its numbers are good to more digits than those of a run by default.
 TOLERANCE = 1e-12
 
@@ -42,7 +46,8 @@ def tables_of(mechanism: Mechanism) -> dict[str, Any]:
             for entry in entries
             if entry.role in ("parameter", "mode", "initial", "input")
             and entry.variable.name not in (c.name for c in mechanism.channels if c.kind == "rate")
-        ],
+        ]
+        + _motor(mechanism, crank),
         "outputs": [{"name": name, "text": v.description, **_unit(v)} for name, v in outputs.items()],
         "freedoms": [
             {
@@ -60,6 +65,8 @@ def tables_of(mechanism: Mechanism) -> dict[str, Any]:
         "picture": _picture(mechanism, reference),
         "moving": [names.index(name) for name in _moving(mechanism)],
         "charts": _charts(mechanism),
+        "natural": _natural(mechanism, reference, crank),
+        "damping": damping_name(mechanism) if crank >= 0 and len(mechanism.freedoms) > 1 else "",
         "transmission": names.index("transmission.angle") if "transmission.angle" in names else -1,
         "sets": [
             {"name": name, "source": known.source, "values": published_values(mechanism, known)}
@@ -121,6 +128,36 @@ def _given(mechanism: Mechanism, variable: Variable, reference: int) -> dict[str
     return row
 
 
+def _motor(mechanism: Mechanism, crank: int) -> list[dict[str, Any]]:
+    """What is given of a motor on the crank: the page's module has it beside what has a value reference, which are below 0."""
+    torque = crank_of(mechanism).torque if crank >= 0 else None
+    if torque is None:
+        return []
+    return [
+        {
+            "name": name,
+            "reference": -1 - number,
+            "text": f"{field.replace('_', ' ').capitalize()} of an induction motor on the crank",
+            "start": NO_MOTOR[field],
+            "section": DRIVE,
+            "unit": "rpm" if unit == "rad/s" else "" if unit == "1" else unit,
+            "factor": dict(UNITS[unit].displays)["rpm"] if unit == "rad/s" else 1.0,
+            "nominal": 1.0,
+            "argument": mechanism.channels[torque].argument,
+            "kind": "motor",
+            "file": field,
+        }
+        for number, (name, (field, unit)) in enumerate(of_the_motor(mechanism).items())
+    ]
+
+
+def _natural(mechanism: Mechanism, reference: dict[str, int], crank: int) -> int | None:
+    """The value reference of the stiffness that a natural frequency is of; -1: it is in the energy, None: there is no such."""
+    if crank < 0 or len(mechanism.freedoms) < 2:
+        return None
+    return reference.get(stiffness_name(mechanism), -1)
+
+
 def _section(variable: Variable) -> str:
     return next(
         name
@@ -161,14 +198,19 @@ def _moving(mechanism: Mechanism) -> list[str]:
 
 
 def _charts(mechanism: Mechanism) -> list[dict[str, Any]]:
-    """Charts: each curve the outputs whose root of squares it is; of one output, the output itself."""
-    names = list(mechanism.output_names)
-    found = [{"title": "Motion", "curves": [{"name": n, "of": [names.index(n)]} for n in _moving(mechanism)]}]
-    torque = [name for name in names if name == "drive.applied_torque"]
-    found.append(
-        {"title": "Torque of the drive", "curves": [{"name": name, "of": [names.index(name)]} for name in torque]}
-    )
+    """Charts: each curve the places beyond the state whose root of squares it is; of one place, that itself.
+
+    The powers stand after the outputs and the joints: see studio.c.
+    """
+    names, variables = list(mechanism.output_names), {v.name: v for v in mechanism.variables}
+    power = len(names) + 3 * len(mechanism.drawing.joints if mechanism.drawing else ())
     joints = [name.removesuffix("fx") for name in names if name.endswith(".fx")]
+    watt = {"unit": "W", "factor": 1.0}
+
+    def outputs(title: str, kind: str, of: list[str]) -> dict[str, Any]:
+        unit = _unit(variables[of[0]]) if of else watt
+        return {"title": title, "kind": kind, **unit, "curves": [{"name": n, "of": [names.index(n)]} for n in of]}
+
     forces = [
         {
             "name": joint.rstrip("."),
@@ -176,5 +218,12 @@ def _charts(mechanism: Mechanism) -> list[dict[str, Any]]:
         }
         for joint in joints
     ]
-    found.append({"title": "Forces in the joints", "curves": forces})
+    powers = [{"name": "of drives and loads", "of": [power + 1]}, {"name": "lost", "of": [power]}]
+    found = [
+        outputs("Motion", "motion", _moving(mechanism)),
+        outputs("Torque of the drive", "motion", [n for n in names if n == "drive.applied_torque"]),
+        {"title": "Forces in the joints", "kind": "forces", "unit": "N", "factor": 1.0, "curves": forces},
+        {"title": "Power", "kind": "power", **watt, "curves": powers},
+        outputs("Transmission angle", "power", [n for n in names if n == "transmission.angle"]),
+    ]
     return [chart for chart in found if chart["curves"]]

@@ -3,7 +3,7 @@
 import uPlot from "uplot";
 import uplotStyle from "uplot/dist/uPlot.min.css";
 import type { Rows } from "./core";
-import { type Mechanism, outputAt, rowLength, type Source } from "./tables";
+import { type Chart as Table, type Mechanism, outputAt, rowLength, type Source } from "./tables";
 
 const COLOURS = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9"];
 /** Colours alone do not tell the curves apart. */
@@ -21,6 +21,7 @@ export class Charts {
   private axis: number[] = [];
   private kind: Source | "" = "";
   private mechanism!: Mechanism;
+  private wanted: (chart: Table) => boolean = () => true;
 
   constructor(private readonly place: HTMLElement) {
     const style = document.createElement("style");
@@ -35,19 +36,19 @@ export class Charts {
     return Math.max(220, this.place.clientWidth - 16);
   }
 
-  /** Make the charts of a mechanism anew; colours of text and grid are those of the page. */
-  show(mechanism: Mechanism, source: Source): void {
+  /** Make those charts of a mechanism anew that are wanted; colours of text and grid are those of the page. */
+  show(mechanism: Mechanism, source: Source, wanted = this.wanted): void {
     this.mechanism = mechanism;
+    this.wanted = wanted;
     this.kind = source;
     for (const { plot } of this.charts) plot.destroy();
     this.place.replaceChildren();
     const colours = getComputedStyle(document.body);
     const stroke = colours.getPropertyValue("--text");
     const grid = { stroke: colours.getPropertyValue("--line"), width: 1 };
-    this.charts = mechanism.charts.map(({ title, curves }) => {
+    this.charts = mechanism.charts.filter(wanted).map(({ title, unit, factor, curves }) => {
       const box = document.createElement("figure");
       const caption = document.createElement("figcaption");
-      const unit = mechanism.outputs[curves[0].of[0]].unit;
       caption.textContent = `${title} [${unit}]`;
       box.setAttribute("aria-label", `${title} in ${unit}: ${curves.map((curve) => curve.name).join(", ")}`);
       box.append(caption);
@@ -80,8 +81,7 @@ export class Charts {
       const line = document.createElement("div");
       line.className = "now";
       plot.over.append(line);
-      const factors = curves.map(({ of }) => ({ of, factor: mechanism.outputs[of[0]].factor }));
-      return { plot, line, curves: factors };
+      return { plot, line, curves: curves.map(({ of }) => ({ of, factor })) };
     });
   }
 

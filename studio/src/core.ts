@@ -1,5 +1,6 @@
 /** The equations: the module of a mechanism, and what is read from its memory. */
 
+import type { Point } from "./explore";
 import { type Mechanism, rowLength } from "./tables";
 
 interface Face {
@@ -15,6 +16,11 @@ interface Face {
   studio_run(step: number, count: number): number;
   studio_orbit(warm: number): number;
   studio_turn(steps: number): number;
+  studio_motor(): number;
+  studio_branch(reference: number, size: number, sense: number): number;
+  studio_follow(): number;
+  studio_amplitude(): number;
+  studio_natural(reference: number): number;
   studio_drag(joint: number, first: number, second: number): number;
 }
 
@@ -25,6 +31,8 @@ export interface Orbit {
   size: number;
   period: number;
   start: number[];
+  /** In the state, of the first of what it starts with: whose amplitude is meant. */
+  place: number;
   /** Real and imaginary parts, the largest modulus first. */
   multipliers: [number, number][];
 }
@@ -59,11 +67,14 @@ export class Core {
     return new Core(mechanism, instance);
   }
 
-  /** Put start values, and then these, by value reference. */
+  /** Put start values, and then these, by value reference: those below 0 are of the motor. */
   give(given: [number, number][]): void {
     this.face.studio_reset();
     const memory = new Float64Array(this.face.memory.buffer, this.face.studio_given());
-    for (const [reference, value] of given) memory[reference] = value;
+    const motor = new Float64Array(this.face.memory.buffer, this.face.studio_motor());
+    for (const [reference, value] of given)
+      if (reference < 0) motor[-1 - reference] = value;
+      else memory[reference] = value;
   }
 
   given(reference: number): number {
@@ -81,9 +92,22 @@ export class Core {
     return this.rows(this.face.studio_run(step, count));
   }
 
-  orbit(warm: boolean): Orbit {
-    const found = this.face.studio_orbit(warm ? 1 : 0) === 1;
-    const all = new Float64Array(this.face.memory.buffer, this.face.studio_found());
+  /** The periodic motion, sought from this start, or else from that of the one found before. */
+  orbit(start?: number[]): Orbit {
+    if (start) this.found().set([start.length, 0, 0, 0, ...start]);
+    return this.motion(this.face.studio_orbit(1) === 1);
+  }
+
+  private found(): Float64Array {
+    return new Float64Array(
+      this.face.memory.buffer,
+      this.face.studio_found(),
+      7 + 3 * this.most + this.most ** 2,
+    );
+  }
+
+  private motion(found: boolean): Orbit {
+    const all = this.found();
     const size = found ? all[0] : 0;
     const real = 4 + this.most + this.most * this.most;
     return {
@@ -92,8 +116,32 @@ export class Core {
       size,
       period: all[3],
       start: Array.from(all.slice(4, 4 + size)),
+      place: all[real + 2 * this.most],
       multipliers: Array.from({ length: size }, (_, i) => [all[real + i], all[real + this.most + i]]),
     };
+  }
+
+  /** Begin a branch at the motion that was found: over what, in what range, and the way that it first goes. */
+  branch(reference: number, size: number, sense: number): boolean {
+    return this.face.studio_branch(reference, size, sense) === 1;
+  }
+
+  /** The next motion on the branch; nothing where there is none. */
+  follow(): Omit<Point, "amplitude"> | undefined {
+    if (this.face.studio_follow() !== 1) return undefined;
+    const { start, multipliers } = this.motion(true);
+    const [value, kind] = this.found().slice(-2);
+    return { value, start, multipliers, kind: (["", "fold", "doubling"] as const)[kind] };
+  }
+
+  /** Half of how far the motion that was found swings. */
+  amplitude(): number {
+    return this.face.studio_amplitude();
+  }
+
+  /** The natural frequency (rad/s) under what is given; see studio_natural. */
+  natural(reference: number): number {
+    return this.face.studio_natural(reference);
   }
 
   turn(steps: number): Rows {

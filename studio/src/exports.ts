@@ -24,7 +24,15 @@ export function caseText(m: Mechanism, state: State, duration: number): string {
     return number < 0 || forced.has(chosen[number]);
   });
   const idle = new Set(m.freedoms.flatMap(({ initial }, n) => (free[n] ? [] : [initial[1]])));
+  const motor = m.given.filter((g) => g.kind === "motor");
+  const law = motor.map((g) => `${g.file!} = ${written(value(g, state))}`).join(", ");
+  // what acts: a motor beside the torque that is given
+  const acting = (g: Given, now: number): string =>
+    g.argument === motor[0]?.argument && value(motor[0], state) !== 0
+      ? `[${written(now)}, { kind = "induction-motor", ${law} }]`
+      : written(now);
   for (const given of m.given) {
+    if (given.kind === "motor") continue;
     const now = value(given, state);
     if (given.arguments) {
       const flag = chosen[modes.indexOf(given)];
@@ -32,7 +40,7 @@ export function caseText(m: Mechanism, state: State, duration: number): string {
     } else if (given.argument === undefined) {
       if (!idle.has(given.reference))
         lines.push(`${given.name} = ${given.choices ? String(now) : written(now)}`);
-    } else if (chosen.includes(given.argument)) lines.push(`${given.file!} = ${written(now)}`);
+    } else if (chosen.includes(given.argument)) lines.push(`${given.file!} = ${acting(given, now)}`);
     else if (now !== 0 && !modes.some((mode) => mode.arguments!.includes(given.argument!)))
       lines.push(`${given.file!} = ${written(now)}`);
   }

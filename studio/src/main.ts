@@ -1,7 +1,6 @@
 /** The studio: a state, what follows from it, and the parts of the page that show both. */
 
 import { Backdrop } from "./backdrop";
-import { Charts } from "./charts";
 import { bytesOf, Core, type Rows } from "./core";
 import { dxfText } from "./dxf";
 import { caseText, linkOf, parameterText, pixels, pythonText, save, stateIn, tableText } from "./exports";
@@ -21,6 +20,7 @@ import {
   type Tables,
 } from "./tables";
 import { digits, motionInWords, multiplierInWords, shown, verdictInWords } from "./words";
+import { Views } from "./views";
 import type { Answer } from "./worker";
 
 /** Steps of a turn and of a run between whose rows the page moves. */
@@ -68,7 +68,11 @@ class Studio {
       fault: (sentence) => this.fault(sentence),
     },
   );
-  private readonly charts = new Charts(by<HTMLElement>("charts"));
+  readonly charts = new Views(
+    by<HTMLElement>("charts"),
+    (values, start) => this.change(values, true, start),
+    this.tables.tolerance,
+  );
   private readonly panel = new Panel(by<HTMLElement>("panel"), {
     change: (name, value, done) => this.change({ [name]: value }, done),
     lock: (name, locked) => {
@@ -123,7 +127,7 @@ class Studio {
       this.time = 0;
       this.picture.show(mechanism);
       by("views").classList.toggle("planar", mechanism.picture.planar);
-      this.charts.show(mechanism, state.source ?? "steady");
+      this.charts.show(mechanism, state.source ?? "steady", bytes);
       this.python.show(mechanism, state);
     }
     if (view) this.view.show(mechanism.picture.planar, view);
@@ -147,10 +151,11 @@ class Studio {
     return this.core.run(1, 0);
   }
 
-  private compute(): void {
+  private compute(start?: number[]): void {
     const m = this.mechanism;
     const duration = this.duration();
     this.solver.ask({
+      start,
       given: givenOf(m, this.state.values),
       source: this.state.source ?? "steady",
       step: duration / RUN_STEPS,
@@ -198,10 +203,22 @@ class Studio {
     }
     by("words").textContent = motionInWords(this.mechanism, answer.rows, answer.source, answer.orbit);
     this.floquet(answer);
+    if (newest && !this.held) this.see(answer);
     this.seek(this.nearest());
     if (first) document.documentElement.dataset.ready = String(Math.round(performance.now()));
     document.documentElement.dataset.answer = String(answer.id);
     document.documentElement.dataset.settled = String(newest);
+  }
+
+  /** Let the charts that take longer see the motion that the page has come to. */
+  private see({ orbit }: Answer): void {
+    const m = this.mechanism;
+    let natural = Number.NaN;
+    if (m.natural !== null) {
+      this.core.give(givenOf(m, this.state.values));
+      natural = this.core.natural(m.natural);
+    }
+    this.charts.see({ mechanism: m, values: this.state.values, orbit, natural });
   }
 
   private floquet({ orbit, milliseconds }: Answer): void {
@@ -303,16 +320,16 @@ class Studio {
   // Changes
 
   /** Put another state; `done` when it is to be undone as one step. */
-  private put(state: State, done: boolean, computed = true): void {
+  private put(state: State, done: boolean, computed = true, start?: number[]): void {
     this.state = state;
     this.panel.update(state.values);
     if (done) this.history.keep(state);
     this.name();
-    if (computed) this.compute();
+    if (computed) this.compute(start);
   }
 
   /** Change what is given, where the links can be joined then; else all stays, and the page says why. */
-  private change(values: Record<string, number>, done: boolean): void {
+  private change(values: Record<string, number>, done: boolean, start?: number[]): void {
     const last = this.state;
     this.state = { ...last, values: { ...last.values, ...values } };
     const { sentence } = this.begin();
@@ -321,7 +338,7 @@ class Studio {
       this.state = last;
       this.panel.update(last.values);
       if (done) this.history.keep(last);
-    } else this.put(this.state, done);
+    } else this.put(this.state, done, true, start);
   }
 
   /** Keep the configuration that is drawn. */

@@ -2,6 +2,7 @@
 
 export interface Given {
   name: string;
+  /** Its value reference; of a motor, which the page's module has besides, below 0. */
   reference: number;
   text: string;
   start: number;
@@ -54,6 +55,22 @@ export interface Curve {
   of: number[];
 }
 
+/** Curves over a motion: each the root of squares of places in a row, counted from the outputs on. */
+export interface Chart {
+  title: string;
+  kind: "motion" | "power" | "forces";
+  unit: string;
+  factor: number;
+  curves: Curve[];
+}
+
+/** What is varied, and between which values (SI). */
+export interface Range {
+  reference: number;
+  low: number;
+  high: number;
+}
+
 export interface Freedom {
   coordinate: number;
   rate: number;
@@ -74,10 +91,14 @@ export interface Mechanism {
   /** Value reference of the tolerance of a run, and its value. */
   tolerance: [number, number];
   picture: Picture;
-  charts: { title: string; curves: Curve[] }[];
+  charts: Chart[];
   /** Outputs that swing with the motion. */
   moving: number[];
   transmission: number;
+  /** The reference of the stiffness of which there is a natural frequency; -1: it is in the energy, null: there is none. */
+  natural: number | null;
+  /** Name of the damping over which stability is charted. */
+  damping: string;
   sets: { name: string; source: string; values: Values }[];
 }
 
@@ -119,7 +140,7 @@ export interface Placement {
 }
 
 export const rowLength = (m: Mechanism): number =>
-  1 + m.states + m.outputs.length + 3 * m.picture.joints.length;
+  1 + m.states + m.outputs.length + 3 * m.picture.joints.length + 2;
 
 /** Places in a row: of an output, and of a joint. */
 export const outputAt = (m: Mechanism, output: number): number => 1 + m.states + output;

@@ -48,7 +48,10 @@ export function motionInWords(m: Mechanism, rows: Rows, source: Source, orbit: O
 }
 
 /** The verdict that the Floquet multipliers give. */
-export function verdictInWords(orbit: Orbit, tolerance: number): string {
+export function verdictInWords(
+  orbit: Pick<Orbit, "found" | "size" | "multipliers">,
+  tolerance: number,
+): string {
   if (!orbit.found) return "no periodic motion";
   if (orbit.size === 0) return "prescribed: no freedom is left that could be unstable";
   const margin = 1 - Math.hypot(...orbit.multipliers[0]);

@@ -1,6 +1,7 @@
-/** The work that takes longer than a frame: runs, periodic motions and their multipliers. */
+/** The work that takes longer than a frame: runs, periodic motions and their multipliers; and searches, in parts. */
 
 import { Core, type Orbit, type Rows } from "./core";
+import { type Exploration, follow, type Found, verdicts } from "./explore";
 import type { Mechanism, Source } from "./tables";
 
 export interface Task {
@@ -9,6 +10,8 @@ export interface Task {
   mechanism?: Mechanism;
   bytes?: ArrayBuffer;
   given: [number, number][];
+  /** Where the periodic motion is sought first, in the place of the one before. */
+  start?: number[];
   source: Source;
   step: number;
   count: number;
@@ -24,18 +27,57 @@ export interface Answer {
   milliseconds: number;
 }
 
+/** A search; without an exploration that before is given up. */
+export interface Search {
+  search: number;
+  mechanism?: Mechanism;
+  bytes?: ArrayBuffer;
+  exploration?: Exploration;
+}
+
+export interface Part {
+  search: number;
+  found: Found[];
+  done: boolean;
+}
+
+/** Time between two parts of what a search finds (ms). */
+const PART = 60;
+
 let core: Promise<Core> | undefined;
+let wanted = 0;
 
 async function answer(data: Task): Promise<void> {
-  if (data.mechanism && data.bytes) core = Core.make(data.mechanism, data.bytes);
   const made = await core!;
   const begun = performance.now();
   made.give(data.given);
-  const orbit = made.orbit(true);
+  const orbit = made.orbit(data.start);
   const source = orbit.found ? data.source : "run";
   const rows = source === "steady" ? made.turn(data.turnSteps) : made.run(data.step, data.count);
   const found: Answer = { id: data.id, orbit, rows, source, milliseconds: performance.now() - begun };
   postMessage(found, { transfer: [rows.values.buffer] });
 }
 
-addEventListener("message", ({ data }: MessageEvent<Task>) => void answer(data));
+async function search({ search: id, exploration }: Search): Promise<void> {
+  wanted = id;
+  if (!exploration) return;
+  const made = await core!;
+  let found: Found[] = [];
+  let last = performance.now();
+  for (const one of exploration.grid ? verdicts(made, exploration) : follow(made, exploration)) {
+    found.push(one);
+    if (performance.now() - last < PART) continue;
+    postMessage({ search: id, found, done: false } satisfies Part);
+    found = [];
+    // a newer search is heard of between two parts
+    await new Promise((resolve) => setTimeout(resolve));
+    if (wanted !== id) return;
+    last = performance.now();
+  }
+  postMessage({ search: id, found, done: true } satisfies Part);
+}
+
+addEventListener("message", ({ data }: MessageEvent<Task | Search>) => {
+  if (data.mechanism && data.bytes) core = Core.make(data.mechanism, data.bytes);
+  void ("search" in data ? search(data) : answer(data));
+});

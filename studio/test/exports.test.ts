@@ -20,6 +20,25 @@ test("a case has what acts, and no more", () => {
   assert.ok(!pushed.some((line) => line.startsWith("drive.speed")));
 });
 
+test("a motor is written beside the torque, where there is one", () => {
+  const plain = { text: "", section: "Drive and loads", unit: "", factor: 1, start: 0, argument: "torque" };
+  const fields = ["breakdown_torque", "breakdown_slip", "synchronous_speed"];
+  const motor = fields.map((file, n) => ({
+    ...plain,
+    name: `m.${file}`,
+    file,
+    kind: "motor",
+    reference: -1 - n,
+  }));
+  const mechanism = { ...WHEEL, given: [...WHEEL.given, ...motor] };
+  const values = { "drive.mode": 0, "drive.torque": 0.5, "m.breakdown_slip": 0.2, "m.synchronous_speed": 50 };
+  const lines = (torque: number): string[] =>
+    caseText(mechanism, { ...STATE, values: { ...values, "m.breakdown_torque": torque } }, 2).split("\n");
+  assert.ok(lines(0).includes("drive.torque = 0.5"));
+  const law = "breakdown_torque = 5.0, breakdown_slip = 0.2, synchronous_speed = 50.0";
+  assert.ok(lines(5).includes(`drive.torque = [0.5, { kind = "induction-motor", ${law} }]`));
+});
+
 test("parameter values are XML, with numbers of their kind and every digit", () => {
   const text = parameterText(WHEEL, { ...STATE, values: { "wheel.radius": 0.1 + 0.2 } });
   assert.match(text, /name="wheel.radius"><ssv:Real value="0.30000000000000004"/);
@@ -29,7 +48,7 @@ test("parameter values are XML, with numbers of their kind and every digit", () 
 
 test("a table has a line of names and one for each row", () => {
   const rows = {
-    values: Float64Array.of(0, 9, 1, 2, 0, 0, 0, 0.5, 9, 3, 4, 0, 0, 0),
+    values: Float64Array.of(0, 9, 1, 2, 0, 0, 0, 7, 8, 0.5, 9, 3, 4, 0, 0, 0, 7, 8),
     count: 2,
     sentence: "",
   };

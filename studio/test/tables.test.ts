@@ -4,7 +4,7 @@ import { givenOf, jointAt, outputAt, rowLength, stateFrom } from "../src/tables"
 import { STATE, TABLES, WHEEL } from "./wheel";
 
 test("a row holds time, state, outputs and places", () => {
-  assert.equal(rowLength(WHEEL), 1 + 1 + 2 + 3);
+  assert.equal(rowLength(WHEEL), 1 + 1 + 2 + 3 + 2);
   assert.equal(outputAt(WHEEL, 1), 3);
   assert.equal(jointAt(WHEEL, 0), 4);
 });

@@ -37,6 +37,8 @@ export const WHEEL: Mechanism = {
   charts: [],
   moving: [1],
   transmission: -1,
+  natural: null,
+  damping: "",
   sets: [],
 };
 

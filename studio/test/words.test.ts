@@ -10,11 +10,12 @@ const orbit = (first: [number, number]): Orbit => ({
   size: 1,
   period: 1,
   start: [],
+  place: 0,
   multipliers: [first],
 });
-/** Rows of time, state, angle, position and place. */
+/** Rows of time, state, angle, position, place and powers. */
 const rows = (...all: [number, number][]): Rows => ({
-  values: Float64Array.from(all.flatMap(([angle, position], n) => [n, 0, angle, position, 0, 0, 0])),
+  values: Float64Array.from(all.flatMap(([angle, position], n) => [n, 0, angle, position, 0, 0, 0, 0, 0])),
   count: all.length,
   sentence: "",
 });

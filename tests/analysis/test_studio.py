@@ -76,6 +76,8 @@ def _shown(page: Page) -> dict[str, Any]:
         *range(mechanism.size),
         *mechanism.output_names,
         *(f"{j.name}{axis}" for j in joints for axis in "xyz"),
+        "power.dissipated",
+        "power.supplied",
     ]
     values = np.array(shown["rows"]["values"]).reshape(shown["rows"]["count"], len(names))
     return shown | {"columns": dict(zip(names, values.T))}

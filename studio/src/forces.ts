@@ -1,0 +1,97 @@
+/** The force in a joint as a vector over the motion, with the envelope of all of them. */
+
+import type { Rows } from "./core";
+import { hull } from "./hull";
+import { type Interval, Plane } from "./plane";
+import { type Chart, type Mechanism, outputAt, rowLength } from "./tables";
+import { digits } from "./words";
+
+const HEIGHT = 300;
+
+export class Forces {
+  readonly box = document.createElement("figure");
+  private readonly joint = document.createElement("select");
+  private readonly sides = document.createElement("select");
+  private readonly words = document.createElement("div");
+  private readonly plane: Plane;
+  private mechanism!: Mechanism;
+  private chart: Chart | undefined;
+  private rows: Rows | undefined;
+  private row = 0;
+
+  constructor() {
+    const line = document.createElement("div");
+    line.className = "axes";
+    this.joint.setAttribute("aria-label", "Joint");
+    this.sides.setAttribute("aria-label", "Seen along");
+    for (const select of [this.joint, this.sides]) select.addEventListener("change", () => this.draw());
+    line.append("Force on ", this.joint, this.sides);
+    this.box.append(line);
+    this.plane = new Plane(this.box, HEIGHT);
+    this.plane.canvas.setAttribute("role", "img");
+    this.plane.onSize = () => this.draw();
+    this.words.className = "told";
+    this.box.append(this.words);
+  }
+
+  show(mechanism: Mechanism): void {
+    this.mechanism = mechanism;
+    this.chart = mechanism.charts.find((chart) => chart.kind === "forces");
+    this.joint.replaceChildren(
+      ...(this.chart?.curves ?? []).map(({ name }, n) => new Option(name, String(n))),
+    );
+    const spatial = this.chart?.curves.some(({ of }) => of.length > 2) ?? false;
+    this.sides.replaceChildren(...["x, y", "y, z", "x, z"].map((name) => new Option(name, name)));
+    this.sides.hidden = !spatial;
+  }
+
+  data(rows: Rows): void {
+    this.rows = rows;
+    this.draw();
+  }
+
+  mark(row: number): void {
+    this.row = row;
+    this.draw();
+  }
+
+  private draw(): void {
+    const { plane, rows, chart } = this;
+    const curve = chart?.curves[Number(this.joint.value)];
+    if (!rows?.count || !curve || this.box.clientWidth === 0) return;
+    const sides = this.sides.value.split(", ");
+    const length = rowLength(this.mechanism);
+    const places = sides.map((side) => {
+      const number = curve.of["xyz".indexOf(side)] as number | undefined;
+      return number === undefined ? -1 : outputAt(this.mechanism, number);
+    });
+    const points = Array.from({ length: rows.count }, (_, row): Interval => {
+      const [x, y] = places.map((place) => (place < 0 ? 0 : rows.values[row * length + place]));
+      return [x, y];
+    });
+    const sizes = points.map(([x, y]) => Math.hypot(x, y));
+    const most = sizes.indexOf(Math.max(...sizes));
+    const reach = 1.06 * sizes[most] || 1;
+    const [x, y] = [0, 1].map((axis): Interval => {
+      const all = points.map((point) => point[axis]);
+      return [Math.min(0, ...all) - 0.06 * reach, Math.max(0, ...all) + 0.06 * reach];
+    });
+    plane.frame(x, y, [`f${sides[0]} [N]`, `f${sides[1]} [N]`], true);
+    const c = plane.context;
+    const envelope = hull(points);
+    c.lineWidth = 1.2;
+    c.strokeStyle = plane.colour("soft");
+    plane.line([...envelope, ...envelope.slice(0, 1)], [5, 4]);
+    c.lineWidth = 2;
+    c.strokeStyle = plane.colour("accent");
+    plane.line(points);
+    c.strokeStyle = plane.colour("bad");
+    plane.line([[0, 0], points[Math.min(this.row, points.length - 1)]]);
+    const [fx, fy] = points[most];
+    const angle = (Math.atan2(fy, fx) * 180) / Math.PI;
+    this.words.textContent =
+      `Greatest ${digits(sizes[most])} N towards ${digits(angle, 3)} deg. Solid: the force over the motion, from its ` +
+      "origin at this instant; dashed: the envelope.";
+    plane.canvas.setAttribute("aria-label", `Force on ${curve.name} as a vector; ${this.words.textContent}`);
+  }
+}

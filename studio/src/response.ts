@@ -1,0 +1,182 @@
+/** How far the slider swings over the speed, or over what else varies: stable and unstable motions, folds, doublings, what to avoid. */
+
+import { amplitudeAt, type Arc, arcsOf, type Avoided, type Interval, jumpsOf, rangesToAvoid } from "./avoid";
+import type { Found, Point } from "./explore";
+import { called, type Context, driving, type Go, Search, swinging, valueOf } from "./search";
+import type { Given } from "./tables";
+import { digits, shown } from "./words";
+
+const HEIGHT = 260;
+/** How near a click must be to a motion to take it (px). */
+const REACH = 20;
+
+export class Response extends Search {
+  protected readonly grid = undefined;
+  /** Motions in the order of a branch, by the number of its part. */
+  private parts: Point[][] = [];
+  private sentences: string[] = [];
+  avoided: Avoided[] = [];
+
+  constructor(
+    go: Go,
+    private readonly tolerance: number,
+  ) {
+    super("Response: how far the slider swings over the speed", ["What varies"], HEIGHT, go);
+    this.plane.canvas.setAttribute("role", "slider");
+  }
+
+  protected first(context: Context): (Given | undefined)[] {
+    return [driving(context)];
+  }
+
+  protected clear(): void {
+    this.parts = [];
+    this.sentences = [];
+    this.avoided = [];
+    this.words.replaceChildren();
+  }
+
+  protected take(found: Found[], done: boolean): void {
+    for (const one of found)
+      if ("point" in one) (this.parts[one.part] ??= []).push(one.point);
+      else if ("sentence" in one) this.sentences.push(one.sentence);
+    this.done = done;
+    if (done) this.tell();
+    this.draw();
+  }
+
+  /** The branches: through the motion that is shown both ways, from the low end, from the high end. */
+  get branches(): Point[][] {
+    const [on, back, ...others] = [0, 1, 2, 3].map((part) => this.parts[part] ?? []);
+    return [[...back.slice(1).reverse(), ...on], ...others].filter((branch) => branch.length > 1);
+  }
+
+  private get arcs(): Arc[] {
+    return this.branches.flatMap((branch) => arcsOf(branch, this.tolerance));
+  }
+
+  protected paint(): void {
+    const { plane } = this;
+    const [{ given }] = this.axes;
+    const [{ low, high }] = this.ranges;
+    const output = swinging(this.context!);
+    const all = this.branches.flat();
+    const scale = (point: Point): Interval => [point.value * given!.factor, point.amplitude * output.factor];
+    const top =
+      1.08 * Math.max(1e-12, ...all.filter((p) => p.value >= low && p.value <= high).map((p) => scale(p)[1]));
+    const x: Interval = [low * given!.factor, high * given!.factor];
+    plane.frame(x, [0, top], [`${called(given!)} [${given!.unit}]`, `amplitude [${output.unit}]`]);
+    const c = plane.context;
+    c.strokeStyle = plane.colour("line");
+    for (const { low: from, high: to } of this.avoided)
+      plane.hatch([from * given!.factor, to * given!.factor], [0, top], 9);
+    for (const { stable, points } of this.arcs) {
+      c.strokeStyle = plane.colour(stable ? "accent" : "bad");
+      c.lineWidth = stable ? 2.4 : 1.4;
+      plane.line(points.map(scale), stable ? [] : [5, 4]);
+    }
+    c.fillStyle = plane.colour("text");
+    for (const point of all) {
+      if (!point.kind) continue;
+      const [px, py] = [plane.px(scale(point)[0]), plane.py(scale(point)[1])];
+      c.save();
+      c.translate(px, py);
+      if (point.kind === "doubling") c.rotate(Math.PI / 4);
+      c.fillRect(-4, -4, 8, 8);
+      c.restore();
+    }
+    const now = valueOf(given!, this.context!.values) * given!.factor;
+    c.lineWidth = 1.5;
+    c.strokeStyle = plane.colour("text");
+    plane.line([
+      [now, 0],
+      [now, top],
+    ]);
+    const { canvas } = plane;
+    canvas.setAttribute("aria-label", `${called(given!)}, with the amplitude over it`);
+    canvas.setAttribute("aria-valuemin", String(x[0]));
+    canvas.setAttribute("aria-valuemax", String(x[1]));
+    canvas.setAttribute("aria-valuenow", String(now));
+    canvas.setAttribute("aria-valuetext", `${digits(now)} ${given!.unit}`);
+  }
+
+  /** In words: where it swings, what to avoid, what happens at folds and doublings. */
+  private tell(): void {
+    const [{ given }] = this.axes;
+    const [{ low, high }] = this.ranges;
+    const output = swinging(this.context!);
+    const at = (value: number): string => shown(value, given!);
+    const { arcs } = this;
+    this.avoided = rangesToAvoid(arcs, low, high);
+    const speed = given!.unit === "rpm" ? "Speeds" : `Values of ${called(given!)}`;
+    const { natural } = this.context!;
+    const lines: string[] = [];
+    if (this.avoided.length > 0)
+      lines.push(
+        `${speed} to avoid: ${this.avoided.map((one) => `${at(one.low)} to ${at(one.high)} (${one.why})`).join("; ")}.`,
+      );
+    else if (arcs.length > 0) lines.push(`${speed} to avoid: none in this range.`);
+    for (const { value, rising, before, after } of jumpsOf(arcs)) {
+      const then = after.map((amplitude) => shown(amplitude, output)).join(" or ");
+      lines.push(
+        `Fold at ${at(value)}: where ${called(given!)} ${rising ? "rises" : "falls"} past it, the motion of ` +
+          `${shown(before, output)} ${then ? `jumps to ${then}` : "ends, and no other stable one was followed"}.`,
+      );
+    }
+    const doublings = this.branches.flat().filter((point) => point.kind === "doubling");
+    if (doublings.length > 0)
+      lines.push(`The period doubles at ${doublings.map((point) => at(point.value)).join(", ")}.`);
+    if (Number.isFinite(natural) && given!.unit === "rpm")
+      lines.push(`Natural frequency ${shown(natural, given!)} (mean effective mass).`);
+    for (const sentence of new Set(this.sentences)) lines.push(`A branch ends: ${sentence}.`);
+    lines.push(
+      "Solid: stable; dashed: unstable; square: fold; diamond: the period doubles; hatched: to avoid.",
+    );
+    this.words.replaceChildren(
+      ...lines.map((line) => {
+        const paragraph = document.createElement("p");
+        paragraph.textContent = line;
+        return paragraph;
+      }),
+    );
+  }
+
+  protected point(event: MouseEvent): void {
+    const [{ given }] = this.axes;
+    const output = swinging(this.context!);
+    const [x, y] = this.plane.at(event);
+    const away = (point: Point): number =>
+      Math.hypot(
+        this.plane.px(point.value * given!.factor) - this.plane.px(x),
+        this.plane.py(point.amplitude * output.factor) - this.plane.py(y),
+      );
+    let best: Point | undefined;
+    for (const point of this.branches.flat()) if (!best || away(point) < away(best)) best = point;
+    if (best && away(best) < REACH) this.go({ [given!.name]: best.value }, best.start);
+    else this.set(x / given!.factor);
+  }
+
+  /** Go to a value, within the range. */
+  private set(value: number): void {
+    const [{ given }] = this.axes;
+    const [{ low, high }] = this.ranges;
+    this.go({ [given!.name]: Math.max(low, Math.min(high, value)) });
+  }
+
+  protected press({ key, shiftKey }: KeyboardEvent): boolean {
+    const [{ low, high }] = this.ranges;
+    const sense = { ArrowLeft: -1, ArrowDown: -1, ArrowRight: 1, ArrowUp: 1 }[key];
+    if (sense === undefined) return false;
+    const now = valueOf(this.axes[0].given!, this.context!.values);
+    this.set(now + (sense * (shiftKey ? 10 : 1) * (high - low)) / 200);
+    return true;
+  }
+
+  /** The amplitude on the stable arcs at a value; for scripts. */
+  amplitudes(value: number): number[] {
+    const inside = this.arcs.filter(
+      ({ points }) => points[0].value <= value && value <= points[points.length - 1].value,
+    );
+    return inside.map((arc) => amplitudeAt(arc, value));
+  }
+}

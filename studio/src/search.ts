@@ -1,0 +1,251 @@
+/** What is common to charts that take seconds: what varies and between which values, a search that goes on beside the page. */
+
+import type { Orbit } from "./core";
+import type { Exploration, Found } from "./explore";
+import { Explorer } from "./explorer";
+import { Plane } from "./plane";
+import { type Given, type Mechanism, type Output, type Range, type Values, givenOf } from "./tables";
+import { digits } from "./words";
+
+/** How long all must stay as it is before a search begins anew (ms). */
+const REST = 250;
+/** Of speeds about the natural frequency, and of others about the value there is. */
+const ABOUT: [number, number] = [0.15, 2.3];
+const OTHERS: [number, number] = [0.1, 2];
+
+export interface Context {
+  mechanism: Mechanism;
+  values: Values;
+  orbit: Orbit;
+  natural: number;
+}
+
+/** Where the page is to go: values by name, and where the motion there is sought first. */
+export type Go = (values: Values, start?: number[]) => void;
+
+export const called = (given: Given): string => given.name.replaceAll(/[._]/g, " ");
+export const valueOf = (given: Given, values: Values): number => values[given.name] ?? given.start;
+
+/** What can vary: real parameters, and inputs that act. */
+function variables({ mechanism, values }: Context): Given[] {
+  const acts = (given: Given): boolean => {
+    const mode = mechanism.given.find((one) => one.arguments?.includes(given.argument ?? ""));
+    const chosen = !mode || mode.arguments![valueOf(mode, values)] === given.argument;
+    return chosen && (given.kind !== "motor" || hasMotor(mechanism, values));
+  };
+  return mechanism.given.filter((given) => !given.choices && given.section !== "Start" && acts(given));
+}
+
+const hasMotor = (mechanism: Mechanism, values: Values): boolean =>
+  mechanism.given.some((given) => given.reference === -1 && valueOf(given, values) !== 0);
+
+/** What drives the crank: its speed, its torque, or the field of its motor. */
+export function driving(context: Context): Given | undefined {
+  const { mechanism, values } = context;
+  const all = variables(context);
+  const motor = hasMotor(mechanism, values) ? all.find((given) => given.reference === -3) : undefined;
+  return (
+    motor ??
+    all.find((given) => given.freedom === mechanism.crank && given.unit === "rpm") ??
+    all.find((given) => given.freedom === mechanism.crank)
+  );
+}
+
+/** The output whose amplitude is meant, by its place in the state. */
+export function swinging({ mechanism: { freedoms, outputs }, orbit: { place } }: Context): Output {
+  return outputs[
+    place < freedoms.length ? freedoms[place].coordinate : freedoms[place - freedoms.length].rate
+  ];
+}
+
+interface Axis {
+  select: HTMLSelectElement;
+  ends: HTMLInputElement[];
+  given: Given | undefined;
+}
+
+export abstract class Search {
+  readonly box = document.createElement("figure");
+  protected readonly plane: Plane;
+  protected readonly words = document.createElement("div");
+  protected readonly axes: Axis[];
+  protected context: Context | undefined;
+  private readonly explorer = new Explorer((found, done) => this.take(found, done));
+  /** Ranges that were typed, by name. */
+  private readonly typed = new Map<string, [number, number]>();
+  private key = "";
+  private timer = 0;
+  private active = false;
+  /** Whether all was found. */
+  done = false;
+
+  constructor(
+    title: string,
+    names: string[],
+    height: number,
+    protected readonly go: Go,
+  ) {
+    const row = document.createElement("div");
+    row.className = "axes";
+    this.axes = names.map((name) => this.axis(row, name));
+    this.box.append(row);
+    this.plane = new Plane(this.box, height);
+    this.words.setAttribute("aria-live", "polite");
+    this.words.className = "told";
+    this.box.append(this.words);
+    this.box.setAttribute("aria-label", title);
+    this.plane.onSize = () => this.draw();
+    const { canvas } = this.plane;
+    canvas.tabIndex = 0;
+    canvas.setAttribute("aria-label", title);
+    canvas.addEventListener("click", (event) => this.point(event));
+    canvas.addEventListener("keydown", (event) => {
+      if (!this.press(event)) return;
+      event.preventDefault();
+      event.stopPropagation();
+    });
+  }
+
+  /** What is varied first: names of the axes. */
+  protected abstract first(context: Context): (Given | undefined)[];
+  /** The number of squares along each axis, of a chart. */
+  protected abstract readonly grid: [number, number] | undefined;
+  protected abstract clear(): void;
+  protected abstract take(found: Found[], done: boolean): void;
+  protected abstract paint(): void;
+  protected abstract point(event: MouseEvent): void;
+  /** Whether a key did something. */
+  protected abstract press(event: KeyboardEvent): boolean;
+
+  open(mechanism: Mechanism, bytes: ArrayBuffer): void {
+    this.explorer.use(mechanism, bytes);
+    for (const axis of this.axes) axis.given = undefined;
+    this.typed.clear();
+    this.context = undefined;
+    this.forget();
+  }
+
+  show(active: boolean): void {
+    this.active = active;
+    if (active) this.renew();
+    else this.forget();
+  }
+
+  /** The motion that is shown is another. */
+  see(context: Context): void {
+    this.context = context;
+    if (this.active) this.renew();
+  }
+
+  private forget(): void {
+    this.key = "";
+    clearTimeout(this.timer);
+    this.explorer.stop();
+  }
+
+  /** Search anew where another thing than what is varied has changed. */
+  private renew(): void {
+    const { context } = this;
+    if (!context) return;
+    this.choices(context);
+    const names = this.axes.map(({ given }) => given?.name);
+    const kept = Object.entries(context.values).filter(([name]) => !names.includes(name));
+    const ranges = this.axes.map(({ given }) => given && this.typed.get(given.name));
+    const key = JSON.stringify([kept, names, ranges, context.orbit.found]);
+    if (key !== this.key) {
+      this.forget();
+      this.key = key;
+      this.done = false;
+      this.box.classList.add("old");
+      this.timer = window.setTimeout(() => this.begin(), REST);
+    }
+    this.draw();
+  }
+
+  private begin(): void {
+    const { mechanism, values, orbit } = this.context!;
+    this.box.classList.remove("old");
+    this.clear();
+    this.ranges = this.axes.map(({ given }) => this.range(given!));
+    this.axes.forEach(({ ends, given }, n) =>
+      ends.forEach(
+        (end, i) => (end.value = digits((i ? this.ranges[n].high : this.ranges[n].low) * given!.factor, 4)),
+      ),
+    );
+    const [{ given }] = this.axes;
+    const task: Exploration = {
+      given: givenOf(mechanism, values),
+      axes: this.ranges,
+      start: orbit.start,
+      at: valueOf(given!, values),
+    };
+    if (this.grid) task.grid = this.grid;
+    this.explorer.ask(task);
+    this.draw();
+  }
+
+  protected ranges: Range[] = [];
+
+  private range(given: Given): Range {
+    const { natural, values } = this.context!;
+    const { reference } = given;
+    const value = valueOf(given, values);
+    const typed = this.typed.get(given.name);
+    if (typed) return { reference, low: typed[0], high: typed[1] };
+    const sign = value < 0 ? -1 : 1;
+    const speed = given.unit === "rpm" && Number.isFinite(natural);
+    const ends = speed
+      ? [Math.min(ABOUT[0] * natural, 0.9 * sign * value), Math.max(ABOUT[1] * natural, 1.1 * sign * value)]
+      : OTHERS.map((share) => share * (sign * value || given.nominal || 1));
+    const [low, high] = ends.map((end) => sign * end).sort((a, b) => a - b);
+    return { reference, low, high };
+  }
+
+  draw(): void {
+    if (this.context && this.active && this.ranges.length > 0) this.paint();
+  }
+
+  private axis(row: HTMLElement, name: string): Axis {
+    const box = document.createElement("span");
+    const select = document.createElement("select");
+    select.setAttribute("aria-label", name);
+    const axis: Axis = { select, ends: [], given: undefined };
+    select.addEventListener("change", () => {
+      axis.given = this.context!.mechanism.given.find((given) => given.name === select.value);
+      this.renew();
+    });
+    box.append(select);
+    for (const word of ["from", "to"]) {
+      const end = document.createElement("input");
+      end.type = "number";
+      end.step = "any";
+      end.setAttribute("aria-label", `${name}: ${word}`);
+      end.addEventListener("change", () => {
+        const [low, high] = axis.ends.map((one) => Number(one.value) / axis.given!.factor);
+        if (low < high) this.typed.set(axis.given!.name, [low, high]);
+        this.renew();
+      });
+      box.append(` ${word} `, end);
+      axis.ends.push(end);
+    }
+    row.append(box);
+    return axis;
+  }
+
+  /** The lists of what can vary, which follow what acts. */
+  private choices(context: Context): void {
+    const all = variables(context);
+    const first = this.first(context);
+    this.axes.forEach((axis, n) => {
+      if (!axis.given || !all.includes(axis.given)) axis.given = first[n] ?? all[n];
+      const names = all.map((given) => given.name);
+      if (names.join() !== Array.from(axis.select.options, (option) => option.value).join())
+        axis.select.replaceChildren(
+          ...all.map(
+            (given) => new Option(`${called(given)}${given.unit ? ` [${given.unit}]` : ""}`, given.name),
+          ),
+        );
+      axis.select.value = axis.given?.name ?? "";
+    });
+  }
+}
