@@ -31,6 +31,7 @@ from .constraints import (
 )
 from .drawing import drawing, plates
 from .forces import LeastPinForce, MaxPinForce, PinForces, pin_forces
+from .formulas import chebyshev_spacing, function_from_formula, path_from_formula
 from .functions import Generators, function_generators
 from .kinds import GEARS, Kind, Stroke, kind_of
 from .limit_positions import (
@@ -75,7 +76,7 @@ from .solve import (
     trade_off,
 )
 from .starts import CrankUnknown, PivotUnknown, SliderUnknown
-from .targets import TargetPath, chebyshev_spacing, function_from_formula, path_from_formula
+from .targets import TargetPath
 from .tasks import (
     Motion,
     PrecisionPoints,

@@ -30,8 +30,9 @@ from ..files import (
     text,
 )
 from ..units import quantity
+from .formulas import function_from_formula, path_from_formula
 from .quick_return import QuickReturn, QuickSwing
-from .targets import TargetPath, function_from_formula, path_from_formula
+from .targets import TargetPath
 from .tasks import (
     Motion,
     Objective,

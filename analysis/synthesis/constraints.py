@@ -419,7 +419,7 @@ def limits_of(
             raise InputError(f"constraint {c!r} is none: use {', '.join(_kinds())}")
     given = _ends(task, normal, bounds, constraints)
     _check_links(given, constraints, sliding)
-    _check_reach(given, normal)
+    _check_reach(given, normal, constraints)
     lows, highs = (np.array([given[name][end] for name in UNKNOWNS]) for end in (0, 1))
     shift, scale = np.zeros(len(UNKNOWNS)), np.ones(len(UNKNOWNS))
     shift[:2] = normal.origin.real, normal.origin.imag
@@ -555,17 +555,35 @@ def _check_links(given: Mapping[str, tuple[float, float]], constraints: Sequence
         )
 
 
-def _check_reach(given: Mapping[str, tuple[float, float]], normal: Normal) -> None:
+def _check_reach(given: Mapping[str, tuple[float, float]], normal: Normal, constraints: Sequence[Constraint]) -> None:
     """Make sure that the coupler point, which stays within crank and point distance of the shaft, can span the target."""
+    from shapely import MultiPoint, Polygon, box
+
+    (left, right), (bottom, top) = given["pivot_x"], given["pivot_y"]
+    room = box(left, bottom, right, top)
+    for c in constraints:
+        if isinstance(c, PivotRegion) and c.pivot == "A":
+            room = room.intersection(Polygon(c.polygon))
+    if room.is_empty:
+        raise InfeasibleError(
+            "the regions of pivot A and the bounds of its place have no point in common: pivot_x is to be "
+            f"{1e3 * left:.4g} to {1e3 * right:.4g} mm, pivot_y {1e3 * bottom:.4g} to {1e3 * top:.4g} mm"
+        )
     points = normal.points if normal.outline is None else normal.outline
     if points is None:
         return
-    x, y = points.real, points.imag
-    across = normal.unit * float(max(np.ptp(x), np.ptp(y)))
-    reach = 2.0 * (given["crank_length"][1] + given["point_distance"][1])
-    if reach < across:
+    across = normal.unit * float(max(np.ptp(points.real), np.ptp(points.imag)))
+    reach = given["crank_length"][1] + given["point_distance"][1]
+    ends = f"{1e3 * given['crank_length'][1]:.4g} mm and {1e3 * given['point_distance'][1]:.4g} mm"
+    if 2.0 * reach < across:
         raise InfeasibleError(
             f"the coupler point cannot span the target, {1e3 * across:.4g} mm across: crank and point distance, of at most "
-            f"{1e3 * given['crank_length'][1]:.4g} mm and {1e3 * given['point_distance'][1]:.4g} mm, keep it within "
-            f"{1e3 * reach:.4g} mm"
+            f"{ends}, keep it within {2e3 * reach:.4g} mm"
+        )
+    places = normal.origin + normal.unit * points
+    away = room.distance(MultiPoint(np.column_stack([places.real, places.imag])))
+    if away > reach:
+        raise InfeasibleError(
+            f"the coupler point cannot come to the target: the crank shaft is to be {1e3 * away:.4g} mm from it at least, and "
+            f"crank and point distance, of at most {ends}, reach {1e3 * reach:.4g} mm"
         )

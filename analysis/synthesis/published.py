@@ -24,8 +24,9 @@ from numpy.typing import NDArray
 from linkwork.five_bar.published import CM_PER_METRE
 
 from .constraints import USUAL, Constraint, FullTurn, LargestLink
+from .formulas import path_from_formula
 from .linkage import Linkage
-from .targets import TargetPath, path_from_formula
+from .targets import TargetPath
 from .tasks import RockerFunction, Straight, Task, TimedPath, UntimedPath, turn
 
 CM2_PER_M2 = CM_PER_METRE**2

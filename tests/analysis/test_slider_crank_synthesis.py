@@ -22,6 +22,7 @@ from analysis.synthesis import (
     Make,
     MaxPinForce,
     MechanicalAdvantage,
+    Motion,
     NoToggle,
     Search,
     SecondCrank,
@@ -114,6 +115,21 @@ def test_the_advantage_is_the_ratio_of_speeds(linkage: Linkage, rotation: float)
 
 def best(*constraints: Any, task: Any = TASK) -> Solution:
     return synthesize(task, constraints=constraints, search=QUICK).best
+
+
+@pytest.mark.parametrize("body", [False, True])
+def test_the_greatest_error_of_a_slider_crank_is_made_small(body: bool) -> None:
+    """Of a function of the slider, and of a body that is carried by the coupler."""
+    points = np.column_stack([0.2 + 0.1 * np.cos(PHI[:8]), 0.15 + 0.05 * np.sin(PHI[:8])])
+    task = Motion(points=points, angle=np.linspace(0.0, 0.5, 8), rotation=PHI[:8]) if body else TASK
+    plain, flat = (
+        synthesize(replace(task, objective=objective), kinds=("slider-crank",), search=QUICK).best
+        for objective in ("error", "worst")
+    )
+    assert flat.value == pytest.approx(flat.evaluation.worst)
+    assert flat.value < 0.95 * plain.evaluation.worst
+    # several are the greatest at once
+    assert np.sum(flat.evaluation.combined > 0.999 * flat.value) >= 3
 
 
 def test_an_advantage_and_a_dead_centre_are_kept() -> None:

@@ -14,7 +14,8 @@ from scipy.special import ellipe
 
 from analysis.files import read_points, write_csv
 from analysis.synthesis import TargetPath, distance_to, function_from_formula, path_from_formula
-from analysis.synthesis.targets import even_odd_area, formula
+from analysis.synthesis.formulas import formula
+from analysis.synthesis.targets import even_odd_area
 from linkwork.errors import InputError, ParameterError, UnknownNameError
 
 T = np.linspace(0.0, 2.0 * pi, 400, endpoint=False)
