@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 import re
+import sys
+from pathlib import Path
 from typing import Any
 
 from latex2mathml.converter import convert
 
 from analysis.cli import COMMANDS
 from linkwork import __version__
+
+sys.path.insert(0, str(Path(__file__).parent))
+import openings  # noqa: E402
 
 project = "Linkwork"
 author = copyright = "The Linkwork developers"
@@ -21,6 +26,7 @@ html_title = f"Linkwork {__version__}"
 html_static_path = ["site.css"]
 html_css_files = ["site.css"]
 html_copy_source = False
+html_extra_path = ["../analysis/studio/page.html"]  # the studio, which the links of `openings` open
 
 myst_enable_extensions = ["dollarmath"]
 myst_heading_anchors = 3
@@ -73,9 +79,17 @@ def list_commands(app: Any, name: str, text: list[str]) -> None:
         text[0] += f"\n```{{eval-rst}}\n.. click:: {function}\n   :prog: linkwork {command}\n   :nested: full\n```\n"
 
 
+def open_in_the_studio(app: Any, name: str, text: list[str]) -> None:
+    """Put links to what a page is about under its heading."""
+    heading, line, rest = text[0].partition("\n")
+    if "/" not in name and (found := openings.links(name, text[0])):
+        text[0] = f"{heading}{line}\n{found}\n{rest}"
+
+
 def setup(app: Any) -> None:
     """Connect what this file adds to Sphinx."""
     app.add_html_math_renderer("mathml", (write_formula, None), (write_formula, None))
     app.connect("source-read", lambda app, name, text: relink(text))
     app.connect("source-read", list_commands)
+    app.connect("source-read", open_in_the_studio)
     app.connect("include-read", lambda app, path, name, text: relink(text))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import importlib.util
 import json
 import pkgutil
@@ -15,8 +16,10 @@ from pathlib import Path
 import pytest
 import yaml
 
+from analysis.mechanisms import PUBLISHED
 from analysis.studies import RAHMAN, YOUSSEF
 from analysis.studies.study import FAILS, UNJUDGED
+from analysis.studio import PAGE, case_of
 from linkwork import __version__
 
 from .studies.results import tables
@@ -247,6 +250,33 @@ def test_there_is_a_short_notebook_without_outputs_for_each_kind_of_user():
         assert not any(cell.get("outputs") or cell.get("execution_count") for cell in cells), path.name
 
 
+@pytest.fixture(scope="module")
+def openings():
+    spec = importlib.util.spec_from_file_location("openings", ROOT / "docs" / "openings.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def test_every_published_set_and_example_opens_in_the_studio(openings):
+    """But for one whose torque varies over the angle, and one whose answer is no mechanism of the FMUs; the states are cases, and the pages that are about them have their links.
+
+    A task opens with its answer, which `docs/openings.py` finds.
+    """
+    examples = {path.stem for path in (ROOT / "examples").glob("*.toml")}
+    assert {*PUBLISHED} <= {*openings.states()} <= {*PUBLISHED, *examples} - {"torsion-bar", "kinds"}
+    for name, state in openings.states().items():
+        assert case_of(state).title == state["title"], name
+    pages = {page.stem: page.read_text(encoding="utf-8") for page in (ROOT / "docs").glob("*.md")}
+    assert {*openings.SETS} <= {*pages}
+    shown = {name for page, text in pages.items() if page != "studio" for name in openings.named(page, text)}
+    assert shown == {*openings.states()}
+    for page, text in pages.items():
+        for address in re.findall('href="([^"]+)"', openings.links(page, text)):
+            kept = base64.urlsafe_b64decode(address.partition("#state=")[2] + "==")
+            assert case_of(json.loads(kept)).parameters
+
+
 @pytest.mark.slow
 @pytest.mark.fmu
 def test_the_site_builds_without_a_warning_and_needs_no_network(tmp_path):
@@ -264,6 +294,8 @@ def test_the_site_builds_without_a_warning_and_needs_no_network(tmp_path):
     pages = {path.relative_to(site).as_posix(): path.read_text(encoding="utf-8") for path in site.rglob("*.html")}
     loaded = re.compile(r"""<(?:script|img|link)[^>]+(?:src|href)=["'](?:https?:)?//""")
     assert [name for name, page in pages.items() if loaded.search(page)] == []
+    assert pages["page.html"] == PAGE.read_text(encoding="utf-8")
+    assert 'href="page.html#state=' in pages["rig-2.html"]
     assert "<mover>" in pages["nomenclature.html"]  # a formula
     assert "simulate" in pages["reference/analysis.run.html"]
     assert "--published" in pages["reference/commands.html"]

@@ -1,6 +1,17 @@
 """The studio: a page on which mechanisms move, can be dragged, and tell the truth, by the same equations as WebAssembly."""
 
-from .page import PAGE, build_page, fresh, page_of
+from .page import PAGE, address_of, build_page, fresh, page_of
 from .state import OPENING, case_of, given_values, opening_state, state_of
 
-__all__ = ["OPENING", "PAGE", "build_page", "case_of", "fresh", "given_values", "opening_state", "page_of", "state_of"]
+__all__ = [
+    "OPENING",
+    "PAGE",
+    "address_of",
+    "build_page",
+    "case_of",
+    "fresh",
+    "given_values",
+    "opening_state",
+    "page_of",
+    "state_of",
+]

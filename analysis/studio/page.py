@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import hashlib
 import json
 import re
@@ -95,6 +96,22 @@ def page_of(state: Mapping[str, Any]) -> str:
     if f'"name":"{state["mechanism"]}"' not in page:
         page = build_page(page, [MECHANISMS[state["mechanism"]]])
     return _with(page, "state", state)
+
+
+def address_of(state: Mapping[str, Any], page: str) -> str:
+    """Address of the page with a state, as the page itself writes it; values that are as at the start are left out.
+
+    Parameters
+    ----------
+    state : mapping
+        Of a mechanism that the page has.
+    page : str
+        Address of the page itself.
+    """
+    start = {variable.name: variable.start for variable in MECHANISMS[state["mechanism"]].variables}
+    values = {name: value for name, value in state["values"].items() if value != start.get(name)}
+    text = json.dumps(dict(state) | {"values": values}, separators=(",", ":"), ensure_ascii=False)
+    return f"{page}#state={base64.urlsafe_b64encode(text.encode()).decode().rstrip('=')}"
 
 
 def main() -> None:

@@ -3,6 +3,7 @@
 import { Backdrop } from "./backdrop";
 import { bytesOf, Core, type Rows } from "./core";
 import { dxfText } from "./dxf";
+import { Embed } from "./embed";
 import { caseText, linkOf, parameterText, pixels, pythonText, save, stateIn, tableText } from "./exports";
 import { History } from "./history";
 import { Panel } from "./panel";
@@ -80,13 +81,11 @@ class Studio {
       this.put({ ...this.state, locks: locked ? [...others, name] : others }, true);
     },
   });
+  private embed!: Embed;
   private readonly solver = new Solver((answer, newest) => this.answered(answer, newest));
   private readonly python = new WithPython(by<HTMLElement>("python"), this.view, {
     state: () => ({ ...this.state, duration: this.duration() }),
-    take: (state) => {
-      this.history.keep(state);
-      void this.restore(state);
-    },
+    take: (state) => this.take(state),
     rows: () => this.answer?.rows,
   });
   private numbers: HTMLTableCellElement[] = [];
@@ -102,6 +101,11 @@ class Studio {
     this.history = new History<State>(JSON.stringify(this.state));
     await this.open(this.state);
     if (wrong) this.fault(wrong);
+    this.embed = new Embed(
+      this.tables,
+      (state) => this.take(state),
+      (sentence) => this.fault(sentence),
+    );
     let last = performance.now();
     const frame = (now: number): void => {
       this.advance((now - last) / 1000);
@@ -143,6 +147,7 @@ class Studio {
     this.fault(sentence);
     this.compute();
     this.name();
+    this.embed?.tell(this.state);
   }
 
   /** The links at the start, from what is given, with the sentence where they cannot be joined. */
@@ -323,7 +328,10 @@ class Studio {
   private put(state: State, done: boolean, computed = true, start?: number[]): void {
     this.state = state;
     this.panel.update(state.values);
-    if (done) this.history.keep(state);
+    if (done) {
+      this.history.keep(state);
+      this.embed.tell(state);
+    }
     this.name();
     if (computed) this.compute(start);
   }
@@ -389,6 +397,12 @@ class Studio {
     const turns = row[outputAt(m, freedom.coordinate)] / freedom.period;
     const { values, count } = this.answer!.rows;
     return values[Math.round((turns - Math.floor(turns)) * (count - 1)) * rowLength(m)];
+  }
+
+  /** Show a state that comes from elsewhere, as a step that can be undone. */
+  private take(state: State): void {
+    this.history.keep(state);
+    void this.restore(state);
   }
 
   /** Show another state; for scripts too. */
@@ -461,9 +475,7 @@ class Studio {
       const [mechanism, name] = sets.value.split("/");
       const set = this.tables.mechanisms.find((m) => m.name === mechanism)?.sets.find((s) => s.name === name);
       if (!set) return;
-      const state: State = { mechanism, title: set.source, values: { ...set.values } };
-      this.history.keep(state);
-      void this.restore(state);
+      this.take({ mechanism, title: set.source, values: { ...set.values } });
     });
     const actions: Record<string, () => void> = {
       play: () => this.play(!this.moving),
@@ -478,8 +490,7 @@ class Studio {
     addEventListener("hashchange", () => {
       try {
         const state = stateIn(location.href, this.tables);
-        if (state) this.history.keep(state);
-        void this.restore(state);
+        if (state) this.take(state);
       } catch (error) {
         this.fault((error as Error).message);
       }

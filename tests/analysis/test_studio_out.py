@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import http.server
+import importlib.util
 import re
 import shutil
 import subprocess
@@ -21,9 +22,9 @@ from PIL import Image
 from analysis.export import interface
 from analysis.mechanisms import MECHANISMS, PUBLISHED
 from analysis.run import Case, Inputs
-from analysis.studio import PAGE, opening_state, state_of
+from analysis.studio import PAGE, address_of, opening_state, state_of
 
-from .test_studio import _drag, _given, _load, _opened, _pin, _saved, browser, in_browser, page  # noqa: F401
+from .test_studio import _drag, _given, _load, _opened, _pin, _saved, in_browser, page  # noqa: F401
 
 ROOT = Path(__file__).parents[2]
 WIDE, PHONE = {"width": 1400, "height": 1000}, {"width": 390, "height": 844}
@@ -367,7 +368,28 @@ def test_links_are_told_apart_without_colour_vision() -> None:
             assert (pair[1] + 0.05) / (pair[0] + 0.05) >= least, name
 
 
-# From a server, and its sources
+# From a server and from the documentation, and its sources
+
+
+@in_browser
+def test_what_the_documentation_links_to_opens(browser: Any) -> None:  # noqa: F811
+    spec = importlib.util.spec_from_file_location("openings", ROOT / "docs" / "openings.py")
+    assert spec is not None
+    assert spec.loader is not None
+    openings = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(openings)
+    page = _opened(browser, PAGE)  # noqa: F811
+    for name, state in openings.states().items():
+        before = page.evaluate("Number(document.documentElement.dataset.answer)")
+        page.evaluate("address => { location.href = address }", address_of(state, PAGE.as_uri()))
+        page.wait_for_function(
+            f"Number(document.documentElement.dataset.answer) > {before} && document.documentElement.dataset.settled === 'true'"
+        )
+        assert page.inner_text("#title") == state["title"], name
+        assert page.inner_text("#fault") == "", name
+        assert page.evaluate("window.studio.shown().rows.count") > 1, name
+        page.evaluate("document.documentElement.dataset.settled = ''")
+    page.close()
 
 
 @in_browser
