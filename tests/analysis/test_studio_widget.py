@@ -65,7 +65,7 @@ def test_the_cell_of_the_documentation_runs(capsys: pytest.CaptureFixture[str]) 
     names: dict[str, Any] = {}
     exec(cell, names)
     assert names["found"].parameters.slider_stiffness == 2000.0
-    assert "period" in capsys.readouterr().out
+    assert "PeriodicOrbit" in capsys.readouterr().out
 
 
 #: What a notebook is to a widget: a model with traits, and a place on the page.
