@@ -148,7 +148,10 @@ def _linkages(case: Case, wanted: _Linkages) -> Answer:
         )
         title = f"Linkage {rank} for a path that was drawn"
         made = case_from(Make().run_case(solution, title), folder=Path(), title=title)
-        states.append(state_of(made))
+        state = state_of(made)
+        # the path says nothing of the way in which the crank turns, and the page seeks periodic motions of one way
+        state["values"]["drive.speed"] = abs(state["values"]["drive.speed"])
+        states.append(state)
         curves.append(_turned(np.array(wanted.points), solution.linkage).tolist())
     headings = ["", "area [mm²]", "worst [mm]", "transmission [deg]", "longest link [mm]", ""]
     return {
