@@ -85,7 +85,7 @@ class Drive:
         """Whether the speed is prescribed."""
         return self.speed is not None
 
-    def arguments(self, mechanism: Mechanism) -> dict[str, str]:
+    def arguments(self, mechanism: Mechanism) -> Mapping[str, str]:
         """What drives each freedom that has a mode: the mode's name, and the one of its `Mode.arguments`.
 
         Raises
@@ -93,22 +93,7 @@ class Drive:
         InputError
             If a mode is not one of a freedom beside the crank, or has no such value.
         """
-        found, crank = {}, crank_of(mechanism)
-        others = {f.mode.name: f.mode for n, f in enumerate(mechanism.freedoms) if f.mode and n != crank.freedom}
-        for name, value in self.modes.items():
-            if name not in others or value not in range(len(others[name].values)):
-                raise InputError(f"{name} = {value} is no mode of a {mechanism.name} that a drive can have")
-        for number, freedom in enumerate(mechanism.freedoms):
-            if (mode := freedom.mode) is None:
-                continue
-            if mode.name in self.modes:
-                found[mode.name] = mode.arguments[self.modes[mode.name]]
-                continue
-            kind = "command" if number == crank.freedom and self.speed_drive else "force"
-            channel = next((c for c in mechanism.channels if c.freedom == number and c.kind == kind), None)
-            acts = channel is not None and (number == crank.freedom or channel.name in self.forces)
-            found[mode.name] = channel.argument if acts and channel else mode.arguments[mode.default]
-        return found
+        return _arguments(mechanism, self.speed_drive, tuple(self.forces), tuple(self.modes.items()))
 
     def flow(self, mechanism: Mechanism) -> Flow:
         """The mechanism's flow, driven in this way.
@@ -176,6 +161,29 @@ class Drive:
         for argument in self.arguments(mechanism).values():
             acting.setdefault(argument, 0.0 if argument in known else True)
         return Inputs(**acting)
+
+
+@cache
+def _arguments(
+    mechanism: Mechanism, speed_drive: bool, forces: tuple[str, ...], modes: tuple[tuple[str, int], ...]
+) -> Mapping[str, str]:
+    """See `Drive.arguments`, which is asked again and again along a branch."""
+    found, crank, own = {}, crank_of(mechanism), dict(modes)
+    others = {f.mode.name: f.mode for n, f in enumerate(mechanism.freedoms) if f.mode and n != crank.freedom}
+    for name, value in modes:
+        if name not in others or value not in range(len(others[name].values)):
+            raise InputError(f"{name} = {value} is no mode of a {mechanism.name} that a drive can have")
+    for number, freedom in enumerate(mechanism.freedoms):
+        if (mode := freedom.mode) is None:
+            continue
+        if mode.name in own:
+            found[mode.name] = mode.arguments[own[mode.name]]
+            continue
+        kind = "command" if number == crank.freedom and speed_drive else "force"
+        channel = next((c for c in mechanism.channels if c.freedom == number and c.kind == kind), None)
+        acts = channel is not None and (number == crank.freedom or channel.name in forces)
+        found[mode.name] = channel.argument if acts and channel else mode.arguments[mode.default]
+    return found
 
 
 @cache

@@ -130,8 +130,6 @@ class PeriodicOrbit(Shown):
         How many other periodic motions of the same period there are, as far as was sought; None where it was not asked.
     nearest : float or None
         How near the links come to the limit of assembly, as `clearance` has it, where that was computed on the way.
-    multipliers : ndarray of complex, shape (n,)
-        Floquet multipliers, the largest first.
     """
 
     parameters: Parameters
@@ -144,12 +142,13 @@ class PeriodicOrbit(Shown):
     stations: Stations | None = None
     others: int | None = None
     nearest: float | None = None
-    multipliers: NDArray[np.complex128] = field(init=False)
-    # `amplitude`, once it has been asked for
+    # `amplitude` and `multipliers`, once they have been asked for
     _amplitude: list[float] = field(default_factory=list, init=False)
+    _multipliers: list[NDArray[np.complex128]] = field(default_factory=list, init=False)
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "multipliers", multipliers(self.monodromy))
+        if not np.isfinite(self.monodromy).all():
+            raise InputError("a monodromy matrix is not finite")
 
     def __repr__(self) -> str:
         try:
@@ -172,6 +171,13 @@ class PeriodicOrbit(Shown):
     def swing(self) -> tuple[str, str]:
         """What the amplitude is of, as messages call it, and its unit: ``("u", "m")`` of a five-bar."""
         return self.flow.labels[0], self.flow.components[0][1]
+
+    @property
+    def multipliers(self) -> NDArray[np.complex128]:
+        """Floquet multipliers, the largest first, shape (n,)."""
+        if not self._multipliers:
+            self._multipliers.append(multipliers(self.monodromy))
+        return self._multipliers[0]
 
     @property
     def largest(self) -> float:
