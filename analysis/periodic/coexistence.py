@@ -194,21 +194,17 @@ def _motions_of(guesses: NDArray[np.float64], row: Sequence[Operation]) -> NDArr
     period, m, n = drives[0].flow(mechanism_of(parameters[0])).period, len(row), guesses.shape[1]
     starts, counts = np.full((m, MOST_ORBITS, n), np.nan), np.zeros(m, dtype=np.int64)
     monodromies, swings = np.full((m, MOST_ORBITS, n * n), np.nan), np.full((m, MOST_ORBITS, SAMPLES), np.nan)
-    section, numbers, vectors, scales = row_of(parameters, drives, guesses[0], VARIATIONAL, PLAIN)
+    section, *points = row_of(parameters, drives, guesses[0], VARIATIONAL, PLAIN)
     coexistence_kernels.solve_all(
         section,
         NO_SOURCE,
-        numbers,
-        vectors,
-        scales,
+        tuple(points),
         period,
         MOST_ITERATIONS,
         SEARCH_TOLERANCE,
         np.linspace(0.0, period, SAMPLES, endpoint=False),
         guesses,
-        starts,
-        monodromies,
-        swings,
+        (starts, monodromies, swings),
         counts,
     )
     largest = np.full((m, MOST_ORBITS), np.nan)

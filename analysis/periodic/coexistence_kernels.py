@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numba import float64, int64, types
 
-from ..numerics.codegen import MATRIX, VECTOR, kernel, part
+from ..numerics.codegen import CUBE, MATRIX, VECTOR, kernel, part
 from ..run.sources import SOURCE
 from .orbit_kernels import DONE, SECTION, advance, deflated, magnitude, make_room, newton, numbered
 from .starts import SAME
@@ -15,7 +15,7 @@ MOST_ORBITS = 8
 
 
 @part
-def _is_known(start, known, scale):  # type: ignore[no-untyped-def]
+def _is_known(start, known, scale):
     """Whether a start is among the known ones."""
     found = False
     for k in range(known.shape[0]):
@@ -25,14 +25,12 @@ def _is_known(start, known, scale):  # type: ignore[no-untyped-def]
 
 @kernel(
     types.void(
-        SECTION, SOURCE, MATRIX, MATRIX, MATRIX, float64, int64, float64, VECTOR, MATRIX, float64[:, :, ::1],
-        float64[:, :, ::1], float64[:, :, ::1], int64[::1],
+        SECTION, SOURCE, types.UniTuple(MATRIX, 3), float64, int64, float64, VECTOR, MATRIX, types.UniTuple(CUBE, 3),
+        int64[::1],
     ),
     purpose="grids of coexisting motions",
 )  # fmt: skip
-def solve_all(  # type: ignore[no-untyped-def]
-    section, source, parameters, drives, scales, end, most, loose, angles, guesses, starts, monodromies, swings, counts
-):  # fmt: skip
+def solve_all(section, source, rows, end, most, loose, angles, guesses, found, counts):
     """All orbits of each of a row of mechanisms, as far as they are found: see `solve_row` for what is not said here.
 
     Each point's orbits are sought from those of the point before, then from every guess with the known ones divided out.
@@ -41,11 +39,12 @@ def solve_all(  # type: ignore[no-untyped-def]
     ----------
     angles : ndarray, shape (samples,)
         Crank angles at which the first component of y is taken.
-    starts, monodromies, swings : ndarray, shapes (m, MOST_ORBITS, n), (m, MOST_ORBITS, n n) and (m, MOST_ORBITS, samples)
-        Written.
+    found : tuple of ndarray, shapes (m, MOST_ORBITS, n), (m, MOST_ORBITS, n n) and (m, MOST_ORBITS, samples)
+        Starts, monodromy matrices, and that component at these angles; written.
     counts : ndarray of int64, shape (m,)
         Orbits of each; written.
     """
+    (parameters, drives, scales), (starts, monodromies, swings) = rows, found
     n = guesses.shape[1]
     z, single = np.empty(n * (1 + n)), np.empty(n)
     report, carry = np.zeros(3), np.array([0.1, 0.0])
@@ -91,7 +90,7 @@ LOST, UNSETTLED = -1, -2
     types.void(SECTION, SOURCE, float64, float64, int64, MATRIX, MATRIX, int64[::1]),
     purpose="basins of attraction",
 )
-def basins_of(section, source, turn, near, most, starts, known, ends):  # type: ignore[no-untyped-def]
+def basins_of(section, source, turn, near, most, starts, known, ends):
     """Which of the known motions each start ends in, followed turn by turn.
 
     Parameters

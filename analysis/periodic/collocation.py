@@ -14,12 +14,12 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import boolean, float64, int64
+from numba import boolean, float64, int64, types
 from numpy.typing import NDArray
 
 from linkwork.limits import LIMIT_SINE
 
-from ..numerics.codegen import MATRIX, VECTOR, evaluate, inner, kernel, part
+from ..numerics.codegen import CUBE, MATRIX, VECTOR, evaluate, inner, kernel, part
 from ..numerics.gauss import gauss
 from ..run.sources import SOURCE
 from .flows import DIRECTIONAL, GAP, PLAIN, VARIATIONAL
@@ -133,12 +133,13 @@ def at_node(s, h, pace, y, w, z):
 
 
 @inner
-def condense(section, angle, h, pace, y, w, bench, end, matrix, slope, moves):
+def condense(section, angle, h, pace, y, w, bench, into):
     """Linearise an element about the slopes w, shape (NODES, f), and eliminate them; whether it could be.
 
-    Written are y at its end with the slopes corrected for this beginning, shape (n,), its derivatives by the beginning, (n, n),
-    and by lambda, (n,), and the corrections and derivatives of the slopes, (NODES f, 1 + n (+ 1)).
+    Written are ``into`` y at its end with the slopes corrected for this beginning, shape (n,), its derivatives by the
+    beginning, (n, n), and by lambda, (n,), and the corrections and derivatives of the slopes, (NODES f, 1 + n (+ 1)).
     """
+    end, matrix, slope, moves = into
     n = y.shape[0]
     f = n // 2
     size = NODES * f
@@ -223,12 +224,13 @@ def tail_of(h, scale, along, w, moves):
 
 
 @inner
-def correct(section, angles, y, w, bench, ends, matrices, slopes, moves, monodromy, report):
+def correct(section, angles, y, w, desk):
     """One correction of beginnings y, shape (m, n), and slopes w, (m, NODES, f), of a period; its size relative to the scale.
 
-    Written are what `condense` gives of each element, the monodromy matrix before the correction, and the decay of the Legendre
-    coefficients into ``report[0]``. Returns NaN where there is no correction.
+    Written on the desk are what `condense` gives of each element, the monodromy matrix before the correction, and the decay of
+    the Legendre coefficients into ``report[0]``. Returns NaN where there is no correction.
     """
+    bench, ends, matrices, slopes, moves, monodromy, report = desk
     m, n = y.shape
     f = n // 2
     scale = section.scale
@@ -240,7 +242,8 @@ def correct(section, angles, y, w, bench, ends, matrices, slopes, moves, monodro
             monodromy[i, j] = 1.0 if i == j else 0.0
     for e in range(m):
         h = angles[e + 1] - angles[e]
-        if not condense(section, angles[e], h, pace, y[e], w[e], bench, ends[e], matrices[e], slopes[e], moves[e]):
+        into = ends[e], matrices[e], slopes[e], moves[e]
+        if not condense(section, angles[e], h, pace, y[e], w[e], bench, into):
             return np.nan
         report[0] = max(report[0], tail_of(h, scale, section.along, w[e], moves[e]))
         after = y[(e + 1) % m]
@@ -316,13 +319,14 @@ def least_gap(section, angles, y, w, bench, gap):
 
 
 class Desk(NamedTuple):
-    """Room to work in for a period: that of an element, what `condense` writes of each, the decay of the coefficients."""
+    """Room to work in for a period: that of an element, what `condense` writes of each, and what `correct` does."""
 
     bench: Bench
     ends: NDArray[np.float64]
     matrices: NDArray[np.float64]
     slopes: NDArray[np.float64]
     moves: NDArray[np.float64]
+    monodromy: NDArray[np.float64]
     report: NDArray[np.float64]
 
 
@@ -335,31 +339,20 @@ def make_desk(n, most):
         np.zeros((most, n, n)),
         np.zeros((most, n)),
         np.zeros((most, NODES * (n // 2), 1 + n)),
+        np.zeros((n, n)),
         np.zeros(1),
     )
 
 
 @part
-def close(section, angles, y, w, desk, monodromy, room):
+def close(section, angles, y, w, desk, room):
     """Newton's method for beginnings y and slopes w of a period that closes; how it ended.
 
     NO_STEP says that the elements are too few.
     """
     before = 0.0
     for count in range(_CORRECTIONS):
-        size = correct(
-            section,
-            angles,
-            y,
-            w,
-            desk.bench,
-            desk.ends,
-            desk.matrices,
-            desk.slopes,
-            desk.moves,
-            monodromy,
-            desk.report,
-        )
+        size = correct(section, angles, y, w, desk)
         if not size <= (0.5 * before if count else _FAR):
             return DIVERGED
         if size <= 100.0 * section.tolerance:
@@ -400,16 +393,12 @@ def spread(section, source, angles, start, y, w, room):
         MATRIX,
         float64,
         boolean,
-        MATRIX,
-        float64[:, :, ::1],
-        float64[:, :, ::1],
-        MATRIX,
-        VECTOR,
-        VECTOR,
+        types.Tuple((MATRIX, CUBE, CUBE)),
+        types.Tuple((MATRIX, VECTOR, VECTOR)),
     ),
     purpose="the collocation of periodic motions",
 )
-def walk(section, source, angles, firsts, starts, change, known, y, w, moves, rows, tails, report):
+def walk(section, source, angles, firsts, starts, change, known, neighbour, found):
     """Follow y with its derivatives over each of the pieces of a period, from what is known of a neighbour.
 
     Parameters
@@ -424,20 +413,18 @@ def walk(section, source, angles, firsts, starts, change, known, y, w, moves, ro
         Of lambda from the neighbour.
     known : bool
         Whether there is one; without it the integrator gives the first guess.
-    y, w, moves : ndarray, shapes (m, n), (m, NODES, f) and (m, NODES f, 2 + n)
-        The neighbour's beginnings, slopes and their derivatives; overwritten.
-    rows : ndarray, shape (k, n (2 + n))
-        y at the end of each piece, dy/dy there by columns, dy/dlambda; written.
-    tails : ndarray, shape (m,)
-        Decay of the Legendre coefficients of each element; written.
-    report : ndarray, shape (1,)
-        How near the links come to the limit of assembly; written.
+    neighbour : tuple of ndarray, shapes (m, n), (m, NODES, f) and (m, NODES f, 2 + n)
+        Its beginnings, slopes and their derivatives; overwritten.
+    found : tuple of ndarray, shapes (k, n (2 + n)), (m,) and (1,)
+        Written: y at the end of each piece, dy/dy there by columns, dy/dlambda; decay of the Legendre coefficients of each
+        element; how near the links come to the limit of assembly.
 
     Returns
     -------
     int
         A `Status`; NO_STEP where elements are too long, DIVERGED if the slopes were not found.
     """
+    (y, w, moves), (rows, tails, report) = neighbour, found
     n = starts.shape[1]
     f = n // 2
     scale = section.scale
@@ -466,7 +453,7 @@ def walk(section, source, angles, firsts, starts, change, known, y, w, moves, ro
             y[e] = start
             before = 0.0
             for count in range(_CORRECTIONS):
-                if not condense(section, angles[e], h, pace, y[e], w[e], bench, end, matrix, slope, moves[e]):
+                if not condense(section, angles[e], h, pace, y[e], w[e], bench, (end, matrix, slope, moves[e])):
                     return DIVERGED
                 size = 0.0
                 for row in range(moves.shape[1]):

@@ -97,12 +97,8 @@ class PeriodPath:
                 np.ascontiguousarray(starts),
                 0.0 if self._value is None else value - self._value,
                 known,
-                self._y,
-                self._w,
-                self._moves,
-                rows,
-                tails,
-                nearest,
+                (self._y, self._w, self._moves),
+                (rows, tails, nearest),
             )
             self._value = None
             if status == Status.LIMIT:

@@ -27,15 +27,16 @@ PASSED = len(_NEXT)
 
 
 @part
-def settle_on(section, source, end, turns, level, start, angles, y, w, desk, monodromy, room):
+def settle_on(section, source, end, turns, level, start, angles, path, desk, room):
     """Begin with the fewest elements that suffice, from the given level of `COUNTS` on; the level, -1 if there is none."""
+    y, w = path
     while level < len(COUNTS):
         m = COUNTS[level] * turns
         for e in range(m + 1):
             angles[e] = end * e / m
         if spread(section, source, angles, start, y[:m], w[:m], room) != DONE:
             return -1
-        status = close(section, angles, y[:m], w[:m], desk, monodromy, room)
+        status = close(section, angles, y[:m], w[:m], desk, room)
         if status == DONE:
             return level
         if status != NO_STEP:
@@ -62,9 +63,9 @@ def predict(known, y, w):
 
 
 @part
-def from_left(section, source, parameters, drives, scales, end, turns, most, loose, smooth, guess, found):
+def from_left(section, source, rows, end, turns, most, loose, smooth, guess, found):
     """Orbits of a row from the left to the right: by collocation as far as it goes, else by shooting."""
-    starts, monodromies, status = found
+    (parameters, drives, scales), (starts, monodromies, status) = rows, found
     n = guess.shape[0]
     z = np.empty(n * (1 + n))
     carry = np.array([0.1, 0.0])
@@ -74,7 +75,7 @@ def from_left(section, source, parameters, drives, scales, end, turns, most, loo
     angles = np.zeros(most_elements + 1)
     # of this orbit and of those before it, the last first
     y, w = np.zeros((1 + PASSED, most_elements, n)), np.zeros((1 + PASSED, most_elements, NODES, n // 2))
-    desk, monodromy = make_desk(n, most_elements), np.zeros((n, n))
+    desk = make_desk(n, most_elements)
     level, known, pause = 0, 0, 0
     passed = 0
     for row in range(parameters.shape[0]):
@@ -84,11 +85,11 @@ def from_left(section, source, parameters, drives, scales, end, turns, most, loo
         if known:
             m = COUNTS[level] * turns
             predict(known, y[:, :m], w[:, :m])
-            what = close(own, angles[: m + 1], y[0, :m], w[0, :m], desk, monodromy, room)
+            what = close(own, angles[: m + 1], y[0, :m], w[0, :m], desk, room)
             if what == NO_STEP:
                 # more elements; the start is good enough to go on from
                 start[:] = y[0, 0]
-                more = settle_on(own, source, end, turns, level + 1, start, angles, y[0], w[0], desk, monodromy, room)
+                more = settle_on(own, source, end, turns, level + 1, start, angles, (y[0], w[0]), desk, room)
                 level, known = max(more, 0), 0
                 what = DONE if more >= 0 else NO_STEP
         by_collocation = what == DONE
@@ -114,13 +115,13 @@ def from_left(section, source, parameters, drives, scales, end, turns, most, loo
             starts[row] = y[0, 0]
             for j in range(n):
                 for i in range(n):
-                    monodromies[row, j * n + i] = monodromy[i, j]
+                    monodromies[row, j * n + i] = desk.monodromy[i, j]
         else:
             starts[row] = start
             monodromies[row] = z[n:]
             pause -= 1
             if smooth and not section.torque and pause < 0:
-                more = settle_on(own, source, end, turns, level, start, angles, y[0], w[0], desk, monodromy, room)
+                more = settle_on(own, source, end, turns, level, start, angles, (y[0], w[0]), desk, room)
                 level, by_collocation = max(more, 0), more >= 0
                 if not by_collocation:
                     pause = _PAUSE
@@ -138,9 +139,9 @@ def from_left(section, source, parameters, drives, scales, end, turns, most, loo
 
 
 @part
-def from_right(section, source, parameters, drives, scales, end, most, found):
+def from_right(section, source, rows, end, most, found):
     """What was not found from the left may be found from the right."""
-    starts, monodromies, status = found
+    (parameters, drives, scales), (starts, monodromies, status) = rows, found
     n = starts.shape[1]
     z, carry, report = np.empty(n * (1 + n)), np.array([0.1, 0.0]), np.zeros(3)
     for row in range(parameters.shape[0] - 2, -1, -1):
@@ -154,9 +155,9 @@ def from_right(section, source, parameters, drives, scales, end, most, found):
 
 
 @part
-def from_others(section, source, parameters, drives, scales, end, most, loose, guesses, found):
+def from_others(section, source, rows, end, most, loose, guesses, found):
     """What was not found from a neighbour is sought from the guesses but the first, once it is found from the left again."""
-    starts, monodromies, status = found
+    (parameters, drives, scales), (starts, monodromies, status) = rows, found
     n = starts.shape[1]
     z, carry, report = np.empty(n * (1 + n)), np.array([0.1, 0.0]), np.zeros(3)
     none = np.empty((0, n))
@@ -182,33 +183,26 @@ def from_others(section, source, parameters, drives, scales, end, most, loose, g
     types.void(
         SECTION,
         SOURCE,
-        MATRIX,
-        MATRIX,
-        MATRIX,
+        types.UniTuple(MATRIX, 3),
         float64,
         int64,
         int64,
         float64,
         boolean,
         MATRIX,
-        MATRIX,
-        MATRIX,
-        int64[::1],
+        types.Tuple((MATRIX, MATRIX, int64[::1])),
     ),
     purpose="grids of periodic motions",
 )
-def solve_row(
-    section, source, parameters, drives, scales, end, turns, most, loose, smooth, guesses, starts, monodromies, status
-):
+def solve_row(section, source, rows, end, turns, most, loose, smooth, guesses, found):
     """Orbits of a row of mechanisms, each begun from the last: the rows of a chart.
 
     By collocation from the PASSED orbits before, as far as it goes; where it does not, by shooting.
 
     Parameters
     ----------
-    parameters, drives : ndarray, shapes (m, constants) and (m, drive)
-        As in `Section`, which has the rest.
-    scales : ndarray, shape (m, n)
+    rows : tuple of ndarray, shapes (m, constants), (m, drive) and (m, n)
+        Parameters, drives and scales as in `Section`, which has the rest.
     turns : int
         In a period.
     loose : float
@@ -218,14 +212,12 @@ def solve_row(
     guesses : ndarray, shape (k, n)
         Start of the first; where Newton's method fails from the neighbour it is begun anew from there. An orbit that is not
         found from a neighbour on either side is sought from the others.
-    starts, monodromies : ndarray, shapes (m, n) and (m, n n)
-        y at crank angle 0, and the monodromy matrix by columns; written where the status is DONE.
-    status : ndarray of int64, shape (m,)
-        `Status` of each; written.
+    found : tuple of ndarray, shapes (m, n), (m, n n) and (m,)
+        Starts, y at crank angle 0, and monodromy matrices by columns, written where the status is DONE; the `Status` of each,
+        int64.
     """
-    found = (starts, monodromies, status)
-    from_left(section, source, parameters, drives, scales, end, turns, most, loose, smooth, guesses[0].copy(), found)
-    from_right(section, source, parameters, drives, scales, end, most, found)
-    if (status != DONE).any():
-        from_others(section, source, parameters, drives, scales, end, most, loose, guesses, found)
-        from_right(section, source, parameters, drives, scales, end, most, found)
+    from_left(section, source, rows, end, turns, most, loose, smooth, guesses[0].copy(), found)
+    from_right(section, source, rows, end, most, found)
+    if (found[2] != DONE).any():
+        from_others(section, source, rows, end, most, loose, guesses, found)
+        from_right(section, source, rows, end, most, found)

@@ -85,24 +85,20 @@ def largest_multipliers(
     given = (None,) if guesses is None else np.atleast_2d(np.asarray(guesses, dtype=float))
     starting = np.array([guess_of(flow, drives[0], guess) for guess in given])
     n, first = flow.size, starting[0]
-    section, numbers, vectors, scales = row_of(rows, drives, first, PLAIN, VARIATIONAL, tolerance=tolerance)
+    section, *points = row_of(rows, drives, first, PLAIN, VARIATIONAL, tolerance=tolerance)
     monodromies, starts = np.full((len(rows), n * n), np.nan), np.full((len(rows), n), np.nan)
     status = np.zeros(len(rows), dtype=np.int64)
     row_kernels.solve_row(
         section,
         NO_SOURCE,
-        numbers,
-        vectors,
-        scales,
+        tuple(points),
         flow.period * turns,
         turns,
         MOST_ITERATIONS,
         SEARCH_TOLERANCE,
         all(map(is_smooth, dict.fromkeys(rows))),
         starting,
-        starts,
-        monodromies,
-        status,
+        (starts, monodromies, status),
     )
     values = np.full(len(rows), np.nan)
     good = status == Status.DONE
