@@ -333,7 +333,7 @@ class _Survey:
         if len(places):
             row, column = places[0].tolist()
             self.problems.append(
-                f"no orbit was found at {len(places)} of {self.grid.largest.size} points (grey), the first at "
+                f"a motion is not found at {len(places)} of {self.grid.largest.size} points (grey), the first at "
                 f"{self.place(float(self.grid.x[column]), float(self.grid.y[row]))}: {self.grid.reason(row, column)}"
             )
 

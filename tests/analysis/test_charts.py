@@ -177,7 +177,7 @@ def test_points_without_an_orbit_are_reported() -> None:
         ((150.0, 400.0), (20.0, 40.0)),
         points=3,
     )
-    assert any("no orbit was found at" in problem and "slider.stiffness = " in problem for problem in chart.problems)
+    assert any("a motion is not found at" in problem and "slider.stiffness = " in problem for problem in chart.problems)
     assert np.ma.getmaskarray(chart.grid.largest).any()
 
 
@@ -201,7 +201,7 @@ def test_a_chart_of_mechanisms_that_cannot_turn_says_so_and_keeps_the_rest() -> 
         assert chart.grid.largest[i, 0] == pytest.approx(find_orbit(there, speed=speed).largest, rel=1e-6)
     points, lines, *_ = chart.problems
     assert points.startswith(
-        "no orbit was found at 2 of 4 points (grey), the first at crank.length = 0.5 m, rocker.length = 0.14 m: the links "
+        "a motion is not found at 2 of 4 points (grey), the first at crank.length = 0.5 m, rocker.length = 0.14 m: the links "
         "come to the limit of assembly"
     )
     assert lines.startswith("true orbit, period doubling: no value at ")

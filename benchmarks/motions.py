@@ -1,0 +1,110 @@
+"""Is a stable motion missed? All that long runs end in, beside what `periodic.find_orbits` finds.
+
+    python -m benchmarks.motions --mechanisms 20
+    python -m benchmarks.motions --light 77
+
+The first draws five-bars at random about the published rigs, with weak dampers; the second takes rig 1 with spring B and a
+damper of 2 N.s/m at so many speeds from 1120 to 2640 rpm. From 129 starts each the mechanism is run for 600 turns; where it
+repeats itself after one to four turns, Newton's method confirms the motion, and it must be among those of the finder.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections import Counter
+from dataclasses import fields, replace
+
+import numpy as np
+
+from analysis.mechanisms import mechanism_of
+from analysis.periodic import Drive, OrbitError, natural_frequency, orbit_of, orbits_of, scale_of
+from analysis.periodic.finder import passages
+from analysis.periodic.flows import PLAIN
+from analysis.periodic.orbit_kernels import NO_SOURCE, period
+from analysis.periodic.orbits import section_of
+from analysis.periodic.starts import starts_of
+from analysis.units import RAD_S_PER_RPM
+from linkwork.errors import LinkworkError
+from linkwork.five_bar.published import SETS
+
+STARTS, TURNS, MOST = 128, 600, 4
+#: Change of y over a period, relative to its scale, at which a run has come to rest; distance of two starts of one motion.
+SETTLED, SAME = 1e-4, 1e-3
+RIGS = [known.parameters for known in SETS.values() if known.parameters.slider_stiffness > 0.0]
+
+
+def drawn(random: np.random.Generator):
+    """A five-bar about a published one, with a speed about its natural frequency."""
+    rig = RIGS[random.integers(len(RIGS))]
+    while True:
+        changed = {}
+        for field in fields(rig):
+            value = getattr(rig, field.name)
+            if isinstance(value, float) and any(
+                word in field.name for word in ("length", "mass", "stiffness", "inertia")
+            ):
+                changed[field.name] = value * float(np.exp(random.normal(0.0, 0.25)))
+        changed["slider_damping"] = rig.slider_damping * 10.0 ** random.uniform(-1.3, 0.0)
+        try:
+            made = replace(rig, **changed)
+            return made, natural_frequency(made) * random.uniform(0.4, 2.4)
+        except LinkworkError:
+            continue
+
+
+def ends_of(parameters, drive):
+    """Where runs come to rest: the turns after which they repeat themselves, and y there."""
+    flow, guess = drive.flow(mechanism_of(parameters)), np.zeros(2)
+    scale = scale_of(parameters, drive, guess)
+    section = section_of(parameters, drive, guess, PLAIN, tolerance=1e-8)
+    for start in (guess, *starts_of(parameters, drive, guess, STARTS, 5)):
+        z, last, carry = start.copy(), np.full((MOST + 1, 2), np.inf), np.array([0.1, 0.0])
+        for _ in range(TURNS):
+            if period(section, NO_SOURCE, flow.period, z, carry) != 0:
+                break
+            last = np.vstack([z, last[:-1]])
+        else:
+            away = np.abs((last[1:] - last[0]) / scale).max(axis=1)
+            if (away < SETTLED).any():
+                yield int(np.argmax(away < SETTLED)) + 1, z
+
+
+def compare(parameters, drive) -> tuple[Counter, int]:
+    """Runs by the turns of the motion they end in, and how many of these motions the finder has not."""
+    scale, seen, missed = scale_of(parameters, drive, np.zeros(2)), Counter(), 0
+    known = {turns: orbits_of(parameters, drive, turns=turns).orbits for turns in range(1, MOST + 1)}
+    starts = {turns: np.array([p for o in found for p in passages(o)]) for turns, found in known.items()}
+    for turns, end in ends_of(parameters, drive):
+        try:
+            orbit = orbit_of(parameters, drive, turns=turns, start=end, settle=False)
+        except OrbitError:
+            continue
+        passed = np.abs((passages(orbit) - orbit.start) / scale).max(axis=1)
+        least = next((n for n in range(1, turns) if passed[n] < SAME), turns)
+        seen[least] += 1
+        near = len(starts[least]) and np.abs((starts[least] - orbit.start) / scale).max(axis=1).min() < SAME
+        missed += not near
+    return seen, missed
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--mechanisms", type=int, default=0)
+    parser.add_argument("--light", type=int, default=0)
+    parser.add_argument("--seed", type=int, default=1)
+    asked = parser.parse_args()
+    random = np.random.default_rng(asked.seed)
+    light = replace(SETS["rig-1-spring-b"].parameters, slider_damping=2.0)
+    cases = [drawn(random) for _ in range(asked.mechanisms)]
+    cases += [(light, rpm * RAD_S_PER_RPM) for rpm in np.linspace(1120.0, 2640.0, asked.light)]
+    total = 0
+    for parameters, speed in cases:
+        seen, missed = compare(parameters, Drive(speed=speed))
+        total += missed
+        runs = ", ".join(f"{seen[turns]} in motions of {turns} turns" for turns in sorted(seen)) or "none comes to rest"
+        print(f"{speed / RAD_S_PER_RPM:8.1f} rpm: {runs}{'; MISSED ' + str(missed) if missed else ''}", flush=True)
+    print(f"{len(cases)} cases, {total} runs that end in a motion the finder has not")
+
+
+if __name__ == "__main__":
+    main()
