@@ -275,7 +275,7 @@ def test_least_change_for_a_pin_force_is_that_of_slsqp():
     def room(x):
         start, force = None, []
         for speed in speeds.tolist():
-            orbit = orbit_of(asked.at(np.asarray(x)), Drive(speed=speed), start=start)
+            orbit = orbit_of(*asked.operation(np.asarray(x), speed), start=start)
             start, turn = orbit.start, orbit.turn(512)
             force.append(float(np.hypot(turn["pin.C.fx"], turn["pin.C.fy"]).max()))
         # the top of a curve through the speeds
