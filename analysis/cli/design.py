@@ -185,7 +185,7 @@ def _forces(solution: Solution, make: Any) -> PinForces | None:
     """The forces on the pins at constant speed; None if the plant has no such linkage, or it is not joined on its way."""
     from ..synthesis import pin_forces
 
-    if solution.linkage.pivot is not None or not solution.verdicts.circuit:
+    if solution.linkage.pivot is not None or not (solution.verdicts.circuit and solution.verdicts.branch):
         return None
     way = None if solution.verdicts.full_turn else (float(solution.rotation.min()), float(solution.rotation.max()))
     return pin_forces(solution.linkage, make, way, run=False)

@@ -16,6 +16,7 @@ from typing import Any, ClassVar, Literal, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.optimize import brentq
 
 from linkwork.errors import ParameterError
 
@@ -62,13 +63,11 @@ def dead_centres(linkage: Linkage) -> tuple[float, ...]:
 def toggles(linkage: Linkage) -> tuple[float, ...]:
     """Crank rotations at which coupler and rocker lie in one line, within a turn from 0 (rad); none if the crank turns fully.
 
-    Of a slider-crank where the coupler is square to the guide.
-
-    Raises
-    ------
-    ParameterError
-        If the rocker pivot moves.
+    Of a slider-crank where the coupler is square to the guide; where the rocker pivot moves, of the shaft that turns once
+    until all is as it was.
     """
+    if linkage.pivot is not None:
+        return _toggles_by_roots(linkage)
     l1, l2, l3, l4 = _lengths(linkage)
     found = []
     if linkage.slides:
@@ -79,6 +78,18 @@ def toggles(linkage: Linkage) -> tuple[float, ...]:
         if abs(cosine) <= 1.0:
             found += [acos(cosine), -acos(cosine)]
     return tuple(sorted((th2 - linkage.crank_phase) % (2.0 * pi) for th2 in found))
+
+
+def _toggles_by_roots(linkage: Linkage) -> tuple[float, ...]:
+    """Where the cosine of the angle between coupler and rocker passes -1 or 1."""
+
+    def beyond(phi: Any) -> Any:
+        return np.abs(linkage.cosine_at_c(linkage.reach(phi))) - 1.0
+
+    phi = np.linspace(0.0, 2.0 * pi, 1441)
+    off = beyond(phi)
+    passed = np.flatnonzero(np.sign(off[1:]) != np.sign(off[:-1]))
+    return tuple(float(brentq(beyond, phi[k], phi[k + 1], xtol=1e-13)) for k in passed)
 
 
 def time_ratio(linkage: Linkage) -> float | None:

@@ -89,6 +89,8 @@ def report(solution: Solution) -> str:
         parts[0] += f"\nslider at D: stroke {1e3 * linkage.pivot.stroke:.6g} mm"
     elif isinstance(linkage.pivot, SecondCrank):
         parts[0] += f"\nsecond crank at D: {format_ratio(linkage.pivot.ratio)} turns for one of the first"
+    if linkage.pivot is not None:
+        parts[0] += _places("toggles", toggles(linkage))
     if straight := solution.straight():
         parts[0] += f"\n{straight}"
     parts += [table(dimension_rows(solution)), rounding_line(solution)]
@@ -105,9 +107,7 @@ def slider_line(linkage: Linkage) -> str:
 def _limits(linkage: Linkage, rotation: NDArray[np.float64]) -> str:
     """Dead centres, toggles, time ratio and mechanical advantage of a four-bar or a slider-crank, a line each."""
     lines, last = "", "slider" if linkage.slides else "rocker"
-    for what, places in ((f"{last} at rest", dead_centres(linkage)), ("toggles", toggles(linkage))):
-        if places:
-            lines += f"\n{what} at crank rotations of {', '.join(f'{degrees(at):.2f}' for at in places)} deg"
+    lines += _places(f"{last} at rest", dead_centres(linkage)) + _places("toggles", toggles(linkage))
     ratio = time_ratio(linkage)
     if ratio is not None:
         lines += f"\ntime ratio of the {last}'s {'strokes' if linkage.slides else 'swings'} {ratio:.4g}"
@@ -120,6 +120,11 @@ def _limits(linkage: Linkage, rotation: NDArray[np.float64]) -> str:
         )
         lines += f"\n{what}: {np.nanmin(gained):.3g} at least on the way"
     return lines
+
+
+def _places(what: str, places: Sequence[float]) -> str:
+    """A line of crank rotations, if there are any."""
+    return f"\n{what} at crank rotations of {', '.join(f'{degrees(at):.2f}' for at in places)} deg" if places else ""
 
 
 def dimension_rows(solution: Solution) -> list[tuple[str, str, str, str, str]]:

@@ -126,7 +126,7 @@ def test_no_time_ratio_without_a_swinging_rocker() -> None:
     assert dead_centres(drag) == ()
     assert time_ratio(drag) is None
     with pytest.raises(ParameterError, match="pivot"):
-        toggles(Linkage(**drag.values() | {"pivot": SliderMotion(FourierSeries.constant(0.1))}))
+        dead_centres(Linkage(**drag.values() | {"pivot": SliderMotion(FourierSeries.constant(0.1))}))
 
 
 def test_a_time_ratio_is_kept_by_the_search() -> None:

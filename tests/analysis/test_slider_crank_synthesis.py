@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from math import pi, radians
+from math import acos, pi, radians
 from pathlib import Path
 from typing import Any
 
@@ -38,7 +38,7 @@ from analysis.synthesis import (
     toggles,
 )
 from analysis.synthesis.report import report
-from linkwork.errors import InputError, ParameterError
+from linkwork.errors import AssemblyError, InputError, ParameterError
 from linkwork.slider_crank.parameters import InitialState
 
 FloatArray = np.ndarray[Any, np.dtype[np.float64]]
@@ -200,6 +200,25 @@ def test_a_force_is_kept_and_the_case_runs_with_it(tmp_path: Path) -> None:
     text = report(held)
     assert "slider at rest at crank rotations of" in text
     assert "force of the slider for one at the crank pin" in text
+
+
+def test_toggles_of_a_geared_five_bar() -> None:
+    """A parallelogram's cranks, turning alike, keep B and D as far apart as the shafts; turning against one another, not."""
+    links = {"ground_length": 0.2, "crank_length": 0.05, "coupler_length": 0.14, "rocker_length": 0.12}
+    assert toggles(Linkage(**links, pivot=SecondCrank(0.05, 1.0, 0.0))) == ()
+    # B and D are 0.2 - 0.1 cos phi apart where they turn in opposite ways from one line, and 0.26 at most
+    against = Linkage(**links, pivot=SecondCrank(0.05, -1.0, pi))
+    assert toggles(against) == pytest.approx([pi - acos(0.6), pi + acos(0.6)])
+    task = TimedPath(points=against.path(0.5 * PHI[:6]), rotation=0.5 * PHI[:6])
+    assert "toggles at crank rotations of 126.87, 233.13 deg" in report(Solution.of(task, against))
+
+
+def test_forces_are_those_of_links_that_are_joined() -> None:
+    short = Linkage(ground_length=0.0, crank_length=0.1, coupler_length=0.05, rocker_length=0.0)
+    for run in (True, False):
+        with pytest.raises(AssemblyError, match=r"cannot be joined|loop closure|do not"):
+            pin_forces(short, MAKE, run=run)
+    assert np.isfinite(pin_forces(short, MAKE, (radians(70.0), radians(110.0)), run=False).force).all()
 
 
 def test_a_five_bar_says_why_it_keeps_none_of_it() -> None:
