@@ -13,7 +13,7 @@ from analysis.cli import COMMANDS
 from linkwork import __version__
 
 sys.path.insert(0, str(Path(__file__).parent))
-import openings  # noqa: E402
+import openings
 
 project = "Linkwork"
 author = copyright = "The Linkwork developers"

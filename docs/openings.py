@@ -1,6 +1,6 @@
 """What of the documentation opens in the studio: published sets, examples that are run, and what was found for the others.
 
-python docs/openings.py              finds the answers to the examples that are tasks anew, and writes them to openings.json (minutes)
+python docs/openings.py              finds the answers to the examples that are tasks anew, for openings.json (minutes)
 python docs/openings.py ellipse ...  those of these examples alone
 """
 
@@ -16,7 +16,7 @@ from html import escape
 from pathlib import Path
 from typing import Any
 
-from analysis.mechanisms import MECHANISMS, PUBLISHED
+from analysis.mechanisms import PUBLISHED
 from analysis.run import case_from, load_case
 from analysis.studio import address_of, state_of
 from linkwork.errors import InputError
@@ -78,7 +78,7 @@ def links(page: str, text: str) -> str:
 
 
 def _answer(path: Path, folder: Path) -> dict[str, Any] | None:
-    """The first answer to a task, if it is one of the mechanisms of the FMUs; where a slider is moved, with the slider let go."""
+    """The first answer to a task, if it is a mechanism of the FMUs; where a slider is moved, with the slider let go."""
     text = path.read_text(encoding="utf-8")
     command = "tune" if "[tune]" in text else "slider-motion" if "[tracking]" in text else "synthesize"
     words = [sys.executable, "-m", "analysis.cli", command, str(path), "--out", str(folder)]

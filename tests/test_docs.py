@@ -259,9 +259,9 @@ def openings():
 
 
 def test_every_published_set_and_example_opens_in_the_studio(openings):
-    """But for one whose torque varies over the angle, and one whose answer is no mechanism of the FMUs; the states are cases, and the pages that are about them have their links.
+    """But for one whose torque varies over the angle, and one whose answer is no mechanism of the FMUs.
 
-    A task opens with its answer, which `docs/openings.py` finds.
+    A task opens with its answer, which `docs/openings.py` finds. The pages that are about them have the links.
     """
     examples = {path.stem for path in (ROOT / "examples").glob("*.toml")}
     assert {*PUBLISHED} <= {*openings.states()} <= {*PUBLISHED, *examples} - {"torsion-bar", "kinds"}

@@ -24,10 +24,17 @@ from analysis.mechanisms import MECHANISMS, PUBLISHED
 from analysis.run import Case, Inputs
 from analysis.studio import PAGE, address_of, opening_state, state_of
 
-from .test_studio import _drag, _given, _load, _opened, _pin, _saved, in_browser, page  # noqa: F401
+from .test_studio import _drag, _given, _load, _opened, _pin, _saved, in_browser
 
 ROOT = Path(__file__).parents[2]
 WIDE, PHONE = {"width": 1400, "height": 1000}, {"width": 390, "height": 844}
+
+
+@pytest.fixture(scope="module")
+def page(browser: Any) -> Iterator[Any]:
+    made = _opened(browser, PAGE)
+    yield made
+    made.close()
 
 
 def _spatial() -> dict[str, Any]:
@@ -43,7 +50,7 @@ def _spatial() -> dict[str, Any]:
 
 @in_browser
 @pytest.mark.parametrize("state", [opening_state, _spatial])
-def test_a_drawing_for_cad_is_to_scale(page: Any, state: Any) -> None:  # noqa: F811
+def test_a_drawing_for_cad_is_to_scale(page: Any, state: Any) -> None:
     found = _load(page, state())
     drawing = MECHANISMS[state()["mechanism"]].drawing
     assert drawing is not None
@@ -67,7 +74,7 @@ def test_a_drawing_for_cad_is_to_scale(page: Any, state: Any) -> None:  # noqa: 
 
 @in_browser
 @pytest.mark.parametrize("state", [opening_state, _spatial])
-def test_start_values_for_the_fmu_are_parameter_values_of_ssp(page: Any, state: Any) -> None:  # noqa: F811
+def test_start_values_for_the_fmu_are_parameter_values_of_ssp(page: Any, state: Any) -> None:
     wanted = state() | {"title": '<Räder> & "Rollen"'}
     _load(page, wanted)
     read = read_ssv(_saved(page, "ssv"), validate=True)
@@ -79,8 +86,8 @@ def test_start_values_for_the_fmu_are_parameter_values_of_ssp(page: Any, state: 
 
 
 @in_browser
-def test_a_link_holds_the_view_and_a_bad_one_is_said(browser: Any) -> None:  # noqa: F811
-    page = _opened(browser, PAGE)  # noqa: F811
+def test_a_link_holds_the_view_and_a_bad_one_is_said(browser: Any) -> None:
+    page = _opened(browser, PAGE)
     _load(page, _spatial())
     page.keyboard.press("2")
     page.keyboard.press("+")
@@ -102,25 +109,25 @@ def test_a_link_holds_the_view_and_a_bad_one_is_said(browser: Any) -> None:  # n
 # What is put behind
 
 
-def _behind(page: Any) -> dict[str, Any]:  # noqa: F811
+def _behind(page: Any) -> dict[str, Any]:
     found: dict[str, Any] = page.evaluate("window.studio.state.behind")
     return found
 
 
-def _fill(page: Any, label: str, text: str) -> None:  # noqa: F811
+def _fill(page: Any, label: str, text: str) -> None:
     field = page.get_by_label(label, exact=False)
     field.fill(text)
     field.press("Enter")
 
 
-def _put_behind(page: Any, path: Path) -> None:  # noqa: F811
+def _put_behind(page: Any, path: Path) -> None:
     _load(page, opening_state())
     page.set_input_files("#backdrop input[type=file]", path)
     page.wait_for_selector("#behind > *", state="attached")
 
 
 @in_browser
-def test_a_photo_lies_where_it_is_put_and_never_leaves(page: Any, tmp_path: Path) -> None:  # noqa: F811
+def test_a_photo_lies_where_it_is_put_and_never_leaves(page: Any, tmp_path: Path) -> None:
     asked: list[str] = []
     page.on("request", lambda request: asked.append(request.url))
     Image.new("RGB", (200, 100), "orange").save(tmp_path / "photo.png")
@@ -174,7 +181,7 @@ def test_a_photo_lies_where_it_is_put_and_never_leaves(page: Any, tmp_path: Path
 
 
 @in_browser
-def test_a_script_in_an_svg_does_not_run(page: Any, tmp_path: Path) -> None:  # noqa: F811
+def test_a_script_in_an_svg_does_not_run(page: Any, tmp_path: Path) -> None:
     text = (
         '<svg xmlns="http://www.w3.org/2000/svg" width="80" height="40" onload="top.hurt = 1">'
         "<script>top.hurt = 1; fetch('http://127.0.0.1:9/')</script><rect width='80' height='40'/></svg>"
@@ -187,7 +194,7 @@ def test_a_script_in_an_svg_does_not_run(page: Any, tmp_path: Path) -> None:  # 
 
 
 @in_browser
-def test_a_drawing_of_ones_own_lies_on_itself(page: Any, tmp_path: Path) -> None:  # noqa: F811
+def test_a_drawing_of_ones_own_lies_on_itself(page: Any, tmp_path: Path) -> None:
     _load(page, opening_state())
     shutil.copy(_saved(page, "dxf"), tmp_path / "own.dxf")
     _put_behind(page, tmp_path / "own.dxf")
@@ -209,7 +216,7 @@ def test_a_drawing_of_ones_own_lies_on_itself(page: Any, tmp_path: Path) -> None
         ("a.dxf", "0\nSECTION\n2\nENTITIES\n0\nEOF\n", "has no LINE"),
     ],
 )
-def test_a_file_that_cannot_be_shown_is_said(page: Any, tmp_path: Path, name: str, text: str, said: str) -> None:  # noqa: F811
+def test_a_file_that_cannot_be_shown_is_said(page: Any, tmp_path: Path, name: str, text: str, said: str) -> None:
     (tmp_path / name).write_text(text, encoding="utf-8")
     _load(page, opening_state())
     page.set_input_files("#backdrop input[type=file]", tmp_path / name)
@@ -222,7 +229,7 @@ def test_a_file_that_cannot_be_shown_is_said(page: Any, tmp_path: Path, name: st
 
 
 @in_browser
-def test_a_spatial_mechanism_is_turned(page: Any) -> None:  # noqa: F811
+def test_a_spatial_mechanism_is_turned(page: Any) -> None:
     _load(page, _spatial())
 
     def matrix() -> Any:
@@ -263,7 +270,7 @@ def test_a_spatial_mechanism_is_turned(page: Any) -> None:  # noqa: F811
 
 
 @in_browser
-def test_a_joint_follows_the_pointer_where_the_view_is_turned_and_enlarged(page: Any) -> None:  # noqa: F811
+def test_a_joint_follows_the_pointer_where_the_view_is_turned_and_enlarged(page: Any) -> None:
     _load(page, _spatial())
     for key in ("4", "+", "+"):
         page.keyboard.press(key)
@@ -278,7 +285,7 @@ def test_a_joint_follows_the_pointer_where_the_view_is_turned_and_enlarged(page:
 
 
 @pytest.fixture
-def phone(browser: Any) -> Iterator[Any]:  # noqa: F811
+def phone(browser: Any) -> Iterator[Any]:
     """The page on a phone, paused, and a finger or two on it: `touch(kind, points)`."""
     context = browser.new_context(viewport=PHONE, has_touch=True, is_mobile=True, device_scale_factor=2)
     made = context.new_page()
@@ -301,7 +308,7 @@ def phone(browser: Any) -> Iterator[Any]:  # noqa: F811
 
 @in_browser
 def test_fingers_drag_a_joint_move_the_drawing_and_enlarge_it(phone: Any) -> None:
-    page, touch = phone  # noqa: F811
+    page, touch = phone
     _load(page, opening_state())
     assert page.evaluate("document.documentElement.scrollWidth") <= PHONE["width"]
     x, y = _pin(page, "P")
@@ -372,13 +379,13 @@ def test_links_are_told_apart_without_colour_vision() -> None:
 
 
 @in_browser
-def test_what_the_documentation_links_to_opens(browser: Any) -> None:  # noqa: F811
+def test_what_the_documentation_links_to_opens(browser: Any) -> None:
     spec = importlib.util.spec_from_file_location("openings", ROOT / "docs" / "openings.py")
     assert spec is not None
     assert spec.loader is not None
     openings = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(openings)
-    page = _opened(browser, PAGE)  # noqa: F811
+    page = _opened(browser, PAGE)
     for name, state in openings.states().items():
         before = page.evaluate("Number(document.documentElement.dataset.answer)")
         page.evaluate("address => { location.href = address }", address_of(state, PAGE.as_uri()))
@@ -393,7 +400,7 @@ def test_what_the_documentation_links_to_opens(browser: Any) -> None:  # noqa: F
 
 
 @in_browser
-def test_the_page_works_from_a_plain_web_server(browser: Any) -> None:  # noqa: F811
+def test_the_page_works_from_a_plain_web_server(browser: Any) -> None:
     handler = functools.partial(http.server.SimpleHTTPRequestHandler, directory=PAGE.parent)
     with http.server.ThreadingHTTPServer(("127.0.0.1", 0), handler) as server:
         thread = threading.Thread(target=server.serve_forever)
@@ -441,9 +448,9 @@ def test_the_sources_of_the_page_are_typed_tidy_and_tested(sources: Path, script
 @in_browser
 @pytest.mark.parametrize("size", [WIDE, PHONE], ids=["wide", "phone"])
 @pytest.mark.parametrize("theme", ["light", "dark"])
-def test_a_reader_of_the_screen_finds_its_way(browser: Any, sources: Path, size: Any, theme: str) -> None:  # noqa: F811
+def test_a_reader_of_the_screen_finds_its_way(browser: Any, sources: Path, size: Any, theme: str) -> None:
     """What axe-core finds: all that is wrong with names, roles and contrast."""
-    page = browser.new_page(viewport=size, color_scheme=theme)  # noqa: F811
+    page = browser.new_page(viewport=size, color_scheme=theme)
     page.goto(PAGE.as_uri())
     page.wait_for_function("document.documentElement.dataset.ready", timeout=120_000)
     page.click("#play")

@@ -87,7 +87,7 @@ HOST = """async ([code, traits]) => {
 
 
 @in_browser
-def test_what_is_dragged_is_known_to_python_and_back(browser: Any) -> None:  # noqa: F811
+def test_what_is_dragged_is_known_to_python_and_back(browser: Any) -> None:
     widget = Widget("table-3.1")
     code = Path(widget_module.__file__).with_suffix(".js").read_text(encoding="utf-8")
     host = browser.new_page(viewport={"width": 1200, "height": 900})
