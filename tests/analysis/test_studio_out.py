@@ -115,7 +115,7 @@ def _behind(page: Any) -> dict[str, Any]:
 
 
 def _fill(page: Any, label: str, text: str) -> None:
-    field = page.get_by_label(label, exact=False)
+    field = page.locator("#backdrop").get_by_label(label)
     field.fill(text)
     field.press("Enter")
 
@@ -142,7 +142,7 @@ def test_a_photo_lies_where_it_is_put_and_never_leaves(page: Any, tmp_path: Path
         _fill(page, label, text)
         assert _behind(page)[key] == pytest.approx(value, rel=1e-12)
     # half the distance between the two points is half the picture, about the first
-    apart = float(page.get_by_label("distance of the two points").input_value())
+    apart = float(page.locator("#backdrop").get_by_label("distance").input_value())
     corner = page.evaluate("window.studio.backdrop.points[0]")
     _fill(page, "distance of the two points", str(apart / 2))
     now = _behind(page)
@@ -163,14 +163,14 @@ def test_a_photo_lies_where_it_is_put_and_never_leaves(page: Any, tmp_path: Path
     x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
     for locked, moved in ((False, 25.0), (True, 0.0)):
         before = _behind(page)["x"]
-        page.get_by_label("locked", exact=True).set_checked(locked)
+        page.locator("#backdrop").get_by_label("locked").set_checked(locked)
         page.mouse.move(x, y)
         page.mouse.down()
         page.mouse.move(x + 25, y, steps=3)
         page.mouse.up()
         page.keyboard.press("0")
         assert (_behind(page)["x"] - before) * scale == pytest.approx(moved, abs=0.5)
-    page.get_by_label("locked", exact=True).set_checked(False)
+    page.locator("#backdrop").get_by_label("locked").set_checked(False)
     page.get_by_role("button", name="Undo").click()
     assert _behind(page)["locked"] is True
     assert "image" not in _saved(page, "svg").read_text(encoding="utf-8")
