@@ -296,6 +296,21 @@ def test_an_fmu_starts_with_the_values_of_the_page(tmp_path: Path, kind: str) ->
     np.testing.assert_allclose(found["slider.position"], wanted["slider.position"], atol=1e-9)
 
 
+@pytest.mark.slow
+@pytest.mark.fmu
+def test_the_fmu_runs_with_the_motor_of_the_page() -> None:
+    pytest.importorskip("ziglang", reason="there is no Zig here: pip install 'linkwork[native]'")
+    motor = {"breakdown_torque": 3.0, "breakdown_slip": 0.2, "synchronous_speed": 40.0}
+    state = opening_state() | {"duration": 0.2}
+    state["values"] = state["values"] | {"drive.mode": 0.0, "initial.crank_speed": 35.0}
+    state["values"] |= {f"drive.torque.{name}": value for name, value in motor.items()}
+    found = do("run", {"state": state, "wanted": {"rows": 200}})
+    case = case_of(state)
+    wanted = simulate(case.parameters, case.inputs, initial=case.initial, stop_time=0.2, step=1e-3)
+    for name in ("crank.speed", "slider.position"):
+        np.testing.assert_allclose(found["outputs"][name], wanted[name], atol=1e-6 * np.abs(wanted[name]).max())
+
+
 # In the browser
 
 
