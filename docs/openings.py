@@ -19,7 +19,6 @@ from typing import Any
 from analysis.mechanisms import PUBLISHED
 from analysis.run import case_from, load_case
 from analysis.studio import address_of, state_of
-from linkwork.errors import InputError
 
 HERE = Path(__file__).resolve().parent
 EXAMPLES = HERE.parent / "examples"
@@ -36,6 +35,10 @@ SETS = {
     "slider-crank": ("rahman-ideal", "rahman-a4-10-s1-3.5", "rahman-a4-20-s1-3.5"),
     "youssef": ("table-3.1", "appendix-1", "rig-1-spring-a", "rig-1-spring-b", "rig-2-spring-c", "rig-2-spring-d"),
 }
+#: What changes over time or angle in examples that are run, and is left out where they open: the page has constant inputs.
+LEFT_OUT = {"run-up": {"force": 0.0}, "slider-crank": {"axial.speed": 0.0, "load": 0.0}}
+#: Examples of which nothing would be left.
+VARYING = ("torsion-bar",)
 #: The page that has them all.
 ALL = "studio"
 
@@ -45,16 +48,16 @@ def states() -> dict[str, dict[str, Any]]:
     """All that opens, by the name of a published set or of an example."""
     found = {name: state_of(case_from({"published": name}, folder=EXAMPLES, title=name)) for name in PUBLISHED}
     found |= json.loads(ANSWERS.read_text(encoding="utf-8"))
-    for path in sorted(EXAMPLES.glob("*.toml")):
-        if path.stem not in found and _runs(path):
-            try:
-                found[path.stem] = state_of(load_case(path))
-            except InputError:
-                continue  # its inputs vary: the page has constant ones
+    for path in filter(is_run, sorted(EXAMPLES.glob("*.toml"))):
+        if path.stem not in VARYING:
+            left = LEFT_OUT.get(path.stem, {})
+            state = state_of(load_case(path, left))
+            without = f", without {' and '.join(left)}" if left else ""
+            found[path.stem] = state | {"title": state["title"] + without}
     return found
 
 
-def _runs(path: Path) -> bool:
+def is_run(path: Path) -> bool:
     """Whether an example is a case of `linkwork run`, and no task."""
     return not re.search(r"^\[(task|tune)\]", path.read_text(encoding="utf-8"), re.MULTILINE)
 
@@ -94,7 +97,7 @@ def main(names: list[str]) -> None:
     """Find answers anew."""
     found = json.loads(ANSWERS.read_text(encoding="utf-8")) if names else {}
     for path in sorted(EXAMPLES.glob("*.toml")):
-        if not _runs(path) and path.stem in (names or [path.stem]):
+        if not is_run(path) and path.stem in (names or [path.stem]):
             with tempfile.TemporaryDirectory() as folder:
                 found[path.stem] = _answer(path, Path(folder))
     found = {name: state for name, state in found.items() if state}

@@ -48,7 +48,7 @@ def studio(what: str | None, out: str | None, browser: bool, port: int, settings
     Examples:
       linkwork studio
       linkwork studio table-3.1
-      linkwork studio examples/slider-crank.toml --set drive.speed='80 rpm' --out page.html
+      linkwork studio examples/run-up.toml --set force='0 N' --out page.html
     """
     from ..files import write_text
     from ..studio import page_of
