@@ -536,7 +536,15 @@ def _ours(folder: Path, user: int) -> bool:
         if status.st_uid not in (user, 0) or (shared and (path == folder or not status.st_mode & 0o1000)):
             return False
     with os.scandir(folder) as entries:
-        return folder.stat().st_uid == user and all(e.stat(follow_symlinks=False).st_uid == user for e in entries)
+        return folder.stat().st_uid == user and all(_is_of(entry, user) for entry in entries)
+
+
+def _is_of(entry: os.DirEntry[str], user: int) -> bool:
+    """Whether a file is a user's; one that another process has renamed or removed meanwhile does no harm."""
+    try:
+        return entry.stat(follow_symlinks=False).st_uid == user
+    except FileNotFoundError:
+        return True
 
 
 def _of_one(group: int, user: int) -> bool:
