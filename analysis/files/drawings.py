@@ -307,24 +307,7 @@ def to_dxf(drawing: Drawing, unit: str = "mm") -> str:
             points = [(x, y, bulge) for (x, y), bulge in zip((shape.points / metre).tolist(), bulges)]
             space.add_lwpolyline(points, format="xyb", close=shape.closed, dxfattribs=own)
     for dimension in drawing.dimensions:
-        height = dimension.height / metre
-        look = {
-            "dimtxt": height,
-            "dimasz": height,
-            "dimexo": 0.5 * height,
-            "dimexe": 0.5 * height,
-            "dimgap": 0.3 * height,
-        }
-        readable = dimension.readable
-        drawn = space.add_aligned_dim(
-            at(readable.start),
-            at(readable.end),
-            readable.offset / metre,
-            text=_number(dimension, metre),
-            override=look | {"dimtad": 1, "dimblk": ""},
-            dxfattribs={"layer": dimension.layer},
-        )
-        drawn.render()
+        _measure(space, dimension.readable, metre)
     for text in drawing.texts:
         space.add_text(
             text.text,
@@ -342,6 +325,20 @@ def to_dxf(drawing: Drawing, unit: str = "mm") -> str:
     dxf = re.sub(r"(\$TDU?(?:CREATE|UPDATE)\n *40\n)[^\n]*", r"\g<1>0.0", stream.getvalue())
     dxf = re.sub(r"(\$(?:FINGERPRINT|VERSION)GUID\n *2\n)[^\n]*", rf"\g<1>{_NO_GUID}", dxf)
     return re.sub(rf"(?<=\n{re.escape(__version__)} @ )[^\n]*", "0", dxf)
+
+
+def _measure(space: Any, dimension: Dimension, metre: float) -> None:
+    """A dimension of a DXF, in a unit."""
+    height = dimension.height / metre
+    ends = [(x / metre, y / metre) for x, y in (dimension.start, dimension.end)]
+    look = {"dimtxt": height, "dimasz": height, "dimexo": 0.5 * height, "dimexe": 0.5 * height, "dimgap": 0.3 * height}
+    space.add_aligned_dim(
+        *ends,
+        dimension.offset / metre,
+        text=_number(dimension, metre),
+        override=look | {"dimtad": 1, "dimblk": ""},
+        dxfattribs={"layer": dimension.layer},
+    ).render()
 
 
 def to_svg(drawing: Drawing, unit: str = "mm") -> str:
