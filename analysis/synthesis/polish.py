@@ -29,7 +29,7 @@ from .program import KEPT, Objective, Program
 from .refine import ITERATIONS, Refinement
 from .search import USUAL_SEARCH, Search, over_cores
 from .starts import Answer, CrankUnknown, PivotUnknown, SliderUnknown, Start, apart, inside, outside
-from .tasks import Normal, Quality
+from .tasks import Normal
 
 FloatArray = NDArray[np.float64]
 
@@ -38,7 +38,12 @@ FEW = 20
 #: How many of the fits go on to the greatest error.
 ONWARDS = 6
 #: How many paths go on to the measure between the curves, and by how many iterations: many by a few, the best of them further.
-RACE = {"area": ((40, 12), (6, 60), (2, 100), (1, 100), (1, 200)), "worst": ((ONWARDS, ITERATIONS),)}
+#: Of an open path, whose ends are free too, the first laps tell less.
+RACE = {
+    "area": ((40, 12), (6, 60), (2, 100), (1, 100), (1, 200)),
+    "open area": ((40, 12), (12, 40), (3, 100), (1, 100), (1, 200)),
+    "worst": ((ONWARDS, ITERATIONS),),
+}
 #: Fits of squares that a path's race begins with besides the starts themselves: most end at the same few optima.
 FITTED = 8
 #: How many of the best are followed to the end, by so many iterations more, where they were cut off.
@@ -155,7 +160,8 @@ def polish(
         kept, interrupted = spread("onwards", [(answer, ITERATIONS) for answer in best], normal.quality)
     else:
         begin = kept_of([worker.measured(answer) for answer in [*kept, *begun]])
-        kept, interrupted = _raced(spread, begin, given, normal.quality)
+        laps = RACE["open area" if normal.quality == "area" and not normal.closed else normal.quality]
+        kept, interrupted = _raced(spread, begin, given, laps)
     if limits.least is not None and not interrupted:
         best = distinct(kept_of(kept) or kept_of(found), ONWARDS, pivot)
         kept, interrupted = spread("least", best, limits.least.along.name)
@@ -169,13 +175,13 @@ def _raced(
     spread: Callable[[str, Sequence[Any], str], tuple[list[Answer], bool]],
     kept: Sequence[Answer],
     given: Sequence[Answer],
-    quality: Quality,
+    laps: Sequence[tuple[int, int]],
 ) -> tuple[list[Answer], bool]:
     """From many answers by few iterations each, from the best of these by more; whether that was interrupted."""
-    for lap, (count, iterations) in enumerate(RACE[quality]):
+    for lap, (count, iterations) in enumerate(laps):
         # guesses run in the first lap whatever they are worth; what does not run in it is left behind
         best = distinct([*given, *kept], count + len(given), distance=RACED)
-        done, interrupted = spread("onwards", [(answer, iterations) for answer in best], quality)
+        done, interrupted = spread("onwards", [(answer, iterations) for answer in best], "race")
         if interrupted:
             return [*done, *kept], True
         rest = [answer for answer in kept if answer not in best] if lap else []

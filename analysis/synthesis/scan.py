@@ -38,8 +38,10 @@ SHAPES = ((0.01, 3.0), (0.05, 6.0), (0.05, 6.0))
 GUIDED, SECOND, AROUND = ((1e-3, 2.0), (0.01, 3.0)), (0.01, 3.0), 48
 #: Candidates in one piece of work.
 CHUNK = 4096
+#: One of so many coupler curves is that of the crank pin.
+PINNED = 64
 #: Of a chunk of coupler curves, how many are placed over the target: the most alike.
-PLACED = 400
+PLACED = 160
 #: Steps of a coupler curve and points of it at even arc length.
 CURVE, EVEN = 128, 64
 #: Pieces of a coupler curve that an open target is laid over: points at even arc length, first steps, lengths in steps.
@@ -375,9 +377,11 @@ def _paths(normal: Normal, limits: Limits, shapes: FloatArray, branch: int) -> C
     links = _links(shapes, limits)
     rotation = np.linspace(0.0, 2.0 * pi, CURVE, endpoint=False)
     coupler, _ = _directions(shapes, np.zeros(len(shapes)), rotation, branch, limits)
-    # the coupler point anywhere about the coupler, evenly in the logarithm of its distance
+    # the coupler point anywhere about the coupler, evenly in the logarithm of its distance; of some on the crank pin itself,
+    # whose circle no descent comes to: at no distance its direction has no meaning
     longest = links.max(axis=1)
     distance = longest * np.exp(np.log(0.1) + np.log(30.0) * shapes[:, 4])
+    distance[: len(shapes) // PINNED] = 0.0
     point = distance * np.exp(2j * pi * shapes[:, 5])
     curves = links[:, 1:2] * np.exp(1j * limits.turns * rotation) + point[:, None] * coupler
     return (_closed_paths if normal.closed else _open_paths)(normal, limits, links, curves, point, branch)
@@ -478,7 +482,7 @@ def _bounded(
 ) -> tuple[FloatArray, ComplexArray]:
     """Sizes and scales within the bounds of links and coupler point."""
     least, most = _sizes(links, limits)
-    most = np.minimum(most, limits.high[6] / np.abs(point))
+    most = np.minimum(most, limits.high[6] / np.maximum(np.abs(point), 1e-300))
     size = np.abs(scale)
     bounded = np.clip(size, np.maximum(least, 1e-9), np.maximum(most, np.maximum(least, 1e-9)))
     return bounded, scale * bounded / np.maximum(size, 1e-300)
@@ -541,6 +545,9 @@ def _apart(found: list[Candidates], starts: int, limits: Limits) -> list[Start]:
         links = (
             [start.q[3] / start.q[4], 1.0 + start.q[2] / start.q[4]] if limits.sliding else start.q[3:6] / start.q[2]
         )
+        if start.q[6] == 0.0:
+            # on the crank pin any other links trace the same circle
+            links = np.ones(len(links))
         second = (
             [log(start.pivot[0] / start.q[2]), cos(start.pivot[1]), sin(start.pivot[1])] if len(start.pivot) else []
         )
