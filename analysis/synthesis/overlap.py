@@ -11,14 +11,92 @@ from __future__ import annotations
 import numpy as np
 from numba import boolean, float64, int64, void
 
-from ..numerics.codegen import MATRIX, VECTOR, kernel
+from ..numerics.codegen import MATRIX, VECTOR, inner, kernel, part
 
-#: Most crossings of one segment that are looked at.
+#: Most crossings of one segment that are looked at, but for one.
 CROSSINGS = 64
+#: Sine of the angle between segments, and share of the extent by which they are apart, up to which they lie on one another.
+PARALLEL = 1e-12
 #: Horizontal bands by which segments are found: a segment is compared with those in its own bands alone.
 BANDS = 96
 #: Segments of a polyline that are passed over together where none of them can be the nearest.
 STRETCH = 12
+
+
+@part
+def _segments(curve, target):
+    """Ends of all segments of two closed polygons, rows xa, ya, xb, yb, and their boxes, rows least and greatest x, then y."""
+    n, m = curve.shape[1], target.shape[1]
+    ends, box = np.empty((4, n + m)), np.empty((4, n + m))
+    for i in range(n + m):
+        for axis in range(2):
+            if i < n:
+                ends[axis, i], ends[2 + axis, i] = curve[axis, i], curve[axis, (i + 1) % n]
+            else:
+                ends[axis, i], ends[2 + axis, i] = target[axis, i - n], target[axis, (i - n + 1) % m]
+            box[2 * axis, i] = min(ends[axis, i], ends[2 + axis, i])
+            box[2 * axis + 1, i] = max(ends[axis, i], ends[2 + axis, i])
+    return ends, box
+
+
+@part
+def _banded(box, floor, scale):
+    """The first and the last band of each segment, and the segments of each band, one band after the other, from where."""
+    total = box.shape[1]
+    first, last = np.empty(total, np.int64), np.empty(total, np.int64)
+    begin = np.zeros(BANDS + 1, np.int64)
+    for i in range(total):
+        first[i] = min(int(scale * (box[2, i] - floor)), BANDS - 1)
+        last[i] = min(int(scale * (box[3, i] - floor)), BANDS - 1)
+        begin[first[i] + 1 : last[i] + 2] += 1
+    begin = np.cumsum(begin)
+    members, filled = np.empty(begin[BANDS], np.int64), begin[:BANDS].copy()
+    for i in range(total):
+        for band in range(first[i], last[i] + 1):
+            members[filled[band]] = i
+            filled[band] += 1
+    return first, last, begin, members
+
+
+@inner
+def _cut(i, ends, box, bands, near, cuts, twins, spans):
+    """Where a segment is cut by others, from 0 to 1, and the segments that lie on it, with the spans of it.
+
+    Returns the number of pieces and that of these segments.
+    """
+    first, last, begin, members = bands
+    dx, dy = ends[2, i] - ends[0, i], ends[3, i] - ends[1, i]
+    size, square = abs(dx) + abs(dy), dx * dx + dy * dy
+    low_x, high_x, low_y, high_y = box[0], box[1], box[2], box[3]
+    left, right, low, high = low_x[i], high_x[i], low_y[i], high_y[i]
+    cuts[0] = 0.0
+    count, like = 1, 0
+    for band in range(first[i], last[i] + 1):
+        for k in members[begin[band] : begin[band + 1]]:
+            # once, in the first band that both are in
+            apart = (high_x[k] < left) | (low_x[k] > right) | (high_y[k] < low) | (low_y[k] > high)
+            if apart or k == i or band != max(first[i], first[k]) or count >= CROSSINGS:
+                continue
+            ex, ey = ends[2, k] - ends[0, k], ends[3, k] - ends[1, k]
+            cross = dx * ey - dy * ex
+            wx, wy = ends[0, k] - ends[0, i], ends[1, k] - ends[1, i]
+            if abs(cross) <= PARALLEL * size * (abs(ex) + abs(ey)):
+                if square > 0.0 and abs(wx * dy - wy * dx) <= near * size:
+                    own = (wx * dx + wy * dy) / square
+                    other = own + (ex * dx + ey * dy) / square
+                    spans[0, like], spans[1, like], twins[like] = min(own, other), max(own, other), k
+                    like += 1
+                    for place in (own, other):
+                        if 0.0 < place < 1.0:
+                            cuts[count] = place
+                            count += 1
+                continue
+            own, other = (wx * ey - wy * ex) / cross, (wx * dy - wy * dx) / cross
+            if 0.0 < own < 1.0 and 0.0 <= other <= 1.0:
+                cuts[count] = own
+                count += 1
+    cuts[count] = 1.0
+    return count, like
 
 
 @kernel(float64(MATRIX, MATRIX, MATRIX), purpose="the curves of linkages")
@@ -27,75 +105,50 @@ def symmetric_difference(curve, target, gradient):
 
     ``curve`` and ``target`` have the rows x, y, shape (2, n) and (2, m); ``gradient`` takes the derivatives, shape (2, n).
     """
-    n, m = curve.shape[1], target.shape[1]
-    total = n + m
-    xa, ya, xb, yb = np.empty(total), np.empty(total), np.empty(total), np.empty(total)
-    for i in range(n):
-        j = (i + 1) % n
-        xa[i], ya[i], xb[i], yb[i] = curve[0, i], curve[1, i], curve[0, j], curve[1, j]
-    for i in range(m):
-        j = (i + 1) % m
-        xa[n + i], ya[n + i], xb[n + i], yb[n + i] = target[0, i], target[1, i], target[0, j], target[1, j]
-    low_x, high_x = np.minimum(xa, xb), np.maximum(xa, xb)
-    low_y, high_y = np.minimum(ya, yb), np.maximum(ya, yb)
+    n = curve.shape[1]
+    ends, box = _segments(curve, target)
+    xa, ya, xb, yb = ends[0], ends[1], ends[2], ends[3]
     gradient[:] = 0.0
-    floor, height = low_y.min(), high_y.max() - low_y.min()
+    floor, height = box[2].min(), box[3].max() - box[2].min()
     if not np.isfinite(height):
         return np.nan
-    # the segments of each band, one band after the other
-    scale = BANDS / max(height, 1e-300)
-    first, last = np.empty(total, np.int64), np.empty(total, np.int64)
-    begin = np.zeros(BANDS + 1, np.int64)
-    for i in range(total):
-        first[i] = min(int(scale * (low_y[i] - floor)), BANDS - 1)
-        last[i] = min(int(scale * (high_y[i] - floor)), BANDS - 1)
-        begin[first[i] + 1 : last[i] + 2] += 1
-    begin = np.cumsum(begin)
-    members, filled = np.empty(begin[BANDS], np.int64), begin[:BANDS].copy()
-    for i in range(total):
-        for band in range(first[i], last[i] + 1):
-            members[filled[band]] = i
-            filled[band] += 1
+    scale, near = BANDS / max(height, 1e-300), PARALLEL * (height + box[1].max() - box[0].min())
+    bands = _banded(box, floor, scale)
+    _, _, begin, members = bands
     area = 0.0
-    cuts = np.empty(CROSSINGS + 2)
-    for i in range(total):
-        dx, dy = xb[i] - xa[i], yb[i] - ya[i]
-        left, right, low, high = low_x[i], high_x[i], low_y[i], high_y[i]
-        cuts[0] = 0.0
-        count = 1
-        for band in range(first[i], last[i] + 1):
-            for k in members[begin[band] : begin[band + 1]]:
-                # once, in the first band that both are in
-                apart = (high_x[k] < left) | (low_x[k] > right) | (high_y[k] < low) | (low_y[k] > high)
-                if apart or k == i or band != max(first[i], first[k]):
-                    continue
-                ex, ey = xb[k] - xa[k], yb[k] - ya[k]
-                cross = dx * ey - dy * ex
-                if cross == 0.0:
-                    continue
-                wx, wy = xa[k] - xa[i], ya[k] - ya[i]
-                own, other = (wx * ey - wy * ex) / cross, (wx * dy - wy * dx) / cross
-                if 0.0 < own < 1.0 and 0.0 <= other <= 1.0 and count <= CROSSINGS:
-                    cuts[count] = own
-                    count += 1
-        cuts[count] = 1.0
+    cuts, twins, spans = np.empty(CROSSINGS + 2), np.empty(CROSSINGS, np.int64), np.empty((2, CROSSINGS))
+    # the last piece that a segment lies on
+    covered, number = np.full(ends.shape[1], -1), 0
+    for i in range(ends.shape[1]):
+        count, like = _cut(i, ends, box, bands, near, cuts, twins, spans)
         cuts[: count + 1].sort()
+        xi, yi = xa[i], ya[i]
+        dx, dy = xb[i] - xi, yb[i] - yi
         for piece in range(count):
             a, b = cuts[piece], cuts[piece + 1]
             if b <= a:
                 continue
-            # left of the middle of this piece: the ray from there to the right counts what is gone round
             middle = 0.5 * (a + b)
-            x, y = xa[i] + middle * dx, ya[i] + middle * dy
+            number += 1
+            shared = 1
+            for t in range(like):
+                if spans[0, t] < middle < spans[1, t]:
+                    covered[twins[t]] = number
+                    shared += 1
+            if shared % 2 == 0:
+                # an even number of them on one another bounds nothing
+                continue
+            # left of the middle of this piece: the ray from there to the right counts what is gone round
+            x, y = xi + middle * dx, yi + middle * dy
             # a horizontal segment has its left above or below, any other to one side
             odd = (dy > 0.0) or (dy == 0.0 and dx < 0.0)
             band = min(max(int(scale * (y - floor)), 0), BANDS - 1)
             for k in members[begin[band] : begin[band + 1]]:
-                spans = k != i and (ya[k] > y) != (yb[k] > y)
-                if spans and xa[k] + (y - ya[k]) * (xb[k] - xa[k]) / (yb[k] - ya[k]) > x:
+                spanned = k != i and (ya[k] > y) != (yb[k] > y)
+                if spanned and xa[k] + (y - ya[k]) * (xb[k] - xa[k]) / (yb[k] - ya[k]) > x and covered[k] != number:
                     odd = not odd
-            side = 1.0 if odd else -1.0
-            x0, y0 = xa[i] + a * dx, ya[i] + a * dy
+            side = (1.0 if odd else -1.0) / shared
+            x0, y0 = xi + a * dx, yi + a * dy
             area += 0.5 * side * (b - a) * (x0 * dy - y0 * dx)
             if i < n:
                 # shares of the piece's sweep that go to the segment's two ends

@@ -78,6 +78,29 @@ def test_area_of_the_symmetric_difference_is_that_of_the_faces(n: int, m: int) -
         assert float((gradient * step).sum()) == pytest.approx(0.5 * (ends[0] - ends[1]), abs=1e-10)
 
 
+@pytest.mark.parametrize("backwards", [False, True])
+@pytest.mark.parametrize("angle", [0.0, 0.4])
+@pytest.mark.parametrize(
+    ("of", "expected"),
+    [
+        # the same square begun elsewhere; beside it; half of it, and a part of one side; a corner that sticks out
+        ([(1, 0), (1, 1), (0, 1), (0, 0)], 0.0),
+        ([(1, 0), (2, 0), (2, 1), (1, 1)], 2.0),
+        ([(0, 0), (0.5, 0), (0.5, 1), (0, 1)], 0.5),
+        ([(1, 0.25), (1, 0.75), (0.5, 0.5)], 0.875),
+        ([(0, 0), (2, 0), (2, 2), (0, 2)], 3.0),
+    ],
+)
+def test_sides_that_lie_on_one_another(
+    of: list[tuple[float, float]], expected: float, angle: float, backwards: bool
+) -> None:
+    turned = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+    square = np.array([(0, 0), (1, 0), (1, 1), (0, 1)], dtype=float)
+    curve, target = (np.ascontiguousarray(turned @ np.array(points, dtype=float).T) for points in (square, of))
+    target = np.ascontiguousarray(target[:, ::-1]) if backwards else target
+    assert symmetric_difference(curve, target, np.empty_like(curve)) == pytest.approx(expected, abs=1e-9)
+
+
 @pytest.mark.parametrize("closed", [True, False])
 @pytest.mark.parametrize("weights", [None, "some"])
 def test_areas_and_their_gradients(closed: bool, weights: str | None) -> None:

@@ -1,0 +1,248 @@
+"""Targets that cross themselves: `synthesize` as it comes, beside a long differential evolution on the area itself.
+
+    python -m benchmarks.crossing                           # runs all, writes the results, prints the table
+    python -m benchmarks.crossing --budget 60 --target eight
+
+Each target is asked for with a transmission angle of 40 degrees over a full turn, and with a full turn alone. SciPy's
+differential evolution has the same unknowns, bounds and constraints, the measure compiled and a generation at a time; it is
+begun afresh, in turn of either assembly, until its time of the processor is over, and each run ends by a simplex. Both are
+measured alike, by `analysis.synthesis.evaluate`. The results are a row for each target and constraint.
+"""
+
+from __future__ import annotations
+
+import argparse
+import csv
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from itertools import count
+from math import inf, tau
+from pathlib import Path
+from time import process_time
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+from rich.console import Console
+from scipy.optimize import Bounds, NonlinearConstraint, OptimizeResult, differential_evolution
+from threadpoolctl import threadpool_limits
+
+from analysis.synthesis import FullTurn, TargetPath, UntimedPath, evaluate, normal_form, synthesize, turn
+from analysis.synthesis.black_box import MEMBERS, PENALTY, BlackBox, descend_from
+from analysis.synthesis.constraints import USUAL, Constraint, limits_of
+from analysis.synthesis.kernels import coupler_path
+from analysis.synthesis.overlap import nearest, symmetric_difference
+from analysis.synthesis.refine import divided
+from analysis.synthesis.starts import linkage_of
+from analysis.synthesis.tasks import Normal
+
+FloatArray = NDArray[np.float64]
+
+RESULTS = Path("out/crossing.csv")
+BUDGET = 10.0
+#: Points of the curves that evolution compares, generations of one run, and by how much a constraint may be violated.
+CURVE, GENERATIONS, KEPT = 120, 800, 1e-4
+ASKED: Mapping[str, tuple[Constraint, ...]] = {"40 degrees": USUAL, "full turn": (FullTurn(),)}
+
+
+def eight(t: FloatArray) -> FloatArray:
+    """Of Gerono, twice as long as wide."""
+    return np.column_stack([0.5 * np.sin(t), 0.25 * np.sin(2.0 * t)])
+
+
+def lemniscate(t: FloatArray) -> FloatArray:
+    """Of Bernoulli."""
+    return np.column_stack([np.cos(t), np.sin(t) * np.cos(t)]) / (1.0 + np.sin(t)[:, None] ** 2)
+
+
+def limacon(t: FloatArray) -> FloatArray:
+    """With a loop inside the other."""
+    return (0.5 + np.cos(t))[:, None] * np.column_stack([np.cos(t), np.sin(t)])
+
+
+def targets() -> dict[str, TargetPath]:
+    """The targets by their name; the open ones but for the last come to their first point again."""
+    round_, there = turn(40), np.linspace(0.0, tau, 41)
+    s = np.linspace(-1.3, 1.3, 41)
+    return {
+        "eight": TargetPath(points=eight(round_), closed=True),
+        "eight, open": TargetPath(points=eight(there), closed=False),
+        "lemniscate": TargetPath(points=lemniscate(round_), closed=True),
+        "lemniscate, open": TargetPath(points=lemniscate(there), closed=False),
+        "limaçon": TargetPath(points=limacon(round_), closed=True),
+        "loop, open": TargetPath(points=np.column_stack([s**3 - s, s**2]), closed=False),
+    }
+
+
+class Row(NamedTuple):
+    """Errors (m2) of a target, and the time of the processor that `synthesize` took (s)."""
+
+    target: str
+    asked: str
+    ours: float
+    evolution: float
+    seconds: float
+
+
+# Evolution
+
+_path, _nearest, _difference = (njit(kernel.py_func) for kernel in (coupler_path, nearest, symmetric_difference))
+
+
+@njit
+def _areas(rows, spans, branch, target, middles, lengths, closed, areas):
+    """Areas between the curves of linkages and a target, by its points or its pieces; infinite where links cannot be joined."""
+    n, m = CURVE, middles.shape[1]
+    zero, out, gradient, half = np.zeros(n), np.empty((2, n)), np.empty((2, n)), np.empty((2, n - 1))
+    distance, segment, share = np.empty(max(n, m)), np.empty(max(n, m), np.int64), np.empty(max(n, m))
+    for row in range(len(rows)):
+        at = np.arange(n) * (spans[row] / (n if closed else n - 1))
+        _path(np.cos(at), np.sin(at), zero, zero, rows[row], branch, out)
+        areas[row] = np.inf
+        if not np.isfinite(out.sum()):
+            continue
+        if closed:
+            areas[row] = _difference(out, target, gradient)
+            continue
+        _nearest(middles, out, False, distance, segment, share)
+        total = (distance[:m] * lengths).sum()
+        half[:] = 0.5 * (out[:, 1:] + out[:, :-1])
+        _nearest(half, target, False, distance, segment, share)
+        for k in range(n - 1):
+            total += distance[k] * np.hypot(out[0, k + 1] - out[0, k], out[1, k + 1] - out[1, k])
+        areas[row] = 0.5 * total
+
+
+class Evolution:
+    """Differential evolution on the area between a path and the curve of one assembly."""
+
+    def __init__(self, task: UntimedPath, normal: Normal, box: BlackBox) -> None:
+        self.task, self.normal, self.box = task, normal, box
+        assert normal.outline is not None
+        line, _ = divided(normal.outline, normal.outline_weights, normal.closed)
+        self._target = np.ascontiguousarray([normal.outline.real, normal.outline.imag])
+        self._middles = np.ascontiguousarray(0.5 * (line[:, 1:] + line[:, :-1]))
+        self._lengths = np.hypot(*np.diff(line, axis=1))
+
+    def areas(self, x: FloatArray) -> FloatArray:
+        """Of rows of unknowns, in units squared."""
+        q, areas = np.ascontiguousarray(self.box._linkages(x)[:, :10]), np.empty(len(x))
+        spans = np.full(len(x), tau) if self.normal.closed else np.ascontiguousarray(x[:, -1])
+        branch = float(self.box.branch)
+        _areas(q, spans, branch, self._target, self._middles, self._lengths, self.normal.closed, areas)
+        return areas
+
+    def charge(self, x: FloatArray) -> float:
+        """The area of one linkage and, in proportion, every violated constraint."""
+        if (x < self.box.low).any() or (x > self.box.high).any():
+            return inf
+        return float(self.areas(x[None, :])[0]) + PENALTY * float(self.box.violations(x[None, :]).clip(min=0.0).sum())
+
+    def error(self, x: FloatArray) -> float:
+        """By the task's own measure (m2); infinite where a constraint is violated."""
+        if self.box.violations(x[None, :]).max() > KEPT:
+            return inf
+        start = self.box.answer(OptimizeResult(x=x, success=True, message="", nit=0)).start
+        span = tau if self.normal.closed else float(x[-1])
+        return evaluate(self.task, linkage_of(start, self.normal), np.linspace(0.0, span, self.normal.n)).error
+
+    def run(self, random: np.random.Generator, over: Callable[[], bool]) -> float:
+        """One run, stopped where its time is over, and a simplex from where it ended."""
+
+        def violations(x: FloatArray) -> FloatArray:
+            return self.box.violations(np.atleast_2d(x.T)).T.reshape(-1, *x.shape[1:])
+
+        found = differential_evolution(
+            lambda x: self.areas(np.ascontiguousarray(x.T)) if x.size else np.empty(0),
+            Bounds(self.box.low, self.box.high),
+            maxiter=GENERATIONS,
+            popsize=MEMBERS,
+            tol=1e-4,
+            init="sobol",
+            updating="deferred",
+            vectorized=True,
+            polish=False,
+            constraints=(NonlinearConstraint(violations, -np.inf, 0.0),),
+            callback=lambda intermediate_result: over(),
+            rng=random,
+        )
+        return min(self.error(found.x), self.error(descend_from(self.box, found.x, self.charge).x))
+
+
+def by_evolution(task: UntimedPath, constraints: Sequence[Constraint], budget: float) -> float:
+    """The least error of all runs within the time (m2)."""
+    normal = normal_form(task)
+    limits = limits_of(task, normal, None, constraints)
+    searches = [Evolution(task, normal, BlackBox(normal, limits, branch)) for branch in limits.branches]
+    for search in searches:
+        search.areas(search.box.low[None, :])
+    begun, best, runs = process_time(), inf, count()
+
+    def over() -> bool:
+        return process_time() - begun > budget
+
+    while not over():
+        number = next(runs)
+        best = min(best, searches[number % len(searches)].run(np.random.default_rng([0, number]), over))
+    return best
+
+
+def run(name: str, path: TargetPath, asked: str, budget: float) -> Row:
+    """Both searches on a target."""
+    task, constraints = UntimedPath(path=path), ASKED[asked]
+    with threadpool_limits(1):
+        begun = process_time()
+        ours = synthesize(task, constraints=constraints).best.error
+        seconds = process_time() - begun
+        return Row(name, asked, ours, by_evolution(task, constraints, budget), seconds)
+
+
+# Results
+
+
+def read(path: Path) -> list[Row]:
+    """The rows of a file."""
+    with path.open(newline="", encoding="utf-8") as file:
+        _, *rows = csv.reader(file)
+    return [Row(row[0], row[1], *map(float, row[2:])) for row in rows]
+
+
+def write(path: Path, rows: Iterable[Row]) -> None:
+    """Write rows to a file."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with path.open("w", newline="", encoding="utf-8") as file:
+        table = csv.writer(file, lineterminator="\n")
+        table.writerow(["target", "asked", "synthesize [m2]", "evolution [m2]", "synthesize [s]"])
+        table.writerows([*row[:2], *(f"{value:.6g}" for value in row[2:])] for row in rows)
+
+
+def markdown(rows: Iterable[Row]) -> str:
+    """The table of a page."""
+    lines = [
+        f"| {row.target} | {row.asked} | {row.ours:.4g} | {row.evolution:.4g} | {row.ours / row.evolution - 1.0:+.1%} |"
+        for row in rows
+    ]
+    heads = [
+        "| target | asked | `synthesize` [m2] | evolution [m2] | ours over evolution's |",
+        "| --- | --- | --- | --- | --- |",
+    ]
+    return "\n".join([*heads, *lines])
+
+
+def main(path: Path, names: Sequence[str], budget: float) -> None:
+    """Run, write and print."""
+    console, rows = Console(width=120), []
+    for name, target in targets().items():
+        for asked in ASKED if name in names else ():
+            rows.append(run(name, target, asked, budget))
+            write(path, rows)
+            console.print(markdown(rows[-1:]).splitlines()[-1], highlight=False, markup=False)
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--budget", type=float, default=BUDGET, help="time of the processor for evolution (s)")
+    parser.add_argument("--target", choices=tuple(targets()), action="append", help="this target alone (repeatable)")
+    parser.add_argument("--results", type=Path, default=RESULTS, help="CSV file with the results")
+    given = parser.parse_args()
+    main(given.results, given.target or tuple(targets()), given.budget)
