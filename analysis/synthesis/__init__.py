@@ -63,18 +63,7 @@ from .scene import LinkageScene
 from .search import QUICK_SEARCH, USUAL_SEARCH, Search
 from .sensitivity import Rounding, Sensitivity, costs, length_step, rounded, sensitivities
 from .solution import Evaluation, Solution, Verdicts, evaluate, judge, ranked
-from .solve import (
-    OVER,
-    Synthesis,
-    SynthesisInterrupted,
-    TradeOff,
-    TradeOffInterrupted,
-    columns_of,
-    improve,
-    synthesize,
-    there_and_back,
-    trade_off,
-)
+from .solve import Synthesis, SynthesisInterrupted, columns_of, improve, synthesize
 from .starts import CrankUnknown, PivotUnknown, SliderUnknown
 from .targets import TargetPath
 from .tasks import (
@@ -89,6 +78,7 @@ from .tasks import (
     normal_form,
     turn,
 )
+from .trading import OVER, TradeOff, TradeOffInterrupted, there_and_back, trade_off
 
 __all__ = [
     "ANGLES",

@@ -55,8 +55,9 @@ from .quick_return import QuickReturn, QuickSwing
 from .requirements import requirement
 from .search import METHODS, Method, Search
 from .solution import Solution
-from .solve import OVER, Synthesis, TradeOff, synthesize, trade_off
+from .solve import Synthesis, synthesize
 from .tasks import Task, normal_form
+from .trading import OVER, TradeOff, trade_off
 
 FloatArray = NDArray[np.float64]
 

@@ -25,10 +25,11 @@ from linkwork.errors import InputError
 from .constraints import Limits
 from .kernels import coupler_path_jacobian, link_jacobian
 from .linkage import geared, wrapped
-from .program import KEPT, Objective, Program
+from .program import KEPT, Program
 from .refine import ITERATIONS, Refinement
 from .search import USUAL_SEARCH, Search, over_cores
 from .starts import Answer, CrankUnknown, PivotUnknown, SliderUnknown, Start, apart, inside, outside
+from .statement import Objective
 from .tasks import Normal
 
 FloatArray = NDArray[np.float64]

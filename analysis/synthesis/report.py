@@ -13,8 +13,8 @@ from .limit_positions import dead_centres, mechanical_advantage, time_ratio, tog
 from .linkage import ANGLES, Linkage, SecondCrank, SliderMotion, format_ratio
 from .sensitivity import ANGLE_STEP, PIVOT_ANGLES, costs, length_step, rounded, sensitivities
 from .solution import Solution, Verdicts
-from .solve import OVER
 from .tasks import RockerFunction, Task, UntimedPath
+from .trading import OVER
 
 #: Factor and unit in which a limit of a trade-off is written, by its SI unit.
 SHOWN = {"m": (1e3, "mm"), "rad": (degrees(1.0), "deg"), "N": (1.0, "N")}

@@ -45,9 +45,10 @@ from analysis.synthesis import (
 )
 from analysis.synthesis.constraints import limits_of
 from analysis.synthesis.polish import fit_least_squares, polish, quality_of, residuals
-from analysis.synthesis.program import BETWEEN, Program
+from analysis.synthesis.program import Program
 from analysis.synthesis.scan import scan
 from analysis.synthesis.starts import Start, linkage_of, start_of
+from analysis.synthesis.statement import BETWEEN
 from analysis.synthesis.tasks import Normal
 from linkwork.errors import InputError, ParameterError
 from tests.linkages import drawn, ellipse

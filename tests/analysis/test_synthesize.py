@@ -391,7 +391,7 @@ class TestTradeOff:
             found = synthesize(*arguments, **more)
             return found if len(calls) == 3 else replace(found, solutions=(poor,))
 
-        monkeypatch.setattr("analysis.synthesis.solve.synthesize", search)
+        monkeypatch.setattr("analysis.synthesis.trading.synthesize", search)
         front = trade_off(TASK, "size", [0.4, 0.6, 0.5], search=Search(starts=1))
         assert len(calls) == 6
         assert front.solutions[0] is front.solutions[1] is front.solutions[2] is not poor
@@ -409,7 +409,7 @@ class TestTradeOff:
                 raise KeyboardInterrupt
             raise SynthesisInterrupted(synthesize(*arguments, **more), 1, 2)
 
-        monkeypatch.setattr("analysis.synthesis.solve.synthesize", search)
+        monkeypatch.setattr("analysis.synthesis.trading.synthesize", search)
         with pytest.raises(TradeOffInterrupted, match=f"stopped after {stop} of 4 problems of the trade-off") as caught:
             trade_off(TASK, "size", [0.3, 0.6], search=Search(starts=1))
         front = caught.value.trade_off
