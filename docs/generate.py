@@ -125,11 +125,19 @@ def race(of: str, page: str) -> str:
     return markdown(read(HERE / "race.csv"), of)
 
 
+def crossing(of: str, page: str) -> str:
+    """The table of docs/crossing.csv."""
+    from benchmarks.crossing import markdown, read
+
+    return markdown(read(HERE / "crossing.csv"))
+
+
 #: The parts of the pages of the theses: chapters of Youssef's, Rahman's, and the studies of ours.
 CHAPTERS = (*"345678", "R", "ours")
 #: What fills a table, from what it is of and the text of its page; `figures` takes long.
 TABLES: dict[str, Callable[[str, str], str]] = {
     "symbols": symbols, "figures": figures, "count": count, "probe": probe, "race": race,
+    "crossing": crossing,
 }  # fmt: skip
 
 

@@ -78,6 +78,13 @@ class TestLiterature:
 
 
 class TestShapes:
+    def test_a_circle_is_that_of_the_crank_pin(self) -> None:
+        circle = np.column_stack([np.cos(T), np.sin(T)])
+        solution = best(traced(circle), candidates=1 << 12, starts=1)
+        # a circle that cuts each side at a quarter and three quarters of it leaves a quarter of the sagitta all round
+        assert solution.error < 0.2501 * 2.0 * pi * (1.0 - np.cos(pi / len(T)))
+        assert solution.linkage.point_distance < 1e-3
+
     def test_a_straight_line(self) -> None:
         line = np.column_stack([np.linspace(0.0, 1.0, 21), np.zeros(21)])
         solution = best(traced(line, closed=False, measure="distance", samples=24), candidates=1 << 12, starts=4)
