@@ -127,9 +127,9 @@ def test_the_greatest_error_of_a_slider_crank_is_made_small(body: bool) -> None:
         for objective in ("error", "worst")
     )
     assert flat.value == pytest.approx(flat.evaluation.worst)
-    assert flat.value < 0.95 * plain.evaluation.worst
+    assert flat.value < 0.99 * plain.evaluation.worst
     # several are the greatest at once
-    assert np.sum(flat.evaluation.combined > 0.999 * flat.value) >= 3
+    assert np.sum(flat.evaluation.combined > 0.999 * flat.value) >= 4
 
 
 def test_an_advantage_and_a_dead_centre_are_kept() -> None:
