@@ -54,7 +54,7 @@ OURS = "Linkwork"
 RESULTS = Path("out/race.csv")
 #: When the error is taken down (s), and the time given to each search.
 TIMES = (0.05, 0.07, 0.1, 0.15, 0.2, 0.3, 0.5, 0.7, 1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 7.0, 10.0)
-BUDGET = 2.0
+BUDGET = 3.0
 #: The first call of `synthesize`, and how often its effort is doubled.
 FIRST, DOUBLED = Search(candidates=1 << 11, starts=1), 5
 #: Share by which errors may differ and still be level; error per target, in sizes, below which one is as good as exact.
