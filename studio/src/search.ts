@@ -157,6 +157,10 @@ export abstract class Search {
       this.key = key;
       this.done = false;
       this.box.classList.add("old");
+      for (const { ends, given } of this.axes) {
+        const { low, high } = this.range(given!);
+        ends.forEach((end, i) => (end.value = digits((i ? high : low) * given!.factor, 6)));
+      }
       this.timer = window.setTimeout(() => this.begin(), REST);
     }
     this.draw();
@@ -167,11 +171,6 @@ export abstract class Search {
     this.box.classList.remove("old");
     this.clear();
     this.ranges = this.axes.map(({ given }) => this.range(given!));
-    this.axes.forEach(({ ends, given }, n) =>
-      ends.forEach(
-        (end, i) => (end.value = digits((i ? this.ranges[n].high : this.ranges[n].low) * given!.factor, 4)),
-      ),
-    );
     const [{ given }] = this.axes;
     const task: Exploration = {
       given: givenOf(mechanism, values),

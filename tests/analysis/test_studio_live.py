@@ -1,0 +1,189 @@
+"""What the studio computes beside the mechanism: response, stability, a motor, powers; its numbers against Python's."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from analysis.mechanisms import PUBLISHED, mechanism_of
+from analysis.periodic import Drive, drive_of, frequency_response, natural_frequency, orbit_of
+from analysis.run import Case, InductionMotor, Inputs, case_from, simulate
+from analysis.studio import PAGE, case_of, state_of
+from benchmarks.studio import measured, report
+from tests.analysis.test_studio import _HELD, _load, _near, _opened, _saved, _varied, in_browser
+
+RPM = np.pi / 30.0
+RIG = PUBLISHED["rig-1-spring-b"]
+MOTOR = InductionMotor(breakdown_torque=6.0, breakdown_slip=0.15, synchronous_speed=48.0)
+
+
+@pytest.fixture(scope="module")
+def page(browser: Any) -> Iterator[Any]:
+    """The built page, opened as a file."""
+    made = _opened(browser, PAGE)
+    yield made
+    made.close()
+
+
+def _state(speed: float) -> dict[str, Any]:
+    mechanism = mechanism_of(RIG.parameters)
+    inputs = Drive(speed=speed * RPM).inputs(mechanism)
+    return state_of(Case(title="", parameters=RIG.parameters, inputs=inputs, stop_time=1.0))
+
+
+def _explored(page: Any, which: str, ranges: Mapping[str, tuple[float, float]]) -> None:
+    """Let the page compute a chart over these ranges, in the units that it shows, by the axis."""
+    page.click(f'[id="tab {which}"]')
+    for axis, ends in ranges.items():
+        for word, end in zip(("from", "to"), ends):
+            field = page.locator(f'[aria-label="{axis}: {word}"]')
+            field.fill(str(end))
+            field.press("Enter")
+    page.wait_for_function(f"window.studio.charts.{which}.done")
+
+
+@in_browser
+def test_the_response_is_pythons_with_its_fold_and_what_to_avoid(page: Any) -> None:
+    _load(page, _state(1020.0))
+    _explored(page, "response", {"What varies": (1000.0, 1100.0)})
+    branches = page.evaluate("window.studio.charts.response.branches")
+    points = [point for branch in branches for point in branch if not point["kind"]]
+    assert len(branches) == 2
+    largest = []
+    for point in points[:: len(points) // 12]:
+        orbit = orbit_of(RIG.parameters, Drive(speed=point["value"]), start=point["start"])
+        _near(np.array(point["start"]) / [0.05, 5.0], orbit.start / [0.05, 5.0])
+        _near(point["amplitude"], orbit.amplitude)
+        found = np.sort_complex([complex(*pair) for pair in point["multipliers"]])
+        # of a motion that grows a hundredfold a turn, errors grow as much
+        np.testing.assert_allclose(found, np.sort_complex(orbit.multipliers), atol=1e-9 * max(1.0, orbit.largest**2))
+        largest.append(orbit.largest)
+    assert min(largest) < 0.9
+    assert max(largest) > 1.5
+    wanted = frequency_response(RIG.parameters, 1000.0 * RPM, 1100.0 * RPM, doublings=0)
+    (fold,) = [s.parameter for branch in wanted.branches for s in branch.special if s.kind.value == "fold"]
+    (found_fold,) = [p["value"] for branch in branches for p in branch if p["kind"] == "fold"]
+    assert found_fold == pytest.approx(fold, rel=1e-7)
+    avoided = page.evaluate("window.studio.charts.response.avoided")
+    several = next(one for one in avoided if "several" in one["why"])
+    theirs = next(one for one in wanted.speeds_to_avoid if "several" in one.risk.value)
+    np.testing.assert_allclose([several["low"], several["high"]], [theirs.low, theirs.high], rtol=1e-5)
+    words = page.locator(".told").filter(has_text="Speeds to avoid").inner_text()
+    assert "1000 rpm to 1036 rpm (several stable motions" in words
+    assert "rises past it" in words
+    assert page.evaluate("window.studio.charts.response.context.natural") == pytest.approx(
+        natural_frequency(RIG.parameters), rel=1e-12
+    )
+    # a key goes to another speed, and the chart stays
+    before = page.evaluate("window.studio.state.values['drive.speed']")
+    page.locator('canvas[role="slider"]').focus()
+    page.keyboard.press("ArrowRight")
+    after = page.evaluate("window.studio.state.values['drive.speed']")
+    assert after - before == pytest.approx(100.0 * RPM / 200.0, rel=1e-9)
+    assert page.evaluate("window.studio.charts.response.done")
+
+
+@in_browser
+def test_every_square_of_the_stability_chart_has_the_verdict_of_its_motion(page: Any) -> None:
+    _load(page, _state(1900.0))
+    _explored(page, "stability", {"Along the width": (1850.0, 2200.0), "Along the height": (5.0, 15.0)})
+    squares = page.evaluate(
+        "(() => { const s = window.studio.charts.stability;"
+        " return [...s.cells.values()].map((one) => ({ ...one, verdict: s.verdict(one) })); })()"
+    )
+    assert {one["verdict"] for one in squares} == {"stable", "unstable"}
+    assert {(one["column"], one["row"]) for one in squares} == {(x, y) for x in range(48) for y in range(32)}
+    for one in np.random.default_rng(1).choice(squares, 12, replace=False):
+        speed = RPM * (1850.0 + 350.0 * (one["column"] + 0.5) / 48)
+        damping = 5.0 + 10.0 * (one["row"] + 0.5) / 32
+        parameters = case_of(
+            _state(1900.0) | {"values": {**_state(1900.0)["values"], "slider.damping": damping}}
+        ).parameters
+        orbit = orbit_of(parameters, Drive(speed=speed), start=one["start"])
+        assert orbit.verdict().stability.value == one["verdict"]
+        found = np.sort_complex([complex(*pair) for pair in one["multipliers"]])
+        _near(found, np.sort_complex(orbit.multipliers))
+    # a click takes the point with its verdict
+    canvas = page.locator('canvas[role="application"]')
+    box = canvas.bounding_box()
+    column, row = next((o["column"], o["row"]) for o in squares if o["verdict"] == "unstable")
+    x = 58 + (box["width"] - 70) * (column + 0.5) / 48
+    canvas.click(position={"x": x, "y": 10 + (box["height"] - 50) * (1.0 - (row + 0.5) / 32)})
+    page.wait_for_function("document.querySelector('#floquet b').textContent === 'unstable'")
+    assert page.evaluate("window.studio.state.values['slider.damping']") == pytest.approx(5.0 + 10.0 * (row + 0.5) / 32)
+
+
+@in_browser
+def test_a_motor_drives_the_crank_as_in_python(page: Any) -> None:
+    parameters, _ = _varied(2)
+    mechanism = mechanism_of(parameters)
+    inputs = Inputs(torque=(0.2, MOTOR), force=3.0)
+    case = Case(title="motor", parameters=parameters, inputs=inputs, stop_time=0.02)
+    run = _load(page, state_of(case) | {"source": "run"})
+    # a motor's torque follows the speed: nothing is held over a step
+    wanted = simulate(parameters, inputs, stop_time=0.02, step=_HELD["step"], tolerance=_HELD["tolerance"])
+    for name in mechanism.output_names:
+        _near(run["columns"][name], wanted[name])
+    found = _load(page, state_of(case))
+    orbit = orbit_of(parameters, drive_of(parameters, inputs))
+    assert found["source"] == "steady"
+    _near(found["answer"]["orbit"]["start"], orbit.start)
+    multipliers = [complex(*pair) for pair in found["answer"]["orbit"]["multipliers"]]
+    _near(np.sort_complex(multipliers), np.sort_complex(orbit.multipliers))
+    # over the speed of its field
+    page.click('[id="tab response"]')
+    page.wait_for_function("window.studio.charts.response.done")
+    points = page.evaluate("window.studio.charts.response.branches.flat()")
+    for point in points[:: len(points) // 4]:
+        motor = InductionMotor(
+            breakdown_torque=MOTOR.breakdown_torque,
+            breakdown_slip=MOTOR.breakdown_slip,
+            synchronous_speed=point["value"],
+        )
+        varied = drive_of(parameters, Inputs(torque=(0.2, motor), force=3.0))
+        again = orbit_of(parameters, varied, start=point["start"])
+        np.testing.assert_allclose(point["start"], again.start, rtol=1e-8, atol=1e-9)
+        assert point["amplitude"] == pytest.approx(again.amplitude, rel=1e-8)
+    read = case_from(tomllib.loads(_saved(page, "case").read_text(encoding="utf-8")), folder=Path())
+    assert read.inputs.parts("torque") == case.inputs.parts("torque")
+    again_of = case_of(state_of(case))
+    assert again_of.inputs.parts("torque") == case.inputs.parts("torque")
+
+
+@in_browser
+def test_powers_are_those_of_the_equations_and_the_envelope_has_the_greatest_force(page: Any) -> None:
+    parameters, drive = _varied(1)
+    mechanism = mechanism_of(parameters)
+    found = _load(page, state_of(Case(title="", parameters=parameters, inputs=drive.inputs(mechanism), stop_time=1.0)))
+    columns, equations = found["columns"], mechanism.equations
+    p = parameters.constants()
+    modes = tuple(map(float, drive.inputs(mechanism).modes(mechanism).values()))
+    channels = [drive.speed if c.kind == "command" else 0.0 for c in mechanism.channels]
+    for row in (0, 100, 500):
+        x = [columns[n][row] for n in range(mechanism.size)]
+        rates = equations.derivative(x, equations.applied(modes, channels, p), p)
+        _near([columns["power.dissipated"][row], columns["power.supplied"][row]], rates[-2:])
+    _near(columns["power.supplied"], columns["drive.applied_torque"] * columns["crank.speed"])
+    page.click('[id="tab forces"]')
+    page.select_option('[aria-label="Joint"]', label="pin.C")
+    greatest = float(np.hypot(columns["pin.C.fx"], columns["pin.C.fy"]).max())
+    said = page.locator(".told").filter(has_text="Greatest").inner_text()
+    assert float(said.split()[1]) == pytest.approx(greatest, rel=1e-3)
+    for tab in ("motion", "power"):
+        page.click(f'[id="tab {tab}"]')
+        assert page.locator("#curves figure").count() == 2
+
+
+@in_browser
+def test_dragging_goes_on_while_a_chart_is_computed(browser: Any, record_property: Any) -> None:
+    found = measured(browser, 3.0)
+    record_property("studio", report(found))
+    # on a machine that does other work too: what would be computed in the page's own thread takes seconds
+    assert found.frame[0] < 100.0
+    assert found.work < 50.0
+    assert found.squares > 1
