@@ -70,6 +70,8 @@ def measured(browser: Any, seconds: float = 4.0) -> Figures:
     # the chart goes on in its worker while the forces are looked at
     page.click('[id="tab stability"]')
     page.wait_for_function("window.studio.charts.stability.cells.size > 0", timeout=120_000)
+    page.click('[id="tab forces"]')
+    already = page.evaluate("window.studio.charts.stability.cells.size")
     box = page.locator('[data-joint="C"] .pin').bounding_box()
     x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
     page.mouse.move(x, y)
@@ -89,7 +91,7 @@ def measured(browser: Any, seconds: float = 4.0) -> Figures:
     work = worked() - before
     page.mouse.up()
     frames = np.array(page.evaluate("window.frames_.slice(2)"))
-    squares = page.evaluate("window.studio.charts.stability.cells.size")
+    squares = page.evaluate("window.studio.charts.stability.cells.size") - already
     page.close()
     return Figures(
         first,

@@ -127,8 +127,8 @@ export abstract class Search {
 
   show(active: boolean): void {
     this.active = active;
+    // what is not looked at goes on
     if (active) this.renew();
-    else this.forget();
   }
 
   /** The motion that is shown is another. */
