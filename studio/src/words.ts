@@ -60,7 +60,9 @@ export function verdictInWords(
 }
 
 export function multiplierInWords([real, imaginary]: [number, number]): string {
-  const size = digits(Math.hypot(real, imaginary));
-  if (imaginary === 0) return digits(real);
+  const modulus = Math.hypot(real, imaginary);
+  // a pair that is real but for rounding
+  if (Math.abs(imaginary) <= 1e-12 * modulus) return digits(real);
+  const size = digits(modulus);
   return `${digits(real)} ${imaginary < 0 ? "−" : "+"} ${digits(Math.abs(imaginary))}i (modulus ${size})`;
 }

@@ -37,6 +37,7 @@ test("a verdict has a margin, and a multiplier its modulus", () => {
   assert.match(verdictInWords({ ...orbit([0, 0]), size: 0, multipliers: [] }, 1e-6), /prescribed/);
   assert.equal(multiplierInWords([0.3, -0.4]), "0.3 − 0.4i (modulus 0.5)");
   assert.equal(multiplierInWords([-0.25, 0]), "-0.25");
+  assert.equal(multiplierInWords([-1.035, 9.3e-61]), "-1.035");
 });
 
 test("a motion is described by its turn and its range", () => {
