@@ -24,6 +24,8 @@ HERE = Path(__file__).resolve().parent
 EXAMPLES = HERE.parent / "examples"
 #: The first answer to each example that is a task, as a state of the page.
 ANSWERS = HERE / "openings.json"
+#: Asks a search for mechanisms of the FMUs alone.
+OF_THE_FMUS = ("--set", 'search.kinds=["four-bar", "slider-crank"]')
 #: Published sets that pages are about; examples are on the pages that name them.
 SETS = {
     "fmu": ("table-3.1", "rahman-a4-10-s1-3.5"),
@@ -35,10 +37,13 @@ SETS = {
     "slider-crank": ("rahman-ideal", "rahman-a4-10-s1-3.5", "rahman-a4-20-s1-3.5"),
     "youssef": ("table-3.1", "appendix-1", "rig-1-spring-a", "rig-1-spring-b", "rig-2-spring-c", "rig-2-spring-d"),
 }
-#: What changes over time or angle in examples that are run, and is left out where they open: the page has constant inputs.
-LEFT_OUT = {"run-up": {"force": 0.0}, "slider-crank": {"axial.speed": 0.0, "load": 0.0}}
-#: Examples of which nothing would be left.
-VARYING = ("torsion-bar",)
+#: What changes over time or angle in examples that are run, and what it is where they open: the page has constant inputs. Of a
+#: torsion bar the mean of its torque (N.m).
+CONSTANT = {
+    "run-up": {"force": 0.0},
+    "slider-crank": {"axial.speed": 0.0, "load": 0.0},
+    "torsion-bar": {"drive.torque": 5.0},
+}
 #: The page that has them all.
 ALL = "studio"
 
@@ -49,11 +54,10 @@ def states() -> dict[str, dict[str, Any]]:
     found = {name: state_of(case_from({"published": name}, folder=EXAMPLES, title=name)) for name in PUBLISHED}
     found |= json.loads(ANSWERS.read_text(encoding="utf-8"))
     for path in filter(is_run, sorted(EXAMPLES.glob("*.toml"))):
-        if path.stem not in VARYING:
-            left = LEFT_OUT.get(path.stem, {})
-            state = state_of(load_case(path, left))
-            without = f", without {' and '.join(left)}" if left else ""
-            found[path.stem] = state | {"title": state["title"] + without}
+        constant = CONSTANT.get(path.stem, {})
+        state = state_of(load_case(path, constant))
+        words = f", with constant {' and '.join(constant)}" if constant else ""
+        found[path.stem] = state | {"title": state["title"] + words}
     return found
 
 
@@ -80,17 +84,22 @@ def links(page: str, text: str) -> str:
     return f'<p class="openings">Opens in the studio: {", ".join(parts)}.</p>' if parts else ""
 
 
-def _answer(path: Path, folder: Path) -> dict[str, Any] | None:
-    """The first answer to a task, if it is a mechanism of the FMUs; where a slider is moved, with the slider let go."""
+def _answer(path: Path, folder: Path) -> dict[str, Any]:
+    """The first answer to a task that is a mechanism of the FMUs; where a slider is moved, with the slider let go."""
     text = path.read_text(encoding="utf-8")
     command = "tune" if "[tune]" in text else "slider-motion" if "[tracking]" in text else "synthesize"
     words = [sys.executable, "-m", "analysis.cli", command, str(path), "--out", str(folder)]
     subprocess.run(words, check=True, stdout=subprocess.DEVNULL)
-    cases = [case for case in sorted(folder.glob("*.toml")) if "parameters" not in case.stem]
-    if not cases:
-        return None
+    added = ", the slider let go" if command == "slider-motion" else ""
+    if not (cases := _cases(folder)):
+        subprocess.run([*words, *OF_THE_FMUS], check=True, stdout=subprocess.DEVNULL)
+        cases, added = _cases(folder), ", the best that the FMUs have"
     state = state_of(load_case(cases[0], {"force": 0.0} if command == "slider-motion" else {}))
-    return state | {"title": state["title"] + (", the slider let go" if command == "slider-motion" else "")}
+    return state | {"title": state["title"] + added}
+
+
+def _cases(folder: Path) -> list[Path]:
+    return [case for case in sorted(folder.glob("*.toml")) if "parameters" not in case.stem]
 
 
 def main(names: list[str]) -> None:
@@ -100,7 +109,6 @@ def main(names: list[str]) -> None:
         if not is_run(path) and path.stem in (names or [path.stem]):
             with tempfile.TemporaryDirectory() as folder:
                 found[path.stem] = _answer(path, Path(folder))
-    found = {name: state for name, state in found.items() if state}
     ANSWERS.write_text(json.dumps(found, indent=1, sort_keys=True) + "\n", encoding="utf-8")
 
 

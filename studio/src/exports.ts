@@ -1,6 +1,6 @@
 /** What is taken out of the page: files, and a link that holds the state. */
 
-import type { Rows } from "./core";
+import type { Orbit, Rows } from "./core";
 import { type Given, type Mechanism, rowLength, type State, stateFrom, type Tables } from "./tables";
 
 const value = (given: Given, state: State): number => state.values[given.name] ?? given.start;
@@ -48,21 +48,26 @@ export function caseText(m: Mechanism, state: State, duration: number): string {
   return `${lines.join("\n")}\n`;
 }
 
-/** Lines of Python that compute what the page shows. */
-export function pythonText(m: Mechanism, state: State, duration: number): string {
+/** Lines of Python that compute what the page shows: the run, and the periodic motion if there is one. */
+export function pythonText(m: Mechanism, state: State, duration: number, orbit?: Orbit): string {
+  const start = orbit?.found && orbit.size > 0 ? JSON.stringify(orbit.start) : undefined;
   return `import tomllib
 from pathlib import Path
 
-from analysis.periodic import drive_of, orbit_of
-from analysis.run import case_from, simulate
+${start ? "from analysis.periodic import drive_of, orbit_of\n" : ""}from analysis.run import case_from, simulate
 
 case = case_from(tomllib.loads(r"""
 ${caseText(m, state, duration)}"""), folder=Path())
 run = simulate(case.parameters, case.inputs, initial=case.initial, stop_time=case.stop_time, step=case.step)
 print(run)
-orbit = orbit_of(case.parameters, drive_of(case.parameters, case.inputs, case.initial))
+${
+  start
+    ? `# of several motions that which the page shows, from its start
+orbit = orbit_of(case.parameters, drive_of(case.parameters, case.inputs, case.initial), start=${start})
 print(orbit, orbit.multipliers)
-`;
+`
+    : ""
+}`;
 }
 
 const escaped = (text: string): string =>

@@ -529,7 +529,7 @@ class Studio {
     if (form === "case")
       save("case.toml", text(caseText(m, this.state, this.duration()), "application/toml"));
     else if (form === "python")
-      save("case.py", text(pythonText(m, this.state, this.duration()), "text/x-python"));
+      save("case.py", text(pythonText(m, this.state, this.duration(), this.answer?.orbit), "text/x-python"));
     else if (form === "ssv") save("parameters.ssv", text(parameterText(m, this.state), "application/xml"));
     else if (form === "dxf") save("drawing.dxf", text(dxfText(this.picture.drawn()), "image/vnd.dxf"));
     else if (form === "table" && rows) save("motion.csv", text(tableText(m, rows), "text/csv"));

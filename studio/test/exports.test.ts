@@ -1,6 +1,6 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { caseText, linkOf, parameterText, stateIn, tableText } from "../src/exports";
+import { caseText, linkOf, parameterText, pythonText, stateIn, tableText } from "../src/exports";
 import { STATE, TABLES, WHEEL } from "./wheel";
 
 Object.assign(globalThis, { location: { href: "https://example.org/page.html#old" } });
@@ -37,6 +37,21 @@ test("a motor is written beside the torque, where there is one", () => {
   assert.ok(lines(0).includes("drive.torque = 0.5"));
   const law = "breakdown_torque = 5.0, breakdown_slip = 0.2, synchronous_speed = 50.0";
   assert.ok(lines(5).includes(`drive.torque = [0.5, { kind = "induction-motor", ${law} }]`));
+});
+
+test("the lines of Python start from the motion that is shown, if there is one", () => {
+  const orbit = {
+    found: true,
+    sentence: "",
+    size: 1,
+    period: 1,
+    start: [0.1, -2e-7],
+    place: 0,
+    multipliers: [],
+  };
+  assert.match(pythonText(WHEEL, STATE, 2, orbit), /orbit_of\(.*, start=\[0\.1,-2e-7\]\)/);
+  for (const none of [undefined, { ...orbit, found: false }, { ...orbit, size: 0 }])
+    assert.doesNotMatch(pythonText(WHEEL, STATE, 2, none), /orbit/);
 });
 
 test("parameter values are XML, with numbers of their kind and every digit", () => {
