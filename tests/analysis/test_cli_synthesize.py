@@ -307,7 +307,7 @@ def test_a_solution_with_a_defect_is_reported(linkwork, tmp_path, monkeypatch) -
         (ELLIPSE + '[trade_off]\nover = "size"\nlimits = [1]', "have at least 2 entries"),
         (
             ELLIPSE + QUICK + "[constraints]\nlargest_link = 0.5\npivot_A = [[9, 9], [10, 9], [9, 10]]",
-            "no linkage keeps all bounds and constraints",
+            "the regions of pivot A and the bounds of its place have no point in common",
         ),
     ],
 )

@@ -29,7 +29,7 @@ def test_a_neighbour_followed_by_collocation_is_the_integrator_s() -> None:
         parameters, drive = family.at(float(speed))
         orbit = orbit_of(parameters, drive)
         starts = np.vstack([orbit.start, pieces_from(parameters, drive, angles[:2], orbit.start[None, :])[0]])
-        direction = family._direction(float(speed), 30.0, 31.0)
+        direction = family.direction(float(speed), 30.0, 31.0)
         found = path.follow(parameters, drive, starts, float(speed), direction, 1.0)
         used += found.clearance is not None
         ends, matrices, slopes = pieces_from(parameters, drive, angles, starts, direction, 1.0)
@@ -44,7 +44,7 @@ def test_collocation_knows_how_near_the_links_come_to_the_limit_of_assembly() ->
     orbit = find_orbit(SMOOTH, speed=30.0)
     family = Family(parameters=SMOOTH, drive=Drive(speed=30.0))
     path = PeriodPath(np.array([0.0, 2.0 * pi]), True)
-    direction = family._direction(30.0, 30.0, 31.0)
+    direction = family.direction(30.0, 30.0, 31.0)
     found = path.follow(orbit.parameters, orbit.drive, orbit.start[None, :], 30.0, direction, 1.0)
     assert found.clearance == pytest.approx(orbit.clearance(), rel=1e-2)
 
@@ -55,7 +55,7 @@ def test_friction_is_left_to_the_integrator() -> None:
     family = Family(parameters=rough, drive=Drive(speed=30.0))
     orbit = orbit_of(rough, Drive(speed=30.0))
     path = PeriodPath(np.array([0.0, 2.0 * pi]), False)
-    direction = family._direction(30.0, 30.0, 31.0)
+    direction = family.direction(30.0, 30.0, 31.0)
     assert path.follow(rough, orbit.drive, orbit.start[None, :], 30.0, direction, 1.0).clearance is None
 
 
