@@ -303,8 +303,10 @@ class _Motion(SimpleNamespace):
 def test_basins_name_the_motion_that_a_start_ends_in() -> None:
     flow = SimpleNamespace(components=(("q", "m"), ("q'", "m/s")), size=2)
     motions = [
-        _Motion(start=np.array([0.1 * n, 0.0]), amplitude=0.01 * n, largest=0.5, swing=("q", "m"), flow=flow)
-        for n in (1, 2, 3)
+        _Motion(
+            start=np.array([0.1 * n, 0.0]), amplitude=0.01 * n, largest=0.5, swing=("q", "m"), flow=flow, turns=turns
+        )
+        for n, turns in ((1, 1), (2, 1), (3, 4))
     ]
     found = Basins(
         position=np.array([0.0, 1.0]),
@@ -316,7 +318,7 @@ def test_basins_name_the_motion_that_a_start_ends_in() -> None:
     (part,) = figures.picture(found).parts
     said = part.hover["it"]
     assert said[0][0] == said[1][1] == "ends in motion 1, amplitude of q 1 cm"
-    assert said[0][1] == "ends in motion 2, amplitude of q 3 cm"
+    assert said[0][1] == "ends in motion 2 of 4 turns, amplitude of q 3 cm"
     assert said[1][0] == "comes to the limit of assembly"
     assert list(part.classes) == [said[0][0], said[0][1], said[1][0]]
     assert part.values.tolist() == [[0, 1], [2, 0]]
