@@ -252,6 +252,10 @@ static Reason cut(void) {
         snprintf(sentence, SENTENCE, "the crank is at rest: there is no periodic motion");
         return INPUT_NOT_FINITE;
     }
+    if (section.x[FREEDOMS + CRANK] < 0.0) {
+        snprintf(sentence, SENTENCE, "the crank turns backwards: periodic motions are sought where it turns forwards");
+        return INPUT_NOT_FINITE;
+    }
     return GOOD;
 }
 

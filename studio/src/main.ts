@@ -133,9 +133,12 @@ class Studio {
       by("views").classList.toggle("planar", mechanism.picture.planar);
       this.charts.show(mechanism, state.source ?? "steady", bytes);
       this.python.show(mechanism, state);
+      this.panel.show(mechanism, state.values, state.locks ?? []);
+    } else {
+      this.panel.update(state.values, true);
+      this.panel.lock(state.locks ?? []);
     }
     if (view) this.view.show(mechanism.picture.planar, view);
-    this.panel.show(mechanism, state.values, state.locks ?? []);
     this.backdrop.show(state.behind);
     this.listNumbers();
     const { values, count, sentence } = this.begin();
@@ -232,7 +235,7 @@ class Studio {
     place.replaceChildren("Periodic motion: ");
     const word = document.createElement("b");
     word.textContent = verdict;
-    word.className = verdict === "unstable" ? verdict : "";
+    word.className = verdict === "unstable" || !orbit.found ? "unstable" : "";
     place.append(word);
     if (orbit.size > 0)
       place.append(`; Floquet multipliers ${orbit.multipliers.map(multiplierInWords).join(", ")}`);
@@ -425,6 +428,9 @@ class Studio {
 
   private name(): void {
     by("title").textContent = this.state.title;
+    const { name, given, sets } = this.mechanism;
+    const set = sets.find(({ values }) => given.every((g) => (values[g.name] ?? g.start) === this.value(g)));
+    by<HTMLSelectElement>("set").value = set ? `${name}/${set.name}` : "";
     by<HTMLButtonElement>("undo").disabled = !this.history.canUndo;
     by<HTMLButtonElement>("redo").disabled = !this.history.canRedo;
   }
@@ -464,7 +470,7 @@ class Studio {
     for (const value of RATES) rate.add(new Option(value === 1 ? "1" : `1/${1 / value}`, String(value)));
     rate.value = String(1 / 10);
     const sets = by<HTMLSelectElement>("set");
-    sets.add(new Option("…", ""));
+    sets.add(new Option("values of its own", ""));
     for (const m of this.tables.mechanisms)
       for (const { name, source } of m.sets) {
         const option = new Option(`${m.title}: ${name}`, `${m.name}/${name}`);
@@ -553,14 +559,14 @@ class Studio {
   }
 
   private key(event: KeyboardEvent, actions: Record<string, () => void>): void {
-    const typing = event.target instanceof HTMLInputElement || event.target instanceof HTMLSelectElement;
+    const typing = event.target instanceof Element && event.target.matches("input, select, textarea");
     const control = event.ctrlKey || event.metaKey;
     let action: (() => void) | undefined;
     if (control && event.key.toLowerCase() === "z") action = event.shiftKey ? actions.redo : actions.undo;
     else if (control && event.key.toLowerCase() === "y") action = actions.redo;
     else if (!typing && !control && !event.altKey)
       action = {
-        " ": event.target instanceof HTMLButtonElement ? undefined : actions.play,
+        " ": (event.target as Element).matches("button, summary, a") ? undefined : actions.play,
         a: actions.assembly,
         l: actions.theme,
         ",": () => this.step(-1),

@@ -1,7 +1,7 @@
 /** Sliders and fields of all that is given, by section. */
 
 import type { Given, Mechanism, Values } from "./tables";
-import { digits } from "./words";
+import { called, digits } from "./words";
 
 /** Sections that are open at first. */
 const OPEN = ["Dimensions", "Drive and loads"];
@@ -15,12 +15,16 @@ export interface Listener {
 interface Row {
   given: Given;
   line: HTMLElement;
-  update: (value: number) => void;
+  update: (value: number, all?: boolean) => void;
 }
 
 /** The range of a slider, in SI. */
 function range(given: Given, value: number): [number, number] {
-  if (given.unit === "deg") return [-Math.PI, Math.PI];
+  if (given.unit === "deg") {
+    // some sources count to a whole turn
+    const turn = 2 * Math.PI;
+    return [value < -Math.PI ? -turn : value > Math.PI ? 0 : -Math.PI, value > Math.PI ? turn : Math.PI];
+  }
   const size = 2.5 * Math.max(Math.abs(value), Math.abs(given.start)) || 10 * (given.nominal ?? 0);
   const round = size > 0 ? 10 ** Math.floor(Math.log10(size)) : 1;
   const most = Math.ceil(size / round) * round || 1;
@@ -29,6 +33,7 @@ function range(given: Given, value: number): [number, number] {
 
 export class Panel {
   private rows: Row[] = [];
+  private readonly locks = new Map<string, HTMLInputElement>();
 
   constructor(
     private readonly place: HTMLElement,
@@ -38,6 +43,7 @@ export class Panel {
   show(mechanism: Mechanism, values: Values, locks: string[]): void {
     this.place.replaceChildren();
     this.rows = [];
+    this.locks.clear();
     const sections = [...new Set(mechanism.given.map((g) => g.section))];
     sections.sort((a, b) => ORDER.indexOf(a) - ORDER.indexOf(b));
     for (const name of sections) {
@@ -53,9 +59,15 @@ export class Panel {
     this.hide(values);
   }
 
-  update(values: Values): void {
-    for (const { given, update } of this.rows) update(values[given.name] ?? given.start);
+  /** Show values; `all`: in the field too in which someone is. */
+  update(values: Values, all = false): void {
+    for (const { given, update } of this.rows) update(values[given.name] ?? given.start, all);
     this.hide(values);
+  }
+
+  /** Of a state that comes back: which dimensions are locked. */
+  lock(locks: string[]): void {
+    for (const [name, lock] of this.locks) lock.checked = locks.includes(name);
   }
 
   /** Inputs that do not act, because their freedom is driven otherwise, are not shown. */
@@ -73,7 +85,7 @@ export class Panel {
     const line = document.createElement("div");
     line.className = "row";
     const label = document.createElement("label");
-    label.textContent = given.name.replace(".", " ").replaceAll("_", " ");
+    label.textContent = called(given);
     label.title = given.text;
     label.htmlFor = `field ${given.name}`;
     line.append(label);
@@ -96,7 +108,7 @@ export class Panel {
     const [slider, field] = [document.createElement("input"), document.createElement("input")];
     slider.type = "range";
     slider.step = "any";
-    slider.setAttribute("aria-label", `${given.name}, slider`);
+    slider.setAttribute("aria-label", `${called(given)}, slider`);
     field.type = "number";
     field.step = "any";
     field.id = `field ${given.name}`;
@@ -105,8 +117,8 @@ export class Panel {
     unit.className = "unit";
     unit.textContent = given.unit;
     let current = Number.NaN;
-    const update = (now: number): void => {
-      if (now === current) return;
+    const update = (now: number, all = false): void => {
+      if (now === current && !all) return;
       current = now;
       if (document.activeElement !== slider) {
         const [least, most] = range(given, now);
@@ -115,14 +127,18 @@ export class Panel {
       }
       slider.value = String(now);
       slider.setAttribute("aria-valuetext", `${digits(now * given.factor)} ${given.unit}`);
-      if (document.activeElement !== field) field.value = digits(now * given.factor, 6);
+      if (all || document.activeElement !== field) field.value = digits(now * given.factor, 6);
       field.dataset.value = String(now);
     };
     slider.addEventListener("input", () => this.listener.change(given.name, Number(slider.value), false));
-    slider.addEventListener("change", () => this.listener.change(given.name, Number(slider.value), true));
+    slider.addEventListener("change", () => {
+      this.listener.change(given.name, Number(slider.value), true);
+      update(current, true);
+    });
+    // what was refused is shown no longer
     field.addEventListener("change", () => {
       if (field.value !== "") this.listener.change(given.name, Number(field.value) / given.factor, true);
-      current = Number.NaN;
+      update(current, true);
     });
     line.append(slider, field, unit);
     if (given.section === "Dimensions") line.append(this.locker(given, locked));
@@ -132,10 +148,11 @@ export class Panel {
 
   private locker(given: Given, locked: boolean): HTMLElement {
     const lock = document.createElement("input");
+    this.locks.set(given.name, lock);
     lock.type = "checkbox";
     lock.checked = locked;
     lock.title = "A drag leaves it as it is";
-    lock.setAttribute("aria-label", `${given.name}: locked, a drag leaves it as it is`);
+    lock.setAttribute("aria-label", `${called(given)}: locked, a drag leaves it as it is`);
     lock.addEventListener("change", () => this.listener.lock(given.name, lock.checked));
     return lock;
   }

@@ -2,9 +2,9 @@
 
 import { amplitudeAt, type Arc, arcsOf, type Avoided, type Interval, jumpsOf, rangesToAvoid } from "./avoid";
 import type { Found, Point } from "./explore";
-import { called, type Context, driving, type Go, Search, swinging, valueOf } from "./search";
+import { type Context, driving, type Go, Search, swinging, valueOf } from "./search";
 import type { Given } from "./tables";
-import { digits, shown } from "./words";
+import { called, digits, shown } from "./words";
 
 const HEIGHT = 260;
 /** How near a click must be to a motion to take it (px). */
@@ -33,7 +33,7 @@ export class Response extends Search {
     this.parts = [];
     this.sentences = [];
     this.avoided = [];
-    this.words.replaceChildren();
+    this.words.textContent = "Being computed …";
   }
 
   protected take(found: Found[], done: boolean): void {
@@ -107,7 +107,8 @@ export class Response extends Search {
     const output = swinging(this.context!);
     const at = (value: number): string => shown(value, given!);
     const { arcs } = this;
-    this.avoided = rangesToAvoid(arcs, low, high);
+    // where nothing was found there may be reasons that the sentences give
+    this.avoided = arcs.length > 0 ? rangesToAvoid(arcs, low, high) : [];
     const speed = given!.unit === "rpm" ? "Speeds" : `Values of ${called(given!)}`;
     const { natural } = this.context!;
     const lines: string[] = [];
@@ -115,7 +116,10 @@ export class Response extends Search {
       lines.push(
         `${speed} to avoid: ${this.avoided.map((one) => `${at(one.low)} to ${at(one.high)} (${one.why})`).join("; ")}.`,
       );
-    else if (arcs.length > 0) lines.push(`${speed} to avoid: none in this range.`);
+    else
+      lines.push(
+        arcs.length > 0 ? `${speed} to avoid: none in this range.` : "No periodic motion was found.",
+      );
     for (const { value, rising, before, after } of jumpsOf(arcs)) {
       const then = after.map((amplitude) => shown(amplitude, output)).join(" or ");
       lines.push(

@@ -5,7 +5,7 @@ import type { Exploration, Found } from "./explore";
 import { Explorer } from "./explorer";
 import { Plane } from "./plane";
 import { type Given, type Mechanism, type Output, type Range, type Values, givenOf } from "./tables";
-import { digits } from "./words";
+import { called, digits } from "./words";
 
 /** How long all must stay as it is before a search begins anew (ms). */
 const REST = 250;
@@ -23,7 +23,6 @@ export interface Context {
 /** Where the page is to go: values by name, and where the motion there is sought first. */
 export type Go = (values: Values, start?: number[]) => void;
 
-export const called = (given: Given): string => given.name.replaceAll(/[._]/g, " ");
 export const valueOf = (given: Given, values: Values): number => values[given.name] ?? given.start;
 
 /** What can vary: real parameters, and inputs that act. */
@@ -122,6 +121,7 @@ export abstract class Search {
     for (const axis of this.axes) axis.given = undefined;
     this.typed.clear();
     this.context = undefined;
+    this.ranges = [];
     this.forget();
   }
 
@@ -148,6 +148,14 @@ export abstract class Search {
     const { context } = this;
     if (!context) return;
     this.choices(context);
+    if (context.orbit.place < 0) {
+      this.forget();
+      this.ranges = [];
+      this.clear();
+      this.plane.wipe();
+      this.words.textContent = "All motion is prescribed: nothing is free to swing.";
+      return;
+    }
     const names = this.axes.map(({ given }) => given?.name);
     const kept = Object.entries(context.values).filter(([name]) => !names.includes(name));
     const ranges = this.axes.map(({ given }) => given && this.typed.get(given.name));

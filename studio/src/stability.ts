@@ -1,9 +1,9 @@
 /** Verdicts over a plane of two parameters, coarse to fine. */
 
 import { type Cell, type Found, middle } from "./explore";
-import { called, type Context, driving, type Go, Search, valueOf } from "./search";
+import { type Context, driving, type Go, Search, valueOf } from "./search";
 import type { Given } from "./tables";
-import { multiplierInWords, shown, verdictInWords } from "./words";
+import { called, multiplierInWords, shown, verdictInWords } from "./words";
 
 const HEIGHT = 300;
 

@@ -176,12 +176,18 @@ export function stateFrom(data: unknown, tables: Tables): State {
   const found: State = { mechanism: mechanism.name, title, values: { ...values }, source, locks };
   if (duration !== undefined) found.duration = duration;
   if (behind !== undefined) {
+    if (typeof behind !== "object" || behind === null) fail("what is behind", behind);
     const { x, y, width, angle, opacity, locked } = behind;
     if (![x, y, width, angle, opacity].every(isNumber) || !(width > 0)) fail("what is behind", behind);
     found.behind = { x, y, width, angle, opacity, locked: locked === true };
   }
   if (view !== undefined) {
-    if (!Array.isArray(view) || view.length !== 5 || !view.every(isNumber) || !(view[2] > 0))
+    if (
+      !Array.isArray(view) ||
+      view.length !== 5 ||
+      !view.every(isNumber) ||
+      !(view[2] >= 0.02 && view[2] <= 200)
+    )
       fail("the view", view);
     found.view = view;
   }

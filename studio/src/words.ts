@@ -66,3 +66,6 @@ export function multiplierInWords([real, imaginary]: [number, number]): string {
   const size = digits(modulus);
   return `${digits(real)} ${imaginary < 0 ? "−" : "+"} ${digits(Math.abs(imaginary))}i (modulus ${size})`;
 }
+
+/** A name of the FMU as people read it. */
+export const called = ({ name }: { name: string }): string => name.replaceAll(/[._]/g, " ");
