@@ -134,13 +134,13 @@ class Studio {
       this.charts.show(mechanism, state.source ?? "steady", bytes);
       this.python.show(mechanism, state);
       this.panel.show(mechanism, state.values, state.locks ?? []);
+      this.listNumbers();
     } else {
       this.panel.update(state.values, true);
       this.panel.lock(state.locks ?? []);
     }
     if (view) this.view.show(mechanism.picture.planar, view);
     this.backdrop.show(state.behind);
-    this.listNumbers();
     const { values, count, sentence } = this.begin();
     if (!this.answer && count > 0) {
       // there is something to see before the first motion is known
