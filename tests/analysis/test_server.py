@@ -16,7 +16,7 @@ import time
 import xml.etree.ElementTree as ElementTree
 import zipfile
 from collections.abc import Callable, Iterator
-from contextlib import closing
+from contextlib import ExitStack, closing
 from http.server import BaseHTTPRequestHandler, HTTPServer
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -248,15 +248,25 @@ def test_a_state_is_the_case_that_it_was_made_of(name: str) -> None:
     assert state_of(again) == state_of(case)
 
 
+#: The command as a terminal runs it: a shell's background jobs, and all that they start, ignore Ctrl-C.
+COMMAND = (
+    "import signal; signal.signal(signal.SIGINT, signal.default_int_handler); from analysis.cli import main; main()"
+)
+
+
 @pytest.mark.slow
 def test_the_command_serves_until_ctrl_c(tmp_path: Path) -> None:
-    with subprocess.Popen(
-        [sys.executable, "-m", "analysis.cli", "studio", "table-3.1", "--no-browser"],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        env=os.environ | {"COLUMNS": "200"},
-    ) as process:
+    with (
+        subprocess.Popen(
+            [sys.executable, "-c", COMMAND, "studio", "table-3.1", "--no-browser"],
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+            env=os.environ | {"COLUMNS": "200"},
+        ) as process,
+        ExitStack() as last,
+    ):
+        last.callback(process.kill)
         assert process.stdout is not None
         address = urlsplit(process.stdout.readline().split()[-1])
         with closing(http.client.HTTPConnection("127.0.0.1", address.port or 0, timeout=60)) as connection:
