@@ -24,11 +24,11 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 from rich.console import Console
-from scipy.optimize import Bounds, NonlinearConstraint, OptimizeResult, differential_evolution
+from scipy.optimize import OptimizeResult
 from threadpoolctl import threadpool_limits
 
 from analysis.synthesis import FullTurn, TargetPath, UntimedPath, evaluate, normal_form, synthesize, turn
-from analysis.synthesis.black_box import MEMBERS, PENALTY, BlackBox, descend_from
+from analysis.synthesis.black_box import PENALTY, BlackBox, descend_from, evolve
 from analysis.synthesis.constraints import USUAL, Constraint, limits_of
 from analysis.synthesis.kernels import coupler_path
 from analysis.synthesis.overlap import nearest, symmetric_difference
@@ -148,23 +148,13 @@ class Evolution:
 
     def run(self, random: np.random.Generator, over: Callable[[], bool]) -> float:
         """One run, stopped where its time is over, and a simplex from where it ended."""
-
-        def violations(x: FloatArray) -> FloatArray:
-            return self.box.violations(np.atleast_2d(x.T)).T.reshape(-1, *x.shape[1:])
-
-        found = differential_evolution(
-            lambda x: self.areas(np.ascontiguousarray(x.T)) if x.size else np.empty(0),
-            Bounds(self.box.low, self.box.high),
+        found = evolve(
+            self.box,
+            random,
+            lambda intermediate_result: over(),
+            lambda x: self.areas(np.ascontiguousarray(x)),
             maxiter=GENERATIONS,
-            popsize=MEMBERS,
             tol=1e-4,
-            init="sobol",
-            updating="deferred",
-            vectorized=True,
-            polish=False,
-            constraints=(NonlinearConstraint(violations, -np.inf, 0.0),),
-            callback=lambda intermediate_result: over(),
-            rng=random,
         )
         return min(self.error(found.x), self.error(descend_from(self.box, found.x, self.charge).x))
 

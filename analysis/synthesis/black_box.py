@@ -139,9 +139,19 @@ def _value(require: Require, p: SimpleNamespace) -> float:
 
 
 def evolve(
-    box: BlackBox, random: np.random.Generator, callback: Callable[[OptimizeResult], None] | None = None
+    box: BlackBox,
+    random: np.random.Generator,
+    callback: Callable[[OptimizeResult], bool | None] | None = None,
+    quality: Callable[[FloatArray], FloatArray] | None = None,
+    *,
+    maxiter: int = GENERATIONS,
+    tol: float = 1e-8,
 ) -> OptimizeResult:
-    """SciPy's differential evolution over whole generations; ``callback(intermediate_result)`` sees each."""
+    """SciPy's differential evolution of a quality, by default the box's, over whole generations.
+
+    ``callback(intermediate_result)`` sees each, and ends it by a true answer.
+    """
+    measure = quality or box.quality
 
     def violations(x: FloatArray) -> FloatArray:
         # of one vector first, of a generation then
@@ -149,11 +159,11 @@ def evolve(
 
     return differential_evolution(
         # SciPy asks for none where no member of a generation keeps the constraints
-        lambda x: box.quality(x.T) if x.size else np.empty(0),
+        lambda x: measure(x.T) if x.size else np.empty(0),
         Bounds(box.low, box.high),
-        maxiter=GENERATIONS,
+        maxiter=maxiter,
         popsize=MEMBERS,
-        tol=1e-8,
+        tol=tol,
         init="sobol",
         updating="deferred",
         vectorized=True,
