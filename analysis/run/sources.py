@@ -10,6 +10,9 @@ from numba import boolean, float64, int64, types
 from numpy.typing import NDArray
 
 from ..numerics.codegen import CUBE, MATRIX, VECTOR, call_user, inner, kernel
+from .signals import kloss
+
+_torque_of_motor = inner(kloss)
 
 
 class Source(NamedTuple):
@@ -77,9 +80,7 @@ def channels_at(begin, elapsed, piece, x, source, u):
     if law[2] != 0.0:
         u[channel] += law[0] * (1.0 - x[coordinate] / law[1])
     if law[3] != 0.0:
-        # Kloss: 2 Tb / (s / sb + sb / s), written so that it holds at synchronous speed
-        slip = 1.0 - x[speed] / law[5]
-        u[channel] += 2.0 * law[3] * slip * law[4] / (slip * slip + law[4] * law[4])
+        u[channel] += _torque_of_motor(law[3:6], x[speed])
     for n in range(source.functions.shape[0]):
         function, of_rate = source.functions[n]
         if function != 0:
