@@ -14,6 +14,7 @@ from typing import Literal
 
 from linkwork.errors import InputError, Interrupted
 
+from ..notebook import format_count
 from ..synthesis import (
     QUICK_SEARCH,
     USUAL,
@@ -169,7 +170,7 @@ def simplest_mechanism(
     guesses = [four_bar]
     for count in numbers:
         slider = SliderUnknown(harmonics=count, stroke=reach)
-        found = tried.attempt(f"four-bar with a moved slider, {_harmonics(count)}", slider, guesses)
+        found = tried.attempt(f"four-bar with a moved slider, {format_count(count, 'harmonic')}", slider, guesses)
         if tried.met():
             return tried.result()
         guesses += [found] if found else []
@@ -188,15 +189,13 @@ def simplest_mechanism(
     guesses = [geared.get(ratio, four_bar)]
     for count in numbers:
         crank = CrankUnknown(ratio=ratio, length=between, harmonics=count)
-        found = tried.attempt(f"five-bar, second crank turned independently, {_harmonics(count)}", crank, guesses)
+        found = tried.attempt(
+            f"five-bar, second crank turned independently, {format_count(count, 'harmonic')}", crank, guesses
+        )
         if tried.met():
             break
         guesses += [found] if found else []
     return tried.result()
-
-
-def _harmonics(count: int) -> str:
-    return f"{count} harmonic{'s' if count > 1 else ''}"
 
 
 @dataclass(eq=False)

@@ -24,6 +24,7 @@ from ..export import KINDS, NATIVE, PYTHON, build, build_native, kinds_here, wit
 from ..files import Choice, Many, Quantity, Whole, entry, flag, read, text, unknown_name, write_csv
 from ..mechanisms import mechanism_of, require_five_bar
 from ..motion import inverse_dynamics, motion_of_plant, slider_motion
+from ..notebook import format_count
 from ..periodic import drive_of, of_the_motor, unit_of
 from ..run import Case, case_from, cosimulate
 from ..studio import case_of, given_values, state_of
@@ -198,7 +199,7 @@ def _moved(case: Case, wanted: _Moved) -> Answer:
         found.append(slider_motion(task, still, unknown, guesses=found[1:], search=search).best)
     rows = [
         [
-            "at rest" if n == 0 else f"{n} harmonic{'s' if n > 1 else ''}",
+            "at rest" if n == 0 else format_count(n, "harmonic"),
             f"{1e6 * s.error:.4g}",
             f"{1e3 * s.evaluation.worst:.3g}",
             f"{1e3 * s.linkage.pivot.stroke:.4g}" if isinstance(s.linkage.pivot, SliderMotion) else "",

@@ -22,6 +22,7 @@ from linkwork.five_bar.published import CM_PER_METRE
 
 from ...figures import COLOURS, Curve, Figure, Panel, plot_curves
 from ...motion import slider_motion
+from ...notebook import format_count
 from ...numerics.fourier import FourierSeries
 from ...synthesis import (
     Linkage,
@@ -207,7 +208,7 @@ def draw_rocker(result: StudyResult) -> Figure:
     task = PROBLEMS[ROCKER].task
     assert isinstance(task, RockerFunction)
     heavy = np.degrees(np.asarray(task.rotation)[np.asarray(task.weights) == WEIGHT])
-    labels = {"fixed": "pivot fixed"} | {f"{n}": f"{n} harmonic{'s' if n > 1 else ''}" for n in (1, 2, 3)}
+    labels = {"fixed": "pivot fixed"} | {f"{n}": format_count(n, "harmonic") for n in (1, 2, 3)}
     colours = dict(zip(labels, (FIXED, *COLOURS)))
 
     def panel(what: str, y_label: str, *more: Curve, verticals: Mapping[str, float] | None = None) -> Panel:
