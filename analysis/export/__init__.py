@@ -4,10 +4,10 @@ from .archive import SOURCES, BuildError, try_out
 from .builds import Built, build_all, kinds_here
 from .compatibility import publish
 from .description import KINDS, NATIVE, NATIVE_FMI3, PYTHON, Kind
-from .interface import interface, with_starts
+from .interface import Entry, interface, with_starts
 from .native_fmu import PLATFORMS, build_native, compile_library, source_files, this_platform
 from .python_fmu import build
-from .web import build_web
+from .web import build_web, crank_number
 
 __all__ = [
     "KINDS",
@@ -18,12 +18,14 @@ __all__ = [
     "SOURCES",
     "BuildError",
     "Built",
+    "Entry",
     "Kind",
     "build",
     "build_all",
     "build_native",
     "build_web",
     "compile_library",
+    "crank_number",
     "interface",
     "kinds_here",
     "publish",

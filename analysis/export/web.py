@@ -57,11 +57,16 @@ def web_sources(mechanism: Mechanism) -> dict[str, str]:
     return files | generated(mechanism, NATIVE) | {"drawing.h": _header(mechanism), "drawing.c": _drawing(mechanism)}
 
 
+def crank_number(mechanism: Mechanism) -> int:
+    """Which freedom turns; -1 without."""
+    return next((n for n, freedom in enumerate(mechanism.freedoms) if freedom.period > 0.0), -1)
+
+
 def _header(mechanism: Mechanism) -> str:
     """drawing.h: what the module has beside a native FMU."""
     joints = mechanism.drawing.joints if mechanism.drawing else ()
     freedoms = mechanism.freedoms
-    crank = next((n for n, freedom in enumerate(freedoms) if freedom.period > 0.0), -1)
+    crank = crank_number(mechanism)
     forces = {c.argument for c in mechanism.channels if c.kind == "force"}
     modes = [-1 if freedom.mode is None else mechanism.modes.index(freedom.mode) for freedom in freedoms]
     freeing = [
@@ -126,7 +131,7 @@ def _driven(mechanism: Mechanism) -> list[tuple[Any, ...]]:
     join, sx, freedoms = casadi.vertcat, casadi.SX, len(mechanism.freedoms)
     motor, speed, d_motor, d_speed = (sx.sym(n, size) for n, size in zip("mvde", (len(MOTOR), 1, len(MOTOR), 1)))
     torque = kloss(motor, speed)
-    crank = next((n for n, freedom in enumerate(mechanism.freedoms) if freedom.period > 0.0), -1)
+    crank = crank_number(mechanism)
     other = next((n for n in range(freedoms) if n != crank), -1)
     trace, place = expressions(mechanism), _torque_of(mechanism, crank)
     run = trace.symbols

@@ -16,7 +16,7 @@ from ..files import unknown_name
 from ..mechanisms import FIVE_BAR, MECHANISMS, mechanism_of
 from ..periodic import of_the_motor
 from ..run import Case, InductionMotor, Inputs
-from .tables import NO_MOTOR, published_values, values_of
+from .tables import NO_MOTOR, given_entries, published_values, values_of
 
 #: What is changed in the first published set of the mechanism that the page opens with: a coupler point.
 OPENING = {"coupler.point_distance": 0.105, "coupler.point_angle": 0.55}
@@ -111,8 +111,7 @@ def given_values(mechanism: Mechanism, values: Any) -> dict[str, float]:
 
 def _given(mechanism: Mechanism) -> dict[str, float]:
     """Start values of all that the page gives a mechanism, a motor included."""
-    rates = {c.name for c in mechanism.channels if c.kind == "rate"} | {"solver.tolerance"}
-    given = (v for v in mechanism.variables if v.causality in ("parameter", "input") and v.name not in rates)
+    given = (entry.variable for entry in given_entries(mechanism))
     motor = {name: NO_MOTOR[field] for name, (field, _) in of_the_motor(mechanism).items()}
     return {v.name: float(v.start) for v in given} | motor
 

@@ -11,7 +11,7 @@ from linkwork.mechanism import Mechanism, PublishedSet
 from linkwork.parameters import field_name
 from linkwork.variables import UNITS, Variable
 
-from ..export import build_web, interface
+from ..export import Entry, build_web, crank_number, interface
 from ..mechanisms import name_in_files
 from ..periodic import crank_of, damping_name, of_the_motor, stiffness_name
 
@@ -36,17 +36,12 @@ def tables_of(mechanism: Mechanism) -> dict[str, Any]:
     reference = {entry.variable.name: entry.reference for entry in entries}
     outputs = {v.name: v for v in mechanism.variables if v.name in mechanism.output_names}
     names = list(mechanism.output_names)
-    crank = next((n for n, freedom in enumerate(mechanism.freedoms) if freedom.period > 0.0), -1)
+    crank = crank_number(mechanism)
     return {
         "name": mechanism.name,
         "title": mechanism.title,
         "module": base64.b64encode(gzip.compress(build_web(mechanism), 9, mtime=0)).decode(),
-        "given": [
-            _given(mechanism, entry.variable, entry.reference)
-            for entry in entries
-            if entry.role in ("parameter", "mode", "initial", "input")
-            and entry.variable.name not in (c.name for c in mechanism.channels if c.kind == "rate")
-        ]
+        "given": [_given(mechanism, entry.variable, entry.reference) for entry in given_entries(mechanism)]
         + _motor(mechanism, crank),
         "outputs": [{"name": name, "text": v.description, **_unit(v)} for name, v in outputs.items()],
         "freedoms": [
@@ -97,6 +92,13 @@ def _unit(variable: Variable) -> dict[str, Any]:
     shown = variable.display or ("" if variable.unit == "rad/s" else next(iter(displays), ""))
     unit = shown or variable.unit
     return {"unit": "" if unit == "1" else unit, "factor": displays.get(unit, 1.0)}
+
+
+def given_entries(mechanism: Mechanism) -> list[Entry]:
+    """What the page gives, but for a motor; the rates of inputs that are constant are none."""
+    rates = [channel.name for channel in mechanism.channels if channel.kind == "rate"]
+    roles = ("parameter", "mode", "initial", "input")
+    return [one for one in interface(mechanism) if one.role in roles and one.variable.name not in rates]
 
 
 def _given(mechanism: Mechanism, variable: Variable, reference: int) -> dict[str, Any]:
