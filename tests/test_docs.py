@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import base64
-import importlib.util
 import json
 import pkgutil
 import re
@@ -22,6 +21,7 @@ from analysis.studies.study import FAILS, UNJUDGED
 from analysis.studio import PAGE, case_of
 from linkwork import __version__
 
+from .scripts import script_of_docs
 from .studies.results import tables
 
 ROOT = Path(__file__).parents[1]
@@ -29,10 +29,7 @@ ROOT = Path(__file__).parents[1]
 
 @pytest.fixture(scope="module")
 def generate():
-    spec = importlib.util.spec_from_file_location("generate", ROOT / "docs" / "generate.py")
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+    return script_of_docs("generate")
 
 
 def test_the_tables_of_the_documentation_are_up_to_date(generate):
@@ -252,10 +249,7 @@ def test_there_is_a_short_notebook_without_outputs_for_each_kind_of_user():
 
 @pytest.fixture(scope="module")
 def openings():
-    spec = importlib.util.spec_from_file_location("openings", ROOT / "docs" / "openings.py")
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+    return script_of_docs("openings")
 
 
 def test_every_published_set_and_example_opens_in_the_studio(openings):

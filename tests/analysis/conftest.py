@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -12,6 +11,7 @@ import pytest
 from click.testing import CliRunner, Result
 
 from analysis import cli
+from benchmarks.studio import chromium
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser
@@ -37,7 +37,7 @@ def linkwork(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., R
 @pytest.fixture(scope="session")
 def launched() -> Iterator[Callable[..., Browser]]:
     """Starts the system's Chromium, with these arguments besides."""
-    path = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
+    path = chromium()
     try:
         from playwright.sync_api import sync_playwright
     except ImportError:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import functools
 import http.server
-import importlib.util
 import re
 import shutil
 import subprocess
@@ -24,6 +23,7 @@ from analysis.mechanisms import MECHANISMS, PUBLISHED
 from analysis.run import Case, Inputs
 from analysis.studio import PAGE, address_of, opening_state, state_of
 
+from ..scripts import script_of_docs
 from .test_studio import _drag, _given, _load, _opened, _pin, _saved, in_browser
 
 ROOT = Path(__file__).parents[2]
@@ -380,11 +380,7 @@ def test_links_are_told_apart_without_colour_vision() -> None:
 
 @in_browser
 def test_what_the_documentation_links_to_opens(browser: Any) -> None:
-    spec = importlib.util.spec_from_file_location("openings", ROOT / "docs" / "openings.py")
-    assert spec is not None
-    assert spec.loader is not None
-    openings = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(openings)
+    openings = script_of_docs("openings")
     page = _opened(browser, PAGE)
     for name, state in openings.states().items():
         before = page.evaluate("Number(document.documentElement.dataset.answer)")
