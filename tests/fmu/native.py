@@ -121,8 +121,13 @@ class Instance:
         return int(getattr(self.library.dll, f"fmi{self.library.fmi}{function}")(c_void_p(self.handle), *converted))
 
     def free(self) -> None:
-        """Free the instance."""
+        """Free the instance, as it is when nothing refers to it any more."""
         getattr(self.library.dll, f"fmi{self.library.fmi}FreeInstance")(c_void_p(self.handle))
+        self.handle = None
+
+    def __del__(self) -> None:
+        if getattr(self, "handle", None) is not None:
+            self.free()
 
     # Values
 

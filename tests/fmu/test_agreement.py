@@ -331,8 +331,6 @@ def test_states_and_resets_bit_for_bit(file: str, natives: dict[str, Path], tmp_
         if seed == 0:
             found = run_in_process(continued, ROOT, natives[file], tmp_path / "there", text.hex())
             assert found == rows[5:]
-        for instance in (one, other):
-            instance.free()
 
 
 def test_states_of_another_kind_are_refused(natives: dict[str, Path], tmp_path: Path) -> None:

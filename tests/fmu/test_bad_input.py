@@ -16,67 +16,32 @@ from .test_description import INPUTS
 
 NAN, INF = float("nan"), float("inf")
 
-#: What every model says alike: values before the initialisation, and what the sentence in the log must say.
+#: Values before the initialisation, and what the sentence in the log must say: one of each kind of error. All that a parameter
+#: may not be is in `tests/plant/test_parameters.py`.
 BAD_ANYWHERE = {
     "negative length": ({"crank.length": -0.05}, "parameter crank.length is -0.05: it must be"),
-    "mass not a number": ({"slider.mass": NAN}, "parameter slider.mass is nan: it must be"),
-    "negative damping": ({"slider.damping": -1.0}, "parameter slider.damping is -1.0: it must be"),
     "branch": ({"assembly.branch": 0}, "parameter assembly.branch is 0: it must be +1 or -1"),
     "drive mode": ({"drive.mode": 7}, "parameter drive.mode is 7: it must be 0 (torque) or 1 (speed)"),
-    "tolerance zero": ({"solver.tolerance": 0.0}, "parameter solver.tolerance is 0.0: it must be between"),
     "tolerance not a number": ({"solver.tolerance": NAN}, "parameter solver.tolerance is nan: it must be between"),
     "start": ({"initial.crank_angle": INF}, "parameter initial.crank_angle is inf: it must be a finite number"),
 }
 BAD_PARAMETERS = {
     "FiveBarSlider": {
         **BAD_ANYWHERE,
-        "zero length": ({"coupler.length": 0.0}, "parameter coupler.length is 0.0: it must be"),
-        "infinite inertia": ({"rocker.inertia": INF}, "parameter rocker.inertia is inf: it must be"),
-        "inertia below what the mass needs": (
-            {"crank.mass": 9.0, "crank.cog_distance": 0.1},
-            "parameter crank.inertia is 0.00125: it must be at least",
-        ),
-        "nothing moves": ({"slider.mass": 0.0, "rocker.mass": 0.0}, "parameter slider.mass is 0.0: it must be"),
         "input not a number": (
             {"slider.force": NAN},
             "input slider.force is nan at t = 0 s: it must be a finite number",
         ),
         "not to be assembled": ({"initial.slider_position": 1.0}, "the links cannot be joined at crank angle 0 rad"),
-        "at the limit of assembly": (
-            {"initial.slider_position": 0.19649999},
-            "limit of assembly at crank angle 0 rad",
-        ),
+        "at the limit of assembly": ({"initial.slider_position": 0.19649999}, "limit of assembly at crank angle 0 rad"),
     },
     "SliderCrank": {
         **BAD_ANYWHERE,
-        "zero length": ({"rod.length": 0.0}, "parameter rod.length is 0.0: it must be"),
-        "infinite inertia": ({"rod.inertia": INF}, "parameter rod.inertia is inf: it must be"),
-        "inertia below what the mass needs": (
-            {"crank.cog_x": 0.3, "crank.cog_y": 0.1},
-            "parameter crank.inertia is 0.33725290293332477: it must be at least crank.mass * (crank.cog_x^2 + "
-            "crank.cog_y^2) = 1.07643 kg.m2",
-        ),
-        "nothing moves": ({"crank.mass": 0.0}, "parameter crank.mass is 0.0: it must be"),
-        "negative damping of the shift": ({"shift.damping": -1.0}, "parameter shift.damping is -1.0: it must be"),
         "axial mode": ({"axial.mode": 3}, "parameter axial.mode is 3: it must be 0 (force), 1 (speed) or 2 (groove)"),
-        "groove": ({"groove.ratio": NAN}, "parameter groove.ratio is nan: it must be a finite number"),
-        "twist": ({"guide.twist": INF}, "parameter guide.twist is inf: it must be a finite number"),
-        "input not a number": ({"axial.speed": NAN}, "input axial.speed is nan at t = 0 s: it must be a finite number"),
         "input too large": ({"axial.speed": 1e300}, "the energy at the start is not finite: "),
-        # sqrt(22^2 in2 + 2^2 m2), less 50 in
         "not to be assembled": (
             {"initial.shift_position": 2.0},
-            "the rod does not reach the guide at crank angle 0 rad (0.0000 deg) and shift 2 m: the crank pin is "
-            "2.07659756 m from the guide, the rod is 1.27 m long, 0.806597563 m too short",
-        ),
-        "not to be assembled in the groove": (
-            {"axial.mode": 2, "groove.amplitude": 3.0, "groove.ratio": 3.0, "initial.crank_angle": 0.5},
-            "the rod does not reach the guide at crank angle 0.5 rad (28.6479 deg) and shift 2.99248496 m",
-        ),
-        # the rod is square to the guide at sqrt(50^2 - 22^2) in = 1.140457171 m, within a thousandth of it from 0.7 um less
-        "at the limit of assembly": (
-            {"initial.shift_position": 1.1404568},
-            "limit of assembly at crank angle 0 rad (0.0000 deg) and shift 1.1404568 m: the rod is within",
+            "the rod does not reach the guide at crank angle 0 rad",
         ),
     },
 }
@@ -152,53 +117,29 @@ def test_bad_parameter_fails_the_initialisation_with_a_sentence(
 
 #: Time and size of a step at t = 0.01, the value of solver.status, and what the sentence must say.
 BAD_STEPS = {
-    "zero": (0.01, 0.0, 1, "a step of 0 s at t = 0.01 s: it must be greater than zero"),
-    "negative": (0.01, -1e-3, 1, "a step of -0.001 s at t = 0.01 s: it must be greater than zero"),
     "not a number": (0.01, NAN, 1, "a step of nan s from t = 0.01 s: both must be finite numbers"),
-    "infinite": (0.01, INF, 1, "a step of inf s from t = 0.01 s: both must be finite numbers"),
-    "from nowhen": (NAN, 1e-3, 1, "a step of 0.001 s from t = nan s: both must be finite numbers"),
-    "lost": (0.01, 1e-19, 1, "a step of 1e-19 s at t = 0.01 s: it is lost in the rounding of the time"),
     "backwards": (0.009, 1e-3, 1, "a step backwards: it starts at t = 0.009 s, but the state is at t = 0.01 s"),
-    "over a gap": (0.02, 1e-3, 1, "a step over a gap: it starts at t = 0.02 s, but the state is at t = 0.01 s"),
 }
+LIMIT, TOO_SMALL = (
+    f"in the step from t = 0.01 s: {what}" for what in ("limit of assembly at crank", "the step size fell to")
+)
 #: Input and value, the value of solver.status, and what the sentence must say.
 BAD_INPUTS = {
     "FiveBarSlider": {
-        "NaN force": ("slider.force", NAN, 2, "input slider.force is nan at t = 0.01 s: it must be a finite number"),
-        "infinite speed": ("drive.speed", INF, 2, "input drive.speed is inf at t = 0.01 s: it must be a finite number"),
         "infinite load": ("load.fy", -INF, 2, "input load.fy is -inf at t = 0.01 s: it must be a finite number"),
-        "slider pushed out": ("slider.force", 1e5, 3, "in the step from t = 0.01 s: limit of assembly at crank angle"),
-        "slider pulled in": ("slider.force", -1e6, 3, "in the step from t = 0.01 s: limit of assembly at crank angle"),
-        "crank run wild": ("drive.speed", 1e5, 3, "in the step from t = 0.01 s: limit of assembly at crank angle"),
-        "beyond floats": ("slider.force", 1e300, 4, "in the step from t = 0.01 s: the step size fell to"),
-        "beyond floats, speed": ("drive.speed", 1e200, 4, "in the step from t = 0.01 s: the step size fell to"),
+        "slider pushed out": ("slider.force", 1e5, 3, LIMIT),
+        "crank run wild": ("drive.speed", 1e5, 3, LIMIT),
+        "beyond floats": ("slider.force", 1e300, 4, TOO_SMALL),
     },
     "SliderCrank": {
-        "NaN load": ("slider.load", NAN, 2, "input slider.load is nan at t = 0.01 s: it must be a finite number"),
-        "infinite speed": ("drive.speed", INF, 2, "input drive.speed is inf at t = 0.01 s: it must be a finite number"),
-        "infinite shift": (
-            "axial.speed",
-            -INF,
-            2,
-            "input axial.speed is -inf at t = 0.01 s: it must be a finite number",
-        ),
         "force of no use": (
             "axial.force",
             NAN,
             2,
             "input axial.force is nan at t = 0.01 s: it must be a finite number",
         ),
-        "crank pushed out": ("axial.speed", 30.0, 3, "in the step from t = 0.01 s: limit of assembly at crank angle"),
-        "crank pulled out": ("axial.speed", -30.0, 3, "in the step from t = 0.01 s: limit of assembly at crank angle"),
-        "crank run off": (
-            "axial.acceleration",
-            1e3,
-            3,
-            "in the step from t = 0.01 s: limit of assembly at crank angle",
-        ),
-        "beyond floats": ("axial.acceleration", 1e300, 4, "in the step from t = 0.01 s: the step size fell to"),
-        "beyond floats, speed": ("drive.speed", 1e200, 4, "in the step from t = 0.01 s: the step size fell to"),
-        "beyond floats, shift": ("axial.speed", 1e200, 4, "in the step from t = 0.01 s: the step size fell to"),
+        "crank pulled out": ("axial.speed", -30.0, 3, LIMIT),
+        "beyond floats": ("axial.acceleration", 1e300, 4, TOO_SMALL),
     },
 }
 

@@ -2,18 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from functools import cache
 from pathlib import Path
-from typing import Any
 from xml.etree.ElementTree import Element
 
-import pytest
-
 from .described import read_unknowns
-from .models import MODES, Model, each
+from .models import MODES, Model
 from .runner import run_in_process
-from .test_description import INPUTS, ROWS
+from .test_description import ROWS
 
 # nothing zero and nothing aligned, so that no dependency hides
 MECHANISMS = {
@@ -75,31 +70,6 @@ MECHANISMS = {
 }
 
 
-def perturb_inputs(fmu: str, folder: str, mechanism: dict[str, float], modes: list[dict[str, int]]) -> list[list[Any]]:
-    """For all drives, at the start and after a step: which outputs change at once with each input."""
-    from bare_master import Fmu
-
-    fmu = Fmu(fmu, folder)
-    inputs = [v.name for v in fmu.variables.values() if v.causality == "input"]
-    found = []
-    for mode in modes:
-        instance = fmu.instantiate().start(mechanism | mode)
-        time = 0.0
-        for steps in (0, 1, 3):
-            time = instance.run([1e-3] * steps, time)
-            state = instance.save()
-            for name in inputs:
-                before = instance.outputs() | dict(zip(("solver.status", "solver.message"), instance.trouble()))
-                instance.set(name, instance.get(name) * 1.01)
-                after = instance.outputs() | dict(zip(("solver.status", "solver.message"), instance.trouble()))
-                found.append([mode, steps, name, [n for n in before if before[n] != after[n]]])
-                assert instance.restore(state) == 0
-                assert instance.outputs() == {n: before[n] for n in fmu.outputs}
-            instance.free_state(state)
-        instance.free()
-    return found
-
-
 def perturb_start(
     fmu: str, folder: str, mechanism: dict[str, float], modes: list[dict[str, int]]
 ) -> dict[str, list[str]]:
@@ -121,50 +91,6 @@ def perturb_start(
             instance.free()
         base.free()
     return found
-
-
-#: Of a model, under each drive, which outputs were seen to change at once with each input, at the start or later.
-Changed = Callable[[str], list[tuple[dict[str, int], str, list[str]]]]
-
-
-@pytest.fixture(scope="module")
-def changed(fmus: dict[str, Path], tmp_path_factory: pytest.TempPathFactory) -> Changed:
-    @cache
-    def of(model: str) -> list[tuple[dict[str, int], str, list[str]]]:
-        arguments = (MECHANISMS[model], list(MODES[model].values()))
-        found = run_in_process(perturb_inputs, fmus[model], tmp_path_factory.mktemp("run"), *arguments)
-        return [(mode, name, outputs) for mode, _, name, outputs in found]
-
-    return of
-
-
-@each({model: {name: name for name in sorted(inputs)} for model, inputs in INPUTS.items()}, "name")
-def test_outputs_that_change_at_once_are_those_declared(
-    description: Element, changed: Changed, model: Model, name: str
-) -> None:
-    declared = {output for output, on in read_unknowns(description, "Output").items() if name in on}
-    # the one dependency declared to be safe that there is not: the acceleration is commanded apart from the speed
-    never = {"drive.speed": {"crank.acceleration"}, "axial.speed": {"shift.acceleration"}}.get(name, set())
-    assert {
-        output for _, given, outputs in changed(model.name) if given == name for output in outputs
-    } == declared - never
-
-
-#: Inputs of one way to drive that are of no effect in the others: what they are read under.
-READ_UNDER = {
-    "drive.torque": ("drive.mode", 0),
-    "drive.speed": ("drive.mode", 1),
-    "drive.acceleration": ("drive.mode", 1),
-    "axial.force": ("axial.mode", 0),
-    "axial.speed": ("axial.mode", 1),
-    "axial.acceleration": ("axial.mode", 1),
-}
-
-
-def test_inputs_of_another_drive_are_of_no_effect(changed: Changed, model: Model) -> None:
-    for mode, name, outputs in changed(model.name):
-        parameter, value = READ_UNDER.get(name, ("drive.mode", mode["drive.mode"]))
-        assert bool(outputs) is (mode[parameter] == value), (mode, name)
 
 
 #: Outputs at the start that change with a parameter of the configuration, of those declared to.

@@ -223,7 +223,6 @@ def test_at_the_start(library: Library, kind: str) -> None:
         assert not call(instance, False, ["time"], knowns, [1.0] * len(knowns)).any()
         if number < 3:
             close(by_differences(instance, of.unknowns, knowns), right, size, 1e-6)
-        instance.free()
 
 
 @pytest.mark.parametrize("fresh", [False, True], ids=["as stepped", "set anew"])
@@ -265,7 +264,6 @@ def test_after_steps(library: Library, fresh: bool) -> None:
                     rows, _ = of.run(case, x, jumped, p, [name])
                     close(np.array(instance.get(*of.unknowns)), rows - limit(of), np.abs(rows) + 1.0)
                     assert instance(f"SetFMU{'s' if library.fmi == 2 else 'S'}tate", saved) == OK
-        instance.free()
 
 
 def limit(of: Oracle) -> Matrix:
@@ -295,7 +293,6 @@ def test_in_model_exchange(library: Library, mode: str) -> None:
         sums_close(instance, of.unknowns, knowns, right, size)
         if number < 3:
             close(by_differences(instance, of.unknowns, list(inputs)), right[:, len(x) :], size[:, len(x) :], 1e-6)
-        instance.free()
 
 
 def output_slopes(instance: Instance, names: Sequence[str]) -> Matrix:
@@ -364,7 +361,6 @@ def test_output_derivatives(library: Library, fresh: bool) -> None:
                     assert instance.step(1e-4, n * h) == OK
                 values.append(instance.get(*names))
             close(ONE_SIDED @ np.array(values) / h, found[[at[n] for n in names]], scale[[at[n] for n in names]], 1e-5)
-        instance.free()
 
 
 def rate_names(of: Oracle) -> list[str]:

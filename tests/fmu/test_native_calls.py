@@ -273,7 +273,6 @@ def test_a_function_is_good_where_it_is_allowed_and_an_error_elsewhere(library: 
             assert f"fmi{library.fmi}{name}" in c.log[0][1] or "fixed parameter" in c.log[0][1]
             assert c("Reset") == OK
             assert c.enter() == OK
-        c.free()
     assert wrong == []
 
 
@@ -290,7 +289,6 @@ def test_a_missing_pointer_is_an_error(library: Library) -> None:
                             c.log.clear()
                             assert c(name, *left_out) == ERROR, (name, place)
                             assert "a pointer is missing" in c.log[0][1]
-                c.free()
 
 
 def test_no_instance_is_an_error(library: Library) -> None:
@@ -303,7 +301,6 @@ def test_no_instance_is_an_error(library: Library) -> None:
         assert c(name, *arguments) == ERROR, name
         c.free()  # does nothing
         c.handle = handle
-    c.free()
 
 
 def test_types_that_no_variable_has(library: Library) -> None:
@@ -312,7 +309,6 @@ def test_types_that_no_variable_has(library: Library) -> None:
         assert c(name, None, c_size_t(0), None, c_size_t(0), c_size_t(0)) == OK, name
         assert c(name, None, c_size_t(1), None, c_size_t(1), c_size_t(1)) == ERROR, name
         assert "nothing of the kind" in c.log[-1][1]
-    c.free()
 
 
 def test_references_and_types(library: Library) -> None:
@@ -345,7 +341,6 @@ def test_references_and_types(library: Library) -> None:
     assert c("SetString", None, c_size_t(1), None, c_size_t(1)) == ERROR
     assert c("SetString", None, c_size_t(0), None, c_size_t(0)) == OK
     assert c("SetString", *c.arrays(["crank.angle"], (c_char_p * 1)(b"\xff"))) == ERROR
-    c.free()
 
 
 def test_what_is_computed_or_fixed_cannot_be_set(library: Library) -> None:
@@ -357,14 +352,12 @@ def test_what_is_computed_or_fixed_cannot_be_set(library: Library) -> None:
     assert c.enter() == OK
     assert c.set(crank__angle=1.0) == ERROR
     assert c.get("crank.angle") == [0.0]
-    c.free()
     c = library.instance().start()
     before = c.get("crank.acceleration")
     assert c.set(slider__damping=3.0) == ERROR
     assert "slider.damping is a fixed parameter, it cannot be set in step mode" in c.log[-1][1]
     assert c.get("crank.acceleration") == before
     assert c.step(0.0, 1e-3) == OK
-    c.free()
 
 
 @pytest.mark.parametrize(
@@ -413,7 +406,6 @@ def test_no_callbacks_at_all(library: Library) -> None:
     assert c.step(5.0, 1e-3) == DISCARD
     assert c("ExitInitializationMode") == ERROR
     assert c.step(0.0, 1e-3) == OK
-    c.free()
 
 
 def test_times_of_the_setup(library: Library) -> None:
@@ -426,7 +418,6 @@ def test_times_of_the_setup(library: Library) -> None:
         else:
             status = c("EnterInitializationMode", c_bool(given), numbers[0], numbers[1], c_bool(ends), numbers[2])
         said.append(c.log[-1][1] if c.log else "")
-        c.free()
         return status
 
     said: list[str] = []
@@ -453,7 +444,6 @@ def test_messages_have_a_decimal_point_in_every_locale(library: Library) -> None
         c = library.instance().start()
         assert c.step(0.25, 1e-3) == DISCARD
         assert "it starts at t = 0.25 s" in c.text()
-        c.free()
     finally:
         libc.setlocale(numeric, before)
 
@@ -485,7 +475,6 @@ def test_categories_of_the_log(library: Library) -> None:
     for name, word in ((b"logStatusDscard", "logStatusDscard"), (None, "without a name")):
         assert ask(True, b"logStatusFatal", name) == ERROR
         assert f"there is no category {word}" in c.log[-1][1]
-    c.free()
 
 
 def test_no_step_past_the_stop_time(library: Library) -> None:
@@ -510,7 +499,6 @@ def test_no_step_past_the_stop_time(library: Library) -> None:
                 assert "it must be finite and not before the start" in c.log[-1][1]
             # solvers try what is beyond the end, and come back
             assert c("SetTime", 2.1) == OK
-        c.free()
 
 
 def test_debug_logging_says_what_is_refused(library: Library) -> None:
@@ -522,5 +510,3 @@ def test_debug_logging_says_what_is_refused(library: Library) -> None:
     assert quiet("SetDebugLogging", *on) == OK
     assert quiet.step(5.0, 1e-3) == DISCARD
     assert "a step over a gap" in quiet.log[-1][1]
-    quiet.free()
-    loud.free()

@@ -78,6 +78,8 @@ def model(library: Library) -> str:
             {"coupler__cog_distance": 1e200, "rocker__inertia": 1e-300},
             "parameter rocker.inertia is 1e-300: it must be large enough",
         ),
+        # coupler and rocker of 0.3 m stretched out, less 2e-8 m
+        ({"crank__length": 0.05, "ground__length": 0.35 - 2e-8}, "limit of assembly at crank angle 0 rad"),
         ({"crank__length": 9.0}, "the links cannot be joined at crank angle 0 rad (0 deg) and slider position 0 m"),
         ({"initial__slider_velocity": 1e200}, "the energy at the start is not finite: crank angle 0 rad"),
         ({"drive__speed": math.nan}, "input drive.speed is nan at t = 0 s: it must be a finite number"),
@@ -109,20 +111,6 @@ def test_what_the_initialisation_refuses(five_bar: Library, values: dict[str, fl
     good.start()
     assert c.get("crank.acceleration", "pin.C.fx") == good.get("crank.acceleration", "pin.C.fx")
     assert c.step(0.0, 1e-3) == OK
-    c.free()
-    good.free()
-
-
-def test_a_limit_of_assembly_at_the_start(five_bar: Library) -> None:
-    c = five_bar.instance()
-    reach = 0.3  # coupler and rocker
-    ends = reach - 2e-8
-    c.set(crank__length=0.05, ground__length=ends + 0.05)
-    c.enter()
-    assert c("ExitInitializationMode") == ERROR
-    assert "limit of assembly at crank angle 0 rad" in c.log[-1][1]
-    assert c.status() == 3
-    c.free()
 
 
 def test_outputs_in_initialisation_mode_follow_what_is_set(library: Library) -> None:
@@ -140,7 +128,6 @@ def test_outputs_in_initialisation_mode_follow_what_is_set(library: Library) -> 
     c.set(crank__length=0.05)
     assert c("ExitInitializationMode") == OK
     assert (c.status(), c.text()) == (0, "")
-    c.free()
 
 
 def test_time_starts_where_the_master_says(library: Library) -> None:
@@ -150,7 +137,6 @@ def test_time_starts_where_the_master_says(library: Library) -> None:
     assert c.get("time") == [2.5]
     assert c.step(2.5, 1e-3) == OK
     assert c.get("time") == [2.501]
-    c.free()
 
 
 def test_the_tighter_of_both_tolerances_holds(library: Library) -> None:
@@ -161,7 +147,6 @@ def test_the_tighter_of_both_tolerances_holds(library: Library) -> None:
         assert c("ExitInitializationMode") == OK
         assert c.step(0.0, 0.1) == OK
         values = c.get("slider.position", "energy.supplied")
-        c.free()
         return values
 
     assert after(1e-6, 1e-11) == after(1e-11, None) == after(1e-11, 1e-6)
@@ -192,8 +177,6 @@ def test_steps_out_of_order(library: Library, time: float, step: float, sentence
         assert instance.step(0.0, 1e-3) == OK
     assert (c.status(), c.text()) == (0, "")
     assert c.get("crank.angle", "energy.residual") == other.get("crank.angle", "energy.residual")
-    c.free()
-    other.free()
 
 
 def test_an_input_that_is_not_finite(library: Library) -> None:
@@ -211,7 +194,6 @@ def test_an_input_that_is_not_finite(library: Library) -> None:
     assert "; before that, input drive.torque is inf" in c.text()
     c.set(drive__torque=0.0)
     assert c.step(0.0, 1e-3) == OK
-    c.free()
 
 
 def to_the_limit(library: Library, **options: Any) -> Instance:
@@ -244,7 +226,6 @@ def test_the_limit_of_assembly_refuses_a_step(library: Library) -> None:
     # the run goes on with another force
     c.set(**{TOO_MUCH[model(library)][0]: 0.0})
     assert c.step(0.0, 1e-3) == OK
-    c.free()
 
 
 def test_a_step_ends_early_at_the_limit(libraries: dict[str, Library]) -> None:
@@ -268,7 +249,6 @@ def test_a_step_ends_early_at_the_limit(libraries: dict[str, Library]) -> None:
             assert c.terminate
         assert (c.status(), c.early, c.terminate) == (3, False, False)
         assert c.reached.value - reached < 1e-6
-        c.free()
 
 
 #: A start from which friction comes near to jamming the links within a turn and a half.
@@ -301,20 +281,17 @@ def test_friction_that_may_jam_the_links_is_refused(five_bar: Library) -> None:
     assert c("ExitInitializationMode") == ERROR
     assert c.status() == 3
     assert c.text().startswith(f"{JAMMING} at crank angle 0 rad (0 deg) and slider position 0 m")
-    c.free()
     c = five_bar.instance().start(**TOO_ROUGH)
     before = c.get("slider.guide_force", "assembly.margin_to_limit")
     assert c.step(0.0, 0.3) == DISCARD
     assert c.status() == 3
     assert c.text().startswith(f"in the step from t = 0 s: {JAMMING} at crank angle ")
     assert c.get("slider.guide_force", "assembly.margin_to_limit") == before
-    c.free()
     c = five_bar.instance().start(**rough(0.01, 0))
     c.set(drive__torque=1e200)
     assert c.step(0.0, 1.0) == DISCARD
     assert c.status() == 3
     assert c.text().startswith(f"in the step from t = 0 s: {JAMMING} near crank angle ")
-    c.free()
 
 
 def test_a_step_ends_early_where_friction_may_jam_the_links(fmi3: Library) -> None:
@@ -323,7 +300,6 @@ def test_a_step_ends_early_where_friction_may_jam_the_links(fmi3: Library) -> No
     assert 0.0 <= c.get("assembly.margin_to_limit")[0] < 1e-6
     assert (c.early, c.terminate, c.status()) == (True, True, 3)
     assert c.text() == f"the step ended early: {JAMMING}"
-    c.free()
 
 
 def test_model_exchange_to_where_friction_may_jam_the_links(five_bar: Library) -> None:
@@ -337,7 +313,6 @@ def test_model_exchange_to_where_friction_may_jam_the_links(five_bar: Library) -
     assert c("EnterEventMode") == OK
     assert c.discrete()[0]
     assert (c.status(), c.text()) == (3, f"the motion has ended: {JAMMING}")
-    c.free()
 
 
 def test_steps_that_cannot_meet_the_tolerance(five_bar: Library) -> None:
@@ -347,18 +322,15 @@ def test_steps_that_cannot_meet_the_tolerance(five_bar: Library) -> None:
     assert c.status() == 4
     assert "in the step from t = 0 s: the step size fell to" in c.text()
     assert ", at crank angle 0 rad (0 deg) and slider position 0 m" in c.text()
-    c.free()
     # accelerations that are not finite from the beginning
     c = five_bar.instance().start(drive__mode=0)
     c.set(drive__torque=1e308, slider__force=1e308)
     assert c.step(0.0, 1.0) == DISCARD
     assert "the accelerations are not finite" in c.text()
-    c.free()
     # more steps than there may be
     c = five_bar.instance().start(slider__stiffness=1e12, slider__damping=0.0)
     assert c.step(0.0, 10.0) == DISCARD
     assert "20000 steps did not suffice: stopped" in c.text()
-    c.free()
 
 
 def test_an_early_return_is_for_the_limit_alone(fmi3: Library) -> None:
@@ -366,7 +338,6 @@ def test_an_early_return_is_for_the_limit_alone(fmi3: Library) -> None:
     c.set(drive__torque=1e200)
     assert c.step(0.0, 1.0) == DISCARD
     assert (c.status(), c.early, c.reached.value) == (4, False, 0.0)
-    c.free()
 
 
 def test_every_way_into_the_limit_is_refused_or_ends_early(libraries: dict[str, Library]) -> None:
@@ -385,13 +356,11 @@ def test_every_way_into_the_limit_is_refused_or_ends_early(libraries: dict[str, 
                     if status != OK or c.early:
                         break
                 else:
-                    c.free()
                     continue
                 assert c.status() == 3, c.text()
                 words.add(" ".join(c.text().partition("s: ")[2].split()[:4]))
                 (margin,) = c.get("assembly.margin_to_limit")
                 assert margin >= 0.0
-                c.free()
     # a step so long that the least step of the integrator is too long near the limit
     for name in FILES[1::2]:
         force, modes = TOO_MUCH[model(libraries[name])]
@@ -400,7 +369,6 @@ def test_every_way_into_the_limit_is_refused_or_ends_early(libraries: dict[str, 
         assert c.step(0.0, 1e8) == DISCARD
         assert c.status() == 3
         words.add(" ".join(c.text().partition("s: ")[2].split()[:4]))
-        c.free()
     assert words - {""} == {"limit of assembly at", "limit of assembly near", "the links cannot be"}
 
 
@@ -410,14 +378,12 @@ def test_a_mechanism_at_rest_takes_any_step(five_bar: Library) -> None:
     before = c.get("slider.position", "crank.angle")
     assert c.step(0.0, 3.0) == OK
     assert c.get("slider.position", "crank.angle") == before
-    c.free()
 
 
 def test_ten_thousand_steps_by_the_masters_own_sum(five_bar: Library) -> None:
     for times in ((k * 1e-4 for k in range(10_000)), summed(1e-4, 10_000)):
         c = five_bar.instance().start(solver__tolerance=1e-4)
         assert {c.step(time, 1e-4) for time in times} == {OK}
-        c.free()
 
 
 def summed(step: float, count: int) -> Iterator[float]:
@@ -436,8 +402,6 @@ def test_what_a_read_leaves_is_good_after_a_refused_step(fmi3: Library) -> None:
         assert instance.step(0.0, 0.1) == DISCARD
     assert c.get("slider.acceleration") == other.get("slider.acceleration")
     assert c.get("slider.acceleration")[0] > 1e8
-    c.free()
-    other.free()
 
 
 def test_locals_that_cannot_be_computed_stay_the_last_good_ones(five_bar: Library) -> None:
@@ -446,7 +410,6 @@ def test_locals_that_cannot_be_computed_stay_the_last_good_ones(five_bar: Librar
     c.set(slider__force=math.nan)
     assert c.get("power.supplied", "power.dissipated") == before
     assert c.status() == 2
-    c.free()
 
 
 def test_the_status_of_the_last_step_is_not_that_of_a_read(libraries: dict[str, Library]) -> None:
@@ -458,7 +421,6 @@ def test_the_status_of_the_last_step_is_not_that_of_a_read(libraries: dict[str, 
     state, ended = c_int(-1), c_int(-1)
     assert c("GetStatus", 0, byref(state)) == c("GetBooleanStatus", 3, byref(ended)) == OK
     assert (state.value, ended.value) == (OK, 0)
-    c.free()
 
 
 def test_the_status_of_a_mended_start_is_good(library: Library) -> None:
@@ -471,7 +433,6 @@ def test_the_status_of_a_mended_start_is_good(library: Library) -> None:
         c.set(crank__length=0.05)
         c.get("crank.angle")
         assert (c.status(), c.text()) == (0, "")
-        c.free()
 
 
 # Inputs that move over a step, outputs that do
@@ -512,14 +473,12 @@ def test_what_moves(library: Library) -> None:
     assert slopes(c, ["crank.angle"], out, order=2) == ERROR
     assert "derivative 2 of crank.angle" in c.log[-1][1]
     assert slopes(c, ["solver.status"], out) == ERROR
-    c.free()
 
 
 def test_output_derivatives_that_are_not_finite(five_bar: Library) -> None:
     c = five_bar.instance().start(drive__mode=0)
     c.set(drive__torque=math.nan)
     assert slopes(c, ["crank.speed"], (c_double * 1)()) == DISCARD
-    c.free()
 
 
 def test_a_commanded_speed_that_moves(libraries: dict[str, Library]) -> None:
@@ -534,8 +493,6 @@ def test_a_commanded_speed_that_moves(libraries: dict[str, Library]) -> None:
     names = ("crank.speed", "slider.position", "energy.supplied")
     assert moving.get(*names) == pytest.approx(given.get(*names), rel=1e-12)
     assert moving.get("drive.speed") == [43.982297150257104 + 5.0]
-    moving.free()
-    given.free()
 
 
 @pytest.mark.parametrize("moved", ["drive.speed", "drive.acceleration", "drive.torque", "slider.force"])
@@ -559,7 +516,6 @@ def test_derivatives_of_outputs_where_any_input_moved(libraries: dict[str, Libra
             c.set(drive__acceleration=slope)
             assert c.get("crank.speed") == [speed]
         found = c.get(*names)
-        c.free()
         return found
 
     c = at(end)
@@ -568,7 +524,6 @@ def test_derivatives_of_outputs_where_any_input_moved(libraries: dict[str, Libra
     up, down = values(end + h), values(end - h)
     expected = [(a - b) / (2 * h) for a, b in zip(up, down)]
     assert list(found) == pytest.approx(expected, rel=1e-6, abs=1e-5 * max(map(abs, expected)))
-    c.free()
 
 
 def test_jumps_of_a_commanded_speed(five_bar: Library) -> None:
@@ -583,8 +538,6 @@ def test_jumps_of_a_commanded_speed(five_bar: Library) -> None:
     for instance in (c, again):
         assert instance.step(0.0, 1e-3) == OK
     assert c.get("crank.speed", "slider.velocity") == again.get("crank.speed", "slider.velocity")
-    c.free()
-    again.free()
 
 
 # Saved states
@@ -643,8 +596,6 @@ def test_a_run_goes_on_from_a_saved_state_bit_for_bit(library: Library) -> None:
     assert other.get(*NAMES) == wanted
     c("FreeFMUState" if library.fmi == 3 else "FreeFMUstate", byref(state))
     c("FreeFMUState" if library.fmi == 3 else "FreeFMUstate", None)
-    c.free()
-    other.free()
 
 
 def test_damaged_states_are_refused(library: Library) -> None:
@@ -685,8 +636,6 @@ def test_damaged_states_are_refused(library: Library) -> None:
     text = serialized(c, c.saved())
     assert restored(c, text) == OK
     assert c.step(0.0, 1e-3) == OK
-    fresh.free()
-    c.free()
 
 
 def test_a_state_with_a_time_that_is_not_finite_is_refused(five_bar: Library) -> None:
@@ -702,7 +651,6 @@ def test_a_state_with_a_time_that_is_not_finite_is_refused(five_bar: Library) ->
     assert restored(c, text.replace(time, nan, 1)) == ERROR
     assert restored(c, nan.join(text.rsplit(time, 1))) == ERROR
     assert restored(c, text) == OK
-    c.free()
 
 
 def test_quotes_in_a_sentence_do_not_spoil_the_text(five_bar: Library) -> None:
@@ -710,7 +658,6 @@ def test_quotes_in_a_sentence_do_not_spoil_the_text(five_bar: Library) -> None:
     c.step(5.0, 1.0)
     saved = json.loads(serialized(c, c.saved()))
     assert saved["message"] == c.text()
-    c.free()
 
 
 # Derivatives
@@ -750,7 +697,6 @@ def test_derivatives_that_there_are_not(library: Library, kind: str) -> None:
     c.set(crank__length=-1.0)
     assert directional(c, ["crank.acceleration"], ["drive.torque"], [1.0], kind) == ERROR
     assert "crank.length is -1" in c.log[-1][1]
-    c.free()
     c = library.instance().start()
     assert directional(c, ["crank.acceleration"], ["crank.length"], [1.0], kind) == ERROR
     assert "crank.length is no known of a derivative in step mode" in c.log[-1][1]
@@ -769,87 +715,12 @@ def test_derivatives_that_there_are_not(library: Library, kind: str) -> None:
         )
     else:
         assert c("GetDirectionalDerivative", None, c_size_t(0), None, c_size_t(0), None, None) == OK
-    c.free()
-
-
-@pytest.mark.parametrize("file", FILES)
-@pytest.mark.parametrize("modes", [{}, {"drive__mode": 0}])
-def test_derivatives_against_differences(libraries: dict[str, Library], file: str, modes: dict[str, Any]) -> None:
-    """A coarse check of all paths; `test_agreement` holds them to the traced equations."""
-    library = libraries[file]
-    outputs = ["crank.speed", "crank.acceleration", "drive.applied_torque", "energy.kinetic", "power.supplied"]
-    inputs = ["drive.speed", "drive.torque", "drive.acceleration"]
-    if model(library) == "SliderCrank":
-        inputs += ["axial.speed", "axial.force"]
-
-    def check(c: Instance, knowns: list[str], moved: Any) -> None:
-        for known in knowns:
-            exact = directional(c, outputs, [known], [1.0])
-            h = 1e-5
-            up, down = moved(known, h), moved(known, -h)
-            assert exact == pytest.approx([(a - b) / (2 * h) for a, b in zip(up, down)], rel=2e-5, abs=2e-4), known
-            if library.fmi == 3:
-                for number in range(len(outputs)):
-                    weights = [float(n == number) for n in range(len(outputs))]
-                    (gradient,) = directional(c, outputs, [known], weights, "Adjoint")
-                    assert gradient == pytest.approx(exact[number], rel=1e-11, abs=1e-11)
-
-    def in_steps(known: str, change: float) -> list[float]:
-        other = library.instance().start(**modes)
-        assert other.step(0.0, 0.01) == OK
-        other.set(**{known: other.get(known)[0] + change})
-        values = other.get(*outputs)
-        other.free()
-        return values
-
-    c = library.instance().start(**modes)
-    assert c.step(0.0, 0.01) == OK
-    c.set(drive__speed=c.get("drive.speed")[0])
-    check(c, inputs, in_steps)
-    c.free()
-
-    def at_start(known: str, change: float) -> list[float]:
-        other = library.instance()
-        other.set(**modes)
-        other.enter()
-        other.set(**{known: other.get(known)[0] + change})
-        values = other.get(*outputs)
-        other.free()
-        return values
-
-    c = library.instance()
-    c.set(**modes)
-    c.enter()
-    check(c, [*inputs, "crank.length", "initial.crank_angle", "initial.crank_speed"], at_start)
-    c.free()
-
-    exchange = library.instance("me").start(**modes)
-    assert exchange("EnterContinuousTimeMode") == OK
-
-    def of_state(known: str, change: float) -> list[float]:
-        place = {"crank.angle": 0, "crank.speed": 2}.get(known)
-        kept = exchange.states(count=6)
-        if place is None:
-            value = exchange.get(known)[0]
-            exchange.set(**{known: value + change})
-            values = exchange.get(*outputs)
-            exchange.set(**{known: value})
-            return values
-        x = (c_double * 6)(*(v + change * (n == place) for n, v in enumerate(kept)))
-        assert exchange("SetContinuousStates", x, c_size_t(6)) == OK
-        values = exchange.get(*outputs)
-        assert exchange("SetContinuousStates", (c_double * 6)(*kept), c_size_t(6)) == OK
-        return values
-
-    check(exchange, ["crank.angle", "crank.speed", "drive.torque", "drive.speed"], of_state)
-    exchange.free()
 
 
 def test_the_states_are_the_knowns_of_model_exchange(five_bar: Library) -> None:
     c = five_bar.instance("me").start()
     assert directional(c, ["crank.acceleration"], ["crank.speed"], [1.0]) != ERROR
     assert directional(c, ["crank.acceleration"], ["crank.acceleration"], [1.0]) == ERROR
-    c.free()
 
 
 def test_works_that_are_no_outputs(natives: dict[str, Path], tmp_path: Path) -> None:
@@ -861,7 +732,6 @@ def test_works_that_are_no_outputs(natives: dict[str, Path], tmp_path: Path) -> 
         c.set(drive__torque=1.0)
         assert c.step(0.1, 0.1) == OK
         assert c.get("energy.supplied") != [0.0]
-        c.free()
 
 
 # Model exchange
@@ -906,7 +776,6 @@ def test_model_exchange_by_hand(library: Library) -> None:
     assert c.states()[2] == 50.0
     assert c.discrete() == (False, False)
     assert c("EnterContinuousTimeMode") == OK
-    c.free()
 
 
 def test_model_exchange_beyond_the_limit(five_bar: Library) -> None:
@@ -921,13 +790,11 @@ def test_model_exchange_beyond_the_limit(five_bar: Library) -> None:
     assert c.discrete()[0]
     assert c.status() == 3
     assert c.text() == "the motion has reached the limit of assembly"
-    c.free()
     c = five_bar.instance("me")
     c.set(crank__length=-1.0)
     c.enter()
     assert c("GetContinuousStates", (c_double * 6)(), c_size_t(6)) == ERROR
     assert "crank.length is -1" in c.log[-1][1]
-    c.free()
 
 
 def test_the_limit_stays_the_reason_until_the_state_is_clear_of_it(five_bar: Library) -> None:
@@ -952,7 +819,6 @@ def test_the_limit_stays_the_reason_until_the_state_is_clear_of_it(five_bar: Lib
     put(x[1])
     c.get("crank.acceleration")
     assert c.status() == 0
-    c.free()
 
 
 def test_the_limit_in_words_for_who_logs(five_bar: Library) -> None:
@@ -962,15 +828,6 @@ def test_the_limit_in_words_for_who_logs(five_bar: Library) -> None:
     assert c("EnterEventMode") == OK
     assert c.discrete()[0]
     assert c.log == [(WARNING, "the motion has reached the limit of assembly")]
-    c.free()
-
-
-def test_the_clearance_at_the_limit_is_the_least_that_is_followed(five_bar: Library) -> None:
-    c = five_bar.instance().start()
-    (margin,) = c.get("assembly.margin_to_limit")
-    (angle,) = c.get("transmission.angle")
-    assert margin == pytest.approx(math.sin(angle) - LIMIT_SINE, rel=1e-12)
-    c.free()
 
 
 # Intermediate updates of FMI 3.0
@@ -1003,8 +860,6 @@ def test_intermediate_updates(fmi3: Library) -> None:
     assert set(forbidden) == {ERROR}
     assert "not allowed during an intermediate update" in c.log[-1][1]
     assert c.get(*NAMES) == plain.get(*NAMES)
-    c.free()
-    plain.free()
 
 
 def test_inputs_set_in_an_intermediate_update_hold_from_there(fmi3: Library) -> None:
@@ -1030,8 +885,6 @@ def test_inputs_set_in_an_intermediate_update_hold_from_there(fmi3: Library) -> 
     assert two.step(times[0], 0.05 - times[0]) == OK
     names = ("crank.angle", "crank.speed", "slider.position", "slider.velocity", "energy.supplied")
     assert c.get(*names) == pytest.approx(two.get(*names), rel=1e-8)
-    c.free()
-    two.free()
 
 
 def test_an_input_that_is_not_finite_in_an_update_refuses_the_step(fmi3: Library) -> None:
@@ -1041,7 +894,6 @@ def test_an_input_that_is_not_finite_in_an_update_refuses_the_step(fmi3: Library
     assert c.step(0.0, 0.05) == DISCARD
     assert c.status() == 2
     assert c.get("time", "slider.force") == [0.0, 0.0]
-    c.free()
 
 
 @pytest.mark.parametrize("ahead", [0.0, 0.004, 1.0])
@@ -1066,7 +918,6 @@ def test_an_update_may_end_the_step(fmi3: Library, ahead: float) -> None:
     assert c.reached.value == pytest.approx(ends, abs=1e-15)
     assert c.get("time") == [c.reached.value]
     assert c.step(c.reached.value, 0.01) == OK
-    c.free()
 
 
 # Arrays
@@ -1083,7 +934,6 @@ def test_of_an_array_with_a_wrong_reference_nothing_is_set(library: Library) -> 
     assert c.enter() == OK
     first = min(library.references, key=lambda name: library.references[name])
     assert c.get(first) != [9.0]
-    c.free()
 
 
 def test_a_known_that_is_named_twice_counts_twice(library: Library) -> None:
@@ -1093,11 +943,9 @@ def test_a_known_that_is_named_twice_counts_twice(library: Library) -> None:
     if library.fmi == 3:
         (g,) = directional(c, ["crank.acceleration"] * 2, ["drive.torque"], [1.5, 0.5], "Adjoint")
         assert g == pytest.approx(once, rel=1e-14)
-    c.free()
     c = library.instance("me").start(drive__mode=0)
     (once,) = directional(c, ["crank.acceleration"], ["crank.speed"], [2.0])
     assert directional(c, ["crank.acceleration"], ["crank.speed"] * 2, [1.5, 0.5]) == [pytest.approx(once, rel=1e-14)]
-    c.free()
 
 
 def test_nothing_asked_is_nothing_wrong(library: Library) -> None:
@@ -1119,7 +967,6 @@ def test_nothing_asked_is_nothing_wrong(library: Library) -> None:
                 assert c(f"{verb}{kind}", references, n, values, c_size_t(2)) == ERROR
                 assert "2 numbers: it must be 1" in c.log[-1][1]
         assert c("GetOutputDerivatives", references, n, (c_int * 1)(1), values, c_size_t(2)) == ERROR
-    c.free()
 
 
 def test_versions(library: Library) -> None:

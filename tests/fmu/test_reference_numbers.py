@@ -36,9 +36,7 @@ def revolutions(fmu: str, folder: str, pattern: list[int], tolerance: float, tur
     return seen
 
 
-@pytest.mark.parametrize(
-    "pattern", [[90], [1], [30], [7, 11, 2, 25, 45]], ids=["quarter turns", "degrees", "30 degrees", "uneven"]
-)
+@pytest.mark.parametrize("pattern", [[90], [7, 11, 2, 25, 45]], ids=["quarter turns", "uneven"])
 def test_three_turns(five_bar: Path, tmp_path: Path, pattern: list[int]) -> None:
     seen = run_in_process(revolutions, five_bar, tmp_path, pattern, 1e-9, 3)
     assert seen["0"]["drive.applied_torque"] == pytest.approx(published.CRANK_TORQUE_AT_START_DYN_CM * DYN_CM, rel=1e-9)
@@ -48,22 +46,6 @@ def test_three_turns(five_bar: Path, tmp_path: Path, pattern: list[int]) -> None
     fx, fy = (force * DYN for force in published.FORCE_AT_C_AT_360_DEG_DYN)
     assert seen["360"]["pin.C.fx"] == pytest.approx(fx, abs=1e-8)
     assert seen["360"]["pin.C.fy"] == pytest.approx(fy, abs=5e-8)
-
-
-def test_three_turns_at_a_tighter_tolerance(five_bar: Path, tmp_path: Path) -> None:
-    seen = run_in_process(revolutions, five_bar, tmp_path, [90], 1e-13, 3)
-    for angle, position in published.U_CM_AT_CRANK_DEG.items():
-        assert seen[str(angle)]["slider.position"] == pytest.approx(position * CM, abs=0.6e-12)
-    for axis, force in zip("xy", published.FORCE_AT_C_AT_360_DEG_DYN):
-        assert seen["360"][f"pin.C.f{axis}"] == pytest.approx(force * DYN, abs=0.6e-8)
-    for quantity in seen.values():
-        assert quantity["closure.residual"] < 1e-15
-
-
-def test_steady_state(five_bar: Path, tmp_path: Path) -> None:
-    last = run_in_process(revolutions, five_bar, tmp_path, [90], 1e-9, 40)["14400"]
-    assert last["slider.position"] == pytest.approx(published.STEADY_U_CM * CM, rel=1e-8)
-    assert last["slider.velocity"] == pytest.approx(published.STEADY_U_RATE_CM_S * CM, rel=1e-8)
 
 
 #: Lengths in inches and angles in degrees as the thesis gives them, in the FMU's units.
@@ -94,12 +76,11 @@ def at_angles(fmu: str, folder: str, values: dict[str, float], angles: list[floa
     return rows
 
 
-@pytest.mark.parametrize("angles", [[30.0], [7.0, 11.0, 30.0], list(range(31))], ids=["one", "three", "degrees"])
 @pytest.mark.parametrize("spot", rahman.SPOTS, ids=["offset and shift", "offset and twist"])
-def test_slider_crank_at_30_degrees(slider_crank: Path, tmp_path: Path, spot: rahman.Spot, angles: list[float]) -> None:
+def test_slider_crank_at_30_degrees(slider_crank: Path, tmp_path: Path, spot: rahman.Spot) -> None:
     load = spot.slider_force_lb * rahman.POUND_FORCE
     values = mechanism(spot.offset_in, spot.shift_in, spot.twist_deg)
-    free, loaded = run_in_process(at_angles, slider_crank, tmp_path, values, angles, load)[-1]
+    free, loaded = run_in_process(at_angles, slider_crank, tmp_path, values, [7.0, 11.0, 30.0], load)[-1]
     assert free["crank.angle"] == pytest.approx(pi / 6, rel=1e-12)
     assert free["slider.position"] / rahman.INCH == pytest.approx(spot.position_in, abs=6e-7)
     assert free["slider.velocity"] / rahman.INCH == pytest.approx(spot.velocity_in_s, abs=6e-7)
@@ -115,64 +96,3 @@ def test_slider_crank_at_30_degrees(slider_crank: Path, tmp_path: Path, spot: ra
     for row in (free, loaded):
         assert row["closure.residual"] < 1e-15
         assert abs(row["energy.residual"]) < 1e-8
-
-
-def torque_given(fmu: str, folder: str, values: dict[str, float], load: float) -> dict[str, float]:
-    """Outputs at the start in torque drive under a slider load."""
-    from bare_master import Fmu
-
-    return Fmu(fmu, folder).instantiate().start(values | {"drive.mode": 0, "slider.load": load}).outputs()
-
-
-@pytest.mark.parametrize("spot", rahman.SPOTS, ids=["offset and shift", "offset and twist"])
-def test_slider_crank_keeps_its_speed_under_that_torque_and_force(
-    slider_crank: Path, tmp_path: Path, spot: rahman.Spot
-) -> None:
-    values = mechanism(spot.offset_in, spot.shift_in, spot.twist_deg)
-    values |= {"initial.crank_angle": pi / 6, "drive.torque": rahman.TORQUE_LB_IN * rahman.POUND_INCH}
-    load = spot.slider_force_lb * rahman.POUND_FORCE
-    assert abs(run_in_process(torque_given, slider_crank, tmp_path / "a", values, 0.0)["crank.acceleration"]) > 4.0
-    held = run_in_process(torque_given, slider_crank, tmp_path / "b", values, load)
-    # the force is printed to 1e-6 lb
-    assert held["crank.acceleration"] == pytest.approx(0.0, abs=1e-6)
-    assert held["slider.acceleration"] / rahman.INCH == pytest.approx(spot.acceleration_in_s2, abs=2e-5)
-
-
-@pytest.mark.parametrize("offset", rahman.DEAD_CENTRES_DEG)
-def test_slider_crank_turns_back_at_its_dead_centres(slider_crank: Path, tmp_path: Path, offset: float) -> None:
-    outer, inner = rahman.DEAD_CENTRES_DEG[offset]
-    angles = [outer - 0.005, outer + 0.005, inner - 0.005, inner + 0.005]
-    rows = run_in_process(at_angles, slider_crank, tmp_path, mechanism(offset), angles, 0.0)
-    signs = [row["slider.velocity"] > 0.0 for row, _ in rows]
-    assert signs == [True, False, False, True]
-    stroke = (rows[0][0]["slider.position"] - rows[2][0]["slider.position"]) / rahman.INCH
-    assert stroke == pytest.approx(rahman.STROKES_IN[offset], abs=6e-4)
-
-
-def can_start(fmu: str, folder: str, cases: list[dict[str, float]]) -> list[int]:
-    """solver.status of initialisations."""
-    from bare_master import Fmu
-
-    fmu = Fmu(fmu, folder)
-    found = []
-    for values in cases:
-        instance = fmu.instantiate()
-        for name, value in values.items():
-            instance.set(name, value)
-        instance.setup()
-        instance.enter()
-        instance.exit()
-        found.append(instance.get("solver.status"))
-        instance.free()
-    return found
-
-
-def test_slider_crank_assembles_up_to_the_greatest_shift(slider_crank: Path, tmp_path: Path) -> None:
-    # crank and offset in line, where the rod has to reach furthest
-    cases = [
-        mechanism(offset, sign * (shift + more))
-        for offset, shift in rahman.GREATEST_SHIFTS_IN.items()
-        for sign in (1.0, -1.0)
-        for more in (-1e-3, 1e-3)
-    ]
-    assert run_in_process(can_start, slider_crank, tmp_path, cases) == [0, 3] * 8

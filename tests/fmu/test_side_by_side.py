@@ -263,26 +263,3 @@ def test_module_body_has_no_side_effects(fmu: Path, model: Model, tmp_path: Path
     assert outputs["crank.speed"] == pytest.approx(
         {"five_bar": 43.982297150257104, "slider_crank": 5.235987755983}[model.plant]
     )
-
-
-def instantiate_often(fmu: str, folder: str, times: int) -> list[Any]:
-    """The end of a short run of one instance after another, what is garbage collected between them."""
-    import gc
-
-    from bare_master import Fmu
-
-    loaded = Fmu(fmu, folder)
-    ends = []
-    for _ in range(times):
-        instance = loaded.instantiate().start()
-        instance.run([1e-3] * 3)
-        ends.append(instance.outputs())
-        instance.free()
-        gc.collect()
-    return ends
-
-
-def test_one_instance_after_another_in_a_process_that_lives_on(fmu: Path, tmp_path: Path) -> None:
-    # the wrapper gives up a reference to the slave module's namespace at every instantiation, which it only borrowed
-    ends = run_in_process(instantiate_often, fmu, tmp_path, 40)
-    assert ends == [ends[0]] * 40
