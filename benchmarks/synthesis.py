@@ -26,7 +26,7 @@ from dataclasses import dataclass
 from math import inf, isfinite, pi, tau
 from statistics import median
 from time import perf_counter
-from types import FunctionType, SimpleNamespace
+from types import SimpleNamespace
 
 import numpy as np
 from numba import njit
@@ -34,6 +34,7 @@ from numpy.typing import NDArray
 from rich.console import Console
 from rich.table import Table
 
+from analysis.numerics.tracing import rebound
 from analysis.synthesis import (
     LargestLink,
     Linkage,
@@ -105,7 +106,7 @@ def _jacobians(repeats, c, s, zero, q, out, jacobian):
 
 def curve_by_numpy(linkage: Linkage, rotation: FloatArray) -> ComplexArray:
     """The coupler curve over arrays, by the plant's own loop closure with NumPy's square root."""
-    joined = FunctionType(kinematics.joined.__code__, {"sqrt": np.sqrt, "Position": kinematics.Position})
+    joined = rebound((kinematics,), {"sqrt": np.sqrt}).of(kinematics.joined)
     q = linkage
     th2 = rotation + q.crank_phase
     c2, s2 = np.cos(th2), np.sin(th2)

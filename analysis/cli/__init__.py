@@ -15,10 +15,7 @@ import click
 
 from linkwork import __version__
 
-WRONG = 1
-ENDED_EARLY = 3
-CHECK_FAILED = 4
-INTERRUPTED = 130
+from .codes import INTERRUPTED
 
 #: Every command: the module of this package that has it, as a function of its name, and its line in ``linkwork --help``.
 COMMANDS = {

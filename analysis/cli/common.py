@@ -17,10 +17,10 @@ from rich.text import Text
 
 from linkwork.errors import InputError, Interrupted, LinkworkError
 
-from . import CHECK_FAILED as CHECK_FAILED
-from . import ENDED_EARLY as ENDED_EARLY
-from . import INTERRUPTED as INTERRUPTED
-from . import WRONG as WRONG
+from .codes import CHECK_FAILED as CHECK_FAILED
+from .codes import ENDED_EARLY as ENDED_EARLY
+from .codes import INTERRUPTED as INTERRUPTED
+from .codes import WRONG as WRONG
 
 #: Wide enough for the tables where the output goes to a file or a pipe.
 console = Console(emoji=False) if sys.stdout.isatty() else Console(emoji=False, width=120)

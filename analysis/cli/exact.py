@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import click
 
-from . import ENDED_EARLY
+from .codes import ENDED_EARLY
 from .common import (
     SYNTHESIS,
     check_kind,

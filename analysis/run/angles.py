@@ -6,16 +6,17 @@ which is relative to the state, for one of whole turns.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from itertools import chain
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .inputs import sample
+from linkwork.mechanism import Mechanism
 
-if TYPE_CHECKING:
-    from .prepared import Run, Start
+from .events import Event
+from .inputs import Encoded
 
 #: Turns from which on they are taken off: all, or where a mechanism is not the same after any number of turns, such as one with
 #: a groove, multiples of these. A power of two, as the denominators of most ratios of a groove are.
@@ -25,30 +26,22 @@ TURNS = 1024
 class WholeTurns:
     """The turns taken off the angles of a run so far; none where an input or an event depends on the angle itself."""
 
-    def __init__(self, run: Run) -> None:
-        self._run = run
-        self._periods = [freedom.period for freedom in run.mechanism.freedoms]
-        self.taken = np.zeros(run.mechanism.size)
-        functions = chain(chain.from_iterable(run.encoded.functions), (event.function for event in run.events))
+    def __init__(
+        self, mechanism: Mechanism, p: Any, modes: Sequence[float], encoded: Encoded, events: Sequence[Event]
+    ) -> None:
+        self._mechanism, self._p, self._modes = mechanism, p, modes
+        self._periods = [freedom.period for freedom in mechanism.freedoms]
+        self.taken = np.zeros(mechanism.size)
+        functions = chain(chain.from_iterable(encoded.functions), (event.function for event in events))
         self._never = any(functions)
         #: from which sample on how much is taken off
         self._since: list[tuple[int, NDArray[np.float64]]] = []
-
-    def from_start(self, start: Start) -> Start:
-        """The start of the run, with few turns."""
-        run, x = self._run, start.x.copy()
-        if not self._too_many(x):
-            return start
-        u = sample(run.encoded, float(run.settings.times[0]), x, run.encoded.law)
-        self.take(x, u, run.encoded.law, 0)
-        # the balance of energy begins with the angle as it is now
-        return type(start)(x, run.mechanism.equations.energy(tuple(x.tolist()), run.p), start.scale)
 
     def take(
         self, x: NDArray[np.float64], u: NDArray[np.float64], law: NDArray[np.float64], first: int, watch: Any = None
     ) -> None:
         """Take turns off the state x, if they are many; ``first`` is the number of the next sample."""
-        if not self._too_many(x) or law[2] != 0.0:
+        if not self.too_many(x) or law[2] != 0.0:
             return
         period = np.zeros(len(x))
         period[: len(self._periods)] = self._periods
@@ -74,18 +67,19 @@ class WholeTurns:
             values[first:, self._columns] += off[: len(self._columns)]
         return values
 
-    def _too_many(self, x: NDArray[np.float64]) -> bool:
+    def too_many(self, x: NDArray[np.float64]) -> bool:
+        """Whether turns are to be taken off the state x."""
         return not self._never and any(0.0 < TURNS * way < abs(angle) for way, angle in zip(self._periods, x.tolist()))
 
     @property
     def _columns(self) -> list[int]:
         """The outputs that are the coordinates."""
-        mechanism = self._run.mechanism
-        return [mechanism.output_names.index(freedom.coordinate) for freedom in mechanism.freedoms]
+        return [self._mechanism.output_names.index(freedom.coordinate) for freedom in self._mechanism.freedoms]
 
     def _repeats(self, x: NDArray[np.float64], u: NDArray[np.float64], way: NDArray[np.float64]) -> bool:
         """Whether the mechanism does the same after the way as at x."""
-        equations, p, acting = self._run.mechanism.equations, self._run.p, self._run.applied(u)
+        equations, p = self._mechanism.equations, self._p
+        acting = equations.applied(self._modes, tuple(u.tolist()), p)
 
         def seen(y: NDArray[np.float64]) -> NDArray[np.float64]:
             state = tuple(y.tolist())

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from math import pi
 
 from ..mechanisms import InitialState, Parameters, mechanism_of
-from .arguments import published_set
+from .arguments import driven, published_set, turn_of
 from .inputs import Inputs, given
 
 
@@ -41,7 +40,8 @@ class Case:
 
 
 def published_case(name: str, *, revolutions: float = 3.0, steps_per_revolution: int = 360) -> Case:
-    """A published set at its running speed, from where it is published to start.
+    """A published set at its running speed, from where it is published to start; for as long as its FMU runs by default, if
+    nothing commands that speed.
 
     Raises
     ------
@@ -49,12 +49,16 @@ def published_case(name: str, *, revolutions: float = 3.0, steps_per_revolution:
         If there is no set of that name.
     """
     entry = published_set(name)
-    turn = 2.0 * pi / entry.crank_speed
+    mechanism, inputs = mechanism_of(entry.parameters), driven(entry, None)
+    turn = turn_of(inputs, mechanism)
+    _, stop_time, step, _ = mechanism.experiment
+    if turn is not None:
+        stop_time, step = revolutions * turn, turn / steps_per_revolution
     return Case(
         title=entry.source,
         parameters=entry.parameters,
         initial=entry.initial,
-        inputs=Inputs(speed=entry.crank_speed),
-        stop_time=revolutions * turn,
-        step=turn / steps_per_revolution,
+        inputs=inputs,
+        stop_time=stop_time,
+        step=step,
     )

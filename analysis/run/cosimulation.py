@@ -306,7 +306,7 @@ def compare(a: Trajectory, b: Trajectory, *, tolerance: float = 1e-6) -> Compari
     Raises
     ------
     InputError
-        If the runs have not the same times or outputs.
+        If the times or the outputs of the runs differ.
 
     Examples
     --------

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time as clock
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -133,8 +133,12 @@ class Run:
         from . import compiled as k
 
         begun = clock.perf_counter()
-        turns = WholeTurns(self)
-        start = turns.from_start(self.start())
+        turns = WholeTurns(self.mechanism, self.p, self.modes, self.encoded, self.events)
+        start, law = self.start(), self.encoded.law
+        if turns.too_many(start.x):
+            turns.take(start.x, sample(self.encoded, float(self.settings.times[0]), start.x, law), law, 0)
+            # the balance of energy begins with the angles as they are now
+            start = replace(start, energy=self.mechanism.equations.energy(tuple(start.x.tolist()), self.p))
         problem = self.problem(start)
         source, kept = compiled_source(self.encoded)
         watch, watching = self._watch(self._balance() if balanced else ())

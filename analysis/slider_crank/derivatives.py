@@ -9,20 +9,20 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, fields
-from types import FunctionType, MappingProxyType, SimpleNamespace
+from types import MappingProxyType, SimpleNamespace
 from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from linkwork.parameters import field_name
-from linkwork.slider_crank import parameters as parameters_module
-from linkwork.slider_crank import variables
+from linkwork.slider_crank import parameters, variables
 from linkwork.slider_crank.parameters import Constants, SliderCrankParameters
 
 from ..files import unknown_name
 from ..numerics.dual import Dual, dual
 from ..numerics.dual import variables as independent
+from ..numerics.tracing import rebound
 from .forces import SLIDER_FORCE, ForceTurn, solve
 from .quantities import JOINTS, MaskedArray, masked_array
 from .shifts import ShiftMotion, in_the_shaft, on_arrays, with_groove
@@ -67,11 +67,8 @@ QUANTITIES: Mapping[str, str] = MappingProxyType(
 FREE_OF_LOAD = (*KINEMATIC, "drive.applied_torque", "guide.mx", "guide.my", "guide.mz")
 
 #: The constants of the equations for arrays or dual numbers in the place of the parameters.
-_CONSTANTS = cast(
-    Callable[[Any], Constants],
-    FunctionType(
-        SliderCrankParameters.constants.__code__, vars(parameters_module) | {"cos": np.cos, "sin": np.sin}, "constants"
-    ),
+_CONSTANTS: Callable[[Any], Constants] = rebound((parameters,), {"cos": np.cos, "sin": np.sin}).of(
+    SliderCrankParameters.constants
 )
 
 

@@ -37,7 +37,7 @@ FloatArray = NDArray[np.float64]
 LINKS = ("ground_length", "crank_length", "coupler_length", "rocker_length")
 LENGTHS = ("pivot_x", "pivot_y", *LINKS, "point_distance")
 ANGLES = ("ground_angle", "crank_phase", "point_angle", "output_angle")
-#: Links that need not be longer than zero of a slider-crank: its rocker, which it has not, and the offset, of either sign.
+#: Links that need not be longer than zero of a slider-crank: its rocker, as it has none, and the offset, of either sign.
 ABSENT = ("rocker_length", "ground_length")
 #: Their units.
 UNITS: Mapping[str, str] = MappingProxyType(dict.fromkeys(LENGTHS, "m") | dict.fromkeys(ANGLES, "rad"))

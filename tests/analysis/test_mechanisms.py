@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pickle
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import asdict, replace
 from math import acos, cos, hypot, pi, sin, sqrt
 from pathlib import Path
@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from click.testing import Result
 from fmpy import simulate_fmu
 from fmpy.validation import validate_fmu
 from scipy.integrate import solve_ivp
@@ -19,6 +20,7 @@ from scipy.linalg import expm
 
 from analysis import Inputs, compare, cosimulate, simulate
 from analysis.export import build
+from analysis.files import read_csv
 from analysis.linear import (
     SampledController,
     control_loop,
@@ -237,6 +239,15 @@ def test_pendulum_swings_as_by_hand() -> None:
     assert np.poly(model.poles) == pytest.approx([1.0, p.damping / p.inertia, p.weight / p.inertia])
     pushed = find_equilibrium(published.parameters, Inputs(torque=0.5 * p.weight))
     assert pushed["pendulum.angle"] == pytest.approx(-acos(0.5))
+
+
+def test_a_published_set_that_nothing_drives_runs_from_the_command_line(linkwork: Callable[..., Result]) -> None:
+    assert linkwork("run", "--published", "pendulum-demo", "--no-plot").exit_code == 0
+    run = read_csv("out/pendulum-demo.csv")
+    known = demo(PENDULUM)
+    swung = solve_ivp(right_side(PENDULUM, known.parameters.constants(), {"torque": 0.0}), (0.0, 1.0), (0.0, 30.0), rtol=1e-9)
+    # for as long as its FMU runs by default: time, angle
+    assert run[-1, :2] == pytest.approx([1.0, swung.y[0, -1]], rel=1e-6)
 
 
 def test_torque_balances_the_pendulum_upside_down() -> None:
