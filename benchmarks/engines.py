@@ -2,8 +2,7 @@
 
 Each engine gets the formulation, the integrator and the solver settings that reach the accuracy soonest: the closed loop as
 relative joints with one closing pin in MuJoCo, as planar bodies with three pins in Exudyn, no Python code inside the
-integration. Accuracy is the largest error of the slider position on a sample grid, relative to its largest magnitude, against
-the reduced equations of `linkwork` integrated to 1e-13.
+integration. Accuracy is that of `benchmarks.engine_cases`.
 
     python -m benchmarks.engines
 
@@ -16,163 +15,19 @@ from __future__ import annotations
 import contextlib
 import io
 import sys
-from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass, replace
-from functools import cache, partial
-from math import ceil, cos, inf, isfinite, log, pi, sin
+from collections.abc import Callable, Iterator
+from functools import partial
+from math import ceil, cos, inf, log, sin
 from time import perf_counter
 from typing import Any, NamedTuple
 
 import numpy as np
-from scipy.integrate import solve_ivp
 
-from linkwork.five_bar.dynamics import Inputs, derivative
-from linkwork.five_bar.kinematics import coefficients, coupler_angle, position, rocker_angle
-from linkwork.five_bar.parameters import Constants, FiveBarParameters
-from linkwork.five_bar.published import DYN_CM_PER_NEWTON_METRE, SETS
-
-ACCURACY = 1e-6
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Case:
-    """One run from th2 = u = u' = 0: parameters, drive, duration (s) and number of sample intervals.
-
-    With ``crank_speed`` (rad/s) the crank turns at that constant speed. Without it the crank starts from rest under the
-    torsion bar of fig. 3.6: T = torque (1 - th2/switch_angle) until th2 reaches ``switch_angle``, then none.
-    """
-
-    name: str
-    parameters: FiveBarParameters
-    duration: float
-    samples: int
-    crank_speed: float | None = None
-    torque: float = 0.0
-    switch_angle: float = 1.0
-
-    def __post_init__(self) -> None:
-        if self.parameters.slider_coulomb_friction != 0.0:
-            raise ValueError("the engine models have no Coulomb friction in the guide")
-
-    @property
-    def times(self) -> np.ndarray:
-        """Sample times (s), the start included."""
-        return np.linspace(0.0, self.duration, self.samples + 1)
-
-    @property
-    def start_speed(self) -> float:
-        """Crank speed at the start (rad/s)."""
-        return self.crank_speed or 0.0
-
-
-def steps_in(interval: float, time_step: float) -> int:
-    """Least number of equal steps in ``interval`` that are no longer than ``time_step`` (both s)."""
-    return max(1, ceil(interval / time_step * (1.0 - 1e-9)))
-
-
-_TABLE_3_1 = SETS["table-3.1"]
-
-#: Table 3.1 at 420 rpm for three turns, and the torsion bar of fig. 3.6 with T0 = 1e8 dyn.cm; k = 1e6, mu = 3e4 (cgs).
-CASES: tuple[Case, ...] = (
-    Case(
-        name="constant-speed",
-        parameters=_TABLE_3_1.parameters,
-        crank_speed=_TABLE_3_1.crank_speed,
-        duration=3 * 2.0 * pi / _TABLE_3_1.crank_speed,
-        samples=36,
-    ),
-    Case(
-        name="torsion-bar",
-        parameters=_TABLE_3_1.parameters,
-        torque=1e8 / DYN_CM_PER_NEWTON_METRE,
-        duration=0.5,
-        samples=50,
-    ),
-)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class EngineRun:
-    """What a run took and how good it was.
-
-    ``seconds`` is the wall time of the integration alone, ``error`` the largest error of u on the sample grid relative to
-    the largest magnitude of u (infinite where the engine failed), ``steps`` the number of time steps.
-    """
-
-    seconds: float
-    error: float
-    label: str
-    steps: int
-
+from benchmarks.accuracy import loosest
+from benchmarks.engine_cases import CASES, Case, EngineRun, centre, relative_error, start, steps_in
+from linkwork.five_bar.parameters import Constants
 
 Run = Callable[[Case, float], EngineRun]
-
-
-# --- the reference ------------------------------------------------------------------------------------------------------
-
-
-@cache
-def reference(case: Case) -> np.ndarray:
-    """Slider position (m) at `Case.times`: the reduced equations by DOP853 at rtol 1e-13, the torque switched at an event."""
-    p = case.parameters.constants()
-    speed_drive = 0.0 if case.crank_speed is None else 1.0
-
-    def rate(_: float, x: np.ndarray, torque: float) -> tuple[float, ...]:
-        applied = torque * (1.0 - x[0] / case.switch_angle)
-        return derivative(tuple(x.tolist()), Inputs(speed_drive, applied, 0.0, 0.0, 0.0, 0.0), p)
-
-    def switch(_: float, x: np.ndarray, torque: float) -> float:
-        return x[0] - case.switch_angle if torque else -1.0
-
-    switch.terminal = True  # type: ignore[attr-defined]
-    times = case.times
-    start, x, torque = 0.0, np.array([0.0, 0.0, case.start_speed, 0.0, 0.0, 0.0]), case.torque
-    u = [0.0]
-    while len(u) < times.size:
-        leg = solve_ivp(
-            rate,
-            (start, case.duration),
-            x,
-            method="DOP853",
-            t_eval=times[len(u) :],
-            events=switch,
-            args=(torque,),
-            rtol=1e-13,
-            atol=1e-15,
-        )
-        u.extend(leg.y[1])
-        if leg.status == 1:
-            start, x, torque = leg.t_events[0][0], leg.y_events[0][0], 0.0
-    result = np.array(u)
-    result.setflags(write=False)
-    return result
-
-
-def relative_error(case: Case, u: np.ndarray) -> float:
-    """Largest |u - u_ref| on the sample grid over the largest |u_ref|; infinite where u is not finite."""
-    expected = reference(case)
-    error = float(np.max(np.abs(u - expected)) / np.max(np.abs(expected)))
-    return error if isfinite(error) else inf
-
-
-class _Start(NamedTuple):
-    """Angles (rad) and rates (rad/s) of coupler and rocker at th2 = u = u' = 0 that close the loop."""
-
-    th3: float
-    th4: float
-    w3: float
-    w4: float
-
-
-def _start(case: Case, p: Constants) -> _Start:
-    g = position(0.0, 0.0, p)
-    k = coefficients(g, p)
-    return _Start(coupler_angle(g), rocker_angle(g), k.k32 * case.start_speed, k.k42 * case.start_speed)
-
-
-def _centre(distance: float, angle: float) -> tuple[float, float]:
-    """Centre of mass in the frame of its link (m)."""
-    return distance * cos(angle), distance * sin(angle)
 
 
 # --- MuJoCo -------------------------------------------------------------------------------------------------------------
@@ -234,9 +89,9 @@ def _mujoco_model(case: Case, iterations: int, *, stiffened: bool = True) -> tup
     q = case.parameters
     p = q.constants()
     rate = CLOSURE_RATE_TORQUE if case.crank_speed is None else CLOSURE_RATE_SPEED
-    x2, y2 = _centre(q.crank_cog_distance, q.crank_cog_angle)
-    x3, y3 = _centre(q.coupler_cog_distance, q.coupler_cog_angle)
-    x4, y4 = _centre(q.rocker_cog_distance, q.rocker_cog_angle)
+    x2, y2 = centre(q.crank_cog_distance, q.crank_cog_angle)
+    x3, y3 = centre(q.coupler_cog_distance, q.coupler_cog_angle)
+    x4, y4 = centre(q.rocker_cog_distance, q.rocker_cog_angle)
     text = _MJCF.format(
         **{name: getattr(p, name) for name in ("l1", "l2", "l3", "l4", "ca", "sa", "gx", "gy", "k", "u0", "mu")},
         **{"x2": x2, "y2": y2, "x3": x3, "y3": y3, "x4": x4, "y4": y4},
@@ -262,7 +117,7 @@ def _mujoco_model(case: Case, iterations: int, *, stiffened: bool = True) -> tup
     if stiffened:
         model.body_invweight0 *= 1e-4 if iterations == 1 else 1e-6
     data = mujoco.MjData(model)
-    s = _start(case, p)
+    s = start(case, p)
     data.qpos[:] = (0.0, s.th3, 0.0, s.th4)
     data.qvel[:] = (case.start_speed, s.w3 - case.start_speed, 0.0, s.w4)
     return model, data
@@ -355,6 +210,89 @@ class _Bar(NamedTuple):
 _EXUDYN_CRANK, _EXUDYN_SLIDER = 0, 1
 
 
+class _Assembly:
+    """A system of Exudyn's in the plane, and what it is put together from."""
+
+    def __init__(self, gx: float, gy: float) -> None:
+        self.exu, self.items = _import_exudyn()
+        self.mbs = self.exu.SystemContainer().AddSystem()
+        self.gx, self.gy = gx, gy
+        self.ground = self.coordinate(self.mbs.AddNode(self.items.NodePointGround()))
+
+    def coordinate(self, node: Any) -> Any:
+        return self.mbs.AddMarker(self.items.MarkerNodeCoordinate(nodeNumber=node, coordinate=0))
+
+    def point(self, body: Any, x: float, y: float = 0.0) -> Any:
+        return self.mbs.AddMarker(self.items.MarkerBodyPosition(bodyNumber=body, localPosition=[x, y, 0.0]))
+
+    def bar(
+        self, x: float, angle: float, speed: float, w: float, m: float, inertia: float, g: tuple[float, float]
+    ) -> _Bar:
+        """Link whose frame is at ``x``, with ``speed`` along y, at ``angle``; ``g`` is its centre of mass."""
+        rx, ry = cos(angle) * g[0] - sin(angle) * g[1], sin(angle) * g[0] + cos(angle) * g[1]
+        node = self.mbs.AddNode(
+            self.items.NodeRigidBody2D(
+                referenceCoordinates=[x + rx, ry, angle], initialVelocities=[-w * ry, speed + w * rx, w]
+            )
+        )
+        body = self.mbs.AddObject(self.items.ObjectRigidBody2D(mass=m, inertia=inertia, nodeNumber=node))
+        if self.gx or self.gy:
+            marker = self.mbs.AddMarker(self.items.MarkerBodyMass(bodyNumber=body))
+            self.mbs.AddLoad(self.items.LoadMassProportional(markerNumber=marker, loadVector=[self.gx, self.gy, 0.0]))
+        return _Bar(body, *g)
+
+    def pin(self, a: Any, b: Any) -> None:
+        self.mbs.AddObject(self.items.ObjectJointRevolute2D(markerNumbers=[a, b]))
+
+    def spring(self, node: Any, **constants: float) -> Any:
+        """A spring and damper between a node's coordinate and the ground."""
+        return self.mbs.AddObject(
+            self.items.ObjectConnectorCoordinateSpringDamper(
+                markerNumbers=[self.ground, self.coordinate(node)], **constants
+            )
+        )
+
+    def crank(self, case: Case, p: Constants) -> tuple[Any, Any]:
+        """Node and body of the crank."""
+        q = case.parameters
+        node = self.mbs.AddNode(self.items.Node1D(initialVelocities=[case.start_speed]))
+        body = self.mbs.AddObject(self.items.ObjectRotationalMass1D(inertia=q.crank_inertia, nodeNumber=node))
+        if p.mx2 or p.my2:
+            marker = self.point(body, *centre(q.crank_cog_distance, q.crank_cog_angle))
+            weight = [p.m2 * p.gx, p.m2 * p.gy, 0.0]
+            self.mbs.AddLoad(self.items.LoadForceVector(markerNumber=marker, loadVector=weight))
+        return node, body
+
+    def slider(self, p: Constants) -> tuple[Any, Any]:
+        """Node and body of the slider, with its spring and damper."""
+        node = self.mbs.AddNode(self.items.Node1D())
+        body = self.mbs.AddObject(
+            self.items.ObjectMass1D(
+                mass=p.m5,
+                nodeNumber=node,
+                referencePosition=[p.l1, 0.0, 0.0],
+                referenceRotation=[[p.ca, -p.sa, 0.0], [p.sa, p.ca, 0.0], [0.0, 0.0, 1.0]],
+            )
+        )
+        along_guide = p.m5 * (p.gx * p.ca + p.gy * p.sa)
+        if along_guide:
+            self.mbs.AddLoad(self.items.LoadCoordinate(markerNumber=self.coordinate(node), load=along_guide))
+        self.spring(node, stiffness=p.k, damping=p.mu, offset=p.u0)
+        return node, body
+
+    def drive(self, case: Case, node: Any) -> Any:
+        """Drive the crank at its speed, or by a spring, which is returned."""
+        if case.crank_speed is not None:
+            markers = [self.ground, self.coordinate(node)]
+            self.mbs.AddObject(
+                self.items.ObjectConnectorCoordinate(markerNumbers=markers, velocityLevel=True, offset=case.crank_speed)
+            )
+        elif case.torque:
+            # T0 (1 - th2/switch_angle) is a spring on the crank, relaxed at the switch angle and then made inactive
+            return self.spring(node, stiffness=case.torque / case.switch_angle, offset=case.switch_angle)
+        return None
+
+
 def _exudyn_model(case: Case) -> tuple[Any, Any, Any]:
     """System at the start of the run, the sensor of the slider position, and the spring of the torque drive or None.
 
@@ -362,117 +300,31 @@ def _exudyn_model(case: Case) -> tuple[Any, Any, Any]:
     six pin conditions. Four planar bodies with a prismatic joint (twelve coordinates, ten conditions) give the same numbers
     in twice the time, as do two kinematic trees with one pin.
     """
-    exu, items = _import_exudyn()
     q = case.parameters
     p = q.constants()
-    s = _start(case, p)
-    mbs = exu.SystemContainer().AddSystem()
-    ground = mbs.AddMarker(items.MarkerNodeCoordinate(nodeNumber=mbs.AddNode(items.NodePointGround()), coordinate=0))
-
-    def coordinate(node: Any) -> Any:
-        return mbs.AddMarker(items.MarkerNodeCoordinate(nodeNumber=node, coordinate=0))
-
-    def point(body: Any, x: float, y: float = 0.0) -> Any:
-        return mbs.AddMarker(items.MarkerBodyPosition(bodyNumber=body, localPosition=[x, y, 0.0]))
-
-    def bar(
-        origin: tuple[float, float],
-        speed: float,
-        angle: float,
-        w: float,
-        m: float,
-        inertia: float,
-        g: tuple[float, float],
-    ) -> _Bar:
-        """Link whose frame has the given origin, with speed along y, at ``angle``; ``g`` is its centre of mass."""
-        rx, ry = cos(angle) * g[0] - sin(angle) * g[1], sin(angle) * g[0] + cos(angle) * g[1]
-        node = mbs.AddNode(
-            items.NodeRigidBody2D(
-                referenceCoordinates=[origin[0] + rx, origin[1] + ry, angle],
-                initialVelocities=[-w * ry, speed + w * rx, w],
-            )
-        )
-        body = mbs.AddObject(items.ObjectRigidBody2D(mass=m, inertia=inertia, nodeNumber=node))
-        if p.gx or p.gy:
-            marker = mbs.AddMarker(items.MarkerBodyMass(bodyNumber=body))
-            mbs.AddLoad(items.LoadMassProportional(markerNumber=marker, loadVector=[p.gx, p.gy, 0.0]))
-        return _Bar(body, *g)
-
-    def pin(a: Any, b: Any) -> None:
-        mbs.AddObject(items.ObjectJointRevolute2D(markerNumbers=[a, b]))
-
-    crank_node = mbs.AddNode(items.Node1D(initialVelocities=[case.start_speed]))
-    crank = mbs.AddObject(items.ObjectRotationalMass1D(inertia=q.crank_inertia, nodeNumber=crank_node))
-    if p.mx2 or p.my2:
-        centre = point(crank, *_centre(q.crank_cog_distance, q.crank_cog_angle))
-        mbs.AddLoad(items.LoadForceVector(markerNumber=centre, loadVector=[p.m2 * p.gx, p.m2 * p.gy, 0.0]))
-
-    slider_node = mbs.AddNode(items.Node1D())
-    slider = mbs.AddObject(
-        items.ObjectMass1D(
-            mass=p.m5,
-            nodeNumber=slider_node,
-            referencePosition=[p.l1, 0.0, 0.0],
-            referenceRotation=[[p.ca, -p.sa, 0.0], [p.sa, p.ca, 0.0], [0.0, 0.0, 1.0]],
-        )
-    )
-    along_guide = p.m5 * (p.gx * p.ca + p.gy * p.sa)
-    if along_guide:
-        mbs.AddLoad(items.LoadCoordinate(markerNumber=coordinate(slider_node), load=along_guide))
-    mbs.AddObject(
-        items.ObjectConnectorCoordinateSpringDamper(
-            markerNumbers=[ground, coordinate(slider_node)], stiffness=p.k, damping=p.mu, offset=p.u0
-        )
-    )
-
-    coupler = bar(
-        (p.l2, 0.0),
-        p.l2 * case.start_speed,
-        s.th3,
-        s.w3,
-        p.m3,
-        q.coupler_inertia,
-        _centre(q.coupler_cog_distance, q.coupler_cog_angle),
-    )
-    rocker = bar(
-        (p.l1, 0.0),
-        0.0,
-        s.th4,
-        s.w4,
-        p.m4,
-        q.rocker_inertia,
-        _centre(q.rocker_cog_distance, q.rocker_cog_angle),
-    )
-    pin(point(crank, p.l2), point(coupler.body, -coupler.x, -coupler.y))
-    pin(point(coupler.body, p.l3 - coupler.x, -coupler.y), point(rocker.body, p.l4 - rocker.x, -rocker.y))
-    pin(point(rocker.body, -rocker.x, -rocker.y), point(slider, 0.0))
-
-    spring = None
-    if case.crank_speed is not None:
-        mbs.AddObject(
-            items.ObjectConnectorCoordinate(
-                markerNumbers=[ground, coordinate(crank_node)], velocityLevel=True, offset=case.crank_speed
-            )
-        )
-    elif case.torque:
-        # T0 (1 - th2/switch_angle) is a spring on the crank, relaxed at the switch angle and then made inactive
-        spring = mbs.AddObject(
-            items.ObjectConnectorCoordinateSpringDamper(
-                markerNumbers=[ground, coordinate(crank_node)],
-                stiffness=case.torque / case.switch_angle,
-                offset=case.switch_angle,
-            )
-        )
-    sensor = mbs.AddSensor(
-        items.SensorNode(
+    s = start(case, p)
+    made = _Assembly(p.gx, p.gy)
+    crank_node, crank = made.crank(case, p)
+    slider_node, slider = made.slider(p)
+    of_coupler = centre(q.coupler_cog_distance, q.coupler_cog_angle)
+    of_rocker = centre(q.rocker_cog_distance, q.rocker_cog_angle)
+    coupler = made.bar(p.l2, s.th3, p.l2 * case.start_speed, s.w3, p.m3, q.coupler_inertia, of_coupler)
+    rocker = made.bar(p.l1, s.th4, 0.0, s.w4, p.m4, q.rocker_inertia, of_rocker)
+    made.pin(made.point(crank, p.l2), made.point(coupler.body, -coupler.x, -coupler.y))
+    end_of_coupler = made.point(coupler.body, p.l3 - coupler.x, -coupler.y)
+    made.pin(end_of_coupler, made.point(rocker.body, p.l4 - rocker.x, -rocker.y))
+    made.pin(made.point(rocker.body, -rocker.x, -rocker.y), made.point(slider, 0.0))
+    spring = made.drive(case, crank_node)
+    sensor = made.mbs.AddSensor(
+        made.items.SensorNode(
             nodeNumber=slider_node,
             storeInternal=True,
             writeToFile=False,
-            outputVariableType=exu.OutputVariableType.Coordinates,
+            outputVariableType=made.exu.OutputVariableType.Coordinates,
         )
     )
-    mbs.Assemble()
-    return mbs, sensor, spring
+    made.mbs.Assemble()
+    return made.mbs, sensor, spring
 
 
 class _ExudynSolver:
@@ -509,15 +361,10 @@ class _ExudynSolver:
         if not finished:
             raise ArithmeticError(f"Exudyn stopped between t = {start:g} s and {end:g} s")
 
-    def state(self) -> tuple[np.ndarray, np.ndarray]:
-        """Coordinates and velocities now."""
-        data, now = self.mbs.systemData, self.exu.ConfigurationType.Current
-        return data.GetODE2Coordinates(now), data.GetODE2Coordinates_t(now)
-
-    def initial_state(self) -> tuple[np.ndarray, np.ndarray]:
-        """Coordinates and velocities from which the next leg starts."""
-        data, initial = self.mbs.systemData, self.exu.ConfigurationType.Initial
-        return data.GetODE2Coordinates(initial), data.GetODE2Coordinates_t(initial)
+    def state(self, which: str = "Current") -> tuple[np.ndarray, np.ndarray]:
+        """Coordinates and velocities, now or, ``Initial``, from which the next leg starts."""
+        data, configuration = self.mbs.systemData, getattr(self.exu.ConfigurationType, which)
+        return data.GetODE2Coordinates(configuration), data.GetODE2Coordinates_t(configuration)
 
     def start_from(self, state: tuple[np.ndarray, np.ndarray]) -> None:
         """Make ``state`` the initial configuration of the next leg."""
@@ -533,7 +380,7 @@ def _exudyn_until_switch(case: Case, solver: _ExudynSolver, spring: Any, time_st
     u: list[float] = [0.0]
     while True:
         start = (len(u) - 1) * interval
-        begin = solver.initial_state()
+        begin = solver.state("Initial")
         solver.run(start, start + interval, n, interval)
         q, qd = solver.state()
         if q[_EXUDYN_CRANK] >= case.switch_angle:
@@ -594,34 +441,6 @@ def time_steps(case: Case, first: float, last: float, ratio: float = 2.0**-0.25)
     return (interval / n for n in dict.fromkeys(fitted))
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Choice:
-    """A time step (s), the run with it, and whether that run reached the accuracy asked for."""
-
-    time_step: float
-    run: EngineRun
-    reached: bool
-
-
-def largest_step(run: Run, case: Case, series: Iterable[float], accuracy: float = ACCURACY) -> Choice:
-    """First step of a falling ``series`` with which ``run`` reaches ``accuracy``, or its most accurate one if none does.
-
-    A step counts only if the next smaller one, where there is one, reaches the accuracy as well: a lucky cancellation is not
-    an accuracy.
-    """
-    runs: list[Choice] = []
-    for step in series:
-        result = run(case, step)
-        runs.append(Choice(time_step=step, run=result, reached=result.error <= accuracy))
-        if len(runs) > 1 and runs[-1].reached and runs[-2].reached:
-            return runs[-2]
-    if not runs:
-        raise ValueError("the series of time steps is empty")
-    if runs[-1].reached:
-        return runs[-1]
-    return replace(min(runs, key=lambda choice: choice.run.error), reached=False)
-
-
 def fastest(run: Run, case: Case, time_step: float, repeats: int = 7) -> EngineRun:
     """The shortest of several equal runs: the one that the machine disturbed least."""
     return min((run(case, time_step) for _ in range(repeats)), key=lambda result: result.seconds)
@@ -658,9 +477,9 @@ def main() -> None:
             for step in time_steps(case, engine.first_step, engine.last_step, 0.25):
                 line(case, "", step, fastest(engine.run, case, step, 3))
             series = time_steps(case, engine.first_step, engine.last_step)
-            choice = largest_step(engine.run, case, series)
-            best = fastest(engine.run, case, choice.time_step)
-            line(case, "<= 1e-6" if choice.reached else "best", choice.time_step, best)
+            choice = loosest(lambda step, e=engine, c=case: e.run(c, step).error, series)
+            best = fastest(engine.run, case, choice.setting)
+            line(case, "<= 1e-6" if choice.reached else "best", choice.setting, best)
             step = next(time_steps(case, engine.finest_step, engine.finest_step))
             line(case, "finest", step, engine.finest_run(case, step))
 

@@ -1,4 +1,4 @@
-"""Speed of the slider-crank: runs in time, the FMU, joint forces over a turn by both formulations, Monte Carlo.
+"""Speed of the slider-crank: runs in time, joint forces over a turn by both formulations, Monte Carlo.
 
     python -m benchmarks.slider_crank
 
@@ -9,23 +9,15 @@ are the best of several, ratios within this one process.
 
 from __future__ import annotations
 
-import tempfile
-from collections.abc import Callable
 from functools import cache, partial
-from pathlib import Path
 
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from analysis import simulate
+from analysis import Inputs, Trajectory, simulate
 from analysis.cli.common import say, show_table
-from analysis.export import build
-from analysis.run import Inputs, compiled
 from analysis.slider_crank import QUANTITIES, ConstantShift, Tolerance, close, force_turn, joint_loads, monte_carlo
-from benchmarks.engines import ACCURACY
-from benchmarks.fmu import STEP, seconds_per_step
-from benchmarks.solvers import SCIPY_METHODS, TOLERANCES, best_time
-from build_fmu import FMUS
+from benchmarks.accuracy import ACCURACY, SCIPY_METHODS, TOLERANCES, best_time, loosest, right_hand_side
 from linkwork.slider_crank import dynamics, published
 from linkwork.slider_crank.kinematics import coefficients, position
 
@@ -36,20 +28,20 @@ TIMES = np.linspace(0.0, STOP, 49)
 ANGLES = np.linspace(0.0, 2.0 * np.pi, 361)
 
 
-def in_process(tolerance: float) -> np.ndarray:
-    """Slider position at `TIMES` by the compiled solver."""
-    return _run(tolerance)["slider.position"]
-
-
-def _run(tolerance: float):  # type: ignore[no-untyped-def]
+def in_process(tolerance: float) -> Trajectory:
+    """The run by the compiled solver."""
     inputs = Inputs(torque=TORQUE)
     return simulate(PARAMETERS, inputs, initial=INITIAL, stop_time=STOP, samples=TIMES, tolerance=tolerance)
 
 
+def acting(torque: float) -> dynamics.Inputs:
+    """What acts on the plant: a torque on the crank, the shift held."""
+    return dynamics.applied((0.0, 1.0), (torque, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0), PARAMETERS.constants())
+
+
 def by_scipy(method: str, tolerance: float) -> np.ndarray:
-    """The same by one of SciPy's methods on the plain-Python right-hand side."""
-    p = PARAMETERS.constants()
-    inputs = dynamics.applied(0.0, 1.0, TORQUE, 0.0, 0.0, 0.0, 0.0, 0.0, p)
+    """Slider position at `TIMES` by one of SciPy's methods on the plain-Python right-hand side."""
+    p, inputs = PARAMETERS.constants(), acting(TORQUE)
     start = [INITIAL.crank_angle, INITIAL.shift_position, INITIAL.crank_speed, 0.0, 0.0, 0.0]
 
     def rate(_: float, x: np.ndarray) -> tuple[float, ...]:
@@ -62,43 +54,33 @@ def by_scipy(method: str, tolerance: float) -> np.ndarray:
 @cache
 def reference() -> np.ndarray:
     """Slider position at `TIMES` at a tolerance of 1e-13."""
-    return in_process(1e-13)
+    return in_process(1e-13)["slider.position"]
 
 
-def loosest(run: Callable[[float], np.ndarray]) -> tuple[float, float]:
-    """Loosest tolerance whose error and that of the next one are within the accuracy, and its error."""
-    candidate: tuple[float, float] | None = None
-    stroke = float(np.ptp(reference()))
-    for tolerance in TOLERANCES:
-        error = float(np.abs(run(float(tolerance)) - reference()).max()) / stroke
-        if error > ACCURACY:
-            candidate = None
-        elif candidate is None:
-            candidate = (float(tolerance), error)
-        else:
-            return candidate
-    raise RuntimeError("the accuracy is not reached at any tolerance")
+def error(position: np.ndarray) -> float:
+    """Error of a slider position, relative to the stroke."""
+    return float(np.abs(position - reference()).max() / np.ptp(reference()))
 
 
 def runs() -> None:
     """Measure and print the runs in time."""
-    tolerance, error = loosest(in_process)
+    tolerance, off, _ = loosest(lambda tolerance: error(in_process(tolerance)["slider.position"]), TOLERANCES)
     whole = best_time(partial(in_process, tolerance), 30)
-    statistics = [_run(tolerance).statistics for _ in range(30)]
+    statistics = [in_process(tolerance).statistics for _ in range(30)]
     inner = min(s["seconds_integrating"] for s in statistics)
     others = []
     for method in SCIPY_METHODS:
-        setting, off = loosest(partial(by_scipy, method))
-        others.append((best_time(partial(by_scipy, method, setting), 3), off, method))
+        choice = loosest(lambda setting, m=method: error(by_scipy(m, setting)), TOLERANCES)
+        others.append((best_time(partial(by_scipy, method, choice.setting), 3), choice.error, method))
     best = min(others)
     show_table(
         f"{STOP} s under {TORQUE:g} N.m, error at most {ACCURACY:g} of the stroke",
         ("solver", "error", "time [ms]", "times the integration"),
         [
-            (name, f"{off:.1e}", f"{1e3 * seconds:.3f}", f"{seconds / inner:.1f}")
-            for name, off, seconds in (
-                (f"in process, the integration ({int(statistics[0]['steps'])} steps)", error, inner),
-                ("in process, the whole call of simulate", error, whole),
+            (name, f"{e:.1e}", f"{1e3 * seconds:.3f}", f"{seconds / inner:.1f}")
+            for name, e, seconds in (
+                (f"in process, the integration ({int(statistics[0]['steps'])} steps)", off, inner),
+                ("in process, the whole call of simulate", off, whole),
                 (f"SciPy, plain-Python right-hand side, best method ({best[2]})", best[1], best[0]),
             )
         ],
@@ -106,21 +88,9 @@ def runs() -> None:
     )
 
 
-def right_hand_side() -> tuple[float, float]:
-    """Time of one right-hand side, compiled and in plain Python (s)."""
-    p = PARAMETERS.constants()
-    n = 20_000
-    x = (1.0, INITIAL.shift_position, INITIAL.crank_speed, 0.0, 0.0, 0.0)
-    inputs = dynamics.applied(0.0, 1.0, TORQUE, 0.0, 0.0, 0.0, 0.0, 0.0, p)
-    states, forces, out = np.tile(x, (n, 1)), np.tile(inputs, (n, 1)), np.empty((n, 6))
-    fast = best_time(lambda: compiled.solver(p).derivatives(p, states, forces, out), 20) / n
-    plain = best_time(lambda: [dynamics.derivative(x, inputs, p) for _ in range(1000)]) / 1000
-    return fast, plain
-
-
 def _scalar_turn() -> None:
     p = PARAMETERS.constants()
-    inputs = dynamics.applied(1.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, p)
+    inputs = dynamics.applied((1.0, 1.0), (0.0,) * 7, p)
     for angle in ANGLES.tolist():
         x = (angle, INITIAL.shift_position, INITIAL.crank_speed, 0.0, 0.0, 0.0)
         q = position(x[0], x[1], p)
@@ -181,16 +151,12 @@ def tolerances() -> None:
 
 def main() -> None:
     """Measure and print the tables."""
-    in_process(1e-6)
     runs()
-    fast, plain = right_hand_side()
+    x = (1.0, INITIAL.shift_position, INITIAL.crank_speed, 0.0, 0.0, 0.0)
+    p, inputs = PARAMETERS.constants(), acting(TORQUE)
+    fast = right_hand_side(PARAMETERS, Inputs(torque=TORQUE), np.tile(x, (20_000, 1)))
+    plain = best_time(lambda: [dynamics.derivative(x, inputs, p) for _ in range(1000)]) / 1000
     say(f"a right-hand side takes {1e9 * fast:.0f} ns compiled, {1e6 * plain:.1f} microseconds in plain Python")
-    with tempfile.TemporaryDirectory() as folder:
-        whole, bare = seconds_per_step(Path(build(FMUS["SliderCrank"], folder)))
-    say(
-        f"the FMU takes {1e6 * whole:.0f} microseconds a step of {1e3 * STEP:g} ms, inputs and outputs included, and "
-        f"{1e6 * bare:.0f} for doStep alone: {STEP / whole:.1f} times faster than real time"
-    )
     forces()
     tolerances()
 

@@ -10,27 +10,20 @@ MuJoCo and Exudyn (extra ``bench``) are left out with a word where they are not 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from functools import partial
-from time import perf_counter
+from typing import Any
 
 import numpy as np
 from rich.console import Console
 from rich.table import Table
-from scipy.integrate import solve_ivp
 
-from analysis import Inputs, TorsionBar, simulate
-from analysis.run import compiled
+from analysis import Event, Inputs, TorsionBar, simulate
 from benchmarks import engines
-from benchmarks.engines import ACCURACY, CASES, Case, relative_error
-from linkwork.five_bar import dynamics
+from benchmarks.accuracy import ACCURACY, SCIPY_METHODS, TOLERANCES, best_time, loosest, right_hand_side
+from benchmarks.engine_cases import CASES, Case, by_scipy, relative_error
 from linkwork.five_bar.parameters import InitialState
 from tests.oracles.multipliers import SpeedDrive, simulate_redundant
-
-TOLERANCES = 10.0 ** np.arange(-3.0, -11.0, -0.1)
-REPEATS = 7
-SCIPY_METHODS = ("RK45", "DOP853", "LSODA", "Radau", "BDF")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -43,38 +36,11 @@ class Timing:
     note: str
 
 
-def loosest(run: Callable[[float], np.ndarray], case: Case, settings: Iterable[float]) -> tuple[float, float] | None:
-    """First of the settings, loose to tight, whose error and that of the next one are within the accuracy; and its error."""
-    candidate: tuple[float, float] | None = None
-    for setting in settings:
-        error = relative_error(case, run(float(setting)))
-        if error > ACCURACY:
-            candidate = None
-        elif candidate is None:
-            candidate = (float(setting), error)
-        else:
-            return candidate
-    return candidate
-
-
-def best_time(run: Callable[[], object], repeats: int = REPEATS) -> float:
-    """Shortest of several runs (s)."""
-    times = []
-    for _ in range(repeats):
-        begun = perf_counter()
-        run()
-        times.append(perf_counter() - begun)
-    return min(times)
-
-
-# The in-process solver
-
-
 def in_process(case: Case) -> tuple[list[Timing], str]:
     """The compiled solver: the whole call of `simulate`, the integration inside it, and the bare right-hand sides."""
     inputs = Inputs(speed=case.crank_speed) if case.crank_speed else Inputs(torque=TorsionBar(torque=case.torque))
 
-    def run(tolerance: float) -> object:
+    def run(tolerance: float) -> Any:
         return simulate(
             case.parameters,
             inputs,
@@ -84,19 +50,17 @@ def in_process(case: Case) -> tuple[list[Timing], str]:
             tolerance=tolerance,
         )
 
-    found = loosest(lambda tolerance: run(tolerance)["slider.position"], case, TOLERANCES)  # type: ignore[index]
-    assert found is not None, "the in-process solver does not reach the accuracy"
-    tolerance, error = found
-    whole = best_time(lambda: run(tolerance), 50)
-    results = [run(tolerance) for _ in range(50)]
-    statistics = results[0].statistics  # type: ignore[attr-defined]
-    inner = min(r.statistics["seconds_integrating"] for r in results)  # type: ignore[attr-defined]
-    evaluations = int(statistics["evaluations"])
-    bare = right_hand_side(case) * evaluations
-    note = f"tolerance {tolerance:.1e}, {int(statistics['steps'])} steps, {evaluations} evaluations"
+    found = loosest(lambda tolerance: relative_error(case, run(tolerance)["slider.position"]), TOLERANCES)
+    assert found.reached, "the in-process solver does not reach the accuracy"
+    whole = best_time(lambda: run(found.setting), 50)
+    statistics = [run(found.setting).statistics for _ in range(50)]
+    inner = min(s["seconds_integrating"] for s in statistics)
+    steps, evaluations = int(statistics[0]["steps"]), int(statistics[0]["evaluations"])
+    bare = right_hand_side(case.parameters, inputs, _states(case)) * evaluations
+    note = f"tolerance {found.setting:.1e}, {steps} steps, {evaluations} evaluations"
     timings = [
-        Timing(solver="in process, the integration", seconds=inner, error=error, note=note),
-        Timing(solver="in process, the whole call of simulate", seconds=whole, error=error, note="all 27 outputs"),
+        Timing(solver="in process, the integration", seconds=inner, error=found.error, note=note),
+        Timing(solver="in process, the whole call of simulate", seconds=whole, error=found.error, note="all outputs"),
     ]
     return timings, (
         f"{case.name}: the integration takes {inner / bare:.2f} times the bare cost of its {evaluations} right-hand sides "
@@ -104,93 +68,40 @@ def in_process(case: Case) -> tuple[list[Timing], str]:
     )
 
 
-def right_hand_side(case: Case) -> float:
-    """Time of one compiled right-hand side, along the states of the case (s)."""
-    n = 20_000
-    angles = np.linspace(0.0, 2.0 * np.pi, n)
-    speed = case.crank_speed or 70.0
-    states = np.column_stack(
-        [angles, 0.01 * np.sin(angles), np.full(n, speed), 0.2 * np.cos(angles), 0 * angles, 0 * angles]
-    )
-    forces = np.zeros((n, 6))
-    forces[:, 0] = 1.0 if case.crank_speed else 0.0
-    out = np.empty((n, 6))
-    p = case.parameters.constants()
-    return best_time(lambda: compiled.solver(p).derivatives(p, states, forces, out), 20) / n
-
-
-# SciPy
+def _states(case: Case) -> np.ndarray:
+    """States like those of the case, for its right-hand side."""
+    angles = np.linspace(0.0, 2.0 * np.pi, 20_000)
+    none, speed = np.zeros_like(angles), np.full_like(angles, case.crank_speed or 70.0)
+    return np.column_stack([angles, 0.01 * np.sin(angles), speed, 0.2 * np.cos(angles), none, none])
 
 
 def with_scipy(case: Case) -> Timing:
     """`solve_ivp` on the plain-Python right-hand side, by the method that is fastest at the accuracy."""
-    best: Timing | None = None
+    length, speed = case.parameters.crank_length, max(1.0, case.start_speed)
+    scale = np.array([1.0, length, speed, length * 40.0])
+    timings = []
     for method in SCIPY_METHODS:
-        found = loosest(lambda rtol, m=method: _scipy(case, m, rtol), case, TOLERANCES)
-        if found is None:
-            continue
-        rtol, error = found
-        seconds = best_time(lambda m=method, r=rtol: _scipy(case, m, r), 3)
-        if best is None or seconds < best.seconds:
-            best = Timing(
-                solver="SciPy, plain-Python right-hand side",
-                seconds=seconds,
-                error=error,
-                note=f"{method}, rtol {rtol:.1e}",
+
+        def run(rtol: float, method: str = method) -> np.ndarray:
+            return by_scipy(case, method, rtol, rtol * scale)
+
+        rtol, error, reached = loosest(lambda rtol, run=run: relative_error(case, run(rtol)), TOLERANCES)
+        if reached:
+            timings.append(
+                Timing(
+                    solver="SciPy, plain-Python right-hand side",
+                    seconds=best_time(partial(run, rtol), 3),
+                    error=error,
+                    note=f"{method}, rtol {rtol:.1e}",
+                )
             )
-    assert best is not None, "no method of SciPy reaches the accuracy"
-    return best
-
-
-def _scipy(case: Case, method: str, rtol: float) -> np.ndarray:
-    """u at the case's times; the four mechanical states alone, the torque switched at an event."""
-    p = case.parameters.constants()
-    speed_drive = 1.0 if case.crank_speed else 0.0
-
-    def rhs(t: float, x: np.ndarray, torque: float) -> tuple[float, ...]:
-        th2, u, w2, v = x.tolist()
-        applied = torque * (1.0 - th2 / case.switch_angle)
-        return dynamics.derivative(
-            (th2, u, w2, v, 0.0, 0.0), dynamics.Inputs(speed_drive, applied, 0.0, 0.0, 0.0, 0.0), p
-        )[:4]
-
-    def released(t: float, x: np.ndarray, torque: float) -> float:
-        return x[0] - case.switch_angle if torque else -1.0
-
-    released.terminal = True  # type: ignore[attr-defined]
-    start, torque = 0.0, case.torque
-    x = np.array([0.0, 0.0, case.start_speed, 0.0])
-    scale = np.array(
-        [1.0, case.parameters.crank_length, max(1.0, case.start_speed), case.parameters.crank_length * 40.0]
-    )
-    u = [0.0]
-    while len(u) < len(case.times):
-        leg = solve_ivp(
-            rhs,
-            (start, case.duration),
-            x,
-            method=method,
-            t_eval=case.times[len(u) :],
-            events=released if torque else None,
-            args=(torque,),
-            rtol=rtol,
-            atol=rtol * scale,
-        )
-        u.extend(leg.y[1])
-        if leg.status != 1:
-            break
-        start, x, torque = leg.t_events[0][0], leg.y_events[0][0], 0.0
-    return np.array(u) if len(u) == len(case.times) else np.full(len(case.times), np.nan)
-
-
-# The multiplier form
+    return min(timings, key=lambda timing: timing.seconds)
 
 
 def with_multipliers(case: Case) -> Timing:
     """The redundant form under SciPy's DOP853; under the torsion bar the time of release is given to it for nothing."""
-    found = loosest(lambda rtol: _multipliers(case, rtol), case, TOLERANCES[::5])
-    assert found is not None, "the multiplier form does not reach the accuracy"
-    rtol, error = found
+    rtol, error, reached = loosest(lambda rtol: relative_error(case, _multipliers(case, rtol)), TOLERANCES[::5])
+    assert reached, "the multiplier form does not reach the accuracy"
     seconds = best_time(lambda: _multipliers(case, rtol), 2)
     return Timing(
         solver="multiplier form under SciPy", seconds=seconds, error=error, note=f"DOP853, rtol {rtol:.1e}, 8 states"
@@ -198,49 +109,28 @@ def with_multipliers(case: Case) -> Timing:
 
 
 def _multipliers(case: Case, rtol: float) -> np.ndarray:
+    def run(start: InitialState, torque: float, times: np.ndarray, **drive: Any) -> Any:
+        def applied(t: float, q: np.ndarray, qd: np.ndarray) -> tuple[float, ...]:
+            return (torque * (1.0 - q[0] / case.switch_angle), 0.0, 0.0, 0.0)
+
+        return simulate_redundant(case.parameters, start, applied, times, rtol=rtol, atol=rtol * 1e-2, **drive)
+
     start = InitialState(crank_speed=case.start_speed)
     if case.crank_speed:
-        run = simulate_redundant(
-            case.parameters,
-            start,
-            lambda t, q, qd: (0.0, 0.0, 0.0, 0.0),
-            case.times,
-            rtol=rtol,
-            atol=rtol * 1e-2,
-            speed=SpeedDrive(case.crank_speed),
-        )
-        return run.q[:, 3]
+        return run(start, 0.0, case.times, speed=SpeedDrive(case.crank_speed)).q[:, 3]
     release = _release_time(case)
-    inner = case.times[case.times < release]
-    first = simulate_redundant(
-        case.parameters,
-        start,
-        lambda t, q, qd: (case.torque * (1.0 - q[0] / case.switch_angle), 0.0, 0.0, 0.0),
-        np.append(inner, release),
-        rtol=rtol,
-        atol=rtol * 1e-2,
-    )
+    first = run(start, case.torque, np.append(case.times[case.times < release], release))
     middle = InitialState(
         crank_angle=first.q[-1, 0],
         crank_speed=first.qd[-1, 0],
         slider_position=first.q[-1, 3],
         slider_velocity=first.qd[-1, 3],
     )
-    outer = case.times[case.times > release]
-    second = simulate_redundant(
-        case.parameters,
-        middle,
-        lambda t, q, qd: (0.0, 0.0, 0.0, 0.0),
-        np.append(release, outer),
-        rtol=rtol,
-        atol=rtol * 1e-2,
-    )
+    second = run(middle, 0.0, np.append(release, case.times[case.times > release]))
     return np.concatenate([first.q[:-1, 3], second.q[1:, 3]])
 
 
 def _release_time(case: Case) -> float:
-    from analysis import Event
-
     run = simulate(
         case.parameters,
         Inputs(torque=TorsionBar(torque=case.torque)),
@@ -252,16 +142,13 @@ def _release_time(case: Case) -> float:
     return run.events[0].time
 
 
-# The engines
-
-
 def with_engine(engine: engines.Engine, case: Case) -> Timing:
     """A multibody engine at its largest step that reaches the accuracy."""
     steps = engines.time_steps(case, engine.first_step, engine.last_step)
-    choice = engines.largest_step(engine.run, case, steps)
-    run = engines.fastest(engine.run, case, choice.time_step)
+    choice = loosest(lambda step: engine.run(case, step).error, steps)
+    run = engines.fastest(engine.run, case, choice.setting)
     reached = "" if choice.reached else ", accuracy not reached"
-    note = f"step {choice.time_step:.2e} s, {run.steps} steps{reached}"
+    note = f"step {choice.setting:.2e} s, {run.steps} steps{reached}"
     return Timing(solver=run.label, seconds=run.seconds, error=run.error, note=note)
 
 

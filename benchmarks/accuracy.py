@@ -1,0 +1,66 @@
+"""Times at equal accuracy: each solver at its loosest setting that reaches it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from time import perf_counter
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.mechanisms import Parameters, mechanism_of
+from analysis.run import Inputs, encode, machine
+from analysis.run.compiled import rows
+from analysis.run.equations import DERIVATIVE
+
+#: Error that is asked for, relative to the largest value.
+ACCURACY = 1e-6
+TOLERANCES = 10.0 ** np.arange(-3.0, -11.0, -0.1)
+SCIPY_METHODS = ("RK45", "DOP853", "LSODA", "Radau", "BDF")
+
+
+class Choice(NamedTuple):
+    """A setting, such as a tolerance or a time step, its error, and whether that is within `ACCURACY`."""
+
+    setting: float
+    error: float
+    reached: bool
+
+
+def loosest(error: Callable[[float], float], settings: Iterable[float]) -> Choice:
+    """First of the settings, loose to tight, that reaches the accuracy, or the most accurate one if none does.
+
+    A setting counts only if the next tighter one, where there is one, reaches the accuracy as well: a lucky cancellation is not
+    an accuracy.
+    """
+    tried: list[Choice] = []
+    for setting in settings:
+        found = error(float(setting))
+        tried.append(Choice(float(setting), found, found <= ACCURACY))
+        if len(tried) > 1 and tried[-1].reached and tried[-2].reached:
+            return tried[-2]
+    if tried[-1].reached:
+        return tried[-1]
+    return min(tried, key=lambda choice: choice.error)._replace(reached=False)
+
+
+def best_time(run: Callable[[], object], repeats: int = 7) -> float:
+    """Shortest of several runs (s)."""
+    times = []
+    for _ in range(repeats):
+        begun = perf_counter()
+        run()
+        times.append(perf_counter() - begun)
+    return min(times)
+
+
+def right_hand_side(parameters: Parameters, inputs: Inputs, states: NDArray[np.float64]) -> float:
+    """Time of one compiled right-hand side, along states without forces (s)."""
+    mechanism = mechanism_of(parameters)
+    p = parameters.constants()
+    equation = machine(mechanism, mechanism.switched(p)).addresses[DERIVATIVE]
+    modes = np.array([*encode(inputs, mechanism).modes.values()], dtype=float)
+    forces, out = np.zeros((len(states), len(mechanism.channels))), np.empty_like(states)
+    constants = np.array([*p, 0.0])
+    return best_time(lambda: rows(equation, modes, constants, states, forces, out), 20) / len(states)

@@ -1,0 +1,166 @@
+"""The runs of the five-bar slider that solvers and engines are timed at, and how accurate they are.
+
+Accuracy is the largest error of the slider position on a sample grid, relative to its largest magnitude, against the reduced
+equations of `linkwork` integrated to 1e-13.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+from math import ceil, cos, inf, isfinite, pi, sin
+from typing import NamedTuple
+
+import numpy as np
+from scipy.integrate import solve_ivp
+
+from linkwork.five_bar.dynamics import Inputs, derivative
+from linkwork.five_bar.kinematics import coefficients, coupler_angle, position, rocker_angle
+from linkwork.five_bar.parameters import Constants, FiveBarParameters
+from linkwork.five_bar.published import DYN_CM_PER_NEWTON_METRE, SETS
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Case:
+    """One run from th2 = u = u' = 0: parameters, drive, duration (s) and number of sample intervals.
+
+    With ``crank_speed`` (rad/s) the crank turns at that constant speed. Without it the crank starts from rest under the
+    torsion bar of fig. 3.6: T = torque (1 - th2/switch_angle) until th2 reaches ``switch_angle``, then none.
+    """
+
+    name: str
+    parameters: FiveBarParameters
+    duration: float
+    samples: int
+    crank_speed: float | None = None
+    torque: float = 0.0
+    switch_angle: float = 1.0
+
+    def __post_init__(self) -> None:
+        if self.parameters.slider_coulomb_friction != 0.0:
+            raise ValueError("the engine models have no Coulomb friction in the guide")
+
+    @property
+    def times(self) -> np.ndarray:
+        """Sample times (s), the start included."""
+        return np.linspace(0.0, self.duration, self.samples + 1)
+
+    @property
+    def start_speed(self) -> float:
+        """Crank speed at the start (rad/s)."""
+        return self.crank_speed or 0.0
+
+
+def steps_in(interval: float, time_step: float) -> int:
+    """Least number of equal steps in ``interval`` that are no longer than ``time_step`` (both s)."""
+    return max(1, ceil(interval / time_step * (1.0 - 1e-9)))
+
+
+_TABLE_3_1 = SETS["table-3.1"]
+
+#: Table 3.1 at 420 rpm for three turns, and the torsion bar of fig. 3.6 with T0 = 1e8 dyn.cm; k = 1e6, mu = 3e4 (cgs).
+CASES: tuple[Case, ...] = (
+    Case(
+        name="constant-speed",
+        parameters=_TABLE_3_1.parameters,
+        crank_speed=_TABLE_3_1.crank_speed,
+        duration=3 * 2.0 * pi / _TABLE_3_1.crank_speed,
+        samples=36,
+    ),
+    Case(
+        name="torsion-bar",
+        parameters=_TABLE_3_1.parameters,
+        torque=1e8 / DYN_CM_PER_NEWTON_METRE,
+        duration=0.5,
+        samples=50,
+    ),
+)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class EngineRun:
+    """What a run took and how good it was.
+
+    ``seconds`` is the wall time of the integration alone, ``error`` the largest error of u on the sample grid relative to
+    the largest magnitude of u (infinite where the engine failed), ``steps`` the number of time steps.
+    """
+
+    seconds: float
+    error: float
+    label: str
+    steps: int
+
+
+@cache
+def reference(case: Case) -> np.ndarray:
+    """Slider position (m) at `Case.times`: the reduced equations by DOP853 at rtol 1e-13."""
+    result = by_scipy(case, "DOP853", 1e-13, 1e-15)
+    result.setflags(write=False)
+    return result
+
+
+def by_scipy(case: Case, method: str, rtol: float, atol: float | np.ndarray) -> np.ndarray:
+    """Slider position (m) by `solve_ivp` on the reduced equations in plain Python, the torque switched at an event.
+
+    The four mechanical states alone; NaN where the method fails.
+    """
+    p = case.parameters.constants()
+    speed_drive = 0.0 if case.crank_speed is None else 1.0
+
+    def rate(_: float, x: np.ndarray, torque: float) -> tuple[float, ...]:
+        th2, u, w2, v = x.tolist()
+        applied = torque * (1.0 - th2 / case.switch_angle)
+        return derivative((th2, u, w2, v, 0.0, 0.0), Inputs(speed_drive, applied, 0.0, 0.0, 0.0, 0.0), p)[:4]
+
+    def switch(_: float, x: np.ndarray, torque: float) -> float:
+        return x[0] - case.switch_angle
+
+    switch.terminal = True  # type: ignore[attr-defined]
+    times, start, torque = case.times, 0.0, case.torque
+    x = np.array([0.0, 0.0, case.start_speed, 0.0])
+    u = [0.0]
+    while len(u) < times.size:
+        leg = solve_ivp(
+            rate,
+            (start, case.duration),
+            x,
+            method=method,
+            t_eval=times[len(u) :],
+            events=switch if torque else None,
+            args=(torque,),
+            rtol=rtol,
+            atol=atol,
+        )
+        u.extend(leg.y[1])
+        if leg.status != 1:
+            break
+        start, x, torque = leg.t_events[0][0], leg.y_events[0][0], 0.0
+    return np.array(u) if len(u) == times.size else np.full(times.size, np.nan)
+
+
+def relative_error(case: Case, u: np.ndarray) -> float:
+    """Largest |u - u_ref| on the sample grid over the largest |u_ref|; infinite where u is not finite."""
+    expected = reference(case)
+    error = float(np.max(np.abs(u - expected)) / np.max(np.abs(expected)))
+    return error if isfinite(error) else inf
+
+
+class Start(NamedTuple):
+    """Angles (rad) and rates (rad/s) of coupler and rocker at th2 = u = u' = 0 that close the loop."""
+
+    th3: float
+    th4: float
+    w3: float
+    w4: float
+
+
+def start(case: Case, p: Constants) -> Start:
+    """How the case starts."""
+    g = position(0.0, 0.0, p)
+    k = coefficients(g, p)
+    return Start(coupler_angle(g), rocker_angle(g), k.k32 * case.start_speed, k.k42 * case.start_speed)
+
+
+def centre(distance: float, angle: float) -> tuple[float, float]:
+    """Centre of mass in the frame of its link (m)."""
+    return distance * cos(angle), distance * sin(angle)
