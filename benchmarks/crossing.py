@@ -18,7 +18,7 @@ from itertools import count
 from math import inf, tau
 from pathlib import Path
 from time import process_time
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit
@@ -86,7 +86,8 @@ class Row(NamedTuple):
 
 # Evolution
 
-_path, _nearest, _difference = (njit(kernel.py_func) for kernel in (coupler_path, nearest, symmetric_difference))
+_KERNELS: tuple[Any, ...] = (coupler_path, nearest, symmetric_difference)
+_path, _nearest, _difference = (njit()(kernel.py_func) for kernel in _KERNELS)
 
 
 @njit

@@ -31,7 +31,8 @@ from analysis import Inputs, cosimulate, simulate
 from analysis.export import NATIVE, NATIVE_FMI3, build, build_native
 from analysis.mechanisms import MECHANISMS
 from analysis.run import Harmonics, ramp, table
-from linkwork.five_bar.published import TABLE_3_1, InitialState
+from linkwork.five_bar.parameters import InitialState
+from linkwork.five_bar.published import TABLE_3_1
 from linkwork.plant import Plant
 from linkwork.slider_crank.published import OFFSET_CASE
 

@@ -132,7 +132,7 @@ def read(path: Path) -> list[Row]:
         return []
     with path.open(newline="", encoding="utf-8") as file:
         _, *rows = csv.reader(file)
-    return [Row(*row[:3], float(row[3]), tuple(map(float, row[4:]))) for row in rows]
+    return [Row(kind, name, by, float(exact), tuple(map(float, errors))) for kind, name, by, exact, *errors in rows]
 
 
 def write(path: Path, rows: Iterable[Row]) -> None:

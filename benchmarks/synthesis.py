@@ -27,6 +27,7 @@ from math import inf, isfinite, pi, tau
 from statistics import median
 from time import perf_counter
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 from numba import njit
@@ -80,7 +81,8 @@ FEW = Search(candidates=1 << 12, starts=4)
 
 # Kernels
 
-_path, _jacobian = (njit(error_model="numpy")(kernel.py_func) for kernel in (coupler_path, coupler_path_jacobian))
+_KERNELS: tuple[Any, ...] = (coupler_path, coupler_path_jacobian)
+_path, _jacobian = (njit(error_model="numpy")(kernel.py_func) for kernel in _KERNELS)
 
 
 @njit

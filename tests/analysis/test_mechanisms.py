@@ -245,7 +245,9 @@ def test_a_published_set_that_nothing_drives_runs_from_the_command_line(linkwork
     assert linkwork("run", "--published", "pendulum-demo", "--no-plot").exit_code == 0
     run = read_csv("out/pendulum-demo.csv")
     known = demo(PENDULUM)
-    swung = solve_ivp(right_side(PENDULUM, known.parameters.constants(), {"torque": 0.0}), (0.0, 1.0), (0.0, 30.0), rtol=1e-9)
+    swung = solve_ivp(
+        right_side(PENDULUM, known.parameters.constants(), {"torque": 0.0}), (0.0, 1.0), (0.0, 30.0), rtol=1e-9
+    )
     # for as long as its FMU runs by default: time, angle
     assert run[-1, :2] == pytest.approx([1.0, swung.y[0, -1]], rel=1e-6)
 
