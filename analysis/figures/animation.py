@@ -15,26 +15,29 @@ from ..files import free, record
 from .style import Figure
 
 
-@contextmanager
-def gif(
-    figure: Figure, path: str | Path, *, frames: int, frames_per_second: int = 20, dpi: int = 80
-) -> Iterator[Callable[[], None]]:
-    """Write a GIF: each call of the function that this context gives adds the figure, as it is then, as a picture.
-
-    The figure is laid out once, for the first picture: its panels must not move from picture to picture.
+def check_frames(frames: int) -> None:
+    """Make sure that there are frames enough to move.
 
     Raises
     ------
     InputError
-        If there are fewer than two frames.
     """
     if frames < 2:
         raise InputError(f"an animation in {frames} frames: there must be at least 2")
+
+
+@contextmanager
+def gif(figure: Figure, path: str | Path, frames_per_second: int) -> Iterator[tuple[Path, Callable[[], None]]]:
+    """Write a GIF: the context gives its path, and a function that adds the figure as it then is.
+
+    A command that may not write over the file writes one beside it. The figure is laid out once, for the first picture: its
+    panels must not move from picture to picture.
+    """
     path = free(path)
     path.parent.mkdir(parents=True, exist_ok=True)
     FigureCanvasAgg(figure)
     writer = PillowWriter(fps=frames_per_second, metadata={})
-    with writer.saving(figure, str(path), dpi=dpi):
+    with writer.saving(figure, str(path), dpi=80):
 
         def add() -> None:
             if figure.get_layout_engine() is not None:
@@ -42,5 +45,5 @@ def gif(
                 figure.set_layout_engine("none")
             writer.grab_frame()
 
-        yield add
+        yield path, add
     record(path)

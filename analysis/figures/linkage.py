@@ -20,7 +20,7 @@ from linkwork.five_bar.parameters import FiveBarParameters
 
 from ..run import Trajectory
 from ..units import CM_PER_METRE
-from .animation import gif
+from .animation import check_frames, gif
 from .dispatch import draw_mechanism, last_samples, plot
 from .style import (
     BLOCK,
@@ -352,6 +352,7 @@ def animate_linkage(
     InputError
         If the run has fewer than two samples or there are fewer than two frames.
     """
+    check_frames(frames)
     if len(trajectory) < 2:
         raise InputError(f"an animation of {len(trajectory)} samples: there must be at least 2")
     time, slides = trajectory.time, trajectory["slider.position"]
@@ -370,7 +371,7 @@ def animate_linkage(
         (dot,) = below.plot([], [], "o", color=SLIDER, markersize=DOT)
         below.set_xlabel("time [s]")
         below.set_ylabel("slider position [mm]")
-        with gif(figure, path, frames=frames, frames_per_second=frames_per_second) as add_frame:
+        with gif(figure, path, frames_per_second) as (file, add_frame):
             for i, q in zip(chosen, configurations):
                 above.clear()
                 scene.prepare(above)
@@ -378,4 +379,4 @@ def animate_linkage(
                 done.set_data(time[: i + 1], u[: i + 1])
                 dot.set_data(time[i : i + 1], u[i : i + 1])
                 add_frame()
-    return Path(path)
+    return file

@@ -18,7 +18,6 @@ from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 import textalloc
-from matplotlib.animation import PillowWriter
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
@@ -34,6 +33,7 @@ from linkwork.slider_crank.vectors import Vector
 
 from ..run import Trajectory
 from ..slider_crank import PeriodicShift, Range, assembled_ranges, constant_shift, ranges
+from .animation import check_frames, gif
 from .dispatch import animate, draw_mechanism, last_samples, plot
 from .solids import ball, box, paint, tube
 from .style import (
@@ -304,17 +304,11 @@ class _Scene:
             return
         if self.a4 != 0.0:
             # the direction of the crank axis once more, at the guide
-            self._line(
-                axis,
-                [self.foot, self.foot + np.array([0.0, 0.0, 2.6 * u])],
-                color="0.4",
-                linewidth=HAIR,
-                linestyle="--",
-            )
+            along = self.foot + np.array([0.0, 0.0, 2.6 * u])
+            self._line(axis, [self.foot, along], color="0.4", linewidth=HAIR, linestyle="--")
         t = np.linspace(0.0, self.parameters.guide_twist, 121)
-        self._line(
-            axis, self.foot + 1.5 * u * np.column_stack([0.0 * t, np.sin(t), np.cos(t)]), color=_TWIST, linewidth=LINE
-        )
+        twist = self.foot + 1.5 * u * np.column_stack([0.0 * t, np.sin(t), np.cos(t)])
+        self._line(axis, twist, color=_TWIST, linewidth=LINE)
         look = {
             "arrowstyle": "-|>",
             "color": "black",
@@ -484,8 +478,7 @@ def animate_mechanism(
     InputError
         If there are fewer than two frames, or the unit is not known.
     """
-    if frames < 2:
-        raise InputError(f"an animation in {frames} frames: there must be at least 2")
+    check_frames(frames)
     law = constant_shift(0.0) if law is None else law
     factor = _factor(unit)
     widest = max(assembled_ranges(parameters, law), key=lambda part: part.high - part.low)
@@ -498,8 +491,6 @@ def animate_mechanism(
     poses = [_pose(parameters, float(a), law.at(float(a))[0], factor) for a in angles]
     parts = _parts(parameters, law, factor)
     scene = _Scene(parameters, parts, poses, unit, view)
-    path = Path(path)
-    path.parent.mkdir(parents=True, exist_ok=True)
     with styled(laid_out=False):
         head, foot = (0.35 if title else 0.0), 1.6
         figure, above = _sheet(scene, 7.0, head=head, foot=foot)
@@ -508,15 +499,14 @@ def animate_mechanism(
         write_title(figure, title)
         _slides(below, parts, unit)
         (dot,) = below.plot([], [], "o", color=CRANK, markersize=DOT, zorder=7)
-        writer = PillowWriter(fps=frames_per_second, metadata={})
-        with writer.saving(figure, str(path), dpi=80):
+        with gif(figure, path, frames_per_second) as (file, add_frame):
             for pose in poses:
                 scene.draw(above, pose, letters=False)
                 dot.set_data([degrees(pose.angle)], [pose.slide])
-                writer.grab_frame()
+                add_frame()
                 for artist in (*above.lines, *above.collections):
                     artist.remove()
-    return path
+    return file
 
 
 def _slides(axis: Axes, parts: Sequence[_Part], unit: str) -> None:

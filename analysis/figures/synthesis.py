@@ -12,9 +12,7 @@ from textwrap import fill
 from typing import Any
 
 import numpy as np
-from matplotlib.animation import PillowWriter
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Polygon
 from matplotlib.ticker import MaxNLocator
@@ -38,6 +36,7 @@ from ..synthesis import (
     quality_unit,
     rounding_line,
 )
+from .animation import check_frames, gif
 from .dispatch import animate, plot
 from .style import (
     BLOCK,
@@ -352,6 +351,24 @@ def _quarters(axis: Axes, turns: FloatArray) -> None:
     axis.set_xlabel("crank rotation [deg]")
 
 
+def _panel(axis: Axes, scene: LinkageScene, *, size: float, letters: bool = True) -> None:
+    """The linkage as it starts, with its curve and the target."""
+    _, pins = _start(scene)
+    frame = _Frame(scene, _around(scene))
+    frame.prepare(axis)
+    _draw_target(axis, scene, size=size)
+    _draw_curves(axis, scene)
+    _draw_linkage(axis, scene, frame, pins, letters=letters)
+
+
+def _task(axis: Axes, scene: LinkageScene) -> None:
+    """What was asked for beside what was found: the function, or the path with magnified errors."""
+    if scene.function is not None:
+        _rocker(axis, scene)
+    else:
+        _enlarged(axis, scene)
+
+
 @plot.register
 def plot_solution(solution: Solution, *, title: str = "") -> Figure:
     """A linkage to scale; its target and path with magnified errors, or its function; errors and transmission angle.
@@ -362,8 +379,6 @@ def plot_solution(solution: Solution, *, title: str = "") -> Figure:
         If the links cannot be joined anywhere.
     """
     scene = LinkageScene(solution, title)
-    _, pins = _start(scene)
-    frame = _Frame(scene, _around(scene))
     with styled():
         right = ["task", "errors", "transmission", *(["motion"] if scene.motion is not None else [])]
         figure = Figure(figsize=(10.4, 3.1 + 1.3 * len(right)))
@@ -372,15 +387,8 @@ def plot_solution(solution: Solution, *, title: str = "") -> Figure:
             width_ratios=(1.25, 1.0),
             height_ratios=(2.1, *(1.0 for _ in right[1:])),
         )
-        left = panels["linkage"]
-        frame.prepare(left)
-        _draw_target(left, scene, size=2.5)
-        _draw_curves(left, scene)
-        _draw_linkage(left, scene, frame, pins)
-        if scene.function is not None:
-            _rocker(panels["task"], scene)
-        else:
-            _enlarged(panels["task"], scene)
+        _panel(panels["linkage"], scene, size=2.5)
+        _task(panels["task"], scene)
         _errors(panels["errors"], scene)
         _transmission(panels["transmission"], scene)
         if scene.motion is not None:
@@ -408,8 +416,6 @@ def plot_sheet(solution: Solution, forces: PinForces | None = None, *, title: st
         If the links cannot be joined anywhere.
     """
     scene = LinkageScene(solution, title)
-    _, pins = _start(scene)
-    frame = _Frame(scene, _around(scene))
     with styled():
         figure = Figure(figsize=A4)
         right = ["task", "transmission", *(["forces"] if forces is not None else [])]
@@ -419,14 +425,8 @@ def plot_sheet(solution: Solution, forces: PinForces | None = None, *, title: st
             width_ratios=(1.2, 1.0),
             height_ratios=(*(1.6 if name == "task" else 1.0 for name in right), 1.3),
         )
-        frame.prepare(panels["linkage"])
-        _draw_target(panels["linkage"], scene, size=2.0)
-        _draw_curves(panels["linkage"], scene)
-        _draw_linkage(panels["linkage"], scene, frame, pins)
-        if scene.function is not None:
-            _rocker(panels["task"], scene)
-        else:
-            _enlarged(panels["task"], scene)
+        _panel(panels["linkage"], scene, size=2.0)
+        _task(panels["task"], scene)
         _transmission(panels["transmission"], scene)
         if forces is not None:
             _forces(panels["forces"], forces, "guide" if solution.linkage.slides else "D")
@@ -439,18 +439,8 @@ def plot_sheet(solution: Solution, forces: PinForces | None = None, *, title: st
         grid.set_fontsize(TINY)
         grid.auto_set_column_width(range(len(head)))
         write_title(figure, scene.title)
-        write_notes(
-            figure,
-            [
-                line
-                for line in (
-                    f"{solution.verdicts.grashof}; " + headline(solution).replace("\n", "; "),
-                    rounding_line(solution),
-                    made,
-                )
-                if line
-            ],
-        )
+        verdict = f"{solution.verdicts.grashof}; " + headline(solution).replace("\n", "; ")
+        write_notes(figure, [line for line in (verdict, rounding_line(solution), made) if line])
         return finish(figure)
 
 
@@ -481,12 +471,7 @@ def plot_alternatives(synthesis: Synthesis, *, title: str = "") -> Figure:
         figure = Figure(figsize=(3.5 * columns, 3.5 * rows + (0.3 if title else 0.0)))
         axes = figure.subplots(rows, columns, squeeze=False).ravel()
         for axis, scene in zip(axes, scenes):
-            _, pins = _start(scene)
-            frame = _Frame(scene, _around(scene))
-            frame.prepare(axis)
-            _draw_target(axis, scene, size=1.8)
-            _draw_curves(axis, scene)
-            _draw_linkage(axis, scene, frame, pins, letters=False)
+            _panel(axis, scene, size=1.8, letters=False)
             axis.set_title(scene.title)
         for axis in axes[len(scenes) :]:
             axis.set_visible(False)
@@ -552,11 +537,8 @@ def animate_solution(
     InputError
         If there are fewer than two frames, or the links cannot be joined anywhere.
     """
-    if frames < 2:
-        raise InputError(f"an animation in {frames} frames: there must be at least 2")
+    check_frames(frames)
     scene = LinkageScene(solution, title)
-    path = Path(path)
-    path.parent.mkdir(parents=True, exist_ok=True)
     first, _ = _start(scene)
     backwards = len(scene.rotation) > 1 and scene.rotation[-1] < scene.rotation[0]
     turn = first + (-1.0 if backwards else 1.0) * np.linspace(0.0, 2.0 * np.pi, frames, endpoint=False)
@@ -565,7 +547,6 @@ def animate_solution(
     tall = float(np.clip(5.0 * height / width, 2.5, 7.0))
     with styled():
         figure = Figure(figsize=(5.4, tall + 2.1))
-        FigureCanvasAgg(figure)
         above, below = figure.subplots(2, 1, height_ratios=(tall, 1.6))
         write_title(figure, scene.title)
         if scene.function is not None:
@@ -574,14 +555,13 @@ def animate_solution(
             _transmission(below, scene)
         x, y = np.degrees(scene.transmission if scene.function is None else scene.function)
         (now,) = below.plot([], [], "o", color=CRANK, markersize=DOT, zorder=6)
-        writer = PillowWriter(fps=frames_per_second, metadata={})
         trace: list[FloatArray] = []
         frame.prepare(above)
         _draw_target(above, scene, size=2.0)
         _draw_curves(above, scene, traced=False)
         fixed = set(above.get_children())
-        with writer.saving(figure, str(path), dpi=80):
-            for number, phi in enumerate(turn):
+        with gif(figure, path, frames_per_second) as (file, add_frame):
+            for phi in turn:
                 pins = scene.pins(float(phi))
                 if pins is None:
                     # the trace has a gap there
@@ -596,9 +576,5 @@ def animate_solution(
                 _draw_linkage(above, scene, frame, pins, letters=False)
                 at = x[0] + (np.degrees(phi) - x[0]) % 360.0
                 now.set_data([at], [np.interp(at, x, y) if at <= x[-1] + 1e-9 else np.nan])
-                if number == 0:
-                    # laid out once: the panels must not creep from frame to frame
-                    figure.draw_without_rendering()
-                    figure.set_layout_engine("none")
-                writer.grab_frame()
-    return path
+                add_frame()
+    return file

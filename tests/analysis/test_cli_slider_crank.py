@@ -437,6 +437,13 @@ class TestPicture:
         for ending in (".png", "-range.png", ".gif"):
             assert f"wrote out/{name}{ending}" in result.output
 
+    def test_an_animation_of_others_stays(self, linkwork, tmp_path):
+        others = tmp_path / "out" / "rahman-a4-10-s1-3.5.gif"
+        others.parent.mkdir()
+        others.write_bytes(b"GIF89a of mine")
+        assert "wrote out/rahman-a4-10-s1-3.5-2.gif" in linkwork("picture", "--animate", "--frames", 2).output
+        assert others.read_bytes() == b"GIF89a of mine"
+
     def test_it_is_of_what_was_asked_for(self, linkwork, monkeypatch):
         asked = []
         right = figures.plot

@@ -459,6 +459,7 @@ def damped_verdicts(charts: Mapping[float, Chart]) -> list[Verdict]:
     nine = [boundary_stiffnesses(equation(p), -1, count=2, order=2).real for p in mechanisms]
     cut = max(np.abs(ends - (hill(p).low, hill(p).high)).max() for ends, p in zip(nine, mechanisms))
     at = [width_at(found, 1.5) for found in charts.values()]
+    removes = "omega_c that removes the region, up to I4 = 1.5"
     return [
         at_most(
             "growth of the width with omega_c, greatest; I4 = 1.5", TEXT, 0.0, np.diff(at).max(), place="L3915, L3952"
@@ -470,16 +471,9 @@ def damped_verdicts(charts: Mapping[float, Chart]) -> list[Verdict]:
             np.diff(list(tips.values())).min(),
             place="L3917",
         ),
-        at_most(
-            "omega_c that removes the region, up to I4 = 1.5",
-            TEXT,
-            STATED,
-            worst["true orbit"],
-            "1/s",
-            place="L3919-3921",
-        ),
+        at_most(removes, TEXT, STATED, worst["true orbit"], "1/s", place="L3919-3921"),
         near(
-            "omega_c that removes the region, up to I4 = 1.5",
+            removes,
             LISTING,
             LISTED,
             worst["true orbit"],
@@ -488,7 +482,7 @@ def damped_verdicts(charts: Mapping[float, Chart]) -> list[Verdict]:
             place="appendix 4",
             why="its regions are too wide",
         ),
-        near("omega_c that removes the region, up to I4 = 1.5", OURS, REMOVING, worst["true orbit"], 5e-4, "1/s"),
+        near(removes, OURS, REMOVING, worst["true orbit"], 5e-4, "1/s"),
         near(
             "omega_c that removes the region by the listing as transcribed; I4 = 1.5",
             OURS,
