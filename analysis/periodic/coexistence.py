@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-import inspect
-import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -19,15 +16,14 @@ from linkwork.errors import InputError
 from ..files import write_csv
 from ..mechanisms import Parameters, mechanism_of
 from ..notebook import Shown, format_count
-from ..numerics.codegen import fingerprint
 from ..run import takes_published
-from . import coexistence_kernels, floquet, orbits
+from . import coexistence_kernels
 from .coexistence_kernels import LOST, MOST_ORBITS, UNSETTLED
 from .drives import Drive
 from .finder import Orbits, orbits_of, passages
 from .floquet import TOLERANCE, multipliers
 from .flows import GAP, PLAIN, VARIATIONAL
-from .grids import axes_of, kept_rows, name_of
+from .grids import axes_of, code_of, kept_rows, name_of
 from .orbit_kernels import NO_SOURCE
 from .orbits import MOST_ITERATIONS, SEARCH_TOLERANCE, PeriodicOrbit, guess_of, require_turns, section_of
 from .planes import Operation, Plane
@@ -157,7 +153,7 @@ def coexistence(
     guess = guess_of(flow, drive, start)
     guesses = np.vstack([guess, starts_of(parameters, drive, guess, STARTS)])
     rows = [[operation(first, value) for first in xs.tolist()] for value in ys.tolist()]
-    code = _code(coexistence_kernels.solve_all, orbits, floquet)
+    code = code_of(coexistence_kernels.solve_all)
     data, computed = kept_rows(
         partial(_motions_of, guesses),
         rows,
@@ -178,11 +174,6 @@ def coexistence(
         swing=flow.components[0],
         computed=computed,
     )
-
-
-def _code(kernel: Any, *modules: ModuleType) -> tuple[str, ...]:
-    """What computes a row, this module included: for its name in the cache."""
-    return fingerprint(kernel), *(inspect.getsource(module) for module in (sys.modules[__name__], *modules))
 
 
 def _motions_of(guesses: NDArray[np.float64], row: Sequence[Operation]) -> NDArray[np.float64]:
@@ -344,7 +335,7 @@ def basins(
     # a motion of several turns is met at the beginning of any of them
     passed = [passages(orbit) for orbit in motions]
     known, owner = np.vstack(passed), np.repeat(np.arange(len(motions)), [len(starts) for starts in passed])
-    code = _code(coexistence_kernels.basins_of, orbits)
+    code = code_of(coexistence_kernels.basins_of)
     ends, computed = kept_rows(
         partial(_ends, parameters, drive, known, across),
         up.tolist(),

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import inspect
 import warnings
 from collections.abc import Callable, Sequence
 from contextlib import suppress
@@ -149,13 +148,7 @@ def grid(
     mechanism = mechanism_of(parameters)
     guess = orbits.guess_of(drive.flow(mechanism), drive, start)
     guesses = np.vstack([guess, starts_of(parameters, drive, guess, STARTS)])
-    # what computes the rows, beside their arguments
-    code = (
-        fingerprint(row_kernels.solve_row),
-        fingerprint(multipliers),
-        inspect.getsource(orbits),
-        inspect.getsource(rows),
-    )
+    code = code_of(row_kernels.solve_row, multipliers)
     points = [[operation(first, value) for first in xs.tolist()] for value in ys.tolist()]
     data, computed = kept_rows(
         partial(_compute_row, guesses, tolerance),
@@ -204,6 +197,12 @@ def axes_of(x: ArrayLike, y: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np
     return xs, ys
 
 
+def code_of(*functions: Any) -> tuple[str, ...]:
+    """What computes a row: functions that are compiled, and all Python of this package, whatever of it they are called by."""
+    sources = (path.read_text(encoding="utf-8") for path in sorted(Path(__file__).parent.glob("*.py")))
+    return *map(fingerprint, functions), *sources
+
+
 def name_of(
     row: Sequence[Operation],
     guesses: NDArray[np.float64],
@@ -221,7 +220,7 @@ def name_of(
     functions : sequence of int
         Numbers of the flow's functions that are called.
     code : sequence of str
-        Of what computes the row.
+        Of what computes the row: see `code_of`.
     *numbers : float
         What else goes in.
     """
