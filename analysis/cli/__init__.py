@@ -15,7 +15,10 @@ import click
 
 from linkwork import __version__
 
-from .codes import INTERRUPTED
+from .codes import CHECK_FAILED as CHECK_FAILED
+from .codes import ENDED_EARLY as ENDED_EARLY
+from .codes import INTERRUPTED as INTERRUPTED
+from .codes import WRONG as WRONG
 
 #: Every command: the module of this package that has it, as a function of its name, and its line in ``linkwork --help``.
 COMMANDS = {
