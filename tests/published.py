@@ -74,9 +74,7 @@ TORQUE_AT_0_25_S = MappingProxyType({"th2_rad": 17.8051227, "u_cm": -0.61160400,
 # fig. 3.2, k = 0: turns after which coupler and rocker come to sin(th4 - th3) = 0.3, by mu in dyn.s/cm. The thesis calls
 # the drift linear; it accelerates, and is near linear only from mu = 5e5 on
 TURNS_TO_SINE_0_3: Mapping[float, float] = MappingProxyType({1e4: 3.0, 5e4: 4.9, 1e5: 8.0, 5e5: 36.0})
-# fig. 3.3: growth of the drift without gravity ("about 25 %")
-DRIFT_GROWTH_WITHOUT_GRAVITY = 1.25
-# and u after forty turns at mu = 1e6 dyn.s/cm, by gravity in m/s2; the thesis calls M "slightly reduced" without gravity
+# fig. 3.3: u after forty turns at mu = 1e6 dyn.s/cm, by gravity in m/s2; the thesis calls M "slightly reduced" without gravity
 U_AFTER_40_TURNS_CM: Mapping[float, float] = MappingProxyType({9.81: -1.93, 0.0: -2.38})
 # fig. 3.4: crank angle of the least steady u, and mean u, by k in dyn/cm ("220" in the scan is 22 deg)
 LEAST_STEADY_U_AT_DEG: Mapping[float, float] = MappingProxyType({5e5: 23.45, 1e6: 17.5, 2e6: 5.2})
@@ -130,8 +128,6 @@ RESONANCE_PRINTED = 30.6120
 # lower and upper end in lambda_k^2 of the first unstable region by I4: thesis's appendix 3, and about the periodic orbit
 FIRST_REGION_THESIS = MappingProxyType({0.5: (0.25786, 0.26031), 1.0: (0.26580, 0.27054), 1.5: (0.27382, 0.28069)})
 FIRST_REGION = MappingProxyType({0.5: (0.258298, 0.259203), 1.0: (0.266540, 0.268367), 1.5: (0.274727, 0.277501)})
-# nonlinear runs at I4 = 1 by lambda_k^2: whether they stay bounded; the first lies just below the thesis's region
-BOUNDED_AT = MappingProxyType({0.2655: True, 0.26745: False, 0.2695: True})
 # omega_c (1/s) that removes the region everywhere up to I4 = 1.5: stated by the thesis, by its appendix 4 when run, true
 REMOVING_DAMPING_READ_OFF, REMOVING_DAMPING_THESIS, REMOVING_DAMPING = 0.45, 0.459, 0.167
 # second harmonic near half the natural frequency: how many times too small that of appendix 2 is when run, "about"

@@ -15,7 +15,7 @@ from typing import Any, NamedTuple, TypeVar
 
 from hypothesis import strategies as st
 
-from linkwork.five_bar import dynamics, kinematics
+from linkwork.five_bar import dynamics
 from linkwork.five_bar.parameters import Constants, FiveBarParameters, InitialState
 
 #: Least |sin(rocker angle - coupler angle)| of the states drawn.
@@ -172,9 +172,3 @@ def rough(seed: int, drive: str, *only: str) -> Case:
         if dynamics.clearance(case.state, case.inputs(drive), case.p) > 0.01:
             return case
         values = {name: 0.5 * value for name, value in values.items()}
-
-
-def sine(case: Case, th2: float, u: float) -> float:
-    """|sin(rocker angle - coupler angle)| of a case's mechanism elsewhere; zero where it cannot be joined."""
-    p = case.parameters.constants()
-    return sqrt(max(0.0, kinematics.assembly_square(th2, u, p))) / (p.l3 * p.l4)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import importlib.util
 import re
+import shlex
 import shutil
 import subprocess
 import sys
@@ -76,82 +77,22 @@ def test_a_run_that_ends_early_keeps_its_data_and_exits_with_3(linkwork, tmp_pat
     assert rows[-1, 0] == pytest.approx(0.499978413)
 
 
-@pytest.mark.parametrize(
-    ("arguments", "code", "said"),
-    [
-        (["run", "--published", "table-3.2"], 1, "there is no published set 'table-3.2'; did you mean table-3.1?"),
-        (["run", "--published", "table-3.1", "--set", "slider.stifness=1"], 1, "did you mean slider.stiffness"),
-        (["run", "--published", "table-3.1", "--set", "crank.length=-1"], 1, "parameter crank.length is -1.0"),
-        (["run", "--published", "table-3.1", "--set", "initial.slider_position=1"], 1, "cannot be joined"),
-        (["run", "--published", "table-3.1", "--set", "slider.stiffness=nan"], 1, "parameter slider.stiffness is nan"),
-        (["run", "--published", "table-3.1", "--method", "Raduo"], 1, "no method 'Raduo'; did you mean Radau?"),
-        (["runn"], 2, "there is no command 'runn'; did you mean run?"),
-        (["slider-crank", "force"], 2, "there is no command 'force'; did you mean forces?"),
-        (["run", "--publishd", "table-3.1"], 2, "no such option '--publishd'; did you mean '--published'?"),
-        (["run", EXAMPLES / "ellipse.toml"], 1, "is a synthesis case: linkwork synthesize /"),
-        (["run", EXAMPLES / "slider-motion.toml"], 1, "is a case of a slider's motion: linkwork slider-motion /"),
-        (["run", EXAMPLES / "hand-drawn.svg"], 1, "is a drawing: a synthesis case names it as the file of its task"),
-        (["run", ROOT / "build_fmu.py"], 1, "is a Python script: python /"),
-        (["synthesize", EXAMPLES / "run-up.toml"], 1, "is a case of a run: linkwork run /"),
-        (["slider-motion", EXAMPLES / "ellipse.toml"], 1, "(this command takes a case of a slider's motion)"),
-        (["slider-crank", "info", EXAMPLES / "slider-crank.toml"], 1, "is a case of a run: linkwork run /"),
-        (["info", EXAMPLES / "ellipse.toml"], 1, "is a synthesis case: linkwork synthesize /"),
-        (["resonance", EXAMPLES / "ellipse.toml"], 1, "is a synthesis case: linkwork synthesize /"),
-        (["run", "--published", "table-3.1", "--tolerance", "nan"], 2, "not between 0 and 1"),
-        (
-            ["run", "--published", "table-3.1", "--no-plot", "--out", "/proc/no"],
-            1,
-            "/proc/no: No such file or directory",
-        ),
-        (["check", "--tolerance", "-1"], 2, "not between 0 and 1"),
-        (["run"], 2, "give either a case file or --published"),
-        (["run", "--published", "table-3.1", "--set", "nonsense"], 2, "NAME=VALUE"),
-        (["run", "nowhere.toml"], 2, "does not exist"),
-        (["check", "--fmu", "nowhere.fmu"], 1, "there is no file nowhere.fmu"),
-        (
-            ["check", "--interface", "model-exchang"],
-            2,
-            "no interface 'model-exchang' to check; did you mean model-exchange?",
-        ),
-        (
-            ["run", "--published", "table-3.1", "--interface", "model-exchange"],
-            2,
-            "--interface is for a run through an FMU",
-        ),
-        (["check", "no-such-case"], 2, "there is no standard case or case file 'no-such-case'"),
-        (["check", "speed-jum"], 2, "did you mean speed-jump?"),
-        (["figures", "9.9"], 2, "there is no figure 9.9"),
-        (["figures", "R55"], 2, "did you mean R5?"),
-        (["build", "SixBar"], 1, "there is no model 'SixBar'"),
-        (["build", "FiveBarSlidr"], 1, "did you mean FiveBarSlider?"),
-        (["build", "--kinds", "python,nativ"], 1, "there is no kind of FMU 'nativ'; did you mean native?"),
-        (["build", "--platforms", "x86_64-linx"], 1, "no platform 'x86_64-linx'; did you mean x86_64-linux?"),
-        (["info", "nothing"], 2, "there is no mechanism, published set, case file or FMU 'nothing'"),
-        (["info", "five-bars"], 2, "did you mean five-bar?"),
-        (["resonance", "--published", "table-3.1", "--vary", "slider.mess"], 1, "there is no slider.mess"),
-        (["resonance", "--published", "table-3.1", "--vary", "slider.damping"], 2, "--from and --to are needed"),
-        (["resonance", "--published", "table-3.1", "--from", "100 rpm", "--to", "50 rpm"], 2, "must increase"),
-        (["resonance", "--published", "table-3.1", "--from", "0", "--to", "50 rpm"], 2, "speeds must be above zero"),
-        (["resonance", "--published", "table-3.1", "--speed", "300 rpm"], 2, "it is the speed that varies"),
-        (["resonance", "--published", "table-3.1", "--from", "100 kg", "--to", "200 rpm"], 1, "--from"),
-        (["resonance", "--published", "table-3.1", "--set", "slider.stiffness=0"], 2, "no natural frequency"),
-        (["resonance"], 2, "either a case file or --published"),
-        (["stability", "--published", "table-3.1", "--x", "slider.mess"], 1, "there is no slider.mess"),
-        (["stability", "--published", "table-3.1", "--y", "slider.coulomb_friction"], 1, "give the range of the axis"),
-        (["stability", "--published", "table-3.1", "--x-range", "2", "1"], 2, "--x-range: from drive.speed = 2 rad/s"),
-        (["stability", "--published", "table-3.1", "--x-range", "0", "1"], 2, "speeds must be above zero"),
-        (["stability", "--published", "table-3.1", "--cores", "0"], 2, "number of cores"),
-        (["stability", "--published", "table-3.1", "--guess-speed", "3"], 2, "the speed is prescribed"),
-        (["stability", "--published", "table-3.1", "--set", "slider.damping=-1"], 1, "slider.damping"),
-        (["stability", "--published", "table-3.1", "--speed", "-1"], 1, "above zero"),
-        (["stability", "--published", "table-3.1", "--points", "1"], 2, "points"),
-    ],
-)
-def test_what_is_wrong_is_reported_in_a_sentence(linkwork, arguments, code, said):
-    result = linkwork(*arguments)
+def wrong_commands():
+    """Rows of ``wrong_commands.txt``: exit code, words of the command line, sentence."""
+    for line in Path(__file__).with_name("wrong_commands.txt").read_text(encoding="utf-8").splitlines():
+        if not line.startswith("#"):
+            code, words, said = line.split(" | ")
+            given = words.replace("EXAMPLES", str(EXAMPLES)).replace("ROOT", str(ROOT))
+            yield pytest.param(shlex.split(given), int(code), said, id=words)
+
+
+@pytest.mark.parametrize(("words", "code", "said"), [*wrong_commands()])
+def test_what_is_wrong_is_reported_in_a_sentence(linkwork, tmp_path, words, code, said):
+    result = linkwork(*words)
     assert result.exit_code == code
     assert said in " ".join((result.output + result.stderr).split())
     assert "Traceback" not in result.output + result.stderr
+    assert not (tmp_path / "out").exists()
 
 
 @pytest.mark.parametrize("given", [["--set", "drive.speed=420"], ["case.toml"]])
@@ -408,18 +349,9 @@ def test_resonance_of_a_published_set(linkwork, tmp_path):
 
 def test_resonance_says_what_moves_it(linkwork, tmp_path):
     result = linkwork(
-        "resonance",
-        "--published",
-        "rig-2-spring-c",
-        "--from",
-        "560 rpm",
-        "--to",
-        "610 rpm",
-        "--no-plot",
-        "--sensitivity",
-        "--places",
-        "0",
-    )
+        "resonance", "--published", "rig-2-spring-c", "--from", "560 rpm", "--to", "610 rpm",
+        "--no-plot", "--sensitivity", "--places", "0",
+    )  # fmt: skip
     assert result.exit_code == 0, result.output
     # half a percent for a percent of the stiffness: w^2 = k / m; an amplitude that the damper alone limits
     assert re.search(r"maximum │ +586\.1\d │ slider\.stiffness \+0\.49\d* +│ +1\.7153 ", result.output), result.output
@@ -431,18 +363,9 @@ def test_resonance_says_what_moves_it(linkwork, tmp_path):
 
 def test_resonance_says_where_nothing_can_be_said_of_what_moves_it(linkwork):
     result = linkwork(
-        "resonance",
-        "--published",
-        "rig-2-spring-c",
-        "--from",
-        "620 rpm",
-        "--to",
-        "640 rpm",
-        "--no-plot",
-        "--sensitivity",
-        "--places",
-        "0",
-    )
+        "resonance", "--published", "rig-2-spring-c", "--from", "620 rpm", "--to", "640 rpm",
+        "--no-plot", "--sensitivity", "--places", "0",
+    )  # fmt: skip
     assert result.exit_code == 0, result.output
     assert "no special point" in result.output
 

@@ -357,37 +357,6 @@ def test_products_do_not_depend_on_the_frame(seed: int) -> None:
     same(cross(a, b), -cross(b, a))
 
 
-def test_product_of_unit_lines_is_the_cosine_of_their_dual_angle() -> None:
-    """A line along i through the origin, and one turned by 0.6 about k at the height 2 above it."""
-    i = Dual([1.0, 0.0, 0.0])
-    angle = Dual(0.6, 2.0)
-    same(i @ apply(about_k(angle), i), np.cos(angle))
-
-
-@given(seeds)
-@several
-def test_forces_and_velocities_change_their_point_of_reference(seed: int) -> None:
-    """From a frame with origin p: the moment about O is M + p x F, the velocity at O is v + p x omega."""
-    m, a = displacement(seed), drawn(seed + 1, 3)
-    there = apply(m, a)
-    np.testing.assert_allclose(there.real, m.real @ a.real, atol=1e-12)
-    np.testing.assert_allclose(there.dual, m.real @ a.dual + np.cross(origin(m), there.real), atol=1e-11)
-
-
-@given(seeds)
-@several
-def test_a_screw_carried_by_a_body_changes_by_the_cross_product_with_its_velocity(seed: int) -> None:
-    """Rate of m(t) b for a body that moves as exp(t V) m: V x (m b), by a central difference along the motion."""
-    m, b = displacement(seed), drawn(seed + 1, 3)
-    rate, h = drawn(seed + 2), 1e-5
-
-    def moved(t: float) -> Dual:
-        return apply(about_k(Dual(float(rate.real), float(rate.dual)) * t) @ m, b)
-
-    velocity = Dual([0.0, 0.0, float(rate.real)], [0.0, 0.0, float(rate.dual)])
-    same((moved(h) - moved(-h)) / (2.0 * h), cross(velocity, apply(m, b)), 1e-7)
-
-
 def test_stack_and_join() -> None:
     x, y = Dual([1.0, 2.0], [3.0, 4.0]), 5.0
     both = stack([x, y])

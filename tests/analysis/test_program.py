@@ -19,7 +19,6 @@ from analysis.synthesis import (
     Assembly,
     Constraint,
     CrankUnknown,
-    FullTurn,
     Grashof,
     InfeasibleError,
     LargestLink,
@@ -290,11 +289,6 @@ class TestConstraints:
         assert solution.linkage.least_transmission == 0.0
         assert solution.verdicts.sound
 
-    def test_full_turn(self) -> None:
-        solution = best(FullTurn(), SMALL)
-        assert solution.verdicts.full_turn
-        assert solution.verdicts.sound
-
     @pytest.mark.parametrize("branch", [1, -1])
     def test_assembly(self, branch: int) -> None:
         assert best(*USUAL, Assembly(branch=branch)).linkage.branch == branch
@@ -336,14 +330,11 @@ class TestConstraints:
 
     def test_what_loses_the_symbol_is_refused_by_name(self) -> None:
         # float() of a symbol is NaN, and so would the constraint be
-        for function in (lambda p: float(p.pivot_x), lambda p: 1.0, lambda p: math.gamma(p.crank_length)):
+        branching = lambda p: p.pivot_x if p.pivot_x > 0 else 0.0  # noqa: E731
+        losing = (lambda p: float(p.pivot_x), lambda p: 1.0, lambda p: math.gamma(p.crank_length))
+        for function in (branching, *losing):
             with pytest.raises(InputError, match="my rule cannot be traced"):
                 best(*USUAL, Require(function=function, name="my rule"))
-
-    def test_a_function_that_branches_is_refused_by_name(self) -> None:
-        bad = Require(function=lambda p: p.pivot_x if p.pivot_x > 0 else 0.0, name="my rule")
-        with pytest.raises(InputError, match="my rule cannot be traced"):
-            best(*USUAL, bad)
 
     def test_what_cannot_be_is_said_by_name(self) -> None:
         impossible = Require(function=lambda p: 2.0 - math.cos(p.point_angle), name="a cosine of two")

@@ -4,31 +4,26 @@ from __future__ import annotations
 
 from dataclasses import replace
 from itertools import product
-from math import cos, inf, nan, radians, sin
+from math import inf, nan, radians
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
-from numpy.typing import NDArray
 from scipy.optimize import brentq
 
-from analysis.slider_crank import DeadCentreError, JointLoads, Rates, binors, close, follow, joint_loads, rates
+from analysis.slider_crank import DeadCentreError, JointLoads, Rates, close, follow, joint_loads, rates
 from linkwork.errors import AssemblyError, InputError
 from linkwork.slider_crank import dynamics, kinematics
 from linkwork.slider_crank.parameters import SliderCrankParameters
 from linkwork.slider_crank.published import CRANK_SPEED, CRANK_TORQUE, parameters
-from tests.analysis.test_slider_crank_closure import in_unit
 from tests.published_rahman import (
     DEAD_CENTRES_DEG,
     INCH,
     OFFSETS_IN,
     POUND_FORCE,
-    POUND_INCH,
     SHIFTS_IN,
-    SPOTS,
     TORQUE_LB_IN,
     TWISTS_DEG,
-    Spot,
 )
 from tests.slider_cranks import Case, cases, seeded
 
@@ -108,32 +103,6 @@ def test_agrees_with_vector_mechanics_for_random_mechanisms_and_motions(case: Ca
         assert_same(joint_loads(found, **motion, torque=expected[0].torque), [expected], 1e-10 / lever + 1e-9)
 
 
-@pytest.mark.parametrize("spot", SPOTS)
-def test_spot_values(spot: Spot) -> None:
-    found = close(parameters(spot.offset_in, spot.twist_deg), radians(30.0), spot.shift_in * INCH)
-    moved = rates(found, speed=CRANK_SPEED)
-    assert moved.slider_velocity[0] / INCH == pytest.approx(spot.velocity_in_s, abs=1e-6)
-    assert moved.slider_acceleration[0] / INCH == pytest.approx(spot.acceleration_in_s2, abs=1e-5)
-    sought = joint_loads(found, speed=CRANK_SPEED, torque=TORQUE_LB_IN * POUND_INCH)
-    assert sought.slider_force[0] / POUND_FORCE == pytest.approx(spot.slider_force_lb, abs=2e-6)
-    free = joint_loads(found, speed=CRANK_SPEED, slider_force=0.0)
-    assert free.torque[0] / POUND_INCH == pytest.approx(spot.torque_lb_in, abs=1e-5)
-
-
-@pytest.mark.parametrize("unit", [INCH, 1e-3])
-def test_the_unit_of_length_does_not_matter(unit: float) -> None:
-    """With lengths in inches or millimetres forces come out in kg.unit/s2."""
-    p = parameters(20.0, 310.0)
-    metres = joint_loads(close(p, TURN, 6.0 * INCH), speed=CRANK_SPEED, slider_force=20.0)
-    other = joint_loads(close(in_unit(p, unit), TURN, 6.0 * INCH / unit), speed=CRANK_SPEED, slider_force=20.0 / unit)
-    for names, power in ((FORCES, 1), (MOMENTS, 2)):
-        largest = max(np.abs(getattr(metres, name)).max() for name in names)
-        for name in names:
-            np.testing.assert_allclose(
-                getattr(other, name) * unit**power, getattr(metres, name), rtol=0.0, atol=1e-12 * largest
-            )
-
-
 def test_points_and_start_of_the_iteration_do_not_matter() -> None:
     """Continuation gives the rod another spin than closing each point for itself; the forces are the same."""
     p = seeded(5).parameters
@@ -176,80 +145,7 @@ def test_rates_are_those_of_the_dual_velocities(seed: int) -> None:
     np.testing.assert_array_equal(now.slider.real, 0.0)
 
 
-def test_the_rod_joins_the_velocities_of_its_pins() -> None:
-    p = parameters(10.0, 232.0)
-    found = close(p, TURN, 3.5 * INCH)
-    moved = rates(found, speed=CRANK_SPEED, shift_velocity=0.3)
-
-    def at(
-        velocity: NDArray[np.float64], omega: NDArray[np.float64], point: NDArray[np.float64]
-    ) -> NDArray[np.float64]:
-        return velocity + np.cross(omega, point)
-
-    pin = np.stack(
-        [-p.crank_length * np.sin(TURN) * CRANK_SPEED, p.crank_length * np.cos(TURN) * CRANK_SPEED, 0 * TURN + 0.3], -1
-    )
-    np.testing.assert_allclose(at(moved.rod.dual, moved.rod.real, found.crank_pin), pin, atol=1e-12)
-    guide = np.array([0.0, -sin(p.guide_twist), -cos(p.guide_twist)])
-    np.testing.assert_allclose(
-        at(moved.rod.dual, moved.rod.real, found.slider_pin), moved.slider_velocity[:, None] * guide, atol=1e-12
-    )
-
-
 # ------------------------------------------------------------------ balances that no joint enters
-
-
-@pytest.mark.parametrize("seed", range(6))
-def test_what_acts_from_outside_changes_the_momentum_and_the_moment_of_momentum(seed: int) -> None:
-    """Momenta of all links in the ground frame, from their velocities, differentiated numerically."""
-    case = seeded(seed)
-    p = case.parameters
-    th, s1, w, v, _, _ = case.state
-    e, a, h = 10.0, 2.0, 1e-5
-    g = np.array([p.gravity_x, p.gravity_y, p.gravity_z])
-    masses = (p.crank_mass, p.rod_mass, p.slider_mass)
-
-    def momentum(t: float) -> tuple[NDArray[np.float64], list[NDArray[np.float64]]]:
-        """p and H about O together (6,), and the centres of mass."""
-        at = close(p, th + w * t + 0.5 * e * t * t, s1 + v * t + 0.5 * a * t * t)
-        moved = rates(at, speed=w + e * t, shift_velocity=v + a * t)
-        crank, guide = at.crank_frame, at.guide_frame
-        between = at.slider_pin[0] - at.crank_pin[0]
-        centres = [
-            np.array([0.0, 0.0, at.shift[0]]) + crank.real[0] @ [p.crank_cog_x, p.crank_cog_y, p.crank_cog_z],
-            at.crank_pin[0] + between * p.rod_cog_distance / p.rod_length,
-            at.slider_pin[0] + guide.real[0] @ [p.slider_cog_x, p.slider_cog_y, p.slider_cog_z],
-        ]
-        total = np.zeros(6)
-        for mass, centre, body in zip(masses, centres, (moved.crank, moved.rod, moved.slider)):
-            linear = mass * (body.dual[0] + np.cross(body.real[0], centre))
-            total += np.concatenate([linear, np.cross(centre, linear)])
-        # spins about the centres of mass: the crank's about its axis, the rod's transverse
-        omega = w + e * t
-        own = p.crank_inertia - p.crank_mass * (p.crank_cog_x**2 + p.crank_cog_y**2)
-        xz = -p.crank_product_xz + p.crank_mass * p.crank_cog_x * p.crank_cog_z
-        yz = -p.crank_product_yz + p.crank_mass * p.crank_cog_y * p.crank_cog_z
-        total[3:] += crank.real[0] @ (omega * np.array([xz, yz, own])) + p.rod_inertia * moved.rod.real[0]
-        return total, centres
-
-    slope = (momentum(h)[0] - momentum(-h)[0]) / (2.0 * h)
-    found = close(p, th, s1)
-    loads = joint_loads(found, speed=w, shift_velocity=v, acceleration=e, shift_acceleration=a, slider_force=case.load)
-    guide = np.array([0.0, -sin(p.guide_twist), -cos(p.guide_twist)])
-    pushed = loads.guide[0] + loads.slider_force[0] * guide
-    force = loads.bearing[0] + [0.0, 0.0, loads.axial[0]] + pushed + sum(masses) * g
-    moment = loads.bearing_moment[0] + np.cross(found.slider_pin[0], pushed) + loads.guide_moment[0]
-    for mass, centre in zip(masses, momentum(0.0)[1]):
-        moment = moment + np.cross(centre, mass * g)
-    np.testing.assert_allclose(force, slope[:3], rtol=0.0, atol=1e-5 * np.abs(slope).max())
-    np.testing.assert_allclose(moment, slope[3:], rtol=0.0, atol=1e-5 * np.abs(slope).max())
-
-
-def test_virtual_work() -> None:
-    """At rest and without gravity the torque balances the slider's force by the ratio of their motions."""
-    found = close(parameters(10.0, 232.0), TURN, 3.5 * INCH)
-    loads = joint_loads(found, speed=0.0, slider_force=7.0)
-    np.testing.assert_allclose(loads.torque, -7.0 * rates(found, speed=1.0).slider_velocity, atol=1e-12)
 
 
 # ------------------------------------------------------------------ frames
@@ -319,19 +215,3 @@ def test_no_rates_at_the_limit_of_assembly() -> None:
     p = replace(parameters(0.0), rod_length=12.0 * INCH, rod_cog_distance=6.0 * INCH)
     with pytest.raises(AssemblyError, match="perpendicular to the guide at theta1 = 0 rad"):
         rates(close(p, 0.0, 0.0), speed=1.0)
-
-
-def test_binors_are_of_the_bodies() -> None:
-    """Momentum of the crank of section 3.1 turning about its axis, by hand: m1 a1/2 w, and m1 K^2 w."""
-    crank, rod, slider = binors(parameters())
-    assert (crank.mass, rod.mass, slider.mass) == (
-        parameters().crank_mass,
-        parameters().rod_mass,
-        parameters().slider_mass,
-    )
-    p = parameters()
-    found = rates(close(p, 0.0, 0.0), speed=2.0)
-    momentum = crank.momentum(found.crank)
-    np.testing.assert_allclose(momentum.real[0], [0.0, p.crank_mass * 6.0 * INCH * 2.0, 0.0], atol=1e-15)
-    square = (1.5 * INCH) ** 2 / 4.0 + (12.0 * INCH) ** 2 / 3.0
-    np.testing.assert_allclose(momentum.dual[0], [0.0, 0.0, p.crank_mass * square * 2.0], rtol=1e-7, atol=1e-15)

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import random
-import re
 from collections.abc import Iterator
 from dataclasses import replace
 from itertools import pairwise
-from math import cos, degrees, hypot, inf, nan, pi, radians, sin, sqrt
+from math import cos, degrees, inf, nan, pi, radians, sin, sqrt
 
 import numpy as np
 import pytest
@@ -15,10 +14,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from analysis.slider_crank import mobility as M
-from linkwork.errors import AssemblyError, InputError, ParameterError
+from linkwork.errors import InputError, ParameterError
 from linkwork.slider_crank import kinematics as K
 from linkwork.slider_crank import published
-from linkwork.slider_crank.assembly import check_assembly
 from linkwork.slider_crank.parameters import SliderCrankParameters
 from tests import published_rahman as rahman
 from tests.published_rahman import INCH
@@ -123,35 +121,6 @@ def apart(a: float, b: float, span: float = TURN) -> float:
 # ------------------------------------------------------------------ can it be assembled
 
 
-def test_assembly_is_checked_at_the_configuration() -> None:
-    par = published.parameters(30.0)
-    limit = sqrt(par.rod_length**2 - (par.crank_length + par.guide_offset) ** 2)
-    check_assembly(par, 0.0, limit - 1e-4)
-    check_assembly(par, radians(150.0), 1.1 * limit)
-    with pytest.raises(AssemblyError) as caught:
-        check_assembly(par, TURN, 0.75)
-    message = str(caught.value)
-    away = hypot(42.0 * INCH, 0.75)
-    assert "crank angle 6.28318531 rad (360.0000 deg) and shift 0.75 m" in message
-    numbers = [float(n) for n in re.findall(r"([\d.e-]+) m\b", message)]
-    assert numbers[1:] == pytest.approx([away, 1.27, away - 1.27], abs=1e-8)
-    assert message.endswith("m too short")
-    for sign in (1.0, -1.0):
-        with pytest.raises(AssemblyError, match=r"limit of assembly .* shift .* within 0\.0\d\d deg of perpendicular"):
-            check_assembly(par, 0.0, sign * (limit - 1e-7))
-
-
-def test_limit_of_assembly_is_a_thousandth() -> None:
-    par = mechanism(0.3, 1.0, 0.2, 1.5 * pi)
-    for cosine, reaches in ((1.01e-3, True), (0.99e-3, False)):
-        shift = sqrt(1.0 - cosine**2 - 0.5**2)
-        if reaches:
-            check_assembly(par, 0.0, shift)
-        else:
-            with pytest.raises(AssemblyError, match=r"limit of assembly .* within 0\.057 deg"):
-                check_assembly(par, 0.0, shift)
-
-
 @several
 @given(drawn=mechanisms())
 def test_margin_over_the_turn_is_the_least_of_a_scan(drawn: tuple[SliderCrankParameters, float]) -> None:
@@ -213,37 +182,6 @@ def test_ranges_of_general_mechanisms() -> None:
     assert min(counts.values()) > 5  # all three kinds were there
 
 
-def test_two_ranges() -> None:
-    # the guide through the crank axis and along it: the pin is near the guide nowhere; twisted, only about two angles
-    par = mechanism(1.0, 0.5, 0.0, 1.5 * pi)
-    found = M.ranges(par, STILL)
-    # |cos theta1| <= a2 / a1
-    assert [(degrees(part.low), degrees(part.high)) for part in found] == [
-        pytest.approx((60.0, 120.0), abs=1e-12),
-        pytest.approx((240.0, 300.0), abs=1e-12),
-    ]
-    # a crank longer than the rod goes past the guide: the slider moves between the limits of assembly
-    assert [part.stroke for part in found] == pytest.approx([1.5 - sin(pi / 3), sin(pi / 3) - 0.5], abs=1e-12)
-    assert found[0].greatest == pytest.approx((pi / 2, 0.0, 1.5), abs=1e-12)
-
-
-def test_range_over_zero_goes_on_past_the_turn() -> None:
-    par = mechanism(0.5, 1.0, -0.9, 1.5 * pi)  # |0.5 c - 0.9| <= 1: not near 180 deg
-    (part,) = M.ranges(par, STILL)
-    limit = np.arccos(-0.2)
-    assert (part.low, part.high) == pytest.approx((TURN - limit, TURN + limit), abs=1e-13)
-    assert all(0.0 <= centre.crank_angle < TURN for centre in part.dead_centres)
-
-
-def test_nothing_reaches_a_guide_too_far_away() -> None:
-    par = mechanism(0.5, 1.0, 2.0, 1.5 * pi)
-    law = M.constant_shift(0.1)
-    assert M.ranges(par, law) == M.dead_centres(par, law) == M.singularities(par, law) == ()
-    assert M.assembly_margin(par, law) == pytest.approx((1.0 - hypot(2.5, 0.1), 0.0), abs=1e-14)
-    assert not turns_fully(par, law)
-    assert M.greatest_shift(par) is None
-
-
 # ------------------------------------------------------------------ greatest shift
 
 
@@ -254,26 +192,6 @@ def test_greatest_shift_at_right_angles(offset_in: float) -> None:
         assert greatest is not None
         assert greatest / INCH == pytest.approx(rahman.GREATEST_SHIFTS_IN[offset_in], abs=6e-4)
         assert greatest / INCH == pytest.approx(sqrt(50.0**2 - (12.0 + offset_in) ** 2), abs=1e-12)
-
-
-@several
-@given(drawn=mechanisms())
-def test_crank_turns_fully_up_to_the_greatest_shift(drawn: tuple[SliderCrankParameters, float]) -> None:
-    par, shift = drawn
-    greatest = M.greatest_shift(par)
-    if greatest is None:
-        assert not turns_fully(par, M.constant_shift(0.0))
-        assert not turns_fully(par, M.constant_shift(shift))
-        return
-    assert greatest >= 0.0
-    if greatest > 1e6:  # guide and crank axis all but parallel
-        return
-    # about no shift at all the margin is of the second order in it
-    tiny = (1e-9 if greatest > 1e-3 else 1e-6) / max(abs(sin(par.guide_twist)), 1e-6)
-    for sign in (1.0, -1.0):
-        if greatest > tiny:
-            assert turns_fully(par, M.constant_shift(sign * (greatest - tiny)))
-        assert not turns_fully(par, M.constant_shift(sign * (greatest + tiny)))
 
 
 def test_greatest_shift_of_general_mechanisms_is_that_of_a_scan() -> None:
@@ -321,12 +239,6 @@ def test_greatest_margin_is_the_greatest_of_a_scan(drawn: tuple[SliderCrankParam
     assert scan.max() - 1e-13 <= margin.length == pytest.approx(scan.max(), abs=1e-4)
     there = squares(par, shift, np.array([margin.crank_angle]))[0]
     assert par.rod_length - sqrt(par.rod_length**2 - there) == pytest.approx(margin.length, abs=1e-12)
-
-
-def test_thesis_case_assembles_at_every_twist() -> None:
-    # a4 = 20, S1 = 0
-    for twist in range(0, 360, 3):
-        assert turns_fully(published.parameters(20.0, float(twist)), STILL)
 
 
 # ------------------------------------------------------------------ dead centres
@@ -551,41 +463,6 @@ def test_groove_repeats_after_whole_turns(ratio: float, turns: int) -> None:
 def test_groove_that_does_not_repeat_is_refused() -> None:
     with pytest.raises(ParameterError, match=r"groove\.ratio is 1\.4142.* repeat after at most 64 turns"):
         M.groove_shift(grooved(published.parameters(), 0.1, sqrt(2.0)))
-
-
-def test_dead_centres_of_a_moving_shift_are_not_the_singularities() -> None:
-    model = grooved(published.parameters(20.0, 310.0), 3.0 * INCH, 1.0)
-    law = M.groove_shift(model)
-    stops = [centre.crank_angle for centre in M.dead_centres(model, law)]
-    singular = [centre.crank_angle for centre in M.singularities(model, law)]
-    assert len(stops) == len(singular) == 2
-    assert all(apart(a, b) > 0.01 for a, b in zip(stops, singular))
-    p = model.constants()
-    for angle in singular:
-        q = K.position(angle, model.groove_amplitude * sin(angle), p)
-        assert K.coefficients(q, p).kth == pytest.approx(0.0, abs=1e-13)
-
-
-def test_flat_groove_is_a_shift_held() -> None:
-    model = grooved(published.parameters(20.0, 232.0), 0.0, 2.0)
-    assert M.dead_centres(model, M.groove_shift(model)) == M.dead_centres(model, STILL)
-    assert M.ranges(model, M.groove_shift(model)) == M.ranges(model, STILL)
-
-
-def test_any_periodic_law() -> None:
-    # a smooth law of many harmonics, with bounds that are not sharp
-    def law_at(th: float) -> tuple[float, float]:
-        inner = 0.8 * sin(3.0 * th)
-        return 0.1 * cos(th + inner), -0.1 * sin(th + inner) * (1.0 + 2.4 * cos(3.0 * th))
-
-    law = M.PeriodicShift(at=law_at, rate=0.4, curvature=4.0)
-    for offset, twist in ((20.0, 310.0), (30.0, 232.0), (0.0, 270.0)):
-        par = published.parameters(offset, twist)
-        assert_law_agrees_with_a_scan(par, law)
-        assert_stroke_is_that_of_a_scan(par, law)
-        # bounds decide how long the search takes, not what it finds
-        sharper = M.dead_centres(par, replace(law, rate=0.35, curvature=1.9))
-        assert np.array(sharper) == pytest.approx(np.array(M.dead_centres(par, law)), abs=1e-12)
 
 
 @pytest.mark.parametrize("gap", [0.05, 1e-2, 2e-3])

@@ -3,9 +3,6 @@
 from __future__ import annotations
 
 import signal
-import subprocess
-import sys
-import time
 from collections.abc import Callable
 from dataclasses import replace
 from math import pi, sqrt
@@ -40,13 +37,14 @@ from analysis.periodic import (
 from analysis.youssef import PeriodicEquation, hill_regions, linear_equation, linear_test, linear_verdict, monodromy
 from linkwork.errors import InputError, LinkworkError, ParameterError, UnknownNameError
 from linkwork.five_bar.published import SETS, SQUARE_OF_OMEGA_K, TABLE_3_1, chapter_4
+from tests.published import (
+    FIRST_REGION,
+    FIRST_REGION_THESIS,
+    REMOVING_DAMPING,
+    REMOVING_DAMPING_READ_OFF,
+    REMOVING_DAMPING_THESIS,
+)
 
-# --- STABILITY: notes on Youssef, chapters IV and V; sigma2 = 0.05, p45 = 0.2, k/(m4 + m5) = 1000 1/s2
-# first unstable region in lambda_k^2 by I4, right to the digits given, and by appendix 3 when run
-FIRST_REGION = {0.5: (0.258298, 0.259203), 1.0: (0.266540, 0.268367), 1.5: (0.274727, 0.277501)}
-FIRST_REGION_APPENDIX_3 = {0.5: (0.25786, 0.26031), 1.0: (0.26580, 0.27054), 1.5: (0.27382, 0.28069)}
-# omega_c = mu/(m4 + m5) (1/s) that removes it up to I4 = 1.5: stated, by appendix 4 when run, right
-REMOVING_OMEGA_C_THESIS, REMOVING_OMEGA_C_OWN, REMOVING_OMEGA_C = 0.45, 0.459, 0.167
 # long nonlinear runs at I4 = 1, lambda_k^2: the first lies just below appendix 3's region, the others in it; the second is ours
 LONG_RUNS = ((0.2655, "bounded"), (0.2662, "bounded"), (0.26745, "grows"), (0.2695, "bounded"))
 
@@ -102,12 +100,6 @@ def test_torque_drive_has_charts_too() -> None:
     assert run.growth == pytest.approx(orbit.largest, rel=1e-3)
     with pytest.raises(InputError, match="by torque"):
         linear_verdict(rig, Drive(torque=0.01))
-
-
-@pytest.mark.parametrize("cores", [0])
-def test_no_cores_are_refused(cores: int) -> None:
-    with pytest.raises(InputError, match="cores"):
-        grid(first_region_plane(), [0.26, 0.27], [1.0], n_jobs=cores)
 
 
 def test_a_small_margin_is_given_more_turns() -> None:
@@ -313,7 +305,7 @@ def test_first_region_of_the_true_orbit(inertia_ratio: float) -> None:
     assert about_zero == pytest.approx(right, abs=2.5e-4)
     assert np.abs(about_zero - right).max() > 1e-5
     # the thesis's is two and a half times as wide
-    wide, narrow = (high - low for low, high in (FIRST_REGION_APPENDIX_3[inertia_ratio], found.roots))
+    wide, narrow = (high - low for low, high in (FIRST_REGION_THESIS[inertia_ratio], found.roots))
     assert 2.4 < wide / narrow < 2.8
 
 
@@ -371,10 +363,10 @@ def test_removing_damping_of_the_first_region() -> None:
         return orbit_test(first_region_plane(omega_c), -1)(x, inertia_ratio)
 
     worst = removing_damping_over(test, lambda _: (0.26, 0.285), (0.0, 0.5), (1.1, 1.5), samples=3, tolerance=1e-5)
-    assert worst.damping == pytest.approx(REMOVING_OMEGA_C, abs=5e-4)
+    assert worst.damping == pytest.approx(REMOVING_DAMPING, abs=5e-4)
     assert worst.other == 1.5
-    assert REMOVING_OMEGA_C_THESIS / worst.damping > 2.5
-    assert pytest.approx(REMOVING_OMEGA_C_OWN, rel=0.03) == REMOVING_OMEGA_C_THESIS
+    assert REMOVING_DAMPING_READ_OFF / worst.damping > 2.5
+    assert pytest.approx(REMOVING_DAMPING_THESIS, rel=0.03) == REMOVING_DAMPING_READ_OFF
 
 
 def test_damping_out_of_range_is_reported() -> None:
@@ -415,46 +407,6 @@ def test_a_grid_on_a_full_disk_is_computed_all_the_same(tmp_path: Path, monkeypa
     assert not list(tmp_path.iterdir())
     monkeypatch.undo()
     assert np.array_equal(found.starts, grid(first_region_plane(), XS, YS, folder=tmp_path).starts)
-
-
-@pytest.mark.slow
-@pytest.mark.skipif(sys.platform != "linux", reason="which processes there are is read from /proc")
-def test_workers_of_a_grid_end_with_the_process_that_started_them(tmp_path: Path) -> None:
-    # the workers write their numbers, then compute for minutes
-    code = f"""
-import os, time, joblib
-from pathlib import Path
-from analysis.numerics.workers import end_with
-
-def work(caller):
-    end_with(caller)
-    Path({str(tmp_path)!r}, str(os.getpid())).touch()
-    time.sleep(120)
-
-joblib.Parallel(n_jobs=2)(joblib.delayed(work)(os.getpid()) for _ in range(2))
-"""
-    process = subprocess.Popen([sys.executable, "-c", code], start_new_session=True)
-
-    def until(reached: Callable[[], bool]) -> bool:
-        end = time.monotonic() + 60.0
-        while not (done := reached()) and time.monotonic() < end:
-            time.sleep(0.1)
-        return done
-
-    def runs(number: int) -> bool:
-        try:
-            return "State:\tZ" not in Path(f"/proc/{number}/status").read_text()
-        except OSError:
-            return False
-
-    try:
-        assert until(lambda: len(list(tmp_path.iterdir())) == 2)
-        workers = [int(path.name) for path in tmp_path.iterdir()]
-        assert all(map(runs, workers))
-    finally:
-        process.kill()
-        process.wait()
-    assert until(lambda: not any(map(runs, workers)))
 
 
 def test_grid_goes_on_from_what_is_there(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -524,6 +476,8 @@ def test_points_without_an_orbit_are_masked_with_a_reason(tmp_path: Path) -> Non
 
 
 def test_bad_grids_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="cores"):
+        grid(first_region_plane(), XS, YS, n_jobs=0)
     with pytest.raises(InputError, match="axis y"):
         grid(first_region_plane(), XS, [], folder=tmp_path)
     with pytest.raises(InputError, match="axis x"):
@@ -542,7 +496,7 @@ def test_grid_is_kept_beside_the_compiled_code(tmp_path: Path, monkeypatch: pyte
 
 @pytest.mark.parametrize(("lambda_k2", "expected"), LONG_RUNS)
 def test_long_runs_without_damping(lambda_k2: float, expected: str) -> None:
-    low, high = FIRST_REGION_APPENDIX_3[1.0]
+    low, high = FIRST_REGION_THESIS[1.0]
     assert (low < lambda_k2 < high) or lambda_k2 == 0.2655
     outcome = Outcome.GROWS if expected == "grows" else Outcome.BOUNDED
     run = confirm(chapter_4(1.0), Drive(speed=crank_speed(lambda_k2)), turns=2000)

@@ -182,12 +182,6 @@ def rates(parameters: FiveBarParameters, q: ArrayLike, crank_speed: float, slide
     return np.array([crank_speed, w3, w4, slider_velocity])
 
 
-def mass_matrix(parameters: FiveBarParameters, q: ArrayLike) -> Vector:
-    """Mass matrix of the redundant coordinates, shape (4, 4): sum over the links of m J_G^T J_G and I_G."""
-    links = _links(parameters)
-    return _mass_matrix(_state(np.asarray(q, dtype=float), np.zeros(4), links), links)
-
-
 def _mass_matrix(state: _State, links: _Links) -> Vector:
     jacobian = state.jacobian[:4]
     return np.real(jacobian.conj().T @ (links.masses[:, None] * jacobian)) + np.diag(links.inertias)
@@ -226,8 +220,8 @@ def _system(
     return matrix, np.concatenate([force, bias])
 
 
-def _refined_solve(matrix: Vector, rhs: Vector) -> tuple[Vector, float, int]:
-    """Solve a symmetric system with iterative refinement: the solution, its relative residual, the refinements.
+def _refined_solve(matrix: Vector, rhs: Vector) -> tuple[Vector, float]:
+    """Solve a symmetric system with iterative refinement: the solution and its relative residual.
 
     Rows and columns are first brought to like size (kg.m2, kg and m stand side by side in the matrix); the residuals are
     formed in extended precision, as the thesis's subroutine does.
@@ -242,16 +236,14 @@ def _refined_solve(matrix: Vector, rhs: Vector) -> tuple[Vector, float, int]:
     wide_x = np.linalg.solve(a, b).astype(np.longdouble)
     size = np.abs(a) @ np.abs(wide_x.astype(float)) + np.abs(b)
     size[size == 0.0] = 1.0
-    refinements = 0
     wide_r = wide_b - wide_a @ wide_x
-    while refinements < MOST_REFINEMENTS:
+    for _ in range(MOST_REFINEMENTS):
         trial_x = wide_x + np.linalg.solve(a, wide_r.astype(float))
         trial_r = wide_b - wide_a @ trial_x
         if not np.abs(trial_r / size).max() < np.abs(wide_r / size).max():
             break
         wide_x, wide_r = trial_x, trial_r
-        refinements += 1
-    return wide_x.astype(float) * scale, float(np.abs(wide_r / size).max()), refinements
+    return wide_x.astype(float) * scale, float(np.abs(wide_r / size).max())
 
 
 def _cross(a: complex, b: complex) -> float:
@@ -331,7 +323,7 @@ def solve_multipliers(
     ``crank_acceleration`` (rad/s2) its multiplier is the crank torque, and ``torque`` is of no effect.
     """
     q, qd = np.asarray(q, dtype=float), np.asarray(qd, dtype=float)
-    x, residual, _ = _refined_solve(*_system(parameters, q, qd, (torque, slider_force, *load), crank_acceleration))
+    x, residual = _refined_solve(*_system(parameters, q, qd, (torque, slider_force, *load), crank_acceleration))
     accelerations, multipliers = x[:4], -x[4:]
     links = _links(parameters)
     newton = _newton_euler(_state(q, qd, links), accelerations, complex(*load), links)

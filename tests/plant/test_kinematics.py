@@ -71,16 +71,6 @@ def test_branch_is_the_sign_of_the_sine_and_both_assemblies_close(case: Case) ->
     assert abs(mirrored - tips[1]) < 1e-12
 
 
-def test_thesis_configuration() -> None:
-    # Table 3.1 at th2 = u = 0: B and D 10.35 cm apart, an isosceles triangle under the links of 15 cm
-    p = TABLE_3_1.constants()
-    g = K.position(0.0, 0.0, p)
-    assert g.c3 == pytest.approx(10.35 / 2 / 15, abs=1e-15)
-    assert g.s3 == pytest.approx(sqrt(1.0 - (10.35 / 30) ** 2), abs=1e-15)
-    assert (g.c4, g.s4) == pytest.approx((-g.c3, g.s3), abs=1e-15)
-    assert g.s43 > 0.0  # the thesis's assembly is +1
-
-
 @pytest.mark.parametrize("seed", SEEDS)
 def test_velocity_coefficients_are_the_partial_derivatives(seed: int) -> None:
     case = seeded(seed)
@@ -231,15 +221,3 @@ def test_plus_root_of_the_listing_changes_assembly_where_b_passes_d() -> None:
     # vertically above, where the listing divides by zero, nothing special happens
     before, at, after = (K.position(th2, over + h, p) for h in (-1e-7, 0.0, 1e-7))
     assert at == pytest.approx([0.5 * (x + y) for x, y in zip(before, after)], abs=1e-11)
-
-
-@pytest.mark.parametrize("branch", [1, -1])
-def test_a_whole_turn_stays_on_its_assembly(branch: int) -> None:
-    p = replace(TABLE_3_1, assembly_branch=branch).constants()
-    last = K.position(0.0, 0.0, p)
-    for degree in range(1, 361):
-        g = K.position(radians(degree), 0.0, p)
-        assert g.s43 * branch > 0.3
-        assert hypot(g.c3 - last.c3, g.s3 - last.s3) < 0.05
-        last = g
-    assert last == pytest.approx(K.position(0.0, 0.0, p), abs=1e-14)

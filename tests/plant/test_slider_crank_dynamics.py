@@ -1,11 +1,11 @@
-"""Dynamics of the slider-crank, what is special of it: Newton and Euler on each body in space, the groove and prescribed
-motions, mirror images in space, and the thesis's relations and numbers. What it shares is in `test_dynamics`."""
+"""Dynamics of the slider-crank, what is special of it: Newton and Euler on each body in space, the groove, and the thesis's
+relations and numbers. What it shares is in `test_dynamics`."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from math import cos, hypot, pi, radians, sin
+from math import hypot, radians
 
 import numpy as np
 import pytest
@@ -14,13 +14,11 @@ from hypothesis import given, settings
 from linkwork.slider_crank import dynamics as D
 from linkwork.slider_crank import kinematics as K
 from linkwork.slider_crank import published
-from linkwork.slider_crank.parameters import SliderCrankParameters
 from linkwork.slider_crank.vectors import scale
 from tests.oracles.bodies import (
     crank_particles,
     guide_frame,
     pins,
-    shift_push,
     slider_crank,
     slider_motion,
     solve_bodies,
@@ -99,151 +97,18 @@ def test_newton_and_euler_agree_on_seeded_mechanisms(drive: str) -> None:
         assert_agrees_with_bodies(seeded(seed), drive)
 
 
-def test_axial_force_is_that_of_drive_groove_spring_and_damper() -> None:
-    for drive in DRIVES:
-        for seed in range(10):
-            case = seeded(seed)
-            x, i = case.under(drive), case.inputs(drive)
-            e = evaluate(x, i, case.p)
-            assert e.forces.axial == pytest.approx(
-                e.motion.force + shift_push(x[1], x[3], case.parameters), rel=1e-9, abs=1e-9
-            )
-            pitch = K.groove(x[0], case.p).pitch
-            assert e.forces.bearing_moment.z == pytest.approx(
-                e.motion.torque - pitch * e.motion.groove_force, rel=1e-9, abs=1e-9
-            )
-
-
-def test_prescribed_motions_are_the_motions_under_the_forces_they_take() -> None:
-    # what a drive by speed, shift or groove supplies, given as torque and force, makes the same motion
-    for drive in DRIVES:
-        for seed in range(20):
-            case = seeded(seed)
-            p, x, i = case.p, case.under(drive), case.inputs(drive)
-            motion = evaluate(x, i, p).motion
-            pitch = K.groove(x[0], p).pitch
-            torque = motion.torque - pitch * motion.groove_force
-            free = REST._replace(torque=torque, force=motion.force, load=i.load)
-            again = evaluate(x, free, p).motion
-            size = max(abs(motion.crank_acceleration) * p.a1, abs(motion.shift_acceleration), p.a1 * x[2] ** 2)
-            assert (again.crank_acceleration * p.a1, again.shift_acceleration) == pytest.approx(
-                (motion.crank_acceleration * p.a1, motion.shift_acceleration), abs=1e-9 * size
-            )
-            if i.speed_drive:
-                assert motion.crank_acceleration == pytest.approx(i.acceleration, rel=1e-12)
-            if i.shift_drive:
-                assert motion.shift_acceleration == pytest.approx(i.shift_acceleration, rel=1e-12)
-
-
-def test_groove_makes_shift_velocity_and_acceleration() -> None:
-    for seed in range(20):
-        case = seeded(seed)
-        p, par, (th, _, w, v, *_) = case.p, case.parameters, case.state
-        for drive, (_, _, groove) in DRIVES.items():
-            x = D.grooved((th, 0.123, w, v, 3.0, 5.0), groove, p)
-            if not groove:
-                assert x == (th, 0.123, w, v, 3.0, 5.0)
-                continue
-            phase = par.groove_ratio * th
-            assert x == pytest.approx(
-                (
-                    th,
-                    par.groove_amplitude * sin(phase),
-                    w,
-                    par.groove_amplitude * par.groove_ratio * cos(phase) * w,
-                    3.0,
-                    5.0,
-                ),
-                rel=1e-13,
-            )
-            e = evaluate(x, case.inputs(drive), p).motion.crank_acceleration
-
-            def shift_velocity(
-                t: float, e: float = e, th: float = th, w: float = w, par: SliderCrankParameters = par
-            ) -> float:
-                angle, speed = th + w * t + 0.5 * e * t * t, w + e * t
-                return par.groove_amplitude * par.groove_ratio * cos(par.groove_ratio * angle) * speed
-
-            h = 1e-4 / max(abs(w), abs(e) ** 0.5)
-            change = (
-                (8 * (shift_velocity(h) - shift_velocity(-h)) - shift_velocity(2 * h) + shift_velocity(-2 * h)) / 12 / h
-            )
-            found = evaluate(x, case.inputs(drive), p).motion.shift_acceleration
-            assert found == pytest.approx(change, rel=1e-8, abs=1e-8 * abs(w) ** 2 * p.a1)
-            # whatever shift the state carries, derivative and outputs see the groove's
-            assert D.derivative((th, 9.0, w, 9.0, 0.0, 0.0), case.inputs(drive), p) == D.derivative(
-                (*x[:4], 0.0, 0.0), case.inputs(drive), p
-            )
-            assert D.outputs((th, 9.0, w, 9.0, 0.0, 0.0), case.inputs(drive), 0.0, p) == D.outputs(
-                (*x[:4], 0.0, 0.0), case.inputs(drive), 0.0, p
-            )
-
-
-# ------------------------------------------------------------------ mirror images
-
-
-#: Components of forces that change their sign in a mirror normal to y or z, and of moments and turning, that do not.
-MIRRORS = {"y": ("y", "xz"), "z": ("z", "xy")}
-
-
-def mirrored(case: Case, mirror: str) -> Case:
-    """The case seen in the mirror y = 0 (the crank turns the other way) or z = 0 (the shift is the other way)."""
-    par, (th, s1, w, v, _, _) = case.parameters, case.state
-
-    def negated(*names: str) -> dict[str, float]:
-        return {name: -getattr(par, name) for name in names}
-
-    if mirror == "y":
-        fields = negated(
-            "crank_cog_y", "crank_product_yz", "slider_cog_y", "gravity_y", "groove_amplitude", "guide_twist"
-        )
-        return case._replace(
-            parameters=replace(par, **fields),
-            state=(-th, s1, -w, v, 0.0, 0.0),
-            torque=-case.torque,
-            acceleration=-case.acceleration,
-        )
-    fields = negated(
-        "crank_cog_z",
-        "crank_product_xz",
-        "crank_product_yz",
-        "slider_cog_y",
-        "gravity_z",
-        "groove_amplitude",
-        "shift_spring_free_position",
-    )
-    return case._replace(
-        parameters=replace(par, **fields, guide_twist=pi - par.guide_twist),
-        state=(th, -s1, w, -v, 0.0, 0.0),
-        force=-case.force,
-        shift_acceleration=-case.shift_acceleration,
-    )
-
-
-def mirror_sign(name: str, mirror: str) -> float:
-    """Sign of an output in the mirror."""
-    polar, axial = MIRRORS[mirror]
-    if name.startswith("rod_w") or name.startswith(("bearing_m", "guide_m")):
-        return -1.0 if name[-1] in axial else 1.0
-    if name[-2:] in ("_x", "_y", "_z", "fx", "fy", "fz"):
-        return -1.0 if name[-1] in polar else 1.0
-    flips = {
-        "y": ("crank_angle", "crank_speed", "crank_acceleration", "drive_applied_torque"),
-        "z": ("shift_position", "shift_velocity", "shift_acceleration", "axial_applied_force"),
-    }
-    return -1.0 if name in flips[mirror] else 1.0
-
-
-@pytest.mark.parametrize("mirror", MIRRORS)
-@every_drive
-def test_mirror_image_moves_as_the_mechanism_does(drive: str, mirror: str) -> None:
-    for seed in range(15):
-        case = seeded(seed)
-        image = mirrored(case, mirror)
-        direct = D.outputs(case.state, case.inputs(drive), 0.0, case.p)
-        seen = D.outputs(image.state, image.inputs(drive), 0.0, image.p)
-        for name, expected, value in zip(D.Outputs._fields, direct, seen):
-            assert mirror_sign(name, mirror) * value == pytest.approx(expected, rel=1e-8, abs=1e-8), name
+@pytest.mark.parametrize("seed", range(20))
+def test_groove_takes_the_place_of_the_shift_of_the_state(seed: int) -> None:
+    case = seeded(seed)
+    p, (th, _, w, *_) = case.p, case.state
+    carried, law = (th, 9.0, w, 9.0, 0.0, 0.0), K.groove(th, p)
+    for drive, (_, _, groove) in DRIVES.items():
+        x = D.grooved(carried, groove, p)
+        assert x == ((th, law.shift, w, pytest.approx(law.pitch * w, rel=1e-13), 0.0, 0.0) if groove else carried)
+        if groove:
+            i = case.inputs(drive)
+            assert D.derivative(carried, i, p) == D.derivative(x, i, p)
+            assert D.outputs(carried, i, 0.0, p) == D.outputs(x, i, 0.0, p)
 
 
 # ------------------------------------------------------------------ the thesis's relations and numbers
@@ -285,28 +150,6 @@ def test_relations_of_the_thesis_that_hold_and_what_they_lack(angle_deg: float) 
     # with the slider's centre of mass off the pin there is a moment
     moved = replace(par, slider_cog_y=0.01).constants()
     assert hypot(*evaluate(x, REST._replace(speed_drive=1.0), moved).forces.guide_moment) > 1e-3
-
-
-def test_planar_mechanism_has_the_textbooks_forces() -> None:
-    # in line, light rod, at constant speed: T = (push of the slider) times the velocity ratio, all in the plane
-    par = SliderCrankParameters(
-        crank_length=0.1,
-        rod_length=0.4,
-        guide_twist=1.5 * pi,
-        crank_mass=1.0,
-        crank_inertia=0.01,
-        slider_mass=2.0,
-    )
-    p = par.constants()
-    for th in np.linspace(0.1, 6.1, 13).tolist():
-        x = (th, 0.0, 10.0, 0.0, 0.0, 0.0)
-        e = evaluate(x, REST._replace(speed_drive=1.0, shift_drive=1.0, load=-30.0), p)
-        lean = np.arcsin(0.1 * cos(th) / 0.4)
-        acceleration = e.motion.slider_acceleration
-        thrust = (2.0 * acceleration + 30.0) / cos(lean)  # along the rod
-        assert e.forces.crank_pin == pytest.approx((-thrust * sin(lean), thrust * cos(lean), 0.0), abs=1e-12)
-        assert e.motion.torque == pytest.approx(0.1 * thrust * cos(th - lean), abs=1e-12)
-        assert e.forces.guide == pytest.approx((thrust * sin(lean), 0.0, 0.0), abs=1e-11)
 
 
 def test_outputs_carry_the_configuration_and_the_forces() -> None:

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Container
+import tomllib
 from functools import cache
-from importlib import import_module
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,11 +12,15 @@ import pytest
 from analysis import studies
 from analysis.studies.study import LISTING, OURS, TEXT, UNJUDGED, StudyResult
 
-#: The files of tests that have the statements that do not hold, and those that cannot be judged.
-FILES = (*(f"test_chapter_{n}" for n in range(3, 9)), "test_rahman")
-
-#: A statement: the number of its study, and its words.
-Statement = tuple[str, str]
+#: What does not hold and what cannot be judged, by study.
+VERDICTS = tomllib.loads(Path(__file__).with_name("verdicts.toml").read_text(encoding="utf-8"))
+#: Studies whose results take more than a second or two.
+LONG = {
+    *("3.2", "4.3", "4.4", "4.6", "4.7", "5.1", "5.2", "5.3", "5.4", "6.7", "6.8", "6.9", "6.10", "6.11", "7.2"),
+    *(f"7.{n}" for n in range(6, 13)),
+    *(f"8.{n}" for n in (*range(7, 12), *range(13, 22))),
+    *("rig-1-resonance", "rig-1-friction", "rig-2-forces", "rahman-closure", "rahman-rates"),
+}
 
 
 @cache
@@ -31,27 +35,33 @@ def computed(number: str, statement: str, source: str = OURS) -> float:
     return verdict.computed
 
 
-def every(chapter: str, long: Container[str] = ()) -> pytest.MarkDecorator:
-    """A parameter: the numbers of a chapter's studies; those whose result takes more than a second or two are slow tests."""
-    numbers = [n for n in studies.STUDIES if n.startswith(chapter)]
+def every(*beginnings: str) -> pytest.MarkDecorator:
+    """A parameter: the numbers of the studies that begin so; those that take long are slow tests."""
+    numbers = [n for n in studies.STUDIES if n.startswith(beginnings)]
     return pytest.mark.parametrize(
-        "number", [pytest.param(n, marks=pytest.mark.slow) if n in long else n for n in numbers]
+        "number", [pytest.param(n, marks=pytest.mark.slow) if n in LONG else n for n in numbers]
     )
 
 
-def tables(name: str) -> set[Statement]:
-    """The statements of all files of tests in their tables of a name: REFUTED or UNJUDGED."""
-    return set().union(*(getattr(import_module(f"{__package__}.{file}"), name, ()) for file in FILES))
+def stated(kind: str, number: str) -> set[str]:
+    """The statements of a study that are ``refuted`` or ``unjudged``."""
+    return set(VERDICTS.get(number, {}).get(kind, ()))
 
 
-def check_verdicts(number: str, refuted: set[Statement], cannot: set[Statement] = frozenset()) -> None:
-    """What fails and what cannot be judged is what the tables say, and all of it is the thesis's."""
+def check(number: str) -> None:
+    """What must be true of every study."""
+    check_verdicts(number)
+    check_plot_and_data(number)
+
+
+def check_verdicts(number: str) -> None:
+    """What fails and what cannot be judged is what the table says, and all of it is the thesis's."""
     verdicts = result(number).verdicts
     unjudged = [v for v in verdicts if v.outcome == UNJUDGED]
-    assert {(number, v.statement) for v in unjudged} == {entry for entry in cannot if entry[0] == number}
+    assert {v.statement for v in unjudged} == stated("unjudged", number)
     assert all(v.why for v in unjudged)
     failed = [v for v in verdicts if not v.holds and v not in unjudged]
-    assert {(number, v.statement) for v in failed} == {entry for entry in refuted if entry[0] == number}
+    assert {v.statement for v in failed} == stated("refuted", number)
     assert all(v.source in (TEXT, LISTING) for v in (*failed, *unjudged))
     assert all(v.source in (TEXT, LISTING, OURS) for v in verdicts)
     assert all(np.isfinite(v.computed) for v in verdicts if v not in unjudged)

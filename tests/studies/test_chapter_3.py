@@ -11,49 +11,12 @@ from analysis.studies.youssef import chapter_3, free_crank, runs
 from linkwork.five_bar.parameters import InitialState
 from tests import published
 
-from .results import check_plot_and_data, check_verdicts, computed, every, result
-
-#: What the thesis states and the right physics does not bear out.
-REFUTED = {
-    *(("3.2", f"turns of a transient down to 5 %; mu = {mu} dyn.s/cm") for mu in ("5e4", "1e5", "5e5", "1e6")),
-    *(
-        (
-            "3.2",
-            f"change of the motion's shape from the third turn to the fourth, relative to its range; mu = {mu} dyn.s/cm",
-        )
-        for mu in ("5e4", "1e5")
-    ),
-    *(("3.2", f"third turn's drift relative to the first's; mu = {mu} dyn.s/cm") for mu in ("1e4", "5e4", "1e5")),
-    *(("3.3", f"size of M without gravity over that with it; mu = {mu} dyn.s/cm") for mu in ("5e5", "1e6")),
-    *(
-        ("3.4", f"distance from the steady motion in the second turn, relative to its range; k = {k} dyn/cm")
-        for k in ("5e5", "1e6")
-    ),
-    ("3.4", "crank angle of the least u; k = 2e6 dyn/cm"),
-    ("3.4", "mean slope of u from the least to the greatest, greatest over least of the three springs"),
-    ("3.4", "width of the curve in u from least to greatest, relative to that with the next softer spring"),
-    ("3.4", "range of the slope of the fall over its mean; k = 1e7 dyn/cm"),
-    ("3.5", "angle from the greatest difference of the torque to the nearer extreme of the torque"),
-    ("3.5", "angle from the greatest difference of the slider's acceleration to the nearer extreme of the torque"),
-    ("3.7", "exponent of T0 in the time to 1 rad"),
-    ("3.7", "T0 as the time grows"),
-    ("3.8", "greatest u; T0 = 1e7 dyn.cm"),
-    ("3.14", "mean crank speed of the greatest second harmonic over the first"),
-}
-#: What is said of the drawings alone.
-UNJUDGED = {(number, "the curves are smooth but for the sampling") for number in ("3.13", "3.14")}
-#: Studies whose results take more than a second or two.
-LONG = {"3.2"}
+from .results import check, computed, every, result
 
 
-@every("3.", LONG)
-def test_verdicts(number: str) -> None:
-    check_verdicts(number, REFUTED, UNJUDGED)
-
-
-@every("3.", LONG)
-def test_plot_and_data(number: str) -> None:
-    check_plot_and_data(number)
+@every("3.")
+def test_verdicts_plot_and_data(number: str) -> None:
+    check(number)
 
 
 class TestDrift:

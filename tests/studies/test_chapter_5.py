@@ -11,46 +11,12 @@ from analysis.youssef import Variant
 from linkwork.five_bar.published import chapter_4
 from tests import published
 
-from .results import check_plot_and_data, check_verdicts, every, result
-
-#: What the thesis states and the right physics does not bear out.
-REFUTED = {
-    *(
-        ("5.1", f"{side} boundary in lambda_k^2; I4 = {ratio}")
-        for side in ("lower", "upper")
-        for ratio in ("0.5", "1", "1.5")
-    ),
-    ("5.1", "largest multiplier at half the zeroth boundary; I4 = 1"),
-    ("5.2", "axis A at sigma2 = 0.01"),
-    ("5.2", "growth of the axis A from sigma2 = 0.01 to 0.1"),
-    ("5.3", "axis A at sigma3 = 0.8; angles held"),
-    *(
-        ("5.3", f"{what}; same ground link")
-        for what in (
-            "growth of the width with sigma3, greatest",
-            "axis A at sigma3 = 0.8",
-            "change of the axis A over sigma3",
-            "omega_c that removes the region, sigma3 from 0.8 to 1.2",
-        )
-    ),
-    ("5.3", "greatest width to that of Fig 5.1 and 5.2"),
-    *((number, "width of the second region to that of the first, greatest") for number in ("5.1", "5.2", "5.3")),
-    ("5.4", "omega_c that removes the region, up to I4 = 1.5"),
-}
-#: What cannot be judged.
-UNJUDGED = {("5.4", "the computer-oriented method is fast")}
-#: Studies whose results take more than a second or two.
-LONG = {"5.1", "5.2", "5.3", "5.4"}
+from .results import check, every, result
 
 
-@every("5.", LONG)
-def test_verdicts(number: str) -> None:
-    check_verdicts(number, REFUTED, UNJUDGED)
-
-
-@every("5.", LONG)
-def test_plot_and_data(number: str) -> None:
-    check_plot_and_data(number)
+@every("5.")
+def test_verdicts_plot_and_data(number: str) -> None:
+    check(number)
 
 
 @pytest.mark.parametrize("inertia_ratio", published.FIRST_REGION)

@@ -11,36 +11,17 @@ from analysis.studies.youssef.quality import both, linkages
 from analysis.synthesis import distance_to
 from analysis.synthesis.published import PROBLEMS, packaging_path
 
-from .results import check_plot_and_data, check_verdicts, every
-
-#: What the thesis states and the right physics does not bear out.
-REFUTED = {
-    *((number, "error of the printed linkage") for number in ("6.4", "6.5", "6.6", "6.7", "6.8", "6.9")),
-    ("6.6", "increase of the error by the bounds"),
-    ("6.11", "quality function of the nineteen points, printed linkage, of ours"),
-    ("quality", "minima found at 72 points, more than at 12; timed ellipse (a)"),
-    ("quality", "error of the printed linkage, of the least with no longer link; timed ellipse (a)"),
-}
-#: What cannot be judged.
-UNJUDGED = {("6.11", "the path is within the region")}
-#: Studies whose results take more than a second or two.
-LONG = {"6.7", "6.8", "6.9", "6.10", "6.11", "quality"}
+from .results import check, every
 
 
-@every("6.", LONG)
-def test_verdicts(number: str) -> None:
-    check_verdicts(number, REFUTED, UNJUDGED)
-
-
-@every("6.", LONG)
-def test_plot_and_data(number: str) -> None:
-    check_plot_and_data(number)
+@every("6.")
+def test_verdicts_plot_and_data(number: str) -> None:
+    check(number)
 
 
 @pytest.mark.slow
 def test_the_combined_quality_function() -> None:
-    check_verdicts("quality", REFUTED)
-    check_plot_and_data("quality")
+    check("quality")
     longest = max(PROBLEMS[name].linkage.largest_link for name in ("ellipse-a", "path-a"))
     found = linkages()["ours; combined"]
     assert found.largest_link <= longest

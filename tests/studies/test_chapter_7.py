@@ -24,42 +24,17 @@ from analysis.synthesis import Linkage, SliderMotion
 from analysis.synthesis.published import PROBLEMS
 from linkwork.five_bar import kinematics
 
-from .results import check_plot_and_data, check_verdicts, computed, every
-
-#: What the thesis states and the right physics does not bear out.
-REFUTED = {
-    ("7.2", "share of the area within the outer boundary that P reaches"),
-    ("7.5", "the same of random desired points"),
-    ("7.11", "error of the printed series, least of its readings"),
-    ("7.12", "area with the printed series"),
-}
-#: What cannot be judged.
-UNJUDGED = {
-    ("7.4", "the desired points"),
-    ("7.6", "the variational method takes far more effort in many cases"),
-    ("control", "latches hold and release the slider"),
-    ("control", "secondary linkages and cams drive the slider"),
-    ("control", "the mechanism is led by hand and its inputs are recorded"),
-    ("control", "the simplest linkage: a four-bar, then a slider, then a fifth link"),
-}
-#: Studies whose results take more than a second or two.
-LONG = {"7.2", "7.6", "7.7", "7.8", "7.9", "7.10", "7.11", "7.12"}
+from .results import check, computed, every
 
 
-@every("7.", LONG)
-def test_verdicts(number: str) -> None:
-    check_verdicts(number, REFUTED, UNJUDGED)
-
-
-@every("7.", LONG)
-def test_plot_and_data(number: str) -> None:
-    check_plot_and_data(number)
+@every("7.")
+def test_verdicts_plot_and_data(number: str) -> None:
+    check(number)
 
 
 @pytest.mark.slow
 def test_methods_of_control() -> None:
-    check_verdicts("control", REFUTED, UNJUDGED)
-    check_plot_and_data("control")
+    check("control")
 
 
 # Goals: sums of squared errors at N = 24 over the weight (deg2), areas (cm2), by the number of harmonics, the printed links

@@ -23,99 +23,15 @@ from linkwork.five_bar.parameters import InitialState
 from linkwork.five_bar.published import SETS
 from tests import published
 
-from .results import check_plot_and_data, check_verdicts, every
+from .results import check, every
+
+
+@every("8.", "rig-")
+def test_verdicts_plot_and_data(number: str) -> None:
+    check(number)
+
 
 PAGE = Path(__file__).parents[2] / "docs" / "rig-2.md"
-
-#: What the thesis states and the right physics does not bear out.
-REFUTED = {
-    ("8.14", "calculated natural frequency"),
-    ("8.14", "speed of the local maximum"),
-    ("8.14", "harmonic 3 over the greater of 1 and 2, most of six"),
-    ("8.14", "rise of the amplitude at a third of the natural frequency, relative"),
-    ("8.15", "points of inflection at 500 rpm, as of a sine"),
-    ("8.15", "speed of the minimum"),
-    ("8.16", "calculated natural frequency"),
-    ("8.16", "speed of the local maximum"),
-    ("8.16", "natural frequency over spring A's"),
-    ("8.16", "harmonic 3 over the greater of 1 and 2, most of six"),
-    ("8.16", "rise of the amplitude at a third of the natural frequency, relative"),
-    ("8.16", "rise of the amplitude at a quarter of the natural frequency, relative"),
-    ("8.17", "greatest displacement at 800 rpm, where the guide was too short, over that at all speeds below"),
-    ("8.18", "harmonic 2 over 1, greatest from 300 to 1000 rpm; spring C"),
-    ("8.18", "harmonic 2 over 1, greatest from 300 to 1000 rpm; spring D"),
-    ("8.19", "calculated natural frequency"),
-    ("8.19", "amplitude at 1000 rpm over that of the theory, with the orders that it leaves out"),
-    ("8.19", "amplitude at 1000 rpm over that of the theory, with friction by 0.05 of the guide's force"),
-    (
-        "8.19",
-        "amplitude at 1000 rpm over that of the theory, with a damper 1.25 times as strong, for a wider resonance",
-    ),
-    ("8.20", "calculated natural frequency"),
-    ("8.20", "natural frequency over spring C's"),
-    ("8.20", "amplitude at 1000 rpm over that of the theory, with the orders that it leaves out"),
-    ("8.20", "amplitude at 1000 rpm over that of the theory, with friction by 0.05 of the guide's force"),
-    (
-        "8.20",
-        "amplitude at 1000 rpm over that of the theory, with a damper 1.25 times as strong, for a wider resonance",
-    ),
-    ("8.21", "greatest harmonic 1 over greatest harmonic 2; spring C"),
-    ("8.21", "rise of the amplitude at half of the natural frequency, relative; spring C"),
-    ("8.21", "greatest harmonic 1 over greatest harmonic 2; spring D"),
-    ("8.21", "rise of the amplitude at half of the natural frequency, relative; spring D"),
-    ("8.21", "the same at half with friction by 0.05 of the guide's force; spring C"),
-    ("8.21", "the same at half with friction by 0.05 of the guide's force; spring D"),
-    ("rig-1-friction", "coefficients, of 0.05, 0.1, 0.2, with which all of the following holds"),
-    ("rig-1-friction", "force of the guide less the joint's, 420 rpm"),
-    ("rig-1-friction", "amplitude taken off, spring B over A; coefficient 0.05"),
-    (
-        "rig-1-friction",
-        "rise of the amplitude at a third and a quarter of the natural frequency, spring B; coefficient 0.05",
-    ),
-    ("rig-1-friction", "displacement at 800 over 570 rpm, B; coefficient 0.05"),
-    ("rig-1-friction", "amplitude taken off at 390 to 450 rpm, spring A; coefficient 0.2"),
-    ("rig-1-friction", "shift of the phase at 390 to 450 rpm, spring A; coefficient 0.2"),
-    ("rig-1-friction", "work of Coulomb over viscous friction, 420 rpm; coefficient 0.2"),
-    ("rig-1-friction", "amplitude taken off, spring B over A; coefficient 0.2"),
-    ("rig-1-friction", "displacement at 800 over 570 rpm, B; coefficient 0.2"),
-}
-#: What cannot be judged: the measured curves are lost.
-UNJUDGED = {
-    ("8.6", "average damping coefficient of rig 1"),
-    ("8.6", "average damping coefficient of rig 2"),
-    ("8.7", "the motion observed at 360 rpm has the period of a crank cycle"),
-    ("8.8", "almost total agreement in phase, slightly other amplitudes"),
-    ("8.9", "almost total agreement in phase, slightly other amplitudes"),
-    ("8.10", "almost total agreement in phase, slightly other amplitudes"),
-    ("8.11", "almost total agreement in phase, reasonable agreement in amplitude"),
-    ("8.12", "almost total agreement in phase, reasonable agreement in amplitude"),
-    ("8.13", "almost total agreement in phase, reasonable agreement in amplitude"),
-    ("8.13", "agreement at other speeds, good in phase and reasonable in amplitude"),
-    ("8.19", "theory and experiment agree up to resonance"),
-    ("8.19", "theory has a narrower resonance, smaller amplitudes beyond"),
-    ("8.20", "theory and experiment agree up to resonance"),
-    ("8.20", "theory has a narrower resonance, smaller amplitudes beyond"),
-    ("rig-1-friction", "the average of the damping coefficient contributes"),
-    ("rig-1-friction", "friction in the pins contributes"),
-}
-#: Studies whose results take more than a second or two.
-LONG = {*(f"8.{n}" for n in (*range(7, 12), *range(13, 22))), "rig-1-resonance", "rig-1-friction", "rig-2-forces"}
-
-
-@every("8.", LONG)
-def test_verdicts(number: str) -> None:
-    check_verdicts(number, REFUTED, UNJUDGED)
-
-
-@every("8.", LONG)
-def test_plot_and_data(number: str) -> None:
-    check_plot_and_data(number)
-
-
-@every("rig-", LONG)
-def test_studies_of_ours(number: str) -> None:
-    check_verdicts(number, REFUTED, UNJUDGED)
-    check_plot_and_data(number)
 
 
 @pytest.mark.parametrize("name", published.NATURAL_RPM)

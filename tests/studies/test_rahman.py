@@ -32,117 +32,15 @@ from ..published_rahman import (
     TORQUE_LB_IN,
     TWISTS_DEG,
 )
-from .results import check_plot_and_data, check_verdicts, result
-
-OFFSET_NAMES = tuple(f"a4 = {a4} in" for a4 in (10, 20, 30))
-SHIFT_NAMES = tuple(f"S1 = {s1} in" for s1 in (3, 6, 9))
-SPATIAL = (*OFFSET_NAMES, *SHIFT_NAMES, "alpha4 = 232 deg", "alpha4 = 310 deg")
-#: Cases in which the loop, and in which row 37f is looked at.
-OPEN = ("a4 = 10 in at S1 = 3.5 in", *SPATIAL[-2:])
-ROW_F = ("a4 = 30 in at S1 = 9 in", SPATIAL[-1])
-
-#: What Rahman states and the right physics does not bear out.
-REFUTED = {
-    *(("R5", f"stroke relative to the ideal one's; {case}") for case in OFFSET_NAMES),
-    *(("R6", f"stroke relative to the ideal one's; {case}") for case in SHIFT_NAMES),
-    ("R7", "stroke relative to the ideal one's; alpha4 = 270 deg"),
-    ("R5", "mean power that an offset saves at the same RPM without a load"),
-    *(
-        (f"R{n}", f"greatest magnitude of 1T1i - (-1F1j S1); {case}")
-        for n, cases in ((14, OFFSET_NAMES), (15, SHIFT_NAMES))
-        for case in cases
-    ),
-    *(
-        (f"R{n}", f"greatest magnitude of 1T1j - (1F1i S1); {case}")
-        for n, cases in ((16, OFFSET_NAMES), (17, SHIFT_NAMES))
-        for case in cases
-    ),
-    *(
-        (f"R{n}", f"spikes of {symbol} in a turn")
-        for symbol, first in (("3F3k", 27), ("4F4k", 36))
-        for n in range(first, first + 3)
-    ),
-    # of the joint forces and torques 4F4i, 3F3j and 3F3k do grow
-    *(
-        (f"R{n}", f"greatest magnitude of {symbol}, least gain from one a4 to the next")
-        for n, symbol in zip(
-            (8, 11, 14, 16, 18, 21, 33, 36), ("1F1i", "1F1j", "1T1i", "1T1j", "2F2i", "3F3i", "4F4j", "4F4k")
-        )
-    ),
-    *((CONSTANT, f"greatest magnitude of {symbol}; {case}") for symbol in ("1F1k", "2F2k") for case in SPATIAL),
-    *(
-        (CONSTANT, f"greatest magnitude of {symbol}, where S1 = 0; {case}")
-        for symbol in ("1T1i", "1T1j")
-        for case in SPATIAL[-2:]
-    ),
-    *(
-        ("rahman-closure", statement)
-        for statement in (
-            "freedoms of the chain, of which theta1 and S1 are given",
-            *(f"loop open by a rotation where the iteration ends; {case}" for case in OPEN),
-            *(f"error of S4 where the iteration ends; {case}" for case in OPEN),
-            "greatest entry of A Delta - V where the iteration ends",
-            "most corrections at an angle, outside the plane",
-            "share of angles at which the iteration settles from estimates 120 deg off",
-            *(f"greatest S1 at which the mechanism works; a4 = {a4} in" for a4 in (0, 10, 30)),
-            "gain of the greatest S1 from one a4 to the next, least of all",
-            "range of alpha4 in which the mechanism works",
-        )
-    ),
-    *(
-        ("rahman-rates", statement)
-        for statement in (
-            "rank of the coefficients of eq 38 with its right side",
-            "angular velocity by eqs 30, 31 less that of Z(theta) Y(eta)",
-            "right side of row 6 of eq 38 less that of 37f",
-            "S1' by eq 28a less the rate of eq 28",
-            "theta2' by eq 39 less the solution of 37a to 37e",
-            *(f"row 37f with the rates of eqs 39 to 43, where |sin theta2| > 0.15; {case}" for case in ROW_F),
-            *(f"velocity of point 3 by the forward path less the mixed path; {case}" for case in ROW_F),
-            "theta2 at the second spike; a4 = 10 in, S1 = 0",
-            "greatest accelerations by eqs 38a, 39a, 42a within 10 deg of a spike relative to elsewhere, ten being abnormal",
-        )
-    ),
-    *(
-        ("rahman-forces", statement)
-        for statement in (
-            *(
-                f"greatest difference of a joint force from the right one in the plane; {words}"
-                for words in ("as printed", "erratum 5 mended", "erratum 6 mended")
-            ),
-            "error of 2F2i after ten passes of eqs 69i, 69j, 69k from 1 lb",
-            "slider's momentum along j by eq 51a less 51",
-            "rod's momentum along k by eq 52a less 52",
-            "left side of eq 62c with the right forces",
-            "mass of the crank of specific gravity 0.28 less m1, relative to it",
-        )
-    ),
-}
-
-#: What depends on rounding, on signs that the scan has lost, or on data that are not given.
-UNJUDGED = {
-    ("rahman-closure", "the iteration converges up to S1 = 1.5 in at a4 = 0"),
-    ("rahman-closure", "beyond its limits closure is lost, or the slider goes to the opposite side"),
-    ("rahman-rates", "eqs 55 and 56 are the rates of 50a and 51a"),
-    ("rahman-forces", "with an offset fatigue failure is likely at high speed"),
-}
-
-#: Studies that follow the thesis's iteration over turns.
-LONG = ("rahman-closure", "rahman-rates")
-EVERY = pytest.mark.parametrize("number", [pytest.param(n, marks=pytest.mark.slow) if n in LONG else n for n in RAHMAN])
+from .results import check, every, result
 
 
-@EVERY
-def test_verdicts(number: str) -> None:
-    check_verdicts(number, REFUTED, UNJUDGED)
+@every("R", "rahman-")
+def test_verdicts_plot_and_data(number: str) -> None:
+    check(number)
 
 
-@EVERY
-def test_plot_and_data(number: str) -> None:
-    check_plot_and_data(number)
-
-
-@EVERY
+@every("R", "rahman-")
 def test_statements_have_a_place_and_are_unique(number: str) -> None:
     verdicts = result(number).verdicts
     assert all((v.source == TEXT) == bool(v.place) for v in verdicts)

@@ -13,7 +13,7 @@ from analysis import studies
 from analysis.studies.study import OURS, TEXT, at_least, at_most, near, unjudged
 from linkwork.errors import InputError
 
-from .results import check_plot_and_data, check_verdicts
+from .results import check
 
 
 def test_there_is_a_study_of_every_figure() -> None:
@@ -65,5 +65,4 @@ def test_a_verdict_says_what_it_found() -> None:
 
 @pytest.mark.slow
 def test_the_study_of_the_linkage() -> None:
-    check_verdicts("linkage", set())
-    check_plot_and_data("linkage")
+    check("linkage")
