@@ -41,6 +41,8 @@ from platformdirs import user_cache_dir
 
 from linkwork.errors import LinkworkError
 
+from . import linking
+
 VECTOR = float64[::1]
 MATRIX = float64[:, ::1]
 CUBE = float64[:, :, ::1]
@@ -302,10 +304,13 @@ def user_function(function: Any, size: int) -> Any:
 
 # Kernels
 
-#: Decorator of functions that kernels call; Python cannot, which saves a third of the compilation.
-part = njit(error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)
+_PART: dict[str, Any] = {
+    "error_model": "numpy", "no_cpython_wrapper": True, "no_cfunc_wrapper": True, "pipeline_class": linking.OfParts
+}  # fmt: skip
+#: Decorator of functions that kernels call; Python cannot.
+part = njit(**_PART)
 #: The same for functions that make no arrays: to count references to those they are handed would cost more than all they do.
-inner = njit(error_model="numpy", _nrt=False, no_cpython_wrapper=True, no_cfunc_wrapper=True)
+inner = njit(**_PART, _nrt=False)
 
 
 def kernel(*signature: Any, purpose: str) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
@@ -369,7 +374,10 @@ class Kernel:
             numba.config.CACHE_DIR = str(folder)
         try:
             with _announced(self.purpose):
-                return njit(*self.signature, cache=folder is not None, error_model="numpy", nogil=True)(self.py_func)
+                return njit(
+                    *self.signature, cache=folder is not None, error_model="numpy", nogil=True, no_cfunc_wrapper=True,
+                    pipeline_class=linking.OfKernels,
+                )(self.py_func)  # fmt: skip
         finally:
             numba.config.CACHE_DIR = before
 
@@ -411,7 +419,7 @@ def fingerprint(function: Any, signature: Any = None) -> str:
     """
     digest = hashlib.sha256(f"{numba.__version__} {llvmlite.__version__} {np.__version__} {signature}".encode())
     seen: set[int] = set()
-    files = {Path(__file__)}
+    files = {Path(__file__), Path(linking.__file__)}
 
     def add(value: Any) -> None:
         digest.update(repr(sorted(getattr(value, "targetoptions", {}).items(), key=str)).encode())
