@@ -313,6 +313,13 @@ part = njit(**_PART)
 inner = njit(**_PART, _nrt=False)
 
 
+@inner
+def copy(source, target):
+    """Copy a vector: for ``target[:] = source`` Numba compiles what writes an error message about shapes, which takes a second."""
+    for i in range(target.shape[0]):
+        target[i] = source[i]
+
+
 def kernel(*signature: Any, purpose: str) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
     """Decorator: compile a function for its explicit signature when it is first called, and keep the machine code on disk.
 

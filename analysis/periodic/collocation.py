@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from linkwork.limits import LIMIT_SINE
 
-from ..numerics.codegen import CUBE, MATRIX, VECTOR, evaluate, inner, kernel, part
+from ..numerics.codegen import CUBE, MATRIX, VECTOR, copy, evaluate, inner, kernel, part
 from ..numerics.gauss import gauss
 from ..run.sources import SOURCE
 from .flows import DIRECTIONAL, GAP, PLAIN, VARIATIONAL
@@ -105,6 +105,14 @@ def eliminate(matrix, size):
             for j in range(size, width):
                 matrix[r, j] -= factor * matrix[c, j]
     return True
+
+
+@inner
+def identity(matrix):
+    """Write the identity."""
+    for i in range(matrix.shape[0]):
+        for j in range(matrix.shape[0]):
+            matrix[i, j] = 1.0 if i == j else 0.0
 
 
 @inner
@@ -237,9 +245,7 @@ def correct(section, angles, y, w, desk):
     shift, column = bench.z, bench.out
     report[0] = 0.0
     pace = pace_of(section, y[0], bench)
-    for i in range(n):
-        for j in range(n):
-            monodromy[i, j] = 1.0 if i == j else 0.0
+    identity(monodromy)
     for e in range(m):
         h = angles[e + 1] - angles[e]
         into = ends[e], matrices[e], slopes[e], moves[e]
@@ -371,7 +377,7 @@ def spread(section, source, angles, start, y, w, room):
     carry = np.array([0.1, 0.0])
     for e in range(y.shape[0]):
         angle, h = angles[e], angles[e + 1] - angles[e]
-        y[e] = z
+        copy(z, y[e])
         for s in range(NODES + 1):
             following = angles[e] + C[s] * h if s < NODES else angles[e + 1]
             status = advance(section, source, angle, following, z, room, carry)
@@ -380,7 +386,7 @@ def spread(section, source, angles, start, y, w, room):
             angle = following
             if s < NODES:
                 evaluate(section.equations[PLAIN], angle, z, section.modes, section.drive, section.p, out)
-                w[e, s] = out[n // 2 :]
+                copy(out[n // 2 :], w[e, s])
     return DONE
 
 
@@ -435,8 +441,8 @@ def walk(section, source, angles, firsts, starts, change, known, neighbour, foun
     pace = pace_of(section, starts[0], bench)
     for piece in range(starts.shape[0]):
         first, last = firsts[piece], firsts[piece + 1]
-        start[:] = starts[piece]
-        whole[:] = np.eye(n)
+        copy(starts[piece], start)
+        identity(whole)
         along[:] = 0.0
         if not known:
             status = spread(section, source, angles[first : last + 1], start, y[first:last], w[first:last], room)
@@ -450,7 +456,7 @@ def walk(section, source, angles, firsts, starts, change, known, neighbour, foun
                 for i in range(n):
                     ahead += moves[e, row, 1 + i] * (start[i] - y[e, i])
                 w[e, row // f, row % f] += ahead
-            y[e] = start
+            copy(start, y[e])
             before = 0.0
             for count in range(_CORRECTIONS):
                 if not condense(section, angles[e], h, pace, y[e], w[e], bench, (end, matrix, slope, moves[e])):
@@ -472,15 +478,17 @@ def walk(section, source, angles, firsts, starts, change, known, neighbour, foun
                     column[i] = 0.0
                     for k in range(n):
                         column[i] += matrix[i, k] * whole[k, j]
-                whole[:, j] = column
+                for i in range(n):
+                    whole[i, j] = column[i]
             _carry(matrix, slope, along, column)
-            start[:] = end
+            copy(end, start)
         for i in range(n):
             rows[piece, i] = start[i]
             rows[piece, n + n * n + i] = along[i]
             for j in range(n):
                 rows[piece, n + j * n + i] = whole[i, j]
-    if tails.max() > DECAY * np.sqrt(section.tolerance):
-        return NO_STEP
+    for e in range(tails.shape[0]):
+        if tails[e] > DECAY * np.sqrt(section.tolerance):
+            return NO_STEP
     report[0] = least_gap(section, angles, y, w, bench, room.gap)
     return DONE if report[0] > LIMIT_SINE else LIMIT

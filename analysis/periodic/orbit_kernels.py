@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from linkwork.limits import LIMIT_SINE, NEAR_LIMIT
 
-from ..numerics.codegen import MATRIX, VECTOR, evaluate, inner, kernel, part
+from ..numerics.codegen import MATRIX, VECTOR, copy, evaluate, inner, kernel, part
 from ..run.sources import SOURCE, Source
 from ..run.stepping import NODES, STAGES, attempt, following, interpolant, interpolate, shorter, stage
 from .flows import DIRECTIONAL, GAP, PLAIN, STATE, VARIATIONAL
@@ -170,8 +170,7 @@ def advance(section, source, begin, end, z, room, carry):
     while status == DONE and angle < end:
         status, angle = _take(section, source, equation, angle, end, slowest, z, room, carry)
         if status == DONE:
-            for i in range(size):
-                z[i] = room.y[i]
+            copy(room.y, z)
             if angle < end:
                 evaluate(equation, angle, z, section.modes, section.drive, section.p, room.k[0])
     return status
@@ -215,7 +214,21 @@ def period(section, source, end, z, carry):
     return advance(section, source, 0.0, end, z, room, carry)
 
 
-@part
+@inner
+def difference(a, b, out):
+    """a - b, as many components as ``out`` has."""
+    for i in range(out.shape[0]):
+        out[i] = a[i] - b[i]
+
+
+@inner
+def moved(start, fraction, correction, trial):
+    """A fraction of a correction added to a start."""
+    for i in range(start.shape[0]):
+        trial[i] = start[i] + fraction * correction[i]
+
+
+@inner
 def magnitude(correction, scale):
     """Largest component relative to the scale."""
     size = 0.0
@@ -253,7 +266,7 @@ def newton(section, source, end, most, start, z, room, carry, report):
             if status == DONE:
                 if iteration == 0:
                     break
-                following[:] = z[:n] - trial
+                difference(z, trial, following)
                 solve_small(matrix.copy(), following)
                 next_size = magnitude(following, scale)
                 # near the solution corrections stop falling at the integrator's error
@@ -262,10 +275,10 @@ def newton(section, source, end, most, start, z, room, carry, report):
             fraction *= 0.5
             if fraction < _LEAST_FRACTION:
                 return status if status != DONE else DIVERGED
-            trial[:] = start + fraction * correction
+            moved(start, fraction, correction, trial)
         report[1] = iteration + 1.0
-        start[:] = trial
-        correction[:] = z[:n] - trial
+        copy(trial, start)
+        difference(z, trial, correction)
         report[0] = magnitude(correction, scale)
         for i in range(n):
             for j in range(n):
@@ -279,9 +292,9 @@ def newton(section, source, end, most, start, z, room, carry, report):
         fraction = min(1.0, 4.0 * fraction)
         if size <= 100.0 * tolerance:
             fraction = 1.0
-        trial[:] = start + fraction * correction
+        moved(start, fraction, correction, trial)
         if size <= 100.0 * tolerance:
-            start[:] = trial
+            copy(trial, start)
             return DONE
     return DIVERGED
 
@@ -354,9 +367,9 @@ def deflated(section, source, end, most, reach, start, known, z, room, carry):
             fraction *= 0.5
             if iteration == 0 or fraction < _LEAST_SEARCHED:
                 return status
-            trial[:] = start + fraction * correction
-        start[:] = trial
-        correction[:] = z[:n] - trial
+            moved(start, fraction, correction, trial)
+        copy(trial, start)
+        difference(z, trial, correction)
         for i in range(n):
             for j in range(n):
                 matrix[i, j] = (1.0 if i == j else 0.0) - z[n + j * n + i]
@@ -378,15 +391,17 @@ def deflated(section, source, end, most, reach, start, known, z, room, carry):
             if square > 0.0:
                 slope -= 2.0 * along / (square * (1.0 + square))
         if size <= 100.0 * section.tolerance and nearest > 1e-6:
-            start[:] = start + correction
+            moved(start, 1.0, correction, start)
             return DONE
         if nearest == 0.0 or slope == 1.0:
             return DIVERGED
-        correction[:] = correction / (1.0 - slope)
+        for i in range(n):
+            correction[i] /= 1.0 - slope
         size = magnitude(correction, scale)
         if size > reach:
-            correction[:] = correction * (reach / size)
-        trial[:] = start + correction
+            for i in range(n):
+                correction[i] *= reach / size
+        moved(start, 1.0, correction, trial)
     return DIVERGED
 
 
@@ -430,8 +445,9 @@ def settle(section, source, turn, change, most, start):
         status = advance(section, source, 0.0, turn, z, room, carry)
         if status != DONE:
             return status
-        size = magnitude(z - start, section.scale)
-        start[:] = z
+        difference(z, start, start)
+        size = magnitude(start, section.scale)
+        copy(z, start)
         if size < change:
             return DONE
     return DONE
@@ -455,7 +471,7 @@ def sample(section, source, stations, starts, angles, rows):
         angle, end = stations[piece], angles[-1]
         if piece + 1 < stations.shape[0]:
             end = min(end, stations[piece + 1])
-        z[:] = starts[piece]
+        copy(starts[piece], z)
         status, slowest = _enter(section, equation, angle, z, room)
         if status == DONE and done < angles.shape[0] and angles[done] <= angle:
             evaluate(section.equations[STATE], angle, z, section.modes, section.drive, section.p, rows[done])

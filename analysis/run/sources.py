@@ -40,9 +40,14 @@ SOURCE = types.NamedTuple((VECTOR, CUBE, MATRIX, PLACES, VECTOR, ADDRESSES, PLAC
 @inner
 def find(t, breaks):
     """Piece of the polynomials in force from t on; the outer ones go on beyond the ends."""
-    n = breaks.shape[0] - 1
-    i = np.searchsorted(breaks, t, side="right") - 1
-    return min(max(i, 0), n - 1)
+    piece, above = 0, breaks.shape[0] - 1
+    while above - piece > 1:
+        middle = (piece + above) // 2
+        if breaks[middle] <= t:
+            piece = middle
+        else:
+            above = middle
+    return piece
 
 
 @inner
