@@ -315,7 +315,7 @@ inner = njit(**_PART, _nrt=False)
 
 @inner
 def copy(source, target):
-    """Copy a vector: for ``target[:] = source`` Numba compiles what writes an error message about shapes, which takes a second."""
+    """Copy a vector. For ``target[:] = source`` Numba compiles what writes a message about shapes, which takes a second."""
     for i in range(target.shape[0]):
         target[i] = source[i]
 

@@ -16,7 +16,7 @@ _HASH = hash(Flags())
 _ALIVE: list[Any] = []
 
 
-class _Options(Flags):  # type: ignore[misc]
+class _Options(Flags):
     """Numba's options, which it compares whenever it looks for the type of a call: by what is set, not one after the other."""
 
     def __eq__(self, other: object) -> bool:
@@ -26,7 +26,7 @@ class _Options(Flags):  # type: ignore[misc]
         return _HASH
 
 
-class _Part(JITCodeLibrary):  # type: ignore[misc]
+class _Part(JITCodeLibrary):
     """Code that is neither optimised nor made machine code of where it stands, but where it is linked into a kernel."""
 
     def _optimize_final_module(self) -> None:
@@ -42,7 +42,7 @@ class _Part(JITCodeLibrary):  # type: ignore[misc]
                 engine.add_global_mapping(variable, ctypes.addressof(_ALIVE[-1]))
 
 
-class OfKernels(Compiler):  # type: ignore[misc]
+class OfKernels(Compiler):
     """Numba's compiler, for `njit(pipeline_class=...)`."""
 
     def __init__(
