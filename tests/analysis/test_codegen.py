@@ -220,6 +220,9 @@ def test_each_compilation_says_once_what_it_is_for(
     assert example(3.0) == 7.0
     assert another(2.0) == 6.0
     assert capsys.readouterr().err == "linkwork: compiling an example, once on this machine ...\n"
+    # machine code is of the kernels alone, which have the helper in them
+    (part,) = helper.overloads.values()
+    assert part.library.get_pointer_to_function(part.fndesc.llvm_func_name) == 0
 
 
 def test_fingerprint_follows_every_function_and_constant_that_is_compiled() -> None:
