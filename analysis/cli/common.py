@@ -218,6 +218,14 @@ def save_picture(picture: Any, path: str | Path, *, html: bool) -> list[Path]:
     return written
 
 
+def plotted(wanted: bool, result: Any, path: str | Path, **options: Any) -> list[Path]:
+    """The picture of a result, where pictures are wanted: what was written."""
+    from .. import figures
+    from ..files import save_figure
+
+    return [save_figure(figures.plot(result, **options), path)] if wanted else []
+
+
 plot_option = click.option("--plot/--no-plot", default=True, show_default=True, help="Whether to write a plot.")
 
 
@@ -356,6 +364,7 @@ def show_table(
     rows: Iterable[Sequence[str]],
     *,
     words: Collection[str] = (),
+    unwrapped: Collection[str] = (),
     styles: Iterable[str | None] = repeat(None),
 ) -> None:
     """Print a table.
@@ -368,12 +377,15 @@ def show_table(
     rows : iterable of sequence of str
     words : collection of str
         The headings of columns of words, which are aligned to the left; the others are of numbers.
+    unwrapped : collection of str
+        The headings of columns that are kept in one line.
     styles : iterable of str, optional
         Of the rows, in rich's terms.
     """
     grid = Table(title=plain(title), title_justify="left", show_header=bool(headings))
     for heading in headings:
-        grid.add_column(plain(heading), justify="left" if heading in words else "right")
+        justify: Any = "left" if heading in words else "right"
+        grid.add_column(plain(heading), justify=justify, no_wrap=heading in unwrapped)
     for row, style in zip(rows, styles):
         grid.add_row(*(plain(cell) for cell in row), style=style)
     console.print(grid)

@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import sys
 import tomllib
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
-from rich.markup import escape
-from rich.table import Table
 
 from linkwork.errors import Interrupted
 
@@ -21,13 +19,14 @@ from .common import (
     check_kind,
     console,
     folder_of,
-    force_option,
     handled,
-    plain,
+    out_option,
+    plotted,
     print_error,
     print_written,
     say,
     set_option,
+    show_table,
     workers_options,
 )
 
@@ -57,21 +56,11 @@ def leave_if_stopped(stopped: Interrupted | None, kept: str) -> None:
         sys.exit(INTERRUPTED)
 
 
-def table(title: str, headings: Sequence[str], left: Collection[str] = ()) -> Table:
-    """An empty table, its columns to the right but for those that are named."""
-    grid = Table(title=plain(title), title_justify="left")
-    for heading in headings:
-        grid.add_column(escape(heading), justify="left" if heading in left else "right")
-    return grid
-
-
 def search_options(command: Callable[..., Any]) -> Callable[..., Any]:
     """The options that commands with a search share."""
-    folder = click.Path(file_okay=False)
     for option in (
         click.option("--plots/--no-plots", default=True, show_default=True, help="Whether to write plots."),
-        click.option("--out", default="out", show_default=True, type=folder, help="Folder for the results."),
-        force_option,
+        out_option(help="Folder for the results."),
         workers_options(),
         click.option("--seed", type=click.IntRange(0), help="Of the search: the same seed gives the same linkages."),
         click.option(
@@ -106,10 +95,8 @@ def print_solutions(title: str, solutions: Sequence[Solution], forces: Sequence[
         *(["pin force [N]"] if forces else []),
         "verdict",
     )
-    grid = table(title, headings, left=("verdict",))
-    for rank, s in enumerate(solutions, start=1):
-        v = s.verdicts
-        grid.add_row(
+    rows = [
+        (
             str(rank),
             f"{factor * s.error:.5g}",
             f"{scale * s.evaluation.rms:.4g}",
@@ -118,9 +105,11 @@ def print_solutions(title: str, solutions: Sequence[Solution], forces: Sequence[
             format_transmission(v),
             *([f"{forces[rank - 1].greatest:.4g} on {forces[rank - 1].pin}"] if forces else []),
             ", ".join([v.grashof, *([] if v.full_turn else ["no full turn"]), *v.defects]),
-            style=None if v.sound else "yellow",
         )
-    console.print(grid)
+        for rank, (s, v) in enumerate(((s, s.verdicts) for s in solutions), start=1)
+    ]
+    styles = [None if s.verdicts.sound else "yellow" for s in solutions]
+    show_table(title, headings, rows, words=("verdict",), styles=styles)
 
 
 def print_best(solution: Solution) -> None:
@@ -128,10 +117,7 @@ def print_best(solution: Solution) -> None:
     from ..synthesis import dimension_rows, rounding_line
 
     head, *rows = dimension_rows(solution)
-    grid = table("the first of them", head, left=head[:1])
-    for row in rows:
-        grid.add_row(*row)
-    console.print(grid)
+    show_table("the first of them", head, rows, words=head[:1])
     console.print(rounding_line(solution), highlight=False, soft_wrap=True)
 
 
@@ -169,8 +155,8 @@ def write_solution(
         )
     cut = plates(solution, width=make.width, thickness=make.thickness, pin=make.hole, title=title)
     written += [save_drawing(folder / f"best-plates.{ending}", cut) for ending in ("dxf", "svg")]
+    written += plotted(plots, solution, folder / "best-linkage.png", title=title)
     if plots:
-        written.append(save_figure(figures.plot(solution, title=title), folder / "best-linkage.png"))
         forces = _forces(solution, make)
         made = make.describe(forces=forces is not None)
         sheet = figures.plot_sheet(solution, forces, title=title, made=made)
@@ -222,8 +208,7 @@ def synthesize(
       linkwork synthesize examples/kinds.toml --set search.kinds='["slider-crank"]'
       linkwork synthesize examples/ellipse.toml --set constraints.largest_link='300 mm' --set task.n=36
     """
-    from .. import figures
-    from ..files import save_figure, write_csv
+    from ..files import write_csv
     from ..synthesis import (
         SynthesisInterrupted,
         TradeOffInterrupted,
@@ -257,8 +242,7 @@ def synthesize(
         print_solutions("the same curve from other pivots: the first one's cognates", others)
         written.append(write_csv(folder / "cognates.csv", columns_of(others)))
     written += write_solution(result.best, folder, chosen.title, make=chosen.make, plots=plots, animate=animate)
-    if plots:
-        written.append(save_figure(figures.plot(result, title=chosen.title), folder / "alternatives.png"))
+    written += plotted(plots, result, folder / "alternatives.png", title=chosen.title)
     print_written(written)
     if not result.best.verdicts.sound:
         print_error(f"note: none of them is free of defects: the first has {result.best.verdicts}")
@@ -273,8 +257,6 @@ def synthesize(
 
 
 def _trade_off(traded: TradeOff, title: str, folder: Path, plots: bool) -> list[Path]:
-    from .. import figures
-    from ..files import save_figure
     from ..synthesis import OVER, error_unit, format_limit, quality_name, quality_unit
 
     task = next((s.task for s in traded.solutions if s is not None), None)
@@ -284,12 +266,10 @@ def _trade_off(traded: TradeOff, title: str, folder: Path, plots: bool) -> list[
         return []
     (factor, unit), (scale, length) = quality_unit(task), error_unit(task)
     headings = ("limit", f"{quality_name(task)} [{unit}]", f"worst [{length}]")
-    grid = table(f"{title}: error against the {what}", headings)
+    rows = []
     for limit, s in zip(traded.limit, traded.solutions):
         numbers = ("no linkage", "") if s is None else (f"{factor * s.error:.5g}", f"{scale * s.evaluation.worst:.4g}")
-        grid.add_row(format_limit(traded.over, float(limit)), *numbers)
-    console.print(grid)
+        rows.append((format_limit(traded.over, float(limit)), *numbers))
+    show_table(f"{title}: error against the {what}", headings, rows)
     written = [traded.to_csv(folder / "trade-off.csv")]
-    if plots:
-        written.append(save_figure(figures.plot(traded, title=title), folder / "trade-off.png"))
-    return written
+    return written + plotted(plots, traded, folder / "trade-off.png", title=title)

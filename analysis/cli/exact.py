@@ -13,8 +13,9 @@ from .common import (
     check_kind,
     console,
     folder_of,
-    force_option,
     handled,
+    out_option,
+    plotted,
     print_error,
     print_written,
     set_option,
@@ -30,10 +31,7 @@ from .design import overrides_of, print_best, print_solutions, write_described
 )
 @click.option("--count", type=click.IntRange(1), default=6, show_default=True, help="Linkages of four poses to report.")
 @click.option("--plots/--no-plots", default=True, show_default=True, help="Whether to write plots.")
-@click.option(
-    "--out", default="out", show_default=True, type=click.Path(file_okay=False), help="Folder for the results."
-)
-@force_option
+@out_option(help="Folder for the results.")
 @handled
 def exact(case: str, settings: Sequence[str], crank_phase: str | None, count: int, plots: bool, out: str) -> None:
     """Find every four-bar that does exactly what a CASE file (TOML or JSON) asks for at a few points.
@@ -47,8 +45,7 @@ def exact(case: str, settings: Sequence[str], crank_phase: str | None, count: in
       linkwork exact examples/five-poses.toml
       linkwork exact examples/sine-function.toml --set task.n=5
     """
-    from .. import figures
-    from ..files import save_figure, write_csv
+    from ..files import write_csv
     from ..synthesis import (
         Generators,
         Guidance,
@@ -77,11 +74,10 @@ def exact(case: str, settings: Sequence[str], crank_phase: str | None, count: in
         if best.verdicts.sound:
             print_best(best)
             written += write_described(best, folder, chosen.title, curve="best-curve", text="best-report", drawn="best")
-    if plots and not isinstance(found, Generators):
-        written.append(save_figure(figures.plot(found, title=chosen.title), folder / "poses.png"))
-    if plots and found.solutions:
-        picture = figures.plot(found.solutions[0], title=chosen.title)
-        written.append(save_figure(picture, folder / "best-linkage.png"))
+    if not isinstance(found, Generators):
+        written += plotted(plots, found, folder / "poses.png", title=chosen.title)
+    if found.solutions:
+        written += plotted(plots, found.solutions[0], folder / "best-linkage.png", title=chosen.title)
     print_written(written)
     if not any(s.verdicts.sound for s in found.solutions):
         print_error(f"note: {found.describe()}")

@@ -7,12 +7,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from rich.markup import escape
-from rich.table import Table
 
 from linkwork.errors import LinkworkError
 
-from .common import console, print_error
+from .common import console, print_error, show_table
 from .driven import swing_of
 
 #: Parameters that are named of a point.
@@ -37,11 +35,8 @@ def report_sensitivity(response: Any, factor: float, unit: str, path: str) -> li
     operation = family.parameters, family.drive
     # a percent of nothing is nothing
     names = [name for name in gradient_names(*operation) if name != family.vary and value_of(*operation, name) != 0.0]
-    grid = Table(title="what moves it most: percent for a percent of a parameter", title_justify="left")
     what, size, cm = swing_of(response.branches[0].orbits[0])
-    for heading in ("", f"at [{unit}]", f"its place: {family.name}", f"amplitude [{cm}]", f"amplitude of {what} there"):
-        grid.add_column(escape(heading), justify="right" if heading.endswith("]") else "left")
-    rows = []
+    rows, shown = [], []
     for word, point in _points(response):
         try:
             found = special_gradient(family, point, names)
@@ -50,12 +45,13 @@ def report_sensitivity(response: Any, factor: float, unit: str, path: str) -> li
             continue
         place, amplitude = found.place, found.amplitude
         rows.append([factor * place.value, size * amplitude.value, *_shares(place), *_shares(amplitude)])
-        shown = f"{rows[-1][0]:.2f}", _named(place), f"{rows[-1][1]:.4f}", _named(amplitude)
-        grid.add_row(word, *shown)
+        shown.append((word, f"{rows[-1][0]:.2f}", _named(place), f"{rows[-1][1]:.4f}", _named(amplitude)))
     if not rows:
         console.print("no special point of which one could say what moves it", highlight=False)
         return []
-    console.print(grid)
+    headings = ["", f"at [{unit}]", f"its place: {family.name}", f"amplitude [{cm}]", f"amplitude of {what} there"]
+    title = "what moves it most: percent for a percent of a parameter"
+    show_table(title, headings, shown, words=headings[::2])
     headings = [f"at [{unit}]", f"amplitude of {what} [{cm}]"]
     headings += [f"{of} by {name} [%/%]" for of in ("place", "amplitude") for name in names]
     return [write_csv(path, dict(zip(headings, np.array(rows).T)))]

@@ -19,11 +19,13 @@ from .common import (
     console,
     folder_of,
     handled,
+    plotted,
     print_error,
     print_written,
     set_option,
+    show_table,
 )
-from .design import leave_if_stopped, overrides_of, search_options, table, write_described
+from .design import leave_if_stopped, overrides_of, search_options, write_described
 
 if TYPE_CHECKING:
     from ..motion import SliderCase, SliderDrive
@@ -96,10 +98,9 @@ def _strategy(chosen: SliderCase) -> tuple[Any, Interrupted | None]:
             raise
         found, stopped = error.strategy, error
     headings = ("mechanism", "what came of it")
-    grid = table(f"{chosen.synthesis.title}: the simplest mechanism", headings, left=headings)
-    for step in found.steps:
-        grid.add_row(step.mechanism, step.reason, style="green" if found.met and step is found.chosen else None)
-    console.print(grid)
+    rows = [(step.mechanism, step.reason) for step in found.steps]
+    styles = ["green" if found.met and step is found.chosen else None for step in found.steps]
+    show_table(f"{chosen.synthesis.title}: the simplest mechanism", headings, rows, words=headings, styles=styles)
     if not found.met:
         print_error(f"note: none meets the tolerance; the nearest is kept: {found.chosen.mechanism}")
     return found.chosen.solution, stopped
@@ -144,8 +145,7 @@ def _print_motions(title: str, solutions: Sequence[Solution]) -> None:
         "guide [deg]",
         "angle at C [deg]",
     )
-    grid = table(f"{title}: {quality_name(task)}", headings, left=("pivot",))
-    grid.columns[0].no_wrap = grid.columns[-1].no_wrap = True
+    rows = []
     for s in solutions:
         pivot = s.linkage.pivot
         words, motion = "fixed", ["", "", "", ""]
@@ -157,28 +157,16 @@ def _print_motions(title: str, solutions: Sequence[Solution]) -> None:
                 *(f"{1e3 * greatest(s.linkage, k):.5g}" for k in (1, 2)),
                 f"{degrees(pivot.guide_angle):.2f}",
             ]
-        grid.add_row(
-            words,
-            f"{factor * s.error:.5g}",
-            f"{scale * s.evaluation.worst:.4g}",
-            *motion,
-            format_transmission(s.verdicts),
-            style=None if s.verdicts.sound else "yellow",
-        )
-    console.print(grid)
+        errors = (f"{factor * s.error:.5g}", f"{scale * s.evaluation.worst:.4g}")
+        rows.append((words, *errors, *motion, format_transmission(s.verdicts)))
+    styles = [None if s.verdicts.sound else "yellow" for s in solutions]
+    title = f"{title}: {quality_name(task)}"
+    show_table(title, headings, rows, words=("pivot",), unwrapped=(headings[0], headings[-1]), styles=styles)
 
 
 def _write_solution(solution: Solution, folder: Path, title: str, plots: bool) -> list[Path]:
     written = write_described(solution, folder, title, curve="curve", text="report", drawn="linkage")
-    return written + _plotted(plots, solution, folder / "linkage.png", title=title)
-
-
-def _plotted(plots: bool, result: Any, path: Path, **options: Any) -> list[Path]:
-    """The picture of a result, where pictures are wanted."""
-    from .. import figures
-    from ..files import save_figure
-
-    return [save_figure(figures.plot(result, **options), path)] if plots else []
+    return written + plotted(plots, solution, folder / "linkage.png", title=title)
 
 
 def _motion_columns(series: FourierSeries, rotation: Any) -> dict[str, Any]:
@@ -212,7 +200,7 @@ def _dynamics(chosen: SliderCase, solution: Solution, folder: Path, plots: bool)
         save_parameters(folder / "five-bar-parameters.toml", drive.parameters),
         write_tables(folder / "five-bar.toml", run_case(drive, title, "force.csv")),
     ]
-    written += _plotted(plots, drive, folder / "motion.png", title=title)
+    written += plotted(plots, drive, folder / "motion.png", title=title)
     if chosen.tracking is not None:
         written += _tracking(chosen, drive, folder, plots)
     if chosen.least_effort is not None:
@@ -278,7 +266,7 @@ def _tracking(chosen: SliderCase, drive: SliderDrive, folder: Path, plots: bool)
         "power [W]": run.power,
     }
     written = [write_csv(folder / "tracking.csv", columns)]
-    return written + _plotted(plots, run, folder / "tracking.png")
+    return written + plotted(plots, run, folder / "tracking.png")
 
 
 def _effort(chosen: SliderCase, drive: SliderDrive, linkage: Linkage, folder: Path, plots: bool) -> list[Path]:
@@ -308,4 +296,4 @@ def _effort(chosen: SliderCase, drive: SliderDrive, linkage: Linkage, folder: Pa
         f"departure [{'rad' if unit == 'deg' else 'm'}]": least.error,
     }
     written = [write_csv(folder / "least-effort.csv", columns)]
-    return written + _plotted(plots, least, folder / "least-effort.png", before=drive)
+    return written + plotted(plots, least, folder / "least-effort.png", before=drive)

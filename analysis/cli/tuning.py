@@ -18,6 +18,7 @@ from .common import (
     handled,
     out_option,
     plot_option,
+    plotted,
     print_error,
     print_written,
     say,
@@ -49,8 +50,7 @@ def tune(case: str, settings: Sequence[str], as_json: bool, plot: bool, out: str
     """
     import json
 
-    from .. import figures
-    from ..files import save_figure, write_tables
+    from ..files import write_tables
     from ..tuning import load_tuning_case
     from ..tuning import tune as find
 
@@ -68,8 +68,7 @@ def tune(case: str, settings: Sequence[str], as_json: bool, plot: bool, out: str
         write_tables(f"{stem}.toml", chosen.tuned_tables(tuned)),
         write_tables(f"{stem}.json", tables),
     ]
-    if plot:
-        written.append(save_figure(figures.plot(tuned, title=chosen.title), f"{stem}.png"))
+    written += plotted(plot, tuned, f"{stem}.png", title=chosen.title)
     if not as_json:
         print_written(written)
     for sentence in tuned.missed:

@@ -6,8 +6,6 @@ from typing import Any
 
 import click
 import numpy as np
-from rich.markup import escape
-from rich.table import Table
 
 from linkwork.errors import InputError, LinkworkError, ParameterError
 from linkwork.parameters import field_name
@@ -179,24 +177,17 @@ def _ends(parameters: Any, vary: str, low: str | None, high: str | None, natural
 
 
 def _branches(title: str, response: Any, factor: float, unit: str) -> None:
-    grid = Table(title=f"{title}: periodic motions over {response.family.name}", title_justify="left")
     events_heading = f"what happens on it, at [{unit}]"
-    for heading in ("branch", "turns", "points", f"from [{unit}]", f"to [{unit}]", "motion", events_heading):
-        grid.add_column(escape(heading), justify="left" if heading.startswith("what") else "right")
+    headings = ("branch", "turns", "points", f"from [{unit}]", f"to [{unit}]", "motion", events_heading)
+    rows = []
     for number, branch in enumerate(response.branches, start=1):
         words = [s.value for s in branch.stability()]
         shares = ", ".join(f"{words.count(word) / len(words):.0%} {word}" for word in dict.fromkeys(words))
         events = [f"{s.kind.value} at {factor * s.parameter:.6g} ({_form(response.family, s)})" for s in branch.special]
-        grid.add_row(
-            str(number),
-            str(branch.turns),
-            str(len(branch)),
-            f"{factor * branch.parameter[0]:.6g}",
-            "closed" if branch.closed else f"{factor * branch.parameter[-1]:.6g}",
-            shares,
-            "; ".join(events),
-        )
-    console.print(grid)
+        begins, ends = (f"{factor * branch.parameter[end]:.6g}" for end in (0, -1))
+        ends = "closed" if branch.closed else ends
+        rows.append((str(number), str(branch.turns), str(len(branch)), begins, ends, shares, "; ".join(events)))
+    show_table(f"{title}: periodic motions over {response.family.name}", headings, rows, words=headings[-1:])
 
 
 def _form(family: Any, special: Any) -> str:
@@ -221,23 +212,23 @@ def _extrema(response: Any, factor: float, unit: str, table: Any) -> None:
         console.print("the amplitude has neither a maximum nor a minimum inside the range", highlight=False)
         return
     what, size, cm = swing_of(response.branches[0].orbits[0])
-    grid = Table(title=f"where the amplitude of {what} is largest and least", title_justify="left")
     names = () if table is None else tuple(table.amplitudes)
-    for heading in ("", f"at [{unit}]", f"amplitude [{cm}]", "motion", *(f"{name} [{cm}]" for name in names)):
-        grid.add_column(escape(heading), justify="left" if heading in ("", "motion") else "right")
+    headings = ("", f"at [{unit}]", f"amplitude [{cm}]", "motion", *(f"{name} [{cm}]" for name in names))
     if table is not None and _friction(response.family.parameters):
         console.print("the approximations are of the mechanism without its Coulomb friction", highlight=False)
     entries.sort(key=lambda entry: entry[1].parameter)
     beside = [] if table is None else list(table.at([extremum.parameter for _, extremum in entries]).values())
-    for number, (word, extremum) in enumerate(entries):
-        grid.add_row(
+    rows = [
+        (
             word,
             f"{factor * extremum.parameter:.2f}",
             f"{size * extremum.amplitude:.4f}",
             extremum.stability.value,
             *(f"{size * values[number]:.4f}" for values in beside),
         )
-    console.print(grid)
+        for number, (word, extremum) in enumerate(entries)
+    ]
+    show_table(f"where the amplitude of {what} is largest and least", headings, rows, words=("", "motion"))
 
 
 def _avoid(response: Any, factor: float, unit: str) -> None:
@@ -401,40 +392,26 @@ def _regions(found: Any) -> None:
             f"up to {found.most} stable motions were found at one point of the lines searched: --coexisting shows where"
         )
     say("; ".join(sentences))
-    grid = Table(title="boundaries of instability", title_justify="left")
-    for heading in ("motion", "kind", f"{x.name} [{x.unit}]", f"{y.name} [{y.unit}]", "ends because"):
-        grid.add_column(escape(heading))
+    rows = []
     for traced in found.boundaries:
-        points = traced.points
         spans = [
-            f"{axis.factor * points[:, i].min():.6g} to {axis.factor * points[:, i].max():.6g}"
-            for i, axis in enumerate(found.axes)
+            f"{axis.factor * values.min():.6g} to {axis.factor * values.max():.6g}"
+            for axis, values in zip(found.axes, traced.points.T)
         ]
-        grid.add_row(
-            traced.motion, traced.kind.value, *spans, "; ".join(dict.fromkeys(str(end) for end in traced.ends))
-        )
-    if found.boundaries:
-        console.print(grid)
+        ends = "; ".join(dict.fromkeys(map(str, traced.ends)))
+        rows.append((traced.motion, traced.kind.value, *spans, ends))
+    if rows:
+        headings = ("motion", "kind", f"{x.name} [{x.unit}]", f"{y.name} [{y.unit}]", "ends because")
+        show_table("boundaries of instability", headings, rows, words=headings)
     for removal in found.removals:
         console.print(removal, highlight=False, soft_wrap=True)
 
 
 def _runs(found: Any) -> None:
     x, y = found.axes
-    grid = Table(title="confirmed by long nonlinear runs", title_justify="left")
-    for heading in (
-        f"{x.name} [{x.unit}]",
-        f"{y.name} [{y.unit}]",
-        "verdict",
-        "multiplier",
-        "run",
-        "growth a turn",
-        "",
-    ):
-        grid.add_column(escape(heading))
-    for run in found.runs:
-        c = run.confirmation
-        grid.add_row(
+    headings = (f"{x.name} [{x.unit}]", f"{y.name} [{y.unit}]", "verdict", "multiplier", "run", "growth a turn", "")
+    rows = [
+        (
             f"{x.factor * run.x:.6g}",
             f"{y.factor * run.y:.6g}",
             c.verdict.stability.value,
@@ -443,4 +420,6 @@ def _runs(found: Any) -> None:
             f"{c.growth:.6f}",
             "agrees" if c.agrees else "DOES NOT AGREE",
         )
-    console.print(grid)
+        for run, c in ((run, run.confirmation) for run in found.runs)
+    ]
+    show_table("confirmed by long nonlinear runs", headings, rows, words=headings)
