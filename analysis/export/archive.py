@@ -49,10 +49,7 @@ class BuildError(LinkworkError):
 def write(entries: Mapping[str, bytes], target: Path) -> Path:
     """Write an FMU: deflated, in order, with fixed times; in place only if it is valid.
 
-    Raises
-    ------
-    BuildError
-        If it is not valid.
+    Raises BuildError if it is not valid.
     """
     # moved into place whole: a reader never sees half an FMU, and a failed build leaves the old one
     part = target.with_suffix(".part.fmu")

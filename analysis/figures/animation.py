@@ -16,12 +16,7 @@ from .style import Figure
 
 
 def check_frames(frames: int) -> None:
-    """Make sure that there are frames enough to move.
-
-    Raises
-    ------
-    InputError
-    """
+    """Make sure that there are frames enough to move; raises InputError if there are not."""
     if frames < 2:
         raise InputError(f"an animation in {frames} frames: there must be at least 2")
 

@@ -63,13 +63,7 @@ class _Pins:
 
 
 def _pins(parameters: FiveBarParameters, crank_angle: float, slider_position: float) -> _Pins:
-    """Where the pins are.
-
-    Raises
-    ------
-    AssemblyError
-        If the links cannot be joined there.
-    """
+    """Where the pins are; raises AssemblyError if the links cannot be joined there."""
     k = parameters.constants()
     try:
         g = kinematics.position(crank_angle, slider_position, k)

@@ -93,12 +93,7 @@ def _pose(parameters: SliderCrankParameters, angle: float, shift: float, factor:
 def _checked_pose(parameters: SliderCrankParameters, angle: float, shift: float, factor: float) -> _Pose:
     """The joints at a configuration that was asked for.
 
-    Raises
-    ------
-    AssemblyError
-        If the rod does not reach the guide there.
-    InputError
-        If angle or shift are not finite.
+    Raises AssemblyError if the rod does not reach the guide there; InputError if angle or shift are not finite.
     """
     for name, value in (("crank angle", angle), ("shift", shift)):
         if not isfinite(value):

@@ -51,13 +51,7 @@ def prepare(path: str | Path) -> Path:
 
 
 def ending_of(path: Path, known: Sequence[str]) -> str:
-    """The ending of a path, in small letters.
-
-    Raises
-    ------
-    InputError
-        If it is not one of those known.
-    """
+    """The ending of a path, in small letters; raises InputError if it is not one of those known."""
     ending = path.suffix.lower()
     if ending not in known:
         endings = f"{', '.join(known[:-1])} or {known[-1]}"
@@ -82,10 +76,7 @@ def whole(path: Path) -> Iterator[Path]:
 def read_text(path: Path) -> str:
     """The text of a file in UTF-8, or in UTF-16 with a byte order mark; of one that ends in ``.gz``, what is packed in it.
 
-    Raises
-    ------
-    InputError
-        If it cannot be read, is no plain file, or is larger than the limit for its kind (LINKWORK_MAX_FILE_MB).
+    Raises InputError if it cannot be read, is no plain file, or is larger than the limit for its kind (LINKWORK_MAX_FILE_MB).
     """
     packed = path.suffix.lower() == ".gz"
     most = limit("FILE_MB", _TEXT.get(Path(path.stem if packed else path).suffix.lower(), _TEXT[""]))
@@ -114,12 +105,7 @@ def read_text(path: Path) -> str:
 def check_plain(path: Path) -> None:
     """Make sure that a path leads to a file, where it leads to anything: devices and pipes may never end.
 
-    Raises
-    ------
-    InputError
-        If it is something else.
-    OSError
-        If it is not there.
+    Raises InputError if it is something else; OSError if it is not there.
     """
     mode = os.stat(path).st_mode
     if not stat.S_ISREG(mode):

@@ -208,10 +208,7 @@ class _Balance:
     def solve(self, guess: FloatArray) -> Equilibrium:
         """Newton's method with halved steps where the imbalance would grow.
 
-        Raises
-        ------
-        EquilibriumError
-            If it does not converge.
+        Raises EquilibriumError if it does not converge.
         """
         q, moved = guess.copy(), np.array(self.its.free)[self.free]
         before = self.imbalance(q[:, None])[0]

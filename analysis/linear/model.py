@@ -369,12 +369,8 @@ def constant_inputs(mechanism: Mechanism, modes: Modes, channels: ArrayLike) -> 
 def evaluate(parameters: Parameters, modes: Modes, states: FloatArray, channels: FloatArray) -> dict[str, FloatArray]:
     """The arrays of `Matrices` at states, shape (s, size), under channels, shape (s, channels), along the first axis.
 
-    Raises
-    ------
-    InputError
-        If a state or a channel is not finite, or nothing is free.
-    AssemblyError
-        If the links cannot be joined at a state.
+    Raises InputError if a state or a channel is not finite, or nothing is free; AssemblyError if the links cannot be joined at
+    a state.
     """
     mechanism = mechanism_of(parameters)
     its, p, n = layout(mechanism, modes), parameters.constants(), len(states)
@@ -423,10 +419,7 @@ def channels_along(
 ) -> tuple[Modes, FloatArray]:
     """Modes and channels, shape (s, channels), under inputs at times and states.
 
-    Raises
-    ------
-    InputError
-        If the inputs are another mechanism's or not finite, or command a rate that is not that of the states.
+    Raises InputError if the inputs are another mechanism's or not finite, or command a rate that is not that of the states.
     """
     inputs, _ = given(mechanism, inputs, None)
     encoded = encode(inputs, mechanism)

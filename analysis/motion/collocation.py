@@ -114,13 +114,7 @@ class Collocation:
 
 
 def check_choice(name: str, choice: str, known: Sequence[str]) -> None:
-    """Make sure that a choice is one of those there are.
-
-    Raises
-    ------
-    InputError
-        If it is not.
-    """
+    """Make sure that a choice is one of those there are; raises InputError if it is not."""
     if choice not in known:
         raise InputError(f"{name} is {choice!r}: it must be one of {', '.join(known)}")
 
@@ -149,10 +143,7 @@ class Mesh:
     def of_motion(cls, problem: Problem, slider: FourierSeries, intervals: int) -> Mesh:
         """The mesh along a motion, with the force of inverse dynamics.
 
-        Raises
-        ------
-        AssemblyError
-            If the links cannot be joined along it.
+        Raises AssemblyError if the links cannot be joined along it.
         """
         p, w = problem.parameters, problem.crank_speed
         drive = inverse_dynamics(p, slider, w, load=problem.load, samples=max(256, 4 * slider.order))
@@ -329,10 +320,7 @@ class Problem:
     def within(self) -> FourierSeries:
         """A motion to start from: over a grid, the one of least travel that keeps the bound, or nearly.
 
-        Raises
-        ------
-        UnattainableError
-            If at some crank angle no slider position keeps the bound.
+        Raises UnattainableError if at some crank angle no slider position keeps the bound.
         """
         p = self.parameters
         theta = 2.0 * pi * np.arange(ANGLES) / ANGLES

@@ -203,12 +203,8 @@ def slider_force(
 ) -> float:
     """Slider force F2 (N) that gives the slider an acceleration u'' (m/s2) at a constant crank speed.
 
-    Raises
-    ------
-    ValueError, ZeroDivisionError
-        If the links cannot be joined there.
-    InputError
-        If there is friction by contact forces.
+    Raises ValueError, ZeroDivisionError if the links cannot be joined there; InputError if there is friction by contact
+    forces.
     """
     require_no_contact_friction(p, "a prescribed motion of the slider")
     g = kinematics.position(th2, u, p)
@@ -283,38 +279,20 @@ def inverse_dynamics(
 
 
 def check_speed(crank_speed: float) -> None:
-    """Make sure that a constant crank speed (rad/s) is one.
-
-    Raises
-    ------
-    InputError
-        If it is zero or not finite.
-    """
+    """Make sure that a constant crank speed (rad/s) is one; raises InputError if it is zero or not finite."""
     if not (isfinite(crank_speed) and crank_speed != 0.0):
         raise InputError(f"crank speed is {crank_speed} rad/s: it must be finite and not zero")
 
 
 def whole(value: float, what: str) -> int:
-    """Make sure that a number of something is a whole one.
-
-    Raises
-    ------
-    InputError
-        If it is not.
-    """
+    """Make sure that a number of something is a whole one; raises InputError if it is not."""
     if not float(value).is_integer():
         raise InputError(f"{value} {what}: it must be a whole number")
     return int(value)
 
 
 def load_at(load: Load, crank_angle: float) -> tuple[float, float]:
-    """The load at P (N, N) at a crank angle (rad).
-
-    Raises
-    ------
-    InputError
-        If it is not two finite numbers.
-    """
+    """The load at P (N, N) at a crank angle (rad); raises InputError if it is not two finite numbers."""
     given = load(crank_angle) if callable(load) else load
     try:
         fx, fy = (float(part) for part in given)

@@ -198,13 +198,7 @@ def _forces(mechanism: Mechanism) -> str:
 
 
 def require_acting(drive: Drive, mechanism: Mechanism, channel: Channel) -> None:
-    """Make sure that a channel acts under a drive.
-
-    Raises
-    ------
-    InputError
-        If the freedom is driven otherwise.
-    """
+    """Make sure that a channel acts under a drive; raises InputError if the freedom is driven otherwise."""
     mode = mechanism.freedoms[channel.freedom].mode if channel.freedom >= 0 else None
     chosen = "" if mode is None else drive.arguments(mechanism)[mode.name]
     if mode is not None and chosen != channel.argument:

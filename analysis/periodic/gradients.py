@@ -436,10 +436,7 @@ _Step = Callable[[MotionGradient], tuple[FloatArray, float]]
 def _located(orbit: PeriodicOrbit, along: str, step_of: _Step, what: str) -> PeriodicOrbit:
     """The motion at the special point near a motion, by Newton's method.
 
-    Raises
-    ------
-    LinkworkError
-        If Newton's method goes elsewhere.
+    Raises LinkworkError if Newton's method goes elsewhere.
     """
     begun = value_of(orbit.parameters, orbit.drive, along)
     for _ in range(_STEPS):

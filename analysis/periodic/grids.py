@@ -183,13 +183,7 @@ def _compute_row(guesses: NDArray[np.float64], tolerance: float, row: Sequence[O
 
 
 def axes_of(x: ArrayLike, y: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Values of the axes of a grid.
-
-    Raises
-    ------
-    InputError
-        If an axis is empty or not finite.
-    """
+    """Values of the axes of a grid; raises InputError if an axis is empty or not finite."""
     xs, ys = (np.array(axis, dtype=float, ndmin=1) for axis in (x, y))
     for name, axis in (("x", xs), ("y", ys)):
         if axis.ndim != 1 or len(axis) == 0 or not np.isfinite(axis).all():

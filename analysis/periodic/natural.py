@@ -20,13 +20,7 @@ MASS_SAMPLES = 1024
 
 
 def first_freedom(mechanism: Mechanism) -> int:
-    """Number of the first freedom that is not the crank's.
-
-    Raises
-    ------
-    ParameterError
-        If there is none.
-    """
+    """Number of the first freedom that is not the crank's; raises ParameterError if there is none."""
     crank = crank_of(mechanism).freedom
     for number in range(len(mechanism.freedoms)):
         if number != crank:

@@ -391,10 +391,7 @@ def approach(
 def guess_of(flow: Flow, drive: Drive, start: ArrayLike | None) -> NDArray[np.float64]:
     """Where Newton's method begins: ``start``, checked; without it all at zero, at a speed that a motor may have.
 
-    Raises
-    ------
-    InputError
-        If ``start`` does not have the components of the state, or is missing and needed.
+    Raises InputError if ``start`` does not have the components of the state, or is missing and needed.
     """
     if start is None:
         guess = np.zeros(flow.size)
@@ -415,13 +412,7 @@ def guess_of(flow: Flow, drive: Drive, start: ArrayLike | None) -> NDArray[np.fl
 
 
 def require_turns(turns: int) -> None:
-    """Make sure that a period can have so many turns.
-
-    Raises
-    ------
-    InputError
-        If it cannot.
-    """
+    """Make sure that a period can have so many turns; raises InputError if it cannot."""
     if turns < 1 or turns != int(turns):
         raise InputError(f"turns is {turns}: a period has a whole number of them, at least one")
 

@@ -61,10 +61,7 @@ class PeriodPath:
     ) -> Ends:
         """Follow the plant from the beginnings of the pieces, at a value of lambda: see `pieces_from`.
 
-        Raises
-        ------
-        OrbitError
-            If a piece cannot be followed.
+        Raises OrbitError if a piece cannot be followed.
         """
         self._pause -= 1
         if drive.speed_drive and self.smooth and self._pause < 0:

@@ -227,10 +227,7 @@ def undetermined(turn: ForceTurn, quantity: str) -> NDArray[np.bool_]:
 def check_names(names: Sequence[str], known: Collection[str], kind: str) -> None:
     """Make sure that there are quantities or errors of these names.
 
-    Raises
-    ------
-    UnknownNameError
-        If one is not among the known.
+    Raises UnknownNameError if one is not among the known.
     """
     for name in names:
         if name not in known:

@@ -73,13 +73,7 @@ def unit_table(units: str) -> Mapping[str, tuple[str, float]]:
 
 
 def check_joint(name: str, frame: int) -> None:
-    """Make sure that there are such a force or moment and such a frame.
-
-    Raises
-    ------
-    InputError
-        If there are not.
-    """
+    """Make sure that there are such a force or moment and such a frame; raises InputError if there are not."""
     if name not in JOINTS:
         raise unknown_name(name, JOINTS, f"joint force or moment {name!r}")
     if frame not in FRAMES:

@@ -364,10 +364,7 @@ def _spread(rows: Sequence[tuple[Any, ...]], poles: NDArray[np.bool_]) -> Spread
 def _check_samples(parameters: SliderCrankParameters, drawn: Mapping[str, FloatArray]) -> None:
     """Make sure that every sample is a mechanism, as `SliderCrankParameters` does of one.
 
-    Raises
-    ------
-    InputError
-        If some are none: which tolerances make them, and how many.
+    Raises InputError if some are none: which tolerances make them, and how many.
     """
     values: dict[str, Any] = {field.name: getattr(parameters, field.name) for field in fields(parameters)}
     for name, x in drawn.items():

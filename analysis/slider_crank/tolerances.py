@@ -192,13 +192,7 @@ tolerance_effects = estimate
 
 
 def check_tolerances(tolerances: Sequence[Tolerance]) -> tuple[str, ...]:
-    """Names of the tolerances.
-
-    Raises
-    ------
-    InputError
-        If there is none, or two of the same name.
-    """
+    """Names of the tolerances; raises InputError if there is none, or two of the same name."""
     names = tuple(t.name for t in tolerances)
     if not names:
         raise InputError("there is no tolerance: give at least one")

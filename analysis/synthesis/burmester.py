@@ -178,13 +178,7 @@ def guidance(task: Task, count: int = 6) -> Guidance | GuidanceMap:
 
 
 def _poses(task: Task) -> tuple[Poses, ComplexArray, FloatArray]:
-    """Places and angles, of which there must be four or five.
-
-    Raises
-    ------
-    InputError
-        As `guidance`.
-    """
+    """Places and angles, of which there must be four or five; raises InputError as `guidance`."""
     if not isinstance(task, PrecisionPoints | Motion) or task.angle is None:
         raise InputError(f"{type(task).__name__}: poses are wanted, points with the body's angle at each")
     if task.rotation is not None:
@@ -254,10 +248,7 @@ _FORMS = _forms()
 def _kernel(rows: FloatArray, size: int) -> FloatArray:
     """A basis of the vectors for which all rows are zero, in columns.
 
-    Raises
-    ------
-    InputError
-        If there are more than ``size`` of them.
+    Raises InputError if there are more than ``size`` of them.
     """
     _, values, right = np.linalg.svd(rows)
     if values[-1] < INDEPENDENT * values[0]:
@@ -392,10 +383,7 @@ def dyads_of_four(p: ComplexArray, angle: FloatArray) -> tuple[ComplexArray, Com
     The condition that three lines in m meet is a cubic in z that vanishes at the pole of two poses: a line through it meets the
     curve twice more.
 
-    Raises
-    ------
-    InputError
-        If the poses are not independent.
+    Raises InputError if the poses are not independent.
     """
     rows = _conditions(p, angle)
     _kernel(rows, 4)

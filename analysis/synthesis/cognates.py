@@ -141,13 +141,7 @@ def _ratio(linkage: Linkage) -> complex:
 
 
 def _place_on_coupler(linkage: Linkage) -> complex:
-    """(P - B)/(C - B).
-
-    Raises
-    ------
-    ParameterError
-        As `cognates`.
-    """
+    """(P - B)/(C - B); raises ParameterError as `cognates`."""
     if linkage.pivot is not None or linkage.slides:
         raise ParameterError("pivot", linkage.pivot, "be fixed: only a four-bar has cognates")
     if not _off_pins(linkage):

@@ -224,10 +224,7 @@ class Way(NamedTuple):
     def ends(self, what: str) -> tuple[float, float]:
         """First and last crank angle of a turn, or crank rotation of the task.
 
-        Raises
-        ------
-        InputError
-            If neither is known.
+        Raises InputError if neither is known.
         """
         if self.turn:
             return 0.0, 2.0 * pi
@@ -235,13 +232,7 @@ class Way(NamedTuple):
         return float(rotation.min()), float(rotation.max())
 
     def timed(self, what: str) -> FloatArray:
-        """The task's crank rotations.
-
-        Raises
-        ------
-        InputError
-            If it gives none.
-        """
+        """The task's crank rotations; raises InputError if it gives none."""
         if self.rotation is None:
             raise InputError(f"{what} needs crank rotations, and the task gives none")
         return self.rotation
@@ -398,12 +389,8 @@ def limits_of(
 ) -> Limits:
     """Bounds and constraints of a task in normal form, of a four-bar or a slider-crank.
 
-    Raises
-    ------
-    ParameterError
-        If a bound does not have the name of a dimension, or its ends are in the wrong order.
-    InfeasibleError
-        If they contradict one another.
+    Raises ParameterError if a bound does not have the name of a dimension, or its ends are in the wrong order; InfeasibleError
+    if they contradict one another.
     """
     if not isinstance(bounds, Mapping | None):
         raise InputError(f"bounds are {bounds!r}: they must be a mapping from a dimension's name to its two ends")

@@ -145,10 +145,7 @@ def _links(th2: FloatArray, th4: FloatArray, crank_phase: float, mounting: float
 
     A link of negative length is one that points the other way.
 
-    Raises
-    ------
-    InputError
-        If the points leave infinitely many linkages.
+    Raises InputError if the points leave infinitely many linkages.
     """
     rows = _rows(th2, th4)
     scale = np.linalg.svd(rows[:, :3], compute_uv=False)

@@ -123,12 +123,8 @@ def limits_of_kinds(
 ) -> list[Limits]:
     """Bounds and constraints of the searches: one for each kind, or the usual one, of geared five-bars one for each ratio.
 
-    Raises
-    ------
-    InputError
-        If a kind is none, cannot do the task, or has no such constraint.
-    ParameterError, InfeasibleError
-        As `limits_of`.
+    Raises InputError if a kind is none, cannot do the task, or has no such constraint; ParameterError, InfeasibleError as
+    `limits_of`.
     """
     kinds = usual_kinds(task) if kinds is None else kinds
     if isinstance(kinds, str) or not kinds:

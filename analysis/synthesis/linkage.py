@@ -109,10 +109,7 @@ class SliderMotion:
 def geared(ratio: float) -> tuple[int, int]:
     """Turns k of the first crank and m of the second until both are where they were: the ratio is m/k.
 
-    Raises
-    ------
-    ParameterError
-        If it is not zero and no ratio of whole numbers up to six.
+    Raises ParameterError if it is not zero and no ratio of whole numbers up to six.
     """
     if isfinite(ratio):
         near = Fraction(ratio).limit_denominator(TEETH)

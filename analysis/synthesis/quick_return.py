@@ -109,10 +109,7 @@ class QuickSwing(RockerFunction):
 def _advance(time_ratio: float) -> float:
     """By how much the slow part of a turn is more than half of one (rad).
 
-    Raises
-    ------
-    ParameterError
-        If the time ratio is not a finite number of 1 or more.
+    Raises ParameterError if the time ratio is not a finite number of 1 or more.
     """
     if not (isfinite(time_ratio) and time_ratio >= 1.0):
         raise ParameterError("time ratio", time_ratio, "be a finite number of 1 or more")
@@ -124,12 +121,8 @@ def quick_returns(
 ) -> tuple[Solution, ...]:
     """The linkage with the greatest least transmission angle, in either assembly.
 
-    Raises
-    ------
-    InputError
-        If a bound or a constraint is none that this can keep.
-    InfeasibleError
-        If there is none; it says what transmission angle can be had.
+    Raises InputError if a bound or a constraint is none that this can keep; InfeasibleError if there is none; it says what
+    transmission angle can be had.
     """
     for c in constraints:
         if not isinstance(c, LeastTransmission | FullTurn | LargestLink | Assembly):

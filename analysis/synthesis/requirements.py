@@ -38,10 +38,7 @@ def requirement(text: Any, name: str = "constraints.require") -> Require:
     or without (SI), ``+ - * / **``, brackets, ``pi`` and functions. It is parsed, and each part either stands on this list or
     is refused.
 
-    Raises
-    ------
-    InputError
-        If it is none; the part that is not is named.
+    Raises InputError if it is none; the part that is not is named.
     """
     if not isinstance(text, str):
         raise ParameterError(name, text, "be a text such as 'crank_length <= 50 mm'")

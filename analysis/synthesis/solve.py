@@ -299,10 +299,8 @@ def improve(
 def _as_sought(task: Task, constraints: Sequence[Any], pivot: PivotUnknown | None, search: Search) -> Task:
     """The task as it is searched for: of the greatest error, where that is bounded and something else made small.
 
-    Raises
-    ------
-    InputError
-        If what is asked is about a four-bar, and the pivot moved, or the method can make nothing but errors small.
+    Raises InputError if what is asked is about a four-bar, and the pivot moved, or the method can make nothing but errors
+    small.
     """
     demands = [c for c in constraints if isinstance(c, Demand)] if isinstance(constraints, Sequence) else []
     if demands and pivot is not None:
@@ -344,10 +342,7 @@ def fitted_form(task: Task, pivot: PivotUnknown | None) -> Normal:
 def _start(of: Linkage | Solution, normal: Normal, pivot: PivotUnknown | None) -> Start:
     """A linkage as a start, its untimed stations at the solution's rotations, or else where it comes nearest to them.
 
-    Raises
-    ------
-    InputError
-        If rotations are needed and cannot be found so, because the path is open.
+    Raises InputError if rotations are needed and cannot be found so, because the path is open.
     """
     linkage, rotation = (of.linkage, of.evaluation.rotation) if isinstance(of, Solution) else (of, None)
     if normal.timed:

@@ -31,11 +31,8 @@ FREEDOM_WEIGHT = 1.4
 def plane_points(points: ArrayLike, what: str, least: int) -> FloatArray:
     """Points as an array of shape (n, 2) of finite numbers, a copy.
 
-    Raises
-    ------
-    InputError
-        If the shape is another, a coordinate is not finite, or there are less than ``least`` points; ``what`` they are is
-        named.
+    Raises InputError if the shape is another, a coordinate is not finite, or there are less than ``least`` points; ``what``
+    they are is named.
     """
     try:
         array = np.array(points, dtype=float)

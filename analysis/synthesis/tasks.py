@@ -474,10 +474,7 @@ class Normal:
 def reweighted(task: Task, weights: ArrayLike | None) -> Task:
     """The task with other weights, where any are given.
 
-    Raises
-    ------
-    InputError
-        If they are not one per target, or the task has none.
+    Raises InputError if they are not one per target, or the task has none.
     """
     if weights is None:
         return task

@@ -44,13 +44,7 @@ class Condition(Protocol):
         """The requirement that it belongs to."""
 
     def value(self, x: FloatArray) -> float:
-        """The function.
-
-        Raises
-        ------
-        LostError
-            If the place is not found.
-        """
+        """The function; raises LostError if the place is not found."""
 
     def slopes(self, x: FloatArray) -> FloatArray:
         """Its derivatives by the changes, shape (k,)."""
@@ -138,10 +132,7 @@ class PeakBeyond:
 def peak(wish: Wish, x: FloatArray, near: Spot) -> tuple[Gradient, Spot]:
     """The level of a resonance, with its derivatives by the parameters that may be changed, and the motion there.
 
-    Raises
-    ------
-    LinkworkError
-        If there is none near.
+    Raises LinkworkError if there is none near.
     """
     orbit = Place(wish, Across.at_level(wish, near, near.level), near).at(x).orbit
     found = extremum_gradient(orbit, wish.over, wish.names)

@@ -254,13 +254,7 @@ class Place:
         self._scale = np.append(scale_of(*wish.operation(spot.x, spot.level), spot.y), wish.size)
 
     def at(self, x: FloatArray) -> Found:
-        """The place with changes in their tolerances.
-
-        Raises
-        ------
-        LostError
-            If it is not found again.
-        """
+        """The place with changes in their tolerances; raises LostError if it is not found again."""
         last = self._last
         moved = np.abs(x - last.x) * self.wish.tolerance
         size = np.maximum(np.abs(self.wish.present), self.wish.tolerance)
@@ -406,10 +400,7 @@ class Centre(Place):
 def centre_of(wish: Wish, folds: Sequence[Spot]) -> Centre:
     """The centre of the closed branch with two folds; a large one is shrunk first, by the least changes that do.
 
-    Raises
-    ------
-    LostError
-        If it cannot be shrunk so far within the bounds of the changes.
+    Raises LostError if it cannot be shrunk so far within the bounds of the changes.
     """
     x, places = folds[0].x, [Place(wish, Lost(Crossing.FOLD), fold) for fold in folds]
     low, high = wish.scaled(wish.low), wish.scaled(wish.high)

@@ -65,10 +65,7 @@ def objective(wish: Wish, x: Any) -> Any:
 def nearest(wish: Wish, conditions: Sequence[Condition], x: FloatArray) -> Answer:
     """Solve from some changes; where no changes keep the conditions, make the sum of the violations least.
 
-    Raises
-    ------
-    LinkworkError
-        If a place is not found even at the start.
+    Raises LinkworkError if a place is not found even at the start.
     """
     answer = _solve(wish, conditions, x, elastic=False)
     if not answer.met and isfinite(answer.total):

@@ -145,12 +145,8 @@ def amplitudes_over(
     All parts of a linear slider equation but its damping are constants and multiples of the inverse square of the speed, so
     that two speeds give them at all others.
 
-    Raises
-    ------
-    InputError
-        As `slider_equation` does; it takes the equation from samples, or in powers of the crank's length.
-    HarmonicBalanceError
-        If the equations are singular at one of the speeds.
+    Raises InputError as `slider_equation` does; it takes the equation from samples, or in powers of the crank's length;
+    HarmonicBalanceError if the equations are singular at one of the speeds.
     """
     _require_order(order)
     w = np.ravel(np.asarray(speeds, dtype=float))[:, None]

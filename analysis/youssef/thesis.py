@@ -78,10 +78,7 @@ class Linkage(NamedTuple):
 def linkage(parameters: FiveBarParameters) -> Linkage:
     """The ratios of a mechanism.
 
-    Raises
-    ------
-    InputError
-        If the coupler has mass, the rocker's centre of mass is off the slider, or gravity or a preload acts.
+    Raises InputError if the coupler has mass, the rocker's centre of mass is off the slider, or gravity or a preload acts.
     """
     for name in ("coupler_mass", "coupler_inertia", "rocker_cog_distance", "gravity", "slider_spring_free_position"):
         if value := getattr(parameters, name):

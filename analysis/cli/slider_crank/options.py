@@ -117,10 +117,7 @@ class _MechanismOptions:
     def choose(self, *, paced: bool) -> Chosen:
         """The mechanism; ``paced`` says whether the speed matters.
 
-        Raises
-        ------
-        LinkworkError
-            If a file, a name or a value is wrong.
+        Raises LinkworkError if a file, a name or a value is wrong.
         """
         from ...files import unknown_name
         from ...run import load_parameters, parameters_from

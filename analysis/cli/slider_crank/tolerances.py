@@ -123,10 +123,7 @@ def _degrees(turn: ForceTurn, i: int) -> float:
 def _in_the_turn(angle: float, chosen: Chosen) -> float:
     """The same crank angle from 0 to 360 deg.
 
-    Raises
-    ------
-    InputError
-        If it is outside of them and the shift there is another than a turn before or after.
+    Raises InputError if it is outside of them and the shift there is another than a turn before or after.
     """
     if 0.0 <= angle <= tau:
         return angle
