@@ -19,7 +19,7 @@ from linkwork.parameters import field_name
 
 from .. import files
 from ..files import Choice, Kinds, Many, Quantity, Reader, Table, entry
-from ..mechanisms import FIVE_BAR, MECHANISMS, PUBLISHED, Parameters, mechanism_of, name_in_files
+from ..mechanisms import MECHANISMS, PUBLISHED, Parameters, mechanism_of, name_in_files
 from ..units import with_unit
 from .arguments import driven, readers_of, turn_of
 from .case import Case
@@ -193,8 +193,7 @@ def case_from(
         None if published is None else published.parameters,
         mechanism,
     )
-    # a five-bar's published start is at rest but for the speed, which the drive gives
-    base = None if published is None or mechanism is FIVE_BAR else published.initial
+    base = None if published is None or published.at_rest else published.initial
     initial = start_from(mechanism, data.get("initial", {}), base)
     readers = {name: _reader(unit, folder) for name, (_, unit) in acting.items()}
     found = _found(data, readers, driving)

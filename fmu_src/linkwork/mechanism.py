@@ -188,12 +188,17 @@ class Drawing(NamedTuple):
 
 
 class PublishedSet(NamedTuple):
-    """A mechanism as printed: parameters, state at the start, the rate of the first freedom that it is run at, source."""
+    """A mechanism as printed: parameters, state at the start, the rate of the first freedom that it is run at, source.
+
+    ``at_rest`` says whether the start is one at rest but for that rate: where something else drives the mechanism it starts at
+    rest then, unless a case file says otherwise.
+    """
 
     parameters: Any
     initial: Any
     crank_speed: float
     source: str
+    at_rest: bool = False
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

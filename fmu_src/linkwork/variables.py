@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from math import pi
-from typing import NamedTuple
+from typing import Any, NamedTuple
+
+from .parameters import field_name
 
 
 class Unit(NamedTuple):
@@ -87,6 +89,50 @@ class Variable(NamedTuple):
     nominal: float | None = None
 
 
+def parameter(start: Any, name: str, unit: str, description: str, symbol: str = "") -> Variable:
+    """A parameter that starts from the same of ``start``, bounded as its ``RULES`` say; people think of angles in degrees."""
+    field = field_name(name)
+    minimum = None if field in start.RULES.free_sign else 0.0
+    display = "deg" if unit == "rad" else ""
+    return Variable(name, "parameter", unit, description, symbol, getattr(start, field), "Real", minimum, None, display)
+
+
+def choice(name: str, description: str, start: int, least: int, greatest: int) -> Variable:
+    """A parameter that is a whole number."""
+    return Variable(name, "parameter", "", description, "", start, "Integer", least, greatest)
+
+
+def speed_inputs(angle: str, start: float) -> tuple[Variable, Variable]:
+    """The commanded speed of the crank and its rate; ``angle`` is the symbol of its angle."""
+    speed = "Crank speed at the start of a step; used where drive.mode is 1"
+    rate = "Rate of change of the crank speed over a step; used where drive.mode is 1"
+    return (
+        Variable("drive.speed", "input", "rad/s", speed, rf"\dot{angle}", start, display="rpm"),
+        Variable("drive.acceleration", "input", "rad/s2", rate, rf"\ddot{angle}"),
+    )
+
+
+def crank_outputs(angle: str) -> tuple[Variable, Variable, Variable]:
+    """Angle, speed and acceleration of the crank; ``angle`` is the symbol of its angle."""
+    return (
+        output("crank.angle", "rad", "Crank angle, counted on over full turns", angle, *POSITION, display="deg"),
+        output("crank.speed", "rad/s", "Crank speed", rf"\dot{angle}", *RATE, display="rpm", rate_of="crank.angle"),
+        output("crank.acceleration", "rad/s2", "Crank acceleration", rf"\ddot{angle}", rate_of="crank.speed"),
+    )
+
+
+def energy_outputs(potential: str, dissipated: str, supplied: str) -> tuple[Variable, ...]:
+    """Energies and their balance; in words what has potential energy, what loses work and what does work."""
+    balance = "Energy balance: gained plus dissipated less supplied; zero but for error"
+    return (
+        output("energy.kinetic", "J", "Kinetic energy of all links", "", *RATE, minimum=0.0),
+        output("energy.potential", "J", f"Potential energy of {potential}", "", "state"),
+        output("energy.dissipated", "J", f"Work lost in {dissipated} since the start", "", "state"),
+        output("energy.supplied", "J", f"Work of {supplied} since the start", "", "speed"),
+        output("energy.residual", "J", balance, "", "speed"),
+    )
+
+
 def output(
     name: str,
     unit: str,
@@ -104,6 +150,10 @@ def output(
     return Variable(
         name, "output", unit, description, symbol, 0.0, "Real", minimum, maximum, display, depends, level, rate_of
     )
+
+
+#: What an output depends on that follows from the positions at the start, and one that follows from the rates too.
+POSITION, RATE = ("state", "position"), ("speed", "velocity")
 
 
 def tolerance_parameter() -> Variable:

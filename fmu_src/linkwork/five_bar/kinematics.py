@@ -141,18 +141,6 @@ def coupler_point_velocity(g: Position, w2: float, w3: float, p: Constants) -> t
     )
 
 
-def coupler_point_acceleration(
-    g: Position, w2: float, w3: float, e2: float, e3: float, p: Constants
-) -> tuple[float, float]:
-    """Acceleration of the coupler point P (m/s2) for the angular accelerations e2 of the crank and e3 of the coupler."""
-    rx = p.xp * g.c3 - p.yp * g.s3
-    ry = p.xp * g.s3 + p.yp * g.c3
-    return (
-        -p.l2 * (g.s2 * e2 + g.c2 * w2 * w2) - ry * e3 - rx * w3 * w3,
-        p.l2 * (g.c2 * e2 - g.s2 * w2 * w2) + rx * e3 - ry * w3 * w3,
-    )
-
-
 def assembly_margin(th2: float, u: float, p: Constants) -> tuple[float, float]:
     """Distances of BD to the limits of assembly (m): l3 + l4 - BD, and BD - |l3 - l4|. Both are positive inside."""
     dx = p.l1 + u * p.ca - p.l2 * cos(th2)

@@ -5,47 +5,44 @@ The start values are the case a4 = 10 in, S1 = 3.5 in, alpha4 = 270 deg of Rahma
 
 from __future__ import annotations
 
+from functools import partial
 from math import pi
 
-from ..parameters import field_name
-from ..variables import Variable, output, status_variables, tolerance_parameter
+from ..variables import (
+    POSITION,
+    RATE,
+    Variable,
+    choice,
+    crank_outputs,
+    energy_outputs,
+    output,
+    parameter,
+    speed_inputs,
+    status_variables,
+    tolerance_parameter,
+)
 from .published import CRANK_SPEED, OFFSET_CASE
 
 _MECHANISM, _INITIAL = OFFSET_CASE
-
-
-def _parameter(
-    name: str, unit: str, description: str, symbol: str = "", *, minimum: float | None = None, display: str = ""
-) -> Variable:
-    start = getattr(_MECHANISM, field_name(name))
-    return Variable(name, "parameter", unit, description, symbol, start, "Real", minimum, None, display)
-
+_parameter = partial(parameter, _MECHANISM)
 
 PARAMETERS = (
-    _parameter("crank.length", "m", "Crank, from its axis to the crank pin; greater than zero", "a_1", minimum=0.0),
-    _parameter("rod.length", "m", "Rod, crank pin to slider pin; greater than zero", "a_2", minimum=0.0),
+    _parameter("crank.length", "m", "Crank, from its axis to the crank pin; greater than zero", "a_1"),
+    _parameter("rod.length", "m", "Rod, crank pin to slider pin; greater than zero", "a_2"),
     _parameter("guide.offset", "m", "Offset between crank axis and guide, along their common normal", "a_4"),
     _parameter(
-        "guide.twist",
-        "rad",
-        "Twist between crank axis and guide; perpendicular at 90 and 270 deg",
-        "\\alpha_4",
-        display="deg",
+        "guide.twist", "rad", "Twist between crank axis and guide; perpendicular at 90 and 270 deg", "\\alpha_4"
     ),
-    _parameter("crank.mass", "kg", "Mass of the crank; greater than zero", "m_1", minimum=0.0),
-    _parameter("rod.mass", "kg", "Mass of the rod", "m_2", minimum=0.0),
-    _parameter("slider.mass", "kg", "Mass of the slider", "m_3", minimum=0.0),
-    _parameter(
-        "crank.inertia", "kg.m2", "Moment of inertia of the crank about its axis; greater than zero", "", minimum=0.0
-    ),
+    _parameter("crank.mass", "kg", "Mass of the crank; greater than zero", "m_1"),
+    _parameter("rod.mass", "kg", "Mass of the rod", "m_2"),
+    _parameter("slider.mass", "kg", "Mass of the slider", "m_3"),
+    _parameter("crank.inertia", "kg.m2", "Moment of inertia of the crank about its axis; greater than zero"),
     _parameter("crank.cog_x", "m", "Centre of mass of the crank, from the axis towards the crank pin"),
     _parameter("crank.cog_y", "m", "Centre of mass of the crank, across axis and crank"),
     _parameter("crank.cog_z", "m", "Centre of mass of the crank, along the axis from the plane of the crank pin"),
     _parameter("crank.product_xz", "kg.m2", "Product of inertia of the crank: integral of x z over its mass"),
     _parameter("crank.product_yz", "kg.m2", "Product of inertia of the crank: integral of y z over its mass"),
-    _parameter(
-        "rod.inertia", "kg.m2", "Moment of inertia of the rod, transverse, about its centre of mass", "", minimum=0.0
-    ),
+    _parameter("rod.inertia", "kg.m2", "Moment of inertia of the rod, transverse, about its centre of mass"),
     _parameter("rod.cog_distance", "m", "Centre of mass of the rod, distance from the crank pin"),
     _parameter(
         "slider.cog_x", "m", "Centre of mass of the slider from its pin, along the common normal (i of frame 4)"
@@ -54,54 +51,34 @@ PARAMETERS = (
     _parameter(
         "slider.cog_z", "m", "Centre of mass of the slider from its pin, along the guide against its position (k)"
     ),
-    _parameter("slider.stiffness", "N/m", "Stiffness of the spring on the slider", minimum=0.0),
+    _parameter("slider.stiffness", "N/m", "Stiffness of the spring on the slider"),
     _parameter("slider.spring_free_position", "m", "Slider position at which its spring is free"),
-    _parameter("slider.damping", "N.s/m", "Viscous damping of the slider", minimum=0.0),
-    _parameter(
-        "slider.coulomb_friction", "N", "Level of Coulomb friction in the guide, smooth about rest", minimum=0.0
-    ),
-    _parameter("shift.stiffness", "N/m", "Stiffness of the spring on the axial shift", minimum=0.0),
+    _parameter("slider.damping", "N.s/m", "Viscous damping of the slider"),
+    _parameter("slider.coulomb_friction", "N", "Level of Coulomb friction in the guide, smooth about rest"),
+    _parameter("shift.stiffness", "N/m", "Stiffness of the spring on the axial shift"),
     _parameter("shift.spring_free_position", "m", "Axial shift at which its spring is free"),
-    _parameter("shift.damping", "N.s/m", "Viscous damping of the axial shift", minimum=0.0),
+    _parameter("shift.damping", "N.s/m", "Viscous damping of the axial shift"),
     _parameter("groove.amplitude", "m", "Amplitude of the shift that a groove makes; axial.mode 2", "S_{S1}"),
     _parameter("groove.ratio", "1", "Periods of that shift in a turn of the crank; axial.mode 2", "\\alpha"),
     _parameter("gravity.x", "m/s2", "Acceleration of gravity along x of the ground frame"),
     _parameter("gravity.y", "m/s2", "Acceleration of gravity along y of the ground frame"),
     _parameter("gravity.z", "m/s2", "Acceleration of gravity along z of the ground frame, the crank axis"),
-    Variable(
+    choice(
         "assembly.branch",
-        "parameter",
-        "",
         "Assembly: on which side of the crank pin's foot on the guide the slider is, +1 or -1",
-        "",
         _MECHANISM.assembly_branch,
-        "Integer",
         -1,
         1,
     ),
-    Variable(
-        "drive.mode",
-        "parameter",
-        "",
-        "0: drive.torque acts on the crank; 1: the crank turns at drive.speed",
-        "",
-        1,
-        "Integer",
-        0,
-        1,
-    ),
-    Variable(
+    choice("drive.mode", "0: drive.torque acts on the crank; 1: the crank turns at drive.speed", 1, 0, 1),
+    choice(
         "axial.mode",
-        "parameter",
-        "",
         "0: axial.force acts on the crank; 1: the crank shifts at axial.speed; 2: a groove shifts it",
-        "",
         1,
-        "Integer",
         0,
         2,
     ),
-    Variable("initial.crank_angle", "parameter", "rad", "Crank angle at the start", "\\theta_1", 0.0, display="deg"),
+    Variable("initial.crank_angle", "parameter", "rad", "Crank angle at the start", "\\theta_1", display="deg"),
     Variable(
         "initial.crank_speed",
         "parameter",
@@ -131,22 +108,7 @@ PARAMETERS = (
 
 INPUTS = (
     Variable("drive.torque", "input", "N.m", "Torque on the crank, about z; used where drive.mode is 0", "T"),
-    Variable(
-        "drive.speed",
-        "input",
-        "rad/s",
-        "Crank speed at the start of a step; used where drive.mode is 1",
-        "\\dot\\theta_1",
-        CRANK_SPEED,
-        display="rpm",
-    ),
-    Variable(
-        "drive.acceleration",
-        "input",
-        "rad/s2",
-        "Rate of change of the crank speed over a step; used where drive.mode is 1",
-        "\\ddot\\theta_1",
-    ),
+    *speed_inputs("\\theta_1", CRANK_SPEED),
     Variable("axial.force", "input", "N", "Force on the crank along its axis; used where axial.mode is 0"),
     Variable(
         "axial.speed",
@@ -178,46 +140,21 @@ def _vector(
 
 #: The real outputs stand in the order of `dynamics.Outputs`.
 OUTPUTS = (
-    output(
-        "crank.angle", "rad", "Crank angle, counted on over full turns", "\\theta_1", "state", "position", display="deg"
-    ),
-    output(
-        "crank.speed",
-        "rad/s",
-        "Crank speed",
-        "\\dot\\theta_1",
-        "speed",
-        "velocity",
-        display="rpm",
-        rate_of="crank.angle",
-    ),
-    output("crank.acceleration", "rad/s2", "Crank acceleration", "\\ddot\\theta_1", rate_of="crank.speed"),
-    output("shift.position", "m", "Axial shift of the crank", "S_1", "state", "position"),
-    output(
-        "shift.velocity",
-        "m/s",
-        "Axial velocity of the crank",
-        "\\dot S_1",
-        "speed",
-        "velocity",
-        rate_of="shift.position",
-    ),
+    *crank_outputs("\\theta_1"),
+    output("shift.position", "m", "Axial shift of the crank", "S_1", *POSITION),
+    output("shift.velocity", "m/s", "Axial velocity of the crank", "\\dot S_1", *RATE, rate_of="shift.position"),
     output("shift.acceleration", "m/s2", "Axial acceleration of the crank", "\\ddot S_1", rate_of="shift.velocity"),
-    output(
-        "slider.position", "m", "Slider position along the guide, from the common normal", "S_4", "state", "position"
-    ),
-    output("slider.velocity", "m/s", "Slider velocity", "\\dot S_4", "speed", "velocity", rate_of="slider.position"),
+    output("slider.position", "m", "Slider position along the guide, from the common normal", "S_4", *POSITION),
+    output("slider.velocity", "m/s", "Slider velocity", "\\dot S_4", *RATE, rate_of="slider.position"),
     output("slider.acceleration", "m/s2", "Slider acceleration", "\\ddot S_4", rate_of="slider.velocity"),
-    *_vector("crank_pin.", "m", "Crank pin", "state", "position"),
-    *_vector("slider_pin.", "m", "Slider pin", "state", "position"),
-    *_vector("rod.w", "rad/s", "Angular velocity of the rod, none about itself", "speed", "velocity"),
+    *_vector("crank_pin.", "m", "Crank pin", *POSITION),
+    *_vector("slider_pin.", "m", "Slider pin", *POSITION),
+    *_vector("rod.w", "rad/s", "Angular velocity of the rod, none about itself", *RATE),
     output(
         "drive.applied_torque", "N.m", "Torque of the drive; where drive.mode is 1 the torque that holds the speed", "T"
     ),
     output(
-        "axial.applied_force",
-        "N",
-        "Force of what drives the shift; where axial.mode is 1 or 2 the force that holds it",
+        "axial.applied_force", "N", "Force of what drives the shift; where axial.mode is 1 or 2 the force that holds it"
     ),
     *_vector("bearing.f", "N", "Force on the crank of bearing, axial drive, shift spring and damper together"),
     *_vector("bearing.m", "N.m", "Moment about O on the crank of bearing, drive and groove together"),
@@ -225,27 +162,18 @@ OUTPUTS = (
     *_vector("slider_pin.f", "N", "Force of the slider on the rod"),
     *_vector("guide.f", "N", "Force of the guide on the slider, across the guide"),
     *_vector("guide.m", "N.m", "Moment of the guide on the slider, about the slider pin"),
-    output("energy.kinetic", "J", "Kinetic energy of all links", "", "speed", "velocity", minimum=0.0),
-    output(
-        "energy.potential",
-        "J",
-        "Potential energy of springs and gravity, the latter zero with every centre of mass at O",
-        "",
-        "state",
+    *energy_outputs(
+        "springs and gravity, the latter zero with every centre of mass at O",
+        "dampers and guide",
+        "crank torque, axial force and slider load",
     ),
-    output("energy.dissipated", "J", "Work lost in dampers and guide since the start", "", "state"),
-    output("energy.supplied", "J", "Work of crank torque, axial force and slider load since the start", "", "speed"),
-    output(
-        "energy.residual", "J", "Energy balance: gained plus dissipated less supplied; zero but for error", "", "speed"
-    ),
-    output("closure.residual", "m", "Length by which the loop fails to close", "", "state", "position", minimum=0.0),
+    output("closure.residual", "m", "Length by which the loop fails to close", "", *POSITION, minimum=0.0),
     output(
         "transmission.angle",
         "rad",
         "Angle between the rod and the plane normal to the guide; 0 at the limit of assembly",
         "",
-        "state",
-        "position",
+        *POSITION,
         minimum=0.0,
         maximum=0.5 * pi,
         display="deg",
@@ -255,8 +183,7 @@ OUTPUTS = (
         "m",
         "Rod length less the crank pin's distance from the guide; positive inside the range of assembly",
         "",
-        "state",
-        "position",
+        *POSITION,
     ),
     *status_variables(),
 )
