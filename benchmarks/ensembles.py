@@ -49,7 +49,7 @@ def best_of_each(runs: list[Callable[[], object]]) -> list[float]:
 
 def times_of(run: Callable[[], object]) -> tuple[float, float]:
     """CPU time of the shortest of several runs, and how much of it is inside the compiled solver (s)."""
-    kernel, spent = compiled.run_many, []
+    kernel, spent = compiled.run, []
 
     def timed(*arguments: object) -> None:
         begun = process_time()
@@ -57,14 +57,14 @@ def times_of(run: Callable[[], object]) -> tuple[float, float]:
         spent.append(process_time() - begun)
 
     times = []
-    compiled.run_many = timed
+    compiled.run = timed
     try:
         for _ in range(REPEATS):
             spent.clear()
             whole = best(run, process_time, 1)
             times.append((whole, sum(spent)))
     finally:
-        compiled.run_many = kernel
+        compiled.run = kernel
     return min(times)
 
 

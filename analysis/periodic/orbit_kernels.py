@@ -21,7 +21,7 @@ from linkwork.limits import LIMIT_SINE, NEAR_LIMIT
 
 from ..numerics.codegen import MATRIX, VECTOR, copy, evaluate, inner, kernel, part
 from ..run.sources import SOURCE, Source
-from ..run.stepping import NODES, STAGES, attempt, following, interpolant, interpolate, shorter, stage
+from ..run.stepping import NODES, STAGES, Flow, attempt, following, interpolant, interpolate, shorter, stage
 from .flows import DIRECTIONAL, GAP, PLAIN, STATE, VARIATIONAL
 
 
@@ -119,16 +119,13 @@ def _clearance(section, angle, z, room):
 def _take(section, source, equation, angle, end, slowest, z, room, carry):
     """A good step from z, its rates in room.k[0], as far as to ``end``: the status and the angle there; z there is room.y."""
     n = section.scale.shape[0]
-    k, y = room.k, room.y
+    flow = Flow(equation, section.modes, section.p, room.sizes)
     proposed = carry[0]
     while True:
         # no sliver of a step before the end
         last = angle + 1.001 * proposed >= end
         h = end - angle if last else proposed
-        error = attempt(
-            equation, section.modes, section.p, room.sizes, 0.0, angle, h, z, k, y, True, 0, source, section.drive
-        )
-        error /= section.tolerance
+        error = attempt(flow, 0.0, angle, h, z, room, section.drive, -1, None) / section.tolerance
         carry[1] += 1.0
         if error <= 1.0:
             break
@@ -138,9 +135,9 @@ def _take(section, source, equation, angle, end, slowest, z, room, carry):
             return (LIMIT if _clearance(section, angle, z, room) < NEAR_LIMIT else NO_STEP), angle
     carry[0] = following(h, proposed, error)
     angle = end if last else angle + h
-    if not _clearance(section, angle, y, room) > LIMIT_SINE:
+    if not _clearance(section, angle, room.y, room) > LIMIT_SINE:
         return LIMIT, angle
-    if section.torque and not y[n - 1] > slowest:
+    if section.torque and not room.y[n - 1] > slowest:
         return STALLED, angle
     return DONE, angle
 

@@ -164,7 +164,7 @@ def _kept(task: Task, prepared: Prepared, heard: Sequence[bool]) -> NDArray[np.f
 
 def _verdicts(task: Task, prepared: Prepared, ends: NDArray[np.float64]) -> tuple[list[int], list[str]]:
     """solver.status and solver.message of each run."""
-    from . import compiled as k
+    from . import records as k
 
     status, messages = [k.FINISHED] * len(ends), [""] * len(ends)
     for i in np.flatnonzero(ends[:, 0] != k.FINISHED).tolist():
@@ -196,7 +196,8 @@ def _integrate(
     ``ends`` gets a row for each run: the compiled code's status, the number of samples, the time of the end (s), the number
     of the channel that was not finite, the state at the end. ``samples`` get the samples, NaN after the end of a run.
     """
-    from . import compiled as k
+    from . import compiled
+    from . import records as k
 
     mechanism, settings, encoded, batch = task.mechanism, task.settings, prepared.encoded, prepared.batch
     m, n = prepared.x.shape[0], len(settings.times)
@@ -210,22 +211,19 @@ def _integrate(
     modes = np.array([float(value) for value in encoded.modes.values()])
     switched = _switched(mechanism, batch.p)
     problem = k.Problem(
-        machine(mechanism, switched).addresses, modes, batch.p[0], batch.scales[0], encoded.commands,
-        settings.tolerance, settings.hold, float(settings.times[-1]), True,
+        machine(mechanism, switched).addresses, modes, encoded.commands, len(mechanism.output_names), settings.tolerance,
+        settings.hold, float(settings.times[-1]),
     )  # fmt: skip
-    held = np.zeros((m, len(mechanism.channels)))
-    carries = np.zeros(m, dtype=k.CARRY)
+    state = k.State(np.zeros(m, dtype=k.CARRY), prepared.x.copy(), np.zeros((m, len(mechanism.channels))))
+    carries = state.carries
     carries["begin"] = settings.times[0]
     status = np.full(m, k.RUNNING)
     status[list(prepared.failures)] = _NO_START
-    laws, x = batch.laws.copy(), prepared.x.copy()
-    own = batch._replace(laws=laws)
+    own, recorded = batch._replace(laws=batch.laws.copy()), k.Samples(settings.times, states, forces)
+    watch = k.watch_nothing(mechanism.size)
     todo = status == k.RUNNING
     while todo.any() and not heard:
-        k.run_many(
-            problem, source, own, carries, x, held, settings.times, states, forces, status,
-            len(mechanism.output_names), settings.max_steps, STEPS_PER_CALL,
-        )  # fmt: skip
+        compiled.run(problem, source, own, watch, state, recorded, status, settings.max_steps, STEPS_PER_CALL)
         todo = (status == k.RUNNING) & (carries["steps"] < settings.max_steps)
     status[todo] = _PAUSED
     counts = carries["sample"]
@@ -242,7 +240,7 @@ def _integrate(
         carries["begin"] + carries["elapsed"],
         carries["lost"],
     )
-    ends[:, 4:] = x
+    ends[:, 4:] = state.x
     return not todo.any()
 
 
@@ -255,7 +253,7 @@ def prepare(task: Task) -> Prepared:
     Runs that come near the limit of assembly or meet a number that is not finite go through `Run.start`, which says why
     they cannot start.
     """
-    from . import compiled as k
+    from . import compiled
 
     mechanism, t = task.mechanism, float(task.settings.times[0])
     encoded, batch = _acting(task)
@@ -265,7 +263,7 @@ def prepare(task: Task) -> Prepared:
     u = np.zeros((len(x), len(mechanism.channels)))
     # users' functions are called as the Python they are, as in `sample`
     source = compiled_source(replace(encoded, functions=((None, None),) * len(encoded.functions)))[0]
-    k.channels_of_many(t, source, batch, x, u)
+    compiled.channels_of_many(t, source, batch, x, u)
     doubtful: set[int] = set()
     if any(chain.from_iterable(encoded.functions)):
         for i in range(len(x)):
@@ -348,7 +346,7 @@ def _elementwise(function: Callable[..., float]) -> Callable[..., NDArray[np.flo
 
 def _acting(task: Task) -> tuple[Encoded, Any]:
     """The inputs of a batch, those of the first run encoded; and of all, as `compiled.Batch` without constants and scales."""
-    from . import compiled as k
+    from . import compiled
 
     times, mechanism = task.settings.times, task.mechanism
     signals = [channel.argument for channel in mechanism.channels if channel.kind != "rate"]
@@ -389,7 +387,7 @@ def _acting(task: Task) -> tuple[Encoded, Any]:
     coefficients = coefficients[which]
     if constant >= 0:
         coefficients[which == constant, 0, :, 0] = [values for _, values in found if values is not None]
-    return kinds[which[0]], k.Batch(
+    return kinds[which[0]], compiled.Batch(
         p=np.empty((0, 0)),
         scales=np.empty((0, 0)),
         steady=np.array([e.steady for e in kinds])[which],

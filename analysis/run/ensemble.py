@@ -347,7 +347,7 @@ def _code(mechanism: Mechanism, parameters: Sequence[Parameters], functions: Ite
     from ..numerics.codegen import fingerprint
     from . import batches, compiled
 
-    kernels = (compiled.run_many, compiled.channels_of_many, compiled.rows)
+    kernels = (compiled.run, compiled.channels_of_many, compiled.rows)
     switched = any(mechanism.switched(p.constants()) for p in parameters)
     ours = [machine(mechanism, switched).fingerprint, inspect.getsource(batches), *map(fingerprint, kernels)]
     return " ".join([*ours, *(fingerprint(f) if f else "" for f in functions)])

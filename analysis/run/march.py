@@ -12,9 +12,10 @@ from scipy.integrate import OdeSolver, solve_ivp
 
 from linkwork.limits import LIMIT_SINE, NEAR_LIMIT
 
-from . import compiled as k
+from . import records as k
 from .events import Event, RunInterrupted, shown
 from .inputs import NotFiniteError, sample
+from .locating import SAME
 from .prepared import Run, verdict
 from .trajectory import Occurrence, Trajectory
 
@@ -236,7 +237,7 @@ class March:
         self.held = self._inputs(self.t, self.x, stop)
         # what happens together with the release or the end of the interval must neither be lost nor be reported twice: what
         # has not been reported by now is left to the beginning of the next one
-        same = k.SAME * (self.t - t0)
+        same = SAME * (self.t - t0)
         just_now = [event for t, event, _ in happened if t >= self.t - same]
         before = self.x - same * self._derivative(self.t, self.x, stop)
         self._gaps = [

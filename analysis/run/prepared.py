@@ -97,20 +97,18 @@ class Run:
         """What acts on the plant, as the equations take it."""
         return self.mechanism.equations.applied(self.modes, tuple(u.tolist()), self.p)
 
-    def problem(self, start: Start) -> Any:
-        """What does not change in the run, as the compiled code reads it."""
-        from .compiled import Problem
+    def problem(self) -> Any:
+        """What runs like it have in common, as the compiled code reads it."""
+        from .records import Problem
 
         return Problem(
             machine(self.mechanism, self.mechanism.switched(self.p)).addresses,
             np.array(self.modes),
-            np.array([*self.p, start.energy]),
-            start.scale,
             self.encoded.commands,
+            len(self.mechanism.output_names),
             self.settings.tolerance,
             self.settings.hold,
             float(self.settings.times[-1]),
-            self.encoded.steady,
         )
 
     def limit(self, x: NDArray[np.float64]) -> str:
@@ -130,7 +128,8 @@ class Run:
         InputError
             As `start`; or if the balance cannot be kept.
         """
-        from . import compiled as k
+        from . import compiled
+        from . import records as k
 
         begun = clock.perf_counter()
         turns = WholeTurns(self.mechanism, self.p, self.modes, self.encoded, self.events)
@@ -139,50 +138,50 @@ class Run:
             turns.take(start.x, sample(self.encoded, float(self.settings.times[0]), start.x, law), law, 0)
             # the balance of energy begins with the angles as they are now
             start = replace(start, energy=self.mechanism.equations.energy(tuple(start.x.tolist()), self.p))
-        problem = self.problem(start)
+        problem = self.problem()
         source, kept = compiled_source(self.encoded)
+        batch = compiled.of_one(source, np.array([*self.p, start.energy]), start.scale, self.encoded.steady)
         watch, watching = self._watch(self._balance() if balanced else ())
         kept += watching
-        times, size = self.settings.times, self.mechanism.size
-        inputs = len(self.mechanism.channels)
-        states, forces = np.full((len(times), size), np.nan), np.full((len(times), inputs), np.nan)
-        held, x = np.zeros(inputs), start.x.copy()
-        carries = np.zeros(1, dtype=k.CARRY)
-        carries["begin"] = times[0]
-        carry = carries[0]
-        status, integrating, most = k.RUNNING, 0.0, self.settings.max_steps
+        times, most = self.settings.times, self.settings.max_steps
+        shape = (1, len(times))
+        samples = k.Samples(
+            times,
+            np.full((*shape, self.mechanism.size), np.nan),
+            np.full((*shape, len(self.mechanism.channels)), np.nan),
+        )
+        state = k.State(np.zeros(1, dtype=k.CARRY), start.x[None].copy(), np.zeros((1, len(self.mechanism.channels))))
+        state.carries["begin"] = times[0]
+        carry, x, u = state.carries[0], state.x[0], state.u[0]
+        status, integrating = np.full(1, k.RUNNING), 0.0
         occurrences: list[list[float]] = []
         with interruptible() as interrupted, shown(progress, times[-1] - times[0]) as show:
             try:
-                while status == k.RUNNING and carry["steps"] < most and not interrupted:
+                while status[0] == k.RUNNING and carry["steps"] < most and not interrupted:
                     entered = clock.perf_counter()
-                    until = min(int(carry["steps"]) + STEPS_PER_CALL, most)
-                    status = k.run(
-                        problem, source, watch, held, carries, x, times, states, forces,
-                        len(self.mechanism.output_names), until,
-                    )  # fmt: skip
+                    compiled.run(problem, source, batch, watch, state, samples, status, most, STEPS_PER_CALL)
                     integrating += clock.perf_counter() - entered
                     found = watch.found[: carry["found"]]
                     found[:, 2:] += turns.taken
                     occurrences += found.tolist()
                     carry["found"] = 0
                     show(carry["begin"] + carry["elapsed"] - times[0])
-                    if status == k.RUNNING:
-                        turns.take(x, held, source.law, int(carry["sample"]), watch)
+                    if status[0] == k.RUNNING:
+                        turns.take(x, u, source.law, int(carry["sample"]), watch)
             except KeyboardInterrupt:  # raised by the caller's code
                 interrupted.append(True)
         t = float(carry["begin"] + carry["elapsed"])
-        if status == k.BAD_INPUT:
+        if status[0] == k.BAD_INPUT:
             raise self.lost(int(carry["lost"]), t, x + turns.taken)
         done = int(carry["sample"])
-        times, states, forces = times[:done], states[:done], forces[:done]
+        times, states, forces = times[:done], samples.states[0, :done], samples.forces[0, :done]
         if carry["started"] and times[-1] < t:
             # the run ended between two samples: its last configuration is recorded too
-            times, states, forces = np.append(times, t), np.vstack([states, x]), np.vstack([forces, held])
-        code, message = verdict(self.mechanism, self.settings, status, t, x + turns.taken, self.limit)
+            times, states, forces = np.append(times, t), np.vstack([states, x]), np.vstack([forces, u])
+        code, message = verdict(self.mechanism, self.settings, int(status[0]), t, x + turns.taken, self.limit)
         trajectory = Trajectory(
             time=times,
-            values=turns.put_back(outputs_of(self.mechanism, problem.modes, problem.p, states, forces)),
+            values=turns.put_back(outputs_of(self.mechanism, problem.modes, batch.p[0], states, forces)),
             status=code,
             message=message,
             events=tuple(
@@ -222,7 +221,7 @@ class Run:
 
     def _watch(self, balance: tuple[int, ...]) -> tuple[Any, list[Any]]:
         """Events and balance as the compiled code reads them, and what has to stay alive meanwhile."""
-        from .compiled import Watch
+        from .records import Watch
 
         n = len(self.events)
         table, addresses, kept = np.zeros((n, 4)), np.zeros(n, dtype=np.int64), []
@@ -249,7 +248,7 @@ def verdict(
 
     ``limit`` says what a limit is; without it, it is that of assembly.
     """
-    from . import compiled as k
+    from . import records as k
 
     # a microsecond, at any time
     at = f"t = {t:.9g} s" if abs(t) < 1e3 else f"t = {t:.6f} s"
@@ -279,9 +278,9 @@ def outputs_of(
         Constants, and after them the mechanical energy at the start (J).
     states, inputs : ndarray, shapes (n, states) and (n, channels)
     """
-    from . import compiled as k
+    from .compiled import rows
 
     values = np.empty((len(states), len(mechanism.output_names)))
     outputs = machine(mechanism, mechanism.switched(p.tolist())).addresses[OUTPUTS]
-    k.rows(outputs, modes, p, np.ascontiguousarray(states), np.ascontiguousarray(inputs), values)
+    rows(outputs, modes, p, np.ascontiguousarray(states), np.ascontiguousarray(inputs), values)
     return values

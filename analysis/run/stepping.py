@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from math import isfinite, nan
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from linkwork import tableau
 from linkwork.integrate import GREATEST_FACTOR, LEAST_FACTOR, SAFETY
@@ -39,20 +41,32 @@ def stage(s, x, k, h, y):
         y[i] = x[i] + h * y[i]
 
 
-@inner
-def attempt(equation, modes, p, scale, begin, elapsed, h, x, k, y, constant, piece, source, u):
-    """A step of size h from x at ``begin + elapsed``, into y, its rates at the start k[0]; its error relative to ``scale``.
+class Flow(NamedTuple):
+    """What moves a state: address of the right-hand side, modes, constants, magnitudes to which errors are relative."""
 
-    ``equation`` is the address of the right-hand side, ``u`` what acts; where it is not ``constant`` it is sampled at each
-    stage.
+    equation: int
+    modes: NDArray[np.float64]
+    p: NDArray[np.float64]
+    scale: NDArray[np.float64]
+
+
+@inner
+def attempt(flow, begin, elapsed, h, x, room, u, piece, source):
+    """A step of size h from x at ``begin + elapsed``, into room.y, its rates at the start room.k[0]; its error relative to
+    ``flow.scale``.
+
+    ``u`` is what acts; where ``piece`` is not negative it is sampled from ``source`` at each stage.
     """
+    k, y = room.k, room.y
     for s in range(1, STAGES):
         stage(s, x, k, h, y)
-        if not constant:
-            channels_at(begin, elapsed + NODES[s] * h, piece, y, source, u)
-        evaluate(equation, begin + (elapsed + NODES[s] * h), y, modes, u, p, k[s])
+        # two conditions: the first decides what is compiled
+        if source is not None:  # noqa: SIM102
+            if piece >= 0:
+                channels_at(begin, elapsed + NODES[s] * h, piece, y, source, u)
+        evaluate(flow.equation, begin + (elapsed + NODES[s] * h), y, flow.modes, u, flow.p, k[s])
     stage(STAGES, x, k, h, y)
-    return _local_error(x, y, k, h, scale)
+    return _local_error(x, y, k, h, flow.scale)
 
 
 @inner

@@ -479,9 +479,9 @@ def test_a_run_cut_into_small_calls_is_the_same_run(case: str, monkeypatch: pyte
     calls = []
     original = compiled.run
 
-    def counted(*arguments: Any) -> int:
+    def counted(*arguments: Any) -> None:
         calls.append(1)
-        return int(original(*arguments))
+        original(*arguments)
 
     monkeypatch.setattr(compiled, "run", counted)
     for steps_per_call in (1, 3):
@@ -564,15 +564,15 @@ def test_right_hand_side_that_the_step_size_cannot_resolve() -> None:
     assert np.all(np.isfinite(ours.values))
 
 
-def _interrupting(after: int) -> Callable[..., int]:
+def _interrupting(after: int) -> Callable[..., None]:
     original = compiled.run
     calls = []
 
-    def run(*arguments: Any) -> int:
+    def run(*arguments: Any) -> None:
         calls.append(1)
         if len(calls) > after:
             raise KeyboardInterrupt
-        return int(original(*arguments))
+        original(*arguments)
 
     return run
 
@@ -600,9 +600,9 @@ def test_interrupt_in_the_last_call_is_not_forgotten(monkeypatch: pytest.MonkeyP
     # else a loop over many short runs could not be stopped
     original = compiled.run
 
-    def run(*arguments: Any) -> int:
+    def run(*arguments: Any) -> None:
         os.kill(os.getpid(), signal.SIGINT)
-        return int(original(*arguments))
+        original(*arguments)
 
     before = signal.getsignal(signal.SIGINT)
     monkeypatch.setattr(compiled, "run", run)

@@ -1,0 +1,57 @@
+"""NamedTuples that compiled functions hand on by reference.
+
+Numba hands a tuple on by value, number by number: of one of thirty arrays, two hundred, for each function that takes it. That
+took more of a kernel's compilation than what the functions do.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from numba import types
+from numba.core import cgutils
+from numba.core.datamodel.models import PrimitiveModel
+from numba.core.datamodel.registry import register_default
+from numba.core.imputils import impl_ret_borrowed
+from numba.core.typing.templates import AttributeTemplate
+from numba.extending import infer_getattr, intrinsic, lower_getattr_generic
+
+
+class Reference(types.Type):  # type: ignore[misc]
+    """Type of a reference to a NamedTuple."""
+
+    def __init__(self, of: Any) -> None:
+        self.dtype = of
+        super().__init__(name=f"Reference({of})")
+
+
+@register_default(Reference)
+class _Model(PrimitiveModel):  # type: ignore[misc]
+    def __init__(self, models: Any, reference: Reference) -> None:
+        super().__init__(models, reference, models[reference.dtype].get_value_type().as_pointer())
+
+
+@infer_getattr
+class _Fields(AttributeTemplate):  # type: ignore[misc]
+    key = Reference
+
+    def generic_resolve(self, reference: Reference, name: str) -> Any:
+        fields = reference.dtype.fields
+        return reference.dtype[fields.index(name)] if name in fields else None
+
+
+@lower_getattr_generic(Reference)
+def _field(context: Any, builder: Any, reference: Reference, value: Any, name: str) -> Any:
+    place = reference.dtype.fields.index(name)
+    found = builder.load(cgutils.gep_inbounds(builder, value, 0, place))
+    return impl_ret_borrowed(context, builder, reference.dtype[place], found)
+
+
+@intrinsic
+def refer(typing_context, fields):
+    """A reference to a NamedTuple, which is good as long as the function that makes it has not returned."""
+
+    def generate(context, builder, signature, arguments):
+        return cgutils.alloca_once_value(builder, arguments[0])
+
+    return Reference(fields)(fields), generate

@@ -1,0 +1,196 @@
+"""Events of a compiled run: the limit of assembly, the torsion bar's release, the user's; where in a step they happen."""
+
+from __future__ import annotations
+
+from linkwork.limits import LIMIT_SINE
+
+from ..numerics.codegen import call_user, inner
+from .equations import DERIVATIVE, OUTPUTS
+from .records import (
+    DIRECTION,
+    EVENT,
+    LEVEL,
+    LIMIT,
+    OUTPUT,
+    RUNNING,
+    STOPS,
+    clearance_at,
+    copy,
+    equation,
+    look_inside,
+    released,
+    renew,
+    time_at,
+)
+from .stepping import NODES, interpolant, interpolate, stage
+
+#: Events that one step can bring at most, and the beginning of an interval besides.
+EVENTS_PER_STEP = 4
+#: Fraction of a step within which an event counts as simultaneous with the end of the run or the release.
+SAME = 1e-9
+
+# What can cut a step short besides a user's event, which goes by its number
+NOTHING = -3
+RELEASE = -2
+ASSEMBLY = -1
+
+
+@inner
+def _gap(e, t, x, u, motion):
+    """What is zero where something happens: the limit of assembly, the release, event e of the user."""
+    watch, source = motion.watch, motion.source
+    if e == ASSEMBLY:
+        return clearance_at(x, u, motion) - LIMIT_SINE
+    if e == RELEASE:
+        return source.law[1] - x[source.law_places[1]]
+    if watch.addresses[e] != 0:
+        return call_user(watch.addresses[e], t, x)
+    equation(OUTPUTS, t, x, u, motion.room.outputs, motion)
+    return motion.room.outputs[int(watch.table[e, OUTPUT])] - watch.table[e, LEVEL]
+
+
+@inner
+def _crosses(before, after, direction):
+    """Whether an event happens between two values; one that starts at zero does not."""
+    return (before < 0.0 <= after and direction >= 0.0) or (before > 0.0 >= after and direction <= 0.0)
+
+
+@inner
+def _record(e, t, x, motion):
+    row = motion.watch.found[motion.carry.found]
+    row[0] = e
+    row[1] = t
+    for i in range(x.shape[0]):
+        row[2 + i] = x[i]
+    motion.carry.found += 1
+
+
+@inner
+def notice_jumps(motion):
+    """Record what the beginning of an interval makes happen; the status."""
+    carry, watch, x = motion.carry, motion.watch, motion.x
+    status = RUNNING
+    for e in range(watch.table.shape[0]):
+        before = watch.gaps[e]
+        if carry.started and before == 0.0:
+            # a zero marks an event that was just reported: wait until the value leaves zero
+            continue
+        watch.gaps[e] = _gap(e, carry.begin, x, motion.u, motion)
+        if carry.started and _crosses(before, watch.gaps[e], watch.table[e, DIRECTION]):
+            _record(e, carry.begin, x, motion)
+            if watch.table[e, STOPS] != 0.0:
+                status = EVENT
+    return status
+
+
+@inner
+def _locate(e, low, high, h, motion):
+    """Fraction of the step at which e happens, by bisection of the interpolant between two fractions."""
+    room = motion.room
+    positive = False
+    for n in range(55):
+        s = low if n == 0 else 0.5 * (low + high)
+        look_inside(s, h, motion)
+        # a NaN, beyond the limit of assembly, compares as not positive
+        sign = _gap(e, time_at(s, h, motion), room.z, room.inside, motion) > 0.0
+        if n == 0:
+            positive = sign
+        elif sign == positive:
+            low = s
+        else:
+            high = s
+    # the limit is approached, not passed: its own side must still be a configuration
+    return low if e == ASSEMBLY else high
+
+
+@inner
+def _events_of_step(what, cut, h, motion):
+    """Record the user's events inside a step, by fractions of it; what stops it first, and where.
+
+    It is cut short by ``what`` at ``cut`` already.
+    """
+    watch, room = motion.watch, motion.room
+    for e in range(watch.table.shape[0]):
+        for quarter in range(EVENTS_PER_STEP):
+            s0 = quarter / EVENTS_PER_STEP
+            s1 = (quarter + 1) / EVENTS_PER_STEP
+            if s1 == 1.0:
+                gap = _gap(e, time_at(s1, h, motion), room.y, motion.u, motion)
+            else:
+                look_inside(s1, h, motion)
+                gap = _gap(e, time_at(s1, h, motion), room.z, room.inside, motion)
+            if _crosses(watch.gaps[e], gap, watch.table[e, DIRECTION]):
+                s = _locate(e, s0, s1, h, motion)
+                interpolate(s, motion.x, room.f, room.z)
+                _record(e, s, room.z, motion)
+                if watch.table[e, STOPS] != 0.0 and s < cut:
+                    what, cut = e, s
+            watch.gaps[e] = gap
+    return what, cut
+
+
+@inner
+def _make_interpolant(h, motion):
+    """Make the interpolant of a step whose rates at the end are those of stage 12."""
+    carry, room, x = motion.carry, motion.room, motion.x
+    copy(motion.u, room.inside)
+    for s in range(13, 16):
+        stage(s, x, room.k, h, room.z)
+        renew(carry.elapsed + NODES[s] * h, room.z, room.inside, motion)
+        equation(DERIVATIVE, time_at(NODES[s], h, motion), room.z, room.inside, room.k[s], motion)
+    carry.evaluations += 3
+    interpolant(x, room.y, room.k, h, room.f)
+
+
+@inner
+def locate_events(clearance, h, motion):
+    """Make the interpolant of a good step and record its events; what cuts the step short, and at which fraction of it."""
+    carry, watch = motion.carry, motion.watch
+    _make_interpolant(h, motion)
+    what, cut = NOTHING, 2.0
+    if clearance < LIMIT_SINE:
+        what = ASSEMBLY
+        cut = _locate(ASSEMBLY, 0.0, 1.0, h, motion)
+    if released(motion.room.y, motion):
+        s = _locate(RELEASE, 0.0, 1.0, h, motion)
+        if s < cut:
+            what, cut = RELEASE, s
+    what, cut = _events_of_step(what, cut, h, motion)
+    # times in the place of fractions; what comes after the cut did not happen
+    kept = carry.known
+    for n in range(carry.known, carry.found):
+        s = watch.found[n, 1]
+        if s <= cut + SAME:
+            copy(watch.found[n], watch.found[kept])
+            watch.found[kept, 1] = time_at(s, h, motion)
+            kept += 1
+    carry.found = kept
+    return what, cut
+
+
+@inner
+def end_at(what, cut, h, motion):
+    """End a step at the fraction where something cuts it short; the status."""
+    carry, watch, source = motion.carry, motion.watch, motion.source
+    x, u = motion.x, motion.u
+    t = time_at(cut, h, motion)
+    interpolate(cut, x, motion.room.f, motion.room.z)
+    copy(motion.room.z, x)
+    if what == RELEASE:
+        x[source.law_places[1]] = source.law[1]
+    renew(carry.elapsed + cut * h, x, u, motion)
+    for e in range(watch.table.shape[0]):
+        watch.gaps[e] = _gap(e, t, x, u, motion)
+    status = RUNNING if what == RELEASE else LIMIT if what == ASSEMBLY else EVENT
+    for n in range(carry.known, carry.found):
+        # at the cut itself, but for rounding: it has happened
+        e = int(watch.found[n, 0])
+        if watch.found[n, 1] >= time_at(cut - SAME, h, motion):
+            watch.gaps[e] = 0.0
+            if watch.table[e, STOPS] != 0.0 and what == RELEASE:
+                status = EVENT
+    if what == RELEASE:
+        source.law[2] = 0.0
+    carry.begin = t
+    carry.elapsed = 0.0
+    return status
