@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from linkwork.integrate import LEAST_STEP
 from linkwork.limits import LIMIT_SINE, NEAR_LIMIT
 
-from ..numerics.codegen import CUBE, MATRIX, VECTOR, evaluate, inner, kernel, part
+from ..numerics.codegen import CUBE, MATRIX, VECTOR, copy, evaluate, inner, kernel, part
 from ..numerics.references import refer
 from .equations import DERIVATIVE, JUMP, OUTPUTS
 from .locating import EVENTS_PER_STEP, NOTHING, end_at, locate_events, notice_jumps
@@ -37,7 +37,6 @@ from .records import (
     Room,
     Samples,
     clearance_at,
-    copy,
     equation,
     released,
     renew,

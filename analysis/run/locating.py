@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from linkwork.limits import LIMIT_SINE
 
-from ..numerics.codegen import call_user, inner
+from ..numerics.codegen import call_user, copy, inner
 from .equations import DERIVATIVE, OUTPUTS
 from .records import (
     DIRECTION,
@@ -15,7 +15,6 @@ from .records import (
     RUNNING,
     STOPS,
     clearance_at,
-    copy,
     equation,
     look_inside,
     released,

@@ -8,7 +8,7 @@ import numpy as np
 from numba import float64, from_dtype, int64, types
 from numpy.typing import NDArray
 
-from ..numerics.codegen import CUBE, MATRIX, VECTOR, evaluate, inner
+from ..numerics.codegen import CUBE, MATRIX, VECTOR, copy, evaluate, inner
 from .equations import CLEARANCE
 from .sources import ADDRESSES, PLACES, Source, channels_at
 from .stepping import interpolate
@@ -139,12 +139,6 @@ WATCH = types.NamedTuple((MATRIX, ADDRESSES, VECTOR, MATRIX, ADDRESSES), Watch)
 CARRIES = from_dtype(CARRY)[::1]
 SAMPLES = types.NamedTuple((VECTOR, CUBE, CUBE), Samples)
 STATE = types.NamedTuple((CARRIES, MATRIX, MATRIX), State)
-
-
-@inner
-def copy(source, target):
-    for i in range(target.shape[0]):
-        target[i] = source[i]
 
 
 @inner
