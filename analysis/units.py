@@ -131,7 +131,8 @@ def in_si(**units: Units) -> Callable[[_Callable], _Callable]:
             made.__init__ = decorate(made.__init__)  # type: ignore[misc]
             return made
         names = list(signature(made).parameters)
-        places = {names.index(name): name for name in units}
+        # those of **options go by their names alone
+        places = {names.index(name): name for name in units if name in names}
 
         @wraps(made)
         def converted(*arguments: Any, **options: Any) -> Any:

@@ -6,7 +6,7 @@ import sys
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, TypedDict, Unpack
 
 import click
 
@@ -48,6 +48,14 @@ COMPARED = ("drive.applied_torque", "pin.C.fx", "pin.C.fy", "slider_pin.fx", "sl
 DEFAULT_FOLDER = Path("build")
 
 
+class Given(TypedDict):
+    """Entries of a case that are given on the command line."""
+
+    stop_time: str | None
+    step: str | None
+    tolerance: float | None
+
+
 @click.command()
 @case_options(PUBLISHED)
 @click.option("--fmu", type=click.Path(exists=True, dir_okay=False), help="Run through this FMU instead of in process.")
@@ -72,11 +80,9 @@ def run(
     fmu: str | None,
     interface: str | None,
     method: str,
-    stop_time: str | None,
-    step: str | None,
-    tolerance: float | None,
     out: str,
     plot: bool,
+    **given: Unpack[Given],
 ) -> None:
     """Run a CASE file (TOML or JSON) or a published set, and write CSV and a plot.
 
@@ -97,10 +103,10 @@ def run(
     if fmu is None and interface is not None:
         raise click.UsageError("--interface is for a run through an FMU: give --fmu")
     interface = interface or INTERFACES[0]
-    times = (("stop_time", "--stop-time", stop_time), ("step", "--step", step))
-    changed: dict[str, Any] = {name: quantity(text, "s", option) for name, option, text in times if text is not None}
-    if tolerance is not None:
-        changed["tolerance"] = tolerance
+    changed: dict[str, Any] = {name: value for name, value in given.items() if value is not None}
+    for name in ("stop_time", "step"):
+        if name in changed:
+            changed[name] = quantity(changed[name], "s", f"--{name.replace('_', '-')}")
     chosen = replace(chosen, **changed)
     common = {name: getattr(chosen, name) for name in ("initial", "stop_time", "step", "tolerance")}
     common["progress"] = console.is_terminal

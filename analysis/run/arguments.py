@@ -77,6 +77,28 @@ def takes_published(**fills: Fill) -> Callable[[_Function], _Function]:
     return decorate
 
 
+def takes_options(kind: type) -> Callable[[_Function], _Function]:
+    """Refuse what is neither an argument of a function nor among its ``**options``, the keys of a TypedDict.
+
+    A class in the place of the argument ``method`` has options of its own.
+    """
+
+    def decorate(function: _Function) -> _Function:
+        known = (*signature(function).parameters, *kind.__annotations__)
+        known = tuple(name for name in known if name != "options")
+
+        @wraps(function)
+        def checked(*arguments: Any, **options: Any) -> Any:
+            for name in options:
+                if name not in known and not isinstance(options.get("method"), type):
+                    raise files.unknown_name(name, known, f"argument {name!r} of {function.__name__}")
+            return function(*arguments, **options)
+
+        return cast(_Function, checked)
+
+    return decorate
+
+
 def command_of(mechanism: Mechanism) -> str | None:
     """Name among the inputs of the command of the first freedom, such as the crank's speed."""
     return next((c.argument for c in mechanism.channels if c.kind == "command" and c.freedom == 0), None)

@@ -13,7 +13,7 @@ from itertools import chain
 from math import prod
 from pathlib import Path
 from tempfile import TemporaryFile
-from typing import Any
+from typing import Any, Unpack
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,14 +26,14 @@ from ..mechanisms import InitialState, Parameters, mechanism_of
 from ..notebook import format_count
 from ..numerics.workers import WorkersLost, check_jobs, interruptible, over_workers, share_memory
 from ..units import Amount, in_si
-from .arguments import driven, started, takes_published
+from .arguments import driven, started, takes_options, takes_published
 from .batches import NOT_RUN, Result, Task, solve
 from .equations import machine
 from .events import shown
 from .inputs import Inputs, compiled_source, encode, given
 from .prepared import outputs_of
 from .signals import Function
-from .simulation import sample_times, settings_of
+from .simulation import MOST_STEPS, RunOptions, sample_times, settings_of
 from .trajectory import Trajectory
 
 #: Samples of a batch at most, where its size is ours to choose.
@@ -151,6 +151,13 @@ def _kept(ensemble: Ensemble, folder: Path | None) -> str:
     return f"{done} of {len(ensemble)} runs done{where}"
 
 
+class EnsembleOptions(RunOptions, total=False):
+    """What is seldom asked for of ensembles."""
+
+    batch: int | None
+
+
+@takes_options(EnsembleOptions)
 @takes_published(inputs=driven, initial=started)
 @in_si(stop_time="s", step="s", start_time="s", hold="s")
 def simulate_many(
@@ -160,15 +167,12 @@ def simulate_many(
     initial: InitialState | Sequence[InitialState] | None = None,
     stop_time: Amount,
     step: Amount = 1e-3,
-    start_time: Amount = 0.0,
     hold: Amount = None,
     tolerance: float = 1e-9,
-    max_steps: int = 100_000_000,
     outputs: Sequence[str] | None = None,
     folder: str | Path | None = None,
-    batch: int | None = None,
     n_jobs: int | None = None,
-    progress: bool = False,
+    **options: Unpack[EnsembleOptions],
 ) -> Ensemble:
     """Run many mechanisms, or one under many inputs, in batches of compiled calls.
 
@@ -185,11 +189,14 @@ def simulate_many(
         Where each batch is kept, once it is done, in a file under a name made from all it depends on: the same call goes on
         from the batches that are there. Files that are damaged are computed again. The arrays of the ensemble are on that
         disk too, as long as it is in use, and take little memory.
+
+    Other Parameters
+    ----------------
     batch : int, optional
         Runs that are prepared and solved together: by default a sixteenth of all, between 16 and 256, fewer where they have
         many samples.
-
-    Other parameters are those of `simulate`.
+    start_time, max_steps, progress
+        As the others, those of `simulate`.
 
     Returns
     -------
@@ -216,6 +223,7 @@ def simulate_many(
     """
     if len(parameters) == 0:
         raise InputError("an ensemble needs at least one set of parameters")
+    batch = options.get("batch")
     if batch is not None and batch < 1:
         raise InputError(f"batch is {batch}: it must be at least 1")
     check_jobs(n_jobs)
@@ -225,7 +233,8 @@ def simulate_many(
     names = mechanism.output_names if outputs is None else tuple(outputs)
     columns = tuple(column_of(name, mechanism.output_names) for name in names)
     all_inputs, starts = _checked(mechanism, inputs, initial, len(parameters))
-    settings = settings_of(sample_times(stop_time, step, start_time), hold, tolerance, max_steps)
+    times = sample_times(stop_time, step, options.get("start_time", 0.0))
+    settings = settings_of(times, hold, tolerance, options.get("max_steps", MOST_STEPS))
     where = None if folder is None else Path(folder)
     # what cannot be compiled is reported here, and not by a worker
     encoded = encode(all_inputs[0], mechanism)
@@ -249,7 +258,7 @@ def simulate_many(
     gathered = _Gathered(parameters, mechanism, settings.times, names, outputs is not None, where)
     gathered.modes[:] = list(encoded.modes.values())
     into = gathered.samples() if where is None and share_memory(n_jobs, threads=True) else None
-    with interruptible() as heard, shown(progress, float(len(parameters))) as show:
+    with interruptible() as heard, shown(options.get("progress", False), float(len(parameters))) as show:
         try:
             work = partial(solve, heard=heard, into=into)
             for _, result in over_workers(work, tasks, heard, n_jobs=n_jobs, threads=True):

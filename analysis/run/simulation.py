@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from math import isfinite, ulp
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypedDict, Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -15,7 +15,7 @@ from linkwork.plant import check_tolerance
 from ..files import limit, unknown_name
 from ..mechanisms import InitialState, Parameters
 from ..units import Amount, in_si
-from .arguments import driven, started, takes_published, usual_times
+from .arguments import driven, started, takes_options, takes_published, usual_times
 from .events import Event
 from .inputs import Inputs
 from .prepared import Run, Settings
@@ -24,6 +24,8 @@ from .trajectory import Trajectory
 if TYPE_CHECKING:
     from scipy.integrate import OdeSolver
 
+#: Steps of a run at most, by default.
+MOST_STEPS = 100_000_000
 #: Samples of a run at most, by default: more are a slip of the unit, and would not fit into memory.
 _SAMPLES = 20_000_000
 SCIPY_METHODS = ("RK23", "RK45", "DOP853", "Radau", "BDF", "LSODA")
@@ -64,6 +66,28 @@ def sample_times(stop_time: Amount, step: Amount, start_time: Amount = 0.0) -> N
     return times
 
 
+class RunOptions(TypedDict, total=False):
+    """What is seldom asked for of runs."""
+
+    start_time: Amount
+    max_steps: int
+    progress: bool
+
+
+class SolverOptions(RunOptions, total=False):
+    """The same, with what SciPy's methods take besides."""
+
+    first_step: float | None
+    max_step: float
+    min_step: float
+    jac: Any
+    jac_sparsity: Any
+    lband: int | None
+    uband: int | None
+    vectorized: bool
+
+
+@takes_options(SolverOptions)
 @takes_published(inputs=driven, initial=started)
 @in_si(stop_time="s", step="s", start_time="s", samples="s", hold="s")
 def simulate(
@@ -73,15 +97,12 @@ def simulate(
     initial: InitialState | None = None,
     stop_time: Amount = None,
     step: Amount = None,
-    start_time: Amount = 0.0,
     samples: ArrayLike | None = None,
     hold: Amount = None,
     method: str | type[OdeSolver] = "compiled",
     tolerance: float = 1e-9,
     events: Sequence[Event] = (),
-    max_steps: int = 100_000_000,
-    progress: bool = False,
-    **options: Any,
+    **options: Unpack[SolverOptions],
 ) -> Trajectory:
     """Run a mechanism in process.
 
@@ -100,8 +121,6 @@ def simulate(
         default.
     step : float or str, optional
         Distance of the recorded samples: by default 1 ms, and where there is no stop_time the 360th part of a turn.
-    start_time : float or str
-        Start of the run.
     samples : array_like, shape (n,), optional
         Times to record instead (s), increasing; the first is the start of the run, the last its end.
     hold : float or str, optional
@@ -114,12 +133,17 @@ def simulate(
     tolerance : float
         Bound of the local error relative to state and size of the mechanism.
     events : sequence of Event
+
+    Other Parameters
+    ----------------
+    start_time : float or str
+        Start of the run; 0 by default.
     max_steps : int
-        Steps after which a compiled run ends with solver.status 4.
+        Steps after which a compiled run ends with solver.status 4; 1e8 by default.
     progress : bool
         Show a progress bar.
-    **options
-        Passed on to SciPy's ``solve_ivp``.
+    first_step, max_step, min_step, jac, jac_sparsity, lband, uband, vectorized
+        For SciPy's ``solve_ivp``, as far as the method has them. A class of your own has options of its own.
 
     Returns
     -------
@@ -144,17 +168,18 @@ def simulate(
     >>> simulate("table-3.1", Inputs(torque="2 N.m"), stop_time="20 ms", step="1 ms")["crank.speed"].shape
     (21,)
     """
+    start_time, progress = options.pop("start_time", 0.0), options.pop("progress", False)
     if samples is None:
         samples = sample_times(*usual_times(parameters, inputs, stop_time, step), start_time)
-    times = np.asarray(samples, float)
-    run = Run(parameters, inputs, initial, settings_of(times, hold, tolerance, max_steps), tuple(events))
+    settings = settings_of(np.asarray(samples, float), hold, tolerance, options.pop("max_steps", MOST_STEPS))
+    run = Run(parameters, inputs, initial, settings, tuple(events))
     if method in ("compiled", "balanced"):
         if options:
             raise InputError(f"the {method} method takes no options, but was given {', '.join(options)}")
         return run.compiled(progress, method == "balanced")
     from .march import solve
 
-    return solve(run, _solver(method), options, progress)
+    return solve(run, _solver(method), dict(options), progress)
 
 
 def settings_of(times: NDArray[np.float64], hold: float | None, tolerance: float, max_steps: int) -> Settings:

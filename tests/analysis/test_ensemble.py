@@ -371,6 +371,7 @@ def test_progress_changes_nothing(capfd: pytest.CaptureFixture[str]) -> None:
         ({"tolerance": 1.0}, ParameterError, "solver.tolerance"),
         ({"hold": 1e-3}, InputError, "held over 0.001 s"),
         ({"batch": 0}, InputError, "batch is 0"),
+        ({"batches": 2}, InputError, "no argument 'batches' of simulate_many; did you mean batch"),
         ({"n_jobs": 0}, InputError, "0 cores"),
         ({"outputs": ["crank.angel"]}, InputError, "there is no output 'crank.angel'; did you mean crank.angle"),
         ({"step": -1.0}, InputError, "step is -1.0 s"),

@@ -703,6 +703,8 @@ def test_progress_is_the_time_since_the_start(monkeypatch: pytest.MonkeyPatch) -
         ({"samples": [0.0, 0.1, 0.15], "hold": 0.05}, InputError, "same multiples"),
         ({"max_steps": 0}, InputError, "max_steps is 0"),
         ({"max_step": 0.1}, InputError, "takes no options, but was given max_step"),
+        ({"start": 0.1}, InputError, "no argument 'start' of simulate; did you mean start_time"),
+        ({"first": 0.1, "method": "RK45"}, InputError, "no argument 'first' of simulate; did you mean first_step"),
         ({"initial": InitialState(slider_position=1.0)}, AssemblyError, "cannot be joined at crank angle 0 rad"),
         ({"initial": InitialState(crank_angle=pi, slider_position=0.0965)}, AssemblyError, "limit of assembly|joined"),
     ],

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from math import degrees, tau
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypedDict, Unpack
 
 import click
 import numpy as np
@@ -22,6 +22,14 @@ if TYPE_CHECKING:
 #: What is in error by default, and the half widths of lengths and of the twist.
 _TOLERANCES = ("crank.length", "rod.length", "guide.offset", "shift.position", "guide.twist")
 _WIDTHS = {"m": "0.25 mm", "rad": "0.1 deg"}
+
+
+class Sampling(TypedDict):
+    """Of the Monte Carlo."""
+
+    samples: int
+    seed: int
+    jobs: int | None
 
 
 @click.command(short_help="Report what manufacturing tolerances do.")
@@ -66,11 +74,9 @@ def tolerances(
     distribution: str,
     quantities: Sequence[str],
     angle: str,
-    samples: int,
-    seed: int,
-    jobs: int | None,
     out: str,
     plot: bool,
+    **sampling: Unpack[Sampling],
 ) -> None:
     """Report what manufacturing tolerances do: exact sensitivities, a linear estimate, and a Monte Carlo beside it.
 
@@ -101,6 +107,7 @@ def tolerances(
     rows, slopes = _slopes(exact, allowed, place, units)
     headings = ("quantity", "to", "unit", f"at {here}", "greatest", "at [deg]")
     show_table(f"{chosen.title}: sensitivities", headings, rows, words=("quantity", "to", "unit"))
+    samples, seed, jobs = sampling["samples"], sampling["seed"], sampling["jobs"]
     with console.status(f"{samples} samples at {len(turn)} crank angles"):
         found = sc.monte_carlo(turn, allowed, quantities=quantities, samples=samples, seed=seed, n_jobs=jobs)
     stem = str(folder_of(out) / chosen.name)
