@@ -157,8 +157,8 @@ class EnsembleOptions(RunOptions, total=False):
     batch: int | None
 
 
-@takes_options(EnsembleOptions)
 @takes_published(inputs=driven, initial=started)
+@takes_options(EnsembleOptions)
 @in_si(stop_time="s", step="s", start_time="s", hold="s")
 def simulate_many(
     parameters: Sequence[Parameters],

@@ -87,8 +87,8 @@ class SolverOptions(RunOptions, total=False):
     vectorized: bool
 
 
-@takes_options(SolverOptions)
 @takes_published(inputs=driven, initial=started)
+@takes_options(SolverOptions)
 @in_si(stop_time="s", step="s", start_time="s", samples="s", hold="s")
 def simulate(
     parameters: Parameters,
