@@ -3,22 +3,89 @@
 import uPlot from "uplot";
 import uplotStyle from "uplot/dist/uPlot.min.css";
 import type { Rows } from "./core";
-import { type Chart as Table, type Mechanism, outputAt, rowLength, type Source } from "./tables";
+import { type Chart as Table, type Curve, type Mechanism, outputAt, rowLength, type Source } from "./tables";
+import { roundingOf } from "./words";
 
-const COLOURS = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9"];
-/** Colours alone do not tell the curves apart. */
+/** Colours alone do not tell the curves apart; of each there is a colour `--curve` with its number. */
 const DASHES: number[][] = [[], [7, 3], [2, 3], [9, 3, 2, 3], [4, 2], [12, 4]];
-const HEIGHT = 150;
+const HEIGHT = 170;
+const FONT = "12px system-ui, sans-serif";
+/** Steps between the marks of an axis in deg. */
+const TURNS = [1, 2, 5, 10, 15, 30, 45, 90, 180, 360];
+
+const colour = (name: string): string => getComputedStyle(document.body).getPropertyValue(`--${name}`);
+
+/** How a curve is drawn, by its number. */
+export interface Look {
+  label: string;
+  stroke: string;
+  dash: number[];
+  width: number;
+}
+
+export function look(label: string, number: number, width = 1.5): Look {
+  const n = number % DASHES.length;
+  return { label, stroke: colour(`curve${n}`), dash: DASHES[n], width };
+}
+
+/** A piece of the curve itself, as the background of its mark in a legend. */
+function sample({ stroke, dash, width }: Look): string {
+  const line = `<path d="M0 4h30" stroke="${stroke}" stroke-width="${width + 0.5}" stroke-dasharray="${dash.join(" ")}"/>`;
+  const drawing = `<svg xmlns="http://www.w3.org/2000/svg" width="30" height="8">${line}</svg>`;
+  return `url("data:image/svg+xml,${encodeURIComponent(drawing)}") no-repeat`;
+}
+
+/** Curves over an axis with a name and a unit, in the colours of the page; without data yet. */
+export function plotIn(
+  place: HTMLElement,
+  axis: string,
+  looks: Look[],
+  options: Partial<uPlot.Options>,
+): uPlot {
+  const stroke = colour("text");
+  const grid = { stroke: colour("line"), width: 1 };
+  const both = { stroke, grid, ticks: grid, font: FONT };
+  const label = { label: axis, labelFont: FONT, labelSize: 16, size: 32 };
+  return new uPlot(
+    {
+      width: 300,
+      height: HEIGHT,
+      legend: {
+        show: looks.length > 1,
+        live: false,
+        markers: { width: 0, fill: (_, series) => sample(looks[series - 1]) },
+      },
+      cursor: { drag: { x: true, y: false } },
+      scales: { x: { time: false } },
+      axes: [
+        {
+          ...both,
+          ...label,
+          ...(axis.endsWith("[deg]") && { incrs: TURNS }),
+          values: (_, all) => all.map(String),
+        },
+        { ...both, size: 58 },
+      ],
+      series: [{ label: axis }, ...looks.map((one) => ({ ...one, points: { show: false } }))],
+      ...options,
+    },
+    [[], ...looks.map(() => [])],
+    place,
+  );
+}
 
 interface Chart {
   plot: uPlot;
   line: HTMLElement;
-  curves: { of: number[]; factor: number }[];
+  curves: Curve[];
+  unit: string;
+  factor: number;
 }
 
 export class Charts {
   private charts: Chart[] = [];
   private axis: number[] = [];
+  private row = 0;
   private kind: Source | "" = "";
   private mechanism!: Mechanism;
   private wanted: (chart: Table) => boolean = () => true;
@@ -43,9 +110,7 @@ export class Charts {
     this.kind = source;
     for (const { plot } of this.charts) plot.destroy();
     this.place.replaceChildren();
-    const colours = getComputedStyle(document.body);
-    const stroke = colours.getPropertyValue("--text");
-    const grid = { stroke: colours.getPropertyValue("--line"), width: 1 };
+    const axis = source === "steady" ? "crank angle [deg]" : "time [s]";
     this.charts = mechanism.charts.filter(wanted).map(({ title, unit, factor, curves }) => {
       const box = document.createElement("figure");
       const caption = document.createElement("figcaption");
@@ -53,35 +118,14 @@ export class Charts {
       box.setAttribute("aria-label", `${title} in ${unit}: ${curves.map((curve) => curve.name).join(", ")}`);
       box.append(caption);
       this.place.append(box);
-      const plot = new uPlot(
-        {
-          width: this.width(),
-          height: HEIGHT,
-          legend: { show: curves.length > 1, live: false },
-          cursor: { drag: { x: true, y: false } },
-          scales: { x: { time: false } },
-          axes: [
-            { stroke, grid, ticks: grid, size: 28, values: (_, ticks) => ticks.map(String) },
-            { stroke, grid, ticks: grid, size: 58 },
-          ],
-          series: [
-            { label: source === "steady" ? "crank angle [deg]" : "time [s]" },
-            ...curves.map((curve, n) => ({
-              label: curve.name,
-              stroke: COLOURS[n % COLOURS.length],
-              dash: DASHES[n % DASHES.length],
-              width: 1.5,
-              points: { show: false },
-            })),
-          ],
-        },
-        [[], ...curves.map(() => [])],
-        box,
-      );
+      const looks = curves.map(({ name }, n) => look(name, n));
+      // its scale is known when it is drawn
+      const hooks = { draw: [() => this.mark(this.row)] };
+      const plot = plotIn(box, axis, looks, { width: this.width(), hooks });
       const line = document.createElement("div");
       line.className = "now";
       plot.over.append(line);
-      return { plot, line, curves: curves.map(({ of }) => ({ of, factor })) };
+      return { plot, line, curves, unit, factor };
     });
   }
 
@@ -99,15 +143,17 @@ export class Charts {
     this.axis = numbers.map((row) =>
       crank < 0 ? rows.values[row * length] : (rows.values[row * length + crank] * 180) / Math.PI,
     );
-    for (const { plot, curves } of this.charts)
-      plot.setData([
-        this.axis,
-        ...curves.map(({ of, factor }) => numbers.map((row) => value(row, of) * factor)),
-      ]);
+    const roundings = roundingOf(m, rows);
+    for (const { plot, unit, factor, curves } of this.charts) {
+      const rounding = roundings.get(unit) ?? 0;
+      const seen = (found: number): number => (Math.abs(found) > rounding ? found * factor : 0);
+      plot.setData([this.axis, ...curves.map(({ of }) => numbers.map((row) => seen(value(row, of))))]);
+    }
   }
 
   /** Mark the instant that is drawn. */
   mark(row: number): void {
+    this.row = row;
     for (const { plot, line } of this.charts)
       line.style.transform = `translateX(${plot.valToPos(this.axis[row] ?? 0, "x")}px)`;
   }

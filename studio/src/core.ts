@@ -2,6 +2,7 @@
 
 import type { Point } from "./explore";
 import { type Mechanism, rowLength } from "./tables";
+import { plainly } from "./words";
 
 interface Face {
   memory: WebAssembly.Memory;
@@ -55,7 +56,10 @@ export class Core {
   private readonly row: number;
   private readonly most: number;
 
-  private constructor(mechanism: Mechanism, instance: WebAssembly.Instance) {
+  private constructor(
+    private readonly mechanism: Mechanism,
+    instance: WebAssembly.Instance,
+  ) {
     this.face = instance.exports as unknown as Face;
     this.face._initialize();
     this.row = rowLength(mechanism);
@@ -85,7 +89,7 @@ export class Core {
   sentence(): string {
     if (this.face.studio_reason() === 0) return "";
     const bytes = new Uint8Array(this.face.memory.buffer, this.face.studio_sentence(), 400);
-    return new TextDecoder().decode(bytes.slice(0, bytes.indexOf(0)));
+    return plainly(new TextDecoder().decode(bytes.slice(0, bytes.indexOf(0))), this.mechanism);
   }
 
   run(step: number, count: number): Rows {

@@ -1,35 +1,31 @@
 /** A second worker: what it finds comes in parts, and what is asked anew takes the place of what was asked. */
 
+import { Background } from "./background";
 import type { Exploration, Found } from "./explore";
 import type { Mechanism } from "./tables";
-import type { Part, Search } from "./worker";
+import type { Part } from "./worker";
 
 export class Explorer {
-  private readonly worker = new Worker(URL.createObjectURL(new Blob([WORKER], { type: "text/javascript" })));
+  private readonly background: Background<Part>;
   private id = 0;
-  private mechanism: Mechanism | undefined;
-  private bytes: ArrayBuffer | undefined;
 
   constructor(found: (parts: Found[], done: boolean) => void) {
-    this.worker.addEventListener("message", ({ data }: MessageEvent<Part>) => {
-      if (data.search === this.id) found(data.found, data.done);
-    });
+    this.background = new Background(
+      (part) => part.search === this.id && found(part.found, part.done),
+      (sentence) => found([{ part: 0, sentence }], true),
+    );
   }
 
   use(mechanism: Mechanism, bytes: ArrayBuffer): void {
-    this.mechanism = mechanism;
-    this.bytes = bytes;
+    this.background.use(mechanism, bytes);
   }
 
   ask(exploration: Exploration): void {
-    const task: Search = { search: ++this.id, exploration };
-    if (this.bytes) Object.assign(task, { mechanism: this.mechanism, bytes: this.bytes });
-    this.bytes = undefined;
-    this.worker.postMessage(task);
+    this.background.give({ search: ++this.id, exploration });
   }
 
   /** What is under way is of no use any more. */
   stop(): void {
-    this.worker.postMessage({ search: ++this.id });
+    this.background.tell({ search: ++this.id });
   }
 }

@@ -1,6 +1,8 @@
 /** What is taken out of the page: files, and a link that holds the state. */
 
 import type { Orbit, Rows } from "./core";
+import { dxfText } from "./dxf";
+import type { Drawn } from "./picture";
 import { type Given, type Mechanism, rowLength, type State, stateFrom, type Tables } from "./tables";
 
 const value = (given: Given, state: State): number => state.values[given.name] ?? given.start;
@@ -127,6 +129,38 @@ export function stateIn(address: string, tables: Tables): State | undefined {
     throw new Error("the state in the address is damaged: a part of the link may be missing");
   }
   return stateFrom(data, tables);
+}
+
+/** What is saved: the motion, and the drawing in its forms. */
+export interface Saved {
+  mechanism: Mechanism;
+  state: State;
+  duration: number;
+  rows?: Rows;
+  orbit?: Orbit;
+  drawing: { svgText(): string; drawn(): Drawn[]; size: [number, number] };
+}
+
+/** Save in one of the forms of the list. */
+export async function saveAs(
+  form: string,
+  { mechanism: m, state, duration, rows, orbit, drawing }: Saved,
+): Promise<void> {
+  const text = (name: string, type: string, content: string): void =>
+    save(name, new Blob([content], { type }));
+  const forms: Record<string, () => void | Promise<void>> = {
+    case: () => text("case.toml", "application/toml", caseText(m, state, duration)),
+    python: () => text("case.py", "text/x-python", pythonText(m, state, duration, orbit)),
+    ssv: () => text("parameters.ssv", "application/xml", parameterText(m, state)),
+    dxf: () => text("drawing.dxf", "image/vnd.dxf", dxfText(drawing.drawn())),
+    svg: () => text("drawing.svg", "image/svg+xml", drawing.svgText()),
+    table: () => rows && text("motion.csv", "text/csv", tableText(m, rows)),
+    png: async () => {
+      const back = getComputedStyle(document.body).getPropertyValue("--card");
+      save("drawing.png", await pixels(drawing.svgText(), ...drawing.size, back));
+    },
+  };
+  await forms[form]?.();
 }
 
 /** Let the browser save a file. */

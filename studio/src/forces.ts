@@ -90,8 +90,8 @@ export class Forces {
     const [fx, fy] = points[most];
     const angle = (Math.atan2(fy, fx) * 180) / Math.PI;
     this.words.textContent =
-      `Greatest ${digits(sizes[most])} N towards ${digits(angle, 3)} deg. Solid: the force over the motion, from its ` +
-      "origin at this instant; dashed: the envelope.";
+      `Greatest ${digits(sizes[most])} N towards ${digits(angle, 3)} deg. Curve: the tip of the force over the motion; ` +
+      "straight line: the force at this instant; dashed: the envelope.";
     plane.canvas.setAttribute("aria-label", `Force on ${curve.name} as a vector; ${this.words.textContent}`);
   }
 }

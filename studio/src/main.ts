@@ -1,18 +1,21 @@
 /** The studio: a state, what follows from it, and the parts of the page that show both. */
 
 import { Backdrop } from "./backdrop";
+import { by, Controls } from "./controls";
 import { bytesOf, Core, type Rows } from "./core";
-import { dxfText } from "./dxf";
 import { Embed } from "./embed";
-import { caseText, linkOf, parameterText, pixels, pythonText, save, stateIn, tableText } from "./exports";
+import { linkOf, saveAs, stateIn } from "./exports";
 import { History } from "./history";
+import { Numbers } from "./numbers";
 import { Panel } from "./panel";
 import { Picture } from "./picture";
+import { Playback } from "./playback";
 import { WithPython } from "./python";
 import { Solver } from "./solver";
 import {
   type Given,
   givenOf,
+  jointAt,
   type Mechanism,
   outputAt,
   rowLength,
@@ -20,7 +23,15 @@ import {
   type State,
   type Tables,
 } from "./tables";
-import { digits, motionInWords, multiplierInWords, shown, verdictInWords } from "./words";
+import {
+  called,
+  capital,
+  digits,
+  motionInWords,
+  multiplierInWords,
+  roundingOf,
+  verdictInWords,
+} from "./words";
 import { Views } from "./views";
 import type { Answer } from "./worker";
 
@@ -28,20 +39,9 @@ import type { Answer } from "./worker";
 const TURN_STEPS = 720;
 const RUN_STEPS = 1440;
 const TURNS_OF_A_RUN = 6;
-const RATES = [1, 1 / 2, 1 / 5, 1 / 10, 1 / 20, 1 / 50, 1 / 100];
+/** How near to its place a joint need not be moved (px). */
+const NEAR = 1e-6;
 
-/** Views by their keys. */
-const LOOKS: Record<string, string> = {
-  "-": "smaller",
-  "+": "larger",
-  "0": "all",
-  "1": "front",
-  "2": "top",
-  "3": "side",
-  "4": "isometric",
-};
-
-const by = <T extends Element>(id: string): T => document.getElementById(id) as unknown as T;
 const stored = <T>(id: string): T => JSON.parse(by<HTMLElement>(id).textContent ?? "") as T;
 
 class Studio {
@@ -49,14 +49,11 @@ class Studio {
   state: State = stored<State>("state");
   private mechanism!: Mechanism;
   private core!: Core;
-  /** What the worker answered last, and which row of it is drawn. */
-  private answer: Answer | undefined;
-  private row = 0;
-  private time = 0;
-  private moving = true;
-  /** The configuration of a drag, which stays as it is while the motion about it changes. */
+  private readonly playback = new Playback();
+  /** The configuration of a drag, which stays as it is while the motion about it changes; whether its start is pulled. */
   private held: Float64Array | undefined;
-  private history!: History<State>;
+  private pulled = false;
+  private history = new History<State>(JSON.stringify(this.state));
   private readonly picture = new Picture(by<SVGSVGElement>("picture"), by("behind"), by("markers"));
   private readonly view = this.picture.view;
   private readonly backdrop = new Backdrop(
@@ -82,81 +79,108 @@ class Studio {
     },
   });
   private embed!: Embed;
-  private readonly solver = new Solver((answer, newest) => this.answered(answer, newest));
+  private readonly solver = new Solver({
+    answered: (answer, newest) => this.answered(answer, newest),
+    failed: (sentence) => this.fault(capital(sentence)),
+  });
   private readonly python = new WithPython(by<HTMLElement>("python"), this.view, {
     state: () => ({ ...this.state, duration: this.duration() }),
-    take: (state) => this.take(state),
-    rows: () => this.answer?.rows,
+    take: (state) => void this.take(state),
+    rows: () => this.playback.answer?.rows,
   });
-  private numbers: HTMLTableCellElement[] = [];
+  private readonly numbers = new Numbers();
+  private readonly controls = new Controls(this.tables, {
+    undo: () => void this.restore(this.history.undo()),
+    redo: () => void this.restore(this.history.redo()),
+    assembly: () => this.assemble(),
+    theme: () => this.theme(document.documentElement.dataset.theme !== "dark"),
+    play: () => this.play(!this.playback.moving),
+    look: (name) => this.look(name),
+    step: (rows) => this.pause(this.playback.row + rows),
+    go: (row) => this.pause(row),
+    choose: (source) => this.put({ ...this.state, source }, true),
+    save: (form) => void this.save(form),
+    take: (state) => void this.take(state),
+  });
 
   async start(): Promise<void> {
     this.wire();
-    let wrong = "";
+    const { mechanism } = this.state;
+    const starts: State[] = [this.state, { mechanism, title: "", values: {} }];
+    let said = "";
     try {
-      this.state = stateIn(location.href, this.tables) ?? this.state;
+      const given = stateIn(location.href, this.tables);
+      if (given) starts.unshift(given);
     } catch (error) {
-      wrong = (error as Error).message;
+      said = (error as Error).message;
+    }
+    // what cannot be shown is said, and something else is shown below it
+    for (const state of starts) {
+      const wrong = await this.open(state);
+      if (!wrong) break;
+      said ||= wrong;
     }
     this.history = new History<State>(JSON.stringify(this.state));
-    await this.open(this.state);
-    if (wrong) this.fault(wrong);
+    this.name();
+    this.fault(said);
     this.embed = new Embed(
       this.tables,
-      (state) => this.take(state),
+      (state) => void this.take(state),
       (sentence) => this.fault(sentence),
     );
     let last = performance.now();
     const frame = (now: number): void => {
-      this.advance((now - last) / 1000);
+      const seconds = ((now - last) / 1000) * this.controls.speed;
+      if (!this.held && this.playback.advance(seconds)) this.seek(this.playback.nearest());
       last = now;
       requestAnimationFrame(frame);
     };
     requestAnimationFrame(frame);
   }
 
-  /** Show a state, of whichever mechanism. */
-  private async open(state: State): Promise<void> {
+  /** Show a state, of whichever mechanism; where it cannot begin all stays, and the sentence says why. */
+  private async open(state: State): Promise<string> {
     const mechanism = this.tables.mechanisms.find((m) => m.name === state.mechanism);
     if (!mechanism) throw new Error(`there is no mechanism ${state.mechanism}`);
+    const bytes = mechanism === this.mechanism ? undefined : await bytesOf(mechanism);
+    const core = bytes ? await Core.make(mechanism, bytes) : this.core;
+    const { values, sentence } = this.begin(core, mechanism, state);
+    this.fault(capital(sentence));
+    if (sentence) return capital(sentence);
     const { view, ...kept } = state;
     this.state = kept;
-    if (mechanism !== this.mechanism) {
-      const bytes = await bytesOf(mechanism);
-      this.core = await Core.make(mechanism, bytes);
-      await this.solver.use(mechanism, bytes);
+    if (bytes) {
+      this.core = core;
+      this.solver.use(mechanism, bytes);
       this.mechanism = mechanism;
-      this.answer = undefined;
-      this.row = 0;
-      this.time = 0;
+      this.playback.show(mechanism);
       this.picture.show(mechanism);
       by("views").classList.toggle("planar", mechanism.picture.planar);
       this.charts.show(mechanism, state.source ?? "steady", bytes);
       this.python.show(mechanism, state);
       this.panel.show(mechanism, state.values, state.locks ?? []);
-      this.listNumbers();
+      this.numbers.show(mechanism, by("panel"));
     } else {
       this.panel.update(state.values, true);
       this.panel.lock(state.locks ?? []);
     }
     if (view) this.view.show(mechanism.picture.planar, view);
     this.backdrop.show(state.behind);
-    const { values, count, sentence } = this.begin();
-    if (!this.answer && count > 0) {
+    if (!this.playback.answer) {
       // there is something to see before the first motion is known
       this.picture.fit(values);
       this.picture.draw(values, (reference) => this.has(reference));
     }
-    this.fault(sentence);
     this.compute();
     this.name();
     this.embed?.tell(this.state);
+    return "";
   }
 
-  /** The links at the start, from what is given, with the sentence where they cannot be joined. */
-  private begin(): Rows {
-    this.core.give(givenOf(this.mechanism, this.state.values));
-    return this.core.run(1, 0);
+  /** The links at the start, with the sentence where they cannot be joined. */
+  private begin(core: Core, mechanism: Mechanism, { values }: State): Rows {
+    core.give(givenOf(mechanism, values));
+    return core.run(1, 0);
   }
 
   private compute(start?: number[]): void {
@@ -192,27 +216,30 @@ class Studio {
   }
 
   private answered(answer: Answer, newest: boolean): void {
-    const first = this.answer === undefined;
-    const kept = this.answer?.source === answer.source ? this.share() : 0;
-    if (answer.rows.values.length % rowLength(this.mechanism) !== 0) return;
-    this.answer = answer;
-    if (answer.rows.count > 0) {
+    const m = this.mechanism;
+    const { playback } = this;
+    const first = playback.answer === undefined;
+    const { rows, source, orbit } = answer;
+    const kept = playback.answer?.source === source ? playback.share : 0;
+    if (rows.values.length % rowLength(m) !== 0) return;
+    playback.answer = answer;
+    if (rows.count > 0) {
       if (!this.held) {
-        this.time = kept * this.length();
+        playback.time = kept * playback.length;
         if (newest) {
-          this.picture.fit(answer.rows.values);
+          this.picture.fit(rows.values);
           this.backdrop.draw();
           this.python.draw();
         }
       }
-      this.picture.drawPaths(answer.rows.values);
-      this.charts.data(answer.rows, answer.source);
-      by<HTMLInputElement>("scrub").max = String(answer.rows.count - 1);
+      this.picture.drawPaths(rows.values);
+      this.charts.data(rows, source);
     }
-    by("words").textContent = motionInWords(this.mechanism, answer.rows, answer.source, answer.orbit);
+    by("words").textContent = motionInWords(m, rows, orbit, this.state.values);
+    this.controls.motion(orbit, source);
     this.floquet(answer);
     if (newest && !this.held) this.see(answer);
-    this.seek(this.nearest());
+    this.seek(playback.nearest());
     if (first) document.documentElement.dataset.ready = String(Math.round(performance.now()));
     document.documentElement.dataset.answer = String(answer.id);
     document.documentElement.dataset.settled = String(newest);
@@ -230,7 +257,7 @@ class Studio {
   }
 
   private floquet({ orbit, milliseconds }: Answer): void {
-    const verdict = verdictInWords(orbit, this.tables.tolerance);
+    const verdict = orbit.found ? verdictInWords(orbit, this.tables.tolerance) : "none found";
     const place = by<HTMLElement>("floquet");
     place.replaceChildren("Periodic motion: ");
     const word = document.createElement("b");
@@ -245,48 +272,16 @@ class Studio {
 
   // The instant that is drawn
 
-  private length(): number {
-    const rows = this.answer?.rows;
-    return rows && rows.count > 0 ? rows.values[(rows.count - 1) * rowLength(this.mechanism)] : 0;
-  }
-
-  private share(): number {
-    return this.length() > 0 ? this.time / this.length() : 0;
-  }
-
-  /** The row nearest to the time. */
-  private nearest(): number {
-    const { values, count } = this.answer!.rows;
-    const length = rowLength(this.mechanism);
-    let [low, high] = [0, count - 1];
-    while (high - low > 1) {
-      const middle = (low + high) >> 1;
-      if (values[middle * length] <= this.time) low = middle;
-      else high = middle;
-    }
-    if (high < 0) return 0;
-    return values[high * length] - this.time < this.time - values[low * length] ? high : low;
-  }
-
-  private advance(seconds: number): void {
-    if (!this.answer || !this.moving || this.held || this.answer.rows.count === 0) return;
-    const length = this.length();
-    if (length === 0) return;
-    this.time = (this.time + seconds * Number(by<HTMLSelectElement>("rate").value)) % length;
-    this.seek(this.nearest());
-  }
-
   /** Draw a row, with its numbers. */
   seek(row: number): void {
-    const rows = this.answer?.rows;
-    if (!rows || rows.count === 0) return;
-    this.row = Math.max(0, Math.min(rows.count - 1, row));
-    const length = rowLength(this.mechanism);
-    const values = this.held ?? rows.values.subarray(this.row * length, (this.row + 1) * length);
+    const { playback } = this;
+    if (playback.count === 0) return;
+    playback.row = Math.max(0, Math.min(playback.count - 1, row));
+    const values = this.held ?? playback.valuesOf(playback.row);
     this.picture.draw(values, (reference) => this.has(reference));
-    this.charts.mark(this.row);
-    by<HTMLInputElement>("scrub").value = String(this.row);
-    this.writeNumbers(values);
+    this.charts.mark(playback.row);
+    this.controls.show(playback);
+    this.tell(values);
   }
 
   private has(reference: number): boolean {
@@ -294,35 +289,12 @@ class Studio {
     return given !== undefined && this.value(given) !== 0;
   }
 
-  /** The table of all outputs at the instant that is drawn. */
-  private listNumbers(): void {
-    const box = document.createElement("details");
-    const head = document.createElement("summary");
-    head.textContent = "Numbers at this instant";
-    const table = document.createElement("table");
-    this.numbers = this.mechanism.outputs.map((output) => {
-      const line = table.insertRow();
-      line.insertCell().textContent = output.name;
-      line.title = output.text;
-      return line.insertCell();
-    });
-    box.append(head, table);
-    box.id = "numbers";
-    by("panel").append(box);
-  }
-
-  private writeNumbers(row: Float64Array): void {
+  private tell(row: Float64Array): void {
     const m = this.mechanism;
-    const crank = m.crank >= 0 ? m.outputs[m.freedoms[m.crank].coordinate] : undefined;
-    const angle = crank ? row[outputAt(m, m.freedoms[m.crank].coordinate)] : 0;
-    by("instant").textContent =
-      `t = ${row[0].toFixed(4)} s${crank ? `, crank at ${((angle * 180) / Math.PI).toFixed(1)} deg` : ""}`;
-    if (!by<HTMLDetailsElement>("numbers").open) return;
-    m.outputs.forEach((output, n) => {
-      const value = row[outputAt(m, n)];
-      this.numbers[n].textContent = shown(value, output, 6);
-      this.numbers[n].dataset.value = String(value);
-    });
+    const angle = m.crank < 0 ? 0 : row[outputAt(m, m.freedoms[m.crank].coordinate)];
+    const crank = m.crank < 0 ? "" : `, crank at ${((angle * 180) / Math.PI).toFixed(1)} deg`;
+    by("instant").textContent = `t = ${row[0].toFixed(4)} s${crank}`;
+    this.numbers.write(row, roundingOf(m, this.playback.answer!.rows));
   }
 
   // Changes
@@ -341,78 +313,82 @@ class Studio {
 
   /** Change what is given, where the links can be joined then; else all stays, and the page says why. */
   private change(values: Record<string, number>, done: boolean, start?: number[]): void {
-    const last = this.state;
-    this.state = { ...last, values: { ...last.values, ...values } };
-    const { sentence } = this.begin();
-    this.fault(sentence);
-    if (sentence) {
-      this.state = last;
-      this.panel.update(last.values);
-      if (done) this.history.keep(last);
-    } else this.put(this.state, done, true, start);
+    const state = { ...this.state, values: { ...this.state.values, ...values } };
+    const { sentence } = this.begin(this.core, this.mechanism, state);
+    this.fault(capital(sentence));
+    if (!sentence) this.put(state, done, true, start);
+    else {
+      this.panel.update(this.state.values);
+      if (done) this.history.keep(this.state);
+      this.name();
+    }
   }
 
   /** Keep the configuration that is drawn. */
   private hold(): void {
-    const rows = this.answer?.rows;
-    const length = rowLength(this.mechanism);
-    if (rows?.count) this.held ??= rows.values.slice(this.row * length, (this.row + 1) * length);
+    if (this.playback.count === 0 || this.held) return;
+    this.held = this.playback.valuesOf(this.playback.row).slice();
+    this.pulled = false;
   }
 
   private drag(joint: number, target: [number, number], done: boolean): void {
-    const m = this.mechanism;
     this.hold();
     if (!this.held) return;
-    const moves = m.picture.joints[joint].moves;
-    const names = new Map(m.given.map((g) => [g.reference, g.name]));
-    const free = moves.filter((reference) => !(this.state.locks ?? []).includes(names.get(reference)!));
-    // the configuration that is drawn is the start of what is dragged
-    const start = m.freedoms.flatMap((f): [number, number][] => [
-      [f.initial[0], this.held![outputAt(m, f.coordinate)]],
-      [f.initial[1], this.held![outputAt(m, f.rate)]],
-    ]);
-    this.core.give([...givenOf(m, this.state.values), ...start]);
-    const { values: row, sentence } = free.length
-      ? this.core.drag(joint, free, this.view.matrix.slice(0, 6), target)
-      : { values: this.held, sentence: `${moves.map((r) => names.get(r)).join(" and ")} locked` };
-    this.fault(sentence);
-    this.held = row;
-    const initial = new Set(start.map(([reference]) => reference));
-    const pulled = free.length > 0 && free.every((reference) => initial.has(reference));
-    const moved = pulled ? start.map(([reference]) => reference) : free.filter((r) => !initial.has(r));
-    const values = Object.fromEntries(moved.map((r) => [names.get(r)!, this.core.given(r)]));
-    const source: Source = pulled ? "run" : (this.state.source ?? "steady");
-    const state: State = { ...this.state, source, values: { ...this.state.values, ...values } };
+    const state = this.pull(joint, target, this.held);
     if (done) {
-      this.time = pulled ? 0 : this.resumed(row);
+      this.playback.time = this.pulled ? 0 : this.playback.resumed(this.held);
       this.held = undefined;
-      by<HTMLSelectElement>("source").value = source;
     }
-    this.put(state, done);
-    this.seek(this.row);
+    if (state || done) this.put(state ?? this.state, done);
+    this.seek(this.playback.row);
   }
 
-  /** When the motion comes to the crank angle of a row: the rows of a turn are at equal steps of it. */
-  private resumed(row: Float64Array): number {
+  /** The state in which a joint comes to a place, as far as the links let it; none where nothing moves. */
+  private pull(joint: number, target: [number, number], held: Float64Array): State | undefined {
     const m = this.mechanism;
-    if (m.crank < 0 || this.answer!.source !== "steady") return this.time;
-    const freedom = m.freedoms[m.crank];
-    const turns = row[outputAt(m, freedom.coordinate)] / freedom.period;
-    const { values, count } = this.answer!.rows;
-    return values[Math.round((turns - Math.floor(turns)) * (count - 1)) * rowLength(m)];
+    const at = jointAt(m, joint);
+    const [x, y] = this.view.seen(held[at], held[at + 1], held[at + 2]);
+    this.fault("");
+    if (Math.hypot(x - target[0], y - target[1]) * this.view.scale < NEAR) return undefined;
+    const given = new Map(m.given.map((g) => [g.reference, g]));
+    const moves = m.picture.joints[joint].moves.map((reference) => given.get(reference)!);
+    const free = moves
+      .filter(({ name }) => !(this.state.locks ?? []).includes(name))
+      .map(({ reference }) => reference);
+    if (free.length === 0) {
+      this.fault(capital(`${moves.map(called).join(" and ")} ${moves.length > 1 ? "are" : "is"} locked`));
+      return undefined;
+    }
+    // the configuration that is drawn is the start of what is dragged
+    const start = m.freedoms.flatMap((f): [number, number][] => [
+      [f.initial[0], held[outputAt(m, f.coordinate)]],
+      [f.initial[1], held[outputAt(m, f.rate)]],
+    ]);
+    this.core.give([...givenOf(m, this.state.values), ...start]);
+    const before = free.map((reference) => this.core.given(reference));
+    const { values: row, sentence } = this.core.drag(joint, free, this.view.matrix.slice(0, 6), target);
+    this.fault(capital(sentence));
+    if (free.every((reference, n) => this.core.given(reference) === before[n])) return undefined;
+    this.held = row;
+    const initial = new Set(start.map(([reference]) => reference));
+    const pulled = free.every((reference) => initial.has(reference));
+    this.pulled ||= pulled;
+    const moved = pulled ? [...initial] : free.filter((reference) => !initial.has(reference));
+    const values = Object.fromEntries(moved.map((r) => [given.get(r)!.name, this.core.given(r)]));
+    const state: State = { ...this.state, values: { ...this.state.values, ...values } };
+    return pulled ? { ...state, source: "run" } : state;
   }
 
   /** Show a state that comes from elsewhere, as a step that can be undone. */
-  private take(state: State): void {
+  private async take(state: State): Promise<void> {
+    if (await this.open(state)) return;
     this.history.keep(state);
-    void this.restore(state);
+    this.name();
   }
 
   /** Show another state; for scripts too. */
   async restore(state: State | undefined): Promise<void> {
-    if (!state) return;
-    await this.open(state);
-    by<HTMLSelectElement>("source").value = state.source ?? "steady";
+    if (state) await this.open(state);
   }
 
   /** The other assembly: the first sign that says how the links are joined. */
@@ -427,10 +403,7 @@ class Studio {
   }
 
   private name(): void {
-    by("title").textContent = this.state.title;
-    const { name, given, sets } = this.mechanism;
-    const set = sets.find(({ values }) => given.every((g) => (values[g.name] ?? g.start) === this.value(g)));
-    by<HTMLSelectElement>("set").value = set ? `${name}/${set.name}` : "";
+    this.controls.name(this.state);
     by<HTMLButtonElement>("undo").disabled = !this.history.canUndo;
     by<HTMLButtonElement>("redo").disabled = !this.history.canRedo;
   }
@@ -438,16 +411,16 @@ class Studio {
   // The page
 
   private play(moving: boolean): void {
-    this.moving = moving;
-    by("play").textContent = moving ? "Pause" : "Move";
+    this.playback.moving = moving;
+    this.controls.show(this.playback);
   }
 
   private theme(dark: boolean): void {
     document.documentElement.dataset.theme = dark ? "dark" : "light";
-    if (this.answer) {
-      this.charts.show(this.mechanism, this.answer.source);
-      this.charts.data(this.answer.rows, this.answer.source);
-    }
+    const { answer } = this.playback;
+    if (!answer) return;
+    this.charts.show(this.mechanism, answer.source);
+    this.charts.data(answer.rows, answer.source);
   }
 
   private wire(): void {
@@ -457,64 +430,27 @@ class Studio {
     this.view.onChange = () => {
       this.backdrop.draw();
       this.python.draw();
-      if (!this.answer) return;
-      this.picture.drawPaths(this.answer.rows.values);
-      this.seek(this.row);
+      const { answer } = this.playback;
+      if (!answer) return;
+      this.picture.drawPaths(answer.rows.values);
+      this.seek(this.playback.row);
     };
-    new ResizeObserver(() => {
-      if (!this.answer) return;
-      this.picture.fit(this.answer.rows.values);
-      this.view.onChange();
-    }).observe(by("picture"));
-    const rate = by<HTMLSelectElement>("rate");
-    for (const value of RATES) rate.add(new Option(value === 1 ? "1" : `1/${1 / value}`, String(value)));
-    rate.value = String(1 / 10);
-    const sets = by<HTMLSelectElement>("set");
-    sets.add(new Option("values of its own", ""));
-    for (const m of this.tables.mechanisms)
-      for (const { name, source } of m.sets) {
-        const option = new Option(`${m.title}: ${name}`, `${m.name}/${name}`);
-        option.title = source;
-        sets.add(option);
-      }
-    sets.addEventListener("change", () => {
-      const [mechanism, name] = sets.value.split("/");
-      const set = this.tables.mechanisms.find((m) => m.name === mechanism)?.sets.find((s) => s.name === name);
-      if (!set) return;
-      this.take({ mechanism, title: set.source, values: { ...set.values } });
-    });
-    const actions: Record<string, () => void> = {
-      play: () => this.play(!this.moving),
-      undo: () => void this.restore(this.history.undo()),
-      redo: () => void this.restore(this.history.redo()),
-      assembly: () => this.assemble(),
-      theme: () => this.theme(document.documentElement.dataset.theme !== "dark"),
-    };
-    for (const [id, action] of Object.entries(actions)) by(id).addEventListener("click", action);
-    for (const button of document.querySelectorAll<HTMLElement>("[data-look]"))
-      button.addEventListener("click", () => this.look(button.dataset.look!));
+    new ResizeObserver(() => this.refit()).observe(by("picture"));
     addEventListener("hashchange", () => {
       try {
         const state = stateIn(location.href, this.tables);
-        if (state) this.take(state);
+        if (state) void this.take(state);
       } catch (error) {
         this.fault((error as Error).message);
       }
     });
-    const choice = by<HTMLSelectElement>("save");
-    choice.addEventListener("change", () => {
-      void this.save(choice.value);
-      choice.value = "";
-    });
-    by("scrub").addEventListener("input", () => {
-      this.play(false);
-      this.go(Number(by<HTMLInputElement>("scrub").value));
-    });
-    by("source").addEventListener("change", () =>
-      this.put({ ...this.state, source: by<HTMLSelectElement>("source").value as Source }, true),
-    );
-    by("panel").addEventListener("toggle", () => this.seek(this.row), true);
-    addEventListener("keydown", (event) => this.key(event, actions));
+    by("panel").addEventListener("toggle", () => this.seek(this.playback.row), true);
+  }
+
+  private refit(): void {
+    if (!this.playback.answer) return;
+    this.picture.fit(this.playback.answer.rows.values);
+    this.view.onChange();
   }
 
   private look(name: string): void {
@@ -522,77 +458,37 @@ class Studio {
     else if (name === "smaller") this.view.smaller();
     else {
       this.view.look(name);
-      if (this.answer) this.picture.fit(this.answer.rows.values);
-      this.view.onChange();
+      this.refit();
     }
   }
 
   /** Save what is shown, in one of the forms of the list. */
   private async save(form: string): Promise<void> {
-    const m = this.mechanism;
-    const rows = this.answer?.rows;
-    const text = (content: string, type: string): Blob => new Blob([content], { type });
-    if (form === "case")
-      save("case.toml", text(caseText(m, this.state, this.duration()), "application/toml"));
-    else if (form === "python")
-      save("case.py", text(pythonText(m, this.state, this.duration(), this.answer?.orbit), "text/x-python"));
-    else if (form === "ssv") save("parameters.ssv", text(parameterText(m, this.state), "application/xml"));
-    else if (form === "dxf") save("drawing.dxf", text(dxfText(this.picture.drawn()), "image/vnd.dxf"));
-    else if (form === "table" && rows) save("motion.csv", text(tableText(m, rows), "text/csv"));
-    else if (form === "svg") save("drawing.svg", text(this.picture.svgText(), "image/svg+xml"));
-    else if (form === "png") {
-      const { width, height } = by<SVGSVGElement>("picture").getBoundingClientRect();
-      const back = getComputedStyle(document.body).getPropertyValue("--card");
-      save("drawing.png", await pixels(this.picture.svgText(), width, height, back));
-    } else if (form === "link") {
-      history.replaceState(null, "", linkOf({ ...this.state, view: this.view.kept }));
-      this.fault("");
-      by("words").textContent = "The address of this page now holds its state: copy it.";
-    }
+    const { mechanism, state, picture: drawing } = this;
+    const { rows, orbit } = this.playback.answer ?? {};
+    await saveAs(form, { mechanism, state, duration: this.duration(), rows, orbit, drawing });
+    if (form !== "link") return;
+    history.replaceState(null, "", linkOf({ ...state, view: this.view.kept }));
+    this.fault("");
+    by("words").textContent = "The address of this page now holds its state: copy it.";
   }
 
   /** Go to a row, and on from there. */
   go(row: number): void {
-    if (!this.answer) return;
+    if (!this.playback.answer) return;
     this.seek(row);
-    this.time = this.answer.rows.values[this.row * rowLength(this.mechanism)];
+    this.playback.time = this.playback.timeOf(this.playback.row);
   }
 
-  private key(event: KeyboardEvent, actions: Record<string, () => void>): void {
-    const typing = event.target instanceof Element && event.target.matches("input, select, textarea");
-    const control = event.ctrlKey || event.metaKey;
-    let action: (() => void) | undefined;
-    if (control && event.key.toLowerCase() === "z") action = event.shiftKey ? actions.redo : actions.undo;
-    else if (control && event.key.toLowerCase() === "y") action = actions.redo;
-    else if (!typing && !control && !event.altKey)
-      action = {
-        " ": (event.target as Element).matches("button, summary, a") ? undefined : actions.play,
-        a: actions.assembly,
-        l: actions.theme,
-        ",": () => this.step(-1),
-        ".": () => this.step(1),
-        ...Object.fromEntries(Object.entries(LOOKS).map(([key, name]) => [key, () => this.look(name)])),
-      }[event.key];
-    if (!action) return;
-    event.preventDefault();
-    action();
-  }
-
-  private step(by: number): void {
+  private pause(row: number): void {
     this.play(false);
-    this.go(this.row + by);
+    this.go(row);
   }
 
   /** For scripts: the rows that are shown, and which of them is drawn. */
   shown(): { rows: Rows; row: number; source: Source; answer: Answer } | undefined {
-    return (
-      this.answer && {
-        rows: this.answer.rows,
-        row: this.row,
-        source: this.answer.source,
-        answer: this.answer,
-      }
-    );
+    const { answer, row } = this.playback;
+    return answer && { rows: answer.rows, row, source: answer.source, answer };
   }
 }
 

@@ -5,6 +5,11 @@ import { called, digits } from "./words";
 
 /** Sections that are open at first. */
 const OPEN = ["Dimensions", "Drive and loads"];
+/** The section whose amounts a drag changes, but for those that are locked. */
+const LOCKABLE = "Dimensions";
+const KEPT = "A drag leaves a dimension with a tick as it is";
+/** What is written in a field: no digit before the point is lost. */
+const written = (value: number): string => digits(value, Math.abs(value) >= 1e5 ? 6 : 5);
 const ORDER = ["Dimensions", "Drive and loads", "Spring, damper, friction", "Masses", "Gravity", "Start"];
 
 export interface Listener {
@@ -52,6 +57,7 @@ export class Panel {
       const head = document.createElement("summary");
       head.textContent = name;
       box.append(head);
+      if (name === LOCKABLE) box.append(this.heading());
       for (const given of mechanism.given.filter((g) => g.section === name))
         box.append(this.row(given, values[given.name] ?? given.start, locks.includes(given.name)));
       this.place.append(box);
@@ -79,6 +85,18 @@ export class Panel {
           if (given.argument && mode.arguments.includes(given.argument))
             line.classList.toggle("idle", given.argument !== acting);
       }
+  }
+
+  /** Over the boxes that lock a dimension. */
+  private heading(): HTMLElement {
+    const line = document.createElement("div");
+    line.className = "row";
+    const words = document.createElement("span");
+    words.className = "heading";
+    words.textContent = "lock";
+    words.title = KEPT;
+    line.append(words);
+    return line;
   }
 
   private row(given: Given, value: number, locked: boolean): HTMLElement {
@@ -127,7 +145,7 @@ export class Panel {
       }
       slider.value = String(now);
       slider.setAttribute("aria-valuetext", `${digits(now * given.factor)} ${given.unit}`);
-      if (all || document.activeElement !== field) field.value = digits(now * given.factor, 6);
+      if (all || document.activeElement !== field) field.value = written(now * given.factor);
       field.dataset.value = String(now);
     };
     slider.addEventListener("input", () => this.listener.change(given.name, Number(slider.value), false));
@@ -141,7 +159,7 @@ export class Panel {
       update(current, true);
     });
     line.append(slider, field, unit);
-    if (given.section === "Dimensions") line.append(this.locker(given, locked));
+    if (given.section === LOCKABLE) line.append(this.locker(given, locked));
     this.rows.push({ given, line, update });
     update(value);
   }
@@ -151,8 +169,8 @@ export class Panel {
     this.locks.set(given.name, lock);
     lock.type = "checkbox";
     lock.checked = locked;
-    lock.title = "A drag leaves it as it is";
-    lock.setAttribute("aria-label", `${called(given)}: locked, a drag leaves it as it is`);
+    lock.title = KEPT;
+    lock.setAttribute("aria-label", `${called(given)}: lock. ${KEPT}`);
     lock.addEventListener("change", () => this.listener.lock(given.name, lock.checked));
     return lock;
   }

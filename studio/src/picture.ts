@@ -79,6 +79,15 @@ export class Picture {
   ) {
     this.view = new View(svg);
     this.view.free = () => this.held < 0;
+    // a finger on a free place scrolls the page; what it takes hold of it moves, and two enlarge
+    svg.addEventListener(
+      "touchstart",
+      (event) => {
+        const taken = (event.target as Element).closest('[role="button"], #behind, .drawing');
+        if (event.cancelable && (taken || event.touches.length > 1)) event.preventDefault();
+      },
+      { passive: false },
+    );
   }
 
   /** Draw another mechanism. */
@@ -181,10 +190,16 @@ export class Picture {
     return found;
   }
 
+  /** Width and height (px). */
+  get size(): Point {
+    const { width, height } = this.svg.getBoundingClientRect();
+    return [width, height];
+  }
+
   /** The picture as a file of its own, without what is behind it. */
   svgText(): string {
     const copy = this.svg.cloneNode(true) as SVGSVGElement;
-    const { width, height } = this.svg.getBoundingClientRect();
+    const [width, height] = this.size;
     copy.setAttribute("xmlns", SPACE);
     copy.setAttribute("width", String(width));
     copy.setAttribute("height", String(height));

@@ -67,6 +67,8 @@ export abstract class Search {
   readonly box = document.createElement("figure");
   protected readonly plane: Plane;
   protected readonly words = document.createElement("div");
+  /** What is wrong with a range. */
+  private readonly fault = document.createElement("p");
   protected readonly axes: Axis[];
   protected context: Context | undefined;
   private readonly explorer = new Explorer((found, done) => this.take(found, done));
@@ -87,7 +89,9 @@ export abstract class Search {
     const row = document.createElement("div");
     row.className = "axes";
     this.axes = names.map((name) => this.axis(row, name));
-    this.box.append(row);
+    this.fault.className = "fault";
+    this.fault.setAttribute("role", "alert");
+    this.box.append(row, this.fault);
     this.plane = new Plane(this.box, height);
     this.words.setAttribute("aria-live", "polite");
     this.words.className = "told";
@@ -148,15 +152,19 @@ export abstract class Search {
     const { context } = this;
     if (!context) return;
     this.choices(context);
-    if (context.orbit.place < 0) {
+    const names = this.axes.map(({ given }) => given?.name);
+    let none = "";
+    if (context.orbit.place < 0) none = "All motion is prescribed: nothing is free to swing.";
+    else if (new Set(names).size < names.length)
+      none = `Both axes are the ${called(this.axes[0].given!)}: choose another variable for one of them.`;
+    if (none) {
       this.forget();
       this.ranges = [];
       this.clear();
       this.plane.wipe();
-      this.words.textContent = "All motion is prescribed: nothing is free to swing.";
+      this.words.textContent = none;
       return;
     }
-    const names = this.axes.map(({ given }) => given?.name);
     const kept = Object.entries(context.values).filter(([name]) => !names.includes(name));
     const ranges = this.axes.map(({ given }) => given && this.typed.get(given.name));
     const key = JSON.stringify([kept, names, ranges, context.orbit.found]);
@@ -219,6 +227,7 @@ export abstract class Search {
     const axis: Axis = { select, ends: [], given: undefined };
     select.addEventListener("change", () => {
       axis.given = this.context!.mechanism.given.find((given) => given.name === select.value);
+      this.fault.textContent = "";
       this.renew();
     });
     box.append(select);
@@ -228,8 +237,13 @@ export abstract class Search {
       end.step = "any";
       end.setAttribute("aria-label", `${name}: ${word}`);
       end.addEventListener("change", () => {
-        const [low, high] = axis.ends.map((one) => Number(one.value) / axis.given!.factor);
-        if (low < high) this.typed.set(axis.given!.name, [low, high]);
+        const given = axis.given!;
+        const [low, high] = axis.ends.map((one) => one.valueAsNumber / given.factor);
+        const right = low < high;
+        if (right) this.typed.set(given.name, [low, high]);
+        this.fault.textContent = right
+          ? ""
+          : `The ${called(given)} must go from a smaller to a larger number: the chart keeps the range that it has.`;
         this.renew();
       });
       box.append(` ${word} `, end);

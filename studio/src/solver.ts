@@ -1,51 +1,48 @@
 /** The worker, given the newest task when it is done with the one before. */
 
-import { bytesOf } from "./core";
+import { Background } from "./background";
 import type { Mechanism } from "./tables";
 import type { Answer, Task } from "./worker";
 
+export interface SolverListener {
+  answered(answer: Answer, newest: boolean): void;
+  /** A task was given up. */
+  failed(sentence: string): void;
+}
+
 export class Solver {
-  private readonly worker = new Worker(URL.createObjectURL(new Blob([WORKER], { type: "text/javascript" })));
+  private readonly background: Background<Answer>;
   private id = 0;
   private busy = false;
   private next: Task | undefined;
-  private mechanism: Mechanism | undefined;
 
-  constructor(answered: (answer: Answer, newest: boolean) => void) {
-    this.worker.addEventListener("message", ({ data }: MessageEvent<Answer>) => {
-      this.busy = false;
-      const task = this.next;
-      this.next = undefined;
-      if (task) this.post(task);
-      answered(data, data.id === this.id);
-    });
+  constructor(listener: SolverListener) {
+    this.background = new Background(
+      (answer) => {
+        this.go();
+        listener.answered(answer, answer.id === this.id);
+      },
+      (sentence) => {
+        this.go();
+        listener.failed(sentence);
+      },
+    );
   }
 
   /** The next tasks are of this mechanism. */
-  async use(mechanism: Mechanism, bytes?: ArrayBuffer): Promise<void> {
-    const made = bytes ?? (await bytesOf(mechanism));
-    this.mechanism = mechanism;
-    this.module = made;
+  use(mechanism: Mechanism, bytes: ArrayBuffer): void {
+    this.background.use(mechanism, bytes);
   }
-
-  private module: ArrayBuffer | undefined;
 
   ask(task: Omit<Task, "id">): void {
-    const whole: Task = { ...task, id: ++this.id };
-    if (this.mechanism) {
-      whole.mechanism = this.mechanism;
-      whole.bytes = this.module;
-      this.mechanism = undefined;
-    } else if (this.next?.mechanism) {
-      whole.mechanism = this.next.mechanism;
-      whole.bytes = this.next.bytes;
-    }
-    if (this.busy) this.next = whole;
-    else this.post(whole);
+    this.next = { ...task, id: ++this.id };
+    if (!this.busy) this.go();
   }
 
-  private post(task: Task): void {
-    this.busy = true;
-    this.worker.postMessage(task);
+  private go(): void {
+    const task = this.next;
+    this.next = undefined;
+    this.busy = task !== undefined;
+    if (task) this.background.give(task);
   }
 }

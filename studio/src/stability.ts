@@ -42,6 +42,7 @@ export class Stability extends Search {
   protected take(found: Found[], done: boolean): void {
     for (const one of found)
       if ("cell" in one) this.cells.set(one.cell.row * this.grid[0] + one.cell.column, one.cell);
+      else if ("sentence" in one) this.words.textContent = one.sentence;
     this.done = done;
     this.draw();
   }

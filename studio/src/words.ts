@@ -1,7 +1,7 @@
 /** Numbers and verdicts in words. */
 
 import type { Orbit, Rows } from "./core";
-import { type Given, type Mechanism, type Output, outputAt, rowLength, type Source } from "./tables";
+import { type Given, type Mechanism, type Output, outputAt, rowLength, type Values } from "./tables";
 
 /** A number as people read it, with so many digits. */
 export function digits(value: number, count = 4): string {
@@ -20,31 +20,111 @@ const column = (m: Mechanism, rows: Rows, output: number): number[] => {
   return Array.from({ length: rows.count }, (_, i) => rows.values[i * length + outputAt(m, output)]);
 };
 
+/** Share of the largest number of a unit below which another of that unit is rounding. */
+const ROUNDING = 1e-12;
+const roundings = new WeakMap<Rows, Map<string, number>>();
+
+/** Below which size the numbers of a motion are rounding (SI), by their unit on the page. */
+export function roundingOf(m: Mechanism, rows: Rows): Map<string, number> {
+  const known = roundings.get(rows);
+  if (known) return known;
+  const found = new Map<string, number>();
+  roundings.set(rows, found);
+  const length = rowLength(m);
+  m.outputs.forEach(({ unit }, output) => {
+    let largest = found.get(unit) ?? 0;
+    for (let at = outputAt(m, output); at < rows.values.length; at += length)
+      largest = Math.max(largest, ROUNDING * Math.abs(rows.values[at]));
+    found.set(unit, largest);
+  });
+  return found;
+}
+
+/** A number as it stands in a sentence, and the units that people read in the place of SI. */
+const N = String.raw`(-?\d+(?:\.\d+)?(?:e[-+]?\d+)?)`;
+const READ: [string, string, number][] = [
+  ["rad/s", "rpm", 30 / Math.PI],
+  ["rad", "deg", 180 / Math.PI],
+  ["m", "mm", 1e3],
+];
+const turned = (degrees: string): string => digits(((Number(degrees) % 360) + 360) % 360);
+const article = (noun: string): string => (/^[aeiou]/.test(noun) ? "an" : "a");
+/** What is done to a sentence, one after another. */
+const REWRITTEN: [RegExp, (whole: string, ...parts: string[]) => string][] = [
+  [/^in the step from t = (\S+) s: (.*)$/, (_, time, rest) => `${rest}, after ${time} s`],
+  [/in the step from t = (\S+) s: /g, (_, time) => `after ${time} s: `],
+  [/limit of assembly (?:at|near) /g, () => "the links cannot be joined beyond "],
+  [RegExp(`${N} rad \\(${N} deg\\)`, "g"), (_, _radians, degrees) => `${turned(degrees)} deg`],
+  ...READ.map(([unit, shown, factor]): (typeof REWRITTEN)[number] => [
+    RegExp(`${N} ${unit}(?![\\w/.^²³])`, "g"),
+    (_, value) => `${digits(factor * Number(value))} ${shown}`,
+  ]),
+  [
+    RegExp(`(?<=\\b(?:at|near|beyond|and) )(\\w+ \\w+) (?=${N} (?:deg|mm)\\b)`, "g"),
+    (_, noun) => `${article(noun)} ${noun} of `,
+  ],
+  [RegExp(N, "g"), (number) => (number.replace(/\D/g, "").length > 4 ? digits(Number(number)) : number)],
+];
+
+/** A sentence of the equations or of Python as people read it: in their units, and with the digits that count. */
+export function plainly(sentence: string, m?: Mechanism): string {
+  const [, name, value, rest] = RegExp(`^parameter (\\S+) is ${N}:(.*)`).exec(sentence) ?? [];
+  const given = m?.given.find((one) => one.name === name);
+  const read = given ? `the ${called(given)} is ${shown(Number(value), given)}:${rest}` : sentence;
+  return REWRITTEN.reduce((text, [pattern, change]) => text.replace(pattern, change), read);
+}
+
+/** Where the crank is driven by a torque, whether there is one: of an input or of a motor. */
+export function isDriven(m: Mechanism, values: Values): boolean {
+  const value = (given: Given): number => values[given.name] ?? given.start;
+  const mode = m.given.find((given) => m.crank >= 0 && given.reference === m.freedoms[m.crank].mode);
+  const chosen = mode?.arguments?.[value(mode)];
+  const torques = m.given.filter((given) => given.argument === chosen);
+  const forced = torques.some((given) => given.kind === "force");
+  return (
+    !forced ||
+    torques.some((given) => value(given) !== 0 && (given.kind === "force" || given.reference === -1))
+  );
+}
+
 /** The least distance of the transmission angle from its limits, 0 and 180 deg (rad). */
 export function leastTransmission(m: Mechanism, rows: Rows): number {
   return Math.min(...column(m, rows, m.transmission).map((angle) => Math.min(angle, Math.PI - angle)));
 }
 
+export const capital = (text: string): string => text.charAt(0).toUpperCase() + text.slice(1);
+
+/** What says once more that there is no periodic motion. */
+const REPEATED = /^no periodic motion found: |: there is no periodic motion( over an angle)?$/;
+
 /** Whether the crank turns all round, how the links stand, and how far they swing. */
-export function motionInWords(m: Mechanism, rows: Rows, source: Source, orbit: Orbit): string {
+export function motionInWords(m: Mechanism, rows: Rows, orbit: Orbit, values: Values): string {
+  // what cannot begin is said where the faults are
+  if (rows.count === 0) return "";
   const parts: string[] = [];
-  if (rows.sentence) parts.push(`Comes to an end: ${rows.sentence}`);
-  else if (m.crank >= 0) {
-    const turned = column(m, rows, m.freedoms[m.crank].coordinate);
-    const whole = Math.max(...turned) - Math.min(...turned) >= m.freedoms[m.crank].period * (1 - 1e-9);
-    parts.push(whole ? "Turns fully" : "Does not turn fully in this time");
+  if (!rows.sentence && m.crank >= 0) {
+    const angles = column(m, rows, m.freedoms[m.crank].coordinate);
+    const whole = Math.max(...angles) - Math.min(...angles) >= m.freedoms[m.crank].period * (1 - 1e-9);
+    parts.push(whole ? "turns fully" : "does not turn fully in this time");
   }
-  if (m.transmission >= 0 && rows.count > 0)
+  if (m.transmission >= 0)
     parts.push(`least transmission angle ${digits((leastTransmission(m, rows) * 180) / Math.PI)} deg`);
-  for (const output of rows.count > 0 ? m.moving : []) {
+  const rounding = roundingOf(m, rows);
+  for (const output of m.moving) {
     const path = column(m, rows, output);
     const range = Math.max(...path) - Math.min(...path);
     const of = m.outputs[output];
-    if (range > 0) parts.push(`${of.name.replace(".", " ")} over ${shown(range, of)}`);
+    parts.push(
+      `${called(of)} ${range > rounding.get(of.unit)! ? `varies by ${shown(range, of)}` : "at rest"}`,
+    );
   }
-  const why =
-    source === "run" && !orbit.found && orbit.sentence ? ` No periodic motion: ${orbit.sentence}.` : "";
-  return `${parts.join(", ")}.${why}`;
+  const sentences = [parts.join(", ")];
+  if (rows.sentence) sentences.unshift(`Comes to an end: ${rows.sentence}`);
+  const why = isDriven(m, values)
+    ? orbit.sentence.replace(REPEATED, "")
+    : "the crank is driven by a torque and none is given";
+  if (!orbit.found && orbit.sentence !== rows.sentence) sentences.push(`No periodic motion: ${why}`);
+  return sentences.map((text) => `${capital(text)}.`).join(" ");
 }
 
 /** The verdict that the Floquet multipliers give. */

@@ -79,5 +79,6 @@ async function search({ search: id, exploration }: Search): Promise<void> {
 
 addEventListener("message", ({ data }: MessageEvent<Task | Search>) => {
   if (data.mechanism && data.bytes) core = Core.make(data.mechanism, data.bytes);
-  void ("search" in data ? search(data) : answer(data));
+  // the page hears of it as of any other error of its worker
+  ("search" in data ? search(data) : answer(data)).catch(reportError);
 });

@@ -1,7 +1,8 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 import type { Orbit, Rows } from "../src/core";
-import { digits, motionInWords, multiplierInWords, shown, verdictInWords } from "../src/words";
+import type { Values } from "../src/tables";
+import { digits, motionInWords, multiplierInWords, plainly, shown, verdictInWords } from "../src/words";
 import { WHEEL } from "./wheel";
 
 const orbit = (first: [number, number]): Orbit => ({
@@ -41,16 +42,61 @@ test("a verdict has a margin, and a multiplier its modulus", () => {
 });
 
 test("a motion is described by its turn and its range", () => {
-  const none = { ...orbit([0, 0]), found: false, sentence: "it does not settle" };
+  const found = orbit([0, 0]);
+  const none = { ...found, found: false, sentence: "it does not settle" };
   const whole = rows([0, 0.1], [3, -0.1], [2 * Math.PI, 0.1]);
+  assert.equal(motionInWords(WHEEL, whole, found, {}), "Turns fully, rim position varies by 200 mm.");
+  // what is rounding is none
+  const still = rows([0, 0.1], [3, 0.1 + 1e-15]);
   assert.equal(
-    motionInWords(WHEEL, whole, "steady", orbit([0, 0])),
-    "Turns fully, rim position over 200 mm.",
-  );
-  assert.equal(
-    motionInWords(WHEEL, rows([0, 0], [3, 0]), "run", none),
-    "Does not turn fully in this time. No periodic motion: it does not settle.",
+    motionInWords(WHEEL, still, none, {}),
+    "Does not turn fully in this time, rim position at rest. No periodic motion: it does not settle.",
   );
   const ended = { ...whole, sentence: "the links part" };
-  assert.match(motionInWords(WHEEL, ended, "run", none), /^Comes to an end: the links part/);
+  assert.equal(
+    motionInWords(WHEEL, ended, { ...none, sentence: "the links part" }, {}),
+    "Comes to an end: the links part. Rim position varies by 200 mm.",
+  );
+  assert.equal(motionInWords(WHEEL, { ...ended, count: 0 }, none, {}), "");
+  assert.match(
+    motionInWords(
+      WHEEL,
+      whole,
+      { ...none, sentence: "the crank is at rest: there is no periodic motion" },
+      {},
+    ),
+    /No periodic motion: the crank is at rest\.$/,
+  );
+});
+
+test("a crank that is driven by a torque and has none is told of", () => {
+  const none = { ...orbit([0, 0]), found: false, sentence: "a turn cannot be followed" };
+  const whole = rows([0, 0.1], [2 * Math.PI, -0.1]);
+  const said = (values: Values): string => motionInWords(WHEEL, whole, none, values);
+  assert.match(said({ "drive.mode": 0 }), /: the crank is driven by a torque and none is given\.$/);
+  assert.match(said({ "drive.mode": 0, "drive.torque": 2 }), /: a turn cannot be followed\.$/);
+  assert.match(said({ "drive.mode": 1 }), /: a turn cannot be followed\.$/);
+});
+
+test("sentences of the equations are read in the units of the page", () => {
+  const read = (sentence: string): string => plainly(sentence, WHEEL);
+  const at = "crank angle 69.1135784 rad (3959.91635 deg) and slider position -0.103371364 m";
+  assert.equal(
+    read(`in the step from t = 0.760714286 s: limit of assembly at ${at}`),
+    "the links cannot be joined beyond a crank angle of 359.9 deg and a slider position of -103.4 mm, after 0.7607 s",
+  );
+  assert.equal(
+    read("the links cannot be joined at crank angle -0.8 rad (-45.8366236 deg)"),
+    "the links cannot be joined at a crank angle of 314.2 deg",
+  );
+  assert.equal(
+    read("a turn cannot be followed beyond crank angle 337.5 deg"),
+    "a turn cannot be followed beyond a crank angle of 337.5 deg",
+  );
+  assert.equal(
+    read("parameter wheel.radius is -0.1: it must be at least 0.012345678 kg.m2"),
+    "the wheel radius is -100 mm: it must be at least 0.01235 kg.m2",
+  );
+  assert.equal(read("it turns at 10.4719755 rad/s: see 0.5 rad"), "it turns at 100 rpm: see 28.65 deg");
+  assert.equal(read("a damper of 12 N/m at 1.5 m/s"), "a damper of 12 N/m at 1.5 m/s");
 });

@@ -11,6 +11,7 @@ import pytest
 from click.testing import CliRunner, Result
 
 from analysis import cli
+from analysis.studio import PAGE
 from benchmarks.studio import chromium
 
 if TYPE_CHECKING:
@@ -64,6 +65,30 @@ def browser(launched: Callable[..., Browser]) -> Iterator[Browser]:
     made = launched()
     yield made
     made.close()
+
+
+@pytest.fixture
+def phone(browser: Browser) -> Iterator[Any]:
+    """The page on a phone, paused, and a finger or two on it: `touch(kind, points)`."""
+    context = browser.new_context(
+        viewport={"width": 390, "height": 844}, has_touch=True, is_mobile=True, device_scale_factor=2
+    )
+    made = context.new_page()
+    made.set_default_timeout(120_000)
+    made.on("pageerror", lambda error: pytest.fail(f"the page: {error}"))
+    made.goto(PAGE.as_uri())
+    made.wait_for_function("document.documentElement.dataset.ready")
+    made.tap("#play")
+    line = context.new_cdp_session(made)
+
+    def touch(kind: str, *points: tuple[float, float]) -> None:
+        fingers = [{"x": x, "y": y, "id": n} for n, (x, y) in enumerate(points)]
+        line.send("Input.dispatchTouchEvent", {"type": f"touch{kind}", "touchPoints": fingers})
+        # moves are taken at the next frame
+        made.evaluate("new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(() => done(0))))")
+
+    yield made, touch
+    context.close()
 
 
 def csv(path: Path) -> dict[str, np.ndarray]:

@@ -284,28 +284,6 @@ def test_a_joint_follows_the_pointer_where_the_view_is_turned_and_enlarged(page:
     assert page.evaluate("window.studio.picture.view.kept.slice(2)") == pytest.approx([1.0, 0.0, 0.0], abs=1e-12)
 
 
-@pytest.fixture
-def phone(browser: Any) -> Iterator[Any]:
-    """The page on a phone, paused, and a finger or two on it: `touch(kind, points)`."""
-    context = browser.new_context(viewport=PHONE, has_touch=True, is_mobile=True, device_scale_factor=2)
-    made = context.new_page()
-    made.set_default_timeout(120_000)
-    made.on("pageerror", lambda error: pytest.fail(f"the page: {error}"))
-    made.goto(PAGE.as_uri())
-    made.wait_for_function("document.documentElement.dataset.ready")
-    made.tap("#play")
-    line = context.new_cdp_session(made)
-
-    def touch(kind: str, *points: tuple[float, float]) -> None:
-        fingers = [{"x": x, "y": y, "id": n} for n, (x, y) in enumerate(points)]
-        line.send("Input.dispatchTouchEvent", {"type": f"touch{kind}", "touchPoints": fingers})
-        # moves are taken at the next frame
-        made.evaluate("new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(() => done(0))))")
-
-    yield made, touch
-    context.close()
-
-
 @in_browser
 def test_fingers_drag_a_joint_move_the_drawing_and_enlarge_it(phone: Any) -> None:
     page, touch = phone
@@ -370,7 +348,16 @@ def test_links_are_told_apart_without_colour_vision() -> None:
             seen = {name: lab(np.clip(matrix @ colour[name], 0, 1)) for name in ("crank", "coupler", "rocker")}
             for a, b in (("crank", "coupler"), ("crank", "rocker"), ("coupler", "rocker")):
                 assert np.linalg.norm(seen[a] - seen[b]) > 20, (kind, a, b)
-        for name, least in (("crank", 3), ("coupler", 3), ("rocker", 3), ("text", 7), ("soft", 4.5), ("bad", 4.5)):
+        curves = [(f"curve{n}", 3) for n in range(6)]
+        for name, least in (
+            ("crank", 3),
+            ("coupler", 3),
+            ("rocker", 3),
+            ("text", 7),
+            ("soft", 4.5),
+            ("bad", 4.5),
+            *curves,
+        ):
             pair = sorted([card, to_xyz[1] @ colour[name]])
             assert (pair[1] + 0.05) / (pair[0] + 0.05) >= least, name
 

@@ -1,0 +1,42 @@
+/** All outputs at the instant that is drawn, as a table. */
+
+import { type Mechanism, outputAt } from "./tables";
+import { shown } from "./words";
+
+export class Numbers {
+  private readonly box = document.createElement("details");
+  private readonly table = document.createElement("table");
+  private cells: HTMLTableCellElement[] = [];
+  private mechanism!: Mechanism;
+
+  constructor() {
+    const head = document.createElement("summary");
+    head.textContent = "Numbers at this instant";
+    this.box.append(head, this.table);
+    this.box.id = "numbers";
+  }
+
+  show(mechanism: Mechanism, place: HTMLElement): void {
+    this.mechanism = mechanism;
+    this.table.replaceChildren();
+    this.cells = mechanism.outputs.map((output) => {
+      const line = this.table.insertRow();
+      line.insertCell().textContent = output.name;
+      line.title = output.text;
+      return line.insertCell();
+    });
+    place.append(this.box);
+  }
+
+  /** The numbers of a row; those that are rounding are none. */
+  write(row: Float64Array, roundings: Map<string, number>): void {
+    if (!this.box.open) return;
+    const m = this.mechanism;
+    m.outputs.forEach((output, n) => {
+      const value = row[outputAt(m, n)];
+      const rounding = Math.abs(value) <= (roundings.get(output.unit) ?? 0);
+      this.cells[n].textContent = shown(rounding ? 0 : value, output, 6);
+      this.cells[n].dataset.value = String(value);
+    });
+  }
+}
