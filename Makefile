@@ -57,7 +57,8 @@ mutate: $(DEV)
 	$(BIN)/pip install --quiet --editable '.[dev,mutation]'
 	nice $(BIN)/python -m tests.mutate $(OF)
 
-# the page of the studio, from its sources in studio/; takes node and npm, which nothing else does
+# the page of the studio, from its sources in studio/, by the node and npm of the virtual environment
+studio: export PATH := $(CURDIR)/$(BIN):$(PATH)
 studio: $(DEV)
 	cd studio && npm ci --no-audit --no-fund --ignore-scripts && npm run --silent check && npm test --silent && npm run --silent build
 	$(BIN)/python -m analysis.studio

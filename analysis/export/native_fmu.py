@@ -22,6 +22,7 @@ from linkwork.mechanism import Mechanism
 from ..files import unknown_name
 from ..mechanisms import check
 from ..numerics.codegen import code_folder
+from ..run import shown
 from .archive import SOURCES, BuildError, documentation, write
 from .description import Kind, build_description, description, terminals
 from .equations_c import generated
@@ -146,11 +147,13 @@ def _binaries(identifier: str, kind: Kind, sources: dict[str, str], platforms: S
         for name, text in sources.items():
             (Path(folder) / name).write_text(text, encoding="utf-8")
         files = [name for name in sources if name.endswith(".c")]
-        for name in platforms:
+        for number, name in enumerate(platforms):
             platform = PLATFORMS[name]
             place = platform.folder_fmi2 if kind.fmi == 2 else platform.folder_fmi3
             library = f"{identifier}.{platform.suffix}"
-            compile_library(folder, files, library, platform.target, (*OPTIONS, *platform.options))
+            with shown(False, float(len(platforms)), f"compiling for {name}") as show:
+                show(float(number))
+                compile_library(folder, files, library, platform.target, (*OPTIONS, *platform.options))
             found.setdefault(f"binaries/{place}/{library}", []).append((Path(folder) / library).read_bytes())
     return {place: parts[0] if len(parts) == 1 else _universal(parts) for place, parts in found.items()}
 

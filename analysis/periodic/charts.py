@@ -351,7 +351,7 @@ class _Survey:
     def follow_lines(self, ys: Sequence[float], progress: bool) -> None:
         """The boundaries that the branches of all motions on the lines y = const lead to, folds above all."""
         lost: list[str] = []
-        with shown(progress and bool(ys), float(len(ys)), "branches") as show:
+        with shown(progress and bool(ys), float(len(ys)), "following branches") as show:
             for number, y in enumerate(ys, start=1):
                 branches, found, failed = branches_on(
                     self.operation, self.box.x, y, name=self.axes[0].name, unit=self.axes[0].si, start=self.start

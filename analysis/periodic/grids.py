@@ -159,7 +159,7 @@ def grid(
         folder=folder,
         n_jobs=n_jobs,
         progress=progress,
-        what="stability",
+        what="filling in the stability chart",
     )
     status = data[..., -1].astype(np.int64)
     return Grid(

@@ -62,7 +62,7 @@ def with_isolas(
         raise InputError(f"places is {places}: motions must be sought at one value of the parameter at least")
     require_turns(turns)
     search = _Isolas(response, greatest_step)
-    with interruptible() as interrupted, shown(progress, float(places * turns), "seek isolas") as show:
+    with interruptible() as interrupted, shown(progress, float(places * turns), "seeking closed branches") as show:
         values = np.linspace(response.low, response.high, places + 2)[1:-1].tolist()
         for number, (value, period) in enumerate(product(values, range(1, turns + 1)), start=1):
             search.seek(value, period, lambda: bool(interrupted))

@@ -191,7 +191,7 @@ def frequency_response(
     if not (np.isfinite(low) and np.isfinite(high) and low < high):
         raise InputError(f"the range is {low} to {high}: it must be finite and increasing")
     family = Family(parameters=parameters, drive=drive, vary=vary)
-    with interruptible() as interrupted, shown(progress, high - low, "follow") as show:
+    with interruptible() as interrupted, shown(progress, high - low, "following the response") as show:
         search = _Search(family, low, high, greatest_step, lambda: bool(interrupted))
         search.follow_from_both_ends(start, most_points, show)
         if not interrupted:

@@ -108,7 +108,7 @@ def cosimulate(
         start_time=float(times[0]),
         inputs=march.first(),
     )
-    with instance, interruptible() as interrupted, shown(progress, times[-1] - times[0], "co-simulate") as show:
+    with instance, interruptible() as interrupted, shown(progress, times[-1] - times[0], "running the FMU") as show:
         for t, row in march.rows(instance):
             recorded.append((t, row))
             show(t - float(times[0]))

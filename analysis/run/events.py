@@ -100,7 +100,7 @@ def heard_by(listener: Callable[[str, float], None]) -> Iterator[None]:
 
 
 @contextmanager
-def shown(progress: bool, duration: float, what: str = "simulate") -> Iterator[Callable[[float], None]]:
+def shown(progress: bool, duration: float, what: str = "running") -> Iterator[Callable[[float], None]]:
     """A progress bar over the time of a run, as a function of the time done; nothing at all where it is not wanted."""
     listener = _LISTENER.get()
     if listener is not None:

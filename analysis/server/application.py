@@ -11,7 +11,7 @@ import secrets
 import socket
 from collections.abc import Callable, Iterable, Mapping
 from http import HTTPStatus
-from typing import Any
+from typing import Any, get_args
 from urllib.parse import parse_qs
 
 from waitress import wasyncore
@@ -19,6 +19,7 @@ from waitress.server import create_server
 
 from linkwork.errors import InputError
 
+from ..synthesis import Kind
 from .worker import Busy, Worker
 
 #: The only address that is listened at; bytes of a request's body and of its head, at most; seconds of silence after which a
@@ -26,8 +27,8 @@ from .worker import Busy, Worker
 ADDRESS, BODY, HEAD, SILENCE, CONNECTIONS = "127.0.0.1", 512_000, 16_000, 30, 32
 #: Where the page sends its token.
 TOKEN = "X-Linkwork-Token"
-#: How the page knows that there is a server.
-_MARK = '<meta name="linkwork-server" content="1">'
+#: How the page knows that there is a server, and what kinds of linkages it searches.
+_MARK = f'<meta name="linkwork-server" content="{" ".join(get_args(Kind))}">'
 
 _HEADERS = [
     ("Cache-Control", "no-store"),
@@ -72,7 +73,7 @@ class Application:
     def __init__(self, page: str, worker: Worker) -> None:
         self.worker = worker
         self.token = secrets.token_urlsafe(32)
-        #: ``host:port`` that are this server, known once it listens.
+        #: Hosts that are this server, known once it listens.
         self.hosts: tuple[str, ...] = ()
         self.page = page.replace("<title>", f"{_MARK}\n<title>", 1).encode()
         self._policy = _POLICY.format(_hashes(page))
@@ -156,6 +157,11 @@ def _hashes(page: str) -> str:
     return " ".join(f"'sha256-{one}'" for one in found)
 
 
+def hosts_of(port: int) -> tuple[str, ...]:
+    """What a browser has as the host of a server at a port; it leaves out the usual one."""
+    return tuple(name if port == 80 else f"{name}:{port}" for name in (ADDRESS, "localhost"))
+
+
 class Server:
     """An `Application` that listens.
 
@@ -196,7 +202,7 @@ class Server:
             max_request_header_size=HEAD,
         )
         self.port = int(listening.getsockname()[1])
-        self.application.hosts = (f"{ADDRESS}:{self.port}", f"localhost:{self.port}")
+        self.application.hosts = hosts_of(self.port)
 
     @property
     def address(self) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import json
 import multiprocessing
 import os
@@ -13,7 +14,8 @@ import threading
 import time
 import traceback
 from collections.abc import Mapping
-from contextlib import suppress
+from contextlib import redirect_stderr, suppress
+from math import inf
 from typing import Any
 
 from linkwork.errors import InputError, LinkworkError
@@ -23,6 +25,7 @@ from ..run import heard_by
 
 #: Seconds between two words of progress, and that an idle process is given to end.
 _INTERVAL, _PATIENCE = 0.1, 5.0
+_NOTE = "linkwork: "
 _LOST = "the process that worked on it ended, as where memory runs out"
 
 
@@ -46,7 +49,13 @@ class Worker:
         self._number = 0
 
     def start(self) -> None:
-        """Start the process, if there is none: the next job need not wait for its imports."""
+        """Start the process, if there is none: the next job need not wait for its imports.
+
+        Raises
+        ------
+        LinkworkError
+            If the system gives none.
+        """
         with self._lock:
             if self._process is not None and self._process.is_alive():
                 return
@@ -54,9 +63,15 @@ class Worker:
             spawn = multiprocessing.get_context("spawn")
             self._folder = tempfile.mkdtemp(prefix="linkwork-studio-")
             self._pipe, other = spawn.Pipe()
-            self._process = spawn.Process(target=_work, args=(other, os.getpid(), self._folder), daemon=True)
-            self._process.start()
-            other.close()
+            process = spawn.Process(target=_work, args=(other, os.getpid(), self._folder), daemon=True)
+            try:
+                process.start()
+            except (OSError, RuntimeError) as error:
+                self._end()
+                raise LinkworkError(f"no process for the job can be started: {error}") from error
+            finally:
+                other.close()
+            self._process = process
 
     def give(self, kind: str, request: Mapping[str, Any]) -> dict[str, Any]:
         """Begin a job.
@@ -69,13 +84,15 @@ class Worker:
         with self._lock:
             if self.look()["state"] == "running":
                 raise Busy("a job is being done already: wait for it, or cancel it")
-            self.start()
             self._number += 1
-            self._job = {"state": "running", "job": self._number, "kind": kind, "what": "begins", "share": 0.0}
+            self._job = {"state": "running", "job": self._number, "kind": kind, "what": "starting", "share": 0.0}
             try:
+                self.start()
                 self._pipe.send((self._number, kind, dict(request)))
             except OSError:
-                self._lost()
+                self._lost(_LOST)
+            except LinkworkError as error:
+                self._lost(str(error))
             return self._job
 
     def look(self) -> dict[str, Any]:
@@ -87,7 +104,7 @@ class Worker:
                     if number == self._number:
                         self._job = self._job | news
             except (EOFError, OSError):
-                self._lost()
+                self._lost(_LOST)
             return self._job
 
     def cancel(self) -> dict[str, Any]:
@@ -96,7 +113,8 @@ class Worker:
             if self.look()["state"] == "running":
                 self._end()
                 self._job = {"state": "cancelled", "job": self._number, "kind": self._job["kind"]}
-                self.start()
+                with suppress(LinkworkError):  # the next job says so
+                    self.start()
             return self._job
 
     def stop(self) -> None:
@@ -104,8 +122,8 @@ class Worker:
         with self._lock:
             self._end()
 
-    def _lost(self) -> None:
-        self._job = {"state": "failed", "job": self._number, "kind": self._job["kind"], "sentence": _LOST}
+    def _lost(self, sentence: str) -> None:
+        self._job = {"state": "failed", "job": self._number, "kind": self._job["kind"], "sentence": sentence}
         self._end()
 
     def _end(self) -> None:
@@ -116,8 +134,10 @@ class Worker:
                     os.killpg(self._process.pid, signal.SIGKILL)
             self._process.kill()
             self._process.join(_PATIENCE)
+            self._process = None
+        if self._pipe is not None:
             self._pipe.close()
-            self._process = self._pipe = None
+            self._pipe = None
         if self._folder:
             shutil.rmtree(self._folder, ignore_errors=True)
             self._folder = ""
@@ -152,10 +172,24 @@ class _Teller:
             self.pipe.send((self.number, {"what": what, "share": min(max(share, 0.0), 1.0)}))
 
 
+class _Terminal(io.TextIOBase):
+    """The terminal, from which notes, such as that something is compiled, are progress too."""
+
+    def __init__(self, teller: _Teller) -> None:
+        self.teller = teller
+
+    def write(self, text: str) -> int:
+        if text.startswith(_NOTE):
+            self.teller.last = -inf
+            self.teller(text.removeprefix(_NOTE).strip().removesuffix(" ..."), 0.0)
+        written = sys.__stderr__.write(text) if sys.__stderr__ else len(text)
+        return written
+
+
 def _answer(do: Any, kind: str, request: Mapping[str, Any], teller: _Teller) -> dict[str, Any]:
     """What came of a job."""
     try:
-        with heard_by(teller):
+        with heard_by(teller), redirect_stderr(_Terminal(teller)):
             return {"state": "done", "answer": json.dumps(do(kind, request), allow_nan=False)}
     except LinkworkError as error:
         return {"state": "failed", "sentence": str(error)}

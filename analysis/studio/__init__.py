@@ -2,6 +2,7 @@
 
 from .page import PAGE, address_of, build_page, fresh, page_of
 from .state import OPENING, case_of, given_values, opening_state, state_of
+from .tables import shown_in
 
 __all__ = [
     "OPENING",
@@ -13,5 +14,6 @@ __all__ = [
     "given_values",
     "opening_state",
     "page_of",
+    "shown_in",
     "state_of",
 ]

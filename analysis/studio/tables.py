@@ -86,12 +86,16 @@ def values_of(mechanism: Mechanism, parameters: Any, initial: Any) -> dict[str, 
     return {name: float(value) for name, value in (own | start).items()}
 
 
-def _unit(variable: Variable) -> dict[str, Any]:
+def shown_in(variable: Variable) -> tuple[str, float]:
     """The unit that people think in, and the factor to it."""
     displays = dict(UNITS[variable.unit].displays) if variable.kind == "Real" else {}
     shown = variable.display or ("" if variable.unit == "rad/s" else next(iter(displays), ""))
     unit = shown or variable.unit
-    return {"unit": "" if unit == "1" else unit, "factor": displays.get(unit, 1.0)}
+    return "" if unit == "1" else unit, displays.get(unit, 1.0)
+
+
+def _unit(variable: Variable) -> dict[str, Any]:
+    return dict(zip(("unit", "factor"), shown_in(variable)))
 
 
 def given_entries(mechanism: Mechanism) -> list[Entry]:

@@ -131,7 +131,7 @@ def polish(
     """Go from every start to an optimum. On Ctrl-C what was done is returned, marked as interrupted."""
     worker = Polisher(normal, limits, pivot)
 
-    def spread(name: str, items: Sequence[Any], what: str = "polish") -> tuple[list[Answer], bool]:
+    def spread(name: str, items: Sequence[Any], what: str) -> tuple[list[Answer], bool]:
         cores = search.cores
         size = 1 if cores == 1 else min(MOST, max(1, -(-len(items) // (3 * cores))))
         # a polisher holds compiled solvers, which do not travel: each part of the work makes its own
@@ -146,7 +146,7 @@ def polish(
     races = normal.outline is not None and normal.quality != "squares" and pivot is None and normal.straight is None
     enough = races and len(begun) >= FITTED
     fitted = starts[: sum(start.given for start in starts) + FITTED] if enough else starts
-    found, interrupted = spread("fit_all", fitted)
+    found, interrupted = spread("fit_all", fitted, f"fitting {len(fitted)} starts")
     kept = kept_of(found)
     # an interruption after the last search has nothing to stop
     if interrupted and len(found) < len(fitted):
@@ -158,14 +158,16 @@ def polish(
         kept = [*map(worker.finish, kept[:FINISHED]), *kept[FINISHED:]]
     elif not races:
         best = [*given, *distinct(kept, ONWARDS, pivot)]
-        kept, interrupted = spread("onwards", [(answer, ITERATIONS) for answer in best], normal.quality)
+        kept, interrupted = spread(
+            "onwards", [(answer, ITERATIONS) for answer in best], f"refining the best {len(best)}"
+        )
     else:
         begin = kept_of([worker.measured(answer) for answer in [*kept, *begun]])
         laps = RACE["open area" if normal.quality == "area" and not normal.closed else normal.quality]
         kept, interrupted = _raced(spread, begin, given, laps)
     if limits.least is not None and not interrupted:
         best = distinct(kept_of(kept) or kept_of(found), ONWARDS, pivot)
-        kept, interrupted = spread("least", best, limits.least.along.name)
+        kept, interrupted = spread("least", best, f"making least the {limits.least.along.name}")
         found = [*(answer for answer in found if not answer.feasible), *kept] if kept else found
     elif limits.along:
         kept = [answer for answer in kept if worker.kept(answer.start).feasible]
@@ -182,7 +184,10 @@ def _raced(
     for lap, (count, iterations) in enumerate(laps):
         # guesses run in the first lap whatever they are worth; what does not run in it is left behind
         best = distinct([*given, *kept], count + len(given), distance=RACED)
-        done, interrupted = spread("onwards", [(answer, iterations) for answer in best], "race")
+        stage = "refining" if lap else "comparing"
+        done, interrupted = spread(
+            "onwards", [(answer, iterations) for answer in best], f"{stage} the best {len(best)}"
+        )
         if interrupted:
             return [*done, *kept], True
         rest = [answer for answer in kept if answer not in best] if lap else []

@@ -23,6 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import qmc
 
+from ..run import shown
 from .constraints import TURNING, InfeasibleError, Limits
 from .kernels import many_directions, match_windows
 from .linkage import BY_SHORTEST, geared, transmission_excess
@@ -82,12 +83,16 @@ def scan(normal: Normal, limits: Limits, *, seed: int, candidates: int, starts: 
         If no shape at all is allowed.
     """
     found: list[Candidates] = []
-    for number, branch in enumerate(limits.branches):
-        chunks = _shapes(limits, seed + 7919 * number, max(1, candidates // len(limits.branches)))
-        if normal.outline is not None:
-            chunks = _filled(chunks)
-        for chunk, shapes in enumerate(chunks):
-            found.append(_placed(normal, limits, shapes, branch, np.random.default_rng([seed, chunk, branch + 1])))
+    placed = 0
+    with shown(False, float(candidates), f"trying {candidates:,} shapes") as show:
+        for number, branch in enumerate(limits.branches):
+            chunks = _shapes(limits, seed + 7919 * number, max(1, candidates // len(limits.branches)))
+            if normal.outline is not None:
+                chunks = _filled(chunks)
+            for chunk, shapes in enumerate(chunks):
+                show(float(placed))
+                found.append(_placed(normal, limits, shapes, branch, np.random.default_rng([seed, chunk, branch + 1])))
+                placed += len(shapes)
     if not found:
         raise InfeasibleError(f"no shape of {limits.kind} {_why(limits, seed)}")
     return _apart(found, starts, limits)

@@ -130,7 +130,9 @@ class TargetPath:
         extent = float(np.ptp(points, axis=0).max())
         nothing = COINCIDENT * max(extent, float(np.abs(points).max()))
         if extent <= nothing:
-            raise InputError(f"all {len(points)} points of the target are the same one, {points[0]} m")
+            raise InputError(
+                f"all {len(points)} points of the target are the same one: {points[0, 0]:.6g} m, {points[0, 1]:.6g} m"
+            )
         # the magnitude too: far from the origin the digits of a coordinate are fewer
         steps = np.hypot(*np.diff(ring(points, self.closed), axis=0).T)
         same = np.flatnonzero(steps <= nothing)
@@ -145,7 +147,7 @@ class TargetPath:
         object.__setattr__(self, "points", points)
         if self.closed and self.enclosed_area <= COINCIDENT * self.length**2:
             raise InputError(
-                "the target is closed and encloses no area: a curve traced there and back is an open one (closed=False)"
+                "the target is closed and encloses no area: a curve traced there and back is one that is not closed"
             )
 
     @classmethod

@@ -142,7 +142,7 @@ def tune(wish: Wish, *, progress: bool = False) -> Tuned:
 def _try_ways(search: _Search, first: Survey, progress: bool) -> None:
     """Try all ways from some changes."""
     ways = _ways(first)
-    with shown(progress, len(ways), "tune") as show:
+    with shown(progress, len(ways), "trying changes") as show:
         for number, way in enumerate(ways):
             found = _exchange(search, first, list(way))
             show(number + 1)

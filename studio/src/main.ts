@@ -85,7 +85,7 @@ class Studio {
   });
   private readonly python = new WithPython(by<HTMLElement>("python"), this.view, {
     state: () => ({ ...this.state, duration: this.duration() }),
-    take: (state) => void this.take(state),
+    take: (state) => this.take(state),
     rows: () => this.playback.answer?.rows,
   });
   private readonly numbers = new Numbers();

@@ -5,6 +5,8 @@ import type { Point } from "./view";
 
 export interface Job {
   state: "idle" | "running" | "done" | "failed" | "cancelled";
+  /** Its number, of all that the server has done. */
+  job?: number;
   kind?: string;
   what?: string;
   share?: number;
@@ -13,15 +15,28 @@ export interface Job {
   sentence?: string;
 }
 
+export interface File {
+  name: string;
+  base64: string;
+}
+
+/** Lines of a small picture. */
+export interface Small {
+  links: Point[][];
+  curves: Point[][];
+}
+
 /** What a job answers, as far as it has it: analysis/server/jobs.py. */
 export interface Answer {
   words: string;
-  table?: { headings: string[]; rows: string[][] };
-  states?: State[];
+  table?: { headings: string[]; rows: string[][]; files?: File[][] };
+  pictures?: Small[];
+  /** By row; null of a linkage that is no mechanism of the page. */
+  states?: (State | null)[];
   curves?: Point[][];
   closed?: boolean;
-  charts?: { title: string; unit: string; x: number[]; y: number[] }[];
-  files?: { name: string; base64: string }[];
+  charts?: { title: string; unit: string; axis: string; x: number[]; y: number[] }[];
+  files?: File[];
   time?: number[];
   outputs?: Record<string, number[]>;
 }
@@ -35,14 +50,20 @@ export interface Request {
 
 const INTERVAL = 250;
 const GONE = "Python does not answer: is linkwork studio still running in its terminal?";
+const ANOTHER = "Another tab has begun a job since: what came of this one is gone.";
 
 export class Server {
-  private constructor(private readonly token: string) {}
+  private constructor(
+    private readonly token: string,
+    /** Of linkages that are searched. */
+    readonly kinds: string[],
+  ) {}
 
   /** The server that this page came from; undefined where it is a file. */
   static here(): Server | undefined {
     const token = new URLSearchParams(location.search).get("token");
-    return token && document.querySelector('meta[name="linkwork-server"]') ? new Server(token) : undefined;
+    const mark = document.querySelector<HTMLMetaElement>('meta[name="linkwork-server"]');
+    return token && mark ? new Server(token, mark.content.split(" ")) : undefined;
   }
 
   async give(kind: string, state: Request, wanted: object): Promise<Job> {
@@ -57,10 +78,11 @@ export class Server {
     return this.ask("DELETE");
   }
 
-  /** The end of the job that is being done; `told` hears of how it goes on. */
-  async follow(told: (job: Job) => void): Promise<Job> {
+  /** The end of a job that is being done; `told` hears of how it goes on. */
+  async follow(begun: Job, told: (job: Job) => void): Promise<Job> {
     for (;;) {
       const job = await this.look();
+      if (job.job !== undefined && job.job !== begun.job) return { state: "failed", sentence: ANOTHER };
       if (job.state !== "running") return job;
       told(job);
       await new Promise((resolve) => setTimeout(resolve, INTERVAL));

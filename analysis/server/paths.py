@@ -1,0 +1,242 @@
+"""Jobs about a path that was drawn: linkages whose coupler point goes along it, and the slider's motion for it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import inf, isfinite, pi
+from pathlib import Path
+from typing import Any, get_args
+
+import numpy as np
+
+from ..files import Choice, Many, Quantity, Whole, entry, flag, save_drawing, write_csv, write_tables
+from ..mechanisms import require_five_bar
+from ..motion import inverse_dynamics, motion_of_plant, slider_motion
+from ..notebook import format_count
+from ..run import Case, case_from
+from ..studio import state_of
+from ..synthesis import (
+    Constraint,
+    FullTurn,
+    Kind,
+    LargestLink,
+    LeastTransmission,
+    Linkage,
+    LinkageScene,
+    Make,
+    Search,
+    SecondCrank,
+    SliderMotion,
+    SliderUnknown,
+    Solution,
+    TargetPath,
+    UntimedPath,
+    drawing,
+    format_transmission,
+    kind_of,
+    synthesize,
+)
+from .answers import Answer, FloatArray, chart, file, folder
+
+_POINT = Many(Quantity("m"), length=2)
+#: What is to be known of linkages that the page cannot show as they are.
+_NOTES: dict[Kind, str] = {
+    "slider-crank": "The page's slider-crank has no coupler point: its curve is in the small picture.",
+    "geared-five-bar": "A geared five-bar is none of the page's mechanisms: its drawing is at real size, and linkwork "
+    "synthesize with its own file searches its gears alone.",
+}
+#: The file of a task, and every so many-th point of a curve that is drawn small.
+_TASK, _EVERY = "linkages.toml", 4
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Drawn:
+    """A path that was drawn (m), and the searches for it."""
+
+    points: tuple[tuple[float, float], ...] = entry(Many(_POINT, least=3))
+    closed: bool = entry(flag, True)
+    starts: int = entry(Whole(1), 24)
+
+    def task(self) -> UntimedPath:
+        return UntimedPath(path=TargetPath(points=np.array(self.points), closed=self.closed))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Linkages(_Drawn):
+    """Linkages for it of these kinds, with at least this transmission angle (rad) and no longer link (m)."""
+
+    kinds: tuple[Kind, ...] = entry(Many(Choice(get_args(Kind)), least=1), ("four-bar",))
+    least_transmission: float = entry(Quantity("rad", least=0.0, below=0.5 * pi), LeastTransmission().angle)
+    longest: float = entry(Quantity("m", above=0.0), inf)
+
+    def constraints(self) -> list[Constraint]:
+        angle = self.least_transmission
+        found: list[Constraint] = [LeastTransmission(angle=angle)] if angle else [FullTurn()]
+        return [*found, LargestLink(length=self.longest)] if isfinite(self.longest) else found
+
+    def tables(self, title: str, **search: Any) -> dict[str, Any]:
+        """The same as a case file of `linkwork synthesize`, every digit kept."""
+        angle: dict[str, Any] = {"least_transmission_angle": self.least_transmission or False}
+        turn = {} if self.least_transmission else {"full_turn": True}
+        longest = {"largest_link": self.longest} if isfinite(self.longest) else {}
+        return {
+            "title": title,
+            "task": {"kind": "untimed-path", "points": [list(p) for p in self.points], "closed": self.closed},
+            "constraints": angle | turn | longest,
+            "search": {"starts": self.starts, "kinds": list(self.kinds)} | search,
+        }
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Moved(_Drawn):
+    """The slider's motion for it: harmonics up to a number, and the greatest stroke (m)."""
+
+    starts: int = entry(Whole(1), 8)
+    harmonics: int = entry(Whole(1), 2)
+    stroke: float = entry(Quantity("m", above=0.0), inf)
+
+
+def linkages(case: Case, wanted: Linkages) -> Answer:
+    """Ranked linkages, drawn, each as a state of the page with the path as that has it: its x axis is the ground link.
+
+    A geared five-bar, of which there is no mechanism to run, is a drawing for CAD and a case of its own that is searched for.
+    """
+    found = synthesize(
+        wanted.task(), constraints=wanted.constraints(), kinds=wanted.kinds, search=Search(starts=wanted.starts)
+    )
+    headings = ["", "area [mm²]", "worst [mm]", "transmission [deg]", "longest link [mm]", ""]
+    rows, states, curves, files = [], [], [], []
+    with folder() as place:
+        for rank, solution in enumerate(found.solutions, 1):
+            v = solution.verdicts
+            rows.append(
+                [
+                    str(rank),
+                    f"{1e6 * solution.error:.4g}",
+                    f"{1e3 * solution.evaluation.worst:.3g}",
+                    format_transmission(v),
+                    f"{1e3 * solution.linkage.largest_link:.4g}",
+                    ", ".join([v.grashof, *v.defects]),
+                ]
+            )
+            title = f"Linkage {rank} for a path that was drawn"
+            shown = not isinstance(solution.linkage.pivot, SecondCrank)
+            states.append(_state(solution, title) if shown else None)
+            curves.append(_turned(np.array(wanted.points), solution.linkage).tolist())
+            files.append([] if shown else _kept(solution, wanted, Path(place) / f"linkage-{rank}", title))
+        of = {kind_of(solution.linkage) for solution in found.solutions}
+        said = (
+            f"{format_count(len(rows), 'linkage')} in {found.seconds:.1f} s, the area between the curves the least first. "
+            f"linkwork synthesize {_TASK} finds them again, and writes drawings, plates and a sheet of the first."
+        )
+        task = write_tables(Path(place) / _TASK, wanted.tables("A path that was drawn"))
+        return {
+            "words": " ".join([said, *(note for kind, note in _NOTES.items() if kind in of)]),
+            "table": {"headings": headings, "rows": rows, "files": files},
+            "pictures": [_picture(solution) for solution in found.solutions],
+            "states": states,
+            "curves": curves,
+            "closed": wanted.closed,
+            "files": [file(task)],
+        }
+
+
+def _state(solution: Solution, title: str) -> Answer:
+    state = state_of(case_from(Make().run_case(solution, title), folder=Path(), title=title))
+    # the path says nothing of the way in which the crank turns, and the page seeks periodic motions of one way
+    state["values"]["drive.speed"] = abs(state["values"]["drive.speed"])
+    return state
+
+
+def _kept(solution: Solution, wanted: Linkages, path: Path, title: str) -> list[Answer]:
+    """A drawing of a linkage that the page cannot show, and a case that searches its kind and its gears alone."""
+    pivot = solution.linkage.pivot
+    assert isinstance(pivot, SecondCrank)
+    case = wanted.tables(title, kinds=[kind_of(solution.linkage)], gears=[pivot.ratio])
+    drawn = drawing(solution, title=title)
+    return [file(write_tables(path.with_suffix(".toml"), case)), file(save_drawing(path.with_suffix(".dxf"), drawn))]
+
+
+def _picture(solution: Solution) -> Answer:
+    """Lines of a small picture in the plane of the path, where the task begins: links and guide, and the coupler curve."""
+    scene = LinkageScene(solution)
+    pins = scene.pins(float(scene.rotation[0])) or {}
+    links = ["AB", "BCPB", *([] if solution.linkage.slides else ["CD"]), *(["DE"] if scene.second_crank else [])]
+    guide = [] if scene.guide is None else [scene.guide.tolist()]
+    return {
+        "links": [[pins[name] for name in link] for link in links if pins] + guide,
+        "curves": [piece[::_EVERY].tolist() for piece in scene.curves],
+    }
+
+
+def _turned(points: FloatArray, linkage: Linkage) -> FloatArray:
+    """Points of the plane in the frame of a linkage's ground link."""
+    z = (points[:, 0] + 1j * points[:, 1] - complex(linkage.pivot_x, linkage.pivot_y)) * np.exp(
+        -1j * linkage.ground_angle
+    )
+    return np.column_stack([z.real, z.imag])
+
+
+def moved(case: Case, wanted: Moved) -> Answer:
+    """The slider's motion with more and more harmonics, the links and the guide kept, and the force of the last."""
+    p = case.parameters
+    require_five_bar(p, "a motion of the slider")
+    task = wanted.task()
+    linkage = Linkage(
+        ground_length=p.ground_length,
+        crank_length=p.crank_length,
+        coupler_length=p.coupler_length,
+        rocker_length=p.rocker_length,
+        point_distance=p.coupler_point_distance,
+        point_angle=p.coupler_point_angle,
+        branch=p.assembly_branch,
+    )
+    if wanted.closed:
+        still = Solution.of(task, linkage)
+    else:
+        kept = {name: (value, value) for name, value in linkage.values().items() if name != "branch"}
+        still = synthesize(task, kept, [FullTurn()], search=Search(starts=4, candidates=1 << 10, solutions=1)).best
+    found = [still]
+    guide = (p.slider_guide_angle, p.slider_guide_angle)
+    for harmonics in range(1, wanted.harmonics + 1):
+        unknown = SliderUnknown(harmonics=harmonics, guide_angle=guide, stroke=wanted.stroke)
+        search = Search(starts=wanted.starts)
+        found.append(slider_motion(task, still, unknown, guesses=found[1:], search=search).best)
+    rows = [
+        [
+            "at rest" if n == 0 else format_count(n, "harmonic"),
+            f"{1e6 * s.error:.4g}",
+            f"{1e3 * s.evaluation.worst:.3g}",
+            f"{1e3 * s.linkage.pivot.stroke:.4g}" if isinstance(s.linkage.pivot, SliderMotion) else "",
+            format_transmission(s.verdicts),
+        ]
+        for n, s in enumerate(found)
+    ]
+    turn = np.linspace(0.0, 2.0 * pi, 181)
+    last = found[-1].linkage
+    charts = [chart("Slider position over the crank angle", "mm", turn, 1e3 * motion_of_plant(last)(turn))]
+    answer: Answer = {
+        "words": "The guide and the links are kept; what is drawn is the path with the last motion.",
+        "table": {
+            "headings": ["slider", "area [mm²]", "worst [mm]", "stroke [mm]", "transmission [deg]"],
+            "rows": rows,
+        },
+        "curves": [s.linkage.path(s.rotation).tolist() for s in found],
+        "closed": wanted.closed,
+        "charts": charts,
+    }
+    speed = case.inputs.speed
+    if not speed:
+        answer["words"] += " No force is computed: the crank is not driven at a speed."
+        return answer
+    load = tuple(sum(case.inputs.parts(name)) for name in ("load_x", "load_y"))
+    drive = inverse_dynamics(p, motion_of_plant(last), speed, load=load)
+    answer["words"] += (
+        f" It takes a force of {drive.peak_force:.4g} N at most, {drive.rms_force:.4g} N rms, and a torque of the crank of "
+        f"{drive.peak_torque:.4g} N.m at most."
+    )
+    charts.append(chart("Force on the slider over the crank angle", "N", drive.crank_angle, drive.force))
+    own = {"crank angle [rad]": drive.crank_angle, "slider position [m]": drive.slider(drive.crank_angle)}
+    with folder() as place:
+        answer["files"] = [file(write_csv(Path(place) / "slider-motion.csv", own | dict(drive.columns())))]
+    return answer

@@ -1,0 +1,75 @@
+/** A run of the FMU over the page's own. */
+
+import { curvesIn } from "./answer";
+import { bytesOf, Core } from "./core";
+import { make } from "./elements";
+import type { Answer } from "./server";
+import { givenOf, type Mechanism, type Output, outputAt, rowLength } from "./tables";
+import { called, digits, shown } from "./words";
+
+/** Steps of a run of the FMU. */
+export const STEPS = 720;
+
+interface Pair {
+  output: Output;
+  page: number[];
+  fmu: number[];
+  /** The largest difference, and as a share of the largest value. */
+  most: number;
+  relative: number;
+}
+
+/** Where the runs differ most is said; what is drawn is chosen, first how the mechanism moves. */
+export async function compareIn(place: HTMLElement, m: Mechanism, answer: Answer): Promise<void> {
+  const pairs = await pairsOf(m, answer);
+  const worst = pairs.reduce((one, other) => (other.relative > one.relative ? other : one));
+  const said = make("p", {
+    textContent:
+      `Over ${pairs[0].page.length} instants the two differ most in ${called(worst.output)}: by ` +
+      `${shown(worst.most, worst.output, 2)}, ${digits(worst.relative, 2)} of the largest value.`,
+  });
+  said.dataset.relative = String(worst.relative);
+  const choice = make("select");
+  for (const { output } of pairs) choice.add(new Option(called(output), output.name));
+  const crank = m.crank >= 0 ? m.freedoms[m.crank].rate : 0;
+  choice.value = m.outputs[m.moving[0] ?? crank].name;
+  const chart = make("div");
+  const drawn = (): void => {
+    const { output, page, fmu } = pairs.find((one) => one.output.name === choice.value)!;
+    const curve = (label: string, values: number[]): { label: string; y: number[] } => ({
+      label,
+      y: values.map((value) => value * output.factor),
+    });
+    const title = `${called(output)}${output.unit && ` [${output.unit}]`}`;
+    const time = answer.time!.slice(0, page.length);
+    chart.replaceChildren();
+    curvesIn(chart, title, "time [s]", time, [curve("page", page), curve("FMU", fmu)]);
+  };
+  choice.addEventListener("change", drawn);
+  place.append(said, make("label", {}, "Output ", choice), chart);
+  drawn();
+}
+
+async function pairsOf(m: Mechanism, answer: Answer): Promise<Pair[]> {
+  const { values, duration } = answer.states![0]!;
+  const core = await Core.make(m, await bytesOf(m));
+  core.give(givenOf(m, values));
+  const own = core.run((duration ?? 1) / STEPS, STEPS);
+  const count = Math.min(own.count, answer.time!.length);
+  const length = rowLength(m);
+  const curves = m.outputs.map((output, n) => {
+    const page = Array.from({ length: count }, (_, row) => own.values[row * length + outputAt(m, n)]);
+    const fmu = answer.outputs![output.name].slice(0, count);
+    return { output, page, fmu, largest: Math.max(...page.map(Math.abs)) };
+  });
+  return curves.map(({ output, page, fmu, largest }) => {
+    const like = curves.filter((one) => one.output.unit === output.unit).map((one) => one.largest);
+    // what is nearly nothing is held against what there is of its unit
+    const scale = Math.max(largest, 1e-3 * Math.max(...like));
+    const apart = page.map((value, row) => Math.abs(value - fmu[row]));
+    const most = Math.max(
+      ...apart.map((d) => (output.unit === "deg" ? Math.min(d, Math.abs(2 * Math.PI - d)) : d)),
+    );
+    return { output, page, fmu, most, relative: scale > 0 ? most / scale : 0 };
+  });
+}

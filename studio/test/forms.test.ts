@@ -1,0 +1,35 @@
+import assert from "node:assert/strict";
+import { test } from "node:test";
+import { numberOf, Wrong } from "../src/elements";
+import { pointsOf, textOf } from "../src/points";
+
+test("a field says what is wrong with its number, and what would be right", () => {
+  assert.equal(numberOf(" 2.5 ", "stroke", "mm", { above: 0 }), 2.5);
+  assert.equal(numberOf("", "stroke", "mm", { above: 0, missing: 7 }), 7);
+  const cases: [string, Parameters<typeof numberOf>[3], string][] = [
+    ["90", { least: 0, below: 90 }, '"angle" is 90 deg: it must be a number at least 0 and below 90 (deg)'],
+    ["-0.1", { least: 0 }, '"angle" is -0.1 deg: it must be a number at least 0 (deg)'],
+    ["0", { above: 0 }, '"angle" is 0 deg: it must be a number above 0 (deg)'],
+    ["1.5", { least: 1, whole: true }, '"angle" is 1.5 deg: it must be a whole number at least 1 (deg)'],
+    ["", { above: 0 }, '"angle" has no number: it must be a number above 0 (deg)'],
+    ["1e999", {}, '"angle" is 1e999 deg: it must be a number (deg)'],
+  ];
+  for (const [text, rule, message] of cases)
+    assert.throws(() => numberOf(text, "angle", "deg", rule), new Wrong(message));
+});
+
+test("points are read line by line, and the first line that is none is named", () => {
+  assert.deepEqual(pointsOf("10 20\n\n-1.5, 2e1\n 3;4 \n"), [
+    [0.01, 0.02],
+    [-0.0015, 0.02],
+    [0.003, 0.004],
+  ]);
+  assert.deepEqual(pointsOf(""), []);
+  for (const row of ["12", "1 2 3", "x y", "12,5 30,1", "1 nan"])
+    assert.throws(() => pointsOf(`1 2\n${row}\n3 4`), {
+      message: `line 2 of the points is "${row}": it must be two numbers, x and y in mm, such as 12.5 -30`,
+    });
+  // written and read again they are the same, to a nanometre
+  const points = pointsOf("123.4567 -0.25");
+  assert.deepEqual(pointsOf(textOf(points)), points);
+});
