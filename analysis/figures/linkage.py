@@ -12,7 +12,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.patches import Arc, Circle, Polygon
 from numpy.typing import ArrayLike, NDArray
-from shapely import MultiLineString, Point
+from shapely import MultiLineString
 
 from linkwork.errors import AssemblyError, InputError
 from linkwork.five_bar import kinematics
@@ -22,6 +22,7 @@ from ..run import Trajectory
 from ..units import CM_PER_METRE
 from .animation import check_frames, gif
 from .dispatch import draw_mechanism, last_samples, plot
+from .marks import roomiest
 from .style import (
     BLOCK,
     BOLD,
@@ -224,19 +225,11 @@ class _Scene:
         links = [(a, q.b), (q.b, q.c), (q.c, q.d), (q.b, q.p), (q.c, q.p)]
         lines = MultiLineString([*links, (a, foot), (a, self.zero), self.rail])
         taken = [theta]
-        directions = np.radians(np.arange(0.0, 360.0, 15.0))
         pins = {"A": a, "B": q.b, "C": q.c} | ({"P": q.p} if self.parameters.coupler_point_distance else {})
         for name, pin in pins.items():
-            places = pin + 1.15 * unit * np.column_stack([np.cos(directions), np.sin(directions)])
-            room = [
-                min(
-                    lines.distance(Point(place)), *(0.6 * hypot(*(place - other)) for other in (*taken, *pins.values()))
-                )
-                for place in places
-            ]
-            # and where several have as much, outside the loop
-            outwards = (places - pin) @ (pin - centre) / (unit * max(hypot(*(pin - centre)), 1e-9))
-            best = places[int(np.argmax(np.array(room) + 0.1 * unit * outwards))]
+            # where several places have as much room, outside the loop
+            outwards = 0.1 * (pin - centre) / max(hypot(*(pin - centre)), 1e-9)
+            best = roomiest(pin, 1.15 * unit, [lines], (*taken, *pins.values()), outwards)
             self._write(axis, best, name)
             taken.append(best)
         # the slider position

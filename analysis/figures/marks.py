@@ -1,4 +1,4 @@
-"""Places marked along x, and points with a text, their letters where no curve runs."""
+"""Places marked along x, points with a text, and the letters of pins: where nothing else is drawn."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.path import Path
 from matplotlib.text import Annotation, Text
 from matplotlib.transforms import Bbox
+from numpy.typing import NDArray
 
 from .style import HAIR, MARK, MARKED, TINY, Figure
 
@@ -19,11 +20,14 @@ from .style import HAIR, MARK, MARKED, TINY, Figure
 _GID, _LABEL = "mark", "label"
 #: Heights in a panel at which the top of a name may be, the first the best; points that it keeps from its line and the rest.
 _TOPS, _GAP = np.linspace(1.0, 0.2, 17), 2.0
+FloatArray: TypeAlias = NDArray[np.float64]
 _Side: TypeAlias = Literal["left", "right"]
 _SIDES: tuple[_Side, _Side] = ("right", "left")
 #: Distances (points) from its point at which a text may be, the first the best, and directions there.
 _DISTANCES = (10.0, 20.0, 34.0, 52.0, 74.0, 100.0, 130.0)
 _DIRECTIONS = np.radians([30.0, -30.0, 150.0, -150.0, 0.0, 180.0, 70.0, 110.0, -70.0, -110.0])
+#: Directions from a pin in which its letter may stand.
+_ROUND = np.radians(np.arange(0.0, 360.0, 15.0))
 
 
 def mark_place(axis: Axes, place: float, text: str) -> None:
@@ -156,6 +160,26 @@ def _turn(label: Annotation, distance: float, direction: float) -> Bbox:
     label.get_window_extent()
     # without the line to the point, which may cross what it likes
     return Text.get_window_extent(label)
+
+
+def roomiest(
+    pin: FloatArray, reach: float, drawn: Sequence[object], marks: Sequence[FloatArray], away: FloatArray | None = None
+) -> FloatArray:
+    """The place at a distance from a pin where a letter has most room from geometries of shapely.
+
+    Pins and other letters, ``marks``, count as nearer than they are. Of places with as much room that in the direction ``away``
+    is taken, whose length is how much that counts.
+    """
+    import shapely
+
+    places: FloatArray = pin + reach * np.column_stack([np.cos(_ROUND), np.sin(_ROUND)])
+    room = shapely.distance(shapely.GeometryCollection(list(drawn)), shapely.points(places))
+    for mark in marks:
+        room = np.minimum(room, 0.6 * np.hypot(*(places - mark).T))
+    if away is not None:
+        room = room + (places - pin) @ away
+    best: FloatArray = places[int(np.argmax(room))]
+    return best
 
 
 #: How letters of each kind move, and over which places, those nearest first.

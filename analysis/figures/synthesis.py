@@ -17,6 +17,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Polygon
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
+from shapely import MultiLineString, MultiPoint
 
 from linkwork.errors import InputError
 
@@ -38,6 +39,7 @@ from ..synthesis import (
 )
 from .animation import check_frames, gif
 from .dispatch import animate, plot
+from .marks import roomiest
 from .style import (
     BLOCK,
     BOLD,
@@ -198,28 +200,12 @@ def _write_letters(axis: Axes, scene: LinkageScene, at: Mapping[str, FloatArray]
     if scene.second_crank:
         lines.append((at["E"], at["D"]))
     marks = [at[n] for n in names]
-    drawn = [p for p in (*scene.curves, scene.traced, scene.target) if p is not None]
-    curve = MM_PER_METRE * np.vstack(drawn) if drawn else np.empty((0, 2))
-    directions = np.radians(np.arange(0.0, 360.0, 15.0))
+    curves = [MM_PER_METRE * p for p in (*scene.curves, scene.traced, scene.target) if p is not None]
+    drawn = [MultiLineString(lines), *(MultiPoint(curve[np.isfinite(curve).all(axis=1)]) for curve in curves)]
     for name in names:
-        places = at[name] + 1.5 * unit * np.column_stack([np.cos(directions), np.sin(directions)])
-        room = np.min([_from_line(places, *line) for line in lines], axis=0)
-        for mark in marks:
-            room = np.minimum(room, 0.6 * np.hypot(*(places - mark).T))
-        if len(curve):
-            near = np.hypot(*(places[:, None] - curve[None, :]).transpose(2, 0, 1)).min(axis=1)
-            room = np.minimum(room, near)
-        place = places[int(np.argmax(room))]
+        place = roomiest(at[name], 1.5 * unit, drawn, marks)
         axis.text(place[0], place[1], name, ha="center", va="center", fontsize=LETTER, zorder=11)
         marks.append(place)
-
-
-def _from_line(points: FloatArray, start: FloatArray, end: FloatArray) -> FloatArray:
-    """Distances of points from the straight line between two others."""
-    way = end - start
-    share = np.clip((points - start) @ way / max(float(way @ way), 1e-300), 0.0, 1.0)
-    distances: FloatArray = np.hypot(*(points - start - share[:, None] * way).T)
-    return distances
 
 
 def _start(scene: LinkageScene) -> tuple[float, Mapping[str, tuple[float, float]]]:

@@ -16,8 +16,7 @@ from linkwork.parameters import fmi_name
 
 from ..mechanisms import Parameters, mechanism_of
 from ..numerics import symbolic
-from ..run import takes_published
-from ..run.equations import of_parameters
+from ..run import of_parameters, takes_published
 from .drives import Drive
 from .orbits import PeriodicOrbit
 from .planes import of_the_motor, require_variable, variable_names

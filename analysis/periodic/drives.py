@@ -16,8 +16,7 @@ from linkwork.mechanism import Channel, Mechanism, Mode, PublishedSet
 
 from ..files import unknown_name
 from ..mechanisms import InitialState, Parameters, mechanism_of, variable_units
-from ..run import InductionMotor, Inputs, driven, started, takes_published
-from ..run.inputs import given
+from ..run import InductionMotor, Inputs, driven, given, started, takes_published
 from ..units import Amount, in_si
 from .flows import Flow, crank_of, flow
 

@@ -24,8 +24,8 @@ from ..mechanisms import mechanism_of
 from ..numerics import symbolic
 from ..numerics.codegen import MAKING, MachineCode
 from ..numerics.gauss import gauss
+from ..run import expressions
 from ..run.compiled import rows
-from ..run.equations import expressions
 from . import orbit_kernels
 from .flows import PLAIN, STATE, Flow
 from .orbit_kernels import NO_SOURCE, Status
