@@ -92,48 +92,36 @@ def near(
     why: str = "",
 ) -> Verdict:
     """A verdict on a value that is stated to within a tolerance."""
-    return Verdict(
-        statement=statement,
-        source=source,
-        place=place,
-        stated=stated,
-        computed=float(computed),
-        lower=stated - tolerance,
-        upper=stated + tolerance,
-        unit=unit,
-        why=why,
-    )
+    bounds = {"lower": stated - tolerance, "upper": stated + tolerance}
+    return _judged(statement, source, stated, computed, unit, place, why, **bounds)
 
 
 def at_least(
     statement: str, source: str, stated: float, computed: float, unit: str = "", *, place: str = "", why: str = ""
 ) -> Verdict:
     """A verdict on a value that is stated to reach another."""
-    return Verdict(
-        statement=statement,
-        source=source,
-        place=place,
-        stated=stated,
-        computed=float(computed),
-        lower=stated,
-        unit=unit,
-        why=why,
-    )
+    return _judged(statement, source, stated, computed, unit, place, why, lower=stated)
 
 
 def at_most(
     statement: str, source: str, stated: float, computed: float, unit: str = "", *, place: str = "", why: str = ""
 ) -> Verdict:
     """A verdict on a value that is stated not to exceed another."""
+    return _judged(statement, source, stated, computed, unit, place, why, upper=stated)
+
+
+def _judged(
+    statement: str, source: str, stated: float, computed: float, unit: str, place: str, why: str, **bounds: float
+) -> Verdict:
     return Verdict(
         statement=statement,
         source=source,
         place=place,
         stated=stated,
         computed=float(computed),
-        upper=stated,
         unit=unit,
         why=why,
+        **bounds,
     )
 
 
