@@ -22,6 +22,8 @@ from dataclasses import dataclass
 from math import acos, atan2, hypot, isfinite, pi
 
 import numpy as np
+import shapely
+from contourpy import contour_generator
 from numpy.typing import ArrayLike, NDArray
 
 from linkwork.errors import InputError
@@ -102,10 +104,7 @@ class AccessibleArea:
         x, y = np.atleast_1d(np.asarray(x, float)), np.atleast_1d(np.asarray(y, float))
         inside = np.zeros(x.shape, dtype=bool)
         for ring in (*self.outer, *self.holes):
-            for (x0, y0), (x1, y1) in zip(ring, np.roll(ring, -1, axis=0)):
-                if y0 != y1:
-                    crossed = (y0 > y) != (y1 > y)
-                    inside ^= crossed & (x < x0 + (y - y0) * ((x1 - x0) / (y1 - y0)))
+            inside ^= shapely.contains_xy(shapely.Polygon(ring), x, y)
         return inside
 
 
@@ -335,29 +334,6 @@ def _trace(
     return _rings(parameters, slider_range, inside, xs, ys), float(1.0 - corners.mean())
 
 
-def _cell_pieces() -> dict[tuple[int, bool], list[tuple[int, int]]]:
-    """Boundary pieces of a cell, from edge to edge with the inside on the left.
-
-    The key is which corners are inside (bit 0 lower left, then counter-clockwise) and whether the centre is, which
-    distinguishes the two saddles. Edges are numbered from the lower one, counter-clockwise.
-    """
-    pieces = {}
-    for code in range(1, 15):
-        corner = [bool(code >> bit & 1) for bit in range(4)]
-        ways = [(edge, corner[edge]) for edge in range(4) if corner[edge] != corner[(edge + 1) % 4]]
-        for centre in (False, True):
-            # walking round the cell, one leaves the inside at an edge; the boundary goes from there to where one
-            # entered it, or, with the inside joined across a saddle, to where one enters it next
-            step = 1 if centre else -1
-            pieces[code, centre] = [
-                (edge, ways[(k + step) % len(ways)][0]) for k, (edge, leaves) in enumerate(ways) if leaves
-            ]
-    return pieces
-
-
-_PIECES = _cell_pieces()
-
-
 def _rings(
     parameters: FiveBarParameters,
     slider_range: tuple[float, float],
@@ -366,34 +342,23 @@ def _rings(
     ys: NDArray[np.float64],
 ) -> list[NDArray[np.float64]]:
     """Closed boundaries of the grid's inside, each vertex bisected onto the boundary along its edge of the grid."""
-    rows, columns = inside.shape
-    code = (
-        inside[:-1, :-1].astype(int) + 2 * inside[:-1, 1:] + 4 * inside[1:, 1:] + 8 * inside[1:, :-1]
-    )  # lower left, lower right, upper right, upper left
-    saddle_j, saddle_i = np.nonzero((code == 5) | (code == 10))
+    heights = inside.astype(float)
+    # where two corners across a cell are inside, its centre says whether they belong together: the contour takes the mean
+    lower, upper = inside[:-1], inside[1:]
+    across = (lower[:, :-1] == upper[:, 1:]) & (lower[:, 1:] == upper[:, :-1]) & (lower[:, :-1] != lower[:, 1:])
+    j, i = np.nonzero(across)
     half = 0.5 * (xs[1] - xs[0])
-    centre = np.zeros(code.shape, dtype=bool)
-    centre[saddle_j, saddle_i] = accessible(parameters, slider_range, xs[saddle_i] + half, ys[saddle_j] + half)
-    # numbers of a cell's edges: horizontal ones first, then vertical ones
-    vertical = rows * columns
-    j, i = np.nonzero((code > 0) & (code < 15))
-    edges = np.stack(
-        [j * columns + i, vertical + j * columns + i + 1, (j + 1) * columns + i, vertical + j * columns + i]
-    )
-    follows: dict[int, int] = {}
-    for numbers, cell_code, middle in zip(edges.T.tolist(), code[j, i].tolist(), centre[j, i].tolist()):
-        for start, end in _PIECES[cell_code, middle]:
-            follows[numbers[start]] = numbers[end]
-    vertices = _crossings(parameters, slider_range, inside, xs, ys, np.array(list(follows), dtype=int))
-    place = {edge: k for k, edge in enumerate(follows)}
-    rings = []
-    while follows:
-        edge, following = follows.popitem()
-        ring = [edge]
-        while following != edge:
-            ring.append(following)
-            following = follows.pop(following)
-        rings.append(vertices[[place[number] for number in ring]])
+    joined = accessible(parameters, slider_range, xs[i] + half, ys[j] + half)
+    for k in range(4):
+        corner = j + k // 2, i + k % 2
+        own = inside[corner] == joined
+        np.add.at(heights, tuple(place[own] for place in corner), np.where(joined[own], 0.5, -0.5))
+    # on an edge of the grid one of the two numbers of a place is whole, but for rounding
+    lines = [np.round(line, 6)[:-1] for line in contour_generator(z=heights).lines(0.5)]
+    if not lines:
+        return []
+    vertices = _crossings(parameters, slider_range, inside, xs, ys, np.concatenate(lines))
+    rings = np.split(vertices, np.cumsum([len(line) for line in lines])[:-1])
     return sorted(rings, key=lambda ring: (-abs(_signed_area(ring)), *ring[0]))
 
 
@@ -403,13 +368,10 @@ def _crossings(
     inside: NDArray[np.bool_],
     xs: NDArray[np.float64],
     ys: NDArray[np.float64],
-    edges: NDArray[np.int64],
+    between: NDArray[np.float64],
 ) -> NDArray[np.float64]:
-    """The point of each numbered edge at which the area ends, shape (k, 2)."""
-    rows, columns = inside.shape
-    upright, number = np.divmod(edges, rows * columns)
-    j, i = np.divmod(number, columns)
-    far_j, far_i = j + upright, i + 1 - upright
+    """Where the area ends between two neighbours of the grid, in whose numbers ``between`` has places; shape (k, 2)."""
+    (i, j), (far_i, far_j) = np.floor(between).astype(int).T, np.ceil(between).astype(int).T
     first = np.column_stack([xs[i], ys[j]])
     second = np.column_stack([xs[far_i], ys[far_j]])
     swap = inside[far_j, far_i][:, None]
