@@ -80,7 +80,7 @@ def even_odd_area(*rings: FloatArray) -> float:
     Of one polyline it is the enclosed area, by the even-odd rule where it crosses itself: both lobes of a figure-eight
     count, an inner loop does not. Of two it is the area of the symmetric difference of what they enclose, because a
     point is in that if it is inside one of them and not the other. The polylines are cut at their crossings, and the faces
-    between the pieces counted or not by a ray from a point in each.
+    between the pieces counted or not by a point in each.
 
     Parameters
     ----------
@@ -92,16 +92,9 @@ def even_odd_area(*rings: FloatArray) -> float:
     vertices = [ring(points, True) for points in rings]
     pieces = shapely.get_parts(shapely.unary_union([shapely.LineString(v) for v in vertices]))
     faces = shapely.get_parts(shapely.polygonize(pieces))
-    x, y = shapely.get_coordinates(shapely.point_on_surface(faces)).T[:, :, None]
-    crossings = np.zeros(len(faces), dtype=int)
-    for v in vertices:
-        (xa, ya), (xb, yb) = v[:-1].T, v[1:].T
-        spans = (ya > y) != (yb > y)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            # segments along the ray divide by zero; they span no ray
-            right = xa + (y - ya) * (xb - xa) / (yb - ya) > x
-        crossings += (spans & right).sum(axis=1)
-    return float(shapely.area(faces)[crossings % 2 == 1].sum())
+    x, y = shapely.get_coordinates(shapely.point_on_surface(faces)).T
+    inside = [shapely.contains_xy(shapely.Polygon(v), x, y) for v in vertices]
+    return float(shapely.area(faces)[np.logical_xor.reduce(inside)].sum())
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

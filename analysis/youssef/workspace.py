@@ -18,8 +18,10 @@ come out by themselves.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import acos, atan2, hypot, isfinite, pi
+from typing import Any
 
 import numpy as np
 import shapely
@@ -354,7 +356,8 @@ def _rings(
         own = inside[corner] == joined
         np.add.at(heights, tuple(place[own] for place in corner), np.where(joined[own], 0.5, -0.5))
     # on an edge of the grid one of the two numbers of a place is whole, but for rounding
-    lines = [np.round(line, 6)[:-1] for line in contour_generator(z=heights).lines(0.5)]
+    contours: Sequence[Any] = contour_generator(z=heights).lines(0.5)
+    lines = [np.round(line, 6)[:-1] for line in contours]
     if not lines:
         return []
     vertices = _crossings(parameters, slider_range, inside, xs, ys, np.concatenate(lines))
