@@ -4,7 +4,7 @@ import uPlot from "uplot";
 import uplotStyle from "uplot/dist/uPlot.min.css";
 import type { Rows } from "./core";
 import { type Chart as Table, type Curve, type Mechanism, outputAt, rowLength, type Source } from "./tables";
-import { roundingOf } from "./words";
+import { called, roundingOf } from "./words";
 
 /** Colours alone do not tell the curves apart; of each there is a colour `--curve` with its number. */
 const DASHES: number[][] = [[], [7, 3], [2, 3], [9, 3, 2, 3], [4, 2], [12, 4]];
@@ -115,10 +115,10 @@ export class Charts {
       const box = document.createElement("figure");
       const caption = document.createElement("figcaption");
       caption.textContent = `${title} [${unit}]`;
-      box.setAttribute("aria-label", `${title} in ${unit}: ${curves.map((curve) => curve.name).join(", ")}`);
+      box.setAttribute("aria-label", `${title} in ${unit}: ${curves.map(called).join(", ")}`);
       box.append(caption);
       this.place.append(box);
-      const looks = curves.map(({ name }, n) => look(name, n));
+      const looks = curves.map((curve, n) => look(called(curve), n));
       // its scale is known when it is drawn
       const hooks = { draw: [() => this.mark(this.row)] };
       const plot = plotIn(box, axis, looks, { width: this.width(), hooks });

@@ -4,7 +4,7 @@ import type { Rows } from "./core";
 import { hull } from "./hull";
 import { type Interval, Plane } from "./plane";
 import { type Chart, type Mechanism, outputAt, rowLength } from "./tables";
-import { digits } from "./words";
+import { called, digits } from "./words";
 
 const HEIGHT = 300;
 
@@ -38,7 +38,7 @@ export class Forces {
     this.mechanism = mechanism;
     this.chart = mechanism.charts.find((chart) => chart.kind === "forces");
     this.joint.replaceChildren(
-      ...(this.chart?.curves ?? []).map(({ name }, n) => new Option(name, String(n))),
+      ...(this.chart?.curves ?? []).map((curve, n) => new Option(called(curve), String(n))),
     );
     const spatial = this.chart?.curves.some(({ of }) => of.length > 2) ?? false;
     this.sides.replaceChildren(...["x, y", "y, z", "x, z"].map((name) => new Option(name, name)));
@@ -51,6 +51,7 @@ export class Forces {
   }
 
   mark(row: number): void {
+    if (row === this.row) return;
     this.row = row;
     this.draw();
   }
@@ -92,6 +93,9 @@ export class Forces {
     this.words.textContent =
       `Greatest ${digits(sizes[most])} N towards ${digits(angle, 3)} deg. Curve: the tip of the force over the motion; ` +
       "straight line: the force at this instant; dashed: the envelope.";
-    plane.canvas.setAttribute("aria-label", `Force on ${curve.name} as a vector; ${this.words.textContent}`);
+    plane.canvas.setAttribute(
+      "aria-label",
+      `Force on ${called(curve)} as a vector; ${this.words.textContent}`,
+    );
   }
 }

@@ -43,10 +43,6 @@ export class Plane {
     return this.colours.getPropertyValue(`--${name}`);
   }
 
-  wipe(): void {
-    this.context.clearRect(0, 0, this.canvas.width, this.canvas.height);
-  }
-
   /** Begin anew with these ranges; `equal`: a unit is as long along both axes. */
   frame(x: Interval, y: Interval, names: [string, string], equal = false): void {
     const [width, height] = [this.width, this.height];

@@ -62,8 +62,10 @@ export class Response extends Search {
     const output = swinging(this.context!);
     const all = this.branches.flat();
     const scale = (point: Point): Interval => [point.value * given!.factor, point.amplitude * output.factor];
-    const top =
-      1.08 * Math.max(1e-12, ...all.filter((p) => p.value >= low && p.value <= high).map((p) => scale(p)[1]));
+    const inside = all.filter((point) => point.value >= low && point.value <= high);
+    const largest = Math.max(0, ...inside.map((point) => scale(point)[1]));
+    // where there is nothing but rounding the axis goes to 1
+    const top = largest > 1e-9 ? 1.08 * largest : 1;
     const x: Interval = [low * given!.factor, high * given!.factor];
     plane.frame(x, [0, top], [`${called(given!)} [${given!.unit}]`, `amplitude [${output.unit}]`]);
     const c = plane.context;

@@ -157,11 +157,13 @@ export abstract class Search {
     if (context.orbit.place < 0) none = "All motion is prescribed: nothing is free to swing.";
     else if (new Set(names).size < names.length)
       none = `Both axes are the ${called(this.axes[0].given!)}: choose another variable for one of them.`;
+    // nothing is drawn then
+    this.plane.canvas.hidden = none !== "";
+    for (const { ends } of this.axes) for (const end of ends) end.disabled = none !== "";
     if (none) {
       this.forget();
       this.ranges = [];
       this.clear();
-      this.plane.wipe();
       this.words.textContent = none;
       return;
     }

@@ -72,8 +72,9 @@ export class Stability extends Search {
       const [low, high] = up.map((share) => this.scaled(1, Math.min(1, share)));
       const verdict = this.verdict(cell);
       const stable = verdict === "stable" || verdict.startsWith("prescribed");
-      const [px, py] = [plane.px(left), plane.py(high)];
-      const [width, height] = [plane.px(right) - px, plane.py(low) - py];
+      // on whole pixels: no seams between squares
+      const [px, py] = [Math.round(plane.px(left)), Math.round(plane.py(high))];
+      const [width, height] = [Math.round(plane.px(right)) - px, Math.round(plane.py(low)) - py];
       // the coarser square lies under it
       c.fillStyle = plane.colour("card");
       c.fillRect(px, py, width, height);

@@ -133,7 +133,7 @@ export function verdictInWords(
   tolerance: number,
 ): string {
   if (!orbit.found) return "no periodic motion";
-  if (orbit.size === 0) return "prescribed: no freedom is left that could be unstable";
+  if (orbit.size === 0) return "prescribed, no freedom is left that could be unstable";
   const margin = 1 - Math.hypot(...orbit.multipliers[0]);
   if (margin > tolerance) return "stable";
   return margin < -tolerance ? "unstable" : "marginal";
