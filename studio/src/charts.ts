@@ -35,6 +35,15 @@ function sample({ stroke, dash, width }: Look): string {
   return `url("data:image/svg+xml,${encodeURIComponent(drawing)}") no-repeat`;
 }
 
+/** The name of a curve in the legend: a click shows and hides the curve, which uPlot hears of. */
+function switchOf({ label }: Look): HTMLElement {
+  const made = document.createElement("button");
+  made.textContent = label;
+  made.title = "Show or hide this curve";
+  made.setAttribute("aria-pressed", "true");
+  return made;
+}
+
 /** Curves over an axis with a name and a unit, in the colours of the page; without data yet. */
 export function plotIn(
   place: HTMLElement,
@@ -42,6 +51,9 @@ export function plotIn(
   looks: Look[],
   options: Partial<uPlot.Options>,
 ): uPlot {
+  const switches = looks.map(switchOf);
+  const pressed = (plot: uPlot, n: number | null): void =>
+    void (n && switches[n - 1].setAttribute("aria-pressed", String(plot.series[n].show)));
   const stroke = colour("text");
   const grid = { stroke: colour("line"), width: 1 };
   const both = { stroke, grid, ticks: grid, font: FONT };
@@ -66,8 +78,12 @@ export function plotIn(
         },
         { ...both, size: 58 },
       ],
-      series: [{ label: axis }, ...looks.map((one) => ({ ...one, points: { show: false } }))],
+      series: [
+        { label: axis },
+        ...looks.map((one, n) => ({ ...one, label: switches[n], pxAlign: 0, points: { show: false } })),
+      ],
       ...options,
+      hooks: { ...options.hooks, setSeries: [pressed] },
     },
     [[], ...looks.map(() => [])],
     place,

@@ -1,8 +1,9 @@
 /** Buttons, lists and keys about the mechanism: what they do is told by who makes them. */
 
-import type { Orbit } from "./core";
 import type { Playback } from "./playback";
 import type { Source, State, Tables } from "./tables";
+import { digits, multiplierInWords, verdictInWords } from "./words";
+import type { Answer } from "./worker";
 
 const RATES = [1, 1 / 2, 1 / 5, 1 / 10, 1 / 20, 1 / 50, 1 / 100];
 /** Views by their keys. */
@@ -92,12 +93,22 @@ export class Controls {
     this.sets.value = set ? `${mechanism}/${set.name}` : "";
   }
 
-  /** Which motion is shown: one that is not there cannot be chosen. */
-  motion({ found }: Orbit, source: Source): void {
+  /** Which motion is shown, of which one that is not there cannot be chosen, and whether the periodic one is stable. */
+  motion({ orbit, source, milliseconds }: Answer): void {
     const [steady] = this.source.options;
-    steady.disabled = !found;
-    steady.text = found ? "periodic" : "periodic (none found)";
+    steady.disabled = !orbit.found;
+    steady.text = orbit.found ? "periodic" : "periodic (none found)";
     this.source.value = source;
+    const verdict = orbit.found ? verdictInWords(orbit, this.tables.tolerance) : "none found";
+    const place = by<HTMLElement>("floquet");
+    const word = document.createElement("b");
+    word.textContent = verdict;
+    word.classList.toggle("unstable", verdict === "unstable" || !orbit.found);
+    place.replaceChildren("Periodic motion: ", word);
+    if (orbit.size > 0)
+      place.append(`; Floquet multipliers ${orbit.multipliers.map(multiplierInWords).join(", ")}`);
+    place.title = `computed in ${digits(milliseconds, 2)} ms`;
+    place.dataset.multipliers = JSON.stringify(orbit.multipliers);
   }
 
   show({ moving, row, count }: Playback): void {

@@ -23,15 +23,7 @@ import {
   type State,
   type Tables,
 } from "./tables";
-import {
-  called,
-  capital,
-  digits,
-  motionInWords,
-  multiplierInWords,
-  roundingOf,
-  verdictInWords,
-} from "./words";
+import { called, capital, motionInWords, roundingOf } from "./words";
 import { Views } from "./views";
 import type { Answer } from "./worker";
 
@@ -236,8 +228,7 @@ class Studio {
       this.charts.data(rows, source);
     }
     by("words").textContent = motionInWords(m, rows, orbit, this.state.values);
-    this.controls.motion(orbit, source);
-    this.floquet(answer);
+    this.controls.motion(answer);
     if (newest && !this.held) this.see(answer);
     this.seek(playback.nearest());
     if (first) document.documentElement.dataset.ready = String(Math.round(performance.now()));
@@ -254,20 +245,6 @@ class Studio {
       natural = this.core.natural(m.natural);
     }
     this.charts.see({ mechanism: m, values: this.state.values, orbit, natural });
-  }
-
-  private floquet({ orbit, milliseconds }: Answer): void {
-    const verdict = orbit.found ? verdictInWords(orbit, this.tables.tolerance) : "none found";
-    const place = by<HTMLElement>("floquet");
-    place.replaceChildren("Periodic motion: ");
-    const word = document.createElement("b");
-    word.textContent = verdict;
-    word.className = verdict === "unstable" || !orbit.found ? "unstable" : "";
-    place.append(word);
-    if (orbit.size > 0)
-      place.append(`; Floquet multipliers ${orbit.multipliers.map(multiplierInWords).join(", ")}`);
-    place.title = `computed in ${digits(milliseconds, 2)} ms`;
-    place.dataset.multipliers = JSON.stringify(orbit.multipliers);
   }
 
   // The instant that is drawn
@@ -395,6 +372,7 @@ class Studio {
   private assemble(): void {
     const sign = this.mechanism.given.find((g) => g.choices && "-1" in g.choices);
     if (sign) this.change({ [sign.name]: -this.value(sign) }, true);
+    else this.fault("These links can be joined in one way only");
   }
 
   private fault(sentence: string): void {
@@ -485,10 +463,10 @@ class Studio {
     this.go(row);
   }
 
-  /** For scripts: the rows that are shown, and which of them is drawn. */
+  /** For scripts: what is shown, and which row of it is drawn. */
   shown(): { rows: Rows; row: number; source: Source; answer: Answer } | undefined {
     const { answer, row } = this.playback;
-    return answer && { rows: answer.rows, row, source: answer.source, answer };
+    return answer && { ...answer, row, answer };
   }
 }
 

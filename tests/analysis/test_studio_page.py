@@ -39,7 +39,13 @@ def test_curves_are_told_apart_in_the_legend_and_axes_have_names(page: Any) -> N
     marks = page.eval_on_selector_all(".u-legend .u-marker", "all => all.map((one) => one.style.background)")
     dashes = [re.findall(r"stroke-dasharray%3D%22(.*?)%22", mark) for mark in marks]
     assert len({str(dash) for dash in dashes}) == len(marks) == 4
-    axis = "window.studio.charts.charts.charts[0].plot.axes[0].label"
+    plot = "window.studio.charts.charts.charts[0].plot"
+    # by the keyboard a curve is hidden, and shown again
+    for shown in ("false", "true"):
+        page.locator(".u-legend button").nth(1).press("Enter")
+        assert page.locator(".u-legend button").nth(1).get_attribute("aria-pressed") == shown
+        assert page.evaluate(f"String({plot}.series[2].show)") == shown
+    axis = f"{plot}.axes[0].label"
     assert page.evaluate(axis) == "crank angle [deg]"
     page.select_option("#source", "run")
     page.wait_for_function("window.studio.shown().source === 'run'")
