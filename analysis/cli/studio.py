@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import sys
+import threading
 import webbrowser
 from collections.abc import Sequence
 from pathlib import Path
@@ -24,6 +26,9 @@ from .common import (
     say,
     set_option,
 )
+
+#: What is set where there is a screen, or a browser was chosen.
+_SCREENS = ("DISPLAY", "WAYLAND_DISPLAY", "BROWSER")
 
 
 @click.command()
@@ -64,10 +69,18 @@ def studio(what: str | None, out: str | None, browser: bool, port: int, settings
     server.worker.start()
     say(f"the studio is at {server.address}")
     print_error("it is served to this machine alone; Ctrl-C stops it")
-    if browser and not webbrowser.open(server.address):
-        print_error("note: there is no browser here: open the address in one, or write the page as a file with --out")
+    if browser:
+        # one in the terminal comes back when it is left, and until then the page is to be served
+        threading.Thread(target=_open, args=(server.address,), daemon=True).start()
     server.run()
     print_error("the studio is closed")
+
+
+def _open(address: str) -> None:
+    """Open a browser; without a screen those that are found draw in the terminal, where the page cannot be."""
+    screen = sys.platform in ("win32", "darwin") or any(os.environ.get(name) for name in _SCREENS)
+    if not (screen and webbrowser.open(address)):
+        print_error("note: there is no browser here: open the address in one, or write the page as a file with --out")
 
 
 def _state(what: str | None, overrides: dict[str, Any]) -> dict[str, Any]:

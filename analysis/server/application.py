@@ -97,7 +97,11 @@ class Application:
 
     def _served(self, environ: Mapping[str, Any]) -> tuple[HTTPStatus, bytes]:
         if environ.get("HTTP_HOST") not in self.hosts:
-            raise _Refused(HTTPStatus.MISDIRECTED_REQUEST, "this server is of the page at its own address alone")
+            raise _Refused(
+                HTTPStatus.MISDIRECTED_REQUEST,
+                "this server answers at its own address alone: open the one that linkwork studio printed; a tunnel must "
+                "keep its port",
+            )
         place = environ.get("PATH_INFO", "")
         origin = environ.get("HTTP_ORIGIN")
         site = environ.get("HTTP_SEC_FETCH_SITE", "none")

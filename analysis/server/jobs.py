@@ -89,8 +89,11 @@ def _tuned(case: Case, wanted: _Tuning) -> Answer:
     variables = {variable.name: variable for variable in mechanism.variables}
     for name, before, after in zip(wish.names, wish.present.tolist(), tuned.values.tolist()):
         unit, factor = shown_in(variables[name])
+        called = name.replace(".", " ").replace("_", " ")
         change = f"{100.0 * (after / before - 1.0):+.3g} %"
-        rows.append([f"{name} [{unit}]" if unit else name, f"{factor * before:.5g}", f"{factor * after:.5g}", change])
+        rows.append(
+            [f"{called} [{unit}]" if unit else called, f"{factor * before:.5g}", f"{factor * after:.5g}", change]
+        )
     rows += [[r.name, r.before.text, r.after.text, "met" if r.met else "not met"] for r in tuned.requirements]
     title = f"{case.title}, tuned"
     changed = state_of(replace(case, title=title, parameters=tuned.parameters))

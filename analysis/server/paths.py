@@ -9,6 +9,8 @@ from typing import Any, get_args
 
 import numpy as np
 
+from linkwork.errors import ParameterError
+
 from ..files import Choice, Many, Quantity, Whole, entry, flag, save_drawing, write_csv, write_tables
 from ..mechanisms import require_five_bar
 from ..motion import inverse_dynamics, motion_of_plant, slider_motion
@@ -181,6 +183,12 @@ def moved(case: Case, wanted: Moved) -> Answer:
     """The slider's motion with more and more harmonics, the links and the guide kept, and the force of the last."""
     p = case.parameters
     require_five_bar(p, "a motion of the slider")
+    if p.coupler_point_distance == 0.0:
+        raise ParameterError(
+            "coupler.point_distance",
+            0.0,
+            "not be zero: the path is that of the crank pin, which the slider does not move",
+        )
     task = wanted.task()
     linkage = Linkage(
         ground_length=p.ground_length,

@@ -49,7 +49,9 @@ export function tableOf(answer: Answer, wanted: Point[], last?: (row: number) =>
   const { headings, rows, files } = answer.table!;
   const made = make("table");
   const head = made.createTHead().insertRow();
-  for (const text of [...headings, ...(last ? [""] : [])])
+  // under a picture there is room for buttons, which a phone shows first
+  const atEnd = last && !answer.pictures;
+  for (const text of [...headings, ...(atEnd ? [""] : [])])
     head.append(make("th", { textContent: text, scope: "col" }));
   const body = made.createTBody();
   rows.forEach((cells, n) => {
@@ -57,7 +59,10 @@ export function tableOf(answer: Answer, wanted: Point[], last?: (row: number) =>
     for (const text of cells) row.insertCell().textContent = text;
     const picture = answer.pictures?.[n];
     if (picture) row.cells[0].append(smallPicture(picture, wanted, answer.closed ?? true));
-    if (last) row.insertCell().append(line(...last(n), ...(files?.[n] ?? []).map(fileButton)));
+    if (last)
+      (atEnd ? row.insertCell() : row.cells[0]).append(
+        line(...last(n), ...(files?.[n] ?? []).map(fileButton)),
+      );
   });
   return make("div", { className: "wide" }, made);
 }

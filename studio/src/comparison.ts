@@ -31,8 +31,10 @@ export async function compareIn(place: HTMLElement, m: Mechanism, answer: Answer
   said.dataset.relative = String(worst.relative);
   const choice = make("select");
   for (const { output } of pairs) choice.add(new Option(called(output), output.name));
-  const crank = m.crank >= 0 ? m.freedoms[m.crank].rate : 0;
-  choice.value = m.outputs[m.moving[0] ?? crank].name;
+  // what swings farthest, or how fast the crank turns
+  const range = (n: number): number => Math.max(...pairs[n].page) - Math.min(...pairs[n].page);
+  const [first] = [...m.moving].sort((one, other) => range(other) - range(one));
+  choice.value = m.outputs[first ?? m.freedoms[Math.max(0, m.crank)].rate].name;
   const chart = make("div");
   const drawn = (): void => {
     const { output, page, fmu } = pairs.find((one) => one.output.name === choice.value)!;

@@ -2,7 +2,8 @@
 
 import { amplitudeAt, type Arc, arcsOf, type Avoided, type Interval, jumpsOf, rangesToAvoid } from "./avoid";
 import type { Found, Point } from "./explore";
-import { type Context, driving, type Go, Search, swinging, valueOf } from "./search";
+import { type Go, Search } from "./search";
+import { type Context, driving, swinging, valueOf } from "./varied";
 import type { Given } from "./tables";
 import { called, digits, shown } from "./words";
 

@@ -1,10 +1,10 @@
 /** What is common to charts that take seconds: what varies and between which values, a search that goes on beside the page. */
 
-import type { Orbit } from "./core";
 import type { Exploration, Found } from "./explore";
 import { Explorer } from "./explorer";
 import { Plane } from "./plane";
-import { type Given, type Mechanism, type Output, type Range, type Values, givenOf } from "./tables";
+import { type Given, type Mechanism, type Range, type Values, givenOf } from "./tables";
+import { type Context, valueOf, variables } from "./varied";
 import { called, digits } from "./words";
 
 /** How long all must stay as it is before a search begins anew (ms). */
@@ -13,49 +13,8 @@ const REST = 250;
 const ABOUT: [number, number] = [0.15, 2.3];
 const OTHERS: [number, number] = [0.1, 2];
 
-export interface Context {
-  mechanism: Mechanism;
-  values: Values;
-  orbit: Orbit;
-  natural: number;
-}
-
 /** Where the page is to go: values by name, and where the motion there is sought first. */
 export type Go = (values: Values, start?: number[]) => void;
-
-export const valueOf = (given: Given, values: Values): number => values[given.name] ?? given.start;
-
-/** What can vary: real parameters, and inputs that act. */
-function variables({ mechanism, values }: Context): Given[] {
-  const acts = (given: Given): boolean => {
-    const mode = mechanism.given.find((one) => one.arguments?.includes(given.argument ?? ""));
-    const chosen = !mode || mode.arguments![valueOf(mode, values)] === given.argument;
-    return chosen && (given.kind !== "motor" || hasMotor(mechanism, values));
-  };
-  return mechanism.given.filter((given) => !given.choices && given.section !== "Start" && acts(given));
-}
-
-const hasMotor = (mechanism: Mechanism, values: Values): boolean =>
-  mechanism.given.some((given) => given.reference === -1 && valueOf(given, values) !== 0);
-
-/** What drives the crank: its speed, its torque, or the field of its motor. */
-export function driving(context: Context): Given | undefined {
-  const { mechanism, values } = context;
-  const all = variables(context);
-  const motor = hasMotor(mechanism, values) ? all.find((given) => given.reference === -3) : undefined;
-  return (
-    motor ??
-    all.find((given) => given.freedom === mechanism.crank && given.unit === "rpm") ??
-    all.find((given) => given.freedom === mechanism.crank)
-  );
-}
-
-/** The output whose amplitude is meant, by its place in the state. */
-export function swinging({ mechanism: { freedoms, outputs }, orbit: { place } }: Context): Output {
-  return outputs[
-    place < freedoms.length ? freedoms[place].coordinate : freedoms[place - freedoms.length].rate
-  ];
-}
 
 interface Axis {
   select: HTMLSelectElement;

@@ -1,7 +1,8 @@
 /** Verdicts over a plane of two parameters, coarse to fine. */
 
 import { type Cell, type Found, middle } from "./explore";
-import { type Context, driving, type Go, Search, valueOf } from "./search";
+import { type Go, Search } from "./search";
+import { type Context, driving, valueOf } from "./varied";
 import type { Given } from "./tables";
 import { called, multiplierInWords, shown, verdictInWords } from "./words";
 

@@ -56,7 +56,7 @@ const REWRITTEN: [RegExp, (whole: string, ...parts: string[]) => string][] = [
   [/limit of assembly (?:at|near) /g, () => "the links cannot be joined beyond "],
   [RegExp(`${N} rad \\(${N} deg\\)`, "g"), (_, _radians, degrees) => `${turned(degrees)} deg`],
   ...READ.map(([unit, shown, factor]): (typeof REWRITTEN)[number] => [
-    RegExp(`${N} ${unit}(?![\\w/.^²³])`, "g"),
+    RegExp(`${N} ${unit}(?![\\w/^²³]|\\.\\w)`, "g"),
     (_, value) => `${digits(factor * Number(value))} ${shown}`,
   ]),
   [

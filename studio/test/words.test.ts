@@ -99,4 +99,5 @@ test("sentences of the equations are read in the units of the page", () => {
   );
   assert.equal(read("it turns at 10.4719755 rad/s: see 0.5 rad"), "it turns at 100 rpm: see 28.65 deg");
   assert.equal(read("a damper of 12 N/m at 1.5 m/s"), "a damper of 12 N/m at 1.5 m/s");
+  assert.equal(read("a torque of 1.25 N.m at 0.02 m."), "a torque of 1.25 N.m at 20 mm.");
 });

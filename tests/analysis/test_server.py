@@ -27,6 +27,7 @@ from urllib.parse import urlsplit
 import numpy as np
 import pytest
 
+from analysis.cli.studio import _open as open_page
 from analysis.export import PLATFORMS, this_platform
 from analysis.mechanisms import MECHANISMS, PUBLISHED
 from analysis.run import case_from, heard_by, simulate
@@ -265,6 +266,7 @@ def test_jobs_fail_in_a_sentence_come_one_at_a_time_and_stop_where_they_are_canc
         ("linkages", {}, {"points": "/etc/passwd"}, "be a list"),
         ("linkages", {}, {"points": ELLIPSE, "longest": 0.001}, "cannot span the target"),
         ("slider", {"mechanism": "slider-crank"}, {"points": ELLIPSE}, "of five-bars"),
+        ("slider", {"values": {"coupler.point_distance": 0.0}}, {"points": ELLIPSE}, "which the slider does not move"),
         ("tune", {}, {"speeds": [40.0, 41.0], "change": [], "share": 0.1}, "at least 1"),
         ("tune", {}, {"speeds": [41.0, 40.0], "change": ["slider.stiffness"], "share": 0.1}, "least, greatest"),
     ],
@@ -361,6 +363,22 @@ def test_linkages_of_every_kind_are_drawn_and_go_on_from_their_files() -> None:
         crank, coupler, *_ = picture["links"]
         assert crank[1] == coupler[0] == coupler[-1]
         assert min(np.hypot(*(np.array(coupler[2]) - point)) for point in curve) < 3e-3
+
+
+@pytest.mark.parametrize("screen", [None, "DISPLAY", "BROWSER"])
+def test_a_browser_is_opened_where_there_is_a_screen(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], screen: str | None
+) -> None:
+    asked: list[str] = []
+    monkeypatch.setattr("sys.platform", "linux")
+    monkeypatch.setattr("webbrowser.open", lambda address: bool(asked.append(address)) or True)
+    for name in ("DISPLAY", "WAYLAND_DISPLAY", "BROWSER"):
+        monkeypatch.delenv(name, raising=False)
+    if screen:
+        monkeypatch.setenv(screen, "x")
+    open_page("http://127.0.0.1:1/")
+    assert asked == (["http://127.0.0.1:1/"] if screen else [])
+    assert ("there is no browser here" in capsys.readouterr().err) == (screen is None)
 
 
 @pytest.mark.slow
