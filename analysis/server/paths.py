@@ -160,15 +160,21 @@ def _kept(solution: Solution, wanted: Linkages, path: Path, title: str) -> list[
 
 
 def _picture(solution: Solution) -> Answer:
-    """Lines of a small picture in the plane of the path, where the task begins: links and guide, and the coupler curve."""
+    """Lines of a small picture in the plane of the path, where the task begins: links and guide, and what is traced."""
     scene = LinkageScene(solution)
     pins = scene.pins(float(scene.rotation[0])) or {}
     links = ["AB", "BCPB", *([] if solution.linkage.slides else ["CD"]), *(["DE"] if scene.second_crank else [])]
     guide = [] if scene.guide is None else [scene.guide.tolist()]
     return {
         "links": [[pins[name] for name in link] for link in links if pins] + guide,
-        "curves": [piece[::_EVERY].tolist() for piece in scene.curves],
+        # of an open path the rest of the curve, which may be far larger, is left out
+        "curves": [piece[::_EVERY].tolist() for piece in (scene.curves if scene.target_closed else _joined(scene))],
     }
+
+
+def _joined(scene: LinkageScene) -> list[FloatArray]:
+    traced = scene.traced
+    return [] if traced is None else [traced[np.isfinite(traced).all(axis=1)]]
 
 
 def _turned(points: FloatArray, linkage: Linkage) -> FloatArray:
