@@ -62,8 +62,7 @@ def interruptible() -> Iterator[Heard]:
         if heard.waiting:
             raise KeyboardInterrupt
 
-    before = signal.getsignal(signal.SIGINT)
-    signal.signal(signal.SIGINT, hear)
+    before = signal.signal(signal.SIGINT, hear)
     try:
         yield heard
     finally:

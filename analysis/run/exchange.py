@@ -56,7 +56,9 @@ class Exchange(CVodeSolver):  # type: ignore[misc]
         # CVode's time counts from there: at a late time its first steps would be lost in the rounding
         self.origin = self.time = float(times[0])
         self.law = encoded.law.copy()
-        inside = encoded.breaks[(encoded.breaks > times[0]) & (encoded.breaks <= times[-1])]
+        # the outer pieces go on beyond their ends
+        breaks = encoded.breaks[1:-1]
+        inside = breaks[(breaks > times[0]) & (breaks <= times[-1])]
         self.ends = [*inside.tolist(), np.inf]
         self.failure: Exception | None
         super().__init__(

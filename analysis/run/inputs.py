@@ -209,6 +209,19 @@ def start_from(mechanism: Mechanism, data: Any, base: InitialState | None = None
     return made
 
 
+@lru_cache(maxsize=64)
+def _at_rest(mechanism: Mechanism) -> InitialState:
+    """State at the start by default."""
+    return start_from(mechanism, {})
+
+
+@lru_cache(maxsize=64)
+def _arguments_of(mechanism: Mechanism) -> tuple[str, ...]:
+    """Names of what can act on a mechanism, and of the flags that choose its modes."""
+    modes = [name for mode in mechanism.modes for name in mode.arguments]
+    return tuple(dict.fromkeys([*(c.argument for c in mechanism.channels if c.kind != "rate"), *modes]))
+
+
 def given(mechanism: Mechanism, inputs: Inputs | None, initial: InitialState | None) -> tuple[Inputs, Any]:
     """Inputs and state at the start of a run, by default nothing and at rest; both must be of the mechanism.
 
@@ -222,13 +235,13 @@ def given(mechanism: Mechanism, inputs: Inputs | None, initial: InitialState | N
     inputs = Inputs() if inputs is None else inputs
     if not isinstance(inputs, Inputs):
         raise InputError(f"inputs is {inputs!r}: it must be analysis.Inputs")
-    modes = [name for mode in mechanism.modes for name in mode.arguments]
-    known = dict.fromkeys([*(c.argument for c in mechanism.channels if c.kind != "rate"), *modes])
     for name in inputs:
-        if name not in known:
+        if name not in (known := _arguments_of(mechanism)):
             raise InputError(f"a {mechanism.name} has no input {name!r}: its inputs are {', '.join(known)}")
-    if initial is None or isinstance(initial, Mapping):
-        initial = start_from(mechanism, initial or {})
+    if initial is None:
+        initial = _at_rest(mechanism)
+    elif isinstance(initial, Mapping):
+        initial = start_from(mechanism, initial)
     if not isinstance(initial, mechanism.initial):
         kind, wanted = type(initial), mechanism.initial
         raise InputError(
@@ -307,6 +320,10 @@ def _signals(mechanism: Mechanism) -> tuple[tuple[str, int, int], ...]:
     )
 
 
+#: Breaks of inputs that have none.
+_NO_BREAKS = np.array([0.0, 1.0])
+
+
 def encode(inputs: Inputs, mechanism: Mechanism) -> Encoded:
     """Bring all channels onto common breaks."""
     signals = _signals(mechanism)
@@ -317,7 +334,7 @@ def encode(inputs: Inputs, mechanism: Mechanism) -> Encoded:
         if isinstance(part, Function) and len(part.breaks) > 0:
             # every one of them is a break inside: the first and the last of the merged ones are none
             times.append(np.array([min(part.breaks) - 1.0, *part.breaks, max(part.breaks) + 1.0]))
-    merged = np.unique(np.concatenate(times)) if times else np.array([0.0, 1.0])
+    merged = np.unique(np.concatenate(times)) if times else _NO_BREAKS
     coefficients = np.zeros((len(merged) - 1, len(signals), 4))
     harmonics: list[tuple[float, float, float, float]] = []
     law = np.zeros(6)
@@ -380,6 +397,8 @@ def align(encoded: Encoded, times: NDArray[np.float64]) -> Encoded:
     0.3 is not 3 * 0.1 in floats: a jump at 0.3 s would otherwise be missed by a whole step where inputs are sampled and
     held, and the sample there would belong to what was before the jump.
     """
+    if encoded.breaks is _NO_BREAKS:
+        return encoded
     after = np.clip(np.searchsorted(times, encoded.breaks), 1, len(times) - 1)
     low, high = times[after - 1], times[after]
     nearest = np.where(encoded.breaks - low < high - encoded.breaks, low, high)

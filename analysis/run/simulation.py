@@ -170,8 +170,10 @@ def simulate(
     """
     start_time, progress = options.pop("start_time", 0.0), options.pop("progress", False)
     if samples is None:
-        samples = sample_times(*usual_times(parameters, inputs, stop_time, step), start_time)
-    settings = settings_of(np.asarray(samples, float), hold, tolerance, options.pop("max_steps", MOST_STEPS))
+        times = sample_times(*usual_times(parameters, inputs, stop_time, step), start_time)
+    else:
+        times = _check_samples(np.asarray(samples, float))
+    settings = settings_of(times, hold, tolerance, options.pop("max_steps", MOST_STEPS))
     run = Run(parameters, inputs, initial, settings, tuple(events))
     if method in ("compiled", "balanced"):
         if options:
@@ -190,7 +192,6 @@ def settings_of(times: NDArray[np.float64], hold: float | None, tolerance: float
     ParameterError, InputError
     """
     check_tolerance(tolerance)
-    times = _check_samples(times)
     if hold is not None:
         _check_hold(hold, times)
     if max_steps < 1:
