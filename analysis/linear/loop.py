@@ -322,7 +322,7 @@ class _Driven:
     def __init__(self, mechanism: Mechanism, inputs: Inputs, channel: str, times: FloatArray) -> None:
         self.mechanism, self.channel = mechanism, channel
         self._encoded = align(encode(inputs, mechanism), times)
-        self._law = self._encoded.law.copy()
+        self._law = self._encoded.source.law.copy()
         self.modes = self._encoded.modes
         self.rows: list[Sequence[float]] = []
 
@@ -503,7 +503,7 @@ class _Linear:
         held = self.acting.copy()
         if self.encoded is not None:
             x = np.array([*measured, 0.0, 0.0])
-            held = sample(self.encoded, time, x, self.encoded.law)[self.forces]
+            held = sample(self.encoded, time, x, self.encoded.source.law)[self.forces]
         held[self.own] = force
         self.w = held - self.acting
 

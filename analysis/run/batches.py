@@ -26,9 +26,9 @@ from ..files import load_array, save_array
 from ..mechanisms import MECHANISMS, InitialState, Parameters
 from ..numerics.symbolic import ELEMENTARY
 from ..numerics.tracing import Rebound, rebound
-from .equations import like_parameters, machine, modules_of
+from .equations import like_parameters, modules_of
 from .inputs import Encoded, Inputs, align, compiled_source, encode, of_functions
-from .prepared import STEPS_PER_CALL, Run, Settings, outputs_of, verdict
+from .prepared import STEPS_PER_CALL, Run, Settings, outputs_of, problem_of, verdict
 
 #: solver.status of a run that was not begun, or was interrupted.
 NOT_RUN = -1
@@ -111,7 +111,7 @@ class Prepared(NamedTuple):
         digest = hashlib.sha256(
             f"{task.code} {task.mechanism.name} {task.outputs} {numbers} {sorted(self.failures)}".encode()
         )
-        for array in (*self.batch, self.x, settings.times, e.places, e.commands):
+        for array in (*self.batch, self.x, settings.times, e.source.places, e.commands):
             digest.update(f"{array.shape}".encode() + array.tobytes())
         return digest.hexdigest()[:32]
 
@@ -208,12 +208,7 @@ def _integrate(
     )
     # kept alive while their addresses are in use
     source, _kept = compiled_source(encoded)
-    modes = np.array([float(value) for value in encoded.modes.values()])
-    switched = _switched(mechanism, batch.p)
-    problem = k.Problem(
-        machine(mechanism, switched).addresses, modes, encoded.commands, len(mechanism.output_names), settings.tolerance,
-        settings.hold, float(settings.times[-1]),
-    )  # fmt: skip
+    problem = problem_of(encoded, settings, _switched(mechanism, batch.p))
     state = k.State(np.zeros(m, dtype=k.CARRY), prepared.x.copy(), np.zeros((m, len(mechanism.channels))))
     carries = state.carries
     carries["begin"] = settings.times[0]
@@ -229,7 +224,7 @@ def _integrate(
     counts = carries["sample"]
     if task.outputs is not None:
         for i, count in enumerate(counts.tolist()):
-            values = outputs_of(mechanism, modes, batch.p[i], states[i, :count], forces[i, :count])
+            values = outputs_of(mechanism, problem.modes, batch.p[i], states[i, :count], forces[i, :count])
             samples[0][i, :count] = values[:, task.outputs]
     for i in np.flatnonzero(counts < n).tolist():
         for part in samples:
@@ -354,10 +349,10 @@ def _acting(task: Task) -> tuple[Encoded, Any]:
 
     def encode_one(inputs: Inputs) -> Encoded:
         encoded = encode(inputs, mechanism)
-        key = encoded.breaks.tobytes()
+        key = encoded.source.breaks.tobytes()
         if key not in moved:
-            moved[key] = align(encoded, times).breaks
-        return replace(encoded, breaks=moved[key])
+            moved[key] = align(encoded, times).source.breaks
+        return replace(encoded, source=encoded.source._replace(breaks=moved[key]))
 
     kinds: list[Encoded] = []
     constant = -1
@@ -375,12 +370,13 @@ def _acting(task: Task) -> tuple[Encoded, Any]:
 
     found = _once(kind_of, task.inputs)
     which = np.array([kind for kind, _ in found])
-    sizes = np.array([(len(e.coefficients), len(e.harmonics)) for e in kinds])
+    sources = [e.source for e in kinds]
+    sizes = np.array([(len(e.coefficients), len(e.harmonics)) for e in sources])
     pieces, waves = sizes.max(axis=0)
     breaks = np.zeros((len(kinds), pieces + 1))
     coefficients = np.zeros((len(kinds), pieces, len(signals), 4))
     harmonics = np.zeros((len(kinds), waves, 4))
-    for n, e in enumerate(kinds):
+    for n, e in enumerate(sources):
         breaks[n, : len(e.breaks)] = e.breaks
         coefficients[n, : len(e.coefficients)] = e.coefficients
         harmonics[n, : len(e.harmonics)] = e.harmonics
@@ -395,6 +391,6 @@ def _acting(task: Task) -> tuple[Encoded, Any]:
         breaks=breaks[which],
         coefficients=coefficients,
         harmonics=harmonics[which],
-        laws=np.array([e.law for e in kinds])[which],
-        law_places=np.array([e.law_places for e in kinds])[which],
+        laws=np.array([e.law for e in sources])[which],
+        law_places=np.array([e.law_places for e in sources])[which],
     )

@@ -22,7 +22,7 @@ from ..units import Amount, in_si
 from .arguments import driven, started, takes_published, usual_times
 from .events import RunInterrupted, shown
 from .fmu import CosimulationError, FmuModel, FmuRun
-from .inputs import Inputs, release, sample
+from .inputs import Inputs, named, release, sample
 from .prepared import Run, Settings
 from .simulation import sample_times
 from .trajectory import Trajectory
@@ -139,7 +139,7 @@ class _Stepwise:
         self.title = ", linear inputs" if linear else ""
         self.mechanism = prepared.mechanism
         self.start = np.array(self.mechanism.state(prepared.initial))
-        self.law = self.encoded.law.copy()
+        self.law = self.encoded.source.law.copy()
         self.status, self.message = 0, ""
         names = self.mechanism.output_names
         rate_of = {v.rate_of: v.name for v in self.mechanism.variables if v.rate_of}
@@ -160,10 +160,7 @@ class _Stepwise:
             ahead = -np.inf
         else:
             ahead = float(times[number + 1] if number + 1 < len(times) else t + times[1] - times[0])
-        return self._named(sample(self.encoded, t, x, self.law, ahead=ahead))
-
-    def _named(self, u: NDArray[np.float64]) -> dict[str, float]:
-        return dict(zip(self.mechanism.input_names, u.tolist()))
+        return named(self.encoded, sample(self.encoded, t, x, self.law, ahead=ahead))
 
     def slopes(self, number: int, row: list[float]) -> dict[str, float]:
         """How the inputs go from a communication point to the next, where the state is predicted from the outputs."""
@@ -177,7 +174,7 @@ class _Stepwise:
         release(self.encoded, there, law)
         change = sample(self.encoded, ahead, there, law, left=True) - sample(self.encoded, t, x, self.law)
         change[self.encoded.commands[:, 0]] = 0.0
-        return self._named(change / h)
+        return named(self.encoded, change / h)
 
     def state(self, row: list[float]) -> NDArray[np.float64]:
         """The state that a row of outputs shows, without the work done."""
@@ -216,10 +213,9 @@ class _Continuous:
     def first(self) -> dict[str, float]:
         """The inputs at the start."""
         prepared = self.prepared
-        x, law = np.array(prepared.mechanism.state(prepared.initial)), prepared.encoded.law.copy()
+        x, law = np.array(prepared.mechanism.state(prepared.initial)), prepared.encoded.source.law.copy()
         release(prepared.encoded, x, law)
-        u = sample(prepared.encoded, float(prepared.settings.times[0]), x, law)
-        return dict(zip(prepared.mechanism.input_names, u.tolist()))
+        return named(prepared.encoded, sample(prepared.encoded, float(prepared.settings.times[0]), x, law))
 
     def rows(self, model: Any) -> Iterator[tuple[float, list[float]]]:
         """Times and outputs, until the end or the limit of assembly, where the last configuration is given, too."""

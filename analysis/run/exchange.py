@@ -15,7 +15,7 @@ from fmpy.sundials.sundials_types import sunrealtype
 from numpy.typing import NDArray
 
 from .fmu import FmuModel
-from .inputs import Encoded, release, sample
+from .inputs import Encoded, named, release, sample
 
 #: Steps of CVode between two samples, at most.
 MOST_STEPS = 100_000
@@ -52,12 +52,11 @@ class Exchange(CVodeSolver):  # type: ignore[misc]
 
     def __init__(self, model: FmuModel, encoded: Encoded, times: NDArray[np.float64], tolerance: float) -> None:
         self.model, self.encoded = model, encoded
-        self.names = encoded.mechanism.input_names
         # CVode's time counts from there: at a late time its first steps would be lost in the rounding
         self.origin = self.time = float(times[0])
-        self.law = encoded.law.copy()
+        self.law = encoded.source.law.copy()
         # the outer pieces go on beyond their ends
-        breaks = encoded.breaks[1:-1]
+        breaks = encoded.source.breaks[1:-1]
         inside = breaks[(breaks > times[0]) & (breaks <= times[-1])]
         self.ends = [*inside.tolist(), np.inf]
         self.failure: Exception | None
@@ -88,7 +87,7 @@ class Exchange(CVodeSolver):  # type: ignore[misc]
 
     def inputs(self, t: float, x: NDArray[np.float64], left: bool = False) -> dict[str, float]:
         """All inputs at a time and a state."""
-        return dict(zip(self.names, sample(self.encoded, t, x, self.law, left=left).tolist()))
+        return named(self.encoded, sample(self.encoded, t, x, self.law, left=left))
 
     def begin(self, *, released: bool = False) -> bool:
         """An event at the present time, from which on the inputs are smooth again; returns whether the run ends here."""
@@ -168,6 +167,6 @@ class Exchange(CVodeSolver):  # type: ignore[misc]
             x = NV_DATA_S(y)
             self.put(self.origin + t, x)
             self.model.get_indicators(gout)
-            gout[self.nz - 1] = self._array(x)[self.encoded.law_places[1]] - self.law[1] if self.law[2] else 1.0
+            gout[self.nz - 1] = self._array(x)[self.encoded.source.law_places[1]] - self.law[1] if self.law[2] else 1.0
 
         return self._tried(work)

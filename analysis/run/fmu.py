@@ -178,10 +178,10 @@ class _Instance:
 
     def _initialise(self, values: Mapping[str, float], tolerance: float, start_time: float) -> None:
         if self._fmi3:
-            self._fmu.instantiate(loggingOn=True, logMessage=self._log_fmi3)
+            self._fmu.instantiate(loggingOn=True, logMessage=self._log)
         else:
             self._callbacks = fmi2CallbackFunctions()
-            self._callbacks.logger = fmi2CallbackLoggerTYPE(self._log_fmi2)
+            self._callbacks.logger = fmi2CallbackLoggerTYPE(self._log)
             addLoggerProxy(byref(self._callbacks))
             self._fmu.instantiate(callbacks=self._callbacks, loggingOn=True)
             self._fmu.setupExperiment(tolerance=tolerance, startTime=start_time)
@@ -198,11 +198,9 @@ class _Instance:
             self._fmu.enterInitializationMode()
         self._fmu.exitInitializationMode()
 
-    def _log_fmi2(self, environment: Any, name: bytes, status: int, category: bytes, message: bytes) -> None:
-        self.messages.append(message.decode("utf-8", errors="replace"))
-
-    def _log_fmi3(self, environment: Any, status: int, category: bytes, message: bytes) -> None:
-        self.messages.append(message.decode("utf-8", errors="replace"))
+    def _log(self, *arguments: Any) -> None:
+        """FMPy hands over what FMI 2.0 or 3.0 does; the message is the last."""
+        self.messages.append(arguments[-1].decode("utf-8", errors="replace"))
 
     def __enter__(self) -> Self:
         return self

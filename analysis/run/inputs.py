@@ -9,7 +9,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from itertools import chain
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -251,14 +251,11 @@ def given(mechanism: Mechanism, inputs: Inputs | None, initial: InitialState | N
     return inputs, initial
 
 
-@dataclass(frozen=True, slots=True)
-class Encoded:
+class Source(NamedTuple):
     """`Inputs` as the arrays that the compiled code reads; a signal is a channel that is not the rate of another.
 
     Attributes
     ----------
-    mechanism : Mechanism
-    modes : dict
     breaks : ndarray, shape (n + 1,)
         Times at which some signal's polynomial changes.
     coefficients : ndarray, shape (n, signals, 4)
@@ -271,6 +268,29 @@ class Encoded:
         Torsion bar: torque, release angle, 1 while it acts. Motor: breakdown torque and slip, synchronous speed.
     law_places : ndarray of int, shape (3,)
         Channel on which bar and motor act, and the components of the state that are its freedom's coordinate and rate.
+    functions : ndarray of int, shape (signals, 2)
+        Addresses of the user's compiled functions for a signal and its rate, or 0.
+    """
+
+    breaks: NDArray[np.float64]
+    coefficients: NDArray[np.float64]
+    harmonics: NDArray[np.float64]
+    places: NDArray[np.int64]
+    law: NDArray[np.float64]
+    law_places: NDArray[np.int64]
+    functions: NDArray[np.int64]
+
+
+@dataclass(frozen=True, slots=True)
+class Encoded:
+    """`Inputs` of a mechanism, brought onto common breaks.
+
+    Attributes
+    ----------
+    mechanism : Mechanism
+    modes : dict
+    source : Source
+        Without the users' functions.
     commands : ndarray of int, shape (c, 3)
         For each commanded rate in force its channel, the component of the state that it is, and the channel of its rate.
     functions : tuple
@@ -279,12 +299,7 @@ class Encoded:
 
     mechanism: Mechanism
     modes: dict[str, int]
-    breaks: NDArray[np.float64]
-    coefficients: NDArray[np.float64]
-    harmonics: NDArray[np.float64]
-    places: NDArray[np.int64]
-    law: NDArray[np.float64]
-    law_places: NDArray[np.int64]
+    source: Source
     commands: NDArray[np.int64]
     functions: tuple[tuple[StateFunction | None, StateFunction | None], ...]
 
@@ -295,11 +310,11 @@ class Encoded:
         A signal whose rate counts, a commanded speed, has to be so by its rate: its value counts at the beginning of an
         interval only.
         """
-        moving = self.coefficients[:, :, 1:].copy()
-        moving[:, self.places[:, 1] >= 0, 0] = 0.0
+        moving = self.source.coefficients[:, :, 1:].copy()
+        moving[:, self.source.places[:, 1] >= 0, 0] = 0.0
         return bool(
-            len(self.harmonics) == 0
-            and self.law[3] == 0.0
+            len(self.source.harmonics) == 0
+            and self.source.law[3] == 0.0
             and not any(chain.from_iterable(self.functions))
             and np.all(moving == 0.0)
         )
@@ -366,18 +381,16 @@ def encode(inputs: Inputs, mechanism: Mechanism) -> Encoded:
         (n, freedoms + mechanism.channels[n].freedom, next(r for _, c, r in signals if c == n))
         for n in mechanism.commands(modes)
     ]
-    return Encoded(
-        mechanism=mechanism,
-        modes=modes,
-        breaks=merged,
-        coefficients=coefficients,
-        harmonics=np.array(harmonics, dtype=float).reshape(-1, 4),
-        places=np.array([row[1:] for row in signals], dtype=np.int64).reshape(-1, 2),
-        law=law,
-        law_places=law_places,
-        commands=np.array(commanded, dtype=np.int64).reshape(-1, 3),
-        functions=tuple(functions),
+    source = Source(
+        merged,
+        coefficients,
+        np.array(harmonics, dtype=float).reshape(-1, 4),
+        np.array([row[1:] for row in signals], dtype=np.int64).reshape(-1, 2),
+        law,
+        law_places,
+        np.zeros((len(signals), 2), dtype=np.int64),
     )
+    return Encoded(mechanism, modes, source, np.array(commanded, dtype=np.int64).reshape(-1, 3), tuple(functions))
 
 
 def _on_breaks(part: Piecewise, breaks: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -397,14 +410,15 @@ def align(encoded: Encoded, times: NDArray[np.float64]) -> Encoded:
     0.3 is not 3 * 0.1 in floats: a jump at 0.3 s would otherwise be missed by a whole step where inputs are sampled and
     held, and the sample there would belong to what was before the jump.
     """
-    if encoded.breaks is _NO_BREAKS:
+    breaks = encoded.source.breaks
+    if breaks is _NO_BREAKS:
         return encoded
-    after = np.clip(np.searchsorted(times, encoded.breaks), 1, len(times) - 1)
+    after = np.clip(np.searchsorted(times, breaks), 1, len(times) - 1)
     low, high = times[after - 1], times[after]
-    nearest = np.where(encoded.breaks - low < high - encoded.breaks, low, high)
-    rounding = 1e-9 * (high - low) + 4.0 * np.spacing(np.abs(encoded.breaks))
-    moved = np.where(np.abs(nearest - encoded.breaks) <= rounding, nearest, encoded.breaks)
-    return replace(encoded, breaks=moved) if np.all(np.diff(moved) > 0.0) else encoded
+    nearest = np.where(breaks - low < high - breaks, low, high)
+    rounding = 1e-9 * (high - low) + 4.0 * np.spacing(np.abs(breaks))
+    moved = np.where(np.abs(nearest - breaks) <= rounding, nearest, breaks)
+    return replace(encoded, source=encoded.source._replace(breaks=moved)) if np.all(np.diff(moved) > 0.0) else encoded
 
 
 # The inputs at a time, sampled in Python
@@ -446,17 +460,14 @@ def sample(
     NotFiniteError
         If one of them is not a finite number.
     """
-    from . import sources as k
+    from .sources import channels
 
     x = np.ascontiguousarray(x)
     if ahead > t:
         release(encoded, x, law)
-    source = k.Source(
-        encoded.breaks, encoded.coefficients, encoded.harmonics, encoded.places, law, encoded.law_places,
-        np.zeros((len(encoded.places), 2), dtype=np.int64),
-    )  # fmt: skip
+    source = encoded.source._replace(law=law)
     u = np.zeros(len(encoded.mechanism.channels))
-    k.channels(t, ahead, left, x, source, encoded.commands, u, np.empty_like(u))
+    channels(t, ahead, left, x, source, encoded.commands, u, np.empty_like(u))
     here = np.zeros_like(u)
     if any(chain.from_iterable(encoded.functions)):
         here = of_functions(encoded, t, x)
@@ -473,9 +484,14 @@ def sample(
     return u
 
 
+def named(encoded: Encoded, u: NDArray[np.float64]) -> dict[str, float]:
+    """The channels by their names in the FMI contract."""
+    return dict(zip(encoded.mechanism.input_names, u.tolist()))
+
+
 def release(encoded: Encoded, x: NDArray[np.float64], law: NDArray[np.float64]) -> None:
     """Release a torsion bar, in ``law``, that at state x has turned as far as it was wound."""
-    if law[2] and x[encoded.law_places[1]] >= law[1]:
+    if law[2] and x[encoded.source.law_places[1]] >= law[1]:
         law[2] = 0.0
 
 
@@ -483,7 +499,7 @@ def of_functions(encoded: Encoded, t: float, x: NDArray[np.float64]) -> NDArray[
     """What the user's functions add to the channels."""
     added = np.zeros(len(encoded.mechanism.channels))
     state = x[: 2 * len(encoded.mechanism.freedoms)].tolist()
-    for functions, places in zip(encoded.functions, encoded.places):
+    for functions, places in zip(encoded.functions, encoded.source.places):
         for function, place in zip(functions, places):
             if function is not None:
                 value = function(t, *state)
@@ -523,13 +539,9 @@ def _reason(error: Exception) -> str:
     return (telling or lines or [type(error).__name__])[0]
 
 
-def compiled_source(encoded: Encoded) -> tuple[Any, list[Any]]:
+def compiled_source(encoded: Encoded) -> tuple[Source, list[Any]]:
     """The inputs as the compiled code reads them, with a law of their own, and what has to stay alive meanwhile."""
-    from . import sources as k
-
     freedoms = len(encoded.mechanism.freedoms)
     kept = [[f and compile_function(f, freedoms) for f in row] for row in encoded.functions]
     addresses = np.array([[f.address if f else 0 for f in row] for row in kept], dtype=np.int64).reshape(-1, 2)
-    e = encoded
-    source = k.Source(e.breaks, e.coefficients, e.harmonics, e.places, e.law.copy(), e.law_places, addresses)
-    return source, kept
+    return encoded.source._replace(law=encoded.source.law.copy(), functions=addresses), kept

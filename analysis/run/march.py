@@ -67,9 +67,9 @@ class March:
         self.settings = run.settings
         start = run.start()
         self.x, self.energy, self.scale = start.x, start.energy, start.scale
-        self.law = run.encoded.law.copy()
+        self.law = run.encoded.source.law.copy()
         #: component of the state that a torsion bar acts by
-        self.angle = int(run.encoded.law_places[1])
+        self.angle = int(run.encoded.source.law_places[1])
         self.t = float(run.settings.times[0])
         #: what acts on the plant
         self.held: Any = None
@@ -85,7 +85,7 @@ class March:
         self._gaps: list[float] | None = None
 
     def _end_of_interval(self, interval: int) -> float:
-        times, breaks = self.settings.times, self.of.encoded.breaks[1:-1]
+        times, breaks = self.settings.times, self.of.encoded.source.breaks[1:-1]
         if self.settings.hold:
             return float(times[interval + 1] if interval + 1 < len(times) else times[-1])
         later = breaks[(breaks > self.t) & (breaks < times[-1])]

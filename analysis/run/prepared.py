@@ -85,7 +85,7 @@ class Run:
             If an input is not a finite number.
         """
         x = np.array(self.mechanism.state(self.initial))
-        u = sample(self.encoded, float(self.settings.times[0]), x, self.encoded.law)
+        u = sample(self.encoded, float(self.settings.times[0]), x, self.encoded.source.law)
         for channel, place, _ in self.encoded.commands:
             x[place] = u[channel]
         state = self.mechanism.equations.start(tuple(x.tolist()), self.applied(u), self.p)
@@ -96,20 +96,6 @@ class Run:
     def applied(self, u: NDArray[np.float64]) -> Any:
         """What acts on the plant, as the equations take it."""
         return self.mechanism.equations.applied(self.modes, tuple(u.tolist()), self.p)
-
-    def problem(self) -> Any:
-        """What runs like it have in common, as the compiled code reads it."""
-        from .records import Problem
-
-        return Problem(
-            machine(self.mechanism, self.mechanism.switched(self.p)).addresses,
-            np.array(self.modes),
-            self.encoded.commands,
-            len(self.mechanism.output_names),
-            self.settings.tolerance,
-            self.settings.hold,
-            float(self.settings.times[-1]),
-        )
 
     def limit(self, x: NDArray[np.float64]) -> str:
         """What a motion has come to that ended at its limit, in words."""
@@ -133,12 +119,12 @@ class Run:
 
         begun = clock.perf_counter()
         turns = WholeTurns(self.mechanism, self.p, self.modes, self.encoded, self.events)
-        start, law = self.start(), self.encoded.law
+        start, law = self.start(), self.encoded.source.law
         if turns.too_many(start.x):
             turns.take(start.x, sample(self.encoded, float(self.settings.times[0]), start.x, law), law, 0)
             # the balance of energy begins with the angles as they are now
             start = replace(start, energy=self.mechanism.equations.energy(tuple(start.x.tolist()), self.p))
-        problem = self.problem()
+        problem = problem_of(self.encoded, self.settings, self.mechanism.switched(self.p))
         source, kept = compiled_source(self.encoded)
         batch = compiled.of_one(source, np.array([*self.p, start.energy]), start.scale, self.encoded.steady)
         watch, watching = self._watch(self._balance() if balanced else ())
@@ -234,6 +220,21 @@ class Run:
                 addresses[i] = kept[-1].address
         found = np.empty((EVENTS_PER_CALL * n, 2 + self.mechanism.size))
         return Watch(table, addresses, np.zeros(n), found, np.array(balance, dtype=np.int64)), kept
+
+
+def problem_of(encoded: Encoded, settings: Settings, switched: bool) -> Any:
+    """What runs with the same kind of inputs have in common, as the compiled code reads it."""
+    from .records import Problem
+
+    return Problem(
+        machine(encoded.mechanism, switched).addresses,
+        np.array(list(encoded.modes.values()), dtype=float),
+        encoded.commands,
+        len(encoded.mechanism.output_names),
+        settings.tolerance,
+        settings.hold,
+        float(settings.times[-1]),
+    )
 
 
 def verdict(

@@ -3,33 +3,14 @@
 from __future__ import annotations
 
 from math import cos, pi, sin
-from typing import NamedTuple
 
-import numpy as np
 from numba import boolean, float64, int64, types
-from numpy.typing import NDArray
 
 from ..numerics.codegen import CUBE, MATRIX, VECTOR, call_user, inner, kernel
+from .inputs import Source
 from .signals import kloss
 
 _torque_of_motor = inner(kloss)
-
-
-class Source(NamedTuple):
-    """Inputs as the compiled code reads them.
-
-    ``breaks``, ``coefficients``, ``harmonics``, ``law`` and ``law_places`` are those of `inputs.Encoded`; ``places``, shape
-    (signals, 2), are the numbers of the channels that take a signal's value and its rate, -1 for none; ``functions``, shape
-    (signals, 2), the addresses of users' functions for both, or 0.
-    """
-
-    breaks: NDArray[np.float64]
-    coefficients: NDArray[np.float64]
-    harmonics: NDArray[np.float64]
-    places: NDArray[np.int64]
-    law: NDArray[np.float64]
-    law_places: NDArray[np.int64]
-    functions: NDArray[np.int64]
 
 
 ADDRESSES = int64[::1]

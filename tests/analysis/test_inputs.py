@@ -21,7 +21,7 @@ def value(inputs: Inputs, t: float, *, left: bool = False, x: Any = REST) -> dic
     """All channels at a time, and the acceleration."""
     encoded = encode(inputs, FIVE_BAR)
     names = [channel.argument for channel in FIVE_BAR.channels]
-    return dict(zip(names, sample(encoded, t, np.asarray(x, float), encoded.law, left=left).tolist()))
+    return dict(zip(names, sample(encoded, t, np.asarray(x, float), encoded.source.law, left=left).tolist()))
 
 
 def force(signal: Any, t: float, *, left: bool = False) -> float:
@@ -109,11 +109,11 @@ def test_torsion_bar(th2: float, expected: float) -> None:
 
 def test_a_torsion_bar_is_released_where_it_has_turned_as_far_as_it_was_wound() -> None:
     encoded = encode(Inputs(torque=TorsionBar(torque=10.0, release_angle=2.0)), FIVE_BAR)
-    law = encoded.law.copy()
+    law = encoded.source.law.copy()
     release(encoded, np.array([1.999, 0, 0, 0]), law)
-    assert law.tolist() == encoded.law.tolist()
+    assert law.tolist() == encoded.source.law.tolist()
     release(encoded, np.array([2.0, 0, 0, 0]), law)
-    assert law.tolist() == [*encoded.law[:2], 0.0, *encoded.law[3:]]
+    assert law.tolist() == [*encoded.source.law[:2], 0.0, *encoded.source.law[3:]]
 
 
 @pytest.mark.parametrize("speed", [-20.0, 0.0, 30.0, 49.9, 50.0, 80.0])
@@ -182,20 +182,20 @@ def test_all_breaks_of_a_function_are_breaks_inside() -> None:
     # the outermost of the merged breaks bound nothing: pieces go on beyond them
     for breaks in ([0.3], [0.1, 0.3]):
         encoded = encode(Inputs(force=Function(lambda t, th2, u, w2, v: 0.0, breaks=breaks)), FIVE_BAR)
-        assert encoded.breaks[1:-1].tolist() == breaks
+        assert encoded.source.breaks[1:-1].tolist() == breaks
 
 
 def test_breaks_that_miss_a_sample_by_rounding_are_moved_onto_it() -> None:
     times = 0.1 * np.arange(11)
     assert times[3] != 0.3
     moved = align(encode(Inputs(force=steps([0.0, 0.3, 0.55], [0.0, 1.0, 2.0])), FIVE_BAR), times)
-    assert moved.breaks[1] == times[3]
-    assert moved.breaks[2] == 0.55
+    assert moved.source.breaks[1] == times[3]
+    assert moved.source.breaks[2] == 0.55
     # late in the day a float misses by more than a billionth of a step
     late = 1e6 + 1e-3 * np.arange(101)
     breaks = np.nextafter(late[[20, 50, 70]], np.inf)
     moved = align(encode(Inputs(force=steps(breaks, [0.0, 1.0, 2.0])), FIVE_BAR), late)
-    assert moved.breaks[:3].tolist() == late[[20, 50, 70]].tolist()
+    assert moved.source.breaks[:3].tolist() == late[[20, 50, 70]].tolist()
 
 
 @pytest.mark.parametrize(
