@@ -179,6 +179,7 @@ def _refused(h, motion):
         # an input may be what stops it
         for i in range(x.shape[0]):
             room.z[i] = x[i] + h * room.k[0, i]
+        copy(u, room.inside)
         renew(carry.elapsed + h, room.z, room.inside, motion)
         lost = _not_finite(room.inside)
         if lost >= 0:
@@ -270,11 +271,11 @@ def _cross_interval(motion, most):
 def _make_room(states, outputs, inputs):
     """Room for so many states, outputs and inputs."""
     return Room(
-        np.zeros((16, states)),
+        np.empty((16, states)),
         np.empty(states),
         np.empty(states),
         np.empty((7, states)),
-        np.zeros(inputs),
+        np.empty(inputs),
         np.empty(outputs),
     )
 

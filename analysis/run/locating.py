@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from linkwork.limits import LIMIT_SINE
 
 from ..numerics.codegen import call_user, copy, inner
@@ -28,10 +30,9 @@ EVENTS_PER_STEP = 4
 #: Fraction of a step within which an event counts as simultaneous with the end of the run or the release.
 SAME = 1e-9
 
-# What can cut a step short besides a user's event, which goes by its number
-NOTHING = -3
-RELEASE = -2
-ASSEMBLY = -1
+# What can cut a step short besides a user's event, which goes by its number. Of Python's integers each would be a type of its
+# own to Numba, for which it compiles the functions that take it once more.
+NOTHING, RELEASE, ASSEMBLY = np.arange(-3, 0)
 
 
 @inner
