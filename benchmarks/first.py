@@ -22,7 +22,13 @@ WAITS = {
     "import analysis": ("-c", "import analysis"),
     "linkwork --version": ("-m", "analysis.cli", "--version"),
     "simulate, Table 3.1": ("-c", "import analysis; analysis.simulate('table-3.1', stop_time=0.5)"),
-    "linkwork resonance --published rig-2-spring-c": ("-m", "analysis.cli", "resonance", "--published", "rig-2-spring-c"),
+    "linkwork resonance --published rig-2-spring-c": (
+        "-m",
+        "analysis.cli",
+        "resonance",
+        "--published",
+        "rig-2-spring-c",
+    ),
 }
 
 

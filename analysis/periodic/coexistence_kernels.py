@@ -5,21 +5,22 @@ from __future__ import annotations
 import numpy as np
 from numba import float64, int64, types
 
-from ..numerics.codegen import CUBE, MATRIX, VECTOR, kernel, part
+from ..numerics.codegen import CUBE, MATRIX, VECTOR, copy, inner, kernel
 from ..run.sources import SOURCE
-from .orbit_kernels import DONE, SECTION, advance, deflated, magnitude, make_room, newton, numbered
+from .orbit_kernels import DONE, SECTION, advance, deflated, difference, magnitude, make_room, newton, numbered
 from .starts import SAME
 
 #: Periodic motions of a point at most that are kept.
 MOST_ORBITS = 8
 
 
-@part
-def _is_known(start, known, scale):
+@inner
+def _is_known(start, known, scale, away):
     """Whether a start is among the known ones."""
     found = False
     for k in range(known.shape[0]):
-        found = found or magnitude(start - known[k], scale) < SAME
+        difference(start, known[k], away)
+        found = found or magnitude(away, scale) < SAME
     return found
 
 
@@ -58,18 +59,18 @@ def solve_all(section, source, rows, end, most, loose, angles, guesses, found, c
         for place in range(before + guesses.shape[0]):
             while count < MOST_ORBITS:
                 if place < before:
-                    start[:] = starts[row - 1, place]
+                    copy(starts[row - 1, place], start)
                 else:
-                    start[:] = guesses[place - before]
+                    copy(guesses[place - before], start)
                     if deflated(wide, source, end, most, 1.0, start, starts[row, :count], z, room, carry) != DONE:
                         break
                 if newton(own, source, end, most, start, z, room, carry, report) != DONE:
                     break
-                if _is_known(start, starts[row, :count], own.scale):
+                if _is_known(start, starts[row, :count], own.scale, single):
                     break
-                starts[row, count] = start
-                monodromies[row, count] = z[n:]
-                single[:] = start
+                copy(start, starts[row, count])
+                copy(z[n:], monodromies[row, count])
+                copy(start, single)
                 angle, carry[0] = 0.0, 0.1
                 for i in range(angles.shape[0]):
                     if angles[i] > angle:
@@ -106,14 +107,15 @@ def basins_of(section, source, turn, near, most, starts, known, ends):
         Number of the known motion, `LOST` where the links come to the limit of assembly, `UNSETTLED`; written.
     """
     room = make_room(section, 0)
-    z, carry = np.empty(starts.shape[1]), np.array([0.1, 0.0])
+    z, away, carry = np.empty(starts.shape[1]), np.empty(starts.shape[1]), np.array([0.1, 0.0])
     for row in range(starts.shape[0]):
-        z[:] = starts[row]
+        copy(starts[row], z)
         carry[0] = 0.1
         ends[row] = UNSETTLED
         for _ in range(most):
             for k in range(known.shape[0]):
-                if magnitude(z - known[k], section.scale) < near:
+                difference(z, known[k], away)
+                if magnitude(away, section.scale) < near:
                     ends[row] = k
             if ends[row] >= 0:
                 break

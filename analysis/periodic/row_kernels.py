@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numba import boolean, float64, int64, types
 
-from ..numerics.codegen import MATRIX, kernel, part
+from ..numerics.codegen import MATRIX, copy, inner, kernel, part
 from ..run.sources import SOURCE
 from .collocation import NODES, close, make_desk, spread
 from .orbit_kernels import DIVERGED, DONE, NO_STEP, SECTION, deflated, make_room, newton, numbered
@@ -52,14 +52,20 @@ def from_guess(own, wide, source, end, most, start, z, room, carry, report):
     return newton(own, source, end, most, start, z, room, carry, report) if status == DONE else status
 
 
-@part
-def predict(known, y, w):
-    """The next beginnings and slopes, into the first place, from so many before them."""
-    y[0] = 0.0
-    w[0] = 0.0
-    for old in range(known):
-        y[0] += _NEXT[known - 1, old] * y[1 + old]
-        w[0] += _NEXT[known - 1, old] * w[1 + old]
+@inner
+def predict(known, size, path):
+    """The next of a vector, of which ``size`` numbers count, into the first row from so many before it."""
+    for i in range(size):
+        path[0, i] = 0.0
+        for old in range(known):
+            path[0, i] += _NEXT[known - 1, old] * path[1 + old, i]
+
+
+@inner
+def make_way(size, path):
+    """Move what is known of a vector, of which ``size`` numbers count, on by a row."""
+    for old in range(PASSED, 0, -1):
+        copy(path[old - 1, :size], path[old, :size])
 
 
 @part
@@ -73,8 +79,9 @@ def from_left(section, source, rows, end, turns, most, loose, smooth, guess, fou
     start = np.empty(n)
     most_elements = COUNTS[-1] * turns
     angles = np.zeros(most_elements + 1)
-    # of this orbit and of those before it, the last first
-    y, w = np.zeros((1 + PASSED, most_elements, n)), np.zeros((1 + PASSED, most_elements, NODES, n // 2))
+    # of this orbit and of those before it, the last first: all numbers of one in a row, and by elements
+    ys, ws = np.zeros((1 + PASSED, most_elements * n)), np.zeros((1 + PASSED, most_elements * NODES * (n // 2)))
+    y, w = ys.reshape((1 + PASSED, most_elements, n)), ws.reshape((1 + PASSED, most_elements, NODES, n // 2))
     desk = make_desk(n, most_elements)
     level, known, pause = 0, 0, 0
     passed = 0
@@ -84,11 +91,12 @@ def from_left(section, source, rows, end, turns, most, loose, smooth, guess, fou
         what = DIVERGED
         if known:
             m = COUNTS[level] * turns
-            predict(known, y[:, :m], w[:, :m])
+            predict(known, y[0, :m].size, ys)
+            predict(known, w[0, :m].size, ws)
             what = close(own, angles[: m + 1], y[0, :m], w[0, :m], desk, room)
             if what == NO_STEP:
                 # more elements; the start is good enough to go on from
-                start[:] = y[0, 0]
+                copy(y[0, 0], start)
                 more = settle_on(own, source, end, turns, level + 1, start, angles, (y[0], w[0]), desk, room)
                 level, known = max(more, 0), 0
                 what = DONE if more >= 0 else NO_STEP
@@ -97,13 +105,14 @@ def from_left(section, source, rows, end, turns, most, loose, smooth, guess, fou
             known = 0
             if passed > 1:
                 # the secant through the last two
-                start[:] = 2.0 * starts[row - 1] - starts[row - 2]
+                for i in range(n):
+                    start[i] = 2.0 * starts[row - 1, i] - starts[row - 2, i]
             elif passed == 1:
-                start[:] = starts[row - 1]
+                copy(starts[row - 1], start)
             if passed:
                 what = newton(own, source, end, most, start, z, room, carry, report)
             if what != DONE:
-                start[:] = guess
+                copy(guess, start)
                 wide = numbered(section, drives[row], parameters[row], scales[row], loose)
                 what = from_guess(own, wide, source, end, most, start, z, room, carry, report)
         status[row] = what
@@ -112,13 +121,13 @@ def from_left(section, source, rows, end, turns, most, loose, smooth, guess, fou
             continue
         passed += 1
         if by_collocation:
-            starts[row] = y[0, 0]
+            copy(y[0, 0], starts[row])
             for j in range(n):
                 for i in range(n):
                     monodromies[row, j * n + i] = desk.monodromy[i, j]
         else:
-            starts[row] = start
-            monodromies[row] = z[n:]
+            copy(start, starts[row])
+            copy(z[n:], monodromies[row])
             pause -= 1
             if smooth and not section.torque and pause < 0:
                 more = settle_on(own, source, end, turns, level, start, angles, (y[0], w[0]), desk, room)
@@ -127,13 +136,12 @@ def from_left(section, source, rows, end, turns, most, loose, smooth, guess, fou
                     pause = _PAUSE
         if by_collocation:
             m = COUNTS[level] * turns
-            for old in range(PASSED, 0, -1):
-                y[old, :m] = y[old - 1, :m]
-                w[old, :m] = w[old - 1, :m]
+            make_way(y[0, :m].size, ys)
+            make_way(w[0, :m].size, ws)
             known = min(known + 1, PASSED)
             if level > 0 and desk.report[0] < IDLE * np.sqrt(section.tolerance):
                 # fewer elements the next time, which is begun by shooting
-                start[:] = y[0, 0]
+                copy(y[0, 0], start)
                 level -= 1
                 known = 0
 
@@ -150,8 +158,8 @@ def from_right(section, source, rows, end, most, found):
             start = starts[row + 1].copy()
             if newton(own, source, end, most, start, z, make_room(own, n), carry, report) == DONE:
                 status[row] = DONE
-                starts[row] = start
-                monodromies[row] = z[n:]
+                copy(start, starts[row])
+                copy(z[n:], monodromies[row])
 
 
 @part
@@ -174,8 +182,8 @@ def from_others(section, source, rows, end, most, loose, guesses, found):
                 and newton(own, source, end, most, start, z, room, carry, report) == DONE
             ):
                 status[row] = DONE
-                starts[row] = start
-                monodromies[row] = z[n:]
+                copy(start, starts[row])
+                copy(z[n:], monodromies[row])
                 break
 
 
@@ -218,6 +226,9 @@ def solve_row(section, source, rows, end, turns, most, loose, smooth, guesses, f
     """
     from_left(section, source, rows, end, turns, most, loose, smooth, guesses[0].copy(), found)
     from_right(section, source, rows, end, most, found)
-    if (found[2] != DONE).any():
+    missing = False
+    for what in found[2]:
+        missing |= what != DONE
+    if missing:
         from_others(section, source, rows, end, most, loose, guesses, found)
         from_right(section, source, rows, end, most, found)

@@ -48,8 +48,11 @@ def _banded(box, floor, scale):
     for i in range(total):
         first[i] = min(int(scale * (box[2, i] - floor)), BANDS - 1)
         last[i] = min(int(scale * (box[3, i] - floor)), BANDS - 1)
-        begin[first[i] + 1 : last[i] + 2] += 1
-    begin = np.cumsum(begin)
+        # a sum of slices has Numba compile the writing of messages about shapes
+        for band in range(first[i], last[i] + 1):
+            begin[band + 1] += 1
+    for band in range(BANDS):
+        begin[band + 1] += begin[band]
     members, filled = np.empty(begin[BANDS], np.int64), begin[:BANDS].copy()
     for i in range(total):
         for band in range(first[i], last[i] + 1):
