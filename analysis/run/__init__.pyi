@@ -48,8 +48,8 @@ from .inputs import Inputs as Inputs
 from .inputs import align as align
 from .inputs import encode as encode
 from .inputs import given as given
-from .inputs import sample as sample
 from .prepared import outputs_of as outputs_of
+from .sampling import sample as sample
 from .signals import MOTOR as MOTOR
 from .signals import Function as Function
 from .signals import Harmonics as Harmonics

@@ -27,8 +27,9 @@ from ..mechanisms import MECHANISMS, InitialState, Parameters
 from ..numerics.symbolic import ELEMENTARY
 from ..numerics.tracing import Rebound, rebound
 from .equations import like_parameters, modules_of
-from .inputs import Encoded, Inputs, align, compiled_source, encode, of_functions
+from .inputs import Encoded, Inputs, align, compiled_source, encode
 from .prepared import STEPS_PER_CALL, Run, Settings, outputs_of, problem_of, verdict
+from .sampling import of_functions
 
 #: solver.status of a run that was not begun, or was interrupted.
 NOT_RUN = -1

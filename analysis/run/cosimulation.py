@@ -22,8 +22,9 @@ from ..units import Amount, in_si
 from .arguments import driven, started, takes_published, usual_times
 from .events import RunInterrupted, shown
 from .fmu import CosimulationError, FmuModel, FmuRun
-from .inputs import Inputs, named, release, sample
+from .inputs import Inputs
 from .prepared import Run, Settings
+from .sampling import named, release, sample
 from .simulation import sample_times
 from .trajectory import Trajectory
 

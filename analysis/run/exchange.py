@@ -15,7 +15,8 @@ from fmpy.sundials.sundials_types import sunrealtype
 from numpy.typing import NDArray
 
 from .fmu import FmuModel
-from .inputs import Encoded, named, release, sample
+from .inputs import Encoded
+from .sampling import named, release, sample
 
 #: Steps of CVode between two samples, at most.
 MOST_STEPS = 100_000

@@ -22,8 +22,9 @@ from ..mechanisms import MECHANISMS, InitialState, variable_units
 from ..units import Units, si
 from .signals import Function, Harmonics, InductionMotor, Piecewise, StateFunction, TorsionBar
 
-_NUMBER = (int, float, np.floating, np.integer)
-_SIGNALS = (*_NUMBER, Piecewise, Harmonics, Function, TorsionBar, InductionMotor)
+#: What counts as a number.
+NUMBER = (int, float, np.floating, np.integer)
+_SIGNALS = (*NUMBER, Piecewise, Harmonics, Function, TorsionBar, InductionMotor)
 
 
 class Inputs:
@@ -130,7 +131,7 @@ class Inputs:
             total = 0.0 + value if type(value) is float else 0.0
             if value is not None and type(value) is not float:
                 for part in _parts(value):
-                    if not isinstance(part, _NUMBER):
+                    if not isinstance(part, NUMBER):
                         return None
                     total += float(part)
             values.append(total)
@@ -142,7 +143,7 @@ class Inputs:
 
         A commanded speed goes along the secant of a step, which is exact where it is constant.
         """
-        return all(isinstance(part, _NUMBER) for name in self._given for part in self.parts(name))
+        return all(isinstance(part, NUMBER) for name in self._given for part in self.parts(name))
 
 
 def _of(given: dict[str, Any]) -> Inputs:
@@ -185,7 +186,7 @@ def _check_channel(name: str, value: Any) -> None:
             )
         if isinstance(part, (Piecewise, Harmonics)) and part.unit not in ("", _units(name)):
             raise InputError(f"{name} is a signal in {part.unit}: it must be in {_units(name)}")
-        if isinstance(part, _NUMBER) and not np.isfinite(part):
+        if isinstance(part, NUMBER) and not np.isfinite(part):
             raise InputError(f"{name} is {part}: it must be a finite number")
     for kind in (TorsionBar, InductionMotor, Function):
         if sum(isinstance(part, kind) for part in parts) > 1:
@@ -419,94 +420,6 @@ def align(encoded: Encoded, times: NDArray[np.float64]) -> Encoded:
     rounding = 1e-9 * (high - low) + 4.0 * np.spacing(np.abs(breaks))
     moved = np.where(np.abs(nearest - breaks) <= rounding, nearest, breaks)
     return replace(encoded, source=encoded.source._replace(breaks=moved)) if np.all(np.diff(moved) > 0.0) else encoded
-
-
-# The inputs at a time, sampled in Python
-
-
-class NotFiniteError(InputError):
-    """An input, by its number among the channels, is not a finite number at a time and a state."""
-
-    def __init__(self, encoded: Encoded, number: int, t: float, x: NDArray[np.float64]) -> None:
-        self.number = number
-        where = encoded.mechanism.where(x.tolist())
-        super().__init__(f"the input {encoded.value_name(number)} is not a finite number at t = {t:.9g} s, {where}")
-
-
-def sample(
-    encoded: Encoded,
-    t: float,
-    x: NDArray[np.float64],
-    law: NDArray[np.float64],
-    *,
-    left: bool = False,
-    ahead: float = -np.inf,
-) -> NDArray[np.float64]:
-    """The channels at time t and state x, sampled in Python; the user's functions are called as the Python they are.
-
-    Parameters
-    ----------
-    law : ndarray, shape (6,)
-        That of ``encoded``, or what has become of it.
-    left : bool
-        Whether the limit from the left is meant where an input jumps.
-    ahead : float
-        Where it is later than t, the channels are sampled at t and held until then (s): commanded
-        rates go along the secant, a torsion bar acts with the torque of the middle of the step, and ``law`` is overwritten
-        once it is released.
-
-    Raises
-    ------
-    NotFiniteError
-        If one of them is not a finite number.
-    """
-    from .sources import channels
-
-    x = np.ascontiguousarray(x)
-    if ahead > t:
-        release(encoded, x, law)
-    source = encoded.source._replace(law=law)
-    u = np.zeros(len(encoded.mechanism.channels))
-    channels(t, ahead, left, x, source, encoded.commands, u, np.empty_like(u))
-    here = np.zeros_like(u)
-    if any(chain.from_iterable(encoded.functions)):
-        here = of_functions(encoded, t, x)
-        u += here
-        if ahead > t and len(encoded.commands) and np.isfinite(here).all():
-            there = of_functions(encoded, ahead, x)
-            for value, _, rate in encoded.commands:
-                u[rate] += (there[value] - here[value]) / (ahead - t) - here[rate]
-    for lost in np.flatnonzero(~np.isfinite(u)):
-        # where inputs are held, a rate is the secant of a command
-        commands = {int(rate): int(value) for value, _, rate in encoded.commands}
-        secant = ahead > t and np.isfinite(here[lost])
-        raise NotFiniteError(encoded, commands.get(int(lost), int(lost)) if secant else int(lost), t, x)
-    return u
-
-
-def named(encoded: Encoded, u: NDArray[np.float64]) -> dict[str, float]:
-    """The channels by their names in the FMI contract."""
-    return dict(zip(encoded.mechanism.input_names, u.tolist()))
-
-
-def release(encoded: Encoded, x: NDArray[np.float64], law: NDArray[np.float64]) -> None:
-    """Release a torsion bar, in ``law``, that at state x has turned as far as it was wound."""
-    if law[2] and x[encoded.source.law_places[1]] >= law[1]:
-        law[2] = 0.0
-
-
-def of_functions(encoded: Encoded, t: float, x: NDArray[np.float64]) -> NDArray[np.float64]:
-    """What the user's functions add to the channels."""
-    added = np.zeros(len(encoded.mechanism.channels))
-    state = x[: 2 * len(encoded.mechanism.freedoms)].tolist()
-    for functions, places in zip(encoded.functions, encoded.source.places):
-        for function, place in zip(functions, places):
-            if function is not None:
-                value = function(t, *state)
-                if not isinstance(value, _NUMBER):
-                    raise InputError(f"an input function returned {value!r} at t = {t:.9g} s: it must return a float")
-                added[place] += float(value)
-    return added
 
 
 # User's functions, compiled

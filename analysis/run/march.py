@@ -14,9 +14,9 @@ from linkwork.limits import LIMIT_SINE, NEAR_LIMIT
 
 from . import records as k
 from .events import Event, RunInterrupted, shown
-from .inputs import NotFiniteError, sample
 from .locating import SAME
 from .prepared import Run, verdict
+from .sampling import NotFiniteError, sample
 from .trajectory import Occurrence, Trajectory
 
 #: Evaluations of inputs that are not finite after which one of SciPy's methods is stopped.

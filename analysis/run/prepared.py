@@ -19,7 +19,8 @@ from ..numerics.workers import interruptible
 from .angles import WholeTurns
 from .equations import OUTPUTS, machine
 from .events import Event, RunInterrupted, shown
-from .inputs import Encoded, Inputs, NotFiniteError, align, compile_function, compiled_source, encode, given, sample
+from .inputs import Encoded, Inputs, align, compile_function, compiled_source, encode, given
+from .sampling import NotFiniteError, sample
 from .trajectory import Occurrence, Trajectory
 
 #: Steps of one compiled call, between which progress is shown and an interrupt is heard: about a tenth of a second.

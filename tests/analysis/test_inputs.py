@@ -11,7 +11,8 @@ from scipy.interpolate import CubicSpline
 
 from analysis.mechanisms import FIVE_BAR
 from analysis.run import Function, Harmonics, InductionMotor, Inputs, Piecewise, TorsionBar, ramp, steps, table
-from analysis.run.inputs import align, encode, release, sample
+from analysis.run.inputs import align, encode
+from analysis.run.sampling import release, sample
 from linkwork.errors import InputError
 
 REST = np.zeros(4)

@@ -33,7 +33,8 @@ from analysis import (
 )
 from analysis.mechanisms import FIVE_BAR
 from analysis.run import Event, compiled, prepared
-from analysis.run.inputs import encode, sample
+from analysis.run.inputs import encode
+from analysis.run.sampling import sample
 from analysis.run.simulation import SCIPY_METHODS
 from linkwork.errors import AssemblyError, InputError, ParameterError
 from linkwork.five_bar import dynamics

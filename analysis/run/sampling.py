@@ -1,0 +1,97 @@
+"""Inputs at a time, sampled in Python: what co-simulation, methods of SciPy and messages read."""
+
+from __future__ import annotations
+
+from itertools import chain
+
+import numpy as np
+from numpy.typing import NDArray
+
+from linkwork.errors import InputError
+
+from .inputs import NUMBER, Encoded
+
+
+class NotFiniteError(InputError):
+    """An input, by its number among the channels, is not a finite number at a time and a state."""
+
+    def __init__(self, encoded: Encoded, number: int, t: float, x: NDArray[np.float64]) -> None:
+        self.number = number
+        where = encoded.mechanism.where(x.tolist())
+        super().__init__(f"the input {encoded.value_name(number)} is not a finite number at t = {t:.9g} s, {where}")
+
+
+def sample(
+    encoded: Encoded,
+    t: float,
+    x: NDArray[np.float64],
+    law: NDArray[np.float64],
+    *,
+    left: bool = False,
+    ahead: float = -np.inf,
+) -> NDArray[np.float64]:
+    """The channels at time t and state x, sampled in Python; the user's functions are called as the Python they are.
+
+    Parameters
+    ----------
+    law : ndarray, shape (6,)
+        That of ``encoded``, or what has become of it.
+    left : bool
+        Whether the limit from the left is meant where an input jumps.
+    ahead : float
+        Where it is later than t, the channels are sampled at t and held until then (s): commanded
+        rates go along the secant, a torsion bar acts with the torque of the middle of the step, and ``law`` is overwritten
+        once it is released.
+
+    Raises
+    ------
+    NotFiniteError
+        If one of them is not a finite number.
+    """
+    from .sources import channels
+
+    x = np.ascontiguousarray(x)
+    if ahead > t:
+        release(encoded, x, law)
+    source = encoded.source._replace(law=law)
+    u = np.zeros(len(encoded.mechanism.channels))
+    channels(t, ahead, left, x, source, encoded.commands, u, np.empty_like(u))
+    here = np.zeros_like(u)
+    if any(chain.from_iterable(encoded.functions)):
+        here = of_functions(encoded, t, x)
+        u += here
+        if ahead > t and len(encoded.commands) and np.isfinite(here).all():
+            there = of_functions(encoded, ahead, x)
+            for value, _, rate in encoded.commands:
+                u[rate] += (there[value] - here[value]) / (ahead - t) - here[rate]
+    for lost in np.flatnonzero(~np.isfinite(u)):
+        # where inputs are held, a rate is the secant of a command
+        commands = {int(rate): int(value) for value, _, rate in encoded.commands}
+        secant = ahead > t and np.isfinite(here[lost])
+        raise NotFiniteError(encoded, commands.get(int(lost), int(lost)) if secant else int(lost), t, x)
+    return u
+
+
+def named(encoded: Encoded, u: NDArray[np.float64]) -> dict[str, float]:
+    """The channels by their names in the FMI contract."""
+    return dict(zip(encoded.mechanism.input_names, u.tolist()))
+
+
+def release(encoded: Encoded, x: NDArray[np.float64], law: NDArray[np.float64]) -> None:
+    """Release a torsion bar, in ``law``, that at state x has turned as far as it was wound."""
+    if law[2] and x[encoded.source.law_places[1]] >= law[1]:
+        law[2] = 0.0
+
+
+def of_functions(encoded: Encoded, t: float, x: NDArray[np.float64]) -> NDArray[np.float64]:
+    """What the user's functions add to the channels."""
+    added = np.zeros(len(encoded.mechanism.channels))
+    state = x[: 2 * len(encoded.mechanism.freedoms)].tolist()
+    for functions, places in zip(encoded.functions, encoded.source.places):
+        for function, place in zip(functions, places):
+            if function is not None:
+                value = function(t, *state)
+                if not isinstance(value, NUMBER):
+                    raise InputError(f"an input function returned {value!r} at t = {t:.9g} s: it must return a float")
+                added[place] += float(value)
+    return added
