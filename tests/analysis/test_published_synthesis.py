@@ -203,7 +203,6 @@ def test_goals(name: str) -> None:
     best = result.best
     error = p.convert(best.error)
     assert error <= p.goal
-    assert result.seconds < 30.0
     # by the thesis's own words, not the package's
     own = error_of(name, row_of(best.linkage), best.linkage.branch)
     assert error == pytest.approx(own, rel=1e-7 if name != "packaging" else 1e-3)
