@@ -9,7 +9,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from itertools import chain
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +20,7 @@ from linkwork.mechanism import Mechanism
 from .. import files
 from ..mechanisms import MECHANISMS, InitialState, variable_units
 from ..units import Units, si
-from .signals import Function, Harmonics, InductionMotor, Piecewise, StateFunction, TorsionBar
+from .signals import Function, Harmonics, InductionMotor, Piecewise, Source, StateFunction, TorsionBar
 
 #: What counts as a number.
 NUMBER = (int, float, np.floating, np.integer)
@@ -250,36 +250,6 @@ def given(mechanism: Mechanism, inputs: Inputs | None, initial: InitialState | N
             f"{wanted.__module__}.{wanted.__qualname__}"
         )
     return inputs, initial
-
-
-class Source(NamedTuple):
-    """`Inputs` as the arrays that the compiled code reads; a signal is a channel that is not the rate of another.
-
-    Attributes
-    ----------
-    breaks : ndarray, shape (n + 1,)
-        Times at which some signal's polynomial changes.
-    coefficients : ndarray, shape (n, signals, 4)
-        Polynomials of the signals between the breaks.
-    harmonics : ndarray, shape (m, 4)
-        Number of the signal, amplitude, frequency, phase.
-    places : ndarray of int, shape (signals, 2)
-        Numbers of the channels that are a signal and its rate, -1 where it has none.
-    law : ndarray, shape (6,)
-        Torsion bar: torque, release angle, 1 while it acts. Motor: breakdown torque and slip, synchronous speed.
-    law_places : ndarray of int, shape (3,)
-        Channel on which bar and motor act, and the components of the state that are its freedom's coordinate and rate.
-    functions : ndarray of int, shape (signals, 2)
-        Addresses of the user's compiled functions for a signal and its rate, or 0.
-    """
-
-    breaks: NDArray[np.float64]
-    coefficients: NDArray[np.float64]
-    harmonics: NDArray[np.float64]
-    places: NDArray[np.int64]
-    law: NDArray[np.float64]
-    law_places: NDArray[np.int64]
-    functions: NDArray[np.int64]
 
 
 @dataclass(frozen=True, slots=True)

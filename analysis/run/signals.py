@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -240,3 +240,33 @@ def _points(times: ArrayLike, values: ArrayLike, least: int) -> tuple[NDArray[np
     if np.any(np.diff(t) <= 0.0):
         raise InputError(f"a table's times must increase: they are {t}")
     return t, y, unit
+
+
+class Source(NamedTuple):
+    """All of `Inputs` as the arrays that the compiled code reads; a signal is a channel that is not the rate of another.
+
+    Attributes
+    ----------
+    breaks : ndarray, shape (n + 1,)
+        Times at which some signal's polynomial changes.
+    coefficients : ndarray, shape (n, signals, 4)
+        Polynomials of the signals between the breaks.
+    harmonics : ndarray, shape (m, 4)
+        Number of the signal, amplitude, frequency, phase.
+    places : ndarray of int, shape (signals, 2)
+        Numbers of the channels that are a signal and its rate, -1 where it has none.
+    law : ndarray, shape (6,)
+        Torsion bar: torque, release angle, 1 while it acts. Motor: breakdown torque and slip, synchronous speed.
+    law_places : ndarray of int, shape (3,)
+        Channel on which bar and motor act, and the components of the state that are its freedom's coordinate and rate.
+    functions : ndarray of int, shape (signals, 2)
+        Addresses of the user's compiled functions for a signal and its rate, or 0.
+    """
+
+    breaks: NDArray[np.float64]
+    coefficients: NDArray[np.float64]
+    harmonics: NDArray[np.float64]
+    places: NDArray[np.int64]
+    law: NDArray[np.float64]
+    law_places: NDArray[np.int64]
+    functions: NDArray[np.int64]

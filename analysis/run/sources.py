@@ -7,8 +7,7 @@ from math import cos, pi, sin
 from numba import boolean, float64, int64, types
 
 from ..numerics.codegen import CUBE, MATRIX, VECTOR, call_user, inner, kernel
-from .inputs import Source
-from .signals import kloss
+from .signals import Source, kloss
 
 _torque_of_motor = inner(kloss)
 
